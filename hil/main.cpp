@@ -1,0 +1,109 @@
+// g++ 12 sees a null pointer in CLI11's inlined std::vector growth, where there is none.
+#pragma GCC diagnostic ignored "-Wnull-dereference"
+
+#include <fmt/format.h>
+
+#include <CLI/CLI.hpp>
+#include <cstdint>
+#include <cstdio>
+#include <exception>
+#include <filesystem>
+#include <stdexcept>
+#include <string>
+#include <vector>
+
+#include "hil/plant/parameters.hpp"
+#include "hil/plant/recorder.hpp"
+
+namespace {
+
+namespace plant = flexspline::plant;
+
+struct RecordOptions {
+  std::string out;
+  std::string plant_file;
+  std::string hide;
+  std::vector<std::string> with;
+  double scale = 1.0;
+  double friction_variation = -1.0;
+  double noise_correlation = -1.0;
+  bool tachometer = false;
+  bool force = false;
+  std::uint64_t seed = 1;
+};
+
+plant::PlantFile open_plant(const std::string& file) {
+  return file.empty() ? plant::demo_plant() : plant::load_plant(file);
+}
+
+void record(const RecordOptions& options) {
+  plant::PlantFile file = open_plant(options.plant_file);
+  plant::Drive& drive = file.drive;
+  for (const std::string& name : options.with) plant::with(drive, name);
+  if (!options.hide.empty()) plant::hide(drive, options.hide, options.scale);
+  if (options.friction_variation >= 0.0) drive.friction_variation = options.friction_variation;
+  if (options.noise_correlation >= 0.0) {
+    drive.sensors.current.correlation = options.noise_correlation;
+    drive.sensors.torque.correlation = options.noise_correlation;
+    drive.sensors.tachometer.correlation = options.noise_correlation;
+  }
+  if (options.tachometer) drive.sensors.has_tachometer = true;
+  if (file.experiments.empty()) throw std::runtime_error("the plant file has no [[experiment]]; add one to record");
+  if (!options.force && std::filesystem::exists(options.out) && !std::filesystem::is_empty(options.out)) {
+    throw std::runtime_error(options.out +
+                             ": is there and not empty; give another folder, or --force to write into it");
+  }
+  plant::write_dataset(plant::record_all(drive, file.experiments, options.seed), drive, options.out);
+  fmt::print("{} experiments in {}\n", file.experiments.size(), options.out);
+}
+
+void list_effects(const std::string& plant_file) {
+  const plant::PlantFile file = open_plant(plant_file);
+  fmt::print("effects of {} (* = part of the drive as it is):\n", file.drive.name);
+  for (const plant::Effect& effect : file.drive.effects) {
+    std::string values;
+    for (const plant::Parameter& p : effect.parameters) {
+      if (p.key != "order") values += fmt::format("{}{} {:g} {}", values.empty() ? "" : ", ", p.key, p.value, p.unit);
+    }
+    fmt::print("{} {:<26} {}{}\n", effect.present ? '*' : ' ', effect.label(), values,
+               effect.catalogue ? "" : "   (in no catalogue)");
+  }
+}
+
+}  // namespace
+
+int main(int argc, char** argv) {
+  CLI::App app{"The twin of a strain-wave drive: records measurements of a drive whose truth is known."};
+  app.require_subcommand(1);
+  RecordOptions options;
+  CLI::App* record_command =
+      app.add_subcommand("record", "simulates the experiments of a plant file and writes a data set");
+  record_command->add_option("--out", options.out, "folder to write into")->required();
+  record_command->add_option("--plant", options.plant_file, "plant file (default: the demo's drive, built in)");
+  record_command->add_option("--hide", options.hide, "effect that the base model does not name, as torque_ripple:2");
+  record_command->add_option("--scale", options.scale, "size of the hidden effect, 1 = usual")->needs("--hide");
+  record_command->add_option("--with", options.with, "effects that the drive has and the base model names, A,B")
+      ->delimiter(',');
+  record_command
+      ->add_option("--friction-variation", options.friction_variation, "relative std of friction from record to record")
+      ->check(CLI::Range(0.0, 0.3));
+  record_command->add_option("--noise-correlation", options.noise_correlation, "AR(1) coefficient of the noise")
+      ->check(CLI::Range(0.0, 0.999));
+  record_command->add_flag("--tachometer", options.tachometer, "record a tachometer, too");
+  record_command->add_option("--seed", options.seed, "of all chance (default 1)");
+  record_command->add_flag("--force", options.force, "write into a folder that is not empty");
+  record_command->footer("Example: flexspline-hil record --out data --hide stribeck_gaussian --seed 7");
+  record_command->callback([&] { record(options); });
+  CLI::App* effects_command = app.add_subcommand("effects", "lists what can be hidden");
+  effects_command->add_option("--plant", options.plant_file, "plant file (default: the demo's drive, built in)");
+  effects_command->callback([&] { list_effects(options.plant_file); });
+  try {
+    app.parse(argc, argv);
+  } catch (const CLI::ParseError& error) {
+    return app.exit(error) == 0 ? 0 : 2;
+  } catch (const std::exception& error) {
+    fmt::print(stderr, "flexspline-hil: {}\n", error.what());
+    return 2;
+  }
+  return 0;
+}

@@ -1,0 +1,84 @@
+#include "hil/plant/friction.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <numbers>
+
+namespace flexspline::plant {
+namespace {
+
+constexpr double kNegligibleExponent = 45.0;
+
+void add_stribeck(const Stribeck& term, const FrictionPoint& at, double speed, FrictionTorque& sum) {
+  const double ratio = speed / term.velocity;
+  const double power = term.exponent == 2.0 ? ratio * ratio : std::pow(ratio, term.exponent);
+  if (power > kNegligibleExponent) return;
+  const double height = (at.direction > 0.0 ? term.positive : term.negative) * std::exp(-power);
+  sum.torque += at.direction * height;
+  // d|w|/dw equals the direction, whose square is 1.
+  sum.by_velocity -= height * term.exponent * power / std::max(speed, 1e-9);
+}
+
+void add_triangle(const TriangleRipple& term, double angle, FrictionTorque& sum) {
+  const double turns = (term.order * angle + term.phase) / (2.0 * std::numbers::pi) + 0.25;
+  const double fraction = turns - std::floor(turns);
+  const double slope = 4.0 * term.amplitude * term.order / (2.0 * std::numbers::pi);
+  const bool rising = fraction < 0.5;
+  sum.torque += term.amplitude * (rising ? 4.0 * fraction - 1.0 : 3.0 - 4.0 * fraction);
+  sum.by_angle += rising ? slope : -slope;
+}
+
+}  // namespace
+
+double MotorFriction::viscous_factor(double temperature_c) const {
+  return std::exp(-temperature_coefficient * (temperature_c - temperature_reference));
+}
+
+double MotorFriction::bristle(const FrictionPoint& at) const {
+  if (dahl_presliding <= 0.0) return 0.0;
+  const double limit = at.direction * dahl_presliding;
+  return limit + (at.bristle - limit) * std::exp(-at.direction * (at.angle - at.anchor) / dahl_presliding);
+}
+
+FrictionTorque MotorFriction::evaluate(const FrictionPoint& at, double viscous_now) const {
+  const double s = at.direction;
+  // On its branch the law goes on smoothly past w = 0, so that a solver can look beyond an event before it locates it.
+  const double along = s * at.velocity;
+  const double speed = std::abs(at.velocity);
+  FrictionTorque sum;
+  sum.torque = viscous_now * at.velocity + viscous_asymmetry * along + coulomb_asymmetry;
+  sum.by_velocity = viscous_now + viscous_asymmetry * s;
+  if (dahl_torque > 0.0) {
+    const double z = bristle(at);
+    const double stiffness = dahl_torque / dahl_presliding;
+    sum.torque += stiffness * z;
+    sum.by_angle += stiffness * (1.0 - s * z / dahl_presliding);
+  } else {
+    sum.torque += s * coulomb;
+  }
+  for (const Stribeck& term : stribeck) add_stribeck(term, at, speed, sum);
+  if (power_torque != 0.0) {
+    const double value = power_torque * std::pow(speed / power_reference, power_exponent);
+    sum.torque += along >= 0.0 ? s * value : -s * value;
+    sum.by_velocity += value * power_exponent / std::max(speed, 1e-9);
+  }
+  for (const LoadFriction& term : load) {
+    const double magnitude = std::abs(at.torque);
+    const double ratio = magnitude / term.reference;
+    const double power = term.exponent == 1.0 ? ratio : std::pow(ratio, term.exponent);
+    const double value = term.coefficient * term.reference * power / gear_ratio;
+    sum.torque += s * value;
+    const double slope = term.exponent * value / std::max(magnitude, 1e-9);
+    sum.by_torque += s * (at.torque >= 0.0 ? slope : -slope);
+  }
+  for (const Ripple& term : ripple) {
+    const double c = std::cos(term.order * at.angle);
+    const double d = std::sin(term.order * at.angle);
+    sum.torque += term.cosine * c + term.sine * d;
+    sum.by_angle += term.order * (term.sine * c - term.cosine * d);
+  }
+  for (const TriangleRipple& term : triangle_ripple) add_triangle(term, at.angle, sum);
+  return sum;
+}
+
+}  // namespace flexspline::plant

@@ -1,0 +1,82 @@
+#pragma once
+
+#include <vector>
+
+namespace flexspline::plant {
+
+/// s F exp(-|w/vs|^exponent), F by direction. The exponent is 2 for the usual Gaussian form.
+struct Stribeck {
+  double positive = 0.0;
+  double negative = 0.0;
+  double velocity = 1.0;
+  double exponent = 2.0;
+};
+
+/// s coefficient Tref |T/Tref|^exponent / N; with exponent 1 Tref cancels.
+struct LoadFriction {
+  double coefficient = 0.0;
+  double exponent = 1.0;
+  double reference = 1.0;
+};
+
+/// cosine cos(k q) + sine sin(k q)
+struct Ripple {
+  double order = 0.0;
+  double cosine = 0.0;
+  double sine = 0.0;
+};
+
+/// amplitude times a triangular wave of k q + phase, zero and rising where that is zero
+struct TriangleRipple {
+  double order = 0.0;
+  double amplitude = 0.0;
+  double phase = 0.0;
+};
+
+/// What the friction on the motor shaft is evaluated at.
+struct FrictionPoint {
+  double direction = 0.0;  ///< +1 or -1: the branch of the set-valued sign
+  double velocity = 0.0;   ///< motor rad/s
+  double torque = 0.0;     ///< through the flexspline, output side, N m
+  double angle = 0.0;      ///< motor rad
+  double anchor = 0.0;     ///< motor angle at which the bristle stood at `bristle`
+  double bristle = 0.0;    ///< bristle deflection at the anchor, rad
+};
+
+/// Torque that resists positive motion, and its partial derivatives.
+struct FrictionTorque {
+  double torque = 0.0;
+  double by_velocity = 0.0;
+  double by_torque = 0.0;
+  double by_angle = 0.0;
+};
+
+/// Everything that stands between Km i and J a + T/N on the motor shaft, apart from inertia.
+struct MotorFriction {
+  double gear_ratio = 100.0;
+  double viscous = 0.0;
+  double viscous_asymmetry = 0.0;
+  double coulomb = 0.0;
+  double coulomb_asymmetry = 0.0;
+  double power_torque = 0.0;
+  double power_exponent = 1.0;
+  double power_reference = 1.0;
+  double temperature_coefficient = 0.0;
+  double temperature_reference = 0.0;
+  double dahl_torque = 0.0;
+  double dahl_presliding = 0.0;
+  std::vector<Stribeck> stribeck;
+  std::vector<LoadFriction> load;
+  std::vector<Ripple> ripple;
+  std::vector<TriangleRipple> triangle_ripple;
+
+  /// Factor on the viscous coefficient at a temperature, exp(-b (temp - temp0)).
+  double viscous_factor(double temperature_c) const;
+  /// `viscous_now` is the viscous coefficient at the present temperature.
+  FrictionTorque evaluate(const FrictionPoint& at, double viscous_now) const;
+  /// Bristle deflection after the shaft went, in one direction, from the anchor to `angle`: the rate-independent law
+  /// dz/dq = 1 - s z/presliding, solved exactly.
+  double bristle(const FrictionPoint& at) const;
+};
+
+}  // namespace flexspline::plant

@@ -1,0 +1,29 @@
+#pragma once
+
+#include <cstdint>
+#include <vector>
+
+#include "hil/plant/parameters.hpp"
+
+namespace flexspline::plant {
+
+/// A stream of numbers that depends on nothing but its three keys, so that switching one sensor on leaves the noise of
+/// the others as it was.
+std::uint64_t stream_seed(std::uint64_t seed, std::uint64_t record, std::uint64_t stream);
+
+/// Standard deviation of a sensor's noise on a column with this peak.
+double noise_std(const Sensor& sensor, const std::vector<double>& truth);
+
+/// Adds noise of the sensor's colour and standard deviation `std` to a column.
+void add_noise(const Sensor& sensor, double std, std::uint64_t seed, std::vector<double>& column);
+
+/// The column late by `delay_samples`, interpolated linearly; before the record it holds its first value.
+void delay(double delay_samples, std::vector<double>& column);
+
+/// The column late by `delay_samples`, interpolated by cubics through value and rate (per sample).
+void delay(double delay_samples, const std::vector<double>& rate_per_sample, std::vector<double>& column);
+
+/// Angles rounded to counts per turn.
+void quantise(int counts_per_turn, std::vector<double>& column);
+
+}  // namespace flexspline::plant

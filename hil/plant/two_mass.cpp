@@ -1,0 +1,356 @@
+#include "hil/plant/two_mass.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <numbers>
+#include <stdexcept>
+#include <utility>
+
+namespace flexspline::plant {
+namespace {
+
+// The L-stable, stiffly accurate SDIRK pair of order two (Alexander 1977): the last stage is the step.
+constexpr double kGamma = 1.0 - std::numbers::sqrt2 / 2.0;
+constexpr double kCarry = (1.0 - kGamma) / kGamma;
+
+constexpr int kNewtonLimit = 40;
+constexpr int kEventLimit = 24;
+constexpr int kLocateLimit = 60;
+constexpr double kMotorStopTolerance = 1e-12;   // rad/s
+constexpr double kOutputStopTolerance = 1e-14;  // rad/s
+constexpr double kBreakTolerance = 1e-12;       // N m
+
+}  // namespace
+
+TwoMass::TwoMass(Physics physics, bool locked, State initial)
+    : physics_(std::move(physics)), locked_(locked), state_(initial) {
+  const bool usable = physics_.motor_inertia > 0.0 && physics_.stiffness > 0.0 && physics_.gear_ratio > 0.0 &&
+                      physics_.damping_exponent > 0.0 && (locked_ || physics_.output_inertia > 0.0);
+  if (!usable) {
+    throw std::invalid_argument(
+        "plant: inertias, stiffness, gear ratio and damping exponent must be positive; check the plant's effects");
+  }
+  if (locked_) {
+    state_.output_angle = 0.0;
+    state_.output_velocity = 0.0;
+  }
+  const auto direction = [](double velocity) { return velocity > 0.0 ? 1 : (velocity < 0.0 ? -1 : 0); };
+  state_.motor_direction = direction(state_.motor_velocity);
+  state_.output_direction = direction(state_.output_velocity);
+  state_.damping = damping_of(state_.motor_velocity / physics_.gear_ratio - state_.output_velocity);
+}
+
+TwoMass::Spring TwoMass::spring(double torsion) const {
+  const double gap = physics_.backlash_half_width;
+  double stretch = torsion;
+  double open = 1.0;
+  if (gap > 0.0) {
+    stretch = torsion > gap ? torsion - gap : (torsion < -gap ? torsion + gap : 0.0);
+    if (stretch == 0.0) open = 0.0;
+  }
+  const double square = stretch * stretch;
+  return {stretch * (physics_.stiffness + physics_.cubic_stiffness * square),
+          open * (physics_.stiffness + 3.0 * physics_.cubic_stiffness * square)};
+}
+
+double TwoMass::rate_of(double damping) const {
+  const double magnitude = std::abs(damping);
+  if (physics_.damping_exponent == 0.5) return damping * magnitude;
+  return std::copysign(std::pow(magnitude, 1.0 / physics_.damping_exponent), damping);
+}
+
+double TwoMass::damping_of(double rate) const {
+  return std::copysign(std::pow(std::abs(rate), physics_.damping_exponent), rate);
+}
+
+double TwoMass::torque(const State& s) const {
+  return spring(s.motor_angle / physics_.gear_ratio - s.output_angle).torque + physics_.damping_torque * s.damping;
+}
+
+double TwoMass::gravity(double angle) const {
+  if (physics_.gravity_cosine == 0.0 && physics_.gravity_sine == 0.0) return 0.0;
+  return physics_.gravity_cosine * std::cos(angle) + physics_.gravity_sine * std::sin(angle);
+}
+
+FrictionPoint TwoMass::friction_point(const State& s, double direction) const {
+  return {direction, s.motor_velocity, torque(s), s.motor_angle, s.motor_angle, s.bristle};
+}
+
+// Newton's method on motor velocity, output velocity and signed damping power. Using the power as the unknown keeps the
+// equations smooth where |v|^alpha has an infinite slope, and well scaled where the torsion rate is next to nothing.
+bool TwoMass::solve_stage(const Stage& stage, const State& start, State& s) const {
+  const double n = physics_.gear_ratio;
+  const double g = stage.weight;
+  const bool motor_moves = s.motor_direction != 0;
+  const bool output_moves = !locked_ && s.output_direction != 0;
+  if (!motor_moves) s.motor_velocity = 0.0;
+  if (!output_moves) s.output_velocity = 0.0;
+  s.motor_angle = stage.motor_angle + g * s.motor_velocity;
+  s.output_angle = stage.output_angle + g * s.output_velocity;
+  if (!motor_moves && !output_moves) {
+    s.damping = 0.0;
+    return true;
+  }
+  const double c = physics_.damping_torque;
+  const bool damped = c > 0.0;
+  const double inverse_exponent = 1.0 / physics_.damping_exponent;
+  const double coulomb = s.output_direction * physics_.output_coulomb;
+  if (!damped) s.damping = 0.0;
+  for (int iteration = 0; iteration < kNewtonLimit; ++iteration) {
+    s.motor_angle = stage.motor_angle + g * s.motor_velocity;
+    s.output_angle = stage.output_angle + g * s.output_velocity;
+    const Spring elastic = spring(s.motor_angle / n - s.output_angle);
+    const double t = elastic.torque + c * s.damping;
+    // Newton step: dw = motor_free - motor_gain dT, dwo = output_free + output_gain dT, dT = ks dv + c du.
+    double motor_free = 0.0, motor_gain = 0.0, output_free = 0.0, output_gain = 0.0;
+    if (motor_moves) {
+      const FrictionTorque f = physics_.friction.evaluate({static_cast<double>(s.motor_direction), s.motor_velocity, t,
+                                                           s.motor_angle, start.motor_angle, start.bristle},
+                                                          viscous_);
+      const double residual =
+          physics_.motor_inertia * (s.motor_velocity - stage.motor_velocity) - g * (motor_drive_ - f.torque - t / n);
+      const double slope = physics_.motor_inertia + g * (f.by_velocity + g * f.by_angle);
+      motor_free = -residual / slope;
+      motor_gain = g * (1.0 / n + f.by_torque) / slope;
+    }
+    if (output_moves) {
+      const double residual = physics_.output_inertia * (s.output_velocity - stage.output_velocity) -
+                              g * (t - physics_.output_viscous * s.output_velocity - coulomb - gravity(s.output_angle) -
+                                   inputs_.load_torque_nm);
+      const double gravity_slope =
+          physics_.gravity_sine * std::cos(s.output_angle) - physics_.gravity_cosine * std::sin(s.output_angle);
+      const double slope = physics_.output_inertia + g * (physics_.output_viscous + g * gravity_slope);
+      output_free = -residual / slope;
+      output_gain = g / slope;
+    }
+    const double rate_free = motor_free / n - output_free;
+    const double rate_gain = motor_gain / n + output_gain;
+    const double ks = elastic.slope * g;
+    double torque_step = 0.0;
+    double damping_step = 0.0;
+    if (damped) {
+      const double mismatch = s.motor_velocity / n - s.output_velocity - rate_of(s.damping);
+      const double magnitude = std::abs(s.damping);
+      const double slope = physics_.damping_exponent == 0.5
+                               ? 2.0 * magnitude
+                               : inverse_exponent * std::pow(std::max(magnitude, 1e-12), inverse_exponent - 1.0);
+      damping_step = (rate_free + mismatch * (1.0 + rate_gain * ks)) / (slope + rate_gain * (ks * slope + c));
+      torque_step = ks * (slope * damping_step - mismatch) + c * damping_step;
+    } else {
+      torque_step = ks * rate_free / (1.0 + rate_gain * ks);
+    }
+    const double motor_step = motor_free - motor_gain * torque_step;
+    const double output_step = output_free + output_gain * torque_step;
+    s.motor_velocity += motor_step;
+    s.output_velocity += output_step;
+    s.damping += damping_step;
+    if (!std::isfinite(s.motor_velocity + s.output_velocity + s.damping)) return false;
+    if (std::abs(motor_step) <= 1e-8 * (1.0 + 1e-3 * std::abs(s.motor_velocity)) && std::abs(output_step) <= 1e-10 &&
+        std::abs(damping_step) <= 1e-8) {
+      s.motor_angle = stage.motor_angle + g * s.motor_velocity;
+      s.output_angle = stage.output_angle + g * s.output_velocity;
+      return true;
+    }
+  }
+  return false;
+}
+
+bool TwoMass::try_step(const State& from, double h, State& to) const {
+  const double g = kGamma * h;
+  to = from;
+  const Stage first{from.motor_angle, from.motor_velocity, from.output_angle, from.output_velocity, g};
+  if (!solve_stage(first, from, to)) return false;
+  const auto carry = [](double before, double after) { return before + kCarry * (after - before); };
+  const Stage second{carry(from.motor_angle, to.motor_angle), carry(from.motor_velocity, to.motor_velocity),
+                     carry(from.output_angle, to.output_angle), carry(from.output_velocity, to.output_velocity), g};
+  if (!solve_stage(second, from, to)) return false;
+  if (to.motor_direction != 0) {
+    FrictionPoint at = friction_point(to, to.motor_direction);
+    at.anchor = from.motor_angle;
+    at.bristle = from.bristle;
+    to.bristle = physics_.friction.bristle(at);
+  }
+  return true;
+}
+
+// How far a state is from the event: negative means that it has happened.
+double TwoMass::margin(Event event, const State& s) const {
+  switch (event) {
+    case Event::motor_stop:
+      return s.motor_direction == 0 ? 1.0 : s.motor_direction * s.motor_velocity;
+    case Event::output_stop:
+      return s.output_direction == 0 ? 1.0 : s.output_direction * s.output_velocity;
+    case Event::motor_break: {
+      if (s.motor_direction != 0) return 1.0;
+      const double need = motor_drive_ - torque(s) / physics_.gear_ratio;
+      return std::min(physics_.friction.evaluate(friction_point(s, 1.0), viscous_).torque - need,
+                      need - physics_.friction.evaluate(friction_point(s, -1.0), viscous_).torque);
+    }
+    case Event::output_break: {
+      if (locked_ || s.output_direction != 0) return 1.0;
+      return physics_.output_coulomb - std::abs(torque(s) - gravity(s.output_angle) - inputs_.load_torque_nm);
+    }
+    case Event::none:
+      break;
+  }
+  return 1.0;
+}
+
+int TwoMass::choose_motor_direction(const State& s) const {
+  const double need = motor_drive_ - torque(s) / physics_.gear_ratio;
+  const double forward = physics_.friction.evaluate(friction_point(s, 1.0), viscous_).torque;
+  const double backward = physics_.friction.evaluate(friction_point(s, -1.0), viscous_).torque;
+  if (forward > backward) return need > forward ? 1 : (need < backward ? -1 : 0);
+  // No static friction (a bristle carries it): the shaft never sticks, it only turns round.
+  return need >= 0.5 * (forward + backward) ? 1 : -1;
+}
+
+int TwoMass::choose_output_direction(const State& s) const {
+  if (locked_) return 0;
+  const double need = torque(s) - gravity(s.output_angle) - inputs_.load_torque_nm;
+  if (physics_.output_coulomb > 0.0)
+    return need > physics_.output_coulomb ? 1 : (need < -physics_.output_coulomb ? -1 : 0);
+  return need >= 0.0 ? 1 : -1;
+}
+
+// A shaft at rest takes the branch that its torques ask for.
+void TwoMass::settle(State& s) const {
+  if (s.motor_velocity == 0.0) s.motor_direction = choose_motor_direction(s);
+  if (s.output_velocity == 0.0) s.output_direction = choose_output_direction(s);
+}
+
+// A shaft released at the start of a step may come out moving against its branch, where a stiff torque decays within
+// the step. Then it sticks for this step if friction can hold it at the end, else it leaves the other way.
+void TwoMass::resolve_resting(State& s, double h) const {
+  State end;
+  const auto retry = [&](int State::*direction, double State::*velocity, Event stop, Event breaks) {
+    if (s.*velocity != 0.0 || s.*direction == 0) return;
+    if (!try_step(s, h, end) || margin(stop, end) >= 0.0) return;
+    const int asked = s.*direction;
+    s.*direction = 0;
+    if (try_step(s, h, end) && margin(breaks, end) < 0.0) s.*direction = -asked;
+  };
+  retry(&State::motor_direction, &State::motor_velocity, Event::motor_stop, Event::motor_break);
+  retry(&State::output_direction, &State::output_velocity, Event::output_stop, Event::output_break);
+}
+
+// Time at which the margin of an event passes zero between 0 and h: regula falsi with the Illinois modification.
+double TwoMass::locate(Event event, const State& from, double h, const State& at_h) const {
+  double low = 0.0, high = h;
+  double low_margin = std::max(margin(event, from), 0.0);
+  double high_margin = margin(event, at_h);
+  const bool stop = event == Event::motor_stop || event == Event::output_stop;
+  const double tolerance =
+      !stop ? kBreakTolerance : (event == Event::motor_stop ? kMotorStopTolerance : kOutputStopTolerance);
+  int side = 0;
+  State trial;
+  double missed = high_margin;
+  for (int i = 0; i < kLocateLimit && missed < -tolerance && high - low > 1e-15; ++i) {
+    double middle = low + (high - low) * low_margin / (low_margin - high_margin);
+    if (i > 20 || !(middle > low && middle < high)) middle = 0.5 * (low + high);
+    if (!try_step(from, middle, trial)) middle = 0.5 * (low + high);
+    const double value = margin(event, trial);
+    if (value < 0.0) {
+      high = middle;
+      high_margin = missed = value;
+      if (side == -1) low_margin *= 0.5;
+      side = -1;
+    } else {
+      low = middle;
+      low_margin = value;
+      if (side == 1) high_margin *= 0.5;
+      side = 1;
+      // A shaft that has almost stopped may be stopped here; sticking that ends must be past its limit.
+      if (stop && value <= tolerance) return low;
+    }
+  }
+  return high;
+}
+
+TwoMass::Event TwoMass::first_event(const State& from, double h, State& to, double& taken) const {
+  constexpr Event kEvents[] = {Event::motor_stop, Event::output_stop, Event::motor_break, Event::output_break};
+  taken = h;
+  Event first = Event::none;
+  for (const Event event : kEvents) {
+    if (event == first || margin(event, to) >= 0.0) continue;
+    const double at = locate(event, from, taken, to);
+    if (!try_step(from, at, to)) throw std::runtime_error("plant: a step to an event did not converge");
+    taken = at;
+    first = event;
+  }
+  return first;
+}
+
+void TwoMass::take_step(double h) {
+  double remaining = h;
+  double piece = h;
+  for (int events = 0; remaining > 1e-13; ++events) {
+    settle(state_);
+    piece = std::min(piece, remaining);
+    resolve_resting(state_, piece);
+    State to;
+    if (!try_step(state_, piece, to)) {
+      piece *= 0.25;
+      if (piece < 1e-12 * h) {
+        throw std::runtime_error("plant: the implicit step does not converge; check the effects' parameters");
+      }
+      continue;
+    }
+    if (events > kEventLimit) {
+      // Events accumulate: stop whatever turned round and go on with the end of the piece.
+      if (margin(Event::motor_stop, to) < 0.0) to.motor_velocity = 0.0;
+      if (margin(Event::output_stop, to) < 0.0) to.output_velocity = 0.0;
+      state_ = to;
+      remaining -= piece;
+      piece = remaining;
+      continue;
+    }
+    double taken = piece;
+    const Event event = first_event(state_, piece, to, taken);
+    state_ = to;
+    const double n = physics_.gear_ratio;
+    if (event == Event::motor_stop || event == Event::output_stop) {
+      (event == Event::motor_stop ? state_.motor_velocity : state_.output_velocity) = 0.0;
+      state_.damping = damping_of(state_.motor_velocity / n - state_.output_velocity);
+    } else if (event == Event::motor_break || event == Event::output_break) {
+      settle(state_);
+    }
+    remaining -= taken;
+    piece = remaining;
+  }
+}
+
+void TwoMass::advance(const Inputs& inputs, double duration_s, int steps) {
+  inputs_ = inputs;
+  motor_drive_ = physics_.torque_constant * inputs.current_a;
+  viscous_ = physics_.friction.viscous * physics_.friction.viscous_factor(inputs.temperature_c);
+  const double h = duration_s / steps;
+  for (int i = 0; i < steps; ++i) take_step(h);
+}
+
+double TwoMass::motor_acceleration(const Inputs& inputs) const {
+  const double drive = physics_.torque_constant * inputs.current_a - torque() / physics_.gear_ratio;
+  const double viscous = physics_.friction.viscous * physics_.friction.viscous_factor(inputs.temperature_c);
+  int direction = state_.motor_direction;
+  if (direction == 0) {
+    const double forward = physics_.friction.evaluate(friction_point(state_, 1.0), viscous).torque;
+    const double backward = physics_.friction.evaluate(friction_point(state_, -1.0), viscous).torque;
+    direction = drive > forward ? 1 : (drive < backward ? -1 : 0);
+    if (direction == 0) return 0.0;
+  }
+  return (drive - physics_.friction.evaluate(friction_point(state_, direction), viscous).torque) /
+         physics_.motor_inertia;
+}
+
+double TwoMass::energy() const {
+  const double torsion = state_.motor_angle / physics_.gear_ratio - state_.output_angle;
+  const double stretch = std::copysign(std::max(std::abs(torsion) - physics_.backlash_half_width, 0.0), torsion);
+  const double square = stretch * stretch;
+  return 0.5 * physics_.motor_inertia * state_.motor_velocity * state_.motor_velocity +
+         0.5 * physics_.output_inertia * state_.output_velocity * state_.output_velocity +
+         square * (0.5 * physics_.stiffness + 0.25 * physics_.cubic_stiffness * square) +
+         physics_.gravity_cosine * std::sin(state_.output_angle) -
+         physics_.gravity_sine * std::cos(state_.output_angle);
+}
+
+}  // namespace flexspline::plant

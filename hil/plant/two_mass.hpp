@@ -1,0 +1,101 @@
+#pragma once
+
+#include "hil/plant/friction.hpp"
+
+namespace flexspline::plant {
+
+/// The numbers of the two-mass drive (model 3 of the report), in SI units. Effects that are absent are zero.
+struct Physics {
+  double gear_ratio = 100.0;
+  double torque_constant = 0.0;
+  double motor_inertia = 0.0;
+  MotorFriction friction;
+  double stiffness = 0.0;
+  double cubic_stiffness = 0.0;
+  double backlash_half_width = 0.0;
+  double damping_torque = 0.0;  ///< at a torsion rate of 1 rad/s
+  double damping_exponent = 1.0;
+  double output_inertia = 0.0;
+  double output_viscous = 0.0;
+  double output_coulomb = 0.0;
+  double gravity_cosine = 0.0;
+  double gravity_sine = 0.0;
+};
+
+/// Positions and velocities of both shafts. `damping` is the signed power |v|^alpha s(v) of the torsion rate; it is
+/// carried along because it keeps its precision where v itself is too small to.
+struct State {
+  double motor_angle = 0.0;
+  double motor_velocity = 0.0;
+  double output_angle = 0.0;
+  double output_velocity = 0.0;
+  double damping = 0.0;
+  double bristle = 0.0;
+  int motor_direction = 0;  ///< branch of the friction: +1, -1, or 0 for exact sticking
+  int output_direction = 0;
+};
+
+struct Inputs {
+  double current_a = 0.0;  ///< true motor current, constant over the call
+  double temperature_c = 30.0;
+  double load_torque_nm = 0.0;  ///< on the output, positive resists
+};
+
+/// Motor, flexspline and load. Each step is an L-stable, second-order, two-stage implicit Runge-Kutta step on fixed
+/// branches of both frictions; where a velocity changes its sign or sticking ends inside it, the step is split there.
+class TwoMass {
+ public:
+  /// Only angles, velocities and bristle of `initial` count; the rest follows from them. Throws std::invalid_argument
+  /// for inertias, stiffness, gear ratio or damping exponent that are not positive.
+  TwoMass(Physics physics, bool locked, State initial = {});
+
+  /// Moves on by `duration_s` in `steps` equal steps.
+  void advance(const Inputs& inputs, double duration_s, int steps);
+
+  const State& state() const { return state_; }
+  const Physics& physics() const { return physics_; }
+  /// Torque through the flexspline, output side, N m.
+  double torque() const { return torque(state_); }
+  /// Motor acceleration at the present state with these inputs, rad/s^2.
+  double motor_acceleration(const Inputs& inputs) const;
+  /// Kinetic and spring energy with gravity's potential, J; the energy of a bristle is not in it.
+  double energy() const;
+
+ private:
+  struct Spring {
+    double torque;
+    double slope;
+  };
+  /// Known parts of one implicit stage: state = base + weight * rate(state).
+  struct Stage {
+    double motor_angle, motor_velocity, output_angle, output_velocity, weight;
+  };
+  enum class Event { none, motor_stop, output_stop, motor_break, output_break };
+
+  Spring spring(double torsion) const;
+  double torque(const State& s) const;
+  double rate_of(double damping) const;
+  double damping_of(double rate) const;
+  FrictionPoint friction_point(const State& s, double direction) const;
+  double gravity(double angle) const;
+  bool solve_stage(const Stage& stage, const State& start, State& s) const;
+  bool try_step(const State& from, double h, State& to) const;
+  void take_step(double h);
+  double margin(Event event, const State& s) const;
+  Event first_event(const State& from, double h, State& to, double& taken) const;
+  double locate(Event event, const State& from, double h, const State& at_h) const;
+  void settle(State& s) const;
+  int choose_motor_direction(const State& s) const;
+  int choose_output_direction(const State& s) const;
+  void resolve_resting(State& s, double h) const;
+  bool consistent(const State& from, const State& to) const;
+
+  Physics physics_;
+  bool locked_;
+  State state_;
+  Inputs inputs_;
+  double motor_drive_ = 0.0;  // Km i
+  double viscous_ = 0.0;
+};
+
+}  // namespace flexspline::plant

@@ -1,0 +1,77 @@
+// The effects of shared/effects as data: what the host does with an effect whose name it learns at run time.
+#pragma once
+
+#include <memory>
+#include <span>
+#include <string>
+#include <string_view>
+#include <vector>
+
+#include "host/numbers/dual.hpp"
+#include "host/numbers/real.hpp"
+#include "shared/effects/effect.hpp"
+
+namespace flexspline::catalogue {
+
+using effects::Balance;
+using effects::DriveConstants;
+using effects::Kind;
+using effects::Phase;
+using numbers::Dual;
+using numbers::Real;
+
+// An effect at work in a simulation: coefficients and inner state.
+class Instance {
+ public:
+  virtual ~Instance() = default;
+  virtual void shift(effects::Inputs<Real>&) const {}
+  virtual void modulate(effects::Inputs<Real>&) const {}
+  // Adds the effect's torques for these inputs, with its state as it stands.
+  virtual void evaluate(const effects::Inputs<Real>&, effects::Torques<Real>&) const {}
+  // The same with the state moved on from `before` to `now`, and left as it was.
+  virtual void evaluate_ahead(const effects::Inputs<Real>& now, const effects::Inputs<Real>& before,
+                              effects::Torques<Real>&) const = 0;
+  virtual void advance(const effects::Inputs<Real>& now, const effects::Inputs<Real>& before) = 0;
+};
+
+// What can be done with an effect along a whole record in number system N. `parameters` are in the order of the
+// catalogue; inner states start from rest at each call.
+template <class N>
+struct Along {
+  using Parameter = typename N::Parameter;
+  // Adds the effect's torque on `balance` at each sample of `inputs` to `torque` (N m), same length. Null for shifts and
+  // modulations.
+  void (*torque)(const Parameter* parameters, const DriveConstants<Parameter>& drive, Balance balance,
+                 std::span<const effects::Inputs<N>> inputs, typename N::Value* torque) = nullptr;
+  // Changes the inputs in place, as shifts and modulations do. Null for sources.
+  void (*change)(const Parameter* parameters, const DriveConstants<Parameter>& drive,
+                 std::span<effects::Inputs<N>> inputs) = nullptr;
+};
+
+struct Entry {
+  std::size_t id = 0;
+  const effects::Description* info = nullptr;
+  std::span<const effects::ParameterInfo> parameters;
+  bool has_state = false;
+  Along<Real> real;
+  Along<Dual> dual;
+  std::unique_ptr<Instance> (*make)(const double* parameters, const DriveConstants<double>& drive) = nullptr;
+
+  std::string_view name() const { return info->name; }
+  // Position of a parameter, or parameters.size() if there is none of that name.
+  std::size_t index_of(std::string_view parameter) const;
+  std::size_t count(Kind kind) const;
+};
+
+// All effects, by rising number.
+std::span<const Entry> all();
+// Null if there is none of that name.
+const Entry* find(std::string_view name);
+// As `find`, for names that are known to exist; throws std::out_of_range.
+const Entry& get(std::string_view name);
+
+// "a,b" to {"a", "b"}.
+std::vector<std::string_view> split_names(std::string_view names);
+bool names_contain(std::string_view names, std::string_view name);
+
+}  // namespace flexspline::catalogue

@@ -1,0 +1,26 @@
+// How small the residual of a perfect model would be, from the best source that the data offer.
+#pragma once
+
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "host/regression/balance_data.hpp"
+
+namespace flexspline::comparison {
+
+struct NoiseFloor {
+  std::optional<double> rmse;  // N m (N on a linear axis), over the rows of the record
+  std::string from = "none";   // periods, replicates, propagated, stated, none
+};
+
+// Floor of the residual of each range of `data.records()`, for a model with the values in `terms`. Sources, best first:
+// period-to-period variance where the motion repeats itself; replicates; stated noise and quantisation of the columns
+// propagated through the pipeline. Never extrapolated from above the band.
+std::vector<NoiseFloor> noise_floors(regression::BalanceData& data, const regression::Terms& terms,
+                                     const std::vector<const data::Experiment*>& experiments, const model::Drive& drive);
+
+// Of all records together, weighted by their rows; none where any record has none.
+NoiseFloor pooled(const std::vector<NoiseFloor>& floors, const std::vector<regression::RowRange>& records);
+
+}  // namespace flexspline::comparison

@@ -1,0 +1,196 @@
+#include "host/data/columns.hpp"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <numbers>
+
+#include "host/data/units.hpp"
+
+namespace flexspline::data {
+namespace {
+
+std::string listed(const std::vector<std::string>& names) {
+  std::string text;
+  for (const std::string& name : names) text += (text.empty() ? "" : ", ") + fmt::format("\"{}\"", name);
+  return text;
+}
+
+std::string near_column(std::string_view name) {
+  std::vector<std::string_view> ours = {"time_s"};
+  for (std::size_t i = 0; i < kColumns; ++i) ours.push_back(column_name(static_cast<Column>(i)));
+  return nearest(name, ours);
+}
+
+class Planner {
+ public:
+  Planner(const CsvFile& csv, std::string file, const DatasetToml* toml, Findings& findings)
+      : csv_(csv), file_(std::move(file)), toml_(toml), findings_(findings) {
+    if (toml_ != nullptr) plan_.mapping_file = toml_->file.string();
+  }
+
+  std::optional<ColumnPlan> plan() {
+    const bool has_time = find_time();
+    for (std::size_t i = 0; i < kColumns; ++i) find(static_cast<Column>(i));
+    list_unused();
+    if (has_time && plan_.columns.empty())
+      findings_.add(Severity::error, "missing_column", file_, csv_.header_line(), "",
+                    fmt::format("beside time, none of the columns is known; not used: {}", listed(plan_.unused)),
+                    "map them in dataset.toml: [columns.current_a] with source = \"NAME IN THE FILE\" and unit");
+    if (!has_time || plan_.columns.empty()) return std::nullopt;
+    return std::move(plan_);
+  }
+
+ private:
+  const ColumnMapping* mapping_of(std::string_view ours) const {
+    if (toml_ == nullptr) return nullptr;
+    const auto at = toml_->columns.find(std::string(ours));
+    return at == toml_->columns.end() ? nullptr : &at->second;
+  }
+
+  // Slot of the column of theirs with this name.
+  std::optional<std::size_t> slot(std::string_view theirs) {
+    const std::vector<std::string>& names = csv_.names();
+    const auto at = std::find(names.begin(), names.end(), theirs);
+    if (at == names.end()) return std::nullopt;
+    if (std::find(at + 1, names.end(), theirs) != names.end())
+      findings_.add(Severity::error, "header", file_, csv_.header_line(), std::string(theirs),
+                    "this name stands twice in the header", "rename one of the two");
+    const std::size_t index = static_cast<std::size_t>(at - names.begin());
+    const auto known = std::find(plan_.wanted.begin(), plan_.wanted.end(), index);
+    if (known != plan_.wanted.end()) return static_cast<std::size_t>(known - plan_.wanted.begin());
+    plan_.wanted.push_back(index);
+    plan_.wanted_names.emplace_back(theirs);
+    return plan_.wanted.size() - 1;
+  }
+
+  bool find_time() {
+    plan_.time.source = "time_s";
+    if (const ColumnMapping* mapping = mapping_of("time_s")) plan_.time = *mapping;
+    const std::optional<std::size_t> found = slot(plan_.time.source);
+    if (!found) {
+      findings_.add(Severity::error, "missing_column", file_, csv_.header_line(), "time_s",
+                    fmt::format("there is no column \"{}\" among {}", plan_.time.source, listed(csv_.names())),
+                    "name the column of time time_s, or map it in dataset.toml: [columns.time_s] with source and unit");
+      return false;
+    }
+    plan_.time_slot = *found;
+    return true;
+  }
+
+  void find(Column column) {
+    const std::string name(column_name(column));
+    const ColumnMapping* mapping = mapping_of(name);
+    PlannedColumn planned;
+    planned.column = column;
+    planned.mapped = mapping != nullptr;
+    planned.mapping.source = name;
+    if (mapping != nullptr) planned.mapping = *mapping;
+    const std::optional<std::size_t> found = slot(planned.mapping.source);
+    if (!found) {
+      if (mapping != nullptr)
+        findings_.add(Severity::warning, "mapping", file_, csv_.header_line(), name,
+                      fmt::format("the file has no column \"{}\" that it is mapped from, so it is not measured here",
+                                  planned.mapping.source),
+                      fmt::format("the columns are {}", listed(csv_.names())));
+      return;
+    }
+    planned.slot = *found;
+    plan_.columns.push_back(planned);
+  }
+
+  void list_unused() {
+    std::string nearly;
+    for (std::size_t i = 0; i < csv_.names().size(); ++i) {
+      const std::string& name = csv_.names()[i];
+      if (name.empty() || std::find(plan_.wanted.begin(), plan_.wanted.end(), i) != plan_.wanted.end()) continue;
+      plan_.unused.push_back(name);
+      const std::string near = column_from_name(name) ? "" : near_column(name);
+      if (!near.empty()) nearly += fmt::format("{}{} for {}", nearly.empty() ? "" : ", ", near, name);
+    }
+    if (plan_.unused.empty()) return;
+    findings_.add(nearly.empty() ? Severity::note : Severity::warning, "unused_column", file_, csv_.header_line(), "",
+                  fmt::format("not used: {}", listed(plan_.unused)),
+                  nearly.empty() ? "map those that matter in dataset.toml" : fmt::format("did you mean {}?", nearly));
+  }
+
+  const CsvFile& csv_;
+  std::string file_;
+  const DatasetToml* toml_;
+  Findings& findings_;
+  ColumnPlan plan_;
+};
+
+}  // namespace
+
+std::optional<ColumnPlan> plan_columns(const CsvFile& csv, const std::filesystem::path& path, const DatasetToml* toml,
+                                       Findings& findings) {
+  return Planner(csv, path.string(), toml, findings).plan();
+}
+
+namespace {
+
+struct UnitUse {
+  std::string_view ours;  // column name
+  Quantity quantity;
+  const ColumnMapping& mapping;
+  std::string file;
+};
+
+std::nullopt_t refuse(const UnitUse& use, const std::string& what, Findings& findings) {
+  findings.add(Severity::error, "mapping", use.file, use.mapping.line, std::string(use.ours), what,
+               fmt::format("write one of {}; or leave unit out and let scale convert", known_units(use.quantity)));
+  return std::nullopt;
+}
+
+// `per_count`: SI per encoder count, where the counts are known.
+std::optional<Conversion> convert(const UnitUse& use, std::optional<double> per_count, std::string_view counts_key,
+                                  Findings& findings) {
+  const ColumnMapping& mapping = use.mapping;
+  Conversion conversion{mapping.scale, mapping.offset};
+  if (mapping.unit.empty()) return conversion;
+  std::optional<Unit> unit = unit_from_text(mapping.unit);
+  if (!unit) return refuse(use, fmt::format("the unit \"{}\" is not known", mapping.unit), findings);
+  const bool counts = unit->quantity == Quantity::counts || unit->quantity == Quantity::counts_rate;
+  const bool rate = use.quantity == Quantity::angular_velocity || use.quantity == Quantity::velocity;
+  const bool position = use.quantity == Quantity::angle || use.quantity == Quantity::length;
+  if (counts && (unit->quantity == Quantity::counts ? position : rate)) {
+    if (!per_count) {
+      findings.add(Severity::error, "mapping", use.file, mapping.line, std::string(use.ours),
+                   fmt::format("its unit is {}, but {} is not given", mapping.unit, counts_key),
+                   fmt::format("write {} = NUMBER under [drive]", counts_key));
+      return std::nullopt;
+    }
+    unit->factor = *per_count;
+  } else if (are_sisters(unit->quantity, use.quantity)) {
+    if (mapping.scale == 1.0)
+      findings.add(
+          Severity::warning, "unit", use.file, mapping.line, std::string(use.ours),
+          fmt::format("its unit is {}, but {} are meant here and scale is 1", mapping.unit, si_unit(use.quantity)),
+          "write axis under [drive], or give the lever arm or pitch as scale");
+  } else if (unit->quantity != use.quantity) {
+    return refuse(use, fmt::format("the unit {} does not fit a column in {}", mapping.unit, si_unit(use.quantity)),
+                  findings);
+  }
+  conversion.factor = mapping.scale * unit->factor;
+  conversion.offset += mapping.scale * unit->offset;
+  return conversion;
+}
+
+}  // namespace
+
+std::optional<Conversion> conversion_of(const PlannedColumn& planned, const ColumnPlan& plan, Axis axis,
+                                        const Experiment& experiment, Findings& findings) {
+  const bool of_output = planned.column == Column::output_position || planned.column == Column::output_velocity;
+  const std::optional<double>& counts = of_output ? experiment.output_encoder_counts : experiment.encoder_counts;
+  std::optional<double> per_count;
+  if (counts) per_count = (axis == Axis::rotary ? 2.0 * std::numbers::pi : 1.0) / *counts;
+  return convert({column_name(planned.column), quantity_of(planned.column, axis), planned.mapping, plan.mapping_file},
+                 per_count, of_output ? "output_encoder_counts" : "encoder_counts", findings);
+}
+
+std::optional<Conversion> time_conversion(const ColumnPlan& plan, Findings& findings) {
+  return convert({"time_s", Quantity::time, plan.time, plan.mapping_file}, std::nullopt, "", findings);
+}
+
+}  // namespace flexspline::data

@@ -1,0 +1,149 @@
+#include "host/data/findings.hpp"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <array>
+#include <numeric>
+
+namespace flexspline::data {
+namespace {
+
+constexpr std::array kKinds = {
+    KindInfo{"file", Severity::error, false},
+    KindInfo{"format", Severity::error, false},
+    KindInfo{"header", Severity::error, false},
+    KindInfo{"key", Severity::error, false},
+    KindInfo{"mapping", Severity::error, false},
+    KindInfo{"tolerate", Severity::error, false},
+    KindInfo{"text_in_number", Severity::error, false},
+    KindInfo{"not_finite", Severity::error, true},
+    KindInfo{"row_length", Severity::error, true},
+    KindInfo{"time_not_increasing", Severity::error, false},
+    KindInfo{"missing_column", Severity::error, false},
+    KindInfo{"too_few_samples", Severity::error, false},
+    KindInfo{"velocity_position_mismatch", Severity::error, true},
+    KindInfo{"wrapped_position", Severity::error, true},
+    KindInfo{"jitter", Severity::warning, true},
+    KindInfo{"conflict", Severity::error, true},
+    KindInfo{"gap", Severity::warning, false},
+    KindInfo{"clipping", Severity::warning, false},
+    KindInfo{"standstill", Severity::warning, false},
+    KindInfo{"constant_column", Severity::warning, false},
+    KindInfo{"unit", Severity::warning, false},
+    KindInfo{"gear_ratio", Severity::warning, false},
+    KindInfo{"key_differs", Severity::warning, false},
+    KindInfo{"unknown_key", Severity::warning, false},
+    KindInfo{"duplicate", Severity::warning, false},
+    KindInfo{"unused_column", Severity::note, false},
+    KindInfo{"empty_column", Severity::note, false},
+};
+
+std::size_t edits(std::string_view a, std::string_view b) {
+  std::vector<std::size_t> row(b.size() + 1);
+  std::iota(row.begin(), row.end(), std::size_t{0});
+  for (std::size_t i = 0; i < a.size(); ++i) {
+    std::size_t diagonal = row[0];
+    row[0] = i + 1;
+    for (std::size_t j = 0; j < b.size(); ++j) {
+      const std::size_t substituted = diagonal + (a[i] == b[j] ? 0 : 1);
+      diagonal = row[j + 1];
+      row[j + 1] = std::min({row[j] + 1, row[j + 1] + 1, substituted});
+    }
+  }
+  return row[b.size()];
+}
+
+}  // namespace
+
+std::span<const KindInfo> known_kinds() {
+  return kKinds;
+}
+
+std::string tolerable_kinds() {
+  std::string text;
+  for (const KindInfo& kind : kKinds)
+    if (kind.tolerable) text += (text.empty() ? "" : ", ") + std::string(kind.name);
+  return text;
+}
+
+std::string nearest(std::string_view word, std::span<const std::string_view> known) {
+  std::string best;
+  std::size_t fewest = std::max<std::size_t>(1, word.size() / 3) + 1;
+  for (const std::string_view candidate : known) {
+    const std::size_t count = edits(word, candidate);
+    if (count < fewest) {
+      fewest = count;
+      best = candidate;
+    }
+  }
+  return best;
+}
+
+std::string nearest(std::string_view word, std::initializer_list<std::string_view> known) {
+  return nearest(word, std::span<const std::string_view>(known.begin(), known.size()));
+}
+
+Findings::Findings(std::vector<std::string> tolerate) : tolerate_(std::move(tolerate)) {
+  for (const std::string& name : tolerate_) {
+    const auto kind = std::find_if(kKinds.begin(), kKinds.end(), [&](const KindInfo& k) { return k.name == name; });
+    if (kind == kKinds.end()) {
+      std::vector<std::string_view> names;
+      for (const KindInfo& k : kKinds) names.push_back(k.name);
+      const std::string near = nearest(name, names);
+      add(Severity::error, "tolerate", "", 0, "",
+          fmt::format("no finding is of kind \"{}\"{}", name,
+                      near.empty() ? "" : fmt::format(" (did you mean \"{}\"?)", near)),
+          fmt::format("kinds that can be tolerated are {}", tolerable_kinds()));
+    } else if (!kind->tolerable && kind->severity == Severity::error) {
+      add(Severity::error, "tolerate", "", 0, "",
+          fmt::format("\"{}\" cannot be tolerated: there is nothing to go on with", name),
+          fmt::format("mend the data; kinds that can be tolerated are {}", tolerable_kinds()));
+    } else if (!kind->tolerable) {
+      add(Severity::note, "tolerate", "", 0, "", fmt::format("\"{}\" is never an error", name),
+          fmt::format("kinds that can be tolerated are {}", tolerable_kinds()));
+    }
+  }
+}
+
+bool Findings::tolerates(std::string_view kind) const {
+  return std::find(tolerate_.begin(), tolerate_.end(), kind) != tolerate_.end();
+}
+
+Severity Findings::add(Finding finding) {
+  if (finding.severity == Severity::error && tolerates(finding.kind)) {
+    const auto kind =
+        std::find_if(kKinds.begin(), kKinds.end(), [&](const KindInfo& k) { return k.name == finding.kind; });
+    if (kind != kKinds.end() && kind->tolerable) finding.severity = Severity::warning;
+  }
+  // Parts of one file share its header and mapping: what is wrong there is said once.
+  const bool known = std::any_of(list_.begin(), list_.end(), [&](const Finding& f) {
+    return f.kind == finding.kind && f.line == finding.line && f.file == finding.file && f.column == finding.column &&
+           f.what == finding.what;
+  });
+  const Severity severity = finding.severity;
+  if (!known) list_.push_back(std::move(finding));
+  return severity;
+}
+
+Severity Findings::add(Severity severity, std::string kind, std::string file, std::size_t line, std::string column,
+                       std::string what, std::string remedy) {
+  return add(
+      Finding{severity, std::move(kind), std::move(file), line, std::move(column), std::move(what), std::move(remedy)});
+}
+
+void Findings::fail(std::string kind, std::string file, std::size_t line, std::string what, std::string remedy) {
+  list_.push_back(
+      Finding{Severity::error, std::move(kind), std::move(file), line, "", std::move(what), std::move(remedy)});
+  throw DataError(list_);
+}
+
+bool Findings::has_errors() const {
+  return std::any_of(list_.begin(), list_.end(), [](const Finding& f) { return f.severity == Severity::error; });
+}
+
+void Findings::throw_if_errors() const {
+  if (has_errors()) throw DataError(list_);
+}
+
+}  // namespace flexspline::data

@@ -1,0 +1,237 @@
+// From files to experiments: which files, which columns, which rows; then the time base and the checks.
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cmath>
+#include <map>
+#include <memory>
+#include <set>
+
+#include "host/data/columns.hpp"
+#include "host/data/csv.hpp"
+#include "host/data/dataset.hpp"
+#include "host/data/dataset_toml.hpp"
+#include "host/data/findings.hpp"
+#include "host/data/keys.hpp"
+#include "host/data/part.hpp"
+
+namespace flexspline::data {
+namespace {
+
+namespace fs = std::filesystem;
+
+std::string lower_extension(const fs::path& path) {
+  std::string extension = path.extension().string();
+  std::transform(extension.begin(), extension.end(), extension.begin(),
+                 [](unsigned char c) { return static_cast<char>(c >= 'A' && c <= 'Z' ? c - 'A' + 'a' : c); });
+  return extension;
+}
+
+bool is_csv(const fs::path& path) {
+  const std::string extension = lower_extension(path);
+  return extension == ".csv" || extension == ".tsv";
+}
+
+fs::path real_path(const fs::path& path) {
+  std::error_code error;
+  const fs::path whole = fs::weakly_canonical(path, error);
+  return error ? path : whole;
+}
+
+class Loader {
+ public:
+  explicit Loader(const LoadOptions& options) : options_(options), findings_(options.tolerate) {
+    findings_.throw_if_errors();
+  }
+
+  Dataset load(const std::vector<fs::path>& paths) {
+    if (paths.empty())
+      findings_.fail("file", "", 0, "no measurements were given", "give files, folders or a dataset.toml");
+    for (const fs::path& path : paths) read_path(path);
+    findings_.throw_if_errors();
+    for (Experiment& experiment : data_.experiments) {
+      if (options_.holdout) experiment.role = Role::holdout;
+      check_part(experiment, data_.drive, findings_);
+    }
+    check_replicates();
+    findings_.throw_if_errors();
+    data_.findings = findings_.list();
+    return std::move(data_);
+  }
+
+ private:
+  void read_path(const fs::path& path) {
+    std::error_code error;
+    if (!fs::exists(path, error))
+      findings_.fail("file", path.string(), 0, "there is no such file or folder",
+                     "give a CSV file, a folder of them, or a dataset.toml");
+    if (fs::is_directory(path))
+      read_folder(path);
+    else if (lower_extension(path) == ".toml")
+      read_toml(path);
+    else
+      read_single_file(path);
+  }
+
+  static std::vector<fs::path> csv_files(const fs::path& folder) {
+    std::vector<fs::path> files;
+    for (const fs::directory_entry& entry : fs::directory_iterator(folder))
+      if (entry.is_regular_file() && is_csv(entry.path())) files.push_back(entry.path());
+    std::sort(files.begin(), files.end());
+    return files;
+  }
+
+  std::vector<fs::path> csv_files_or_fail(const fs::path& folder) {
+    std::vector<fs::path> files = csv_files(folder);
+    bool mat = false;
+    for (const fs::directory_entry& entry : fs::directory_iterator(folder))
+      mat = mat || lower_extension(entry.path()) == ".mat";
+    if (files.empty())
+      findings_.fail("file", folder.string(), 0,
+                     mat ? "the folder has MAT files only, which are not read yet"
+                         : "the folder has no CSV file and no dataset.toml",
+                     mat ? "export them as CSV" : "give a folder with .csv or .tsv files");
+    return files;
+  }
+
+  void read_folder(const fs::path& folder) {
+    if (fs::exists(folder / "dataset.toml")) {
+      read_toml(folder / "dataset.toml");
+      return;
+    }
+    for (const fs::path& file : csv_files_or_fail(folder)) read_file(file, nullptr, nullptr);
+  }
+
+  void read_toml(const fs::path& path) {
+    const DatasetToml toml = read_dataset_toml(path, findings_);
+    if (toml.experiments.empty())
+      for (const fs::path& file : csv_files_or_fail(path.has_parent_path() ? path.parent_path() : fs::path(".")))
+        read_file(file, &toml, nullptr);
+    for (const ExperimentEntry& entry : toml.experiments) read_file(entry.file, &toml, &entry);
+    for (const auto& [name, mapping] : toml.columns)
+      if (name != "time_s" && found_mappings_.count({path.string(), name}) == 0)
+        findings_.add(Severity::error, "missing_column", path.string(), mapping.line, name,
+                      fmt::format("no file has the column \"{}\" that this is mapped from", mapping.source),
+                      "write source as it stands in the header of the files, or take the mapping out");
+  }
+
+  // A file by itself is read by the dataset.toml beside it, if there is one.
+  void read_single_file(const fs::path& path) {
+    const fs::path beside = path.parent_path() / "dataset.toml";
+    if (!fs::exists(beside)) {
+      read_file(path, nullptr, nullptr);
+      return;
+    }
+    const DatasetToml toml = read_dataset_toml(beside, findings_);
+    findings_.add(Severity::note, "mapping", path.string(), 0, "", "read by the dataset.toml beside it", "");
+    bool named = false;
+    for (const ExperimentEntry& entry : toml.experiments)
+      if (real_path(entry.file) == real_path(path)) {
+        read_file(entry.file, &toml, &entry);
+        named = true;
+      }
+    if (!named) read_file(path, &toml, nullptr);
+  }
+
+  struct Source {
+    CsvFile csv;
+    ColumnPlan plan;
+    CsvTable table;
+    KeyMap keys;
+  };
+
+  // Null if the file cannot be used; what is wrong is among the findings.
+  const Source* source(const fs::path& path, const DatasetToml* toml) {
+    const std::string key = (toml == nullptr ? "" : toml->file.string()) + "\n" + real_path(path).string();
+    if (cached_key_ == key) return cached_.get();
+    cached_key_ = key;
+    cached_.reset();
+    std::error_code error;
+    if (!fs::is_regular_file(path, error)) {
+      findings_.add(Severity::error, "file", path.string(), 0, "",
+                    fs::exists(path, error) ? "this is not a file" : "there is no such file",
+                    toml == nullptr ? "check the path" : fmt::format("mend its name in {}", toml->file.string()));
+      return nullptr;
+    }
+    CsvFile csv(path, findings_);
+    KeyMap keys = keys_of_header(csv.keys(), path.string(), findings_);
+    std::optional<ColumnPlan> plan = plan_columns(csv, path, toml, findings_);
+    if (!plan) return nullptr;
+    CsvTable table = csv.read(plan->wanted);
+    cached_ = std::make_unique<Source>(Source{std::move(csv), std::move(*plan), std::move(table), std::move(keys)});
+    return cached_.get();
+  }
+
+  void read_file(const fs::path& path, const DatasetToml* toml, const ExperimentEntry* entry) {
+    PartBounds bounds;
+    if (entry != nullptr) bounds = {entry->from_s, entry->to_s};
+    const std::string identity =
+        fmt::format("{} {} {}", real_path(path).string(), bounds.from_s.value_or(-1e300), bounds.to_s.value_or(1e300));
+    if (!seen_.insert(identity).second) {
+      findings_.add(Severity::warning, "duplicate", path.string(), 0, "",
+                    "this measurement was given twice and is used once", "take one of them out");
+      return;
+    }
+    const Source* file = source(path, toml);
+    if (file == nullptr) return;
+    for (const PlannedColumn& column : file->plan.columns)
+      if (toml != nullptr && column.mapped)
+        found_mappings_.insert({toml->file.string(), std::string(column_name(column.column))});
+
+    KeyMap keys = file->keys;
+    if (toml != nullptr) {
+      KeyMap stated = entry == nullptr ? KeyMap{} : entry->keys;
+      stated.insert(toml->defaults.begin(), toml->defaults.end());
+      stated.insert(toml->drive.begin(), toml->drive.end());
+      // One name in a header cannot fit several parts of the file, so a name given to a part is no contradiction.
+      if (stated.count("experiment") != 0) keys.erase("experiment");
+      keys = merged(stated, keys, findings_);
+    }
+    Experiment experiment;
+    experiment.name = path.stem().string();
+    experiment.file = path;
+    experiment.unused_columns = file->plan.unused;
+    apply_drive_keys(keys, data_.drive, findings_);
+    apply_experiment_keys(keys, experiment, findings_);
+    make_unique(experiment);
+
+    if (read_part(file->table, file->plan, bounds, data_.drive.axis.value_or(Axis::rotary), experiment, findings_))
+      data_.experiments.push_back(std::move(experiment));
+  }
+
+  void make_unique(Experiment& experiment) {
+    const std::string name = experiment.name;
+    for (int number = 2; !names_.insert(experiment.name).second; ++number)
+      experiment.name = fmt::format("{}-{}", name, number);
+    if (experiment.name != name)
+      findings_.add(Severity::warning, "duplicate", experiment.file.string(), 0, "",
+                    fmt::format("another experiment is named \"{}\": this one is \"{}\"", name, experiment.name),
+                    "give it a name of its own in dataset.toml or by \"# experiment: NAME\"");
+  }
+
+  void check_replicates() {
+    for (const Experiment& experiment : data_.experiments)
+      if (!experiment.replicate_of.empty() && names_.count(experiment.replicate_of) == 0)
+        findings_.add(Severity::warning, "unknown_key", experiment.file.string(), 0, "",
+                      fmt::format("\"{}\" is a replicate of \"{}\", which is not in the data", experiment.name,
+                                  experiment.replicate_of),
+                      "name an experiment of the same data set");
+  }
+
+  const LoadOptions& options_;
+  Findings findings_;
+  Dataset data_;
+  std::string cached_key_;
+  std::unique_ptr<Source> cached_;
+  std::set<std::string> seen_;
+  std::set<std::string> names_;
+  std::set<std::pair<std::string, std::string>> found_mappings_;  // dataset.toml, our column
+};
+
+}  // namespace
+
+Dataset load(const std::vector<std::filesystem::path>& paths, const LoadOptions& options) {
+  return Loader(options).load(paths);
+}
+
+}  // namespace flexspline::data

@@ -1,0 +1,85 @@
+// Which physical effect is missing from a model, or that none is.
+#pragma once
+
+#include <functional>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "host/data/dataset.hpp"
+#include "host/model/model.hpp"
+#include "host/regression/identify.hpp"
+
+namespace flexspline::diagnosis {
+
+struct Named {
+  std::string effect;
+  std::optional<double> order;
+};
+
+struct Candidate {
+  std::string effect;
+  std::optional<double> order;
+  regression::Balance balance = regression::Balance::motor;
+  double score = 0.0;              // fall of cross-validated chi-square over the autocorrelation time, less k ln(n_eff)
+  double chi2_fall_percent = 0.0;  // cross-validated
+  double rmse_cv_before = 0.0;
+  double rmse_cv_after = 0.0;
+  std::optional<double> p_value;
+  std::vector<regression::Estimate> parameters;
+  bool admissible = true;
+  std::string why_not;             // where it is not admissible
+  std::vector<std::string> rivals;
+};
+
+struct Localised {
+  std::string variable;
+  double share_percent = 0.0;
+};
+
+// A stretch in which something acted on the axis that no model of the drive explains.
+struct Disturbance {
+  std::string experiment;
+  double from_s = 0.0;
+  double to_s = 0.0;
+  double peak = 0.0;
+  std::string unit;
+};
+
+enum class Verdict {
+  missing_effect,
+  confusable_effects,
+  at_noise_floor,
+  nothing_significant,
+  unknown_structure,
+  insufficient_excitation,
+};
+std::string verdict_name(Verdict verdict);
+
+struct Diagnosis {
+  Verdict verdict = Verdict::nothing_significant;
+  std::vector<Named> named;
+  std::optional<regression::Balance> balance;  // of the named effect, else of the largest excess
+  std::string unit;                            // of the balances' errors
+  double base_rmse = 0.0;
+  double base_rmse_cv = 0.0;
+  std::optional<double> noise_floor;
+  std::string noise_floor_from = "none";
+  std::vector<Localised> localised;
+  std::vector<Candidate> candidates;           // best first
+  std::vector<Localised> remaining_structure;
+  std::vector<Disturbance> disturbances;
+  std::vector<std::string> warnings;
+  std::optional<double> delay_s;               // of the effort against the motion, beyond the alignment, where significant
+};
+
+struct Options {
+  regression::PipelineOptions pipeline;
+  std::function<void(std::string_view)> progress;  // said at each stage; may be empty
+};
+
+// METHOD of the project: see host/diagnosis/README.md. Uses experiments of role fit. The model need not have values: all
+// free parameters are estimated.
+Diagnosis diagnose(const data::Dataset& dataset, const model::Model& model, const Options& options);
+
+}  // namespace flexspline::diagnosis

@@ -1,0 +1,104 @@
+// A model of a drive: what is known of it, and the effects on its torque balances with their parameters.
+#pragma once
+
+#include <filesystem>
+#include <optional>
+#include <stdexcept>
+#include <string>
+#include <string_view>
+#include <vector>
+
+#include "host/data/dataset.hpp"
+#include "host/model/known_effects.hpp"
+
+namespace flexspline::model {
+
+struct Quantity {
+  std::optional<double> value;
+  std::string source;  // "report, table 3"; empty where the file does not say
+};
+
+// Known, not identified. Base of the friction law's reference velocity and of per-unit numbers.
+struct Drive {
+  data::Axis axis = data::Axis::rotary;
+  Quantity gear_ratio;
+  Quantity torque_constant_nm_a;
+  Quantity rated_current_a;
+  Quantity rated_velocity_rad_s;
+  Quantity rated_torque_nm;
+  Quantity temperature_reference_c;
+  Quantity pitch_m;  // linear axis: travel of one motor turn
+};
+
+struct Parameter {
+  std::string name;  // key of the catalogue: "torque"
+  std::optional<double> value;
+  std::string unit;
+  std::optional<double> std;
+  std::optional<double> spread_percent;
+  bool fixed = false;
+};
+
+struct Effect {
+  std::string type;  // name in the catalogue
+  std::string id;    // unique in the model; the type unless the file says otherwise
+  // In the order of the catalogue, all that the catalogue has, with no value where the file has none.
+  std::vector<Parameter> parameters;
+
+  const Parameter* find(std::string_view name) const;
+  Parameter* find(std::string_view name);
+};
+
+struct History {
+  std::string action;  // "add", "remove"
+  std::string effect;
+  std::optional<double> rmse_before;
+  std::optional<double> rmse_after;
+};
+
+struct Model {
+  std::string name;
+  Drive drive;
+  std::vector<Effect> effects;
+  std::vector<History> history;
+
+  const Effect* find(std::string_view id) const;
+  Effect* find(std::string_view id);
+};
+
+// What is wrong with a model file: file, line and what to do are in the text. Exit 2.
+class ModelError : public std::runtime_error {
+ public:
+  using std::runtime_error::runtime_error;
+};
+
+// A model and the text that it came from, so that a rewrite changes values where they stand and keeps all else.
+struct ModelFile {
+  Model model;
+  std::string text;
+};
+
+// Reads a model file. Unknown effects, unknown or missing parameters of an effect, values outside their bounds and a
+// wrong format are a ModelError with file, line, what is known instead and what to do. Units are those of the axis; a
+// value that is outside its bounds by no more than the rounding of a written number is taken as the bound.
+ModelFile read(const std::filesystem::path& path, const KnownEffects& known);
+// The same from a text; `file_name` is only for messages.
+ModelFile parse(std::string text, std::string_view file_name, const KnownEffects& known);
+
+// The text of `file` with the values of `changed`: values, std and spread are replaced where they stand, missing ones
+// inserted, those that are no longer known taken out, new effects and history appended, removed effects cut out with
+// the comments directly above; comments, key order and the text of unchanged numbers stay. Effects are matched by id;
+// their order in `changed` does not matter. Values are written with 6 significant digits (stated ones, in [drive] or
+// fixed, exactly), std and spread with 3; an std or spread that is not finite counts as not known. A `file` without
+// text is written anew. Throws std::logic_error where the result would not read back as `changed`: a value that is not
+// finite, a history that is not a continuation of the file's.
+std::string rewrite(const ModelFile& file, const Model& changed);
+
+// A new file for a model that came from none, with short comments. Throws std::logic_error as `rewrite` does.
+std::string write(const Model& model);
+
+// Whole or not at all: written beside and renamed. Throws ModelError with path and reason; a file that was there before
+// is unchanged then.
+void save(const std::filesystem::path& path, const std::string& text);
+
+}  // namespace flexspline::model

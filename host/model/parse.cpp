@@ -1,0 +1,321 @@
+// From the tree of a model file to a model, with every mistake named by its line.
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+#include <map>
+#include <utility>
+
+#include "host/model/document.hpp"
+#include "host/model/model.hpp"
+#include "host/model/text.hpp"
+#include "host/model/units.hpp"
+
+namespace flexspline::model {
+namespace {
+
+constexpr std::string_view kFormat = "flexspline-model/1";
+// What rounding to the digits of a written value can move it, relative to a bound.
+constexpr double kRounding = 1e-5;
+
+std::size_t edit_distance(std::string_view a, std::string_view b) {
+  std::vector<std::size_t> row;
+  for (std::size_t j = 0; j <= b.size(); ++j) row.push_back(j);
+  for (std::size_t i = 0; i < a.size(); ++i) {
+    std::size_t diagonal = row[0];
+    row[0] = i + 1;
+    for (std::size_t j = 0; j < b.size(); ++j) {
+      const std::size_t changed = diagonal + (a[i] == b[j] ? 0 : 1);
+      diagonal = row[j + 1];
+      row[j + 1] = std::min({changed, row[j] + 1, row[j + 1] + 1});
+    }
+  }
+  return row.back();
+}
+
+// The known name that is likely meant; empty where none is near.
+std::string_view nearest(std::string_view name, const std::vector<std::string_view>& known) {
+  std::string_view best;
+  std::size_t best_distance = std::max<std::size_t>(2, name.size() / 3) + 1;
+  for (const std::string_view candidate : known) {
+    const std::size_t distance = edit_distance(name, candidate);
+    if (distance >= best_distance) continue;
+    best = candidate;
+    best_distance = distance;
+  }
+  return best;
+}
+
+std::string join(const std::vector<std::string_view>& names) {
+  return names.empty() ? "none" : fmt::format("{}", fmt::join(names, ", "));
+}
+
+struct Bounds {
+  double low = -std::numeric_limits<double>::infinity();
+  double high = std::numeric_limits<double>::infinity();
+};
+
+// Everything in [drive] is a size, except the temperature.
+Bounds drive_bounds(std::string_view key) {
+  if (key == "temperature_reference_c") return {-273.15, 1000.0};
+  return {std::numeric_limits<double>::min(), std::numeric_limits<double>::max()};
+}
+
+class Reader {
+ public:
+  Reader(std::string_view file_name, const KnownEffects& known) : file_name_(file_name), known_(known) {}
+
+  Model model(const Node& root) {
+    format(root);
+    for (const Entry& entry : root.entries)
+      require_known(entry, "a model file", {"format", "name", "drive", "effect", "history"});
+    Model result;
+    if (const Node* name = root.find("name")) result.name = text(*name, "name");
+    // First of all: the axis decides on the units.
+    if (const Node* node = root.find("drive")) result.drive = drive(*node);
+    axis_ = result.drive.axis;
+    if (const Node* effects = root.find("effect"))
+      for (const Node& node : tables(*effects, "effect")) result.effects.push_back(effect(node));
+    if (const Node* histories = root.find("history"))
+      for (const Node& node : tables(*histories, "history")) result.history.push_back(history(node));
+    return result;
+  }
+
+ private:
+  [[noreturn]] void fail(std::size_t line, const std::string& what, const std::string& remedy) const {
+    throw ModelError(fmt::format("{}:{}: {}; {}", file_name_, line, what, remedy));
+  }
+
+  void require_known(const Entry& entry, const std::string& where, const std::vector<std::string_view>& known) const {
+    if (std::ranges::find(known, entry.key) != known.end()) return;
+    const std::string_view meant = nearest(entry.key, known);
+    fail(entry.line, fmt::format("{} has no key \"{}\"", where, entry.key),
+         meant.empty() ? fmt::format("known are {}", join(known)) : fmt::format("did you mean \"{}\"?", meant));
+  }
+
+  void format(const Node& root) const {
+    const Node* node = root.find("format");
+    const std::string remedy = fmt::format("the file must say format = \"{}\" before its first table", kFormat);
+    if (!node) fail(1, "this is not a model file: it has no format", remedy);
+    if (node->kind != NodeKind::text || node->text != kFormat)
+      fail(node->line,
+           node->kind == NodeKind::text ? fmt::format("the format is \"{}\", which cannot be read", node->text)
+                                        : fmt::format("format is {}", node->kind_name()),
+           remedy);
+  }
+
+  std::string text(const Node& node, std::string_view key) const {
+    if (node.kind != NodeKind::text)
+      fail(node.line, fmt::format("{} is {}", key, node.kind_name()), "write a text in quotes");
+    return node.text;
+  }
+
+  double number(const Node& node, std::string_view key) const {
+    if (node.kind != NodeKind::number)
+      fail(node.line, fmt::format("{} is {}, not a number", key, node.kind_name()),
+           fmt::format("write a number without quotes and unit, such as {} = 0.01", key));
+    if (!std::isfinite(node.number))
+      fail(node.line, fmt::format("{} is {}", key, std::isnan(node.number) ? "NaN" : "infinite"),
+           "write a finite number, or leave the key out where the value is not known");
+    return node.number;
+  }
+
+  double number_within(const Node& node, std::string_view key, Bounds bounds) const {
+    const double value = number(node, key);
+    const auto slack = [](double bound) { return std::isfinite(bound) ? kRounding * std::abs(bound) : 0.0; };
+    if (value < bounds.low - slack(bounds.low) || value > bounds.high + slack(bounds.high)) {
+      const bool positive = bounds.low == std::numeric_limits<double>::min();
+      fail(node.line, fmt::format("{} = {} is outside its bounds", key, exact_text(value)),
+           positive ? "it must be greater than 0"
+                    : fmt::format("it must lie between {} and {}", bound_text(bounds.low), bound_text(bounds.high)));
+    }
+    return std::clamp(value, bounds.low, bounds.high);
+  }
+
+  static std::string bound_text(double bound) {
+    return std::isfinite(bound) ? number_text(bound, kValueDigits) : bound < 0.0 ? "-infinity" : "infinity";
+  }
+
+  const std::vector<Node>& tables(const Node& node, std::string_view key) const {
+    const bool good = node.kind == NodeKind::array && std::ranges::all_of(node.items, [](const Node& item) {
+                        return item.kind == NodeKind::table && item.has_header;
+                      });
+    if (!good)
+      fail(node.line,
+           fmt::format("{} is {}", key, node.kind == NodeKind::array ? "an array of values" : node.kind_name()),
+           fmt::format("begin each one with a line [[{}]]", key));
+    return node.items;
+  }
+
+  Drive drive(const Node& node) const {
+    if (node.kind != NodeKind::table)
+      fail(node.line, fmt::format("drive is {}", node.kind_name()), "write a table that begins with the line [drive]");
+    std::vector<std::string_view> keys = {"axis"};
+    for (const DriveKey& key : kDriveKeys) keys.push_back(key.key);
+    for (const Entry& entry : node.entries) require_known(entry, "[drive]", keys);
+    Drive result;
+    if (const Node* axis = node.find("axis")) {
+      const std::string name = text(*axis, "axis");
+      if (name != "rotary" && name != "linear")
+        fail(axis->line, fmt::format("axis is \"{}\"", name), "write \"rotary\" or \"linear\"");
+      result.axis = name == "linear" ? data::Axis::linear : data::Axis::rotary;
+    }
+    for (const DriveKey& key : kDriveKeys)
+      if (const Node* value = node.find(key.key)) result.*key.quantity = quantity(*value, key.key);
+    return result;
+  }
+
+  Quantity quantity(const Node& node, std::string_view key) const {
+    Quantity result;
+    const Node* value = &node;
+    if (node.kind == NodeKind::table) {
+      for (const Entry& entry : node.entries)
+        require_known(entry, fmt::format("{} (its unit is in its name)", key), {"value", "source"});
+      if (const Node* source = node.find("source")) result.source = text(*source, "source");
+      value = node.find("value");
+    }
+    if (value) result.value = number_within(*value, key, drive_bounds(key));
+    return result;
+  }
+
+  Effect effect(const Node& node) {
+    const Node* type = node.find("type");
+    if (!type)
+      fail(node.line, "the effect has no type", "write type = \"NAME\"; \"flexspline effects\" lists the names");
+    Effect result;
+    result.type = text(*type, "type");
+    const KnownEffect* known = known_.find(result.type);
+    if (!known) {
+      const std::string_view meant = nearest(result.type, known_.names());
+      fail(type->line, fmt::format("there is no effect \"{}\"", result.type),
+           meant.empty() ? "\"flexspline effects\" lists the names" : fmt::format("did you mean \"{}\"?", meant));
+    }
+    for (const Entry& entry : node.entries) {
+      const bool misplaced = std::ranges::any_of(known->parameters, [&](const auto& p) { return p.name == entry.key; });
+      if (misplaced)
+        fail(entry.line, fmt::format("the parameter {} stands outside the parameters", entry.key),
+             "write it below a line [effect.parameters]");
+      require_known(entry, "[[effect]]", {"type", "id", "parameters"});
+    }
+    identify(node, result, type->line);
+    const Node* parameters = node.find("parameters");
+    if (parameters && parameters->kind != NodeKind::table)
+      fail(parameters->line, fmt::format("the parameters of {} are {}", result.id, parameters->kind_name()),
+           "begin them with a line [effect.parameters], in single brackets");
+    std::vector<std::string_view> names;
+    for (const KnownParameter& parameter : known->parameters) names.push_back(parameter.name);
+    if (parameters)
+      for (const Entry& entry : parameters->entries) require_known(entry, result.type, names);
+    for (const KnownParameter& parameter : known->parameters) {
+      const Node* value = parameters ? parameters->find(parameter.name) : nullptr;
+      result.parameters.push_back(this->parameter(value, parameter));
+      if (parameter.given && !result.parameters.back().value)
+        fail(value ? value->line : type->line,
+             fmt::format("{} needs its {}, which is stated and never estimated", result.id, parameter.name),
+             fmt::format("write {} = NUMBER below [effect.parameters]", parameter.name));
+    }
+    return result;
+  }
+
+  void identify(const Node& node, Effect& result, std::size_t type_line) {
+    const Node* id = node.find("id");
+    result.id = id ? text(*id, "id") : result.type;
+    const std::size_t line = id ? id->line : type_line;
+    const auto plain = [](unsigned char c) { return c > ' ' && c != '"' && c != 0x7F; };
+    if (result.id.empty() || !std::ranges::all_of(result.id, plain))
+      fail(line, fmt::format("the id \"{}\" cannot be used", result.id), "write a name without spaces and quotes");
+    const auto [first, is_new] = lines_of_ids_.emplace(result.id, line);
+    if (!is_new)
+      fail(line, fmt::format("a second effect is named \"{}\", the first one on line {}", result.id, first->second),
+           "give one of them another id = \"NAME\"");
+  }
+
+  Parameter parameter(const Node* node, const KnownParameter& known) const {
+    Parameter result;
+    result.name = known.name;
+    result.unit = axis_ == data::Axis::linear ? known.unit_linear : known.unit_rotary;
+    if (!node) return result;
+    const Node* value = node;
+    if (node->kind == NodeKind::table) {
+      for (const Entry& entry : node->entries)
+        require_known(entry, result.name, {"value", "unit", "std", "spread_percent", "fixed"});
+      if (const Node* unit = node->find("unit")) require_unit(*unit, result);
+      if (const Node* deviation = node->find("std")) {
+        result.std = number(*deviation, "std");
+        if (*result.std < 0.0)
+          fail(deviation->line, fmt::format("std = {} is negative", exact_text(*result.std)),
+               "write a standard deviation of 0 or more, or leave it out");
+      }
+      if (const Node* spread = node->find("spread_percent")) result.spread_percent = number(*spread, "spread_percent");
+      if (const Node* fixed = node->find("fixed")) {
+        if (fixed->kind != NodeKind::boolean)
+          fail(fixed->line, fmt::format("fixed is {}", fixed->kind_name()), "write true or false without quotes");
+        result.fixed = fixed->boolean;
+      }
+      value = node->find("value");
+    }
+    if (value) result.value = number_within(*value, known.name, {known.low, known.high});
+    if (result.fixed && !result.value)
+      fail(node->line, fmt::format("{} is fixed, but has no value", result.name),
+           "write value = NUMBER beside it, or leave out fixed to have it estimated");
+    return result;
+  }
+
+  void require_unit(const Node& node, const Parameter& parameter) const {
+    const std::string unit = text(node, "unit");
+    if (same_unit(unit, parameter.unit)) return;
+    const bool none = is_dimensionless(parameter.unit);
+    fail(node.line,
+         fmt::format("the unit of {} is \"{}\", but {} is expected", parameter.name, unit,
+                     none ? "none" : fmt::format("\"{}\"", parameter.unit)),
+         none ? "convert the value to a plain number and leave the unit out"
+              : fmt::format("convert the value and write unit = \"{}\"", parameter.unit));
+  }
+
+  History history(const Node& node) const {
+    for (const Entry& entry : node.entries)
+      require_known(entry, "[[history]]", {"action", "effect", "rmse_before", "rmse_after"});
+    History result;
+    for (const auto& [key, place] : {std::pair{"action", &History::action}, std::pair{"effect", &History::effect}}) {
+      const Node* value = node.find(key);
+      if (!value) fail(node.line, fmt::format("the history has no {}", key), fmt::format("write {} = \"NAME\"", key));
+      result.*place = text(*value, key);
+    }
+    if (const Node* before = node.find("rmse_before")) result.rmse_before = number(*before, "rmse_before");
+    if (const Node* after = node.find("rmse_after")) result.rmse_after = number(*after, "rmse_after");
+    return result;
+  }
+
+  std::string_view file_name_;
+  const KnownEffects& known_;
+  data::Axis axis_ = data::Axis::rotary;
+  std::map<std::string, std::size_t> lines_of_ids_;
+};
+
+}  // namespace
+
+const Parameter* Effect::find(std::string_view name) const {
+  const auto found = std::ranges::find(parameters, name, &Parameter::name);
+  return found == parameters.end() ? nullptr : &*found;
+}
+
+Parameter* Effect::find(std::string_view name) {
+  return const_cast<Parameter*>(std::as_const(*this).find(name));
+}
+
+const Effect* Model::find(std::string_view id) const {
+  const auto found = std::ranges::find(effects, id, &Effect::id);
+  return found == effects.end() ? nullptr : &*found;
+}
+
+Effect* Model::find(std::string_view id) {
+  return const_cast<Effect*>(std::as_const(*this).find(id));
+}
+
+ModelFile parse(std::string text, std::string_view file_name, const KnownEffects& known) {
+  Model model = Reader(file_name, known).model(parse_document(text, file_name));
+  return {std::move(model), std::move(text)};
+}
+
+}  // namespace flexspline::model

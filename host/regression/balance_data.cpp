@@ -1,0 +1,275 @@
+#include "host/regression/balance_data.hpp"
+
+#include <fmt/format.h>
+
+#include "host/signals/differentiate.hpp"
+
+namespace flexspline::regression {
+namespace {
+
+using data::Column;
+using effects::Kind;
+using effects::Phase;
+using numbers::Dual;
+using numbers::Jet;
+using catalogue::DriveConstants;
+
+constexpr std::size_t kCachedNumbers = 40'000'000;
+
+// Whether a shift or modulation reaches what a term computes.
+bool changes(const Term& changer, const Term& term) {
+  const effects::Description& what = *changer.entry->info;
+  if (what.phase == Phase::shift) return (term.entry->info->reads & effects::kTorsion) != 0;
+  if (what.phase == Phase::modulate) return catalogue::names_contain(what.modulates, term.entry->name());
+  return false;
+}
+
+// Parameters that a column depends on, written exactly.
+void append_shapes(std::string& key, const Term& term) {
+  key += fmt::format("{}", term.entry->id);
+  for (std::size_t p = 0; p < term.values.size(); ++p)
+    if (term.entry->parameters[p].kind != Kind::linear) key += fmt::format(",{:a}", term.values[p]);
+  key += ';';
+}
+
+std::string key_of(const Terms& terms, Slot slot) {
+  const Term& term = terms[slot.term];
+  std::string key = fmt::format("{}:", slot.parameter);
+  append_shapes(key, term);
+  for (const Term& other : terms)
+    if (changes(other, term)) append_shapes(key, other);
+  return key;
+}
+
+// Inputs in number system N from plain ones.
+template <class N>
+effects::Inputs<N> lifted(const effects::Inputs<Real>& in) {
+  if constexpr (std::is_same_v<N, Real>) {
+    return in;
+  } else {
+    using S = typename N::Value;
+    return {S(in.angle),           S(in.velocity),          S(in.speed),          S(in.direction),
+            S(in.acceleration),    S(in.output_angle),      S(in.output_velocity), S(in.output_direction),
+            S(in.output_acceleration), S(in.torsion),       S(in.torsion_rate),   S(in.torsion_direction),
+            S(in.torque),          S(in.torque_magnitude),  S(in.current),        S(in.temperature),
+            S(in.viscous_scale),   S(in.coulomb_scale)};
+  }
+}
+
+template <class P>
+DriveConstants<P> lifted(const DriveConstants<double>& d) {
+  DriveConstants<P> c;
+  c.gear_ratio = P(d.gear_ratio);
+  c.torque_constant = P(d.torque_constant);
+  c.rated_velocity = P(d.rated_velocity);
+  c.reference_temperature = P(d.reference_temperature);
+  c.turn_angle_scale = P(d.turn_angle_scale);
+  return c;
+}
+
+template <class N>
+const catalogue::Along<N>& along(const catalogue::Entry& entry) {
+  if constexpr (std::is_same_v<N, Real>)
+    return entry.real;
+  else
+    return entry.dual;
+}
+
+}  // namespace
+
+bool BalanceData::usable(const Record& r) const {
+  switch (balance_) {
+    case Balance::motor:
+      return !r.effort.empty() && r.has_motor_motion && (!prepared_->torque_measured || !r.torque.empty());
+    case Balance::transmission: return !r.torque.empty() && r.has_motor_motion && r.has_output_motion && !r.at_rest;
+    case Balance::load: return !r.torque.empty() && !r.locked && (r.has_output_motion || r.has_motor_motion) && !r.at_rest;
+  }
+  return false;
+}
+
+double BalanceData::share(const Record& r, Balance of_effect) const {
+  if (of_effect == balance_) return 1.0;
+  if (balance_ != Balance::motor || prepared_->torque_measured) return 0.0;
+  const Balance through = r.locked ? Balance::transmission : Balance::load;
+  return of_effect == through ? 1.0 / prepared_->constants.gear_ratio : 0.0;
+}
+
+void BalanceData::filter(const RowRange& range, std::vector<double>& signal) const {
+  const auto at = static_cast<std::size_t>(&range - ranges_.data());
+  for (const data::Segment& s : prepared_->records[range.record].segments)
+    filters_[at].apply_in_place(std::span<double>(signal.data() + s.first, s.last - s.first));
+}
+
+// Makes rows from what `fill(range, signal)` writes along each record.
+template <class Fill>
+Eigen::VectorXd BalanceData::along_rows(Fill fill) const {
+  Eigen::VectorXd rows(ranges_.empty() ? 0 : ranges_.back().last);
+  std::vector<double> signal;
+  for (const RowRange& range : ranges_) {
+    const Record& r = prepared_->records[range.record];
+    signal.assign(r.inputs.size(), 0.0);
+    fill(range, signal);
+    filter(range, signal);
+    const auto& samples = r.rows[index(balance_)].samples;
+    for (std::size_t k = 0; k < samples.size(); ++k)
+      rows[range.first + static_cast<Eigen::Index>(k)] = signal[samples[k]];
+  }
+  return rows;
+}
+
+BalanceData::BalanceData(const Prepared& prepared, Balance balance) : prepared_(&prepared), balance_(balance) {
+  Eigen::Index first = 0;
+  for (std::size_t i = 0; i < prepared.records.size(); ++i) {
+    const Record& r = prepared.records[i];
+    const auto count = static_cast<Eigen::Index>(r.rows[index(balance)].samples.size());
+    if (!usable(r) || count < 16) continue;
+    ranges_.push_back({i, first, first + count});
+    filters_.emplace_back(signals::ZeroPhaseFilter::kDefaultOrder,
+                          std::min(prepared.pipeline.row_cutoff_hz, 0.45 / r.sample_s), 1.0 / r.sample_s);
+    first += count;
+  }
+  const auto left_side = [&](const Record& r, std::size_t k) {
+    switch (balance_) {
+      case Balance::motor: return r.effort[k] - (prepared.torque_measured ? r.torque[k] / prepared.constants.gear_ratio : 0.0);
+      case Balance::transmission: return r.torque[k];
+      case Balance::load: return r.torque[k] - (r.load_torque.empty() ? 0.0 : r.load_torque[k]);
+    }
+    return 0.0;
+  };
+  const auto fill_target = [&](const RowRange& range, std::vector<double>& signal) {
+    const Record& r = prepared.records[range.record];
+    for (std::size_t k = 0; k < signal.size(); ++k) signal[k] = left_side(r, k);
+    // A known load torque reaches the motor through the gear.
+    if (balance_ == Balance::motor && !prepared.torque_measured && !r.load_torque.empty())
+      for (std::size_t k = 0; k < signal.size(); ++k) signal[k] -= r.load_torque[k] / prepared.constants.gear_ratio;
+  };
+  target_ = along_rows(fill_target);
+  delay_ = along_rows([&](const RowRange& range, std::vector<double>& signal) {
+    fill_target(range, signal);
+    const Record& r = prepared.records[range.record];
+    for (const data::Segment& s : r.segments) {
+      const std::span<double> part(signal.data() + s.first, s.last - s.first);
+      // Filtered first: differences of raw noise would lose their digits to it.
+      const std::vector<double> slope = signals::central_derivative(part, r.sample_s);
+      for (std::size_t k = 0; k < slope.size(); ++k) part[k] = -slope[k];
+    }
+  });
+}
+
+std::vector<std::vector<RowRange>> BalanceData::folds(std::size_t parts) const {
+  std::vector<std::vector<RowRange>> folds(parts);
+  for (const RowRange& range : ranges_)
+    for (std::size_t part = 0; part < parts; ++part) {
+      const auto cut = [&](std::size_t p) {
+        return range.first + static_cast<Eigen::Index>(static_cast<std::size_t>(range.size()) * p / parts);
+      };
+      folds[part].push_back({range.record, cut(part), cut(part + 1)});
+    }
+  return folds;
+}
+
+std::size_t BalanceData::sample_of(const RowRange& range, Eigen::Index row) const {
+  Eigen::Index start = 0;
+  for (const RowRange& whole : ranges_)
+    if (whole.record == range.record) start = whole.first;
+  return prepared_->records[range.record].rows[index(balance_)].samples[static_cast<std::size_t>(row - start)];
+}
+
+template <class N>
+void BalanceData::add_torque(const Terms& terms, const Term& term, const std::vector<typename N::Parameter>& values,
+                             const Record& r, const std::vector<std::vector<typename N::Parameter>>& all_values,
+                             std::vector<typename N::Value>& torque) const {
+  using P = typename N::Parameter;
+  const double own = share(r, term.entry->info->balance);
+  if (own == 0.0) return;
+  const DriveConstants<P> constants = lifted<P>(prepared_->constants);
+  const std::vector<effects::Inputs<N>>* inputs = nullptr;
+  std::vector<effects::Inputs<N>> changed;
+  bool any = false;
+  for (const Term& other : terms) any = any || changes(other, term);
+  if constexpr (std::is_same_v<N, Real>) {
+    if (!any) inputs = &r.inputs;
+  }
+  if (!inputs) {
+    changed.reserve(r.inputs.size());
+    for (const auto& in : r.inputs) changed.push_back(lifted<N>(in));
+    for (const Phase phase : {Phase::shift, Phase::modulate})
+      for (std::size_t t = 0; t < terms.size(); ++t)
+        if (terms[t].entry->info->phase == phase && changes(terms[t], term))
+          along<N>(*terms[t].entry).change(all_values[t].data(), constants, changed);
+    inputs = &changed;
+  }
+  if (own == 1.0) {
+    along<N>(*term.entry).torque(values.data(), constants, term.entry->info->balance, *inputs, torque.data());
+    return;
+  }
+  std::vector<typename N::Value> through(torque.size(), typename N::Value(0.0));
+  along<N>(*term.entry).torque(values.data(), constants, term.entry->info->balance, *inputs, through.data());
+  for (std::size_t k = 0; k < torque.size(); ++k) torque[k] += through[k] * own;
+}
+
+namespace {
+
+std::vector<std::vector<double>> values_of_all(const Terms& terms) {
+  std::vector<std::vector<double>> values;
+  for (const Term& term : terms) values.push_back(term.values);
+  return values;
+}
+
+// Linear parameters: all nought but one, which is one. Others as they stand.
+std::vector<double> unit_values(const Term& term, std::size_t parameter) {
+  std::vector<double> values = term.values;
+  for (std::size_t p = 0; p < values.size(); ++p)
+    if (term.entry->parameters[p].kind == Kind::linear) values[p] = p == parameter ? 1.0 : 0.0;
+  return values;
+}
+
+}  // namespace
+
+const Eigen::VectorXd& BalanceData::column(const Terms& terms, Slot slot) {
+  const std::string key = key_of(terms, slot);
+  const auto found = cache_.find(key);
+  if (found != cache_.end()) return found->second;
+  // A search over shapes makes many columns that nobody asks for again.
+  if (cache_.size() * static_cast<std::size_t>(rows()) > kCachedNumbers) cache_.clear();
+  const Term& term = terms[slot.term];
+  const std::vector<double> values = unit_values(term, slot.parameter);
+  const auto all = values_of_all(terms);
+  return cache_.emplace(key, along_rows([&](const RowRange& range, std::vector<double>& signal) {
+                          add_torque<Real>(terms, term, values, prepared_->records[range.record], all, signal);
+                        }))
+      .first->second;
+}
+
+Eigen::VectorXd BalanceData::shape_column(const Terms& terms, const std::vector<std::size_t>& on_balance, Slot shape) {
+  std::vector<std::vector<Jet>> all;
+  for (const Term& term : terms) all.emplace_back(term.values.begin(), term.values.end());
+  all[shape.term][shape.parameter].v[0] = 1.0;
+  return along_rows([&](const RowRange& range, std::vector<double>& signal) {
+    std::vector<Jet> torque(signal.size(), Jet(0.0));
+    for (const std::size_t t : on_balance)
+      if (terms[t].is_source() && (t == shape.term || changes(terms[shape.term], terms[t])))
+        add_torque<Dual>(terms, terms[t], all[t], prepared_->records[range.record], all, torque);
+    for (std::size_t k = 0; k < signal.size(); ++k) signal[k] = torque[k].v[0];
+  });
+}
+
+Eigen::VectorXd BalanceData::known_torque(const Terms& terms, const std::vector<std::size_t>& on_balance) {
+  Eigen::VectorXd sum = Eigen::VectorXd::Zero(rows());
+  for (const std::size_t t : on_balance)
+    for (std::size_t p = 0; p < terms[t].values.size(); ++p)
+      if (terms[t].is_source() && terms[t].known[p] && terms[t].entry->parameters[p].kind == Kind::linear &&
+          terms[t].values[p] != 0.0)
+        sum += terms[t].values[p] * column(terms, {t, p});
+  return sum;
+}
+
+Eigen::VectorXd BalanceData::term_torque(const Terms& terms, std::size_t t) {
+  Eigen::VectorXd sum = Eigen::VectorXd::Zero(rows());
+  if (!terms[t].is_source()) return sum;
+  for (std::size_t p = 0; p < terms[t].values.size(); ++p)
+    if (terms[t].entry->parameters[p].kind == Kind::linear) sum += terms[t].values[p] * column(terms, {t, p});
+  return sum;
+}
+
+}  // namespace flexspline::regression

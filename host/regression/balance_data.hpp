@@ -1,0 +1,76 @@
+// Rows of one torque balance over all records: the target, and a column for any parameter of any effect. Columns are made
+// when asked for and kept, so that a search over models pays for each column once.
+#pragma once
+
+#include <Eigen/Core>
+#include <string>
+#include <unordered_map>
+
+#include "host/regression/record.hpp"
+#include "host/regression/terms.hpp"
+#include "host/signals/butterworth.hpp"
+
+namespace flexspline::regression {
+
+// Rows [first, last) that belong to one record, or to one part of one.
+struct RowRange {
+  std::size_t record = 0;
+  Eigen::Index first = 0;
+  Eigen::Index last = 0;
+  Eigen::Index size() const { return last - first; }
+};
+
+class BalanceData {
+ public:
+  // Keeps a reference to `prepared`. Records that lack what the balance needs have no rows.
+  BalanceData(const Prepared& prepared, Balance balance);
+
+  Balance balance() const { return balance_; }
+  bool empty() const { return target_.size() == 0; }
+  Eigen::Index rows() const { return target_.size(); }
+  const Prepared& prepared() const { return *prepared_; }
+  const std::vector<RowRange>& records() const { return ranges_; }
+  // Each record's rows cut into `parts` pieces of equal length: part k of all records is fold k of a cross-validation.
+  std::vector<std::vector<RowRange>> folds(std::size_t parts) const;
+  // Index of the sample that a row stands for, within its record.
+  std::size_t sample_of(const RowRange& range, Eigen::Index row) const;
+
+  // Measured left side, filtered, N m: Km i - T/N (motor; Km i without a torque sensor), T, T - load torque.
+  const Eigen::VectorXd& target() const { return target_; }
+  // Negative slope of the target: what a delay of one second adds to it, to first order.
+  const Eigen::VectorXd& delay_column() const { return delay_; }
+
+  // Torque per unit of a linear parameter, with shapes, shifts and modulations as `terms` say, filtered. N m per unit.
+  // The reference holds until the next call.
+  const Eigen::VectorXd& column(const Terms& terms, Slot slot);
+  // Slope of the model's torque by a shape parameter, at the linear parameters of `terms`, filtered.
+  Eigen::VectorXd shape_column(const Terms& terms, const std::vector<std::size_t>& on_balance, Slot shape);
+  // Torque of terms with known linear parameters, filtered: belongs on the left side.
+  Eigen::VectorXd known_torque(const Terms& terms, const std::vector<std::size_t>& on_balance);
+  // Torque of one term at its values, all parameters in, filtered.
+  Eigen::VectorXd term_torque(const Terms& terms, std::size_t term);
+
+  // Filters a signal that is given along the samples of a range's record, in place.
+  void filter(const RowRange& range, std::vector<double>& signal) const;
+
+ private:
+  bool usable(const Record& record) const;
+  // The part of an effect that reaches this balance: its own, and by way of the gear where there is no torque sensor.
+  double share(const Record& record, Balance of_effect) const;
+  template <class Fill>
+  Eigen::VectorXd along_rows(Fill fill) const;
+  template <class N>
+  void add_torque(const Terms& terms, const Term& term, const std::vector<typename N::Parameter>& values,
+                  const Record& record, const std::vector<std::vector<typename N::Parameter>>& all_values,
+                  std::vector<typename N::Value>& torque) const;
+
+  const Prepared* prepared_;
+  Balance balance_;
+  std::vector<RowRange> ranges_;
+  Eigen::VectorXd target_;
+  Eigen::VectorXd delay_;
+  std::vector<signals::ZeroPhaseFilter> filters_;  // one a range
+  std::unordered_map<std::string, Eigen::VectorXd> cache_;
+};
+
+}  // namespace flexspline::regression

@@ -1,0 +1,59 @@
+#include "host/regression/balance_fit.hpp"
+
+#include "host/regression/least_squares.hpp"
+#include "host/regression/shapes.hpp"
+
+namespace flexspline::regression {
+
+Eigen::MatrixXd shape_columns(BalanceData& data, const Terms& terms, const std::vector<std::size_t>& on_balance,
+                              const std::vector<Slot>& shapes) {
+  Eigen::MatrixXd X(data.rows(), static_cast<Eigen::Index>(shapes.size()));
+  for (std::size_t j = 0; j < shapes.size(); ++j)
+    X.col(static_cast<Eigen::Index>(j)) = data.shape_column(terms, on_balance, shapes[j]);
+  return X;
+}
+
+Eigen::VectorXd residual_of(BalanceData& data, const Terms& terms) {
+  Eigen::VectorXd residual = data.target();
+  for (const std::size_t t : terms_on(terms, data.balance(), data.prepared().torque_measured))
+    residual -= data.term_torque(terms, t);
+  return residual;
+}
+
+BalanceFit fit_balance(BalanceData& data, Terms& terms) {
+  BalanceFit fit;
+  fit.balance = data.balance();
+  fit.on_balance = terms_on(terms, data.balance(), data.prepared().torque_measured);
+  fit.linear = free_linear_slots(terms, fit.on_balance);
+  fit.shapes = free_shape_slots(terms, fit.on_balance);
+  fit.root_weights = Eigen::VectorXd::Ones(data.rows());
+  if (data.empty()) return fit;
+  const Eigen::VectorXd target = data.target() - data.known_torque(terms, fit.on_balance);
+  const auto solve = [&] {
+    const LinearFit linear = least_squares(columns_of(data, terms, fit.linear), target, fit.root_weights);
+    for (std::size_t j = 0; j < fit.linear.size(); ++j)
+      terms[fit.linear[j].term].values[fit.linear[j].parameter] = linear.theta[static_cast<Eigen::Index>(j)];
+    return linear;
+  };
+  // Weights and parameters depend on each other; two rounds settle them.
+  sweep_shapes(data, terms, fit.on_balance, fit.root_weights);
+  for (int round = 0; round < 2; ++round) {
+    fit.root_weights = record_weights(data.records(), solve().residual);
+    if (!fit.shapes.empty()) refine_shapes(data, terms, fit.on_balance, fit.root_weights);
+  }
+  fit.residual = solve().residual;
+
+  // Uncertainty of linear parameters and shapes together, to first order.
+  Eigen::MatrixXd J(data.rows(), static_cast<Eigen::Index>(fit.linear.size() + fit.shapes.size()));
+  J << columns_of(data, terms, fit.linear), shape_columns(data, terms, fit.on_balance, fit.shapes);
+  const LinearFit joint = least_squares(J, fit.residual, fit.root_weights);
+  const Eigen::VectorXd weighted = fit.root_weights.cwiseProduct(fit.residual);
+  fit.autocorrelation_time = autocorrelation_time(data.records(), weighted);
+  const double freedom = std::max(1.0, static_cast<double>(data.rows() - J.cols()));
+  fit.covariance = joint.unit_covariance * (weighted.squaredNorm() / freedom * fit.autocorrelation_time);
+  fit.own_share = joint.own_share;
+  fit.condition_number = joint.condition_number;
+  return fit;
+}
+
+}  // namespace flexspline::regression

@@ -1,0 +1,37 @@
+// One balance fitted: shapes and linear parameters together, with weights by record and their uncertainty.
+#pragma once
+
+#include <Eigen/Core>
+#include <string>
+#include <vector>
+
+#include "host/regression/balance_data.hpp"
+
+namespace flexspline::regression {
+
+struct BalanceFit {
+  Balance balance = Balance::motor;
+  std::vector<std::size_t> on_balance;  // terms
+  std::vector<Slot> linear;             // free parameters that the torque is proportional to
+  std::vector<Slot> shapes;
+  Eigen::VectorXd residual;             // target minus model, N m
+  Eigen::VectorXd root_weights;
+  Eigen::MatrixXd covariance;           // of linear, then shapes; corrected for autocorrelation
+  Eigen::VectorXd own_share;            // likewise; see LinearFit
+  double autocorrelation_time = 1.0;
+  double condition_number = 0.0;
+  double rmse() const { return residual.size() ? std::sqrt(residual.squaredNorm() / static_cast<double>(residual.size())) : 0.0; }
+};
+
+// Estimates all free parameters on the balance and writes them into `terms`. Shapes that the model states are where the
+// search starts; others are swept first. Parameters that the data do not determine are set to nought (see own_share).
+BalanceFit fit_balance(BalanceData& data, Terms& terms);
+
+// Residual of terms as they stand on (other) data, N m.
+Eigen::VectorXd residual_of(BalanceData& data, const Terms& terms);
+
+// Slopes of the model by its free shapes: columns that let a linear fit move shapes to first order.
+Eigen::MatrixXd shape_columns(BalanceData& data, const Terms& terms, const std::vector<std::size_t>& on_balance,
+                              const std::vector<Slot>& shapes);
+
+}  // namespace flexspline::regression

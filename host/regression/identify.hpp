@@ -1,0 +1,62 @@
+// Identification of a model from a data set: estimates as the report gives them (by experiment, average, spread) and
+// pooled with intervals.
+#pragma once
+
+#include <memory>
+#include <optional>
+#include <string>
+#include <utility>
+#include <vector>
+
+#include "host/data/dataset.hpp"
+#include "host/model/model.hpp"
+#include "host/regression/balance_fit.hpp"
+
+namespace flexspline::regression {
+
+struct Estimate {
+  Slot slot;
+  std::string id, effect, parameter, unit;
+  double value = 0.0;
+  std::optional<double> std;
+  std::optional<double> low, high;        // 95 % interval
+  std::optional<double> average;          // of the experiments that can tell it
+  std::optional<double> spread_percent;   // standard deviation (n-1) over average
+  bool reliable = true;                   // spread not above the report's 30 %
+  bool identifiable = true;
+  bool fixed = false;
+  std::vector<std::pair<std::string, std::optional<double>>> per_experiment;
+};
+
+// A value that follows from several parameters, as the report gives them: Tvp = Tv + dTv.
+struct Derived {
+  std::string name;
+  double value = 0.0;
+  std::string unit;
+};
+
+struct Identification {
+  Prepared prepared;
+  Terms terms;                    // with values
+  std::vector<BalanceData> data;  // the balances that could be formed
+  std::vector<BalanceFit> fits;   // one each
+  std::vector<Estimate> estimates;
+  std::vector<Derived> derived;
+  double condition_number = 0.0;
+  std::vector<std::string> warnings;
+  model::Model model;             // the input with estimates in it
+};
+
+// Fits every balance that has data. Only experiments of role fit are used. Throws data::DataError where there is nothing
+// to fit on.
+std::unique_ptr<Identification> identify(const data::Dataset& dataset, const model::Model& model,
+                                         const PipelineOptions& options);
+
+// Where data set and model differ in what they know of the drive by more than 0.1 %: the model wins, with a warning. What
+// only the data set knows is filled in.
+model::Drive reconcile(const model::Drive& drive, const data::Dataset& dataset, std::vector<std::string>& warnings);
+
+// Writes estimates into a model.
+void store(model::Model& model, const std::vector<Estimate>& estimates);
+
+}  // namespace flexspline::regression

@@ -1,0 +1,33 @@
+// Weighted linear least squares by orthogonal factorisation, and what the data determine.
+#pragma once
+
+#include <Eigen/Core>
+#include <vector>
+
+#include "host/regression/balance_data.hpp"
+
+namespace flexspline::regression {
+
+struct LinearFit {
+  Eigen::VectorXd theta;           // one a column of X
+  Eigen::VectorXd residual;        // y - X theta, unweighted
+  Eigen::MatrixXd unit_covariance; // (X' W X)^-1; infinite on what is not determined
+  // Of each column, the share that no other column can stand in for (sine of its angle to their span), 0 to 1. Below
+  // kUndetermined the parameter is left at nought and the data cannot tell it.
+  Eigen::VectorXd own_share;
+  double condition_number = 0.0;   // of the columns scaled to unit length
+};
+inline constexpr double kUndetermined = 1e-3;
+
+// Minimises |W^(1/2) (y - X theta)| by a Householder factorisation with column pivoting of the scaled columns.
+// `root_weights`: square roots of the weights, one a row. A column of noughts is undetermined.
+LinearFit least_squares(const Eigen::MatrixXd& X, const Eigen::VectorXd& y, const Eigen::VectorXd& root_weights);
+
+// One over the residual's RMS of each record, repeated along its rows: records with more noise count less. A record is
+// never weighted more than ten times the median one, so that a silent record does not rule the fit.
+Eigen::VectorXd record_weights(const std::vector<RowRange>& records, const Eigen::VectorXd& residual);
+
+// Rows that count as one: integrated autocorrelation time of the weighted residual over all records, at least one.
+double autocorrelation_time(const std::vector<RowRange>& records, const Eigen::VectorXd& weighted_residual);
+
+}  // namespace flexspline::regression

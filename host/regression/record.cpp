@@ -1,0 +1,358 @@
+#include "host/regression/record.hpp"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cmath>
+#include <numeric>
+
+#include "host/signals/butterworth.hpp"
+#include "host/signals/cutoff.hpp"
+#include "host/signals/differentiate.hpp"
+
+namespace flexspline::regression {
+namespace {
+
+using data::Column;
+using data::Experiment;
+using data::Segment;
+using signals::ZeroPhaseFilter;
+
+// Positions are differentiated with a wider filter than rows, so that functions of velocity such as its sign are
+// evaluated on sharp signals and filtered afterwards like the target.
+constexpr double kMotionOverRow = 2.5;
+// Rows per second over the row cut-off: twice the Nyquist rate of what the filter lets through.
+constexpr double kRowsOverCutoff = 4.0;
+
+template <class Process>
+std::vector<double> by_segment(const std::vector<double>& signal, const std::vector<Segment>& segments, Process process) {
+  std::vector<double> result(signal.size(), 0.0);
+  for (const Segment& s : segments) {
+    const std::vector<double> part =
+        process(std::span<const double>(signal.data() + s.first, s.last - s.first));
+    std::copy(part.begin(), part.end(), result.begin() + static_cast<std::ptrdiff_t>(s.first));
+  }
+  return result;
+}
+
+struct Motion {
+  std::vector<double> position, velocity, acceleration;
+  double position_noise = 0.0;  // white, before the filter
+};
+
+// Size of the smallest step of a quantised signal; nothing if it is not quantised.
+std::optional<double> quantum_of(const std::vector<double>& position) {
+  std::vector<double> steps;
+  for (std::size_t k = 1; k < position.size(); ++k) {
+    const double step = std::abs(position[k] - position[k - 1]);
+    if (step > 0.0) steps.push_back(step);
+  }
+  if (steps.size() < 16) return std::nullopt;
+  std::sort(steps.begin(), steps.end());
+  const double smallest = steps[steps.size() / 100];
+  std::size_t whole = 0;
+  for (const double step : steps) {
+    const double multiple = step / smallest;
+    if (std::abs(multiple - std::round(multiple)) < 0.02 * std::max(1.0, multiple * 0.05)) ++whole;
+  }
+  if (10 * whole < 9 * steps.size()) return std::nullopt;
+  return smallest;
+}
+
+// Noise of the derivative over the white noise of the signal, after the filter.
+double derivative_noise_gain(const ZeroPhaseFilter& filter, double sample_s) {
+  const std::size_t half = 4 * filter.settling_samples() + 8;
+  std::vector<double> impulse(2 * half + 1, 0.0);
+  impulse[half] = 1.0;
+  filter.apply_in_place(impulse);
+  const std::vector<double> slope = signals::central_derivative(impulse, sample_s);
+  return std::sqrt(std::inner_product(slope.begin(), slope.end(), slope.begin(), 0.0));
+}
+
+double root_mean_square(const std::vector<double>& x) {
+  return x.empty() ? 0.0 : std::sqrt(std::inner_product(x.begin(), x.end(), x.begin(), 0.0) / static_cast<double>(x.size()));
+}
+
+Motion motion_from_position(const std::vector<double>& raw, const std::vector<Segment>& segments,
+                            const ZeroPhaseFilter& filter, double sample_s) {
+  Motion m;
+  m.position = by_segment(raw, segments, [&](auto part) { return filter.apply(part); });
+  m.velocity = by_segment(m.position, segments, [&](auto part) { return signals::central_derivative(part, sample_s); });
+  m.acceleration =
+      by_segment(m.velocity, segments, [&](auto part) { return signals::central_derivative(part, sample_s); });
+  std::vector<double> rest(raw.size());
+  for (std::size_t k = 0; k < raw.size(); ++k) rest[k] = raw[k] - m.position[k];
+  // The filter keeps a share of the noise; what it takes away stands for the rest.
+  const double kept = std::min(0.8, 2.0 * filter.cutoff_hz() * sample_s);
+  m.position_noise = root_mean_square(rest) / std::sqrt(1.0 - kept);
+  return m;
+}
+
+Motion motion_from_velocity(const std::vector<double>& raw, const std::vector<Segment>& segments,
+                            const ZeroPhaseFilter& filter, double sample_s) {
+  Motion m;
+  m.velocity = by_segment(raw, segments, [&](auto part) { return filter.apply(part); });
+  m.acceleration =
+      by_segment(m.velocity, segments, [&](auto part) { return signals::central_derivative(part, sample_s); });
+  m.position.resize(raw.size(), 0.0);
+  for (const Segment& s : segments)
+    for (std::size_t k = s.first + 1; k < s.last; ++k)
+      m.position[k] = m.position[k - 1] + 0.5 * sample_s * (m.velocity[k] + m.velocity[k - 1]);
+  return m;
+}
+
+// A current that is held for a sample acts, on average, half a sample after its time stamp; the mean with the sample
+// before puts it at the instant at which positions are read.
+std::vector<double> align_held(const std::vector<double>& held, const std::vector<Segment>& segments) {
+  std::vector<double> aligned = held;
+  for (const Segment& s : segments)
+    for (std::size_t k = s.last; k-- > s.first + 1;) aligned[k] = 0.5 * (held[k] + held[k - 1]);
+  return aligned;
+}
+
+// Marks what lies within `reach` samples of a sample for which `bad` holds.
+std::vector<std::uint8_t> spread(const std::vector<std::uint8_t>& bad, std::size_t reach) {
+  std::vector<std::uint8_t> marked(bad.size(), 0);
+  std::ptrdiff_t last = -1;
+  const auto n = static_cast<std::ptrdiff_t>(bad.size());
+  const auto r = static_cast<std::ptrdiff_t>(reach);
+  for (std::ptrdiff_t k = 0; k < n; ++k) {
+    if (!bad[static_cast<std::size_t>(k)]) continue;
+    for (std::ptrdiff_t j = std::max(last + 1, k - r); j <= std::min(n - 1, k + r); ++j) {
+      marked[static_cast<std::size_t>(j)] = 1;
+      last = j;
+    }
+  }
+  return marked;
+}
+
+// Drive off: nothing moves, and the effort changes no more than white noise does. A stuck axis under a changing effort
+// is none: its friction is unknown.
+bool is_at_rest(const Record& record, double motion_span, double resolution) {
+  if (record.locked || record.effort.size() < 16 || motion_span > 2.0 * resolution) return false;
+  double mean = 0.0, steps = 0.0, spread_squared = 0.0;
+  for (const double x : record.effort) mean += x / static_cast<double>(record.effort.size());
+  for (std::size_t k = 1; k < record.effort.size(); ++k) {
+    steps += (record.effort[k] - record.effort[k - 1]) * (record.effort[k] - record.effort[k - 1]);
+    spread_squared += (record.effort[k] - mean) * (record.effort[k] - mean);
+  }
+  // Neighbours of white noise differ by sqrt(2) times its deviation; of noise averaged over two samples by once.
+  return spread_squared <= 2.0 * steps + 1e-12 * mean * mean * static_cast<double>(record.effort.size());
+}
+
+void choose_rows(Record& record, const Pipeline& pipeline, std::size_t settling) {
+  const std::size_t n = record.inputs.size();
+  const auto reach = static_cast<std::size_t>(std::lround(0.6 / (pipeline.row_cutoff_hz * record.sample_s)));
+  std::vector<std::uint8_t> unusable(n, 1);
+  for (const Segment& s : record.segments) {
+    // The ends of a segment carry the filters' guess of what lies beyond; short segments keep at least their middle.
+    const std::size_t edge = std::min(settling, (s.last - s.first) / 10);
+    for (std::size_t k = s.first + edge; k + edge < s.last; ++k) unusable[k] = 0;
+  }
+  const std::vector<std::uint8_t> clipped = spread(record.experiment->masked, reach);
+  for (const Balance balance : {Balance::motor, Balance::transmission, Balance::load}) {
+    Rows& rows = record.rows[index(balance)];
+    std::vector<std::uint8_t> unsure(n, 0);
+    if (pipeline.mask && !record.at_rest) {
+      const double visible = 3.0 * record.velocity_noise[index(balance)];
+      for (std::size_t k = 0; k < n; ++k) {
+        const double v = record.direction_variable(balance, k);
+        const double before = k > 0 ? record.direction_variable(balance, k - 1) : v;
+        unsure[k] = std::abs(v) < visible || v * before < 0.0;
+      }
+      unsure = spread(unsure, reach);
+    }
+    for (std::size_t k = 0; k < n; k += record.decimation) {
+      if (unusable[k]) continue;
+      if (unsure[k] || (!clipped.empty() && clipped[k]))
+        ++rows.masked;
+      else
+        rows.samples.push_back(k);
+    }
+  }
+}
+
+Record prepare_one(const Experiment& e, const catalogue::DriveConstants<double>& drive, const Pipeline& pipeline) {
+  Record r;
+  r.experiment = &e;
+  r.name = e.name;
+  r.locked = e.load == data::Load::locked;
+  r.sample_s = e.sample_s;
+  r.segments = e.segments;
+  const double sample_hz = 1.0 / e.sample_s;
+  r.decimation = std::max<std::size_t>(
+      1, static_cast<std::size_t>(std::floor(sample_hz / (kRowsOverCutoff * pipeline.row_cutoff_hz) + 1e-9)));
+  const ZeroPhaseFilter filter(ZeroPhaseFilter::kDefaultOrder, std::min(pipeline.motion_cutoff_hz, 0.45 * sample_hz),
+                               sample_hz);
+  const double slope_noise = derivative_noise_gain(filter, e.sample_s);
+  const std::size_t n = e.size();
+  r.inputs.resize(n);
+
+  Motion motor, output;
+  double motor_velocity_noise = 0.0, output_velocity_noise = 0.0;
+  if (e.has(Column::motor_position)) {
+    motor = motion_from_position(e[Column::motor_position], r.segments, filter, e.sample_s);
+    r.motor_quantum = e.encoder_counts && drive.turn_angle_scale == 1.0 ? std::optional(2.0 * M_PI / *e.encoder_counts)
+                                                                        : quantum_of(e[Column::motor_position]);
+    motor.position_noise = std::max(motor.position_noise, r.motor_quantum.value_or(0.0) / std::sqrt(12.0));
+    motor_velocity_noise = motor.position_noise * slope_noise;
+    r.has_motor_motion = true;
+  } else if (e.has(Column::motor_velocity)) {
+    motor = motion_from_velocity(e[Column::motor_velocity], r.segments, filter, e.sample_s);
+    std::vector<double> rest(n);
+    for (std::size_t k = 0; k < n; ++k) rest[k] = e[Column::motor_velocity][k] - motor.velocity[k];
+    const double kept = std::min(0.8, 2.0 * filter.cutoff_hz() * e.sample_s);
+    motor_velocity_noise = root_mean_square(rest) * std::sqrt(kept / (1.0 - kept));
+    r.has_motor_motion = true;
+  }
+  if (!r.locked && e.has(Column::output_position)) {
+    output = motion_from_position(e[Column::output_position], r.segments, filter, e.sample_s);
+    r.output_quantum = e.output_encoder_counts ? std::optional(2.0 * M_PI / *e.output_encoder_counts)
+                                               : quantum_of(e[Column::output_position]);
+    output.position_noise = std::max(output.position_noise, r.output_quantum.value_or(0.0) / std::sqrt(12.0));
+    output_velocity_noise = output.position_noise * slope_noise;
+    r.has_output_motion = true;
+  } else if (!r.locked && e.has(Column::output_velocity)) {
+    output = motion_from_velocity(e[Column::output_velocity], r.segments, filter, e.sample_s);
+    r.has_output_motion = true;
+  }
+  r.has_output_motion = r.has_output_motion || r.locked;
+
+  std::vector<double> torque_input;
+  if (e.has(Column::torque)) {
+    r.torque = e[Column::torque];
+    torque_input = by_segment(r.torque, r.segments, [&](auto part) { return filter.apply(part); });
+  }
+  if (e.has(Column::load_torque)) r.load_torque = e[Column::load_torque];
+  std::vector<double> temperature;
+  if (e.has(Column::temperature)) {
+    // Housings warm up over minutes: all that is faster is noise.
+    const ZeroPhaseFilter slow(2, std::min(0.5, 0.4 * sample_hz), sample_hz);
+    temperature = by_segment(e[Column::temperature], r.segments, [&](auto part) { return slow.apply(part); });
+    r.has_temperature = true;
+  }
+  const bool held = e.current_hold == data::CurrentHold::zoh;
+  std::vector<double> current;
+  if (e.has(Column::current)) {
+    current = held ? align_held(e[Column::current], r.segments) : e[Column::current];
+    r.effort.resize(n);
+    for (std::size_t k = 0; k < n; ++k) r.effort[k] = drive.torque_constant * current[k];
+  } else if (e.has(Column::motor_torque)) {
+    r.effort = held ? align_held(e[Column::motor_torque], r.segments) : e[Column::motor_torque];
+  }
+
+  for (std::size_t k = 0; k < n; ++k) {
+    auto& in = r.inputs[k];
+    if (r.has_motor_motion) {
+      in.angle = motor.position[k];
+      in.velocity = motor.velocity[k];
+      in.speed = std::abs(in.velocity);
+      in.acceleration = motor.acceleration[k];
+    }
+    if (!output.velocity.empty()) {
+      in.output_angle = output.position[k];
+      in.output_velocity = output.velocity[k];
+      in.output_acceleration = output.acceleration[k];
+    } else if (!r.locked) {
+      // Without a sensor the output follows the motor through a rigid gear.
+      in.output_angle = in.angle / drive.gear_ratio;
+      in.output_velocity = in.velocity / drive.gear_ratio;
+      in.output_acceleration = in.acceleration / drive.gear_ratio;
+    }
+    in.torsion = in.angle / drive.gear_ratio - in.output_angle;
+    in.torsion_rate = in.velocity / drive.gear_ratio - in.output_velocity;
+    if (!torque_input.empty()) in.torque = torque_input[k];
+    in.torque_magnitude = std::abs(in.torque);
+    if (!current.empty()) in.current = current[k];
+    in.temperature = r.has_temperature ? temperature[k] : drive.reference_temperature;
+    in.viscous_scale = in.coulomb_scale = 1.0;
+  }
+  r.velocity_noise[index(Balance::motor)] = motor_velocity_noise;
+  r.velocity_noise[index(Balance::load)] = r.has_output_motion && output_velocity_noise > 0.0
+                                               ? output_velocity_noise
+                                               : motor_velocity_noise / drive.gear_ratio;
+  r.velocity_noise[index(Balance::transmission)] =
+      std::hypot(motor_velocity_noise / drive.gear_ratio, r.locked ? 0.0 : output_velocity_noise);
+
+  if (r.has_motor_motion) {
+    const std::vector<double>& p = e.has(Column::motor_position) ? e[Column::motor_position] : motor.position;
+    const auto [low, high] = std::minmax_element(p.begin(), p.end());
+    r.at_rest = is_at_rest(r, *high - *low, std::max(r.motor_quantum.value_or(0.0), motor.position_noise));
+  }
+  for (auto& in : r.inputs) {
+    const auto smooth_sign = [&](double v, Balance b) {
+      if (r.at_rest) return 0.0;
+      const double width = r.velocity_noise[index(b)];
+      return width > 0.0 ? std::tanh(v / width) : Real::sign(v);
+    };
+    in.direction = smooth_sign(in.velocity, Balance::motor);
+    in.torsion_direction = smooth_sign(in.torsion_rate, Balance::transmission);
+    in.output_direction = smooth_sign(in.output_velocity, Balance::load);
+  }
+  choose_rows(r, pipeline, filter.settling_samples());
+  return r;
+}
+
+Pipeline choose_pipeline(const std::vector<const Experiment*>& experiments, const PipelineOptions& options) {
+  Pipeline pipeline;
+  pipeline.mask = options.mask;
+  double slowest_hz = 1e300;
+  for (const Experiment* e : experiments) slowest_hz = std::min(slowest_hz, 1.0 / e->sample_s);
+  if (options.cutoff_hz) {
+    pipeline.row_cutoff_hz = pipeline.motion_cutoff_hz = *options.cutoff_hz;
+    pipeline.reason = "given by --cutoff-hz";
+    if (!(*options.cutoff_hz > 0.0) || *options.cutoff_hz >= 0.45 * slowest_hz)
+      throw data::DataError({{data::Severity::error, "cutoff", "", 0, "",
+                              fmt::format("a cut-off of {} Hz does not fit data sampled at {:.6g} Hz", *options.cutoff_hz, slowest_hz),
+                              fmt::format("give --cutoff-hz between 0.1 and {:.4g}", 0.45 * slowest_hz)}});
+    return pipeline;
+  }
+  std::vector<signals::CutoffChoice> choices;
+  for (const Experiment* e : experiments) {
+    const bool current = e->has(Column::current);
+    if (!current && !e->has(Column::motor_torque)) continue;
+    const std::vector<double>& effort = current ? (*e)[Column::current] : (*e)[Column::motor_torque];
+    const double sample_hz = 1.0 / e->sample_s;
+    std::vector<double> velocity;
+    if (e->has(Column::motor_position))
+      velocity = by_segment((*e)[Column::motor_position], e->segments,
+                            [&](auto part) { return signals::central_derivative(part, e->sample_s); });
+    else if (e->has(Column::motor_velocity))
+      velocity = (*e)[Column::motor_velocity];
+    else
+      continue;
+    choices.push_back(signals::choose_cutoff(effort, velocity, sample_hz));
+  }
+  if (choices.empty())
+    throw data::DataError({{data::Severity::error, "missing_column", "", 0, "current_a",
+                            "no experiment has both an effort (current_a or motor_torque_nm) and a motion of the motor",
+                            "record both, or map their columns in dataset.toml"}});
+  const signals::CutoffChoice choice = signals::combine_cutoffs(choices);
+  pipeline.row_cutoff_hz = std::min(choice.cutoff_hz, slowest_hz / 10.0);
+  pipeline.motion_cutoff_hz = std::min(kMotionOverRow * pipeline.row_cutoff_hz, 0.45 * slowest_hz);
+  pipeline.reason = choice.reason;
+  return pipeline;
+}
+
+}  // namespace
+
+Prepared prepare_with(const std::vector<const Experiment*>& experiments, const model::Drive& drive,
+                      const Pipeline& pipeline) {
+  Prepared prepared;
+  prepared.pipeline = pipeline;
+  prepared.constants = catalogue::constants_of(drive);
+  for (const Experiment* e : experiments) {
+    if (!e->has(Column::current)) prepared.constants.torque_constant = drive.torque_constant_nm_a.value.value_or(1.0);
+    prepared.records.push_back(prepare_one(*e, prepared.constants, pipeline));
+    prepared.torque_measured = prepared.torque_measured || e->has(Column::torque);
+    prepared.effort_is_current = prepared.effort_is_current || e->has(Column::current);
+  }
+  return prepared;
+}
+
+Prepared prepare(const std::vector<const Experiment*>& experiments, const model::Drive& drive,
+                 const PipelineOptions& options) {
+  return prepare_with(experiments, drive, choose_pipeline(experiments, options));
+}
+
+}  // namespace flexspline::regression

@@ -1,0 +1,86 @@
+// A measurement made ready for regression: every signal that effects read, aligned, differentiated and with directions,
+// and the left sides of the torque balances.
+#pragma once
+
+#include <array>
+#include <cstddef>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "host/catalogue/constants.hpp"
+#include "host/data/dataset.hpp"
+
+namespace flexspline::regression {
+
+using catalogue::Balance;
+using catalogue::Real;
+inline constexpr std::size_t kBalances = 3;
+constexpr std::size_t index(Balance balance) { return static_cast<std::size_t>(balance); }
+
+struct PipelineOptions {
+  std::optional<double> cutoff_hz;  // sets both filters
+  bool mask = true;                 // leave out reversals and sticking
+};
+
+// What was chosen for the data at hand; the same for all records, so that their rows can be compared.
+struct Pipeline {
+  double row_cutoff_hz = 0.0;     // filter of the target and of every column, Butterworth of order five, zero phase
+  double motion_cutoff_hz = 0.0;  // filter of positions before they are differentiated
+  bool mask = true;
+  std::string reason;             // where the cut-off comes from
+};
+
+// Samples of a record that one balance is fitted on.
+struct Rows {
+  std::vector<std::size_t> samples;  // after decimation and mask
+  std::size_t masked = 0;            // left out by the mask, counted after decimation
+};
+
+struct Record {
+  const data::Experiment* experiment = nullptr;
+  std::string name;
+  bool locked = false;
+  bool at_rest = false;  // drive off: nothing moves and no effort changes; shows offsets alone
+  double sample_s = 0.0;
+  std::size_t decimation = 1;
+  std::vector<data::Segment> segments;
+  std::vector<effects::Inputs<Real>> inputs;
+  std::vector<double> effort;  // motor torque (or force), aligned to the instants of the positions; empty: not measured
+  std::vector<double> torque;  // as measured
+  std::vector<double> load_torque;
+  bool has_motor_motion = false;
+  bool has_output_motion = false;  // measured, or locked
+  bool has_temperature = false;
+  std::optional<double> motor_quantum;   // resolution of the motor position
+  std::optional<double> output_quantum;
+  // Standard deviation of what the resolution and noise of the positions leave in the direction variable of each
+  // balance: motor velocity, torsion rate, output velocity.
+  std::array<double, kBalances> velocity_noise{};
+  std::array<Rows, kBalances> rows;
+
+  // The variable whose sign is the direction of a balance's friction.
+  double direction_variable(Balance balance, std::size_t sample) const {
+    const auto& in = inputs[sample];
+    return balance == Balance::motor ? in.velocity : balance == Balance::load ? in.output_velocity : in.torsion_rate;
+  }
+};
+
+struct Prepared {
+  Pipeline pipeline;
+  std::vector<Record> records;
+  catalogue::DriveConstants<double> constants;
+  bool torque_measured = false;  // else motor and load are one balance, with load terms divided by the gear ratio
+  bool effort_is_current = false;
+};
+
+// Makes all experiments ready. Equations: report 82 (motor), 78 (transmission), 45 (load). Positions, where there are
+// any, give velocity and acceleration; a tachometer is used only without them.
+// Throws data::DataError where no balance can be formed or a record is too short for the filters.
+Prepared prepare(const std::vector<const data::Experiment*>& experiments, const model::Drive& drive,
+                 const PipelineOptions& options);
+// The same with a pipeline that was chosen before, as for hold-out records.
+Prepared prepare_with(const std::vector<const data::Experiment*>& experiments, const model::Drive& drive,
+                      const Pipeline& pipeline);
+
+}  // namespace flexspline::regression

@@ -1,0 +1,235 @@
+#include "host/regression/shapes.hpp"
+
+#include <ceres/ceres.h>
+
+#include <Eigen/QR>
+#include <algorithm>
+#include <cmath>
+
+#include "host/regression/least_squares.hpp"
+
+namespace flexspline::regression {
+namespace {
+
+using effects::Limit;
+
+double quantile(std::vector<double> values, double share) {
+  if (values.empty()) return 0.0;
+  const auto at = static_cast<std::ptrdiff_t>(share * static_cast<double>(values.size() - 1));
+  std::nth_element(values.begin(), values.begin() + at, values.end());
+  return values[static_cast<std::size_t>(at)];
+}
+
+// Magnitudes of a signal over the rows of the balance.
+template <class Signal>
+std::vector<double> magnitudes(const BalanceData& data, Signal signal) {
+  std::vector<double> values;
+  for (const RowRange& range : data.records()) {
+    const Record& r = data.prepared().records[range.record];
+    if (r.at_rest) continue;
+    for (const std::size_t k : r.rows[index(data.balance())].samples) values.push_back(std::abs(signal(r.inputs[k])));
+  }
+  return values;
+}
+
+// Shortest stroke between reversals that is no jitter, over all records.
+double shortest_stroke(const BalanceData& data) {
+  std::vector<double> strokes;
+  for (const RowRange& range : data.records()) {
+    const Record& r = data.prepared().records[range.record];
+    if (r.at_rest) continue;
+    double start = r.inputs.front().angle;
+    double last_sign = 0.0;
+    for (const auto& in : r.inputs) {
+      if (in.speed < 3.0 * r.velocity_noise[index(Balance::motor)]) continue;
+      const double sign = in.velocity > 0.0 ? 1.0 : -1.0;
+      if (last_sign != 0.0 && sign != last_sign) {
+        strokes.push_back(std::abs(in.angle - start));
+        start = in.angle;
+      }
+      last_sign = sign;
+    }
+  }
+  return quantile(strokes, 0.1);
+}
+
+// The sum over rows of weighted squares after the best linear parameters.
+double projected_cost(const Eigen::MatrixXd& X, const Eigen::VectorXd& y, const Eigen::VectorXd& root_weights) {
+  const Eigen::MatrixXd A = root_weights.asDiagonal() * X;
+  const Eigen::VectorXd b = root_weights.cwiseProduct(y);
+  const Eigen::ColPivHouseholderQR<Eigen::MatrixXd> qr(A);
+  return (b - A * qr.solve(b)).squaredNorm();
+}
+
+// Residual of the best linear fit as a function of the shapes alone, each as a share of its range.
+class ProjectedResidual final : public ceres::CostFunction {
+ public:
+  ProjectedResidual(BalanceData& data, Terms& terms, const std::vector<std::size_t>& on_balance,
+                    const std::vector<Slot>& linear, const std::vector<Slot>& shapes,
+                    const std::vector<ShapeRange>& ranges, const Eigen::VectorXd& target,
+                    const Eigen::VectorXd& root_weights)
+      : data_(data),
+        terms_(terms),
+        on_balance_(on_balance),
+        linear_(linear),
+        shapes_(shapes),
+        ranges_(ranges),
+        target_(target),
+        root_weights_(root_weights) {
+    set_num_residuals(static_cast<int>(target.size()));
+    mutable_parameter_block_sizes()->push_back(static_cast<int>(shapes.size()));
+  }
+
+  bool Evaluate(double const* const* parameters, double* residuals, double** jacobians) const override {
+    for (std::size_t j = 0; j < shapes_.size(); ++j)
+      terms_[shapes_[j].term].values[shapes_[j].parameter] = ranges_[j].at(parameters[0][j]);
+    const Eigen::MatrixXd A = root_weights_.asDiagonal() * columns_of(data_, terms_, linear_);
+    const Eigen::VectorXd b = root_weights_.cwiseProduct(target_);
+    const Eigen::ColPivHouseholderQR<Eigen::MatrixXd> qr(A);
+    const Eigen::VectorXd theta = qr.solve(b);
+    Eigen::Map<Eigen::VectorXd>(residuals, b.size()) = b - A * theta;
+    if (!jacobians || !jacobians[0]) return true;
+    for (std::size_t j = 0; j < linear_.size(); ++j)
+      terms_[linear_[j].term].values[linear_[j].parameter] = theta[static_cast<Eigen::Index>(j)];
+    using RowMajor = Eigen::Matrix<double, Eigen::Dynamic, Eigen::Dynamic, Eigen::RowMajor>;
+    Eigen::Map<RowMajor> jacobian(jacobians[0], b.size(), static_cast<Eigen::Index>(shapes_.size()));
+    constexpr double kStep = 1e-6;
+    for (std::size_t j = 0; j < shapes_.size(); ++j) {
+      const double per_share = (ranges_[j].at(parameters[0][j] + kStep) - ranges_[j].at(parameters[0][j] - kStep)) / (2.0 * kStep);
+      const Eigen::VectorXd slope =
+          root_weights_.cwiseProduct(data_.shape_column(terms_, on_balance_, shapes_[j])) * per_share;
+      jacobian.col(static_cast<Eigen::Index>(j)) = -(slope - A * qr.solve(slope));
+    }
+    return true;
+  }
+
+ private:
+  BalanceData& data_;
+  Terms& terms_;
+  const std::vector<std::size_t>& on_balance_;
+  const std::vector<Slot>& linear_;
+  const std::vector<Slot>& shapes_;
+  const std::vector<ShapeRange>& ranges_;
+  const Eigen::VectorXd& target_;
+  const Eigen::VectorXd& root_weights_;
+};
+
+}  // namespace
+
+double ShapeRange::at(double share_of_range) const {
+  return logarithmic ? low * std::pow(high / low, share_of_range) : low + (high - low) * share_of_range;
+}
+
+double ShapeRange::share(double value) const {
+  const double s = logarithmic ? std::log(std::max(value, 1e-300) / low) / std::log(high / low) : (value - low) / (high - low);
+  return std::clamp(s, 0.0, 1.0);
+}
+
+ShapeRange shape_range(const BalanceData& data, const Term& term, std::size_t parameter) {
+  const auto& info = term.entry->parameters[parameter];
+  ShapeRange range{info.low, info.high, false};
+  const auto scale_between = [&](double low, double high) {
+    range.low = std::max(low, info.low);
+    range.high = std::min(std::max(high, 2.0 * range.low), info.high);
+    range.logarithmic = true;
+  };
+  switch (info.limit) {
+    case Limit::stated: break;
+    case Limit::velocity: {
+      const std::vector<double> speeds = magnitudes(data, [](const auto& in) { return in.velocity; });
+      // What the mask leaves must hold enough of the term to see: its width at the slowest hundredth of the rows.
+      scale_between(std::max(quantile(speeds, 0.01), 1e-9), 0.25 * quantile(speeds, 0.95));
+      break;
+    }
+    case Limit::travel: {
+      double resolution = 0.0;
+      for (const RowRange& r : data.records())
+        resolution = std::max(resolution, data.prepared().records[r.record].motor_quantum.value_or(0.0));
+      scale_between(std::max(4.0 * resolution, 1e-9), shortest_stroke(data));
+      break;
+    }
+    case Limit::torsion: {
+      const double largest = quantile(magnitudes(data, [](const auto& in) { return in.torsion; }), 0.99);
+      scale_between(largest * 3e-3, largest / 3.0);
+      break;
+    }
+  }
+  return range;
+}
+
+std::vector<double> shape_grid(const ShapeRange& range, std::size_t count) {
+  std::vector<double> values;
+  for (std::size_t k = 0; k < count; ++k)
+    values.push_back(range.at((static_cast<double>(k) + 0.5) / static_cast<double>(count)));
+  return values;
+}
+
+Eigen::MatrixXd columns_of(BalanceData& data, const Terms& terms, const std::vector<Slot>& linear) {
+  Eigen::MatrixXd X(data.rows(), static_cast<Eigen::Index>(linear.size()));
+  for (std::size_t j = 0; j < linear.size(); ++j) X.col(static_cast<Eigen::Index>(j)) = data.column(terms, linear[j]);
+  return X;
+}
+
+void sweep_shapes(BalanceData& data, Terms& terms, const std::vector<std::size_t>& on_balance,
+                  const Eigen::VectorXd& root_weights) {
+  const std::vector<Slot> shapes = free_shape_slots(terms, on_balance);
+  const std::vector<Slot> linear = free_linear_slots(terms, on_balance);
+  std::vector<Slot> open;
+  for (const Slot& s : shapes) {
+    if (terms[s.term].stated[s.parameter]) continue;
+    open.push_back(s);
+    terms[s.term].values[s.parameter] = shape_range(data, terms[s.term], s.parameter).at(0.5);
+  }
+  constexpr std::size_t kGrid = 6;
+  const Eigen::VectorXd target = data.target() - data.known_torque(terms, on_balance);
+  for (int around = 0; around < (open.size() > 1 ? 2 : 1); ++around)
+    for (const Slot& s : open) {
+      double& value = terms[s.term].values[s.parameter];
+      double best = value, least = std::numeric_limits<double>::infinity();
+      for (const double trial : shape_grid(shape_range(data, terms[s.term], s.parameter), kGrid)) {
+        value = trial;
+        const double cost = projected_cost(columns_of(data, terms, linear), target, root_weights);
+        if (cost < least) {
+          least = cost;
+          best = trial;
+        }
+      }
+      value = best;
+    }
+}
+
+double refine_shapes(BalanceData& data, Terms& terms, const std::vector<std::size_t>& on_balance,
+                     const Eigen::VectorXd& root_weights) {
+  const std::vector<Slot> shapes = free_shape_slots(terms, on_balance);
+  const std::vector<Slot> linear = free_linear_slots(terms, on_balance);
+  const Eigen::VectorXd target = data.target() - data.known_torque(terms, on_balance);
+  if (shapes.empty() || data.empty())
+    return projected_cost(columns_of(data, terms, linear), target, root_weights);
+  std::vector<ShapeRange> ranges;
+  std::vector<double> shares;
+  for (const Slot& s : shapes) {
+    ranges.push_back(shape_range(data, terms[s.term], s.parameter));
+    shares.push_back(std::clamp(ranges.back().share(terms[s.term].values[s.parameter]), 0.01, 0.99));
+  }
+  ceres::Problem problem;
+  problem.AddResidualBlock(
+      new ProjectedResidual(data, terms, on_balance, linear, shapes, ranges, target, root_weights), nullptr,
+      shares.data());
+  for (int j = 0; j < static_cast<int>(shapes.size()); ++j) {
+    problem.SetParameterLowerBound(shares.data(), j, 0.0);
+    problem.SetParameterUpperBound(shares.data(), j, 1.0);
+  }
+  ceres::Solver::Options options;
+  options.linear_solver_type = ceres::DENSE_QR;
+  options.max_num_iterations = 25;
+  options.function_tolerance = 1e-9;
+  options.parameter_tolerance = 1e-6;
+  options.logging_type = ceres::SILENT;
+  ceres::Solver::Summary summary;
+  ceres::Solve(options, &problem, &summary);
+  for (std::size_t j = 0; j < shapes.size(); ++j)
+    terms[shapes[j].term].values[shapes[j].parameter] = ranges[j].at(shares[j]);
+  return 2.0 * summary.final_cost;
+}
+
+}  // namespace flexspline::regression

@@ -1,0 +1,35 @@
+// Shape parameters: the range in which data can show them, and the search within it.
+#pragma once
+
+#include "host/regression/balance_data.hpp"
+
+namespace flexspline::regression {
+
+// Bounds of a shape parameter for the data at hand (see effects::Limit). `logarithmic` where it scales.
+struct ShapeRange {
+  double low = 0.0;
+  double high = 1.0;
+  bool logarithmic = false;
+  // Position within the range, 0 to 1, and back.
+  double at(double share) const;
+  double share(double value) const;
+};
+ShapeRange shape_range(const BalanceData& data, const Term& term, std::size_t parameter);
+
+// Values to start from or to rank candidates on, spread over the range.
+std::vector<double> shape_grid(const ShapeRange& range, std::size_t count);
+
+// Columns of all linear parameters that are free, in the order of `linear`.
+Eigen::MatrixXd columns_of(BalanceData& data, const Terms& terms, const std::vector<Slot>& linear);
+
+// Minimises the weighted residual over the free shapes on this balance by variable projection (linear parameters are
+// eliminated at each step; Jacobian after Kaufman), from the values in `terms`, within their ranges. Writes the result
+// into `terms`. Returns the weighted sum of squares.
+double refine_shapes(BalanceData& data, Terms& terms, const std::vector<std::size_t>& on_balance,
+                     const Eigen::VectorXd& root_weights);
+
+// Chooses starting values for shapes that the model does not state: sweeps each over its grid, twice around.
+void sweep_shapes(BalanceData& data, Terms& terms, const std::vector<std::size_t>& on_balance,
+                  const Eigen::VectorXd& root_weights);
+
+}  // namespace flexspline::regression

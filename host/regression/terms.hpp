@@ -1,0 +1,50 @@
+// A model as regression sees it: effects with unknown and known parameters.
+#pragma once
+
+#include <string>
+#include <vector>
+
+#include "host/catalogue/constants.hpp"
+#include "host/model/model.hpp"
+
+namespace flexspline::regression {
+
+using catalogue::Balance;
+
+// One effect of the model.
+struct Term {
+  const catalogue::Entry* entry = nullptr;
+  std::string id;
+  std::vector<double> values;       // in the order of the catalogue
+  std::vector<std::uint8_t> known;  // fixed by the user, or given; else estimated
+  std::vector<std::uint8_t> stated; // has a value in the model, which is where a search starts
+
+  bool is_source() const { return entry->info->phase == effects::Phase::source; }
+  bool free_linear(std::size_t p) const { return !known[p] && entry->parameters[p].kind == effects::Kind::linear; }
+  bool free_shape(std::size_t p) const { return !known[p] && entry->parameters[p].kind == effects::Kind::shape; }
+  // What it was given beside its name: "torque_ripple:7".
+  std::string label() const;
+};
+
+// A parameter of a term.
+struct Slot {
+  std::size_t term = 0;
+  std::size_t parameter = 0;
+  bool operator==(const Slot&) const = default;
+};
+
+using Terms = std::vector<Term>;
+
+Term term_of(const model::Effect& effect);
+// A candidate: an effect of the catalogue with nothing known but the order, where it has one.
+Term candidate_term(const catalogue::Entry& entry, std::optional<double> order = std::nullopt);
+Terms terms_of(const model::Model& model);
+
+std::vector<Slot> free_linear_slots(const Terms& terms, const std::vector<std::size_t>& which);
+std::vector<Slot> free_shape_slots(const Terms& terms, const std::vector<std::size_t>& which);
+
+// Terms of a model that a balance depends on. In a drive without a torque sensor the motor balance holds the load's (and,
+// in locked load, the transmission's) terms too.
+std::vector<std::size_t> terms_on(const Terms& terms, Balance balance, bool torque_measured);
+
+}  // namespace flexspline::regression

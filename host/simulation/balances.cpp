@@ -1,0 +1,67 @@
+#include "host/simulation/balances.hpp"
+
+#include "host/catalogue/constants.hpp"
+
+namespace flexspline::simulation {
+
+Balances::Balances(const model::Model& model, const catalogue::DriveConstants<double>& constants) {
+  std::vector<catalogue::Instance*> modulations;
+  for (const model::Effect& effect : model.effects) {
+    const catalogue::Entry& entry = catalogue::get(effect.type);
+    const std::vector<double> values = catalogue::values_of(effect, entry);
+    catalogue::Instance* instance = instances_.emplace_back(entry.make(values.data(), constants)).get();
+    if (entry.has_state) states_.push_back(instance);
+    if (entry.info->phase == catalogue::Phase::shift) changing_.push_back(instance);
+    if (entry.info->phase == catalogue::Phase::modulate) modulations.push_back(instance);
+    if (entry.info->phase != catalogue::Phase::source) continue;
+    switch (entry.info->balance) {
+      case catalogue::Balance::motor:
+        motor_.push_back({instance, entry.has_state});
+        break;
+      case catalogue::Balance::transmission:
+        transmission_.push_back({instance, entry.has_state});
+        break;
+      case catalogue::Balance::load:
+        load_.push_back({instance, entry.has_state});
+        break;
+    }
+  }
+  // A shift comes before all that see the signal.
+  changing_.insert(changing_.end(), modulations.begin(), modulations.end());
+}
+
+void Balances::change(Inputs& inputs) const {
+  // An instance does only one of the two; the other call is empty.
+  for (const catalogue::Instance* instance : changing_) {
+    instance->shift(inputs);
+    instance->modulate(inputs);
+  }
+}
+
+void Balances::advance(const Inputs& now, const Inputs& before) {
+  for (catalogue::Instance* instance : states_) instance->advance(now, before);
+}
+
+double Balances::motor_inertia() const {
+  const Inputs rest{};
+  Inputs accelerated{};
+  accelerated.acceleration = 1.0;
+  Torques with;
+  Torques without;
+  add_motor(accelerated, rest, with);
+  add_motor(rest, rest, without);
+  return with.motor - without.motor;
+}
+
+double Balances::output_inertia() const {
+  const Inputs rest{};
+  Inputs accelerated{};
+  accelerated.output_acceleration = 1.0;
+  Torques with;
+  Torques without;
+  add_load(accelerated, rest, with);
+  add_load(rest, rest, without);
+  return with.load - without.load;
+}
+
+}  // namespace flexspline::simulation

@@ -1,0 +1,62 @@
+// The effects of a model, ready to be summed on the three torque balances.
+#pragma once
+
+#include <memory>
+#include <vector>
+
+#include "host/catalogue/catalogue.hpp"
+#include "host/model/model.hpp"
+
+namespace flexspline::simulation {
+
+using catalogue::Balance;
+using Inputs = effects::Inputs<numbers::Real>;
+using Torques = effects::Torques<numbers::Real>;
+
+class Balances {
+ public:
+  // Inner states start from rest. The parameters must have values.
+  Balances(const model::Model& model, const catalogue::DriveConstants<double>& constants);
+
+  // Each adds the torques of the effects that belong to a balance; one effect may add to the others too. Inner states
+  // are moved on from `before` to `now` and left as they were.
+  void add_motor(const Inputs& now, const Inputs& before, Torques& sums) const { add(motor_, now, before, sums); }
+  void add_transmission(const Inputs& now, const Inputs& before, Torques& sums) const {
+    add(transmission_, now, before, sums);
+  }
+  void add_load(const Inputs& now, const Inputs& before, Torques& sums) const { add(load_, now, before, sums); }
+
+  // True where shifts or modulations change what effects see.
+  bool changes_inputs() const { return !changing_.empty(); }
+  void change(Inputs& inputs) const;
+  bool has_state() const { return !states_.empty(); }
+  void advance(const Inputs& now, const Inputs& before);
+
+  bool has_transmission() const { return !transmission_.empty(); }
+  // What the torque grows by per unit of acceleration.
+  double motor_inertia() const;
+  double output_inertia() const;
+
+ private:
+  struct Source {
+    catalogue::Instance* instance;
+    bool has_state;
+  };
+  static void add(const std::vector<Source>& sources, const Inputs& now, const Inputs& before, Torques& sums) {
+    for (const Source& source : sources) {
+      if (source.has_state)
+        source.instance->evaluate_ahead(now, before, sums);
+      else
+        source.instance->evaluate(now, sums);
+    }
+  }
+
+  std::vector<std::unique_ptr<catalogue::Instance>> instances_;
+  std::vector<Source> motor_;
+  std::vector<Source> transmission_;
+  std::vector<Source> load_;
+  std::vector<catalogue::Instance*> changing_;
+  std::vector<catalogue::Instance*> states_;
+};
+
+}  // namespace flexspline::simulation

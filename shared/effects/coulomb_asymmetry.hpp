@@ -1,0 +1,38 @@
+#pragma once
+#include "shared/effects/effect.hpp"
+
+namespace flexspline::effects {
+
+struct CoulombAsymmetry : Stateless {
+  static constexpr Description kInfo{
+      .name = "coulomb_asymmetry",
+      .reads = kMotorMotion,
+      .equation = "dTs while moving",
+      .shows_over = "bias while moving",
+      .source = "report eq. 27, 62",
+      .explanation = "Dry friction is larger in one direction than in the other: a constant torque, but only while the "
+                     "shaft moves.",
+      .causes = "Tooth flanks or seals that differ by direction, one-sided wear.",
+      .rivals = "current_offset,torque_bias",
+      .separated_by = "a record with the drive off, which shows an offset of the sensor alone",
+  };
+  static constexpr ParameterInfo kParameters[] = {
+      {.name = "torque", .unit = units::kTorque, .usual = 1e-3},
+  };
+  template <class N>
+  struct Coefficients {
+    typename N::Gain torque;
+  };
+  template <class N, class P>
+  static Coefficients<N> derive(const P* p, const DriveConstants<P>& d) {
+    return {N::gain(p[0] / d.torque_base)};
+  }
+  // The square of the direction is one while moving, nought at rest, and smooth between where the direction is.
+  template <class N>
+  static void evaluate(const State<N>&, const Coefficients<N>& c, const Inputs<N>& in, Torques<N>& out) {
+    out.motor += c.torque * N::times(in.direction, in.direction);
+  }
+};
+FLEXSPLINE_EFFECT(5, CoulombAsymmetry);
+
+}  // namespace flexspline::effects

@@ -1,0 +1,36 @@
+#pragma once
+#include "shared/effects/effect.hpp"
+
+namespace flexspline::effects {
+
+struct CoulombFriction : Stateless {
+  static constexpr Description kInfo{
+      .name = "coulomb_friction",
+      .reads = kMotorMotion,
+      .equation = "Ts s(w)",
+      .shows_over = "direction",
+      .source = "report eq. 27, 48",
+      .explanation = "Dry friction: the same torque against every motion, whatever its speed.",
+      .causes = "Preload of the tooth mesh and bearings, seals. More after tight assembly, less after wear.",
+      .rivals = "dahl_friction",
+      .separated_by = "small slow motion that reverses often",
+  };
+  static constexpr ParameterInfo kParameters[] = {
+      {.name = "torque", .unit = units::kTorque, .usual = 0.045, .low = 0.0},
+  };
+  template <class N>
+  struct Coefficients {
+    typename N::Gain torque;
+  };
+  template <class N, class P>
+  static Coefficients<N> derive(const P* p, const DriveConstants<P>& d) {
+    return {N::gain(p[0] / d.torque_base)};
+  }
+  template <class N>
+  static void evaluate(const State<N>&, const Coefficients<N>& c, const Inputs<N>& in, Torques<N>& out) {
+    out.motor += c.torque * N::times(in.direction, in.coulomb_scale);
+  }
+};
+FLEXSPLINE_EFFECT(3, CoulombFriction);
+
+}  // namespace flexspline::effects

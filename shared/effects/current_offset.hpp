@@ -1,0 +1,36 @@
+#pragma once
+#include "shared/effects/effect.hpp"
+
+namespace flexspline::effects {
+
+struct CurrentOffset : Stateless {
+  static constexpr Description kInfo{
+      .name = "current_offset",
+      .reads = kCurrent,
+      .equation = "Km i0, i0 = what the sensor reads at zero current",
+      .shows_over = "bias, also at rest",
+      .source = "amplifier",
+      .explanation = "The current sensor reads something although no current flows, so every torque is off by a constant.",
+      .causes = "Offset of the current sensor or of the amplifier's monitor output; drifts with temperature.",
+      .rivals = "coulomb_asymmetry",
+      .separated_by = "a record with the drive off",
+  };
+  static constexpr ParameterInfo kParameters[] = {
+      {.name = "current", .unit = units::kCurrent, .usual = 0.05},
+  };
+  template <class N>
+  struct Coefficients {
+    typename N::Value torque;
+  };
+  template <class N, class P>
+  static Coefficients<N> derive(const P* p, const DriveConstants<P>& d) {
+    return {N::value(p[0] * d.torque_constant / d.torque_base)};
+  }
+  template <class N>
+  static void evaluate(const State<N>&, const Coefficients<N>& c, const Inputs<N>&, Torques<N>& out) {
+    out.motor += N::sum(c.torque);
+  }
+};
+FLEXSPLINE_EFFECT(12, CurrentOffset);
+
+}  // namespace flexspline::effects

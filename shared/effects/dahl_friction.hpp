@@ -1,0 +1,59 @@
+#pragma once
+#include "shared/effects/effect.hpp"
+
+namespace flexspline::effects {
+
+struct DahlFriction {
+  static constexpr Description kInfo{
+      .name = "dahl_friction",
+      .reads = kMotorMotion | kMotorAngle,
+      .equation = "replaces coulomb_friction: sigma z, z' = w (1 - s(w) sigma z/Ts), sigma = Ts/presliding",
+      .shows_over = "travel since reversal",
+      .source = "Dahl",
+      .explanation =
+          "After each reversal friction does not jump: the contacts bend like bristles first, and friction builds "
+          "up over a short travel (presliding).",
+      .causes = "Elastic contacts in the mesh and bearings, preload, seals. Makes fine positioning springy.",
+      .rivals = "lugre_friction,coulomb_friction",
+      .separated_by = "small slow motion that reverses often",
+      .replaces = "coulomb_friction",
+  };
+  static constexpr ParameterInfo kParameters[] = {
+      {.name = "torque", .unit = units::kTorque, .usual = 0.045, .low = 0.0},
+      {.name = "presliding",
+       .unit = units::kAngle,
+       .kind = Kind::shape,
+       .usual = 0.05,
+       .low = 1e-12,
+       .limit = Limit::travel},
+  };
+  template <class N>
+  struct Coefficients {
+    typename N::Gain torque;
+    typename N::StepGain per_travel;
+  };
+  // Share of the full friction that the bristles carry, -1 to 1.
+  template <class N>
+  struct State {
+    typename N::State deflection{};
+  };
+  template <class N, class P>
+  static Coefficients<N> derive(const P* p, const DriveConstants<P>& d) {
+    return {N::gain(p[0] / d.torque_base), N::step_gain(d.angle_base / p[1])};
+  }
+  // The law is rate independent, so it is advanced by travel, with the exact solution for one direction: an explicit
+  // step of its rate form diverges at rated speed.
+  template <class N>
+  static void advance(State<N>& state, const Coefficients<N>& c, const Inputs<N>& now, const Inputs<N>& before) {
+    const typename N::Step travel = now.angle - before.angle;
+    const typename N::State decay = N::exp_negative(N::scaled(c.per_travel, N::magnitude(travel)));
+    state.deflection = N::relax(state.deflection, N::sign(travel), decay);
+  }
+  template <class N>
+  static void evaluate(const State<N>& state, const Coefficients<N>& c, const Inputs<N>& in, Torques<N>& out) {
+    out.motor += c.torque * N::times(N::narrow(state.deflection), in.coulomb_scale);
+  }
+};
+FLEXSPLINE_EFFECT(10, DahlFriction);
+
+}  // namespace flexspline::effects

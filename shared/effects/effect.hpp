@@ -1,0 +1,174 @@
+// What every physical effect is made of. An effect is written once, as templates over a number system N, and from its
+// header it appears in every command, in the simulation, in the diagnosis and in the firmware.
+//
+// A number system is a set of types and functions, not one scalar:
+//   Parameter      what `derive` computes with on the host (double, or a dual number); never on the drive
+//   Value          a signal
+//   Angle          a position; wraps on the drive
+//   Step           a difference of two angles
+//   Sum            an unnarrowed sum of torques, so that products fuse
+//   Share, Gain, StepGain   coefficients: below one per unit, of any size, per angle step
+//   share(p), gain(p), step_gain(p), value(p)          Parameter to coefficient
+//   magnitude, select(condition, a, b), positive(x), clamp(x, limit), gauss, exp_negative, exponential, pow_abs, sincos
+// On the host all types are one plain scalar. Effects use operators between coefficients and signals and take every
+// other function from N; they never branch on a value.
+#pragma once
+
+#include <cstddef>
+#include <cstdint>
+#include <limits>
+#include <string_view>
+
+namespace flexspline::effects {
+
+// The three torque balances; an effect adds a term to the right-hand side of its own.
+enum class Balance : std::uint8_t { motor, transmission, load };
+
+// shift: changes a signal before any other effect sees it; modulate: scales another effect; source: adds a torque.
+enum class Phase : std::uint8_t { shift, modulate, source };
+
+// linear: the torque is proportional to it; shape: searched for within bounds; given: stated by the user.
+enum class Kind : std::uint8_t { linear, shape, given };
+
+// Where the bounds of a shape parameter come from when data are at hand.
+enum class Limit : std::uint8_t {
+  stated,    // low and high below hold for any data
+  velocity,  // a motor velocity: above what the mask leaves visible, below a quarter of the fast motion
+  travel,    // a motor angle: above what the filter resolves, below the shortest stroke between reversals
+  torsion,   // a torsion: above the resolution of the positions, below a third of the largest torsion
+};
+
+// What an effect reads, so that it is offered only where it can be seen.
+enum Signals : std::uint16_t {
+  kMotorMotion = 1,
+  kMotorAngle = 2,
+  kOutputMotion = 4,
+  kOutputAngle = 8,
+  kTorsion = 16,
+  kTorque = 32,
+  kCurrent = 64,
+  kTemperature = 128,
+  kTorqueInput = 256,  // where effort is given as torque or force, not as current
+};
+
+// A unit on a rotary axis and its counterpart on a linear one.
+struct Unit {
+  std::string_view rotary;
+  std::string_view linear;
+};
+
+namespace units {
+inline constexpr Unit kNone{"1", "1"};
+inline constexpr Unit kInertia{"kg*m^2", "kg"};
+inline constexpr Unit kTorque{"N*m", "N"};
+inline constexpr Unit kViscous{"N*m*s/rad", "N*s/m"};
+inline constexpr Unit kVelocity{"rad/s", "m/s"};
+inline constexpr Unit kAngle{"rad", "m"};
+inline constexpr Unit kStiffness{"N*m/rad", "N/m"};
+inline constexpr Unit kCurrent{"A", "A"};
+inline constexpr Unit kPerKelvin{"1/degC", "1/degC"};
+}  // namespace units
+
+inline constexpr double kUnbounded = std::numeric_limits<double>::infinity();
+
+struct ParameterInfo {
+  std::string_view name{};
+  Unit unit{};
+  Kind kind = Kind::linear;
+  double usual = 0.0;  // on a drive of the report's class (N = 100, 40 N m, 0.15 N m motor)
+  double low = -kUnbounded;
+  double high = kUnbounded;
+  Limit limit = Limit::stated;
+};
+
+struct Description {
+  std::string_view name{};
+  Balance balance = Balance::motor;
+  Phase phase = Phase::source;
+  unsigned reads = 0;  // Signals
+  std::string_view equation{};
+  std::string_view shows_over{};
+  std::string_view source{};
+  std::string_view explanation{};  // what it is, for somebody who never heard of it
+  std::string_view causes{};       // usual causes, and what to check on the machine
+  std::string_view rivals{};       // names, separated by commas: what it is confused with
+  std::string_view separated_by{}; // the experiment that tells them apart
+  std::string_view replaces{};     // effects that it stands in for, separated by commas
+  std::string_view modulates{};    // the effect that it scales and needs in the model
+};
+
+// Known facts of the drive that derivations use, and the bases of per-unit numbers (all one where numbers are SI).
+template <class P>
+struct DriveConstants {
+  P gear_ratio{1.0};
+  P torque_constant{1.0};     // N m/A; one where effort is given as torque
+  P rated_velocity{1.0};      // rad/s, motor side
+  P reference_temperature{30.0};
+  P turn_angle_scale{1.0};    // radians of motor turn per unit of motor position: 2 pi / pitch on a linear axis
+  P torque_base{1.0};         // motor balance, N m
+  P output_torque_base{1.0};  // transmission and load balance, N m
+  P velocity_base{1.0};
+  P output_velocity_base{1.0};
+  P acceleration_base{1.0};
+  P output_acceleration_base{1.0};
+  P angle_base{1.0};
+  P torsion_base{1.0};
+  P torsion_rate_base{1.0};
+  P temperature_base{1.0};
+};
+
+// Signals common to all effects, computed once a tick. Direction is an input: regression passes a smooth sign, a
+// simulator +1, -1 or 0 from its set-valued solve.
+template <class N>
+struct Inputs {
+  typename N::Angle angle{};          // motor
+  typename N::Value velocity{};
+  typename N::Value speed{};          // magnitude of the velocity
+  typename N::Value direction{};
+  typename N::Value acceleration{};
+  typename N::Angle output_angle{};
+  typename N::Value output_velocity{};
+  typename N::Value output_direction{};
+  typename N::Value output_acceleration{};
+  typename N::Value torsion{};        // q/N - qo, at the output
+  typename N::Value torsion_rate{};
+  typename N::Value torsion_direction{};
+  typename N::Value torque{};         // through the flexspline, output side
+  typename N::Value torque_magnitude{};
+  typename N::Value current{};
+  typename N::Value temperature{};
+  typename N::Value viscous_scale{};  // one unless an effect modulates
+  typename N::Value coulomb_scale{};
+};
+
+template <class N>
+struct Torques {
+  typename N::Sum motor{};
+  typename N::Sum transmission{};
+  typename N::Sum load{};
+};
+
+// An effect without memory: what it does depends on this tick alone.
+struct Stateless {
+  template <class N>
+  struct State {};
+  template <class N, class C>
+  static constexpr void advance(State<N>&, const C&, const Inputs<N>&, const Inputs<N>&) {}
+};
+
+// The effect with a number in the parameter block; each effect's header defines its own. A number used twice does not
+// compile, and numbers are never given again.
+template <std::size_t Id>
+struct AtId {
+  using Effect = void;
+};
+inline constexpr std::size_t kLastId = 63;
+
+#define FLEXSPLINE_EFFECT(ID, TYPE) \
+  template <>                       \
+  struct AtId<ID> {                 \
+    using Effect = TYPE;            \
+  };                                \
+  static_assert(ID <= kLastId)
+
+}  // namespace flexspline::effects

@@ -1,0 +1,36 @@
+#pragma once
+#include "shared/effects/effect.hpp"
+
+namespace flexspline::effects {
+
+struct Inertia : Stateless {
+  static constexpr Description kInfo{
+      .name = "inertia",
+      .reads = kMotorMotion,
+      .equation = "J a",
+      .shows_over = "acceleration",
+      .source = "report eq. 26",
+      .explanation = "The rotor, the coupling and the wave generator resist every change of speed.",
+      .causes = "Always there. A value far from the data sheet points to a wrong torque constant or a loose coupling.",
+      .rivals = "current_delay",
+      .separated_by = "the same amplitude at a second frequency",
+  };
+  static constexpr ParameterInfo kParameters[] = {
+      {.name = "inertia", .unit = units::kInertia, .usual = 1.0e-4, .low = 0.0},
+  };
+  template <class N>
+  struct Coefficients {
+    typename N::Gain inertia;
+  };
+  template <class N, class P>
+  static Coefficients<N> derive(const P* p, const DriveConstants<P>& d) {
+    return {N::gain(p[0] * d.acceleration_base / d.torque_base)};
+  }
+  template <class N>
+  static void evaluate(const State<N>&, const Coefficients<N>& c, const Inputs<N>& in, Torques<N>& out) {
+    out.motor += c.inertia * in.acceleration;
+  }
+};
+FLEXSPLINE_EFFECT(1, Inertia);
+
+}  // namespace flexspline::effects

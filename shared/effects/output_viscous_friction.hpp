@@ -1,0 +1,37 @@
+#pragma once
+#include "shared/effects/effect.hpp"
+
+namespace flexspline::effects {
+
+struct OutputViscousFriction : Stateless {
+  static constexpr Description kInfo{
+      .name = "output_viscous_friction",
+      .balance = Balance::load,
+      .reads = kOutputMotion,
+      .equation = "Tv3 wo",
+      .shows_over = "output velocity",
+      .source = "report eq. 43",
+      .explanation = "Lubricant in the output bearing resists the faster, the more it is sheared.",
+      .causes = "Output bearing and its seal; grease when cold.",
+      .rivals = "viscous_friction",
+      .separated_by = "a torque sensor",
+  };
+  static constexpr ParameterInfo kParameters[] = {
+      {.name = "coefficient", .unit = units::kViscous, .usual = 0.5, .low = 0.0},
+  };
+  template <class N>
+  struct Coefficients {
+    typename N::Gain coefficient;
+  };
+  template <class N, class P>
+  static Coefficients<N> derive(const P* p, const DriveConstants<P>& d) {
+    return {N::gain(p[0] * d.output_velocity_base / d.output_torque_base)};
+  }
+  template <class N>
+  static void evaluate(const State<N>&, const Coefficients<N>& c, const Inputs<N>& in, Torques<N>& out) {
+    out.load += c.coefficient * in.output_velocity;
+  }
+};
+FLEXSPLINE_EFFECT(18, OutputViscousFriction);
+
+}  // namespace flexspline::effects

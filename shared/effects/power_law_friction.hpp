@@ -1,0 +1,40 @@
+#pragma once
+#include "shared/effects/effect.hpp"
+
+namespace flexspline::effects {
+
+struct PowerLawFriction : Stateless {
+  static constexpr Description kInfo{
+      .name = "power_law_friction",
+      .reads = kMotorMotion,
+      .equation = "c abs(w/wref)^d s(w), 0 < d < 1, wref = rated velocity",
+      .shows_over = "velocity, concave",
+      .source = "grease shear thinning",
+      .explanation = "Friction grows with speed, but ever more slowly: the lubricant thins as it is sheared (sublinear "
+                     "friction).",
+      .causes = "Grease; its kind and temperature set the exponent. Usual in strain-wave gears.",
+      .rivals = "viscous_friction,stribeck_gaussian",
+      .separated_by = "steady motion at five or more speeds from slow to rated",
+  };
+  static constexpr ParameterInfo kParameters[] = {
+      {.name = "torque", .unit = units::kTorque, .usual = 0.02, .low = 0.0},
+      {.name = "exponent", .unit = units::kNone, .kind = Kind::shape, .usual = 0.4, .low = 0.15, .high = 0.85},
+  };
+  template <class N>
+  struct Coefficients {
+    typename N::Gain torque;
+    typename N::Gain per_velocity;
+    typename N::Exponent exponent;
+  };
+  template <class N, class P>
+  static Coefficients<N> derive(const P* p, const DriveConstants<P>& d) {
+    return {N::gain(p[0] / d.torque_base), N::gain(d.velocity_base / d.rated_velocity), N::exponent(p[1])};
+  }
+  template <class N>
+  static void evaluate(const State<N>&, const Coefficients<N>& c, const Inputs<N>& in, Torques<N>& out) {
+    out.motor += c.torque * N::times(N::pow_abs(N::scaled(c.per_velocity, in.velocity), c.exponent), in.direction);
+  }
+};
+FLEXSPLINE_EFFECT(7, PowerLawFriction);
+
+}  // namespace flexspline::effects

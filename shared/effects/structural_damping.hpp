@@ -1,0 +1,41 @@
+#pragma once
+#include "shared/effects/effect.hpp"
+
+namespace flexspline::effects {
+
+struct StructuralDamping : Stateless {
+  static constexpr Description kInfo{
+      .name = "structural_damping",
+      .balance = Balance::transmission,
+      .reads = kTorsion | kTorque,
+      .equation = "c abs(v/vref)^alpha s(v), vref = 1 rad/s",
+      .shows_over = "loop, by direction",
+      .source = "report eq. 68, 75",
+      .explanation = "Twisting the flexspline back and forth loses energy: torque against torsion draws a loop, not a line.",
+      .causes = "Material and tooth contact in the flexspline; grows with preload and wear of the teeth.",
+      .rivals = "dahl_hysteresis",
+      .separated_by = "the same torsion amplitude at a second frequency",
+  };
+  static constexpr ParameterInfo kParameters[] = {
+      {.name = "torque", .unit = units::kTorque, .usual = 57.0, .low = 0.0},
+      {.name = "exponent", .unit = units::kNone, .kind = Kind::shape, .usual = 0.5, .low = 0.1, .high = 1.0},
+  };
+  template <class N>
+  struct Coefficients {
+    typename N::Gain torque;
+    typename N::Gain per_rate;
+    typename N::Exponent exponent;
+  };
+  template <class N, class P>
+  static Coefficients<N> derive(const P* p, const DriveConstants<P>& d) {
+    return {N::gain(p[0] / d.output_torque_base), N::gain(d.torsion_rate_base), N::exponent(p[1])};
+  }
+  template <class N>
+  static void evaluate(const State<N>&, const Coefficients<N>& c, const Inputs<N>& in, Torques<N>& out) {
+    out.transmission +=
+        c.torque * N::times(N::pow_abs(N::scaled(c.per_rate, in.torsion_rate), c.exponent), in.torsion_direction);
+  }
+};
+FLEXSPLINE_EFFECT(15, StructuralDamping);
+
+}  // namespace flexspline::effects

@@ -1,0 +1,42 @@
+#pragma once
+#include "shared/effects/effect.hpp"
+
+namespace flexspline::effects {
+
+struct TorqueRipple : Stateless {
+  static constexpr Description kInfo{
+      .name = "torque_ripple",
+      .reads = kMotorMotion | kMotorAngle,
+      .equation = "a cos(k q) + b sin(k q)",
+      .shows_over = "motor angle, order spectrum",
+      .source = "report 5.3",
+      .explanation = "A torque that repeats with the motor's angle, k times a turn.",
+      .causes = "Twice a turn: the wave generator's two lobes and their misalignment. Once: an eccentric coupling or rotor. "
+                "Higher orders: cogging (slots and poles), bearing balls; on a screw, its pitch.",
+      .rivals = "kinematic_error,load_scaled_ripple",
+      .separated_by = "slow constant speed over many turns, then the same at a second load",
+  };
+  static constexpr ParameterInfo kParameters[] = {
+      {.name = "order", .unit = units::kNone, .kind = Kind::given, .usual = 2.0, .low = 0.01, .high = 1000.0},
+      {.name = "cosine", .unit = units::kTorque, .usual = 0.004},
+      {.name = "sine", .unit = units::kTorque, .usual = 0.0},
+  };
+  template <class N>
+  struct Coefficients {
+    typename N::Order order;
+    typename N::Gain cosine;
+    typename N::Gain sine;
+  };
+  template <class N, class P>
+  static Coefficients<N> derive(const P* p, const DriveConstants<P>& d) {
+    return {N::order(p[0] * d.turn_angle_scale), N::gain(p[1] / d.torque_base), N::gain(p[2] / d.torque_base)};
+  }
+  template <class N>
+  static void evaluate(const State<N>&, const Coefficients<N>& c, const Inputs<N>& in, Torques<N>& out) {
+    const auto wave = N::sincos(N::times_order(in.angle, c.order));
+    out.motor += c.cosine * wave.cosine + c.sine * wave.sine;
+  }
+};
+FLEXSPLINE_EFFECT(11, TorqueRipple);
+
+}  // namespace flexspline::effects

@@ -1,0 +1,37 @@
+#pragma once
+#include "shared/effects/effect.hpp"
+
+namespace flexspline::effects {
+
+struct ViscousAsymmetry : Stateless {
+  static constexpr Description kInfo{
+      .name = "viscous_asymmetry",
+      .reads = kMotorMotion,
+      .equation = "dTv abs(w)",
+      .shows_over = "velocity, even",
+      .source = "report eq. 27, 62",
+      .explanation = "Friction grows faster with speed in one direction than in the other.",
+      .causes = "Tooth flanks, bearing preload or brushes that differ by direction; a screw or an axial load; grease that "
+                "is carried to one side.",
+      .rivals = "coulomb_asymmetry",
+      .separated_by = "both directions at two speeds that differ by a factor of five",
+  };
+  static constexpr ParameterInfo kParameters[] = {
+      {.name = "coefficient", .unit = units::kViscous, .usual = 1e-5},
+  };
+  template <class N>
+  struct Coefficients {
+    typename N::Gain coefficient;
+  };
+  template <class N, class P>
+  static Coefficients<N> derive(const P* p, const DriveConstants<P>& d) {
+    return {N::gain(p[0] * d.velocity_base / d.torque_base)};
+  }
+  template <class N>
+  static void evaluate(const State<N>&, const Coefficients<N>& c, const Inputs<N>& in, Torques<N>& out) {
+    out.motor += c.coefficient * in.speed;
+  }
+};
+FLEXSPLINE_EFFECT(4, ViscousAsymmetry);
+
+}  // namespace flexspline::effects

@@ -1,0 +1,36 @@
+#pragma once
+#include "shared/effects/effect.hpp"
+
+namespace flexspline::effects {
+
+struct ViscousFriction : Stateless {
+  static constexpr Description kInfo{
+      .name = "viscous_friction",
+      .reads = kMotorMotion,
+      .equation = "Tv w",
+      .shows_over = "velocity, linear",
+      .source = "report eq. 27, 48",
+      .explanation = "Lubricant is sheared between moving surfaces: the faster, the more torque it takes.",
+      .causes = "Grease in the wave-generator bearing and the tooth mesh; more when cold or over-filled.",
+      .rivals = "power_law_friction",
+      .separated_by = "steady motion at several speeds",
+  };
+  static constexpr ParameterInfo kParameters[] = {
+      {.name = "coefficient", .unit = units::kViscous, .usual = 3.6e-4, .low = 0.0},
+  };
+  template <class N>
+  struct Coefficients {
+    typename N::Gain coefficient;
+  };
+  template <class N, class P>
+  static Coefficients<N> derive(const P* p, const DriveConstants<P>& d) {
+    return {N::gain(p[0] * d.velocity_base / d.torque_base)};
+  }
+  template <class N>
+  static void evaluate(const State<N>&, const Coefficients<N>& c, const Inputs<N>& in, Torques<N>& out) {
+    out.motor += c.coefficient * N::times(in.velocity, in.viscous_scale);
+  }
+};
+FLEXSPLINE_EFFECT(2, ViscousFriction);
+
+}  // namespace flexspline::effects

@@ -1,0 +1,109 @@
+// The plant is the truth of every campaign, so its own error must not be seen: halving the step may change no signal by
+// more than a tenth of what its sensor can tell.
+
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <cctype>
+#include <cmath>
+#include <numbers>
+#include <string>
+#include <vector>
+
+#include "hil/plant/parameters.hpp"
+#include "hil/plant/recorder.hpp"
+
+namespace flexspline::plant {
+namespace {
+
+constexpr double kShareOfNoise = 0.1;
+constexpr double kShareOfCount = 0.1;
+
+std::vector<double> difference(const std::vector<double>& a, const std::vector<double>& b) {
+  std::vector<double> d(a.size());
+  for (std::size_t k = 0; k < a.size(); ++k) d[k] = a[k] - b[k];
+  return d;
+}
+
+double rms(const std::vector<double>& x) {
+  double sum = 0.0;
+  for (const double value : x) sum += value * value;
+  return std::sqrt(sum / static_cast<double>(x.size()));
+}
+
+/// Largest magnitude once mean and linear trend are taken away.
+double largest_without_drift(std::vector<double> x) {
+  const auto n = static_cast<double>(x.size());
+  const double middle = 0.5 * (n - 1.0);
+  double mean = 0.0, moment = 0.0, square = 0.0;
+  for (std::size_t k = 0; k < x.size(); ++k) {
+    const double t = static_cast<double>(k) - middle;
+    mean += x[k] / n;
+    moment += t * x[k];
+    square += t * t;
+  }
+  double largest = 0.0;
+  for (std::size_t k = 0; k < x.size(); ++k) {
+    const double t = static_cast<double>(k) - middle;
+    largest = std::max(largest, std::abs(x[k] - mean - moment / square * t));
+  }
+  return largest;
+}
+
+std::vector<std::string> hidden_effects() {
+  std::vector<std::string> names = {"nothing"};
+  for (const Effect& effect : demo_plant().drive.effects) {
+    const bool base = effect.type == "inertia" || effect.type == "linear_stiffness" ||
+                      effect.type == "viscous_friction" || effect.type == "coulomb_friction" ||
+                      effect.type.starts_with("output_");
+    if (!base) names.push_back(effect.label());
+  }
+  return names;
+}
+
+class PlantConvergence : public testing::TestWithParam<std::string> {};
+
+TEST_P(PlantConvergence, HalvingTheStepChangesLessThanSensorsCanTell) {
+  const PlantFile file = demo_plant();
+  Drive drive = file.drive;
+  if (GetParam() != "nothing") hide(drive, GetParam());
+  drive.sensors.has_tachometer = true;
+  Drive halved = drive;
+  halved.steps_per_sample = 2 * drive.steps_per_sample;
+  ASSERT_LE(drive.sample_s / drive.steps_per_sample, 1e-3 / 16.0 * (1.0 + 1e-12));
+  double worst_velocity = 0.0, worst_torque = 0.0, worst_motor = 0.0, worst_output = 0.0;
+  for (std::size_t i = 0; i < file.experiments.size(); ++i) {
+    const Record a = record_one(drive, file.experiments[i], 1, i);
+    const Record b = record_one(halved, file.experiments[i], 1, i);
+    const double velocity =
+        rms(difference(a.truth.motor_velocity_rad_s, b.truth.motor_velocity_rad_s)) / a.tachometer_noise_std;
+    const double torque = rms(difference(a.truth.torque_nm, b.truth.torque_nm)) / a.torque_noise_std;
+    const double turn = 2.0 * std::numbers::pi;
+    const double motor = largest_without_drift(difference(a.truth.motor_position_rad, b.truth.motor_position_rad)) *
+                         drive.sensors.motor_counts / turn;
+    const double output = largest_without_drift(difference(a.truth.output_position_rad, b.truth.output_position_rad)) *
+                          drive.sensors.output_counts / turn;
+    EXPECT_LT(velocity, kShareOfNoise) << a.name;
+    EXPECT_LT(torque, kShareOfNoise) << a.name;
+    EXPECT_LT(motor, kShareOfCount) << a.name;
+    EXPECT_LT(output, kShareOfCount) << a.name;
+    worst_velocity = std::max(worst_velocity, velocity);
+    worst_torque = std::max(worst_torque, torque);
+    worst_motor = std::max(worst_motor, motor);
+    worst_output = std::max(worst_output, output);
+  }
+  RecordProperty("worst_velocity_share_of_noise", std::to_string(worst_velocity));
+  RecordProperty("worst_torque_share_of_noise", std::to_string(worst_torque));
+  RecordProperty("worst_motor_position_counts", std::to_string(worst_motor));
+  RecordProperty("worst_output_position_counts", std::to_string(worst_output));
+}
+
+INSTANTIATE_TEST_SUITE_P(Hidden, PlantConvergence, testing::ValuesIn(hidden_effects()), [](const auto& test) {
+  std::string name = test.param;
+  std::replace_if(
+      name.begin(), name.end(), [](unsigned char c) { return std::isalnum(c) == 0; }, '_');
+  return name;
+});
+
+}  // namespace
+}  // namespace flexspline::plant
