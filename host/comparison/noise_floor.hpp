@@ -18,7 +18,8 @@ struct NoiseFloor {
 // period-to-period variance where the motion repeats itself; replicates; stated noise and quantisation of the columns
 // propagated through the pipeline. Never extrapolated from above the band.
 std::vector<NoiseFloor> noise_floors(regression::BalanceData& data, const regression::Terms& terms,
-                                     const std::vector<const data::Experiment*>& experiments, const model::Drive& drive);
+                                     const std::vector<const data::Experiment*>& experiments,
+                                     const model::Drive& drive);
 
 // Of all records together, weighted by their rows; none where any record has none.
 NoiseFloor pooled(const std::vector<NoiseFloor>& floors, const std::vector<regression::RowRange>& records);

@@ -3,7 +3,9 @@
 #include <fmt/format.h>
 
 #include <toml++/toml.h>
+#include <cctype>
 #include <cmath>
+#include <fstream>
 
 namespace flexspline::data {
 namespace {
@@ -35,7 +37,25 @@ class Reader {
   std::string file() const { return toml_.file.string(); }
   static std::size_t line(const toml::node& node) { return node.source().begin.line; }
 
+  // toml++ 3.3 asserts, in builds with assertions, on a header that begins with no key, "[.a]": a user's mistake.
+  void refuse_headers_without_a_key() {
+    std::ifstream stream(toml_.file);
+    std::string text;
+    for (std::size_t number = 1; std::getline(stream, text); ++number) {
+      const std::size_t bracket = text.find_first_not_of(" \t\xEF\xBB\xBF");
+      if (bracket == std::string::npos || text[bracket] != '[') continue;
+      const std::size_t key = text.find_first_not_of(" \t", bracket + (text.compare(bracket, 2, "[[") == 0 ? 2 : 1));
+      const bool starts_key =
+          key != std::string::npos && (std::isalnum(static_cast<unsigned char>(text[key])) != 0 ||
+                                       std::string_view("_-\"']").find(text[key]) != std::string_view::npos);
+      if (!starts_key)
+        findings_.fail("format", file(), number, fmt::format("no valid TOML: no name follows the bracket in {}", text),
+                       "mend this line");
+    }
+  }
+
   toml::table parse() {
+    refuse_headers_without_a_key();
     try {
       return toml::parse_file(toml_.file.string());
     } catch (const toml::parse_error& error) {

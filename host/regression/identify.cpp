@@ -13,6 +13,7 @@ namespace {
 
 // Share that a record must add of a parameter's own before its value counts in the table by experiment.
 constexpr double kTellsAlone = 0.03;
+constexpr double kErrorAlone = 0.2;          // and its error must be less than this share of the pooled value
 constexpr double kReliablePercent = 30.0;  // the report's threshold for std/avg
 
 struct Spread {
@@ -46,7 +47,7 @@ void fit_by_experiment(BalanceData& data, const BalanceFit& fit, const Terms& te
     for (std::size_t j = 0; j < fit.linear.size(); ++j) {
       const auto c = static_cast<Eigen::Index>(j);
       const double error = std::sqrt(noise * alone.unit_covariance(c, c) * fit.autocorrelation_time);
-      const bool tells = alone.own_share[c] > kTellsAlone && error < std::abs(estimates[first_estimate + j].value);
+      const bool tells = alone.own_share[c] > kTellsAlone && error < kErrorAlone * std::abs(estimates[first_estimate + j].value);
       estimates[first_estimate + j].per_experiment.emplace_back(
           data.prepared().records[range.record].name, tells ? std::optional(alone.theta[c]) : std::nullopt);
     }

@@ -24,6 +24,9 @@ constexpr double kMotionOverRow = 2.5;
 // Rows per second over the row cut-off: twice the Nyquist rate of what the filter lets through.
 constexpr double kRowsOverCutoff = 4.0;
 
+// How far, in periods of the row cut-off, the step of friction at a reversal rings through the row filter.
+constexpr double kMaskReach = 1.0;
+
 template <class Process>
 std::vector<double> by_segment(const std::vector<double>& signal, const std::vector<Segment>& segments, Process process) {
   std::vector<double> result(signal.size(), 0.0);
@@ -142,7 +145,7 @@ bool is_at_rest(const Record& record, double motion_span, double resolution) {
 
 void choose_rows(Record& record, const Pipeline& pipeline, std::size_t settling) {
   const std::size_t n = record.inputs.size();
-  const auto reach = static_cast<std::size_t>(std::lround(0.6 / (pipeline.row_cutoff_hz * record.sample_s)));
+  const auto reach = static_cast<std::size_t>(std::lround(kMaskReach / (pipeline.row_cutoff_hz * record.sample_s)));
   std::vector<std::uint8_t> unusable(n, 1);
   for (const Segment& s : record.segments) {
     // The ends of a segment carry the filters' guess of what lies beyond; short segments keep at least their middle.
@@ -341,6 +344,7 @@ Prepared prepare_with(const std::vector<const Experiment*>& experiments, const m
   Prepared prepared;
   prepared.pipeline = pipeline;
   prepared.constants = catalogue::constants_of(drive);
+  prepared.rotary = drive.axis == data::Axis::rotary;
   for (const Experiment* e : experiments) {
     if (!e->has(Column::current)) prepared.constants.torque_constant = drive.torque_constant_nm_a.value.value_or(1.0);
     prepared.records.push_back(prepare_one(*e, prepared.constants, pipeline));

@@ -72,6 +72,7 @@ struct Prepared {
   catalogue::DriveConstants<double> constants;
   bool torque_measured = false;  // else motor and load are one balance, with load terms divided by the gear ratio
   bool effort_is_current = false;
+  bool rotary = true;
 };
 
 // Makes all experiments ready. Equations: report 82 (motor), 78 (transmission), 45 (load). Positions, where there are

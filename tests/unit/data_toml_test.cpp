@@ -218,6 +218,7 @@ TEST(DatasetToml, IsRefusedWhereItIsBroken) {
   const std::vector<Broken> files = {
       {"format = \n", "format", 1, "TOML"},
       {std::string(kFormatLine) + "[.drive]\n", "format", 2, "TOML"},
+      {std::string(kFormatLine) + "[[[drive]\n", "format", 2, "TOML"},
       {"format = \"flexspline-model/1\"\n", "format", 1, "--model"},
       {"format = \"flexspline-dataset/9\"\n", "format", 1, "flexspline-dataset/1"},
       {std::string(kFormatLine) + "[drive]\ngear_ratio = \"many\"\n", "key", 3, "above zero"},

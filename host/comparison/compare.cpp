@@ -1,0 +1,296 @@
+#include "host/comparison/compare.hpp"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+#include <stdexcept>
+
+#include "host/comparison/full_rate.hpp"
+#include "host/comparison/noise_floor.hpp"
+#include "host/comparison/row_variables.hpp"
+#include "host/comparison/score.hpp"
+#include "host/regression/balance_fit.hpp"
+#include "host/regression/identify.hpp"
+#include "host/simulation/simulation.hpp"
+
+namespace flexspline::comparison {
+namespace {
+
+using data::Column;
+using data::Experiment;
+using regression::Balance;
+using regression::BalanceData;
+using regression::Prepared;
+using regression::Record;
+
+constexpr double kUnknown = std::numeric_limits<double>::quiet_NaN();
+constexpr std::size_t kFewestBins = 12;
+constexpr std::size_t kMostBins = 24;
+constexpr std::size_t kFewestInRegion = 30;
+constexpr std::size_t kRowsPerBin = 100;
+
+const char* signal_name(Balance balance) {
+  return balance == Balance::motor          ? "motor_balance"
+         : balance == Balance::transmission ? "transmission_balance"
+                                            : "load_balance";
+}
+
+void require_values(const model::Model& model) {
+  std::string missing;
+  for (const model::Effect& effect : model.effects)
+    for (const auto& info : catalogue::get(effect.type).parameters) {
+      const model::Parameter* p = effect.find(info.name);
+      if (!p || !p->value) missing += fmt::format("{}{}.{}", missing.empty() ? "" : ", ", effect.id, info.name);
+    }
+  if (!missing.empty())
+    throw model::ModelError(fmt::format(
+        "model \"{}\" cannot be compared: no value for {}; identify first, or write the values into the model file",
+        model.name, missing));
+}
+
+// All samples of one signal, over experiments.
+struct Together {
+  std::string signal;
+  Score score;
+  double worst_case_gain = kUnknown;
+  std::size_t masked = 0;
+  bool spoilt = false;  // a free run among them diverged
+};
+
+class Comparer {
+ public:
+  Comparer(const data::Dataset& dataset, const model::Model& model, const regression::PipelineOptions& options)
+      : model_(model) {
+    require_values(model);
+    model_.drive = regression::reconcile(model.drive, dataset, result_.warnings);
+    terms_ = regression::terms_of(model_);
+    std::vector<const Experiment*> fit;
+    for (const Experiment& e : dataset.experiments) {
+      all_.push_back(&e);
+      if (e.role == data::Role::fit) fit.push_back(&e);
+      result_.experiments.push_back({e.name, e.role, {}});
+    }
+    // The pipeline of the identification, so that its errors can be compared with these.
+    prepared_ = regression::prepare(fit.empty() ? all_ : fit, model_.drive, options);
+    if (!fit.empty() && fit.size() < all_.size())
+      prepared_ = regression::prepare_with(all_, model_.drive, prepared_.pipeline);
+    result_.pipeline = prepared_.pipeline;
+  }
+
+  Comparison all() {
+    for (const Balance balance : {Balance::motor, Balance::transmission, Balance::load}) {
+      if (balance != Balance::motor && !prepared_.torque_measured) continue;
+      if (regression::terms_on(terms_, balance, prepared_.torque_measured).empty()) continue;
+      BalanceData data(prepared_, balance);
+      if (!data.empty()) inverse(data);
+    }
+    if (result_.experiments.empty() || together_.empty())
+      throw data::DataError({{data::Severity::error, "missing_column", "", 0, "",
+                              "no torque balance of the model can be formed from these columns",
+                              "record current (or torque) and motor position together"}});
+    for (std::size_t i = 0; i < all_.size(); ++i) free_run(i);
+    for (const Together& t : together_) {
+      if (std::any_of(result_.overall.begin(), result_.overall.end(), [&](auto& s) { return s.signal == t.signal; }))
+        continue;
+      SignalResult s = result_of(t.signal, t.score, t.masked, t.spoilt);
+      s.worst_case_gain = t.worst_case_gain;
+      result_.overall.push_back(std::move(s));
+    }
+    return std::move(result_);
+  }
+
+ private:
+  std::string unit_of(const std::string& signal) const {
+    const data::Axis axis = model_.drive.axis;
+    if (signal == "motor_velocity") return data::unit_of(Column::motor_velocity, axis);
+    if (signal == "motor_position") return data::unit_of(Column::motor_position, axis);
+    if (signal == "output_position") return data::unit_of(Column::output_position, axis);
+    return data::unit_of(Column::torque, axis);
+  }
+
+  SignalResult result_of(const std::string& signal, const Score& score, std::size_t masked, bool spoilt) const {
+    SignalResult s;
+    s.signal = signal;
+    s.unit = unit_of(signal);
+    s.samples = score.samples();
+    s.masked = masked;
+    s.rmse = spoilt ? kUnknown : score.rmse();
+    s.nrmse = spoilt ? kUnknown : score.nrmse();
+    s.fit_percent = spoilt ? kUnknown : score.fit_percent();
+    s.vaf_percent = spoilt ? kUnknown : score.vaf_percent();
+    s.max_abs = spoilt ? kUnknown : score.max_abs();
+    s.worst_case_gain = kUnknown;
+    return s;
+  }
+
+  Together& together(const std::string& signal) {
+    for (Together& t : together_)
+      if (t.signal == signal) return t;
+    together_.push_back({signal, {}, kUnknown, 0, false});
+    return together_.back();
+  }
+
+  void keep(std::size_t experiment, SignalResult s, const Score& score) {
+    Together& t = together(s.signal);
+    t.score.add(score);
+    t.masked += s.masked;
+    t.spoilt = t.spoilt || std::isnan(s.rmse);
+    t.worst_case_gain = std::fmax(t.worst_case_gain, s.worst_case_gain);
+    result_.experiments[experiment].signals.push_back(std::move(s));
+  }
+
+  void inverse(BalanceData& data) {
+    const Eigen::VectorXd residual = regression::residual_of(data, terms_);
+    const std::vector<NoiseFloor> floors = noise_floors(data, terms_, all_, model_.drive);
+    const std::string signal = signal_name(data.balance());
+    const bool collapsed = data.balance() == Balance::motor && !prepared_.torque_measured;
+    Eigen::VectorXd floor_squared = Eigen::VectorXd::Constant(data.rows(), kUnknown);
+    for (std::size_t i = 0; i < data.records().size(); ++i) {
+      const regression::RowRange& range = data.records()[i];
+      const Record& record = prepared_.records[range.record];
+      Score score;
+      for (Eigen::Index k = range.first; k < range.last; ++k) score.add(data.target()[k], residual[k]);
+      SignalResult s = result_of(signal, score, record.rows[regression::index(data.balance())].masked, false);
+      s.noise_floor = floors[i].rmse;
+      s.noise_floor_from = floors[i].from;
+      s.collapsed = collapsed;
+      if (const auto full = full_rate(prepared_, record, data.balance(), terms_)) {
+        std::vector<double> error = full->residual;
+        for (std::size_t k = 0; k < error.size(); ++k)
+          if (!full->valid[k]) error[k] = 0.0;
+        s.worst_case_gain = worst_case_gain(full->target, error, record.segments, 1.0 / record.sample_s,
+                                            prepared_.pipeline.row_cutoff_hz);
+      }
+      if (floors[i].rmse)
+        floor_squared.segment(range.first, range.size()).setConstant(*floors[i].rmse * *floors[i].rmse);
+      keep(range.record, std::move(s), score);
+    }
+    const Together& t = together(signal);
+    SignalResult overall = result_of(signal, t.score, t.masked, false);
+    overall.worst_case_gain = t.worst_case_gain;
+    const NoiseFloor floor = pooled(floors, data.records());
+    overall.noise_floor = floor.rmse;
+    overall.noise_floor_from = floor.from;
+    overall.collapsed = collapsed;
+    result_.overall.push_back(std::move(overall));
+    add_regions(data, signal, residual, floor_squared);
+  }
+
+  void add_regions(const BalanceData& data, const std::string& signal, const Eigen::VectorXd& residual,
+                   const Eigen::VectorXd& floor_squared) {
+    const auto wanted =
+        std::clamp<std::size_t>(static_cast<std::size_t>(data.rows()) / kRowsPerBin, kFewestBins, kMostBins);
+    for (const RowVariable& variable : row_variables(data, model_.drive.axis)) {
+      const Bins bins = equal_count_bins(variable.values, wanted);
+      struct Sums {
+        double error = 0.0, squared = 0.0, floor = 0.0;
+        std::size_t rows = 0;
+      };
+      std::vector<Sums> sums(bins.count());
+      for (Eigen::Index k = 0; k < residual.size(); ++k) {
+        const int bin = bins.bin[static_cast<std::size_t>(k)];
+        if (bin < 0) continue;
+        Sums& b = sums[static_cast<std::size_t>(bin)];
+        b.error += residual[k];
+        b.squared += residual[k] * residual[k];
+        b.floor += floor_squared[k];
+        ++b.rows;
+      }
+      for (std::size_t b = 0; b < sums.size(); ++b) {
+        if (sums[b].rows < kFewestInRegion) continue;
+        const auto n = static_cast<double>(sums[b].rows);
+        const double floor = std::sqrt(sums[b].floor / n);
+        Region region{signal,        unit_of(signal),   variable.name,
+                      variable.unit, bins.edges[b],     bins.edges[b + 1],
+                      sums[b].rows,  sums[b].error / n, std::sqrt(sums[b].squared / n),
+                      kUnknown};
+        if (floor > 0.0) region.excess = region.rmse / floor;
+        result_.regions.push_back(std::move(region));
+      }
+    }
+  }
+
+  void free_run(std::size_t i) {
+    const Experiment& e = *all_[i];
+    simulation::FreeRun run;
+    try {
+      run = simulation::run(model_, e);
+    } catch (const simulation::ModelIncomplete& incomplete) {
+      // The same for every experiment.
+      if (i == 0) result_.warnings.push_back(fmt::format("no free run: {}", incomplete.what()));
+      return;
+    } catch (const std::invalid_argument& unusable) {
+      result_.warnings.push_back(fmt::format("no free run: {}", unusable.what()));
+      return;
+    }
+    const Record& record = prepared_.records[i];
+    if (!run.motor_velocity.empty() && record.has_motor_motion) {
+      std::vector<double> measured(e.size());
+      for (std::size_t k = 0; k < e.size(); ++k) measured[k] = record.inputs[k].velocity;
+      // The measured velocity is filtered; the model's likewise, or reversals would differ for that alone.
+      const double sample_hz = 1.0 / e.sample_s;
+      const signals::ZeroPhaseFilter filter(signals::ZeroPhaseFilter::kDefaultOrder,
+                                            std::min(prepared_.pipeline.motion_cutoff_hz, 0.45 * sample_hz), sample_hz);
+      for (const data::Segment& s : record.segments)
+        filter.apply_in_place(std::span<double>(run.motor_velocity.data() + s.first, s.last - s.first));
+      add_free_run(i, "motor_velocity", measured, run.motor_velocity);
+    }
+    if (e.has(Column::motor_position)) add_free_run(i, "motor_position", e[Column::motor_position], run.motor_position);
+    if (e.has(Column::output_position) && e.load != data::Load::locked)
+      add_free_run(i, "output_position", e[Column::output_position], run.output_position);
+    if (e.has(Column::torque)) add_free_run(i, "torque", e[Column::torque], run.torque);
+  }
+
+  void add_free_run(std::size_t i, const char* signal, const std::vector<double>& measured,
+                    const std::vector<double>& simulated) {
+    if (simulated.empty()) return;
+    const Experiment& e = *all_[i];
+    const Record& record = prepared_.records[i];
+    Score score;
+    std::vector<double> error(measured.size(), 0.0);
+    std::size_t masked = 0;
+    bool diverged = false;
+    for (const data::Segment& s : record.segments)
+      for (std::size_t k = s.first; k < s.last; ++k) {
+        if (!e.masked.empty() && e.masked[k]) {
+          ++masked;
+          continue;
+        }
+        error[k] = measured[k] - simulated[k];
+        diverged = diverged || !std::isfinite(error[k]);
+        score.add(measured[k], error[k]);
+      }
+    if (score.samples() == 0) return;
+    SignalResult result = result_of(signal, score, masked, diverged);
+    if (diverged)
+      result_.warnings.push_back(fmt::format("{}: the free run diverges ({})", e.name, signal));
+    else
+      result.worst_case_gain =
+          worst_case_gain(measured, error, record.segments, 1.0 / e.sample_s, prepared_.pipeline.row_cutoff_hz);
+    keep(i, std::move(result), score);
+  }
+
+  model::Model model_;
+  regression::Terms terms_;
+  std::vector<const Experiment*> all_;
+  Prepared prepared_;
+  std::vector<Together> together_;
+  Comparison result_;
+};
+
+}  // namespace
+
+const SignalResult* Comparison::find_overall(std::string_view signal) const {
+  for (const SignalResult& s : overall)
+    if (s.signal == signal) return &s;
+  return nullptr;
+}
+
+Comparison compare(const data::Dataset& dataset, const model::Model& model,
+                   const regression::PipelineOptions& options) {
+  return Comparer(dataset, model, options).all();
+}
+
+}  // namespace flexspline::comparison

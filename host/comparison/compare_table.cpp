@@ -1,0 +1,103 @@
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cmath>
+#include <iterator>
+
+#include "host/comparison/compare.hpp"
+
+namespace flexspline::comparison {
+namespace {
+
+constexpr std::size_t kRegionsInWords = 3;
+
+bool is_balance(const SignalResult& s) {
+  return s.signal.ends_with("_balance");
+}
+
+// Times the noise floor, or where there is none, share of the signal. A free run comes second: it sums errors up.
+double badness(const ExperimentResult& e) {
+  double worst = 0.0;
+  for (const SignalResult& s : e.signals)
+    if (is_balance(s)) {
+      const double bad = s.excess().value_or(s.nrmse);
+      if (std::isfinite(bad)) worst = std::max(worst, bad);
+    }
+  return worst;
+}
+
+std::string cell(double x, const char* suffix = "") {
+  return std::isfinite(x) ? fmt::format("{:.4g}{}", x, suffix) : std::string("-");
+}
+
+void add_line(std::string& text, std::string_view first, const SignalResult& s) {
+  const auto excess = s.excess();
+  fmt::format_to(std::back_inserter(text), "{:<26.26} {:<20} {:>10} {:<6} {:>8} {:>10} {:>8} {:>10} {:>8}\n", first,
+                 s.signal + (s.collapsed ? "*" : ""), cell(s.rmse), s.unit, cell(100.0 * s.nrmse, " %"),
+                 s.noise_floor ? cell(*s.noise_floor) : "-", excess ? cell(*excess) : "-", cell(s.max_abs),
+                 cell(s.worst_case_gain));
+}
+
+std::string words(const Region& r, const SignalResult& overall) {
+  std::string signal = r.signal, variable = r.variable;
+  std::replace(signal.begin(), signal.end(), '_', ' ');
+  std::replace(variable.begin(), variable.end(), '_', ' ');
+  const std::string unit = r.variable_unit.empty() ? "" : " " + r.variable_unit;
+  const std::string size = std::isfinite(r.excess) ? fmt::format("{:.1f} times the noise", r.excess)
+                                                   : fmt::format("{:.1f} times the error of all rows",
+                                                                 overall.rmse > 0.0 ? r.rmse / overall.rmse : 0.0);
+  const char* side = r.bias > 0.0 ? "too little" : "too much";
+  return fmt::format(
+      "The {} at {} from {:.4g} to {:.4g}{}: error {:.3g} {}, {}; on average the model gives {:.3g} {} {}.\n", signal,
+      variable, r.low, r.high, unit, r.rmse, r.unit, size, std::abs(r.bias), r.unit, side);
+}
+
+}  // namespace
+
+std::string table(const Comparison& comparison) {
+  std::string text = fmt::format("{:<26} {:<20} {:>10} {:<6} {:>8} {:>10} {:>8} {:>10} {:>8}\n", "experiment", "signal",
+                                 "rmse", "unit", "of std", "noise", "excess", "largest", "gain");
+  std::vector<const ExperimentResult*> order;
+  for (const ExperimentResult& e : comparison.experiments) order.push_back(&e);
+  std::stable_sort(order.begin(), order.end(), [](auto* a, auto* b) { return badness(*a) > badness(*b); });
+  bool collapsed = false;
+  for (const ExperimentResult* e : order) {
+    bool first = true;
+    for (const SignalResult& s : e->signals) {
+      add_line(text, first ? (e->role == data::Role::holdout ? e->name + " (hold-out)" : e->name) : "", s);
+      collapsed = collapsed || s.collapsed;
+      first = false;
+    }
+  }
+  bool first = true;
+  for (const SignalResult& s : comparison.overall) {
+    add_line(text, first ? "all together" : "", s);
+    first = false;
+  }
+  if (collapsed) text += "* motor and load as one balance: no torque was measured\n";
+
+  const auto size = [&](const Region& r) {
+    const SignalResult* overall = comparison.find_overall(r.signal);
+    if (std::isfinite(r.excess)) return r.excess;
+    return overall && overall->rmse > 0.0 ? r.rmse / overall->rmse : 0.0;
+  };
+  std::vector<const Region*> regions;
+  for (const Region& r : comparison.regions) regions.push_back(&r);
+  std::stable_sort(regions.begin(), regions.end(), [&](auto* a, auto* b) { return size(*a) > size(*b); });
+  // One sentence a variable; its neighbouring bins would say the same.
+  std::vector<const Region*> said;
+  for (const Region* r : regions) {
+    if (said.size() == kRegionsInWords) break;
+    if (std::any_of(said.begin(), said.end(),
+                    [&](const Region* s) { return s->signal == r->signal && s->variable == r->variable; }))
+      continue;
+    said.push_back(r);
+  }
+  if (!said.empty()) text += "\nWhere the error is largest:\n";
+  for (const Region* r : said)
+    if (const SignalResult* overall = comparison.find_overall(r->signal)) text += "  " + words(*r, *overall);
+  for (const std::string& warning : comparison.warnings) text += fmt::format("warning: {}\n", warning);
+  return text;
+}
+
+}  // namespace flexspline::comparison

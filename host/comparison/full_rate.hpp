@@ -1,0 +1,22 @@
+// Residual and target of one record at every sample, where rows are too few or not evenly spaced.
+#pragma once
+
+#include <cstdint>
+#include <optional>
+#include <vector>
+
+#include "host/regression/balance_data.hpp"
+
+namespace flexspline::comparison {
+
+struct FullRate {
+  std::vector<double> target;       // N m, filtered; nought outside the segments
+  std::vector<double> residual;     // target minus model
+  std::vector<std::uint8_t> valid;  // within the stretches that the record's rows are taken from
+};
+
+// Nothing where the record lacks what the balance needs. `record` need not be one of `prepared`, which gives the rest.
+std::optional<FullRate> full_rate(const regression::Prepared& prepared, const regression::Record& record,
+                                  regression::Balance balance, const regression::Terms& terms);
+
+}  // namespace flexspline::comparison

@@ -1,0 +1,201 @@
+#include "host/comparison/residual_map.hpp"
+
+#include <fmt/format.h>
+
+#include <Eigen/QR>
+#include <algorithm>
+#include <boost/math/distributions/fisher_f.hpp>
+#include <cmath>
+#include <limits>
+#include <optional>
+
+#include "host/comparison/row_variables.hpp"
+#include "host/regression/least_squares.hpp"
+
+namespace flexspline::comparison {
+namespace {
+
+using regression::BalanceData;
+using regression::RowRange;
+
+constexpr double kSignificant = 1e-3;
+constexpr int kOrders = 24;
+constexpr double kWholeWaves = 3.0;
+constexpr std::size_t kMostBins = 24;
+constexpr double kIndependentPerBin = 10.0;
+
+// A map or wave: what it predicts in each row (nought where it has no say), with so many free numbers beside the mean.
+struct Explained {
+  Eigen::VectorXd prediction;
+  double parameters = 0.0;
+  double rows = 0.0;       // in which it has a say
+  double explained = 0.0;  // sum of squares, of the rows in which it has a say
+  double total = 0.0;      // likewise, about the mean
+  double all = 0.0;        // of all rows, about the mean
+};
+
+// Adjusted share of the whole residual's variance, where it is significant. Neighbouring rows count as independent as
+// what is left is, not as the residual itself is, which holds the structure that is looked for.
+std::optional<double> significant_share(const BalanceData& data, const Eigen::VectorXd& residual, const Explained& e,
+                                        double longest_tau, double level) {
+  if (!(e.total > 0.0) || e.parameters < 1.0) return std::nullopt;
+  const double r2 = std::clamp(e.explained / e.total, 0.0, 1.0 - 1e-12);
+  // What explains less than this at one degree of freedom a number is nothing under any autocorrelation.
+  if (r2 * e.rows < e.parameters) return std::nullopt;
+  const double tau =
+      std::clamp(regression::autocorrelation_time(data.records(), residual - e.prediction), 1.0, longest_tau);
+  const double independent = e.rows / tau, freedom = independent - 1.0 - e.parameters;
+  if (freedom < 4.0) return std::nullopt;
+  const double f = (r2 / e.parameters) / ((1.0 - r2) / freedom);
+  const boost::math::fisher_f distribution(e.parameters, freedom);
+  if (boost::math::cdf(boost::math::complement(distribution, f)) > level) return std::nullopt;
+  const double adjusted = 1.0 - (1.0 - r2) * (independent - 1.0) / freedom;
+  if (!(adjusted > 0.0) || !(e.all > 0.0)) return std::nullopt;
+  return adjusted * std::min(1.0, e.total / e.all);
+}
+
+// A step function over the bins, of the residual or, with `directions`, of the residual times the direction.
+Explained map_of(const Bins& bins, const Eigen::VectorXd& residual, const Eigen::VectorXd* directions) {
+  Explained e;
+  e.prediction = Eigen::VectorXd::Zero(residual.size());
+  std::vector<double> sum(bins.count(), 0.0), count(bins.count(), 0.0);
+  const auto sign = [&](Eigen::Index k) { return directions ? (*directions)[k] : 1.0; };
+  const auto bin = [&](Eigen::Index k) { return std::isfinite(sign(k)) ? bins.bin[static_cast<std::size_t>(k)] : -1; };
+  double all = 0.0, squares = 0.0, with_sign = 0.0, signed_sum = 0.0;
+  for (Eigen::Index k = 0; k < residual.size(); ++k) {
+    if (!std::isfinite(sign(k))) continue;
+    e.all += residual[k] * residual[k];
+    signed_sum += residual[k] * sign(k);
+    with_sign += 1.0;
+    if (bin(k) < 0) continue;
+    const auto b = static_cast<std::size_t>(bin(k));
+    sum[b] += residual[k] * sign(k);
+    count[b] += 1.0;
+    all += residual[k] * sign(k);
+    squares += residual[k] * residual[k];
+    e.rows += 1.0;
+  }
+  if (e.rows < 16.0) return e;
+  e.all -= signed_sum * signed_sum / with_sign;
+  e.explained = -all * all / e.rows;
+  e.total = squares + e.explained;
+  e.parameters = -1.0;
+  for (std::size_t b = 0; b < sum.size(); ++b)
+    if (count[b] > 0.0) {
+      e.explained += sum[b] * sum[b] / count[b];
+      e.parameters += 1.0;
+    }
+  for (Eigen::Index k = 0; k < residual.size(); ++k)
+    if (bin(k) >= 0)
+      e.prediction[k] = sign(k) * sum[static_cast<std::size_t>(bin(k))] / count[static_cast<std::size_t>(bin(k))];
+  return e;
+}
+
+Bins record_bins(const BalanceData& data) {
+  Bins bins;
+  bins.bin.assign(static_cast<std::size_t>(data.rows()), -1);
+  for (std::size_t r = 0; r < data.records().size(); ++r)
+    for (Eigen::Index k = data.records()[r].first; k < data.records()[r].last; ++k)
+      bins.bin[static_cast<std::size_t>(k)] = static_cast<int>(r);
+  for (std::size_t r = 0; r <= data.records().size(); ++r) bins.edges.push_back(static_cast<double>(r));
+  return bins;
+}
+
+Bins direction_bins(const Eigen::VectorXd& directions) {
+  Bins bins;
+  bins.edges = {-1.0, 0.0, 1.0};
+  for (const double d : directions) bins.bin.push_back(!std::isfinite(d) ? -1 : d < 0.0 ? 0 : 1);
+  return bins;
+}
+
+// A wave of the motor's turn, as it comes through the filter of the rows: at speed, high orders do not. The zero of an
+// angle that is not absolute differs from record to record, so each record has a phase of its own then. Records that do
+// not see some whole waves stand aside: a part of one looks like anything that is smooth.
+Explained wave_of(const BalanceData& data, const Eigen::VectorXd& residual, int order) {
+  const auto& prepared = data.prepared();
+  const auto balance = regression::index(data.balance());
+  const double per_unit = static_cast<double>(order) * prepared.constants.turn_angle_scale;
+  struct Group {
+    Eigen::Matrix3d normal = Eigen::Matrix3d::Zero();
+    Eigen::Vector3d y = Eigen::Vector3d::Zero();
+    double squares = 0.0;
+    std::vector<RowRange> ranges;
+  };
+  bool absolute = true;
+  for (const RowRange& range : data.records())
+    absolute = absolute && prepared.records[range.record].experiment->motor_position_zero != data::PositionZero::none;
+  Eigen::MatrixX3d x = Eigen::MatrixX3d::Zero(data.rows(), 3);
+  std::vector<Group> groups;
+  for (const RowRange& range : data.records()) {
+    const auto& record = prepared.records[range.record];
+    if (!record.has_motor_motion) continue;
+    const auto& samples = record.rows[balance].samples;
+    double low = std::numeric_limits<double>::infinity(), high = -low;
+    for (Eigen::Index k = range.first; k < range.last; ++k) {
+      const auto& in = record.inputs[samples[static_cast<std::size_t>(k - range.first)]];
+      const double wave = per_unit * in.angle;
+      const double frequency_hz = std::abs(per_unit * in.velocity) / (2.0 * M_PI);
+      const double gain = 1.0 / (1.0 + std::pow(frequency_hz / prepared.pipeline.row_cutoff_hz,
+                                                2.0 * static_cast<double>(signals::ZeroPhaseFilter::kDefaultOrder)));
+      low = std::min(low, wave);
+      high = std::max(high, wave);
+      x.row(k) << 1.0, gain * std::cos(wave), gain * std::sin(wave);
+    }
+    if (high - low < kWholeWaves * 2.0 * M_PI) continue;
+    if (!absolute || groups.empty()) groups.emplace_back();
+    Group& group = groups.back();
+    const auto part = x.middleRows(range.first, range.size());
+    const auto y = residual.segment(range.first, range.size());
+    group.normal += part.transpose() * part;
+    group.y += part.transpose() * y;
+    group.squares += y.squaredNorm();
+    group.ranges.push_back(range);
+  }
+  Explained e;
+  e.all = (residual.array() - residual.mean()).square().sum();
+  e.prediction = Eigen::VectorXd::Zero(residual.size());
+  for (const Group& group : groups) {
+    const Eigen::Vector3d theta = group.normal.colPivHouseholderQr().solve(group.y);
+    const double mean_part = group.y[0] * group.y[0] / group.normal(0, 0);
+    e.explained += group.y.dot(theta) - mean_part;
+    e.total += group.squares - mean_part;
+    e.rows += group.normal(0, 0);
+    e.parameters += 2.0;
+    for (const RowRange& range : group.ranges)
+      e.prediction.segment(range.first, range.size()) = x.middleRows(range.first, range.size()) * theta;
+  }
+  return e;
+}
+
+}  // namespace
+
+std::vector<Share> localise(const BalanceData& data, const Eigen::VectorXd& residual, double autocorrelation_time,
+                            data::Axis axis) {
+  std::vector<Share> shares;
+  if (residual.size() != data.rows() || residual.size() < 16) return shares;
+  const double tau = std::max(1.0, autocorrelation_time);
+  const double independent = static_cast<double>(residual.size()) / tau;
+  const auto wanted = std::clamp<std::size_t>(static_cast<std::size_t>(independent / kIndependentPerBin), 4, kMostBins);
+  const Eigen::VectorXd directions = row_directions(data);
+  const auto add = [&](std::string name, const Explained& explained, double level) {
+    if (const auto share = significant_share(data, residual, explained, tau, level))
+      shares.push_back({std::move(name), 100.0 * *share});
+  };
+  const auto add_maps = [&](const std::string& name, const Bins& bins) {
+    add(name, map_of(bins, residual, nullptr), kSignificant);
+    add(name + " x direction", map_of(bins, residual, &directions), kSignificant);
+  };
+  for (const RowVariable& variable : row_variables(data, axis))
+    add_maps(variable.name, equal_count_bins(variable.values, wanted));
+  add("direction", map_of(direction_bins(directions), residual, nullptr), kSignificant);
+  if (data.records().size() > 1) add_maps("record", record_bins(data));
+  // The turn of a linear axis is known by its pitch alone.
+  const bool turns = axis == data::Axis::rotary || data.prepared().constants.turn_angle_scale != 1.0;
+  for (int order = 1; turns && order <= kOrders; ++order)
+    add(fmt::format("motor_angle order {}", order), wave_of(data, residual, order), kSignificant / kOrders);
+  std::stable_sort(shares.begin(), shares.end(),
+                   [](const Share& a, const Share& b) { return a.share_percent > b.share_percent; });
+  return shares;
+}
+
+}  // namespace flexspline::comparison

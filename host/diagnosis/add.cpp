@@ -1,0 +1,167 @@
+#include "host/diagnosis/add.hpp"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <charconv>
+#include <cmath>
+
+#include "host/comparison/noise_floor.hpp"
+#include "host/diagnosis/candidates.hpp"
+
+namespace flexspline::diagnosis {
+namespace {
+
+using regression::Balance;
+using regression::BalanceData;
+using regression::Identification;
+
+double root_mean_square(const Eigen::VectorXd& r) {
+  return r.size() ? std::sqrt(r.squaredNorm() / static_cast<double>(r.size())) : 0.0;
+}
+
+// Hold-out records on the pipeline of the fit.
+struct Holdout {
+  std::vector<const data::Experiment*> experiments;
+  regression::Prepared prepared;
+  std::unique_ptr<BalanceData> data;
+
+  Holdout(const data::Dataset& dataset, const Identification& fitted, Balance balance) {
+    for (const data::Experiment& e : dataset.experiments)
+      if (e.role == data::Role::holdout) experiments.push_back(&e);
+    if (experiments.empty()) return;
+    prepared = regression::prepare_with(experiments, fitted.model.drive, fitted.prepared.pipeline);
+    prepared.torque_measured = fitted.prepared.torque_measured;
+    data = std::make_unique<BalanceData>(prepared, balance);
+    if (data->empty()) data.reset();
+  }
+};
+
+// The balance on which an effect shows: its own, or the motor's where there is no torque sensor.
+const std::size_t* find_balance(const Identification& fitted, Balance own, std::size_t& found) {
+  const Balance balance = fitted.prepared.torque_measured ? own : Balance::motor;
+  for (std::size_t b = 0; b < fitted.data.size(); ++b)
+    if (fitted.data[b].balance() == balance) {
+      found = b;
+      return &found;
+    }
+  return nullptr;
+}
+
+Addition compare_models(const data::Dataset& dataset, const model::Model& before, const model::Model& after,
+                        Balance own, std::string effect, std::string action, const regression::PipelineOptions& options) {
+  Addition result;
+  result.effect = std::move(effect);
+  const auto base = regression::identify(dataset, before, options);
+  regression::PipelineOptions same = options;
+  const auto extended = regression::identify(dataset, after, same);
+  std::size_t b = 0, x = 0;
+  if (!find_balance(*base, own, b) || !find_balance(*extended, own, x))
+    throw data::DataError({{data::Severity::error, "missing_column", "", 0, "",
+                            fmt::format("these data hold nothing that would show {}", result.effect),
+                            fmt::format("see `flexspline effects {}` for what to record", result.effect.substr(0, result.effect.find(':')))}});
+  const Balance balance = base->data[b].balance();
+  result.signal = std::string(balance_signal(balance));
+  result.unit = before.drive.axis == data::Axis::linear ? "N" : "N*m";
+  result.before.rmse_fit = root_mean_square(regression::residual_of(base->data[b], base->terms));
+  result.after.rmse_fit = root_mean_square(regression::residual_of(extended->data[x], extended->terms));
+  Holdout holdout(dataset, *base, balance);
+  std::vector<const data::Experiment*> judged;
+  BalanceData* judged_on = &extended->data[x];
+  if (holdout.data) {
+    result.before.rmse_holdout = root_mean_square(regression::residual_of(*holdout.data, base->terms));
+    result.after.rmse_holdout = root_mean_square(regression::residual_of(*holdout.data, extended->terms));
+    judged_on = holdout.data.get();
+    judged = holdout.experiments;
+  } else {
+    for (const data::Experiment& e : dataset.experiments)
+      if (e.role == data::Role::fit) judged.push_back(&e);
+  }
+  const comparison::NoiseFloor floor =
+      comparison::pooled(comparison::noise_floors(*judged_on, extended->terms, judged, extended->model.drive), judged_on->records());
+  result.noise_floor = floor.rmse;
+  result.noise_floor_from = floor.from;
+  result.model = extended->model;
+  result.model.history.push_back({std::move(action), result.effect, result.before.rmse_holdout.value_or(result.before.rmse_fit),
+                                  result.after.rmse_holdout.value_or(result.after.rmse_fit)});
+  result.estimates = extended->estimates;
+  result.warnings = extended->warnings;
+  return result;
+}
+
+}  // namespace
+
+std::string_view balance_signal(Balance balance) {
+  switch (balance) {
+    case Balance::motor: return "motor_balance";
+    case Balance::transmission: return "transmission_balance";
+    case Balance::load: return "load_balance";
+  }
+  return "";
+}
+
+EffectName parse_effect(std::string_view text) {
+  const std::size_t colon = text.find(':');
+  EffectName name;
+  name.entry = catalogue::find(text.substr(0, colon));
+  if (!name.entry)
+    throw model::ModelError(fmt::format("there is no effect named \"{}\"; `flexspline effects` lists them", text.substr(0, colon)));
+  const bool ordered = name.entry->count(effects::Kind::given) > 0;
+  if (colon == std::string_view::npos) {
+    if (ordered)
+      throw model::ModelError(fmt::format("{} needs its order per motor turn; write {}:2, for example", text, text));
+    return name;
+  }
+  const std::string_view order = text.substr(colon + 1);
+  double value = 0.0;
+  const auto parsed = std::from_chars(order.data(), order.data() + order.size(), value);
+  if (!ordered) throw model::ModelError(fmt::format("{} has no order; leave out \":{}\"", name.entry->name(), order));
+  if (parsed.ec != std::errc() || parsed.ptr != order.data() + order.size() || !(value > 0.0))
+    throw model::ModelError(fmt::format("\"{}\" is no order; write a positive number, as in {}:2", order, name.entry->name()));
+  name.order = value;
+  return name;
+}
+
+Addition add(const data::Dataset& dataset, const model::Model& model, std::string_view effect,
+             const regression::PipelineOptions& options) {
+  const EffectName name = parse_effect(effect);
+  const regression::Terms terms = regression::terms_of(model);
+  const regression::Terms extended = extend(terms, *name.entry, name.order);  // checks that it may be added
+  model::Model after = model;
+  std::erase_if(after.effects, [&](const model::Effect& e) {
+    return std::none_of(extended.begin(), extended.end(), [&](const regression::Term& t) { return t.id == e.id; });
+  });
+  model::Effect added = catalogue::blank_effect(*name.entry, model.drive.axis);
+  added.id = extended.back().id;
+  if (name.order)
+    for (std::size_t p = 0; p < added.parameters.size(); ++p)
+      if (name.entry->parameters[p].kind == effects::Kind::given) added.parameters[p].value = name.order;
+  after.effects.push_back(std::move(added));
+  return compare_models(dataset, model, after, name.entry->info->balance, std::string(effect), "add", options);
+}
+
+Addition remove(const data::Dataset& dataset, const model::Model& model, std::string_view id,
+                const regression::PipelineOptions& options) {
+  const model::Effect* found = model.find(id);
+  if (!found) {
+    const EffectName name = parse_effect(id);
+    for (const model::Effect& e : model.effects)
+      if (regression::term_of(e).label() == (name.order ? fmt::format("{}:{:g}", name.entry->name(), *name.order) : std::string(id)))
+        found = &e;
+  }
+  if (!found) {
+    std::string known;
+    for (const model::Effect& e : model.effects) known += (known.empty() ? "" : ", ") + e.id;
+    throw model::ModelError(fmt::format("the model has no effect \"{}\"; it has {}", id, known));
+  }
+  const std::string out = found->id;
+  const catalogue::Entry& entry = catalogue::get(found->type);
+  for (const model::Effect& e : model.effects)
+    if (catalogue::get(e.type).info->modulates == entry.name() && e.id != out)
+      throw model::ModelError(fmt::format("{} scales {}; remove {} first", e.id, out, e.id));
+  model::Model after = model;
+  std::erase_if(after.effects, [&](const model::Effect& e) { return e.id == out; });
+  return compare_models(dataset, model, after, entry.info->balance, out, "remove", options);
+}
+
+}  // namespace flexspline::diagnosis

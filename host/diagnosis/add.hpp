@@ -1,0 +1,51 @@
+// An effect more or less in a model: refitted, with the error before and after on data that the fit saw and that it never
+// saw.
+#pragma once
+
+#include <optional>
+#include <string>
+#include <string_view>
+
+#include "host/data/dataset.hpp"
+#include "host/model/model.hpp"
+#include "host/regression/identify.hpp"
+
+namespace flexspline::diagnosis {
+
+struct Errors {
+  double rmse_fit = 0.0;
+  std::optional<double> rmse_holdout;  // none without hold-out records
+};
+
+struct Addition {
+  std::string effect;       // "torque_ripple:2"
+  std::string signal;       // "motor_balance", ...
+  std::string unit;
+  Errors before, after;
+  std::optional<double> noise_floor;  // on the hold-out records where there are any, else on the fitted ones
+  std::string noise_floor_from = "none";
+  model::Model model;                 // refitted, with the step in its history
+  std::vector<regression::Estimate> estimates;
+  std::vector<std::string> warnings;
+};
+
+// What a user writes: a name of the catalogue, with an order where the effect has one ("torque_ripple:2"). Throws
+// model::ModelError naming what is known instead.
+struct EffectName {
+  const catalogue::Entry* entry = nullptr;
+  std::optional<double> order;
+};
+EffectName parse_effect(std::string_view text);
+
+// Adds an effect and refits everything, shapes continuously. Experiments of role fit are fitted, those of role holdout
+// judged. Throws model::ModelError where the effect cannot be added and data::DataError where the data cannot show it.
+Addition add(const data::Dataset& dataset, const model::Model& model, std::string_view effect,
+             const regression::PipelineOptions& options);
+
+// Takes an effect out, by its id or its name, and refits.
+Addition remove(const data::Dataset& dataset, const model::Model& model, std::string_view id,
+                const regression::PipelineOptions& options);
+
+std::string_view balance_signal(regression::Balance balance);
+
+}  // namespace flexspline::diagnosis

@@ -1,0 +1,27 @@
+// Effects of the catalogue that a model does not have and the data could show.
+#pragma once
+
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "host/regression/balance_data.hpp"
+#include "host/regression/terms.hpp"
+
+namespace flexspline::diagnosis {
+
+struct Proposal {
+  const catalogue::Entry* entry = nullptr;
+  std::optional<double> order;
+  regression::Terms extended;  // the model with it: what it replaces is gone, it stands last
+  double added = 0.0;          // parameters more than before
+};
+
+// All effects that may be added on this balance; shapes are in the middle of their range.
+std::vector<Proposal> proposals(const regression::BalanceData& data, const regression::Terms& terms);
+
+// A model with an effect more. Throws model::ModelError where it cannot be (what it modulates or replaces is missing, or
+// it is there already).
+regression::Terms extend(const regression::Terms& terms, const catalogue::Entry& entry, std::optional<double> order);
+
+}  // namespace flexspline::diagnosis

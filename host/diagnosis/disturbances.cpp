@@ -1,0 +1,116 @@
+#include "host/diagnosis/disturbances.hpp"
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <numeric>
+
+namespace flexspline::diagnosis {
+namespace {
+
+using regression::BalanceData;
+using regression::Record;
+using regression::RowRange;
+
+constexpr double kFarOut = 6.0;          // robust standard deviations
+constexpr double kLongest = 0.15;        // s; what lasts longer is a state of the drive
+constexpr double kRepeats = 0.35;        // share of like rows that stand out too: above, it depends on that signal
+constexpr std::size_t kLike = 120;       // rows that count as like ones
+constexpr double kMostOfRecord = 0.3;    // more than that is no exception
+
+double median(std::vector<double> x) {
+  if (x.empty()) return 0.0;
+  const auto middle = x.begin() + static_cast<std::ptrdiff_t>(x.size() / 2);
+  std::nth_element(x.begin(), middle, x.end());
+  return *middle;
+}
+
+// For each row, the share of the rows nearest in `signal` that are marked.
+std::vector<double> share_among_like(const std::vector<double>& signal, const std::vector<std::uint8_t>& marked) {
+  const std::size_t n = signal.size();
+  std::vector<std::size_t> order(n);
+  std::iota(order.begin(), order.end(), std::size_t{0});
+  std::sort(order.begin(), order.end(), [&](std::size_t a, std::size_t b) { return signal[a] < signal[b]; });
+  std::vector<std::size_t> sum(n + 1, 0);
+  for (std::size_t k = 0; k < n; ++k) sum[k + 1] = sum[k] + marked[order[k]];
+  std::vector<double> share(n, 0.0);
+  for (std::size_t k = 0; k < n; ++k) {
+    const std::size_t half = std::min(kLike / 2, n / 4);
+    const std::size_t low = k > half ? k - half : 0, high = std::min(n, k + half + 1);
+    share[order[k]] = static_cast<double>(sum[high] - sum[low]) / static_cast<double>(high - low);
+  }
+  return share;
+}
+
+}  // namespace
+
+std::vector<Disturbance> find_disturbances(const BalanceData& data, const Eigen::VectorXd& residual, Eigen::VectorXd& keep) {
+  std::vector<Disturbance> found;
+  for (const RowRange& range : data.records()) {
+    const Record& r = data.prepared().records[range.record];
+    const auto& samples = r.rows[regression::index(data.balance())].samples;
+    const std::size_t n = samples.size();
+    if (r.at_rest || n < 200) continue;
+    std::vector<double> size(n);
+    std::array<std::vector<double>, 4> signals;  // what an effect of the drive might depend on
+    for (auto& signal : signals) signal.resize(n);
+    double reversal = r.experiment->time_s.front();
+    std::size_t at = 0;
+    for (std::size_t k = 0; k < r.inputs.size() && at < n; ++k) {
+      if (k > 0 && r.direction_variable(data.balance(), k) * r.direction_variable(data.balance(), k - 1) <= 0.0)
+        reversal = r.experiment->time_s[k];
+      if (samples[at] != k) continue;
+      size[at] = std::abs(residual[range.first + static_cast<Eigen::Index>(at)]);
+      signals[0][at] = r.direction_variable(data.balance(), k);
+      signals[1][at] = r.experiment->time_s[k] - reversal;
+      signals[2][at] = r.inputs[k].angle;
+      signals[3][at] = r.inputs[k].torsion;
+      ++at;
+    }
+    const double far = kFarOut * 1.4826 * median(size);
+    std::vector<std::uint8_t> marked(n);
+    for (std::size_t k = 0; k < n; ++k) marked[k] = size[k] > far;
+    const double share = static_cast<double>(std::accumulate(marked.begin(), marked.end(), 0)) / static_cast<double>(n);
+    if (share == 0.0 || share > kMostOfRecord) continue;
+    std::vector<double> alike(n, 0.0);  // largest share of marked rows among those like this one
+    for (const auto& signal : signals) {
+      if (signal.front() == signal.back() && *std::max_element(signal.begin(), signal.end()) == signal.front()) continue;
+      const std::vector<double> shares = share_among_like(signal, marked);
+      for (std::size_t k = 0; k < n; ++k) alike[k] = std::max(alike[k], shares[k]);
+    }
+    const double row_s = r.sample_s * static_cast<double>(r.decimation);
+    const auto reach = static_cast<std::size_t>(std::ceil(1.0 / data.prepared().pipeline.row_cutoff_hz / row_s));
+    for (std::size_t k = 0; k < n;) {
+      if (!marked[k]) {
+        ++k;
+        continue;
+      }
+      // One burst may dip below the limit where it changes sign.
+      std::size_t end = k, last = k;
+      double peak = 0.0, explained = 0.0, rows = 0.0;
+      while (end < n && end - last <= 2 * reach && samples[end] - samples[last] <= 4 * reach * r.decimation) {
+        if (marked[end]) {
+          last = end;
+          peak = std::max(peak, size[end]);
+          explained += alike[end];
+          rows += 1.0;
+        }
+        ++end;
+      }
+      const double from = r.experiment->time_s[samples[k]], to = r.experiment->time_s[samples[last]];
+      const std::size_t low = k > reach ? k - reach : 0, high = std::min(n - 1, last + reach);
+      // Beside rows that the mask left out, at a reversal or a start, friction that the model lacks looks the same.
+      const std::size_t before = low > reach ? low - reach : 0, after = std::min(n - 1, high + reach);
+      const bool beside_mask =
+          samples[after] - samples[before] != (after - before) * r.decimation || before == 0 || after == n - 1;
+      if (to - from <= kLongest && explained / rows < kRepeats && !beside_mask) {
+        found.push_back({r.name, from, to, peak, {}});
+        for (std::size_t j = low; j <= high; ++j) keep[range.first + static_cast<Eigen::Index>(j)] = 0.0;
+      }
+      k = end;
+    }
+  }
+  return found;
+}
+
+}  // namespace flexspline::diagnosis
