@@ -156,7 +156,9 @@ class Comparer {
       s.noise_floor = floors[i].rmse;
       s.noise_floor_from = floors[i].from;
       s.collapsed = collapsed;
-      if (const auto full = full_rate(prepared_, record, data.balance(), terms_)) {
+      // A drive that is off excites no lines.
+      const auto full = record.at_rest ? std::nullopt : full_rate(prepared_, record, data.balance(), terms_);
+      if (full) {
         std::vector<double> error = full->residual;
         for (std::size_t k = 0; k < error.size(); ++k)
           if (!full->valid[k]) error[k] = 0.0;
@@ -266,7 +268,7 @@ class Comparer {
     SignalResult result = result_of(signal, score, masked, diverged);
     if (diverged)
       result_.warnings.push_back(fmt::format("{}: the free run diverges ({})", e.name, signal));
-    else
+    else if (!record.at_rest)
       result.worst_case_gain =
           worst_case_gain(measured, error, record.segments, 1.0 / e.sample_s, prepared_.pipeline.row_cutoff_hz);
     keep(i, std::move(result), score);

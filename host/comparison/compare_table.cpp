@@ -30,9 +30,13 @@ std::string cell(double x, const char* suffix = "") {
   return std::isfinite(x) ? fmt::format("{:.4g}{}", x, suffix) : std::string("-");
 }
 
-void add_line(std::string& text, std::string_view first, const SignalResult& s) {
+std::string label(const ExperimentResult& e) {
+  return e.role == data::Role::holdout ? e.name + " (hold-out)" : e.name;
+}
+
+void add_line(std::string& text, std::size_t width, std::string_view first, const SignalResult& s) {
   const auto excess = s.excess();
-  fmt::format_to(std::back_inserter(text), "{:<26.26} {:<20} {:>10} {:<6} {:>8} {:>10} {:>8} {:>10} {:>8}\n", first,
+  fmt::format_to(std::back_inserter(text), "{:<{}} {:<20} {:>10} {:<6} {:>8} {:>10} {:>8} {:>10} {:>8}\n", first, width,
                  s.signal + (s.collapsed ? "*" : ""), cell(s.rmse), s.unit, cell(100.0 * s.nrmse, " %"),
                  s.noise_floor ? cell(*s.noise_floor) : "-", excess ? cell(*excess) : "-", cell(s.max_abs),
                  cell(s.worst_case_gain));
@@ -55,8 +59,10 @@ std::string words(const Region& r, const SignalResult& overall) {
 }  // namespace
 
 std::string table(const Comparison& comparison) {
-  std::string text = fmt::format("{:<26} {:<20} {:>10} {:<6} {:>8} {:>10} {:>8} {:>10} {:>8}\n", "experiment", "signal",
-                                 "rmse", "unit", "of std", "noise", "excess", "largest", "gain");
+  std::size_t width = std::string_view("all together").size();
+  for (const ExperimentResult& e : comparison.experiments) width = std::max(width, label(e).size());
+  std::string text = fmt::format("{:<{}} {:<20} {:>10} {:<6} {:>8} {:>10} {:>8} {:>10} {:>8}\n", "experiment", width,
+                                 "signal", "rmse", "unit", "of std", "noise", "excess", "largest", "gain");
   std::vector<const ExperimentResult*> order;
   for (const ExperimentResult& e : comparison.experiments) order.push_back(&e);
   std::stable_sort(order.begin(), order.end(), [](auto* a, auto* b) { return badness(*a) > badness(*b); });
@@ -64,14 +70,14 @@ std::string table(const Comparison& comparison) {
   for (const ExperimentResult* e : order) {
     bool first = true;
     for (const SignalResult& s : e->signals) {
-      add_line(text, first ? (e->role == data::Role::holdout ? e->name + " (hold-out)" : e->name) : "", s);
+      add_line(text, width, first ? label(*e) : "", s);
       collapsed = collapsed || s.collapsed;
       first = false;
     }
   }
   bool first = true;
   for (const SignalResult& s : comparison.overall) {
-    add_line(text, first ? "all together" : "", s);
+    add_line(text, width, first ? "all together" : "", s);
     first = false;
   }
   if (collapsed) text += "* motor and load as one balance: no torque was measured\n";

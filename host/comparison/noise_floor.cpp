@@ -26,7 +26,8 @@ constexpr double kSameAngleRad = 0.05;
 constexpr double kSamePosition = 0.01;
 constexpr double kSamePositionUnknownPitch = 0.005;
 constexpr double kSameVelocity = 0.02;
-// The search for the period may be generous: what did not repeat is left out afterwards.
+// The search for the period may end up generous: what did not repeat is left out afterwards.
+constexpr double kRepetition = 0.02;
 constexpr double kLooseRepetition = 0.25;
 // Pairs wanted, as a share of the record's usable samples and as a number of rows.
 constexpr double kWantedShare = 0.3;
@@ -101,15 +102,21 @@ struct Pairs {
   }
 };
 
-// Period of the motion in samples. Set points repeat exactly, so they are asked first.
+// Period of the motion in samples. Set points repeat exactly, so they are asked first; the start of a record is left
+// out where it takes that, as motions are faded in.
 std::optional<double> period_of(const Experiment& e) {
-  for (const Column column : {Column::position_command, Column::motor_position, Column::velocity_command}) {
-    if (!e.has(column)) continue;
-    const auto& longest = *std::max_element(e.segments.begin(), e.segments.end(),
-                                            [](auto& a, auto& b) { return a.last - a.first < b.last - b.first; });
-    const std::span<const double> signal(e[column].data() + longest.first, longest.last - longest.first);
-    if (const auto repetition = signals::find_repetition(signal, kLooseRepetition)) return repetition->exact_samples;
-  }
+  const auto& longest = *std::max_element(e.segments.begin(), e.segments.end(), [](const auto& a, const auto& b) {
+    return a.last - a.first < b.last - b.first;
+  });
+  const std::size_t n = longest.last - longest.first;
+  for (const double limit : {kRepetition, kLooseRepetition})
+    for (const Column column : {Column::position_command, Column::motor_position, Column::velocity_command}) {
+      if (!e.has(column)) continue;
+      for (const std::size_t skip : {std::size_t{0}, n / 10, n / 4}) {
+        const std::span<const double> signal(e[column].data() + longest.first + skip, n - skip);
+        if (const auto repetition = signals::find_repetition(signal, limit)) return repetition->exact_samples;
+      }
+    }
   return std::nullopt;
 }
 

@@ -20,13 +20,14 @@ using regression::RowRange;
 
 constexpr double kSignificant = 1e-3;
 constexpr int kOrders = 24;
-constexpr double kWholeWaves = 3.0;
+constexpr double kWholeWaves = 2.0;
 constexpr std::size_t kMostBins = 24;
-constexpr double kIndependentPerBin = 10.0;
+constexpr std::size_t kRowsPerBin = 16;
 
 // A map or wave: what it predicts in each row (nought where it has no say), with so many free numbers beside the mean.
 struct Explained {
   Eigen::VectorXd prediction;
+  std::vector<RowRange> records;  // in which it has a say
   double parameters = 0.0;
   double rows = 0.0;       // in which it has a say
   double explained = 0.0;  // sum of squares, of the rows in which it has a say
@@ -36,14 +37,13 @@ struct Explained {
 
 // Adjusted share of the whole residual's variance, where it is significant. Neighbouring rows count as independent as
 // what is left is, not as the residual itself is, which holds the structure that is looked for.
-std::optional<double> significant_share(const BalanceData& data, const Eigen::VectorXd& residual, const Explained& e,
-                                        double longest_tau, double level) {
+std::optional<double> significant_share(const Eigen::VectorXd& residual, const Explained& e, double longest_tau,
+                                        double level) {
   if (!(e.total > 0.0) || e.parameters < 1.0) return std::nullopt;
   const double r2 = std::clamp(e.explained / e.total, 0.0, 1.0 - 1e-12);
   // What explains less than this at one degree of freedom a number is nothing under any autocorrelation.
   if (r2 * e.rows < e.parameters) return std::nullopt;
-  const double tau =
-      std::clamp(regression::autocorrelation_time(data.records(), residual - e.prediction), 1.0, longest_tau);
+  const double tau = std::clamp(regression::autocorrelation_time(e.records, residual - e.prediction), 1.0, longest_tau);
   const double independent = e.rows / tau, freedom = independent - 1.0 - e.parameters;
   if (freedom < 4.0) return std::nullopt;
   const double f = (r2 / e.parameters) / ((1.0 - r2) / freedom);
@@ -55,8 +55,10 @@ std::optional<double> significant_share(const BalanceData& data, const Eigen::Ve
 }
 
 // A step function over the bins, of the residual or, with `directions`, of the residual times the direction.
-Explained map_of(const Bins& bins, const Eigen::VectorXd& residual, const Eigen::VectorXd* directions) {
+Explained map_of(const BalanceData& data, const Bins& bins, const Eigen::VectorXd& residual,
+                 const Eigen::VectorXd* directions) {
   Explained e;
+  e.records = data.records();
   e.prediction = Eigen::VectorXd::Zero(residual.size());
   std::vector<double> sum(bins.count(), 0.0), count(bins.count(), 0.0);
   const auto sign = [&](Eigen::Index k) { return directions ? (*directions)[k] : 1.0; };
@@ -161,6 +163,7 @@ Explained wave_of(const BalanceData& data, const Eigen::VectorXd& residual, int 
     e.total += group.squares - mean_part;
     e.rows += group.normal(0, 0);
     e.parameters += 2.0;
+    e.records.insert(e.records.end(), group.ranges.begin(), group.ranges.end());
     for (const RowRange& range : group.ranges)
       e.prediction.segment(range.first, range.size()) = x.middleRows(range.first, range.size()) * theta;
   }
@@ -174,20 +177,19 @@ std::vector<Share> localise(const BalanceData& data, const Eigen::VectorXd& resi
   std::vector<Share> shares;
   if (residual.size() != data.rows() || residual.size() < 16) return shares;
   const double tau = std::max(1.0, autocorrelation_time);
-  const double independent = static_cast<double>(residual.size()) / tau;
-  const auto wanted = std::clamp<std::size_t>(static_cast<std::size_t>(independent / kIndependentPerBin), 4, kMostBins);
+  const auto wanted = std::clamp<std::size_t>(static_cast<std::size_t>(residual.size()) / kRowsPerBin, 4, kMostBins);
   const Eigen::VectorXd directions = row_directions(data);
   const auto add = [&](std::string name, const Explained& explained, double level) {
-    if (const auto share = significant_share(data, residual, explained, tau, level))
+    if (const auto share = significant_share(residual, explained, tau, level))
       shares.push_back({std::move(name), 100.0 * *share});
   };
   const auto add_maps = [&](const std::string& name, const Bins& bins) {
-    add(name, map_of(bins, residual, nullptr), kSignificant);
-    add(name + " x direction", map_of(bins, residual, &directions), kSignificant);
+    add(name, map_of(data, bins, residual, nullptr), kSignificant);
+    add(name + " x direction", map_of(data, bins, residual, &directions), kSignificant);
   };
   for (const RowVariable& variable : row_variables(data, axis))
     add_maps(variable.name, equal_count_bins(variable.values, wanted));
-  add("direction", map_of(direction_bins(directions), residual, nullptr), kSignificant);
+  add("direction", map_of(data, direction_bins(directions), residual, nullptr), kSignificant);
   if (data.records().size() > 1) add_maps("record", record_bins(data));
   // The turn of a linear axis is known by its pitch alone.
   const bool turns = axis == data::Axis::rotary || data.prepared().constants.turn_angle_scale != 1.0;

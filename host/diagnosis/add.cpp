@@ -66,7 +66,9 @@ Addition compare_models(const data::Dataset& dataset, const model::Model& before
   result.before.rmse_fit = root_mean_square(regression::residual_of(base->data[b], base->terms));
   result.after.rmse_fit = root_mean_square(regression::residual_of(extended->data[x], extended->terms));
   Holdout holdout(dataset, *base, balance);
-  std::vector<const data::Experiment*> judged;
+  std::vector<const data::Experiment*> fitted, judged;
+  for (const data::Experiment& e : dataset.experiments)
+    if (e.role == data::Role::fit) fitted.push_back(&e);
   BalanceData* judged_on = &extended->data[x];
   if (holdout.data) {
     result.before.rmse_holdout = root_mean_square(regression::residual_of(*holdout.data, base->terms));
@@ -74,11 +76,13 @@ Addition compare_models(const data::Dataset& dataset, const model::Model& before
     judged_on = holdout.data.get();
     judged = holdout.experiments;
   } else {
-    for (const data::Experiment& e : dataset.experiments)
-      if (e.role == data::Role::fit) judged.push_back(&e);
+    judged = fitted;
   }
-  const comparison::NoiseFloor floor =
+  comparison::NoiseFloor floor =
       comparison::pooled(comparison::noise_floors(*judged_on, extended->terms, judged, extended->model.drive), judged_on->records());
+  if (!floor.rmse && holdout.data)
+    floor = comparison::pooled(comparison::noise_floors(extended->data[x], extended->terms, fitted, extended->model.drive),
+                               extended->data[x].records());
   result.noise_floor = floor.rmse;
   result.noise_floor_from = floor.from;
   result.model = extended->model;

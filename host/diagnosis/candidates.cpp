@@ -41,6 +41,15 @@ bool visible(const BalanceData& data, const catalogue::Entry& entry) {
   if ((reads & effects::kTorque) && !p.torque_measured) return false;
   if ((reads & effects::kCurrent) && !p.effort_is_current) return false;
   if ((reads & effects::kTorqueInput) && p.effort_is_current) return false;
+  const auto any = [&](auto what) {
+    return std::any_of(data.records().begin(), data.records().end(),
+                       [&](const regression::RowRange& range) { return what(p.records[range.record]); });
+  };
+  // Behind a rigid gear the output's motion is the motor's, and so are its effects.
+  if ((reads & effects::kOutputMotion) && !(reads & effects::kOutputAngle) &&
+      !any([](const regression::Record& r) { return r.has_output_motion; }))
+    return false;
+  if ((reads & effects::kOutputAngle) && !p.rotary) return false;
   if (reads & effects::kTemperature) {
     double low = 1e300, high = -1e300;
     for (const auto& range : data.records()) {

@@ -47,6 +47,7 @@ struct Trial {
   Fall fall;
   bool admissible = true;
   std::string why_not;
+  std::string imitated_by;  // the effect of the model that the data cannot tell it from
 };
 
 // Squares left after the best linear fit, with the base's weights: enough to choose a shape on a grid.
@@ -85,8 +86,29 @@ std::optional<std::size_t> position(const Judged& judged, std::string_view id, s
   return std::nullopt;
 }
 
+// The effect of the model whose column looks most like that of the added one.
+std::string imitator(BalanceData& data, const Judged& judged, std::size_t added) {
+  std::string best = "the model";
+  double most = 0.0;
+  for (const Slot& own : judged.linear) {
+    if (own.term != added) continue;
+    const Eigen::VectorXd column = data.column(judged.terms, own);
+    for (const Slot& other : judged.linear) {
+      if (other.term == added) continue;
+      const Eigen::VectorXd& theirs = data.column(judged.terms, other);
+      const double norm = column.norm() * theirs.norm();
+      const double alike = norm > 0.0 ? std::abs(column.dot(theirs)) / norm : 0.0;
+      if (alike > most) {
+        most = alike;
+        best = judged.terms[other.term].id;
+      }
+    }
+  }
+  return best;
+}
+
 // A candidate that needs an impossible value, or that makes the base model impossible, is a fit and no explanation.
-void check_admissible(const Judged& base, Trial& trial) {
+void check_admissible(BalanceData& data, const Judged& base, Trial& trial) {
   const auto& judged = trial.judged;
   const auto refuse = [&](std::string why) {
     if (trial.admissible) trial.why_not = std::move(why);
@@ -109,11 +131,19 @@ void check_admissible(const Judged& base, Trial& trial) {
     const auto before = position(base, t.id, info.name);
     if (!before) continue;
     const double was = base.theta[static_cast<Eigen::Index>(*before)];
-    const bool certain = was > 5.0 * base.std[static_cast<Eigen::Index>(*before)];
-    if (certain && std::abs(value - was) > 0.5 * std::abs(was))
-      refuse(fmt::format("{} would change from {:.3g} to {:.3g}", t.id, was, value));
+    if (was <= 5.0 * base.std[static_cast<Eigen::Index>(*before)]) continue;
+    // A coefficient moves with its exponent, so torques are compared, not numbers.
+    const std::size_t old = base.linear[*before].term;
+    const Eigen::VectorXd torque = data.term_torque(base.terms, old);
+    // An effect that is hardly larger than what is missing is not known well enough to rule anything out.
+    if (torque.norm() < 2.0 * base.residual.norm()) continue;
+    const double change = (data.term_torque(judged.terms, judged.linear[j].term) - torque).norm() / torque.norm();
+    if (change > 0.5) refuse(fmt::format("{} would change by {:.0f} % (its {} from {:.3g} to {:.3g})", t.id, 100.0 * change, info.name, was, value));
   }
-  if (!any_own) refuse("the model's own effects can imitate it in these data");
+  if (!any_own) {
+    trial.imitated_by = imitator(data, judged, added);
+    refuse(fmt::format("{} can imitate it in these data", trial.imitated_by));
+  }
 }
 
 Trial evaluate(Search& search, Proposal proposal) {
@@ -121,8 +151,29 @@ Trial evaluate(Search& search, Proposal proposal) {
   trial.judged = judge(*search.data, proposal.extended, search.keep);
   trial.fall = fall_of(search.base, trial.judged, proposal.added);
   trial.proposal = std::move(proposal);
-  check_admissible(search.base, trial);
+  check_admissible(*search.data, search.base, trial);
   return trial;
+}
+
+bool better(const Trial& a, const Trial& b);
+
+// Where the best shape makes the model impossible, the best of those that do not: a bound that the model's own meaning
+// sets. Returns `refused` where there is none.
+Trial best_admissible(Search& search, Proposal proposal, Trial refused) {
+  Term& added = proposal.extended.back();
+  if (refused.fall.score < kNamedScore) return refused;
+  for (std::size_t p = 0; p < added.values.size(); ++p) {
+    if (!added.free_shape(p)) continue;
+    const double chosen = added.values[p];
+    for (const double value : regression::shape_grid(regression::shape_range(*search.data, added, p), kGridPoints)) {
+      if (value == chosen) continue;
+      added.values[p] = value;
+      Trial trial = evaluate(search, proposal);
+      if (better(trial, refused)) refused = std::move(trial);
+    }
+    added.values[p] = chosen;
+  }
+  return refused;
 }
 
 bool better(const Trial& a, const Trial& b) {
@@ -139,7 +190,8 @@ std::vector<Trial> rank(Search& search) {
   std::vector<Trial> trials;
   for (Proposal& proposal : proposals(*search.data, search.base.terms)) {
     choose_shapes(search, proposal);
-    trials.push_back(evaluate(search, std::move(proposal)));
+    trials.push_back(evaluate(search, proposal));
+    if (!trials.back().admissible) trials.back() = best_admissible(search, std::move(proposal), std::move(trials.back()));
   }
   std::sort(trials.begin(), trials.end(), better);
   for (std::size_t i = 0; i < std::min(kRefined, trials.size()); ++i) {
@@ -172,6 +224,7 @@ Candidate report(const Trial& trial, const Search& search, data::Axis axis) {
   c.p_value = trial.fall.p_value;
   c.admissible = trial.admissible;
   c.why_not = trial.why_not;
+  if (!trial.imitated_by.empty()) c.rivals.push_back(trial.imitated_by);
   const std::size_t added = trial.judged.terms.size() - 1;
   const Term& term = trial.judged.terms[added];
   for (std::size_t p = 0; p < term.values.size(); ++p) {
@@ -222,6 +275,17 @@ std::optional<Trial> eliminate(Search& search, const Trial& first) {
   const Fall lost = fall_of(instead.judged, second.judged, first.proposal.added);
   if (passes(instead) && lost.score < kNamedScore) return instead;
   return std::nullopt;
+}
+
+// Friction that rises out of standstill over a wide range of speed is a concave friction curve, whatever its formula
+// (EFFECTS): a Stribeck term with two negative amplitudes is then reported as sublinear friction.
+bool is_sublinear(const Trial& trial, const BalanceData& data) {
+  if (trial.proposal.entry->name() != "stribeck_gaussian") return false;
+  const Term& term = trial.judged.terms.back();
+  const auto value = [&](std::string_view name) { return term.values[term.entry->index_of(name)]; };
+  const regression::ShapeRange range = regression::shape_range(data, term, term.entry->index_of("velocity"));
+  // The range ends at a quarter of the fast motion; wide is from a tenth of it.
+  return value("amplitude_positive") < 0.0 && value("amplitude_negative") < 0.0 && value("velocity") > 0.4 * range.high;
 }
 
 }  // namespace
@@ -284,6 +348,7 @@ Diagnosis diagnose(const data::Dataset& dataset, const model::Model& model, cons
       chosen = b;
     }
   }
+  std::string alias;  // an effect that the named one stands for as well
   const bool named = !ranked[chosen].empty() && passes(ranked[chosen].front());
   if (named) {
     say("checking what else could explain it");
@@ -295,6 +360,14 @@ Diagnosis diagnose(const data::Dataset& dataset, const model::Model& model, cons
                                 }),
                  list.end());
       list.insert(list.begin(), std::move(*instead));
+    }
+    if (is_sublinear(ranked[chosen].front(), *searches[chosen].data)) {
+      auto& list = ranked[chosen];
+      const auto law = std::find_if(list.begin(), list.end(), [](const Trial& t) { return t.proposal.entry->name() == "power_law_friction"; });
+      if (law != list.end() && law->fall.score > kNamedScore) {
+        std::rotate(list.begin(), law, law + 1);
+        alias = "stribeck_gaussian";
+      }
     }
   } else {
     double excess = 0.0;
@@ -313,6 +386,11 @@ Diagnosis diagnose(const data::Dataset& dataset, const model::Model& model, cons
   result.noise_floor = floors[chosen].rmse;
   result.noise_floor_from = floors[chosen].from;
   result.localised = shares(*search.data, search.base);
+  for (std::size_t b = 0; b < ranked.size(); ++b)
+    for (const Trial& t : ranked[b])
+      if (!t.imitated_by.empty())
+        result.warnings.push_back(fmt::format("{0} cannot be told from {1} in these data: {1} stands for what both share; {2} would tell them apart",
+                                              t.proposal.entry->name(), t.imitated_by, t.proposal.entry->info->separated_by));
   // All balances' candidates in one list, the named one's balance first where scores are equal.
   for (std::size_t b = 0; b < ranked.size(); ++b)
     for (const Trial& t : ranked[b]) result.candidates.push_back(report(t, searches[b], axis));
@@ -329,7 +407,8 @@ Diagnosis diagnose(const data::Dataset& dataset, const model::Model& model, cons
   if (named) {
     result.named.push_back({std::string(list.front().proposal.entry->name()), list.front().proposal.order});
     for (std::size_t i = 1; i < list.size(); ++i) {
-      if (!passes(list[i]) || list[i].fall.score < list.front().fall.score - kRivalMargin) continue;
+      const bool close = passes(list[i]) && list[i].fall.score >= list.front().fall.score - kRivalMargin;
+      if (!close && list[i].proposal.entry->name() != alias) continue;
       result.named.push_back({std::string(list[i].proposal.entry->name()), list[i].proposal.order});
     }
     result.verdict = result.named.size() > 1 ? Verdict::confusable_effects : Verdict::missing_effect;

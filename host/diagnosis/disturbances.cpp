@@ -5,6 +5,8 @@
 #include <cmath>
 #include <numeric>
 
+#include "host/signals/spectrum.hpp"
+
 namespace flexspline::diagnosis {
 namespace {
 
@@ -25,6 +27,21 @@ double median(std::vector<double> x) {
   return *middle;
 }
 
+// What is left of a residual when its slow part is taken away: a running median, which a burst does not move.
+std::vector<double> without_slow_part(const Eigen::VectorXd& residual, const RowRange& range, std::size_t half_window) {
+  const auto n = static_cast<std::size_t>(range.size());
+  std::vector<double> fast(n), window;
+  for (std::size_t k = 0; k < n; ++k) {
+    const std::size_t low = k > half_window ? k - half_window : 0, high = std::min(n, k + half_window + 1);
+    window.assign(residual.data() + range.first + static_cast<Eigen::Index>(low),
+                  residual.data() + range.first + static_cast<Eigen::Index>(high));
+    const auto middle = window.begin() + static_cast<std::ptrdiff_t>(window.size() / 2);
+    std::nth_element(window.begin(), middle, window.end());
+    fast[k] = residual[range.first + static_cast<Eigen::Index>(k)] - *middle;
+  }
+  return fast;
+}
+
 // For each row, the share of the rows nearest in `signal` that are marked.
 std::vector<double> share_among_like(const std::vector<double>& signal, const std::vector<std::uint8_t>& marked) {
   const std::size_t n = signal.size();
@@ -42,6 +59,29 @@ std::vector<double> share_among_like(const std::vector<double>& signal, const st
   return share;
 }
 
+// Rows at which a residual above the limit comes again a period of the motion later or earlier: what repeats with the
+// motion belongs to the drive.
+std::vector<std::uint8_t> recurs(const Record& r, const std::vector<std::size_t>& samples,
+                                 const std::vector<double>& size, double limit, std::size_t reach) {
+  std::vector<std::uint8_t> again(size.size(), 0);
+  const std::vector<double>& position = (*r.experiment)[data::Column::motor_position];
+  if (position.empty()) return again;
+  const auto repetition = signals::find_repetition(position);
+  if (!repetition) return again;
+  std::vector<std::uint8_t> near(r.inputs.size(), 0);
+  const std::size_t wide = reach * r.decimation;
+  for (std::size_t k = 0; k < size.size(); ++k)
+    if (size[k] > limit)
+      for (std::size_t j = samples[k] - std::min(samples[k], wide); j <= std::min(near.size() - 1, samples[k] + wide); ++j)
+        near[j] = 1;
+  for (std::size_t k = 0; k < size.size(); ++k) {
+    const std::size_t later = samples[k] + repetition->samples;
+    again[k] = (later < near.size() && near[later]) ||
+               (samples[k] >= repetition->samples && near[samples[k] - repetition->samples]);
+  }
+  return again;
+}
+
 }  // namespace
 
 std::vector<Disturbance> find_disturbances(const BalanceData& data, const Eigen::VectorXd& residual, Eigen::VectorXd& keep) {
@@ -56,11 +96,13 @@ std::vector<Disturbance> find_disturbances(const BalanceData& data, const Eigen:
     for (auto& signal : signals) signal.resize(n);
     double reversal = r.experiment->time_s.front();
     std::size_t at = 0;
+    const double row_s = r.sample_s * static_cast<double>(r.decimation);
+    const std::vector<double> fast = without_slow_part(residual, range, static_cast<std::size_t>(std::ceil(kLongest / row_s)));
     for (std::size_t k = 0; k < r.inputs.size() && at < n; ++k) {
       if (k > 0 && r.direction_variable(data.balance(), k) * r.direction_variable(data.balance(), k - 1) <= 0.0)
         reversal = r.experiment->time_s[k];
       if (samples[at] != k) continue;
-      size[at] = std::abs(residual[range.first + static_cast<Eigen::Index>(at)]);
+      size[at] = std::abs(fast[at]);
       signals[0][at] = r.direction_variable(data.balance(), k);
       signals[1][at] = r.experiment->time_s[k] - reversal;
       signals[2][at] = r.inputs[k].angle;
@@ -78,8 +120,8 @@ std::vector<Disturbance> find_disturbances(const BalanceData& data, const Eigen:
       const std::vector<double> shares = share_among_like(signal, marked);
       for (std::size_t k = 0; k < n; ++k) alike[k] = std::max(alike[k], shares[k]);
     }
-    const double row_s = r.sample_s * static_cast<double>(r.decimation);
     const auto reach = static_cast<std::size_t>(std::ceil(1.0 / data.prepared().pipeline.row_cutoff_hz / row_s));
+    const std::vector<std::uint8_t> recurring = recurs(r, samples, size, 0.6 * far, reach);
     for (std::size_t k = 0; k < n;) {
       if (!marked[k]) {
         ++k;
@@ -92,7 +134,7 @@ std::vector<Disturbance> find_disturbances(const BalanceData& data, const Eigen:
         if (marked[end]) {
           last = end;
           peak = std::max(peak, size[end]);
-          explained += alike[end];
+          explained += recurring[end] ? 1.0 : alike[end];
           rows += 1.0;
         }
         ++end;

@@ -29,6 +29,8 @@ Eigen::MatrixXd design(BalanceData& data, const Terms& terms, const std::vector<
 void predict_left_out(const BalanceData& data, const Eigen::MatrixXd& X, const Eigen::VectorXd& y, Judged& judged) {
   const auto folds = data.folds(kFolds);
   const Eigen::Index columns = X.cols();
+  // Columns of like size, so that the factorisation can tell a small column from a needless one.
+  const Eigen::VectorXd size = X.colwise().norm().transpose().array().max(1e-300);
   // One triangle for each fold; a fit without a fold stacks the others.
   std::vector<Eigen::MatrixXd> triangles;
   for (const auto& fold : folds) {
@@ -39,7 +41,7 @@ void predict_left_out(const BalanceData& data, const Eigen::MatrixXd& X, const E
     Eigen::Index at = 0;
     for (const RowRange& range : fold) {
       const auto weights = judged.root_weights.segment(range.first, range.size()).asDiagonal();
-      block.block(at, 0, range.size(), columns) = weights * X.middleRows(range.first, range.size());
+      block.block(at, 0, range.size(), columns) = weights * (X.middleRows(range.first, range.size()) * size.cwiseInverse().asDiagonal());
       block.block(at, columns, range.size(), 1) = weights * y.segment(range.first, range.size());
       at += range.size();
     }
@@ -56,8 +58,10 @@ void predict_left_out(const BalanceData& data, const Eigen::MatrixXd& X, const E
         stack.middleRows(at, columns + 1) = triangles[f];
         at += columns + 1;
       }
-    const Eigen::VectorXd theta =
-        Eigen::ColPivHouseholderQR<Eigen::MatrixXd>(stack.leftCols(columns)).setThreshold(1e-10).solve(stack.col(columns));
+    const Eigen::VectorXd theta = Eigen::ColPivHouseholderQR<Eigen::MatrixXd>(stack.leftCols(columns))
+                                      .setThreshold(1e-7)
+                                      .solve(stack.col(columns))
+                                      .cwiseQuotient(size);
     for (std::size_t i = 0; i < folds[out].size(); ++i) {
       const RowRange& range = folds[out][i];
       const Eigen::VectorXd r = y.segment(range.first, range.size()) - X.middleRows(range.first, range.size()) * theta;
@@ -115,7 +119,11 @@ Judged judge(BalanceData& data, Terms terms, const Eigen::VectorXd& keep) {
   judged.autocorrelation_time = regression::autocorrelation_time(data.records(), weighted);
   const double variance = weighted.squaredNorm() / std::max(1.0, static_cast<double>(data.rows() - X.cols()));
   judged.std = (fit.unit_covariance.diagonal() * variance * judged.autocorrelation_time).cwiseSqrt();
-  predict_left_out(data, X, y, judged);
+  // What the whole data do not determine, a part of them does still less.
+  std::vector<Eigen::Index> determined;
+  for (Eigen::Index j = 0; j < X.cols(); ++j)
+    if (fit.own_share[j] >= regression::kUndetermined) determined.push_back(j);
+  predict_left_out(data, X(Eigen::all, determined), y, judged);
   judged.terms = std::move(terms);
   return judged;
 }

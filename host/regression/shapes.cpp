@@ -53,6 +53,21 @@ double shortest_stroke(const BalanceData& data) {
   return quantile(strokes, 0.1);
 }
 
+// Travel after a reversal that the data cannot resolve: some counts of the encoder, and what is covered under the mask.
+double unseen_travel(const BalanceData& data) {
+  std::vector<double> travel;
+  double counts = 0.0;
+  for (const RowRange& range : data.records()) {
+    const Record& r = data.prepared().records[range.record];
+    counts = std::max(counts, 4.0 * r.motor_quantum.value_or(0.0));
+    const double masked_s = 1.0 / data.prepared().pipeline.row_cutoff_hz;
+    for (std::size_t k = 1; k < r.inputs.size(); ++k)
+      if (r.inputs[k].velocity * r.inputs[k - 1].velocity < 0.0)
+        travel.push_back(0.5 * std::abs(r.inputs[k].acceleration) * masked_s * masked_s);
+  }
+  return std::max(counts, quantile(travel, 0.1));
+}
+
 // The sum over rows of weighted squares after the best linear parameters.
 double projected_cost(const Eigen::MatrixXd& X, const Eigen::VectorXd& y, const Eigen::VectorXd& root_weights) {
   const Eigen::MatrixXd A = root_weights.asDiagonal() * X;
@@ -142,10 +157,7 @@ ShapeRange shape_range(const BalanceData& data, const Term& term, std::size_t pa
       break;
     }
     case Limit::travel: {
-      double resolution = 0.0;
-      for (const RowRange& r : data.records())
-        resolution = std::max(resolution, data.prepared().records[r.record].motor_quantum.value_or(0.0));
-      scale_between(std::max(4.0 * resolution, 1e-9), shortest_stroke(data));
+      scale_between(std::max(unseen_travel(data), 1e-9), shortest_stroke(data));
       break;
     }
     case Limit::torsion: {

@@ -1,0 +1,253 @@
+#include "host/cli/app.hpp"
+
+#include <fmt/format.h>
+
+#include <CLI/CLI.hpp>
+#include <algorithm>
+#include <cstdio>
+#include <exception>
+#include <functional>
+#include <memory>
+#include <string>
+#include <string_view>
+#include <vector>
+
+#include "host/cli/commands.hpp"
+#include "host/cli/help.hpp"
+#include "host/data/findings.hpp"
+#include "host/output/text.hpp"
+
+namespace flexspline::cli {
+namespace {
+
+constexpr const char* kDataHelp = "measurements: any number of CSV files, folders, dataset.tomls";
+
+// A command as it was parsed, ready to run.
+struct Chosen {
+  std::function<int(Console&)> run;
+  std::string json;
+};
+
+class App {
+ public:
+  App() {
+    app_.description(
+        "Flexspline finds out which physical effects a drive with strain-wave gear has, and which its model lacks.");
+    app_.require_subcommand(1);
+    add_new();
+    add_check();
+    add_effects();
+    add_identify();
+    add_simulate();
+    add_compare();
+    add_diagnose();
+    add_change<AddOptions>("add", "effect of the catalogue; torque_ripple:2 gives an order");
+    add_change<RemoveOptions>("remove", "id of the effect in the model, or its type");
+    add_not_built();
+    std::vector<std::string> to_come(not_built_yet().begin(), not_built_yet().end());
+    app_.footer(output::wrapped(fmt::format("Not built yet: {}.", output::listed(to_come)), 0) +
+                "\n\nflexspline COMMAND --help explains each with an example. Exit codes: 0 done, 1 a limit that was "
+                "given is not met,\n2 unusable input or arguments.");
+  }
+
+  int run(int argc, char** argv) {
+    const std::string command = argc > 1 ? argv[1] : "";
+    if (const std::string problem = wrong_command(command); !problem.empty()) {
+      fmt::print(stderr, "flexspline: {}\n", problem);
+      return kUnusable;
+    }
+    try {
+      app_.parse(argc, argv);
+    } catch (const CLI::ParseError& error) {
+      if (error.get_exit_code() == 0) return app_.exit(error);
+      fmt::print(stderr, "flexspline {}: {}; flexspline {} --help shows what it takes\n", command, error.what(),
+                 command);
+      return kUnusable;
+    }
+    return run_chosen(command);
+  }
+
+ private:
+  std::string wrong_command(const std::string& command) const {
+    if (command.empty()) return "no command was given; flexspline --help lists them";
+    if (command.starts_with("-")) return {};
+    std::vector<std::string> names;
+    for (const CLI::App* sub : app_.get_subcommands([](const CLI::App*) { return true; }))
+      names.push_back(sub->get_name());
+    if (std::find(names.begin(), names.end(), command) != names.end()) return {};
+    const std::vector<std::string_view> known(names.begin(), names.end());
+    const std::string near = data::nearest(command, known);
+    return fmt::format(
+        "there is no command \"{}\"; {}", command,
+        near.empty() ? std::string("flexspline --help lists them") : fmt::format("did you mean {}?", near));
+  }
+
+  int run_chosen(const std::string& command) {
+    Console console(command, chosen_.json == "-");
+    try {
+      return chosen_.run(console);
+    } catch (const data::DataError& error) {
+      for (const data::Finding& finding : error.findings())
+        if (finding.severity == data::Severity::error) console.error(finding.text());
+    } catch (const std::exception& error) {
+      console.error(error.what());
+    }
+    return kUnusable;
+  }
+
+  template <class Options>
+  std::pair<CLI::App*, std::shared_ptr<Options>> command(std::string_view name) {
+    const CommandHelp& help = help_of(name);
+    CLI::App* sub = app_.add_subcommand(std::string(name), std::string(help.summary));
+    sub->footer(output::wrapped(help.description, 0) + "\n\n" + example_text(help));
+    auto options = std::make_shared<Options>();
+    sub->add_option("--json", options->json, "write the answer as JSON into this file; - is standard output")
+        ->type_name("FILE");
+    sub->callback([this, options] {
+      chosen_.json = options->json;
+      chosen_.run = [options](Console& console) { return cli::run(*options, console); };
+    });
+    return {sub, options};
+  }
+
+  static void take_data(CLI::App* sub, DataInputs& inputs) {
+    sub->add_option("DATA", inputs.data, kDataHelp)->required()->type_name("");
+    take_tolerate(sub, inputs);
+  }
+
+  static void take_tolerate(CLI::App* sub, DataInputs& inputs) {
+    sub->add_option("--tolerate", inputs.tolerate,
+                    fmt::format("treat a finding as a warning; kinds: {}", data::tolerable_kinds()))
+        ->type_name("KIND")
+        ->delimiter(',')
+        ->allow_extra_args(false);
+  }
+
+  static void take_holdout(CLI::App* sub, DataInputs& inputs) {
+    sub->add_option("--holdout", inputs.holdout, "measurements to judge on and never to fit, whatever role they state")
+        ->type_name("DATA ...");
+  }
+
+  static void take_model(CLI::App* sub, std::filesystem::path& model) {
+    sub->add_option("--model", model, "model file")->required()->type_name("MODEL");
+  }
+
+  static void take_pipeline(CLI::App* sub, PipelineInputs& pipeline) {
+    sub->add_option("--cutoff-hz", pipeline.cutoff_hz, "cut-off of both filters (default: chosen from the data)")
+        ->type_name("HZ");
+    sub->add_option("--mask", pipeline.mask, "auto leaves out reversals and sticking, none keeps them (default: auto)")
+        ->check(CLI::IsMember({"auto", "none"}))
+        ->type_name("auto|none");
+  }
+
+  void add_new() {
+    const auto [sub, options] = command<NewOptions>("new");
+    sub->add_option("--from", options->data.data, kDataHelp)->required()->type_name("DATA ...");
+    sub->add_option("--out", options->out, "folder for dataset.toml and base-model.toml")->required()->type_name("DIR");
+    sub->add_option("--map", options->map, "a column of ours is theirs, in this unit; may be repeated")
+        ->type_name("OURS=THEIRS[:UNIT]")
+        ->allow_extra_args(false);
+    sub->add_option("--axis", options->axis, "rotary, or linear (m, m/s, N)")
+        ->check(CLI::IsMember({"rotary", "linear"}))
+        ->type_name("rotary|linear");
+    sub->add_option("--gear-ratio", options->gear_ratio, "motor turns per output turn")
+        ->check(CLI::PositiveNumber)
+        ->type_name("N");
+    sub->add_option("--torque-constant", options->torque_constant_nm_a, "motor torque per ampere, N*m/A")
+        ->check(CLI::PositiveNumber)
+        ->type_name("KM");
+    sub->add_option("--encoder-counts", options->encoder_counts, "counts per motor turn (per metre on a linear axis)")
+        ->check(CLI::PositiveNumber)
+        ->type_name("COUNTS");
+    sub->add_flag("--force", options->force, "write over a dataset.toml and base-model.toml that are there");
+    take_tolerate(sub, options->data);
+  }
+
+  void add_check() {
+    const auto [sub, options] = command<CheckOptions>("check");
+    take_data(sub, options->data);
+    take_pipeline(sub, options->pipeline);
+  }
+
+  void add_effects() {
+    const auto [sub, options] = command<EffectsOptions>("effects");
+    sub->add_option("NAME", options->name, "the effect to explain")->type_name("");
+  }
+
+  void add_identify() {
+    const auto [sub, options] = command<IdentifyOptions>("identify");
+    take_data(sub, options->data);
+    take_model(sub, options->model);
+    sub->add_option("--out", options->out, "the model with the values in it (default: print only)")->type_name("MODEL");
+    sub->add_option(
+           "--method", options->method,
+           "ls: least squares; nls: with a search for shape parameters (default: what the model needs); iv, oe: "
+           "not built yet")
+        ->check(CLI::IsMember({"ls", "nls", "iv", "oe"}))
+        ->type_name("ls|nls");
+    take_holdout(sub, options->data);
+    take_pipeline(sub, options->pipeline);
+  }
+
+  void add_simulate() {
+    const auto [sub, options] = command<SimulateOptions>("simulate");
+    take_data(sub, options->data);
+    take_model(sub, options->model);
+    sub->add_option("--out", options->out, "folder for the simulated measurements")->required()->type_name("DIR");
+  }
+
+  void add_compare() {
+    const auto [sub, options] = command<CompareOptions>("compare");
+    take_data(sub, options->data);
+    take_model(sub, options->model);
+    take_holdout(sub, options->data);
+    sub->add_option("--limit", options->limits, "exit code 1 if a signal's error is above this; may be repeated")
+        ->type_name("SIGNAL=RMSE")
+        ->allow_extra_args(false);
+    take_pipeline(sub, options->pipeline);
+  }
+
+  void add_diagnose() {
+    const auto [sub, options] = command<DiagnoseOptions>("diagnose");
+    take_data(sub, options->data);
+    take_model(sub, options->model);
+    take_holdout(sub, options->data);
+    sub->add_flag("--auto", options->all, "go on with the named effect added, until nothing more is found");
+    take_pipeline(sub, options->pipeline);
+  }
+
+  template <class Options>
+  void add_change(std::string_view name, const std::string& effect_help) {
+    const auto [sub, options] = command<Options>(name);
+    sub->add_option("EFFECT", options->effect, effect_help)->required()->type_name("");
+    take_data(sub, options->data);
+    take_model(sub, options->model);
+    sub->add_option("--out", options->out, "the changed model")->required()->type_name("OUT");
+    take_holdout(sub, options->data);
+    take_pipeline(sub, options->pipeline);
+  }
+
+  void add_not_built() {
+    for (const std::string_view name : not_built_yet()) {
+      CLI::App* sub = app_.add_subcommand(std::string(name), "not built yet");
+      sub->group("");  // not in the list of commands
+      sub->prefix_command();
+      sub->callback([this] {
+        chosen_.run = [](Console&) -> int {
+          throw UsageError("this command is not built yet; flexspline --help lists those that are");
+        };
+      });
+    }
+  }
+
+  CLI::App app_;
+  Chosen chosen_;
+};
+
+}  // namespace
+
+int run(int argc, char** argv) {
+  return App().run(argc, argv);
+}
+
+}  // namespace flexspline::cli

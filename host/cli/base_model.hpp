@@ -1,0 +1,23 @@
+// Which model can be started from, given what was measured.
+#pragma once
+
+#include <string>
+#include <vector>
+
+#include "host/data/dataset.hpp"
+#include "host/model/model.hpp"
+
+namespace flexspline::cli {
+
+struct BaseModel {
+  model::Model model;
+  // A line a balance: what it gets and from which columns, or which column it lacks.
+  std::vector<std::string> reasons;
+};
+
+// The effects that every drive has, on each torque balance whose signals are there (METHOD of the project: a base that
+// is plain, so that what is missing shows). Known facts come from the data set; ratings are guessed from the largest
+// values and their source says so.
+BaseModel base_model(const data::Dataset& dataset, const std::string& name);
+
+}  // namespace flexspline::cli

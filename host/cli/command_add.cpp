@@ -1,0 +1,106 @@
+#include <fmt/format.h>
+
+#include <functional>
+#include <nlohmann/json.hpp>
+
+#include "host/cli/commands.hpp"
+#include "host/diagnosis/add.hpp"
+#include "host/output/json.hpp"
+#include "host/output/text.hpp"
+
+namespace flexspline::cli {
+namespace {
+
+using diagnosis::Addition;
+using nlohmann::json;
+using output::number;
+
+std::string percent_change(double before, double after) {
+  return before > 0.0 ? fmt::format("{:+.1f} %", 100.0 * (after / before - 1.0)) : "-";
+}
+
+void print(const Addition& change, const std::string& what, Console& console) {
+  console.line(console.bold(what));
+  output::Table table({change.signal, "before", "after", "unit", "change"}, "lrrlr");
+  table.row({"error on fitted data", number(change.before.rmse_fit), number(change.after.rmse_fit), change.unit,
+             percent_change(change.before.rmse_fit, change.after.rmse_fit)});
+  if (change.before.rmse_holdout && change.after.rmse_holdout)
+    table.row({"error on held-out data", number(*change.before.rmse_holdout), number(*change.after.rmse_holdout),
+               change.unit, percent_change(*change.before.rmse_holdout, *change.after.rmse_holdout)});
+  if (change.noise_floor)
+    table.row(
+        {fmt::format("noise (from {})", change.noise_floor_from), "", number(*change.noise_floor), change.unit, ""});
+  console.line(table.text());
+  if (!change.before.rmse_holdout)
+    console.line("  No data were held out: --holdout DATA would show whether this holds on others.");
+  console.line();
+  output::Table values({"all parameters", "value", "95 % interval", "", "unit"}, "lrrrl");
+  for (const regression::Estimate& e : change.estimates)
+    values.row({fmt::format("{}.{}", e.id, e.parameter), number(e.value), number(e.low), number(e.high), e.unit});
+  console.line(values.text());
+}
+
+json errors_json(const diagnosis::Errors& errors) {
+  return {{"rmse_fit", output::json_number(errors.rmse_fit)},
+          {"rmse_holdout", output::json_number(errors.rmse_holdout)}};
+}
+
+json change_json(const Addition& change) {
+  json parameters = json::array();
+  for (const regression::Estimate& e : change.estimates) parameters.push_back(output::json_parameter(e));
+  return {{"format", "flexspline-add/1"},
+          {"effect", change.effect},
+          {"signal", change.signal},
+          {"unit", change.unit},
+          {"before", errors_json(change.before)},
+          {"after", errors_json(change.after)},
+          {"noise_floor", output::json_number(change.noise_floor)},
+          {"noise_floor_from", change.noise_floor_from},
+          {"parameters", std::move(parameters)},
+          {"warnings", change.warnings}};
+}
+
+using Change = std::function<Addition(const data::Dataset&, const model::Model&)>;
+
+int change_model(const ChangeOptions& options, const std::string& what, const Change& change, Console& console) {
+  const model::ModelFile file = load_model(options.model);
+  const data::Dataset dataset = load(options.data, console);
+  console.progress("refitting the model");
+  Addition changed = change(dataset, file.model);
+  for (const std::string& warning : changed.warnings) console.warn(warning);
+  // What only the data set knows of the drive stays there: the file keeps what its author wrote.
+  changed.model.drive = file.model.drive;
+  model::save(options.out, model::rewrite(file, changed.model));
+  print(changed, what, console);
+  console.line();
+  console.line(fmt::format("{} holds the model. Next:", options.out.string()));
+  const std::string arguments =
+      fmt::format("--model {} {}", quoted(options.out.string()), as_arguments(options.data.data));
+  console.line(fmt::format("  flexspline compare {}", arguments));
+  console.line(fmt::format("  flexspline diagnose {}", arguments));
+  output::save_json(options.json, change_json(changed));
+  return kDone;
+}
+
+}  // namespace
+
+int run(const AddOptions& options, Console& console) {
+  diagnosis::parse_effect(options.effect);  // a wrong name is said before files are read
+  return change_model(
+      options, fmt::format("{} added", options.effect),
+      [&](const data::Dataset& dataset, const model::Model& model) {
+        return diagnosis::add(dataset, model, options.effect, options.pipeline.options());
+      },
+      console);
+}
+
+int run(const RemoveOptions& options, Console& console) {
+  return change_model(
+      options, fmt::format("{} taken out", options.effect),
+      [&](const data::Dataset& dataset, const model::Model& model) {
+        return diagnosis::remove(dataset, model, options.effect, options.pipeline.options());
+      },
+      console);
+}
+
+}  // namespace flexspline::cli

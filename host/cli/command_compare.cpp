@@ -1,0 +1,71 @@
+#include <fmt/format.h>
+
+#include <charconv>
+#include <cmath>
+#include <nlohmann/json.hpp>
+
+#include "host/cli/commands.hpp"
+#include "host/comparison/compare.hpp"
+#include "host/output/json.hpp"
+#include "host/output/text.hpp"
+
+namespace flexspline::cli {
+namespace {
+
+constexpr std::string_view kSignals[] = {"motor_balance",  "transmission_balance", "load_balance", "motor_velocity",
+                                         "motor_position", "output_position",      "torque"};
+
+struct Limit {
+  std::string signal;
+  double rmse = 0.0;
+};
+
+Limit parse_limit(const std::string& text) {
+  const std::size_t equals = text.find('=');
+  Limit limit{text.substr(0, equals), 0.0};
+  bool known = false;
+  for (const std::string_view signal : kSignals) known |= signal == limit.signal;
+  const std::string value = equals == std::string::npos ? "" : text.substr(equals + 1);
+  const auto [stop, error] = std::from_chars(value.data(), value.data() + value.size(), limit.rmse);
+  if (!known || error != std::errc{} || stop != value.data() + value.size() || !(limit.rmse >= 0.0))
+    throw UsageError(fmt::format("--limit {} is not SIGNAL=RMSE; signals are {}, as in --limit motor_balance=0.02",
+                                 text, output::listed({std::begin(kSignals), std::end(kSignals)}, "and")));
+  return limit;
+}
+
+bool is_kept(const Limit& limit, const comparison::Comparison& comparison, Console& console) {
+  for (const comparison::SignalResult& s : comparison.overall) {
+    if (s.signal != limit.signal) continue;
+    const bool kept = s.rmse <= limit.rmse;
+    console.line(fmt::format("{}: rmse {} is {} the limit of {}: {}", s.signal, output::with_unit(s.rmse, s.unit),
+                             kept ? "within" : "above", output::with_unit(limit.rmse, s.unit),
+                             kept ? console.good("met") : console.bad("not met")));
+    if (!kept)
+      console.error(fmt::format("the limit {}={:g} is not met: rmse {}", limit.signal, limit.rmse,
+                                output::with_unit(s.rmse, s.unit)));
+    return kept;
+  }
+  throw UsageError(
+      fmt::format("--limit {}: these data and this model do not give that signal; flexspline check says "
+                  "which columns are missing",
+                  limit.signal));
+}
+
+}  // namespace
+
+int run(const CompareOptions& options, Console& console) {
+  std::vector<Limit> limits;
+  for (const std::string& text : options.limits) limits.push_back(parse_limit(text));
+  const model::ModelFile file = load_model(options.model);
+  const data::Dataset dataset = load(options.data, console);
+  console.progress("comparing model and measurement");
+  const comparison::Comparison comparison = comparison::compare(dataset, file.model, options.pipeline.options());
+  for (const std::string& warning : comparison.warnings) console.warn(warning);
+  console.line(comparison::table(comparison));
+  output::save_json(options.json, comparison::to_json(comparison));
+  bool all_kept = true;
+  for (const Limit& limit : limits) all_kept = is_kept(limit, comparison, console) && all_kept;
+  return all_kept ? kDone : kNotMet;
+}
+
+}  // namespace flexspline::cli

@@ -1,0 +1,139 @@
+#include <fmt/format.h>
+
+#include <nlohmann/json.hpp>
+
+#include "host/catalogue/catalogue.hpp"
+#include "host/cli/commands.hpp"
+#include "host/data/findings.hpp"
+#include "host/output/identification.hpp"
+#include "host/output/json.hpp"
+#include "host/output/text.hpp"
+
+namespace flexspline::cli {
+namespace {
+
+using catalogue::Entry;
+using nlohmann::json;
+
+std::string kind_name(effects::Kind kind) {
+  switch (kind) {
+    case effects::Kind::linear:
+      return "linear";
+    case effects::Kind::shape:
+      return "shape";
+    case effects::Kind::given:
+      return "given";
+  }
+  return "";
+}
+
+std::string phase_name(effects::Phase phase) {
+  switch (phase) {
+    case effects::Phase::shift:
+      return "shift";
+    case effects::Phase::modulate:
+      return "modulate";
+    case effects::Phase::source:
+      return "source";
+  }
+  return "";
+}
+
+std::string usual(const Entry& entry) {
+  std::vector<std::string> values;
+  for (const effects::ParameterInfo& p : entry.parameters)
+    if (p.kind != effects::Kind::given) values.push_back(output::with_unit(p.usual, p.unit.rotary));
+  return output::listed(values, "and");
+}
+
+json entry_json(const Entry& entry) {
+  json parameters = json::array();
+  for (const effects::ParameterInfo& p : entry.parameters)
+    parameters.push_back({{"parameter", p.name},
+                          {"unit", p.unit.rotary},
+                          {"unit_linear", p.unit.linear},
+                          {"kind", kind_name(p.kind)},
+                          {"usual", output::json_number(p.usual)},
+                          {"low", output::json_number(p.low)},
+                          {"high", output::json_number(p.high)}});
+  json rivals = json::array();
+  for (const std::string_view rival : catalogue::split_names(entry.info->rivals)) rivals.push_back(rival);
+  return {{"name", entry.name()},
+          {"balance", output::balance_name(entry.info->balance)},
+          {"phase", phase_name(entry.info->phase)},
+          {"equation", entry.info->equation},
+          {"parameters", std::move(parameters)},
+          {"shows_over", entry.info->shows_over},
+          {"source", entry.info->source},
+          {"explanation", entry.info->explanation},
+          {"causes", entry.info->causes},
+          {"separated_by", entry.info->separated_by},
+          {"rivals", std::move(rivals)}};
+}
+
+std::string comma_separated(std::string_view names) {
+  std::vector<std::string> list;
+  for (const std::string_view name : catalogue::split_names(names)) list.emplace_back(name);
+  return output::listed(list);
+}
+
+void describe(const Entry& entry, Console& console) {
+  const effects::Description& info = *entry.info;
+  console.line(console.bold(info.name));
+  console.line(output::wrapped(info.explanation));
+  console.line();
+  console.line(
+      output::wrapped(fmt::format("On the {} balance: {}", output::balance_name(info.balance), info.equation)));
+  output::Table table({"parameter", "unit", "(linear axis)", "", "usual"}, "llllr");
+  for (const effects::ParameterInfo& p : entry.parameters) {
+    const char* how = p.kind == effects::Kind::linear  ? "estimated"
+                      : p.kind == effects::Kind::shape ? "estimated, a shape: searched for"
+                                                       : "stated by you";
+    table.row(
+        {std::string(p.name), std::string(p.unit.rotary), std::string(p.unit.linear), how, output::number(p.usual)});
+  }
+  console.line(table.text());
+  console.line();
+  const auto say = [&](std::string_view what, std::string_view text) {
+    if (!text.empty()) console.line(output::wrapped(fmt::format("{}: {}", what, text)));
+  };
+  say("Shows over", info.shows_over);
+  say("Usual causes, and what to check", info.causes);
+  say("Confused with", comma_separated(info.rivals));
+  say("Told apart by", info.separated_by);
+  say("Stands in for", comma_separated(info.replaces));
+  say("Scales", info.modulates);
+  say("Source", info.source);
+}
+
+}  // namespace
+
+int run(const EffectsOptions& options, Console& console) {
+  json list = json::array();
+  if (!options.name.empty()) {
+    const Entry* entry = catalogue::find(options.name);
+    if (entry == nullptr) {
+      std::vector<std::string_view> names;
+      for (const Entry& e : catalogue::all()) names.push_back(e.name());
+      const std::string near = data::nearest(options.name, names);
+      throw UsageError(fmt::format("there is no effect \"{}\"; {}flexspline effects lists all", options.name,
+                                   near.empty() ? "" : fmt::format("did you mean {}? ", near)));
+    }
+    describe(*entry, console);
+    list.push_back(entry_json(*entry));
+  } else {
+    output::Table table({"effect", "balance", "torque or change", "usual", "shows over"}, "lllll");
+    for (const Entry& entry : catalogue::all()) {
+      table.row({std::string(entry.name()), output::balance_name(entry.info->balance),
+                 std::string(entry.info->equation), usual(entry), std::string(entry.info->shows_over)});
+      list.push_back(entry_json(entry));
+    }
+    console.line(table.text(0));
+    console.line();
+    console.line("flexspline effects NAME explains one.");
+  }
+  output::save_json(options.json, {{"format", "flexspline-effects/1"}, {"effects", std::move(list)}});
+  return kDone;
+}
+
+}  // namespace flexspline::cli

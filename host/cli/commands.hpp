@@ -1,0 +1,88 @@
+// The commands: what each is given, and what runs it. One file a command; the options come from app.cpp.
+#pragma once
+
+#include <filesystem>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "host/cli/inputs.hpp"
+
+namespace flexspline::cli {
+
+struct EffectsOptions {
+  std::string name;  // empty: all
+  std::string json;
+};
+int run(const EffectsOptions& options, Console& console);
+
+struct CheckOptions {
+  DataInputs data;
+  PipelineInputs pipeline;
+  std::string json;
+};
+int run(const CheckOptions& options, Console& console);
+
+struct NewOptions {
+  DataInputs data;
+  std::filesystem::path out;
+  std::vector<std::string> map;  // OURS=THEIRS[:UNIT]
+  std::string axis;              // empty: guessed
+  std::optional<double> gear_ratio;
+  std::optional<double> torque_constant_nm_a;
+  std::optional<double> encoder_counts;
+  bool force = false;
+  std::string json;
+};
+int run(const NewOptions& options, Console& console);
+
+struct IdentifyOptions {
+  DataInputs data;
+  PipelineInputs pipeline;
+  std::filesystem::path model;
+  std::filesystem::path out;  // empty: print only
+  std::string method;         // empty: what the model needs
+  std::string json;
+};
+int run(const IdentifyOptions& options, Console& console);
+
+struct SimulateOptions {
+  DataInputs data;
+  std::filesystem::path model;
+  std::filesystem::path out;
+  std::string json;
+};
+int run(const SimulateOptions& options, Console& console);
+
+struct CompareOptions {
+  DataInputs data;
+  PipelineInputs pipeline;
+  std::filesystem::path model;
+  std::vector<std::string> limits;  // SIGNAL=RMSE
+  std::string json;
+};
+int run(const CompareOptions& options, Console& console);
+
+struct DiagnoseOptions {
+  DataInputs data;
+  PipelineInputs pipeline;
+  std::filesystem::path model;
+  bool all = false;  // --auto
+  std::string json;
+};
+int run(const DiagnoseOptions& options, Console& console);
+
+struct ChangeOptions {
+  std::string effect;
+  DataInputs data;
+  PipelineInputs pipeline;
+  std::filesystem::path model;
+  std::filesystem::path out;
+  std::string json;
+};
+struct AddOptions : ChangeOptions {};
+struct RemoveOptions : ChangeOptions {};
+int run(const AddOptions& options, Console& console);
+int run(const RemoveOptions& options, Console& console);
+
+}  // namespace flexspline::cli

@@ -1,0 +1,111 @@
+#include "host/cli/help.hpp"
+
+#include <fmt/format.h>
+
+#include <array>
+#include <stdexcept>
+
+namespace flexspline::cli {
+namespace {
+
+// A simulated drive, one of whose effects its base model lacks: data that every example can use.
+constexpr std::string_view kMakeData = "flexspline-hil record --out demo-out --hide viscous_asymmetry";
+constexpr std::string_view kIdentify =
+    "flexspline identify demo-out --model demo-out/base-model.toml --out fitted.toml";
+constexpr std::string_view kAdd =
+    "flexspline add viscous_asymmetry --model demo-out/base-model.toml demo-out --out better.toml";
+
+const std::array kHelp = {
+    CommandHelp{
+        "new",
+        "first dataset.toml and base model from the measurements that there are",
+        "Reads CSV files as a logger left them, finds out which column is what from names, units and motion, and "
+        "writes "
+        "two files into a new folder: dataset.toml, which maps the columns to ours, and base-model.toml, with the "
+        "effects that these signals can show. The measurements stay where they are and as they are. What is guessed is "
+        "said, and stands as a comment in the files; --map and the other options overrule it. A single record is split "
+        "into a part to fit and a part to verify.",
+        {kMakeData, "flexspline new --from demo-out --out project"}},
+    CommandHelp{
+        "check",
+        "what is in the data: signals, rates, noise, excitation, findings",
+        "Reads measurements and says of each experiment what it holds: signals with their range, noise and smallest "
+        "step, motion, reversals, a period if it repeats itself; then everything that was found wrong and what to do "
+        "about it, what can be identified from these signals, and which filters would be used.",
+        {kMakeData, "flexspline check demo-out"}},
+    CommandHelp{
+        "effects",
+        "the catalogue of physical effects, or one of them explained",
+        "Without a name: all effects with the torque balance they act on, their equation, usual size and where they "
+        "show. With a name: what the effect is, where it comes from on a machine, what it is confused with and which "
+        "experiment tells them apart.",
+        {"flexspline effects stribeck_gaussian"}},
+    CommandHelp{
+        "identify",
+        "estimates the parameters of a model",
+        "Estimates every parameter that the model does not fix, from the experiments of role fit: for each experiment "
+        "alone, with average and spread, and for all together with 95 % intervals. A spread above 30 % is flagged: the "
+        "parameter is not reliable, or an effect is missing. With --out the model is written with the values; its "
+        "comments and layout stay.",
+        {kMakeData, kIdentify}},
+    CommandHelp{
+        "simulate",
+        "runs a model on the measured input",
+        "Runs the model from the measured effort alone, experiment by experiment, and writes the motion and torque "
+        "that it predicts as CSV files, with a dataset.toml so that every other command reads them.",
+        {kMakeData, kIdentify, "flexspline simulate --model fitted.toml demo-out --out simulated"}},
+    CommandHelp{
+        "compare",
+        "model against measurement, by experiment, signal and region",
+        "Compares in both directions: the torque that the model asks for the measured motion (the balances), and the "
+        "motion that it makes of the measured torque (free run). Errors stand beside the noise of the measurement "
+        "where that is known; the regions with the largest excess over it are named. --limit makes a test of it: exit "
+        "code 1 where a signal's error is above.",
+        {kMakeData, kIdentify, "flexspline compare --model fitted.toml demo-out"}},
+    CommandHelp{
+        "diagnose",
+        "which physical effect is missing from a model, or that none is",
+        "Fits the model, looks at where its error stands, tries every effect of the catalogue against data left out of "
+        "the fit, and names the one that is missing; or says that none is, or that these data cannot tell, and which "
+        "experiment would. The model needs no values. With --auto it goes on with the effect added until nothing more "
+        "is found.",
+        {kMakeData, "flexspline diagnose --model demo-out/base-model.toml demo-out"}},
+    CommandHelp{
+        "add",
+        "adds an effect to a model and refits it, with the error before and after",
+        "Adds an effect of the catalogue, estimates all parameters anew and says what that does to the error, on the "
+        "data "
+        "that were fitted and on those held out. Comments and layout of the model file stay; its history gets a line.",
+        {kMakeData, kAdd}},
+    CommandHelp{
+        "remove",
+        "takes an effect out of a model and refits it, and shows what that costs",
+        "Takes an effect out, by its id or its type, estimates the rest anew and says what that does to the error, on "
+        "the "
+        "data that were fitted and on those held out.",
+        {kMakeData, kAdd, "flexspline remove coulomb_asymmetry --model better.toml demo-out --out smaller.toml"}},
+};
+
+constexpr std::array<std::string_view, 16> kNotBuilt = {
+    "demo",   "measure", "sensitivity", "plan",    "pack",    "unpack", "export", "drives",
+    "record", "flash",   "backup",      "restore", "monitor", "twin",   "hil",    "workbench"};
+
+}  // namespace
+
+const CommandHelp& help_of(std::string_view command) {
+  for (const CommandHelp& help : kHelp)
+    if (help.name == command) return help;
+  throw std::logic_error(fmt::format("no help is written for {}", command));
+}
+
+std::span<const std::string_view> not_built_yet() {
+  return kNotBuilt;
+}
+
+std::string example_text(const CommandHelp& help) {
+  std::string text = "Example:";
+  for (const std::string_view line : help.examples) text += fmt::format("\n  {}", line);
+  return text;
+}
+
+}  // namespace flexspline::cli

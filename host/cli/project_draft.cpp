@@ -1,0 +1,228 @@
+#include "host/cli/project_draft.hpp"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cmath>
+#include <optional>
+#include <utility>
+
+#include "host/cli/record_summary.hpp"
+#include "host/data/csv.hpp"
+#include "host/model/text.hpp"
+#include "host/output/text.hpp"
+
+namespace flexspline::cli {
+namespace {
+
+namespace fs = std::filesystem;
+using data::Column;
+
+bool is_csv(const fs::path& path) {
+  std::string extension = path.extension().string();
+  for (char& c : extension) c = static_cast<char>(std::tolower(static_cast<unsigned char>(c)));
+  return extension == ".csv" || extension == ".tsv";
+}
+
+[[noreturn]] void fail(const fs::path& file, const std::string& what, const std::string& remedy) {
+  throw data::DataError({{data::Severity::error, "file", file.string(), 0, "", what, remedy}});
+}
+
+std::vector<fs::path> csv_files_in(const fs::path& folder) {
+  std::vector<fs::path> files;
+  for (const fs::directory_entry& entry : fs::directory_iterator(folder))
+    if (entry.is_regular_file() && is_csv(entry.path())) files.push_back(entry.path());
+  std::sort(files.begin(), files.end());
+  if (files.empty()) fail(folder, "the folder has no CSV file", "give a folder with .csv or .tsv files");
+  return files;
+}
+
+// The dataset.toml that a path stands for, if it does.
+std::optional<fs::path> toml_of(const fs::path& path) {
+  if (fs::is_directory(path) && fs::exists(path / "dataset.toml")) return path / "dataset.toml";
+  if (path.extension() == ".toml") return path;
+  return std::nullopt;
+}
+
+data::KeyValue text_value(const std::string& text) {
+  return {text, std::nullopt, "", 0};
+}
+data::KeyValue number_value(double value) {
+  return {model::exact_text(value), value, "", 0};
+}
+
+ColumnGuess mapping_of(const std::string& text, const std::vector<std::string>& names) {
+  const std::size_t equals = text.find('=');
+  if (equals == std::string::npos)
+    throw UsageError(fmt::format("--map {} is not OURS=THEIRS[:UNIT]; as in --map current_a=Iq:mA", text));
+  ColumnGuess guess{text.substr(0, equals), text.substr(equals + 1), "", ""};
+  if (guess.ours != "time_s" && !data::column_from_name(guess.ours)) {
+    std::vector<std::string> ours = {"time_s"};
+    for (std::size_t c = 0; c < data::kColumns; ++c) ours.emplace_back(data::column_name(static_cast<Column>(c)));
+    throw UsageError(fmt::format("--map {}: there is no column \"{}\" of ours; ours are {}", text, guess.ours,
+                                 output::listed(ours)));
+  }
+  const auto is_name = [&](const std::string& name) {
+    return std::find(names.begin(), names.end(), name) != names.end();
+  };
+  const std::size_t colon = guess.theirs.rfind(':');
+  if (!is_name(guess.theirs) && colon != std::string::npos) {
+    guess.unit = guess.theirs.substr(colon + 1);
+    guess.theirs.erase(colon);
+    if (!data::unit_from_text(guess.unit))
+      throw UsageError(fmt::format("--map {}: the unit \"{}\" is not known; write one as in --map {}={}:rpm", text,
+                                   guess.unit, guess.ours, guess.theirs));
+  }
+  if (!is_name(guess.theirs))
+    throw UsageError(fmt::format("--map {}: no file has a column \"{}\"; the columns are {}", text, guess.theirs,
+                                 output::listed(names)));
+  return guess;
+}
+
+// Values of some columns of a file, by name; empty where it does not have one.
+std::vector<std::vector<double>> values_of(const data::CsvFile& csv, const std::vector<std::string>& names) {
+  std::vector<std::size_t> wanted;
+  std::vector<std::optional<std::size_t>> slots;
+  for (const std::string& name : names) {
+    const auto at = std::find(csv.names().begin(), csv.names().end(), name);
+    slots.push_back(at == csv.names().end() ? std::nullopt : std::optional(wanted.size()));
+    if (at != csv.names().end()) wanted.push_back(static_cast<std::size_t>(at - csv.names().begin()));
+  }
+  const data::CsvTable table = csv.read(wanted);
+  std::vector<std::vector<double>> values;
+  for (const auto& slot : slots) values.push_back(slot ? table.columns[*slot] : std::vector<double>{});
+  return values;
+}
+
+ColumnGuess* find(std::vector<ColumnGuess>& columns, std::string_view ours) {
+  for (ColumnGuess& c : columns)
+    if (c.ours == ours) return &c;
+  return nullptr;
+}
+
+double factor_of(const std::string& unit) {
+  const auto known = data::unit_from_text(unit);
+  return known ? known->factor : 1.0;
+}
+
+// Units that names do not give, from the values of the first file.
+void guess_units(std::vector<ColumnGuess>& columns, const data::CsvFile& csv) {
+  ColumnGuess* time = find(columns, "time_s");
+  ColumnGuess* velocity = find(columns, "motor_velocity_rad_s");
+  const ColumnGuess* position = find(columns, "motor_position_rad");
+  const auto source = [](const ColumnGuess* c, const char* ours) { return c ? c->theirs : std::string(ours); };
+  auto values = values_of(
+      csv, {source(time, "time_s"), source(position, "motor_position_rad"), source(velocity, "motor_velocity_rad_s")});
+  if (time != nullptr && time->unit.empty())
+    if (const auto unit = time_unit_by_values(values[0])) {
+      time->unit = *unit;
+      time->why = fmt::format("\"{}\" reads as a time, in {} by the size of its steps", time->theirs, *unit);
+    }
+  if (velocity == nullptr || !velocity->unit.empty() || values[1].empty()) return;
+  for (double& t : values[0]) t *= time != nullptr ? factor_of(time->unit) : 1.0;
+  for (double& q : values[1]) q *= position != nullptr ? factor_of(position->unit) : 1.0;
+  if (const auto unit = velocity_unit_by_values(values[0], values[1], values[2])) {
+    velocity->unit = *unit;
+    velocity->why =
+        fmt::format("\"{}\" reads as a velocity, in {} by comparison with the position", velocity->theirs, *unit);
+  }
+}
+
+void add_options(Draft& draft, const NewOptions& options) {
+  if (!options.axis.empty()) draft.toml.drive["axis"] = text_value(options.axis);
+  if (options.gear_ratio) draft.toml.drive["gear_ratio"] = number_value(*options.gear_ratio);
+  if (options.torque_constant_nm_a)
+    draft.toml.drive["torque_constant_nm_a"] = number_value(*options.torque_constant_nm_a);
+  if (options.encoder_counts) draft.toml.defaults["encoder_counts"] = number_value(*options.encoder_counts);
+}
+
+Draft draft_of_files(const std::vector<fs::path>& files, const NewOptions& options) {
+  Draft draft;
+  data::Findings findings;
+  std::vector<std::string> names;
+  std::optional<data::CsvFile> first;
+  for (const fs::path& file : files) {
+    data::CsvFile csv(file, findings);
+    for (const std::string& name : csv.names())
+      if (std::find(names.begin(), names.end(), name) == names.end()) names.push_back(name);
+    if (!first) first.emplace(std::move(csv));
+    data::ExperimentEntry entry;
+    entry.file = fs::absolute(file);
+    draft.toml.experiments.push_back(std::move(entry));
+  }
+  std::vector<ColumnGuess> stated;
+  for (const std::string& text : options.map) stated.push_back(mapping_of(text, names));
+  std::optional<data::Axis> axis;
+  if (!options.axis.empty()) axis = options.axis == "linear" ? data::Axis::linear : data::Axis::rotary;
+  HeaderGuess guess = guess_columns(names, stated, axis);
+  guess_units(guess.columns, *first);
+
+  for (const ColumnGuess& c : guess.columns) {
+    data::ColumnMapping mapping;
+    mapping.source = c.theirs;
+    mapping.unit = c.unit;
+    draft.toml.columns[c.ours] = mapping;
+    draft.comments[c.ours] = c.why.empty() ? "stated" : fmt::format("guess: {}", c.why);
+    draft.notes.push_back(fmt::format("{}: {}{}", c.ours,
+                                      c.why.empty() ? fmt::format("\"{}\", as stated", c.theirs) : c.why,
+                                      c.unit.empty() ? "" : fmt::format(" ({})", c.unit)));
+  }
+  if (guess.axis == data::Axis::linear || !options.axis.empty()) {
+    draft.toml.drive["axis"] = text_value(guess.axis == data::Axis::linear ? "linear" : "rotary");
+    if (!guess.axis_why.empty()) {
+      draft.axis_comment = fmt::format("guess: {}", guess.axis_why);
+      draft.notes.push_back(fmt::format("the axis is linear (m, m/s, N), as {}", guess.axis_why));
+    }
+  }
+  if (guess.joint_side) {
+    draft.toml.drive["gear_ratio"] = number_value(1.0);
+    draft.gear_comment = "no motor sensors: the joint's columns stand for the motor's";
+    draft.notes.push_back(
+        "there are no motor sensors: the joint's own columns stand for the motor's, with gear ratio 1");
+  }
+  draft.columns = guess.columns;
+  draft.unused = guess.unused;
+  add_options(draft, options);
+  return draft;
+}
+
+Draft draft_of_toml(const fs::path& path, const NewOptions& options) {
+  if (!options.map.empty())
+    throw UsageError(fmt::format("--map does not go with {}, which maps columns; change it there", path.string()));
+  Draft draft;
+  data::Findings findings(options.data.tolerate);
+  draft.toml = data::read_dataset_toml(path, findings);
+  if (draft.toml.experiments.empty())
+    for (const fs::path& file : csv_files_in(path.has_parent_path() ? path.parent_path() : fs::path("."))) {
+      data::ExperimentEntry entry;
+      entry.file = file;
+      draft.toml.experiments.push_back(std::move(entry));
+    }
+  for (data::ExperimentEntry& entry : draft.toml.experiments) entry.file = fs::absolute(entry.file);
+  draft.notes.push_back(fmt::format("what {} says is kept", path.string()));
+  add_options(draft, options);
+  return draft;
+}
+
+}  // namespace
+
+Draft draft_of(const NewOptions& options) {
+  std::vector<fs::path> files;
+  for (const fs::path& path : options.data.data) {
+    if (!fs::exists(path))
+      fail(path, "there is no such file or folder", "give CSV files, folders of them, or a dataset.toml");
+    if (const auto toml = toml_of(path)) {
+      if (options.data.data.size() > 1)
+        throw UsageError(fmt::format("{} says already what belongs together; give it alone, or give CSV files only",
+                                     toml->string()));
+      return draft_of_toml(*toml, options);
+    }
+    if (fs::is_directory(path))
+      for (fs::path& file : csv_files_in(path)) files.push_back(std::move(file));
+    else
+      files.push_back(path);
+  }
+  return draft_of_files(files, options);
+}
+
+}  // namespace flexspline::cli

@@ -1,0 +1,38 @@
+// A first dataset.toml from what a logger left: columns guessed, experiments listed, a single record split.
+#pragma once
+
+#include <filesystem>
+#include <map>
+#include <string>
+#include <vector>
+
+#include "host/cli/column_guess.hpp"
+#include "host/cli/commands.hpp"
+#include "host/data/dataset_toml.hpp"
+
+namespace flexspline::cli {
+
+struct Draft {
+  data::DatasetToml toml;                       // files with absolute paths
+  std::map<std::string, std::string> comments;  // by column of ours
+  std::string axis_comment;
+  std::string gear_comment;
+  std::vector<std::string> notes;    // what was guessed, for people
+  std::vector<ColumnGuess> columns;  // guessed or mapped
+  std::vector<std::string> unused;
+};
+
+// From CSV files and folders of them, or from one dataset.toml, whose facts are kept.
+// Throws data::DataError and UsageError.
+Draft draft_of(const NewOptions& options);
+
+// Reads the measurements as the draft describes them.
+data::Dataset load_draft(const Draft& draft, const NewOptions& options);
+
+// Adds what only the values show: the gear ratio, and the split of a single record.
+void complete(Draft& draft, data::Dataset& dataset);
+
+// The text of dataset.toml in `folder`; files are named relative to it.
+std::string text_of(const Draft& draft, const std::filesystem::path& folder);
+
+}  // namespace flexspline::cli

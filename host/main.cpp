@@ -1,0 +1,5 @@
+#include "host/cli/app.hpp"
+
+int main(int argc, char** argv) {
+  return flexspline::cli::run(argc, argv);
+}

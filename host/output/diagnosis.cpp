@@ -1,0 +1,246 @@
+#include "host/output/diagnosis.hpp"
+
+#include <fmt/format.h>
+
+#include <cmath>
+#include <nlohmann/json.hpp>
+
+#include "host/catalogue/catalogue.hpp"
+#include "host/output/identification.hpp"
+#include "host/output/json.hpp"
+#include "host/output/text.hpp"
+
+namespace flexspline::output {
+namespace {
+
+using diagnosis::Candidate;
+using diagnosis::Diagnosis;
+using diagnosis::Verdict;
+using nlohmann::json;
+
+constexpr std::size_t kRowsShown = 10;
+
+std::string verdict_in_words(const Diagnosis& d) {
+  std::vector<std::string> names;
+  for (const diagnosis::Named& n : d.named) names.push_back(effect_in_words(n.effect, n.order));
+  switch (d.verdict) {
+    case Verdict::missing_effect:
+      return fmt::format("The model lacks {}.", listed(names));
+    case Verdict::confusable_effects:
+      return fmt::format("The model lacks one of {}; these data cannot tell which.", listed(names, "or"));
+    case Verdict::at_noise_floor:
+      return "Nothing is missing: the model's error is the noise of the measurement.";
+    case Verdict::nothing_significant:
+      return "No effect of the catalogue improves the model. How large the noise is is not known, so something small "
+             "may be missing.";
+    case Verdict::unknown_structure:
+      return "Something is missing that no effect of the catalogue explains.";
+    case Verdict::insufficient_excitation:
+      return "These data do not excite the drive enough to tell.";
+  }
+  return {};
+}
+
+std::string evidence(const Diagnosis& d) {
+  std::string text;
+  if (d.balance) text += fmt::format("{} balance: ", balance_name(*d.balance));
+  text += fmt::format("error {}, {} on data left out of the fit", with_unit(d.base_rmse, d.unit),
+                      with_unit(d.base_rmse_cv, d.unit));
+  if (d.noise_floor)
+    text += fmt::format("; noise {} (from {}), so the error is {:.2f} times the noise",
+                        with_unit(*d.noise_floor, d.unit), d.noise_floor_from, d.base_rmse / *d.noise_floor);
+  else
+    text += "; noise not known (state noise_std_COLUMN in dataset.toml, or record a periodic motion)";
+  return text;
+}
+
+std::string shares(const std::vector<diagnosis::Localised>& parts) {
+  std::vector<std::string> texts;
+  for (const diagnosis::Localised& part : parts)
+    texts.push_back(fmt::format("{} {:.1f} %", part.variable, part.share_percent));
+  return listed(texts);
+}
+
+std::string candidate_table(const Diagnosis& d) {
+  Table table({"", "candidate", "balance", "score", "explains", "error before", "after", "", ""}, "rllrrrrll");
+  std::size_t rank = 0;
+  for (const Candidate& c : d.candidates) {
+    if (++rank > kRowsShown) break;
+    table.row({fmt::format("{}", rank), effect_label(c.effect, c.order), balance_name(c.balance), number(c.score),
+               fmt::format("{:.1f} %", c.chi2_fall_percent), number(c.rmse_cv_before), number(c.rmse_cv_after), d.unit,
+               c.admissible ? "" : "refused: " + c.why_not});
+  }
+  return table.text();
+}
+
+const Candidate* candidate_of(const Diagnosis& d, const diagnosis::Named& named) {
+  for (const Candidate& c : d.candidates)
+    if (c.effect == named.effect && c.order == named.order) return &c;
+  return nullptr;
+}
+
+std::string replaced(std::string text, std::string_view what, const std::string& by) {
+  const std::size_t at = text.find(what);
+  return at == std::string::npos ? text : text.replace(at, what.size(), by);
+}
+
+void print_named(Console& console, const Diagnosis& d, const diagnosis::Named& named) {
+  const catalogue::Entry* entry = catalogue::find(named.effect);
+  if (entry == nullptr) return;
+  console.line();
+  console.line(console.bold(effect_in_words(named.effect, named.order)));
+  console.line(wrapped(entry->info->explanation));
+  if (!entry->info->causes.empty()) console.line(wrapped(fmt::format("Causes: {}", entry->info->causes)));
+  const Candidate* candidate = candidate_of(d, named);
+  if (candidate == nullptr) return;
+  for (const regression::Estimate& e : candidate->parameters)
+    console.line(
+        fmt::format("  {} = {}{}", e.parameter, with_unit(e.value, e.unit),
+                    e.low && e.high ? fmt::format("   (95 %: {} to {})", number(*e.low), number(*e.high)) : ""));
+  if (!candidate->rivals.empty() && !entry->info->separated_by.empty())
+    console.line(wrapped(fmt::format("Not to be told from {} here: record {} to separate them.",
+                                     listed(candidate->rivals, "or"), entry->info->separated_by)));
+}
+
+void print_next(Console& console, const Diagnosis& d, const std::string& add_command) {
+  std::vector<std::string> steps;
+  switch (d.verdict) {
+    case Verdict::missing_effect:
+    case Verdict::confusable_effects:
+      for (const diagnosis::Named& n : d.named)
+        steps.push_back(replaced(add_command, "EFFECT", effect_label(n.effect, n.order)));
+      break;
+    case Verdict::unknown_structure:
+      steps.push_back("flexspline compare shows in which region the error stands; look at the drive there");
+      break;
+    case Verdict::insufficient_excitation:
+      steps.push_back("record slow and fast motion in both directions; flexspline identify names what cannot be told");
+      break;
+    case Verdict::at_noise_floor:
+    case Verdict::nothing_significant:
+      break;
+  }
+  if (steps.empty()) return;
+  console.line();
+  console.line("Next:");
+  for (const std::string& step : steps) console.line("  " + step);
+}
+
+json localised_json(const std::vector<diagnosis::Localised>& parts) {
+  json list = json::array();
+  for (const diagnosis::Localised& part : parts)
+    list.push_back({{"variable", part.variable}, {"share_percent", json_number(part.share_percent)}});
+  return list;
+}
+
+json named_json(const std::vector<diagnosis::Named>& named) {
+  json list = json::array();
+  for (const diagnosis::Named& n : named) list.push_back({{"effect", n.effect}, {"order", json_number(n.order)}});
+  return list;
+}
+
+json candidate_json(const Candidate& c, std::size_t rank) {
+  json parameters = json::array();
+  for (const regression::Estimate& e : c.parameters) parameters.push_back(json_parameter(e));
+  const catalogue::Entry* entry = catalogue::find(c.effect);
+  const auto text = [&](std::string_view effects::Description::*field) {
+    return entry ? json(std::string(entry->info->*field)) : json(nullptr);
+  };
+  return {{"effect", c.effect},
+          {"order", json_number(c.order)},
+          {"balance", balance_name(c.balance)},
+          {"rank", rank},
+          {"score", json_number(c.score)},
+          {"chi2_fall_percent", json_number(c.chi2_fall_percent)},
+          {"rmse_cv_before", json_number(c.rmse_cv_before)},
+          {"rmse_cv_after", json_number(c.rmse_cv_after)},
+          {"p_value", json_number(c.p_value)},
+          {"parameters", std::move(parameters)},
+          {"minimum_detectable", nullptr},
+          {"admissible", c.admissible},
+          {"why_not", c.admissible ? json(nullptr) : json(c.why_not)},
+          {"rivals", c.rivals},
+          {"separating_experiment", text(&effects::Description::separated_by)},
+          {"explanation", text(&effects::Description::explanation)}};
+}
+
+}  // namespace
+
+std::string effect_label(const std::string& effect, const std::optional<double>& order) {
+  return order ? fmt::format("{}:{:g}", effect, *order) : effect;
+}
+
+std::string effect_in_words(const std::string& effect, const std::optional<double>& order) {
+  return order ? fmt::format("{} ({:g} per turn)", effect, *order) : effect;
+}
+
+void print_diagnosis(Console& console, const Diagnosis& d, const std::string& add_command) {
+  console.line(console.bold(verdict_in_words(d)));
+  console.line(wrapped(evidence(d)));
+  if (!d.localised.empty()) console.line(wrapped(fmt::format("The error goes with {}.", shares(d.localised))));
+  if (d.delay_s)
+    console.line(
+        wrapped(fmt::format("The effort lags the motion by {:.3g} ms beyond the alignment: check the time "
+                            "stamps, or current_hold.",
+                            1e3 * *d.delay_s)));
+  for (const diagnosis::Named& named : d.named) print_named(console, d, named);
+  if (!d.candidates.empty()) {
+    console.line();
+    console.line(candidate_table(d));
+  }
+  if (!d.remaining_structure.empty())
+    console.line(wrapped(fmt::format("With that added, the error still goes with {}.", shares(d.remaining_structure))));
+  if (!d.disturbances.empty()) {
+    Table table({"disturbance in", "from", "to", "peak"}, "lrrr");
+    for (const diagnosis::Disturbance& x : d.disturbances)
+      table.row({x.experiment, fmt::format("{:.3f} s", x.from_s), fmt::format("{:.3f} s", x.to_s),
+                 with_unit(x.peak, x.unit)});
+    console.line();
+    console.line(table.text());
+  }
+  print_next(console, d, add_command);
+}
+
+json diagnosis_json(const Diagnosis& d) {
+  json candidates = json::array();
+  for (const Candidate& c : d.candidates) candidates.push_back(candidate_json(c, candidates.size() + 1));
+  json disturbances = json::array();
+  for (const diagnosis::Disturbance& x : d.disturbances)
+    disturbances.push_back({{"experiment", x.experiment},
+                            {"from_s", json_number(x.from_s)},
+                            {"to_s", json_number(x.to_s)},
+                            {"peak", json_number(x.peak)},
+                            {"unit", x.unit}});
+  return {{"format", "flexspline-diagnose/1"},
+          {"verdict", diagnosis::verdict_name(d.verdict)},
+          {"named", named_json(d.named)},
+          {"balance", d.balance ? json(balance_name(*d.balance)) : json(nullptr)},
+          {"base",
+           {{"rmse", json_number(d.base_rmse)},
+            {"rmse_cv", json_number(d.base_rmse_cv)},
+            {"noise_floor", json_number(d.noise_floor)},
+            {"noise_floor_from", d.noise_floor_from},
+            {"unit", d.unit}}},
+          {"localised", localised_json(d.localised)},
+          {"candidates", std::move(candidates)},
+          {"parameter_trends", json::array()},
+          {"remaining_structure", localised_json(d.remaining_structure)},
+          {"disturbances", std::move(disturbances)},
+          {"delay_s", json_number(d.delay_s)},
+          {"warnings", d.warnings},
+          {"rounds", json::array()}};
+}
+
+json rounds_json(const std::vector<Diagnosis>& rounds) {
+  json result = diagnosis_json(rounds.front());
+  std::vector<diagnosis::Named> all;
+  for (const Diagnosis& d : rounds) {
+    // The round in which nothing was found ends the search; it names nothing that was added.
+    if (d.verdict == Verdict::missing_effect) all.insert(all.end(), d.named.begin(), d.named.end());
+    result["rounds"].push_back(diagnosis_json(d));
+  }
+  if (!all.empty()) result["named"] = named_json(all);
+  return result;
+}
+
+}  // namespace flexspline::output

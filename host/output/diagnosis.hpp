@@ -1,0 +1,27 @@
+// What a diagnosis found, as text and as JSON.
+#pragma once
+
+#include <nlohmann/json_fwd.hpp>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "host/diagnosis/diagnosis.hpp"
+#include "host/output/console.hpp"
+
+namespace flexspline::output {
+
+// "torque_ripple:2", as the command `add` takes it.
+std::string effect_label(const std::string& effect, const std::optional<double>& order);
+// "torque_ripple (2 per turn)", for people.
+std::string effect_in_words(const std::string& effect, const std::optional<double>& order);
+
+// Verdict, evidence, candidates, rivals with the experiment that separates them, where the error lies, what to do next.
+// `add_command`: what to type to add the named effect, with EFFECT where its name goes.
+void print_diagnosis(Console& console, const diagnosis::Diagnosis& found, const std::string& add_command);
+
+// "flexspline-diagnose/1". With more than one round, `named` holds all that were added.
+nlohmann::json diagnosis_json(const diagnosis::Diagnosis& found);
+nlohmann::json rounds_json(const std::vector<diagnosis::Diagnosis>& rounds);
+
+}  // namespace flexspline::output

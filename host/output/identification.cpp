@@ -1,0 +1,190 @@
+#include "host/output/identification.hpp"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <nlohmann/json.hpp>
+
+#include "host/output/json.hpp"
+#include "host/output/text.hpp"
+
+namespace flexspline::output {
+namespace {
+
+using nlohmann::json;
+using regression::Estimate;
+
+constexpr std::size_t kExperimentsAbreast = 5;
+constexpr std::size_t kNameWidth = 13;
+
+std::string label(const Estimate& e) {
+  return fmt::format("{}.{}", e.id, e.parameter);
+}
+
+std::string shortened(const std::string& name) {
+  return name.size() <= kNameWidth ? name : name.substr(0, kNameWidth - 2) + "..";
+}
+
+std::vector<std::string> experiment_names(const regression::Identification& found) {
+  std::vector<std::string> names;
+  for (const Estimate& e : found.estimates)
+    for (const auto& [name, value] : e.per_experiment)
+      if (std::find(names.begin(), names.end(), name) == names.end()) names.push_back(name);
+  return names;
+}
+
+std::optional<double> value_in(const Estimate& e, const std::string& experiment) {
+  for (const auto& [name, value] : e.per_experiment)
+    if (name == experiment) return value;
+  return std::nullopt;
+}
+
+std::string by_experiment(const regression::Identification& found) {
+  const std::vector<std::string> names = experiment_names(found);
+  if (names.empty()) return {};
+  std::string text;
+  // Side by side as far as a terminal is wide; average and spread stand beside the last ones.
+  for (std::size_t first = 0; first < names.size(); first += kExperimentsAbreast) {
+    const std::size_t last = std::min(names.size(), first + kExperimentsAbreast);
+    const bool ends = last == names.size();
+    std::vector<std::string> head = {"by experiment"};
+    for (std::size_t k = first; k < last; ++k) head.push_back(shortened(names[k]));
+    if (ends) head.insert(head.end(), {"average", "std/avg"});
+    Table table(head, "lr");
+    for (const Estimate& e : found.estimates) {
+      if (e.per_experiment.empty()) continue;
+      std::vector<std::string> cells = {label(e)};
+      for (std::size_t k = first; k < last; ++k) cells.push_back(number(value_in(e, names[k])));
+      if (ends) {
+        cells.push_back(number(e.average));
+        cells.push_back(e.spread_percent ? fmt::format("{:.1f} %{}", *e.spread_percent, e.reliable ? "" : " !") : "-");
+      }
+      table.row(cells);
+    }
+    text += (text.empty() ? "" : "\n\n") + table.text();
+  }
+  const bool unreliable =
+      std::any_of(found.estimates.begin(), found.estimates.end(), [](const Estimate& e) { return !e.reliable; });
+  if (unreliable)
+    text +=
+        "\n  ! differs by more than 30 % from experiment to experiment: not reliable, or an effect is missing "
+        "(flexspline diagnose)";
+  return text;
+}
+
+std::string pooled(const regression::Identification& found) {
+  Table table({"all together", "value", "95 % interval", "", "unit", ""}, "lrrrll");
+  for (const Estimate& e : found.estimates)
+    table.row({label(e), number(e.value), number(e.low), number(e.high), e.unit,
+               e.identifiable ? "" : "these data cannot tell it"});
+  return table.text();
+}
+
+std::string errors(const regression::Identification& found) {
+  Table table({"balance", "rmse", "of", "rows", "condition"}, "lrlrr");
+  for (const regression::BalanceFit& fit : found.fits)
+    table.row({balance_name(fit.balance), number(fit.rmse()), torque_unit(found.model.drive.axis),
+               fmt::format("{}", fit.residual.size()), number(fit.condition_number)});
+  return table.text();
+}
+
+}  // namespace
+
+std::string torque_unit(data::Axis axis) {
+  return axis == data::Axis::rotary ? "N*m" : "N";
+}
+
+std::string balance_name(regression::Balance balance) {
+  switch (balance) {
+    case regression::Balance::motor:
+      return "motor";
+    case regression::Balance::transmission:
+      return "transmission";
+    case regression::Balance::load:
+      return "load";
+  }
+  return "";
+}
+
+std::string pipeline_text(const regression::Prepared& prepared) {
+  const regression::Pipeline& p = prepared.pipeline;
+  std::size_t used = 0, masked = 0, held = 0, held_by_assumption = 0;
+  std::vector<std::string> decimations;
+  for (const regression::Record& record : prepared.records) {
+    for (const regression::Rows& rows : record.rows) {
+      used += rows.samples.size();
+      masked += rows.masked;
+    }
+    const std::string decimation = fmt::format("{}", record.decimation);
+    if (std::find(decimations.begin(), decimations.end(), decimation) == decimations.end())
+      decimations.push_back(decimation);
+    if (record.experiment->current_hold == data::CurrentHold::zoh && !record.effort.empty()) {
+      ++held;
+      if (!record.experiment->current_hold_stated) ++held_by_assumption;
+    }
+  }
+  std::string text = fmt::format("filters: {:.4g} Hz for all rows, {:.4g} Hz for positions; {}", p.row_cutoff_hz,
+                                 p.motion_cutoff_hz, p.reason);
+  text += decimations == std::vector<std::string>{"1"}
+              ? "; every sample is a row"
+              : fmt::format("; one sample in {} is a row", listed(decimations, "or"));
+  const double share =
+      used + masked > 0 ? 100.0 * static_cast<double>(masked) / static_cast<double>(used + masked) : 0.0;
+  text += p.mask ? fmt::format("; {:.1f} % of them masked (reversals, sticking, clipping)", share)
+                 : std::string("; no mask for reversals and sticking");
+  if (held > 0)
+    text += fmt::format(
+        "; effort moved by half a sample in {} of {} experiments, as a drive holds it{}", held, prepared.records.size(),
+        held_by_assumption > 0 ? " (assumed: current_hold = \"none\" in dataset.toml turns it off)" : "");
+  return text;
+}
+
+std::string identification_text(const regression::Identification& found) {
+  std::string text = by_experiment(found);
+  text += (text.empty() ? "" : "\n\n") + pooled(found);
+  if (!found.derived.empty()) {
+    Table table({"derived", "value", "unit"}, "lrl");
+    for (const regression::Derived& d : found.derived) table.row({d.name, number(d.value), d.unit});
+    text += "\n\n" + table.text();
+  }
+  return text + "\n\n" + errors(found) + "\n\n" + wrapped(pipeline_text(found.prepared));
+}
+
+json identification_json(const regression::Identification& found, const std::string& method) {
+  json parameters = json::array();
+  for (const Estimate& e : found.estimates) {
+    json parameter = json_parameter(e);
+    parameter["average"] = json_number(e.average);
+    parameter["spread_percent"] = json_number(e.spread_percent);
+    parameter["reliable"] = e.reliable;
+    parameter["identifiable"] = e.identifiable;
+    json per_experiment = json::array();
+    for (const auto& [name, value] : e.per_experiment)
+      per_experiment.push_back({{"name", name}, {"value", json_number(value)}});
+    parameter["per_experiment"] = std::move(per_experiment);
+    parameters.push_back(std::move(parameter));
+  }
+  json derived = json::array();
+  for (const regression::Derived& d : found.derived)
+    derived.push_back({{"name", d.name}, {"value", json_number(d.value)}, {"unit", d.unit}});
+  json balances = json::array();
+  for (const regression::BalanceFit& fit : found.fits)
+    balances.push_back({{"balance", balance_name(fit.balance)},
+                        {"rmse", json_number(fit.rmse())},
+                        {"unit", torque_unit(found.model.drive.axis)},
+                        {"rows", fit.residual.size()},
+                        {"autocorrelation_time", json_number(fit.autocorrelation_time)}});
+  const regression::Pipeline& p = found.prepared.pipeline;
+  return {{"format", "flexspline-identify/1"},
+          {"method", method},
+          {"cutoff_hz", json_number(p.row_cutoff_hz)},
+          {"motion_cutoff_hz", json_number(p.motion_cutoff_hz)},
+          {"cutoff_reason", p.reason},
+          {"parameters", std::move(parameters)},
+          {"derived", std::move(derived)},
+          {"balances", std::move(balances)},
+          {"condition_number", json_number(found.condition_number)},
+          {"warnings", found.warnings}};
+}
+
+}  // namespace flexspline::output

@@ -1,0 +1,25 @@
+// What an identification found, as text and as JSON.
+#pragma once
+
+#include <nlohmann/json_fwd.hpp>
+#include <string>
+
+#include "host/regression/identify.hpp"
+
+namespace flexspline::output {
+
+// How the data were prepared: cut-offs and where they come from, decimation, mask, alignment of the effort.
+std::string pipeline_text(const regression::Prepared& prepared);
+
+// Table by experiment (as the report's tables 3 to 8), pooled values with 95 % intervals, derived values, errors of
+// the balances.
+std::string identification_text(const regression::Identification& found);
+
+// "flexspline-identify/1"; `method`: ls or nls.
+nlohmann::json identification_json(const regression::Identification& found, const std::string& method);
+
+// "N*m", or "N" on a linear axis.
+std::string torque_unit(data::Axis axis);
+std::string balance_name(regression::Balance balance);
+
+}  // namespace flexspline::output

@@ -1,0 +1,42 @@
+#include "host/output/json.hpp"
+
+#include <fmt/format.h>
+
+#include <cmath>
+#include <nlohmann/json.hpp>
+
+#include "host/model/model.hpp"
+
+namespace flexspline::output {
+
+using nlohmann::json;
+
+json json_number(double value) {
+  return std::isfinite(value) ? json(value) : json(nullptr);
+}
+json json_number(const std::optional<double>& value) {
+  return value ? json_number(*value) : json(nullptr);
+}
+
+json json_parameter(const regression::Estimate& e) {
+  return {{"id", e.id},
+          {"effect", e.effect},
+          {"parameter", e.parameter},
+          {"value", json_number(e.value)},
+          {"unit", e.unit},
+          {"std", json_number(e.std)},
+          {"interval", json::array({json_number(e.low), json_number(e.high)})}};
+}
+
+void save_json(const std::string& where, const json& content) {
+  if (where.empty()) return;
+  // Names come from the user's files and may be in any encoding.
+  const std::string text = content.dump(2, ' ', false, nlohmann::json::error_handler_t::replace) + "\n";
+  if (where == "-") {
+    fmt::print("{}", text);
+    return;
+  }
+  model::save(where, text);
+}
+
+}  // namespace flexspline::output

@@ -1,0 +1,23 @@
+// JSON as the contract has it: numbers that are not known or not finite are null.
+#pragma once
+
+#include <nlohmann/json_fwd.hpp>
+#include <optional>
+#include <string>
+#include <string_view>
+
+#include "host/regression/identify.hpp"
+
+namespace flexspline::output {
+
+nlohmann::json json_number(double value);
+nlohmann::json json_number(const std::optional<double>& value);
+
+// {"id","effect","parameter","value","unit","std","interval":[lo,hi]}: a parameter wherever one stands.
+nlohmann::json json_parameter(const regression::Estimate& estimate);
+
+// Whole or not at all; `where` is a file, or "-" for standard output. Nothing is done where it is empty.
+// Throws std::runtime_error with path and reason.
+void save_json(const std::string& where, const nlohmann::json& json);
+
+}  // namespace flexspline::output

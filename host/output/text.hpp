@@ -1,0 +1,42 @@
+// Tables and paragraphs for a terminal.
+#pragma once
+
+#include <cstddef>
+#include <optional>
+#include <string>
+#include <string_view>
+#include <vector>
+
+namespace flexspline::output {
+
+inline constexpr std::size_t kLineWidth = 110;
+
+// Columns as wide as their widest cell, two blanks apart. Widths are counted in characters of UTF-8.
+class Table {
+ public:
+  // `alignment`: one letter a column, l or r; the last one holds for all that follow.
+  Table(std::vector<std::string> head, std::string alignment);
+  void row(std::vector<std::string> cells);
+  bool empty() const { return rows_.size() <= 1; }
+  // Each line begins with `indent` blanks; no line feed at the end.
+  std::string text(std::size_t indent = 2) const;
+
+ private:
+  std::vector<std::vector<std::string>> rows_;  // the head first
+  std::string alignment_;
+};
+
+// A paragraph broken at blanks into lines of at most kLineWidth characters, each after `indent` blanks and all but the
+// first after `hang` more.
+std::string wrapped(std::string_view text, std::size_t indent = 2, std::size_t hang = 0);
+
+// Four significant digits; "-" for what is not known.
+std::string number(double value);
+std::string number(const std::optional<double>& value);
+// "12.3 N*m", "0.5" where the unit is 1 or empty.
+std::string with_unit(double value, std::string_view unit);
+
+// "a", "a and b", "a, b and c".
+std::string listed(const std::vector<std::string>& items, std::string_view last_joint = "and");
+
+}  // namespace flexspline::output

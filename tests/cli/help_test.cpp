@@ -1,0 +1,86 @@
+// --help, its examples, commands that do not exist.
+#include <gtest/gtest.h>
+
+#include <sstream>
+
+#include "tests/cli/tool.hpp"
+
+namespace flexspline::cli_test {
+namespace {
+
+constexpr const char* kBuilt[] = {"new",     "check",    "effects", "identify", "simulate",
+                                  "compare", "diagnose", "add",     "remove"};
+constexpr const char* kToCome[] = {"measure", "sensitivity", "plan",   "pack",  "unpack",
+                                   "export",  "drives",      "record", "flash", "backup",
+                                   "restore", "monitor",     "twin",   "hil",   "workbench"};
+
+std::vector<std::string> example_lines(const std::string& help) {
+  std::vector<std::string> lines;
+  std::istringstream text(help);
+  bool in_example = false;
+  for (std::string line; std::getline(text, line);) {
+    if (line == "Example:")
+      in_example = true;
+    else if (in_example && line.starts_with("  "))
+      lines.push_back(line.substr(2));
+  }
+  return lines;
+}
+
+class EachCommand : public testing::TestWithParam<const char*> {};
+
+TEST_P(EachCommand, ExplainsItself) {
+  const Shell shell;
+  const Answer answer = shell.run(std::string("flexspline ") + GetParam() + " --help");
+  EXPECT_EQ(answer.code, 0);
+  EXPECT_TRUE(answer.err.empty()) << answer.err;
+  EXPECT_TRUE(contains(answer.out, "--json"));
+  EXPECT_GT(answer.out.size(), 300u);
+}
+
+TEST_P(EachCommand, HasAnExampleThatWorks) {
+  const Shell shell;
+  const std::vector<std::string> lines = example_lines(shell.must(std::string("flexspline ") + GetParam() + " --help"));
+  ASSERT_FALSE(lines.empty());
+  EXPECT_TRUE(lines.back().starts_with(std::string("flexspline ") + GetParam())) << lines.back();
+  for (const std::string& line : lines) EXPECT_FALSE(shell.must(line).empty()) << line;
+}
+
+TEST_P(EachCommand, RefusesAnOptionThatItDoesNotHave) {
+  const Shell shell;
+  const Answer answer = shell.run(std::string("flexspline ") + GetParam() + " --no-such-option");
+  EXPECT_EQ(answer.code, 2);
+  EXPECT_TRUE(contains(answer.err, std::string("flexspline ") + GetParam() + ": ")) << answer.err;
+  EXPECT_TRUE(answer.out.empty());
+}
+
+INSTANTIATE_TEST_SUITE_P(Commands, EachCommand, testing::ValuesIn(kBuilt),
+                         [](const auto& test) { return std::string(test.param); });
+
+TEST(Help, ListsTheCommandsAndThoseToCome) {
+  const Shell shell;
+  const std::string help = shell.must("flexspline --help");
+  for (const char* name : kBuilt) EXPECT_TRUE(contains(help, std::string("\n  ") + name)) << name;
+  for (const char* name : kToCome) EXPECT_TRUE(contains(help, name)) << name;
+}
+
+TEST(Help, CommandsToComeSaySoAndExitWithTwo) {
+  const Shell shell;
+  for (const char* name : kToCome) {
+    const Answer answer = shell.run(std::string("flexspline ") + name + " --drive twin some.csv");
+    EXPECT_EQ(answer.code, 2) << name;
+    EXPECT_TRUE(contains(answer.err, "not built yet")) << answer.err;
+    EXPECT_EQ(std::count(answer.err.begin(), answer.err.end(), '\n'), 1) << answer.err;
+  }
+}
+
+TEST(Help, AWrongCommandNamesTheNearestOne) {
+  const Shell shell;
+  const Answer answer = shell.run("flexspline identfy");
+  EXPECT_EQ(answer.code, 2);
+  EXPECT_TRUE(contains(answer.err, "did you mean identify?")) << answer.err;
+  EXPECT_EQ(shell.run("flexspline").code, 2);
+}
+
+}  // namespace
+}  // namespace flexspline::cli_test

@@ -1,0 +1,211 @@
+// host/comparison: figures against closed forms, and the twin against the model that it is.
+#include "host/comparison/compare.hpp"
+
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <nlohmann/json.hpp>
+
+#include "host/comparison/score.hpp"
+#include "tests/unit/comparison_test_drive.hpp"
+
+namespace flexspline::comparison {
+namespace {
+
+using plant::Mode;
+using plant::Waveform;
+
+struct Compared {
+  plant::Drive drive = plant::demo_plant().drive;
+  data::Dataset dataset;
+  model::Model model = known_model(drive);
+  Comparison comparison;
+  Compared() {
+    dataset = record(drive,
+                     {plan("free", Mode::velocity, Waveform::sine, 60.0, 1.0, 4.0),
+                      plan("locked", Mode::current, Waveform::sine, 2.0, 0.5, 4.0, true),
+                      plan("rest", Mode::off, Waveform::zero, 0.0, 1.0, 2.0)},
+                     1);
+    dataset.experiments[1].role = data::Role::holdout;
+    comparison = compare(dataset, model, {});
+  }
+};
+
+const Compared& compared() {
+  static const Compared c;
+  return c;
+}
+
+const SignalResult* find(const ExperimentResult& e, std::string_view signal) {
+  for (const SignalResult& s : e.signals)
+    if (s.signal == signal) return &s;
+  return nullptr;
+}
+
+TEST(Score, FollowsItsDefinitions) {
+  const std::vector<double> y{1.0, 3.0, 5.0, 7.0}, e{1.0, -1.0, 1.0, 1.0};
+  Score score;
+  for (std::size_t k = 0; k < y.size(); ++k) score.add(y[k], e[k]);
+  const double std_y = std::sqrt(5.0);
+  EXPECT_DOUBLE_EQ(score.rmse(), 1.0);
+  EXPECT_DOUBLE_EQ(score.nrmse(), 1.0 / std_y);
+  EXPECT_DOUBLE_EQ(score.fit_percent(), 100.0 * (1.0 - 2.0 / std::sqrt(20.0)));
+  EXPECT_DOUBLE_EQ(score.vaf_percent(), 100.0 * (1.0 - 0.75 / 5.0));
+  EXPECT_DOUBLE_EQ(score.max_abs(), 1.0);
+}
+
+TEST(Score, OfTwoPartsIsThatOfTheWhole) {
+  Score whole, a, b;
+  for (int k = 0; k < 50; ++k) {
+    const double y = 1000.0 + std::sin(0.3 * k), e = 0.1 * std::cos(1.1 * k) + 0.02;
+    whole.add(y, e);
+    (k < 13 ? a : b).add(y, e);
+  }
+  a.add(b);
+  EXPECT_EQ(a.samples(), whole.samples());
+  EXPECT_NEAR(a.nrmse(), whole.nrmse(), 1e-12);
+  EXPECT_NEAR(a.vaf_percent(), whole.vaf_percent(), 1e-9);
+}
+
+TEST(Score, HasNoShareOfASignalThatDoesNotVary) {
+  Score score;
+  score.add(2.0, 0.5);
+  score.add(2.0, -0.5);
+  EXPECT_DOUBLE_EQ(score.rmse(), 0.5);
+  EXPECT_TRUE(std::isnan(score.nrmse()));
+  EXPECT_TRUE(std::isnan(score.vaf_percent()));
+}
+
+TEST(WorstCaseGain, IsTheRatioAtTheLineThatIsWorst) {
+  std::vector<double> y(2000), e(2000);
+  for (std::size_t k = 0; k < y.size(); ++k) {
+    const double t = 1e-3 * static_cast<double>(k);
+    y[k] = std::sin(2.0 * M_PI * 4.0 * t) + std::sin(2.0 * M_PI * 20.0 * t);
+    e[k] = 0.01 * std::sin(2.0 * M_PI * 4.0 * t) + 0.2 * std::sin(2.0 * M_PI * 20.0 * t);
+  }
+  EXPECT_NEAR(worst_case_gain(y, e, {{0, 2000}}, 1000.0, 50.0), 0.2, 0.005);
+  EXPECT_NEAR(worst_case_gain(y, e, {{0, 2000}}, 1000.0, 10.0), 0.01, 0.001);
+}
+
+TEST(Compare, NamesTheParametersThatHaveNoValue) {
+  model::Model m = compared().model;
+  m.find("viscous_friction")->find("coefficient")->value.reset();
+  try {
+    compare(compared().dataset, m, {});
+    FAIL() << "a model without values was compared";
+  } catch (const model::ModelError& error) {
+    EXPECT_NE(std::string(error.what()).find("viscous_friction.coefficient"), std::string::npos) << error.what();
+    EXPECT_NE(std::string(error.what()).find("identify first"), std::string::npos) << error.what();
+    EXPECT_EQ(std::string(error.what()).find("inertia.inertia"), std::string::npos) << error.what();
+  }
+}
+
+TEST(Compare, ReportsTheSignalsThatEachExperimentHas) {
+  const Comparison& c = compared().comparison;
+  ASSERT_EQ(c.experiments.size(), 3u);
+  const auto has = [&](std::size_t i, std::string_view signal) { return find(c.experiments[i], signal) != nullptr; };
+  EXPECT_TRUE(has(0, "motor_balance") && has(0, "load_balance") && has(0, "output_position") && has(0, "torque"));
+  EXPECT_FALSE(has(0, "transmission_balance"));
+  EXPECT_TRUE(has(1, "motor_balance") && has(1, "transmission_balance") && has(1, "motor_position"));
+  EXPECT_FALSE(has(1, "load_balance") || has(1, "output_position"));
+  EXPECT_TRUE(has(2, "motor_balance"));
+  EXPECT_EQ(c.experiments[1].role, data::Role::holdout);
+}
+
+TEST(Compare, OfTheTrueModelStandsNearTheNoiseFloorAndTheFreeRunFollows) {
+  for (const char* signal : {"motor_balance", "transmission_balance", "load_balance"}) {
+    const SignalResult* s = compared().comparison.find_overall(signal);
+    ASSERT_NE(s, nullptr);
+    ASSERT_TRUE(s->excess().has_value()) << signal;
+    EXPECT_GT(*s->excess(), 0.8) << signal;
+    EXPECT_LT(*s->excess(), 2.0) << signal;
+    EXPECT_FALSE(s->collapsed);
+  }
+  EXPECT_LT(find(compared().comparison.experiments[0], "motor_velocity")->nrmse, 0.01);
+  EXPECT_LT(find(compared().comparison.experiments[1], "motor_position")->nrmse, 0.02);
+}
+
+TEST(Compare, ShowsAWrongStiffnessInTheBalanceThatItActsOnAndInLockedFreeRun) {
+  model::Model wrong = compared().model;
+  *wrong.find("linear_stiffness")->find("stiffness")->value *= 1.2;
+  const Comparison c = compare(compared().dataset, wrong, {});
+  EXPECT_GT(*c.find_overall("transmission_balance")->excess(), 5.0);
+  EXPECT_DOUBLE_EQ(c.find_overall("motor_balance")->rmse, compared().comparison.find_overall("motor_balance")->rmse);
+  EXPECT_GT(find(c.experiments[1], "motor_position")->nrmse, 0.1);
+  EXPECT_LT(find(c.experiments[1], "torque")->nrmse, 0.1);  // the current dictates the torque
+  const auto worst = std::max_element(c.regions.begin(), c.regions.end(), [](const Region& a, const Region& b) {
+    return (std::isfinite(a.excess) ? a.excess : 0.0) < (std::isfinite(b.excess) ? b.excess : 0.0);
+  });
+  EXPECT_EQ(worst->signal, "transmission_balance");
+}
+
+TEST(Compare, RegionsHoldEveryRowOfASignalOnceAVariable) {
+  const Comparison& c = compared().comparison;
+  std::size_t rows = 0;
+  double squares = 0.0;
+  for (const Region& r : c.regions) {
+    EXPECT_GE(r.samples, 30u);
+    EXPECT_LT(r.low, r.high);
+    if (r.signal != "motor_balance" || r.variable != "velocity") continue;
+    rows += r.samples;
+    squares += r.rmse * r.rmse * static_cast<double>(r.samples);
+  }
+  const SignalResult* s = c.find_overall("motor_balance");
+  // A bin of less than 30 rows is left out.
+  EXPECT_GE(rows + 60, s->samples);
+  EXPECT_LE(rows, s->samples);
+  EXPECT_NEAR(std::sqrt(squares / static_cast<double>(rows)) / s->rmse, 1.0, 0.05);
+}
+
+TEST(Compare, WithoutATorqueSensorMotorAndLoadAreOneBalance) {
+  data::Dataset dataset = compared().dataset;
+  dataset.experiments.resize(1);
+  dataset.experiments[0][data::Column::torque].clear();
+  dataset.experiments[0].noise_std = {};
+  model::Model m = compared().model;
+  std::erase_if(m.effects, [](const model::Effect& e) {
+    return catalogue::get(e.type).info->balance == catalogue::Balance::transmission;
+  });
+  const Comparison c = compare(dataset, m, {});
+  ASSERT_NE(c.find_overall("motor_balance"), nullptr);
+  EXPECT_TRUE(c.find_overall("motor_balance")->collapsed);
+  EXPECT_EQ(c.find_overall("load_balance"), nullptr);
+  EXPECT_EQ(c.find_overall("torque"), nullptr);
+  EXPECT_LT(c.find_overall("motor_balance")->nrmse, 0.02);
+}
+
+TEST(Compare, JsonHasTheFieldsOfItsFormatAndNullForWhatIsNotKnown) {
+  const nlohmann::json j = to_json(compared().comparison);
+  EXPECT_EQ(j["format"], "flexspline-compare/1");
+  EXPECT_EQ(j["experiments"][1]["role"], "holdout");
+  EXPECT_TRUE(j["parameter_trends"].is_array());
+  for (const char* key : {"signal", "unit", "samples", "masked", "rmse", "nrmse", "fit_percent", "vaf_percent",
+                          "max_abs", "worst_case_gain", "noise_floor", "noise_floor_from", "collapsed"})
+    EXPECT_TRUE(j["overall"][0].contains(key)) << key;
+  for (const char* key : {"signal", "variable", "low", "high", "samples", "bias", "rmse", "excess"})
+    EXPECT_TRUE(j["regions"][0].contains(key)) << key;
+  for (const auto& s : j["overall"])
+    if (s["signal"] == "motor_velocity") {
+      EXPECT_TRUE(s["noise_floor"].is_null());
+      EXPECT_EQ(s["noise_floor_from"], "none");
+    }
+  EXPECT_EQ(j["overall"][0]["noise_floor_from"], "propagated");
+}
+
+TEST(Compare, TableHasTheWorstExperimentFirstAndThreeRegionsInWords) {
+  model::Model wrong = compared().model;
+  *wrong.find("linear_stiffness")->find("stiffness")->value *= 1.2;
+  const std::string text = table(compare(compared().dataset, wrong, {}));
+  const auto locked = text.find("locked (hold-out)"), free = text.find("\nfree");
+  ASSERT_NE(locked, std::string::npos);
+  ASSERT_NE(free, std::string::npos);
+  EXPECT_LT(locked, free);
+  std::size_t sentences = 0;
+  for (std::size_t at = text.find("  The "); at != std::string::npos; at = text.find("  The ", at + 1)) ++sentences;
+  EXPECT_EQ(sentences, 3u);
+  EXPECT_NE(text.find("times the noise"), std::string::npos);
+  EXPECT_NE(text.find("The transmission balance at "), std::string::npos) << text;
+}
+
+}  // namespace
+}  // namespace flexspline::comparison
