@@ -16,6 +16,7 @@
 #include "host/cli/help.hpp"
 #include "host/data/findings.hpp"
 #include "host/output/text.hpp"
+#include "host/text/nearest.hpp"
 
 namespace flexspline::cli {
 namespace {
@@ -34,6 +35,7 @@ class App {
     app_.description(
         "Flexspline finds out which physical effects a drive with strain-wave gear has, and which its model lacks.");
     app_.require_subcommand(1);
+    add_demo();
     add_new();
     add_check();
     add_effects();
@@ -76,7 +78,7 @@ class App {
       names.push_back(sub->get_name());
     if (std::find(names.begin(), names.end(), command) != names.end()) return {};
     const std::vector<std::string_view> known(names.begin(), names.end());
-    const std::string near = data::nearest(command, known);
+    const std::string near = text::nearest(command, known);
     return fmt::format(
         "there is no command \"{}\"; {}", command,
         near.empty() ? std::string("flexspline --help lists them") : fmt::format("did you mean {}?", near));
@@ -125,7 +127,7 @@ class App {
 
   static void take_holdout(CLI::App* sub, DataInputs& inputs) {
     sub->add_option("--holdout", inputs.holdout, "measurements to judge on and never to fit, whatever role they state")
-        ->type_name("DATA ...");
+        ->type_name("DATA");
   }
 
   static void take_model(CLI::App* sub, std::filesystem::path& model) {
@@ -137,19 +139,27 @@ class App {
         ->type_name("HZ");
     sub->add_option("--mask", pipeline.mask, "auto leaves out reversals and sticking, none keeps them (default: auto)")
         ->check(CLI::IsMember({"auto", "none"}))
-        ->type_name("auto|none");
+        ->type_name("");
+  }
+
+  void add_demo() {
+    const auto [sub, options] = command<DemoOptions>("demo");
+    sub->add_option("--hidden", options->hidden, "effect that the twin hides, or none (default: by chance)")
+        ->type_name("NAME");
+    sub->add_option("--seed", options->seed, "of all chance (default: another one each time)")->type_name("N");
+    sub->add_option("--out", options->out, "folder for recording and models (default: demo-out)")->type_name("DIR");
   }
 
   void add_new() {
     const auto [sub, options] = command<NewOptions>("new");
-    sub->add_option("--from", options->data.data, kDataHelp)->required()->type_name("DATA ...");
+    sub->add_option("--from", options->data.data, kDataHelp)->required()->type_name("DATA");
     sub->add_option("--out", options->out, "folder for dataset.toml and base-model.toml")->required()->type_name("DIR");
     sub->add_option("--map", options->map, "a column of ours is theirs, in this unit; may be repeated")
         ->type_name("OURS=THEIRS[:UNIT]")
         ->allow_extra_args(false);
     sub->add_option("--axis", options->axis, "rotary, or linear (m, m/s, N)")
         ->check(CLI::IsMember({"rotary", "linear"}))
-        ->type_name("rotary|linear");
+        ->type_name("");
     sub->add_option("--gear-ratio", options->gear_ratio, "motor turns per output turn")
         ->check(CLI::PositiveNumber)
         ->type_name("N");
@@ -184,7 +194,7 @@ class App {
            "ls: least squares; nls: with a search for shape parameters (default: what the model needs); iv, oe: "
            "not built yet")
         ->check(CLI::IsMember({"ls", "nls", "iv", "oe"}))
-        ->type_name("ls|nls");
+        ->type_name("");
     take_holdout(sub, options->data);
     take_pipeline(sub, options->pipeline);
   }

@@ -15,6 +15,8 @@ using diagnosis::Addition;
 using nlohmann::json;
 using output::number;
 
+constexpr int kDigits = 5;  // an interval of 0.1 % is still one
+
 std::string percent_change(double before, double after) {
   return before > 0.0 ? fmt::format("{:+.1f} %", 100.0 * (after / before - 1.0)) : "-";
 }
@@ -36,7 +38,8 @@ void print(const Addition& change, const std::string& what, Console& console) {
   console.line();
   output::Table values({"all parameters", "value", "95 % interval", "", "unit"}, "lrrrl");
   for (const regression::Estimate& e : change.estimates)
-    values.row({fmt::format("{}.{}", e.id, e.parameter), number(e.value), number(e.low), number(e.high), e.unit});
+    values.row({fmt::format("{}.{}", e.id, e.parameter), number(e.value, kDigits), number(e.low, kDigits),
+                number(e.high, kDigits), e.unit});
   console.line(values.text());
 }
 

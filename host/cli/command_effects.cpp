@@ -4,10 +4,10 @@
 
 #include "host/catalogue/catalogue.hpp"
 #include "host/cli/commands.hpp"
-#include "host/data/findings.hpp"
 #include "host/output/identification.hpp"
 #include "host/output/json.hpp"
 #include "host/output/text.hpp"
+#include "host/text/nearest.hpp"
 
 namespace flexspline::cli {
 namespace {
@@ -115,7 +115,7 @@ int run(const EffectsOptions& options, Console& console) {
     if (entry == nullptr) {
       std::vector<std::string_view> names;
       for (const Entry& e : catalogue::all()) names.push_back(e.name());
-      const std::string near = data::nearest(options.name, names);
+      const std::string near = text::nearest(options.name, names);
       throw UsageError(fmt::format("there is no effect \"{}\"; {}flexspline effects lists all", options.name,
                                    near.empty() ? "" : fmt::format("did you mean {}? ", near)));
     }

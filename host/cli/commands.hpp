@@ -1,6 +1,7 @@
 // The commands: what each is given, and what runs it. One file a command; the options come from app.cpp.
 #pragma once
 
+#include <cstdint>
 #include <filesystem>
 #include <optional>
 #include <string>
@@ -9,6 +10,14 @@
 #include "host/cli/inputs.hpp"
 
 namespace flexspline::cli {
+
+struct DemoOptions {
+  std::string hidden;  // empty: by chance; "none": nothing
+  std::optional<std::uint64_t> seed;
+  std::filesystem::path out = "demo-out";
+  std::string json;
+};
+int run(const DemoOptions& options, Console& console);
 
 struct EffectsOptions {
   std::string name;  // empty: all

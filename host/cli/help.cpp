@@ -16,6 +16,14 @@ constexpr std::string_view kAdd =
     "flexspline add viscous_asymmetry --model demo-out/base-model.toml demo-out --out better.toml";
 
 const std::array kHelp = {
+    CommandHelp{"demo",
+                "the whole story on the embedded twin, with a hidden effect",
+                "A simulated drive with one effect that the model does not know is recorded, identified and compared; "
+                "the missing "
+                "effect is diagnosed and added, and both models are judged on motions that the fit never saw. At the "
+                "end the twin "
+                "tells what it had hidden.",
+                {"flexspline demo --hidden stribeck_gaussian --seed 7 --out demo-out"}},
     CommandHelp{
         "new",
         "first dataset.toml and base model from the measurements that there are",
@@ -74,21 +82,20 @@ const std::array kHelp = {
         "add",
         "adds an effect to a model and refits it, with the error before and after",
         "Adds an effect of the catalogue, estimates all parameters anew and says what that does to the error, on the "
-        "data "
-        "that were fitted and on those held out. Comments and layout of the model file stay; its history gets a line.",
+        "data that were fitted and on those held out. Comments and layout of the model file stay; its history gets a "
+        "line.",
         {kMakeData, kAdd}},
     CommandHelp{
         "remove",
         "takes an effect out of a model and refits it, and shows what that costs",
         "Takes an effect out, by its id or its type, estimates the rest anew and says what that does to the error, on "
-        "the "
-        "data that were fitted and on those held out.",
+        "the data that were fitted and on those held out.",
         {kMakeData, kAdd, "flexspline remove coulomb_asymmetry --model better.toml demo-out --out smaller.toml"}},
 };
 
-constexpr std::array<std::string_view, 16> kNotBuilt = {
-    "demo",   "measure", "sensitivity", "plan",    "pack",    "unpack", "export", "drives",
-    "record", "flash",   "backup",      "restore", "monitor", "twin",   "hil",    "workbench"};
+constexpr auto kNotBuilt =
+    std::to_array<std::string_view>({"measure", "sensitivity", "plan", "pack", "unpack", "export", "drives", "record",
+                                     "flash", "backup", "restore", "monitor", "twin", "hil", "workbench"});
 
 }  // namespace
 

@@ -16,7 +16,8 @@ struct NoiseFloor {
 
 // Floor of the residual of each range of `data.records()`, for a model with the values in `terms`. Sources, best first:
 // period-to-period variance where the motion repeats itself; replicates; stated noise and quantisation of the columns
-// propagated through the pipeline. Never extrapolated from above the band.
+// propagated through the pipeline. Never extrapolated from above the band. Replicates of a record are looked for among
+// `experiments`: those that a key names as such, and those with the same position set points.
 std::vector<NoiseFloor> noise_floors(regression::BalanceData& data, const regression::Terms& terms,
                                      const std::vector<const data::Experiment*>& experiments,
                                      const model::Drive& drive);

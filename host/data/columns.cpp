@@ -6,6 +6,7 @@
 #include <numbers>
 
 #include "host/data/units.hpp"
+#include "host/text/nearest.hpp"
 
 namespace flexspline::data {
 namespace {
@@ -19,7 +20,7 @@ std::string listed(const std::vector<std::string>& names) {
 std::string near_column(std::string_view name) {
   std::vector<std::string_view> ours = {"time_s"};
   for (std::size_t i = 0; i < kColumns; ++i) ours.push_back(column_name(static_cast<Column>(i)));
-  return nearest(name, ours);
+  return text::nearest(name, ours);
 }
 
 class Planner {

@@ -2,13 +2,18 @@
 
 #include <fmt/format.h>
 
-#include <toml++/toml.h>
-#include <cctype>
 #include <cmath>
 #include <fstream>
+#include <sstream>
+
+#include "host/text/nearest.hpp"
+#include "host/text/toml.hpp"
 
 namespace flexspline::data {
 namespace {
+
+using text::Node;
+using text::NodeKind;
 
 constexpr std::string_view kFormat = "flexspline-dataset/1";
 
@@ -17,66 +22,52 @@ class Reader {
   Reader(std::filesystem::path path, Findings& findings) : findings_(findings) { toml_.file = std::move(path); }
 
   DatasetToml read() {
-    const toml::table root = parse();
+    const Node root = parse();
     check_format(root);
-    for (const auto& [key, node] : root) {
+    for (const auto& entry : root.entries) {
+      const std::string& key = entry.key;
+      const Node& node = entry.value;
       if (key == "format") continue;
       if (key == "drive")
-        each(node, "[drive]", [&](std::string_view k, const toml::node& v) { drive(k, v); });
+        each(node, "[drive]", [&](std::string_view k, const Node& v) { drive(k, v); });
       else if (key == "columns")
-        each(node, "[columns]", [&](std::string_view k, const toml::node& v) { column(k, v); });
+        each(node, "[columns]", [&](std::string_view k, const Node& v) { column(k, v); });
       else if (key == "experiment")
         experiments(node);
       else
-        unknown(node, std::string(key.str()), nearest(key.str(), {"format", "drive", "columns", "experiment"}));
+        unknown(node, key, text::nearest(key, {"format", "drive", "columns", "experiment"}));
     }
     return std::move(toml_);
   }
 
  private:
   std::string file() const { return toml_.file.string(); }
-  static std::size_t line(const toml::node& node) { return node.source().begin.line; }
 
-  // toml++ 3.3 asserts, in builds with assertions, on a header that begins with no key, "[.a]": a user's mistake.
-  void refuse_headers_without_a_key() {
-    std::ifstream stream(toml_.file);
-    std::string text;
-    for (std::size_t number = 1; std::getline(stream, text); ++number) {
-      const std::size_t bracket = text.find_first_not_of(" \t\xEF\xBB\xBF");
-      if (bracket == std::string::npos || text[bracket] != '[') continue;
-      const std::size_t key = text.find_first_not_of(" \t", bracket + (text.compare(bracket, 2, "[[") == 0 ? 2 : 1));
-      const bool starts_key =
-          key != std::string::npos && (std::isalnum(static_cast<unsigned char>(text[key])) != 0 ||
-                                       std::string_view("_-\"']").find(text[key]) != std::string_view::npos);
-      if (!starts_key)
-        findings_.fail("format", file(), number, fmt::format("no valid TOML: no name follows the bracket in {}", text),
-                       "mend this line");
-    }
-  }
-
-  toml::table parse() {
-    refuse_headers_without_a_key();
+  Node parse() {
+    std::ifstream stream(toml_.file, std::ios::binary);
+    std::ostringstream content;
+    if (stream.peek() != std::ifstream::traits_type::eof()) content << stream.rdbuf();
+    if (!stream.is_open() || stream.bad())
+      findings_.fail("file", file(), 0, "cannot read this file", "check the path and the permissions");
     try {
-      return toml::parse_file(toml_.file.string());
-    } catch (const toml::parse_error& error) {
-      const auto at = error.source().begin;
-      findings_.fail(at.line > 0 ? "format" : "file", file(), at.line,
-                     at.line > 0 ? fmt::format("no valid TOML at column {}: {}", at.column, error.description())
-                                 : "cannot read this file",
-                     at.line > 0 ? "mend this line" : "check the path and the permissions");
+      return text::parse_toml(content.view());
+    } catch (const text::TomlError& error) {
+      const std::string where = error.column() > 0 ? fmt::format(" at column {}", error.column()) : std::string();
+      findings_.fail("format", file(), error.line(), fmt::format("no valid TOML{}: {}", where, error.what()),
+                     "mend this line");
     }
   }
 
-  void check_format(const toml::table& root) {
-    const toml::node* node = root.get("format");
+  void check_format(const Node& root) {
+    const Node* node = root.find("format");
     if (node == nullptr) {
       findings_.add(Severity::warning, "unknown_key", file(), 1, "", "the file does not say its format",
                     fmt::format("write format = \"{}\" as its first line", kFormat));
       return;
     }
-    const std::string format = node->value_or(std::string{});
+    const std::string format = node->text;
     if (format == kFormat) return;
-    findings_.fail("format", file(), line(*node),
+    findings_.fail("format", file(), node->line,
                    fmt::format("the format is \"{}\", this tool reads \"{}\"", format, kFormat),
                    format.starts_with("flexspline-model/") ? "this is a model: give it as --model"
                    : format.starts_with("flexspline-dataset/")
@@ -84,49 +75,46 @@ class Reader {
                        : "give a data set");
   }
 
-  void unknown(const toml::node& node, const std::string& key, const std::string& near) {
-    findings_.add(Severity::warning, "unknown_key", file(), line(node), "",
+  void unknown(const Node& node, const std::string& key, const std::string& near) {
+    findings_.add(Severity::warning, "unknown_key", file(), node.line, "",
                   fmt::format("the key {} is not known here and is ignored", key),
                   near.empty() ? "take it out" : fmt::format("did you mean {}?", near));
   }
 
-  void wrong_type(const toml::node& node, std::string_view key, std::string_view expected) {
-    findings_.add(Severity::error, "key", file(), line(node), "", fmt::format("{} must be {}", key, expected),
+  void wrong_type(const Node& node, std::string_view key, std::string_view expected) {
+    findings_.add(Severity::error, "key", file(), node.line, "", fmt::format("{} must be {}", key, expected),
                   "see the format of dataset.toml");
   }
 
   template <typename Visit>
-  void each(const toml::node& node, std::string_view what, Visit visit) {
-    const toml::table* table = node.as_table();
-    if (table == nullptr) {
+  void each(const Node& node, std::string_view what, Visit visit) {
+    if (node.kind != NodeKind::table) {
       wrong_type(node, what, "a table");
       return;
     }
-    for (const auto& [key, value] : *table) visit(key.str(), value);
+    for (const auto& entry : node.entries) visit(entry.key, entry.value);
   }
 
-  std::optional<double> number(std::string_view key, const toml::node& node) {
-    const std::optional<double> value = node.is_number() ? node.value<double>() : std::nullopt;
-    if (value && std::isfinite(*value)) return value;
+  std::optional<double> number(std::string_view key, const Node& node) {
+    if (node.kind == NodeKind::number && std::isfinite(node.number)) return node.number;
     wrong_type(node, key, "a number");
     return std::nullopt;
   }
 
-  std::string text(std::string_view key, const toml::node& node) {
-    const std::optional<std::string> value = node.value_exact<std::string>();
-    if (!value) wrong_type(node, key, "text in quotes");
-    return value.value_or(std::string{});
+  std::string text(std::string_view key, const Node& node) {
+    if (node.kind != NodeKind::text) wrong_type(node, key, "text in quotes");
+    return node.text;
   }
 
-  void take(KeyMap& keys, std::string_view key, const toml::node& node) {
+  void take(KeyMap& keys, std::string_view key, const Node& node) {
     KeyValue value;
     value.file = file();
-    value.line = line(node);
-    if (node.is_number()) {
-      value.number = node.value<double>();
+    value.line = node.line;
+    if (node.kind == NodeKind::number) {
+      value.number = node.number;
       value.text = fmt::format("{}", *value.number);
-    } else if (node.is_string()) {
-      value.text = node.value_or(std::string{});
+    } else if (node.kind == NodeKind::text) {
+      value.text = node.text;
     } else {
       wrong_type(node, key, "a number or text");
       return;
@@ -134,7 +122,7 @@ class Reader {
     keys.insert_or_assign(std::string(key), value);
   }
 
-  void drive(std::string_view key, const toml::node& node) {
+  void drive(std::string_view key, const Node& node) {
     if (is_drive_key(key))
       take(toml_.drive, key, node);
     else if (is_experiment_key(key) && key != "experiment" && key != "replicate_of")
@@ -143,17 +131,17 @@ class Reader {
       unknown(node, fmt::format("{} of [drive]", key), nearest_key(key));
   }
 
-  void column(std::string_view name, const toml::node& node) {
+  void column(std::string_view name, const Node& node) {
     if (name != "time_s" && !column_from_name(name)) {
       std::vector<std::string_view> names = {"time_s"};
       for (std::size_t i = 0; i < kColumns; ++i) names.push_back(column_name(static_cast<Column>(i)));
-      unknown(node, fmt::format("[columns.{}]", name), nearest(name, names));
+      unknown(node, fmt::format("[columns.{}]", name), text::nearest(name, names));
       return;
     }
     ColumnMapping mapping;
     mapping.source = name;
-    mapping.line = line(node);
-    each(node, fmt::format("columns.{}", name), [&](std::string_view key, const toml::node& value) {
+    mapping.line = node.line;
+    each(node, fmt::format("columns.{}", name), [&](std::string_view key, const Node& value) {
       if (key == "source")
         mapping.source = text(key, value);
       else if (key == "unit")
@@ -164,7 +152,7 @@ class Reader {
         mapping.offset = number(key, value).value_or(0.0);
       else
         unknown(value, fmt::format("{} of [columns.{}]", key, name),
-                nearest(key, {"source", "unit", "scale", "offset"}));
+                text::nearest(key, {"source", "unit", "scale", "offset"}));
     });
     if (mapping.scale == 0.0)
       findings_.add(Severity::error, "key", file(), mapping.line, std::string(name), "scale is zero",
@@ -172,19 +160,18 @@ class Reader {
     toml_.columns.insert_or_assign(std::string(name), mapping);
   }
 
-  void experiments(const toml::node& node) {
-    const toml::array* array = node.as_array();
-    if (array == nullptr) {
+  void experiments(const Node& node) {
+    if (node.kind != NodeKind::array) {
       wrong_type(node, "experiment", "a list of tables: write [[experiment]] with two brackets");
       return;
     }
-    for (const toml::node& entry : *array) experiment(entry);
+    for (const Node& entry : node.items) experiment(entry);
   }
 
-  void experiment(const toml::node& node) {
+  void experiment(const Node& node) {
     ExperimentEntry entry;
-    entry.line = line(node);
-    each(node, "[[experiment]]", [&](std::string_view key, const toml::node& value) {
+    entry.line = node.line;
+    each(node, "[[experiment]]", [&](std::string_view key, const Node& value) {
       if (key == "file")
         entry.file = text(key, value);
       else if (key == "from_s")
@@ -196,7 +183,7 @@ class Reader {
       else if (is_experiment_key(key))
         take(entry.keys, key, value);
       else if (is_drive_key(key))
-        findings_.add(Severity::warning, "unknown_key", file(), line(value), "",
+        findings_.add(Severity::warning, "unknown_key", file(), value.line, "",
                       fmt::format("{} is a fact of the drive and is ignored here", key), "write it under [drive]");
       else
         unknown(value, fmt::format("{} of [[experiment]]", key), near_experiment_key(key));
@@ -215,7 +202,7 @@ class Reader {
   }
 
   static std::string near_experiment_key(std::string_view key) {
-    const std::string near = nearest(key, {"file", "name", "from_s", "to_s", "role", "load"});
+    const std::string near = text::nearest(key, {"file", "name", "from_s", "to_s", "role", "load"});
     return near.empty() ? nearest_key(key) : near;
   }
 

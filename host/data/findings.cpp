@@ -4,7 +4,8 @@
 
 #include <algorithm>
 #include <array>
-#include <numeric>
+
+#include "host/text/nearest.hpp"
 
 namespace flexspline::data {
 namespace {
@@ -39,21 +40,6 @@ constexpr std::array kKinds = {
     KindInfo{"empty_column", Severity::note, false},
 };
 
-std::size_t edits(std::string_view a, std::string_view b) {
-  std::vector<std::size_t> row(b.size() + 1);
-  std::iota(row.begin(), row.end(), std::size_t{0});
-  for (std::size_t i = 0; i < a.size(); ++i) {
-    std::size_t diagonal = row[0];
-    row[0] = i + 1;
-    for (std::size_t j = 0; j < b.size(); ++j) {
-      const std::size_t substituted = diagonal + (a[i] == b[j] ? 0 : 1);
-      diagonal = row[j + 1];
-      row[j + 1] = std::min({row[j] + 1, row[j + 1] + 1, substituted});
-    }
-  }
-  return row[b.size()];
-}
-
 }  // namespace
 
 std::span<const KindInfo> known_kinds() {
@@ -67,30 +53,13 @@ std::string tolerable_kinds() {
   return text;
 }
 
-std::string nearest(std::string_view word, std::span<const std::string_view> known) {
-  std::string best;
-  std::size_t fewest = std::max<std::size_t>(1, word.size() / 3) + 1;
-  for (const std::string_view candidate : known) {
-    const std::size_t count = edits(word, candidate);
-    if (count < fewest) {
-      fewest = count;
-      best = candidate;
-    }
-  }
-  return best;
-}
-
-std::string nearest(std::string_view word, std::initializer_list<std::string_view> known) {
-  return nearest(word, std::span<const std::string_view>(known.begin(), known.size()));
-}
-
 Findings::Findings(std::vector<std::string> tolerate) : tolerate_(std::move(tolerate)) {
   for (const std::string& name : tolerate_) {
     const auto kind = std::find_if(kKinds.begin(), kKinds.end(), [&](const KindInfo& k) { return k.name == name; });
     if (kind == kKinds.end()) {
       std::vector<std::string_view> names;
       for (const KindInfo& k : kKinds) names.push_back(k.name);
-      const std::string near = nearest(name, names);
+      const std::string near = text::nearest(name, names);
       add(Severity::error, "tolerate", "", 0, "",
           fmt::format("no finding is of kind \"{}\"{}", name,
                       near.empty() ? "" : fmt::format(" (did you mean \"{}\"?)", near)),

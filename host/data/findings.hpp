@@ -1,7 +1,6 @@
 // Collects what is found while measurements are read, and knows which kinds there are.
 #pragma once
 
-#include <initializer_list>
 #include <span>
 #include <string>
 #include <string_view>
@@ -23,10 +22,6 @@ std::span<const KindInfo> known_kinds();
 
 // "jitter, not_finite, ...": the kinds that `--tolerate` takes.
 std::string tolerable_kinds();
-
-// The entry of `known` with the fewest edits to `word`; empty if more than a third of the word would change.
-std::string nearest(std::string_view word, std::span<const std::string_view> known);
-std::string nearest(std::string_view word, std::initializer_list<std::string_view> known);
 
 class Findings {
  public:

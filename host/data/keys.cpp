@@ -7,6 +7,8 @@
 #include <cmath>
 #include <utility>
 
+#include "host/text/nearest.hpp"
+
 namespace flexspline::data {
 namespace {
 
@@ -78,7 +80,7 @@ std::string nearest_key(std::string_view key) {
   for (std::size_t i = 0; i < kColumns; ++i)
     noise.push_back(std::string(kNoise) + std::string(column_name(static_cast<Column>(i))));
   known.insert(known.end(), noise.begin(), noise.end());
-  return nearest(key, known);
+  return text::nearest(key, known);
 }
 
 KeyMap keys_of_header(const std::vector<HeaderKey>& lines, const std::string& file, Findings& findings) {

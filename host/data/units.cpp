@@ -3,7 +3,8 @@
 #include <algorithm>
 #include <array>
 #include <numbers>
-#include <utility>
+
+#include "host/text/unit_signs.hpp"
 
 namespace flexspline::data {
 namespace {
@@ -100,21 +101,10 @@ constexpr auto kUnits = std::to_array<Entry>({
     {"inc/s", "", {counts_rate, 1.0, 0.0}},
 });
 
-void replace_all(std::string& text, std::string_view from, std::string_view to) {
-  for (std::size_t at = text.find(from); at != std::string::npos; at = text.find(from, at + to.size()))
-    text.replace(at, from.size(), to);
-}
-
+// "N*m", "N m" and "Nm" are one spelling.
 std::string normalised(std::string_view text) {
-  std::string unit(text);
-  for (const auto& [from, to] : {std::pair<std::string_view, std::string_view>{"\xC2\xB0", "deg"},  // degree sign
-                                 {"\xC2\xB5", "u"},                                                 // micro sign
-                                 {"\xCE\xBC", "u"},                                                 // Greek mu
-                                 {"\xC2\xB7", ""},                                                  // middle dot
-                                 {"\xE2\x8B\x85", ""},                                              // dot operator
-                                 {"*", ""},
-                                 {" ", ""}})
-    replace_all(unit, from, to);
+  std::string unit = text::unit_in_ascii(text);
+  std::erase_if(unit, [](char c) { return c == '*' || c == ' '; });
   return unit;
 }
 

@@ -31,8 +31,12 @@ constexpr double kRivalMargin = 10.0;
 constexpr double kOwnShare = 0.003;
 constexpr std::size_t kGridPoints = 6;
 constexpr std::size_t kRefined = 4;     // candidates whose shapes are searched continuously
-constexpr double kAtFloor = 1.15;       // residual over noise floor
-constexpr double kUnexplained = 1.2;
+// Residual over noise floor: what the filters leave around reversals repeats with the motion, so a true model stands some
+// 15 % above its floor.
+constexpr double kAtFloor = 1.3;
+// Maps of a complete model show significant shares of a few percent, too.
+constexpr double kShownShare = 5.0;
+constexpr double kUnexplained = 1.3;
 
 // One balance with the model as it is, and what adding an effect would do.
 struct Search {
@@ -248,8 +252,9 @@ Candidate report(const Trial& trial, const Search& search, data::Axis axis) {
 
 std::vector<Localised> shares(const BalanceData& data, const Judged& judged) {
   std::vector<Localised> list;
-  for (const auto& share : comparison::localise(data, judged.residual, judged.autocorrelation_time))
-    list.push_back({share.variable, share.share_percent});
+  const data::Axis axis = data.prepared().rotary ? data::Axis::rotary : data::Axis::linear;
+  for (const auto& share : comparison::localise(data, judged.residual, judged.autocorrelation_time, axis))
+    if (share.share_percent >= kShownShare) list.push_back({share.variable, share.share_percent});
   return list;
 }
 

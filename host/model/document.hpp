@@ -1,48 +1,16 @@
-// A TOML text as a tree that knows where in the text each key and value stands, so that values can be replaced there.
+// The TOML tree of a model file.
 #pragma once
 
-#include <cstddef>
-#include <cstdint>
-#include <string>
 #include <string_view>
-#include <vector>
+
+#include "host/text/toml.hpp"
 
 namespace flexspline::model {
 
-// Half-open range of bytes of the text.
-struct Span {
-  std::size_t begin = 0;
-  std::size_t end = 0;
-};
-
-enum class NodeKind : std::uint8_t { table, array, text, number, boolean, other };
-
-struct Entry;
-
-struct Node {
-  NodeKind kind = NodeKind::other;
-  Span span;                   // value; of a table with a header the header, of one made by dotted keys its first key
-  std::size_t line = 1;        // where the span begins, from 1
-  bool is_inline = false;      // table in braces
-  bool has_header = false;     // table with a [header] or [[header]] of its own
-  std::string text;            // kind text
-  double number = 0.0;         // kind number: integers and floats alike, infinity and NaN included
-  bool boolean = false;        // kind boolean
-  std::vector<Entry> entries;  // kind table, in the order of the text
-  std::vector<Node> items;     // kind array
-
-  const Node* find(std::string_view key) const;    // nullptr: not there
-  const Entry* entry(std::string_view key) const;  // nullptr: not there
-  // "a table", "text", ...: for messages.
-  std::string_view kind_name() const;
-};
-
-struct Entry {
-  std::string key;
-  Span key_span;  // of a dotted key the last part
-  std::size_t line = 1;
-  Node value;
-};
+using text::Entry;
+using text::Node;
+using text::NodeKind;
+using text::Span;
 
 // The root table. Throws ModelError with `file_name`, line and what the TOML reader says.
 Node parse_document(std::string_view text, std::string_view file_name);

@@ -11,6 +11,7 @@
 #include "host/model/model.hpp"
 #include "host/model/text.hpp"
 #include "host/model/units.hpp"
+#include "host/text/nearest.hpp"
 
 namespace flexspline::model {
 namespace {
@@ -18,34 +19,8 @@ namespace {
 constexpr std::string_view kFormat = "flexspline-model/1";
 // What rounding to the digits of a written value can move it, relative to a bound.
 constexpr double kRounding = 1e-5;
-
-std::size_t edit_distance(std::string_view a, std::string_view b) {
-  std::vector<std::size_t> row;
-  for (std::size_t j = 0; j <= b.size(); ++j) row.push_back(j);
-  for (std::size_t i = 0; i < a.size(); ++i) {
-    std::size_t diagonal = row[0];
-    row[0] = i + 1;
-    for (std::size_t j = 0; j < b.size(); ++j) {
-      const std::size_t changed = diagonal + (a[i] == b[j] ? 0 : 1);
-      diagonal = row[j + 1];
-      row[j + 1] = std::min({changed, row[j] + 1, row[j + 1] + 1});
-    }
-  }
-  return row.back();
-}
-
-// The known name that is likely meant; empty where none is near.
-std::string_view nearest(std::string_view name, const std::vector<std::string_view>& known) {
-  std::string_view best;
-  std::size_t best_distance = std::max<std::size_t>(2, name.size() / 3) + 1;
-  for (const std::string_view candidate : known) {
-    const std::size_t distance = edit_distance(name, candidate);
-    if (distance >= best_distance) continue;
-    best = candidate;
-    best_distance = distance;
-  }
-  return best;
-}
+// Edits that a misspelt name may always be away from the one that is meant: two letters that changed places.
+constexpr std::size_t kSlips = 2;
 
 std::string join(const std::vector<std::string_view>& names) {
   return names.empty() ? "none" : fmt::format("{}", fmt::join(names, ", "));
@@ -89,7 +64,7 @@ class Reader {
 
   void require_known(const Entry& entry, const std::string& where, const std::vector<std::string_view>& known) const {
     if (std::ranges::find(known, entry.key) != known.end()) return;
-    const std::string_view meant = nearest(entry.key, known);
+    const std::string meant = text::nearest(entry.key, known, kSlips);
     fail(entry.line, fmt::format("{} has no key \"{}\"", where, entry.key),
          meant.empty() ? fmt::format("known are {}", join(known)) : fmt::format("did you mean \"{}\"?", meant));
   }
@@ -187,7 +162,7 @@ class Reader {
     result.type = text(*type, "type");
     const KnownEffect* known = known_.find(result.type);
     if (!known) {
-      const std::string_view meant = nearest(result.type, known_.names());
+      const std::string meant = text::nearest(result.type, known_.names(), kSlips);
       fail(type->line, fmt::format("there is no effect \"{}\"", result.type),
            meant.empty() ? "\"flexspline effects\" lists the names" : fmt::format("did you mean \"{}\"?", meant));
     }

@@ -7,6 +7,8 @@
 #include <optional>
 #include <string>
 
+#include "host/text/unit_signs.hpp"
+
 namespace flexspline::model {
 namespace {
 
@@ -34,29 +36,9 @@ class UnitReader {
   }
 
  private:
-  // Signs outside ASCII become ASCII ones; spaces that only surround an operator go.
+  // Spaces that only surround the text go.
   static std::string plain(std::string_view text) {
-    static constexpr std::array<std::pair<std::string_view, std::string_view>, 9> kSigns = {{{"\u00B7", "*"},
-                                                                                             {"\u22C5", "*"},
-                                                                                             {"\u00D7", "*"},
-                                                                                             {"\u00B2", "^2"},
-                                                                                             {"\u00B3", "^3"},
-                                                                                             {"\u00B0", "deg"},
-                                                                                             {"\u00B5", "u"},
-                                                                                             {"\u207B", "-"},
-                                                                                             {"\u00B9", "1"}}};
-    std::string result;
-    for (std::size_t i = 0; i < text.size();) {
-      bool replaced = false;
-      for (const auto& [sign, ascii] : kSigns) {
-        if (!text.substr(i).starts_with(sign)) continue;
-        result += ascii;
-        i += sign.size();
-        replaced = true;
-        break;
-      }
-      if (!replaced) result += text[i++];
-    }
+    const std::string result = text::unit_in_ascii(text);
     const std::size_t first = result.find_first_not_of(" \t");
     if (first == std::string::npos) return {};
     return result.substr(first, result.find_last_not_of(" \t") - first + 1);

@@ -16,6 +16,7 @@ using regression::Estimate;
 
 constexpr std::size_t kExperimentsAbreast = 5;
 constexpr std::size_t kNameWidth = 13;
+constexpr int kDigits = 5;  // an interval of 0.1 % is still one
 
 std::string label(const Estimate& e) {
   return fmt::format("{}.{}", e.id, e.parameter);
@@ -75,7 +76,7 @@ std::string by_experiment(const regression::Identification& found) {
 std::string pooled(const regression::Identification& found) {
   Table table({"all together", "value", "95 % interval", "", "unit", ""}, "lrrrll");
   for (const Estimate& e : found.estimates)
-    table.row({label(e), number(e.value), number(e.low), number(e.high), e.unit,
+    table.row({label(e), number(e.value, kDigits), number(e.low, kDigits), number(e.high, kDigits), e.unit,
                e.identifiable ? "" : "these data cannot tell it"});
   return table.text();
 }

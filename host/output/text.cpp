@@ -70,11 +70,11 @@ std::string wrapped(std::string_view text, std::size_t indent, std::size_t hang)
   return result;
 }
 
-std::string number(double value) {
-  return std::isfinite(value) ? fmt::format("{:.4g}", value) : "-";
+std::string number(double value, int digits) {
+  return std::isfinite(value) ? fmt::format("{:.{}g}", value, digits) : "-";
 }
-std::string number(const std::optional<double>& value) {
-  return value ? number(*value) : "-";
+std::string number(const std::optional<double>& value, int digits) {
+  return value ? number(*value, digits) : "-";
 }
 
 std::string with_unit(double value, std::string_view unit) {

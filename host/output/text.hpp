@@ -30,9 +30,9 @@ class Table {
 // first after `hang` more.
 std::string wrapped(std::string_view text, std::size_t indent = 2, std::size_t hang = 0);
 
-// Four significant digits; "-" for what is not known.
-std::string number(double value);
-std::string number(const std::optional<double>& value);
+// Significant digits; "-" for what is not known.
+std::string number(double value, int digits = 4);
+std::string number(const std::optional<double>& value, int digits = 4);
 // "12.3 N*m", "0.5" where the unit is 1 or empty.
 std::string with_unit(double value, std::string_view unit);
 

@@ -25,7 +25,7 @@ constexpr double kMotionOverRow = 2.5;
 constexpr double kRowsOverCutoff = 4.0;
 
 // How far, in periods of the row cut-off, the step of friction at a reversal rings through the row filter.
-constexpr double kMaskReach = 1.0;
+constexpr double kMaskReach = 1.5;
 
 template <class Process>
 std::vector<double> by_segment(const std::vector<double>& signal, const std::vector<Segment>& segments, Process process) {

@@ -8,8 +8,8 @@
 namespace flexspline::cli_test {
 namespace {
 
-constexpr const char* kBuilt[] = {"new",     "check",    "effects", "identify", "simulate",
-                                  "compare", "diagnose", "add",     "remove"};
+constexpr const char* kBuilt[] = {"demo",     "new",     "check",    "effects", "identify",
+                                  "simulate", "compare", "diagnose", "add",     "remove"};
 constexpr const char* kToCome[] = {"measure", "sensitivity", "plan",   "pack",  "unpack",
                                    "export",  "drives",      "record", "flash", "backup",
                                    "restore", "monitor",     "twin",   "hil",   "workbench"};

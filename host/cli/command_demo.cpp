@@ -1,0 +1,184 @@
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cmath>
+#include <nlohmann/json.hpp>
+#include <random>
+
+#include "host/cli/commands.hpp"
+#include "host/cli/twin_process.hpp"
+#include "host/comparison/compare.hpp"
+#include "host/diagnosis/add.hpp"
+#include "host/diagnosis/diagnosis.hpp"
+#include "host/output/json.hpp"
+#include "host/output/text.hpp"
+#include "host/regression/identify.hpp"
+
+namespace flexspline::cli {
+namespace {
+
+using nlohmann::json;
+using output::number;
+
+// What the demo may hide: effects that a strain-wave drive may have and a first model lacks.
+constexpr std::string_view kMayHide[] = {
+    "viscous_asymmetry", "coulomb_asymmetry", "stribeck_gaussian",   "load_dependent_friction", "power_law_friction",
+    "gravity",           "current_offset",    "torque_ripple:2",     "torque_ripple:7",         "temperature_viscous",
+    "dahl_friction",     "backlash",          "structural_damping"};
+
+std::string label(const diagnosis::Named& named) {
+  return named.order ? fmt::format("{}:{:g}", named.effect, *named.order) : named.effect;
+}
+
+// The same effect, whether or not an order was given with it.
+bool is_the_hidden_one(const diagnosis::Named& named, const std::string& hidden) {
+  return label(named) == hidden || (named.effect == "torque_ripple" && hidden == "torque_ripple" && named.order == 2.0);
+}
+
+// Free run on motions that the fit never saw: nothing of the measurement but the effort goes in.
+comparison::Comparison on_unseen(const data::Dataset& dataset, const model::Model& model) {
+  data::Dataset unseen;
+  unseen.drive = dataset.drive;
+  for (const data::Experiment& e : dataset.experiments)
+    if (e.role == data::Role::holdout) unseen.experiments.push_back(e);
+  return comparison::compare(unseen, model, {});
+}
+
+void print_free_runs(const comparison::Comparison& before, const comparison::Comparison& after, Console& console) {
+  output::Table table({"free run on unseen motions", "before", "after", "unit", "change"}, "lrrlr");
+  for (const comparison::SignalResult& a : after.overall) {
+    const comparison::SignalResult* b = before.find_overall(a.signal);
+    if (!b || a.signal.ends_with("_balance")) continue;
+    table.row({a.signal, number(b->rmse), number(a.rmse), a.unit,
+               b->rmse > 0.0 ? fmt::format("{:+.0f} %", 100.0 * (a.rmse / b->rmse - 1.0)) : "-"});
+  }
+  if (!table.empty()) console.line(table.text());
+}
+
+}  // namespace
+
+int run(const DemoOptions& options, Console& console) {
+  std::uint64_t seed = options.seed.value_or(0);
+  if (!options.seed) seed = std::random_device{}() % 100000;
+  std::mt19937_64 chance(seed);
+  std::string hidden = options.hidden;
+  if (hidden.empty()) hidden = kMayHide[std::uniform_int_distribution<std::size_t>(0, std::size(kMayHide) - 1)(chance)];
+  if (hidden != "none") {
+    const std::string name = hidden.substr(0, hidden.find(':'));
+    const bool known = std::any_of(std::begin(kMayHide), std::end(kMayHide), [&](std::string_view may) { return may.substr(0, may.find(':')) == name; });
+    if (!known) {
+      std::string list;
+      for (const std::string_view may : kMayHide) list += fmt::format("{}{}", list.empty() ? "" : ", ", may);
+      throw UsageError(fmt::format("\"{}\" cannot be hidden; choose one of {}, or none", hidden, list));
+    }
+    if (hidden == "torque_ripple") hidden = "torque_ripple:2";
+  }
+
+  const std::filesystem::path folder = options.out;
+  make_folder(folder);
+  const std::filesystem::path recording = folder / "recording";
+  console.line(console.bold("1. Record"));
+  console.progress("the twin records 16 experiments");
+  std::vector<std::string> arguments{"record", "--force", "--out", recording.string(), "--seed", std::to_string(seed)};
+  if (hidden != "none") arguments.insert(arguments.end(), {"--hide", hidden});
+  run_twin(arguments);
+  DataInputs inputs;
+  inputs.data = {recording};
+  const data::Dataset dataset = load(inputs, console);
+  const auto unseen = std::count_if(dataset.experiments.begin(), dataset.experiments.end(), [](const auto& e) { return e.role == data::Role::holdout; });
+  console.line(output::wrapped(fmt::format(
+      "A twin of a strain-wave drive (100:1, 40 N m) was moved through {} experiments, free and with its output locked; {} of "
+      "them are kept aside to judge on. It has an effect that the model does not know{}. Recording: {}",
+      dataset.experiments.size(), unseen, options.hidden.empty() ? ", chosen by chance" : "", recording.string())));
+  console.line();
+
+  console.line(console.bold("2. Identify"));
+  const model::ModelFile base_file = load_model(recording / "base-model.toml");
+  console.progress("identifying the model");
+  const auto base = regression::identify(dataset, base_file.model, {});
+  const std::filesystem::path base_path = folder / "model.toml";
+  model::Model stored = base->model;
+  stored.drive = base_file.model.drive;
+  const std::string base_text = model::rewrite(base_file, stored);
+  model::save(base_path, base_text);
+  output::Table parameters({"parameter", "value", "95 % interval", "", "unit"}, "lrrrl");
+  for (const auto& e : base->estimates)
+    parameters.row({fmt::format("{}.{}", e.id, e.parameter), number(e.value), number(e.low), number(e.high), e.unit});
+  console.line(parameters.text());
+  console.line(fmt::format("  Model: {}", base_path.string()));
+  console.line();
+
+  console.line(console.bold("3. Where does it fail, and what is missing?"));
+  diagnosis::Options diagnose_options;
+  diagnose_options.progress = [&](std::string_view stage) { console.progress(stage); };
+  const diagnosis::Diagnosis found = diagnosis::diagnose(dataset, base->model, diagnose_options);
+  if (found.noise_floor)
+    console.line(output::wrapped(fmt::format("The {} is off by {}, {:.1f} times what noise alone would leave.",
+                                             found.balance ? diagnosis::balance_signal(*found.balance) : "model",
+                                             output::with_unit(found.base_rmse, found.unit), found.base_rmse / *found.noise_floor)));
+  for (std::size_t i = 0; i < std::min<std::size_t>(2, found.localised.size()); ++i)
+    console.line(output::wrapped(fmt::format("{:.0f} % of the error depends on {}.", found.localised[i].share_percent, found.localised[i].variable)));
+  output::Table ranked({"candidate", "score", "error falls by", "on"}, "lrrl");
+  for (std::size_t i = 0; i < std::min<std::size_t>(4, found.candidates.size()); ++i) {
+    const auto& c = found.candidates[i];
+    ranked.row({label({c.effect, c.order}), fmt::format("{:.0f}", c.score), fmt::format("{:.1f} %", 100.0 * (1.0 - c.rmse_cv_after / c.rmse_cv_before)),
+                std::string(diagnosis::balance_signal(c.balance))});
+  }
+  console.line(ranked.text());
+  console.line();
+
+  json answer = {{"format", "flexspline-demo/1"}, {"hidden", hidden == "none" ? json(nullptr) : json(hidden)}, {"seed", seed},
+                 {"named", json::array()}, {"verdict", diagnosis::verdict_name(found.verdict)}, {"error_before", nullptr},
+                 {"error_after", nullptr}, {"noise_floor", output::json_number(found.noise_floor)}, {"unit", found.unit}, {"report", nullptr}};
+  bool right = hidden == "none" && found.named.empty();
+  if (found.named.empty()) {
+    console.line(console.bold("  Nothing is missing that these data could show."));
+  } else {
+    std::vector<std::string> names;
+    for (const auto& n : found.named) {
+      names.push_back(label(n));
+      right = right || is_the_hidden_one(n, hidden);
+      answer["named"].push_back({{"effect", n.effect}, {"order", n.order ? json(*n.order) : json(nullptr)}});
+    }
+    const auto& info = *catalogue::get(found.named.front().effect).info;
+    console.line(console.bold(fmt::format("  Missing: {}", output::listed(names, "or"))));
+    console.line(output::wrapped(info.explanation));
+    console.line(output::wrapped(fmt::format("Usual causes: {}", info.causes)));
+    console.line();
+
+    console.line(console.bold("4. Add it, and judge on motions that the fit never saw"));
+    console.progress("adding the effect and refitting");
+    const diagnosis::Addition added = diagnosis::add(dataset, base->model, names.front(), {});
+    const std::filesystem::path path = folder / "model-with-effect.toml";
+    model::Model better = added.model;
+    better.drive = base_file.model.drive;
+    model::save(path, model::rewrite(model::parse(base_text, base_path.string(), catalogue::known_effects()), better));
+    answer["error_before"] = output::json_number(added.before.rmse_holdout);
+    answer["error_after"] = output::json_number(added.after.rmse_holdout);
+    answer["noise_floor"] = output::json_number(added.noise_floor);
+    if (added.before.rmse_holdout && added.after.rmse_holdout) {
+      output::Table table({added.signal, "error", "unit", "of noise"}, "lrlr");
+      const auto row = [&](const char* what, double value) {
+        table.row({what, number(value), added.unit, added.noise_floor ? fmt::format("{:.2f}", value / *added.noise_floor) : "-"});
+      };
+      row("before", *added.before.rmse_holdout);
+      row("after", *added.after.rmse_holdout);
+      if (added.noise_floor) row("noise alone", *added.noise_floor);
+      console.line(table.text());
+    }
+    console.progress("running both models on the unseen motions");
+    print_free_runs(on_unseen(dataset, base->model), on_unseen(dataset, added.model), console);
+    console.line(fmt::format("  Model: {}", path.string()));
+  }
+  console.line();
+  console.line(console.bold("5. What the twin had hidden"));
+  if (hidden == "none")
+    console.line(fmt::format("  Nothing. {}", right ? console.good("Right.") : console.bad("The name above is a false alarm.")));
+  else
+    console.line(fmt::format("  {} (seed {}): {}. All true values: {}", hidden, seed, right ? console.good("named right") : console.bad("named wrong"),
+                             (recording / "truth.toml").string()));
+  output::save_json(options.json, answer);
+  return kDone;
+}
+
+}  // namespace flexspline::cli
