@@ -15,9 +15,12 @@ using effects::Torques;
 template <class N>
 typename N::Sum on_balance(const Torques<N>& torques, Balance balance) {
   switch (balance) {
-    case Balance::motor: return torques.motor;
-    case Balance::transmission: return torques.transmission;
-    case Balance::load: return torques.load;
+    case Balance::motor:
+      return torques.motor;
+    case Balance::transmission:
+      return torques.transmission;
+    case Balance::load:
+      return torques.load;
   }
   return torques.motor;
 }
@@ -114,7 +117,8 @@ const std::vector<Entry>& entries() {
 }  // namespace
 
 std::size_t Entry::index_of(std::string_view parameter) const {
-  const auto at = std::find_if(parameters.begin(), parameters.end(), [&](const auto& p) { return p.name == parameter; });
+  const auto at =
+      std::find_if(parameters.begin(), parameters.end(), [&](const auto& p) { return p.name == parameter; });
   return static_cast<std::size_t>(at - parameters.begin());
 }
 
@@ -123,7 +127,9 @@ std::size_t Entry::count(Kind kind) const {
       std::count_if(parameters.begin(), parameters.end(), [&](const auto& p) { return p.kind == kind; }));
 }
 
-std::span<const Entry> all() { return entries(); }
+std::span<const Entry> all() {
+  return entries();
+}
 
 const Entry* find(std::string_view name) {
   for (const Entry& entry : entries())

@@ -39,8 +39,8 @@ class Instance {
 template <class N>
 struct Along {
   using Parameter = typename N::Parameter;
-  // Adds the effect's torque on `balance` at each sample of `inputs` to `torque` (N m), same length. Null for shifts and
-  // modulations.
+  // Adds the effect's torque on `balance` at each sample of `inputs` to `torque` (N m), same length. Null for shifts
+  // and modulations.
   void (*torque)(const Parameter* parameters, const DriveConstants<Parameter>& drive, Balance balance,
                  std::span<const effects::Inputs<N>> inputs, typename N::Value* torque) = nullptr;
   // Changes the inputs in place, as shifts and modulations do. Null for sources.

@@ -11,8 +11,8 @@ class CatalogueEffects final : public model::KnownEffects {
     for (const Entry& entry : all()) {
       model::KnownEffect known{entry.name(), {}};
       for (const auto& p : entry.parameters)
-        known.parameters.push_back({p.name, std::string(p.unit.rotary), std::string(p.unit.linear), p.low, p.high,
-                                    p.kind == Kind::given});
+        known.parameters.push_back(
+            {p.name, std::string(p.unit.rotary), std::string(p.unit.linear), p.low, p.high, p.kind == Kind::given});
       effects_.push_back(std::move(known));
     }
   }

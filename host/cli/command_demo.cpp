@@ -22,8 +22,8 @@ using output::number;
 
 // What the demo may hide: effects that a strain-wave drive may have and a first model lacks.
 constexpr std::string_view kMayHide[] = {
-    "viscous_asymmetry", "coulomb_asymmetry", "stribeck_gaussian",   "load_dependent_friction", "power_law_friction",
-    "gravity",           "current_offset",    "torque_ripple:2",     "torque_ripple:7",         "temperature_viscous",
+    "viscous_asymmetry", "coulomb_asymmetry", "stribeck_gaussian", "load_dependent_friction", "power_law_friction",
+    "gravity",           "current_offset",    "torque_ripple:2",   "torque_ripple:7",         "temperature_viscous",
     "dahl_friction",     "backlash",          "structural_damping"};
 
 std::string label(const diagnosis::Named& named) {
@@ -44,15 +44,30 @@ comparison::Comparison on_unseen(const data::Dataset& dataset, const model::Mode
   return comparison::compare(unseen, model, {});
 }
 
+// In free motion the velocity is compared; in locked load the current dictates the torque, and the angle shows the
+// errors.
 void print_free_runs(const comparison::Comparison& before, const comparison::Comparison& after, Console& console) {
-  output::Table table({"free run on unseen motions", "before", "after", "unit", "change"}, "lrrlr");
-  for (const comparison::SignalResult& a : after.overall) {
-    const comparison::SignalResult* b = before.find_overall(a.signal);
-    if (!b || a.signal.ends_with("_balance")) continue;
-    table.row({a.signal, number(b->rmse), number(a.rmse), a.unit,
-               b->rmse > 0.0 ? fmt::format("{:+.0f} %", 100.0 * (a.rmse / b->rmse - 1.0)) : "-"});
+  output::Table table({"free run, current alone goes in", "signal", "error before", "after", "unit"}, "llrrl");
+  bool worse = false;
+  for (std::size_t i = 0; i < after.experiments.size(); ++i) {
+    const auto& signals = after.experiments[i].signals;
+    const bool locked =
+        std::none_of(signals.begin(), signals.end(), [](const auto& s) { return s.signal == "output_position"; });
+    const std::string_view wanted = locked ? "motor_position" : "motor_velocity";
+    const auto a = std::find_if(signals.begin(), signals.end(), [&](const auto& s) { return s.signal == wanted; });
+    if (a == signals.end()) continue;
+    for (const comparison::SignalResult& b : before.experiments[i].signals) {
+      if (b.signal != wanted) continue;
+      table.row({after.experiments[i].name, std::string(wanted), number(b.rmse), number(a->rmse), a->unit});
+      worse = worse || a->rmse > 1.2 * b.rmse;
+    }
   }
   if (!table.empty()) console.line(table.text());
+  if (worse)
+    console.line(
+        output::wrapped("A free run has no feedback. Where friction falls with speed, slow motion under a given "
+                        "current is unstable: the "
+                        "smallest difference grows, and no model follows it for long."));
 }
 
 }  // namespace
@@ -65,7 +80,8 @@ int run(const DemoOptions& options, Console& console) {
   if (hidden.empty()) hidden = kMayHide[std::uniform_int_distribution<std::size_t>(0, std::size(kMayHide) - 1)(chance)];
   if (hidden != "none") {
     const std::string name = hidden.substr(0, hidden.find(':'));
-    const bool known = std::any_of(std::begin(kMayHide), std::end(kMayHide), [&](std::string_view may) { return may.substr(0, may.find(':')) == name; });
+    const bool known = std::any_of(std::begin(kMayHide), std::end(kMayHide),
+                                   [&](std::string_view may) { return may.substr(0, may.find(':')) == name; });
     if (!known) {
       std::string list;
       for (const std::string_view may : kMayHide) list += fmt::format("{}{}", list.empty() ? "" : ", ", may);
@@ -85,9 +101,11 @@ int run(const DemoOptions& options, Console& console) {
   DataInputs inputs;
   inputs.data = {recording};
   const data::Dataset dataset = load(inputs, console);
-  const auto unseen = std::count_if(dataset.experiments.begin(), dataset.experiments.end(), [](const auto& e) { return e.role == data::Role::holdout; });
+  const auto unseen = std::count_if(dataset.experiments.begin(), dataset.experiments.end(),
+                                    [](const auto& e) { return e.role == data::Role::holdout; });
   console.line(output::wrapped(fmt::format(
-      "A twin of a strain-wave drive (100:1, 40 N m) was moved through {} experiments, free and with its output locked; {} of "
+      "A twin of a strain-wave drive (100:1, 40 N m) was moved through {} experiments, free and with its output "
+      "locked; {} of "
       "them are kept aside to judge on. It has an effect that the model does not know{}. Recording: {}",
       dataset.experiments.size(), unseen, options.hidden.empty() ? ", chosen by chance" : "", recording.string())));
   console.line();
@@ -115,21 +133,31 @@ int run(const DemoOptions& options, Console& console) {
   if (found.noise_floor)
     console.line(output::wrapped(fmt::format("The {} is off by {}, {:.1f} times what noise alone would leave.",
                                              found.balance ? diagnosis::balance_signal(*found.balance) : "model",
-                                             output::with_unit(found.base_rmse, found.unit), found.base_rmse / *found.noise_floor)));
+                                             output::with_unit(found.base_rmse, found.unit),
+                                             found.base_rmse / *found.noise_floor)));
   for (std::size_t i = 0; i < std::min<std::size_t>(2, found.localised.size()); ++i)
-    console.line(output::wrapped(fmt::format("{:.0f} % of the error depends on {}.", found.localised[i].share_percent, found.localised[i].variable)));
+    console.line(output::wrapped(fmt::format("{:.0f} % of the error depends on {}.", found.localised[i].share_percent,
+                                             found.localised[i].variable)));
   output::Table ranked({"candidate", "score", "error falls by", "on"}, "lrrl");
   for (std::size_t i = 0; i < std::min<std::size_t>(4, found.candidates.size()); ++i) {
     const auto& c = found.candidates[i];
-    ranked.row({label({c.effect, c.order}), fmt::format("{:.0f}", c.score), fmt::format("{:.1f} %", 100.0 * (1.0 - c.rmse_cv_after / c.rmse_cv_before)),
+    ranked.row({label({c.effect, c.order}), fmt::format("{:.0f}", c.score),
+                fmt::format("{:.1f} %", 100.0 * (1.0 - c.rmse_cv_after / c.rmse_cv_before)),
                 std::string(diagnosis::balance_signal(c.balance))});
   }
   console.line(ranked.text());
   console.line();
 
-  json answer = {{"format", "flexspline-demo/1"}, {"hidden", hidden == "none" ? json(nullptr) : json(hidden)}, {"seed", seed},
-                 {"named", json::array()}, {"verdict", diagnosis::verdict_name(found.verdict)}, {"error_before", nullptr},
-                 {"error_after", nullptr}, {"noise_floor", output::json_number(found.noise_floor)}, {"unit", found.unit}, {"report", nullptr}};
+  json answer = {{"format", "flexspline-demo/1"},
+                 {"hidden", hidden == "none" ? json(nullptr) : json(hidden)},
+                 {"seed", seed},
+                 {"named", json::array()},
+                 {"verdict", diagnosis::verdict_name(found.verdict)},
+                 {"error_before", nullptr},
+                 {"error_after", nullptr},
+                 {"noise_floor", output::json_number(found.noise_floor)},
+                 {"unit", found.unit},
+                 {"report", nullptr}};
   bool right = hidden == "none" && found.named.empty();
   if (found.named.empty()) {
     console.line(console.bold("  Nothing is missing that these data could show."));
@@ -159,7 +187,8 @@ int run(const DemoOptions& options, Console& console) {
     if (added.before.rmse_holdout && added.after.rmse_holdout) {
       output::Table table({added.signal, "error", "unit", "of noise"}, "lrlr");
       const auto row = [&](const char* what, double value) {
-        table.row({what, number(value), added.unit, added.noise_floor ? fmt::format("{:.2f}", value / *added.noise_floor) : "-"});
+        table.row({what, number(value), added.unit,
+                   added.noise_floor ? fmt::format("{:.2f}", value / *added.noise_floor) : "-"});
       };
       row("before", *added.before.rmse_holdout);
       row("after", *added.after.rmse_holdout);
@@ -173,9 +202,11 @@ int run(const DemoOptions& options, Console& console) {
   console.line();
   console.line(console.bold("5. What the twin had hidden"));
   if (hidden == "none")
-    console.line(fmt::format("  Nothing. {}", right ? console.good("Right.") : console.bad("The name above is a false alarm.")));
+    console.line(
+        fmt::format("  Nothing. {}", right ? console.good("Right.") : console.bad("The name above is a false alarm.")));
   else
-    console.line(fmt::format("  {} (seed {}): {}. All true values: {}", hidden, seed, right ? console.good("named right") : console.bad("named wrong"),
+    console.line(fmt::format("  {} (seed {}): {}. All true values: {}", hidden, seed,
+                             right ? console.good("named right") : console.bad("named wrong"),
                              (recording / "truth.toml").string()));
   output::save_json(options.json, answer);
   return kDone;

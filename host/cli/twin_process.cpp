@@ -26,7 +26,8 @@ std::filesystem::path beside_this_program() {
 void run_twin(const std::vector<std::string>& arguments) {
   const std::string program = beside_this_program().string();
   if (access(program.c_str(), X_OK) != 0)
-    throw std::runtime_error(fmt::format("{} is not there; build it with ./dev build, and keep both programs in one folder", program));
+    throw std::runtime_error(
+        fmt::format("{} is not there; build it with ./dev build, and keep both programs in one folder", program));
   std::vector<std::string> words{program};
   words.insert(words.end(), arguments.begin(), arguments.end());
   std::vector<char*> argv;
@@ -44,7 +45,8 @@ void run_twin(const std::vector<std::string>& arguments) {
   while (waitpid(child, &status, 0) < 0)
     if (errno != EINTR) throw std::runtime_error(fmt::format("lost {}: {}", program, std::strerror(errno)));
   if (!WIFEXITED(status) || WEXITSTATUS(status) != 0)
-    throw std::runtime_error(fmt::format("{} {} did not succeed; its message stands above", program, arguments.empty() ? "" : arguments.front()));
+    throw std::runtime_error(fmt::format("{} {} did not succeed; its message stands above", program,
+                                         arguments.empty() ? "" : arguments.front()));
 }
 
 }  // namespace flexspline::cli

@@ -49,7 +49,8 @@ const std::size_t* find_balance(const Identification& fitted, Balance own, std::
 }
 
 Addition compare_models(const data::Dataset& dataset, const model::Model& before, const model::Model& after,
-                        Balance own, std::string effect, std::string action, const regression::PipelineOptions& options) {
+                        Balance own, std::string effect, std::string action,
+                        const regression::PipelineOptions& options) {
   Addition result;
   result.effect = std::move(effect);
   const auto base = regression::identify(dataset, before, options);
@@ -59,7 +60,8 @@ Addition compare_models(const data::Dataset& dataset, const model::Model& before
   if (!find_balance(*base, own, b) || !find_balance(*extended, own, x))
     throw data::DataError({{data::Severity::error, "missing_column", "", 0, "",
                             fmt::format("these data hold nothing that would show {}", result.effect),
-                            fmt::format("see `flexspline effects {}` for what to record", result.effect.substr(0, result.effect.find(':')))}});
+                            fmt::format("see `flexspline effects {}` for what to record",
+                                        result.effect.substr(0, result.effect.find(':')))}});
   const Balance balance = base->data[b].balance();
   result.signal = std::string(balance_signal(balance));
   result.unit = before.drive.axis == data::Axis::linear ? "N" : "N*m";
@@ -78,15 +80,17 @@ Addition compare_models(const data::Dataset& dataset, const model::Model& before
   } else {
     judged = fitted;
   }
-  comparison::NoiseFloor floor =
-      comparison::pooled(comparison::noise_floors(*judged_on, extended->terms, judged, extended->model.drive), judged_on->records());
+  comparison::NoiseFloor floor = comparison::pooled(
+      comparison::noise_floors(*judged_on, extended->terms, judged, extended->model.drive), judged_on->records());
   if (!floor.rmse && holdout.data)
-    floor = comparison::pooled(comparison::noise_floors(extended->data[x], extended->terms, fitted, extended->model.drive),
-                               extended->data[x].records());
+    floor =
+        comparison::pooled(comparison::noise_floors(extended->data[x], extended->terms, fitted, extended->model.drive),
+                           extended->data[x].records());
   result.noise_floor = floor.rmse;
   result.noise_floor_from = floor.from;
   result.model = extended->model;
-  result.model.history.push_back({std::move(action), result.effect, result.before.rmse_holdout.value_or(result.before.rmse_fit),
+  result.model.history.push_back({std::move(action), result.effect,
+                                  result.before.rmse_holdout.value_or(result.before.rmse_fit),
                                   result.after.rmse_holdout.value_or(result.after.rmse_fit)});
   result.estimates = extended->estimates;
   result.warnings = extended->warnings;
@@ -97,9 +101,12 @@ Addition compare_models(const data::Dataset& dataset, const model::Model& before
 
 std::string_view balance_signal(Balance balance) {
   switch (balance) {
-    case Balance::motor: return "motor_balance";
-    case Balance::transmission: return "transmission_balance";
-    case Balance::load: return "load_balance";
+    case Balance::motor:
+      return "motor_balance";
+    case Balance::transmission:
+      return "transmission_balance";
+    case Balance::load:
+      return "load_balance";
   }
   return "";
 }
@@ -109,7 +116,8 @@ EffectName parse_effect(std::string_view text) {
   EffectName name;
   name.entry = catalogue::find(text.substr(0, colon));
   if (!name.entry)
-    throw model::ModelError(fmt::format("there is no effect named \"{}\"; `flexspline effects` lists them", text.substr(0, colon)));
+    throw model::ModelError(
+        fmt::format("there is no effect named \"{}\"; `flexspline effects` lists them", text.substr(0, colon)));
   const bool ordered = name.entry->count(effects::Kind::given) > 0;
   if (colon == std::string_view::npos) {
     if (ordered)
@@ -121,7 +129,8 @@ EffectName parse_effect(std::string_view text) {
   const auto parsed = std::from_chars(order.data(), order.data() + order.size(), value);
   if (!ordered) throw model::ModelError(fmt::format("{} has no order; leave out \":{}\"", name.entry->name(), order));
   if (parsed.ec != std::errc() || parsed.ptr != order.data() + order.size() || !(value > 0.0))
-    throw model::ModelError(fmt::format("\"{}\" is no order; write a positive number, as in {}:2", order, name.entry->name()));
+    throw model::ModelError(
+        fmt::format("\"{}\" is no order; write a positive number, as in {}:2", order, name.entry->name()));
   name.order = value;
   return name;
 }
@@ -150,7 +159,8 @@ Addition remove(const data::Dataset& dataset, const model::Model& model, std::st
   if (!found) {
     const EffectName name = parse_effect(id);
     for (const model::Effect& e : model.effects)
-      if (regression::term_of(e).label() == (name.order ? fmt::format("{}:{:g}", name.entry->name(), *name.order) : std::string(id)))
+      if (regression::term_of(e).label() ==
+          (name.order ? fmt::format("{}:{:g}", name.entry->name(), *name.order) : std::string(id)))
         found = &e;
   }
   if (!found) {

@@ -1,5 +1,5 @@
-// An effect more or less in a model: refitted, with the error before and after on data that the fit saw and that it never
-// saw.
+// An effect more or less in a model: refitted, with the error before and after on data that the fit saw and that it
+// never saw.
 #pragma once
 
 #include <optional>
@@ -18,13 +18,13 @@ struct Errors {
 };
 
 struct Addition {
-  std::string effect;       // "torque_ripple:2"
-  std::string signal;       // "motor_balance", ...
+  std::string effect;  // "torque_ripple:2"
+  std::string signal;  // "motor_balance", ...
   std::string unit;
   Errors before, after;
   std::optional<double> noise_floor;  // on the hold-out records where there are any, else on the fitted ones
   std::string noise_floor_from = "none";
-  model::Model model;                 // refitted, with the step in its history
+  model::Model model;  // refitted, with the step in its history
   std::vector<regression::Estimate> estimates;
   std::vector<std::string> warnings;
 };

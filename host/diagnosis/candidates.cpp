@@ -80,7 +80,8 @@ Terms extend(const Terms& terms, const catalogue::Entry& entry, std::optional<do
     if (t.entry->name() == entry.name() && (!ordered || t.label() == regression::candidate_term(entry, order).label()))
       throw model::ModelError(fmt::format("the model has {} already; remove it first, or identify again", t.label()));
   if (!entry.info->modulates.empty() && !has(terms, entry.info->modulates))
-    throw model::ModelError(fmt::format("{} scales {}, which the model does not have; add that first", entry.name(), entry.info->modulates));
+    throw model::ModelError(fmt::format("{} scales {}, which the model does not have; add that first", entry.name(),
+                                        entry.info->modulates));
   Terms extended;
   for (const Term& t : terms)
     if (!catalogue::names_contain(entry.info->replaces, t.entry->name())) extended.push_back(t);

@@ -20,8 +20,8 @@ struct Proposal {
 // All effects that may be added on this balance; shapes are in the middle of their range.
 std::vector<Proposal> proposals(const regression::BalanceData& data, const regression::Terms& terms);
 
-// A model with an effect more. Throws model::ModelError where it cannot be (what it modulates or replaces is missing, or
-// it is there already).
+// A model with an effect more. Throws model::ModelError where it cannot be (what it modulates or replaces is missing,
+// or it is there already).
 regression::Terms extend(const regression::Terms& terms, const catalogue::Entry& entry, std::optional<double> order);
 
 }  // namespace flexspline::diagnosis

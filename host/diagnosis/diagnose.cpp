@@ -22,17 +22,17 @@ using regression::Slot;
 using regression::Term;
 using regression::Terms;
 
-// METHOD steps 6 and 8. The score's limit was set on null data; the fall says that an effect matters, not only that it is
-// there.
+// METHOD steps 6 and 8. The score's limit was set on null data; the fall says that an effect matters, not only that it
+// is there.
 constexpr double kNamedScore = 20.0;
 constexpr double kNamedFallPercent = 0.5;
 constexpr double kRivalMargin = 10.0;
 // A candidate of which the base model can imitate all but this share is one with it in these data.
 constexpr double kOwnShare = 0.003;
 constexpr std::size_t kGridPoints = 6;
-constexpr std::size_t kRefined = 4;     // candidates whose shapes are searched continuously
-// Residual over noise floor: what the filters leave around reversals repeats with the motion, so a true model stands some
-// 15 % above its floor.
+constexpr std::size_t kRefined = 4;  // candidates whose shapes are searched continuously
+// Residual over noise floor: what the filters leave around reversals repeats with the motion, so a true model stands
+// some 15 % above its floor.
 constexpr double kAtFloor = 1.3;
 // Maps of a complete model show significant shares of a few percent, too.
 constexpr double kShownShare = 5.0;
@@ -142,7 +142,9 @@ void check_admissible(BalanceData& data, const Judged& base, Trial& trial) {
     // An effect that is hardly larger than what is missing is not known well enough to rule anything out.
     if (torque.norm() < 2.0 * base.residual.norm()) continue;
     const double change = (data.term_torque(judged.terms, judged.linear[j].term) - torque).norm() / torque.norm();
-    if (change > 0.5) refuse(fmt::format("{} would change by {:.0f} % (its {} from {:.3g} to {:.3g})", t.id, 100.0 * change, info.name, was, value));
+    if (change > 0.5)
+      refuse(fmt::format("{} would change by {:.0f} % (its {} from {:.3g} to {:.3g})", t.id, 100.0 * change, info.name,
+                         was, value));
   }
   if (!any_own) {
     trial.imitated_by = imitator(data, judged, added);
@@ -195,7 +197,8 @@ std::vector<Trial> rank(Search& search) {
   for (Proposal& proposal : proposals(*search.data, search.base.terms)) {
     choose_shapes(search, proposal);
     trials.push_back(evaluate(search, proposal));
-    if (!trials.back().admissible) trials.back() = best_admissible(search, std::move(proposal), std::move(trials.back()));
+    if (!trials.back().admissible)
+      trials.back() = best_admissible(search, std::move(proposal), std::move(trials.back()));
   }
   std::sort(trials.begin(), trials.end(), better);
   for (std::size_t i = 0; i < std::min(kRefined, trials.size()); ++i) {
@@ -258,8 +261,8 @@ std::vector<Localised> shares(const BalanceData& data, const Judged& judged) {
   return list;
 }
 
-// Forward once more and back: an effect that was named because it resembles the true one is dropped when the true one is
-// in. Returns the trial to name, `first` or one that makes it needless.
+// Forward once more and back: an effect that was named because it resembles the true one is dropped when the true one
+// is in. Returns the trial to name, `first` or one that makes it needless.
 std::optional<Trial> eliminate(Search& search, const Trial& first) {
   Search next{search.data, search.keep, first.judged};
   std::vector<Trial> more = rank(next);
@@ -297,12 +300,18 @@ bool is_sublinear(const Trial& trial, const BalanceData& data) {
 
 std::string verdict_name(Verdict verdict) {
   switch (verdict) {
-    case Verdict::missing_effect: return "missing_effect";
-    case Verdict::confusable_effects: return "confusable_effects";
-    case Verdict::at_noise_floor: return "at_noise_floor";
-    case Verdict::nothing_significant: return "nothing_significant";
-    case Verdict::unknown_structure: return "unknown_structure";
-    case Verdict::insufficient_excitation: return "insufficient_excitation";
+    case Verdict::missing_effect:
+      return "missing_effect";
+    case Verdict::confusable_effects:
+      return "confusable_effects";
+    case Verdict::at_noise_floor:
+      return "at_noise_floor";
+    case Verdict::nothing_significant:
+      return "nothing_significant";
+    case Verdict::unknown_structure:
+      return "unknown_structure";
+    case Verdict::insufficient_excitation:
+      return "insufficient_excitation";
   }
   return "";
 }
@@ -344,10 +353,11 @@ Diagnosis diagnose(const data::Dataset& dataset, const model::Model& model, cons
   double best = -1e300;
   std::vector<comparison::NoiseFloor> floors;
   for (std::size_t b = 0; b < searches.size(); ++b) {
-    floors.push_back(comparison::pooled(comparison::noise_floors(*searches[b].data, searches[b].base.terms, experiments,
-                                                                 base->model.drive),
-                                        searches[b].data->records()));
-    const double score = ranked[b].empty() ? -1e299 : ranked[b].front().fall.score - (passes(ranked[b].front()) ? 0.0 : 1e9);
+    floors.push_back(comparison::pooled(
+        comparison::noise_floors(*searches[b].data, searches[b].base.terms, experiments, base->model.drive),
+        searches[b].data->records()));
+    const double score =
+        ranked[b].empty() ? -1e299 : ranked[b].front().fall.score - (passes(ranked[b].front()) ? 0.0 : 1e9);
     if (score > best) {
       best = score;
       chosen = b;
@@ -361,14 +371,16 @@ Diagnosis diagnose(const data::Dataset& dataset, const model::Model& model, cons
       auto& list = ranked[chosen];
       list.erase(std::remove_if(list.begin(), list.end(),
                                 [&](const Trial& t) {
-                                  return t.proposal.entry == instead->proposal.entry && t.proposal.order == instead->proposal.order;
+                                  return t.proposal.entry == instead->proposal.entry &&
+                                         t.proposal.order == instead->proposal.order;
                                 }),
                  list.end());
       list.insert(list.begin(), std::move(*instead));
     }
     if (is_sublinear(ranked[chosen].front(), *searches[chosen].data)) {
       auto& list = ranked[chosen];
-      const auto law = std::find_if(list.begin(), list.end(), [](const Trial& t) { return t.proposal.entry->name() == "power_law_friction"; });
+      const auto law = std::find_if(list.begin(), list.end(),
+                                    [](const Trial& t) { return t.proposal.entry->name() == "power_law_friction"; });
       if (law != list.end() && law->fall.score > kNamedScore) {
         std::rotate(list.begin(), law, law + 1);
         alias = "stribeck_gaussian";
@@ -394,8 +406,9 @@ Diagnosis diagnose(const data::Dataset& dataset, const model::Model& model, cons
   for (std::size_t b = 0; b < ranked.size(); ++b)
     for (const Trial& t : ranked[b])
       if (!t.imitated_by.empty())
-        result.warnings.push_back(fmt::format("{0} cannot be told from {1} in these data: {1} stands for what both share; {2} would tell them apart",
-                                              t.proposal.entry->name(), t.imitated_by, t.proposal.entry->info->separated_by));
+        result.warnings.push_back(fmt::format(
+            "{0} cannot be told from {1} in these data: {1} stands for what both share; {2} would tell them apart",
+            t.proposal.entry->name(), t.imitated_by, t.proposal.entry->info->separated_by));
   // All balances' candidates in one list, the named one's balance first where scores are equal.
   for (std::size_t b = 0; b < ranked.size(); ++b)
     for (const Trial& t : ranked[b]) result.candidates.push_back(report(t, searches[b], axis));

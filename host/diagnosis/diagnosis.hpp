@@ -28,7 +28,7 @@ struct Candidate {
   std::optional<double> p_value;
   std::vector<regression::Estimate> parameters;
   bool admissible = true;
-  std::string why_not;             // where it is not admissible
+  std::string why_not;  // where it is not admissible
   std::vector<std::string> rivals;
 };
 
@@ -66,11 +66,11 @@ struct Diagnosis {
   std::optional<double> noise_floor;
   std::string noise_floor_from = "none";
   std::vector<Localised> localised;
-  std::vector<Candidate> candidates;           // best first
+  std::vector<Candidate> candidates;  // best first
   std::vector<Localised> remaining_structure;
   std::vector<Disturbance> disturbances;
   std::vector<std::string> warnings;
-  std::optional<double> delay_s;               // of the effort against the motion, beyond the alignment, where significant
+  std::optional<double> delay_s;  // of the effort against the motion, beyond the alignment, where significant
 };
 
 struct Options {
@@ -78,8 +78,8 @@ struct Options {
   std::function<void(std::string_view)> progress;  // said at each stage; may be empty
 };
 
-// METHOD of the project: see host/diagnosis/README.md. Uses experiments of role fit. The model need not have values: all
-// free parameters are estimated.
+// METHOD of the project: see host/diagnosis/README.md. Uses experiments of role fit. The model need not have values:
+// all free parameters are estimated.
 Diagnosis diagnose(const data::Dataset& dataset, const model::Model& model, const Options& options);
 
 }  // namespace flexspline::diagnosis

@@ -14,11 +14,11 @@ using regression::BalanceData;
 using regression::Record;
 using regression::RowRange;
 
-constexpr double kFarOut = 6.0;          // robust standard deviations
-constexpr double kLongest = 0.15;        // s; what lasts longer is a state of the drive
-constexpr double kRepeats = 0.35;        // share of like rows that stand out too: above, it depends on that signal
-constexpr std::size_t kLike = 120;       // rows that count as like ones
-constexpr double kMostOfRecord = 0.3;    // more than that is no exception
+constexpr double kFarOut = 6.0;        // robust standard deviations
+constexpr double kLongest = 0.15;      // s; what lasts longer is a state of the drive
+constexpr double kRepeats = 0.35;      // share of like rows that stand out too: above, it depends on that signal
+constexpr std::size_t kLike = 120;     // rows that count as like ones
+constexpr double kMostOfRecord = 0.3;  // more than that is no exception
 
 double median(std::vector<double> x) {
   if (x.empty()) return 0.0;
@@ -72,7 +72,8 @@ std::vector<std::uint8_t> recurs(const Record& r, const std::vector<std::size_t>
   const std::size_t wide = reach * r.decimation;
   for (std::size_t k = 0; k < size.size(); ++k)
     if (size[k] > limit)
-      for (std::size_t j = samples[k] - std::min(samples[k], wide); j <= std::min(near.size() - 1, samples[k] + wide); ++j)
+      for (std::size_t j = samples[k] - std::min(samples[k], wide); j <= std::min(near.size() - 1, samples[k] + wide);
+           ++j)
         near[j] = 1;
   for (std::size_t k = 0; k < size.size(); ++k) {
     const std::size_t later = samples[k] + repetition->samples;
@@ -84,7 +85,8 @@ std::vector<std::uint8_t> recurs(const Record& r, const std::vector<std::size_t>
 
 }  // namespace
 
-std::vector<Disturbance> find_disturbances(const BalanceData& data, const Eigen::VectorXd& residual, Eigen::VectorXd& keep) {
+std::vector<Disturbance> find_disturbances(const BalanceData& data, const Eigen::VectorXd& residual,
+                                           Eigen::VectorXd& keep) {
   std::vector<Disturbance> found;
   for (const RowRange& range : data.records()) {
     const Record& r = data.prepared().records[range.record];
@@ -97,7 +99,8 @@ std::vector<Disturbance> find_disturbances(const BalanceData& data, const Eigen:
     double reversal = r.experiment->time_s.front();
     std::size_t at = 0;
     const double row_s = r.sample_s * static_cast<double>(r.decimation);
-    const std::vector<double> fast = without_slow_part(residual, range, static_cast<std::size_t>(std::ceil(kLongest / row_s)));
+    const std::vector<double> fast =
+        without_slow_part(residual, range, static_cast<std::size_t>(std::ceil(kLongest / row_s)));
     for (std::size_t k = 0; k < r.inputs.size() && at < n; ++k) {
       if (k > 0 && r.direction_variable(data.balance(), k) * r.direction_variable(data.balance(), k - 1) <= 0.0)
         reversal = r.experiment->time_s[k];
@@ -116,7 +119,8 @@ std::vector<Disturbance> find_disturbances(const BalanceData& data, const Eigen:
     if (share == 0.0 || share > kMostOfRecord) continue;
     std::vector<double> alike(n, 0.0);  // largest share of marked rows among those like this one
     for (const auto& signal : signals) {
-      if (signal.front() == signal.back() && *std::max_element(signal.begin(), signal.end()) == signal.front()) continue;
+      if (signal.front() == signal.back() && *std::max_element(signal.begin(), signal.end()) == signal.front())
+        continue;
       const std::vector<double> shares = share_among_like(signal, marked);
       for (std::size_t k = 0; k < n; ++k) alike[k] = std::max(alike[k], shares[k]);
     }

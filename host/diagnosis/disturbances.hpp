@@ -11,8 +11,9 @@
 namespace flexspline::diagnosis {
 
 // A burst: rows whose residual stands far above the rest, though the axis passes through the same velocity and the same
-// time after a reversal elsewhere without one. An effect of the drive shows wherever its signals come back; a disturbance
-// does not. Returns the stretches in time; `keep` gets noughts at their rows and at their filter's reach around them.
+// time after a reversal elsewhere without one. An effect of the drive shows wherever its signals come back; a
+// disturbance does not. Returns the stretches in time; `keep` gets noughts at their rows and at their filter's reach
+// around them.
 std::vector<Disturbance> find_disturbances(const regression::BalanceData& data, const Eigen::VectorXd& residual,
                                            Eigen::VectorXd& keep);
 

@@ -41,7 +41,8 @@ void predict_left_out(const BalanceData& data, const Eigen::MatrixXd& X, const E
     Eigen::Index at = 0;
     for (const RowRange& range : fold) {
       const auto weights = judged.root_weights.segment(range.first, range.size()).asDiagonal();
-      block.block(at, 0, range.size(), columns) = weights * (X.middleRows(range.first, range.size()) * size.cwiseInverse().asDiagonal());
+      block.block(at, 0, range.size(), columns) =
+          weights * (X.middleRows(range.first, range.size()) * size.cwiseInverse().asDiagonal());
       block.block(at, columns, range.size(), 1) = weights * y.segment(range.first, range.size());
       at += range.size();
     }
@@ -74,7 +75,9 @@ void predict_left_out(const BalanceData& data, const Eigen::MatrixXd& X, const E
   }
 }
 
-double total(const std::vector<double>& x) { return std::accumulate(x.begin(), x.end(), 0.0); }
+double total(const std::vector<double>& x) {
+  return std::accumulate(x.begin(), x.end(), 0.0);
+}
 
 // Noise of each record, with a floor under records that are nearly silent.
 std::vector<double> variances(const Judged& judged) {
@@ -91,7 +94,9 @@ double Judged::rmse() const {
   return std::sqrt((root_weights.array() > 0.0).select(residual.array().square(), 0.0).sum() / std::max(1.0, rows));
 }
 
-double Judged::rmse_cv() const { return std::sqrt(total(cv_squares) / std::max(1.0, total(cv_rows))); }
+double Judged::rmse_cv() const {
+  return std::sqrt(total(cv_squares) / std::max(1.0, total(cv_rows)));
+}
 
 Judged judge(BalanceData& data, Terms terms, const Eigen::VectorXd& keep) {
   Judged judged;

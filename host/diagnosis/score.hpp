@@ -17,15 +17,15 @@ using regression::Terms;
 // A model on one balance, fitted with weights by record and judged by cross-validation. Its shapes are free to first
 // order, and so is a delay of the effort.
 struct Judged {
-  Terms terms;                            // with fitted values
+  Terms terms;  // with fitted values
   std::vector<Slot> linear;
-  Eigen::VectorXd theta;                  // linear parameters, then shifts of shapes, then the delay in s
-  Eigen::VectorXd std;                    // likewise; corrected for autocorrelation
+  Eigen::VectorXd theta;  // linear parameters, then shifts of shapes, then the delay in s
+  Eigen::VectorXd std;    // likewise; corrected for autocorrelation
   Eigen::VectorXd own_share;
-  Eigen::VectorXd residual;               // in-sample
-  Eigen::VectorXd root_weights;           // nought where a disturbance is left out
-  std::vector<double> cv_squares;         // of each record, over rows that were left out of the fit
-  std::vector<double> cv_rows;            // rows that count, of each record
+  Eigen::VectorXd residual;        // in-sample
+  Eigen::VectorXd root_weights;    // nought where a disturbance is left out
+  std::vector<double> cv_squares;  // of each record, over rows that were left out of the fit
+  std::vector<double> cv_rows;     // rows that count, of each record
   double autocorrelation_time = 1.0;
   double rmse() const;
   double rmse_cv() const;
@@ -35,12 +35,13 @@ struct Judged {
 Judged judge(BalanceData& data, Terms terms, const Eigen::VectorXd& keep);
 
 struct Fall {
-  double score = 0.0;        // twice the log likelihood ratio of left-out rows over the autocorrelation time, less k ln(n_eff)
-  double chi2_percent = 0.0; // of the left-out chi-square
+  double score =
+      0.0;  // twice the log likelihood ratio of left-out rows over the autocorrelation time, less k ln(n_eff)
+  double chi2_percent = 0.0;  // of the left-out chi-square
   double p_value = 1.0;
 };
-// From `base` to `extended`, which has `added` parameters more. Noise is each record's own; a record that is quieter than
-// a tenth of the median one counts as that.
+// From `base` to `extended`, which has `added` parameters more. Noise is each record's own; a record that is quieter
+// than a tenth of the median one counts as that.
 Fall fall_of(const Judged& base, const Judged& extended, double added);
 
 }  // namespace flexspline::diagnosis

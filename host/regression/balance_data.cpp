@@ -7,12 +7,12 @@
 namespace flexspline::regression {
 namespace {
 
+using catalogue::DriveConstants;
 using data::Column;
 using effects::Kind;
 using effects::Phase;
 using numbers::Dual;
 using numbers::Jet;
-using catalogue::DriveConstants;
 
 constexpr std::size_t kCachedNumbers = 40'000'000;
 
@@ -48,11 +48,12 @@ effects::Inputs<N> lifted(const effects::Inputs<Real>& in) {
     return in;
   } else {
     using S = typename N::Value;
-    return {S(in.angle),           S(in.velocity),          S(in.speed),          S(in.direction),
-            S(in.acceleration),    S(in.output_angle),      S(in.output_velocity), S(in.output_direction),
-            S(in.output_acceleration), S(in.torsion),       S(in.torsion_rate),   S(in.torsion_direction),
-            S(in.torque),          S(in.torque_magnitude),  S(in.current),        S(in.temperature),
-            S(in.viscous_scale),   S(in.coulomb_scale)};
+    return {S(in.angle),           S(in.velocity),         S(in.speed),
+            S(in.direction),       S(in.acceleration),     S(in.output_angle),
+            S(in.output_velocity), S(in.output_direction), S(in.output_acceleration),
+            S(in.torsion),         S(in.torsion_rate),     S(in.torsion_direction),
+            S(in.torque),          S(in.torque_magnitude), S(in.current),
+            S(in.temperature),     S(in.viscous_scale),    S(in.coulomb_scale)};
   }
 }
 
@@ -81,8 +82,10 @@ bool BalanceData::usable(const Record& r) const {
   switch (balance_) {
     case Balance::motor:
       return !r.effort.empty() && r.has_motor_motion && (!prepared_->torque_measured || !r.torque.empty());
-    case Balance::transmission: return !r.torque.empty() && r.has_motor_motion && r.has_output_motion && !r.at_rest;
-    case Balance::load: return !r.torque.empty() && !r.locked && (r.has_output_motion || r.has_motor_motion) && !r.at_rest;
+    case Balance::transmission:
+      return !r.torque.empty() && r.has_motor_motion && r.has_output_motion && !r.at_rest;
+    case Balance::load:
+      return !r.torque.empty() && !r.locked && (r.has_output_motion || r.has_motor_motion) && !r.at_rest;
   }
   return false;
 }
@@ -130,9 +133,12 @@ BalanceData::BalanceData(const Prepared& prepared, Balance balance) : prepared_(
   }
   const auto left_side = [&](const Record& r, std::size_t k) {
     switch (balance_) {
-      case Balance::motor: return r.effort[k] - (prepared.torque_measured ? r.torque[k] / prepared.constants.gear_ratio : 0.0);
-      case Balance::transmission: return r.torque[k];
-      case Balance::load: return r.torque[k] - (r.load_torque.empty() ? 0.0 : r.load_torque[k]);
+      case Balance::motor:
+        return r.effort[k] - (prepared.torque_measured ? r.torque[k] / prepared.constants.gear_ratio : 0.0);
+      case Balance::transmission:
+        return r.torque[k];
+      case Balance::load:
+        return r.torque[k] - (r.load_torque.empty() ? 0.0 : r.load_torque[k]);
     }
     return 0.0;
   };
@@ -235,9 +241,10 @@ const Eigen::VectorXd& BalanceData::column(const Terms& terms, Slot slot) {
   const Term& term = terms[slot.term];
   const std::vector<double> values = unit_values(term, slot.parameter);
   const auto all = values_of_all(terms);
-  return cache_.emplace(key, along_rows([&](const RowRange& range, std::vector<double>& signal) {
-                          add_torque<Real>(terms, term, values, prepared_->records[range.record], all, signal);
-                        }))
+  return cache_
+      .emplace(key, along_rows([&](const RowRange& range, std::vector<double>& signal) {
+                 add_torque<Real>(terms, term, values, prepared_->records[range.record], all, signal);
+               }))
       .first->second;
 }
 

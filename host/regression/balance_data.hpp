@@ -1,5 +1,5 @@
-// Rows of one torque balance over all records: the target, and a column for any parameter of any effect. Columns are made
-// when asked for and kept, so that a search over models pays for each column once.
+// Rows of one torque balance over all records: the target, and a column for any parameter of any effect. Columns are
+// made when asked for and kept, so that a search over models pays for each column once.
 #pragma once
 
 #include <Eigen/Core>

@@ -14,13 +14,15 @@ struct BalanceFit {
   std::vector<std::size_t> on_balance;  // terms
   std::vector<Slot> linear;             // free parameters that the torque is proportional to
   std::vector<Slot> shapes;
-  Eigen::VectorXd residual;             // target minus model, N m
+  Eigen::VectorXd residual;  // target minus model, N m
   Eigen::VectorXd root_weights;
-  Eigen::MatrixXd covariance;           // of linear, then shapes; corrected for autocorrelation
-  Eigen::VectorXd own_share;            // likewise; see LinearFit
+  Eigen::MatrixXd covariance;  // of linear, then shapes; corrected for autocorrelation
+  Eigen::VectorXd own_share;   // likewise; see LinearFit
   double autocorrelation_time = 1.0;
   double condition_number = 0.0;
-  double rmse() const { return residual.size() ? std::sqrt(residual.squaredNorm() / static_cast<double>(residual.size())) : 0.0; }
+  double rmse() const {
+    return residual.size() ? std::sqrt(residual.squaredNorm() / static_cast<double>(residual.size())) : 0.0;
+  }
 };
 
 // Estimates all free parameters on the balance and writes them into `terms`. Shapes that the model states are where the

@@ -13,7 +13,7 @@ namespace {
 
 // Share that a record must add of a parameter's own before its value counts in the table by experiment.
 constexpr double kTellsAlone = 0.03;
-constexpr double kErrorAlone = 0.2;          // and its error must be less than this share of the pooled value
+constexpr double kErrorAlone = 0.2;        // and its error must be less than this share of the pooled value
 constexpr double kReliablePercent = 30.0;  // the report's threshold for std/avg
 
 struct Spread {
@@ -41,15 +41,17 @@ void fit_by_experiment(BalanceData& data, const BalanceFit& fit, const Terms& te
   const Eigen::VectorXd target = data.target() - data.known_torque(terms, fit.on_balance);
   for (const RowRange& range : data.records()) {
     if (range.size() < 4 * X.cols()) continue;
-    const LinearFit alone = least_squares(X.middleRows(range.first, range.size()), target.segment(range.first, range.size()),
-                                          Eigen::VectorXd::Ones(range.size()));
+    const LinearFit alone =
+        least_squares(X.middleRows(range.first, range.size()), target.segment(range.first, range.size()),
+                      Eigen::VectorXd::Ones(range.size()));
     const double noise = alone.residual.squaredNorm() / static_cast<double>(range.size() - X.cols());
     for (std::size_t j = 0; j < fit.linear.size(); ++j) {
       const auto c = static_cast<Eigen::Index>(j);
       const double error = std::sqrt(noise * alone.unit_covariance(c, c) * fit.autocorrelation_time);
-      const bool tells = alone.own_share[c] > kTellsAlone && error < kErrorAlone * std::abs(estimates[first_estimate + j].value);
-      estimates[first_estimate + j].per_experiment.emplace_back(
-          data.prepared().records[range.record].name, tells ? std::optional(alone.theta[c]) : std::nullopt);
+      const bool tells =
+          alone.own_share[c] > kTellsAlone && error < kErrorAlone * std::abs(estimates[first_estimate + j].value);
+      estimates[first_estimate + j].per_experiment.emplace_back(data.prepared().records[range.record].name,
+                                                                tells ? std::optional(alone.theta[c]) : std::nullopt);
     }
   }
 }
@@ -84,8 +86,8 @@ Estimate* find_estimate(std::vector<Estimate>& estimates, std::string_view effec
   return nullptr;
 }
 
-// Tvp = Tv + dTv, Tvn = Tv - dTv and likewise for Coulomb friction (EFFECTS: derived values). The spread of a difference
-// of directions says little; that of the two directions themselves is what the report judges.
+// Tvp = Tv + dTv, Tvn = Tv - dTv and likewise for Coulomb friction (EFFECTS: derived values). The spread of a
+// difference of directions says little; that of the two directions themselves is what the report judges.
 void derive_directions(std::vector<Estimate>& estimates, std::vector<Derived>& derived) {
   struct Pair {
     const char *even_effect, *even, *odd_effect, *odd, *positive, *negative;
@@ -133,15 +135,17 @@ void warn_of_excitation(BalanceData& data, const BalanceFit& fit, const Terms& t
     const auto c = static_cast<Eigen::Index>(j);
     const std::string name = fmt::format("{}.{}", term.id, term.entry->parameters[fit.linear[j].parameter].name);
     if (X.col(c).norm() == 0.0) {
-      result.warnings.push_back(fmt::format("{}: nothing in these data depends on it; record {}", name, term.entry->info->separated_by));
+      result.warnings.push_back(
+          fmt::format("{}: nothing in these data depends on it; record {}", name, term.entry->info->separated_by));
     } else if (fit.own_share[c] < kUndetermined) {
       const Slot other = fit.linear[likest(X, j)];
-      result.warnings.push_back(fmt::format("{} cannot be told from {} in these data and is left at nought; record {}", name,
-                                            terms[other.term].id, term.entry->info->separated_by));
+      result.warnings.push_back(fmt::format("{} cannot be told from {} in these data and is left at nought; record {}",
+                                            name, terms[other.term].id, term.entry->info->separated_by));
     } else if (fit.own_share[c] < 0.03) {
       const Slot other = fit.linear[likest(X, j)];
-      result.warnings.push_back(fmt::format("{} is weakly excited: {:.1f} % of its effect is its own, the rest looks like {}; {} would tell",
-                                            name, 100.0 * fit.own_share[c], terms[other.term].id, term.entry->info->separated_by));
+      result.warnings.push_back(
+          fmt::format("{} is weakly excited: {:.1f} % of its effect is its own, the rest looks like {}; {} would tell",
+                      name, 100.0 * fit.own_share[c], terms[other.term].id, term.entry->info->separated_by));
     }
   }
   for (std::size_t j = 0; j < fit.shapes.size(); ++j) {
@@ -149,8 +153,8 @@ void warn_of_excitation(BalanceData& data, const BalanceFit& fit, const Terms& t
     const double value = term.values[fit.shapes[j].parameter];
     const double share = shape_range(data, term, fit.shapes[j].parameter).share(value);
     if (share < 0.005 || share > 0.995)
-      result.warnings.push_back(fmt::format("{}.{} stopped at the end of what these data can show ({:.4g}); record {}", term.id,
-                                            term.entry->parameters[fit.shapes[j].parameter].name, value,
+      result.warnings.push_back(fmt::format("{}.{} stopped at the end of what these data can show ({:.4g}); record {}",
+                                            term.id, term.entry->parameters[fit.shapes[j].parameter].name, value,
                                             term.entry->info->separated_by));
   }
 }
@@ -165,7 +169,8 @@ model::Drive reconcile(const model::Drive& drive, const data::Dataset& dataset, 
       ours.value = theirs;
       ours.source = "data set";
     } else if (std::abs(*ours.value - *theirs) > 1e-3 * std::abs(*ours.value)) {
-      warnings.push_back(fmt::format("{} is {:g} in the model and {:g} in the data set; the model's is used", name, *ours.value, *theirs));
+      warnings.push_back(fmt::format("{} is {:g} in the model and {:g} in the data set; the model's is used", name,
+                                     *ours.value, *theirs));
     }
   };
   one(result.gear_ratio, dataset.drive.gear_ratio, "gear_ratio");
@@ -239,8 +244,9 @@ std::unique_ptr<Identification> identify(const data::Dataset& dataset, const mod
   }
   for (std::size_t t = 0; t < result->terms.size(); ++t)
     if (!touched[t])
-      result->warnings.push_back(fmt::format("{}: its balance cannot be formed from these data; its parameters are left as they are",
-                                             result->terms[t].id));
+      result->warnings.push_back(
+          fmt::format("{}: its balance cannot be formed from these data; its parameters are left as they are",
+                      result->terms[t].id));
   derive_directions(result->estimates, result->derived);
   store(result->model, result->estimates);
   return result;

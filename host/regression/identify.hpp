@@ -19,10 +19,10 @@ struct Estimate {
   std::string id, effect, parameter, unit;
   double value = 0.0;
   std::optional<double> std;
-  std::optional<double> low, high;        // 95 % interval
-  std::optional<double> average;          // of the experiments that can tell it
-  std::optional<double> spread_percent;   // standard deviation (n-1) over average
-  bool reliable = true;                   // spread not above the report's 30 %
+  std::optional<double> low, high;       // 95 % interval
+  std::optional<double> average;         // of the experiments that can tell it
+  std::optional<double> spread_percent;  // standard deviation (n-1) over average
+  bool reliable = true;                  // spread not above the report's 30 %
   bool identifiable = true;
   bool fixed = false;
   std::vector<std::pair<std::string, std::optional<double>>> per_experiment;
@@ -44,16 +44,16 @@ struct Identification {
   std::vector<Derived> derived;
   double condition_number = 0.0;
   std::vector<std::string> warnings;
-  model::Model model;             // the input with estimates in it
+  model::Model model;  // the input with estimates in it
 };
 
-// Fits every balance that has data. Only experiments of role fit are used. Throws data::DataError where there is nothing
-// to fit on.
+// Fits every balance that has data. Only experiments of role fit are used. Throws data::DataError where there is
+// nothing to fit on.
 std::unique_ptr<Identification> identify(const data::Dataset& dataset, const model::Model& model,
                                          const PipelineOptions& options);
 
-// Where data set and model differ in what they know of the drive by more than 0.1 %: the model wins, with a warning. What
-// only the data set knows is filled in.
+// Where data set and model differ in what they know of the drive by more than 0.1 %: the model wins, with a warning.
+// What only the data set knows is filled in.
 model::Drive reconcile(const model::Drive& drive, const data::Dataset& dataset, std::vector<std::string>& warnings);
 
 // Writes estimates into a model.

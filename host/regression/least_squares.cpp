@@ -16,8 +16,7 @@ LinearFit least_squares(const Eigen::MatrixXd& X, const Eigen::VectorXd& y, cons
   fit.theta = Eigen::VectorXd::Zero(columns);
   fit.residual = y;
   fit.own_share = Eigen::VectorXd::Zero(columns);
-  fit.unit_covariance =
-      Eigen::MatrixXd::Constant(columns, columns, 0.0);
+  fit.unit_covariance = Eigen::MatrixXd::Constant(columns, columns, 0.0);
   fit.unit_covariance.diagonal().setConstant(std::numeric_limits<double>::infinity());
   if (columns == 0 || X.rows() == 0) return fit;
 
@@ -75,7 +74,8 @@ Eigen::VectorXd record_weights(const std::vector<RowRange>& records, const Eigen
   Eigen::VectorXd weights = Eigen::VectorXd::Ones(residual.size());
   std::vector<double> noise;
   for (const RowRange& range : records)
-    noise.push_back(std::sqrt(residual.segment(range.first, range.size()).squaredNorm() / static_cast<double>(range.size())));
+    noise.push_back(
+        std::sqrt(residual.segment(range.first, range.size()).squaredNorm() / static_cast<double>(range.size())));
   if (noise.empty()) return weights;
   std::vector<double> sorted = noise;
   std::nth_element(sorted.begin(), sorted.begin() + static_cast<std::ptrdiff_t>(sorted.size() / 2), sorted.end());

@@ -9,13 +9,13 @@
 namespace flexspline::regression {
 
 struct LinearFit {
-  Eigen::VectorXd theta;           // one a column of X
-  Eigen::VectorXd residual;        // y - X theta, unweighted
-  Eigen::MatrixXd unit_covariance; // (X' W X)^-1; infinite on what is not determined
+  Eigen::VectorXd theta;            // one a column of X
+  Eigen::VectorXd residual;         // y - X theta, unweighted
+  Eigen::MatrixXd unit_covariance;  // (X' W X)^-1; infinite on what is not determined
   // Of each column, the share that no other column can stand in for (sine of its angle to their span), 0 to 1. Below
   // kUndetermined the parameter is left at nought and the data cannot tell it.
   Eigen::VectorXd own_share;
-  double condition_number = 0.0;   // of the columns scaled to unit length
+  double condition_number = 0.0;  // of the columns scaled to unit length
 };
 inline constexpr double kUndetermined = 1e-3;
 

@@ -28,11 +28,11 @@ constexpr double kRowsOverCutoff = 4.0;
 constexpr double kMaskReach = 1.5;
 
 template <class Process>
-std::vector<double> by_segment(const std::vector<double>& signal, const std::vector<Segment>& segments, Process process) {
+std::vector<double> by_segment(const std::vector<double>& signal, const std::vector<Segment>& segments,
+                               Process process) {
   std::vector<double> result(signal.size(), 0.0);
   for (const Segment& s : segments) {
-    const std::vector<double> part =
-        process(std::span<const double>(signal.data() + s.first, s.last - s.first));
+    const std::vector<double> part = process(std::span<const double>(signal.data() + s.first, s.last - s.first));
     std::copy(part.begin(), part.end(), result.begin() + static_cast<std::ptrdiff_t>(s.first));
   }
   return result;
@@ -73,7 +73,8 @@ double derivative_noise_gain(const ZeroPhaseFilter& filter, double sample_s) {
 }
 
 double root_mean_square(const std::vector<double>& x) {
-  return x.empty() ? 0.0 : std::sqrt(std::inner_product(x.begin(), x.end(), x.begin(), 0.0) / static_cast<double>(x.size()));
+  return x.empty() ? 0.0
+                   : std::sqrt(std::inner_product(x.begin(), x.end(), x.begin(), 0.0) / static_cast<double>(x.size()));
 }
 
 Motion motion_from_position(const std::vector<double>& raw, const std::vector<Segment>& segments,
@@ -305,9 +306,10 @@ Pipeline choose_pipeline(const std::vector<const Experiment*>& experiments, cons
     pipeline.row_cutoff_hz = pipeline.motion_cutoff_hz = *options.cutoff_hz;
     pipeline.reason = "given by --cutoff-hz";
     if (!(*options.cutoff_hz > 0.0) || *options.cutoff_hz >= 0.45 * slowest_hz)
-      throw data::DataError({{data::Severity::error, "cutoff", "", 0, "",
-                              fmt::format("a cut-off of {} Hz does not fit data sampled at {:.6g} Hz", *options.cutoff_hz, slowest_hz),
-                              fmt::format("give --cutoff-hz between 0.1 and {:.4g}", 0.45 * slowest_hz)}});
+      throw data::DataError(
+          {{data::Severity::error, "cutoff", "", 0, "",
+            fmt::format("a cut-off of {} Hz does not fit data sampled at {:.6g} Hz", *options.cutoff_hz, slowest_hz),
+            fmt::format("give --cutoff-hz between 0.1 and {:.4g}", 0.45 * slowest_hz)}});
     return pipeline;
   }
   std::vector<signals::CutoffChoice> choices;

@@ -16,7 +16,9 @@ namespace flexspline::regression {
 using catalogue::Balance;
 using catalogue::Real;
 inline constexpr std::size_t kBalances = 3;
-constexpr std::size_t index(Balance balance) { return static_cast<std::size_t>(balance); }
+constexpr std::size_t index(Balance balance) {
+  return static_cast<std::size_t>(balance);
+}
 
 struct PipelineOptions {
   std::optional<double> cutoff_hz;  // sets both filters
@@ -28,7 +30,7 @@ struct Pipeline {
   double row_cutoff_hz = 0.0;     // filter of the target and of every column, Butterworth of order five, zero phase
   double motion_cutoff_hz = 0.0;  // filter of positions before they are differentiated
   bool mask = true;
-  std::string reason;             // where the cut-off comes from
+  std::string reason;  // where the cut-off comes from
 };
 
 // Samples of a record that one balance is fitted on.
@@ -52,7 +54,7 @@ struct Record {
   bool has_motor_motion = false;
   bool has_output_motion = false;  // measured, or locked
   bool has_temperature = false;
-  std::optional<double> motor_quantum;   // resolution of the motor position
+  std::optional<double> motor_quantum;  // resolution of the motor position
   std::optional<double> output_quantum;
   // Standard deviation of what the resolution and noise of the positions leave in the direction variable of each
   // balance: motor velocity, torsion rate, output velocity.

@@ -110,7 +110,8 @@ class ProjectedResidual final : public ceres::CostFunction {
     Eigen::Map<RowMajor> jacobian(jacobians[0], b.size(), static_cast<Eigen::Index>(shapes_.size()));
     constexpr double kStep = 1e-6;
     for (std::size_t j = 0; j < shapes_.size(); ++j) {
-      const double per_share = (ranges_[j].at(parameters[0][j] + kStep) - ranges_[j].at(parameters[0][j] - kStep)) / (2.0 * kStep);
+      const double per_share =
+          (ranges_[j].at(parameters[0][j] + kStep) - ranges_[j].at(parameters[0][j] - kStep)) / (2.0 * kStep);
       const Eigen::VectorXd slope =
           root_weights_.cwiseProduct(data_.shape_column(terms_, on_balance_, shapes_[j])) * per_share;
       jacobian.col(static_cast<Eigen::Index>(j)) = -(slope - A * qr.solve(slope));
@@ -136,7 +137,8 @@ double ShapeRange::at(double share_of_range) const {
 }
 
 double ShapeRange::share(double value) const {
-  const double s = logarithmic ? std::log(std::max(value, 1e-300) / low) / std::log(high / low) : (value - low) / (high - low);
+  const double s =
+      logarithmic ? std::log(std::max(value, 1e-300) / low) / std::log(high / low) : (value - low) / (high - low);
   return std::clamp(s, 0.0, 1.0);
 }
 
@@ -149,7 +151,8 @@ ShapeRange shape_range(const BalanceData& data, const Term& term, std::size_t pa
     range.logarithmic = true;
   };
   switch (info.limit) {
-    case Limit::stated: break;
+    case Limit::stated:
+      break;
     case Limit::velocity: {
       const std::vector<double> speeds = magnitudes(data, [](const auto& in) { return in.velocity; });
       // What the mask leaves must hold enough of the term to see: its width at the slowest hundredth of the rows.
@@ -215,8 +218,7 @@ double refine_shapes(BalanceData& data, Terms& terms, const std::vector<std::siz
   const std::vector<Slot> shapes = free_shape_slots(terms, on_balance);
   const std::vector<Slot> linear = free_linear_slots(terms, on_balance);
   const Eigen::VectorXd target = data.target() - data.known_torque(terms, on_balance);
-  if (shapes.empty() || data.empty())
-    return projected_cost(columns_of(data, terms, linear), target, root_weights);
+  if (shapes.empty() || data.empty()) return projected_cost(columns_of(data, terms, linear), target, root_weights);
   std::vector<ShapeRange> ranges;
   std::vector<double> shares;
   for (const Slot& s : shapes) {
@@ -224,9 +226,8 @@ double refine_shapes(BalanceData& data, Terms& terms, const std::vector<std::siz
     shares.push_back(std::clamp(ranges.back().share(terms[s.term].values[s.parameter]), 0.01, 0.99));
   }
   ceres::Problem problem;
-  problem.AddResidualBlock(
-      new ProjectedResidual(data, terms, on_balance, linear, shapes, ranges, target, root_weights), nullptr,
-      shares.data());
+  problem.AddResidualBlock(new ProjectedResidual(data, terms, on_balance, linear, shapes, ranges, target, root_weights),
+                           nullptr, shares.data());
   for (int j = 0; j < static_cast<int>(shapes.size()); ++j) {
     problem.SetParameterLowerBound(shares.data(), j, 0.0);
     problem.SetParameterUpperBound(shares.data(), j, 1.0);

@@ -15,9 +15,9 @@ using catalogue::Balance;
 struct Term {
   const catalogue::Entry* entry = nullptr;
   std::string id;
-  std::vector<double> values;       // in the order of the catalogue
-  std::vector<std::uint8_t> known;  // fixed by the user, or given; else estimated
-  std::vector<std::uint8_t> stated; // has a value in the model, which is where a search starts
+  std::vector<double> values;        // in the order of the catalogue
+  std::vector<std::uint8_t> known;   // fixed by the user, or given; else estimated
+  std::vector<std::uint8_t> stated;  // has a value in the model, which is where a search starts
 
   bool is_source() const { return entry->info->phase == effects::Phase::source; }
   bool free_linear(std::size_t p) const { return !known[p] && entry->parameters[p].kind == effects::Kind::linear; }
@@ -43,8 +43,8 @@ Terms terms_of(const model::Model& model);
 std::vector<Slot> free_linear_slots(const Terms& terms, const std::vector<std::size_t>& which);
 std::vector<Slot> free_shape_slots(const Terms& terms, const std::vector<std::size_t>& which);
 
-// Terms of a model that a balance depends on. In a drive without a torque sensor the motor balance holds the load's (and,
-// in locked load, the transmission's) terms too.
+// Terms of a model that a balance depends on. In a drive without a torque sensor the motor balance holds the load's
+// (and, in locked load, the transmission's) terms too.
 std::vector<std::size_t> terms_on(const Terms& terms, Balance balance, bool torque_measured);
 
 }  // namespace flexspline::regression

@@ -12,14 +12,20 @@ struct Backlash : Stateless {
       .equation = "shift: dead zone of dq, half_width to each side",
       .shows_over = "torsion near zero",
       .source = "lost motion",
-      .explanation = "Around zero torque the output can be moved a little without any torque: the spring has a gap in its "
-                     "middle.",
+      .explanation =
+          "Around zero torque the output can be moved a little without any torque: the spring has a gap in its "
+          "middle.",
       .causes = "Play of a coupling, key or bolt in the load path, worn teeth. New strain-wave gears have almost none.",
       .rivals = "cubic_stiffness",
       .separated_by = "small multi-sine about zero torque in locked load",
   };
   static constexpr ParameterInfo kParameters[] = {
-      {.name = "half_width", .unit = units::kAngle, .kind = Kind::shape, .usual = 1.5e-4, .low = 0.0, .limit = Limit::torsion},
+      {.name = "half_width",
+       .unit = units::kAngle,
+       .kind = Kind::shape,
+       .usual = 1.5e-4,
+       .low = 0.0,
+       .limit = Limit::torsion},
   };
   template <class N>
   struct Coefficients {

@@ -10,8 +10,9 @@ struct CoulombAsymmetry : Stateless {
       .equation = "dTs while moving",
       .shows_over = "bias while moving",
       .source = "report eq. 27, 62",
-      .explanation = "Dry friction is larger in one direction than in the other: a constant torque, but only while the "
-                     "shaft moves.",
+      .explanation =
+          "Dry friction is larger in one direction than in the other: a constant torque, but only while the "
+          "shaft moves.",
       .causes = "Tooth flanks or seals that differ by direction, one-sided wear.",
       .rivals = "current_offset,torque_bias",
       .separated_by = "a record with the drive off, which shows an offset of the sensor alone",

@@ -10,7 +10,8 @@ struct CurrentOffset : Stateless {
       .equation = "Km i0, i0 = what the sensor reads at zero current",
       .shows_over = "bias, also at rest",
       .source = "amplifier",
-      .explanation = "The current sensor reads something although no current flows, so every torque is off by a constant.",
+      .explanation =
+          "The current sensor reads something although no current flows, so every torque is off by a constant.",
       .causes = "Offset of the current sensor or of the amplifier's monitor output; drifts with temperature.",
       .rivals = "coulomb_asymmetry",
       .separated_by = "a record with the drive off",

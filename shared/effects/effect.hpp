@@ -89,20 +89,20 @@ struct Description {
   std::string_view equation{};
   std::string_view shows_over{};
   std::string_view source{};
-  std::string_view explanation{};  // what it is, for somebody who never heard of it
-  std::string_view causes{};       // usual causes, and what to check on the machine
-  std::string_view rivals{};       // names, separated by commas: what it is confused with
-  std::string_view separated_by{}; // the experiment that tells them apart
-  std::string_view replaces{};     // effects that it stands in for, separated by commas
-  std::string_view modulates{};    // the effect that it scales and needs in the model
+  std::string_view explanation{};   // what it is, for somebody who never heard of it
+  std::string_view causes{};        // usual causes, and what to check on the machine
+  std::string_view rivals{};        // names, separated by commas: what it is confused with
+  std::string_view separated_by{};  // the experiment that tells them apart
+  std::string_view replaces{};      // effects that it stands in for, separated by commas
+  std::string_view modulates{};     // the effect that it scales and needs in the model
 };
 
 // Known facts of the drive that derivations use, and the bases of per-unit numbers (all one where numbers are SI).
 template <class P>
 struct DriveConstants {
   P gear_ratio{1.0};
-  P torque_constant{1.0};     // N m/A; one where effort is given as torque
-  P rated_velocity{1.0};      // rad/s, motor side
+  P torque_constant{1.0};  // N m/A; one where effort is given as torque
+  P rated_velocity{1.0};   // rad/s, motor side
   P reference_temperature{30.0};
   P turn_angle_scale{1.0};    // radians of motor turn per unit of motor position: 2 pi / pitch on a linear axis
   P torque_base{1.0};         // motor balance, N m
@@ -121,19 +121,19 @@ struct DriveConstants {
 // simulator +1, -1 or 0 from its set-valued solve.
 template <class N>
 struct Inputs {
-  typename N::Angle angle{};          // motor
+  typename N::Angle angle{};  // motor
   typename N::Value velocity{};
-  typename N::Value speed{};          // magnitude of the velocity
+  typename N::Value speed{};  // magnitude of the velocity
   typename N::Value direction{};
   typename N::Value acceleration{};
   typename N::Angle output_angle{};
   typename N::Value output_velocity{};
   typename N::Value output_direction{};
   typename N::Value output_acceleration{};
-  typename N::Value torsion{};        // q/N - qo, at the output
+  typename N::Value torsion{};  // q/N - qo, at the output
   typename N::Value torsion_rate{};
   typename N::Value torsion_direction{};
-  typename N::Value torque{};         // through the flexspline, output side
+  typename N::Value torque{};  // through the flexspline, output side
   typename N::Value torque_magnitude{};
   typename N::Value current{};
   typename N::Value temperature{};

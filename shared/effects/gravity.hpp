@@ -11,7 +11,8 @@ struct Gravity : Stateless {
       .equation = "cosine cos(qo) + sine sin(qo), which is m g l sin(qo + phi)",
       .shows_over = "output angle",
       .source = "unbalanced link",
-      .explanation = "The link's centre of mass is off the axis, so its weight turns the output, depending on the angle.",
+      .explanation =
+          "The link's centre of mass is off the axis, so its weight turns the output, depending on the angle.",
       .causes = "An arm, tool or cable that is not balanced; a base that is not level.",
       .rivals = "linear_stiffness",
       .separated_by = "slow motion over a large part of an output turn",

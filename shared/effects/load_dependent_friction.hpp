@@ -10,11 +10,13 @@ struct LoadDependentFriction : Stateless {
       .equation = "mu abs(T)/N s(w)",
       .shows_over = "torque, by direction",
       .source = "mesh friction, efficiency",
-      .explanation = "The harder the gear is loaded, the harder its teeth and bearings press together, and the more they "
-                     "rub.",
+      .explanation =
+          "The harder the gear is loaded, the harder its teeth and bearings press together, and the more they "
+          "rub.",
       .causes = "Tooth mesh and wave-generator bearing under load: the gear's efficiency. Seen only where load varies.",
       .rivals = "stribeck_gaussian,torque_constant_saturation",
-      .separated_by = "a constant external load in both directions at low current; a slow free triangle against Stribeck",
+      .separated_by =
+          "a constant external load in both directions at low current; a slow free triangle against Stribeck",
   };
   static constexpr ParameterInfo kParameters[] = {
       {.name = "coefficient", .unit = units::kNone, .usual = 0.03, .low = 0.0, .high = 1.0},

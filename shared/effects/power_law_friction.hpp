@@ -10,8 +10,9 @@ struct PowerLawFriction : Stateless {
       .equation = "c abs(w/wref)^d s(w), 0 < d < 1, wref = rated velocity",
       .shows_over = "velocity, concave",
       .source = "grease shear thinning",
-      .explanation = "Friction grows with speed, but ever more slowly: the lubricant thins as it is sheared (sublinear "
-                     "friction).",
+      .explanation =
+          "Friction grows with speed, but ever more slowly: the lubricant thins as it is sheared (sublinear "
+          "friction).",
       .causes = "Grease; its kind and temperature set the exponent. Usual in strain-wave gears.",
       .rivals = "viscous_friction,stribeck_gaussian",
       .separated_by = "steady motion at five or more speeds from slow to rated",

@@ -10,17 +10,24 @@ struct StribeckGaussian : Stateless {
       .equation = "s(w) F exp(-(w/vs)^2), F by direction",
       .shows_over = "low velocity",
       .source = "Tustin; report eq. 53, 85",
-      .explanation = "Near standstill the surfaces touch instead of floating on lubricant: friction is higher there and "
-                     "falls as motion gets faster. It makes slow motion jerk.",
-      .causes = "Boundary lubrication, thick or old grease, long standstill. A negative amplitude means friction that "
-                "rises out of standstill.",
+      .explanation =
+          "Near standstill the surfaces touch instead of floating on lubricant: friction is higher there and "
+          "falls as motion gets faster. It makes slow motion jerk.",
+      .causes =
+          "Boundary lubrication, thick or old grease, long standstill. A negative amplitude means friction that "
+          "rises out of standstill.",
       .rivals = "load_dependent_friction,power_law_friction",
       .separated_by = "a slow free triangle of velocity",
   };
   static constexpr ParameterInfo kParameters[] = {
       {.name = "amplitude_positive", .unit = units::kTorque, .usual = 0.012},
       {.name = "amplitude_negative", .unit = units::kTorque, .usual = 0.012},
-      {.name = "velocity", .unit = units::kVelocity, .kind = Kind::shape, .usual = 3.0, .low = 1e-6, .limit = Limit::velocity},
+      {.name = "velocity",
+       .unit = units::kVelocity,
+       .kind = Kind::shape,
+       .usual = 3.0,
+       .low = 1e-6,
+       .limit = Limit::velocity},
   };
   template <class N>
   struct Coefficients {
@@ -31,7 +38,8 @@ struct StribeckGaussian : Stateless {
   template <class N, class P>
   static Coefficients<N> derive(const P* p, const DriveConstants<P>& d) {
     const P half(0.5);
-    return {N::gain(half * p[0] / d.torque_base), N::gain(half * p[1] / d.torque_base), N::gain(d.velocity_base / p[2])};
+    return {N::gain(half * p[0] / d.torque_base), N::gain(half * p[1] / d.torque_base),
+            N::gain(d.velocity_base / p[2])};
   }
   // s (1 + s) / 2 and s (1 - s) / 2 choose the amplitude of the direction without a branch.
   template <class N>

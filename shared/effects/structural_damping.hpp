@@ -11,7 +11,8 @@ struct StructuralDamping : Stateless {
       .equation = "c abs(v/vref)^alpha s(v), vref = 1 rad/s",
       .shows_over = "loop, by direction",
       .source = "report eq. 68, 75",
-      .explanation = "Twisting the flexspline back and forth loses energy: torque against torsion draws a loop, not a line.",
+      .explanation =
+          "Twisting the flexspline back and forth loses energy: torque against torsion draws a loop, not a line.",
       .causes = "Material and tooth contact in the flexspline; grows with preload and wear of the teeth.",
       .rivals = "dahl_hysteresis",
       .separated_by = "the same torsion amplitude at a second frequency",

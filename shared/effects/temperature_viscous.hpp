@@ -18,7 +18,12 @@ struct TemperatureViscous : Stateless {
       .modulates = "viscous_friction",
   };
   static constexpr ParameterInfo kParameters[] = {
-      {.name = "coefficient", .unit = units::kPerKelvin, .kind = Kind::shape, .usual = 0.012, .low = -0.02, .high = 0.06},
+      {.name = "coefficient",
+       .unit = units::kPerKelvin,
+       .kind = Kind::shape,
+       .usual = 0.012,
+       .low = -0.02,
+       .high = 0.06},
   };
   template <class N>
   struct Coefficients {
@@ -31,7 +36,8 @@ struct TemperatureViscous : Stateless {
   }
   template <class N>
   static void modulate(const Coefficients<N>& c, Inputs<N>& in) {
-    in.viscous_scale = N::times(in.viscous_scale, N::exp_negative(N::scaled(c.coefficient, in.temperature - c.reference)));
+    in.viscous_scale =
+        N::times(in.viscous_scale, N::exp_negative(N::scaled(c.coefficient, in.temperature - c.reference)));
   }
 };
 FLEXSPLINE_EFFECT(9, TemperatureViscous);

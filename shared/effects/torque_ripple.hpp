@@ -11,8 +11,9 @@ struct TorqueRipple : Stateless {
       .shows_over = "motor angle, order spectrum",
       .source = "report 5.3",
       .explanation = "A torque that repeats with the motor's angle, k times a turn.",
-      .causes = "Twice a turn: the wave generator's two lobes and their misalignment. Once: an eccentric coupling or rotor. "
-                "Higher orders: cogging (slots and poles), bearing balls; on a screw, its pitch.",
+      .causes =
+          "Twice a turn: the wave generator's two lobes and their misalignment. Once: an eccentric coupling or rotor. "
+          "Higher orders: cogging (slots and poles), bearing balls; on a screw, its pitch.",
       .rivals = "kinematic_error,load_scaled_ripple",
       .separated_by = "slow constant speed over many turns, then the same at a second load",
   };

@@ -11,8 +11,9 @@ struct ViscousAsymmetry : Stateless {
       .shows_over = "velocity, even",
       .source = "report eq. 27, 62",
       .explanation = "Friction grows faster with speed in one direction than in the other.",
-      .causes = "Tooth flanks, bearing preload or brushes that differ by direction; a screw or an axial load; grease that "
-                "is carried to one side.",
+      .causes =
+          "Tooth flanks, bearing preload or brushes that differ by direction; a screw or an axial load; grease that "
+          "is carried to one side.",
       .rivals = "coulomb_asymmetry",
       .separated_by = "both directions at two speeds that differ by a factor of five",
   };

@@ -23,7 +23,8 @@ class EmpsAxis : public ::testing::Test {
  protected:
   void SetUp() override {
     if (!std::filesystem::exists(emps_folder() / "emps_train.csv"))
-      GTEST_SKIP() << "no measurements of the EMPS axis in " << emps_folder() << "; set FLEXSPLINE_DATA to their parent folder";
+      GTEST_SKIP() << "no measurements of the EMPS axis in " << emps_folder()
+                   << "; set FLEXSPLINE_DATA to their parent folder";
     model_.drive.axis = data::Axis::linear;
     model_.drive.gear_ratio.value = 1.0;
     for (const char* effect : {"inertia", "viscous_friction", "coulomb_friction", "torque_bias"})
@@ -33,7 +34,8 @@ class EmpsAxis : public ::testing::Test {
   // A data set as a user writes it: the columns are theirs, the experiments are parts of a file.
   data::Dataset dataset(const std::string& file, const std::string& experiments) {
     const std::filesystem::path folder =
-        std::filesystem::temp_directory_path() / fmt::format("flexspline-emps-{}", ::testing::UnitTest::GetInstance()->current_test_info()->name());
+        std::filesystem::temp_directory_path() /
+        fmt::format("flexspline-emps-{}", ::testing::UnitTest::GetInstance()->current_test_info()->name());
     std::filesystem::create_directories(folder);
     std::filesystem::copy_file(emps_folder() / file, folder / file, std::filesystem::copy_options::overwrite_existing);
     std::ofstream(folder / "dataset.toml") << R"(format = "flexspline-dataset/1"
@@ -67,7 +69,8 @@ role = "holdout"
 };
 
 const regression::Estimate& estimate(const regression::Identification& found, std::string_view effect) {
-  return *std::find_if(found.estimates.begin(), found.estimates.end(), [&](const auto& e) { return e.effect == effect; });
+  return *std::find_if(found.estimates.begin(), found.estimates.end(),
+                       [&](const auto& e) { return e.effect == effect; });
 }
 
 double value(const model::Model& model, std::string_view effect, std::string_view parameter) {
@@ -75,7 +78,8 @@ double value(const model::Model& model, std::string_view effect, std::string_vie
 }
 
 TEST_F(EmpsAxis, PublishedParametersComeOutWithThePublishedPipeline) {
-  const data::Dataset data = dataset("emps_train.csv", "[[experiment]]\nfile = \"emps_train.csv\"\nname = \"train\"\ncurrent_hold = \"none\"\n");
+  const data::Dataset data = dataset(
+      "emps_train.csv", "[[experiment]]\nfile = \"emps_train.csv\"\nname = \"train\"\ncurrent_hold = \"none\"\n");
   const auto found = regression::identify(data, model_, {.cutoff_hz = 100.0, .mask = false});
   EXPECT_NEAR(estimate(*found, "inertia").value, 95.1089, 0.006 * 95.1089);
   EXPECT_NEAR(estimate(*found, "viscous_friction").value, 203.5034, 0.006 * 203.5034);
@@ -95,7 +99,8 @@ TEST_F(EmpsAxis, DirectionDependenceIsNamedFirstAndStribeckIsNot) {
   EXPECT_EQ(d.noise_floor_from, "periods");
   EXPECT_EQ(d.unit, "N");
   // No record shows the axis at rest: what is constant, the bias and the asymmetry share.
-  const auto shared = std::find_if(d.candidates.begin(), d.candidates.end(), [](const auto& c) { return c.effect == "coulomb_asymmetry"; });
+  const auto shared = std::find_if(d.candidates.begin(), d.candidates.end(),
+                                   [](const auto& c) { return c.effect == "coulomb_asymmetry"; });
   ASSERT_NE(shared, d.candidates.end());
   EXPECT_FALSE(shared->admissible);
   ASSERT_EQ(shared->rivals.size(), 1u);
@@ -105,8 +110,8 @@ TEST_F(EmpsAxis, DirectionDependenceIsNamedFirstAndStribeckIsNot) {
 TEST_F(EmpsAxis, AddingItTakesTheHeldOutErrorDownByAFifthAndKeepsTheModelSensible) {
   const data::Dataset data = halves();
   const diagnosis::Addition added = diagnosis::add(data, model_, "viscous_asymmetry", {});
-  fmt::print("held-out error {:.3f} N to {:.3f} N, noise {:.3f} N ({})\n", *added.before.rmse_holdout, *added.after.rmse_holdout,
-             added.noise_floor.value_or(0.0), added.noise_floor_from);
+  fmt::print("held-out error {:.3f} N to {:.3f} N, noise {:.3f} N ({})\n", *added.before.rmse_holdout,
+             *added.after.rmse_holdout, added.noise_floor.value_or(0.0), added.noise_floor_from);
   EXPECT_LT(*added.after.rmse_holdout, 0.8 * *added.before.rmse_holdout);
   EXPECT_GT(*added.after.rmse_holdout, 0.3 * *added.before.rmse_holdout);
   EXPECT_NEAR(value(added.model, "inertia", "inertia"), 95.1, 2.0);
@@ -115,12 +120,14 @@ TEST_F(EmpsAxis, AddingItTakesTheHeldOutErrorDownByAFifthAndKeepsTheModelSensibl
   EXPECT_LT(std::abs(value(added.model, "torque_bias", "torque")), 5.0);
 
   const diagnosis::Diagnosis second = diagnosis::diagnose(data, added.model, {});
-  const bool sublinear = std::any_of(second.named.begin(), second.named.end(), [](const auto& n) { return n.effect == "power_law_friction"; });
+  const bool sublinear = std::any_of(second.named.begin(), second.named.end(),
+                                     [](const auto& n) { return n.effect == "power_law_friction"; });
   EXPECT_TRUE(sublinear || !second.remaining_structure.empty()) << diagnosis::verdict_name(second.verdict);
 }
 
 TEST_F(EmpsAxis, ForcePulsesAreDisturbancesAndNoFriction) {
-  const data::Dataset data = dataset("emps_test_pulses.csv", "[[experiment]]\nfile = \"emps_test_pulses.csv\"\nname = \"pulses\"\n");
+  const data::Dataset data =
+      dataset("emps_test_pulses.csv", "[[experiment]]\nfile = \"emps_test_pulses.csv\"\nname = \"pulses\"\n");
   const diagnosis::Diagnosis d = diagnosis::diagnose(data, model_, {});
   for (const auto& n : d.named) EXPECT_EQ(n.effect, "viscous_asymmetry");
   ASSERT_GE(d.disturbances.size(), 5u);

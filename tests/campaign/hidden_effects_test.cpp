@@ -1,5 +1,5 @@
-// Drives with one effect that the model does not know, and drives with none: what the diagnosis names, and what adding it
-// does to the error on motions that the fit never saw.
+// Drives with one effect that the model does not know, and drives with none: what the diagnosis names, and what adding
+// it does to the error on motions that the fit never saw.
 #include <gtest/gtest.h>
 
 #include <fmt/format.h>
@@ -53,16 +53,16 @@ Outcome run(const Case& c) {
   for (const auto& n : d.named) outcome.named += (outcome.named.empty() ? "" : "+") + label(n.effect, n.order);
   if (d.named.empty()) outcome.named = "-";
   for (std::size_t i = 0; i < std::min<std::size_t>(4, d.candidates.size()); ++i)
-    outcome.detail += fmt::format(" {}({:.0f},{:.2f}%{})", label(d.candidates[i].effect, d.candidates[i].order),
-                                  d.candidates[i].score, d.candidates[i].chi2_fall_percent,
-                                  d.candidates[i].admissible ? "" : ",x");
+    outcome.detail +=
+        fmt::format(" {}({:.0f},{:.2f}%{})", label(d.candidates[i].effect, d.candidates[i].order),
+                    d.candidates[i].score, d.candidates[i].chi2_fall_percent, d.candidates[i].admissible ? "" : ",x");
   if (c.hidden.empty()) {
     outcome.right = d.named.empty();
     return outcome;
   }
   const std::string truth = c.hidden == "torque_ripple" ? "torque_ripple:2" : c.hidden;
-  outcome.right = std::any_of(d.named.begin(), d.named.end(),
-                              [&](const auto& n) { return label(n.effect, n.order) == truth; });
+  outcome.right =
+      std::any_of(d.named.begin(), d.named.end(), [&](const auto& n) { return label(n.effect, n.order) == truth; });
   // The floor: the residual of the true model with its true parameters, through the same pipeline.
   const diagnosis::Addition added = diagnosis::add(dataset, base, truth, {});
   const model::Model true_model = testing::model_of(demo.drive, true, true);
@@ -91,9 +91,9 @@ std::vector<Outcome> run_all(const std::vector<Case>& cases) {
 }
 
 const std::vector<std::string> kHidden = {
-    "viscous_asymmetry", "coulomb_asymmetry",  "stribeck_gaussian", "load_dependent_friction", "power_law_friction",
-    "gravity",           "current_offset",     "torque_ripple:2",   "torque_ripple:7",         "temperature_viscous",
-    "dahl_friction",     "backlash",           "structural_damping"};
+    "viscous_asymmetry", "coulomb_asymmetry", "stribeck_gaussian", "load_dependent_friction", "power_law_friction",
+    "gravity",           "current_offset",    "torque_ripple:2",   "torque_ripple:7",         "temperature_viscous",
+    "dahl_friction",     "backlash",          "structural_damping"};
 
 void print(const std::vector<Outcome>& outcomes) {
   std::map<std::string, std::map<std::string, int>> confusion;

@@ -63,8 +63,7 @@ inline model::Model model_of(const plant::Drive& drive, bool with_hidden, bool w
     model::Effect ours = catalogue::blank_effect(*entry, data::Axis::rotary);
     if (effect.has("order")) ours.id = effect.type + "_" + std::to_string(std::lround(effect.value("order")));
     for (std::size_t p = 0; p < ours.parameters.size(); ++p)
-      if (effect.has(ours.parameters[p].name) &&
-          (with_values || entry->parameters[p].kind == effects::Kind::given))
+      if (effect.has(ours.parameters[p].name) && (with_values || entry->parameters[p].kind == effects::Kind::given))
         ours.parameters[p].value = effect.value(ours.parameters[p].name);
     model.effects.push_back(std::move(ours));
   }
