@@ -30,6 +30,7 @@ struct Candidate {
   bool admissible = true;
   std::string why_not;  // where it is not admissible
   std::vector<std::string> rivals;
+  std::string note;  // what its values mean, where that is not what the effect's name says
 };
 
 struct Localised {

@@ -97,6 +97,7 @@ void print_named(Console& console, const Diagnosis& d, const diagnosis::Named& n
     console.line(
         fmt::format("  {} = {}{}", e.parameter, with_unit(e.value, e.unit),
                     e.low && e.high ? fmt::format("   (95 %: {} to {})", number(*e.low), number(*e.high)) : ""));
+  if (!candidate->note.empty()) console.line(wrapped(candidate->note));
   if (!candidate->rivals.empty() && !entry->info->separated_by.empty())
     console.line(wrapped(fmt::format("Not to be told from {} here: record {} to separate them.",
                                      listed(candidate->rivals, "or"), entry->info->separated_by)));
@@ -108,7 +109,8 @@ void print_next(Console& console, const Diagnosis& d, const std::string& add_com
     case Verdict::missing_effect:
     case Verdict::confusable_effects:
       for (const diagnosis::Named& n : d.named)
-        steps.push_back(replaced(add_command, "EFFECT", effect_label(n.effect, n.order)));
+        if (const Candidate* c = candidate_of(d, n); c == nullptr || c->admissible)
+          steps.push_back(replaced(add_command, "EFFECT", effect_label(n.effect, n.order)));
       break;
     case Verdict::unknown_structure:
       steps.push_back("flexspline compare shows in which region the error stands; look at the drive there");
@@ -139,7 +141,7 @@ json named_json(const std::vector<diagnosis::Named>& named) {
   return list;
 }
 
-json candidate_json(const Candidate& c, std::size_t rank) {
+json candidate_json(const Candidate& c, std::size_t rank, const std::string& unit) {
   json parameters = json::array();
   for (const regression::Estimate& e : c.parameters) parameters.push_back(json_parameter(e));
   const catalogue::Entry* entry = catalogue::find(c.effect);
@@ -154,6 +156,7 @@ json candidate_json(const Candidate& c, std::size_t rank) {
           {"chi2_fall_percent", json_number(c.chi2_fall_percent)},
           {"rmse_cv_before", json_number(c.rmse_cv_before)},
           {"rmse_cv_after", json_number(c.rmse_cv_after)},
+          {"unit", unit},
           {"p_value", json_number(c.p_value)},
           {"parameters", std::move(parameters)},
           {"minimum_detectable", nullptr},
@@ -203,7 +206,7 @@ void print_diagnosis(Console& console, const Diagnosis& d, const std::string& ad
 
 json diagnosis_json(const Diagnosis& d) {
   json candidates = json::array();
-  for (const Candidate& c : d.candidates) candidates.push_back(candidate_json(c, candidates.size() + 1));
+  for (const Candidate& c : d.candidates) candidates.push_back(candidate_json(c, candidates.size() + 1, d.unit));
   json disturbances = json::array();
   for (const diagnosis::Disturbance& x : d.disturbances)
     disturbances.push_back({{"experiment", x.experiment},

@@ -112,7 +112,8 @@ std::string pipeline_text(const regression::Prepared& prepared) {
   std::size_t used = 0, masked = 0, held = 0, held_by_assumption = 0;
   std::vector<std::string> decimations;
   for (const regression::Record& record : prepared.records) {
-    for (const regression::Rows& rows : record.rows) {
+    if (!record.effort.empty()) {
+      const regression::Rows& rows = record.rows[regression::index(regression::Balance::motor)];
       used += rows.samples.size();
       masked += rows.masked;
     }
@@ -131,7 +132,7 @@ std::string pipeline_text(const regression::Prepared& prepared) {
               : fmt::format("; one sample in {} is a row", listed(decimations, "or"));
   const double share =
       used + masked > 0 ? 100.0 * static_cast<double>(masked) / static_cast<double>(used + masked) : 0.0;
-  text += p.mask ? fmt::format("; {:.1f} % of them masked (reversals, sticking, clipping)", share)
+  text += p.mask ? fmt::format("; {:.1f} % of the motor balance's rows masked (reversals, sticking, clipping)", share)
                  : std::string("; no mask for reversals and sticking");
   if (held > 0)
     text += fmt::format(

@@ -1,0 +1,222 @@
+#include "host/diagnosis/trials.hpp"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+
+#include "host/regression/least_squares.hpp"
+#include "host/regression/shapes.hpp"
+
+namespace flexspline::diagnosis {
+namespace {
+
+using regression::Term;
+
+// The score's limit was set on null data; the fall says that an effect matters, not only that it is there.
+constexpr double kNamedFallPercent = 0.5;
+// A candidate of which the base model can imitate all but this share is one with it in these data.
+constexpr double kOwnShare = 0.003;
+constexpr std::size_t kGridPoints = 6;
+constexpr std::size_t kRefined = 4;  // candidates whose shapes are searched continuously
+
+// Squares left after the best linear fit, with the base's weights: enough to choose a shape on a grid.
+double in_sample(BalanceData& data, const Terms& terms, const Judged& base) {
+  const auto on_balance = regression::terms_on(terms, data.balance(), data.prepared().torque_measured);
+  const auto linear = regression::free_linear_slots(terms, on_balance);
+  const Eigen::MatrixXd X = regression::columns_of(data, terms, linear);
+  const regression::LinearFit fit =
+      regression::least_squares(X, data.target() - data.known_torque(terms, on_balance), base.root_weights);
+  return base.root_weights.cwiseProduct(fit.residual).squaredNorm();
+}
+
+void choose_shapes(Search& search, Proposal& proposal) {
+  Term& added = proposal.extended.back();
+  for (std::size_t p = 0; p < added.values.size(); ++p) {
+    if (!added.free_shape(p)) continue;
+    double best = added.values[p], least = std::numeric_limits<double>::infinity();
+    for (const double value : regression::shape_grid(regression::shape_range(*search.data, added, p), kGridPoints)) {
+      added.values[p] = value;
+      const double squares = in_sample(*search.data, proposal.extended, search.base);
+      if (squares < least) {
+        least = squares;
+        best = value;
+      }
+    }
+    added.values[p] = best;
+  }
+}
+
+// The effect of the model whose column looks most like that of the added one.
+std::string imitator(BalanceData& data, const Judged& judged, std::size_t added) {
+  std::string best = "the model";
+  double most = 0.0;
+  for (const Slot& own : judged.linear) {
+    if (own.term != added) continue;
+    const Eigen::VectorXd column = data.column(judged.terms, own);
+    for (const Slot& other : judged.linear) {
+      if (other.term == added) continue;
+      const Eigen::VectorXd& theirs = data.column(judged.terms, other);
+      const double norm = column.norm() * theirs.norm();
+      const double alike = norm > 0.0 ? std::abs(column.dot(theirs)) / norm : 0.0;
+      if (alike > most) {
+        most = alike;
+        best = judged.terms[other.term].id;
+      }
+    }
+  }
+  return best;
+}
+
+// A candidate that needs an impossible value, or that makes the base model impossible, is a fit and no explanation.
+void check_admissible(BalanceData& data, const Judged& base, Trial& trial) {
+  const auto& judged = trial.judged;
+  const auto refuse = [&](std::string why) {
+    if (trial.admissible) trial.why_not = std::move(why);
+    trial.admissible = false;
+  };
+  const std::size_t added = judged.terms.size() - 1;
+  bool any_own = judged.terms[added].entry->info->phase != effects::Phase::source;
+  for (std::size_t j = 0; j < judged.linear.size(); ++j) {
+    const Term& t = judged.terms[judged.linear[j].term];
+    const auto& info = t.entry->parameters[judged.linear[j].parameter];
+    const double value = judged.theta[static_cast<Eigen::Index>(j)];
+    if (judged.linear[j].term == added) {
+      any_own = any_own || judged.own_share[static_cast<Eigen::Index>(j)] > kOwnShare;
+      if (value < info.low || value > info.high)
+        refuse(fmt::format("its {} would be {:.3g} {}, which is not possible", info.name, value, info.unit.rotary));
+      continue;
+    }
+    // Friction, inertia and stiffness have a sign; offsets and asymmetries may have any.
+    if (info.low != 0.0) continue;
+    const auto before = position(base, t.id, info.name);
+    if (!before) continue;
+    const double was = base.theta[static_cast<Eigen::Index>(*before)];
+    if (was <= 5.0 * base.std[static_cast<Eigen::Index>(*before)]) continue;
+    // A coefficient moves with its exponent, so torques are compared, not numbers.
+    const std::size_t old = base.linear[*before].term;
+    const Eigen::VectorXd torque = data.term_torque(base.terms, old);
+    // An effect that is hardly larger than what is missing is not known well enough to rule anything out.
+    if (torque.norm() < 2.0 * base.residual.norm()) continue;
+    const double change = (data.term_torque(judged.terms, judged.linear[j].term) - torque).norm() / torque.norm();
+    if (change > 0.5)
+      refuse(fmt::format("{} would change by {:.0f} % (its {} from {:.3g} to {:.3g})", t.id, 100.0 * change, info.name,
+                         was, value));
+  }
+  if (!any_own) {
+    trial.imitated_by = imitator(data, judged, added);
+    refuse(fmt::format("{} can imitate it in these data", trial.imitated_by));
+  }
+}
+
+Trial evaluate(Search& search, Proposal proposal) {
+  Trial trial;
+  trial.judged = judge(*search.data, proposal.extended, search.keep);
+  trial.fall = fall_of(search.base, trial.judged, proposal.added);
+  trial.proposal = std::move(proposal);
+  check_admissible(*search.data, search.base, trial);
+  return trial;
+}
+
+bool better(const Trial& a, const Trial& b);
+
+// Where the best shape makes the model impossible, the best of those that do not: a bound that the model's own meaning
+// sets. Returns `refused` where there is none.
+Trial best_admissible(Search& search, Proposal proposal, Trial refused) {
+  Term& added = proposal.extended.back();
+  if (refused.fall.score < kNamedScore) return refused;
+  for (std::size_t p = 0; p < added.values.size(); ++p) {
+    if (!added.free_shape(p)) continue;
+    const double chosen = added.values[p];
+    for (const double value : regression::shape_grid(regression::shape_range(*search.data, added, p), kGridPoints)) {
+      if (value == chosen) continue;
+      added.values[p] = value;
+      Trial trial = evaluate(search, proposal);
+      if (better(trial, refused)) refused = std::move(trial);
+    }
+    added.values[p] = chosen;
+  }
+  return refused;
+}
+
+bool better(const Trial& a, const Trial& b) {
+  if (a.admissible != b.admissible) return a.admissible;
+  return a.fall.score > b.fall.score;
+}
+
+}  // namespace
+
+std::optional<std::size_t> position(const Judged& judged, std::string_view id, std::string_view parameter) {
+  for (std::size_t j = 0; j < judged.linear.size(); ++j) {
+    const Term& t = judged.terms[judged.linear[j].term];
+    if (t.id == id && t.entry->parameters[judged.linear[j].parameter].name == parameter) return j;
+  }
+  return std::nullopt;
+}
+
+bool passes(const Trial& t) {
+  return t.admissible && t.fall.score > kNamedScore && t.fall.chi2_percent > kNamedFallPercent;
+}
+
+std::vector<Trial> rank(Search& search) {
+  std::vector<Trial> trials;
+  for (Proposal& proposal : proposals(*search.data, search.base.terms)) {
+    choose_shapes(search, proposal);
+    trials.push_back(evaluate(search, proposal));
+    if (!trials.back().admissible)
+      trials.back() = best_admissible(search, std::move(proposal), std::move(trials.back()));
+  }
+  std::sort(trials.begin(), trials.end(), better);
+  for (std::size_t i = 0; i < std::min(kRefined, trials.size()); ++i) {
+    Trial& trial = trials[i];
+    const Term& added = trial.proposal.extended.back();
+    bool has_shape = false;
+    for (std::size_t p = 0; p < added.values.size(); ++p) has_shape = has_shape || added.free_shape(p);
+    if (!has_shape || trial.fall.score < kNamedScore) continue;
+    Proposal refined = trial.proposal;
+    refined.extended = trial.judged.terms;
+    const auto on_balance =
+        regression::terms_on(refined.extended, search.data->balance(), search.data->prepared().torque_measured);
+    regression::refine_shapes(*search.data, refined.extended, on_balance, trial.judged.root_weights);
+    Trial again = evaluate(search, std::move(refined));
+    if (better(again, trial) || !trial.admissible) trial = std::move(again);
+  }
+  std::sort(trials.begin(), trials.end(), better);
+  return trials;
+}
+
+// Friction that rises out of standstill over a wide range of speed is a concave friction curve, whatever its formula
+// (EFFECTS): a Stribeck term with two negative amplitudes is then reported as sublinear friction.
+bool is_sublinear(const Trial& trial, const BalanceData& data) {
+  if (trial.proposal.entry->name() != "stribeck_gaussian") return false;
+  const Term& term = trial.judged.terms.back();
+  const auto value = [&](std::string_view name) { return term.values[term.entry->index_of(name)]; };
+  const regression::ShapeRange range = regression::shape_range(data, term, term.entry->index_of("velocity"));
+  // The range ends at a quarter of the fast motion; wide is from a tenth of it.
+  return value("amplitude_positive") < 0.0 && value("amplitude_negative") < 0.0 && value("velocity") > 0.4 * range.high;
+}
+
+std::optional<Trial> eliminate(Search& search, const Trial& first) {
+  Search next{search.data, search.keep, first.judged};
+  std::vector<Trial> more = rank(next);
+  if (more.empty() || !passes(more.front())) return std::nullopt;
+  const Trial& second = more.front();
+  // Only what may be added to the base model alone can take the place of the first.
+  Proposal alone;
+  try {
+    alone.extended = extend(search.base.terms, *second.proposal.entry, second.proposal.order);
+  } catch (const model::ModelError&) {
+    return std::nullopt;
+  }
+  alone.entry = second.proposal.entry;
+  alone.order = second.proposal.order;
+  alone.added = second.proposal.added;
+  alone.extended.back().values = second.judged.terms.back().values;
+  Trial instead = evaluate(search, std::move(alone));
+  const Fall lost = fall_of(instead.judged, second.judged, first.proposal.added);
+  if (passes(instead) && lost.score < kNamedScore) return instead;
+  return std::nullopt;
+}
+
+}  // namespace flexspline::diagnosis

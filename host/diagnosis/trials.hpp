@@ -1,0 +1,51 @@
+// What adding each effect of the catalogue would do on one torque balance.
+#pragma once
+
+#include <optional>
+#include <string>
+#include <string_view>
+#include <vector>
+
+#include "host/diagnosis/candidates.hpp"
+#include "host/diagnosis/score.hpp"
+
+namespace flexspline::diagnosis {
+
+// One balance with the model as it is.
+struct Search {
+  BalanceData* data = nullptr;
+  Eigen::VectorXd keep;  // nought for rows in which a disturbance acted
+  Judged base;
+};
+
+struct Trial {
+  Proposal proposal;
+  Judged judged;
+  Fall fall;
+  bool admissible = true;
+  std::string why_not;
+  std::string imitated_by;  // the effect of the model that the data cannot tell it from
+};
+
+// Margin of score within which two effects are rivals.
+inline constexpr double kRivalMargin = 10.0;
+// What an effect must score to be told at all.
+inline constexpr double kNamedScore = 20.0;
+
+// Whether an effect may be named: admissible, certain, and large enough to matter.
+bool passes(const Trial& trial);
+
+// All effects that could be added, best first; the best ones with their shapes searched continuously.
+std::vector<Trial> rank(Search& search);
+
+// Forward once more and back: an effect that was named because it resembles the true one is dropped when the true one
+// is in. Returns the trial to name in the place of `first`, or nothing.
+std::optional<Trial> eliminate(Search& search, const Trial& first);
+
+// A Stribeck term that is sublinear friction: both amplitudes negative, over a wide range of speed.
+bool is_sublinear(const Trial& trial, const BalanceData& data);
+
+// Where a parameter stands among the linear ones of a judged model, or nothing if it is not estimated there.
+std::optional<std::size_t> position(const Judged& judged, std::string_view id, std::string_view parameter);
+
+}  // namespace flexspline::diagnosis
