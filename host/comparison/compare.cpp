@@ -182,8 +182,10 @@ class Comparer {
 
   void add_regions(const BalanceData& data, const std::string& signal, const Eigen::VectorXd& residual,
                    const Eigen::VectorXd& floor_squared) {
-    const auto wanted =
-        std::clamp<std::size_t>(static_cast<std::size_t>(data.rows()) / kRowsPerBin, kFewestBins, kMostBins);
+    // A short record has few rows; its regions are wider then, never too thin to be judged.
+    const auto rows = static_cast<std::size_t>(data.rows());
+    const std::size_t wanted = std::min(std::clamp(rows / kRowsPerBin, kFewestBins, kMostBins),
+                                        std::max<std::size_t>(1, rows / kFewestInRegion));
     for (const RowVariable& variable : row_variables(data, model_.drive.axis)) {
       const Bins bins = equal_count_bins(variable.values, wanted);
       struct Sums {

@@ -118,7 +118,9 @@ EffectName parse_effect(std::string_view text) {
   if (!name.entry)
     throw model::ModelError(
         fmt::format("there is no effect named \"{}\"; `flexspline effects` lists them", text.substr(0, colon)));
-  const bool ordered = name.entry->count(effects::Kind::given) > 0;
+  const auto given = std::find_if(name.entry->parameters.begin(), name.entry->parameters.end(),
+                                  [](const auto& p) { return p.kind == effects::Kind::given; });
+  const bool ordered = given != name.entry->parameters.end();
   if (colon == std::string_view::npos) {
     if (ordered)
       throw model::ModelError(fmt::format("{} needs its order per motor turn; write {}:2, for example", text, text));
@@ -128,9 +130,10 @@ EffectName parse_effect(std::string_view text) {
   double value = 0.0;
   const auto parsed = std::from_chars(order.data(), order.data() + order.size(), value);
   if (!ordered) throw model::ModelError(fmt::format("{} has no order; leave out \":{}\"", name.entry->name(), order));
-  if (parsed.ec != std::errc() || parsed.ptr != order.data() + order.size() || !(value > 0.0))
-    throw model::ModelError(
-        fmt::format("\"{}\" is no order; write a positive number, as in {}:2", order, name.entry->name()));
+  if (parsed.ec != std::errc() || parsed.ptr != order.data() + order.size() ||
+      !(value >= given->low && value <= given->high))
+    throw model::ModelError(fmt::format("\"{}\" is no order; write a number from {:g} to {:g}, as in {}:2", order,
+                                        given->low, given->high, name.entry->name()));
   name.order = value;
   return name;
 }

@@ -167,7 +167,9 @@ void judge_rest(const Examined& chosen, Diagnosis& result) {
   const Judged& after = result.named.empty() ? chosen.search.base : chosen.trials.front().judged;
   // What is missing may pass for a delay, so it is read off the better model.
   const Eigen::Index delay = after.theta.size() - 1;
-  if (std::abs(after.theta[delay]) > kCertain * after.std[delay]) result.delay_s = after.theta[delay];
+  if (chosen.search.data->balance() == regression::Balance::motor &&
+      std::abs(after.theta[delay]) > kCertain * after.std[delay])
+    result.delay_s = after.theta[delay];
   const std::vector<Localised> remaining = shares(*chosen.search.data, after);
   const bool at_floor = result.noise_floor && after.rmse() < kAtFloor * *result.noise_floor;
   if (!at_floor) result.remaining_structure = remaining;
@@ -205,6 +207,7 @@ Diagnosis diagnose(const data::Dataset& dataset, const model::Model& model, cons
   if (options.progress) options.progress("fitting the model");
   const auto base = regression::identify(dataset, model, options.pipeline);
   result.warnings = base->warnings;
+  result.parameter_trends = parameter_trends(*base);
   std::vector<const data::Experiment*> experiments;
   for (const data::Experiment& e : dataset.experiments)
     if (e.role == data::Role::fit) experiments.push_back(&e);

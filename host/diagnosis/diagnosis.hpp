@@ -7,6 +7,7 @@
 #include <vector>
 
 #include "host/data/dataset.hpp"
+#include "host/diagnosis/trends.hpp"
 #include "host/model/model.hpp"
 #include "host/regression/identify.hpp"
 
@@ -67,7 +68,8 @@ struct Diagnosis {
   std::optional<double> noise_floor;
   std::string noise_floor_from = "none";
   std::vector<Localised> localised;
-  std::vector<Candidate> candidates;  // best first
+  std::vector<Candidate> candidates;    // best first
+  std::vector<Trend> parameter_trends;  // of the model as it is
   std::vector<Localised> remaining_structure;
   std::vector<Disturbance> disturbances;
   std::vector<std::string> warnings;

@@ -85,7 +85,9 @@ void check_admissible(BalanceData& data, const Judged& base, Trial& trial) {
     if (judged.linear[j].term == added) {
       any_own = any_own || judged.own_share[static_cast<Eigen::Index>(j)] > kOwnShare;
       if (value < info.low || value > info.high)
-        refuse(fmt::format("its {} would be {:.3g} {}, which is not possible", info.name, value, info.unit.rotary));
+        refuse(fmt::format(
+            "its {} would be {:.3g} {}, which is not possible", info.name, value,
+            catalogue::unit_on(info.unit, data.prepared().rotary ? data::Axis::rotary : data::Axis::linear)));
       continue;
     }
     // Friction, inertia and stiffness have a sign; offsets and asymmetries may have any.

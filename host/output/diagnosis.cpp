@@ -2,8 +2,10 @@
 
 #include <fmt/format.h>
 
+#include <algorithm>
 #include <cmath>
 #include <nlohmann/json.hpp>
+#include <span>
 
 #include "host/catalogue/catalogue.hpp"
 #include "host/output/identification.hpp"
@@ -56,7 +58,8 @@ std::string evidence(const Diagnosis& d) {
 
 std::string shares(const std::vector<diagnosis::Localised>& parts) {
   std::vector<std::string> texts;
-  for (const diagnosis::Localised& part : parts)
+  // Signals go together in any motion; the first few say it all.
+  for (const diagnosis::Localised& part : std::span(parts).first(std::min<std::size_t>(3, parts.size())))
     texts.push_back(fmt::format("{} {:.1f} %", part.variable, part.share_percent));
   return listed(texts);
 }
@@ -135,6 +138,17 @@ json localised_json(const std::vector<diagnosis::Localised>& parts) {
   return list;
 }
 
+json trends_json(const std::vector<diagnosis::Trend>& trends) {
+  json list = json::array();
+  for (const diagnosis::Trend& t : trends)
+    list.push_back({{"id", t.id},
+                    {"parameter", t.parameter},
+                    {"over", t.over},
+                    {"slope", json_number(t.slope)},
+                    {"p_value", json_number(t.p_value)}});
+  return list;
+}
+
 json named_json(const std::vector<diagnosis::Named>& named) {
   json list = json::array();
   for (const diagnosis::Named& n : named) list.push_back({{"effect", n.effect}, {"order", json_number(n.order)}});
@@ -162,6 +176,7 @@ json candidate_json(const Candidate& c, std::size_t rank, const std::string& uni
           {"minimum_detectable", nullptr},
           {"admissible", c.admissible},
           {"why_not", c.admissible ? json(nullptr) : json(c.why_not)},
+          {"note", c.note.empty() ? json(nullptr) : json(c.note)},
           {"rivals", c.rivals},
           {"separating_experiment", text(&effects::Description::separated_by)},
           {"explanation", text(&effects::Description::explanation)}};
@@ -183,15 +198,19 @@ void print_diagnosis(Console& console, const Diagnosis& d, const std::string& ad
   if (!d.localised.empty()) console.line(wrapped(fmt::format("The error goes with {}.", shares(d.localised))));
   if (d.delay_s)
     console.line(
-        wrapped(fmt::format("The effort lags the motion by {:.3g} ms beyond the alignment: check the time "
-                            "stamps, or current_hold.",
-                            1e3 * *d.delay_s)));
+        wrapped(fmt::format("The effort {} the motion by {:.3g} ms beyond the alignment: check the time stamps, or "
+                            "current_hold.",
+                            *d.delay_s > 0.0 ? "lags" : "leads", 1e3 * std::abs(*d.delay_s))));
   for (const diagnosis::Named& named : d.named) print_named(console, d, named);
   if (!d.candidates.empty()) {
     console.line();
     console.line(candidate_table(d));
   }
-  if (!d.remaining_structure.empty())
+  for (const diagnosis::Trend& t : d.parameter_trends)
+    console.line(
+        wrapped(fmt::format("{}.{} differs between experiments with {}: the model lacks something that goes with it.",
+                            t.id, t.parameter, t.over)));
+  if (!d.named.empty() && !d.remaining_structure.empty())
     console.line(wrapped(fmt::format("With that added, the error still goes with {}.", shares(d.remaining_structure))));
   if (!d.disturbances.empty()) {
     Table table({"disturbance in", "from", "to", "peak"}, "lrrr");
@@ -226,7 +245,7 @@ json diagnosis_json(const Diagnosis& d) {
             {"unit", d.unit}}},
           {"localised", localised_json(d.localised)},
           {"candidates", std::move(candidates)},
-          {"parameter_trends", json::array()},
+          {"parameter_trends", trends_json(d.parameter_trends)},
           {"remaining_structure", localised_json(d.remaining_structure)},
           {"disturbances", std::move(disturbances)},
           {"delay_s", json_number(d.delay_s)},

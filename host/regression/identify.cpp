@@ -159,6 +159,37 @@ void warn_of_excitation(BalanceData& data, const BalanceFit& fit, const Terms& t
   }
 }
 
+// Fits a balance; a parameter whose best value is not possible (negative friction) is held at its bound and the others
+// are fitted again. Returns the fit and what was held, which is said in the warnings.
+std::pair<BalanceFit, std::vector<Slot>> fit_within_bounds(BalanceData& data, Terms& terms, data::Axis axis,
+                                                           std::vector<std::string>& warnings) {
+  std::vector<Slot> held;
+  for (;;) {
+    BalanceFit fit = fit_balance(data, terms);
+    const auto outside = std::find_if(fit.linear.begin(), fit.linear.end(), [&](const Slot& slot) {
+      const auto& info = terms[slot.term].entry->parameters[slot.parameter];
+      const double value = terms[slot.term].values[slot.parameter];
+      return value < info.low || value > info.high;
+    });
+    if (outside == fit.linear.end()) {
+      for (const Slot& slot : held) terms[slot.term].known[slot.parameter] = 0;
+      return {std::move(fit), std::move(held)};
+    }
+    Term& term = terms[outside->term];
+    const auto& info = term.entry->parameters[outside->parameter];
+    double& value = term.values[outside->parameter];
+    const double bound = value < info.low ? info.low : info.high;
+    const auto unit = catalogue::unit_on(info.unit, axis);
+    warnings.push_back(fmt::format(
+        "{}.{} would be {:.4g} {}, which is not possible; it is held at {:g}: the model lacks something, or has an "
+        "effect too many",
+        term.id, info.name, value, unit, bound));
+    value = bound;
+    term.known[outside->parameter] = 1;
+    held.push_back(*outside);
+  }
+}
+
 }  // namespace
 
 model::Drive reconcile(const model::Drive& drive, const data::Dataset& dataset, std::vector<std::string>& warnings) {
@@ -219,7 +250,8 @@ std::unique_ptr<Identification> identify(const data::Dataset& dataset, const mod
                             "no torque balance of the model can be formed from these columns",
                             "record current (or torque) and motor position together"}});
   for (BalanceData& data : result->data) {
-    result->fits.push_back(fit_balance(data, result->terms));
+    auto [bounded, held] = fit_within_bounds(data, result->terms, model.drive.axis, result->warnings);
+    result->fits.push_back(std::move(bounded));
     const BalanceFit& fit = result->fits.back();
     const std::size_t first = result->estimates.size();
     Eigen::Index at = 0;
@@ -238,6 +270,7 @@ std::unique_ptr<Identification> identify(const data::Dataset& dataset, const mod
       }
     fit_by_experiment(data, fit, result->terms, result->estimates, first);
     for (std::size_t j = first; j < result->estimates.size(); ++j) summarise(result->estimates[j]);
+    for (const Slot& slot : held) result->estimates.push_back(estimate_of(result->terms, slot, model.drive.axis));
     for (const std::size_t t : fit.on_balance) touched[t] = 1;
     result->condition_number = std::max(result->condition_number, fit.condition_number);
     warn_of_excitation(data, fit, result->terms, *result);

@@ -162,7 +162,7 @@ void choose_rows(Record& record, const Pipeline& pipeline, std::size_t settling)
       for (std::size_t k = 0; k < n; ++k) {
         const double v = record.direction_variable(balance, k);
         const double before = k > 0 ? record.direction_variable(balance, k - 1) : v;
-        unsure[k] = std::abs(v) < visible || v * before < 0.0;
+        unsure[k] = std::abs(v) <= visible || v * before < 0.0;  // a position that stays is without noise, too
       }
       unsure = spread(unsure, reach);
     }

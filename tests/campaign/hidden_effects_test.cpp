@@ -6,7 +6,6 @@
 
 #include <algorithm>
 #include <atomic>
-#include <cstdlib>
 #include <map>
 #include <mutex>
 #include <thread>
@@ -22,6 +21,7 @@ struct Case {
   std::string hidden;  // empty: nothing is
   double scale = 1.0;
   std::uint64_t seed = 0;
+  std::string with;  // effects that the drive has besides, and the model knows
 };
 
 struct Outcome {
@@ -42,9 +42,8 @@ Outcome run(const Case& c) {
   Outcome outcome{c, "", false, 0.0, 0.0, "", ""};
   plant::PlantFile demo = plant::demo_plant();
   if (!c.hidden.empty()) plant::hide(demo.drive, c.hidden, c.scale);
-  if (const char* others = std::getenv("FLEXSPLINE_WITH"))
-    for (const std::string_view name : catalogue::split_names(others))
-      if (c.hidden.find(name) == std::string::npos) plant::with(demo.drive, name);
+  for (const std::string_view name : catalogue::split_names(c.with))
+    if (name != c.hidden) plant::with(demo.drive, name);
   const auto records = plant::record_all(demo.drive, demo.experiments, c.seed);
   const data::Dataset dataset = testing::dataset_of(demo.drive, records);
   const model::Model base = testing::model_of(demo.drive, false, false);
@@ -61,8 +60,7 @@ Outcome run(const Case& c) {
     return outcome;
   }
   const std::string truth = c.hidden == "torque_ripple" ? "torque_ripple:2" : c.hidden;
-  outcome.right =
-      std::any_of(d.named.begin(), d.named.end(), [&](const auto& n) { return label(n.effect, n.order) == truth; });
+  outcome.right = outcome.named == truth;
   // The floor: the residual of the true model with its true parameters, through the same pipeline.
   const diagnosis::Addition added = diagnosis::add(dataset, base, truth, {});
   const model::Model true_model = testing::model_of(demo.drive, true, true);
@@ -114,15 +112,15 @@ void print(const std::vector<Outcome>& outcomes) {
 // Seeds below 1000 were looked at while the diagnosis was written; these judge it.
 constexpr std::uint64_t kFirstSeed = 7001;
 
-std::vector<Case> cases_at(double scale) {
+std::vector<Case> cases_at(double scale, std::uint64_t seeds, const std::string& with = {}) {
   std::vector<Case> cases;
   for (const std::string& hidden : kHidden)
-    for (std::uint64_t s = 0; s < 3; ++s) cases.push_back({hidden, scale, kFirstSeed + 100 * s});
+    for (std::uint64_t s = 0; s < seeds; ++s) cases.push_back({hidden, scale, kFirstSeed + 100 * s, with});
   return cases;
 }
 
 TEST(HiddenEffects, AreNamedAtUsualSizeAndAddingThemReachesTheFloor) {
-  const auto outcomes = run_all(cases_at(1.0));
+  const auto outcomes = run_all(cases_at(1.0, 3));
   print(outcomes);
   for (const Outcome& o : outcomes) {
     EXPECT_TRUE(o.right) << o.what.hidden << " seed " << o.what.seed << ": named " << o.named << ";" << o.detail;
@@ -130,8 +128,18 @@ TEST(HiddenEffects, AreNamedAtUsualSizeAndAddingThemReachesTheFloor) {
   }
 }
 
+TEST(HiddenEffects, AreNamedOnADriveThatHasMostOtherEffectsToo) {
+  const auto outcomes = run_all(
+      cases_at(1.0, 1, "stribeck_gaussian,load_dependent_friction,gravity,torque_ripple:2,temperature_viscous"));
+  print(outcomes);
+  for (const Outcome& o : outcomes) {
+    EXPECT_TRUE(o.right) << o.what.hidden << ": named " << o.named << ";" << o.detail;
+    EXPECT_LE(o.holdout_over_floor, 1.1) << o.what.hidden;
+  }
+}
+
 TEST(HiddenEffects, AreNamedAtAFifthOfTheirSizeInNineOfTenDrives) {
-  const auto outcomes = run_all(cases_at(0.2));
+  const auto outcomes = run_all(cases_at(0.2, 3));
   print(outcomes);
   const auto right = std::count_if(outcomes.begin(), outcomes.end(), [](const Outcome& o) { return o.right; });
   EXPECT_GE(right, static_cast<std::ptrdiff_t>(std::ceil(0.9 * static_cast<double>(outcomes.size()))));
@@ -139,7 +147,7 @@ TEST(HiddenEffects, AreNamedAtAFifthOfTheirSizeInNineOfTenDrives) {
 
 TEST(HiddenEffects, NothingIsNamedWhereNothingIsHidden) {
   std::vector<Case> cases;
-  for (std::uint64_t s = 0; s < 60; ++s) cases.push_back({"", 1.0, kFirstSeed + 1000 + s});
+  for (std::uint64_t s = 0; s < 60; ++s) cases.push_back({"", 1.0, kFirstSeed + 1000 + s, ""});
   const auto outcomes = run_all(cases);
   print(outcomes);
   const auto false_names = std::count_if(outcomes.begin(), outcomes.end(), [](const Outcome& o) { return !o.right; });

@@ -5,34 +5,11 @@
 #include <vector>
 
 #include "hil/plant/physics.hpp"
-#include "hil/plant/recorder.hpp"
-#include "host/catalogue/constants.hpp"
-#include "host/data/dataset.hpp"
-#include "host/model/model.hpp"
+#include "tests/support/twin_data.hpp"
 
 namespace flexspline::comparison {
 
-inline data::Experiment experiment_of(const plant::Record& r, const plant::Drive& drive) {
-  using data::Column;
-  data::Experiment e;
-  e.name = r.name;
-  e.role = r.holdout ? data::Role::holdout : data::Role::fit;
-  e.load = r.locked ? data::Load::locked : data::Load::free;
-  e.sample_s = drive.sample_s;
-  e.time_s = r.time_s;
-  e.segments = {{0, r.time_s.size()}};
-  e[Column::current] = r.current_a;
-  e[Column::motor_position] = r.motor_position_rad;
-  e[Column::output_position] = r.output_position_rad;
-  e[Column::torque] = r.torque_nm;
-  e[Column::temperature] = r.temperature_c;
-  e.noise_std[static_cast<std::size_t>(Column::current)] = r.current_noise_std;
-  e.noise_std[static_cast<std::size_t>(Column::torque)] = r.torque_noise_std;
-  e.encoder_counts = drive.sensors.motor_counts;
-  e.output_encoder_counts = drive.sensors.output_counts;
-  e.motor_position_zero = e.output_position_zero = data::PositionZero::absolute;
-  return e;
-}
+using testing::experiment_of;
 
 // The same as sensors without noise and with any resolution would have seen it.
 inline data::Experiment noiseless_experiment_of(plant::Record r, const plant::Drive& drive) {
@@ -67,22 +44,7 @@ inline data::Dataset record(const plant::Drive& drive, const std::vector<plant::
 }
 
 // All effects that are present and not hidden, with their true values.
-inline model::Model known_model(const plant::Drive& drive) {
-  model::Model m;
-  m.name = drive.name;
-  m.drive.gear_ratio.value = drive.gear_ratio;
-  m.drive.torque_constant_nm_a.value = drive.torque_constant_nm_a;
-  m.drive.rated_velocity_rad_s.value = drive.rated_velocity_rad_s;
-  m.drive.rated_torque_nm.value = drive.rated_torque_nm;
-  m.drive.temperature_reference_c.value = drive.temperature_reference_c;
-  for (const plant::Effect& effect : drive.effects) {
-    if (!effect.present || effect.hidden) continue;
-    model::Effect known = catalogue::blank_effect(catalogue::get(effect.type), data::Axis::rotary);
-    for (const plant::Parameter& p : effect.parameters) known.find(p.key)->value = p.value;
-    m.effects.push_back(known);
-  }
-  return m;
-}
+inline model::Model known_model(const plant::Drive& drive) { return testing::model_of(drive, false, true); }
 
 inline std::vector<const data::Experiment*> pointers(const data::Dataset& dataset) {
   std::vector<const data::Experiment*> all;

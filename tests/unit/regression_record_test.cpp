@@ -81,7 +81,7 @@ TEST(PreparedRecord, MaskReachesOneAndAHalfPeriodsOfTheCutOffToEachSideOfARevers
     const Record r = prepared(e, {cutoff_hz, true});
     const double row_s = kSample * static_cast<double>(r.decimation);
     EXPECT_GE(widest_gap(r), 3.0 / cutoff_hz - 2.0 * kSample) << cutoff_hz;
-    EXPECT_LE(widest_gap(r), 3.0 / cutoff_hz + 2.0 * row_s) << cutoff_hz;
+    EXPECT_LE(widest_gap(r), 3.0 / cutoff_hz + 2.0 * row_s + 3.0 * kSample) << cutoff_hz;
     // Reversals at a quarter and three quarters of each of five periods.
     const auto masked = static_cast<double>(r.rows[index(Balance::motor)].masked);
     EXPECT_NEAR(masked * row_s, 10.0 * 3.0 / cutoff_hz, 10.0 * row_s) << cutoff_hz;
@@ -106,10 +106,12 @@ TEST(PreparedRecord, MaskGrowsWithTheResolutionOfTheEncoderByItsNoiseInTheVeloci
     const double noise = r.velocity_noise[index(Balance::motor)];
     EXPECT_NEAR(noise / (quantum / std::sqrt(12.0) * std::sqrt(power)), 1.0, 0.2) << quantum;
     for (const std::size_t k : motor_rows(r)) EXPECT_GE(r.inputs[k].speed, 3.0 * noise);
-    // Speed is below three times the noise for |t| < 3 noise / acceleration, and the reach comes on top.
+    // Speed is below three times the noise for |t| < 3 noise / acceleration, and the reach comes on top. Noise makes
+    // single samples stand below the limit until speed is about twice that.
     const double slow = 2.0 * 3.0 * noise / (kPi * kPi);
     EXPECT_GT(widest_gap(r), before) << quantum;
-    EXPECT_NEAR(widest_gap(r), 3.0 / kCutoff + slow, 0.02 + 0.25 * slow) << quantum;
+    EXPECT_GE(widest_gap(r), 3.0 / kCutoff + 0.5 * slow) << quantum;
+    EXPECT_LE(widest_gap(r), 3.0 / kCutoff + 2.0 * slow + 0.02) << quantum;
     before = widest_gap(r);
   }
 }

@@ -1,0 +1,106 @@
+#include "host/diagnosis/trends.hpp"
+
+#include <algorithm>
+#include <boost/math/distributions/students_t.hpp>
+#include <cmath>
+#include <numeric>
+#include <optional>
+
+namespace flexspline::diagnosis {
+namespace {
+
+constexpr std::size_t kFewest = 6;
+constexpr double kCertain = 1e-3;
+constexpr double kMatters = 0.03;
+
+struct Setting {
+  const char* name;
+  bool is_scale;  // compared by its logarithm
+  std::vector<std::optional<double>> by_record;
+};
+
+std::vector<Setting> settings_of(const regression::Prepared& prepared) {
+  std::vector<Setting> settings{{"speed", true, {}},
+                                {"frequency", true, {}},
+                                {"temperature", false, {}},
+                                {"order in time", false, {}},
+                                {"torque", true, {}}};
+  double order = 0.0;
+  for (const regression::Record& r : prepared.records) {
+    double speed = 0.0, acceleration = 0.0, temperature = 0.0, torque = 0.0;
+    for (const auto& in : r.inputs) {
+      speed += in.velocity * in.velocity;
+      acceleration += in.acceleration * in.acceleration;
+      temperature += in.temperature;
+      torque += in.torque_magnitude;
+    }
+    const auto n = static_cast<double>(r.inputs.size());
+    const bool moves = !r.at_rest && speed > 0.0;
+    const auto known = [&](bool is, double value) { return is && moves ? std::optional(value) : std::nullopt; };
+    settings[0].by_record.push_back(known(true, std::sqrt(speed / n)));
+    settings[1].by_record.push_back(known(true, moves ? std::sqrt(acceleration / speed) : 0.0));
+    settings[2].by_record.push_back(known(r.has_temperature, temperature / n));
+    settings[3].by_record.push_back(known(true, order++));
+    settings[4].by_record.push_back(known(!r.torque.empty() && torque > 0.0, torque / n));
+  }
+  return settings;
+}
+
+// Slope of y over x with its two-sided p-value; nothing without spread in x.
+struct Line {
+  double slope, p_value;
+};
+std::optional<Line> fit_line(const std::vector<double>& x, const std::vector<double>& y) {
+  const auto n = static_cast<double>(x.size());
+  const double mean_x = std::accumulate(x.begin(), x.end(), 0.0) / n,
+               mean_y = std::accumulate(y.begin(), y.end(), 0.0) / n;
+  double xx = 0.0, xy = 0.0, yy = 0.0;
+  for (std::size_t k = 0; k < x.size(); ++k) {
+    xx += (x[k] - mean_x) * (x[k] - mean_x);
+    xy += (x[k] - mean_x) * (y[k] - mean_y);
+    yy += (y[k] - mean_y) * (y[k] - mean_y);
+  }
+  if (!(xx > 1e-12 * (1.0 + mean_x * mean_x)) || x.size() < 3) return std::nullopt;
+  const double slope = xy / xx;
+  const double variance = std::max(yy - slope * xy, 1e-12 * yy) / (n - 2.0) / xx;
+  if (!(variance > 0.0)) return std::nullopt;
+  const boost::math::students_t_distribution<double> t(n - 2.0);
+  return Line{slope, 2.0 * boost::math::cdf(boost::math::complement(t, std::abs(slope) / std::sqrt(variance)))};
+}
+
+}  // namespace
+
+std::vector<Trend> parameter_trends(const regression::Identification& identified) {
+  const auto& records = identified.prepared.records;
+  const std::vector<Setting> settings = settings_of(identified.prepared);
+  std::vector<Trend> trends;
+  double tried = 0.0;
+  for (const regression::Estimate& e : identified.estimates) {
+    if (catalogue::get(e.effect).parameters[e.slot.parameter].low != 0.0) continue;  // offsets have no relative change
+    for (const Setting& setting : settings) {
+      std::vector<double> x, y;
+      for (const auto& [name, value] : e.per_experiment) {
+        if (!value || *value <= 0.0) continue;
+        const auto at = std::find_if(records.begin(), records.end(), [&](const auto& r) { return r.name == name; });
+        if (at == records.end()) continue;
+        const auto& setting_value = setting.by_record[static_cast<std::size_t>(at - records.begin())];
+        if (!setting_value) continue;
+        x.push_back(setting.is_scale ? std::log(*setting_value) : *setting_value);
+        y.push_back(std::log(*value));
+      }
+      if (x.size() < kFewest) continue;
+      const auto line = fit_line(x, y);
+      if (!line) continue;
+      tried += 1.0;
+      const auto [low, high] = std::minmax_element(x.begin(), x.end());
+      if (std::abs(line->slope) * (*high - *low) < kMatters) continue;
+      trends.push_back({e.id, e.parameter, setting.name, line->slope, line->p_value});
+    }
+  }
+  for (Trend& t : trends) t.p_value = std::min(1.0, t.p_value * tried);
+  std::erase_if(trends, [](const Trend& t) { return t.p_value > kCertain; });
+  std::sort(trends.begin(), trends.end(), [](const Trend& a, const Trend& b) { return a.p_value < b.p_value; });
+  return trends;
+}
+
+}  // namespace flexspline::diagnosis

@@ -1,0 +1,24 @@
+// Parameters that differ between experiments along something: evidence of an effect that the model lacks.
+#pragma once
+
+#include <string>
+#include <vector>
+
+#include "host/regression/identify.hpp"
+
+namespace flexspline::diagnosis {
+
+struct Trend {
+  std::string id, parameter;
+  std::string over;    // "speed", "frequency", "temperature", "order in time", "torque"
+  double slope = 0.0;  // of the logarithm of the parameter by the logarithm of speed, frequency or torque (a power); by
+                       // 1 degC or by one record: share of the average
+  double p_value = 1.0;  // two-sided t-test, times the number of things tried
+};
+
+// Regresses the value of each parameter of physical sign by experiment on what its experiments differ in. Only trends
+// with a corrected p-value below 0.001 that move the parameter by more than 3 % over the records are returned, surest
+// first. Needs six experiments that tell the parameter; standing still counts as none.
+std::vector<Trend> parameter_trends(const regression::Identification& identified);
+
+}  // namespace flexspline::diagnosis
