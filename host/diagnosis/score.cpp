@@ -121,7 +121,8 @@ Judged judge(BalanceData& data, Terms terms, const Eigen::VectorXd& keep) {
   judged.own_share = fit.own_share;
   judged.residual = fit.residual;
   const Eigen::VectorXd weighted = judged.root_weights.cwiseProduct(fit.residual);
-  judged.autocorrelation_time = regression::autocorrelation_time(data.records(), weighted);
+  judged.autocorrelation_time =
+      std::max(regression::autocorrelation_time(data.records(), weighted), data.filter_autocorrelation_time());
   const double variance = weighted.squaredNorm() / std::max(1.0, static_cast<double>(data.rows() - X.cols()));
   judged.std = (fit.unit_covariance.diagonal() * variance * judged.autocorrelation_time).cwiseSqrt();
   // What the whole data do not determine, a part of them does still less.

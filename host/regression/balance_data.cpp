@@ -14,6 +14,7 @@ using effects::Phase;
 using numbers::Dual;
 using numbers::Jet;
 
+constexpr Eigen::Index kFewestRows = 16;
 constexpr std::size_t kCachedNumbers = 40'000'000;
 
 // Whether a shift or modulation reaches what a term computes.
@@ -125,7 +126,13 @@ BalanceData::BalanceData(const Prepared& prepared, Balance balance) : prepared_(
   for (std::size_t i = 0; i < prepared.records.size(); ++i) {
     const Record& r = prepared.records[i];
     const auto count = static_cast<Eigen::Index>(r.rows[index(balance)].samples.size());
-    if (!usable(r) || count < 16) continue;
+    if (!usable(r)) continue;
+    if (count < kFewestRows) {
+      left_out_.emplace(i, fmt::format("{} (of its {} rows {} are masked)", r.name,
+                                       r.rows[index(balance)].masked + static_cast<std::size_t>(count),
+                                       r.rows[index(balance)].masked));
+      continue;
+    }
     ranges_.push_back({i, first, first + count});
     filters_.emplace_back(signals::ZeroPhaseFilter::kDefaultOrder,
                           std::min(prepared.pipeline.row_cutoff_hz, 0.45 / r.sample_s), 1.0 / r.sample_s);
@@ -160,6 +167,23 @@ BalanceData::BalanceData(const Prepared& prepared, Balance balance) : prepared_(
       for (std::size_t k = 0; k < slope.size(); ++k) part[k] = -slope[k];
     }
   });
+}
+
+double BalanceData::filter_autocorrelation_time() const {
+  double longest = 1.0;
+  for (std::size_t i = 0; i < ranges_.size(); ++i) {
+    const Record& r = prepared_->records[ranges_[i].record];
+    const double row_hz = 1.0 / (r.sample_s * static_cast<double>(r.decimation));
+    constexpr int kSteps = 200;
+    const double top_hz = std::min(3.0 * filters_[i].cutoff_hz(), 0.5 / r.sample_s);
+    double bandwidth_hz = 0.0;
+    for (int k = 0; k < kSteps; ++k) {
+      const double gain = filters_[i].gain((k + 0.5) / kSteps * top_hz);
+      bandwidth_hz += gain * gain * top_hz / kSteps;
+    }
+    longest = std::max(longest, row_hz / (2.0 * bandwidth_hz));
+  }
+  return longest;
 }
 
 std::vector<std::vector<RowRange>> BalanceData::folds(std::size_t parts) const {

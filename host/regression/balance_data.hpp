@@ -3,6 +3,7 @@
 #pragma once
 
 #include <Eigen/Core>
+#include <map>
 #include <string>
 #include <unordered_map>
 
@@ -50,10 +51,15 @@ class BalanceData {
   // Torque of one term at its values, all parameters in, filtered.
   Eigen::VectorXd term_torque(const Terms& terms, std::size_t term);
 
-  // Filters a signal that is given along the samples of a range's record, in place.
-  void filter(const RowRange& range, std::vector<double>& signal) const;
+  // Rows that count as one for white noise, because the row filter correlates neighbours: row rate over twice the
+  // filter's noise bandwidth. A short residual underestimates this.
+  double filter_autocorrelation_time() const;
+  // Records with too few rows to be used, by their index, with name and reason.
+  const std::map<std::size_t, std::string>& left_out() const { return left_out_; }
 
  private:
+  // Filters a signal that is given along the samples of a range's record, in place.
+  void filter(const RowRange& range, std::vector<double>& signal) const;
   bool usable(const Record& record) const;
   // The part of an effect that reaches this balance: its own, and by way of the gear where there is no torque sensor.
   double share(const Record& record, Balance of_effect) const;
@@ -67,6 +73,7 @@ class BalanceData {
   const Prepared* prepared_;
   Balance balance_;
   std::vector<RowRange> ranges_;
+  std::map<std::size_t, std::string> left_out_;
   Eigen::VectorXd target_;
   Eigen::VectorXd delay_;
   std::vector<signals::ZeroPhaseFilter> filters_;  // one a range

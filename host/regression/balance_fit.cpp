@@ -48,7 +48,8 @@ BalanceFit fit_balance(BalanceData& data, Terms& terms) {
   J << columns_of(data, terms, fit.linear), shape_columns(data, terms, fit.on_balance, fit.shapes);
   const LinearFit joint = least_squares(J, fit.residual, fit.root_weights);
   const Eigen::VectorXd weighted = fit.root_weights.cwiseProduct(fit.residual);
-  fit.autocorrelation_time = autocorrelation_time(data.records(), weighted);
+  fit.autocorrelation_time =
+      std::max(autocorrelation_time(data.records(), weighted), data.filter_autocorrelation_time());
   const double freedom = std::max(1.0, static_cast<double>(data.rows() - J.cols()));
   fit.covariance = joint.unit_covariance * (weighted.squaredNorm() / freedom * fit.autocorrelation_time);
   fit.own_share = joint.own_share;

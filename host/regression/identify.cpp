@@ -4,6 +4,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <map>
 
 #include "host/regression/least_squares.hpp"
 #include "host/regression/shapes.hpp"
@@ -238,17 +239,30 @@ std::unique_ptr<Identification> identify(const data::Dataset& dataset, const mod
   result->prepared = prepare(fit_on, result->model.drive, options);
   result->terms = terms_of(result->model);
   std::vector<std::uint8_t> touched(result->terms.size(), 0);
+  std::map<std::size_t, std::string> too_short;  // by record, of any balance
+  std::vector<std::uint8_t> used(result->prepared.records.size(), 0);
   for (const Balance balance : {Balance::motor, Balance::transmission, Balance::load}) {
     if (balance != Balance::motor && !result->prepared.torque_measured) continue;
     if (terms_on(result->terms, balance, result->prepared.torque_measured).empty()) continue;
     BalanceData data(result->prepared, balance);
+    too_short.insert(data.left_out().begin(), data.left_out().end());
     if (data.empty()) continue;
+    for (const RowRange& range : data.records()) used[range.record] = 1;
     result->data.push_back(std::move(data));
   }
+  // A record may show one balance and not another: free motion twists too little for the transmission's.
+  std::erase_if(too_short, [&](const auto& record) { return used[record.first] != 0; });
+  std::string list;
+  for (const auto& [record, what] : too_short) list += (list.empty() ? "" : ", ") + what;
+  if (result->data.empty() && !too_short.empty())
+    throw data::DataError({{data::Severity::error, "too_few_samples", "", 0, "",
+                            fmt::format("too few rows are left to fit on in {}", list),
+                            "record longer or faster motion, or raise --cutoff-hz, or give --mask none"}});
   if (result->data.empty())
     throw data::DataError({{data::Severity::error, "missing_column", "", 0, "",
                             "no torque balance of the model can be formed from these columns",
                             "record current (or torque) and motor position together"}});
+  if (!too_short.empty()) result->warnings.push_back(fmt::format("too few rows are left in {}; not used", list));
   for (BalanceData& data : result->data) {
     auto [bounded, held] = fit_within_bounds(data, result->terms, model.drive.axis, result->warnings);
     result->fits.push_back(std::move(bounded));
