@@ -160,7 +160,7 @@ TEST(FallOf, ATrueColumnGainsInProportionToTheLengthOfTheRecord) {
     }
     return sum / 8.0;
   };
-  const double once = gain(4.0), twice = gain(8.0);
+  const double once = gain(8.0), twice = gain(16.0);
   EXPECT_GT(once, 20.0);
   EXPECT_NEAR(twice / once, 2.0, 0.4);
 }
