@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <array>
+#include <cmath>
 #include <stdexcept>
 
 #include "shared/effects/list.hpp"
@@ -25,10 +26,44 @@ typename N::Sum on_balance(const Torques<N>& torques, Balance balance) {
   return torques.motor;
 }
 
+template <class E>
+constexpr bool kAddsTorque = requires(typename E::template State<Real> state,
+                                      typename E::template Coefficients<Real> coefficients, Inputs<Real> inputs,
+                                      Torques<Real> torques) {
+  E::evaluate(state, coefficients, inputs, torques);
+};
+
+constexpr std::size_t position_of(std::span<const effects::ParameterInfo> parameters, std::string_view name) {
+  std::size_t at = 0;
+  while (at < parameters.size() && parameters[at].name != name) ++at;
+  return at;
+}
+
+// Coefficients divide by lengths and by what others are stated per. A parameter of nought that has none of these (an
+// effect that is switched off, a search that has not begun) gets the smallest value that leaves the others finite.
+template <class E, class N>
+auto coefficients_of(const typename N::Parameter* parameters, const DriveConstants<typename N::Parameter>& drive) {
+  using P = typename N::Parameter;
+  constexpr std::span<const effects::ParameterInfo> kInfos = E::kParameters;
+  std::array<P, kInfos.size()> values;
+  std::copy(parameters, parameters + kInfos.size(), values.begin());
+  for (const auto& info : kInfos) {
+    if (info.per.empty()) continue;
+    P& per = values[position_of(kInfos, info.per)];
+    if (per == P(0.0)) per = P(1e-30);
+  }
+  for (std::size_t p = 0; p < values.size(); ++p) {
+    if (!(kInfos[p].low > 0.0) || values[p] != P(0.0)) continue;
+    values[p] = P(kInfos[p].low);
+    if (!kInfos[p].per.empty()) values[p] = values[p] * values[position_of(kInfos, kInfos[p].per)];
+  }
+  return E::template derive<N>(values.data(), drive);
+}
+
 template <class E, class N>
 void torque_along(const typename N::Parameter* parameters, const DriveConstants<typename N::Parameter>& drive,
                   Balance balance, std::span<const Inputs<N>> inputs, typename N::Value* torque) {
-  const auto coefficients = E::template derive<N>(parameters, drive);
+  const auto coefficients = coefficients_of<E, N>(parameters, drive);
   typename E::template State<N> state{};
   for (std::size_t k = 0; k < inputs.size(); ++k) {
     if (k > 0) E::advance(state, coefficients, inputs[k], inputs[k - 1]);
@@ -39,9 +74,25 @@ void torque_along(const typename N::Parameter* parameters, const DriveConstants<
 }
 
 template <class E, class N>
+void torque_along_plain(const typename N::Parameter* parameters, const DriveConstants<typename N::Parameter>& drive,
+                        Balance balance, std::span<const Inputs<Real>> inputs, typename N::Value* torque) {
+  const auto coefficients = coefficients_of<E, N>(parameters, drive);
+  typename E::template State<N> state{};
+  Inputs<N> before;
+  for (std::size_t k = 0; k < inputs.size(); ++k) {
+    const Inputs<N> now = lifted<N>(inputs[k]);
+    if (k > 0) E::advance(state, coefficients, now, before);
+    Torques<N> sums{};
+    E::evaluate(state, coefficients, now, sums);
+    torque[k] += on_balance(sums, balance);
+    before = now;
+  }
+}
+
+template <class E, class N>
 void change_along(const typename N::Parameter* parameters, const DriveConstants<typename N::Parameter>& drive,
                   std::span<Inputs<N>> inputs) {
-  const auto coefficients = E::template derive<N>(parameters, drive);
+  const auto coefficients = coefficients_of<E, N>(parameters, drive);
   for (Inputs<N>& in : inputs) {
     if constexpr (E::kInfo.phase == Phase::shift)
       E::shift(coefficients, in);
@@ -54,7 +105,7 @@ template <class E>
 class InstanceOf final : public Instance {
  public:
   InstanceOf(const double* parameters, const DriveConstants<double>& drive)
-      : coefficients_(E::template derive<Real>(parameters, drive)) {}
+      : coefficients_(coefficients_of<E, Real>(parameters, drive)) {}
 
   void shift(Inputs<Real>& in) const override {
     if constexpr (E::kInfo.phase == Phase::shift) E::shift(coefficients_, in);
@@ -63,17 +114,17 @@ class InstanceOf final : public Instance {
     if constexpr (E::kInfo.phase == Phase::modulate) E::modulate(coefficients_, in);
   }
   void evaluate(const Inputs<Real>& in, Torques<Real>& out) const override {
-    if constexpr (E::kInfo.phase == Phase::source) E::evaluate(state_, coefficients_, in, out);
+    if constexpr (kAddsTorque<E>) E::evaluate(state_, coefficients_, in, out);
   }
   void evaluate_ahead(const Inputs<Real>& now, const Inputs<Real>& before, Torques<Real>& out) const override {
-    if constexpr (E::kInfo.phase == Phase::source) {
+    if constexpr (kAddsTorque<E>) {
       auto state = state_;
       E::advance(state, coefficients_, now, before);
       E::evaluate(state, coefficients_, now, out);
     }
   }
   void advance(const Inputs<Real>& now, const Inputs<Real>& before) override {
-    if constexpr (E::kInfo.phase == Phase::source) E::advance(state_, coefficients_, now, before);
+    if constexpr (kAddsTorque<E>) E::advance(state_, coefficients_, now, before);
   }
 
  private:
@@ -84,10 +135,11 @@ class InstanceOf final : public Instance {
 template <class E, class N>
 Along<N> along() {
   Along<N> functions;
-  if constexpr (E::kInfo.phase == Phase::source)
+  if constexpr (kAddsTorque<E>) {
     functions.torque = &torque_along<E, N>;
-  else
-    functions.change = &change_along<E, N>;
+    functions.torque_of_plain = &torque_along_plain<E, N>;
+  }
+  if constexpr (E::kInfo.phase != Phase::source) functions.change = &change_along<E, N>;
   return functions;
 }
 
@@ -125,6 +177,34 @@ std::size_t Entry::index_of(std::string_view parameter) const {
 std::size_t Entry::count(Kind kind) const {
   return static_cast<std::size_t>(
       std::count_if(parameters.begin(), parameters.end(), [&](const auto& p) { return p.kind == kind; }));
+}
+
+template <class P>
+std::vector<P> natural(const Entry& entry, const std::vector<P>& reduced) {
+  using std::pow;
+  std::vector<P> values = reduced;
+  // What is stated per another comes after it: first roots, then ratios to what is neither.
+  for (std::size_t p = 0; p < values.size(); ++p)
+    if (const auto root = entry.parameters[p].root_of; !root.empty())
+      values[p] = pow(reduced[p], reduced[entry.index_of(root)]);
+  for (std::size_t p = 0; p < values.size(); ++p)
+    if (const auto per = entry.parameters[p].per; !per.empty()) values[p] = values[p] * values[entry.index_of(per)];
+  return values;
+}
+template std::vector<double> natural(const Entry&, const std::vector<double>&);
+template std::vector<numbers::Jet> natural(const Entry&, const std::vector<numbers::Jet>&);
+
+std::vector<double> reduced(const Entry& entry, const std::vector<double>& natural) {
+  std::vector<double> values = natural;
+  for (std::size_t p = 0; p < values.size(); ++p)
+    if (const auto per = entry.parameters[p].per; !per.empty()) {
+      const double unit = natural[entry.index_of(per)];
+      values[p] = unit != 0.0 ? natural[p] / unit : 0.0;
+    }
+  for (std::size_t p = 0; p < values.size(); ++p)
+    if (const auto root = entry.parameters[p].root_of; !root.empty())
+      values[p] = std::pow(std::max(values[p], 0.0), 1.0 / natural[entry.index_of(root)]);
+  return values;
 }
 
 std::span<const Entry> all() {

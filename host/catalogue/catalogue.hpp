@@ -39,10 +39,13 @@ class Instance {
 template <class N>
 struct Along {
   using Parameter = typename N::Parameter;
-  // Adds the effect's torque on `balance` at each sample of `inputs` to `torque` (N m), same length. Null for shifts
-  // and modulations.
+  // Adds the effect's torque on `balance` at each sample of `inputs` to `torque` (N m), same length. Null where it adds
+  // to none, as most shifts and all modulations.
   void (*torque)(const Parameter* parameters, const DriveConstants<Parameter>& drive, Balance balance,
                  std::span<const effects::Inputs<N>> inputs, typename N::Value* torque) = nullptr;
+  // The same along plain inputs.
+  void (*torque_of_plain)(const Parameter* parameters, const DriveConstants<Parameter>& drive, Balance balance,
+                          std::span<const effects::Inputs<Real>> inputs, typename N::Value* torque) = nullptr;
   // Changes the inputs in place, as shifts and modulations do. Null for sources.
   void (*change)(const Parameter* parameters, const DriveConstants<Parameter>& drive,
                  std::span<effects::Inputs<N>> inputs) = nullptr;
@@ -61,7 +64,34 @@ struct Entry {
   // Position of a parameter, or parameters.size() if there is none of that name.
   std::size_t index_of(std::string_view parameter) const;
   std::size_t count(Kind kind) const;
+  bool adds_torque() const { return real.torque != nullptr; }
+  bool adds_to(Balance balance) const { return info->balance == balance || (info->adds_to & on(balance)) != 0; }
+  // The balance on which its parameters are estimated.
+  Balance told_by() const { return info->told_by_motor ? Balance::motor : info->balance; }
 };
+
+// Parameters as they are searched for (see effects::ParameterInfo), and back. Where a parameter that another is stated
+// per is nought, so is the reduced one.
+template <class P>
+std::vector<P> natural(const Entry& entry, const std::vector<P>& reduced);
+std::vector<double> reduced(const Entry& entry, const std::vector<double>& natural);
+
+// Inputs in number system N from plain ones.
+template <class N>
+effects::Inputs<N> lifted(const effects::Inputs<Real>& in) {
+  if constexpr (std::is_same_v<N, Real>) {
+    return in;
+  } else {
+    using S = typename N::Value;
+    return {S(in.angle),           S(in.velocity),         S(in.speed),
+            S(in.direction),       S(in.acceleration),     S(in.output_angle),
+            S(in.output_velocity), S(in.output_direction), S(in.output_acceleration),
+            S(in.torsion),         S(in.torsion_rate),     S(in.torsion_direction),
+            S(in.torque),          S(in.torque_magnitude), S(in.current),
+            S(in.temperature),     S(in.viscous_scale),    S(in.coulomb_scale),
+            S(in.elapsed)};
+  }
+}
 
 // All effects, by rising number.
 std::span<const Entry> all();

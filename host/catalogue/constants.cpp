@@ -10,9 +10,14 @@ class CatalogueEffects final : public model::KnownEffects {
   CatalogueEffects() {
     for (const Entry& entry : all()) {
       model::KnownEffect known{entry.name(), {}};
-      for (const auto& p : entry.parameters)
+      for (const auto& p : entry.parameters) {
+        // Bounds of a ratio or a root say only the sign of the parameter itself.
+        const bool own = p.per.empty() && p.root_of.empty();
+        const double low = own ? p.low : p.low >= 0.0 ? 0.0 : -effects::kUnbounded;
+        const double high = own ? p.high : effects::kUnbounded;
         known.parameters.push_back(
-            {p.name, std::string(p.unit.rotary), std::string(p.unit.linear), p.low, p.high, p.kind == Kind::given});
+            {p.name, std::string(p.unit.rotary), std::string(p.unit.linear), low, high, p.kind == Kind::given});
+      }
       effects_.push_back(std::move(known));
     }
   }

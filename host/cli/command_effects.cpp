@@ -21,6 +21,8 @@ std::string kind_name(effects::Kind kind) {
       return "linear";
     case effects::Kind::shape:
       return "shape";
+    case effects::Kind::grid:
+      return "grid";
     case effects::Kind::given:
       return "given";
   }
@@ -88,7 +90,9 @@ void describe(const Entry& entry, Console& console) {
   for (const effects::ParameterInfo& p : entry.parameters) {
     const char* how = p.kind == effects::Kind::linear  ? "estimated"
                       : p.kind == effects::Kind::shape ? "estimated, a shape: searched for"
-                                                       : "stated by you";
+                      : p.kind == effects::Kind::grid
+                          ? "set from the range of the data where the model does not state it"
+                          : "stated by you";
     table.row(
         {std::string(p.name), std::string(p.unit.rotary), std::string(p.unit.linear), how, output::number(p.usual)});
   }

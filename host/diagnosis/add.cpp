@@ -153,7 +153,7 @@ Addition add(const data::Dataset& dataset, const model::Model& model, std::strin
     for (std::size_t p = 0; p < added.parameters.size(); ++p)
       if (name.entry->parameters[p].kind == effects::Kind::given) added.parameters[p].value = name.order;
   after.effects.push_back(std::move(added));
-  return compare_models(dataset, model, after, name.entry->info->balance, std::string(effect), "add", options);
+  return compare_models(dataset, model, after, name.entry->told_by(), std::string(effect), "add", options);
 }
 
 Addition remove(const data::Dataset& dataset, const model::Model& model, std::string_view id,
@@ -178,7 +178,7 @@ Addition remove(const data::Dataset& dataset, const model::Model& model, std::st
       throw model::ModelError(fmt::format("{} scales {}; remove {} first", e.id, out, e.id));
   model::Model after = model;
   std::erase_if(after.effects, [&](const model::Effect& e) { return e.id == out; });
-  return compare_models(dataset, model, after, entry.info->balance, out, "remove", options);
+  return compare_models(dataset, model, after, entry.told_by(), out, "remove", options);
 }
 
 }  // namespace flexspline::diagnosis

@@ -2,7 +2,10 @@
 
 #include <fmt/format.h>
 
+#include <Eigen/QR>
+
 #include <algorithm>
+#include <cmath>
 
 #include "host/regression/shapes.hpp"
 
@@ -29,18 +32,45 @@ bool replaced_in(const Terms& terms, const catalogue::Entry& entry) {
   return std::any_of(names.begin(), names.end(), [&](std::string_view n) { return has(terms, n); });
 }
 
+// The model has the effect, or one that takes its place.
+bool stands_in(const Terms& terms, std::string_view name) {
+  return has(terms, name) || std::any_of(terms.begin(), terms.end(), [&](const Term& t) {
+           return catalogue::names_contain(t.entry->info->replaces, name);
+         });
+}
+
+// All torques of the motor balance could be scaled alike, unless one of them is known: a parameter that the user gave,
+// or the torque of a loaded sensor.
+bool knows_torque_scale(const BalanceData& data, const Terms& terms) {
+  for (const Term& t : terms)
+    for (std::size_t p = 0; p < t.known.size(); ++p)
+      if (t.known[p] && t.entry->parameters[p].kind == Kind::linear && t.values[p] != 0.0) return true;
+  if (!data.prepared().torque_measured) return false;
+  constexpr double kLoaded = 0.1;  // of the motor's torque
+  double sensor = 0.0, effort = 0.0;
+  for (const auto& range : data.records()) {
+    const regression::Record& r = data.prepared().records[range.record];
+    for (std::size_t k = 0; k < r.inputs.size() && !r.effort.empty(); ++k) {
+      sensor += r.inputs[k].torque * r.inputs[k].torque;
+      effort += r.effort[k] * r.effort[k];
+    }
+  }
+  return std::sqrt(sensor) > kLoaded * data.prepared().constants.gear_ratio * std::sqrt(effort);
+}
+
 // Something in the model already stands in for this effect.
 bool covered(const Terms& terms, const catalogue::Entry& entry) {
   return std::any_of(terms.begin(), terms.end(),
                      [&](const Term& t) { return catalogue::names_contain(t.entry->info->replaces, entry.name()); });
 }
 
-bool visible(const BalanceData& data, const catalogue::Entry& entry) {
+bool visible(const BalanceData& data, const Terms& terms, const catalogue::Entry& entry) {
   const unsigned reads = entry.info->reads;
   const regression::Prepared& p = data.prepared();
   if ((reads & effects::kTorque) && !p.torque_measured) return false;
   if ((reads & effects::kCurrent) && !p.effort_is_current) return false;
   if ((reads & effects::kTorqueInput) && p.effort_is_current) return false;
+  if ((reads & effects::kTorqueScale) && !knows_torque_scale(data, terms)) return false;
   const auto any = [&](auto what) {
     return std::any_of(data.records().begin(), data.records().end(),
                        [&](const regression::RowRange& range) { return what(p.records[range.record]); });
@@ -65,6 +95,48 @@ bool visible(const BalanceData& data, const catalogue::Entry& entry) {
   return true;
 }
 
+// Orders of an effect that the residual holds most of, by its waves at the rows alone: without the filter, which costs
+// far more than it could change in the ranking of neighbours.
+std::vector<double> likely_orders(const BalanceData& data, const catalogue::Entry& entry,
+                                  const Eigen::VectorXd& residual) {
+  constexpr std::size_t kTried = 3;
+  std::vector<std::pair<double, double>> found;  // minus the fall, order
+  std::vector<effects::Inputs<catalogue::Real>> rows;
+  for (const auto& range : data.records()) {
+    const regression::Record& r = data.prepared().records[range.record];
+    for (const std::size_t k : r.rows[regression::index(data.balance())].samples) rows.push_back(r.inputs[k]);
+  }
+  const std::size_t given = static_cast<std::size_t>(std::find_if(entry.parameters.begin(), entry.parameters.end(),
+                                                                  [](const auto& p) { return p.kind == Kind::given; }) -
+                                                     entry.parameters.begin());
+  for (int order = 1; order <= kHighestOrder; ++order) {
+    Eigen::MatrixXd waves(residual.size(), 0);
+    for (std::size_t p = 0; p < entry.parameters.size(); ++p) {
+      if (p == given) continue;
+      std::vector<double> values(entry.parameters.size(), 0.0), wave(rows.size(), 0.0);
+      values[given] = order;
+      values[p] = 1.0;
+      if (entry.info->phase == Phase::shift) {
+        // What it does to the torsion, a stiffness makes a torque of.
+        auto shifted = rows;
+        entry.real.change(values.data(), data.prepared().constants, shifted);
+        for (std::size_t k = 0; k < rows.size(); ++k) wave[k] = shifted[k].torsion - rows[k].torsion;
+      } else {
+        entry.real.torque(values.data(), data.prepared().constants, data.balance(), rows, wave.data());
+      }
+      waves.conservativeResize(Eigen::NoChange, waves.cols() + 1);
+      waves.rightCols(1) = Eigen::Map<const Eigen::VectorXd>(wave.data(), residual.size());
+    }
+    const Eigen::VectorXd explained = waves * Eigen::ColPivHouseholderQR<Eigen::MatrixXd>(waves).solve(residual);
+    found.emplace_back(-explained.squaredNorm(), order);
+  }
+  std::sort(found.begin(), found.end());
+  std::vector<double> orders;
+  for (std::size_t i = 0; i < kTried; ++i) orders.push_back(found[i].second);
+  std::sort(orders.begin(), orders.end());
+  return orders;
+}
+
 std::size_t free_count(const Terms& terms) {
   std::size_t count = 0;
   for (const Term& t : terms)
@@ -79,7 +151,7 @@ Terms extend(const Terms& terms, const catalogue::Entry& entry, std::optional<do
   for (const Term& t : terms)
     if (t.entry->name() == entry.name() && (!ordered || t.label() == regression::candidate_term(entry, order).label()))
       throw model::ModelError(fmt::format("the model has {} already; remove it first, or identify again", t.label()));
-  if (!entry.info->modulates.empty() && !has(terms, entry.info->modulates))
+  if (!entry.info->modulates.empty() && !stands_in(terms, entry.info->modulates))
     throw model::ModelError(fmt::format("{} scales {}, which the model does not have; add that first", entry.name(),
                                         entry.info->modulates));
   Terms extended;
@@ -92,20 +164,26 @@ Terms extend(const Terms& terms, const catalogue::Entry& entry, std::optional<do
   return extended;
 }
 
-std::vector<Proposal> proposals(const BalanceData& data, const Terms& terms) {
+bool begins_at_nought(const Term& term, std::size_t p) {
+  const auto& info = term.entry->parameters[p];
+  return info.low < 0.0 && info.per.empty() && term.entry->info->phase != Phase::modulate;
+}
+
+std::vector<Proposal> proposals(const BalanceData& data, const Terms& terms, const Eigen::VectorXd& residual) {
   std::vector<Proposal> list;
   const bool collapsed = !data.prepared().torque_measured && data.balance() == regression::Balance::motor;
   for (const catalogue::Entry& entry : catalogue::all()) {
-    if (entry.info->balance != data.balance() && !collapsed) continue;
-    if (!visible(data, entry) || covered(terms, entry)) continue;
+    if (entry.told_by() != data.balance() && !collapsed) continue;
+    if (!visible(data, terms, entry) || covered(terms, entry)) continue;
     if (!entry.info->replaces.empty() && !replaced_in(terms, entry)) continue;
-    if (!entry.info->modulates.empty() && !has(terms, entry.info->modulates)) continue;
+    if (!entry.info->modulates.empty() && !stands_in(terms, entry.info->modulates)) continue;
     const bool ordered = entry.count(Kind::given) > 0;
     if (!ordered && has(terms, entry.name())) continue;
     // Orders are counted by turn: a linear axis has turns where its pitch is known.
     const bool turns = data.prepared().rotary || data.prepared().constants.turn_angle_scale != 1.0;
     if (ordered && !turns) continue;
-    for (int order = 1; order <= (ordered ? kHighestOrder : 1); ++order) {
+    const std::vector<double> orders = ordered ? likely_orders(data, entry, residual) : std::vector<double>{0.0};
+    for (const double order : orders) {
       Proposal proposal;
       proposal.entry = &entry;
       if (ordered) proposal.order = order;
@@ -116,7 +194,9 @@ std::vector<Proposal> proposals(const BalanceData& data, const Terms& terms) {
       proposal.extended = extend(terms, entry, proposal.order);
       Term& added = proposal.extended.back();
       for (std::size_t p = 0; p < added.values.size(); ++p)
-        if (added.free_shape(p)) added.values[p] = regression::shape_range(data, added, p).at(0.5);
+        if (added.free_shape(p))
+          added.values[p] = begins_at_nought(added, p) ? 0.0 : regression::shape_range(data, added, p).at(0.5);
+      regression::settle_grids(data, proposal.extended, {proposal.extended.size() - 1});
       proposal.added = static_cast<double>(free_count(proposal.extended)) - static_cast<double>(free_count(terms));
       list.push_back(std::move(proposal));
     }

@@ -17,11 +17,17 @@ struct Proposal {
   double added = 0.0;          // parameters more than before
 };
 
-// All effects that may be added on this balance; shapes are in the middle of their range.
-std::vector<Proposal> proposals(const regression::BalanceData& data, const regression::Terms& terms);
+// All effects that may be added on this balance; shapes are in the middle of their range. Of an effect that comes in
+// orders per turn, those that the residual (one a row) shows most.
+std::vector<Proposal> proposals(const regression::BalanceData& data, const regression::Terms& terms,
+                                const Eigen::VectorXd& residual);
 
 // A model with an effect more. Throws model::ModelError where it cannot be (what it modulates or replaces is missing,
 // or it is there already).
 regression::Terms extend(const regression::Terms& terms, const catalogue::Entry& entry, std::optional<double> order);
+
+// Whether a shape of the candidate is all but linear about nought, so that its slope there tells what it could do and
+// no grid is needed: an angle or a ratio of either sign.
+bool begins_at_nought(const regression::Term& term, std::size_t parameter);
 
 }  // namespace flexspline::diagnosis

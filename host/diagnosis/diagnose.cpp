@@ -50,6 +50,7 @@ Candidate report(const Trial& trial, const Search& search, data::Axis axis) {
         "slowly with speed (see power_law_friction), and no Stribeck friction.";
   const std::size_t added = trial.judged.terms.size() - 1;
   const Term& term = trial.judged.terms[added];
+  const std::vector<double> natural = catalogue::natural(*term.entry, term.values);
   for (std::size_t p = 0; p < term.values.size(); ++p) {
     regression::Estimate e;
     e.slot = {added, p};
@@ -57,7 +58,7 @@ Candidate report(const Trial& trial, const Search& search, data::Axis axis) {
     e.effect = std::string(term.entry->name());
     e.parameter = std::string(term.entry->parameters[p].name);
     e.unit = std::string(catalogue::unit_on(term.entry->parameters[p].unit, axis));
-    e.value = term.values[p];
+    e.value = natural[p];
     e.fixed = term.known[p] != 0;
     if (const auto at = position(trial.judged, e.id, e.parameter)) {
       e.std = trial.judged.std[static_cast<Eigen::Index>(*at)];
@@ -131,7 +132,9 @@ std::string settle(Examined& chosen) {
 void name_effects(const Examined& chosen, const std::string& alias, Diagnosis& result) {
   const auto& list = chosen.trials;
   for (const Trial& t : list) {
-    const bool close = passes(t) && t.fall.score >= list.front().fall.score - kRivalMargin;
+    // A law with more parameters that leaves the same error is no rival of the simpler one: it can do no worse.
+    const bool wider = t.proposal.added > list.front().proposal.added;
+    const bool close = passes(t) && !wider && t.fall.score >= list.front().fall.score - kRivalMargin;
     if (close || t.proposal.entry->name() == alias)
       result.named.push_back({std::string(t.proposal.entry->name()), t.proposal.order});
   }

@@ -34,7 +34,7 @@ double in_sample(BalanceData& data, const Terms& terms, const Judged& base) {
 void choose_shapes(Search& search, Proposal& proposal) {
   Term& added = proposal.extended.back();
   for (std::size_t p = 0; p < added.values.size(); ++p) {
-    if (!added.free_shape(p)) continue;
+    if (!added.free_shape(p) || begins_at_nought(added, p)) continue;
     double best = added.values[p], least = std::numeric_limits<double>::infinity();
     for (const double value : regression::shape_grid(regression::shape_range(*search.data, added, p), kGridPoints)) {
       added.values[p] = value;
@@ -77,7 +77,7 @@ void check_admissible(BalanceData& data, const Judged& base, Trial& trial) {
     trial.admissible = false;
   };
   const std::size_t added = judged.terms.size() - 1;
-  bool any_own = judged.terms[added].entry->info->phase != effects::Phase::source;
+  bool any_own = judged.terms[added].entry->count(effects::Kind::linear) == 0;
   for (std::size_t j = 0; j < judged.linear.size(); ++j) {
     const Term& t = judged.terms[judged.linear[j].term];
     const auto& info = t.entry->parameters[judged.linear[j].parameter];
@@ -90,8 +90,10 @@ void check_admissible(BalanceData& data, const Judged& base, Trial& trial) {
             catalogue::unit_on(info.unit, data.prepared().rotary ? data::Axis::rotary : data::Axis::linear)));
       continue;
     }
-    // Friction, inertia and stiffness have a sign; offsets and asymmetries may have any.
+    // Friction, inertia and stiffness have a sign; offsets and asymmetries may have any. What the candidate can draw
+    // itself may go over to it.
     if (info.low != 0.0) continue;
+    if (catalogue::names_contain(judged.terms[added].entry->info->contains, t.entry->name())) continue;
     const auto before = position(base, t.id, info.name);
     if (!before) continue;
     const double was = base.theta[static_cast<Eigen::Index>(*before)];
@@ -129,7 +131,7 @@ Trial best_admissible(Search& search, Proposal proposal, Trial refused) {
   Term& added = proposal.extended.back();
   if (refused.fall.score < kNamedScore) return refused;
   for (std::size_t p = 0; p < added.values.size(); ++p) {
-    if (!added.free_shape(p)) continue;
+    if (!added.free_shape(p) || begins_at_nought(added, p)) continue;
     const double chosen = added.values[p];
     for (const double value : regression::shape_grid(regression::shape_range(*search.data, added, p), kGridPoints)) {
       if (value == chosen) continue;
@@ -161,21 +163,37 @@ bool passes(const Trial& t) {
   return t.admissible && t.fall.score > kNamedScore && t.fall.chi2_percent > kNamedFallPercent;
 }
 
+// A law that contains another fits at least as well. Of those that leave all but the same error, the one with the
+// fewest parameters comes first.
+void prefer_simple(std::vector<Trial>& trials) {
+  constexpr double kSameError = 1.02;
+  if (trials.empty() || !passes(trials.front())) return;
+  const double least = trials.front().judged.rmse_cv();
+  std::size_t simplest = 0;
+  for (std::size_t i = 1; i < trials.size(); ++i)
+    if (passes(trials[i]) && trials[i].judged.rmse_cv() <= kSameError * least &&
+        trials[i].proposal.added < trials[simplest].proposal.added)
+      simplest = i;
+  std::rotate(trials.begin(), trials.begin() + static_cast<std::ptrdiff_t>(simplest),
+              trials.begin() + static_cast<std::ptrdiff_t>(simplest) + 1);
+}
+
 std::vector<Trial> rank(Search& search) {
   std::vector<Trial> trials;
-  for (Proposal& proposal : proposals(*search.data, search.base.terms)) {
+  for (Proposal& proposal : proposals(*search.data, search.base.terms, search.base.residual)) {
     choose_shapes(search, proposal);
     trials.push_back(evaluate(search, proposal));
     if (!trials.back().admissible)
       trials.back() = best_admissible(search, std::move(proposal), std::move(trials.back()));
   }
-  std::sort(trials.begin(), trials.end(), better);
-  for (std::size_t i = 0; i < std::min(kRefined, trials.size()); ++i) {
-    Trial& trial = trials[i];
+  // By score alone: a shape that is only near may make the model impossible where the best one does not.
+  std::sort(trials.begin(), trials.end(), [](const Trial& a, const Trial& b) { return a.fall.score > b.fall.score; });
+  std::size_t refined_already = 0;
+  for (Trial& trial : trials) {
     const Term& added = trial.proposal.extended.back();
     bool has_shape = false;
     for (std::size_t p = 0; p < added.values.size(); ++p) has_shape = has_shape || added.free_shape(p);
-    if (!has_shape || trial.fall.score < kNamedScore) continue;
+    if (!has_shape || trial.fall.score < kNamedScore || ++refined_already > kRefined) continue;
     Proposal refined = trial.proposal;
     refined.extended = trial.judged.terms;
     const auto on_balance =
@@ -185,6 +203,7 @@ std::vector<Trial> rank(Search& search) {
     if (better(again, trial) || !trial.admissible) trial = std::move(again);
   }
   std::sort(trials.begin(), trials.end(), better);
+  prefer_simple(trials);
   return trials;
 }
 

@@ -20,6 +20,7 @@ struct ScalarSystem {
   using Exponent = S;
   using Order = S;
   using State = S;
+  using Travel = S;
   struct Wave {
     S cosine;
     S sine;
@@ -31,14 +32,26 @@ struct ScalarSystem {
   static S value(const S& p) { return p; }
   static S exponent(const S& p) { return p; }
   static S order(const S& p) { return p; }
+  static S power(const S& p, const S& exponent) {
+    using std::pow;
+    return pow(p, exponent);
+  }
+  static S one() { return S(1.0); }
   static S sum(const S& x) { return x; }
   static S narrow(const S& x) { return x; }
+  static S widen(const S& x) { return x; }
+  static S widen(const S& gain, const S& x) { return gain * x; }
   static S times(const S& a, const S& b) { return a * b; }
   static S scaled(const S& gain, const S& x) { return gain * x; }
+  static S travel(const S& gain, const S& x) { return gain * x; }
+  static S step(const S& travel, const S& x) { return travel * x; }
   static S times_order(const S& angle, const S& order) { return angle * order; }
   static S sign(const S& x) { return S(x > S(0.0) ? 1.0 : x < S(0.0) ? -1.0 : 0.0); }
   static S magnitude(const S& x) { return x < S(0.0) ? -x : x; }
   static S clamp(const S& x, const S& limit) { return x > limit ? limit : x < -limit ? -limit : x; }
+  static S between(const S& x, const S& low, const S& high) { return x > high ? high : x < low ? low : x; }
+  static S clamp_to_one(const S& x) { return clamp(x, S(1.0)); }
+  static S by_sign(const S& x, const S& a, const S& b) { return x < S(0.0) ? b : a; }
   // Moves to `target` and keeps `share` of the distance; no motion, no change.
   static S relax(const S& from, const S& target, const S& share) { return target + (from - target) * share; }
   static Wave sincos(const S& x) {
@@ -53,6 +66,25 @@ struct ScalarSystem {
   static S exp_negative(const S& x) {
     using std::exp;
     return exp(-x);
+  }
+  static S lorentzian(const S& x) { return S(1.0) / (S(1.0) + x * x); }
+  static S reciprocal(const S& x) { return S(1.0) / x; }
+  // (1 - exp(-x)) / x
+  static S exp_mean(const S& x) {
+    using std::exp;
+    if (x < S(1e-4)) return S(1.0) - x * (S(0.5) - x * S(1.0 / 6.0));
+    return (S(1.0) - exp(-x)) / x;
+  }
+  // The solution at x of u' = -u^q, u(0) = 1. For q < 1 it reaches nought and stays there.
+  static S q_exp_negative(const S& x, const S& q) {
+    using std::exp;
+    using std::log;
+    const S z = (q - S(1.0)) * x;
+    if (z <= S(-1.0 + 1e-12)) return S(0.0);
+    // log(1 + z) / (q - 1), in a form that has no gap at q = 1.
+    const bool small = z < S(1e-4) && z > S(-1e-4);
+    const S per = small ? S(1.0) - z * (S(0.5) - z * (S(1.0 / 3.0) - z * S(0.25))) : log(S(1.0) + z) / z;
+    return exp(-x * per);
   }
 };
 

@@ -20,8 +20,13 @@ constexpr std::size_t kCachedNumbers = 40'000'000;
 // Whether a shift or modulation reaches what a term computes.
 bool changes(const Term& changer, const Term& term) {
   const effects::Description& what = *changer.entry->info;
-  if (what.phase == Phase::shift) return (term.entry->info->reads & effects::kTorsion) != 0;
-  if (what.phase == Phase::modulate) return catalogue::names_contain(what.modulates, term.entry->name());
+  // A kinematic error's own torque follows the measured torque.
+  if (what.phase == Phase::shift)
+    return (term.entry->info->reads & effects::kTorsion) != 0 && term.entry->info->phase == Phase::source;
+  // What takes the place of an effect is scaled as that would be.
+  if (what.phase == Phase::modulate)
+    return catalogue::names_contain(what.modulates, term.entry->name()) ||
+           catalogue::names_contain(term.entry->info->replaces, what.modulates);
   return false;
 }
 
@@ -42,22 +47,6 @@ std::string key_of(const Terms& terms, Slot slot) {
   return key;
 }
 
-// Inputs in number system N from plain ones.
-template <class N>
-effects::Inputs<N> lifted(const effects::Inputs<Real>& in) {
-  if constexpr (std::is_same_v<N, Real>) {
-    return in;
-  } else {
-    using S = typename N::Value;
-    return {S(in.angle),           S(in.velocity),         S(in.speed),
-            S(in.direction),       S(in.acceleration),     S(in.output_angle),
-            S(in.output_velocity), S(in.output_direction), S(in.output_acceleration),
-            S(in.torsion),         S(in.torsion_rate),     S(in.torsion_direction),
-            S(in.torque),          S(in.torque_magnitude), S(in.current),
-            S(in.temperature),     S(in.viscous_scale),    S(in.coulomb_scale)};
-  }
-}
-
 template <class P>
 DriveConstants<P> lifted(const DriveConstants<double>& d) {
   DriveConstants<P> c;
@@ -67,6 +56,13 @@ DriveConstants<P> lifted(const DriveConstants<double>& d) {
   c.reference_temperature = P(d.reference_temperature);
   c.turn_angle_scale = P(d.turn_angle_scale);
   return c;
+}
+
+// The direction of a torsion rate that a shift has changed, smooth over the noise of the rate as it was measured.
+template <class S>
+S direction_of(const S& rate, double width) {
+  using std::tanh;
+  return width > 0.0 ? tanh(rate / S(width)) : S(rate > S(0.0) ? 1.0 : rate < S(0.0) ? -1.0 : 0.0);
 }
 
 template <class N>
@@ -210,32 +206,45 @@ void BalanceData::add_torque(const Terms& terms, const Term& term, const std::ve
                              const Record& r, const std::vector<std::vector<typename N::Parameter>>& all_values,
                              std::vector<typename N::Value>& torque) const {
   using P = typename N::Parameter;
-  const double own = share(r, term.entry->info->balance);
-  if (own == 0.0) return;
+  if (!term.adds_torque()) return;
   const DriveConstants<P> constants = lifted<P>(prepared_->constants);
-  const std::vector<effects::Inputs<N>>* inputs = nullptr;
   std::vector<effects::Inputs<N>> changed;
   bool any = false;
   for (const Term& other : terms) any = any || changes(other, term);
-  if constexpr (std::is_same_v<N, Real>) {
-    if (!any) inputs = &r.inputs;
-  }
-  if (!inputs) {
+  if (any) {
     changed.reserve(r.inputs.size());
-    for (const auto& in : r.inputs) changed.push_back(lifted<N>(in));
+    for (const auto& in : r.inputs) changed.push_back(catalogue::lifted<N>(in));
+    bool turned = false;
     for (const Phase phase : {Phase::shift, Phase::modulate})
       for (std::size_t t = 0; t < terms.size(); ++t)
-        if (terms[t].entry->info->phase == phase && changes(terms[t], term))
-          along<N>(*terms[t].entry).change(all_values[t].data(), constants, changed);
-    inputs = &changed;
+        if (terms[t].entry->info->phase == phase && changes(terms[t], term)) {
+          along<N>(*terms[t].entry)
+              .change(catalogue::natural(*terms[t].entry, all_values[t]).data(), constants, changed);
+          turned = turned || (phase == Phase::shift && (terms[t].entry->info->reads & effects::kMotorAngle) != 0);
+        }
+    if (turned && !r.at_rest)
+      for (auto& in : changed)
+        in.torsion_direction = direction_of(in.torsion_rate, r.velocity_noise[index(Balance::transmission)]);
   }
-  if (own == 1.0) {
-    along<N>(*term.entry).torque(values.data(), constants, term.entry->info->balance, *inputs, torque.data());
-    return;
+  const std::vector<P> natural = catalogue::natural(*term.entry, values);
+  for (const Balance to : {Balance::motor, Balance::transmission, Balance::load}) {
+    const double weight = term.entry->adds_to(to) ? share(r, to) : 0.0;
+    if (weight == 0.0) continue;
+    const auto add = [&](typename N::Value* sum) {
+      const catalogue::Along<N>& functions = along<N>(*term.entry);
+      if (any)
+        functions.torque(natural.data(), constants, to, changed, sum);
+      else
+        functions.torque_of_plain(natural.data(), constants, to, r.inputs, sum);
+    };
+    if (weight == 1.0) {
+      add(torque.data());
+      continue;
+    }
+    std::vector<typename N::Value> through(torque.size(), typename N::Value(0.0));
+    add(through.data());
+    for (std::size_t k = 0; k < torque.size(); ++k) torque[k] += through[k] * weight;
   }
-  std::vector<typename N::Value> through(torque.size(), typename N::Value(0.0));
-  along<N>(*term.entry).torque(values.data(), constants, term.entry->info->balance, *inputs, through.data());
-  for (std::size_t k = 0; k < torque.size(); ++k) torque[k] += through[k] * own;
 }
 
 namespace {
@@ -279,7 +288,7 @@ Eigen::VectorXd BalanceData::shape_column(const Terms& terms, const std::vector<
   return along_rows([&](const RowRange& range, std::vector<double>& signal) {
     std::vector<Jet> torque(signal.size(), Jet(0.0));
     for (const std::size_t t : on_balance)
-      if (terms[t].is_source() && (t == shape.term || changes(terms[shape.term], terms[t])))
+      if (terms[t].adds_torque() && (t == shape.term || changes(terms[shape.term], terms[t])))
         add_torque<Dual>(terms, terms[t], all[t], prepared_->records[range.record], all, torque);
     for (std::size_t k = 0; k < signal.size(); ++k) signal[k] = torque[k].v[0];
   });
@@ -289,15 +298,24 @@ Eigen::VectorXd BalanceData::known_torque(const Terms& terms, const std::vector<
   Eigen::VectorXd sum = Eigen::VectorXd::Zero(rows());
   for (const std::size_t t : on_balance)
     for (std::size_t p = 0; p < terms[t].values.size(); ++p)
-      if (terms[t].is_source() && terms[t].known[p] && terms[t].entry->parameters[p].kind == Kind::linear &&
+      if (terms[t].adds_torque() && terms[t].known[p] && terms[t].entry->parameters[p].kind == Kind::linear &&
           terms[t].values[p] != 0.0)
         sum += terms[t].values[p] * column(terms, {t, p});
+  for (const std::size_t t : on_balance)
+    if (terms[t].scaled_by_none()) sum += term_torque(terms, t);
+  for (const std::size_t t : terms_reaching(terms, balance_, prepared_->torque_measured)) sum += term_torque(terms, t);
   return sum;
 }
 
 Eigen::VectorXd BalanceData::term_torque(const Terms& terms, std::size_t t) {
   Eigen::VectorXd sum = Eigen::VectorXd::Zero(rows());
-  if (!terms[t].is_source()) return sum;
+  if (!terms[t].adds_torque()) return sum;
+  if (terms[t].scaled_by_none()) {
+    const auto all = values_of_all(terms);
+    return along_rows([&](const RowRange& range, std::vector<double>& signal) {
+      add_torque<Real>(terms, terms[t], terms[t].values, prepared_->records[range.record], all, signal);
+    });
+  }
   for (std::size_t p = 0; p < terms[t].values.size(); ++p)
     if (terms[t].entry->parameters[p].kind == Kind::linear) sum += terms[t].values[p] * column(terms, {t, p});
   return sum;

@@ -46,7 +46,8 @@ class BalanceData {
   const Eigen::VectorXd& column(const Terms& terms, Slot slot);
   // Slope of the model's torque by a shape parameter, at the linear parameters of `terms`, filtered.
   Eigen::VectorXd shape_column(const Terms& terms, const std::vector<std::size_t>& on_balance, Slot shape);
-  // Torque of terms with known linear parameters, filtered: belongs on the left side.
+  // Torque of terms with known linear parameters, of those that no linear parameter scales at their shapes as they
+  // stand, and of those that only reach this balance, filtered: belongs on the left side. It moves with the shapes.
   Eigen::VectorXd known_torque(const Terms& terms, const std::vector<std::size_t>& on_balance);
   // Torque of one term at its values, all parameters in, filtered.
   Eigen::VectorXd term_torque(const Terms& terms, std::size_t term);
@@ -61,7 +62,7 @@ class BalanceData {
   // Filters a signal that is given along the samples of a range's record, in place.
   void filter(const RowRange& range, std::vector<double>& signal) const;
   bool usable(const Record& record) const;
-  // The part of an effect that reaches this balance: its own, and by way of the gear where there is no torque sensor.
+  // How much of what adds to a balance reaches this one: its own, and by way of the gear without a torque sensor.
   double share(const Record& record, Balance of_effect) const;
   template <class Fill>
   Eigen::VectorXd along_rows(Fill fill) const;

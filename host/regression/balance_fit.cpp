@@ -13,9 +13,29 @@ Eigen::MatrixXd shape_columns(BalanceData& data, const Terms& terms, const std::
   return X;
 }
 
+NaturalValue natural_value(const Term& term, Slot asked, const std::vector<Slot>& slots,
+                           const Eigen::MatrixXd& covariance) {
+  NaturalValue result;
+  result.value = catalogue::natural(*term.entry, term.values)[asked.parameter];
+  Eigen::VectorXd slopes = Eigen::VectorXd::Zero(covariance.rows());
+  for (std::size_t j = 0; j < slots.size(); ++j) {
+    if (slots[j].term != asked.term) continue;
+    std::vector<numbers::Jet> values(term.values.begin(), term.values.end());
+    values[slots[j].parameter].v[0] = 1.0;
+    slopes[static_cast<Eigen::Index>(j)] = catalogue::natural(*term.entry, values)[asked.parameter].v[0];
+  }
+  // What is not determined has an infinite variance, which must not meet a slope of nought.
+  for (Eigen::Index i = 0; i < slopes.size(); ++i)
+    for (Eigen::Index j = 0; j < slopes.size(); ++j)
+      if (slopes[i] != 0.0 && slopes[j] != 0.0) result.variance += slopes[i] * covariance(i, j) * slopes[j];
+  return result;
+}
+
 Eigen::VectorXd residual_of(BalanceData& data, const Terms& terms) {
   Eigen::VectorXd residual = data.target();
   for (const std::size_t t : terms_on(terms, data.balance(), data.prepared().torque_measured))
+    residual -= data.term_torque(terms, t);
+  for (const std::size_t t : terms_reaching(terms, data.balance(), data.prepared().torque_measured))
     residual -= data.term_torque(terms, t);
   return residual;
 }
@@ -28,8 +48,9 @@ BalanceFit fit_balance(BalanceData& data, Terms& terms) {
   fit.shapes = free_shape_slots(terms, fit.on_balance);
   fit.root_weights = Eigen::VectorXd::Ones(data.rows());
   if (data.empty()) return fit;
-  const Eigen::VectorXd target = data.target() - data.known_torque(terms, fit.on_balance);
+  settle_grids(data, terms, fit.on_balance);
   const auto solve = [&] {
+    const Eigen::VectorXd target = data.target() - data.known_torque(terms, fit.on_balance);
     const LinearFit linear = least_squares(columns_of(data, terms, fit.linear), target, fit.root_weights);
     for (std::size_t j = 0; j < fit.linear.size(); ++j)
       terms[fit.linear[j].term].values[fit.linear[j].parameter] = linear.theta[static_cast<Eigen::Index>(j)];

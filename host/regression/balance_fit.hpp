@@ -29,6 +29,16 @@ struct BalanceFit {
 // search starts; others are swept first. Parameters that the data do not determine are set to nought (see own_share).
 BalanceFit fit_balance(BalanceData& data, Terms& terms);
 
+// A parameter in its own unit, where it was searched for as a ratio or a root, with the variance that follows from the
+// covariance of what it depends on.
+struct NaturalValue {
+  double value = 0.0;
+  double variance = 0.0;
+};
+// `slots` are those of `covariance`, in its order; the parameter asked for need not be among them.
+NaturalValue natural_value(const Term& term, Slot asked, const std::vector<Slot>& slots,
+                           const Eigen::MatrixXd& covariance);
+
 // Residual of terms as they stand on (other) data, N m.
 Eigen::VectorXd residual_of(BalanceData& data, const Terms& terms);
 

@@ -4,7 +4,9 @@
 
 #include <algorithm>
 #include <cmath>
+#include <iterator>
 #include <map>
+#include <tuple>
 
 #include "host/regression/least_squares.hpp"
 #include "host/regression/shapes.hpp"
@@ -66,7 +68,7 @@ Estimate estimate_of(const Terms& terms, Slot slot, data::Axis axis) {
   e.effect = std::string(term.entry->name());
   e.parameter = std::string(info.name);
   e.unit = std::string(catalogue::unit_on(info.unit, axis));
-  e.value = term.values[slot.parameter];
+  e.value = catalogue::natural(*term.entry, term.values)[slot.parameter];
   e.fixed = term.known[slot.parameter] != 0;
   return e;
 }
@@ -191,6 +193,44 @@ std::pair<BalanceFit, std::vector<Slot>> fit_within_bounds(BalanceData& data, Te
   }
 }
 
+// Fits all balances. What an effect adds to a balance that does not tell its parameters is known there, so the balance
+// that tells comes first: the transmission's before the motor's, and, where the motor's tells of others, both again.
+// Returns what was held at a bound on each.
+std::vector<std::vector<Slot>> fit_all(Identification& result, data::Axis axis) {
+  std::vector<std::vector<Slot>> held(result.data.size());
+  result.fits.resize(result.data.size());
+  bool reach = false, told_elsewhere = false;
+  for (const Term& term : result.terms) {
+    reach = reach || term.entry->info->adds_to != 0;
+    told_elsewhere = told_elsewhere || term.entry->info->told_by_motor;
+  }
+  std::vector<std::size_t> order;
+  for (std::size_t b = 0; b < result.data.size(); ++b)
+    if (!reach || result.data[b].balance() != Balance::motor) order.push_back(b);
+  for (std::size_t b = 0; b < result.data.size() && reach; ++b)
+    if (result.data[b].balance() == Balance::motor) order.push_back(b);
+  for (int pass = 0; pass < (told_elsewhere ? 2 : 1); ++pass)
+    for (const std::size_t b : order) {
+      std::vector<std::string> warnings;
+      std::tie(result.fits[b], held[b]) = fit_within_bounds(result.data[b], result.terms, axis, warnings);
+      if (pass > 0 || !told_elsewhere) std::ranges::move(warnings, std::back_inserter(result.warnings));
+    }
+  return held;
+}
+
+// Values of kind grid were set from the data and belong to the model from now on.
+void store_grids(model::Model& model, const Term& term, data::Axis axis) {
+  model::Effect* effect = model.find(term.id);
+  for (std::size_t p = 0; effect && p < term.values.size(); ++p) {
+    const auto& info = term.entry->parameters[p];
+    model::Parameter* parameter = effect->find(info.name);
+    if (info.kind != effects::Kind::grid || !parameter || parameter->value) continue;
+    parameter->value = term.values[p];
+    parameter->unit = std::string(catalogue::unit_on(info.unit, axis));
+    parameter->fixed = true;
+  }
+}
+
 }  // namespace
 
 model::Drive reconcile(const model::Drive& drive, const data::Dataset& dataset, std::vector<std::string>& warnings) {
@@ -263,17 +303,20 @@ std::unique_ptr<Identification> identify(const data::Dataset& dataset, const mod
                             "no torque balance of the model can be formed from these columns",
                             "record current (or torque) and motor position together"}});
   if (!too_short.empty()) result->warnings.push_back(fmt::format("too few rows are left in {}; not used", list));
-  for (BalanceData& data : result->data) {
-    auto [bounded, held] = fit_within_bounds(data, result->terms, model.drive.axis, result->warnings);
-    result->fits.push_back(std::move(bounded));
-    const BalanceFit& fit = result->fits.back();
+  std::vector<std::vector<Slot>> held_on = fit_all(*result, model.drive.axis);
+  for (std::size_t b = 0; b < result->data.size(); ++b) {
+    BalanceData& data = result->data[b];
+    const BalanceFit& fit = result->fits[b];
+    const std::vector<Slot>& held = held_on[b];
     const std::size_t first = result->estimates.size();
+    std::vector<Slot> all = fit.linear;
+    all.insert(all.end(), fit.shapes.begin(), fit.shapes.end());
     Eigen::Index at = 0;
     for (const std::vector<Slot>* slots : {&fit.linear, &fit.shapes})
       for (const Slot& slot : *slots) {
         Estimate e = estimate_of(result->terms, slot, model.drive.axis);
         e.identifiable = fit.own_share[at] >= kUndetermined;
-        const double variance = fit.covariance(at, at);
+        const double variance = natural_value(result->terms[slot.term], slot, all, fit.covariance).variance;
         if (e.identifiable && std::isfinite(variance)) {
           e.std = std::sqrt(variance);
           e.low = e.value - 1.96 * *e.std;
@@ -294,6 +337,7 @@ std::unique_ptr<Identification> identify(const data::Dataset& dataset, const mod
       result->warnings.push_back(
           fmt::format("{}: its balance cannot be formed from these data; its parameters are left as they are",
                       result->terms[t].id));
+  for (const Term& term : result->terms) store_grids(result->model, term, model.drive.axis);
   derive_directions(result->estimates, result->derived);
   store(result->model, result->estimates);
   return result;

@@ -270,6 +270,7 @@ Record prepare_one(const Experiment& e, const catalogue::DriveConstants<double>&
     if (!current.empty()) in.current = current[k];
     in.temperature = r.has_temperature ? temperature[k] : drive.reference_temperature;
     in.viscous_scale = in.coulomb_scale = 1.0;
+    in.elapsed = e.sample_s;
   }
   r.velocity_noise[index(Balance::motor)] = motor_velocity_noise;
   r.velocity_noise[index(Balance::load)] = r.has_output_motion && output_velocity_noise > 0.0

@@ -68,9 +68,25 @@ double unseen_travel(const BalanceData& data) {
   return std::max(counts, quantile(travel, 0.1));
 }
 
+double largest_torsion(const BalanceData& data) {
+  return quantile(magnitudes(data, [](const auto& in) { return in.torsion; }), 0.99);
+}
+
+// Weighted columns of like size, so that the factorisation can tell a small one (a cubed torsion) from a needless one.
+struct ScaledColumns {
+  Eigen::MatrixXd A;
+  Eigen::VectorXd size;
+};
+ScaledColumns scaled_columns(const Eigen::MatrixXd& X, const Eigen::VectorXd& root_weights) {
+  ScaledColumns s{root_weights.asDiagonal() * X, {}};
+  s.size = s.A.colwise().norm().transpose().array().max(1e-300);
+  s.A *= s.size.cwiseInverse().asDiagonal();
+  return s;
+}
+
 // The sum over rows of weighted squares after the best linear parameters.
 double projected_cost(const Eigen::MatrixXd& X, const Eigen::VectorXd& y, const Eigen::VectorXd& root_weights) {
-  const Eigen::MatrixXd A = root_weights.asDiagonal() * X;
+  const Eigen::MatrixXd A = scaled_columns(X, root_weights).A;
   const Eigen::VectorXd b = root_weights.cwiseProduct(y);
   const Eigen::ColPivHouseholderQR<Eigen::MatrixXd> qr(A);
   return (b - A * qr.solve(b)).squaredNorm();
@@ -81,31 +97,30 @@ class ProjectedResidual final : public ceres::CostFunction {
  public:
   ProjectedResidual(BalanceData& data, Terms& terms, const std::vector<std::size_t>& on_balance,
                     const std::vector<Slot>& linear, const std::vector<Slot>& shapes,
-                    const std::vector<ShapeRange>& ranges, const Eigen::VectorXd& target,
-                    const Eigen::VectorXd& root_weights)
+                    const std::vector<ShapeRange>& ranges, const Eigen::VectorXd& root_weights)
       : data_(data),
         terms_(terms),
         on_balance_(on_balance),
         linear_(linear),
         shapes_(shapes),
         ranges_(ranges),
-        target_(target),
         root_weights_(root_weights) {
-    set_num_residuals(static_cast<int>(target.size()));
+    set_num_residuals(static_cast<int>(data.rows()));
     mutable_parameter_block_sizes()->push_back(static_cast<int>(shapes.size()));
   }
 
   bool Evaluate(double const* const* parameters, double* residuals, double** jacobians) const override {
     for (std::size_t j = 0; j < shapes_.size(); ++j)
       terms_[shapes_[j].term].values[shapes_[j].parameter] = ranges_[j].at(parameters[0][j]);
-    const Eigen::MatrixXd A = root_weights_.asDiagonal() * columns_of(data_, terms_, linear_);
-    const Eigen::VectorXd b = root_weights_.cwiseProduct(target_);
+    const auto [A, size] = scaled_columns(columns_of(data_, terms_, linear_), root_weights_);
+    const Eigen::VectorXd b = root_weights_.cwiseProduct(data_.target() - data_.known_torque(terms_, on_balance_));
     const Eigen::ColPivHouseholderQR<Eigen::MatrixXd> qr(A);
     const Eigen::VectorXd theta = qr.solve(b);
     Eigen::Map<Eigen::VectorXd>(residuals, b.size()) = b - A * theta;
     if (!jacobians || !jacobians[0]) return true;
     for (std::size_t j = 0; j < linear_.size(); ++j)
-      terms_[linear_[j].term].values[linear_[j].parameter] = theta[static_cast<Eigen::Index>(j)];
+      terms_[linear_[j].term].values[linear_[j].parameter] =
+          theta[static_cast<Eigen::Index>(j)] / size[static_cast<Eigen::Index>(j)];
     using RowMajor = Eigen::Matrix<double, Eigen::Dynamic, Eigen::Dynamic, Eigen::RowMajor>;
     Eigen::Map<RowMajor> jacobian(jacobians[0], b.size(), static_cast<Eigen::Index>(shapes_.size()));
     constexpr double kStep = 1e-6;
@@ -126,7 +141,6 @@ class ProjectedResidual final : public ceres::CostFunction {
   const std::vector<Slot>& linear_;
   const std::vector<Slot>& shapes_;
   const std::vector<ShapeRange>& ranges_;
-  const Eigen::VectorXd& target_;
   const Eigen::VectorXd& root_weights_;
 };
 
@@ -150,26 +164,66 @@ ShapeRange shape_range(const BalanceData& data, const Term& term, std::size_t pa
     range.high = std::min(std::max(high, 2.0 * range.low), info.high);
     range.logarithmic = true;
   };
+  const auto speeds = [&] { return magnitudes(data, [](const auto& in) { return in.velocity; }); };
+  constexpr double kNegligible = 1e-9;
   switch (info.limit) {
     case Limit::stated:
       break;
     case Limit::velocity: {
-      const std::vector<double> speeds = magnitudes(data, [](const auto& in) { return in.velocity; });
+      const std::vector<double> all = speeds();
       // What the mask leaves must hold enough of the term to see: its width at the slowest hundredth of the rows.
-      scale_between(std::max(quantile(speeds, 0.01), 1e-9), 0.25 * quantile(speeds, 0.95));
+      scale_between(std::max(quantile(all, 0.01), kNegligible), 0.25 * quantile(all, 0.95));
       break;
     }
-    case Limit::travel: {
-      scale_between(std::max(unseen_travel(data), 1e-9), shortest_stroke(data));
+    case Limit::travel:
+      scale_between(std::max(unseen_travel(data), kNegligible), shortest_stroke(data));
       break;
-    }
     case Limit::torsion: {
-      const double largest = quantile(magnitudes(data, [](const auto& in) { return in.torsion; }), 0.99);
+      const double largest = largest_torsion(data);
       scale_between(largest * 3e-3, largest / 3.0);
+      if (info.low < 0.0) range = {-largest / 3.0, largest / 3.0, false};  // of either sign
+      break;
+    }
+    case Limit::current: {
+      const std::vector<double> all = magnitudes(data, [](const auto& in) { return in.current; });
+      const double largest = *std::max_element(all.begin(), all.end());
+      range = {std::max(0.1 * largest, info.low), largest, false};
+      break;
+    }
+    case Limit::inverse_velocity: {
+      const std::vector<double> all = speeds();
+      scale_between(1e-3 / std::max(quantile(all, 0.95), kNegligible),
+                    1.0 / std::max(quantile(all, 0.01), kNegligible));
+      break;
+    }
+    case Limit::inverse_travel: {
+      const double least = std::max(unseen_travel(data), kNegligible);
+      scale_between(1.0 / std::max(shortest_stroke(data), 2.0 * least), 1.0 / least);
+      break;
+    }
+    case Limit::inverse_torsion: {
+      const double largest = std::max(largest_torsion(data), 1e-300);
+      scale_between(0.5 / largest, 1.0 / (3e-3 * largest));
+      break;
+    }
+    case Limit::inverse_torque: {
+      const double largest =
+          std::max(quantile(magnitudes(data, [](const auto& in) { return in.torque; }), 0.99), 1e-300);
+      scale_between(0.01 / largest, 30.0 / largest);
       break;
     }
   }
   return range;
+}
+
+void settle_grids(const BalanceData& data, Terms& terms, const std::vector<std::size_t>& which) {
+  for (const std::size_t t : which)
+    for (std::size_t p = 0; p < terms[t].values.size(); ++p) {
+      const auto& info = terms[t].entry->parameters[p];
+      if (info.kind != effects::Kind::grid || terms[t].stated[p]) continue;
+      terms[t].values[p] = info.share_of_range * largest_torsion(data);
+      terms[t].stated[p] = 1;
+    }
 }
 
 std::vector<double> shape_grid(const ShapeRange& range, std::size_t count) {
@@ -196,14 +250,17 @@ void sweep_shapes(BalanceData& data, Terms& terms, const std::vector<std::size_t
     terms[s.term].values[s.parameter] = shape_range(data, terms[s.term], s.parameter).at(0.5);
   }
   constexpr std::size_t kGrid = 6;
-  const Eigen::VectorXd target = data.target() - data.known_torque(terms, on_balance);
+  const auto cost_now = [&] {
+    return projected_cost(columns_of(data, terms, linear), data.target() - data.known_torque(terms, on_balance),
+                          root_weights);
+  };
   for (int around = 0; around < (open.size() > 1 ? 2 : 1); ++around)
     for (const Slot& s : open) {
       double& value = terms[s.term].values[s.parameter];
       double best = value, least = std::numeric_limits<double>::infinity();
       for (const double trial : shape_grid(shape_range(data, terms[s.term], s.parameter), kGrid)) {
         value = trial;
-        const double cost = projected_cost(columns_of(data, terms, linear), target, root_weights);
+        const double cost = cost_now();
         if (cost < least) {
           least = cost;
           best = trial;
@@ -217,8 +274,9 @@ double refine_shapes(BalanceData& data, Terms& terms, const std::vector<std::siz
                      const Eigen::VectorXd& root_weights) {
   const std::vector<Slot> shapes = free_shape_slots(terms, on_balance);
   const std::vector<Slot> linear = free_linear_slots(terms, on_balance);
-  const Eigen::VectorXd target = data.target() - data.known_torque(terms, on_balance);
-  if (shapes.empty() || data.empty()) return projected_cost(columns_of(data, terms, linear), target, root_weights);
+  if (shapes.empty() || data.empty())
+    return projected_cost(columns_of(data, terms, linear), data.target() - data.known_torque(terms, on_balance),
+                          root_weights);
   std::vector<ShapeRange> ranges;
   std::vector<double> shares;
   for (const Slot& s : shapes) {
@@ -226,7 +284,7 @@ double refine_shapes(BalanceData& data, Terms& terms, const std::vector<std::siz
     shares.push_back(std::clamp(ranges.back().share(terms[s.term].values[s.parameter]), 0.01, 0.99));
   }
   ceres::Problem problem;
-  problem.AddResidualBlock(new ProjectedResidual(data, terms, on_balance, linear, shapes, ranges, target, root_weights),
+  problem.AddResidualBlock(new ProjectedResidual(data, terms, on_balance, linear, shapes, ranges, root_weights),
                            nullptr, shares.data());
   for (int j = 0; j < static_cast<int>(shapes.size()); ++j) {
     problem.SetParameterLowerBound(shares.data(), j, 0.0);
@@ -234,7 +292,7 @@ double refine_shapes(BalanceData& data, Terms& terms, const std::vector<std::siz
   }
   ceres::Solver::Options options;
   options.linear_solver_type = ceres::DENSE_QR;
-  options.max_num_iterations = 25;
+  options.max_num_iterations = 60;
   options.function_tolerance = 1e-9;
   options.parameter_tolerance = 1e-6;
   options.logging_type = ceres::SILENT;

@@ -16,6 +16,9 @@ struct ShapeRange {
 };
 ShapeRange shape_range(const BalanceData& data, const Term& term, std::size_t parameter);
 
+// Gives parameters of kind grid that the model does not state their values, from the largest torsion of the data.
+void settle_grids(const BalanceData& data, Terms& terms, const std::vector<std::size_t>& which);
+
 // Values to start from or to rank candidates on, spread over the range.
 std::vector<double> shape_grid(const ShapeRange& range, std::size_t count);
 

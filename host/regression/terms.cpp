@@ -16,12 +16,14 @@ Term term_of(const model::Effect& effect) {
   Term term;
   term.entry = &catalogue::get(effect.type);
   term.id = effect.id;
-  term.values = catalogue::values_of(effect, *term.entry);
+  term.values = catalogue::reduced(*term.entry, catalogue::values_of(effect, *term.entry));
   for (const auto& info : term.entry->parameters) {
     const model::Parameter* p = effect.find(info.name);
-    const bool stated = p && p->value.has_value();
+    // A ratio to a parameter without a value says nothing.
+    const model::Parameter* per = info.per.empty() ? p : effect.find(info.per);
+    const bool stated = p && p->value.has_value() && (info.per.empty() || (per && per->value.value_or(0.0) != 0.0));
     term.stated.push_back(stated);
-    term.known.push_back(info.kind == Kind::given || (stated && p->fixed));
+    term.known.push_back(info.kind == Kind::given || info.kind == Kind::grid || (stated && p->fixed));
   }
   return term;
 }
@@ -33,7 +35,7 @@ Term candidate_term(const catalogue::Entry& entry, std::optional<double> order) 
   for (const auto& info : entry.parameters) {
     const bool given = info.kind == Kind::given;
     term.values.push_back(given ? order.value_or(info.usual) : 0.0);
-    term.known.push_back(given);
+    term.known.push_back(given || info.kind == Kind::grid);
     term.stated.push_back(given);
   }
   return term;
@@ -49,7 +51,7 @@ std::vector<Slot> free_linear_slots(const Terms& terms, const std::vector<std::s
   std::vector<Slot> slots;
   for (const std::size_t t : which)
     for (std::size_t p = 0; p < terms[t].values.size(); ++p)
-      if (terms[t].is_source() && terms[t].free_linear(p)) slots.push_back({t, p});
+      if (terms[t].free_linear(p)) slots.push_back({t, p});
   return slots;
 }
 
@@ -64,9 +66,18 @@ std::vector<Slot> free_shape_slots(const Terms& terms, const std::vector<std::si
 std::vector<std::size_t> terms_on(const Terms& terms, Balance balance, bool torque_measured) {
   std::vector<std::size_t> which;
   for (std::size_t t = 0; t < terms.size(); ++t) {
-    const Balance own = terms[t].entry->info->balance;
+    const Balance own = terms[t].entry->told_by();
     if (own == balance || (!torque_measured && balance == Balance::motor)) which.push_back(t);
   }
+  return which;
+}
+
+std::vector<std::size_t> terms_reaching(const Terms& terms, Balance balance, bool torque_measured) {
+  std::vector<std::size_t> which;
+  if (!torque_measured) return which;
+  for (std::size_t t = 0; t < terms.size(); ++t)
+    if (terms[t].adds_torque() && terms[t].entry->told_by() != balance && terms[t].entry->adds_to(balance))
+      which.push_back(t);
   return which;
 }
 

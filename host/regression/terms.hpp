@@ -15,11 +15,13 @@ using catalogue::Balance;
 struct Term {
   const catalogue::Entry* entry = nullptr;
   std::string id;
-  std::vector<double> values;        // in the order of the catalogue
+  std::vector<double> values;        // in the order of the catalogue, reduced (see effects::ParameterInfo)
   std::vector<std::uint8_t> known;   // fixed by the user, or given; else estimated
   std::vector<std::uint8_t> stated;  // has a value in the model, which is where a search starts
 
-  bool is_source() const { return entry->info->phase == effects::Phase::source; }
+  bool adds_torque() const { return entry->adds_torque(); }
+  // Adds a torque that no linear parameter scales.
+  bool scaled_by_none() const { return adds_torque() && entry->count(effects::Kind::linear) == 0; }
   bool free_linear(std::size_t p) const { return !known[p] && entry->parameters[p].kind == effects::Kind::linear; }
   bool free_shape(std::size_t p) const { return !known[p] && entry->parameters[p].kind == effects::Kind::shape; }
   // What it was given beside its name: "torque_ripple:7".
@@ -43,8 +45,10 @@ Terms terms_of(const model::Model& model);
 std::vector<Slot> free_linear_slots(const Terms& terms, const std::vector<std::size_t>& which);
 std::vector<Slot> free_shape_slots(const Terms& terms, const std::vector<std::size_t>& which);
 
-// Terms of a model that a balance depends on. In a drive without a torque sensor the motor balance holds the load's
-// (and, in locked load, the transmission's) terms too.
+// Terms of a model whose parameters a balance tells. In a drive without a torque sensor the motor balance holds the
+// load's (and, in locked load, the transmission's) terms too.
 std::vector<std::size_t> terms_on(const Terms& terms, Balance balance, bool torque_measured);
+// Terms that add to a balance although another one tells their parameters.
+std::vector<std::size_t> terms_reaching(const Terms& terms, Balance balance, bool torque_measured);
 
 }  // namespace flexspline::regression

@@ -13,7 +13,7 @@ Balances::Balances(const model::Model& model, const catalogue::DriveConstants<do
     if (entry.has_state) states_.push_back(instance);
     if (entry.info->phase == catalogue::Phase::shift) changing_.push_back(instance);
     if (entry.info->phase == catalogue::Phase::modulate) modulations.push_back(instance);
-    if (entry.info->phase != catalogue::Phase::source) continue;
+    if (!entry.adds_torque()) continue;
     switch (entry.info->balance) {
       case catalogue::Balance::motor:
         motor_.push_back({instance, entry.has_state});
@@ -26,6 +26,14 @@ Balances::Balances(const model::Model& model, const catalogue::DriveConstants<do
         break;
     }
   }
+  Inputs twisted{};
+  twisted.torsion = 1e-3;
+  Inputs loaded = twisted;
+  loaded.torque = loaded.torque_magnitude = 1.0;
+  Torques without, with;
+  add_transmission(twisted, Inputs{}, without);
+  add_transmission(loaded, Inputs{}, with);
+  transmission_reads_torque_ = with.transmission != without.transmission;
   // A shift comes before all that see the signal.
   changing_.insert(changing_.end(), modulations.begin(), modulations.end());
 }

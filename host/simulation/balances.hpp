@@ -32,6 +32,8 @@ class Balances {
   bool has_state() const { return !states_.empty(); }
   void advance(const Inputs& now, const Inputs& before);
 
+  // True where what the transmission carries depends on the torque signal itself.
+  bool transmission_reads_torque() const { return transmission_reads_torque_; }
   bool has_transmission() const { return !transmission_.empty(); }
   // What the torque grows by per unit of acceleration.
   double motor_inertia() const;
@@ -57,6 +59,7 @@ class Balances {
   std::vector<Source> load_;
   std::vector<catalogue::Instance*> changing_;
   std::vector<catalogue::Instance*> states_;
+  bool transmission_reads_torque_ = false;
 };
 
 }  // namespace flexspline::simulation

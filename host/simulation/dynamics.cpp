@@ -85,10 +85,16 @@ Torques Dynamics::sum(Balance balance) {
     }
     return sums;
   };
-  if (!balances_.changes_inputs()) return add(now_);
-  Inputs changed = now_;
-  balances_.change(changed);
-  return add(changed);
+  return balances_.changes_inputs() ? add(seen_by_effects()) : add(now_);
+}
+
+Inputs Dynamics::seen_by_effects() const {
+  Inputs seen = now_;
+  if (!balances_.changes_inputs()) return seen;
+  balances_.change(seen);
+  // A shift that turns with the motor changes the torsion's rate, and with it its direction.
+  if (seen.torsion_rate != now_.torsion_rate) seen.torsion_direction = sign_of(seen.torsion_rate);
+  return seen;
 }
 
 double Dynamics::transmission_torque(double torsion_rate) {
@@ -96,7 +102,13 @@ double Dynamics::transmission_torque(double torsion_rate) {
   now_.torsion = base + stage_.theta * torsion_rate;
   now_.torsion_rate = torsion_rate;
   now_.torsion_direction = sign_of(torsion_rate);
-  const Torques sums = sum(Balance::transmission);
+  Torques sums = sum(Balance::transmission);
+  // Effects that read the torque which they are part of: their share is small, so a few rounds settle it.
+  constexpr int kRounds = 4;
+  for (int round = 0; round < kRounds && balances_.transmission_reads_torque(); ++round) {
+    set_torque(sums.transmission);
+    sums = sum(Balance::transmission);
+  }
   motor_share_ = sums.motor;
   load_share_ = sums.load;
   return sums.transmission;
@@ -233,6 +245,7 @@ void Dynamics::solve_rigid(Solution& solution) {
 Dynamics::Solution Dynamics::solve(const Stage& stage) {
   stage_ = stage;
   set_forcing(stage.forcing);
+  now_.elapsed = stage.elapsed;
   guess_motor_ = stage.base.motor_velocity + stage.theta * last_.motor_acceleration;
   guess_output_ = stage.base.output_velocity + stage.theta * last_.output_acceleration;
   guess_torque_ = last_.torque;
@@ -257,12 +270,13 @@ Dynamics::Trial Dynamics::attempt(const Forcing& begin, const Forcing& end, doub
   const double theta = kGamma * duration;
   const double rest = duration - theta;
   Trial trial;
-  trial.middle = solve({theta, state_, between(begin, end, kGamma), held});
+  trial.middle = solve({theta, theta, state_, between(begin, end, kGamma), held});
+  trial.duration = duration;
   const Solution& m = trial.middle;
   const State base{
       state_.motor_position + rest * m.state.motor_velocity, state_.motor_velocity + rest * m.motor_acceleration,
       state_.output_position + rest * m.state.output_velocity, state_.output_velocity + rest * m.output_acceleration};
-  trial.end = solve({theta, base, end, held});
+  trial.end = solve({theta, duration, base, end, held});
   return trial;
 }
 
@@ -333,8 +347,8 @@ void Dynamics::accept(const Trial& trial, const Forcing& forcing) {
   if (!balances_.has_state()) return;
   set_forcing(forcing);
   fill(trial.end);
-  Inputs seen = now_;
-  if (balances_.changes_inputs()) balances_.change(seen);
+  now_.elapsed = trial.duration;
+  const Inputs seen = seen_by_effects();
   balances_.advance(seen, before_);
   before_ = seen;
 }

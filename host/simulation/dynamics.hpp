@@ -61,6 +61,7 @@ class Dynamics {
   // An implicit stage: velocity = base + theta * acceleration, position = base + theta * velocity.
   struct Stage {
     double theta = 0.0;
+    double elapsed = 0.0;  // since the step began
     State base;
     Forcing forcing;
     Held held;
@@ -77,6 +78,7 @@ class Dynamics {
   struct Trial {
     Solution middle;
     Solution end;
+    double duration = 0.0;
   };
   struct Moving {
     double velocity = 0.0;
@@ -100,6 +102,8 @@ class Dynamics {
   void set_output(double velocity, int direction);
   void set_torque(double torque);
   Torques sum(Balance balance);
+  // The inputs under work, with shifts and modulations.
+  Inputs seen_by_effects() const;
   double transmission_torque(double torsion_rate);
   double torque_at_rest(double torsion);
   double steepness_at_rest();

@@ -1,17 +1,9 @@
 // What every physical effect is made of. An effect is written once, as templates over a number system N, and from its
 // header it appears in every command, in the simulation, in the diagnosis and in the firmware.
 //
-// A number system is a set of types and functions, not one scalar:
-//   Parameter      what `derive` computes with on the host (double, or a dual number); never on the drive
-//   Value          a signal
-//   Angle          a position; wraps on the drive
-//   Step           a difference of two angles
-//   Sum            an unnarrowed sum of torques, so that products fuse
-//   Share, Gain, StepGain   coefficients: below one per unit, of any size, per angle step
-//   share(p), gain(p), step_gain(p), value(p)          Parameter to coefficient
-//   magnitude, select(condition, a, b), positive(x), clamp(x, limit), gauss, exp_negative, exponential, pow_abs, sincos
-// On the host all types are one plain scalar. Effects use operators between coefficients and signals and take every
-// other function from N; they never branch on a value.
+// A number system is a set of types and functions, not one scalar; README.md has the table of what it must offer. On
+// the host all types are one plain scalar. Effects use operators between coefficients and signals and take every other
+// function from N; they never branch on a value.
 #pragma once
 
 #include <cstddef>
@@ -27,15 +19,21 @@ enum class Balance : std::uint8_t { motor, transmission, load };
 // shift: changes a signal before any other effect sees it; modulate: scales another effect; source: adds a torque.
 enum class Phase : std::uint8_t { shift, modulate, source };
 
-// linear: the torque is proportional to it; shape: searched for within bounds; given: stated by the user.
-enum class Kind : std::uint8_t { linear, shape, given };
+// linear: the torque is proportional to it (and to all that are stated per it); shape: searched for within bounds;
+// given: stated by the user; grid: set from the range of the data where the model does not state it, and then known.
+enum class Kind : std::uint8_t { linear, shape, given, grid };
 
 // Where the bounds of a shape parameter come from when data are at hand.
 enum class Limit : std::uint8_t {
-  stated,    // low and high below hold for any data
-  velocity,  // a motor velocity: above what the mask leaves visible, below a quarter of the fast motion
-  travel,    // a motor angle: above what the filter resolves, below the shortest stroke between reversals
-  torsion,   // a torsion: above the resolution of the positions, below a third of the largest torsion
+  stated,            // low and high below hold for any data
+  velocity,          // a motor velocity: above what the mask leaves visible, below a quarter of the fast motion
+  travel,            // a motor angle: above what the filter resolves, below the shortest stroke between reversals
+  torsion,           // a torsion: above the resolution of the positions, below a third of the largest torsion
+  current,           // a current: between a tenth of the largest and the largest
+  inverse_velocity,  // one over a motor velocity, from a thousandth of the fast motion's to that of the slowest visible
+  inverse_travel,    // one over a motor angle: the inverse of travel
+  inverse_torsion,   // one over a torsion: from half the largest torsion's to above the resolution's
+  inverse_torque,    // one over a torque: from a hundredth of the largest torque's to thirty times it
 };
 
 // What an effect reads, so that it is offered only where it can be seen.
@@ -49,6 +47,7 @@ enum Signals : std::uint16_t {
   kCurrent = 64,
   kTemperature = 128,
   kTorqueInput = 256,  // where effort is given as torque or force, not as current
+  kTorqueScale = 512,  // needs something that fixes the torque scale: a known parameter, or a loaded torque sensor
 };
 
 // A unit on a rotary axis and its counterpart on a linear one.
@@ -67,6 +66,8 @@ inline constexpr Unit kAngle{"rad", "m"};
 inline constexpr Unit kStiffness{"N*m/rad", "N/m"};
 inline constexpr Unit kCurrent{"A", "A"};
 inline constexpr Unit kPerKelvin{"1/degC", "1/degC"};
+inline constexpr Unit kPerAngle{"1/rad", "1/m"};
+inline constexpr Unit kTime{"s", "s"};
 }  // namespace units
 
 inline constexpr double kUnbounded = std::numeric_limits<double>::infinity();
@@ -79,6 +80,12 @@ struct ParameterInfo {
   double low = -kUnbounded;
   double high = kUnbounded;
   Limit limit = Limit::stated;
+  // How a shape is searched for, where its own number is a poor measure: as a ratio to another parameter (so that the
+  // torque is proportional to that one), or as the root of a power. Limits and the bounds above then hold for
+  //   reduced = (value / value(per))^(1 / value(root_of)).
+  std::string_view per{};
+  std::string_view root_of{};
+  double share_of_range = 1.0;  // of the largest torsion, for kind grid
 };
 
 struct Description {
@@ -95,7 +102,16 @@ struct Description {
   std::string_view separated_by{};  // the experiment that tells them apart
   std::string_view replaces{};      // effects that it stands in for, separated by commas
   std::string_view modulates{};     // the effect that it scales and needs in the model
+  std::string_view contains{};      // effects whose torque it can draw as a part of its own
+  // Other balances that it adds to (bits of `on`); its parameters are estimated on its own balance, or, where that
+  // tells nothing of them, on the motor balance.
+  unsigned adds_to = 0;
+  bool told_by_motor = false;
+  bool host_only = false;  // too large for a drive
 };
+constexpr unsigned on(Balance balance) {
+  return 1U << static_cast<unsigned>(balance);
+}
 
 // Known facts of the drive that derivations use, and the bases of per-unit numbers (all one where numbers are SI).
 template <class P>
@@ -115,6 +131,8 @@ struct DriveConstants {
   P torsion_base{1.0};
   P torsion_rate_base{1.0};
   P temperature_base{1.0};
+  P current_base{1.0};
+  P time_base{1.0};  // of Inputs::elapsed: one tick on a drive
 };
 
 // Signals common to all effects, computed once a tick. Direction is an input: regression passes a smooth sign, a
@@ -139,6 +157,7 @@ struct Inputs {
   typename N::Value temperature{};
   typename N::Value viscous_scale{};  // one unless an effect modulates
   typename N::Value coulomb_scale{};
+  typename N::Value elapsed{};  // since the inputs before; one on a drive, whose time base is its tick
 };
 
 template <class N>

@@ -91,7 +91,7 @@ class TrialFixed {
   static constexpr Value scaled(Gain g, Value x) {
     return {static_cast<std::int32_t>(shift_right(product(g, x.raw), kMantissaBits - g.exponent))};
   }
-  static constexpr Travel scaled(StepGain g, Step x) {
+  static constexpr Travel travel(StepGain g, Step x) {
     return {shift_right(product(g, x.raw), kMantissaBits + kAngleBits - kTravelBits - g.exponent)};
   }
   static constexpr Value magnitude(Value x) { return {x.raw < 0 ? -x.raw : x.raw}; }

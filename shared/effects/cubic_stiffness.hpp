@@ -1,0 +1,39 @@
+#pragma once
+#include "shared/effects/effect.hpp"
+
+namespace flexspline::effects {
+
+struct CubicStiffness : Stateless {
+  static constexpr Description kInfo{
+      .name = "cubic_stiffness",
+      .balance = Balance::transmission,
+      .reads = kTorsion | kTorque,
+      .equation = "K3 dq^3",
+      .shows_over = "torsion, odd",
+      .source = "report eq. 37, 77",
+      .explanation = "The spring gets stiffer the more it is twisted.",
+      .causes =
+          "Usual in strain-wave gears: more teeth share the load as it grows. A soft start is also what wear "
+          "looks like.",
+      .rivals = "backlash,piecewise_stiffness",
+      .separated_by = "multi-sine, small amplitude about zero, beside one up to the peak torque",
+  };
+  static constexpr ParameterInfo kParameters[] = {
+      {.name = "stiffness", .unit = {"N*m/rad^3", "N/m^3"}, .usual = 3e8},
+  };
+  template <class N>
+  struct Coefficients {
+    typename N::Gain stiffness;
+  };
+  template <class N, class P>
+  static Coefficients<N> derive(const P* p, const DriveConstants<P>& d) {
+    return {N::gain(p[0] * d.torsion_base * d.torsion_base * d.torsion_base / d.output_torque_base)};
+  }
+  template <class N>
+  static void evaluate(const State<N>&, const Coefficients<N>& c, const Inputs<N>& in, Torques<N>& out) {
+    out.transmission += c.stiffness * N::times(in.torsion, N::times(in.torsion, in.torsion));
+  }
+};
+FLEXSPLINE_EFFECT(31, CubicStiffness);
+
+}  // namespace flexspline::effects

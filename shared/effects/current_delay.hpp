@@ -1,0 +1,53 @@
+#pragma once
+#include "shared/effects/effect.hpp"
+
+namespace flexspline::effects {
+
+struct CurrentDelay {
+  static constexpr Description kInfo{
+      .name = "current_delay",
+      .reads = kCurrent,
+      .equation = "Km (i(t) - i(t-d))",
+      .shows_over = "current slope",
+      .source = "sampling, filters",
+      .explanation = "The motor feels the current later than the log says.",
+      .causes =
+          "Filters and sampling in the amplifier, a command that was logged instead of the measured current, "
+          "clocks that differ.",
+      .rivals = "inertia",
+      .separated_by = "motion at several frequencies up to the current loop's bandwidth",
+  };
+  static constexpr ParameterInfo kParameters[] = {
+      {.name = "delay", .unit = units::kTime, .kind = Kind::shape, .usual = 1e-3, .low = 1e-6, .high = 0.02},
+  };
+  template <class N>
+  struct Coefficients {
+    typename N::Gain torque;
+    typename N::Gain per_time;
+  };
+  // The delay's first-order all-pass, 2/(1 + s d/2) - 1, whose phase errs by (2 pi f d)^3/12. The state is how far the
+  // low-pass in it lags behind the current: nought at rest, so that a record may begin at any current.
+  template <class N>
+  struct State {
+    typename N::State lag{};
+  };
+  template <class N, class P>
+  static Coefficients<N> derive(const P* p, const DriveConstants<P>& d) {
+    const P two(2.0);
+    return {N::gain(two * d.torque_constant * d.current_base / d.torque_base), N::gain(two * d.time_base / p[0])};
+  }
+  // Exact for a current that is a straight line between two inputs.
+  template <class N>
+  static void advance(State<N>& state, const Coefficients<N>& c, const Inputs<N>& now, const Inputs<N>& before) {
+    const typename N::Travel share = N::travel(c.per_time, now.elapsed);
+    const typename N::State rise = N::times(N::widen(now.current - before.current), N::exp_mean(share));
+    state.lag = N::relax(state.lag, typename N::State{}, N::exp_negative(share)) + rise;
+  }
+  template <class N>
+  static void evaluate(const State<N>& state, const Coefficients<N>& c, const Inputs<N>&, Torques<N>& out) {
+    out.motor += c.torque * N::narrow(state.lag);
+  }
+};
+FLEXSPLINE_EFFECT(29, CurrentDelay);
+
+}  // namespace flexspline::effects

@@ -1,0 +1,44 @@
+#pragma once
+#include "shared/effects/effect.hpp"
+
+namespace flexspline::effects {
+
+struct CurrentSaturation : Stateless {
+  static constexpr Description kInfo{
+      .name = "current_saturation",
+      .reads = kCurrent,
+      .equation = "Km (i - sat(i))",
+      .shows_over = "current, clipped",
+      .source = "report eq. 26",
+      .explanation = "The amplifier gives no more than its limit, although the log shows a larger current.",
+      .causes =
+          "A current limit in the amplifier, a supply voltage that is too low at speed; the logged current is "
+          "the command.",
+      .rivals = "torque_constant_saturation",
+      .separated_by = "slow sine of current with a rising amplitude in locked load",
+  };
+  static constexpr ParameterInfo kParameters[] = {
+      {.name = "limit",
+       .unit = units::kCurrent,
+       .kind = Kind::shape,
+       .usual = 3.0,
+       .low = 1e-6,
+       .limit = Limit::current},
+  };
+  template <class N>
+  struct Coefficients {
+    typename N::Gain torque;
+    typename N::Value limit;
+  };
+  template <class N, class P>
+  static Coefficients<N> derive(const P* p, const DriveConstants<P>& d) {
+    return {N::gain(d.torque_constant * d.current_base / d.torque_base), N::value(p[0] / d.current_base)};
+  }
+  template <class N>
+  static void evaluate(const State<N>&, const Coefficients<N>& c, const Inputs<N>& in, Torques<N>& out) {
+    out.motor += c.torque * (in.current - N::clamp(in.current, c.limit));
+  }
+};
+FLEXSPLINE_EFFECT(28, CurrentSaturation);
+
+}  // namespace flexspline::effects

@@ -1,0 +1,69 @@
+#pragma once
+#include "shared/effects/effect.hpp"
+
+namespace flexspline::effects {
+
+struct DahlHysteresis {
+  static constexpr Description kInfo{
+      .name = "dahl_hysteresis",
+      .balance = Balance::transmission,
+      .reads = kTorsion | kTorque,
+      .equation = "T' = sigma v abs(1 - T/Tc s(v))^i s(1 - T/Tc s(v))",
+      .shows_over = "loop, rate independent",
+      .source = "Dahl; report eq. 65",
+      .explanation =
+          "Twisting back and forth loses the same energy however slowly it is done: part of the torque follows "
+          "the last reversal, not the torsion alone.",
+      .causes = "Friction inside the flexspline, its bolted joints and the mesh.",
+      .rivals =
+          "structural_damping,modified_dahl_hysteresis,bouc_wen_hysteresis,duhem_hysteresis,prandtl_ishlinskii_"
+          "hysteresis",
+      .separated_by = "the same torsion amplitude at a second frequency: a loop that stays as it is",
+  };
+  static constexpr ParameterInfo kParameters[] = {
+      {.name = "torque", .unit = units::kTorque, .usual = 2.0, .low = 0.0},
+      {.name = "stiffness",
+       .unit = units::kStiffness,
+       .kind = Kind::shape,
+       .usual = 5000.0,
+       .low = 1e-9,
+       .limit = Limit::inverse_torsion,
+       .per = "torque"},
+      {.name = "exponent", .unit = units::kNone, .kind = Kind::shape, .usual = 1.0, .low = 0.5, .high = 4.0},
+  };
+  template <class N>
+  struct Coefficients {
+    typename N::Gain torque;
+    typename N::Gain per_torsion;
+    typename N::Exponent exponent;
+    typename N::Exponent less_one;
+  };
+  // Share of the full torque, -1 to 1.
+  template <class N>
+  struct State {
+    typename N::State carried{};
+  };
+  template <class N, class P>
+  static Coefficients<N> derive(const P* p, const DriveConstants<P>& d) {
+    return {N::gain(p[0] / d.output_torque_base), N::gain(p[1] * d.torsion_base / p[0]), N::exponent(p[2]),
+            N::exponent(p[2] - P(1.0))};
+  }
+  // What is left to the limit, u = abs(s - T/Tc), obeys u' = -u^i over travel x = sigma abs(dq)/Tc, whose solution is
+  // u0 times the q-exponential of x u0^(i-1).
+  template <class N>
+  static void advance(State<N>& state, const Coefficients<N>& c, const Inputs<N>& now, const Inputs<N>& before) {
+    const typename N::Value torsion = now.torsion - before.torsion;
+    const typename N::State limit = N::sign(torsion);
+    const typename N::Value left = N::narrow(N::magnitude(limit - state.carried));
+    const typename N::Travel travel =
+        N::times(N::travel(c.per_torsion, N::magnitude(torsion)), N::pow_abs(left, c.less_one));
+    state.carried = N::relax(state.carried, limit, N::q_exp_negative(travel, c.exponent));
+  }
+  template <class N>
+  static void evaluate(const State<N>& state, const Coefficients<N>& c, const Inputs<N>&, Torques<N>& out) {
+    out.transmission += c.torque * N::narrow(state.carried);
+  }
+};
+FLEXSPLINE_EFFECT(33, DahlHysteresis);
+
+}  // namespace flexspline::effects

@@ -1,0 +1,88 @@
+#pragma once
+#include "shared/effects/effect.hpp"
+
+namespace flexspline::effects {
+
+struct DuhemHysteresis {
+  static constexpr Description kInfo{
+      .name = "duhem_hysteresis",
+      .balance = Balance::transmission,
+      .reads = kTorsion | kTorque,
+      .equation =
+          "replaces stiffness and damping: T' = a abs(v) (phi(dq) - T) + b v, phi(x) = phi_0 + phi_1 x + phi_2 "
+          "x^2 + phi_3 x^3",
+      .shows_over = "loop, rate independent",
+      .source = "Duhem; report eq. 67, with phi of the torsion",
+      .explanation =
+          "One law for spring and loop together: the torque follows a slope b and is drawn towards a curve phi "
+          "of the torsion.",
+      .causes = "Friction inside the flexspline and the mesh, described together with the stiffness.",
+      .rivals = "dahl_hysteresis,bouc_wen_hysteresis,structural_damping,prandtl_ishlinskii_hysteresis",
+      .separated_by = "the same torsion amplitude at a second frequency: a loop that stays as it is",
+      .replaces = "linear_stiffness,cubic_stiffness,quadratic_stiffness,structural_damping",
+  };
+  static constexpr ParameterInfo kParameters[] = {
+      {.name = "rate",
+       .unit = units::kPerAngle,
+       .kind = Kind::shape,
+       .usual = 2500.0,
+       .low = 1e-9,
+       .limit = Limit::inverse_torsion},
+      {.name = "stiffness", .unit = units::kStiffness, .usual = 11300.0},
+      {.name = "phi_0", .unit = units::kTorque, .usual = 0.0},
+      {.name = "phi_1", .unit = units::kStiffness, .usual = 6300.0},
+      {.name = "phi_2", .unit = {"N*m/rad^2", "N/m^2"}, .usual = 0.0},
+      {.name = "phi_3", .unit = {"N*m/rad^3", "N/m^3"}, .usual = 3e8},
+  };
+  template <class N>
+  struct Coefficients {
+    typename N::Gain rate;
+    typename N::Gain stiffness;
+    typename N::Value half_phi_0;
+    typename N::Gain half_phi_1;
+    typename N::Gain half_phi_2;
+    typename N::Gain half_phi_3;
+    typename N::Gain torque;
+  };
+  // The torque, in output torque bases.
+  template <class N>
+  struct State {
+    typename N::State torque{};
+  };
+  template <class N, class P>
+  static Coefficients<N> derive(const P* p, const DriveConstants<P>& d) {
+    const P half(0.5);
+    const P one = d.torsion_base / d.output_torque_base;
+    const P two = one * d.torsion_base;
+    const P three = two * d.torsion_base;
+    return {N::gain(p[0] * d.torsion_base),
+            N::gain(p[1] * one),
+            N::value(half * p[2] / d.output_torque_base),
+            N::gain(half * p[3] * one),
+            N::gain(half * p[4] * two),
+            N::gain(half * p[5] * three),
+            N::gain(P(1.0))};
+  }
+  template <class N>
+  static typename N::Value half_phi(const Coefficients<N>& c, typename N::Value x) {
+    const typename N::Value square = N::times(x, x);
+    return c.half_phi_0 + N::scaled(c.half_phi_1, x) + N::scaled(c.half_phi_2, square) +
+           N::scaled(c.half_phi_3, N::times(square, x));
+  }
+  // Exact for the phi in the middle of the step: T' = -a abs(v) (T - phi) + b v is linear in T.
+  template <class N>
+  static void advance(State<N>& state, const Coefficients<N>& c, const Inputs<N>& now, const Inputs<N>& before) {
+    const typename N::Value torsion = now.torsion - before.torsion;
+    const typename N::Travel travel = N::travel(c.rate, N::magnitude(torsion));
+    const typename N::Value phi = half_phi(c, now.torsion) + half_phi(c, before.torsion);
+    state.torque = N::relax(state.torque, N::widen(phi), N::exp_negative(travel)) +
+                   N::times(N::widen(c.stiffness, torsion), N::exp_mean(travel));
+  }
+  template <class N>
+  static void evaluate(const State<N>& state, const Coefficients<N>& c, const Inputs<N>&, Torques<N>& out) {
+    out.transmission += c.torque * N::narrow(state.torque);
+  }
+};
+FLEXSPLINE_EFFECT(35, DuhemHysteresis);
+
+}  // namespace flexspline::effects

@@ -1,0 +1,62 @@
+#pragma once
+#include "shared/effects/effect.hpp"
+
+namespace flexspline::effects {
+
+struct ModifiedDahlHysteresis {
+  static constexpr Description kInfo{
+      .name = "modified_dahl_hysteresis",
+      .balance = Balance::transmission,
+      .reads = kTorsion | kTorque,
+      .equation = "T' = sigma v abs(1 - T/Tc s(v))^2 s(1 - T/Tc s(v))",
+      .shows_over = "loop, rate independent",
+      .source = "report eq. 66",
+      .explanation =
+          "As dahl_hysteresis with the exponent two: a steep start after each reversal and a slow approach to "
+          "the limit.",
+      .causes = "Friction inside the flexspline, its bolted joints and the mesh.",
+      .rivals = "dahl_hysteresis,structural_damping,bouc_wen_hysteresis,duhem_hysteresis,prandtl_ishlinskii_hysteresis",
+      .separated_by = "the same torsion amplitude at a second frequency: a loop that stays as it is",
+  };
+  static constexpr ParameterInfo kParameters[] = {
+      {.name = "torque", .unit = units::kTorque, .usual = 2.0, .low = 0.0},
+      {.name = "stiffness",
+       .unit = units::kStiffness,
+       .kind = Kind::shape,
+       .usual = 5000.0,
+       .low = 1e-9,
+       .limit = Limit::inverse_torsion,
+       .per = "torque"},
+  };
+  template <class N>
+  struct Coefficients {
+    typename N::Gain torque;
+    typename N::Gain per_torsion;
+    typename N::Exponent exponent;
+  };
+  // Share of the full torque, -1 to 1.
+  template <class N>
+  struct State {
+    typename N::State carried{};
+  };
+  template <class N, class P>
+  static Coefficients<N> derive(const P* p, const DriveConstants<P>& d) {
+    return {N::gain(p[0] / d.output_torque_base), N::gain(p[1] * d.torsion_base / p[0]), N::exponent(P(2.0))};
+  }
+  // See dahl_hysteresis: u becomes u/(1 + x u).
+  template <class N>
+  static void advance(State<N>& state, const Coefficients<N>& c, const Inputs<N>& now, const Inputs<N>& before) {
+    const typename N::Value torsion = now.torsion - before.torsion;
+    const typename N::State limit = N::sign(torsion);
+    const typename N::Value left = N::narrow(N::magnitude(limit - state.carried));
+    const typename N::Travel travel = N::times(N::travel(c.per_torsion, N::magnitude(torsion)), left);
+    state.carried = N::relax(state.carried, limit, N::q_exp_negative(travel, c.exponent));
+  }
+  template <class N>
+  static void evaluate(const State<N>& state, const Coefficients<N>& c, const Inputs<N>&, Torques<N>& out) {
+    out.transmission += c.torque * N::narrow(state.carried);
+  }
+};
+FLEXSPLINE_EFFECT(34, ModifiedDahlHysteresis);
+
+}  // namespace flexspline::effects

@@ -1,0 +1,118 @@
+#pragma once
+#include "shared/effects/effect.hpp"
+
+namespace flexspline::effects {
+
+struct PreisachHysteresis {
+  static constexpr Description kInfo{
+      .name = "preisach_hysteresis",
+      .balance = Balance::transmission,
+      .reads = kTorsion | kTorque,
+      .equation = "sum over j >= k of weight_jk times a relay that goes up at level j and down at level k of dq",
+      .shows_over = "loops within loops",
+      .source = "Preisach",
+      .explanation =
+          "The loop as a sum of relays with two thresholds each: the most general of the rate-independent laws "
+          "here, with the most parameters. For analysis on the host.",
+      .causes = "Friction inside the flexspline and the mesh, of many contacts that slip one after the other.",
+      .rivals = "prandtl_ishlinskii_hysteresis,dahl_hysteresis,bouc_wen_hysteresis,duhem_hysteresis",
+      .separated_by = "sines of several amplitudes that ride on a slower one, away from zero",
+      .contains = "linear_stiffness",
+      .host_only = true,
+  };
+  static constexpr ParameterInfo kParameters[] = {
+      {.name = "span", .unit = units::kAngle, .kind = Kind::grid, .usual = 1.6e-3, .low = 1e-12},
+      {.name = "weight_11", .unit = units::kTorque, .usual = 0.05},
+      {.name = "weight_21", .unit = units::kTorque, .usual = 0.05},
+      {.name = "weight_22", .unit = units::kTorque, .usual = 0.05},
+      {.name = "weight_31", .unit = units::kTorque, .usual = 0.05},
+      {.name = "weight_32", .unit = units::kTorque, .usual = 0.05},
+      {.name = "weight_33", .unit = units::kTorque, .usual = 0.05},
+      {.name = "weight_41", .unit = units::kTorque, .usual = 0.01},
+      {.name = "weight_42", .unit = units::kTorque, .usual = 0.05},
+      {.name = "weight_43", .unit = units::kTorque, .usual = 0.05},
+      {.name = "weight_44", .unit = units::kTorque, .usual = 0.05},
+      {.name = "weight_51", .unit = units::kTorque, .usual = 0.01},
+      {.name = "weight_52", .unit = units::kTorque, .usual = 0.01},
+      {.name = "weight_53", .unit = units::kTorque, .usual = 0.05},
+      {.name = "weight_54", .unit = units::kTorque, .usual = 0.05},
+      {.name = "weight_55", .unit = units::kTorque, .usual = 0.05},
+      {.name = "weight_61", .unit = units::kTorque, .usual = 0.01},
+      {.name = "weight_62", .unit = units::kTorque, .usual = 0.01},
+      {.name = "weight_63", .unit = units::kTorque, .usual = 0.01},
+      {.name = "weight_64", .unit = units::kTorque, .usual = 0.05},
+      {.name = "weight_65", .unit = units::kTorque, .usual = 0.05},
+      {.name = "weight_66", .unit = units::kTorque, .usual = 0.05},
+      {.name = "weight_71", .unit = units::kTorque, .usual = 0.01},
+      {.name = "weight_72", .unit = units::kTorque, .usual = 0.01},
+      {.name = "weight_73", .unit = units::kTorque, .usual = 0.01},
+      {.name = "weight_74", .unit = units::kTorque, .usual = 0.01},
+      {.name = "weight_75", .unit = units::kTorque, .usual = 0.05},
+      {.name = "weight_76", .unit = units::kTorque, .usual = 0.05},
+      {.name = "weight_77", .unit = units::kTorque, .usual = 0.05},
+      {.name = "weight_81", .unit = units::kTorque, .usual = 0.01},
+      {.name = "weight_82", .unit = units::kTorque, .usual = 0.01},
+      {.name = "weight_83", .unit = units::kTorque, .usual = 0.01},
+      {.name = "weight_84", .unit = units::kTorque, .usual = 0.01},
+      {.name = "weight_85", .unit = units::kTorque, .usual = 0.01},
+      {.name = "weight_86", .unit = units::kTorque, .usual = 0.05},
+      {.name = "weight_87", .unit = units::kTorque, .usual = 0.05},
+      {.name = "weight_88", .unit = units::kTorque, .usual = 0.05},
+      {.name = "weight_91", .unit = units::kTorque, .usual = 0.01},
+      {.name = "weight_92", .unit = units::kTorque, .usual = 0.01},
+      {.name = "weight_93", .unit = units::kTorque, .usual = 0.01},
+      {.name = "weight_94", .unit = units::kTorque, .usual = 0.01},
+      {.name = "weight_95", .unit = units::kTorque, .usual = 0.01},
+      {.name = "weight_96", .unit = units::kTorque, .usual = 0.01},
+      {.name = "weight_97", .unit = units::kTorque, .usual = 0.05},
+      {.name = "weight_98", .unit = units::kTorque, .usual = 0.05},
+      {.name = "weight_99", .unit = units::kTorque, .usual = 0.05},
+  };
+  static constexpr int kLevels = 9;
+  static constexpr int kRelays = kLevels * (kLevels + 1) / 2;
+  template <class N>
+  struct Coefficients {
+    typename N::Value up[kLevels];  // centres of the edges
+    typename N::Value down[kLevels];
+    typename N::Gain per_edge;
+    typename N::Gain weight[kRelays];
+  };
+  template <class N>
+  struct State {
+    typename N::Value relay[kRelays]{};
+  };
+  // Levels (2 m - 10)/9 of the span, m = 1 to 9, each a ninth of the span higher for going up and lower for going down.
+  template <class N, class P>
+  static Coefficients<N> derive(const P* p, const DriveConstants<P>& d) {
+    Coefficients<N> c;
+    const P edge = p[0] / P(1.0 * kLevels);
+    for (int m = 0; m < kLevels; ++m) {
+      c.up[m] = N::value(edge * P(2.0 * m - 7.0) / d.torsion_base);
+      c.down[m] = N::value(edge * P(2.0 * m - 9.0) / d.torsion_base);
+    }
+    c.per_edge = N::gain(d.torsion_base / edge);
+    for (int i = 0; i < kRelays; ++i) c.weight[i] = N::gain(p[1 + i] / d.output_torque_base);
+    return c;
+  }
+  // A relay goes over along an edge that is as wide as the distance of two levels: what a finer grid of relays does
+  // between them. So the sum has no steps where the gear has none.
+  template <class N>
+  static void advance(State<N>& state, const Coefficients<N>& c, const Inputs<N>& now, const Inputs<N>&) {
+    typename N::Value up[kLevels];
+    typename N::Value down[kLevels];
+    for (int m = 0; m < kLevels; ++m) {
+      up[m] = N::clamp(N::scaled(c.per_edge, now.torsion - c.up[m]), N::one());
+      down[m] = N::clamp(N::scaled(c.per_edge, now.torsion - c.down[m]), N::one());
+    }
+    int at = 0;
+    for (int j = 0; j < kLevels; ++j)
+      for (int k = 0; k <= j; ++k, ++at) state.relay[at] = N::between(state.relay[at], up[j], down[k]);
+  }
+  template <class N>
+  static void evaluate(const State<N>& state, const Coefficients<N>& c, const Inputs<N>&, Torques<N>& out) {
+    for (int i = 0; i < kRelays; ++i) out.transmission += c.weight[i] * state.relay[i];
+  }
+};
+FLEXSPLINE_EFFECT(38, PreisachHysteresis);
+
+}  // namespace flexspline::effects

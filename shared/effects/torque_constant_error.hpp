@@ -1,0 +1,38 @@
+#pragma once
+#include "shared/effects/effect.hpp"
+
+namespace flexspline::effects {
+
+struct TorqueConstantError : Stateless {
+  static constexpr Description kInfo{
+      .name = "torque_constant_error",
+      .reads = kCurrent | kTorqueScale,
+      .equation = "-kappa Km i",
+      .shows_over = "scale",
+      .source = "report eq. 61: inertia supplied",
+      .explanation = "The motor makes more torque per ampere than its data sheet says (kappa positive), or less.",
+      .causes =
+          "Spread of magnets and windings (10 % is usual), a warm magnet, a wrong commutation angle, peak "
+          "against RMS amperes.",
+      .rivals = "torque_sensor_gain,torque_constant_saturation",
+      .separated_by = "a known inertia or weight at the output, or the back EMF at a known speed",
+  };
+  static constexpr ParameterInfo kParameters[] = {
+      {.name = "ratio", .unit = units::kNone, .usual = 0.2, .low = -0.5, .high = 0.5},
+  };
+  template <class N>
+  struct Coefficients {
+    typename N::Gain ratio;
+  };
+  template <class N, class P>
+  static Coefficients<N> derive(const P* p, const DriveConstants<P>& d) {
+    return {N::gain(-p[0] * d.torque_constant * d.current_base / d.torque_base)};
+  }
+  template <class N>
+  static void evaluate(const State<N>&, const Coefficients<N>& c, const Inputs<N>& in, Torques<N>& out) {
+    out.motor += c.ratio * in.current;
+  }
+};
+FLEXSPLINE_EFFECT(26, TorqueConstantError);
+
+}  // namespace flexspline::effects

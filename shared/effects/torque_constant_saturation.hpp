@@ -1,0 +1,36 @@
+#pragma once
+#include "shared/effects/effect.hpp"
+
+namespace flexspline::effects {
+
+struct TorqueConstantSaturation : Stateless {
+  static constexpr Description kInfo{
+      .name = "torque_constant_saturation",
+      .reads = kCurrent,
+      .equation = "Km k3 i^3",
+      .shows_over = "current, at its peaks",
+      .source = "magnetic saturation",
+      .explanation = "At large currents the iron saturates, and an ampere makes less torque than at small ones.",
+      .causes = "A motor driven near its peak current. Check the torque constant over current in its data sheet.",
+      .rivals = "load_dependent_friction,torque_constant_error,cubic_stiffness",
+      .separated_by = "a constant external load in both directions at low current",
+  };
+  static constexpr ParameterInfo kParameters[] = {
+      {.name = "coefficient", .unit = {"1/A^2", "1/A^2"}, .usual = 5e-3},
+  };
+  template <class N>
+  struct Coefficients {
+    typename N::Gain coefficient;
+  };
+  template <class N, class P>
+  static Coefficients<N> derive(const P* p, const DriveConstants<P>& d) {
+    return {N::gain(p[0] * d.torque_constant * d.current_base * d.current_base * d.current_base / d.torque_base)};
+  }
+  template <class N>
+  static void evaluate(const State<N>&, const Coefficients<N>& c, const Inputs<N>& in, Torques<N>& out) {
+    out.motor += c.coefficient * N::times(in.current, N::times(in.current, in.current));
+  }
+};
+FLEXSPLINE_EFFECT(27, TorqueConstantSaturation);
+
+}  // namespace flexspline::effects

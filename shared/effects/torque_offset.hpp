@@ -1,0 +1,42 @@
+#pragma once
+#include "shared/effects/effect.hpp"
+
+namespace flexspline::effects {
+
+struct TorqueOffset : Stateless {
+  static constexpr Description kInfo{
+      .name = "torque_offset",
+      .balance = Balance::transmission,
+      .reads = kTorque,
+      .equation = "T0, in the measured T only; motor balance -T0/N",
+      .shows_over = "bias",
+      .source = "K0 in report eq. 69; bridge",
+      .explanation = "The torque sensor reads something although there is no torque.",
+      .causes = "Offset of the strain-gauge bridge or its amplifier; drifts with temperature and mounting.",
+      .rivals = "torsion_zero,quadratic_stiffness",
+      .separated_by = "a record with the output free and the drive off",
+      .adds_to = on(Balance::motor) | on(Balance::load),
+  };
+  static constexpr ParameterInfo kParameters[] = {
+      {.name = "torque", .unit = units::kTorque, .usual = 0.2},
+  };
+  template <class N>
+  struct Coefficients {
+    typename N::Value torque;
+    typename N::Value motor;
+  };
+  template <class N, class P>
+  static Coefficients<N> derive(const P* p, const DriveConstants<P>& d) {
+    return {N::value(p[0] / d.output_torque_base), N::value(-p[0] / (d.gear_ratio * d.torque_base))};
+  }
+  // A sensor is no spring: what it adds to the reading is taken back where the reading stands for the torque.
+  template <class N>
+  static void evaluate(const State<N>&, const Coefficients<N>& c, const Inputs<N>&, Torques<N>& out) {
+    out.transmission += N::sum(c.torque);
+    out.load += N::sum(c.torque);
+    out.motor += N::sum(c.motor);
+  }
+};
+FLEXSPLINE_EFFECT(41, TorqueOffset);
+
+}  // namespace flexspline::effects

@@ -1,0 +1,45 @@
+#pragma once
+#include "shared/effects/effect.hpp"
+
+namespace flexspline::effects {
+
+struct TorqueSensorGain : Stateless {
+  static constexpr Description kInfo{
+      .name = "torque_sensor_gain",
+      .balance = Balance::transmission,
+      .reads = kTorque | kCurrent | kTorqueScale,
+      .equation = "ratio times the modelled T, in the measured T only; motor balance -ratio/(1+ratio) T/N",
+      .shows_over = "scale",
+      .source = "bridge",
+      .explanation = "The torque sensor reads too much (ratio positive), or too little.",
+      .causes = "Calibration of the bridge, a part of the load that bypasses it.",
+      .rivals = "torque_constant_error,linear_stiffness",
+      .separated_by = "a known weight on a known lever",
+      .adds_to = on(Balance::motor) | on(Balance::load),
+      .told_by_motor = true,
+  };
+  static constexpr ParameterInfo kParameters[] = {
+      {.name = "ratio", .unit = units::kNone, .kind = Kind::shape, .usual = 0.03, .low = -0.3, .high = 0.3},
+  };
+  template <class N>
+  struct Coefficients {
+    typename N::Gain torque;
+    typename N::Gain motor;
+  };
+  // Of the measured torque, the share ratio/(1 + ratio) is not there.
+  template <class N, class P>
+  static Coefficients<N> derive(const P* p, const DriveConstants<P>& d) {
+    const P share = p[0] / (P(1.0) + p[0]);
+    return {N::gain(share), N::gain(-share * d.output_torque_base / (d.gear_ratio * d.torque_base))};
+  }
+  // A sensor is no spring: what it adds to the reading is taken back where the reading stands for the torque.
+  template <class N>
+  static void evaluate(const State<N>&, const Coefficients<N>& c, const Inputs<N>& in, Torques<N>& out) {
+    out.transmission += c.torque * in.torque;
+    out.load += c.torque * in.torque;
+    out.motor += c.motor * in.torque;
+  }
+};
+FLEXSPLINE_EFFECT(42, TorqueSensorGain);
+
+}  // namespace flexspline::effects

@@ -1,0 +1,53 @@
+#pragma once
+#include "shared/effects/effect.hpp"
+
+namespace flexspline::effects {
+
+struct TorqueSensorRipple : Stateless {
+  static constexpr Description kInfo{
+      .name = "torque_sensor_ripple",
+      .balance = Balance::transmission,
+      .reads = kTorque | kMotorAngle,
+      .equation = "a cos(k q) + b sin(k q), in the measured T only; motor balance with -1/N",
+      .shows_over = "motor angle, not in motion",
+      .source = "report 5.3",
+      .explanation =
+          "The torque sensor reads a ripple that repeats with the motor angle and that the drive does not feel: "
+          "strain gauges on the flexspline see it bend round once for each lobe.",
+      .causes = "Gauges on the flexspline itself; misalignment of the gauges.",
+      .rivals = "torque_ripple,kinematic_error",
+      .separated_by = "slow constant speed over many turns without load",
+      .adds_to = on(Balance::motor) | on(Balance::load),
+  };
+  static constexpr ParameterInfo kParameters[] = {
+      {.name = "order", .unit = units::kNone, .kind = Kind::given, .usual = 2.0, .low = 0.01, .high = 1000.0},
+      {.name = "cosine", .unit = units::kTorque, .usual = 0.3},
+      {.name = "sine", .unit = units::kTorque, .usual = 0.0},
+  };
+  template <class N>
+  struct Coefficients {
+    typename N::Order order;
+    typename N::Gain cosine;
+    typename N::Gain sine;
+    typename N::Gain motor_cosine;
+    typename N::Gain motor_sine;
+  };
+  template <class N, class P>
+  static Coefficients<N> derive(const P* p, const DriveConstants<P>& d) {
+    const P motor = P(-1.0) / (d.gear_ratio * d.torque_base);
+    return {N::order(p[0] * d.turn_angle_scale), N::gain(p[1] / d.output_torque_base),
+            N::gain(p[2] / d.output_torque_base), N::gain(p[1] * motor), N::gain(p[2] * motor)};
+  }
+  // A sensor is no spring: what it adds to the reading is taken back where the reading stands for the torque.
+  template <class N>
+  static void evaluate(const State<N>&, const Coefficients<N>& c, const Inputs<N>& in, Torques<N>& out) {
+    const auto wave = N::sincos(N::times_order(in.angle, c.order));
+    const typename N::Sum ripple = c.cosine * wave.cosine + c.sine * wave.sine;
+    out.transmission += ripple;
+    out.load += ripple;
+    out.motor += c.motor_cosine * wave.cosine + c.motor_sine * wave.sine;
+  }
+};
+FLEXSPLINE_EFFECT(43, TorqueSensorRipple);
+
+}  // namespace flexspline::effects
