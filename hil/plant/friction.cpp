@@ -34,7 +34,22 @@ double MotorFriction::viscous_factor(double temperature_c) const {
   return std::exp(-temperature_coefficient * (temperature_c - temperature_reference));
 }
 
+double MotorFriction::coulomb_factor(double temperature_c) const {
+  return std::exp(-coulomb_temperature_coefficient * (temperature_c - temperature_reference));
+}
+
+double LuGre::limit(double w) const {
+  const double ratio = w / velocity;
+  return coulomb + (static_friction - coulomb) * std::exp(-ratio * ratio);
+}
+
 double MotorFriction::bristle(const FrictionPoint& at) const {
+  if (lugre.stiffness > 0.0) {
+    // For the mean g of a step the law is linear in z, and solved by travel.
+    const double most = 0.5 * (lugre.limit(at.velocity) + lugre.limit(at.anchor_velocity)) / lugre.stiffness;
+    const double limit = at.direction * most;
+    return limit + (at.bristle - limit) * std::exp(-at.direction * (at.angle - at.anchor) / most);
+  }
   if (dahl_presliding <= 0.0) return 0.0;
   const double limit = at.direction * dahl_presliding;
   return limit + (at.bristle - limit) * std::exp(-at.direction * (at.angle - at.anchor) / dahl_presliding);
@@ -48,13 +63,27 @@ FrictionTorque MotorFriction::evaluate(const FrictionPoint& at, double viscous_n
   FrictionTorque sum;
   sum.torque = viscous_now * at.velocity + viscous_asymmetry * along + coulomb_asymmetry;
   sum.by_velocity = viscous_now + viscous_asymmetry * s;
-  if (dahl_torque > 0.0) {
+  sum.torque += quadratic * at.velocity * along;
+  sum.by_velocity += 2.0 * quadratic * std::abs(along);
+  if (lugre.stiffness > 0.0) {
     const double z = bristle(at);
-    const double stiffness = dahl_torque / dahl_presliding;
+    const double slack = 1.0 - s * lugre.stiffness * z / lugre.limit(at.velocity);
+    sum.torque += dry_share * lugre.stiffness * z + lugre.damping * at.velocity * slack;
+    sum.by_angle += dry_share * lugre.stiffness * slack;
+    sum.by_velocity += lugre.damping * slack;
+  } else if (dahl_torque > 0.0) {
+    const double z = bristle(at);
+    const double stiffness = dry_share * dahl_torque / dahl_presliding;
     sum.torque += stiffness * z;
     sum.by_angle += stiffness * (1.0 - s * z / dahl_presliding);
   } else {
-    sum.torque += s * coulomb;
+    sum.torque += s * coulomb * dry_share;
+  }
+  for (const HessSoom& term : hess_soom) {
+    const double ratio = speed / term.velocity;
+    const double value = (s > 0.0 ? term.positive : term.negative) / (1.0 + ratio * ratio);
+    sum.torque += s * value;
+    sum.by_velocity -= value * 2.0 * ratio / (term.velocity * (1.0 + ratio * ratio));
   }
   for (const Stribeck& term : stribeck) add_stribeck(term, at, speed, sum);
   if (power_torque != 0.0) {
@@ -76,6 +105,13 @@ FrictionTorque MotorFriction::evaluate(const FrictionPoint& at, double viscous_n
     const double d = std::sin(term.order * at.angle);
     sum.torque += term.cosine * c + term.sine * d;
     sum.by_angle += term.order * (term.sine * c - term.cosine * d);
+  }
+  for (const Ripple& term : load_ripple) {
+    const double c = std::cos(term.order * at.angle);
+    const double d = std::sin(term.order * at.angle);
+    sum.torque += at.torque * (term.cosine * c + term.sine * d);
+    sum.by_torque += term.cosine * c + term.sine * d;
+    sum.by_angle += at.torque * term.order * (term.sine * c - term.cosine * d);
   }
   for (const TriangleRipple& term : triangle_ripple) add_triangle(term, at.angle, sum);
   return sum;

@@ -33,14 +33,33 @@ struct TriangleRipple {
   double phase = 0.0;
 };
 
+/// s F / (1 + (w/vs)^2), F by direction.
+struct HessSoom {
+  double positive = 0.0;
+  double negative = 0.0;
+  double velocity = 1.0;
+};
+
+/// s0 z + s1 z', z' = w - s0 |w| z/g, g = Fc + (Fs - Fc) exp(-(w/vs)^2). A stiffness of zero: the drive has none.
+struct LuGre {
+  double coulomb = 0.0;
+  double static_friction = 0.0;
+  double velocity = 1.0;
+  double stiffness = 0.0;
+  double damping = 0.0;
+
+  double limit(double velocity_rad_s) const;
+};
+
 /// What the friction on the motor shaft is evaluated at.
 struct FrictionPoint {
-  double direction = 0.0;  ///< +1 or -1: the branch of the set-valued sign
-  double velocity = 0.0;   ///< motor rad/s
-  double torque = 0.0;     ///< through the flexspline, output side, N m
-  double angle = 0.0;      ///< motor rad
-  double anchor = 0.0;     ///< motor angle at which the bristle stood at `bristle`
-  double bristle = 0.0;    ///< bristle deflection at the anchor, rad
+  double direction = 0.0;        ///< +1 or -1: the branch of the set-valued sign
+  double velocity = 0.0;         ///< motor rad/s
+  double torque = 0.0;           ///< through the flexspline, output side, N m
+  double angle = 0.0;            ///< motor rad
+  double anchor = 0.0;           ///< motor angle at which the bristle stood at `bristle`
+  double bristle = 0.0;          ///< bristle deflection at the anchor, rad
+  double anchor_velocity = 0.0;  ///< motor rad/s there
 };
 
 /// Torque that resists positive motion, and its partial derivatives.
@@ -62,7 +81,13 @@ struct MotorFriction {
   double power_exponent = 1.0;
   double power_reference = 1.0;
   double temperature_coefficient = 0.0;
+  double coulomb_temperature_coefficient = 0.0;
   double temperature_reference = 0.0;
+  double dry_share = 1.0;  ///< present factor on friction that does not depend on speed
+  double quadratic = 0.0;
+  std::vector<HessSoom> hess_soom;
+  std::vector<Ripple> load_ripple;  ///< times the torque through the flexspline
+  LuGre lugre;
   double dahl_torque = 0.0;
   double dahl_presliding = 0.0;
   std::vector<Stribeck> stribeck;
@@ -72,6 +97,9 @@ struct MotorFriction {
 
   /// Factor on the viscous coefficient at a temperature, exp(-b (temp - temp0)).
   double viscous_factor(double temperature_c) const;
+  /// The same on Coulomb friction and on what takes its place.
+  double coulomb_factor(double temperature_c) const;
+  bool has_bristle() const { return dahl_torque > 0.0 || lugre.stiffness > 0.0; }
   /// `viscous_now` is the viscous coefficient at the present temperature.
   FrictionTorque evaluate(const FrictionPoint& at, double viscous_now) const;
   /// Bristle deflection after the shaft went, in one direction, from the anchor to `angle`: the rate-independent law

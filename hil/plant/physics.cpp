@@ -11,6 +11,21 @@ namespace {
 
 using Apply = std::function<void(const Effect&, const Drive&, Physics&)>;
 
+// The catalogue's relays go over along an edge as wide as the distance of two levels. Here each is several sharp ones.
+void add_relays(const Effect& e, const Drive&, Physics& p) {
+  const double edge = e.value("span") / 9.0;
+  for (int j = 1; j <= 9; ++j)
+    for (int k = 1; k <= j; ++k) {
+      const double weight = e.value(fmt::format("weight_{}{}", j, k));
+      constexpr int kSharp = 6;
+      for (int i = 0; weight != 0.0 && i < kSharp; ++i) {
+        const double within = (2.0 * i + 1.0) / kSharp - 1.0;
+        p.transmission.loops.relays.push_back(
+            {edge * (2 * j - 9 + within), edge * (2 * k - 11 + within), weight / kSharp});
+      }
+    }
+}
+
 const std::map<std::string, Apply, std::less<>>& appliers() {
   static const std::map<std::string, Apply, std::less<>> kAppliers = {
       {"inertia", [](const Effect& e, const Drive&, Physics& p) { p.motor_inertia = e.value("inertia"); }},
@@ -65,14 +80,17 @@ const std::map<std::string, Apply, std::less<>>& appliers() {
        }},
       // The sensor's error is no torque: the recorder adds it to the reading.
       {"current_offset", [](const Effect&, const Drive&, Physics&) {}},
-      {"linear_stiffness", [](const Effect& e, const Drive&, Physics& p) { p.stiffness = e.value("stiffness"); }},
-      {"cubic_stiffness", [](const Effect& e, const Drive&, Physics& p) { p.cubic_stiffness = e.value("stiffness"); }},
+      {"linear_stiffness",
+       [](const Effect& e, const Drive&, Physics& p) { p.transmission.stiffness = e.value("stiffness"); }},
+      {"cubic_stiffness",
+       [](const Effect& e, const Drive&, Physics& p) { p.transmission.cubic_stiffness = e.value("stiffness"); }},
       {"structural_damping",
        [](const Effect& e, const Drive&, Physics& p) {
          p.damping_torque = e.value("torque");
          p.damping_exponent = e.value("exponent");
        }},
-      {"backlash", [](const Effect& e, const Drive&, Physics& p) { p.backlash_half_width = e.value("half_width"); }},
+      {"backlash",
+       [](const Effect& e, const Drive&, Physics& p) { p.transmission.backlash_half_width = e.value("half_width"); }},
       {"output_inertia", [](const Effect& e, const Drive&, Physics& p) { p.output_inertia = e.value("inertia"); }},
       {"output_viscous_friction",
        [](const Effect& e, const Drive&, Physics& p) { p.output_viscous = e.value("coefficient"); }},
@@ -83,6 +101,80 @@ const std::map<std::string, Apply, std::less<>>& appliers() {
          p.gravity_cosine = e.value("cosine");
          p.gravity_sine = e.value("sine");
        }},
+      {"stribeck_hess_soom",
+       [](const Effect& e, const Drive&, Physics& p) {
+         p.friction.hess_soom.push_back(
+             {e.value("amplitude_positive"), e.value("amplitude_negative"), e.value("velocity")});
+       }},
+      {"quadratic_drag",
+       [](const Effect& e, const Drive&, Physics& p) { p.friction.quadratic = e.value("coefficient"); }},
+      {"temperature_coulomb",
+       [](const Effect& e, const Drive& d, Physics& p) {
+         p.friction.coulomb_temperature_coefficient = e.value("coefficient");
+         p.friction.temperature_reference = d.temperature_reference_c;
+       }},
+      {"lugre_friction",
+       [](const Effect& e, const Drive&, Physics& p) {
+         p.friction.lugre = {e.value("coulomb"), e.value("static"), e.value("velocity"), e.value("stiffness"),
+                             e.value("damping")};
+       }},
+      {"load_scaled_ripple",
+       [](const Effect& e, const Drive&, Physics& p) {
+         p.friction.load_ripple.push_back({e.value("order"), e.value("cosine"), e.value("sine")});
+       }},
+      {"torque_constant_error",
+       [](const Effect& e, const Drive&, Physics& p) { p.torque_constant *= 1.0 + e.value("ratio"); }},
+      {"torque_constant_saturation",
+       [](const Effect& e, const Drive&, Physics& p) { p.torque_saturation = e.value("coefficient"); }},
+      {"current_saturation", [](const Effect& e, const Drive&, Physics& p) { p.current_limit_a = e.value("limit"); }},
+      {"quadratic_stiffness",
+       [](const Effect& e, const Drive&, Physics& p) { p.transmission.quadratic_stiffness = e.value("stiffness"); }},
+      {"piecewise_stiffness",
+       [](const Effect& e, const Drive&, Physics& p) {
+         p.transmission.slopes = {e.value("stiffness_1"), e.value("stiffness_2"), e.value("stiffness_3"),
+                                  e.value("torque_1"), e.value("torque_2")};
+       }},
+      {"dahl_hysteresis",
+       [](const Effect& e, const Drive&, Physics& p) {
+         p.transmission.loops.dahl.push_back({e.value("torque"), e.value("stiffness"), e.value("exponent"), 0.0});
+       }},
+      {"modified_dahl_hysteresis",
+       [](const Effect& e, const Drive&, Physics& p) {
+         p.transmission.loops.dahl.push_back({e.value("torque"), e.value("stiffness"), 2.0, 0.0});
+       }},
+      {"torque_proportional_hysteresis",
+       [](const Effect& e, const Drive&, Physics& p) {
+         p.transmission.loops.dahl.push_back({e.value("torque"), e.value("stiffness"), 1.0, e.value("ratio")});
+       }},
+      {"duhem_hysteresis",
+       [](const Effect& e, const Drive&, Physics& p) {
+         p.transmission.loops.duhem.push_back(
+             {e.value("rate"),
+              e.value("stiffness"),
+              {e.value("phi_0"), e.value("phi_1"), e.value("phi_2"), e.value("phi_3")}});
+       }},
+      {"bouc_wen_hysteresis",
+       [](const Effect& e, const Drive&, Physics& p) {
+         p.transmission.loops.bouc_wen.push_back(
+             {e.value("stiffness"), e.value("beta"), e.value("gamma"), e.value("exponent")});
+       }},
+      {"prandtl_ishlinskii_hysteresis",
+       [](const Effect& e, const Drive&, Physics& p) {
+         for (int j = 1; e.has(fmt::format("threshold_{}", j)); ++j)
+           p.transmission.loops.plays.push_back(
+               {e.value(fmt::format("threshold_{}", j)), e.value(fmt::format("weight_{}", j))});
+       }},
+      {"preisach_hysteresis", &add_relays},
+      {"kinematic_error",
+       [](const Effect& e, const Drive&, Physics& p) {
+         p.transmission.kinematic_error.push_back({e.value("order"), e.value("cosine"), e.value("sine")});
+       }},
+      // Errors of sensors are no torques: the recorder adds them to the readings, and makes current act late.
+      {"current_delay", [](const Effect&, const Drive&, Physics&) {}},
+      {"torque_offset", [](const Effect&, const Drive&, Physics&) {}},
+      {"torque_sensor_gain", [](const Effect&, const Drive&, Physics&) {}},
+      {"torque_sensor_ripple", [](const Effect&, const Drive&, Physics&) {}},
+      {"torsion_zero", [](const Effect&, const Drive&, Physics&) {}},
   };
   return kAppliers;
 }
@@ -108,6 +200,10 @@ Physics physics_of(const Drive& drive) {
     }
     found->second(effect, drive, physics);
   }
+  if (physics.transmission.slopes.stiffness_1 > 0.0 || !physics.transmission.loops.duhem.empty())
+    physics.transmission.stiffness = 0.0;  // these stand in for it
+  if (!physics.transmission.loops.duhem.empty()) physics.damping_torque = 0.0;
+  if (physics.friction.lugre.stiffness > 0.0) physics.friction.coulomb = 0.0;
   if (physics.friction.dahl_torque > 0.0) {
     if (!(physics.friction.dahl_presliding > 0.0)) {
       throw std::invalid_argument("dahl_friction: presliding must be positive");
@@ -117,9 +213,21 @@ Physics physics_of(const Drive& drive) {
   return physics;
 }
 
-double current_offset_of(const Drive& drive) {
-  const Effect* offset = drive.find("current_offset");
-  return offset == nullptr ? 0.0 : offset->value("current");
+SensorErrors sensor_errors_of(const Drive& drive) {
+  SensorErrors errors;
+  const auto value = [&](std::string_view type, std::string_view key) {
+    const Effect* effect = drive.find(type);
+    return effect == nullptr ? 0.0 : effect->value(key);
+  };
+  errors.current_offset_a = value("current_offset", "current");
+  errors.current_delay_s = value("current_delay", "delay");
+  errors.torque_offset_nm = value("torque_offset", "torque");
+  errors.torque_gain = 1.0 + value("torque_sensor_gain", "ratio");
+  errors.torsion_zero_rad = value("torsion_zero", "angle");
+  for (const Effect& effect : drive.effects)
+    if (effect.present && effect.type == "torque_sensor_ripple")
+      errors.torque_ripple.push_back({effect.value("order"), effect.value("cosine"), effect.value("sine")});
+  return errors;
 }
 
 }  // namespace flexspline::plant

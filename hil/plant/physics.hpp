@@ -9,7 +9,15 @@ namespace flexspline::plant {
 /// simulate, for one that stands twice where it cannot, and for a missing parameter.
 Physics physics_of(const Drive& drive);
 
-/// What the current sensor reads at zero current, A.
-double current_offset_of(const Drive& drive);
+/// What the sensors and the amplifier make of the truth.
+struct SensorErrors {
+  double current_offset_a = 0.0;  ///< read at zero current
+  double current_delay_s = 0.0;   ///< the motor feels the logged current that much later
+  double torque_offset_nm = 0.0;
+  double torque_gain = 1.0;
+  double torsion_zero_rad = 0.0;      ///< torsion when the positions say that there is none
+  std::vector<Ripple> torque_ripple;  ///< read besides the torque, N m over the motor angle
+};
+SensorErrors sensor_errors_of(const Drive& drive);
 
 }  // namespace flexspline::plant

@@ -49,11 +49,43 @@ void scale_friction(const Drive& drive, std::uint64_t seed, Record& record, Phys
   physics.friction.viscous *= record.viscous_factor;
   physics.friction.coulomb *= record.coulomb_factor;
   physics.friction.dahl_torque *= record.coulomb_factor;
+  physics.friction.lugre.coulomb *= record.coulomb_factor;
+  physics.friction.lugre.static_friction *= record.coulomb_factor;
+  physics.friction.lugre.stiffness *= record.coulomb_factor;
 }
 
 std::vector<double> per_sample(std::vector<double> rate, double sample_s) {
   for (double& value : rate) value *= sample_s;
   return rate;
+}
+
+// The reading of a torque sensor that is on the flexspline and turns with it.
+std::vector<double> torque_reading(const SensorErrors& errors, const Record::Truth& truth) {
+  std::vector<double> reading = truth.torque_nm;
+  for (std::size_t k = 0; k < reading.size(); ++k) {
+    reading[k] = errors.torque_gain * reading[k] + errors.torque_offset_nm;
+    for (const Ripple& r : errors.torque_ripple) {
+      const double phase = r.order * truth.motor_position_rad[k];
+      reading[k] += r.cosine * std::cos(phase) + r.sine * std::sin(phase);
+    }
+  }
+  return reading;
+}
+
+// Currents that act from one sample to the next where the motor feels them late: that of an earlier sample first.
+struct LateCurrent {
+  double first_a = 0.0;
+  double first_s = 0.0;
+  double then_a = 0.0;
+};
+LateCurrent late_current(const std::vector<double>& logged, double delay_s, double sample_s) {
+  const double samples = delay_s / sample_s;
+  const auto whole = static_cast<std::ptrdiff_t>(samples);
+  const auto at = [&](std::ptrdiff_t late) {
+    const auto k = static_cast<std::ptrdiff_t>(logged.size()) - 1 - late;
+    return logged[static_cast<std::size_t>(std::max<std::ptrdiff_t>(k, 0))];
+  };
+  return {at(whole + 1), (samples - static_cast<double>(whole)) * sample_s, at(whole)};
 }
 
 void measure(const Drive& drive, std::uint64_t seed, std::uint64_t index, Record& record) {
@@ -66,14 +98,15 @@ void measure(const Drive& drive, std::uint64_t seed, std::uint64_t index, Record
   // The commanded current is a staircase, so a late reading shows an earlier step, not a slope between two.
   const auto steps_late = static_cast<std::ptrdiff_t>(std::ceil(sensors.current.delay_samples));
   const auto& current = record.truth.current_a;
-  const double offset = current_offset_of(drive);
+  const SensorErrors errors = sensor_errors_of(drive);
+  const double offset = errors.current_offset_a;
   for (std::size_t k = 0; k < current.size(); ++k) {
     const auto source = static_cast<std::ptrdiff_t>(k) - steps_late;
     record.current_a.push_back((source < 0 ? current.front() : current[static_cast<std::size_t>(source)]) + offset);
   }
   record.current_noise_std = noisy(sensors.current, kCurrent, record.current_a);
 
-  record.torque_nm = record.truth.torque_nm;
+  record.torque_nm = torque_reading(errors, record.truth);
   delay(sensors.torque.delay_samples, record.torque_nm);
   record.torque_noise_std = noisy(sensors.torque, kTorque, record.torque_nm);
 
@@ -89,6 +122,7 @@ void measure(const Drive& drive, std::uint64_t seed, std::uint64_t index, Record
   record.motor_position_rad = record.truth.motor_position_rad;
   delay(sensors.motor_delay_samples, per_sample(record.truth.motor_velocity_rad_s, drive.sample_s),
         record.motor_position_rad);
+  for (double& q : record.motor_position_rad) q -= errors.torsion_zero_rad * drive.gear_ratio;
   quantise(sensors.motor_counts, record.motor_position_rad);
   record.motor_position_noise_std = quantisation_std(sensors.motor_counts);
   record.output_position_rad = record.truth.output_position_rad;
@@ -117,7 +151,8 @@ Record record_one(const Drive& drive, const ExperimentPlan& plan, std::uint64_t 
   }
   TwoMass plant(std::move(physics), plan.locked, start);
   VelocityController controller(drive.loop, drive.current_limit_a, drive.sample_s);
-  const double offset = current_offset_of(drive);
+  const SensorErrors errors = sensor_errors_of(drive);
+  const double offset = errors.current_offset_a;
   const auto samples = static_cast<std::size_t>(std::llround(plan.duration_s / drive.sample_s));
   Record::Truth& truth = record.truth;
   for (std::size_t k = 0; k < samples; ++k) {
@@ -142,7 +177,17 @@ Record record_one(const Drive& drive, const ExperimentPlan& plan, std::uint64_t 
     truth.output_velocity_rad_s.push_back(state.output_velocity);
     truth.torque_nm.push_back(plant.torque());
     truth.temperature_c.push_back(inputs.temperature_c);
-    plant.advance(inputs, drive.sample_s, drive.steps_per_sample);
+    if (errors.current_delay_s > 0.0) {
+      const LateCurrent late = late_current(truth.current_a, errors.current_delay_s, drive.sample_s);
+      if (late.first_s > 0.0) {
+        inputs.current_a = late.first_a;
+        plant.advance(inputs, late.first_s, drive.steps_per_sample);
+      }
+      inputs.current_a = late.then_a;
+      plant.advance(inputs, drive.sample_s - late.first_s, drive.steps_per_sample);
+    } else {
+      plant.advance(inputs, drive.sample_s, drive.steps_per_sample);
+    }
   }
   measure(drive, seed, index, record);
   return record;

@@ -24,7 +24,7 @@ constexpr double kBreakTolerance = 1e-12;       // N m
 
 TwoMass::TwoMass(Physics physics, bool locked, State initial)
     : physics_(std::move(physics)), locked_(locked), state_(initial) {
-  const bool usable = physics_.motor_inertia > 0.0 && physics_.stiffness > 0.0 && physics_.gear_ratio > 0.0 &&
+  const bool usable = physics_.motor_inertia > 0.0 && physics_.transmission.has_spring() && physics_.gear_ratio > 0.0 &&
                       physics_.damping_exponent > 0.0 && (locked_ || physics_.output_inertia > 0.0);
   if (!usable) {
     throw std::invalid_argument(
@@ -37,20 +37,32 @@ TwoMass::TwoMass(Physics physics, bool locked, State initial)
   const auto direction = [](double velocity) { return velocity > 0.0 ? 1 : (velocity < 0.0 ? -1 : 0); };
   state_.motor_direction = direction(state_.motor_velocity);
   state_.output_direction = direction(state_.output_velocity);
-  state_.damping = damping_of(state_.motor_velocity / physics_.gear_ratio - state_.output_velocity);
+  state_.damping = damping_of(state_.motor_velocity * ratio(state_.motor_angle) - state_.output_velocity);
+  state_.loops = physics_.transmission.loops.at_rest();
+  state_.loops.torsion = torsion(state_);
 }
 
-TwoMass::Spring TwoMass::spring(double torsion) const {
-  const double gap = physics_.backlash_half_width;
-  double stretch = torsion;
-  double open = 1.0;
-  if (gap > 0.0) {
-    stretch = torsion > gap ? torsion - gap : (torsion < -gap ? torsion + gap : 0.0);
-    if (stretch == 0.0) open = 0.0;
-  }
-  const double square = stretch * stretch;
-  return {stretch * (physics_.stiffness + physics_.cubic_stiffness * square),
-          open * (physics_.stiffness + 3.0 * physics_.cubic_stiffness * square)};
+double TwoMass::ratio(double motor_angle) const {
+  return 1.0 / physics_.gear_ratio + physics_.transmission.error_slope(motor_angle);
+}
+
+double TwoMass::torsion(const State& s) const {
+  return s.motor_angle / physics_.gear_ratio - s.output_angle + physics_.transmission.error(s.motor_angle);
+}
+
+TorqueSlope TwoMass::elastic(const State& s) const {
+  const double x = torsion(s);
+  TorqueSlope sum = physics_.transmission.spring(x);
+  const Loops& loops = physics_.transmission.loops;
+  if (loops.empty()) return sum;
+  const TorqueSlope more = loops.torque(loops.ahead(s.loops, x, false), x >= s.loops.torsion ? 1.0 : -1.0);
+  return {sum.torque + more.torque, sum.slope + more.slope};
+}
+
+double TwoMass::drive_torque(const Inputs& inputs) const {
+  const double limit = physics_.current_limit_a;
+  const double i = limit > 0.0 ? std::clamp(inputs.current_a, -limit, limit) : inputs.current_a;
+  return physics_.torque_constant * (i - physics_.torque_saturation * i * i * i);
 }
 
 double TwoMass::rate_of(double damping) const {
@@ -64,7 +76,7 @@ double TwoMass::damping_of(double rate) const {
 }
 
 double TwoMass::torque(const State& s) const {
-  return spring(s.motor_angle / physics_.gear_ratio - s.output_angle).torque + physics_.damping_torque * s.damping;
+  return elastic(s).torque + physics_.damping_torque * s.damping;
 }
 
 double TwoMass::gravity(double angle) const {
@@ -73,13 +85,12 @@ double TwoMass::gravity(double angle) const {
 }
 
 FrictionPoint TwoMass::friction_point(const State& s, double direction) const {
-  return {direction, s.motor_velocity, torque(s), s.motor_angle, s.motor_angle, s.bristle};
+  return {direction, s.motor_velocity, torque(s), s.motor_angle, s.motor_angle, s.bristle, s.motor_velocity};
 }
 
 // Newton's method on motor velocity, output velocity and signed damping power. Using the power as the unknown keeps the
 // equations smooth where |v|^alpha has an infinite slope, and well scaled where the torsion rate is next to nothing.
 bool TwoMass::solve_stage(const Stage& stage, const State& start, State& s) const {
-  const double n = physics_.gear_ratio;
   const double g = stage.weight;
   const bool motor_moves = s.motor_direction != 0;
   const bool output_moves = !locked_ && s.output_direction != 0;
@@ -99,19 +110,21 @@ bool TwoMass::solve_stage(const Stage& stage, const State& start, State& s) cons
   for (int iteration = 0; iteration < kNewtonLimit; ++iteration) {
     s.motor_angle = stage.motor_angle + g * s.motor_velocity;
     s.output_angle = stage.output_angle + g * s.output_velocity;
-    const Spring elastic = spring(s.motor_angle / n - s.output_angle);
-    const double t = elastic.torque + c * s.damping;
+    const TorqueSlope spring = elastic(s);
+    const double t = spring.torque + c * s.damping;
+    const double n = ratio(s.motor_angle);
     // Newton step: dw = motor_free - motor_gain dT, dwo = output_free + output_gain dT, dT = ks dv + c du.
     double motor_free = 0.0, motor_gain = 0.0, output_free = 0.0, output_gain = 0.0;
     if (motor_moves) {
-      const FrictionTorque f = physics_.friction.evaluate({static_cast<double>(s.motor_direction), s.motor_velocity, t,
-                                                           s.motor_angle, start.motor_angle, start.bristle},
-                                                          viscous_);
+      const FrictionTorque f =
+          physics_.friction.evaluate({static_cast<double>(s.motor_direction), s.motor_velocity, t, s.motor_angle,
+                                      start.motor_angle, start.bristle, start.motor_velocity},
+                                     viscous_);
       const double residual =
-          physics_.motor_inertia * (s.motor_velocity - stage.motor_velocity) - g * (motor_drive_ - f.torque - t / n);
+          physics_.motor_inertia * (s.motor_velocity - stage.motor_velocity) - g * (motor_drive_ - f.torque - t * n);
       const double slope = physics_.motor_inertia + g * (f.by_velocity + g * f.by_angle);
       motor_free = -residual / slope;
-      motor_gain = g * (1.0 / n + f.by_torque) / slope;
+      motor_gain = g * (n + f.by_torque) / slope;
     }
     if (output_moves) {
       const double residual = physics_.output_inertia * (s.output_velocity - stage.output_velocity) -
@@ -123,13 +136,13 @@ bool TwoMass::solve_stage(const Stage& stage, const State& start, State& s) cons
       output_free = -residual / slope;
       output_gain = g / slope;
     }
-    const double rate_free = motor_free / n - output_free;
-    const double rate_gain = motor_gain / n + output_gain;
-    const double ks = elastic.slope * g;
+    const double rate_free = motor_free * n - output_free;
+    const double rate_gain = motor_gain * n + output_gain;
+    const double ks = spring.slope * g;
     double torque_step = 0.0;
     double damping_step = 0.0;
     if (damped) {
-      const double mismatch = s.motor_velocity / n - s.output_velocity - rate_of(s.damping);
+      const double mismatch = s.motor_velocity * n - s.output_velocity - rate_of(s.damping);
       const double magnitude = std::abs(s.damping);
       const double slope = physics_.damping_exponent == 0.5
                                ? 2.0 * magnitude
@@ -168,7 +181,12 @@ bool TwoMass::try_step(const State& from, double h, State& to) const {
     FrictionPoint at = friction_point(to, to.motor_direction);
     at.anchor = from.motor_angle;
     at.bristle = from.bristle;
+    at.anchor_velocity = from.motor_velocity;
     to.bristle = physics_.friction.bristle(at);
+  }
+  if (!physics_.transmission.loops.empty()) {
+    to.loops = physics_.transmission.loops.ahead(from.loops, torsion(to), true);
+    to.loops.total_torque = torque(to);
   }
   return true;
 }
@@ -182,7 +200,7 @@ double TwoMass::margin(Event event, const State& s) const {
       return s.output_direction == 0 ? 1.0 : s.output_direction * s.output_velocity;
     case Event::motor_break: {
       if (s.motor_direction != 0) return 1.0;
-      const double need = motor_drive_ - torque(s) / physics_.gear_ratio;
+      const double need = motor_drive_ - torque(s) * ratio(s.motor_angle);
       return std::min(physics_.friction.evaluate(friction_point(s, 1.0), viscous_).torque - need,
                       need - physics_.friction.evaluate(friction_point(s, -1.0), viscous_).torque);
     }
@@ -197,7 +215,7 @@ double TwoMass::margin(Event event, const State& s) const {
 }
 
 int TwoMass::choose_motor_direction(const State& s) const {
-  const double need = motor_drive_ - torque(s) / physics_.gear_ratio;
+  const double need = motor_drive_ - torque(s) * ratio(s.motor_angle);
   const double forward = physics_.friction.evaluate(friction_point(s, 1.0), viscous_).torque;
   const double backward = physics_.friction.evaluate(friction_point(s, -1.0), viscous_).torque;
   if (forward > backward) return need > forward ? 1 : (need < backward ? -1 : 0);
@@ -308,10 +326,9 @@ void TwoMass::take_step(double h) {
     double taken = piece;
     const Event event = first_event(state_, piece, to, taken);
     state_ = to;
-    const double n = physics_.gear_ratio;
     if (event == Event::motor_stop || event == Event::output_stop) {
       (event == Event::motor_stop ? state_.motor_velocity : state_.output_velocity) = 0.0;
-      state_.damping = damping_of(state_.motor_velocity / n - state_.output_velocity);
+      state_.damping = damping_of(state_.motor_velocity * ratio(state_.motor_angle) - state_.output_velocity);
     } else if (event == Event::motor_break || event == Event::output_break) {
       settle(state_);
     }
@@ -322,14 +339,15 @@ void TwoMass::take_step(double h) {
 
 void TwoMass::advance(const Inputs& inputs, double duration_s, int steps) {
   inputs_ = inputs;
-  motor_drive_ = physics_.torque_constant * inputs.current_a;
+  motor_drive_ = drive_torque(inputs);
   viscous_ = physics_.friction.viscous * physics_.friction.viscous_factor(inputs.temperature_c);
+  physics_.friction.dry_share = physics_.friction.coulomb_factor(inputs.temperature_c);
   const double h = duration_s / steps;
   for (int i = 0; i < steps; ++i) take_step(h);
 }
 
 double TwoMass::motor_acceleration(const Inputs& inputs) const {
-  const double drive = physics_.torque_constant * inputs.current_a - torque() / physics_.gear_ratio;
+  const double drive = drive_torque(inputs) - torque() * ratio(state_.motor_angle);
   const double viscous = physics_.friction.viscous * physics_.friction.viscous_factor(inputs.temperature_c);
   int direction = state_.motor_direction;
   if (direction == 0) {
@@ -343,13 +361,9 @@ double TwoMass::motor_acceleration(const Inputs& inputs) const {
 }
 
 double TwoMass::energy() const {
-  const double torsion = state_.motor_angle / physics_.gear_ratio - state_.output_angle;
-  const double stretch = std::copysign(std::max(std::abs(torsion) - physics_.backlash_half_width, 0.0), torsion);
-  const double square = stretch * stretch;
   return 0.5 * physics_.motor_inertia * state_.motor_velocity * state_.motor_velocity +
          0.5 * physics_.output_inertia * state_.output_velocity * state_.output_velocity +
-         square * (0.5 * physics_.stiffness + 0.25 * physics_.cubic_stiffness * square) +
-         physics_.gravity_cosine * std::sin(state_.output_angle) -
+         physics_.transmission.energy(torsion(state_)) + physics_.gravity_cosine * std::sin(state_.output_angle) -
          physics_.gravity_sine * std::cos(state_.output_angle);
 }
 

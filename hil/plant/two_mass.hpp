@@ -1,6 +1,6 @@
 #pragma once
 
-#include "hil/plant/friction.hpp"
+#include "hil/plant/transmission.hpp"
 
 namespace flexspline::plant {
 
@@ -10,9 +10,10 @@ struct Physics {
   double torque_constant = 0.0;
   double motor_inertia = 0.0;
   MotorFriction friction;
-  double stiffness = 0.0;
-  double cubic_stiffness = 0.0;
-  double backlash_half_width = 0.0;
+  /// The motor's torque is Km (i - saturation i^3); the amplifier gives at most `current_limit_a`.
+  double torque_saturation = 0.0;
+  double current_limit_a = 0.0;  ///< zero: none
+  Transmission transmission;
   double damping_torque = 0.0;  ///< at a torsion rate of 1 rad/s
   double damping_exponent = 1.0;
   double output_inertia = 0.0;
@@ -31,6 +32,7 @@ struct State {
   double output_velocity = 0.0;
   double damping = 0.0;
   double bristle = 0.0;
+  LoopState loops;
   int motor_direction = 0;  ///< branch of the friction: +1, -1, or 0 for exact sticking
   int output_direction = 0;
 };
@@ -62,18 +64,19 @@ class TwoMass {
   double energy() const;
 
  private:
-  struct Spring {
-    double torque;
-    double slope;
-  };
   /// Known parts of one implicit stage: state = base + weight * rate(state).
   struct Stage {
     double motor_angle, motor_velocity, output_angle, output_velocity, weight;
   };
   enum class Event { none, motor_stop, output_stop, motor_break, output_break };
 
-  Spring spring(double torsion) const;
+  double torsion(const State& s) const;
+  /// Spring and loops where the torsion of `s` is, from the loops' state as it stands.
+  TorqueSlope elastic(const State& s) const;
   double torque(const State& s) const;
+  /// How much faster the spring twists than the output, for each rad/s of the motor.
+  double ratio(double motor_angle) const;
+  double drive_torque(const Inputs& inputs) const;
   double rate_of(double damping) const;
   double damping_of(double rate) const;
   FrictionPoint friction_point(const State& s, double direction) const;

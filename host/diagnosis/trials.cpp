@@ -163,17 +163,22 @@ bool passes(const Trial& t) {
   return t.admissible && t.fall.score > kNamedScore && t.fall.chi2_percent > kNamedFallPercent;
 }
 
-// A law that contains another fits at least as well. Of those that leave all but the same error, the one with the
-// fewest parameters comes first.
-void prefer_simple(std::vector<Trial>& trials) {
-  constexpr double kSameError = 1.02;
+// A law that contains another fits at least as well. Of those that leave all but the same error, by the error itself
+// and by what was missing, the one with the fewest parameters comes first.
+void prefer_simple(const Judged& base, std::vector<Trial>& trials) {
+  constexpr double kSameError = 1.05;
+  constexpr double kSameFall = 0.005;
   if (trials.empty() || !passes(trials.front())) return;
+  const auto square = [](double x) { return x * x; };
   const double least = trials.front().judged.rmse_cv();
+  const double fall = square(base.rmse_cv()) - square(least);
   std::size_t simplest = 0;
-  for (std::size_t i = 1; i < trials.size(); ++i)
-    if (passes(trials[i]) && trials[i].judged.rmse_cv() <= kSameError * least &&
+  for (std::size_t i = 1; i < trials.size(); ++i) {
+    const double left = trials[i].judged.rmse_cv();
+    if (passes(trials[i]) && left <= kSameError * least && square(left) - square(least) <= kSameFall * fall &&
         trials[i].proposal.added < trials[simplest].proposal.added)
       simplest = i;
+  }
   std::rotate(trials.begin(), trials.begin() + static_cast<std::ptrdiff_t>(simplest),
               trials.begin() + static_cast<std::ptrdiff_t>(simplest) + 1);
 }
@@ -203,7 +208,7 @@ std::vector<Trial> rank(Search& search) {
     if (better(again, trial) || !trial.admissible) trial = std::move(again);
   }
   std::sort(trials.begin(), trials.end(), better);
-  prefer_simple(trials);
+  prefer_simple(search.base, trials);
   return trials;
 }
 

@@ -72,6 +72,12 @@ double largest_torsion(const BalanceData& data) {
   return quantile(magnitudes(data, [](const auto& in) { return in.torsion; }), 0.99);
 }
 
+std::vector<double> usual_reduced(const catalogue::Entry& entry) {
+  std::vector<double> usual;
+  for (const auto& info : entry.parameters) usual.push_back(info.usual);
+  return catalogue::reduced(entry, usual);
+}
+
 // Weighted columns of like size, so that the factorisation can tell a small one (a cubed torsion) from a needless one.
 struct ScaledColumns {
   Eigen::MatrixXd A;
@@ -184,6 +190,11 @@ ShapeRange shape_range(const BalanceData& data, const Term& term, std::size_t pa
       if (info.low < 0.0) range = {-largest / 3.0, largest / 3.0, false};  // of either sign
       break;
     }
+    case Limit::corner: {
+      const double largest = largest_torsion(data);
+      scale_between(largest * 3e-3, largest * 1.5);
+      break;
+    }
     case Limit::current: {
       const std::vector<double> all = magnitudes(data, [](const auto& in) { return in.current; });
       const double largest = *std::max_element(all.begin(), all.end());
@@ -247,7 +258,11 @@ void sweep_shapes(BalanceData& data, Terms& terms, const std::vector<std::size_t
   for (const Slot& s : shapes) {
     if (terms[s.term].stated[s.parameter]) continue;
     open.push_back(s);
-    terms[s.term].values[s.parameter] = shape_range(data, terms[s.term], s.parameter).at(0.5);
+    const auto& info = terms[s.term].entry->parameters[s.parameter];
+    // A ratio or an exponent begins at its usual value, what has a size at the middle of its range.
+    terms[s.term].values[s.parameter] = info.limit == Limit::stated
+                                            ? usual_reduced(*terms[s.term].entry)[s.parameter]
+                                            : shape_range(data, terms[s.term], s.parameter).at(0.5);
   }
   constexpr std::size_t kGrid = 6;
   const auto cost_now = [&] {
@@ -257,7 +272,7 @@ void sweep_shapes(BalanceData& data, Terms& terms, const std::vector<std::size_t
   for (int around = 0; around < (open.size() > 1 ? 2 : 1); ++around)
     for (const Slot& s : open) {
       double& value = terms[s.term].values[s.parameter];
-      double best = value, least = std::numeric_limits<double>::infinity();
+      double best = value, least = cost_now();
       for (const double trial : shape_grid(shape_range(data, terms[s.term], s.parameter), kGrid)) {
         value = trial;
         const double cost = cost_now();

@@ -40,15 +40,15 @@ struct PiecewiseStiffness : Stateless {
        .kind = Kind::shape,
        .usual = 3.0,
        .low = 1e-12,
-       .limit = Limit::torsion,
+       .limit = Limit::corner,
        .per = "stiffness_1"},
       {.name = "torque_2",
        .unit = units::kTorque,
        .kind = Kind::shape,
        .usual = 7.0,
-       .low = 1e-12,
-       .limit = Limit::torsion,
-       .per = "stiffness_1"},
+       .low = 1.0,
+       .high = 20.0,
+       .per = "torque_1"},
   };
   template <class N>
   struct Coefficients {

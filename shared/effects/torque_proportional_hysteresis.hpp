@@ -50,14 +50,14 @@ struct TorqueProportionalHysteresis {
   template <class N, class P>
   static Coefficients<N> derive(const P* p, const DriveConstants<P>& d) {
     const P most = p[0] + P(2.0) * p[1] * d.output_torque_base;
-    return {N::gain(most / d.output_torque_base), N::value(p[0] / most), N::gain(p[1] * d.output_torque_base / most),
-            N::gain(p[2] * d.torsion_base / most)};
+    return {N::gain(most / d.output_torque_base), N::value(p[0] / most),
+            N::gain(P(0.5) * p[1] * d.output_torque_base / most), N::gain(p[2] * d.torsion_base / most)};
   }
-  // Exact for the bound at the end of the step.
+  // Exact for the mean of the bounds at both ends of the step.
   template <class N>
   static void advance(State<N>& state, const Coefficients<N>& c, const Inputs<N>& now, const Inputs<N>& before) {
     const typename N::Value torsion = now.torsion - before.torsion;
-    const typename N::Value bound = c.rest + N::scaled(c.per_torque, now.torque_magnitude);
+    const typename N::Value bound = c.rest + N::scaled(c.per_torque, now.torque_magnitude + before.torque_magnitude);
     const typename N::Travel travel = N::times(N::travel(c.per_torsion, N::magnitude(torsion)), N::reciprocal(bound));
     state.share = N::relax(state.share, N::times(N::sign(torsion), bound), N::exp_negative(travel));
   }

@@ -14,7 +14,7 @@ using testing::experiment_of;
 // The same as sensors without noise and with any resolution would have seen it.
 inline data::Experiment noiseless_experiment_of(plant::Record r, const plant::Drive& drive) {
   r.current_a = r.truth.current_a;
-  for (double& current : r.current_a) current += plant::current_offset_of(drive);
+  for (double& current : r.current_a) current += plant::sensor_errors_of(drive).current_offset_a;
   r.motor_position_rad = r.truth.motor_position_rad;
   r.output_position_rad = r.truth.output_position_rad;
   r.torque_nm = r.truth.torque_nm;

@@ -58,9 +58,12 @@ Values hysteresis(const Record& record, double longest,
   double state = 0.0;
   Values result;
   for (std::size_t k = 0; k < record.size(); ++k) {
+    // Between two samples other signals stand at their mean.
+    Instant mean = record[k];
+    if (k > 0) mean.T = 0.5 * (std::abs(record[k].T) + std::abs(record[k - 1].T));
     if (k > 0)
       state = along_path(state, record[k - 1].dq, record[k].dq, longest,
-                         [&](double z, double x, double sign) { return slope(z, x, sign, record[k]); });
+                         [&](double z, double x, double sign) { return slope(z, x, sign, mean); });
     result.push_back(state);
   }
   return result;

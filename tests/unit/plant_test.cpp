@@ -18,7 +18,7 @@ Physics bare() {
   Physics p;
   p.torque_constant = 0.0543;
   p.motor_inertia = 1.04e-4;
-  p.stiffness = 6.3e3;
+  p.transmission.stiffness = 6.3e3;
   p.output_inertia = 0.06;
   return p;
 }
@@ -42,7 +42,7 @@ struct PlainDrive {
     const long steps = std::lround(duration / h);
     for (long i = 0; i < steps; ++i) {
       const double v = w / p.gear_ratio - wo;
-      torque = p.stiffness * (q / p.gear_ratio - qo) +
+      torque = p.transmission.stiffness * (q / p.gear_ratio - qo) +
                p.damping_torque * std::copysign(std::pow(std::abs(v), p.damping_exponent), v);
       const double bias = p.friction.viscous_asymmetry * std::abs(w) + (w == 0.0 ? 0.0 : p.friction.coulomb_asymmetry);
       const double motor = p.torque_constant * current - torque / p.gear_ratio - p.friction.viscous * w - bias;
@@ -128,7 +128,7 @@ TEST(Plant, RingsAtTheTwoMassResonance) {
   const Physics p = bare();
   const double ratio = p.gear_ratio;
   const double reduced = 1.0 / (1.0 / (p.motor_inertia * ratio * ratio) + 1.0 / p.output_inertia);
-  const double expected_hz = std::sqrt(p.stiffness / reduced) / (2.0 * std::numbers::pi);
+  const double expected_hz = std::sqrt(p.transmission.stiffness / reduced) / (2.0 * std::numbers::pi);
   State start;
   start.motor_angle = 0.1;
   TwoMass plant(p, false, start);
@@ -155,7 +155,7 @@ TEST(Plant, LosesEnergyWithoutInput) {
   start.output_velocity = -0.4;
   Physics p = demo();
   p.gravity_sine = 3.0;
-  p.backlash_half_width = 1.5e-4;
+  p.transmission.backlash_half_width = 1.5e-4;
   p.friction.coulomb_asymmetry = 0.0;
   TwoMass plant(p, false, start);
   double before = plant.energy();
@@ -205,16 +205,16 @@ TEST(Plant, AgreesWithAPlainIntegratorThroughStickSlipAndReversals) {
 
 TEST(Plant, BacklashFreesTheMotorInsideTheGap) {
   Physics p = bare();
-  p.backlash_half_width = 1.5e-4;
+  p.transmission.backlash_half_width = 1.5e-4;
   State start;
   start.motor_velocity = 1.0;
   TwoMass plant(p, true, start);
-  const double edge = p.gear_ratio * p.backlash_half_width;
+  const double edge = p.gear_ratio * p.transmission.backlash_half_width;
   plant.advance({}, 0.999 * edge, 64);
   EXPECT_EQ(plant.torque(), 0.0);
   EXPECT_NEAR(plant.state().motor_velocity, 1.0, 1e-12);
   plant.advance({}, 5e-3, 80);
-  EXPECT_NEAR(plant.torque(), p.stiffness * (plant.state().motor_angle / p.gear_ratio - p.backlash_half_width), 1e-9);
+  EXPECT_NEAR(plant.torque(), p.transmission.stiffness * (plant.state().motor_angle / p.gear_ratio - p.transmission.backlash_half_width), 1e-9);
   EXPECT_GT(plant.torque(), 0.1);
 }
 
@@ -238,7 +238,7 @@ TEST(Plant, BristleHasItsStiffnessAtRestAndTwiceThatAtAReversal) {
 TEST(Plant, BristleCarriesAStaticTorqueAsTheLawSays) {
   // Dahl under a torque M that rises slowly from rest: 1 - exp(-q/presliding) = M/Ts.
   Physics p = bare();
-  p.stiffness = 1e-3;
+  p.transmission.stiffness = 1e-3;
   p.friction.dahl_torque = 0.045;
   p.friction.dahl_presliding = 0.05;
   p.friction.viscous = 5e-2;
