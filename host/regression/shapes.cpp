@@ -195,6 +195,11 @@ ShapeRange shape_range(const BalanceData& data, const Term& term, std::size_t pa
       scale_between(largest * 3e-3, largest * 1.5);
       break;
     }
+    case Limit::span: {
+      const double largest = largest_torsion(data);
+      range = {std::max(0.5 * largest, info.low), 1.3 * largest, false};
+      break;
+    }
     case Limit::current: {
       const std::vector<double> all = magnitudes(data, [](const auto& in) { return in.current; });
       const double largest = *std::max_element(all.begin(), all.end());

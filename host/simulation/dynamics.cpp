@@ -123,7 +123,9 @@ double Dynamics::steepness_at_rest() {
   const double one = transmission_torque(kTiny) - rest;
   const double two = transmission_torque(2.0 * kTiny) - rest;
   if (!(one > 0.0 && two > one)) return 1.0;
-  return std::clamp(1.0 / std::log2(two / one), 1.0, 10.0);
+  const double power = std::clamp(1.0 / std::log2(two / one), 1.0, 10.0);
+  // A whole power, which costs far less to compute, comes out with rounding.
+  return std::abs(power - std::round(power)) < 1e-9 ? std::round(power) : power;
 }
 
 template <class Residual>

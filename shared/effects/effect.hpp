@@ -30,6 +30,7 @@ enum class Limit : std::uint8_t {
   travel,            // a motor angle: above what the filter resolves, below the shortest stroke between reversals
   torsion,           // a torsion: above the resolution of the positions, below a third of the largest torsion
   corner,            // a torsion at which something changes: above the resolution, up to half more than the largest
+  span,              // the whole range of a torsion: from half the largest to a third more
   current,           // a current: between a tenth of the largest and the largest
   inverse_velocity,  // one over a motor velocity, from a thousandth of the fast motion's to that of the slowest visible
   inverse_travel,    // one over a motor angle: the inverse of travel

@@ -21,7 +21,7 @@ struct PreisachHysteresis {
       .host_only = true,
   };
   static constexpr ParameterInfo kParameters[] = {
-      {.name = "span", .unit = units::kAngle, .kind = Kind::grid, .usual = 1.6e-3, .low = 1e-12},
+      {.name = "span", .unit = units::kAngle, .kind = Kind::shape, .usual = 1.6e-3, .low = 1e-12, .limit = Limit::span},
       {.name = "weight_11", .unit = units::kTorque, .usual = 0.05},
       {.name = "weight_21", .unit = units::kTorque, .usual = 0.05},
       {.name = "weight_22", .unit = units::kTorque, .usual = 0.05},
@@ -75,11 +75,13 @@ struct PreisachHysteresis {
     typename N::Value up[kLevels];  // centres of the edges
     typename N::Value down[kLevels];
     typename N::Gain per_edge;
+    typename N::Value initial[kRelays];  // of a gear that was worked until nothing of its past is left
     typename N::Gain weight[kRelays];
   };
+  // How far each relay is from where it began.
   template <class N>
   struct State {
-    typename N::Value relay[kRelays]{};
+    typename N::Value moved[kRelays]{};
   };
   // Levels (2 m - 10)/9 of the span, m = 1 to 9, each a ninth of the span higher for going up and lower for going down.
   template <class N, class P>
@@ -91,7 +93,12 @@ struct PreisachHysteresis {
       c.down[m] = N::value(edge * P(2.0 * m - 9.0) / d.torsion_base);
     }
     c.per_edge = N::gain(d.torsion_base / edge);
-    for (int i = 0; i < kRelays; ++i) c.weight[i] = N::gain(p[1 + i] / d.output_torque_base);
+    int at = 0;
+    for (int j = 1; j <= kLevels; ++j)
+      for (int k = 1; k <= j; ++k, ++at) {
+        c.weight[at] = N::gain(p[1 + at] / d.output_torque_base);
+        c.initial[at] = N::value(P(j + k > 10 ? -1.0 : j + k < 10 ? 1.0 : 0.0));
+      }
     return c;
   }
   // A relay goes over along an edge that is as wide as the distance of two levels: what a finer grid of relays does
@@ -106,11 +113,12 @@ struct PreisachHysteresis {
     }
     int at = 0;
     for (int j = 0; j < kLevels; ++j)
-      for (int k = 0; k <= j; ++k, ++at) state.relay[at] = N::between(state.relay[at], up[j], down[k]);
+      for (int k = 0; k <= j; ++k, ++at)
+        state.moved[at] = N::between(state.moved[at] + c.initial[at], up[j], down[k]) - c.initial[at];
   }
   template <class N>
   static void evaluate(const State<N>& state, const Coefficients<N>& c, const Inputs<N>&, Torques<N>& out) {
-    for (int i = 0; i < kRelays; ++i) out.transmission += c.weight[i] * state.relay[i];
+    for (int i = 0; i < kRelays; ++i) out.transmission += c.weight[i] * (state.moved[i] + c.initial[i]);
   }
 };
 FLEXSPLINE_EFFECT(38, PreisachHysteresis);

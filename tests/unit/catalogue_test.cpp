@@ -188,7 +188,7 @@ const std::vector<Published>& published() {
     for (int j = 1; j <= 8; ++j) keys.push_back("weight_" + std::to_string(j));
     for (int j = 1; j <= 9; ++j)
       for (int k = 1; k <= j; ++k) keys.push_back("weight_" + std::to_string(j) + std::to_string(k));
-    std::vector<Published::Parameter> plays, relays{{"span", "rad", grid, 1e-5, 1e-2}};
+    std::vector<Published::Parameter> plays, relays{{"span", "rad", shape, 1e-5, 1e-2}};
     for (std::size_t j = 0; j < 8; ++j) plays.push_back({keys[j], "rad", grid, 1e-6, 1e-2});
     for (std::size_t j = 8; j < 16; ++j) plays.push_back({keys[j], "N*m/rad", linear, -1e5, 1e5});
     for (std::size_t j = 16; j < keys.size(); ++j) relays.push_back({keys[j], "N*m", linear, -10.0, 10.0});

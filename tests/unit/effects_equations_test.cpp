@@ -23,7 +23,11 @@ Values random_reduced(const Entry& entry, std::mt19937& random) {
       // A bound is an edge, where a slope has two values; of plays and relays that are wider than the motion nothing
       // shows.
       const double usual_value = values[p];
-      values[p] *= 0.4 + (info.kind == Kind::grid ? 0.5 : 2.0) * unit(random);
+      values[p] *=
+          0.4 + (info.kind == Kind::grid || info.limit == effects::Limit::corner || info.limit == effects::Limit::span
+                     ? 0.5
+                     : 2.0) *
+                    unit(random);
       if (info.low > 0.0 && values[p] <= info.low) values[p] = info.low + 0.3 * std::max(usual_value - info.low, 0.5);
       if (values[p] >= info.high) values[p] = 0.5 * (usual_value + info.high);
       if (info.low < 0.0 && unit(random) < 0.5) values[p] = -values[p];

@@ -131,8 +131,8 @@ Values relays_truth(const Values& p, const Record& record) {
       for (int f = 0; f < kFine; ++f) {
         const double within = edge * (2.0 * (f + 0.5) / kFine - 1.0);
         const double high = edge * (2 * j - 9) + within, low = edge * (2 * k - 11) + within;
-        double state = within < 0.0 ? 1.0 : -1.0;  // half of them up: nought
-        for (std::size_t n = 1; n < record.size(); ++n) {
+        double state = high + low > 0.0 ? -1.0 : 1.0;
+        for (std::size_t n = 0; n < record.size(); ++n) {
           if (record[n].dq >= high) state = 1.0;
           if (record[n].dq <= low) state = -1.0;
           result[n] += p[at] * state / kFine;
