@@ -1,11 +1,17 @@
 #include "host/simulation/balances.hpp"
 
+#include <algorithm>
+
 #include "host/catalogue/constants.hpp"
 
 namespace flexspline::simulation {
 
 Balances::Balances(const model::Model& model, const catalogue::DriveConstants<double>& constants) {
   std::vector<catalogue::Instance*> modulations;
+  // What a modulation scales is not straight.
+  const bool fold = std::none_of(model.effects.begin(), model.effects.end(), [](const model::Effect& e) {
+    return catalogue::get(e.type).info->phase != catalogue::Phase::source;
+  });
   for (const model::Effect& effect : model.effects) {
     const catalogue::Entry& entry = catalogue::get(effect.type);
     const std::vector<double> values = catalogue::values_of(effect, entry);
@@ -14,6 +20,7 @@ Balances::Balances(const model::Model& model, const catalogue::DriveConstants<do
     if (entry.info->phase == catalogue::Phase::shift) changing_.push_back(instance);
     if (entry.info->phase == catalogue::Phase::modulate) modulations.push_back(instance);
     if (!entry.adds_torque()) continue;
+    if (fold && !entry.has_state && take_straight(*instance, entry.info->balance)) continue;
     switch (entry.info->balance) {
       case catalogue::Balance::motor:
         motor_.push_back({instance, entry.has_state});
@@ -36,6 +43,17 @@ Balances::Balances(const model::Model& model, const catalogue::DriveConstants<do
   transmission_reads_torque_ = with.transmission != without.transmission;
   // A shift comes before all that see the signal.
   changing_.insert(changing_.end(), modulations.begin(), modulations.end());
+}
+
+bool Balances::take_straight(const catalogue::Instance& instance, Balance balance) {
+  if (balance == Balance::transmission) {
+    const auto stiffness = spring_of(instance);
+    stiffness_ += stiffness.value_or(0.0);
+    return stiffness.has_value();
+  }
+  const auto straight = straight_of(instance, balance);
+  if (straight) (balance == Balance::motor ? straight_motor_ : straight_load_) += *straight;
+  return straight.has_value();
 }
 
 void Balances::change(Inputs& inputs) const {

@@ -6,6 +6,7 @@
 
 #include "host/catalogue/catalogue.hpp"
 #include "host/model/model.hpp"
+#include "host/simulation/straight.hpp"
 
 namespace flexspline::simulation {
 
@@ -20,11 +21,22 @@ class Balances {
 
   // Each adds the torques of the effects that belong to a balance; one effect may add to the others too. Inner states
   // are moved on from `before` to `now` and left as they were.
-  void add_motor(const Inputs& now, const Inputs& before, Torques& sums) const { add(motor_, now, before, sums); }
+  void add_motor(const Inputs& now, const Inputs& before, Torques& sums) const {
+    sums.motor += straight_motor_.torque(now.acceleration, now.velocity, now.direction);
+    add(motor_, now, before, sums);
+  }
   void add_transmission(const Inputs& now, const Inputs& before, Torques& sums) const {
+    sums.transmission += stiffness_ * now.torsion;
     add(transmission_, now, before, sums);
   }
-  void add_load(const Inputs& now, const Inputs& before, Torques& sums) const { add(load_, now, before, sums); }
+  void add_load(const Inputs& now, const Inputs& before, Torques& sums) const {
+    sums.load += straight_load_.torque(now.output_acceleration, now.output_velocity, now.output_direction);
+    add(load_, now, before, sums);
+  }
+
+  // All of a shaft's torques where they are straight in its motion, which then has a closed form; else null.
+  const Straight* all_of_motor() const { return motor_.empty() ? &straight_motor_ : nullptr; }
+  const Straight* all_of_load() const { return load_.empty() ? &straight_load_ : nullptr; }
 
   // True where shifts or modulations change what effects see.
   bool changes_inputs() const { return !changing_.empty(); }
@@ -34,7 +46,7 @@ class Balances {
 
   // True where what the transmission carries depends on the torque signal itself.
   bool transmission_reads_torque() const { return transmission_reads_torque_; }
-  bool has_transmission() const { return !transmission_.empty(); }
+  bool has_transmission() const { return stiffness_ != 0.0 || !transmission_.empty(); }
   // What the torque grows by per unit of acceleration.
   double motor_inertia() const;
   double output_inertia() const;
@@ -44,6 +56,8 @@ class Balances {
     catalogue::Instance* instance;
     bool has_state;
   };
+  // Adds a straight effect to the sums; false where it is none.
+  bool take_straight(const catalogue::Instance& instance, Balance balance);
   static void add(const std::vector<Source>& sources, const Inputs& now, const Inputs& before, Torques& sums) {
     for (const Source& source : sources) {
       if (source.has_state)
@@ -54,6 +68,10 @@ class Balances {
   }
 
   std::vector<std::unique_ptr<catalogue::Instance>> instances_;
+  // Straight effects are summed once; the others are asked each time.
+  Straight straight_motor_;
+  Straight straight_load_;
+  double stiffness_ = 0.0;
   std::vector<Source> motor_;
   std::vector<Source> transmission_;
   std::vector<Source> load_;

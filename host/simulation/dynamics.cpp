@@ -152,18 +152,41 @@ Dynamics::Moving Dynamics::solve_set_valued(Residual&& residual, double guess, d
   return {0.0, 0};
 }
 
+// As solve_set_valued, in closed form.
+Dynamics::Moving Dynamics::solve_straight(const Straight& c, double base, double driving, double guess, double limit,
+                                          int held, int last) const {
+  const auto in = [&](int direction) {
+    return Moving{c.velocity_in(direction, base, stage_.theta, driving), direction};
+  };
+  if (held != 0) return in(held);
+  const int expected = sign_of(guess);
+  if (expected != 0) {
+    const Moving moving = in(expected);
+    if (sign_of(moving.velocity) == expected) return moving;
+  }
+  const bool starts_forward = c.left_at_rest(1.0, base, stage_.theta, driving) < -limit;
+  const bool starts_backward = c.left_at_rest(-1.0, base, stage_.theta, driving) > limit;
+  if (starts_forward && !(starts_backward && last < 0)) return in(1);
+  if (starts_backward) return in(-1);
+  return {0.0, 0};
+}
+
 Dynamics::Moving Dynamics::solve_motor(double torque) {
   const double slope = motor_inertia_ / stage_.theta;
   const double guess = guess_motor_ - (torque - guess_torque_) / (gear_ratio_ * slope);
   set_torque(torque);
   const double driving = stage_.forcing.effort - torque / gear_ratio_ - motor_share_;
+  const double tolerance = 0.1 * gear_ratio_ * tolerance_;
+  if (const Straight* all = balances_.all_of_motor())
+    return solve_straight(*all, stage_.base.motor_velocity, driving, guess, tolerance * slope, stage_.held.motor,
+                          last_.motor_direction);
   return solve_set_valued(
       [&](double velocity, int direction) {
         set_motor(velocity, direction);
         const Torques sums = sum(Balance::motor);
         return sums.motor - driving;
       },
-      guess, slope, 0.1 * gear_ratio_ * tolerance_of(stage_.theta), stage_.held.motor, last_.motor_direction);
+      guess, slope, tolerance, stage_.held.motor, last_.motor_direction);
 }
 
 Dynamics::Moving Dynamics::solve_load(double torque) {
@@ -172,13 +195,17 @@ Dynamics::Moving Dynamics::solve_load(double torque) {
   const double guess = guess_output_ + (torque - guess_torque_) / slope;
   set_torque(torque);
   const double driving = torque - stage_.forcing.load_torque - load_share_;
+  const double tolerance = 0.1 * tolerance_;
+  if (const Straight* all = balances_.all_of_load())
+    return solve_straight(*all, stage_.base.output_velocity, driving, guess, tolerance * slope, stage_.held.output,
+                          last_.output_direction);
   return solve_set_valued(
       [&](double velocity, int direction) {
         set_output(velocity, direction);
         const Torques sums = sum(Balance::load);
         return sums.load - driving;
       },
-      guess, slope, 0.1 * tolerance_of(stage_.theta), stage_.held.output, last_.output_direction);
+      guess, slope, tolerance, stage_.held.output, last_.output_direction);
 }
 
 // The torsion rate v decides all: the transmission's torque grows with it, so the motor is slower and the output
@@ -206,7 +233,7 @@ void Dynamics::solve_coupled(Solution& solution) {
     solve_shafts(transmission_torque(rate));
     return rate - motor.velocity / gear_ratio_ + output.velocity;
   };
-  const Root root = find_root(mismatch, rate_root_, rate_slope_, tolerance_of(stage_.theta));
+  const Root root = find_root(mismatch, rate_root_, rate_slope_, tolerance_);
   if (root.jump) {
     // The torque itself is set-valued there: take the one between that makes the velocities fit.
     const double low = mismatch(root.low);
@@ -234,7 +261,7 @@ void Dynamics::solve_rigid(Solution& solution) {
     const Torques motor = sum(Balance::motor);
     return motor.motor + now_.torque / gear_ratio_ - stage_.forcing.effort;
   };
-  const Moving motor = solve_set_valued(residual, guess_motor_, slope, 0.1 * gear_ratio_ * tolerance_of(stage_.theta),
+  const Moving motor = solve_set_valued(residual, guess_motor_, slope, 0.1 * gear_ratio_ * tolerance_,
                                         stage_.held.motor, last_.motor_direction);
   // The last evaluation was within the tolerance of the solution, unless it was that of another direction.
   if (now_.direction != motor.direction) residual(motor.velocity, motor.direction);
@@ -246,6 +273,7 @@ void Dynamics::solve_rigid(Solution& solution) {
 
 Dynamics::Solution Dynamics::solve(const Stage& stage) {
   stage_ = stage;
+  tolerance_ = tolerance_of(stage.theta);
   set_forcing(stage.forcing);
   now_.elapsed = stage.elapsed;
   guess_motor_ = stage.base.motor_velocity + stage.theta * last_.motor_acceleration;

@@ -98,6 +98,9 @@ class Dynamics {
   template <class Residual>
   Moving solve_set_valued(Residual&& residual, double guess, double slope, double tolerance, int held, int last) const;
 
+  Moving solve_straight(const Straight& c, double base, double driving, double guess, double limit, int held,
+                        int last) const;
+
   void set_motor(double velocity, int direction);
   void set_output(double velocity, int direction);
   void set_torque(double torque);
@@ -124,6 +127,7 @@ class Dynamics {
   Inputs before_{};  // at state_, as effects see it
   Inputs now_{};     // under work
   Stage stage_;
+  double tolerance_ = 0.0;  // of its velocities at the output
   // What effects of one balance add to another, from when they were last summed.
   double motor_share_ = 0.0;
   double load_share_ = 0.0;
