@@ -142,6 +142,11 @@ class App {
         ->type_name("");
   }
 
+  static void take_report(CLI::App* sub, std::filesystem::path& report) {
+    sub->add_option("--report", report, "write a page with plots for a browser or a printer (HTML, all in one file)")
+        ->type_name("FILE");
+  }
+
   void add_demo() {
     const auto [sub, options] = command<DemoOptions>("demo");
     sub->add_option("--hidden", options->hidden, "effect that the twin hides, or none (default: by chance)")
@@ -196,6 +201,7 @@ class App {
         ->check(CLI::IsMember({"ls", "nls", "iv", "oe"}))
         ->type_name("");
     take_holdout(sub, options->data);
+    take_report(sub, options->report);
     take_pipeline(sub, options->pipeline);
   }
 
@@ -214,6 +220,7 @@ class App {
     sub->add_option("--limit", options->limits, "exit code 1 if a signal's error is above this; may be repeated")
         ->type_name("SIGNAL=RMSE")
         ->allow_extra_args(false);
+    take_report(sub, options->report);
     take_pipeline(sub, options->pipeline);
   }
 
@@ -223,6 +230,7 @@ class App {
     take_model(sub, options->model);
     take_holdout(sub, options->data);
     sub->add_flag("--auto", options->all, "go on with the named effect added, until nothing more is found");
+    take_report(sub, options->report);
     take_pipeline(sub, options->pipeline);
   }
 
@@ -234,6 +242,7 @@ class App {
     take_model(sub, options->model);
     sub->add_option("--out", options->out, "the changed model")->required()->type_name("OUT");
     take_holdout(sub, options->data);
+    take_report(sub, options->report);
     take_pipeline(sub, options->pipeline);
   }
 

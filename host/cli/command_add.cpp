@@ -4,6 +4,7 @@
 #include <nlohmann/json.hpp>
 
 #include "host/cli/commands.hpp"
+#include "host/cli/report_option.hpp"
 #include "host/diagnosis/add.hpp"
 #include "host/output/json.hpp"
 #include "host/output/text.hpp"
@@ -65,15 +66,35 @@ json change_json(const Addition& change) {
 
 using Change = std::function<Addition(const data::Dataset&, const model::Model&)>;
 
-int change_model(const ChangeOptions& options, const std::string& what, const Change& change, Console& console) {
+void write_page(const ChangeOptions& options, const std::string& command, const data::Dataset& dataset,
+                const model::Model& before, const Addition& changed, Console& console) {
+  if (options.report.empty()) return;
+  const regression::PipelineOptions pipeline = options.pipeline.options();
+  write_report(options.report,
+               {.command = command,
+                .data_name = as_arguments(options.data.data),
+                .model_name = options.out.string(),
+                .dataset = &dataset,
+                .model = changed.model,
+                .before = regression::identify(dataset, before, pipeline)->model,
+                .pipeline = pipeline,
+                .estimates = changed.estimates,
+                .addition = changed},
+               console);
+}
+
+int change_model(const ChangeOptions& options, const std::string& command, const std::string& what,
+                 const Change& change, Console& console) {
+  require_report_place(options.report);
   const model::ModelFile file = load_model(options.model);
   const data::Dataset dataset = load(options.data, console);
   console.progress("refitting the model");
-  Addition changed = change(dataset, file.model);
+  const Addition changed = change(dataset, file.model);
   for (const std::string& warning : changed.warnings) console.warn(warning);
   // What only the data set knows of the drive stays there: the file keeps what its author wrote.
-  changed.model.drive = file.model.drive;
-  model::save(options.out, model::rewrite(file, changed.model));
+  model::Model stored = changed.model;
+  stored.drive = file.model.drive;
+  model::save(options.out, model::rewrite(file, stored));
   print(changed, what, console);
   console.line();
   console.line(fmt::format("{} holds the model. Next:", options.out.string()));
@@ -81,6 +102,7 @@ int change_model(const ChangeOptions& options, const std::string& what, const Ch
       fmt::format("--model {} {}", quoted(options.out.string()), as_arguments(options.data.data));
   console.line(fmt::format("  flexspline compare {}", arguments));
   console.line(fmt::format("  flexspline diagnose {}", arguments));
+  write_page(options, command, dataset, file.model, changed, console);
   output::save_json(options.json, change_json(changed));
   return kDone;
 }
@@ -90,7 +112,7 @@ int change_model(const ChangeOptions& options, const std::string& what, const Ch
 int run(const AddOptions& options, Console& console) {
   diagnosis::parse_effect(options.effect);  // a wrong name is said before files are read
   return change_model(
-      options, fmt::format("{} added", options.effect),
+      options, "add", fmt::format("{} added", options.effect),
       [&](const data::Dataset& dataset, const model::Model& model) {
         return diagnosis::add(dataset, model, options.effect, options.pipeline.options());
       },
@@ -99,7 +121,7 @@ int run(const AddOptions& options, Console& console) {
 
 int run(const RemoveOptions& options, Console& console) {
   return change_model(
-      options, fmt::format("{} taken out", options.effect),
+      options, "remove", fmt::format("{} taken out", options.effect),
       [&](const data::Dataset& dataset, const model::Model& model) {
         return diagnosis::remove(dataset, model, options.effect, options.pipeline.options());
       },

@@ -5,6 +5,7 @@
 #include <nlohmann/json.hpp>
 
 #include "host/cli/commands.hpp"
+#include "host/cli/report_option.hpp"
 #include "host/comparison/compare.hpp"
 #include "host/output/json.hpp"
 #include "host/output/text.hpp"
@@ -56,12 +57,22 @@ bool is_kept(const Limit& limit, const comparison::Comparison& comparison, Conso
 int run(const CompareOptions& options, Console& console) {
   std::vector<Limit> limits;
   for (const std::string& text : options.limits) limits.push_back(parse_limit(text));
+  require_report_place(options.report);
   const model::ModelFile file = load_model(options.model);
   const data::Dataset dataset = load(options.data, console);
   console.progress("comparing model and measurement");
   const comparison::Comparison comparison = comparison::compare(dataset, file.model, options.pipeline.options());
   for (const std::string& warning : comparison.warnings) console.warn(warning);
   console.line(comparison::table(comparison));
+  if (!options.report.empty())
+    write_report(options.report,
+                 {.command = "compare",
+                  .data_name = as_arguments(options.data.data),
+                  .model_name = options.model.string(),
+                  .dataset = &dataset,
+                  .model = file.model,
+                  .pipeline = options.pipeline.options()},
+                 console);
   output::save_json(options.json, comparison::to_json(comparison));
   bool all_kept = true;
   for (const Limit& limit : limits) all_kept = is_kept(limit, comparison, console) && all_kept;

@@ -4,8 +4,10 @@
 #include <cmath>
 #include <nlohmann/json.hpp>
 #include <random>
+#include <utility>
 
 #include "host/cli/commands.hpp"
+#include "host/cli/report_option.hpp"
 #include "host/cli/twin_process.hpp"
 #include "host/comparison/compare.hpp"
 #include "host/diagnosis/add.hpp"
@@ -159,6 +161,13 @@ int run(const DemoOptions& options, Console& console) {
                  {"unit", found.unit},
                  {"report", nullptr}};
   bool right = hidden == "none" && found.named.empty();
+  report::Subject page{.command = "demo",
+                       .data_name = recording.string(),
+                       .model_name = base_path.string(),
+                       .dataset = &dataset,
+                       .model = base->model,
+                       .estimates = base->estimates,
+                       .rounds = {found}};
   if (found.named.empty()) {
     console.line(console.bold("  Nothing is missing that these data could show."));
   } else {
@@ -198,7 +207,15 @@ int run(const DemoOptions& options, Console& console) {
     console.progress("running both models on the unseen motions");
     print_free_runs(on_unseen(dataset, base->model), on_unseen(dataset, added.model), console);
     console.line(fmt::format("  Model: {}", path.string()));
+    page.model_name = path.string();
+    page.before = std::exchange(page.model, added.model);
+    page.estimates = added.estimates;
+    page.addition = added;
   }
+  const std::filesystem::path report = folder / "report.html";
+  console.progress("writing the report");
+  report::write(report, page);
+  answer["report"] = report.string();
   console.line();
   console.line(console.bold("5. What the twin had hidden"));
   if (hidden == "none")
@@ -208,6 +225,8 @@ int run(const DemoOptions& options, Console& console) {
     console.line(fmt::format("  {} (seed {}): {}. All true values: {}", hidden, seed,
                              right ? console.good("named right") : console.bad("named wrong"),
                              (recording / "truth.toml").string()));
+  console.line();
+  console.line(fmt::format("All of this with plots: {}, for a browser.", report.string()));
   output::save_json(options.json, answer);
   return kDone;
 }

@@ -3,6 +3,7 @@
 #include <nlohmann/json.hpp>
 
 #include "host/cli/commands.hpp"
+#include "host/cli/report_option.hpp"
 #include "host/diagnosis/add.hpp"
 #include "host/diagnosis/diagnosis.hpp"
 #include "host/output/diagnosis.hpp"
@@ -23,9 +24,29 @@ std::string add_command(const DiagnoseOptions& options) {
   return text + fmt::format(" --out {}", quoted(out.string()));
 }
 
+// The model of the last round with values, beside the one that was asked about where effects were added.
+void write_page(const DiagnoseOptions& options, const data::Dataset& dataset, const model::Model& asked,
+                const model::Model& last, const std::vector<diagnosis::Diagnosis>& rounds, Console& console) {
+  if (options.report.empty()) return;
+  console.progress("fitting the model for the report");
+  const regression::PipelineOptions pipeline = options.pipeline.options();
+  const auto fitted = regression::identify(dataset, last, pipeline);
+  report::Subject subject{.command = "diagnose",
+                          .data_name = as_arguments(options.data.data),
+                          .model_name = options.model.string(),
+                          .dataset = &dataset,
+                          .model = fitted->model,
+                          .pipeline = pipeline,
+                          .estimates = fitted->estimates,
+                          .rounds = rounds};
+  if (rounds.size() > 1) subject.before = regression::identify(dataset, asked, pipeline)->model;
+  write_report(options.report, subject, console);
+}
+
 }  // namespace
 
 int run(const DiagnoseOptions& options, Console& console) {
+  require_report_place(options.report);
   const model::ModelFile file = load_model(options.model);
   const data::Dataset dataset = load(options.data, console);
   diagnosis::Options how;
@@ -50,6 +71,7 @@ int run(const DiagnoseOptions& options, Console& console) {
                            how.pipeline)
                 .model;
   }
+  write_page(options, dataset, file.model, model, rounds, console);
   output::save_json(options.json, options.all ? output::rounds_json(rounds) : output::diagnosis_json(rounds.front()));
   return kDone;
 }

@@ -4,6 +4,7 @@
 
 #include "host/catalogue/catalogue.hpp"
 #include "host/cli/commands.hpp"
+#include "host/output/effect_curve.hpp"
 #include "host/output/identification.hpp"
 #include "host/output/json.hpp"
 #include "host/output/text.hpp"
@@ -70,7 +71,8 @@ json entry_json(const Entry& entry) {
           {"explanation", entry.info->explanation},
           {"causes", entry.info->causes},
           {"separated_by", entry.info->separated_by},
-          {"rivals", std::move(rivals)}};
+          {"rivals", std::move(rivals)},
+          {"curve", output::curve_json(output::effect_curve(entry))}};
 }
 
 std::string comma_separated(std::string_view names) {
@@ -97,6 +99,9 @@ void describe(const Entry& entry, Console& console) {
         {std::string(p.name), std::string(p.unit.rotary), std::string(p.unit.linear), how, output::number(p.usual)});
   }
   console.line(table.text());
+  console.line();
+  console.line("At these values:");
+  console.line(output::curve_text(output::effect_curve(entry), output::takes_braille()));
   console.line();
   const auto say = [&](std::string_view what, std::string_view text) {
     if (!text.empty()) console.line(output::wrapped(fmt::format("{}: {}", what, text)));

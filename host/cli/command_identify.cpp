@@ -4,6 +4,7 @@
 #include <nlohmann/json.hpp>
 
 #include "host/cli/commands.hpp"
+#include "host/cli/report_option.hpp"
 #include "host/output/identification.hpp"
 #include "host/output/json.hpp"
 #include "host/output/text.hpp"
@@ -33,6 +34,7 @@ std::string method_of(const IdentifyOptions& options, const model::Model& model)
 }  // namespace
 
 int run(const IdentifyOptions& options, Console& console) {
+  require_report_place(options.report);
   const model::ModelFile file = load_model(options.model);
   const std::string method = method_of(options, file.model);
   const data::Dataset dataset = load(options.data, console);
@@ -55,6 +57,16 @@ int run(const IdentifyOptions& options, Console& console) {
     console.line(fmt::format("  flexspline compare --model {} {}", quoted(options.out.string()),
                              as_arguments(options.data.data)));
   }
+  if (!options.report.empty())
+    write_report(options.report,
+                 {.command = "identify",
+                  .data_name = as_arguments(options.data.data),
+                  .model_name = options.model.string(),
+                  .dataset = &dataset,
+                  .model = found->model,
+                  .pipeline = options.pipeline.options(),
+                  .estimates = found->estimates},
+                 console);
   output::save_json(options.json, output::identification_json(*found, method));
   return kDone;
 }

@@ -49,8 +49,9 @@ struct IdentifyOptions {
   DataInputs data;
   PipelineInputs pipeline;
   std::filesystem::path model;
-  std::filesystem::path out;  // empty: print only
-  std::string method;         // empty: what the model needs
+  std::filesystem::path out;     // empty: print only
+  std::string method;            // empty: what the model needs
+  std::filesystem::path report;  // empty: none
   std::string json;
 };
 int run(const IdentifyOptions& options, Console& console);
@@ -68,6 +69,7 @@ struct CompareOptions {
   PipelineInputs pipeline;
   std::filesystem::path model;
   std::vector<std::string> limits;  // SIGNAL=RMSE
+  std::filesystem::path report;     // empty: none
   std::string json;
 };
 int run(const CompareOptions& options, Console& console);
@@ -76,7 +78,8 @@ struct DiagnoseOptions {
   DataInputs data;
   PipelineInputs pipeline;
   std::filesystem::path model;
-  bool all = false;  // --auto
+  bool all = false;              // --auto
+  std::filesystem::path report;  // empty: none
   std::string json;
 };
 int run(const DiagnoseOptions& options, Console& console);
@@ -87,6 +90,7 @@ struct ChangeOptions {
   PipelineInputs pipeline;
   std::filesystem::path model;
   std::filesystem::path out;
+  std::filesystem::path report;  // empty: none
   std::string json;
 };
 struct AddOptions : ChangeOptions {};

@@ -22,7 +22,7 @@ const std::array kHelp = {
                 "the missing "
                 "effect is diagnosed and added, and both models are judged on motions that the fit never saw. At the "
                 "end the twin "
-                "tells what it had hidden.",
+                "tells what it had hidden. All of it stands with plots in report.html.",
                 {"flexspline demo --hidden stribeck_gaussian --seed 7 --out demo-out"}},
     CommandHelp{
         "new",
@@ -46,7 +46,7 @@ const std::array kHelp = {
         "the catalogue of physical effects, or one of them explained",
         "Without a name: all effects with the torque balance they act on, their equation, usual size and where they "
         "show. With a name: what the effect is, where it comes from on a machine, what it is confused with and which "
-        "experiment tells them apart.",
+        "experiment tells them apart; and a drawn curve.",
         {"flexspline effects stribeck_gaussian"}},
     CommandHelp{
         "identify",
@@ -54,7 +54,7 @@ const std::array kHelp = {
         "Estimates every parameter that the model does not fix, from the experiments of role fit: for each experiment "
         "alone, with average and spread, and for all together with 95 % intervals. A spread above 30 % is flagged: the "
         "parameter is not reliable, or an effect is missing. With --out the model is written with the values; its "
-        "comments and layout stay.",
+        "comments and layout stay. --report writes a page with plots for a browser or a printer.",
         {kMakeData, kIdentify}},
     CommandHelp{
         "simulate",
@@ -68,7 +68,7 @@ const std::array kHelp = {
         "Compares in both directions: the torque that the model asks for the measured motion (the balances), and the "
         "motion that it makes of the measured torque (free run). Errors stand beside the noise of the measurement "
         "where that is known; the regions with the largest excess over it are named. --limit makes a test of it: exit "
-        "code 1 where a signal's error is above.",
+        "code 1 where a signal's error is above. --report writes a page with plots of all of it.",
         {kMakeData, kIdentify, "flexspline compare --model fitted.toml demo-out"}},
     CommandHelp{
         "diagnose",
@@ -76,14 +76,14 @@ const std::array kHelp = {
         "Fits the model, looks at where its error stands, tries every effect of the catalogue against data left out of "
         "the fit, and names the one that is missing; or says that none is, or that these data cannot tell, and which "
         "experiment would. The model needs no values. With --auto it goes on with the effect added until nothing more "
-        "is found.",
+        "is found. --report writes a page with plots: where the model fails, and what is missing.",
         {kMakeData, "flexspline diagnose --model demo-out/base-model.toml demo-out"}},
     CommandHelp{
         "add",
         "adds an effect to a model and refits it, with the error before and after",
         "Adds an effect of the catalogue, estimates all parameters anew and says what that does to the error, on the "
         "data that were fitted and on those held out. Comments and layout of the model file stay; its history gets a "
-        "line.",
+        "line. --report writes a page with plots, with the error before and after.",
         {kMakeData, kAdd}},
     CommandHelp{
         "remove",

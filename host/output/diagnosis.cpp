@@ -22,27 +22,6 @@ using nlohmann::json;
 
 constexpr std::size_t kRowsShown = 10;
 
-std::string verdict_in_words(const Diagnosis& d) {
-  std::vector<std::string> names;
-  for (const diagnosis::Named& n : d.named) names.push_back(effect_in_words(n.effect, n.order));
-  switch (d.verdict) {
-    case Verdict::missing_effect:
-      return fmt::format("The model lacks {}.", listed(names));
-    case Verdict::confusable_effects:
-      return fmt::format("The model lacks one of {}; these data cannot tell which.", listed(names, "or"));
-    case Verdict::at_noise_floor:
-      return "Nothing is missing: the model's error is the noise of the measurement.";
-    case Verdict::nothing_significant:
-      return "No effect of the catalogue improves the model. How large the noise is is not known, so something small "
-             "may be missing.";
-    case Verdict::unknown_structure:
-      return "Something is missing that no effect of the catalogue explains.";
-    case Verdict::insufficient_excitation:
-      return "These data do not excite the drive enough to tell.";
-  }
-  return {};
-}
-
 std::string evidence(const Diagnosis& d) {
   std::string text;
   if (d.balance) text += fmt::format("{} balance: ", balance_name(*d.balance));
@@ -190,6 +169,27 @@ std::string effect_label(const std::string& effect, const std::optional<double>&
 
 std::string effect_in_words(const std::string& effect, const std::optional<double>& order) {
   return order ? fmt::format("{} ({:g} per turn)", effect, *order) : effect;
+}
+
+std::string verdict_in_words(const Diagnosis& d) {
+  std::vector<std::string> names;
+  for (const diagnosis::Named& n : d.named) names.push_back(effect_in_words(n.effect, n.order));
+  switch (d.verdict) {
+    case Verdict::missing_effect:
+      return fmt::format("The model lacks {}.", listed(names));
+    case Verdict::confusable_effects:
+      return fmt::format("The model lacks one of {}; these data cannot tell which.", listed(names, "or"));
+    case Verdict::at_noise_floor:
+      return "Nothing is missing: the model's error is the noise of the measurement.";
+    case Verdict::nothing_significant:
+      return "No effect of the catalogue improves the model. How large the noise is is not known, so something small "
+             "may be missing.";
+    case Verdict::unknown_structure:
+      return "Something is missing that no effect of the catalogue explains.";
+    case Verdict::insufficient_excitation:
+      return "These data do not excite the drive enough to tell.";
+  }
+  return {};
 }
 
 void print_diagnosis(Console& console, const Diagnosis& d, const std::string& add_command) {

@@ -16,6 +16,9 @@ std::string effect_label(const std::string& effect, const std::optional<double>&
 // "torque_ripple (2 per turn)", for people.
 std::string effect_in_words(const std::string& effect, const std::optional<double>& order);
 
+// "The model lacks stribeck_gaussian."
+std::string verdict_in_words(const diagnosis::Diagnosis& found);
+
 // Verdict, evidence, candidates, rivals with the experiment that separates them, where the error lies, what to do next.
 // `add_command`: what to type to add the named effect, with EFFECT where its name goes.
 void print_diagnosis(Console& console, const diagnosis::Diagnosis& found, const std::string& add_command);

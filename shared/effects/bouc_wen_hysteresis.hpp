@@ -17,7 +17,9 @@ struct BoucWenHysteresis {
       .causes = "Friction inside the flexspline, its bolted joints and the mesh.",
       .rivals =
           "dahl_hysteresis,modified_dahl_hysteresis,duhem_hysteresis,structural_damping,prandtl_ishlinskii_hysteresis",
-      .separated_by = "the same torsion amplitude at a second frequency: a loop that stays as it is",
+      .separated_by =
+          "the same torsion amplitude at a second frequency, which leaves this loop as it is; loops of several "
+          "amplitudes against other laws of hysteresis",
   };
   static constexpr ParameterInfo kParameters[] = {
       {.name = "stiffness", .unit = units::kStiffness, .usual = 5000.0, .low = 0.0},

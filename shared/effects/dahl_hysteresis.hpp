@@ -12,13 +12,15 @@ struct DahlHysteresis {
       .shows_over = "loop, rate independent",
       .source = "Dahl; report eq. 65",
       .explanation =
-          "Twisting back and forth loses the same energy however slowly it is done: part of the torque follows "
-          "the last reversal, not the torsion alone.",
+          "Twisting back and forth loses the same energy however slowly it is done: part of the torque depends on "
+          "where the motion last reversed, not on the torsion alone.",
       .causes = "Friction inside the flexspline, its bolted joints and the mesh.",
       .rivals =
           "structural_damping,modified_dahl_hysteresis,bouc_wen_hysteresis,duhem_hysteresis,prandtl_ishlinskii_"
           "hysteresis",
-      .separated_by = "the same torsion amplitude at a second frequency: a loop that stays as it is",
+      .separated_by =
+          "the same torsion amplitude at a second frequency, which leaves this loop as it is; loops of several "
+          "amplitudes against other laws of hysteresis",
   };
   static constexpr ParameterInfo kParameters[] = {
       {.name = "torque", .unit = units::kTorque, .usual = 2.0, .low = 0.0},

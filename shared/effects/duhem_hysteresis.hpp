@@ -18,8 +18,10 @@ struct DuhemHysteresis {
           "of the torsion.",
       .causes = "Friction inside the flexspline and the mesh, described together with the stiffness.",
       .rivals = "dahl_hysteresis,bouc_wen_hysteresis,structural_damping,prandtl_ishlinskii_hysteresis",
-      .separated_by = "the same torsion amplitude at a second frequency: a loop that stays as it is",
-      .replaces = "linear_stiffness,cubic_stiffness,quadratic_stiffness,structural_damping",
+      .separated_by =
+          "the same torsion amplitude at a second frequency, which leaves this loop as it is; loops of several "
+          "amplitudes against other laws of hysteresis",
+      .replaces = "linear_stiffness,cubic_stiffness,quadratic_stiffness,piecewise_stiffness,structural_damping",
   };
   static constexpr ParameterInfo kParameters[] = {
       {.name = "rate",

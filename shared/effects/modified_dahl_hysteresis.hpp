@@ -16,7 +16,9 @@ struct ModifiedDahlHysteresis {
           "the limit.",
       .causes = "Friction inside the flexspline, its bolted joints and the mesh.",
       .rivals = "dahl_hysteresis,structural_damping,bouc_wen_hysteresis,duhem_hysteresis,prandtl_ishlinskii_hysteresis",
-      .separated_by = "the same torsion amplitude at a second frequency: a loop that stays as it is",
+      .separated_by =
+          "the same torsion amplitude at a second frequency, which leaves this loop as it is; loops of several "
+          "amplitudes against other laws of hysteresis",
   };
   static constexpr ParameterInfo kParameters[] = {
       {.name = "torque", .unit = units::kTorque, .usual = 2.0, .low = 0.0},

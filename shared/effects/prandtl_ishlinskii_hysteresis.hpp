@@ -12,8 +12,8 @@ struct PrandtlIshlinskiiHysteresis {
       .shows_over = "loops within loops",
       .source = "Ishlinskii",
       .explanation =
-          "The loop as a sum of plays of different widths: any loop that is the same wherever it starts, with "
-          "loops within loops. Beside a stiffness its weights are negative.",
+          "The loop as a sum of plays of different widths: any loop whose shape does not depend on where along the "
+          "torsion it lies, with loops within loops. Beside a stiffness its weights are negative.",
       .causes = "Friction inside the flexspline and the mesh, of many contacts that slip one after the other.",
       .rivals = "dahl_hysteresis,bouc_wen_hysteresis,duhem_hysteresis,preisach_hysteresis",
       .separated_by = "sines of several amplitudes that ride on a slower one",

@@ -13,7 +13,7 @@ struct TorqueSensorRipple : Stateless {
       .source = "report 5.3",
       .explanation =
           "The torque sensor reads a ripple that repeats with the motor angle and that the drive does not feel: "
-          "strain gauges on the flexspline see it bend round once for each lobe.",
+          "strain gauges on the flexspline are bent by each lobe of the wave generator that passes.",
       .causes = "Gauges on the flexspline itself; misalignment of the gauges.",
       .rivals = "torque_ripple,kinematic_error",
       .separated_by = "slow constant speed over many turns without load",

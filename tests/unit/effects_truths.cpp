@@ -106,18 +106,41 @@ Values delay_truth(const Values& p, const Record& record) {
   return result;
 }
 
-// Play of half-width r by its turning points: the output is the last torsion from which it was pushed.
-Values plays_truth(const Values& p, const Record& record) {
-  Values result(record.size(), 0.0);
-  for (std::size_t j = 0; j < 8; ++j) {
-    double middle = 0.0;
-    for (std::size_t k = 1; k < record.size(); ++k) {
-      if (record[k].dq - middle > p[j]) middle = record[k].dq - p[j];
-      if (middle - record[k].dq > p[j]) middle = record[k].dq + p[j];
-      result[k] += p[8 + j] * middle;
+// Masing's rule for a loop whose virgin curve f is odd: T = f(x1) + 2 f((x2 - x1)/2) + 2 f((x3 - x2)/2) + ... over the
+// turning points that are not yet forgotten. A branch that reaches as far as the one before forgets both.
+Values masing(const Record& record, const std::function<double(double)>& virgin) {
+  Values points = {0.0};
+  Values result;
+  for (const Instant& sample : record) {
+    const double x = sample.dq;
+    if (points.size() > 1 && (x - points.back()) * (points.back() - points[points.size() - 2]) >= 0.0)
+      points.pop_back();
+    points.push_back(x);
+    for (bool forgets = true; forgets && points.size() > 2;) {
+      const std::size_t n = points.size();
+      const double branch = std::abs(points[n - 1] - points[n - 2]);
+      const double before = (n == 3 ? 2.0 : 1.0) * std::abs(points[n - 2] - points[n - 3]);
+      forgets = branch >= before;
+      if (!forgets) break;
+      // The virgin curve begins at nought, which is no turning point.
+      points.erase(points.end() - (n == 3 ? 2 : 3), points.end() - 1);
     }
+    double torque = 0.0;
+    for (std::size_t n = 1; n < points.size(); ++n) {
+      const double branch = points[n] - points[n - 1];
+      torque += s(branch) * (n == 1 ? virgin(std::abs(branch)) : 2.0 * virgin(0.5 * std::abs(branch)));
+    }
+    result.push_back(torque);
   }
   return result;
+}
+
+Values plays_truth(const Values& p, const Record& record) {
+  return masing(record, [&](double x) {
+    double torque = 0.0;
+    for (std::size_t j = 0; j < 8; ++j) torque += p[8 + j] * std::max(x - p[j], 0.0);
+    return torque;
+  });
 }
 
 // Each relay with its edges as many sharp relays side by side, which is what an edge stands for.

@@ -1,0 +1,42 @@
+// All that a report page tells, gathered into one JSON document.
+#pragma once
+
+#include <filesystem>
+#include <nlohmann/json_fwd.hpp>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "host/data/dataset.hpp"
+#include "host/diagnosis/add.hpp"
+#include "host/diagnosis/diagnosis.hpp"
+#include "host/model/model.hpp"
+#include "host/regression/identify.hpp"
+
+namespace flexspline::report {
+
+// What a page is about. Models need values.
+struct Subject {
+  std::string command{};     // "diagnose"
+  std::string data_name{};   // as the user named the data
+  std::string model_name{};  // likewise
+  const data::Dataset* dataset = nullptr;
+  model::Model model{};                  // that the page judges
+  std::optional<model::Model> before{};  // without what was added
+  regression::PipelineOptions pipeline{};
+  // Each only where the command has it.
+  std::vector<regression::Estimate> estimates{};  // of `model`
+  std::vector<diagnosis::Diagnosis> rounds{};     // the first of `before` where there is one
+  std::optional<diagnosis::Addition> addition{};  // or removal, of the command `remove`
+};
+
+// "flexspline-report/1"; README.md says what stands in it. Compares model and measurement once more, as `compare` does.
+// Throws what comparison::compare throws.
+nlohmann::json document(const Subject& subject);
+
+// Throws std::runtime_error saying what to do unless a page could be written there.
+void require_place(const std::filesystem::path& file);
+// Writes the page of `subject`, whole or not at all. Throws as `document` and model::save do.
+void write(const std::filesystem::path& file, const Subject& subject);
+
+}  // namespace flexspline::report

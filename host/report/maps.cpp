@@ -1,0 +1,191 @@
+#include <fmt/format.h>
+
+#include <Eigen/QR>
+#include <algorithm>
+#include <cmath>
+#include <limits>
+#include <nlohmann/json.hpp>
+
+#include "host/comparison/residual_map.hpp"
+#include "host/comparison/row_variables.hpp"
+#include "host/output/json.hpp"
+#include "host/regression/least_squares.hpp"
+#include "host/report/parts.hpp"
+
+namespace flexspline::report {
+namespace {
+
+using comparison::Bins;
+using nlohmann::json;
+using output::json_number;
+
+// As residual maps are judged (comparison/residual_map.cpp).
+constexpr std::size_t kMostBins = 24;
+constexpr std::size_t kRowsPerBin = 16;
+constexpr std::size_t kFewestInBin = 8;
+constexpr int kOrders = 24;
+constexpr double kWholeWaves = 2.0;
+
+struct BinnedMean {
+  std::vector<double> mean, standard_error;
+};
+
+// Mean of the residual by bin, times the direction of motion where that is given. Neighbouring rows count as one as far
+// as what the map leaves is correlated.
+BinnedMean binned(const BalanceView& balance, const Eigen::VectorXd& residual, const Bins& bins,
+                  const Eigen::VectorXd* directions) {
+  constexpr double kNone = std::numeric_limits<double>::quiet_NaN();
+  const auto sign = [&](Eigen::Index k) { return directions ? (*directions)[k] : 1.0; };
+  const auto bin = [&](Eigen::Index k) { return std::isfinite(sign(k)) ? bins.bin[static_cast<std::size_t>(k)] : -1; };
+  std::vector<double> sum(bins.count(), 0.0), rows(bins.count(), 0.0), squares(bins.count(), 0.0);
+  for (Eigen::Index k = 0; k < residual.size(); ++k)
+    if (bin(k) >= 0) {
+      sum[static_cast<std::size_t>(bin(k))] += residual[k] * sign(k);
+      rows[static_cast<std::size_t>(bin(k))] += 1.0;
+    }
+  Eigen::VectorXd left = residual;
+  for (Eigen::Index k = 0; k < residual.size(); ++k) {
+    if (bin(k) < 0) continue;
+    const auto b = static_cast<std::size_t>(bin(k));
+    left[k] -= sign(k) * sum[b] / rows[b];
+    squares[b] += left[k] * left[k];
+  }
+  const double tau = std::clamp(regression::autocorrelation_time(balance.data->records(), left), balance.filter_time,
+                                std::max(balance.filter_time, balance.autocorrelation_time));
+  BinnedMean result;
+  for (std::size_t b = 0; b < bins.count(); ++b) {
+    const bool enough = rows[b] >= static_cast<double>(kFewestInBin);
+    result.mean.push_back(enough ? sum[b] / rows[b] : kNone);
+    result.standard_error.push_back(enough ? std::sqrt(squares[b] / rows[b] * std::min(tau, rows[b]) / rows[b])
+                                           : kNone);
+  }
+  return result;
+}
+
+json numbers(const std::vector<double>& values) {
+  json list = json::array();
+  for (const double v : values) list.push_back(json_number(v));
+  return list;
+}
+
+json mean_json(const BinnedMean& m) {
+  return {{"mean", numbers(m.mean)}, {"standard_error", numbers(m.standard_error)}};
+}
+
+// Standard error of a bin's mean if the residual were noise alone.
+std::vector<double> noise_of_means(const BalanceView& balance, const Bins& bins) {
+  std::vector<double> squares(bins.count(), 0.0), rows(bins.count(), 0.0);
+  for (Eigen::Index k = 0; k < balance.floor_squared.size(); ++k)
+    if (const int b = bins.bin[static_cast<std::size_t>(k)]; b >= 0) {
+      squares[static_cast<std::size_t>(b)] += balance.floor_squared[k];
+      rows[static_cast<std::size_t>(b)] += 1.0;
+    }
+  std::vector<double> noise;
+  for (std::size_t b = 0; b < bins.count(); ++b)
+    noise.push_back(std::sqrt(squares[b] / rows[b] * std::min(balance.filter_time, rows[b]) / rows[b]));
+  return noise;
+}
+
+std::vector<double> centres(const Bins& bins, const Eigen::VectorXd& values) {
+  std::vector<double> sum(bins.count(), 0.0), rows(bins.count(), 0.0);
+  for (Eigen::Index k = 0; k < values.size(); ++k)
+    if (const int b = bins.bin[static_cast<std::size_t>(k)]; b >= 0) {
+      sum[static_cast<std::size_t>(b)] += values[k];
+      rows[static_cast<std::size_t>(b)] += 1.0;
+    }
+  for (std::size_t b = 0; b < sum.size(); ++b) sum[b] /= rows[b];
+  return sum;
+}
+
+// Amplitude of each order of the motor's turn in the residual: root mean square of the fitted waves times root two.
+// Each record has a phase of its own, so that no common zero of the angle is needed; one that sees less than some whole
+// waves stands aside.
+std::vector<double> order_amplitudes(const View& view, const BalanceView& balance, const Eigen::VectorXd& residual) {
+  std::vector<double> amplitudes;
+  const auto at = regression::index(balance.data->balance());
+  for (int order = 1; order <= kOrders; ++order) {
+    const double per_unit = order * view.prepared.constants.turn_angle_scale;
+    double squares = 0.0, rows = 0.0;
+    for (const regression::RowRange& range : balance.data->records()) {
+      const regression::Record& record = view.prepared.records[range.record];
+      if (!record.has_motor_motion) continue;
+      Eigen::MatrixX3d x(range.size(), 3);
+      for (Eigen::Index k = 0; k < range.size(); ++k) {
+        const double wave = per_unit * record.inputs[record.rows[at].samples[static_cast<std::size_t>(k)]].angle;
+        x.row(k) << 1.0, std::cos(wave), std::sin(wave);
+      }
+      double low = std::numeric_limits<double>::infinity(), high = -low;
+      for (const std::size_t sample : record.rows[at].samples) {
+        low = std::min(low, record.inputs[sample].angle);
+        high = std::max(high, record.inputs[sample].angle);
+      }
+      if (per_unit * (high - low) < kWholeWaves * 2.0 * M_PI) continue;
+      const Eigen::Vector3d theta = x.colPivHouseholderQr().solve(residual.segment(range.first, range.size()));
+      squares += 0.5 * (theta[1] * theta[1] + theta[2] * theta[2]) * static_cast<double>(range.size());
+      rows += static_cast<double>(range.size());
+    }
+    amplitudes.push_back(rows > 0.0 ? std::sqrt(2.0 * squares / rows) : std::numeric_limits<double>::quiet_NaN());
+  }
+  return amplitudes;
+}
+
+double share_of(const std::vector<comparison::Share>& shares, const std::string& variable) {
+  for (const comparison::Share& s : shares)
+    if (s.variable == variable) return s.share_percent;
+  return 0.0;
+}
+
+json map_of(const View& view, const BalanceView& balance, const comparison::RowVariable& variable,
+            const std::vector<comparison::Share>& shares, const Eigen::VectorXd& directions) {
+  const auto wanted =
+      std::clamp<std::size_t>(static_cast<std::size_t>(balance.residual.size()) / kRowsPerBin, 4, kMostBins);
+  const Bins bins = comparison::equal_count_bins(variable.values, wanted);
+  if (bins.count() < 2) return nullptr;
+  json map{{"variable", variable.name},
+           {"unit", variable.unit},
+           {"x", numbers(centres(bins, variable.values))},
+           {"edges", numbers(bins.edges)},
+           {"noise", numbers(noise_of_means(balance, bins))},
+           {"share_percent", share_of(shares, variable.name)},
+           {"share_with_direction_percent", share_of(shares, variable.name + " x direction")},
+           {"plain", mean_json(binned(balance, balance.residual, bins, nullptr))},
+           {"with_direction", mean_json(binned(balance, balance.residual, bins, &directions))},
+           {"plain_before", nullptr},
+           {"with_direction_before", nullptr},
+           {"orders", nullptr}};
+  if (balance.before) {
+    map["plain_before"] = mean_json(binned(balance, *balance.before, bins, nullptr));
+    map["with_direction_before"] = mean_json(binned(balance, *balance.before, bins, &directions));
+  }
+  if (variable.name == "motor_angle") {
+    map["orders"] = {{"amplitude", numbers(order_amplitudes(view, balance, balance.residual))}, {"before", nullptr}};
+    if (balance.before) map["orders"]["before"] = numbers(order_amplitudes(view, balance, *balance.before));
+    for (int order = 1; order <= kOrders; ++order)
+      map["share_percent"] =
+          std::max(map["share_percent"].get<double>(), share_of(shares, fmt::format("motor_angle order {}", order)));
+  }
+  return map;
+}
+
+}  // namespace
+
+json residual_maps(const View& view) {
+  json list = json::array();
+  for (const BalanceView& balance : view.balances) {
+    const Eigen::VectorXd directions = comparison::row_directions(*balance.data);
+    const std::vector<comparison::Share> shares =
+        comparison::localise(*balance.data, View::shown(balance), balance.autocorrelation_time, view.axis());
+    std::vector<json> maps;
+    for (const comparison::RowVariable& variable : comparison::row_variables(*balance.data, view.axis()))
+      if (json map = map_of(view, balance, variable, shares, directions); !map.is_null())
+        maps.push_back(std::move(map));
+    const auto strength = [](const json& m) {
+      return std::max(m["share_percent"].get<double>(), m["share_with_direction_percent"].get<double>());
+    };
+    std::stable_sort(maps.begin(), maps.end(), [&](const json& a, const json& b) { return strength(a) > strength(b); });
+    list.push_back({{"signal", balance.signal}, {"unit", balance.unit}, {"maps", maps}});
+  }
+  return list;
+}
+
+}  // namespace flexspline::report

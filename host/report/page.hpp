@@ -1,0 +1,18 @@
+// A document as one HTML file that needs nothing else: no network, no other file.
+#pragma once
+
+#include <nlohmann/json_fwd.hpp>
+#include <string>
+#include <string_view>
+
+namespace flexspline::report {
+
+// The page of a document (see document.hpp). Whatever stands in its texts, none of it becomes markup or script.
+std::string page(const nlohmann::json& document);
+
+// Text as it may stand between tags and in attributes of HTML.
+std::string escaped(std::string_view text);
+// JSON as it may stand in a script element: no text in it can end the element or open a comment.
+std::string embedded(const nlohmann::json& document);
+
+}  // namespace flexspline::report

@@ -1,0 +1,51 @@
+// Model and measurement side by side on the rows of each balance: what all parts of a page are made from.
+#pragma once
+
+#include <memory>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "host/comparison/compare.hpp"
+#include "host/regression/balance_data.hpp"
+#include "host/report/document.hpp"
+
+namespace flexspline::report {
+
+struct BalanceView {
+  std::unique_ptr<regression::BalanceData> data;
+  std::string signal;  // "motor_balance"
+  std::string unit;
+  Eigen::VectorXd residual;               // measured minus model, one a row
+  std::optional<Eigen::VectorXd> before;  // of the model before
+  Eigen::VectorXd floor_squared;          // of the row's record; NaN where its noise is not known
+  double autocorrelation_time = 1.0;      // rows that count as one, of `residual`
+  double filter_time = 1.0;               // likewise of white noise behind the filter
+};
+
+// Stays where it is: balances refer to `prepared`.
+struct View {
+  View(const Subject& subject);
+  View(const View&) = delete;
+  View& operator=(const View&) = delete;
+
+  data::Axis axis() const { return model.drive.axis; }
+  std::string unit_of(data::Column column) const { return data::unit_of(column, axis()); }
+  // Residual that the page is about: before, where there is one; what shows there is what was looked for.
+  static const Eigen::VectorXd& shown(const BalanceView& balance) {
+    return balance.before ? *balance.before : balance.residual;
+  }
+  const comparison::SignalResult* result(std::size_t record, const std::string& signal) const;
+
+  const data::Dataset& dataset;
+  model::Model model;
+  std::optional<model::Model> model_before;
+  comparison::Comparison comparison;
+  std::optional<comparison::Comparison> comparison_before;
+  regression::Prepared prepared;
+  regression::Terms terms;
+  std::optional<regression::Terms> terms_before;
+  std::vector<BalanceView> balances;
+};
+
+}  // namespace flexspline::report
