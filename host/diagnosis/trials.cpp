@@ -166,7 +166,7 @@ bool passes(const Trial& t) {
 // A law that contains another fits at least as well. Of those that leave all but the same error, by the error itself
 // and by what was missing, the one with the fewest parameters comes first.
 void prefer_simple(const Judged& base, std::vector<Trial>& trials) {
-  constexpr double kSameError = 1.05;
+  constexpr double kSameError = 1.1;
   constexpr double kSameFall = 0.005;
   if (trials.empty() || !passes(trials.front())) return;
   const auto square = [](double x) { return x * x; };
