@@ -14,9 +14,10 @@ struct ScalarSystem {
   using Angle = S;
   using Step = S;
   using Sum = S;
-  using Share = S;
   using Gain = S;
   using StepGain = S;
+  using RatioGain = S;
+  using Ratio = S;
   using Exponent = S;
   using Order = S;
   using State = S;
@@ -26,9 +27,9 @@ struct ScalarSystem {
     S sine;
   };
 
-  static S share(const S& p) { return p; }
   static S gain(const S& p) { return p; }
   static S step_gain(const S& p) { return p; }
+  static S ratio_gain(const S& p) { return p; }
   static S value(const S& p) { return p; }
   static S exponent(const S& p) { return p; }
   static S order(const S& p) { return p; }
@@ -40,10 +41,17 @@ struct ScalarSystem {
   static S sum(const S& x) { return x; }
   static S narrow(const S& x) { return x; }
   static S widen(const S& x) { return x; }
-  static S widen(const S& gain, const S& x) { return gain * x; }
+  static S bounded(const S& x) { return x; }
   static S times(const S& a, const S& b) { return a * b; }
   static S scaled(const S& gain, const S& x) { return gain * x; }
+  static S ratio(const S& gain, const S& x) { return gain * x; }
   static S travel(const S& gain, const S& x) { return gain * x; }
+  // Of a bound that nears nought the travel over it grows without end.
+  static S over(const S& travel, const S& x) { return travel / (x < S(1e-12) ? S(1e-12) : x); }
+  static S times_power(const S& travel, const S& x, const S& exponent) {
+    using std::pow;
+    return travel * pow(x < S(1e-9) ? S(1e-9) : x, exponent);
+  }
   static S step(const S& travel, const S& x) { return travel * x; }
   static S times_order(const S& angle, const S& order) { return angle * order; }
   static S sign(const S& x) { return S(x > S(0.0) ? 1.0 : x < S(0.0) ? -1.0 : 0.0); }

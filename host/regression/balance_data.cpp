@@ -215,9 +215,11 @@ void BalanceData::add_torque(const Terms& terms, const Term& term, const std::ve
     changed.reserve(r.inputs.size());
     for (const auto& in : r.inputs) changed.push_back(catalogue::lifted<N>(in));
     bool turned = false;
-    for (const Phase phase : {Phase::shift, Phase::modulate})
+    constexpr std::pair<Phase, bool> kSteps[] = {{Phase::shift, false}, {Phase::shift, true}, {Phase::modulate, false}};
+    for (const auto& [phase, last] : kSteps)
       for (std::size_t t = 0; t < terms.size(); ++t)
-        if (terms[t].entry->info->phase == phase && changes(terms[t], term)) {
+        if (terms[t].entry->info->phase == phase && terms[t].entry->info->acts_last == last &&
+            changes(terms[t], term)) {
           along<N>(*terms[t].entry)
               .change(catalogue::natural(*terms[t].entry, all_values[t]).data(), constants, changed);
           turned = turned || (phase == Phase::shift && (terms[t].entry->info->reads & effects::kMotorAngle) != 0);

@@ -7,6 +7,7 @@
 namespace flexspline::simulation {
 
 Balances::Balances(const model::Model& model, const catalogue::DriveConstants<double>& constants) {
+  std::vector<catalogue::Instance*> last_shifts;
   std::vector<catalogue::Instance*> modulations;
   // What a modulation scales is not straight.
   const bool fold = std::none_of(model.effects.begin(), model.effects.end(), [](const model::Effect& e) {
@@ -17,7 +18,8 @@ Balances::Balances(const model::Model& model, const catalogue::DriveConstants<do
     const std::vector<double> values = catalogue::values_of(effect, entry);
     catalogue::Instance* instance = instances_.emplace_back(entry.make(values.data(), constants)).get();
     if (entry.has_state) states_.push_back(instance);
-    if (entry.info->phase == catalogue::Phase::shift) changing_.push_back(instance);
+    if (entry.info->phase == catalogue::Phase::shift)
+      (entry.info->acts_last ? last_shifts : changing_).push_back(instance);
     if (entry.info->phase == catalogue::Phase::modulate) modulations.push_back(instance);
     if (!entry.adds_torque()) continue;
     if (fold && !entry.has_state && take_straight(*instance, entry.info->balance)) continue;
@@ -42,6 +44,7 @@ Balances::Balances(const model::Model& model, const catalogue::DriveConstants<do
   add_transmission(loaded, Inputs{}, with);
   transmission_reads_torque_ = with.transmission != without.transmission;
   // A shift comes before all that see the signal.
+  changing_.insert(changing_.end(), last_shifts.begin(), last_shifts.end());
   changing_.insert(changing_.end(), modulations.begin(), modulations.end());
 }
 

@@ -18,6 +18,7 @@ struct Backlash : Stateless {
       .causes = "Play of a coupling, key or bolt in the load path, worn teeth. New strain-wave gears have almost none.",
       .rivals = "cubic_stiffness",
       .separated_by = "small multi-sine about zero torque in locked load",
+      .acts_last = true,
   };
   static constexpr ParameterInfo kParameters[] = {
       {.name = "half_width",

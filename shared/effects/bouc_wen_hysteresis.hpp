@@ -73,8 +73,9 @@ struct BoucWenHysteresis {
     const typename N::Value share = N::narrow(state.share);
     const typename N::Travel travel = N::travel(c.per_torsion, N::magnitude(torsion));
     const typename N::Value k = N::by_sign(N::times(along, share), N::one(), c.unloading);
-    const typename N::Value slope = N::one() - N::times(k, N::pow_abs(share, c.exponent));
-    const typename N::Value bend = N::scaled(c.stiffening, N::times(N::magnitude(k), N::pow_abs(share, c.less_one)));
+    const typename N::Value slope = N::one() - N::times(k, N::pow_abs(state.share, c.exponent));
+    const typename N::Value bend =
+        N::scaled(c.stiffening, N::times(N::magnitude(k), N::pow_abs(state.share, c.less_one)));
     const typename N::Value mean = N::times(slope, N::exp_mean(N::times(travel, bend)));
     state.share = N::clamp_to_one(state.share + N::times(N::step(travel, mean), along));
   }

@@ -41,7 +41,7 @@ struct CurrentDelay {
   static void advance(State<N>& state, const Coefficients<N>& c, const Inputs<N>& now, const Inputs<N>& before) {
     const typename N::Travel share = N::travel(c.per_time, now.elapsed);
     const typename N::State rise = N::times(N::widen(now.current - before.current), N::exp_mean(share));
-    state.lag = N::relax(state.lag, typename N::State{}, N::exp_negative(share)) + rise;
+    state.lag = N::bounded(N::relax(state.lag, typename N::State{}, N::exp_negative(share)) + rise);
   }
   template <class N>
   static void evaluate(const State<N>& state, const Coefficients<N>& c, const Inputs<N>&, Torques<N>& out) {

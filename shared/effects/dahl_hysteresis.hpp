@@ -39,7 +39,6 @@ struct DahlHysteresis {
     typename N::Gain per_torsion;
     typename N::Exponent exponent;
     typename N::Exponent less_one;
-    typename N::Value least;
   };
   // Share of the full torque, -1 to 1.
   template <class N>
@@ -49,19 +48,17 @@ struct DahlHysteresis {
   template <class N, class P>
   static Coefficients<N> derive(const P* p, const DriveConstants<P>& d) {
     return {N::gain(p[0] / d.output_torque_base), N::gain(p[1] * d.torsion_base / p[0]), N::exponent(p[2]),
-            N::exponent(p[2] - P(1.0)), N::value(P(1e-9))};
+            N::exponent(p[2] - P(1.0))};
   }
   // What is left to the limit, u = abs(s - T/Tc), obeys u' = -u^i over travel x = sigma abs(dq)/Tc, whose solution is
-  // u0 times the q-exponential of x u0^(i-1). At nought that power has no value where i < 1, and there it is not
-  // needed.
+  // u0 times the q-exponential of x u0^(i-1). Where i < 1 that power grows without bound as the limit comes near, which
+  // is then reached after a finite travel.
   template <class N>
   static void advance(State<N>& state, const Coefficients<N>& c, const Inputs<N>& now, const Inputs<N>& before) {
     const typename N::Value torsion = now.torsion - before.torsion;
     const typename N::State limit = N::sign(torsion);
-    const typename N::Value left = N::narrow(N::magnitude(limit - state.carried));
-    const typename N::Value base = N::by_sign(left - c.least, left, c.least);
-    const typename N::Travel travel =
-        N::times(N::travel(c.per_torsion, N::magnitude(torsion)), N::pow_abs(base, c.less_one));
+    const typename N::State left = N::magnitude(limit - state.carried);
+    const typename N::Travel travel = N::times_power(N::travel(c.per_torsion, N::magnitude(torsion)), left, c.less_one);
     state.carried = N::relax(state.carried, limit, N::q_exp_negative(travel, c.exponent));
   }
   template <class N>

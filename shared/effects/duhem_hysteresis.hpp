@@ -39,7 +39,7 @@ struct DuhemHysteresis {
   template <class N>
   struct Coefficients {
     typename N::Gain rate;
-    typename N::Gain stiffness;
+    typename N::Value lead;  // b/a, what the torque leads phi by in long motion
     typename N::Value half_phi_0;
     typename N::Gain half_phi_1;
     typename N::Gain half_phi_2;
@@ -58,7 +58,7 @@ struct DuhemHysteresis {
     const P two = one * d.torsion_base;
     const P three = two * d.torsion_base;
     return {N::gain(p[0] * d.torsion_base),
-            N::gain(p[1] * one),
+            N::value(p[1] / (p[0] * d.output_torque_base)),
             N::value(half * p[2] / d.output_torque_base),
             N::gain(half * p[3] * one),
             N::gain(half * p[4] * two),
@@ -71,14 +71,14 @@ struct DuhemHysteresis {
     return c.half_phi_0 + N::scaled(c.half_phi_1, x) + N::scaled(c.half_phi_2, square) +
            N::scaled(c.half_phi_3, N::times(square, x));
   }
-  // Exact for the phi in the middle of the step: T' = -a abs(v) (T - phi) + b v is linear in T.
+  // Exact for the phi in the middle of the step: T' = -a abs(v) (T - phi) + b v relaxes to phi + s(v) b/a.
   template <class N>
   static void advance(State<N>& state, const Coefficients<N>& c, const Inputs<N>& now, const Inputs<N>& before) {
     const typename N::Value torsion = now.torsion - before.torsion;
     const typename N::Travel travel = N::travel(c.rate, N::magnitude(torsion));
     const typename N::Value phi = half_phi(c, now.torsion) + half_phi(c, before.torsion);
-    state.torque = N::relax(state.torque, N::widen(phi), N::exp_negative(travel)) +
-                   N::times(N::widen(c.stiffness, torsion), N::exp_mean(travel));
+    const typename N::State target = N::widen(phi) + N::times(N::sign(torsion), c.lead);
+    state.torque = N::relax(state.torque, target, N::exp_negative(travel));
   }
   template <class N>
   static void evaluate(const State<N>& state, const Coefficients<N>& c, const Inputs<N>&, Torques<N>& out) {

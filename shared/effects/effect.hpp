@@ -109,6 +109,7 @@ struct Description {
   // tells nothing of them, on the motor balance.
   unsigned adds_to = 0;
   bool told_by_motor = false;
+  bool acts_last = false;  // a shift that acts on the signal as all others have left it
   bool host_only = false;  // too large for a drive
 };
 constexpr unsigned on(Balance balance) {

@@ -42,8 +42,9 @@ struct KinematicError : Stateless {
     const P k = p[0] * d.turn_angle_scale;
     const P rate = k * d.velocity_base / d.torsion_rate_base;
     const P torque = k * d.output_torque_base / d.torque_base;
-    return {N::order(k),           N::gain(p[1] / d.torsion_base), N::gain(p[2] / d.torsion_base), N::gain(p[2] * rate),
-            N::gain(-p[1] * rate), N::gain(p[2] * torque),         N::gain(-p[1] * torque)};
+    return {N::order(k * d.angle_base), N::gain(p[1] / d.torsion_base), N::gain(p[2] / d.torsion_base),
+            N::gain(p[2] * rate),       N::gain(-p[1] * rate),          N::gain(p[2] * torque),
+            N::gain(-p[1] * torque)};
   }
   template <class N>
   static void shift(const Coefficients<N>& c, Inputs<N>& in) {

@@ -31,7 +31,7 @@ struct LoadScaledRipple : Stateless {
   template <class N, class P>
   static Coefficients<N> derive(const P* p, const DriveConstants<P>& d) {
     const P torque = d.output_torque_base / d.torque_base;
-    return {N::order(p[0] * d.turn_angle_scale), N::gain(p[1] * torque), N::gain(p[2] * torque)};
+    return {N::order(p[0] * d.turn_angle_scale * d.angle_base), N::gain(p[1] * torque), N::gain(p[2] * torque)};
   }
   template <class N>
   static void evaluate(const State<N>&, const Coefficients<N>& c, const Inputs<N>& in, Torques<N>& out) {

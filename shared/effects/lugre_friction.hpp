@@ -56,7 +56,7 @@ struct LugreFriction {
     typename N::Gain damping;
     typename N::Value sliding;  // Fc/Fs
     typename N::Gain rise;      // 1 - Fc/Fs
-    typename N::Gain per_velocity;
+    typename N::RatioGain per_velocity;
     typename N::StepGain per_travel;
   };
   // Share of the static friction that the bristles carry.
@@ -71,13 +71,13 @@ struct LugreFriction {
             N::gain(p[4] * d.velocity_base / d.torque_base),
             N::value(sliding),
             N::gain(P(1.0) - sliding),
-            N::gain(d.velocity_base / p[2]),
+            N::ratio_gain(d.velocity_base / p[2]),
             N::step_gain(p[3] * d.angle_base / p[1])};
   }
   // g over the static friction.
   template <class N>
   static typename N::Value limit(const Coefficients<N>& c, const Inputs<N>& in) {
-    return c.sliding + N::scaled(c.rise, N::gauss(N::scaled(c.per_velocity, in.velocity)));
+    return c.sliding + N::scaled(c.rise, N::gauss(N::ratio(c.per_velocity, in.velocity)));
   }
   // Over a step the speed hardly changes, so that its g is a constant and the law is linear in z: solved exactly by
   // travel, as s0 is far too stiff for an explicit step.
@@ -85,8 +85,7 @@ struct LugreFriction {
   static void advance(State<N>& state, const Coefficients<N>& c, const Inputs<N>& now, const Inputs<N>& before) {
     const typename N::Step travel = now.angle - before.angle;
     const typename N::Value most = limit(c, now);
-    const typename N::State share =
-        N::exp_negative(N::times(N::travel(c.per_travel, N::magnitude(travel)), N::reciprocal(most)));
+    const typename N::State share = N::exp_negative(N::over(N::travel(c.per_travel, N::magnitude(travel)), most));
     state.deflection = N::relax(state.deflection, N::times(N::sign(travel), most), share);
   }
   // s1 z' = s1 w (1 - s(w) s0 z/g): nought in steady sliding.

@@ -24,16 +24,16 @@ struct PowerLawFriction : Stateless {
   template <class N>
   struct Coefficients {
     typename N::Gain torque;
-    typename N::Gain per_velocity;
+    typename N::RatioGain per_velocity;
     typename N::Exponent exponent;
   };
   template <class N, class P>
   static Coefficients<N> derive(const P* p, const DriveConstants<P>& d) {
-    return {N::gain(p[0] / d.torque_base), N::gain(d.velocity_base / d.rated_velocity), N::exponent(p[1])};
+    return {N::gain(p[0] / d.torque_base), N::ratio_gain(d.velocity_base / d.rated_velocity), N::exponent(p[1])};
   }
   template <class N>
   static void evaluate(const State<N>&, const Coefficients<N>& c, const Inputs<N>& in, Torques<N>& out) {
-    out.motor += c.torque * N::times(N::pow_abs(N::scaled(c.per_velocity, in.velocity), c.exponent), in.direction);
+    out.motor += c.torque * N::times(N::pow_abs(N::ratio(c.per_velocity, in.velocity), c.exponent), in.direction);
   }
 };
 FLEXSPLINE_EFFECT(7, PowerLawFriction);

@@ -31,18 +31,18 @@ struct StribeckHessSoom : Stateless {
   struct Coefficients {
     typename N::Gain positive;
     typename N::Gain negative;
-    typename N::Gain per_velocity;
+    typename N::RatioGain per_velocity;
   };
   template <class N, class P>
   static Coefficients<N> derive(const P* p, const DriveConstants<P>& d) {
     const P half(0.5);
     return {N::gain(half * p[0] / d.torque_base), N::gain(half * p[1] / d.torque_base),
-            N::gain(d.velocity_base / p[2])};
+            N::ratio_gain(d.velocity_base / p[2])};
   }
   // s (1 + s) / 2 and s (1 - s) / 2 choose the amplitude of the direction without a branch.
   template <class N>
   static void evaluate(const State<N>&, const Coefficients<N>& c, const Inputs<N>& in, Torques<N>& out) {
-    const typename N::Value fall = N::lorentzian(N::scaled(c.per_velocity, in.velocity));
+    const typename N::Value fall = N::lorentzian(N::ratio(c.per_velocity, in.velocity));
     const typename N::Value odd = N::times(in.direction, fall);
     const typename N::Value even = N::times(in.direction, odd);
     out.motor += c.positive * (odd + even) + c.negative * (odd - even);

@@ -58,7 +58,7 @@ struct TorqueProportionalHysteresis {
   static void advance(State<N>& state, const Coefficients<N>& c, const Inputs<N>& now, const Inputs<N>& before) {
     const typename N::Value torsion = now.torsion - before.torsion;
     const typename N::Value bound = c.rest + N::scaled(c.per_torque, now.torque_magnitude + before.torque_magnitude);
-    const typename N::Travel travel = N::times(N::travel(c.per_torsion, N::magnitude(torsion)), N::reciprocal(bound));
+    const typename N::Travel travel = N::over(N::travel(c.per_torsion, N::magnitude(torsion)), bound);
     state.share = N::relax(state.share, N::times(N::sign(torsion), bound), N::exp_negative(travel));
   }
   template <class N>

@@ -30,7 +30,8 @@ struct TorqueRipple : Stateless {
   };
   template <class N, class P>
   static Coefficients<N> derive(const P* p, const DriveConstants<P>& d) {
-    return {N::order(p[0] * d.turn_angle_scale), N::gain(p[1] / d.torque_base), N::gain(p[2] / d.torque_base)};
+    return {N::order(p[0] * d.turn_angle_scale * d.angle_base), N::gain(p[1] / d.torque_base),
+            N::gain(p[2] / d.torque_base)};
   }
   template <class N>
   static void evaluate(const State<N>&, const Coefficients<N>& c, const Inputs<N>& in, Torques<N>& out) {

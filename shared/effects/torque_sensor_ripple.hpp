@@ -35,7 +35,7 @@ struct TorqueSensorRipple : Stateless {
   template <class N, class P>
   static Coefficients<N> derive(const P* p, const DriveConstants<P>& d) {
     const P motor = P(-1.0) / (d.gear_ratio * d.torque_base);
-    return {N::order(p[0] * d.turn_angle_scale), N::gain(p[1] / d.output_torque_base),
+    return {N::order(p[0] * d.turn_angle_scale * d.angle_base), N::gain(p[1] / d.output_torque_base),
             N::gain(p[2] / d.output_torque_base), N::gain(p[1] * motor), N::gain(p[2] * motor)};
   }
   // A sensor is no spring: what it adds to the reading is taken back where the reading stands for the torque.

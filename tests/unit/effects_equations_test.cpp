@@ -137,9 +137,6 @@ TEST_P(EveryEffect, GivesTheSameTorquePerUnit) {
                       &drive.acceleration_base, &drive.output_acceleration_base, &drive.angle_base, &drive.torsion_base,
                       &drive.torsion_rate_base, &drive.temperature_base, &drive.current_base, &drive.time_base})
       *b = base();
-    // A slope over the motor's angle is per radian, whatever unit the phase has.
-    if (entry_.adds_torque() && entry_.info->phase == Phase::shift) drive.angle_base = 1.0;
-    drive.turn_angle_scale = drive.angle_base;  // radians of motor turn per unit of motor position
     const double result_base = entry_.info->phase == Phase::shift       ? drive.torsion_base
                                : entry_.info->phase == Phase::modulate  ? 1.0
                                : entry_.info->balance == Balance::motor ? drive.torque_base

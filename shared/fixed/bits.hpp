@@ -1,0 +1,74 @@
+// Integer arithmetic that the number types stand on: products of 64 bits and shifts that round. All of it is defined
+// for every input, so that the same inputs give the same bits on every processor and at every level of optimisation.
+#pragma once
+
+#include <bit>
+#include <cstdint>
+
+namespace flexspline::fixed {
+
+// Product of two 64-bit numbers, from four of 32 bits.
+struct Product {
+  std::uint64_t high = 0;
+  std::uint64_t low = 0;
+};
+constexpr Product multiply(std::uint64_t a, std::uint64_t b) {
+  constexpr std::uint64_t kLow = 0xFFFFFFFF;
+  const std::uint64_t low = (a & kLow) * (b & kLow);
+  const std::uint64_t cross = (a >> 32) * (b & kLow) + (low >> 32);
+  const std::uint64_t other = (a & kLow) * (b >> 32) + (cross & kLow);
+  return {(a >> 32) * (b >> 32) + (cross >> 32) + (other >> 32), (other << 32) | (low & kLow)};
+}
+
+// a b 2^-bits rounded down, for 0 < bits < 64; the caller knows that it fits.
+constexpr std::uint64_t multiply_down(std::uint64_t a, std::uint64_t b, int bits) {
+  const Product p = multiply(a, b);
+  return (p.high << (64 - bits)) | (p.low >> bits);
+}
+
+constexpr std::uint64_t size_of(std::int64_t x) {
+  const auto bits = static_cast<std::uint64_t>(x);
+  return x < 0 ? 0 - bits : bits;
+}
+constexpr std::int64_t with_sign(std::uint64_t size, bool negative) {
+  return static_cast<std::int64_t>(negative ? 0 - size : size);
+}
+constexpr std::int64_t negated(std::int64_t x) {
+  return with_sign(size_of(x), x > 0);
+}
+
+// a b 2^-bits rounded to the nearest (halves away from nought), for 0 < bits < 64; the caller knows that it fits.
+constexpr std::int64_t multiply_round(std::int64_t a, std::int64_t b, int bits) {
+  const Product p = multiply(size_of(a), size_of(b));
+  const std::uint64_t half = std::uint64_t{1} << (bits - 1);
+  const std::uint64_t low = p.low + half;
+  const std::uint64_t high = p.high + (low < half ? 1 : 0);
+  return with_sign((high << (64 - bits)) | (low >> bits), (a < 0) != (b < 0));
+}
+
+// x 2^-bits rounded to the nearest; bits may be negative, and then the caller knows that it fits.
+constexpr std::int64_t shift_right(std::int64_t x, int bits) {
+  if (bits <= 0) return bits <= -64 ? 0 : static_cast<std::int64_t>(static_cast<std::uint64_t>(x) << -bits);
+  if (bits >= 64) return 0;
+  return (x >> bits) + ((x >> (bits - 1)) & 1);
+}
+
+// a b 2^-31 rounded to the nearest: one instruction (SMMULR and a shift) where the processor has it.
+constexpr std::int32_t multiply31(std::int32_t a, std::int32_t b) {
+  return static_cast<std::int32_t>((std::int64_t{a} * b + (std::int64_t{1} << 30)) >> 31);
+}
+
+// A polynomial in x of 31 fractional bits, by Horner's rule; the result has the format of the coefficients.
+template <std::size_t Size>
+constexpr std::int32_t polynomial(const std::int32_t (&coefficients)[Size], std::int32_t x) {
+  std::int32_t sum = coefficients[Size - 1];
+  for (std::size_t n = Size - 1; n > 0; --n) sum = coefficients[n - 1] + multiply31(sum, x);
+  return sum;
+}
+
+template <class T>
+constexpr T limited(T x, T low, T high) {
+  return x < low ? low : x > high ? high : x;
+}
+
+}  // namespace flexspline::fixed

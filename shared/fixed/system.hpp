@@ -1,0 +1,273 @@
+// The number system of the drive, as shared/effects/README.md asks for it: integers only. Its policy says what happens
+// where a result is safe by proof: `Trusting` takes it as it is, `Verifying` (checked.hpp) looks.
+#pragma once
+
+#include <cstdint>
+
+#include "shared/fixed/coefficients.hpp"
+#include "shared/fixed/elementary.hpp"
+#include "shared/fixed/types.hpp"
+
+namespace flexspline::fixed {
+
+struct Trusting {
+  static constexpr std::int32_t value(std::int64_t x) { return static_cast<std::int32_t>(x); }
+  static constexpr std::int64_t state_sum(std::int64_t a, std::int64_t b) {
+    return static_cast<std::int64_t>(static_cast<std::uint64_t>(a) + static_cast<std::uint64_t>(b));
+  }
+  // x 2^bits as a state.
+  static constexpr std::int64_t state_shift(std::int64_t x, int bits) { return shift_right(x, -bits); }
+  static constexpr void expect(bool, const char*) {}
+};
+
+// The input limited, times the mantissa: below 2^61.
+template <class G>
+constexpr std::int64_t product(const G& g, std::int64_t x) {
+  return g.mantissa * limited<std::int64_t>(x, -std::int64_t{g.limit}, g.limit);
+}
+
+template <class Policy>
+struct FixedSystem {
+  using Parameter = double;
+  // Values and states take the policy along, as sums of them are what may leave the range.
+  struct Value : fixed::Value {
+    friend constexpr auto operator<=>(Value, Value) = default;
+    friend constexpr Value operator+(Value a, Value b) { return {{Policy::value(std::int64_t{a.raw} + b.raw)}}; }
+    friend constexpr Value operator-(Value a, Value b) { return {{Policy::value(std::int64_t{a.raw} - b.raw)}}; }
+    friend constexpr Value operator-(Value a) { return {{Policy::value(-std::int64_t{a.raw})}}; }
+  };
+  struct State : fixed::State {
+    friend constexpr State operator+(State a, State b) { return {{Policy::state_sum(a.raw, b.raw)}}; }
+    friend constexpr State operator-(State a, State b) { return {{Policy::state_sum(a.raw, negated(b.raw))}}; }
+    friend constexpr State operator-(State a) { return {{negated(a.raw)}}; }
+  };
+  struct Gain : fixed::Gain {
+    friend constexpr fixed::Sum operator*(Gain g, Value x) {
+      return {shift_right(product(g, x.raw), kMantissaBits + kValueBits - kSumBits - g.exponent)};
+    }
+  };
+  struct Wave {
+    Value cosine;
+    Value sine;
+  };
+  using Angle = fixed::Angle;
+  using Step = fixed::Step;
+  using Sum = fixed::Sum;
+  using Travel = fixed::Travel;
+  using Ratio = fixed::Ratio;
+  using StepGain = fixed::StepGain;
+  using RatioGain = fixed::RatioGain;
+  using Exponent = fixed::Exponent;
+  using Order = fixed::Order;
+
+  // Where exp_negative and reciprocal would leave the range of a value: -2.75 and 1/15.
+  static constexpr std::int32_t kLeastExponential = -0x16000000;
+  static constexpr std::int32_t kLeastDivisor = (std::int32_t{1} << kValueBits) / 15;
+
+  // Coefficients, on the host; Findings has what does not fit.
+  static Gain gain(double x) { return {make_gain(x)}; }
+  static StepGain step_gain(double x) { return make_step_gain(x); }
+  static RatioGain ratio_gain(double x) { return make_ratio_gain(x); }
+  static Value value(double x) { return {make_value(x)}; }
+  static Exponent exponent(double x) { return make_exponent(x); }
+  static Order order(double radians_per_turn) { return make_order(radians_per_turn); }
+  static double power(double x, double exponent) { return __builtin_pow(x, exponent); }
+
+  // From here on integers only.
+  static constexpr Value one() { return {{std::int32_t{1} << kValueBits}}; }
+  static constexpr Value times(Value a, Value b) {
+    return {{Policy::value(shift_right(std::int64_t{a.raw} * b.raw, kValueBits))}};
+  }
+  static constexpr Value scaled(Gain g, Value x) {
+    return {{Policy::value(shift_right(product(g, x.raw), kMantissaBits - g.exponent))}};
+  }
+  static constexpr Ratio ratio(RatioGain g, Value x) {
+    return {shift_right(product(g, x.raw), kMantissaBits + kValueBits - kRatioBits - g.exponent)};
+  }
+  static constexpr Sum sum(Value x) { return {std::int64_t{x.raw} * (std::int64_t{1} << (kSumBits - kValueBits))}; }
+  // The whole of the balance: what does not fit a signal is clamped, as the last step.
+  static constexpr Value narrow(Sum x) {
+    return {{static_cast<std::int32_t>(
+        limited<std::int64_t>(shift_right(x.raw, kSumBits - kValueBits), -0x7FFFFFFF, 0x7FFFFFFF))}};
+  }
+  static constexpr Value narrow(State x) {
+    return {{static_cast<std::int32_t>(shift_right(x.raw, kStateBits - kValueBits))}};
+  }
+  static constexpr State widen(Value x) { return {{Policy::state_shift(x.raw, kStateBits - kValueBits)}}; }
+
+  static constexpr Step magnitude(Step x) {
+    const std::uint64_t size = size_of(x.raw);
+    return {static_cast<std::int64_t>(size > kLargest ? kLargest : size)};
+  }
+  static constexpr Value magnitude(Value x) { return x.raw < 0 ? -x : x; }
+  static constexpr State magnitude(State x) { return x.raw < 0 ? -x : x; }
+  static constexpr Value clamp(Value x, Value limit) { return {{limited(x.raw, (-limit).raw, limit.raw)}}; }
+  static constexpr Value between(Value x, Value low, Value high) { return {{limited(x.raw, low.raw, high.raw)}}; }
+  static constexpr State clamp_to_one(State x) { return {{limited(x.raw, -kOneState, kOneState)}}; }
+  static constexpr State bounded(State x) { return {{limited(x.raw, -4 * kOneState, 4 * kOneState)}}; }
+  static constexpr Value by_sign(Value x, Value a, Value b) { return x.raw < 0 ? b : a; }
+  static constexpr State sign(Step x) { return {{x.raw > 0 ? kOneState : x.raw < 0 ? -kOneState : 0}}; }
+  static constexpr State sign(Value x) { return {{x.raw > 0 ? kOneState : x.raw < 0 ? -kOneState : 0}}; }
+
+  static constexpr Travel travel(StepGain g, Step x) {
+    return limited_travel(shift_right(product(g, x.raw), kMantissaBits + kAngleBits - kTravelBits - g.exponent));
+  }
+  static constexpr Travel travel(Gain g, Value x) {
+    return limited_travel(shift_right(product(g, x.raw), kMantissaBits + kValueBits - kTravelBits - g.exponent));
+  }
+  static constexpr Travel times(Travel t, Value x) {
+    return by_mantissa(t, static_cast<std::uint32_t>(x.raw < 0 ? 0 : x.raw), kValueBits);
+  }
+  static constexpr Travel over(Travel t, Value x) {
+    if (t.raw == 0) return t;
+    if (x.raw <= 0) return {kLargestTravel};
+    const Reciprocal r = reciprocal_of(static_cast<std::uint64_t>(x.raw));
+    return by_mantissa(t, r.mantissa, kMantissaBits - kValueBits - r.exponent);
+  }
+  static constexpr Travel times_power(Travel t, State x, Exponent e) {
+    if (e.raw == 0 || t.raw == 0) return t;
+    if (x.raw == 0) return e.raw > 0 ? Travel{} : Travel{kLargestTravel};
+    const Power p = power_of_two_of(log_times(size_of(x.raw), kStateBits, e));
+    return by_mantissa(t, p.mantissa, kMantissaBits - p.exponent);
+  }
+  // What a step moves a state by: never more than four, as the state is clamped to one next.
+  static constexpr State step(Travel t, Value x) {
+    constexpr std::uint64_t kFour = std::uint64_t{4} << kStateBits;
+    const auto factor = static_cast<std::uint64_t>(size_of(x.raw));
+    const Product p = multiply(t.raw, factor);
+    constexpr int kBits = kTravelBits + kValueBits - kStateBits;
+    const std::uint64_t size = (p.high >> (kBits - 1)) != 0 ? kFour : (p.high << (64 - kBits)) | (p.low >> kBits);
+    return {{with_sign(size > kFour ? kFour : size, x.raw < 0)}};
+  }
+  static constexpr State times(State a, Value b) {
+    constexpr std::uint64_t kMost = std::uint64_t{1} << 63;
+    const Product p = multiply(size_of(a.raw), size_of(b.raw));
+    const bool fits = (p.high >> (kValueBits - 1)) == 0;
+    Policy::expect(fits, "a product of a state leaves its range");
+    const std::uint64_t size = (p.high << (64 - kValueBits)) | (p.low >> kValueBits);
+    return {{with_sign(fits ? size : kMost - 1, (a.raw < 0) != (b.raw < 0))}};
+  }
+  // Rounds towards the target, so that it never leaves the hull of both.
+  static constexpr State relax(State from, State target, State share) {
+    const bool above = from.raw > target.raw;
+    const std::uint64_t a = static_cast<std::uint64_t>(from.raw);
+    const std::uint64_t b = static_cast<std::uint64_t>(target.raw);
+    const std::uint64_t kept = multiply_down(above ? a - b : b - a, static_cast<std::uint64_t>(share.raw), kStateBits);
+    return {{static_cast<std::int64_t>(above ? b + kept : b - kept)}};
+  }
+
+  static constexpr State exp_negative(Travel x) { return {{static_cast<std::int64_t>(decay(x.raw))}}; }
+  static constexpr Value exp_negative(Value x) {
+    constexpr std::int64_t kPerLn2 = 0x5C551D94AE0BF85E;  // Q62
+    const std::int64_t y =
+        -multiply_round(x.raw < kLeastExponential ? kLeastExponential : x.raw, kPerLn2, 62 + kValueBits - kLogBits);
+    return from_power(power_of_two_of(y));
+  }
+  static constexpr Value exp_mean(Travel x) {
+    const Halvings h = halvings_of(x.raw);
+    if (h.count == 0) {
+      const auto mean = decay_mean(static_cast<std::int32_t>(h.rest >> (kTravelBits - 31)));
+      return {{static_cast<std::int32_t>(shift_right(mean, kMantissaBits - kValueBits))}};
+    }
+    constexpr int kLostBits = 52;  // so that the shift below is less than a word
+    const std::uint64_t lost = ((std::uint64_t{1} << kStateBits) - decay(x.raw)) >> (kStateBits - kLostBits);
+    const Reciprocal r = reciprocal_of(x.raw);
+    return {{static_cast<std::int32_t>(
+        multiply_down(lost, r.mantissa, kLostBits + kMantissaBits - kValueBits - kTravelBits - r.exponent))}};
+  }
+  // exp(-y), y = log(1 + z)/(q - 1), z = (q - 1) x.
+  static constexpr State q_exp_negative(Travel x, Exponent q) {
+    constexpr int kZBits = 52;
+    const std::int64_t less_one = std::int64_t{q.raw} - (std::int64_t{1} << kExponentBits);
+    const std::int64_t z =
+        multiply_round(static_cast<std::int64_t>(x.raw), less_one, kTravelBits + kExponentBits - kZBits);
+    constexpr std::int64_t kSmall = std::int64_t{1} << (kZBits - 4);
+    if (z < kSmall && z > -kSmall) {
+      // The square of a small z is far below a unit, but z itself is rounded: from x, not from z, comes what counts.
+      const auto mean = static_cast<std::uint32_t>(log_mean(static_cast<std::int32_t>(shift_right(z, kZBits - 31))));
+      return exp_negative(by_mantissa(x, mean, kMantissaBits));
+    }
+    const std::int64_t base = (std::int64_t{1} << kZBits) + z;
+    if (base <= 0) return {};
+    const std::int64_t log = log2_of(static_cast<std::uint64_t>(base)) - (std::int64_t{kZBits} << kLogBits);
+    const std::uint64_t natural = multiply_down(size_of(log), kLn2, kTravelBits - (50 - kLogBits));  // Q50
+    const Reciprocal r = reciprocal_of(size_of(less_one));
+    return exp_negative(
+        by_mantissa({natural}, r.mantissa, kMantissaBits - r.exponent - kExponentBits - (kTravelBits - 50)));
+  }
+  static constexpr Value gauss(Ratio x) {
+    constexpr std::int64_t kAllGone = std::int64_t{11} << (kRatioBits - 1);  // exp(-5.5^2) is 7e-14
+    const std::int64_t size = limited<std::int64_t>(x.raw, -kAllGone, kAllGone);
+    const Travel square{static_cast<std::uint64_t>(multiply_round(size, size, 2 * kRatioBits - kTravelBits))};
+    return narrow(exp_negative(square));
+  }
+  static constexpr Value lorentzian(Ratio x) {
+    constexpr std::int64_t kAllGone = std::int64_t{11000} << kRatioBits;  // one over its square is one unit
+    constexpr int kBits = 36;
+    const std::int64_t size = limited<std::int64_t>(x.raw, -kAllGone, kAllGone);
+    const auto square = static_cast<std::uint64_t>(multiply_round(size, size, 2 * kRatioBits - kBits));
+    const Reciprocal r = reciprocal_of((std::uint64_t{1} << kBits) + square);
+    return {{static_cast<std::int32_t>(shift_right(r.mantissa, kMantissaBits - kValueBits - kBits - r.exponent))}};
+  }
+  static constexpr Value reciprocal(Value x) {
+    const Reciprocal r = reciprocal_of(static_cast<std::uint64_t>(x.raw < kLeastDivisor ? kLeastDivisor : x.raw));
+    return {{static_cast<std::int32_t>(shift_right(r.mantissa, kMantissaBits - 2 * kValueBits - r.exponent))}};
+  }
+  static constexpr Value pow_abs(Ratio x, Exponent e) { return raised(size_of(x.raw), kRatioBits, e); }
+  static constexpr Value pow_abs(State x, Exponent e) { return raised(size_of(x.raw), kStateBits, e); }
+
+  static constexpr Angle times_order(Angle angle, Order order) {
+    Product p = multiply(static_cast<std::uint64_t>(angle.raw), static_cast<std::uint64_t>(order.raw));
+    if (angle.raw < 0) p.high -= static_cast<std::uint64_t>(order.raw);
+    return {static_cast<std::int64_t>((p.high << (64 - kOrderBits)) | (p.low >> kOrderBits))};
+  }
+  static constexpr Wave sincos(Angle phase) {
+    const SineCosine w = sine_cosine(static_cast<std::uint32_t>(static_cast<std::uint64_t>(phase.raw)));
+    constexpr int kBits = kMantissaBits - kValueBits;
+    return {{{static_cast<std::int32_t>(shift_right(w.cosine, kBits))}},
+            {{static_cast<std::int32_t>(shift_right(w.sine, kBits))}}};
+  }
+
+ private:
+  static constexpr std::int64_t kOneState = std::int64_t{1} << kStateBits;
+  static constexpr std::uint64_t kLargest = 0x7FFFFFFFFFFFFFFF;
+
+  static constexpr Travel limited_travel(std::int64_t x) {
+    const auto size = static_cast<std::uint64_t>(x < 0 ? 0 : x);
+    return {size > kLargestTravel ? kLargestTravel : size};
+  }
+  // t m 2^-bits, limited; bits may be anything.
+  static constexpr Travel by_mantissa(Travel t, std::uint32_t m, int bits) {
+    const Product p = multiply(t.raw, m);  // below 2^95
+    if (bits >= 96) return {};
+    if (bits >= 64) return {p.high >> (bits - 64)};
+    if (bits <= 0) {
+      const int up = -bits;
+      if (p.high != 0 || up >= 63 || p.low > (kLargestTravel >> up))
+        return {p.low == 0 && p.high == 0 ? 0 : kLargestTravel};
+      return {p.low << up};
+    }
+    if ((p.high >> (bits - 1)) != 0) return {kLargestTravel};
+    const std::uint64_t size = (p.high << (64 - bits)) | (p.low >> bits);
+    return {size > kLargestTravel ? kLargestTravel : size};
+  }
+  // e log2(x 2^-bits), Q40, limited to what a power of two can take.
+  static constexpr std::int64_t log_times(std::uint64_t x, int bits, Exponent e) {
+    const std::int64_t log = log2_of(x) - (std::int64_t{bits} << kLogBits);
+    return multiply_round(log, e.raw, kExponentBits);
+  }
+  static constexpr Value raised(std::uint64_t x, int bits, Exponent e) {
+    if (e.raw == 0) return one();
+    if (x == 0) return e.raw > 0 ? Value{} : Value{{0x7FFFFFFF}};
+    return from_power(power_of_two_of(log_times(x, bits, e)));
+  }
+  static constexpr Value from_power(Power p) {
+    Policy::expect(p.exponent < 4, "a power leaves the range of a value");
+    if (p.exponent >= 4) return {{0x7FFFFFFF}};
+    return {{static_cast<std::int32_t>(shift_right(p.mantissa, kMantissaBits - kValueBits - p.exponent))}};
+  }
+};
+
+using Fixed = FixedSystem<Trusting>;
+
+}  // namespace flexspline::fixed
