@@ -21,7 +21,7 @@
 namespace flexspline::cli {
 namespace {
 
-constexpr const char* kDataHelp = "measurements: any number of CSV files, folders, dataset.tomls";
+constexpr const char* kDataHelp = "measurements: any number of CSV or MAT files, folders, dataset.tomls";
 
 // A command as it was parsed, ready to run.
 struct Chosen {

@@ -257,6 +257,11 @@ std::string unit_in_name(std::string_view name) {
     const std::string ratio = words[words.size() - 2] + "/" + words.back();
     if (data::unit_from_text(ratio)) return ratio;
   }
+  // Before its capitals make two words of mA.
+  const auto is_letter = [](char c) { return std::isalpha(static_cast<unsigned char>(c)) != 0; };
+  const auto tail = std::find_if_not(name.rbegin(), name.rend(), is_letter).base();
+  const std::string last(tail, name.end());
+  if (last.size() > 1 && tail != name.begin() && data::unit_from_text(last)) return last;
   return unit_of_word(words.back());
 }
 

@@ -27,7 +27,8 @@ const std::array kHelp = {
     CommandHelp{
         "new",
         "first dataset.toml and base model from the measurements that there are",
-        "Reads CSV files as a logger left them, finds out which column is what from names, units and motion, and "
+        "Reads CSV and MAT files as a logger left them, finds out which column is what from names, units and motion, "
+        "and "
         "writes "
         "two files into a new folder: dataset.toml, which maps the columns to ours, and base-model.toml, with the "
         "effects that these signals can show. The measurements stay where they are and as they are. What is guessed is "

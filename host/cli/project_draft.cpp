@@ -3,14 +3,16 @@
 #include <fmt/format.h>
 
 #include <algorithm>
-#include <cmath>
+#include <map>
+#include <memory>
 #include <optional>
 #include <utility>
 
 #include "host/cli/record_summary.hpp"
-#include "host/data/csv.hpp"
+#include "host/data/recording.hpp"
 #include "host/model/text.hpp"
 #include "host/output/text.hpp"
+#include "host/text/nearest.hpp"
 
 namespace flexspline::cli {
 namespace {
@@ -18,23 +20,8 @@ namespace {
 namespace fs = std::filesystem;
 using data::Column;
 
-bool is_csv(const fs::path& path) {
-  std::string extension = path.extension().string();
-  for (char& c : extension) c = static_cast<char>(std::tolower(static_cast<unsigned char>(c)));
-  return extension == ".csv" || extension == ".tsv";
-}
-
 [[noreturn]] void fail(const fs::path& file, const std::string& what, const std::string& remedy) {
   throw data::DataError({{data::Severity::error, "file", file.string(), 0, "", what, remedy}});
-}
-
-std::vector<fs::path> csv_files_in(const fs::path& folder) {
-  std::vector<fs::path> files;
-  for (const fs::directory_entry& entry : fs::directory_iterator(folder))
-    if (entry.is_regular_file() && is_csv(entry.path())) files.push_back(entry.path());
-  std::sort(files.begin(), files.end());
-  if (files.empty()) fail(folder, "the folder has no CSV file", "give a folder with .csv or .tsv files");
-  return files;
 }
 
 // The dataset.toml that a path stands for, if it does.
@@ -51,7 +38,8 @@ data::KeyValue number_value(double value) {
   return {model::exact_text(value), value, "", 0};
 }
 
-ColumnGuess mapping_of(const std::string& text, const std::vector<std::string>& names) {
+// `names`: the columns of all files; `first` may say why it has none of a name.
+ColumnGuess mapping_of(const std::string& text, const std::vector<std::string>& names, const data::Recording& first) {
   const std::size_t equals = text.find('=');
   if (equals == std::string::npos)
     throw UsageError(fmt::format("--map {} is not OURS=THEIRS[:UNIT]; as in --map current_a=Iq:mA", text));
@@ -66,32 +54,69 @@ ColumnGuess mapping_of(const std::string& text, const std::vector<std::string>& 
     return std::find(names.begin(), names.end(), name) != names.end();
   };
   const std::size_t colon = guess.theirs.rfind(':');
-  if (!is_name(guess.theirs) && colon != std::string::npos) {
+  // A row of a MAT file's matrix has a colon of its own: data(1,:).
+  if (!is_name(guess.theirs) && colon != std::string::npos && guess.theirs.find(')', colon) == std::string::npos) {
     guess.unit = guess.theirs.substr(colon + 1);
     guess.theirs.erase(colon);
     if (!data::unit_from_text(guess.unit))
       throw UsageError(fmt::format("--map {}: the unit \"{}\" is not known; write one as in --map {}={}:rpm", text,
                                    guess.unit, guess.ours, guess.theirs));
   }
-  if (!is_name(guess.theirs))
-    throw UsageError(fmt::format("--map {}: no file has a column \"{}\"; the columns are {}", text, guess.theirs,
-                                 output::listed(names)));
+  if (!is_name(guess.theirs)) {
+    const std::string why = first.why_not(guess.theirs);
+    throw UsageError(fmt::format("--map {}: {}; the columns are {}", text,
+                                 why.empty() ? fmt::format("no file has a column \"{}\"", guess.theirs)
+                                             : fmt::format("\"{}\" {}", guess.theirs, why),
+                                 output::listed(text::nearest_first(guess.theirs, names))));
+  }
   return guess;
 }
 
-// Values of some columns of a file, by name; empty where it does not have one.
-std::vector<std::vector<double>> values_of(const data::CsvFile& csv, const std::vector<std::string>& names) {
+// Values of some columns of one table in a file, by name; empty where it does not have one.
+std::vector<std::vector<double>> values_of(const data::Recording& recording, const std::vector<std::string>& names) {
+  const std::vector<std::string>& there = recording.names();
   std::vector<std::size_t> wanted;
   std::vector<std::optional<std::size_t>> slots;
   for (const std::string& name : names) {
-    const auto at = std::find(csv.names().begin(), csv.names().end(), name);
-    slots.push_back(at == csv.names().end() ? std::nullopt : std::optional(wanted.size()));
-    if (at != csv.names().end()) wanted.push_back(static_cast<std::size_t>(at - csv.names().begin()));
+    const auto at = std::find(there.begin(), there.end(), name);
+    slots.push_back(at == there.end() ? std::nullopt : std::optional(wanted.size()));
+    if (at != there.end()) wanted.push_back(static_cast<std::size_t>(at - there.begin()));
   }
-  const data::CsvTable table = csv.read(wanted);
+  const data::Table table = recording.read(wanted);
   std::vector<std::vector<double>> values;
   for (const auto& slot : slots) values.push_back(slot ? table.columns[*slot] : std::vector<double>{});
   return values;
+}
+
+using Lengths = std::vector<std::pair<std::string, std::size_t>>;
+
+Lengths lengths_of(const data::Recording& recording) {
+  Lengths lengths;
+  for (std::size_t i = 0; i < recording.names().size(); ++i)
+    lengths.emplace_back(recording.names()[i], recording.length(i));
+  return lengths;
+}
+
+std::vector<std::string> of_length(std::size_t wanted, const Lengths& lengths) {
+  std::vector<std::string> names;
+  for (const auto& [name, length] : lengths)
+    if (length == wanted) names.push_back(name);
+  return names;
+}
+
+// The columns of a file that make one table with the time called so; where there is none, those of the largest table.
+std::vector<std::string> table_with(const std::string& time, const Lengths& lengths) {
+  std::size_t wanted = 0, most = 0;
+  std::map<std::size_t, std::size_t> values;
+  for (const auto& [name, length] : lengths) {
+    if (name == time) return of_length(length, lengths);
+    values[length] += length;
+    if (values[length] > most) {
+      most = values[length];
+      wanted = length;
+    }
+  }
+  return of_length(wanted, lengths);
 }
 
 ColumnGuess* find(std::vector<ColumnGuess>& columns, std::string_view ours) {
@@ -106,13 +131,13 @@ double factor_of(const std::string& unit) {
 }
 
 // Units that names do not give, from the values of the first file.
-void guess_units(std::vector<ColumnGuess>& columns, const data::CsvFile& csv) {
+void guess_units(std::vector<ColumnGuess>& columns, const data::Recording& recording) {
   ColumnGuess* time = find(columns, "time_s");
   ColumnGuess* velocity = find(columns, "motor_velocity_rad_s");
   const ColumnGuess* position = find(columns, "motor_position_rad");
   const auto source = [](const ColumnGuess* c, const char* ours) { return c ? c->theirs : std::string(ours); };
-  auto values = values_of(
-      csv, {source(time, "time_s"), source(position, "motor_position_rad"), source(velocity, "motor_velocity_rad_s")});
+  auto values = values_of(recording, {source(time, "time_s"), source(position, "motor_position_rad"),
+                                      source(velocity, "motor_velocity_rad_s")});
   if (time != nullptr && time->unit.empty())
     if (const auto unit = time_unit_by_values(values[0])) {
       time->unit = *unit;
@@ -140,21 +165,30 @@ Draft draft_of_files(const std::vector<fs::path>& files, const NewOptions& optio
   Draft draft;
   data::Findings findings;
   std::vector<std::string> names;
-  std::optional<data::CsvFile> first;
+  std::vector<Lengths> lengths;
+  std::unique_ptr<data::Recording> first;
+  const auto add_new = [](const std::vector<std::string>& from, std::vector<std::string>& to) {
+    for (const std::string& name : from)
+      if (std::find(to.begin(), to.end(), name) == to.end()) to.push_back(name);
+  };
   for (const fs::path& file : files) {
-    data::CsvFile csv(file, findings);
-    for (const std::string& name : csv.names())
-      if (std::find(names.begin(), names.end(), name) == names.end()) names.push_back(name);
-    if (!first) first.emplace(std::move(csv));
+    std::unique_ptr<data::Recording> recording = data::open_recording(file, findings);
+    add_new(recording->names(), names);
+    lengths.push_back(lengths_of(*recording));
+    if (!first) first = std::move(recording);
     data::ExperimentEntry entry;
     entry.file = fs::absolute(file);
     draft.toml.experiments.push_back(std::move(entry));
   }
   std::vector<ColumnGuess> stated;
-  for (const std::string& text : options.map) stated.push_back(mapping_of(text, names));
+  for (const std::string& text : options.map) stated.push_back(mapping_of(text, names, *first));
   std::optional<data::Axis> axis;
   if (!options.axis.empty()) axis = options.axis == "linear" ? data::Axis::linear : data::Axis::rotary;
-  HeaderGuess guess = guess_columns(names, stated, axis);
+  const ColumnGuess* time = find(stated, "time_s");
+  std::vector<std::string> of_one_table;
+  for (const Lengths& of_file : lengths)
+    add_new(table_with(time != nullptr ? time->theirs : "time_s", of_file), of_one_table);
+  HeaderGuess guess = guess_columns(of_one_table, stated, axis);
   guess_units(guess.columns, *first);
 
   for (const ColumnGuess& c : guess.columns) {
@@ -193,7 +227,8 @@ Draft draft_of_toml(const fs::path& path, const NewOptions& options) {
   data::Findings findings(options.data.tolerate);
   draft.toml = data::read_dataset_toml(path, findings);
   if (draft.toml.experiments.empty())
-    for (const fs::path& file : csv_files_in(path.has_parent_path() ? path.parent_path() : fs::path("."))) {
+    for (const fs::path& file :
+         data::recordings_in(path.has_parent_path() ? path.parent_path() : fs::path("."), findings)) {
       data::ExperimentEntry entry;
       entry.file = file;
       draft.toml.experiments.push_back(std::move(entry));
@@ -207,18 +242,19 @@ Draft draft_of_toml(const fs::path& path, const NewOptions& options) {
 }  // namespace
 
 Draft draft_of(const NewOptions& options) {
+  data::Findings findings;
   std::vector<fs::path> files;
   for (const fs::path& path : options.data.data) {
     if (!fs::exists(path))
-      fail(path, "there is no such file or folder", "give CSV files, folders of them, or a dataset.toml");
+      fail(path, "there is no such file or folder", "give CSV or MAT files, folders of them, or a dataset.toml");
     if (const auto toml = toml_of(path)) {
       if (options.data.data.size() > 1)
-        throw UsageError(fmt::format("{} says already what belongs together; give it alone, or give CSV files only",
+        throw UsageError(fmt::format("{} says already what belongs together; give it alone, or give recordings only",
                                      toml->string()));
       return draft_of_toml(*toml, options);
     }
     if (fs::is_directory(path))
-      for (fs::path& file : csv_files_in(path)) files.push_back(std::move(file));
+      for (fs::path& file : data::recordings_in(path, findings)) files.push_back(std::move(file));
     else
       files.push_back(path);
   }

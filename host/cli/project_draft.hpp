@@ -22,7 +22,7 @@ struct Draft {
   std::vector<std::string> unused;
 };
 
-// From CSV files and folders of them, or from one dataset.toml, whose facts are kept.
+// From CSV and MAT files and folders of them, or from one dataset.toml, whose facts are kept.
 // Throws data::DataError and UsageError.
 Draft draft_of(const NewOptions& options);
 

@@ -12,9 +12,11 @@ namespace flexspline::data {
 namespace {
 
 std::string listed(const std::vector<std::string>& names) {
+  constexpr std::size_t kMost = 40;  // a MAT file may hold hundreds
   std::string text;
-  for (const std::string& name : names) text += (text.empty() ? "" : ", ") + fmt::format("\"{}\"", name);
-  return text;
+  for (std::size_t i = 0; i < std::min(names.size(), kMost); ++i)
+    text += (i == 0 ? "" : ", ") + fmt::format("\"{}\"", names[i]);
+  return names.size() > kMost ? fmt::format("{} and {} more", text, names.size() - kMost) : text;
 }
 
 std::string near_column(std::string_view name) {
@@ -25,20 +27,20 @@ std::string near_column(std::string_view name) {
 
 class Planner {
  public:
-  Planner(const CsvFile& csv, std::string file, const DatasetToml* toml, Findings& findings)
-      : csv_(csv), file_(std::move(file)), toml_(toml), findings_(findings) {
+  Planner(const Recording& recording, std::string file, const DatasetToml* toml, Findings& findings)
+      : recording_(recording), file_(std::move(file)), toml_(toml), findings_(findings) {
     if (toml_ != nullptr) plan_.mapping_file = toml_->file.string();
   }
 
   std::optional<ColumnPlan> plan() {
-    const bool has_time = find_time();
+    has_time_ = find_time();
     for (std::size_t i = 0; i < kColumns; ++i) find(static_cast<Column>(i));
     list_unused();
-    if (has_time && plan_.columns.empty())
-      findings_.add(Severity::error, "missing_column", file_, csv_.header_line(), "",
+    if (has_time_ && plan_.columns.empty())
+      findings_.add(Severity::error, "missing_column", file_, recording_.header_line(), "",
                     fmt::format("beside time, none of the columns is known; not used: {}", listed(plan_.unused)),
                     "map them in dataset.toml: [columns.current_a] with source = \"NAME IN THE FILE\" and unit");
-    if (!has_time || plan_.columns.empty()) return std::nullopt;
+    if (!has_time_ || plan_.columns.empty()) return std::nullopt;
     return std::move(plan_);
   }
 
@@ -51,11 +53,11 @@ class Planner {
 
   // Slot of the column of theirs with this name.
   std::optional<std::size_t> slot(std::string_view theirs) {
-    const std::vector<std::string>& names = csv_.names();
+    const std::vector<std::string>& names = recording_.names();
     const auto at = std::find(names.begin(), names.end(), theirs);
     if (at == names.end()) return std::nullopt;
     if (std::find(at + 1, names.end(), theirs) != names.end())
-      findings_.add(Severity::error, "header", file_, csv_.header_line(), std::string(theirs),
+      findings_.add(Severity::error, "header", file_, recording_.header_line(), std::string(theirs),
                     "this name stands twice in the header", "rename one of the two");
     const std::size_t index = static_cast<std::size_t>(at - names.begin());
     const auto known = std::find(plan_.wanted.begin(), plan_.wanted.end(), index);
@@ -65,13 +67,40 @@ class Planner {
     return plan_.wanted.size() - 1;
   }
 
+  std::string near_first(std::string_view name) const { return listed(text::nearest_first(name, recording_.names())); }
+
+  // Something of this name is there, but no column can be made of it.
+  bool is_no_column(const std::string& theirs, const std::string& ours) {
+    const std::string why = recording_.why_not(theirs);
+    if (why.empty()) return false;
+    findings_.add(Severity::error, "mapping", file_, 0, ours, fmt::format("\"{}\" {}", theirs, why),
+                  fmt::format("save it as a vector of real numbers, or map another to {}; those there are {}", ours,
+                              near_first(theirs)));
+    return true;
+  }
+
+  bool has_length_of_time(std::size_t slot, const std::string& ours) {
+    if (!has_time_) return true;
+    const std::size_t length = recording_.length(plan_.wanted[slot]);
+    const std::size_t time = recording_.length(plan_.wanted[plan_.time_slot]);
+    if (length == time) return true;
+    findings_.add(Severity::error, "mapping", file_, 0, ours,
+                  fmt::format("\"{}\" has {} values, but the time \"{}\" has {}", plan_.wanted_names[slot], length,
+                              plan_.time.source, time),
+                  "map the time that belongs to it, or bring all to one time in MATLAB: interp1(t, x, time_s)");
+    plan_.wanted.pop_back();  // it is new there: what was wanted before has the length of time
+    plan_.wanted_names.pop_back();
+    return false;
+  }
+
   bool find_time() {
     plan_.time.source = "time_s";
     if (const ColumnMapping* mapping = mapping_of("time_s")) plan_.time = *mapping;
     const std::optional<std::size_t> found = slot(plan_.time.source);
     if (!found) {
-      findings_.add(Severity::error, "missing_column", file_, csv_.header_line(), "time_s",
-                    fmt::format("there is no column \"{}\" among {}", plan_.time.source, listed(csv_.names())),
+      if (is_no_column(plan_.time.source, "time_s")) return false;
+      findings_.add(Severity::error, "missing_column", file_, recording_.header_line(), "time_s",
+                    fmt::format("there is no column \"{}\" among {}", plan_.time.source, near_first(plan_.time.source)),
                     "name the column of time time_s, or map it in dataset.toml: [columns.time_s] with source and unit");
       return false;
     }
@@ -89,44 +118,47 @@ class Planner {
     if (mapping != nullptr) planned.mapping = *mapping;
     const std::optional<std::size_t> found = slot(planned.mapping.source);
     if (!found) {
+      if (is_no_column(planned.mapping.source, name)) return;
       if (mapping != nullptr)
-        findings_.add(Severity::warning, "mapping", file_, csv_.header_line(), name,
+        findings_.add(Severity::warning, "mapping", file_, recording_.header_line(), name,
                       fmt::format("the file has no column \"{}\" that it is mapped from, so it is not measured here",
                                   planned.mapping.source),
-                      fmt::format("the columns are {}", listed(csv_.names())));
+                      fmt::format("the columns are {}", near_first(planned.mapping.source)));
       return;
     }
+    if (!has_length_of_time(*found, name)) return;
     planned.slot = *found;
     plan_.columns.push_back(planned);
   }
 
   void list_unused() {
     std::string nearly;
-    for (std::size_t i = 0; i < csv_.names().size(); ++i) {
-      const std::string& name = csv_.names()[i];
+    for (std::size_t i = 0; i < recording_.names().size(); ++i) {
+      const std::string& name = recording_.names()[i];
       if (name.empty() || std::find(plan_.wanted.begin(), plan_.wanted.end(), i) != plan_.wanted.end()) continue;
       plan_.unused.push_back(name);
       const std::string near = column_from_name(name) ? "" : near_column(name);
       if (!near.empty()) nearly += fmt::format("{}{} for {}", nearly.empty() ? "" : ", ", near, name);
     }
     if (plan_.unused.empty()) return;
-    findings_.add(nearly.empty() ? Severity::note : Severity::warning, "unused_column", file_, csv_.header_line(), "",
-                  fmt::format("not used: {}", listed(plan_.unused)),
+    findings_.add(nearly.empty() ? Severity::note : Severity::warning, "unused_column", file_, recording_.header_line(),
+                  "", fmt::format("not used: {}", listed(plan_.unused)),
                   nearly.empty() ? "map those that matter in dataset.toml" : fmt::format("did you mean {}?", nearly));
   }
 
-  const CsvFile& csv_;
+  const Recording& recording_;
   std::string file_;
   const DatasetToml* toml_;
   Findings& findings_;
   ColumnPlan plan_;
+  bool has_time_ = false;
 };
 
 }  // namespace
 
-std::optional<ColumnPlan> plan_columns(const CsvFile& csv, const std::filesystem::path& path, const DatasetToml* toml,
-                                       Findings& findings) {
-  return Planner(csv, path.string(), toml, findings).plan();
+std::optional<ColumnPlan> plan_columns(const Recording& recording, const std::filesystem::path& path,
+                                       const DatasetToml* toml, Findings& findings) {
+  return Planner(recording, path.string(), toml, findings).plan();
 }
 
 namespace {

@@ -6,10 +6,10 @@
 #include <string>
 #include <vector>
 
-#include "host/data/csv.hpp"
 #include "host/data/dataset.hpp"
 #include "host/data/dataset_toml.hpp"
 #include "host/data/findings.hpp"
+#include "host/data/recording.hpp"
 
 namespace flexspline::data {
 
@@ -21,7 +21,7 @@ struct PlannedColumn {
 };
 
 struct ColumnPlan {
-  std::vector<std::size_t> wanted;  // indices into CsvFile::names()
+  std::vector<std::size_t> wanted;  // indices into Recording::names()
   std::vector<std::string> wanted_names;
   std::size_t time_slot = 0;
   ColumnMapping time;
@@ -31,8 +31,8 @@ struct ColumnPlan {
 };
 
 // Empty if the file has no time or no column of ours; the findings say what to map.
-std::optional<ColumnPlan> plan_columns(const CsvFile& csv, const std::filesystem::path& path, const DatasetToml* toml,
-                                       Findings& findings);
+std::optional<ColumnPlan> plan_columns(const Recording& recording, const std::filesystem::path& path,
+                                       const DatasetToml* toml, Findings& findings);
 
 // Theirs to ours: the unit first, then scale and offset.
 struct Conversion {

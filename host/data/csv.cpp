@@ -131,15 +131,13 @@ std::string read_whole(const std::filesystem::path& path, Findings& findings) {
 
 void refuse_what_is_not_csv(const std::filesystem::path& path, const std::string& text, Findings& findings) {
   const std::string file = path.string();
-  if (path.extension() == ".mat" || text.starts_with("MATLAB "))
-    findings.fail("format", file, 0, "MAT files are not read yet",
-                  "export it as CSV, in MATLAB: writetable(table(time_s, current_a, ...), \"run.csv\")");
   if (text.find_first_not_of(" \t\r\n") == std::string::npos)
     findings.fail("header", file, 0, "the file is empty", "record again, or leave the file out");
   if (text.starts_with("\xFF\xFE") || text.starts_with("\xFE\xFF"))
     findings.fail("format", file, 0, "the file is UTF-16 text", "save it as CSV in UTF-8");
   if (std::memchr(text.data(), '\0', std::min<std::size_t>(text.size(), 65536)) != nullptr)
-    findings.fail("format", file, 0, "this is a binary file, not CSV text", "export the measurement as CSV");
+    findings.fail("format", file, 0, "this is a binary file, neither CSV text nor MAT",
+                  "export the measurement as CSV or MAT");
 }
 
 struct Line {
@@ -204,12 +202,12 @@ void CsvFile::read_header(const std::string& file, Findings& findings) {
                 "write the names of the columns into the first line: time_s,current_a,...");
 }
 
-CsvTable CsvFile::read(std::span<const std::size_t> wanted) const {
+Table CsvFile::read(std::span<const std::size_t> wanted) const {
   constexpr std::size_t kUnwanted = std::numeric_limits<std::size_t>::max();
   std::vector<std::size_t> slots(names_.size(), kUnwanted);
   for (std::size_t i = 0; i < wanted.size(); ++i) slots[wanted[i]] = i;
 
-  CsvTable table;
+  Table table;
   table.columns.resize(wanted.size());
   const char* at = text_.data() + data_begin_;
   const char* const text_end = text_.data() + text_.size();

@@ -108,8 +108,8 @@ struct LoadOptions {
 };
 
 // Reads any number of files, folders and dataset.tomls. A folder with a dataset.toml is read by that file, one
-// without by its CSV files in the order of their names; a dataset.toml names which files belong and how columns map.
-// Throws DataError with all findings of severity error.
+// without by its CSV and MAT files in the order of their names; a dataset.toml names which files belong and how columns
+// map. Throws DataError with all findings of severity error.
 Dataset load(const std::vector<std::filesystem::path>& paths, const LoadOptions& options = {});
 
 // Throws DataError of kind "missing_column" unless every experiment has at least one column of each group; the

@@ -9,9 +9,9 @@
 #include <string_view>
 #include <vector>
 
-#include "host/data/csv.hpp"
 #include "host/data/dataset.hpp"
 #include "host/data/findings.hpp"
+#include "host/data/recording.hpp"
 
 namespace flexspline::data {
 

@@ -8,12 +8,12 @@
 #include <set>
 
 #include "host/data/columns.hpp"
-#include "host/data/csv.hpp"
 #include "host/data/dataset.hpp"
 #include "host/data/dataset_toml.hpp"
 #include "host/data/findings.hpp"
 #include "host/data/keys.hpp"
 #include "host/data/part.hpp"
+#include "host/data/recording.hpp"
 
 namespace flexspline::data {
 namespace {
@@ -25,11 +25,6 @@ std::string lower_extension(const fs::path& path) {
   std::transform(extension.begin(), extension.end(), extension.begin(),
                  [](unsigned char c) { return static_cast<char>(c >= 'A' && c <= 'Z' ? c - 'A' + 'a' : c); });
   return extension;
-}
-
-bool is_csv(const fs::path& path) {
-  const std::string extension = lower_extension(path);
-  return extension == ".csv" || extension == ".tsv";
 }
 
 fs::path real_path(const fs::path& path) {
@@ -64,7 +59,7 @@ class Loader {
     std::error_code error;
     if (!fs::exists(path, error))
       findings_.fail("file", path.string(), 0, "there is no such file or folder",
-                     "give a CSV file, a folder of them, or a dataset.toml");
+                     "give a CSV or MAT file, a folder of them, or a dataset.toml");
     if (fs::is_directory(path))
       read_folder(path);
     else if (lower_extension(path) == ".toml")
@@ -73,46 +68,30 @@ class Loader {
       read_single_file(path);
   }
 
-  static std::vector<fs::path> csv_files(const fs::path& folder) {
-    std::vector<fs::path> files;
-    for (const fs::directory_entry& entry : fs::directory_iterator(folder))
-      if (entry.is_regular_file() && is_csv(entry.path())) files.push_back(entry.path());
-    std::sort(files.begin(), files.end());
-    return files;
-  }
-
-  std::vector<fs::path> csv_files_or_fail(const fs::path& folder) {
-    std::vector<fs::path> files = csv_files(folder);
-    bool mat = false;
-    for (const fs::directory_entry& entry : fs::directory_iterator(folder))
-      mat = mat || lower_extension(entry.path()) == ".mat";
-    if (files.empty())
-      findings_.fail("file", folder.string(), 0,
-                     mat ? "the folder has MAT files only, which are not read yet"
-                         : "the folder has no CSV file and no dataset.toml",
-                     mat ? "export them as CSV" : "give a folder with .csv or .tsv files");
-    return files;
-  }
-
   void read_folder(const fs::path& folder) {
     if (fs::exists(folder / "dataset.toml")) {
       read_toml(folder / "dataset.toml");
       return;
     }
-    for (const fs::path& file : csv_files_or_fail(folder)) read_file(file, nullptr, nullptr);
+    for (const fs::path& file : recordings_in(folder, findings_)) read_file(file, nullptr, nullptr);
   }
 
   void read_toml(const fs::path& path) {
     const DatasetToml toml = read_dataset_toml(path, findings_);
     if (toml.experiments.empty())
-      for (const fs::path& file : csv_files_or_fail(path.has_parent_path() ? path.parent_path() : fs::path(".")))
+      for (const fs::path& file : recordings_in(path.has_parent_path() ? path.parent_path() : fs::path("."), findings_))
         read_file(file, &toml, nullptr);
     for (const ExperimentEntry& entry : toml.experiments) read_file(entry.file, &toml, &entry);
     for (const auto& [name, mapping] : toml.columns)
-      if (name != "time_s" && found_mappings_.count({path.string(), name}) == 0)
+      if (name != "time_s" && found_mappings_.count({path.string(), name}) == 0 && !has_error_of(name))
         findings_.add(Severity::error, "missing_column", path.string(), mapping.line, name,
                       fmt::format("no file has the column \"{}\" that this is mapped from", mapping.source),
                       "write source as it stands in the header of the files, or take the mapping out");
+  }
+
+  bool has_error_of(const std::string& column) const {
+    return std::any_of(findings_.list().begin(), findings_.list().end(),
+                       [&](const Finding& f) { return f.severity == Severity::error && f.column == column; });
   }
 
   // A file by itself is read by the dataset.toml beside it, if there is one.
@@ -134,9 +113,8 @@ class Loader {
   }
 
   struct Source {
-    CsvFile csv;
     ColumnPlan plan;
-    CsvTable table;
+    Table table;
     KeyMap keys;
   };
 
@@ -153,12 +131,12 @@ class Loader {
                     toml == nullptr ? "check the path" : fmt::format("mend its name in {}", toml->file.string()));
       return nullptr;
     }
-    CsvFile csv(path, findings_);
-    KeyMap keys = keys_of_header(csv.keys(), path.string(), findings_);
-    std::optional<ColumnPlan> plan = plan_columns(csv, path, toml, findings_);
+    const std::unique_ptr<Recording> recording = open_recording(path, findings_);
+    KeyMap keys = keys_of_header(recording->keys(), path.string(), findings_);
+    std::optional<ColumnPlan> plan = plan_columns(*recording, path, toml, findings_);
     if (!plan) return nullptr;
-    CsvTable table = csv.read(plan->wanted);
-    cached_ = std::make_unique<Source>(Source{std::move(csv), std::move(*plan), std::move(table), std::move(keys)});
+    Table table = recording->read(plan->wanted);
+    cached_ = std::make_unique<Source>(Source{std::move(*plan), std::move(table), std::move(keys)});
     return cached_.get();
   }
 

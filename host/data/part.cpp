@@ -17,7 +17,7 @@ constexpr double kInfinity = std::numeric_limits<double>::infinity();
 
 class Part {
  public:
-  Part(const CsvTable& table, const ColumnPlan& plan, Experiment& experiment, Findings& findings)
+  Part(const Table& table, const ColumnPlan& plan, Experiment& experiment, Findings& findings)
       : table_(table), plan_(plan), experiment_(experiment), findings_(findings), file_(experiment.file.string()) {}
 
   bool read(const PartBounds& bounds, Axis axis) {
@@ -111,7 +111,7 @@ class Part {
   }
 
   bool report(const BadCell& cell, std::size_t count) {
-    const std::size_t line = table_.lines[cell.row];
+    const std::size_t line = table_.line(cell.row);
     const std::string& column = plan_.wanted_names[cell.column];
     const std::string more = count > 1 ? fmt::format(", and {} more in this column", count - 1) : "";
     if (cell.kind == BadCell::Kind::text) {
@@ -122,8 +122,9 @@ class Part {
     }
     const bool tolerated = findings_.tolerates("not_finite");
     findings_.add(Severity::error, "not_finite", file_, line, column,
-                  cell.kind == BadCell::Kind::empty ? fmt::format("the value is missing{}", more)
-                                                    : fmt::format("\"{}\" is not a finite number{}", cell.text, more),
+                  table_.place(cell.row) + (cell.kind == BadCell::Kind::empty
+                                                ? fmt::format("the value is missing{}", more)
+                                                : fmt::format("\"{}\" is not a finite number{}", cell.text, more)),
                   tolerated ? "the samples were cut out as gaps"
                             : "find out why the logger wrote it; --tolerate not_finite cuts such samples out as gaps");
     return tolerated;
@@ -140,7 +141,7 @@ class Part {
     }
     if (first == nullptr) return true;
     const bool tolerated = findings_.tolerates("row_length");
-    findings_.add(Severity::error, "row_length", file_, table_.lines[first->row], "",
+    findings_.add(Severity::error, "row_length", file_, table_.line(first->row), "",
                   fmt::format("the line has {} fields, the header another number{}", first->fields,
                               count > 1 ? fmt::format(", as have {} more lines", count - 1) : ""),
                   tolerated ? "the lines were cut out"
@@ -154,8 +155,8 @@ class Part {
       const double before = time_[rows_[i - 1]];
       const double now = time_[rows_[i]];
       if (now > before) continue;
-      return fail("time_not_increasing", table_.lines[rows_[i]], plan_.wanted_names[plan_.time_slot],
-                  fmt::format("the time {:.9g} s comes after {:.9g} s", now, before),
+      return fail("time_not_increasing", table_.line(rows_[i]), plan_.wanted_names[plan_.time_slot],
+                  fmt::format("{}the time {:.9g} s comes after {:.9g} s", table_.place(rows_[i]), now, before),
                   now == before ? "log time with more digits, or take repeated lines out"
                                 : "if recordings follow each other in this file, split it");
     }
@@ -238,7 +239,7 @@ class Part {
     return true;
   }
 
-  const CsvTable& table_;
+  const Table& table_;
   const ColumnPlan& plan_;
   Experiment& experiment_;
   Findings& findings_;
@@ -253,8 +254,8 @@ class Part {
 
 }  // namespace
 
-bool read_part(const CsvTable& table, const ColumnPlan& plan, const PartBounds& bounds, Axis axis,
-               Experiment& experiment, Findings& findings) {
+bool read_part(const Table& table, const ColumnPlan& plan, const PartBounds& bounds, Axis axis, Experiment& experiment,
+               Findings& findings) {
   return Part(table, plan, experiment, findings).read(bounds, axis);
 }
 

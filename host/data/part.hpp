@@ -4,9 +4,9 @@
 #include <optional>
 
 #include "host/data/columns.hpp"
-#include "host/data/csv.hpp"
 #include "host/data/dataset.hpp"
 #include "host/data/findings.hpp"
+#include "host/data/recording.hpp"
 
 namespace flexspline::data {
 
@@ -21,8 +21,8 @@ struct PartBounds {
 };
 
 // Fills `experiment`, whose keys are set already. False if it cannot be used; the findings say why.
-bool read_part(const CsvTable& table, const ColumnPlan& plan, const PartBounds& bounds, Axis axis,
-               Experiment& experiment, Findings& findings);
+bool read_part(const Table& table, const ColumnPlan& plan, const PartBounds& bounds, Axis axis, Experiment& experiment,
+               Findings& findings);
 
 // The checks on the uniform time base, once all of the drive is known.
 void check_part(Experiment& experiment, const DriveFacts& drive, Findings& findings);

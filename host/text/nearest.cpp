@@ -2,7 +2,6 @@
 
 #include <algorithm>
 #include <numeric>
-#include <vector>
 
 namespace flexspline::text {
 namespace {
@@ -35,6 +34,12 @@ std::string nearest(std::string_view word, std::span<const std::string_view> kno
     best = candidate;
   }
   return best;
+}
+
+std::vector<std::string> nearest_first(std::string_view word, std::vector<std::string> known) {
+  std::stable_sort(known.begin(), known.end(),
+                   [&](const std::string& a, const std::string& b) { return edits(word, a) < edits(word, b); });
+  return known;
 }
 
 std::string nearest(std::string_view word, std::initializer_list<std::string_view> known, std::size_t always_allowed) {

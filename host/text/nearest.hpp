@@ -6,6 +6,7 @@
 #include <span>
 #include <string>
 #include <string_view>
+#include <vector>
 
 namespace flexspline::text {
 
@@ -14,5 +15,8 @@ namespace flexspline::text {
 std::string nearest(std::string_view word, std::span<const std::string_view> known, std::size_t always_allowed = 1);
 std::string nearest(std::string_view word, std::initializer_list<std::string_view> known,
                     std::size_t always_allowed = 1);
+
+// `known` by the number of such edits to `word`, the fewest first.
+std::vector<std::string> nearest_first(std::string_view word, std::vector<std::string> known);
 
 }  // namespace flexspline::text

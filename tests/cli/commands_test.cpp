@@ -4,6 +4,7 @@
 #include <cmath>
 
 #include "tests/cli/tool.hpp"
+#include "tests/support/mat5.hpp"
 
 namespace flexspline::cli_test {
 namespace {
@@ -67,6 +68,38 @@ TEST(New, GuessesColumnsAndUnitsOfAForeignLog) {
   EXPECT_TRUE(contains(toml, "gear_ratio = 100")) << toml;  // by the slope of one position over the other
   EXPECT_TRUE(contains(shell.file("project/base-model.toml"), "current_offset"));
   shell.must("flexspline check project");
+}
+
+TEST(New, ReadsAMatFileAsItReadsTheSameCsv) {
+  const Shell shell;
+  std::vector<double> time, current, angle;
+  std::string text = "recorder,Iq_in_mA,motorpos\n";
+  for (int k = 0; k < 2000; ++k) {
+    time.push_back(0.002 * k);
+    current.push_back(300.0 * std::cos(3.0 * time.back()));
+    angle.push_back(40.0 * (1.0 - std::cos(3.0 * time.back())));
+    char line[200];
+    std::snprintf(line, sizeof line, "%.17g,%.17g,%.17g\n", time.back(), current.back(), angle.back());
+    text += line;
+  }
+  shell.write("csv/log.csv", text);
+  shell.write("mat/log.mat", flexspline::testing::Mat5Text()
+                                 .add("recorder", time)
+                                 .add("Iq_in_mA", current)
+                                 .add("motorpos", angle)
+                                 .add("settings", {1.0, 2.0, 3.0})
+                                 .text());
+  for (const std::string kind : {"csv", "mat"})
+    shell.must("flexspline new --from " + kind + " --out from-" + kind +
+               " --gear-ratio 100 --torque-constant 0.05 --map time_s=recorder --map motor_position_rad=motorpos");
+  const std::string toml = shell.file("from-mat/dataset.toml");
+  EXPECT_TRUE(contains(toml, "source = \"Iq_in_mA\"\nunit = \"mA\"")) << toml;
+  EXPECT_FALSE(contains(toml, "source = \"settings\"")) << toml;
+  EXPECT_EQ(shell.json("flexspline check from-mat")["experiments"][0]["signals"],
+            shell.json("flexspline check from-csv")["experiments"][0]["signals"]);
+  const Answer absent = shell.run("flexspline new --from mat --out other --map time_s=recoder");
+  EXPECT_EQ(absent.code, 2);
+  EXPECT_TRUE(contains(absent.err, "the columns are recorder, ")) << absent.err;
 }
 
 TEST(New, TakesTheUsersMappingOverItsOwn) {

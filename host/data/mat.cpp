@@ -1,0 +1,117 @@
+#include "host/data/mat.hpp"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cmath>
+#include <fstream>
+#include <limits>
+
+#include "host/data/mat5_check.hpp"
+
+namespace flexspline::data {
+namespace {
+
+// A matrix with more signals than this is no record of a drive; its names would bury all others.
+constexpr std::size_t kMostSignals = 256;
+
+void refuse_what_is_not_mat(const std::filesystem::path& path, Findings& findings) {
+  const std::string file = path.string();
+  const std::ifstream stream(path, std::ios::binary);
+  std::error_code error;
+  const std::uintmax_t size = std::filesystem::file_size(path, error);
+  if (error || !stream) findings.fail("file", file, 0, "cannot read this file", "check the path and the permissions");
+  if (size == 0) findings.fail("header", file, 0, "the file is empty", "record again, or leave the file out");
+  const MatVersion version = mat_version(path);
+  if (version == MatVersion::v4)
+    findings.fail("format", file, 0, "this is a MAT file of version 4, which is not read",
+                  "load it in MATLAB and save it by save(\"run.mat\", \"-v7\")");
+  if (version == MatVersion::none)
+    findings.fail("format", file, 0, "this is not a MAT file: MATLAB's header is missing or cut off",
+                  "copy or save it again, in MATLAB by save(\"run.mat\", \"-v7\"); a CSV file must not end in .mat");
+}
+
+}  // namespace
+
+MatFile::MatFile(const std::filesystem::path& path, Findings& findings) {
+  refuse_what_is_not_mat(path, findings);
+  contents_ = read_mat(path);
+  if (!contents_.failure.empty())
+    findings.fail("format", path.string(), 0, "the file " + contents_.failure,
+                  "copy it again from where it was recorded, or save it again in MATLAB");
+  for (const MatRefused& refused : contents_.refused) why_not_.emplace(refused.name, refused.why);
+  for (const MatText& text : contents_.texts) take_key(text.name, text.text, "is text");
+  for (std::size_t i = 0; i < contents_.arrays.size(); ++i) take(i);
+  if (!names_.empty()) return;
+  std::string there;
+  for (const auto& [name, why] : why_not_) there += fmt::format("{}\"{}\" {}", there.empty() ? ": " : ", ", name, why);
+  findings.fail("header", path.string(), 0, "the file holds no vector or matrix of real numbers" + there,
+                "save each signal as a vector: save(\"run.mat\", \"time_s\", \"current_a\", ...)");
+}
+
+void MatFile::add(std::string name, const View& view) {
+  names_.push_back(std::move(name));
+  views_.push_back(view);
+}
+
+// In MATLAB any number is an array: dimensions of one do not count.
+void MatFile::take(std::size_t array) {
+  const MatArray& a = contents_.arrays[array];
+  std::vector<std::size_t> dims = a.dims;
+  std::erase(dims, std::size_t{1});
+  if (dims.empty())
+    take_key(a.name, fmt::format("{}", a.values.front()), "is a single number");
+  else if (dims.size() == 1)
+    add(a.name, {array, 0, 1, dims[0]});
+  else if (dims.size() == 2)
+    take_matrix(array, dims[0], dims[1]);
+  else
+    why_not_.emplace(a.name, fmt::format("has {} dimensions", dims.size()));
+}
+
+void MatFile::take_matrix(std::size_t array, std::size_t rows, std::size_t columns) {
+  const std::string& name = contents_.arrays[array].name;
+  const bool in_columns = rows >= columns;
+  if (std::min(rows, columns) > kMostSignals) {
+    why_not_.emplace(name, fmt::format("is a matrix of {} by {}, too large to be signals", rows, columns));
+    return;
+  }
+  why_not_.emplace(name, fmt::format("is a matrix of {} by {}, whose signals are \"{}({})\" and so on", rows, columns,
+                                     name, in_columns ? ":,1" : "1,:"));
+  if (in_columns)
+    for (std::size_t k = 0; k < columns; ++k) add(fmt::format("{}(:,{})", name, k + 1), {array, k * rows, 1, rows});
+  else
+    for (std::size_t k = 0; k < rows; ++k) add(fmt::format("{}({},:)", name, k + 1), {array, k, rows, columns});
+}
+
+void MatFile::take_key(const std::string& name, const std::string& value, const char* what) {
+  keys_.push_back({name, value, 0});
+  why_not_.emplace(name, what);
+}
+
+std::string MatFile::why_not(std::string_view name) const {
+  const auto at = why_not_.find(name);
+  return at == why_not_.end() ? std::string() : at->second;
+}
+
+Table MatFile::read(std::span<const std::size_t> wanted) const {
+  Table table;
+  for (std::size_t slot = 0; slot < wanted.size(); ++slot) {
+    const View& view = views_[wanted[slot]];
+    const std::vector<double>& values = contents_.arrays[view.array].values;
+    std::vector<double>& column = table.columns.emplace_back(view.count);
+    for (std::size_t row = 0; row < view.count; ++row) {
+      const double value = values[view.first + row * view.step];
+      column[row] = value;
+      if (std::isfinite(value)) continue;
+      column[row] = std::numeric_limits<double>::quiet_NaN();
+      const char* text = std::isnan(value) ? "NaN" : value > 0.0 ? "Inf" : "-Inf";
+      table.bad_cells.push_back({row, slot, BadCell::Kind::not_finite, text});
+    }
+  }
+  std::stable_sort(table.bad_cells.begin(), table.bad_cells.end(),
+                   [](const BadCell& a, const BadCell& b) { return a.row < b.row; });
+  return table;
+}
+
+}  // namespace flexspline::data
