@@ -220,6 +220,11 @@ class App {
     sub->add_option("--limit", options->limits, "exit code 1 if a signal's error is above this; may be repeated")
         ->type_name("SIGNAL=RMSE")
         ->allow_extra_args(false);
+    sub->add_option(
+           "--beside", options->beside,
+           "a black box to compare the model with: fir:N, arx:NA,NB,NK, or fir:auto, arx:auto; may be repeated")
+        ->type_name("BOX")
+        ->allow_extra_args(false);
     take_report(sub, options->report);
     take_pipeline(sub, options->pipeline);
   }

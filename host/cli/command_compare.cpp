@@ -57,11 +57,18 @@ bool is_kept(const Limit& limit, const comparison::Comparison& comparison, Conso
 int run(const CompareOptions& options, Console& console) {
   std::vector<Limit> limits;
   for (const std::string& text : options.limits) limits.push_back(parse_limit(text));
+  std::vector<blackbox::Specification> beside;
+  try {
+    for (const std::string& text : options.beside) beside.push_back(blackbox::parse_specification(text));
+  } catch (const std::invalid_argument& wrong) {
+    throw UsageError(fmt::format("--beside {}", wrong.what()));
+  }
   require_report_place(options.report);
   const model::ModelFile file = load_model(options.model);
   const data::Dataset dataset = load(options.data, console);
   console.progress("comparing model and measurement");
-  const comparison::Comparison comparison = comparison::compare(dataset, file.model, options.pipeline.options());
+  const comparison::Comparison comparison =
+      comparison::compare(dataset, file.model, options.pipeline.options(), beside);
   for (const std::string& warning : comparison.warnings) console.warn(warning);
   console.line(comparison::table(comparison));
   if (!options.report.empty())

@@ -69,6 +69,7 @@ struct CompareOptions {
   PipelineInputs pipeline;
   std::filesystem::path model;
   std::vector<std::string> limits;  // SIGNAL=RMSE
+  std::vector<std::string> beside;  // fir:20, arx:4,4,1
   std::filesystem::path report;     // empty: none
   std::string json;
 };

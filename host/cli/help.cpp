@@ -69,8 +69,10 @@ const std::array kHelp = {
         "Compares in both directions: the torque that the model asks for the measured motion (the balances), and the "
         "motion that it makes of the measured torque (free run). Errors stand beside the noise of the measurement "
         "where that is known; the regions with the largest excess over it are named. --limit makes a test of it: exit "
-        "code 1 where a signal's error is above. --report writes a page with plots of all of it.",
-        {kMakeData, kIdentify, "flexspline compare --model fitted.toml demo-out"}},
+        "code 1 where a signal's error is above. --beside fits a linear black box (FIR or ARX) to the same signals, on "
+        "the experiments that are not held out, and shows what error its many parameters reach. --report writes a page "
+        "with plots of all of it.",
+        {kMakeData, kIdentify, "flexspline compare --model fitted.toml demo-out --beside arx:4,4,1"}},
     CommandHelp{
         "diagnose",
         "which physical effect is missing from a model, or that none is",

@@ -61,8 +61,9 @@ struct Together {
 
 class Comparer {
  public:
-  Comparer(const data::Dataset& dataset, const model::Model& model, const regression::PipelineOptions& options)
-      : model_(model) {
+  Comparer(const data::Dataset& dataset, const model::Model& model, const regression::PipelineOptions& options,
+           const std::vector<blackbox::Specification>& beside)
+      : model_(model), beside_(beside) {
     require_values(model);
     model_.drive = regression::reconcile(model.drive, dataset, result_.warnings);
     terms_ = regression::terms_of(model_);
@@ -98,6 +99,7 @@ class Comparer {
       s.worst_case_gain = t.worst_case_gain;
       result_.overall.push_back(std::move(s));
     }
+    result_.beside = judge_beside(beside_signals_, beside_, result_.warnings);
     return std::move(result_);
   }
 
@@ -169,6 +171,7 @@ class Comparer {
         floor_squared.segment(range.first, range.size()).setConstant(*floors[i].rmse * *floors[i].rmse);
       keep(range.record, std::move(s), score);
     }
+    if (!beside_.empty()) beside_signals_.push_back(balance_signal(prepared_, data, terms_, signal, unit_of(signal)));
     const Together& t = together(signal);
     SignalResult overall = result_of(signal, t.score, t.masked, false);
     overall.worst_case_gain = t.worst_case_gain;
@@ -267,6 +270,7 @@ class Comparer {
         score.add(measured[k], error[k]);
       }
     if (score.samples() == 0) return;
+    if (!beside_.empty()) add_free_run_signal(prepared_, i, signal, unit_of(signal), measured, error, beside_signals_);
     SignalResult result = result_of(signal, score, masked, diverged);
     if (diverged)
       result_.warnings.push_back(fmt::format("{}: the free run diverges ({})", e.name, signal));
@@ -281,6 +285,8 @@ class Comparer {
   std::vector<const Experiment*> all_;
   Prepared prepared_;
   std::vector<Together> together_;
+  std::vector<blackbox::Specification> beside_;
+  std::vector<BesideSignal> beside_signals_;
   Comparison result_;
 };
 
@@ -292,9 +298,9 @@ const SignalResult* Comparison::find_overall(std::string_view signal) const {
   return nullptr;
 }
 
-Comparison compare(const data::Dataset& dataset, const model::Model& model,
-                   const regression::PipelineOptions& options) {
-  return Comparer(dataset, model, options).all();
+Comparison compare(const data::Dataset& dataset, const model::Model& model, const regression::PipelineOptions& options,
+                   const std::vector<blackbox::Specification>& beside) {
+  return Comparer(dataset, model, options, beside).all();
 }
 
 }  // namespace flexspline::comparison

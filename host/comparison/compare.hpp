@@ -6,6 +6,7 @@
 #include <string>
 #include <vector>
 
+#include "host/comparison/beside.hpp"
 #include "host/data/dataset.hpp"
 #include "host/model/model.hpp"
 #include "host/regression/record.hpp"
@@ -59,6 +60,7 @@ struct Comparison {
   std::vector<ExperimentResult> experiments;  // in the order of the data set
   std::vector<SignalResult> overall;          // all samples of all experiments together
   std::vector<Region> regions;
+  std::vector<BesideResult> beside;  // black boxes, in the order asked for, each with its signals
   regression::Pipeline pipeline;
   std::vector<std::string> warnings;
 
@@ -68,8 +70,10 @@ struct Comparison {
 // Inverse model: each torque balance on the rows of the regression, with the motion as measured. Free run: what the
 // model does with the measured effort alone, from the measured state at the start of each segment; nothing is taken out
 // of the positions, as drift is an error. The cut-off is chosen from the experiments of role fit, where there are any.
+// `beside`: black boxes that are fitted to the same signals, see beside.hpp.
 // Throws model::ModelError naming parameters without a value, data::DataError where no balance can be formed.
-Comparison compare(const data::Dataset& dataset, const model::Model& model, const regression::PipelineOptions& options);
+Comparison compare(const data::Dataset& dataset, const model::Model& model, const regression::PipelineOptions& options,
+                   const std::vector<blackbox::Specification>& beside = {});
 
 // "flexspline-compare/1". What is not known or not finite is null.
 nlohmann::json to_json(const Comparison& comparison);

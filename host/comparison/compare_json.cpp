@@ -34,10 +34,39 @@ json to_json(const std::vector<SignalResult>& signals) {
   return list;
 }
 
+json to_json(const BesideResult& b) {
+  json experiments = json::array();
+  for (const BesideExperiment& e : b.experiments)
+    experiments.push_back({{"name", e.name},
+                           {"role", e.role == data::Role::fit ? "fit" : "holdout"},
+                           {"rmse", number(e.rmse)},
+                           {"model_rmse", number(e.model_rmse)}});
+  return {{"asked", b.asked},
+          {"black_box", b.black_box},
+          {"signal", b.signal},
+          {"unit", b.unit},
+          {"load", b.load.empty() ? json(nullptr) : json(b.load)},
+          {"inputs", b.inputs},
+          {"parameters", b.parameters},
+          {"sample_s", number(b.sample_s)},
+          {"samples", b.samples},
+          {"rmse", number(b.rmse)},
+          {"nrmse", number(b.nrmse)},
+          {"fit_percent", number(b.fit_percent)},
+          {"rmse_one_step", number(b.rmse_one_step)},
+          {"rmse_fit", number(b.rmse_fit)},
+          {"rmse_holdout", number(b.rmse_holdout)},
+          {"model_rmse", number(b.model_rmse)},
+          {"model_rmse_holdout", number(b.model_rmse_holdout)},
+          {"largest_pole", number(b.largest_pole)},
+          {"stable", b.stable},
+          {"experiments", std::move(experiments)}};
+}
+
 }  // namespace
 
 json to_json(const Comparison& comparison) {
-  json experiments = json::array(), regions = json::array();
+  json experiments = json::array(), regions = json::array(), beside = json::array();
   for (const ExperimentResult& e : comparison.experiments)
     experiments.push_back(
         {{"name", e.name}, {"role", e.role == data::Role::fit ? "fit" : "holdout"}, {"signals", to_json(e.signals)}});
@@ -52,9 +81,14 @@ json to_json(const Comparison& comparison) {
                        {"bias", number(r.bias)},
                        {"rmse", number(r.rmse)},
                        {"excess", number(r.excess)}});
-  return {{"format", "flexspline-compare/1"},       {"experiments", std::move(experiments)},
-          {"overall", to_json(comparison.overall)}, {"regions", std::move(regions)},
-          {"parameter_trends", json::array()},      {"cutoff_hz", number(comparison.pipeline.row_cutoff_hz)},
+  for (const BesideResult& b : comparison.beside) beside.push_back(to_json(b));
+  return {{"format", "flexspline-compare/1"},
+          {"experiments", std::move(experiments)},
+          {"overall", to_json(comparison.overall)},
+          {"regions", std::move(regions)},
+          {"beside", std::move(beside)},
+          {"parameter_trends", json::array()},
+          {"cutoff_hz", number(comparison.pipeline.row_cutoff_hz)},
           {"warnings", comparison.warnings}};
 }
 

@@ -56,6 +56,28 @@ std::string words(const Region& r, const SignalResult& overall) {
       variable, r.low, r.high, unit, r.rmse, r.unit, size, std::abs(r.bias), r.unit, side);
 }
 
+// A black box a line, with the model on the same samples beside it.
+std::string beside_table(const std::vector<BesideResult>& results) {
+  std::string text =
+      "\nBeside the model, black boxes fitted to the same signals (free run; the model on the same samples):\n";
+  const auto line = [&text](std::string_view box, std::string_view signal, std::string_view unit,
+                            const auto&... cells) {
+    fmt::format_to(std::back_inserter(text), "{:<14} {:<21} {:<6}", box, signal, unit);
+    ((fmt::format_to(std::back_inserter(text), " {:>10}", cells)), ...);
+    text += '\n';
+  };
+  line("black box", "signal", "unit", "parameters", "rmse", "model", "held out", "model", "one step", "of std");
+  bool unstable = false;
+  for (const BesideResult& b : results) {
+    line(b.black_box + (b.stable ? "" : "!"), b.load.empty() ? b.signal : fmt::format("{} {}", b.signal, b.load),
+         b.unit, b.parameters, cell(b.rmse), cell(b.model_rmse), cell(b.rmse_holdout), cell(b.model_rmse_holdout),
+         cell(b.rmse_one_step), cell(100.0 * b.nrmse, " %"));
+    unstable = unstable || !b.stable;
+  }
+  if (unstable) text += "! not stable: its free run grows without bound\n";
+  return text;
+}
+
 }  // namespace
 
 std::string table(const Comparison& comparison) {
@@ -102,6 +124,7 @@ std::string table(const Comparison& comparison) {
   if (!said.empty()) text += "\nWhere the error is largest:\n";
   for (const Region* r : said)
     if (const SignalResult* overall = comparison.find_overall(r->signal)) text += "  " + words(*r, *overall);
+  if (!comparison.beside.empty()) text += beside_table(comparison.beside);
   for (const std::string& warning : comparison.warnings) text += fmt::format("warning: {}\n", warning);
   return text;
 }
