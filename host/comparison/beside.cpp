@@ -84,6 +84,20 @@ void add_stretches(BesideSignal& signal, const Record& record, const Series& ser
   }
 }
 
+// An input that is nought throughout (torsion without a sensor on the output) would only count as parameters.
+void drop_dead_inputs(BesideSignal& signal) {
+  for (std::size_t u = signal.inputs.size(); u-- > 0;) {
+    const auto is_dead = [u](const BesideSignal::Stretch& s) {
+      const std::vector<double>& x = s.record.inputs[u];
+      return std::all_of(x.begin(), x.end(), [](double v) { return v == 0.0; });
+    };
+    if (!std::all_of(signal.stretches.begin(), signal.stretches.end(), is_dead)) continue;
+    signal.inputs.erase(signal.inputs.begin() + static_cast<std::ptrdiff_t>(u));
+    for (BesideSignal::Stretch& s : signal.stretches)
+      s.record.inputs.erase(s.record.inputs.begin() + static_cast<std::ptrdiff_t>(u));
+  }
+}
+
 // Sums over judged samples beyond the memory of a black box.
 struct Sums {
   blackbox::Errors box;
@@ -171,6 +185,7 @@ BesideSignal balance_signal(const Prepared& prepared, const regression::BalanceD
     }
     add_stretches(signal, record, series);
   }
+  drop_dead_inputs(signal);
   return signal;
 }
 

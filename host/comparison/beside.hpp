@@ -62,7 +62,8 @@ struct BesideResult {
 
 // A balance: its target from the motion, both filtered. Inputs are acceleration and velocity of the motor (motor),
 // torsion and torsion rate (transmission), acceleration and velocity of the output (load); a motor balance that holds
-// the others takes the torsion too. The motion of the same instant is known: a delay of one means that one.
+// the others takes the torsion too; what is nought throughout is left out. The motion of the same instant is known: a
+// delay of one means that one.
 BesideSignal balance_signal(const regression::Prepared& prepared, const regression::BalanceData& data,
                             const regression::Terms& terms, const std::string& signal, const std::string& unit);
 
