@@ -1,0 +1,202 @@
+#include "host/measurement/period.hpp"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+
+#include "host/signals/fft.hpp"
+#include "host/signals/interpolate.hpp"
+#include "host/signals/spectrum.hpp"
+
+namespace flexspline::measurement {
+namespace {
+
+using data::Column;
+using data::Experiment;
+
+constexpr std::array kSetPoints = {Column::current_command, Column::velocity_command, Column::position_command};
+constexpr std::array kMeasured = {Column::current, Column::motor_torque, Column::motor_velocity, Column::motor_position,
+                                  Column::output_position};
+// Mismatch of a period with the next, of the signal's RMS: sharp for what repeats exactly, then for what is noisy.
+constexpr std::array kMismatch = {0.02, 0.15};
+constexpr double kSetPointShare = 1e-3;
+constexpr double kEffortShare = 0.05;
+constexpr double kEffortOverNoise = 10.0;
+constexpr std::size_t kShortestPeriod = 16;
+
+data::Segment longest_segment(const Experiment& e) {
+  data::Segment longest;
+  for (const data::Segment& s : e.segments)
+    if (s.last - s.first > longest.last - longest.first) longest = s;
+  return longest;
+}
+
+bool is_constant(std::span<const double> x) {
+  return std::all_of(x.begin(), x.end(), [&](double v) { return v == x.front(); });
+}
+
+struct Found {
+  double exact_samples = 0.0;
+  std::string from;
+};
+
+std::optional<Found> search(const Experiment& e, const data::Segment& s) {
+  const std::size_t n = s.last - s.first;
+  const auto in = [&](Column column, double limit) -> std::optional<Found> {
+    if (!e.has(column)) return std::nullopt;
+    // Excitations are often faded in.
+    for (const std::size_t skip : {std::size_t{0}, n / 10, n / 4}) {
+      const std::span<const double> part(e[column].data() + s.first + skip, n - skip);
+      if (part.empty() || is_constant(part)) continue;
+      if (const auto r = signals::find_repetition(part, limit))
+        if (r->samples >= kShortestPeriod) return Found{r->exact_samples, std::string(data::column_name(column))};
+    }
+    return std::nullopt;
+  };
+  for (const Column column : kSetPoints)
+    if (auto found = in(column, kMismatch.front())) return found;
+  for (const double limit : kMismatch)
+    for (const Column column : kMeasured)
+      if (auto found = in(column, limit)) return found;
+  return std::nullopt;
+}
+
+}  // namespace
+
+PeriodSearch find_period(const Experiment& e, std::optional<double> period_s) {
+  const data::Segment s = longest_segment(e);
+  if (s.last - s.first < 4 * kShortestPeriod) return {std::nullopt, "the record is too short to hold two periods"};
+  std::optional<Found> found;
+  if (period_s) {
+    double exact = *period_s / e.sample_s;
+    if (std::abs(exact - std::round(exact)) < 0.01) exact = std::round(exact);
+    if (!(exact >= static_cast<double>(kShortestPeriod)))
+      return {std::nullopt,
+              fmt::format("the stated period of {:g} s holds fewer than {} samples", *period_s, kShortestPeriod)};
+    found = Found{exact, "stated"};
+  } else {
+    found = search(e, s);
+  }
+  if (!found) return {std::nullopt, "neither set points, effort nor motion repeat themselves"};
+
+  // The first sample of a segment has no difference to one before, and interpolation needs a neighbour.
+  const std::size_t begin = s.first + 2, end = s.last - 2;
+  const double periods = std::floor(static_cast<double>(end - begin) / found->exact_samples);
+  if (periods < 2.0)
+    return {std::nullopt, fmt::format("the record holds {:.3g} periods of {:.4g} s; two whole ones are needed, five "
+                                      "are good",
+                                      static_cast<double>(s.last - s.first) / found->exact_samples,
+                                      found->exact_samples * e.sample_s)};
+  Period p;
+  p.exact_samples = found->exact_samples;
+  p.samples = static_cast<std::size_t>(std::lround(found->exact_samples));
+  p.from = found->from;
+  p.count = static_cast<std::size_t>(periods);
+  p.first_left_out = p.count >= 3;
+  // What is over at the end is better left out at the start, where the motion settles.
+  p.first = end - static_cast<std::size_t>(std::ceil(periods * found->exact_samples));
+  if (p.first_left_out) {
+    --p.count;
+    p.first = end - static_cast<std::size_t>(std::ceil(static_cast<double>(p.count) * found->exact_samples));
+  }
+  return {p, ""};
+}
+
+Periods periods_of(std::span<const double> signal, const Period& period) {
+  Periods periods;
+  for (std::size_t p = 0; p < period.count; ++p) {
+    const double start = static_cast<double>(period.first) + static_cast<double>(p) * period.exact_samples;
+    const auto whole = static_cast<std::size_t>(start);
+    const double fraction = start - static_cast<double>(whole);
+    if (fraction == 0.0) {
+      const auto part = signal.subspan(whole, period.samples);
+      periods.values.emplace_back(part.begin(), part.end());
+      periods.noise_gain.push_back(1.0);
+      continue;
+    }
+    // One sample before and two behind, for the cubic.
+    const std::size_t from = whole - 1, length = std::min(period.samples + 3, signal.size() - from);
+    std::vector<double> shifted = signals::fractional_delay(signal.subspan(from, length), -fraction);
+    shifted.resize(period.samples + 1, shifted.back());
+    periods.values.emplace_back(shifted.begin() + 1, shifted.end());
+    const std::array<double, 8> unit = {0, 0, 0, 0, 1, 0, 0, 0};
+    double gain = 0.0;
+    for (const double v : signals::fractional_delay(unit, -fraction)) gain += v * v;
+    periods.noise_gain.push_back(gain);
+  }
+  return periods;
+}
+
+std::vector<std::complex<double>> line_amplitudes(std::span<const double> period) {
+  const std::size_t n = period.size();
+  std::vector<std::complex<double>> lines;
+  const double scale = 2.0 / static_cast<double>(n);
+  if (n % 2 == 0) {
+    lines = signals::RealFft(n).forward(period);
+  } else {
+    // The transform takes even sizes: of the period and its repetition every other line is nought.
+    std::vector<double> twice(period.begin(), period.end());
+    twice.insert(twice.end(), period.begin(), period.end());
+    const auto all = signals::RealFft(2 * n).forward(twice);
+    for (std::size_t k = 0; k < all.size(); k += 2) lines.push_back(0.5 * all[k]);
+  }
+  for (auto& line : lines) line *= scale;
+  lines.front() *= 0.5;
+  if (n % 2 == 0) lines.back() *= 0.5;
+  return lines;
+}
+
+PeriodSpectra::PeriodSpectra(const Periods& periods) {
+  for (const std::vector<double>& period : periods.values) spectra_.push_back(line_amplitudes(period));
+}
+
+std::complex<double> PeriodSpectra::mean(std::size_t line) const {
+  std::complex<double> sum;
+  for (const auto& spectrum : spectra_) sum += spectrum[line];
+  return sum / static_cast<double>(spectra_.size());
+}
+
+double PeriodSpectra::noise_power(std::size_t line) const {
+  if (spectra_.size() < 2) return 0.0;
+  double sum = 0.0;
+  for (std::size_t p = 1; p < spectra_.size(); ++p) sum += std::norm(spectra_[p][line] - spectra_[p - 1][line]);
+  return 0.5 * sum / static_cast<double>(spectra_.size() - 1);
+}
+
+bool ExcitedLines::contains(std::size_t line) const {
+  return std::binary_search(lines.begin(), lines.end(), line);
+}
+
+ExcitedLines excited_lines(const Experiment& e, const Period& period) {
+  ExcitedLines excited;
+  const auto take = [&](Column column, double share, double over_noise) {
+    const PeriodSpectra spectra(e[column], period);
+    double largest = 0.0;
+    for (std::size_t k = 1; k < spectra.lines(); ++k) largest = std::max(largest, std::abs(spectra.mean(k)));
+    if (!(largest > 0.0)) return false;
+    const auto periods = static_cast<double>(spectra.count());
+    for (std::size_t k = 1; k < spectra.lines(); ++k) {
+      const double size = std::abs(spectra.mean(k));
+      if (size > share * largest && size > over_noise * std::sqrt(spectra.noise_power(k) / periods))
+        excited.lines.push_back(k);
+    }
+    excited.from = data::column_name(column);
+    return !excited.lines.empty();
+  };
+  for (const Column column : kSetPoints) {
+    if (!e.has(column)) continue;
+    const std::span<const double> part(e[column].data() + period.first, period.samples);
+    if (is_constant(part)) continue;
+    if (take(column, kSetPointShare, kEffortOverNoise)) {
+      excited.by_set_point = true;
+      return excited;
+    }
+  }
+  for (const Column column : {Column::current, Column::motor_torque})
+    if (e.has(column) && take(column, kEffortShare, kEffortOverNoise)) return excited;
+  return excited;
+}
+
+}  // namespace flexspline::measurement
