@@ -39,6 +39,7 @@ class App {
     add_new();
     add_check();
     add_effects();
+    add_measure();
     add_identify();
     add_simulate();
     add_compare();
@@ -187,6 +188,14 @@ class App {
   void add_effects() {
     const auto [sub, options] = command<EffectsOptions>("effects");
     sub->add_option("NAME", options->name, "the effect to explain")->type_name("");
+  }
+
+  void add_measure() {
+    const auto [sub, options] = command<MeasureOptions>("measure");
+    take_data(sub, options->data);
+    sub->add_option("--period-s", options->period_s, "period of the excitation (default: found in the data)")
+        ->check(CLI::PositiveNumber)
+        ->type_name("S");
   }
 
   void add_identify() {

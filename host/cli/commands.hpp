@@ -32,6 +32,13 @@ struct CheckOptions {
 };
 int run(const CheckOptions& options, Console& console);
 
+struct MeasureOptions {
+  DataInputs data;
+  std::optional<double> period_s;  // else found in the data
+  std::string json;
+};
+int run(const MeasureOptions& options, Console& console);
+
 struct NewOptions {
   DataInputs data;
   std::filesystem::path out;

@@ -50,6 +50,17 @@ const std::array kHelp = {
         "experiment tells them apart; and a drawn curve.",
         {"flexspline effects stribeck_gaussian"}},
     CommandHelp{
+        "measure",
+        "before any model: frequency response, noise floor, distortion, resonance",
+        "Says what measurements tell of a drive without any model: the frequency response from the current to "
+        "velocity, "
+        "torque and torsion with its coherence and confidence band; resonances and anti-resonances with damping; the "
+        "noise of each signal, from what differs between the periods of an excitation; odd and even nonlinear "
+        "distortion, from the lines that a linear drive would leave empty. What the motions at hand cannot tell is "
+        "said, and which motion would. Best is an odd random-phase multisine with some odd lines left out, repeated "
+        "six times.",
+        {kMakeData, "flexspline measure demo-out"}},
+    CommandHelp{
         "identify",
         "estimates the parameters of a model",
         "Estimates every parameter that the model does not fix, from the experiments of role fit: for each experiment "
@@ -97,8 +108,8 @@ const std::array kHelp = {
 };
 
 constexpr auto kNotBuilt =
-    std::to_array<std::string_view>({"measure", "sensitivity", "plan", "pack", "unpack", "export", "drives", "record",
-                                     "flash", "backup", "restore", "monitor", "twin", "hil", "workbench"});
+    std::to_array<std::string_view>({"sensitivity", "plan", "pack", "unpack", "export", "drives", "record", "flash",
+                                     "backup", "restore", "monitor", "twin", "hil", "workbench"});
 
 }  // namespace
 

@@ -1,7 +1,5 @@
 #include "host/measurement/distortion.hpp"
 
-#include <fmt/format.h>
-
 #include <algorithm>
 #include <boost/math/distributions/fisher_f.hpp>
 #include <cmath>
@@ -109,9 +107,7 @@ Distortion distortion_of(const Channel& input, const Channel& output, const Peri
   if (excited.lines.empty()) return neither("no line of the period stands above the noise of the effort");
   d.low_hz = period.frequency_hz(excited.lines.front(), sample_s);
   d.high_hz = period.frequency_hz(excited.lines.back(), sample_s);
-  if (!period.is_whole())
-    return neither(fmt::format("the period of {:.6g} samples is no whole number of samples, so that its lines smear",
-                               period.exact_samples));
+  if (!period.is_whole()) return neither("the period is no whole number of samples, so that its lines smear");
 
   const Lines lines(input, output, period, sample_s, excited);
   if (excited.lines.size() == 1) {

@@ -9,6 +9,9 @@ namespace flexspline::measurement {
 namespace {
 
 constexpr double kTrustedBand = 0.5;
+constexpr double kTrustedCoherence = 0.5;
+constexpr std::size_t kLowestLine = 4;
+constexpr double kHighestShare = 0.4;  // of the sample rate
 constexpr double kConfidence = 0.05;
 // Coherence of signals without noise is one only up to rounding and interpolation.
 constexpr double kLargestCoherence = 1.0 - 1e-12;
@@ -47,6 +50,7 @@ void Spectra::add(const Spectra& other) {
     yy[k] += other.yy[k];
     xy[k] += other.xy[k];
     averages[k] += other.averages[k];
+    distortion[k] += other.distortion[k];
   }
 }
 
@@ -62,6 +66,7 @@ Spectra spectra_by_periods(const Channel& input, const Channel& output, const Pe
   s.yy.assign(lines, 0.0);
   s.xy.assign(lines, 0.0);
   s.averages.assign(lines, 0.0);
+  s.distortion.assign(lines, 0.0);
   for (std::size_t k = 0; k < lines; ++k) s.frequency_hz[k] = period.frequency_hz(k, sample_s);
   // |c|^2 / 2 is the power of a line; over the resolution it is a density.
   const double scale = 0.5 / s.resolution_hz;
@@ -80,7 +85,7 @@ Spectra spectra_by_periods(const Channel& input, const Channel& output, const Pe
 
 std::optional<Spectra> spectra_by_welch(const Channel& input, const Channel& output,
                                         std::span<const data::Segment> segments, double sample_s, std::size_t window,
-                                        std::span<const double> only_near_hz) {
+                                        const WelchLimits& limits) {
   std::vector<signals::CrossSpectrum> parts;
   for (const data::Segment& segment : segments) {
     const std::size_t first = segment.first + 1, n = segment.last > first ? segment.last - first : 0;
@@ -100,13 +105,15 @@ std::optional<Spectra> spectra_by_welch(const Channel& input, const Channel& out
   s.yy = all.yy;
   s.xy = all.xy;
   s.averages.assign(all.xx.size(), 0.0);
+  s.distortion.assign(all.xx.size(), 0.0);
   const std::vector<double> leak_x = leaked(all.xx), leak_y = leaked(all.yy);
   for (std::size_t k = 0; k < all.xx.size(); ++k) {
-    const bool near = only_near_hz.empty() || std::any_of(only_near_hz.begin(), only_near_hz.end(), [&](double f) {
-                        return std::abs(f - s.frequency_hz[k]) < 2.0 * s.resolution_hz;
-                      });
-    // Each segment loses its mean, which takes from the first line, too.
-    const bool inner = k >= 2 && k + 1 < all.xx.size();
+    const bool near = limits.near_hz.empty() ||
+                      std::any_of(limits.near_hz.begin(), limits.near_hz.end(),
+                                  [&](double f) { return std::abs(f - s.frequency_hz[k]) < 2.0 * s.resolution_hz; });
+    // What is slower than the window spreads over the lowest lines.
+    const double highest = std::min(kHighestShare / sample_s, limits.to_hz.value_or(kHighestShare / sample_s));
+    const bool inner = k >= kLowestLine && s.frequency_hz[k] <= highest;
     const bool excited = inner && near && all.xx[k] > 4.0 * leak_x[k] && all.yy[k] > 4.0 * leak_y[k];
     const double weight = excited ? independent : 0.0;
     s.xx[k] *= weight;
@@ -128,12 +135,31 @@ std::vector<ResponseLine> response_of(const Spectra& s, const Channel& input, co
                     input.correction(line.frequency_hz, sample_s);
     line.coherence = std::min(kLargestCoherence, std::norm(s.xy[k]) / power);
     const double incoherent = (1.0 - line.coherence) / line.coherence;
-    line.std = std::sqrt(0.5 * incoherent / (averages - 1.0));
-    line.band = std::sqrt((std::pow(kConfidence, -1.0 / (averages - 1.0)) - 1.0) * incoherent);
-    line.trusted = line.band < kTrustedBand;
+    const double distortion = s.distortion[k] / s.yy[k];
+    line.std = std::sqrt(0.5 * (incoherent / (averages - 1.0) + distortion));
+    line.band = std::sqrt((std::pow(kConfidence, -1.0 / (averages - 1.0)) - 1.0) * incoherent -
+                          std::log(kConfidence) * distortion);
+    line.trusted = line.band < kTrustedBand && line.coherence > kTrustedCoherence;
     lines.push_back(line);
   }
   return lines;
+}
+
+std::vector<ResponseLine> thinned(std::span<const ResponseLine> lines, std::size_t most) {
+  if (lines.size() <= most || most == 0) return {lines.begin(), lines.end()};
+  const double low = lines.front().frequency_hz, span = std::log(lines.back().frequency_hz / low);
+  std::vector<ResponseLine> chosen;
+  std::size_t part = 0;
+  for (const ResponseLine& line : lines) {
+    const auto own = std::min(
+        most - 1, static_cast<std::size_t>(static_cast<double>(most) * std::log(line.frequency_hz / low) / span));
+    if (chosen.empty() || own > part)
+      chosen.push_back(line);
+    else if (line.band < chosen.back().band)
+      chosen.back() = line;
+    part = own;
+  }
+  return chosen;
 }
 
 }  // namespace flexspline::measurement

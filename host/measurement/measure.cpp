@@ -8,6 +8,7 @@
 #include <tuple>
 #include <utility>
 
+#include "host/signals/cutoff.hpp"
 #include "host/signals/fft.hpp"
 
 namespace flexspline::measurement {
@@ -57,6 +58,34 @@ std::string unit_over(const std::string& output, const std::string& input) {
     return unit.find_first_of("*/") == std::string::npos ? unit : "(" + unit + ")";
   };
   return bracketed(output) + "/" + bracketed(input);
+}
+
+bool has_set_point(const Experiment& e) {
+  return e.has(data::Column::current_command) || e.has(data::Column::velocity_command) ||
+         e.has(data::Column::position_command);
+}
+
+// A line of the output's distortion, taken for as large at excited lines as at the larger kind of the others.
+Spectra with_distortion(Spectra spectra, const Distortion& distortion, const Channel& output, double sample_s) {
+  if (distortion.excitation != Excitation::kOddMultisine) return spectra;
+  double power = 0.0;
+  for (const auto& level : {distortion.odd, distortion.even})
+    if (level && level->significant)
+      power = std::max(power, level->rms * level->rms / static_cast<double>(level->lines));
+  for (std::size_t k = 0; k < spectra.frequency_hz.size(); ++k)
+    spectra.distortion[k] = spectra.averages[k] * power / spectra.resolution_hz /
+                            std::norm(output.correction(spectra.frequency_hz[k], sample_s));
+  return spectra;
+}
+
+// Upper end of the band in which the effort drives the motion, by the power that is coherent.
+double coherent_to_hz(const Experiment& e, const Channel& input, const Channel& output) {
+  double highest = 0.0;
+  for (const data::Segment& s : e.segments) {
+    const auto part = [&](const Channel& c) { return std::span(c.values).subspan(s.first, s.last - s.first); };
+    highest = std::max(highest, signals::choose_cutoff(part(input), part(output), 1.0 / e.sample_s).coherent_to_hz);
+  }
+  return highest;
 }
 
 // Pools are told apart by load, output, kind of average, lines of the period and sample rate.
@@ -134,18 +163,20 @@ class Measuring {
     if (r.period) excited = excited_lines(e, *r.period);
     const bool multisine = r.period && r.period->is_whole() && excited.lines.size() >= kMultisineLines;
     // Harmonics that the drive's friction makes of a set point's lines are coherent, too, and no linear response.
-    std::vector<double> near_hz;
-    if (r.period && excited.by_set_point)
-      for (const std::size_t k : excited.lines) near_hz.push_back(r.period->frequency_hz(k, e.sample_s));
+    WelchLimits limits;
+    for (const std::size_t k : excited.lines) limits.near_hz.push_back(r.period->frequency_hz(k, e.sample_s));
     const std::size_t window = common_window(experiments_, e.sample_s);
 
-    for (const Channel& output : responses_of(e, dataset_.drive)) {
+    const std::vector<Channel> outputs = responses_of(e, dataset_.drive);
+    if (!multisine && !outputs.empty()) limits.to_hz = coherent_to_hz(e, *input, outputs.front());
+    for (const Channel& output : outputs) {
       if (r.period) r.distortion.push_back(distortion_of(*input, output, *r.period, e.sample_s, excited));
       std::optional<Spectra> spectra;
       if (multisine)
-        spectra = spectra_by_periods(*input, output, *r.period, e.sample_s, excited);
+        spectra = with_distortion(spectra_by_periods(*input, output, *r.period, e.sample_s, excited),
+                                  r.distortion.back(), output, e.sample_s);
       else
-        spectra = spectra_by_welch(*input, output, e.segments, e.sample_s, window, near_hz);
+        spectra = spectra_by_welch(*input, output, e.segments, e.sample_s, window, limits);
       if (!spectra) continue;
       r.responses.push_back(response_from(*spectra, *input, output, e.load, e.sample_s, 1));
       keep(*spectra, *input, output, e);
@@ -210,18 +241,32 @@ class Measuring {
           "There is no frequency response without what answers the current: record motor_position_rad or torque_nm.");
     const bool resonance_told = std::any_of(answer_.pooled.begin(), answer_.pooled.end(),
                                             [](const PooledResponse& p) { return p.resonances.why_not.empty(); });
-    if (effort && response && !resonance_told)
-      notes.push_back(
-          fmt::format("Whether there is a resonance cannot be told from these motions: record {}.", kWhatToRecord));
+    const auto told = [](const Distortion& d) { return d.odd.has_value() || d.even.has_value(); };
+    const bool distortion_told =
+        any([&](const RecordMeasurement& r) { return std::any_of(r.distortion.begin(), r.distortion.end(), told); });
+    if (effort && response && !(resonance_told && distortion_told))
+      notes.push_back(fmt::format("{} cannot be told from these motions: record {}.",
+                                  resonance_told    ? "Odd and even nonlinear distortion"
+                                  : distortion_told ? "Whether there is a resonance"
+                                                    : "Whether there is a resonance, and nonlinear distortion,",
+                                  kWhatToRecord));
     if (!any([](const RecordMeasurement& r) { return !r.noise.empty(); }))
       notes.push_back(
           "The noise floor cannot be told, as no record repeats itself: repeat one period of the excitation six times "
           "or more, or record a minute at rest for the sensors alone.");
-    const auto told = [](const Distortion& d) { return d.odd.has_value() || d.even.has_value(); };
-    if (effort && response &&
-        !any([&](const RecordMeasurement& r) { return std::any_of(r.distortion.begin(), r.distortion.end(), told); }))
-      notes.push_back(fmt::format("Odd and even nonlinear distortion cannot be told from these motions: record {}.",
-                                  kWhatToRecord));
+    std::vector<std::string> blind;
+    for (std::size_t k = 0; k < experiments_.size(); ++k) {
+      const bool welch = std::any_of(answer_.records[k].responses.begin(), answer_.records[k].responses.end(),
+                                     [](const FrequencyResponse& r) { return !r.by_periods && r.trusted() > 0; });
+      if (welch && !answer_.records[k].period && !has_set_point(*experiments_[k]))
+        blind.push_back(answer_.records[k].name);
+    }
+    if (!blind.empty())
+      notes.push_back(
+          fmt::format("{} of {} records ({}{}) neither repeat themselves nor have a set point: if a controller moved "
+                      "the drive, its "
+                      "answer to friction counts there as excitation and spoils the response; record the set point.",
+                      blind.size(), answer_.records.size(), blind.front(), blind.size() > 1 ? ", ..." : ""));
     for (const RecordMeasurement& r : answer_.records)
       if (r.masked_percent > 5.0)
         notes.push_back(fmt::format(

@@ -19,9 +19,13 @@ using data::Experiment;
 constexpr std::array kSetPoints = {Column::current_command, Column::velocity_command, Column::position_command};
 constexpr std::array kMeasured = {Column::current, Column::motor_torque, Column::motor_velocity, Column::motor_position,
                                   Column::output_position};
-// Mismatch of a period with the next, of the signal's RMS: sharp for what repeats exactly, then for what is noisy.
-constexpr std::array kMismatch = {0.02, 0.15};
+// Mismatch of a period with the next, of the signal's RMS: of set points, which repeat exactly, and of what is noisy.
+constexpr double kExact = 0.02, kNoisy = 0.15;
 constexpr double kSetPointShare = 1e-3;
+// Dry friction in closed loop puts a third harmonic of up to a third into the effort; lines above that are meant. Only
+// beside many of them weaker ones are taken for meant, too.
+constexpr double kStrongShare = 0.35;
+constexpr std::size_t kManyLines = 8;
 constexpr double kEffortShare = 0.05;
 constexpr double kEffortOverNoise = 10.0;
 constexpr std::size_t kShortestPeriod = 16;
@@ -40,27 +44,31 @@ bool is_constant(std::span<const double> x) {
 struct Found {
   double exact_samples = 0.0;
   std::string from;
+  double mismatch = 0.0;
 };
 
 std::optional<Found> search(const Experiment& e, const data::Segment& s) {
   const std::size_t n = s.last - s.first;
-  const auto in = [&](Column column, double limit) -> std::optional<Found> {
-    if (!e.has(column)) return std::nullopt;
+  const auto in = [&](Column column, double limit) {
+    std::optional<Found> best;
+    if (!e.has(column)) return best;
     // Excitations are often faded in.
     for (const std::size_t skip : {std::size_t{0}, n / 10, n / 4}) {
       const std::span<const double> part(e[column].data() + s.first + skip, n - skip);
       if (part.empty() || is_constant(part)) continue;
-      if (const auto r = signals::find_repetition(part, limit))
-        if (r->samples >= kShortestPeriod) return Found{r->exact_samples, std::string(data::column_name(column))};
+      const auto r = signals::find_repetition(part, limit);
+      if (!r || r->samples < kShortestPeriod || (best && best->mismatch <= r->mismatch)) continue;
+      best = Found{r->exact_samples, std::string(data::column_name(column)), r->mismatch};
     }
-    return std::nullopt;
+    return best;
   };
   for (const Column column : kSetPoints)
-    if (auto found = in(column, kMismatch.front())) return found;
-  for (const double limit : kMismatch)
-    for (const Column column : kMeasured)
-      if (auto found = in(column, limit)) return found;
-  return std::nullopt;
+    if (auto found = in(column, kExact)) return found;
+  // The signal with the least noise tells the period best.
+  std::optional<Found> best;
+  for (const Column column : kMeasured)
+    if (auto found = in(column, kNoisy); found && (!best || found->mismatch < best->mismatch)) best = found;
+  return best;
 }
 
 }  // namespace
@@ -75,17 +83,18 @@ PeriodSearch find_period(const Experiment& e, std::optional<double> period_s) {
     if (!(exact >= static_cast<double>(kShortestPeriod)))
       return {std::nullopt,
               fmt::format("the stated period of {:g} s holds fewer than {} samples", *period_s, kShortestPeriod)};
-    found = Found{exact, "stated"};
+    found = Found{exact, "stated", 0.0};
   } else {
     found = search(e, s);
   }
   if (!found) return {std::nullopt, "neither set points, effort nor motion repeat themselves"};
 
-  // The first sample of a segment has no difference to one before, and interpolation needs a neighbour.
-  const std::size_t begin = s.first + 2, end = s.last - 2;
+  // Interpolation needs neighbours.
+  const std::size_t margin = found->exact_samples == std::round(found->exact_samples) ? 0 : 2;
+  const std::size_t begin = s.first + margin, end = s.last - margin;
   const double periods = std::floor(static_cast<double>(end - begin) / found->exact_samples);
   if (periods < 2.0)
-    return {std::nullopt, fmt::format("the record holds {:.3g} periods of {:.4g} s; two whole ones are needed, five "
+    return {std::nullopt, fmt::format("the record holds {:.3g} periods of {:.4g} s; two whole ones are needed, six "
                                       "are good",
                                       static_cast<double>(s.last - s.first) / found->exact_samples,
                                       found->exact_samples * e.sample_s)};
@@ -171,31 +180,32 @@ bool ExcitedLines::contains(std::size_t line) const {
 
 ExcitedLines excited_lines(const Experiment& e, const Period& period) {
   ExcitedLines excited;
-  const auto take = [&](Column column, double share, double over_noise) {
+  const auto take = [&](Column column, bool set_point) {
     const PeriodSpectra spectra(e[column], period);
-    double largest = 0.0;
-    for (std::size_t k = 1; k < spectra.lines(); ++k) largest = std::max(largest, std::abs(spectra.mean(k)));
-    if (!(largest > 0.0)) return false;
     const auto periods = static_cast<double>(spectra.count());
-    for (std::size_t k = 1; k < spectra.lines(); ++k) {
+    std::vector<double> sizes(spectra.lines(), 0.0);
+    for (std::size_t k = 1; k < sizes.size(); ++k) {
       const double size = std::abs(spectra.mean(k));
-      if (size > share * largest && size > over_noise * std::sqrt(spectra.noise_power(k) / periods))
-        excited.lines.push_back(k);
+      if (size > kEffortOverNoise * std::sqrt(spectra.noise_power(k) / periods)) sizes[k] = size;
     }
+    const double largest = *std::max_element(sizes.begin(), sizes.end());
+    if (!(largest > 0.0)) return false;
+    const auto strong = static_cast<std::size_t>(
+        std::count_if(sizes.begin(), sizes.end(), [&](double size) { return size > kStrongShare * largest; }));
+    const double share = set_point ? kSetPointShare : strong >= kManyLines ? kEffortShare : kStrongShare;
+    for (std::size_t k = 1; k < sizes.size(); ++k)
+      if (sizes[k] > share * largest) excited.lines.push_back(k);
     excited.from = data::column_name(column);
-    return !excited.lines.empty();
+    excited.by_set_point = set_point;
+    return true;
   };
   for (const Column column : kSetPoints) {
     if (!e.has(column)) continue;
     const std::span<const double> part(e[column].data() + period.first, period.samples);
-    if (is_constant(part)) continue;
-    if (take(column, kSetPointShare, kEffortOverNoise)) {
-      excited.by_set_point = true;
-      return excited;
-    }
+    if (!is_constant(part) && take(column, true)) return excited;
   }
   for (const Column column : {Column::current, Column::motor_torque})
-    if (e.has(column) && take(column, kEffortShare, kEffortOverNoise)) return excited;
+    if (e.has(column) && take(column, false)) return excited;
   return excited;
 }
 

@@ -32,8 +32,9 @@ struct PeriodSearch {
   std::string why_not;  // a sentence without a full stop; empty where there is one
 };
 
-// Looks at the longest segment: set points first, as they repeat exactly, then the effort, then the motion. The first
-// period is left out where at least three are there. With `period_s` nothing is searched for.
+// Looks at the longest segment: set points first, as they repeat exactly, then effort and motion, of which the one that
+// repeats best is taken. The first period is left out where at least three are there. With `period_s` nothing is
+// searched for.
 PeriodSearch find_period(const data::Experiment& experiment, std::optional<double> period_s = std::nullopt);
 
 // The periods of a signal, one after the other. A period between samples is cut by cubic interpolation.
@@ -66,8 +67,9 @@ class PeriodSpectra {
   std::vector<std::vector<std::complex<double>>> spectra_;
 };
 
-// Lines that the excitation holds: those of a set point above a thousandth of its largest; without a set point those of
-// the effort above a twentieth of its largest and ten times its noise. Sorted, without the mean.
+// Lines that the excitation holds, ten times above the noise: those of a set point above a thousandth of its largest;
+// without a set point those of the effort above a third of its largest, as weaker ones may be a controller's answer to
+// friction, or above a twentieth where at least eight stand above the third. Sorted, without the mean.
 struct ExcitedLines {
   std::vector<std::size_t> lines;
   std::string from;  // column

@@ -18,6 +18,8 @@ constexpr double kFitSpan = 1.5;       // lines from the extremum divided by thi
 constexpr std::size_t kFitLines = 10;  // at least
 constexpr double kLargestShift = 0.25;
 constexpr double kLargestDamping = 0.8;
+constexpr double kLargestStd = 0.05;     // of the frequency
+constexpr double kLargestMisfit = 0.25;  // RMS of the relative deviation of lines from the fit
 // Without noise the weights are those of a relative error.
 constexpr double kSmallestStd = 1e-5;
 
@@ -83,6 +85,11 @@ class LocalFit {
 
   bool ok() const { return ok_; }
   double chi2() const { return chi2_; }
+  double misfit() const {
+    double sum = 0.0;
+    for (std::size_t k = 0; k < s_.size(); ++k) sum += std::norm(g_[k] - model(k)) / std::norm(g_[k]);
+    return std::sqrt(sum / static_cast<double>(s_.size()));
+  }
   double freedoms() const {
     return std::max(1.0, 2.0 * static_cast<double>(s_.size()) - static_cast<double>(theta_.size()));
   }
@@ -174,7 +181,7 @@ std::optional<Root> fitted_root(std::span<const ResponseLine> lines, double cent
       lowest = criterion;
     }
   }
-  return best == nullptr ? std::nullopt : best->root(of_zeros);
+  return best == nullptr || best->misfit() > kLargestMisfit ? std::nullopt : best->root(of_zeros);
 }
 
 // By how much a maximum stands above the higher one of the lowest points that lead to higher ground, in dB.
@@ -185,31 +192,29 @@ double prominence(const std::vector<double>& x, std::size_t at) {
   return x[at] - std::max(left, right);
 }
 
-Resonance resonance_at(std::span<const ResponseLine> lines, std::size_t at, bool anti, double resolution_hz,
-                       bool windowed) {
+// Nothing where no pole or zero that is broad enough to be told from a single line explains the extremum.
+std::optional<Resonance> resonance_at(std::span<const ResponseLine> lines, std::size_t at, bool anti,
+                                      double resolution_hz, bool windowed) {
   const double centre = lines[at].frequency_hz;
   std::size_t first = at, last = at + 1;
   while (first > 0 && (lines[first - 1].frequency_hz > centre / kFitSpan || at - first < kFitLines / 2)) --first;
   while (last < lines.size() && (lines[last].frequency_hz < centre * kFitSpan || last - first < kFitLines)) ++last;
 
+  const std::optional<Root> q = fitted_root(lines.subspan(first, last - first), centre, anti);
+  if (!q || std::abs(q->frequency - 1.0) > kLargestShift || q->damping > kLargestDamping) return std::nullopt;
   Resonance r;
   r.anti = anti;
-  const std::optional<Root> q = fitted_root(lines.subspan(first, last - first), centre, anti);
-  const bool near = q && std::abs(q->frequency - 1.0) < kLargestShift && q->damping < kLargestDamping;
-  // Zeros may lie beyond the axis by a delay; a drive's poles cannot.
-  if (near && (q->damping > 0.0 || (anti && q->damping > -3.0 * q->damping_std - 0.02))) {
-    r.frequency_hz = q->frequency * centre;
-    r.frequency_std_hz = q->frequency_std * centre;
-    r.damping = std::max(0.0, q->damping);
-    r.damping_std = q->damping_std;
-    r.damping_is_upper_limit = windowed && 2.0 * *r.damping * r.frequency_hz < 2.0 * resolution_hz;
-    return r;
-  }
-  r.frequency_hz = centre;
-  const double below = at > 0 ? centre - lines[at - 1].frequency_hz : resolution_hz;
-  const double above = at + 1 < lines.size() ? lines[at + 1].frequency_hz - centre : resolution_hz;
-  r.frequency_std_hz = 0.5 * std::max(below, above);
-  return r;
+  r.frequency_hz = q->frequency * centre;
+  r.frequency_std_hz = q->frequency_std * centre;
+  r.damping = std::max(0.0, q->damping);
+  r.damping_std = q->damping_std;
+  const double width_hz = 2.0 * r.damping * r.frequency_hz;
+  r.damping_is_upper_limit = windowed && width_hz < 2.0 * resolution_hz;
+  // A drive's poles are damped; its zeros may come to lie beyond the axis by a delay or by noise.
+  const bool damped = anti ? q->damping > -3.0 * q->damping_std - 0.02 : q->damping > 2.0 * q->damping_std;
+  const bool broad = width_hz > (windowed ? 0.5 : anti ? -1.0 : 0.1) * resolution_hz;
+  const bool sure = r.frequency_std_hz < kLargestStd * r.frequency_hz;
+  return damped && broad && sure ? std::optional(r) : std::nullopt;
 }
 
 }  // namespace
@@ -243,8 +248,16 @@ ResonanceSearch find_resonances(std::span<const ResponseLine> response, double r
     for (std::size_t k = 1; k + 1 < x.size(); ++k) {
       if (x[k] < x[k - 1] || x[k] <= x[k + 1]) continue;
       const double uncertain = 20.0 * std::log10(1.0 + lines[k].band);
-      if (prominence(x, k) > kProminenceDb + 2.0 * uncertain)
-        search.found.push_back(resonance_at(lines, k, anti, resolution_hz, windowed));
+      if (!(prominence(x, k) > kProminenceDb + 2.0 * uncertain)) continue;
+      const auto r = resonance_at(lines, k, anti, resolution_hz, windowed);
+      const auto same = [&](const Resonance& other) {
+        return other.anti == anti && std::abs(other.frequency_hz - r->frequency_hz) <
+                                         resolution_hz + 2.0 * (other.frequency_std_hz + r->frequency_std_hz);
+      };
+      if (!r)
+        ++search.unexplained;
+      else if (std::none_of(search.found.begin(), search.found.end(), same))
+        search.found.push_back(*r);
     }
   }
   std::sort(search.found.begin(), search.found.end(),

@@ -106,6 +106,34 @@ TEST(FrequencyResponse, ConfidenceBandHoldsTheTruthNineteenTimesOfTwenty) {
   EXPECT_LT(squares / static_cast<double>(trusted), 2.0);
 }
 
+TEST(FrequencyResponse, BandHoldsTheDistortionThatRepeatsItself) {
+  // y = x + 0.3 x^3 without noise: coherence is one, and another realisation gives another response.
+  const double cubic = 0.3;
+  std::size_t inside = 0, all = 0;
+  std::complex<double> mean;
+  std::vector<std::complex<double>> found;
+  std::vector<double> bands;
+  for (unsigned seed = 1; seed <= 8; ++seed) {
+    data::Dataset dataset;
+    dataset.experiments.push_back(testing::experiment_of(3 * kPeriodSamples, kSample));
+    data::Experiment& e = dataset.experiments[0];
+    e[Column::current] = testing::signal_of(testing::multisine(161, 0.1, seed), kPeriod, kSample, e.size());
+    for (const double x : e[Column::current]) e[Column::torque].push_back(x + cubic * x * x * x);
+    const Measurement m = measure(dataset);
+    for (const ResponseLine& line : m.records[0].responses.at(0).lines) {
+      EXPECT_GT(line.coherence, 1.0 - 1e-9);
+      found.push_back(line.response);
+      bands.push_back(line.band * std::abs(line.response));
+      mean += line.response;
+    }
+  }
+  mean /= static_cast<double>(found.size());
+  for (std::size_t k = 0; k < found.size(); ++k, ++all) inside += std::abs(found[k] - mean) < bands[k] ? 1 : 0;
+  ASSERT_GT(all, 400u);
+  EXPECT_GT(static_cast<double>(inside) / static_cast<double>(all), 0.88);
+  EXPECT_LT(static_cast<double>(inside) / static_cast<double>(all), 0.99);
+}
+
 TEST(FrequencyResponse, OfUnrelatedSignalsIsNotTrusted) {
   std::vector<double> x(40000, 0.0), y(40000, 0.0);
   testing::add_noise(x, 1.0, 1);
@@ -128,7 +156,7 @@ TEST(FrequencyResponse, OfADelayHasItsPhaseAndFullCoherence) {
   const auto spectra = spectra_by_welch(input, output, segments, kSample, 2000);
   ASSERT_TRUE(spectra.has_value());
   const auto lines = response_of(*spectra, input, output, kSample);
-  ASSERT_GT(lines.size(), 900u);
+  ASSERT_GT(lines.size(), 790u);  // up to four tenths of the sample rate
   for (const ResponseLine& line : lines) {
     EXPECT_GT(line.coherence, 0.98);
     EXPECT_NEAR(std::abs(line.response), 1.0, 0.03);
@@ -194,8 +222,7 @@ TEST(Resonance, OfALockedDriveIsFoundWithinAPercent) {
   EXPECT_FALSE(r.anti);
   EXPECT_NEAR(r.frequency_hz, 12.4, 0.124);
   EXPECT_LT(std::abs(r.frequency_hz - 12.4), 4.0 * r.frequency_std_hz + 1e-6);
-  ASSERT_TRUE(r.damping.has_value());
-  EXPECT_NEAR(*r.damping, 0.06, 0.003);
+  EXPECT_NEAR(r.damping, 0.06, 0.003);
   EXPECT_FALSE(r.damping_is_upper_limit);
 }
 
@@ -206,12 +233,10 @@ TEST(Resonance, AndAntiResonanceOfAFreeDriveAreBothFound) {
   ASSERT_EQ(found.size(), 2u);
   EXPECT_TRUE(found[0].anti);
   EXPECT_NEAR(found[0].frequency_hz, kAntiHz, 0.01 * kAntiHz);
-  ASSERT_TRUE(found[0].damping.has_value());
-  EXPECT_NEAR(*found[0].damping, kAntiDamping, 0.1 * kAntiDamping);
+  EXPECT_NEAR(found[0].damping, kAntiDamping, 0.1 * kAntiDamping);
   EXPECT_FALSE(found[1].anti);
   EXPECT_NEAR(found[1].frequency_hz, kResonanceHz, 0.01 * kResonanceHz);
-  ASSERT_TRUE(found[1].damping.has_value());
-  EXPECT_NEAR(*found[1].damping, kResonanceDamping, 0.1 * kResonanceDamping);
+  EXPECT_NEAR(found[1].damping, kResonanceDamping, 0.1 * kResonanceDamping);
 }
 
 TEST(Resonance, StatesAnUncertaintyThatItsErrorsKeepTo) {
@@ -261,7 +286,7 @@ TEST(Resonance, IsSeenByWelchWithNoiseAsExcitation) {
   ASSERT_EQ(m.pooled.size(), 1u);
   ASSERT_EQ(m.pooled[0].resonances.found.size(), 1u);
   EXPECT_NEAR(m.pooled[0].resonances.found[0].frequency_hz, 12.4, 0.124);
-  EXPECT_NEAR(m.pooled[0].resonances.found[0].damping.value_or(0.0), 0.06, 0.006);
+  EXPECT_NEAR(m.pooled[0].resonances.found[0].damping, 0.06, 0.006);
 }
 
 }  // namespace
