@@ -10,10 +10,23 @@ using data::Axis;
 using data::Column;
 using data::Experiment;
 
+// Of rounding to steps at a random place.
+double step_variance(const std::optional<double>& counts, Axis axis) {
+  if (!counts || !(*counts > 0.0)) return 0.0;
+  const double step = (axis == Axis::rotary ? 2.0 * std::numbers::pi : 1.0) / *counts;
+  return step * step / 12.0;
+}
+double step_variance(const Experiment& e, Column column, Axis axis) {
+  if (column == Column::motor_position) return step_variance(e.encoder_counts, axis);
+  if (column == Column::output_position) return step_variance(e.output_encoder_counts, axis);
+  return 0.0;
+}
+
 // On a linear axis columns keep their names.
 Channel column_channel(const Experiment& e, Column column, Axis axis) {
   Channel c{std::string(data::column_name(column)), data::unit_of(column, axis), e[column]};
   if (column == Column::current || column == Column::motor_torque) c.held = e.current_hold == data::CurrentHold::zoh;
+  c.step_variance = step_variance(e, column, axis);
   return c;
 }
 
@@ -21,6 +34,7 @@ Channel velocity_from(const Experiment& e, Column position, Column velocity, Axi
   Channel c{std::string(data::column_name(velocity)), data::unit_of(velocity, axis),
             std::vector<double>(e.size(), 0.0)};
   c.differenced = true;
+  c.step_variance = step_variance(e, position, axis);
   const std::vector<double>& p = e[position];
   for (const data::Segment& s : e.segments) {
     for (std::size_t k = s.first + 1; k < s.last; ++k) c.values[k] = (p[k] - p[k - 1]) / e.sample_s;
@@ -45,6 +59,9 @@ std::optional<Channel> torsion_of(const Experiment& e, const data::DriveFacts& d
             e[Column::motor_position]};
   for (std::size_t k = 0; k < c.values.size(); ++k)
     c.values[k] = c.values[k] / *drive.gear_ratio - (output ? e[Column::output_position][k] : 0.0);
+  const Axis axis = drive.axis.value_or(Axis::rotary);
+  c.step_variance = step_variance(e, Column::motor_position, axis) / (*drive.gear_ratio * *drive.gear_ratio) +
+                    (output ? step_variance(e, Column::output_position, axis) : 0.0);
   return c;
 }
 

@@ -18,6 +18,10 @@ struct Channel {
   bool held = false;         // a command that the drive holds for a sample: later by half a sample
   bool differenced = false;  // backward difference of a position over a sample; valid from a segment's second sample
 
+  // Variance that the stated steps of encoders add to a sample of what was differenced, else of the signal. In a motion
+  // that repeats itself the steps do so, too: they are no noise from period to period, and no effect of the drive.
+  double step_variance = 0.0;
+
   // What a line of the sampled signal is to be multiplied by to be that of the physical quantity; one at 0 Hz.
   std::complex<double> correction(double frequency_hz, double sample_s) const;
 };

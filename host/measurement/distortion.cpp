@@ -4,6 +4,7 @@
 #include <boost/math/distributions/fisher_f.hpp>
 #include <cmath>
 #include <limits>
+#include <numbers>
 
 namespace flexspline::measurement {
 namespace {
@@ -45,7 +46,7 @@ class Lines {
       power += std::norm(y_.mean(k) - g * x_.mean(k)) * physical(k);
       double differences = 0.0;
       for (std::size_t p = 1; p < y_.count(); ++p) differences += std::norm(of(p) - of(p - 1));
-      noise += 0.5 * differences / ((periods - 1.0) * periods) * physical(k);
+      noise += (0.5 * differences / ((periods - 1.0) * periods) + steps(k)) * physical(k);
     }
     const auto lines = static_cast<double>(detection.size());
     const double over = per_line ? lines : 1.0;
@@ -70,6 +71,17 @@ class Lines {
  private:
   double physical(std::size_t line) const {
     return std::norm(output_.correction(period_.frequency_hz(line, sample_s_), sample_s_));
+  }
+
+  // Power of a line that the encoder's steps make, as white noise that repeats itself.
+  double steps(std::size_t line) const {
+    const auto samples = static_cast<double>(period_.samples);
+    double power = 4.0 * output_.step_variance / samples;
+    if (output_.differenced) {
+      const double slope = 2.0 * std::sin(std::numbers::pi * static_cast<double>(line) / samples) / sample_s_;
+      power *= slope * slope;
+    }
+    return power;
   }
 
   std::complex<double> response_at(std::size_t line) const {

@@ -14,7 +14,7 @@ namespace flexspline::measurement {
 struct DistortionLevel {
   std::size_t lines = 0;     // of detection
   double level_db = 0.0;     // against the excited lines; minus infinity where there is nothing
-  double noise_db = 0.0;     // of the same lines, against the same
+  double noise_db = 0.0;     // of the same lines, with the stated steps of an encoder, against the same
   double rms = 0.0;          // of these lines together, without the noise, in the signal's unit
   double p_value = 1.0;      // of as much power by noise alone (F test)
   bool significant = false;  // p_value below 0.001 and above -100 dB
