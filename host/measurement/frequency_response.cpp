@@ -86,17 +86,20 @@ Spectra spectra_by_periods(const Channel& input, const Channel& output, const Pe
 std::optional<Spectra> spectra_by_welch(const Channel& input, const Channel& output,
                                         std::span<const data::Segment> segments, double sample_s, std::size_t window,
                                         const WelchLimits& limits) {
+  // Window by window, to see how many of them hold the power of a line: a chirp passes it once.
   std::vector<signals::CrossSpectrum> parts;
+  double independent = 0.0;
   for (const data::Segment& segment : segments) {
-    const std::size_t first = segment.first + 1, n = segment.last > first ? segment.last - first : 0;
-    if (n < window) continue;
-    parts.push_back(signals::cross_spectrum(std::span(input.values).subspan(first, n),
-                                            std::span(output.values).subspan(first, n), 1.0 / sample_s, window));
+    std::size_t windows = 0;
+    for (std::size_t first = segment.first + 1; first + window <= segment.last; first += window / 2, ++windows)
+      parts.push_back(signals::cross_spectrum(std::span(input.values).subspan(first, window),
+                                              std::span(output.values).subspan(first, window), 1.0 / sample_s, window));
+    signals::CrossSpectrum counted;
+    counted.averages = windows;
+    independent += counted.independent_averages();
   }
   if (parts.empty()) return std::nullopt;
   const signals::CrossSpectrum all = signals::pool(parts);
-  double independent = 0.0;
-  for (const signals::CrossSpectrum& part : parts) independent += part.independent_averages();
 
   Spectra s;
   s.resolution_hz = 1.0 / (sample_s * static_cast<double>(window));
@@ -115,7 +118,12 @@ std::optional<Spectra> spectra_by_welch(const Channel& input, const Channel& out
     const double highest = std::min(kHighestShare / sample_s, limits.to_hz.value_or(kHighestShare / sample_s));
     const bool inner = k >= kLowestLine && s.frequency_hz[k] <= highest;
     const bool excited = inner && near && all.xx[k] > 4.0 * leak_x[k] && all.yy[k] > 4.0 * leak_y[k];
-    const double weight = excited ? independent : 0.0;
+    double squares = 0.0;
+    for (const signals::CrossSpectrum& part : parts) squares += part.xx[k] * part.xx[k];
+    const auto windows = static_cast<double>(parts.size());
+    // Of noise the mean of the squares is twice the square of the mean.
+    const double filled = squares > 0.0 ? std::min(1.0, 2.0 * all.xx[k] * all.xx[k] * windows / squares) : 1.0;
+    const double weight = excited ? independent * filled : 0.0;
     s.xx[k] *= weight;
     s.yy[k] *= weight;
     s.xy[k] *= weight;

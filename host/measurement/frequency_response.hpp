@@ -38,9 +38,9 @@ struct WelchLimits {
   std::optional<double> to_hz;  // what is coherent above may be noise that a controller returns
 };
 
-// Welch's average over the segments that hold one window. Lines at which the signals hold no more than what leaks from
-// stronger ones have no averages, nor have those outside the limits or above four tenths of the sample rate. Nothing
-// where no segment is long enough.
+// Welch's average over the segments that hold one window. Averages count as far as their windows hold the line. Lines
+// at which the signals hold no more than what leaks from stronger ones have no averages, nor have those outside the
+// limits or above four tenths of the sample rate. Nothing where no segment is long enough.
 std::optional<Spectra> spectra_by_welch(const Channel& input, const Channel& output,
                                         std::span<const data::Segment> segments, double sample_s, std::size_t window,
                                         const WelchLimits& limits = {});

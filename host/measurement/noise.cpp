@@ -38,6 +38,13 @@ double rms_around_mean(std::span<const double> x) {
   return std::sqrt(sum / static_cast<double>(x.size()));
 }
 
+// Of a signal without noise the arithmetic leaves something.
+double beyond_rounding(double rms, const Channel& channel) {
+  double largest = 0.0;
+  for (const double v : channel.values) largest = std::max(largest, std::abs(v));
+  return rms > 1e-12 * largest ? rms : 0.0;
+}
+
 // `density` at lines k * resolution_hz, the first of which is the mean.
 std::vector<NoiseBand> bands_of(const std::vector<double>& density, double resolution_hz) {
   std::vector<NoiseBand> bands;
@@ -75,7 +82,7 @@ NoiseLevel noise_by_periods(const Channel& channel, const Period& period, double
     density.resize(lines.size(), 0.0);
     for (std::size_t k = 0; k < lines.size(); ++k) density[k] += share * 0.5 * std::norm(lines[k]) / resolution_hz;
   }
-  level.rms = std::sqrt(power);
+  level.rms = beyond_rounding(std::sqrt(power), channel);
   const auto all =
       std::span(channel.values)
           .subspan(period.first, static_cast<std::size_t>(static_cast<double>(period.count) * period.exact_samples));
@@ -104,7 +111,7 @@ NoiseLevel noise_at_rest(const Channel& channel, std::span<const data::Segment> 
         bands_of(signals::power_density(x, 1.0 / sample_s, window), 1.0 / (sample_s * static_cast<double>(window)));
   }
   if (freedoms > 0.0) {
-    level.rms = std::sqrt(squares / freedoms);
+    level.rms = beyond_rounding(std::sqrt(squares / freedoms), channel);
     level.signal_rms = std::sqrt(level.signal_rms / samples);
   }
   return level;

@@ -230,12 +230,12 @@ ResonanceSearch find_resonances(std::span<const ResponseLine> response, double r
     search.to_hz = lines.back().frequency_hz;
   }
   if (lines.size() < kFewestLines || search.to_hz < kFewestSpan * search.from_hz) {
-    search.why_not = lines.empty()
-                         ? std::string("no line of the response can be trusted")
-                         : fmt::format(
-                               "{} lines of the response can be trusted, from {:.3g} to {:.3g} Hz: too few for a "
-                               "resonance to show",
-                               lines.size(), search.from_hz, search.to_hz);
+    const std::string count = lines.size() == 1 ? "one line" : fmt::format("{} lines", lines.size());
+    search.why_not = lines.empty() ? "no line of the response can be trusted"
+                                   : fmt::format(
+                                         "only {} of the response can be trusted, from {:.3g} to {:.3g} Hz: "
+                                         "too few for a resonance to show",
+                                         count, search.from_hz, search.to_hz);
     return search;
   }
   std::vector<double> up(lines.size()), down(lines.size());

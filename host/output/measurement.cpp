@@ -159,7 +159,7 @@ void add_distortion(std::string& text, const Measurement& found) {
                        ? fmt::format("{:.3g} Hz", d.low_hz)
                        : fmt::format("{} odd lines, {:.3g} to {:.3g} Hz", d.excited_lines, d.low_hz, d.high_hz),
                    level_text(d.odd), level_text(d.even),
-                   std::isfinite(any->noise_db) ? fmt::format("{:.1f} dB", any->noise_db) : "none"});
+                   any->noise_db > -200.0 ? fmt::format("{:.1f} dB", any->noise_db) : "none"});
       } else {
         hides = true;
       }

@@ -196,6 +196,23 @@ TEST(FrequencyResponse, OfAHeldCommandIsThatOfThePlantAlone) {
   EXPECT_GT(seen, 100u);
 }
 
+TEST(FrequencyResponse, CountsOnlyWindowsThatHoldALine) {
+  // Noise in the first quarter of the record alone, and all along.
+  const std::size_t n = 64000;
+  std::vector<double> x(n, 0.0), all(n, 0.0);
+  testing::add_noise(all, 1.0, 1);
+  std::copy(all.begin(), all.begin() + n / 4, x.begin());
+  const std::vector<data::Segment> segments = {{0, n}};
+  const auto averages = [&](const std::vector<double>& signal) {
+    const Channel channel = testing::channel(signal);
+    const auto spectra = spectra_by_welch(channel, channel, segments, kSample, 1000);
+    double sum = 0.0;
+    for (const double a : spectra->averages) sum += a / static_cast<double>(spectra->averages.size());
+    return sum;
+  };
+  EXPECT_NEAR(averages(x) / averages(all), 0.25, 0.05);
+}
+
 TEST(FrequencyResponse, OfASineSaysNothingBesideItsLine) {
   const std::size_t n = 20000;
   const std::vector<testing::Line> lines = {{8, 1.0}};

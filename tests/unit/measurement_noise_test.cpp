@@ -131,7 +131,7 @@ TEST(NoiseFloor, OfARecordAtRestIsThatOfItsSensors) {
   ASSERT_EQ(m.records[0].noise.size(), 3u);  // current, position, velocity
   EXPECT_EQ(m.records[0].noise[0].from, "standstill");
   EXPECT_NEAR(m.records[0].noise[0].rms, 0.02, 0.002);
-  EXPECT_NEAR(m.records[0].noise[1].rms, 0.0, 1e-9);
+  EXPECT_EQ(m.records[0].noise[1].rms, 0.0);
   EXPECT_TRUE(m.records[0].responses.empty());
 }
 

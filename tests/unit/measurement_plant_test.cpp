@@ -51,7 +51,8 @@ std::vector<std::pair<double, double>> poles(const plant::Physics& p, bool outpu
     a.row(3) /= p.output_inertia;
   }
   std::vector<std::pair<double, double>> found;
-  for (const std::complex<double> pole : Eigen::EigenSolver<Eigen::Matrix4d>(a).eigenvalues())
+  const Eigen::Vector4cd eigenvalues = a.eigenvalues();
+  for (const std::complex<double> pole : eigenvalues)
     if (pole.imag() > 1e-6) found.emplace_back(std::abs(pole) / testing::kTwoPi, -pole.real() / std::abs(pole));
   return found;
 }
