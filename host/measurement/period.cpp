@@ -5,6 +5,7 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <numbers>
 
 #include "host/signals/fft.hpp"
 #include "host/signals/interpolate.hpp"
@@ -29,6 +30,7 @@ constexpr std::size_t kManyLines = 8;
 constexpr double kEffortShare = 0.05;
 constexpr double kEffortOverNoise = 10.0;
 constexpr std::size_t kShortestPeriod = 16;
+constexpr std::size_t kLargestFactor = 50;
 
 data::Segment longest_segment(const Experiment& e) {
   data::Segment longest;
@@ -69,6 +71,49 @@ std::optional<Found> search(const Experiment& e, const data::Segment& s) {
   for (const Column column : kMeasured)
     if (auto found = in(column, kNoisy); found && (!best || found->mismatch < best->mismatch)) best = found;
   return best;
+}
+
+std::size_t largest_factor(std::size_t n) {
+  std::size_t largest = 1;
+  for (std::size_t f = 2; f * f <= n; ++f)
+    for (; n % f == 0; n /= f) largest = f;
+  return std::max(largest, n);
+}
+
+// sum_n x[n] exp(-2 pi j k n / N), k up to N/2, as a convolution of a size that is quick (L. I. Bluestein, 1970): kn is
+// (k^2 + n^2 - (k - n)^2) / 2. A period may be of any length, and a large prime takes the plain transform minutes.
+std::vector<std::complex<double>> transform_of_any_size(std::span<const double> x) {
+  const std::size_t n = x.size(), lines = n / 2 + 1, size = signals::fast_fft_size(n + lines);
+  const auto chirp = [n](std::size_t k) {
+    // Whole turns are left out before they cost digits.
+    const std::size_t turns = k * k % (2 * n);
+    return std::polar(1.0, std::numbers::pi * static_cast<double>(turns) / static_cast<double>(n));
+  };
+  std::vector<double> ar(size, 0.0), ai(size, 0.0), br(size, 0.0), bi(size, 0.0);
+  for (std::size_t k = 0; k < n; ++k) {
+    const std::complex<double> c = chirp(k), a = x[k] * std::conj(c);
+    ar[k] = a.real();
+    ai[k] = a.imag();
+    if (k > 0) {
+      br[size - k] = c.real();
+      bi[size - k] = c.imag();
+    }
+    if (k < lines) {
+      br[k] = c.real();
+      bi[k] = c.imag();
+    }
+  }
+  signals::RealFft fft(size);
+  const auto far = fft.forward(ar), fai = fft.forward(ai), fbr = fft.forward(br), fbi = fft.forward(bi);
+  std::vector<std::complex<double>> real(far.size()), imaginary(far.size());
+  for (std::size_t k = 0; k < far.size(); ++k) {
+    real[k] = far[k] * fbr[k] - fai[k] * fbi[k];
+    imaginary[k] = far[k] * fbi[k] + fai[k] * fbr[k];
+  }
+  const std::vector<double> cr = fft.inverse(real), ci = fft.inverse(imaginary);
+  std::vector<std::complex<double>> spectrum(lines);
+  for (std::size_t k = 0; k < lines; ++k) spectrum[k] = std::complex(cr[k], ci[k]) * std::conj(chirp(k));
+  return spectrum;
 }
 
 }  // namespace
@@ -140,17 +185,10 @@ Periods periods_of(std::span<const double> signal, const Period& period) {
 
 std::vector<std::complex<double>> line_amplitudes(std::span<const double> period) {
   const std::size_t n = period.size();
-  std::vector<std::complex<double>> lines;
+  std::vector<std::complex<double>> lines = n % 2 == 0 && largest_factor(n) <= kLargestFactor
+                                                ? signals::RealFft(n).forward(period)
+                                                : transform_of_any_size(period);
   const double scale = 2.0 / static_cast<double>(n);
-  if (n % 2 == 0) {
-    lines = signals::RealFft(n).forward(period);
-  } else {
-    // The transform takes even sizes: of the period and its repetition every other line is nought.
-    std::vector<double> twice(period.begin(), period.end());
-    twice.insert(twice.end(), period.begin(), period.end());
-    const auto all = signals::RealFft(2 * n).forward(twice);
-    for (std::size_t k = 0; k < all.size(); k += 2) lines.push_back(0.5 * all[k]);
-  }
   for (auto& line : lines) line *= scale;
   lines.front() *= 0.5;
   if (n % 2 == 0) lines.back() *= 0.5;

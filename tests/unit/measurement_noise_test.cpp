@@ -51,8 +51,9 @@ TEST(Period, IsNotFoundInNoiseAndThenSaysWhy) {
   EXPECT_NE(long_one.why_not.find("two whole ones"), std::string::npos) << long_one.why_not;
 }
 
-TEST(Period, OfOddLengthHasTheLinesOfItsCosines) {
-  for (const std::size_t n : {1500u, 1501u}) {
+TEST(Period, OfAnyLengthHasTheLinesOfItsCosines) {
+  // Quick, odd, prime, and twice a prime.
+  for (const std::size_t n : {1500u, 1501u, 10007u, 20014u}) {
     const auto lines = testing::multisine(99, 0.7, 8);
     const auto found = line_amplitudes(testing::signal_of(lines, static_cast<double>(n) * kSample, kSample, n));
     ASSERT_EQ(found.size(), n / 2 + 1);

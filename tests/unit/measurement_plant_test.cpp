@@ -155,5 +155,41 @@ TEST(MeasuredPlant, WithACubicSpringHasOddDistortionOfTheTorsion) {
   EXPECT_FALSE(torsion->even->significant) << torsion->even->level_db << " " << torsion->even->noise_db;
 }
 
+TEST(MeasuredPlant, ShowsItsPolesUnderAVelocityControllerThatKeepsItFromSticking) {
+  plant::Physics physics = linear_drive();
+  physics.friction.coulomb = 0.008;
+  const auto lines = testing::multisine(121, 0.4, 36);
+  const std::size_t samples = 7 * kPeriodSamples;
+  data::Dataset dataset;
+  data::Experiment e = testing::experiment_of(samples, kSample);
+  e.current_hold = data::CurrentHold::zoh;
+  e.encoder_counts = kCounts;
+  e[Column::velocity_command] = testing::signal_of(lines, kPeriodSamples * kSample, kSample, samples);
+  plant::TwoMass drive(physics, false);
+  std::mt19937 random(37);
+  std::normal_distribution<double> noise(0.0, 0.05);
+  double integral = 0.0;
+  for (double& command : e[Column::velocity_command]) {
+    command += 30.0;
+    const double error = command - drive.state().motor_velocity + noise(random);
+    integral += 1.0 * error * kSample;
+    const double current = 0.02 * error + integral, quantum = testing::kTwoPi / kCounts;
+    e[Column::current].push_back(current);
+    e[Column::motor_position].push_back(quantum * std::round(drive.state().motor_angle / quantum));
+    drive.advance({current, 30.0, 0.0}, kSample, 16);
+  }
+  dataset.experiments.push_back(std::move(e));
+  const Measurement m = measure(dataset);
+  EXPECT_EQ(m.records[0].period->from, "velocity_command_rad_s");
+  const auto& found = m.pooled.at(0).resonances.found;
+  const auto zero = poles(physics, false, true), pole = poles(physics, false, false);
+  ASSERT_EQ(found.size(), 2u);
+  EXPECT_NEAR(found[0].frequency_hz, zero[0].first, 0.02 * zero[0].first);
+  EXPECT_NEAR(found[1].frequency_hz, pole[0].first, 0.02 * pole[0].first);
+  // The friction never changes its sign.
+  EXPECT_FALSE(m.records[0].distortion.at(0).odd->significant);
+  EXPECT_FALSE(m.records[0].distortion.at(0).even->significant);
+}
+
 }  // namespace
 }  // namespace flexspline::measurement
