@@ -60,6 +60,14 @@ std::string unit_over(const std::string& output, const std::string& input) {
   return bracketed(output) + "/" + bracketed(input);
 }
 
+// Speeds of either sign reach a twentieth of the largest.
+bool reverses(const Experiment& e, const data::DriveFacts& drive) {
+  const std::vector<Channel> responses = responses_of(e, drive);
+  if (responses.empty() || responses.front().name.find("velocity") == std::string::npos) return false;
+  const auto [low, high] = std::minmax_element(responses.front().values.begin(), responses.front().values.end());
+  return *low<-0.05 * *high&& * high> - 0.05 * *low;
+}
+
 bool has_set_point(const Experiment& e) {
   return e.has(data::Column::current_command) || e.has(data::Column::velocity_command) ||
          e.has(data::Column::position_command);
@@ -254,6 +262,20 @@ class Measuring {
       notes.push_back(
           "The noise floor cannot be told, as no record repeats itself: repeat one period of the excitation six times "
           "or more, or record a minute at rest for the sensors alone.");
+    std::size_t reversing = 0;
+    for (std::size_t k = 0; k < experiments_.size(); ++k) {
+      const auto& responses = answer_.records[k].responses;
+      if (experiments_[k]->load == data::Load::free && !responses.empty() && responses.front().trusted() > 0 &&
+          reverses(*experiments_[k], dataset_.drive))
+        ++reversing;
+    }
+    if (reversing > 0)
+      notes.push_back(fmt::format(
+          "In {} of {} records the free motor reverses: dry friction, where there is any, is part of the response "
+          "then, "
+          "which is not that of inertia and spring alone and changes with the amplitude; add a mean velocity that "
+          "keeps one direction to see those.",
+          reversing, answer_.records.size()));
     std::vector<std::string> blind;
     for (std::size_t k = 0; k < experiments_.size(); ++k) {
       const bool welch = std::any_of(answer_.records[k].responses.begin(), answer_.records[k].responses.end(),

@@ -133,6 +133,8 @@ TEST(MeasuredPlant, WithDryFrictionHasOddDistortionAndWithAsymmetryEvenToo) {
   EXPECT_TRUE(odd.odd->significant);
   EXPECT_GT(odd.odd->level_db, -40.0);
   EXPECT_GT(odd.odd->level_db, odd.even->level_db + 15.0);
+  ASSERT_EQ(symmetric.notes.size(), 1u);
+  EXPECT_NE(symmetric.notes[0].find("reverses"), std::string::npos);
 
   physics.friction.coulomb_asymmetry = 0.003;
   const Measurement skewed = measure(record(physics, false, 0.05, 0.0, 34));
@@ -186,6 +188,7 @@ TEST(MeasuredPlant, ShowsItsPolesUnderAVelocityControllerThatKeepsItFromSticking
   ASSERT_EQ(found.size(), 2u);
   EXPECT_NEAR(found[0].frequency_hz, zero[0].first, 0.02 * zero[0].first);
   EXPECT_NEAR(found[1].frequency_hz, pole[0].first, 0.02 * pole[0].first);
+  EXPECT_TRUE(m.notes.empty());
   // The friction never changes its sign.
   EXPECT_FALSE(m.records[0].distortion.at(0).odd->significant);
   EXPECT_FALSE(m.records[0].distortion.at(0).even->significant);
