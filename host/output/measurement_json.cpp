@@ -1,5 +1,3 @@
-#include <fmt/format.h>
-
 #include <cmath>
 #include <nlohmann/json.hpp>
 #include <numbers>
@@ -63,13 +61,14 @@ json noise_json(const measurement::NoiseLevel& n) {
     bands.push_back({{"low_hz", json_number(band.low_hz)},
                      {"high_hz", json_number(band.high_hz)},
                      {"density", json_number(band.density)}});
-  return {{"signal", n.signal},
-          {"unit", n.unit},
-          {"noise_rms", json_number(n.rms)},
-          {"signal_rms", json_number(n.signal_rms)},
-          {"noise_from", n.from},
-          {"density_unit", fmt::format("({})^2/Hz", n.unit)},
-          {"bands", std::move(bands)}};
+  return {
+      {"signal", n.signal},
+      {"unit", n.unit},
+      {"noise_rms", json_number(n.rms)},
+      {"signal_rms", json_number(n.signal_rms)},
+      {"noise_from", n.from},
+      {"density_unit", n.unit.find_first_of("*/") == std::string::npos ? n.unit + "^2/Hz" : "(" + n.unit + ")^2/Hz"},
+      {"bands", std::move(bands)}};
 }
 
 json level_json(const std::optional<measurement::DistortionLevel>& level) {
