@@ -18,8 +18,9 @@ constexpr std::size_t kTableLines = 14;
 constexpr double kManyRecords = 3;
 
 std::string frequency_text(double hz, double std_hz) {
+  if (std_hz < 1e-5 * hz) return fmt::format("{:.6g} Hz", hz);
   // Two digits of the uncertainty.
-  const int decimals = std_hz > 0.0 ? std::clamp(1 - static_cast<int>(std::floor(std::log10(std_hz))), 0, 4) : 4;
+  const int decimals = std::clamp(1 - static_cast<int>(std::floor(std::log10(std_hz))), 0, 6);
   return fmt::format("{:.{}f} ± {:.{}f} Hz", hz, decimals, std_hz, decimals);
 }
 
