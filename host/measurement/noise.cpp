@@ -17,19 +17,6 @@ double mean_square(std::span<const double> x) {
   return sum / static_cast<double>(x.size());
 }
 
-// Least squares; takes two degrees of freedom.
-void take_out_line(std::vector<double>& x) {
-  const auto n = static_cast<double>(x.size());
-  const double middle = 0.5 * (n - 1.0);
-  double mean = 0.0, slope = 0.0;
-  for (std::size_t k = 0; k < x.size(); ++k) {
-    mean += x[k] / n;
-    slope += x[k] * (static_cast<double>(k) - middle);
-  }
-  slope *= 12.0 / (n * (n * n - 1.0));
-  for (std::size_t k = 0; k < x.size(); ++k) x[k] -= mean + slope * (static_cast<double>(k) - middle);
-}
-
 double rms_around_mean(std::span<const double> x) {
   double mean = 0.0;
   for (const double v : x) mean += v / static_cast<double>(x.size());

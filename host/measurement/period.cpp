@@ -116,6 +116,29 @@ std::vector<std::complex<double>> transform_of_any_size(std::span<const double> 
   return spectrum;
 }
 
+// How many of the periods, counted from the last one, remain after those in which the motion still settles: the first
+// differs from the second by twice what the second differs from the third. At least three do.
+std::size_t settled(const Experiment& e, const Period& period) {
+  for (const Column column :
+       {Column::motor_position, Column::motor_velocity, Column::output_position, Column::torque}) {
+    if (!e.has(column)) continue;
+    const Periods cut = periods_of(e[column], period);
+    std::vector<double> change;
+    for (std::size_t p = 1; p < cut.values.size(); ++p) {
+      std::vector<double> d = cut.values[p];
+      for (std::size_t k = 0; k < d.size(); ++k) d[k] -= cut.values[p - 1][k];
+      take_out_line(d);
+      double sum = 0.0;
+      for (const double v : d) sum += v * v;
+      change.push_back(sum);
+    }
+    std::size_t first = 0;
+    while (period.count - first > 3 && change[first] > 4.0 * change[first + 1]) ++first;
+    return period.count - first;
+  }
+  return period.count;
+}
+
 }  // namespace
 
 PeriodSearch find_period(const Experiment& e, std::optional<double> period_s) {
@@ -148,14 +171,27 @@ PeriodSearch find_period(const Experiment& e, std::optional<double> period_s) {
   p.samples = static_cast<std::size_t>(std::lround(found->exact_samples));
   p.from = found->from;
   p.count = static_cast<std::size_t>(periods);
-  p.first_left_out = p.count >= 3;
   // What is over at the end is better left out at the start, where the motion settles.
-  p.first = end - static_cast<std::size_t>(std::ceil(periods * found->exact_samples));
-  if (p.first_left_out) {
-    --p.count;
-    p.first = end - static_cast<std::size_t>(std::ceil(static_cast<double>(p.count) * found->exact_samples));
-  }
+  const auto keep = [&](std::size_t count) {
+    p.left_out += p.count - count;
+    p.count = count;
+    p.first = end - static_cast<std::size_t>(std::ceil(static_cast<double>(count) * found->exact_samples));
+  };
+  keep(p.count >= 3 ? p.count - 1 : p.count);
+  keep(settled(e, p));
   return {p, ""};
+}
+
+void take_out_line(std::vector<double>& x) {
+  const auto n = static_cast<double>(x.size());
+  const double middle = 0.5 * (n - 1.0);
+  double mean = 0.0, slope = 0.0;
+  for (std::size_t k = 0; k < x.size(); ++k) {
+    mean += x[k] / n;
+    slope += x[k] * (static_cast<double>(k) - middle);
+  }
+  slope *= 12.0 / (n * (n * n - 1.0));
+  for (std::size_t k = 0; k < x.size(); ++k) x[k] -= mean + slope * (static_cast<double>(k) - middle);
 }
 
 Periods periods_of(std::span<const double> signal, const Period& period) {

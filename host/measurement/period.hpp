@@ -14,11 +14,11 @@ namespace flexspline::measurement {
 
 struct Period {
   double exact_samples = 0.0;
-  std::size_t samples = 0;      // of one period, rounded
-  std::size_t first = 0;        // sample of the record at which the first period that counts begins
-  std::size_t count = 0;        // whole periods from there, at least two
-  bool first_left_out = false;  // one period before `first` lets the motion settle
-  std::string from;             // column that it was found in; "stated" where the user gave it
+  std::size_t samples = 0;   // of one period, rounded
+  std::size_t first = 0;     // sample of the record at which the first period that counts begins
+  std::size_t count = 0;     // whole periods from there, at least two
+  std::size_t left_out = 0;  // periods before `first`, in which the motion settles
+  std::string from;          // column that it was found in; "stated" where the user gave it
 
   // A whole number of samples: only then do lines fall where the Fourier transform of a period has them.
   bool is_whole() const { return exact_samples == static_cast<double>(samples); }
@@ -33,9 +33,13 @@ struct PeriodSearch {
 };
 
 // Looks at the longest segment: set points first, as they repeat exactly, then effort and motion, of which the one that
-// repeats best is taken. The first period is left out where at least three are there. With `period_s` nothing is
+// repeats best is taken. The first period is left out
+// where at least three are there, and more while the motion still settles and three remain. With `period_s` nothing is
 // searched for.
 PeriodSearch find_period(const data::Experiment& experiment, std::optional<double> period_s = std::nullopt);
+
+// Takes out the straight line of least squares, and with it two degrees of freedom.
+void take_out_line(std::vector<double>& signal);
 
 // The periods of a signal, one after the other. A period between samples is cut by cubic interpolation.
 struct Periods {

@@ -112,7 +112,7 @@ json period_json(const measurement::RecordMeasurement& r) {
   return {{"period_s", json_number(r.period->exact_samples * r.sample_s)},
           {"samples", json_number(r.period->exact_samples)},
           {"periods", r.period->count},
-          {"first_left_out", r.period->first_left_out},
+          {"periods_left_out", r.period->left_out},
           {"found_in", r.period->from}};
 }
 
