@@ -39,14 +39,16 @@ class Lines {
   // Sums of power where `per_line` is false, which is what harmonics of a sine are told by.
   DistortionLevel level(const std::vector<std::size_t>& detection, bool corrected, bool per_line) const {
     const auto periods = static_cast<double>(y_.count());
-    double power = 0.0, noise = 0.0;
+    double power = 0.0, noise = 0.0, squares = 0.0;
     for (const std::size_t k : detection) {
       const std::complex<double> g = corrected ? response_at(k) : 0.0;
       const auto of = [&](std::size_t p) { return y_[p][k] - g * x_[p][k]; };
       power += std::norm(y_.mean(k) - g * x_.mean(k)) * physical(k);
       double differences = 0.0;
       for (std::size_t p = 1; p < y_.count(); ++p) differences += std::norm(of(p) - of(p - 1));
-      noise += (0.5 * differences / ((periods - 1.0) * periods) + steps(k)) * physical(k);
+      const double own = (0.5 * differences / ((periods - 1.0) * periods) + steps(k)) * physical(k);
+      noise += own;
+      squares += own * own;
     }
     const auto lines = static_cast<double>(detection.size());
     const double over = per_line ? lines : 1.0;
@@ -57,10 +59,12 @@ class Lines {
     level.noise_db = decibel(noise / over / excited_power_);
     level.rms = std::sqrt(0.5 * distortion);
     if (noise > 0.0) {
+      // Noise is larger where the response is: lines count as far as they hold it (F. E. Satterthwaite, 1946).
       // Differences of neighbours share a period: two thirds of them count as independent.
-      const double of_noise = std::max(2.0, 2.0 * lines * (periods - 1.0) * (periods > 2.0 ? 2.0 / 3.0 : 1.0));
+      const double of_power = 2.0 * noise * noise / squares;
+      const double of_noise = of_power * (periods - 1.0) * (periods > 2.0 ? 2.0 / 3.0 : 1.0);
       level.p_value =
-          boost::math::cdf(boost::math::complement(boost::math::fisher_f(2.0 * lines, of_noise), power / noise));
+          boost::math::cdf(boost::math::complement(boost::math::fisher_f(of_power, of_noise), power / noise));
     } else if (power > 0.0) {
       level.p_value = 0.0;
     }
