@@ -51,6 +51,21 @@ TEST(Period, IsNotFoundInNoiseAndThenSaysWhy) {
   EXPECT_NE(long_one.why_not.find("two whole ones"), std::string::npos) << long_one.why_not;
 }
 
+TEST(Period, InWhichTheMotionSettlesIsLeftOut) {
+  data::Experiment e = multisine_record(1.5, 15000, 0.0);
+  e[Column::motor_velocity] = e[Column::current];
+  EXPECT_EQ(find_period(e).period->left_out, 1u);
+  // Still above the noise in the third of the ten periods.
+  for (std::size_t k = 0; k < e.size(); ++k) e[Column::motor_velocity][k] += 50.0 * std::exp(-e.time_s[k] / 0.8);
+  testing::add_noise(e[Column::motor_velocity], 0.02, 6);
+  const PeriodSearch search = find_period(e);
+  EXPECT_GE(search.period->left_out, 2u);
+  EXPECT_GE(search.period->count, 3u);
+  EXPECT_EQ(search.period->left_out + search.period->count, 10u);
+  const NoiseLevel level = noise_by_periods(testing::channel(e[Column::motor_velocity]), *search.period, kSample);
+  EXPECT_NEAR(level.rms, 0.02, 0.002);
+}
+
 TEST(Period, OfAnyLengthHasTheLinesOfItsCosines) {
   // Quick, odd, prime, and twice a prime.
   for (const std::size_t n : {1500u, 1501u, 10007u, 20014u}) {
