@@ -21,6 +21,7 @@ struct ScalarSystem {
   using Exponent = S;
   using Order = S;
   using State = S;
+  using Share = S;
   using Travel = S;
   struct Wave {
     S cosine;
@@ -31,6 +32,7 @@ struct ScalarSystem {
   static S step_gain(const S& p) { return p; }
   static S ratio_gain(const S& p) { return p; }
   static S value(const S& p) { return p; }
+  static S share(const S& p) { return p; }
   static S exponent(const S& p) { return p; }
   static S order(const S& p) { return p; }
   static S power(const S& p, const S& exponent) {
@@ -45,6 +47,7 @@ struct ScalarSystem {
   static S times(const S& a, const S& b) { return a * b; }
   static S scaled(const S& gain, const S& x) { return gain * x; }
   static S ratio(const S& gain, const S& x) { return gain * x; }
+  static S signal(const S& gain, const S& x) { return gain * x; }
   static S travel(const S& gain, const S& x) { return gain * x; }
   // Of a bound that nears nought the travel over it grows without end.
   static S over(const S& travel, const S& x) { return travel / (x < S(1e-12) ? S(1e-12) : x); }

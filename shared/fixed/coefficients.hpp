@@ -36,6 +36,13 @@ inline Value make_value(double x) {
   return {static_cast<std::int32_t>(
       nearest(scaled_by_power(x, kValueBits), 2147483647.0, "a value is not below 16 bases"))};
 }
+inline Share make_share(double x) {
+  if (!(x >= 0.0 && x <= 1.0)) {
+    Findings::note("a share is not between nought and one");
+    return {};
+  }
+  return {static_cast<std::uint64_t>(scaled_by_power(x, kShareBits) + 0.5)};
+}
 inline Exponent make_exponent(double x) {
   return {static_cast<std::int32_t>(
       nearest(scaled_by_power(x, kExponentBits), 2147483647.0, "an exponent is not between -8 and 8"))};

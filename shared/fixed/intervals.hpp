@@ -110,6 +110,7 @@ struct Intervals {
   };
   using StepGain = fixed::StepGain;
   using RatioGain = fixed::RatioGain;
+  using Share = fixed::Share;
   using Exponent = fixed::Exponent;
   using Order = fixed::Order;
   struct Wave {
@@ -121,6 +122,7 @@ struct Intervals {
   static StepGain step_gain(double x) { return make_step_gain(x); }
   static RatioGain ratio_gain(double x) { return make_ratio_gain(x); }
   static Value value(double x) { return exactly(Fixed::value(x)); }
+  static Share share(double x) { return make_share(x); }
   static Exponent exponent(double x) { return make_exponent(x); }
   static Order order(double radians_per_turn) { return make_order(radians_per_turn); }
   static double power(double x, double exponent) { return Fixed::power(x, exponent); }
@@ -159,6 +161,10 @@ struct Intervals {
   static Value magnitude(Value x) { return {least(x), most(x)}; }
   static State magnitude(State x) { return {least(x), most(x)}; }
   static Value clamp(Value x, Value limit) { return between(x, -limit, limit); }
+  static State clamp(State x, Value limit) {
+    const Fixed::Value most = detail::value_of(limit.high);
+    return {Fixed::clamp(detail::state_of(x.low), most).raw, Fixed::clamp(detail::state_of(x.high), most).raw};
+  }
   static Value between(Value x, Value low, Value high) {
     return {limited(x.low, low.low, high.low), limited(x.high, low.high, high.high)};
   }
@@ -170,6 +176,10 @@ struct Intervals {
     return {Fixed::sign(detail::value_of(x.low)).raw, Fixed::sign(detail::value_of(x.high)).raw};
   }
 
+  static State signal(const StepGain& g, Step) {
+    const std::int64_t most = g.mantissa == 0 ? 0 : 2 * kOne;
+    return {-most, most};
+  }
   static Travel travel(const StepGain& g, Step) { return {0, g.mantissa == 0 ? 0 : kLargestTravel}; }
   static Travel travel(const Gain& g, Value x) {
     return {Fixed::travel(Fixed::Gain{g}, detail::value_of(x.low)).raw,
@@ -198,6 +208,9 @@ struct Intervals {
     };
     return {smallest(corner(a.low, b.low), corner(a.low, b.high), corner(a.high, b.low), corner(a.high, b.high)),
             largest(corner(a.low, b.low), corner(a.low, b.high), corner(a.high, b.low), corner(a.high, b.high))};
+  }
+  static State times(State a, Share b) {
+    return {Fixed::times(detail::state_of(a.low), b).raw, Fixed::times(detail::state_of(a.high), b).raw};
   }
   // For a share between nought and one; the drive rounds towards the target.
   static State relax(State from, State target, State) { return hull(from, target); }

@@ -53,6 +53,7 @@ struct FixedSystem {
   using Angle = fixed::Angle;
   using Step = fixed::Step;
   using Sum = fixed::Sum;
+  using Share = fixed::Share;
   using Travel = fixed::Travel;
   using Ratio = fixed::Ratio;
   using StepGain = fixed::StepGain;
@@ -69,6 +70,7 @@ struct FixedSystem {
   static StepGain step_gain(double x) { return make_step_gain(x); }
   static RatioGain ratio_gain(double x) { return make_ratio_gain(x); }
   static Value value(double x) { return {make_value(x)}; }
+  static Share share(double x) { return make_share(x); }
   static Exponent exponent(double x) { return make_exponent(x); }
   static Order order(double radians_per_turn) { return make_order(radians_per_turn); }
   static double power(double x, double exponent) { return __builtin_pow(x, exponent); }
@@ -102,6 +104,12 @@ struct FixedSystem {
   static constexpr Value magnitude(Value x) { return x.raw < 0 ? -x : x; }
   static constexpr State magnitude(State x) { return x.raw < 0 ? -x : x; }
   static constexpr Value clamp(Value x, Value limit) { return {{limited(x.raw, (-limit).raw, limit.raw)}}; }
+  static constexpr State clamp(State x, Value limit) {
+    constexpr std::int32_t kEight = std::int32_t{1} << (kValueBits + 3);
+    if (limit.raw >= kEight) return x;
+    const std::int64_t most = shift_right(limit.raw, kValueBits - kStateBits);
+    return {{limited(x.raw, -most, most)}};
+  }
   static constexpr Value between(Value x, Value low, Value high) { return {{limited(x.raw, low.raw, high.raw)}}; }
   static constexpr State clamp_to_one(State x) { return {{limited(x.raw, -kOneState, kOneState)}}; }
   static constexpr State bounded(State x) { return {{limited(x.raw, -4 * kOneState, 4 * kOneState)}}; }
@@ -109,6 +117,14 @@ struct FixedSystem {
   static constexpr State sign(Step x) { return {{x.raw > 0 ? kOneState : x.raw < 0 ? -kOneState : 0}}; }
   static constexpr State sign(Value x) { return {{x.raw > 0 ? kOneState : x.raw < 0 ? -kOneState : 0}}; }
 
+  // Two, as every signal is limited to at entry: so the bound of a linear observer needs no trust in its input.
+  static constexpr State signal(StepGain g, Step x) {
+    const int up = g.exponent - (kMantissaBits + kAngleBits - kStateBits);
+    const std::int64_t whole = product(g, x.raw);  // below 2^61, which is two
+    if (up <= 0) return {{shift_right(whole, -up)}};
+    const std::int64_t most = 2 * kOneState >> up;
+    return {{limited(whole, -most, most) * (std::int64_t{1} << up)}};
+  }
   static constexpr Travel travel(StepGain g, Step x) {
     return limited_travel(shift_right(product(g, x.raw), kMantissaBits + kAngleBits - kTravelBits - g.exponent));
   }
@@ -146,6 +162,11 @@ struct FixedSystem {
     Policy::expect(fits, "a product of a state leaves its range");
     const std::uint64_t size = (p.high << (64 - kValueBits)) | (p.low >> kValueBits);
     return {{with_sign(fits ? size : kMost - 1, (a.raw < 0) != (b.raw < 0))}};
+  }
+  static constexpr State times(State a, Share b) {
+    const Product p = multiply(size_of(a.raw), b.raw);  // below 2^126
+    constexpr int kUp = 64 - kShareBits;
+    return {{with_sign(((p.high << kUp) | (p.low >> kShareBits)) + ((p.low >> (kShareBits - 1)) & 1), a.raw < 0)}};
   }
   // Rounds towards the target, so that it never leaves the hull of both.
   static constexpr State relax(State from, State target, State share) {

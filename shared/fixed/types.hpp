@@ -15,6 +15,7 @@ inline constexpr int kRatioBits = 44;
 inline constexpr int kMantissaBits = 30;
 inline constexpr int kExponentBits = 28;
 inline constexpr int kOrderBits = 48;
+inline constexpr int kShareBits = 63;
 
 // A signal, in bases.
 struct Value {
@@ -41,6 +42,10 @@ struct Sum {
 // Inner state and shares of it.
 struct State {
   std::int64_t raw = 0;
+};
+// What part of a state is kept or passed on, 0 to 1.
+struct Share {
+  std::uint64_t raw = 0;
 };
 // A distance over a characteristic length, from 0 to 31, where all functions of it have reached their limit.
 struct Travel {

@@ -1,0 +1,165 @@
+// Velocity and acceleration from the counts of an encoder, by a Kalman filter in its steady state (report sections 4.1
+// and 4.3, after Belanger): the shaft's acceleration wanders, driven by a jerk that is white noise, and rounding to
+// counts is a measurement noise of a twelfth of a count squared.
+//
+// All three states count in velocity bases: the position error times the corner frequency w, the velocity, and the
+// acceleration over w. So one format holds them whatever the corner is, and every coefficient is a share (a corner
+// above one radian a tick makes none, which derive() finds). The position itself is not a state: only the difference of
+// two readings enters, which wraps, and the position error carries over what was not used yet, so that no count is lost
+// however slow the motion.
+#pragma once
+
+#include "shared/effects/effect.hpp"
+#include "shared/observers/riccati.hpp"
+
+namespace flexspline::observers {
+
+// What the filter assumes of the motion and of the encoder; in the units of position of the motor (rad on a rotary
+// axis).
+template <class P>
+struct KalmanSetup {
+  P encoder_counts{};  // per motor turn, after quadrature
+  P jerk_density{};    // of the white jerk, (rad/s^3)^2/Hz: how fast accelerations are expected to change
+};
+
+// Host only: the variance of rounding to counts, rad^2.
+template <class P>
+P count_variance(const P& encoder_counts, const effects::DriveConstants<P>& d) {
+  const P count = P(6.283185307179586) / (encoder_counts * d.turn_angle_scale);
+  return count * count / P(12.0);
+}
+// Host only: the setup whose filter has the corner frequency (where its three poles lie, at 60 degrees from one
+// another) `corner_rad_s`: S = T r w^6.
+template <class P>
+KalmanSetup<P> setup_for_corner(const P& encoder_counts, const P& corner_rad_s, const effects::DriveConstants<P>& d) {
+  const P cube = corner_rad_s * corner_rad_s * corner_rad_s;
+  return {encoder_counts, d.time_base * count_variance(encoder_counts, d) * cube * cube};
+}
+
+// The gains of the filter for states scaled as above; they depend on the corner frequency times the tick alone.
+template <class P>
+struct KalmanGains {
+  P corner{};  // w T
+  P position{};
+  P velocity{};
+  P acceleration{};
+};
+// Host only. The model over one tick, with h = w T, and the covariances over w^2 times the count's variance.
+template <class P>
+KalmanGains<P> kalman_gains(const P& h) {
+  const P one(1.0), none(0.0), square = h * h;
+  const Matrix3<P> model{{{one, h, square / P(2.0)}, {none, one, h}, {none, none, one}}};
+  const Matrix3<P> noise{{{square * square * square / P(20.0), square * square * h / P(8.0), square * square / P(6.0)},
+                          {square * square * h / P(8.0), square * square / P(3.0), square * h / P(2.0)},
+                          {square * square / P(6.0), square * h / P(2.0), square}}};
+  const auto gain = steady_gain(steady_covariance(model, noise, one), one);
+  return {h, gain[0], gain[1], gain[2]};
+}
+
+struct EncoderKalman {
+  template <class N>
+  struct Coefficients {
+    typename N::StepGain per_step;
+    typename N::Share tick;       // h
+    typename N::Share half_tick;  // h/2
+    typename N::Share kept;       // one less the gain of the position
+    typename N::Share velocity;
+    typename N::Share acceleration;
+    typename N::Gain acceleration_scale;  // from velocity bases times w to acceleration bases
+  };
+  template <class N>
+  struct State {
+    typename N::Angle before{};
+    typename N::State position_error{};  // measured less estimated position after the last reading, times w
+    typename N::State velocity{};
+    typename N::State acceleration{};  // over w
+    bool started = false;
+  };
+  template <class N>
+  struct Estimate {
+    typename N::Value velocity{};
+    typename N::Value acceleration{};
+  };
+
+  // Host only. The drive's tick is `d.time_base`, in seconds.
+  template <class N, class P>
+  static Coefficients<N> derive(const KalmanSetup<P>& setup, const effects::DriveConstants<P>& d) {
+    const P variance = count_variance(setup.encoder_counts, d);
+    const P corner = N::power(setup.jerk_density / (variance * d.time_base), P(1.0 / 6.0));
+    return coefficients<N>(kalman_gains(corner * d.time_base), d);
+  }
+  // Host only: from gains that are known already.
+  template <class N, class P>
+  static Coefficients<N> coefficients(const KalmanGains<P>& g, const effects::DriveConstants<P>& d) {
+    return {N::step_gain(d.angle_base / (d.velocity_base * d.time_base)),
+            N::share(g.corner),
+            N::share(g.corner / P(2.0)),
+            N::share(P(1.0) - g.position),
+            N::share(g.velocity),
+            N::share(g.acceleration),
+            N::gain(g.corner / d.time_base * d.velocity_base / d.acceleration_base)};
+  }
+
+  // One tick: takes a reading and returns the estimates at the time of that reading, in bases. The first call only
+  // takes note of where the shaft stands.
+  template <class N>
+  static constexpr Estimate<N> update(State<N>& s, const Coefficients<N>& c, typename N::Angle reading) {
+    if (!s.started) s.before = reading;
+    s.started = true;
+    const auto travelled = N::signal(c.per_step, reading - s.before);
+    s.before = reading;
+    const auto expected = s.velocity + N::times(s.acceleration, c.half_tick);
+    // What the reading surprises by is `surprise`; what is left of it once the position took up its part is the error.
+    const auto surprise = s.position_error + N::times(travelled - expected, c.tick);
+    s.position_error = N::times(surprise, c.kept);
+    s.velocity = s.velocity + N::times(s.acceleration, c.tick) + N::times(surprise, c.velocity);
+    s.acceleration = s.acceleration + N::times(surprise, c.acceleration);
+    return {N::narrow(s.velocity), N::scaled(c.acceleration_scale, N::narrow(s.acceleration))};
+  }
+};
+
+// The largest magnitudes that the states and the sums on the way to them can reach, in velocity bases, for readings
+// that move by at most two bases a tick, which N::signal sees to; and whether all fit a state, which ends at eight.
+struct KalmanBounds {
+  double surprise = 0.0;
+  double velocity = 0.0;
+  double acceleration = 0.0;
+  double sums = 0.0;
+  bool fit = false;
+};
+// Host only. The filter is linear, so the bound is twice the sum of the magnitudes of its answer to one reading;
+// round-off (five roundings a tick of half of 2^-60) is such an input too, and far below the margin.
+inline KalmanBounds kalman_bounds(const KalmanGains<double>& g) {
+  constexpr double kEnvelope = 2.0, kMargin = 1e-6, kRange = 8.0;
+  constexpr double kTimeConstants = 100.0;  // the slowest poles decay with half the corner frequency
+  double error = 0.0, velocity = 0.0, acceleration = 0.0, travelled = 1.0;
+  KalmanBounds sum;
+  double expected_sum = 0.0, difference_sum = 0.0, predicted_sum = 0.0;
+  const long ticks = static_cast<long>(kTimeConstants / g.corner) + 100;
+  for (long k = 0; k < ticks; ++k) {
+    const double expected = velocity + acceleration * g.corner / 2.0;
+    const double surprise = error + (travelled - expected) * g.corner;
+    const double predicted = velocity + acceleration * g.corner;
+    error = surprise * (1.0 - g.position);
+    velocity = predicted + surprise * g.velocity;
+    acceleration += surprise * g.acceleration;
+    expected_sum += detail::size_of(expected);
+    difference_sum += detail::size_of(travelled - expected);
+    predicted_sum += detail::size_of(predicted);
+    sum.surprise += detail::size_of(surprise);
+    sum.velocity += detail::size_of(velocity);
+    sum.acceleration += detail::size_of(acceleration);
+    travelled = 0.0;
+  }
+  const auto bound = [](double x) { return kEnvelope * x + kMargin; };
+  sum.sums = 0.0;
+  for (const double x : {expected_sum, difference_sum, predicted_sum})
+    if (bound(x) > sum.sums) sum.sums = bound(x);
+  sum.surprise = bound(sum.surprise);
+  sum.velocity = bound(sum.velocity);
+  sum.acceleration = bound(sum.acceleration);
+  sum.fit = sum.surprise < kRange && sum.velocity < kRange && sum.acceleration < kRange && sum.sums < kRange;
+  return sum;
+}
+
+}  // namespace flexspline::observers

@@ -1,0 +1,81 @@
+// Takes torque ripple of a known order out of a torque signal (report section 5.3: a Kalman filter on a harmonic
+// oscillator). The oscillator's phase is the order times the motor's angle, so what is estimated is the mean of the
+// torque and the amplitudes of cosine and sine,
+//   torque = mean + a cos(phase) + b sin(phase),
+// all three as random walks per unit of travel: the filter is as narrow in orders at every speed, and stands still with
+// the shaft.
+#pragma once
+
+#include "shared/effects/effect.hpp"
+
+namespace flexspline::observers {
+
+template <class P>
+struct RippleSetup {
+  P order{};           // cycles per motor turn
+  P memory{};          // motor angle (rad on a rotary axis) after which 1/e of an old amplitude is left
+  P largest_ripple{};  // amplitude that cosine and sine are held to, N m at the output
+};
+
+struct RippleFilter {
+  template <class N>
+  struct Coefficients {
+    typename N::StepGain per_travel;
+    typename N::Order order;
+    typename N::Value largest;
+    typename N::Value mean_part;  // of what surprises, when all of it is taken up
+    typename N::Value wave_part;
+  };
+  template <class N>
+  struct State {
+    typename N::Angle before{};
+    typename N::State mean{};
+    typename N::State cosine{};
+    typename N::State sine{};
+    bool started = false;
+  };
+
+  // Host only. Torques are of the output side, as a torque sensor measures them.
+  template <class N, class P>
+  static Coefficients<N> derive(const RippleSetup<P>& setup, const effects::DriveConstants<P>& d) {
+    // Parts of 1/3, 2/3 and 2/3 make the whole step a projection, so that no surprise is ever taken up more than once:
+    // the estimates cannot swing up, whatever the order of the phases. On average over a turn an amplitude, and the
+    // mean, then follow with a third of the step.
+    const P part = P(1.0) / P(3.0);
+    return {N::step_gain(d.angle_base / (part * setup.memory)),
+            N::order(setup.order * d.turn_angle_scale * d.angle_base),
+            N::value(setup.largest_ripple / d.output_torque_base), N::value(part), N::value(part + part)};
+  }
+
+  // One tick: takes where the shaft stands and the torque there, within two bases, and returns the torque without the
+  // ripple. The first call only takes note of the angle and of the torque.
+  template <class N>
+  static constexpr typename N::Value update(State<N>& s, const Coefficients<N>& c, typename N::Angle angle,
+                                            typename N::Value torque) {
+    if (!s.started) {
+      s.before = angle;
+      s.mean = N::bounded(N::widen(torque));
+      s.started = true;
+    }
+    const typename N::Travel travel = N::travel(c.per_travel, N::magnitude(angle - s.before));
+    const typename N::State step = N::widen(N::one()) - N::exp_negative(travel);
+    s.before = angle;
+    const typename N::Wave wave = N::sincos(N::times_order(angle, c.order));
+    const auto surprise = torque - N::narrow(s.mean) - ripple<N>(s, wave);
+    // Random walks hold what they know without end, and would drift where the phase does not tell them apart: so each
+    // is held to its bound.
+    s.mean = N::bounded(s.mean + N::times(step, N::times(c.mean_part, surprise)));
+    const auto part = N::times(c.wave_part, surprise);
+    s.cosine = N::clamp(s.cosine + N::times(step, N::times(part, wave.cosine)), c.largest);
+    s.sine = N::clamp(s.sine + N::times(step, N::times(part, wave.sine)), c.largest);
+    return torque - ripple<N>(s, wave);
+  }
+
+ private:
+  template <class N>
+  static constexpr typename N::Value ripple(const State<N>& s, const typename N::Wave& wave) {
+    return N::times(N::narrow(s.cosine), wave.cosine) + N::times(N::narrow(s.sine), wave.sine);
+  }
+};
+
+}  // namespace flexspline::observers
