@@ -7,6 +7,8 @@
 
 #include "shared/fixed/system.hpp"
 #include "shared/model/drive_model.hpp"
+#include "shared/observers/encoder_kalman.hpp"
+#include "shared/observers/ripple_filter.hpp"
 
 namespace flexspline {
 namespace {
@@ -110,6 +112,39 @@ std::uint64_t hash_of(model::DriveModel<Fixed>& model, int ticks) {
   return hash.value();
 }
 
+// Gains that need no rounding, so that the host's floating point has no part in the bits.
+std::uint64_t hash_of_encoder_kalman(int ticks) {
+  using observers::EncoderKalman;
+  const auto c = EncoderKalman::coefficients<Fixed>(
+      observers::KalmanGains<double>{1.0 / 64.0, 1.0 / 32.0, 1.0 / 32.0, 1.0 / 64.0}, drive());
+  EncoderKalman::State<Fixed> state;
+  Random random;
+  Hash hash;
+  for (int k = 0; k < ticks; ++k) {
+    const auto now = EncoderKalman::update<Fixed>(state, c, {random.angle()});
+    hash.take(now.velocity.raw);
+    hash.take(now.acceleration.raw);
+    hash.take(state.position_error.raw);
+  }
+  return hash.value();
+}
+
+std::uint64_t hash_of_ripple_filter(int ticks) {
+  using observers::RippleFilter;
+  const auto c = RippleFilter::derive<Fixed>(
+      observers::RippleSetup<double>{.order = 2.0, .memory = 64.0, .largest_ripple = 10.0}, drive());
+  RippleFilter::State<Fixed> state;
+  Random random;
+  Hash hash;
+  for (int k = 0; k < ticks; ++k) {
+    const fixed::Angle angle{random.angle()};
+    hash.take(RippleFilter::update<Fixed>(state, c, angle, {{random.signal()}}).raw);
+    hash.take(state.cosine.raw);
+    hash.take(state.sine.raw);
+  }
+  return hash.value();
+}
+
 void print(std::string_view name, std::uint64_t hash) {
   std::printf("%.*s %016llx\n", static_cast<int>(name.size()), name.data(), static_cast<unsigned long long>(hash));
 }
@@ -134,5 +169,7 @@ int main() {
       print(Effect::kInfo.name, hash_of(one, 20'000));
     }
   });
+  print("encoder_kalman", hash_of_encoder_kalman(1'000'000));
+  print("ripple_filter", hash_of_ripple_filter(1'000'000));
   print("all", hash_of(all, 1'000'000));
 }

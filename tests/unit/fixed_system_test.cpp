@@ -39,6 +39,7 @@ static_assert(!std::is_convertible_v<Fixed::Value, Fixed::Sum>);
 static_assert(!std::is_convertible_v<Fixed::Angle, Fixed::Step>);
 static_assert(!std::is_convertible_v<Fixed::Gain, Fixed::RatioGain>);
 static_assert(!std::is_convertible_v<Fixed::Travel, Fixed::State>);
+static_assert(!std::is_convertible_v<Fixed::Share, Fixed::State>);
 
 TEST(FixedSystem, GainClampsItsInputSoThatNoSizeOfGainOverflows) {
   for (const double size : {0.0, 1e-9, 3e-4, 0.3, 1.0, 7.0, 900.0, 1e6}) {
@@ -74,6 +75,9 @@ TEST(FixedSystem, WhatDoesNotFitAFormatIsFoundWhenItIsMade) {
   EXPECT_TRUE(is_found([] { Fixed::gain(1e12); }));
   EXPECT_TRUE(is_found([] { Fixed::gain(HUGE_VAL); }));
   EXPECT_TRUE(is_found([] { Fixed::exponent(8.0); }));
+  EXPECT_TRUE(is_found([] { Fixed::share(1.0 + 1e-9); }));
+  EXPECT_TRUE(is_found([] { Fixed::share(-1e-9); }));
+  EXPECT_TRUE(is_found([] { Fixed::share(std::nan("")); }));
   EXPECT_TRUE(is_found([] { Fixed::order(1e6); }));
 }
 
@@ -92,6 +96,37 @@ TEST(FixedSystem, RelaxingNeverLeavesWhatLiesBetweenStateAndTarget) {
   }
   const Fixed::State all{{std::int64_t{1} << 60}};
   EXPECT_EQ(Fixed::relax(Fixed::State{{12345}}, Fixed::State{{-77}}, all).raw, 12345);
+}
+
+TEST(FixedSystem, AShareOfAStateIsExactToItsLastBit) {
+  std::mt19937_64 random(2);
+  for (int k = 0; k < 100'000; ++k) {
+    const Fixed::State x{{static_cast<std::int64_t>(random()) >> (random() % 63)}};
+    const double size = std::ldexp(static_cast<double>(random() >> 11), -53 - static_cast<int>(random() % 30));
+    const fixed::Share share = Fixed::share(size);
+    const long double exact = static_cast<long double>(x.raw) * ldexpl(static_cast<long double>(share.raw), -63);
+    ASSERT_LE(fabsl(static_cast<long double>(Fixed::times(x, share).raw) - exact), 0.5L + fabsl(exact) * 0x1p-62L);
+    ASSERT_LE(fabsl(ldexpl(static_cast<long double>(share.raw), -63) - static_cast<long double>(size)), 0x1p-63L);
+  }
+  for (const std::int64_t raw : {INT64_MIN, INT64_MIN + 1, std::int64_t{-1}, std::int64_t{0}, INT64_MAX})
+    EXPECT_EQ(Fixed::times(Fixed::State{{raw}}, Fixed::share(1.0)).raw, raw);
+  EXPECT_EQ(Fixed::times(Fixed::State{{INT64_MIN}}, Fixed::share(0.0)).raw, 0);
+}
+
+TEST(FixedSystem, AStepAsASignalIsExactAndEndsAtTwo) {
+  for (const double size : {0.0, 1e-3, 0.7, 3.9, 4.1, 500.0, 1e5, 3e6}) {
+    for (const double sign : {-1.0, 1.0}) {
+      const auto gain = Fixed::step_gain(sign * size);
+      for (const std::int64_t raw : {std::int64_t{0}, std::int64_t{1}, std::int64_t{-17}, std::int64_t{123'456},
+                                     std::int64_t{1} << 30, -(std::int64_t{1} << 30), INT64_MAX, INT64_MIN}) {
+        // A gain below four reaches half a turn first.
+        const double turns = std::clamp(std::ldexp(static_cast<double>(raw), -32), -0.5, 0.5);
+        const double expected = std::clamp(sign * size * turns, -2.0, 2.0);
+        EXPECT_NEAR(real(Fixed::signal(gain, {raw})), expected, 1e-9 * std::abs(expected) + std::ldexp(1.0, -60))
+            << size << " " << raw;
+      }
+    }
+  }
 }
 
 TEST(FixedSystem, AFractionalOrderKeepsItsPhaseOverAMillionTurns) {
@@ -229,6 +264,14 @@ TEST_F(IntervalsHold, EveryFunctionOfStatesAndTravels) {
     holds(Intervals::step(travels, a), Fixed::step(travel, x), "step");
     holds(Intervals::clamp_to_one(s), Fixed::clamp_to_one(state), "clamp_to_one");
     holds(Intervals::bounded(s), Fixed::bounded(state), "bounded");
+    const Fixed::Value limit = Fixed::magnitude(Fixed::Value{{static_cast<std::int32_t>(a.high)}});
+    holds(Intervals::clamp(s, {limit.raw, limit.raw}), Fixed::clamp(state, limit), "clamp");
+    ASSERT_LE(std::abs(Fixed::clamp(state, limit).raw), Fixed::widen(limit).raw);
+    const auto share = Fixed::share(std::ldexp(static_cast<double>(random_() >> 11), -53));
+    holds(Intervals::times(s, share), Fixed::times(state, share), "times share");
+    const auto step_gain = Fixed::step_gain(std::ldexp(static_cast<double>(draw(1 << 30)), -20));
+    const fixed::Step step{static_cast<std::int64_t>(random_()) >> (random_() % 63)};
+    holds(Intervals::signal(step_gain, {}), Fixed::signal(step_gain, step), "signal");
     holds(Intervals::exp_negative(travels), Fixed::exp_negative(travel), "exp_negative");
     holds(Intervals::q_exp_negative(travels, q), Fixed::q_exp_negative(travel, q), "q_exp_negative");
     holds(Intervals::exp_mean(travels), Fixed::exp_mean(travel), "exp_mean");
