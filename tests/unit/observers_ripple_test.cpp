@@ -184,7 +184,8 @@ TEST(RippleFilter, CannotGrowWhateverItIsGiven) {
   std::int64_t at = 0;
   for (int k = 0; k < 200'000; ++k) {
     // Jumps of any size, and torques that always push the same way.
-    at += static_cast<std::int64_t>(random()) >> (random() % 64);
+    const std::int64_t jump = static_cast<std::int64_t>(random()) >> (random() % 64);
+    at = static_cast<std::int64_t>(static_cast<std::uint64_t>(at) + static_cast<std::uint64_t>(jump));
     const double push =
         std::cos(kTurn * 2.0 * std::ldexp(static_cast<double>(at & 0xFFFFFFFF), -32)) > 0.0 ? 2.0 : -2.0;
     RippleFilter::update<Checked>(s, c, {at}, Checked::value(push));
