@@ -236,7 +236,7 @@ struct Comparison {
   double share = 1.0;
 };
 
-TEST(Section43EncoderVelocity, OnTheMotorTheKalmanFilterHasAThirdOfPlainDifferentiationsErrorAtItsDelay) {
+TEST(Section43, OnTheMotorTheKalmanFilterHasAThirdOfPlainDifferentiationsErrorAtItsDelay) {
   const Comparison comparison(kMotorSide);
   for (const Motion& motion : {sine(1.0, 100.0), sine(1.0, 1.0), triangle(100.0), triangle(1.0), constant(5.0),
                                constant(0.5), constant(0.05), constant(0.02)}) {
@@ -244,7 +244,7 @@ TEST(Section43EncoderVelocity, OnTheMotorTheKalmanFilterHasAThirdOfPlainDifferen
     EXPECT_LE(e.kalman, std::min(e.same_delay, e.moving_average) / 3.0) << motion.name;
   }
 }
-TEST(Section43EncoderVelocity, OnTheLoadTheKalmanFilterHasAThirdOfPlainDifferentiationsErrorAtItsDelay) {
+TEST(Section43, OnTheLoadTheKalmanFilterHasAThirdOfPlainDifferentiationsErrorAtItsDelay) {
   const Comparison comparison(kLoadSide);
   for (const Motion& motion :
        {sine(1.0, 1.0), sine(0.5, 0.2), triangle(1.0), triangle(0.2), constant(0.5), constant(0.05)}) {
@@ -256,7 +256,7 @@ TEST(Section43EncoderVelocity, OnTheLoadTheKalmanFilterHasAThirdOfPlainDifferent
 // Where counts come more slowly than the filter forgets them, each becomes a pulse of its own, in either filter: of
 // energy w for the filter of corner w (the integral of its answer squared), a/((2 - a) T) for the low-pass. Their ratio
 // is all that can be gained then, and at 15 Hz and 1 kHz it is less than nine.
-TEST(Section43EncoderVelocity, BelowACountPerMemoryAThirdIsOutOfReachAndTheRatioIsThatOfThePulsesEnergies) {
+TEST(Section43, BelowACountPerMemoryAThirdIsOutOfReachAndTheRatioIsThatOfThePulsesEnergies) {
   const Comparison comparison(kLoadSide);
   const Errors e = comparison.of(constant(0.005));
   const double corner = kTurn * kLoadSide.corner_hz;
