@@ -46,6 +46,7 @@ class App {
     add_diagnose();
     add_change<AddOptions>("add", "effect of the catalogue; torque_ripple:2 gives an order");
     add_change<RemoveOptions>("remove", "id of the effect in the model, or its type");
+    add_sensitivity();
     add_not_built();
     std::vector<std::string> to_come(not_built_yet().begin(), not_built_yet().end());
     app_.footer(output::wrapped(fmt::format("Not built yet: {}.", output::listed(to_come)), 0) +
@@ -257,6 +258,19 @@ class App {
     sub->add_option("--out", options->out, "the changed model")->required()->type_name("OUT");
     take_holdout(sub, options->data);
     take_report(sub, options->report);
+    take_pipeline(sub, options->pipeline);
+  }
+
+  void add_sensitivity() {
+    const auto [sub, options] = command<SensitivityOptions>("sensitivity");
+    take_data(sub, options->data);
+    take_model(sub, options->model);
+    sub->add_flag("--refit", options->refit,
+                  "estimate what is left anew each time: what the other effects cannot make good");
+    sub->add_option("--scale", options->scale, "scale a parameter, too; may be repeated")
+        ->type_name("EFFECT.PARAMETER=FACTOR")
+        ->allow_extra_args(false);
+    take_holdout(sub, options->data);
     take_pipeline(sub, options->pipeline);
   }
 

@@ -82,6 +82,16 @@ struct CompareOptions {
 };
 int run(const CompareOptions& options, Console& console);
 
+struct SensitivityOptions {
+  DataInputs data;
+  PipelineInputs pipeline;
+  std::filesystem::path model;
+  bool refit = false;
+  std::vector<std::string> scale;  // EFFECT.PARAMETER=FACTOR
+  std::string json;
+};
+int run(const SensitivityOptions& options, Console& console);
+
 struct DiagnoseOptions {
   DataInputs data;
   PipelineInputs pipeline;

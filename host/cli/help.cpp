@@ -105,11 +105,22 @@ const std::array kHelp = {
         "Takes an effect out, by its id or its type, estimates the rest anew and says what that does to the error, on "
         "the data that were fitted and on those held out.",
         {kMakeData, kAdd, "flexspline remove coulomb_asymmetry --model better.toml demo-out --out smaller.toml"}},
+    CommandHelp{
+        "sensitivity",
+        "what the model depends on: each effect left out or scaled in turn",
+        "Leaves each effect of the model out in turn, and scales the stiffness to a tenth and to ten times (and with "
+        "--scale any parameter), everything else as it is. Each of these models is judged as compare does: the torque "
+        "balances, and the free run with its amplitude and phase at the frequency of the motion. The largest growth of "
+        "an error comes first. What hardly changes anything need not be modelled, or these motions do not show it. "
+        "With "
+        "--refit the other parameters are estimated anew first: what they cannot make good is what the effect is for.",
+        {kMakeData, kIdentify,
+         "flexspline sensitivity --model fitted.toml demo-out --scale viscous_friction.coefficient=1.5"}},
 };
 
 constexpr auto kNotBuilt =
-    std::to_array<std::string_view>({"sensitivity", "plan", "pack", "unpack", "export", "drives", "record", "flash",
-                                     "backup", "restore", "monitor", "twin", "hil", "workbench"});
+    std::to_array<std::string_view>({"plan", "pack", "unpack", "export", "drives", "record", "flash", "backup",
+                                     "restore", "monitor", "twin", "hil", "workbench"});
 
 }  // namespace
 

@@ -6,7 +6,9 @@
 #include <cmath>
 #include <limits>
 #include <stdexcept>
+#include <utility>
 
+#include "host/comparison/free_run.hpp"
 #include "host/comparison/full_rate.hpp"
 #include "host/comparison/noise_floor.hpp"
 #include "host/comparison/row_variables.hpp"
@@ -35,19 +37,6 @@ const char* signal_name(Balance balance) {
   return balance == Balance::motor          ? "motor_balance"
          : balance == Balance::transmission ? "transmission_balance"
                                             : "load_balance";
-}
-
-void require_values(const model::Model& model) {
-  std::string missing;
-  for (const model::Effect& effect : model.effects)
-    for (const auto& info : catalogue::get(effect.type).parameters) {
-      const model::Parameter* p = effect.find(info.name);
-      if (!p || !p->value) missing += fmt::format("{}{}.{}", missing.empty() ? "" : ", ", effect.id, info.name);
-    }
-  if (!missing.empty())
-    throw model::ModelError(fmt::format(
-        "model \"{}\" cannot be compared: no value for {}; identify first, or write the values into the model file",
-        model.name, missing));
 }
 
 // All samples of one signal, over experiments.
@@ -232,27 +221,12 @@ class Comparer {
       result_.warnings.push_back(fmt::format("no free run: {}", unusable.what()));
       return;
     }
-    const Record& record = prepared_.records[i];
-    if (!run.motor_velocity.empty() && record.has_motor_motion) {
-      std::vector<double> measured(e.size());
-      for (std::size_t k = 0; k < e.size(); ++k) measured[k] = record.inputs[k].velocity;
-      // The measured velocity is filtered; the model's likewise, or reversals would differ for that alone.
-      const double sample_hz = 1.0 / e.sample_s;
-      const signals::ZeroPhaseFilter filter(signals::ZeroPhaseFilter::kDefaultOrder,
-                                            std::min(prepared_.pipeline.motion_cutoff_hz, 0.45 * sample_hz), sample_hz);
-      for (const data::Segment& s : record.segments)
-        filter.apply_in_place(std::span<double>(run.motor_velocity.data() + s.first, s.last - s.first));
-      add_free_run(i, "motor_velocity", measured, run.motor_velocity);
-    }
-    if (e.has(Column::motor_position)) add_free_run(i, "motor_position", e[Column::motor_position], run.motor_position);
-    if (e.has(Column::output_position) && e.load != data::Load::locked)
-      add_free_run(i, "output_position", e[Column::output_position], run.output_position);
-    if (e.has(Column::torque)) add_free_run(i, "torque", e[Column::torque], run.torque);
+    for (const FreeRunSignal& signal : free_run_signals(prepared_, i, std::move(run)))
+      add_free_run(i, signal.name, signal.measured, signal.simulated);
   }
 
-  void add_free_run(std::size_t i, const char* signal, const std::vector<double>& measured,
+  void add_free_run(std::size_t i, const std::string& signal, const std::vector<double>& measured,
                     const std::vector<double>& simulated) {
-    if (simulated.empty()) return;
     const Experiment& e = *all_[i];
     const Record& record = prepared_.records[i];
     Score score;
@@ -291,6 +265,19 @@ class Comparer {
 };
 
 }  // namespace
+
+void require_values(const model::Model& model) {
+  std::string missing;
+  for (const model::Effect& effect : model.effects)
+    for (const auto& info : catalogue::get(effect.type).parameters) {
+      const model::Parameter* p = effect.find(info.name);
+      if (!p || !p->value) missing += fmt::format("{}{}.{}", missing.empty() ? "" : ", ", effect.id, info.name);
+    }
+  if (!missing.empty())
+    throw model::ModelError(fmt::format(
+        "model \"{}\" cannot be compared: no value for {}; identify first, or write the values into the model file",
+        model.name, missing));
+}
 
 const SignalResult* Comparison::find_overall(std::string_view signal) const {
   for (const SignalResult& s : overall)

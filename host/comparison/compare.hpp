@@ -75,6 +75,9 @@ struct Comparison {
 Comparison compare(const data::Dataset& dataset, const model::Model& model, const regression::PipelineOptions& options,
                    const std::vector<blackbox::Specification>& beside = {});
 
+// Throws model::ModelError naming the parameters without a value, if there are any.
+void require_values(const model::Model& model);
+
 // "flexspline-compare/1". What is not known or not finite is null.
 nlohmann::json to_json(const Comparison& comparison);
 

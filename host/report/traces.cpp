@@ -2,17 +2,15 @@
 #include <cmath>
 #include <nlohmann/json.hpp>
 
+#include "host/comparison/free_run.hpp"
 #include "host/comparison/full_rate.hpp"
 #include "host/output/json.hpp"
 #include "host/report/parts.hpp"
 #include "host/report/trace.hpp"
-#include "host/signals/butterworth.hpp"
-#include "host/simulation/simulation.hpp"
 
 namespace flexspline::report {
 namespace {
 
-using data::Column;
 using nlohmann::json;
 using output::json_number;
 
@@ -55,49 +53,22 @@ json balance_trace(const View& view, const BalanceView& balance, std::size_t rec
   return trace;
 }
 
-struct FreeRunSignal {
-  const char* name;
-  Column column;
-  std::vector<double> simulation::FreeRun::*simulated;
-};
-constexpr FreeRunSignal kFreeRun[] = {
-    {"motor_velocity", Column::motor_velocity, &simulation::FreeRun::motor_velocity},
-    {"motor_position", Column::motor_position, &simulation::FreeRun::motor_position},
-    {"output_position", Column::output_position, &simulation::FreeRun::output_position},
-    {"torque", Column::torque, &simulation::FreeRun::torque},
-};
-
 json free_run_traces(const View& view, std::size_t record_at, std::size_t points) {
   json traces = json::array();
   const data::Experiment& e = view.dataset.experiments[record_at];
-  const regression::Record& record = view.prepared.records[record_at];
-  const bool compared = std::any_of(std::begin(kFreeRun), std::end(kFreeRun),
-                                    [&](const FreeRunSignal& s) { return view.result(record_at, s.name) != nullptr; });
   // What the comparison could not run is not run here either.
-  if (!compared) return traces;
-  simulation::FreeRun run = simulation::run(view.model, e);
-  const Thinning thinning(record.segments, points);
-  for (const FreeRunSignal& signal : kFreeRun) {
+  const auto& compared = view.comparison.experiments[record_at].signals;
+  if (std::all_of(compared.begin(), compared.end(), [](const auto& s) { return s.signal.ends_with("_balance"); }))
+    return traces;
+  const Thinning thinning(view.prepared.records[record_at].segments, points);
+  for (const comparison::FreeRunSignal& signal :
+       comparison::free_run_signals(view.prepared, record_at, simulation::run(view.model, e))) {
     if (!view.result(record_at, signal.name)) continue;
-    std::vector<double>& simulated = run.*signal.simulated;
-    std::vector<double> measured(e.size());
-    if (signal.column == Column::motor_velocity) {
-      // As the comparison has it: both filtered alike.
-      for (std::size_t k = 0; k < e.size(); ++k) measured[k] = record.inputs[k].velocity;
-      const double sample_hz = 1.0 / e.sample_s;
-      const signals::ZeroPhaseFilter filter(signals::ZeroPhaseFilter::kDefaultOrder,
-                                            std::min(view.prepared.pipeline.motion_cutoff_hz, 0.45 * sample_hz),
-                                            sample_hz);
-      for (const data::Segment& s : record.segments)
-        filter.apply_in_place(std::span<double>(simulated.data() + s.first, s.last - s.first));
-    } else {
-      measured = e[signal.column];
-    }
     traces.push_back({{"signal", signal.name},
                       {"unit", view.unit_of(signal.column)},
                       {"time", packed(thinning.times(e.time_s))},
-                      {"measured", packed(thinning.values(measured))},
-                      {"model", packed(thinning.values(simulated))}});
+                      {"measured", packed(thinning.values(signal.measured))},
+                      {"model", packed(thinning.values(signal.simulated))}});
   }
   return traces;
 }

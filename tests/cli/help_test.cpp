@@ -9,9 +9,9 @@ namespace flexspline::cli_test {
 namespace {
 
 constexpr const char* kBuilt[] = {"demo",     "new",     "check",    "effects", "measure", "identify",
-                                  "simulate", "compare", "diagnose", "add",     "remove"};
-constexpr const char* kToCome[] = {"sensitivity", "plan",   "pack",    "unpack",  "export", "drives", "record",
-                                   "flash",       "backup", "restore", "monitor", "twin",   "hil",    "workbench"};
+                                  "simulate", "compare", "diagnose", "add",     "remove",  "sensitivity"};
+constexpr const char* kToCome[] = {"plan",   "pack",    "unpack",  "export", "drives", "record",   "flash",
+                                   "backup", "restore", "monitor", "twin",   "hil",    "workbench"};
 
 std::vector<std::string> example_lines(const std::string& help) {
   std::vector<std::string> lines;
