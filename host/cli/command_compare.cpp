@@ -78,7 +78,8 @@ int run(const CompareOptions& options, Console& console) {
                   .model_name = options.model.string(),
                   .dataset = &dataset,
                   .model = file.model,
-                  .pipeline = options.pipeline.options()},
+                  .pipeline = options.pipeline.options(),
+                  .beside = beside},
                  console);
   output::save_json(options.json, comparison::to_json(comparison));
   bool all_kept = true;

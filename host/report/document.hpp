@@ -7,6 +7,7 @@
 #include <string>
 #include <vector>
 
+#include "host/blackbox/specification.hpp"
 #include "host/data/dataset.hpp"
 #include "host/diagnosis/add.hpp"
 #include "host/diagnosis/diagnosis.hpp"
@@ -24,6 +25,7 @@ struct Subject {
   model::Model model{};                  // that the page judges
   std::optional<model::Model> before{};  // without what was added
   regression::PipelineOptions pipeline{};
+  std::vector<blackbox::Specification> beside{};  // black boxes to stand beside `model`
   // Each only where the command has it.
   std::vector<regression::Estimate> estimates{};  // of `model`
   std::vector<diagnosis::Diagnosis> rounds{};     // the first of `before` where there is one

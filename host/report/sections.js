@@ -108,10 +108,10 @@ function freeRunTable() {
 }
 
 const kTimeNames = { x: "time (s)" };
-function timePlot(linked, names, colours, unit, data, { height, noise, nought, label, title, caption, dashes = [] }) {
+function timePlot(linked, names, colours, unit, data, { height, noise, nought, label, title, caption, half, bare, dashes = [] }) {
   return figure({
-    title, label, caption, height,
-    key: names.map((name, k) => ({ name, colour: colours[k], dash: dashes[k] })).concat(noise ? [{ name: "noise alone (±2 standard deviations)", colour: "noise", kind: "band" }] : []),
+    title, label, caption, height, half,
+    key: bare ? null : names.map((name, k) => ({ name, colour: colours[k], dash: dashes[k] })).concat(noise ? [{ name: "noise alone (±2 standard deviations)", colour: "noise", kind: "band" }] : []),
     make: (k, plot) => ({
       data,
       options: {
@@ -157,9 +157,7 @@ function fillExperiment(body, trace) {
 {
   const s = section("How good is the model?", "The model is asked for the torque that the measured motion takes, and that is compared with the torque that was measured, " +
     "balance by balance: at the motor, through the gear, at the load. What is left over is the error.");
-  const errors = errorTable(), runs = freeRunTable();
-  if (errors) s.append(errors);
-  if (runs) s.append(runs);
+  s.append(...[errorTable(), freeRunTable(), besideTable()].filter(Boolean));
   for (const warning of report.comparison.warnings) s.append(el("p", { class: "note" }, warning));
   const traces = new Map(report.traces.map((t) => [t.experiment, t]));
   const drawn = experiments.filter((e) => traces.has(e.name) && (traces.get(e.name).balances.length || traces.get(e.name).free_runs.length));
@@ -170,6 +168,7 @@ function fillExperiment(body, trace) {
       k === 0, (body) => fillExperiment(body, traces.get(e.name))));
   });
   if (drawn.length > 1) s.append(el("p", { class: "paper-only soft" }, `Only the experiments that were open on the screen are printed (${drawn.length} in all).`));
+  freeRunGallery(traces);
 }
 
 // ---- where it fails ----

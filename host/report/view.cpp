@@ -23,7 +23,7 @@ regression::Prepared prepared_as_compared(const data::Dataset& dataset, const mo
 View::View(const Subject& subject) : dataset(*subject.dataset), model(subject.model), model_before(subject.before) {
   std::vector<std::string> said_already;
   model.drive = regression::reconcile(model.drive, dataset, said_already);
-  comparison = comparison::compare(dataset, model, subject.pipeline);
+  comparison = comparison::compare(dataset, model, subject.pipeline, subject.beside);
   terms = regression::terms_of(model);
   if (model_before) {
     model_before->drive = model.drive;

@@ -64,6 +64,20 @@ TEST_F(Report, OfCompareHasTheNumbersOfItsJson) {
   EXPECT_EQ(document["comparison"]["experiments"], compared["experiments"]);
 }
 
+TEST_F(Report, OfCompareShowsSixteenFreeRunsAndBlackBoxesOnOnePage) {
+  shell_.must("flexspline compare --model fitted.toml demo-out --beside arx:4,4,1 --report all.html --json all.json");
+  const std::string page = shell_.file("all.html");
+  expect_loads_nothing(page);
+  EXPECT_LT(page.size(), 3'000'000u);
+  const nlohmann::json document = document_in(page);
+  ASSERT_EQ(document["traces"].size(), 16u);
+  for (const nlohmann::json& trace : document["traces"])
+    EXPECT_EQ(trace["free_runs"].size(), contains(trace["experiment"].get<std::string>(), "locked") ? 3u : 4u)
+        << trace["experiment"];
+  EXPECT_EQ(document["comparison"]["beside"].size(), 7u);
+  EXPECT_EQ(document["comparison"]["beside"], nlohmann::json::parse(shell_.file("all.json"))["beside"]);
+}
+
 TEST_F(Report, OfDiagnoseHoldsTheCandidates) {
   const nlohmann::json document =
       page_of("flexspline diagnose --model demo-out/base-model.toml demo-out --json d.json", "d.html");

@@ -66,7 +66,8 @@ Subject subject_of(const Case& c) {
           .data_name = "folder & <img src=x onerror=alert(1)>",
           .model_name = "model.toml",
           .dataset = &c.dataset,
-          .model = c.model};
+          .model = c.model,
+          .beside = {blackbox::parse_specification("arx:2,2,1")}};
 }
 
 // Made once: it takes some seconds under sanitizers.
@@ -126,7 +127,8 @@ TEST(ReportPage, StaysSmall) {
 }
 
 TEST(ReportDocument, NumbersAreThoseOfTheComparison) {
-  const comparison::Comparison truth = comparison::compare(the_case().dataset, the_case().model, {});
+  const comparison::Comparison truth =
+      comparison::compare(the_case().dataset, the_case().model, {}, subject_of(the_case()).beside);
   json expected = comparison::to_json(truth);
   expected.erase("regions");
   EXPECT_EQ(the_document()["comparison"], expected);
@@ -201,6 +203,58 @@ TEST(ReportDocument, FrictionIsTheSumOfItsPartsAndLeavesOutWhatIsNone) {
     EXPECT_NEAR(sum, friction["model"][b].get<double>(), 1e-12);
     EXPECT_GT(friction["velocity"][b].get<double>() * friction["measured"][b].get<double>(), 0.0);
   }
+}
+
+TEST(ReportDocument, EveryExperimentHasItsFreeRunBesideTheMeasurement) {
+  ASSERT_EQ(the_document()["traces"].size(), 2u);
+  for (std::size_t e = 0; e < 2; ++e) {
+    const json& trace = the_document()["traces"][e];
+    std::vector<std::string> names;
+    for (const json& run : trace["free_runs"]) {
+      names.push_back(run["signal"]);
+      const std::size_t points = run["time"]["count"];
+      EXPECT_GT(points, 300u);
+      EXPECT_LE(points, 1001u);
+      EXPECT_EQ(run["measured"]["count"], points);
+      EXPECT_EQ(run["model"]["count"], points);
+      if (run["signal"] != "motor_velocity") continue;  // hardly any noise, which thinning would favour
+      // What is drawn has the error that is told.
+      double error = 0.0;
+      for (std::size_t k = 0; k < points; ++k)
+        error += std::pow(decoded(run["measured"], k) - decoded(run["model"], k), 2.0) / static_cast<double>(points);
+      const json& signals = the_document()["comparison"]["experiments"][e]["signals"];
+      const auto told =
+          std::find_if(signals.begin(), signals.end(), [](const json& x) { return x["signal"] == "motor_velocity"; });
+      ASSERT_NE(told, signals.end());
+      EXPECT_NEAR(std::sqrt(error), (*told)["rmse"].get<double>(), 0.1 * (*told)["rmse"].get<double>());
+    }
+    for (const char* signal : {"motor_velocity", "torque"})
+      EXPECT_NE(std::find(names.begin(), names.end(), signal), names.end()) << trace["experiment"] << signal;
+  }
+}
+
+TEST(ReportDocument, BlackBoxesStandBesideTheModel) {
+  const json& beside = the_document()["comparison"]["beside"];
+  ASSERT_FALSE(beside.empty());
+  EXPECT_EQ(beside[0]["black_box"], "arx:2,2,1");
+  EXPECT_EQ(beside[0]["signal"], "motor_balance");
+  Subject without = subject_of(the_case());
+  without.beside.clear();
+  EXPECT_TRUE(document(without)["comparison"]["beside"].empty());
+}
+
+TEST(ReportPage, DrawsFreeRunsAndBlackBoxesBeforeWhatExplainsThem) {
+  // Functions of the page, and where they are called.
+  const std::string html = page(the_document());
+  EXPECT_EQ(count(html, "function freeRunGallery("), 1u);
+  EXPECT_EQ(count(html, "function besideTable("), 1u);
+  const std::size_t good = html.find("section(\"How good is the model?\"");
+  const std::size_t beside = html.find("besideTable()", good), runs = html.find("freeRunGallery(traces)", good);
+  const std::size_t fails = html.find("\"Where does it fail?\"", good);
+  EXPECT_LT(good, beside);
+  EXPECT_LT(beside, runs);
+  EXPECT_LT(runs, fails);
+  EXPECT_NE(fails, std::string::npos);
 }
 
 TEST(ReportDocument, LoadedRecordsDrawALoop) {
