@@ -24,10 +24,13 @@ constexpr std::size_t kSentences = 3;
 // Less growth, in shares of the signal, is not worth a line.
 constexpr double kTelling = 0.005;
 
-std::string signal_name(const SignalError& s) {
+std::string name_of(const SignalError& s) {
   std::string name = s.signal;
   std::replace(name.begin(), name.end(), '_', ' ');
-  return s.load.empty() ? name : name + ", " + s.load;
+  return name;
+}
+std::string signal_name(const SignalError& s) {
+  return s.load.empty() ? name_of(s) : name_of(s) + ", " + s.load;
 }
 
 std::string error_text(const SignalError& s) {
@@ -86,17 +89,17 @@ std::string table_of(const Sensitivity& answer, std::vector<std::string>& nothin
   return table.text(0);
 }
 
-// "leaving out coulomb_friction: motor velocity, free: error 3.1 -> 14.2 rad/s, amplitude +12 %, phase -4.0 deg".
+// "leaving out coulomb_friction: free motor velocity error 3.1 -> 14.2 rad/s, amplitude +12 %, phase -4.0 deg".
 // What moves otherwise is easier to see than what a balance lacks.
 std::string sentence(const Sensitivity& answer, const Variant& variant) {
   const std::vector<const SignalError*> signals = telling(variant);
   if (signals.empty()) return {};
   const auto moving = std::find_if(signals.begin(), signals.end(), [](auto* s) { return !s->is_balance(); });
   const SignalError& s = moving == signals.end() ? *signals.front() : **moving;
-  std::string text =
-      fmt::format("{}: {}: error {} -> {} {}",
-                  variant.change->leaves_out() ? "leaving out " + variant.change->effect : "with " + variant.label(),
-                  signal_name(s), error_text(*answer.full.find(s.signal, s.load)), error_text(s), s.unit);
+  std::string text = fmt::format(
+      "{}: {}{}{} error {} -> {} {}",
+      variant.change->leaves_out() ? "leaving out " + variant.change->effect : "with " + variant.label(), s.load,
+      s.load.empty() ? "" : " ", name_of(s), error_text(*answer.full.find(s.signal, s.load)), error_text(s), s.unit);
   if (std::isfinite(s.response.amplitude_ratio))
     text += fmt::format(", amplitude {}, phase {}", amplitude_text(s), phase_text(s));
   return text;
@@ -111,7 +114,7 @@ void print(const Sensitivity& answer, Console& console) {
     if (std::find(said.begin(), said.end(), variant.change->effect) != said.end()) continue;
     const std::string text = sentence(answer, variant);
     if (text.empty()) continue;
-    console.line(output::wrapped(text, 2, 2));
+    console.line("  " + text);
     said.push_back(variant.change->effect);
   }
   console.line();
