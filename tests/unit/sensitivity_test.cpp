@@ -226,6 +226,24 @@ TEST(Sensitivity, OverExperimentsOneGainFitsAllSines) {
   EXPECT_EQ(v.find("motor_velocity", "free")->most_in, motor_data({1.0}).experiments[0].name);
 }
 
+TEST(Sensitivity, AModelThatDivergesComesFirstAndHasNoError) {
+  model::Model model = motor_model();
+  model.effects.push_back(catalogue::blank_effect(catalogue::get("viscous_asymmetry"), data::Axis::rotary));
+  model.effects.back().parameters[0].value = 1e-9;
+  // Friction that drives the motor in one direction, and soon without bound.
+  const Sensitivity answer =
+      analyse(motor_data({2.0}), model, {.pipeline = kPipeline, .more = {{"viscous_asymmetry", "coefficient", 1e7}}});
+  const Variant& worst = answer.variants.front();
+  EXPECT_EQ(worst.label(), "viscous_asymmetry.coefficient x 1e+07");
+  EXPECT_TRUE(std::isinf(worst.growth));
+  EXPECT_TRUE(std::isnan(worst.find("motor_velocity", "free")->rmse));
+  EXPECT_TRUE(std::isnan(worst.find("motor_velocity", "free")->response.amplitude_ratio));
+  EXPECT_TRUE(std::isfinite(worst.find("motor_balance")->rmse));
+  const nlohmann::json json = to_json(answer)["variants"][0];
+  EXPECT_TRUE(json["growth"].is_null());
+  EXPECT_TRUE(json["overall"][1]["rmse"].is_null());
+}
+
 TEST(Sensitivity, RefittingMakesGoodWhatItCan) {
   // A model that is wrong by a factor of two is refitted first, and a scaled parameter stays where it was put.
   constexpr double f = 2.0;
