@@ -206,10 +206,30 @@ class App {
     sub->add_option("--out", options->out, "the model with the values in it (default: print only)")->type_name("MODEL");
     sub->add_option(
            "--method", options->method,
-           "ls: least squares; nls: with a search for shape parameters (default: what the model needs); iv, oe: "
-           "not built yet")
-        ->check(CLI::IsMember({"ls", "nls", "iv", "oe"}))
+           "ls: least squares; nls: with a search for shape parameters; partitioned: linear parameters first, then the "
+           "others; iv: instrumental variables, for noisy velocities; oe: least error of the free run (default: ls or "
+           "nls, as the model needs)")
+        ->check(CLI::IsMember({"ls", "nls", "partitioned", "iv", "oe"}))
         ->type_name("");
+    sub->add_option(
+           "--intervals", options->intervals,
+           "standard; profile: where the best fit of all others gets significantly worse; bootstrap: from rows "
+           "drawn again (ls and nls)")
+        ->check(CLI::IsMember({"standard", "profile", "bootstrap"}))
+        ->capture_default_str()
+        ->type_name("");
+    sub->add_option(
+           "--supply", options->supply,
+           "a parameter that you know another way, in its SI unit, as inertia.inertia=1.07e-4; may be repeated")
+        ->type_name("EFFECT.PARAMETER=VALUE")
+        ->allow_extra_args(false);
+    sub->add_option("--starts", options->starts, "starts of the search for shape parameters")
+        ->check(CLI::Range(1, 100))
+        ->capture_default_str()
+        ->type_name("N");
+    sub->add_option("--seed", options->seed, "of the random starts and of the bootstrap")
+        ->capture_default_str()
+        ->type_name("N");
     take_holdout(sub, options->data);
     take_report(sub, options->report);
     take_pipeline(sub, options->pipeline);

@@ -1,34 +1,46 @@
 #include <fmt/format.h>
 
-#include <algorithm>
+#include <cmath>
+#include <memory>
 #include <nlohmann/json.hpp>
+#include <stdexcept>
 
 #include "host/cli/commands.hpp"
 #include "host/cli/report_option.hpp"
+#include "host/estimation/estimate.hpp"
 #include "host/output/identification.hpp"
 #include "host/output/json.hpp"
 #include "host/output/text.hpp"
-#include "host/regression/identify.hpp"
 
 namespace flexspline::cli {
 namespace {
 
-bool has_free_shapes(const model::Model& model) {
-  for (const regression::Term& term : regression::terms_of(model))
-    for (std::size_t p = 0; p < term.values.size(); ++p)
-      if (term.free_shape(p)) return true;
-  return false;
+// "inertia.inertia=1.07e-4"
+estimation::Supplied supplied_from(const std::string& text) {
+  const std::size_t equals = text.find('=');
+  const std::size_t dot = text.rfind('.', equals);
+  std::size_t used = 0;
+  double value = 0.0;
+  try {
+    if (equals != std::string::npos) value = std::stod(text.substr(equals + 1), &used);
+  } catch (const std::logic_error&) {
+    used = 0;
+  }
+  if (equals == std::string::npos || dot == std::string::npos || used == 0 || equals + 1 + used != text.size() ||
+      !std::isfinite(value))
+    throw UsageError(fmt::format("--supply {} is not EFFECT.PARAMETER=VALUE, as inertia.inertia=1.07e-4", text));
+  return {text.substr(0, dot), text.substr(dot + 1, equals - dot - 1), value};
 }
 
-std::string method_of(const IdentifyOptions& options, const model::Model& model) {
-  const bool shapes = has_free_shapes(model);
-  if (options.method == "ls" && shapes)
-    throw UsageError(
-        "the model has shape parameters, which least squares alone does not find; give --method nls, or state them "
-        "with fixed = true");
-  if (options.method == "iv" || options.method == "oe")
-    throw UsageError(fmt::format("--method {} is not built yet; use ls or nls", options.method));
-  return options.method.empty() ? (shapes ? "nls" : "ls") : options.method;
+estimation::Options options_from(const IdentifyOptions& options, Console& console) {
+  estimation::Options how;
+  how.method = estimation::method_from_name(options.method);
+  how.intervals = estimation::intervals_from_name(options.intervals);
+  for (const std::string& text : options.supply) how.supplied.push_back(supplied_from(text));
+  how.starts = options.starts;
+  how.seed = options.seed;
+  how.progress = [&console](std::string_view what) { console.progress(std::string(what)); };
+  return how;
 }
 
 }  // namespace
@@ -36,10 +48,17 @@ std::string method_of(const IdentifyOptions& options, const model::Model& model)
 int run(const IdentifyOptions& options, Console& console) {
   require_report_place(options.report);
   const model::ModelFile file = load_model(options.model);
-  const std::string method = method_of(options, file.model);
+  const estimation::Options how = options_from(options, console);
+  model::Model known = file.model;
+  std::unique_ptr<regression::Identification> found;
   const data::Dataset dataset = load(options.data, console);
   console.progress("estimating the parameters");
-  const auto found = regression::identify(dataset, file.model, options.pipeline.options());
+  try {
+    for (const estimation::Supplied& supplied : how.supplied) estimation::supply(known, supplied);
+    found = estimation::estimate(dataset, known, options.pipeline.options(), how);
+  } catch (const std::invalid_argument& unsuitable) {
+    throw UsageError(unsuitable.what());
+  }
   for (const std::string& warning : found->warnings) console.warn(warning);
   console.line(output::identification_text(*found));
 
@@ -48,7 +67,7 @@ int run(const IdentifyOptions& options, Console& console) {
     console.line("No file was written: --out MODEL writes the model with these values.");
   } else {
     // What only the data set knows of the drive stays there: the file keeps what its author wrote.
-    model::Model changed = file.model;
+    model::Model changed = known;
     regression::store(changed, found->estimates);
     model::save(options.out, model::rewrite(file, changed));
     console.line();
@@ -67,7 +86,9 @@ int run(const IdentifyOptions& options, Console& console) {
                   .pipeline = options.pipeline.options(),
                   .estimates = found->estimates},
                  console);
-  output::save_json(options.json, output::identification_json(*found, method));
+  const auto used = how.method == estimation::Method::automatic ? estimation::method_for(known) : how.method;
+  output::save_json(options.json,
+                    output::identification_json(*found, std::string(estimation::name_of(used)), options.intervals));
   return kDone;
 }
 

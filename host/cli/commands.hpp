@@ -58,6 +58,10 @@ struct IdentifyOptions {
   std::filesystem::path model;
   std::filesystem::path out;     // empty: print only
   std::string method;            // empty: what the model needs
+  std::string intervals = "standard";
+  std::vector<std::string> supply;  // EFFECT.PARAMETER=VALUE
+  int starts = 3;
+  std::uint64_t seed = 1;
   std::filesystem::path report;  // empty: none
   std::string json;
 };

@@ -74,11 +74,13 @@ std::string by_experiment(const regression::Identification& found) {
 }
 
 std::string pooled(const regression::Identification& found) {
-  Table table({"all together", "value", "95 % interval", "", "unit", ""}, "lrrrll");
+  Table table({"all together", "value", "95 % interval", "", "unit", "excited", ""}, "lrrrlrl");
   for (const Estimate& e : found.estimates)
     table.row({label(e), number(e.value, kDigits), number(e.low, kDigits), number(e.high, kDigits), e.unit,
-               e.identifiable ? "" : "these data cannot tell it"});
-  return table.text();
+               e.excitation ? fmt::format("{:.3g} %", 100.0 * *e.excitation) : "",
+               e.identifiable ? (e.fixed ? "known" : "") : "these data cannot tell it"});
+  return table.text() +
+         "\n  excited: the share of a parameter's effect on these data that no other parameter can stand in for";
 }
 
 std::string errors(const regression::Identification& found) {
@@ -152,7 +154,8 @@ std::string identification_text(const regression::Identification& found) {
   return text + "\n\n" + errors(found) + "\n\n" + wrapped(pipeline_text(found.prepared));
 }
 
-json identification_json(const regression::Identification& found, const std::string& method) {
+json identification_json(const regression::Identification& found, const std::string& method,
+                         const std::string& intervals) {
   json parameters = json::array();
   for (const Estimate& e : found.estimates) {
     json parameter = json_parameter(e);
@@ -160,6 +163,7 @@ json identification_json(const regression::Identification& found, const std::str
     parameter["spread_percent"] = json_number(e.spread_percent);
     parameter["reliable"] = e.reliable;
     parameter["identifiable"] = e.identifiable;
+    parameter["excitation"] = json_number(e.excitation);
     json per_experiment = json::array();
     for (const auto& [name, value] : e.per_experiment)
       per_experiment.push_back({{"name", name}, {"value", json_number(value)}});
@@ -179,6 +183,7 @@ json identification_json(const regression::Identification& found, const std::str
   const regression::Pipeline& p = found.prepared.pipeline;
   return {{"format", "flexspline-identify/1"},
           {"method", method},
+          {"intervals", intervals},
           {"cutoff_hz", json_number(p.row_cutoff_hz)},
           {"motion_cutoff_hz", json_number(p.motion_cutoff_hz)},
           {"cutoff_reason", p.reason},

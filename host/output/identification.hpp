@@ -15,8 +15,9 @@ std::string pipeline_text(const regression::Prepared& prepared);
 // the balances.
 std::string identification_text(const regression::Identification& found);
 
-// "flexspline-identify/1"; `method`: ls or nls.
-nlohmann::json identification_json(const regression::Identification& found, const std::string& method);
+// "flexspline-identify/1"; `method` and `intervals` by their names: nls, profile.
+nlohmann::json identification_json(const regression::Identification& found, const std::string& method,
+                                   const std::string& intervals);
 
 // "N*m", or "N" on a linear axis.
 std::string torque_unit(data::Axis axis);

@@ -25,6 +25,9 @@ struct Estimate {
   bool reliable = true;                  // spread not above the report's 30 %
   bool identifiable = true;
   bool fixed = false;
+  // Persistent excitation, by parameter (report 3.1): the share of its effect on the data, 0 to 1, that no other
+  // parameter can stand in for.
+  std::optional<double> excitation;
   std::vector<std::pair<std::string, std::optional<double>>> per_experiment;
 };
 
@@ -37,9 +40,10 @@ struct Derived {
 
 struct Identification {
   Prepared prepared;
-  Terms terms;                    // with values
-  std::vector<BalanceData> data;  // the balances that could be formed
-  std::vector<BalanceFit> fits;   // one each
+  Terms terms;                          // with values
+  std::vector<BalanceData> data;        // the balances that could be formed
+  std::vector<BalanceFit> fits;         // one each
+  std::vector<std::vector<Slot>> held;  // on each, parameters that are held at a bound
   std::vector<Estimate> estimates;
   std::vector<Derived> derived;
   double condition_number = 0.0;
@@ -51,6 +55,13 @@ struct Identification {
 // nothing to fit on.
 std::unique_ptr<Identification> identify(const data::Dataset& dataset, const model::Model& model,
                                          const PipelineOptions& options);
+
+// Its three steps, for other estimators to come between: balances from the data; their fit; estimates, tables and
+// warnings from the fits and the values in `terms`.
+std::unique_ptr<Identification> form(const data::Dataset& dataset, const model::Model& model,
+                                     const PipelineOptions& options);
+void fit(Identification& identification);
+void assemble(Identification& identification);
 
 // Where data set and model differ in what they know of the drive by more than 0.1 %: the model wins, with a warning.
 // What only the data set knows is filled in.

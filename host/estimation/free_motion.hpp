@@ -1,0 +1,25 @@
+// The data as the model alone would have made them: the measured effort, and the motion and torque of its free run.
+#pragma once
+
+#include <vector>
+
+#include "host/regression/identify.hpp"
+
+namespace flexspline::estimation {
+
+using regression::Identification;
+
+// The model of an identification with the values of its terms.
+model::Model model_with_values(const Identification& identification);
+
+// Every record again, with motion and torque of the free run, made ready by the same pipeline with the same rows. A
+// record that cannot be simulated or diverges keeps what was measured and is not marked. Records run on all cores; the
+// result does not depend on their number.
+struct FreeMotion {
+  std::vector<data::Experiment> experiments;
+  regression::Prepared prepared;
+  std::vector<std::uint8_t> simulated;  // by record
+};
+FreeMotion free_motion(const Identification& identification);
+
+}  // namespace flexspline::estimation

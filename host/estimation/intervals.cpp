@@ -1,0 +1,164 @@
+#include "host/estimation/intervals.hpp"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cmath>
+#include <random>
+
+#include "host/regression/least_squares.hpp"
+#include "host/regression/shapes.hpp"
+
+namespace flexspline::estimation {
+namespace {
+
+using regression::BalanceData;
+using regression::BalanceFit;
+using regression::Estimate;
+using regression::RowRange;
+using regression::Slot;
+using regression::Terms;
+
+constexpr double kLikelihoodRatio = 3.84;  // 95 % point of chi-square with one degree of freedom
+
+Estimate* estimate_of(Identification& identification, const Slot& slot) {
+  for (Estimate& e : identification.estimates)
+    if (e.slot == slot && !e.fixed) return &e;
+  return nullptr;
+}
+
+double natural(const Terms& terms, const Slot& slot) {
+  const regression::Term& term = terms[slot.term];
+  return catalogue::natural(*term.entry, term.values)[slot.parameter];
+}
+
+// Fits all that is free on the balance at these weights, from where the terms stand, and returns the weighted sum of
+// squares.
+double fit_rest(BalanceData& data, Terms& terms, const std::vector<std::size_t>& on_balance,
+                const Eigen::VectorXd& root_weights) {
+  regression::refine_shapes(data, terms, on_balance, root_weights);
+  const std::vector<Slot> linear = regression::free_linear_slots(terms, on_balance);
+  const regression::LinearFit fit = regression::least_squares(
+      regression::columns_of(data, terms, linear), data.target() - data.known_torque(terms, on_balance), root_weights);
+  for (std::size_t j = 0; j < linear.size(); ++j)
+    terms[linear[j].term].values[linear[j].parameter] = fit.theta[static_cast<Eigen::Index>(j)];
+  return root_weights.cwiseProduct(fit.residual).squaredNorm();
+}
+
+// The value of one parameter at which the sum of squares, with all others fitted, has grown by `allowed`; `side` -1
+// or 1.
+std::optional<double> end_of_profile(BalanceData& data, const Terms& best, const BalanceFit& fit, const Slot& slot,
+                                     double step, double low, double high, double least, double allowed, int side) {
+  const double start = best[slot.term].values[slot.parameter];
+  Terms terms = best;
+  terms[slot.term].known[slot.parameter] = 1;
+  const auto excess_at = [&](double value) {
+    terms[slot.term].values[slot.parameter] = value;
+    return fit_rest(data, terms, fit.on_balance, fit.root_weights) - least - allowed;
+  };
+  // Outward in growing steps, then by halving.
+  double inside = start, outside = start;
+  bool found = false;
+  for (int k = 0; k < 8 && !found; ++k, step *= 2.0) {
+    outside = std::clamp(inside + side * step, low, high);
+    if (outside == inside) return std::nullopt;
+    found = excess_at(outside) > 0.0;
+    if (!found) inside = outside;
+  }
+  if (!found) return std::nullopt;
+  for (int k = 0; k < 7; ++k) {
+    const double middle = 0.5 * (inside + outside);
+    (excess_at(middle) > 0.0 ? outside : inside) = middle;
+  }
+  terms[slot.term].values[slot.parameter] = 0.5 * (inside + outside);
+  fit_rest(data, terms, fit.on_balance, fit.root_weights);
+  return natural(terms, slot);
+}
+
+std::vector<Slot> slots_of(const BalanceFit& fit) {
+  std::vector<Slot> slots = fit.linear;
+  slots.insert(slots.end(), fit.shapes.begin(), fit.shapes.end());
+  return slots;
+}
+
+}  // namespace
+
+void profile(Identification& identification, const Progress& progress) {
+  for (std::size_t b = 0; b < identification.fits.size(); ++b) {
+    const BalanceFit& fit = identification.fits[b];
+    BalanceData& data = identification.data[b];
+    Terms best = identification.terms;
+    const double least = fit_rest(data, best, fit.on_balance, fit.root_weights);
+    const auto slots = slots_of(fit);
+    const double freedom = std::max(1.0, static_cast<double>(data.rows()) - static_cast<double>(slots.size()));
+    const double allowed = kLikelihoodRatio * least / freedom * fit.autocorrelation_time;
+    for (std::size_t j = 0; j < slots.size(); ++j) {
+      Estimate* estimate = estimate_of(identification, slots[j]);
+      const double variance = fit.covariance(static_cast<Eigen::Index>(j), static_cast<Eigen::Index>(j));
+      if (!estimate || !estimate->identifiable || !std::isfinite(variance)) continue;
+      const regression::Term& term = best[slots[j].term];
+      progress(fmt::format("profile of {}.{}", term.id, term.entry->parameters[slots[j].parameter].name));
+      double low = term.entry->parameters[slots[j].parameter].low;
+      double high = term.entry->parameters[slots[j].parameter].high;
+      if (j >= fit.linear.size()) {
+        const regression::ShapeRange range = regression::shape_range(data, term, slots[j].parameter);
+        low = range.low;
+        high = range.high;
+      }
+      const double step = std::max(std::sqrt(variance), 1e-9 * std::abs(estimate->value));
+      const auto a = end_of_profile(data, best, fit, slots[j], step, low, high, least, allowed, -1);
+      const auto b_end = end_of_profile(data, best, fit, slots[j], step, low, high, least, allowed, 1);
+      estimate->low = a;
+      estimate->high = b_end;
+      if (a && b_end && *a > *b_end) std::swap(estimate->low, estimate->high);
+      if (!a || !b_end)
+        identification.warnings.push_back(fmt::format("{}.{}: the data give no {} bound within its range; record {}",
+                                                      term.id, term.entry->parameters[slots[j].parameter].name,
+                                                      !a && !b_end ? ""
+                                                      : !a         ? "lower"
+                                                                   : "upper",
+                                                      term.entry->info->separated_by));
+    }
+  }
+}
+
+void bootstrap(Identification& identification, int replicates, std::uint64_t seed, const Progress& progress) {
+  std::mt19937_64 random(seed);
+  for (std::size_t b = 0; b < identification.fits.size(); ++b) {
+    const BalanceFit& fit = identification.fits[b];
+    BalanceData& data = identification.data[b];
+    const auto slots = slots_of(fit);
+    if (slots.empty()) continue;
+    // Blocks are long against what neighbours have in common, and there are at least twenty.
+    const auto rows = static_cast<double>(data.rows());
+    const auto length = static_cast<Eigen::Index>(std::clamp(10.0 * fit.autocorrelation_time, 1.0, rows / 20.0));
+    std::vector<RowRange> blocks;
+    for (const RowRange& range : data.records())
+      for (Eigen::Index first = range.first; first < range.last; first += length)
+        blocks.push_back({range.record, first, std::min(first + length, range.last)});
+    std::vector<std::vector<double>> drawn(slots.size());
+    for (int r = 0; r < replicates; ++r) {
+      if (r % 20 == 0) progress(fmt::format("bootstrap: {} of {}", r, replicates));
+      std::vector<int> times(blocks.size(), 0);
+      for (std::size_t k = 0; k < blocks.size(); ++k) ++times[random() % blocks.size()];
+      Eigen::VectorXd weights = fit.root_weights;
+      for (std::size_t k = 0; k < blocks.size(); ++k)
+        weights.segment(blocks[k].first, blocks[k].size()) *= std::sqrt(static_cast<double>(times[k]));
+      Terms terms = identification.terms;
+      fit_rest(data, terms, fit.on_balance, weights);
+      for (std::size_t j = 0; j < slots.size(); ++j) drawn[j].push_back(natural(terms, slots[j]));
+    }
+    for (std::size_t j = 0; j < slots.size(); ++j) {
+      Estimate* estimate = estimate_of(identification, slots[j]);
+      if (!estimate || !estimate->identifiable || drawn[j].empty()) continue;
+      std::sort(drawn[j].begin(), drawn[j].end());
+      const auto at = [&](double share) {
+        return drawn[j][static_cast<std::size_t>(std::lround(share * static_cast<double>(drawn[j].size() - 1)))];
+      };
+      estimate->low = at(0.025);
+      estimate->high = at(0.975);
+    }
+  }
+}
+
+}  // namespace flexspline::estimation

@@ -1,0 +1,275 @@
+#include "host/estimation/output_error.hpp"
+
+#include <ceres/ceres.h>
+#include <fmt/format.h>
+
+#include <Eigen/QR>
+#include <algorithm>
+#include <cmath>
+
+#include "host/estimation/free_motion.hpp"
+#include "host/regression/least_squares.hpp"
+#include "host/regression/shapes.hpp"
+
+namespace flexspline::estimation {
+namespace {
+
+using regression::Balance;
+using regression::Record;
+using regression::RowRange;
+using regression::Slot;
+
+constexpr double kShownAtLeast = 1e-6;  // of the error's size, by a step of one standard error
+
+// A free parameter, moved in units of its standard error from least squares.
+struct Free {
+  Slot slot;
+  std::size_t fit = 0;
+  Eigen::Index at = 0;  // in the covariance of the fit
+  double start = 0.0;
+  double unit = 0.0;
+  double low = 0.0, high = 0.0;
+};
+
+// What is compared in a record.
+enum class Signal { velocity, position, torque };
+struct Part {
+  std::size_t record = 0;
+  Signal signal{};
+  RowRange range;
+  double weight = 1.0;
+};
+
+double signal_of(const Record& record, std::size_t sample, Signal signal) {
+  const auto& in = record.inputs[sample];
+  return signal == Signal::velocity ? in.velocity : signal == Signal::position ? in.angle : in.torque;
+}
+
+class OutputError {
+ public:
+  explicit OutputError(Identification& identification) : all_(identification) {
+    for (std::size_t b = 0; b < all_.fits.size(); ++b) {
+      const regression::BalanceFit& fit = all_.fits[b];
+      for (std::size_t j = 0; j < fit.linear.size() + fit.shapes.size(); ++j)
+        add(b, j < fit.linear.size() ? fit.linear[j] : fit.shapes[j - fit.linear.size()], static_cast<Eigen::Index>(j),
+            j >= fit.linear.size());
+    }
+    const FreeMotion motion = free_motion(all_);
+    usable_ = motion.simulated;
+    Eigen::Index rows = 0;
+    for (std::size_t i = 0; i < all_.prepared.records.size(); ++i) {
+      const Record& record = all_.prepared.records[i];
+      if (!motion.simulated[i] || record.at_rest || !record.has_motor_motion) continue;
+      take(i, record.locked ? Signal::position : Signal::velocity, rows);
+      if (all_.prepared.torque_measured && record.experiment->has(data::Column::torque)) take(i, Signal::torque, rows);
+    }
+    rows_ = rows;
+    const Eigen::VectorXd error = errors(motion);
+    std::vector<RowRange> ranges;
+    for (const Part& part : parts_) ranges.push_back(part.range);
+    const Eigen::VectorXd weights = by_signal(error);
+    for (Part& part : parts_) part.weight = weights[part.range.first];
+  }
+
+  bool empty() const { return rows_ == 0 || free_.empty(); }
+  Eigen::Index rows() const { return rows_; }
+  std::vector<Free>& free() { return free_; }
+  const std::vector<Part>& parts() const { return parts_; }
+  const std::vector<std::uint8_t>& usable() const { return usable_; }
+
+  // Puts positions (in units from the start) into the terms.
+  void set(const double* x) {
+    for (std::size_t j = 0; j < free_.size(); ++j)
+      all_.terms[free_[j].slot.term].values[free_[j].slot.parameter] = free_[j].start + x[j] * free_[j].unit;
+  }
+  // Weighted errors of the terms as they stand; empty where a record that could be simulated no longer can.
+  Eigen::VectorXd weighted() {
+    const FreeMotion motion = free_motion(all_);
+    if (motion.simulated != usable_) return {};
+    Eigen::VectorXd e = errors(motion);
+    for (const Part& part : parts_) e.segment(part.range.first, part.range.size()) *= part.weight;
+    return e;
+  }
+
+ private:
+  void add(std::size_t b, Slot slot, Eigen::Index at, bool shape) {
+    const regression::BalanceFit& fit = all_.fits[b];
+    if (fit.own_share[at] < regression::kUndetermined) return;
+    const regression::Term& term = all_.terms[slot.term];
+    const auto& info = term.entry->parameters[slot.parameter];
+    Free f{slot, b, at, term.values[slot.parameter], 0.0, info.low, info.high};
+    const double variance = fit.covariance(at, at);
+    f.unit = std::isfinite(variance) && variance > 0.0 ? std::sqrt(variance) : 0.01 * std::abs(f.start);
+    f.unit = std::max(f.unit, 1e-4 * std::abs(f.start));
+    if (shape) {
+      const regression::ShapeRange range = regression::shape_range(all_.data[b], term, slot.parameter);
+      f.low = range.low;
+      f.high = range.high;
+      f.unit = std::min(f.unit, 0.1 * (range.high - range.low));
+    }
+    if (f.unit > 0.0) free_.push_back(f);
+  }
+  void take(std::size_t record, Signal signal, Eigen::Index& rows) {
+    const auto n = static_cast<Eigen::Index>(samples(record).size());
+    if (n == 0) return;
+    parts_.push_back({record, signal, {parts_.size(), rows, rows + n}, 1.0});
+    rows += n;
+  }
+  // Every decimated sample counts: the free run is judged at reversals too.
+  std::vector<std::size_t> samples(std::size_t record) const {
+    const Record& r = all_.prepared.records[record];
+    std::vector<std::size_t> result;
+    for (const data::Segment& s : r.segments)
+      for (std::size_t k = s.first; k < s.last; k += r.decimation)
+        if (r.experiment->masked.empty() || !r.experiment->masked[k]) result.push_back(k);
+    return result;
+  }
+  Eigen::VectorXd errors(const FreeMotion& motion) const {
+    Eigen::VectorXd e(rows_);
+    for (const Part& part : parts_) {
+      Eigen::Index row = part.range.first;
+      for (const std::size_t k : samples(part.record))
+        e[row++] = signal_of(all_.prepared.records[part.record], k, part.signal) -
+                   signal_of(motion.prepared.records[part.record], k, part.signal);
+    }
+    return e;
+  }
+  // Weights of the records of one signal among themselves.
+  Eigen::VectorXd by_signal(const Eigen::VectorXd& error) const {
+    Eigen::VectorXd weights(error.size());
+    for (const Signal signal : {Signal::velocity, Signal::position, Signal::torque}) {
+      std::vector<RowRange> ranges;
+      for (const Part& part : parts_)
+        if (part.signal == signal) ranges.push_back(part.range);
+      if (ranges.empty()) continue;
+      const Eigen::VectorXd some = regression::record_weights(ranges, error);
+      for (const RowRange& range : ranges)
+        weights.segment(range.first, range.size()) = some.segment(range.first, range.size());
+    }
+    return weights;
+  }
+
+  Identification& all_;
+  std::vector<Free> free_;
+  std::vector<Part> parts_;
+  std::vector<std::uint8_t> usable_;
+  Eigen::Index rows_ = 0;
+};
+
+// Slopes of the weighted errors by a step of `step` units each, from both sides.
+Eigen::MatrixXd slopes(OutputError& problem, const std::vector<double>& x) {
+  constexpr double kStep = 0.05;
+  Eigen::MatrixXd J(problem.rows(), static_cast<Eigen::Index>(x.size()));
+  std::vector<double> moved = x;
+  for (std::size_t j = 0; j < x.size(); ++j) {
+    moved[j] = x[j] + kStep;
+    problem.set(moved.data());
+    const Eigen::VectorXd above = problem.weighted();
+    moved[j] = x[j] - kStep;
+    problem.set(moved.data());
+    const Eigen::VectorXd below = problem.weighted();
+    moved[j] = x[j];
+    if (above.size() == 0 || below.size() == 0)
+      J.col(static_cast<Eigen::Index>(j)).setZero();
+    else
+      J.col(static_cast<Eigen::Index>(j)) = (above - below) / (2.0 * kStep);
+  }
+  problem.set(x.data());
+  return J;
+}
+
+class Cost final : public ceres::CostFunction {
+ public:
+  explicit Cost(OutputError& problem) : problem_(problem) {
+    set_num_residuals(static_cast<int>(problem.rows()));
+    mutable_parameter_block_sizes()->push_back(static_cast<int>(problem.free().size()));
+  }
+  bool Evaluate(double const* const* parameters, double* residuals, double** jacobians) const override {
+    const std::size_t count = problem_.free().size();
+    const std::vector<double> x(parameters[0], parameters[0] + count);
+    problem_.set(x.data());
+    const Eigen::VectorXd e = problem_.weighted();
+    if (e.size() == 0) return false;  // a step too far: the solver tries a shorter one
+    Eigen::Map<Eigen::VectorXd>(residuals, e.size()) = e;
+    if (!jacobians || !jacobians[0]) return true;
+    using RowMajor = Eigen::Matrix<double, Eigen::Dynamic, Eigen::Dynamic, Eigen::RowMajor>;
+    Eigen::Map<RowMajor>(jacobians[0], e.size(), static_cast<Eigen::Index>(count)) = slopes(problem_, x);
+    return true;
+  }
+
+ private:
+  OutputError& problem_;
+};
+
+// (J'J)^-1 s^2, corrected for the autocorrelation of the errors, into the covariances of the fits.
+void take_covariance(Identification& identification, OutputError& problem, const std::vector<double>& x) {
+  const Eigen::MatrixXd J = slopes(problem, x);
+  const Eigen::VectorXd e = problem.weighted();
+  const regression::LinearFit joint = regression::least_squares(J, e, Eigen::VectorXd::Ones(e.size()));
+  std::vector<RowRange> ranges;
+  for (const Part& part : problem.parts()) ranges.push_back(part.range);
+  const double time = regression::autocorrelation_time(ranges, e);
+  const double freedom = std::max(1.0, static_cast<double>(e.size() - J.cols()));
+  const double variance = e.squaredNorm() / freedom * time;
+  const std::vector<Free>& free = problem.free();
+  std::string unseen;
+  for (std::size_t i = 0; i < free.size(); ++i) {
+    regression::BalanceFit& fit = identification.fits[free[i].fit];
+    const auto a = static_cast<Eigen::Index>(i);
+    if (J.col(a).norm() < kShownAtLeast * e.norm()) {
+      const regression::Term& term = identification.terms[free[i].slot.term];
+      unseen += (unseen.empty() ? "" : ", ") +
+                fmt::format("{}.{}", term.id, term.entry->parameters[free[i].slot.parameter].name);
+      continue;
+    }
+    for (std::size_t j = 0; j < free.size(); ++j) {
+      if (free[j].fit != free[i].fit) continue;
+      fit.covariance(free[i].at, free[j].at) =
+          joint.unit_covariance(a, static_cast<Eigen::Index>(j)) * variance * free[i].unit * free[j].unit;
+    }
+    fit.autocorrelation_time = time;
+  }
+  if (!unseen.empty())
+    identification.warnings.push_back(fmt::format("the free run does not show {}: as least squares found it", unseen));
+}
+
+}  // namespace
+
+void refit_to_output(Identification& identification) {
+  OutputError problem(identification);
+  if (problem.empty()) {
+    identification.warnings.push_back(
+        "no record has a free run to fit to: the values are those of least squares. An inertia and the effects of the "
+        "balances are needed for one");
+    return;
+  }
+  std::vector<double> x(problem.free().size(), 0.0);
+  ceres::Problem search;
+  search.AddResidualBlock(new Cost(problem), nullptr, x.data());
+  for (int j = 0; j < static_cast<int>(x.size()); ++j) {
+    const Free& f = problem.free()[static_cast<std::size_t>(j)];
+    // Bounds in units from the start; an infinite one is left out.
+    if (std::isfinite(f.low)) search.SetParameterLowerBound(x.data(), j, std::min(0.0, (f.low - f.start) / f.unit));
+    if (std::isfinite(f.high)) search.SetParameterUpperBound(x.data(), j, std::max(0.0, (f.high - f.start) / f.unit));
+  }
+  ceres::Solver::Options options;
+  options.linear_solver_type = ceres::DENSE_QR;
+  options.max_num_iterations = 12;
+  options.function_tolerance = 1e-6;
+  options.parameter_tolerance = 1e-5;
+  options.logging_type = ceres::SILENT;
+  ceres::Solver::Summary summary;
+  ceres::Solve(options, &search, &summary);
+  problem.set(x.data());
+  take_covariance(identification, problem, x);
+  problem.set(x.data());
+  for (std::size_t b = 0; b < identification.fits.size(); ++b)
+    identification.fits[b].residual = regression::residual_of(identification.data[b], identification.terms);
+  std::string without;
+  for (std::size_t i = 0; i < problem.usable().size(); ++i)
+    if (!problem.usable()[i]) without += (without.empty() ? "" : ", ") + identification.prepared.records[i].name;
+  if (!without.empty())
+    identification.warnings.push_back(fmt::format("no free run, and so no part in the fit, for {}", without));
+}
+
+}  // namespace flexspline::estimation

@@ -1,0 +1,16 @@
+// Output error: the parameters with which the model's free run comes nearest to the measured motion and torque.
+#pragma once
+
+#include "host/regression/identify.hpp"
+
+namespace flexspline::estimation {
+
+using regression::Identification;
+
+// Refits all parameters together from the values that least squares found. What is minimised, for each record: velocity
+// of the motor where the load is free, its position where it is locked (there the effort dictates the torque), and the
+// torque where it is measured, each over its error at the start. Parameters that the free run does not show keep their
+// values, with a warning. Replaces residuals and covariances of the fits.
+void refit_to_output(Identification& identification);
+
+}  // namespace flexspline::estimation

@@ -1,0 +1,135 @@
+#include "host/estimation/partition.hpp"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+#include <random>
+
+#include "host/regression/shapes.hpp"
+
+namespace flexspline::estimation {
+namespace {
+
+using regression::BalanceData;
+using regression::BalanceFit;
+using regression::Slot;
+using regression::Term;
+using regression::Terms;
+
+bool has_free_shape(const Term& term) {
+  for (std::size_t p = 0; p < term.values.size(); ++p)
+    if (term.free_shape(p)) return true;
+  return false;
+}
+
+// Puts the parameters of one fit before those of another one on the same balance.
+void put_before(BalanceFit& fit, const BalanceFit& first, const std::vector<std::size_t>& term_now) {
+  std::vector<Slot> linear;
+  for (Slot slot : first.linear) {
+    slot.term = term_now[slot.term];
+    linear.push_back(slot);
+  }
+  const auto before = static_cast<Eigen::Index>(linear.size());
+  const Eigen::Index after = fit.covariance.rows();
+  Eigen::MatrixXd covariance = Eigen::MatrixXd::Zero(before + after, before + after);
+  covariance.topLeftCorner(before, before) = first.covariance.topLeftCorner(before, before);
+  covariance.bottomRightCorner(after, after) = fit.covariance;
+  Eigen::VectorXd own(before + after);
+  own << first.own_share.head(before), fit.own_share;
+  linear.insert(linear.end(), fit.linear.begin(), fit.linear.end());
+  fit.linear = std::move(linear);
+  fit.covariance = std::move(covariance);
+  fit.own_share = std::move(own);
+  fit.condition_number = std::max(fit.condition_number, first.condition_number);
+}
+
+}  // namespace
+
+std::unique_ptr<Identification> partitioned(const data::Dataset& dataset, const model::Model& model,
+                                            const regression::PipelineOptions& pipeline) {
+  model::Model simple = model;
+  std::erase_if(simple.effects,
+                [](const model::Effect& effect) { return has_free_shape(regression::term_of(effect)); });
+  auto all = regression::form(dataset, model, pipeline);
+  if (simple.effects.empty() || simple.effects.size() == model.effects.size()) {
+    regression::fit(*all);
+    regression::assemble(*all);
+    return all;
+  }
+  auto first = regression::form(dataset, simple, pipeline);
+  regression::fit(*first);
+  std::vector<std::size_t> term_now(first->terms.size());
+  std::vector<Slot> plugged_in;
+  for (std::size_t t = 0; t < first->terms.size(); ++t)
+    for (std::size_t now = 0; now < all->terms.size(); ++now) {
+      if (all->terms[now].id != first->terms[t].id) continue;
+      term_now[t] = now;
+      for (std::size_t p = 0; p < all->terms[now].values.size(); ++p) {
+        if (!all->terms[now].free_linear(p)) continue;
+        all->terms[now].values[p] = first->terms[t].values[p];
+        all->terms[now].known[p] = 1;
+        plugged_in.push_back({now, p});
+      }
+    }
+  regression::fit(*all);
+  for (const Slot& slot : plugged_in) all->terms[slot.term].known[slot.parameter] = 0;
+  for (BalanceFit& fit : all->fits)
+    for (const BalanceFit& before : first->fits)
+      if (before.balance == fit.balance) put_before(fit, before, term_now);
+  all->warnings.insert(all->warnings.end(), first->warnings.begin(), first->warnings.end());
+  regression::assemble(*all);
+  return all;
+}
+
+void search_from_several_starts(Identification& identification, int starts, std::uint64_t seed) {
+  constexpr double kLike = 1e-3;   // of the sum of squares
+  constexpr double kApart = 0.05;  // of a shape's range
+  std::mt19937_64 random(seed);
+  std::uniform_real_distribution<double> share(0.0, 1.0);
+  for (std::size_t b = 0; b < identification.fits.size(); ++b) {
+    BalanceFit& fit = identification.fits[b];
+    BalanceData& data = identification.data[b];
+    std::vector<Slot> open;
+    for (const Slot& slot : fit.shapes)
+      if (!identification.terms[slot.term].stated[slot.parameter]) open.push_back(slot);
+    if (open.empty()) continue;
+    Terms best = identification.terms;
+    double least = regression::refine_shapes(data, best, fit.on_balance, fit.root_weights);
+    const double swept = least;
+    bool elsewhere = false;
+    for (int start = 1; start < starts; ++start) {
+      Terms trial = identification.terms;
+      for (const Slot& slot : open)
+        trial[slot.term].values[slot.parameter] =
+            regression::shape_range(data, trial[slot.term], slot.parameter).at(share(random));
+      const double cost = regression::refine_shapes(data, trial, fit.on_balance, fit.root_weights);
+      bool apart = false;
+      for (const Slot& slot : open) {
+        const regression::ShapeRange range = regression::shape_range(data, trial[slot.term], slot.parameter);
+        apart = apart || std::abs(range.share(trial[slot.term].values[slot.parameter]) -
+                                  range.share(best[slot.term].values[slot.parameter])) > kApart;
+      }
+      elsewhere = elsewhere || (apart && std::abs(cost - least) < kLike * least);
+      if (cost < least) {
+        least = cost;
+        best = trial;
+      }
+    }
+    if (elsewhere)
+      identification.warnings.push_back(
+          "searches from several starts end at different shape parameters with the same error: these data do not tell "
+          "them (--intervals profile shows how far)");
+    if (least > (1.0 - 1e-6) * swept) continue;
+    // From the better place, as if the model stated it.
+    for (const Slot& slot : open) {
+      Term& term = best[slot.term];
+      identification.terms[slot.term].values[slot.parameter] = term.values[slot.parameter];
+      identification.terms[slot.term].stated[slot.parameter] = 1;
+    }
+    fit = regression::fit_balance(data, identification.terms);
+  }
+}
+
+}  // namespace flexspline::estimation
