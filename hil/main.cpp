@@ -14,6 +14,7 @@
 
 #include "hil/plant/parameters.hpp"
 #include "hil/plant/recorder.hpp"
+#include "hil/rhs100/data_set.hpp"
 
 namespace {
 
@@ -24,6 +25,7 @@ struct RecordOptions {
   std::string plant_file;
   std::string hide;
   std::vector<std::string> with;
+  std::vector<std::string> parts;
   double scale = 1.0;
   double friction_variation = -1.0;
   double noise_correlation = -1.0;
@@ -34,6 +36,13 @@ struct RecordOptions {
 
 plant::PlantFile open_plant(const std::string& file) {
   return file.empty() ? plant::demo_plant() : plant::load_plant(file);
+}
+
+void require_empty(const RecordOptions& options) {
+  if (!options.force && std::filesystem::exists(options.out) && !std::filesystem::is_empty(options.out)) {
+    throw std::runtime_error(options.out +
+                             ": is there and not empty; give another folder, or --force to write into it");
+  }
 }
 
 void record(const RecordOptions& options) {
@@ -49,12 +58,15 @@ void record(const RecordOptions& options) {
   }
   if (options.tachometer) drive.sensors.has_tachometer = true;
   if (file.experiments.empty()) throw std::runtime_error("the plant file has no [[experiment]]; add one to record");
-  if (!options.force && std::filesystem::exists(options.out) && !std::filesystem::is_empty(options.out)) {
-    throw std::runtime_error(options.out +
-                             ": is there and not empty; give another folder, or --force to write into it");
-  }
+  require_empty(options);
   plant::write_dataset(plant::record_all(drive, file.experiments, options.seed), drive, options.out);
   fmt::print("{} experiments in {}\n", file.experiments.size(), options.out);
+}
+
+void make_rhs_100(const RecordOptions& options) {
+  require_empty(options);
+  const std::size_t written = flexspline::rhs100::write_data_set(options.out, options.parts, options.seed);
+  fmt::print("{} experiments in {}\n", written, options.out);
 }
 
 void list_effects(const std::string& plant_file) {
@@ -94,6 +106,16 @@ int main(int argc, char** argv) {
   record_command->add_flag("--force", options.force, "write into a folder that is not empty");
   record_command->footer("Example: flexspline-hil record --out data --hide stribeck_gaussian --seed 7");
   record_command->callback([&] { record(options); });
+  CLI::App* rhs_command = app.add_subcommand(
+      "rhs-100", "makes the experiments of Taghirad and Belanger's report, each with its own row's parameters");
+  rhs_command->add_option("--out", options.out, "folder to write into")->required();
+  rhs_command
+      ->add_option("--part", options.parts, "only these, A,B: table-1, table-3, table-4, table-6, table-7, table-8")
+      ->delimiter(',');
+  rhs_command->add_option("--seed", options.seed, "of all chance (default 1)");
+  rhs_command->add_flag("--force", options.force, "write into a folder that is not empty");
+  rhs_command->footer("Example: flexspline-hil rhs-100 --out rhs-100");
+  rhs_command->callback([&] { make_rhs_100(options); });
   CLI::App* effects_command = app.add_subcommand("effects", "lists what can be hidden");
   effects_command->add_option("--plant", options.plant_file, "plant file (default: the demo's drive, built in)");
   effects_command->callback([&] { list_effects(options.plant_file); });

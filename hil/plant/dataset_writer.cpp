@@ -1,40 +1,14 @@
 #include <fmt/format.h>
 
-#include <fstream>
 #include <iterator>
-#include <stdexcept>
-#include <system_error>
 
 #include "hil/plant/recorder.hpp"
+#include "hil/plant/whole_file.hpp"
 
 namespace flexspline::plant {
 namespace {
 
 using Text = fmt::memory_buffer;
-
-/// A file under its final name is always complete: it is written beside it and renamed.
-void write_whole(const std::filesystem::path& file, const Text& text) {
-  std::filesystem::path draft = file;
-  draft += ".partial";
-  {
-    std::ofstream out(draft, std::ios::binary | std::ios::trunc);
-    out.write(text.data(), static_cast<std::streamsize>(text.size()));
-    out.close();
-    if (!out) {
-      std::error_code ignored;
-      std::filesystem::remove(draft, ignored);
-      throw std::runtime_error(
-          fmt::format("{}: cannot be written; check the folder's permissions and free space", file.string()));
-    }
-  }
-  std::error_code failed;
-  std::filesystem::rename(draft, file, failed);
-  if (failed) {
-    std::error_code ignored;
-    std::filesystem::remove(draft, ignored);
-    throw std::runtime_error(fmt::format("{}: cannot be put in place: {}", file.string(), failed.message()));
-  }
-}
 
 template <class... Args>
 void line(Text& text, fmt::format_string<Args...> format, Args&&... args) {
@@ -160,15 +134,14 @@ Text truth(const std::vector<Record>& records, const Drive& drive) {
 }  // namespace
 
 void write_dataset(const std::vector<Record>& records, const Drive& drive, const std::filesystem::path& folder) {
-  std::error_code failed;
-  std::filesystem::create_directories(folder, failed);
-  if (failed) {
-    throw std::runtime_error(fmt::format("{}: the folder cannot be made: {}", folder.string(), failed.message()));
-  }
-  for (const Record& record : records) write_whole(folder / (record.name + ".csv"), csv(record, drive));
-  write_whole(folder / "base-model.toml", base_model(drive));
-  write_whole(folder / "truth.toml", truth(records, drive));
-  write_whole(folder / "dataset.toml", dataset(records, drive));
+  make_folder(folder);
+  const auto write = [&](const std::string& name, const Text& text) {
+    write_whole(folder / name, {text.data(), text.size()});
+  };
+  for (const Record& record : records) write(record.name + ".csv", csv(record, drive));
+  write("base-model.toml", base_model(drive));
+  write("truth.toml", truth(records, drive));
+  write("dataset.toml", dataset(records, drive));
 }
 
 }  // namespace flexspline::plant

@@ -42,6 +42,8 @@ double waveform(Waveform shape, double phase) {
       const double value = std::min({half / kRamp, (0.5 - half) / kRamp, 1.0});
       return fraction < 0.5 ? value : -value;
     }
+    case Waveform::square:
+      return fraction < 0.5 ? 1.0 : -1.0;
     case Waveform::composite: {
       static const double peak = composite_peak();
       return composite(phase) / peak;

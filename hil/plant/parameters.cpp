@@ -177,6 +177,7 @@ ExperimentPlan read_experiment(const toml::table& table, std::string_view origin
                   {"asymmetric_sine", Waveform::asymmetric_sine},
                   {"triangle", Waveform::triangle},
                   {"trapezoid", Waveform::trapezoid},
+                  {"square", Waveform::square},
                   {"composite", Waveform::composite}});
   section.number("amplitude", plan.amplitude);
   section.not_negative("frequency_hz", plan.frequency_hz);

@@ -85,7 +85,7 @@ struct Drive {
 };
 
 enum class Mode { off, current, velocity };
-enum class Waveform { zero, sine, asymmetric_sine, triangle, trapezoid, composite };
+enum class Waveform { zero, sine, asymmetric_sine, triangle, trapezoid, square, composite };
 
 /// One motion to record. The amplitude is in ampere (Mode::current) or motor rad/s (Mode::velocity).
 struct ExperimentPlan {
