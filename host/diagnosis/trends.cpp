@@ -20,11 +20,8 @@ struct Setting {
 };
 
 std::vector<Setting> settings_of(const regression::Prepared& prepared) {
-  std::vector<Setting> settings{{"speed", true, {}},
-                                {"frequency", true, {}},
-                                {"temperature", false, {}},
-                                {"order in time", false, {}},
-                                {"torque", true, {}}};
+  std::vector<Setting> settings{{"speed", true, {}},        {"frequency", true, {}},      {"acceleration", true, {}},
+                                {"temperature", false, {}}, {"order in time", false, {}}, {"torque", true, {}}};
   double order = 0.0;
   for (const regression::Record& r : prepared.records) {
     double speed = 0.0, acceleration = 0.0, temperature = 0.0, torque = 0.0;
@@ -39,9 +36,10 @@ std::vector<Setting> settings_of(const regression::Prepared& prepared) {
     const auto known = [&](bool is, double value) { return is && moves ? std::optional(value) : std::nullopt; };
     settings[0].by_record.push_back(known(true, std::sqrt(speed / n)));
     settings[1].by_record.push_back(known(true, moves ? std::sqrt(acceleration / speed) : 0.0));
-    settings[2].by_record.push_back(known(r.has_temperature, temperature / n));
-    settings[3].by_record.push_back(known(true, order++));
-    settings[4].by_record.push_back(known(!r.torque.empty() && torque > 0.0, torque / n));
+    settings[2].by_record.push_back(known(true, std::sqrt(acceleration / n)));
+    settings[3].by_record.push_back(known(r.has_temperature, temperature / n));
+    settings[4].by_record.push_back(known(true, order++));
+    settings[5].by_record.push_back(known(!r.torque.empty() && torque > 0.0, torque / n));
   }
   return settings;
 }
@@ -74,8 +72,10 @@ std::vector<Trend> parameter_trends(const regression::Identification& identified
   const auto& records = identified.prepared.records;
   const std::vector<Setting> settings = settings_of(identified.prepared);
   std::vector<Trend> trends;
-  double tried = 0.0;
   for (const regression::Estimate& e : identified.estimates) {
+    // Counted by parameter: a model with more of them must not hide what one of them shows.
+    double tried = 0.0;
+    const auto first = static_cast<std::ptrdiff_t>(trends.size());
     if (catalogue::get(e.effect).parameters[e.slot.parameter].low != 0.0) continue;  // offsets have no relative change
     for (const Setting& setting : settings) {
       std::vector<double> x, y;
@@ -96,8 +96,9 @@ std::vector<Trend> parameter_trends(const regression::Identification& identified
       if (std::abs(line->slope) * (*high - *low) < kMatters) continue;
       trends.push_back({e.id, e.parameter, setting.name, line->slope, line->p_value});
     }
+    std::for_each(trends.begin() + first, trends.end(),
+                  [&](Trend& t) { t.p_value = std::min(1.0, t.p_value * tried); });
   }
-  for (Trend& t : trends) t.p_value = std::min(1.0, t.p_value * tried);
   std::erase_if(trends, [](const Trend& t) { return t.p_value > kCertain; });
   std::sort(trends.begin(), trends.end(), [](const Trend& a, const Trend& b) { return a.p_value < b.p_value; });
   return trends;

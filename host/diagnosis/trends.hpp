@@ -10,10 +10,11 @@ namespace flexspline::diagnosis {
 
 struct Trend {
   std::string id, parameter;
-  std::string over;    // "speed", "frequency", "temperature", "order in time", "torque"
-  double slope = 0.0;  // of the logarithm of the parameter by the logarithm of speed, frequency or torque (a power); by
-                       // 1 degC or by one record: share of the average
-  double p_value = 1.0;  // two-sided t-test, times the number of things tried
+  // "speed", "frequency", "acceleration", "temperature", "order in time", "torque"
+  std::string over;
+  double slope = 0.0;  // of the logarithm of the parameter by the logarithm of speed, frequency, acceleration or torque
+                       // (a power); by 1 degC or by one record: share of the average
+  double p_value = 1.0;  // two-sided t-test, times the number of things tried for this parameter
 };
 
 // Regresses the value of each parameter of physical sign by experiment on what its experiments differ in. Only trends
