@@ -48,6 +48,8 @@ Candidate report(const Trial& trial, const Search& search, data::Axis axis) {
     c.note =
         "Both amplitudes are negative over a wide range of speed: this is sublinear friction, which grows ever more "
         "slowly with speed (see power_law_friction), and no Stribeck friction.";
+  else if (is_rising(trial))
+    c.note = "Both amplitudes are negative: friction rises out of standstill, so that slow motion starts smoothly.";
   const std::size_t added = trial.judged.terms.size() - 1;
   const Term& term = trial.judged.terms[added];
   const std::vector<double> natural = catalogue::natural(*term.entry, term.values);

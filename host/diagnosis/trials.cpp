@@ -212,15 +212,21 @@ std::vector<Trial> rank(Search& search) {
   return trials;
 }
 
+bool is_rising(const Trial& trial) {
+  const Term& term = trial.judged.terms.back();
+  return term.entry->name().starts_with("stribeck_") && term.values[term.entry->index_of("amplitude_positive")] < 0.0 &&
+         term.values[term.entry->index_of("amplitude_negative")] < 0.0;
+}
+
 // Friction that rises out of standstill over a wide range of speed is a concave friction curve, whatever its formula
 // (EFFECTS): a Stribeck term with two negative amplitudes is then reported as sublinear friction.
 bool is_sublinear(const Trial& trial, const BalanceData& data) {
-  if (trial.proposal.entry->name() != "stribeck_gaussian") return false;
+  if (trial.proposal.entry->name() != "stribeck_gaussian" || !is_rising(trial)) return false;
   const Term& term = trial.judged.terms.back();
   const auto value = [&](std::string_view name) { return term.values[term.entry->index_of(name)]; };
   const regression::ShapeRange range = regression::shape_range(data, term, term.entry->index_of("velocity"));
   // The range ends at a quarter of the fast motion; wide is from a tenth of it.
-  return value("amplitude_positive") < 0.0 && value("amplitude_negative") < 0.0 && value("velocity") > 0.4 * range.high;
+  return value("velocity") > 0.4 * range.high;
 }
 
 std::optional<Trial> eliminate(Search& search, const Trial& first) {

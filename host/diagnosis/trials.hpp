@@ -44,6 +44,8 @@ std::optional<Trial> eliminate(Search& search, const Trial& first);
 
 // A Stribeck term that is sublinear friction: both amplitudes negative, over a wide range of speed.
 bool is_sublinear(const Trial& trial, const BalanceData& data);
+// A Stribeck term whose amplitudes are both negative: friction rises out of standstill.
+bool is_rising(const Trial& trial);
 
 // Where a parameter stands among the linear ones of a judged model, or nothing if it is not estimated there.
 std::optional<std::size_t> position(const Judged& judged, std::string_view id, std::string_view parameter);
