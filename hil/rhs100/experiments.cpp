@@ -179,10 +179,10 @@ MotorRow final_decision() {
           motor.friction.positive.coulomb, motor.friction.negative.coulomb};
 }
 
-Experiment simulated_motor(plant::ExperimentPlan plan) {
+Experiment simulated_motor(double load_nm, plant::ExperimentPlan plan) {
   const report::DcMotor motor = published::simulated_motor();
   const report::DirectionalFriction& friction = motor.friction.positive;
-  Experiment e{bare_motor(motor.torque_constant, motor.inertia, kSimulationLoad), std::move(plan)};
+  Experiment e{bare_motor(motor.torque_constant, motor.inertia, load_nm), std::move(plan)};
   set_effect(e.drive, "viscous_friction", {{"coefficient", friction.viscous}});
   set_effect(e.drive, "coulomb_friction", {{"torque", friction.coulomb}});
   set_effect(e.drive, "stribeck_hess_soom",
@@ -271,15 +271,17 @@ Set table_1_composite() {
   Set set = motor_set("table-1-composite", "simulation check: a composite of three harmonics, constant load",
                       simulated_motor_model());
   set.load_torque_nm = kSimulationLoad;
-  set.experiments.push_back(simulated_motor(motor_plan("composite", plant::Waveform::composite, 2.0, 2.0, 60.0)));
+  set.experiments.push_back(
+      simulated_motor(kSimulationLoad, motor_plan("composite", plant::Waveform::composite, 3.0, 0.25, 180.0)));
   return set;
 }
 
 Set table_1_saw_tooth() {
   Set set =
       motor_set("table-1-saw-tooth", "simulation check: a slow saw-tooth, constant load", simulated_stribeck_model());
-  set.load_torque_nm = kSimulationLoad;
-  set.experiments.push_back(simulated_motor(motor_plan("saw-tooth", plant::Waveform::triangle, 0.9, 0.5, 60.0)));
+  set.load_torque_nm = kSlowSimulationLoad;
+  set.experiments.push_back(
+      simulated_motor(kSlowSimulationLoad, motor_plan("saw-tooth", plant::Waveform::triangle, 0.7, 0.5, 60.0)));
   return set;
 }
 

@@ -43,7 +43,8 @@ inline constexpr double kFullLockedCurrent = 5.0;  ///< A at 100 % with the outp
 inline constexpr double kFullSlowCurrent = 7.0;    ///< A at 100 % in current mode with the output free
 inline constexpr int kMotorCounts = 16384;
 inline constexpr int kOutputCounts = 262144;
-inline constexpr double kSimulationLoad = 0.02;  ///< N m, the constant load of section 3.4
+inline constexpr double kSimulationLoad = 0.05;       ///< N m, the constant load of section 3.4 with the composite
+inline constexpr double kSlowSimulationLoad = 0.005;  ///< with the saw-tooth: both directions break away alike
 
 /// Tables 4 (with the other seven of the eleven experiments of section 4.2.2 as hold-out), 6, 7 and 8.
 Set table_4();

@@ -1,0 +1,150 @@
+// Table 1: the simulation check with 2 % of noise on input and output, and why the report's simulation did not feel the
+// Stribeck velocity.
+#include <gtest/gtest.h>
+
+#include "hil/report/friction_block.hpp"
+#include "hil/report/published.hpp"
+#include "hil/rhs100/models.hpp"
+#include "tests/report/free_run_fit.hpp"
+#include "tests/report/rhs100_data.hpp"
+
+namespace flexspline::testing {
+namespace {
+
+namespace published = report::published;
+
+constexpr double kGuessedConstant = 0.08;  // of the base model
+const report::DcMotor kTruth = published::simulated_motor();
+
+regression::PipelineOptions cutoff(double hz) {
+  regression::PipelineOptions options;
+  options.cutoff_hz = hz;
+  return options;
+}
+
+// What the composite tells, put into a model that has a Stribeck term and fixed there: the report's partition.
+model::Model partitioned(const regression::Identification& linear) {
+  model::Model model = model_of(rhs100::simulated_stribeck_model());
+  for (const regression::Estimate& e : linear.estimates) fix(model, e.effect, e.parameter, e.value);
+  return model;
+}
+
+class Table1 : public ::testing::Test {
+ protected:
+  const rhs100::Set composite = rhs100::table_1_composite(), saw_tooth = rhs100::table_1_saw_tooth();
+
+  std::unique_ptr<regression::Identification> linear(std::uint64_t seed, const regression::PipelineOptions& options) {
+    return regression::identify(dataset_of(composite, seed), base_model(composite), options);
+  }
+};
+
+void expect_within_three_percent(const regression::Identification& found) {
+  const auto off_percent = [&](double value, double truth) { return 100.0 * std::abs(value / truth - 1.0); };
+  const report::DirectionalFriction& friction = kTruth.friction.positive;
+  // The report's were off by 9.7, 7.0, 5.9 and 18 %.
+  EXPECT_LT(off_percent(estimate(found, "inertia", "inertia").value, kTruth.inertia), 3.0);
+  EXPECT_LT(off_percent(kGuessedConstant * (1.0 + estimate(found, "torque_constant_error", "ratio").value),
+                        kTruth.torque_constant),
+            3.0);
+  EXPECT_LT(off_percent(estimate(found, "viscous_friction", "coefficient").value, friction.viscous), 3.0);
+  EXPECT_LT(off_percent(estimate(found, "coulomb_friction", "torque").value, friction.coulomb), 3.0);
+}
+
+TEST_F(Table1, LinearEstimatesAreWithinThreePercent) {
+  for (std::uint64_t seed = 7001; seed < 7009; ++seed) {
+    SCOPED_TRACE(seed);
+    expect_within_three_percent(*linear(seed, cutoff(10.0)));
+  }
+  expect_within_three_percent(*linear(kJudgingSeed, {}));  // with the cut-off that the tool chooses
+}
+
+TEST_F(Table1, FromItsSinusoidsAloneTheToolSaysThatStribeckCannotBeTold) {
+  for (const auto& options : {regression::PipelineOptions{}, cutoff(10.0), cutoff(20.0)}) {
+    const auto found =
+        regression::identify(dataset_of(composite), model_of(rhs100::simulated_stribeck_model()), options);
+    bool said = false;
+    for (const std::string& w : found->warnings)
+      said = said || (w.find("stribeck_hess_soom.velocity stopped at the end of what these data can show") == 0 &&
+                      w.find("record a slow free triangle") != std::string::npos);
+    EXPECT_TRUE(said);
+  }
+}
+
+// Slow motion under Stribeck friction jumps: from rest to 1 rad/s within some milliseconds, and back from 0.16 rad/s. A
+// regression has to mask that, and what is left holds the amplitude times the square of the speed alone.
+TEST_F(Table1, RegressionOnTheSlowSawToothDoesNotClaimTheSpeed) {
+  const auto found =
+      regression::identify(dataset_of(saw_tooth), partitioned(*linear(kJudgingSeed, cutoff(10.0))), cutoff(200.0));
+  const regression::Estimate& speed = estimate(*found, "stribeck_hess_soom", "velocity");
+  EXPECT_LT(*speed.low, kTruth.friction.positive.stribeck_velocity);
+  EXPECT_GT(*speed.high, kTruth.friction.positive.stribeck_velocity);
+}
+
+TEST_F(Table1, TheFreeRunOnTheSlowSawToothTellsAmplitudeAndSpeed) {
+  const report::DirectionalFriction& truth = kTruth.friction.positive;
+  Column speeds, claimed;
+  int covered = 0;
+  for (std::uint64_t seed = 7001; seed < 7005; ++seed) {
+    const auto fast = linear(seed, cutoff(10.0));
+    const std::vector<FreeParameter> parameters{
+        {{{"stribeck_hess_soom", "amplitude_positive"}, {"stribeck_hess_soom", "amplitude_negative"}},
+         {0.001, 0.003, 0.006, 0.012, 0.024}},
+        {{{"stribeck_hess_soom", "velocity"}}, {0.01, 0.05, 0.25}},
+        // Not better known from the composite than the slow run needs them; else their errors would be the speed's.
+        {{{"coulomb_friction", "torque"}}, {estimate(*fast, "coulomb_friction", "torque").value}},
+        {{{"viscous_friction", "coefficient"}}, {estimate(*fast, "viscous_friction", "coefficient").value}},
+        {{{"torque_constant_error", "ratio"}}, {estimate(*fast, "torque_constant_error", "ratio").value}}};
+    const data::Dataset slow = dataset_of(saw_tooth, seed);
+    const FreeRunFit fit = fit_free_run(slow.experiments.front(), partitioned(*fast), parameters, 20.0, 2.0);
+    EXPECT_NEAR(fit.values[0] / truth.stribeck, 1.0, 0.15) << "the report's: 5 times the truth";
+    EXPECT_NEAR(fit.values[1] / truth.stribeck_velocity, 1.0, 0.15) << "the report's: 0.07 times the truth";
+    covered += fit.low[1] <= truth.stribeck_velocity && truth.stribeck_velocity <= fit.high[1];
+    speeds.push_back(fit.values[1]);
+    claimed.push_back(fit.std[1]);
+    printf("%zu F %.5f +- %.5f vs %.4f +- %.4f rmse %.5f\n", (size_t)seed, fit.values[0], fit.std[0], fit.values[1],
+           fit.std[1], fit.rmse);
+  }
+  EXPECT_GE(covered, 3) << "of 4 intervals of 95 %";
+  // What the intervals claim is what the estimates do.
+  EXPECT_LT(spread_percent(speeds), 2.5 * 100.0 * mean(claimed) / mean(speeds));
+}
+
+// The velocity of the report's motor under a slow saw-tooth current, with its friction block of one kind.
+std::vector<double> velocity_with(report::FrictionMethod method, double step_s, double stribeck_velocity) {
+  report::FrictionCurve curve = kTruth.friction;
+  curve.positive.stribeck_velocity = curve.negative.stribeck_velocity = stribeck_velocity;
+  const auto block = report::make_friction_block(method, {kTruth.inertia, {curve}}, step_s);
+  std::vector<double> velocity;
+  double v = 0.0;
+  const int steps_per_ms = static_cast<int>(std::lround(1e-3 / step_s));
+  for (int k = 0; k < 10000 * steps_per_ms; ++k) {
+    const double phase = 0.5 * step_s * k, turn = phase - std::floor(phase);
+    const double triangle = turn < 0.25 ? 4.0 * turn : turn < 0.75 ? 2.0 - 4.0 * turn : 4.0 * turn - 4.0;
+    v = block->next_velocity(v, kTruth.torque_constant * 0.7 * triangle);
+    if (k % steps_per_ms == 0) velocity.push_back(v);
+  }
+  return velocity;
+}
+
+double effect_percent(report::FrictionMethod method, double step_s, double velocity) {
+  const std::vector<double> base = velocity_with(method, step_s, kTruth.friction.positive.stribeck_velocity);
+  std::vector<double> change = velocity_with(method, step_s, velocity);
+  for (std::size_t k = 0; k < change.size(); ++k) change[k] -= base[k];
+  return 100.0 * root_mean_square(change) / root_mean_square(base);
+}
+
+TEST(Table1Simulation, TheReportsBoundaryLayerHidTheStribeckVelocityFromItsOwnSimulation) {
+  const report::BoundaryLayerFriction layer({kTruth.inertia, {kTruth.friction}}, published::kSampleS);
+  EXPECT_NEAR(layer.width(1), 0.6, 1e-9);
+  EXPECT_GT(layer.width(1), 10.0 * kTruth.friction.positive.stribeck_velocity);
+  for (const double velocity : {0.0035, 0.02, 0.1}) {
+    const double report_s = effect_percent(report::FrictionMethod::boundary_layer, published::kSampleS, velocity);
+    const double exact = effect_percent(report::FrictionMethod::implicit, published::kSampleS / 16.0, velocity);
+    printf("%g: %.3f %% %.3f %%\n", velocity, report_s, exact);
+    EXPECT_LT(report_s, 1.0);
+    EXPECT_GT(exact, 3.0 * report_s);
+  }
+}
+
+}  // namespace
+}  // namespace flexspline::testing
