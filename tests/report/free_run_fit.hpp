@@ -17,7 +17,7 @@ namespace flexspline::testing {
 
 struct FreeParameter {
   std::vector<std::pair<std::string, std::string>> places;  // effect and parameter; several have one value
-  std::vector<double> starts;  // all combinations are tried, and the best is where the search begins
+  std::vector<double> starts;
 };
 
 struct FreeRunFit {
@@ -25,88 +25,121 @@ struct FreeRunFit {
   double rmse = 0.0;                           // of the velocity
 };
 
-// The free run of one experiment on its current without what is above `current_cutoff_hz`, as noise makes a shaft break
-// away early. Positive parameters, searched by their logarithm. The covariance is a jackknife over blocks of a
-// `block_s`, as those of one stroke do.
-inline FreeRunFit fit_free_run(data::Experiment experiment, model::Model model,
-                               const std::vector<FreeParameter>& parameters, double current_cutoff_hz, double block_s) {
-  const std::vector<double> measured = experiment[data::Column::motor_velocity];
-  const signals::ZeroPhaseFilter filter(5, current_cutoff_hz, 1.0 / experiment.sample_s);
-  experiment[data::Column::current] = filter.apply(experiment[data::Column::current]);
-  simulation::Options options;
-  options.step_s = 0.25e-3;  // 1/16 ms gives the same to 0.1 %
-  options.initial_motor_velocity = 0.0;
-  const auto n = static_cast<Eigen::Index>(measured.size()), p = static_cast<Eigen::Index>(parameters.size());
-  const auto residual = [&](const Eigen::VectorXd& logs) {
-    for (Eigen::Index j = 0; j < p; ++j)
-      for (const auto& [effect, parameter] : parameters[static_cast<std::size_t>(j)].places)
-        fix(model, effect, parameter, std::exp(logs[j]));
-    const simulation::FreeRun run = simulation::run(model, experiment, options);
-    Eigen::VectorXd r(n);
-    for (Eigen::Index k = 0; k < n; ++k)
-      r[k] = measured[static_cast<std::size_t>(k)] - run.motor_velocity[static_cast<std::size_t>(k)];
-    return r;
-  };
-  // A friction too large never lets go, and has no slope that would say so.
-  Eigen::VectorXd at(p), r;
-  std::size_t combinations = 1;
-  for (const FreeParameter& one : parameters) combinations *= one.starts.size();
-  for (std::size_t c = 0; c < combinations; ++c) {
-    Eigen::VectorXd trial(p);
-    std::size_t rest = c;
-    for (Eigen::Index j = 0; j < p; ++j) {
-      const std::vector<double>& starts = parameters[static_cast<std::size_t>(j)].starts;
-      trial[j] = std::log(starts[rest % starts.size()]);
-      rest /= starts.size();
-    }
-    const Eigen::VectorXd left = residual(trial);
-    if (r.size() != 0 && left.squaredNorm() >= r.squaredNorm()) continue;
-    r = left;
-    at = trial;
+// Errors of a model's free run as a function of the logarithms of some parameters.
+class FreeRunError {
+ public:
+  // The current is taken without what is above `current_cutoff_hz`, as noise makes a shaft break away early.
+  FreeRunError(data::Experiment experiment, model::Model model, const std::vector<FreeParameter>& parameters,
+               double current_cutoff_hz)
+      : experiment_(std::move(experiment)),
+        model_(std::move(model)),
+        parameters_(parameters),
+        measured_(experiment_[data::Column::motor_velocity]) {
+    const signals::ZeroPhaseFilter filter(5, current_cutoff_hz, 1.0 / experiment_.sample_s);
+    experiment_[data::Column::current] = filter.apply(experiment_[data::Column::current]);
+    options_.step_s = 0.25e-3;  // 1/16 ms gives the same to 0.1 %
+    options_.initial_motor_velocity = 0.0;
   }
-  Eigen::MatrixXd slopes(n, p);
-  double damping = 1e-2;
-  constexpr double kStep = 1e-3;
-  for (int iteration = 0; iteration < 40; ++iteration) {
-    for (Eigen::Index j = 0; j < p; ++j) {
-      Eigen::VectorXd up = at, down = at;
-      up[j] += kStep;
-      down[j] -= kStep;
-      slopes.col(j) = (residual(up) - residual(down)) / (2.0 * kStep);
+
+  Eigen::Index samples() const { return static_cast<Eigen::Index>(measured_.size()); }
+  double sample_s() const { return experiment_.sample_s; }
+
+  Eigen::VectorXd at(const Eigen::VectorXd& logs) {
+    for (std::size_t j = 0; j < parameters_.size(); ++j)
+      for (const auto& [effect, parameter] : parameters_[j].places)
+        fix(model_, effect, parameter, std::exp(logs[static_cast<Eigen::Index>(j)]));
+    const simulation::FreeRun run = simulation::run(model_, experiment_, options_);
+    return Eigen::Map<const Eigen::VectorXd>(measured_.data(), samples()) -
+           Eigen::Map<const Eigen::VectorXd>(run.motor_velocity.data(), samples());
+  }
+
+  Eigen::MatrixXd slopes(const Eigen::VectorXd& logs) {
+    constexpr double kStep = 1e-3;
+    Eigen::MatrixXd columns(samples(), logs.size());
+    for (Eigen::Index j = 0; j < logs.size(); ++j) {
+      const Eigen::VectorXd step = Eigen::VectorXd::Unit(logs.size(), j) * kStep;
+      columns.col(j) = (at(logs + step) - at(logs - step)) / (2.0 * kStep);
     }
-    const Eigen::MatrixXd normal = slopes.transpose() * slopes;
+    return columns;
+  }
+
+ private:
+  data::Experiment experiment_;
+  model::Model model_;
+  const std::vector<FreeParameter>& parameters_;
+  std::vector<double> measured_;
+  simulation::Options options_;
+};
+
+// Levenberg and Marquardt's search from `at`, which it moves. Returns the errors there.
+inline Eigen::VectorXd descend(FreeRunError& error, Eigen::VectorXd& at) {
+  Eigen::VectorXd r = error.at(at);
+  double damping = 1e-2;
+  for (int iteration = 0; iteration < 40; ++iteration) {
+    const Eigen::MatrixXd slopes = error.slopes(at);
     const Eigen::VectorXd gradient = slopes.transpose() * r;
-    bool moved = false;
-    double step_size = 0.0;
-    for (int trial = 0; trial < 8 && !moved; ++trial) {
-      Eigen::MatrixXd damped = normal;
+    double moved_by = 0.0;
+    for (int trial = 0; trial < 8 && moved_by == 0.0; ++trial) {
+      Eigen::MatrixXd damped = slopes.transpose() * slopes;
       damped.diagonal() *= 1.0 + damping;
       const Eigen::VectorXd step = damped.ldlt().solve(-gradient).cwiseMax(-0.7).cwiseMin(0.7);
-      const Eigen::VectorXd next = residual(at + step);
-      moved = next.squaredNorm() < r.squaredNorm();
-      damping *= moved ? 0.2 : 5.0;
-      if (!moved) continue;
-      step_size = step.cwiseAbs().maxCoeff();
+      const Eigen::VectorXd next = error.at(at + step);
+      const bool better = next.squaredNorm() < r.squaredNorm();
+      damping *= better ? 0.2 : 5.0;
+      if (!better) continue;
+      moved_by = step.cwiseAbs().maxCoeff();
       at += step;
       r = next;
     }
-    if (!moved || step_size < 1e-4) break;
+    if (moved_by < 1e-3) break;
   }
-  // Delete-a-block jackknife, to first order.
-  const Eigen::MatrixXd normal = slopes.transpose() * slopes;
+  return r;
+}
+
+// Fits positive parameters. The first one's starts are tried for each combination of the others', which each begin a
+// search: a friction too large never lets go and has no slope that would say so, and there are local minima. Intervals
+// come from a jackknife over blocks of `block_s`, to first order, as errors of one stroke go together.
+inline FreeRunFit fit_free_run(const data::Experiment& experiment, const model::Model& model,
+                               const std::vector<FreeParameter>& parameters, double current_cutoff_hz, double block_s) {
+  FreeRunError error(experiment, model, parameters, current_cutoff_hz);
+  const auto p = static_cast<Eigen::Index>(parameters.size());
+  std::size_t combinations = 1;
+  for (std::size_t j = 1; j < parameters.size(); ++j) combinations *= parameters[j].starts.size();
+  Eigen::VectorXd best, r;
+  for (std::size_t c = 0; c < combinations; ++c) {
+    Eigen::VectorXd start(p);
+    std::size_t rest = c;
+    for (std::size_t j = 1; j < parameters.size(); ++j) {
+      start[static_cast<Eigen::Index>(j)] = std::log(parameters[j].starts[rest % parameters[j].starts.size()]);
+      rest /= parameters[j].starts.size();
+    }
+    double least = 0.0, first = 0.0;
+    for (const double value : parameters.front().starts) {
+      start[0] = std::log(value);
+      const double left = error.at(start).squaredNorm();
+      if (least != 0.0 && left >= least) continue;
+      least = left;
+      first = start[0];
+    }
+    start[0] = first;
+    const Eigen::VectorXd left = descend(error, start);
+    if (r.size() != 0 && left.squaredNorm() >= r.squaredNorm()) continue;
+    r = left;
+    best = start;
+  }
+  const Eigen::MatrixXd slopes = error.slopes(best), normal = slopes.transpose() * slopes;
   Eigen::MatrixXd covariance = Eigen::MatrixXd::Zero(p, p);
-  const auto block = static_cast<Eigen::Index>(std::lround(block_s / experiment.sample_s));
-  const Eigen::Index blocks = n / block;
-  for (Eigen::Index b = 0; b < blocks; ++b) {
-    const auto part = slopes.middleRows(b * block, block);
-    const Eigen::VectorXd score = part.transpose() * r.segment(b * block, block);
+  const auto block = static_cast<Eigen::Index>(std::lround(block_s / error.sample_s()));
+  for (Eigen::Index first = 0; first + block <= error.samples(); first += block) {
+    const auto part = slopes.middleRows(first, block);
+    const Eigen::VectorXd score = part.transpose() * r.segment(first, block);
     const Eigen::VectorXd shift = (normal - part.transpose() * part).ldlt().solve(score);
     covariance += shift * shift.transpose();
   }
   FreeRunFit fit;
-  fit.rmse = std::sqrt(r.squaredNorm() / static_cast<double>(n));
+  fit.rmse = std::sqrt(r.squaredNorm() / static_cast<double>(r.size()));
   for (Eigen::Index j = 0; j < p; ++j) {
-    const double value = std::exp(at[j]), deviation = std::sqrt(covariance(j, j));
+    const double value = std::exp(best[j]), deviation = std::sqrt(covariance(j, j));
     fit.values.push_back(value);
     fit.std.push_back(value * deviation);
     fit.low.push_back(value * std::exp(-2.0 * deviation));

@@ -88,8 +88,8 @@ TEST_F(Table1, TheFreeRunOnTheSlowSawToothTellsAmplitudeAndSpeed) {
     const auto fast = linear(seed, cutoff(10.0));
     const std::vector<FreeParameter> parameters{
         {{{"stribeck_hess_soom", "amplitude_positive"}, {"stribeck_hess_soom", "amplitude_negative"}},
-         {0.001, 0.003, 0.006, 0.012, 0.024}},
-        {{{"stribeck_hess_soom", "velocity"}}, {0.01, 0.05, 0.25}},
+         {0.002, 0.004, 0.006, 0.008, 0.01, 0.012, 0.016, 0.024}},
+        {{{"stribeck_hess_soom", "velocity"}}, {0.02, 0.1}},
         // Not better known from the composite than the slow run needs them; else their errors would be the speed's.
         {{{"coulomb_friction", "torque"}}, {estimate(*fast, "coulomb_friction", "torque").value}},
         {{{"viscous_friction", "coefficient"}}, {estimate(*fast, "viscous_friction", "coefficient").value}},
