@@ -3,8 +3,11 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <atomic>
+#include <future>
 #include <iterator>
 #include <stdexcept>
+#include <thread>
 
 #include "hil/plant/whole_file.hpp"
 #include "hil/report/published.hpp"
@@ -104,10 +107,17 @@ std::string_view view(const Text& text) {
 
 void write_set(const Set& set, const std::filesystem::path& folder, std::uint64_t seed) {
   plant::make_folder(folder);
-  for (std::size_t k = 0; k < set.experiments.size(); ++k) {
-    const Text text = csv(set, set.experiments[k], record(set, k, seed));
-    plant::write_whole(folder / (set.experiments[k].plan.name + ".csv"), view(text));
-  }
+  std::atomic<std::size_t> next = 0;
+  const auto work = [&] {
+    for (std::size_t k = next++; k < set.experiments.size(); k = next++) {
+      const Text text = csv(set, set.experiments[k], record(set, k, seed));
+      plant::write_whole(folder / (set.experiments[k].plan.name + ".csv"), view(text));
+    }
+  };
+  std::vector<std::future<void>> workers;
+  for (unsigned i = 0; i < std::max(1U, std::thread::hardware_concurrency()); ++i)
+    workers.push_back(std::async(std::launch::async, work));
+  for (std::future<void>& worker : workers) worker.get();
   Text dataset = dataset_head(set.gear_ratio);
   list_experiments(dataset, set, "");
   plant::write_whole(folder / "base-model.toml", set.base_model);

@@ -40,20 +40,20 @@ Friction of locked runs is the average of tables 7 and 8, compliance of free run
 | wave-form codes | 1 sine, 3 triangle, 4 square, 7 composite (eq. 60), 8 asymmetric sine | four types and the asymmetric one are named, their numbers are not |
 | output inertia | {} kg m^2 | reflected, {:.2g} of the motor's side |
 | output friction | {} N m s/rad, {} N m | |
-| 100 % in velocity mode | {} rad/s at the motor | what 3.5 A can follow at 0.8 Hz |
+| 100 % in velocity mode | {} rad/s at the motor | a speed that 3.5 A can follow at 0.8 Hz |
 | 100 % with the output locked | {} A | gives the torsion at which the linear and the cubic fit of tables 4 and 6 agree (about 3 mrad in 100-8) |
 | 100 % in current mode, free | {} A | 18 % of less does not move a drive with table 7's Coulomb friction |
 | asymmetric sine | its larger half is the amplitude | |
 | the seven experiments of section 4.2.2 that no table has | 50-3, 50-4; sines 20-1-02, 40-1-04, 60-1-06, 80-1-08, 100-1-10; eq. 79's values; role `holdout` | the ranges are given |
-| encoders | {} counts at the motor, {} at the output | the report's motor has a tachometer alone, which at 1 to 2 % of noise shows nothing at 0.1 rad/s; it is recorded, too |
+| encoders | {} counts at the motor, {} at the output | the report's motor has a tachometer alone, which at 2 % of noise blurs what happens at 0.1 rad/s; it is recorded, too |
 | table 3's rows | the scan has the last column alone; the others are the final decision, up and down by the printed deviation | |
 | currents of the bare motor | 0.5 A at 0.5 Hz; saw-teeth of 0.30 to 0.36 A at 0.2 to 0.5 Hz | |
-| table 1: load | {} N m, constant | |
-| table 1: inputs | composite 2 A at 2, 4, 6 Hz; saw-tooth 0.9 A at 0.5 Hz; 60 s | three harmonics, and slow |
+| table 1: load | {} N m with the composite, {} with the saw-tooth, constant | with the lesser one both directions break away alike |
+| table 1: inputs | composite 3 A at 0.25, 0.5, 0.75 Hz, 180 s; saw-tooth 0.7 A at 0.5 Hz, 60 s | three harmonics, and slow |
 | lengths | 10 to 20 s, at least three periods | |
 )",
       kOutputInertia, kOutputInertia / 1e4 / 1.04e-4, kOutputViscous, kOutputCoulomb, kFullVelocity, kFullLockedCurrent,
-      kFullSlowCurrent, kMotorCounts, kOutputCounts, kSimulationLoad);
+      kFullSlowCurrent, kMotorCounts, kOutputCounts, kSimulationLoad, kSlowSimulationLoad);
   return text;
 }
 
