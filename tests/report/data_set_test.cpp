@@ -17,7 +17,7 @@ std::string text_of(const std::filesystem::path& file) {
   return {std::istreambuf_iterator<char>(in), {}};
 }
 
-class DataSet : public ::testing::Test {
+class Rhs100DataSet : public ::testing::Test {
  protected:
   void SetUp() override {
     folder = std::filesystem::temp_directory_path() / ("rhs-100-" + std::to_string(::getpid()));
@@ -27,7 +27,7 @@ class DataSet : public ::testing::Test {
   std::filesystem::path folder;
 };
 
-TEST_F(DataSet, FilesHoldWhatTheTwinRecorded) {
+TEST_F(Rhs100DataSet, FilesHoldWhatTheTwinRecorded) {
   ASSERT_EQ(rhs100::write_data_set(folder, {"table-6"}, kJudgingSeed), 4u);
   const rhs100::Set set = rhs100::table_6();
   const data::Dataset in_memory = dataset_of(set), read = data::load({folder / "table-6"});
@@ -47,7 +47,7 @@ TEST_F(DataSet, FilesHoldWhatTheTwinRecorded) {
   }
 }
 
-TEST_F(DataSet, TheSameSeedGivesTheSameFilesAndAnotherSeedOthers) {
+TEST_F(Rhs100DataSet, TheSameSeedGivesTheSameFilesAndAnotherSeedOthers) {
   for (const auto& [name, seed] : {std::pair{"a", 7001}, std::pair{"b", 7001}, std::pair{"c", 7002}})
     rhs100::write_data_set(folder / name, {"table-3-slow"}, static_cast<std::uint64_t>(seed));
   const std::filesystem::path file = "table-3-slow/slow-1.csv";
@@ -55,7 +55,7 @@ TEST_F(DataSet, TheSameSeedGivesTheSameFilesAndAnotherSeedOthers) {
   EXPECT_NE(text_of(folder / "a" / file), text_of(folder / "c" / file));
 }
 
-TEST_F(DataSet, AllPartsHaveTheReportsExperimentsAndSayWhatIsChosen) {
+TEST_F(Rhs100DataSet, AllPartsHaveTheReportsExperimentsAndSayWhatIsChosen) {
   EXPECT_EQ(rhs100::write_data_set(folder, {}, kJudgingSeed), 11u + 4u + 26u + 15u + 8u + 2u);
   // The drive as a whole: tables 4, 7 and 8, without what the tool would complain of.
   const data::Dataset drive = data::load({folder});
@@ -71,7 +71,7 @@ TEST_F(DataSet, AllPartsHaveTheReportsExperimentsAndSayWhatIsChosen) {
     EXPECT_NE(readme.find(chosen), std::string::npos) << chosen;
 }
 
-TEST_F(DataSet, APartThatThereIsNotIsRefusedWithTheNamesOfThoseThatAre) {
+TEST_F(Rhs100DataSet, APartThatThereIsNotIsRefusedWithTheNamesOfThoseThatAre) {
   try {
     rhs100::write_data_set(folder, {"table-9"}, 1);
     FAIL();

@@ -5,6 +5,7 @@
 
 #include <Eigen/Cholesky>
 #include <Eigen/Core>
+#include <algorithm>
 #include <cmath>
 #include <string>
 #include <vector>
@@ -21,8 +22,8 @@ struct FreeParameter {
 };
 
 struct FreeRunFit {
-  std::vector<double> values, std, low, high;  // with 95 % intervals, of the logarithm
-  double rmse = 0.0;                           // of the velocity
+  std::vector<double> values, low, high;  // with 95 % intervals, of the logarithm
+  double rmse = 0.0;                      // of the velocity
 };
 
 // Errors of a model's free run as a function of the logarithms of some parameters.
@@ -54,7 +55,8 @@ class FreeRunError {
   }
 
   Eigen::MatrixXd slopes(const Eigen::VectorXd& logs) {
-    constexpr double kStep = 1e-3;
+    // Wider than the steps in which a simulation on a grid of time breaks away.
+    constexpr double kStep = 1e-2;
     Eigen::MatrixXd columns(samples(), logs.size());
     for (Eigen::Index j = 0; j < logs.size(); ++j) {
       const Eigen::VectorXd step = Eigen::VectorXd::Unit(logs.size(), j) * kStep;
@@ -79,7 +81,7 @@ inline Eigen::VectorXd descend(FreeRunError& error, Eigen::VectorXd& at) {
     const Eigen::MatrixXd slopes = error.slopes(at);
     const Eigen::VectorXd gradient = slopes.transpose() * r;
     double moved_by = 0.0;
-    for (int trial = 0; trial < 8 && moved_by == 0.0; ++trial) {
+    for (int trial = 0; trial < 5 && moved_by == 0.0; ++trial) {
       Eigen::MatrixXd damped = slopes.transpose() * slopes;
       damped.diagonal() *= 1.0 + damping;
       const Eigen::VectorXd step = damped.ldlt().solve(-gradient).cwiseMax(-0.7).cwiseMin(0.7);
@@ -91,21 +93,51 @@ inline Eigen::VectorXd descend(FreeRunError& error, Eigen::VectorXd& at) {
       at += step;
       r = next;
     }
-    if (moved_by < 1e-3) break;
+    if (moved_by < 3e-3) break;
   }
   return r;
 }
 
+// Where a search ended: the parameters' logarithms, the errors there, and a jackknife's deviations.
+struct FreeRunEnd {
+  Eigen::VectorXd at, errors, deviations;
+};
+
+// Deviations by a jackknife over blocks of samples, to first order, as errors of one stroke go together.
+inline Eigen::VectorXd jackknife(FreeRunError& error, const FreeRunEnd& end, Eigen::Index block) {
+  const Eigen::MatrixXd slopes = error.slopes(end.at), normal = slopes.transpose() * slopes;
+  Eigen::VectorXd variances = Eigen::VectorXd::Zero(end.at.size());
+  for (Eigen::Index first = 0; first + block <= error.samples(); first += block) {
+    const auto part = slopes.middleRows(first, block);
+    const Eigen::VectorXd score = part.transpose() * end.errors.segment(first, block);
+    variances += (normal - part.transpose() * part).ldlt().solve(score).cwiseAbs2();
+  }
+  return variances.cwiseSqrt();
+}
+
+// Whether the errors of one end are larger than those of another by more than they differ from block to block.
+inline bool surely_worse(const FreeRunEnd& end, const FreeRunEnd& best, Eigen::Index block) {
+  double sum = 0.0, squares = 0.0;
+  for (Eigen::Index first = 0; first + block <= best.errors.size(); first += block) {
+    const double more =
+        end.errors.segment(first, block).squaredNorm() - best.errors.segment(first, block).squaredNorm();
+    sum += more;
+    squares += more * more;
+  }
+  return sum > 2.0 * std::sqrt(squares);
+}
+
 // Fits positive parameters. The first one's starts are tried for each combination of the others', which each begin a
-// search: a friction too large never lets go and has no slope that would say so, and there are local minima. Intervals
-// come from a jackknife over blocks of `block_s`, to first order, as errors of one stroke go together.
+// search: a friction too large never lets go and has no slope that would say so, and there are local minima. An
+// interval spans those that the data cannot tell from the best.
 inline FreeRunFit fit_free_run(const data::Experiment& experiment, const model::Model& model,
                                const std::vector<FreeParameter>& parameters, double current_cutoff_hz, double block_s) {
   FreeRunError error(experiment, model, parameters, current_cutoff_hz);
   const auto p = static_cast<Eigen::Index>(parameters.size());
+  const auto block = static_cast<Eigen::Index>(std::lround(block_s / error.sample_s()));
   std::size_t combinations = 1;
   for (std::size_t j = 1; j < parameters.size(); ++j) combinations *= parameters[j].starts.size();
-  Eigen::VectorXd best, r;
+  std::vector<FreeRunEnd> ends;
   for (std::size_t c = 0; c < combinations; ++c) {
     Eigen::VectorXd start(p);
     std::size_t rest = c;
@@ -122,28 +154,27 @@ inline FreeRunFit fit_free_run(const data::Experiment& experiment, const model::
       first = start[0];
     }
     start[0] = first;
-    const Eigen::VectorXd left = descend(error, start);
-    if (r.size() != 0 && left.squaredNorm() >= r.squaredNorm()) continue;
-    r = left;
-    best = start;
+    FreeRunEnd end;
+    end.errors = descend(error, start);
+    end.at = start;
+    end.deviations = jackknife(error, end, block);
+    ends.push_back(std::move(end));
   }
-  const Eigen::MatrixXd slopes = error.slopes(best), normal = slopes.transpose() * slopes;
-  Eigen::MatrixXd covariance = Eigen::MatrixXd::Zero(p, p);
-  const auto block = static_cast<Eigen::Index>(std::lround(block_s / error.sample_s()));
-  for (Eigen::Index first = 0; first + block <= error.samples(); first += block) {
-    const auto part = slopes.middleRows(first, block);
-    const Eigen::VectorXd score = part.transpose() * r.segment(first, block);
-    const Eigen::VectorXd shift = (normal - part.transpose() * part).ldlt().solve(score);
-    covariance += shift * shift.transpose();
+  const FreeRunEnd best = *std::min_element(ends.begin(), ends.end(), [](const FreeRunEnd& a, const FreeRunEnd& b) {
+    return a.errors.squaredNorm() < b.errors.squaredNorm();
+  });
+  Eigen::VectorXd low = best.at, high = best.at;
+  for (const FreeRunEnd& end : ends) {
+    if (surely_worse(end, best, block)) continue;
+    low = low.cwiseMin(end.at - 2.0 * end.deviations);
+    high = high.cwiseMax(end.at + 2.0 * end.deviations);
   }
   FreeRunFit fit;
-  fit.rmse = std::sqrt(r.squaredNorm() / static_cast<double>(r.size()));
+  fit.rmse = std::sqrt(best.errors.squaredNorm() / static_cast<double>(error.samples()));
   for (Eigen::Index j = 0; j < p; ++j) {
-    const double value = std::exp(best[j]), deviation = std::sqrt(covariance(j, j));
-    fit.values.push_back(value);
-    fit.std.push_back(value * deviation);
-    fit.low.push_back(value * std::exp(-2.0 * deviation));
-    fit.high.push_back(value * std::exp(2.0 * deviation));
+    fit.values.push_back(std::exp(best.at[j]));
+    fit.low.push_back(std::exp(low[j]));
+    fit.high.push_back(std::exp(high[j]));
   }
   return fit;
 }
