@@ -3,6 +3,8 @@
 
 #include <algorithm>
 #include <cmath>
+#include <cstdint>
+#include <numbers>
 
 namespace flexspline::numbers {
 
@@ -17,6 +19,7 @@ struct ScalarSystem {
   using Gain = S;
   using StepGain = S;
   using RatioGain = S;
+  using DistanceGain = S;
   using Ratio = S;
   using Exponent = S;
   using Order = S;
@@ -31,6 +34,7 @@ struct ScalarSystem {
   static S gain(const S& p) { return p; }
   static S step_gain(const S& p) { return p; }
   static S ratio_gain(const S& p) { return p; }
+  static S distance_gain(const S& p) { return p; }
   static S value(const S& p) { return p; }
   static S share(const S& p) { return p; }
   static S exponent(const S& p) { return p; }
@@ -70,6 +74,12 @@ struct ScalarSystem {
     using std::sin;
     return {cos(x), sin(x)};
   }
+  // Integers of 2^-32, as control counts on a drive: positions and distances in turns, a value, the wave at a phase.
+  static S angle(std::int64_t q32) { return S(static_cast<double>(q32) * 0x1p-32); }
+  static S steps(std::int64_t q32) { return angle(q32); }
+  static S value_of(std::int64_t q32) { return angle(q32); }
+  static Wave wave(std::uint32_t q32) { return sincos(S(2.0 * std::numbers::pi) * angle(q32)); }
+  static S distance(const S& gain, const S& x) { return gain * x; }
   static S gauss(const S& x) {
     using std::exp;
     return exp(-x * x);

@@ -87,4 +87,27 @@ inline RatioGain make_ratio_gain(double x) {
   return make_coefficient<RatioGain>(x, kLargestRatio, kValueBits);
 }
 
+// Per unit of angle (a turn), from distances of up to 2^31 turns to a state that stops at four.
+inline DistanceGain make_distance_gain(double x) {
+  constexpr int kLeastExponent = -60;  // a product below has to be shifted by less than a word
+  constexpr int kMostExponent = 30;
+  const double size = x < 0.0 ? -x : x;
+  DistanceGain g;
+  if (size == 0.0) return g;
+  int exponent = 0;
+  double mantissa = size;
+  for (; mantissa >= 1.0 && exponent <= kMostExponent; mantissa *= 0.5) ++exponent;
+  for (; mantissa < 0.5 && exponent >= kLeastExponent; mantissa *= 2.0) --exponent;
+  if (!is_finite(x) || exponent > kMostExponent || exponent < kLeastExponent) {
+    Findings::note("a gain of a distance is not between 1e-18 and 1e9");
+    return g;
+  }
+  const double limit = scaled_by_power(4.0 / size, kAngleBits);
+  g.mantissa =
+      static_cast<std::int32_t>(nearest(scaled_by_power(x < 0.0 ? -mantissa : mantissa, kMantissaBits), 1.1e9, ""));
+  g.exponent = static_cast<std::int8_t>(exponent);
+  g.limit = limit < 9e18 ? static_cast<std::int64_t>(limit) : std::numeric_limits<std::int64_t>::max();
+  return g;
+}
+
 }  // namespace flexspline::fixed

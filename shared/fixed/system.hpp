@@ -58,6 +58,7 @@ struct FixedSystem {
   using Ratio = fixed::Ratio;
   using StepGain = fixed::StepGain;
   using RatioGain = fixed::RatioGain;
+  using DistanceGain = fixed::DistanceGain;
   using Exponent = fixed::Exponent;
   using Order = fixed::Order;
 
@@ -69,6 +70,7 @@ struct FixedSystem {
   static Gain gain(double x) { return {make_gain(x)}; }
   static StepGain step_gain(double x) { return make_step_gain(x); }
   static RatioGain ratio_gain(double x) { return make_ratio_gain(x); }
+  static DistanceGain distance_gain(double x) { return make_distance_gain(x); }
   static Value value(double x) { return {make_value(x)}; }
   static Share share(double x) { return make_share(x); }
   static Exponent exponent(double x) { return make_exponent(x); }
@@ -110,6 +112,7 @@ struct FixedSystem {
     const std::int64_t most = shift_right(limit.raw, kValueBits - kStateBits);
     return {{limited(x.raw, -most, most)}};
   }
+  static constexpr State clamp(State x, State limit) { return {{limited(x.raw, negated(limit.raw), limit.raw)}}; }
   static constexpr Value between(Value x, Value low, Value high) { return {{limited(x.raw, low.raw, high.raw)}}; }
   static constexpr State clamp_to_one(State x) { return {{limited(x.raw, -kOneState, kOneState)}}; }
   static constexpr State bounded(State x) { return {{limited(x.raw, -4 * kOneState, 4 * kOneState)}}; }
@@ -124,6 +127,17 @@ struct FixedSystem {
     if (up <= 0) return {{shift_right(whole, -up)}};
     const std::int64_t most = 2 * kOneState >> up;
     return {{limited(whole, -most, most) * (std::int64_t{1} << up)}};
+  }
+  // Within four: see DistanceGain.
+  static constexpr State signal(DistanceGain g, Step x) {
+    const int bits = kMantissaBits + kAngleBits - kStateBits - g.exponent;
+    const std::int64_t distance = limited<std::int64_t>(x.raw, -g.limit, g.limit);
+    if (bits > 0) return {{multiply_round(distance, g.mantissa, bits)}};
+    return {{distance * g.mantissa * (std::int64_t{1} << -bits)}};
+  }
+  // Up to 16 turns; the gain is in turns per base.
+  static constexpr Step distance(Gain g, Value x) {
+    return {shift_right(product(g, x.raw), kMantissaBits + kValueBits - kAngleBits - g.exponent)};
   }
   static constexpr Travel travel(StepGain g, Step x) {
     return limited_travel(shift_right(product(g, x.raw), kMantissaBits + kAngleBits - kTravelBits - g.exponent));
@@ -248,6 +262,13 @@ struct FixedSystem {
     return {{{static_cast<std::int32_t>(shift_right(w.cosine, kBits))}},
             {{static_cast<std::int32_t>(shift_right(w.sine, kBits))}}};
   }
+  // Integers of 2^-32: a position and a distance in turns, a value below 15, the wave at a phase in turns.
+  static constexpr Angle angle(std::int64_t q32) { return {q32}; }
+  static constexpr Step steps(std::int64_t q32) { return {q32}; }
+  static constexpr Value value_of(std::int64_t q32) {
+    return {{Policy::value(shift_right(q32, kAngleBits - kValueBits))}};
+  }
+  static constexpr Wave wave(std::uint32_t q32) { return sincos({static_cast<std::int64_t>(q32)}); }
 
  private:
   static constexpr std::int64_t kOneState = std::int64_t{1} << kStateBits;

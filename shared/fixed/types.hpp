@@ -32,6 +32,9 @@ struct Angle {
   friend constexpr Step operator-(Angle a, Angle b) {
     return {static_cast<std::int64_t>(static_cast<std::uint64_t>(a.raw) - static_cast<std::uint64_t>(b.raw))};
   }
+  friend constexpr Angle operator+(Angle a, Step b) {
+    return {static_cast<std::int64_t>(static_cast<std::uint64_t>(a.raw) + static_cast<std::uint64_t>(b.raw))};
+  }
 };
 // A torque before it is narrowed: a term is below 16 bases, so that half a million of them fit.
 struct Sum {
@@ -71,6 +74,12 @@ struct RatioGain {
   std::int32_t mantissa = 0;
   std::int8_t exponent = 0;
   std::int32_t limit = 0;
+};
+// The same for distances of many turns: the input has 64 bits, the result stays within four.
+struct DistanceGain {
+  std::int32_t mantissa = 0;
+  std::int8_t exponent = 0;
+  std::int64_t limit = 0;
 };
 // Of a power, -8 to 8.
 struct Exponent {
