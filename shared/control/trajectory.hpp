@@ -1,10 +1,10 @@
 // A set point of position that keeps to limits of position, velocity and acceleration for every sequence of commands,
 // and arrives at its target exactly and without overshoot, in as short a time as the limits allow (to a tick).
 //
-// It counts in integers on the host and on the drive: positions in 2^-32 turns with a fraction of 16 bits, velocity v in
-// 2^-48 turns a tick, and A the largest change of it a tick. p[k] = p[k-1] + v[k]. From v the drive can stop, losing A a
-// tick, within
-//   D(v) = r n + A n (n - 1)/2 + ... = n v - A n (n + 1)/2,   v = n A + r,  0 <= r < A.
+// It counts in integers on the host and on the drive: positions in 2^-32 turns with a fraction of 16 bits, velocity v
+// in 2^-48 turns a tick, and A the largest change of it a tick. p[k] = p[k-1] + v[k]. From v the drive can stop, losing
+// A a tick, within
+//   D(v) = (v - A) + (v - 2 A) + ... = n v - A n (n + 1)/2,   v = n A + r,  0 <= r < A.
 // Of all v[k] that differ from v[k-1] by at most A, that one is taken which is largest towards the target and leaves
 // room to stop: v + D(v) <= distance. Then v - A will do so in the next tick, so that there always is one.
 #pragma once
@@ -15,6 +15,7 @@
 #include "shared/fixed/bits.hpp"
 #include "shared/fixed/elementary.hpp"
 #include "shared/fixed/findings.hpp"
+#include "shared/fixed/types.hpp"
 
 namespace flexspline::control {
 
@@ -39,7 +40,7 @@ struct Trajectory {
     std::int64_t change = 1;    // largest, of the velocity a tick
     typename N::DistanceGain to_velocity{};
     typename N::DistanceGain to_acceleration{};
-    typename N::DistanceGain from_velocity{};
+    std::int64_t velocity_base = 0;  // 2^-48 turns a tick
   };
   struct State {
     std::int64_t position = 0;  // 2^-32 turns
@@ -65,13 +66,15 @@ struct Trajectory {
                       velocity * (velocity / change + 4.0) + 4.0 * change < 0x1p61;
     Coefficients<N> c;
     if (!fits || setup.lowest > setup.highest) {
-      fixed::Findings::note("limits of a trajectory: above a unit a tick, below half a turn a tick, 8192 turns to stop");
+      fixed::Findings::note(
+          "limits of a trajectory: above a unit a tick, below half a turn a tick, 8192 turns to stop");
       return c;
     }
     c.lowest = setup.lowest;
     c.highest = setup.highest;
     c.velocity = static_cast<std::int64_t>(velocity);
     c.change = static_cast<std::int64_t>(change);
+    c.velocity_base = static_cast<std::int64_t>(static_cast<double>(d.velocity_base * d.time_base) * units);
     const P per_tick = d.angle_base / d.time_base / P(0x1p16);  // of a unit of velocity, read as 2^-32 turns
     c.to_velocity = N::distance_gain(per_tick / d.velocity_base);
     c.to_acceleration = N::distance_gain(per_tick / d.time_base / d.acceleration_base);
@@ -98,11 +101,16 @@ struct Trajectory {
     // Seen towards the target.
     const bool backwards = left < 0;
     const std::int64_t v = backwards ? -before : before;
-    const std::int64_t next = towards(v, s.steps, backwards ? -left : left, c.change,
-                                      fixed::limited<std::int64_t>(speed, 0, c.velocity));
+    const std::int64_t next =
+        towards(v, s.steps, backwards ? -left : left, c.change, fixed::limited<std::int64_t>(speed, 0, c.velocity));
     move(s, backwards ? -next : next, c.change);
     return {N::angle(s.position), N::narrow(N::signal(c.to_velocity, N::steps(s.velocity))),
             N::narrow(N::signal(c.to_acceleration, N::steps(s.velocity - before)))};
+  }
+  // A velocity in bases as `update` takes it.
+  template <class N>
+  static constexpr std::int64_t speed_of(const Coefficients<N>& c, fixed::Value velocity) {
+    return fixed::multiply_round(velocity.raw, c.velocity_base, fixed::kValueBits);
   }
   static constexpr bool arrived(const State& s, std::int64_t target) {
     return s.velocity == 0 && s.fraction == 0 && s.position == target;
@@ -112,8 +120,8 @@ struct Trajectory {
   // What is left to go, in 2^-48 turns.
   static constexpr std::int64_t distance(const State& s, std::int64_t target) {
     constexpr std::int64_t kMost = std::int64_t{1} << (kMostDistanceBits - kFractionBits);
-    const auto whole = static_cast<std::int64_t>(static_cast<std::uint64_t>(target) -
-                                                 static_cast<std::uint64_t>(s.position));
+    const auto whole =
+        static_cast<std::int64_t>(static_cast<std::uint64_t>(target) - static_cast<std::uint64_t>(s.position));
     return fixed::limited(whole, -kMost, kMost) * (std::int64_t{1} << kFractionBits) - s.fraction;
   }
   // v + D(v) of v = n A: A n (n + 1)/2.
