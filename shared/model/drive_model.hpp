@@ -92,9 +92,13 @@ class DriveModel {
   // One tick. `in` has what is measured or set: positions, velocities, accelerations, directions, torque, current,
   // temperature, all within two bases, which the caller limits once, at entry. Returns the torques of the three
   // balances. The first tick only takes note of where the drive stands.
-  constexpr effects::Torques<N> tick(effects::Inputs<N> in) {
+  constexpr effects::Torques<N> tick(effects::Inputs<N> in) { return tick(in, in.angle); }
+  // The same with another angle for effects that repeat with it and have no memory (ripples): a model along a set point
+  // may take what is periodic from where the motor stands.
+  constexpr effects::Torques<N> tick(effects::Inputs<N> in, typename N::Angle periodic_angle) {
+    const auto angle = in.angle;
     complete(in);
-    shift(in);
+    shift(in, periodic_angle);
     modulate(in);
     if (!started_) before_ = in;
     started_ = true;
@@ -103,12 +107,14 @@ class DriveModel {
       for (std::size_t i = 0; i < places.count; ++i) {
         auto& state = places.states[i];
         const auto& coefficients = places.coefficients[i];
+        in.angle = is_periodic<Effect>() ? periodic_angle : angle;
         Effect::advance(state, coefficients, in, before_);
         if constexpr (Effect::kInfo.phase == effects::Phase::source || Effect::kInfo.adds_to != 0)
           Effect::evaluate(state, coefficients, in, out);
       }
     });
     before_ = in;
+    before_.angle = angle;
     return out;
   }
 
@@ -121,6 +127,10 @@ class DriveModel {
       return id_of<Effect, Id + 1>();
     }
   }
+  template <class Effect>
+  static constexpr bool is_periodic() {
+    return (Effect::kInfo.reads & effects::kMotorAngle) != 0 && std::is_empty_v<typename Effect::template State<N>>;
+  }
   static constexpr void complete(effects::Inputs<N>& in) {
     in.speed = N::magnitude(in.velocity);
     in.torque_magnitude = N::magnitude(in.torque);
@@ -129,15 +139,18 @@ class DriveModel {
     in.elapsed = N::one();
   }
   // The dead zone of a backlash lies behind everything else that changes the torsion.
-  constexpr void shift(effects::Inputs<N>& in) {
+  constexpr void shift(effects::Inputs<N>& in, typename N::Angle periodic_angle) {
+    const auto angle = in.angle;
     for (const bool last : {false, true}) {
       places_.for_each([&]<class Effect>(Places<Effect, N>& places) {
         if constexpr (Effect::kInfo.phase == effects::Phase::shift) {
           if (Effect::kInfo.acts_last != last) return;
+          in.angle = is_periodic<Effect>() ? periodic_angle : angle;
           for (std::size_t i = 0; i < places.count; ++i) Effect::shift(places.coefficients[i], in);
         }
       });
     }
+    in.angle = angle;
   }
   constexpr void modulate(effects::Inputs<N>& in) {
     places_.for_each([&]<class Effect>(Places<Effect, N>& places) {

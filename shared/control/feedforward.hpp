@@ -1,0 +1,142 @@
+// Feedforward: the torque that a set point takes by the drive's model, and how far the motor has to lead the output.
+//
+// From the set point come position, velocity and acceleration, and with them inertia, friction (its memory as well),
+// the load and the torsion: they are free of noise, known without delay, and close no loop. Measured are
+// - the motor's angle, for what repeats with it (ripples, kinematic errors): a set point is off by the following error,
+//   and k times that is lost of a ripple's phase. It does close a loop, but one of known gain: a ripple of amplitude a
+//   acts as a stiffness of at most k a, which has to stay far below that of the position loop.
+// - temperature and a load that the model does not know: both change slowly. Neither angle nor velocity measured enters
+//   friction: friction compensated by its own sign is a negative damping, and hunts.
+//
+// Direction is clamp(w_set / band, 1): continuous, so that a set point with noise below the band cannot make friction
+// chatter, and nought at standstill, where friction takes whatever side it must.
+#pragma once
+
+#include <cstdint>
+
+#include "shared/control/limits.hpp"
+#include "shared/effects/effect.hpp"
+#include "shared/model/drive_model.hpp"
+
+namespace flexspline::control {
+
+// In SI units.
+template <class P>
+struct FeedforwardSetup {
+  P direction_band{};      // rad/s of the motor: above it friction acts in full
+  P torque_limit{};        // N m at the motor
+  P load_limit{};          // N m at the output
+  P stiffness{};           // N m/rad at the output, the largest of the transmission; nought: no lead
+  P torsion_limit{};       // rad at the output
+  P torsion_rate_limit{};  // rad/s, of how fast the lead may change: jumps of the acceleration would make it jump
+  P output_zero_turns{};   // of the motor where the output's angle is nought, for gravity
+};
+
+struct Feedforward {
+  template <class N>
+  struct Coefficients {
+    typename N::Gain per_band{};
+    typename N::Gain output_velocity{};
+    typename N::Gain output_acceleration{};
+    typename N::Order output_angle{};
+    typename N::Step to_output_zero{};
+    typename N::Gain share_of_load{};  // T/N
+    typename N::Value torque_limit{};
+    typename N::Value load_limit{};
+    bool leads = false;
+    typename N::Gain compliance{};
+    typename N::Value torsion_limit{};
+    typename N::Value torsion_change{};
+    typename N::Gain lead{};  // turns of the motor per torsion
+    typename N::StepGain lead_velocity{};
+  };
+  template <class N>
+  struct State {
+    typename N::Value load{};  // torque through the flexspline, at the tick before
+    typename N::Value torsion{};
+  };
+  template <class N>
+  struct SetPoint {
+    typename N::Angle position{};  // of the motor
+    typename N::Value velocity{};
+    typename N::Value acceleration{};
+  };
+  template <class N>
+  struct Measured {
+    typename N::Angle angle{};  // of the motor
+    typename N::Value temperature{};
+    typename N::Value load{};  // that the model does not know, output side
+  };
+  template <class N>
+  struct Output {
+    typename N::Value torque{};    // motor
+    typename N::Step lead{};       // to be added to the motor's set point of position
+    typename N::Value velocity{};  // of the lead, to be added to that of velocity
+  };
+
+  // Host only. The model's effects are derived with the same `d`; which of them it holds says what is fed forward.
+  // Errors of sensors do not belong into it: they turn no shaft.
+  template <class N, class P>
+  static Coefficients<N> derive(const FeedforwardSetup<P>& s, const effects::DriveConstants<P>& d) {
+    constexpr double kTurn = 6.283185307179586;
+    require(s.direction_band > P(0.0), "the band of the direction has to be positive");
+    require(s.torque_limit <= P(2.0) * d.torque_base && s.load_limit <= P(2.0) * d.output_torque_base,
+            "a limit of a feedforward is not within two bases");
+    Coefficients<N> c;
+    c.per_band = N::gain(d.velocity_base / s.direction_band);
+    c.output_velocity = N::gain(d.velocity_base / (d.gear_ratio * d.output_velocity_base));
+    c.output_acceleration = N::gain(d.acceleration_base / (d.gear_ratio * d.output_acceleration_base));
+    c.output_angle = N::order(P(kTurn) / d.gear_ratio);
+    c.to_output_zero = N::steps(static_cast<std::int64_t>(static_cast<double>(-s.output_zero_turns) * 0x1p32));
+    c.share_of_load = N::gain(d.output_torque_base / (d.gear_ratio * d.torque_base));
+    c.torque_limit = N::value(s.torque_limit / d.torque_base);
+    c.load_limit = N::value(s.load_limit / d.output_torque_base);
+    c.leads = s.stiffness > P(0.0);
+    if (!c.leads) return c;
+    require(s.torsion_limit <= P(2.0) * d.torsion_base, "a limit of a torsion is not within two bases");
+    c.compliance = N::gain(d.output_torque_base / (s.stiffness * d.torsion_base));
+    c.torsion_limit = N::value(s.torsion_limit / d.torsion_base);
+    c.torsion_change = N::value(s.torsion_rate_limit * d.time_base / d.torsion_base);
+    c.lead = N::gain(d.gear_ratio * d.torsion_base / d.angle_base);
+    c.lead_velocity = N::step_gain(d.angle_base / (d.velocity_base * d.time_base));
+    return c;
+  }
+
+  // One tick. The set point within two bases.
+  //   T = load(set point) + measured load;  torque = motor(set point, measured angle) + T/N
+  //   dq += (T - transmission(dq))/K_largest, a chord step a tick: it settles where the transmission carries T, however
+  //   it bends, as long as it is nowhere stiffer; lead = N dq.
+  // Friction that depends on the load takes the load of the tick before.
+  template <class N>
+  static constexpr Output<N> update(State<N>& s, const Coefficients<N>& c, model::DriveModel<N>& model,
+                                    const SetPoint<N>& set, const Measured<N>& measured) {
+    effects::Inputs<N> in{};
+    in.angle = set.position;
+    in.velocity = set.velocity;
+    in.acceleration = set.acceleration;
+    in.direction = N::clamp(N::scaled(c.per_band, set.velocity), N::one());
+    in.output_angle = N::times_order(set.position + c.to_output_zero, c.output_angle);
+    in.output_velocity = N::scaled(c.output_velocity, set.velocity);
+    in.output_acceleration = N::scaled(c.output_acceleration, set.acceleration);
+    in.output_direction = in.direction;
+    in.torsion = s.torsion;
+    in.torque = s.load;
+    in.temperature = measured.temperature;
+    const effects::Torques<N> torques = model.tick(in, measured.angle);
+    s.load = N::clamp(N::narrow(torques.load) + N::clamp(measured.load, c.load_limit), c.load_limit);
+    typename N::Sum motor = torques.motor;
+    motor += c.share_of_load * s.load;
+    Output<N> out;
+    out.torque = N::clamp(N::narrow(motor), c.torque_limit);
+    if (!c.leads) return out;
+    const auto missing = s.load - N::clamp(N::narrow(torques.transmission), c.load_limit + c.load_limit);
+    const auto change = N::clamp(N::scaled(c.compliance, missing), c.torsion_change);
+    const auto before = s.torsion;
+    s.torsion = N::clamp(s.torsion + change, c.torsion_limit);
+    out.lead = N::distance(c.lead, s.torsion);
+    out.velocity = N::narrow(N::signal(c.lead_velocity, N::distance(c.lead, s.torsion - before)));
+    return out;
+  }
+};
+
+}  // namespace flexspline::control
