@@ -94,6 +94,8 @@ struct Feedforward {
     c.leads = s.stiffness > P(0.0);
     if (!c.leads) return c;
     require(s.torsion_limit <= P(2.0) * d.torsion_base, "a limit of a torsion is not within two bases");
+    require(s.torsion_rate_limit * d.gear_ratio <= P(2.0) * d.velocity_base,
+            "the lead of a feedforward may change faster than two bases of velocity");
     c.compliance = N::gain(d.output_torque_base / (s.stiffness * d.torsion_base));
     c.torsion_limit = N::value(s.torsion_limit / d.torsion_base);
     c.torsion_change = N::value(s.torsion_rate_limit * d.time_base / d.torsion_base);
