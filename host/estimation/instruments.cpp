@@ -82,9 +82,12 @@ void refit(BalanceData& data, const FreeMotion& motion, Terms& terms, BalanceFit
     fit.autocorrelation_time =
         std::max(regression::autocorrelation_time(data.records(), weighted), data.filter_autocorrelation_time());
     const double freedom = std::max(1.0, static_cast<double>(data.rows() - count));
-    const double variance = weighted.squaredNorm() / freedom * fit.autocorrelation_time;
     const Eigen::MatrixXd inverse = normal.inverse();
-    const Eigen::MatrixXd scaled = inverse * (zs.transpose() * zs) * inverse.transpose() * variance;
+    const Eigen::MatrixXd middle =
+        regression::robust_middle(data.records(), zs, weighted,
+                                  regression::robust_lags(fit.autocorrelation_time, data.rows())) *
+        (static_cast<double>(data.rows()) / freedom);
+    const Eigen::MatrixXd scaled = inverse * middle * inverse.transpose();
     for (Eigen::Index i = 0; i < count; ++i)
       for (Eigen::Index j = 0; j < count; ++j)
         fit.covariance(kept[static_cast<std::size_t>(i)], kept[static_cast<std::size_t>(j)]) =

@@ -210,7 +210,14 @@ void take_covariance(Identification& identification, OutputError& problem, const
   for (const Part& part : problem.parts()) ranges.push_back(part.range);
   const double time = regression::autocorrelation_time(ranges, e);
   const double freedom = std::max(1.0, static_cast<double>(e.size() - J.cols()));
-  const double variance = e.squaredNorm() / freedom * time;
+  std::vector<Eigen::Index> told;
+  for (Eigen::Index j = 0; j < J.cols(); ++j)
+    if (std::isfinite(joint.unit_covariance(j, j))) told.push_back(j);
+  Eigen::MatrixXd covariance = joint.unit_covariance;
+  const Eigen::MatrixXd unit = joint.unit_covariance(told, told);
+  covariance(told, told) =
+      unit * regression::robust_middle(ranges, J(Eigen::all, told), e, regression::robust_lags(time, e.size())) * unit *
+      (static_cast<double>(e.size()) / freedom);
   const std::vector<Free>& free = problem.free();
   std::string unseen;
   for (std::size_t i = 0; i < free.size(); ++i) {
@@ -225,7 +232,7 @@ void take_covariance(Identification& identification, OutputError& problem, const
     for (std::size_t j = 0; j < free.size(); ++j) {
       if (free[j].fit != free[i].fit) continue;
       fit.covariance(free[i].at, free[j].at) =
-          joint.unit_covariance(a, static_cast<Eigen::Index>(j)) * variance * free[i].unit * free[j].unit;
+          covariance(a, static_cast<Eigen::Index>(j)) * free[i].unit * free[j].unit;
     }
     fit.autocorrelation_time = time;
   }

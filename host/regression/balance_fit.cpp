@@ -1,5 +1,7 @@
 #include "host/regression/balance_fit.hpp"
 
+#include <cmath>
+
 #include "host/regression/least_squares.hpp"
 #include "host/regression/shapes.hpp"
 
@@ -72,7 +74,15 @@ BalanceFit fit_balance(BalanceData& data, Terms& terms) {
   fit.autocorrelation_time =
       std::max(autocorrelation_time(data.records(), weighted), data.filter_autocorrelation_time());
   const double freedom = std::max(1.0, static_cast<double>(data.rows() - J.cols()));
-  fit.covariance = joint.unit_covariance * (weighted.squaredNorm() / freedom * fit.autocorrelation_time);
+  fit.covariance = joint.unit_covariance;
+  std::vector<Eigen::Index> told;
+  for (Eigen::Index j = 0; j < J.cols(); ++j)
+    if (std::isfinite(joint.unit_covariance(j, j))) told.push_back(j);
+  const Eigen::MatrixXd middle = robust_middle(data.records(), fit.root_weights.asDiagonal() * J(Eigen::all, told),
+                                               weighted, robust_lags(fit.autocorrelation_time, data.rows())) *
+                                 (static_cast<double>(data.rows()) / freedom);
+  const Eigen::MatrixXd unit = joint.unit_covariance(told, told);
+  fit.covariance(told, told) = unit * middle * unit;
   fit.own_share = joint.own_share;
   fit.condition_number = joint.condition_number;
   return fit;

@@ -86,6 +86,25 @@ Eigen::VectorXd record_weights(const std::vector<RowRange>& records, const Eigen
   return weights;
 }
 
+Eigen::Index robust_lags(double autocorrelation_time, Eigen::Index rows) {
+  return std::clamp<Eigen::Index>(static_cast<Eigen::Index>(std::lround(6.0 * autocorrelation_time)), 12,
+                                  std::max<Eigen::Index>(12, rows / 10));
+}
+
+Eigen::MatrixXd robust_middle(const std::vector<RowRange>& records, const Eigen::MatrixXd& columns,
+                              const Eigen::VectorXd& residual, Eigen::Index lags) {
+  const Eigen::MatrixXd scores = residual.asDiagonal() * columns;
+  Eigen::MatrixXd middle = scores.transpose() * scores;
+  for (const RowRange& range : records)
+    for (Eigen::Index lag = 1; lag <= std::min(lags, range.size() - 1); ++lag) {
+      const double weight = 1.0 - static_cast<double>(lag) / static_cast<double>(lags + 1);
+      const Eigen::MatrixXd product = scores.middleRows(range.first, range.size() - lag).transpose() *
+                                      scores.middleRows(range.first + lag, range.size() - lag);
+      middle += weight * (product + product.transpose());
+    }
+  return middle;
+}
+
 double autocorrelation_time(const std::vector<RowRange>& records, const Eigen::VectorXd& weighted_residual) {
   std::vector<std::span<const double>> parts;
   std::size_t longest = 0;

@@ -27,6 +27,16 @@ LinearFit least_squares(const Eigen::MatrixXd& X, const Eigen::VectorXd& y, cons
 // never weighted more than ten times the median one, so that a silent record does not rule the fit.
 Eigen::VectorXd record_weights(const std::vector<RowRange>& records, const Eigen::VectorXd& residual);
 
+// What neighbouring rows have in common, in a covariance (Newey and West 1987): the sum over lags of the products of
+// columns and residual, X'rr'X with weights that fall to nought at `lags` rows. The covariance of least squares with
+// unit covariance U is then U times this times U; that of an estimate by instruments has the instruments as columns.
+// Columns and residual are weighted; a lag does not reach from one record into another.
+Eigen::MatrixXd robust_middle(const std::vector<RowRange>& records, const Eigen::MatrixXd& columns,
+                              const Eigen::VectorXd& residual, Eigen::Index lags);
+
+// How far neighbours are looked at for a residual of this autocorrelation time.
+Eigen::Index robust_lags(double autocorrelation_time, Eigen::Index rows);
+
 // Rows that count as one: integrated autocorrelation time of the weighted residual over all records, at least one.
 double autocorrelation_time(const std::vector<RowRange>& records, const Eigen::VectorXd& weighted_residual);
 
