@@ -24,10 +24,13 @@ bool replace(data::Experiment& experiment, Column column, const std::vector<doub
   return true;
 }
 
-bool simulate(const model::Model& model, const data::Experiment& measured, data::Experiment& result) {
+bool simulate(const model::Model& model, const data::Experiment& measured, std::optional<double> initial_velocity,
+              data::Experiment& result) {
   simulation::FreeRun run;
+  simulation::Options options;
+  options.initial_motor_velocity = initial_velocity;
   try {
-    run = simulation::run(model, measured);
+    run = simulation::run(model, measured, options);
   } catch (const simulation::ModelIncomplete&) {
     return false;
   } catch (const std::invalid_argument&) {
@@ -62,14 +65,15 @@ model::Model model_with_values(const Identification& identification) {
   return model;
 }
 
-FreeMotion free_motion(const Identification& identification) {
+FreeMotion free_motion(const Identification& identification, std::span<const std::optional<double>> initial_velocity) {
   const model::Model model = model_with_values(identification);
   const regression::Prepared& measured = identification.prepared;
   FreeMotion result;
   for (const regression::Record& record : measured.records) result.experiments.push_back(*record.experiment);
   result.simulated.assign(measured.records.size(), 0);
   in_parallel(measured.records.size(), [&](std::size_t i) {
-    if (simulate(model, *measured.records[i].experiment, result.experiments[i])) result.simulated[i] = 1;
+    const std::optional<double> initial = initial_velocity.empty() ? std::nullopt : initial_velocity[i];
+    if (simulate(model, *measured.records[i].experiment, initial, result.experiments[i])) result.simulated[i] = 1;
   });
   std::vector<const data::Experiment*> all;
   for (const data::Experiment& e : result.experiments) all.push_back(&e);

@@ -1,6 +1,8 @@
 // The data as the model alone would have made them: the measured effort, and the motion and torque of its free run.
 #pragma once
 
+#include <optional>
+#include <span>
 #include <vector>
 
 #include "host/regression/identify.hpp"
@@ -14,12 +16,14 @@ model::Model model_with_values(const Identification& identification);
 
 // Every record again, with motion and torque of the free run, made ready by the same pipeline with the same rows. A
 // record that cannot be simulated or diverges keeps what was measured and is not marked. Records run on all cores; the
-// result does not depend on their number.
+// result does not depend on their number. Initial motor velocities by record, where the caller knows better than the
+// first sample does; else empty.
 struct FreeMotion {
   std::vector<data::Experiment> experiments;
   regression::Prepared prepared;
   std::vector<std::uint8_t> simulated;  // by record
 };
-FreeMotion free_motion(const Identification& identification);
+FreeMotion free_motion(const Identification& identification,
+                       std::span<const std::optional<double>> initial_velocity = {});
 
 }  // namespace flexspline::estimation

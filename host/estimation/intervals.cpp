@@ -91,11 +91,13 @@ void profile(Identification& identification, const Progress& progress) {
     const double least = fit_rest(data, best, fit.on_balance, fit.root_weights);
     const auto slots = slots_of(fit);
     const double freedom = std::max(1.0, static_cast<double>(data.rows()) - static_cast<double>(slots.size()));
-    const double allowed = kLikelihoodRatio * least / freedom * fit.autocorrelation_time;
     for (std::size_t j = 0; j < slots.size(); ++j) {
       Estimate* estimate = estimate_of(identification, slots[j]);
       const double variance = fit.covariance(static_cast<Eigen::Index>(j), static_cast<Eigen::Index>(j));
       if (!estimate || !estimate->identifiable || !std::isfinite(variance)) continue;
+      // Autocorrelation widens a profile as it widens the standard error.
+      const double allowed =
+          kLikelihoodRatio * least / freedom * variance / fit.white_variance[static_cast<Eigen::Index>(j)];
       const regression::Term& term = best[slots[j].term];
       progress(fmt::format("profile of {}.{}", term.id, term.entry->parameters[slots[j].parameter].name));
       double low = term.entry->parameters[slots[j].parameter].low;

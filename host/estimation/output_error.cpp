@@ -6,10 +6,12 @@
 #include <Eigen/QR>
 #include <algorithm>
 #include <cmath>
+#include <optional>
 
 #include "host/estimation/free_motion.hpp"
 #include "host/regression/least_squares.hpp"
 #include "host/regression/shapes.hpp"
+#include "host/simulation/initial_motion.hpp"
 
 namespace flexspline::estimation {
 namespace {
@@ -29,6 +31,13 @@ struct Free {
   double start = 0.0;
   double unit = 0.0;
   double low = 0.0, high = 0.0;
+};
+
+// The velocity at the first sample of a record, which noise would put wrong: estimated along with the parameters.
+struct Start {
+  std::size_t record = 0;
+  double velocity = 0.0;  // as measured
+  double unit = 0.0;
 };
 
 // What is compared in a record.
@@ -65,6 +74,7 @@ class OutputError {
     }
     rows_ = rows;
     const Eigen::VectorXd error = errors(motion);
+    add_starts(error);
     std::vector<RowRange> ranges;
     for (const Part& part : parts_) ranges.push_back(part.range);
     const Eigen::VectorXd weights = by_signal(error);
@@ -74,17 +84,21 @@ class OutputError {
   bool empty() const { return rows_ == 0 || free_.empty(); }
   Eigen::Index rows() const { return rows_; }
   std::vector<Free>& free() { return free_; }
+  const std::vector<Start>& starts() const { return starts_; }
+  std::size_t unknowns() const { return free_.size() + starts_.size(); }
   const std::vector<Part>& parts() const { return parts_; }
   const std::vector<std::uint8_t>& usable() const { return usable_; }
 
-  // Puts positions (in units from the start) into the terms.
+  // Puts positions (in units from the start) into the terms and the first velocities.
   void set(const double* x) {
+    for (std::size_t i = 0; i < starts_.size(); ++i)
+      initial_[starts_[i].record] = starts_[i].velocity + x[free_.size() + i] * starts_[i].unit;
     for (std::size_t j = 0; j < free_.size(); ++j)
       all_.terms[free_[j].slot.term].values[free_[j].slot.parameter] = free_[j].start + x[j] * free_[j].unit;
   }
   // Weighted errors of the terms as they stand; empty where a record that could be simulated no longer can.
   Eigen::VectorXd weighted() {
-    const FreeMotion motion = free_motion(all_);
+    const FreeMotion motion = free_motion(all_, initial_);
     if (motion.simulated != usable_) return {};
     Eigen::VectorXd e = errors(motion);
     for (const Part& part : parts_) e.segment(part.range.first, part.range.size()) *= part.weight;
@@ -108,6 +122,19 @@ class OutputError {
       f.unit = std::min(f.unit, 0.1 * (range.high - range.low));
     }
     if (f.unit > 0.0) free_.push_back(f);
+  }
+  // In moving records of one piece; a locked motor hardly moves at its start.
+  void add_starts(const Eigen::VectorXd& error) {
+    initial_.assign(all_.prepared.records.size(), std::nullopt);
+    for (const Part& part : parts_) {
+      const Record& record = all_.prepared.records[part.record];
+      if (part.signal != Signal::velocity || record.segments.size() != 1) continue;
+      const auto measured = simulation::initial_motion(*record.experiment, record.experiment->segments.front(),
+                                                       data::Column::motor_position, data::Column::motor_velocity);
+      const Eigen::Index n = part.range.size();
+      const double unit = error.segment(part.range.first, n).norm() / std::sqrt(static_cast<double>(n));
+      if (measured && unit > 0.0) starts_.push_back({part.record, measured->velocity, unit});
+    }
   }
   void take(std::size_t record, Signal signal, Eigen::Index& rows) {
     const auto n = static_cast<Eigen::Index>(samples(record).size());
@@ -151,28 +178,38 @@ class OutputError {
 
   Identification& all_;
   std::vector<Free> free_;
+  std::vector<Start> starts_;
+  std::vector<std::optional<double>> initial_;  // velocities, by record
   std::vector<Part> parts_;
   std::vector<std::uint8_t> usable_;
   Eigen::Index rows_ = 0;
 };
 
-// Slopes of the weighted errors by a step of `step` units each, from both sides.
+// Slopes of the weighted errors by a step of `step` units each, from both sides. A first velocity matters to its own
+// record alone, so all of them are moved at once.
 Eigen::MatrixXd slopes(OutputError& problem, const std::vector<double>& x) {
   constexpr double kStep = 0.05;
-  Eigen::MatrixXd J(problem.rows(), static_cast<Eigen::Index>(x.size()));
-  std::vector<double> moved = x;
-  for (std::size_t j = 0; j < x.size(); ++j) {
-    moved[j] = x[j] + kStep;
-    problem.set(moved.data());
-    const Eigen::VectorXd above = problem.weighted();
-    moved[j] = x[j] - kStep;
-    problem.set(moved.data());
-    const Eigen::VectorXd below = problem.weighted();
-    moved[j] = x[j];
-    if (above.size() == 0 || below.size() == 0)
-      J.col(static_cast<Eigen::Index>(j)).setZero();
-    else
-      J.col(static_cast<Eigen::Index>(j)) = (above - below) / (2.0 * kStep);
+  const std::size_t parameters = problem.free().size();
+  Eigen::MatrixXd J = Eigen::MatrixXd::Zero(problem.rows(), static_cast<Eigen::Index>(x.size()));
+  const auto slope = [&](std::size_t first, std::size_t last) -> Eigen::VectorXd {
+    std::vector<double> moved = x;
+    Eigen::VectorXd both[2];
+    for (const int side : {0, 1}) {
+      for (std::size_t j = first; j < last; ++j) moved[j] = x[j] + (side == 0 ? kStep : -kStep);
+      problem.set(moved.data());
+      both[side] = problem.weighted();
+      if (both[side].size() == 0) return Eigen::VectorXd::Zero(problem.rows());
+    }
+    return (both[0] - both[1]) / (2.0 * kStep);
+  };
+  for (std::size_t j = 0; j < parameters; ++j) J.col(static_cast<Eigen::Index>(j)) = slope(j, j + 1);
+  if (!problem.starts().empty()) {
+    const Eigen::VectorXd all = slope(parameters, x.size());
+    for (std::size_t i = 0; i < problem.starts().size(); ++i)
+      for (const Part& part : problem.parts())
+        if (part.record == problem.starts()[i].record)
+          J.col(static_cast<Eigen::Index>(parameters + i)).segment(part.range.first, part.range.size()) =
+              all.segment(part.range.first, part.range.size());
   }
   problem.set(x.data());
   return J;
@@ -182,10 +219,10 @@ class Cost final : public ceres::CostFunction {
  public:
   explicit Cost(OutputError& problem) : problem_(problem) {
     set_num_residuals(static_cast<int>(problem.rows()));
-    mutable_parameter_block_sizes()->push_back(static_cast<int>(problem.free().size()));
+    mutable_parameter_block_sizes()->push_back(static_cast<int>(problem.unknowns()));
   }
   bool Evaluate(double const* const* parameters, double* residuals, double** jacobians) const override {
-    const std::size_t count = problem_.free().size();
+    const std::size_t count = problem_.unknowns();
     const std::vector<double> x(parameters[0], parameters[0] + count);
     problem_.set(x.data());
     const Eigen::VectorXd e = problem_.weighted();
@@ -250,10 +287,10 @@ void refit_to_output(Identification& identification) {
         "balances are needed for one");
     return;
   }
-  std::vector<double> x(problem.free().size(), 0.0);
+  std::vector<double> x(problem.unknowns(), 0.0);
   ceres::Problem search;
   search.AddResidualBlock(new Cost(problem), nullptr, x.data());
-  for (int j = 0; j < static_cast<int>(x.size()); ++j) {
+  for (int j = 0; j < static_cast<int>(problem.free().size()); ++j) {
     const Free& f = problem.free()[static_cast<std::size_t>(j)];
     // Bounds in units from the start; an infinite one is left out.
     if (std::isfinite(f.low)) search.SetParameterLowerBound(x.data(), j, std::min(0.0, (f.low - f.start) / f.unit));
@@ -262,7 +299,7 @@ void refit_to_output(Identification& identification) {
   ceres::Solver::Options options;
   options.linear_solver_type = ceres::DENSE_QR;
   options.max_num_iterations = 12;
-  options.function_tolerance = 1e-6;
+  options.function_tolerance = 1e-5;  // a hundredth of a standard error
   options.parameter_tolerance = 1e-5;
   options.logging_type = ceres::SILENT;
   ceres::Solver::Summary summary;

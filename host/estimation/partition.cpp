@@ -38,10 +38,13 @@ void put_before(BalanceFit& fit, const BalanceFit& first, const std::vector<std:
   covariance.bottomRightCorner(after, after) = fit.covariance;
   Eigen::VectorXd own(before + after);
   own << first.own_share.head(before), fit.own_share;
+  Eigen::VectorXd excitation(before + after);
+  excitation << first.excitation.head(before), fit.excitation;
   linear.insert(linear.end(), fit.linear.begin(), fit.linear.end());
   fit.linear = std::move(linear);
   fit.covariance = std::move(covariance);
   fit.own_share = std::move(own);
+  fit.excitation = std::move(excitation);
   fit.condition_number = std::max(fit.condition_number, first.condition_number);
 }
 

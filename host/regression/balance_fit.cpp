@@ -42,6 +42,22 @@ Eigen::VectorXd residual_of(BalanceData& data, const Terms& terms) {
   return residual;
 }
 
+// Columns of the linear parameters. A column that is the target itself (the effort, where nothing but the effort fixes
+// the scale of the torques, report 3.6) would explain everything by nothing: it is nought, so not determined.
+static Eigen::MatrixXd columns_beside(BalanceData& data, const Terms& terms, const std::vector<Slot>& linear,
+                                      const Eigen::VectorXd& target) {
+  constexpr double kSame = 1e-3;
+  Eigen::MatrixXd X = columns_of(data, terms, linear);
+  for (std::size_t j = 0; j < linear.size(); ++j) {
+    if ((terms[linear[j].term].entry->info->reads & effects::kTorqueScale) == 0) continue;
+    const auto column = X.col(static_cast<Eigen::Index>(j));
+    const double square = column.squaredNorm();
+    if (square > 0.0 && (target - column * (column.dot(target) / square)).norm() < kSame * target.norm())
+      X.col(static_cast<Eigen::Index>(j)).setZero();
+  }
+  return X;
+}
+
 BalanceFit fit_balance(BalanceData& data, Terms& terms) {
   BalanceFit fit;
   fit.balance = data.balance();
@@ -53,7 +69,7 @@ BalanceFit fit_balance(BalanceData& data, Terms& terms) {
   settle_grids(data, terms, fit.on_balance);
   const auto solve = [&] {
     const Eigen::VectorXd target = data.target() - data.known_torque(terms, fit.on_balance);
-    const LinearFit linear = least_squares(columns_of(data, terms, fit.linear), target, fit.root_weights);
+    const LinearFit linear = least_squares(columns_beside(data, terms, fit.linear, target), target, fit.root_weights);
     for (std::size_t j = 0; j < fit.linear.size(); ++j)
       terms[fit.linear[j].term].values[fit.linear[j].parameter] = linear.theta[static_cast<Eigen::Index>(j)];
     return linear;
@@ -68,7 +84,8 @@ BalanceFit fit_balance(BalanceData& data, Terms& terms) {
 
   // Uncertainty of linear parameters and shapes together, to first order.
   Eigen::MatrixXd J(data.rows(), static_cast<Eigen::Index>(fit.linear.size() + fit.shapes.size()));
-  J << columns_of(data, terms, fit.linear), shape_columns(data, terms, fit.on_balance, fit.shapes);
+  J << columns_beside(data, terms, fit.linear, data.target() - data.known_torque(terms, fit.on_balance)),
+      shape_columns(data, terms, fit.on_balance, fit.shapes);
   const LinearFit joint = least_squares(J, fit.residual, fit.root_weights);
   const Eigen::VectorXd weighted = fit.root_weights.cwiseProduct(fit.residual);
   fit.autocorrelation_time =
@@ -84,6 +101,8 @@ BalanceFit fit_balance(BalanceData& data, Terms& terms) {
   const Eigen::MatrixXd unit = joint.unit_covariance(told, told);
   fit.covariance(told, told) = unit * middle * unit;
   fit.own_share = joint.own_share;
+  fit.excitation = joint.share_beside_all;
+  fit.white_variance = joint.unit_covariance.diagonal() * (weighted.squaredNorm() / freedom);
   fit.condition_number = joint.condition_number;
   return fit;
 }

@@ -16,8 +16,10 @@ struct BalanceFit {
   std::vector<Slot> shapes;
   Eigen::VectorXd residual;  // target minus model, N m
   Eigen::VectorXd root_weights;
-  Eigen::MatrixXd covariance;  // of linear, then shapes; corrected for autocorrelation
-  Eigen::VectorXd own_share;   // likewise; see LinearFit
+  Eigen::MatrixXd covariance;      // of linear, then shapes; corrected for autocorrelation
+  Eigen::VectorXd own_share;       // likewise; see LinearFit
+  Eigen::VectorXd excitation;      // likewise: LinearFit::share_beside_all
+  Eigen::VectorXd white_variance;  // likewise: what the variances would be without autocorrelation
   double autocorrelation_time = 1.0;
   double condition_number = 0.0;
   double rmse() const {

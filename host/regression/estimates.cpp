@@ -201,7 +201,7 @@ void assemble(Identification& result) {
       for (const Slot& slot : *slots) {
         Estimate e = estimate_of(result.terms, slot, axis);
         e.identifiable = fit.own_share[at] >= kUndetermined;
-        e.excitation = fit.own_share[at];
+        e.excitation = fit.excitation[at];
         const double variance = natural_value(result.terms[slot.term], slot, all, fit.covariance).variance;
         if (e.identifiable && std::isfinite(variance)) {
           e.std = std::sqrt(variance);

@@ -16,6 +16,7 @@ LinearFit least_squares(const Eigen::MatrixXd& X, const Eigen::VectorXd& y, cons
   fit.theta = Eigen::VectorXd::Zero(columns);
   fit.residual = y;
   fit.own_share = Eigen::VectorXd::Zero(columns);
+  fit.share_beside_all = Eigen::VectorXd::Zero(columns);
   fit.unit_covariance = Eigen::MatrixXd::Constant(columns, columns, 0.0);
   fit.unit_covariance.diagonal().setConstant(std::numeric_limits<double>::infinity());
   if (columns == 0 || X.rows() == 0) return fit;
@@ -44,6 +45,7 @@ LinearFit least_squares(const Eigen::MatrixXd& X, const Eigen::VectorXd& y, cons
     Eigen::Index worst = 0;
     own.minCoeff(&worst);
     for (Eigen::Index j = 0; j < count; ++j) fit.own_share[kept[static_cast<std::size_t>(j)]] = own[j];
+    if (fit.share_beside_all.isZero(0.0)) fit.share_beside_all = fit.own_share;
     if (own[worst] < kUndetermined) {
       // Of columns that explain each other, the last one goes: models list the basic effects first.
       Eigen::Index out = worst;

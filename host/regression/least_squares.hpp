@@ -15,7 +15,8 @@ struct LinearFit {
   // Of each column, the share that no other column can stand in for (sine of its angle to their span), 0 to 1. Below
   // kUndetermined the parameter is left at nought and the data cannot tell it.
   Eigen::VectorXd own_share;
-  double condition_number = 0.0;  // of the columns scaled to unit length
+  Eigen::VectorXd share_beside_all;  // the same, counting also the columns that were taken out as not determined
+  double condition_number = 0.0;     // of the columns scaled to unit length
 };
 inline constexpr double kUndetermined = 1e-3;
 

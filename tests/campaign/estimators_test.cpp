@@ -104,7 +104,7 @@ TEST(Estimators, IntervalsOf95PercentCover90To98PercentOver200Seeds) {
 
 TEST(Estimators, IntervalsOfTheFreeRunCover90To98PercentOver200Seeds) {
   NoisyMotor motor;
-  motor.duration_s = 4.0;
+  motor.duration_s = 2.0;
   expect_coverage(over_seeds(motor, Method::output_error, 200, {}));
 }
 
