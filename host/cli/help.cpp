@@ -65,9 +65,13 @@ const std::array kHelp = {
         "estimates the parameters of a model",
         "Estimates every parameter that the model does not fix, from the experiments of role fit: for each experiment "
         "alone, with average and spread, and for all together with 95 % intervals. A spread above 30 % is flagged: the "
-        "parameter is not reliable, or an effect is missing. With --out the model is written with the values; its "
-        "comments and layout stay. --report writes a page with plots for a browser or a printer.",
-        {kMakeData, kIdentify}},
+        "parameter is not reliable, or an effect is missing. \"excited\" is the share of a parameter's effect on the "
+        "data that no other parameter can stand in for. With --out the model is written with the values; its comments "
+        "and layout stay. --method iv or oe is for velocities so noisy that least squares finds too little of "
+        "everything; --intervals profile or bootstrap for parameters whose uncertainty is not symmetric; --supply for "
+        "what you know another way, as an inertia where the torque constant is open too. --report writes a page with plots for a browser or a printer.",
+        {kMakeData, kIdentify,
+         "flexspline identify demo-out --model demo-out/base-model.toml --method oe --supply inertia.inertia=1.04e-4"}},
     CommandHelp{
         "simulate",
         "runs a model on the measured input",
