@@ -21,6 +21,7 @@ using regression::Record;
 using regression::RowRange;
 using regression::Slot;
 
+constexpr double kFar = 100.0;  // standard errors of least squares
 constexpr double kShownAtLeast = 1e-6;  // of the error's size, by a step of one standard error
 
 // A free parameter, moved in units of its standard error from least squares.
@@ -292,9 +293,10 @@ void refit_to_output(Identification& identification) {
   search.AddResidualBlock(new Cost(problem), nullptr, x.data());
   for (int j = 0; j < static_cast<int>(problem.free().size()); ++j) {
     const Free& f = problem.free()[static_cast<std::size_t>(j)];
-    // Bounds in units from the start; an infinite one is left out.
-    if (std::isfinite(f.low)) search.SetParameterLowerBound(x.data(), j, std::min(0.0, (f.low - f.start) / f.unit));
-    if (std::isfinite(f.high)) search.SetParameterUpperBound(x.data(), j, std::max(0.0, (f.high - f.start) / f.unit));
+    // In units from the start. Bounds make every step of the solver a search: those out of reach are left out.
+    const double low = (f.low - f.start) / f.unit, high = (f.high - f.start) / f.unit;
+    if (low > -kFar) search.SetParameterLowerBound(x.data(), j, std::min(0.0, low));
+    if (high < kFar) search.SetParameterUpperBound(x.data(), j, std::max(0.0, high));
   }
   ceres::Solver::Options options;
   options.linear_solver_type = ceres::DENSE_QR;
