@@ -1,4 +1,6 @@
 #pragma once
+#include <array>
+
 #include "shared/effects/effect.hpp"
 
 namespace flexspline::effects {
@@ -80,8 +82,8 @@ struct PrandtlIshlinskiiHysteresis {
   static constexpr int kPlays = 8;
   template <class N>
   struct Coefficients {
-    typename N::Value threshold[kPlays];
-    typename N::Gain weight[kPlays];
+    std::array<typename N::Value, kPlays> threshold;
+    std::array<typename N::Gain, kPlays> weight;
   };
   template <class N>
   struct State {

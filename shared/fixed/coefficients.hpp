@@ -2,17 +2,13 @@
 #pragma once
 
 #include <cstdint>
-#include <limits>
 
 #include "shared/fixed/bits.hpp"
+#include "shared/fixed/complete.hpp"
 #include "shared/fixed/findings.hpp"
 #include "shared/fixed/types.hpp"
 
 namespace flexspline::fixed {
-
-inline constexpr double kLargestValue = 15.99;  // of what a gain may give, in bases
-inline constexpr double kLargestStep = 31.0;
-inline constexpr double kLargestRatio = 131072.0;
 
 // x 2^power, exact as long as nothing falls below the smallest double.
 constexpr double scaled_by_power(double x, int power) {
@@ -54,60 +50,53 @@ inline Order make_order(double radians_per_turn) {
                   "an order is not below 16384 cycles a turn")};
 }
 
-// A coefficient whose input has `input_bits` fractional bits and whose result stays below `largest`.
+// Mantissa and exponent of a number, rounded; a mantissa of one is written as a half of the next power. Below `least`
+// it is nought.
 template <class G>
-G make_coefficient(double x, double largest, int input_bits) {
+G make_floating(double x, double least) {
   G g;
   if (!is_finite(x)) {
     Findings::note("a coefficient is not finite");
     return g;
   }
   double size = x < 0.0 ? -x : x;
-  if (size < 1e-12) size = 0.0;  // less than a unit of any result
+  if (size < least) return g;
   int exponent = 0;
   for (; size >= 1.0; size *= 0.5) ++exponent;
-  for (; size < 0.5 && size > 0.0; size *= 2.0) --exponent;
-  const double limit = scaled_by_power(largest / (size > 0.0 ? size : 0.5), input_bits - exponent);
-  if (limit < 1.0 || exponent > 60) {
-    Findings::note("a coefficient leaves no input that it could be applied to: another base is needed");
+  for (; size < 0.5; size *= 2.0) --exponent;
+  if (exponent > G::kMostExponent || exponent < G::kLeastExponent) {
+    Findings::note("a coefficient is too large or too small for its format: another base is needed");
     return g;
   }
   g.mantissa = static_cast<std::int32_t>(nearest(scaled_by_power(x < 0.0 ? -size : size, kMantissaBits), 1.1e9, ""));
   g.exponent = static_cast<std::int8_t>(exponent);
-  g.limit = limit < 2147483647.0 ? static_cast<std::int32_t>(limit) : std::numeric_limits<std::int32_t>::max();
   return g;
 }
+// Complete, or of a limit of nought and a note.
+template <class G>
+G make_coefficient(double x, double least) {
+  G g = make_floating<G>(x, least);
+  if (!complete(g)) {
+    Findings::note("a coefficient leaves no input that it could be applied to: another base is needed");
+    return {};
+  }
+  return g;
+}
+inline constexpr double kLargestValue = kLargestValueQ20 * 0x1p-20;  // of what a gain may give, in bases
+inline constexpr double kLeastCoefficient = 1e-12;                   // less than a unit of any result
 inline Gain make_gain(double x) {
-  return make_coefficient<Gain>(x, kLargestValue, kValueBits);
+  return make_coefficient<Gain>(x, kLeastCoefficient);
 }
 inline StepGain make_step_gain(double x) {
-  return make_coefficient<StepGain>(x, kLargestStep, kAngleBits);
+  return make_coefficient<StepGain>(x, kLeastCoefficient);
 }
 inline RatioGain make_ratio_gain(double x) {
-  return make_coefficient<RatioGain>(x, kLargestRatio, kValueBits);
+  return make_coefficient<RatioGain>(x, kLeastCoefficient);
 }
-
-// Per unit of angle (a turn), from distances of up to 2^31 turns to a state that stops at four.
+// Per unit of angle (a turn), from distances of up to 2^31 turns to a state that stops at four; nought, or from 1e-18
+// to 1e9.
 inline DistanceGain make_distance_gain(double x) {
-  constexpr int kLeastExponent = -60;  // a product below has to be shifted by less than a word
-  constexpr int kMostExponent = 30;
-  const double size = x < 0.0 ? -x : x;
-  DistanceGain g;
-  if (size == 0.0) return g;
-  int exponent = 0;
-  double mantissa = size;
-  for (; mantissa >= 1.0 && exponent <= kMostExponent; mantissa *= 0.5) ++exponent;
-  for (; mantissa < 0.5 && exponent >= kLeastExponent; mantissa *= 2.0) --exponent;
-  if (!is_finite(x) || exponent > kMostExponent || exponent < kLeastExponent) {
-    Findings::note("a gain of a distance is not between 1e-18 and 1e9");
-    return g;
-  }
-  const double limit = scaled_by_power(4.0 / size, kAngleBits);
-  g.mantissa =
-      static_cast<std::int32_t>(nearest(scaled_by_power(x < 0.0 ? -mantissa : mantissa, kMantissaBits), 1.1e9, ""));
-  g.exponent = static_cast<std::int8_t>(exponent);
-  g.limit = limit < 9e18 ? static_cast<std::int64_t>(limit) : std::numeric_limits<std::int64_t>::max();
-  return g;
+  return make_coefficient<DistanceGain>(x, 1e-300);
 }
 
 }  // namespace flexspline::fixed

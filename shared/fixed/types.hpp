@@ -16,6 +16,8 @@ inline constexpr int kMantissaBits = 30;
 inline constexpr int kExponentBits = 28;
 inline constexpr int kOrderBits = 48;
 inline constexpr int kShareBits = 63;
+inline constexpr std::uint64_t kLargestValueQ20 =
+    (std::uint64_t{16} << 20) - (std::uint64_t{1} << 13);  // what a gain may give
 
 // A signal, in bases.
 struct Value {
@@ -61,22 +63,30 @@ struct Ratio {
 // Coefficients mantissa 2^(exponent - 30). The input is clamped to `limit` before it is multiplied, so that the product
 // always fits; a limit of nought marks one that cannot be used.
 struct Gain {
+  static constexpr int kLeastExponent = -40;
+  static constexpr int kMostExponent = 60;
   std::int32_t mantissa = 0;
   std::int8_t exponent = 0;
   std::int32_t limit = 0;
 };
 struct StepGain {
+  static constexpr int kLeastExponent = -40;
+  static constexpr int kMostExponent = 60;
   std::int32_t mantissa = 0;
   std::int8_t exponent = 0;
   std::int32_t limit = 0;
 };
 struct RatioGain {
+  static constexpr int kLeastExponent = -40;
+  static constexpr int kMostExponent = 60;
   std::int32_t mantissa = 0;
   std::int8_t exponent = 0;
   std::int32_t limit = 0;
 };
 // The same for distances of many turns: the input has 64 bits, the result stays within four.
 struct DistanceGain {
+  static constexpr int kLeastExponent = -60;  // a product below has to be shifted by less than a word
+  static constexpr int kMostExponent = 30;
   std::int32_t mantissa = 0;
   std::int8_t exponent = 0;
   std::int64_t limit = 0;

@@ -68,6 +68,17 @@ struct AllPlaces<N, std::index_sequence<Ids...>> : PlaceAt<Ids, N>... {
 template <class N>
 class DriveModel {
  public:
+  using Numbers = N;
+  // The number of an effect in parameter blocks.
+  template <class Effect>
+  static constexpr std::size_t number_of() {
+    return id_of<Effect>();
+  }
+  // No effects.
+  constexpr void clear() {
+    places_.for_each([]<class Effect>(Places<Effect, N>& places) { places.count = 0; });
+    reset();
+  }
   // Adds an effect at rest. Returns false where the model already has it as often as it can.
   template <class Effect>
   constexpr bool add(const typename Effect::template Coefficients<N>& coefficients) {
