@@ -47,6 +47,7 @@ class App {
     add_change<AddOptions>("add", "effect of the catalogue; torque_ripple:2 gives an order");
     add_change<RemoveOptions>("remove", "id of the effect in the model, or its type");
     add_sensitivity();
+    add_pack();
     add_not_built();
     std::vector<std::string> to_come(not_built_yet().begin(), not_built_yet().end());
     app_.footer(output::wrapped(fmt::format("Not built yet: {}.", output::listed(to_come)), 0) +
@@ -292,6 +293,36 @@ class App {
         ->allow_extra_args(false);
     take_holdout(sub, options->data);
     take_pipeline(sub, options->pipeline);
+  }
+
+  void add_pack() {
+    const auto [pack, options] = command<PackCommandOptions>("pack");
+    take_model(pack, options->model);
+    pack->add_option("--out", options->out, "the parameter block")->required()->type_name("BLOCK");
+    pack->add_option("--tick-hz", options->pack.tick_hz, "ticks of the drive's control loop a second")
+        ->capture_default_str()
+        ->type_name("HZ");
+    pack->add_option("--bound", options->pack.bound, "largest error against double, as a share of rated torque")
+        ->check(CLI::PositiveNumber)
+        ->capture_default_str()
+        ->type_name("SHARE");
+    pack->add_option("--drive", options->pack.drive, "name of the drive that the block is for (default: any)")
+        ->type_name("NAME");
+    pack->add_option("--encoder-counts", options->pack.encoder_counts,
+                     "per motor turn: the block then has an encoder filter")
+        ->type_name("COUNTS");
+    pack->add_option("--filter-corner-hz", options->pack.filter_corner_hz, "corner of the encoder filter")
+        ->check(CLI::PositiveNumber)
+        ->capture_default_str()
+        ->type_name("HZ");
+    pack->add_option("--image", options->pack.image, "effects that the firmware has (default: all that can run)")
+        ->type_name("EFFECT")
+        ->delimiter(',')
+        ->allow_extra_args(false);
+    const auto [unpack, unpack_options] = command<UnpackOptions>("unpack");
+    unpack->add_option("BLOCK", unpack_options->block, "parameter block")->required()->type_name("");
+    unpack->add_option("--out", unpack_options->out, "the model that the block was made from (default: print only)")
+        ->type_name("MODEL");
   }
 
   void add_not_built() {

@@ -8,6 +8,7 @@
 #include <vector>
 
 #include "host/cli/inputs.hpp"
+#include "host/deployment/pack.hpp"
 
 namespace flexspline::cli {
 
@@ -56,8 +57,8 @@ struct IdentifyOptions {
   DataInputs data;
   PipelineInputs pipeline;
   std::filesystem::path model;
-  std::filesystem::path out;     // empty: print only
-  std::string method;            // empty: what the model needs
+  std::filesystem::path out;  // empty: print only
+  std::string method;         // empty: what the model needs
   std::string intervals = "standard";
   std::vector<std::string> supply;  // EFFECT.PARAMETER=VALUE
   int starts = 3;
@@ -119,5 +120,20 @@ struct AddOptions : ChangeOptions {};
 struct RemoveOptions : ChangeOptions {};
 int run(const AddOptions& options, Console& console);
 int run(const RemoveOptions& options, Console& console);
+
+struct PackCommandOptions {
+  std::filesystem::path model;
+  std::filesystem::path out;
+  deployment::PackOptions pack;
+  std::string json;
+};
+int run(const PackCommandOptions& options, Console& console);
+
+struct UnpackOptions {
+  std::filesystem::path block;
+  std::filesystem::path out;  // empty: print only
+  std::string json;
+};
+int run(const UnpackOptions& options, Console& console);
 
 }  // namespace flexspline::cli

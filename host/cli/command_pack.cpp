@@ -1,0 +1,189 @@
+#include <fmt/format.h>
+
+#include <fstream>
+#include <iterator>
+#include <nlohmann/json.hpp>
+
+#include "host/catalogue/constants.hpp"
+#include "host/cli/commands.hpp"
+#include "host/deployment/bases.hpp"
+#include "host/output/json.hpp"
+#include "host/output/text.hpp"
+
+namespace flexspline::cli {
+namespace {
+
+using nlohmann::json;
+using output::number;
+
+constexpr int kDigits = 3;
+
+std::string text_of(const model::Name& name) {
+  return {name.begin(), std::find(name.begin(), name.end(), '\0')};
+}
+
+std::vector<std::uint8_t> read_bytes(const std::filesystem::path& path) {
+  std::ifstream in(path, std::ios::binary);
+  if (!in) throw deployment::PackError(fmt::format("{} cannot be read; is the path right?", path.string()));
+  // One more than the largest block tells that a file is larger.
+  std::vector<std::uint8_t> bytes(model::kLargestBlock + 1);
+  in.read(reinterpret_cast<char*>(bytes.data()), static_cast<std::streamsize>(bytes.size()));
+  bytes.resize(static_cast<std::size_t>(in.gcount()));
+  return bytes;
+}
+
+json json_of(const deployment::Packed& packed) {
+  json proof = json::array();
+  for (const auto& part : packed.proof)
+    proof.push_back(
+        {{"part", part.part}, {"kind", part.kind}, {"bound", output::json_number(part.bound)}, {"unit", part.unit}});
+  return {{"format", "flexspline-pack/1"},
+          {"bytes", packed.bytes.size()},
+          {"sha256", packed.sha256},
+          {"max_error_nm", packed.max_error_nm},
+          {"max_error_share_of_rated", packed.max_error_share_of_rated},
+          {"worst_balance", packed.worst_balance},
+          {"torque_scale", packed.torque_scale},
+          {"proof", proof}};
+}
+
+struct Named {
+  const char* name;
+  const char* unit;
+  double value;
+};
+std::vector<Named> bases_of(const deployment::Unpacked& block) {
+  const auto d = deployment::from_block(block.header.bases);
+  const bool linear = block.header.axis == 1;
+  const char* const torque = linear ? "N" : "N*m";
+  const char* const velocity = linear ? "m/s" : "rad/s";
+  const char* const acceleration = linear ? "m/s^2" : "rad/s^2";
+  const char* const angle = linear ? "m" : "rad";
+  return {{"torque", torque, d.torque_base},
+          {"output_torque", torque, d.output_torque_base},
+          {"velocity", velocity, d.velocity_base},
+          {"output_velocity", velocity, d.output_velocity_base},
+          {"acceleration", acceleration, d.acceleration_base},
+          {"output_acceleration", acceleration, d.output_acceleration_base},
+          {"angle", angle, d.angle_base},
+          {"torsion", angle, d.torsion_base},
+          {"torsion_rate", velocity, d.torsion_rate_base},
+          {"temperature", "degC", d.temperature_base},
+          {"current", "A", d.current_base},
+          {"tick", "s", d.time_base}};
+}
+std::vector<Named> limits_of(const deployment::Unpacked& block) {
+  const auto d = deployment::from_block(block.header.bases);
+  const model::Limits& l = block.header.limits;
+  const bool linear = block.header.axis == 1;
+  const char* const torque = linear ? "N" : "N*m";
+  const char* const velocity = linear ? "m/s" : "rad/s";
+  const auto in = [](fixed::Value x, double base) { return std::ldexp(x.raw, -fixed::kValueBits) * base; };
+  return {{"torque", torque, in(l.torque, d.torque_base)},
+          {"load", torque, in(l.load, d.output_torque_base)},
+          {"velocity", velocity, in(l.velocity, d.velocity_base)},
+          {"overspeed", velocity, in(l.overspeed, d.velocity_base)},
+          {"current", "A", in(l.current, d.current_base)},
+          {"torsion", linear ? "m" : "rad", in(l.torsion, d.torsion_base)},
+          {"direction_band", velocity, in(l.direction_band, d.velocity_base)}};
+}
+
+json json_of(const deployment::Unpacked& block) {
+  const auto quantities = [](const std::vector<Named>& all) {
+    json list = json::array();
+    for (const Named& q : all) list.push_back({{"name", q.name}, {"value", q.value}, {"unit", q.unit}});
+    return list;
+  };
+  json effects = json::array();
+  for (const auto& effect : block.effects) {
+    json coefficients = json::array();
+    for (const auto& c : effect.coefficients) coefficients.push_back({{"kind", c.kind}, {"value", c.value}});
+    effects.push_back({{"effect", effect.type}, {"coefficients", coefficients}});
+  }
+  json parameters = json::array();
+  if (block.model)
+    for (const model::Effect& effect : block.model->effects)
+      for (const model::Parameter& p : effect.parameters)
+        parameters.push_back({{"id", effect.id},
+                              {"effect", effect.type},
+                              {"parameter", p.name},
+                              {"value", output::json_number(p.value)},
+                              {"unit", p.unit},
+                              {"std", nullptr},
+                              {"interval", {nullptr, nullptr}}});
+  return {{"format", "flexspline-unpack/1"},
+          {"drive", text_of(block.header.drive)},
+          {"model", text_of(block.header.model)},
+          {"axis", block.header.axis == 1 ? "linear" : "rotary"},
+          {"encoder_counts", block.header.encoder_counts == 0 ? json() : json(block.header.encoder_counts)},
+          {"bases", quantities(bases_of(block))},
+          {"limits", quantities(limits_of(block))},
+          {"effects", effects},
+          {"sections", block.sections},
+          {"parameters", parameters},
+          {"coefficients_follow_from_parameters", block.model ? json(block.coefficients_follow) : json()}};
+}
+
+}  // namespace
+
+int run(const PackCommandOptions& options, Console& console) {
+  const model::ModelFile file = load_model(options.model);
+  console.progress("proving the block and comparing it with double");
+  deployment::Packed packed;
+  try {
+    packed = deployment::pack(file.model, options.pack);
+  } catch (const deployment::BoundError& error) {
+    console.error(error.what());
+    return kNotMet;
+  }
+  model::save(options.out, std::string(packed.bytes.begin(), packed.bytes.end()));
+  console.line(fmt::format("{}: {} bytes, SHA-256 {}", options.out.string(), packed.bytes.size(), packed.sha256));
+  console.line(fmt::format("Largest error against double: {} {} on the {} balance, {} of rated torque",
+                           number(packed.max_error_nm, kDigits), packed.proof.front().unit, packed.worst_balance,
+                           number(packed.max_error_share_of_rated, kDigits)));
+  if (packed.torque_scale > 1.0)
+    console.line(fmt::format("Torques go up to more than 16 times the rated one: their bases are {:g} times as wide",
+                             packed.torque_scale));
+  console.line();
+  console.line(console.bold(fmt::format("{:<32}{:<18}{:>12}  {}", "part", "bound by", "bound", "unit")));
+  for (const auto& part : packed.proof)
+    console.line(fmt::format("{:<32}{:<18}{:>12}  {}", part.part, part.kind, number(part.bound, kDigits), part.unit));
+  output::save_json(options.json, json_of(packed));
+  return kDone;
+}
+
+int run(const UnpackOptions& options, Console& console) {
+  const deployment::Unpacked block = deployment::unpack(read_bytes(options.block));
+  if (!options.out.empty()) {
+    if (!block.model)
+      throw deployment::PackError(
+          fmt::format("{} has no note of the model that it was made from, so there is none to write; leave out --out",
+                      options.block.string()));
+    model::save(options.out, model::write(*block.model));
+  }
+  const std::string drive = text_of(block.header.drive);
+  console.line(fmt::format("{}: a good block of model \"{}\" for {}", options.block.string(),
+                           text_of(block.header.model), drive.empty() ? "any drive" : "drive \"" + drive + "\""));
+  const auto table = [&](const char* title, const std::vector<Named>& all) {
+    console.line();
+    console.line(console.bold(title));
+    for (const Named& q : all) console.line(fmt::format("  {:<22}{:>12}  {}", q.name, number(q.value, 6), q.unit));
+  };
+  table("Bases", bases_of(block));
+  table("Limits", limits_of(block));
+  console.line();
+  console.line(console.bold("Effects, with their coefficients per unit"));
+  for (const auto& effect : block.effects) {
+    std::string text;
+    for (const auto& c : effect.coefficients) text += fmt::format(" {} {:.6g}", c.kind, c.value);
+    console.line(fmt::format("  {:<30}{}", effect.type, text));
+  }
+  if (block.model)
+    console.line(block.coefficients_follow
+                     ? "The coefficients are, to the bit, what the parameters in the block's note give."
+                     : "The block was made by another version: its parameters now give other coefficients.");
+  output::save_json(options.json, json_of(block));
+  return kDone;
+}
+
+}  // namespace flexspline::cli

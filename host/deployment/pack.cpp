@@ -1,0 +1,211 @@
+#include "host/deployment/pack.hpp"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <numbers>
+
+#include "host/catalogue/constants.hpp"
+#include "host/deployment/bases.hpp"
+#include "host/deployment/note.hpp"
+#include "host/deployment/sha256.hpp"
+#include "host/deployment/trial.hpp"
+#include "host/output/text.hpp"
+#include "shared/fixed/system.hpp"
+#include "shared/observers/encoder_kalman.hpp"
+
+namespace flexspline::deployment {
+namespace {
+
+using effects::DriveConstants;
+using fixed::Findings;
+using fixed::Fixed;
+
+constexpr std::array<double, 4> kTorqueScales = {1.0, 2.0, 4.0, 8.0};
+constexpr double kTurn = 2.0 * std::numbers::pi;
+// Limits in bases: those of torque and current are the ratings, so that they hold where nothing else is known.
+constexpr double kOverspeed = 1.25;
+constexpr double kDirectionBand = 1.0 / 200.0;
+constexpr double kTorsionLimit = 2.0;
+
+std::vector<EffectValues> values_of(const model::Model& model, const PackOptions& options) {
+  std::vector<EffectValues> all;
+  std::vector<std::string> missing;
+  for (const model::Effect& effect : model.effects) {
+    const catalogue::Entry& entry = catalogue::get(effect.type);
+    const bool in_image = options.image.empty() ||
+                          std::find(options.image.begin(), options.image.end(), effect.type) != options.image.end();
+    if (entry.info->host_only)
+      throw PackError(
+          fmt::format("{} does not fit: it is too large for a drive, and has a memory that no table holds; "
+                      "replace it by one of {}",
+                      effect.id, entry.info->rivals));
+    if (!in_image)
+      throw PackError(
+          fmt::format("{} does not fit: the firmware image lacks it; take it out of the model, or build an "
+                      "image with it",
+                      effect.id));
+    for (const model::Parameter& p : effect.parameters)
+      if (!p.value) missing.push_back(effect.id + "." + p.name);
+    all.push_back({entry.id, effect.id, catalogue::values_of(effect, entry)});
+  }
+  if (!missing.empty())
+    throw PackError(fmt::format("the model has no value for {}; identify it first", output::listed(missing)));
+  // As drives read them, by rising number; the order of those of one kind is the model's.
+  std::stable_sort(all.begin(), all.end(), [](const auto& a, const auto& b) { return a.number < b.number; });
+  return all;
+}
+
+model::Name name_of(const std::string& text) {
+  model::Name name{};
+  std::size_t bytes = std::min(text.size(), name.size() - 1);
+  // No character is cut in two.
+  while (bytes < text.size() && bytes > 0 && (static_cast<unsigned char>(text[bytes]) & 0xC0U) == 0x80U) --bytes;
+  for (std::size_t i = 0; i < bytes; ++i) {
+    const auto byte = static_cast<unsigned char>(text[i]);
+    name[i] = byte < 0x20 || byte == 0x7F ? ' ' : text[i];
+  }
+  return name;
+}
+
+model::BlockHeader header_of(const model::Model& model, const DriveConstants<double>& d, const PackOptions& options) {
+  model::BlockHeader h;
+  h.drive = name_of(options.drive);
+  h.model = name_of(model.name);
+  h.axis = model.drive.axis == data::Axis::linear ? 1 : 0;
+  h.encoder_counts = static_cast<std::uint32_t>(std::llround(options.encoder_counts.value_or(0.0)));
+  h.bases = in_block(d);
+  const double rated = rated_output_torque(model.drive);
+  const auto value = [](double x) { return fixed::Value(Fixed::value(std::clamp(x, 1e-6, 2.0))); };
+  h.limits.torque = value(std::max(rated / d.gear_ratio, d.torque_constant * d.current_base) / d.torque_base);
+  h.limits.load = value(rated / d.output_torque_base);
+  h.limits.velocity = value(1.0);
+  h.limits.overspeed = value(kOverspeed);
+  h.limits.current = value(1.0);
+  h.limits.torsion = value(kTorsionLimit);
+  h.limits.direction_band = value(kDirectionBand);
+  return h;
+}
+
+// Adds the encoder filter to the block; what its states stay below.
+ProofPart add_encoder_filter(model::BlockWriter& writer, const DriveConstants<double>& d, const PackOptions& options) {
+  using observers::EncoderKalman;
+  const double corner = kTurn * options.filter_corner_hz;
+  Findings::clear();
+  const auto c = EncoderKalman::derive<Fixed>(observers::setup_for_corner(*options.encoder_counts, corner, d), d);
+  const auto bounds = observers::kalman_bounds(observers::kalman_gains(corner * d.time_base));
+  if (Findings::count() != 0 || !bounds.fit)
+    throw PackError(fmt::format("the encoder filter does not fit: {}; choose another corner than {:g} Hz",
+                                Findings::count() != 0 ? Findings::first() : "its states leave their range",
+                                options.filter_corner_hz));
+  writer.add(static_cast<std::uint16_t>(model::Section::encoder_filter), c);
+  return {"encoder_filter", "impulse_response", bounds.velocity * d.velocity_base,
+          d.turn_angle_scale == 1.0 ? "rad/s" : "m/s"};
+}
+
+struct Tried {
+  DriveConstants<double> drive;
+  Bounds bounds;
+};
+// Widens the bases of torque until the proof holds.
+Tried proven(const model::Model& model, const std::vector<EffectValues>& effects, const PackOptions& options,
+             Packed& packed) {
+  std::string reason;
+  for (const double scale : kTorqueScales) {
+    Tried tried{bases_of(model, 1.0 / options.tick_hz, scale), {}};
+    try {
+      tried.bounds = prove(effects, tried.drive);
+    } catch (const PackError& error) {
+      reason = error.what();
+      continue;
+    }
+    if (tried.bounds.holds) {
+      packed.torque_scale = scale;
+      return tried;
+    }
+    reason = fmt::format("the proof fails: {}", tried.bounds.reason);
+    // Which of them it is: those that fail alone.
+    for (const EffectValues& e : effects)
+      if (const Bounds alone = prove({e}, tried.drive); !alone.holds)
+        reason = fmt::format("{} does not fit: {}", e.id, alone.reason);
+  }
+  throw PackError(reason + fmt::format(" (with torques up to {:g} times the rated one); check its parameters against "
+                                       "the ratings in [drive]",
+                                       kTorqueScales.back()));
+}
+
+std::array<double, 3> torque_bases(const DriveConstants<double>& d) {
+  return {d.torque_base, d.output_torque_base, d.output_torque_base};
+}
+
+void prove_parts(const std::vector<EffectValues>& effects, const Tried& tried, const std::string& unit,
+                 Packed& packed) {
+  const auto bases = torque_bases(tried.drive);
+  const auto entries = catalogue::all();
+  for (const EffectValues& e : effects) {
+    const auto entry = std::find_if(entries.begin(), entries.end(), [&](const auto& x) { return x.id == e.number; });
+    const Bounds alone = prove({e}, tried.drive);
+    double most = 0.0;
+    for (std::size_t b = 0; b < bases.size(); ++b) most = std::max(most, alone.torque[b] * bases[b]);
+    packed.proof.push_back({e.id, entry->has_state ? "invariant" : "interval", most, unit});
+  }
+  for (std::size_t b = 0; b < bases.size(); ++b)
+    packed.proof.push_back({fmt::format("{}_balance", kBalances[b]), "range", tried.bounds.torque[b] * bases[b], unit});
+}
+
+void measure_error(const std::vector<EffectValues>& effects, const Tried& tried, const model::Model& model,
+                   const PackOptions& options, const std::string& unit, Packed& packed) {
+  const Difference d = compare(effects, tried.drive, tried.bounds, options.samples, options.seed);
+  if (!d.finding.empty() || !d.within)
+    throw PackError(fmt::format("the proof does not hold on a sample: {}",
+                                d.finding.empty() ? "a torque is beyond its bound" : d.finding));
+  const double rated = rated_output_torque(model.drive);
+  const std::array<double, 3> rated_of = {rated / tried.drive.gear_ratio, rated, rated};
+  const auto bases = torque_bases(tried.drive);
+  for (std::size_t b = 0; b < bases.size(); ++b) {
+    const double error = d.worst[b] * bases[b];
+    packed.proof.push_back({fmt::format("{}_balance", kBalances[b]), "measured_error", error, unit});
+    if (error / rated_of[b] < packed.max_error_share_of_rated) continue;
+    packed.max_error_share_of_rated = error / rated_of[b];
+    packed.max_error_nm = error;
+    packed.worst_balance = kBalances[b];
+  }
+  if (packed.max_error_share_of_rated > options.bound)
+    throw PackError(
+        fmt::format("the block is off by {:.2g} of rated torque on the {} balance, more than {:.2g}; the "
+                    "model's torques are far above the ratings in [drive], or --bound is too small",
+                    packed.max_error_share_of_rated, packed.worst_balance, options.bound));
+}
+
+}  // namespace
+
+Packed pack(const model::Model& model, const PackOptions& options) {
+  if (!(options.tick_hz >= 1.0 && options.tick_hz <= 1e6))
+    throw PackError(fmt::format("a tick of {:g} Hz is not between 1 Hz and 1 MHz", options.tick_hz));
+  if (options.encoder_counts && !(*options.encoder_counts >= 4.0 && *options.encoder_counts <= 0x1p30))
+    throw PackError("encoder counts are not between 4 and 2^30 a turn");
+  const std::vector<EffectValues> effects = values_of(model, options);
+  const std::string unit = model.drive.axis == data::Axis::linear ? "N" : "N*m";
+  Packed packed;
+  const Tried tried = proven(model, effects, options, packed);
+  prove_parts(effects, tried, unit, packed);
+  measure_error(effects, tried, model, options, unit, packed);
+
+  packed.bytes.resize(model::kLargestBlock);
+  model::BlockWriter writer(packed.bytes);
+  writer.begin(header_of(model, tried.drive, options));
+  write_effects(writer, effects, tried.drive);
+  if (options.encoder_counts) packed.proof.push_back(add_encoder_filter(writer, tried.drive, options));
+  writer.add_bytes(model::kParametersNote, note_of(model.drive, effects));
+  const std::size_t size = writer.end();
+  if (size == 0) throw PackError(fmt::format("the block is larger than {} bytes", model::kLargestBlock));
+  packed.bytes.resize(size);
+  packed.sha256 = sha256(packed.bytes);
+  // What is handed out was read by what the drive reads it with.
+  static_cast<void>(unpack(packed.bytes));
+  return packed;
+}
+
+}  // namespace flexspline::deployment
