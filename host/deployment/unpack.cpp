@@ -38,6 +38,14 @@ double floating(const G& g) {
 void describe(const fixed::Gain& g, std::vector<Coefficient>& out) {
   out.push_back({"gain", floating(g)});
 }
+void describe(const fixed::Weight& x, std::vector<Coefficient>& out) {
+  out.push_back({"torque", std::ldexp(x.raw, -fixed::kValueBits)});
+}
+void describe(const fixed::Harmonic& h, std::vector<Coefficient>& out) {
+  out.push_back({"order", std::ldexp(static_cast<double>(h.order), -fixed::kOrderBits)});
+  out.push_back({"amplitude", std::ldexp(h.amplitude, -fixed::kValueBits)});
+  out.push_back({"phase_turns", std::ldexp(h.phase, -32)});
+}
 void describe(const fixed::StepGain& g, std::vector<Coefficient>& out) {
   out.push_back({"gain_per_turn", floating(g)});
 }

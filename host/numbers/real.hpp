@@ -17,6 +17,7 @@ struct ScalarSystem {
   using Step = S;
   using Sum = S;
   using Gain = S;
+  using Weight = S;
   using StepGain = S;
   using RatioGain = S;
   using DistanceGain = S;
@@ -31,6 +32,19 @@ struct ScalarSystem {
     S sine;
   };
 
+  // A wave over an angle by its two amplitudes, so that it stays linear in them.
+  struct Harmonic {
+    S order;
+    S cosine;
+    S sine;
+  };
+  static Harmonic harmonic(const S& order, const S& cosine, const S& sine) { return {order, cosine, sine}; }
+  static S wave(const Harmonic& h, const S& angle) {
+    const Wave w = sincos(h.order * angle);
+    return h.cosine * w.cosine + h.sine * w.sine;
+  }
+  static S wave_times(const Harmonic& h, const S& angle, const S& x) { return x * wave(h, angle); }
+  static S weight(const S& p) { return p; }
   static S gain(const S& p) { return p; }
   static S step_gain(const S& p) { return p; }
   static S ratio_gain(const S& p) { return p; }

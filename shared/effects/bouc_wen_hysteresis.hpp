@@ -41,7 +41,7 @@ struct BoucWenHysteresis {
   };
   template <class N>
   struct Coefficients {
-    typename N::Gain torque;  // at full yield
+    typename N::Weight torque;  // at full yield
     typename N::Gain per_torsion;
     typename N::Value unloading;  // (gamma - beta)/(gamma + beta)
     typename N::Gain stiffening;  // n
@@ -56,7 +56,7 @@ struct BoucWenHysteresis {
   template <class N, class P>
   static Coefficients<N> derive(const P* p, const DriveConstants<P>& d) {
     const P most = N::power(p[1] + p[2], P(-1.0) / p[3]);
-    return {N::gain(p[0] * most / d.output_torque_base),
+    return {N::weight(p[0] * most / d.output_torque_base),
             N::gain(d.torsion_base / most),
             N::value((p[2] - p[1]) / (p[2] + p[1])),
             N::gain(p[3]),

@@ -22,11 +22,11 @@ struct CoulombAsymmetry : Stateless {
   };
   template <class N>
   struct Coefficients {
-    typename N::Gain torque;
+    typename N::Weight torque;
   };
   template <class N, class P>
   static Coefficients<N> derive(const P* p, const DriveConstants<P>& d) {
-    return {N::gain(p[0] / d.torque_base)};
+    return {N::weight(p[0] / d.torque_base)};
   }
   // The square of the direction is one while moving, nought at rest, and smooth between where the direction is.
   template <class N>

@@ -22,7 +22,7 @@ struct CurrentDelay {
   };
   template <class N>
   struct Coefficients {
-    typename N::Gain torque;
+    typename N::Weight torque;
     typename N::Gain per_time;
   };
   // The delay's first-order all-pass, 2/(1 + s d/2) - 1, whose phase errs by (2 pi f d)^3/12. The state is how far the
@@ -34,7 +34,7 @@ struct CurrentDelay {
   template <class N, class P>
   static Coefficients<N> derive(const P* p, const DriveConstants<P>& d) {
     const P two(2.0);
-    return {N::gain(two * d.torque_constant * d.current_base / d.torque_base), N::gain(two * d.time_base / p[0])};
+    return {N::weight(two * d.torque_constant * d.current_base / d.torque_base), N::gain(two * d.time_base / p[0])};
   }
   // Exact for a current that is a straight line between two inputs.
   template <class N>

@@ -27,12 +27,12 @@ struct CurrentSaturation : Stateless {
   };
   template <class N>
   struct Coefficients {
-    typename N::Gain torque;
+    typename N::Weight torque;
     typename N::Value limit;
   };
   template <class N, class P>
   static Coefficients<N> derive(const P* p, const DriveConstants<P>& d) {
-    return {N::gain(d.torque_constant * d.current_base / d.torque_base), N::value(p[0] / d.current_base)};
+    return {N::weight(d.torque_constant * d.current_base / d.torque_base), N::value(p[0] / d.current_base)};
   }
   template <class N>
   static void evaluate(const State<N>&, const Coefficients<N>& c, const Inputs<N>& in, Torques<N>& out) {

@@ -29,7 +29,7 @@ struct DahlFriction {
   };
   template <class N>
   struct Coefficients {
-    typename N::Gain torque;
+    typename N::Weight torque;
     typename N::StepGain per_travel;
   };
   // Share of the full friction that the bristles carry, -1 to 1.
@@ -39,7 +39,7 @@ struct DahlFriction {
   };
   template <class N, class P>
   static Coefficients<N> derive(const P* p, const DriveConstants<P>& d) {
-    return {N::gain(p[0] / d.torque_base), N::step_gain(d.angle_base / p[1])};
+    return {N::weight(p[0] / d.torque_base), N::step_gain(d.angle_base / p[1])};
   }
   // The law is rate independent, so it is advanced by travel, with the exact solution for one direction: an explicit
   // step of its rate form diverges at rated speed.

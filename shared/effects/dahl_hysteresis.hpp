@@ -35,7 +35,7 @@ struct DahlHysteresis {
   };
   template <class N>
   struct Coefficients {
-    typename N::Gain torque;
+    typename N::Weight torque;
     typename N::Gain per_torsion;
     typename N::Exponent exponent;
     typename N::Exponent less_one;
@@ -47,7 +47,7 @@ struct DahlHysteresis {
   };
   template <class N, class P>
   static Coefficients<N> derive(const P* p, const DriveConstants<P>& d) {
-    return {N::gain(p[0] / d.output_torque_base), N::gain(p[1] * d.torsion_base / p[0]), N::exponent(p[2]),
+    return {N::weight(p[0] / d.output_torque_base), N::gain(p[1] * d.torsion_base / p[0]), N::exponent(p[2]),
             N::exponent(p[2] - P(1.0))};
   }
   // What is left to the limit, u = abs(s - T/Tc), obeys u' = -u^i over travel x = sigma abs(dq)/Tc, whose solution is

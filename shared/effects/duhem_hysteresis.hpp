@@ -44,7 +44,7 @@ struct DuhemHysteresis {
     typename N::Gain half_phi_1;
     typename N::Gain half_phi_2;
     typename N::Gain half_phi_3;
-    typename N::Gain torque;
+    typename N::Weight torque;
   };
   // The torque, in output torque bases.
   template <class N>
@@ -63,7 +63,7 @@ struct DuhemHysteresis {
             N::gain(half * p[3] * one),
             N::gain(half * p[4] * two),
             N::gain(half * p[5] * three),
-            N::gain(P(1.0))};
+            N::weight(P(1.0))};
   }
   template <class N>
   static typename N::Value half_phi(const Coefficients<N>& c, typename N::Value x) {

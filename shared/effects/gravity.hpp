@@ -23,12 +23,12 @@ struct Gravity : Stateless {
   };
   template <class N>
   struct Coefficients {
-    typename N::Gain cosine;
-    typename N::Gain sine;
+    typename N::Weight cosine;
+    typename N::Weight sine;
   };
   template <class N, class P>
   static Coefficients<N> derive(const P* p, const DriveConstants<P>& d) {
-    return {N::gain(p[0] / d.output_torque_base), N::gain(p[1] / d.output_torque_base)};
+    return {N::weight(p[0] / d.output_torque_base), N::weight(p[1] / d.output_torque_base)};
   }
   template <class N>
   static void evaluate(const State<N>&, const Coefficients<N>& c, const Inputs<N>& in, Torques<N>& out) {

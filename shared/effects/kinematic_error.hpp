@@ -34,8 +34,8 @@ struct KinematicError : Stateless {
     typename N::Gain sine;
     typename N::Gain rate_cosine;  // of its slope, times velocity
     typename N::Gain rate_sine;
-    typename N::Gain torque_cosine;  // of its slope, times torque
-    typename N::Gain torque_sine;
+    typename N::Weight torque_cosine;  // of its slope, times torque
+    typename N::Weight torque_sine;
   };
   template <class N, class P>
   static Coefficients<N> derive(const P* p, const DriveConstants<P>& d) {
@@ -43,8 +43,8 @@ struct KinematicError : Stateless {
     const P rate = k * d.velocity_base / d.torsion_rate_base;
     const P torque = k * d.output_torque_base / d.torque_base;
     return {N::order(k * d.angle_base), N::gain(p[1] / d.torsion_base), N::gain(p[2] / d.torsion_base),
-            N::gain(p[2] * rate),       N::gain(-p[1] * rate),          N::gain(p[2] * torque),
-            N::gain(-p[1] * torque)};
+            N::gain(p[2] * rate),       N::gain(-p[1] * rate),          N::weight(p[2] * torque),
+            N::weight(-p[1] * torque)};
   }
   template <class N>
   static void shift(const Coefficients<N>& c, Inputs<N>& in) {

@@ -21,11 +21,11 @@ struct LinearStiffness : Stateless {
   };
   template <class N>
   struct Coefficients {
-    typename N::Gain stiffness;
+    typename N::Weight stiffness;
   };
   template <class N, class P>
   static Coefficients<N> derive(const P* p, const DriveConstants<P>& d) {
-    return {N::gain(p[0] * d.torsion_base / d.output_torque_base)};
+    return {N::weight(p[0] * d.torsion_base / d.output_torque_base)};
   }
   template <class N>
   static void evaluate(const State<N>&, const Coefficients<N>& c, const Inputs<N>& in, Torques<N>& out) {

@@ -24,19 +24,16 @@ struct LoadScaledRipple : Stateless {
   };
   template <class N>
   struct Coefficients {
-    typename N::Order order;
-    typename N::Gain cosine;
-    typename N::Gain sine;
+    typename N::Harmonic ripple;
   };
   template <class N, class P>
   static Coefficients<N> derive(const P* p, const DriveConstants<P>& d) {
     const P torque = d.output_torque_base / d.torque_base;
-    return {N::order(p[0] * d.turn_angle_scale * d.angle_base), N::gain(p[1] * torque), N::gain(p[2] * torque)};
+    return {N::harmonic(p[0] * d.turn_angle_scale * d.angle_base, p[1] * torque, p[2] * torque)};
   }
   template <class N>
   static void evaluate(const State<N>&, const Coefficients<N>& c, const Inputs<N>& in, Torques<N>& out) {
-    const auto wave = N::sincos(N::times_order(in.angle, c.order));
-    out.motor += c.cosine * N::times(in.torque, wave.cosine) + c.sine * N::times(in.torque, wave.sine);
+    out.motor += N::wave_times(c.ripple, in.angle, in.torque);
   }
 };
 FLEXSPLINE_EFFECT(25, LoadScaledRipple);

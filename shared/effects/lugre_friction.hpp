@@ -52,8 +52,8 @@ struct LugreFriction {
   };
   template <class N>
   struct Coefficients {
-    typename N::Gain full;  // static friction, the most that the bristles carry
-    typename N::Gain damping;
+    typename N::Weight full;  // static friction, the most that the bristles carry
+    typename N::Weight damping;
     typename N::Value sliding;  // Fc/Fs
     typename N::Gain rise;      // 1 - Fc/Fs
     typename N::RatioGain per_velocity;
@@ -67,8 +67,8 @@ struct LugreFriction {
   template <class N, class P>
   static Coefficients<N> derive(const P* p, const DriveConstants<P>& d) {
     const P sliding = p[0] / p[1];
-    return {N::gain(p[1] / d.torque_base),
-            N::gain(p[4] * d.velocity_base / d.torque_base),
+    return {N::weight(p[1] / d.torque_base),
+            N::weight(p[4] * d.velocity_base / d.torque_base),
             N::value(sliding),
             N::gain(P(1.0) - sliding),
             N::ratio_gain(d.velocity_base / p[2]),

@@ -32,7 +32,7 @@ struct ModifiedDahlHysteresis {
   };
   template <class N>
   struct Coefficients {
-    typename N::Gain torque;
+    typename N::Weight torque;
     typename N::Gain per_torsion;
     typename N::Exponent exponent;
   };
@@ -43,7 +43,7 @@ struct ModifiedDahlHysteresis {
   };
   template <class N, class P>
   static Coefficients<N> derive(const P* p, const DriveConstants<P>& d) {
-    return {N::gain(p[0] / d.output_torque_base), N::gain(p[1] * d.torsion_base / p[0]), N::exponent(P(2.0))};
+    return {N::weight(p[0] / d.output_torque_base), N::gain(p[1] * d.torsion_base / p[0]), N::exponent(P(2.0))};
   }
   // See dahl_hysteresis: u becomes u/(1 + x u).
   template <class N>

@@ -52,9 +52,9 @@ struct PiecewiseStiffness : Stateless {
   };
   template <class N>
   struct Coefficients {
-    typename N::Gain inner;
-    typename N::Gain middle;
-    typename N::Gain outer;
+    typename N::Weight inner;
+    typename N::Weight middle;
+    typename N::Weight outer;
     typename N::Value first;  // torsion at the corners
     typename N::Value second;
   };
@@ -64,7 +64,7 @@ struct PiecewiseStiffness : Stateless {
     const P scale = d.torsion_base / d.output_torque_base;
     const P first = p[3] / p[0];
     const P second = first + (p[4] - p[3]) / p[1];
-    return {N::gain(p[0] * scale), N::gain(p[1] * scale), N::gain(p[2] * scale), N::value(first / d.torsion_base),
+    return {N::weight(p[0] * scale), N::weight(p[1] * scale), N::weight(p[2] * scale), N::value(first / d.torsion_base),
             N::value(second / d.torsion_base)};
   }
   template <class N>

@@ -23,13 +23,13 @@ struct PowerLawFriction : Stateless {
   };
   template <class N>
   struct Coefficients {
-    typename N::Gain torque;
+    typename N::Weight torque;
     typename N::RatioGain per_velocity;
     typename N::Exponent exponent;
   };
   template <class N, class P>
   static Coefficients<N> derive(const P* p, const DriveConstants<P>& d) {
-    return {N::gain(p[0] / d.torque_base), N::ratio_gain(d.velocity_base / d.rated_velocity), N::exponent(p[1])};
+    return {N::weight(p[0] / d.torque_base), N::ratio_gain(d.velocity_base / d.rated_velocity), N::exponent(p[1])};
   }
   template <class N>
   static void evaluate(const State<N>&, const Coefficients<N>& c, const Inputs<N>& in, Torques<N>& out) {

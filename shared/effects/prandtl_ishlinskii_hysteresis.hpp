@@ -83,7 +83,7 @@ struct PrandtlIshlinskiiHysteresis {
   template <class N>
   struct Coefficients {
     std::array<typename N::Value, kPlays> threshold;
-    std::array<typename N::Gain, kPlays> weight;
+    std::array<typename N::Weight, kPlays> weight;
   };
   template <class N>
   struct State {
@@ -94,7 +94,7 @@ struct PrandtlIshlinskiiHysteresis {
     Coefficients<N> c;
     for (int j = 0; j < kPlays; ++j) {
       c.threshold[j] = N::value(p[j] / d.torsion_base);
-      c.weight[j] = N::gain(p[kPlays + j] * d.torsion_base / d.output_torque_base);
+      c.weight[j] = N::weight(p[kPlays + j] * d.torsion_base / d.output_torque_base);
     }
     return c;
   }

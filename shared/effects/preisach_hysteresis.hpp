@@ -76,7 +76,7 @@ struct PreisachHysteresis {
     typename N::Value down[kLevels];
     typename N::Gain per_edge;
     typename N::Value initial[kRelays];  // of a gear that was worked until nothing of its past is left
-    typename N::Gain weight[kRelays];
+    typename N::Weight weight[kRelays];
   };
   // How far each relay is from where it began.
   template <class N>
@@ -96,7 +96,7 @@ struct PreisachHysteresis {
     int at = 0;
     for (int j = 1; j <= kLevels; ++j)
       for (int k = 1; k <= j; ++k, ++at) {
-        c.weight[at] = N::gain(p[1 + at] / d.output_torque_base);
+        c.weight[at] = N::weight(p[1 + at] / d.output_torque_base);
         c.initial[at] = N::value(P(j + k > 10 ? -1.0 : j + k < 10 ? 1.0 : 0.0));
       }
     return c;

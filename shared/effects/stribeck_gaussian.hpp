@@ -31,14 +31,14 @@ struct StribeckGaussian : Stateless {
   };
   template <class N>
   struct Coefficients {
-    typename N::Gain positive;
-    typename N::Gain negative;
+    typename N::Weight positive;
+    typename N::Weight negative;
     typename N::RatioGain per_velocity;
   };
   template <class N, class P>
   static Coefficients<N> derive(const P* p, const DriveConstants<P>& d) {
     const P half(0.5);
-    return {N::gain(half * p[0] / d.torque_base), N::gain(half * p[1] / d.torque_base),
+    return {N::weight(half * p[0] / d.torque_base), N::weight(half * p[1] / d.torque_base),
             N::ratio_gain(d.velocity_base / p[2])};
   }
   // s (1 + s) / 2 and s (1 - s) / 2 choose the amplitude of the direction without a branch.

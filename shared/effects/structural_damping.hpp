@@ -23,13 +23,13 @@ struct StructuralDamping : Stateless {
   };
   template <class N>
   struct Coefficients {
-    typename N::Gain torque;
+    typename N::Weight torque;
     typename N::RatioGain per_rate;
     typename N::Exponent exponent;
   };
   template <class N, class P>
   static Coefficients<N> derive(const P* p, const DriveConstants<P>& d) {
-    return {N::gain(p[0] / d.output_torque_base), N::ratio_gain(d.torsion_rate_base), N::exponent(p[1])};
+    return {N::weight(p[0] / d.output_torque_base), N::ratio_gain(d.torsion_rate_base), N::exponent(p[1])};
   }
   template <class N>
   static void evaluate(const State<N>&, const Coefficients<N>& c, const Inputs<N>& in, Torques<N>& out) {

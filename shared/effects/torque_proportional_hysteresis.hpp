@@ -37,7 +37,7 @@ struct TorqueProportionalHysteresis {
   };
   template <class N>
   struct Coefficients {
-    typename N::Gain most;  // bound at twice the rated torque
+    typename N::Weight most;  // bound at twice the rated torque
     typename N::Value rest;
     typename N::Gain per_torque;
     typename N::Gain per_torsion;
@@ -50,7 +50,7 @@ struct TorqueProportionalHysteresis {
   template <class N, class P>
   static Coefficients<N> derive(const P* p, const DriveConstants<P>& d) {
     const P most = p[0] + P(2.0) * p[1] * d.output_torque_base;
-    return {N::gain(most / d.output_torque_base), N::value(p[0] / most),
+    return {N::weight(most / d.output_torque_base), N::value(p[0] / most),
             N::gain(P(0.5) * p[1] * d.output_torque_base / most), N::gain(p[2] * d.torsion_base / most)};
   }
   // Exact for the mean of the bounds at both ends of the step.

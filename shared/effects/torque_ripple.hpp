@@ -24,19 +24,15 @@ struct TorqueRipple : Stateless {
   };
   template <class N>
   struct Coefficients {
-    typename N::Order order;
-    typename N::Gain cosine;
-    typename N::Gain sine;
+    typename N::Harmonic ripple;
   };
   template <class N, class P>
   static Coefficients<N> derive(const P* p, const DriveConstants<P>& d) {
-    return {N::order(p[0] * d.turn_angle_scale * d.angle_base), N::gain(p[1] / d.torque_base),
-            N::gain(p[2] / d.torque_base)};
+    return {N::harmonic(p[0] * d.turn_angle_scale * d.angle_base, p[1] / d.torque_base, p[2] / d.torque_base)};
   }
   template <class N>
   static void evaluate(const State<N>&, const Coefficients<N>& c, const Inputs<N>& in, Torques<N>& out) {
-    const auto wave = N::sincos(N::times_order(in.angle, c.order));
-    out.motor += c.cosine * wave.cosine + c.sine * wave.sine;
+    out.motor += N::wave(c.ripple, in.angle);
   }
 };
 FLEXSPLINE_EFFECT(11, TorqueRipple);

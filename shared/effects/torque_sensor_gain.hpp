@@ -23,14 +23,14 @@ struct TorqueSensorGain : Stateless {
   };
   template <class N>
   struct Coefficients {
-    typename N::Gain torque;
-    typename N::Gain motor;
+    typename N::Weight torque;
+    typename N::Weight motor;
   };
   // Of the measured torque, the share ratio/(1 + ratio) is not there.
   template <class N, class P>
   static Coefficients<N> derive(const P* p, const DriveConstants<P>& d) {
     const P share = p[0] / (P(1.0) + p[0]);
-    return {N::gain(share), N::gain(-share * d.output_torque_base / (d.gear_ratio * d.torque_base))};
+    return {N::weight(share), N::weight(-share * d.output_torque_base / (d.gear_ratio * d.torque_base))};
   }
   // A sensor is no spring: what it adds to the reading is taken back where the reading stands for the torque.
   template <class N>

@@ -26,26 +26,23 @@ struct TorqueSensorRipple : Stateless {
   };
   template <class N>
   struct Coefficients {
-    typename N::Order order;
-    typename N::Gain cosine;
-    typename N::Gain sine;
-    typename N::Gain motor_cosine;
-    typename N::Gain motor_sine;
+    typename N::Harmonic output;
+    typename N::Harmonic motor;
   };
   template <class N, class P>
   static Coefficients<N> derive(const P* p, const DriveConstants<P>& d) {
+    const P order = p[0] * d.turn_angle_scale * d.angle_base;
     const P motor = P(-1.0) / (d.gear_ratio * d.torque_base);
-    return {N::order(p[0] * d.turn_angle_scale * d.angle_base), N::gain(p[1] / d.output_torque_base),
-            N::gain(p[2] / d.output_torque_base), N::gain(p[1] * motor), N::gain(p[2] * motor)};
+    return {N::harmonic(order, p[1] / d.output_torque_base, p[2] / d.output_torque_base),
+            N::harmonic(order, p[1] * motor, p[2] * motor)};
   }
   // A sensor is no spring: what it adds to the reading is taken back where the reading stands for the torque.
   template <class N>
   static void evaluate(const State<N>&, const Coefficients<N>& c, const Inputs<N>& in, Torques<N>& out) {
-    const auto wave = N::sincos(N::times_order(in.angle, c.order));
-    const typename N::Sum ripple = c.cosine * wave.cosine + c.sine * wave.sine;
+    const typename N::Sum ripple = N::wave(c.output, in.angle);
     out.transmission += ripple;
     out.load += ripple;
-    out.motor += c.motor_cosine * wave.cosine + c.motor_sine * wave.sine;
+    out.motor += N::wave(c.motor, in.angle);
   }
 };
 FLEXSPLINE_EFFECT(43, TorqueSensorRipple);

@@ -20,11 +20,11 @@ struct ViscousFriction : Stateless {
   };
   template <class N>
   struct Coefficients {
-    typename N::Gain coefficient;
+    typename N::Weight coefficient;
   };
   template <class N, class P>
   static Coefficients<N> derive(const P* p, const DriveConstants<P>& d) {
-    return {N::gain(p[0] * d.velocity_base / d.torque_base)};
+    return {N::weight(p[0] * d.velocity_base / d.torque_base)};
   }
   template <class N>
   static void evaluate(const State<N>&, const Coefficients<N>& c, const Inputs<N>& in, Torques<N>& out) {

@@ -32,6 +32,10 @@ inline Value make_value(double x) {
   return {static_cast<std::int32_t>(
       nearest(scaled_by_power(x, kValueBits), 2147483647.0, "a value is not below 16 bases"))};
 }
+inline Weight make_weight(double x) {
+  return {static_cast<std::int32_t>(
+      nearest(scaled_by_power(x, kValueBits), 2147483647.0, "a torque of one signal is not below 16 bases"))};
+}
 inline Share make_share(double x) {
   if (!(x >= 0.0 && x <= 1.0)) {
     Findings::note("a share is not between nought and one");
@@ -48,6 +52,18 @@ inline Order make_order(double radians_per_turn) {
   constexpr double kTurn = 6.283185307179586;
   return {nearest(scaled_by_power(radians_per_turn / kTurn, kOrderBits), scaled_by_power(1.0, 62),
                   "an order is not below 16384 cycles a turn")};
+}
+
+// cosine cos(order q) + sine sin(order q), the order in radians per turn.
+inline Harmonic make_harmonic(double radians_per_turn, double cosine, double sine) {
+  constexpr double kTurn = 6.283185307179586;
+  Harmonic h;
+  h.order = make_order(radians_per_turn).raw;
+  h.amplitude = make_weight(__builtin_sqrt(cosine * cosine + sine * sine)).raw;
+  h.phase = static_cast<std::uint32_t>(
+      static_cast<std::uint64_t>(nearest(__builtin_atan2(cosine, sine) / kTurn * 0x1p32, 0x1p33, "")));
+  complete(h);
+  return h;
 }
 
 // Mantissa and exponent of a number, rounded; a mantissa of one is written as a half of the next power. Below `least`

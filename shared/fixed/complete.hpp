@@ -5,9 +5,13 @@
 #include <cstdint>
 
 #include "shared/fixed/bits.hpp"
+#include "shared/fixed/elementary.hpp"
 #include "shared/fixed/types.hpp"
 
 namespace flexspline::fixed {
+
+// A gain per turn below an eighth or so has fewer bits than its error bound needs.
+inline constexpr std::uint32_t kLeastFactor = std::uint32_t{1} << 21;
 
 namespace detail {
 // largest / (mantissa 2^(exponent - 30)) in units of 2^-input_bits, rounded down; nought counts as a half.
@@ -29,15 +33,56 @@ constexpr bool complete(G& g, std::uint64_t largest_q20, int input_bits) {
 }
 }  // namespace detail
 
-// Each sets the limit of the input; false where it leaves no input that the coefficient could be applied to.
+// Each sets what follows from mantissa and exponent; false where that leaves no input that the coefficient could be
+// applied to.
 constexpr bool complete(Gain& g) {
   return detail::complete(g, kLargestValueQ20, kValueBits);
 }
 constexpr bool complete(StepGain& g) {
-  return detail::complete(g, std::uint64_t{31} << 20, kAngleBits);
+  if (!detail::complete(g, std::uint64_t{31} << 20, kAngleBits)) return false;
+  // A travel is steps times mantissa 2^(exponent - 4) in Q58. So many bits of the mantissa are kept as a product with
+  // the largest input, shifted up, leaves room for.
+  constexpr int kUp = kTravelBits - kAngleBits - kMantissaBits;
+  const auto size = static_cast<std::uint64_t>(size_of(g.mantissa)) << 2;
+  const int shift = g.exponent + kUp - 2;
+  g.up = static_cast<std::uint8_t>(shift > 0 && shift < 32 ? shift : 0);
+  if (shift >= 32) return false;
+  g.factor = static_cast<std::uint32_t>(limited<std::int64_t>(
+      shift_right(static_cast<std::int64_t>(size), shift < 0 ? -shift : 0), 0, std::int64_t{0xFFFFFFFF}));
+  // The input shifted up has to fit a word.
+  const std::int64_t most = std::int64_t{0xFFFFFFFF} >> g.up;
+  if (g.limit > most) g.limit = static_cast<std::int32_t>(most);
+  return g.mantissa == 0 || g.factor >= kLeastFactor;
 }
 constexpr bool complete(RatioGain& g) {
-  return detail::complete(g, std::uint64_t{1} << 37, kValueBits);
+  if (!detail::complete(g, std::uint64_t{1} << 37, kValueBits)) return false;
+  g.near = g.bell = 0;
+  g.up = 0;
+  g.log = -(std::int32_t{31} << 25);
+  if (g.mantissa == 0) return true;
+  const auto size = static_cast<std::uint64_t>(size_of(g.mantissa));
+  g.log = static_cast<std::int32_t>(
+      shift_right(log2_of(size) + (std::int64_t{g.exponent - kMantissaBits} << kLogBits), kLogBits - 25));
+  // Times 1.2011, the root of log2(e): as a mantissa from 1/2 to 1 in Q32 and a power of two.
+  constexpr std::uint64_t kRoot = 0x99BE610C;  // Q31
+  std::uint64_t bell = (size * kRoot + (std::uint64_t{1} << 28)) >> 29;
+  int exponent = g.exponent;
+  if (bell > 0xFFFFFFFF) {
+    bell = (bell + 1) >> 1;
+    ++exponent;
+  }
+  if (bell > 0xFFFFFFFF) bell = 0xFFFFFFFF;
+  const int shift = exponent + 1;
+  if (shift >= 32) return false;
+  g.up = static_cast<std::uint8_t>(shift > 0 ? shift : 0);
+  g.bell = static_cast<std::uint32_t>(shift < 0 ? (shift <= -32 ? 0 : bell >> -shift) : bell);
+  // Where 2^-(w^2) is below half a unit, w = 5.29.
+  constexpr std::uint64_t kGoneQ20 = 5546967;
+  const std::uint64_t mantissa = bell >> 2;
+  g.near = static_cast<std::uint32_t>(
+      detail::input_limit(kGoneQ20, static_cast<std::int32_t>(mantissa), exponent, kValueBits, 0x7FFFFFFF));
+  if (g.up > 0 && g.near > (0xFFFFFFFFU >> g.up)) g.near = 0xFFFFFFFFU >> g.up;
+  return g.near > 0;
 }
 constexpr bool complete(DistanceGain& g) {
   constexpr std::uint64_t kMost = 0x7FFFFFFFFFFFFFFF;
@@ -45,6 +90,19 @@ constexpr bool complete(DistanceGain& g) {
                             : static_cast<std::int64_t>(detail::input_limit(std::uint64_t{4} << 20, g.mantissa,
                                                                             g.exponent, kAngleBits, kMost));
   return g.mantissa == 0 || g.limit > 0;
+}
+constexpr bool complete(Harmonic& h) {
+  constexpr std::int64_t kMost = std::int64_t{1} << 62;
+  constexpr int kRest = kOrderBits - 32;
+  if (h.order <= -kMost || h.order >= kMost || h.amplitude == INT32_MIN) return false;
+  h.whole = static_cast<std::int32_t>(h.order >> kOrderBits);
+  // What is left over is taken with a sign, as turns have one.
+  const auto fraction = static_cast<std::uint64_t>(h.order) & ((std::uint64_t{1} << kOrderBits) - 1);
+  const std::uint64_t rounded = fraction + (std::uint64_t{1} << (kRest - 1));
+  h.fraction = static_cast<std::uint32_t>(rounded >> kRest);
+  if ((rounded >> kOrderBits) != 0) ++h.whole;
+  h.remainder = static_cast<std::int32_t>(static_cast<std::uint32_t>(fraction << (32 - kRest)));
+  return true;
 }
 
 }  // namespace flexspline::fixed

@@ -71,8 +71,12 @@ inline Range<State> operator+(Range<State> a, Range<State> b) {
 inline Range<State> operator-(Range<State> a, Range<State> b) {
   return a + -b;
 }
+// A sum is far below the end of its word, so that ends of many terms can still be added here.
+inline constexpr std::int64_t kSumMost = std::int64_t{1} << 61;
 inline Range<Sum> operator+(Range<Sum> a, Range<Sum> b) {
-  return {a.low + b.low, a.high + b.high};
+  const Range<Sum> sum{a.low + b.low, a.high + b.high};
+  if (sum.low < -kSumMost || sum.high > kSumMost) Findings::note("a sum of torques is not below 128 bases");
+  return {limited(sum.low, -kSumMost, kSumMost), limited(sum.high, -kSumMost, kSumMost)};
 }
 inline Range<Sum>& operator+=(Range<Sum>& a, Range<Sum> b) {
   return a = a + b;
@@ -83,7 +87,12 @@ struct Intervals {
   using Value = Range<fixed::Value>;
   using State = Range<fixed::State>;
   using Sum = Range<fixed::Sum>;
-  using Ratio = Range<fixed::Ratio>;
+  struct Scaled {
+    fixed::RatioGain gain;
+    Value signal;
+  };
+  using Ratio = Scaled;
+  using Kept = State;
   struct Travel {
     std::uint64_t low = 0;
     std::uint64_t high = 0;
@@ -93,6 +102,16 @@ struct Intervals {
   struct Angle {
     friend constexpr Step operator-(Angle, Angle) { return {}; }
   };
+  struct Weight : fixed::Weight {
+    friend Sum operator*(const Weight& w, Value x) {
+      constexpr std::int64_t kSixteen = std::int64_t{16} << kSumBits;
+      const std::int64_t a = w.raw * x.low, b = w.raw * x.high;
+      if (limited(a, 1 - kSixteen, kSixteen - 1) != a || limited(b, 1 - kSixteen, kSixteen - 1) != b)
+        Findings::note("a torque may not be below 16 bases");
+      return a < b ? Sum{a, b} : Sum{b, a};
+    }
+  };
+  using Harmonic = fixed::Harmonic;
   struct Gain : fixed::Gain {
     friend Sum operator*(const Gain& g, Value x) {
       const auto end = [&](std::int64_t raw) { return (Fixed::Gain{g} * detail::value_of(raw)).raw; };
@@ -118,6 +137,10 @@ struct Intervals {
     Value sine;
   };
 
+  static Weight weight(double x) { return {make_weight(x)}; }
+  static Harmonic harmonic(double radians_per_turn, double cosine, double sine) {
+    return make_harmonic(radians_per_turn, cosine, sine);
+  }
   static Gain gain(double x) { return {make_gain(x)}; }
   static StepGain step_gain(double x) { return make_step_gain(x); }
   static RatioGain ratio_gain(double x) { return make_ratio_gain(x); }
@@ -129,7 +152,7 @@ struct Intervals {
 
   static Value one() { return exactly(Fixed::one()); }
   static Value times(Value a, Value b) {
-    const auto corner = [](std::int64_t x, std::int64_t y) { return shift_right(x * y, kValueBits); };
+    const auto corner = [](std::int64_t x, std::int64_t y) { return (x * y) >> kValueBits; };
     return detail::value_range(
         smallest(corner(a.low, b.low), corner(a.low, b.high), corner(a.high, b.low), corner(a.high, b.high)),
         largest(corner(a.low, b.low), corner(a.low, b.high), corner(a.high, b.low), corner(a.high, b.high)));
@@ -138,11 +161,7 @@ struct Intervals {
     return g.ordered<Value>(
         x, [&](std::int64_t raw) { return std::int64_t{Fixed::scaled(Fixed::Gain{g}, detail::value_of(raw)).raw}; });
   }
-  static Ratio ratio(const RatioGain& g, Value x) {
-    const std::int64_t a = Fixed::ratio(g, detail::value_of(x.low)).raw;
-    const std::int64_t b = Fixed::ratio(g, detail::value_of(x.high)).raw;
-    return a < b ? Ratio{a, b} : Ratio{b, a};
-  }
+  static Scaled ratio(const RatioGain& g, Value x) { return {g, x}; }
   static Sum sum(Value x) {
     return {Fixed::sum(detail::value_of(x.low)).raw, Fixed::sum(detail::value_of(x.high)).raw};
   }
@@ -151,10 +170,7 @@ struct Intervals {
     return {Fixed::narrow(detail::state_of(x.low)).raw, Fixed::narrow(detail::state_of(x.high)).raw};
   }
   static State widen(Value x) {
-    constexpr std::int64_t kEight = std::int64_t{8} << kValueBits;
-    if (most(x) >= kEight) Findings::note("a value may not fit a state");
-    return {Fixed::widen(detail::value_of(limited(x.low, 1 - kEight, kEight - 1))).raw,
-            Fixed::widen(detail::value_of(limited(x.high, 1 - kEight, kEight - 1))).raw};
+    return {Fixed::widen(detail::value_of(x.low)).raw, Fixed::widen(detail::value_of(x.high)).raw};
   }
 
   static Step magnitude(Step x) { return x; }
@@ -212,31 +228,40 @@ struct Intervals {
   static State times(State a, Share b) {
     return {Fixed::times(detail::state_of(a.low), b).raw, Fixed::times(detail::state_of(a.high), b).raw};
   }
-  // For a share between nought and one; the drive rounds towards the target.
-  static State relax(State from, State target, State) { return hull(from, target); }
+  // For a share between nought and one. The drive may pass the target by a unit, and not by more however long it runs.
+  static State relax(State from, State target, State) {
+    constexpr std::int64_t kUnit = std::int64_t{1} << (kStateBits - 27);
+    if (from.high - target.low >= 8 * kOne || target.high - from.low >= 8 * kOne)
+      Findings::note("a distance to relax over may leave its range");
+    return hull(from, State{target.low - kUnit, target.high + kUnit});
+  }
 
   static State exp_negative(Travel x) {
-    return share(Fixed::exp_negative(fixed::Travel{x.high}).raw, Fixed::exp_negative(fixed::Travel{x.low}).raw);
+    return share(Fixed::exp_negative(fixed::Travel{x.high}), Fixed::exp_negative(fixed::Travel{x.low}));
   }
   static State q_exp_negative(Travel x, Exponent q) {
-    return share(Fixed::q_exp_negative({x.high}, q).raw, Fixed::q_exp_negative({x.low}, q).raw);
+    return share(Fixed::q_exp_negative({x.high}, q), Fixed::q_exp_negative({x.low}, q));
   }
   static Value exp_negative(Value x) {
     if (x.low < Fixed::kLeastExponential) Findings::note("an exponential may reach its limit");
     return padded(Fixed::exp_negative(detail::value_of(x.high)).raw, Fixed::exp_negative(detail::value_of(x.low)).raw);
   }
   static Value exp_mean(Travel x) { return padded(Fixed::exp_mean({x.high}).raw, Fixed::exp_mean({x.low}).raw); }
-  static Value gauss(Ratio x) { return padded(Fixed::gauss({most(x)}).raw, Fixed::gauss({least(x)}).raw); }
-  static Value lorentzian(Ratio x) {
-    return padded(Fixed::lorentzian({most(x)}).raw, Fixed::lorentzian({least(x)}).raw);
+  static Value gauss(const Scaled& x) {
+    return padded(at(Fixed::gauss, x, most(x.signal)).raw, at(Fixed::gauss, x, least(x.signal)).raw);
+  }
+  static Value lorentzian(const Scaled& x) {
+    return padded(at(Fixed::lorentzian, x, most(x.signal)).raw, at(Fixed::lorentzian, x, least(x.signal)).raw);
   }
   static Value reciprocal(Value x) {
     if (x.low < Fixed::kLeastDivisor) Findings::note("a divisor may come too near to nought");
     return padded(Fixed::reciprocal(detail::value_of(x.high)).raw, Fixed::reciprocal(detail::value_of(x.low)).raw);
   }
-  static Value pow_abs(Ratio x, Exponent e) {
-    const std::int64_t a = Checked::pow_abs(fixed::Ratio{least(x)}, e).raw;
-    const std::int64_t b = Checked::pow_abs(fixed::Ratio{most(x)}, e).raw;
+  static Value pow_abs(const Scaled& x, Exponent e) {
+    const auto end = [&](std::int64_t raw) {
+      return std::int64_t{Checked::pow_abs(Checked::Scaled{x.gain, {{static_cast<std::int32_t>(raw)}}}, e).raw};
+    };
+    const std::int64_t a = end(least(x.signal)), b = end(most(x.signal));
     return a < b ? padded(a, b) : padded(b, a);
   }
   static Value pow_abs(State x, Exponent e) {
@@ -245,6 +270,10 @@ struct Intervals {
     return a < b ? padded(a, b) : padded(b, a);
   }
   static Angle times_order(Angle angle, const Order&) { return angle; }
+  static Sum wave(const Harmonic& h, Angle) { return Weight{{h.amplitude}} * padded(-one().high, one().high); }
+  static Sum wave_times(const Harmonic& h, Angle, Value x) {
+    return Weight{{h.amplitude}} * times(x, padded(-one().high, one().high));
+  }
   static Wave sincos(Angle) {
     const Value whole = padded(-one().high, one().high);
     return {whole, whole};
@@ -253,13 +282,18 @@ struct Intervals {
  private:
   static constexpr std::int64_t kOne = std::int64_t{1} << kStateBits;
 
+  // A function of a ratio at one signal.
+  template <class Function>
+  static Fixed::Value at(Function&& function, const Scaled& x, std::int64_t raw) {
+    return function(Fixed::Scaled{x.gain, detail::value_of(raw)});
+  }
   static Value exactly(Fixed::Value x) { return {x.raw, x.raw}; }
   static State clamped(State x, std::int64_t limit) {
     return {limited(x.low, -limit, limit), limited(x.high, -limit, limit)};
   }
-  static State share(std::int64_t low, std::int64_t high) {
+  static State share(Fixed::State low, Fixed::State high) {
     constexpr std::int64_t kMargin = kOne >> 26;
-    return {limited<std::int64_t>(low - kMargin, 0, kOne), limited<std::int64_t>(high + kMargin, 0, kOne)};
+    return {limited<std::int64_t>(low.raw - kMargin, 0, kOne), limited<std::int64_t>(high.raw + kMargin, 0, kOne)};
   }
   static Value padded(std::int64_t low, std::int64_t high) {
     constexpr std::int64_t kMargin = 4;

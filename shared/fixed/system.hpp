@@ -7,6 +7,7 @@
 #include "shared/fixed/coefficients.hpp"
 #include "shared/fixed/elementary.hpp"
 #include "shared/fixed/types.hpp"
+#include "shared/fixed/word.hpp"
 
 namespace flexspline::fixed {
 
@@ -41,6 +42,10 @@ struct FixedSystem {
     friend constexpr State operator-(State a, State b) { return {{Policy::state_sum(a.raw, negated(b.raw))}}; }
     friend constexpr State operator-(State a) { return {{negated(a.raw)}}; }
   };
+  // A term of a sum keeps its factors apart, so that a processor multiplies and adds at once.
+  struct Weight : fixed::Weight {
+    friend constexpr fixed::Sum operator*(Weight w, Value x) { return {long_product(w.raw, x.raw)}; }
+  };
   struct Gain : fixed::Gain {
     friend constexpr fixed::Sum operator*(Gain g, Value x) {
       return {shift_right(product(g, x.raw), kMantissaBits + kValueBits - kSumBits - g.exponent)};
@@ -50,6 +55,20 @@ struct FixedSystem {
     Value cosine;
     Value sine;
   };
+  // A signal over a characteristic size, not multiplied yet: each function needs it in its own way.
+  struct Scaled {
+    fixed::RatioGain gain;
+    Value signal;
+    constexpr operator fixed::Ratio() const {
+      return {shift_right(product(gain, signal.raw), kMantissaBits + kValueBits - kRatioBits - gain.exponent)};
+    }
+  };
+  // What a relaxation loses of its distance, 1 - exp(-x), Q63: exact however small x is.
+  struct Kept {
+    std::uint64_t lost = 0;
+    constexpr operator State() const { return {{kOneState - static_cast<std::int64_t>(lost >> (63 - kStateBits))}}; }
+  };
+  using Harmonic = fixed::Harmonic;
   using Angle = fixed::Angle;
   using Step = fixed::Step;
   using Sum = fixed::Sum;
@@ -67,6 +86,10 @@ struct FixedSystem {
   static constexpr std::int32_t kLeastDivisor = (std::int32_t{1} << kValueBits) / 15;
 
   // Coefficients, on the host; Findings has what does not fit.
+  static Weight weight(double x) { return {make_weight(x)}; }
+  static Harmonic harmonic(double radians_per_turn, double cosine, double sine) {
+    return make_harmonic(radians_per_turn, cosine, sine);
+  }
   static Gain gain(double x) { return {make_gain(x)}; }
   static StepGain step_gain(double x) { return make_step_gain(x); }
   static RatioGain ratio_gain(double x) { return make_ratio_gain(x); }
@@ -80,53 +103,81 @@ struct FixedSystem {
   // From here on integers only.
   static constexpr Value one() { return {{std::int32_t{1} << kValueBits}}; }
   static constexpr Value times(Value a, Value b) {
-    return {{Policy::value(shift_right(std::int64_t{a.raw} * b.raw, kValueBits))}};
+#if defined(__OPTIMIZE__)
+    // Of signals that nothing modulates.
+    if (__builtin_constant_p(b.raw) && b.raw == one().raw) return a;
+#endif
+    return {{Policy::value(long_product(a.raw, b.raw) >> kValueBits)}};
   }
   static constexpr Value scaled(Gain g, Value x) {
     return {{Policy::value(shift_right(product(g, x.raw), kMantissaBits - g.exponent))}};
   }
-  static constexpr Ratio ratio(RatioGain g, Value x) {
-    return {shift_right(product(g, x.raw), kMantissaBits + kValueBits - kRatioBits - g.exponent)};
+  static constexpr Scaled ratio(const RatioGain& g, Value x) {
+    return {g, x};
   }
-  static constexpr Sum sum(Value x) { return {std::int64_t{x.raw} * (std::int64_t{1} << (kSumBits - kValueBits))}; }
+  static constexpr Sum sum(Value x) {
+    return {std::int64_t{x.raw} * (std::int64_t{1} << (kSumBits - kValueBits))};
+  }
   // The whole of the balance: what does not fit a signal is clamped, as the last step.
   static constexpr Value narrow(Sum x) {
     return {{static_cast<std::int32_t>(
         limited<std::int64_t>(shift_right(x.raw, kSumBits - kValueBits), -0x7FFFFFFF, 0x7FFFFFFF))}};
   }
+  // Both have the same place of their point in a word: rounded down.
   static constexpr Value narrow(State x) {
-    return {{static_cast<std::int32_t>(shift_right(x.raw, kStateBits - kValueBits))}};
+    static_assert(kStateBits - kValueBits == 32);
+    return {{static_cast<std::int32_t>(x.raw >> 32)}};
   }
-  static constexpr State widen(Value x) { return {{Policy::state_shift(x.raw, kStateBits - kValueBits)}}; }
+  static constexpr State widen(Value x) {
+    return {{std::int64_t{x.raw} * (std::int64_t{1} << 32)}};
+  }
 
   static constexpr Step magnitude(Step x) {
     const std::uint64_t size = size_of(x.raw);
     return {static_cast<std::int64_t>(size > kLargest ? kLargest : size)};
   }
-  static constexpr Value magnitude(Value x) { return x.raw < 0 ? -x : x; }
-  static constexpr State magnitude(State x) { return x.raw < 0 ? -x : x; }
-  static constexpr Value clamp(Value x, Value limit) { return {{limited(x.raw, (-limit).raw, limit.raw)}}; }
+  static constexpr Value magnitude(Value x) {
+    return x.raw < 0 ? -x : x;
+  }
+  static constexpr State magnitude(State x) {
+    return x.raw < 0 ? -x : x;
+  }
+  static constexpr Value clamp(Value x, Value limit) {
+    return {{limited(x.raw, (-limit).raw, limit.raw)}};
+  }
   static constexpr State clamp(State x, Value limit) {
-    constexpr std::int32_t kEight = std::int32_t{1} << (kValueBits + 3);
-    if (limit.raw >= kEight) return x;
-    const std::int64_t most = shift_right(limit.raw, kValueBits - kStateBits);
+    const std::int64_t most = widen(limit).raw;
     return {{limited(x.raw, -most, most)}};
   }
-  static constexpr State clamp(State x, State limit) { return {{limited(x.raw, negated(limit.raw), limit.raw)}}; }
-  static constexpr Value between(Value x, Value low, Value high) { return {{limited(x.raw, low.raw, high.raw)}}; }
-  static constexpr State clamp_to_one(State x) { return {{limited(x.raw, -kOneState, kOneState)}}; }
-  static constexpr State bounded(State x) { return {{limited(x.raw, -4 * kOneState, 4 * kOneState)}}; }
-  static constexpr Value by_sign(Value x, Value a, Value b) { return x.raw < 0 ? b : a; }
-  static constexpr State sign(Step x) { return {{x.raw > 0 ? kOneState : x.raw < 0 ? -kOneState : 0}}; }
-  static constexpr State sign(Value x) { return {{x.raw > 0 ? kOneState : x.raw < 0 ? -kOneState : 0}}; }
+  static constexpr State clamp(State x, State limit) {
+    return {{limited(x.raw, negated(limit.raw), limit.raw)}};
+  }
+  static constexpr Value between(Value x, Value low, Value high) {
+    return {{limited(x.raw, low.raw, high.raw)}};
+  }
+  static constexpr State clamp_to_one(State x) {
+    return {{limited(x.raw, -kOneState, kOneState)}};
+  }
+  static constexpr State bounded(State x) {
+    return {{limited(x.raw, -4 * kOneState, 4 * kOneState)}};
+  }
+  static constexpr Value by_sign(Value x, Value a, Value b) {
+    return x.raw < 0 ? b : a;
+  }
+  static constexpr State sign(Step x) {
+    return {{x.raw > 0 ? kOneState : x.raw < 0 ? -kOneState : 0}};
+  }
+  static constexpr State sign(Value x) {
+    return {{x.raw > 0 ? kOneState : x.raw < 0 ? -kOneState : 0}};
+  }
 
   // Two, as every signal is limited to at entry: so the bound of a linear observer needs no trust in its input.
   static constexpr State signal(StepGain g, Step x) {
+    constexpr std::int64_t kTwo = 2 * kOneState;
     const int up = g.exponent - (kMantissaBits + kAngleBits - kStateBits);
-    const std::int64_t whole = product(g, x.raw);  // below 2^61, which is two
-    if (up <= 0) return {{shift_right(whole, -up)}};
-    const std::int64_t most = 2 * kOneState >> up;
-    return {{limited(whole, -most, most) * (std::int64_t{1} << up)}};
+    const std::int64_t whole = product(g, x.raw);  // below 2^61
+    if (up <= 0) return {{limited(shift_right(whole, -up), -kTwo, kTwo)}};
+    return {{limited(whole, -(kTwo >> up), kTwo >> up) * (std::int64_t{1} << up)}};
   }
   // Within four: see DistanceGain.
   static constexpr State signal(DistanceGain g, Step x) {
@@ -139,8 +190,12 @@ struct FixedSystem {
   static constexpr Step distance(Gain g, Value x) {
     return {shift_right(product(g, x.raw), kMantissaBits + kValueBits - kAngleBits - g.exponent)};
   }
-  static constexpr Travel travel(StepGain g, Step x) {
-    return limited_travel(shift_right(product(g, x.raw), kMantissaBits + kAngleBits - kTravelBits - g.exponent));
+  static constexpr Travel travel(const StepGain& g, Step x) {
+    // Longer than half a turn is as good as half a turn.
+    const auto low = static_cast<std::int32_t>(x.raw), high = static_cast<std::int32_t>(x.raw >> 32);
+    const std::uint32_t size = magnitude_of(high == low >> 31 ? low : 0x7FFFFFFF);
+    const auto most = static_cast<std::uint32_t>(g.limit);
+    return {long_product((size < most ? size : most) << g.up, g.factor)};
   }
   static constexpr Travel travel(Gain g, Value x) {
     return limited_travel(shift_right(product(g, x.raw), kMantissaBits + kValueBits - kTravelBits - g.exponent));
@@ -182,16 +237,26 @@ struct FixedSystem {
     constexpr int kUp = 64 - kShareBits;
     return {{with_sign(((p.high << kUp) | (p.low >> kShareBits)) + ((p.low >> (kShareBits - 1)) & 1), a.raw < 0)}};
   }
-  // Rounds towards the target, so that it never leaves the hull of both.
+  // Takes what it loses off the distance, of which 28 fractional bits count: so it may pass the target by a unit.
+  static constexpr State relax(State from, State target, Kept kept) {
+    const std::int64_t away = Policy::state_sum(from.raw, negated(target.raw));
+    Policy::expect(away < 8 * kOneState && away >= -8 * kOneState, "a distance to relax over leaves its range");
+    const auto distance = static_cast<std::int32_t>(away >> 31);
+    const auto low = static_cast<std::int32_t>(kept.lost);
+    // The lower word is taken with a sign, as the distance has one.
+    const auto high = static_cast<std::int32_t>((kept.lost >> 32) + (low < 0 ? 1 : 0));
+    const std::int64_t change = long_product(distance, high) + (long_product(distance, low) >> 32);
+    return {{static_cast<std::int64_t>(static_cast<std::uint64_t>(from.raw) - static_cast<std::uint64_t>(change))}};
+  }
+  // What is kept as a share, as other functions than exponentials give it.
   static constexpr State relax(State from, State target, State share) {
-    const bool above = from.raw > target.raw;
-    const std::uint64_t a = static_cast<std::uint64_t>(from.raw);
-    const std::uint64_t b = static_cast<std::uint64_t>(target.raw);
-    const std::uint64_t kept = multiply_down(above ? a - b : b - a, static_cast<std::uint64_t>(share.raw), kStateBits);
-    return {{static_cast<std::int64_t>(above ? b + kept : b - kept)}};
+    const std::uint64_t lost = static_cast<std::uint64_t>(kOneState - share.raw) << (63 - kStateBits);
+    return relax(from, target, Kept{lost < kAllLost ? lost : kAllLost});
   }
 
-  static constexpr State exp_negative(Travel x) { return {{static_cast<std::int64_t>(decay(x.raw))}}; }
+  static constexpr Kept exp_negative(Travel x) {
+    return {lost_of(x.raw)};
+  }
   static constexpr Value exp_negative(Value x) {
     constexpr std::int64_t kPerLn2 = 0x5C551D94AE0BF85E;  // Q62
     const std::int64_t y =
@@ -205,13 +270,13 @@ struct FixedSystem {
       return {{static_cast<std::int32_t>(shift_right(mean, kMantissaBits - kValueBits))}};
     }
     constexpr int kLostBits = 52;  // so that the shift below is less than a word
-    const std::uint64_t lost = ((std::uint64_t{1} << kStateBits) - decay(x.raw)) >> (kStateBits - kLostBits);
+    const std::uint64_t lost = ((std::uint64_t{1} << 60) - decay(x.raw)) >> (60 - kLostBits);
     const Reciprocal r = reciprocal_of(x.raw);
     return {{static_cast<std::int32_t>(
         multiply_down(lost, r.mantissa, kLostBits + kMantissaBits - kValueBits - kTravelBits - r.exponent))}};
   }
   // exp(-y), y = log(1 + z)/(q - 1), z = (q - 1) x.
-  static constexpr State q_exp_negative(Travel x, Exponent q) {
+  static constexpr Kept q_exp_negative(Travel x, Exponent q) {
     constexpr int kZBits = 52;
     const std::int64_t less_one = std::int64_t{q.raw} - (std::int64_t{1} << kExponentBits);
     const std::int64_t z =
@@ -223,18 +288,21 @@ struct FixedSystem {
       return exp_negative(by_mantissa(x, mean, kMantissaBits));
     }
     const std::int64_t base = (std::int64_t{1} << kZBits) + z;
-    if (base <= 0) return {};
+    if (base <= 0) return {kAllLost};
     const std::int64_t log = log2_of(static_cast<std::uint64_t>(base)) - (std::int64_t{kZBits} << kLogBits);
     const std::uint64_t natural = multiply_down(size_of(log), kLn2, kTravelBits - (50 - kLogBits));  // Q50
     const Reciprocal r = reciprocal_of(size_of(less_one));
     return exp_negative(
         by_mantissa({natural}, r.mantissa, kMantissaBits - r.exponent - kExponentBits - (kTravelBits - 50)));
   }
-  static constexpr Value gauss(Ratio x) {
-    constexpr std::int64_t kAllGone = std::int64_t{11} << (kRatioBits - 1);  // exp(-5.5^2) is 7e-14
-    const std::int64_t size = limited<std::int64_t>(x.raw, -kAllGone, kAllGone);
-    const Travel square{static_cast<std::uint64_t>(multiply_round(size, size, 2 * kRatioBits - kTravelBits))};
-    return narrow(exp_negative(square));
+  static constexpr Value gauss(const Scaled& x) {
+    const std::uint32_t size = magnitude_of(x.signal.raw);
+    // The ratio times the root of log2(e), Q28, below 5.3; its square Q27.
+    const std::uint32_t w = multiply_high((size < x.gain.near ? size : x.gain.near) << x.gain.up, x.gain.bell);
+    const auto square = static_cast<std::uint32_t>(long_product(w, w) >> 29);
+    const std::uint32_t halvings = (square + (std::uint32_t{1} << 26)) >> 27;
+    const std::int32_t power = power_of_two_word(static_cast<std::int32_t>(0 - (square << 5)));
+    return {{power >> (halvings + (kMantissaBits - kValueBits))}};
   }
   static constexpr Value lorentzian(Ratio x) {
     constexpr std::int64_t kAllGone = std::int64_t{11000} << kRatioBits;  // one over its square is one unit
@@ -248,8 +316,36 @@ struct FixedSystem {
     const Reciprocal r = reciprocal_of(static_cast<std::uint64_t>(x.raw < kLeastDivisor ? kLeastDivisor : x.raw));
     return {{static_cast<std::int32_t>(shift_right(r.mantissa, kMantissaBits - 2 * kValueBits - r.exponent))}};
   }
-  static constexpr Value pow_abs(Ratio x, Exponent e) { return raised(size_of(x.raw), kRatioBits, e); }
-  static constexpr Value pow_abs(State x, Exponent e) { return raised(size_of(x.raw), kStateBits, e); }
+  // For exponents above nought; results below 11.
+  static constexpr Value pow_abs(const Scaled& x, Exponent e) {
+    const std::uint32_t size = magnitude_of(x.signal.raw);
+    const int zeros = std::countl_zero(size);
+    const std::int32_t log =
+        x.gain.log + ((31 - kValueBits) << 25) - (zeros << 25) + log2_of_mantissa(size << (zeros & 31));
+    return power_of(log, e, size == 0);
+  }
+  static constexpr Value pow_abs(State x, Exponent e) {
+    if (e.raw == 0) return one();
+    const std::uint64_t size = size_of(x.raw);
+    const int zeros = std::countl_zero(size);
+    const auto mantissa = static_cast<std::uint32_t>((size << (zeros & 63)) >> 32);
+    return power_of(((63 - kStateBits) << 25) - (zeros << 25) + log2_of_mantissa(mantissa), e, size == 0);
+  }
+  // Of an amplitude and a phase: one sine. The whole turns count as well, where the order is not whole.
+  static constexpr Value wave_of(const Harmonic& h, Angle angle) {
+    const auto turns = static_cast<std::int32_t>(angle.raw >> 32);
+    const auto part = static_cast<std::uint32_t>(angle.raw);
+    std::uint32_t phase = h.phase + part * static_cast<std::uint32_t>(h.whole);
+    phase += static_cast<std::uint32_t>(turns) * h.fraction;
+    phase += multiply_high(part, h.fraction);
+    return {{sine_word(static_cast<std::uint32_t>(add_high(static_cast<std::int32_t>(phase), turns, h.remainder)))}};
+  }
+  static constexpr Sum wave(const Harmonic& h, Angle angle) {
+    return Weight{{h.amplitude}} * wave_of(h, angle);
+  }
+  static constexpr Sum wave_times(const Harmonic& h, Angle angle, Value x) {
+    return Weight{{h.amplitude}} * times(x, wave_of(h, angle));
+  }
 
   static constexpr Angle times_order(Angle angle, Order order) {
     Product p = multiply(static_cast<std::uint64_t>(angle.raw), static_cast<std::uint64_t>(order.raw));
@@ -263,12 +359,18 @@ struct FixedSystem {
             {{static_cast<std::int32_t>(shift_right(w.sine, kBits))}}};
   }
   // Integers of 2^-32: a position and a distance in turns, a value below 15, the wave at a phase in turns.
-  static constexpr Angle angle(std::int64_t q32) { return {q32}; }
-  static constexpr Step steps(std::int64_t q32) { return {q32}; }
+  static constexpr Angle angle(std::int64_t q32) {
+    return {q32};
+  }
+  static constexpr Step steps(std::int64_t q32) {
+    return {q32};
+  }
   static constexpr Value value_of(std::int64_t q32) {
     return {{Policy::value(shift_right(q32, kAngleBits - kValueBits))}};
   }
-  static constexpr Wave wave(std::uint32_t q32) { return sincos({static_cast<std::int64_t>(q32)}); }
+  static constexpr Wave wave(std::uint32_t q32) {
+    return sincos({static_cast<std::int64_t>(q32)});
+  }
 
  private:
   static constexpr std::int64_t kOneState = std::int64_t{1} << kStateBits;
@@ -298,10 +400,18 @@ struct FixedSystem {
     const std::int64_t log = log2_of(x) - (std::int64_t{bits} << kLogBits);
     return multiply_round(log, e.raw, kExponentBits);
   }
-  static constexpr Value raised(std::uint64_t x, int bits, Exponent e) {
-    if (e.raw == 0) return one();
-    if (x == 0) return e.raw > 0 ? Value{} : Value{{0x7FFFFFFF}};
-    return from_power(power_of_two_of(log_times(x, bits, e)));
+  // 2^(e log), log in Q25; the power is counted from 28 halvings on, below which nothing is left of a value.
+  static constexpr Value power_of(std::int32_t log, Exponent e, bool of_nought) {
+    constexpr int kBits = 25 + kExponentBits - 32;
+    constexpr std::int32_t kLow = std::int32_t{28} << kBits;
+    const std::int64_t product = long_product(log, e.raw);
+    const auto high = static_cast<std::int32_t>(product >> 32) + kLow;
+    const auto counted =
+        static_cast<std::uint32_t>(limited<std::int32_t>(of_nought ? 0 : high, 0, (1 << (kBits + 5)) - 1));
+    const std::uint32_t y = (counted << (26 - kBits)) | (static_cast<std::uint32_t>(product) >> (32 - (26 - kBits)));
+    const std::uint32_t halvings = 31 - ((y + (std::uint32_t{1} << 25)) >> 26);
+    Policy::expect(halvings < 32, "a power leaves the range of a value");
+    return {{power_of_two_word(static_cast<std::int32_t>(y << 6)) >> (halvings & 31)}};
   }
   static constexpr Value from_power(Power p) {
     Policy::expect(p.exponent < 4, "a power leaves the range of a value");

@@ -9,8 +9,8 @@ namespace flexspline::fixed {
 
 inline constexpr int kValueBits = 27;
 inline constexpr int kAngleBits = 32;
-inline constexpr int kStateBits = 60;
-inline constexpr int kSumBits = 44;
+inline constexpr int kStateBits = 59;
+inline constexpr int kSumBits = 54;
 inline constexpr int kRatioBits = 44;
 inline constexpr int kMantissaBits = 30;
 inline constexpr int kExponentBits = 28;
@@ -38,10 +38,12 @@ struct Angle {
     return {static_cast<std::int64_t>(static_cast<std::uint64_t>(a.raw) + static_cast<std::uint64_t>(b.raw))};
   }
 };
-// A torque before it is narrowed: a term is below 16 bases, so that half a million of them fit.
+// A torque before it is narrowed: products of a weight and a value, to the last bit.
 struct Sum {
   std::int64_t raw = 0;
-  friend constexpr Sum operator+(Sum a, Sum b) { return {a.raw + b.raw}; }
+  friend constexpr Sum operator+(Sum a, Sum b) {
+    return {static_cast<std::int64_t>(static_cast<std::uint64_t>(a.raw) + static_cast<std::uint64_t>(b.raw))};
+  }
   constexpr Sum& operator+=(Sum b) { return *this = *this + b; }
 };
 // Inner state and shares of it.
@@ -60,6 +62,20 @@ struct Travel {
 struct Ratio {
   std::int64_t raw = 0;
 };
+// Of a torque, in bases: what a value of one makes. Multiplies without a shift and without rounding.
+struct Weight {
+  std::int32_t raw = 0;
+};
+// A wave over an angle as amplitude and phase, so that one sine is computed and not two. The order is split up as its
+// product with an angle needs it (complete.hpp).
+struct Harmonic {
+  std::int64_t order = 0;      // as `Order`
+  std::uint32_t phase = 0;     // of the sine, 2^-32 turns
+  std::int32_t amplitude = 0;  // as `Weight`
+  std::int32_t whole = 0;
+  std::uint32_t fraction = 0;  // 2^-32
+  std::int32_t remainder = 0;  // 2^-64
+};
 // Coefficients mantissa 2^(exponent - 30). The input is clamped to `limit` before it is multiplied, so that the product
 // always fits; a limit of nought marks one that cannot be used.
 struct Gain {
@@ -69,19 +85,28 @@ struct Gain {
   std::int8_t exponent = 0;
   std::int32_t limit = 0;
 };
+// Per turn, of steps. `factor` 2^up is the same number in 2^-26 units of a travel.
 struct StepGain {
   static constexpr int kLeastExponent = -40;
   static constexpr int kMostExponent = 60;
   std::int32_t mantissa = 0;
   std::int8_t exponent = 0;
+  std::uint8_t up = 0;
   std::int32_t limit = 0;
+  std::uint32_t factor = 0;
 };
+// One over a characteristic size of a signal. `bell` 2^up is that number times the root of log2(e), for inputs up to
+// `near`; `log` is log2 of it in Q25.
 struct RatioGain {
   static constexpr int kLeastExponent = -40;
   static constexpr int kMostExponent = 60;
   std::int32_t mantissa = 0;
   std::int8_t exponent = 0;
+  std::uint8_t up = 0;
   std::int32_t limit = 0;
+  std::uint32_t near = 0;
+  std::uint32_t bell = 0;
+  std::int32_t log = 0;
 };
 // The same for distances of many turns: the input has 64 bits, the result stays within four.
 struct DistanceGain {

@@ -166,6 +166,26 @@ requires(std::is_base_of_v<fixed::Gain, T> || std::is_base_of_v<fixed::StepGain,
          std::is_base_of_v<fixed::DistanceGain, T>) struct Encoding<T> : detail::Floating<T> {
 };
 
+template <class T>
+requires std::is_base_of_v<fixed::Weight, T>
+struct Encoding<T> : detail::OneWord<T> {
+};
+template <class T>
+requires std::is_base_of_v<fixed::Harmonic, T>
+struct Encoding<T> {
+  static constexpr void put(Writer& w, const T& x) {
+    w.put(x.order);
+    w.put(x.phase);
+    w.put(x.amplitude);
+  }
+  static constexpr bool take(Reader& r, T& x) {
+    x.order = r.take<std::int64_t>();
+    x.phase = r.take<std::uint32_t>();
+    x.amplitude = r.take<std::int32_t>();
+    return fixed::complete(x);
+  }
+};
+
 template <>
 struct Encoding<Number> {
   static constexpr void put(Writer& w, const Number& x) {

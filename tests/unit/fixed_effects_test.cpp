@@ -48,7 +48,7 @@ TEST(ProofOfABlock, RefusesWhatCouldLeaveItsRangeAndSaysWhy) {
   };
   // Twenty times rated torque at twice rated torsion.
   EXPECT_EQ(reason_of("linear_stiffness", {10.0 * drive.output_torque_base / drive.torsion_base}),
-            "a gain may reach its limit: its result is not below 16 bases");
+            "a torque may not be below 16 bases");
   EXPECT_EQ(reason_of("torsion_zero", {14.5 * drive.torsion_base}), "a value may leave its range");
   Models models;
   EXPECT_FALSE(models.add_named("torque_bias", {20.0 * drive.torque_base}, drive));
@@ -123,7 +123,7 @@ TEST(DriveModel, SlowMotionMovesAStateThatASignalCouldNotShow) {
     narrow.deflection = Fixed::widen(Fixed::narrow(narrow.deflection));
   }
   const double expected = -std::expm1(-kTurn * std::ldexp(ticks, -32) / presliding_rad);
-  EXPECT_NEAR(std::ldexp(static_cast<double>(wide.deflection.raw), -60), expected, 1e-8 * expected);
+  EXPECT_NEAR(std::ldexp(static_cast<double>(wide.deflection.raw), -fixed::kStateBits), expected, 1e-8 * expected);
   EXPECT_EQ(narrow.deflection.raw, 0);
 }
 

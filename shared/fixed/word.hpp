@@ -1,0 +1,188 @@
+// Functions on one word of 32 bits, for what every tick computes: a dozen or two instructions each, the same in each
+// run. Each states its formats and its largest error, which a test holds against long double over the whole domain.
+// Polynomials are Chebyshev interpolations of the named function, rounded to their format.
+//
+// Qn: an integer of n fractional bits.
+#pragma once
+
+#include <bit>
+#include <cstddef>
+#include <cstdint>
+#include <type_traits>
+#include <utility>
+
+namespace flexspline::fixed {
+
+// Products of two words. Cortex-M0 has no long multiplication: its parts are put together from 16 bits.
+#if defined(__ARM_ARCH_6M__)
+[[gnu::noinline]] inline std::uint64_t long_product_of_parts(std::uint32_t a, std::uint32_t b) {
+  const std::uint32_t a0 = a & 0xFFFF, a1 = a >> 16, b0 = b & 0xFFFF, b1 = b >> 16;
+  const std::uint32_t low = a0 * b0, one = a1 * b0 + (low >> 16), two = a0 * b1 + (one & 0xFFFF);
+  return (std::uint64_t{a1 * b1 + (one >> 16) + (two >> 16)} << 32) | ((two << 16) | (low & 0xFFFF));
+}
+constexpr std::uint64_t long_product(std::uint32_t a, std::uint32_t b) {
+  return std::is_constant_evaluated() ? std::uint64_t{a} * b : long_product_of_parts(a, b);
+}
+constexpr std::int64_t long_product(std::int32_t a, std::int32_t b) {
+  if (std::is_constant_evaluated()) return std::int64_t{a} * b;
+  const auto ua = static_cast<std::uint32_t>(a), ub = static_cast<std::uint32_t>(b);
+  const std::uint32_t more = (a < 0 ? ub : 0) + (b < 0 ? ua : 0);
+  return static_cast<std::int64_t>(long_product_of_parts(ua, ub) - (std::uint64_t{more} << 32));
+}
+#else
+constexpr std::uint64_t long_product(std::uint32_t a, std::uint32_t b) {
+  return std::uint64_t{a} * b;
+}
+constexpr std::int64_t long_product(std::int32_t a, std::int32_t b) {
+  return std::int64_t{a} * b;
+}
+#endif
+
+// c + a b 2^-32, rounded to the nearest (halves up): SMMLAR, which no compiler finds by itself, where the processor has
+// it. Sums wrap.
+constexpr std::int32_t add_high(std::int32_t c, std::int32_t a, std::int32_t b) {
+#if defined(__ARM_FEATURE_DSP) && __ARM_FEATURE_DSP
+  if (!std::is_constant_evaluated()) {
+    std::int32_t sum;
+    asm("smmlar %0, %1, %2, %3" : "=r"(sum) : "r"(a), "r"(b), "r"(c));
+    return sum;
+  }
+#endif
+  const auto product = static_cast<std::uint64_t>(long_product(a, b)) + (std::uint64_t{1} << 31);
+  return static_cast<std::int32_t>(static_cast<std::uint32_t>(c) + static_cast<std::uint32_t>(product >> 32));
+}
+// a b 2^-32, rounded to the nearest: SMMULR.
+constexpr std::int32_t multiply_high(std::int32_t a, std::int32_t b) {
+#if defined(__ARM_FEATURE_DSP) && __ARM_FEATURE_DSP
+  if (!std::is_constant_evaluated()) {
+    std::int32_t product;
+    asm("smmulr %0, %1, %2" : "=r"(product) : "r"(a), "r"(b));
+    return product;
+  }
+#endif
+  return add_high(0, a, b);
+}
+// a b 2^-32, rounded down.
+constexpr std::uint32_t multiply_high(std::uint32_t a, std::uint32_t b) {
+  return static_cast<std::uint32_t>(long_product(a, b) >> 32);
+}
+// a b 2^-bits, rounded down; the caller knows that it fits.
+constexpr std::int32_t multiply_shift(std::int32_t a, std::int32_t b, int bits) {
+  return static_cast<std::int32_t>(long_product(a, b) >> bits);
+}
+constexpr std::uint32_t magnitude_of(std::int32_t x) {
+  const auto sign = static_cast<std::uint32_t>(x >> 31);
+  return (static_cast<std::uint32_t>(x) ^ sign) - sign;
+}
+
+namespace detail {
+// Where a table lies. Compilers would build its numbers from immediates, at two instructions each.
+template <class T, std::size_t Size>
+constexpr const T* in_memory(const T (&table)[Size]) {
+  const T* at = table;
+#if defined(__arm__) && !defined(__ARM_ARCH_6M__)
+  if (!std::is_constant_evaluated()) asm("" : "+r"(at));
+#endif
+  return at;
+}
+template <std::size_t... Down>
+constexpr std::int32_t horner(const std::int32_t* c, std::int32_t x, std::index_sequence<Down...>) {
+  std::int32_t sum = c[sizeof...(Down)];
+  ((sum = add_high(c[sizeof...(Down) - 1 - Down], sum, x)), ...);
+  return sum;
+}
+// c0 + x (c1 + x (c2 + ...)) with x in 2^-32.
+template <std::size_t Size>
+constexpr std::int32_t horner(const std::int32_t (&coefficients)[Size], std::int32_t x) {
+  return horner(in_memory(coefficients), x, std::make_index_sequence<Size - 1>{});
+}
+}  // namespace detail
+
+// 2^x for x in Q32 from -1/2 to 1/2, in Q30; within 4 units of Q30.
+constexpr std::int32_t power_of_two_word(std::int32_t x) {
+  constexpr std::int32_t kCoefficients[] = {1073741824, 744261146, 257941250, 59596185, 10327310, 1438860, 166016};
+  return detail::horner(kCoefficients, x);
+}
+
+// sin(2 pi x) for x in turns, Q32, in Q27; within 1.5 units.
+constexpr std::int32_t sine_word(std::uint32_t phase) {
+  // sin(2 pi t)/t over 16 t^2 in Q30, each four times as large as the one before stands for.
+  constexpr std::int32_t kCoefficients[] = {843314853, -1387196611, 684531186, -160602359, 20845600};
+  // Beyond a quarter turn to either side: half a turn less it.
+  const bool beyond = static_cast<std::int32_t>(phase ^ (phase << 1)) < 0;
+  const auto t = static_cast<std::int32_t>(beyond ? 0x80000000U - phase : phase);
+  const std::int32_t square = multiply_high(t, t);
+  return multiply_high(t, detail::horner(kCoefficients, square * 4));
+}
+
+// log2(x) of an integer x from 1 on, in Q25, within 1.2 units: a table finds a factor that brings the mantissa next to
+// one.
+namespace detail {
+struct LogEntry {
+  std::uint32_t factor = 0;  // 1/(1 + (i + 1/2)/32), Q32
+  std::int32_t log = 0;      // -log2 of it, Q25
+};
+struct WordLogTable {
+  LogEntry entries[32]{};
+};
+// Bit by bit: the square of the mantissa passes two where the next bit of the logarithm is one.
+constexpr WordLogTable make_word_log_table() {
+  WordLogTable table;
+  for (std::uint64_t i = 0; i < 32; ++i) {
+    const auto factor = static_cast<std::uint32_t>(((std::uint64_t{1} << 39) / (65 + 2 * i) + 1) / 2);
+    std::uint64_t mantissa = std::uint64_t{factor} << 31;  // Q62, from 1 to 2: twice the factor
+    std::int64_t bits = 0;
+    constexpr int kBits = 34;
+    for (int k = 0; k < kBits; ++k) {
+      // Its upper half is enough for 25 bits.
+      const std::uint64_t upper = mantissa >> 31;
+      mantissa = upper * upper;
+      const bool passes = (mantissa >> 63) != 0;
+      bits = 2 * bits + (passes ? 1 : 0);
+      if (passes) mantissa >>= 1;
+    }
+    constexpr int kDown = kBits - 25;
+    table.entries[i] = {factor,
+                        static_cast<std::int32_t>((((std::int64_t{1} << kBits) - bits) + (1 << (kDown - 1))) >> kDown)};
+  }
+  return table;
+}
+inline constexpr WordLogTable kWordLogTable = make_word_log_table();
+}  // namespace detail
+
+// Of the mantissa alone: x as an integer that was shifted up until its highest bit stood; from 0 to 1.
+constexpr std::int32_t log2_of_mantissa(std::uint32_t mantissa) {
+  // log2(1 + r)/r over r up to 1/62 to each side, in Q21 and sixteenths of it.
+  constexpr std::int32_t kCoefficients[] = {3025551, -94558, 3940};
+  const detail::LogEntry& entry = detail::in_memory(detail::kWordLogTable.entries)[(mantissa >> 26) & 31];
+  // Next to one, so that Q36 holds what it differs by: the one itself is shifted out.
+  const auto r = static_cast<std::int32_t>(multiply_high(mantissa, entry.factor) << 5);
+  return entry.log + multiply_high(r, detail::horner(kCoefficients, r));
+}
+
+// (1 - 2^-x)/x for x in Q31 from 0 to 1, in Q31; within 2e-8 of itself.
+constexpr std::uint32_t halving_mean(std::int32_t x) {
+  constexpr std::int32_t kCoefficients[] = {1488522224, -1031763206, 476734752, -164875809, 44380305, -7897239};
+  return static_cast<std::uint32_t>(detail::horner(kCoefficients, x));
+}
+
+inline constexpr std::uint64_t kAllLost = 0x7FFFFFFE00000000;  // one, as far as it shows
+
+// 1 - exp(-x) for x in Q58, in Q63, within 1e-8; of a small x within 2e-8 of itself.
+constexpr std::uint64_t lost_of(std::uint64_t travel) {
+  constexpr std::uint32_t kPerLn2 = 0xB8AA3B29;  // Q31
+  const auto high = static_cast<std::uint32_t>(travel >> 32), low = static_cast<std::uint32_t>(travel);
+  const std::uint64_t halvings = long_product(high, kPerLn2) + multiply_high(low, kPerLn2);  // Q57
+  const auto count = static_cast<std::uint32_t>(halvings >> 57) & 63;
+  const std::uint64_t fraction = halvings << 7;  // Q64
+  const auto upper = static_cast<std::uint32_t>(fraction >> 32);
+  const std::uint32_t mean = halving_mean(static_cast<std::int32_t>(upper >> 1));
+  const std::uint64_t lost = long_product(upper, mean) + multiply_high(static_cast<std::uint32_t>(fraction), mean);
+  // What is left is halved as often as the whole part says; of what that loses below a word nothing shows. Never quite
+  // all, so that a word with a sign holds it.
+  constexpr std::uint32_t kAll = kAllLost >> 32;
+  const std::uint32_t left = (kAll - static_cast<std::uint32_t>(lost >> 32)) >> (count < 31 ? count : 31);
+  return (std::uint64_t{kAll - left} << 32) | static_cast<std::uint32_t>(lost);
+}
+
+}  // namespace flexspline::fixed
