@@ -1,0 +1,309 @@
+// The application on a drive, over any board: modes, the control tick, and the work behind it.
+//
+//   main() -> Application::tick(), from the board's timer -> Control::observe() and Control::update()
+//
+// The tick interrupts background work, never the other way round. The state of the drive belongs to the tick; a command
+// waits in a mailbox for the next tick. Parameters are the one thing that background work writes: it asks for them, and
+// the tick lends them only while the amplifier is off.
+#pragma once
+
+#include <atomic>
+#include <cstddef>
+#include <cstdint>
+#include <optional>
+#include <span>
+
+#include "firmware/board.hpp"
+#include "firmware/control.hpp"
+#include "firmware/faults.hpp"
+#include "firmware/messages.hpp"
+#include "firmware/parameter_block.hpp"
+#include "firmware/safety.hpp"
+#include "firmware/telemetry.hpp"
+#include "firmware/watchdog.hpp"
+
+namespace flexspline::firmware {
+
+template <Board B>
+class Application {
+ public:
+  using Ring = Telemetry<B::kTelemetryWords>;
+  static constexpr std::uint32_t kBootTicks = 50;
+
+  explicit Application(B& board) : board_(board) {}
+
+  // The control tick: called by the board's timer, kTickHz times a second.
+  void tick() {
+    const Readings readings = board_.read();
+    ++status_.tick;
+    watchdog_.report(Part::sensors);
+    lend_or_take_back();
+    Estimate estimate;
+    if (has_parameters()) estimate = control_.observe(readings);
+    take_command(estimate);
+    judge(readings, estimate);
+    watchdog_.report(Part::safety);
+    Output output;
+    if (is_armed(status_.mode)) output = control_.update(demand_, estimate);
+    watchdog_.report(Part::control);
+    board_.actuate(actuation(output));
+    watchdog_.report(Part::output);
+    last_ = output;
+    follow_up(output);
+    telemetry_.record(status_.tick, channels(readings, estimate, output));
+    if (board_.tick_overrun()) enter_fault({Fault::tick_overrun, status_.tick, 0, 0});
+  }
+
+  // What has time: called again and again from main(), and interrupted by the tick at any point.
+  void background() {
+    watchdog_.report(Part::background);
+    take_block();
+    if (watchdog_.all_reported()) board_.feed_watchdog();
+  }
+
+  // The command interface, for background work (a protocol) or for whoever calls the tick, but not for both at once.
+  // False: the command before has not been taken yet; a tick later it has.
+  bool submit(const Command& command) {
+    if (command_waits_.load(std::memory_order_acquire)) return false;
+    command_ = command;
+    command_waits_.store(true, std::memory_order_release);
+    return true;
+  }
+  // The answer to the last command taken, once.
+  std::optional<Answer> answer() {
+    if (!answer_waits_.load(std::memory_order_acquire)) return {};
+    const Answer answer = answer_;
+    answer_waits_.store(false, std::memory_order_release);
+    return answer;
+  }
+  // A parameter block. It has to stay where it is until block_finding() has the answer, which background work finds.
+  void offer(std::span<const std::byte> block) {
+    block_ = block;
+    block_finding_.reset();
+    block_step_ = BlockStep::check;
+  }
+  std::optional<BlockFinding> block_finding() const { return block_finding_; }
+
+  Ring& telemetry() { return telemetry_; }
+  const Status& status() const { return status_; }
+
+ private:
+  enum class BlockStep : std::uint8_t { none, check, wait };
+  enum class Owner : std::uint8_t { tick, wanted, background };
+
+  bool has_parameters() const { return status_.has_parameters; }
+
+  // Parameters.
+
+  // The tick's half: lends the parameters while nothing is driven by them, and starts anew with what comes back.
+  void lend_or_take_back() {
+    const Owner owner = owner_.load(std::memory_order_acquire);
+    if (owner == Owner::wanted && !is_armed(status_.mode)) {
+      status_.has_parameters = false;
+      owner_.store(Owner::background, std::memory_order_release);
+    } else if (owner == Owner::tick && new_parameters_) {
+      new_parameters_ = false;
+      status_.has_parameters = true;
+      control_.restart();
+      safety_ = {};
+    }
+  }
+  // Background work's half: nothing reaches the parameters before the whole block was looked at.
+  void take_block() {
+    if (block_step_ == BlockStep::check) {
+      const BlockFinding finding = check_block(block_, B::kTickHz);
+      if (finding != BlockFinding::good) return block_done(finding);
+      owner_.store(Owner::wanted, std::memory_order_release);
+      asked_at_ = status_.tick;
+      block_step_ = BlockStep::wait;
+    } else if (block_step_ == BlockStep::wait) {
+      if (owner_.load(std::memory_order_acquire) == Owner::background) {
+        parameters_ = parameters_in(block_);
+        new_parameters_ = true;
+        owner_.store(Owner::tick, std::memory_order_release);
+        block_done(BlockFinding::good);
+      } else if (status_.tick - asked_at_ > 1) {
+        Owner wanted = Owner::wanted;
+        if (owner_.compare_exchange_strong(wanted, Owner::tick)) block_done(BlockFinding::armed);
+      }
+    }
+  }
+  void block_done(BlockFinding finding) {
+    block_step_ = BlockStep::none;
+    block_finding_ = finding;
+  }
+
+  // Commands.
+
+  void take_command(const Estimate& estimate) {
+    if (!command_waits_.load(std::memory_order_acquire)) return;
+    safety_.host_is_there();
+    const Refusal refusal = obey(command_, estimate);
+    answer_ = {command_.number, refusal, status_.mode};
+    answer_waits_.store(true, std::memory_order_release);
+    command_waits_.store(false, std::memory_order_release);
+  }
+  Refusal obey(const Command& command, const Estimate& estimate) {
+    switch (command.kind) {
+      case Command::Kind::heartbeat:
+        return Refusal::none;
+      case Command::Kind::arm:
+        return arm(command, estimate);
+      case Command::Kind::set:
+        if (!may_be_commanded(status_.mode)) return Refusal::not_armed;
+        if (command.mode != status_.mode) return Refusal::other_mode;
+        take_set_point(command);
+        return Refusal::none;
+      case Command::Kind::disarm:
+        if (!is_armed(status_.mode)) return Refusal::not_armed;
+        enter_idle();
+        return Refusal::none;
+      case Command::Kind::clear_fault:
+        // Back to boot: idle again once the sensors were found good for as long as after a reset.
+        if (status_.mode != Mode::fault) return Refusal::none;
+        status_.mode = Mode::boot;
+        boot_ticks_ = 0;
+        return Refusal::none;
+    }
+    return Refusal::no_mode;
+  }
+  Refusal arm(const Command& command, const Estimate& estimate) {
+    if (status_.mode == Mode::boot) return Refusal::booting;
+    if (status_.mode == Mode::fault || status_.mode == Mode::stop) return Refusal::fault;
+    if (!may_be_commanded(command.mode)) return Refusal::no_mode;
+    if (!has_parameters()) return Refusal::no_parameters;
+    if (command.mode == Mode::excitation && parameters_.excitation.ticks == 0) return Refusal::no_excitation;
+    if (status_.mode == Mode::idle && N::magnitude(estimate.velocity) > parameters_.safety.standstill)
+      return Refusal::moving;
+    status_.mode = command.mode;
+    demand_.compensate = command.compensate;
+    demand_.position = estimate.angle;
+    take_set_point(command);
+    control_.start(demand_, estimate);
+    return Refusal::none;
+  }
+  void take_set_point(const Command& command) {
+    demand_.mode = command.mode;
+    demand_.position = command.position;
+    demand_.velocity = command.velocity;
+    demand_.current = command.current;
+  }
+
+  // Modes.
+
+  void judge(const Readings& readings, const Estimate& estimate) {
+    const bool needs_output = has_parameters() && parameters_.has_output_encoder;
+    FaultRecord found = safety_.check_samples(status_.tick, readings, needs_output);
+    if (found.fault == Fault::none && has_parameters())
+      found = safety_.check(status_.tick, readings, estimate, last_, parameters_, status_.mode);
+    if (found.fault != Fault::none) {
+      boot_ticks_ = 0;
+      return respond(found, estimate);
+    }
+    if (status_.mode == Mode::boot) boot();
+  }
+  void boot() {
+    if (++boot_ticks_ < kBootTicks) return;
+    status_.mode = Mode::idle;
+    if (board_.reset_cause() == ResetCause::watchdog && !told_reset_)
+      enter_fault({Fault::watchdog, status_.tick, 0, 0});
+    told_reset_ = true;
+  }
+  // A drive that is off stays off; one that comes to rest already is not told to do so again.
+  void respond(const FaultRecord& found, const Estimate& estimate) {
+    if (status_.mode == Mode::fault) return;
+    if (!is_armed(status_.mode) || info_of(found.fault).ends_in == SafeState::off) return enter_fault(found);
+    if (status_.mode == Mode::stop) return;
+    status_.fault = found;
+    status_.mode = Mode::stop;
+    demand_ = {.mode = Mode::stop};
+    stop_ticks_ = 0;
+    control_.start(demand_, estimate);
+  }
+  void enter_fault(const FaultRecord& found) {
+    status_.fault = found;
+    status_.mode = Mode::fault;
+    amplifier_off();
+  }
+  void enter_idle() {
+    status_.mode = Mode::idle;
+    amplifier_off();
+  }
+  void amplifier_off() {
+    demand_ = {};
+    last_ = {};
+    control_.off();
+    board_.actuate({});
+  }
+  // What this tick's output means for the mode of the next.
+  void follow_up(const Output& output) {
+    if (status_.mode == Mode::excitation && output.finished) enter_idle();
+    if (status_.mode != Mode::stop) return;
+    if (output.at_rest) return enter_fault(status_.fault);
+    if (++stop_ticks_ >= parameters_.safety.stop_ticks)
+      enter_fault({Fault::stop_failed, status_.tick, static_cast<std::int32_t>(status_.fault.fault), 0});
+  }
+
+  Actuation actuation(const Output& output) const {
+    if (!is_armed(status_.mode)) return {};
+    const N::Value share = N::scaled(parameters_.amplifier, output.current);
+    const std::int64_t most = 32767;
+    return {static_cast<std::int16_t>(fixed::limited(fixed::shift_right(share.raw, fixed::kValueBits - 15), -most, most)),
+            true};
+  }
+
+  ChannelValues channels(const Readings& readings, const Estimate& e, const Output& out) const {
+    const auto turns = [](N::Angle a) { return static_cast<std::uint32_t>(static_cast<std::uint64_t>(a.raw) >> 32); };
+    const auto fraction = [](N::Angle a) { return static_cast<std::uint32_t>(static_cast<std::uint64_t>(a.raw)); };
+    const auto word = [](N::Value x) { return static_cast<std::uint32_t>(x.raw); };
+    const auto state = static_cast<std::uint32_t>(status_.mode) |
+                       (static_cast<std::uint32_t>(status_.fault.fault) << 8) | (out.limited ? 1U << 16 : 0U);
+    return {state,
+            readings.motor_counter,
+            turns(e.angle),
+            fraction(e.angle),
+            turns(e.output_angle),
+            fraction(e.output_angle),
+            word(e.velocity),
+            word(e.acceleration),
+            word(e.output_velocity),
+            word(e.torque),
+            word(e.current),
+            word(e.temperature),
+            word(e.disturbance),
+            turns(out.position),
+            fraction(out.position),
+            word(out.velocity),
+            word(out.acceleration),
+            word(out.feedforward),
+            word(out.torque),
+            word(out.current)};
+  }
+
+  B& board_;
+  Status status_{};
+  Demand demand_{};
+  Output last_{};
+  Safety safety_{};
+  Watchdog watchdog_{};
+  Ring telemetry_{};
+  Parameters parameters_{};
+  Control control_{parameters_};
+  std::uint32_t boot_ticks_ = 0;
+  std::uint32_t stop_ticks_ = 0;
+  bool told_reset_ = false;
+
+  Command command_{};
+  Answer answer_{};
+  std::atomic<bool> command_waits_{false};
+  std::atomic<bool> answer_waits_{false};
+
+  std::span<const std::byte> block_{};
+  std::optional<BlockFinding> block_finding_{};
+  BlockStep block_step_ = BlockStep::none;
+  std::uint32_t asked_at_ = 0;
+  std::atomic<Owner> owner_{Owner::tick};
+  bool new_parameters_ = false;
+};
+
+}  // namespace flexspline::firmware

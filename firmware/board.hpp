@@ -1,0 +1,47 @@
+// What the application asks of a board. The application is a template over it: a real board, QEMU's and the software
+// board of the desktop run the same sources, and no call is virtual.
+#pragma once
+
+#include <concepts>
+#include <cstdint>
+
+namespace flexspline::firmware {
+
+// One set of samples, taken together at the start of a tick. Each `..._samples` counts the samples of its source: a
+// number that stands still says that the values beside it are old.
+struct Readings {
+  std::uint32_t motor_counter = 0;   // of the encoder, wraps; positive with positive current
+  std::uint32_t output_counter = 0;  // the same at the output, where there is an encoder
+  std::uint16_t motor_samples = 0;
+  std::uint16_t output_samples = 0;
+  std::uint16_t analog_samples = 0;
+  // Shares of full scale, 2^-15.
+  std::int16_t current = 0;
+  std::int16_t torque = 0;
+  std::int16_t temperature = 0;
+};
+
+// For the current controller, until the next tick. Not enabled: both switches of every leg open.
+struct Actuation {
+  std::int16_t current = 0;  // share of the amplifier's full scale, 2^-15
+  bool enabled = false;
+};
+
+enum class ResetCause : std::uint8_t { power, watchdog };
+
+template <class B>
+concept Board = requires(B board, const Actuation& actuation) {
+  { B::kTickHz } -> std::convertible_to<std::uint32_t>;
+  { B::kTelemetryWords } -> std::convertible_to<std::uint32_t>;  // a power of two
+  // Called at each tick, in this order: samples at the start of the tick, current, and whether the tick took longer
+  // than there was time.
+  { board.read() } -> std::same_as<Readings>;
+  board.actuate(actuation);
+  { board.tick_overrun() } -> std::same_as<bool>;
+  // Called from background work. The watchdog resets the drive when it was not fed for kWatchdogTicks (faults.hpp), and
+  // a reset switches the amplifier off.
+  board.feed_watchdog();
+  { board.reset_cause() } -> std::same_as<ResetCause>;
+};
+
+}  // namespace flexspline::firmware

@@ -1,0 +1,209 @@
+// The control tick: what the sensors say (observe), and what current answers the demand (update).
+#pragma once
+
+#include <cstdint>
+
+#include "firmware/board.hpp"
+#include "firmware/messages.hpp"
+#include "shared/control/drive_parameters.hpp"
+
+namespace flexspline::firmware {
+
+using Parameters = control::DriveParameters<N>;
+
+// What is wanted, as the host said it.
+struct Demand {
+  Mode mode = Mode::idle;
+  bool compensate = false;
+  N::Angle position{};
+  N::Value velocity{};
+  N::Value current{};
+};
+
+struct Estimate {
+  N::Angle angle{};  // of the motor
+  N::Value velocity{};
+  N::Value acceleration{};
+  N::Angle output_angle{};  // of the output; stays nought without an encoder there
+  N::Value output_velocity{};
+  N::Value torque{};  // through the flexspline, without the sensor's ripple
+  N::Value current{};
+  N::Value temperature{};
+  N::Value disturbance{};
+  std::int32_t moved = 0;  // counts of the motor's encoder since the tick before
+};
+
+struct Output {
+  N::Angle position{};  // the set point, within its limits
+  N::Value velocity{};
+  N::Value acceleration{};
+  N::Value feedforward{};
+  N::Value torque{};
+  N::Value current{};
+  bool limited = false;
+  bool at_rest = false;   // modes velocity and stop: the set point is nought and so is the shaft's velocity
+  bool finished = false;  // the excitation is over
+};
+
+class Control {
+ public:
+  explicit constexpr Control(Parameters& parameters) : p_(parameters) {}
+
+  // At rest and knowing nothing: after the parameters changed.
+  void restart() {
+    motor_encoder_ = output_encoder_ = {};
+    motor_motion_ = output_motion_ = {};
+    disturbance_ = {};
+    ripple_ = {};
+    off();
+  }
+  // The amplifier is off: what the loops remember is void.
+  void off() {
+    loops_ = {};
+    excitation_ = {};
+    last_ = {};
+  }
+
+  Estimate observe(const Readings& readings) {
+    Estimate e;
+    e.moved = observers::EncoderAngle::moved(motor_encoder_, readings.motor_counter);
+    e.angle = observers::EncoderAngle::update(motor_encoder_, p_.motor_encoder, readings.motor_counter);
+    const auto motor = observers::EncoderKalman::update<N>(motor_motion_, p_.motor_motion, e.angle);
+    e.velocity = motor.velocity;
+    e.acceleration = motor.acceleration;
+    if (p_.has_output_encoder) {
+      e.output_angle = observers::EncoderAngle::update(output_encoder_, p_.output_encoder, readings.output_counter);
+      e.output_velocity = observers::EncoderKalman::update<N>(output_motion_, p_.output_motion, e.output_angle).velocity;
+    }
+    e.current = measured(p_.current, readings.current);
+    e.temperature = measured(p_.temperature, readings.temperature);
+    if (p_.has_torque_sensor)
+      e.torque = observers::RippleFilter::update<N>(ripple_, p_.ripple, e.angle, measured(p_.torque, readings.torque));
+    e.disturbance = observers::DisturbanceObserver::update<N>(
+        disturbance_, p_.disturbance, N::scaled(p_.torque_of_current, e.current), last_.feedforward,
+        N::clamp(e.acceleration - modelled_acceleration(), two_bases()));
+    return e;
+  }
+
+  // Enters an armed mode where the shaft is, at the velocity that it has. The torque goes on from what it is.
+  void start(const Demand& demand, const Estimate& e) {
+    const bool goes_on = uses_trajectory(last_mode_) && uses_trajectory(demand.mode) && loops_.mode != control::Mode::off;
+    if (!goes_on) {
+      trajectory_ = control::Trajectory::moving<N>(p_.trajectory, e.angle.raw,
+                                                   control::Trajectory::speed_of<N>(p_.trajectory, e.velocity));
+    }
+    if (demand.mode == Mode::excitation) control::Excitation::start<N>(excitation_, p_.excitation);
+    feedforward_ = {};
+    p_.model.reset();
+    last_mode_ = demand.mode;
+  }
+
+  Output update(const Demand& demand, const Estimate& e) {
+    Output out;
+    control::Loops::Command<N> command;
+    switch (demand.mode) {
+      case Mode::current:
+        command.mode = control::Mode::torque;
+        command.torque = N::scaled(p_.torque_of_current, N::clamp(demand.current, p_.loops.current_limit));
+        break;
+      case Mode::velocity:
+      case Mode::stop:
+        follow_velocity(demand.mode == Mode::stop ? N::Value{} : demand.velocity, e, out);
+        command = {control::Mode::velocity, {}, out.velocity, {}};
+        break;
+      case Mode::position:
+        follow_position(demand, out);
+        command = {control::Mode::position, out.position, out.velocity, {}};
+        break;
+      case Mode::excitation:
+        excite(e, out, command);
+        break;
+      default:
+        off();
+        return {};
+    }
+    if (demand.compensate && uses_trajectory(demand.mode)) compensate(e, out, command);
+    const auto loops = control::Loops::update<N>(loops_, p_.loops, command, e.angle, e.velocity);
+    out.torque = loops.torque;
+    out.current = loops.current;
+    out.limited = loops.limited;
+    out.at_rest = out.velocity == N::Value{} && N::magnitude(e.velocity) <= p_.safety.standstill;
+    last_ = out;
+    return out;
+  }
+
+ private:
+  static constexpr bool uses_trajectory(Mode mode) {
+    return mode == Mode::velocity || mode == Mode::position || mode == Mode::stop;
+  }
+  static constexpr N::Value two_bases() { return N::one() + N::one(); }
+  // A signal is limited to two bases where it enters.
+  static constexpr N::Value measured(const control::AnalogScale<N>& scale, std::int16_t share) {
+    const N::Value part{{std::int32_t{share} * (1 << (fixed::kValueBits - 15))}};
+    return N::clamp(N::scaled(scale.gain, part) - scale.offset, two_bases());
+  }
+  // The inertia's share of the feedforward is that of the set point's acceleration.
+  N::Value modelled_acceleration() const {
+    return last_.feedforward == N::Value{} ? N::Value{} : last_.acceleration;
+  }
+
+  // The set point starts from where the shaft is at each tick, so that limits of position hold for the shaft.
+  void follow_velocity(N::Value velocity, const Estimate& e, Output& out) {
+    constexpr std::int64_t kFar = std::int64_t{4096} << fixed::kAngleBits;
+    trajectory_.position = e.angle.raw;
+    const N::Angle target = e.angle + N::Step{velocity.raw < 0 ? -kFar : kFar};
+    set(control::Trajectory::update<N>(trajectory_, p_.trajectory, target.raw,
+                                       control::Trajectory::speed_of<N>(p_.trajectory, N::magnitude(velocity))),
+        out);
+  }
+  void follow_position(const Demand& demand, Output& out) {
+    constexpr std::int64_t kAsFastAsAllowed = std::int64_t{1} << 62;
+    const bool any = demand.velocity == N::Value{};
+    set(control::Trajectory::update<N>(
+            trajectory_, p_.trajectory, demand.position.raw,
+            any ? kAsFastAsAllowed
+                : control::Trajectory::speed_of<N>(p_.trajectory, N::magnitude(demand.velocity))),
+        out);
+  }
+  static void set(const control::Trajectory::SetPoint<N>& point, Output& out) {
+    out.position = point.position;
+    out.velocity = point.velocity;
+    out.acceleration = point.acceleration;
+  }
+  void excite(const Estimate& e, Output& out, control::Loops::Command<N>& command) {
+    const auto wanted = control::Excitation::update<N>(excitation_, p_.excitation, e.velocity);
+    out.finished = control::Excitation::finished<N>(excitation_);
+    if (p_.excites_torque) {
+      command.mode = control::Mode::torque;
+      command.torque = wanted;
+    } else {
+      out.velocity = wanted;
+      command = {control::Mode::velocity, {}, wanted, {}};
+    }
+  }
+  void compensate(const Estimate& e, Output& out, control::Loops::Command<N>& command) {
+    const auto forward = control::Feedforward::update<N>(feedforward_, p_.feedforward, p_.model,
+                                                         {out.position, out.velocity, out.acceleration},
+                                                         {e.angle, e.temperature, {}});
+    out.feedforward = forward.torque;
+    command.torque = forward.torque;
+    command.position = command.position + forward.lead;
+    command.velocity = command.velocity + forward.velocity;
+  }
+
+  Parameters& p_;
+  observers::EncoderAngle::State motor_encoder_{};
+  observers::EncoderAngle::State output_encoder_{};
+  observers::EncoderKalman::State<N> motor_motion_{};
+  observers::EncoderKalman::State<N> output_motion_{};
+  observers::DisturbanceObserver::State<N> disturbance_{};
+  observers::RippleFilter::State<N> ripple_{};
+  control::Trajectory::State trajectory_{};
+  control::Excitation::State<N> excitation_{};
+  control::Feedforward::State<N> feedforward_{};
+  control::Loops::State<N> loops_{};
+  Output last_{};
+  Mode last_mode_ = Mode::idle;
+};
+
+}  // namespace flexspline::firmware

@@ -1,0 +1,129 @@
+// Looks at each tick for what must stop the drive. The limits of torque, current and velocity that hold for every
+// command are not here: they are part of the loops. Here is what remains when those do not help.
+#pragma once
+
+#include <cstdint>
+
+#include "firmware/control.hpp"
+#include "firmware/faults.hpp"
+
+namespace flexspline::firmware {
+
+class Safety {
+ public:
+  // Without parameters there are no scales and no limits: only whether samples come. Returns the first fault found.
+  FaultRecord check_samples(std::uint32_t tick, const Readings& r, bool needs_output) {
+    motor_age_ = r.motor_samples == before_.motor_samples ? motor_age_ + 1 : 0;
+    output_age_ = r.output_samples == before_.output_samples ? output_age_ + 1 : 0;
+    analog_age_ = r.analog_samples == before_.analog_samples ? analog_age_ + 1 : 0;
+    FaultRecord found{Fault::none, tick, 0, 0};
+    const auto stale = [&](Fault fault, std::uint32_t age) { expect(found, fault, age < kStaleTicks, age, kStaleTicks); };
+    stale(Fault::motor_encoder_stale, motor_age_);
+    if (needs_output) stale(Fault::output_encoder_stale, output_age_);
+    stale(Fault::analog_stale, analog_age_);
+    before_.motor_samples = r.motor_samples;
+    before_.output_samples = r.output_samples;
+    before_.analog_samples = r.analog_samples;
+    return found;
+  }
+
+  // `last` is what the tick before commanded.
+  FaultRecord check(std::uint32_t tick, const Readings& r, const Estimate& e, const Output& last, const Parameters& p,
+                    Mode mode) {
+    FaultRecord found{Fault::none, tick, 0, 0};
+    check_ranges(found, r, p);
+    check_always(found, e, p.safety);
+    if (is_armed(mode)) {
+      check_motion(found, e, last, p.safety);
+    } else {
+      forget_motion();
+    }
+    if (may_be_commanded(mode)) expect(found, Fault::host_lost, host_age_ < p.safety.host_ticks, host_age_, p.safety.host_ticks);
+    if (host_age_ < UINT32_MAX) ++host_age_;
+    return found;
+  }
+  // A command came.
+  void host_is_there() { host_age_ = 0; }
+
+ private:
+  template <class Seen, class Limit>
+  static void expect(FaultRecord& found, Fault fault, bool holds, Seen seen, Limit limit) {
+    if (holds || found.fault != Fault::none) return;
+    found = {fault, found.tick, static_cast<std::int32_t>(seen), static_cast<std::int32_t>(limit)};
+  }
+  void check_range(FaultRecord& found, Fault fault, const control::AnalogScale<N>& scale, std::int16_t share,
+                   std::uint8_t& count) {
+    const bool inside = share > scale.lowest && share < scale.highest;
+    if (inside) {
+      count = 0;
+    } else if (count < kRangeTicks) {
+      ++count;
+    }
+    expect(found, fault, count < kRangeTicks, share, share < 0 ? scale.lowest : scale.highest);
+  }
+  void check_ranges(FaultRecord& found, const Readings& r, const Parameters& p) {
+    check_range(found, Fault::current_out_of_range, p.current, r.current, current_outside_);
+    check_range(found, Fault::temperature_out_of_range, p.temperature, r.temperature, temperature_outside_);
+    if (!p.has_torque_sensor) return;
+    check_range(found, Fault::torque_out_of_range, p.torque, r.torque, torque_outside_);
+    torque_same_ = r.torque == before_.torque && torque_same_ < UINT16_MAX ? torque_same_ + 1U : 0U;
+    before_.torque = r.torque;
+    const std::uint32_t most = p.safety.torque_same_ticks;
+    expect(found, Fault::torque_stuck, most == 0 || torque_same_ < most, torque_same_, most);
+  }
+  void check_always(FaultRecord& found, const Estimate& e, const control::SafetyLimits<N>& limits) {
+    over_current_ = N::magnitude(e.current) > limits.overcurrent ? over_current_ + 1 : 0;
+    expect(found, Fault::overcurrent, over_current_ < kOvercurrentTicks, e.current.raw, limits.overcurrent.raw);
+    hot_ = e.temperature > limits.overtemperature ? hot_ + 1 : 0;
+    expect(found, Fault::overtemperature, hot_ < kHotTicks, e.temperature.raw, limits.overtemperature.raw);
+  }
+  void check_motion(FaultRecord& found, const Estimate& e, const Output& last, const control::SafetyLimits<N>& limits) {
+    const std::int32_t most = limits.counts_a_tick;
+    expect(found, Fault::motor_encoder_jump, e.moved <= most && e.moved >= -most, e.moved, most);
+    expect(found, Fault::implausible_motion, N::magnitude(e.acceleration) <= limits.acceleration, e.acceleration.raw,
+           limits.acceleration.raw);
+    expect(found, Fault::overspeed, N::magnitude(e.velocity) <= limits.overspeed, e.velocity.raw, limits.overspeed.raw);
+    const N::Value missing = N::magnitude(e.current - last.current);
+    mismatch_ = missing > limits.current_mismatch ? mismatch_ + 1 : 0;
+    expect(found, Fault::current_mismatch, mismatch_ < limits.mismatch_ticks, missing.raw, limits.current_mismatch.raw);
+    check_stuck(found, e, last, limits);
+  }
+  // A shaft that friction holds stays within twice its breakaway torque; beyond that it moves, if only by the torsion of
+  // the gear.
+  void check_stuck(FaultRecord& found, const Estimate& e, const Output& last, const control::SafetyLimits<N>& limits) {
+    if (e.moved != 0 || !watches_) {
+      lowest_ = highest_ = last.torque;
+      unmoved_ = 0;
+      watches_ = true;
+    }
+    if (last.torque < lowest_) lowest_ = last.torque;
+    if (last.torque > highest_) highest_ = last.torque;
+    const N::Value span = highest_ - lowest_;
+    if (span > limits.stuck_torque) ++unmoved_;
+    expect(found, Fault::motor_encoder_stuck, unmoved_ < limits.stuck_ticks, span.raw, limits.stuck_torque.raw);
+  }
+  void forget_motion() {
+    watches_ = false;
+    mismatch_ = 0;
+    host_age_ = 0;
+  }
+
+  Readings before_{};
+  std::uint32_t motor_age_ = 0;
+  std::uint32_t output_age_ = 0;
+  std::uint32_t analog_age_ = 0;
+  std::uint32_t host_age_ = 0;
+  std::uint32_t torque_same_ = 0;
+  std::uint32_t over_current_ = 0;
+  std::uint32_t hot_ = 0;
+  std::uint32_t mismatch_ = 0;
+  std::uint32_t unmoved_ = 0;
+  N::Value lowest_{};
+  N::Value highest_{};
+  std::uint8_t current_outside_ = 0;
+  std::uint8_t torque_outside_ = 0;
+  std::uint8_t temperature_outside_ = 0;
+  bool watches_ = false;
+};
+
+}  // namespace flexspline::firmware

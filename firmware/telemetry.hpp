@@ -1,0 +1,126 @@
+// Telemetry: what the host asked for, tick by tick, in a ring between the control tick (writes) and background work
+// (reads). A frame is
+//   word 0  sequence number of the frame: one more for each that was due, written or not
+//   word 1  tick
+//   then    one word for each channel, in the order asked for
+// A ring that is full drops the new frame and counts it: the tick never waits, and a gap in the sequence says what is
+// missing.
+#pragma once
+
+#include <array>
+#include <atomic>
+#include <cstddef>
+#include <cstdint>
+#include <span>
+
+namespace flexspline::firmware {
+
+// Values are of 2^-27 bases unless said otherwise.
+enum class Channel : std::uint8_t {
+  state,           // mode, fault << 8, loops limited << 16
+  readings,        // motor encoder's counter
+  motor_turns,     // whole turns of the motor's position
+  motor_fraction,  // and the rest, 2^-32 turns
+  output_turns,
+  output_fraction,
+  velocity,
+  acceleration,
+  output_velocity,
+  torque,    // measured, without ripple
+  current,   // measured
+  temperature,
+  disturbance,
+  set_turns,
+  set_fraction,
+  set_velocity,
+  set_acceleration,
+  feedforward_torque,
+  command_torque,
+  command_current,
+};
+inline constexpr std::size_t kChannels = 20;
+using ChannelValues = std::array<std::uint32_t, kChannels>;
+
+struct TelemetrySetup {
+  static constexpr std::size_t kMost = 12;
+  std::uint16_t every = 1;  // ticks
+  std::uint8_t count = 0;   // nought: no telemetry
+  std::array<Channel, kMost> channels{};
+};
+
+// `kWords` a power of two.
+template <std::size_t kWords>
+class Telemetry {
+  static_assert(kWords >= 32 && (kWords & (kWords - 1)) == 0);
+
+ public:
+  static constexpr std::size_t kHeaderWords = 2;
+
+  // Background: starts anew with other channels; what is in the ring is lost, sequence and drops begin at nought.
+  // Returns false, and changes nothing, for what cannot be recorded.
+  bool configure(const TelemetrySetup& setup) {
+    if (setup.count > TelemetrySetup::kMost || setup.every == 0) return false;
+    for (std::size_t i = 0; i < setup.count; ++i)
+      if (static_cast<std::size_t>(setup.channels[i]) >= kChannels) return false;
+    // The tick interrupts background work, never the other way round: from here on it leaves the ring alone.
+    running_.store(false);
+    setup_ = setup;
+    written_.store(0);
+    read_.store(0);
+    sequence_ = 0;
+    dropped_ = 0;
+    until_next_ = 0;
+    running_.store(setup.count > 0);
+    return true;
+  }
+  const TelemetrySetup& setup() const { return setup_; }
+  std::size_t frame_words() const { return setup_.count + kHeaderWords; }
+
+  // Tick.
+  void record(std::uint32_t tick, const ChannelValues& values) {
+    if (!running_.load(std::memory_order_relaxed)) return;
+    if (until_next_ > 0) {
+      --until_next_;
+      return;
+    }
+    until_next_ = setup_.every - 1U;
+    const std::uint32_t sequence = sequence_++;
+    const std::uint32_t at = written_.load(std::memory_order_relaxed);
+    if (at - read_.load(std::memory_order_acquire) + frame_words() > kWords) {
+      dropped_ = dropped_ + 1;
+      return;
+    }
+    put(at, sequence);
+    put(at + 1, tick);
+    for (std::uint32_t i = 0; i < setup_.count; ++i)
+      put(at + 2 + i, values[static_cast<std::size_t>(setup_.channels[i])]);
+    written_.store(at + static_cast<std::uint32_t>(frame_words()), std::memory_order_release);
+  }
+
+  // Background: takes the oldest frame. Returns its words (the front of `frame`), none where there is no frame or it
+  // would not fit.
+  std::span<const std::uint32_t> read(std::span<std::uint32_t> frame) {
+    const std::uint32_t at = read_.load(std::memory_order_relaxed);
+    const std::size_t words = frame_words();
+    if (written_.load(std::memory_order_acquire) == at || frame.size() < words) return {};
+    for (std::size_t i = 0; i < words; ++i) frame[i] = ring_[(at + i) & (kWords - 1)];
+    read_.store(at + static_cast<std::uint32_t>(words), std::memory_order_release);
+    return frame.first(words);
+  }
+  // Frames that found the ring full, since configure().
+  std::uint32_t dropped() const { return dropped_; }
+
+ private:
+  void put(std::uint32_t at, std::uint32_t word) { ring_[at & (kWords - 1)] = word; }
+
+  std::array<std::uint32_t, kWords> ring_{};
+  std::atomic<std::uint32_t> written_{0};
+  std::atomic<std::uint32_t> read_{0};
+  std::atomic<bool> running_{false};
+  TelemetrySetup setup_{};
+  std::uint32_t sequence_ = 0;
+  volatile std::uint32_t dropped_ = 0;
+  std::uint32_t until_next_ = 0;
+};
+
+}  // namespace flexspline::firmware

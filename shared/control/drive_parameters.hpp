@@ -1,0 +1,72 @@
+// All numbers that a drive's tick computes with, apart from what it remembers from tick to tick. Made on the host from
+// SI units (drive_parameters_setup.hpp), changed as a whole or not at all.
+#pragma once
+
+#include <cstdint>
+
+#include "shared/control/excitation.hpp"
+#include "shared/control/feedforward.hpp"
+#include "shared/control/loops.hpp"
+#include "shared/control/trajectory.hpp"
+#include "shared/model/drive_model.hpp"
+#include "shared/observers/disturbance.hpp"
+#include "shared/observers/encoder_angle.hpp"
+#include "shared/observers/encoder_kalman.hpp"
+#include "shared/observers/ripple_filter.hpp"
+
+namespace flexspline::control {
+
+// An analogue sensor gives a share of its full scale, 2^-15; value = gain share - offset, in the base of the signal.
+// Readings at `lowest` or below and `highest` or above are those of a broken wire or an amplifier at its rail.
+template <class N>
+struct AnalogScale {
+  typename N::Gain gain{};
+  typename N::Value offset{};
+  std::int16_t lowest = -32768;
+  std::int16_t highest = 32767;
+};
+
+// Above (or, for times, beyond) which the drive stops by itself; firmware/faults.hpp says what happens then.
+template <class N>
+struct SafetyLimits {
+  typename N::Value overspeed{};         // measured velocity
+  typename N::Value overcurrent{};       // measured current
+  typename N::Value overtemperature{};   // measured
+  typename N::Value acceleration{};      // estimated: faster than any torque can make it, so the encoder is wrong
+  typename N::Value stuck_torque{};      // torque commanded may change by this much without a count of motion
+  typename N::Value current_mismatch{};  // between commanded and measured current
+  typename N::Value standstill{};        // velocity below which the drive counts as at rest
+  std::int32_t counts_a_tick = 0;        // most that the motor's encoder can move
+  std::uint32_t host_ticks = 0;          // without a command, while armed
+  std::uint32_t stop_ticks = 0;          // that a controlled stop may take
+  std::uint16_t stuck_ticks = 0;         // over which the torque may change as said above
+  std::uint16_t mismatch_ticks = 0;
+  std::uint16_t torque_same_ticks = 0;  // the torque sensor's noise changes its reading within these; nought: no sensor
+};
+
+template <class N>
+struct DriveParameters {
+  std::uint32_t tick_hz = 0;
+  bool has_output_encoder = false;
+  bool has_torque_sensor = false;
+  bool excites_torque = true;  // else the excitation is a velocity
+  observers::EncoderAngle::Coefficients motor_encoder{};
+  observers::EncoderAngle::Coefficients output_encoder{};
+  observers::EncoderKalman::Coefficients<N> motor_motion{};
+  observers::EncoderKalman::Coefficients<N> output_motion{};
+  observers::DisturbanceObserver::Coefficients<N> disturbance{};
+  observers::RippleFilter::Coefficients<N> ripple{};
+  AnalogScale<N> current{};
+  AnalogScale<N> torque{};
+  AnalogScale<N> temperature{};
+  typename N::Gain torque_of_current{};
+  typename N::Gain amplifier{};  // from a current in bases to a share of the amplifier's full scale
+  Loops::Coefficients<N> loops{};
+  Trajectory::Coefficients<N> trajectory{};
+  Feedforward::Coefficients<N> feedforward{};
+  Excitation::Coefficients<N> excitation{};
+  SafetyLimits<N> safety{};
+  model::DriveModel<N> model{};
+};
+
+}  // namespace flexspline::control

@@ -1,0 +1,69 @@
+// The position of a shaft from the counter of its encoder: the counter wraps, and its counts need not divide 2^32, so
+// turns and the rest of a turn are kept as integers, and no count is ever lost. Integers on the host and on the drive.
+#pragma once
+
+#include <cstdint>
+
+#include "shared/fixed/findings.hpp"
+#include "shared/fixed/types.hpp"
+
+namespace flexspline::observers {
+
+struct EncoderAngle {
+  static constexpr std::uint32_t kMostCounts = std::uint32_t{1} << 24;
+  struct Coefficients {
+    std::uint32_t counts = 0;     // per turn
+    std::uint64_t per_count = 0;  // 2^-56 turns: as 2^-32 it would drift within a turn
+  };
+  struct State {
+    std::uint32_t before = 0;  // the counter's last reading
+    std::int32_t turns = 0;    // wraps, as an angle does
+    std::uint32_t rest = 0;    // counts, below those of a turn
+    bool started = false;
+  };
+
+  // Host only.
+  static Coefficients derive(std::uint32_t counts_per_turn) {
+    if (counts_per_turn < 4 || counts_per_turn > kMostCounts) {
+      fixed::Findings::note("an encoder has between 4 and 2^24 counts a turn");
+      return {};
+    }
+    return {counts_per_turn, ((std::uint64_t{1} << 56) + counts_per_turn / 2) / counts_per_turn};
+  }
+  // One tick: takes the counter and returns where the shaft stands, in 2^-32 turns, right to a unit. The first call
+  // takes the counter as it is, so that an absolute encoder stays one. A tick of more than a turn is another angle.
+  static constexpr fixed::Angle update(State& s, const Coefficients& c, std::uint32_t counter) {
+    const auto moved = static_cast<std::int32_t>(s.started ? counter - s.before : counter);
+    s.before = counter;
+    if (!s.started) {
+      s = {counter, 0, 0, true};
+      const auto counts = static_cast<std::int32_t>(c.counts);
+      s.turns = moved / counts - (moved % counts < 0 ? 1 : 0);
+      s.rest = static_cast<std::uint32_t>(moved % counts + (moved % counts < 0 ? counts : 0));
+      return angle(s, c);
+    }
+    const std::int64_t rest = std::int64_t{s.rest} + limited_to_a_turn(c, moved);
+    const std::int64_t counts = c.counts;
+    const int carry = rest < 0 ? -1 : rest >= counts ? 1 : 0;
+    s.rest = static_cast<std::uint32_t>(rest - carry * counts);
+    s.turns = static_cast<std::int32_t>(static_cast<std::uint32_t>(s.turns) + static_cast<std::uint32_t>(carry));
+    return angle(s, c);
+  }
+  // By how much the counter moved since the last update, in counts.
+  static constexpr std::int32_t moved(const State& s, std::uint32_t counter) {
+    return s.started ? static_cast<std::int32_t>(counter - s.before) : 0;
+  }
+
+ private:
+  static constexpr std::int64_t limited_to_a_turn(const Coefficients& c, std::int32_t moved) {
+    const auto counts = static_cast<std::int32_t>(c.counts);
+    return moved > counts ? counts : moved < -counts ? -counts : moved;
+  }
+  static constexpr fixed::Angle angle(const State& s, const Coefficients& c) {
+    const std::uint64_t part = (s.rest * c.per_count + (std::uint64_t{1} << 23)) >> 24;
+    const auto whole = static_cast<std::uint64_t>(static_cast<std::uint32_t>(s.turns)) << 32;
+    return {static_cast<std::int64_t>(whole + part)};
+  }
+};
+
+}  // namespace flexspline::observers
