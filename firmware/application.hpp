@@ -153,6 +153,7 @@ class Application {
         if (!may_be_commanded(status_.mode)) return Refusal::not_armed;
         if (command.mode != status_.mode) return Refusal::other_mode;
         take_set_point(command);
+        control_.take(demand_);
         return Refusal::none;
       case Command::Kind::disarm:
         if (!is_armed(status_.mode)) return Refusal::not_armed;
@@ -177,15 +178,16 @@ class Application {
       return Refusal::moving;
     status_.mode = command.mode;
     demand_.compensate = command.compensate;
-    demand_.position = estimate.angle;
     take_set_point(command);
     control_.start(demand_, estimate);
     return Refusal::none;
   }
   void take_set_point(const Command& command) {
     demand_.mode = command.mode;
+    demand_.stream = command.stream;
     demand_.position = command.position;
     demand_.velocity = command.velocity;
+    demand_.acceleration = command.acceleration;
     demand_.current = command.current;
   }
 

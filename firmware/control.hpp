@@ -15,8 +15,10 @@ using Parameters = control::DriveParameters<N>;
 struct Demand {
   Mode mode = Mode::idle;
   bool compensate = false;
+  bool stream = false;
   N::Angle position{};
   N::Value velocity{};
+  N::Value acceleration{};
   N::Value current{};
 };
 
@@ -96,6 +98,19 @@ class Control {
     feedforward_ = {};
     p_.model.reset();
     last_mode_ = demand.mode;
+    streams_ = false;
+    take(demand);
+  }
+
+  // A new set point within the mode.
+  void take(const Demand& demand) {
+    if (demand.mode != Mode::position) return;
+    if (demand.stream) {
+      stream_ = control::Stream::at<N>(p_.stream, p_.trajectory, demand.position, demand.velocity, demand.acceleration);
+    } else if (streams_) {
+      trajectory_ = control::Trajectory::moving<N>(p_.trajectory, stream_.position, stream_.velocity);
+    }
+    streams_ = demand.stream;
   }
 
   Output update(const Demand& demand, const Estimate& e) {
@@ -157,6 +172,7 @@ class Control {
         out);
   }
   void follow_position(const Demand& demand, Output& out) {
+    if (streams_) return set(control::Stream::update<N>(stream_, p_.trajectory), out);
     constexpr std::int64_t kAsFastAsAllowed = std::int64_t{1} << 62;
     const bool any = demand.velocity == N::Value{};
     set(control::Trajectory::update<N>(
@@ -199,11 +215,13 @@ class Control {
   observers::DisturbanceObserver::State<N> disturbance_{};
   observers::RippleFilter::State<N> ripple_{};
   control::Trajectory::State trajectory_{};
+  control::Stream::State stream_{};
   control::Excitation::State<N> excitation_{};
   control::Feedforward::State<N> feedforward_{};
   control::Loops::State<N> loops_{};
   Output last_{};
   Mode last_mode_ = Mode::idle;
+  bool streams_ = false;
 };
 
 }  // namespace flexspline::firmware

@@ -38,10 +38,12 @@ struct Command {
   };
   Kind kind = Kind::heartbeat;
   Mode mode = Mode::idle;
-  bool compensate = false;  // feedforward of the model; in modes velocity and position
+  bool compensate = false;   // feedforward of the model in modes velocity and position; from `arm` on
+  bool stream = false;       // mode position: not a target, but where the shaft shall be now, and how it goes on
   std::uint16_t number = 0;  // comes back with the answer
   N::Angle position{};      // of the motor
-  N::Value velocity{};      // set point, or how fast to go to the position (nought: as fast as the limits allow)
+  N::Value velocity{};      // set point, or how fast to go to a target (nought: as fast as the limits allow)
+  N::Value acceleration{};  // of a stream
   N::Value current{};
 };
 

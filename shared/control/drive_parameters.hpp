@@ -7,6 +7,7 @@
 #include "shared/control/excitation.hpp"
 #include "shared/control/feedforward.hpp"
 #include "shared/control/loops.hpp"
+#include "shared/control/stream.hpp"
 #include "shared/control/trajectory.hpp"
 #include "shared/model/drive_model.hpp"
 #include "shared/observers/disturbance.hpp"
@@ -63,6 +64,7 @@ struct DriveParameters {
   typename N::Gain amplifier{};  // from a current in bases to a share of the amplifier's full scale
   Loops::Coefficients<N> loops{};
   Trajectory::Coefficients<N> trajectory{};
+  Stream::Coefficients stream{};
   Feedforward::Coefficients<N> feedforward{};
   Excitation::Coefficients<N> excitation{};
   SafetyLimits<N> safety{};

@@ -120,6 +120,7 @@ DriveParameters<N> derive(const DriveSetup<P>& s, const effects::DriveConstants<
   require(s.loops.current_limit <= s.amplifier_full_scale, "the amplifier cannot give the current limit");
   p.loops = Loops::derive<N>(s.loops, d);
   p.trajectory = Trajectory::derive<N>(s.trajectory, d);
+  p.stream = Stream::derive(d);
   p.feedforward = Feedforward::derive<N>(s.feedforward, d);
   if (s.excitation.ticks > 0)
     p.excitation = Excitation::derive<N>(s.excitation, s.excites_torque ? d.torque_base : d.velocity_base, d);

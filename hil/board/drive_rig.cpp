@@ -1,0 +1,104 @@
+#include "hil/board/drive_rig.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <numbers>
+
+#include "hil/plant/sensors.hpp"
+
+namespace flexspline::board {
+namespace {
+
+constexpr double kTurn = 2.0 * std::numbers::pi;
+constexpr double kSurgeA = 2.0;
+enum Stream : std::uint64_t { kSensorNoise = 17 };
+
+std::uint32_t counter(double angle_rad, int counts) {
+  return static_cast<std::uint32_t>(std::llround(angle_rad / kTurn * counts));
+}
+
+}  // namespace
+
+AnalogScales scales_of(const plant::Drive& drive) {
+  const double limit = drive.current_limit_a;
+  return {.current_a = 2.0 * limit,
+          .torque_nm = 3.0 * drive.rated_torque_nm,
+          .temperature_c = 200.0,
+          .amplifier_a = 1.25 * limit};
+}
+
+DriveRig::DriveRig(const RigSetup& setup)
+    : setup_(setup),
+      scales_(scales_of(setup.drive)),
+      errors_(plant::sensor_errors_of(setup.drive)),
+      plant_(plant::physics_of(setup.drive), setup.locked),
+      generator_(plant::stream_seed(setup.seed, 0, kSensorNoise)),
+      temperature_c_(setup.drive.temperature_reference_c) {}
+
+double DriveRig::noise(const plant::Sensor& sensor, double rated) {
+  // Drawn even where it is not used: a fault that is injected does not change the noise of what follows.
+  const double drawn = normal_(generator_);
+  return setup_.noise ? std::max(sensor.noise_share * rated, sensor.noise_floor) * drawn : 0.0;
+}
+
+std::int16_t DriveRig::share(double value, double full_scale) const {
+  return static_cast<std::int16_t>(std::clamp(std::lround(value / full_scale * 32768.0), -32768L, 32767L));
+}
+
+firmware::Readings DriveRig::sense() {
+  const plant::State& state = plant_.state();
+  const plant::Sensors& sensors = setup_.drive.sensors;
+  firmware::Readings r = last_;
+  const double current = current_a_ + noise(sensors.current, setup_.drive.rated_current_a);
+  double torque = errors_.torque_gain * plant_.torque() + errors_.torque_offset_nm;
+  for (const plant::Ripple& ripple : errors_.torque_ripple) {
+    const double phase = ripple.order * state.motor_angle;
+    torque += ripple.cosine * std::cos(phase) + ripple.sine * std::sin(phase);
+  }
+  torque += noise(sensors.torque, setup_.drive.rated_torque_nm);
+  const double temperature = temperature_c_ + noise(sensors.temperature, 0.0);
+
+  if (!has(Injection::motor_encoder_stale)) {
+    ++r.motor_samples;
+    const double zero = errors_.torsion_zero_rad * setup_.drive.gear_ratio;
+    if (!has(Injection::motor_encoder_stuck)) r.motor_counter = counter(state.motor_angle - zero, sensors.motor_counts);
+    if (has(Injection::motor_encoder_jump)) r.motor_counter += static_cast<std::uint32_t>(sensors.motor_counts / 4);
+  }
+  if (!has(Injection::output_encoder_stale)) {
+    ++r.output_samples;
+    r.output_counter = counter(state.output_angle, sensors.output_counts);
+  }
+  if (!has(Injection::analog_stale)) {
+    ++r.analog_samples;
+    r.current = has(Injection::current_out_of_range) ? INT16_MIN : share(current, scales_.current_a);
+    r.temperature = has(Injection::temperature_out_of_range) ? INT16_MAX : share(temperature, scales_.temperature_c);
+    if (has(Injection::torque_out_of_range)) {
+      r.torque = INT16_MAX;
+    } else if (!has(Injection::torque_stuck)) {
+      r.torque = share(torque, scales_.torque_nm);
+    }
+  }
+  last_ = r;
+  return r;
+}
+
+void DriveRig::act(const firmware::Actuation& actuation) {
+  current_a_ = actuation.enabled ? actuation.current / 32768.0 * scales_.amplifier_a : 0.0;
+  bool flows = actuation.enabled;
+  if (has(Injection::amplifier_dead)) {
+    current_a_ = 0.0;
+    flows = false;
+  }
+  if (has(Injection::current_surge)) {
+    current_a_ = scales_.amplifier_a + kSurgeA;
+    flows = true;
+  }
+  plant::Inputs inputs;
+  // The amplifier makes its (biased) reading follow the command.
+  inputs.current_a = flows ? current_a_ - errors_.current_offset_a : 0.0;
+  inputs.temperature_c = temperature_c_;
+  inputs.load_torque_nm = load_torque_nm_;
+  plant_.advance(inputs, setup_.tick_s, 1);
+}
+
+}  // namespace flexspline::board

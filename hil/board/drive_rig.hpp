@@ -1,0 +1,91 @@
+#pragma once
+
+#include <cstdint>
+#include <optional>
+#include <random>
+#include <set>
+
+#include "firmware/board.hpp"
+#include "hil/plant/parameters.hpp"
+#include "hil/plant/physics.hpp"
+#include "hil/plant/two_mass.hpp"
+
+namespace flexspline::board {
+
+/// What can be done to the drive while it runs.
+enum class Injection {
+  motor_encoder_stale,     ///< no new sample: count and sample number stand still
+  output_encoder_stale,
+  analog_stale,
+  motor_encoder_stuck,     ///< samples come, the count stands still
+  motor_encoder_jump,      ///< the count is off by a quarter of a turn
+  current_out_of_range,    ///< the converter's input is open
+  torque_out_of_range,
+  temperature_out_of_range,
+  torque_stuck,            ///< the torque's reading stands still
+  amplifier_dead,          ///< no current flows, whatever is commanded
+  current_surge,           ///< 2 A above what the amplifier can give flow, and are measured
+  tick_overrun,            ///< each tick takes longer than there is time
+  background_hangs,        ///< background work never runs
+  tick_hangs,              ///< the control tick never runs
+};
+
+/// Full scales of the analogue inputs and of the amplifier; a reading is a share of them in 2^-15.
+struct AnalogScales {
+  double current_a = 0.0;
+  double torque_nm = 0.0;
+  double temperature_c = 0.0;
+  double amplifier_a = 0.0;
+};
+
+struct RigSetup {
+  plant::Drive drive;
+  std::uint64_t seed = 1;
+  double tick_s = 1.0 / 20'000.0;
+  bool noise = true;
+  bool locked = false;
+};
+AnalogScales scales_of(const plant::Drive& drive);
+
+/// A drive on a table without its processor: the plant, its amplifier, its sensors with their noise and rounding. One
+/// tick is sense(), then act(). The same setup gives the same bits.
+class DriveRig {
+ public:
+  explicit DriveRig(const RigSetup& setup);
+
+  /// Samples of all sensors, taken now.
+  firmware::Readings sense();
+  /// What the amplifier does until the next tick; moves the plant on by one.
+  void act(const firmware::Actuation& actuation);
+
+  void inject(Injection what) { injected_.insert(what); }
+  void clear(Injection what) { injected_.erase(what); }
+  bool has(Injection what) const { return injected_.contains(what); }
+  void set_temperature(double celsius) { temperature_c_ = celsius; }
+  /// On the output; positive resists positive motion.
+  void set_load_torque(double nm) { load_torque_nm_ = nm; }
+
+  const plant::State& truth() const { return plant_.state(); }
+  /// Through the flexspline, output side, N m.
+  double torque_nm() const { return plant_.torque(); }
+  /// As the amplifier commanded it in the last tick, A; what flows is less by the drive's current offset.
+  double current_a() const { return current_a_; }
+
+ private:
+  double noise(const plant::Sensor& sensor, double rated);
+  std::int16_t share(double value, double full_scale) const;
+
+  RigSetup setup_;
+  AnalogScales scales_;
+  plant::SensorErrors errors_;
+  plant::TwoMass plant_;
+  std::mt19937_64 generator_;
+  std::normal_distribution<double> normal_;
+  std::set<Injection> injected_;
+  firmware::Readings last_;
+  double temperature_c_;
+  double load_torque_nm_ = 0.0;
+  double current_a_ = 0.0;
+};
+
+}  // namespace flexspline::board

@@ -1,0 +1,57 @@
+// Set points of position that come one after the other from a host, each with its velocity and acceleration: between
+// two of them the drive goes on as the last one says,
+//   v[k] = clamp(v[k-1] + a, v_limit),  p[k] = p[k-1] + (v[k-1] + v[k])/2,
+// so that a host at a thousandth of a second gives a set point without steps at every tick. Limits of position,
+// velocity and acceleration are those of the trajectory. A jump from one set point to the next is the host's; the loops
+// limit what comes of it. Integers on the host and on the drive, as in trajectory.hpp.
+#pragma once
+
+#include "shared/control/trajectory.hpp"
+
+namespace flexspline::control {
+
+struct Stream {
+  struct Coefficients {
+    std::int64_t acceleration_base = 0;  // 2^-48 turns a tick, a tick
+  };
+  struct State {
+    std::int64_t position = 0;  // 2^-32 turns
+    std::int64_t fraction = 0;  // of it, 2^-16
+    std::int64_t velocity = 0;  // 2^-48 turns a tick
+    std::int64_t change = 0;    // of the velocity a tick
+  };
+
+  // Host only.
+  template <class P>
+  static Coefficients derive(const effects::DriveConstants<P>& d) {
+    const double units = 0x1p48 / static_cast<double>(d.angle_base);
+    const double base = static_cast<double>(d.acceleration_base * d.time_base * d.time_base) * units;
+    return {fixed::nearest(base, 0x1p46, "the base of acceleration is above a quarter of a turn a tick, a tick")};
+  }
+  // What the host says of this tick. Values in bases, of which each is held to its limit.
+  template <class N>
+  static constexpr State at(const Coefficients& c, const Trajectory::Coefficients<N>& limits, fixed::Angle position,
+                            fixed::Value velocity, fixed::Value acceleration) {
+    const std::int64_t v = Trajectory::speed_of<N>(limits, velocity);
+    const std::int64_t a = fixed::multiply_round(acceleration.raw, c.acceleration_base, fixed::kValueBits);
+    return {fixed::limited(position.raw, limits.lowest, limits.highest), 0,
+            fixed::limited(v, -limits.velocity, limits.velocity), fixed::limited(a, -limits.change, limits.change)};
+  }
+  // One tick: the set point of this tick; the state then is that of the next.
+  template <class N>
+  static constexpr Trajectory::SetPoint<N> update(State& s, const Trajectory::Coefficients<N>& limits) {
+    const Trajectory::SetPoint<N> point{N::angle(s.position), N::narrow(N::signal(limits.to_velocity, N::steps(s.velocity))),
+                                        N::narrow(N::signal(limits.to_acceleration, N::steps(s.change)))};
+    const std::int64_t next = fixed::limited(s.velocity + s.change, -limits.velocity, limits.velocity);
+    const std::int64_t fine = s.fraction + ((s.velocity + next) >> 1);
+    s.change = next - s.velocity;
+    s.velocity = next;
+    s.fraction = fine & ((std::int64_t{1} << Trajectory::kFractionBits) - 1);
+    const auto moved = static_cast<std::uint64_t>(fine >> Trajectory::kFractionBits);
+    const auto position = static_cast<std::int64_t>(static_cast<std::uint64_t>(s.position) + moved);
+    s.position = fixed::limited(position, limits.lowest, limits.highest);
+    return point;
+  }
+};
+
+}  // namespace flexspline::control
