@@ -250,8 +250,9 @@ class Application {
     if (!is_armed(status_.mode)) return {};
     const N::Value share = N::scaled(parameters_.amplifier, output.current);
     const std::int64_t most = 32767;
-    return {static_cast<std::int16_t>(fixed::limited(fixed::shift_right(share.raw, fixed::kValueBits - 15), -most, most)),
-            true};
+    return {
+        static_cast<std::int16_t>(fixed::limited(fixed::shift_right(share.raw, fixed::kValueBits - 15), -most, most)),
+        true};
   }
 
   ChannelValues channels(const Readings& readings, const Estimate& e, const Output& out) const {

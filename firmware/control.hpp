@@ -75,7 +75,8 @@ class Control {
     e.acceleration = motor.acceleration;
     if (p_.has_output_encoder) {
       e.output_angle = observers::EncoderAngle::update(output_encoder_, p_.output_encoder, readings.output_counter);
-      e.output_velocity = observers::EncoderKalman::update<N>(output_motion_, p_.output_motion, e.output_angle).velocity;
+      e.output_velocity =
+          observers::EncoderKalman::update<N>(output_motion_, p_.output_motion, e.output_angle).velocity;
     }
     e.current = measured(p_.current, readings.current);
     e.temperature = measured(p_.temperature, readings.temperature);
@@ -89,7 +90,8 @@ class Control {
 
   // Enters an armed mode where the shaft is, at the velocity that it has. The torque goes on from what it is.
   void start(const Demand& demand, const Estimate& e) {
-    const bool goes_on = uses_trajectory(last_mode_) && uses_trajectory(demand.mode) && loops_.mode != control::Mode::off;
+    const bool goes_on =
+        uses_trajectory(last_mode_) && uses_trajectory(demand.mode) && loops_.mode != control::Mode::off;
     if (!goes_on) {
       trajectory_ = control::Trajectory::moving<N>(p_.trajectory, e.angle.raw,
                                                    control::Trajectory::speed_of<N>(p_.trajectory, e.velocity));
@@ -158,9 +160,7 @@ class Control {
     return N::clamp(N::scaled(scale.gain, part) - scale.offset, two_bases());
   }
   // The inertia's share of the feedforward is that of the set point's acceleration.
-  N::Value modelled_acceleration() const {
-    return last_.feedforward == N::Value{} ? N::Value{} : last_.acceleration;
-  }
+  N::Value modelled_acceleration() const { return last_.feedforward == N::Value{} ? N::Value{} : last_.acceleration; }
 
   // The set point starts from where the shaft is at each tick, so that limits of position hold for the shaft.
   void follow_velocity(N::Value velocity, const Estimate& e, Output& out) {
@@ -177,8 +177,7 @@ class Control {
     const bool any = demand.velocity == N::Value{};
     set(control::Trajectory::update<N>(
             trajectory_, p_.trajectory, demand.position.raw,
-            any ? kAsFastAsAllowed
-                : control::Trajectory::speed_of<N>(p_.trajectory, N::magnitude(demand.velocity))),
+            any ? kAsFastAsAllowed : control::Trajectory::speed_of<N>(p_.trajectory, N::magnitude(demand.velocity))),
         out);
   }
   static void set(const control::Trajectory::SetPoint<N>& point, Output& out) {
@@ -198,9 +197,9 @@ class Control {
     }
   }
   void compensate(const Estimate& e, Output& out, control::Loops::Command<N>& command) {
-    const auto forward = control::Feedforward::update<N>(feedforward_, p_.feedforward, p_.model,
-                                                         {out.position, out.velocity, out.acceleration},
-                                                         {e.angle, e.temperature, {}});
+    const auto forward =
+        control::Feedforward::update<N>(feedforward_, p_.feedforward, p_.model,
+                                        {out.position, out.velocity, out.acceleration}, {e.angle, e.temperature, {}});
     out.feedforward = forward.torque;
     command.torque = forward.torque;
     command.position = command.position + forward.lead;

@@ -36,8 +36,8 @@ enum class SafeState : std::uint8_t {
   stop,  // the velocity loop brings the shaft to rest with the limited deceleration; then off
 };
 
-// How long a cause has to last, in ticks, where that is no parameter. A single bad sample of an analogue input is noise;
-// an encoder that missed a sample or two still has its count.
+// How long a cause has to last, in ticks, where that is no parameter. A single bad sample of an analogue input is
+// noise; an encoder that missed a sample or two still has its count.
 inline constexpr std::uint32_t kStaleTicks = 3;
 inline constexpr std::uint32_t kRangeTicks = 3;
 inline constexpr std::uint32_t kOvercurrentTicks = 2;
@@ -62,7 +62,8 @@ inline constexpr std::array<FaultInfo, kFaults> kFaultTable{{
     {Fault::motor_encoder_jump, SafeState::off, 1, "motor_encoder_jump",
      "the motor's encoder moved by more counts in a tick than at twice the overspeed"},
     {Fault::motor_encoder_stuck, SafeState::off, 0, "motor_encoder_stuck",
-     "the torque changed by more than friction can hold, and the motor's encoder shows no motion (stuck_torque, stuck_s)"},
+     "the torque changed by more than friction can hold, and the motor's encoder shows no motion (stuck_torque, "
+     "stuck_s)"},
     {Fault::implausible_motion, SafeState::off, 0, "implausible_motion",
      "the motor's encoder shows an acceleration that no torque can give (acceleration)"},
     {Fault::current_out_of_range, SafeState::off, kRangeTicks, "current_out_of_range",

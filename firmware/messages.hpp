@@ -41,9 +41,9 @@ struct Command {
   bool compensate = false;   // feedforward of the model in modes velocity and position; from `arm` on
   bool stream = false;       // mode position: not a target, but where the shaft shall be now, and how it goes on
   std::uint16_t number = 0;  // comes back with the answer
-  N::Angle position{};      // of the motor
-  N::Value velocity{};      // set point, or how fast to go to a target (nought: as fast as the limits allow)
-  N::Value acceleration{};  // of a stream
+  N::Angle position{};       // of the motor
+  N::Value velocity{};       // set point, or how fast to go to a target (nought: as fast as the limits allow)
+  N::Value acceleration{};   // of a stream
   N::Value current{};
 };
 

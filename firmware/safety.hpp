@@ -17,7 +17,9 @@ class Safety {
     output_age_ = r.output_samples == before_.output_samples ? output_age_ + 1 : 0;
     analog_age_ = r.analog_samples == before_.analog_samples ? analog_age_ + 1 : 0;
     FaultRecord found{Fault::none, tick, 0, 0};
-    const auto stale = [&](Fault fault, std::uint32_t age) { expect(found, fault, age < kStaleTicks, age, kStaleTicks); };
+    const auto stale = [&](Fault fault, std::uint32_t age) {
+      expect(found, fault, age < kStaleTicks, age, kStaleTicks);
+    };
     stale(Fault::motor_encoder_stale, motor_age_);
     if (needs_output) stale(Fault::output_encoder_stale, output_age_);
     stale(Fault::analog_stale, analog_age_);
@@ -38,7 +40,8 @@ class Safety {
     } else {
       forget_motion();
     }
-    if (may_be_commanded(mode)) expect(found, Fault::host_lost, host_age_ < p.safety.host_ticks, host_age_, p.safety.host_ticks);
+    if (may_be_commanded(mode))
+      expect(found, Fault::host_lost, host_age_ < p.safety.host_ticks, host_age_, p.safety.host_ticks);
     if (host_age_ < UINT32_MAX) ++host_age_;
     return found;
   }
@@ -88,8 +91,8 @@ class Safety {
     expect(found, Fault::current_mismatch, mismatch_ < limits.mismatch_ticks, missing.raw, limits.current_mismatch.raw);
     check_stuck(found, e, last, limits);
   }
-  // A shaft that friction holds stays within twice its breakaway torque; beyond that it moves, if only by the torsion of
-  // the gear.
+  // A shaft that friction holds stays within twice its breakaway torque; beyond that it moves, if only by the torsion
+  // of the gear.
   void check_stuck(FaultRecord& found, const Estimate& e, const Output& last, const control::SafetyLimits<N>& limits) {
     if (e.moved != 0 || !watches_) {
       lowest_ = highest_ = last.torque;

@@ -26,8 +26,8 @@ enum class Channel : std::uint8_t {
   velocity,
   acceleration,
   output_velocity,
-  torque,    // measured, without ripple
-  current,   // measured
+  torque,   // measured, without ripple
+  current,  // measured
   temperature,
   disturbance,
   set_turns,

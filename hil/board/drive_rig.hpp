@@ -14,20 +14,18 @@ namespace flexspline::board {
 
 /// What can be done to the drive while it runs.
 enum class Injection {
-  motor_encoder_stale,     ///< no new sample: count and sample number stand still
+  motor_encoder_stale,  ///< no new sample: count and sample number stand still
   output_encoder_stale,
   analog_stale,
-  motor_encoder_stuck,     ///< samples come, the count stands still
-  motor_encoder_jump,      ///< the count is off by a quarter of a turn
-  current_out_of_range,    ///< the converter's input is open
+  motor_encoder_stuck,   ///< samples come, the count stands still
+  motor_encoder_jump,    ///< the count is off by a quarter of a turn
+  current_out_of_range,  ///< the converter's input is open
   torque_out_of_range,
   temperature_out_of_range,
-  torque_stuck,            ///< the torque's reading stands still
-  amplifier_dead,          ///< no current flows, whatever is commanded
-  current_surge,           ///< 2 A above what the amplifier can give flow, and are measured
-  tick_overrun,            ///< each tick takes longer than there is time
-  background_hangs,        ///< background work never runs
-  tick_hangs,              ///< the control tick never runs
+  torque_stuck,    ///< the torque's reading stands still
+  amplifier_dead,  ///< no current flows, whatever is commanded
+  current_surge,   ///< 2 A above what the amplifier can give flow, and are measured
+  tick_overrun,    ///< each tick takes longer than there is time for
 };
 
 /// Full scales of the analogue inputs and of the amplifier; a reading is a share of them in 2^-15.

@@ -29,7 +29,8 @@ double inertia_of(const plant::Drive& drive) {
 template <class Effect>
 void add_all(const plant::Drive& drive, const effects::DriveConstants<double>& d, model::DriveModel<N>& model) {
   // What a sensor gets wrong turns no shaft.
-  for (const std::string_view of_sensor : {"torsion_zero", "torque_offset", "torque_sensor_gain", "torque_sensor_ripple"})
+  for (const std::string_view of_sensor :
+       {"torsion_zero", "torque_offset", "torque_sensor_gain", "torque_sensor_ripple"})
     if (Effect::kInfo.name == of_sensor) return;
   for (const plant::Effect& effect : drive.effects) {
     if (!effect.present || effect.hidden || effect.type != Effect::kInfo.name) continue;

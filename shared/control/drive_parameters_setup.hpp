@@ -16,18 +16,18 @@ struct AnalogSetup {
 
 template <class P>
 struct SafetySetup {
-  P overspeed{};               // rad/s
-  P overcurrent{};             // A
-  P overtemperature{};         // degrees Celsius
-  P acceleration{};            // rad/s^2
-  P stuck_torque{};            // N m
-  P stuck_s{P(0.05)};          // s
-  P current_mismatch{};        // A
-  P mismatch_s{P(0.005)};      // s
-  P torque_same_s{P(0.01)};    // s
-  P standstill{P(1.0)};        // rad/s
-  P host_s{P(0.1)};            // s
-  P stop_s{P(1.0)};            // s
+  P overspeed{};             // rad/s
+  P overcurrent{};           // A
+  P overtemperature{};       // degrees Celsius
+  P acceleration{};          // rad/s^2
+  P stuck_torque{};          // N m
+  P stuck_s{P(0.05)};        // s
+  P current_mismatch{};      // A
+  P mismatch_s{P(0.005)};    // s
+  P torque_same_s{P(0.01)};  // s
+  P standstill{P(1.0)};      // rad/s
+  P host_s{P(0.1)};          // s
+  P stop_s{P(1.0)};          // s
 };
 
 template <class P>

@@ -40,7 +40,8 @@ struct Stream {
   // One tick: the set point of this tick; the state then is that of the next.
   template <class N>
   static constexpr Trajectory::SetPoint<N> update(State& s, const Trajectory::Coefficients<N>& limits) {
-    const Trajectory::SetPoint<N> point{N::angle(s.position), N::narrow(N::signal(limits.to_velocity, N::steps(s.velocity))),
+    const Trajectory::SetPoint<N> point{N::angle(s.position),
+                                        N::narrow(N::signal(limits.to_velocity, N::steps(s.velocity))),
                                         N::narrow(N::signal(limits.to_acceleration, N::steps(s.change)))};
     const std::int64_t next = fixed::limited(s.velocity + s.change, -limits.velocity, limits.velocity);
     const std::int64_t fine = s.fraction + ((s.velocity + next) >> 1);

@@ -1,0 +1,18 @@
+#!/bin/sh
+# Builds the image: build.sh OUT_DIR. Exit 3 where there is no ARM compiler.
+set -eu
+out=${1:?usage: build.sh OUT_DIR}
+here=$(cd -- "$(dirname -- "$0")" && pwd)
+root=$(cd -- "$here/../.." && pwd)
+compiler=${ARM_GXX:-arm-none-eabi-g++}
+command -v "$compiler" >/dev/null || {
+  echo "no $compiler: install gcc-arm-none-eabi, libnewlib-arm-none-eabi and libstdc++-arm-none-eabi-newlib" >&2
+  exit 3
+}
+mkdir -p "$out"
+"$compiler" -std=c++20 -Os -mcpu=cortex-m4 -mthumb -mfloat-abi=soft \
+  -ffunction-sections -fdata-sections -fno-exceptions -fno-rtti -fno-threadsafe-statics -fno-unwind-tables \
+  -fno-asynchronous-unwind-tables -Wall -Wextra -Wpedantic -Wshadow -Werror -Wno-volatile \
+  -nostartfiles -Wl,--gc-sections -Wl,-Map="$out/image.map" -T "$here/board.ld" -I "$root" \
+  "$here/start.cpp" "$here/semihosting.cpp" "$here/main.cpp" -o "$out/image.elf.new" --specs=nano.specs --specs=nosys.specs
+mv "$out/image.elf.new" "$out/image.elf"

@@ -1,0 +1,61 @@
+// From reset to main(): the vector table, what the linker script lays out, and nothing that waits for hardware.
+#include <cstdint>
+
+#include "boards/qemu_stm32f405/semihosting.hpp"
+
+// A start-up calls main(), which no other code may.
+#pragma GCC diagnostic ignored "-Wpedantic"
+
+extern "C" {
+extern std::uint32_t stack_top[], data_start[], data_end[], data_load[], bss_start[], bss_end[];
+using Constructor = void (*)();
+extern const Constructor constructors_start[], constructors_end[];
+
+int main();
+void SysTick_Handler();
+
+[[noreturn]] void Reset_Handler() {
+  const std::uint32_t* from = data_load;
+  for (std::uint32_t* to = data_start; to < data_end; ++to) *to = *from++;
+  for (std::uint32_t* to = bss_start; to < bss_end; ++to) *to = 0;
+  for (const Constructor* c = constructors_start; c < constructors_end; ++c) (*c)();
+  main();
+  flexspline::qemu::leave(1);
+}
+// Any exception that has no business here.
+[[noreturn]] void Unexpected_Handler() {
+  flexspline::qemu::print("unexpected exception\n");
+  flexspline::qemu::leave(3);
+}
+// No object is ever destroyed.
+int __aeabi_atexit(void*, void (*)(void*), void*) {
+  return 0;
+}
+void* __dso_handle = nullptr;
+}
+
+namespace {
+union Vector {
+  std::uint32_t* stack;
+  void (*handler)();
+};
+// The system exceptions; none of the board's interrupts is ever enabled.
+[[gnu::section(".vectors"), gnu::used]] const Vector kVectors[16] = {
+    {.stack = stack_top},
+    {.handler = Reset_Handler},
+    {.handler = Unexpected_Handler},
+    {.handler = Unexpected_Handler},
+    {.handler = Unexpected_Handler},
+    {.handler = Unexpected_Handler},
+    {.handler = Unexpected_Handler},
+    {.handler = nullptr},
+    {.handler = nullptr},
+    {.handler = nullptr},
+    {.handler = nullptr},
+    {.handler = Unexpected_Handler},
+    {.handler = Unexpected_Handler},
+    {.handler = nullptr},
+    {.handler = Unexpected_Handler},
+    {.handler = SysTick_Handler},
+};
+}  // namespace
