@@ -75,7 +75,9 @@ class Safety {
     expect(found, Fault::torque_stuck, most == 0 || torque_same_ < most, torque_same_, most);
   }
   void check_always(FaultRecord& found, const Estimate& e, const control::SafetyLimits<N>& limits) {
-    over_current_ = N::magnitude(e.current) > limits.overcurrent ? over_current_ + 1 : 0;
+    // A reading at the rail is no current.
+    const bool over = N::magnitude(e.current) > limits.overcurrent && current_outside_ == 0;
+    over_current_ = over ? over_current_ + 1 : 0;
     expect(found, Fault::overcurrent, over_current_ < kOvercurrentTicks, e.current.raw, limits.overcurrent.raw);
     hot_ = e.temperature > limits.overtemperature ? hot_ + 1 : 0;
     expect(found, Fault::overtemperature, hot_ < kHotTicks, e.temperature.raw, limits.overtemperature.raw);
