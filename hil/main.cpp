@@ -12,6 +12,7 @@
 #include <string>
 #include <vector>
 
+#include "hil/board/command_drive.hpp"
 #include "hil/plant/parameters.hpp"
 #include "hil/plant/recorder.hpp"
 #include "hil/rhs100/data_set.hpp"
@@ -116,6 +117,27 @@ int main(int argc, char** argv) {
   rhs_command->add_flag("--force", options.force, "write into a folder that is not empty");
   rhs_command->footer("Example: flexspline-hil rhs-100 --out rhs-100");
   rhs_command->callback([&] { make_rhs_100(options); });
+  flexspline::board::DriveOptions drive_options;
+  CLI::App* drive_command = app.add_subcommand(
+      "drive", "runs the firmware's application on a simulated drive, with and without compensation");
+  drive_command->add_option("--scenario", drive_options.scenario,
+                            "slow-reversals, sine, trapezoid, joint-trajectory or constant-slow (default sine)");
+  drive_command->add_option("--seconds", drive_options.seconds, "simulated time (default 10)")
+      ->check(CLI::Range(0.01, 36000.0));
+  drive_command->add_option("--plant", drive_options.plant_file, "plant file (default: the demo's drive, built in)");
+  drive_command->add_option("--with", drive_options.with, "effects that the drive has and its model knows, A,B")
+      ->delimiter(',');
+  drive_command->add_option("--hide", drive_options.hide, "effect that the drive has and its model does not know");
+  drive_command->add_option("--compensation", drive_options.compensation, "on, off, both (default)")
+      ->check(CLI::IsMember({"on", "off", "both"}));
+  drive_command->add_option("--inject", drive_options.inject, "what goes wrong, as motor-encoder-stuck");
+  drive_command->add_option("--inject-at", drive_options.inject_at_s, "when, in seconds (default: half the time)");
+  drive_command->add_option("--processor", drive_options.processor_image,
+                            "firmware image to run it on, in QEMU (boards/qemu_stm32f405)");
+  drive_command->add_option("--json", drive_options.json, "file for the result; - is standard output");
+  drive_command->add_option("--seed", drive_options.seed, "of the sensors' noise (default 1)");
+  drive_command->footer("Example: flexspline-hil drive --scenario slow-reversals --seconds 4");
+  drive_command->callback([&] { flexspline::board::run_drive(drive_options); });
   CLI::App* effects_command = app.add_subcommand("effects", "lists what can be hidden");
   effects_command->add_option("--plant", options.plant_file, "plant file (default: the demo's drive, built in)");
   effects_command->callback([&] { list_effects(options.plant_file); });

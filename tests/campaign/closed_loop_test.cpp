@@ -1,0 +1,125 @@
+// The whole of a drive in closed loop: a minute of it, what compensation saves, and the same bits from the image of an
+// ARM processor as from the desktop.
+#include <gtest/gtest.h>
+
+#include <cstdlib>
+#include <filesystem>
+#include <memory>
+#include <string>
+
+#include "hil/board/processor.hpp"
+#include "hil/board/scenario.hpp"
+
+namespace flexspline::tests {
+namespace {
+
+using board::Processor;
+using board::ScenarioPlan;
+using board::ScenarioResult;
+
+ScenarioPlan plan_of(std::string_view scenario, double duration_s, std::uint64_t seed = 7001) {
+  ScenarioPlan plan;
+  plan.drive = plant::demo_plant().drive;
+  plan.scenario = scenario;
+  plan.duration_s = duration_s;
+  plan.seed = seed;
+  return plan;
+}
+ScenarioResult run(ScenarioPlan plan, bool compensation = true, std::unique_ptr<board::Brain> brain = nullptr) {
+  plan.compensation = compensation;
+  const ScenarioResult result = board::run_scenario(plan, std::move(brain));
+  EXPECT_EQ(result.end.mode, firmware::Mode::position) << firmware::info_of(result.end.fault.fault).reason;
+  return result;
+}
+
+TEST(ClosedLoop, AMinuteOfItGivesTheSameBitsAndTheSameTelemetryInEachRun) {
+  const ScenarioResult first = run(plan_of("joint-trajectory", 60.0)), again = run(plan_of("joint-trajectory", 60.0));
+  EXPECT_EQ(first.ticks, 1'200'101u);
+  EXPECT_EQ(first.frames, first.ticks);
+  EXPECT_EQ(first.telemetry_hash, again.telemetry_hash);
+  EXPECT_EQ(first.rms_error_rad, again.rms_error_rad);
+  EXPECT_NE(run(plan_of("joint-trajectory", 60.0, 7002)).telemetry_hash, first.telemetry_hash);
+  // Far faster than time passes.
+  EXPECT_LT(first.wall_s, 30.0);
+}
+
+// Bounds below as well as above: an error that vanishes is a loop that measures itself.
+TEST(ClosedLoop, CompensationFollowsCloserInEveryScenario) {
+  struct Expected {
+    const char* scenario;
+    double rms_ratio, peak_ratio;  // with over without compensation, at most
+  };
+  for (const Expected& e : {Expected{"slow-reversals", 1.1, 0.7}, Expected{"sine", 0.9, 0.35},
+                            Expected{"trapezoid", 0.9, 0.45}, Expected{"joint-trajectory", 0.7, 0.4},
+                            Expected{"constant-slow", 0.3, 0.6}}) {
+    const auto plan = plan_of(e.scenario, 10.0);
+    const ScenarioResult off = run(plan, false), on = run(plan, true);
+    SCOPED_TRACE(e.scenario);
+    RecordProperty(std::string(e.scenario) + "_rms_ratio", std::to_string(on.rms_error_rad / off.rms_error_rad));
+    EXPECT_LT(on.rms_error_rad, e.rms_ratio * off.rms_error_rad);
+    EXPECT_LT(on.peak_error_rad, e.peak_ratio * off.peak_error_rad);
+    EXPECT_LT(off.rms_error_rad, 3e-4);
+    EXPECT_GT(on.rms_error_rad, 1e-6);
+    // It is another way to the same motion, not another motion.
+    EXPECT_NEAR(on.rms_current_a, off.rms_current_a, 0.03 * off.rms_current_a);
+  }
+}
+
+TEST(ClosedLoop, ModelThatLacksAnEffectOfTheDriveFollowsWorse) {
+  auto plan = plan_of("constant-slow", 10.0);
+  plant::with(plan.drive, "torque_ripple:2");
+  const double known = run(plan).rms_error_rad;
+  plan.drive = plant::demo_plant().drive;
+  plant::hide(plan.drive, "torque_ripple:2");
+  EXPECT_GT(run(plan).rms_error_rad, 1.2 * known);
+}
+
+class ProcessorInTheLoop : public testing::Test {
+ protected:
+  void SetUp() override {
+    if (!std::filesystem::is_regular_file(FLEXSPLINE_IMAGE))
+      GTEST_SKIP() << "no firmware image at " << FLEXSPLINE_IMAGE << ": the ARM compiler is not installed";
+    if (!Processor::is_installed()) GTEST_SKIP() << "qemu-system-arm is not installed";
+  }
+};
+
+TEST_F(ProcessorInTheLoop, GivesTheSameTelemetryAsTheSoftwareBoardBitByBit) {
+  auto plan = plan_of("sine", 2.0);
+  plant::with(plan.drive, "stribeck_gaussian");
+  plant::with(plan.drive, "torque_ripple:2");
+  const ScenarioResult desktop = run(plan);
+  for (int again = 0; again < 2; ++again) {
+    auto processor = std::make_unique<Processor>(FLEXSPLINE_IMAGE);
+    const ScenarioResult image = run(plan, true, std::move(processor));
+    EXPECT_EQ(image.ticks, 40'101u);
+    EXPECT_EQ(image.telemetry_hash, desktop.telemetry_hash);
+    EXPECT_EQ(image.rms_error_rad, desktop.rms_error_rad);
+  }
+}
+
+TEST_F(ProcessorInTheLoop, AFaultEndsInTheSameTickAsOnTheSoftwareBoard) {
+  for (const auto name : board::injection_names()) {
+    auto plan = plan_of("sine", 1.2);
+    plan.compensation = false;
+    plan.injection = board::injection_named(name);
+    plan.injection_s = 1.0;
+    const ScenarioResult desktop = board::run_scenario(plan);
+    const ScenarioResult image = board::run_scenario(plan, std::make_unique<Processor>(FLEXSPLINE_IMAGE));
+    EXPECT_NE(image.end.fault.fault, firmware::Fault::none) << name;
+    EXPECT_EQ(image.end.fault.fault, desktop.end.fault.fault) << name;
+    EXPECT_EQ(image.end.fault.tick, desktop.end.fault.tick) << name;
+    EXPECT_EQ(image.telemetry_hash, desktop.telemetry_hash) << name;
+  }
+}
+
+TEST_F(ProcessorInTheLoop, TheImageEndsWhenItIsSwitchedOff) {
+  Processor processor(FLEXSPLINE_IMAGE);
+  processor.start(board::Block(), {}, firmware::ResetCause::power);
+  firmware::LockStepDown down;
+  for (int k = 0; k < 100; ++k) processor.tick(down);
+  EXPECT_EQ(processor.stop(), 0);
+  EXPECT_GT(processor.most_instructions(), 100u);
+}
+
+}  // namespace
+}  // namespace flexspline::tests
