@@ -1,0 +1,208 @@
+#include "tests/soak/diagnose_case.hpp"
+
+#include <fmt/format.h>
+
+#include <Eigen/QR>
+#include <algorithm>
+#include <chrono>
+#include <cmath>
+#include <set>
+
+#include "host/diagnosis/add.hpp"
+#include "host/diagnosis/diagnosis.hpp"
+#include "host/regression/shapes.hpp"
+#include "tests/support/twin_data.hpp"
+
+namespace flexspline::soak {
+namespace {
+
+using regression::BalanceData;
+using regression::Balance;
+
+constexpr std::size_t kMostRounds = 4;
+
+std::vector<std::string> split(const std::string& text, char at) {
+  std::vector<std::string> parts;
+  for (std::size_t from = 0; from < text.size();) {
+    const std::size_t to = std::min(text.find(at, from), text.size());
+    parts.push_back(text.substr(from, to - from));
+    from = to + 1;
+  }
+  return parts;
+}
+
+std::string label(const std::string& effect, const std::optional<double>& order) {
+  return order ? fmt::format("{}:{:g}", effect, *order) : effect;
+}
+
+// As the diagnosis names it: orders are said, the plant's own name for the common order is without.
+std::string as_named(const std::string& hidden) {
+  const catalogue::Entry* entry = catalogue::find(hidden);
+  return entry && entry->count(effects::Kind::given) > 0 ? hidden + ":2" : hidden;
+}
+
+double root_mean_square(const Eigen::VectorXd& r) {
+  return r.size() ? std::sqrt(r.squaredNorm() / static_cast<double>(r.size())) : 0.0;
+}
+
+// A drive's recordings with what only the plant knows.
+struct Bench {
+  plant::PlantFile file;
+  std::vector<plant::Record> records;
+  data::Dataset dataset;
+  model::Model base, truth;
+
+  explicit Bench(const Case& c) : file(plant::demo_plant()) {
+    const std::vector<std::string> hidden = split(c.hidden, '+'), with = split(c.with, ',');
+    for (const std::string& name : hidden) plant::hide(file.drive, name, c.scale);
+    for (const std::string& name : with)
+      if (std::find(hidden.begin(), hidden.end(), name) == hidden.end()) plant::with(file.drive, name);
+    file.drive.friction_variation = c.friction_variation;
+    file.drive.sensors.current.correlation = c.noise_correlation;
+    file.drive.sensors.torque.correlation = c.noise_correlation;
+    records = plant::record_all(file.drive, file.experiments, c.seed);
+    dataset = testing::dataset_of(file.drive, records);
+    base = testing::model_of(file.drive, false, false);
+    truth = testing::model_of(file.drive, true, true);
+  }
+
+  std::vector<const data::Experiment*> of(data::Role role) const {
+    std::vector<const data::Experiment*> list;
+    for (const auto& e : dataset.experiments)
+      if (e.role == role) list.push_back(&e);
+    return list;
+  }
+
+  // RMS of the true model's residual on the hold-out records.
+  double holdout_floor(Balance balance) const {
+    const regression::Prepared prepared = regression::prepare(of(data::Role::fit), truth.drive, {});
+    const regression::Prepared judged = regression::prepare_with(of(data::Role::holdout), truth.drive, prepared.pipeline);
+    BalanceData data(judged, balance);
+    return root_mean_square(regression::residual_of(data, regression::terms_of(truth)));
+  }
+
+  // What the hidden effects add and the base model cannot imitate, over the noise alone, on the fitted records.
+  double missing_over_noise(Balance balance) const {
+    const regression::Prepared prepared = regression::prepare(of(data::Role::fit), truth.drive, {});
+    BalanceData data(prepared, balance);
+    const regression::Terms full = regression::terms_of(truth), without = regression::terms_of(testing::model_of(
+                                                                    file.drive, false, true));
+    Eigen::VectorXd noise = regression::residual_of(data, full);
+    Eigen::VectorXd missing = regression::residual_of(data, without) - noise;
+    for (std::size_t t = 0; t < full.size(); ++t) {
+      const std::string_view name = full[t].entry->name();
+      const bool viscous = name == "viscous_friction", dry = name == "coulomb_friction" || name == "dahl_friction";
+      if (!viscous && !dry) continue;
+      const Eigen::VectorXd torque = data.term_torque(full, t);
+      for (const auto& range : data.records()) {
+        const auto at = std::find_if(records.begin(), records.end(), [&](const plant::Record& r) {
+          return r.name == prepared.records[range.record].name;
+        });
+        noise.segment(range.first, range.size()) -= ((viscous ? at->viscous_factor : at->coulomb_factor) - 1.0) *
+                                                    torque.segment(range.first, range.size());
+      }
+    }
+    const auto on_balance = regression::terms_on(without, balance, true);
+    Eigen::MatrixXd X = regression::columns_of(data, without, regression::free_linear_slots(without, on_balance));
+    if (X.cols() == 0) {
+      regression::Terms open = regression::terms_of(base);
+      X = regression::columns_of(data, open, regression::free_linear_slots(open, on_balance));
+    }
+    const Eigen::VectorXd size = X.colwise().norm().transpose().array().max(1e-300);
+    X *= size.cwiseInverse().asDiagonal();
+    missing -= X * Eigen::ColPivHouseholderQR<Eigen::MatrixXd>(X).solve(missing);
+    return root_mean_square(missing) / root_mean_square(noise);
+  }
+};
+
+void compare_parameters(const Bench& bench, const std::string& hidden, const diagnosis::Addition& added,
+                        Outcome& outcome) {
+  const catalogue::Entry& entry = catalogue::get(hidden.substr(0, hidden.find(':')));
+  const plant::Effect* truth = nullptr;
+  for (const plant::Effect& e : bench.file.drive.effects)
+    if (e.hidden) truth = &e;
+  // The two parts of a wave are judged by its height: either may be near nought.
+  double height = 0.0;
+  for (const plant::Parameter& p : truth->parameters)
+    if (p.key == "cosine" || p.key == "sine") height = std::hypot(height, p.value);
+  for (const regression::Estimate& e : added.estimates) {
+    if (e.effect != entry.name() || !truth->has(e.parameter) || !e.std || e.fixed) continue;
+    if (e.id != added.model.effects.back().id) continue;
+    const double is = truth->value(e.parameter);
+    const auto kind = entry.parameters[entry.index_of(e.parameter)].kind;
+    if (kind == effects::Kind::given || kind == effects::Kind::grid) continue;
+    const double scale = height > 0.0 ? height : std::abs(is);
+    outcome.recovered.push_back({e.parameter, kind == effects::Kind::shape, scale > 0.0 ? (e.value - is) / scale : 0.0,
+                                 e.low && e.high && *e.low <= is && is <= *e.high});
+  }
+}
+
+// Adds what is named until nothing is, and compares with all that was hidden.
+bool finds_all(const Bench& bench, const std::vector<std::string>& hidden, diagnosis::Diagnosis d) {
+  std::set<std::string> found, wanted;
+  for (const std::string& h : hidden) wanted.insert(as_named(h));
+  model::Model model = bench.base;
+  for (std::size_t round = 0; round < kMostRounds && d.verdict == diagnosis::Verdict::missing_effect; ++round) {
+    const std::string name = label(d.named.front().effect, d.named.front().order);
+    found.insert(name);
+    model = diagnosis::add(bench.dataset, model, name, {}).model;
+    d = diagnosis::diagnose(bench.dataset, model, {});
+  }
+  return found == wanted;
+}
+
+}  // namespace
+
+std::string Case::key() const {
+  return fmt::format("{} x{:g} seed {} friction {:g} colour {:g} with {}", hidden.empty() ? "-" : hidden, scale, seed,
+                     friction_variation, noise_correlation, with.empty() ? "-" : with);
+}
+
+Outcome run(const Case& what) {
+  Outcome outcome;
+  outcome.what = what;
+  const Bench bench(what);
+  const auto start = std::chrono::steady_clock::now();
+  const diagnosis::Diagnosis d = diagnosis::diagnose(bench.dataset, bench.base, {});
+  outcome.seconds = std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
+  outcome.verdict = diagnosis::verdict_name(d.verdict);
+  for (const auto& n : d.named) outcome.named += (outcome.named.empty() ? "" : "+") + label(n.effect, n.order);
+  if (d.named.empty()) outcome.named = "-";
+  for (std::size_t i = 0; i < d.candidates.size(); ++i) {
+    const diagnosis::Candidate& c = d.candidates[i];
+    if (i < 4)
+      outcome.detail += fmt::format(" {}({:.1f},{:.2f}%{})", label(c.effect, c.order), c.score, c.chi2_fall_percent,
+                                    c.admissible ? "" : ",x");
+    if (c.admissible && (i == 0 || c.score > outcome.best_score)) {
+      outcome.best_score = c.score;
+      outcome.best_fall_percent = c.chi2_fall_percent;
+    }
+  }
+  const std::vector<std::string> hidden = split(what.hidden, '+');
+  if (hidden.empty()) {
+    outcome.right = d.named.empty();
+    return outcome;
+  }
+  const bool known =
+      std::all_of(hidden.begin(), hidden.end(), [](const auto& h) { return catalogue::find(h.substr(0, h.find(':'))); });
+  if (!known) {
+    outcome.right = d.verdict == diagnosis::Verdict::unknown_structure ||
+                    (d.verdict == diagnosis::Verdict::missing_effect && !d.remaining_structure.empty());
+    return outcome;
+  }
+  if (hidden.size() > 1) {
+    outcome.found_all = finds_all(bench, hidden, d);
+    outcome.right = outcome.found_all;
+    return outcome;
+  }
+  const std::string truth = as_named(hidden.front());
+  outcome.right = outcome.named == truth;
+  const Balance balance = catalogue::get(truth.substr(0, truth.find(':'))).told_by();
+  outcome.missing_over_noise = bench.missing_over_noise(balance);
+  const diagnosis::Addition added = diagnosis::add(bench.dataset, bench.base, truth, {});
+  outcome.holdout_over_floor = *added.after.rmse_holdout / bench.holdout_floor(balance);
+  compare_parameters(bench, truth, added, outcome);
+  return outcome;
+}
+
+}  // namespace flexspline::soak
