@@ -6,6 +6,7 @@
 #include <cmath>
 #include <numeric>
 
+#include "host/diagnosis/triangles.hpp"
 #include "host/regression/balance_fit.hpp"
 #include "host/regression/least_squares.hpp"
 #include "host/regression/shapes.hpp"
@@ -26,65 +27,97 @@ Eigen::MatrixXd design(BalanceData& data, const Terms& terms, const std::vector<
   return X;
 }
 
-void predict_left_out(const BalanceData& data, const Eigen::MatrixXd& X, const Eigen::VectorXd& y, Judged& judged) {
-  const auto folds = data.folds(kFolds);
-  const Eigen::Index columns = X.cols();
-  // Columns of like size, so that the factorisation can tell a small column from a needless one.
-  const Eigen::VectorXd size = X.colwise().norm().transpose().array().max(1e-300);
-  // One triangle for each fold; a fit without a fold stacks the others.
-  std::vector<Eigen::MatrixXd> triangles;
-  for (const auto& fold : folds) {
-    Eigen::Index rows = 0;
-    for (const RowRange& range : fold) rows += range.size();
-    Eigen::MatrixXd block(std::max(rows, columns + 1), columns + 1);
-    block.setZero();
-    Eigen::Index at = 0;
-    for (const RowRange& range : fold) {
-      const auto weights = judged.root_weights.segment(range.first, range.size()).asDiagonal();
-      block.block(at, 0, range.size(), columns) =
-          weights * (X.middleRows(range.first, range.size()) * size.cwiseInverse().asDiagonal());
-      block.block(at, columns, range.size(), 1) = weights * y.segment(range.first, range.size());
-      at += range.size();
-    }
-    const Eigen::HouseholderQR<Eigen::MatrixXd> qr(block);
-    triangles.emplace_back(qr.matrixQR().topRows(columns + 1).triangularView<Eigen::Upper>());
-  }
-  judged.cv_squares.assign(data.records().size(), 0.0);
-  judged.cv_rows.assign(data.records().size(), 0.0);
-  for (std::size_t out = 0; out < folds.size(); ++out) {
-    Eigen::MatrixXd stack((columns + 1) * static_cast<Eigen::Index>(kFolds - 1), columns + 1);
-    Eigen::Index at = 0;
-    for (std::size_t f = 0; f < folds.size(); ++f)
-      if (f != out) {
-        stack.middleRows(at, columns + 1) = triangles[f];
-        at += columns + 1;
-      }
-    const Eigen::VectorXd theta = Eigen::ColPivHouseholderQR<Eigen::MatrixXd>(stack.leftCols(columns))
-                                      .setThreshold(1e-7)
-                                      .solve(stack.col(columns))
-                                      .cwiseQuotient(size);
-    for (std::size_t i = 0; i < folds[out].size(); ++i) {
-      const RowRange& range = folds[out][i];
-      const Eigen::VectorXd r = y.segment(range.first, range.size()) - X.middleRows(range.first, range.size()) * theta;
-      for (Eigen::Index k = 0; k < range.size(); ++k)
-        if (judged.root_weights[range.first + k] > 0.0) {
-          judged.cv_squares[i] += r[k] * r[k];
-          judged.cv_rows[i] += 1.0;
-        }
-    }
-  }
+// Noise below a hundredth of the median record's is taken for that.
+double least_of(std::vector<double> variances) {
+  if (variances.empty()) return 0.0;
+  const auto middle = variances.begin() + static_cast<std::ptrdiff_t>(variances.size() / 2);
+  std::nth_element(variances.begin(), middle, variances.end());
+  return 0.01 * *middle;
 }
 
-double total(const std::vector<double>& x) {
-  return std::accumulate(x.begin(), x.end(), 0.0);
+std::vector<double> raw_variances(const std::vector<RecordSums>& records) {
+  std::vector<double> variances;
+  for (const RecordSums& r : records) variances.push_back(r.squares / std::max(1.0, r.rows));
+  return variances;
 }
 
-// Noise of each record, with a floor under records that are nearly silent.
-std::vector<double> variances(const Judged& judged) {
-  std::vector<double> variance;
-  for (std::size_t i = 0; i < judged.cv_rows.size(); ++i)
-    variance.push_back(judged.cv_squares[i] / std::max(1.0, judged.cv_rows[i]));
-  return variance;
+std::vector<RecordSums> sums_of(const Triangles& triangles, const Eigen::VectorXd& theta, const Eigen::MatrixXd& u) {
+  std::vector<RecordSums> records(triangles.whole.size());
+  for (std::size_t i = 0; i < records.size(); ++i)
+    add_sums(triangles.whole[i], theta, u, triangles.rows_of(i), records[i]);
+  return records;
+}
+
+// Generalised least squares on all records, the spread and the noise of each of them estimated with it. `tau` rows
+// count as one.
+struct MixedFit {
+  regression::LinearFit linear;  // of the scaled columns
+  Eigen::MatrixXd u;
+  Spread spread;
+};
+MixedFit fit_all(const Triangles& triangles, const std::vector<Group>& groups, double tau) {
+  MixedFit fit;
+  const Eigen::Index columns = triangles.columns();
+  const auto solve = [&] {
+    std::vector<Eigen::MatrixXd> reduced;
+    std::vector<const Eigen::MatrixXd*> blocks;
+    for (std::size_t i = 0; i < triangles.whole.size(); ++i)
+      reduced.push_back(fit.spread.variance.empty() ? triangles.whole[i]
+                                                    : without_deviations(triangles.whole[i], fit.u, fit.spread.std,
+                                                                         fit.spread.variance[i] * tau));
+    for (const Eigen::MatrixXd& r : reduced) blocks.push_back(&r);
+    const Eigen::MatrixXd all = stacked(blocks);
+    fit.linear = regression::least_squares(all.leftCols(columns), all.col(columns), Eigen::VectorXd::Ones(all.rows()));
+    fit.u = directions(groups, fit.linear.theta);
+  };
+  solve();
+  // Parameters, spread and noise settle each other.
+  constexpr int kMostRounds = 12;
+  constexpr double kSame = 0.02;
+  for (int round = 0; round < kMostRounds; ++round) {
+    const std::vector<RecordSums> sums = sums_of(triangles, fit.linear.theta, fit.u);
+    const double least = least_of(raw_variances(sums));
+    const SmallVector before = fit.spread.std;
+    fit.spread = estimate_spread(sums, tau, least);
+    solve();
+    if (round > 1 && (groups.empty() ||
+                      (fit.spread.std - before).cwiseAbs().maxCoeff() <= kSame * fit.spread.std.cwiseAbs().maxCoeff()))
+      break;
+  }
+  return fit;
+}
+
+// Predicts each part of all records from the others. What the whole data do not determine, a part of them does still
+// less: `determined` columns alone are fitted.
+std::vector<RecordSums> predict_left_out(const Triangles& triangles, const MixedFit& whole, double tau) {
+  const Eigen::Index columns = triangles.columns();
+  std::vector<Eigen::Index> used;
+  for (Eigen::Index j = 0; j < columns; ++j)
+    if (whole.linear.own_share[j] >= regression::kUndetermined) used.push_back(j);
+  std::vector<RecordSums> records(triangles.whole.size());
+  for (std::size_t out = 0; out < kFolds; ++out) {
+    std::vector<Eigen::MatrixXd> reduced;
+    for (std::size_t i = 0; i < records.size(); ++i) {
+      std::vector<const Eigen::MatrixXd*> others;
+      for (std::size_t f = 0; f < kFolds; ++f)
+        if (f != out) others.push_back(&triangles.parts[i][f]);
+      reduced.push_back(without_deviations(stacked(others), whole.u, whole.spread.std, whole.spread.variance[i] * tau));
+    }
+    std::vector<const Eigen::MatrixXd*> blocks;
+    for (const Eigen::MatrixXd& r : reduced) blocks.push_back(&r);
+    const Eigen::MatrixXd all = stacked(blocks);
+    Eigen::VectorXd theta = Eigen::VectorXd::Zero(columns);
+    theta(used) =
+        Eigen::ColPivHouseholderQR<Eigen::MatrixXd>(all(Eigen::all, used)).setThreshold(1e-5).solve(all.col(columns));
+    for (std::size_t i = 0; i < records.size(); ++i)
+      add_sums(triangles.parts[i][out], theta, whole.u, triangles.rows[i][out], records[i]);
+  }
+  return records;
+}
+
+double rows_of(const std::vector<RecordSums>& records) {
+  return std::accumulate(records.begin(), records.end(), 0.0,
+                         [](double sum, const RecordSums& r) { return sum + r.rows; });
 }
 
 }  // namespace
@@ -95,66 +128,80 @@ double Judged::rmse() const {
 }
 
 double Judged::rmse_cv() const {
-  return std::sqrt(total(cv_squares) / std::max(1.0, total(cv_rows)));
+  const Spread spread = with_spread(left_out, deviations.std, autocorrelation_time, least_of(raw_variances(left_out)));
+  return std::sqrt(std::accumulate(spread.squares.begin(), spread.squares.end(), 0.0) /
+                   std::max(1.0, rows_of(left_out)));
 }
 
 Judged judge(BalanceData& data, Terms terms, const Eigen::VectorXd& keep) {
   Judged judged;
   const auto on_balance = regression::terms_on(terms, data.balance(), data.prepared().torque_measured);
   judged.linear = regression::free_linear_slots(terms, on_balance);
+  judged.groups = friction_groups(terms, judged.linear);
   const Eigen::VectorXd y = data.target() - data.known_torque(terms, on_balance);
-  judged.root_weights = keep;
-  regression::LinearFit fit;
-  Eigen::MatrixXd X;
-  for (int round = 0; round < 3; ++round) {
-    // Slopes by shapes need the linear parameters, so the first round sets those.
-    X = round == 0 ? regression::columns_of(data, terms, judged.linear) : design(data, terms, judged.linear);
-    fit = regression::least_squares(X, y, judged.root_weights);
+  const auto set = [&](const Eigen::VectorXd& theta) {
     for (std::size_t j = 0; j < judged.linear.size(); ++j)
-      terms[judged.linear[j].term].values[judged.linear[j].parameter] = fit.theta[static_cast<Eigen::Index>(j)];
-    if (round < 2) {
-      const Eigen::VectorXd counted = keep.cwiseProduct(fit.residual);
-      judged.root_weights = keep.cwiseProduct(regression::record_weights(data.records(), counted));
-    }
+      terms[judged.linear[j].term].values[judged.linear[j].parameter] = theta[static_cast<Eigen::Index>(j)];
+  };
+  double tau = data.filter_autocorrelation_time();
+  if (!regression::free_shape_slots(terms, on_balance).empty()) {
+    // Slopes by shapes need the linear parameters.
+    const Triangles linear = triangles_of(data, regression::columns_of(data, terms, judged.linear), y, keep, 1);
+    set(fit_all(linear, judged.groups, tau).linear.theta.cwiseQuotient(linear.size));
   }
-  judged.theta = fit.theta;
-  judged.own_share = fit.own_share;
-  judged.residual = fit.residual;
-  const Eigen::VectorXd weighted = judged.root_weights.cwiseProduct(fit.residual);
-  judged.autocorrelation_time =
-      std::max(regression::autocorrelation_time(data.records(), weighted), data.filter_autocorrelation_time());
-  const double variance = weighted.squaredNorm() / std::max(1.0, static_cast<double>(data.rows() - X.cols()));
-  judged.std = (fit.unit_covariance.diagonal() * variance * judged.autocorrelation_time).cwiseSqrt();
-  // What the whole data do not determine, a part of them does still less.
-  std::vector<Eigen::Index> determined;
-  for (Eigen::Index j = 0; j < X.cols(); ++j)
-    if (fit.own_share[j] >= regression::kUndetermined) determined.push_back(j);
-  predict_left_out(data, X(Eigen::all, determined), y, judged);
+  const Eigen::MatrixXd X = design(data, terms, judged.linear);
+  const Triangles triangles = triangles_of(data, X, y, keep, kFolds);
+  MixedFit fit;
+  judged.root_weights.resize(data.rows());
+  // What deviations explain depends on how many rows count, which depends on what they leave.
+  for (int round = 0; round < 2; ++round) {
+    fit = fit_all(triangles, judged.groups, tau);
+    judged.theta = fit.linear.theta.cwiseQuotient(triangles.size);
+    judged.residual = y - X * judged.theta;
+    for (std::size_t i = 0; i < data.records().size(); ++i) {
+      const RowRange& range = data.records()[i];
+      const SmallVector& b = fit.spread.by_record[i];
+      if (b.size() > 0 && b.cwiseAbs().maxCoeff() > 0.0)
+        judged.residual.segment(range.first, range.size()) -=
+            X.middleRows(range.first, range.size()) * (fit.u * b).cwiseQuotient(triangles.size);
+      judged.root_weights.segment(range.first, range.size()) =
+          keep.segment(range.first, range.size()) / std::sqrt(fit.spread.variance[i]);
+    }
+    judged.autocorrelation_time =
+        std::max(regression::autocorrelation_time(data.records(), judged.root_weights.cwiseProduct(judged.residual)),
+                 data.filter_autocorrelation_time());
+    if (judged.groups.empty() || judged.autocorrelation_time < 1.1 * tau) break;
+    tau = judged.autocorrelation_time;
+  }
+  set(judged.theta);
+  judged.own_share = fit.linear.own_share;
+  judged.deviations = fit.spread;
+  // Noise counts `tau` rows as one already, in the triangles' weights.
+  const double counted = (keep.array() > 0.0).count();
+  const double freedom = counted / std::max(1.0, counted - static_cast<double>(X.cols()));
+  judged.std = (fit.linear.unit_covariance.diagonal() * freedom * (judged.autocorrelation_time / tau))
+                   .cwiseSqrt()
+                   .cwiseQuotient(triangles.size);
+  judged.left_out = predict_left_out(triangles, fit, tau);
   judged.terms = std::move(terms);
   return judged;
 }
 
 Fall fall_of(const Judged& base, const Judged& extended, double added) {
-  const std::vector<double> before = variances(base), after = variances(extended);
-  std::vector<double> sorted = after;
-  std::nth_element(sorted.begin(), sorted.begin() + static_cast<std::ptrdiff_t>(sorted.size() / 2), sorted.end());
-  const double least = 0.01 * sorted[sorted.size() / 2];
-  double ratio = 0.0, chi2_before = 0.0, chi2_after = 0.0;
-  for (std::size_t i = 0; i < after.size(); ++i) {
-    const double noise = std::max({after[i], least, 1e-300});
-    ratio += base.cv_rows[i] * std::log(std::max(before[i], noise) / noise);
-    // A record that got worse counts against the extension.
-    if (before[i] < after[i]) ratio -= base.cv_rows[i] * std::log(noise / std::max({before[i], least, 1e-300}));
-    chi2_before += base.cv_squares[i] / noise;
-    chi2_after += extended.cv_squares[i] / noise;
-  }
   const double tau = std::max(1.0, std::min(base.autocorrelation_time, extended.autocorrelation_time));
-  const double effective = total(base.cv_rows) / tau;
+  const double least = least_of(raw_variances(extended.left_out));
+  const Spread before = estimate_spread(base.left_out, tau, least);
+  const Spread after = estimate_spread(extended.left_out, tau, least);
+  double ratio = 0.0;
+  for (std::size_t i = 0; i < after.deviance.size(); ++i) ratio += before.deviance[i] - after.deviance[i];
+  const double effective = rows_of(base.left_out) / tau;
+  const double chi2_before = chi_square(base.left_out, after, tau),
+               chi2_after = chi_square(extended.left_out, after, tau);
   Fall fall;
-  fall.score = ratio / tau - added * std::log(std::max(2.0, effective));
+  fall.score = ratio - added * std::log(std::max(2.0, effective));
   fall.chi2_percent = chi2_before > 0.0 ? 100.0 * (1.0 - chi2_after / chi2_before) : 0.0;
   const boost::math::chi_squared_distribution<double> distribution(std::max(1.0, added));
-  fall.p_value = ratio > 0.0 ? boost::math::cdf(boost::math::complement(distribution, ratio / tau)) : 1.0;
+  fall.p_value = ratio > 0.0 ? boost::math::cdf(boost::math::complement(distribution, ratio)) : 1.0;
   return fall;
 }
 

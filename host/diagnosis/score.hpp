@@ -5,6 +5,7 @@
 #include <string>
 #include <vector>
 
+#include "host/diagnosis/deviations.hpp"
 #include "host/regression/balance_data.hpp"
 
 namespace flexspline::diagnosis {
@@ -22,13 +23,14 @@ struct Judged {
   Eigen::VectorXd theta;  // linear parameters, then shifts of shapes, then the delay in s
   Eigen::VectorXd std;    // likewise; corrected for autocorrelation
   Eigen::VectorXd own_share;
-  Eigen::VectorXd residual;        // in-sample
-  Eigen::VectorXd root_weights;    // nought where a disturbance is left out
-  std::vector<double> cv_squares;  // of each record, over rows that were left out of the fit
-  std::vector<double> cv_rows;     // rows that count, of each record
+  Eigen::VectorXd residual;      // in-sample, less the records' deviations
+  Eigen::VectorXd root_weights;  // nought where a disturbance is left out
   double autocorrelation_time = 1.0;
+  std::vector<Group> groups;         // friction that differs from record to record
+  Spread deviations;                 // in-sample
+  std::vector<RecordSums> left_out;  // of each record, over rows that were left out of the fit
   double rmse() const;
-  double rmse_cv() const;
+  double rmse_cv() const;  // the records' deviations taken off as the left-out rows have them
 };
 
 // Fits and judges `terms` on `data`. `keep` holds one a row, or nought for rows that must not count.
@@ -40,8 +42,8 @@ struct Fall {
   double chi2_percent = 0.0;  // of the left-out chi-square
   double p_value = 1.0;
 };
-// From `base` to `extended`, which has `added` parameters more. Noise is each record's own; a record that is quieter
-// than a tenth of the median one counts as that.
+// From `base` to `extended`, which has `added` parameters more. Noise is each record's own, and so is the spread of
+// friction each model's; a record that is quieter than a tenth of the median one counts as that.
 Fall fall_of(const Judged& base, const Judged& extended, double added);
 
 }  // namespace flexspline::diagnosis

@@ -103,10 +103,12 @@ void check_admissible(BalanceData& data, const Judged& base, Trial& trial) {
     const Eigen::VectorXd torque = data.term_torque(base.terms, old);
     // An effect that is hardly larger than what is missing is not known well enough to rule anything out.
     if (torque.norm() < 2.0 * base.residual.norm()) continue;
-    const double change = (data.term_torque(judged.terms, judged.linear[j].term) - torque).norm() / torque.norm();
+    // Of the larger one: without what is missing an effect may be found half as large as it is, or twice.
+    const Eigen::VectorXd now = data.term_torque(judged.terms, judged.linear[j].term);
+    const double change = (now - torque).norm() / std::max(torque.norm(), now.norm());
     if (change > 0.5)
-      refuse(fmt::format("{} would change by {:.0f} % (its {} from {:.3g} to {:.3g})", t.id, 100.0 * change, info.name,
-                         was, value));
+      refuse(fmt::format("{} would change by {:.0f} % (its {} from {:.3g} to {:.3g})", t.id,
+                         100.0 * (now - torque).norm() / torque.norm(), info.name, was, value));
   }
   if (!any_own) {
     trial.imitated_by = imitator(data, judged, added);

@@ -1,4 +1,6 @@
 #pragma once
+#include <type_traits>
+
 #include "shared/effects/effect.hpp"
 
 namespace flexspline::effects {
@@ -113,8 +115,13 @@ struct PreisachHysteresis {
     }
     int at = 0;
     for (int j = 0; j < kLevels; ++j)
-      for (int k = 0; k <= j; ++k, ++at)
+      for (int k = 0; k <= j; ++k, ++at) {
+        // A regression asks for one relay at a time; on plain numbers a weight of nought stays nought.
+        if constexpr (std::is_same_v<typename N::Gain, double>) {
+          if (c.weight[at] == 0.0) continue;
+        }
         state.moved[at] = N::between(state.moved[at] + c.initial[at], up[j], down[k]) - c.initial[at];
+      }
   }
   template <class N>
   static void evaluate(const State<N>& state, const Coefficients<N>& c, const Inputs<N>&, Torques<N>& out) {

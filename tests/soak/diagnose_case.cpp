@@ -16,8 +16,8 @@
 namespace flexspline::soak {
 namespace {
 
-using regression::BalanceData;
 using regression::Balance;
+using regression::BalanceData;
 
 constexpr std::size_t kMostRounds = 4;
 
@@ -76,7 +76,8 @@ struct Bench {
   // RMS of the true model's residual on the hold-out records.
   double holdout_floor(Balance balance) const {
     const regression::Prepared prepared = regression::prepare(of(data::Role::fit), truth.drive, {});
-    const regression::Prepared judged = regression::prepare_with(of(data::Role::holdout), truth.drive, prepared.pipeline);
+    const regression::Prepared judged =
+        regression::prepare_with(of(data::Role::holdout), truth.drive, prepared.pipeline);
     BalanceData data(judged, balance);
     return root_mean_square(regression::residual_of(data, regression::terms_of(truth)));
   }
@@ -85,8 +86,8 @@ struct Bench {
   double missing_over_noise(Balance balance) const {
     const regression::Prepared prepared = regression::prepare(of(data::Role::fit), truth.drive, {});
     BalanceData data(prepared, balance);
-    const regression::Terms full = regression::terms_of(truth), without = regression::terms_of(testing::model_of(
-                                                                    file.drive, false, true));
+    const regression::Terms full = regression::terms_of(truth),
+                            without = regression::terms_of(testing::model_of(file.drive, false, true));
     Eigen::VectorXd noise = regression::residual_of(data, full);
     Eigen::VectorXd missing = regression::residual_of(data, without) - noise;
     for (std::size_t t = 0; t < full.size(); ++t) {
@@ -98,8 +99,8 @@ struct Bench {
         const auto at = std::find_if(records.begin(), records.end(), [&](const plant::Record& r) {
           return r.name == prepared.records[range.record].name;
         });
-        noise.segment(range.first, range.size()) -= ((viscous ? at->viscous_factor : at->coulomb_factor) - 1.0) *
-                                                    torque.segment(range.first, range.size());
+        noise.segment(range.first, range.size()) -=
+            ((viscous ? at->viscous_factor : at->coulomb_factor) - 1.0) * torque.segment(range.first, range.size());
       }
     }
     const auto on_balance = regression::terms_on(without, balance, true);
@@ -183,8 +184,8 @@ Outcome run(const Case& what) {
     outcome.right = d.named.empty();
     return outcome;
   }
-  const bool known =
-      std::all_of(hidden.begin(), hidden.end(), [](const auto& h) { return catalogue::find(h.substr(0, h.find(':'))); });
+  const bool known = std::all_of(hidden.begin(), hidden.end(),
+                                 [](const auto& h) { return catalogue::find(h.substr(0, h.find(':'))); });
   if (!known) {
     outcome.right = d.verdict == diagnosis::Verdict::unknown_structure ||
                     (d.verdict == diagnosis::Verdict::missing_effect && !d.remaining_structure.empty());

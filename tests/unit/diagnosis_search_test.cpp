@@ -95,8 +95,7 @@ struct Bench {
 // A judgement of records with these squares of left-out rows.
 Judged judged(std::vector<double> squares, std::vector<double> rows, double tau) {
   Judged j;
-  j.cv_squares = std::move(squares);
-  j.cv_rows = std::move(rows);
+  for (std::size_t i = 0; i < rows.size(); ++i) j.left_out.push_back({rows[i], squares[i], {}, {}});
   j.autocorrelation_time = tau;
   return j;
 }
@@ -182,9 +181,9 @@ TEST(Judge, PredictsEachFifthAsAFitOfTheOthersDoes) {
                 X.middleRows(fold[0].first, fold[0].size()) * theta.cast<double>())
                    .squaredNorm();
   }
-  ASSERT_EQ(bench.base.cv_squares.size(), 1u);
-  EXPECT_NEAR(bench.base.cv_squares[0] / squares, 1.0, 1e-6);
-  EXPECT_EQ(bench.base.cv_rows[0], static_cast<double>(data.rows()));
+  ASSERT_EQ(bench.base.left_out.size(), 1u);
+  EXPECT_NEAR(bench.base.left_out[0].squares / squares, 1.0, 1e-6);
+  EXPECT_EQ(bench.base.left_out[0].rows, static_cast<double>(data.rows()));
   EXPECT_GT(bench.base.rmse_cv(), bench.base.rmse());
 }
 
@@ -210,7 +209,7 @@ TEST(Judge, RowsThatDoNotCountMoveNothing) {
   const Judged with = judge(data, bench.terms, keep), without = judge(bench.data, bench.terms, keep);
   for (Eigen::Index j = 0; j < 3; ++j) EXPECT_NEAR(with.theta[j] / without.theta[j], 1.0, 1e-3) << j;
   EXPECT_NEAR(with.rmse_cv() / without.rmse_cv(), 1.0, 1e-2);
-  EXPECT_EQ(with.cv_rows[0], (keep.array() > 0.0).count());
+  EXPECT_EQ(with.left_out[0].rows, (keep.array() > 0.0).count());
 }
 
 std::vector<Disturbance> disturbances_of(Bench& bench) {

@@ -1,0 +1,68 @@
+// Friction that differs from run to run: a factor of each friction group in each record, of which only the spread is
+// known. Deviations are eliminated from each record's triangle (a Schur complement, done orthogonally), so that the
+// parameters are those of generalised least squares with the deviations' covariance.
+#pragma once
+
+#include <Eigen/Core>
+#include <string>
+#include <vector>
+
+#include "host/diagnosis/triangles.hpp"
+#include "host/regression/terms.hpp"
+
+namespace flexspline::diagnosis {
+
+// Friction that varies as one: its columns of the regression.
+struct Group {
+  std::string name;  // "viscous friction"
+  std::vector<Eigen::Index> columns;
+};
+inline constexpr Eigen::Index kMostGroups = 4;
+// Fewer records than that do not tell a spread.
+inline constexpr std::size_t kFewestRecords = 3;
+
+// Groups among the linear parameters that a regression estimates.
+std::vector<Group> friction_groups(const regression::Terms& terms, const std::vector<regression::Slot>& linear);
+
+using SmallVector = Eigen::Matrix<double, Eigen::Dynamic, 1, 0, kMostGroups, 1>;
+using SmallMatrix = Eigen::Matrix<double, Eigen::Dynamic, Eigen::Dynamic, 0, kMostGroups, kMostGroups>;
+
+// A record's error e against the groups' torques Z: all that its likelihood needs.
+struct RecordSums {
+  double rows = 0.0;
+  double squares = 0.0;  // e'e
+  SmallVector along;     // Z'e
+  SmallMatrix own;       // Z'Z
+};
+
+// Spread and noise that explain the records' errors best.
+struct Spread {
+  SmallVector std;                     // of each group, relative
+  std::vector<double> variance;        // noise of each record, deviations taken off, (N m)^2
+  std::vector<SmallVector> by_record;  // the deviations, relative
+  std::vector<double> squares;         // e'e with the deviations taken off
+  // Minus twice the log likelihood of each record, with rows over `tau` that count: n/tau ln(variance) and what the
+  // deviations cost.
+  std::vector<double> deviance;
+};
+// Maximises the likelihood of e ~ N(0, variance tau + Z std^2 Z') over the spreads and the records' variances, which
+// are not taken smaller than `least_variance`. Fewer than kFewestRecords records with the group have a spread of
+// nought.
+Spread estimate_spread(const std::vector<RecordSums>& records, double tau, double least_variance);
+// The same with the spreads given.
+Spread with_spread(const std::vector<RecordSums>& records, const SmallVector& std, double tau, double least_variance);
+// e'V^-1 e of all records, times tau, in the noise and the spread of `model`.
+double chi_square(const std::vector<RecordSums>& records, const Spread& model, double tau);
+
+// A record's triangle of [X y] over the root of its noise, with deviations along X u of this standard deviation (the
+// columns of `u`) eliminated: the triangle of generalised least squares.
+Eigen::MatrixXd without_deviations(const Eigen::MatrixXd& triangle, const Eigen::MatrixXd& u, const SmallVector& std,
+                                   double noise_variance);
+
+// Sums of the error that `theta` (of the scaled columns) leaves in a triangle; adds to `sums`.
+void add_sums(const Eigen::MatrixXd& triangle, const Eigen::VectorXd& theta, const Eigen::MatrixXd& u, double rows,
+              RecordSums& sums);
+// The groups' torques: columns of u are the groups' parameters (scaled columns), nought elsewhere.
+Eigen::MatrixXd directions(const std::vector<Group>& groups, const Eigen::VectorXd& theta);
+
+}  // namespace flexspline::diagnosis
