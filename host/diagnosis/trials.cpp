@@ -6,6 +6,7 @@
 #include <cmath>
 #include <limits>
 
+#include "host/estimation/in_parallel.hpp"
 #include "host/regression/least_squares.hpp"
 #include "host/regression/shapes.hpp"
 
@@ -14,8 +15,6 @@ namespace {
 
 using regression::Term;
 
-// The score's limit was set on null data; the fall says that an effect matters, not only that it is there.
-constexpr double kNamedFallPercent = 0.5;
 // A candidate of which the base model can imitate all but this share is one with it in these data.
 constexpr double kOwnShare = 0.003;
 constexpr std::size_t kGridPoints = 6;
@@ -186,30 +185,39 @@ void prefer_simple(const Judged& base, std::vector<Trial>& trials) {
 }
 
 std::vector<Trial> rank(Search& search) {
-  std::vector<Trial> trials;
-  for (Proposal& proposal : proposals(*search.data, search.base.terms, search.base.residual)) {
-    choose_shapes(search, proposal);
-    trials.push_back(evaluate(search, proposal));
-    if (!trials.back().admissible)
-      trials.back() = best_admissible(search, std::move(proposal), std::move(trials.back()));
-  }
+  std::vector<Proposal> tried = proposals(*search.data, search.base.terms, search.base.residual);
+  std::vector<Trial> trials(tried.size());
+  // Each on its own copy of the data, with the columns that are there: the result is that of one thread.
+  estimation::in_parallel(tried.size(), [&](std::size_t i) {
+    BalanceData data = *search.data;
+    Search own{&data, search.keep, search.base};
+    Proposal& proposal = tried[i];
+    choose_shapes(own, proposal);
+    trials[i] = evaluate(own, proposal);
+    if (!trials[i].admissible) trials[i] = best_admissible(own, std::move(proposal), std::move(trials[i]));
+  });
   // By score alone: a shape that is only near may make the model impossible where the best one does not.
-  std::sort(trials.begin(), trials.end(), [](const Trial& a, const Trial& b) { return a.fall.score > b.fall.score; });
-  std::size_t refined_already = 0;
+  std::stable_sort(trials.begin(), trials.end(),
+                   [](const Trial& a, const Trial& b) { return a.fall.score > b.fall.score; });
+  std::vector<Trial*> unrefined;
   for (Trial& trial : trials) {
     const Term& added = trial.proposal.extended.back();
     bool has_shape = false;
     for (std::size_t p = 0; p < added.values.size(); ++p) has_shape = has_shape || added.free_shape(p);
-    if (!has_shape || trial.fall.score < kNamedScore || ++refined_already > kRefined) continue;
+    if (has_shape && trial.fall.score >= kNamedScore && unrefined.size() < kRefined) unrefined.push_back(&trial);
+  }
+  estimation::in_parallel(unrefined.size(), [&](std::size_t i) {
+    Trial& trial = *unrefined[i];
+    BalanceData data = *search.data;
+    Search own{&data, search.keep, search.base};
     Proposal refined = trial.proposal;
     refined.extended = trial.judged.terms;
-    const auto on_balance =
-        regression::terms_on(refined.extended, search.data->balance(), search.data->prepared().torque_measured);
-    regression::refine_shapes(*search.data, refined.extended, on_balance, trial.judged.root_weights);
-    Trial again = evaluate(search, std::move(refined));
+    const auto on_balance = regression::terms_on(refined.extended, data.balance(), data.prepared().torque_measured);
+    regression::refine_shapes(data, refined.extended, on_balance, trial.judged.root_weights);
+    Trial again = evaluate(own, std::move(refined));
     if (better(again, trial) || !trial.admissible) trial = std::move(again);
-  }
-  std::sort(trials.begin(), trials.end(), better);
+  });
+  std::stable_sort(trials.begin(), trials.end(), better);
   prefer_simple(search.base, trials);
   return trials;
 }

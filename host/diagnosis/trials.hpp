@@ -7,6 +7,7 @@
 #include <vector>
 
 #include "host/diagnosis/candidates.hpp"
+#include "host/diagnosis/named_score.hpp"
 #include "host/diagnosis/score.hpp"
 
 namespace flexspline::diagnosis {
@@ -29,8 +30,8 @@ struct Trial {
 
 // Margin of score within which two effects are rivals.
 inline constexpr double kRivalMargin = 10.0;
-// What an effect must score to be told at all.
-inline constexpr double kNamedScore = 20.0;
+// The fall of chi-square, in percent, that says that an effect matters, not only that it is there.
+inline constexpr double kNamedFallPercent = 0.5;
 
 // Whether an effect may be named: admissible, certain, and large enough to matter.
 bool passes(const Trial& trial);

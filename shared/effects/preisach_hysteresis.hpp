@@ -79,6 +79,11 @@ struct PreisachHysteresis {
     typename N::Gain per_edge;
     typename N::Value initial[kRelays];  // of a gear that was worked until nothing of its past is left
     typename N::Weight weight[kRelays];
+    // Relays that add something, in order: a regression asks for one at a time, which is a small part of the work.
+    unsigned char level_up[kRelays];
+    unsigned char level_down[kRelays];
+    unsigned char relay[kRelays];
+    int used = 0;
   };
   // How far each relay is from where it began.
   template <class N>
@@ -100,6 +105,12 @@ struct PreisachHysteresis {
       for (int k = 1; k <= j; ++k, ++at) {
         c.weight[at] = N::weight(p[1 + at] / d.output_torque_base);
         c.initial[at] = N::value(P(j + k > 10 ? -1.0 : j + k < 10 ? 1.0 : 0.0));
+        if constexpr (std::is_same_v<P, double>) {
+          if (p[1 + at] == 0.0) continue;
+        }
+        c.level_up[c.used] = static_cast<unsigned char>(j - 1);
+        c.level_down[c.used] = static_cast<unsigned char>(k - 1);
+        c.relay[c.used++] = static_cast<unsigned char>(at);
       }
     return c;
   }
@@ -109,23 +120,26 @@ struct PreisachHysteresis {
   static void advance(State<N>& state, const Coefficients<N>& c, const Inputs<N>& now, const Inputs<N>&) {
     typename N::Value up[kLevels];
     typename N::Value down[kLevels];
-    for (int m = 0; m < kLevels; ++m) {
+    const bool few = c.used < kLevels;
+    for (int m = 0; m < kLevels && !few; ++m) {
       up[m] = N::clamp(N::scaled(c.per_edge, now.torsion - c.up[m]), N::one());
       down[m] = N::clamp(N::scaled(c.per_edge, now.torsion - c.down[m]), N::one());
     }
-    int at = 0;
-    for (int j = 0; j < kLevels; ++j)
-      for (int k = 0; k <= j; ++k, ++at) {
-        // A regression asks for one relay at a time; on plain numbers a weight of nought stays nought.
-        if constexpr (std::is_same_v<typename N::Gain, double>) {
-          if (c.weight[at] == 0.0) continue;
-        }
-        state.moved[at] = N::between(state.moved[at] + c.initial[at], up[j], down[k]) - c.initial[at];
+    for (int i = 0; i < c.used; ++i) {
+      const int j = c.level_up[i], k = c.level_down[i], at = c.relay[i];
+      if (few) {
+        up[j] = N::clamp(N::scaled(c.per_edge, now.torsion - c.up[j]), N::one());
+        down[k] = N::clamp(N::scaled(c.per_edge, now.torsion - c.down[k]), N::one());
       }
+      state.moved[at] = N::between(state.moved[at] + c.initial[at], up[j], down[k]) - c.initial[at];
+    }
   }
   template <class N>
   static void evaluate(const State<N>& state, const Coefficients<N>& c, const Inputs<N>&, Torques<N>& out) {
-    for (int i = 0; i < kRelays; ++i) out.transmission += c.weight[i] * (state.moved[i] + c.initial[i]);
+    for (int i = 0; i < c.used; ++i) {
+      const int at = c.relay[i];
+      out.transmission += c.weight[at] * (state.moved[at] + c.initial[at]);
+    }
   }
 };
 FLEXSPLINE_EFFECT(38, PreisachHysteresis);

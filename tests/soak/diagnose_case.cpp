@@ -10,6 +10,7 @@
 
 #include "host/diagnosis/add.hpp"
 #include "host/diagnosis/diagnosis.hpp"
+#include "host/diagnosis/trials.hpp"
 #include "host/regression/shapes.hpp"
 #include "tests/support/twin_data.hpp"
 
@@ -19,6 +20,8 @@ namespace {
 using regression::Balance;
 using regression::BalanceData;
 
+// Of a set in which no candidate takes off enough.
+constexpr double kNoScore = -20.0;
 constexpr std::size_t kMostRounds = 4;
 
 std::vector<std::string> split(const std::string& text, char at) {
@@ -166,6 +169,7 @@ Outcome run(const Case& what) {
   const auto start = std::chrono::steady_clock::now();
   const diagnosis::Diagnosis d = diagnosis::diagnose(bench.dataset, bench.base, {});
   outcome.seconds = std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
+  outcome.best_score = kNoScore;
   outcome.verdict = diagnosis::verdict_name(d.verdict);
   for (const auto& n : d.named) outcome.named += (outcome.named.empty() ? "" : "+") + label(n.effect, n.order);
   if (d.named.empty()) outcome.named = "-";
@@ -174,10 +178,8 @@ Outcome run(const Case& what) {
     if (i < 4)
       outcome.detail += fmt::format(" {}({:.1f},{:.2f}%{})", label(c.effect, c.order), c.score, c.chi2_fall_percent,
                                     c.admissible ? "" : ",x");
-    if (c.admissible && (i == 0 || c.score > outcome.best_score)) {
-      outcome.best_score = c.score;
-      outcome.best_fall_percent = c.chi2_fall_percent;
-    }
+    if (c.admissible && c.chi2_fall_percent > diagnosis::kNamedFallPercent)
+      outcome.best_score = std::max(outcome.best_score, c.score);
   }
   const std::vector<std::string> hidden = split(what.hidden, '+');
   if (hidden.empty()) {

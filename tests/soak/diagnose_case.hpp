@@ -37,10 +37,9 @@ struct Outcome {
   double missing_over_noise = 0.0;  // RMS of what the hidden effects add to their balance, over the noise floor
   std::optional<double> holdout_over_floor;  // after the hidden effect was added
   std::vector<Recovered> recovered;
-  double best_score = 0.0;         // of all admissible candidates, named or not
-  double best_fall_percent = 0.0;  // of that candidate
-  std::string detail;              // the first candidates
-  double seconds = 0.0;            // of the diagnosis alone
+  double best_score = 0.0;  // of all candidates that are admissible and take off enough of chi-square, named or not
+  std::string detail;       // the first candidates
+  double seconds = 0.0;     // of the diagnosis alone
 };
 
 // Records the demo's drive, diagnoses it with a model that lacks what is hidden, and, for a single hidden effect of the

@@ -1,0 +1,245 @@
+#include "tests/soak/page.hpp"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <boost/math/distributions/beta.hpp>
+#include <boost/math/distributions/chi_squared.hpp>
+#include <cmath>
+#include <functional>
+#include <map>
+#include <numeric>
+
+#include "host/catalogue/catalogue.hpp"
+#include "tests/soak/campaign.hpp"
+
+namespace flexspline::soak {
+namespace {
+
+// Sets with nothing hidden that may get a name: one in this many; the limit is set for a third of that.
+constexpr double kFalseAlarmTarget = 1.0 / 300.0;
+constexpr double kCalibratedFor = 1.0 / 1000.0;
+
+using Selection = std::vector<const Outcome*>;
+
+Selection select(const std::vector<Outcome>& all, const std::function<bool(const Outcome&)>& which) {
+  Selection some;
+  for (const Outcome& o : all)
+    if (which(o)) some.push_back(&o);
+  return some;
+}
+
+std::size_t count_right(const Selection& some) {
+  return static_cast<std::size_t>(std::count_if(some.begin(), some.end(), [](const Outcome* o) { return o->right; }));
+}
+
+std::string share(std::size_t count, std::size_t total) {
+  if (total == 0) return "-";
+  const Interval i = exact_interval(count, total);
+  return fmt::format("{} of {} ({:.1f} %; {:.1f} to {:.1f})", count, total,
+                     100.0 * static_cast<double>(count) / static_cast<double>(total), 100.0 * i.low, 100.0 * i.high);
+}
+
+bool single(const Outcome& o) {
+  return !o.what.hidden.empty() && o.what.hidden.find('+') == std::string::npos;
+}
+
+// Of an effect of the catalogue; the plant knows others.
+bool listed(const Outcome& o) {
+  return catalogue::find(o.what.hidden.substr(0, o.what.hidden.find_first_of(":+"))) != nullptr;
+}
+
+double quantile(std::vector<double> x, double at) {
+  if (x.empty()) return 0.0;
+  std::sort(x.begin(), x.end());
+  return x[static_cast<std::size_t>(at * static_cast<double>(x.size() - 1))];
+}
+
+std::string false_alarms(const std::vector<Outcome>& all) {
+  std::string text =
+      "## Nothing hidden\n\n| friction from run to run | noise | false names | largest score |\n| --- | --- | --- | "
+      "--- |\n";
+  const auto row = [&](const std::string& friction, const std::string& noise, const Selection& some) {
+    double largest = -1e9;
+    for (const Outcome* o : some) largest = std::max(largest, o->best_score);
+    if (!some.empty())
+      text += fmt::format("| {} | {} | {} | {:.1f} |\n", friction, noise,
+                          share(some.size() - count_right(some), some.size()), largest);
+  };
+  for (const double variation : {0.0, 0.03})
+    for (const double correlation : {0.0, 0.9})
+      row(variation > 0.0 ? "3 %" : "none", correlation > 0.0 ? "coloured (AR(1) of 0.9)" : "white",
+          select(all, [&](const Outcome& o) {
+            return o.what.hidden.empty() && o.what.friction_variation == variation &&
+                   o.what.noise_correlation == correlation;
+          }));
+  row("all", "all", select(all, [](const Outcome& o) { return o.what.hidden.empty(); }));
+  return text + "\nIn brackets: share, and its exact (Clopper and Pearson) 95 % interval.\n\n";
+}
+
+std::string power(const std::vector<Outcome>& all) {
+  std::string text =
+      "## One effect hidden\n\nBy the RMS of what the effect adds and the rest of the model cannot imitate, over the "
+      "RMS of "
+      "the noise.\n\n| missing over noise | named right, friction constant | named right, friction 3 % from run to run "
+      "| a "
+      "wrong name |\n| --- | --- | --- | --- |\n";
+  constexpr double kEdges[] = {0.0, 0.025, 0.05, 0.1, 0.25, 1.0, 1e9};
+  for (std::size_t k = std::size(kEdges) - 1; k-- > 0;) {
+    const auto in = [&](const Outcome& o) {
+      return single(o) && listed(o) && o.missing_over_noise >= kEdges[k] && o.missing_over_noise < kEdges[k + 1];
+    };
+    const Selection constant = select(all, [&](const Outcome& o) { return in(o) && o.what.friction_variation == 0.0; });
+    const Selection varies = select(all, [&](const Outcome& o) { return in(o) && o.what.friction_variation > 0.0; });
+    const Selection both = select(all, in);
+    const auto wrong = static_cast<std::size_t>(
+        std::count_if(both.begin(), both.end(), [](const Outcome* o) { return !o->right && o->named != "-"; }));
+    if (both.empty()) continue;
+    text += fmt::format("| {} | {} | {} | {} |\n",
+                        kEdges[k + 1] > 1e8 ? fmt::format("{:g} and more", kEdges[k])
+                                            : fmt::format("{:g} to {:g}", kEdges[k], kEdges[k + 1]),
+                        share(count_right(constant), constant.size()), share(count_right(varies), varies.size()),
+                        share(wrong, both.size()));
+  }
+  const Selection told = select(all, [](const Outcome& o) {
+    return single(o) && listed(o) && o.named != "-" && o.named.find('+') == std::string::npos;
+  });
+  return text + fmt::format("\nRight when one effect was named: {}.\n\n", share(count_right(told), told.size()));
+}
+
+std::string confusion(const std::vector<Outcome>& all) {
+  std::map<std::string, std::map<std::string, std::size_t>> table;
+  for (const Outcome& o : all)
+    if (!o.what.hidden.empty())
+      ++table[fmt::format("{} x {:g}", o.what.hidden, o.what.scale)][o.right          ? "right"
+                                                                     : o.named == "-" ? o.verdict
+                                                                                      : o.named];
+  std::string text = "## What was named\n\n| hidden, size over its usual one | named |\n| --- | --- |\n";
+  for (const auto& [hidden, names] : table) {
+    std::string list;
+    for (const auto& [name, count] : names)
+      list += fmt::format("{}{}{}", list.empty() ? "" : ", ", name, count > 1 ? fmt::format(" x {}", count) : "");
+    text += fmt::format("| {} | {} |\n", hidden, list);
+  }
+  return text + "\n";
+}
+
+std::string after_adding(const std::vector<Outcome>& all) {
+  std::string text =
+      "## After adding the true effect\n\n| friction from run to run | hold-out error over the floor: median, 95 % of "
+      "drives | "
+      "error of parameters | of shapes | intervals of 95 % that hold the truth |\n| --- | --- | --- | --- | --- |\n";
+  for (const double variation : {0.0, 0.03}) {
+    std::vector<double> holdout, linear, shape;
+    std::size_t covered = 0, intervals = 0;
+    for (const Outcome* o : select(all, [&](const Outcome& c) {
+           return single(c) && listed(c) && c.right && c.what.friction_variation == variation;
+         })) {
+      if (o->holdout_over_floor) holdout.push_back(*o->holdout_over_floor);
+      for (const Recovered& r : o->recovered) {
+        if (o->missing_over_noise >= 0.25) (r.shape ? shape : linear).push_back(std::abs(r.error));
+        covered += r.covered ? 1 : 0;
+        ++intervals;
+      }
+    }
+    text += fmt::format("| {} | {:.3f}, {:.3f} | {:.2f} %, {:.2f} % | {:.2f} %, {:.2f} % | {} |\n",
+                        variation > 0.0 ? "3 %" : "none", quantile(holdout, 0.5), quantile(holdout, 0.95),
+                        100.0 * quantile(linear, 0.5), 100.0 * quantile(linear, 0.95), 100.0 * quantile(shape, 0.5),
+                        100.0 * quantile(shape, 0.95), share(covered, intervals));
+  }
+  return text +
+         "\nOf drives that were named right; errors where the effect is a quarter of the noise or more. The floor is "
+         "the residual of the true model with its nominal parameters, so where friction differs from run to run it "
+         "holds the hold-out records' own deviations.\n\n";
+}
+
+std::string others(const std::vector<Outcome>& all) {
+  const Selection pairs = select(all, [](const Outcome& o) { return o.what.hidden.find('+') != std::string::npos; });
+  const Selection unknown = select(all, [](const Outcome& o) { return !o.what.hidden.empty() && !listed(o); });
+  return fmt::format(
+      "## Two effects hidden\n\nBoth found, and nothing else, by adding what is named until nothing is: {}.\n\n"
+      "## An effect that is in no catalogue\n\nFlagged as unknown or as leaving structure: {}.\n\n",
+      share(count_right(pairs), pairs.size()), share(count_right(unknown), unknown.size()));
+}
+
+}  // namespace
+
+Interval exact_interval(std::size_t count, std::size_t total) {
+  Interval interval;
+  const auto k = static_cast<double>(count), n = static_cast<double>(total);
+  constexpr double kTail = 0.025;
+  if (count > 0) interval.low = boost::math::quantile(boost::math::beta_distribution<double>(k, n - k + 1.0), kTail);
+  if (count < total)
+    interval.high = boost::math::quantile(boost::math::beta_distribution<double>(k + 1.0, n - k), 1.0 - kTail);
+  return interval;
+}
+
+double threshold_from(std::vector<double> scores, double share_passed) {
+  std::sort(scores.begin(), scores.end());
+  const std::size_t tail = std::max<std::size_t>(scores.size() / 10, 1);
+  const double start = scores[scores.size() - tail - 1];
+  double excess = 0.0;
+  for (std::size_t k = scores.size() - tail; k < scores.size(); ++k) excess += scores[k] - start;
+  const double degrees = 2.0 * static_cast<double>(tail);
+  const double scale =
+      2.0 * excess / boost::math::quantile(boost::math::chi_squared_distribution<double>(degrees), 0.05);
+  const double beyond = static_cast<double>(tail) / static_cast<double>(scores.size());
+  return start + scale * std::log(beyond / share_passed);
+}
+
+std::string page_of(const std::vector<Outcome>& all, const std::string& version) {
+  std::uint64_t low = ~0ULL, high = 0;
+  double seconds = 0.0;
+  for (const Outcome& o : all) {
+    low = std::min(low, o.what.seed);
+    high = std::max(high, o.what.seed);
+    seconds += o.seconds;
+  }
+  std::string text = fmt::format(
+      "# Campaign: what the diagnosis names\n\nMade by `./dev soak MINUTES diagnose` of version {}: {} simulated "
+      "drives, "
+      "seeds {} to {} (judging seeds start at {}; those that set the limits end at {}), {:.1f} s each for the "
+      "diagnosis "
+      "beside others.\n\n",
+      version, all.size(), low, high, kFirstJudgingSeed, kLastTuningSeed,
+      all.empty() ? 0.0 : seconds / static_cast<double>(all.size()));
+  return text + false_alarms(all) + power(all) + after_adding(all) + others(all) + confusion(all) +
+         fmt::format(
+             "Targets: false names in at most {:.2f} % of the sets with nothing hidden; named right 100 % from a "
+             "quarter "
+             "of the noise on and 95 % from a tenth; right when named 99 %; hold-out within 1.05 of the floor; "
+             "parameters within 2 %, shapes within 5 %; intervals that hold the truth in 90 to 98 %; both of two "
+             "effects in 97 %; 90 % of unknown ones flagged.\n",
+             100.0 * kFalseAlarmTarget);
+}
+
+std::string threshold_header(const std::vector<Outcome>& all, const std::string& version) {
+  std::vector<double> scores;
+  std::map<std::string, std::vector<double>> by_kind;
+  std::uint64_t low = ~0ULL, high = 0;
+  for (const Outcome& o : all) {
+    if (!o.what.hidden.empty()) continue;
+    scores.push_back(o.best_score);
+    by_kind[fmt::format("friction {:g} %, noise correlation {:g}", 100.0 * o.what.friction_variation,
+                        o.what.noise_correlation)]
+        .push_back(o.best_score);
+    low = std::min(low, o.what.seed);
+    high = std::max(high, o.what.seed);
+  }
+  std::string kinds;
+  for (const auto& [kind, some] : by_kind)
+    kinds += fmt::format("//   {}: {} sets, largest score {:.1f}\n", kind, some.size(), quantile(some, 1.0));
+  return fmt::format(
+      "// Made by `./dev soak MINUTES calibrate`; not written by hand. What a set with nothing hidden scores: the best "
+      "of all\n// candidates that are admissible and take off enough of the chi-square.\n#pragma once\n\nnamespace "
+      "flexspline::diagnosis {{\n\n// From {} sets of the demo's drive and its experiments, seeds {} to {}, version "
+      "{}:\n{}"
+      "// Quantiles of the score: 50 % {:.1f}, 90 % {:.1f}, 99 % {:.1f}. One set in {:.0f} passes the limit, by an "
+      "exponential\n// tail above the 90 % quantile whose scale is taken at its upper 95 % bound.\ninline constexpr "
+      "double "
+      "kNamedScore = {:.1f};\n\n}}  // namespace flexspline::diagnosis\n",
+      scores.size(), low, high, version, kinds, quantile(scores, 0.5), quantile(scores, 0.9), quantile(scores, 0.99),
+      1.0 / kCalibratedFor, threshold_from(scores, kCalibratedFor));
+}
+
+}  // namespace flexspline::soak
