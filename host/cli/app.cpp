@@ -48,6 +48,7 @@ class App {
     add_change<RemoveOptions>("remove", "id of the effect in the model, or its type");
     add_sensitivity();
     add_pack();
+    add_plan();
     add_not_built();
     std::vector<std::string> to_come(not_built_yet().begin(), not_built_yet().end());
     app_.footer(output::wrapped(fmt::format("Not built yet: {}.", output::listed(to_come)), 0) +
@@ -323,6 +324,43 @@ class App {
     unpack->add_option("BLOCK", unpack_options->block, "parameter block")->required()->type_name("");
     unpack->add_option("--out", unpack_options->out, "the model that the block was made from (default: print only)")
         ->type_name("MODEL");
+  }
+
+  void add_plan() {
+    const auto [sub, options] = command<PlanOptions>("plan");
+    sub->add_option("DATA", options->data.data, fmt::format("what there is already: {}", kDataHelp))->type_name("");
+    take_tolerate(sub, options->data);
+    take_model(sub, options->model);
+    sub->add_option("--out", options->out, "the plan")->required()->type_name("PLAN");
+    sub->add_option("--separate", options->separate, "two effects to tell apart (default: what is not well known)")
+        ->delimiter(',')
+        ->expected(2)
+        ->type_name("A,B");
+    const auto limit = [sub = sub](const char* name, std::optional<double>& value, const char* help, const char* unit) {
+      sub->add_option(name, value, help)->check(CLI::PositiveNumber)->type_name(unit);
+    };
+    limit("--current-a", options->current_a, "largest motor current (default: the model's rated one)", "A");
+    limit("--velocity-rad-s", options->velocity_rad_s, "largest motor velocity (default: the model's rated one)",
+          "RAD/S");
+    limit("--travel-rad", options->travel_rad, "travel of the output from end to end (default: one turn)", "RAD");
+    limit("--duration-s", options->duration_s, "of all recordings together (default: 180)", "S");
+    limit("--load-torque-nm", options->load_torque_nm,
+          "constant torque that you can apply to the output (default: what half of the current holds)", "NM");
+    limit("--run-s", options->run_s, "of one recording (default: 8)", "S");
+    limit("--sample-hz", options->sample_hz, "rate of the recording (default: that of DATA, else 1000)", "HZ");
+    sub->add_option("--without", options->without, "what you cannot do: off, locked, load, temperature")
+        ->delimiter(',')
+        ->check(CLI::IsMember({"off", "locked", "load", "temperature"}))
+        ->type_name("WHAT");
+    sub->add_option("--temperatures", options->temperatures_c, "housing cold and warm, degC (default: 25,40)")
+        ->delimiter(',')
+        ->expected(2)
+        ->type_name("COLD,WARM");
+    sub->add_option("--motions", options->motions, "at most so many")
+        ->check(CLI::Range(1, 20))
+        ->capture_default_str()
+        ->type_name("N");
+    take_pipeline(sub, options->pipeline);
   }
 
   void add_not_built() {

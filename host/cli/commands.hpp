@@ -107,6 +107,20 @@ struct DiagnoseOptions {
 };
 int run(const DiagnoseOptions& options, Console& console);
 
+struct PlanOptions {
+  DataInputs data;  // may be none
+  PipelineInputs pipeline;
+  std::filesystem::path model;
+  std::filesystem::path out;
+  std::vector<std::string> separate;  // two effects, or none
+  std::vector<std::string> without;   // off, locked, load, temperature
+  std::vector<double> temperatures_c;
+  std::optional<double> current_a, velocity_rad_s, travel_rad, duration_s, load_torque_nm, run_s, sample_hz;
+  int motions = 4;
+  std::string json;
+};
+int run(const PlanOptions& options, Console& console);
+
 struct ChangeOptions {
   std::string effect;
   DataInputs data;

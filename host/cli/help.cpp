@@ -69,7 +69,8 @@ const std::array kHelp = {
         "data that no other parameter can stand in for. With --out the model is written with the values; its comments "
         "and layout stay. --method iv or oe is for velocities so noisy that least squares finds too little of "
         "everything; --intervals profile or bootstrap for parameters whose uncertainty is not symmetric; --supply for "
-        "what you know another way, as an inertia where the torque constant is open too. --report writes a page with plots for a browser or a printer.",
+        "what you know another way, as an inertia where the torque constant is open too. --report writes a page with "
+        "plots for a browser or a printer.",
         {kMakeData, kIdentify,
          "flexspline identify demo-out --model demo-out/base-model.toml --method oe --supply inertia.inertia=1.04e-4"}},
     CommandHelp{
@@ -136,10 +137,26 @@ const std::array kHelp = {
         "model that it was made from. A damaged block is refused: which entry and field, and why.",
         {kMakeData, kIdentify, "flexspline pack --model fitted.toml --out drive.block",
          "flexspline unpack drive.block --out again.toml"}},
+    CommandHelp{
+        "plan",
+        "designs the motion that separates two effects, or that shows what is not well known",
+        "Rehearses some thirty motions with the model, within the limits of the drive: triangles slow and fast, "
+        "sines, "
+        "saw-teeth, multi-sines, chirps, ladders of speeds, a locked output, a constant load, two temperatures, "
+        "the drive off. With --separate, those are taken in which the true one of two effects beats the other "
+        "by most: its torque that the model with the other cannot imitate, over the noise. Without, those that "
+        "make all parameters known best. Measurements, where given, tell the noise, the sizes of the effects "
+        "and what need not be "
+        "recorded again. Where no motion separates two effects, the answer says so. The plan is a TOML file "
+        "that "
+        "flexspline-hil record --plan runs on the twin.",
+        {kMakeData, kIdentify,
+         "flexspline plan --separate stribeck_gaussian,load_dependent_friction --model fitted.toml --out "
+         "plan.toml"}},
 };
 
 constexpr auto kNotBuilt = std::to_array<std::string_view>(
-    {"plan", "export", "drives", "record", "flash", "backup", "restore", "monitor", "twin", "hil", "workbench"});
+    {"export", "drives", "record", "flash", "backup", "restore", "monitor", "twin", "hil", "workbench"});
 
 }  // namespace
 

@@ -5,6 +5,7 @@
 
 #include "host/comparison/noise_floor.hpp"
 #include "host/comparison/residual_map.hpp"
+#include "host/diagnosis/detectable.hpp"
 #include "host/diagnosis/diagnosis.hpp"
 #include "host/diagnosis/disturbances.hpp"
 #include "host/diagnosis/trials.hpp"
@@ -153,15 +154,18 @@ void name_effects(const Examined& chosen, const std::string& alias, Diagnosis& r
   std::rotate(result.candidates.begin(), first, first + 1);
 }
 
-void list_candidates(const std::vector<Examined>& all, data::Axis axis, Diagnosis& result) {
-  for (const Examined& e : all)
+void list_candidates(std::vector<Examined>& all, data::Axis axis, Diagnosis& result) {
+  for (Examined& e : all) {
+    const Detection detection(e.search);
     for (const Trial& t : e.trials) {
       result.candidates.push_back(report(t, e.search, axis));
+      result.candidates.back().minimum_detectable = detection.smallest(t);
       if (!t.imitated_by.empty())
         result.warnings.push_back(fmt::format(
             "{0} cannot be told from {1} in these data: {1} stands for what both share; {2} would tell them apart",
             t.proposal.entry->name(), t.imitated_by, t.proposal.entry->info->separated_by));
     }
+  }
   std::stable_sort(result.candidates.begin(), result.candidates.end(), [](const Candidate& a, const Candidate& b) {
     return a.admissible != b.admissible ? a.admissible : a.score > b.score;
   });

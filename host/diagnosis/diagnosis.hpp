@@ -18,6 +18,15 @@ struct Named {
   std::optional<double> order;
 };
 
+// The smallest effect that these data, with this model, would have shown.
+struct Detectable {
+  // The smallest value that would be named: of the effect's only size, of the first of several in their usual ratio,
+  // or, as "amplitude", of a wave at the phase that is seen worst. Without std and interval.
+  regression::Estimate size;
+  bool at_most = false;                  // an effect that grows as this falls: a limit that it stays below
+  std::vector<regression::Estimate> at;  // shapes at which that holds
+};
+
 struct Candidate {
   std::string effect;
   std::optional<double> order;
@@ -31,6 +40,7 @@ struct Candidate {
   bool admissible = true;
   std::string why_not;  // where it is not admissible
   std::vector<std::string> rivals;
+  std::optional<Detectable> minimum_detectable;
   std::string note;  // what its values mean, where that is not what the effect's name says
 };
 

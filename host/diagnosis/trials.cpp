@@ -15,8 +15,6 @@ namespace {
 
 using regression::Term;
 
-// A candidate of which the base model can imitate all but this share is one with it in these data.
-constexpr double kOwnShare = 0.003;
 constexpr std::size_t kGridPoints = 6;
 constexpr std::size_t kRefined = 4;  // candidates whose shapes are searched continuously
 

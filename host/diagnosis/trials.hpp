@@ -32,6 +32,8 @@ struct Trial {
 inline constexpr double kRivalMargin = 10.0;
 // The fall of chi-square, in percent, that says that an effect matters, not only that it is there.
 inline constexpr double kNamedFallPercent = 0.5;
+// A candidate of which the model can imitate all but this share is one with it in the data.
+inline constexpr double kOwnShare = 0.003;
 
 // Whether an effect may be named: admissible, certain, and large enough to matter.
 bool passes(const Trial& trial);

@@ -8,9 +8,9 @@
 namespace flexspline::cli_test {
 namespace {
 
-constexpr const char* kBuilt[] = {"demo",     "new",     "check",    "effects", "measure", "identify",
-                                  "simulate", "compare", "diagnose", "add",     "remove",  "sensitivity"};
-constexpr const char* kToCome[] = {"plan",   "pack",    "unpack",  "export", "drives", "record",   "flash",
+constexpr const char* kBuilt[] = {"demo",    "new",      "check", "effects", "measure",     "identify", "simulate",
+                                  "compare", "diagnose", "add",   "remove",  "sensitivity", "plan"};
+constexpr const char* kToCome[] = {"pack",   "unpack",  "export",  "drives", "record", "flash",
                                    "backup", "restore", "monitor", "twin",   "hil",    "workbench"};
 
 std::vector<std::string> example_lines(const std::string& help) {

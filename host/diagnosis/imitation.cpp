@@ -1,0 +1,57 @@
+#include "host/diagnosis/imitation.hpp"
+
+#include <Eigen/QR>
+#include <algorithm>
+
+#include "host/regression/balance_fit.hpp"
+#include "host/regression/shapes.hpp"
+
+namespace flexspline::diagnosis {
+
+using regression::BalanceData;
+using regression::Slot;
+using regression::Terms;
+
+Eigen::VectorXd model_torque(BalanceData& data, const Terms& terms) {
+  const auto on_balance = regression::terms_on(terms, data.balance(), data.prepared().torque_measured);
+  Eigen::VectorXd sum = data.known_torque(terms, on_balance);
+  for (const std::size_t t : on_balance) {
+    if (!terms[t].adds_torque() || terms[t].scaled_by_none()) continue;
+    for (std::size_t p = 0; p < terms[t].values.size(); ++p)
+      if (terms[t].free_linear(p) && terms[t].values[p] != 0.0) sum += terms[t].values[p] * data.column(terms, {t, p});
+  }
+  return sum;
+}
+
+Eigen::MatrixXd model_columns(BalanceData& data, const Terms& terms) {
+  const auto on_balance = regression::terms_on(terms, data.balance(), data.prepared().torque_measured);
+  const std::vector<Slot> linear = regression::free_linear_slots(terms, on_balance);
+  const std::vector<Slot> shapes = regression::free_shape_slots(terms, on_balance);
+  Eigen::MatrixXd X(data.rows(), static_cast<Eigen::Index>(linear.size() + shapes.size() + 1));
+  X << regression::columns_of(data, terms, linear), regression::shape_columns(data, terms, on_balance, shapes),
+      data.delay_column();
+  return X;
+}
+
+Imitation::Imitation(const Eigen::MatrixXd& columns, const Eigen::VectorXd& root_weights)
+    : root_weights_(root_weights) {
+  Eigen::MatrixXd scaled = root_weights.asDiagonal() * columns;
+  for (auto column : scaled.colwise()) column /= std::max(column.norm(), 1e-300);
+  Eigen::ColPivHouseholderQR<Eigen::MatrixXd> qr(scaled);
+  qr.setThreshold(1e-7);
+  span_ = qr.householderQ() * Eigen::MatrixXd::Identity(scaled.rows(), qr.rank());
+}
+
+Eigen::MatrixXd Imitation::own_part(const Eigen::MatrixXd& torques) const {
+  Eigen::MatrixXd left = root_weights_.asDiagonal() * torques;
+  left -= span_ * (span_.transpose() * left);
+  // Rows without weight count for nothing.
+  return (root_weights_.array() > 0.0).select(root_weights_.array(), 1.0).inverse().matrix().asDiagonal() * left;
+}
+
+double Imitation::own_share(const Eigen::VectorXd& torque) const {
+  const double whole = root_weights_.cwiseProduct(torque).norm();
+  return whole > 0.0 ? root_weights_.cwiseProduct(own_part(torque).col(0)).norm() / whole : 0.0;
+}
+
+}  // namespace flexspline::diagnosis

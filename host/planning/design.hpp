@@ -1,0 +1,72 @@
+// Which motions to record next: those that separate two effects, or those that show what data have left open.
+#pragma once
+
+#include <functional>
+#include <optional>
+#include <string>
+#include <string_view>
+#include <vector>
+
+#include "host/data/dataset.hpp"
+#include "host/model/model.hpp"
+#include "host/planning/motions.hpp"
+#include "host/planning/plan.hpp"
+#include "host/planning/rehearsal.hpp"
+#include "host/regression/record.hpp"
+
+namespace flexspline::planning {
+
+struct Question {
+  const model::Model* model = nullptr;
+  const data::Dataset* dataset = nullptr;  // what has been recorded; may be null
+  regression::PipelineOptions pipeline;
+  Setting setting;
+  Sensors sensors;
+  double sample_s = 1e-3;
+  std::size_t most_motions = 4;
+  std::function<void(std::string_view)> progress;  // may be empty
+};
+
+// Limits, gear and what recordings will hold, from the model's [drive] and from the data where there are any. Limits
+// that neither knows are nought: a velocity or current that has to be stated.
+Setting setting_of(const model::Model& model, const data::Dataset* dataset);
+Sensors sensors_of(const data::Dataset* dataset);
+
+// Twice the log likelihood ratio, over the autocorrelation time, by which the true one of two effects is expected to
+// beat the other: the squares of its torque that the model with the other cannot imitate, over the noise.
+struct Separation {
+  double of_first = 0.0;
+  double of_second = 0.0;
+  double worst() const { return of_first < of_second ? of_first : of_second; }
+};
+// Below this two effects are rivals; the diagnosis has the same margin.
+inline constexpr double kTold = 10.0;
+
+// A parameter of the model, with the relative standard deviation that is expected of it.
+struct Precision {
+  std::string id, parameter, unit;
+  double value = 0.0;
+  std::optional<double> percent_before;  // none: not determined at all, or no data
+  std::optional<double> percent_after;
+};
+
+struct Design {
+  Plan plan;
+  std::optional<Separation> before, after;
+  std::vector<Precision> parameters;  // of a plan that excites what is open
+  std::vector<std::string> warnings;
+  // Of each run of the plan, as rehearsed.
+  struct Peak {
+    double current_a = 0.0, velocity_rad_s = 0.0, travel_rad = 0.0;
+  };
+  std::vector<Peak> peaks;
+};
+
+// The model need have values only where there are no data to identify it on. Throws model::ModelError for effects that
+// cannot be added, simulation::ModelIncomplete, data::DataError, PlanError where no motion stays within the limits.
+Design separate(const Question& question, std::string_view first, std::string_view second);
+// D-optimal: each motion in turn is the one that most increases the determinant of the information on all parameters,
+// each relative to its value.
+Design excite(const Question& question);
+
+}  // namespace flexspline::planning

@@ -1,0 +1,144 @@
+#include "host/planning/hypotheses.hpp"
+
+#include <algorithm>
+#include <cmath>
+
+#include "host/diagnosis/add.hpp"
+#include "host/diagnosis/imitation.hpp"
+#include "host/diagnosis/trials.hpp"
+#include "host/regression/shapes.hpp"
+
+namespace flexspline::planning {
+namespace {
+
+using effects::Kind;
+using regression::Balance;
+using regression::Term;
+
+constexpr std::size_t kGridPoints = 7;
+
+Bench::Side* side_of(Bench& bench, Balance balance) {
+  for (Bench::Side& side : bench.sides())
+    if (side.planned->balance() == balance) return &side;
+  return nullptr;
+}
+
+std::vector<double> usual_values(const Term& term) {
+  std::vector<double> usual;
+  for (const auto& info : term.entry->parameters) usual.push_back(info.usual);
+  usual = catalogue::reduced(*term.entry, usual);
+  for (std::size_t p = 0; p < usual.size(); ++p)
+    if (term.known[p]) usual[p] = term.values[p];
+  return usual;
+}
+
+// Shapes that are searched on a grid; the others are moved along their slope.
+std::vector<std::size_t> grid_shapes(const Term& term) {
+  std::vector<std::size_t> list;
+  for (std::size_t p = 0; p < term.values.size(); ++p)
+    if (term.free_shape(p) && !(term.entry->parameters[p].low < 0.0 && term.entry->parameters[p].per.empty()))
+      list.push_back(p);
+  return list;
+}
+
+// The added term's values over its grid: one shape over its range, the others as usual; then a second likewise.
+std::vector<std::vector<double>> grid_of(const BalanceData& data, const Term& term) {
+  const std::vector<double> usual = usual_values(term);
+  std::vector<std::vector<double>> grid{usual};
+  for (const std::size_t p : grid_shapes(term)) {
+    const regression::ShapeRange range = regression::shape_range(data, term, p);
+    for (const double value : regression::shape_grid(range, kGridPoints)) {
+      grid.push_back(usual);
+      grid.back()[p] = value;
+    }
+  }
+  return grid;
+}
+
+bool possible(const Term& term) {
+  const auto& parameters = term.entry->parameters;
+  for (std::size_t p = 0; p < parameters.size(); ++p)
+    if (term.free_linear(p) && (term.values[p] < parameters[p].low || term.values[p] > parameters[p].high))
+      return false;
+  return true;
+}
+
+// A model fitted to what was recorded; shapes of either sign follow their slopes.
+diagnosis::Judged fitted(BalanceData& data, Terms terms) {
+  const Eigen::VectorXd all = Eigen::VectorXd::Ones(data.rows());
+  diagnosis::Judged judged = diagnosis::judge(data, std::move(terms), all);
+  for (int step = 0; step < 2; ++step) {
+    Term& added = judged.terms.back();
+    const auto on_balance = regression::terms_on(judged.terms, data.balance(), data.prepared().torque_measured);
+    const auto shapes = regression::free_shape_slots(judged.terms, on_balance);
+    bool moved = false;
+    for (std::size_t i = 0; i < shapes.size(); ++i) {
+      const auto& info = added.entry->parameters[shapes[i].parameter];
+      if (shapes[i].term + 1 != judged.terms.size() || !(info.low < 0.0 && info.per.empty())) continue;
+      double& value = added.values[shapes[i].parameter];
+      value =
+          std::clamp(value + judged.theta[static_cast<Eigen::Index>(judged.linear.size() + i)], info.low, info.high);
+      moved = true;
+    }
+    if (!moved) break;
+    judged = diagnosis::judge(data, judged.terms, all);
+  }
+  return judged;
+}
+
+}  // namespace
+
+Terms without(const Terms& terms, std::string_view effect) {
+  const diagnosis::EffectName name = diagnosis::parse_effect(effect);
+  const std::string label = regression::candidate_term(*name.entry, name.order).label();
+  Terms left;
+  for (const Term& t : terms)
+    if (t.label() != label) left.push_back(t);
+  return left;
+}
+
+Contender contender(Bench& bench, Layout& layout, const Terms& model, std::string_view effect) {
+  const diagnosis::EffectName name = diagnosis::parse_effect(effect);
+  Contender c;
+  c.label = std::string(effect);
+  Terms base = diagnosis::extend(model, *name.entry, name.order);
+  Bench::Side* side = side_of(bench, name.entry->told_by());
+  if (!side) side = side_of(bench, Balance::motor);
+  if (side) regression::settle_grids(*side->planned, base, {base.size() - 1});
+
+  Terms truth = base;
+  truth.back().values = usual_values(truth.back());
+  for (const Term& t : bench.terms())
+    if (t.label() == truth.back().label()) truth.back().values = t.values;
+  std::vector<Terms> variants;
+  const std::vector<std::vector<double>> grid =
+      side ? grid_of(*side->planned, base.back()) : std::vector<std::vector<double>>{truth.back().values};
+  double least = 1e300;
+  for (const std::vector<double>& values : grid) {
+    Terms terms = base;
+    terms.back().values = values;
+    if (!side || !side->recorded) {
+      variants.push_back(terms);
+      continue;
+    }
+    const diagnosis::Judged judged = fitted(*side->recorded, terms);
+    if (const double rmse = judged.rmse(); rmse < least) {
+      least = rmse;
+      const Eigen::VectorXd torque =
+          diagnosis::model_torque(*side->recorded, judged.terms) - diagnosis::model_torque(*side->recorded, model);
+      const diagnosis::Imitation imitation(diagnosis::model_columns(*side->recorded, model),
+                                           Eigen::VectorXd::Ones(side->recorded->rows()));
+      const double noise = rmse * rmse * judged.autocorrelation_time;
+      side->noise = std::min(side->noise, noise);
+      c.seen = possible(judged.terms.back()) &&
+               imitation.own_part(torque).col(0).squaredNorm() / noise > diagnosis::kNamedScore;
+      if (c.seen) truth = judged.terms;
+    }
+    variants.push_back(judged.terms);
+  }
+  c.truth = layout.add(std::move(truth));
+  for (Terms& terms : variants) c.variants.push_back(layout.add(std::move(terms)));
+  return c;
+}
+
+}  // namespace flexspline::planning

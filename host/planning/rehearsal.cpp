@@ -1,0 +1,116 @@
+#include "host/planning/rehearsal.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+#include <numbers>
+
+#include "host/catalogue/constants.hpp"
+#include "host/simulation/dynamics.hpp"
+
+namespace flexspline::planning {
+namespace {
+
+using data::Column;
+using simulation::Coupling;
+using simulation::Forcing;
+
+constexpr double kStep_s = 1.0 / 4000.0;
+// Of the velocity loop, in turns of phase a sample: a tenth of what a sampled loop could have at most.
+constexpr double kBandwidth = 0.02;
+
+double steps_of(double position, double counts) {
+  const double step = 2.0 * std::numbers::pi / counts;
+  return std::floor(position / step + 0.5) * step;
+}
+
+double sensor_offset(const model::Model& model) {
+  const model::Effect* offset = model.find("current_offset");
+  return offset && !offset->parameters.empty() ? offset->parameters.front().value.value_or(0.0) : 0.0;
+}
+
+}  // namespace
+
+Rehearsal rehearse(const model::Model& model, const Run& run, double sample_s, const Limits& limits,
+                   const Sensors& sensors) {
+  catalogue::DriveConstants<double> constants = catalogue::constants_of(model.drive);
+  if (!sensors.current) constants.torque_constant = 1.0;
+  const simulation::Balances balances(model, constants);
+  const double inertia = balances.motor_inertia() +
+                         (run.locked ? 0.0 : balances.output_inertia() / (constants.gear_ratio * constants.gear_ratio));
+  const bool two_masses = balances.has_transmission() && balances.output_inertia() > 0.0;
+  const Coupling coupling = run.locked ? Coupling::locked_output : two_masses ? Coupling::two_masses : Coupling::rigid;
+  Rehearsal result;
+  data::Experiment& e = result.experiment;
+  e.name = run.name;
+  e.load = run.locked ? data::Load::locked : data::Load::free;
+  e.current_hold_stated = true;
+  e.sample_s = sample_s;
+  e.motor_position_zero = e.output_position_zero = data::PositionZero::absolute;
+  if (sensors.motor_counts > 0.0) e.encoder_counts = sensors.motor_counts;
+  if (sensors.output_counts > 0.0) e.output_encoder_counts = sensors.output_counts;
+
+  simulation::Dynamics dynamics(simulation::Balances(model, constants), constants, coupling);
+  const double offset = sensor_offset(model);
+  const double temperature = run.temperature_c.value_or(constants.reference_temperature);
+  // Gains of a loop on an inertia: proportional for its bandwidth, integral a quarter of that lower.
+  const double bandwidth = 2.0 * std::numbers::pi * kBandwidth / sample_s;
+  const double proportional = bandwidth * inertia / constants.torque_constant;
+  const double integral = 0.25 * bandwidth * proportional;
+  const double limit = limits.current_a;
+  const std::vector<double> wanted = set_points(run, sample_s);
+  const int steps = std::max(1, static_cast<int>(std::ceil(sample_s / kStep_s - 1e-6)));
+  double integrated = 0.0, low = 0.0, high = 0.0;
+  std::size_t clipped = 0;
+  const auto effort_column = sensors.current ? Column::current : Column::motor_torque;
+  bool started = false;
+  for (std::size_t k = 0; k < wanted.size(); ++k) {
+    const simulation::State& s = dynamics.state();
+    double current = 0.0;
+    if (run.mode == Mode::current) current = std::clamp(wanted[k], -limit, limit);
+    if (run.mode == Mode::velocity) {
+      const double error = wanted[k] - s.motor_velocity;
+      const double next = integrated + integral * error * sample_s;
+      const double asked = proportional * error + next;
+      current = std::clamp(asked, -limit, limit);
+      if (current == asked || (asked > current) != (error > 0.0)) integrated = next;
+      clipped += current != asked;
+    }
+    // A drive that is off reads its offset; one that is on controls its biased reading.
+    if (run.mode == Mode::off) current = offset;
+    Forcing forcing;
+    forcing.current = current;
+    forcing.effort = current * constants.torque_constant;
+    forcing.temperature = temperature;
+    forcing.load_torque = run.load_torque_nm;
+    if (!started) dynamics.start({}, forcing, true, std::numeric_limits<double>::infinity(), 0.0);
+    started = true;
+    e.time_s.push_back(static_cast<double>(k) * sample_s);
+    e[effort_column].push_back(current);
+    e[Column::motor_position].push_back(sensors.motor_counts > 0.0 ? steps_of(s.motor_position, sensors.motor_counts)
+                                                                   : s.motor_position);
+    const double output = two_masses || run.locked ? s.output_position : s.motor_position / constants.gear_ratio;
+    if (sensors.output_position)
+      e[Column::output_position].push_back(sensors.output_counts > 0.0 ? steps_of(output, sensors.output_counts)
+                                                                       : output);
+    if (sensors.torque) e[Column::torque].push_back(dynamics.torque());
+    if (sensors.temperature) e[Column::temperature].push_back(temperature);
+    if (run.load_torque_nm != 0.0) e[Column::load_torque].push_back(run.load_torque_nm);
+    result.peak_current_a = std::max(result.peak_current_a, std::abs(current));
+    result.peak_velocity_rad_s = std::max(result.peak_velocity_rad_s, std::abs(s.motor_velocity));
+    low = std::min(low, output);
+    high = std::max(high, output);
+    for (int n = 0; n < steps; ++n) dynamics.step(forcing, forcing, sample_s / steps);
+    if (!std::isfinite(dynamics.state().motor_velocity) || std::abs(dynamics.state().motor_velocity) > 1e9) {
+      result.diverged = true;
+      break;
+    }
+  }
+  result.travel_rad = high - low;
+  result.clipped_share = wanted.empty() ? 0.0 : static_cast<double>(clipped) / static_cast<double>(wanted.size());
+  e.segments = {{0, e.time_s.size()}};
+  e.masked.assign(e.time_s.size(), 0);
+  return result;
+}
+
+}  // namespace flexspline::planning
