@@ -24,6 +24,7 @@ namespace plant = flexspline::plant;
 struct RecordOptions {
   std::string out;
   std::string plant_file;
+  std::string plan;
   std::string hide;
   std::vector<std::string> with;
   std::vector<std::string> parts;
@@ -58,6 +59,9 @@ void record(const RecordOptions& options) {
     drive.sensors.tachometer.correlation = options.noise_correlation;
   }
   if (options.tachometer) drive.sensors.has_tachometer = true;
+  if (!options.plan.empty()) file.experiments = plant::load_plan(options.plan, drive);
+  if (file.experiments.empty() && !options.plan.empty())
+    throw std::runtime_error(options.plan + ": the plan has no [[run]]: there is nothing to record");
   if (file.experiments.empty()) throw std::runtime_error("the plant file has no [[experiment]]; add one to record");
   require_empty(options);
   plant::write_dataset(plant::record_all(drive, file.experiments, options.seed), drive, options.out);
@@ -93,6 +97,9 @@ int main(int argc, char** argv) {
       app.add_subcommand("record", "simulates the experiments of a plant file and writes a data set");
   record_command->add_option("--out", options.out, "folder to write into")->required();
   record_command->add_option("--plant", options.plant_file, "plant file (default: the demo's drive, built in)");
+  record_command->add_option(
+      "--plan", options.plan,
+      "runs of a plan that `flexspline plan` wrote, in the place of the plant file's experiments");
   record_command->add_option("--hide", options.hide, "effect that the base model does not name, as torque_ripple:2");
   record_command->add_option("--scale", options.scale, "size of the hidden effect, 1 = usual")->needs("--hide");
   record_command->add_option("--with", options.with, "effects that the drive has and the base model names, A,B")

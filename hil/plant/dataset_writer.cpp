@@ -42,14 +42,15 @@ Text csv(const Record& record, const Drive& drive) {
   line(text, "# noise_std_output_position_rad: {}", record.output_position_noise_std);
   line(text, "# noise_std_temperature_c: {}", record.temperature_noise_std);
   if (tachometer) line(text, "# noise_std_motor_velocity_rad_s: {}", record.tachometer_noise_std);
-  line(text, "time_s,current_a,motor_position_rad,output_position_rad,torque_nm,temperature_c,{}{}",
-       record.velocity_mode ? "velocity_command_rad_s" : "current_command_a",
-       tachometer ? ",motor_velocity_rad_s" : "");
+  line(text, "time_s,current_a,motor_position_rad,output_position_rad,torque_nm,temperature_c,{}{}{}",
+       record.velocity_mode ? "velocity_command_rad_s" : "current_command_a", tachometer ? ",motor_velocity_rad_s" : "",
+       record.load_torque_nm.empty() ? "" : ",load_torque_nm");
   for (std::size_t k = 0; k < record.time_s.size(); ++k) {
     fmt::format_to(std::back_inserter(text), "{:.9g},{:.7g},{:.10g},{:.10g},{:.7g},{:.6g},{:.7g}", record.time_s[k],
                    record.current_a[k], record.motor_position_rad[k], record.output_position_rad[k],
                    record.torque_nm[k], record.temperature_c[k], record.command[k]);
     if (tachometer) fmt::format_to(std::back_inserter(text), ",{:.7g}", record.motor_velocity_rad_s[k]);
+    if (!record.load_torque_nm.empty()) fmt::format_to(std::back_inserter(text), ",{:.7g}", record.load_torque_nm[k]);
     text.push_back('\n');
   }
   return text;

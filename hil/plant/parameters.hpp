@@ -85,7 +85,25 @@ struct Drive {
 };
 
 enum class Mode { off, current, velocity };
-enum class Waveform { zero, sine, asymmetric_sine, triangle, trapezoid, square, composite };
+enum class Waveform {
+  zero,
+  sine,
+  asymmetric_sine,
+  triangle,
+  trapezoid,
+  square,
+  composite,
+  saw_tooth,
+  inverted_sine,
+  multi_sine
+};
+
+/// One line of a multi-sine: sin of `harmonic` times the cycle's phase and `phase_turns` more.
+struct Line {
+  int harmonic = 1;
+  double phase_turns = 0.0;
+  double weight = 1.0;
+};
 
 /// One motion to record. The amplitude is in ampere (Mode::current) or motor rad/s (Mode::velocity).
 struct ExperimentPlan {
@@ -100,6 +118,13 @@ struct ExperimentPlan {
   double temperature_c = 30.0;      ///< at the start
   double temperature_rise_c = 0.0;  ///< until the end of the record
   double start_output_rad = 0.0;
+  /// Of runs of a plan.
+  double offset = 0.0;
+  double end_frequency_hz = -1.0;  ///< of a linear chirp; below zero: none
+  std::vector<Line> lines;         ///< of a multi-sine
+  double slope_limit = 0.0;        ///< of the set point, per second; zero: none
+  bool fades_out = false;
+  double load_torque_nm = 0.0;  ///< on the output, positive resists
 };
 
 struct PlantFile {
@@ -113,6 +138,11 @@ PlantFile load_plant(const std::filesystem::path& file);
 PlantFile parse_plant(std::string_view text, std::string_view origin);
 /// The drive and the experiments of the demo, which are built in.
 PlantFile demo_plant();
+
+/// The runs of a plan that `flexspline plan` wrote ("flexspline-plan/1"), for `drive`, at the plan's sample time, which
+/// is put into the drive, as is a current limit that is lower than the drive's. Throws std::runtime_error with file,
+/// line and cause, also for what the plant cannot do: position control.
+std::vector<ExperimentPlan> load_plan(const std::filesystem::path& file, Drive& drive);
 
 /// Makes `effect` (a type, or "torque_ripple:7" for an order) present at `scale` times its size and hides it: the base
 /// model does not name it. Throws std::invalid_argument where the drive's file does not know the effect.

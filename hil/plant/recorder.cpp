@@ -155,16 +155,19 @@ Record record_one(const Drive& drive, const ExperimentPlan& plan, std::uint64_t 
   const double offset = errors.current_offset_a;
   const auto samples = static_cast<std::size_t>(std::llround(plan.duration_s / drive.sample_s));
   Record::Truth& truth = record.truth;
+  const std::vector<double> set_points = commands(plan, drive.sample_s);
+  if (plan.load_torque_nm != 0.0) record.load_torque_nm.assign(samples, plan.load_torque_nm);
   for (std::size_t k = 0; k < samples; ++k) {
     const double time = static_cast<double>(k) * drive.sample_s;
     const State& state = plant.state();
-    const double set_point = command(plan, time);
+    const double set_point = set_points[k];
     double held = 0.0;
     if (plan.mode == Mode::current) held = std::clamp(set_point, -drive.current_limit_a, drive.current_limit_a);
     if (plan.mode == Mode::velocity) held = controller.update(set_point, state.motor_velocity);
     Inputs inputs;
     // A drive that is on makes its (biased) reading follow the command.
     inputs.current_a = plan.mode == Mode::off ? 0.0 : held - offset;
+    inputs.load_torque_nm = plan.load_torque_nm;
     inputs.temperature_c = plan.temperature_c + plan.temperature_rise_c * time / plan.duration_s;
 
     record.time_s.push_back(time);

@@ -23,6 +23,7 @@ struct Record {
   std::vector<double> output_position_rad;
   std::vector<double> torque_nm;
   std::vector<double> temperature_c;
+  std::vector<double> load_torque_nm;        ///< applied from outside; empty where there was none
   std::vector<double> motor_velocity_rad_s;  ///< the tachometer's; empty where there is none
   std::vector<double> command;               ///< set point: motor rad/s in velocity mode, else A
   bool velocity_mode = false;

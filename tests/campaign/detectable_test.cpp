@@ -83,7 +83,7 @@ TEST(Detectable, EffectsHalfAsLargeAgainAreNamedAndAThirdOfThemAreNot) {
       "viscous_asymmetry", "coulomb_asymmetry", "stribeck_gaussian", "load_dependent_friction",   "power_law_friction",
       "gravity",           "current_offset",    "torque_ripple:2",   "temperature_viscous",       "temperature_coulomb",
       "cubic_stiffness",   "backlash",          "quadratic_drag",    "torque_constant_saturation"};
-  constexpr int kSeeds = 3;
+  constexpr int kSeeds = 2;
   std::vector<Shown> all(labels.size());
   std::atomic<std::size_t> next{0};
   const auto work = [&] {

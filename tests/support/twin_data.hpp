@@ -27,6 +27,7 @@ inline data::Experiment experiment_of(const plant::Record& record, const plant::
   e[Column::output_position] = record.output_position_rad;
   e[Column::torque] = record.torque_nm;
   e[Column::temperature] = record.temperature_c;
+  e[Column::load_torque] = record.load_torque_nm;
   e.noise_std[static_cast<std::size_t>(Column::current)] = record.current_noise_std;
   e.noise_std[static_cast<std::size_t>(Column::torque)] = record.torque_noise_std;
   e.segments = {{0, e.time_s.size()}};
