@@ -15,6 +15,7 @@
 #include "host/comparison/score.hpp"
 #include "host/regression/balance_fit.hpp"
 #include "host/regression/identify.hpp"
+#include "host/regression/record_constants.hpp"
 #include "host/simulation/simulation.hpp"
 
 namespace flexspline::comparison {
@@ -74,7 +75,10 @@ class Comparer {
       if (balance != Balance::motor && !prepared_.torque_measured) continue;
       if (regression::terms_on(terms_, balance, prepared_.torque_measured).empty()) continue;
       BalanceData data(prepared_, balance);
-      if (!data.empty()) inverse(data);
+      if (data.empty()) continue;
+      if (regression::settle_record_constants(prepared_, data, terms_, {}, Eigen::VectorXd::Ones(data.rows())))
+        data = BalanceData(prepared_, balance);
+      inverse(data);
     }
     if (result_.experiments.empty() || together_.empty())
       throw data::DataError({{data::Severity::error, "missing_column", "", 0, "",

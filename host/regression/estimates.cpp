@@ -212,7 +212,19 @@ void assemble(Identification& result) {
         ++at;
       }
     fit_by_experiment(data, fit, result.terms, result.estimates, first);
-    for (std::size_t j = first; j < result.estimates.size(); ++j) summarise(result.estimates[j]);
+    for (std::size_t j = first; j < result.estimates.size(); ++j) {
+      Estimate& e = result.estimates[j];
+      const bool per_record = result.terms[e.slot.term].entry->parameters[e.slot.parameter].per_record;
+      if (per_record)
+        for (const RowRange& range : data.records()) {
+          const Record& record = result.prepared.records[range.record];
+          e.per_experiment.emplace_back(record.name, e.value + record.torsion_zero_rad);
+        }
+      summarise(e);
+      // It is meant to differ.
+      if (per_record) e.spread_percent.reset();
+      if (per_record) e.reliable = true;
+    }
     for (const Slot& slot : held) result.estimates.push_back(estimate_of(result.terms, slot, axis));
     for (const std::size_t t : fit.on_balance) touched[t] = 1;
     result.condition_number = std::max(result.condition_number, fit.condition_number);

@@ -8,6 +8,8 @@
 #include <map>
 #include <tuple>
 
+#include "host/regression/record_constants.hpp"
+
 namespace flexspline::regression {
 namespace {
 
@@ -130,7 +132,24 @@ std::unique_ptr<Identification> form(const data::Dataset& dataset, const model::
 }
 
 void fit(Identification& result) {
+  constexpr int kRounds = 3;
+  const std::vector<std::string> warnings = result.warnings;
   result.held = fit_all(result, result.model.drive.axis);
+  if (record_constants(result.terms).empty()) return;
+  for (int round = 0; round < kRounds; ++round) {
+    bool moved = false;
+    for (std::size_t b = 0; b < result.data.size(); ++b) {
+      const BalanceFit& found = result.fits[b];
+      std::vector<Slot> beside = found.linear;
+      beside.insert(beside.end(), found.shapes.begin(), found.shapes.end());
+      moved =
+          settle_record_constants(result.prepared, result.data[b], result.terms, beside, found.root_weights) || moved;
+    }
+    if (!moved) return;
+    for (BalanceData& data : result.data) data = BalanceData(result.prepared, data.balance());
+    result.warnings = warnings;
+    result.held = fit_all(result, result.model.drive.axis);
+  }
 }
 
 std::unique_ptr<Identification> identify(const data::Dataset& dataset, const model::Model& model,

@@ -51,6 +51,7 @@ struct Record {
   std::vector<double> effort;  // motor torque (or force), aligned to the instants of the positions; empty: not measured
   std::vector<double> torque;  // as measured
   std::vector<double> load_torque;
+  double torsion_zero_rad = 0.0;  // by how much the torsion was moved, see record_constants.hpp
   bool has_motor_motion = false;
   bool has_output_motion = false;  // measured, or locked
   bool has_temperature = false;

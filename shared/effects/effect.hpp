@@ -88,6 +88,7 @@ struct ParameterInfo {
   std::string_view per{};
   std::string_view root_of{};
   double share_of_range = 1.0;  // of the largest torsion, for kind grid
+  bool per_record = false;      // a constant of each recording; the model holds what they have in common
 };
 
 struct Description {

@@ -20,7 +20,12 @@ struct TorsionZero : Stateless {
       .separated_by = "locked load with a torque far from zero, or positions that are referenced",
   };
   static constexpr ParameterInfo kParameters[] = {
-      {.name = "angle", .unit = units::kAngle, .kind = Kind::shape, .usual = 1e-4, .limit = Limit::torsion},
+      {.name = "angle",
+       .unit = units::kAngle,
+       .kind = Kind::shape,
+       .usual = 1e-4,
+       .limit = Limit::torsion,
+       .per_record = true},
   };
   template <class N>
   struct Coefficients {
