@@ -187,6 +187,62 @@ Judged judge(BalanceData& data, Terms terms, const Eigen::VectorXd& keep) {
   return judged;
 }
 
+namespace {
+
+// Standard deviations of `judged` for the groups of another model, by name; a group that it does not have has none.
+SmallVector spread_for(const std::vector<Group>& groups, const Judged& judged) {
+  SmallVector std = SmallVector::Zero(static_cast<Eigen::Index>(groups.size()));
+  for (std::size_t g = 0; g < groups.size(); ++g)
+    for (std::size_t k = 0; k < judged.groups.size(); ++k)
+      if (judged.groups[k].name == groups[g].name)
+        std[static_cast<Eigen::Index>(g)] = judged.deviations.std[static_cast<Eigen::Index>(k)];
+  return std;
+}
+
+}  // namespace
+
+regression::Whitening whitening_of(BalanceData& data, const Judged& judged) {
+  regression::Whitening whitening(judged.root_weights);
+  if (judged.groups.empty() || judged.deviations.std.maxCoeff() <= 0.0) return whitening;
+  const Eigen::MatrixXd X = regression::columns_of(data, judged.terms, judged.linear);
+  const Eigen::VectorXd theta = judged.theta.head(X.cols());
+  const Eigen::MatrixXd along = judged.root_weights.asDiagonal() * (X * directions(judged.groups, theta)) *
+                                judged.deviations.std.asDiagonal() / std::sqrt(judged.autocorrelation_time);
+  for (const RowRange& range : data.records()) whitening.vary(range, along.middleRows(range.first, range.size()));
+  return whitening;
+}
+
+double squares_left(BalanceData& data, const Terms& terms, const Judged& judged) {
+  const auto on_balance = regression::terms_on(terms, data.balance(), data.prepared().torque_measured);
+  const auto linear = regression::free_linear_slots(terms, on_balance);
+  const Eigen::VectorXd keep = (judged.root_weights.array() > 0.0).cast<double>();
+  const Triangles triangles = triangles_of(data, regression::columns_of(data, terms, linear),
+                                           data.target() - data.known_torque(terms, on_balance), keep, 1);
+  const std::vector<Group> groups = friction_groups(terms, linear);
+  const Eigen::Index columns = triangles.columns();
+  SmallVector std = SmallVector::Zero(static_cast<Eigen::Index>(groups.size()));
+  Eigen::VectorXd theta = Eigen::VectorXd::Zero(columns);
+  double left = 0.0;
+  // The groups' torques come from a fit without deviations.
+  for (int round = 0; round < 2; ++round) {
+    const Eigen::MatrixXd u = directions(groups, theta);
+    std::vector<Eigen::MatrixXd> reduced;
+    std::vector<const Eigen::MatrixXd*> blocks;
+    for (std::size_t i = 0; i < triangles.whole.size(); ++i)
+      reduced.push_back(
+          without_deviations(triangles.whole[i], u, std, judged.deviations.variance[i] * judged.autocorrelation_time));
+    for (const Eigen::MatrixXd& r : reduced) blocks.push_back(&r);
+    const Eigen::MatrixXd all = stacked(blocks);
+    if (columns > 0)
+      theta =
+          Eigen::ColPivHouseholderQR<Eigen::MatrixXd>(all.leftCols(columns)).setThreshold(1e-7).solve(all.col(columns));
+    left = (all.col(columns) - all.leftCols(columns) * theta).squaredNorm();
+    std = spread_for(groups, judged);
+    if (groups.empty() || std.maxCoeff() <= 0.0) break;
+  }
+  return left;
+}
+
 Fall fall_of(const Judged& base, const Judged& extended, double added) {
   const double tau = std::max(1.0, std::min(base.autocorrelation_time, extended.autocorrelation_time));
   const double least = least_of(raw_variances(extended.left_out));

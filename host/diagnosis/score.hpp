@@ -7,6 +7,7 @@
 
 #include "host/diagnosis/deviations.hpp"
 #include "host/regression/balance_data.hpp"
+#include "host/regression/whitening.hpp"
 
 namespace flexspline::diagnosis {
 
@@ -35,6 +36,12 @@ struct Judged {
 
 // Fits and judges `terms` on `data`. `keep` holds one a row, or nought for rows that must not count.
 Judged judge(BalanceData& data, Terms terms, const Eigen::VectorXd& keep);
+
+// What makes the errors of a judged model alike and independent, its records' deviations among them.
+regression::Whitening whitening_of(BalanceData& data, const Judged& judged);
+// Whitened squares that `terms` leave after their best linear fit, with noise and spread as `judged` has them: enough
+// to choose a shape on a grid.
+double squares_left(BalanceData& data, const Terms& terms, const Judged& judged);
 
 struct Fall {
   double score =

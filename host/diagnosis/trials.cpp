@@ -16,17 +16,9 @@ namespace {
 using regression::Term;
 
 constexpr std::size_t kGridPoints = 6;
+// Relative change of the squares that ends the search: well below one by score.
+constexpr double kSameSquares = 1e-5;
 constexpr std::size_t kRefined = 4;  // candidates whose shapes are searched continuously
-
-// Squares left after the best linear fit, with the base's weights: enough to choose a shape on a grid.
-double in_sample(BalanceData& data, const Terms& terms, const Judged& base) {
-  const auto on_balance = regression::terms_on(terms, data.balance(), data.prepared().torque_measured);
-  const auto linear = regression::free_linear_slots(terms, on_balance);
-  const Eigen::MatrixXd X = regression::columns_of(data, terms, linear);
-  const regression::LinearFit fit =
-      regression::least_squares(X, data.target() - data.known_torque(terms, on_balance), base.root_weights);
-  return base.root_weights.cwiseProduct(fit.residual).squaredNorm();
-}
 
 void choose_shapes(Search& search, Proposal& proposal) {
   Term& added = proposal.extended.back();
@@ -35,7 +27,7 @@ void choose_shapes(Search& search, Proposal& proposal) {
     double best = added.values[p], least = std::numeric_limits<double>::infinity();
     for (const double value : regression::shape_grid(regression::shape_range(*search.data, added, p), kGridPoints)) {
       added.values[p] = value;
-      const double squares = in_sample(*search.data, proposal.extended, search.base);
+      const double squares = squares_left(*search.data, proposal.extended, search.base);
       if (squares < least) {
         least = squares;
         best = value;
@@ -211,7 +203,7 @@ std::vector<Trial> rank(Search& search) {
     Proposal refined = trial.proposal;
     refined.extended = trial.judged.terms;
     const auto on_balance = regression::terms_on(refined.extended, data.balance(), data.prepared().torque_measured);
-    regression::refine_shapes(data, refined.extended, on_balance, trial.judged.root_weights);
+    regression::refine_shapes(data, refined.extended, on_balance, whitening_of(data, trial.judged), kSameSquares);
     Trial again = evaluate(own, std::move(refined));
     if (better(again, trial) || !trial.admissible) trial = std::move(again);
   });

@@ -83,17 +83,17 @@ struct ScaledColumns {
   Eigen::MatrixXd A;
   Eigen::VectorXd size;
 };
-ScaledColumns scaled_columns(const Eigen::MatrixXd& X, const Eigen::VectorXd& root_weights) {
-  ScaledColumns s{root_weights.asDiagonal() * X, {}};
+ScaledColumns scaled_columns(const Eigen::MatrixXd& X, const Whitening& whitening) {
+  ScaledColumns s{whitening * X, {}};
   s.size = s.A.colwise().norm().transpose().array().max(1e-300);
   s.A *= s.size.cwiseInverse().asDiagonal();
   return s;
 }
 
 // The sum over rows of weighted squares after the best linear parameters.
-double projected_cost(const Eigen::MatrixXd& X, const Eigen::VectorXd& y, const Eigen::VectorXd& root_weights) {
-  const Eigen::MatrixXd A = scaled_columns(X, root_weights).A;
-  const Eigen::VectorXd b = root_weights.cwiseProduct(y);
+double projected_cost(const Eigen::MatrixXd& X, const Eigen::VectorXd& y, const Whitening& whitening) {
+  const Eigen::MatrixXd A = scaled_columns(X, whitening).A;
+  const Eigen::VectorXd b = whitening * y;
   const Eigen::ColPivHouseholderQR<Eigen::MatrixXd> qr(A);
   return (b - A * qr.solve(b)).squaredNorm();
 }
@@ -103,14 +103,14 @@ class ProjectedResidual final : public ceres::CostFunction {
  public:
   ProjectedResidual(BalanceData& data, Terms& terms, const std::vector<std::size_t>& on_balance,
                     const std::vector<Slot>& linear, const std::vector<Slot>& shapes,
-                    const std::vector<ShapeRange>& ranges, const Eigen::VectorXd& root_weights)
+                    const std::vector<ShapeRange>& ranges, const Whitening& whitening)
       : data_(data),
         terms_(terms),
         on_balance_(on_balance),
         linear_(linear),
         shapes_(shapes),
         ranges_(ranges),
-        root_weights_(root_weights) {
+        whitening_(whitening) {
     set_num_residuals(static_cast<int>(data.rows()));
     mutable_parameter_block_sizes()->push_back(static_cast<int>(shapes.size()));
   }
@@ -118,8 +118,8 @@ class ProjectedResidual final : public ceres::CostFunction {
   bool Evaluate(double const* const* parameters, double* residuals, double** jacobians) const override {
     for (std::size_t j = 0; j < shapes_.size(); ++j)
       terms_[shapes_[j].term].values[shapes_[j].parameter] = ranges_[j].at(parameters[0][j]);
-    const auto [A, size] = scaled_columns(columns_of(data_, terms_, linear_), root_weights_);
-    const Eigen::VectorXd b = root_weights_.cwiseProduct(data_.target() - data_.known_torque(terms_, on_balance_));
+    const auto [A, size] = scaled_columns(columns_of(data_, terms_, linear_), whitening_);
+    const Eigen::VectorXd b = whitening_ * (data_.target() - data_.known_torque(terms_, on_balance_));
     const Eigen::ColPivHouseholderQR<Eigen::MatrixXd> qr(A);
     const Eigen::VectorXd theta = qr.solve(b);
     Eigen::Map<Eigen::VectorXd>(residuals, b.size()) = b - A * theta;
@@ -133,8 +133,7 @@ class ProjectedResidual final : public ceres::CostFunction {
     for (std::size_t j = 0; j < shapes_.size(); ++j) {
       const double per_share =
           (ranges_[j].at(parameters[0][j] + kStep) - ranges_[j].at(parameters[0][j] - kStep)) / (2.0 * kStep);
-      const Eigen::VectorXd slope =
-          root_weights_.cwiseProduct(data_.shape_column(terms_, on_balance_, shapes_[j])) * per_share;
+      const Eigen::VectorXd slope = (whitening_ * data_.shape_column(terms_, on_balance_, shapes_[j])) * per_share;
       jacobian.col(static_cast<Eigen::Index>(j)) = -(slope - A * qr.solve(slope));
     }
     return true;
@@ -147,7 +146,7 @@ class ProjectedResidual final : public ceres::CostFunction {
   const std::vector<Slot>& linear_;
   const std::vector<Slot>& shapes_;
   const std::vector<ShapeRange>& ranges_;
-  const Eigen::VectorXd& root_weights_;
+  const Whitening& whitening_;
 };
 
 }  // namespace
@@ -292,11 +291,17 @@ void sweep_shapes(BalanceData& data, Terms& terms, const std::vector<std::size_t
 
 double refine_shapes(BalanceData& data, Terms& terms, const std::vector<std::size_t>& on_balance,
                      const Eigen::VectorXd& root_weights) {
+  constexpr double kTolerance = 1e-9;
+  return refine_shapes(data, terms, on_balance, Whitening(root_weights), kTolerance);
+}
+
+double refine_shapes(BalanceData& data, Terms& terms, const std::vector<std::size_t>& on_balance,
+                     const Whitening& whitening, double tolerance) {
   const std::vector<Slot> shapes = free_shape_slots(terms, on_balance);
   const std::vector<Slot> linear = free_linear_slots(terms, on_balance);
   if (shapes.empty() || data.empty())
     return projected_cost(columns_of(data, terms, linear), data.target() - data.known_torque(terms, on_balance),
-                          root_weights);
+                          whitening);
   std::vector<ShapeRange> ranges;
   std::vector<double> shares;
   for (const Slot& s : shapes) {
@@ -304,8 +309,8 @@ double refine_shapes(BalanceData& data, Terms& terms, const std::vector<std::siz
     shares.push_back(std::clamp(ranges.back().share(terms[s.term].values[s.parameter]), 0.01, 0.99));
   }
   ceres::Problem problem;
-  problem.AddResidualBlock(new ProjectedResidual(data, terms, on_balance, linear, shapes, ranges, root_weights),
-                           nullptr, shares.data());
+  problem.AddResidualBlock(new ProjectedResidual(data, terms, on_balance, linear, shapes, ranges, whitening), nullptr,
+                           shares.data());
   for (int j = 0; j < static_cast<int>(shapes.size()); ++j) {
     problem.SetParameterLowerBound(shares.data(), j, 0.0);
     problem.SetParameterUpperBound(shares.data(), j, 1.0);
@@ -313,7 +318,7 @@ double refine_shapes(BalanceData& data, Terms& terms, const std::vector<std::siz
   ceres::Solver::Options options;
   options.linear_solver_type = ceres::DENSE_QR;
   options.max_num_iterations = 60;
-  options.function_tolerance = 1e-9;
+  options.function_tolerance = tolerance;
   options.parameter_tolerance = 1e-6;
   options.logging_type = ceres::SILENT;
   ceres::Solver::Summary summary;

@@ -2,6 +2,7 @@
 #pragma once
 
 #include "host/regression/balance_data.hpp"
+#include "host/regression/whitening.hpp"
 
 namespace flexspline::regression {
 
@@ -30,6 +31,9 @@ Eigen::MatrixXd columns_of(BalanceData& data, const Terms& terms, const std::vec
 // into `terms`. Returns the weighted sum of squares.
 double refine_shapes(BalanceData& data, Terms& terms, const std::vector<std::size_t>& on_balance,
                      const Eigen::VectorXd& root_weights);
+// The same with errors that rows have in common, to a relative change of the sum below `tolerance`.
+double refine_shapes(BalanceData& data, Terms& terms, const std::vector<std::size_t>& on_balance,
+                     const Whitening& whitening, double tolerance);
 
 // Chooses starting values for shapes that the model does not state: sweeps each over its grid, twice around.
 void sweep_shapes(BalanceData& data, Terms& terms, const std::vector<std::size_t>& on_balance,

@@ -1,0 +1,30 @@
+#include "host/regression/whitening.hpp"
+
+#include <Eigen/Eigenvalues>
+#include <cmath>
+
+namespace flexspline::regression {
+
+void Whitening::vary(const RowRange& rows, const Eigen::MatrixXd& columns) {
+  const Eigen::SelfAdjointEigenSolver<Eigen::MatrixXd> eigen(columns.transpose() * columns);
+  Common common{rows, Eigen::MatrixXd::Zero(columns.rows(), columns.cols()), Eigen::VectorXd::Zero(columns.cols())};
+  const double largest = eigen.eigenvalues().maxCoeff();
+  for (Eigen::Index k = 0; k < columns.cols(); ++k) {
+    const double square = eigen.eigenvalues()[k];
+    if (!(square > 1e-12 * largest) || !(square > 0.0)) continue;
+    common.basis.col(k) = columns * eigen.eigenvectors().col(k) / std::sqrt(square);
+    common.taken[k] = 1.0 - 1.0 / std::sqrt(1.0 + square);
+  }
+  common_.push_back(std::move(common));
+}
+
+Eigen::MatrixXd Whitening::operator*(const Eigen::MatrixXd& rows) const {
+  Eigen::MatrixXd white = root_weights_.asDiagonal() * rows;
+  for (const Common& c : common_) {
+    auto part = white.middleRows(c.rows.first, c.rows.size());
+    part -= c.basis * (c.taken.asDiagonal() * (c.basis.transpose() * part)).eval();
+  }
+  return white;
+}
+
+}  // namespace flexspline::regression
