@@ -4,8 +4,7 @@
 
 #include "host/cli/commands.hpp"
 #include "host/cli/report_option.hpp"
-#include "host/diagnosis/add.hpp"
-#include "host/diagnosis/diagnosis.hpp"
+#include "host/diagnosis/complete.hpp"
 #include "host/output/diagnosis.hpp"
 #include "host/output/json.hpp"
 
@@ -52,27 +51,21 @@ int run(const DiagnoseOptions& options, Console& console) {
   diagnosis::Options how;
   how.pipeline = options.pipeline.options();
   how.progress = [&](std::string_view stage) { console.progress(stage); };
-  model::Model model = file.model;
-  std::vector<diagnosis::Diagnosis> rounds;
-  for (;;) {
-    rounds.push_back(diagnosis::diagnose(dataset, model, how));
-    const diagnosis::Diagnosis& found = rounds.back();
+  std::size_t round = 0;
+  const auto say = [&](const diagnosis::Diagnosis& found) {
     for (const std::string& warning : found.warnings) console.warn(warning);
     if (options.all) {
       console.line();
-      console.line(console.bold(fmt::format("Round {}", rounds.size())));
+      console.line(console.bold(fmt::format("Round {}", ++round)));
     }
     output::print_diagnosis(console, found, add_command(options));
-    if (!options.all || found.verdict != diagnosis::Verdict::missing_effect || found.named.empty() ||
-        rounds.size() == kMostRounds)
-      break;
-    console.progress("adding it");
-    model = diagnosis::add(dataset, model, output::effect_label(found.named.front().effect, found.named.front().order),
-                           how.pipeline)
-                .model;
-  }
-  write_page(options, dataset, file.model, model, rounds, console);
-  output::save_json(options.json, options.all ? output::rounds_json(rounds) : output::diagnosis_json(rounds.front()));
+  };
+  const diagnosis::Completion done = diagnosis::complete(dataset, file.model, how, options.all ? kMostRounds : 1, say);
+  for (const std::string& effect : done.removed)
+    console.line(fmt::format("{} was needless once the others were in the model, and was removed.", effect));
+  write_page(options, dataset, file.model, done.model, done.rounds, console);
+  output::save_json(options.json, options.all ? output::rounds_json(done.rounds, done.removed)
+                                              : output::diagnosis_json(done.rounds.front()));
   return kDone;
 }
 

@@ -22,6 +22,11 @@ constexpr double kAtFloor = 1.3;
 constexpr double kShownShare = 5.0;
 // A delay is reported from this many standard errors on.
 constexpr double kCertain = 5.0;
+// An effect that takes off less of what stands above the floor leaves another unsaid: the best substitute for one that
+// is not in the catalogue takes off 60 % and less.
+constexpr double kRecovered = 80.0;
+// What is left after that is shown even where no single variable explains much of it.
+constexpr double kLeastShare = 1.0;
 
 // A balance and all that was found on it.
 struct Examined {
@@ -73,11 +78,11 @@ Candidate report(const Trial& trial, const Search& search, data::Axis axis) {
   return c;
 }
 
-std::vector<Localised> shares(const BalanceData& data, const Judged& judged) {
+std::vector<Localised> shares(const BalanceData& data, const Judged& judged, double least = kShownShare) {
   std::vector<Localised> list;
   const data::Axis axis = data.prepared().rotary ? data::Axis::rotary : data::Axis::linear;
   for (const auto& share : comparison::localise(data, judged.residual, judged.autocorrelation_time, axis))
-    if (share.share_percent >= kShownShare) list.push_back({share.variable, share.share_percent});
+    if (share.share_percent >= least) list.push_back({share.variable, share.share_percent});
   return list;
 }
 
@@ -179,8 +184,22 @@ void judge_rest(const Examined& chosen, Diagnosis& result) {
   if (chosen.search.data->balance() == regression::Balance::motor &&
       std::abs(after.theta[delay]) > kCertain * after.std[delay])
     result.delay_s = after.theta[delay];
-  const std::vector<Localised> remaining = shares(*chosen.search.data, after);
+  result.friction_drift = drifts(after);
+  for (const Drift& d : result.friction_drift)
+    result.warnings.push_back(fmt::format(
+        "{} differs between runs by {:.1f} %, and nothing that was recorded says why: temperature? An effect that "
+        "shows "
+        "only from run to run counts for less then; log the temperature, and repeat one motion from time to time",
+        d.group, d.percent));
   const bool at_floor = result.noise_floor && after.rmse() < kAtFloor * *result.noise_floor;
+  bool enough = true;
+  if (result.noise_floor && !result.named.empty()) {
+    const auto above = [&](const Judged& j) { return j.rmse() * j.rmse() - *result.noise_floor * *result.noise_floor; };
+    if (above(chosen.search.base) > 0.0)
+      result.recovered_percent = std::clamp(100.0 * (1.0 - above(after) / above(chosen.search.base)), 0.0, 100.0);
+    enough = at_floor || result.recovered_percent.value_or(100.0) >= kRecovered;
+  }
+  const std::vector<Localised> remaining = shares(*chosen.search.data, after, enough ? kShownShare : kLeastShare);
   if (!at_floor) result.remaining_structure = remaining;
   if (!result.named.empty()) return;
   if (at_floor)

@@ -80,7 +80,10 @@ struct Diagnosis {
   std::vector<Localised> localised;
   std::vector<Candidate> candidates;    // best first
   std::vector<Trend> parameter_trends;  // of the model as it is
+  std::vector<Drift> friction_drift;    // with the named effect in the model
   std::vector<Localised> remaining_structure;
+  // Of the chi-square above the noise floor, the share in percent that the named effect takes off.
+  std::optional<double> recovered_percent;
   std::vector<Disturbance> disturbances;
   std::vector<std::string> warnings;
   std::optional<double> delay_s;  // of the effort against the motion, beyond the alignment, where significant

@@ -5,6 +5,7 @@
 #include <cmath>
 #include <numeric>
 #include <optional>
+#include <utility>
 
 namespace flexspline::diagnosis {
 namespace {
@@ -102,6 +103,26 @@ std::vector<Trend> parameter_trends(const regression::Identification& identified
   std::erase_if(trends, [](const Trend& t) { return t.p_value > kCertain; });
   std::sort(trends.begin(), trends.end(), [](const Trend& a, const Trend& b) { return a.p_value < b.p_value; });
   return trends;
+}
+
+std::vector<Drift> drifts(const Judged& judged) {
+  constexpr double kLeast = 0.01;
+  // Twice the log likelihood ratio of a spread against none.
+  constexpr double kCertainSpread = 12.0;
+  std::vector<Drift> list;
+  const double tau = judged.autocorrelation_time;
+  const auto deviance = [&](const SmallVector& std) {
+    const Spread spread = with_spread(judged.left_out, std, tau, 0.0);
+    return std::accumulate(spread.deviance.begin(), spread.deviance.end(), 0.0);
+  };
+  for (std::size_t g = 0; g < judged.groups.size(); ++g) {
+    SmallVector none = judged.deviations.std;
+    double& own = none[static_cast<Eigen::Index>(g)];
+    const double std = std::exchange(own, 0.0);
+    if (std >= kLeast && deviance(none) - deviance(judged.deviations.std) > kCertainSpread)
+      list.push_back({judged.groups[g].name, 100.0 * std});
+  }
+  return list;
 }
 
 }  // namespace flexspline::diagnosis

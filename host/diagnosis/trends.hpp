@@ -4,6 +4,7 @@
 #include <string>
 #include <vector>
 
+#include "host/diagnosis/score.hpp"
 #include "host/regression/identify.hpp"
 
 namespace flexspline::diagnosis {
@@ -21,5 +22,14 @@ struct Trend {
 // with a corrected p-value below 0.001 that move the parameter by more than 3 % over the records are returned, surest
 // first. Needs six experiments that tell the parameter; standing still counts as none.
 std::vector<Trend> parameter_trends(const regression::Identification& identified);
+
+// Friction that differs between runs although nothing that the model or the data know of does.
+struct Drift {
+  std::string group;  // "viscous friction"
+  double percent = 0.0;
+};
+
+// Spreads that the left-out rows of a judged model bear witness to, from 1 % on.
+std::vector<Drift> drifts(const Judged& judged);
 
 }  // namespace flexspline::diagnosis

@@ -117,6 +117,13 @@ json localised_json(const std::vector<diagnosis::Localised>& parts) {
   return list;
 }
 
+json drift_json(const std::vector<diagnosis::Drift>& drifts) {
+  json list = json::array();
+  for (const diagnosis::Drift& drift : drifts)
+    list.push_back({{"group", drift.group}, {"percent", json_number(drift.percent)}});
+  return list;
+}
+
 json trends_json(const std::vector<diagnosis::Trend>& trends) {
   json list = json::array();
   for (const diagnosis::Trend& t : trends)
@@ -246,21 +253,26 @@ json diagnosis_json(const Diagnosis& d) {
           {"localised", localised_json(d.localised)},
           {"candidates", std::move(candidates)},
           {"parameter_trends", trends_json(d.parameter_trends)},
+          {"friction_drift", drift_json(d.friction_drift)},
           {"remaining_structure", localised_json(d.remaining_structure)},
+          {"recovered_percent", json_number(d.recovered_percent)},
           {"disturbances", std::move(disturbances)},
           {"delay_s", json_number(d.delay_s)},
           {"warnings", d.warnings},
           {"rounds", json::array()}};
 }
 
-json rounds_json(const std::vector<Diagnosis>& rounds) {
+json rounds_json(const std::vector<Diagnosis>& rounds, const std::vector<std::string>& removed) {
   json result = diagnosis_json(rounds.front());
   std::vector<diagnosis::Named> all;
   for (const Diagnosis& d : rounds) {
-    // The round in which nothing was found ends the search; it names nothing that was added.
-    if (d.verdict == Verdict::missing_effect) all.insert(all.end(), d.named.begin(), d.named.end());
+    // The last round ends the search; it names nothing that was added.
+    if (&d != &rounds.back() || rounds.size() == 1) all.insert(all.end(), d.named.begin(), d.named.end());
     result["rounds"].push_back(diagnosis_json(d));
   }
+  std::erase_if(all, [&](const diagnosis::Named& n) {
+    return std::find(removed.begin(), removed.end(), effect_label(n.effect, n.order)) != removed.end();
+  });
   if (!all.empty()) result["named"] = named_json(all);
   return result;
 }

@@ -23,8 +23,9 @@ std::string verdict_in_words(const diagnosis::Diagnosis& found);
 // `add_command`: what to type to add the named effect, with EFFECT where its name goes.
 void print_diagnosis(Console& console, const diagnosis::Diagnosis& found, const std::string& add_command);
 
-// "flexspline-diagnose/1". With more than one round, `named` holds all that were added.
+// "flexspline-diagnose/1". With more than one round, `named` holds all that were added and not removed again.
 nlohmann::json diagnosis_json(const diagnosis::Diagnosis& found);
-nlohmann::json rounds_json(const std::vector<diagnosis::Diagnosis>& rounds);
+nlohmann::json rounds_json(const std::vector<diagnosis::Diagnosis>& rounds,
+                           const std::vector<std::string>& removed = {});
 
 }  // namespace flexspline::output

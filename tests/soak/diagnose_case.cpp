@@ -9,6 +9,7 @@
 #include <set>
 
 #include "host/diagnosis/add.hpp"
+#include "host/diagnosis/complete.hpp"
 #include "host/diagnosis/diagnosis.hpp"
 #include "host/diagnosis/trials.hpp"
 #include "host/regression/shapes.hpp"
@@ -142,16 +143,13 @@ void compare_parameters(const Bench& bench, const std::string& hidden, const dia
 }
 
 // Adds what is named until nothing is, and compares with all that was hidden.
-bool finds_all(const Bench& bench, const std::vector<std::string>& hidden, diagnosis::Diagnosis d) {
-  std::set<std::string> found, wanted;
+bool finds_all(const Bench& bench, const std::vector<std::string>& hidden) {
+  std::multiset<std::string> found, wanted;
   for (const std::string& h : hidden) wanted.insert(as_named(h));
-  model::Model model = bench.base;
-  for (std::size_t round = 0; round < kMostRounds && d.verdict == diagnosis::Verdict::missing_effect; ++round) {
-    const std::string name = label(d.named.front().effect, d.named.front().order);
-    found.insert(name);
-    model = diagnosis::add(bench.dataset, model, name, {}).model;
-    d = diagnosis::diagnose(bench.dataset, model, {});
-  }
+  const diagnosis::Completion done = diagnosis::complete(bench.dataset, bench.base, {}, kMostRounds);
+  for (std::size_t round = 0; round + 1 < done.rounds.size(); ++round)
+    found.insert(label(done.rounds[round].named.front().effect, done.rounds[round].named.front().order));
+  for (const std::string& out : done.removed) found.erase(out);
   return found == wanted;
 }
 
@@ -194,7 +192,7 @@ Outcome run(const Case& what) {
     return outcome;
   }
   if (hidden.size() > 1) {
-    outcome.found_all = finds_all(bench, hidden, d);
+    outcome.found_all = finds_all(bench, hidden);
     outcome.right = outcome.found_all;
     return outcome;
   }

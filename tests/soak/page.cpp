@@ -3,8 +3,6 @@
 #include <fmt/format.h>
 
 #include <algorithm>
-#include <boost/math/distributions/beta.hpp>
-#include <boost/math/distributions/chi_squared.hpp>
 #include <cmath>
 #include <functional>
 #include <map>
@@ -12,6 +10,7 @@
 
 #include "host/catalogue/catalogue.hpp"
 #include "tests/soak/campaign.hpp"
+#include "tests/support/campaign_statistics.hpp"
 
 namespace flexspline::soak {
 namespace {
@@ -20,6 +19,9 @@ namespace {
 constexpr double kFalseAlarmTarget = 1.0 / 300.0;
 constexpr double kCalibratedFor = 1.0 / 1000.0;
 
+using testing::exact_interval;
+using testing::Interval;
+using testing::threshold_from;
 using Selection = std::vector<const Outcome*>;
 
 Selection select(const std::vector<Outcome>& all, const std::function<bool(const Outcome&)>& which) {
@@ -163,29 +165,6 @@ std::string others(const std::vector<Outcome>& all) {
 }
 
 }  // namespace
-
-Interval exact_interval(std::size_t count, std::size_t total) {
-  Interval interval;
-  const auto k = static_cast<double>(count), n = static_cast<double>(total);
-  constexpr double kTail = 0.025;
-  if (count > 0) interval.low = boost::math::quantile(boost::math::beta_distribution<double>(k, n - k + 1.0), kTail);
-  if (count < total)
-    interval.high = boost::math::quantile(boost::math::beta_distribution<double>(k + 1.0, n - k), 1.0 - kTail);
-  return interval;
-}
-
-double threshold_from(std::vector<double> scores, double share_passed) {
-  std::sort(scores.begin(), scores.end());
-  const std::size_t tail = std::max<std::size_t>(scores.size() / 10, 1);
-  const double start = scores[scores.size() - tail - 1];
-  double excess = 0.0;
-  for (std::size_t k = scores.size() - tail; k < scores.size(); ++k) excess += scores[k] - start;
-  const double degrees = 2.0 * static_cast<double>(tail);
-  const double scale =
-      2.0 * excess / boost::math::quantile(boost::math::chi_squared_distribution<double>(degrees), 0.05);
-  const double beyond = static_cast<double>(tail) / static_cast<double>(scores.size());
-  return start + scale * std::log(beyond / share_passed);
-}
 
 std::string page_of(const std::vector<Outcome>& all, const std::string& version) {
   std::uint64_t low = ~0ULL, high = 0;

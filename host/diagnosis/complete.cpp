@@ -1,0 +1,98 @@
+#include "host/diagnosis/complete.hpp"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <map>
+
+#include "host/diagnosis/add.hpp"
+#include "host/diagnosis/trials.hpp"
+
+namespace flexspline::diagnosis {
+namespace {
+
+// Of the first fall: what comes after that is a matter of how well the formula fits.
+constexpr double kWorthAdding = 0.003;
+
+// Fall of chi-square over rows, in units of the noise where that is known: comparable between balances.
+double fall_of(const Diagnosis& d) {
+  if (d.candidates.empty()) return 0.0;
+  const Candidate& c = d.candidates.front();
+  const double fall = c.rmse_cv_before * c.rmse_cv_before - c.rmse_cv_after * c.rmse_cv_after;
+  return d.noise_floor && *d.noise_floor > 0.0 ? fall / (*d.noise_floor * *d.noise_floor) : fall;
+}
+
+std::string label(const Named& named) {
+  return named.order ? fmt::format("{}:{:g}", named.effect, *named.order) : named.effect;
+}
+
+}  // namespace
+
+std::string needless(const data::Dataset& dataset, const model::Model& model, const std::vector<std::string>& ids,
+                     const Options& options) {
+  const auto fitted = regression::identify(dataset, model, options.pipeline);
+  std::string worst;
+  double least = kNamedScore;
+  for (BalanceData& data : fitted->data) {
+    const Eigen::VectorXd keep = Eigen::VectorXd::Ones(data.rows());
+    const auto on_balance = regression::terms_on(fitted->terms, data.balance(), fitted->prepared.torque_measured);
+    Judged full;
+    for (const std::size_t t : on_balance) {
+      const regression::Term& term = fitted->terms[t];
+      if (std::find(ids.begin(), ids.end(), term.id) == ids.end() || !term.entry->info->replaces.empty()) continue;
+      const bool scaled = std::any_of(fitted->terms.begin(), fitted->terms.end(), [&](const regression::Term& other) {
+        return other.entry->info->modulates == term.entry->name();
+      });
+      if (scaled) continue;
+      if (full.left_out.empty()) full = judge(data, fitted->terms, keep);
+      regression::Terms without = fitted->terms;
+      without.erase(without.begin() + static_cast<std::ptrdiff_t>(t));
+      double parameters = 0.0;
+      for (const auto known : term.known) parameters += known ? 0.0 : 1.0;
+      const double score = diagnosis::fall_of(judge(data, std::move(without), keep), full, parameters).score;
+      if (score < least) {
+        least = score;
+        worst = term.id;
+      }
+    }
+  }
+  return worst;
+}
+
+Completion complete(const data::Dataset& dataset, const model::Model& model, const Options& options,
+                    std::size_t most_rounds, const std::function<void(const Diagnosis&)>& said) {
+  Completion result;
+  result.model = model;
+  std::vector<std::string> added;               // ids
+  std::map<std::string, std::string> label_of;  // by id
+  for (;;) {
+    Diagnosis found = diagnose(dataset, result.model, options);
+    bool more = found.verdict == Verdict::missing_effect && result.rounds.size() + 1 < most_rounds;
+    if (more && !result.rounds.empty() && fall_of(found) < kWorthAdding * fall_of(result.rounds.front())) {
+      found.warnings.push_back(
+          fmt::format("{} is not added: it takes off less than {:g} % of what the first effect did",
+                      label(found.named.front()), 100.0 * kWorthAdding));
+      more = false;
+    }
+    result.rounds.push_back(std::move(found));
+    if (said) said(result.rounds.back());
+    if (!more) return result;
+    if (options.progress) options.progress("adding it");
+    result.model = add(dataset, result.model, label(result.rounds.back().named.front()), options.pipeline).model;
+    added.push_back(result.model.effects.back().id);
+    label_of[added.back()] = label(result.rounds.back().named.front());
+    if (added.size() < 2) continue;
+    // The newest was just named beside the others; those are tried.
+    const std::vector<std::string> before(added.begin(), added.end() - 1);
+    const std::string out = needless(dataset, result.model, before, options);
+    if (out.empty()) continue;
+    result.model = remove(dataset, result.model, out, options.pipeline).model;
+    std::erase(added, out);
+    // Named once and needless since: naming it again would go round in circles.
+    const bool again = std::find(result.removed.begin(), result.removed.end(), label_of[out]) != result.removed.end();
+    if (again) return result;
+    result.removed.push_back(label_of[out]);
+  }
+}
+
+}  // namespace flexspline::diagnosis
