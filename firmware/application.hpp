@@ -214,7 +214,7 @@ class Application {
   // A drive that is off stays off; one that comes to rest already is not told to do so again.
   void respond(const FaultRecord& found, const Estimate& estimate) {
     if (status_.mode == Mode::fault) return;
-    if (!is_armed(status_.mode) || info_of(found.fault).ends_in == SafeState::off) return enter_fault(found);
+    if (!is_armed(status_.mode) || ends_in(found.fault) == SafeState::off) return enter_fault(found);
     if (status_.mode == Mode::stop) return;
     status_.fault = found;
     status_.mode = Mode::stop;

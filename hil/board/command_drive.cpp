@@ -6,6 +6,7 @@
 #include <memory>
 #include <stdexcept>
 
+#include "firmware/fault_texts.hpp"
 #include "hil/board/processor.hpp"
 #include "hil/board/scenario.hpp"
 #include "hil/plant/whole_file.hpp"

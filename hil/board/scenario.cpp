@@ -8,6 +8,7 @@
 #include <stdexcept>
 #include <utility>
 
+#include "firmware/fault_texts.hpp"
 #include "hil/board/drive_setup.hpp"
 
 namespace flexspline::board {

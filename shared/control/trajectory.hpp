@@ -9,6 +9,7 @@
 // room to stop: v + D(v) <= distance. Then v - A will do so in the next tick, so that there always is one.
 #pragma once
 
+#include <bit>
 #include <cstdint>
 
 #include "shared/effects/effect.hpp"
@@ -83,12 +84,20 @@ struct Trajectory {
 
   // Stands still at a position (2^-32 turns).
   static constexpr State at(std::int64_t position) { return {position, 0, 0, 0}; }
-  // At a position and moving, as when control is handed over; limits count from here on. One division, so not for every
-  // tick. `velocity` in 2^-48 turns a tick.
+  // At a position and moving, as when control is handed over; limits count from here on. One division, by bits, as a
+  // library's of 64 bits is larger than all this file; so not for every tick. `velocity` in 2^-48 turns a tick.
   template <class N>
   static constexpr State moving(const Coefficients<N>& c, std::int64_t position, std::int64_t velocity) {
     const std::int64_t v = fixed::limited(velocity, -c.velocity, c.velocity);
-    return {position, 0, v, static_cast<std::int64_t>(fixed::size_of(v)) / c.change};
+    State s{position, 0, v, 0};
+    auto rest = static_cast<std::int64_t>(fixed::size_of(v));
+    const int widest = std::countl_zero(static_cast<std::uint64_t>(c.change)) - std::countl_zero(fixed::size_of(v));
+    for (int bit = widest; bit >= 0; --bit) {
+      if ((rest >> bit) < c.change) continue;
+      rest -= c.change * (std::int64_t{1} << bit);
+      s.steps += std::int64_t{1} << bit;
+    }
+    return s;
   }
 
   // One tick towards `target` (2^-32 turns), no faster than `speed` (2^-48 turns a tick) where that is less than the

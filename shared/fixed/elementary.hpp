@@ -64,7 +64,9 @@ constexpr std::uint32_t power_of_two(std::int32_t x) {
 // steps of Newton's rule, each of which squares the relative error.
 constexpr std::uint32_t reciprocal_of_mantissa(std::uint32_t m) {
   constexpr std::uint64_t kTwo = std::uint64_t{1} << 32;  // Q31
-  std::uint64_t r = (48 * (std::uint64_t{1} << 31) - 32 * std::uint64_t{m}) / 17;
+  // (48 - 32 m)/17, rounded down: in two divisions of 32 bits, as one of 64 is a call to a library where words have 32.
+  const std::uint32_t rest = 0xC0000000U - m;
+  std::uint64_t r = 32 * std::uint64_t{rest / 17} + 32 * (rest % 17) / 17;
   for (int step = 0; step < 3; ++step) r = (r * (kTwo - ((r * m) >> 31))) >> 31;
   return static_cast<std::uint32_t>((r + 1) >> 1);
 }

@@ -7,6 +7,7 @@
 #include <memory>
 #include <string>
 
+#include "firmware/fault_texts.hpp"
 #include "hil/board/processor.hpp"
 #include "hil/board/scenario.hpp"
 

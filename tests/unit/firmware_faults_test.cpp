@@ -9,6 +9,7 @@
 #include <set>
 #include <string>
 
+#include "firmware/fault_texts.hpp"
 #include "tests/support/virtual_drive.hpp"
 
 namespace flexspline::tests {
@@ -83,7 +84,7 @@ TEST_P(Faults, EndInTheirSafeStateWithinTheStatedTicks) {
   ASSERT_EQ(name_of(drive->status().fault.fault), name_of(c.fault));
   EXPECT_LE(ticks, c.ticks);
   const double velocity = drive->rig().truth().motor_velocity;
-  if (firmware::info_of(c.fault).ends_in == SafeState::off) {
+  if (firmware::ends_in(c.fault) == SafeState::off) {
     EXPECT_EQ(drive->status().mode, Mode::fault);
     EXPECT_FALSE(drive->last().actuation.enabled);
     EXPECT_EQ(drive->last().actuation.current, 0);
