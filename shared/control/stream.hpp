@@ -7,6 +7,7 @@
 #pragma once
 
 #include "shared/control/trajectory.hpp"
+#include "shared/fixed/coefficients.hpp"
 
 namespace flexspline::control {
 
