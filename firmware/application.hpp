@@ -274,6 +274,7 @@ class Application {
             word(e.current),
             word(e.temperature),
             word(e.disturbance),
+            word(e.torsion),
             turns(out.position),
             fraction(out.position),
             word(out.velocity),

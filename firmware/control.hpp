@@ -26,9 +26,10 @@ struct Estimate {
   N::Angle angle{};  // of the motor
   N::Value velocity{};
   N::Value acceleration{};
-  N::Angle output_angle{};  // of the output; stays nought without an encoder there
+  N::Angle output_angle{};  // of the output: measured, or estimated without an encoder there
   N::Value output_velocity{};
-  N::Value torque{};  // through the flexspline, without the sensor's ripple
+  N::Value torsion{};  // estimated without an encoder at the output, else nought
+  N::Value torque{};   // through the flexspline, without the sensor's ripple
   N::Value current{};
   N::Value temperature{};
   N::Value disturbance{};
@@ -56,6 +57,7 @@ class Control {
     motor_encoder_ = output_encoder_ = {};
     motor_motion_ = output_motion_ = {};
     disturbance_ = {};
+    torsion_ = {};
     ripple_ = {};
     off();
   }
@@ -63,7 +65,7 @@ class Control {
   void off() {
     loops_ = {};
     excitation_ = {};
-    last_ = {};
+    nominal_ = {};
   }
 
   Estimate observe(const Readings& readings) {
@@ -79,12 +81,14 @@ class Control {
           observers::EncoderKalman::update<N>(output_motion_, p_.output_motion, e.output_angle).velocity;
     }
     e.current = measured(p_.current, readings.current);
+    const N::Value applied = N::scaled(p_.torque_of_current, e.current);
+    if (!p_.has_output_encoder) estimate_output(applied, e);
     e.temperature = measured(p_.temperature, readings.temperature);
     if (p_.has_torque_sensor)
       e.torque = observers::RippleFilter::update<N>(ripple_, p_.ripple, e.angle, measured(p_.torque, readings.torque));
-    e.disturbance = observers::DisturbanceObserver::update<N>(
-        disturbance_, p_.disturbance, N::scaled(p_.torque_of_current, e.current), last_.feedforward,
-        N::clamp(e.acceleration - modelled_acceleration(), two_bases()));
+    e.disturbance =
+        observers::DisturbanceObserver::update<N>(disturbance_, p_.disturbance, applied, nominal_.torque,
+                                                  N::clamp(e.acceleration - nominal_.acceleration, two_bases()));
     return e;
   }
 
@@ -98,6 +102,8 @@ class Control {
     }
     if (demand.mode == Mode::excitation) control::Excitation::start<N>(excitation_, p_.excitation);
     feedforward_ = {};
+    nominal_ = {};
+    torsion_ = {};
     p_.model.reset();
     last_mode_ = demand.mode;
     streams_ = false;
@@ -139,13 +145,13 @@ class Control {
         off();
         return {};
     }
+    nominal_ = {};
     if (demand.compensate && uses_trajectory(demand.mode)) compensate(e, out, command);
     const auto loops = control::Loops::update<N>(loops_, p_.loops, command, e.angle, e.velocity);
     out.torque = loops.torque;
     out.current = loops.current;
     out.limited = loops.limited;
     out.at_rest = out.velocity == N::Value{} && N::magnitude(e.velocity) <= p_.safety.standstill;
-    last_ = out;
     return out;
   }
 
@@ -159,9 +165,19 @@ class Control {
     const N::Value part{{std::int32_t{share} * (1 << (fixed::kValueBits - 15))}};
     return N::clamp(N::scaled(scale.gain, part) - scale.offset, two_bases());
   }
-  // The inertia's share of the feedforward is that of the set point's acceleration.
-  N::Value modelled_acceleration() const { return last_.feedforward == N::Value{} ? N::Value{} : last_.acceleration; }
-
+  // The observer tells how the drive differs from its nominal motion. Without a model friction would count as torsion,
+  // and around a reversal it does: a stiff gear is the better guess then.
+  void estimate_output(N::Value applied, Estimate& e) {
+    const N::Value rest = p_.safety.standstill;
+    const bool forward = nominal_.velocity > rest && e.velocity > rest;
+    const bool backward = nominal_.velocity < -rest && e.velocity < -rest;
+    const auto difference = observers::TorsionObserver::update<N>(
+        torsion_, p_.torsion, N::clamp(applied - nominal_.torque, two_bases()),
+        N::clamp(e.velocity - nominal_.velocity, two_bases()), forward || backward);
+    e.torsion = nominal_.torsion + difference.torsion;
+    e.output_velocity = N::scaled(p_.output_of_velocity, nominal_.velocity) + difference.output_velocity;
+    e.output_angle = N::times_order(e.angle, p_.output_angle) + N::distance(p_.torsion_turns, -e.torsion);
+  }
   // The set point starts from where the shaft is at each tick, so that limits of position hold for the shaft.
   void follow_velocity(N::Value velocity, const Estimate& e, Output& out) {
     constexpr std::int64_t kFar = std::int64_t{4096} << fixed::kAngleBits;
@@ -201,6 +217,7 @@ class Control {
         control::Feedforward::update<N>(feedforward_, p_.feedforward, p_.model,
                                         {out.position, out.velocity, out.acceleration}, {e.angle, e.temperature, {}});
     out.feedforward = forward.torque;
+    nominal_ = {forward.torque, out.velocity + forward.velocity, out.acceleration, feedforward_.torsion};
     command.torque = forward.torque;
     command.position = command.position + forward.lead;
     command.velocity = command.velocity + forward.velocity;
@@ -212,13 +229,21 @@ class Control {
   observers::EncoderKalman::State<N> motor_motion_{};
   observers::EncoderKalman::State<N> output_motion_{};
   observers::DisturbanceObserver::State<N> disturbance_{};
+  observers::TorsionObserver::State<N> torsion_{};
   observers::RippleFilter::State<N> ripple_{};
   control::Trajectory::State trajectory_{};
   control::Stream::State stream_{};
   control::Excitation::State<N> excitation_{};
   control::Feedforward::State<N> feedforward_{};
   control::Loops::State<N> loops_{};
-  Output last_{};
+  // What the model says of the tick before, with compensation; else standstill without a torque.
+  struct Nominal {
+    N::Value torque{};
+    N::Value velocity{};
+    N::Value acceleration{};
+    N::Value torsion{};
+  };
+  Nominal nominal_{};
   Mode last_mode_ = Mode::idle;
   bool streams_ = false;
 };

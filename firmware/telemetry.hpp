@@ -30,6 +30,7 @@ enum class Channel : std::uint8_t {
   current,  // measured
   temperature,
   disturbance,
+  torsion,  // estimated where the output has no encoder
   set_turns,
   set_fraction,
   set_velocity,
@@ -38,7 +39,7 @@ enum class Channel : std::uint8_t {
   command_torque,
   command_current,
 };
-inline constexpr std::size_t kChannels = 20;
+inline constexpr std::size_t kChannels = 21;
 using ChannelValues = std::array<std::uint32_t, kChannels>;
 
 struct TelemetrySetup {

@@ -26,6 +26,11 @@ double inertia_of(const plant::Drive& drive) {
   return inertia->value("inertia");
 }
 
+double output_inertia_of(const plant::Drive& drive) {
+  const plant::Effect* inertia = drive.find("output_inertia");
+  return inertia == nullptr ? 0.0 : inertia->value("inertia");
+}
+
 template <class Effect>
 void add_all(const plant::Drive& drive, const effects::DriveConstants<double>& d, model::DriveModel<N>& model) {
   // What a sensor gets wrong turns no shaft.
@@ -75,6 +80,12 @@ control::DriveSetup<double> setup_of(const plant::Drive& drive, std::uint32_t ti
   s.motor_corner = kTurn * 150.0;
   s.output_corner = kTurn * 50.0;
   s.has_torque_sensor = true;
+  s.torsion = {.inertia = inertia,
+               .output_inertia = output_inertia_of(drive),
+               .stiffness = stiffness,
+               .torque_noise = 0.01,
+               .load_walk = 1.0,
+               .velocity_noise = 0.3};
   s.ripple = {.order = 2.0, .memory = kTurn * 20.0, .largest_ripple = 0.05 * drive.rated_torque_nm};
   s.disturbance = {.inertia = inertia, .time_constant_s = 0.01, .limit = 1.9 * d.torque_base};
   s.current = {.full_scale = scales.current_a};

@@ -14,6 +14,7 @@
 #include "shared/observers/encoder_angle.hpp"
 #include "shared/observers/encoder_kalman.hpp"
 #include "shared/observers/ripple_filter.hpp"
+#include "shared/observers/torsion.hpp"
 
 namespace flexspline::control {
 
@@ -56,6 +57,11 @@ struct DriveParameters {
   observers::EncoderKalman::Coefficients<N> motor_motion{};
   observers::EncoderKalman::Coefficients<N> output_motion{};
   observers::DisturbanceObserver::Coefficients<N> disturbance{};
+  // Without an encoder at the output.
+  observers::TorsionObserver::Coefficients<N> torsion{};
+  typename N::Order output_angle{};       // of the motor's
+  typename N::Gain torsion_turns{};       // turns of the output per base of torsion
+  typename N::Gain output_of_velocity{};  // base of the output's velocity per base of the motor's
   observers::RippleFilter::Coefficients<N> ripple{};
   AnalogScale<N> current{};
   AnalogScale<N> torque{};

@@ -37,6 +37,7 @@ struct DriveSetup {
   std::uint32_t output_counts = 0;  // nought: no encoder at the output
   P motor_corner{};                 // rad/s, of the motor's Kalman filter
   P output_corner{};
+  observers::TorsionSetup<P> torsion{};  // used without an encoder at the output
   bool has_torque_sensor = false;
   observers::RippleSetup<P> ripple{};  // of the torque sensor
   observers::DisturbanceSetup<P> disturbance{};
@@ -107,6 +108,12 @@ DriveParameters<N> derive(const DriveSetup<P>& s, const effects::DriveConstants<
     p.output_encoder = observers::EncoderAngle::derive(s.output_counts);
     p.output_motion = observers::EncoderKalman::derive<N>(
         observers::setup_for_corner(P(static_cast<double>(s.output_counts)), s.output_corner, output), output);
+  }
+  if (!p.has_output_encoder) {
+    p.torsion = observers::TorsionObserver::derive<N>(s.torsion, d);
+    p.output_angle = N::order(P(6.283185307179586) / d.gear_ratio);
+    p.torsion_turns = N::gain(d.torsion_base / d.angle_base);
+    p.output_of_velocity = N::gain(d.velocity_base / (d.gear_ratio * d.output_velocity_base));
   }
   p.disturbance = observers::DisturbanceObserver::derive<N>(s.disturbance, d);
   p.current = detail::analog_scale<N>(s.current, d.current_base);

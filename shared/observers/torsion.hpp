@@ -1,6 +1,6 @@
 // Torsion and output of a gear whose output has no encoder: a Kalman filter in its steady state on two masses and a
 // spring, of which only the motor's velocity is measured,
-//   J w' = t - K dq/N,   dq' = w/N - wo,   Jo wo' = K dq.
+//   J w' = t - K dq/N,   dq' = w/N - wo,   Jo wo' = K dq - l,   l a load that nobody knows, as a random walk.
 // All of it are differences from a nominal motion: t is the applied less the modelled torque, w the measured velocity
 // less the set point's, and so the estimates are to be added to the model's torsion and to the set point over N. Then
 // friction, gravity and a spring that bends are the model's business, and what is left is linear; without a model the
@@ -26,7 +26,7 @@ struct TorsionSetup {
   P output_inertia{};  // kg m^2
   P stiffness{};       // N m/rad at the output, where the gear usually works
   P torque_noise{};    // N m at the motor, std of what no model says, from tick to tick
-  P load_noise{};      // N m at the output, the same
+  P load_walk{};       // N m per root second at the output: how fast an unknown load changes
   P velocity_noise{};  // rad/s, std of the measured velocity
 };
 
@@ -36,22 +36,26 @@ struct TorsionObserver {
     typename N::Share by_torque{};    // of the motor's velocity
     typename N::Share by_torsion{};   // the same
     typename N::Share output{};       // of the output's velocity, by torsion
+    typename N::Share by_load{};      // the same, by the load
     typename N::Share from_motor{};   // of the torsion, by the motor's velocity
     typename N::Share from_output{};  // and by the output's
     typename N::Gain velocity{};      // of each state, by what the measurement surprises
     typename N::Gain torsion{};
     typename N::Gain output_velocity{};
+    typename N::Gain load{};
   };
   template <class N>
   struct State {
     typename N::State velocity{};  // all in their bases
     typename N::State torsion{};
     typename N::State output_velocity{};
+    typename N::State load{};
   };
   template <class N>
   struct Estimate {
     typename N::Value torsion{};          // of torsion_base
     typename N::Value output_velocity{};  // of output_velocity_base
+    typename N::Value load{};             // of output_torque_base; positive resists
   };
 
   // Host only. Notes a tick that is too long for the resonance.
@@ -61,42 +65,48 @@ struct TorsionObserver {
     const P by_torque = tick * d.torque_base / (s.inertia * d.velocity_base);
     const P by_torsion = tick * s.stiffness * d.torsion_base / (d.gear_ratio * s.inertia * d.velocity_base);
     const P output = tick * s.stiffness * d.torsion_base / (s.output_inertia * d.output_velocity_base);
+    const P by_load = tick * d.output_torque_base / (s.output_inertia * d.output_velocity_base);
     const P from_motor = tick * d.velocity_base / (d.gear_ratio * d.torsion_base);
     const P from_output = tick * d.output_velocity_base / d.torsion_base;
     // A state within four bases, corrected by one, then stays within eight on the way.
     constexpr double kMost = 0.3;
-    for (const P& x : {by_torque, by_torsion, output, from_motor, from_output})
+    for (const P& x : {by_torque, by_torsion, output, by_load, from_motor, from_output})
       control::require(x > P(0.0) && x < P(kMost), "a tick of the torsion observer is too long for the resonance");
     const P one(1.0), none(0.0);
-    const Matrix3<P> model{{{one, -by_torsion, none},
-                            {from_motor, one - from_motor * by_torsion - from_output * output, -from_output},
-                            {none, output, one}}};
+    const Matrix<P, 4> model{
+        {{one, -by_torsion, none, none},
+         {from_motor, one - from_motor * by_torsion - from_output * output, -from_output, from_output * by_load},
+         {none, output, one, -by_load},
+         {none, none, none, one}}};
     const P q_motor = by_torque * s.torque_noise / d.torque_base;
-    const P q_output = tick * s.load_noise / (s.output_inertia * d.output_velocity_base);
-    const P on_motor[] = {q_motor, from_motor * q_motor, none};
-    const P on_output[] = {none, -from_output * q_output, q_output};
-    const Matrix3<P> noise = detail::filled<P>(
-        [&](std::size_t i, std::size_t j) { return on_motor[i] * on_motor[j] + on_output[i] * on_output[j]; });
+    const P q_load = s.load_walk * N::power(tick, P(0.5)) / d.output_torque_base;
+    const P on_motor[] = {q_motor, from_motor * q_motor, none, none};
+    const P on_load[] = {none, none, none, q_load};
+    const Matrix<P, 4> noise = detail::filled<P, 4>(
+        [&](std::size_t i, std::size_t j) { return on_motor[i] * on_motor[j] + on_load[i] * on_load[j]; });
     const P velocity_noise = s.velocity_noise / d.velocity_base;
     const P variance = velocity_noise * velocity_noise;
     const auto gain = steady_gain(steady_covariance(model, noise, variance), variance);
-    return {N::share(by_torque),   N::share(by_torsion), N::share(output), N::share(from_motor),
-            N::share(from_output), N::gain(gain[0]),     N::gain(gain[1]), N::gain(gain[2])};
+    return {N::share(by_torque),   N::share(by_torsion), N::share(output), N::share(by_load), N::share(from_motor),
+            N::share(from_output), N::gain(gain[0]),     N::gain(gain[1]), N::gain(gain[2]),  N::gain(gain[3])};
   }
   // One tick: the torque that acted since the tick before, and the motor's velocity now; differences, as said above, in
-  // bases and within two.
+  // bases and within two. Where they are not to be trusted, as where friction changes its side and no model says when
+  // to a tick, the masses go on without them.
   template <class N>
   static constexpr Estimate<N> update(State<N>& s, const Coefficients<N>& c, typename N::Value torque,
-                                      typename N::Value velocity) {
-    const auto motor = s.velocity + N::times(N::widen(torque), c.by_torque) - N::times(s.torsion, c.by_torsion);
-    const auto output = s.output_velocity + N::times(s.torsion, c.output);
+                                      typename N::Value velocity, bool trusted = true) {
+    const auto motor = s.velocity + N::times(N::widen(trusted ? torque : typename N::Value{}), c.by_torque) -
+                       N::times(s.torsion, c.by_torsion);
+    const auto output = s.output_velocity + N::times(s.torsion, c.output) - N::times(s.load, c.by_load);
     const auto torsion = s.torsion + N::times(motor, c.from_motor) - N::times(output, c.from_output);
-    const auto surprise = velocity - N::narrow(motor);
+    const auto surprise = trusted ? velocity - N::narrow(motor) : typename N::Value{};
     // Bounded, so that wrong inputs for ever cannot run the sums out of their range.
     s.velocity = N::bounded(motor + corrected<N>(surprise, c.velocity));
     s.torsion = N::bounded(torsion + corrected<N>(surprise, c.torsion));
     s.output_velocity = N::bounded(output + corrected<N>(surprise, c.output_velocity));
-    return {N::narrow(s.torsion), N::narrow(s.output_velocity)};
+    s.load = N::bounded(s.load + corrected<N>(surprise, c.load));
+    return {N::narrow(s.torsion), N::narrow(s.output_velocity), N::narrow(s.load)};
   }
 
  private:

@@ -194,5 +194,42 @@ TEST(Modes, LimitsOfTorqueAndVelocityHoldWhateverTheHostSays) {
   EXPECT_GT(velocity, 0.9 * demo_drive().rated_velocity_rad_s);
 }
 
+// Without an encoder at the output the drive estimates it; the plant knows better.
+TEST(Modes, WithoutAnEncoderAtTheOutputItIsEstimatedCloserThanAStiffGearWouldBe) {
+  auto setup = demo_setup();
+  setup.output_counts = 0;
+  // No structural damping, which no linear observer knows.
+  plant::Drive drive_of = demo_drive();
+  plant::without(drive_of, "structural_damping");
+  const firmware::TelemetrySetup channels{
+      .every = 1, .count = 3, .channels = {Channel::output_turns, Channel::output_fraction, Channel::torsion}};
+  VirtualDrive drive({.drive = drive_of, .seed = 1}, Block(board::parameters_of(drive_of, setup)), channels);
+  drive.keep_frames(true);
+  drive.run(100);
+  Command c = arm_velocity(60.0);
+  c.compensate = true;
+  ASSERT_EQ(drive.command(c).refusal, Refusal::none);
+  double squares = 0.0, stiff_squares = 0.0;
+  for (int k = 0; k < 40'000; ++k) {
+    if (k % 4000 == 0) {
+      c.kind = Command::Kind::set;
+      c.velocity = -c.velocity;
+      drive.post(c);
+    } else if (k % 20 == 0) {
+      drive.post(of_kind(Command::Kind::heartbeat));
+    }
+    drive.rig().set_load_torque(k % 8000 < 4000 ? 2.0 : -2.0);
+    const double output = drive.rig().truth().output_angle, motor = drive.rig().truth().motor_angle;
+    drive.run(1);
+    const auto& v = drive.frames().back().values;
+    const double estimated = (static_cast<std::int32_t>(v[0]) + std::ldexp(v[1], -32)) * kTurn;
+    squares += std::pow(estimated - output, 2);
+    stiff_squares += std::pow(motor / demo_drive().gear_ratio - output, 2);
+  }
+  EXPECT_EQ(drive.status().mode, Mode::velocity);
+  RecordProperty("rms_over_stiff", std::to_string(std::sqrt(squares / stiff_squares)));
+  EXPECT_LT(std::sqrt(squares / stiff_squares), 0.7);
+}
+
 }  // namespace
 }  // namespace flexspline::tests
