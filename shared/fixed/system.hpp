@@ -126,18 +126,20 @@ struct FixedSystem {
   // Both have the same place of their point in a word: rounded down.
   static constexpr Value narrow(State x) {
     static_assert(kStateBits - kValueBits == 32);
-    return {{static_cast<std::int32_t>(x.raw >> 32)}};
+    return {{as_word(static_cast<std::int32_t>(x.raw >> 32))}};
   }
   static constexpr State widen(Value x) {
     return {{std::int64_t{x.raw} * (std::int64_t{1} << 32)}};
   }
 
+  // Of the least number it is that number again, which travel() takes for a long way.
   static constexpr Step magnitude(Step x) {
-    const std::uint64_t size = size_of(x.raw);
-    return {static_cast<std::int64_t>(size > kLargest ? kLargest : size)};
+    const auto sign = static_cast<std::uint64_t>(x.raw >> 63);
+    return {static_cast<std::int64_t>((static_cast<std::uint64_t>(x.raw) ^ sign) - sign)};
   }
   static constexpr Value magnitude(Value x) {
-    return x.raw < 0 ? -x : x;
+    Policy::expect(x.raw != INT32_MIN, "a value leaves its range");
+    return {{as_word(static_cast<std::int32_t>(magnitude_of(x.raw)))}};
   }
   static constexpr State magnitude(State x) {
     return x.raw < 0 ? -x : x;
@@ -165,7 +167,9 @@ struct FixedSystem {
     return x.raw < 0 ? b : a;
   }
   static constexpr State sign(Step x) {
-    return {{x.raw > 0 ? kOneState : x.raw < 0 ? -kOneState : 0}};
+    const auto high = static_cast<std::int32_t>(x.raw >> 32);
+    const std::int32_t one = (high >> 31 | 1) * (std::int32_t{1} << kValueBits);
+    return widen({{as_word((high | static_cast<std::int32_t>(x.raw)) != 0 ? one : 0)}});
   }
   static constexpr State sign(Value x) {
     return {{x.raw > 0 ? kOneState : x.raw < 0 ? -kOneState : 0}};
@@ -241,10 +245,10 @@ struct FixedSystem {
   static constexpr State relax(State from, State target, Kept kept) {
     const std::int64_t away = Policy::state_sum(from.raw, negated(target.raw));
     Policy::expect(away < 8 * kOneState && away >= -8 * kOneState, "a distance to relax over leaves its range");
-    const auto distance = static_cast<std::int32_t>(away >> 31);
+    const std::int32_t distance = as_word(static_cast<std::int32_t>(away >> 31));
     const auto low = static_cast<std::int32_t>(kept.lost);
     // The lower word is taken with a sign, as the distance has one.
-    const auto high = static_cast<std::int32_t>((kept.lost >> 32) + (low < 0 ? 1 : 0));
+    const std::int32_t high = as_word(static_cast<std::int32_t>((kept.lost >> 32) + (low < 0 ? 1 : 0)));
     const std::int64_t change = long_product(distance, high) + (long_product(distance, low) >> 32);
     return {{static_cast<std::int64_t>(static_cast<std::uint64_t>(from.raw) - static_cast<std::uint64_t>(change))}};
   }

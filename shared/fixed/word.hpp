@@ -70,12 +70,35 @@ constexpr std::uint32_t multiply_high(std::uint32_t a, std::uint32_t b) {
 constexpr std::int32_t multiply_shift(std::int32_t a, std::int32_t b, int bits) {
   return static_cast<std::int32_t>(long_product(a, b) >> bits);
 }
+// Keeps a word a word: compilers that have seen it widened multiply all 64 bits of it.
+constexpr std::int32_t as_word(std::int32_t x) {
+#if defined(__arm__)
+  if (!std::is_constant_evaluated()) asm("" : "+r"(x));
+#endif
+  return x;
+}
+// x 2^-bits for bits from 0 to 63, rounded down: beyond 31 nothing is left.
+constexpr std::uint32_t shift_down(std::uint32_t x, std::uint32_t bits) {
+#if defined(__arm__) && defined(__thumb2__)
+  if (!std::is_constant_evaluated()) {
+    std::uint32_t down;
+    asm("lsr %0, %1, %2" : "=r"(down) : "r"(x), "r"(bits));
+    return down;
+  }
+#endif
+  return bits > 31 ? 0 : x >> bits;
+}
 constexpr std::uint32_t magnitude_of(std::int32_t x) {
   const auto sign = static_cast<std::uint32_t>(x >> 31);
   return (static_cast<std::uint32_t>(x) ^ sign) - sign;
 }
 
 namespace detail {
+// Not within the functions, where compilers copy them to the stack first.
+inline constexpr std::int32_t kPowerOfTwo[] = {1073741824, 744261146, 257941250, 59596185, 10327310, 1438860, 166016};
+inline constexpr std::int32_t kSine[] = {843314853, -1387196611, 684531186, -160602359, 20845600};
+inline constexpr std::int32_t kLogMean[] = {3025551, -94558, 3940};
+inline constexpr std::int32_t kHalvingMean[] = {1488522224, -1031763206, 476734752, -164875809, 44380305, -7897239};
 // Where a table lies. Compilers would build its numbers from immediates, at two instructions each.
 template <class T, std::size_t Size>
 constexpr const T* in_memory(const T (&table)[Size]) {
@@ -100,19 +123,17 @@ constexpr std::int32_t horner(const std::int32_t (&coefficients)[Size], std::int
 
 // 2^x for x in Q32 from -1/2 to 1/2, in Q30; within 4 units of Q30.
 constexpr std::int32_t power_of_two_word(std::int32_t x) {
-  constexpr std::int32_t kCoefficients[] = {1073741824, 744261146, 257941250, 59596185, 10327310, 1438860, 166016};
-  return detail::horner(kCoefficients, x);
+  return detail::horner(detail::kPowerOfTwo, x);
 }
 
 // sin(2 pi x) for x in turns, Q32, in Q27; within 1.5 units.
 constexpr std::int32_t sine_word(std::uint32_t phase) {
   // sin(2 pi t)/t over 16 t^2 in Q30, each four times as large as the one before stands for.
-  constexpr std::int32_t kCoefficients[] = {843314853, -1387196611, 684531186, -160602359, 20845600};
   // Beyond a quarter turn to either side: half a turn less it.
   const bool beyond = static_cast<std::int32_t>(phase ^ (phase << 1)) < 0;
   const auto t = static_cast<std::int32_t>(beyond ? 0x80000000U - phase : phase);
   const std::int32_t square = multiply_high(t, t);
-  return multiply_high(t, detail::horner(kCoefficients, square * 4));
+  return multiply_high(t, detail::horner(detail::kSine, square * 4));
 }
 
 // log2(x) of an integer x from 1 on, in Q25, within 1.2 units: a table finds a factor that brings the mantissa next to
@@ -153,17 +174,15 @@ inline constexpr WordLogTable kWordLogTable = make_word_log_table();
 // Of the mantissa alone: x as an integer that was shifted up until its highest bit stood; from 0 to 1.
 constexpr std::int32_t log2_of_mantissa(std::uint32_t mantissa) {
   // log2(1 + r)/r over r up to 1/62 to each side, in Q21 and sixteenths of it.
-  constexpr std::int32_t kCoefficients[] = {3025551, -94558, 3940};
   const detail::LogEntry& entry = detail::in_memory(detail::kWordLogTable.entries)[(mantissa >> 26) & 31];
   // Next to one, so that Q36 holds what it differs by: the one itself is shifted out.
   const auto r = static_cast<std::int32_t>(multiply_high(mantissa, entry.factor) << 5);
-  return entry.log + multiply_high(r, detail::horner(kCoefficients, r));
+  return entry.log + multiply_high(r, detail::horner(detail::kLogMean, r));
 }
 
 // (1 - 2^-x)/x for x in Q31 from 0 to 1, in Q31; within 2e-8 of itself.
 constexpr std::uint32_t halving_mean(std::int32_t x) {
-  constexpr std::int32_t kCoefficients[] = {1488522224, -1031763206, 476734752, -164875809, 44380305, -7897239};
-  return static_cast<std::uint32_t>(detail::horner(kCoefficients, x));
+  return static_cast<std::uint32_t>(detail::horner(detail::kHalvingMean, x));
 }
 
 inline constexpr std::uint64_t kAllLost = 0x7FFFFFFE00000000;  // one, as far as it shows
@@ -181,7 +200,7 @@ constexpr std::uint64_t lost_of(std::uint64_t travel) {
   // What is left is halved as often as the whole part says; of what that loses below a word nothing shows. Never quite
   // all, so that a word with a sign holds it.
   constexpr std::uint32_t kAll = kAllLost >> 32;
-  const std::uint32_t left = (kAll - static_cast<std::uint32_t>(lost >> 32)) >> (count < 31 ? count : 31);
+  const std::uint32_t left = shift_down(kAll - static_cast<std::uint32_t>(lost >> 32), count);
   return (std::uint64_t{kAll - left} << 32) | static_cast<std::uint32_t>(lost);
 }
 

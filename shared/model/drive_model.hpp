@@ -1,9 +1,11 @@
 // A drive model as the drive runs it: a fixed place for each effect of the image, no heap, every tick the same work.
+// Which effects an image has is known when it is compiled: what it lacks costs nothing.
 #pragma once
 
 #include <array>
 #include <cstddef>
 #include <cstdint>
+#include <tuple>
 #include <type_traits>
 #include <utility>
 
@@ -19,53 +21,99 @@ constexpr std::size_t places_of() {
   return 1;
 }
 
-template <class Effect, class N>
+// What a firmware image can run. All effects, as often as they are in a model; a tick asks each whether it is there.
+struct EveryEffect {
+  static constexpr bool kFilled = false;
+  static constexpr std::size_t places(std::size_t, std::size_t most) { return most; }
+};
+// The effects of these numbers, as often as each stands here. A tick runs all of them, without asking: an effect that a
+// block leaves out has coefficients of nought, and does nothing.
+template <std::size_t... Numbers>
+struct TheseEffects {
+  static constexpr bool kFilled = true;
+  static constexpr std::size_t places(std::size_t number, std::size_t most) {
+    const std::size_t often = (std::size_t{0} + ... + (Numbers == number ? 1 : 0));
+    return often < most ? often : most;
+  }
+};
+
+template <class Effect, class N, std::size_t Count = places_of<Effect>()>
 struct Places {
   std::uint8_t count = 0;
-  std::array<typename Effect::template Coefficients<N>, places_of<Effect>()> coefficients{};
-  std::array<typename Effect::template State<N>, places_of<Effect>()> states{};
+  std::array<typename Effect::template Coefficients<N>, Count> coefficients{};
+  std::array<typename Effect::template State<N>, Count> states{};
 };
 
 namespace detail {
-template <class Effect>
-constexpr bool runs_on_drive() {
+template <class Effect, class Image>
+constexpr std::size_t places_in(std::size_t number) {
   if constexpr (std::is_void_v<Effect>) {
-    return false;
+    return 0;
+  } else if constexpr (Effect::kInfo.host_only) {
+    return 0;
   } else {
-    return !Effect::kInfo.host_only;
+    return Image::places(number, places_of<Effect>());
   }
 }
-struct Nothing {};
-template <std::size_t Id, class N, bool kRuns = runs_on_drive<typename effects::AtId<Id>::Effect>()>
+template <std::size_t Id, class N, class Image,
+          std::size_t Count = places_in<typename effects::AtId<Id>::Effect, Image>(Id)>
 struct PlaceAt {
-  static constexpr bool kExists = false;
-};
-template <std::size_t Id, class N>
-struct PlaceAt<Id, N, true> {
   static constexpr bool kExists = true;
   using Effect = typename effects::AtId<Id>::Effect;
-  Places<Effect, N> places{};
+  Places<Effect, N, Count> places{};
 };
-template <class N, class Ids>
+template <std::size_t Id, class N, class Image>
+struct PlaceAt<Id, N, Image, 0> {
+  static constexpr bool kExists = false;
+};
+template <class N, class Image, class Ids>
 struct AllPlaces;
-template <class N, std::size_t... Ids>
-struct AllPlaces<N, std::index_sequence<Ids...>> : PlaceAt<Ids, N>... {
+template <class N, class Image, std::size_t... Ids>
+struct AllPlaces<N, Image, std::index_sequence<Ids...>> : PlaceAt<Ids, N, Image>... {
   template <class Visit>
   constexpr void for_each(Visit&& visit) {
-    (visit_one<Ids>(visit), ...);
+    (visit_one<Ids>(*this, visit), ...);
   }
+  template <class Visit>
+  constexpr void for_each(Visit&& visit) const {
+    (visit_one<Ids>(*this, visit), ...);
+  }
+  // Signals that effects with memory read: those of the tick before are kept.
+  static constexpr unsigned remembered() { return (0U | ... | remembered_by<Ids>()); }
 
  private:
-  template <std::size_t Id, class Visit>
-  constexpr void visit_one(Visit& visit) {
-    using Place = PlaceAt<Id, N>;
-    if constexpr (Place::kExists) visit.template operator()<typename Place::Effect>(static_cast<Place&>(*this).places);
+  template <std::size_t Id, class Self, class Visit>
+  static constexpr void visit_one(Self& self, Visit& visit) {
+    using Place = PlaceAt<Id, N, Image>;
+    if constexpr (Place::kExists) {
+      using Which = std::conditional_t<std::is_const_v<Self>, const Place, Place>;
+      visit.template operator()<typename Place::Effect>(static_cast<Which&>(self).places);
+    }
   }
+  template <std::size_t Id>
+  static constexpr unsigned remembered_by() {
+    if constexpr (PlaceAt<Id, N, Image>::kExists) {
+      using Effect = typename PlaceAt<Id, N, Image>::Effect;
+      return std::is_empty_v<typename Effect::template State<N>> ? 0U : Effect::kInfo.reads;
+    } else {
+      return 0U;
+    }
+  }
+};
+struct Nothing {};
+// T where `kKept`, else nothing.
+template <bool kKept, class T>
+struct Slot {
+  using Type = T;
+};
+template <class T>
+struct Slot<false, T> {
+  using Type = Nothing;
 };
 }  // namespace detail
 
-// All effects of the catalogue that run on a drive, in the number system N.
-template <class N>
+// The effects of `Image` in the number system N.
+template <class N, class Image = EveryEffect>
 class DriveModel {
  public:
   using Numbers = N;
@@ -74,58 +122,65 @@ class DriveModel {
   static constexpr std::size_t number_of() {
     return id_of<Effect>();
   }
-  // No effects.
-  constexpr void clear() {
-    places_.for_each([]<class Effect>(Places<Effect, N>& places) { places.count = 0; });
-    reset();
-  }
   // Adds an effect at rest. Returns false where the model already has it as often as it can.
   template <class Effect>
   constexpr bool add(const typename Effect::template Coefficients<N>& coefficients) {
-    auto& places = static_cast<detail::PlaceAt<id_of<Effect>(), N>&>(places_).places;
+    auto& places = static_cast<detail::PlaceAt<id_of<Effect>(), N, Image>&>(places_).places;
     if (places.count == places.coefficients.size()) return false;
     places.coefficients[places.count] = coefficients;
     places.states[places.count] = {};
     ++places.count;
     return true;
   }
-  // Calls visit.operator()<Effect>(places) for each effect that the drive can run, by rising number.
+  // No effects.
+  constexpr void clear() {
+    places_.for_each([]<class Effect>(auto& places) {
+      places.count = 0;
+      places.coefficients = {};
+    });
+    reset();
+  }
+  // Calls visit.operator()<Effect>(places) for each effect that the image can run, by rising number.
   template <class Visit>
   constexpr void for_each(Visit&& visit) {
     places_.for_each(visit);
   }
+  template <class Visit>
+  constexpr void for_each(Visit&& visit) const {
+    places_.for_each(visit);
+  }
   // The state of rest: as after add().
   constexpr void reset() {
-    places_.for_each([]<class Effect>(Places<Effect, N>& places) { places.states = {}; });
+    places_.for_each([]<class Effect>(auto& places) { places.states = {}; });
     started_ = false;
   }
 
   // One tick. `in` has what is measured or set: positions, velocities, accelerations, directions, torque, current,
   // temperature, all within two bases, which the caller limits once, at entry. Returns the torques of the three
   // balances. The first tick only takes note of where the drive stands.
-  constexpr effects::Torques<N> tick(effects::Inputs<N> in) { return tick(in, in.angle); }
+  constexpr effects::Torques<N> tick(const effects::Inputs<N>& in) { return tick(in, in.angle); }
   // The same with another angle for effects that repeat with it and have no memory (ripples): a model along a set point
   // may take what is periodic from where the motor stands.
-  constexpr effects::Torques<N> tick(effects::Inputs<N> in, typename N::Angle periodic_angle) {
+  constexpr effects::Torques<N> tick(const effects::Inputs<N>& measured, typename N::Angle periodic_angle) {
+    effects::Inputs<N> in = measured;
     const auto angle = in.angle;
     complete(in);
     shift(in, periodic_angle);
     modulate(in);
-    if (!started_) before_ = in;
-    started_ = true;
+    const effects::Inputs<N> before = remembered(in);
     effects::Torques<N> out{};
-    places_.for_each([&]<class Effect>(Places<Effect, N>& places) {
-      for (std::size_t i = 0; i < places.count; ++i) {
+    places_.for_each([&]<class Effect>(auto& places) {
+      each_of<Effect>(places, [&](std::size_t i) {
         auto& state = places.states[i];
         const auto& coefficients = places.coefficients[i];
         in.angle = is_periodic<Effect>() ? periodic_angle : angle;
-        Effect::advance(state, coefficients, in, before_);
+        Effect::advance(state, coefficients, in, before);
         if constexpr (Effect::kInfo.phase == effects::Phase::source || Effect::kInfo.adds_to != 0)
           Effect::evaluate(state, coefficients, in, out);
-      }
+      });
     });
-    before_ = in;
-    before_.angle = angle;
+    in.angle = angle;
+    remember(in);
     return out;
   }
 
@@ -142,6 +197,20 @@ class DriveModel {
   static constexpr bool is_periodic() {
     return (Effect::kInfo.reads & effects::kMotorAngle) != 0 && std::is_empty_v<typename Effect::template State<N>>;
   }
+  template <class Effect, class P, class Visit>
+  static constexpr void each_of(P& places, Visit&& visit) {
+    constexpr std::size_t kPlaces = std::tuple_size_v<decltype(places.coefficients)>;
+    if constexpr (Image::kFilled) {
+      [&]<std::size_t... I>(std::index_sequence<I...>) {
+        (visit(I), ...);
+      }
+      (std::make_index_sequence<kPlaces>{});
+    } else if constexpr (kPlaces == 1) {
+      if (places.count != 0) visit(0);
+    } else {
+      for (std::size_t i = 0; i < places.count; ++i) visit(i);
+    }
+  }
   static constexpr void complete(effects::Inputs<N>& in) {
     in.speed = N::magnitude(in.velocity);
     in.torque_magnitude = N::magnitude(in.torque);
@@ -151,28 +220,62 @@ class DriveModel {
   }
   // The dead zone of a backlash lies behind everything else that changes the torsion.
   constexpr void shift(effects::Inputs<N>& in, typename N::Angle periodic_angle) {
+    shift_those<false>(in, periodic_angle);
+    shift_those<true>(in, periodic_angle);
+  }
+  template <bool kLast>
+  constexpr void shift_those(effects::Inputs<N>& in, typename N::Angle periodic_angle) {
     const auto angle = in.angle;
-    for (const bool last : {false, true}) {
-      places_.for_each([&]<class Effect>(Places<Effect, N>& places) {
-        if constexpr (Effect::kInfo.phase == effects::Phase::shift) {
-          if (Effect::kInfo.acts_last != last) return;
+    places_.for_each([&]<class Effect>(auto& places) {
+      if constexpr (Effect::kInfo.phase == effects::Phase::shift && Effect::kInfo.acts_last == kLast)
+        each_of<Effect>(places, [&](std::size_t i) {
           in.angle = is_periodic<Effect>() ? periodic_angle : angle;
-          for (std::size_t i = 0; i < places.count; ++i) Effect::shift(places.coefficients[i], in);
-        }
-      });
-    }
+          Effect::shift(places.coefficients[i], in);
+        });
+    });
     in.angle = angle;
   }
   constexpr void modulate(effects::Inputs<N>& in) {
-    places_.for_each([&]<class Effect>(Places<Effect, N>& places) {
-      if constexpr (Effect::kInfo.phase == effects::Phase::modulate) {
-        for (std::size_t i = 0; i < places.count; ++i) Effect::modulate(places.coefficients[i], in);
-      }
+    places_.for_each([&]<class Effect>(auto& places) {
+      if constexpr (Effect::kInfo.phase == effects::Phase::modulate)
+        each_of<Effect>(places, [&](std::size_t i) { Effect::modulate(places.coefficients[i], in); });
     });
   }
 
-  detail::AllPlaces<N, std::make_index_sequence<effects::kLastId + 1>> places_;
-  effects::Inputs<N> before_{};
+  using All = detail::AllPlaces<N, Image, std::make_index_sequence<effects::kLastId + 1>>;
+  // Of the tick before, what effects with memory may ask for: angle, torsion, magnitude of the torque, current.
+  static constexpr unsigned kRemembered = All::remembered();
+  template <unsigned kSignal, class T>
+  using Kept = typename detail::Slot<(kRemembered & kSignal) != 0, T>::Type;
+  struct Memory {
+    [[no_unique_address]] Kept<effects::kMotorAngle, typename N::Angle> angle{};
+    [[no_unique_address]] Kept<effects::kTorsion, typename N::Value> torsion{};
+    [[no_unique_address]] Kept<effects::kTorque, typename N::Value> torque_magnitude{};
+    [[no_unique_address]] Kept<effects::kCurrent, typename N::Value> current{};
+  };
+  constexpr void remember(const effects::Inputs<N>& in) {
+    if constexpr ((kRemembered & effects::kMotorAngle) != 0) memory_.angle = in.angle;
+    if constexpr ((kRemembered & effects::kTorsion) != 0) memory_.torsion = in.torsion;
+    if constexpr ((kRemembered & effects::kTorque) != 0) memory_.torque_magnitude = in.torque_magnitude;
+    if constexpr ((kRemembered & effects::kCurrent) != 0) memory_.current = in.current;
+  }
+  constexpr effects::Inputs<N> remembered(const effects::Inputs<N>& now) {
+    if constexpr (kRemembered != 0) {
+      if (!started_) {
+        remember(now);
+        started_ = true;
+      }
+    }
+    effects::Inputs<N> before{};
+    if constexpr ((kRemembered & effects::kMotorAngle) != 0) before.angle = memory_.angle;
+    if constexpr ((kRemembered & effects::kTorsion) != 0) before.torsion = memory_.torsion;
+    if constexpr ((kRemembered & effects::kTorque) != 0) before.torque_magnitude = memory_.torque_magnitude;
+    if constexpr ((kRemembered & effects::kCurrent) != 0) before.current = memory_.current;
+    return before;
+  }
+
+  All places_;
+  Memory memory_{};
   bool started_ = false;
 };
 

@@ -76,9 +76,9 @@ inline Proof prove(DriveModel<fixed::Intervals> model) {
     // Both visits meet the effects in the same order.
     std::array<const void*, effects::kLastId + 1> old{};
     std::size_t at = 0;
-    before.for_each([&]<class Effect>(Places<Effect, fixed::Intervals>& places) { old[at++] = &places.states; });
+    before.for_each([&]<class Effect>(auto& places) { old[at++] = &places.states; });
     at = 0;
-    model.for_each([&]<class Effect>(Places<Effect, fixed::Intervals>& places) {
+    model.for_each([&]<class Effect>(auto& places) {
       using States = decltype(places.states);
       const States& states = *static_cast<const States*>(old[at++]);
       for (std::size_t i = 0; i < places.count; ++i)
