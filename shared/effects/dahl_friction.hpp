@@ -46,7 +46,7 @@ struct DahlFriction {
   template <class N>
   static void advance(State<N>& state, const Coefficients<N>& c, const Inputs<N>& now, const Inputs<N>& before) {
     const typename N::Step travel = now.angle - before.angle;
-    const typename N::State decay = N::exp_negative(N::travel(c.per_travel, N::magnitude(travel)));
+    const auto decay = N::exp_negative(N::travel(c.per_travel, N::magnitude(travel)));
     state.deflection = N::relax(state.deflection, N::sign(travel), decay);
   }
   template <class N>

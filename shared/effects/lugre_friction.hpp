@@ -85,7 +85,7 @@ struct LugreFriction {
   static void advance(State<N>& state, const Coefficients<N>& c, const Inputs<N>& now, const Inputs<N>& before) {
     const typename N::Step travel = now.angle - before.angle;
     const typename N::Value most = limit(c, now);
-    const typename N::State share = N::exp_negative(N::over(N::travel(c.per_travel, N::magnitude(travel)), most));
+    const auto share = N::exp_negative(N::over(N::travel(c.per_travel, N::magnitude(travel)), most));
     state.deflection = N::relax(state.deflection, N::times(N::sign(travel), most), share);
   }
   // s1 z' = s1 w (1 - s(w) s0 z/g): nought in steady sliding.

@@ -31,23 +31,22 @@ struct StribeckGaussian : Stateless {
   };
   template <class N>
   struct Coefficients {
-    typename N::Weight positive;
-    typename N::Weight negative;
+    typename N::Weight odd;  // half the sum of both amplitudes, and half their difference
+    typename N::Weight even;
     typename N::RatioGain per_velocity;
   };
   template <class N, class P>
   static Coefficients<N> derive(const P* p, const DriveConstants<P>& d) {
     const P half(0.5);
-    return {N::weight(half * p[0] / d.torque_base), N::weight(half * p[1] / d.torque_base),
+    return {N::weight(half * (p[0] + p[1]) / d.torque_base), N::weight(half * (p[0] - p[1]) / d.torque_base),
             N::ratio_gain(d.velocity_base / p[2])};
   }
-  // s (1 + s) / 2 and s (1 - s) / 2 choose the amplitude of the direction without a branch.
+  // The direction and its square choose the amplitude without a branch.
   template <class N>
   static void evaluate(const State<N>&, const Coefficients<N>& c, const Inputs<N>& in, Torques<N>& out) {
     const typename N::Value bell = N::gauss(N::ratio(c.per_velocity, in.velocity));
-    const typename N::Value odd = N::times(in.direction, bell);
-    const typename N::Value even = N::times(in.direction, odd);
-    out.motor += c.positive * (odd + even) + c.negative * (odd - even);
+    out.motor += c.odd * N::times(in.direction, bell);
+    out.motor += c.even * N::times(N::times(in.direction, in.direction), bell);
   }
 };
 FLEXSPLINE_EFFECT(6, StribeckGaussian);

@@ -21,6 +21,11 @@ struct Verifying {
     expect((a < 0) != (b < 0) || (sum < 0) == (a < 0), "a sum of states leaves its range");
     return sum;
   }
+  static std::int64_t state_difference(std::int64_t a, std::int64_t b) {
+    const std::int64_t difference = Trusting::state_difference(a, b);
+    expect((a < 0) == (b < 0) || (difference < 0) == (a < 0), "a sum of states leaves its range");
+    return difference;
+  }
   static std::int64_t state_shift(std::int64_t x, int bits) {
     const std::int64_t shifted = Trusting::state_shift(x, bits);
     expect(shift_right(shifted, bits) == x, "a value does not fit a state");

@@ -49,6 +49,8 @@ constexpr bool complete(StepGain& g) {
   if (shift >= 32) return false;
   g.factor = static_cast<std::uint32_t>(limited<std::int64_t>(
       shift_right(static_cast<std::int64_t>(size), shift < 0 ? -shift : 0), 0, std::int64_t{0xFFFFFFFF}));
+  constexpr std::uint64_t kPerLn2 = 0xB8AA3B29;  // Q31
+  g.halvings = static_cast<std::uint32_t>((g.factor * kPerLn2 + (std::uint64_t{1} << 31)) >> 32);
   // The input shifted up has to fit a word.
   const std::int64_t most = std::int64_t{0xFFFFFFFF} >> g.up;
   if (g.limit > most) g.limit = static_cast<std::int32_t>(most);

@@ -16,6 +16,9 @@ struct Trusting {
   static constexpr std::int64_t state_sum(std::int64_t a, std::int64_t b) {
     return static_cast<std::int64_t>(static_cast<std::uint64_t>(a) + static_cast<std::uint64_t>(b));
   }
+  static constexpr std::int64_t state_difference(std::int64_t a, std::int64_t b) {
+    return static_cast<std::int64_t>(static_cast<std::uint64_t>(a) - static_cast<std::uint64_t>(b));
+  }
   // x 2^bits as a state.
   static constexpr std::int64_t state_shift(std::int64_t x, int bits) { return shift_right(x, -bits); }
   static constexpr void expect(bool, const char*) {}
@@ -39,7 +42,7 @@ struct FixedSystem {
   };
   struct State : fixed::State {
     friend constexpr State operator+(State a, State b) { return {{Policy::state_sum(a.raw, b.raw)}}; }
-    friend constexpr State operator-(State a, State b) { return {{Policy::state_sum(a.raw, negated(b.raw))}}; }
+    friend constexpr State operator-(State a, State b) { return {{Policy::state_difference(a.raw, b.raw)}}; }
     friend constexpr State operator-(State a) { return {{negated(a.raw)}}; }
   };
   // A term of a sum keeps its factors apart, so that a processor multiplies and adds at once.
@@ -67,6 +70,13 @@ struct FixedSystem {
   struct Kept {
     std::uint64_t lost = 0;
     constexpr operator State() const { return {{kOneState - static_cast<std::int64_t>(lost >> (63 - kStateBits))}}; }
+  };
+  // A travel of steps, not multiplied yet.
+  struct Way {
+    std::uint32_t steps;
+    std::uint32_t factor;
+    std::uint32_t halvings;
+    constexpr operator fixed::Travel() const { return {long_product(steps, factor)}; }
   };
   using Harmonic = fixed::Harmonic;
   using Angle = fixed::Angle;
@@ -194,12 +204,11 @@ struct FixedSystem {
   static constexpr Step distance(Gain g, Value x) {
     return {shift_right(product(g, x.raw), kMantissaBits + kValueBits - kAngleBits - g.exponent)};
   }
-  static constexpr Travel travel(const StepGain& g, Step x) {
-    // Longer than half a turn is as good as half a turn.
-    const auto low = static_cast<std::int32_t>(x.raw), high = static_cast<std::int32_t>(x.raw >> 32);
-    const std::uint32_t size = magnitude_of(high == low >> 31 ? low : 0x7FFFFFFF);
+  // Of a magnitude. Longer than a turn is as good as a turn.
+  static constexpr Way travel(const StepGain& g, Step x) {
+    const std::uint32_t size = x.raw >> 32 != 0 ? 0xFFFFFFFF : static_cast<std::uint32_t>(x.raw);
     const auto most = static_cast<std::uint32_t>(g.limit);
-    return {long_product((size < most ? size : most) << g.up, g.factor)};
+    return {(size < most ? size : most) << g.up, g.factor, g.halvings};
   }
   static constexpr Travel travel(Gain g, Value x) {
     return limited_travel(shift_right(product(g, x.raw), kMantissaBits + kValueBits - kTravelBits - g.exponent));
@@ -243,7 +252,7 @@ struct FixedSystem {
   }
   // Takes what it loses off the distance, of which 28 fractional bits count: so it may pass the target by a unit.
   static constexpr State relax(State from, State target, Kept kept) {
-    const std::int64_t away = Policy::state_sum(from.raw, negated(target.raw));
+    const std::int64_t away = Policy::state_difference(from.raw, target.raw);
     Policy::expect(away < 8 * kOneState && away >= -8 * kOneState, "a distance to relax over leaves its range");
     const std::int32_t distance = as_word(static_cast<std::int32_t>(away >> 31));
     const auto low = static_cast<std::int32_t>(kept.lost);
@@ -258,6 +267,9 @@ struct FixedSystem {
     return relax(from, target, Kept{lost < kAllLost ? lost : kAllLost});
   }
 
+  static constexpr Kept exp_negative(const Way& x) {
+    return {lost_of_halvings(long_product(x.steps, x.halvings))};
+  }
   static constexpr Kept exp_negative(Travel x) {
     return {lost_of(x.raw)};
   }
@@ -304,9 +316,10 @@ struct FixedSystem {
     // The ratio times the root of log2(e), Q28, below 5.3; its square Q27.
     const std::uint32_t w = multiply_high((size < x.gain.near ? size : x.gain.near) << x.gain.up, x.gain.bell);
     const auto square = static_cast<std::uint32_t>(long_product(w, w) >> 29);
-    const std::uint32_t halvings = (square + (std::uint32_t{1} << 26)) >> 27;
+    constexpr std::uint32_t kRounding = (std::uint32_t{1} << 26) + (std::uint32_t{kMantissaBits - kValueBits} << 27);
+    const std::uint32_t down = (square + kRounding) >> 27;
     const std::int32_t power = power_of_two_word(static_cast<std::int32_t>(0 - (square << 5)));
-    return {{power >> (halvings + (kMantissaBits - kValueBits))}};
+    return {{power >> down}};
   }
   static constexpr Value lorentzian(Ratio x) {
     constexpr std::int64_t kAllGone = std::int64_t{11000} << kRatioBits;  // one over its square is one unit
@@ -324,8 +337,8 @@ struct FixedSystem {
   static constexpr Value pow_abs(const Scaled& x, Exponent e) {
     const std::uint32_t size = magnitude_of(x.signal.raw);
     const int zeros = std::countl_zero(size);
-    const std::int32_t log =
-        x.gain.log + ((31 - kValueBits) << 25) - (zeros << 25) + log2_of_mantissa(size << (zeros & 31));
+    const std::int32_t log = x.gain.log + ((31 - kValueBits) << 25) - (zeros << 25) +
+                             log2_of_mantissa(shift_up(size, static_cast<std::uint32_t>(zeros)));
     return power_of(log, e, size == 0);
   }
   static constexpr Value pow_abs(State x, Exponent e) {

@@ -85,7 +85,8 @@ struct Gain {
   std::int8_t exponent = 0;
   std::int32_t limit = 0;
 };
-// Per turn, of steps. `factor` 2^up is the same number in 2^-26 units of a travel.
+// Per turn, of steps. `factor` 2^up is the same number in 2^-26 units of a travel; `halvings` 2^up times 2 log2(e) of
+// it.
 struct StepGain {
   static constexpr int kLeastExponent = -40;
   static constexpr int kMostExponent = 60;
@@ -94,6 +95,7 @@ struct StepGain {
   std::uint8_t up = 0;
   std::int32_t limit = 0;
   std::uint32_t factor = 0;
+  std::uint32_t halvings = 0;
 };
 // One over a characteristic size of a signal. `bell` 2^up is that number times the root of log2(e), for inputs up to
 // `near`; `log` is log2 of it in Q25.

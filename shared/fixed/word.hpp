@@ -88,6 +88,17 @@ constexpr std::uint32_t shift_down(std::uint32_t x, std::uint32_t bits) {
 #endif
   return bits > 31 ? 0 : x >> bits;
 }
+// x 2^bits for bits from 0 to 63, of which the lowest word is left.
+constexpr std::uint32_t shift_up(std::uint32_t x, std::uint32_t bits) {
+#if defined(__arm__) && defined(__thumb2__)
+  if (!std::is_constant_evaluated()) {
+    std::uint32_t up;
+    asm("lsl %0, %1, %2" : "=r"(up) : "r"(x), "r"(bits));
+    return up;
+  }
+#endif
+  return bits > 31 ? 0 : x << bits;
+}
 constexpr std::uint32_t magnitude_of(std::int32_t x) {
   const auto sign = static_cast<std::uint32_t>(x >> 31);
   return (static_cast<std::uint32_t>(x) ^ sign) - sign;
@@ -108,16 +119,44 @@ constexpr const T* in_memory(const T (&table)[Size]) {
 #endif
   return at;
 }
-template <std::size_t... Down>
-constexpr std::int32_t horner(const std::int32_t* c, std::int32_t x, std::index_sequence<Down...>) {
-  std::int32_t sum = c[sizeof...(Down)];
-  ((sum = add_high(c[sizeof...(Down) - 1 - Down], sum, x)), ...);
-  return sum;
+// Two neighbours at once, where the processor can.
+struct Pair {
+  std::int32_t first = 0;
+  std::int32_t second = 0;
+};
+template <std::size_t Index>
+constexpr Pair load_pair(const std::int32_t* table) {
+#if defined(__arm__) && defined(__thumb2__)
+  // No memory operand: what lies in a table never changes.
+  if (!std::is_constant_evaluated()) {
+    Pair p;
+    asm("ldrd %0, %1, [%2, %3]" : "=r"(p.first), "=r"(p.second) : "r"(table), "n"(Index * sizeof(std::int32_t)));
+    return p;
+  }
+#endif
+  return {table[Index], table[Index + 1]};
 }
-// c0 + x (c1 + x (c2 + ...)) with x in 2^-32.
+// c0 + x (c1 + x (c2 + ...)) with x in 2^-32, from the last of `Count` coefficients on.
+template <std::size_t Count>
+constexpr std::int32_t horner(const std::int32_t* c, std::int32_t sum, std::int32_t x) {
+  if constexpr (Count == 0) {
+    return sum;
+  } else if constexpr (Count == 1) {
+    return add_high(c[0], sum, x);
+  } else {
+    const Pair p = load_pair<Count - 2>(c);
+    return horner<Count - 2>(c, add_high(p.first, add_high(p.second, sum, x), x), x);
+  }
+}
 template <std::size_t Size>
 constexpr std::int32_t horner(const std::int32_t (&coefficients)[Size], std::int32_t x) {
-  return horner(in_memory(coefficients), x, std::make_index_sequence<Size - 1>{});
+  const std::int32_t* c = in_memory(coefficients);
+  if constexpr (Size % 2 == 1) {
+    return horner<Size - 1>(c, c[Size - 1], x);
+  } else {
+    const Pair p = load_pair<Size - 2>(c);
+    return horner<Size - 2>(c, add_high(p.first, p.second, x), x);
+  }
 }
 }  // namespace detail
 
@@ -187,11 +226,8 @@ constexpr std::uint32_t halving_mean(std::int32_t x) {
 
 inline constexpr std::uint64_t kAllLost = 0x7FFFFFFE00000000;  // one, as far as it shows
 
-// 1 - exp(-x) for x in Q58, in Q63, within 1e-8; of a small x within 2e-8 of itself.
-constexpr std::uint64_t lost_of(std::uint64_t travel) {
-  constexpr std::uint32_t kPerLn2 = 0xB8AA3B29;  // Q31
-  const auto high = static_cast<std::uint32_t>(travel >> 32), low = static_cast<std::uint32_t>(travel);
-  const std::uint64_t halvings = long_product(high, kPerLn2) + multiply_high(low, kPerLn2);  // Q57
+// 1 - 2^-x for x in Q57, in Q63, within 1e-8; of a small x within 2e-8 of itself.
+constexpr std::uint64_t lost_of_halvings(std::uint64_t halvings) {
   const auto count = static_cast<std::uint32_t>(halvings >> 57) & 63;
   const std::uint64_t fraction = halvings << 7;  // Q64
   const auto upper = static_cast<std::uint32_t>(fraction >> 32);
@@ -202,6 +238,12 @@ constexpr std::uint64_t lost_of(std::uint64_t travel) {
   constexpr std::uint32_t kAll = kAllLost >> 32;
   const std::uint32_t left = shift_down(kAll - static_cast<std::uint32_t>(lost >> 32), count);
   return (std::uint64_t{kAll - left} << 32) | static_cast<std::uint32_t>(lost);
+}
+// 1 - exp(-x) for x in Q58, likewise.
+constexpr std::uint64_t lost_of(std::uint64_t travel) {
+  constexpr std::uint32_t kPerLn2 = 0xB8AA3B29;  // Q31
+  const auto high = static_cast<std::uint32_t>(travel >> 32), low = static_cast<std::uint32_t>(travel);
+  return lost_of_halvings(long_product(high, kPerLn2) + multiply_high(low, kPerLn2));
 }
 
 }  // namespace flexspline::fixed
