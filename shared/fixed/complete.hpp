@@ -63,8 +63,8 @@ constexpr bool complete(RatioGain& g) {
   g.log = -(std::int32_t{31} << 25);
   if (g.mantissa == 0) return true;
   const auto size = static_cast<std::uint64_t>(size_of(g.mantissa));
-  g.log = static_cast<std::int32_t>(
-      shift_right(log2_of(size) + (std::int64_t{g.exponent - kMantissaBits} << kLogBits), kLogBits - 25));
+  g.log = static_cast<std::int32_t>(shift_right(
+      log2_of(size) + (std::int64_t{g.exponent - kMantissaBits + 31 - kValueBits} << kLogBits), kLogBits - 25));
   // Times 1.2011, the root of log2(e): as a mantissa from 1/2 to 1 in Q32 and a power of two.
   constexpr std::uint64_t kRoot = 0x99BE610C;  // Q31
   std::uint64_t bell = (size * kRoot + (std::uint64_t{1} << 28)) >> 29;

@@ -71,6 +71,10 @@ struct FixedSystem {
     std::uint64_t lost = 0;
     constexpr operator State() const { return {{kOneState - static_cast<std::int64_t>(lost >> (63 - kStateBits))}}; }
   };
+  // Magnitude of a step, 2^-32 turns.
+  struct Length {
+    std::uint32_t raw;
+  };
   // A travel of steps, not multiplied yet.
   struct Way {
     std::uint32_t steps;
@@ -142,10 +146,10 @@ struct FixedSystem {
     return {{std::int64_t{x.raw} * (std::int64_t{1} << 32)}};
   }
 
-  // Of the least number it is that number again, which travel() takes for a long way.
-  static constexpr Step magnitude(Step x) {
-    const auto sign = static_cast<std::uint64_t>(x.raw >> 63);
-    return {static_cast<std::int64_t>((static_cast<std::uint64_t>(x.raw) ^ sign) - sign)};
+  // Longer than half a turn is as good as a turn.
+  static constexpr Length magnitude(Step x) {
+    const auto low = static_cast<std::int32_t>(x.raw), high = static_cast<std::int32_t>(x.raw >> 32);
+    return {high == low >> 31 ? magnitude_of(low) : 0xFFFFFFFF};
   }
   static constexpr Value magnitude(Value x) {
     Policy::expect(x.raw != INT32_MIN, "a value leaves its range");
@@ -204,11 +208,9 @@ struct FixedSystem {
   static constexpr Step distance(Gain g, Value x) {
     return {shift_right(product(g, x.raw), kMantissaBits + kValueBits - kAngleBits - g.exponent)};
   }
-  // Of a magnitude. Longer than a turn is as good as a turn.
-  static constexpr Way travel(const StepGain& g, Step x) {
-    const std::uint32_t size = x.raw >> 32 != 0 ? 0xFFFFFFFF : static_cast<std::uint32_t>(x.raw);
+  static constexpr Way travel(const StepGain& g, Length x) {
     const auto most = static_cast<std::uint32_t>(g.limit);
-    return {(size < most ? size : most) << g.up, g.factor, g.halvings};
+    return {(x.raw < most ? x.raw : most) << g.up, g.factor, g.halvings};
   }
   static constexpr Travel travel(Gain g, Value x) {
     return limited_travel(shift_right(product(g, x.raw), kMantissaBits + kValueBits - kTravelBits - g.exponent));
@@ -337,8 +339,8 @@ struct FixedSystem {
   static constexpr Value pow_abs(const Scaled& x, Exponent e) {
     const std::uint32_t size = magnitude_of(x.signal.raw);
     const int zeros = std::countl_zero(size);
-    const std::int32_t log = x.gain.log + ((31 - kValueBits) << 25) - (zeros << 25) +
-                             log2_of_mantissa(shift_up(size, static_cast<std::uint32_t>(zeros)));
+    const std::int32_t log =
+        x.gain.log - (zeros << 25) + log2_of_mantissa(shift_up(size, static_cast<std::uint32_t>(zeros)));
     return power_of(log, e, size == 0);
   }
   static constexpr Value pow_abs(State x, Exponent e) {
@@ -352,7 +354,9 @@ struct FixedSystem {
   static constexpr Value wave_of(const Harmonic& h, Angle angle) {
     const auto turns = static_cast<std::int32_t>(angle.raw >> 32);
     const auto part = static_cast<std::uint32_t>(angle.raw);
-    std::uint32_t phase = h.phase + part * static_cast<std::uint32_t>(h.whole);
+    // In this order two instructions multiply and add.
+    auto phase = static_cast<std::uint32_t>(
+        as_word(static_cast<std::int32_t>(h.phase + part * static_cast<std::uint32_t>(h.whole))));
     phase += static_cast<std::uint32_t>(turns) * h.fraction;
     phase += multiply_high(part, h.fraction);
     return {{sine_word(static_cast<std::uint32_t>(add_high(static_cast<std::int32_t>(phase), turns, h.remainder)))}};
@@ -423,8 +427,7 @@ struct FixedSystem {
     constexpr std::int32_t kLow = std::int32_t{28} << kBits;
     const std::int64_t product = long_product(log, e.raw);
     const auto high = static_cast<std::int32_t>(product >> 32) + kLow;
-    const auto counted =
-        static_cast<std::uint32_t>(limited<std::int32_t>(of_nought ? 0 : high, 0, (1 << (kBits + 5)) - 1));
+    const std::uint32_t counted = saturated<kBits + 5>(of_nought ? 0 : high);
     const std::uint32_t y = (counted << (26 - kBits)) | (static_cast<std::uint32_t>(product) >> (32 - (26 - kBits)));
     const std::uint32_t halvings = 31 - ((y + (std::uint32_t{1} << 25)) >> 26);
     Policy::expect(halvings < 32, "a power leaves the range of a value");

@@ -98,7 +98,8 @@ struct StepGain {
   std::uint32_t halvings = 0;
 };
 // One over a characteristic size of a signal. `bell` 2^up is that number times the root of log2(e), for inputs up to
-// `near`; `log` is log2 of it in Q25.
+// `near`; `log` is log2 of it in Q25, of signals
+// that were shifted up until their highest bit stood.
 struct RatioGain {
   static constexpr int kLeastExponent = -40;
   static constexpr int kMostExponent = 60;

@@ -15,19 +15,38 @@ namespace flexspline::fixed {
 
 // Products of two words. Cortex-M0 has no long multiplication: its parts are put together from 16 bits.
 #if defined(__ARM_ARCH_6M__)
-[[gnu::noinline]] inline std::uint64_t long_product_of_parts(std::uint32_t a, std::uint32_t b) {
+namespace detail {
+// From halves, the upper ones with a sign where the numbers have one. No step leaves 32 bits.
+[[gnu::noinline]] inline std::int64_t signed_product(std::int32_t a, std::int32_t b) {
+  const auto a0 = static_cast<std::int32_t>(a & 0xFFFF), b0 = static_cast<std::int32_t>(b & 0xFFFF);
+  const std::int32_t a1 = a >> 16, b1 = b >> 16;
+  const std::uint32_t low = static_cast<std::uint32_t>(a0) * static_cast<std::uint32_t>(b0);
+  const std::int32_t one = a1 * b0 + static_cast<std::int32_t>(low >> 16);
+  const std::int32_t two = a0 * b1 + (one & 0xFFFF);
+  const auto high = static_cast<std::uint32_t>(a1 * b1 + (one >> 16) + (two >> 16));
+  return static_cast<std::int64_t>((std::uint64_t{high} << 32) |
+                                   ((static_cast<std::uint32_t>(two) << 16) | (low & 0xFFFF)));
+}
+[[gnu::noinline]] inline std::int32_t sum_with_high(std::int32_t c, std::int32_t a, std::int32_t b) {
+  const auto a0 = static_cast<std::int32_t>(a & 0xFFFF), b0 = static_cast<std::int32_t>(b & 0xFFFF);
+  const std::int32_t a1 = a >> 16, b1 = b >> 16;
+  const std::uint32_t low = static_cast<std::uint32_t>(a0) * static_cast<std::uint32_t>(b0);
+  const std::int32_t one = a1 * b0 + static_cast<std::int32_t>(low >> 16);
+  const std::int32_t two = a0 * b1 + (one & 0xFFFF);
+  return static_cast<std::int32_t>(static_cast<std::uint32_t>(c) +
+                                   static_cast<std::uint32_t>(a1 * b1 + (one >> 16) + (((two >> 15) + 1) >> 1)));
+}
+[[gnu::noinline]] inline std::uint64_t unsigned_product(std::uint32_t a, std::uint32_t b) {
   const std::uint32_t a0 = a & 0xFFFF, a1 = a >> 16, b0 = b & 0xFFFF, b1 = b >> 16;
   const std::uint32_t low = a0 * b0, one = a1 * b0 + (low >> 16), two = a0 * b1 + (one & 0xFFFF);
   return (std::uint64_t{a1 * b1 + (one >> 16) + (two >> 16)} << 32) | ((two << 16) | (low & 0xFFFF));
 }
+}  // namespace detail
 constexpr std::uint64_t long_product(std::uint32_t a, std::uint32_t b) {
-  return std::is_constant_evaluated() ? std::uint64_t{a} * b : long_product_of_parts(a, b);
+  return std::is_constant_evaluated() ? std::uint64_t{a} * b : detail::unsigned_product(a, b);
 }
 constexpr std::int64_t long_product(std::int32_t a, std::int32_t b) {
-  if (std::is_constant_evaluated()) return std::int64_t{a} * b;
-  const auto ua = static_cast<std::uint32_t>(a), ub = static_cast<std::uint32_t>(b);
-  const std::uint32_t more = (a < 0 ? ub : 0) + (b < 0 ? ua : 0);
-  return static_cast<std::int64_t>(long_product_of_parts(ua, ub) - (std::uint64_t{more} << 32));
+  return std::is_constant_evaluated() ? std::int64_t{a} * b : detail::signed_product(a, b);
 }
 #else
 constexpr std::uint64_t long_product(std::uint32_t a, std::uint32_t b) {
@@ -47,6 +66,8 @@ constexpr std::int32_t add_high(std::int32_t c, std::int32_t a, std::int32_t b) 
     asm("smmlar %0, %1, %2, %3" : "=r"(sum) : "r"(a), "r"(b), "r"(c));
     return sum;
   }
+#elif defined(__ARM_ARCH_6M__)
+  if (!std::is_constant_evaluated()) return detail::sum_with_high(c, a, b);
 #endif
   const auto product = static_cast<std::uint64_t>(long_product(a, b)) + (std::uint64_t{1} << 31);
   return static_cast<std::int32_t>(static_cast<std::uint32_t>(c) + static_cast<std::uint32_t>(product >> 32));
@@ -98,6 +119,19 @@ constexpr std::uint32_t shift_up(std::uint32_t x, std::uint32_t bits) {
   }
 #endif
   return bits > 31 ? 0 : x << bits;
+}
+// x within 0 and 2^Bits - 1.
+template <int Bits>
+constexpr std::uint32_t saturated(std::int32_t x) {
+#if defined(__arm__) && defined(__thumb2__)
+  if (!std::is_constant_evaluated()) {
+    std::uint32_t limited;
+    asm("usat %0, %2, %1" : "=r"(limited) : "r"(x), "n"(Bits));
+    return limited;
+  }
+#endif
+  constexpr std::int32_t kMost = (std::int32_t{1} << Bits) - 1;
+  return static_cast<std::uint32_t>(x < 0 ? 0 : x > kMost ? kMost : x);
 }
 constexpr std::uint32_t magnitude_of(std::int32_t x) {
   const auto sign = static_cast<std::uint32_t>(x >> 31);
