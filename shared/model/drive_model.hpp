@@ -167,7 +167,8 @@ class DriveModel {
     complete(in);
     shift(in, periodic_angle);
     modulate(in);
-    const effects::Inputs<N> before = remembered(in);
+    // Not const: compilers keep constants in memory.
+    effects::Inputs<N> before = remembered(in);
     effects::Torques<N> out{};
     places_.for_each([&]<class Effect>(auto& places) {
       each_of<Effect>(places, [&](std::size_t i) {
