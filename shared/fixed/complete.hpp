@@ -10,17 +10,15 @@
 
 namespace flexspline::fixed {
 
-// A gain per turn below an eighth or so has fewer bits than its error bound needs.
-inline constexpr std::uint32_t kLeastFactor = std::uint32_t{1} << 21;
-
 namespace detail {
 // largest / (mantissa 2^(exponent - 30)) in units of 2^-input_bits, rounded down; nought counts as a half.
 // `largest_q20` below 2^37.
 constexpr std::uint64_t input_limit(std::uint64_t largest_q20, std::int32_t mantissa, int exponent, int input_bits,
                                     std::uint64_t most) {
   const std::uint64_t size = mantissa == 0 ? std::uint64_t{1} << (kMantissaBits - 1) : size_of(mantissa);
-  const std::uint64_t quotient = (largest_q20 << 26) / size;  // of 46 - 30 fractional bits
-  const int up = input_bits - 16 - exponent;
+  const int zeros = std::countl_zero(largest_q20);
+  const std::uint64_t quotient = (largest_q20 << zeros) / size;
+  const int up = input_bits + kMantissaBits - 20 - zeros - exponent;
   if (up <= -64) return 0;
   if (up < 0) return quotient >> -up < most ? quotient >> -up : most;
   if (up >= std::countl_zero(quotient)) return most;
@@ -41,7 +39,8 @@ constexpr bool complete(Gain& g) {
 constexpr bool complete(StepGain& g) {
   if (!detail::complete(g, std::uint64_t{31} << 20, kAngleBits)) return false;
   // A travel is steps times mantissa 2^(exponent - 4) in Q58. So many bits of the mantissa are kept as a product with
-  // the largest input, shifted up, leaves room for.
+  // the largest input, shifted up, leaves room for: of gains below a thousandth a turn less than an error bound needs,
+  // which the packer's comparison with double finds.
   constexpr int kUp = kTravelBits - kAngleBits - kMantissaBits;
   const auto size = static_cast<std::uint64_t>(size_of(g.mantissa)) << 2;
   const int shift = g.exponent + kUp - 2;
@@ -54,7 +53,7 @@ constexpr bool complete(StepGain& g) {
   // The input shifted up has to fit a word.
   const std::int64_t most = std::int64_t{0xFFFFFFFF} >> g.up;
   if (g.limit > most) g.limit = static_cast<std::int32_t>(most);
-  return g.mantissa == 0 || g.factor >= kLeastFactor;
+  return true;
 }
 constexpr bool complete(RatioGain& g) {
   if (!detail::complete(g, std::uint64_t{1} << 37, kValueBits)) return false;
