@@ -39,44 +39,44 @@ struct DuhemHysteresis {
   template <class N>
   struct Coefficients {
     typename N::Gain rate;
-    typename N::Value lead;  // b/a, what the torque leads phi by in long motion
-    typename N::Value half_phi_0;
-    typename N::Gain half_phi_1;
-    typename N::Gain half_phi_2;
-    typename N::Gain half_phi_3;
+    typename N::Value lead;  // quarter of b/a, what the torque leads phi by in long motion
+    typename N::Value eighth_phi_0;
+    typename N::Gain eighth_phi_1;
+    typename N::Gain eighth_phi_2;
+    typename N::Gain eighth_phi_3;
     typename N::Weight torque;
   };
-  // The torque, in output torque bases.
+  // A quarter of the torque, in output torque bases: a drive relaxes over distances below eight.
   template <class N>
   struct State {
     typename N::State torque{};
   };
   template <class N, class P>
   static Coefficients<N> derive(const P* p, const DriveConstants<P>& d) {
-    const P half(0.5);
+    const P eighth(0.125), quarter(0.25);
     const P one = d.torsion_base / d.output_torque_base;
     const P two = one * d.torsion_base;
     const P three = two * d.torsion_base;
     return {N::gain(p[0] * d.torsion_base),
-            N::value(p[1] / (p[0] * d.output_torque_base)),
-            N::value(half * p[2] / d.output_torque_base),
-            N::gain(half * p[3] * one),
-            N::gain(half * p[4] * two),
-            N::gain(half * p[5] * three),
-            N::weight(P(1.0))};
+            N::value(quarter * p[1] / (p[0] * d.output_torque_base)),
+            N::value(eighth * p[2] / d.output_torque_base),
+            N::gain(eighth * p[3] * one),
+            N::gain(eighth * p[4] * two),
+            N::gain(eighth * p[5] * three),
+            N::weight(P(4.0))};
   }
   template <class N>
-  static typename N::Value half_phi(const Coefficients<N>& c, typename N::Value x) {
+  static typename N::Value eighth_phi(const Coefficients<N>& c, typename N::Value x) {
     const typename N::Value square = N::times(x, x);
-    return c.half_phi_0 + N::scaled(c.half_phi_1, x) + N::scaled(c.half_phi_2, square) +
-           N::scaled(c.half_phi_3, N::times(square, x));
+    return c.eighth_phi_0 + N::scaled(c.eighth_phi_1, x) + N::scaled(c.eighth_phi_2, square) +
+           N::scaled(c.eighth_phi_3, N::times(square, x));
   }
   // Exact for the phi in the middle of the step: T' = -a abs(v) (T - phi) + b v relaxes to phi + s(v) b/a.
   template <class N>
   static void advance(State<N>& state, const Coefficients<N>& c, const Inputs<N>& now, const Inputs<N>& before) {
     const typename N::Value torsion = now.torsion - before.torsion;
     const typename N::Travel travel = N::travel(c.rate, N::magnitude(torsion));
-    const typename N::Value phi = half_phi(c, now.torsion) + half_phi(c, before.torsion);
+    const typename N::Value phi = eighth_phi(c, now.torsion) + eighth_phi(c, before.torsion);
     const typename N::State target = N::widen(phi) + N::times(N::sign(torsion), c.lead);
     state.torque = N::relax(state.torque, target, N::exp_negative(travel));
   }
