@@ -41,7 +41,9 @@ inline Share make_share(double x) {
     Findings::note("a share is not between nought and one");
     return {};
   }
-  return {static_cast<std::uint64_t>(scaled_by_power(x, kShareBits) + 0.5)};
+  constexpr std::uint64_t kOne = std::uint64_t{1} << kShareBits;
+  const auto raw = static_cast<std::uint64_t>(scaled_by_power(x, kShareBits) + 0.5);
+  return {raw < kOne ? raw : kOne - 1};
 }
 inline Exponent make_exponent(double x) {
   return {static_cast<std::int32_t>(

@@ -34,7 +34,13 @@ constexpr bool complete(G& g, std::uint64_t largest_q20, int input_bits) {
 // Each sets what follows from mantissa and exponent; false where that leaves no input that the coefficient could be
 // applied to.
 constexpr bool complete(Gain& g) {
-  return detail::complete(g, kLargestValueQ20, kValueBits);
+  if (!detail::complete(g, kLargestValueQ20, kValueBits)) return false;
+  // The largest input shifted up by one less than the exponent fits a word.
+  const int shift = g.exponent - 1;
+  g.up = static_cast<std::uint8_t>(shift > 0 ? shift : 0);
+  g.factor = static_cast<std::int32_t>(limited<std::int64_t>(
+      shift_right(std::int64_t{g.mantissa} * 2, shift < 0 ? -shift : 0), -0x7FFFFFFF, 0x7FFFFFFF));
+  return true;
 }
 constexpr bool complete(StepGain& g) {
   if (!detail::complete(g, std::uint64_t{31} << 20, kAngleBits)) return false;
@@ -53,6 +59,8 @@ constexpr bool complete(StepGain& g) {
   // The input shifted up has to fit a word.
   const std::int64_t most = std::int64_t{0xFFFFFFFF} >> g.up;
   if (g.limit > most) g.limit = static_cast<std::int32_t>(most);
+  g.near = static_cast<std::uint32_t>(detail::input_limit(std::uint64_t{2} << 20, g.mantissa, g.exponent, kAngleBits,
+                                                          static_cast<std::uint64_t>(g.limit)));
   return true;
 }
 constexpr bool complete(RatioGain& g) {
@@ -87,10 +95,20 @@ constexpr bool complete(RatioGain& g) {
 }
 constexpr bool complete(DistanceGain& g) {
   constexpr std::uint64_t kMost = 0x7FFFFFFFFFFFFFFF;
-  g.limit = g.mantissa == 0 ? 0
-                            : static_cast<std::int64_t>(detail::input_limit(std::uint64_t{4} << 20, g.mantissa,
-                                                                            g.exponent, kAngleBits, kMost));
-  return g.mantissa == 0 || g.limit > 0;
+  g.limit = 0;
+  g.factor = 0;
+  g.down = 0;
+  if (g.mantissa == 0) return true;
+  g.limit =
+      static_cast<std::int64_t>(detail::input_limit(std::uint64_t{4} << 20, g.mantissa, g.exponent, kAngleBits, kMost));
+  if (g.limit <= 0) return false;
+  // The limited input in a word, and then as much of it as there is room for: gain 2^(59 - 32 + down) is the factor.
+  const int bits = 64 - std::countl_zero(static_cast<std::uint64_t>(g.limit));
+  g.down = static_cast<std::int8_t>(bits - 31);
+  g.factor = static_cast<std::int32_t>(
+      limited<std::int64_t>(shift_right(g.mantissa, kMantissaBits - (kStateBits - kAngleBits) - g.down - g.exponent),
+                            -0x7FFFFFFF, 0x7FFFFFFF));
+  return true;
 }
 constexpr bool complete(Harmonic& h) {
   constexpr std::int64_t kMost = std::int64_t{1} << 62;

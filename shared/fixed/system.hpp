@@ -24,11 +24,12 @@ struct Trusting {
   static constexpr void expect(bool, const char*) {}
 };
 
-// The input limited, times the mantissa: below 2^61.
-template <class G>
-constexpr std::int64_t product(const G& g, std::int64_t x) {
-  return g.mantissa * limited<std::int64_t>(x, -std::int64_t{g.limit}, g.limit);
+// The input limited, times the gain: Q57, below 16.
+constexpr std::int64_t product(const Gain& g, std::int32_t x) {
+  const std::int32_t limited_x = limited(x, -g.limit, g.limit);
+  return long_product(static_cast<std::int32_t>(static_cast<std::uint32_t>(limited_x) << g.up), g.factor);
 }
+inline constexpr int kProductBits = 57;
 
 template <class Policy>
 struct FixedSystem {
@@ -50,8 +51,8 @@ struct FixedSystem {
     friend constexpr fixed::Sum operator*(Weight w, Value x) { return {long_product(w.raw, x.raw)}; }
   };
   struct Gain : fixed::Gain {
-    friend constexpr fixed::Sum operator*(Gain g, Value x) {
-      return {shift_right(product(g, x.raw), kMantissaBits + kValueBits - kSumBits - g.exponent)};
+    friend constexpr fixed::Sum operator*(const Gain& g, Value x) {
+      return {product(g, x.raw) >> (kProductBits - kSumBits)};
     }
   };
   struct Wave {
@@ -63,7 +64,8 @@ struct FixedSystem {
     fixed::RatioGain gain;
     Value signal;
     constexpr operator fixed::Ratio() const {
-      return {shift_right(product(gain, signal.raw), kMantissaBits + kValueBits - kRatioBits - gain.exponent)};
+      const std::int32_t x = limited(signal.raw, -gain.limit, gain.limit);
+      return {shift_right(long_product(x, gain.mantissa), kMantissaBits + kValueBits - kRatioBits - gain.exponent)};
     }
   };
   // What a relaxation loses of its distance, 1 - exp(-x), Q63: exact however small x is.
@@ -123,8 +125,9 @@ struct FixedSystem {
 #endif
     return {{Policy::value(long_product(a.raw, b.raw) >> kValueBits)}};
   }
-  static constexpr Value scaled(Gain g, Value x) {
-    return {{Policy::value(shift_right(product(g, x.raw), kMantissaBits - g.exponent))}};
+  static constexpr Value scaled(const Gain& g, Value x) {
+    constexpr std::int64_t kHalf = std::int64_t{1} << (kProductBits - kValueBits - 1);
+    return {{Policy::value((product(g, x.raw) + kHalf) >> (kProductBits - kValueBits))}};
   }
   static constexpr Scaled ratio(const RatioGain& g, Value x) {
     return {g, x};
@@ -134,13 +137,17 @@ struct FixedSystem {
   }
   // The whole of the balance: what does not fit a signal is clamped, as the last step.
   static constexpr Value narrow(Sum x) {
-    return {{static_cast<std::int32_t>(
-        limited<std::int64_t>(shift_right(x.raw, kSumBits - kValueBits), -0x7FFFFFFF, 0x7FFFFFFF))}};
+    constexpr int kUp = kValueBits + 32 - kSumBits;
+    const auto high = static_cast<std::int32_t>(x.raw >> 32);
+    constexpr std::int32_t kMost = std::int32_t{1} << (31 - kUp);
+    const auto word = static_cast<std::int32_t>(static_cast<std::uint64_t>(x.raw) >> (32 - kUp));
+    return {{high >= -kMost + 1 && high < kMost ? word : high < 0 ? -0x7FFFFFFF : 0x7FFFFFFF}};
   }
-  // Both have the same place of their point in a word: rounded down.
+  // Both have the same place of their point in a word.
   static constexpr Value narrow(State x) {
     static_assert(kStateBits - kValueBits == 32);
-    return {{as_word(static_cast<std::int32_t>(x.raw >> 32))}};
+    const auto high = static_cast<std::uint32_t>(x.raw >> 32);
+    return {{as_word(static_cast<std::int32_t>(high + (static_cast<std::uint32_t>(x.raw) >> 31)))}};
   }
   static constexpr State widen(Value x) {
     return {{std::int64_t{x.raw} * (std::int64_t{1} << 32)}};
@@ -161,9 +168,12 @@ struct FixedSystem {
   static constexpr Value clamp(Value x, Value limit) {
     return {{limited(x.raw, (-limit).raw, limit.raw)}};
   }
+  // The limit has no lower word: the upper one decides.
   static constexpr State clamp(State x, Value limit) {
-    const std::int64_t most = widen(limit).raw;
-    return {{limited(x.raw, -most, most)}};
+    const auto high = static_cast<std::int32_t>(x.raw >> 32);
+    if (high >= limit.raw) return widen(limit);
+    if (high < -limit.raw) return widen({{-limit.raw}});
+    return x;
   }
   static constexpr State clamp(State x, State limit) {
     return {{limited(x.raw, negated(limit.raw), limit.raw)}};
@@ -190,30 +200,31 @@ struct FixedSystem {
   }
 
   // Two, as every signal is limited to at entry: so the bound of a linear observer needs no trust in its input.
-  static constexpr State signal(StepGain g, Step x) {
-    constexpr std::int64_t kTwo = 2 * kOneState;
-    const int up = g.exponent - (kMantissaBits + kAngleBits - kStateBits);
-    const std::int64_t whole = product(g, x.raw);  // below 2^61
-    if (up <= 0) return {{limited(shift_right(whole, -up), -kTwo, kTwo)}};
-    return {{limited(whole, -(kTwo >> up), kTwo >> up) * (std::int64_t{1} << up)}};
+  static constexpr State signal(const StepGain& g, Step x) {
+    const std::uint32_t size = magnitude(x).raw;
+    const std::uint64_t travelled = long_product((size < g.near ? size : g.near) << g.up, g.factor);
+    const auto sign =
+        static_cast<std::uint64_t>(x.raw >> 63) ^ static_cast<std::uint64_t>(std::int64_t{g.mantissa} >> 63);
+    return {{static_cast<std::int64_t>(((travelled << (kStateBits - kTravelBits)) ^ sign) - sign)}};
   }
   // Within four: see DistanceGain.
-  static constexpr State signal(DistanceGain g, Step x) {
-    const int bits = kMantissaBits + kAngleBits - kStateBits - g.exponent;
+  static constexpr State signal(const DistanceGain& g, Step x) {
     const std::int64_t distance = limited<std::int64_t>(x.raw, -g.limit, g.limit);
-    if (bits > 0) return {{multiply_round(distance, g.mantissa, bits)}};
-    return {{distance * g.mantissa * (std::int64_t{1} << -bits)}};
+    const auto word = static_cast<std::int32_t>(
+        g.down >= 0 ? distance >> g.down : static_cast<std::int64_t>(static_cast<std::uint64_t>(distance) << -g.down));
+    return {{long_product(word, g.factor)}};
   }
   // Up to 16 turns; the gain is in turns per base.
-  static constexpr Step distance(Gain g, Value x) {
-    return {shift_right(product(g, x.raw), kMantissaBits + kValueBits - kAngleBits - g.exponent)};
+  static constexpr Step distance(const Gain& g, Value x) {
+    return {product(g, x.raw) >> (kProductBits - kAngleBits)};
   }
   static constexpr Way travel(const StepGain& g, Length x) {
     const auto most = static_cast<std::uint32_t>(g.limit);
     return {(x.raw < most ? x.raw : most) << g.up, g.factor, g.halvings};
   }
-  static constexpr Travel travel(Gain g, Value x) {
-    return limited_travel(shift_right(product(g, x.raw), kMantissaBits + kValueBits - kTravelBits - g.exponent));
+  static constexpr Travel travel(const Gain& g, Value x) {
+    const std::int64_t travelled = product(g, x.raw);
+    return {static_cast<std::uint64_t>(travelled < 0 ? 0 : travelled) << (kTravelBits - kProductBits)};
   }
   static constexpr Travel times(Travel t, Value x) {
     return by_mantissa(t, static_cast<std::uint32_t>(x.raw < 0 ? 0 : x.raw), kValueBits);
@@ -247,10 +258,15 @@ struct FixedSystem {
     const std::uint64_t size = (p.high << (64 - kValueBits)) | (p.low >> kValueBits);
     return {{with_sign(fits ? size : kMost - 1, (a.raw < 0) != (b.raw < 0))}};
   }
-  static constexpr State times(State a, Share b) {
-    const Product p = multiply(size_of(a.raw), b.raw);  // below 2^126
-    constexpr int kUp = 64 - kShareBits;
-    return {{with_sign(((p.high << kUp) | (p.low >> kShareBits)) + ((p.low >> (kShareBits - 1)) & 1), a.raw < 0)}};
+  // Rounded down, to two units; by words, of which the product of both lower ones does not show.
+  static constexpr State times(State a, const Share& b) {
+    const std::int32_t high = as_word(static_cast<std::int32_t>(a.raw >> 32));
+    // A share of one has no word with a sign: it is as near to it as that shows.
+    const auto whole = static_cast<std::int32_t>(b.raw >> 32);
+    const auto rest = static_cast<std::int32_t>(static_cast<std::uint32_t>(b.raw) >> 1);
+    const std::int64_t lower = (long_product(high, rest) >> 31) +
+                               multiply_high(static_cast<std::uint32_t>(a.raw), static_cast<std::uint32_t>(whole));
+    return {{(long_product(high, whole) + lower) * 2}};
   }
   // Takes what it loses off the distance, of which 28 fractional bits count: so it may pass the target by a unit.
   static constexpr State relax(State from, State target, Kept kept) {
@@ -397,10 +413,6 @@ struct FixedSystem {
   static constexpr std::int64_t kOneState = std::int64_t{1} << kStateBits;
   static constexpr std::uint64_t kLargest = 0x7FFFFFFFFFFFFFFF;
 
-  static constexpr Travel limited_travel(std::int64_t x) {
-    const auto size = static_cast<std::uint64_t>(x < 0 ? 0 : x);
-    return {size > kLargestTravel ? kLargestTravel : size};
-  }
   // t m 2^-bits, limited; bits may be anything.
   static constexpr Travel by_mantissa(Travel t, std::uint32_t m, int bits) {
     const Product p = multiply(t.raw, m);  // below 2^95

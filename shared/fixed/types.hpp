@@ -50,7 +50,7 @@ struct Sum {
 struct State {
   std::int64_t raw = 0;
 };
-// What part of a state is kept or passed on, 0 to 1.
+// What part of a state is kept or passed on, from nought to next to one.
 struct Share {
   std::uint64_t raw = 0;
 };
@@ -77,12 +77,14 @@ struct Harmonic {
   std::int32_t remainder = 0;  // 2^-64
 };
 // Coefficients mantissa 2^(exponent - 30). The input is clamped to `limit` before it is multiplied, so that the product
-// always fits; a limit of nought marks one that cannot be used.
+// always fits; a limit of nought marks one that cannot be used. `factor` 2^up is the same number in 2^-30.
 struct Gain {
   static constexpr int kLeastExponent = -40;
-  static constexpr int kMostExponent = 60;
+  static constexpr int kMostExponent = 32;
   std::int32_t mantissa = 0;
   std::int8_t exponent = 0;
+  std::uint8_t up = 0;
+  std::int32_t factor = 0;
   std::int32_t limit = 0;
 };
 // Per turn, of steps. `factor` 2^up is the same number in 2^-26 units of a travel; `halvings` 2^up times 2 log2(e) of
@@ -96,6 +98,7 @@ struct StepGain {
   std::int32_t limit = 0;
   std::uint32_t factor = 0;
   std::uint32_t halvings = 0;
+  std::uint32_t near = 0;  // steps that make a signal of two
 };
 // One over a characteristic size of a signal. `bell` 2^up is that number times the root of log2(e), for inputs up to
 // `near`; `log` is log2 of it in Q25, of signals
@@ -117,6 +120,8 @@ struct DistanceGain {
   static constexpr int kMostExponent = 30;
   std::int32_t mantissa = 0;
   std::int8_t exponent = 0;
+  std::int8_t down = 0;  // what the limited input is shifted by, so that its product with `factor` is a state
+  std::int32_t factor = 0;
   std::int64_t limit = 0;
 };
 // Of a power, -8 to 8.

@@ -214,7 +214,7 @@ struct Encoding<T> {
   static constexpr void put(Writer& w, const T& x) { w.put(x.raw); }
   static constexpr bool take(Reader& r, T& x) {
     x.raw = r.take<std::uint64_t>();
-    return x.raw <= (std::uint64_t{1} << fixed::kShareBits);
+    return x.raw < (std::uint64_t{1} << fixed::kShareBits);
   }
 };
 template <class T>

@@ -108,11 +108,12 @@ struct EncoderKalman {
     s.started = true;
     const auto travelled = N::signal(c.per_step, reading - s.before);
     s.before = reading;
-    const auto expected = s.velocity + N::times(s.acceleration, c.half_tick);
+    const auto half_rise = N::times(s.acceleration, c.half_tick);
+    const auto expected = s.velocity + half_rise;
     // What the reading surprises by is `surprise`; what is left of it once the position took up its part is the error.
     const auto surprise = s.position_error + N::times(travelled - expected, c.tick);
     s.position_error = N::times(surprise, c.kept);
-    s.velocity = s.velocity + N::times(s.acceleration, c.tick) + N::times(surprise, c.velocity);
+    s.velocity = expected + half_rise + N::times(surprise, c.velocity);
     s.acceleration = s.acceleration + N::times(surprise, c.acceleration);
     return {N::narrow(s.velocity), N::scaled(c.acceleration_scale, N::narrow(s.acceleration))};
   }

@@ -100,7 +100,7 @@ TEST(Excitation, SinesHaveOneLine) {
   ASSERT_EQ(y.size(), plain().ticks);
   EXPECT_LT(std::abs(line(y, 1) - sine_line(1.0)), 1e-7);
   EXPECT_LT(std::abs(line(inverted, 1) - sine_line(-1.0)), 1e-7);
-  for (const int h : {0, 2, 3, 17}) EXPECT_LT(std::abs(line(y, h)), 1e-8) << h;
+  for (const int h : {0, 2, 3, 17}) EXPECT_LT(std::abs(line(y, h)), 2e-8) << h;
 }
 
 TEST(Excitation, AnAsymmetricSineHasTheLinesOfItsHalves) {
@@ -146,7 +146,7 @@ TEST(Excitation, TheCompositeIsEquationSixtyOverItsLargestMagnitude) {
   EXPECT_LT(std::abs(line(y, 1) - 1.0 / peak), 1e-7);
   EXPECT_LT(std::abs(line(y, 2) - sine_line(0.5 / peak)), 1e-7);
   EXPECT_LT(std::abs(line(y, 3) - sine_line(1.0 / peak)), 1e-7);
-  EXPECT_LT(std::abs(line(y, 0)), 1e-8);
+  EXPECT_LT(std::abs(line(y, 0)), 2e-8);
   EXPECT_LT(std::abs(line(y, 4)), 1e-8);
 }
 
@@ -337,7 +337,7 @@ TEST(Excitation, OnADriveAgreesWithDouble) {
     double worst = 0.0;
     for (std::size_t k = 0; k < std::min(y.size(), exact.size()); ++k)
       worst = std::max(worst, std::abs(y[k] - exact[k]));
-    EXPECT_LT(worst, 2e-8);
+    EXPECT_LT(worst, 3e-8);
     all = std::max(all, worst);
   }
   EXPECT_EQ(Findings::count(), 0) << Findings::first();
