@@ -49,6 +49,28 @@ double stated_noise(const model::Drive& drive, const regression::Prepared& prepa
   return square * 2.0 * prepared.pipeline.row_cutoff_hz * sample_s;
 }
 
+// How large the signals of a balance are in a record; noise of sensors often grows with what they measure.
+double loudness(const regression::Prepared& prepared, const regression::Record& record, Balance balance) {
+  double sum = 0.0;
+  const double gear = balance == Balance::motor ? prepared.constants.gear_ratio : 1.0;
+  for (std::size_t k = 0; k < record.inputs.size(); ++k) {
+    const double torque = record.torque.empty() ? 0.0 : record.torque[k] / gear;
+    const double effort = balance == Balance::motor && !record.effort.empty() ? record.effort[k] : 0.0;
+    sum += torque * torque + effort * effort;
+  }
+  return std::sqrt(sum / std::max(1.0, static_cast<double>(record.inputs.size())));
+}
+
+double loudness(const BalanceData& data) {
+  double sum = 0.0, rows = 0.0;
+  for (const regression::RowRange& range : data.records()) {
+    const double one = loudness(data.prepared(), data.prepared().records[range.record], data.balance());
+    sum += one * one * static_cast<double>(range.size());
+    rows += static_cast<double>(range.size());
+  }
+  return std::sqrt(sum / std::max(1.0, rows));
+}
+
 bool complete(const model::Model& model) {
   for (const model::Effect& e : model.effects)
     for (const model::Parameter& p : e.parameters)
@@ -180,6 +202,10 @@ void Bench::prepare(const Question& question) {
       side.noise = stated_noise(model_.drive, prepared_, balance, question.sample_s) *
                    side.planned->filter_autocorrelation_time();
     side.noise = std::max(side.noise, 1e-30);
+    side.louder.assign(prepared_.records.size(), 1.0);
+    const double known = side.recorded ? loudness(*side.recorded) : 0.0;
+    for (std::size_t i = 0; known > 0.0 && i < prepared_.records.size(); ++i)
+      side.louder[i] = std::max(1.0, loudness(prepared_, prepared_.records[i], balance) / known);
     sides_.push_back(std::move(side));
   }
 }

@@ -26,6 +26,7 @@ class Bench {
   struct Side {
     std::unique_ptr<BalanceData> planned;
     BalanceData* recorded = nullptr;  // null where there are no data
+    std::vector<double> louder;       // noise of each planned record in the noise of what was recorded
     double noise = 1.0;               // squares per row of the residual of a true model, times the autocorrelation time
   };
   std::vector<Side>& sides() { return sides_; }

@@ -36,7 +36,8 @@ std::vector<Factors> factors_of(Bench& bench, const Layout& layout) {
       for (const Eigen::MatrixXd& part : parts) list.push_back(&part);
       f.recorded = together(list);
     }
-    const auto parts = factors(*side.planned, layout.over(*side.planned));
+    auto parts = factors(*side.planned, layout.over(*side.planned));
+    for (std::size_t i = 0; i < parts.size(); ++i) parts[i] /= side.louder[i];
     for (std::size_t m = 0; m < bench.motions().size(); ++m) {
       std::vector<const Eigen::MatrixXd*> list;
       for (std::size_t r = 0; r < bench.motions()[m].runs.size(); ++r)
@@ -204,8 +205,9 @@ Design separate(const Question& question, std::string_view first, std::string_vi
       std::vector<std::size_t> more = chosen;
       more.push_back(m);
       const Separation s = separation(all, more, a, b);
+      if (s.worst() < kWorthwhile * std::max(design.after->worst(), 1e-3)) continue;
       // Beyond what is enough, the least trouble wins.
-      const double merit = std::log(std::max(1e-6, std::min(s.worst(), kEnough))) - 0.7 * bench.motions()[m].trouble +
+      const double merit = std::log(std::max(1e-6, std::min(s.worst(), kEnough))) - 0.3 * bench.motions()[m].trouble +
                            0.01 * std::log(std::max(1e-6, s.worst()));
       if (merit > most) {
         most = merit;
@@ -213,12 +215,14 @@ Design separate(const Question& question, std::string_view first, std::string_vi
         reached = s;
       }
     }
-    if (!best || reached.worst() < kWorthwhile * std::max(design.after->worst(), 1e-9)) break;
+    if (!best) break;
     chosen.push_back(*best);
     design.after = reached;
   }
   const auto size = [](const Contender& c) {
-    return fmt::format("{} {}", c.label, c.seen ? "as large as the data show it" : "of the usual size");
+    return fmt::format(
+        "{} {}", c.label,
+        c.seen ? "as large as the data show it" : "as large as it can be unseen, at most of its usual size");
   };
   if (design.after->worst() < kTold) {
     design.plan.notes.push_back(fmt::format(

@@ -86,6 +86,19 @@ diagnosis::Judged fitted(BalanceData& data, Terms terms) {
   return judged;
 }
 
+// How much of an effect of usual size may be there without these data showing it.
+double unseen_share(BalanceData& data, const Terms& base, const Terms& usual, const diagnosis::Imitation& imitation,
+                    double noise) {
+  // With its own parameters alone: the others are as the base has them.
+  Terms terms = usual;
+  for (Term& t : terms)
+    for (const Term& b : base)
+      if (t.label() == b.label()) t.values = b.values;
+  const Eigen::VectorXd torque = diagnosis::model_torque(data, terms) - diagnosis::model_torque(data, base);
+  const double squares = imitation.own_part(torque).col(0).squaredNorm() / noise;
+  return squares > diagnosis::kNamedScore ? std::sqrt(diagnosis::kNamedScore / squares) : 1.0;
+}
+
 }  // namespace
 
 Terms without(const Terms& terms, std::string_view effect) {
@@ -113,7 +126,7 @@ Contender contender(Bench& bench, Layout& layout, const Terms& model, std::strin
   std::vector<Terms> variants;
   const std::vector<std::vector<double>> grid =
       side ? grid_of(*side->planned, base.back()) : std::vector<std::vector<double>>{truth.back().values};
-  double least = 1e300;
+  double least = 1e300, unseen = 1.0;
   for (const std::vector<double>& values : grid) {
     Terms terms = base;
     terms.back().values = values;
@@ -133,9 +146,14 @@ Contender contender(Bench& bench, Layout& layout, const Terms& model, std::strin
       c.seen = possible(judged.terms.back()) &&
                imitation.own_part(torque).col(0).squaredNorm() / noise > diagnosis::kNamedScore;
       if (c.seen) truth = judged.terms;
+      unseen = c.seen ? 1.0 : unseen_share(*side->recorded, model, truth, imitation, noise);
     }
     variants.push_back(judged.terms);
   }
+  // An effect that the data do not show is no larger than what they would have shown.
+  if (!c.seen)
+    for (std::size_t p = 0; p < truth.back().values.size(); ++p)
+      if (truth.back().free_linear(p)) truth.back().values[p] *= unseen;
   c.truth = layout.add(std::move(truth));
   for (Terms& terms : variants) c.variants.push_back(layout.add(std::move(terms)));
   return c;
