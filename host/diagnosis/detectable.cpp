@@ -16,6 +16,8 @@ using regression::Term;
 constexpr std::size_t kGridPoints = 6;  // as the search has them, so that its columns are at hand
 // Nobody would call it an effect beyond that many times the usual size.
 constexpr double kLargestScale = 1e6;
+// Of the least shape that the search looks at: nothing is told of an effect that is that small.
+constexpr double kUnseen = 1e-3;
 
 std::vector<double> usual_values(const catalogue::Entry& entry) {
   std::vector<double> usual;
@@ -172,13 +174,15 @@ std::optional<Detectable> Detection::of_shape(const Trial& trial, regression::Te
   // The end at which it does less is the one where it vanishes.
   const bool falls = at_low.norm() > at_high.norm();
   if (!would_name(falls ? at_low : at_high)) return std::nullopt;
-  double with = falls ? 0.0 : 1.0, without = falls ? 1.0 : 0.0;
-  if (would_name(falls ? at_high : at_low)) with = without;  // the least that the search looks at
-  for (int i = 0; i < 8 && with != without; ++i) {
-    const double middle = 0.5 * (with + without);
-    (would_name(torque_at(range.at(middle))) ? with : without) = middle;
+  double with = range.at(falls ? 0.0 : 1.0), without = range.at(falls ? 1.0 : 0.0);
+  // A size below what the search looks at passes for the least that it does.
+  if (would_name(falls ? at_high : at_low)) without = falls || !range.logarithmic ? with : kUnseen * range.low;
+  if (without == with) return std::nullopt;
+  for (int i = 0; i < 10; ++i) {
+    const double middle = range.logarithmic ? std::sqrt(with * without) : 0.5 * (with + without);
+    (would_name(torque_at(middle)) ? with : without) = middle;
   }
-  term.values[size] = range.at(with);
+  term.values[size] = with;
   const double value = catalogue::natural(*term.entry, term.values)[size];
   return Detectable{estimate(*search_, term, size, value), falls, shapes_of(*search_, term, size)};
 }

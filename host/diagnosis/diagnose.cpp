@@ -8,6 +8,7 @@
 #include "host/diagnosis/detectable.hpp"
 #include "host/diagnosis/diagnosis.hpp"
 #include "host/diagnosis/disturbances.hpp"
+#include "host/diagnosis/rivals.hpp"
 #include "host/diagnosis/trials.hpp"
 
 namespace flexspline::diagnosis {
@@ -165,10 +166,11 @@ void list_candidates(std::vector<Examined>& all, data::Axis axis, Diagnosis& res
     for (const Trial& t : e.trials) {
       result.candidates.push_back(report(t, e.search, axis));
       result.candidates.back().minimum_detectable = detection.smallest(t);
-      if (!t.imitated_by.empty())
-        result.warnings.push_back(fmt::format(
-            "{0} cannot be told from {1} in these data: {1} stands for what both share; {2} would tell them apart",
-            t.proposal.entry->name(), t.imitated_by, t.proposal.entry->info->separated_by));
+      if (t.imitated_by.empty()) continue;
+      result.candidates.back().rival_reasons.push_back(compare_with_model(e.search, t));
+      result.warnings.push_back(fmt::format(
+          "{0} cannot be told from {1} in these data: {1} stands for what both share; {2} would tell them apart",
+          t.proposal.entry->name(), t.imitated_by, t.proposal.entry->info->separated_by));
     }
   }
   std::stable_sort(result.candidates.begin(), result.candidates.end(), [](const Candidate& a, const Candidate& b) {
@@ -254,7 +256,10 @@ Diagnosis diagnose(const data::Dataset& dataset, const model::Model& model, cons
   result.noise_floor_from = chosen.floor.from;
   result.localised = shares(*chosen.search.data, chosen.search.base);
   list_candidates(all, model.drive.axis, result);
-  if (chosen.names_one()) name_effects(chosen, alias, result);
+  if (chosen.names_one()) {
+    name_effects(chosen, alias, result);
+    explain_named(chosen.search, chosen.trials, model.drive.axis, result);
+  }
   judge_rest(chosen, result);
   const bool moves = std::any_of(base->prepared.records.begin(), base->prepared.records.end(),
                                  [](const regression::Record& r) { return !r.at_rest; });

@@ -27,6 +27,26 @@ struct Detectable {
   std::vector<regression::Estimate> at;  // shapes at which that holds
 };
 
+// Why an effect cannot be told from another one in these data.
+struct RivalReason {
+  std::string effect;
+  double own_percent = 0.0;  // of its torque that the other cannot imitate
+  std::string variable;      // over which both do the same; empty: no single one
+};
+
+// What the model lacks over the variable in which an effect shows most, and what the effect makes of it.
+struct Evidence {
+  std::string variable, unit;
+  bool resisting = false;  // torques count as positive where they resist the motion
+  double share_percent = 0.0;
+  struct Bin {
+    double low = 0.0, high = 0.0;
+    double lacking = 0.0;  // mean, N m
+    double effect = 0.0;
+  };
+  std::vector<Bin> bins;
+};
+
 struct Candidate {
   std::string effect;
   std::optional<double> order;
@@ -40,6 +60,8 @@ struct Candidate {
   bool admissible = true;
   std::string why_not;  // where it is not admissible
   std::vector<std::string> rivals;
+  std::vector<RivalReason> rival_reasons;
+  std::optional<Evidence> evidence;  // of named effects
   std::optional<Detectable> minimum_detectable;
   std::string note;  // what its values mean, where that is not what the effect's name says
 };

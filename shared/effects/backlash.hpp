@@ -15,7 +15,13 @@ struct Backlash : Stateless {
       .explanation =
           "Around zero torque the output can be moved a little without any torque: the spring has a gap in its "
           "middle.",
+      .consequence =
+          "At each change of the torque's sign the output rests while the motor crosses the gap, then is hit: "
+          "knocking, a lost angle, limit cycles about a position.",
       .causes = "Play of a coupling, key or bolt in the load path, worn teeth. New strain-wave gears have almost none.",
+      .check =
+          "Hold the motor and move the output by hand at both ends of the gap with a dial gauge; look for a loose key, "
+          "bolt or coupling; count hours on the teeth.",
       .rivals = "cubic_stiffness",
       .separated_by = "small multi-sine about zero torque in locked load",
       .acts_last = true,

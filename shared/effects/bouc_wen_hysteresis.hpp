@@ -14,7 +14,13 @@ struct BoucWenHysteresis {
       .explanation =
           "A hysteresis with a shape that can be tuned: how abruptly it yields (n) and how its loop leans "
           "(gamma over beta).",
+      .consequence =
+          "The output stops at another angle when it comes from the other side, and vibration dies out sooner than a "
+          "spring would let it.",
       .causes = "Friction inside the flexspline, its bolted joints and the mesh.",
+      .check =
+          "Load and unload the locked output slowly by hand: the angle that stays at zero torque is the loop's width. "
+          "Check the flexspline's bolts first.",
       .rivals =
           "dahl_hysteresis,modified_dahl_hysteresis,duhem_hysteresis,structural_damping,prandtl_ishlinskii_hysteresis",
       .separated_by =

@@ -13,7 +13,13 @@ struct CoulombAsymmetry : Stateless {
       .explanation =
           "Dry friction is larger in one direction than in the other: a constant torque, but only while the "
           "shaft moves.",
+      .consequence =
+          "One direction needs more torque than the other; with equal commands the axis creeps or ends short in one "
+          "direction.",
       .causes = "Tooth flanks or seals that differ by direction, one-sided wear.",
+      .check =
+          "Compare the current at the same slow speed both ways, with the drive off the sensor must read nought. Look "
+          "at seals, brushes and an axial load on one side.",
       .rivals = "current_offset,torque_bias",
       .separated_by = "a record with the drive off, which shows an offset of the sensor alone",
   };

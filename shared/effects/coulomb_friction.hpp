@@ -11,7 +11,13 @@ struct CoulombFriction : Stateless {
       .shows_over = "direction",
       .source = "report eq. 27, 48",
       .explanation = "Dry friction: the same torque against every motion, whatever its speed.",
+      .consequence =
+          "The axis sticks at every reversal until the torque has built up: flat tops in slow position sines, a dead "
+          "zone of the controller.",
       .causes = "Preload of the tooth mesh and bearings, seals. More after tight assembly, less after wear.",
+      .check =
+          "Raise the current slowly until the motor turns, in both directions and at several angles; a value that grew "
+          "since assembly means preload, a seal or a dry bearing.",
       .rivals = "dahl_friction",
       .separated_by = "small slow motion that reverses often",
   };

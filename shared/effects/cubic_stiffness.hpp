@@ -12,9 +12,15 @@ struct CubicStiffness : Stateless {
       .shows_over = "torsion, odd",
       .source = "report eq. 37, 77",
       .explanation = "The spring gets stiffer the more it is twisted.",
+      .consequence =
+          "The resonance rises with the load, so a controller that is damped at rest may ring under load, or the other "
+          "way round.",
       .causes =
           "Usual in strain-wave gears: more teeth share the load as it grows. A soft start is also what wear "
           "looks like.",
+      .check =
+          "Measure the angle of the locked output at a tenth, half and all of the rated torque and compare with the "
+          "maker's stiffness steps.",
       .rivals = "backlash,piecewise_stiffness",
       .separated_by = "multi-sine, small amplitude about zero, beside one up to the peak torque",
   };

@@ -11,9 +11,15 @@ struct CurrentDelay {
       .shows_over = "current slope",
       .source = "sampling, filters",
       .explanation = "The motor feels the current later than the log says.",
+      .consequence =
+          "Phase is lost at high frequency: the current loop and everything around it has less margin than the log "
+          "suggests.",
       .causes =
           "Filters and sampling in the amplifier, a command that was logged instead of the measured current, "
           "clocks that differ.",
+      .check =
+          "Compare the time stamps of current and position, look for a filter in the amplifier's monitor output, log "
+          "the measured current and not the command.",
       .rivals = "inertia",
       .separated_by = "motion at several frequencies up to the current loop's bandwidth",
   };

@@ -12,7 +12,11 @@ struct CurrentOffset : Stateless {
       .source = "amplifier",
       .explanation =
           "The current sensor reads something although no current flows, so every torque is off by a constant.",
+      .consequence =
+          "The axis creeps when zero current is commanded, and seems to have more friction one way than the other.",
       .causes = "Offset of the current sensor or of the amplifier's monitor output; drifts with temperature.",
+      .check =
+          "Read the current sensor with the power stage off; redo the amplifier's offset calibration, warm and cold.",
       .rivals = "coulomb_asymmetry",
       .separated_by = "a record with the drive off",
   };

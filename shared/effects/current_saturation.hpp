@@ -11,9 +11,13 @@ struct CurrentSaturation : Stateless {
       .shows_over = "current, clipped",
       .source = "report eq. 26",
       .explanation = "The amplifier gives no more than its limit, although the log shows a larger current.",
+      .consequence = "Fast starts are slower than commanded and the controller winds up.",
       .causes =
           "A current limit in the amplifier, a supply voltage that is too low at speed; the logged current is "
           "the command.",
+      .check =
+          "Look for a current or power limit in the amplifier's settings and at the supply voltage under load; log the "
+          "measured current.",
       .rivals = "torque_constant_saturation",
       .separated_by = "slow sine of current with a rising amplitude in locked load",
   };

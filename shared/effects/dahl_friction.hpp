@@ -13,7 +13,12 @@ struct DahlFriction {
       .explanation =
           "After each reversal friction does not jump: the contacts bend like bristles first, and friction builds "
           "up over a short travel (presliding).",
+      .consequence =
+          "Small commands move the axis and spring back; it settles slowly on the last few counts of the encoder.",
       .causes = "Elastic contacts in the mesh and bearings, preload, seals. Makes fine positioning springy.",
+      .check =
+          "Make a very small slow triangle of torque and look whether the angle follows as a spring does; check "
+          "preload and seals.",
       .rivals = "lugre_friction,coulomb_friction",
       .separated_by = "small slow motion that reverses often",
       .replaces = "coulomb_friction",

@@ -14,7 +14,13 @@ struct DahlHysteresis {
       .explanation =
           "Twisting back and forth loses the same energy however slowly it is done: part of the torque depends on "
           "where the motion last reversed, not on the torsion alone.",
+      .consequence =
+          "The output stops at another angle when it comes from the other side, by up to the loop's width, however "
+          "slow the motion is.",
       .causes = "Friction inside the flexspline, its bolted joints and the mesh.",
+      .check =
+          "Lock the output, raise and lower the current slowly: torque against angle draws the loop. Check the "
+          "flexspline's bolts and clamping first.",
       .rivals =
           "structural_damping,modified_dahl_hysteresis,bouc_wen_hysteresis,duhem_hysteresis,prandtl_ishlinskii_"
           "hysteresis",

@@ -16,7 +16,11 @@ struct DuhemHysteresis {
       .explanation =
           "One law for spring and loop together: the torque follows a slope b and is drawn towards a curve phi "
           "of the torsion.",
+      .consequence =
+          "The output stops at another angle when it comes from the other side, and the stiffness seen depends on what "
+          "came before.",
       .causes = "Friction inside the flexspline and the mesh, described together with the stiffness.",
+      .check = "Lock the output and make slow loops of several sizes; check the flexspline's bolts and clamping first.",
       .rivals = "dahl_hysteresis,bouc_wen_hysteresis,structural_damping,prandtl_ishlinskii_hysteresis",
       .separated_by =
           "the same torsion amplitude at a second frequency, which leaves this loop as it is; loops of several "

@@ -100,7 +100,9 @@ struct Description {
   std::string_view shows_over{};
   std::string_view source{};
   std::string_view explanation{};   // what it is, for somebody who never heard of it
-  std::string_view causes{};        // usual causes, and what to check on the machine
+  std::string_view consequence{};   // what it does to the motion
+  std::string_view causes{};        // usual causes
+  std::string_view check{};         // what to look at on the machine
   std::string_view rivals{};        // names, separated by commas: what it is confused with
   std::string_view separated_by{};  // the experiment that tells them apart
   std::string_view replaces{};      // effects that it stands in for, separated by commas

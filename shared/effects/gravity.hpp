@@ -13,7 +13,13 @@ struct Gravity : Stateless {
       .source = "unbalanced link",
       .explanation =
           "The link's centre of mass is off the axis, so its weight turns the output, depending on the angle.",
+      .consequence =
+          "The axis needs torque to stand still, differing with the angle, and runs away downwards when the drive is "
+          "off.",
       .causes = "An arm, tool or cable that is not balanced; a base that is not level.",
+      .check =
+          "Turn the output slowly through a turn and note the holding current; check balance weights, cables and the "
+          "level of the base.",
       .rivals = "linear_stiffness",
       .separated_by = "slow motion over a large part of an output turn",
   };

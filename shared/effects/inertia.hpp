@@ -11,7 +11,11 @@ struct Inertia : Stateless {
       .shows_over = "acceleration",
       .source = "report eq. 26",
       .explanation = "The rotor, the coupling and the wave generator resist every change of speed.",
+      .consequence = "Every acceleration takes torque; too small a value in the model makes fast motion lag.",
       .causes = "Always there. A value far from the data sheet points to a wrong torque constant or a loose coupling.",
+      .check =
+          "Compare with the data sheets of rotor, coupling and wave generator; check the set screw or clamp between "
+          "them.",
       .rivals = "current_delay",
       .separated_by = "the same amplitude at a second frequency",
   };

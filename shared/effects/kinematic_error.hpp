@@ -15,9 +15,15 @@ struct KinematicError : Stateless {
       .explanation =
           "The gear does not turn the output quite evenly: over a turn of the motor the output leads and lags "
           "by some arc seconds. The motor feels it as a ripple that grows with the load.",
+      .consequence =
+          "The output leads and lags twice a turn of the motor; at a certain speed this meets the resonance and the "
+          "axis shakes.",
       .causes =
           "Errors of the teeth and the wave generator's shape, misalignment in assembly; mostly twice a motor "
           "turn.",
+      .check =
+          "Turn slowly with an encoder on the output and compare with the motor's; check the alignment of circular "
+          "spline and wave generator.",
       .rivals = "load_scaled_ripple,torque_ripple,dahl_hysteresis",
       .separated_by = "slow constant speed over many turns with an output encoder",
       .adds_to = on(Balance::motor),

@@ -12,7 +12,12 @@ struct LinearStiffness : Stateless {
       .shows_over = "torsion, linear",
       .source = "report eq. 37, 78",
       .explanation = "The flexspline twists under load, like a spring between motor and output.",
+      .consequence =
+          "The output swings after a stop and bends under load; it sets the resonance with the load's inertia.",
       .causes = "Always there. Softer than the data sheet: a loose clamp or bolt in the load path.",
+      .check =
+          "Apply a known torque to the output with the motor held and read the angle; look for loose bolts when it is "
+          "soft.",
       .rivals = "cubic_stiffness",
       .separated_by = "locked load at full torque and at a tenth of it",
   };

@@ -13,7 +13,13 @@ struct LoadDependentFriction : Stateless {
       .explanation =
           "The harder the gear is loaded, the harder its teeth and bearings press together, and the more they "
           "rub.",
+      .consequence =
+          "Efficiency falls: lifting takes more and lowering less torque than the load alone; control gets sluggish "
+          "under load.",
       .causes = "Tooth mesh and wave-generator bearing under load: the gear's efficiency. Seen only where load varies.",
+      .check =
+          "Lift and lower the same weight at the same speed and compare the currents; check the lubricant of the tooth "
+          "mesh and the wear of the teeth.",
       .rivals = "stribeck_gaussian,torque_constant_saturation",
       .separated_by =
           "a constant external load in both directions at low current; a slow free triangle against Stribeck",

@@ -13,7 +13,10 @@ struct LoadScaledRipple : Stateless {
       .explanation =
           "A torque on the motor that repeats with its angle and grows with the load: what a kinematic error of "
           "the gear looks like from the motor.",
+      .consequence = "The speed ripples under load and is smooth without.",
       .causes = "Kinematic error of the mesh; misalignment of the wave generator that shows under load.",
+      .check =
+          "Turn slowly at two loads and compare the ripple of the current; check the alignment of the wave generator.",
       .rivals = "kinematic_error,torque_ripple",
       .separated_by = "slow constant speed over many turns at two loads, with an output encoder",
   };

@@ -15,7 +15,10 @@ struct LugreFriction {
       .explanation =
           "The contacts bend like bristles before they slide (presliding), and slide with a friction that is "
           "higher near standstill than in motion.",
+      .consequence =
+          "The axis springs within its stiction, breaks loose and jerks at slow speed; it hunts about a position.",
       .causes = "Elastic contacts in mesh, bearings and seals together with boundary lubrication.",
+      .check = "Creep at the slowest speed that is used and look for stick-slip; check grease and preload.",
       .rivals = "dahl_friction,stribeck_gaussian,stribeck_hess_soom,coulomb_friction",
       .separated_by = "small slow motion that reverses often, and a slow free triangle of velocity",
       .replaces = "coulomb_friction,stribeck_gaussian,stribeck_hess_soom",

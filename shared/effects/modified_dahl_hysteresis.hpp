@@ -14,7 +14,11 @@ struct ModifiedDahlHysteresis {
       .explanation =
           "As dahl_hysteresis with the exponent two: a steep start after each reversal and a slow approach to "
           "the limit.",
+      .consequence = "The output stops at another angle when it comes from the other side, by up to the loop's width.",
       .causes = "Friction inside the flexspline, its bolted joints and the mesh.",
+      .check =
+          "Lock the output, raise and lower the current slowly: torque against angle draws the loop. Check the "
+          "flexspline's bolts and clamping first.",
       .rivals = "dahl_hysteresis,structural_damping,bouc_wen_hysteresis,duhem_hysteresis,prandtl_ishlinskii_hysteresis",
       .separated_by =
           "the same torsion amplitude at a second frequency, which leaves this loop as it is; loops of several "

@@ -12,7 +12,13 @@ struct OutputCoulombFriction : Stateless {
       .shows_over = "direction",
       .source = "report eq. 43",
       .explanation = "Dry friction of the output bearing: the same torque against every motion of the link.",
+      .consequence =
+          "The link stays where it stopped although the gear is still twisted: the torque at rest is not known to "
+          "better than this.",
       .causes = "Preload and seal of the output bearing, cables that drag.",
+      .check =
+          "Uncouple the motor and turn the link by hand or with a spring balance; look for dragging cables and a tight "
+          "seal.",
       .rivals = "coulomb_friction",
       .separated_by = "a torque sensor",
   };

@@ -12,7 +12,9 @@ struct OutputInertia : Stateless {
       .shows_over = "acceleration",
       .source = "report eq. 45",
       .explanation = "The link and all that it carries resist every change of speed.",
+      .consequence = "Sets the resonance with the gear's stiffness: a heavier link swings slower and longer.",
       .causes = "Always there. A change means another payload.",
+      .check = "Weigh the payload, or compute it from the drawings; ask what was mounted since the last recording.",
       .rivals = "inertia",
       .separated_by = "a torque sensor, or a second known payload",
   };

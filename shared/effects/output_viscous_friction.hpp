@@ -12,7 +12,9 @@ struct OutputViscousFriction : Stateless {
       .shows_over = "output velocity",
       .source = "report eq. 43",
       .explanation = "Lubricant in the output bearing resists the faster, the more it is sheared.",
+      .consequence = "The link is damped; fast motion takes more torque through the gear.",
       .causes = "Output bearing and its seal; grease when cold.",
+      .check = "Uncouple the motor, let the link swing and see how soon it stops, cold and warm.",
       .rivals = "viscous_friction",
       .separated_by = "a torque sensor",
   };

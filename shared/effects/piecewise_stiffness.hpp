@@ -14,7 +14,10 @@ struct PiecewiseStiffness : Stateless {
       .explanation =
           "The spring has three slopes, as makers of gears state it: soft up to a torque T1, harder up to T2, "
           "hardest beyond.",
-      .causes = "Teeth that come into mesh one after the other. Compare the slopes with the catalogue of the gear.",
+      .consequence = "The resonance jumps with the load's range; a model with one stiffness is too soft or too stiff.",
+      .causes = "Teeth that come into mesh one after the other.",
+      .check =
+          "Compare the corners and slopes with the three that the maker's catalogue states for this size and ratio.",
       .rivals = "cubic_stiffness,backlash",
       .separated_by = "slow sine of torque up to twice T2 in locked load",
       .replaces = "linear_stiffness",

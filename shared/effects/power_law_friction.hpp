@@ -13,7 +13,11 @@ struct PowerLawFriction : Stateless {
       .explanation =
           "Friction grows with speed, but ever more slowly: the lubricant thins as it is sheared (sublinear "
           "friction).",
+      .consequence =
+          "The torque rises steeply at slow speed and little at high speed: a straight viscous line is wrong at both "
+          "ends.",
       .causes = "Grease; its kind and temperature set the exponent. Usual in strain-wave gears.",
+      .check = "Hold five or more speeds from slow to rated and plot the current; note grease and temperature.",
       .rivals = "viscous_friction,stribeck_gaussian",
       .separated_by = "steady motion at five or more speeds from slow to rated",
   };

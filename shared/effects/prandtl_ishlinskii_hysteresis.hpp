@@ -16,7 +16,10 @@ struct PrandtlIshlinskiiHysteresis {
       .explanation =
           "The loop as a sum of plays of different widths: any loop whose shape does not depend on where along the "
           "torsion it lies, with loops within loops. Beside a stiffness its weights are negative.",
+      .consequence = "The output stops at angles that depend on all reversals before; small motions have small loops.",
       .causes = "Friction inside the flexspline and the mesh, of many contacts that slip one after the other.",
+      .check =
+          "Lock the output and ride small sines on a slow large one; check the flexspline's bolts and clamping first.",
       .rivals = "dahl_hysteresis,bouc_wen_hysteresis,duhem_hysteresis,preisach_hysteresis",
       .separated_by = "sines of several amplitudes that ride on a slower one",
       .contains = "linear_stiffness",

@@ -16,7 +16,10 @@ struct PreisachHysteresis {
       .explanation =
           "The loop as a sum of relays with two thresholds each: the most general of the rate-independent laws "
           "here, with the most parameters. Beside a stiffness its weights are negative. For analysis on the host.",
+      .consequence = "The output stops at angles that depend on all reversals before, in loops within loops.",
       .causes = "Friction inside the flexspline and the mesh, of many contacts that slip one after the other.",
+      .check =
+          "Lock the output and ride small sines on a slow large one; check the flexspline's bolts and clamping first.",
       .rivals = "prandtl_ishlinskii_hysteresis,dahl_hysteresis,bouc_wen_hysteresis,duhem_hysteresis",
       .separated_by = "sines of several amplitudes that ride on a slower one, away from zero",
       .contains = "linear_stiffness",

@@ -11,7 +11,10 @@ struct QuadraticDrag : Stateless {
       .shows_over = "velocity, convex",
       .source = "churning",
       .explanation = "The lubricant is flung about: friction grows with the square of speed.",
+      .consequence = "The top speed is lower and the gear warmer than expected; slow motion shows nothing.",
       .causes = "Too much oil or grease, or one that is too thick for the speed; a fan on the shaft.",
+      .check =
+          "Check the amount and kind of lubricant against the maker's table; look for a fan or a brush on the shaft.",
       .rivals = "viscous_friction,power_law_friction",
       .separated_by = "steady motion at five or more speeds from slow to rated",
   };

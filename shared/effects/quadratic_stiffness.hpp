@@ -12,9 +12,13 @@ struct QuadraticStiffness : Stateless {
       .shows_over = "torsion, even",
       .source = "report eq. 69, 75",
       .explanation = "The spring is stiffer in one direction than in the other.",
+      .consequence = "The output bends further one way than the other under the same load.",
       .causes =
           "A flexspline that sits off centre, a bolted joint that opens to one side; often the shadow of an "
           "offset of torque or torsion.",
+      .check =
+          "Load the locked output by the same torque in both directions; zero the torque sensor and the positions "
+          "first, then look at bolts that open to one side.",
       .rivals = "torque_offset,torsion_zero",
       .separated_by = "large and small sines of torque about zero in locked load",
   };

@@ -13,9 +13,14 @@ struct StribeckGaussian : Stateless {
       .explanation =
           "Near standstill the surfaces touch instead of floating on lubricant: friction is higher there and "
           "falls as motion gets faster. It makes slow motion jerk.",
+      .consequence =
+          "Slow motion jerks (stick-slip), and the axis overshoots as it breaks loose; fast motion shows nothing.",
       .causes =
           "Boundary lubrication, thick or old grease, long standstill. A negative amplitude means friction that "
           "rises out of standstill.",
+      .check =
+          "Creep at the slowest speed that is used and listen; run the axis warm and repeat; look at the age and the "
+          "amount of grease.",
       .rivals = "load_dependent_friction,power_law_friction",
       .separated_by = "a slow free triangle of velocity",
   };

@@ -13,7 +13,11 @@ struct StribeckHessSoom : Stateless {
       .explanation =
           "Friction is higher near standstill and falls with speed, as with stribeck_gaussian, but with a "
           "longer tail towards fast motion.",
+      .consequence =
+          "Slow motion jerks (stick-slip) over a wide range of speed, and the axis overshoots as it breaks loose.",
       .causes = "Boundary lubrication, thick or old grease, long standstill.",
+      .check =
+          "Creep at slow speeds and listen; run the axis warm and repeat; look at the age and the amount of grease.",
       .rivals = "stribeck_gaussian,load_dependent_friction,power_law_friction",
       .separated_by = "a slow free triangle of velocity that reaches five times the Stribeck velocity",
   };

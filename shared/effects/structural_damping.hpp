@@ -13,7 +13,11 @@ struct StructuralDamping : Stateless {
       .source = "report eq. 68, 75",
       .explanation =
           "Twisting the flexspline back and forth loses energy: torque against torsion draws a loop, not a line.",
+      .consequence = "Vibration of the output dies out; the gear warms when it is twisted back and forth.",
       .causes = "Material and tooth contact in the flexspline; grows with preload and wear of the teeth.",
+      .check =
+          "Strike the link with the motor held and count the swings; compare with the value after assembly, growth "
+          "means preload or wear.",
       .rivals = "dahl_hysteresis",
       .separated_by = "the same torsion amplitude at a second frequency",
   };

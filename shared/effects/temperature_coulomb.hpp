@@ -12,7 +12,11 @@ struct TemperatureCoulomb : Stateless {
       .shows_over = "temperature",
       .source = "lubricant, preload",
       .explanation = "The friction that does not depend on speed falls as the gear warms up.",
+      .consequence = "A cold axis sticks more: the first motions of a day are worse than later ones.",
       .causes = "Preload of the mesh and bearings that changes as parts expand; grease that stiffens in the cold.",
+      .check =
+          "Repeat a slow motion every few minutes from a cold start and plot the current over the housing's "
+          "temperature.",
       .rivals = "temperature_viscous",
       .separated_by = "slow and fast motion at two temperatures",
       .modulates = "coulomb_friction",

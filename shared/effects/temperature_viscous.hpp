@@ -12,7 +12,11 @@ struct TemperatureViscous : Stateless {
       .shows_over = "temperature, between runs",
       .source = "lubricant",
       .explanation = "Warm lubricant is thinner: viscous friction falls as the gear warms up.",
+      .consequence = "A cold axis needs more torque at speed and may miss its top speed after a cold start.",
       .causes = "Always there to some extent; seen where records were taken cold and warm.",
+      .check =
+          "Repeat a fast motion every few minutes from a cold start and plot the current over the housing's "
+          "temperature; check the grease's range.",
       .rivals = "temperature_coulomb",
       .separated_by = "slow and fast motion at two temperatures",
       .modulates = "viscous_friction",

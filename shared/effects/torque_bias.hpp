@@ -11,7 +11,10 @@ struct TorqueBias : Stateless {
       .shows_over = "bias",
       .source = "drives that report torque or force, not current",
       .explanation = "The given torque or force is off by a constant.",
+      .consequence = "The axis seems to be pushed one way, moving or not.",
       .causes = "Offset of the drive's torque signal, or a constant load such as weight on a vertical axis.",
+      .check =
+          "Read the torque signal with the drive off; look for a weight, a spring or a counterbalance on the axis.",
       .rivals = "coulomb_asymmetry",
       .separated_by = "a record with the drive off",
   };

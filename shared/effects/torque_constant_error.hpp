@@ -11,9 +11,14 @@ struct TorqueConstantError : Stateless {
       .shows_over = "scale",
       .source = "report eq. 61: inertia supplied",
       .explanation = "The motor makes more torque per ampere than its data sheet says (kappa positive), or less.",
+      .consequence =
+          "All torques of the model are off by the same share: loads and inertias come out too large or too small.",
       .causes =
           "Spread of magnets and windings (10 % is usual), a warm magnet, a wrong commutation angle, peak "
           "against RMS amperes.",
+      .check =
+          "Hold a known weight on the output and compare the current with the data sheet's; check peak against RMS "
+          "amperes and the commutation angle.",
       .rivals = "torque_sensor_gain,torque_constant_saturation",
       .separated_by = "a known inertia or weight at the output, or the back EMF at a known speed",
   };

@@ -11,7 +11,12 @@ struct TorqueConstantSaturation : Stateless {
       .shows_over = "current, at its peaks",
       .source = "magnetic saturation",
       .explanation = "At large currents the iron saturates, and an ampere makes less torque than at small ones.",
-      .causes = "A motor driven near its peak current. Check the torque constant over current in its data sheet.",
+      .consequence =
+          "The last amperes give little: peak acceleration and holding torque are below what the model says.",
+      .causes = "A motor driven near its peak current.",
+      .check =
+          "Hold rising known weights and plot them over the current; a line that bends is the iron. Check the motor's "
+          "peak current.",
       .rivals = "load_dependent_friction,torque_constant_error,cubic_stiffness",
       .separated_by = "a constant external load in both directions at low current",
   };

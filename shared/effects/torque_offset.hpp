@@ -12,7 +12,11 @@ struct TorqueOffset : Stateless {
       .shows_over = "bias",
       .source = "K0 in report eq. 69; bridge",
       .explanation = "The torque sensor reads something although there is no torque.",
+      .consequence = "The axis seems loaded at rest; torque control drifts against it.",
       .causes = "Offset of the strain-gauge bridge or its amplifier; drifts with temperature and mounting.",
+      .check =
+          "Read the sensor with the output free and at rest, in several positions; zero the bridge amplifier when it "
+          "is warm.",
       .rivals = "torsion_zero,quadratic_stiffness",
       .separated_by = "a record with the output free and the drive off",
       .adds_to = on(Balance::motor) | on(Balance::load),

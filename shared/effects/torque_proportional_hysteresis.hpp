@@ -14,7 +14,11 @@ struct TorqueProportionalHysteresis {
       .explanation =
           "The hysteresis of the gear grows with the torque through it: its loop is narrow about zero and wide "
           "at full load.",
+      .consequence = "The output's angle under load depends on where the load came from, by a share of the load.",
       .causes = "Friction between teeth and in the wave generator, pressed together by the load.",
+      .check =
+          "Load and unload the locked output to half and to all of the torque and compare the width of the two loops; "
+          "check lubricant and wear of the teeth.",
       .rivals = "dahl_hysteresis,load_dependent_friction",
       .separated_by = "loops of small amplitude at no load and at half the rated torque",
   };

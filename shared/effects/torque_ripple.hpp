@@ -11,9 +11,14 @@ struct TorqueRipple : Stateless {
       .shows_over = "motor angle, order spectrum",
       .source = "report 5.3",
       .explanation = "A torque that repeats with the motor's angle, k times a turn.",
+      .consequence =
+          "The speed ripples at a multiple of the motor's speed, and where that meets the resonance the axis shakes.",
       .causes =
           "Twice a turn: the wave generator's two lobes and their misalignment. Once: an eccentric coupling or rotor. "
           "Higher orders: cogging (slots and poles), bearing balls; on a screw, its pitch.",
+      .check =
+          "Turn slowly at constant speed and look at the current over the angle; release the coupling and repeat to "
+          "tell motor from gear; check concentricity.",
       .rivals = "kinematic_error,load_scaled_ripple",
       .separated_by = "slow constant speed over many turns, then the same at a second load",
   };

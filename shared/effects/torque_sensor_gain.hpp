@@ -12,7 +12,12 @@ struct TorqueSensorGain : Stateless {
       .shows_over = "scale",
       .source = "bridge",
       .explanation = "The torque sensor reads too much (ratio positive), or too little.",
+      .consequence =
+          "Loads and stiffness come out too large or too small by the same share, and torque control gives too much or "
+          "too little.",
       .causes = "Calibration of the bridge, a part of the load that bypasses it.",
+      .check =
+          "Hang a known weight on a known lever and compare; look for a load path around the sensor, as a stiff cable.",
       .rivals = "torque_constant_error,linear_stiffness",
       .separated_by = "a known weight on a known lever",
       .adds_to = on(Balance::motor) | on(Balance::load),

@@ -14,7 +14,13 @@ struct TorqueSensorRipple : Stateless {
       .explanation =
           "The torque sensor reads a ripple that repeats with the motor angle and that the drive does not feel: "
           "strain gauges on the flexspline are bent by each lobe of the wave generator that passes.",
+      .consequence =
+          "The torque signal ripples twice a turn of the motor although the axis runs evenly; torque control then "
+          "makes it real.",
       .causes = "Gauges on the flexspline itself; misalignment of the gauges.",
+      .check =
+          "Turn slowly without load: the reading must be flat. Check the gauges' pattern (opposed pairs cancel the "
+          "ripple) and filter or map it.",
       .rivals = "torque_ripple,kinematic_error",
       .separated_by = "slow constant speed over many turns without load",
       .adds_to = on(Balance::motor) | on(Balance::load),

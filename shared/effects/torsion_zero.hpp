@@ -13,9 +13,11 @@ struct TorsionZero : Stateless {
       .shows_over = "per record",
       .source = "integrated tachometer",
       .explanation = "The torsion is counted from a wrong zero: motor and output position have no common one.",
+      .consequence = "The spring seems bent at rest; stiffness differs by direction where it does not.",
       .causes =
           "Incremental encoders that start at nought wherever the axis stands, positions integrated from a "
           "tachometer.",
+      .check = "Let the axis rest without load and zero both positions there, or use absolute encoders or an index.",
       .rivals = "torque_offset,quadratic_stiffness",
       .separated_by = "locked load with a torque far from zero, or positions that are referenced",
   };

@@ -11,9 +11,13 @@ struct ViscousAsymmetry : Stateless {
       .shows_over = "velocity, even",
       .source = "report eq. 27, 62",
       .explanation = "Friction grows faster with speed in one direction than in the other.",
+      .consequence = "One direction is slower than the other at the same torque, the more the faster it goes.",
       .causes =
           "Tooth flanks, bearing preload or brushes that differ by direction; a screw or an axial load; grease that "
           "is carried to one side.",
+      .check =
+          "Hold the same speed both ways at several speeds and compare the currents; look at brushes, axial load and "
+          "where the grease went.",
       .rivals = "coulomb_asymmetry",
       .separated_by = "both directions at two speeds that differ by a factor of five",
   };

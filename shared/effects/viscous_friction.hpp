@@ -11,7 +11,10 @@ struct ViscousFriction : Stateless {
       .shows_over = "velocity, linear",
       .source = "report eq. 27, 48",
       .explanation = "Lubricant is sheared between moving surfaces: the faster, the more torque it takes.",
+      .consequence =
+          "Fast motion takes torque and warms the gear; it also damps, so too much in the model makes control weak.",
       .causes = "Grease in the wave-generator bearing and the tooth mesh; more when cold or over-filled.",
+      .check = "Hold several speeds and plot the current, cold and warm; check the kind and amount of grease.",
       .rivals = "power_law_friction",
       .separated_by = "steady motion at several speeds",
   };
