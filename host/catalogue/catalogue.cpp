@@ -143,9 +143,10 @@ Along<N> along() {
   return functions;
 }
 
-std::vector<Entry> make_entries() {
+std::vector<Entry> make_entries(bool made_by_user) {
   std::vector<Entry> entries;
   effects::for_each_effect([&]<class E>(std::size_t id) {
+    if (E::kInfo.made_by_user != made_by_user) return;
     Entry entry;
     entry.id = id;
     entry.info = &E::kInfo;
@@ -162,7 +163,7 @@ std::vector<Entry> make_entries() {
 }
 
 const std::vector<Entry>& entries() {
-  static const std::vector<Entry> table = make_entries();
+  static const std::vector<Entry> table = make_entries(false);
   return table;
 }
 
@@ -213,6 +214,13 @@ std::span<const Entry> all() {
 
 const Entry* find(std::string_view name) {
   for (const Entry& entry : entries())
+    if (entry.name() == name) return &entry;
+  return nullptr;
+}
+
+const Entry* find_made_by_user(std::string_view name) {
+  static const std::vector<Entry> table = make_entries(true);
+  for (const Entry& entry : table)
     if (entry.name() == name) return &entry;
   return nullptr;
 }

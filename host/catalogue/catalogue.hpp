@@ -1,6 +1,7 @@
 // The effects of shared/effects as data: what the host does with an effect whose name it learns at run time.
 #pragma once
 
+#include <functional>
 #include <memory>
 #include <span>
 #include <string>
@@ -10,6 +11,10 @@
 #include "host/numbers/dual.hpp"
 #include "host/numbers/real.hpp"
 #include "shared/effects/effect.hpp"
+
+namespace flexspline::model {
+struct Definition;
+}
 
 namespace flexspline::catalogue {
 
@@ -41,14 +46,17 @@ struct Along {
   using Parameter = typename N::Parameter;
   // Adds the effect's torque on `balance` at each sample of `inputs` to `torque` (N m), same length. Null where it adds
   // to none, as most shifts and all modulations.
-  void (*torque)(const Parameter* parameters, const DriveConstants<Parameter>& drive, Balance balance,
-                 std::span<const effects::Inputs<N>> inputs, typename N::Value* torque) = nullptr;
+  std::function<void(const Parameter* parameters, const DriveConstants<Parameter>& drive, Balance balance,
+                     std::span<const effects::Inputs<N>> inputs, typename N::Value* torque)>
+      torque;
   // The same along plain inputs.
-  void (*torque_of_plain)(const Parameter* parameters, const DriveConstants<Parameter>& drive, Balance balance,
-                          std::span<const effects::Inputs<Real>> inputs, typename N::Value* torque) = nullptr;
+  std::function<void(const Parameter* parameters, const DriveConstants<Parameter>& drive, Balance balance,
+                     std::span<const effects::Inputs<Real>> inputs, typename N::Value* torque)>
+      torque_of_plain;
   // Changes the inputs in place, as shifts and modulations do. Null for sources.
-  void (*change)(const Parameter* parameters, const DriveConstants<Parameter>& drive,
-                 std::span<effects::Inputs<N>> inputs) = nullptr;
+  std::function<void(const Parameter* parameters, const DriveConstants<Parameter>& drive,
+                     std::span<effects::Inputs<N>> inputs)>
+      change;
 };
 
 struct Entry {
@@ -58,13 +66,16 @@ struct Entry {
   bool has_state = false;
   Along<Real> real;
   Along<Dual> dual;
-  std::unique_ptr<Instance> (*make)(const double* parameters, const DriveConstants<double>& drive) = nullptr;
+  std::function<std::unique_ptr<Instance>(const double* parameters, const DriveConstants<double>& drive)> make;
+  // Of an effect that a user made: what its model file states; else null, and no label.
+  const model::Definition* definition = nullptr;
+  std::string label{};  // "table_effect:velocity"
 
   std::string_view name() const { return info->name; }
   // Position of a parameter, or parameters.size() if there is none of that name.
   std::size_t index_of(std::string_view parameter) const;
   std::size_t count(Kind kind) const;
-  bool adds_torque() const { return real.torque != nullptr; }
+  bool adds_torque() const { return static_cast<bool>(real.torque); }
   bool adds_to(Balance balance) const { return info->balance == balance || (info->adds_to & on(balance)) != 0; }
   // The balance on which its parameters are estimated.
   Balance told_by() const { return info->told_by_motor ? Balance::motor : info->balance; }
@@ -93,8 +104,10 @@ effects::Inputs<N> lifted(const effects::Inputs<Real>& in) {
   }
 }
 
-// All effects, by rising number.
+// All effects, by rising number, but those that users make: see defined.hpp.
 std::span<const Entry> all();
+// What users make effects of: an entry that takes all that is stated as parameters. Null if there is none of that name.
+const Entry* find_made_by_user(std::string_view name);
 // Null if there is none of that name.
 const Entry* find(std::string_view name);
 // As `find`, for names that are known to exist; throws std::out_of_range.

@@ -2,6 +2,8 @@
 
 #include <numbers>
 
+#include "host/catalogue/defined.hpp"
+
 namespace flexspline::catalogue {
 namespace {
 
@@ -9,7 +11,7 @@ class CatalogueEffects final : public model::KnownEffects {
  public:
   CatalogueEffects() {
     for (const Entry& entry : all()) {
-      model::KnownEffect known{entry.name(), {}};
+      model::KnownEffect known{entry.name(), {}, model::Form::plain};
       for (const auto& p : entry.parameters) {
         // Bounds of a ratio or a root say only the sign of the parameter itself.
         const bool own = p.per.empty() && p.root_of.empty();
@@ -20,6 +22,8 @@ class CatalogueEffects final : public model::KnownEffects {
       }
       effects_.push_back(std::move(known));
     }
+    effects_.push_back({kTableEffect, {}, model::Form::table});
+    effects_.push_back({kExpressionEffect, {}, model::Form::formula});
   }
   const model::KnownEffect* find(std::string_view name) const override {
     for (const auto& known : effects_)
@@ -30,6 +34,9 @@ class CatalogueEffects final : public model::KnownEffects {
     std::vector<std::string_view> names;
     for (const auto& known : effects_) names.push_back(known.name);
     return names;
+  }
+  std::optional<model::Objection> objection(const model::Effect& effect) const override {
+    return objection_to(effect);
   }
 
  private:

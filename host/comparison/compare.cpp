@@ -8,6 +8,7 @@
 #include <stdexcept>
 #include <utility>
 
+#include "host/catalogue/defined.hpp"
 #include "host/comparison/free_run.hpp"
 #include "host/comparison/full_rate.hpp"
 #include "host/comparison/noise_floor.hpp"
@@ -273,10 +274,8 @@ class Comparer {
 void require_values(const model::Model& model) {
   std::string missing;
   for (const model::Effect& effect : model.effects)
-    for (const auto& info : catalogue::get(effect.type).parameters) {
-      const model::Parameter* p = effect.find(info.name);
-      if (!p || !p->value) missing += fmt::format("{}{}.{}", missing.empty() ? "" : ", ", effect.id, info.name);
-    }
+    for (const std::string& name : catalogue::missing_values(effect))
+      missing += fmt::format("{}{}.{}", missing.empty() ? "" : ", ", effect.id, name);
   if (!missing.empty())
     throw model::ModelError(fmt::format(
         "model \"{}\" cannot be compared: no value for {}; identify first, or write the values into the model file",

@@ -6,6 +6,7 @@
 #include <charconv>
 #include <cmath>
 
+#include "host/catalogue/defined.hpp"
 #include "host/comparison/noise_floor.hpp"
 #include "host/diagnosis/candidates.hpp"
 
@@ -172,9 +173,9 @@ Addition remove(const data::Dataset& dataset, const model::Model& model, std::st
     throw model::ModelError(fmt::format("the model has no effect \"{}\"; it has {}", id, known));
   }
   const std::string out = found->id;
-  const catalogue::Entry& entry = catalogue::get(found->type);
+  const catalogue::Entry& entry = catalogue::entry_of(*found);
   for (const model::Effect& e : model.effects)
-    if (catalogue::get(e.type).info->modulates == entry.name() && e.id != out)
+    if (catalogue::entry_of(e).info->modulates == entry.name() && e.id != out)
       throw model::ModelError(fmt::format("{} scales {}; remove {} first", e.id, out, e.id));
   model::Model after = model;
   std::erase_if(after.effects, [&](const model::Effect& e) { return e.id == out; });

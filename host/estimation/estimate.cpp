@@ -7,6 +7,7 @@
 #include <stdexcept>
 #include <utility>
 
+#include "host/catalogue/defined.hpp"
 #include "host/estimation/instruments.hpp"
 #include "host/estimation/intervals.hpp"
 #include "host/estimation/output_error.hpp"
@@ -56,14 +57,14 @@ void supply(model::Model& model, const Supplied& supplied) {
   model::Parameter* parameter = effect->find(supplied.parameter);
   if (!parameter) {
     std::string names;
-    for (const auto& info : catalogue::get(effect->type).parameters)
+    for (const auto& info : catalogue::entry_of(*effect).parameters)
       names += (names.empty() ? "" : ", ") + std::string(info.name);
     throw std::invalid_argument(
         fmt::format("{} has no parameter {}: it has {}", supplied.id, supplied.parameter, names));
   }
   parameter->value = supplied.value;
   parameter->fixed = true;
-  for (const auto& info : catalogue::get(effect->type).parameters)
+  for (const auto& info : catalogue::entry_of(*effect).parameters)
     if (info.name == supplied.parameter) parameter->unit = std::string(catalogue::unit_on(info.unit, model.drive.axis));
 }
 

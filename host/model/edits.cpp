@@ -146,6 +146,12 @@ std::size_t EditedDocument::end_of_effects() const {
   return text_.size();
 }
 
+std::size_t EditedDocument::end_of_effect(const Node& effect) const {
+  for (std::size_t i = sections_.size(); i-- > 0;)
+    if (sections_[i].effect == &effect) return sections_[i].own_end;
+  return text_.size();
+}
+
 std::size_t EditedDocument::end_of_history() const {
   for (std::size_t i = sections_.size(); i-- > 0;)
     if (sections_[i].is_history) return sections_[i].own_end;

@@ -43,6 +43,7 @@ class EditedDocument {
   std::size_t end_of_root() const;
   std::size_t end_of_effects() const;
   std::size_t end_of_history() const;
+  std::size_t end_of_effect(const Node& effect) const;  // of one
 
   std::size_t line_begin(std::size_t position) const;
   std::size_t line_end(std::size_t position) const;  // behind its newline

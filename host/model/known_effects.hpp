@@ -2,6 +2,8 @@
 // so that reading a file does not depend on how effects are written.
 #pragma once
 
+#include <cstdint>
+#include <optional>
 #include <string>
 #include <string_view>
 #include <vector>
@@ -17,9 +19,20 @@ struct KnownParameter {
   bool given;  // order: must be stated by the user, is never estimated
 };
 
+// What a file states of an effect beside its parameters: nothing, a table, or a formula with parameters of its own.
+enum class Form : std::uint8_t { plain, table, formula };
+
 struct KnownEffect {
   std::string_view name;
   std::vector<KnownParameter> parameters;
+  Form form = Form::plain;
+};
+
+struct Effect;
+
+// What is wrong with an effect that a user made. `key` is where: "variable", "table", "formula", or a parameter's name.
+struct Objection {
+  std::string key, what, remedy;
 };
 
 class KnownEffects {
@@ -28,6 +41,8 @@ class KnownEffects {
   // nullptr where there is no effect of that name; else valid as long as this object.
   virtual const KnownEffect* find(std::string_view name) const = 0;
   virtual std::vector<std::string_view> names() const = 0;
+  // Of an effect that a user made; nothing where it can be used.
+  virtual std::optional<Objection> objection(const Effect&) const { return std::nullopt; }
 };
 
 }  // namespace flexspline::model

@@ -37,13 +37,35 @@ struct Parameter {
   std::optional<double> std;
   std::optional<double> spread_percent;
   bool fixed = false;
+  // Bounds of a parameter that the user made; those of the catalogue are in the catalogue.
+  std::optional<double> low{};
+  std::optional<double> high{};
+};
+
+// A torque by points over one signal.
+struct Table {
+  std::vector<double> at;     // the signal, in even steps
+  std::vector<double> value;  // torque, on the effect's balance; empty: to be identified
+  std::vector<double> std;    // of each value; may be empty
+  bool fixed = false;         // is not estimated
+};
+
+// What an effect computes, where its type leaves that to the user.
+struct Definition {
+  std::string balance = "motor";  // "motor", "transmission", "load"
+  std::string variable;           // of a table: the signal that it runs over
+  bool times_direction = false;   // of a table: times the sign of the motion on its balance
+  Table table;
+  std::string formula;  // of a formula: its torque
 };
 
 struct Effect {
   std::string type;  // name in the catalogue
   std::string id;    // unique in the model; the type unless the file says otherwise
   // In the order of the catalogue, all that the catalogue has, with no value where the file has none.
+  // Of one that the user made, those that the file has.
   std::vector<Parameter> parameters;
+  std::optional<Definition> definition{};  // of one that the user made
 
   const Parameter* find(std::string_view name) const;
   Parameter* find(std::string_view name);

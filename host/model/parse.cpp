@@ -171,9 +171,13 @@ class Reader {
       if (misplaced)
         fail(entry.line, fmt::format("the parameter {} stands outside the parameters", entry.key),
              "write it below a line [effect.parameters]");
-      require_known(entry, "[[effect]]", {"type", "id", "parameters"});
+      require_known(entry, "[[effect]]", keys_of(known->form));
     }
     identify(node, result, type->line);
+    if (known->form != Form::plain) {
+      made_by_user(node, *known, result);
+      return result;
+    }
     const Node* parameters = node.find("parameters");
     if (parameters && parameters->kind != NodeKind::table)
       fail(parameters->line, fmt::format("the parameters of {} are {}", result.id, parameters->kind_name()),
@@ -193,6 +197,95 @@ class Reader {
     return result;
   }
 
+  static std::vector<std::string_view> keys_of(Form form) {
+    if (form == Form::table) return {"type", "id", "variable", "balance", "times_direction", "table"};
+    if (form == Form::formula) return {"type", "id", "formula", "balance", "parameters"};
+    return {"type", "id", "parameters"};
+  }
+
+  void made_by_user(const Node& node, const KnownEffect& known, Effect& result) const {
+    Definition definition;
+    if (const Node* balance = node.find("balance")) {
+      definition.balance = text(*balance, "balance");
+      if (definition.balance != "motor" && definition.balance != "transmission" && definition.balance != "load")
+        fail(balance->line, fmt::format("there is no balance \"{}\"", definition.balance),
+             "write \"motor\", \"transmission\" or \"load\"");
+    }
+    const std::string_view key = known.form == Form::table ? "variable" : "formula";
+    const Node* what = node.find(key);
+    if (!what)
+      fail(node.line, fmt::format("{} has no {}", result.id, key),
+           known.form == Form::table ? "write variable = \"velocity\", for example"
+                                     : "write formula = \"a*tanh(velocity/b)\", for example");
+    (known.form == Form::table ? definition.variable : definition.formula) = text(*what, key);
+    if (const Node* times = node.find("times_direction")) {
+      if (times->kind != NodeKind::boolean)
+        fail(times->line, fmt::format("times_direction is {}", times->kind_name()), "write true or false");
+      definition.times_direction = times->boolean;
+    }
+    if (const Node* table = node.find("table")) definition.table = this->table(*table);
+    result.definition = std::move(definition);
+    const Node* parameters = node.find("parameters");
+    if (parameters && parameters->kind != NodeKind::table)
+      fail(parameters->line, fmt::format("the parameters of {} are {}", result.id, parameters->kind_name()),
+           "begin them with a line [effect.parameters], in single brackets");
+    if (parameters)
+      for (const Entry& entry : parameters->entries) result.parameters.push_back(own_parameter(entry));
+    if (const auto objection = known_.objection(result)) {
+      const Node* at = node.find(objection->key);
+      if (!at && parameters) at = parameters->find(objection->key);
+      fail(at ? at->line : node.line, objection->what, objection->remedy);
+    }
+  }
+
+  Table table(const Node& node) const {
+    if (node.kind != NodeKind::table)
+      fail(node.line, fmt::format("table is {}", node.kind_name()), "begin it with a line [effect.table]");
+    Table result;
+    for (const Entry& entry : node.entries) require_known(entry, "[effect.table]", {"at", "value", "std", "fixed"});
+    for (const auto& [key, place] : {std::pair{"at", &Table::at}, {"value", &Table::value}, {"std", &Table::std}})
+      if (const Node* list = node.find(key)) result.*place = numbers(*list, key);
+    if (const Node* fixed = node.find("fixed")) {
+      if (fixed->kind != NodeKind::boolean)
+        fail(fixed->line, fmt::format("fixed is {}", fixed->kind_name()), "write true or false without quotes");
+      result.fixed = fixed->boolean;
+    }
+    for (const auto& [key, size] : {std::pair{"value", result.value.size()}, {"std", result.std.size()}})
+      if (size != 0 && size != result.at.size())
+        fail(node.find(key)->line, fmt::format("{} has {} numbers, and at has {}", key, size, result.at.size()),
+             "give one for each point");
+    return result;
+  }
+
+  std::vector<double> numbers(const Node& node, std::string_view key) const {
+    if (node.kind != NodeKind::array)
+      fail(node.line, fmt::format("{} is {}", key, node.kind_name()), fmt::format("write {} = [1.0, 2.0]", key));
+    std::vector<double> result;
+    for (const Node& item : node.items) result.push_back(number(item, key));
+    return result;
+  }
+
+  // A parameter of a formula: the user says what the catalogue says of others.
+  Parameter own_parameter(const Entry& entry) const {
+    const Node& node = entry.value;
+    KnownParameter known{
+        entry.key, "-", "-", -std::numeric_limits<double>::infinity(), std::numeric_limits<double>::infinity(), false};
+    std::optional<double> low, high;
+    if (node.kind == NodeKind::table) {
+      if (const Node* unit = node.find("unit")) known.unit_rotary = known.unit_linear = text(*unit, "unit");
+      if (const Node* bound = node.find("low")) low = number(*bound, "low");
+      if (const Node* bound = node.find("high")) high = number(*bound, "high");
+      if (low && high && !(*low < *high))
+        fail(node.line, fmt::format("low of {} is not below its high", entry.key), "write the smaller one as low");
+    }
+    known.low = low.value_or(known.low);
+    known.high = high.value_or(known.high);
+    Parameter result = parameter(&node, known, true);
+    result.low = low;
+    result.high = high;
+    return result;
+  }
+
   void identify(const Node& node, Effect& result, std::size_t type_line) {
     const Node* id = node.find("id");
     result.id = id ? text(*id, "id") : result.type;
@@ -206,15 +299,16 @@ class Reader {
            "give one of them another id = \"NAME\"");
   }
 
-  Parameter parameter(const Node* node, const KnownParameter& known) const {
+  Parameter parameter(const Node* node, const KnownParameter& known, bool own = false) const {
     Parameter result;
     result.name = known.name;
     result.unit = axis_ == data::Axis::linear ? known.unit_linear : known.unit_rotary;
     if (!node) return result;
     const Node* value = node;
     if (node->kind == NodeKind::table) {
-      for (const Entry& entry : node->entries)
-        require_known(entry, result.name, {"value", "unit", "std", "spread_percent", "fixed"});
+      std::vector<std::string_view> keys = {"value", "unit", "std", "spread_percent", "fixed"};
+      if (own) keys.insert(keys.end(), {"low", "high"});
+      for (const Entry& entry : node->entries) require_known(entry, result.name, keys);
       if (const Node* unit = node->find("unit")) require_unit(*unit, result);
       if (const Node* deviation = node->find("std")) {
         result.std = number(*deviation, "std");

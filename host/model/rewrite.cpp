@@ -46,15 +46,34 @@ Field text_field(std::string key, const std::string& text) {
 
 std::vector<Field> fields_of(const Parameter& parameter) {
   const bool fixed = parameter.fixed;
+  const auto bound = [](const char* key, const std::optional<double>& value) {
+    return number_field(key, value, value ? exact_text(*value) : "");
+  };
   return {number_field("value", parameter.value, parameter.value ? value_text(parameter) : ""),
           deviation_field("std", parameter.std), deviation_field("spread_percent", parameter.spread_percent),
           // Not fixed is what a file says by saying nothing.
           Field{"fixed", fixed ? std::optional<std::string>("true") : std::nullopt,
-                [fixed](const Node& node) { return node.boolean == fixed; }}};
+                [fixed](const Node& node) { return node.boolean == fixed; }},
+          bound("low", parameter.low), bound("high", parameter.high)};
 }
 
+Field flag_field(std::string key, bool flag) {
+  return {std::move(key), flag ? std::optional<std::string>("true") : std::nullopt,
+          [flag](const Node& node) { return node.boolean == flag; }};
+}
+
+// A list whose numbers are replaced one by one where there are as many of them, so that comments between them stay.
+struct List {
+  const char* key;
+  const std::vector<double>* values;
+  int digits;
+};
+
 // The order in which keys stand in a table that we extend.
-constexpr std::string_view kOrder[] = {"format", "name", "value", "unit", "std", "source", "spread_percent", "fixed"};
+constexpr std::string_view kOrder[] = {
+    "format",          "name", "type",  "id",   "variable", "formula", "balance",
+    "times_direction", "at",   "value", "unit", "std",      "source",  "spread_percent",
+    "fixed",           "low",  "high"};
 
 class Round {
  public:
@@ -158,7 +177,7 @@ class Round {
 
   void effect(const Node& node, const Effect& effect) {
     const Node* parameters = node.find("parameters");
-    bool structural = false;
+    bool structural = effect.definition && definition(node, *effect.definition);
     for (const Parameter& parameter : effect.parameters) {
       const Node* stands = parameters ? parameters->find(parameter.name) : nullptr;
       const std::vector<Field> fields = fields_of(parameter);
@@ -174,6 +193,49 @@ class Round {
           edits_.insert_parameter(node, parameter.name, parameter_text(parameter), parameter_order(effect));
       }
     }
+  }
+
+  bool definition(const Node& node, const Definition& definition) {
+    std::vector<Field> fields = {text_field("variable", definition.variable), text_field("formula", definition.formula),
+                                 flag_field("times_direction", definition.times_direction)};
+    // The motor balance is what a file says by saying nothing.
+    if (node.find("balance") || definition.balance != "motor")
+      fields.push_back(text_field("balance", definition.balance));
+    if (sync(node, fields)) return true;
+    const Table& table = definition.table;
+    const Node* stands = node.find("table");
+    if (!stands && table.at.empty()) return false;
+    if (!stands) {
+      edits_.insert_blocks(document_.end_of_effect(node), table_block(table, document_.newline()));
+      return true;
+    }
+    for (const List& list : {List{"at", &table.at, kPointDigits}, List{"value", &table.value, kValueDigits},
+                             List{"std", &table.std, kDeviationDigits}})
+      if (this->list(*stands, list)) return true;
+    return sync(*stands, {flag_field("fixed", table.fixed)});
+  }
+
+  // True where an entry had to be added or taken out.
+  bool list(const Node& table, const List& list) {
+    const Node* stands = table.find(list.key);
+    if (!stands && list.values->empty()) return false;
+    if (!stands || list.values->empty()) {
+      if (stands)
+        edits_.remove_entry(table, list.key);
+      else
+        edits_.insert_entry(table, list.key, list_text(*list.values, list.digits, document_.newline()), kOrder);
+      return true;
+    }
+    if (stands->items.size() != list.values->size()) {
+      edits_.replace(stands->span, list_text(*list.values, list.digits, document_.newline()));
+      return false;
+    }
+    for (std::size_t k = 0; k < list.values->size(); ++k) {
+      const double value = (*list.values)[k];
+      const std::string text = number_text(value, list.digits);
+      if (!reads(stands->items[k], value, text)) edits_.replace(stands->items[k].span, text);
+    }
+    return false;
   }
 
   // A number that is to say more becomes a table in braces, in which a number that does not change keeps its text.
@@ -207,7 +269,7 @@ std::string rewrite(const ModelFile& file, const Model& changed) {
   std::string text = file.text;
   // Every round but the last changes something for good, one key of each effect at the least.
   std::size_t rounds = 20 + model.effects.size() + file.model.effects.size();
-  for (const Effect& effect : model.effects) rounds += 6 * effect.parameters.size();
+  for (const Effect& effect : model.effects) rounds += 8 * effect.parameters.size() + (effect.definition ? 12 : 0);
   for (;;) {
     std::optional<std::string> next = Round(text).run(model);
     if (!next) break;

@@ -25,13 +25,28 @@ bool same(const std::optional<double>& read, const std::optional<double>& meant,
   return !meant || *read == *meant || number_text(*read, digits) == number_text(*meant, digits);
 }
 
+bool same(const std::vector<double>& read, const std::vector<double>& meant, int digits) {
+  return std::ranges::equal(read, meant, [digits](double a, double b) { return same(a, b, digits); });
+}
+
+bool same(const Definition& read, const Definition& meant) {
+  return read.balance == meant.balance && read.variable == meant.variable && read.formula == meant.formula &&
+         read.times_direction == meant.times_direction && read.table.fixed == meant.table.fixed &&
+         same(read.table.at, meant.table.at, kPointDigits) && same(read.table.value, meant.table.value, kValueDigits) &&
+         same(read.table.std, meant.table.std, kDeviationDigits);
+}
+
 void require_same_effect(const Effect& read, const Effect& meant) {
   if (read.type != meant.type) differ(fmt::format("the type of {}", meant.id));
+  if (read.definition.has_value() != meant.definition.has_value() ||
+      (meant.definition && !same(*read.definition, *meant.definition)))
+    differ(fmt::format("what {} computes", meant.id));
   for (const Parameter& parameter : meant.parameters) {
     const Parameter* other = read.find(parameter.name);
     if (!other || !same(other->value, parameter.value, kValueDigits) ||
         !same(other->std, parameter.std, kDeviationDigits) ||
-        !same(other->spread_percent, parameter.spread_percent, kDeviationDigits) || other->fixed != parameter.fixed)
+        !same(other->spread_percent, parameter.spread_percent, kDeviationDigits) || other->fixed != parameter.fixed ||
+        other->low != parameter.low || other->high != parameter.high)
       differ(fmt::format("{} of {}", parameter.name, meant.id));
   }
   for (const Parameter& parameter : read.parameters)
@@ -56,6 +71,7 @@ EffectsOfModel::EffectsOfModel(const Model& model) {
       type_names_.push_back(effect.type);
       parameter_names_.emplace_back();
       effects_.emplace_back();
+      if (effect.definition) effects_.back().form = effect.definition->variable.empty() ? Form::formula : Form::table;
     }
     for (const Parameter& parameter : effect.parameters) {
       if (std::ranges::find(parameter_names_[at], parameter.name) != parameter_names_[at].end()) continue;
@@ -99,6 +115,11 @@ Model without_unknowns(Model model) {
       drop_if_not_finite(parameter.std);
       drop_if_not_finite(parameter.spread_percent);
     }
+    if (!effect.definition) continue;
+    Table& table = effect.definition->table;
+    for (const std::vector<double>* list : {&table.at, &table.value})
+      for (const double value : *list) require_finite(value, effect.id + ".table");
+    if (!std::ranges::all_of(table.std, [](double x) { return std::isfinite(x); })) table.std.clear();
   }
   for (History& history : model.history) {
     drop_if_not_finite(history.rmse_before);

@@ -5,6 +5,7 @@
 #include <charconv>
 #include <cmath>
 #include <stdexcept>
+#include <utility>
 
 #include "host/model/units.hpp"
 
@@ -82,12 +83,14 @@ std::string toml_string(std::string_view text) {
 }
 
 bool is_stated(const Parameter& parameter) {
-  return parameter.value || parameter.std || parameter.spread_percent || parameter.fixed;
+  return parameter.value || parameter.std || parameter.spread_percent || parameter.fixed || parameter.low ||
+         parameter.high;
 }
 
 std::string parameter_text(const Parameter& parameter) {
   const bool has_unit = !is_dimensionless(parameter.unit);
-  if (parameter.value && !has_unit && !parameter.std && !parameter.spread_percent && !parameter.fixed)
+  if (parameter.value && !has_unit && !parameter.std && !parameter.spread_percent && !parameter.fixed &&
+      !parameter.low && !parameter.high)
     return value_text(parameter);
   std::string fields;
   const auto add = [&fields](std::string_view key, const std::string& text) {
@@ -98,6 +101,8 @@ std::string parameter_text(const Parameter& parameter) {
   if (parameter.std) add("std", number_text(*parameter.std, kDeviationDigits));
   if (parameter.spread_percent) add("spread_percent", number_text(*parameter.spread_percent, kDeviationDigits));
   if (parameter.fixed) add("fixed", "true");
+  if (parameter.low) add("low", exact_text(*parameter.low));
+  if (parameter.high) add("high", exact_text(*parameter.high));
   return fields.empty() ? "{}" : "{ " + fields + " }";
 }
 
@@ -113,13 +118,43 @@ std::string effect_block(const Effect& effect, std::string_view newline) {
   std::string block = fmt::format("[[effect]]{0}type = {1}{0}", newline, toml_string(effect.type));
   if (!effect.id.empty() && effect.id != effect.type)
     block += fmt::format("id = {}{}", toml_string(effect.id), newline);
+  if (effect.definition) {
+    const Definition& d = *effect.definition;
+    for (const auto& [key, value] : {std::pair{"variable", &d.variable}, {"formula", &d.formula}})
+      if (!value->empty()) block += fmt::format("{} = {}{}", key, toml_string(*value), newline);
+    block += fmt::format("balance = {}{}", toml_string(d.balance), newline);
+    if (d.times_direction) block += fmt::format("times_direction = true{}", newline);
+  }
   bool first = true;
   for (const Parameter& parameter : effect.parameters) {
-    if (!is_stated(parameter)) continue;
+    // The parameters of a formula are known from here alone.
+    if (!is_stated(parameter) && !effect.definition) continue;
     if (first) block += fmt::format("[effect.parameters]{}", newline);
     first = false;
     block += fmt::format("{} = {}{}", parameter.name, parameter_text(parameter), newline);
   }
+  if (effect.definition) block += table_block(effect.definition->table, newline);
+  return block;
+}
+
+std::string list_text(const std::vector<double>& values, int digits, std::string_view newline) {
+  constexpr std::size_t kPerLine = 8;
+  std::string text = "[";
+  for (std::size_t k = 0; k < values.size(); ++k) {
+    if (k % kPerLine == 0) text += fmt::format("{}  ", newline);
+    text += fmt::format("{},{}", number_text(values[k], digits), k % kPerLine + 1 < kPerLine ? " " : "");
+  }
+  while (text.ends_with(' ')) text.pop_back();
+  return text + fmt::format("{}]", newline);
+}
+
+std::string table_block(const Table& table, std::string_view newline) {
+  if (table.at.empty()) return {};
+  std::string block = fmt::format("[effect.table]{0}at = {1}{0}", newline, list_text(table.at, kPointDigits, newline));
+  if (!table.value.empty())
+    block += fmt::format("value = {}{}", list_text(table.value, kValueDigits, newline), newline);
+  if (!table.std.empty()) block += fmt::format("std = {}{}", list_text(table.std, kDeviationDigits, newline), newline);
+  if (table.fixed) block += fmt::format("fixed = true{}", newline);
   return block;
 }
 

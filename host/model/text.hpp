@@ -10,6 +10,7 @@ namespace flexspline::model {
 
 inline constexpr int kValueDigits = 6;
 inline constexpr int kDeviationDigits = 3;  // of std and spread
+inline constexpr int kPointDigits = 9;      // of a table: its steps are even
 
 // Shortest text with at most `digits` significant digits: "0.045", "3.63e-4", "3e8". The value is finite.
 std::string number_text(double value, int digits);
@@ -28,6 +29,11 @@ std::string quantity_text(const Quantity& quantity);
 // "[[effect]]" or "[[history]]" with its lines, each ended by `newline`.
 std::string effect_block(const Effect& effect, std::string_view newline = "\n");
 std::string history_block(const History& history, std::string_view newline = "\n");
+
+// "[effect.table]" with its lists; empty where the table has no points.
+std::string table_block(const Table& table, std::string_view newline = "\n");
+// A list in brackets, eight numbers a line.
+std::string list_text(const std::vector<double>& values, int digits, std::string_view newline = "\n");
 
 // Whether there is anything of the parameter to write.
 bool is_stated(const Parameter& parameter);

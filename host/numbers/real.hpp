@@ -3,6 +3,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <cstddef>
 #include <cstdint>
 #include <numbers>
 
@@ -83,6 +84,25 @@ struct ScalarSystem {
   static S by_sign(const S& x, const S& a, const S& b) { return x < S(0.0) ? b : a; }
   // Moves to `target` and keeps `share` of the distance; no motion, no change.
   static S relax(const S& from, const S& target, const S& share) { return target + (from - target) * share; }
+  // Straight lines between `points` values: at a position counted in points from the first, held beyond both ends; and
+  // at a phase, a turn being the whole table.
+  template <std::size_t Size>
+  static S table(const S (&values)[Size], int points, const S& at) {
+    if (!(at > S(0.0)) || points < 2) return values[0];
+    if (at >= S(points - 1.0)) return values[points - 1];
+    const double index = std::floor(plain(at));
+    const auto k = static_cast<std::size_t>(index);
+    return values[k] + (values[k + 1] - values[k]) * (at - S(index));
+  }
+  template <std::size_t Size>
+  static S table_over_turn(const S (&values)[Size], int points, const S& phase) {
+    const S turns = phase * S(0.5 * std::numbers::inv_pi);
+    const S at = (turns - S(std::floor(plain(turns)))) * S(static_cast<double>(points));
+    const double index = std::min(std::floor(plain(at)), points - 1.0);
+    const auto k = static_cast<std::size_t>(index);
+    const std::size_t next = k + 1 < static_cast<std::size_t>(points) ? k + 1 : 0;
+    return values[k] + (values[next] - values[k]) * (at - S(index));
+  }
   static Wave sincos(const S& x) {
     using std::cos;
     using std::sin;
@@ -120,6 +140,15 @@ struct ScalarSystem {
     const bool small = z < S(1e-4) && z > S(-1e-4);
     const S per = small ? S(1.0) - z * (S(0.5) - z * (S(1.0 / 3.0) - z * S(0.25))) : log(S(1.0) + z) / z;
     return exp(-x * per);
+  }
+
+ private:
+  // Without a derivative.
+  static double plain(const S& x) {
+    if constexpr (requires { x.a; })
+      return x.a;
+    else
+      return x;
   }
 };
 

@@ -313,10 +313,18 @@ Eigen::VectorXd BalanceData::term_torque(const Terms& terms, std::size_t t) {
   Eigen::VectorXd sum = Eigen::VectorXd::Zero(rows());
   if (!terms[t].adds_torque()) return sum;
   if (terms[t].scaled_by_none()) {
+    std::string key = "whole:";
+    append_shapes(key, terms[t]);
+    for (const Term& other : terms)
+      if (changes(other, terms[t])) append_shapes(key, other);
+    if (const auto found = cache_.find(key); found != cache_.end()) return found->second;
+    if (cache_.size() * static_cast<std::size_t>(rows()) > kCachedNumbers) cache_.clear();
     const auto all = values_of_all(terms);
-    return along_rows([&](const RowRange& range, std::vector<double>& signal) {
-      add_torque<Real>(terms, terms[t], terms[t].values, prepared_->records[range.record], all, signal);
-    });
+    return cache_
+        .emplace(key, along_rows([&](const RowRange& range, std::vector<double>& signal) {
+                   add_torque<Real>(terms, terms[t], terms[t].values, prepared_->records[range.record], all, signal);
+                 }))
+        .first->second;
   }
   for (std::size_t p = 0; p < terms[t].values.size(); ++p)
     if (terms[t].entry->parameters[p].kind == Kind::linear) sum += terms[t].values[p] * column(terms, {t, p});

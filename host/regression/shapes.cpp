@@ -174,6 +174,9 @@ ShapeRange shape_range(const BalanceData& data, const Term& term, std::size_t pa
   switch (info.limit) {
     case Limit::stated:
       break;
+    case Limit::scale:
+      range.logarithmic = true;
+      break;
     case Limit::velocity: {
       const std::vector<double> all = speeds();
       // What the mask leaves must hold enough of the term to see: its width at the slowest hundredth of the rows.
@@ -264,7 +267,7 @@ void sweep_shapes(BalanceData& data, Terms& terms, const std::vector<std::size_t
     open.push_back(s);
     const auto& info = terms[s.term].entry->parameters[s.parameter];
     // A ratio or an exponent begins at its usual value, what has a size at the middle of its range.
-    terms[s.term].values[s.parameter] = info.limit == Limit::stated
+    terms[s.term].values[s.parameter] = info.limit == Limit::stated || info.limit == Limit::scale
                                             ? usual_reduced(*terms[s.term].entry)[s.parameter]
                                             : shape_range(data, terms[s.term], s.parameter).at(0.5);
   }

@@ -2,11 +2,14 @@
 
 #include <fmt/format.h>
 
+#include "host/catalogue/defined.hpp"
+
 namespace flexspline::regression {
 
 using effects::Kind;
 
 std::string Term::label() const {
+  if (!entry->label.empty()) return entry->label;
   for (std::size_t p = 0; p < entry->parameters.size(); ++p)
     if (entry->parameters[p].kind == Kind::given) return fmt::format("{}:{:g}", entry->name(), values[p]);
   return std::string(entry->name());
@@ -14,7 +17,7 @@ std::string Term::label() const {
 
 Term term_of(const model::Effect& effect) {
   Term term;
-  term.entry = &catalogue::get(effect.type);
+  term.entry = &catalogue::entry_of(effect);
   term.id = effect.id;
   term.values = catalogue::reduced(*term.entry, catalogue::values_of(effect, *term.entry));
   for (const auto& info : term.entry->parameters) {

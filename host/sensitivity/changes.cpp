@@ -8,6 +8,7 @@
 #include <stdexcept>
 
 #include "host/catalogue/constants.hpp"
+#include "host/catalogue/defined.hpp"
 
 namespace flexspline::sensitivity {
 namespace {
@@ -15,7 +16,7 @@ namespace {
 // True while the model has the effect, or one that takes its place.
 bool stands_in(const model::Model& model, std::string_view type) {
   return std::any_of(model.effects.begin(), model.effects.end(), [&](const model::Effect& e) {
-    return e.type == type || catalogue::names_contain(catalogue::get(e.type).info->replaces, type);
+    return e.type == type || catalogue::names_contain(catalogue::entry_of(e).info->replaces, type);
   });
 }
 
@@ -27,7 +28,7 @@ std::string names_of(const List& list, Name name) {
 }
 
 void require_within_bounds(const model::Effect& effect, std::size_t p, const Change& change) {
-  const catalogue::Entry& entry = catalogue::get(effect.type);
+  const catalogue::Entry& entry = catalogue::entry_of(effect);
   const effects::ParameterInfo& info = entry.parameters[p];
   // Bounds hold for parameters as they are searched for.
   const double value = catalogue::reduced(entry, catalogue::values_of(effect, entry))[p];
@@ -94,7 +95,7 @@ Changed apply(const model::Model& model, const Change& change) {
   std::vector<model::Effect>& effects = changed.model.effects;
   std::erase_if(effects, [&](const model::Effect& e) { return e.id == change.effect; });
   const auto scales_nothing = [&](const model::Effect& e) {
-    const std::string_view scaled = catalogue::get(e.type).info->modulates;
+    const std::string_view scaled = catalogue::entry_of(e).info->modulates;
     return !scaled.empty() && !stands_in(changed.model, scaled);
   };
   for (const model::Effect& e : effects)

@@ -3,6 +3,7 @@
 #include <algorithm>
 
 #include "host/catalogue/constants.hpp"
+#include "host/catalogue/defined.hpp"
 
 namespace flexspline::simulation {
 
@@ -11,10 +12,10 @@ Balances::Balances(const model::Model& model, const catalogue::DriveConstants<do
   std::vector<catalogue::Instance*> modulations;
   // What a modulation scales is not straight.
   const bool fold = std::none_of(model.effects.begin(), model.effects.end(), [](const model::Effect& e) {
-    return catalogue::get(e.type).info->phase != catalogue::Phase::source;
+    return catalogue::entry_of(e).info->phase != catalogue::Phase::source;
   });
   for (const model::Effect& effect : model.effects) {
-    const catalogue::Entry& entry = catalogue::get(effect.type);
+    const catalogue::Entry& entry = catalogue::entry_of(effect);
     const std::vector<double> values = catalogue::values_of(effect, entry);
     catalogue::Instance* instance = instances_.emplace_back(entry.make(values.data(), constants)).get();
     if (entry.has_state) states_.push_back(instance);
@@ -22,7 +23,8 @@ Balances::Balances(const model::Model& model, const catalogue::DriveConstants<do
       (entry.info->acts_last ? last_shifts : changing_).push_back(instance);
     if (entry.info->phase == catalogue::Phase::modulate) modulations.push_back(instance);
     if (!entry.adds_torque()) continue;
-    if (fold && !entry.has_state && take_straight(*instance, entry.info->balance)) continue;
+    // What a user made may be straight where it is tried and bend elsewhere.
+    if (fold && !entry.has_state && !entry.definition && take_straight(*instance, entry.info->balance)) continue;
     switch (entry.info->balance) {
       case catalogue::Balance::motor:
         motor_.push_back({instance, entry.has_state});

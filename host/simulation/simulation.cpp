@@ -6,6 +6,7 @@
 #include <string>
 
 #include "host/catalogue/constants.hpp"
+#include "host/catalogue/defined.hpp"
 #include "host/simulation/dynamics.hpp"
 #include "host/simulation/initial_motion.hpp"
 
@@ -82,11 +83,7 @@ class RecordInputs {
 std::vector<std::string> missing_values(const model::Model& model) {
   std::vector<std::string> missing;
   for (const model::Effect& effect : model.effects) {
-    for (const auto& info : catalogue::get(effect.type).parameters) {
-      const auto same = [&](const model::Parameter& parameter) { return parameter.name == info.name; };
-      const auto at = std::find_if(effect.parameters.begin(), effect.parameters.end(), same);
-      if (at == effect.parameters.end() || !at->value) missing.push_back(effect.id + "." + std::string(info.name));
-    }
+    for (const std::string& name : catalogue::missing_values(effect)) missing.push_back(effect.id + "." + name);
   }
   return missing;
 }
@@ -95,7 +92,7 @@ void require_complete(const model::Model& model, bool by_current) {
   std::vector<std::string> missing = missing_values(model);
   if (by_current && !model.drive.torque_constant_nm_a.value) missing.emplace_back("drive.torque_constant_nm_a");
   const auto beyond_motor = [](const model::Effect& effect) {
-    return catalogue::get(effect.type).info->balance != catalogue::Balance::motor;
+    return catalogue::entry_of(effect).info->balance != catalogue::Balance::motor;
   };
   if (!model.drive.gear_ratio.value && std::any_of(model.effects.begin(), model.effects.end(), beyond_motor))
     missing.emplace_back("drive.gear_ratio");

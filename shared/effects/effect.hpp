@@ -26,6 +26,7 @@ enum class Kind : std::uint8_t { linear, shape, given, grid };
 // Where the bounds of a shape parameter come from when data are at hand.
 enum class Limit : std::uint8_t {
   stated,            // low and high below hold for any data
+  scale,             // the same, of something with a size: searched for by its ratio to them
   velocity,          // a motor velocity: above what the mask leaves visible, below a quarter of the fast motion
   travel,            // a motor angle: above what the filter resolves, below the shortest stroke between reversals
   torsion,           // a torsion: above the resolution of the positions, below a third of the largest torsion
@@ -114,6 +115,8 @@ struct Description {
   bool told_by_motor = false;
   bool acts_last = false;  // a shift that acts on the signal as all others have left it
   bool host_only = false;  // too large for a drive
+  // What it computes is stated in the model file beside its parameters, so that each one there is an effect of its own.
+  bool made_by_user = false;
 };
 constexpr unsigned on(Balance balance) {
   return 1U << static_cast<unsigned>(balance);

@@ -32,6 +32,7 @@
 #include "shared/effects/stribeck_gaussian.hpp"
 #include "shared/effects/stribeck_hess_soom.hpp"
 #include "shared/effects/structural_damping.hpp"
+#include "shared/effects/table_effect.hpp"
 #include "shared/effects/temperature_coulomb.hpp"
 #include "shared/effects/temperature_viscous.hpp"
 #include "shared/effects/torque_bias.hpp"

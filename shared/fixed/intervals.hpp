@@ -269,6 +269,19 @@ struct Intervals {
     const std::int64_t b = Checked::pow_abs(Checked::State{{most(x)}}, e).raw;
     return a < b ? padded(a, b) : padded(b, a);
   }
+  // Between the least and the largest value that the positions reach.
+  template <std::size_t Size>
+  static Value table(const Value (&values)[Size], std::int32_t points, Ratio at) {
+    const auto index = [&](std::int64_t raw) {
+      return static_cast<std::int32_t>(limited<std::int64_t>(raw >> kRatioBits, 0, points - 1));
+    };
+    const std::int32_t last = index(at.high);
+    return hull_of(values, index(at.low), last + 1 < points ? last + 1 : last);
+  }
+  template <std::size_t Size>
+  static Value table_over_turn(const Value (&values)[Size], std::int32_t points, Angle) {
+    return hull_of(values, 0, points - 1);
+  }
   static Angle times_order(Angle angle, const Order&) { return angle; }
   static Sum wave(const Harmonic& h, Angle) { return Weight{{h.amplitude}} * padded(-one().high, one().high); }
   static Sum wave_times(const Harmonic& h, Angle, Value x) {
@@ -286,6 +299,12 @@ struct Intervals {
   template <class Function>
   static Fixed::Value at(Function&& function, const Scaled& x, std::int64_t raw) {
     return function(Fixed::Scaled{x.gain, detail::value_of(raw)});
+  }
+  template <std::size_t Size>
+  static Value hull_of(const Value (&values)[Size], std::int32_t first, std::int32_t last) {
+    Value all = values[first];
+    for (std::int32_t k = first + 1; k <= last; ++k) all = hull(all, values[k]);
+    return all;
   }
   static Value exactly(Fixed::Value x) { return {x.raw, x.raw}; }
   static State clamped(State x, std::int64_t limit) {

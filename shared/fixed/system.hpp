@@ -395,6 +395,24 @@ struct FixedSystem {
     return {{{static_cast<std::int32_t>(shift_right(w.cosine, kBits))}},
             {{static_cast<std::int32_t>(shift_right(w.sine, kBits))}}};
   }
+  // Straight lines between `points` values: at a position counted in points from the first, held beyond both ends; and
+  // at a phase, a turn being the whole table. A line is exact to half a unit, and to 2^-30 of its own rise.
+  template <std::size_t Size>
+  static constexpr Value table(const Value (&values)[Size], std::int32_t points, Ratio at) {
+    if (at.raw <= 0 || points < 2) return values[0];
+    const std::int64_t index = at.raw >> kRatioBits;
+    if (index >= points - 1) return values[points - 1];
+    const std::int64_t rest = at.raw & ((std::int64_t{1} << kRatioBits) - 1);
+    return on_line(values[index], values[index + 1], rest >> (kRatioBits - kLineBits));
+  }
+  template <std::size_t Size>
+  static constexpr Value table_over_turn(const Value (&values)[Size], std::int32_t points, Angle phase) {
+    const std::uint64_t at = (static_cast<std::uint64_t>(phase.raw) & 0xFFFFFFFF) * static_cast<std::uint64_t>(points);
+    const auto index = static_cast<std::int32_t>(at >> kAngleBits);
+    const auto rest = static_cast<std::int64_t>((at & 0xFFFFFFFF) >> (kAngleBits - kLineBits));
+    return on_line(values[index], values[index + 1 < points ? index + 1 : 0], rest);
+  }
+
   // Integers of 2^-32: a position and a distance in turns, a value below 15, the wave at a phase in turns.
   static constexpr Angle angle(std::int64_t q32) {
     return {q32};
@@ -410,6 +428,11 @@ struct FixedSystem {
   }
 
  private:
+  static constexpr int kLineBits = 30;
+  static constexpr Value on_line(Value a, Value b, std::int64_t share) {
+    return {{static_cast<std::int32_t>(a.raw + shift_right((std::int64_t{b.raw} - a.raw) * share, kLineBits))}};
+  }
+
   static constexpr std::int64_t kOneState = std::int64_t{1} << kStateBits;
   static constexpr std::uint64_t kLargest = 0x7FFFFFFFFFFFFFFF;
 
