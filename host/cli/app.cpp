@@ -44,8 +44,8 @@ class App {
     add_simulate();
     add_compare();
     add_diagnose();
-    add_change<AddOptions>("add", "effect of the catalogue; torque_ripple:2 gives an order");
-    add_change<RemoveOptions>("remove", "id of the effect in the model, or its type");
+    add_add();
+    take_change(command<RemoveOptions>("remove"), "id of the effect in the model, or its type");
     add_sensitivity();
     add_pack();
     add_plan();
@@ -271,9 +271,29 @@ class App {
     take_pipeline(sub, options->pipeline);
   }
 
-  template <class Options>
-  void add_change(std::string_view name, const std::string& effect_help) {
-    const auto [sub, options] = command<Options>(name);
+  void add_add() {
+    const auto added = command<AddOptions>("add");
+    take_change(added,
+                "effect of the catalogue; torque_ripple:2 gives an order; table_effect:velocity learns a curve over a "
+                "signal, table_effect:torque*direction one times the direction; expression_effect takes --formula");
+    const auto [sub, options] = added;
+    sub->add_option("--formula", options->made.formula, "torque of an expression_effect, over signals and parameters")
+        ->type_name("TEXT");
+    sub->add_option("--parameter", options->made.parameters,
+                    "of the formula, with bounds where it does not only scale the torque; may be repeated")
+        ->type_name("NAME=LOW..HIGH:UNIT")
+        ->allow_extra_args(false);
+    sub->add_option("--points", options->made.points, "of a table_effect; else as many as the data ask for")
+        ->type_name("N");
+    sub->add_option(
+           "--balance", options->made.balance,
+           "of a table_effect or expression_effect: motor, transmission or load; else where its signals belong")
+        ->type_name("NAME");
+  }
+
+  template <class Command>
+  void take_change(const Command& change, const std::string& effect_help) {
+    const auto& [sub, options] = change;
     sub->add_option("EFFECT", options->effect, effect_help)->required()->type_name("");
     take_data(sub, options->data);
     take_model(sub, options->model);

@@ -7,6 +7,7 @@
 #include "host/cli/report_option.hpp"
 #include "host/diagnosis/add.hpp"
 #include "host/output/json.hpp"
+#include "host/output/learned_table.hpp"
 #include "host/output/text.hpp"
 
 namespace flexspline::cli {
@@ -42,6 +43,10 @@ void print(const Addition& change, const std::string& what, Console& console) {
     values.row({fmt::format("{}.{}", e.id, e.parameter), number(e.value, kDigits), number(e.low, kDigits),
                 number(e.high, kDigits), e.unit});
   console.line(values.text());
+  for (const auto& [id, learned] : change.tables) {
+    console.line();
+    console.line(output::learned_table_text(id, change.model.find(id)->definition->variable, learned, change.unit));
+  }
 }
 
 json errors_json(const diagnosis::Errors& errors) {
@@ -52,6 +57,9 @@ json errors_json(const diagnosis::Errors& errors) {
 json change_json(const Addition& change) {
   json parameters = json::array();
   for (const regression::Estimate& e : change.estimates) parameters.push_back(output::json_parameter(e));
+  json tables = json::array();
+  for (const auto& [id, learned] : change.tables)
+    tables.push_back(output::learned_table_json(id, *change.model.find(id)->definition, learned, change.unit));
   return {{"format", "flexspline-add/1"},
           {"effect", change.effect},
           {"signal", change.signal},
@@ -61,6 +69,7 @@ json change_json(const Addition& change) {
           {"noise_floor", output::json_number(change.noise_floor)},
           {"noise_floor_from", change.noise_floor_from},
           {"parameters", std::move(parameters)},
+          {"tables", std::move(tables)},
           {"warnings", change.warnings}};
 }
 
@@ -110,11 +119,15 @@ int change_model(const ChangeOptions& options, const std::string& command, const
 }  // namespace
 
 int run(const AddOptions& options, Console& console) {
-  diagnosis::parse_effect(options.effect);  // a wrong name is said before files are read
+  // A wrong name is said before files are read.
+  if (diagnosis::names_made_effect(options.effect))
+    diagnosis::made_effect(options.effect, options.made, {});
+  else
+    diagnosis::parse_effect(options.effect);
   return change_model(
       options, "add", fmt::format("{} added", options.effect),
       [&](const data::Dataset& dataset, const model::Model& model) {
-        return diagnosis::add(dataset, model, options.effect, options.pipeline.options());
+        return diagnosis::add(dataset, model, options.effect, options.pipeline.options(), options.made);
       },
       console);
 }

@@ -2,7 +2,7 @@
 
 #include <nlohmann/json.hpp>
 
-#include "host/catalogue/catalogue.hpp"
+#include "host/catalogue/defined.hpp"
 #include "host/cli/commands.hpp"
 #include "host/output/effect_curve.hpp"
 #include "host/output/identification.hpp"
@@ -115,15 +115,75 @@ void describe(const Entry& entry, Console& console) {
   say("Source", info.source);
 }
 
+// What users make has no parameters of its own and no curve: how one is made stands in their place.
+constexpr std::string_view kMadeByUsers[] = {catalogue::kTableEffect, catalogue::kExpressionEffect};
+
+std::string how_to_add(std::string_view name) {
+  return name == catalogue::kTableEffect
+             ? "flexspline add table_effect:velocity --model base-model.toml DATA --out better.toml"
+             : "flexspline add expression_effect --formula 'a*tanh(velocity/b)' --parameter a:N*m --parameter "
+               "b=0.1..50:rad/s --model base-model.toml DATA --out better.toml";
+}
+
+json made_json(const effects::Description& info) {
+  json rivals = json::array();
+  for (const std::string_view rival : catalogue::split_names(info.rivals)) rivals.push_back(rival);
+  json signals = json::array();
+  for (const effects::VariableInfo& v : effects::kVariables)
+    signals.push_back({{"signal", v.name}, {"unit", v.unit.rotary}, {"unit_linear", v.unit.linear}});
+  return {{"name", info.name},
+          {"balance", nullptr},
+          {"phase", phase_name(info.phase)},
+          {"equation", info.equation},
+          {"parameters", json::array()},
+          {"shows_over", info.shows_over},
+          {"source", info.source},
+          {"explanation", info.explanation},
+          {"causes", info.causes},
+          {"separated_by", info.separated_by},
+          {"rivals", std::move(rivals)},
+          {"signals", std::move(signals)},
+          {"curve", nullptr}};
+}
+
+void describe_made(const effects::Description& info, Console& console) {
+  console.line(console.bold(info.name));
+  console.line(output::wrapped(info.explanation));
+  console.line();
+  console.line(output::wrapped(fmt::format("On the balance that you choose: {}", info.equation)));
+  output::Table table({"signal", "unit", "(linear axis)", ""}, "llll");
+  for (const effects::VariableInfo& v : effects::kVariables)
+    table.row({std::string(v.name), std::string(v.unit.rotary), std::string(v.unit.linear), std::string(v.meaning)});
+  console.line(table.text());
+  if (info.name == catalogue::kExpressionEffect)
+    console.line(output::wrapped(
+        "direction, output_direction and torsion_direction are 1, -1, or 0 at rest. Functions: sin, cos, tan, tanh, "
+        "exp, "
+        "ln, sqrt, abs, sign, min, max; powers are written ^, conditions a > b ? c : d. Parameters that only scale the "
+        "torque are estimated; others are searched for and need bounds."));
+  console.line();
+  console.line(output::wrapped(fmt::format("Usual causes, and what to check: {}", info.causes)));
+  console.line(output::wrapped(fmt::format("Told apart by: {}", info.separated_by)));
+  console.line();
+  console.line("  " + how_to_add(info.name));
+}
+
 }  // namespace
 
 int run(const EffectsOptions& options, Console& console) {
   json list = json::array();
   if (!options.name.empty()) {
     const Entry* entry = catalogue::find(options.name);
+    if (const effects::Description* made = catalogue::description_of(options.name)) {
+      describe_made(*made, console);
+      output::save_json(options.json,
+                        {{"format", "flexspline-effects/1"}, {"effects", json::array({made_json(*made)})}});
+      return kDone;
+    }
     if (entry == nullptr) {
       std::vector<std::string_view> names;
       for (const Entry& e : catalogue::all()) names.push_back(e.name());
+      names.insert(names.end(), std::begin(kMadeByUsers), std::end(kMadeByUsers));
       const std::string near = text::nearest(options.name, names);
       throw UsageError(fmt::format("there is no effect \"{}\"; {}flexspline effects lists all", options.name,
                                    near.empty() ? "" : fmt::format("did you mean {}? ", near)));
@@ -136,6 +196,11 @@ int run(const EffectsOptions& options, Console& console) {
       table.row({std::string(entry.name()), output::balance_name(entry.info->balance),
                  std::string(entry.info->equation), usual(entry), std::string(entry.info->shows_over)});
       list.push_back(entry_json(entry));
+    }
+    for (const std::string_view name : kMadeByUsers) {
+      const effects::Description& info = *catalogue::description_of(name);
+      table.row({std::string(name), "yours", std::string(info.equation), "", std::string(info.shows_over)});
+      list.push_back(made_json(info));
     }
     console.line(table.text(0));
     console.line();

@@ -9,6 +9,7 @@
 
 #include "host/cli/inputs.hpp"
 #include "host/deployment/pack.hpp"
+#include "host/diagnosis/made.hpp"
 
 namespace flexspline::cli {
 
@@ -130,7 +131,9 @@ struct ChangeOptions {
   std::filesystem::path report;  // empty: none
   std::string json;
 };
-struct AddOptions : ChangeOptions {};
+struct AddOptions : ChangeOptions {
+  diagnosis::Made made;
+};
 struct RemoveOptions : ChangeOptions {};
 int run(const AddOptions& options, Console& console);
 int run(const RemoveOptions& options, Console& console);

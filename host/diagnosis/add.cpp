@@ -90,11 +90,15 @@ Addition compare_models(const data::Dataset& dataset, const model::Model& before
   result.noise_floor = floor.rmse;
   result.noise_floor_from = floor.from;
   result.model = extended->model;
-  result.model.history.push_back({std::move(action), result.effect,
-                                  result.before.rmse_holdout.value_or(result.before.rmse_fit),
+  result.model.history.push_back({action, result.effect, result.before.rmse_holdout.value_or(result.before.rmse_fit),
                                   result.after.rmse_holdout.value_or(result.after.rmse_fit)});
   result.estimates = extended->estimates;
+  result.tables = extended->tables;
   result.warnings = extended->warnings;
+  if (action == "add" && result.before.rmse_holdout && *result.after.rmse_holdout >= *result.before.rmse_holdout)
+    result.warnings.push_back(
+        fmt::format("the error on held-out data did not fall: {} does not hold beyond the data that it was fitted on",
+                    result.effect));
   return result;
 }
 
@@ -140,7 +144,17 @@ EffectName parse_effect(std::string_view text) {
 }
 
 Addition add(const data::Dataset& dataset, const model::Model& model, std::string_view effect,
-             const regression::PipelineOptions& options) {
+             const regression::PipelineOptions& options, const Made& made) {
+  if (names_made_effect(effect)) {
+    model::Model after = model;
+    model::Effect added = made_effect(effect, made, model);
+    // A table has its points from the data before it is refitted with the rest.
+    if (added.type == catalogue::kTableEffect)
+      added.definition->table = learn(*regression::identify(dataset, model, options), added, made).table;
+    const Balance own = catalogue::entry_of(added).told_by();
+    after.effects.push_back(std::move(added));
+    return compare_models(dataset, model, after, own, std::string(effect), "add", options);
+  }
   const EffectName name = parse_effect(effect);
   const regression::Terms terms = regression::terms_of(model);
   const regression::Terms extended = extend(terms, *name.entry, name.order);  // checks that it may be added
@@ -160,7 +174,10 @@ Addition add(const data::Dataset& dataset, const model::Model& model, std::strin
 Addition remove(const data::Dataset& dataset, const model::Model& model, std::string_view id,
                 const regression::PipelineOptions& options) {
   const model::Effect* found = model.find(id);
-  if (!found) {
+  if (!found && names_made_effect(id)) {
+    for (const model::Effect& e : model.effects)
+      if (e.definition && (regression::term_of(e).label() == id || e.type == id)) found = &e;
+  } else if (!found) {
     const EffectName name = parse_effect(id);
     for (const model::Effect& e : model.effects)
       if (regression::term_of(e).label() ==

@@ -7,6 +7,7 @@
 #include <string_view>
 
 #include "host/data/dataset.hpp"
+#include "host/diagnosis/made.hpp"
 #include "host/model/model.hpp"
 #include "host/regression/identify.hpp"
 
@@ -26,6 +27,7 @@ struct Addition {
   std::string noise_floor_from = "none";
   model::Model model;  // refitted, with the step in its history
   std::vector<regression::Estimate> estimates;
+  std::vector<std::pair<std::string, regression::LearnedTable>> tables;  // of the refitted model, by id
   std::vector<std::string> warnings;
 };
 
@@ -39,8 +41,9 @@ EffectName parse_effect(std::string_view text);
 
 // Adds an effect and refits everything, shapes continuously. Experiments of role fit are fitted, those of role holdout
 // judged. Throws model::ModelError where the effect cannot be added and data::DataError where the data cannot show it.
+// An effect that users make (see made.hpp) is told apart by `made`.
 Addition add(const data::Dataset& dataset, const model::Model& model, std::string_view effect,
-             const regression::PipelineOptions& options);
+             const regression::PipelineOptions& options, const Made& made = {});
 
 // Takes an effect out, by its id or its name, and refits.
 Addition remove(const data::Dataset& dataset, const model::Model& model, std::string_view id,

@@ -77,7 +77,8 @@ std::vector<Trend> parameter_trends(const regression::Identification& identified
     // Counted by parameter: a model with more of them must not hide what one of them shows.
     double tried = 0.0;
     const auto first = static_cast<std::ptrdiff_t>(trends.size());
-    if (identified.terms[e.slot.term].entry->parameters[e.slot.parameter].low != 0.0) continue;  // offsets have no relative change
+    if (identified.terms[e.slot.term].entry->parameters[e.slot.parameter].low != 0.0)
+      continue;  // offsets have no relative change
     for (const Setting& setting : settings) {
       std::vector<double> x, y;
       for (const auto& [name, value] : e.per_experiment) {

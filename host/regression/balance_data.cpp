@@ -202,6 +202,34 @@ std::size_t BalanceData::sample_of(const RowRange& range, Eigen::Index row) cons
 }
 
 template <class N>
+bool BalanceData::change_inputs(const Terms& terms, const Term& term, const Record& r,
+                                const std::vector<std::vector<typename N::Parameter>>& all_values,
+                                std::vector<effects::Inputs<N>>& changed) const {
+  bool any = false;
+  for (const Term& other : terms) any = any || changes(other, term);
+  if (!any) return false;
+  const auto constants = lifted<typename N::Parameter>(prepared_->constants);
+  changed.reserve(r.inputs.size());
+  for (const auto& in : r.inputs) changed.push_back(catalogue::lifted<N>(in));
+  bool turned = false;
+  constexpr std::pair<Phase, bool> kSteps[] = {{Phase::shift, false}, {Phase::shift, true}, {Phase::modulate, false}};
+  for (const auto& [phase, last] : kSteps)
+    for (std::size_t t = 0; t < terms.size(); ++t)
+      if (terms[t].entry->info->phase == phase && terms[t].entry->info->acts_last == last && changes(terms[t], term)) {
+        along<N>(*terms[t].entry).change(catalogue::natural(*terms[t].entry, all_values[t]).data(), constants, changed);
+        turned = turned || (phase == Phase::shift && (terms[t].entry->info->reads & effects::kMotorAngle) != 0);
+      }
+  if (turned && !r.at_rest)
+    for (auto& in : changed)
+      in.torsion_direction = direction_of(in.torsion_rate, r.velocity_noise[index(Balance::transmission)]);
+  return true;
+}
+
+template bool BalanceData::change_inputs<Real>(const Terms&, const Term&, const Record&,
+                                               const std::vector<std::vector<double>>&,
+                                               std::vector<effects::Inputs<Real>>&) const;
+
+template <class N>
 void BalanceData::add_torque(const Terms& terms, const Term& term, const std::vector<typename N::Parameter>& values,
                              const Record& r, const std::vector<std::vector<typename N::Parameter>>& all_values,
                              std::vector<typename N::Value>& torque) const {
@@ -209,25 +237,7 @@ void BalanceData::add_torque(const Terms& terms, const Term& term, const std::ve
   if (!term.adds_torque()) return;
   const DriveConstants<P> constants = lifted<P>(prepared_->constants);
   std::vector<effects::Inputs<N>> changed;
-  bool any = false;
-  for (const Term& other : terms) any = any || changes(other, term);
-  if (any) {
-    changed.reserve(r.inputs.size());
-    for (const auto& in : r.inputs) changed.push_back(catalogue::lifted<N>(in));
-    bool turned = false;
-    constexpr std::pair<Phase, bool> kSteps[] = {{Phase::shift, false}, {Phase::shift, true}, {Phase::modulate, false}};
-    for (const auto& [phase, last] : kSteps)
-      for (std::size_t t = 0; t < terms.size(); ++t)
-        if (terms[t].entry->info->phase == phase && terms[t].entry->info->acts_last == last &&
-            changes(terms[t], term)) {
-          along<N>(*terms[t].entry)
-              .change(catalogue::natural(*terms[t].entry, all_values[t]).data(), constants, changed);
-          turned = turned || (phase == Phase::shift && (terms[t].entry->info->reads & effects::kMotorAngle) != 0);
-        }
-    if (turned && !r.at_rest)
-      for (auto& in : changed)
-        in.torsion_direction = direction_of(in.torsion_rate, r.velocity_noise[index(Balance::transmission)]);
-  }
+  const bool any = change_inputs<N>(terms, term, r, all_values, changed);
   const std::vector<P> natural = catalogue::natural(*term.entry, values);
   for (const Balance to : {Balance::motor, Balance::transmission, Balance::load}) {
     const double weight = term.entry->adds_to(to) ? share(r, to) : 0.0;

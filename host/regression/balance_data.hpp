@@ -10,6 +10,7 @@
 #include "host/regression/record.hpp"
 #include "host/regression/terms.hpp"
 #include "host/signals/butterworth.hpp"
+#include "shared/effects/variables.hpp"
 
 namespace flexspline::regression {
 
@@ -52,6 +53,21 @@ class BalanceData {
   // Torque of one term at its values, all parameters in, filtered.
   Eigen::VectorXd term_torque(const Terms& terms, std::size_t term);
 
+  // What one unit at each point of a table adds, one column a point: straight lines between even points of a signal
+  // (`low` to `high`, or over a turn for an angle), times the direction where `times_direction`. The signal is as the
+  // shifts of `terms` leave it. Unfiltered columns cost a small part and serve to tell signals apart.
+  struct Points {
+    effects::Variable variable{};
+    bool times_direction = false;
+    Balance balance = Balance::motor;
+    double low = 0.0;
+    double high = 1.0;
+    std::size_t count = 2;
+  };
+  Eigen::MatrixXd point_columns(const Terms& terms, const Points& points, bool filtered = true);
+  // Values of a signal at the rows, as the shifts of `terms` leave it; angles within a turn.
+  Eigen::VectorXd signal_at_rows(const Terms& terms, effects::Variable variable);
+
   // Rows that count as one for white noise, because the row filter correlates neighbours: row rate over twice the
   // filter's noise bandwidth. A short residual underestimates this.
   double filter_autocorrelation_time() const;
@@ -66,6 +82,11 @@ class BalanceData {
   double share(const Record& record, Balance of_effect) const;
   template <class Fill>
   Eigen::VectorXd along_rows(Fill fill) const;
+  // Inputs as shifts and modulations of `terms` leave them for a term; false where they change nothing of it.
+  template <class N>
+  bool change_inputs(const Terms& terms, const Term& term, const Record& record,
+                     const std::vector<std::vector<typename N::Parameter>>& all_values,
+                     std::vector<effects::Inputs<N>>& changed) const;
   template <class N>
   void add_torque(const Terms& terms, const Term& term, const std::vector<typename N::Parameter>& values,
                   const Record& record, const std::vector<std::vector<typename N::Parameter>>& all_values,

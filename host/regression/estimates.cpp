@@ -235,6 +235,14 @@ void assemble(Identification& result) {
       result.warnings.push_back(fmt::format(
           "{}: its balance cannot be formed from these data; its parameters are left as they are", result.terms[t].id));
   for (const Term& term : result.terms) store_grids(result.model, term, axis);
+  for (const auto& [id, learned] : result.tables) {
+    result.model.find(id)->definition->table = learned.table;
+    const auto unseen = std::count(learned.visited.begin(), learned.visited.end(), std::uint8_t{0});
+    if (unseen > 0)
+      result.warnings.push_back(fmt::format(
+          "{}: {} of its {} points lie where these data have no rows; they are drawn on from their neighbours", id,
+          unseen, learned.visited.size()));
+  }
   derive_directions(result.estimates, result.derived);
   store(result.model, result.estimates);
 }

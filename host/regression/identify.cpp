@@ -8,6 +8,7 @@
 #include <map>
 #include <tuple>
 
+#include "host/catalogue/defined.hpp"
 #include "host/regression/record_constants.hpp"
 
 namespace flexspline::regression {
@@ -131,25 +132,61 @@ std::unique_ptr<Identification> form(const data::Dataset& dataset, const model::
   return result;
 }
 
-void fit(Identification& result) {
-  constexpr int kRounds = 3;
-  const std::vector<std::string> warnings = result.warnings;
-  result.held = fit_all(result, result.model.drive.axis);
-  if (record_constants(result.terms).empty()) return;
-  for (int round = 0; round < kRounds; ++round) {
-    bool moved = false;
-    for (std::size_t b = 0; b < result.data.size(); ++b) {
-      const BalanceFit& found = result.fits[b];
-      std::vector<Slot> beside = found.linear;
-      beside.insert(beside.end(), found.shapes.begin(), found.shapes.end());
-      moved =
-          settle_record_constants(result.prepared, result.data[b], result.terms, beside, found.root_weights) || moved;
-    }
-    if (!moved) return;
-    for (BalanceData& data : result.data) data = BalanceData(result.prepared, data.balance());
-    result.warnings = warnings;
-    result.held = fit_all(result, result.model.drive.axis);
+namespace {
+
+// Moves the constants of each record to where they fit best, and forms the balances anew. Returns whether any moved.
+bool settle_record_constants(Identification& result) {
+  if (record_constants(result.terms).empty()) return false;
+  bool moved = false;
+  for (std::size_t b = 0; b < result.data.size(); ++b) {
+    const BalanceFit& found = result.fits[b];
+    std::vector<Slot> beside = found.linear;
+    beside.insert(beside.end(), found.shapes.begin(), found.shapes.end());
+    moved = settle_record_constants(result.prepared, result.data[b], result.terms, beside, found.root_weights) || moved;
   }
+  if (!moved) return false;
+  for (BalanceData& data : result.data) data = BalanceData(result.prepared, data.balance());
+  return true;
+}
+
+// Learns the tables of a balance beside its other effects, one after the other. Returns whether there were any.
+bool learn_tables(Identification& result) {
+  bool any = false;
+  for (std::size_t t = 0; t < result.terms.size(); ++t) {
+    Term& term = result.terms[t];
+    const model::Definition* definition = term.entry->definition;
+    if (!definition || definition->variable.empty() || definition->table.fixed) continue;
+    for (std::size_t b = 0; b < result.data.size(); ++b) {
+      const std::vector<std::size_t>& on_balance = result.fits[b].on_balance;
+      if (std::find(on_balance.begin(), on_balance.end(), t) == on_balance.end()) continue;
+      const TableQuestion question = question_of(*definition);
+      auto learned = learn_table(result.data[b], result.terms, question, result.fits[b].root_weights, term.id);
+      if (!learned) {
+        result.warnings.push_back(fmt::format("{}: {} does not vary in these data; the table is left as it is", term.id,
+                                              definition->variable));
+        continue;
+      }
+      term.entry = &catalogue::entry_of(effect_of(question, learned->table, term.id));
+      result.tables.emplace_back(term.id, std::move(*learned));
+      any = true;
+    }
+  }
+  return any;
+}
+
+}  // namespace
+
+void fit(Identification& result) {
+  const std::vector<std::string> before = result.warnings;
+  const auto again = [&] {
+    // What the fit before warned of may have gone.
+    result.warnings = before;
+    result.held = fit_all(result, result.model.drive.axis);
+  };
+  again();
+  constexpr int kRounds = 3;
+  for (int round = 0; round < kRounds && settle_record_constants(result); ++round) again();
+  if (learn_tables(result)) again();
 }
 
 std::unique_ptr<Identification> identify(const data::Dataset& dataset, const model::Model& model,

@@ -11,6 +11,7 @@
 #include "host/data/dataset.hpp"
 #include "host/model/model.hpp"
 #include "host/regression/balance_fit.hpp"
+#include "host/regression/learn_table.hpp"
 
 namespace flexspline::regression {
 
@@ -45,6 +46,7 @@ struct Identification {
   std::vector<BalanceFit> fits;         // one each
   std::vector<std::vector<Slot>> held;  // on each, parameters that are held at a bound
   std::vector<Estimate> estimates;
+  std::vector<std::pair<std::string, LearnedTable>> tables;  // by id: those of the model that are not fixed
   std::vector<Derived> derived;
   double condition_number = 0.0;
   std::vector<std::string> warnings;

@@ -1,0 +1,116 @@
+// Columns of a table: what one unit at each of its points adds.
+#include <algorithm>
+#include <cmath>
+#include <numbers>
+
+#include "host/regression/balance_data.hpp"
+
+namespace flexspline::regression {
+namespace {
+
+// A stand-in that reads what a table over the variable reads, so that it sees what shifts leave of it.
+struct Reader {
+  effects::Description info;
+  catalogue::Entry entry;
+  Term term;
+  explicit Reader(effects::Variable variable) {
+    for (const effects::VariableInfo& v : effects::kVariables)
+      if (v.variable == variable) info.reads = v.reads;
+    entry.info = &info;
+    term.entry = &entry;
+  }
+};
+
+std::vector<std::vector<double>> values_of_all(const Terms& terms) {
+  std::vector<std::vector<double>> values;
+  for (const Term& term : terms) values.push_back(term.values);
+  return values;
+}
+
+double signal_of(const effects::Inputs<Real>& in, effects::Variable variable, double turn_angle_scale) {
+  constexpr double kTurn = 2.0 * std::numbers::pi;
+  const auto within_turn = [](double angle) { return angle - kTurn * std::floor(angle / kTurn); };
+  if (variable == effects::Variable::motor_angle) return within_turn(in.angle * turn_angle_scale);
+  if (variable == effects::Variable::output_angle) return within_turn(in.output_angle);
+  return effects::signal_of<Real>(variable, in);
+}
+
+}  // namespace
+
+Eigen::MatrixXd BalanceData::point_columns(const Terms& terms, const Points& points, bool filtered) {
+  const Reader reader(points.variable);
+  const auto all = values_of_all(terms);
+  const bool closed =
+      points.variable == effects::Variable::motor_angle || points.variable == effects::Variable::output_angle;
+  const auto count = static_cast<Eigen::Index>(points.count);
+  const double per_signal = closed ? static_cast<double>(count) / (2.0 * std::numbers::pi)
+                                   : static_cast<double>(count - 1) / (points.high - points.low);
+  Eigen::MatrixXd columns = Eigen::MatrixXd::Zero(rows(), count);
+  for (const RowRange& range : ranges_) {
+    const Record& r = prepared_->records[range.record];
+    const double weight = share(r, points.balance);
+    if (weight == 0.0) continue;
+    std::vector<effects::Inputs<Real>> changed;
+    const bool any = change_inputs<Real>(terms, reader.term, r, all, changed);
+    const std::vector<effects::Inputs<Real>>& inputs = any ? changed : r.inputs;
+    struct Place {
+      Eigen::Index point;
+      double share, size;
+    };
+    std::vector<Place> places(inputs.size());
+    for (std::size_t k = 0; k < inputs.size(); ++k) {
+      const double x = signal_of(inputs[k], points.variable, prepared_->constants.turn_angle_scale);
+      const double most = static_cast<double>(closed ? count : count - 1);
+      const double at = std::clamp(closed ? x * per_signal : (x - points.low) * per_signal, 0.0, most);
+      const auto point = std::min<Eigen::Index>(static_cast<Eigen::Index>(at), closed ? count - 1 : count - 2);
+      places[k] = {point, at - static_cast<double>(point),
+                   points.times_direction ? weight * effects::direction_on<Real>(points.balance, inputs[k]) : weight};
+    }
+    const auto& samples = r.rows[index(balance_)].samples;
+    if (!filtered) {
+      for (std::size_t k = 0; k < samples.size(); ++k) {
+        const Place& p = places[samples[k]];
+        const Eigen::Index row = range.first + static_cast<Eigen::Index>(k);
+        columns(row, p.point) += p.size * (1.0 - p.share);
+        columns(row, (p.point + 1) % count) += p.size * p.share;
+      }
+      continue;
+    }
+    std::vector<std::vector<std::size_t>> reaching(points.count);
+    for (std::size_t k = 0; k < places.size(); ++k) {
+      reaching[static_cast<std::size_t>(places[k].point)].push_back(k);
+      reaching[static_cast<std::size_t>((places[k].point + 1) % count)].push_back(k);
+    }
+    std::vector<double> signal;
+    for (Eigen::Index j = 0; j < count; ++j) {
+      if (reaching[static_cast<std::size_t>(j)].empty()) continue;
+      signal.assign(inputs.size(), 0.0);
+      for (const std::size_t k : reaching[static_cast<std::size_t>(j)]) {
+        const Place& p = places[k];
+        signal[k] += p.size * (p.point == j ? 1.0 - p.share : p.share);
+      }
+      filter(range, signal);
+      for (std::size_t k = 0; k < samples.size(); ++k)
+        columns(range.first + static_cast<Eigen::Index>(k), j) = signal[samples[k]];
+    }
+  }
+  return columns;
+}
+
+Eigen::VectorXd BalanceData::signal_at_rows(const Terms& terms, effects::Variable variable) {
+  const Reader reader(variable);
+  const auto all = values_of_all(terms);
+  Eigen::VectorXd signal(rows());
+  for (const RowRange& range : ranges_) {
+    const Record& r = prepared_->records[range.record];
+    std::vector<effects::Inputs<Real>> changed;
+    const bool any = change_inputs<Real>(terms, reader.term, r, all, changed);
+    const auto& samples = r.rows[index(balance_)].samples;
+    for (std::size_t k = 0; k < samples.size(); ++k)
+      signal[range.first + static_cast<Eigen::Index>(k)] =
+          signal_of((any ? changed : r.inputs)[samples[k]], variable, prepared_->constants.turn_angle_scale);
+  }
+  return signal;
+}
+
+}  // namespace flexspline::regression
