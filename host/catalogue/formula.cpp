@@ -4,7 +4,6 @@
 #include <muParser.h>
 
 #include <algorithm>
-#include <array>
 #include <cmath>
 #include <numbers>
 
@@ -15,8 +14,6 @@ namespace flexspline::catalogue {
 namespace {
 
 using Inputs = effects::Inputs<numbers::Real>;
-
-constexpr std::size_t kAtOnce = 256;
 
 struct Direction {
   const char* name;
@@ -39,7 +36,7 @@ struct Name {
   effects::Variable variable{};
   std::size_t parameter = 0;
   bool is_parameter = false;
-  std::array<double, kAtOnce> values{};
+  double value = 0.0;
 
   double of(const Inputs& in, double turn_angle_scale) const {
     if (direction != nullptr) return in.*direction;
@@ -84,7 +81,7 @@ class Formula::Parser {
       names_.reserve(used.size());
       for (const std::string& name : used) {
         names_.push_back(meaning(name, parameters));
-        parser_.DefineVar(name, names_.back().values.data());
+        parser_.DefineVar(name, &names_.back().value);
       }
       parser_.Eval();
       if (parser_.GetNumResults() != 1)
@@ -105,22 +102,15 @@ class Formula::Parser {
   void add(std::span<const double> parameters, double turn_angle_scale, std::span<const Inputs> inputs,
            double* torque) {
     for (Name& n : names_)
-      if (n.is_parameter) n.values.fill(parameters[n.parameter]);
-    std::array<double, kAtOnce> results;
-    for (std::size_t first = 0; first < inputs.size(); first += kAtOnce) {
-      const std::size_t count = std::min(kAtOnce, inputs.size() - first);
+      if (n.is_parameter) n.value = parameters[n.parameter];
+    // One by one: the packaged parser evaluates whole arrays with OpenMP, whose threads cost up to a hundred times what
+    // they save where the processor has other work.
+    for (std::size_t k = 0; k < inputs.size(); ++k) {
       for (Name& n : names_)
-        if (!n.is_parameter)
-          for (std::size_t k = 0; k < count; ++k) n.values[k] = n.of(inputs[first + k], turn_angle_scale);
-      // One sample is not worth the parser's loop, and simulation asks for one at a time.
-      if (count == 1)
-        results[0] = parser_.Eval();
-      else
-        parser_.Eval(results.data(), static_cast<int>(count));
-      for (std::size_t k = 0; k < count; ++k) {
-        if (!std::isfinite(results[k])) no_number(k);
-        torque[first + k] += results[k];
-      }
+        if (!n.is_parameter) n.value = n.of(inputs[k], turn_angle_scale);
+      const double result = parser_.Eval();
+      if (!std::isfinite(result)) no_number();
+      torque[k] += result;
     }
   }
 
@@ -166,9 +156,9 @@ class Formula::Parser {
     return result;
   }
 
-  [[noreturn]] void no_number(std::size_t k) const {
+  [[noreturn]] void no_number() const {
     std::string where;
-    for (const Name& n : names_) where += fmt::format("{}{} = {:.4g}", where.empty() ? "" : ", ", n.name, n.values[k]);
+    for (const Name& n : names_) where += fmt::format("{}{} = {:.4g}", where.empty() ? "" : ", ", n.name, n.value);
     throw FormulaError(fmt::format("the formula \"{}\" gives no number at {}", text_, where),
                        "guard it, as in sqrt(abs(x)) or x/max(y, 0.1), or narrow the bounds of its parameters");
   }
