@@ -28,6 +28,22 @@ void add_triangle(const TriangleRipple& term, double angle, FrictionTorque& sum)
   sum.by_angle += rising ? slope : -slope;
 }
 
+void add_bump(const Bump& term, const FrictionPoint& at, double gear_ratio, FrictionTorque& sum) {
+  const double per_motor = term.of_output ? 1.0 / gear_ratio : 1.0;
+  double distance = at.angle * per_motor - term.angle;
+  if (!term.of_output) distance = std::remainder(distance, 2.0 * std::numbers::pi);
+  const double ratio = distance / term.width;
+  const double value = term.height * std::exp(-ratio * ratio);
+  sum.torque += at.direction * value;
+  sum.by_angle -= at.direction * value * 2.0 * ratio / term.width * per_motor;
+}
+
+void add_onset(const Onset& term, const FrictionPoint& at, double speed, FrictionTorque& sum) {
+  const double share = 1.0 / (1.0 + std::exp(-(speed - term.velocity) / term.width));
+  sum.torque += at.direction * term.height * share;
+  sum.by_velocity += term.height * share * (1.0 - share) / term.width;
+}
+
 }  // namespace
 
 double MotorFriction::viscous_factor(double temperature_c) const {
@@ -114,6 +130,8 @@ FrictionTorque MotorFriction::evaluate(const FrictionPoint& at, double viscous_n
     sum.by_angle += at.torque * term.order * (term.sine * c - term.cosine * d);
   }
   for (const TriangleRipple& term : triangle_ripple) add_triangle(term, at.angle, sum);
+  for (const Bump& term : bumps) add_bump(term, at, gear_ratio, sum);
+  for (const Onset& term : onsets) add_onset(term, at, speed, sum);
   return sum;
 }
 

@@ -33,6 +33,22 @@ struct TriangleRipple {
   double phase = 0.0;
 };
 
+/// s height exp(-(x/width)^2), x the distance of the shaft from an angle: of the motor, within a turn, or of the gear's
+/// output.
+struct Bump {
+  double height = 0.0;
+  double angle = 0.0;
+  double width = 1.0;
+  bool of_output = false;
+};
+
+/// s height / (1 + exp(-(|w| - velocity)/width)): friction that sets in above a speed.
+struct Onset {
+  double height = 0.0;
+  double velocity = 1.0;
+  double width = 1.0;
+};
+
 /// s F / (1 + (w/vs)^2), F by direction.
 struct HessSoom {
   double positive = 0.0;
@@ -94,6 +110,8 @@ struct MotorFriction {
   std::vector<LoadFriction> load;
   std::vector<Ripple> ripple;
   std::vector<TriangleRipple> triangle_ripple;
+  std::vector<Bump> bumps;
+  std::vector<Onset> onsets;
 
   /// Factor on the viscous coefficient at a temperature, exp(-b (temp - temp0)).
   double viscous_factor(double temperature_c) const;

@@ -78,6 +78,18 @@ const std::map<std::string, Apply, std::less<>>& appliers() {
        [](const Effect& e, const Drive&, Physics& p) {
          p.friction.triangle_ripple.push_back({e.value("order"), e.value("amplitude"), e.value("phase")});
        }},
+      {"damaged_tooth",
+       [](const Effect& e, const Drive&, Physics& p) {
+         p.friction.bumps.push_back({e.value("height"), e.value("angle"), e.value("width"), false});
+       }},
+      {"tight_spot",
+       [](const Effect& e, const Drive&, Physics& p) {
+         p.friction.bumps.push_back({e.value("height"), e.value("angle"), e.value("width"), true});
+       }},
+      {"speed_onset",
+       [](const Effect& e, const Drive&, Physics& p) {
+         p.friction.onsets.push_back({e.value("height"), e.value("velocity"), e.value("width")});
+       }},
       // The sensor's error is no torque: the recorder adds it to the reading.
       {"current_offset", [](const Effect&, const Drive&, Physics&) {}},
       {"linear_stiffness",

@@ -261,6 +261,8 @@ Diagnosis diagnose(const data::Dataset& dataset, const model::Model& model, cons
     explain_named(chosen.search, chosen.trials, model.drive.axis, result);
   }
   judge_rest(chosen, result);
+  if (options.progress) options.progress("looking for what no effect explains");
+  tell_unknown(chosen.search, chosen.names_one() ? &chosen.trials.front() : nullptr, result);
   const bool moves = std::any_of(base->prepared.records.begin(), base->prepared.records.end(),
                                  [](const regression::Record& r) { return !r.at_rest; });
   if (!moves) result.verdict = Verdict::insufficient_excitation;

@@ -8,6 +8,7 @@
 
 #include "host/data/dataset.hpp"
 #include "host/diagnosis/trends.hpp"
+#include "host/diagnosis/unknown.hpp"
 #include "host/model/model.hpp"
 #include "host/regression/identify.hpp"
 
@@ -108,7 +109,8 @@ struct Diagnosis {
   std::optional<double> recovered_percent;
   std::vector<Disturbance> disturbances;
   std::vector<std::string> warnings;
-  std::optional<double> delay_s;  // of the effort against the motion, beyond the alignment, where significant
+  std::optional<UnknownStructure> unknown;  // where the verdict is unknown_structure and a curve shows what it is
+  std::optional<double> delay_s;            // of the effort against the motion, beyond the alignment, where significant
 };
 
 struct Options {

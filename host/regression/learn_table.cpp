@@ -70,7 +70,7 @@ Fitted fit_points(BalanceData& data, const Terms& terms, const TableQuestion& qu
                   Beside& b) {
   const BalanceData::Points points{question.variable, question.times_direction, question.balance, at.front(), at.back(),
                                    at.size()};
-  b.problem.points = data.point_columns(terms, points);
+  b.problem.points = data.point_columns(terms, points, question.filtered);
   Fitted fitted;
   fitted.curve = fit_curve(b.problem);
   fitted.at = std::move(at);

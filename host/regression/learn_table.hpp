@@ -34,6 +34,7 @@ struct TableQuestion {
   std::vector<double> at;         // points to keep; empty: their number and range follow from the data
   std::size_t most_points = 256;  // where they do
   bool exactly = false;           // as many as that
+  bool filtered = true;           // else columns as they are at the rows, which cost little
   bool delay_too = false;         // a delay of the effort stands beside the others
 };
 

@@ -1,0 +1,185 @@
+#include "host/diagnosis/unknown.hpp"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cmath>
+
+#include "host/catalogue/defined.hpp"
+#include "host/diagnosis/diagnosis.hpp"
+#include "host/diagnosis/trials.hpp"
+
+namespace flexspline::diagnosis {
+namespace {
+
+using effects::Variable;
+using regression::Balance;
+using regression::LearnedTable;
+using regression::TableQuestion;
+
+// A curve has many numbers and the best of some two dozen signals is taken, so it must show more than an effect of the
+// catalogue; both limits were set on drives that lack nothing.
+constexpr double kCurveScore = 60.0;
+constexpr double kCurveFallPercent = 3.0;
+// METHOD of the project: what is named must recover this share, or something else is there.
+constexpr double kRecovered = 0.8;
+constexpr std::size_t kScreenedPoints = 24;
+constexpr std::size_t kLearned = 3;  // signals whose curves are learnt in full
+// A simpler curve is taken where it predicts as well.
+constexpr double kAsWell = 0.02;
+constexpr double kLeastTemperatureSpan = 3.0;
+
+struct Screened {
+  TableQuestion question;
+  std::string label;
+  LearnedTable curve;
+};
+
+std::string label_of(const TableQuestion& q) {
+  for (const effects::VariableInfo& v : effects::kVariables)
+    if (v.variable == q.variable) return fmt::format("{}{}", v.name, q.times_direction ? "*direction" : "");
+  return {};
+}
+
+bool measured(const BalanceData& data, const effects::VariableInfo& v) {
+  const regression::Prepared& p = data.prepared();
+  const auto all = [&](auto has) {
+    return std::all_of(data.records().begin(), data.records().end(),
+                       [&](const RowRange& range) { return has(p.records[range.record]); });
+  };
+  if ((v.reads & effects::kTorque) && !p.torque_measured) return false;
+  if ((v.reads & effects::kCurrent) && !p.effort_is_current) return false;
+  if ((v.reads & effects::kTemperature) && !all([](const auto& r) { return r.has_temperature; })) return false;
+  if ((v.reads & effects::kOutputMotion) && !all([](const auto& r) { return r.has_output_motion; })) return false;
+  if ((v.reads & effects::kTorsion) && !all([](const auto& r) { return r.has_output_motion && r.has_motor_motion; }))
+    return false;
+  const bool turns = p.rotary || p.constants.turn_angle_scale != 1.0;
+  if (v.variable == Variable::motor_angle && !turns) return false;
+  return v.variable != Variable::output_angle || p.rotary;
+}
+
+// Signals that a curve may run over on this balance: measured, varying, and not the left side itself.
+std::vector<TableQuestion> questions(BalanceData& data, const Terms& model) {
+  std::vector<TableQuestion> list;
+  for (const effects::VariableInfo& v : effects::kVariables) {
+    if (!measured(data, v)) continue;
+    // The current is what the motor balance measures, the torque what the others do: a curve over them explains itself.
+    if (data.balance() == Balance::motor && v.variable == Variable::current) continue;
+    if (data.balance() != Balance::motor && (v.reads & effects::kTorque)) continue;
+    const Eigen::VectorXd signal = data.signal_at_rows(model, v.variable);
+    const regression::Covered range = regression::covered_range(signal);
+    const double span = range.high - range.low;
+    if (!(span > 0.0) || (v.variable == Variable::temperature && span < kLeastTemperatureSpan)) continue;
+    // Part of a turn only is a curve over an angle, too, but one that its ends do not close.
+    for (const bool times_direction : {false, true}) {
+      TableQuestion q;
+      q.variable = v.variable;
+      q.times_direction = times_direction;
+      q.balance = data.balance();
+      q.delay_too = true;
+      list.push_back(q);
+    }
+  }
+  return list;
+}
+
+bool tells(const LearnedTable& curve) {
+  return curve.score > kCurveScore && curve.fall_percent > kCurveFallPercent;
+}
+
+// Where the curve is least certain among the points that were visited, and what else goes along with it.
+std::string next_record(const UnknownStructure& unknown, const data::Axis axis) {
+  const model::Table& table = unknown.curve.table;
+  const effects::VariableInfo& v = *catalogue::find_variable(unknown.definition.variable);
+  std::size_t widest = 0;
+  for (std::size_t k = 0; k < table.std.size(); ++k)
+    if (table.std[k] > table.std[widest]) widest = k;
+  const auto unit = catalogue::unit_on(v.unit, axis);
+  std::string text = fmt::format(
+      "slow motion to and fro over {} from {:.3g} to {:.3g} {}, most of all around {:.3g} {}, where the curve is least "
+      "certain",
+      v.name, table.at.front(), table.at.back(), unit, table.at[widest], unit);
+  std::string others;
+  for (std::size_t k = 1; k < unknown.depends_on.size() && k < 3; ++k)
+    if (unknown.depends_on[k].fall_percent > 0.5 * unknown.depends_on.front().fall_percent &&
+        unknown.depends_on[k].variable.substr(0, unknown.depends_on[k].variable.find('*')) != v.name)
+      others += fmt::format("{}{}", others.empty() ? "" : " and ", unknown.depends_on[k].variable);
+  if (!others.empty()) text += fmt::format("; and a motion in which {} does not go along with {}", v.name, others);
+  return text + "; then the same at another load or temperature, to see whether the curve stays";
+}
+
+}  // namespace
+
+std::optional<UnknownStructure> find_unknown(Search& search, const Terms& model) {
+  BalanceData& data = *search.data;
+  const Eigen::VectorXd weights = search.base.root_weights.cwiseProduct(search.keep);
+  std::vector<Screened> list;
+  for (TableQuestion q : questions(data, model)) {
+    // Without the filter a curve costs little, and serves to tell signals apart.
+    q.filtered = false;
+    q.most_points = kScreenedPoints;
+    q.exactly = true;
+    if (auto curve = regression::learn_table(data, model, q, weights))
+      list.push_back({q, label_of(q), std::move(*curve)});
+  }
+  const auto more = [](const Screened& a, const Screened& b) { return a.curve.fall_percent > b.curve.fall_percent; };
+  std::sort(list.begin(), list.end(), more);
+  if (list.empty() || !(list.front().curve.score > 0.0)) return std::nullopt;
+  std::vector<Screened> learned;
+  for (std::size_t k = 0; k < std::min(kLearned, list.size()); ++k) {
+    TableQuestion q = list[k].question;
+    q.filtered = true;
+    q.exactly = false;
+    q.most_points = 128;
+    if (auto curve = regression::learn_table(data, model, q, weights))
+      learned.push_back({q, list[k].label, std::move(*curve)});
+  }
+  if (learned.empty()) return std::nullopt;
+  std::sort(learned.begin(), learned.end(), more);
+  const Screened* best = &learned.front();
+  for (const Screened& s : learned)
+    if (s.curve.fall_percent > (1.0 - kAsWell) * learned.front().curve.fall_percent &&
+        s.curve.effective < best->curve.effective)
+      best = &s;
+  if (!tells(best->curve)) return std::nullopt;
+  UnknownStructure unknown;
+  unknown.effect = fmt::format("{}:{}", catalogue::kTableEffect, best->label);
+  unknown.definition = *regression::effect_of(best->question, best->curve.table, "unknown").definition;
+  unknown.curve = best->curve;
+  unknown.depends_on.push_back({best->label, best->curve.fall_percent});
+  for (const Screened& s : list)
+    if (s.label != best->label && s.curve.score > kCurveScore)
+      unknown.depends_on.push_back({s.label, s.curve.fall_percent});
+  unknown.record_next = next_record(unknown, data.prepared().rotary ? data::Axis::rotary : data::Axis::linear);
+  return unknown;
+}
+
+void tell_unknown(Search& search, const Trial* named, Diagnosis& result) {
+  auto unknown = find_unknown(search, named ? named->judged.terms : search.base.terms);
+  if (!unknown) return;
+  if (named) {
+    const auto square = [](double x) { return x * x; };
+    const double without = square(search.base.rmse_cv()), with_named = square(named->judged.rmse_cv());
+    const double rest = with_named * unknown->curve.fall_percent / 100.0;
+    const double share = (without - with_named) / std::max(without - with_named + rest, 1e-300);
+    if (share >= kRecovered) return;
+    // Two effects of the catalogue explain more than one does.
+    Search next{search.data, search.keep, named->judged};
+    const std::vector<Trial> more = rank(next);
+    if (!more.empty() && passes(more.front())) {
+      const double with_both = square(more.front().judged.rmse_cv());
+      if (without - with_both >= kRecovered * (without - with_named + rest)) return;
+    }
+    unknown->named_share_percent = 100.0 * share;
+    // Learnt once more beside the model as it is: what is missing is one thing.
+    if (auto whole = find_unknown(search, search.base.terms)) {
+      whole->named_share_percent = unknown->named_share_percent;
+      unknown = std::move(whole);
+    }
+    result.named.clear();
+  }
+  result.verdict = Verdict::unknown_structure;
+  result.unknown = std::move(unknown);
+}
+
+}  // namespace flexspline::diagnosis
