@@ -2,6 +2,7 @@
 #pragma once
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <cstddef>
 #include <cstdint>
@@ -87,7 +88,7 @@ struct ScalarSystem {
   // Straight lines between `points` values: at a position counted in points from the first, held beyond both ends; and
   // at a phase, a turn being the whole table.
   template <std::size_t Size>
-  static S table(const S (&values)[Size], int points, const S& at) {
+  static S table(const std::array<S, Size>& values, int points, const S& at) {
     if (!(at > S(0.0)) || points < 2) return values[0];
     if (at >= S(points - 1.0)) return values[points - 1];
     const double index = std::floor(plain(at));
@@ -95,7 +96,7 @@ struct ScalarSystem {
     return values[k] + (values[k + 1] - values[k]) * (at - S(index));
   }
   template <std::size_t Size>
-  static S table_over_turn(const S (&values)[Size], int points, const S& phase) {
+  static S table_over_turn(const std::array<S, Size>& values, int points, const S& phase) {
     const S turns = phase * S(0.5 * std::numbers::inv_pi);
     const S at = (turns - S(std::floor(plain(turns)))) * S(static_cast<double>(points));
     const double index = std::min(std::floor(plain(at)), points - 1.0);

@@ -3,6 +3,7 @@
 // that need not be monotone to the last unit get a margin. For the host.
 #pragma once
 
+#include <array>
 #include <cstdint>
 
 #include "shared/fixed/checked.hpp"
@@ -271,15 +272,17 @@ struct Intervals {
   }
   // Between the least and the largest value that the positions reach.
   template <std::size_t Size>
-  static Value table(const Value (&values)[Size], std::int32_t points, Ratio at) {
+  static Value table(const std::array<Value, Size>& values, std::int32_t points, const Scaled& x) {
     const auto index = [&](std::int64_t raw) {
-      return static_cast<std::int32_t>(limited<std::int64_t>(raw >> kRatioBits, 0, points - 1));
+      const fixed::Ratio at = Fixed::Scaled{x.gain, detail::value_of(raw)};
+      return static_cast<std::int32_t>(limited<std::int64_t>(at.raw >> kRatioBits, 0, points - 1));
     };
-    const std::int32_t last = index(at.high);
-    return hull_of(values, index(at.low), last + 1 < points ? last + 1 : last);
+    const std::int32_t a = index(x.signal.low), b = index(x.signal.high);
+    const std::int32_t first = a < b ? a : b, last = a < b ? b : a;
+    return hull_of(values, first, last + 1 < points ? last + 1 : last);
   }
   template <std::size_t Size>
-  static Value table_over_turn(const Value (&values)[Size], std::int32_t points, Angle) {
+  static Value table_over_turn(const std::array<Value, Size>& values, std::int32_t points, Angle) {
     return hull_of(values, 0, points - 1);
   }
   static Angle times_order(Angle angle, const Order&) { return angle; }
@@ -301,7 +304,7 @@ struct Intervals {
     return function(Fixed::Scaled{x.gain, detail::value_of(raw)});
   }
   template <std::size_t Size>
-  static Value hull_of(const Value (&values)[Size], std::int32_t first, std::int32_t last) {
+  static Value hull_of(const std::array<Value, Size>& values, std::int32_t first, std::int32_t last) {
     Value all = values[first];
     for (std::int32_t k = first + 1; k <= last; ++k) all = hull(all, values[k]);
     return all;

@@ -2,6 +2,7 @@
 // where a result is safe by proof: `Trusting` takes it as it is, `Verifying` (checked.hpp) looks.
 #pragma once
 
+#include <array>
 #include <cstdint>
 
 #include "shared/fixed/coefficients.hpp"
@@ -398,7 +399,7 @@ struct FixedSystem {
   // Straight lines between `points` values: at a position counted in points from the first, held beyond both ends; and
   // at a phase, a turn being the whole table. A line is exact to half a unit, and to 2^-30 of its own rise.
   template <std::size_t Size>
-  static constexpr Value table(const Value (&values)[Size], std::int32_t points, Ratio at) {
+  static constexpr Value table(const std::array<Value, Size>& values, std::int32_t points, Ratio at) {
     if (at.raw <= 0 || points < 2) return values[0];
     const std::int64_t index = at.raw >> kRatioBits;
     if (index >= points - 1) return values[points - 1];
@@ -406,7 +407,7 @@ struct FixedSystem {
     return on_line(values[index], values[index + 1], rest >> (kRatioBits - kLineBits));
   }
   template <std::size_t Size>
-  static constexpr Value table_over_turn(const Value (&values)[Size], std::int32_t points, Angle phase) {
+  static constexpr Value table_over_turn(const std::array<Value, Size>& values, std::int32_t points, Angle phase) {
     const std::uint64_t at = (static_cast<std::uint64_t>(phase.raw) & 0xFFFFFFFF) * static_cast<std::uint64_t>(points);
     const auto index = static_cast<std::int32_t>(at >> kAngleBits);
     const auto rest = static_cast<std::int64_t>((at & 0xFFFFFFFF) >> (kAngleBits - kLineBits));

@@ -148,6 +148,7 @@ requires(std::is_base_of_v<fixed::Value, T> || std::is_base_of_v<fixed::Exponent
          std::is_base_of_v<fixed::Gain, T> || std::is_base_of_v<fixed::StepGain, T> ||
          std::is_base_of_v<fixed::RatioGain, T> || std::is_base_of_v<fixed::DistanceGain, T> ||
          std::is_base_of_v<fixed::Order, T> || std::is_base_of_v<fixed::Share, T> ||
+         std::is_base_of_v<fixed::Weight, T> || std::is_base_of_v<fixed::Harmonic, T> ||
          std::is_base_of_v<fixed::State, T> ||
          std::is_base_of_v<fixed::Step, T>) inline constexpr bool HasFormat<T> = true;
 }  // namespace detail
