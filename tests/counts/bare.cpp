@@ -108,6 +108,8 @@ struct Vectors {
   void (*handlers[15])();
 };
 [[gnu::section(".vectors"), gnu::used]] const Vectors vectors = {
-    &stack_top, {reset, fault, fault, fault, fault, fault, nullptr, nullptr, nullptr, nullptr, fault, fault, nullptr, fault, fault}};
+    &stack_top,
+    {reset, fault, fault, fault, fault, fault, nullptr, nullptr, nullptr, nullptr, fault, fault, nullptr, fault,
+     fault}};
 #endif
 }

@@ -1,0 +1,171 @@
+// What the drive's numbers give for ticks of the worst inputs: ends of the range, jumps, far more than a drive would
+// let through. A hash of the bits for each effect, for the observers, and for all effects together.
+#pragma once
+
+#include <cstdint>
+#include <string_view>
+
+#include "shared/fixed/system.hpp"
+#include "shared/model/drive_model.hpp"
+#include "shared/observers/encoder_kalman.hpp"
+#include "shared/observers/ripple_filter.hpp"
+
+namespace flexspline::same_bits {
+
+using fixed::Fixed;
+
+// Marsaglia's xorshift: the same numbers everywhere.
+class Random {
+ public:
+  std::uint64_t next() {
+    state_ ^= state_ << 13;
+    state_ ^= state_ >> 7;
+    state_ ^= state_ << 17;
+    return state_;
+  }
+  // Often at the ends of the range, at nought or next to it.
+  std::int32_t signal() {
+    const std::uint64_t bits = next();
+    switch (bits & 15) {
+      case 0:
+        return INT32_MIN;
+      case 1:
+        return INT32_MAX;
+      case 2:
+        return 0;
+      case 3:
+        return static_cast<std::int32_t>((bits >> 8) % 3) - 1;
+      case 4:
+      case 5:
+      case 6:
+        return static_cast<std::int32_t>(bits >> 32);
+      default:
+        return static_cast<std::int32_t>(bits >> 32) >> ((bits >> 8) & 31);
+    }
+  }
+  std::int64_t angle() {
+    const std::uint64_t bits = next();
+    return static_cast<std::int64_t>(bits) >> ((next() >> 8) & 63);
+  }
+
+ private:
+  std::uint64_t state_ = 88172645463325252;
+};
+
+class Hash {  // FNV-1a, by words
+ public:
+  void take(std::int64_t x) { value_ = (value_ ^ static_cast<std::uint64_t>(x)) * 1099511628211U; }
+  std::uint64_t value() const { return value_; }
+
+ private:
+  std::uint64_t value_ = 14695981039346656037U;
+};
+
+inline effects::Inputs<Fixed> adversarial(Random& random) {
+  effects::Inputs<Fixed> in;
+  in.angle.raw = random.angle();
+  in.output_angle.raw = random.angle();
+  for (Fixed::Value* signal : {&in.velocity, &in.direction, &in.acceleration, &in.output_velocity, &in.output_direction,
+                               &in.output_acceleration, &in.torsion, &in.torsion_rate, &in.torsion_direction,
+                               &in.torque, &in.current, &in.temperature})
+    signal->raw = random.signal();
+  return in;
+}
+
+inline effects::DriveConstants<double> drive() {
+  effects::DriveConstants<double> d;
+  d.gear_ratio = 100.0;
+  d.torque_constant = 0.125;
+  d.rated_velocity = d.velocity_base = 200.0;
+  d.torque_base = 0.5;
+  d.output_torque_base = 40.0;
+  d.output_velocity_base = 2.0;
+  d.acceleration_base = 4000.0;
+  d.output_acceleration_base = 40.0;
+  d.angle_base = 6.25;
+  d.torsion_base = 0.00625;
+  d.torsion_rate_base = 1.0;
+  d.temperature_base = 64.0;
+  d.current_base = 4.0;
+  d.time_base = 1.0 / 16384.0;
+  return d;
+}
+
+template <class Effect>
+void add(model::DriveModel<Fixed>& model) {
+  double parameters[sizeof(Effect::kParameters) / sizeof(Effect::kParameters[0])];
+  double* next = parameters;
+  for (const effects::ParameterInfo& p : Effect::kParameters) *next++ = p.usual != 0.0 ? p.usual : 0.0625;
+  model.add<Effect>(Effect::template derive<Fixed>(parameters, drive()));
+}
+
+inline std::uint64_t hash_of(model::DriveModel<Fixed>& model, int ticks) {
+  Random random;
+  Hash hash;
+  for (int k = 0; k < ticks; ++k) {
+    const auto torques = model.tick(adversarial(random));
+    hash.take(torques.motor.raw);
+    hash.take(torques.transmission.raw);
+    hash.take(torques.load.raw);
+  }
+  return hash.value();
+}
+
+// Gains that need no rounding, so that the host's floating point has no part in the bits.
+inline std::uint64_t hash_of_encoder_kalman(int ticks) {
+  using observers::EncoderKalman;
+  const auto c = EncoderKalman::coefficients<Fixed>(
+      observers::KalmanGains<double>{1.0 / 64.0, 1.0 / 32.0, 1.0 / 32.0, 1.0 / 64.0}, drive());
+  EncoderKalman::State<Fixed> state;
+  Random random;
+  Hash hash;
+  for (int k = 0; k < ticks; ++k) {
+    const auto now = EncoderKalman::update<Fixed>(state, c, {random.angle()});
+    hash.take(now.velocity.raw);
+    hash.take(now.acceleration.raw);
+    hash.take(state.position_error.raw);
+  }
+  return hash.value();
+}
+
+inline std::uint64_t hash_of_ripple_filter(int ticks) {
+  using observers::RippleFilter;
+  const auto c = RippleFilter::derive<Fixed>(
+      observers::RippleSetup<double>{.order = 2.0, .memory = 64.0, .largest_ripple = 10.0}, drive());
+  RippleFilter::State<Fixed> state;
+  Random random;
+  Hash hash;
+  for (int k = 0; k < ticks; ++k) {
+    const fixed::Angle angle{random.angle()};
+    hash.take(RippleFilter::update<Fixed>(state, c, angle, {{random.signal()}}).raw);
+    hash.take(state.cosine.raw);
+    hash.take(state.sine.raw);
+  }
+  return hash.value();
+}
+
+// Calls print(name, hash) for each; `ticks` of an effect alone, `many` of the others.
+template <class Print>
+void run(int ticks, int many, Print&& print) {
+  // Not on the stack: the smallest machine has 16 KB in all.
+  static model::DriveModel<Fixed> all, one;
+  effects::for_each_effect([&]<class Effect>(std::size_t) {
+    if constexpr (!Effect::kInfo.host_only) {
+      add<Effect>(all);
+      one.clear();
+      add<Effect>(one);
+      // What changes a signal shows in what reads it.
+      if constexpr (Effect::kInfo.phase == effects::Phase::shift) add<effects::LinearStiffness>(one);
+      if constexpr (Effect::kInfo.phase == effects::Phase::modulate) {
+        add<effects::ViscousFriction>(one);
+        add<effects::CoulombFriction>(one);
+      }
+      print(Effect::kInfo.name, hash_of(one, ticks));
+    }
+  });
+  print("encoder_kalman", hash_of_encoder_kalman(many));
+  print("ripple_filter", hash_of_ripple_filter(many));
+  print("all", hash_of(all, many));
+}
+
+}  // namespace flexspline::same_bits
