@@ -145,6 +145,7 @@ template <>
 inline constexpr bool HasFormat<Number> = true;
 template <class T>
 requires(std::is_base_of_v<fixed::Value, T> || std::is_base_of_v<fixed::Exponent, T> ||
+         std::is_base_of_v<fixed::Weight, T> || std::is_base_of_v<fixed::Harmonic, T> ||
          std::is_base_of_v<fixed::Gain, T> || std::is_base_of_v<fixed::StepGain, T> ||
          std::is_base_of_v<fixed::RatioGain, T> || std::is_base_of_v<fixed::DistanceGain, T> ||
          std::is_base_of_v<fixed::Order, T> || std::is_base_of_v<fixed::Share, T> ||

@@ -16,11 +16,8 @@ common=(-std=c++20 -O2 -fno-schedule-insns -Wall -Wextra -Werror -fno-exceptions
 # The RISC-V compiler of Debian has no C++ headers; those of the ARM one are of the same library, and the few that are
 # used here need nothing else.
 arm_headers() {
-  local sysroot
-  sysroot=$(dirname "$(dirname "$(arm-none-eabi-g++ -print-file-name=libc.a)")")/include
   arm-none-eabi-g++ -mcpu=cortex-m3 -mthumb -xc++ -E -v - </dev/null 2>&1 |
-    sed -n '/#include </,/^End/p' | grep -E '^ .*(c\+\+|newlib)' | sed 's/^ /-isystem /' | tr '\n' ' '
-  : "$sysroot"
+    sed -n '/#include </,/^End/p' | grep -v '/lib/gcc/arm-none-eabi/[0-9.]*/include' | grep '^ ' | sed 's/^ /-isystem /' | tr '\n' ' '
 }
 
 if [[ $1 == run ]]; then
@@ -34,9 +31,11 @@ if [[ $1 == run ]]; then
       exec timeout 120 qemu-system-riscv32 -M virt -bios none -nographic -monitor none -serial stdio -kernel "$elf" </dev/null
       ;;
   esac
-  # Semihosting writes to standard error.
-  exec timeout 120 qemu-system-arm -M "$machine" -nographic -monitor none -serial none \
-    -semihosting-config enable=on,target=native -icount shift=0,sleep=off -kernel "$elf" </dev/null 2>&1
+  # Semihosting writes to standard error, where QEMU itself has something to say of one machine's clock.
+  timeout 120 qemu-system-arm -M "$machine" -nographic -monitor none -serial none \
+    -semihosting-config enable=on,target=native -icount shift=0,sleep=off -kernel "$elf" </dev/null 2>&1 |
+    grep -v '^Timer with period zero'
+  exit
 fi
 
 machine=$1 source=$2 elf=$3

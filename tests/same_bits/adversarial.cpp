@@ -1,14 +1,54 @@
-// Prints the hashes of a million ticks, to be compared between compilers and levels of optimisation; with an argument
-// those of few ticks, as the machines in QEMU give them (tests/counts/same_bits.cpp).
+// Prints the hashes of a million ticks, to be compared between compilers and levels of optimisation. `few`: those of
+// few ticks, as machines in QEMU give them. `block`: the coefficients as a parameter block, a C++ array, for those
+// machines, which then need no floating point.
 #include "tests/same_bits/adversarial.hpp"
 
 #include <cstdio>
+#include <string_view>
 
-int main(int argc, char**) {
-  const bool few = argc > 1;
-  flexspline::same_bits::run(few ? 200 : 20'000, few ? 2'000 : 1'000'000,
-                             [](std::string_view name, std::uint64_t hash) {
-                               std::printf("%.*s %016llx\n", static_cast<int>(name.size()), name.data(),
-                                           static_cast<unsigned long long>(hash));
-                             });
+#include "shared/model/block.hpp"
+
+namespace {
+
+using namespace flexspline;
+
+void print_block() {
+  static std::uint8_t bytes[model::kLargestBlock];
+  model::BlockWriter writer(bytes);
+  model::BlockHeader header;
+  const auto one = [](model::Number& n) { n = {std::int32_t{1} << fixed::kMantissaBits, 0}; };
+  model::for_each_member(header.bases, [&]<class M>(M& member) {
+    if constexpr (std::is_same_v<M, model::Number>) {
+      one(member);
+    } else {
+      for (model::Number& n : member) one(n);
+    }
+  });
+  model::for_each_member(header.limits, [](fixed::Value& x) { x.raw = std::int32_t{1} << fixed::kValueBits; });
+  header.limits.overspeed.raw = std::int32_t{3} << (fixed::kValueBits - 1);
+  writer.begin(header);
+  effects::for_each_effect([&]<class Effect>(std::size_t number) {
+    if constexpr (!Effect::kInfo.host_only)
+      writer.add(static_cast<std::uint16_t>(number), same_bits::Derived::effect<Effect>());
+  });
+  writer.add(static_cast<std::uint16_t>(model::Section::encoder_filter), same_bits::Derived::encoder_filter());
+  writer.add(static_cast<std::uint16_t>(model::Section::torque_ripple_filter), same_bits::Derived::ripple_filter());
+  const std::size_t size = writer.end();
+  for (std::size_t i = 0; i < size; ++i) std::printf("%u,%s", bytes[i], i % 20 == 19 ? "\n" : "");
+}
+
+}  // namespace
+
+int main(int argc, char** argv) {
+  const std::string_view what = argc > 1 ? argv[1] : "";
+  if (what == "block") {
+    print_block();
+    return 0;
+  }
+  const bool few = what == "few";
+  same_bits::run<same_bits::Derived>(few ? 200 : 20'000, few ? 2'000 : 1'000'000,
+                                     [](std::string_view name, std::uint64_t hash) {
+                                       std::printf("%.*s %016llx\n", static_cast<int>(name.size()), name.data(),
+                                                   static_cast<unsigned long long>(hash));
+                                     });
 }

@@ -91,12 +91,29 @@ inline effects::DriveConstants<double> drive() {
   return d;
 }
 
-template <class Effect>
+// Coefficients as the host derives them.
+struct Derived {
+  template <class Effect>
+  static typename Effect::template Coefficients<Fixed> effect() {
+    double parameters[sizeof(Effect::kParameters) / sizeof(Effect::kParameters[0])];
+    double* next = parameters;
+    for (const effects::ParameterInfo& p : Effect::kParameters) *next++ = p.usual != 0.0 ? p.usual : 0.0625;
+    return Effect::template derive<Fixed>(parameters, drive());
+  }
+  // Gains that need no rounding.
+  static observers::EncoderKalman::Coefficients<Fixed> encoder_filter() {
+    return observers::EncoderKalman::coefficients<Fixed>(
+        observers::KalmanGains<double>{1.0 / 64.0, 1.0 / 32.0, 1.0 / 32.0, 1.0 / 64.0}, drive());
+  }
+  static observers::RippleFilter::Coefficients<Fixed> ripple_filter() {
+    return observers::RippleFilter::derive<Fixed>(
+        observers::RippleSetup<double>{.order = 2.0, .memory = 64.0, .largest_ripple = 10.0}, drive());
+  }
+};
+
+template <class Coefficients, class Effect>
 void add(model::DriveModel<Fixed>& model) {
-  double parameters[sizeof(Effect::kParameters) / sizeof(Effect::kParameters[0])];
-  double* next = parameters;
-  for (const effects::ParameterInfo& p : Effect::kParameters) *next++ = p.usual != 0.0 ? p.usual : 0.0625;
-  model.add<Effect>(Effect::template derive<Fixed>(parameters, drive()));
+  model.add<Effect>(Coefficients::template effect<Effect>());
 }
 
 inline std::uint64_t hash_of(model::DriveModel<Fixed>& model, int ticks) {
@@ -111,11 +128,8 @@ inline std::uint64_t hash_of(model::DriveModel<Fixed>& model, int ticks) {
   return hash.value();
 }
 
-// Gains that need no rounding, so that the host's floating point has no part in the bits.
-inline std::uint64_t hash_of_encoder_kalman(int ticks) {
+inline std::uint64_t hash_of_encoder_kalman(const observers::EncoderKalman::Coefficients<Fixed>& c, int ticks) {
   using observers::EncoderKalman;
-  const auto c = EncoderKalman::coefficients<Fixed>(
-      observers::KalmanGains<double>{1.0 / 64.0, 1.0 / 32.0, 1.0 / 32.0, 1.0 / 64.0}, drive());
   EncoderKalman::State<Fixed> state;
   Random random;
   Hash hash;
@@ -128,10 +142,8 @@ inline std::uint64_t hash_of_encoder_kalman(int ticks) {
   return hash.value();
 }
 
-inline std::uint64_t hash_of_ripple_filter(int ticks) {
+inline std::uint64_t hash_of_ripple_filter(const observers::RippleFilter::Coefficients<Fixed>& c, int ticks) {
   using observers::RippleFilter;
-  const auto c = RippleFilter::derive<Fixed>(
-      observers::RippleSetup<double>{.order = 2.0, .memory = 64.0, .largest_ripple = 10.0}, drive());
   RippleFilter::State<Fixed> state;
   Random random;
   Hash hash;
@@ -145,26 +157,26 @@ inline std::uint64_t hash_of_ripple_filter(int ticks) {
 }
 
 // Calls print(name, hash) for each; `ticks` of an effect alone, `many` of the others.
-template <class Print>
+template <class Coefficients, class Print>
 void run(int ticks, int many, Print&& print) {
   // Not on the stack: the smallest machine has 16 KB in all.
   static model::DriveModel<Fixed> all, one;
   effects::for_each_effect([&]<class Effect>(std::size_t) {
     if constexpr (!Effect::kInfo.host_only) {
-      add<Effect>(all);
+      add<Coefficients, Effect>(all);
       one.clear();
-      add<Effect>(one);
+      add<Coefficients, Effect>(one);
       // What changes a signal shows in what reads it.
-      if constexpr (Effect::kInfo.phase == effects::Phase::shift) add<effects::LinearStiffness>(one);
+      if constexpr (Effect::kInfo.phase == effects::Phase::shift) add<Coefficients, effects::LinearStiffness>(one);
       if constexpr (Effect::kInfo.phase == effects::Phase::modulate) {
-        add<effects::ViscousFriction>(one);
-        add<effects::CoulombFriction>(one);
+        add<Coefficients, effects::ViscousFriction>(one);
+        add<Coefficients, effects::CoulombFriction>(one);
       }
       print(Effect::kInfo.name, hash_of(one, ticks));
     }
   });
-  print("encoder_kalman", hash_of_encoder_kalman(many));
-  print("ripple_filter", hash_of_ripple_filter(many));
+  print("encoder_kalman", hash_of_encoder_kalman(Coefficients::encoder_filter(), many));
+  print("ripple_filter", hash_of_ripple_filter(Coefficients::ripple_filter(), many));
   print("all", hash_of(all, many));
 }
 
