@@ -264,7 +264,7 @@ struct FixedSystem {
     const std::int32_t high = as_word(static_cast<std::int32_t>(a.raw >> 32));
     // A share of one has no word with a sign: it is as near to it as that shows.
     const auto whole = static_cast<std::int32_t>(b.raw >> 32);
-    const auto rest = static_cast<std::int32_t>(static_cast<std::uint32_t>(b.raw) >> 1);
+    const std::int32_t rest = as_word(static_cast<std::int32_t>(static_cast<std::uint32_t>(b.raw) >> 1));
     const std::int64_t lower = (long_product(high, rest) >> 31) +
                                multiply_high(static_cast<std::uint32_t>(a.raw), static_cast<std::uint32_t>(whole));
     return {{(long_product(high, whole) + lower) * 2}};

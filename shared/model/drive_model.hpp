@@ -162,7 +162,8 @@ class DriveModel {
   // The same with another angle for effects that repeat with it and have no memory (ripples): a model along a set point
   // may take what is periodic from where the motor stands.
   constexpr effects::Torques<N> tick(const effects::Inputs<N>& measured, typename N::Angle periodic_angle) {
-    effects::Inputs<N> in = measured;
+    effects::Inputs<N> in;
+    take(in, measured);
     const auto angle = in.angle;
     complete(in);
     shift(in, periodic_angle);
@@ -211,6 +212,23 @@ class DriveModel {
     } else {
       for (std::size_t i = 0; i < places.count; ++i) visit(i);
     }
+  }
+  // One by one, so that what the image does not read is not copied; a copy of the whole stays one.
+  static constexpr void take(effects::Inputs<N>& in, const effects::Inputs<N>& from) {
+    in.angle = from.angle;
+    in.velocity = from.velocity;
+    in.direction = from.direction;
+    in.acceleration = from.acceleration;
+    in.output_angle = from.output_angle;
+    in.output_velocity = from.output_velocity;
+    in.output_direction = from.output_direction;
+    in.output_acceleration = from.output_acceleration;
+    in.torsion = from.torsion;
+    in.torsion_rate = from.torsion_rate;
+    in.torsion_direction = from.torsion_direction;
+    in.torque = from.torque;
+    in.current = from.current;
+    in.temperature = from.temperature;
   }
   static constexpr void complete(effects::Inputs<N>& in) {
     in.speed = N::magnitude(in.velocity);

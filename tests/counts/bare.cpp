@@ -1,5 +1,7 @@
 #include "tests/counts/bare.hpp"
 
+#include <cstddef>
+
 extern "C" {
 extern std::uint32_t data_begin, data_end, data_load, bss_begin, bss_end, stack_top;
 extern void (*init_array_begin[])();
@@ -71,6 +73,21 @@ void start_counter() {
 }  // namespace flexspline::bare
 
 extern "C" {
+
+#if defined(__riscv)
+// There is no C library; compilers call these for copies of structures.
+void* memcpy(void* to, const void* from, std::size_t bytes) {
+  auto* t = static_cast<volatile char*>(to);
+  auto* f = static_cast<const char*>(from);
+  while (bytes-- != 0) *t++ = *f++;
+  return to;
+}
+void* memset(void* to, int value, std::size_t bytes) {
+  auto* t = static_cast<volatile char*>(to);
+  while (bytes-- != 0) *t++ = static_cast<char>(value);
+  return to;
+}
+#endif
 
 // What the host notes about coefficients is thread_local; one thread has its place here.
 alignas(8) char thread_storage[64];

@@ -1,0 +1,113 @@
+#!/usr/bin/env bash
+# measure.sh FOLDER ADVERSARIAL: builds the counting images into FOLDER, runs them in QEMU, writes FOLDER/table.txt and
+# compares it with budget.txt, above and below. ADVERSARIAL is the program of tests/same_bits, which writes the block.
+# measure.sh bits FOLDER ADVERSARIAL: the hashes of bare machines against those recorded.
+set -euo pipefail
+here=$(cd -- "$(dirname -- "${BASH_SOURCE[0]}")" && pwd)
+
+build() { # MACHINE SOURCE ELF FLAGS...
+  # Newlib warns of what semihosting programs never call.
+  "$here/build.sh" "$@" >"$3.log" 2>&1 || {
+    cat "$3.log" >&2
+    exit 1
+  }
+}
+
+if [[ $1 == bits ]]; then
+  folder=$2 status=0
+  mkdir -p "$folder"
+  "$3" block >"$folder/block.inc"
+  for machine in m0 m3 m4 m7 riscv; do
+    build $machine "$here/same_bits.cpp" "$folder/bits-$machine.elf" -I"$folder"
+    "$here/build.sh" run $machine "$folder/bits-$machine.elf" >"$folder/bits-$machine.txt"
+    if diff "$folder/bits-$machine.txt" "$here/../same_bits/recorded_few.txt" >&2; then
+      echo "$machine: the recorded bits, $(tail -n 1 "$folder/bits-$machine.txt")"
+    else
+      echo "$machine: other bits than those recorded" >&2
+      status=1
+    fi
+  done
+  exit $status
+fi
+
+folder=$1
+mkdir -p "$folder"
+"$2" block >"$folder/block.inc"
+table=$folder/table.txt
+: >"$table"
+
+# What of the image is flash of `SYMBOL` and of the tables.
+flash() { # ELF SYMBOL
+  arm-none-eabi-nm -S -C "$1" | awk -v symbol="$2" '
+    function hex(text, i, value) {
+      for (i = 1; i <= length(text); ++i) value = 16 * value + index("0123456789abcdef", substr(text, i, 1)) - 1
+      return value
+    }
+    NF >= 4 && (index($0, "::" symbol "(") || $0 ~ /detail::k(PowerOfTwo|Sine|LogMean|HalvingMean|WordLogTable)$/ ||
+      $0 ~ /detail::(signed_product|sum_with_high|unsigned_product)\(/) { sum += hex($2) }
+    END { print sum }'
+}
+# The deepest stack below a function, from the call graph: frames of all that can be called, one below the other.
+stack() { # CALL_GRAPH FUNCTION
+  awk -v name="$2" '
+    /^node:/ {
+      match($0, /title: "[^"]*"/); title = substr($0, RSTART + 8, RLENGTH - 9)
+      if (match($0, /[0-9]+ bytes/)) own[title] = substr($0, RSTART, RLENGTH) + 0
+      if (index($0, name "(")) start = title
+    }
+    /^edge:/ {
+      match($0, /sourcename: "[^"]*"/); from = substr($0, RSTART + 13, RLENGTH - 14)
+      match($0, /targetname: "[^"]*"/); to = substr($0, RSTART + 13, RLENGTH - 14)
+      calls[from] = calls[from] "\n" to
+    }
+    function deepest(at, list, n, i, most, below) {
+      if (at == "__indirect_call" || ++level > 50) return 1e6
+      n = split(calls[at], list, "\n")
+      for (i = 2; i <= n; ++i) { below = deepest(list[i]); if (below > most) most = below }
+      --level
+      return own[at] + most
+    }
+    END { print start == "" ? "-" : deepest(start) }' "$1"
+}
+
+for machine in m4 m3 m0; do
+  elf=$folder/counts-$machine.elf
+  build count-$machine "$here/instructions.cpp" "$elf" -I"$folder" -fstack-usage -fcallgraph-info=su,da \
+    -Wl,-Map="$folder/counts-$machine.map"
+  arm-none-eabi-objcopy -O binary "$elf" "$folder/counts-$machine.bin"
+  # Integers only: no helper of floating point may be in the image.
+  if arm-none-eabi-nm "$elf" |
+    grep -E '__aeabi_(f|d|cf|cd)(add|sub|mul|div|cmp|rsub|2)|__aeabi_(i|ui|l|ul)2[fd]|__(add|sub|mul|div)[sd]f3' >&2; then
+    echo "$elf holds floating point" >&2
+    exit 1
+  fi
+  "$here/build.sh" run count-$machine "$elf" | sed "s/^/$machine /" >>"$table"
+  graph=$(ls "$folder"/counts-$machine*instructions.ci)
+  for part in six_effects whole; do
+    bytes=$(flash "$elf" ${part}_tick)
+    echo "$machine ${part}_flash $bytes $bytes" >>"$table"
+    bytes=$(stack "$graph" ${part}_tick)
+    echo "$machine ${part}_stack $bytes $bytes" >>"$table"
+  done
+done
+# In the same run, on the same machine, beside what one would write in floating point.
+build count-m4 "$here/instructions.cpp" "$folder/peers.elf" -I"$folder" -DFLEXSPLINE_PEERS -lm
+"$here/build.sh" run count-m4 "$folder/peers.elf" | grep '^six' | sed 's/^/m4-fpu /' >>"$table"
+
+printf '%-8s %-32s %8s %8s   %s\n' machine part least most budget
+awk '
+  NR == FNR { if ($0 !~ /^#/ && NF >= 4) { low[$1 " " $2] = $3; high[$1 " " $2] = $4 } next }
+  {
+    key = $1 " " $2; note = ""
+    if (key in high) {
+      seen[key] = 1
+      note = low[key] " to " high[key]
+      if ($4 > high[key]) { note = note "  ABOVE"; bad = 1 }
+      if ($4 < low[key]) { note = note "  BELOW: lower the budget"; bad = 1 }
+    }
+    printf "%-8s %-32s %8s %8s   %s\n", $1, $2, $3, $4, note
+  }
+  END {
+    for (key in high) if (!(key in seen)) { print "no " key " was measured"; bad = 1 }
+    exit bad
+  }' "$here/budget.txt" "$table"
