@@ -173,7 +173,7 @@ void measure_error(const std::vector<EffectValues>& effects, const Tried& tried,
     packed.worst_balance = kBalances[b];
   }
   if (packed.max_error_share_of_rated > options.bound)
-    throw PackError(
+    throw BoundError(
         fmt::format("the block is off by {:.2g} of rated torque on the {} balance, more than {:.2g}; the "
                     "model's torques are far above the ratings in [drive], or --bound is too small",
                     packed.max_error_share_of_rated, packed.worst_balance, options.bound));

@@ -1,0 +1,79 @@
+// pack and unpack as a user runs them.
+#include <gtest/gtest.h>
+
+#include "tests/cli/tool.hpp"
+
+namespace flexspline::cli_test {
+namespace {
+
+constexpr const char* kModel = R"(format = "flexspline-model/1"
+name = "bench"
+[drive]
+axis = "rotary"
+gear_ratio = 100
+torque_constant_nm_a = 0.0543
+rated_current_a = 2.0
+rated_velocity_rad_s = 200.0
+rated_torque_nm = 40.0
+[[effect]]
+type = "viscous_friction"
+[effect.parameters]
+coefficient = { value = 3.6123456789e-4, unit = "N*m*s/rad" }
+[[effect]]
+type = "stribeck_gaussian"
+[effect.parameters]
+amplitude_positive = { value = 0.012, unit = "N*m" }
+amplitude_negative = { value = 0.01, unit = "N*m" }
+velocity = { value = 3.0, unit = "rad/s" }
+)";
+
+TEST(PackCommand, MakesABlockThatUnpackTurnsIntoTheModelAgain) {
+  const Shell shell;
+  shell.write("m.toml", kModel);
+  const nlohmann::json packed =
+      shell.json("flexspline pack --model m.toml --out drive.block --drive arm-1 --encoder-counts 4096");
+  EXPECT_EQ(packed["format"], "flexspline-pack/1");
+  expect_fields(packed, {"bytes", "sha256", "max_error_nm", "max_error_share_of_rated", "proof"});
+  EXPECT_EQ(packed["bytes"], shell.file("drive.block").size());
+  EXPECT_EQ(packed["sha256"].get<std::string>(), shell.must("sha256sum drive.block").substr(0, 64));
+  EXPECT_LT(packed["max_error_share_of_rated"], 1e-6);
+  ASSERT_GT(packed["proof"].size(), 4u);
+  for (const nlohmann::json& part : packed["proof"]) expect_fields(part, {"part", "kind", "bound", "unit"});
+
+  const nlohmann::json unpacked = shell.json("flexspline unpack drive.block --out again.toml");
+  EXPECT_EQ(unpacked["format"], "flexspline-unpack/1");
+  EXPECT_EQ(unpacked["drive"], "arm-1");
+  EXPECT_EQ(unpacked["model"], "bench");
+  EXPECT_EQ(unpacked["encoder_counts"], 4096);
+  EXPECT_EQ(unpacked["coefficients_follow_from_parameters"], true);
+  EXPECT_EQ(unpacked["parameters"][0]["value"], 3.6123456789e-4);
+  shell.must("flexspline pack --model again.toml --out again.block --drive arm-1 --encoder-counts 4096");
+  EXPECT_EQ(shell.file("again.block"), shell.file("drive.block"));
+}
+
+TEST(PackCommand, RefusesWhatDoesNotFitAndWritesNothing) {
+  const Shell shell;
+  shell.write("m.toml", kModel);
+  const Answer bound = shell.run("flexspline pack --model m.toml --out b.block --bound 1e-15");
+  EXPECT_EQ(bound.code, 1);
+  EXPECT_TRUE(contains(bound.err, "of rated torque")) << bound.err;
+  const Answer image = shell.run("flexspline pack --model m.toml --out b.block --image viscous_friction,inertia");
+  EXPECT_EQ(image.code, 2);
+  EXPECT_TRUE(contains(image.err, "stribeck_gaussian does not fit: the firmware image lacks it")) << image.err;
+  EXPECT_EQ(shell.run("test -e b.block").code, 1);
+}
+
+TEST(UnpackCommand, SaysWhatIsWrongWithABlock) {
+  const Shell shell;
+  shell.write("m.toml", kModel);
+  shell.must("flexspline pack --model m.toml --out drive.block");
+  shell.must("printf 'x' | dd of=drive.block bs=1 seek=300 conv=notrunc status=none");
+  const Answer damaged = shell.run("flexspline unpack drive.block");
+  EXPECT_EQ(damaged.code, 2);
+  EXPECT_TRUE(contains(damaged.err, "its checksum does not fit its bytes")) << damaged.err;
+  EXPECT_EQ(shell.run("flexspline unpack m.toml").code, 2);
+  EXPECT_EQ(shell.run("flexspline unpack not-there").code, 2);
+}
+
+}  // namespace
+}  // namespace flexspline::cli_test
