@@ -43,6 +43,8 @@ void Samples::start() {
 
 std::int32_t Samples::step(int channel) {
   Swing& s = swings_[static_cast<std::size_t>(channel)];
+  // A torsion does not jump: laws with memory take the way that it went.
+  if (s.stands && channel == torsion) return torsion_;
   if (s.stands) return s.corner;
   s.phase += s.rate;
   return static_cast<std::int32_t>(std::lround(kMost * std::sin(s.phase)));
