@@ -39,10 +39,11 @@ struct LockStepUp {
   std::uint8_t frame_words = 0;
   std::uint32_t dropped = 0;
   std::uint32_t instructions = 0;  // of the control tick, where the board can count them
+  std::uint32_t stack_bytes = 0;   // used so far; in the last one, when it is switched off
   std::array<std::uint32_t, TelemetrySetup::kMost + 2> frame{};
 };
 
-static_assert(sizeof(LockStepStart) == 20 && sizeof(LockStepDown) == 64 && sizeof(LockStepUp) == 100);
+static_assert(sizeof(LockStepStart) == 20 && sizeof(LockStepDown) == 64 && sizeof(LockStepUp) == 104);
 static_assert(std::is_trivially_copyable_v<LockStepStart> && std::is_trivially_copyable_v<LockStepDown> &&
               std::is_trivially_copyable_v<LockStepUp>);
 

@@ -68,9 +68,16 @@ const HostFile* up_pipe = nullptr;
 
 }  // namespace
 
+extern "C" std::uint32_t used_stack_bytes();
+
 extern "C" void SysTick_Handler() {
   if (!down_pipe->read(&board.down, sizeof(board.down))) flexspline::qemu::leave(kExitNoDesktop);
-  if (board.down.ends) flexspline::qemu::leave(kExitDone);
+  if (board.down.ends) {
+    LockStepUp last;
+    last.stack_bytes = used_stack_bytes();
+    up_pipe->write(&last, sizeof(last));
+    flexspline::qemu::leave(kExitDone);
+  }
   const std::uint32_t before = QemuBoard::instructions();
   LockStepUp up = flexspline::firmware::lock_step(application, board.down);
   up.instructions = QemuBoard::instructions() - before;

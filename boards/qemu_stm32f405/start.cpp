@@ -6,8 +6,12 @@
 // A start-up calls main(), which no other code may.
 #pragma GCC diagnostic ignored "-Wpedantic"
 
+namespace {
+constexpr std::uint32_t kPaint = 0xA5A5A5A5, kOwnFrameWords = 32;
+}
+
 extern "C" {
-extern std::uint32_t stack_top[], data_start[], data_end[], data_load[], bss_start[], bss_end[];
+extern std::uint32_t stack_bottom[], stack_top[], data_start[], data_end[], data_load[], bss_start[], bss_end[];
 using Constructor = void (*)();
 extern const Constructor constructors_start[], constructors_end[];
 
@@ -18,6 +22,8 @@ void SysTick_Handler();
   const std::uint32_t* from = data_load;
   for (std::uint32_t* to = data_start; to < data_end; ++to) *to = *from++;
   for (std::uint32_t* to = bss_start; to < bss_end; ++to) *to = 0;
+  // What is still painted at the end was never used; this function's own frame is at the top.
+  for (std::uint32_t* word = stack_bottom; word + kOwnFrameWords < stack_top; ++word) *word = kPaint;
   for (const Constructor* c = constructors_start; c < constructors_end; ++c) (*c)();
   main();
   flexspline::qemu::leave(1);
@@ -26,6 +32,11 @@ void SysTick_Handler();
 [[noreturn]] void Unexpected_Handler() {
   flexspline::qemu::print("unexpected exception\n");
   flexspline::qemu::leave(3);
+}
+std::uint32_t used_stack_bytes() {
+  const std::uint32_t* word = stack_bottom;
+  while (word < stack_top && *word == kPaint) ++word;
+  return static_cast<std::uint32_t>(stack_top - word) * 4;
 }
 // No object is ever destroyed.
 int __aeabi_atexit(void*, void (*)(void*), void*) {

@@ -125,6 +125,8 @@ firmware::LockStepUp Processor::tick(const firmware::LockStepDown& down) {
   firmware::LockStepUp up;
   receive(&up, sizeof(up));
   most_instructions_ = std::max(most_instructions_, up.instructions);
+  instructions_ += up.instructions;
+  ++ticks_;
   return up;
 }
 
@@ -137,6 +139,9 @@ int Processor::stop() {
   firmware::LockStepDown last;
   last.ends = true;
   send(&last, sizeof(last));
+  firmware::LockStepUp up;
+  receive(&up, sizeof(up));
+  stack_bytes_ = up.stack_bytes;
   int status = 0;
   waitpid(child_, &status, 0);
   child_ = -1;

@@ -28,6 +28,10 @@ class Processor : public Brain {
   static bool is_installed();
   /// Most instructions that one control tick took so far.
   std::uint32_t most_instructions() const { return most_instructions_; }
+  /// Of all ticks so far, on average.
+  double mean_instructions() const { return ticks_ > 0 ? static_cast<double>(instructions_) / ticks_ : 0.0; }
+  /// Most of the stack that was ever in use; known after stop().
+  std::uint32_t stack_bytes() const { return stack_bytes_; }
 
  private:
   void send(const void* bytes, std::size_t count);
@@ -40,6 +44,9 @@ class Processor : public Brain {
   int down_ = -1;
   int up_ = -1;
   std::uint32_t most_instructions_ = 0;
+  std::uint32_t stack_bytes_ = 0;
+  std::uint64_t instructions_ = 0;
+  std::uint32_t ticks_ = 0;
 };
 
 }  // namespace flexspline::board

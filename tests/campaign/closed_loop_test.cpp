@@ -5,6 +5,7 @@
 #include <cstdlib>
 #include <filesystem>
 #include <memory>
+#include <span>
 #include <string>
 
 #include "firmware/fault_texts.hpp"
@@ -50,9 +51,9 @@ TEST(ClosedLoop, CompensationFollowsCloserInEveryScenario) {
     const char* scenario;
     double rms_ratio, peak_ratio;  // with over without compensation, at most
   };
-  for (const Expected& e : {Expected{"slow-reversals", 1.1, 0.7}, Expected{"sine", 0.9, 0.35},
-                            Expected{"trapezoid", 0.9, 0.45}, Expected{"joint-trajectory", 0.7, 0.4},
-                            Expected{"constant-slow", 0.3, 0.6}}) {
+  for (const Expected& e :
+       {Expected{"slow-reversals", 1.1, 0.7}, Expected{"sine", 0.9, 0.35}, Expected{"trapezoid", 0.9, 0.45},
+        Expected{"joint-trajectory", 0.7, 0.4}, Expected{"constant-slow", 0.3, 0.6}}) {
     const auto plan = plan_of(e.scenario, 10.0);
     const ScenarioResult off = run(plan, false), on = run(plan, true);
     SCOPED_TRACE(e.scenario);
@@ -122,6 +123,38 @@ TEST_F(ProcessorInTheLoop, TheImageEndsWhenItIsSwitchedOff) {
   for (int k = 0; k < 100; ++k) processor.tick(down);
   EXPECT_EQ(processor.stop(), 0);
   EXPECT_GT(processor.most_instructions(), 100u);
+}
+
+// A processor that is still there when its drive is gone.
+class Borrowed : public board::Brain {
+ public:
+  explicit Borrowed(Processor& processor) : processor_(processor) {}
+  void start(const board::Block& block, const firmware::TelemetrySetup& setup, firmware::ResetCause cause) override {
+    processor_.start(block, setup, cause);
+  }
+  firmware::LockStepUp tick(const firmware::LockStepDown& down) override { return processor_.tick(down); }
+  void offer(std::span<const std::byte> block) override { processor_.offer(block); }
+
+ private:
+  Processor& processor_;
+};
+
+// The stack is as large as the linker script says; between two ticks there are 8400 cycles.
+TEST_F(ProcessorInTheLoop, ATickOfAModelWithManyEffectsStaysWithinItsStackAndItsTime) {
+  constexpr std::uint32_t kStackBytes = 1536, kCycles = 168'000'000 / 20'000;
+  Processor processor(FLEXSPLINE_IMAGE);
+  auto plan = plan_of("joint-trajectory", 0.5);
+  for (const char* effect : {"stribeck_gaussian", "torque_ripple:2", "torque_ripple:7", "gravity", "kinematic_error",
+                             "load_dependent_friction", "temperature_viscous"})
+    plant::with(plan.drive, effect);
+  run(plan, true, std::make_unique<Borrowed>(processor));
+  EXPECT_EQ(processor.stop(), 0);
+  RecordProperty("stack_bytes", std::to_string(processor.stack_bytes()));
+  RecordProperty("most_instructions", std::to_string(processor.most_instructions()));
+  RecordProperty("mean_instructions", std::to_string(processor.mean_instructions()));
+  EXPECT_LT(processor.stack_bytes(), kStackBytes);
+  EXPECT_GT(processor.stack_bytes(), 400u);
+  EXPECT_LT(processor.most_instructions(), kCycles);
 }
 
 }  // namespace
