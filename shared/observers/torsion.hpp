@@ -6,8 +6,8 @@
 // friction, gravity and a spring that bends are the model's business, and what is left is linear; without a model the
 // nominal motion is standstill, and friction counts as torsion.
 //
-// What it cannot know: a constant error of friction looks like a torque through the gear, b at the motor as up to N b/K
-// of torsion. No observer tells them apart from the motor's side alone.
+// What it cannot know: a constant error of friction looks like a torque through the gear, b at the motor as N b/K of
+// torsion. No observer tells them apart from the motor's side alone.
 //
 // Each tick takes the velocities first and the torsion with the new ones (symplectic Euler), which neither damps nor
 // excites the resonance; the gains are those of the Riccati equation for exactly this step.
