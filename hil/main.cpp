@@ -139,6 +139,9 @@ int main(int argc, char** argv) {
       ->check(CLI::IsMember({"on", "off", "both"}));
   drive_command->add_option("--inject", drive_options.inject, "what goes wrong, as motor-encoder-stuck");
   drive_command->add_option("--inject-at", drive_options.inject_at_s, "when, in seconds (default: half the time)");
+  drive_command->add_option(
+      "--block", drive_options.block_file,
+      "parameter block of `flexspline pack --tick-hz 20000`: the drive's model (default: the plant's)");
   drive_command->add_option("--processor", drive_options.processor_image,
                             "firmware image to run it on, in QEMU (boards/qemu_stm32f405)");
   drive_command->add_option("--json", drive_options.json, "file for the result; - is standard output");

@@ -26,6 +26,7 @@ ScenarioPlan plan_of(const DriveOptions& options) {
   plan.drive = options.plant_file.empty() ? plant::demo_plant().drive : plant::load_plant(options.plant_file).drive;
   for (const std::string& effect : options.with) plant::with(plan.drive, effect);
   if (!options.hide.empty()) plant::hide(plan.drive, options.hide);
+  if (!options.block_file.empty()) plan.packed = load_packed_model(options.block_file);
   plan.scenario = options.scenario;
   plan.duration_s = options.seconds;
   plan.seed = options.seed;

@@ -17,6 +17,7 @@ struct DriveOptions {
   std::string inject;
   double inject_at_s = -1.0;
   std::string processor_image;
+  std::string block_file;
   std::string json;
   std::uint64_t seed = 1;
 };

@@ -1,12 +1,14 @@
 #include "hil/board/drive_setup.hpp"
 
 #include <algorithm>
+#include <cmath>
 #include <numbers>
 #include <stdexcept>
 #include <string>
 #include <string_view>
 #include <vector>
 
+#include "hil/board/brain.hpp"
 #include "hil/board/drive_rig.hpp"
 #include "shared/fixed/findings.hpp"
 
@@ -68,13 +70,16 @@ effects::DriveConstants<double> constants_of(const plant::Drive& drive, std::uin
   return d;
 }
 
-control::DriveSetup<double> setup_of(const plant::Drive& drive, std::uint32_t tick_hz) {
-  const effects::DriveConstants<double> d = constants_of(drive, tick_hz);
+control::DriveSetup<double> setup_of(const plant::Drive& drive) {
+  return setup_of(drive, constants_of(drive));
+}
+
+control::DriveSetup<double> setup_of(const plant::Drive& drive, const effects::DriveConstants<double>& d) {
   const AnalogScales scales = scales_of(drive);
   const double inertia = inertia_of(drive), stiffness = stiffness_of(drive);
   const double most_torque = d.torque_constant * drive.current_limit_a;
   control::DriveSetup<double> s;
-  s.tick_hz = tick_hz;
+  s.tick_hz = static_cast<std::uint32_t>(std::lround(1.0 / d.time_base));
   s.motor_counts = static_cast<std::uint32_t>(drive.sensors.motor_counts);
   s.output_counts = static_cast<std::uint32_t>(drive.sensors.output_counts);
   s.motor_corner = kTurn * 150.0;
@@ -116,14 +121,36 @@ control::DriveSetup<double> setup_of(const plant::Drive& drive, std::uint32_t ti
   return s;
 }
 
+namespace {
+void require_no_findings() {
+  if (fixed::Findings::count() != 0)
+    throw std::runtime_error("the drive's parameters do not fit its numbers: " + std::string(fixed::Findings::first()));
+}
+}  // namespace
+
+firmware::Parameters parameters_of(const plant::Drive& drive, const PackedModel& packed) {
+  const effects::DriveConstants<double>& d = packed.constants;
+  const control::DriveSetup<double> setup = setup_of(drive, d);
+  if (setup.tick_hz != SoftwareBoard::kTickHz)
+    throw std::runtime_error("the block was packed for " + std::to_string(setup.tick_hz) +
+                             " ticks a second; pack it with --tick-hz " + std::to_string(SoftwareBoard::kTickHz));
+  if (std::abs(d.gear_ratio - drive.gear_ratio) > 1e-6 * drive.gear_ratio)
+    throw std::runtime_error("the block was packed for a gear of " + std::to_string(d.gear_ratio) +
+                             ", the drive has one of " + std::to_string(drive.gear_ratio));
+  fixed::Findings::clear();
+  firmware::Parameters parameters = control::derive<N>(setup, d);
+  parameters.model = packed.model;
+  require_no_findings();
+  return parameters;
+}
+
 firmware::Parameters parameters_of(const plant::Drive& drive, const control::DriveSetup<double>& setup) {
   const effects::DriveConstants<double> d = constants_of(drive, setup.tick_hz);
   fixed::Findings::clear();
   firmware::Parameters parameters = control::derive<N>(setup, d);
   parameters.model.for_each(
       [&]<class Effect>(model::Places<Effect, N>&) { add_all<Effect>(drive, d, parameters.model); });
-  if (fixed::Findings::count() != 0)
-    throw std::runtime_error("the drive's parameters do not fit its numbers: " + std::string(fixed::Findings::first()));
+  require_no_findings();
   return parameters;
 }
 

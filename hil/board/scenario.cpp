@@ -95,8 +95,8 @@ firmware::TelemetrySetup telemetry() {
 
 class Host {
  public:
-  Host(const plant::Drive& drive, const Scenario& scenario, bool compensation)
-      : d_(constants_of(drive)), scenario_(scenario), compensation_(compensation) {}
+  Host(const effects::DriveConstants<double>& d, const Scenario& scenario, bool compensation)
+      : d_(d), scenario_(scenario), compensation_(compensation) {}
 
   firmware::Command command(firmware::Command::Kind kind, double time_s) const {
     const Reference r = scenario_.at(time_s);
@@ -142,9 +142,10 @@ const Scenario& scenario(std::string_view name) {
 ScenarioResult run_scenario(const ScenarioPlan& plan, std::unique_ptr<Brain> brain) {
   constexpr std::uint32_t kBootTicks = 100, kHostTicks = SoftwareBoard::kTickHz / 1000;
   const Scenario& motion = scenario(plan.scenario);
-  const Host host(plan.drive, motion, plan.compensation);
+  const Host host(plan.packed ? plan.packed->constants : constants_of(plan.drive), motion, plan.compensation);
   const auto started = std::chrono::steady_clock::now();
-  const Block block(parameters_of(plan.drive, setup_of(plan.drive)));
+  const Block block(plan.packed ? parameters_of(plan.drive, *plan.packed)
+                                : parameters_of(plan.drive, setup_of(plan.drive)));
   VirtualDrive drive({.drive = plan.drive, .seed = plan.seed}, block, telemetry(), std::move(brain));
   drive.run(kBootTicks);
   const firmware::Answer armed = drive.command(host.command(firmware::Command::Kind::arm, 0.0));

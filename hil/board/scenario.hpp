@@ -7,6 +7,7 @@
 #include <string_view>
 #include <vector>
 
+#include "hil/board/packed_model.hpp"
 #include "hil/board/virtual_drive.hpp"
 
 namespace flexspline::board {
@@ -36,6 +37,7 @@ struct ScenarioPlan {
   bool compensation = true;
   std::optional<Injection> injection{};
   double injection_s = 0.0;
+  std::optional<PackedModel> packed{};  ///< the model that the drive computes with; else the plant's own
 };
 
 /// What happened. Errors are those of the true output position against the reference, after the first second.
