@@ -15,6 +15,12 @@ mkdir -p "$out"
   -fno-asynchronous-unwind-tables -Wall -Wextra -Wpedantic -Wshadow -Werror -Wno-volatile \
   -nostartfiles -Wl,--gc-sections -Wl,-Map="$out/image.map" -T "$here/board.ld" -I "$root" \
   "$here/start.cpp" "$here/semihosting.cpp" "$here/main.cpp" -o "$out/image.elf.new" --specs=nano.specs --specs=nosys.specs
+# Integers only, and no heap: a symbol of either says that something slipped in.
+forbidden=$("${compiler%g++}nm" "$out/image.elf.new" | grep -E ' (__aeabi_[fd][a-z0-9]+|__aeabi_[a-z]+2[fd]|malloc|free|_Zn[wa]|_Zd[la]|__cxa_throw)' || true)
+[ -z "$forbidden" ] || {
+  echo "the image holds floating point, heap or exceptions: $forbidden" >&2
+  exit 1
+}
 # Flash, and RAM without the telemetry ring of 8 KB but with the stack; the linker script holds both to their limits.
 size=${compiler%g++}size
 "$size" -A "$out/image.elf.new" | awk '
