@@ -112,6 +112,10 @@ control::DriveSetup<double> setup_of(const plant::Drive& drive, const effects::D
                    .stiffness = stiffness,
                    .torsion_limit = 1.9 * d.torsion_base,
                    .torsion_rate_limit = 0.5 * d.velocity_base / d.gear_ratio};
+  if (const plant::Effect* damping = drive.find("structural_damping")) {
+    s.feedforward.damping_torque = damping->value("torque");
+    s.feedforward.damping_exponent = damping->value("exponent");
+  }
   s.safety.overspeed = 1.25 * drive.rated_velocity_rad_s;
   s.safety.overcurrent = 1.2 * drive.current_limit_a;
   s.safety.overtemperature = 80.0;

@@ -30,6 +30,10 @@ struct FeedforwardSetup {
   P torsion_limit{};       // rad at the output
   P torsion_rate_limit{};  // rad/s, of how fast the lead may change: jumps of the acceleration would make it jump
   P output_zero_turns{};   // of the motor where the output's angle is nought, for gravity
+  // Structural damping of the transmission, `damping_torque` abs(rate)^damping_exponent (report eq. 78), N m at 1
+  // rad/s: it lets the spring settle slowly, and the lead has to be as slow. Nought: none.
+  P damping_torque{};
+  P damping_exponent{P(0.5)};
 };
 
 struct Feedforward {
@@ -47,13 +51,19 @@ struct Feedforward {
     typename N::Gain compliance{};
     typename N::Value torsion_limit{};
     typename N::Value torsion_change{};
-    typename N::Gain lead{};  // turns of the motor per torsion
+    bool damped = false;
+    typename N::RatioGain per_damping{};
+    typename N::Exponent rate_exponent{};
+    typename N::Value most_damping{};
+    typename N::Value creep{};  // bases of torsion in a tick at 1 rad/s
+    typename N::Gain lead{};    // turns of the motor per torsion
     typename N::StepGain lead_velocity{};
   };
   template <class N>
   struct State {
     typename N::Value load{};  // torque through the flexspline, at the tick before
     typename N::Value torsion{};
+    typename N::State settled{};  // the torsion, of which a tick changes less than a value can show
   };
   template <class N>
   struct SetPoint {
@@ -99,6 +109,17 @@ struct Feedforward {
     c.compliance = N::gain(d.output_torque_base / (s.stiffness * d.torsion_base));
     c.torsion_limit = N::value(s.torsion_limit / d.torsion_base);
     c.torsion_change = N::value(s.torsion_rate_limit * d.time_base / d.torsion_base);
+    c.damped = s.damping_torque > P(0.0);
+    if (c.damped) {
+      require(s.damping_exponent >= P(0.1) && s.damping_exponent <= P(1.0),
+              "the exponent of a feedforward's damping is not between 0.1 and 1");
+      // Faster than eight radians a second nothing creeps, and powers stay in their range.
+      const P most = s.damping_torque * N::power(P(8.0), s.damping_exponent) / d.output_torque_base;
+      c.per_damping = N::ratio_gain(d.output_torque_base / s.damping_torque);
+      c.rate_exponent = N::exponent(P(1.0) / s.damping_exponent);
+      c.most_damping = N::value(most < P(8.0) ? most : P(8.0));
+      c.creep = N::value(d.time_base / d.torsion_base);
+    }
     c.lead = N::gain(d.gear_ratio * d.torsion_base / d.angle_base);
     c.lead_velocity = N::step_gain(d.angle_base / (d.velocity_base * d.time_base));
     return c;
@@ -107,7 +128,8 @@ struct Feedforward {
   // One tick. The set point within two bases.
   //   T = load(set point) + measured load;  torque = motor(set point, measured angle) + T/N
   //   dq += (T - transmission(dq))/K_largest, a chord step a tick: it settles where the transmission carries T, however
-  //   it bends, as long as it is nowhere stiffer; lead = N dq.
+  //   it bends, as long as it is nowhere stiffer; lead = N dq. With damping a step is no longer than
+  //   T_tick (abs(T - transmission(dq))/damping_torque)^(1/damping_exponent), as the rate of the transmission is.
   // Friction that depends on the load takes the load of the tick before.
   template <class N>
   static constexpr Output<N> update(State<N>& s, const Coefficients<N>& c, model::DriveModel<N>& model,
@@ -132,9 +154,15 @@ struct Feedforward {
     out.torque = N::clamp(N::narrow(motor), c.torque_limit);
     if (!c.leads) return out;
     const auto missing = s.load - N::clamp(N::narrow(torques.transmission), c.load_limit + c.load_limit);
-    const auto change = N::clamp(N::scaled(c.compliance, missing), c.torsion_change);
+    auto change = N::widen(N::clamp(N::scaled(c.compliance, missing), c.torsion_change));
+    if (c.damped) {
+      const auto rate = N::pow_abs(N::ratio(c.per_damping, N::clamp(missing, c.most_damping)), c.rate_exponent);
+      const auto four = N::one() + N::one() + N::one() + N::one();
+      change = N::clamp(change, N::times(N::widen(N::clamp(rate, four)), c.creep));
+    }
     const auto before = s.torsion;
-    s.torsion = N::clamp(s.torsion + change, c.torsion_limit);
+    s.settled = N::clamp(s.settled + change, c.torsion_limit);
+    s.torsion = N::narrow(s.settled);
     out.lead = N::distance(c.lead, s.torsion);
     out.velocity = N::narrow(N::signal(c.lead_velocity, N::distance(c.lead, s.torsion - before)));
     return out;
