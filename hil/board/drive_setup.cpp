@@ -6,6 +6,7 @@
 #include <stdexcept>
 #include <string>
 #include <string_view>
+#include <type_traits>
 #include <vector>
 
 #include "hil/board/brain.hpp"
@@ -126,6 +127,25 @@ control::DriveSetup<double> setup_of(const plant::Drive& drive, const effects::D
 }
 
 namespace {
+// The lead's damping is that of the packed model, not the plant's: what it gives at a rate of 1 rad/s, and its
+// exponent.
+void set_damping(const PackedModel& packed, control::FeedforwardSetup<double>& setup) {
+  setup.damping_torque = 0.0;
+  model::DriveModel<N> model = packed.model;
+  model.for_each([&]<class Effect>(model::Places<Effect, N>& places) {
+    if constexpr (std::is_same_v<Effect, effects::StructuralDamping>) {
+      if (places.count == 0) return;
+      effects::Inputs<N> in{};
+      effects::Torques<N> out{};
+      in.torsion_rate = N::value(1.0 / packed.constants.torsion_rate_base);
+      in.torsion_direction = N::one();
+      Effect::evaluate(places.states[0], places.coefficients[0], in, out);
+      setup.damping_torque =
+          std::ldexp(N::narrow(out.transmission).raw, -fixed::kValueBits) * packed.constants.output_torque_base;
+      setup.damping_exponent = std::ldexp(places.coefficients[0].exponent.raw, -fixed::kExponentBits);
+    }
+  });
+}
 void require_no_findings() {
   if (fixed::Findings::count() != 0)
     throw std::runtime_error("the drive's parameters do not fit its numbers: " + std::string(fixed::Findings::first()));
@@ -134,13 +154,14 @@ void require_no_findings() {
 
 firmware::Parameters parameters_of(const plant::Drive& drive, const PackedModel& packed) {
   const effects::DriveConstants<double>& d = packed.constants;
-  const control::DriveSetup<double> setup = setup_of(drive, d);
+  control::DriveSetup<double> setup = setup_of(drive, d);
   if (setup.tick_hz != SoftwareBoard::kTickHz)
     throw std::runtime_error("the block was packed for " + std::to_string(setup.tick_hz) +
                              " ticks a second; pack it with --tick-hz " + std::to_string(SoftwareBoard::kTickHz));
   if (std::abs(d.gear_ratio - drive.gear_ratio) > 1e-6 * drive.gear_ratio)
     throw std::runtime_error("the block was packed for a gear of " + std::to_string(d.gear_ratio) +
                              ", the drive has one of " + std::to_string(drive.gear_ratio));
+  set_damping(packed, setup.feedforward);
   fixed::Findings::clear();
   firmware::Parameters parameters = control::derive<N>(setup, d);
   parameters.model = packed.model;

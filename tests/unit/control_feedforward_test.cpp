@@ -128,6 +128,41 @@ TEST(Feedforward, IsTheSumOfItsPartsInSiUnits) {
   EXPECT_GT(largest_lead, 0.003);
 }
 
+// K dq + c v^(1/2) = T from dq = 0: what is missing, e = T - K dq, obeys e' = -K (e/c)^2, so e = T/(1 + K T t/c^2).
+TEST(Feedforward, WithStructuralDampingTheLeadCreepsAsTheSpringDoes) {
+  auto s = setup();
+  s.damping_torque = 57.0;
+  s.damping_exponent = 0.5;
+  const auto c = made<Fixed>(s);
+  const auto c_checked = made<Checked>(s);
+  const auto c_real = made<Real>(s);
+  auto model = whole<Fixed>();
+  auto checked = whole<Checked>();
+  auto exact = whole<Real>();
+  Feedforward::State<Fixed> state;
+  Feedforward::State<Checked> state_checked;
+  Feedforward::State<Real> state_real;
+  Findings::clear();
+  const double load = 1.2;
+  const fixed::Angle level{std::llround(3.25 * 0x1p32)};  // where gravity is nought
+  double lead = 0.0;
+  for (int k = 1; k <= 160'000; ++k) {
+    const auto out = Feedforward::update<Fixed>(state, c, model, {level, {}, {}}, {{}, {}, Fixed::value(load / 40.0)});
+    const auto out_checked = Feedforward::update<Checked>(state_checked, c_checked, checked, {level, {}, {}},
+                                                          {{}, {}, Checked::value(load / 40.0)});
+    const auto out_real =
+        Feedforward::update<Real>(state_real, c_real, exact, {3.25, 0.0, 0.0}, {0.0, 0.0, load / 40.0});
+    const double missing = load / (1.0 + kStiffness * load * k * kTickS / (57.0 * 57.0));
+    lead = kGear * (load - missing) / kStiffness / kTurn;
+    ASSERT_NEAR(turns(out.lead), lead, 1e-6) << k;
+    ASSERT_NEAR(turns(out.lead), out_real.lead, 5e-7) << k;
+    ASSERT_EQ(out.lead.raw, out_checked.lead.raw);
+  }
+  EXPECT_EQ(Findings::count(), 0) << Findings::first();
+  // Ten seconds later some of it is still to come.
+  EXPECT_LT(lead, 0.97 * kGear * load / kStiffness / kTurn);
+}
+
 TEST(Feedforward, OnADriveAgreesWithDouble) {
   const auto c = made<Fixed>();
   const auto c_checked = made<Checked>();
