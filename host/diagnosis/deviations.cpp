@@ -42,11 +42,6 @@ double cost(const RecordSums& r, const SmallVector& std, double v) {
   return log_det - g.dot(m.solve(g));
 }
 
-SmallVector best_deviations(const RecordSums& r, const SmallVector& std, double v) {
-  const SmallVector g = std.cwiseProduct(r.along) / v;
-  return std.cwiseProduct(inner(r, std, v).solve(g));
-}
-
 // The best spread of one group, the others as they are: a grid, then golden sections. Nought where that is as good.
 void choose(const std::vector<RecordSums>& records, const std::vector<double>& noise, Eigen::Index group,
             SmallVector& std) {
@@ -123,14 +118,8 @@ Spread estimate(const std::vector<RecordSums>& records, const SmallVector* given
     settle(records, tau, least_variance, spread);
   }
   for (std::size_t i = 0; i < records.size(); ++i) {
-    const SmallVector& b = spread.by_record[i];
-    double deviance = records[i].rows / tau * std::log(spread.variance[i]);
-    const Eigen::LLT<SmallMatrix> m = inner(records[i], spread.std, spread.variance[i] * tau);
-    for (Eigen::Index g = 0; g < groups; ++g) {
-      deviance += 2.0 * std::log(m.matrixLLT()(g, g));
-      if (spread.std[g] > 0.0) deviance += b[g] * b[g] / (spread.std[g] * spread.std[g]);
-    }
-    spread.deviance[i] = deviance;
+    const Cost cost = cost_of_deviations(records[i], spread.std, spread.variance[i] * tau);
+    spread.deviance[i] = records[i].rows / tau * std::log(spread.variance[i]) + cost.squares + cost.log_det;
   }
   return spread;
 }
@@ -159,16 +148,21 @@ Spread with_spread(const std::vector<RecordSums>& records, const SmallVector& st
   return estimate(records, &std, tau, least_variance);
 }
 
-double chi_square(const std::vector<RecordSums>& records, const Spread& model, double tau) {
-  double sum = 0.0;
-  for (std::size_t i = 0; i < records.size(); ++i) {
-    const double v = model.variance[i] * tau;
-    sum += records[i].squares / model.variance[i];
-    if (model.std.size() == 0) continue;
-    const SmallVector g = model.std.cwiseProduct(records[i].along) / v;
-    sum -= tau * g.dot(inner(records[i], model.std, v).solve(g));
+SmallVector best_deviations(const RecordSums& r, const SmallVector& std, double v) {
+  if (std.size() == 0) return std;
+  const SmallVector g = std.cwiseProduct(r.along) / v;
+  return std.cwiseProduct(inner(r, std, v).solve(g));
+}
+
+Cost cost_of_deviations(const RecordSums& r, const SmallVector& spread, double v) {
+  Cost cost;
+  const SmallVector b = best_deviations(r, spread, v);
+  const Eigen::LLT<SmallMatrix> m = inner(r, spread, v);
+  for (Eigen::Index g = 0; g < spread.size(); ++g) {
+    cost.log_det += 2.0 * std::log(m.matrixLLT()(g, g));
+    if (spread[g] > 0.0) cost.squares += b[g] * b[g] / (spread[g] * spread[g]);
   }
-  return sum;
+  return cost;
 }
 
 Eigen::MatrixXd without_deviations(const Eigen::MatrixXd& triangle, const Eigen::MatrixXd& u, const SmallVector& std,

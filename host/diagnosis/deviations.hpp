@@ -51,8 +51,14 @@ struct Spread {
 Spread estimate_spread(const std::vector<RecordSums>& records, double tau, double least_variance);
 // The same with the spreads given.
 Spread with_spread(const std::vector<RecordSums>& records, const SmallVector& std, double tau, double least_variance);
-// e'V^-1 e of all records, times tau, in the noise and the spread of `model`.
-double chi_square(const std::vector<RecordSums>& records, const Spread& model, double tau);
+// The deviations that are likeliest in noise of this variance (tau in it).
+SmallVector best_deviations(const RecordSums& record, const SmallVector& std, double noise_variance);
+// What they cost: their squares over those of the spread, and the log determinant of the spread over the noise.
+struct Cost {
+  double squares = 0.0;
+  double log_det = 0.0;
+};
+Cost cost_of_deviations(const RecordSums& record, const SmallVector& std, double noise_variance);
 
 // A record's triangle of [X y] over the root of its noise, with deviations along X u of this standard deviation (the
 // columns of `u`) eliminated: the triangle of generalised least squares.

@@ -10,6 +10,7 @@
 #include "host/diagnosis/disturbances.hpp"
 #include "host/diagnosis/rivals.hpp"
 #include "host/diagnosis/trials.hpp"
+#include "host/regression/shapes.hpp"
 
 namespace flexspline::diagnosis {
 namespace {
@@ -87,6 +88,22 @@ std::vector<Localised> shares(const BalanceData& data, const Judged& judged, dou
   return list;
 }
 
+// Shapes were fitted as if friction were the same in all records. Where it is not, they are searched again with that
+// known, or candidates would be named for no more than a better search.
+void settle_shapes(Search& search) {
+  BalanceData& data = *search.data;
+  if (search.base.groups.empty() || search.base.deviations.std.maxCoeff() <= 0.0) return;
+  regression::Terms terms = search.base.terms;
+  const auto on_balance = regression::terms_on(terms, data.balance(), data.prepared().torque_measured);
+  if (regression::free_shape_slots(terms, on_balance).empty()) return;
+  constexpr double kTolerance = 1e-7;
+  for (int round = 0; round < 2; ++round) {
+    regression::refine_shapes(data, terms, on_balance, whitening_of(data, search.base), kTolerance);
+    search.base = judge(data, terms, search.keep);
+    terms = search.base.terms;
+  }
+}
+
 std::vector<Examined> examine(regression::Identification& base, const std::vector<const data::Experiment*>& experiments,
                               const Options& options, Diagnosis& result) {
   std::vector<Examined> all;
@@ -101,6 +118,7 @@ std::vector<Examined> examine(regression::Identification& base, const std::vecto
       result.disturbances.push_back(std::move(d));
     }
     one.search.base = one.search.keep.minCoeff() < 1.0 ? judge(data, base.terms, one.search.keep) : std::move(whole);
+    settle_shapes(one.search);
     one.trials = rank(one.search);
     one.floor = comparison::pooled(comparison::noise_floors(data, one.search.base.terms, experiments, base.model.drive),
                                    data.records());

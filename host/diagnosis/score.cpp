@@ -76,7 +76,8 @@ MixedFit fit_all(const Triangles& triangles, const std::vector<Group>& groups, d
   constexpr double kSame = 0.02;
   for (int round = 0; round < kMostRounds; ++round) {
     const std::vector<RecordSums> sums = sums_of(triangles, fit.linear.theta, fit.u);
-    const double least = least_of(raw_variances(sums));
+    // Deviations are no noise: the limit follows what is left without them.
+    const double least = least_of(round == 0 ? raw_variances(sums) : fit.spread.variance);
     const SmallVector before = fit.spread.std;
     fit.spread = estimate_spread(sums, tau, least);
     solve();
@@ -89,35 +90,43 @@ MixedFit fit_all(const Triangles& triangles, const std::vector<Group>& groups, d
 
 // Predicts each part of all records from the others. What the whole data do not determine, a part of them does still
 // less: `determined` columns alone are fitted.
-std::vector<RecordSums> predict_left_out(const Triangles& triangles, const MixedFit& whole, double tau) {
+std::vector<LeftOut> predict_left_out(const Triangles& triangles, const MixedFit& whole, double tau) {
   const Eigen::Index columns = triangles.columns();
   std::vector<Eigen::Index> used;
   for (Eigen::Index j = 0; j < columns; ++j)
     if (whole.linear.own_share[j] >= regression::kUndetermined) used.push_back(j);
-  std::vector<RecordSums> records(triangles.whole.size());
+  std::vector<LeftOut> records(triangles.whole.size());
   for (std::size_t out = 0; out < kFolds; ++out) {
-    std::vector<Eigen::MatrixXd> reduced;
-    for (std::size_t i = 0; i < records.size(); ++i) {
-      std::vector<const Eigen::MatrixXd*> others;
-      for (std::size_t f = 0; f < kFolds; ++f)
-        if (f != out) others.push_back(&triangles.parts[i][f]);
-      reduced.push_back(without_deviations(stacked(others), whole.u, whole.spread.std, whole.spread.variance[i] * tau));
-    }
+    std::vector<Eigen::MatrixXd> others, reduced;
     std::vector<const Eigen::MatrixXd*> blocks;
+    for (std::size_t i = 0; i < records.size(); ++i) {
+      std::vector<const Eigen::MatrixXd*> parts;
+      for (std::size_t f = 0; f < kFolds; ++f)
+        if (f != out) parts.push_back(&triangles.parts[i][f]);
+      others.push_back(stacked(parts));
+      reduced.push_back(without_deviations(others.back(), whole.u, whole.spread.std, whole.spread.variance[i] * tau));
+    }
     for (const Eigen::MatrixXd& r : reduced) blocks.push_back(&r);
     const Eigen::MatrixXd all = stacked(blocks);
     Eigen::VectorXd theta = Eigen::VectorXd::Zero(columns);
     theta(used) =
         Eigen::ColPivHouseholderQR<Eigen::MatrixXd>(all(Eigen::all, used)).setThreshold(1e-5).solve(all.col(columns));
-    for (std::size_t i = 0; i < records.size(); ++i)
-      add_sums(triangles.parts[i][out], theta, whole.u, triangles.rows[i][out], records[i]);
+    for (std::size_t i = 0; i < records.size(); ++i) {
+      RecordSums seen;
+      add_sums(others[i], theta, whole.u, triangles.rows_of(i) - triangles.rows[i][out], seen);
+      const Eigen::VectorXd own =
+          theta + whole.u * best_deviations(seen, whole.spread.std, whole.spread.variance[i] * tau);
+      const Eigen::MatrixXd& part = triangles.parts[i][out];
+      records[i].rows += triangles.rows[i][out];
+      records[i].squares += (part.col(columns) - part.leftCols(columns) * own).squaredNorm();
+    }
   }
   return records;
 }
 
-double rows_of(const std::vector<RecordSums>& records) {
+double rows_of(const std::vector<LeftOut>& records) {
   return std::accumulate(records.begin(), records.end(), 0.0,
-                         [](double sum, const RecordSums& r) { return sum + r.rows; });
+                         [](double sum, const LeftOut& r) { return sum + r.rows; });
 }
 
 }  // namespace
@@ -128,9 +137,9 @@ double Judged::rmse() const {
 }
 
 double Judged::rmse_cv() const {
-  const Spread spread = with_spread(left_out, deviations.std, autocorrelation_time, least_of(raw_variances(left_out)));
-  return std::sqrt(std::accumulate(spread.squares.begin(), spread.squares.end(), 0.0) /
-                   std::max(1.0, rows_of(left_out)));
+  const double squares = std::accumulate(left_out.begin(), left_out.end(), 0.0,
+                                         [](double sum, const LeftOut& r) { return sum + r.squares; });
+  return std::sqrt(squares / std::max(1.0, rows_of(left_out)));
 }
 
 Judged judge(BalanceData& data, Terms terms, const Eigen::VectorXd& keep) {
@@ -176,6 +185,7 @@ Judged judge(BalanceData& data, Terms terms, const Eigen::VectorXd& keep) {
   set(judged.theta);
   judged.own_share = fit.linear.own_share;
   judged.deviations = fit.spread;
+  judged.sums = sums_of(triangles, fit.linear.theta, fit.u);
   // Noise counts `tau` rows as one already, in the triangles' weights.
   const double counted = (keep.array() > 0.0).count();
   const double freedom = counted / std::max(1.0, counted - static_cast<double>(X.cols()));
@@ -245,14 +255,22 @@ double squares_left(BalanceData& data, const Terms& terms, const Judged& judged)
 
 Fall fall_of(const Judged& base, const Judged& extended, double added) {
   const double tau = std::max(1.0, std::min(base.autocorrelation_time, extended.autocorrelation_time));
-  const double least = least_of(raw_variances(extended.left_out));
-  const Spread before = estimate_spread(base.left_out, tau, least);
-  const Spread after = estimate_spread(extended.left_out, tau, least);
-  double ratio = 0.0;
-  for (std::size_t i = 0; i < after.deviance.size(); ++i) ratio += before.deviance[i] - after.deviance[i];
+  std::vector<double> after;
+  for (const LeftOut& r : extended.left_out) after.push_back(r.squares / std::max(1.0, r.rows));
+  const double least = std::max(least_of(after), 1e-300);
+  double ratio = 0.0, chi2_before = 0.0, chi2_after = 0.0;
+  const auto noise = [&](const LeftOut& r) { return std::max(r.squares / std::max(1.0, r.rows), least); };
+  // Minus twice the log likelihood: what the rows leave, and what the records' deviations cost.
+  const auto deviance = [&](const Judged& judged, std::size_t i, double& chi2) {
+    const LeftOut& r = judged.left_out[i];
+    Cost cost;
+    if (i < judged.sums.size()) cost = cost_of_deviations(judged.sums[i], judged.deviations.std, noise(r) * tau);
+    chi2 += r.squares / noise(extended.left_out[i]) + tau * cost.squares;
+    return r.rows / tau * std::log(noise(r)) + cost.squares + cost.log_det;
+  };
+  for (std::size_t i = 0; i < after.size(); ++i)
+    ratio += deviance(base, i, chi2_before) - deviance(extended, i, chi2_after);
   const double effective = rows_of(base.left_out) / tau;
-  const double chi2_before = chi_square(base.left_out, after, tau),
-               chi2_after = chi_square(extended.left_out, after, tau);
   Fall fall;
   fall.score = ratio - added * std::log(std::max(2.0, effective));
   fall.chi2_percent = chi2_before > 0.0 ? 100.0 * (1.0 - chi2_after / chi2_before) : 0.0;

@@ -16,6 +16,13 @@ using regression::RowRange;
 using regression::Slot;
 using regression::Terms;
 
+// A record's rows, each predicted from others: parameters from all records without its part, the record's own deviation
+// from its other parts.
+struct LeftOut {
+  double rows = 0.0;
+  double squares = 0.0;
+};
+
 // A model on one balance, fitted with weights by record and judged by cross-validation. Its shapes are free to first
 // order, and so is a delay of the effort.
 struct Judged {
@@ -27,11 +34,12 @@ struct Judged {
   Eigen::VectorXd residual;      // in-sample, less the records' deviations
   Eigen::VectorXd root_weights;  // nought where a disturbance is left out
   double autocorrelation_time = 1.0;
-  std::vector<Group> groups;         // friction that differs from record to record
-  Spread deviations;                 // in-sample
-  std::vector<RecordSums> left_out;  // of each record, over rows that were left out of the fit
+  std::vector<Group> groups;      // friction that differs from record to record
+  Spread deviations;              // in-sample
+  std::vector<RecordSums> sums;   // of each record, in-sample, deviations in
+  std::vector<LeftOut> left_out;  // of each record
   double rmse() const;
-  double rmse_cv() const;  // the records' deviations taken off as the left-out rows have them
+  double rmse_cv() const;
 };
 
 // Fits and judges `terms` on `data`. `keep` holds one a row, or nought for rows that must not count.

@@ -113,7 +113,7 @@ std::vector<Drift> drifts(const Judged& judged) {
   std::vector<Drift> list;
   const double tau = judged.autocorrelation_time;
   const auto deviance = [&](const SmallVector& std) {
-    const Spread spread = with_spread(judged.left_out, std, tau, 0.0);
+    const Spread spread = with_spread(judged.sums, std, tau, 0.0);
     return std::accumulate(spread.deviance.begin(), spread.deviance.end(), 0.0);
   };
   for (std::size_t g = 0; g < judged.groups.size(); ++g) {

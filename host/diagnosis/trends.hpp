@@ -29,7 +29,7 @@ struct Drift {
   double percent = 0.0;
 };
 
-// Spreads that the left-out rows of a judged model bear witness to, from 1 % on.
+// Spreads that the errors of a judged model bear witness to, from 1 % on.
 std::vector<Drift> drifts(const Judged& judged);
 
 }  // namespace flexspline::diagnosis

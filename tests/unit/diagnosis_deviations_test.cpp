@@ -82,12 +82,11 @@ TEST(WithoutDeviations, LeavesTheFitOfGeneralisedLeastSquaresWithTheDenseCovaria
   EXPECT_NEAR((all.col(4) - all.leftCols(4) * ours).squaredNorm(), chi2, 1e-8 * chi2);
 }
 
-TEST(WithSpread, HasTheLikelihoodAndTheChiSquareOfTheDenseCovariance) {
+TEST(WithSpread, HasTheLikelihoodOfTheDenseCovariance) {
   const Bench bench(2, 4, 60, 0.1, 0.05);
   const SmallVector std = (SmallVector(2) << 0.1, 0.05).finished();
   const std::vector<RecordSums> sums = bench.sums(bench.theta);
   const Spread spread = with_spread(sums, std, 1.0, 0.0);
-  double chi2 = 0.0;
   for (std::size_t i = 0; i < bench.X.size(); ++i) {
     const VectorXd e = bench.y[i] - bench.X[i] * bench.theta;
     const MatrixXd V = bench.covariance(i, std, spread.variance[i]);
@@ -96,9 +95,7 @@ TEST(WithSpread, HasTheLikelihoodAndTheChiSquareOfTheDenseCovariance) {
     const double log_det = 2.0 * llt.matrixLLT().diagonal().array().log().sum();
     // Noise at its own best value leaves as many squares as rows.
     EXPECT_NEAR(spread.deviance[i] + sums[i].rows, log_det + one, 1e-3 * sums[i].rows) << i;
-    chi2 += one;
   }
-  EXPECT_NEAR(chi_square(sums, spread, 1.0), chi2, 1e-9 * chi2);
 }
 
 TEST(EstimateSpread, FindsTheSpreadsTheDeviationsAndTheNoiseThatWereDrawn) {

@@ -159,7 +159,8 @@ TEST(Proposals, CountTheParametersThatTheyAdd) {
   const regression::Prepared prepared = regression::prepare({&e}, {}, kOptions);
   const regression::BalanceData data(prepared, regression::Balance::motor);
   std::map<std::string_view, double> added;
-  for (const Proposal& p : proposals(data, regression::terms_of(model_of(kPlain)), data.target())) added[p.entry->name()] = p.added;
+  for (const Proposal& p : proposals(data, regression::terms_of(model_of(kPlain)), data.target()))
+    added[p.entry->name()] = p.added;
   EXPECT_EQ(added.at("viscous_asymmetry"), 1.0);
   EXPECT_EQ(added.at("stribeck_gaussian"), 3.0);
   EXPECT_EQ(added.at("torque_ripple"), 2.0) << "its order is given";

@@ -95,7 +95,7 @@ struct Bench {
 // A judgement of records with these squares of left-out rows.
 Judged judged(std::vector<double> squares, std::vector<double> rows, double tau) {
   Judged j;
-  for (std::size_t i = 0; i < rows.size(); ++i) j.left_out.push_back({rows[i], squares[i], {}, {}});
+  for (std::size_t i = 0; i < rows.size(); ++i) j.left_out.push_back({rows[i], squares[i]});
   j.autocorrelation_time = tau;
   return j;
 }
