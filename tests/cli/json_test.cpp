@@ -70,7 +70,7 @@ TEST(Json, DiagnoseNamesWhatIsHidden) {
   const nlohmann::json found = shell.json("flexspline diagnose --model demo-out/base-model.toml demo-out");
   EXPECT_EQ(found["format"], "flexspline-diagnose/1");
   expect_fields(found, {"verdict", "named", "balance", "base", "localised", "candidates", "parameter_trends",
-                        "remaining_structure", "disturbances", "rounds"});
+                        "friction_drift", "recovered_percent", "remaining_structure", "disturbances", "rounds"});
   expect_fields(found["base"], {"rmse", "rmse_cv", "noise_floor", "noise_floor_from"});
   EXPECT_EQ(found["verdict"], "missing_effect");
   ASSERT_EQ(found["named"].size(), 1u);

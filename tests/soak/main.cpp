@@ -21,7 +21,7 @@ using namespace flexspline::soak;
 using Clock = std::chrono::steady_clock;
 
 // Fewer sets than that have no tail to speak of.
-constexpr std::size_t kFewestNulls = 100;
+constexpr std::size_t kFewestNulls = 60;
 
 // Runs rounds until time is up or there are none; a drive that was begun is finished.
 void run_until(Clock::time_point end, const std::function<std::vector<Case>(std::uint64_t)>& round_of,
