@@ -180,7 +180,9 @@ int run(const DemoOptions& options, Console& console) {
     const auto& info = *catalogue::get(found.named.front().effect).info;
     console.line(console.bold(fmt::format("  Missing: {}", output::listed(names, "or"))));
     console.line(output::wrapped(info.explanation));
+    console.line(output::wrapped(fmt::format("What it does: {}", info.consequence)));
     console.line(output::wrapped(fmt::format("Usual causes: {}", info.causes)));
+    console.line(output::wrapped(fmt::format("Check on the machine: {}", info.check)));
     console.line();
 
     console.line(console.bold("4. Add it, and judge on motions that the fit never saw"));

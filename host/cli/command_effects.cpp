@@ -69,7 +69,9 @@ json entry_json(const Entry& entry) {
           {"shows_over", entry.info->shows_over},
           {"source", entry.info->source},
           {"explanation", entry.info->explanation},
+          {"consequence", entry.info->consequence},
           {"causes", entry.info->causes},
+          {"check", entry.info->check},
           {"separated_by", entry.info->separated_by},
           {"rivals", std::move(rivals)},
           {"curve", output::curve_json(output::effect_curve(entry))}};
@@ -107,7 +109,9 @@ void describe(const Entry& entry, Console& console) {
     if (!text.empty()) console.line(output::wrapped(fmt::format("{}: {}", what, text)));
   };
   say("Shows over", info.shows_over);
-  say("Usual causes, and what to check", info.causes);
+  say("What it does", info.consequence);
+  say("Usual causes", info.causes);
+  say("Check on the machine", info.check);
   say("Confused with", comma_separated(info.rivals));
   say("Told apart by", info.separated_by);
   say("Stands in for", comma_separated(info.replaces));

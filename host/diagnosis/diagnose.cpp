@@ -8,6 +8,7 @@
 #include "host/diagnosis/detectable.hpp"
 #include "host/diagnosis/diagnosis.hpp"
 #include "host/diagnosis/disturbances.hpp"
+#include "host/diagnosis/doubts.hpp"
 #include "host/diagnosis/rivals.hpp"
 #include "host/diagnosis/trials.hpp"
 #include "host/regression/shapes.hpp"
@@ -120,6 +121,9 @@ std::vector<Examined> examine(regression::Identification& base, const std::vecto
     one.search.base = one.search.keep.minCoeff() < 1.0 ? judge(data, base.terms, one.search.keep) : std::move(whole);
     settle_shapes(one.search);
     one.trials = rank(one.search);
+    doubt_orders(one.search, one.trials);
+    if (std::string warning = one_way_warning(data); data.balance() == regression::Balance::motor && !warning.empty())
+      result.warnings.push_back(std::move(warning));
     one.floor = comparison::pooled(comparison::noise_floors(data, one.search.base.terms, experiments, base.model.drive),
                                    data.records());
     all.push_back(std::move(one));

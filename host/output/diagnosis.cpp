@@ -8,6 +8,7 @@
 #include <span>
 
 #include "host/catalogue/catalogue.hpp"
+#include "host/output/explanation.hpp"
 #include "host/output/identification.hpp"
 #include "host/output/json.hpp"
 #include "host/output/text.hpp"
@@ -44,13 +45,14 @@ std::string shares(const std::vector<diagnosis::Localised>& parts) {
 }
 
 std::string candidate_table(const Diagnosis& d) {
-  Table table({"", "candidate", "balance", "score", "explains", "error before", "after", "", ""}, "rllrrrrll");
+  Table table({"", "candidate", "balance", "score", "explains", "error before", "after", "", "would show from", ""},
+              "rllrrrrlll");
   std::size_t rank = 0;
   for (const Candidate& c : d.candidates) {
     if (++rank > kRowsShown) break;
     table.row({fmt::format("{}", rank), effect_label(c.effect, c.order), balance_name(c.balance), number(c.score),
                fmt::format("{:.1f} %", c.chi2_fall_percent), number(c.rmse_cv_before), number(c.rmse_cv_after), d.unit,
-               c.admissible ? "" : "refused: " + c.why_not});
+               detectable_in_words(c), c.admissible ? "" : "refused: " + c.why_not});
   }
   return table.text();
 }
@@ -66,25 +68,6 @@ std::string replaced(std::string text, std::string_view what, const std::string&
   return at == std::string::npos ? text : text.replace(at, what.size(), by);
 }
 
-void print_named(Console& console, const Diagnosis& d, const diagnosis::Named& named) {
-  const catalogue::Entry* entry = catalogue::find(named.effect);
-  if (entry == nullptr) return;
-  console.line();
-  console.line(console.bold(effect_in_words(named.effect, named.order)));
-  console.line(wrapped(entry->info->explanation));
-  if (!entry->info->causes.empty()) console.line(wrapped(fmt::format("Causes: {}", entry->info->causes)));
-  const Candidate* candidate = candidate_of(d, named);
-  if (candidate == nullptr) return;
-  for (const regression::Estimate& e : candidate->parameters)
-    console.line(
-        fmt::format("  {} = {}{}", e.parameter, with_unit(e.value, e.unit),
-                    e.low && e.high ? fmt::format("   (95 %: {} to {})", number(*e.low), number(*e.high)) : ""));
-  if (!candidate->note.empty()) console.line(wrapped(candidate->note));
-  if (!candidate->rivals.empty() && !entry->info->separated_by.empty())
-    console.line(wrapped(fmt::format("Not to be told from {} here: record {} to separate them.",
-                                     listed(candidate->rivals, "or"), entry->info->separated_by)));
-}
-
 void print_next(Console& console, const Diagnosis& d, const std::string& add_command) {
   std::vector<std::string> steps;
   switch (d.verdict) {
@@ -93,6 +76,10 @@ void print_next(Console& console, const Diagnosis& d, const std::string& add_com
       for (const diagnosis::Named& n : d.named)
         if (const Candidate* c = candidate_of(d, n); c == nullptr || c->admissible)
           steps.push_back(replaced(add_command, "EFFECT", effect_label(n.effect, n.order)));
+      if (d.named.size() > 1)
+        steps.push_back(fmt::format(
+            "flexspline plan --separate {},{} --help   shows how to record what tells them apart",
+            effect_label(d.named[0].effect, d.named[0].order), effect_label(d.named[1].effect, d.named[1].order)));
       break;
     case Verdict::unknown_structure:
       steps.push_back("flexspline compare shows in which region the error stands; look at the drive there");
@@ -159,13 +146,18 @@ json candidate_json(const Candidate& c, std::size_t rank, const std::string& uni
           {"unit", unit},
           {"p_value", json_number(c.p_value)},
           {"parameters", std::move(parameters)},
-          {"minimum_detectable", nullptr},
+          {"minimum_detectable", detectable_json(c)},
           {"admissible", c.admissible},
           {"why_not", c.admissible ? json(nullptr) : json(c.why_not)},
           {"note", c.note.empty() ? json(nullptr) : json(c.note)},
           {"rivals", c.rivals},
+          {"rival_reasons", rival_reasons_json(c)},
+          {"evidence", evidence_json(c, unit)},
           {"separating_experiment", text(&effects::Description::separated_by)},
-          {"explanation", text(&effects::Description::explanation)}};
+          {"explanation", text(&effects::Description::explanation)},
+          {"consequence", text(&effects::Description::consequence)},
+          {"causes", text(&effects::Description::causes)},
+          {"check", text(&effects::Description::check)}};
 }
 
 }  // namespace
@@ -208,7 +200,8 @@ void print_diagnosis(Console& console, const Diagnosis& d, const std::string& ad
         wrapped(fmt::format("The effort {} the motion by {:.3g} ms beyond the alignment: check the time stamps, or "
                             "current_hold.",
                             *d.delay_s > 0.0 ? "lags" : "leads", 1e3 * std::abs(*d.delay_s))));
-  for (const diagnosis::Named& named : d.named) print_named(console, d, named);
+  for (const diagnosis::Named& named : d.named)
+    if (const Candidate* c = candidate_of(d, named)) print_explanation(console, *c, d.unit);
   if (!d.candidates.empty()) {
     console.line();
     console.line(candidate_table(d));

@@ -24,9 +24,14 @@ double steps_of(double position, double counts) {
   return std::floor(position / step + 0.5) * step;
 }
 
-double sensor_offset(const model::Model& model) {
-  const model::Effect* offset = model.find("current_offset");
-  return offset && !offset->parameters.empty() ? offset->parameters.front().value.value_or(0.0) : 0.0;
+// What a current sensor reads without current: the effort that stands at rest where nothing moves or pushes.
+double reading_at_rest(const simulation::Balances& balances, double temperature, double torque_constant) {
+  simulation::Inputs rest{};
+  rest.viscous_scale = rest.coulomb_scale = 1.0;
+  rest.temperature = temperature;
+  simulation::Torques sums{};
+  balances.add_motor(rest, rest, sums);
+  return sums.motor / torque_constant;
 }
 
 }  // namespace
@@ -51,8 +56,8 @@ Rehearsal rehearse(const model::Model& model, const Run& run, double sample_s, c
   if (sensors.output_counts > 0.0) e.output_encoder_counts = sensors.output_counts;
 
   simulation::Dynamics dynamics(simulation::Balances(model, constants), constants, coupling);
-  const double offset = sensor_offset(model);
   const double temperature = run.temperature_c.value_or(constants.reference_temperature);
+  const double offset = reading_at_rest(balances, temperature, constants.torque_constant);
   // Gains of a loop on an inertia: proportional for its bandwidth, integral a quarter of that lower.
   const double bandwidth = 2.0 * std::numbers::pi * kBandwidth / sample_s;
   const double proportional = bandwidth * inertia / constants.torque_constant;

@@ -36,13 +36,12 @@ json comparison_json(const comparison::Comparison& comparison) {
   return answer;
 }
 
-// Causes of each candidate, for the page alone.
+// Equations of the candidates, for the page alone.
 json diagnosis_json(const diagnosis::Diagnosis& found) {
   json answer = output::diagnosis_json(found);
   answer["verdict_in_words"] = output::verdict_in_words(found);
   for (json& candidate : answer["candidates"]) {
     const catalogue::Entry* entry = catalogue::find(candidate["effect"].get<std::string>());
-    candidate["causes"] = entry ? json(entry->info->causes) : json(nullptr);
     candidate["equation"] = entry ? json(entry->info->equation) : json(nullptr);
   }
   return answer;

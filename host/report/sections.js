@@ -377,9 +377,13 @@ function candidateCard(c, round) {
     `${withUnit(c.rmse_cv_before, c.unit)} to ${withUnit(c.rmse_cv_after, c.unit)}; it explains ${number(c.chi2_fall_percent, 3)} % of what the model leaves. ` +
     `The score is ${number(c.score, 3)} (20 would do): ${scoreInWords(c)}.`));
   if (c.note) card.append(el("p", {}, c.note));
+  if (c.evidence && c.evidence.bins.length) card.append(evidenceTable(c.evidence));
+  if (c.consequence) card.append(el("p", {}, el("strong", {}, "What it does: "), c.consequence));
   if (c.causes) card.append(el("p", {}, el("strong", {}, "Usual causes: "), c.causes));
+  if (c.check) card.append(el("p", {}, el("strong", {}, "Check on the machine: "), c.check));
   if (c.rivals.length) {
-    card.append(el("p", {}, el("strong", {}, "Not to be told from: "), listed(c.rivals, "or"), " in these data."));
+    card.append(el("p", {}, el("strong", {}, "Not to be told from: "), listed(c.rivals, "or"), " in these data. ",
+      c.rival_reasons.map((r) => `Beside ${r.effect}, only ${number(r.own_percent, 2)} % of what it does is its own${r.variable ? `; both go with ${variableName(r.variable)}` : ""}.`).join(" ")));
     if (c.separating_experiment) card.append(el("p", {}, el("strong", {}, "What would tell them apart: "), c.separating_experiment, "."));
   }
   if (c.parameters.length)
@@ -387,15 +391,27 @@ function candidateCard(c, round) {
       c.parameters.map((p) => [p.parameter, { n: number(p.value) }, { n: interval(p) }, unitText(p.unit)])));
   return card;
 }
+// What the model lacks over the variable in which the effect shows most.
+function evidenceTable(map) {
+  const what = map.resisting ? "lacks (positive resists the motion)" : "lacks";
+  return table(`Where it shows in these data, over ${variableName(map.variable)}`,
+    [{ n: unitText(map.variable_unit) || "from" }, { n: "to" }, { n: `the model ${what}` }, { n: "the effect makes" }, "unit"],
+    map.bins.map((b) => [{ n: number(b.low, 3) }, { n: number(b.high, 3) }, { n: number(b.lacking, 3) }, { n: number(b.effect, 3) }, unitText(map.unit)]));
+}
+// The smallest size that would have been named.
+function leastShown(c) {
+  const m = c.minimum_detectable;
+  return m ? `${m.at_most ? "below " : ""}${m.parameter} ${withUnit(Number(m.value.toPrecision(2)), m.unit)}` : "–";
+}
 function interval(p) { return p.interval[0] === null ? "–" : `${number(p.interval[0])} to ${number(p.interval[1])}`; }
 
 // `named`: those of the verdict; the others are told by how far they are behind.
 function candidateTable(list, named, caption) {
   const isNamed = (c) => named.some((n) => n.effect === c.effect && n.order === c.order);
   const verdict = (c) => (!c.admissible ? "refused: " + c.why_not : named.length && !isNamed(c) && c.score >= 20 ? "helps, but explains less than the best" : scoreInWords(c));
-  return table(caption, ["candidate", "balance", { n: "score" }, { n: "explains" }, { n: "error before" }, { n: "after" }, "unit", "evidence"],
+  return table(caption, ["candidate", "balance", { n: "score" }, { n: "explains" }, { n: "error before" }, { n: "after" }, "unit", "would show from", "evidence"],
     list.map((c) => [effectName(c), c.balance, { n: number(c.score, 3) }, { n: number(c.chi2_fall_percent, 3) + " %" }, { n: number(c.rmse_cv_before, 3) }, { n: number(c.rmse_cv_after, 3) }, unitText(c.unit),
-      verdict(c)]));
+      leastShown(c), verdict(c)]));
 }
 
 function fillRound(s, round) {

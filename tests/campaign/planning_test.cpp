@@ -132,15 +132,6 @@ plant::ExperimentPlan locked(plant::Waveform waveform, double amplitude, double 
   e.locked = true;
   return e;
 }
-// A load that is lifted and never let down.
-plant::ExperimentPlan lift(double torque_nm) {
-  plant::ExperimentPlan e =
-      motion(fmt::format("lift-{:g}", torque_nm), plant::Mode::velocity, plant::Waveform::sine, 30.0, 0.5);
-  e.offset = 40.0;
-  e.load_torque_nm = torque_nm;
-  return e;
-}
-
 using plant::Waveform;
 const std::vector<Pair> kPairs = {
     {"stribeck_gaussian",
@@ -150,9 +141,9 @@ const std::vector<Pair> kPairs = {
      {velocity(Waveform::sine, 100.0, 1.0, 30.0), locked(Waveform::square, 2.0, 0.25)}},
     {"load_dependent_friction",
      "torque_constant_saturation",
-     0.15,
-     0.05,
-     {velocity(Waveform::sine, 60.0, 1.0, 30.0), lift(2.0), lift(4.0)}},
+     0.08,
+     0.04,
+     {velocity(Waveform::sine, 60.0, 1.0, 30.0), locked(Waveform::sine, 3.0, 0.5)}},
     {"temperature_viscous",
      "temperature_coulomb",
      0.2,
@@ -161,8 +152,8 @@ const std::vector<Pair> kPairs = {
       velocity(Waveform::sine, 80.0, 1.0, 30.0)}},
     {"dahl_hysteresis",
      "structural_damping",
-     0.08,
-     0.5,
+     0.15,
+     0.3,
      {velocity(Waveform::sine, 60.0, 1.0, 30.0), locked(Waveform::sine, 3.0, 0.5)}},
     {"backlash",
      "cubic_stiffness",
@@ -176,8 +167,8 @@ const std::vector<Pair> kPairs = {
      {velocity(Waveform::sine, 60.0, 1.0, 30.0), velocity(Waveform::sine, 100.0, 0.5, 30.0)}},
     {"cubic_stiffness",
      "quadratic_stiffness",
-     0.025,
-     0.012,
+     0.03,
+     0.02,
      {velocity(Waveform::sine, 60.0, 1.0, 30.0), locked(Waveform::sine, 3.0, 0.5)},
      false},
 };
