@@ -17,6 +17,8 @@ constexpr double kEnough = 10.0 * kTold;
 constexpr double kWorthwhile = 1.2;
 // Parameters are known well enough then.
 constexpr double kPrecisePercent = 1.0;
+// What a unit of trouble costs, in seconds of recording.
+constexpr double kTrouble_s = 15.0;
 
 // Factors of one balance: of what was recorded, and of each motion.
 struct Factors {
@@ -260,13 +262,16 @@ Design excite(const Question& question) {
   while (chosen.size() < question.most_motions && !precise()) {
     const double now = log_determinant(information);
     std::optional<std::size_t> best;
-    double most = 1.0;  // a factor e in the volume of what is possible
+    double most = 0.0;
     for (const std::size_t m : open_motions(bench, chosen, question)) {
       std::vector<std::size_t> more = chosen;
       more.push_back(m);
-      const double gain = log_determinant(parameters.information(all, more)) - now - bench.motions()[m].trouble;
-      if (gain > most) {
-        most = gain;
+      const double gain = log_determinant(parameters.information(all, more)) - now;
+      // A factor e in the volume of what is possible is the least that counts; then it is what the time brings.
+      const Motion& motion = bench.motions()[m];
+      const double merit = gain > 1.0 ? gain / (duration(motion) + kTrouble_s * motion.trouble) : 0.0;
+      if (merit > most) {
+        most = merit;
         best = m;
       }
     }

@@ -1,0 +1,187 @@
+// Plans: their file, their set points against the plant's own reading of them, and what is chosen for effects whose
+// separation is known.
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <cmath>
+#include <filesystem>
+#include <fstream>
+
+#include "hil/plant/excitation.hpp"
+#include "host/catalogue/constants.hpp"
+#include "host/planning/design.hpp"
+
+namespace flexspline::planning {
+namespace {
+
+Plan a_plan() {
+  Plan plan;
+  plan.model = "some drive";
+  plan.separate = {"gravity", "linear_stiffness"};
+  plan.limits = {2.0, 180.0, 6.28, 60.0, 5.0};
+  planning::Run run;
+  run.name = "first";
+  run.waveform = Waveform::multi_sine;
+  run.amplitude = 12.5;
+  run.offset = -3.0;
+  run.frequency_hz = 0.5;
+  run.lines = {{1, 0.25, 1.0}, {3, 0.6123, 0.5}, {7, 0.0, 2.0}};
+  run.duration_s = 3.0;
+  run.temperature_c = 41.0;
+  plan.runs.push_back(run);
+  run = {};
+  run.name = "second";
+  run.mode = Mode::current;
+  run.amplitude = 1.5;
+  run.frequency_hz = 0.2;
+  run.end_frequency_hz = 7.0;
+  run.slope_limit = 40.0;
+  run.locked = true;
+  run.load_torque_nm = -2.0;
+  run.instructions = "Lock the output.";
+  plan.runs.push_back(run);
+  return plan;
+}
+
+TEST(Plan, ReadsBackAsItWasWritten) {
+  const Plan plan = a_plan();
+  const Plan read = parse(text_of(plan), "plan.toml");
+  EXPECT_EQ(text_of(read), text_of(plan));
+  ASSERT_EQ(read.runs.size(), 2u);
+  EXPECT_EQ(read.runs[0].waveform, Waveform::multi_sine);
+  ASSERT_EQ(read.runs[0].lines.size(), 3u);
+  EXPECT_DOUBLE_EQ(read.runs[0].lines[1].phase_turns, 0.6123);
+  EXPECT_EQ(read.runs[1].mode, Mode::current);
+  EXPECT_TRUE(read.runs[1].locked);
+  EXPECT_DOUBLE_EQ(*read.runs[1].end_frequency_hz, 7.0);
+  EXPECT_EQ(read.separate, plan.separate);
+}
+
+TEST(Plan, SaysWhereAFileIsWrong) {
+  const auto error_of = [](const std::string& text) -> std::string {
+    try {
+      parse(text, "plan.toml");
+    } catch (const PlanError& error) {
+      return error.what();
+    }
+    return "";
+  };
+  const std::string head = "format = \"flexspline-plan/1\"\n[[run]]\nname = \"a\"\n";
+  EXPECT_NE(error_of(head + "waveform = \"sinus\"\n").find("plan.toml:4: [[run]]: waveform = \"sinus\" is unknown"),
+            std::string::npos);
+  EXPECT_NE(error_of(head + "amplitud = 3.0\n").find("unknown key \"amplitud\""), std::string::npos);
+  EXPECT_NE(error_of(head + "waveform = \"multi_sine\"\n").find("needs lines"), std::string::npos);
+  EXPECT_NE(error_of("format = \"flexspline-plan/2\"\n").find("format must be"), std::string::npos);
+  EXPECT_NE(error_of(head + "duration_s = -1.0\n").find("duration_s"), std::string::npos);
+}
+
+// The plant reads plans and makes their waveforms by itself.
+TEST(Plan, SetPointsAreThoseOfThePlant) {
+  Plan plan = a_plan();
+  for (const Waveform waveform :
+       {Waveform::sine, Waveform::inverted_sine, Waveform::composite, Waveform::asymmetric_sine, Waveform::square,
+        Waveform::saw_tooth, Waveform::triangle, Waveform::zero}) {
+    planning::Run run;
+    run.name = name_of(waveform);
+    run.waveform = waveform;
+    run.amplitude = 40.0;
+    run.offset = 5.0;
+    run.frequency_hz = 0.7;
+    run.duration_s = 4.0;
+    if (waveform == Waveform::square) run.slope_limit = 2000.0;
+    plan.runs.push_back(run);
+  }
+  const auto file = std::filesystem::temp_directory_path() / "flexspline-planning-test.toml";
+  std::ofstream(file) << text_of(plan);
+  plant::Drive drive = plant::demo_plant().drive;
+  const auto runs = plant::load_plan(file, drive);
+  std::filesystem::remove(file);
+  ASSERT_EQ(runs.size(), plan.runs.size());
+  EXPECT_DOUBLE_EQ(drive.current_limit_a, 2.0);
+  for (std::size_t i = 0; i < runs.size(); ++i) {
+    const std::vector<double> ours = set_points(plan.runs[i], plan.sample_s), theirs = plant::commands(runs[i], 1e-3);
+    ASSERT_EQ(ours.size(), theirs.size());
+    // A sample on an edge may fall to either side of it.
+    const bool jumps = plan.runs[i].waveform == Waveform::saw_tooth || plan.runs[i].waveform == Waveform::square;
+    std::size_t far = 0;
+    for (std::size_t k = 0; k < ours.size(); ++k)
+      far += std::abs(ours[k] - theirs[k]) > 2e-5 * (plan.runs[i].amplitude + std::abs(plan.runs[i].offset));
+    EXPECT_LE(far, jumps ? ours.size() / 50 : 0u) << plan.runs[i].name;
+    EXPECT_GT(*std::max_element(ours.begin(), ours.end()), 0.0);
+  }
+}
+
+model::Model a_drive() {
+  model::Model m;
+  m.name = "drive";
+  m.drive.gear_ratio.value = 100.0;
+  m.drive.torque_constant_nm_a.value = 0.0543;
+  m.drive.rated_current_a.value = 3.0;
+  m.drive.rated_velocity_rad_s.value = 150.0;
+  m.drive.rated_torque_nm.value = 40.0;
+  for (const char* type : {"inertia", "viscous_friction", "coulomb_friction", "linear_stiffness", "structural_damping",
+                           "output_inertia", "output_coulomb_friction"}) {
+    const catalogue::Entry& entry = catalogue::get(type);
+    model::Effect effect = catalogue::blank_effect(entry, data::Axis::rotary);
+    for (std::size_t p = 0; p < effect.parameters.size(); ++p) effect.parameters[p].value = entry.parameters[p].usual;
+    m.effects.push_back(std::move(effect));
+  }
+  return m;
+}
+
+Question question_of(const model::Model& model) {
+  Question q;
+  q.model = &model;
+  q.setting = setting_of(model, nullptr);
+  q.setting.run_s = 4.0;
+  q.setting.temperature = false;
+  return q;
+}
+
+TEST(Planning, AnOffsetOfTheSensorIsToldFromAsymmetryWithTheDriveOff) {
+  const model::Model m = a_drive();
+  const Question q = question_of(m);
+  const Design d = separate(q, "current_offset", "coulomb_asymmetry");
+  EXPECT_TRUE(
+      std::any_of(d.plan.runs.begin(), d.plan.runs.end(), [](const planning::Run& r) { return r.mode == Mode::off; }));
+  EXPECT_GT(d.after->worst(), kTold);
+  ASSERT_EQ(d.peaks.size(), d.plan.runs.size());
+  for (const Design::Peak& peak : d.peaks) {
+    EXPECT_LE(peak.current_a, q.setting.limits.current_a);
+    EXPECT_LE(peak.velocity_rad_s, 1.02 * q.setting.limits.velocity_rad_s);
+    EXPECT_LE(peak.travel_rad, 1.02 * q.setting.limits.travel_rad);
+  }
+}
+
+TEST(Planning, WithoutTheDriveOffTheSameTwoAreOneClass) {
+  const model::Model m = a_drive();
+  Question q = question_of(m);
+  q.setting.off = q.setting.locked = q.setting.external_load = false;
+  const Design d = separate(q, "current_offset", "coulomb_asymmetry");
+  EXPECT_LT(d.after->worst(), kTold);
+  EXPECT_TRUE(d.plan.runs.empty());
+  ASSERT_FALSE(d.plan.notes.empty());
+  EXPECT_NE(d.plan.notes.front().find("No motion within these limits"), std::string::npos);
+}
+
+TEST(Planning, StiffnessIsUnknownUntilTheOutputIsLocked) {
+  const model::Model m = a_drive();
+  const Design d = excite(question_of(m));
+  EXPECT_TRUE(std::any_of(d.plan.runs.begin(), d.plan.runs.end(), [](const planning::Run& r) { return r.locked; }));
+  for (const Precision& p : d.parameters) {
+    ASSERT_TRUE(p.percent_after.has_value()) << p.id;
+    EXPECT_LT(*p.percent_after, 20.0) << p.id;
+  }
+}
+
+TEST(Planning, LimitsThatNoMotionKeepsAreSaid) {
+  const model::Model m = a_drive();
+  Question q = question_of(m);
+  q.setting.limits.travel_rad = 1e-9;
+  q.setting.limits.velocity_rad_s = 1e-6;
+  q.setting.off = q.setting.locked = q.setting.external_load = false;
+  EXPECT_THROW(separate(q, "gravity", "torque_bias"), std::exception);
+}
+
+}  // namespace
+}  // namespace flexspline::planning
