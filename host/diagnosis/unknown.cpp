@@ -21,8 +21,9 @@ using regression::TableQuestion;
 // catalogue; both limits were set on drives that lack nothing.
 constexpr double kCurveScore = 60.0;
 constexpr double kCurveFallPercent = 3.0;
-// METHOD of the project: what is named must recover this share, or something else is there.
-constexpr double kRecovered = 0.8;
+// What is named must recover this share, or something else is there: substitutes for unknown laws stay below, effects
+// of the catalogue that are the nearest to one above.
+constexpr double kRecovered = 0.9;
 constexpr std::size_t kScreenedPoints = 24;
 constexpr std::size_t kLearned = 3;  // signals whose curves are learnt in full
 // A simpler curve is taken where it predicts as well.
@@ -58,14 +59,29 @@ bool measured(const BalanceData& data, const effects::VariableInfo& v) {
   return v.variable != Variable::output_angle || p.rotary;
 }
 
+// The current is what the motor balance measures, the torque what the others do: a curve over them explains itself. The
+// motion of one side goes along with that of the other, so that each balance has its own.
+bool belongs(Balance balance, const effects::VariableInfo& v) {
+  if (v.variable == Variable::temperature || v.variable == Variable::motor_angle ||
+      v.variable == Variable::output_angle)
+    return true;
+  switch (balance) {
+    case Balance::motor:
+      return v.variable != Variable::current && (v.reads & effects::kOutputMotion) == 0;
+    case Balance::transmission:
+      return (v.reads & (effects::kTorsion | effects::kCurrent)) != 0;
+    case Balance::load:
+      return (v.reads & effects::kOutputMotion) != 0;
+  }
+  return false;
+}
+
 // Signals that a curve may run over on this balance: measured, varying, and not the left side itself.
 std::vector<TableQuestion> questions(BalanceData& data, const Terms& model) {
   std::vector<TableQuestion> list;
   for (const effects::VariableInfo& v : effects::kVariables) {
     if (!measured(data, v)) continue;
-    // The current is what the motor balance measures, the torque what the others do: a curve over them explains itself.
-    if (data.balance() == Balance::motor && v.variable == Variable::current) continue;
-    if (data.balance() != Balance::motor && (v.reads & effects::kTorque)) continue;
+    if (!belongs(data.balance(), v)) continue;
     const Eigen::VectorXd signal = data.signal_at_rows(model, v.variable);
     const regression::Covered range = regression::covered_range(signal);
     const double span = range.high - range.low;
@@ -138,7 +154,7 @@ std::optional<UnknownStructure> find_unknown(Search& search, const Terms& model)
   std::sort(learned.begin(), learned.end(), more);
   const Screened* best = &learned.front();
   for (const Screened& s : learned)
-    if (s.curve.fall_percent > (1.0 - kAsWell) * learned.front().curve.fall_percent &&
+    if (100.0 - s.curve.fall_percent < (1.0 + kAsWell) * (100.0 - learned.front().curve.fall_percent) &&
         s.curve.effective < best->curve.effective)
       best = &s;
   if (!tells(best->curve)) return std::nullopt;
@@ -154,28 +170,48 @@ std::optional<UnknownStructure> find_unknown(Search& search, const Terms& model)
   return unknown;
 }
 
+namespace {
+
+// The model with the curve in it, judged as candidates are.
+Judged with_curve(Search& search, const UnknownStructure& unknown) {
+  model::Effect effect;
+  effect.type = std::string(catalogue::kTableEffect);
+  effect.id = "unknown";
+  effect.definition = unknown.definition;
+  Terms terms = search.base.terms;
+  terms.push_back(regression::term_of(effect));
+  return judge(*search.data, std::move(terms), search.keep);
+}
+
+// What the named effects explain of what the curve explains, by the squares of left-out rows; one where the curve does
+// not explain more for certain.
+double share_of(const Judged& base, const Judged& named, const Judged& curve, double more_numbers) {
+  const Fall of_named = fall_of(named, curve, std::max(0.0, more_numbers));
+  if (of_named.score < kCurveScore) return 1.0;
+  // In units of the base's squares.
+  const double with_curve = 1.0 - fall_of(base, curve, 0.0).chi2_percent / 100.0;
+  const double with_named = with_curve / std::max(1.0 - of_named.chi2_percent / 100.0, 1e-12);
+  return with_curve < 1.0 ? (1.0 - with_named) / (1.0 - with_curve) : 1.0;
+}
+
+}  // namespace
+
 void tell_unknown(Search& search, const Trial* named, Diagnosis& result) {
-  auto unknown = find_unknown(search, named ? named->judged.terms : search.base.terms);
+  auto unknown = find_unknown(search, search.base.terms);
   if (!unknown) return;
   if (named) {
-    const auto square = [](double x) { return x * x; };
-    const double without = square(search.base.rmse_cv()), with_named = square(named->judged.rmse_cv());
-    const double rest = with_named * unknown->curve.fall_percent / 100.0;
-    const double share = (without - with_named) / std::max(without - with_named + rest, 1e-300);
-    if (share >= kRecovered) return;
-    // Two effects of the catalogue explain more than one does.
+    const Judged curve = with_curve(search, *unknown);
+    const auto share = [&](const Trial& trial, double numbers) {
+      return share_of(search.base, trial.judged, curve, unknown->curve.effective - numbers);
+    };
+    unknown->named_share_percent = 100.0 * share(*named, named->proposal.added);
+    if (*unknown->named_share_percent >= 100.0 * kRecovered) return;
+    // Two effects of the catalogue may explain what one does not.
     Search next{search.data, search.keep, named->judged};
     const std::vector<Trial> more = rank(next);
-    if (!more.empty() && passes(more.front())) {
-      const double with_both = square(more.front().judged.rmse_cv());
-      if (without - with_both >= kRecovered * (without - with_named + rest)) return;
-    }
-    unknown->named_share_percent = 100.0 * share;
-    // Learnt once more beside the model as it is: what is missing is one thing.
-    if (auto whole = find_unknown(search, search.base.terms)) {
-      whole->named_share_percent = unknown->named_share_percent;
-      unknown = std::move(whole);
-    }
+    if (!more.empty() && passes(more.front()) &&
+        share(more.front(), named->proposal.added + more.front().proposal.added) >= kRecovered)
+      return;
     result.named.clear();
   }
   result.verdict = Verdict::unknown_structure;

@@ -36,7 +36,7 @@ struct UnknownStructure {
 std::optional<UnknownStructure> find_unknown(Search& search, const regression::Terms& model);
 
 // Tells whether what is missing is outside the catalogue. `named` is the trial that stands to be named, or null where
-// none is. Where a curve explains what no effect does, or a named one explains less than four fifths of it and no
+// none is. Where a curve explains what no effect does, or a named one explains less than nine tenths of it and no
 // second one the rest, the verdict becomes unknown_structure and nothing is named.
 void tell_unknown(Search& search, const Trial* named, Diagnosis& result);
 

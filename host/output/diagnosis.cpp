@@ -11,6 +11,7 @@
 #include "host/output/explanation.hpp"
 #include "host/output/identification.hpp"
 #include "host/output/json.hpp"
+#include "host/output/learned_table.hpp"
 #include "host/output/text.hpp"
 
 namespace flexspline::output {
@@ -68,6 +69,16 @@ std::string replaced(std::string text, std::string_view what, const std::string&
   return at == std::string::npos ? text : text.replace(at, what.size(), by);
 }
 
+// Of the points that rows reach, the standard error of the one in the middle.
+double typical_error(const regression::LearnedTable& curve) {
+  std::vector<double> errors;
+  for (std::size_t k = 0; k < curve.table.std.size(); ++k)
+    if (curve.visited[k]) errors.push_back(curve.table.std[k]);
+  if (errors.empty()) return 0.0;
+  std::nth_element(errors.begin(), errors.begin() + static_cast<std::ptrdiff_t>(errors.size() / 2), errors.end());
+  return errors[errors.size() / 2];
+}
+
 void print_next(Console& console, const Diagnosis& d, const std::string& add_command) {
   std::vector<std::string> steps;
   switch (d.verdict) {
@@ -82,6 +93,9 @@ void print_next(Console& console, const Diagnosis& d, const std::string& add_com
             effect_label(d.named[0].effect, d.named[0].order), effect_label(d.named[1].effect, d.named[1].order)));
       break;
     case Verdict::unknown_structure:
+      if (d.unknown)
+        steps.push_back(fmt::format("{} --balance {}", replaced(add_command, "EFFECT", d.unknown->effect),
+                                    d.unknown->definition.balance));
       steps.push_back("flexspline compare shows in which region the error stands; look at the drive there");
       break;
     case Verdict::insufficient_excitation:
@@ -95,6 +109,41 @@ void print_next(Console& console, const Diagnosis& d, const std::string& add_com
   console.line();
   console.line("Next:");
   for (const std::string& step : steps) console.line("  " + step);
+}
+
+void print_unknown(Console& console, const Diagnosis& d) {
+  const diagnosis::UnknownStructure& u = *d.unknown;
+  console.line();
+  console.line(
+      wrapped(fmt::format("It goes with {}{}: a curve over it takes {:.1f} % off the squared error on data left out of "
+                          "the fit (score {:.0f}). "
+                          "At the points that the data reach it is known to {}.",
+                          u.definition.variable, u.definition.times_direction ? ", times the direction of motion" : "",
+                          u.curve.fall_percent, u.curve.score, with_unit(typical_error(u.curve), d.unit))));
+  if (u.named_share_percent && !d.candidates.empty())
+    console.line(wrapped(
+        fmt::format("The nearest effect of the catalogue, {}, explains {:.0f} % of what the curve does.",
+                    effect_label(d.candidates.front().effect, d.candidates.front().order), *u.named_share_percent)));
+  std::vector<std::string> others;
+  for (std::size_t k = 1; k < std::min<std::size_t>(4, u.depends_on.size()); ++k)
+    others.push_back(fmt::format("{} {:.1f} %", u.depends_on[k].variable, u.depends_on[k].fall_percent));
+  if (!others.empty())
+    console.line(wrapped(fmt::format("Curves over other signals, which may go along with it: {}.", listed(others))));
+  console.line(curve_text(curve_of_table(u.definition, u.curve.table, d.unit), takes_braille()));
+  console.line(wrapped(fmt::format("Record next: {}.", u.record_next)));
+}
+
+json unknown_json(const Diagnosis& d) {
+  if (!d.unknown) return nullptr;
+  const diagnosis::UnknownStructure& u = *d.unknown;
+  json answer = learned_table_json("unknown", u.definition, u.curve, d.unit);
+  answer["effect"] = u.effect;
+  answer["depends_on"] = json::array();
+  for (const auto& over : u.depends_on)
+    answer["depends_on"].push_back({{"variable", over.variable}, {"fall_percent", json_number(over.fall_percent)}});
+  answer["named_share_percent"] = json_number(u.named_share_percent);
+  answer["record_next"] = u.record_next;
+  return answer;
 }
 
 json localised_json(const std::vector<diagnosis::Localised>& parts) {
@@ -202,6 +251,7 @@ void print_diagnosis(Console& console, const Diagnosis& d, const std::string& ad
                             *d.delay_s > 0.0 ? "lags" : "leads", 1e3 * std::abs(*d.delay_s))));
   for (const diagnosis::Named& named : d.named)
     if (const Candidate* c = candidate_of(d, named)) print_explanation(console, *c, d.unit);
+  if (d.unknown) print_unknown(console, d);
   if (!d.candidates.empty()) {
     console.line();
     console.line(candidate_table(d));
@@ -250,6 +300,7 @@ json diagnosis_json(const Diagnosis& d) {
           {"remaining_structure", localised_json(d.remaining_structure)},
           {"recovered_percent", json_number(d.recovered_percent)},
           {"disturbances", std::move(disturbances)},
+          {"unknown", unknown_json(d)},
           {"delay_s", json_number(d.delay_s)},
           {"warnings", d.warnings},
           {"rounds", json::array()}};

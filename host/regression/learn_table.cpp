@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <limits>
 
 #include "host/catalogue/defined.hpp"
 #include "host/regression/balance_fit.hpp"
@@ -14,8 +15,8 @@ namespace {
 constexpr std::size_t kFolds = 5;
 constexpr std::size_t kCounts[] = {16, 32, 64, 128, 256};
 constexpr std::size_t kAlways = 3;
-// More points are taken where they add this share to the fall of left-out squares.
-constexpr double kWorthMore = 0.01;
+// More points are taken where they take this share off the left-out squares.
+constexpr double kWorthMore = 0.02;
 
 bool is_closed(effects::Variable variable) {
   return variable == effects::Variable::motor_angle || variable == effects::Variable::output_angle;
@@ -63,6 +64,7 @@ struct Fitted {
   Curve curve;
   std::vector<double> at;
   std::vector<std::uint8_t> visited;
+  double left() const { return curve.squares_with; }
   double fall() const { return curve.squares_without - curve.squares_with; }
 };
 
@@ -128,22 +130,21 @@ std::optional<LearnedTable> learn_table(BalanceData& data, const Terms& terms, c
   Beside b = beside(data, terms, question, root_weights, but);
   if (!question.at.empty()) return learned(data, b, fit_points(data, terms, question, question.at, b));
   std::vector<Fitted> tried;
-  double most = 0.0;
+  double least = std::numeric_limits<double>::infinity();
   std::vector<std::size_t> counts(std::begin(kCounts), std::end(kCounts));
   if (question.exactly) counts = {question.most_points};
   for (const std::size_t count : counts) {
     if (count > question.most_points || static_cast<Eigen::Index>(4 * count) > data.rows()) break;
     // A bump that is narrow shows only between points that are close, so that the first counts are tried in any case.
     const std::size_t n = tried.size();
-    if (n >= kAlways && tried[n - 1].fall() < (1.0 + kWorthMore) * tried[n - 2].fall()) break;
+    if (n >= kAlways && tried[n - 1].left() > (1.0 - kWorthMore) * tried[n - 2].left()) break;
     tried.push_back(fit_points(
         data, terms, question,
         closed ? catalogue::points_of_turn(count) : catalogue::even_points(range.low, range.high, count), b));
-    most = std::max(most, tried.back().fall());
+    least = std::min(least, tried.back().left());
   }
   for (Fitted& fitted : tried)
-    if (fitted.fall() >= (1.0 - kWorthMore) * most || &fitted == &tried.back())
-      return learned(data, b, std::move(fitted));
+    if (fitted.left() <= (1.0 + kWorthMore) * least) return learned(data, b, std::move(fitted));
   return std::nullopt;
 }
 

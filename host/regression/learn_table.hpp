@@ -40,7 +40,7 @@ struct TableQuestion {
 
 // Fits all free linear parameters of `terms` on this balance and the table together (shapes move to first order), as
 // smooth as left-out rows ask for. A table of `terms` with the id `but` is left out: it is the one to learn. The number
-// of points is the least that predicts left-out rows as well as more would, within a hundredth of the fall. Nothing
+// of points is the least that predicts left-out rows as well as more would, within a fiftieth of their squares. Nothing
 // where the signal does not vary.
 std::optional<LearnedTable> learn_table(BalanceData& data, const Terms& terms, const TableQuestion& question,
                                         const Eigen::VectorXd& root_weights, std::string_view but = {});

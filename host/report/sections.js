@@ -414,6 +414,31 @@ function candidateTable(list, named, caption) {
       leastShown(c), verdict(c)]));
 }
 
+// A curve over one signal, for what no effect of the catalogue explains.
+function fillUnknown(s, c) {
+  const at = c.points.map((p) => p.at), value = c.points.map((p) => p.value), unit = unitText(c.unit), xUnit = unitText(c.variable_unit);
+  const end = (k) => c.points.map((p) => (p.visited ? p.interval[k] : null));
+  const name = variableName(c.variable), what = c.times_direction ? "times the direction of motion" : "";
+  s.append(figure({
+    title: `What no effect explains, over ${name}`, height: 240,
+    label: `Torque over ${name} that no effect of the catalogue explains; it explains ${number(c.chi2_fall_percent, 3)} % of the squared error on data left out of the fit`,
+    caption: el("span", {}, el("strong", {}, `${number(c.chi2_fall_percent, 3)} %`), ` of the squared error on data left out of its fit goes with this curve${what ? ", " + what : ""}`),
+    key: [{ name: "learnt curve", colour: "residual" }, { name: "95 % of it", colour: "residual", kind: "band" }],
+    make: (k, plot) => ({
+      data: [at, end(1), end(0), value],
+      options: {
+        scales: { x: { time: false } },
+        axes: axes(xUnit ? `${name} (${xUnit})` : name, unit, k),
+        series: [{}, kHidden, kHidden, line("residual", k, { width: 2 })],
+        bands: [{ series: [1, 2], fill: faded("residual") }],
+        cursor: { drag: { x: false, y: false }, y: false },
+        hooks: { drawClear: [noughtHook(k)], setCursor: [readoutHook(plot, [null, null, "torque"], unit, "at", xUnit)] },
+      },
+    }),
+  }));
+  s.append(el("p", {}, `Record next: ${c.record_next}.`));
+}
+
 function fillRound(s, round) {
   s.append(el("p", {}, round.verdict_in_words));
   const telling = round.localised.slice(0, 3).map((l) => `${variableName(l.variable)} (${number(l.share_percent, 3)} %)`);
@@ -425,6 +450,7 @@ function fillRound(s, round) {
     const c = round.candidates.find((x) => same(x, named));
     if (c) s.append(candidateCard(c, round));
   }
+  if (round.unknown) fillUnknown(s, round.unknown);
   if (round.candidates.length) {
     s.append(candidateTable(round.candidates.slice(0, 8), round.named, "Every effect that could be added was tried against data left out of the fit. The best of them:"));
     if (round.candidates.length > 8)

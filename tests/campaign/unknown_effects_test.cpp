@@ -76,7 +76,9 @@ Outcome run(const Case& c) {
   if (d.unknown) {
     outcome.curve = d.unknown->effect;
     outcome.right_signal = c.truth.curves.contains(d.unknown->effect.substr(d.unknown->effect.find(':') + 1));
-    const diagnosis::Addition added = diagnosis::add(dataset, base, d.unknown->effect, {});
+    diagnosis::Made made;
+    made.balance = d.unknown->definition.balance;
+    const diagnosis::Addition added = diagnosis::add(dataset, base, d.unknown->effect, {}, made);
     outcome.before = *added.before.rmse_holdout / floor;
     outcome.after = *added.after.rmse_holdout / floor;
   }
@@ -121,9 +123,12 @@ TEST(UnknownEffects, TuningSeeds) {
   if (std::getenv("FLEXSPLINE_TUNE") == nullptr) GTEST_SKIP() << "set FLEXSPLINE_TUNE to see the tuning seeds";
   std::vector<Case> cases;
   const int seeds = std::atoi(std::getenv("FLEXSPLINE_TUNE"));
+  const char* only = std::getenv("FLEXSPLINE_ONLY");
   for (int s = 1; s <= seeds; ++s) {
-    for (const Truth& t : truths(1.0)) cases.push_back({t, static_cast<std::uint64_t>(900 + s)});
-    cases.push_back({{}, static_cast<std::uint64_t>(900 + s)});
+    for (const double scale : {1.0, 0.5})
+      for (const Truth& t : truths(scale))
+        if (only == nullptr || t.hidden == only) cases.push_back({t, static_cast<std::uint64_t>(900 + s)});
+    if (only == nullptr) cases.push_back({{}, static_cast<std::uint64_t>(900 + s)});
   }
   run_all(cases);
 }
