@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cmath>
 #include <limits>
+#include <map>
 
 #include "host/catalogue/defined.hpp"
 #include "host/regression/balance_fit.hpp"
@@ -15,6 +16,8 @@ namespace {
 constexpr std::size_t kFolds = 5;
 constexpr std::size_t kCounts[] = {16, 32, 64, 128, 256};
 constexpr std::size_t kAlways = 3;
+constexpr std::size_t kFirst = 32;
+constexpr int kWeighings = 2;
 // More points are taken where they take this share off the left-out squares.
 constexpr double kWorthMore = 0.02;
 
@@ -25,7 +28,8 @@ bool is_closed(effects::Variable variable) {
 // Columns of what stands beside the table, and the target without what is known.
 struct Beside {
   CurveProblem problem;
-  std::vector<std::string> ids;  // of each column
+  std::vector<std::string> ids;                    // of each column
+  std::map<std::size_t, Eigen::MatrixXd> columns;  // of tables, by their points
 };
 
 Beside beside(BalanceData& data, const Terms& all, const TableQuestion& question, const Eigen::VectorXd& root_weights,
@@ -72,7 +76,9 @@ Fitted fit_points(BalanceData& data, const Terms& terms, const TableQuestion& qu
                   Beside& b) {
   const BalanceData::Points points{question.variable, question.times_direction, question.balance, at.front(), at.back(),
                                    at.size()};
-  b.problem.points = data.point_columns(terms, points, question.filtered);
+  Eigen::MatrixXd& columns = b.columns[at.size()];
+  if (columns.size() == 0) columns = data.point_columns(terms, points, question.filtered);
+  b.problem.points = columns;
   Fitted fitted;
   fitted.curve = fit_curve(b.problem);
   fitted.at = std::move(at);
@@ -128,6 +134,20 @@ std::optional<LearnedTable> learn_table(BalanceData& data, const Terms& terms, c
   const Covered range = covered_range(data.signal_at_rows(terms, question.variable));
   if (!(range.high > range.low)) return std::nullopt;
   Beside b = beside(data, terms, question, root_weights, but);
+  const auto points = [&](std::size_t count) {
+    return closed ? catalogue::points_of_turn(count) : catalogue::even_points(range.low, range.high, count);
+  };
+  // Without the curve, records that show it most seem the noisiest and count the least: so they are weighed by what a
+  // first curve leaves.
+  const std::vector<double> first = !question.at.empty() ? question.at
+                                    : question.exactly   ? points(question.most_points)
+                                                         : points(std::min<std::size_t>(kFirst, question.most_points));
+  for (int round = 0; round < kWeighings && static_cast<Eigen::Index>(2 * first.size()) < data.rows(); ++round) {
+    const Fitted fitted = fit_points(data, terms, question, first, b);
+    const Eigen::VectorXd keep = (root_weights.array() > 0.0).cast<double>();
+    b.problem.root_weights =
+        keep.cwiseProduct(record_weights(data.records(), keep.cwiseProduct(fitted.curve.residual)));
+  }
   if (!question.at.empty()) return learned(data, b, fit_points(data, terms, question, question.at, b));
   std::vector<Fitted> tried;
   double least = std::numeric_limits<double>::infinity();
@@ -138,9 +158,7 @@ std::optional<LearnedTable> learn_table(BalanceData& data, const Terms& terms, c
     // A bump that is narrow shows only between points that are close, so that the first counts are tried in any case.
     const std::size_t n = tried.size();
     if (n >= kAlways && tried[n - 1].left() > (1.0 - kWorthMore) * tried[n - 2].left()) break;
-    tried.push_back(fit_points(
-        data, terms, question,
-        closed ? catalogue::points_of_turn(count) : catalogue::even_points(range.low, range.high, count), b));
+    tried.push_back(fit_points(data, terms, question, points(count), b));
     least = std::min(least, tried.back().left());
   }
   for (Fitted& fitted : tried)
