@@ -25,7 +25,8 @@ constexpr std::size_t kFirstId = 1000;  // beyond those of the catalogue
 
 std::string key_of(const model::Effect& effect) {
   const Definition& d = *effect.definition;
-  std::string key = fmt::format("{}|{}|{}|{}|{}", effect.type, d.balance, d.variable, d.times_direction, d.formula);
+  std::string key =
+      fmt::format("{}|{}|{}|{}|{}|{}", effect.type, d.balance, d.variable, d.times_direction, d.table.fixed, d.formula);
   for (const model::Parameter& p : effect.parameters)
     key += fmt::format("|{},{},{:a},{:a}", p.name, p.unit, p.low.value_or(-HUGE_VAL), p.high.value_or(HUGE_VAL));
   for (const auto* list : {&d.table.at, &d.table.value}) {

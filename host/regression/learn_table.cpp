@@ -18,6 +18,7 @@ constexpr std::size_t kCounts[] = {16, 32, 64, 128, 256};
 constexpr std::size_t kAlways = 3;
 constexpr std::size_t kFirst = 32;
 constexpr int kWeighings = 2;
+constexpr int kFewSmoothings = 8;
 // More points are taken where they take this share off the left-out squares.
 constexpr double kWorthMore = 0.02;
 
@@ -73,14 +74,14 @@ struct Fitted {
 };
 
 Fitted fit_points(BalanceData& data, const Terms& terms, const TableQuestion& question, std::vector<double> at,
-                  Beside& b) {
+                  Beside& b, int smoothings = kSmoothings) {
   const BalanceData::Points points{question.variable, question.times_direction, question.balance, at.front(), at.back(),
                                    at.size()};
   Eigen::MatrixXd& columns = b.columns[at.size()];
   if (columns.size() == 0) columns = data.point_columns(terms, points, question.filtered);
   b.problem.points = columns;
   Fitted fitted;
-  fitted.curve = fit_curve(b.problem);
+  fitted.curve = fit_curve(b.problem, smoothings);
   fitted.at = std::move(at);
   const Eigen::VectorXd length = (b.problem.root_weights.asDiagonal() * b.problem.points).colwise().norm();
   for (Eigen::Index k = 0; k < length.size(); ++k) fitted.visited.push_back(length[k] > 1e-3 * length.maxCoeff());
@@ -142,8 +143,9 @@ std::optional<LearnedTable> learn_table(BalanceData& data, const Terms& terms, c
   const std::vector<double> first = !question.at.empty() ? question.at
                                     : question.exactly   ? points(question.most_points)
                                                          : points(std::min<std::size_t>(kFirst, question.most_points));
-  for (int round = 0; round < kWeighings && static_cast<Eigen::Index>(2 * first.size()) < data.rows(); ++round) {
-    const Fitted fitted = fit_points(data, terms, question, first, b);
+  for (int round = question.filtered ? 0 : 1;
+       round < kWeighings && static_cast<Eigen::Index>(2 * first.size()) < data.rows(); ++round) {
+    const Fitted fitted = fit_points(data, terms, question, first, b, kFewSmoothings);
     const Eigen::VectorXd keep = (root_weights.array() > 0.0).cast<double>();
     b.problem.root_weights =
         keep.cwiseProduct(record_weights(data.records(), keep.cwiseProduct(fitted.curve.residual)));

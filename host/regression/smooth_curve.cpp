@@ -11,8 +11,7 @@
 namespace flexspline::regression {
 namespace {
 
-// Smoothings tried, over the size of the data's part of the normal equations.
-constexpr int kSmoothings = 29;
+// Smoothings tried lie between these, over the size of the data's part of the normal equations.
 constexpr double kLeast = 1e-7;
 constexpr double kMost = 1e7;
 // Directions of no length: points that no row reaches.
@@ -219,14 +218,14 @@ Curve fit_curve(const CurveProblem& problem, double smoothing) {
   return finish(problem, g, freedom, Solver(g, freedom, problem.closed), smoothing);
 }
 
-Curve fit_curve(const CurveProblem& problem) {
+Curve fit_curve(const CurveProblem& problem, int smoothings) {
   const Products g = products_of(problem);
   const Freedom freedom = freedom_of(g);
   const Solver solver(g, freedom, problem.closed);
   double best = solver.size(), least = std::numeric_limits<double>::infinity();
-  for (int k = 0; k < kSmoothings; ++k) {
+  for (int k = 0; k < smoothings; ++k) {
     const double smoothing =
-        solver.size() * kMost * std::pow(kLeast / kMost, static_cast<double>(k) / (kSmoothings - 1));
+        solver.size() * kMost * std::pow(kLeast / kMost, static_cast<double>(k) / (smoothings - 1));
     const double now = left_out(g, solver, smoothing);
     // From smooth to rough: a rougher curve must predict better, not as well.
     if (now < least * (1.0 - 1e-9)) {

@@ -37,7 +37,9 @@ struct Curve {
 // 1923; Eilers and Marx 1996 for the view as P-splines of degree one), where t's torque is held orthogonal, in the
 // data, to what `others` imitate to more than `kImitated` of its length. The smoothing is the one whose fits predict
 // left-out folds best.
-Curve fit_curve(const CurveProblem& problem);
+// That one is searched for on so many values over fourteen decades.
+inline constexpr int kSmoothings = 29;
+Curve fit_curve(const CurveProblem& problem, int smoothings = kSmoothings);
 // The same with a given smoothing.
 Curve fit_curve(const CurveProblem& problem, double smoothing);
 
