@@ -101,9 +101,14 @@ const std::array kHelp = {
         "add",
         "adds an effect to a model and refits it, with the error before and after",
         "Adds an effect of the catalogue, estimates all parameters anew and says what that does to the error, on the "
-        "data that were fitted and on those held out. Comments and layout of the model file stay; its history gets a "
+        "data that were fitted and on those held out. table_effect:SIGNAL learns a curve over a signal of your choice, "
+        "as "
+        "smooth as the data ask for, where no effect of the catalogue fits; expression_effect fits a formula of yours. "
+        "Comments and layout of the model file stay; its history gets a "
         "line. --report writes a page with plots, with the error before and after.",
-        {kMakeData, kAdd}},
+        {kMakeData, kAdd,
+         "flexspline add expression_effect --formula 'a*abs(velocity)' --parameter a:N*m*s/rad --model "
+         "demo-out/base-model.toml demo-out --out better.toml"}},
     CommandHelp{
         "remove",
         "takes an effect out of a model and refits it, and shows what that costs",

@@ -213,6 +213,7 @@ void tell_unknown(Search& search, const Trial* named, Diagnosis& result) {
         share(more.front(), named->proposal.added + more.front().proposal.added) >= kRecovered)
       return;
     result.named.clear();
+    result.remaining_structure = result.localised;
   }
   result.verdict = Verdict::unknown_structure;
   result.unknown = std::move(unknown);

@@ -212,7 +212,7 @@ Matrix second_differences(Eigen::Index points, bool closed) {
   return d;
 }
 
-Curve fit_curve(const CurveProblem& problem, double smoothing) {
+Curve fit_curve_smoothed(const CurveProblem& problem, double smoothing) {
   const Products g = products_of(problem);
   const Freedom freedom = freedom_of(g);
   return finish(problem, g, freedom, Solver(g, freedom, problem.closed), smoothing);

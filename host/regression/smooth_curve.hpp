@@ -41,7 +41,7 @@ struct Curve {
 inline constexpr int kSmoothings = 29;
 Curve fit_curve(const CurveProblem& problem, int smoothings = kSmoothings);
 // The same with a given smoothing.
-Curve fit_curve(const CurveProblem& problem, double smoothing);
+Curve fit_curve_smoothed(const CurveProblem& problem, double smoothing);
 
 // Cosine between a direction of the curve and the span of the others from which on it is theirs.
 inline constexpr double kImitated = 0.995;

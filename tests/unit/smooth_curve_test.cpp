@@ -64,7 +64,7 @@ TEST(SmoothCurve, IsTheClosedFormOfThePenalisedLeastSquares) {
     m.problem.target += m.problem.others * Eigen::Vector2d(3.0, -2.0);
     for (Eigen::Index k = 0; k < 400; ++k) m.problem.root_weights[k] = 0.5 + 1.0 * static_cast<double>(k % 3);
     const double smoothing = 2.5;
-    const Curve curve = fit_curve(m.problem, smoothing);
+    const Curve curve = fit_curve_smoothed(m.problem, smoothing);
     Matrix A(400, 26);
     A << m.problem.others, m.problem.points;
     Matrix d = Matrix::Zero(closed ? 24 : 22, 26);
@@ -92,7 +92,7 @@ TEST(SmoothCurve, IsTheClosedFormOfThePenalisedLeastSquares) {
 TEST(SmoothCurve, LeftOutSquaresAreThoseOfFitsWithoutEachFold) {
   const Made m = made(300, 16, 0.2, bump, 5);
   const double smoothing = 1.0;
-  const Curve curve = fit_curve(m.problem, smoothing);
+  const Curve curve = fit_curve_smoothed(m.problem, smoothing);
   const Matrix d = second_differences(16, false);
   double sum = 0.0;
   for (int f = 0; f < 5; ++f) {
