@@ -183,7 +183,7 @@ const effects::Description kExpression{
         "A torque that you write as a formula over the signals, with parameters of your own; they are fitted as those "
         "of any other effect.",
     .causes = "What you know of the machine and the catalogue does not: a seal's law, a spring, a brake.",
-    .rivals = "table_effect",
+    .rivals = kTableEffect,
     .separated_by = "motion over the whole range of the signals that the formula reads",
     .host_only = true,
     .made_by_user = true,

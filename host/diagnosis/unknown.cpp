@@ -24,6 +24,8 @@ constexpr double kCurveFallPercent = 3.0;
 // What is named must recover this share, or something else is there: substitutes for unknown laws stay below, effects
 // of the catalogue that are the nearest to one above.
 constexpr double kRecovered = 0.9;
+// Two that are right leave nothing to a curve; two that are not come closer to it than one.
+constexpr double kRecoveredByTwo = 0.98;
 constexpr std::size_t kScreenedPoints = 24;
 constexpr std::size_t kLearned = 3;  // signals whose curves are learnt in full
 // A simpler curve is taken where it predicts as well.
@@ -210,7 +212,7 @@ void tell_unknown(Search& search, const Trial* named, Diagnosis& result) {
     Search next{search.data, search.keep, named->judged};
     const std::vector<Trial> more = rank(next);
     if (!more.empty() && passes(more.front()) &&
-        share(more.front(), named->proposal.added + more.front().proposal.added) >= kRecovered)
+        share(more.front(), named->proposal.added + more.front().proposal.added) >= kRecoveredByTwo)
       return;
     result.named.clear();
     result.remaining_structure = result.localised;

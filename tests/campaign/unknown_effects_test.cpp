@@ -4,7 +4,9 @@
 
 #include <fmt/format.h>
 
+#include <algorithm>
 #include <atomic>
+#include <cmath>
 #include <cstdlib>
 #include <map>
 #include <set>
@@ -116,6 +118,43 @@ std::vector<Truth> truths(double scale) {
        {"quadratic_drag", "power_law_friction"},
        {"velocity", "speed*direction", "velocity*direction"}},
   };
+}
+
+// Seeds from 7001 on are for judging; limits were set on seeds below 1100.
+TEST(UnknownEffects, AreFlaggedOrGivenTheNameOfTheirClassAndTheirCurveTakesTheErrorToTheFloor) {
+  std::vector<Case> cases;
+  for (const std::uint64_t seed : {7001, 7002})
+    for (const Truth& t : truths(1.0)) cases.push_back({t, seed});
+  const std::vector<Outcome> outcomes = run_all(cases);
+  int told = 0, flagged = 0, right_signal = 0;
+  std::vector<double> after;
+  for (const Outcome& o : outcomes) {
+    told += o.flagged || o.of_its_class ? 1 : 0;
+    if (!o.flagged) continue;
+    ++flagged;
+    right_signal += o.right_signal ? 1 : 0;
+    after.push_back(o.after);
+    EXPECT_LT(o.after, 0.2 * o.before) << o.what.truth.hidden;
+  }
+  const auto all = static_cast<int>(outcomes.size());
+  fmt::print("told {} of {}; flagged {}, with the right signal {}\n", told, all, flagged, right_signal);
+  EXPECT_GE(told, static_cast<int>(std::ceil(0.9 * all)));
+  ASSERT_GE(flagged, 6) << "three of the truths have no relative in the catalogue";
+  EXPECT_GE(right_signal, static_cast<int>(std::ceil(0.9 * flagged)));
+  std::sort(after.begin(), after.end());
+  fmt::print("held-out error with the curve over the floor: median {:.3f}, largest {:.3f}\n", after[after.size() / 2],
+             after.back());
+  EXPECT_LT(after[after.size() / 2], 1.15);
+  EXPECT_LT(after.back(), 1.6);
+}
+
+TEST(UnknownEffects, AreNotSeenWhereNothingIsMissing) {
+  std::vector<Case> cases;
+  for (const std::uint64_t seed : {7003, 7004}) cases.push_back({{}, seed});
+  for (const Outcome& o : run_all(cases)) {
+    EXPECT_FALSE(o.flagged) << o.what.seed << " " << o.curve;
+    EXPECT_TRUE(o.curve.empty());
+  }
 }
 
 // Seeds to tune on, for whoever changes a limit: FLEXSPLINE_TUNE=1 runs these alone.
