@@ -72,6 +72,37 @@ void describe(const std::array<T, Size>& all, std::vector<Coefficient>& out) {
   for (const T& x : all) describe(x, out);
 }
 
+// For coefficients that say themselves how a block holds them (model::HasFields).
+struct Describing {
+  std::vector<Coefficient>& out;
+  template <class T>
+  bool operator()(const T& x) {
+    describe(x, out);
+    return true;
+  }
+  template <class T>
+  bool bounded(const T& x, std::int32_t, std::int32_t) {
+    out.push_back({"number", static_cast<double>(static_cast<std::int32_t>(x))});
+    return true;
+  }
+  template <class Elements, class Count>
+  bool list(const Elements& elements, const Count& count, std::int32_t) {
+    for (std::size_t k = 0; k < static_cast<std::size_t>(count); ++k) describe(elements[k], out);
+    return true;
+  }
+};
+
+template <class T>
+void describe_all(const T& coefficients, std::vector<Coefficient>& out) {
+  if constexpr (model::HasFields<T>) {
+    Describing codec{out};
+    T copy = coefficients;
+    copy.fields(codec);
+  } else {
+    model::for_each_member(coefficients, [&](const auto& c) { describe(c, out); });
+  }
+}
+
 std::string text_of(const model::Name& name) {
   return {name.begin(), std::find(name.begin(), name.end(), '\0')};
 }
@@ -140,7 +171,7 @@ Unpacked unpack(std::span<const std::uint8_t> block) {
   model->for_each([&]<class Effect>(const auto& places) {
     for (std::size_t i = 0; i < places.count; ++i) {
       UnpackedEffect effect{std::string(Effect::kInfo.name), {}};
-      model::for_each_member(places.coefficients[i], [&](const auto& c) { describe(c, effect.coefficients); });
+      describe_all(places.coefficients[i], effect.coefficients);
       unpacked.effects.push_back(std::move(effect));
     }
   });

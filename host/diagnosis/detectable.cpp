@@ -77,8 +77,9 @@ Detection::Detection(Search& search)
 // model that lacks it.
 bool Detection::named(const Trial& trial, const Eigen::VectorXd& own, double scale) const {
   Judged with, without;
-  with.cv_squares = without.cv_squares = trial.judged.cv_squares;
-  with.cv_rows = without.cv_rows = trial.judged.cv_rows;
+  with.left_out = without.left_out = trial.judged.left_out;
+  with.sums = without.sums = trial.judged.sums;
+  with.deviations = without.deviations = trial.judged.deviations;
   with.autocorrelation_time = trial.judged.autocorrelation_time;
   without.autocorrelation_time = search_->base.autocorrelation_time;
   const auto& records = search_->data->records();
@@ -86,7 +87,7 @@ bool Detection::named(const Trial& trial, const Eigen::VectorXd& own, double sca
     double squares = 0.0;
     for (Eigen::Index k = records[i].first; k < records[i].last; ++k)
       if (search_->base.root_weights[k] > 0.0) squares += own[k] * own[k];
-    without.cv_squares[i] += scale * scale * squares;
+    without.left_out[i].squares += scale * scale * squares;
   }
   const Fall fall = fall_of(without, with, trial.proposal.added);
   return fall.score > kNamedScore && fall.chi2_percent > kNamedFallPercent;
