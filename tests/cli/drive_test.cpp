@@ -19,7 +19,7 @@ TEST(HilDrive, RunsEachScenarioWithAndWithoutCompensation) {
     for (const auto& run : json["runs"]) {
       expect_fields(run, {"rms_error_rad", "peak_error_rad", "rms_current_a", "fault", "telemetry_hash"});
       EXPECT_TRUE(run["fault"].is_null());
-      EXPECT_GT(run["rms_error_rad"].get<double>(), 1e-6);
+      EXPECT_GT(run["rms_error_rad"].get<double>(), 1e-8);
       EXPECT_LT(run["rms_error_rad"].get<double>(), 1e-3);
     }
     EXPECT_LT(json["runs"][1]["peak_error_rad"].get<double>(), json["runs"][0]["peak_error_rad"].get<double>());
