@@ -1,6 +1,5 @@
 #include "host/estimation/output_error.hpp"
 
-#include <ceres/ceres.h>
 #include <fmt/format.h>
 
 #include <Eigen/QR>
@@ -10,6 +9,7 @@
 
 #include "host/estimation/free_motion.hpp"
 #include "host/regression/least_squares.hpp"
+#include "host/regression/minimise.hpp"
 #include "host/regression/shapes.hpp"
 #include "host/simulation/initial_motion.hpp"
 
@@ -21,7 +21,7 @@ using regression::Record;
 using regression::RowRange;
 using regression::Slot;
 
-constexpr double kFar = 100.0;  // standard errors of least squares
+constexpr double kFar = 100.0;          // standard errors of least squares
 constexpr double kShownAtLeast = 1e-6;  // of the error's size, by a step of one standard error
 
 // A free parameter, moved in units of its standard error from least squares.
@@ -216,29 +216,6 @@ Eigen::MatrixXd slopes(OutputError& problem, const std::vector<double>& x) {
   return J;
 }
 
-class Cost final : public ceres::CostFunction {
- public:
-  explicit Cost(OutputError& problem) : problem_(problem) {
-    set_num_residuals(static_cast<int>(problem.rows()));
-    mutable_parameter_block_sizes()->push_back(static_cast<int>(problem.unknowns()));
-  }
-  bool Evaluate(double const* const* parameters, double* residuals, double** jacobians) const override {
-    const std::size_t count = problem_.unknowns();
-    const std::vector<double> x(parameters[0], parameters[0] + count);
-    problem_.set(x.data());
-    const Eigen::VectorXd e = problem_.weighted();
-    if (e.size() == 0) return false;  // a step too far: the solver tries a shorter one
-    Eigen::Map<Eigen::VectorXd>(residuals, e.size()) = e;
-    if (!jacobians || !jacobians[0]) return true;
-    using RowMajor = Eigen::Matrix<double, Eigen::Dynamic, Eigen::Dynamic, Eigen::RowMajor>;
-    Eigen::Map<RowMajor>(jacobians[0], e.size(), static_cast<Eigen::Index>(count)) = slopes(problem_, x);
-    return true;
-  }
-
- private:
-  OutputError& problem_;
-};
-
 // (J'J)^-1 s^2, corrected for the autocorrelation of the errors, into the covariances of the fits.
 void take_covariance(Identification& identification, OutputError& problem, const std::vector<double>& x) {
   const Eigen::MatrixXd J = slopes(problem, x);
@@ -289,23 +266,24 @@ void refit_to_output(Identification& identification) {
     return;
   }
   std::vector<double> x(problem.unknowns(), 0.0);
-  ceres::Problem search;
-  search.AddResidualBlock(new Cost(problem), nullptr, x.data());
-  for (int j = 0; j < static_cast<int>(problem.free().size()); ++j) {
-    const Free& f = problem.free()[static_cast<std::size_t>(j)];
+  regression::Minimisation how;
+  for (const Free& f : problem.free()) {
     // In units from the start. Bounds make every step of the solver a search: those out of reach are left out.
     const double low = (f.low - f.start) / f.unit, high = (f.high - f.start) / f.unit;
-    if (low > -kFar) search.SetParameterLowerBound(x.data(), j, std::min(0.0, low));
-    if (high < kFar) search.SetParameterUpperBound(x.data(), j, std::max(0.0, high));
+    how.low.push_back(low > -kFar ? std::min(0.0, low) : -INFINITY);
+    how.high.push_back(high < kFar ? std::max(0.0, high) : INFINITY);
   }
-  ceres::Solver::Options options;
-  options.linear_solver_type = ceres::DENSE_QR;
-  options.max_num_iterations = 12;
-  options.function_tolerance = 1e-5;  // a hundredth of a standard error
-  options.parameter_tolerance = 1e-5;
-  options.logging_type = ceres::SILENT;
-  ceres::Solver::Summary summary;
-  ceres::Solve(options, &search, &summary);
+  how.iterations = 12;
+  how.function_tolerance = 1e-5;  // a hundredth of a standard error
+  how.parameter_tolerance = 1e-5;
+  const auto errors_at = [&](const std::vector<double>& at, Eigen::VectorXd& errors, Eigen::MatrixXd* slope) {
+    problem.set(at.data());
+    errors = problem.weighted();
+    if (errors.size() == 0) return false;
+    if (slope) *slope = slopes(problem, at);
+    return true;
+  };
+  regression::minimise(x, problem.rows(), errors_at, how);
   problem.set(x.data());
   take_covariance(identification, problem, x);
   problem.set(x.data());

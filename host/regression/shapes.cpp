@@ -1,12 +1,11 @@
 #include "host/regression/shapes.hpp"
 
-#include <ceres/ceres.h>
-
 #include <Eigen/QR>
 #include <algorithm>
 #include <cmath>
 
 #include "host/regression/least_squares.hpp"
+#include "host/regression/minimise.hpp"
 
 namespace flexspline::regression {
 namespace {
@@ -97,57 +96,6 @@ double projected_cost(const Eigen::MatrixXd& X, const Eigen::VectorXd& y, const 
   const Eigen::ColPivHouseholderQR<Eigen::MatrixXd> qr(A);
   return (b - A * qr.solve(b)).squaredNorm();
 }
-
-// Residual of the best linear fit as a function of the shapes alone, each as a share of its range.
-class ProjectedResidual final : public ceres::CostFunction {
- public:
-  ProjectedResidual(BalanceData& data, Terms& terms, const std::vector<std::size_t>& on_balance,
-                    const std::vector<Slot>& linear, const std::vector<Slot>& shapes,
-                    const std::vector<ShapeRange>& ranges, const Whitening& whitening)
-      : data_(data),
-        terms_(terms),
-        on_balance_(on_balance),
-        linear_(linear),
-        shapes_(shapes),
-        ranges_(ranges),
-        whitening_(whitening) {
-    set_num_residuals(static_cast<int>(data.rows()));
-    mutable_parameter_block_sizes()->push_back(static_cast<int>(shapes.size()));
-  }
-
-  bool Evaluate(double const* const* parameters, double* residuals, double** jacobians) const override {
-    for (std::size_t j = 0; j < shapes_.size(); ++j)
-      terms_[shapes_[j].term].values[shapes_[j].parameter] = ranges_[j].at(parameters[0][j]);
-    const auto [A, size] = scaled_columns(columns_of(data_, terms_, linear_), whitening_);
-    const Eigen::VectorXd b = whitening_ * (data_.target() - data_.known_torque(terms_, on_balance_));
-    const Eigen::ColPivHouseholderQR<Eigen::MatrixXd> qr(A);
-    const Eigen::VectorXd theta = qr.solve(b);
-    Eigen::Map<Eigen::VectorXd>(residuals, b.size()) = b - A * theta;
-    if (!jacobians || !jacobians[0]) return true;
-    for (std::size_t j = 0; j < linear_.size(); ++j)
-      terms_[linear_[j].term].values[linear_[j].parameter] =
-          theta[static_cast<Eigen::Index>(j)] / size[static_cast<Eigen::Index>(j)];
-    using RowMajor = Eigen::Matrix<double, Eigen::Dynamic, Eigen::Dynamic, Eigen::RowMajor>;
-    Eigen::Map<RowMajor> jacobian(jacobians[0], b.size(), static_cast<Eigen::Index>(shapes_.size()));
-    constexpr double kStep = 1e-6;
-    for (std::size_t j = 0; j < shapes_.size(); ++j) {
-      const double per_share =
-          (ranges_[j].at(parameters[0][j] + kStep) - ranges_[j].at(parameters[0][j] - kStep)) / (2.0 * kStep);
-      const Eigen::VectorXd slope = (whitening_ * data_.shape_column(terms_, on_balance_, shapes_[j])) * per_share;
-      jacobian.col(static_cast<Eigen::Index>(j)) = -(slope - A * qr.solve(slope));
-    }
-    return true;
-  }
-
- private:
-  BalanceData& data_;
-  Terms& terms_;
-  const std::vector<std::size_t>& on_balance_;
-  const std::vector<Slot>& linear_;
-  const std::vector<Slot>& shapes_;
-  const std::vector<ShapeRange>& ranges_;
-  const Whitening& whitening_;
-};
 
 }  // namespace
 
@@ -311,24 +259,36 @@ double refine_shapes(BalanceData& data, Terms& terms, const std::vector<std::siz
     ranges.push_back(shape_range(data, terms[s.term], s.parameter));
     shares.push_back(std::clamp(ranges.back().share(terms[s.term].values[s.parameter]), 0.01, 0.99));
   }
-  ceres::Problem problem;
-  problem.AddResidualBlock(new ProjectedResidual(data, terms, on_balance, linear, shapes, ranges, whitening), nullptr,
-                           shares.data());
-  for (int j = 0; j < static_cast<int>(shapes.size()); ++j) {
-    problem.SetParameterLowerBound(shares.data(), j, 0.0);
-    problem.SetParameterUpperBound(shares.data(), j, 1.0);
-  }
-  ceres::Solver::Options options;
-  options.linear_solver_type = ceres::DENSE_QR;
-  options.max_num_iterations = 60;
-  options.function_tolerance = tolerance;
-  options.parameter_tolerance = 1e-6;
-  options.logging_type = ceres::SILENT;
-  ceres::Solver::Summary summary;
-  ceres::Solve(options, &problem, &summary);
+  // Residual of the best linear fit as a function of the shapes alone, each as a share of its range.
+  const auto projected = [&](const std::vector<double>& x, Eigen::VectorXd& residual, Eigen::MatrixXd* slopes) {
+    for (std::size_t j = 0; j < shapes.size(); ++j)
+      terms[shapes[j].term].values[shapes[j].parameter] = ranges[j].at(x[j]);
+    const auto [A, size] = scaled_columns(columns_of(data, terms, linear), whitening);
+    const Eigen::VectorXd b = whitening * (data.target() - data.known_torque(terms, on_balance));
+    const Eigen::ColPivHouseholderQR<Eigen::MatrixXd> qr(A);
+    const Eigen::VectorXd theta = qr.solve(b);
+    residual = b - A * theta;
+    if (!slopes) return true;
+    for (std::size_t j = 0; j < linear.size(); ++j)
+      terms[linear[j].term].values[linear[j].parameter] =
+          theta[static_cast<Eigen::Index>(j)] / size[static_cast<Eigen::Index>(j)];
+    slopes->resize(b.size(), static_cast<Eigen::Index>(shapes.size()));
+    constexpr double kStep = 1e-6;
+    for (std::size_t j = 0; j < shapes.size(); ++j) {
+      const double per_share = (ranges[j].at(x[j] + kStep) - ranges[j].at(x[j] - kStep)) / (2.0 * kStep);
+      const Eigen::VectorXd slope = (whitening * data.shape_column(terms, on_balance, shapes[j])) * per_share;
+      slopes->col(static_cast<Eigen::Index>(j)) = -(slope - A * qr.solve(slope));
+    }
+    return true;
+  };
+  Minimisation how;
+  how.low.assign(shapes.size(), 0.0);
+  how.high.assign(shapes.size(), 1.0);
+  how.function_tolerance = tolerance;
+  const double cost = minimise(shares, data.rows(), projected, how);
   for (std::size_t j = 0; j < shapes.size(); ++j)
     terms[shapes[j].term].values[shapes[j].parameter] = ranges[j].at(shares[j]);
-  return 2.0 * summary.final_cost;
+  return 2.0 * cost;
 }
 
 }  // namespace flexspline::regression

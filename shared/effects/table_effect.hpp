@@ -1,6 +1,5 @@
 #pragma once
 #include <array>
-#include <iterator>
 
 #include "shared/effects/effect.hpp"
 #include "shared/effects/variables.hpp"
@@ -59,7 +58,7 @@ struct TableEffect : Stateless {
     // How a parameter block holds them.
     template <class Codec>
     constexpr bool fields(Codec& codec) {
-      return codec.bounded(variable, 0, static_cast<std::int32_t>(std::size(kVariables)) - 1) &&
+      return codec.bounded(variable, 0, static_cast<std::int32_t>(Variable::temperature)) &&
              codec.bounded(balance, 0, 2) && codec.bounded(times_direction, 0, 1) && codec.bounded(periodic, 0, 1) &&
              codec(from) && codec(per_step) && codec(turn) && codec.list(value, points, 2);
     }

@@ -1,0 +1,56 @@
+#include "host/regression/minimise.hpp"
+
+#include <ceres/ceres.h>
+
+#include <cmath>
+
+namespace flexspline::regression {
+namespace {
+
+class Cost final : public ceres::CostFunction {
+ public:
+  Cost(const Residuals& residuals, Eigen::Index count, std::size_t unknowns)
+      : residuals_(residuals), count_(count), unknowns_(unknowns) {
+    set_num_residuals(static_cast<int>(count));
+    mutable_parameter_block_sizes()->push_back(static_cast<int>(unknowns));
+  }
+  bool Evaluate(double const* const* parameters, double* residuals, double** jacobians) const override {
+    const std::vector<double> x(parameters[0], parameters[0] + unknowns_);
+    const bool wants_slopes = jacobians && jacobians[0];
+    Eigen::VectorXd r;
+    Eigen::MatrixXd slopes;
+    if (!residuals_(x, r, wants_slopes ? &slopes : nullptr)) return false;
+    Eigen::Map<Eigen::VectorXd>(residuals, count_) = r;
+    using RowMajor = Eigen::Matrix<double, Eigen::Dynamic, Eigen::Dynamic, Eigen::RowMajor>;
+    if (wants_slopes) Eigen::Map<RowMajor>(jacobians[0], count_, static_cast<Eigen::Index>(unknowns_)) = slopes;
+    return true;
+  }
+
+ private:
+  const Residuals& residuals_;
+  Eigen::Index count_;
+  std::size_t unknowns_;
+};
+
+}  // namespace
+
+double minimise(std::vector<double>& x, Eigen::Index count, const Residuals& residuals, const Minimisation& how) {
+  ceres::Problem problem;
+  problem.AddResidualBlock(new Cost(residuals, count, x.size()), nullptr, x.data());
+  for (std::size_t j = 0; j < x.size(); ++j) {
+    const int at = static_cast<int>(j);
+    if (j < how.low.size() && std::isfinite(how.low[j])) problem.SetParameterLowerBound(x.data(), at, how.low[j]);
+    if (j < how.high.size() && std::isfinite(how.high[j])) problem.SetParameterUpperBound(x.data(), at, how.high[j]);
+  }
+  ceres::Solver::Options options;
+  options.linear_solver_type = ceres::DENSE_QR;
+  options.max_num_iterations = how.iterations;
+  options.function_tolerance = how.function_tolerance;
+  options.parameter_tolerance = how.parameter_tolerance;
+  options.logging_type = ceres::SILENT;
+  ceres::Solver::Summary summary;
+  ceres::Solve(options, &problem, &summary);
+  return summary.final_cost;
+}
+
+}  // namespace flexspline::regression
