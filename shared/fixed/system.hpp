@@ -355,17 +355,16 @@ struct FixedSystem {
   // For exponents above nought; results below 11.
   static constexpr Value pow_abs(const Scaled& x, Exponent e) {
     const std::uint32_t size = magnitude_of(x.signal.raw);
-    const int zeros = std::countl_zero(size);
-    const std::int32_t log =
-        x.gain.log - (zeros << 25) + log2_of_mantissa(shift_up(size, static_cast<std::uint32_t>(zeros)));
-    return power_of(log, e, size == 0);
+    const auto zeros = static_cast<std::uint32_t>(std::countl_zero(size));
+    return power_of(log_sum(static_cast<std::uint32_t>(x.gain.log) - (zeros << 25), shift_up(size, zeros)), e,
+                    size == 0);
   }
   static constexpr Value pow_abs(State x, Exponent e) {
     if (e.raw == 0) return one();
     const std::uint64_t size = size_of(x.raw);
-    const int zeros = std::countl_zero(size);
-    const auto mantissa = static_cast<std::uint32_t>((size << (zeros & 63)) >> 32);
-    return power_of(((63 - kStateBits) << 25) - (zeros << 25) + log2_of_mantissa(mantissa), e, size == 0);
+    const auto zeros = static_cast<std::uint32_t>(std::countl_zero(size)) & 63;
+    const auto mantissa = static_cast<std::uint32_t>((size << zeros) >> 32);
+    return power_of(log_sum((63 - kStateBits - zeros) << 25, mantissa), e, size == 0);
   }
   // Of an amplitude and a phase: one sine. The whole turns count as well, where the order is not whole.
   static constexpr Value wave_of(const Harmonic& h, Angle angle) {
@@ -456,6 +455,10 @@ struct FixedSystem {
   static constexpr std::int64_t log_times(std::uint64_t x, int bits, Exponent e) {
     const std::int64_t log = log2_of(x) - (std::int64_t{bits} << kLogBits);
     return multiply_round(log, e.raw, kExponentBits);
+  }
+  // Wraps for gains that no signal could use.
+  static constexpr std::int32_t log_sum(std::uint32_t whole, std::uint32_t mantissa) {
+    return static_cast<std::int32_t>(whole + static_cast<std::uint32_t>(log2_of_mantissa(mantissa)));
   }
   // 2^(e log), log in Q25; the power is counted from 28 halvings on, below which nothing is left of a value.
   static constexpr Value power_of(std::int32_t log, Exponent e, bool of_nought) {

@@ -199,7 +199,7 @@ constexpr std::int32_t power_of_two_word(std::int32_t x) {
   return detail::horner(detail::kPowerOfTwo, x);
 }
 
-// sin(2 pi x) for x in turns, Q32, in Q27; within 1.5 units.
+// sin(2 pi x) for x in turns, Q32, in Q27; within 2 units.
 constexpr std::int32_t sine_word(std::uint32_t phase) {
   // sin(2 pi t)/t over 16 t^2 in Q30, each four times as large as the one before stands for.
   // Beyond a quarter turn to either side: half a turn less it.

@@ -129,7 +129,7 @@ struct KalmanBounds {
   bool fit = false;
 };
 // Host only. The filter is linear, so the bound is twice the sum of the magnitudes of its answer to one reading;
-// round-off (five roundings a tick of half of 2^-60) is such an input too, and far below the margin.
+// round-off (five roundings a tick of a few units of 2^-59) is such an input too, and far below the margin.
 inline KalmanBounds kalman_bounds(const KalmanGains<double>& g) {
   constexpr double kEnvelope = 2.0, kMargin = 1e-6, kRange = 8.0;
   constexpr double kTimeConstants = 100.0;  // the slowest poles decay with half the corner frequency
