@@ -19,7 +19,7 @@ using fixed::Fixed;
 using observers::EncoderKalman;
 
 constexpr std::uint8_t kBlock[] = {
-#include "block.inc"
+#include <block.inc>
 };
 constexpr int kTicks = 1500;
 constexpr std::int32_t kOne = std::int32_t{1} << fixed::kValueBits;

@@ -8,7 +8,7 @@ namespace flexspline {
 namespace {
 
 constexpr std::uint8_t kBlock[] = {
-#include "block.inc"
+#include <block.inc>
 };
 
 template <class T>
