@@ -245,7 +245,7 @@ double squares_left(BalanceData& data, const Terms& terms, const Judged& judged)
     const Eigen::MatrixXd all = stacked(blocks);
     if (columns > 0)
       theta =
-          Eigen::ColPivHouseholderQR<Eigen::MatrixXd>(all.leftCols(columns)).setThreshold(1e-7).solve(all.col(columns));
+          Eigen::ColPivHouseholderQR<Eigen::MatrixXd>(all.leftCols(columns)).setThreshold(1e-5).solve(all.col(columns));
     left = (all.col(columns) - all.leftCols(columns) * theta).squaredNorm();
     std = spread_for(groups, judged);
     if (groups.empty() || std.maxCoeff() <= 0.0) break;

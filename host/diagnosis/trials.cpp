@@ -160,13 +160,19 @@ void prefer_simple(const Judged& base, std::vector<Trial>& trials) {
   constexpr double kSameError = 1.1;
   constexpr double kSameFall = 0.005;
   if (trials.empty() || !passes(trials.front())) return;
-  const auto square = [](double x) { return x * x; };
-  const double least = trials.front().judged.rmse_cv();
-  const double fall = square(base.rmse_cv()) - square(least);
+  // Left-out squares over the noise of each record as the best one has it: a loud record must not decide alone.
+  const std::vector<LeftOut> noise = trials.front().judged.left_out;
+  const auto chi2 = [&](const Judged& judged) {
+    double sum = 0.0;
+    for (std::size_t i = 0; i < noise.size(); ++i)
+      sum += judged.left_out[i].squares * noise[i].rows / std::max(noise[i].squares, 1e-300);
+    return sum;
+  };
+  const double least = chi2(trials.front().judged), fall = chi2(base) - least;
   std::size_t simplest = 0;
   for (std::size_t i = 1; i < trials.size(); ++i) {
-    const double left = trials[i].judged.rmse_cv();
-    if (passes(trials[i]) && left <= kSameError * least && square(left) - square(least) <= kSameFall * fall &&
+    const double left = chi2(trials[i].judged);
+    if (passes(trials[i]) && left <= kSameError * kSameError * least && left - least <= kSameFall * fall &&
         trials[i].proposal.added < trials[simplest].proposal.added)
       simplest = i;
   }

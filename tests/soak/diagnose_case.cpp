@@ -11,7 +11,6 @@
 #include "host/diagnosis/add.hpp"
 #include "host/diagnosis/complete.hpp"
 #include "host/diagnosis/diagnosis.hpp"
-#include "host/diagnosis/trials.hpp"
 #include "host/regression/shapes.hpp"
 #include "tests/support/twin_data.hpp"
 
@@ -21,7 +20,7 @@ namespace {
 using regression::Balance;
 using regression::BalanceData;
 
-// Of a set in which no candidate takes off enough.
+// Of a set in which no candidate is admissible.
 constexpr double kNoScore = -20.0;
 constexpr std::size_t kMostRounds = 4;
 
@@ -176,8 +175,7 @@ Outcome run(const Case& what) {
     if (i < 4)
       outcome.detail += fmt::format(" {}({:.1f},{:.2f}%{})", label(c.effect, c.order), c.score, c.chi2_fall_percent,
                                     c.admissible ? "" : ",x");
-    if (c.admissible && c.chi2_fall_percent > diagnosis::kNamedFallPercent)
-      outcome.best_score = std::max(outcome.best_score, c.score);
+    if (c.admissible) outcome.best_score = std::max(outcome.best_score, c.score);
   }
   const std::vector<std::string> hidden = split(what.hidden, '+');
   if (hidden.empty()) {

@@ -37,7 +37,7 @@ struct Outcome {
   double missing_over_noise = 0.0;  // RMS of what the hidden effects add to their balance, over the noise floor
   std::optional<double> holdout_over_floor;  // after the hidden effect was added
   std::vector<Recovered> recovered;
-  double best_score = 0.0;  // of all candidates that are admissible and take off enough of chi-square, named or not
+  double best_score = 0.0;  // of all candidates that are admissible, named or not
   std::string detail;       // the first candidates
   double seconds = 0.0;     // of the diagnosis alone
 };

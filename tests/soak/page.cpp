@@ -210,7 +210,7 @@ std::string threshold_header(const std::vector<Outcome>& all, const std::string&
     kinds += fmt::format("//   {}: {} sets, largest score {:.1f}\n", kind, some.size(), quantile(some, 1.0));
   return fmt::format(
       "// Made by `./dev soak MINUTES calibrate`; not written by hand. What a set with nothing hidden scores: the best "
-      "of all\n// candidates that are admissible and take off enough of the chi-square.\n#pragma once\n\nnamespace "
+      "of all\n// candidates that are admissible.\n#pragma once\n\nnamespace "
       "flexspline::diagnosis {{\n\n// From {} sets of the demo's drive and its experiments, seeds {} to {}, version "
       "{}:\n{}"
       "// Quantiles of the score: 50 % {:.1f}, 90 % {:.1f}, 99 % {:.1f}. One set in {:.0f} passes the limit, by an "
