@@ -154,8 +154,8 @@ bool passes(const Trial& t) {
   return t.admissible && t.fall.score > kNamedScore && t.fall.chi2_percent > kNamedFallPercent;
 }
 
-// A law that contains another fits at least as well. Of those that leave all but the same error, by the error itself
-// and by what was missing, the one with the fewest parameters comes first.
+// A law that contains another fits at least as well. Of the best one and its rivals in the catalogue that leave all but
+// the same error, by the error itself and by what was missing, the one with the fewest parameters comes first.
 void prefer_simple(const Judged& base, std::vector<Trial>& trials) {
   constexpr double kSameError = 1.1;
   constexpr double kSameFall = 0.005;
@@ -172,6 +172,10 @@ void prefer_simple(const Judged& base, std::vector<Trial>& trials) {
   std::size_t simplest = 0;
   for (std::size_t i = 1; i < trials.size(); ++i) {
     const double left = chi2(trials[i].judged);
+    const catalogue::Entry &best = *trials.front().proposal.entry, &other = *trials[i].proposal.entry;
+    if (!catalogue::names_contain(best.info->rivals, other.name()) &&
+        !catalogue::names_contain(other.info->rivals, best.name()))
+      continue;
     if (passes(trials[i]) && left <= kSameError * kSameError * least && left - least <= kSameFall * fall &&
         trials[i].proposal.added < trials[simplest].proposal.added)
       simplest = i;

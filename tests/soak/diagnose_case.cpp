@@ -57,7 +57,15 @@ struct Bench {
 
   explicit Bench(const Case& c) : file(plant::demo_plant()) {
     const std::vector<std::string> hidden = split(c.hidden, '+'), with = split(c.with, ',');
-    for (const std::string& name : hidden) plant::hide(file.drive, name, c.scale);
+    // The plant hides one; others are made a part of it and taken out of the model.
+    for (std::size_t k = 0; k < hidden.size(); ++k) {
+      if (k == 0) {
+        plant::hide(file.drive, hidden[k], c.scale);
+        continue;
+      }
+      plant::with(file.drive, hidden[k]);
+      for (plant::Effect& e : file.drive.effects) e.hidden = e.hidden || e.label() == hidden[k];
+    }
     for (const std::string& name : with)
       if (std::find(hidden.begin(), hidden.end(), name) == hidden.end()) plant::with(file.drive, name);
     file.drive.friction_variation = c.friction_variation;
@@ -196,6 +204,8 @@ Outcome run(const Case& what) {
   }
   const std::string truth = as_named(hidden.front());
   outcome.right = outcome.named == truth;
+  const std::vector<std::string> group = split(outcome.named, '+');
+  outcome.found_all = std::find(group.begin(), group.end(), truth) != group.end();
   const Balance balance = catalogue::get(truth.substr(0, truth.find(':'))).told_by();
   outcome.missing_over_noise = bench.missing_over_noise(balance);
   const diagnosis::Addition added = diagnosis::add(bench.dataset, bench.base, truth, {});

@@ -33,7 +33,7 @@ struct Outcome {
   std::string named;    // "+" between effects that could not be told apart, "-" for none
   std::string verdict;  // as the diagnosis says it
   bool right = false;
-  bool found_all = false;           // of several: by adding what is named until nothing is
+  bool found_all = false;           // of several, by adding what is named until nothing is; of one, among those named
   double missing_over_noise = 0.0;  // RMS of what the hidden effects add to their balance, over the noise floor
   std::optional<double> holdout_over_floor;  // after the hidden effect was added
   std::vector<Recovered> recovered;

@@ -84,8 +84,7 @@ std::string power(const std::vector<Outcome>& all) {
       "## One effect hidden\n\nBy the RMS of what the effect adds and the rest of the model cannot imitate, over the "
       "RMS of "
       "the noise.\n\n| missing over noise | named right, friction constant | named right, friction 3 % from run to run "
-      "| a "
-      "wrong name |\n| --- | --- | --- | --- |\n";
+      "| in a group that cannot be told apart | a wrong name |\n| --- | --- | --- | --- | --- |\n";
   constexpr double kEdges[] = {0.0, 0.025, 0.05, 0.1, 0.25, 1.0, 1e9};
   for (std::size_t k = std::size(kEdges) - 1; k-- > 0;) {
     const auto in = [&](const Outcome& o) {
@@ -95,13 +94,15 @@ std::string power(const std::vector<Outcome>& all) {
     const Selection varies = select(all, [&](const Outcome& o) { return in(o) && o.what.friction_variation > 0.0; });
     const Selection both = select(all, in);
     const auto wrong = static_cast<std::size_t>(
-        std::count_if(both.begin(), both.end(), [](const Outcome* o) { return !o->right && o->named != "-"; }));
+        std::count_if(both.begin(), both.end(), [](const Outcome* o) { return !o->found_all && o->named != "-"; }));
     if (both.empty()) continue;
-    text += fmt::format("| {} | {} | {} | {} |\n",
+    const auto grouped = static_cast<std::size_t>(
+        std::count_if(both.begin(), both.end(), [](const Outcome* o) { return !o->right && o->found_all; }));
+    text += fmt::format("| {} | {} | {} | {} | {} |\n",
                         kEdges[k + 1] > 1e8 ? fmt::format("{:g} and more", kEdges[k])
                                             : fmt::format("{:g} to {:g}", kEdges[k], kEdges[k + 1]),
                         share(count_right(constant), constant.size()), share(count_right(varies), varies.size()),
-                        share(wrong, both.size()));
+                        share(grouped, both.size()), share(wrong, both.size()));
   }
   const Selection told = select(all, [](const Outcome& o) {
     return single(o) && listed(o) && o.named != "-" && o.named.find('+') == std::string::npos;
