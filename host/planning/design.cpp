@@ -75,6 +75,11 @@ Separation separation(const std::vector<Factors>& all, const std::vector<std::si
   return {beats(totals, all, a, b), beats(totals, all, b, a)};
 }
 
+// The worse of the two decides; that one of them is told is a step on the way, where neither alone shows the other.
+double progress(const Separation& s) {
+  return s.worst() + 0.01 * std::min(std::max(s.of_first, s.of_second), kEnough);
+}
+
 double duration(const Motion& motion) {
   double sum = 0.0;
   for (const Run& run : motion.runs) sum += run.duration_s;
@@ -207,10 +212,10 @@ Design separate(const Question& question, std::string_view first, std::string_vi
       std::vector<std::size_t> more = chosen;
       more.push_back(m);
       const Separation s = separation(all, more, a, b);
-      if (s.worst() < kWorthwhile * std::max(design.after->worst(), 1e-3)) continue;
+      if (progress(s) < kWorthwhile * std::max(progress(*design.after), 1e-3)) continue;
       // Beyond what is enough, the least trouble wins.
-      const double merit = std::log(std::max(1e-6, std::min(s.worst(), kEnough))) - 0.3 * bench.motions()[m].trouble +
-                           0.01 * std::log(std::max(1e-6, s.worst()));
+      const double merit =
+          std::log(std::min(progress(s), kEnough)) - 0.3 * bench.motions()[m].trouble + 0.01 * std::log(progress(s));
       if (merit > most) {
         most = merit;
         best = m;

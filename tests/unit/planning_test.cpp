@@ -174,13 +174,14 @@ TEST(Planning, StiffnessIsUnknownUntilTheOutputIsLocked) {
   }
 }
 
-TEST(Planning, LimitsThatNoMotionKeepsAreSaid) {
+TEST(Planning, ACurrentThatMovesNothingTellsNothing) {
   const model::Model m = a_drive();
   Question q = question_of(m);
-  q.setting.limits.travel_rad = 1e-9;
-  q.setting.limits.velocity_rad_s = 1e-6;
+  q.setting.limits.current_a = 0.01;
   q.setting.off = q.setting.locked = q.setting.external_load = false;
-  EXPECT_THROW(separate(q, "gravity", "torque_bias"), std::exception);
+  const Design d = separate(q, "viscous_asymmetry", "coulomb_asymmetry");
+  EXPECT_LT(d.after->worst(), kTold);
+  EXPECT_TRUE(d.plan.runs.empty());
 }
 
 }  // namespace
