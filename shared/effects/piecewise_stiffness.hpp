@@ -15,7 +15,7 @@ struct PiecewiseStiffness : Stateless {
           "The spring has three slopes, as makers of gears state it: soft up to a torque T1, harder up to T2, "
           "hardest beyond.",
       .consequence = "The resonance jumps with the load's range; a model with one stiffness is too soft or too stiff.",
-      .causes = "Teeth that come into mesh one after the other.",
+      .causes = "Teeth that come into mesh one after the other as the load grows.",
       .check =
           "Compare the corners and slopes with the three that the maker's catalogue states for this size and ratio.",
       .rivals = "cubic_stiffness,backlash",

@@ -13,7 +13,7 @@ struct TorqueConstantSaturation : Stateless {
       .explanation = "At large currents the iron saturates, and an ampere makes less torque than at small ones.",
       .consequence =
           "The last amperes give little: peak acceleration and holding torque are below what the model says.",
-      .causes = "A motor driven near its peak current.",
+      .causes = "A motor driven near its peak current, or one with little iron.",
       .check =
           "Hold rising known weights and plot them over the current; a line that bends is the iron. Check the motor's "
           "peak current.",
