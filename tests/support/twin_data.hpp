@@ -70,10 +70,8 @@ inline model::Model model_of(const plant::Drive& drive, bool with_hidden, bool w
   }
   // What an effect stands in for is not in the drive beside it.
   std::string replaced;
-  for (const model::Effect& e : model.effects)
-    replaced += std::string(catalogue::get(e.type).info->replaces) + ",";
-  std::erase_if(model.effects,
-                [&](const model::Effect& e) { return catalogue::names_contain(replaced, e.type); });
+  for (const model::Effect& e : model.effects) replaced += std::string(catalogue::get(e.type).info->replaces) + ",";
+  std::erase_if(model.effects, [&](const model::Effect& e) { return catalogue::names_contain(replaced, e.type); });
   // A drive whose dry friction is Dahl's is first taken for one with Coulomb friction.
   const plant::Effect* dahl = drive.find("dahl_friction");
   if (dahl && dahl->hidden && !with_hidden && !model.find("coulomb_friction"))
