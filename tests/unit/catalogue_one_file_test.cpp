@@ -114,7 +114,7 @@ const Reasons& reasons() {
        "sublinear friction has two formulas, of which one is named as the other's rival"},
       {"host/diagnosis/trials.cpp", "likewise"},
       {"host/output/effect_curve.cpp", "a shift is drawn on a spring"},
-      {"host/regression/identify.cpp", "coefficients by direction are made of an even and an odd effect"}};
+      {"host/regression/estimates.cpp", "coefficients by direction are made of an even and an odd effect"}};
   return kReasons;
 }
 
