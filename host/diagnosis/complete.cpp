@@ -13,6 +13,9 @@ namespace {
 
 // Of the first fall: what comes after that is a matter of how well the formula fits.
 constexpr double kWorthAdding = 0.003;
+// Unless the error still stands above the noise by more than that: beside a first effect that is huge, one that matters
+// takes off little of it.
+constexpr double kAtFloor = 1.3;
 
 // Fall of chi-square over rows, in units of the noise where that is known: comparable between balances.
 double fall_of(const Diagnosis& d) {
@@ -68,7 +71,8 @@ Completion complete(const data::Dataset& dataset, const model::Model& model, con
   for (;;) {
     Diagnosis found = diagnose(dataset, result.model, options);
     bool more = found.verdict == Verdict::missing_effect && result.rounds.size() + 1 < most_rounds;
-    if (more && !result.rounds.empty() && fall_of(found) < kWorthAdding * fall_of(result.rounds.front())) {
+    const bool above = found.noise_floor && found.base_rmse > kAtFloor * *found.noise_floor;
+    if (more && !above && !result.rounds.empty() && fall_of(found) < kWorthAdding * fall_of(result.rounds.front())) {
       found.warnings.push_back(
           fmt::format("{} is not added: it takes off less than {:g} % of what the first effect did",
                       label(found.named.front()), 100.0 * kWorthAdding));
