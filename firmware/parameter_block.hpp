@@ -103,7 +103,7 @@ inline bool encoder_fits(const observers::EncoderAngle::Coefficients& c) {
 inline bool model_fits(const Parameters& p) {
   bool fits = true;
   // Visiting changes nothing.
-  auto& model = const_cast<model::DriveModel<N>&>(p.model);
+  auto& model = const_cast<decltype(Parameters::model)&>(p.model);
   model.for_each([&]<class Effect>(const model::Places<Effect, N>& places) {
     fits = fits && places.count <= places.coefficients.size();
   });

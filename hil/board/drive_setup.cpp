@@ -35,7 +35,8 @@ double output_inertia_of(const plant::Drive& drive) {
 }
 
 template <class Effect>
-void add_all(const plant::Drive& drive, const effects::DriveConstants<double>& d, model::DriveModel<N>& model) {
+void add_all(const plant::Drive& drive, const effects::DriveConstants<double>& d,
+             model::DriveModel<N, model::EveryFormula>& model) {
   // What a sensor gets wrong turns no shaft.
   for (const std::string_view of_sensor :
        {"torsion_zero", "torque_offset", "torque_sensor_gain", "torque_sensor_ripple"})
@@ -131,7 +132,7 @@ namespace {
 // exponent.
 void set_damping(const PackedModel& packed, control::FeedforwardSetup<double>& setup) {
   setup.damping_torque = 0.0;
-  model::DriveModel<N> model = packed.model;
+  auto model = packed.model;
   model.for_each([&]<class Effect>(model::Places<Effect, N>& places) {
     if constexpr (std::is_same_v<Effect, effects::StructuralDamping>) {
       if (places.count == 0) return;

@@ -13,7 +13,7 @@ namespace flexspline::board {
 struct PackedModel {
   model::BlockHeader header;
   effects::DriveConstants<double> constants;
-  model::DriveModel<firmware::N> model;
+  model::DriveModel<firmware::N, model::EveryFormula> model;
 };
 
 /// Reads a block. Throws std::runtime_error with what is wrong with it.

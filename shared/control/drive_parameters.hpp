@@ -74,7 +74,7 @@ struct DriveParameters {
   Feedforward::Coefficients<N> feedforward{};
   Excitation::Coefficients<N> excitation{};
   SafetyLimits<N> safety{};
-  model::DriveModel<N> model{};
+  model::DriveModel<N, model::EveryFormula> model{};
 };
 
 }  // namespace flexspline::control

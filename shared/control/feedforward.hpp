@@ -131,8 +131,8 @@ struct Feedforward {
   //   it bends, as long as it is nowhere stiffer; lead = N dq. With damping a step is no longer than
   //   T_tick (abs(T - transmission(dq))/damping_torque)^(1/damping_exponent), as the rate of the transmission is.
   // Friction that depends on the load takes the load of the tick before.
-  template <class N>
-  static constexpr Output<N> update(State<N>& s, const Coefficients<N>& c, model::DriveModel<N>& model,
+  template <class N, class Image>
+  static constexpr Output<N> update(State<N>& s, const Coefficients<N>& c, model::DriveModel<N, Image>& model,
                                     const SetPoint<N>& set, const Measured<N>& measured) {
     effects::Inputs<N> in{};
     in.angle = set.position;

@@ -24,13 +24,19 @@ constexpr std::size_t places_of() {
 // What a firmware image can run. All effects, as often as they are in a model; a tick asks each whether it is there.
 struct EveryEffect {
   static constexpr bool kFilled = false;
+  static constexpr bool kTables = true;
   static constexpr std::size_t places(std::size_t, std::size_t most) { return most; }
+};
+// All but those that a user makes: the points of a table take a kilobyte a place, which small processors do not have.
+struct EveryFormula : EveryEffect {
+  static constexpr bool kTables = false;
 };
 // The effects of these numbers, as often as each stands here. A tick runs all of them, without asking: an effect that a
 // block leaves out has coefficients of nought, and does nothing.
 template <std::size_t... Numbers>
 struct TheseEffects {
   static constexpr bool kFilled = true;
+  static constexpr bool kTables = true;
   static constexpr std::size_t places(std::size_t number, std::size_t most) {
     const std::size_t often = (std::size_t{0} + ... + (Numbers == number ? 1 : 0));
     return often < most ? often : most;
@@ -49,7 +55,7 @@ template <class Effect, class Image>
 constexpr std::size_t places_in(std::size_t number) {
   if constexpr (std::is_void_v<Effect>) {
     return 0;
-  } else if constexpr (Effect::kInfo.host_only) {
+  } else if constexpr (Effect::kInfo.host_only || (Effect::kInfo.made_by_user && !Image::kTables)) {
     return 0;
   } else {
     return Image::places(number, places_of<Effect>());
