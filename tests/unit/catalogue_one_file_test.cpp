@@ -40,7 +40,8 @@ std::vector<Source> sources_below(std::initializer_list<const char*> folders) {
 }
 
 bool is_infrastructure(std::string_view path) {
-  return path == "shared/effects/effect.hpp" || path == "shared/effects/variables.hpp" || path == "shared/effects/list.hpp" || path == "shared/effects/walk.hpp";
+  return path == "shared/effects/effect.hpp" || path == "shared/effects/variables.hpp" ||
+         path == "shared/effects/list.hpp" || path == "shared/effects/walk.hpp";
 }
 
 // C++ type of the effect that each header defines: FLEXSPLINE_EFFECT(16, Backlash) stands once in each.
@@ -113,6 +114,9 @@ const Reasons& reasons() {
       {"host/diagnosis/diagnose.cpp",
        "sublinear friction has two formulas, of which one is named as the other's rival"},
       {"host/diagnosis/trials.cpp", "likewise"},
+      {"host/diagnosis/deviations.cpp",
+       "which frictions go up and down together from run to run is no property of one"},
+      {"host/sensitivity/changes.cpp", "the report scales the stiffness, and no other parameter"},
       {"host/output/effect_curve.cpp", "a shift is drawn on a spring"},
       {"host/regression/estimates.cpp", "coefficients by direction are made of an even and an odd effect"}};
   return kReasons;
