@@ -232,8 +232,13 @@ struct Intervals {
   // For a share between nought and one. The drive may pass the target by a unit, and not by more however long it runs.
   static State relax(State from, State target, State) {
     constexpr std::int64_t kUnit = std::int64_t{1} << (kStateBits - 27);
-    if (from.high - target.low >= 8 * kOne || target.high - from.low >= 8 * kOne)
+    constexpr std::int64_t kMost = 8 * kOne;
+    const auto apart = [](std::int64_t high, std::int64_t low) { return high - low >= kMost; };
+    if (target.low <= -kMost || target.high >= kMost || from.low <= -kMost || from.high >= kMost ||
+        apart(from.high, target.low) || apart(target.high, from.low)) {
       Findings::note("a distance to relax over may leave its range");
+      return {-kMost, kMost};
+    }
     return hull(from, State{target.low - kUnit, target.high + kUnit});
   }
 

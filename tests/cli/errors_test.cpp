@@ -90,7 +90,7 @@ TEST(BadInput, ArgumentsThatAreMissingOrWrongAreNamed) {
   expect_refusal(shell, "flexspline check data.csv --tolerate everything", {"everything"});
   expect_refusal(shell, "flexspline compare --model model.toml data.csv --limit friction=1",
                  {"friction", "motor_balance"});
-  expect_refusal(shell, "flexspline identify data.csv --model model.toml --method oe", {"not built yet"});
+  expect_refusal(shell, "flexspline identify data.csv --model model.toml --method best", {"best", "partitioned"});
   expect_refusal(shell, "flexspline new --from data.csv --out project --map speed=current_a",
                  {"speed", "motor_velocity_rad_s"});
 }
