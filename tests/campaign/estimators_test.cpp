@@ -102,11 +102,11 @@ TEST(Estimators, IntervalsOf95PercentCover90To98PercentOver200Seeds) {
   expect_coverage(over_seeds(motor, Method::ls, 200, {}));
 }
 
-// Each seed takes some seconds: fewer of them, and wider limits (2.5 standard errors of 95 % over 40).
-TEST(Estimators, IntervalsOfTheFreeRunCoverAsMuchOver40Seeds) {
+// Each seed takes a second: fewer of them, and a wider limit (three standard errors of 95 % over 60).
+TEST(Estimators, IntervalsOfTheFreeRunCoverAsMuchOver60Seeds) {
   NoisyMotor motor;
   motor.duration_s = 2.0;
-  for (const auto& [name, s] : over_seeds(motor, Method::output_error, 40, {})) EXPECT_GE(s.covered, 0.86) << name;
+  for (const auto& [name, s] : over_seeds(motor, Method::output_error, 60, {})) EXPECT_GE(s.covered, 0.865) << name;
 }
 
 }  // namespace
