@@ -48,6 +48,7 @@ class App {
     take_change(command<RemoveOptions>("remove"), "id of the effect in the model, or its type");
     add_sensitivity();
     add_pack();
+    add_export();
     add_plan();
     add_not_built();
     std::vector<std::string> to_come(not_built_yet().begin(), not_built_yet().end());
@@ -314,6 +315,17 @@ class App {
         ->allow_extra_args(false);
     take_holdout(sub, options->data);
     take_pipeline(sub, options->pipeline);
+  }
+
+  void add_export() {
+    const auto [sub, options] = command<ExportOptions>("export");
+    take_model(sub, options->model);
+    sub->add_option("--as", options->as, "c: a C header; csv: tables; mujoco, urdf: a joint for a physics engine")
+        ->required()
+        ->check(CLI::IsMember({"c", "csv", "mujoco", "urdf"}))
+        ->type_name("c|csv|mujoco|urdf");
+    sub->add_option("--out", options->out, "the file, or the folder of tables (default: print; csv needs it)")
+        ->type_name("PATH");
   }
 
   void add_pack() {

@@ -153,4 +153,12 @@ struct UnpackOptions {
 };
 int run(const UnpackOptions& options, Console& console);
 
+struct ExportOptions {
+  std::filesystem::path model;
+  std::string as;             // "c", "csv", "mujoco", "urdf"
+  std::filesystem::path out;  // empty: standard output, or the model's name for the folder of tables
+  std::string json;
+};
+int run(const ExportOptions& options, Console& console);
+
 }  // namespace flexspline::cli

@@ -143,6 +143,17 @@ const std::array kHelp = {
         {kMakeData, kIdentify, "flexspline pack --model fitted.toml --out drive.block",
          "flexspline unpack drive.block --out again.toml"}},
     CommandHelp{
+        "export",
+        "the model for other tools: C header, tables, MuJoCo, URDF",
+        "c: one C99 header with all the model's effects, those with memory too, to be called once a sample; its "
+        "numbers "
+        "are those of simulate, to rounding. csv: a folder with the parameters, the friction over speed, the "
+        "transmission's loop, and the curve of each effect that depends on one signal. mujoco, urdf: a joint with "
+        "armature, the straight line nearest to the friction, and stiffness; what a joint cannot hold is said in a "
+        "comment.",
+        {kMakeData, kIdentify, "flexspline export --model fitted.toml --as c --out drive_model.h",
+         "flexspline export --model fitted.toml --as csv --out tables"}},
+    CommandHelp{
         "plan",
         "designs the motion that separates two effects, or that shows what is not well known",
         "Rehearses some thirty motions with the model, within the limits of the drive: triangles slow and fast, "

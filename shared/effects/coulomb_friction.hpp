@@ -20,6 +20,7 @@ struct CoulombFriction : Stateless {
           "since assembly means preload, a seal or a dry bearing.",
       .rivals = "dahl_friction",
       .separated_by = "small slow motion that reverses often",
+      .surface = "dry friction",
   };
   static constexpr ParameterInfo kParameters[] = {
       {.name = "torque", .unit = units::kTorque, .usual = 0.045, .low = 0.0},

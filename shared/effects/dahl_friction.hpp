@@ -22,6 +22,7 @@ struct DahlFriction {
       .rivals = "lugre_friction,coulomb_friction",
       .separated_by = "small slow motion that reverses often",
       .replaces = "coulomb_friction",
+      .surface = "dry friction",
   };
   static constexpr ParameterInfo kParameters[] = {
       {.name = "torque", .unit = units::kTorque, .usual = 0.045, .low = 0.0},

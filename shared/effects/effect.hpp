@@ -109,6 +109,9 @@ struct Description {
   std::string_view replaces{};      // effects that it stands in for, separated by commas
   std::string_view modulates{};     // the effect that it scales and needs in the model
   std::string_view contains{};      // effects whose torque it can draw as a part of its own
+  // A surface whose friction differs from run to run, as grease warms or settles: what carries the same name scales
+  // together.
+  std::string_view surface{};
   // Other balances that it adds to (bits of `on`); its parameters are estimated on its own balance, or, where that
   // tells nothing of them, on the motor balance.
   unsigned adds_to = 0;

@@ -22,6 +22,7 @@ struct LugreFriction {
       .rivals = "dahl_friction,stribeck_gaussian,stribeck_hess_soom,coulomb_friction",
       .separated_by = "small slow motion that reverses often, and a slow free triangle of velocity",
       .replaces = "coulomb_friction,stribeck_gaussian,stribeck_hess_soom",
+      .surface = "dry friction",
   };
   static constexpr ParameterInfo kParameters[] = {
       {.name = "coulomb", .unit = units::kTorque, .usual = 0.045, .low = 0.0},

@@ -21,6 +21,7 @@ struct OutputCoulombFriction : Stateless {
           "seal.",
       .rivals = "coulomb_friction",
       .separated_by = "a torque sensor",
+      .surface = "the output's dry friction",
   };
   static constexpr ParameterInfo kParameters[] = {
       {.name = "torque", .unit = units::kTorque, .usual = 0.6, .low = 0.0},

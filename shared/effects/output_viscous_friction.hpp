@@ -17,6 +17,7 @@ struct OutputViscousFriction : Stateless {
       .check = "Uncouple the motor, let the link swing and see how soon it stops, cold and warm.",
       .rivals = "viscous_friction",
       .separated_by = "a torque sensor",
+      .surface = "the output's viscous friction",
   };
   static constexpr ParameterInfo kParameters[] = {
       {.name = "coefficient", .unit = units::kViscous, .usual = 0.5, .low = 0.0},

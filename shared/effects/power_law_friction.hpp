@@ -20,6 +20,7 @@ struct PowerLawFriction : Stateless {
       .check = "Hold five or more speeds from slow to rated and plot the current; note grease and temperature.",
       .rivals = "viscous_friction,stribeck_gaussian",
       .separated_by = "steady motion at five or more speeds from slow to rated",
+      .surface = "viscous friction",
   };
   static constexpr ParameterInfo kParameters[] = {
       {.name = "torque", .unit = units::kTorque, .usual = 0.02, .low = 0.0},

@@ -17,6 +17,7 @@ struct ViscousFriction : Stateless {
       .check = "Hold several speeds and plot the current, cold and warm; check the kind and amount of grease.",
       .rivals = "power_law_friction",
       .separated_by = "steady motion at several speeds",
+      .surface = "viscous friction",
   };
   static constexpr ParameterInfo kParameters[] = {
       {.name = "coefficient", .unit = units::kViscous, .usual = 3.6e-4, .low = 0.0},

@@ -10,7 +10,7 @@ namespace {
 
 constexpr const char* kBuilt[] = {"demo",     "new",         "check",   "effects",  "measure",
                                   "identify", "simulate",    "compare", "diagnose", "add",
-                                  "remove",   "sensitivity", "plan",    "pack",     "unpack"};
+                                  "remove",   "sensitivity", "plan",    "pack",     "unpack",     "export"};
 constexpr const char* kToCome[] = {"export",  "drives",  "record", "flash", "backup",
                                    "restore", "monitor", "twin",   "hil",   "workbench"};
 

@@ -114,8 +114,6 @@ const Reasons& reasons() {
       {"host/diagnosis/diagnose.cpp",
        "sublinear friction has two formulas, of which one is named as the other's rival"},
       {"host/diagnosis/trials.cpp", "likewise"},
-      {"host/diagnosis/deviations.cpp",
-       "which frictions go up and down together from run to run is no property of one"},
       {"host/sensitivity/changes.cpp", "the report scales the stiffness, and no other parameter"},
       {"host/output/effect_curve.cpp", "a shift is drawn on a spring"},
       {"host/regression/estimates.cpp", "coefficients by direction are made of an even and an odd effect"}};

@@ -5,6 +5,8 @@
 #include <Eigen/Dense>
 #include <cmath>
 #include <random>
+#include <set>
+#include <string_view>
 
 #include "host/diagnosis/deviations.hpp"
 #include "host/regression/whitening.hpp"
@@ -140,6 +142,14 @@ TEST(FrictionGroups, LawsOfTheSameSurfaceAreOne) {
   EXPECT_EQ(groups[0].name, "viscous friction");
   EXPECT_EQ(groups[0].columns, std::vector<Eigen::Index>{1});
   EXPECT_EQ(groups[1].columns, std::vector<Eigen::Index>{2});
+}
+
+TEST(FrictionGroups, ACatalogueHasNoMoreThanTheirMatricesHold) {
+  std::set<std::string_view> surfaces;
+  for (const catalogue::Entry& entry : catalogue::all())
+    if (!entry.info->surface.empty()) surfaces.insert(entry.info->surface);
+  EXPECT_GE(surfaces.size(), 2u);
+  EXPECT_LE(static_cast<Eigen::Index>(surfaces.size()), kMostGroups);
 }
 
 TEST(Whitening, MakesTheDenseCovarianceTheIdentity) {

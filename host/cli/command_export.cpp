@@ -1,0 +1,77 @@
+#include <fmt/format.h>
+
+#include <nlohmann/json.hpp>
+
+#include "host/catalogue/defined.hpp"
+#include "host/cli/commands.hpp"
+#include "host/interchange/export.hpp"
+#include "host/output/json.hpp"
+
+namespace flexspline::cli {
+namespace {
+
+using nlohmann::json;
+
+void needs_values(const model::Model& model, const std::filesystem::path& path) {
+  std::string missing;
+  for (const model::Effect& effect : model.effects)
+    for (const std::string& parameter : catalogue::missing_values(effect))
+      missing += (missing.empty() ? "" : ", ") + effect.id + "." + parameter;
+  if (!missing.empty())
+    throw interchange::ExportError(
+        fmt::format("{}: no value for {}; run flexspline identify first", path.string(), missing));
+  if (model.effects.empty())
+    throw interchange::ExportError(
+        fmt::format("{}: the model has no effects, so there is nothing to write", path.string()));
+}
+
+}  // namespace
+
+int run(const ExportOptions& options, Console& console) {
+  const model::Model model = load_model(options.model).model;
+  needs_values(model, options.model);
+  const std::string source = options.model.filename().string();
+  json files = json::array();
+  if (options.as == "csv") {
+    if (options.out.empty()) throw UsageError("tables are several files; give --out DIR");
+    const auto tables = interchange::csv_tables(model);
+    make_folder(options.out);
+    for (const auto& [name, text] : tables) {
+      model::save(options.out / name, text);
+      console.line((options.out / name).string());
+      files.push_back((options.out / name).string());
+    }
+  } else {
+    const std::string text = options.as == "c"        ? interchange::c_header(model, source)
+                             : options.as == "mujoco" ? interchange::mujoco(model, source)
+                                                      : interchange::urdf(model, source);
+    if (!options.out.empty()) {
+      model::save(options.out, text);
+      console.line(fmt::format("{}: {} bytes", options.out.string(), text.size()));
+      files.push_back(options.out.string());
+    } else if (options.json == "-") {
+      throw UsageError("the file and the answer cannot both go to standard output; give --out FILE");
+    } else {
+      fmt::print("{}", text);
+    }
+  }
+  json answer = {{"format", "flexspline-export/1"}, {"as", options.as}, {"model", model.name}, {"files", files}};
+  if (options.as == "mujoco" || options.as == "urdf") {
+    const interchange::Joint joint = interchange::joint_of(model);
+    const bool linear = model.drive.axis == data::Axis::linear;
+    const auto quantity = [&](const char* name, double value, const char* rotary, const char* straight) {
+      return json{{"name", name}, {"value", output::json_number(value)}, {"unit", linear ? straight : rotary}};
+    };
+    answer["joint"] = {quantity("armature", joint.armature, "kg*m^2", "kg"),
+                       quantity("damping", joint.damping, "N*m*s/rad", "N*s/m"),
+                       quantity("friction", joint.friction, "N*m", "N"),
+                       quantity("friction_error", joint.friction_error, "N*m", "N"),
+                       quantity("stiffness", joint.stiffness, "N*m/rad", "N/m"),
+                       quantity("link_damping", joint.link_damping, "N*m*s/rad", "N*s/m")};
+    answer["left_out"] = joint.left_out;
+  }
+  output::save_json(options.json, answer);
+  return kDone;
+}
+
+}  // namespace flexspline::cli
