@@ -214,7 +214,7 @@ class Device {
   }
   void done() {
     stage_ = Stage::idle;
-    if (setup_.kind() != RequestKind::of_class || setup_.recipient() != Recipient::interface) return;
+    if (setup_.kind() == RequestKind::standard || setup_.recipient() != Recipient::interface) return;
     for_class_of_interface([&](auto& c, std::size_t) {
       if constexpr (requires { c.control_done(setup_); }) c.control_done(setup_);
     });
