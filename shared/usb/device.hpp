@@ -58,10 +58,18 @@ concept ClassHooks = requires(C c, Link<P> link, const Setup& setup, std::span<s
   // control_done(setup), when the host has seen the end of a request.
 };
 
+// Alternate settings that bring endpoints of their own are not built.
+template <class C>
+constexpr bool alternates_have_no_endpoints() {
+  if constexpr (requires { C::kAlternates; }) return C::kInEndpoints + C::kOutEndpoints == 0;
+  return true;
+}
+
 // `I` is an identity (identity.hpp).
 template <class I, Port P, InterfaceClass... C>
 class Device {
   static_assert((ClassHooks<C, P> && ...));
+  static_assert((alternates_have_no_endpoints<C>() && ...));
   using Parts = Composition<C...>;
 
  public:
@@ -358,7 +366,6 @@ class Device {
     bool accepted = false;
     for_class_of_interface([&](auto& c, std::size_t i) {
       if constexpr (requires { c.kAlternates; }) {
-        static_assert(c.kInEndpoints + c.kOutEndpoints == 0);
         accepted = setup_.value < c.kAlternates;
         if (accepted) c.set_alternate(setup_.value_low());
       } else if (setup_.value == 0) {

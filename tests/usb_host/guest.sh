@@ -97,8 +97,7 @@ with_libraries() { # FILE TARGET_NAME
     [[ -e $root$library ]] || cp -L "$library" "$root$library"
   done
 }
-cp -L "$(command -v busybox)" "$root/bin/busybox"
-for program in usbip lsusb "${programs[@]}"; do with_libraries "$program" "$(basename "$program")"; done
+for program in busybox usbip lsusb "${programs[@]}"; do with_libraries "$program" "$(basename "$program")"; done
 # hidapi over libusb turns strings into wide characters by the C library's converters.
 gconv=$(dirname "$(find /usr/lib -path '*gconv/UTF-16.so' 2>/dev/null | head -n 1)")
 if [[ -d $gconv ]]; then
@@ -163,7 +162,7 @@ status=0
 timeout -k 5 "$seconds" qemu-system-x86_64 -accel tcg -smp 1 -m 512 -nodefaults -display none -no-reboot -serial stdio \
   -nic user,model=e1000 -kernel "$kernel/vmlinuz" -initrd "$work/initramfs.gz" \
   -append "console=ttyS0 quiet loglevel=3 panic=-1 random.trust_cpu=on TWIN_PORT=$port" \
-  </dev/null 2>"$work/qemu.txt" | tr -d '\r' | tee "$work/serial.txt" | sed -u '/^guest: exit /d' || status=$?
+  </dev/null 2>"$work/qemu.txt" | tr -d '\r' | tee "$work/serial.txt" | sed -u '/^guest: exit /d; /reboot: Power down/d' || status=$?
 if grep -q '^guest: exit ' "$work/serial.txt"; then
   status=$(awk '/^guest: exit / {print $3}' "$work/serial.txt")
 elif ((status == 124 || status == 137)); then

@@ -25,12 +25,13 @@ drive_is_gone() { ! grep -qs 1209 /sys/bus/usb/devices/*/idVendor; }
 
 # attach [BUS_ID]: plugs in; back when the operating system is done with it.
 attach() {
-  usbip --tcp-port "$TWIN_PORT" attach -r "$TWIN_HOST" -b "${1:-1-1}" || fail "usbip attach ${1:-1-1}"
+  usbip --tcp-port "$TWIN_PORT" attach -r "$TWIN_HOST" -b "${1:-1-1}" >/tmp/usbip.txt 2>&1 ||
+    { cat /tmp/usbip.txt; fail "usbip attach ${1:-1-1}"; }
   until_true 10 drive_is_there || fail "no device appeared after attach ${1:-1-1}"
 }
 # detach [PORT]: pulls out, as the operating system sees it.
 detach() {
-  usbip detach -p "${1:-00}" || fail "usbip detach ${1:-00}"
+  usbip detach -p "${1:-00}" >/tmp/usbip.txt 2>&1 || { cat /tmp/usbip.txt; fail "usbip detach ${1:-00}"; }
   until_true 10 drive_is_gone || fail "the device stayed after detach"
 }
 
