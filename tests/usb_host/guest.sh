@@ -92,7 +92,8 @@ with_libraries() { # FILE TARGET_NAME
     exit 2
   }
   cp -L "$source" "$root/bin/$2"
-  { ldd "$source" 2>/dev/null || true; } | grep -o '/[^ ]*' | while read -r library; do
+  # A static program, or a script, loads none.
+  { ldd "$source" 2>/dev/null | grep -o '/[^ ]*' || true; } | while read -r library; do
     mkdir -p "$root$(dirname "$library")"
     [[ -e $root$library ]] || cp -L "$library" "$root$library"
   done
