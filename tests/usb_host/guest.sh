@@ -56,14 +56,29 @@ modules=(e1000 usb-common usbcore usbip-core vhci-hcd hid hid-generic usbhid)
 
 # The kernel of this Debian, taken out of its package.
 kernel=$(dirname "$work")/kernel
+# download_kernel FOLDER APT_OPTIONS...: sets `package`; false, with `reason`, where it did not come.
+download_kernel() {
+  local folder=$1
+  shift
+  package=$(apt-cache "$@" depends linux-image-amd64 2>/dev/null | awk '$1 == "Depends:" && $2 ~ /^linux-image-/ {print $2; exit}')
+  reason="apt knows no package linux-image-amd64; is this Debian, and is the network there?"
+  [[ -n $package ]] || return 1
+  (cd "$folder" && timeout 300 apt-get "$@" -q download "$package") >"$kernel/download.log" 2>&1 && return
+  reason="$package cannot be downloaded: $(grep -m 1 '^E:' "$kernel/download.log" || echo 'is the network there?')"
+  return 1
+}
 fetch_kernel() {
-  local package new=$kernel/new
+  local package reason new=$kernel/new own=()
   rm -rf "$new"
   mkdir -p "$new"
-  package=$(apt-cache depends linux-image-amd64 2>/dev/null | awk '$1 == "Depends:" && $2 ~ /^linux-image-/ {print $2; exit}')
-  [[ -n $package ]] || skip "no kernel: apt knows no package linux-image-amd64; is this Debian, and were its package lists fetched (apt-get update)?"
-  (cd "$new" && timeout 300 apt-get -q download "$package") >"$kernel/download.log" 2>&1 ||
-    skip "no kernel: $package cannot be downloaded: $(grep -m 1 '^E:' "$kernel/download.log" || echo 'is the network there?')"
+  if ! download_kernel "$new"; then
+    # Package lists that are missing, or older than the last update of Debian: own ones, which nobody has to be root for.
+    mkdir -p "$kernel"/apt/{lists,cache/archives}/partial
+    own=(-o "Dir::State::Lists=$kernel/apt/lists" -o "Dir::Cache=$kernel/apt/cache")
+    timeout 300 apt-get "${own[@]}" -q update >"$kernel/update.log" 2>&1 || true
+    download_kernel "$new" "${own[@]}" || skip "no kernel: $reason"
+    rm -rf "$kernel/apt"
+  fi
   local wanted=('./boot/vmlinuz-*')
   for module in "${modules[@]}"; do wanted+=("*/$module.ko"); done
   # Those that are built in are not found, which is no error.
@@ -144,7 +159,8 @@ trap end_twin EXIT
 port=0
 if [[ -n $twin ]]; then
   : >"$work/twin.txt"
-  sh -c "exec $twin" >"$work/twin.txt" 2>&1 </dev/null &
+  # With a limit of its own: should this script be killed, the twin does not stay for ever.
+  timeout $((seconds + 60)) sh -c "exec $twin" >"$work/twin.txt" 2>&1 </dev/null &
   twin_process=$!
   for _ in $(seq 200); do
     port=$(awk '$1 == "port" {print $2; exit}' "$work/twin.txt")
