@@ -81,7 +81,7 @@ class Device {
   static_assert(I::kManufacturer.size() <= kLongestString && I::kProduct.size() <= kLongestString);
 
   // `serial` has to outlive the device; what is beyond 31 characters is not shown.
-  Device(P& port, std::string_view serial) : port_(port), serial_(serial.substr(0, kLongestString)) {}
+  Device(P& port, std::string_view serial) : port_(port), serial_(shown(serial)) {}
 
   template <class Class>
   Class& get() {
@@ -230,6 +230,10 @@ class Device {
 
   // Requests.
 
+  // Not substr(), which drags the library's exceptions into an image.
+  static constexpr std::string_view shown(std::string_view text) {
+    return {text.data(), text.size() < kLongestString ? text.size() : kLongestString};
+  }
   bool is_set_address() const {
     return setup_.kind() == RequestKind::standard && setup_.recipient() == Recipient::device && !setup_.to_host() &&
            setup_.request == static_cast<std::uint8_t>(StandardRequest::set_address);
@@ -320,7 +324,7 @@ class Device {
     const std::string_view text = string(index);
     if (text.empty()) return kRefused;
     std::size_t n = 2;
-    for (const char c : text.substr(0, kLongestString)) {
+    for (const char c : shown(text)) {
       const auto byte = static_cast<std::uint8_t>(c);
       buffer_[n++] = byte < 0x80 ? byte : std::uint8_t{'?'};  // ASCII, as UTF-16
       buffer_[n++] = 0;
