@@ -31,6 +31,15 @@ for way in hidraw libusb; do
   [ -e /dev/hidraw0 ] || { echo 1-1:1.0 >/sys/bus/usb/drivers/usbhid/bind; until_true 5 drive_is_there; }
 done
 
+# Configured away, and again; then reset, after which the kernel begins with the descriptors.
+echo 0 >/sys/bus/usb/devices/1-1/authorized
+until_true 5 no test -e /dev/hidraw0 || fail "the interface stayed without a configuration"
+echo 1 >/sys/bus/usb/devices/1-1/authorized
+until_true 5 drive_is_there || fail "the configuration did not come back"
+usbreset 1209:0001 >reset.txt 2>&1 || { cat reset.txt; fail "usbreset"; }
+until_true 5 drive_is_there || fail "the device did not come back after a reset"
+echo_check_hidraw echo ECHO1 50 || fail "echo after a reset"
+
 detach 00
 attach 1-1
 echo_check_hidraw echo ECHO1 50 || fail "echo after attaching again"
