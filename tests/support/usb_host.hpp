@@ -5,7 +5,6 @@
 #include <array>
 #include <cstdint>
 #include <deque>
-#include <map>
 #include <optional>
 #include <span>
 #include <string>
@@ -29,13 +28,18 @@ struct TestPort {
     int began = 0;  // how often its toggle was put to DATA0
   };
 
-  std::map<std::uint8_t, Pipe> pipes;
+  struct Pipes {
+    std::array<Pipe, 32> all;
+    Pipe& operator[](std::uint8_t a) { return all[static_cast<std::size_t>((a & 0x0f) | ((a & 0x80) >> 3))]; }
+  };
+
+  Pipes pipes;
   std::uint8_t address = 0;
   std::vector<std::string> broken;  // rules of the contract
 
   TestPort() { bus_reset(); }
   void bus_reset() {
-    pipes.clear();
+    pipes = {};
     address = 0;
     pipes[0x00].open = pipes[0x80].open = true;
   }
