@@ -418,7 +418,6 @@ class Device {
     });
   }
   void configure(bool on) {
-    halted_ = 0;
     if (configured_) {
       for_each_class([](auto& c, std::size_t) { c.stop(); });
       for_each_endpoint(kConfiguration,

@@ -147,7 +147,10 @@ class TestHost {
       done.data.insert(done.data.end(), packet.begin(), packet.end());
       more = packet.size() == 64 && done.data.size() < r.length;
     }
+    // After all that was asked for there is no packet, not even an empty one.
+    const bool extra = wire_.pipes[0x80].waiting.has_value();
     went(out(0, {}), done);
+    done.hung = done.hung || extra;
     return done;
   }
   Done set(Request r, const Octets& data = {}) {

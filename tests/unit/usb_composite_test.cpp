@@ -84,6 +84,7 @@ TEST(UsbComposite, TakesLongDataWholeOrNotAtAll) {
   EXPECT_TRUE(b.host.set({0x41, 1, 0, 1, 0}, counting(201)).stalled);    // longer than anybody takes
   EXPECT_TRUE(b.host.put({0x41, 1, 0, 1, 150}, counting(100)).stalled);  // shorter than promised
   EXPECT_TRUE(b.host.put({0x41, 1, 0, 1, 70}, counting(100)).stalled);   // longer
+  EXPECT_TRUE(b.host.put({0x41, 1, 0, 1, 70}, counting(128)).stalled);   // longer by a whole packet
   EXPECT_EQ(block.blocks, before);
   EXPECT_TRUE(b.host.set({0x41, 1, 0, 1, 0}, {0xee}).stalled);  // the class refuses what it got
   EXPECT_EQ(block.blocks, before + 1);
