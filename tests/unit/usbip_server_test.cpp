@@ -173,6 +173,21 @@ TEST_F(UsbIpServer, LongTransfersGoInPackets) {
   }
   EXPECT_EQ(got[21], 149);
   EXPECT_EQ(got[22], 0);
+  // More than the device has room for: it goes on where it stopped.
+  Octets six(6 * 64);
+  for (std::size_t i = 0; i < six.size(); ++i) six[i] = static_cast<std::uint8_t>(i / 64);
+  const std::uint32_t out = c->submit({.endpoint = 1, .data = six});
+  EXPECT_EQ(c->unread(), 0u);
+  for (int mark = 0; mark < 6; ++mark) {
+    ASSERT_TRUE(first.get<Reports>().receive(got)) << mark;
+    EXPECT_EQ(got[0], mark);
+    turn();
+    turn();
+  }
+  EXPECT_FALSE(first.get<Reports>().receive(got));
+  const auto whole = c->returned();
+  EXPECT_EQ(whole->sequence, out);
+  EXPECT_EQ(whole->actual, six.size());
   // To the host: until it has all that it asked for.
   const std::uint32_t in = c->submit({.endpoint = 1, .in = true, .length = 128});
   usb::Report report;
@@ -190,6 +205,62 @@ TEST_F(UsbIpServer, LongTransfersGoInPackets) {
   first.get<Reports>().send(report);
   c->submit({.endpoint = 1, .in = true, .length = 10});
   EXPECT_EQ(c->returned()->status, -75);
+}
+
+// The drive's device, but for packets to the host that come out shorter or longer.
+class Crooked : public usbip::BusDevice {
+ public:
+  void reset() override { device.reset(); }
+  void setup(std::span<const std::uint8_t, 8> bytes) override { device.setup(bytes); }
+  usbip::Handshake in(std::uint8_t endpoint, std::vector<std::uint8_t>& packet) override {
+    const usbip::Handshake hand = device.in(endpoint, packet);
+    const std::size_t to = endpoint == 0 ? control_bytes : report_bytes;
+    if (hand == usbip::Handshake::ack && to != 0 && !packet.empty()) packet.resize(to);
+    return hand;
+  }
+  usbip::Handshake out(std::uint8_t endpoint, std::span<const std::uint8_t> packet) override {
+    return device.out(endpoint, packet);
+  }
+  HidDevice device{"CROOKED"};
+  std::size_t control_bytes = 0, report_bytes = 0;  // nought: as they are
+};
+
+TEST_F(UsbIpServer, AShortPacketEndsATransferAndALongOneIsAnOverflow) {
+  Crooked crooked;
+  server.plug("1-3", crooked);
+  auto c = attached("1-3");
+  crooked.report_bytes = 10;
+  for (const std::uint32_t flags : {0u, 1u}) {
+    crooked.device.get<Reports>().send(usb::Report{});
+    crooked.device.poll();
+    c->submit({.endpoint = 1, .in = true, .length = 128, .flags = flags});
+    const auto r = c->returned();
+    EXPECT_EQ(r->status, flags == 0 ? 0 : kShort);
+    EXPECT_EQ(r->actual, 10u);
+  }
+  crooked.control_bytes = 19;
+  EXPECT_EQ(c->get(0x80, 6, 0x0100, 0, 18).status, -75);
+  crooked.control_bytes = 0;
+  EXPECT_EQ(c->get(0x80, 6, 0x0100, 0, 18).status, 0);
+  c.reset();
+  server.unplug("1-3");
+}
+
+TEST_F(UsbIpServer, ALaterTransferDoesNotOvertakeOneThatWaits) {
+  usbip::Bus bus;
+  HidDevice device{"X"};
+  bus.plug("1-1", device);
+  usbip::Connection talk(bus);
+  talk.take(import_request("1-1"));
+  talk.take(submit_bytes({.sequence = 1, .setup = UsbIpClient::setup(0x00, 9, 1, 0, 0)}));
+  talk.output().clear();
+  talk.take(submit_bytes({.sequence = 7, .endpoint = 1, .in = true, .length = 64}));
+  device.get<Reports>().send(usb::Report{});
+  device.poll();
+  talk.take(submit_bytes({.sequence = 8, .endpoint = 1, .in = true, .length = 64}));
+  talk.advance();
+  ASSERT_EQ(talk.output().size(), 48u + 64u);
+  EXPECT_EQ(get32(talk.output(), 4), 7u);
 }
 
 TEST_F(UsbIpServer, TakesBackATransferThatWaitsAndSaysSoWhereItHadEnded) {
