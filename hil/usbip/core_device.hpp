@@ -1,0 +1,57 @@
+#pragma once
+
+#include <cstdint>
+#include <span>
+#include <string>
+#include <utility>
+#include <vector>
+
+#include "hil/usbip/bus_device.hpp"
+#include "hil/usbip/software_port.hpp"
+#include "shared/usb/device.hpp"
+
+namespace flexspline::usbip {
+
+/// The drive's own device core (shared/usb) on a software port: `CoreDevice<usb::FlexsplineIdentity, usb::Hid<16, 4>>`.
+/// The application reaches its classes by get(), and calls poll() after it has given them something to send.
+template <class Identity, class... Classes>
+class CoreDevice final : public BusDevice {
+ public:
+  explicit CoreDevice(std::string serial) : serial_(std::move(serial)) { reset(); }
+  // The core holds references to its neighbours.
+  CoreDevice(const CoreDevice&) = delete;
+  CoreDevice& operator=(const CoreDevice&) = delete;
+
+  template <class Class>
+  Class& get() {
+    return core_.template get<Class>();
+  }
+  bool configured() const { return core_.configured(); }
+  void poll() { core_.poll(); }
+
+  void reset() override {
+    port_.bus_reset();
+    core_.reset();
+  }
+  void setup(std::span<const std::uint8_t, 8> bytes) override {
+    port_.setup_came();
+    core_.setup(bytes);
+  }
+  Handshake in(std::uint8_t endpoint, std::vector<std::uint8_t>& packet) override {
+    const Handshake hand = port_.take(endpoint, packet);
+    if (hand == Handshake::ack) core_.sent(endpoint);
+    return hand;
+  }
+  Handshake out(std::uint8_t endpoint, std::span<const std::uint8_t> packet) override {
+    const Handshake hand = port_.offer(endpoint);
+    if (hand == Handshake::ack) core_.received(endpoint, packet);
+    return hand;
+  }
+
+ private:
+  std::string serial_;
+  SoftwarePort port_;
+  usb::Device<Identity, SoftwarePort, Classes...> core_{port_, serial_};
+};
+
+}  // namespace flexspline::usbip

@@ -1,0 +1,44 @@
+// What the device core asks of the hardware that speaks on the wire. The core is a template over it; a controller of a
+// chip and the software port of the twin (hil/usbip) run the same core, and no call is virtual.
+//
+// The port calls the core back, all from one context (an interrupt or background work, not both):
+//   reset()                  a bus reset ended
+//   setup(bytes)             SETUP came on endpoint 0; whatever waited there is void
+//   received(number, bytes)  an OUT packet came on an endpoint that was asked to receive
+//   sent(number)             the host took the packet of send()
+#pragma once
+
+#include <concepts>
+#include <cstdint>
+#include <span>
+
+#include "shared/usb/chapter9.hpp"
+
+namespace flexspline::usb {
+
+struct EndpointSetup {
+  std::uint8_t address = 0;
+  TransferType type = TransferType::control;
+  std::uint16_t packet_bytes = 0;
+};
+
+template <class P>
+concept Port = requires(P port, std::uint8_t number, std::span<const std::uint8_t> packet, EndpointSetup endpoint) {
+  // When a controller has to know its new address: before the status stage of SET_ADDRESS (it then waits by itself) or
+  // after it.
+  { P::kAddressBeforeStatus } -> std::convertible_to<bool>;
+  port.set_address(number);
+  // Opens an endpoint with its toggle at DATA0, not halted, nothing waiting. Endpoint 0 is open from the reset on.
+  port.open(endpoint);
+  port.close(number);  // by address; it answers nothing any more
+  // One packet that goes when the host asks, until then NAK; the port copies it. Never two at a time.
+  port.send(number, packet);
+  // Ready for one packet; until then NAK.
+  port.receive(number);
+  // By address. STALL to whatever the host asks, and what waited is forgotten; on endpoint 0 the next SETUP ends it.
+  // Unstalled, the toggle begins at DATA0 and nothing waits.
+  port.stall(number);
+  port.unstall(number);
+};
+
+}  // namespace flexspline::usb
