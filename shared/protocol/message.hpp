@@ -1,8 +1,8 @@
 // The message that goes between a host and a drive, over whatever link: at most 64 bytes, little-endian.
 //
-//   0  kind     of a request; an answer has the same with kAnswerBit; from kFirstUnasked on what a drive sends by
-//   itself 1  number   of the request, any; comes back with the answer 2  length   of the payload, 0 to 60 3  code of
-//   an answer; else nought (of telemetry: the number of frames) 4  payload
+//   0  kind     of a request, below 0x70; an answer has the same with kAnswerBit; from kFirstUnasked on what a drive
+//   sends by itself 1  number   of the request, any; comes back with the answer 2  length   of the payload, 0 to 60 3
+//   code of an answer; else nought (of telemetry: the number of frames) 4  payload
 //
 // README.md has the table of kinds. A report of 64 bytes is filled up with noughts.
 #pragma once
@@ -26,7 +26,8 @@ inline constexpr std::size_t kMostPayload = kReportBytes - kHeadBytes;
 using Report = std::array<std::uint8_t, kReportBytes>;
 
 inline constexpr std::uint8_t kAnswerBit = 0x80;
-inline constexpr std::uint8_t kFirstUnasked = 0xF0;
+inline constexpr std::uint8_t kEndOfRequests = 0x70;
+inline constexpr std::uint8_t kFirstUnasked = kAnswerBit + kEndOfRequests;
 
 // Numbers stay as they are for good; a kind that is no longer served is not used again.
 enum class Kind : std::uint8_t {
@@ -82,6 +83,7 @@ struct Message {
   std::array<std::uint8_t, kMostPayload> payload{};
 
   constexpr Kind request() const { return static_cast<Kind>(kind & ~kAnswerBit); }
+  constexpr bool is_request() const { return kind < kEndOfRequests; }
   constexpr bool is_unasked() const { return kind >= kFirstUnasked; }
   constexpr bool is_answer() const { return kind >= kAnswerBit && !is_unasked(); }
   constexpr std::size_t size() const { return kHeadBytes + length; }

@@ -173,6 +173,15 @@ struct BlockRead {
   }
   bool operator==(const BlockRead&) const = default;
 };
+// `sequence` as the status had it: a restore that is asked for twice, because an answer got lost, is done once.
+struct BlockRestore {
+  std::uint16_t sequence = 0;
+  template <class Codec>
+  constexpr void fields(Codec& c) {
+    c(sequence);
+  }
+  bool operator==(const BlockRestore&) const = default;
+};
 // Answer to commit and restore: of the validator, nought for a good block.
 struct Reason {
   std::uint32_t reason = 0;

@@ -67,6 +67,9 @@ class ParameterStore {
   // Empty where there is none. The bytes lie in flash, from a multiple of eight on, until the next begin().
   constexpr std::span<const std::uint8_t> active() const { return good_block(active_); }
   constexpr std::span<const std::uint8_t> previous() const { return good_block(1 - active_); }
+  // CRC-32 of these, nought where there is none.
+  constexpr std::uint32_t active_crc() const { return rank_[active_] == 0 ? 0 : word(active_, 2); }
+  constexpr std::uint32_t previous_crc() const { return rank_[1 - active_] == 0 ? 0 : word(1 - active_, 2); }
   // One more with each commit and each restore; nought: there is no active block.
   constexpr std::uint16_t sequence() const { return rank_[active_]; }
   constexpr std::size_t staged() const { return staged_; }

@@ -64,6 +64,9 @@ void randomise(std::mt19937& r, Chunk& x) {
 void randomise(std::mt19937& r, BlockRead& x) {
   x = {below<Which>(r, 2), static_cast<std::uint32_t>(r())};
 }
+void randomise(std::mt19937& r, BlockRestore& x) {
+  x.sequence = static_cast<std::uint16_t>(r());
+}
 void randomise(std::mt19937& r, Reason& x) {
   x.reason = static_cast<std::uint32_t>(r());
 }
@@ -114,8 +117,8 @@ void randomise(std::mt19937& r, FrameHead& x) {
 template <class T>
 class Payload : public ::testing::Test {};
 using AllPayloads =
-    ::testing::Types<Empty, Hello, Identity, Effects, Status, BlockBegin, Chunk, BlockRead, Reason, Command,
-                     CommandAnswer, Excitation, ExcitationGuard, ExcitationLines, Subscription, FrameHead>;
+    ::testing::Types<Empty, Hello, Identity, Effects, Status, BlockBegin, Chunk, BlockRead, BlockRestore, Reason,
+                     Command, CommandAnswer, Excitation, ExcitationGuard, ExcitationLines, Subscription, FrameHead>;
 TYPED_TEST_SUITE(Payload, AllPayloads);
 
 TYPED_TEST(Payload, ComesBackAsItWasSentAndEveryOtherLengthIsRefused) {
@@ -199,7 +202,7 @@ TEST(Protocol, BytesOnTheWireAreTheRecordedOnes) {
   EXPECT_EQ(wire(request(Kind::block_begin, 2, BlockBegin{0x1234, 0xDEADBEEF})), "1002080034120000efbeadde");
   EXPECT_EQ(wire(request(Kind::block_chunk, 3, Chunk{56, {1, 2, 3}, 3})), "1103070038000000010203");
   EXPECT_EQ(wire(request(Kind::block_commit, 4, Empty{})), "12040000");
-  EXPECT_EQ(wire(request(Kind::block_restore, 4, Empty{})), "13040000");
+  EXPECT_EQ(wire(request(Kind::block_restore, 4, BlockRestore{0x0102})), "130402000201");
   EXPECT_EQ(wire(request(Kind::block_read, 5, BlockRead{Which::previous, 0x38})), "140505000138000000");
   EXPECT_EQ(wire(answer_to(request(Kind::block_commit, 4, Empty{}), Code::invalid, Reason{11})), "920404250b000000");
   EXPECT_EQ(wire(request(Kind::command, 6, Command{CommandKind::arm, Mode::position, true, true, -2, 1, 2, 3})),
