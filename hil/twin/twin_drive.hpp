@@ -19,8 +19,8 @@ struct TwinSetup {
   std::uint64_t seed = 1;
   std::string serial = "TWIN";
   std::filesystem::path flash_file{};  ///< empty: what is flashed ends with the twin
-  bool as_made = true;               ///< an empty flash memory gets the block of the drive's maker
-  bool locked = false;               ///< the output
+  bool as_made = true;                 ///< an empty flash memory gets the block of the drive's maker
+  bool locked = false;                 ///< the output
 };
 
 using TwinApplication = firmware::Application<board::SoftwareBoard>;
