@@ -8,11 +8,10 @@
 namespace flexspline::cli_test {
 namespace {
 
-constexpr const char* kBuilt[] = {"demo",     "new",         "check",   "effects",  "measure",
-                                  "identify", "simulate",    "compare", "diagnose", "add",
-                                  "remove",   "sensitivity", "plan",    "pack",     "unpack"};
-constexpr const char* kToCome[] = {"export",  "drives",  "record", "flash", "backup",
-                                   "restore", "monitor", "twin",   "hil",   "workbench"};
+constexpr const char* kBuilt[] = {"demo",    "new",      "check", "effects", "measure",     "identify", "simulate",
+                                  "compare", "diagnose", "add",   "remove",  "sensitivity", "plan",     "pack",
+                                  "unpack",  "drives",   "flash", "backup",  "restore",     "monitor",  "record"};
+constexpr const char* kToCome[] = {"export", "twin", "hil", "workbench"};
 
 std::vector<std::string> example_lines(const std::string& help) {
   std::vector<std::string> lines;
