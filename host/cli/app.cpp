@@ -428,6 +428,7 @@ class App {
         ->type_name("PLAN");
     record->add_option("--out", record_options->out, "folder for the measurements")->required()->type_name("DIR");
     record->add_flag("--force", record_options->force, "write into a folder that is not empty");
+    record->add_flag("--clear-fault", record_options->clear_fault, "the cause of the fault it stands in is gone");
     take_yes(record, record_options->yes);
   }
 

@@ -87,6 +87,7 @@ int run(const RecordOptions& options, Console& console) {
   const drive::Origin origin{session.serial(), session.board(), fmt::format("{}.{}", id.firmware[0], id.firmware[1]),
                              deployment::sha256(block)};
   make_folder(options.out);
+  if (options.clear_fault) recorder.clear_fault();
   console.line(named(session));
   const Interruptible interruptible;
   std::vector<drive::Recording> all;

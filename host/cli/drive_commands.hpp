@@ -55,6 +55,7 @@ struct RecordOptions {
   std::filesystem::path out;
   bool yes = false;
   bool force = false;
+  bool clear_fault = false;
   std::string json;
 };
 int run(const RecordOptions& options, Console& console);

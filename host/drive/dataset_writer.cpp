@@ -11,7 +11,7 @@ namespace {
 
 // A TOML float needs a point or an exponent.
 std::string real(double value) {
-  std::string text = fmt::format("{}", value);
+  std::string text = fmt::format("{:.8g}", value);
   if (text.find_first_of(".e") == std::string::npos) text += ".0";
   return text;
 }
@@ -27,8 +27,8 @@ std::string csv_of(const Recording& r, const Scales& scales, const Origin& origi
   line("# experiment: {}", r.run.name);
   line("# load: {}", r.run.locked ? "locked" : "free");
   line("# role: fit");
-  line("# gear_ratio: {}", scales.constants.gear_ratio);
-  line("# torque_constant_nm_a: {}", scales.constants.torque_constant);
+  line("# gear_ratio: {:.8g}", scales.constants.gear_ratio);
+  line("# torque_constant_nm_a: {:.8g}", scales.constants.torque_constant);
   if (scales.header.encoder_counts > 0) line("# encoder_counts: {}", scales.header.encoder_counts);
   line("# motor_position_zero: absolute");
   line("# output_position_zero: absolute");

@@ -6,6 +6,7 @@
 #include <chrono>
 #include <cmath>
 #include <numbers>
+#include <thread>
 
 #include "host/planning/excitation.hpp"
 #include "shared/control/excitation.hpp"
@@ -186,14 +187,22 @@ void Recorder::send_excitation(const planning::Run& run) {
   });
 }
 
+void Recorder::clear_fault() {
+  if (session_.status().mode == protocol::Mode::fault) session_.command({.kind = protocol::CommandKind::clear_fault});
+}
+
 Recording Recorder::record(const planning::Run& run, const Watch& watch) {
   Recording out;
   out.run = run;
   const double tick_s = 1.0 / session_.identity().tick_hz;
   const bool moves = run.mode != planning::Mode::off;
-  const protocol::Status before = session_.status();
+  protocol::Status before = session_.status();
+  for (int i = 0; i < 50 && before.mode == protocol::Mode::boot; ++i) {
+    std::this_thread::sleep_for(Milliseconds(10));
+    before = session_.status();
+  }
   if (before.mode == protocol::Mode::fault)
-    session_.fail(fmt::format("it stands in a fault: {}; find its cause, then switch the drive off and on",
+    session_.fail(fmt::format("it stands in a fault: {}; find its cause, then record with --clear-fault",
                               protocol::fault_text(before.fault).reason));
   if (before.mode != protocol::Mode::idle)
     session_.fail(fmt::format("it is in mode {}, not idle; another program may have it", name_of(before.mode)));

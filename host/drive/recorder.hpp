@@ -36,6 +36,8 @@ class Recorder {
     std::function<bool()> stops;  // asked again and again: the user wants an end
     std::function<void(double time_s)> progress{};
   };
+  // A fault that the drive stands in, as the user says that its cause is gone.
+  void clear_fault();
   // The drive is at rest and not armed when it returns, and where the link still works also when it throws.
   Recording record(const planning::Run& run, const Watch& watch);
 

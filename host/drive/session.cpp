@@ -6,6 +6,7 @@
 #include <chrono>
 #include <thread>
 
+#include "shared/fixed/types.hpp"
 #include "shared/model/encoding.hpp"
 #include "shared/protocol/texts.hpp"
 
@@ -16,7 +17,6 @@ using protocol::Code;
 using protocol::Kind;
 using Clock = std::chrono::steady_clock;
 
-constexpr Milliseconds kAnswer{500};
 constexpr Milliseconds kErase{6000};  // of a sector, by the data sheets of usual parts 2 s
 constexpr int kTries = 4;
 constexpr Milliseconds kBusy{1000};
@@ -32,7 +32,7 @@ std::string text_in(std::span<const std::uint8_t> bytes) {
 
 }  // namespace
 
-Session::Session(std::unique_ptr<transport::Link> link) : link_(std::move(link)) {
+Session::Session(std::unique_ptr<transport::Link> link, Milliseconds answer) : link_(std::move(link)), answer_(answer) {
   protocol::Message m;
   try {
     m = exchange(protocol::request(Kind::identify, 0, protocol::Hello{}));
@@ -74,7 +74,7 @@ protocol::Message Session::exchange(protocol::Message request) {
   const auto busy_until = Clock::now() + kBusy;
   for (int tries = 0; tries < (erases ? 1 : kTries); ++tries) {
     const std::uint8_t number = post(request);
-    const auto end = Clock::now() + (erases ? kErase : kAnswer);
+    const auto end = Clock::now() + (erases ? kErase : answer_);
     while (Clock::now() < end) {
       const auto m = link_->receive(std::chrono::duration_cast<Milliseconds>(end - Clock::now()) + Milliseconds(1));
       if (!m) continue;
@@ -113,19 +113,37 @@ protocol::CommandAnswer Session::command(const protocol::Command& command) {
 
 void Session::stop() noexcept {
   try {
-    protocol::Mode mode = command({}).mode;
+    const protocol::Mode mode = command({}).mode;
     if (!protocol::is_armed(mode)) return;
-    if (mode != protocol::Mode::stop) {
-      command({.kind = protocol::CommandKind::arm, .mode = protocol::Mode::velocity});
-      // The drive's own deceleration; a second is more than any takes. Each question is a sign of the host as well.
-      for (int i = 0; i < 50 && protocol::is_armed(mode); ++i) {
-        std::this_thread::sleep_for(Milliseconds(20));
-        mode = command({}).mode;
-      }
-    }
-    if (protocol::is_armed(mode)) command({.kind = protocol::CommandKind::disarm});
+    if (mode != protocol::Mode::stop) command({.kind = protocol::CommandKind::arm, .mode = protocol::Mode::velocity});
+    wait_for_rest();
+    if (protocol::is_armed(command({}).mode)) command({.kind = protocol::CommandKind::disarm});
   } catch (const std::exception&) {
     // A drive that does not hear its host stops by itself.
+  }
+}
+
+// Until the drive's own deceleration has brought it to rest, at most a second: more than any takes.
+void Session::wait_for_rest() {
+  constexpr std::uint16_t kEveryMs = 10;
+  constexpr std::int32_t kSlow = std::int32_t{1} << (fixed::kValueBits - 8);  // of the base of velocity
+  subscribe({protocol::Channel::velocity, protocol::Channel::state},
+            static_cast<std::uint16_t>(std::clamp<std::uint32_t>(identity_.tick_hz / 1000 * kEveryMs, 1, 65535)));
+  const auto end = Clock::now() + std::chrono::seconds(1);
+  auto said_at = Clock::now();
+  int slow = 0;
+  while (slow < 3 && Clock::now() < end) {
+    const auto m = next(Milliseconds(kEveryMs));
+    if (m && m->is_unasked())
+      protocol::for_each_frame(*m, [&](const auto&, auto, std::span<const std::uint32_t> words) {
+        const auto velocity = static_cast<std::int32_t>(words[0]);
+        const bool armed = protocol::is_armed(static_cast<protocol::Mode>(words[1] & 0xFF));
+        slow = !armed ? 3 : velocity > -kSlow && velocity < kSlow ? slow + 1 : 0;
+      });
+    // A sign of the host, by its clock or by the drive's.
+    if (!m && Clock::now() - said_at < Milliseconds(20)) continue;
+    command({});
+    said_at = Clock::now();
   }
 }
 

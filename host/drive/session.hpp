@@ -28,7 +28,8 @@ using Bytes = std::vector<std::uint8_t>;
 class Session {
  public:
   // Identifies the drive. Throws DriveError where nothing answers or versions do not agree, LinkError as the link does.
-  explicit Session(std::unique_ptr<transport::Link> link);
+  // `answer`: how long a drive may take to answer before it is asked again.
+  explicit Session(std::unique_ptr<transport::Link> link, Milliseconds answer = Milliseconds(500));
 
   const protocol::Identity& identity() const { return identity_; }
   std::string name() const { return link_->name(); }
@@ -70,9 +71,11 @@ class Session {
   [[noreturn]] void fail(const std::string& what) const;
 
  private:
+  void wait_for_rest();
   protocol::Message done(const protocol::Message& answer) const;
 
   std::unique_ptr<transport::Link> link_;
+  Milliseconds answer_;
   protocol::Identity identity_;
   std::deque<protocol::Message> unasked_;
   std::uint8_t number_ = 0;
