@@ -84,6 +84,16 @@ class Application {
   }
   std::optional<BlockFinding> block_finding() const { return block_finding_; }
 
+  // Changes the excitation: edit(coefficients, is torque). The tick reads it in mode `excitation` alone, and gets there
+  // by a command alone, which background work gives as well; so nothing has to be lent. False, and nothing done, while
+  // the drive is armed, a command waits, or there are no parameters.
+  template <class Edit>
+  bool edit_excitation(Edit&& edit) {
+    if (is_armed(status_.mode) || command_waits_.load(std::memory_order_acquire) || !has_parameters()) return false;
+    edit(parameters_.excitation, parameters_.excites_torque);
+    return true;
+  }
+
   Ring& telemetry() { return telemetry_; }
   const Status& status() const { return status_; }
 

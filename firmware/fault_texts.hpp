@@ -1,4 +1,5 @@
-// What faults are called, why they happen, and within how many ticks they are found. For the host's side of a drive.
+// What faults are called, why they happen (in the words that a host knows as well, shared/protocol/texts.hpp), and
+// within how many ticks they are found. No image holds them.
 #pragma once
 
 #include <array>
@@ -7,6 +8,7 @@
 #include <string_view>
 
 #include "firmware/faults.hpp"
+#include "shared/protocol/texts.hpp"
 
 namespace flexspline::firmware {
 
@@ -17,44 +19,46 @@ struct FaultInfo {
   std::string_view reason{};
 };
 
-inline constexpr std::array<FaultInfo, kFaults> kFaultTable{{
-    {Fault::none, 0, "none", "no fault"},
-    {Fault::motor_encoder_stale, kStaleTicks, "motor_encoder_stale", "the motor's encoder gave no new sample"},
-    {Fault::output_encoder_stale, kStaleTicks, "output_encoder_stale", "the output's encoder gave no new sample"},
-    {Fault::analog_stale, kStaleTicks, "analog_stale", "the converter gave no new samples"},
-    {Fault::motor_encoder_jump, 1, "motor_encoder_jump",
-     "the motor's encoder moved by more counts in a tick than at twice the overspeed"},
-    {Fault::motor_encoder_stuck, 0, "motor_encoder_stuck",
-     "the torque changed by more than friction can hold, and the motor's encoder shows no motion (stuck_torque, "
-     "stuck_s)"},
-    {Fault::implausible_motion, 0, "implausible_motion",
-     "the motor's encoder shows an acceleration that no torque can give (acceleration)"},
-    {Fault::current_out_of_range, kRangeTicks, "current_out_of_range",
-     "the current's converter is at its rail: sensor or wire broken"},
-    {Fault::torque_out_of_range, kRangeTicks, "torque_out_of_range",
-     "the torque's converter is at its rail: sensor or wire broken"},
-    {Fault::temperature_out_of_range, kRangeTicks, "temperature_out_of_range",
-     "the temperature's converter is at its rail: sensor or wire broken"},
-    {Fault::torque_stuck, 0, "torque_stuck",
-     "the torque sensor's reading never changed, not even by its noise (torque_same_s)"},
-    {Fault::current_mismatch, 0, "current_mismatch",
-     "the measured current is not the commanded one: amplifier or sensor broken (current_mismatch, mismatch_s)"},
-    {Fault::overcurrent, kOvercurrentTicks, "overcurrent", "the measured current is above its limit"},
-    {Fault::overspeed, 1, "overspeed", "the motor turns faster than its limit"},
-    {Fault::overtemperature, kHotTicks, "overtemperature", "the drive is too hot"},
-    {Fault::host_lost, 0, "host_lost", "the host sent no command (host_s)"},
-    {Fault::tick_overrun, 1, "tick_overrun", "a control tick did not end before the next one was due"},
-    {Fault::watchdog, kWatchdogTicks, "watchdog",
-     "the watchdog reset the drive: a part of the application had stopped reporting"},
-    {Fault::stop_failed, 0, "stop_failed", "the shaft did not come to rest in time (stop_s)"},
-}};
+static_assert(protocol::kFaults == kFaults);
+namespace detail {
+constexpr FaultInfo fault_info(Fault fault) {
+  const protocol::FaultText text = protocol::fault_text(static_cast<std::uint8_t>(fault));
+  const auto ticks = [fault]() -> std::uint32_t {
+    switch (fault) {
+      case Fault::motor_encoder_stale:
+      case Fault::output_encoder_stale:
+      case Fault::analog_stale:
+        return kStaleTicks;
+      case Fault::current_out_of_range:
+      case Fault::torque_out_of_range:
+      case Fault::temperature_out_of_range:
+        return kRangeTicks;
+      case Fault::motor_encoder_jump:
+      case Fault::overspeed:
+      case Fault::tick_overrun:
+        return 1;
+      case Fault::overcurrent:
+        return kOvercurrentTicks;
+      case Fault::overtemperature:
+        return kHotTicks;
+      case Fault::watchdog:
+        return kWatchdogTicks;
+      default:
+        return 0;
+    }
+  };
+  return {fault, ticks(), text.name, text.reason};
+}
+}  // namespace detail
+
+inline constexpr std::array<FaultInfo, kFaults> kFaultTable = [] {
+  std::array<FaultInfo, kFaults> table{};
+  for (std::size_t i = 0; i < kFaults; ++i) table[i] = detail::fault_info(static_cast<Fault>(i));
+  return table;
+}();
 constexpr const FaultInfo& info_of(Fault fault) {
   return kFaultTable[static_cast<std::size_t>(fault)];
 }
-static_assert([] {
-  for (std::size_t i = 0; i < kFaults; ++i)
-    if (kFaultTable[i].fault != static_cast<Fault>(i)) return false;
-  return true;
-}());
+static_assert(info_of(Fault::stop_failed).name == "stop_failed" && info_of(Fault::overspeed).name == "overspeed");
 
 }  // namespace flexspline::firmware

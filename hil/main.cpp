@@ -16,6 +16,7 @@
 #include "hil/plant/parameters.hpp"
 #include "hil/plant/recorder.hpp"
 #include "hil/rhs100/data_set.hpp"
+#include "hil/twin/server.hpp"
 
 namespace {
 
@@ -148,6 +149,27 @@ int main(int argc, char** argv) {
   drive_command->add_option("--seed", drive_options.seed, "of the sensors' noise (default 1)");
   drive_command->footer("Example: flexspline-hil drive --scenario slow-reversals --seconds 4");
   drive_command->callback([&] { flexspline::board::run_drive(drive_options); });
+  flexspline::twin::TwinOptions twin_options;
+  CLI::App* twin_command = app.add_subcommand("twin", "a drive for `flexspline --drive`, until it is stopped");
+  twin_command->add_option("--serve", twin_options.port, "port on 127.0.0.1 (default and 0: any that is free)")
+      ->check(CLI::Range(0, 65535));
+  twin_command->add_flag("--pty", twin_options.pty, "a serial line (pseudo terminal) in the place of a port");
+  twin_command->add_flag("--inherit", twin_options.inherits, "a socket that stands as standard input");
+  twin_command->add_option("--plant", twin_options.plant_file, "plant file (default: the demo's drive, built in)");
+  twin_command->add_option("--with", twin_options.with, "effects that the drive has and its maker knows, A,B")
+      ->delimiter(',');
+  twin_command->add_option("--hide", twin_options.hide, "effect that the drive has and its maker does not know");
+  twin_command->add_option("--flash", twin_options.flash_file, "file that holds its flash memory (default: none)");
+  twin_command->add_option("--serial", twin_options.serial, "serial number (default TWIN)");
+  twin_command->add_option("--inject", twin_options.inject, "what goes wrong once it is armed, as motor-encoder-stuck");
+  twin_command->add_option("--inject-at", twin_options.inject_at_s, "how long it was armed then, s (default 1)");
+  twin_command->add_option("--seed", twin_options.seed, "of the sensors' noise (default 1)");
+  twin_command->add_flag("--empty", twin_options.empty, "an empty flash memory stays without parameters");
+  twin_command->add_flag("--locked", twin_options.locked, "the output is locked");
+  twin_command->add_flag("--fast", twin_options.fast, "while armed faster than real time, as far as its host keeps up");
+  twin_command->add_flag("--lossy", twin_options.lossy, "with --fast: does not wait for a host that reads slowly");
+  twin_command->footer("Example: flexspline-hil twin --serve 4711 --flash twin.flash");
+  twin_command->callback([&] { flexspline::twin::run_twin(twin_options); });
   CLI::App* effects_command = app.add_subcommand("effects", "lists what can be hidden");
   effects_command->add_option("--plant", options.plant_file, "plant file (default: the demo's drive, built in)");
   effects_command->callback([&] { list_effects(options.plant_file); });

@@ -13,6 +13,7 @@
 #include <vector>
 
 #include "host/cli/commands.hpp"
+#include "host/cli/drive_commands.hpp"
 #include "host/cli/help.hpp"
 #include "host/data/findings.hpp"
 #include "host/output/text.hpp"
@@ -50,6 +51,7 @@ class App {
     add_pack();
     add_export();
     add_plan();
+    add_drive_commands();
     add_not_built();
     std::vector<std::string> to_come(not_built_yet().begin(), not_built_yet().end());
     app_.footer(output::wrapped(fmt::format("Not built yet: {}.", output::listed(to_come)), 0) +
@@ -393,6 +395,53 @@ class App {
         ->capture_default_str()
         ->type_name("N");
     take_pipeline(sub, options->pipeline);
+  }
+
+  static void take_drive(CLI::App* sub, std::string& drive) {
+    sub->add_option("--drive", drive, fmt::format("{} (default: the only one on USB)", transport::kDriveHelp))
+        ->type_name("DRIVE");
+  }
+  static void take_yes(CLI::App* sub, bool& yes) { sub->add_flag("--yes", yes, "ask nothing"); }
+
+  void add_drive_commands() {
+    const auto [drives, drives_options] = command<DrivesOptions>("drives");
+    drives->add_option("--also", drives_options->also, "look here, too: serial:PORT, tcp:HOST:PORT; may be repeated")
+        ->type_name("DRIVE")
+        ->allow_extra_args(false);
+    const auto [flash, flash_options] = command<FlashOptions>("flash");
+    take_drive(flash, flash_options->drive);
+    flash->add_option("--model", flash_options->model, "model file, packed for this drive")->type_name("MODEL");
+    flash->add_option("--block", flash_options->block, "parameter block of pack or backup")->type_name("BLOCK");
+    take_yes(flash, flash_options->yes);
+    const auto [backup, backup_options] = command<BackupOptions>("backup");
+    take_drive(backup, backup_options->drive);
+    backup->add_option("--out", backup_options->out, "file for the block")->required()->type_name("BLOCK");
+    backup->add_flag("--previous", backup_options->previous, "the block before the active one");
+    const auto [restore, restore_options] = command<RestoreOptions>("restore");
+    take_drive(restore, restore_options->drive);
+    take_yes(restore, restore_options->yes);
+    const auto [monitor, monitor_options] = command<MonitorOptions>("monitor");
+    take_drive(monitor, monitor_options->drive);
+    monitor->add_option("--seconds", monitor_options->seconds, "how long (default: until Ctrl-C)")
+        ->check(CLI::PositiveNumber)
+        ->type_name("S");
+    monitor->add_option("--rate-hz", monitor_options->rate_hz, "lines a second")
+        ->check(CLI::Range(0.5, 100.0))
+        ->capture_default_str()
+        ->type_name("HZ");
+    monitor->add_option("--channels", monitor_options->channels, "which signals, at most 12 (default: the main ones)")
+        ->delimiter(',')
+        ->type_name("NAME")
+        ->allow_extra_args(false);
+    const auto [record, record_options] = command<RecordOptions>("record");
+    take_drive(record, record_options->drive);
+    record->add_option("--plan", record_options->plan, "motions: of flexspline plan, or by hand")
+        ->required()
+        ->type_name("PLAN");
+    record->add_option("--out", record_options->out, "folder for the measurements")->required()->type_name("DIR");
+    record->add_flag("--force", record_options->force, "write into a folder that is not empty");
+    record->add_flag("--clear-fault", record_options->clear_fault, "the cause of the fault it stands in is gone");
+    take_yes(record, record_options->yes);
   }
 
   void add_not_built() {

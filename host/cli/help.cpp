@@ -169,10 +169,55 @@ const std::array kHelp = {
         {kMakeData, kIdentify,
          "flexspline plan --separate stribeck_gaussian,load_dependent_friction --model fitted.toml --out "
          "plan.toml"}},
+    CommandHelp{
+        "drives",
+        "the drives in reach, and what each is",
+        "Lists the drives on USB with serial number, firmware, effects of the image and state; one that cannot be "
+        "opened with the reason and what to do. What is behind a serial port or a socket is asked with --also.",
+        {"flexspline drives --also twin"}},
+    CommandHelp{
+        "flash",
+        "puts a model or a parameter block on a drive",
+        "Packs the model for this drive (its tick rate, its effects), or takes a block as it is, and says what that "
+        "changes against the block in use, parameter by parameter. The drive keeps the old block until the new one has "
+        "arrived whole and was found good, and has it for restore afterwards; it refuses while it is armed. On a "
+        "terminal it asks first; without one, or with --yes, it does not.",
+        {kMakeData, kIdentify, "flexspline flash --drive twin --model fitted.toml --yes"}},
+    CommandHelp{
+        "backup",
+        "saves the parameter block of a drive",
+        "Reads the active block, or with --previous the one before it, into a file that flash --block and unpack "
+        "take.",
+        {"flexspline backup --drive twin --out drive.block"}},
+    CommandHelp{
+        "restore",
+        "goes back to the parameter block before",
+        "Makes the block before the active one active, and says first what that changes. A second restore goes forth "
+        "again. Nothing is erased; a power cut leaves one or the other.",
+        {kMakeData, kIdentify, "flexspline flash --drive twin --model fitted.toml --yes",
+         "flexspline restore --drive twin --yes"}},
+    CommandHelp{
+        "monitor",
+        "live signals of a drive",
+        "Shows mode, faults and signals as they are; on a terminal with a curve of the last seconds behind each, "
+        "else a line at a time. --json writes the samples at the end. It only looks: nothing is armed.",
+        {"flexspline monitor --drive twin --seconds 0.5"}},
+    CommandHelp{
+        "record",
+        "runs the motions of a plan on a drive and saves the measurements",
+        "Runs each motion of a plan as an excitation on the drive itself, at most at the plan's limits and the "
+        "drive's, "
+        "and writes a data set: a CSV file for each run with the drive's identity and its block's hash, and "
+        "dataset.toml. Frames that got lost are counted and named in the file. Ctrl-C, a limit or a fault brings the "
+        "drive to rest; what was finished before is kept (exit code 1). Runs that need a person (a locked output, a "
+        "load) ask on a terminal, and without one need --yes.",
+        {kMakeData, kIdentify,
+         "flexspline plan --model fitted.toml --run-s 2 --motions 1 --without off,locked,load,temperature --out "
+         "plan.toml",
+         "flexspline record --drive twin --plan plan.toml --out recorded"}},
 };
 
-constexpr auto kNotBuilt = std::to_array<std::string_view>(
-    {"export", "drives", "record", "flash", "backup", "restore", "monitor", "twin", "hil", "workbench"});
+constexpr auto kNotBuilt = std::to_array<std::string_view>({"export", "twin", "hil", "workbench"});
 
 }  // namespace
 

@@ -4,7 +4,7 @@
 #include <cmath>
 
 #include "host/numbers/real.hpp"
-#include "host/planning/plan.hpp"
+#include "host/planning/excitation.hpp"
 #include "shared/control/excitation.hpp"
 
 namespace flexspline::planning {
@@ -50,30 +50,35 @@ ExcitationSetup<double> shaped(const Run& run, ExcitationSetup<double> setup) {
 
 }  // namespace
 
+control::ExcitationSetup<double> excitation_of(const Run& run, double tick_s) {
+  const auto ticks = static_cast<std::uint32_t>(std::llround(run.duration_s / tick_s));
+  if (run.waveform == Waveform::multi_sine && (run.lines.empty() || run.lines.size() > control::kMostLines))
+    throw PlanError(fmt::format("run \"{}\": a multi_sine has 1 to {} lines, not {}; state them under lines", run.name,
+                                control::kMostLines, run.lines.size()));
+  ExcitationSetup<double> setup;
+  setup.amplitude = run.waveform == Waveform::zero ? 0.0 : std::abs(run.amplitude);
+  setup.offset = run.offset;
+  setup.frequency_hz = run.frequency_hz;
+  setup.end_frequency_hz = run.end_frequency_hz.value_or(-1.0);
+  setup.ticks = ticks;
+  setup.fade_ticks = static_cast<std::uint32_t>(std::min<double>(kFade_s / tick_s, 0.5 * static_cast<double>(ticks)));
+  const double largest = (run.waveform == Waveform::asymmetric_sine ? setup.negative_per_positive : 1.0);
+  setup.limit = 1.000001 * (largest * setup.amplitude + std::abs(run.offset));
+  setup.slope_limit = run.slope_limit.value_or(4.0 * setup.limit / tick_s);
+  setup = shaped(run, setup);
+  const double highest = run.frequency_hz * control::detail::highest_harmonic(setup);
+  if (!(std::max(highest, run.end_frequency_hz.value_or(0.0)) * tick_s < 0.5))
+    throw PlanError(fmt::format("run \"{}\": {:g} Hz is more than half of the sample rate; plan a lower frequency",
+                                run.name, std::max(highest, run.end_frequency_hz.value_or(0.0))));
+  return setup;
+}
+
 std::vector<double> set_points(const Run& run, double sample_s) {
   const auto samples = static_cast<std::size_t>(std::llround(run.duration_s / sample_s));
   std::vector<double> points(samples, 0.0);
   const double amplitude = run.waveform == Waveform::zero ? 0.0 : run.amplitude;
   if (run.mode == Mode::off || samples == 0 || (amplitude == 0.0 && run.offset == 0.0)) return points;
-  if (run.waveform == Waveform::multi_sine && (run.lines.empty() || run.lines.size() > control::kMostLines))
-    throw PlanError(fmt::format("run \"{}\": a multi_sine has 1 to {} lines, not {}; state them under lines", run.name,
-                                control::kMostLines, run.lines.size()));
-  ExcitationSetup<double> setup;
-  setup.amplitude = std::abs(amplitude);
-  setup.offset = run.offset;
-  setup.frequency_hz = run.frequency_hz;
-  setup.end_frequency_hz = run.end_frequency_hz.value_or(-1.0);
-  setup.ticks = static_cast<std::uint32_t>(samples);
-  setup.fade_ticks =
-      static_cast<std::uint32_t>(std::min<double>(kFade_s / sample_s, 0.5 * static_cast<double>(samples)));
-  const double largest = (run.waveform == Waveform::asymmetric_sine ? setup.negative_per_positive : 1.0);
-  setup.limit = 1.000001 * (largest * setup.amplitude + std::abs(run.offset));
-  setup.slope_limit = run.slope_limit.value_or(4.0 * setup.limit / sample_s);
-  setup = shaped(run, setup);
-  const double highest = run.frequency_hz * control::detail::highest_harmonic(setup);
-  if (!(std::max(highest, run.end_frequency_hz.value_or(0.0)) * sample_s < 0.5))
-    throw PlanError(fmt::format("run \"{}\": {:g} Hz is more than half of the sample rate; plan a lower frequency",
-                                run.name, std::max(highest, run.end_frequency_hz.value_or(0.0))));
+  const ExcitationSetup<double> setup = excitation_of(run, sample_s);
   effects::DriveConstants<double> unit;
   unit.time_base = sample_s;
   const double base = setup.limit;

@@ -58,9 +58,9 @@ class Shell {
   // A line as it is typed; flexspline and flexspline-hil are on the path.
   Answer run(const std::string& line) const {
     const fs::path bin = fs::path(FLEXSPLINE_TOOL).parent_path();
-    const std::string script = "cd '" + folder_.string() + "' && PATH='" + bin.string() + "':\"$PATH\" && { " + line +
-                               "\n} >'" + (root_ / "out").string() + "' 2>'" + (root_ / "err").string() +
-                               "' </dev/null";
+    const std::string script = "cd '" + folder_.string() + "' && export XDG_STATE_HOME='" + (root_ / "state").string() +
+                               "' && PATH='" + bin.string() + "':\"$PATH\" && { " + line + "\n} >'" +
+                               (root_ / "out").string() + "' 2>'" + (root_ / "err").string() + "' </dev/null";
     const int status = std::system(script.c_str());
     return {WIFEXITED(status) ? WEXITSTATUS(status) : -1, content_of(root_ / "out"), content_of(root_ / "err")};
   }

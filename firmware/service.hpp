@@ -1,0 +1,355 @@
+// What a host asks of the drive: takes messages, answers them, sends telemetry. Runs in background work; the tick knows
+// nothing of it. Whatever the link, USB or serial, it hands over whole messages and fetches whole messages.
+//
+// What a host may do is decided here and in Application: parameters and excitation change only while the drive is not
+// armed; commands go through the application's mailbox, which arms from `idle` alone.
+#pragma once
+
+#include <array>
+#include <concepts>
+#include <cstddef>
+#include <cstdint>
+#include <optional>
+#include <span>
+
+#include "firmware/application.hpp"
+#include "firmware/excitation_intake.hpp"
+#include "firmware/telemetry_messages.hpp"
+#include "shared/protocol/payloads.hpp"
+#include "shared/storage/parameter_store.hpp"
+
+namespace flexspline::firmware {
+
+// Who judges blocks, and who puts the active one to use. Numbers are reasons, nought is good.
+template <class B>
+concept BlockUser = requires(B blocks, std::span<const std::uint8_t> block) {
+  { blocks.validate(block) } -> std::convertible_to<std::uint32_t>;  // where it lies, without a copy
+  blocks.adopt(block);                                               // begins; the block stays where it is
+  { blocks.adopted() } -> std::same_as<std::optional<std::uint32_t>>;
+};
+
+// The application's own.
+template <class Application, std::uint32_t kTickHz>
+class ApplicationBlocks {
+ public:
+  explicit ApplicationBlocks(Application& application) : application_(application) {}
+  std::uint32_t validate(std::span<const std::uint8_t> block) const {
+    return static_cast<std::uint32_t>(check_block(std::as_bytes(block), kTickHz));
+  }
+  void adopt(std::span<const std::uint8_t> block) { application_.offer(std::as_bytes(block)); }
+  std::optional<std::uint32_t> adopted() const {
+    const auto finding = application_.block_finding();
+    if (!finding) return {};
+    return static_cast<std::uint32_t>(*finding);
+  }
+
+ private:
+  Application& application_;
+};
+
+// What does not change while the drive runs.
+struct DriveInfo {
+  std::array<std::uint8_t, 2> firmware{};  // version
+  std::array<std::uint8_t, 16> board{};
+  std::array<std::uint8_t, 16> serial{};
+};
+
+// The numbers on the wire are the application's own.
+static_assert(protocol::kChannels == kChannels && protocol::kMostChannels == TelemetrySetup::kMost);
+static_assert(protocol::kFaults == kFaults);
+static_assert(static_cast<int>(protocol::Channel::command_current) == static_cast<int>(Channel::command_current) &&
+              static_cast<int>(protocol::Channel::torsion) == static_cast<int>(Channel::torsion));
+static_assert(static_cast<int>(protocol::Mode::fault) == static_cast<int>(Mode::fault) &&
+              static_cast<int>(protocol::Mode::current) == static_cast<int>(Mode::current));
+static_assert(static_cast<int>(protocol::CommandKind::clear_fault) == static_cast<int>(Command::Kind::clear_fault));
+static_assert(static_cast<int>(protocol::Refusal::booting) == static_cast<int>(Refusal::booting));
+static_assert(static_cast<int>(protocol::StoreState::damaged) == static_cast<int>(storage::StoreState::damaged));
+static_assert(static_cast<int>(protocol::Code::worn) - static_cast<int>(protocol::Code::too_long) + 1 ==
+              static_cast<int>(storage::StoreError::worn));
+
+template <class Application, class Store, BlockUser Blocks>
+class Service {
+ public:
+  Service(Application& application, Store& store, Blocks& blocks, std::uint32_t tick_hz, const DriveInfo& info)
+      : application_(application), store_(store), blocks_(blocks), tick_hz_(tick_hz), info_(info) {}
+
+  // Before the first tick: the newest good block of the store is the drive's.
+  void start() {
+    store_.boot(validator());
+    if (!store_.active().empty()) blocks_.adopt(store_.active());
+  }
+  // The link is gone or new: the next host has to identify itself, and gets no one else's telemetry.
+  void disconnected() {
+    agreed_ = false;
+    has_answer_ = false;
+    frames_.restart();
+    application_.telemetry().configure({});
+  }
+
+  // A message that came. False: there is no room for its answer yet, offer it again later.
+  bool take(const protocol::Message& m) {
+    if (has_answer_) return false;
+    if (!m.is_request()) return true;
+    if (waits_for_ != Wait::none) {
+      answer(protocol::answer_to(m, protocol::Code::busy));
+      return true;
+    }
+    if (!agreed_ && m.request() != protocol::Kind::identify) {
+      answer(protocol::answer_to(m, protocol::Code::wrong_version));
+      return true;
+    }
+    request_ = protocol::answer_to(m, protocol::Code::done);
+    serve(m);
+    return true;
+  }
+  // The next message to send, if there is one: answers before telemetry.
+  bool next(protocol::Message& m) {
+    if (has_answer_) {
+      m = answer_;
+      has_answer_ = false;
+      return true;
+    }
+    return frames_.next(application_, m);
+  }
+  // Call again and again, beside Application::background().
+  void background() {
+    if (waits_for_ == Wait::room) {
+      if (application_.submit(command_)) waits_for_ = Wait::command;
+    } else if (waits_for_ == Wait::command) {
+      const auto got = application_.answer();
+      if (!got || got->number != command_.number) return;
+      waits_for_ = Wait::none;
+      const protocol::CommandAnswer payload{static_cast<protocol::Refusal>(got->refusal),
+                                            static_cast<protocol::Mode>(got->mode)};
+      finish(got->refusal == Refusal::none ? protocol::Code::done : protocol::Code::refused, payload);
+    } else if (waits_for_ == Wait::adoption) {
+      const auto reason = blocks_.adopted();
+      // Decided on, and with the tick again.
+      if (!reason || (*reason == 0 && !application_.status().has_parameters)) return;
+      waits_for_ = Wait::none;
+      finish(*reason == 0 ? protocol::Code::done : protocol::Code::invalid, protocol::Reason{*reason});
+    }
+  }
+
+ private:
+  using Kind = protocol::Kind;
+  using Code = protocol::Code;
+  enum class Wait : std::uint8_t { none, room, command, adoption };
+
+  auto validator() {
+    return [this](std::span<const std::uint8_t> block) { return blocks_.validate(block); };
+  }
+  bool armed() const { return is_armed(application_.status().mode); }
+
+  void answer(const protocol::Message& m) {
+    answer_ = m;
+    has_answer_ = true;
+  }
+  void finish(Code code) {
+    request_.code = static_cast<std::uint8_t>(code);
+    answer(request_);
+  }
+  template <class Payload>
+  void finish(Code code, const Payload& payload) {
+    protocol::put_payload(request_, payload);
+    finish(code);
+  }
+  // Takes the payload; where it is none, answers so and returns false.
+  template <class Payload>
+  bool taken(const protocol::Message& m, Payload& payload) {
+    const Code code = protocol::take_payload(m.content(), payload);
+    if (code != Code::done) finish(code);
+    return code == Code::done;
+  }
+  static Code code_of(storage::StoreError error) {
+    if (error == storage::StoreError::none) return Code::done;
+    return static_cast<Code>(static_cast<int>(Code::too_long) + static_cast<int>(error) - 1);
+  }
+
+  void serve(const protocol::Message& m) {
+    switch (m.request()) {
+      case Kind::identify:
+        return identify(m);
+      case Kind::status:
+      case Kind::effects:
+      case Kind::block_commit: {
+        protocol::Empty empty;
+        if (!taken(m, empty)) return;
+        if (m.request() == Kind::status) return status();
+        if (m.request() == Kind::effects) return effects();
+        return commit();
+      }
+      case Kind::block_begin:
+        return begin_block(m);
+      case Kind::block_chunk:
+        return take_chunk(m);
+      case Kind::block_restore:
+        return restore(m);
+      case Kind::block_read:
+        return read_block(m);
+      case Kind::command:
+        return command(m);
+      case Kind::excitation:
+      case Kind::excitation_guard:
+      case Kind::excitation_lines:
+      case Kind::excitation_use:
+        return finish(excitation_.take(application_, m));
+      case Kind::telemetry:
+        return telemetry(m);
+      default:
+        return finish(Code::unknown_request);
+    }
+  }
+
+  void identify(const protocol::Message& m) {
+    protocol::Hello hello;
+    const Code code = protocol::take_front(m.content(), hello);
+    agreed_ = code == Code::done && hello.major == protocol::kMajor;
+    if (code != Code::done) return finish(code);
+    protocol::Identity id;
+    id.firmware = info_.firmware;
+    id.board = info_.board;
+    id.serial = info_.serial;
+    id.tick_hz = tick_hz_;
+    id.block_bytes = Store::kCapacity;
+    for (const std::uint8_t byte : kEffects.bits)
+      for (int bit = 0; bit < 8; ++bit) id.effects = static_cast<std::uint16_t>(id.effects + ((byte >> bit) & 1));
+    id.channels = kChannels;
+    id.most_channels = TelemetrySetup::kMost;
+    id.most_lines = control::kMostLines;
+    finish(Code::done, id);
+  }
+  void effects() { finish(Code::done, kEffects); }
+  void status() {
+    const Status& s = application_.status();
+    protocol::Status out;
+    out.tick = s.tick;
+    out.mode = static_cast<protocol::Mode>(s.mode);
+    out.has_parameters = s.has_parameters;
+    out.store = static_cast<protocol::StoreState>(store_.state());
+    out.fault = static_cast<std::uint8_t>(s.fault.fault);
+    out.fault_tick = s.fault.tick;
+    out.fault_seen = s.fault.seen;
+    out.fault_limit = s.fault.limit;
+    out.dropped = application_.telemetry().dropped();
+    out.sequence = store_.sequence();
+    out.staged = static_cast<std::uint32_t>(store_.staged());
+    out.active = {static_cast<std::uint32_t>(store_.active().size()), store_.active_crc()};
+    out.previous = {static_cast<std::uint32_t>(store_.previous().size()), store_.previous_crc()};
+    finish(Code::done, out);
+  }
+
+  // Blocks.
+
+  void begin_block(const protocol::Message& m) {
+    protocol::BlockBegin begin;
+    if (!taken(m, begin)) return;
+    if (armed()) return finish(Code::armed);
+    finish(code_of(store_.begin(begin.bytes, begin.crc)));
+  }
+  void take_chunk(const protocol::Message& m) {
+    protocol::Chunk chunk;
+    if (!taken(m, chunk)) return;
+    if (armed()) return finish(Code::armed);
+    finish(code_of(store_.write(chunk.offset, std::span<const std::uint8_t>(chunk.bytes).first(chunk.count))));
+  }
+  void commit() {
+    if (armed()) return finish(Code::armed);
+    std::uint32_t reason = 0;
+    const storage::StoreError error = store_.commit(validator(), reason);
+    use_block(error, reason);
+  }
+  void restore(const protocol::Message& m) {
+    protocol::BlockRestore wanted;
+    if (!taken(m, wanted)) return;
+    if (armed()) return finish(Code::armed);
+    if (store_.sequence() == static_cast<std::uint16_t>(wanted.sequence + 1))
+      return finish(Code::done, protocol::Reason{});
+    if (store_.sequence() != wanted.sequence) return finish(Code::wrong_value);
+    std::uint32_t reason = 0;
+    const storage::StoreError error = store_.restore(validator(), reason);
+    use_block(error, reason);
+  }
+  void use_block(storage::StoreError error, std::uint32_t reason) {
+    if (error != storage::StoreError::none) return finish(code_of(error), protocol::Reason{reason});
+    blocks_.adopt(store_.active());
+    waits_for_ = Wait::adoption;
+  }
+  void read_block(const protocol::Message& m) {
+    protocol::BlockRead wanted;
+    if (!taken(m, wanted)) return;
+    const auto block = wanted.which == protocol::Which::active ? store_.active() : store_.previous();
+    if (block.empty()) return finish(Code::no_block);
+    if (wanted.offset > block.size()) return finish(Code::wrong_value);
+    protocol::Chunk chunk;
+    chunk.offset = wanted.offset;
+    const std::size_t left = block.size() - wanted.offset;
+    chunk.count = static_cast<std::uint8_t>(left < protocol::kMostChunk ? left : protocol::kMostChunk);
+    for (std::size_t i = 0; i < chunk.count; ++i) chunk.bytes[i] = block[wanted.offset + i];
+    finish(Code::done, chunk);
+  }
+
+  // Commands.
+
+  void command(const protocol::Message& m) {
+    protocol::Command c;
+    if (!taken(m, c)) return;
+    constexpr std::int64_t kFarthest = std::int64_t{1} << 62;
+    for (const std::int32_t word : {c.velocity, c.acceleration, c.current})
+      if (word == INT32_MIN) return finish(Code::wrong_value);
+    if (c.position <= -kFarthest || c.position >= kFarthest) return finish(Code::wrong_value);
+    command_ = {static_cast<Command::Kind>(c.kind),
+                static_cast<Mode>(c.mode),
+                c.compensate,
+                c.stream,
+                ++command_number_,
+                N::Angle{c.position},
+                N::Value{{c.velocity}},
+                N::Value{{c.acceleration}},
+                N::Value{{c.current}}};
+    application_.answer();  // to a command that nobody asks about any more
+    waits_for_ = application_.submit(command_) ? Wait::command : Wait::room;
+  }
+
+  // Telemetry.
+
+  void telemetry(const protocol::Message& m) {
+    protocol::Subscription wanted;
+    if (!taken(m, wanted)) return;
+    TelemetrySetup setup;
+    setup.every = wanted.every;
+    setup.count = wanted.count;
+    for (std::size_t i = 0; i < wanted.count; ++i) setup.channels[i] = static_cast<Channel>(wanted.channels[i]);
+    frames_.restart();
+    finish(application_.telemetry().configure(setup) ? Code::done : Code::wrong_value);
+  }
+
+  static constexpr protocol::Effects kEffects = [] {
+    protocol::Effects out;
+    using Model = decltype(Parameters::model);
+    const auto mark = []<class Effect>(protocol::Effects& all) {
+      constexpr std::size_t number = Model::template number_of<Effect>();
+      static_assert(number < 256);
+      all.bits[number / 8] = static_cast<std::uint8_t>(all.bits[number / 8] | (1U << (number % 8)));
+    };
+    Model{}.for_each([&]<class Effect>(auto&) { mark.template operator()<Effect>(out); });
+    return out;
+  }();
+
+  Application& application_;
+  Store& store_;
+  Blocks& blocks_;
+  std::uint32_t tick_hz_;
+  DriveInfo info_;
+  protocol::Message answer_{};
+  protocol::Message request_{};  // its answer in the making
+  TelemetryMessages frames_{};
+  ExcitationIntake excitation_{};
+  Command command_{};
+  std::uint16_t command_number_ = 0;
+  Wait waits_for_ = Wait::none;
+  bool has_answer_ = false;
+  bool agreed_ = false;
+};
+
+}  // namespace flexspline::firmware

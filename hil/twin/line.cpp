@@ -1,0 +1,155 @@
+#include "hil/twin/line.hpp"
+
+#include <arpa/inet.h>
+#include <fcntl.h>
+#include <netinet/in.h>
+#include <netinet/tcp.h>
+#include <poll.h>
+#include <stdlib.h>
+#include <sys/socket.h>
+#include <termios.h>
+#include <unistd.h>
+
+#include <algorithm>
+#include <cerrno>
+#include <cstring>
+#include <stdexcept>
+#include <utility>
+
+namespace flexspline::twin {
+namespace {
+
+[[noreturn]] void fail(const std::string& what) {
+  throw std::runtime_error(what + ": " + std::strerror(errno));
+}
+void make_nonblocking(int fd) {
+  fcntl(fd, F_SETFL, fcntl(fd, F_GETFL) | O_NONBLOCK);
+  fcntl(fd, F_SETFD, FD_CLOEXEC);
+}
+
+}  // namespace
+
+Line Line::listening(int port) {
+  Line line;
+  line.listener_ = socket(AF_INET, SOCK_STREAM | SOCK_CLOEXEC, 0);
+  if (line.listener_ < 0) fail("no socket");
+  const int on = 1;
+  setsockopt(line.listener_, SOL_SOCKET, SO_REUSEADDR, &on, sizeof(on));
+  sockaddr_in address{};
+  address.sin_family = AF_INET;
+  address.sin_addr.s_addr = htonl(INADDR_LOOPBACK);
+  address.sin_port = htons(static_cast<std::uint16_t>(port));
+  if (bind(line.listener_, reinterpret_cast<const sockaddr*>(&address), sizeof(address)) != 0 ||
+      listen(line.listener_, 1) != 0)
+    fail("cannot listen at 127.0.0.1:" + std::to_string(port) + "; take another port, or 0 for any");
+  socklen_t size = sizeof(address);
+  getsockname(line.listener_, reinterpret_cast<sockaddr*>(&address), &size);
+  line.name_ = "tcp:127.0.0.1:" + std::to_string(ntohs(address.sin_port));
+  make_nonblocking(line.listener_);
+  return line;
+}
+
+Line Line::terminal() {
+  Line line;
+  line.host_ = posix_openpt(O_RDWR | O_NOCTTY);
+  if (line.host_ < 0 || grantpt(line.host_) != 0 || unlockpt(line.host_) != 0) fail("no pseudo terminal");
+  const std::string path = ptsname(line.host_);
+  line.keeps_open_ = open(path.c_str(), O_RDWR | O_NOCTTY | O_CLOEXEC);
+  if (line.keeps_open_ < 0) fail(path);
+  termios settings{};
+  tcgetattr(line.keeps_open_, &settings);
+  cfmakeraw(&settings);
+  tcsetattr(line.keeps_open_, TCSANOW, &settings);
+  make_nonblocking(line.host_);
+  line.name_ = "serial:" + path;
+  line.is_terminal_ = true;
+  return line;
+}
+
+Line Line::inherited(int fd) {
+  Line line;
+  line.host_ = fd;
+  make_nonblocking(fd);
+  line.name_ = "twin";
+  return line;
+}
+
+Line::Line(Line&& other) noexcept
+    : name_(std::move(other.name_)),
+      listener_(std::exchange(other.listener_, -1)),
+      host_(std::exchange(other.host_, -1)),
+      keeps_open_(std::exchange(other.keeps_open_, -1)),
+      is_terminal_(other.is_terminal_) {}
+
+Line::~Line() {
+  for (const int fd : {listener_, host_, keeps_open_})
+    if (fd >= 0) close(fd);
+}
+
+bool Line::turn(int wait_ms) {
+  pollfd all[2] = {{listener_, POLLIN, 0}, {host_, static_cast<short>(out_.empty() ? POLLIN : POLLIN | POLLOUT), 0}};
+  poll(all, 2, wait_ms);
+  if (listener_ >= 0 && (all[0].revents & POLLIN) != 0) accept_host();
+  if (host_ >= 0) read_bytes();
+  if (host_ >= 0) write_bytes();
+  return std::exchange(changed_, false);
+}
+
+// A host that connects while another is there takes its place: the one before may be dead without having said so.
+void Line::accept_host() {
+  const int host = accept(listener_, nullptr, nullptr);
+  if (host < 0) return;
+  lose_host();
+  host_ = host;
+  make_nonblocking(host_);
+  const int on = 1, bytes = 4096;
+  setsockopt(host_, IPPROTO_TCP, TCP_NODELAY, &on, sizeof(on));
+  setsockopt(host_, SOL_SOCKET, SO_SNDBUF, &bytes, sizeof(bytes));
+}
+
+void Line::read_bytes() {
+  std::uint8_t bytes[1024];
+  for (;;) {
+    const ssize_t got = read(host_, bytes, sizeof(bytes));
+    if (got > 0) {
+      protocol::Message m;
+      for (ssize_t i = 0; i < got; ++i)
+        if (reader_.take(bytes[i], m)) arrived_.push_back(m);
+      continue;
+    }
+    const bool waits = got < 0 && (errno == EAGAIN || errno == EWOULDBLOCK || errno == EINTR);
+    if (!waits && !is_terminal_) lose_host();
+    return;
+  }
+}
+
+void Line::write_bytes() {
+  while (!out_.empty()) {
+    const ssize_t sent =
+        is_terminal_ ? write(host_, out_.data(), out_.size()) : ::send(host_, out_.data(), out_.size(), MSG_NOSIGNAL);
+    if (sent > 0) {
+      out_.erase(out_.begin(), out_.begin() + sent);
+      continue;
+    }
+    if (errno != EAGAIN && errno != EWOULDBLOCK && errno != EINTR && !is_terminal_) lose_host();
+    return;
+  }
+}
+
+void Line::lose_host() {
+  if (host_ < 0) return;
+  close(host_);
+  host_ = -1;
+  ended_ = listener_ < 0;
+  changed_ = true;
+  reader_.restart();
+  arrived_.clear();
+  out_.clear();
+}
+
+void Line::send(const protocol::Message& m) {
+  const protocol::SerialFrame frame = protocol::serial_frame(m);
+  out_.insert(out_.end(), frame.bytes.begin(), frame.bytes.begin() + static_cast<std::ptrdiff_t>(frame.size));
+}
+
+}  // namespace flexspline::twin

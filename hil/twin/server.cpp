@@ -1,0 +1,120 @@
+#include "hil/twin/server.hpp"
+
+#include <fmt/format.h>
+#include <unistd.h>
+
+#include <algorithm>
+#include <chrono>
+#include <cmath>
+#include <cstdio>
+#include <optional>
+#include <stdexcept>
+
+#include "hil/board/scenario.hpp"
+#include "hil/plant/parameters.hpp"
+#include "hil/twin/line.hpp"
+#include "hil/twin/twin_drive.hpp"
+
+namespace flexspline::twin {
+namespace {
+
+using Clock = std::chrono::steady_clock;
+constexpr std::uint32_t kTickHz = board::SoftwareBoard::kTickHz;
+
+TwinSetup setup_of(const TwinOptions& options) {
+  TwinSetup setup;
+  setup.drive = options.plant_file.empty() ? plant::demo_plant().drive : plant::load_plant(options.plant_file).drive;
+  for (const std::string& effect : options.with) plant::with(setup.drive, effect);
+  if (!options.hide.empty()) plant::hide(setup.drive, options.hide);
+  setup.flash_file = options.flash_file;
+  setup.serial = options.serial;
+  setup.seed = options.seed;
+  setup.as_made = !options.empty;
+  setup.locked = options.locked;
+  return setup;
+}
+
+Line line_of(const TwinOptions& options) {
+  if (options.inherits) return Line::inherited(STDIN_FILENO);
+  return options.pty ? Line::terminal() : Line::listening(std::max(options.port, 0));
+}
+
+class Server {
+ public:
+  explicit Server(const TwinOptions& options)
+      : options_(options), drive_(setup_of(options)), line_(line_of(options)), due_(Clock::now()) {
+    if (!options.inject.empty()) {
+      injection_ = board::injection_named(options.inject);
+      if (!injection_) throw std::runtime_error("there is no injection '" + options.inject + "'");
+    }
+  }
+
+  void run() {
+    if (!options_.inherits) {
+      fmt::print("drive {} at {}\n", options_.serial, line_.name());
+      std::fflush(stdout);
+    }
+    int wait_ms = 0;
+    while (!line_.ended()) {
+      if (line_.turn(wait_ms)) drive_.service().disconnected();
+      const std::uint32_t ticks = ticks_now();
+      for (std::uint32_t i = 0; i < ticks; ++i) tick();
+      exchange();
+      wait_ms = ticks > 0 && runs_fast() ? 0 : 1;
+    }
+  }
+
+ private:
+  static constexpr std::uint32_t kBurst = 100;
+  // An armed drive without its host for 0.1 s stops: an armed twin that runs fast waits for its host well before.
+  static constexpr std::uint32_t kMostAhead = 1'000;
+
+  bool runs_fast() const { return options_.fast && is_armed(drive_.status().mode) && line_.has_host(); }
+  std::uint32_t ticks_now() {
+    const auto now = Clock::now();
+    if (runs_fast()) {
+      due_ = now;
+      if (since_message_ >= kMostAhead || (!options_.lossy && !line_.has_room())) return 0;
+      return kBurst;
+    }
+    const auto late = std::chrono::duration<double>(now - due_).count();
+    // A machine that was busy: time that cannot be made good is dropped.
+    if (late > 0.05) due_ = now - std::chrono::milliseconds(50);
+    const auto ticks = static_cast<std::uint32_t>(std::max(0.0, std::floor(std::min(late, 0.05) * kTickHz)));
+    due_ += std::chrono::nanoseconds(std::int64_t{1'000'000'000} / kTickHz * ticks);
+    return ticks;
+  }
+  void tick() {
+    drive_.tick();
+    ++since_message_;
+    if (injection_ && is_armed(drive_.status().mode) && ++armed_ticks_ == std::llround(options_.inject_at_s * kTickHz))
+      drive_.rig().inject(*injection_);
+    // Answers and frames leave as they come, so that the drive's ring holds what a real one would.
+    if (drive_.status().tick % 20 == 0) exchange();
+  }
+  void exchange() {
+    while (!line_.arrived().empty() && drive_.service().take(line_.arrived().front())) {
+      line_.arrived().pop_front();
+      since_message_ = 0;
+    }
+    protocol::Message m;
+    while (line_.has_room() && drive_.service().next(m))
+      if (line_.has_host()) line_.send(m);
+  }
+
+  TwinOptions options_;
+  TwinDrive drive_;
+  Line line_;
+  Clock::time_point due_;
+  std::optional<board::Injection> injection_;
+  std::uint32_t since_message_ = 0;
+  std::int64_t armed_ticks_ = 0;
+};
+
+}  // namespace
+
+void run_twin(const TwinOptions& options) {
+  Server(options).run();
+}
+
+}  // namespace flexspline::twin

@@ -1,0 +1,32 @@
+#pragma once
+
+#include <cstdint>
+#include <string>
+#include <vector>
+
+namespace flexspline::twin {
+
+struct TwinOptions {
+  std::string plant_file;  ///< empty: the demo's drive
+  std::vector<std::string> with;
+  std::string hide;
+  std::string flash_file;
+  std::string serial = "TWIN";
+  std::string inject;
+  double inject_at_s = 1.0;  ///< after the drive was armed first
+  std::uint64_t seed = 1;
+  int port = -1;          ///< on 127.0.0.1; nought: any that is free
+  bool pty = false;       ///< a serial line
+  bool inherits = false;  ///< a line that the caller left as standard input
+  bool empty = false;
+  bool locked = false;
+  bool fast = false;
+  bool lossy = false;
+};
+
+/// Runs a drive for hosts that come by, one at a time, over a line of bytes with the serial framing. In real time; with
+/// `fast` an armed drive runs as fast as it can, but no further ahead than its host keeps up with. Returns where the
+/// line that it inherited ends; else never. Throws std::runtime_error with what cannot be opened.
+void run_twin(const TwinOptions& options);
+
+}  // namespace flexspline::twin

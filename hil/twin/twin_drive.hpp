@@ -1,0 +1,75 @@
+#pragma once
+
+#include <cstdint>
+#include <filesystem>
+#include <memory>
+#include <optional>
+#include <span>
+#include <string>
+
+#include "firmware/service.hpp"
+#include "hil/board/brain.hpp"
+#include "hil/board/drive_rig.hpp"
+#include "hil/twin/flash_file.hpp"
+
+namespace flexspline::twin {
+
+struct TwinSetup {
+  plant::Drive drive{};
+  std::uint64_t seed = 1;
+  std::string serial = "TWIN";
+  std::filesystem::path flash_file{};  ///< empty: what is flashed ends with the twin
+  bool as_made = true;                 ///< an empty flash memory gets the block of the drive's maker
+  bool locked = false;                 ///< the output
+};
+
+using TwinApplication = firmware::Application<board::SoftwareBoard>;
+
+/// Packed parameter blocks for the twin's application: judged as a drive judges them, and completed with what the drive
+/// knows of itself (sensors, amplifier, loops), in the bases of the block.
+class TwinBlocks {
+ public:
+  static constexpr std::uint32_t kDoesNotFit = 200;  ///< sound, but not for this drive
+
+  TwinBlocks(TwinApplication& application, const plant::Drive& drive) : application_(application), drive_(drive) {}
+  std::uint32_t validate(std::span<const std::uint8_t> block) const;
+  void adopt(std::span<const std::uint8_t> block);
+  std::optional<std::uint32_t> adopted() const;
+
+ private:
+  TwinApplication& application_;
+  const plant::Drive& drive_;
+  board::Block in_use_;
+};
+
+/// A whole drive: plant, sensors, the firmware's application and its service for a host, and flash memory. Time passes
+/// in run(), and nowhere else.
+class TwinDrive {
+ public:
+  using Store = storage::ParameterStore<FlashFile>;
+  using Service = firmware::Service<TwinApplication, Store, TwinBlocks>;
+
+  explicit TwinDrive(const TwinSetup& setup);
+
+  /// One tick, and the background work until the next.
+  void tick();
+  void run(std::uint32_t ticks) {
+    for (std::uint32_t i = 0; i < ticks; ++i) tick();
+  }
+  Service& service() { return *service_; }
+  const firmware::Status& status() const { return application_.status(); }
+  const Store& store() const { return store_; }
+  board::DriveRig& rig() { return rig_; }
+
+ private:
+  TwinSetup setup_;
+  board::DriveRig rig_;
+  board::SoftwareBoard board_;
+  TwinApplication application_{board_};
+  FlashFile flash_;
+  Store store_{flash_};
+  TwinBlocks blocks_{application_, setup_.drive};
+  std::unique_ptr<Service> service_;
+};
+
+}  // namespace flexspline::twin

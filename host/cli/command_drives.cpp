@@ -1,0 +1,75 @@
+#include <fmt/format.h>
+
+#include <nlohmann/json.hpp>
+
+#include "host/cli/drive_commands.hpp"
+#include "host/output/json.hpp"
+#include "shared/protocol/texts.hpp"
+
+namespace flexspline::cli {
+namespace {
+
+using nlohmann::json;
+
+struct Seen {
+  transport::Found found;
+  json answer;  // null where it was not asked
+};
+
+// Asks a drive who it is. What is wrong with one drive does not hide the others.
+Seen asked(transport::Found found) {
+  Seen seen{std::move(found), nullptr};
+  if (!seen.found.usable) return seen;
+  try {
+    drive::Session session = open_drive(seen.found.drive);
+    const protocol::Identity& id = session.identity();
+    const protocol::Status status = session.status();
+    seen.answer = {{"serial", session.serial()},
+                   {"board", session.board()},
+                   {"firmware", fmt::format("{}.{}", id.firmware[0], id.firmware[1])},
+                   {"protocol", fmt::format("{}.{}", id.major, id.minor)},
+                   {"tick_hz", id.tick_hz},
+                   {"effects", id.effects},
+                   {"block_bytes", id.block_bytes},
+                   {"mode", protocol::name_of(status.mode)},
+                   {"fault", protocol::fault_text(status.fault).name},
+                   {"has_parameters", status.has_parameters}};
+  } catch (const std::exception& error) {
+    seen.found.usable = false;
+    seen.found.problem = error.what();
+  }
+  return seen;
+}
+
+}  // namespace
+
+int run(const DrivesOptions& options, Console& console) {
+  std::vector<Seen> all;
+  for (transport::Found& found : transport::find_drives()) all.push_back(asked(std::move(found)));
+  for (const std::string& name : options.also) all.push_back(asked({name, name, true, {}}));
+  json list = json::array();
+  for (const Seen& one : all) {
+    json entry = one.answer.is_null() ? json::object() : one.answer;
+    entry["drive"] = one.found.drive;
+    entry["usable"] = one.found.usable;
+    entry["problem"] = one.found.problem.empty() ? json() : json(one.found.problem);
+    if (one.answer.is_null()) {
+      console.line(fmt::format("{:<28} {}", one.found.drive, console.bad(one.found.problem)));
+    } else {
+      console.line(fmt::format("{:<28} {} (board {}, firmware {}), {} effects, {}{}", one.found.drive,
+                               one.answer["serial"].get<std::string>(), one.answer["board"].get<std::string>(),
+                               one.answer["firmware"].get<std::string>(), one.answer["effects"].get<int>(),
+                               one.answer["mode"].get<std::string>(),
+                               one.answer["has_parameters"].get<bool>() ? "" : ", without parameters"));
+    }
+    list.push_back(std::move(entry));
+  }
+  if (all.empty())
+    console.line(
+        "no drive on USB; check cable and power. A drive on a serial line is named by its port (--drive "
+        "serial:/dev/ttyACM0), and without hardware there is --drive twin.");
+  output::save_json(options.json, {{"format", "flexspline-drives/1"}, {"drives", std::move(list)}});
+  return kDone;
+}
+
+}  // namespace flexspline::cli

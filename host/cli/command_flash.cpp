@@ -1,0 +1,160 @@
+// What is kept on a drive: flash, backup, restore.
+#include <fmt/format.h>
+#include <unistd.h>
+
+#include <nlohmann/json.hpp>
+
+#include "host/cli/drive_commands.hpp"
+#include "host/deployment/pack.hpp"
+#include "host/drive/block_changes.hpp"
+#include "host/drive/scales.hpp"
+#include "host/output/json.hpp"
+#include "host/output/text.hpp"
+#include "shared/fixed/system.hpp"
+#include "shared/model/drive_model.hpp"
+#include "shared/protocol/texts.hpp"
+
+namespace flexspline::cli {
+namespace {
+
+using drive::BlockChange;
+using drive::BlockView;
+using drive::Bytes;
+using nlohmann::json;
+
+json json_of(const drive::Session& session) {
+  return {{"serial", session.serial()}, {"board", session.board()}, {"drive", session.name()}};
+}
+json json_of(const BlockView& view) {
+  if (view.bytes == 0) return nullptr;
+  return {{"bytes", view.bytes}, {"sha256", view.sha256}, {"model", view.model}, {"drive", view.drive}};
+}
+json json_of(const std::vector<BlockChange>& changes) {
+  json list = json::array();
+  for (const BlockChange& c : changes)
+    list.push_back({{"effect", c.effect},
+                    {"change", c.what},
+                    {"parameter", c.parameter.empty() ? json() : json(c.parameter)},
+                    {"before", output::json_number(c.before)},
+                    {"after", output::json_number(c.after)},
+                    {"unit", c.unit.empty() ? json() : json(c.unit)}});
+  return list;
+}
+
+std::string described(const BlockView& view) {
+  if (view.bytes == 0) return "none";
+  return fmt::format("\"{}\", {} bytes, SHA-256 {}...", view.model, view.bytes, view.sha256.substr(0, 16));
+}
+
+void print(const std::vector<BlockChange>& changes, Console& console) {
+  std::vector<std::string> same;
+  for (const BlockChange& c : changes) {
+    if (c.what == "same") {
+      same.push_back(c.effect);
+    } else if (c.parameter.empty()) {
+      console.line(fmt::format("  {:<9} {}", c.what, c.effect));
+    } else {
+      const std::string percent =
+          c.before && *c.before != 0.0 ? fmt::format("  ({:+.3g} %)", 100.0 * (*c.after / *c.before - 1.0)) : "";
+      console.line(fmt::format("  {:<9} {:<40} {:>12} -> {:<12} {}{}", c.what, c.effect + "." + c.parameter,
+                               c.before ? output::number(*c.before, 5) : "-", output::number(*c.after, 5), c.unit,
+                               percent));
+    }
+  }
+  if (!same.empty()) console.line(fmt::format("  {:<9} {}", "same", fmt::format("{}", fmt::join(same, ", "))));
+}
+
+// Names of the effects in an image, for the packer to refuse others with their names.
+std::vector<std::string> effects_of(const protocol::Effects& effects) {
+  std::vector<std::string> names;
+  using Every = model::DriveModel<fixed::Fixed, model::EveryEffect>;
+  Every{}.for_each([&]<class Effect>(const auto&) {
+    if (effects.has(static_cast<std::uint8_t>(Every::number_of<Effect>()))) names.emplace_back(Effect::kInfo.name);
+  });
+  return names;
+}
+
+Bytes block_of(const FlashOptions& options, drive::Session& session, const Bytes& active, Console& console) {
+  if (!options.block.empty()) return read_block_file(options.block);
+  const model::ModelFile file = load_model(options.model);
+  deployment::PackOptions pack;
+  pack.tick_hz = session.identity().tick_hz;
+  pack.image = effects_of(session.effects());
+  if (const auto scales = drive::scales_of(active); scales && scales->header.encoder_counts > 0)
+    pack.encoder_counts = scales->header.encoder_counts;
+  console.progress("proving the block and comparing it with double");
+  return deployment::pack(file.model, pack).bytes;
+}
+
+}  // namespace
+
+int run(const FlashOptions& options, Console& console) {
+  if (options.model.empty() == options.block.empty())
+    throw UsageError("say what to flash: --model MODEL, or --block BLOCK of flexspline pack or backup");
+  drive::Session session = open_drive(options.drive);
+  const Bytes active = session.read_block(protocol::Which::active);
+  const Bytes block = block_of(options, session, active, console);
+  const std::vector<BlockChange> changes = drive::changes(active, block);
+  const BlockView before = drive::view_of(active), after = drive::view_of(block);
+  console.line(fmt::format("{}", named(session)));
+  console.line(fmt::format("  active    {}", described(before)));
+  console.line(fmt::format("  new       {}", described(after)));
+  print(changes, console);
+  const bool is_new = block != active;
+  if (!is_new) console.line("The drive has this block already; nothing to do.");
+  const bool flashes = is_new && confirmed("Flash it?", options.yes);
+  if (is_new && !flashes) console.line("Nothing was changed.");
+  if (flashes) {
+    session.write_block(block, [&](std::size_t sent) {
+      console.progress(fmt::format("flashing: {} of {} bytes", sent, block.size()));
+    });
+    console.line(fmt::format("{} flashed, read back and in use; flexspline restore goes back to the one before.",
+                             console.good("Block")));
+  }
+  output::save_json(options.json, {{"format", "flexspline-flash/1"},
+                                   {"drive", json_of(session)},
+                                   {"before", json_of(before)},
+                                   {"after", json_of(after)},
+                                   {"changes", json_of(changes)},
+                                   {"flashed", flashes}});
+  return kDone;
+}
+
+int run(const BackupOptions& options, Console& console) {
+  drive::Session session = open_drive(options.drive);
+  const auto which = options.previous ? protocol::Which::previous : protocol::Which::active;
+  const Bytes block = session.read_block(which);
+  if (block.empty())
+    session.fail(options.previous ? "it has no block before the active one" : "it has no parameter block to back up");
+  model::save(options.out, std::string(block.begin(), block.end()));
+  const BlockView view = drive::view_of(block);
+  console.line(fmt::format("{}: block {} of {}", options.out.string(), described(view), named(session)));
+  output::save_json(options.json,
+                    {{"format", "flexspline-backup/1"}, {"drive", json_of(session)}, {"block", json_of(view)}});
+  return kDone;
+}
+
+int run(const RestoreOptions& options, Console& console) {
+  drive::Session session = open_drive(options.drive);
+  const Bytes active = session.read_block(protocol::Which::active);
+  const Bytes previous = session.read_block(protocol::Which::previous);
+  if (previous.empty()) session.fail(std::string(protocol::text_of(protocol::Code::no_previous)));
+  const std::vector<BlockChange> changes = drive::changes(active, previous);
+  const BlockView before = drive::view_of(active), after = drive::view_of(previous);
+  console.line(named(session));
+  console.line(fmt::format("  active    {}", described(before)));
+  console.line(fmt::format("  before it {}", described(after)));
+  print(changes, console);
+  const bool restores = confirmed("Restore it?", options.yes);
+  if (restores) session.restore();
+  console.line(restores ? "Restored and in use; another restore goes forth again." : "Nothing was changed.");
+  output::save_json(options.json, {{"format", "flexspline-restore/1"},
+                                   {"drive", json_of(session)},
+                                   {"before", json_of(before)},
+                                   {"after", json_of(after)},
+                                   {"changes", json_of(changes)},
+                                   {"restored", restores}});
+  return kDone;
+}
+
+}  // namespace flexspline::cli

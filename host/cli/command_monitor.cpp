@@ -1,0 +1,190 @@
+#include <fmt/format.h>
+#include <unistd.h>
+
+#include <algorithm>
+#include <chrono>
+#include <cmath>
+#include <cstdio>
+#include <deque>
+#include <nlohmann/json.hpp>
+
+#include "host/cli/drive_commands.hpp"
+#include "host/drive/scales.hpp"
+#include "host/output/json.hpp"
+#include "host/output/text.hpp"
+#include "host/text/nearest.hpp"
+#include "shared/protocol/texts.hpp"
+
+namespace flexspline::cli {
+namespace {
+
+using nlohmann::json;
+using protocol::Channel;
+using Clock = std::chrono::steady_clock;
+
+const std::vector<Channel> kMain{
+    Channel::velocity,       Channel::output_velocity, Channel::current,        Channel::torque,
+    Channel::torsion,        Channel::temperature,     Channel::disturbance,    Channel::feedforward_torque,
+    Channel::command_torque, Channel::motor_fraction,  Channel::output_fraction};
+constexpr std::size_t kHistory = 60;
+
+std::vector<Channel> channels_of(const std::vector<std::string>& names) {
+  if (names.empty()) return kMain;
+  std::vector<Channel> channels;
+  for (const std::string& name : names) {
+    std::vector<std::string_view> known;
+    std::size_t found = protocol::kChannels;
+    for (std::size_t i = 0; i < protocol::kChannels; ++i) {
+      known.push_back(protocol::kChannelTexts[i].name);
+      if (known.back() == name) found = i;
+    }
+    if (found == protocol::kChannels) {
+      const std::string near = text::nearest(name, known);
+      throw UsageError(fmt::format(
+          "there is no channel \"{}\"; {}", name,
+          near.empty() ? fmt::format("there are {}", fmt::join(known, ", ")) : fmt::format("did you mean {}?", near)));
+    }
+    channels.push_back(static_cast<Channel>(found));
+  }
+  if (channels.size() >= protocol::kMostChannels)
+    throw UsageError(
+        fmt::format("at most {} channels beside the state, not {}", protocol::kMostChannels - 1, channels.size()));
+  return channels;
+}
+
+// A signal's last seconds in one line of characters.
+std::string sparkline(const std::deque<double>& values) {
+  constexpr std::string_view kBars[] = {"▁", "▂", "▃", "▄", "▅", "▆", "▇", "█"};
+  if (values.empty()) return {};
+  const auto [low, high] = std::minmax_element(values.begin(), values.end());
+  const double range = *high - *low;
+  std::string text;
+  for (const double value : values) {
+    const double part = range > 0.0 ? (value - *low) / range : 0.0;
+    text += kBars[static_cast<std::size_t>(std::min(7.0, std::floor(part * 8.0)))];
+  }
+  return text;
+}
+
+// How much of the torque that the drive commands is the model's own (compensation).
+std::string share_of(double feedforward, double command) {
+  if (command == 0.0) return "-";
+  return fmt::format("{:.0f} %", 100.0 * feedforward / command);
+}
+
+struct Sample {
+  double time_s = 0.0;
+  std::uint32_t state = 0;
+  std::vector<double> values;
+  std::string mode() const { return std::string(protocol::name_of(static_cast<protocol::Mode>(state & 0xFF))); }
+  protocol::FaultText fault() const { return protocol::fault_text(static_cast<std::uint8_t>(state >> 8)); }
+};
+
+class Screen {
+ public:
+  Screen(std::vector<Channel> channels, Console& console)
+      : channels_(std::move(channels)), console_(console), history_(channels_.size()) {}
+
+  void show(const Sample& s) {
+    std::string text;
+    if (lines_ > 0) text += fmt::format("\x1b[{}A", lines_);
+    lines_ = 0;
+    const auto line = [&](const std::string& content) {
+      text += "\x1b[2K" + content + "\n";
+      ++lines_;
+    };
+    line(fmt::format("{:9.2f} s  {}  {}", s.time_s, console_.bold(s.mode()),
+                     s.mode() == "fault" || s.mode() == "stop" ? console_.bad(std::string(s.fault().reason)) : ""));
+    std::optional<double> feedforward, command;
+    for (std::size_t i = 0; i < channels_.size(); ++i) {
+      history_[i].push_back(s.values[i]);
+      if (history_[i].size() > kHistory) history_[i].pop_front();
+      const protocol::ChannelText& c = protocol::text_of(channels_[i]);
+      line(fmt::format("{:<20}{:>12} {:<8} {}", c.name, output::number(s.values[i], 5), c.unit,
+                       console_.dim(sparkline(history_[i]))));
+      if (channels_[i] == Channel::feedforward_torque) feedforward = s.values[i];
+      if (channels_[i] == Channel::command_torque) command = s.values[i];
+    }
+    if (feedforward && command)
+      line(fmt::format("{:<20}{:>12}", "compensation's share", share_of(*feedforward, *command)));
+    fmt::print("{}", text);
+    std::fflush(stdout);
+  }
+
+ private:
+  std::vector<Channel> channels_;
+  Console& console_;
+  std::vector<std::deque<double>> history_;
+  int lines_ = 0;
+};
+
+}  // namespace
+
+int run(const MonitorOptions& options, Console& console) {
+  const std::vector<Channel> channels = channels_of(options.channels);
+  drive::Session session = open_drive(options.drive);
+  const drive::Scales scales = drive::scales_of(session);
+  const double tick_hz = session.identity().tick_hz;
+  const auto every = static_cast<std::uint16_t>(std::clamp(std::round(tick_hz / options.rate_hz), 1.0, 65535.0));
+  std::vector<Channel> asked{Channel::state};
+  asked.insert(asked.end(), channels.begin(), channels.end());
+  const bool is_terminal = isatty(STDOUT_FILENO) != 0 && options.json != "-";
+  console.line(named(session));
+  if (!is_terminal) {
+    std::string head = "time_s,mode,fault";
+    for (const Channel c : channels)
+      head += fmt::format(",{}{}", protocol::text_of(c).name,
+                          protocol::text_of(c).unit.empty() ? "" : fmt::format(" [{}]", protocol::text_of(c).unit));
+    console.line(head);
+  }
+  const Interruptible interruptible;
+  session.subscribe(asked, every);
+  Screen screen(channels, console);
+  json samples = json::array();
+  std::uint32_t first_tick = 0, next = 0, lost = 0;
+  bool any = false;
+  auto heard_at = Clock::now();
+  const auto take = [&](const protocol::FrameHead& head, std::uint32_t i, std::span<const std::uint32_t> words) {
+    if (words.size() != asked.size()) return;
+    const std::uint32_t tick = head.tick + i * every;
+    if (!any) first_tick = tick;
+    any = true;
+    lost += head.sequence + i - next;
+    next = head.sequence + i + 1;
+    Sample s{static_cast<double>(tick - first_tick) / tick_hz, words[0], {}};
+    for (std::size_t k = 0; k < channels.size(); ++k) s.values.push_back(scales.value(channels[k], words[k + 1]));
+    if (is_terminal) {
+      screen.show(s);
+    } else {
+      std::string line = fmt::format("{:.4f},{},{}", s.time_s, s.mode(), s.fault().name);
+      for (const double value : s.values) line += fmt::format(",{:.6g}", value);
+      console.line(line);
+    }
+    if (!options.json.empty())
+      samples.push_back(
+          {{"time_s", s.time_s}, {"mode", s.mode()}, {"fault", s.fault().name}, {"values", std::move(s.values)}});
+  };
+  const auto begin = Clock::now();
+  while (!Interruptible::interrupted()) {
+    const auto now = Clock::now();
+    if (options.seconds > 0.0 && std::chrono::duration<double>(now - begin).count() >= options.seconds) break;
+    const auto m = session.next(transport::Milliseconds(20));
+    if (m) heard_at = now;
+    if (m && m->is_unasked()) protocol::for_each_frame(*m, take);
+    if (now - heard_at > std::chrono::seconds(3))
+      session.fail("the drive went silent; check cable and power, then try again");
+  }
+  session.subscribe({}, 1);
+  if (lost > 0) console.warn(fmt::format("{} frames were lost", lost));
+  json names = json::array();
+  for (const Channel c : channels)
+    names.push_back({{"name", protocol::text_of(c).name}, {"unit", protocol::text_of(c).unit}});
+  output::save_json(options.json, {{"format", "flexspline-monitor/1"},
+                                   {"drive", {{"serial", session.serial()}, {"board", session.board()}}},
+                                   {"channels", names},
+                                   {"frames_lost", lost},
+                                   {"samples", samples}});
+  return kDone;
+}
+
+}  // namespace flexspline::cli

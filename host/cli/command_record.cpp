@@ -1,0 +1,139 @@
+#include <fmt/format.h>
+#include <unistd.h>
+
+#include <algorithm>
+#include <cstdio>
+#include <iostream>
+#include <nlohmann/json.hpp>
+
+#include "host/cli/drive_commands.hpp"
+#include "host/deployment/sha256.hpp"
+#include "host/drive/dataset_writer.hpp"
+#include "host/drive/recorder.hpp"
+#include "host/output/json.hpp"
+
+namespace flexspline::cli {
+namespace {
+
+namespace fs = std::filesystem;
+using nlohmann::json;
+
+bool needs_a_person(const planning::Run& run) {
+  return run.locked || run.load_torque_nm != 0.0 || run.temperature_c || !run.instructions.empty();
+}
+std::string task_of(const planning::Run& run) {
+  std::string text = run.instructions;
+  const auto add = [&](const std::string& more) { text += (text.empty() ? "" : "; ") + more; };
+  if (run.locked) add("lock the output");
+  if (run.load_torque_nm != 0.0) add(fmt::format("apply {:g} N*m to the output", run.load_torque_nm));
+  if (run.temperature_c) add(fmt::format("bring the housing to {:g} degC", *run.temperature_c));
+  return text;
+}
+
+// Whether somebody is there to do what runs need, before the first of them moves.
+void require_person(const planning::Plan& plan, bool yes) {
+  if (yes || isatty(STDIN_FILENO) != 0) return;
+  for (const planning::Run& run : plan.runs)
+    if (needs_a_person(run))
+      throw UsageError(fmt::format("run \"{}\" needs a person ({}); record on a terminal, or say --yes when all is so",
+                                   run.name, task_of(run)));
+}
+// False: the person wants to stop.
+bool prepared(const planning::Run& run, bool yes) {
+  if (yes || !needs_a_person(run)) return true;
+  fmt::print(stderr, "{}: {}. Enter when done, q to stop: ", run.name, task_of(run));
+  std::fflush(stderr);
+  std::string answer;
+  return std::getline(std::cin, answer) && answer != "q";
+}
+
+json json_of(const drive::Recording& r) {
+  json gaps = json::array();
+  for (const drive::Gap& gap : r.gaps) gaps.push_back({{"from_s", gap.from_s}, {"frames", gap.frames}});
+  return {{"name", r.run.name},
+          {"samples", r.time_s.size()},
+          {"duration_s", r.time_s.empty() ? 0.0 : r.time_s.back()},
+          {"frames_lost", r.lost},
+          {"frames_dropped_by_drive", r.dropped},
+          {"gaps", gaps},
+          {"complete", r.complete},
+          {"ended", r.ended.empty() ? json() : json(r.ended)}};
+}
+
+void say(const drive::Recording& r, Console& console) {
+  console.line(fmt::format("  {:<28} {:>8} samples, {:.3g} s{}", r.run.name, r.time_s.size(),
+                           r.time_s.empty() ? 0.0 : r.time_s.back(),
+                           r.complete ? std::string() : ", not complete: " + r.ended));
+  if (r.lost > 0)
+    console.warn(
+        fmt::format("{}: {} frames were lost in {} gaps, {} of them on the drive; the file names them. Record "
+                    "more slowly (sample_s), or on a faster line or machine",
+                    r.run.name, r.lost, r.gaps.size(), r.dropped));
+}
+
+}  // namespace
+
+int run(const RecordOptions& options, Console& console) {
+  const planning::Plan plan = planning::read(options.plan);
+  if (plan.runs.empty()) throw UsageError(options.plan.string() + ": the plan has no [[run]]: nothing to record");
+  if (!options.force && fs::exists(options.out) && !fs::is_empty(options.out))
+    throw UsageError(options.out.string() + ": is there and not empty; give another folder, or --force");
+  require_person(plan, options.yes);
+  drive::Session session = open_drive(options.drive);
+  const drive::Bytes block = session.read_block(protocol::Which::active);
+  const drive::Scales scales = drive::scales_of(session);
+  drive::Recorder recorder(session, scales, plan);
+  const protocol::Identity& id = session.identity();
+  const drive::Origin origin{session.serial(), session.board(), fmt::format("{}.{}", id.firmware[0], id.firmware[1]),
+                             deployment::sha256(block)};
+  make_folder(options.out);
+  if (options.clear_fault) recorder.clear_fault();
+  console.line(named(session));
+  const Interruptible interruptible;
+  std::vector<drive::Recording> all;
+  std::string ended, failure;
+  for (std::size_t i = 0; i < plan.runs.size() && ended.empty(); ++i) {
+    const planning::Run& run = plan.runs[i];
+    if (!prepared(run, options.yes)) {
+      ended = "interrupted";
+      break;
+    }
+    try {
+      drive::Recording r =
+          recorder.record(run, {Interruptible::interrupted, [&](double time_s) {
+                                  console.progress(fmt::format("run {} of {}, {}: {:.1f} of {:g} s", i + 1,
+                                                               plan.runs.size(), run.name, time_s, run.duration_s));
+                                }});
+      say(r, console);
+      ended = r.ended;
+      if (r.complete) model::save(options.out / (run.name + ".csv"), drive::csv_of(r, scales, origin));
+      all.push_back(std::move(r));
+    } catch (const std::exception& error) {
+      // What was finished is worth keeping.
+      failure = error.what();
+      break;
+    }
+  }
+  const auto complete = std::count_if(all.begin(), all.end(), [](const auto& r) { return r.complete; });
+  if (complete > 0) model::save(options.out / "dataset.toml", drive::dataset_toml_of(all, scales, origin));
+  json runs = json::array();
+  for (const drive::Recording& r : all) runs.push_back(json_of(r));
+  output::save_json(options.json,
+                    {{"format", "flexspline-record/1"},
+                     {"drive", {{"serial", origin.serial}, {"board", origin.board}, {"firmware", origin.firmware}}},
+                     {"block_sha256", origin.block_sha256},
+                     {"ended", !failure.empty() ? json(failure)
+                               : ended.empty()  ? json()
+                                                : json(ended)},
+                     {"runs", runs}});
+  const std::string kept = fmt::format("{} of {} runs are in {}", complete, plan.runs.size(), options.out.string());
+  if (!failure.empty()) throw drive::DriveError(fmt::format("{} ({})", failure, kept));
+  if (!ended.empty()) {
+    console.error(fmt::format("{}; the drive is at rest; {}", ended, kept));
+    return kNotMet;
+  }
+  console.line(kept);
+  return kDone;
+}
+
+}  // namespace flexspline::cli

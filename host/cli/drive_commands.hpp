@@ -1,0 +1,82 @@
+// The commands that speak with a drive: what each is given, and what runs it.
+#pragma once
+
+#include <filesystem>
+#include <string>
+#include <vector>
+
+#include "host/cli/inputs.hpp"
+#include "host/drive/session.hpp"
+
+namespace flexspline::cli {
+
+struct DrivesOptions {
+  std::vector<std::string> also;  // ports and sockets to look behind
+  std::string json;
+};
+int run(const DrivesOptions& options, Console& console);
+
+struct FlashOptions {
+  std::string drive;
+  std::filesystem::path model;
+  std::filesystem::path block;
+  bool yes = false;
+  std::string json;
+};
+int run(const FlashOptions& options, Console& console);
+
+struct BackupOptions {
+  std::string drive;
+  std::filesystem::path out;
+  bool previous = false;
+  std::string json;
+};
+int run(const BackupOptions& options, Console& console);
+
+struct RestoreOptions {
+  std::string drive;
+  bool yes = false;
+  std::string json;
+};
+int run(const RestoreOptions& options, Console& console);
+
+struct MonitorOptions {
+  std::string drive;
+  double seconds = 0.0;  // nought: until Ctrl-C
+  double rate_hz = 10.0;
+  std::vector<std::string> channels;
+  std::string json;
+};
+int run(const MonitorOptions& options, Console& console);
+
+struct RecordOptions {
+  std::string drive;
+  std::filesystem::path plan;
+  std::filesystem::path out;
+  bool yes = false;
+  bool force = false;
+  bool clear_fault = false;
+  std::string json;
+};
+int run(const RecordOptions& options, Console& console);
+
+// Opens what --drive names and identifies it.
+drive::Session open_drive(const std::string& drive);
+// "drive SERIAL (BOARD) at NAME".
+std::string named(const drive::Session& session);
+// Asks on a terminal, unless `yes`; without a terminal nobody is asked and it is true.
+bool confirmed(const std::string& question, bool yes);
+// A block from a file, at most one byte more than any block may have.
+drive::Bytes read_block_file(const std::filesystem::path& path);
+
+// True once Ctrl-C was pressed (or the process was told to end) while one of these lives.
+class Interruptible {
+ public:
+  Interruptible();
+  ~Interruptible();
+  Interruptible(const Interruptible&) = delete;
+  Interruptible& operator=(const Interruptible&) = delete;
+  static bool interrupted();
+};
+
+}  // namespace flexspline::cli

@@ -1,0 +1,274 @@
+#include "host/drive/recorder.hpp"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <chrono>
+#include <cmath>
+#include <numbers>
+#include <thread>
+
+#include "host/planning/excitation.hpp"
+#include "shared/control/excitation.hpp"
+#include "shared/fixed/findings.hpp"
+#include "shared/protocol/excitation_requests.hpp"
+#include "shared/protocol/texts.hpp"
+
+namespace flexspline::drive {
+namespace {
+
+using protocol::Channel;
+using protocol::Kind;
+using Clock = std::chrono::steady_clock;
+
+constexpr double kTurn = 2.0 * std::numbers::pi;
+// A host that is silent for 0.1 s counts as lost; it shows itself well before, by either clock.
+constexpr Milliseconds kHeartbeat{20};
+constexpr std::uint32_t kHeartbeatTicks = 400;
+constexpr Milliseconds kSilence{2000};
+constexpr double kOver = 1.1;  // of a limit: noise is no reason to stop
+constexpr std::size_t kLongestGapList = 20;
+
+const std::vector<Channel> kChannels{Channel::motor_fraction, Channel::output_fraction, Channel::current,
+                                     Channel::torque,         Channel::temperature,     Channel::set_velocity};
+std::vector<Channel> channels_of(const planning::Run& run) {
+  std::vector<Channel> channels = kChannels;
+  if (run.mode != planning::Mode::velocity) channels.back() = Channel::command_current;
+  return channels;
+}
+
+// A position whose whole turns are counted here: the next one is the nearest to where the motion would lead.
+class Unwrapped {
+ public:
+  double next(double fraction, double samples) {
+    if (!known_) {
+      known_ = true;
+      return turns_ = fraction;
+    }
+    const double expected = turns_ + rate_ * samples;
+    const double off = fraction - expected;
+    const double now = expected + off - std::nearbyint(off);
+    rate_ = (now - turns_) / samples;
+    return turns_ = now;
+  }
+  double rate() const { return rate_; }
+
+ private:
+  bool known_ = false;
+  double turns_ = 0.0;
+  double rate_ = 0.0;  // per sample
+};
+
+}  // namespace
+
+// Frames into columns, and what the plan's limits say of them.
+class Recorder::Columns {
+ public:
+  Columns(const Scales& scales, const planning::Plan& plan, double tick_s, std::uint16_t every, Recording& out)
+      : scales_(scales), plan_(plan), tick_s_(tick_s), every_(every), out_(out), channels_(channels_of(out.run)) {}
+
+  void take(const protocol::FrameHead& head, std::uint32_t index, std::span<const std::uint32_t> words) {
+    if (words.size() != channels_.size()) return;
+    const std::uint32_t sequence = head.sequence + index;
+    const std::uint32_t tick = head.tick + index * every_;
+    if (out_.time_s.empty()) {
+      first_tick_ = tick;
+      next_ = sequence;
+      // Frames before the first that came were lost as well.
+      note_gap(sequence, 0.0);
+    }
+    const double time_s = static_cast<double>(tick - first_tick_) * tick_s_;
+    const std::uint32_t missing = sequence - next_;
+    if (missing > 0) note_gap(missing, time_s - missing * every_ * tick_s_);
+    next_ = sequence + 1;
+    last_tick_ = tick;
+    const auto value = [&](std::size_t i) { return scales_.value(channels_[i], words[i]); };
+    const double samples = 1.0 + missing;
+    out_.time_s.push_back(time_s);
+    out_.motor_position_rad.push_back(kTurn * motor_.next(value(0), samples));
+    out_.output_position_rad.push_back(kTurn * output_.next(value(1), samples));
+    out_.current_a.push_back(value(2));
+    out_.torque_nm.push_back(value(3));
+    out_.temperature_c.push_back(value(4));
+    out_.command.push_back(value(5));
+    watch();
+  }
+  std::uint32_t last_tick() const { return last_tick_; }
+  const std::string& exceeded() const { return exceeded_; }
+
+ private:
+  void note_gap(std::uint32_t frames, double from_s) {
+    if (frames == 0) return;
+    out_.lost += frames;
+    if (out_.gaps.size() < kLongestGapList) out_.gaps.push_back({from_s, frames});
+  }
+  void watch() {
+    const planning::Limits& limits = plan_.limits;
+    const std::size_t n = out_.time_s.size();
+    constexpr std::size_t kOver10 = 10;
+    if (n <= kOver10 || !exceeded_.empty()) return;
+    const auto too_much = [&](const char* what, double seen, double limit, const char* unit) {
+      if (limit > 0.0 && seen > kOver * limit)
+        exceeded_ = fmt::format("{} of {:.4g} {} is above the plan's limit of {:g} {}", what, seen, unit, limit, unit);
+    };
+    const auto& q = out_.motor_position_rad;
+    too_much("a velocity",
+             std::abs(q[n - 1] - q[n - 1 - kOver10]) / (out_.time_s[n - 1] - out_.time_s[n - 1 - kOver10]),
+             limits.velocity_rad_s, "rad/s");
+    double current = 0.0;
+    for (std::size_t i = n - kOver10; i < n; ++i) current += out_.current_a[i] / kOver10;
+    too_much("a current", std::abs(current), limits.current_a, "A");
+    low_ = std::min(low_, out_.output_position_rad.back());
+    high_ = std::max(high_, out_.output_position_rad.back());
+    too_much("a travel of the output", high_ - low_, limits.travel_rad, "rad");
+  }
+
+  const Scales& scales_;
+  const planning::Plan& plan_;
+  double tick_s_;
+  std::uint16_t every_;
+  Recording& out_;
+  std::vector<Channel> channels_;
+  Unwrapped motor_, output_;
+  std::uint32_t first_tick_ = 0, last_tick_ = 0, next_ = 0;
+  double low_ = 1e300, high_ = -1e300;
+  std::string exceeded_;
+};
+
+Recorder::Recorder(Session& session, const Scales& scales, const planning::Plan& plan)
+    : session_(session), scales_(scales), plan_(plan) {
+  const double ticks = plan.sample_s * session.identity().tick_hz;
+  if (!(ticks >= 1.0 && ticks <= 65535.0) || std::abs(ticks - std::round(ticks)) > 1e-6 * ticks)
+    session.fail(
+        fmt::format("a sample every {:g} s is no whole number of its ticks ({} a second); change sample_s of "
+                    "the plan",
+                    plan.sample_s, session.identity().tick_hz));
+  every_ = static_cast<std::uint16_t>(std::lround(ticks));
+  for (const planning::Run& run : plan.runs) {
+    if (run.mode == planning::Mode::position)
+      throw planning::PlanError(fmt::format(
+          "run \"{}\": a drive makes excitations of current and velocity, not of position; plan a velocity", run.name));
+    if (run.mode == planning::Mode::off) continue;
+    const auto setup = planning::excitation_of(run, 1.0 / session.identity().tick_hz);
+    const bool is_current = run.mode == planning::Mode::current;
+    const double limit = is_current ? plan.limits.current_a : plan.limits.velocity_rad_s;
+    if (limit > 0.0 && setup.limit > 1.001 * limit)
+      throw planning::PlanError(
+          fmt::format("run \"{}\": its set point goes up to {:g}, beyond the plan's limit of {:g}; "
+                      "lower its amplitude or offset",
+                      run.name, setup.limit, limit));
+  }
+}
+
+void Recorder::send_excitation(const planning::Run& run) {
+  const effects::DriveConstants<double>& d = scales_.constants;
+  auto setup = planning::excitation_of(run, 1.0 / session_.identity().tick_hz);
+  const bool is_torque = run.mode == planning::Mode::current;
+  if (is_torque) {
+    const double km = d.torque_constant;
+    setup.amplitude *= km, setup.offset *= km, setup.limit *= km, setup.slope_limit *= km;
+    if (plan_.limits.velocity_rad_s > 0.0) {
+      const double bound = std::ldexp(scales_.header.limits.overspeed.raw, -fixed::kValueBits) * d.velocity_base;
+      setup.velocity_limit = std::min(plan_.limits.velocity_rad_s, 0.9 * bound);
+      setup.overspeed = std::min(1.15 * setup.velocity_limit, bound);
+    }
+  }
+  // Nothing moves: the least number that a limit can be.
+  const double base = is_torque ? d.torque_base : d.velocity_base;
+  setup.limit = std::max(setup.limit, 1e-6 * base);
+  setup.slope_limit = std::max(setup.slope_limit, setup.limit);
+  fixed::Findings::clear();
+  const auto c = control::Excitation::derive<fixed::Fixed>(setup, base, d);
+  if (fixed::Findings::count() != 0)
+    session_.fail(fmt::format("run \"{}\" does not fit the drive: {}", run.name, fixed::Findings::first()));
+  protocol::send_excitation(c, is_torque, [this](Kind kind, const auto& payload) {
+    session_.ask(kind, payload);
+    return true;
+  });
+}
+
+void Recorder::clear_fault() {
+  if (session_.status().mode == protocol::Mode::fault) session_.command({.kind = protocol::CommandKind::clear_fault});
+}
+
+Recording Recorder::record(const planning::Run& run, const Watch& watch) {
+  Recording out;
+  out.run = run;
+  const double tick_s = 1.0 / session_.identity().tick_hz;
+  const bool moves = run.mode != planning::Mode::off;
+  protocol::Status before = session_.status();
+  for (int i = 0; i < 50 && before.mode == protocol::Mode::boot; ++i) {
+    std::this_thread::sleep_for(Milliseconds(10));
+    before = session_.status();
+  }
+  if (before.mode == protocol::Mode::fault)
+    session_.fail(fmt::format("it stands in a fault: {}; find its cause, then record with --clear-fault",
+                              protocol::fault_text(before.fault).reason));
+  if (before.mode != protocol::Mode::idle)
+    session_.fail(fmt::format("it is in mode {}, not idle; another program may have it", name_of(before.mode)));
+  if (moves) send_excitation(run);
+  Columns columns(scales_, plan_, tick_s, every_, out);
+  try {
+    session_.subscribe(channels_of(run), every_);
+    if (moves) session_.command({.kind = protocol::CommandKind::arm, .mode = protocol::Mode::excitation});
+    auto said_at = Clock::now(), heard_at = said_at;
+    std::uint32_t said_tick = 0;
+    bool waits = false;
+    std::uint8_t asked = 0;
+    while (true) {
+      const auto m = session_.next(Milliseconds(5));
+      const auto now = Clock::now();
+      if (m) heard_at = now;
+      if (m && m->is_unasked()) {
+        protocol::for_each_frame(*m,
+                                 [&](const auto& head, std::uint32_t i, auto words) { columns.take(head, i, words); });
+      } else if (m && waits && m->number == asked) {
+        waits = false;
+        protocol::CommandAnswer answer;
+        if (moves && protocol::take_payload(m->content(), answer) == protocol::Code::done &&
+            answer.mode != protocol::Mode::excitation) {
+          out.complete = answer.mode == protocol::Mode::idle;
+          break;
+        }
+      }
+      const double time_s = out.time_s.empty() ? 0.0 : out.time_s.back();
+      if (!moves && time_s >= run.duration_s) {
+        out.complete = true;
+        break;
+      }
+      if (!columns.exceeded().empty()) out.ended = columns.exceeded();
+      if (watch.stops && watch.stops()) out.ended = "interrupted";
+      if (!out.ended.empty()) break;
+      if (now - heard_at > kSilence) session_.fail("the drive went silent; check cable and power");
+      const bool is_late = now - said_at > Milliseconds(500);
+      if ((!waits || is_late) && (now - said_at >= kHeartbeat || columns.last_tick() - said_tick >= kHeartbeatTicks)) {
+        waits = true;
+        asked = session_.post(protocol::request(Kind::command, 0, protocol::Command{}));
+        said_at = now;
+        said_tick = columns.last_tick();
+        if (watch.progress) watch.progress(time_s);
+      }
+    }
+    session_.stop();
+    const protocol::Status after = session_.status();
+    out.dropped = after.dropped;
+    // What is on its way yet.
+    while (const auto m = session_.next(Milliseconds(15))) {
+      if (!m->is_unasked()) continue;
+      protocol::for_each_frame(*m,
+                               [&](const auto& head, std::uint32_t i, auto words) { columns.take(head, i, words); });
+      if (columns.last_tick() >= after.tick || static_cast<std::int32_t>(columns.last_tick() - after.tick) >= 0) break;
+    }
+    session_.subscribe({}, 1);
+    if (!out.complete && out.ended.empty()) {
+      const protocol::FaultText fault = protocol::fault_text(after.fault);
+      out.ended = fmt::format("fault {}: {}", fault.name, fault.reason);
+    }
+  } catch (const std::exception&) {
+    session_.stop();
+    throw;
+  }
+  return out;
+}
+
+}  // namespace flexspline::drive

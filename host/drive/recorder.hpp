@@ -1,0 +1,54 @@
+// Runs the motions of a plan on a drive, one at a time, and gathers what its sensors say.
+#pragma once
+
+#include <cstdint>
+#include <functional>
+#include <string>
+#include <vector>
+
+#include "host/drive/scales.hpp"
+#include "host/drive/session.hpp"
+#include "host/planning/plan.hpp"
+
+namespace flexspline::drive {
+
+struct Gap {
+  double from_s = 0.0;
+  std::uint32_t frames = 0;
+};
+
+struct Recording {
+  planning::Run run;
+  std::vector<double> time_s, current_a, motor_position_rad, output_position_rad, torque_nm, temperature_c, command;
+  std::uint32_t lost = 0;     // frames, wherever
+  std::uint32_t dropped = 0;  // of these on the drive, which had no room for them
+  std::vector<Gap> gaps;
+  bool complete = false;
+  std::string ended;  // why it is not: "interrupted", a limit, a fault
+};
+
+class Recorder {
+ public:
+  // Of a whole plan, before anything moves: throws DriveError or PlanError for a run that this drive cannot make.
+  Recorder(Session& session, const Scales& scales, const planning::Plan& plan);
+
+  struct Watch {
+    std::function<bool()> stops;  // asked again and again: the user wants an end
+    std::function<void(double time_s)> progress{};
+  };
+  // A fault that the drive stands in, as the user says that its cause is gone.
+  void clear_fault();
+  // The drive is at rest and not armed when it returns, and where the link still works also when it throws.
+  Recording record(const planning::Run& run, const Watch& watch);
+
+ private:
+  class Columns;
+  void send_excitation(const planning::Run& run);
+
+  Session& session_;
+  const Scales& scales_;
+  const planning::Plan& plan_;
+  std::uint16_t every_ = 1;
+};
+
+}  // namespace flexspline::drive

@@ -1,0 +1,113 @@
+// Drives on USB, by hidapi. The program is linked to one of its back ends, hidraw (Debian's default here) or libusb;
+// both behave alike but for what a device without permission looks like.
+#include <fmt/format.h>
+#include <hidapi/hidapi.h>
+
+#include <algorithm>
+#include <array>
+#include <span>
+#include <string>
+
+#include "host/transport/link.hpp"
+#include "shared/usb/identity.hpp"
+
+namespace flexspline::transport {
+namespace {
+
+using Identity = usb::FlexsplineIdentity;
+constexpr const char* kRemedy =
+    "your user may not open it: sudo cp 70-flexspline.rules /etc/udev/rules.d/ && sudo udevadm control --reload, then "
+    "plug the drive in again (the file stands in host/drive)";
+
+std::string narrow(const wchar_t* text) {
+  std::string out;
+  for (; text != nullptr && *text != L'\0'; ++text) out += *text > 0 && *text < 128 ? static_cast<char>(*text) : '?';
+  return out;
+}
+
+// hidapi's own state, which has to be there as long as a device is open.
+void start() {
+  if (hid_init() != 0) throw LinkError("USB: hidapi cannot be started; is /sys mounted?");
+}
+
+class Hid : public Link {
+ public:
+  Hid(hid_device* device, std::string serial) : device_(device), serial_(std::move(serial)) {}
+  ~Hid() override { hid_close(device_); }
+  Hid(const Hid&) = delete;
+  Hid& operator=(const Hid&) = delete;
+
+  void send(const protocol::Message& m) override {
+    // The first byte is the number of the report; drives have none.
+    std::array<std::uint8_t, protocol::kReportBytes + 1> bytes{};
+    const protocol::Report report = protocol::encode(m);
+    std::copy(report.begin(), report.end(), bytes.begin() + 1);
+    if (hid_write(device_, bytes.data(), bytes.size()) < 0) gone();
+  }
+  std::optional<protocol::Message> receive(Milliseconds limit) override {
+    protocol::Report report{};
+    const int got = hid_read_timeout(device_, report.data(), report.size(), static_cast<int>(limit.count()));
+    if (got < 0) gone();
+    protocol::Message m;
+    if (got == 0 || !protocol::decode(std::span(report).first(static_cast<std::size_t>(got)), m)) return {};
+    return m;
+  }
+  std::string name() const override { return "hid:" + serial_; }
+
+ private:
+  [[noreturn]] void gone() const {
+    throw LinkError(
+        fmt::format("{}: the drive is gone ({}); plug it in again and try again", name(), narrow(hid_error(device_))));
+  }
+  hid_device* device_;
+  std::string serial_;
+};
+
+}  // namespace
+
+std::vector<Found> find_hid() {
+  start();
+  std::vector<Found> found;
+  hid_device_info* all = hid_enumerate(Identity::kVendorId, Identity::kProductId);
+  for (const hid_device_info* one = all; one != nullptr; one = one->next) {
+    const std::string serial = narrow(one->serial_number);
+    Found drive{"hid:" + serial, narrow(one->product_string) + " on USB, " + one->path, true, {}};
+    if (hid_device* device = hid_open_path(one->path)) {
+      hid_close(device);
+    } else {
+      drive.usable = false;
+      drive.problem = kRemedy;
+    }
+    found.push_back(std::move(drive));
+  }
+  hid_free_enumeration(all);
+  return found;
+}
+
+std::unique_ptr<Link> open_hid(const std::string& serial) {
+  start();
+  hid_device_info* all = hid_enumerate(Identity::kVendorId, Identity::kProductId);
+  std::string path, its_serial, others;
+  std::size_t count = 0;
+  for (const hid_device_info* one = all; one != nullptr; one = one->next) {
+    const std::string this_serial = narrow(one->serial_number);
+    others += (others.empty() ? "" : ", ") + this_serial;
+    if (!serial.empty() && this_serial != serial) continue;
+    path = one->path;
+    its_serial = this_serial;
+    ++count;
+  }
+  hid_free_enumeration(all);
+  if (count == 0) {
+    const std::string there = others.empty() ? "no drive is on USB" : "those on USB are " + others;
+    throw LinkError(fmt::format("{}: {}; check cable and power, or use --drive twin without hardware",
+                                serial.empty() ? "USB" : "hid:" + serial, there));
+  }
+  if (count > 1)
+    throw LinkError(fmt::format("USB: there is more than one drive ({}); say which: --drive SERIAL", others));
+  hid_device* device = hid_open_path(path.c_str());
+  if (device == nullptr) throw LinkError(fmt::format("hid:{}: {} cannot be opened; {}", its_serial, path, kRemedy));
+  return std::make_unique<Hid>(device, its_serial);
+}
+
+}  // namespace flexspline::transport

@@ -1,0 +1,42 @@
+#include <fmt/format.h>
+#include <netdb.h>
+#include <netinet/in.h>
+#include <netinet/tcp.h>
+#include <sys/socket.h>
+#include <unistd.h>
+
+#include <cerrno>
+#include <cstring>
+
+#include "host/transport/link.hpp"
+
+namespace flexspline::transport {
+
+std::unique_ptr<Link> open_tcp(const std::string& address) {
+  const std::size_t colon = address.rfind(':');
+  if (colon == std::string::npos || colon == 0 || colon + 1 == address.size())
+    throw LinkError(fmt::format("tcp:{}: an address is HOST:PORT, as tcp:127.0.0.1:4711", address));
+  addrinfo hints{};
+  hints.ai_socktype = SOCK_STREAM;
+  addrinfo* found = nullptr;
+  const int wrong = getaddrinfo(address.substr(0, colon).c_str(), address.substr(colon + 1).c_str(), &hints, &found);
+  if (wrong != 0) throw LinkError(fmt::format("tcp:{}: {}; check the address", address, gai_strerror(wrong)));
+  int fd = -1;
+  int error = 0;
+  for (const addrinfo* one = found; one != nullptr && fd < 0; one = one->ai_next) {
+    fd = socket(one->ai_family, one->ai_socktype | SOCK_CLOEXEC, one->ai_protocol);
+    if (fd >= 0 && connect(fd, one->ai_addr, one->ai_addrlen) == 0) break;
+    error = errno;
+    if (fd >= 0) close(fd);
+    fd = -1;
+  }
+  freeaddrinfo(found);
+  if (fd < 0)
+    throw LinkError(fmt::format("tcp:{}: {}; is the twin running? flexspline-hil twin --serve PORT starts one", address,
+                                std::strerror(error)));
+  const int on = 1;
+  setsockopt(fd, IPPROTO_TCP, TCP_NODELAY, &on, sizeof(on));
+  return stream_link(fd, "tcp:" + address);
+}
+
+}  // namespace flexspline::transport

@@ -1,0 +1,250 @@
+// The message that goes between a host and a drive, over whatever link: at most 64 bytes, little-endian.
+//
+//   0  kind     of a request, below 0x70; an answer has the same with kAnswerBit; from kFirstUnasked on what a drive
+//   sends by itself 1  number   of the request, any; comes back with the answer 2  length   of the payload, 0 to 60 3
+//   code of an answer; else nought (of telemetry: the number of frames) 4  payload
+//
+// README.md has the table of kinds. A report of 64 bytes is filled up with noughts.
+#pragma once
+
+#include <array>
+#include <cstddef>
+#include <cstdint>
+#include <span>
+#include <type_traits>
+
+#include "shared/model/encoding.hpp"
+
+namespace flexspline::protocol {
+
+inline constexpr std::uint8_t kMajor = 1;  // another one: nothing but `identify` is understood
+inline constexpr std::uint8_t kMinor = 0;  // grows with what is added
+
+inline constexpr std::size_t kReportBytes = 64;
+inline constexpr std::size_t kHeadBytes = 4;
+inline constexpr std::size_t kMostPayload = kReportBytes - kHeadBytes;
+using Report = std::array<std::uint8_t, kReportBytes>;
+
+inline constexpr std::uint8_t kAnswerBit = 0x80;
+inline constexpr std::uint8_t kEndOfRequests = 0x70;
+inline constexpr std::uint8_t kFirstUnasked = kAnswerBit + kEndOfRequests;
+
+// Numbers stay as they are for good; a kind that is no longer served is not used again.
+enum class Kind : std::uint8_t {
+  identify = 0x01,
+  status = 0x02,
+  effects = 0x03,
+  block_begin = 0x10,
+  block_chunk = 0x11,
+  block_commit = 0x12,
+  block_restore = 0x13,
+  block_read = 0x14,
+  command = 0x20,
+  excitation = 0x21,
+  excitation_guard = 0x22,
+  excitation_lines = 0x23,
+  excitation_use = 0x24,
+  telemetry = 0x30,
+  map_info = 0x40,   // the residual map: kept free, not served yet
+  map_bins = 0x41,   //
+  map_reset = 0x42,  //
+  telemetry_frames = kFirstUnasked,
+};
+
+enum class Code : std::uint8_t {
+  done,
+  unknown_request,  // this drive does not know it
+  wrong_length,
+  wrong_value,    // a number is outside what its field may hold
+  wrong_version,  // `identify` with an agreeing major has to come first
+  busy,           // the request before has not been answered
+  armed,          // not while the drive is armed
+  refused,        // a command; the payload says why
+  no_parameters,
+  no_block,
+  not_available,  // this drive cannot do that
+  // Of the parameter store, in its order.
+  too_long = 0x20,
+  not_begun,
+  out_of_order,
+  incomplete,
+  wrong_checksum,
+  invalid,  // the validator refused it; the payload has its reason
+  flash,
+  no_previous,
+  worn,
+};
+
+struct Message {
+  std::uint8_t kind = 0;
+  std::uint8_t number = 0;
+  std::uint8_t length = 0;
+  std::uint8_t code = 0;
+  std::array<std::uint8_t, kMostPayload> payload{};
+
+  constexpr Kind request() const { return static_cast<Kind>(kind & ~kAnswerBit); }
+  constexpr bool is_request() const { return kind < kEndOfRequests; }
+  constexpr bool is_unasked() const { return kind >= kFirstUnasked; }
+  constexpr bool is_answer() const { return kind >= kAnswerBit && !is_unasked(); }
+  constexpr std::size_t size() const { return kHeadBytes + length; }
+  constexpr std::span<const std::uint8_t> content() const { return std::span(payload).first(length); }
+};
+
+// The first size() bytes count; the rest are noughts.
+constexpr Report encode(const Message& m) {
+  Report report{};
+  report[0] = m.kind;
+  report[1] = m.number;
+  report[2] = m.length;
+  report[3] = m.code;
+  for (std::size_t i = 0; i < m.length && i < kMostPayload; ++i) report[kHeadBytes + i] = m.payload[i];
+  return report;
+}
+// False for what is cut off or states a length that does not fit. Bytes behind the message are passed over.
+constexpr bool decode(std::span<const std::uint8_t> bytes, Message& m) {
+  if (bytes.size() < kHeadBytes) return false;
+  const std::uint8_t length = bytes[2];
+  if (length > kMostPayload || bytes.size() < kHeadBytes + length) return false;
+  m = {bytes[0], bytes[1], length, bytes[3], {}};
+  for (std::size_t i = 0; i < length; ++i) m.payload[i] = bytes[kHeadBytes + i];
+  return true;
+}
+
+// A payload names its fields once, in their order on the wire, for both directions:
+//   template <class Codec> constexpr void fields(Codec& c) { c(number); c.within(kind, 5); }
+class PutFields {
+ public:
+  explicit constexpr PutFields(std::span<std::uint8_t> room) : writer_(room) {}
+  template <class T>
+  constexpr void operator()(T& x) {
+    if constexpr (std::is_same_v<T, bool>) {
+      writer_.put(static_cast<std::uint8_t>(x));
+    } else {
+      writer_.put(x);
+    }
+  }
+  template <class T, std::size_t Size>
+  constexpr void operator()(std::array<T, Size>& all) {
+    for (T& x : all) (*this)(x);
+  }
+  // An integer or enumeration below `end`.
+  template <class T>
+  constexpr void within(T& x, std::uint32_t) {
+    (*this)(x);
+  }
+  // The first `count` of `all`, whose number travels before them in a byte.
+  template <class T, std::size_t Size>
+  constexpr void some(std::array<T, Size>& all, std::uint8_t& count) {
+    writer_.put(count);
+    for (std::size_t i = 0; i < count && i < Size; ++i) one(all[i]);
+  }
+  // Bytes up to the end of the message.
+  template <std::size_t Size>
+  constexpr void rest(std::array<std::uint8_t, Size>& bytes, std::uint8_t& count) {
+    for (std::size_t i = 0; i < count && i < Size; ++i) writer_.put(bytes[i]);
+  }
+  constexpr std::size_t size() const { return writer_.size(); }
+  constexpr bool good() const { return writer_.fits(); }
+
+ private:
+  template <class T>
+  constexpr void one(T& x) {
+    if constexpr (std::is_class_v<T>) {
+      x.fields(*this);
+    } else {
+      (*this)(x);
+    }
+  }
+  model::Writer writer_;
+};
+class TakeFields {
+ public:
+  explicit constexpr TakeFields(std::span<const std::uint8_t> bytes) : reader_(bytes) {}
+  template <class T>
+  constexpr void operator()(T& x) {
+    if constexpr (std::is_same_v<T, bool>) {
+      const auto byte = reader_.take<std::uint8_t>();
+      x = byte != 0;
+      in_range_ = in_range_ && byte <= 1;
+    } else {
+      x = reader_.take<T>();
+    }
+  }
+  template <class T, std::size_t Size>
+  constexpr void operator()(std::array<T, Size>& all) {
+    for (T& x : all) (*this)(x);
+  }
+  template <class T>
+  constexpr void within(T& x, std::uint32_t end) {
+    const auto raw = reader_.take<T>();
+    const bool fits = static_cast<std::uint32_t>(raw) < end;
+    x = fits ? raw : T{};
+    in_range_ = in_range_ && fits;
+  }
+  template <class T, std::size_t Size>
+  constexpr void some(std::array<T, Size>& all, std::uint8_t& count) {
+    within(count, Size + 1);
+    for (std::size_t i = 0; i < count; ++i) one(all[i]);
+  }
+  template <std::size_t Size>
+  constexpr void rest(std::array<std::uint8_t, Size>& bytes, std::uint8_t& count) {
+    count = static_cast<std::uint8_t>(reader_.left() < Size ? reader_.left() : Size);
+    for (std::size_t i = 0; i < count; ++i) bytes[i] = reader_.take<std::uint8_t>();
+  }
+  constexpr bool whole() const { return reader_.whole() && reader_.left() == 0; }
+  constexpr bool long_enough() const { return reader_.whole(); }
+  constexpr bool in_range() const { return in_range_; }
+
+ private:
+  template <class T>
+  constexpr void one(T& x) {
+    if constexpr (std::is_class_v<T>) {
+      x.fields(*this);
+    } else {
+      (*this)(x);
+    }
+  }
+  model::Reader reader_;
+  bool in_range_ = true;
+};
+
+template <class Payload>
+constexpr void put_payload(Message& m, const Payload& payload) {
+  PutFields put(m.payload);
+  Payload copy = payload;
+  copy.fields(put);
+  m.length = static_cast<std::uint8_t>(put.good() ? put.size() : 0);
+}
+// `done`, `wrong_length` where the bytes are not those of a whole payload, or `wrong_value`.
+template <class Payload>
+constexpr Code take_payload(std::span<const std::uint8_t> bytes, Payload& payload) {
+  TakeFields take(bytes);
+  payload.fields(take);
+  if (!take.whole()) return Code::wrong_length;
+  return take.in_range() ? Code::done : Code::wrong_value;
+}
+// The same for `identify`, where a later version may have put more behind what is known here.
+template <class Payload>
+constexpr Code take_front(std::span<const std::uint8_t> bytes, Payload& payload) {
+  TakeFields take(bytes);
+  payload.fields(take);
+  return take.long_enough() ? Code::done : Code::wrong_length;
+}
+
+template <class Payload>
+constexpr Message request(Kind kind, std::uint8_t number, const Payload& payload) {
+  Message m{static_cast<std::uint8_t>(kind), number, 0, 0, {}};
+  put_payload(m, payload);
+  return m;
+}
+constexpr Message answer_to(const Message& request, Code code) {
+  return {static_cast<std::uint8_t>(request.kind | kAnswerBit), request.number, 0, static_cast<std::uint8_t>(code), {}};
+}
+template <class Payload>
+constexpr Message answer_to(const Message& request, Code code, const Payload& payload) {
+  Message m = answer_to(request, code);
+  put_payload(m, payload);
+  return m;
+}
+
+}  // namespace flexspline::protocol

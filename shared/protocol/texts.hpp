@@ -1,0 +1,171 @@
+// What codes, refusals, faults and channels are called for people. For the host's side; no image holds them.
+#pragma once
+
+#include <array>
+#include <cstddef>
+#include <cstdint>
+#include <string_view>
+
+#include "shared/protocol/payloads.hpp"
+
+namespace flexspline::protocol {
+
+constexpr std::string_view text_of(Code code) {
+  switch (code) {
+    case Code::done:
+      return "done";
+    case Code::unknown_request:
+      return "the drive's firmware does not know this request; bring the firmware up to date";
+    case Code::wrong_length:
+      return "the drive's firmware expects another length of this request; bring tool and firmware to one version";
+    case Code::wrong_value:
+      return "a number in the request is outside what the drive takes";
+    case Code::wrong_version:
+      return "tool and firmware speak different versions; bring both to one version";
+    case Code::busy:
+      return "the drive still works on the request before; try again";
+    case Code::armed:
+      return "that cannot be changed while the drive is armed; disarm it first";
+    case Code::refused:
+      return "the drive refused the command";
+    case Code::no_parameters:
+      return "the drive has no parameters in use; flash a block first";
+    case Code::no_block:
+      return "the drive has no such block";
+    case Code::not_available:
+      return "this drive cannot do that";
+    case Code::too_long:
+      return "the block is empty or longer than the drive's flash has room for";
+    case Code::not_begun:
+      return "no block is being sent; begin anew";
+    case Code::out_of_order:
+      return "a piece of the block is missing; begin anew";
+    case Code::incomplete:
+      return "the block is not complete; begin anew";
+    case Code::wrong_checksum:
+      return "what arrived is not what was sent; try again over a better line";
+    case Code::invalid:
+      return "the drive's validator refused the block; nothing was changed";
+    case Code::flash:
+      return "the drive's flash memory did not take what was written; try again, and if it stays the memory is worn "
+             "out";
+    case Code::no_previous:
+      return "there is no valid block before the active one; flash one from a backup";
+    case Code::worn:
+      return "there is no room to note another restore; flash the block from a backup";
+  }
+  return "a code that this tool does not know; bring the tool up to date";
+}
+
+constexpr std::string_view text_of(Refusal refusal) {
+  switch (refusal) {
+    case Refusal::none:
+      return "not refused";
+    case Refusal::armed:
+      return "only an idle drive can do that; disarm it first";
+    case Refusal::not_armed:
+      return "the drive is not armed";
+    case Refusal::other_mode:
+      return "the set point is for another mode than the drive is in";
+    case Refusal::no_mode:
+      return "that is no mode that a drive can be commanded into";
+    case Refusal::moving:
+      return "the shaft moves; bring it to rest first";
+    case Refusal::no_parameters:
+      return "the drive has no parameters; flash a block first";
+    case Refusal::no_excitation:
+      return "the drive has no excitation";
+    case Refusal::fault:
+      return "the drive stands in a fault; find its cause and clear it first";
+    case Refusal::booting:
+      return "the drive is starting";
+  }
+  return "a refusal that this tool does not know";
+}
+
+constexpr std::string_view name_of(Mode mode) {
+  constexpr std::array<std::string_view, kModes> kNames{"boot",     "idle",       "current", "velocity",
+                                                        "position", "excitation", "stop",    "fault"};
+  return static_cast<std::size_t>(mode) < kNames.size() ? kNames[static_cast<std::size_t>(mode)] : "unknown";
+}
+
+// A fault's name, and why it happens. By their numbers (firmware/faults.hpp).
+struct FaultText {
+  std::string_view name{};
+  std::string_view reason{};
+};
+inline constexpr std::array<FaultText, kFaults> kFaultTexts{{
+    {"none", "no fault"},
+    {"motor_encoder_stale", "the motor's encoder gave no new sample"},
+    {"output_encoder_stale", "the output's encoder gave no new sample"},
+    {"analog_stale", "the converter gave no new samples"},
+    {"motor_encoder_jump", "the motor's encoder moved by more counts in a tick than at twice the overspeed"},
+    {"motor_encoder_stuck",
+     "the torque changed by more than friction can hold, and the motor's encoder shows no motion (stuck_torque, "
+     "stuck_s)"},
+    {"implausible_motion", "the motor's encoder shows an acceleration that no torque can give (acceleration)"},
+    {"current_out_of_range", "the current's converter is at its rail: sensor or wire broken"},
+    {"torque_out_of_range", "the torque's converter is at its rail: sensor or wire broken"},
+    {"temperature_out_of_range", "the temperature's converter is at its rail: sensor or wire broken"},
+    {"torque_stuck", "the torque sensor's reading never changed, not even by its noise (torque_same_s)"},
+    {"current_mismatch",
+     "the measured current is not the commanded one: amplifier or sensor broken (current_mismatch, mismatch_s)"},
+    {"overcurrent", "the measured current is above its limit"},
+    {"overspeed", "the motor turns faster than its limit"},
+    {"overtemperature", "the drive is too hot"},
+    {"host_lost", "the host sent no command (host_s)"},
+    {"tick_overrun", "a control tick did not end before the next one was due"},
+    {"watchdog", "the watchdog reset the drive: a part of the application had stopped reporting"},
+    {"stop_failed", "the shaft did not come to rest in time (stop_s)"},
+}};
+constexpr FaultText fault_text(std::uint8_t number) {
+  return number < kFaults ? kFaultTexts[number] : FaultText{"unknown", "a fault that this tool does not know"};
+}
+
+// The base that a channel's numbers are shares of, 2^-27; or what else its word is.
+enum class Base : std::uint8_t {
+  word,
+  turns,     // signed, of the motor or output
+  fraction,  // of a turn, 2^-32; unsigned
+  velocity,
+  acceleration,
+  output_velocity,
+  torque,         // of the motor
+  output_torque,  // through the flexspline
+  current,
+  temperature,
+  torsion,
+};
+struct ChannelText {
+  std::string_view name{};
+  std::string_view unit{};
+  Base base = Base::word;
+};
+inline constexpr std::array<ChannelText, kChannels> kChannelTexts{{
+    {"state", "", Base::word},
+    {"readings", "counts", Base::word},
+    {"motor_turns", "turns", Base::turns},
+    {"motor_fraction", "turns", Base::fraction},
+    {"output_turns", "turns", Base::turns},
+    {"output_fraction", "turns", Base::fraction},
+    {"velocity", "rad/s", Base::velocity},
+    {"acceleration", "rad/s^2", Base::acceleration},
+    {"output_velocity", "rad/s", Base::output_velocity},
+    {"torque", "N*m", Base::output_torque},
+    {"current", "A", Base::current},
+    {"temperature", "degC", Base::temperature},
+    {"disturbance", "N*m", Base::torque},
+    {"torsion", "rad", Base::torsion},
+    {"set_turns", "turns", Base::turns},
+    {"set_fraction", "turns", Base::fraction},
+    {"set_velocity", "rad/s", Base::velocity},
+    {"set_acceleration", "rad/s^2", Base::acceleration},
+    {"feedforward_torque", "N*m", Base::torque},
+    {"command_torque", "N*m", Base::torque},
+    {"command_current", "A", Base::current},
+}};
+constexpr const ChannelText& text_of(Channel channel) {
+  return kChannelTexts[static_cast<std::size_t>(channel)];
+}
+
+}  // namespace flexspline::protocol

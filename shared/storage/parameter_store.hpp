@@ -1,0 +1,219 @@
+// Two parameter blocks in flash: the active one and the one before. README.md has the layout and why a power cut at any
+// point leaves a complete old or a complete new block.
+//
+// The block itself is none of the store's business: `validate(bytes)` is asked, which returns nought for a good block
+// and any other number as the reason.
+#pragma once
+
+#include <cstddef>
+#include <cstdint>
+#include <span>
+
+#include "shared/model/encoding.hpp"
+#include "shared/storage/flash_port.hpp"
+
+namespace flexspline::storage {
+
+enum class StoreError : std::uint8_t {
+  none,
+  too_long,        // the block does not fit a sector
+  not_begun,       // nothing is being staged
+  out_of_order,    // a chunk has to follow the one before it, or repeat what is staged
+  incomplete,      // fewer bytes were staged than announced
+  wrong_checksum,  // what was staged is not what was announced
+  invalid,         // the validator refused it; nothing was changed
+  flash,           // the memory did not take what was written
+  no_previous,     // there is no valid block before the active one
+  worn,            // no room for another sequence number; staging a block anew makes room
+};
+
+// What boot() found.
+enum class StoreState : std::uint8_t {
+  empty,      // no block was ever committed
+  good,       // the newest block that was committed is active
+  fell_back,  // the newest one is damaged; the one before is active
+  damaged,    // blocks were committed and none of them is good: there is no active one
+};
+
+template <FlashPort Flash>
+class ParameterStore {
+ public:
+  static constexpr std::size_t kHeaderBytes = 256;
+  static constexpr std::size_t kCapacity = Flash::kSectorBytes - kHeaderBytes;
+  static constexpr std::uint32_t kMagic = 0x504C5846;  // "FXLP"
+  static_assert(Flash::kSectorBytes > kHeaderBytes && Flash::kSectorBytes % 8 == 0);
+
+  explicit constexpr ParameterStore(Flash& flash) : flash_(flash) {}
+
+  // Looks at both sectors; nothing is remembered from before and nothing is written.
+  template <class Validate>
+  constexpr StoreState boot(Validate&& validate) {
+    staged_ = announced_ = 0;
+    staging_ = false;
+    bool committed[kSectors]{};
+    for (std::size_t s = 0; s < kSectors; ++s) {
+      rank_[s] = rank_of(s);
+      committed[s] = word(s, 0) == kMagic && rank_[s] > 0;
+      if (!committed[s] || !is_whole(s) || validate(block(s)) != 0) rank_[s] = 0;
+    }
+    active_ = rank_[1] > rank_[0] ? 1 : 0;
+    if (rank_[active_] == 0) return state_ = committed[0] || committed[1] ? StoreState::damaged : StoreState::empty;
+    const std::size_t other = 1 - active_;
+    const bool lost_newer = committed[other] && rank_[other] == 0 && rank_of(other) > rank_[active_];
+    return state_ = lost_newer ? StoreState::fell_back : StoreState::good;
+  }
+  constexpr StoreState state() const { return state_; }
+
+  // Empty where there is none. The bytes lie in flash, from a multiple of eight on, until the next begin().
+  constexpr std::span<const std::uint8_t> active() const { return good_block(active_); }
+  constexpr std::span<const std::uint8_t> previous() const { return good_block(1 - active_); }
+  // CRC-32 of these, nought where there is none.
+  constexpr std::uint32_t active_crc() const { return rank_[active_] == 0 ? 0 : word(active_, 2); }
+  constexpr std::uint32_t previous_crc() const { return rank_[1 - active_] == 0 ? 0 : word(1 - active_, 2); }
+  // One more with each commit and each restore; nought: there is no active block.
+  constexpr std::uint16_t sequence() const { return rank_[active_]; }
+  constexpr std::size_t staged() const { return staged_; }
+
+  // Begins to stage a block of so many bytes with this CRC-32: erases the sector that is not active, which gives up the
+  // block before the active one.
+  constexpr StoreError begin(std::size_t bytes, std::uint32_t crc) {
+    staging_ = false;
+    staged_ = 0;
+    if (bytes == 0 || bytes > kCapacity) return StoreError::too_long;
+    const std::size_t s = target();
+    rank_[s] = 0;
+    if (!flash_.erase(s)) return StoreError::flash;
+    for (const std::uint8_t byte : flash_.bytes(s))
+      if (byte != 0xFF) return StoreError::flash;
+    announced_ = bytes;
+    crc_ = crc;
+    staging_ = true;
+    return StoreError::none;
+  }
+  // A chunk: `offset` is where the chunk before ended. All but the last are of a multiple of four bytes. A chunk that
+  // is staged already, byte for byte, is taken again: a host whose answer got lost repeats itself.
+  constexpr StoreError write(std::size_t offset, std::span<const std::uint8_t> chunk) {
+    if (!staging_) return StoreError::not_begun;
+    if (offset % 4 != 0 || chunk.empty() || offset > staged_ || chunk.size() > announced_ - offset)
+      return StoreError::out_of_order;
+    if (chunk.size() % 4 != 0 && offset + chunk.size() != announced_) return StoreError::out_of_order;
+    const std::size_t s = target();
+    if (offset < staged_) return is_same(s, offset, chunk) ? StoreError::none : StoreError::out_of_order;
+    for (std::size_t i = 0; i < chunk.size(); i += 4) {
+      std::uint32_t value = kErasedWord;
+      for (std::size_t b = 0; b < 4 && i + b < chunk.size(); ++b) {
+        value &= ~(std::uint32_t{0xFF} << (8 * b));
+        value |= std::uint32_t{chunk[i + b]} << (8 * b);
+      }
+      if (!put(s, (kHeaderBytes + offset + i) / 4, value)) return give_up();
+    }
+    staged_ = offset + chunk.size();
+    return StoreError::none;
+  }
+  // Validates what was staged as a whole, then makes it the active block. `reason` gets the validator's.
+  template <class Validate>
+  constexpr StoreError commit(Validate&& validate, std::uint32_t& reason) {
+    reason = 0;
+    if (!staging_) return StoreError::not_begun;
+    if (staged_ != announced_) return StoreError::incomplete;
+    const std::size_t s = target();
+    const auto bytes = flash_.bytes(s).subspan(kHeaderBytes, announced_);
+    if (model::crc32(bytes) != crc_) return StoreError::wrong_checksum;
+    reason = validate(bytes);
+    if (reason != 0) return StoreError::invalid;
+    if (rank_[active_] == kMostRank) return StoreError::worn;
+    if (!put(s, 0, kMagic) || !put(s, 1, static_cast<std::uint32_t>(announced_)) || !put(s, 2, crc_)) return give_up();
+    staging_ = false;
+    return put_slot(s, kFirstSlot);
+  }
+  // Makes the block before the active one active, and that one the one before: a second restore goes back again.
+  // Validated first: an image may have changed since.
+  template <class Validate>
+  constexpr StoreError restore(Validate&& validate, std::uint32_t& reason) {
+    reason = 0;
+    const std::size_t s = 1 - active_;
+    if (rank_[active_] == 0 || rank_[s] == 0 || !is_whole(s)) return StoreError::no_previous;
+    reason = validate(block(s));
+    if (reason != 0) return StoreError::invalid;
+    if (rank_[active_] == kMostRank) return StoreError::worn;
+    std::size_t slot = kFirstSlot;
+    while (slot < kSlotsEnd && (word(s, slot) != kErasedWord || word(s, slot + 1) != kErasedWord)) slot += 2;
+    return slot == kSlotsEnd ? StoreError::worn : put_slot(s, slot);
+  }
+
+ private:
+  // Words of the header: magic, bytes, CRC, one left free; then a slot of two words for each time that the block became
+  // active: a check, and last of all the number and its complement.
+  static constexpr std::size_t kFirstSlot = 4;
+  static constexpr std::size_t kSlotsEnd = kHeaderBytes / 4;
+  static constexpr std::uint16_t kMostRank = 0xFFFE;
+
+  // Sixteen of its bits are nought. A write that was cut short leaves fewer, so it can never be another valid number.
+  static constexpr std::uint32_t code_of(std::uint16_t rank) {
+    return std::uint32_t{rank} | (std::uint32_t{static_cast<std::uint16_t>(~rank)} << 16);
+  }
+  // Binds the number to the block: what an erase that was cut short leaves is no number by chance.
+  static constexpr std::uint32_t check_of(std::uint16_t rank, std::uint32_t crc) { return (crc ^ rank) * 0x9E3779B1U; }
+  constexpr std::uint32_t word(std::size_t sector, std::size_t at) const {
+    model::Reader r(flash_.bytes(sector).subspan(4 * at, 4));
+    return r.take<std::uint32_t>();
+  }
+  // The largest number in the slots, nought where there is none.
+  constexpr std::uint16_t rank_of(std::size_t sector) const {
+    std::uint16_t largest = 0;
+    const std::uint32_t crc = word(sector, 2);
+    for (std::size_t slot = kFirstSlot; slot < kSlotsEnd; slot += 2) {
+      const std::uint32_t code = word(sector, slot + 1);
+      const auto rank = static_cast<std::uint16_t>(code);
+      const bool valid = code == code_of(rank) && word(sector, slot) == check_of(rank, crc) && rank <= kMostRank;
+      if (valid && rank > largest) largest = rank;
+    }
+    return largest;
+  }
+  constexpr bool is_whole(std::size_t sector) const {
+    const std::uint32_t bytes = word(sector, 1);
+    return word(sector, 0) == kMagic && bytes > 0 && bytes <= kCapacity &&
+           model::crc32(flash_.bytes(sector).subspan(kHeaderBytes, bytes)) == word(sector, 2);
+  }
+  constexpr std::span<const std::uint8_t> block(std::size_t sector) const {
+    return flash_.bytes(sector).subspan(kHeaderBytes, word(sector, 1));
+  }
+  constexpr std::span<const std::uint8_t> good_block(std::size_t sector) const {
+    return rank_[sector] == 0 ? std::span<const std::uint8_t>{} : block(sector);
+  }
+  // Where a new block goes: never over the active one.
+  constexpr std::size_t target() const { return rank_[active_] == 0 ? active_ : 1 - active_; }
+  constexpr bool put(std::size_t sector, std::size_t at, std::uint32_t value) {
+    return flash_.program(sector, at, value) && word(sector, at) == value;
+  }
+  constexpr bool is_same(std::size_t sector, std::size_t offset, std::span<const std::uint8_t> chunk) const {
+    const auto there = flash_.bytes(sector).subspan(kHeaderBytes + offset, chunk.size());
+    for (std::size_t i = 0; i < chunk.size(); ++i)
+      if (there[i] != chunk[i]) return false;
+    return offset + chunk.size() <= staged_;
+  }
+  constexpr StoreError give_up() {
+    staging_ = false;
+    return StoreError::flash;
+  }
+  constexpr StoreError put_slot(std::size_t sector, std::size_t slot) {
+    const auto rank = static_cast<std::uint16_t>(rank_[active_] + 1);
+    if (!put(sector, slot, check_of(rank, word(sector, 2))) || !put(sector, slot + 1, code_of(rank)))
+      return StoreError::flash;
+    rank_[sector] = rank;
+    active_ = sector;
+    state_ = StoreState::good;
+    return StoreError::none;
+  }
+
+  Flash& flash_;
+  std::size_t active_ = 0;
+  std::uint16_t rank_[kSectors]{};  // nought: no good block there
+  std::size_t staged_ = 0;
+  std::size_t announced_ = 0;
+  std::uint32_t crc_ = 0;
+  bool staging_ = false;
+  StoreState state_ = StoreState::empty;
+};
+
+}  // namespace flexspline::storage

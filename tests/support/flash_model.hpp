@@ -1,0 +1,97 @@
+// A NOR flash of two sectors whose power can be cut at any of its operations: before it, inside it or after it.
+#pragma once
+
+#include <array>
+#include <cstddef>
+#include <cstdint>
+#include <cstring>
+#include <random>
+#include <span>
+
+#include "shared/storage/flash_port.hpp"
+
+namespace flexspline::testing {
+
+struct PowerCut {};
+
+enum class CutAt { before, inside, after };
+
+// What outlasts a power cut.
+template <std::size_t kBytes>
+struct FlashCells {
+  alignas(8) std::array<std::array<std::uint8_t, kBytes>, storage::kSectors> sectors;
+  FlashCells() {
+    for (auto& sector : sectors) sector.fill(0xFF);
+  }
+};
+
+// The memory as the processor sees it, from one start to the next.
+template <std::size_t kBytes>
+class FlashModel {
+ public:
+  static constexpr std::size_t kSectorBytes = kBytes;
+
+  explicit FlashModel(FlashCells<kBytes>& cells, std::uint64_t seed = 1) : cells_(cells), random_(seed) {}
+  // The power goes at the operation of this number, from nought.
+  void cut(std::size_t operation, CutAt where) {
+    cut_ = static_cast<long>(operation);
+    where_ = where;
+  }
+  std::size_t operations() const { return operations_; }
+  void fail_from_now() { fails_ = true; }
+
+  bool erase(std::size_t sector) {
+    auto& bytes = cells_.sectors[sector];
+    if (!begin_operation()) return false;
+    if (cut_here(CutAt::inside)) {
+      // How far it came: a few cells, garbage throughout or in part of the words, or all but a few cells.
+      const auto how = random_() % 4;
+      for (std::size_t i = 0; i < bytes.size(); ++i) {
+        const auto noise = static_cast<std::uint8_t>(random_());
+        if (how == 0 && random_() % 64 == 0) bytes[i] |= noise;
+        if (how == 1) bytes[i] = noise;
+        if (how == 2 && (i / 4) % 3 != 0) bytes[i] = noise;
+        if (how == 3) bytes[i] = random_() % 256 == 0 ? noise : 0xFF;
+      }
+      throw PowerCut{};
+    }
+    bytes.fill(0xFF);
+    return end_operation();
+  }
+  bool program(std::size_t sector, std::size_t word, std::uint32_t value) {
+    std::uint8_t* at = cells_.sectors[sector].data() + 4 * word;
+    if (!begin_operation()) return false;
+    std::uint32_t now = 0;
+    std::memcpy(&now, at, 4);
+    std::uint32_t then = now & value;
+    if (cut_here(CutAt::inside)) {
+      then |= now & static_cast<std::uint32_t>(random_());  // some of the bits, perhaps none or all
+      std::memcpy(at, &then, 4);
+      throw PowerCut{};
+    }
+    std::memcpy(at, &then, 4);
+    return end_operation();
+  }
+  std::span<const std::uint8_t> bytes(std::size_t sector) const { return cells_.sectors[sector]; }
+
+ private:
+  bool cut_here(CutAt where) const { return cut_ == static_cast<long>(operations_) && where_ == where; }
+  bool begin_operation() {
+    if (cut_here(CutAt::before)) throw PowerCut{};
+    return !fails_;
+  }
+  bool end_operation() {
+    if (cut_here(CutAt::after)) throw PowerCut{};
+    ++operations_;
+    return true;
+  }
+
+  FlashCells<kBytes>& cells_;
+  std::mt19937_64 random_;
+  std::size_t operations_ = 0;
+  long cut_ = -1;
+  CutAt where_ = CutAt::before;
+  bool fails_ = false;
+};
+
+}  // namespace flexspline::testing

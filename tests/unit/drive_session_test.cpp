@@ -1,0 +1,198 @@
+// The host's side of a drive against the drive's own service, in one process: time passes while the host waits. The
+// line between them loses what the test says.
+#include "host/drive/session.hpp"
+
+#include <gtest/gtest.h>
+
+#include <deque>
+#include <functional>
+
+#include "hil/twin/factory_block.hpp"
+#include "hil/twin/twin_drive.hpp"
+#include "host/drive/recorder.hpp"
+
+namespace flexspline::drive {
+namespace {
+
+using protocol::Code;
+using protocol::Kind;
+
+const plant::Drive& demo() {
+  static const plant::Drive drive = plant::demo_plant().drive;
+  return drive;
+}
+Bytes other_block() {
+  plant::Drive drive = demo();
+  for (plant::Effect& effect : drive.effects)
+    if (effect.type == "viscous_friction") effect.parameter("coefficient").value *= 1.2;
+  return twin::factory_block(drive);
+}
+
+// Decides of each answer whether it arrives.
+using Loss = std::function<bool(const protocol::Message&)>;
+
+class Loopback : public transport::Link {
+ public:
+  Loopback(twin::TwinDrive& drive, Loss loses) : drive_(drive), loses_(std::move(loses)) {}
+  void send(const protocol::Message& m) override {
+    protocol::Message arrived;
+    ASSERT_TRUE(protocol::decode(protocol::encode(m), arrived));
+    while (!drive_.service().take(arrived)) drive_.tick();
+  }
+  // A tick lasts a millisecond at most, so that limits of time are not waited for.
+  std::optional<protocol::Message> receive(transport::Milliseconds limit) override {
+    for (auto i = 0; i < 20 * std::min<long>(limit.count(), 20); ++i) {
+      protocol::Message m;
+      if (drive_.service().next(m)) {
+        if (m.is_unasked() || !loses_ || !loses_(m)) return m;
+      }
+      drive_.tick();
+    }
+    return {};
+  }
+  std::string name() const override { return "loopback"; }
+
+ private:
+  twin::TwinDrive& drive_;
+  Loss loses_;
+};
+Session open(twin::TwinDrive& drive, Loss loses = {}) {
+  drive.run(200);
+  return Session(std::make_unique<Loopback>(drive, std::move(loses)), Milliseconds(50));
+}
+// Loses the first `times` answers of a kind.
+Loss lose(Kind kind, int times) {
+  return [kind, times](const protocol::Message& m) mutable { return m.request() == kind && times-- > 0; };
+}
+std::string error_of(const std::function<void()>& act) {
+  try {
+    act();
+  } catch (const std::runtime_error& error) {
+    return error.what();
+  }
+  return "no error";
+}
+
+TEST(Session, IdentifiesTheDriveAndReadsItsBlock) {
+  twin::TwinDrive drive({.drive = demo(), .serial = "SN-9"});
+  Session session = open(drive);
+  EXPECT_EQ(session.serial(), "SN-9");
+  EXPECT_EQ(session.board(), "twin");
+  EXPECT_EQ(session.read_block(protocol::Which::active), twin::factory_block(demo()));
+  EXPECT_TRUE(session.read_block(protocol::Which::previous).empty());
+}
+
+TEST(Session, FlashesThroughLostAnswersOfEveryKind) {
+  for (const Kind kind : {Kind::identify, Kind::block_chunk, Kind::block_commit, Kind::status, Kind::block_read}) {
+    twin::TwinDrive drive({.drive = demo()});
+    Session session = open(drive, lose(kind, 1));
+    const Bytes block = other_block();
+    session.write_block(block);
+    EXPECT_TRUE(std::ranges::equal(drive.store().active(), block)) << static_cast<int>(kind);
+    EXPECT_EQ(drive.store().sequence(), 2U) << "once, and not twice";
+  }
+}
+
+TEST(Session, ARestoreWhoseAnswerGotLostIsDoneOnce) {
+  twin::TwinDrive drive({.drive = demo()});
+  Session session = open(drive, lose(Kind::block_restore, 1));
+  session.write_block(other_block());
+  session.restore();
+  EXPECT_TRUE(std::ranges::equal(drive.store().active(), twin::factory_block(demo())));
+  EXPECT_EQ(drive.store().sequence(), 3U);
+}
+
+TEST(Session, ADriveThatDoesNotAnswerIsAnErrorThatSaysWhatToDo) {
+  twin::TwinDrive drive({.drive = demo()});
+  EXPECT_NE(error_of([&] { open(drive, [](const auto&) { return true; }); }).find("loopback: nothing there answers"),
+            std::string::npos);
+}
+
+TEST(Session, WhatTheDriveRefusesIsSaidInWords) {
+  twin::TwinDrive drive({.drive = demo()});
+  Session session = open(drive);
+  Bytes damaged = other_block();
+  damaged[200] ^= 1;
+  EXPECT_NE(error_of([&] { session.write_block(damaged); }).find("validator refused the block"), std::string::npos);
+  EXPECT_NE(error_of([&] { session.restore(); }).find("no valid block before"), std::string::npos);
+  session.command({.kind = protocol::CommandKind::arm, .mode = protocol::Mode::velocity});
+  EXPECT_NE(error_of([&] { session.write_block(other_block()); }).find("disarm it first"), std::string::npos);
+  EXPECT_NE(error_of([&] {
+              session.command({.kind = protocol::CommandKind::set, .mode = protocol::Mode::current});
+            }).find("another mode"),
+            std::string::npos);
+  session.stop();
+  EXPECT_EQ(session.status().mode, protocol::Mode::idle);
+}
+
+planning::Plan plan_of(planning::Run run) {
+  planning::Plan plan;
+  plan.runs.push_back(std::move(run));
+  return plan;
+}
+
+TEST(Recorder, RecordsARunAndLeavesTheDriveAtRest) {
+  twin::TwinDrive drive({.drive = demo()});
+  Session session = open(drive);
+  const Scales scales = scales_of(session);
+  planning::Run run;
+  run.name = "sine", run.waveform = planning::Waveform::sine;
+  run.amplitude = 40.0, run.frequency_hz = 2.0, run.duration_s = 1.5;
+  const planning::Plan plan = plan_of(run);
+  const Recording r = Recorder(session, scales, plan).record(run, {});
+  EXPECT_TRUE(r.complete) << r.ended;
+  EXPECT_EQ(r.lost, 0U);
+  EXPECT_GE(r.time_s.size(), 1500U);
+  EXPECT_LE(r.time_s.size(), 1600U);
+  EXPECT_EQ(session.status().mode, protocol::Mode::idle);
+  // The position is the integral of the command: a sine of 40 rad/s at 2 Hz swings by 6.37 rad.
+  double most = 0.0, set = 0.0, least = 0.0;
+  for (std::size_t k = 0; k < r.time_s.size(); ++k) {
+    most = std::max(most, r.motor_position_rad[k] - r.motor_position_rad.front());
+    least = std::min(least, r.motor_position_rad[k] - r.motor_position_rad.front());
+    set = std::max(set, r.command[k]);
+    EXPECT_NEAR(r.output_position_rad[k], r.motor_position_rad[k] / 100.0, 0.003);
+  }
+  EXPECT_NEAR(set, 40.0, 0.1);
+  EXPECT_NEAR(most - least, 6.37, 0.4);
+}
+
+TEST(Recorder, StopsWhenItIsToldToAndBrakesTheShaft) {
+  twin::TwinDrive drive({.drive = demo()});
+  Session session = open(drive);
+  const Scales scales = scales_of(session);
+  planning::Run run;
+  run.name = "long", run.waveform = planning::Waveform::square;
+  run.amplitude = 100.0, run.frequency_hz = 0.1, run.duration_s = 30.0;
+  const planning::Plan plan = plan_of(run);
+  int asked = 0;
+  const Recording r = Recorder(session, scales, plan).record(run, {[&] { return ++asked > 300; }, {}});
+  EXPECT_FALSE(r.complete);
+  EXPECT_EQ(r.ended, "interrupted");
+  EXPECT_EQ(session.status().mode, protocol::Mode::idle);
+  EXPECT_EQ(session.status().fault, 0U);
+  EXPECT_LT(std::abs(drive.rig().truth().motor_velocity), 2.0) << "braked, not coasting";
+}
+
+TEST(Recorder, AVelocityBeyondThePlansLimitEndsTheRun) {
+  twin::TwinDrive drive({.drive = demo()});
+  Session session = open(drive);
+  const Scales scales = scales_of(session);
+  planning::Run run;
+  run.name = "current", run.mode = planning::Mode::current, run.waveform = planning::Waveform::zero;
+  run.offset = 1.3, run.duration_s = 10.0;
+  planning::Plan plan = plan_of(run);
+  plan.limits.travel_rad = 0.5;
+  const Recording r = Recorder(session, scales, plan).record(run, {});
+  EXPECT_FALSE(r.complete);
+  EXPECT_NE(r.ended.find("travel of the output"), std::string::npos) << r.ended;
+  // With a limit of velocity the drive guards itself and the run ends by its time or its travel.
+  plan.limits.velocity_rad_s = 20.0;
+  plan.limits.travel_rad = 0.0;
+  plan.runs[0].duration_s = run.duration_s = 1.0;
+  const Recording guarded = Recorder(session, scales, plan).record(run, {});
+  EXPECT_TRUE(guarded.complete) << guarded.ended;
+}
+
+}  // namespace
+}  // namespace flexspline::drive
