@@ -146,6 +146,14 @@ Unpacked unpack(std::span<const std::uint8_t> block) {
   model::for_each_entry(block, [&](std::uint16_t kind, std::span<const std::uint8_t>) {
     if (kind >= 0x100 && kind < model::kFirstNote) unpacked.sections.push_back(kind);
   });
+  const auto tick_hz = static_cast<std::uint32_t>(std::lround(1.0 / from_block(unpacked.header.bases).time_base));
+  if (const auto v = control::check_for_drive(block, tick_hz); !v.good()) {
+    unpacked.refusal = model::text_of(v.fault);
+  } else {
+    const auto parameters = std::make_unique<control::DriveParameters<Fixed>>();
+    control::load_for_drive(block, *parameters);
+    unpacked.settings = described(*parameters, from_block(unpacked.header.bases));
+  }
   model->for_each([&]<class Effect>(const auto& places) {
     for (std::size_t i = 0; i < places.count; ++i) {
       UnpackedEffect effect{std::string(Effect::kInfo.name), {}};
