@@ -30,11 +30,18 @@ class Application {
   using Ring = Telemetry<B::kTelemetryWords>;
   static constexpr std::uint32_t kBootTicks = 50;
 
-  explicit Application(B& board) : board_(board) {}
+  // An image's application is constinit and begins when main() says so.
+  constexpr Application() = default;
+  explicit Application(B& board) { begin(board); }
+  Application(const Application&) = delete;
+  void begin(B& board) {
+    board_ = &board;
+    control_.attach(parameters_);
+  }
 
   // The control tick: called by the board's timer, kTickHz times a second.
   void tick() {
-    const Readings readings = board_.read();
+    const Readings readings = board_->read();
     ++status_.tick;
     watchdog_.report(Part::sensors);
     lend_or_take_back();
@@ -46,19 +53,19 @@ class Application {
     Output output;
     if (is_armed(status_.mode)) output = control_.update(demand_, estimate);
     watchdog_.report(Part::control);
-    board_.actuate(actuation(output));
+    board_->actuate(actuation(output));
     watchdog_.report(Part::output);
     last_ = output;
     follow_up(output);
     telemetry_.record(status_.tick, channels(readings, estimate, output));
-    if (board_.tick_overrun()) enter_fault({Fault::tick_overrun, status_.tick, 0, 0});
+    if (board_->tick_overrun()) enter_fault({Fault::tick_overrun, status_.tick, 0, 0});
   }
 
   // What has time: called again and again from main(), and interrupted by the tick at any point.
   void background() {
     watchdog_.report(Part::background);
     take_block();
-    if (watchdog_.all_reported()) board_.feed_watchdog();
+    if (watchdog_.all_reported()) board_->feed_watchdog();
   }
 
   // The command interface, for background work (a protocol) or for whoever calls the tick, but not for both at once.
@@ -76,7 +83,17 @@ class Application {
     answer_waits_.store(false, std::memory_order_release);
     return answer;
   }
-  // A parameter block. It has to stay where it is until block_finding() has the answer, which background work finds.
+  // Before the first tick: takes the block that lies in flash, at once. Where it is not good the drive has no parameters.
+  void boot_with(std::span<const std::byte> block) {
+    const BlockFinding finding = check_block(block, B::kTickHz);
+    if (finding == BlockFinding::none) {
+      load_block(block, parameters_);
+      new_parameters_ = true;
+    }
+    block_done(finding);
+  }
+  // A packed parameter block, in flash or in memory. It has to stay where it is until block_finding() has the answer,
+  // which background work finds.
   void offer(std::span<const std::byte> block) {
     block_ = block;
     block_finding_.reset();
@@ -122,16 +139,16 @@ class Application {
   void take_block() {
     if (block_step_ == BlockStep::check) {
       const BlockFinding finding = check_block(block_, B::kTickHz);
-      if (finding != BlockFinding::good) return block_done(finding);
+      if (finding != BlockFinding::none) return block_done(finding);
       owner_.store(Owner::wanted, std::memory_order_release);
       asked_at_ = status_.tick;
       block_step_ = BlockStep::wait;
     } else if (block_step_ == BlockStep::wait) {
       if (owner_.load(std::memory_order_acquire) == Owner::background) {
-        parameters_ = parameters_in(block_);
+        load_block(block_, parameters_);
         new_parameters_ = true;
         owner_.store(Owner::tick, std::memory_order_release);
-        block_done(BlockFinding::good);
+        block_done(BlockFinding::none);
       } else if (status_.tick - asked_at_ > 1) {
         Owner wanted = Owner::wanted;
         if (owner_.compare_exchange_strong(wanted, Owner::tick)) block_done(BlockFinding::armed);
@@ -217,7 +234,7 @@ class Application {
   void boot() {
     if (++boot_ticks_ < kBootTicks) return;
     status_.mode = Mode::idle;
-    if (board_.reset_cause() == ResetCause::watchdog && !told_reset_)
+    if (board_->reset_cause() == ResetCause::watchdog && !told_reset_)
       enter_fault({Fault::watchdog, status_.tick, 0, 0});
     told_reset_ = true;
   }
@@ -245,7 +262,7 @@ class Application {
     demand_ = {};
     last_ = {};
     control_.off();
-    board_.actuate({});
+    board_->actuate({});
   }
   // What this tick's output means for the mode of the next.
   void follow_up(const Output& output) {
@@ -294,7 +311,7 @@ class Application {
             word(out.current)};
   }
 
-  B& board_;
+  B* board_ = nullptr;
   Status status_{};
   Demand demand_{};
   Output last_{};
@@ -302,7 +319,7 @@ class Application {
   Watchdog watchdog_{};
   Ring telemetry_{};
   Parameters parameters_{};
-  Control control_{parameters_};
+  Control control_{};
   std::uint32_t boot_ticks_ = 0;
   std::uint32_t stop_ticks_ = 0;
   bool told_reset_ = false;

@@ -13,7 +13,7 @@ using Parameters = control::DriveParameters<N>;
 
 // What is wanted, as the host said it.
 struct Demand {
-  Mode mode = Mode::idle;
+  Mode mode = Mode::boot;
   bool compensate = false;
   bool stream = false;
   N::Angle position{};
@@ -50,7 +50,9 @@ struct Output {
 
 class Control {
  public:
-  explicit constexpr Control(Parameters& parameters) : p_(parameters) {}
+  // The parameters stay the caller's. A pointer that is set later, so that a whole application is noughts until it
+  // begins, and costs an image neither a copy of it in flash nor a constructor.
+  constexpr void attach(Parameters& parameters) { p_ = &parameters; }
 
   // At rest and knowing nothing: after the parameters changed.
   void restart() {
@@ -71,23 +73,24 @@ class Control {
   Estimate observe(const Readings& readings) {
     Estimate e;
     e.moved = observers::EncoderAngle::moved(motor_encoder_, readings.motor_counter);
-    e.angle = observers::EncoderAngle::update(motor_encoder_, p_.motor_encoder, readings.motor_counter);
-    const auto motor = observers::EncoderKalman::update<N>(motor_motion_, p_.motor_motion, e.angle);
+    e.angle = observers::EncoderAngle::update(motor_encoder_, p_->motor_encoder, readings.motor_counter);
+    const auto motor = observers::EncoderKalman::update<N>(motor_motion_, p_->motor_motion, e.angle);
     e.velocity = motor.velocity;
     e.acceleration = motor.acceleration;
-    if (p_.has_output_encoder) {
-      e.output_angle = observers::EncoderAngle::update(output_encoder_, p_.output_encoder, readings.output_counter);
+    if (p_->has_output_encoder) {
+      e.output_angle = observers::EncoderAngle::update(output_encoder_, p_->output_encoder, readings.output_counter);
       e.output_velocity =
-          observers::EncoderKalman::update<N>(output_motion_, p_.output_motion, e.output_angle).velocity;
+          observers::EncoderKalman::update<N>(output_motion_, p_->output_motion, e.output_angle).velocity;
     }
-    e.current = measured(p_.current, readings.current);
-    const N::Value applied = N::scaled(p_.torque_of_current, e.current);
-    if (!p_.has_output_encoder) estimate_output(applied, e);
-    e.temperature = measured(p_.temperature, readings.temperature);
-    if (p_.has_torque_sensor)
-      e.torque = observers::RippleFilter::update<N>(ripple_, p_.ripple, e.angle, measured(p_.torque, readings.torque));
+    e.current = measured(p_->current, readings.current);
+    const N::Value applied = N::scaled(p_->torque_of_current, e.current);
+    if (!p_->has_output_encoder) estimate_output(applied, e);
+    e.temperature = measured(p_->temperature, readings.temperature);
+    if (p_->has_torque_sensor)
+      e.torque =
+          observers::RippleFilter::update<N>(ripple_, p_->ripple, e.angle, measured(p_->torque, readings.torque));
     e.disturbance =
-        observers::DisturbanceObserver::update<N>(disturbance_, p_.disturbance, applied, nominal_.torque,
+        observers::DisturbanceObserver::update<N>(disturbance_, p_->disturbance, applied, nominal_.torque,
                                                   N::clamp(e.acceleration - nominal_.acceleration, two_bases()));
     return e;
   }
@@ -97,14 +100,14 @@ class Control {
     const bool goes_on =
         uses_trajectory(last_mode_) && uses_trajectory(demand.mode) && loops_.mode != control::Mode::off;
     if (!goes_on) {
-      trajectory_ = control::Trajectory::moving<N>(p_.trajectory, e.angle.raw,
-                                                   control::Trajectory::speed_of<N>(p_.trajectory, e.velocity));
+      trajectory_ = control::Trajectory::moving<N>(p_->trajectory, e.angle.raw,
+                                                   control::Trajectory::speed_of<N>(p_->trajectory, e.velocity));
     }
-    if (demand.mode == Mode::excitation) control::Excitation::start<N>(excitation_, p_.excitation);
+    if (demand.mode == Mode::excitation) control::Excitation::start<N>(excitation_, p_->excitation);
     feedforward_ = {};
     nominal_ = {};
     torsion_ = {};
-    p_.model.reset();
+    p_->model.reset();
     last_mode_ = demand.mode;
     streams_ = false;
     take(demand);
@@ -114,9 +117,10 @@ class Control {
   void take(const Demand& demand) {
     if (demand.mode != Mode::position) return;
     if (demand.stream) {
-      stream_ = control::Stream::at<N>(p_.stream, p_.trajectory, demand.position, demand.velocity, demand.acceleration);
+      stream_ =
+          control::Stream::at<N>(p_->stream, p_->trajectory, demand.position, demand.velocity, demand.acceleration);
     } else if (streams_) {
-      trajectory_ = control::Trajectory::moving<N>(p_.trajectory, stream_.position, stream_.velocity);
+      trajectory_ = control::Trajectory::moving<N>(p_->trajectory, stream_.position, stream_.velocity);
     }
     streams_ = demand.stream;
   }
@@ -127,7 +131,7 @@ class Control {
     switch (demand.mode) {
       case Mode::current:
         command.mode = control::Mode::torque;
-        command.torque = N::scaled(p_.torque_of_current, N::clamp(demand.current, p_.loops.current_limit));
+        command.torque = N::scaled(p_->torque_of_current, N::clamp(demand.current, p_->loops.current_limit));
         break;
       case Mode::velocity:
       case Mode::stop:
@@ -147,11 +151,11 @@ class Control {
     }
     nominal_ = {};
     if (demand.compensate && uses_trajectory(demand.mode)) compensate(e, out, command);
-    const auto loops = control::Loops::update<N>(loops_, p_.loops, command, e.angle, e.velocity);
+    const auto loops = control::Loops::update<N>(loops_, p_->loops, command, e.angle, e.velocity);
     out.torque = loops.torque;
     out.current = loops.current;
     out.limited = loops.limited;
-    out.at_rest = out.velocity == N::Value{} && N::magnitude(e.velocity) <= p_.safety.standstill;
+    out.at_rest = out.velocity == N::Value{} && N::magnitude(e.velocity) <= p_->safety.standstill;
     return out;
   }
 
@@ -168,32 +172,32 @@ class Control {
   // The observer tells how the drive differs from its nominal motion. Without a model friction would count as torsion,
   // and around a reversal it does: a stiff gear is the better guess then.
   void estimate_output(N::Value applied, Estimate& e) {
-    const N::Value rest = p_.safety.standstill;
+    const N::Value rest = p_->safety.standstill;
     const bool forward = nominal_.velocity > rest && e.velocity > rest;
     const bool backward = nominal_.velocity < -rest && e.velocity < -rest;
     const auto difference = observers::TorsionObserver::update<N>(
-        torsion_, p_.torsion, N::clamp(applied - nominal_.torque, two_bases()),
+        torsion_, p_->torsion, N::clamp(applied - nominal_.torque, two_bases()),
         N::clamp(e.velocity - nominal_.velocity, two_bases()), forward || backward);
     e.torsion = nominal_.torsion + difference.torsion;
-    e.output_velocity = N::scaled(p_.output_of_velocity, nominal_.velocity) + difference.output_velocity;
-    e.output_angle = N::times_order(e.angle, p_.output_angle) + N::distance(p_.torsion_turns, -e.torsion);
+    e.output_velocity = N::scaled(p_->output_of_velocity, nominal_.velocity) + difference.output_velocity;
+    e.output_angle = N::times_order(e.angle, p_->output_angle) + N::distance(p_->torsion_turns, -e.torsion);
   }
   // The set point starts from where the shaft is at each tick, so that limits of position hold for the shaft.
   void follow_velocity(N::Value velocity, const Estimate& e, Output& out) {
     constexpr std::int64_t kFar = std::int64_t{4096} << fixed::kAngleBits;
     trajectory_.position = e.angle.raw;
     const N::Angle target = e.angle + N::Step{velocity.raw < 0 ? -kFar : kFar};
-    set(control::Trajectory::update<N>(trajectory_, p_.trajectory, target.raw,
-                                       control::Trajectory::speed_of<N>(p_.trajectory, N::magnitude(velocity))),
+    set(control::Trajectory::update<N>(trajectory_, p_->trajectory, target.raw,
+                                       control::Trajectory::speed_of<N>(p_->trajectory, N::magnitude(velocity))),
         out);
   }
   void follow_position(const Demand& demand, Output& out) {
-    if (streams_) return set(control::Stream::update<N>(stream_, p_.trajectory), out);
+    if (streams_) return set(control::Stream::update<N>(stream_, p_->trajectory), out);
     constexpr std::int64_t kAsFastAsAllowed = std::int64_t{1} << 62;
     const bool any = demand.velocity == N::Value{};
     set(control::Trajectory::update<N>(
-            trajectory_, p_.trajectory, demand.position.raw,
-            any ? kAsFastAsAllowed : control::Trajectory::speed_of<N>(p_.trajectory, N::magnitude(demand.velocity))),
+            trajectory_, p_->trajectory, demand.position.raw,
+            any ? kAsFastAsAllowed : control::Trajectory::speed_of<N>(p_->trajectory, N::magnitude(demand.velocity))),
         out);
   }
   static void set(const control::Trajectory::SetPoint<N>& point, Output& out) {
@@ -202,9 +206,9 @@ class Control {
     out.acceleration = point.acceleration;
   }
   void excite(const Estimate& e, Output& out, control::Loops::Command<N>& command) {
-    const auto wanted = control::Excitation::update<N>(excitation_, p_.excitation, e.velocity);
+    const auto wanted = control::Excitation::update<N>(excitation_, p_->excitation, e.velocity);
     out.finished = control::Excitation::finished<N>(excitation_);
-    if (p_.excites_torque) {
+    if (p_->excites_torque) {
       command.mode = control::Mode::torque;
       command.torque = wanted;
     } else {
@@ -214,7 +218,7 @@ class Control {
   }
   void compensate(const Estimate& e, Output& out, control::Loops::Command<N>& command) {
     const auto forward =
-        control::Feedforward::update<N>(feedforward_, p_.feedforward, p_.model,
+        control::Feedforward::update<N>(feedforward_, p_->feedforward, p_->model,
                                         {out.position, out.velocity, out.acceleration}, {e.angle, e.temperature, {}});
     out.feedforward = forward.torque;
     nominal_ = {forward.torque, out.velocity + forward.velocity, out.acceleration, feedforward_.torsion};
@@ -223,7 +227,7 @@ class Control {
     command.velocity = command.velocity + forward.velocity;
   }
 
-  Parameters& p_;
+  Parameters* p_ = nullptr;
   observers::EncoderAngle::State motor_encoder_{};
   observers::EncoderAngle::State output_encoder_{};
   observers::EncoderKalman::State<N> motor_motion_{};
@@ -244,7 +248,7 @@ class Control {
     N::Value torsion{};
   };
   Nominal nominal_{};
-  Mode last_mode_ = Mode::idle;
+  Mode last_mode_ = Mode::boot;
   bool streams_ = false;
 };
 

@@ -13,7 +13,7 @@
 
 namespace flexspline::firmware {
 
-// Once, before the first tick; the parameter block follows it, padded to a multiple of eight bytes.
+// Once, before the first tick; the parameter block follows it.
 struct LockStepStart {
   std::uint32_t block_bytes = 0;  // nought: the drive has none
   TelemetrySetup telemetry{};
@@ -35,7 +35,7 @@ struct LockStepUp {
   Answer answer{};
   bool has_answer = false;
   bool has_finding = false;
-  BlockFinding finding = BlockFinding::good;
+  BlockFinding finding = BlockFinding::none;
   std::uint8_t frame_words = 0;
   std::uint32_t dropped = 0;
   std::uint32_t instructions = 0;  // of the control tick, where the board can count them

@@ -37,7 +37,7 @@ struct Command {
     clear_fault,  // fault to boot, and to idle where the cause is gone
   };
   Kind kind = Kind::heartbeat;
-  Mode mode = Mode::idle;
+  Mode mode = Mode::boot;
   bool compensate = false;   // feedforward of the model in modes velocity and position; from `arm` on
   bool stream = false;       // mode position: not a target, but where the shaft shall be now, and how it goes on
   std::uint16_t number = 0;  // comes back with the answer

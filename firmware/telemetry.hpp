@@ -118,7 +118,7 @@ class Telemetry {
   std::atomic<std::uint32_t> written_{0};
   std::atomic<std::uint32_t> read_{0};
   std::atomic<bool> running_{false};
-  TelemetrySetup setup_{};
+  TelemetrySetup setup_{.every = 0};
   std::uint32_t sequence_ = 0;
   volatile std::uint32_t dropped_ = 0;
   std::uint32_t until_next_ = 0;

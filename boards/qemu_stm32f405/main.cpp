@@ -62,7 +62,7 @@ constexpr std::size_t kPageBytes = 16 * 1024;
 [[gnu::section(".parameters")]] alignas(8) std::byte parameter_page[kPageBytes];
 
 QemuBoard board;
-Application<QemuBoard> application(board);
+constinit Application<QemuBoard> application;
 const HostFile* down_pipe = nullptr;
 const HostFile* up_pipe = nullptr;
 
@@ -94,10 +94,9 @@ int main() {
     flexspline::qemu::leave(kExitNoDesktop);
   down_pipe = &down;
   up_pipe = &up;
+  application.begin(board);
   application.telemetry().configure(start.telemetry);
-  if (start.block_bytes > 0) application.offer({parameter_page, start.block_bytes});
-  // The block is looked at before there is a tick that could interrupt it.
-  application.background();
+  if (start.block_bytes > 0) application.boot_with({parameter_page, start.block_bytes});
   QemuBoard::start_timers();
   for (;;) {
     application.background();

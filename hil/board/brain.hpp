@@ -15,7 +15,10 @@ namespace flexspline::board {
 class Block {
  public:
   Block() = default;
-  explicit Block(const firmware::Parameters& parameters);
+  /// The bytes of a packed block, whatever they are.
+  explicit Block(std::span<const std::uint8_t> packed);
+  /// Packs parameters that were derived with the constants `d`.
+  Block(const firmware::Parameters& parameters, const effects::DriveConstants<double>& d);
   std::span<std::byte> bytes() { return {reinterpret_cast<std::byte*>(words_.data()), size_}; }
   std::span<const std::byte> bytes() const { return {reinterpret_cast<const std::byte*>(words_.data()), size_}; }
   /// Makes it shorter, as a transfer that was cut off does.

@@ -118,6 +118,9 @@ control::DriveSetup<double> setup_of(const plant::Drive& drive, const effects::D
     s.feedforward.damping_torque = damping->value("torque");
     s.feedforward.damping_exponent = damping->value("exponent");
   }
+  s.residual_map = {.standstill_velocity = 0.5,
+                    .largest_velocity = drive.rated_velocity_rad_s,
+                    .largest_residual = 0.25 * most_torque};
   s.safety.overspeed = 1.25 * drive.rated_velocity_rad_s;
   s.safety.overcurrent = 1.2 * drive.current_limit_a;
   s.safety.overtemperature = 80.0;
@@ -128,47 +131,11 @@ control::DriveSetup<double> setup_of(const plant::Drive& drive, const effects::D
 }
 
 namespace {
-// The lead's damping is that of the packed model, not the plant's: what it gives at a rate of 1 rad/s, and its
-// exponent.
-void set_damping(const PackedModel& packed, control::FeedforwardSetup<double>& setup) {
-  setup.damping_torque = 0.0;
-  auto model = packed.model;
-  model.for_each([&]<class Effect>(model::Places<Effect, N>& places) {
-    if constexpr (std::is_same_v<Effect, effects::StructuralDamping>) {
-      if (places.count == 0) return;
-      effects::Inputs<N> in{};
-      effects::Torques<N> out{};
-      in.torsion_rate = N::value(1.0 / packed.constants.torsion_rate_base);
-      in.torsion_direction = N::one();
-      Effect::evaluate(places.states[0], places.coefficients[0], in, out);
-      setup.damping_torque =
-          std::ldexp(N::narrow(out.transmission).raw, -fixed::kValueBits) * packed.constants.output_torque_base;
-      setup.damping_exponent = std::ldexp(places.coefficients[0].exponent.raw, -fixed::kExponentBits);
-    }
-  });
-}
 void require_no_findings() {
   if (fixed::Findings::count() != 0)
     throw std::runtime_error("the drive's parameters do not fit its numbers: " + std::string(fixed::Findings::first()));
 }
 }  // namespace
-
-firmware::Parameters parameters_of(const plant::Drive& drive, const PackedModel& packed) {
-  const effects::DriveConstants<double>& d = packed.constants;
-  control::DriveSetup<double> setup = setup_of(drive, d);
-  if (setup.tick_hz != SoftwareBoard::kTickHz)
-    throw std::runtime_error("the block was packed for " + std::to_string(setup.tick_hz) +
-                             " ticks a second; pack it with --tick-hz " + std::to_string(SoftwareBoard::kTickHz));
-  if (std::abs(d.gear_ratio - drive.gear_ratio) > 1e-6 * drive.gear_ratio)
-    throw std::runtime_error("the block was packed for a gear of " + std::to_string(d.gear_ratio) +
-                             ", the drive has one of " + std::to_string(drive.gear_ratio));
-  set_damping(packed, setup.feedforward);
-  fixed::Findings::clear();
-  firmware::Parameters parameters = control::derive<N>(setup, d);
-  parameters.model = packed.model;
-  require_no_findings();
-  return parameters;
-}
 
 firmware::Parameters parameters_of(const plant::Drive& drive, const control::DriveSetup<double>& setup) {
   const effects::DriveConstants<double> d = constants_of(drive, setup.tick_hz);

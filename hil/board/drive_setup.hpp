@@ -1,7 +1,6 @@
 #pragma once
 
 #include "firmware/control.hpp"
-#include "hil/board/packed_model.hpp"
 #include "hil/plant/parameters.hpp"
 #include "shared/control/drive_parameters_setup.hpp"
 
@@ -18,7 +17,5 @@ control::DriveSetup<double> setup_of(const plant::Drive& drive);
 /// The parameters of the setup, and as the model the effects that the drive's plant has and the catalogue knows, with
 /// the plant's own values. Throws std::runtime_error with the reason where numbers do not fit.
 firmware::Parameters parameters_of(const plant::Drive& drive, const control::DriveSetup<double>& setup);
-/// The same with a model that was identified and packed. Throws where it was packed for another tick rate or gear.
-firmware::Parameters parameters_of(const plant::Drive& drive, const PackedModel& packed);
 
 }  // namespace flexspline::board

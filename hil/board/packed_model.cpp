@@ -7,6 +7,8 @@
 #include <string>
 #include <vector>
 
+#include "shared/model/block_texts.hpp"
+
 namespace flexspline::board {
 namespace {
 
@@ -36,21 +38,18 @@ effects::DriveConstants<double> constants_of(const model::Bases& b) {
   return d;
 }
 
-// Filters and loops come from the drive's setup; a block may have some as well.
-struct IgnoredSections {
-  model::BlockVerdict section(std::uint16_t, std::span<const std::uint8_t>) { return {}; }
-};
-
 }  // namespace
 
-PackedModel read_packed_model(std::span<const std::uint8_t> bytes) {
-  PackedModel packed;
-  IgnoredSections others;
-  const model::BlockVerdict verdict = model::load(bytes, packed.header, packed.model, others);
-  if (!verdict.good())
-    throw std::runtime_error(std::string("this is no good parameter block: ") + model::text_of(verdict.fault));
-  packed.constants = constants_of(packed.header.bases);
-  return packed;
+PackedModel read_packed_model(std::span<const std::uint8_t> bytes, std::uint32_t tick_hz) {
+  const model::BlockVerdict verdict = control::check_for_drive(bytes, tick_hz);
+  if (!verdict.good()) {
+    std::string advice;
+    if (verdict.fault == model::BlockFault::missing_section) advice = "; pack it with --drive";
+    if (verdict.fault == model::BlockFault::other_tick_rate)
+      advice = "; pack it with --tick-hz " + std::to_string(tick_hz);
+    throw std::runtime_error(std::string("the drive refuses this block: ") + model::text_of(verdict.fault) + advice);
+  }
+  return {{bytes.begin(), bytes.end()}, constants_of(model::header_of(bytes).bases)};
 }
 
 PackedModel load_packed_model(const std::string& file) {

@@ -112,12 +112,9 @@ void Processor::start(const Block& block, const firmware::TelemetrySetup& teleme
     throw std::runtime_error(emulator + " cannot be started: " + std::strerror(error));
   }
   const auto bytes = block.bytes();
-  const std::size_t padded = (bytes.size() + 7) / 8 * 8;
-  const firmware::LockStepStart start{static_cast<std::uint32_t>(padded), telemetry};
+  const firmware::LockStepStart start{static_cast<std::uint32_t>(bytes.size()), telemetry};
   send(&start, sizeof(start));
-  std::vector<std::byte> whole(bytes.begin(), bytes.end());
-  whole.resize(padded);
-  send(whole.data(), whole.size());
+  send(bytes.data(), bytes.size());
 }
 
 firmware::LockStepUp Processor::tick(const firmware::LockStepDown& down) {

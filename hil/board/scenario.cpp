@@ -142,10 +142,14 @@ const Scenario& scenario(std::string_view name) {
 ScenarioResult run_scenario(const ScenarioPlan& plan, std::unique_ptr<Brain> brain) {
   constexpr std::uint32_t kBootTicks = 100, kHostTicks = SoftwareBoard::kTickHz / 1000;
   const Scenario& motion = scenario(plan.scenario);
-  const Host host(plan.packed ? plan.packed->constants : constants_of(plan.drive), motion, plan.compensation);
+  const effects::DriveConstants<double> constants = plan.packed ? plan.packed->constants : constants_of(plan.drive);
+  if (std::abs(constants.gear_ratio - plan.drive.gear_ratio) > 1e-6 * plan.drive.gear_ratio)
+    throw std::runtime_error("the block was packed for a gear of " + std::to_string(constants.gear_ratio) +
+                             ", the drive has one of " + std::to_string(plan.drive.gear_ratio));
+  const Host host(constants, motion, plan.compensation);
   const auto started = std::chrono::steady_clock::now();
-  const Block block(plan.packed ? parameters_of(plan.drive, *plan.packed)
-                                : parameters_of(plan.drive, setup_of(plan.drive)));
+  const Block block =
+      plan.packed ? Block(plan.packed->bytes) : Block(parameters_of(plan.drive, setup_of(plan.drive)), constants);
   VirtualDrive drive({.drive = plan.drive, .seed = plan.seed}, block, telemetry(), std::move(brain));
   drive.run(kBootTicks);
   const firmware::Answer armed = drive.command(host.command(firmware::Command::Kind::arm, 0.0));

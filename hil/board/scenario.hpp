@@ -37,7 +37,7 @@ struct ScenarioPlan {
   bool compensation = true;
   std::optional<Injection> injection{};
   double injection_s = 0.0;
-  std::optional<PackedModel> packed{};  ///< the model that the drive computes with; else the plant's own
+  std::optional<PackedModel> packed{};  ///< what the drive is given; else the plant's own values
 };
 
 /// What happened. Errors are those of the true output position against the reference, after the first second.

@@ -341,7 +341,9 @@ class App {
         ->check(CLI::PositiveNumber)
         ->capture_default_str()
         ->type_name("SHARE");
-    pack->add_option("--drive", options->pack.drive, "name of the drive that the block is for (default: any)")
+    pack->add_option("--drive", options->drive, "settings of the drive: its loops, limits and sensors")
+        ->type_name("FILE.toml");
+    pack->add_option("--drive-name", options->pack.drive, "name of the drive that the block is for (default: any)")
         ->type_name("NAME");
     pack->add_option("--encoder-counts", options->pack.encoder_counts,
                      "per motor turn: the block then has an encoder filter")

@@ -88,6 +88,13 @@ std::vector<Named> limits_of(const deployment::Unpacked& block) {
           {"direction_band", velocity, in(l.direction_band, d.velocity_base)}};
 }
 
+json settings_json(const deployment::Unpacked& block) {
+  json list = json::array();
+  for (const auto& q : block.settings)
+    list.push_back({{"name", q.name}, {"value", output::json_number(q.value)}, {"unit", q.unit}});
+  return list;
+}
+
 json json_of(const deployment::Unpacked& block) {
   const auto quantities = [](const std::vector<Named>& all) {
     json list = json::array();
@@ -120,6 +127,8 @@ json json_of(const deployment::Unpacked& block) {
           {"limits", quantities(limits_of(block))},
           {"effects", effects},
           {"sections", block.sections},
+          {"settings", block.settings.empty() ? json() : settings_json(block)},
+          {"refused_by_a_drive", block.refusal.empty() ? json() : json(block.refusal)},
           {"parameters", parameters},
           {"coefficients_follow_from_parameters", block.model ? json(block.coefficients_follow) : json()}};
 }
@@ -130,8 +139,15 @@ int run(const PackCommandOptions& options, Console& console) {
   const model::ModelFile file = load_model(options.model);
   console.progress("proving the block and comparing it with double");
   deployment::Packed packed;
+  deployment::PackOptions pack = options.pack;
+  if (!options.drive.empty()) {
+    std::ifstream in(options.drive, std::ios::binary);
+    if (!in) throw deployment::PackError(fmt::format("{} cannot be read; is the path right?", options.drive.string()));
+    pack.settings.emplace(std::istreambuf_iterator<char>(in), std::istreambuf_iterator<char>());
+    pack.settings_origin = options.drive.string();
+  }
   try {
-    packed = deployment::pack(file.model, options.pack);
+    packed = deployment::pack(file.model, pack);
   } catch (const deployment::BoundError& error) {
     console.error(error.what());
     return kNotMet;
@@ -171,6 +187,14 @@ int run(const UnpackOptions& options, Console& console) {
   };
   table("Bases", bases_of(block));
   table("Limits", limits_of(block));
+  console.line();
+  if (block.settings.empty()) {
+    console.line(fmt::format("No drive takes it: {}; good to simulate with", block.refusal));
+  } else {
+    console.line(console.bold("Settings of the drive"));
+    for (const auto& q : block.settings)
+      console.line(fmt::format("  {:<30}{:>12}  {}", q.name, number(q.value, 6), q.unit));
+  }
   console.line();
   console.line(console.bold("Effects, with their coefficients per unit"));
   for (const auto& effect : block.effects) {

@@ -141,6 +141,7 @@ int run(const RemoveOptions& options, Console& console);
 struct PackCommandOptions {
   std::filesystem::path model;
   std::filesystem::path out;
+  std::filesystem::path drive;  // settings of the drive; empty: none in the block
   deployment::PackOptions pack;
   std::string json;
 };

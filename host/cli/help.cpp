@@ -133,8 +133,14 @@ const std::array kHelp = {
         "integers, and a checksum. Proves that no number can leave its range whatever the drive measures within twice "
         "its ratings, and compares the block with double along a hundred thousand samples of the whole envelope. A "
         "model that does not fit, or whose error is above --bound, is refused with the reason (exit code 1 for the "
-        "bound, 2 for all else). The model's parameters go into the block too, for unpack.",
-        {kMakeData, kIdentify, "flexspline pack --model fitted.toml --out drive.block --encoder-counts 4096"}},
+        "bound, 2 for all else). The model's parameters go into the block too, for unpack. With --drive the block has "
+        "all that a drive needs: loops (50 Hz velocity with integral, 10 Hz position), limits, sensors, feedforward "
+        "and observers, as a TOML file states them (host/deployment/README.md has the keys) and else as the ratings "
+        "and the model suggest. Without it a block is good to simulate with; a drive refuses it.",
+        {kMakeData, kIdentify, "flexspline pack --model fitted.toml --out drive.block --encoder-counts 4096",
+         "printf 'format = \"flexspline-drive/1\"\\n[output_encoder]\\ncounts = 65536\\n' | tee drive.toml",
+         "flexspline pack --model fitted.toml --drive drive.toml --tick-hz 20000 --encoder-counts 4096 --out "
+         "full.block"}},
     CommandHelp{
         "unpack",
         "checks a parameter block and says what is in it",

@@ -13,6 +13,7 @@
 #include "host/deployment/sha256.hpp"
 #include "host/deployment/trial.hpp"
 #include "host/output/text.hpp"
+#include "shared/control/drive_block.hpp"
 #include "shared/fixed/system.hpp"
 #include "shared/observers/encoder_kalman.hpp"
 
@@ -105,6 +106,17 @@ ProofPart add_encoder_filter(model::BlockWriter& writer, const DriveConstants<do
           d.turn_angle_scale == 1.0 ? "rad/s" : "m/s"};
 }
 
+// What the states of both encoders' filters stay below.
+void prove_filters(const control::DriveSetup<double>& setup, const DriveConstants<double>& d, Packed& packed) {
+  const auto filter = [&](const char* name, double corner, double base) {
+    const auto bounds = observers::kalman_bounds(observers::kalman_gains(corner * d.time_base));
+    packed.proof.push_back(
+        {name, "impulse_response", bounds.velocity * base, d.turn_angle_scale == 1.0 ? "rad/s" : "m/s"});
+  };
+  filter("encoder_filter", setup.motor_corner, d.velocity_base);
+  if (setup.output_counts != 0) filter("output_filter", setup.output_corner, d.output_velocity_base);
+}
+
 struct Tried {
   DriveConstants<double> drive;
   Bounds bounds;
@@ -194,10 +206,21 @@ Packed pack(const model::Model& model, const PackOptions& options) {
   measure_error(effects, tried, model, options, unit, packed);
 
   packed.bytes.resize(model::kLargestBlock);
+  model::BlockHeader header = header_of(model, tried.drive, options);
+  std::optional<control::DriveSetup<double>> setup;
+  if (options.settings) {
+    setup = parse_drive_setup(*options.settings, options.settings_origin, model, tried.drive, options.encoder_counts);
+    header.encoder_counts = setup->motor_counts;
+  }
   model::BlockWriter writer(packed.bytes);
-  writer.begin(header_of(model, tried.drive, options));
+  writer.begin(header);
   write_effects(writer, effects, tried.drive);
-  if (options.encoder_counts) packed.proof.push_back(add_encoder_filter(writer, tried.drive, options));
+  if (setup) {
+    control::add_settings(writer, settings_of(*setup, tried.drive, options.settings_origin));
+    prove_filters(*setup, tried.drive, packed);
+  } else if (options.encoder_counts) {
+    packed.proof.push_back(add_encoder_filter(writer, tried.drive, options));
+  }
   writer.add_bytes(model::kParametersNote, note_of(model.drive, effects));
   const std::size_t size = writer.end();
   if (size == 0) throw PackError(fmt::format("the block is larger than {} bytes", model::kLargestBlock));

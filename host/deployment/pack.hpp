@@ -9,6 +9,7 @@
 #include <string>
 #include <vector>
 
+#include "host/deployment/drive_settings.hpp"
 #include "host/model/model.hpp"
 #include "shared/model/block.hpp"
 
@@ -28,8 +29,11 @@ class BoundError : public PackError {
 
 struct PackOptions {
   double tick_hz = 16000.0;
-  double bound = 1e-6;                   // of the error, as a share of rated torque
-  std::string drive;                     // identity; empty: any
+  double bound = 1e-6;  // of the error, as a share of rated torque
+  std::string drive;    // identity; empty: any
+  // Settings of the drive (drive_settings.hpp): then the block has all that a drive needs. Text and where it is from.
+  std::optional<std::string> settings;
+  std::string settings_origin = "settings";
   std::optional<double> encoder_counts;  // per motor turn: then the block has an encoder filter
   double filter_corner_hz = 50.0;
   std::vector<std::string> image;  // effects that the firmware has; empty: all that a drive can run
@@ -74,6 +78,9 @@ struct Unpacked {
   model::BlockHeader header;
   std::vector<UnpackedEffect> effects;
   std::vector<std::uint16_t> sections;
+  // Of the drive's settings, in SI; empty where the block has none, and then `refusal` says what a drive makes of it.
+  std::vector<NamedQuantity> settings;
+  std::string refusal;
   std::optional<model::Model> model;  // from the note that the host leaves in a block
   bool coefficients_follow = false;   // from the parameters of that model, to the bit
 };

@@ -8,28 +8,14 @@
 #include "host/deployment/bases.hpp"
 #include "host/deployment/note.hpp"
 #include "host/deployment/pack.hpp"
+#include "shared/control/drive_block.hpp"
 #include "shared/fixed/system.hpp"
-#include "shared/observers/encoder_kalman.hpp"
+#include "shared/model/block_texts.hpp"
 
 namespace flexspline::deployment {
 namespace {
 
 using fixed::Fixed;
-
-// What a drive has room for in a block, as the host knows it.
-struct Sections {
-  model::BlockVerdict section(std::uint16_t kind, std::span<const std::uint8_t> bytes) {
-    found.push_back(kind);
-    if (kind == static_cast<std::uint16_t>(model::Section::encoder_filter)) {
-      observers::EncoderKalman::Coefficients<Fixed> c{};
-      return model::read_section(bytes, c);
-    }
-    // Of what the firmware alone knows the frame was checked.
-    return kind <= kLastSection ? model::BlockVerdict{} : model::BlockVerdict{model::BlockFault::unknown_entry};
-  }
-  static constexpr std::uint16_t kLastSection = 0x1FF;
-  std::vector<std::uint16_t> found;
-};
 
 template <class G>
 double floating(const G& g) {
@@ -72,35 +58,25 @@ void describe(const std::array<T, Size>& all, std::vector<Coefficient>& out) {
   for (const T& x : all) describe(x, out);
 }
 
-// For coefficients that say themselves how a block holds them (model::HasFields).
-struct Describing {
-  std::vector<Coefficient>& out;
-  template <class T>
-  bool operator()(const T& x) {
-    describe(x, out);
-    return true;
-  }
-  template <class T>
-  bool bounded(const T& x, std::int32_t, std::int32_t) {
-    out.push_back({"number", static_cast<double>(static_cast<std::int32_t>(x))});
-    return true;
-  }
-  template <class Elements, class Count>
-  bool list(const Elements& elements, const Count& count, std::int32_t) {
-    for (std::size_t k = 0; k < static_cast<std::size_t>(count); ++k) describe(elements[k], out);
-    return true;
-  }
-};
+void describe(bool x, std::vector<Coefficient>& out) {
+  out.push_back({"flag", x ? 1.0 : 0.0});
+}
+void describe(effects::Variable x, std::vector<Coefficient>& out) {
+  out.push_back({"variable", static_cast<double>(x)});
+}
+void describe(effects::Balance x, std::vector<Coefficient>& out) {
+  out.push_back({"balance", static_cast<double>(x)});
+}
+void describe(std::int16_t x, std::vector<Coefficient>& out) {
+  out.push_back({"number", static_cast<double>(x)});
+}
 
 template <class T>
 void describe_all(const T& coefficients, std::vector<Coefficient>& out) {
-  if constexpr (model::HasFields<T>) {
-    Describing codec{out};
-    T copy = coefficients;
-    copy.fields(codec);
-  } else {
-    model::for_each_member(coefficients, [&](const auto& c) { describe(c, out); });
-  }
+  model::for_each_member(coefficients, [&](const auto& c) { describe(c, out); });
+  // Of a table only the points that it has.
+  if constexpr (requires { coefficients.points; })
+    out.resize(out.size() - coefficients.value.size() + static_cast<std::size_t>(coefficients.points));
 }
 
 std::string text_of(const model::Name& name) {
@@ -165,9 +141,19 @@ model::Model model_from(const Note& note, const model::BlockHeader& header) {
 Unpacked unpack(std::span<const std::uint8_t> block) {
   Unpacked unpacked;
   const auto model = std::make_unique<model::DriveModel<Fixed>>();
-  Sections sections;
-  if (const auto v = model::load(block, unpacked.header, *model, sections); !v.good()) refuse(v);
-  unpacked.sections = sections.found;
+  if (const auto v = control::load(block, *model); !v.good()) refuse(v);
+  unpacked.header = model::header_of(block);
+  model::for_each_entry(block, [&](std::uint16_t kind, std::span<const std::uint8_t>) {
+    if (kind >= 0x100 && kind < model::kFirstNote) unpacked.sections.push_back(kind);
+  });
+  const auto tick_hz = static_cast<std::uint32_t>(std::lround(1.0 / from_block(unpacked.header.bases).time_base));
+  if (const auto v = control::check_for_drive(block, tick_hz); !v.good()) {
+    unpacked.refusal = model::text_of(v.fault);
+  } else {
+    const auto parameters = std::make_unique<control::DriveParameters<Fixed>>();
+    control::load_for_drive(block, *parameters);
+    unpacked.settings = described(*parameters, from_block(unpacked.header.bases));
+  }
   model->for_each([&]<class Effect>(const auto& places) {
     for (std::size_t i = 0; i < places.count; ++i) {
       UnpackedEffect effect{std::string(Effect::kInfo.name), {}};

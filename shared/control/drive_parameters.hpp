@@ -7,6 +7,7 @@
 #include "shared/control/excitation.hpp"
 #include "shared/control/feedforward.hpp"
 #include "shared/control/loops.hpp"
+#include "shared/control/residual_map.hpp"
 #include "shared/control/stream.hpp"
 #include "shared/control/trajectory.hpp"
 #include "shared/model/drive_model.hpp"
@@ -24,8 +25,8 @@ template <class N>
 struct AnalogScale {
   typename N::Gain gain{};
   typename N::Value offset{};
-  std::int16_t lowest = -32768;
-  std::int16_t highest = 32767;
+  std::int16_t lowest = 0;
+  std::int16_t highest = 0;
 };
 
 // Above (or, for times, beyond) which the drive stops by itself; firmware/faults.hpp says what happens then.
@@ -47,11 +48,11 @@ struct SafetyLimits {
 };
 
 template <class N>
-struct DriveParameters {
+struct DriveSettings {
   std::uint32_t tick_hz = 0;
   bool has_output_encoder = false;
   bool has_torque_sensor = false;
-  bool excites_torque = true;  // else the excitation is a velocity
+  bool excites_torque = false;  // else the excitation is a velocity
   observers::EncoderAngle::Coefficients motor_encoder{};
   observers::EncoderAngle::Coefficients output_encoder{};
   observers::EncoderKalman::Coefficients<N> motor_motion{};
@@ -74,6 +75,11 @@ struct DriveParameters {
   Feedforward::Coefficients<N> feedforward{};
   Excitation::Coefficients<N> excitation{};
   SafetyLimits<N> safety{};
+  ResidualMap::Coefficients residual_map{};
+};
+
+template <class N>
+struct DriveParameters : DriveSettings<N> {
   model::DriveModel<N, model::EveryFormula> model{};
 };
 

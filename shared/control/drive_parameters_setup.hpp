@@ -51,6 +51,7 @@ struct DriveSetup {
   ExcitationSetup<P> excitation{};
   bool excites_torque = true;  // else the excitation is a velocity
   SafetySetup<P> safety{};
+  ResidualMapSetup<P> residual_map{};
 };
 
 namespace detail {
@@ -131,6 +132,7 @@ DriveParameters<N> derive(const DriveSetup<P>& s, const effects::DriveConstants<
   p.feedforward = Feedforward::derive<N>(s.feedforward, d);
   if (s.excitation.ticks > 0)
     p.excitation = Excitation::derive<N>(s.excitation, s.excites_torque ? d.torque_base : d.velocity_base, d);
+  p.residual_map = ResidualMap::derive<N>(s.residual_map, d);
   p.safety = detail::safety_limits<N>(s.safety, s.motor_counts, d);
   return p;
 }

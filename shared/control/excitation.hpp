@@ -41,12 +41,12 @@ struct Excitation {
     std::uint32_t ticks = 0;
     std::uint32_t fade_ticks = 0;
     std::uint64_t fade_step = 0;  // 2^-64 of the fade
+    RateLimiter::Coefficients<N> limiter{};
     typename N::Value positive{};
     typename N::Value negative{};
     typename N::Value offset{};
-    std::array<DriveLine<N>, kMostLines> lines{};
-    RateLimiter::Coefficients<N> limiter{};
     SpeedGuard::Coefficients<N> guard{};
+    std::array<DriveLine<N>, kMostLines> lines{};
   };
   template <class N>
   struct State {

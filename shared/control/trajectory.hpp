@@ -38,7 +38,7 @@ struct Trajectory {
     std::int64_t lowest = 0;
     std::int64_t highest = 0;
     std::int64_t velocity = 0;  // largest, 2^-48 turns a tick
-    std::int64_t change = 1;    // largest, of the velocity a tick
+    std::int64_t change = 0;    // largest, of the velocity a tick; at least one
     typename N::DistanceGain to_velocity{};
     typename N::DistanceGain to_acceleration{};
     std::int64_t velocity_base = 0;  // 2^-48 turns a tick
@@ -69,6 +69,7 @@ struct Trajectory {
     if (!fits || setup.lowest > setup.highest) {
       fixed::Findings::note(
           "limits of a trajectory: above a unit a tick, below half a turn a tick, 8192 turns to stop");
+      c.change = 1;
       return c;
     }
     c.lowest = setup.lowest;

@@ -50,18 +50,11 @@ struct TableEffect : Stateless {
     Balance balance{};
     bool times_direction = false;
     bool periodic = false;
-    std::int16_t points = 0;
     typename N::Value from{};
     typename N::RatioGain per_step{};  // steps per unit of the signal
     typename N::Order turn{};
+    std::int16_t points = 0;
     std::array<typename N::Value, kMostPoints> value{};  // the first `points` of them
-    // How a parameter block holds them.
-    template <class Codec>
-    constexpr bool fields(Codec& codec) {
-      return codec.bounded(variable, 0, static_cast<std::int32_t>(Variable::temperature)) &&
-             codec.bounded(balance, 0, 2) && codec.bounded(times_direction, 0, 1) && codec.bounded(periodic, 0, 1) &&
-             codec(from) && codec(per_step) && codec(turn) && codec.list(value, points, 2);
-    }
   };
   template <class N, class P>
   static Coefficients<N> derive(const P* p, const DriveConstants<P>& d) {

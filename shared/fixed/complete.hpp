@@ -11,13 +11,26 @@
 namespace flexspline::fixed {
 
 namespace detail {
+// By bits, as a library's division of 64 bits is larger than all this file; `by` is below 2^31.
+constexpr std::uint64_t divided(std::uint64_t dividend, std::uint32_t by) {
+  std::uint64_t quotient = dividend;
+  std::uint32_t rest = 0;
+  for (int bit = 0; bit < 64; ++bit) {
+    rest = (rest << 1) | static_cast<std::uint32_t>(quotient >> 63);
+    quotient <<= 1;
+    if (rest < by) continue;
+    rest -= by;
+    quotient |= 1;
+  }
+  return quotient;
+}
 // largest / (mantissa 2^(exponent - 30)) in units of 2^-input_bits, rounded down; nought counts as a half.
 // `largest_q20` below 2^37.
 constexpr std::uint64_t input_limit(std::uint64_t largest_q20, std::int32_t mantissa, int exponent, int input_bits,
                                     std::uint64_t most) {
   const std::uint64_t size = mantissa == 0 ? std::uint64_t{1} << (kMantissaBits - 1) : size_of(mantissa);
   const int zeros = std::countl_zero(largest_q20);
-  const std::uint64_t quotient = (largest_q20 << zeros) / size;
+  const std::uint64_t quotient = divided(largest_q20 << zeros, static_cast<std::uint32_t>(size));
   const int up = input_bits + kMantissaBits - 20 - zeros - exponent;
   if (up <= -64) return 0;
   if (up < 0) return quotient >> -up < most ? quotient >> -up : most;

@@ -6,9 +6,12 @@
 #include <cstddef>
 #include <cstdint>
 #include <span>
+#include <type_traits>
+#include <utility>
 
 #include "shared/model/drive_model.hpp"
 #include "shared/model/encoding.hpp"
+#include "shared/model/rows.hpp"
 
 namespace flexspline::model {
 
@@ -19,13 +22,25 @@ inline constexpr std::size_t kMostEntries = 64;
 
 // What an entry holds. Below 256: coefficients of the effect of that number. From kFirstNote on: notes that the drive
 // keeps and does not read.
+// Sections: what the drive's tick needs beside the model (shared/control/drive_block.hpp). A section that changes gets
+// another number; numbers are never given again.
 enum class Section : std::uint16_t {
-  encoder_filter = 0x100,
+  encoder_filter = 0x100,  // of the motor
   feedforward = 0x101,
   loops = 0x102,
   trajectory = 0x103,
-  rate_limiter = 0x104,
   torque_ripple_filter = 0x105,
+  general = 0x110,
+  motor_encoder = 0x111,
+  output_encoder = 0x112,
+  output_filter = 0x113,
+  disturbance = 0x114,
+  torsion = 0x115,
+  sensors = 0x116,
+  excitation = 0x117,
+  excitation_lines = 0x118,
+  safety = 0x119,
+  residual_map = 0x11A,
 };
 inline constexpr std::uint16_t kFirstNote = 0xF000;
 inline constexpr std::uint16_t kParametersNote = 0xF000;  // what the effects were derived from, for `unpack`
@@ -81,49 +96,11 @@ enum class BlockFault : std::uint8_t {
   missing_effect,
   too_often,
   wrong_coefficient,
+  unlike_coefficients,
+  missing_section,
+  other_tick_rate,
+  armed,  // good, but the drive is armed
 };
-constexpr const char* text_of(BlockFault fault) {
-  switch (fault) {
-    case BlockFault::none:
-      return "no fault";
-    case BlockFault::too_short:
-      return "it ends before its header does";
-    case BlockFault::too_long:
-      return "it is longer than any block may be";
-    case BlockFault::wrong_magic:
-      return "it does not begin as a parameter block does";
-    case BlockFault::unknown_version:
-      return "its version is not known here";
-    case BlockFault::wrong_length:
-      return "its length is not the one that it states";
-    case BlockFault::wrong_checksum:
-      return "its checksum does not fit its bytes";
-    case BlockFault::wrong_name:
-      return "a name holds what is no text";
-    case BlockFault::wrong_base:
-      return "a base is not a positive number";
-    case BlockFault::wrong_limit:
-      return "a limit is not between nought and two bases";
-    case BlockFault::wrong_header:
-      return "a field of the header holds what it may not";
-    case BlockFault::too_many_entries:
-      return "it has more entries than a drive takes";
-    case BlockFault::entry_cut_off:
-      return "an entry goes beyond the end";
-    case BlockFault::entry_of_wrong_length:
-      return "an entry is longer or shorter than its coefficients";
-    case BlockFault::unknown_entry:
-      return "an entry is of no known kind";
-    case BlockFault::missing_effect:
-      return "an effect is not in this firmware";
-    case BlockFault::too_often:
-      return "an effect or a section stands more often than the drive has places";
-    case BlockFault::wrong_coefficient:
-      return "a coefficient is outside the bounds of its format";
-  }
-  return "unknown fault";
-}
-
 // Where a block is wrong: which entry (from nought; of the header: -1), and which field in it where one is to blame.
 struct BlockVerdict {
   BlockFault fault = BlockFault::none;
@@ -141,48 +118,48 @@ inline constexpr std::size_t kChecksum = 4;
 inline constexpr std::size_t kLeastBlock = kBlockStart + kHeaderBytes + kChecksum;
 
 // Printable from the first to the last character, noughts behind, the last of all a nought.
-constexpr bool is_name(const Name& name) {
+inline bool is_name(const std::uint8_t* name) {
   bool ended = false;
-  for (const char c : name) {
-    const auto byte = static_cast<unsigned char>(c);
+  for (std::size_t i = 0; i < sizeof(Name); ++i) {
+    const std::uint8_t byte = name[i];
     if (byte != 0 && (ended || byte < 0x20 || byte == 0x7F)) return false;
     ended = ended || byte == 0;
   }
   return ended;
 }
-constexpr BlockVerdict take_header(Reader& r, BlockHeader& h) {
-  BlockVerdict v;
-  const auto wrong = [&](BlockFault fault, int field) {
-    if (v.good()) v = {fault, -1, static_cast<std::int16_t>(field), 0};
+inline constexpr int kBases = 17;
+inline constexpr int kReferenceTemperature = 3;
+inline constexpr int kLimits = 7;
+inline constexpr int kVelocityLimit = 2;  // and behind it the overspeed
+// Fields count from the drive's name on. All bytes of the header are there.
+inline BlockVerdict check_header(const std::uint8_t* at) {
+  std::int16_t field = 0;
+  const auto wrong = [&](BlockFault fault) { return BlockVerdict{fault, -1, field, 0}; };
+  const auto next = [&] {
+    const std::uint32_t word = word_at(at);
+    at += 4;
+    return word;
   };
-  for (Name* name : {&h.drive, &h.model}) {
-    for (char& c : *name) c = static_cast<char>(r.take<std::uint8_t>());
-    if (!is_name(*name)) wrong(BlockFault::wrong_name, name == &h.model ? 1 : 0);
+  for (; field < 2; ++field, at += sizeof(Name))
+    if (!is_name(at)) return wrong(BlockFault::wrong_name);
+  if (next() > 1) return wrong(BlockFault::wrong_header);
+  ++field;
+  if (next() > (std::uint32_t{1} << 30)) return wrong(BlockFault::wrong_header);
+  ++field;
+  for (int i = 0; i < kBases; ++i, ++field) {
+    const auto mantissa = static_cast<std::int32_t>(next()), exponent = static_cast<std::int32_t>(next());
+    if (!normal(mantissa, exponent, -100, 100) || (mantissa <= 0 && i != kReferenceTemperature))
+      return wrong(BlockFault::wrong_base);
   }
-  h.axis = r.take<std::uint32_t>();
-  if (h.axis > 1) wrong(BlockFault::wrong_header, 2);
-  h.encoder_counts = r.take<std::uint32_t>();
-  if (h.encoder_counts > (std::uint32_t{1} << 30)) wrong(BlockFault::wrong_header, 3);
-  int field = 4;
-  const auto base = [&](Number& n, bool any_sign) {
-    if (!Encoding<Number>::take(r, n) || (!any_sign && n.mantissa <= 0)) wrong(BlockFault::wrong_base, field);
-    ++field;
-  };
-  for_each_member(h.bases, [&]<class M>(M& member) {
-    if constexpr (std::is_same_v<M, Number>) {
-      base(member, &member == &h.bases.reference_temperature);
-    } else {
-      for (Number& one : member) base(one, false);
-    }
-  });
-  for_each_member(h.limits, [&](fixed::Value& limit) {
-    constexpr std::int32_t kTwo = std::int32_t{2} << fixed::kValueBits;
-    if (!Encoding<fixed::Value>::take(r, limit) || limit.raw <= 0 || limit.raw > kTwo)
-      wrong(BlockFault::wrong_limit, field);
-    ++field;
-  });
-  if (v.good() && h.limits.velocity.raw >= h.limits.overspeed.raw) wrong(BlockFault::wrong_limit, field - 4);
-  return v;
+  std::uint32_t velocity = 0;
+  for (int i = 0; i < kLimits; ++i, ++field) {
+    constexpr std::uint32_t kTwo = std::uint32_t{2} << fixed::kValueBits;
+    const std::uint32_t limit = next();
+    if (limit - 1 >= kTwo) return wrong(BlockFault::wrong_limit);
+    if (i == kVelocityLimit) velocity = limit;
+    if (i == kVelocityLimit + 1 && velocity >= limit) return wrong(BlockFault::wrong_limit);
+  }
+  return {};
 }
 // Puts an entry around what `fill(writer)` writes.
 template <class Fill>
@@ -196,114 +173,198 @@ constexpr void put_entry(Writer& w, std::uint16_t kind, Fill&& fill) {
 }
 }  // namespace detail
 
-// Walks the entries of a block that was found good as a whole. visit(kind, bytes of it).
+// What the block at the start of these bytes states as its length; nought where none begins there.
+constexpr std::size_t stated_bytes(std::span<const std::uint8_t> bytes) {
+  if (bytes.size() < detail::kLeastBlock) return 0;
+  Reader r(bytes);
+  if (r.take<std::uint32_t>() != kBlockMagic) return 0;
+  r.take<std::uint32_t>();
+  return r.take<std::uint32_t>();
+}
+
+// Walks the entries of a block that was found good. visit(kind, bytes of it).
 template <class Visit>
-constexpr void for_each_entry(std::span<const std::uint8_t> block, Visit&& visit) {
-  Reader start(block.subspan(6));
-  const auto entries = start.take<std::uint16_t>();
+void for_each_entry(std::span<const std::uint8_t> block, Visit&& visit) {
   std::size_t at = detail::kBlockStart + detail::kHeaderBytes;
-  for (std::uint16_t i = 0; i < entries; ++i) {
-    Reader r(block.subspan(at));
-    const auto kind = r.take<std::uint16_t>();
-    r.take<std::uint16_t>();
-    const auto bytes = r.take<std::uint32_t>();
-    visit(kind, block.subspan(at + detail::kEntryHeader, bytes));
+  for (std::uint32_t left = detail::word_at(block.data() + 4) >> 16; left > 0; --left) {
+    const std::uint32_t kind = detail::word_at(&block[at]), bytes = detail::word_at(&block[at + 4]);
+    visit(static_cast<std::uint16_t>(kind), block.subspan(at + detail::kEntryHeader, bytes));
     at += detail::kEntryHeader + bytes;
   }
 }
 
-// Start, length, checksum, header and frame of the entries; not what is in them.
-constexpr BlockVerdict check_frame(std::span<const std::uint8_t> block, BlockHeader& header) {
+// Start, length, checksum and header; not the entries.
+inline BlockVerdict check_start(std::span<const std::uint8_t> block) {
   if (block.size() < detail::kLeastBlock) return {BlockFault::too_short};
   if (block.size() > kLargestBlock) return {BlockFault::too_long};
-  Reader r(block.first(block.size() - detail::kChecksum));
-  if (r.take<std::uint32_t>() != kBlockMagic) return {BlockFault::wrong_magic};
-  if (r.take<std::uint16_t>() != kBlockVersion) return {BlockFault::unknown_version};
-  const auto entries = r.take<std::uint16_t>();
-  if (r.take<std::uint32_t>() != block.size()) return {BlockFault::wrong_length};
-  Reader end(block.last(detail::kChecksum));
-  if (end.take<std::uint32_t>() != crc32(block.first(block.size() - detail::kChecksum)))
-    return {BlockFault::wrong_checksum};
-  if (const BlockVerdict v = detail::take_header(r, header); !v.good()) return v;
-  if (entries > kMostEntries) return {BlockFault::too_many_entries};
-  for (std::uint16_t i = 0; i < entries; ++i) {
-    const auto at = static_cast<std::int16_t>(i);
-    if (r.left() < detail::kEntryHeader) return {BlockFault::entry_cut_off, at};
-    const auto kind = r.take<std::uint16_t>();
-    if (r.take<std::uint16_t>() != 0) return {BlockFault::unknown_entry, at, -1, kind};
-    const auto bytes = r.take<std::uint32_t>();
-    if (bytes > r.left()) return {BlockFault::entry_cut_off, at, -1, kind};
-    for (std::uint32_t b = 0; b < bytes; ++b) r.take<std::uint8_t>();
-  }
-  if (r.left() != 0) return {BlockFault::wrong_length};
+  const std::uint8_t* const at = block.data();
+  if (detail::word_at(at) != kBlockMagic) return {BlockFault::wrong_magic};
+  const std::uint32_t version_and_entries = detail::word_at(at + 4);
+  if ((version_and_entries & 0xFFFF) != kBlockVersion) return {BlockFault::unknown_version};
+  if (detail::word_at(at + 8) != block.size()) return {BlockFault::wrong_length};
+  const std::size_t before_checksum = block.size() - detail::kChecksum;
+  if (detail::word_at(at + before_checksum) != crc32(block.first(before_checksum))) return {BlockFault::wrong_checksum};
+  if (const BlockVerdict v = detail::check_header(at + detail::kBlockStart); !v.good()) return v;
+  if ((version_and_entries >> 16) > kMostEntries) return {BlockFault::too_many_entries};
   return {};
 }
 
-// What the sections of a block are read into; firmware has a T with a section each, by Section's numbers.
-// `sections.section(number, bytes)` returns BlockFault::unknown_entry for those that it does not have.
-struct NoSections {
-  constexpr BlockVerdict section(std::uint16_t, std::span<const std::uint8_t>) { return {BlockFault::unknown_entry}; }
-};
-// Reads a section's coefficients (EncoderKalman::Coefficients<Fixed>, ...).
-template <class T>
-constexpr BlockVerdict read_section(std::span<const std::uint8_t> bytes, T& coefficients) {
-  Reader r(bytes);
-  std::int16_t wrong = -1;
-  if constexpr (HasFields<T>) {
-    if (!Encoding<T>::take(r, coefficients)) wrong = 0;
-  } else {
-    std::int16_t at = 0;
-    for_each_member(coefficients, [&]<class M>(M& member) {
-      if (!Encoding<M>::take(r, member) && wrong < 0) wrong = at;
-      ++at;
-    });
-  }
-  if (!r.whole()) return {BlockFault::entry_of_wrong_length};
-  if (wrong >= 0) return {BlockFault::wrong_coefficient, -1, wrong, 0};
-  if (r.left() != 0) return {BlockFault::entry_of_wrong_length};
-  return {};
+// The header of a block that was found good.
+inline BlockHeader header_of(std::span<const std::uint8_t> block) {
+  BlockHeader h;
+  Reader r(block.subspan(detail::kBlockStart));
+  for (Name* name : {&h.drive, &h.model})
+    for (char& c : *name) c = static_cast<char>(r.take<std::uint8_t>());
+  h.axis = r.take<std::uint32_t>();
+  h.encoder_counts = r.take<std::uint32_t>();
+  const auto take = [&](Number& n) {
+    n.mantissa = r.take<std::int32_t>();
+    n.exponent = r.take<std::int32_t>();
+  };
+  for_each_member(h.bases, [&]<class M>(M& member) {
+    if constexpr (std::is_same_v<M, Number>) {
+      take(member);
+    } else {
+      for (Number& one : member) take(one);
+    }
+  });
+  for_each_member(h.limits, [&](fixed::Value& limit) { limit.raw = r.take<std::int32_t>(); });
+  return h;
 }
+
+// What an image can take of a block: effects into a model, sections into settings.
+struct EffectPlace {
+  std::uint16_t at;  // of Places<Effect, N, Count> in all places: a count and then the coefficients, from `start` on
+  std::uint16_t stride;
+  std::uint8_t number;
+  std::uint8_t count;
+  std::uint8_t start;
+  std::uint8_t row;  // where it begins among all rows
+};
+struct SectionPlace {
+  bool (*agrees)(const void* section, void* context);  // what its fields cannot say each by itself; null: nothing
+  std::uint16_t kind;
+  std::uint16_t at;  // in the settings
+  std::uint8_t row;
+  std::uint8_t times;  // an array of so many
+};
+struct BlockPlaces {
+  std::span<const EffectPlace> effects;
+  const std::uint8_t* effect_rows;
+  std::span<const SectionPlace> sections;
+  const std::uint8_t* section_rows;
+};
+// Sections whose fields have to agree are no larger than this.
+inline constexpr std::size_t kLargestChecked = 160;
 
 namespace detail {
-// Reads one effect into the model. Which one: looked for by its number.
-template <class Model>
-constexpr BlockVerdict add_entry(Model& into, std::uint16_t kind, std::span<const std::uint8_t> bytes) {
-  BlockVerdict v{BlockFault::missing_effect};
-  into.for_each([&]<class Effect>(auto&) {
-    if (Model::template number_of<Effect>() != kind) return;
-    using Coefficients = typename Effect::template Coefficients<typename Model::Numbers>;
-    Coefficients c{};
-    v = read_section(bytes, c);
-    if (v.good() && !into.template add<Effect>(c)) v = {BlockFault::too_often};
-  });
-  return v;
+constexpr BlockVerdict verdict_of(const RowVerdict& v) {
+  switch (v.fault) {
+    case RowFault::none:
+      return {};
+    case RowFault::length:
+      return {BlockFault::entry_of_wrong_length};
+    case RowFault::field:
+      break;
+  }
+  return {BlockFault::wrong_coefficient, -1, v.field, 0};
+}
+// What an entry is read into and what is kept while a block is read.
+struct Reading {
+  const BlockPlaces& places;
+  void* model;
+  void* settings;
+  void* context;
+  std::uint32_t seen = 0;
+  std::uint8_t often[effects::kLastId + 1]{};
+};
+template <bool kTables>
+BlockVerdict take_effect(Reading& r, std::uint32_t kind, std::span<const std::uint8_t> bytes) {
+  for (const EffectPlace& place : r.places.effects) {
+    if (place.number != kind) continue;
+    const std::size_t before = r.often[kind]++;
+    if (before == place.count) return {BlockFault::too_often};
+    std::byte* memory = nullptr;
+    if (r.model != nullptr) {
+      std::byte* const all = static_cast<std::byte*>(r.model) + place.at;
+      *all = static_cast<std::byte>(before + 1);
+      memory = all + place.start + place.stride * before;
+    }
+    return verdict_of(take_row<kTables>(r.places.effect_rows + place.row, bytes, memory));
+  }
+  return {BlockFault::missing_effect};
+}
+template <bool kTables>
+BlockVerdict take_section(Reading& r, std::uint32_t kind, std::span<const std::uint8_t> bytes) {
+  std::uint32_t bit = 1;
+  for (const SectionPlace& place : r.places.sections) {
+    if (place.kind != kind) {
+      bit <<= 1;
+      continue;
+    }
+    if ((r.seen & bit) != 0) return {BlockFault::too_often};
+    r.seen |= bit;
+    alignas(8) std::byte checked[kLargestChecked];
+    std::byte* memory = r.settings != nullptr     ? static_cast<std::byte*>(r.settings) + place.at
+                        : place.agrees != nullptr ? checked
+                                                  : nullptr;
+    const RowVerdict v = take_row<kTables>(r.places.section_rows + place.row, bytes, memory, place.times);
+    if (v.fault == RowFault::none && place.agrees != nullptr && !place.agrees(memory, r.context))
+      return {BlockFault::unlike_coefficients};
+    return verdict_of(v);
+  }
+  return {BlockFault::unknown_entry};
 }
 }  // namespace detail
 
-// Reads a block into a model at rest (emptied first) and `sections`. Checks all of it; where the verdict is not good,
-// what was read is not to be used. Notes are passed over.
-template <class Model, class Sections>
-constexpr BlockVerdict load(std::span<const std::uint8_t> block, BlockHeader& header, Model& into, Sections& sections) {
-  into.clear();
-  if (const BlockVerdict v = check_frame(block, header); !v.good()) return v;
-  BlockVerdict found;
-  std::int16_t at = 0;
-  for_each_entry(block, [&](std::uint16_t kind, std::span<const std::uint8_t> bytes) {
-    if (found.good() && kind < kFirstNote) {
-      found = kind < 0x100 ? detail::add_entry(into, kind, bytes) : sections.section(kind, bytes);
-      if (!found.good()) {
-        found.entry = at;
-        found.kind = kind;
-      }
+// The one validator. Looks at all of a block: start, checksum, header, each entry, each field. Notes are passed over.
+// With a model (DriveModel of the image that `places` is of, at rest) and settings, either may be null, it fills them
+// as well; where the verdict is not good, what was read is not to be used. `seen` says which sections there were, by
+// their place; `context` is handed to those that agree with something.
+template <bool kTables>
+BlockVerdict read_block(std::span<const std::uint8_t> block, const BlockPlaces& places, void* model, void* settings,
+                        std::uint32_t& seen, void* context) {
+  if (const BlockVerdict v = check_start(block); !v.good()) return v;
+  detail::Reading reading{places, model, settings, context};
+  if (model != nullptr)
+    for (const EffectPlace& place : places.effects) static_cast<std::byte*>(model)[place.at] = std::byte{0};
+  const std::uint8_t* at = block.data() + detail::kBlockStart + detail::kHeaderBytes;
+  const std::uint8_t* const end = block.data() + block.size() - detail::kChecksum;
+  const auto entries = static_cast<std::int16_t>(detail::word_at(block.data() + 4) >> 16);
+  for (std::int16_t entry = 0; entry < entries; ++entry) {
+    if (end - at < static_cast<std::ptrdiff_t>(detail::kEntryHeader)) return {BlockFault::entry_cut_off, entry};
+    const std::uint32_t kind = detail::word_at(at), length = detail::word_at(at + 4);
+    at += detail::kEntryHeader;
+    BlockVerdict v;
+    if (kind > 0xFFFF) {  // what has to be nought
+      v = {BlockFault::unknown_entry};
+    } else if (length > static_cast<std::size_t>(end - at)) {
+      v = {BlockFault::entry_cut_off};
+    } else if (kind <= effects::kLastId) {
+      v = detail::take_effect<kTables>(reading, kind, {at, length});
+    } else if (kind < 0x100) {
+      v = {BlockFault::missing_effect};
+    } else if (kind < kFirstNote) {
+      v = detail::take_section<kTables>(reading, kind, {at, length});
     }
-    ++at;
-  });
-  return found;
+    if (!v.good()) {
+      v.entry = entry;
+      v.kind = static_cast<std::uint16_t>(kind);
+      return v;
+    }
+    at += length;
+  }
+  if (at != end) return {BlockFault::wrong_length};
+  seen = reading.seen;
+  return {};
 }
-template <class Model>
-constexpr BlockVerdict load(std::span<const std::uint8_t> block, BlockHeader& header, Model& into) {
-  NoSections none;
-  return load(block, header, into, none);
+
+// Reads coefficients of a struct alone, as it stands in an entry.
+template <class T>
+RowVerdict read_row(std::span<const std::uint8_t> bytes, T& coefficients) {
+  static constexpr Row kRow = row_of<T>();
+  static_assert(size_in_memory(kRow) == sizeof(T));
+  return take_row(kRow.parts.data(), bytes, reinterpret_cast<std::byte*>(&coefficients));
 }
 
 // Writes a block; host only in use, but of integers all the same. Entries are added between begin() and end().
@@ -319,13 +380,24 @@ class BlockWriter {
       for (const char c : *name) writer_.put(static_cast<std::uint8_t>(c));
     writer_.put(h.axis);
     writer_.put(h.encoder_counts);
-    Encoding<Bases>::put(writer_, h.bases);
-    Encoding<Limits>::put(writer_, h.limits);
+    for_each_member(h.bases, [&]<class M>(const M& member) {
+      if constexpr (std::is_same_v<M, Number>) {
+        put(writer_, member);
+      } else {
+        for (const Number& one : member) put(writer_, one);
+      }
+    });
+    for_each_member(h.limits, [&](const fixed::Value& limit) { writer_.put(limit.raw); });
   }
-  // Coefficients of an effect or of a section.
+  // Coefficients of an effect, or another struct of numbers.
   template <class T>
-  constexpr void add(std::uint16_t kind, const T& coefficients) {
-    detail::put_entry(writer_, kind, [&](Writer& w) { Encoding<T>::put(w, coefficients); });
+  void add(std::uint16_t kind, const T& coefficients) {
+    static constexpr Row kRow = row_of<T>();
+    static_assert(size_in_memory(kRow) == sizeof(T));
+    add_row(kind, kRow.parts.data(), &coefficients);
+  }
+  void add_row(std::uint16_t kind, const std::uint8_t* row, const void* memory, int times = 1) {
+    detail::put_entry(writer_, kind, [&](Writer& w) { put_row(w, row, static_cast<const std::byte*>(memory), times); });
     ++entries_;
   }
   constexpr void add_bytes(std::uint16_t kind, std::span<const std::uint8_t> bytes) {

@@ -5,6 +5,7 @@
 #include <array>
 #include <cstddef>
 #include <cstdint>
+#include <cstring>
 #include <tuple>
 #include <type_traits>
 #include <utility>
@@ -106,6 +107,15 @@ struct AllPlaces<N, Image, std::index_sequence<Ids...>> : PlaceAt<Ids, N, Image>
     }
   }
 };
+// Rest is nought in every state of every effect. Said so, it takes a processor a call and not a page of stores.
+template <class States>
+constexpr void set_to_rest(States& states) {
+  if (std::is_constant_evaluated() || !std::is_trivially_copyable_v<States>) {
+    states = {};
+  } else {
+    std::memset(static_cast<void*>(&states), 0, sizeof(states));
+  }
+}
 struct Nothing {};
 // T where `kKept`, else nothing.
 template <bool kKept, class T>
@@ -123,11 +133,17 @@ template <class N, class Image = EveryEffect>
 class DriveModel {
  public:
   using Numbers = N;
+  static constexpr bool kTables = Image::kTables;
   // The number of an effect in parameter blocks.
   template <class Effect>
   static constexpr std::size_t number_of() {
     return id_of<Effect>();
   }
+  // For who fills places from bytes (block_places.hpp): the memory of all places, and that of an effect in it.
+  using Memory = detail::AllPlaces<N, Image, std::make_index_sequence<effects::kLastId + 1>>;
+  template <std::size_t Id>
+  using PlaceOf = detail::PlaceAt<Id, N, Image>;
+  void* memory() { return &places_; }
   // Adds an effect at rest. Returns false where the model already has it as often as it can.
   template <class Effect>
   constexpr bool add(const typename Effect::template Coefficients<N>& coefficients) {
@@ -157,7 +173,9 @@ class DriveModel {
   }
   // The state of rest: as after add().
   constexpr void reset() {
-    places_.for_each([]<class Effect>(auto& places) { places.states = {}; });
+    places_.for_each([]<class Effect>(auto& places) {
+      if constexpr (!std::is_empty_v<typename Effect::template State<N>>) detail::set_to_rest(places.states);
+    });
     started_ = false;
   }
 
@@ -267,12 +285,12 @@ class DriveModel {
     });
   }
 
-  using All = detail::AllPlaces<N, Image, std::make_index_sequence<effects::kLastId + 1>>;
+  using All = Memory;
   // Of the tick before, what effects with memory may ask for: angle, torsion, magnitude of the torque, current.
   static constexpr unsigned kRemembered = All::remembered();
   template <unsigned kSignal, class T>
   using Kept = typename detail::Slot<(kRemembered & kSignal) != 0, T>::Type;
-  struct Memory {
+  struct Remembered {
     [[no_unique_address]] Kept<effects::kMotorAngle, typename N::Angle> angle{};
     [[no_unique_address]] Kept<effects::kTorsion, typename N::Value> torsion{};
     [[no_unique_address]] Kept<effects::kTorque, typename N::Value> torque_magnitude{};
@@ -300,7 +318,7 @@ class DriveModel {
   }
 
   All places_;
-  Memory memory_{};
+  Remembered memory_{};
   bool started_ = false;
 };
 

@@ -31,7 +31,7 @@ TEST(PackCommand, MakesABlockThatUnpackTurnsIntoTheModelAgain) {
   const Shell shell;
   shell.write("m.toml", kModel);
   const nlohmann::json packed =
-      shell.json("flexspline pack --model m.toml --out drive.block --drive arm-1 --encoder-counts 4096");
+      shell.json("flexspline pack --model m.toml --out drive.block --drive-name arm-1 --encoder-counts 4096");
   EXPECT_EQ(packed["format"], "flexspline-pack/1");
   expect_fields(packed, {"bytes", "sha256", "max_error_nm", "max_error_share_of_rated", "proof"});
   EXPECT_EQ(packed["bytes"], shell.file("drive.block").size());
@@ -47,8 +47,38 @@ TEST(PackCommand, MakesABlockThatUnpackTurnsIntoTheModelAgain) {
   EXPECT_EQ(unpacked["encoder_counts"], 4096);
   EXPECT_EQ(unpacked["coefficients_follow_from_parameters"], true);
   EXPECT_EQ(unpacked["parameters"][0]["value"], 3.6123456789e-4);
-  shell.must("flexspline pack --model again.toml --out again.block --drive arm-1 --encoder-counts 4096");
+  shell.must("flexspline pack --model again.toml --out again.block --drive-name arm-1 --encoder-counts 4096");
   EXPECT_EQ(shell.file("again.block"), shell.file("drive.block"));
+}
+
+TEST(PackCommand, WithSettingsMakesABlockThatADriveTakesAndWithoutSaysThatNoneDoes) {
+  const Shell shell;
+  shell.write("m.toml", kModel);
+  shell.must("flexspline pack --model m.toml --out model.block");
+  const nlohmann::json model = shell.json("flexspline unpack model.block");
+  EXPECT_TRUE(model["settings"].is_null());
+  EXPECT_TRUE(contains(model["refused_by_a_drive"].get<std::string>(), "settings of the drive")) << model;
+  const Answer refused = shell.run("flexspline-hil drive --seconds 0.1 --block model.block");
+  EXPECT_EQ(refused.code, 2);
+  EXPECT_TRUE(contains(refused.err, "--drive")) << refused.err;
+
+  shell.write("d.toml",
+              "format = \"flexspline-drive/1\"\n[motor]\ninertia_kg_m2 = 1.04e-4\n[motor_encoder]\ncounts = 16384\n"
+              "[output_encoder]\ncounts = 262144\n[limits]\ncurrent_a = 3.5\n[torque_sensor]\n");
+  shell.must("flexspline pack --model m.toml --drive d.toml --tick-hz 20000 --out drive.block");
+  const nlohmann::json drive = shell.json("flexspline unpack drive.block");
+  EXPECT_TRUE(drive["refused_by_a_drive"].is_null());
+  for (const nlohmann::json& q : drive["settings"])
+    if (q["name"] == "current_limit") {
+      EXPECT_NEAR(q["value"].get<double>(), 3.5, 1e-6);
+    }
+  const nlohmann::json run = shell.json("flexspline-hil drive --seconds 1 --scenario sine --block drive.block");
+  EXPECT_TRUE(run["runs"][1]["fault"].is_null());
+
+  shell.write("d.toml", "format = \"flexspline-drive/1\"\n[motor]\ninertia = 1e-4\n");
+  const Answer wrong = shell.run("flexspline pack --model m.toml --drive d.toml --encoder-counts 4096 --out no.block");
+  EXPECT_EQ(wrong.code, 2);
+  EXPECT_TRUE(contains(wrong.err, "d.toml")) << wrong.err;
 }
 
 TEST(PackCommand, RefusesWhatDoesNotFitAndWritesNothing) {

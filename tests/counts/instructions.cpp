@@ -27,7 +27,7 @@ constexpr std::int32_t kOne = std::int32_t{1} << fixed::kValueBits;
 template <class T>
 void read(std::uint16_t kind, T& coefficients) {
   model::for_each_entry(kBlock, [&](std::uint16_t found, std::span<const std::uint8_t> bytes) {
-    if (found == kind && !model::read_section(bytes, coefficients).good()) bare::stop(4);
+    if (found == kind && model::read_row(bytes, coefficients).fault != model::RowFault::none) bare::stop(4);
   });
 }
 

@@ -15,7 +15,7 @@ template <class T>
 T read(std::uint16_t kind) {
   T coefficients{};
   model::for_each_entry(kBlock, [&](std::uint16_t found, std::span<const std::uint8_t> bytes) {
-    if (found == kind && !model::read_section(bytes, coefficients).good()) bare::stop(4);
+    if (found == kind && model::read_row(bytes, coefficients).fault != model::RowFault::none) bare::stop(4);
   });
   return coefficients;
 }
@@ -40,9 +40,8 @@ struct FromBlock {
 
 int main() {
   using namespace flexspline;
-  model::BlockHeader header;
-  if (const auto verdict = model::check_frame(kBlock, header); !verdict.good()) {
-    bare::print(model::text_of(verdict.fault));
+  if (!model::check_start(kBlock).good()) {
+    bare::print("no good block");
     return 4;
   }
   same_bits::run<FromBlock>(200, 2'000, [](std::string_view name, std::uint64_t hash) {

@@ -39,7 +39,7 @@ inline control::DriveSetup<double> demo_setup() {
   return board::setup_of(demo_drive());
 }
 inline Block demo_block(const control::DriveSetup<double>& setup = demo_setup()) {
-  return Block(board::parameters_of(demo_drive(), setup));
+  return Block(board::parameters_of(demo_drive(), setup), demo_constants());
 }
 inline double real(fixed::Value x) {
   return std::ldexp(x.raw, -fixed::kValueBits);

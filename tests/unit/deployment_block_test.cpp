@@ -12,8 +12,9 @@
 #include "host/deployment/bases.hpp"
 #include "host/deployment/pack.hpp"
 #include "host/deployment/sha256.hpp"
+#include "shared/control/drive_block.hpp"
 #include "shared/fixed/system.hpp"
-#include "shared/model/block.hpp"
+#include "shared/model/block_texts.hpp"
 
 namespace flexspline::tests {
 namespace {
@@ -64,7 +65,8 @@ struct Read {
 };
 Read read(const std::vector<std::uint8_t>& bytes) {
   Read r;
-  r.verdict = model::load(std::span<const std::uint8_t>(bytes), r.header, *r.drive);
+  r.verdict = control::load(bytes, *r.drive);
+  if (r.verdict.good()) r.header = model::header_of(bytes);
   return r;
 }
 // With a checksum that fits again.
@@ -267,8 +269,7 @@ TEST_F(Block, IsForTheEffectsOfItsImage) {
   const auto bytes = deployment::pack(drive_with({"inertia", "viscous_friction"}), options).bytes;
   using Small = model::DriveModel<Fixed, model::TheseEffects<1>>;
   Small small;
-  model::BlockHeader header;
-  EXPECT_EQ(model::load(std::span<const std::uint8_t>(bytes), header, small).fault, BlockFault::missing_effect);
+  EXPECT_EQ(control::load(bytes, small).fault, BlockFault::missing_effect);
 }
 
 TEST(Pack, SaysWhyAModelDoesNotFit) {

@@ -26,7 +26,7 @@ TEST(Modes, WithoutParametersADriveIsIdleAndCannotBeArmed) {
   EXPECT_EQ(drive.status().mode, Mode::idle);
   EXPECT_FALSE(drive.status().has_parameters);
   EXPECT_EQ(drive.command(arm(Mode::velocity)).refusal, Refusal::no_parameters);
-  EXPECT_EQ(drive.commit(demo_block()), firmware::BlockFinding::good);
+  EXPECT_EQ(drive.commit(demo_block()), firmware::BlockFinding::none);
   drive.run(2);
   EXPECT_EQ(drive.command(arm(Mode::velocity)).refusal, Refusal::none);
   EXPECT_EQ(drive.status().mode, Mode::velocity);
@@ -203,7 +203,8 @@ TEST(Modes, WithoutAnEncoderAtTheOutputItIsEstimatedCloserThanAStiffGearWouldBe)
   plant::without(drive_of, "structural_damping");
   const firmware::TelemetrySetup channels{
       .every = 1, .count = 3, .channels = {Channel::output_turns, Channel::output_fraction, Channel::torsion}};
-  VirtualDrive drive({.drive = drive_of, .seed = 1}, Block(board::parameters_of(drive_of, setup)), channels);
+  VirtualDrive drive({.drive = drive_of, .seed = 1},
+                     Block(board::parameters_of(drive_of, setup), board::constants_of(drive_of)), channels);
   drive.keep_frames(true);
   drive.run(100);
   Command c = arm_velocity(60.0);

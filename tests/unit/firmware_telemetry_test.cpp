@@ -8,6 +8,7 @@
 #include <span>
 #include <string>
 
+#include "shared/model/block_texts.hpp"
 #include "tests/support/virtual_drive.hpp"
 
 namespace flexspline::tests {
@@ -187,7 +188,7 @@ double largest_current(VirtualDrive& drive) {
 TEST(ParameterBlock, OfAnIdleDriveIsReplacedAsAWhole) {
   const auto drive = idle_drive();
   EXPECT_NEAR(largest_current(*drive), 3.0, 1e-3);
-  EXPECT_EQ(drive->commit(demo_block(other_setup())), BlockFinding::good);
+  EXPECT_EQ(drive->commit(demo_block(other_setup())), BlockFinding::none);
   drive->run(2);
   EXPECT_NEAR(largest_current(*drive), 1.0, 1e-3);
 }
@@ -208,32 +209,32 @@ TEST(ParameterBlock, ThatIsBadIsRefusedWithItsReasonAndTheOldOneStays) {
   const auto drive = idle_drive();
   const Block good = demo_block(other_setup());
   const auto expect_refused = [&](const Block& block, BlockFinding finding) {
-    EXPECT_EQ(drive->commit(block), finding) << firmware::reason_of(finding);
-    EXPECT_FALSE(firmware::reason_of(finding).empty());
+    EXPECT_EQ(drive->commit(block), finding) << model::text_of(finding);
+    EXPECT_STRNE(model::text_of(finding), "unknown fault");
     EXPECT_TRUE(drive->status().has_parameters);
     EXPECT_EQ(drive->status().mode, Mode::idle);
   };
   Block cut = good;
   cut.cut(1000);
-  expect_refused(cut, BlockFinding::short_block);
+  expect_refused(cut, BlockFinding::wrong_length);
   std::mt19937_64 random(1);
   for (int k = 0; k < 200; ++k) {
     Block flipped = good;
-    const std::size_t bit = random() % (firmware::kBlockBytes * 8);
+    const std::size_t bit = random() % (good.bytes().size() * 8);
     flipped.bytes()[bit / 8] ^= std::byte{static_cast<unsigned char>(1U << (bit % 8))};
     const BlockFinding finding = drive->commit(flipped);
-    EXPECT_NE(finding, BlockFinding::good) << "bit " << bit;
+    EXPECT_NE(finding, BlockFinding::none) << "bit " << bit;
   }
   // Well-formed, but not for this drive.
   auto parameters = board::parameters_of(demo_drive(), other_setup());
   parameters.tick_hz = 16'000;
-  expect_refused(Block(parameters), BlockFinding::other_tick_rate);
+  expect_refused(Block(parameters, demo_constants()), BlockFinding::other_tick_rate);
   parameters = board::parameters_of(demo_drive(), other_setup());
   parameters.motor_encoder.counts = 0;
-  expect_refused(Block(parameters), BlockFinding::encoder);
+  expect_refused(Block(parameters, demo_constants()), BlockFinding::wrong_coefficient);
   parameters = board::parameters_of(demo_drive(), other_setup());
   parameters.loops.torque_limit = {};
-  expect_refused(Block(parameters), BlockFinding::limits);
+  expect_refused(Block(parameters, demo_constants()), BlockFinding::wrong_coefficient);
   EXPECT_NEAR(largest_current(*drive), 3.0, 1e-3);
 }
 
@@ -243,7 +244,7 @@ TEST(ParameterBlock, ThatWasDamagedInFlashLeavesADriveThatCannotBeArmed) {
   VirtualDrive drive({.drive = demo_drive()}, block);
   drive.run(100);
   EXPECT_TRUE(drive.last().has_finding);
-  EXPECT_EQ(drive.last().finding, BlockFinding::damaged);
+  EXPECT_EQ(drive.last().finding, BlockFinding::wrong_checksum);
   EXPECT_EQ(drive.status().mode, Mode::idle);
   EXPECT_EQ(drive.command(arm_current(1.0)).refusal, Refusal::no_parameters);
 }

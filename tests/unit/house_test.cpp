@@ -38,7 +38,7 @@ const std::map<std::string, std::set<std::string>, std::less<>> kMayInclude = {
 
 // Headers that need neither heap nor floating point nor an operating system.
 const std::set<std::string, std::less<>> kFreestandingHeaders = {
-    "array",  "bit",  "climits",     "compare", "concepts",    "cstddef", "cstdint", "initializer_list",
+    "array",  "bit",  "climits",     "compare", "concepts",    "cstddef", "cstdint", "cstring", "initializer_list",
     "limits", "span", "string_view", "tuple",   "type_traits", "utility", "version"};
 
 // Each costs many seconds a file under sanitizers, so each stands in one file of the folders that need it.

@@ -1,0 +1,58 @@
+// What is wrong with a block, for people. No image of a drive holds these.
+#pragma once
+
+#include "shared/model/block.hpp"
+
+namespace flexspline::model {
+
+constexpr const char* text_of(BlockFault fault) {
+  switch (fault) {
+    case BlockFault::none:
+      return "no fault";
+    case BlockFault::too_short:
+      return "it ends before its header does";
+    case BlockFault::too_long:
+      return "it is longer than any block may be";
+    case BlockFault::wrong_magic:
+      return "it does not begin as a parameter block does";
+    case BlockFault::unknown_version:
+      return "its version is not known here";
+    case BlockFault::wrong_length:
+      return "its length is not the one that it states";
+    case BlockFault::wrong_checksum:
+      return "its checksum does not fit its bytes";
+    case BlockFault::wrong_name:
+      return "a name holds what is no text";
+    case BlockFault::wrong_base:
+      return "a base is not a positive number";
+    case BlockFault::wrong_limit:
+      return "a limit is not between nought and two bases";
+    case BlockFault::wrong_header:
+      return "a field of the header holds what it may not";
+    case BlockFault::too_many_entries:
+      return "it has more entries than a drive takes";
+    case BlockFault::entry_cut_off:
+      return "an entry goes beyond the end";
+    case BlockFault::entry_of_wrong_length:
+      return "an entry is longer or shorter than its coefficients";
+    case BlockFault::unknown_entry:
+      return "an entry is of no known kind";
+    case BlockFault::missing_effect:
+      return "an effect is not in this firmware";
+    case BlockFault::too_often:
+      return "an effect or a section stands more often than the drive has places";
+    case BlockFault::wrong_coefficient:
+      return "a coefficient is outside the bounds of its format";
+    case BlockFault::unlike_coefficients:
+      return "coefficients of an entry contradict each other";
+    case BlockFault::missing_section:
+      return "it lacks a section that a drive needs, as a block packed without settings of the drive does";
+    case BlockFault::other_tick_rate:
+      return "it was made for another tick rate";
+    case BlockFault::armed:
+      return "parameters cannot change while the drive is armed; disarm it first";
+  }
+  return "unknown fault";
+}
+
+}  // namespace flexspline::model

@@ -1,0 +1,167 @@
+// Settings of a drive: what follows from the ratings, what a file says, and where it is wrong.
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <numbers>
+#include <string>
+
+#include "host/catalogue/constants.hpp"
+#include "host/deployment/bases.hpp"
+#include "host/deployment/drive_settings.hpp"
+#include "host/deployment/pack.hpp"
+#include "shared/control/drive_block.hpp"
+
+namespace flexspline::tests {
+namespace {
+
+using deployment::PackError;
+
+constexpr double kTurn = 2.0 * std::numbers::pi;
+
+model::Model some_model() {
+  model::Model m;
+  m.name = "some";
+  m.drive.gear_ratio.value = 100.0;
+  m.drive.torque_constant_nm_a.value = 0.05;
+  m.drive.rated_current_a.value = 2.0;
+  m.drive.rated_velocity_rad_s.value = 200.0;
+  m.drive.rated_torque_nm.value = 40.0;
+  for (const auto& [type, value] : {std::pair{"inertia", 1e-4},
+                                    {"viscous_friction", 3.6e-4},
+                                    {"linear_stiffness", 6300.0},
+                                    {"output_inertia", 0.06}}) {
+    model::Effect effect = catalogue::blank_effect(catalogue::get(type), m.drive.axis);
+    effect.id = type;
+    effect.parameters[0].value = value;
+    m.effects.push_back(effect);
+  }
+  return m;
+}
+control::DriveSetup<double> parsed(const std::string& tables, const model::Model& m = some_model()) {
+  const auto d = deployment::bases_of(m, 1.0 / 20'000.0, 1.0);
+  return deployment::parse_drive_setup("format = \"flexspline-drive/1\"\n" + tables, "d.toml", m, d);
+}
+std::string error_of(const std::string& tables, const model::Model& m = some_model()) {
+  try {
+    parsed(tables, m);
+  } catch (const PackError& error) {
+    return error.what();
+  }
+  return "none";
+}
+const std::string kCounts = "[motor_encoder]\ncounts = 4096\n";
+
+TEST(DriveSettings, FollowFromTheRatingsWhereTheFileDoesNotStateThem) {
+  const auto s = parsed(kCounts);
+  EXPECT_EQ(s.tick_hz, 20'000u);
+  EXPECT_EQ(s.motor_counts, 4096u);
+  EXPECT_EQ(s.output_counts, 0u);
+  EXPECT_FALSE(s.has_torque_sensor);
+  // A first-order velocity loop of 50 Hz around an inertia has this gain; position closes at 10 Hz around it.
+  EXPECT_NEAR(s.loops.velocity_gain, 1e-4 * kTurn * 50.0, 1e-12);
+  EXPECT_NEAR(s.loops.position_gain, kTurn * 10.0, 1e-12);
+  EXPECT_NEAR(s.loops.integral_gain / s.loops.velocity_gain, kTurn * 10.0, 1e-9);
+  EXPECT_NEAR(s.loops.current_limit, 2.0, 1e-6);
+  EXPECT_NEAR(s.loops.torque_limit, 0.1, 1e-6);
+  EXPECT_NEAR(s.trajectory.acceleration_limit, 0.5 * 0.1 / 1e-4, 0.1);
+  EXPECT_NEAR(s.feedforward.stiffness, 6300.0, 0.1);
+  EXPECT_NEAR(s.torsion.output_inertia, 0.06, 1e-12);
+}
+
+TEST(DriveSettings, AreThoseOfTheFile) {
+  const auto s = parsed(
+      "[motor_encoder]\ncounts = 8192\ncorner_hz = 80\n[output_encoder]\ncounts = 65536\n[velocity_loop]\n"
+      "bandwidth_hz = 30\nintegral_nm_rad = 0\n[position_loop]\nbandwidth_hz = 4\n[limits]\ncurrent_a = 1.5\n"
+      "velocity_rad_s = 100\nlowest_rad = -6.283185307179586\nhighest_rad = 12.566370614359172\n[torque_sensor]\n"
+      "full_scale_nm = 90\nripple_order = 4\n[faults]\nhost_s = 0.5\n[excitation]\nshape = \"composite\"\n"
+      "amplitude = 0.05\nduration_s = 2\n");
+  EXPECT_NEAR(s.motor_corner, kTurn * 80.0, 1e-9);
+  EXPECT_EQ(s.output_counts, 65536u);
+  EXPECT_NEAR(s.loops.velocity_gain, 1e-4 * kTurn * 30.0, 1e-12);
+  EXPECT_EQ(s.loops.integral_gain, 0.0);
+  EXPECT_NEAR(s.loops.position_gain, kTurn * 4.0, 1e-12);
+  EXPECT_EQ(s.loops.current_limit, 1.5);
+  EXPECT_EQ(s.trajectory.velocity_limit, 100.0);
+  // A turn is 2^32.
+  EXPECT_NEAR(static_cast<double>(s.trajectory.lowest), -0x1p32, 16.0);
+  EXPECT_NEAR(static_cast<double>(s.trajectory.highest), 0x1p33, 32.0);
+  EXPECT_TRUE(s.has_torque_sensor);
+  EXPECT_EQ(s.torque.full_scale, 90.0);
+  EXPECT_EQ(s.ripple.order, 4.0);
+  EXPECT_EQ(s.safety.host_s, 0.5);
+  EXPECT_EQ(s.excitation.line_count, 3u);
+  EXPECT_EQ(s.excitation.ticks, 40'000u);
+}
+
+TEST(DriveSettings, ThatAreWrongAreRefusedWithTheirPlace) {
+  const auto expect = [](const std::string& error, std::initializer_list<const char*> parts) {
+    for (const char* part : parts) EXPECT_NE(error.find(part), std::string::npos) << error;
+  };
+  EXPECT_EQ(error_of(kCounts), "none");
+  expect(error_of(""), {"d.toml", "counts", "[motor_encoder]"});
+  expect(error_of(kCounts + "[limits]\ncurrent_a = 4.5\n"), {"d.toml:5:", "[limits] current_a is 4.5", "at most 4"});
+  expect(error_of(kCounts + "[limits]\ncurrent_a = 0\n"), {"d.toml:5:", "above nought"});
+  expect(error_of(kCounts + "[limits]\ncurrent_a = nan\n"), {"d.toml:5:"});
+  expect(error_of(kCounts + "[limits]\ncurrent_a = \"1\"\n"), {"d.toml:5:", "has to be a number", "text"});
+  expect(error_of(kCounts + "[limits]\ncurrent = 1\n"), {"d.toml:5:", "[limits] current is no setting", "current_a"});
+  expect(error_of(kCounts + "[limit]\ncurrent_a = 1\n"), {"d.toml:4:", "[limit] is no table", "limits"});
+  expect(error_of("limits = 3\n" + kCounts), {"d.toml:2:", "limits has to be a table"});
+  expect(error_of("[motor_encoder]\ncounts = 4096.5\n"), {"d.toml:3:", "no whole number"});
+  expect(error_of("[motor_encoder]\ncounts = 3\n"), {"d.toml:3:", "between 4 and"});
+  expect(error_of(kCounts + "[output_encoder]\n"), {"[output_encoder] needs counts"});
+  expect(error_of(kCounts + "[excitation]\nshape = \"round\"\n"), {"d.toml:5:", "round", "multi_sine"});
+  expect(error_of("[motor_encoder\n"), {"d.toml:2:"});
+  model::Model m = some_model();
+  m.effects.erase(m.effects.begin());
+  expect(error_of(kCounts, m), {"inertia_kg_m2", "[motor]"});
+  m = some_model();
+  m.effects.pop_back();
+  expect(error_of(kCounts, m), {"inertia_kg_m2", "[load]"});
+  EXPECT_EQ(error_of(kCounts + "[output_encoder]\ncounts = 4096\n", m), "none");
+  try {
+    deployment::parse_drive_setup("format = \"flexspline-model/1\"\n", "d.toml", m, deployment::bases_of(m, 5e-5, 1.0));
+    ADD_FAILURE();
+  } catch (const PackError& error) {
+    expect(error.what(), {"d.toml:1:", "flexspline-drive/1"});
+  }
+}
+
+TEST(DriveSettings, ThatContradictEachOtherDoNotFit) {
+  const auto d = deployment::bases_of(some_model(), 1.0 / 20'000.0, 1.0);
+  const auto s = parsed(kCounts + "[limits]\nvelocity_rad_s = 150\noverspeed_rad_s = 100\n");
+  EXPECT_THROW(deployment::settings_of(s, d, "d.toml"), PackError);
+}
+
+// What is packed is what a drive takes, and unpack says it again.
+TEST(DriveSettings, ComeBackFromABlock) {
+  deployment::PackOptions options;
+  options.samples = 300;
+  options.tick_hz = 20'000;
+  for (const char* more :
+       {"", "[output_encoder]\ncounts = 65536\n[torque_sensor]\n[excitation]\nshape = \"multi_sine\"\n"}) {
+    options.settings = "format = \"flexspline-drive/1\"\n" + kCounts + more;
+    const auto packed = deployment::pack(some_model(), options);
+    const auto verdict = control::check_for_drive(packed.bytes, 20'000);
+    EXPECT_TRUE(verdict.good()) << static_cast<int>(verdict.fault) << " " << verdict.kind << " " << verdict.field;
+    const auto unpacked = deployment::unpack(packed.bytes);
+    EXPECT_TRUE(unpacked.refusal.empty());
+    EXPECT_EQ(unpacked.header.encoder_counts, 4096u);
+    const auto value = [&](const std::string& name) {
+      for (const auto& q : unpacked.settings)
+        if (q.name == name) return q.value;
+      return std::nan("");
+    };
+    EXPECT_EQ(value("tick_rate"), 20'000.0);
+    EXPECT_NEAR(value("velocity_gain"), 1e-4 * kTurn * 50.0, 1e-8);
+    EXPECT_NEAR(value("position_gain"), kTurn * 10.0, 1e-5);
+    EXPECT_NEAR(value("integral_gain"), 1e-4 * kTurn * 50.0 * kTurn * 10.0, 1e-6);
+    EXPECT_NEAR(value("current_limit"), 2.0, 1e-6);
+    EXPECT_NEAR(value("velocity_limit"), 200.0, 1e-4);
+    EXPECT_NEAR(value("acceleration_limit"), 500.0, 0.1);
+    EXPECT_NEAR(value("fault_host"), 0.1, 1e-9);
+    EXPECT_NEAR(value("residual_map_largest"), 0.025, 1e-6);
+  }
+}
+
+}  // namespace
+}  // namespace flexspline::tests
