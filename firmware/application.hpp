@@ -47,6 +47,8 @@ class Application {
     lend_or_take_back();
     Estimate estimate;
     if (has_parameters()) estimate = control_.observe(readings);
+    if (status_.maps_residual && control_.has_residual())
+      residual_map_.add(parameters_.residual_map, estimate.velocity, estimate.angle, control_.residual());
     take_command(estimate);
     judge(readings, estimate);
     watchdog_.report(Part::safety);
@@ -83,7 +85,8 @@ class Application {
     answer_waits_.store(false, std::memory_order_release);
     return answer;
   }
-  // Before the first tick: takes the block that lies in flash, at once. Where it is not good the drive has no parameters.
+  // Before the first tick: takes the block that lies in flash, at once. Where it is not good the drive has no
+  // parameters.
   void boot_with(std::span<const std::byte> block) {
     const BlockFinding finding = check_block(block, B::kTickHz);
     if (finding == BlockFinding::none) {
@@ -110,6 +113,15 @@ class Application {
     edit(parameters_.excitation, parameters_.excites_torque);
     return true;
   }
+  // A bin of the residual map, for background work. False: there is no bin of this number.
+  bool map_bin(std::uint16_t number, MapBin& bin) const {
+    using Map = control::ResidualMap;
+    if (number >= Map::kVelocityBins * Map::kAngleBins) return false;
+    Map::Bin found;
+    if (!residual_map_.read(number / Map::kAngleBins, number % Map::kAngleBins, found)) return false;
+    bin = {number, static_cast<std::uint16_t>(found.count), found.sum, found.squares};
+    return true;
+  }
 
   Ring& telemetry() { return telemetry_; }
   const Status& status() const { return status_; }
@@ -127,6 +139,7 @@ class Application {
     const Owner owner = owner_.load(std::memory_order_acquire);
     if (owner == Owner::wanted && !is_armed(status_.mode)) {
       status_.has_parameters = false;
+      status_.maps_residual = false;  // in other bases the bins would mean something else
       owner_.store(Owner::background, std::memory_order_release);
     } else if (owner == Owner::tick && new_parameters_) {
       new_parameters_ = false;
@@ -191,6 +204,15 @@ class Application {
         if (status_.mode != Mode::fault) return Refusal::none;
         status_.mode = Mode::boot;
         boot_ticks_ = 0;
+        return Refusal::none;
+      case Command::Kind::start_map:
+      case Command::Kind::stop_map:
+        if (!has_parameters()) return Refusal::no_parameters;
+        status_.maps_residual = command.kind == Command::Kind::start_map;
+        return Refusal::none;
+      case Command::Kind::clear_map:
+        if (is_armed(status_.mode)) return Refusal::armed;
+        residual_map_.reset();
         return Refusal::none;
     }
     return Refusal::no_mode;
@@ -318,6 +340,7 @@ class Application {
   Safety safety_{};
   Watchdog watchdog_{};
   Ring telemetry_{};
+  control::ResidualMap residual_map_{};
   Parameters parameters_{};
   Control control_{};
   std::uint32_t boot_ticks_ = 0;

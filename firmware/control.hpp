@@ -68,6 +68,7 @@ class Control {
     loops_ = {};
     excitation_ = {};
     nominal_ = {};
+    compensates_ = false;
   }
 
   Estimate observe(const Readings& readings) {
@@ -125,6 +126,11 @@ class Control {
     streams_ = demand.stream;
   }
 
+  // What the model of the tick before leaves over of the motor's torque, where there was one: off() and other modes
+  // have none.
+  bool has_residual() const { return compensates_; }
+  N::Value residual() const { return disturbance_.residual; }
+
   Output update(const Demand& demand, const Estimate& e) {
     Output out;
     control::Loops::Command<N> command;
@@ -150,7 +156,8 @@ class Control {
         return {};
     }
     nominal_ = {};
-    if (demand.compensate && uses_trajectory(demand.mode)) compensate(e, out, command);
+    compensates_ = demand.compensate && uses_trajectory(demand.mode);
+    if (compensates_) compensate(e, out, command);
     const auto loops = control::Loops::update<N>(loops_, p_->loops, command, e.angle, e.velocity);
     out.torque = loops.torque;
     out.current = loops.current;
@@ -250,6 +257,7 @@ class Control {
   Nominal nominal_{};
   Mode last_mode_ = Mode::boot;
   bool streams_ = false;
+  bool compensates_ = false;
 };
 
 }  // namespace flexspline::firmware

@@ -35,6 +35,9 @@ struct Command {
     set,          // a new set point for `mode`, which has to be the present one
     disarm,       // to idle, amplifier off at once
     clear_fault,  // fault to boot, and to idle where the cause is gone
+    start_map,    // residuals count from here on, in any mode in which the model's torque is fed forward
+    stop_map,
+    clear_map,  // while the drive is not armed, as it takes as long as a tick
   };
   Kind kind = Kind::heartbeat;
   Mode mode = Mode::boot;
@@ -70,7 +73,17 @@ struct Status {
   std::uint32_t tick = 0;
   Mode mode = Mode::boot;
   bool has_parameters = false;
+  bool maps_residual = false;
   FaultRecord fault{};  // the one that the drive stands in, or the last one
+};
+
+// A bin of the residual map, which is asked for by its number (Application::map_bin): velocity bin times 32 and the bin
+// of the motor's angle. Sums count in units of the map (shared/control/residual_map.hpp): 511 are the largest residual.
+struct MapBin {
+  std::uint16_t number = 0;
+  std::uint16_t count = 0;  // of ticks; halved with both sums where it is full
+  std::int32_t sum = 0;
+  std::uint32_t squares = 0;
 };
 
 }  // namespace flexspline::firmware

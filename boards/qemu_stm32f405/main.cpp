@@ -52,7 +52,7 @@ class QemuBoard {
   }
   static std::uint32_t instructions() { return hardware(kTimer2Count); }
 
-  LockStepDown down{};
+  LockStepDown down{.reads_frame = false};
   Actuation actuation{};
 };
 

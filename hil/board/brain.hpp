@@ -67,6 +67,8 @@ class SoftwareBrain : public Brain {
   void start(const Block& block, const firmware::TelemetrySetup& telemetry, firmware::ResetCause cause) override;
   firmware::LockStepUp tick(const firmware::LockStepDown& down) override;
   void offer(std::span<const std::byte> block) override { application_->offer(block); }
+  /// A bin of the residual map, as a message asks for it.
+  bool map_bin(std::uint16_t number, firmware::MapBin& bin) const { return application_->map_bin(number, bin); }
 
   /// The control tick, or background work, does not run any more.
   void hang_tick(bool hangs) { tick_hangs_ = hangs; }

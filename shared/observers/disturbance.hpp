@@ -29,6 +29,7 @@ struct DisturbanceObserver {
   template <class N>
   struct State {
     typename N::State disturbance{};
+    typename N::Value residual{};  // r of the last tick, limited
   };
 
   // Host only.
@@ -49,8 +50,8 @@ struct DisturbanceObserver {
     typename N::Sum left = N::sum(applied);
     left += N::sum(-modelled);
     left += c.inertia * -acceleration;
-    const auto seen = N::widen(N::clamp(N::narrow(left), c.limit));
-    s.disturbance = s.disturbance + N::times(seen - s.disturbance, c.share);
+    s.residual = N::clamp(N::narrow(left), c.limit);
+    s.disturbance = s.disturbance + N::times(N::widen(s.residual) - s.disturbance, c.share);
     return N::narrow(s.disturbance);
   }
 };
