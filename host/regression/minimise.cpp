@@ -17,16 +17,23 @@ class Cost final : public ceres::CostFunction {
   bool Evaluate(double const* const* parameters, double* residuals, double** jacobians) const override {
     const std::vector<double> x(parameters[0], parameters[0] + unknowns_);
     const bool wants_slopes = jacobians && jacobians[0];
-    Eigen::VectorXd r;
-    Eigen::MatrixXd slopes;
-    if (!residuals_(x, r, wants_slopes ? &slopes : nullptr)) return false;
-    Eigen::Map<Eigen::VectorXd>(residuals, count_) = r;
+    // The solver asks again where its line search has been: for the values, then for the slopes.
+    if (x != at_ || (wants_slopes && slopes_.size() == 0)) {
+      at_.clear();
+      slopes_.resize(0, 0);
+      if (!residuals_(x, values_, wants_slopes ? &slopes_ : nullptr)) return false;
+      at_ = x;
+    }
+    Eigen::Map<Eigen::VectorXd>(residuals, count_) = values_;
     using RowMajor = Eigen::Matrix<double, Eigen::Dynamic, Eigen::Dynamic, Eigen::RowMajor>;
-    if (wants_slopes) Eigen::Map<RowMajor>(jacobians[0], count_, static_cast<Eigen::Index>(unknowns_)) = slopes;
+    if (wants_slopes) Eigen::Map<RowMajor>(jacobians[0], count_, static_cast<Eigen::Index>(unknowns_)) = slopes_;
     return true;
   }
 
  private:
+  mutable std::vector<double> at_;
+  mutable Eigen::VectorXd values_;
+  mutable Eigen::MatrixXd slopes_;
   const Residuals& residuals_;
   Eigen::Index count_;
   std::size_t unknowns_;
@@ -47,6 +54,8 @@ double minimise(std::vector<double>& x, Eigen::Index count, const Residuals& res
   options.max_num_iterations = how.iterations;
   options.function_tolerance = how.function_tolerance;
   options.parameter_tolerance = how.parameter_tolerance;
+  // By values alone: a line search that asked for slopes would pay for those of each point that it leaves.
+  options.line_search_interpolation_type = ceres::QUADRATIC;
   options.logging_type = ceres::SILENT;
   ceres::Solver::Summary summary;
   ceres::Solve(options, &problem, &summary);
