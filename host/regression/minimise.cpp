@@ -9,8 +9,8 @@ namespace {
 
 class Cost final : public ceres::CostFunction {
  public:
-  Cost(const Residuals& residuals, Eigen::Index count, std::size_t unknowns)
-      : residuals_(residuals), count_(count), unknowns_(unknowns) {
+  Cost(const Residuals& residuals, Eigen::Index count, std::size_t unknowns, const Minimisation& how)
+      : residuals_(residuals), count_(count), unknowns_(unknowns), how_(how) {
     set_num_residuals(static_cast<int>(count));
     mutable_parameter_block_sizes()->push_back(static_cast<int>(unknowns));
   }
@@ -22,6 +22,7 @@ class Cost final : public ceres::CostFunction {
       at_.clear();
       slopes_.resize(0, 0);
       if (!residuals_(x, values_, wants_slopes ? &slopes_ : nullptr)) return false;
+      if (wants_slopes) hold_at_bounds(x);
       at_ = x;
     }
     Eigen::Map<Eigen::VectorXd>(residuals, count_) = values_;
@@ -31,19 +32,31 @@ class Cost final : public ceres::CostFunction {
   }
 
  private:
+  // What stands at a bound and would go beyond stays there, and the step of the others is made without it: a step that
+  // counted on it and was cut back after would be a poor one for them, too.
+  void hold_at_bounds(const std::vector<double>& x) const {
+    for (std::size_t j = 0; j < unknowns_; ++j) {
+      const auto column = slopes_.col(static_cast<Eigen::Index>(j));
+      const double slope = column.dot(values_);
+      const bool low = j < how_.low.size() && x[j] <= how_.low[j], high = j < how_.high.size() && x[j] >= how_.high[j];
+      if ((low && slope > 0.0) || (high && slope < 0.0)) slopes_.col(static_cast<Eigen::Index>(j)).setZero();
+    }
+  }
+
   mutable std::vector<double> at_;
   mutable Eigen::VectorXd values_;
   mutable Eigen::MatrixXd slopes_;
   const Residuals& residuals_;
   Eigen::Index count_;
   std::size_t unknowns_;
+  const Minimisation& how_;
 };
 
 }  // namespace
 
 double minimise(std::vector<double>& x, Eigen::Index count, const Residuals& residuals, const Minimisation& how) {
   ceres::Problem problem;
-  problem.AddResidualBlock(new Cost(residuals, count, x.size()), nullptr, x.data());
+  problem.AddResidualBlock(new Cost(residuals, count, x.size(), how), nullptr, x.data());
   for (std::size_t j = 0; j < x.size(); ++j) {
     const int at = static_cast<int>(j);
     if (j < how.low.size() && std::isfinite(how.low[j])) problem.SetParameterLowerBound(x.data(), at, how.low[j]);
