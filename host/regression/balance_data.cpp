@@ -94,11 +94,18 @@ double BalanceData::share(const Record& r, Balance of_effect) const {
   return of_effect == through ? 1.0 / prepared_->constants.gear_ratio : 0.0;
 }
 
-void BalanceData::filter(const RowRange& range, Eigen::MatrixXd& signals) const {
+void BalanceData::filter(const RowRange& range, Eigen::Ref<Eigen::MatrixXd> signals) const {
   const auto at = static_cast<std::size_t>(&range - ranges_.data());
   for (const data::Segment& s : prepared_->records[range.record].segments)
     filters_[at].apply_columns_in_place(
         signals.middleRows(static_cast<Eigen::Index>(s.first), static_cast<Eigen::Index>(s.last - s.first)));
+}
+
+bool BalanceData::filtered_alike(const RowRange& a, const RowRange& b) const {
+  const Record &first = prepared_->records[a.record], &second = prepared_->records[b.record];
+  return first.sample_s == second.sample_s && first.segments.size() == 1 && second.segments.size() == 1 &&
+         first.inputs.size() == second.inputs.size() && first.segments[0].first == second.segments[0].first &&
+         first.segments[0].last == second.segments[0].last;
 }
 
 void BalanceData::take_rows(const RowRange& range, const double* signal, Eigen::Ref<Eigen::VectorXd> rows) const {
@@ -116,21 +123,32 @@ void BalanceData::take_rows(const RowRange& range, const double* signal, Eigen::
 
 template <class Fill>
 Eigen::MatrixXd BalanceData::along_rows(std::size_t columns, Fill fill) const {
-  // Some at a time: more would not stay in the processor's cache.
-  constexpr Eigen::Index kTogether = 8;
+  // Some at a time: more would not stay in the processor's cache. Of records that are alike some are taken together.
+  constexpr std::size_t kTogether = 8;
   Eigen::MatrixXd rows(ranges_.empty() ? 0 : ranges_.back().last, static_cast<Eigen::Index>(columns));
   Eigen::MatrixXd signals;
-  for (Eigen::Index first = 0; first < rows.cols(); first += kTogether)
-    for (const RowRange& range : ranges_) {
-      const auto samples = static_cast<Eigen::Index>(prepared_->records[range.record].inputs.size());
-      signals.setZero(samples, std::min(kTogether, rows.cols() - first));
-      for (Eigen::Index j = 0; j < signals.cols(); ++j)
-        fill(range, static_cast<std::size_t>(first + j),
-             std::span<double>(signals.col(j).data(), static_cast<std::size_t>(samples)));
-      filter(range, signals);
-      for (Eigen::Index j = 0; j < signals.cols(); ++j)
-        take_rows(range, signals.col(j).data(), rows.col(first + j).segment(range.first, range.size()));
+  for (std::size_t first = 0; first < columns; first += kTogether) {
+    const std::size_t many = std::min(kTogether, columns - first);
+    for (std::size_t i = 0; i < ranges_.size();) {
+      std::size_t end = i + 1;
+      while (end < ranges_.size() && (end - i + 1) * many <= kTogether && filtered_alike(ranges_[i], ranges_[end]))
+        ++end;
+      const std::size_t samples = prepared_->records[ranges_[i].record].inputs.size();
+      signals.setZero(static_cast<Eigen::Index>(samples), static_cast<Eigen::Index>((end - i) * many));
+      Eigen::Index at = 0;
+      for (std::size_t range = i; range < end; ++range)
+        for (std::size_t j = 0; j < many; ++j)
+          fill(ranges_[range], first + j, std::span<double>(signals.col(at++).data(), samples));
+      filter(ranges_[i], signals);
+      at = 0;
+      for (std::size_t range = i; range < end; ++range)
+        for (std::size_t j = 0; j < many; ++j)
+          take_rows(
+              ranges_[range], signals.col(at++).data(),
+              rows.col(static_cast<Eigen::Index>(first + j)).segment(ranges_[range].first, ranges_[range].size()));
+      i = end;
     }
+  }
   return rows;
 }
 

@@ -86,7 +86,9 @@ class BalanceData {
 
  private:
   // Filters signals that are given along the samples of a range's record, in place.
-  void filter(const RowRange& range, Eigen::MatrixXd& signals) const;
+  void filter(const RowRange& range, Eigen::Ref<Eigen::MatrixXd> signals) const;
+  // Whether signals of both may stand side by side in one filter.
+  bool filtered_alike(const RowRange& a, const RowRange& b) const;
   bool usable(const Record& record) const;
   // How much of what adds to a balance reaches this one: its own, and by way of the gear without a torque sensor.
   double share(const Record& record, Balance of_effect) const;
