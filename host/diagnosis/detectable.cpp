@@ -107,7 +107,7 @@ std::optional<double> Detection::scale_to_name(const Trial& trial, const Eigen::
   return high;
 }
 
-std::optional<Detectable> Detection::of_linear(const Trial& trial, regression::Terms terms) const {
+std::optional<Detectable> Detection::of_linear(const Trial& trial, regression::Terms terms, BalanceData& data) const {
   Term& term = terms.back();
   const std::vector<double> usual = usual_values(*term.entry);
   Eigen::VectorXd torque = Eigen::VectorXd::Zero(search_->data->rows());
@@ -115,7 +115,7 @@ std::optional<Detectable> Detection::of_linear(const Trial& trial, regression::T
   for (std::size_t p = 0; p < term.values.size(); ++p) {
     if (!term.free_linear(p) || usual[p] == 0.0) continue;
     first = std::min(first, p);
-    torque += usual[p] * search_->data->column(terms, {terms.size() - 1, p});
+    torque += usual[p] * data.column(terms, {terms.size() - 1, p});
   }
   const auto scale = first < term.values.size() ? scale_to_name(trial, torque) : std::nullopt;
   if (!scale) return std::nullopt;
@@ -125,7 +125,7 @@ std::optional<Detectable> Detection::of_linear(const Trial& trial, regression::T
   return Detectable{estimate(*search_, term, first, std::abs(value)), false, shapes_of(*search_, term, first)};
 }
 
-std::optional<Detectable> Detection::of_wave(const Trial& trial, regression::Terms terms) const {
+std::optional<Detectable> Detection::of_wave(const Trial& trial, regression::Terms terms, BalanceData& data) const {
   Term& term = terms.back();
   const std::size_t cosine = term.entry->index_of("cosine"), sine = term.entry->index_of("sine");
   const double usual = std::hypot(usual_values(*term.entry)[cosine], usual_values(*term.entry)[sine]);
@@ -136,7 +136,7 @@ std::optional<Detectable> Detection::of_wave(const Trial& trial, regression::Ter
   for (int i = 0; i < 2; ++i) {
     term.values[cosine] = i == 0 ? usual : 0.0;
     term.values[sine] = i == 0 ? 0.0 : usual;
-    parts[i] = model_torque(*search_->data, terms) - base_torque_;
+    parts[i] = model_torque(data, terms) - base_torque_;
   }
   for (int i = 0; i < kPhases; ++i) {
     const double phase = std::numbers::pi * i / kPhases;
@@ -150,14 +150,14 @@ std::optional<Detectable> Detection::of_wave(const Trial& trial, regression::Ter
 }
 
 // A size that the torque is not proportional to: the first value, from where the effect vanishes, that would be named.
-std::optional<Detectable> Detection::of_shape(const Trial& trial, regression::Terms terms) const {
+std::optional<Detectable> Detection::of_shape(const Trial& trial, regression::Terms terms, BalanceData& data) const {
   Term& term = terms.back();
   std::size_t size = 0;
   while (size < term.values.size() && !term.free_shape(size)) ++size;
   if (size == term.values.size()) return std::nullopt;
   const auto torque_at = [&](double value) -> Eigen::VectorXd {
     term.values[size] = value;
-    return model_torque(*search_->data, terms) - base_torque_;
+    return model_torque(data, terms) - base_torque_;
   };
   const auto& info = term.entry->parameters[size];
   if (info.low < 0.0 && info.per.empty()) {
@@ -188,15 +188,15 @@ std::optional<Detectable> Detection::of_shape(const Trial& trial, regression::Te
   return Detectable{estimate(*search_, term, size, value), falls, shapes_of(*search_, term, size)};
 }
 
-std::optional<Detectable> Detection::smallest(const Trial& trial) const {
+std::optional<Detectable> Detection::smallest(const Trial& trial, BalanceData& data) const {
   regression::Terms terms = trial.judged.terms;
   Term& term = terms.back();
   settle_shapes(*search_->data, trial, term);
-  if (is_wave(*term.entry)) return of_wave(trial, std::move(terms));
+  if (is_wave(*term.entry)) return of_wave(trial, std::move(terms), data);
   // What takes the place of another effect has the size of that one.
   if (term.entry->count(Kind::linear) > 0 && term.entry->info->replaces.empty())
-    return of_linear(trial, std::move(terms));
-  return of_shape(trial, std::move(terms));
+    return of_linear(trial, std::move(terms), data);
+  return of_shape(trial, std::move(terms), data);
 }
 
 }  // namespace flexspline::diagnosis

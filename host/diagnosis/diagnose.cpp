@@ -11,6 +11,7 @@
 #include "host/diagnosis/doubts.hpp"
 #include "host/diagnosis/rivals.hpp"
 #include "host/diagnosis/trials.hpp"
+#include "host/estimation/in_parallel.hpp"
 #include "host/regression/shapes.hpp"
 
 namespace flexspline::diagnosis {
@@ -185,9 +186,15 @@ void name_effects(const Examined& chosen, const std::string& alias, Diagnosis& r
 void list_candidates(std::vector<Examined>& all, data::Axis axis, Diagnosis& result) {
   for (Examined& e : all) {
     const Detection detection(e.search);
-    for (const Trial& t : e.trials) {
+    std::vector<std::optional<Detectable>> smallest(e.trials.size());
+    estimation::in_parallel(e.trials.size(), [&](std::size_t i) {
+      BalanceData data = *e.search.data;
+      smallest[i] = detection.smallest(e.trials[i], data);
+    });
+    for (std::size_t i = 0; i < e.trials.size(); ++i) {
+      const Trial& t = e.trials[i];
       result.candidates.push_back(report(t, e.search, axis));
-      result.candidates.back().minimum_detectable = detection.smallest(t);
+      result.candidates.back().minimum_detectable = std::move(smallest[i]);
       if (t.imitated_by.empty()) continue;
       result.candidates.back().rival_reasons.push_back(compare_with_model(e.search, t));
       result.warnings.push_back(fmt::format(

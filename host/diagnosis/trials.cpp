@@ -20,14 +20,15 @@ constexpr std::size_t kGridPoints = 6;
 constexpr double kSameSquares = 1e-5;
 constexpr std::size_t kRefined = 4;  // candidates whose shapes are searched continuously
 
-void choose_shapes(Search& search, Proposal& proposal) {
+// On `coarse`, the same rows from fewer samples.
+void choose_shapes(Search& search, BalanceData& coarse, Proposal& proposal) {
   Term& added = proposal.extended.back();
   for (std::size_t p = 0; p < added.values.size(); ++p) {
     if (!added.free_shape(p) || begins_at_nought(added, p)) continue;
     double best = added.values[p], least = std::numeric_limits<double>::infinity();
     for (const double value : regression::shape_grid(regression::shape_range(*search.data, added, p), kGridPoints)) {
       added.values[p] = value;
-      const double squares = squares_left(*search.data, proposal.extended, search.base);
+      const double squares = squares_left(coarse, proposal.extended, search.base);
       if (squares < least) {
         least = squares;
         best = value;
@@ -187,12 +188,15 @@ void prefer_simple(const Judged& base, std::vector<Trial>& trials) {
 std::vector<Trial> rank(Search& search) {
   std::vector<Proposal> tried = proposals(*search.data, search.base.terms, search.base.residual);
   std::vector<Trial> trials(tried.size());
+  regression::Prepared few;
+  BalanceData thinned = search.data->thinned(few);
+  thinned.columns(search.base.terms, search.base.linear);
   // Each on its own copy of the data, with the columns that are there: the result is that of one thread.
   estimation::in_parallel(tried.size(), [&](std::size_t i) {
-    BalanceData data = *search.data;
+    BalanceData data = *search.data, coarse = thinned;
     Search own{&data, search.keep, search.base};
     Proposal& proposal = tried[i];
-    choose_shapes(own, proposal);
+    choose_shapes(own, coarse, proposal);
     trials[i] = evaluate(own, proposal);
     if (!trials[i].admissible) trials[i] = best_admissible(own, std::move(proposal), std::move(trials[i]));
   });
@@ -208,12 +212,13 @@ std::vector<Trial> rank(Search& search) {
   }
   estimation::in_parallel(unrefined.size(), [&](std::size_t i) {
     Trial& trial = *unrefined[i];
-    BalanceData data = *search.data;
+    BalanceData data = *search.data, coarse = thinned;
     Search own{&data, search.keep, search.base};
     Proposal refined = trial.proposal;
     refined.extended = trial.judged.terms;
     const auto on_balance = regression::terms_on(refined.extended, data.balance(), data.prepared().torque_measured);
-    regression::refine_shapes(data, refined.extended, on_balance, whitening_of(data, trial.judged), kSameSquares);
+    regression::refine_shapes(data, refined.extended, on_balance, whitening_of(data, trial.judged), kSameSquares,
+                              &coarse);
     Trial again = evaluate(own, std::move(refined));
     if (better(again, trial) || !trial.admissible) trial = std::move(again);
   });

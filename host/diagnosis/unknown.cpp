@@ -8,6 +8,7 @@
 #include "host/catalogue/defined.hpp"
 #include "host/diagnosis/diagnosis.hpp"
 #include "host/diagnosis/trials.hpp"
+#include "host/estimation/in_parallel.hpp"
 
 namespace flexspline::diagnosis {
 namespace {
@@ -101,6 +102,20 @@ std::vector<TableQuestion> questions(BalanceData& data, const Terms& model) {
   return list;
 }
 
+// Those that the data tell, in the order of the questions; learnt on all cores.
+std::vector<Screened> curves(BalanceData& data, const Terms& model, const std::vector<TableQuestion>& asked,
+                             const Eigen::VectorXd& weights) {
+  std::vector<std::optional<LearnedTable>> learned(asked.size());
+  estimation::in_parallel(asked.size(), [&](std::size_t i) {
+    BalanceData own = data;
+    learned[i] = regression::learn_table(own, model, asked[i], weights);
+  });
+  std::vector<Screened> list;
+  for (std::size_t i = 0; i < asked.size(); ++i)
+    if (learned[i]) list.push_back({asked[i], label_of(asked[i]), std::move(*learned[i])});
+  return list;
+}
+
 bool tells(const LearnedTable& curve) {
   return curve.score > kCurveScore && curve.fall_percent > kCurveFallPercent;
 }
@@ -131,27 +146,25 @@ std::string next_record(const UnknownStructure& unknown, const data::Axis axis) 
 std::optional<UnknownStructure> find_unknown(Search& search, const Terms& model) {
   BalanceData& data = *search.data;
   const Eigen::VectorXd weights = search.base.root_weights.cwiseProduct(search.keep);
-  std::vector<Screened> list;
-  for (TableQuestion q : questions(data, model)) {
+  std::vector<TableQuestion> asked = questions(data, model);
+  for (TableQuestion& q : asked) {
     // Without the filter a curve costs little, and serves to tell signals apart.
     q.filtered = false;
     q.most_points = kScreenedPoints;
     q.exactly = true;
-    if (auto curve = regression::learn_table(data, model, q, weights))
-      list.push_back({q, label_of(q), std::move(*curve)});
   }
+  std::vector<Screened> list = curves(data, model, asked, weights);
   const auto more = [](const Screened& a, const Screened& b) { return a.curve.fall_percent > b.curve.fall_percent; };
   std::sort(list.begin(), list.end(), more);
   if (list.empty() || !(list.front().curve.score > 0.0)) return std::nullopt;
-  std::vector<Screened> learned;
+  asked.clear();
   for (std::size_t k = 0; k < std::min(kLearned, list.size()); ++k) {
-    TableQuestion q = list[k].question;
-    q.filtered = true;
-    q.exactly = false;
-    q.most_points = 128;
-    if (auto curve = regression::learn_table(data, model, q, weights))
-      learned.push_back({q, list[k].label, std::move(*curve)});
+    asked.push_back(list[k].question);
+    asked.back().filtered = true;
+    asked.back().exactly = false;
+    asked.back().most_points = 128;
   }
+  std::vector<Screened> learned = curves(data, model, asked, weights);
   if (learned.empty()) return std::nullopt;
   std::sort(learned.begin(), learned.end(), more);
   const Screened* best = &learned.front();

@@ -94,25 +94,60 @@ double BalanceData::share(const Record& r, Balance of_effect) const {
   return of_effect == through ? 1.0 / prepared_->constants.gear_ratio : 0.0;
 }
 
-void BalanceData::filter(const RowRange& range, std::vector<double>& signal) const {
+void BalanceData::filter(const RowRange& range, Eigen::Ref<Eigen::MatrixXd> signals) const {
   const auto at = static_cast<std::size_t>(&range - ranges_.data());
   for (const data::Segment& s : prepared_->records[range.record].segments)
-    filters_[at].apply_in_place(std::span<double>(signal.data() + s.first, s.last - s.first));
+    filters_[at].apply_columns_in_place(
+        signals.middleRows(static_cast<Eigen::Index>(s.first), static_cast<Eigen::Index>(s.last - s.first)));
 }
 
-// Makes rows from what `fill(range, signal)` writes along each record.
+bool BalanceData::filtered_alike(const RowRange& a, const RowRange& b) const {
+  const Record &first = prepared_->records[a.record], &second = prepared_->records[b.record];
+  return first.sample_s == second.sample_s && first.segments.size() == 1 && second.segments.size() == 1 &&
+         first.inputs.size() == second.inputs.size() && first.segments[0].first == second.segments[0].first &&
+         first.segments[0].last == second.segments[0].last;
+}
+
+void BalanceData::take_rows(const RowRange& range, const double* signal, Eigen::Ref<Eigen::VectorXd> rows) const {
+  const auto& samples = prepared_->records[range.record].rows[index(balance_)].samples;
+  for (std::size_t k = 0; k < samples.size(); ++k) {
+    const double* at = signal + samples[k];
+    const double x = beyond_.empty() ? 0.0 : beyond_[static_cast<std::size_t>(range.first) + k];
+    // A cubic through four samples; the filter leaves nothing that it could not follow.
+    rows[static_cast<Eigen::Index>(k)] =
+        x == 0.0 ? *at
+                 : at[-1] * (x * (1.0 - x) * (x - 2.0) / 6.0) + at[0] * ((x + 1.0) * (x - 1.0) * (x - 2.0) / 2.0) +
+                       at[1] * ((x + 1.0) * x * (2.0 - x) / 2.0) + at[2] * ((x + 1.0) * x * (x - 1.0) / 6.0);
+  }
+}
+
 template <class Fill>
-Eigen::VectorXd BalanceData::along_rows(Fill fill) const {
-  Eigen::VectorXd rows(ranges_.empty() ? 0 : ranges_.back().last);
-  std::vector<double> signal;
-  for (const RowRange& range : ranges_) {
-    const Record& r = prepared_->records[range.record];
-    signal.assign(r.inputs.size(), 0.0);
-    fill(range, signal);
-    filter(range, signal);
-    const auto& samples = r.rows[index(balance_)].samples;
-    for (std::size_t k = 0; k < samples.size(); ++k)
-      rows[range.first + static_cast<Eigen::Index>(k)] = signal[samples[k]];
+Eigen::MatrixXd BalanceData::along_rows(std::size_t columns, Fill fill) const {
+  // Some at a time: more would not stay in the processor's cache. Of records that are alike some are taken together.
+  constexpr std::size_t kTogether = 8;
+  Eigen::MatrixXd rows(ranges_.empty() ? 0 : ranges_.back().last, static_cast<Eigen::Index>(columns));
+  Eigen::MatrixXd signals;
+  for (std::size_t first = 0; first < columns; first += kTogether) {
+    const std::size_t many = std::min(kTogether, columns - first);
+    for (std::size_t i = 0; i < ranges_.size();) {
+      std::size_t end = i + 1;
+      while (end < ranges_.size() && (end - i + 1) * many <= kTogether && filtered_alike(ranges_[i], ranges_[end]))
+        ++end;
+      const std::size_t samples = prepared_->records[ranges_[i].record].inputs.size();
+      signals.setZero(static_cast<Eigen::Index>(samples), static_cast<Eigen::Index>((end - i) * many));
+      Eigen::Index at = 0;
+      for (std::size_t range = i; range < end; ++range)
+        for (std::size_t j = 0; j < many; ++j)
+          fill(ranges_[range], first + j, std::span<double>(signals.col(at++).data(), samples));
+      filter(ranges_[i], signals);
+      at = 0;
+      for (std::size_t range = i; range < end; ++range)
+        for (std::size_t j = 0; j < many; ++j)
+          take_rows(
+              ranges_[range], signals.col(at++).data(),
+              rows.col(static_cast<Eigen::Index>(first + j)).segment(ranges_[range].first, ranges_[range].size()));
+      i = end;
+    }
   }
   return rows;
 }
@@ -145,16 +180,16 @@ BalanceData::BalanceData(const Prepared& prepared, Balance balance) : prepared_(
     }
     return 0.0;
   };
-  const auto fill_target = [&](const RowRange& range, std::vector<double>& signal) {
+  const auto fill_target = [&](const RowRange& range, std::size_t, std::span<double> signal) {
     const Record& r = prepared.records[range.record];
     for (std::size_t k = 0; k < signal.size(); ++k) signal[k] = left_side(r, k);
     // A known load torque reaches the motor through the gear.
     if (balance_ == Balance::motor && !prepared.torque_measured && !r.load_torque.empty())
       for (std::size_t k = 0; k < signal.size(); ++k) signal[k] -= r.load_torque[k] / prepared.constants.gear_ratio;
   };
-  target_ = along_rows(fill_target);
-  delay_ = along_rows([&](const RowRange& range, std::vector<double>& signal) {
-    fill_target(range, signal);
+  target_ = along_rows(1, fill_target);
+  delay_ = along_rows(1, [&](const RowRange& range, std::size_t, std::span<double> signal) {
+    fill_target(range, 0, signal);
     const Record& r = prepared.records[range.record];
     for (const data::Segment& s : r.segments) {
       const std::span<double> part(signal.data() + s.first, s.last - s.first);
@@ -232,7 +267,7 @@ template bool BalanceData::change_inputs<Real>(const Terms&, const Term&, const 
 template <class N>
 void BalanceData::add_torque(const Terms& terms, const Term& term, const std::vector<typename N::Parameter>& values,
                              const Record& r, const std::vector<std::vector<typename N::Parameter>>& all_values,
-                             std::vector<typename N::Value>& torque) const {
+                             std::span<typename N::Value> torque) const {
   using P = typename N::Parameter;
   if (!term.adds_torque()) return;
   const DriveConstants<P> constants = lifted<P>(prepared_->constants);
@@ -278,31 +313,61 @@ std::vector<double> unit_values(const Term& term, std::size_t parameter) {
 }  // namespace
 
 const Eigen::VectorXd& BalanceData::column(const Terms& terms, Slot slot) {
-  const std::string key = key_of(terms, slot);
-  const auto found = cache_.find(key);
-  if (found != cache_.end()) return found->second;
+  make_columns(terms, {slot});
+  return cache_.at(key_of(terms, slot));
+}
+
+Eigen::MatrixXd BalanceData::columns(const Terms& terms, const std::vector<Slot>& slots) {
+  make_columns(terms, slots);
+  Eigen::MatrixXd X(rows(), static_cast<Eigen::Index>(slots.size()));
+  for (std::size_t j = 0; j < slots.size(); ++j)
+    X.col(static_cast<Eigen::Index>(j)) = cache_.at(key_of(terms, slots[j]));
+  return X;
+}
+
+void BalanceData::make_columns(const Terms& terms, const std::vector<Slot>& slots) {
+  const auto missing = [&] {
+    std::vector<Slot> list;
+    for (const Slot& slot : slots)
+      if (!cache_.contains(key_of(terms, slot))) list.push_back(slot);
+    return list;
+  };
+  std::vector<Slot> wanted = missing();
+  if (wanted.empty()) return;
   // A search over shapes makes many columns that nobody asks for again.
-  if (cache_.size() * static_cast<std::size_t>(rows()) > kCachedNumbers) cache_.clear();
-  const Term& term = terms[slot.term];
-  const std::vector<double> values = unit_values(term, slot.parameter);
+  if (cache_.size() * static_cast<std::size_t>(rows()) > kCachedNumbers) {
+    cache_.clear();
+    wanted = missing();
+  }
   const auto all = values_of_all(terms);
-  return cache_
-      .emplace(key, along_rows([&](const RowRange& range, std::vector<double>& signal) {
-                 add_torque<Real>(terms, term, values, prepared_->records[range.record], all, signal);
-               }))
-      .first->second;
+  const Eigen::MatrixXd made =
+      along_rows(wanted.size(), [&](const RowRange& range, std::size_t j, std::span<double> signal) {
+        const Term& term = terms[wanted[j].term];
+        add_torque<Real>(terms, term, unit_values(term, wanted[j].parameter), prepared_->records[range.record], all,
+                         signal);
+      });
+  for (std::size_t j = 0; j < wanted.size(); ++j)
+    cache_.insert_or_assign(key_of(terms, wanted[j]), made.col(static_cast<Eigen::Index>(j)));
 }
 
 Eigen::VectorXd BalanceData::shape_column(const Terms& terms, const std::vector<std::size_t>& on_balance, Slot shape) {
+  return shape_columns(terms, on_balance, {shape});
+}
+
+Eigen::MatrixXd BalanceData::shape_columns(const Terms& terms, const std::vector<std::size_t>& on_balance,
+                                           const std::vector<Slot>& shapes) {
   std::vector<std::vector<Jet>> all;
   for (const Term& term : terms) all.emplace_back(term.values.begin(), term.values.end());
-  all[shape.term][shape.parameter].v[0] = 1.0;
-  return along_rows([&](const RowRange& range, std::vector<double>& signal) {
-    std::vector<Jet> torque(signal.size(), Jet(0.0));
+  std::vector<Jet> torque;
+  return along_rows(shapes.size(), [&](const RowRange& range, std::size_t j, std::span<double> signal) {
+    const Slot shape = shapes[j];
+    all[shape.term][shape.parameter].v[0] = 1.0;
+    torque.assign(signal.size(), Jet(0.0));
     for (const std::size_t t : on_balance)
       if (terms[t].adds_torque() && (t == shape.term || changes(terms[shape.term], terms[t])))
         add_torque<Dual>(terms, terms[t], all[t], prepared_->records[range.record], all, torque);
     for (std::size_t k = 0; k < signal.size(); ++k) signal[k] = torque[k].v[0];
+    all[shape.term][shape.parameter].v[0] = 0.0;
   });
 }
 
@@ -331,9 +396,11 @@ Eigen::VectorXd BalanceData::term_torque(const Terms& terms, std::size_t t) {
     if (cache_.size() * static_cast<std::size_t>(rows()) > kCachedNumbers) cache_.clear();
     const auto all = values_of_all(terms);
     return cache_
-        .emplace(key, along_rows([&](const RowRange& range, std::vector<double>& signal) {
-                   add_torque<Real>(terms, terms[t], terms[t].values, prepared_->records[range.record], all, signal);
-                 }))
+        .emplace(key, along_rows(1,
+                                 [&](const RowRange& range, std::size_t, std::span<double> signal) {
+                                   add_torque<Real>(terms, terms[t], terms[t].values, prepared_->records[range.record],
+                                                    all, signal);
+                                 }))
         .first->second;
   }
   for (std::size_t p = 0; p < terms[t].values.size(); ++p)

@@ -4,6 +4,7 @@
 
 #include <Eigen/Core>
 #include <map>
+#include <span>
 #include <string>
 #include <unordered_map>
 
@@ -45,8 +46,12 @@ class BalanceData {
   // Torque per unit of a linear parameter, with shapes, shifts and modulations as `terms` say, filtered. N m per unit.
   // The reference holds until the next call.
   const Eigen::VectorXd& column(const Terms& terms, Slot slot);
+  // Those of many parameters side by side: what is not there yet is filtered together, which costs less than half.
+  Eigen::MatrixXd columns(const Terms& terms, const std::vector<Slot>& slots);
   // Slope of the model's torque by a shape parameter, at the linear parameters of `terms`, filtered.
   Eigen::VectorXd shape_column(const Terms& terms, const std::vector<std::size_t>& on_balance, Slot shape);
+  Eigen::MatrixXd shape_columns(const Terms& terms, const std::vector<std::size_t>& on_balance,
+                                const std::vector<Slot>& shapes);
   // Torque of terms with known linear parameters, of those that no linear parameter scales at their shapes as they
   // stand, and of those that only reach this balance, filtered: belongs on the left side. It moves with the shapes.
   Eigen::VectorXd known_torque(const Terms& terms, const std::vector<std::size_t>& on_balance);
@@ -68,6 +73,11 @@ class BalanceData {
   // Values of a signal at the rows, as the shifts of `terms` leave it; angles within a turn.
   Eigen::VectorXd signal_at_rows(const Terms& terms, effects::Variable variable);
 
+  // The same rows and target, with columns from fewer samples (eight a period of the row cut-off): they cost a part,
+  // and are near enough to choose a point on a grid and to begin a search, not to report. `few` takes the samples and
+  // must live as long as the result.
+  BalanceData thinned(Prepared& few) const;
+
   // Rows that count as one for white noise, because the row filter correlates neighbours: row rate over twice the
   // filter's noise bandwidth. A short residual underestimates this.
   double filter_autocorrelation_time() const;
@@ -75,13 +85,18 @@ class BalanceData {
   const std::map<std::size_t, std::string>& left_out() const { return left_out_; }
 
  private:
-  // Filters a signal that is given along the samples of a range's record, in place.
-  void filter(const RowRange& range, std::vector<double>& signal) const;
+  // Filters signals that are given along the samples of a range's record, in place.
+  void filter(const RowRange& range, Eigen::Ref<Eigen::MatrixXd> signals) const;
+  // Whether signals of both may stand side by side in one filter.
+  bool filtered_alike(const RowRange& a, const RowRange& b) const;
   bool usable(const Record& record) const;
   // How much of what adds to a balance reaches this one: its own, and by way of the gear without a torque sensor.
   double share(const Record& record, Balance of_effect) const;
+  // Rows from what `fill(range, column, signal)` writes along each record, filtered.
   template <class Fill>
-  Eigen::VectorXd along_rows(Fill fill) const;
+  Eigen::MatrixXd along_rows(std::size_t columns, Fill fill) const;
+  // Values of a filtered signal at the rows of a range.
+  void take_rows(const RowRange& range, const double* signal, Eigen::Ref<Eigen::VectorXd> rows) const;
   // Inputs as shifts and modulations of `terms` leave them for a term; false where they change nothing of it.
   template <class N>
   bool change_inputs(const Terms& terms, const Term& term, const Record& record,
@@ -90,7 +105,9 @@ class BalanceData {
   template <class N>
   void add_torque(const Terms& terms, const Term& term, const std::vector<typename N::Parameter>& values,
                   const Record& record, const std::vector<std::vector<typename N::Parameter>>& all_values,
-                  std::vector<typename N::Value>& torque) const;
+                  std::span<typename N::Value> torque) const;
+  // Puts columns that are not there yet among those that are.
+  void make_columns(const Terms& terms, const std::vector<Slot>& slots);
 
   const Prepared* prepared_;
   Balance balance_;
@@ -99,6 +116,8 @@ class BalanceData {
   Eigen::VectorXd target_;
   Eigen::VectorXd delay_;
   std::vector<signals::ZeroPhaseFilter> filters_;  // one a range
+  // Where rows stand between the samples of thinned data: how far beyond the sample of the record's rows, in samples.
+  std::vector<double> beyond_;
   std::unordered_map<std::string, Eigen::VectorXd> cache_;
 };
 

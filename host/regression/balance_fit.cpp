@@ -9,10 +9,7 @@ namespace flexspline::regression {
 
 Eigen::MatrixXd shape_columns(BalanceData& data, const Terms& terms, const std::vector<std::size_t>& on_balance,
                               const std::vector<Slot>& shapes) {
-  Eigen::MatrixXd X(data.rows(), static_cast<Eigen::Index>(shapes.size()));
-  for (std::size_t j = 0; j < shapes.size(); ++j)
-    X.col(static_cast<Eigen::Index>(j)) = data.shape_column(terms, on_balance, shapes[j]);
-  return X;
+  return data.shape_columns(terms, on_balance, shapes);
 }
 
 NaturalValue natural_value(const Term& term, Slot asked, const std::vector<Slot>& slots,

@@ -81,17 +81,27 @@ Eigen::MatrixXd BalanceData::point_columns(const Terms& terms, const Points& poi
       reaching[static_cast<std::size_t>(places[k].point)].push_back(k);
       reaching[static_cast<std::size_t>((places[k].point + 1) % count)].push_back(k);
     }
-    std::vector<double> signal;
-    for (Eigen::Index j = 0; j < count; ++j) {
-      if (reaching[static_cast<std::size_t>(j)].empty()) continue;
-      signal.assign(inputs.size(), 0.0);
-      for (const std::size_t k : reaching[static_cast<std::size_t>(j)]) {
-        const Place& p = places[k];
-        signal[k] += p.size * (p.point == j ? 1.0 - p.share : p.share);
+    std::vector<Eigen::Index> visited;
+    for (Eigen::Index j = 0; j < count; ++j)
+      if (!reaching[static_cast<std::size_t>(j)].empty()) visited.push_back(j);
+    // Some at a time: together they would not stay in the cache.
+    constexpr std::size_t kTogether = 8;
+    for (std::size_t first = 0; first < visited.size(); first += kTogether) {
+      const std::size_t many = std::min(kTogether, visited.size() - first);
+      Eigen::MatrixXd signals =
+          Eigen::MatrixXd::Zero(static_cast<Eigen::Index>(inputs.size()), static_cast<Eigen::Index>(many));
+      for (std::size_t i = 0; i < many; ++i) {
+        const Eigen::Index j = visited[first + i];
+        for (const std::size_t k : reaching[static_cast<std::size_t>(j)]) {
+          const Place& p = places[k];
+          signals(static_cast<Eigen::Index>(k), static_cast<Eigen::Index>(i)) +=
+              p.size * (p.point == j ? 1.0 - p.share : p.share);
+        }
       }
-      filter(range, signal);
-      for (std::size_t k = 0; k < samples.size(); ++k)
-        columns(range.first + static_cast<Eigen::Index>(k), j) = signal[samples[k]];
+      filter(range, signals);
+      for (std::size_t i = 0; i < many; ++i)
+        take_rows(range, signals.col(static_cast<Eigen::Index>(i)).data(),
+                  columns.col(visited[first + i]).segment(range.first, range.size()));
     }
   }
   return columns;

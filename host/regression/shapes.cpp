@@ -200,9 +200,7 @@ std::vector<double> shape_grid(const ShapeRange& range, std::size_t count) {
 }
 
 Eigen::MatrixXd columns_of(BalanceData& data, const Terms& terms, const std::vector<Slot>& linear) {
-  Eigen::MatrixXd X(data.rows(), static_cast<Eigen::Index>(linear.size()));
-  for (std::size_t j = 0; j < linear.size(); ++j) X.col(static_cast<Eigen::Index>(j)) = data.column(terms, linear[j]);
-  return X;
+  return data.columns(terms, linear);
 }
 
 void sweep_shapes(BalanceData& data, Terms& terms, const std::vector<std::size_t>& on_balance,
@@ -247,7 +245,7 @@ double refine_shapes(BalanceData& data, Terms& terms, const std::vector<std::siz
 }
 
 double refine_shapes(BalanceData& data, Terms& terms, const std::vector<std::size_t>& on_balance,
-                     const Whitening& whitening, double tolerance) {
+                     const Whitening& whitening, double tolerance, BalanceData* coarse) {
   const std::vector<Slot> shapes = free_shape_slots(terms, on_balance);
   const std::vector<Slot> linear = free_linear_slots(terms, on_balance);
   if (shapes.empty() || data.empty())
@@ -259,24 +257,37 @@ double refine_shapes(BalanceData& data, Terms& terms, const std::vector<std::siz
     ranges.push_back(shape_range(data, terms[s.term], s.parameter));
     shares.push_back(std::clamp(ranges.back().share(terms[s.term].values[s.parameter]), 0.01, 0.99));
   }
-  // Residual of the best linear fit as a function of the shapes alone, each as a share of its range.
+  // Residual of the best linear fit as a function of the shapes alone, each as a share of its range. Slopes are asked
+  // for where values were: the factors are kept until then.
+  std::vector<double> factored_at;
+  Eigen::MatrixXd A;
+  Eigen::VectorXd size, theta, left;
+  Eigen::ColPivHouseholderQR<Eigen::MatrixXd> qr;
+  BalanceData* on = nullptr;
   const auto projected = [&](const std::vector<double>& x, Eigen::VectorXd& residual, Eigen::MatrixXd* slopes) {
     for (std::size_t j = 0; j < shapes.size(); ++j)
       terms[shapes[j].term].values[shapes[j].parameter] = ranges[j].at(x[j]);
-    const auto [A, size] = scaled_columns(columns_of(data, terms, linear), whitening);
-    const Eigen::VectorXd b = whitening * (data.target() - data.known_torque(terms, on_balance));
-    const Eigen::ColPivHouseholderQR<Eigen::MatrixXd> qr(A);
-    const Eigen::VectorXd theta = qr.solve(b);
-    residual = b - A * theta;
+    if (x != factored_at) {
+      ScaledColumns columns = scaled_columns(columns_of(*on, terms, linear), whitening);
+      A = std::move(columns.A);
+      size = std::move(columns.size);
+      const Eigen::VectorXd b = whitening * (on->target() - on->known_torque(terms, on_balance));
+      qr.compute(A);
+      theta = qr.solve(b);
+      left = b - A * theta;
+      factored_at = x;
+    }
+    residual = left;
     if (!slopes) return true;
     for (std::size_t j = 0; j < linear.size(); ++j)
       terms[linear[j].term].values[linear[j].parameter] =
           theta[static_cast<Eigen::Index>(j)] / size[static_cast<Eigen::Index>(j)];
-    slopes->resize(b.size(), static_cast<Eigen::Index>(shapes.size()));
+    slopes->resize(left.size(), static_cast<Eigen::Index>(shapes.size()));
     constexpr double kStep = 1e-6;
+    const Eigen::MatrixXd columns = whitening * on->shape_columns(terms, on_balance, shapes);
     for (std::size_t j = 0; j < shapes.size(); ++j) {
       const double per_share = (ranges[j].at(x[j] + kStep) - ranges[j].at(x[j] - kStep)) / (2.0 * kStep);
-      const Eigen::VectorXd slope = (whitening * data.shape_column(terms, on_balance, shapes[j])) * per_share;
+      const Eigen::VectorXd slope = columns.col(static_cast<Eigen::Index>(j)) * per_share;
       slopes->col(static_cast<Eigen::Index>(j)) = -(slope - A * qr.solve(slope));
     }
     return true;
@@ -285,7 +296,14 @@ double refine_shapes(BalanceData& data, Terms& terms, const std::vector<std::siz
   how.low.assign(shapes.size(), 0.0);
   how.high.assign(shapes.size(), 1.0);
   how.function_tolerance = tolerance;
-  const double cost = minimise(shares, data.rows(), projected, how);
+  // The few samples lead to where the others need a step or two.
+  double cost = 0.0;
+  for (BalanceData* const stage : {coarse, &data}) {
+    if (!stage) continue;
+    on = stage;
+    factored_at.clear();
+    cost = minimise(shares, data.rows(), projected, how);
+  }
   for (std::size_t j = 0; j < shapes.size(); ++j)
     terms[shapes[j].term].values[shapes[j].parameter] = ranges[j].at(shares[j]);
   return 2.0 * cost;

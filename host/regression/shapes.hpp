@@ -31,9 +31,10 @@ Eigen::MatrixXd columns_of(BalanceData& data, const Terms& terms, const std::vec
 // into `terms`. Returns the weighted sum of squares.
 double refine_shapes(BalanceData& data, Terms& terms, const std::vector<std::size_t>& on_balance,
                      const Eigen::VectorXd& root_weights);
-// The same with errors that rows have in common, to a relative change of the sum below `tolerance`.
+// The same with errors that rows have in common, to a relative change of the sum below `tolerance`. Where `coarse`
+// (BalanceData::thinned) is given, the search begins on that.
 double refine_shapes(BalanceData& data, Terms& terms, const std::vector<std::size_t>& on_balance,
-                     const Whitening& whitening, double tolerance);
+                     const Whitening& whitening, double tolerance, BalanceData* coarse = nullptr);
 
 // Chooses starting values for shapes that the model does not state: sweeps each over its grid, twice around.
 void sweep_shapes(BalanceData& data, Terms& terms, const std::vector<std::size_t>& on_balance,

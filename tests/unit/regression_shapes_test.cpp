@@ -8,6 +8,7 @@
 #include <functional>
 
 #include "host/regression/identify.hpp"
+#include "host/regression/minimise.hpp"
 
 namespace flexspline::regression {
 namespace {
@@ -162,6 +163,68 @@ TEST(BalanceRows, FoldsCutEachRecordIntoEqualPartsWithoutGapOrOverlap) {
     }
     EXPECT_EQ(at, data.records()[record].last);
   }
+}
+
+TEST(BalanceRows, ColumnsMadeTogetherAreThoseMadeOneByOne) {
+  model::Model m = plain_model();
+  m.effects.push_back(catalogue::blank_effect(catalogue::get("stribeck_gaussian"), data::Axis::rotary));
+  // Two records that are alike share a filter, the third has its own.
+  const data::Dataset d =
+      dataset_of({experiment("a", kFast, plain), experiment("b", kSlow, plain), experiment("c", kFast, plain, 7.0)});
+  const auto found = identify(d, m, kOptions);
+  BalanceData together(found->prepared, Balance::motor), single(found->prepared, Balance::motor);
+  const auto on_balance = terms_on(found->terms, Balance::motor, false);
+  const std::vector<Slot> slots = free_linear_slots(found->terms, on_balance);
+  ASSERT_EQ(slots.size(), 5U);
+  const Eigen::MatrixXd columns = together.columns(found->terms, slots);
+  for (std::size_t j = 0; j < slots.size(); ++j) {
+    const Eigen::VectorXd alone = single.column(found->terms, slots[j]);
+    EXPECT_GT(alone.norm(), 0.0);
+    EXPECT_LT((columns.col(static_cast<Eigen::Index>(j)) - alone).norm(), 1e-12 * alone.norm()) << j;
+  }
+}
+
+TEST(BalanceRows, ColumnsFromFewerSamplesFollowThoseOfAll) {
+  model::Model m = plain_model();
+  m.effects.push_back(catalogue::blank_effect(catalogue::get("stribeck_gaussian"), data::Axis::rotary));
+  const data::Dataset d = dataset_of({experiment("a", kFast, plain), experiment("b", kSlow, plain)});
+  // One sample in 6 or in 13 is a row: every third is kept, or every sixth and rows fall between them.
+  for (const double cutoff_hz : {40.0, 19.0}) {
+    const auto found = identify(d, m, {cutoff_hz, true});
+    BalanceData all(found->prepared, Balance::motor);
+    Prepared few;
+    BalanceData thinned = all.thinned(few);
+    EXPECT_LT(3 * few.records[0].inputs.size(), found->prepared.records[0].inputs.size() + 3);
+    ASSERT_EQ(thinned.rows(), all.rows());
+    EXPECT_EQ((thinned.target() - all.target()).norm(), 0.0);
+    const std::vector<Slot> slots = free_linear_slots(found->terms, terms_on(found->terms, Balance::motor, false));
+    const Eigen::MatrixXd a = all.columns(found->terms, slots), b = thinned.columns(found->terms, slots);
+    for (Eigen::Index j = 0; j < a.cols(); ++j)
+      EXPECT_LT((a.col(j) - b.col(j)).norm(), 0.02 * a.col(j).norm()) << cutoff_hz << " Hz, column " << j;
+  }
+}
+
+TEST(Minimise, WhatStandsAtABoundDoesNotHoldUpTheOthers) {
+  // A narrow valley along y = 3 x that falls towards x = 2; x may go to 1.
+  int asked = 0;
+  const auto valley = [&](const std::vector<double>& x, Eigen::VectorXd& residuals, Eigen::MatrixXd* slopes) {
+    ++asked;
+    residuals = Eigen::Vector2d(x[0] - 2.0, 100.0 * (x[1] - 3.0 * x[0]));
+    if (slopes) {
+      slopes->resize(2, 2);
+      *slopes << 1.0, 0.0, -300.0, 100.0;
+    }
+    return true;
+  };
+  std::vector<double> x{0.2, 2.0};
+  Minimisation how;
+  how.low = {0.0, 0.0};
+  how.high = {1.0, 10.0};
+  how.function_tolerance = how.parameter_tolerance = 1e-10;
+  EXPECT_NEAR(minimise(x, 2, valley, how), 0.5, 1e-9);
+  EXPECT_EQ(x[0], 1.0);
+  EXPECT_NEAR(x[1], 3.0, 1e-7);
+  EXPECT_LT(asked, 100);  // twice as often where it is cut back after each step
 }
 
 }  // namespace
