@@ -83,7 +83,8 @@ class Application {
     answer_waits_.store(false, std::memory_order_release);
     return answer;
   }
-  // Before the first tick: takes the block that lies in flash, at once. Where it is not good the drive has no parameters.
+  // Before the first tick: takes the block that lies in flash, at once. Where it is not good the drive has no
+  // parameters.
   void boot_with(std::span<const std::byte> block) {
     const BlockFinding finding = check_block(block, B::kTickHz);
     if (finding == BlockFinding::none) {
