@@ -7,6 +7,7 @@
 
 #include "firmware/messages.hpp"
 #include "shared/control/excitation.hpp"
+#include "shared/fixed/complete.hpp"
 #include "shared/protocol/payloads.hpp"
 
 namespace flexspline::firmware {
@@ -40,13 +41,18 @@ class ExcitationIntake {
   }
   static bool is_limit(std::int32_t raw) { return raw > 0 && raw <= (std::int32_t{2} << fixed::kValueBits); }
   static bool is_signal(std::int32_t raw) { return raw > INT32_MIN && (raw == 0 || is_limit(raw) || is_limit(-raw)); }
+  // Only the normal form is a gain, so that one number has one form.
   static bool make_gain(std::int32_t mantissa, std::int32_t exponent, N::Gain& gain) {
-    std::array<std::uint8_t, 8> bytes{};
-    model::Writer w(bytes);
-    w.put(mantissa);
-    w.put(exponent);
-    model::Reader r(bytes);
-    return model::Encoding<N::Gain>::take(r, gain);
+    const std::uint64_t size = fixed::size_of(mantissa);
+    const bool normal = mantissa == 0 ? exponent == 0
+                                      : size >= (std::uint64_t{1} << (fixed::kMantissaBits - 1)) &&
+                                            size <= (std::uint64_t{1} << fixed::kMantissaBits) &&
+                                            exponent >= N::Gain::kLeastExponent && exponent <= N::Gain::kMostExponent;
+    if (!normal) return false;
+    gain = {};
+    gain.mantissa = mantissa;
+    gain.exponent = static_cast<std::int8_t>(exponent);
+    return fixed::complete(gain);
   }
 
   template <class Application>

@@ -7,8 +7,8 @@
 
 namespace flexspline::twin {
 
-/// The parameter block that a drive leaves its maker with: the effects that are no secret of the plant, with the
-/// plant's own values, in the bases of its ratings.
+/// The parameter block that a drive leaves its maker with: its sensors, loops and limits, and the effects that are no
+/// secret of the plant, with the plant's own values, in the bases of its ratings.
 std::vector<std::uint8_t> factory_block(const plant::Drive& drive);
 
 }  // namespace flexspline::twin

@@ -1,17 +1,13 @@
 #include "hil/twin/twin_drive.hpp"
 
 #include <algorithm>
+#include <span>
 #include <stdexcept>
 
-#include "hil/board/drive_setup.hpp"
 #include "hil/twin/factory_block.hpp"
 
 namespace flexspline::twin {
 namespace {
-
-struct AnySection {
-  model::BlockVerdict section(std::uint16_t, std::span<const std::uint8_t>) { return {}; }
-};
 
 template <std::size_t Size>
 std::array<std::uint8_t, Size> text_in(const std::string& text) {
@@ -21,31 +17,6 @@ std::array<std::uint8_t, Size> text_in(const std::string& text) {
 }
 
 }  // namespace
-
-std::uint32_t TwinBlocks::validate(std::span<const std::uint8_t> block) const {
-  model::BlockHeader header;
-  model::DriveModel<firmware::N, model::EveryFormula> model;
-  AnySection others;
-  const model::BlockVerdict verdict = model::load(block, header, model, others);
-  if (!verdict.good()) return static_cast<std::uint32_t>(verdict.fault);
-  try {
-    board::parameters_of(drive_, board::read_packed_model(block));
-  } catch (const std::runtime_error&) {
-    return kDoesNotFit;
-  }
-  return 0;
-}
-
-void TwinBlocks::adopt(std::span<const std::uint8_t> block) {
-  in_use_ = board::Block(board::parameters_of(drive_, board::read_packed_model(block)));
-  application_.offer(in_use_.bytes());
-}
-
-std::optional<std::uint32_t> TwinBlocks::adopted() const {
-  const auto finding = application_.block_finding();
-  if (!finding) return {};
-  return static_cast<std::uint32_t>(*finding);
-}
 
 TwinDrive::TwinDrive(const TwinSetup& setup)
     : setup_(setup),

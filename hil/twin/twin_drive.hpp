@@ -3,8 +3,6 @@
 #include <cstdint>
 #include <filesystem>
 #include <memory>
-#include <optional>
-#include <span>
 #include <string>
 
 #include "firmware/service.hpp"
@@ -25,22 +23,7 @@ struct TwinSetup {
 
 using TwinApplication = firmware::Application<board::SoftwareBoard>;
 
-/// Packed parameter blocks for the twin's application: judged as a drive judges them, and completed with what the drive
-/// knows of itself (sensors, amplifier, loops), in the bases of the block.
-class TwinBlocks {
- public:
-  static constexpr std::uint32_t kDoesNotFit = 200;  ///< sound, but not for this drive
-
-  TwinBlocks(TwinApplication& application, const plant::Drive& drive) : application_(application), drive_(drive) {}
-  std::uint32_t validate(std::span<const std::uint8_t> block) const;
-  void adopt(std::span<const std::uint8_t> block);
-  std::optional<std::uint32_t> adopted() const;
-
- private:
-  TwinApplication& application_;
-  const plant::Drive& drive_;
-  board::Block in_use_;
-};
+using TwinBlocks = firmware::ApplicationBlocks<TwinApplication, board::SoftwareBoard::kTickHz>;
 
 /// A whole drive: plant, sensors, the firmware's application and its service for a host, and flash memory. Time passes
 /// in run(), and nowhere else.
@@ -68,7 +51,7 @@ class TwinDrive {
   TwinApplication application_{board_};
   FlashFile flash_;
   Store store_{flash_};
-  TwinBlocks blocks_{application_, setup_.drive};
+  TwinBlocks blocks_{application_};
   std::unique_ptr<Service> service_;
 };
 

@@ -414,6 +414,10 @@ class App {
     take_drive(flash, flash_options->drive);
     flash->add_option("--model", flash_options->model, "model file, packed for this drive")->type_name("MODEL");
     flash->add_option("--block", flash_options->block, "parameter block of pack or backup")->type_name("BLOCK");
+    flash
+        ->add_option("--settings", flash_options->settings,
+                     "of the drive, as pack --drive takes them (default: those of its active block)")
+        ->type_name("FILE.toml");
     take_yes(flash, flash_options->yes);
     const auto [backup, backup_options] = command<BackupOptions>("backup");
     take_drive(backup, backup_options->drive);

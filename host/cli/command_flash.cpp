@@ -2,12 +2,17 @@
 #include <fmt/format.h>
 #include <unistd.h>
 
+#include <cmath>
+#include <fstream>
+#include <iterator>
 #include <nlohmann/json.hpp>
 
 #include "host/cli/drive_commands.hpp"
+#include "host/deployment/bases.hpp"
 #include "host/deployment/pack.hpp"
 #include "host/drive/block_changes.hpp"
 #include "host/drive/scales.hpp"
+#include "host/drive/settings_text.hpp"
 #include "host/output/json.hpp"
 #include "host/output/text.hpp"
 #include "shared/fixed/system.hpp"
@@ -74,16 +79,51 @@ std::vector<std::string> effects_of(const protocol::Effects& effects) {
   return names;
 }
 
+std::string text_of_file(const std::filesystem::path& path) {
+  std::ifstream in(path, std::ios::binary);
+  if (!in) throw UsageError(fmt::format("{} cannot be read; is the path right?", path.string()));
+  return {std::istreambuf_iterator<char>(in), std::istreambuf_iterator<char>()};
+}
+
+// A model of another gear would turn the drive by other angles than are commanded.
+void require_same_gear(const Bytes& active, const Bytes& block) {
+  const auto old = drive::scales_of(active), now = drive::scales_of(block);
+  if (!old || !now) return;
+  const double before = old->constants.gear_ratio, after = now->constants.gear_ratio;
+  if (std::abs(after - before) > 1e-3 * before)
+    throw UsageError(
+        fmt::format("the model is of a gear of {:g}, the drive's active block of {:g}; take the drive's own "
+                    "model, or pack a block and flash it with --block",
+                    after, before));
+}
+
 Bytes block_of(const FlashOptions& options, drive::Session& session, const Bytes& active, Console& console) {
   if (!options.block.empty()) return read_block_file(options.block);
   const model::ModelFile file = load_model(options.model);
   deployment::PackOptions pack;
   pack.tick_hz = session.identity().tick_hz;
   pack.image = effects_of(session.effects());
-  if (const auto scales = drive::scales_of(active); scales && scales->header.encoder_counts > 0)
-    pack.encoder_counts = scales->header.encoder_counts;
+  if (!options.settings.empty()) {
+    pack.settings = text_of_file(options.settings);
+    pack.settings_origin = options.settings.string();
+  } else if (!active.empty()) {
+    // Signals are limited to two bases where they enter a drive.
+    const double most_a = 1.99 * deployment::bases_of(file.model, 1.0 / pack.tick_hz, 1.0).current_base;
+    std::optional<double> lowered_from_a;
+    pack.settings = drive::settings_text(deployment::unpack(active), most_a, lowered_from_a);
+    if (lowered_from_a)
+      console.warn(
+          fmt::format("overcurrent is lowered from {:.4g} A to {:.4g} A: with this model's rated current the "
+                      "drive measures no more; a higher rated_current_a in [drive] keeps it",
+                      *lowered_from_a, most_a));
+    pack.settings_origin = "the active block's settings";
+  } else {
+    throw UsageError("the drive has no block to take its settings from; state them: --settings FILE.toml");
+  }
   console.progress("proving the block and comparing it with double");
-  return deployment::pack(file.model, pack).bytes;
+  const Bytes block = deployment::pack(file.model, pack).bytes;
+  require_same_gear(active, block);
+  return block;
 }
 
 }  // namespace

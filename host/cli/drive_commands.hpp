@@ -20,6 +20,7 @@ struct FlashOptions {
   std::string drive;
   std::filesystem::path model;
   std::filesystem::path block;
+  std::filesystem::path settings;  // empty: those of the active block
   bool yes = false;
   std::string json;
 };

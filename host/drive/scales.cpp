@@ -45,7 +45,8 @@ std::int32_t Scales::per_unit(double value, double base) const {
 
 std::optional<Scales> scales_of(const Bytes& block) {
   Scales scales;
-  if (!model::check_frame(block, scales.header).good()) return {};
+  if (!model::check_start(block).good()) return {};
+  scales.header = model::header_of(block);
   scales.constants = deployment::from_block(scales.header.bases);
   return scales;
 }

@@ -7,6 +7,7 @@
 #include <thread>
 
 #include "shared/fixed/types.hpp"
+#include "shared/model/block_texts.hpp"
 #include "shared/model/encoding.hpp"
 #include "shared/protocol/texts.hpp"
 
@@ -179,7 +180,7 @@ void Session::write_block(const Bytes& block, const std::function<void(std::size
   if (code == Code::invalid) {
     protocol::Reason reason;
     protocol::take_payload(m.content(), reason);
-    fail(fmt::format("{} (reason {})", protocol::text_of(code), reason.reason));
+    fail(fmt::format("{}: {}", protocol::text_of(code), model::text_of(static_cast<model::BlockFault>(reason.reason))));
   }
   // A commit that was done and whose answer got lost is no more there to be done again.
   const protocol::Status now = status();

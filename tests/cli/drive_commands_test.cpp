@@ -86,17 +86,40 @@ TEST(Flash, SaysWhatChangesFlashesAndRestoreGoesBack) {
   shell.must("flexspline unpack b.block");
 }
 
+TEST(Flash, AnotherModelLeavesTheSettingsOfTheDriveAsTheyWere) {
+  const Shell shell;
+  // With the drive's current limit as rated current its overcurrent can be measured.
+  std::string model = model_with(1.0);
+  model.replace(model.find("rated_current_a = 2.0"), 21, "rated_current_a = 3.5");
+  shell.write("a.toml", model);
+  const TwinProcess twin({"--serve", "0"});
+  shell.must("flexspline backup --out made.block --drive " + twin.name());
+  shell.must("flexspline flash --model a.toml --drive " + twin.name());
+  shell.must("flexspline backup --out now.block --drive " + twin.name());
+  const json made = shell.json("flexspline unpack made.block"), now = shell.json("flexspline unpack now.block");
+  ASSERT_EQ(made["settings"].size(), now["settings"].size());
+  for (std::size_t i = 0; i < made["settings"].size(); ++i) {
+    const json &was = made["settings"][i], &is = now["settings"][i];
+    EXPECT_EQ(was["name"], is["name"]);
+    EXPECT_NEAR(is["value"].get<double>(), was["value"].get<double>(), 1e-4 * std::abs(was["value"].get<double>()))
+        << was["name"];
+  }
+}
+
 TEST(Flash, RefusesWhatDoesNotFitAndTheDriveKeepsItsBlock) {
   const Shell shell;
   std::string other_gear = model_with(1.0);
   other_gear.replace(other_gear.find("gear_ratio = 100"), 16, "gear_ratio = 50 ");
   shell.write("gear.toml", other_gear);
   shell.write("no.block", "this is no block");
+  shell.write("a.toml", model_with(1.0));
+  shell.must("flexspline pack --model a.toml --tick-hz 20000 --out model.block");  // without a drive's settings
   const TwinProcess twin({"--serve", "0"});
   const std::string drive = " --drive " + twin.name();
   const std::string made = sha_of(shell, twin);
   for (const auto& [line, expected] :
-       std::vector<std::pair<std::string, std::string>>{{"flash --model gear.toml", "validator refused"},
+       std::vector<std::pair<std::string, std::string>>{{"flash --model gear.toml", "a gear of 50"},
+                                                        {"flash --block model.block", "settings of the drive"},
                                                         {"flash --block no.block", "no good parameter block"},
                                                         {"flash --block missing.block", "cannot be read"},
                                                         {"flash", "--model MODEL"},

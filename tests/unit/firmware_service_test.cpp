@@ -141,7 +141,7 @@ TEST(Service, WhatWasFlashedIsThereAtTheNextStart) {
   std::filesystem::remove(file);
 }
 
-TEST(Service, ABlockThatIsDamagedOrForAnotherDriveIsRefusedAndTheOldOneStaysInUse) {
+TEST(Service, ABlockThatIsDamagedOrForAnotherTickRateIsRefusedAndTheOldOneStaysInUse) {
   Bench b;
   const Bytes made = b.host.read(protocol::Which::active);
   std::uint32_t reason = 0;
@@ -149,10 +149,12 @@ TEST(Service, ABlockThatIsDamagedOrForAnotherDriveIsRefusedAndTheOldOneStaysInUs
   damaged[300] ^= 1;
   EXPECT_EQ(b.host.flash(damaged, &reason), Code::invalid);
   EXPECT_EQ(reason, static_cast<std::uint32_t>(model::BlockFault::wrong_checksum));
-  plant::Drive other = demo();
-  other.gear_ratio = 50.0;
-  EXPECT_EQ(b.host.flash(twin::factory_block(other), &reason), Code::invalid);
-  EXPECT_EQ(reason, twin::TwinBlocks::kDoesNotFit);
+  const auto d = board::constants_of(demo(), 10'000);
+  const board::Block slow(board::parameters_of(demo(), board::setup_of(demo(), d)), d);
+  Bytes other_rate;
+  for (const std::byte byte : slow.bytes()) other_rate.push_back(static_cast<std::uint8_t>(byte));
+  EXPECT_EQ(b.host.flash(other_rate, &reason), Code::invalid);
+  EXPECT_EQ(reason, static_cast<std::uint32_t>(model::BlockFault::other_tick_rate));
   EXPECT_EQ(b.host.read(protocol::Which::active), made);
   EXPECT_EQ(b.host.arm(Mode::velocity).refusal, Refusal::none);
 }
