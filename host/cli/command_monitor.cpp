@@ -127,7 +127,7 @@ int run(const MonitorOptions& options, Console& console) {
   const double tick_hz = session.identity().tick_hz;
   const auto every = static_cast<std::uint16_t>(std::clamp(std::round(tick_hz / options.rate_hz), 1.0, 65535.0));
   std::vector<Channel> asked{Channel::state};
-  asked.insert(asked.end(), channels.begin(), channels.end());
+  for (const Channel c : channels) asked.push_back(c);
   const bool is_terminal = isatty(STDOUT_FILENO) != 0 && options.json != "-";
   console.line(named(session));
   if (!is_terminal) {
