@@ -74,7 +74,7 @@ class ExcitationIntake {
       c.step_change = e.step_change;
       c.ticks = 0;
       c.fade_ticks = e.fade_ticks;
-      c.fade_step = e.fade_ticks > 1 ? ~std::uint64_t{0} / e.fade_ticks : 0;
+      c.fade_step = e.fade_ticks > 1 ? fixed::detail::divided(~std::uint64_t{0}, e.fade_ticks) : 0;
       c.positive = N::Value{{e.positive}};
       c.negative = N::Value{{e.negative}};
       c.offset = N::Value{{e.offset}};

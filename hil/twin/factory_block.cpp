@@ -1,15 +1,36 @@
 #include "hil/twin/factory_block.hpp"
 
+#include <algorithm>
+#include <span>
+#include <string>
+
 #include "hil/board/brain.hpp"
 #include "hil/board/drive_setup.hpp"
+#include "shared/model/block.hpp"
 
 namespace flexspline::twin {
 
+namespace {
+
+// The block of the drive's parameters knows no names.
+void set_name(std::span<std::uint8_t> block, std::size_t at, const std::string& name) {
+  constexpr std::size_t kMost = sizeof(model::Name) - 1;
+  std::copy_n(name.begin(), std::min(name.size(), kMost), block.begin() + static_cast<std::ptrdiff_t>(at));
+}
+
+}  // namespace
+
 std::vector<std::uint8_t> factory_block(const plant::Drive& drive) {
   const effects::DriveConstants<double> d = board::constants_of(drive);
-  const board::Block block(board::parameters_of(drive, board::setup_of(drive, d)), d);
-  const auto* const bytes = reinterpret_cast<const std::uint8_t*>(block.bytes().data());
-  return {bytes, bytes + block.bytes().size()};
+  const board::Block made(board::parameters_of(drive, board::setup_of(drive, d)), d);
+  const auto* const bytes = reinterpret_cast<const std::uint8_t*>(made.bytes().data());
+  std::vector<std::uint8_t> block(bytes, bytes + made.bytes().size());
+  set_name(block, model::detail::kBlockStart, drive.name);
+  set_name(block, model::detail::kBlockStart + sizeof(model::Name), "as made");
+  const auto checked = std::span<std::uint8_t>(block).first(block.size() - model::detail::kChecksum);
+  model::Writer end(std::span<std::uint8_t>(block).last(model::detail::kChecksum));
+  end.put(model::crc32(checked));
+  return block;
 }
 
 }  // namespace flexspline::twin

@@ -1,0 +1,39 @@
+// Between the service and reports of 64 bytes (USB HID): whole messages both ways, nothing lost on the drive's side.
+#pragma once
+
+#include <span>
+
+#include "shared/protocol/message.hpp"
+
+namespace flexspline::firmware {
+
+// `Reports` has receive(report), which is false where none came, send(report), and room() for reports to the host
+// (shared/usb/hid.hpp). What is no message is passed over.
+template <class Service, class Reports>
+class ReportLink {
+ public:
+  ReportLink(Service& service, Reports& reports) : service_(service), reports_(reports) {}
+
+  // From background work, again and again; `connected`: a host has configured the device.
+  void turn(bool connected) {
+    if (connected != connected_) service_.disconnected();
+    if (connected != connected_) waits_ = false;
+    connected_ = connected;
+    if (!connected) return;
+    // A request that the service has no room for waits here, and those behind it with their endpoint.
+    protocol::Report report;
+    if (!waits_) waits_ = reports_.receive(report) && protocol::decode(report, request_);
+    if (waits_) waits_ = !service_.take(request_);
+    protocol::Message m;
+    while (reports_.room() > 0 && service_.next(m)) reports_.send(protocol::encode(m));
+  }
+
+ private:
+  Service& service_;
+  Reports& reports_;
+  protocol::Message request_{};
+  bool waits_ = false;
+  bool connected_ = false;
+};
+
+}  // namespace flexspline::firmware
