@@ -5,7 +5,9 @@
 #include <memory>
 
 #include "host/catalogue/constants.hpp"
+#include "host/catalogue/defined.hpp"
 #include "host/deployment/bases.hpp"
+#include "host/deployment/fold.hpp"
 #include "host/deployment/note.hpp"
 #include "host/deployment/pack.hpp"
 #include "shared/control/drive_block.hpp"
@@ -121,6 +123,14 @@ model::Model model_from(const Note& note, const model::BlockHeader& header) {
   m.name = text_of(header.model);
   m.drive = note.drive;
   for (const EffectValues& e : note.effects) {
+    if (e.number == model::DriveModel<Fixed>::number_of<effects::TableEffect>()) {
+      const auto& p = e.parameters;
+      if (p.size() != effects::TableEffect::kParameters.size() || !(p[0] >= 0.0 && p[0] <= 12.0) ||
+          !(p[1] >= 0.0 && p[1] <= 2.0) || !(p[3] >= 2.0 && p[3] <= 256.0))
+        throw PackError(fmt::format("the block's note on the table {} cannot be read", e.id));
+      m.effects.push_back({std::string(catalogue::kTableEffect), e.id, {}, definition_of(p)});
+      continue;
+    }
     const auto all = catalogue::all();
     const auto entry = std::find_if(all.begin(), all.end(), [&](const auto& x) { return x.id == e.number; });
     if (entry == all.end() || entry->parameters.size() != e.parameters.size())
