@@ -3,11 +3,11 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
-#include <numbers>
+#include <stdexcept>
 
 #include "host/catalogue/constants.hpp"
 #include "host/catalogue/defined.hpp"
-#include "shared/effects/table_effect.hpp"
+#include "shared/effects/variables.hpp"
 
 namespace flexspline::deployment {
 namespace {
@@ -23,7 +23,15 @@ const effects::VariableInfo& info_of(effects::Variable variable) {
                        [&](const auto& info) { return info.variable == variable; });
 }
 
+const catalogue::Entry& table_entry() {
+  return *catalogue::find_made_by_user(catalogue::kTableEffect);
+}
+
 }  // namespace
+
+std::size_t table_number() {
+  return table_entry().id;
+}
 
 std::optional<Folded> folded(const model::Effect& effect, const model::Drive& drive,
                              const effects::DriveConstants<double>& bases) {
@@ -71,30 +79,39 @@ std::optional<Folded> folded(const model::Effect& effect, const model::Drive& dr
 }
 
 std::vector<double> table_parameters(const model::Definition& d) {
-  using effects::TableEffect;
-  std::vector<double> all(TableEffect::kParameters.size(), 0.0);
+  const catalogue::Entry& entry = table_entry();
+  std::vector<double> all(entry.parameters.size(), 0.0);
   const auto balance = std::find(kBalanceNames.begin(), kBalanceNames.end(), d.balance);
-  all[0] = static_cast<double>(catalogue::find_variable(d.variable)->variable);
-  all[1] = static_cast<double>(balance - kBalanceNames.begin());
-  all[2] = d.times_direction ? 1.0 : 0.0;
-  all[3] = static_cast<double>(d.table.value.size());
-  all[4] = d.table.at.front();
-  all[5] = d.table.at.back();
-  std::copy(d.table.value.begin(), d.table.value.end(), all.begin() + TableEffect::kStated);
+  all[entry.index_of("variable")] = static_cast<double>(catalogue::find_variable(d.variable)->variable);
+  all[entry.index_of("balance")] = static_cast<double>(balance - kBalanceNames.begin());
+  all[entry.index_of("times_direction")] = d.times_direction ? 1.0 : 0.0;
+  all[entry.index_of("points")] = static_cast<double>(d.table.value.size());
+  all[entry.index_of("from")] = d.table.at.front();
+  all[entry.index_of("to")] = d.table.at.back();
+  std::copy(d.table.value.begin(), d.table.value.end(),
+            all.begin() + static_cast<std::ptrdiff_t>(entry.index_of("value")));
   return all;
 }
 
 model::Definition definition_of(const std::vector<double>& p) {
-  using effects::TableEffect;
+  const catalogue::Entry& entry = table_entry();
+  const auto stated = [&](const char* name, double least, double most) {
+    const std::size_t at = entry.index_of(name);
+    if (p.size() != entry.parameters.size() || !(p[at] >= least && p[at] <= most))
+      throw std::invalid_argument("these are no parameters of a table");
+    return static_cast<std::size_t>(p[at]);
+  };
   model::Definition d;
-  const effects::VariableInfo& variable = info_of(static_cast<effects::Variable>(static_cast<int>(p[0])));
-  const auto points = static_cast<std::size_t>(p[3]);
+  const effects::VariableInfo& variable = info_of(
+      static_cast<effects::Variable>(stated("variable", 0.0, static_cast<double>(effects::Variable::temperature))));
+  const std::size_t points = stated("points", 2.0, static_cast<double>(catalogue::kMostPoints));
   d.variable = std::string(variable.name);
-  d.balance = kBalanceNames.at(static_cast<std::size_t>(p[1]));
-  d.times_direction = p[2] != 0.0;
-  d.table.at = variable.periodic ? catalogue::points_of_turn(points) : catalogue::even_points(p[4], p[5], points);
-  d.table.value.assign(p.begin() + TableEffect::kStated,
-                       p.begin() + TableEffect::kStated + static_cast<std::ptrdiff_t>(points));
+  d.balance = kBalanceNames.at(stated("balance", 0.0, 2.0));
+  d.times_direction = stated("times_direction", 0.0, 1.0) != 0;
+  d.table.at = variable.periodic ? catalogue::points_of_turn(points)
+                                 : catalogue::even_points(p[entry.index_of("from")], p[entry.index_of("to")], points);
+  const auto first = p.begin() + static_cast<std::ptrdiff_t>(entry.index_of("value"));
+  d.table.value.assign(first, first + static_cast<std::ptrdiff_t>(points));
   d.table.fixed = true;
   return d;
 }

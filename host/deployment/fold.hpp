@@ -2,6 +2,7 @@
 // has table_effect.
 #pragma once
 
+#include <cstddef>
 #include <optional>
 #include <vector>
 
@@ -18,8 +19,12 @@ struct Folded {
 std::optional<Folded> folded(const model::Effect& effect, const model::Drive& drive,
                              const effects::DriveConstants<double>& bases);
 
+// The number of table effects in a block.
+std::size_t table_number();
+
 // The parameters of a table effect as a drive's coefficients are derived from them; and back.
 std::vector<double> table_parameters(const model::Definition& definition);
+// Throws std::invalid_argument where they are none.
 model::Definition definition_of(const std::vector<double>& table_parameters);
 
 }  // namespace flexspline::deployment

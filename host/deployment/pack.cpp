@@ -33,8 +33,6 @@ constexpr double kOverspeed = 1.25;
 constexpr double kDirectionBand = 1.0 / 200.0;
 constexpr double kTorsionLimit = 2.0;
 
-constexpr std::size_t kTableNumber = model::DriveModel<Fixed>::number_of<effects::TableEffect>();
-
 // The effects of a model as a drive runs them, with tables for those that the image lacks.
 struct OnDrive {
   std::vector<EffectValues> effects;
@@ -59,7 +57,7 @@ OnDrive on_drive(const model::Model& model, const PackOptions& options) {
                       "replace it by one of {}",
                       effect.id, entry.info->rivals));
     if (effect.type == catalogue::kTableEffect && has(effect.type)) {
-      all.effects.push_back({kTableNumber, effect.id, table_parameters(*effect.definition)});
+      all.effects.push_back({table_number(), effect.id, table_parameters(*effect.definition)});
     } else if (effect.type != catalogue::kExpressionEffect && effect.type != catalogue::kTableEffect &&
                has(effect.type)) {
       all.effects.push_back({entry.id, effect.id, catalogue::values_of(effect, entry)});
@@ -75,7 +73,7 @@ OnDrive on_drive(const model::Model& model, const PackOptions& options) {
             has(catalogue::kTableEffect) ? "it depends on more than one signal or on what was before, which "
                                            "no table holds"
                                          : "table_effect, which it could be folded into"));
-      all.effects.push_back({kTableNumber, effect.id, table_parameters(*table->table.definition)});
+      all.effects.push_back({table_number(), effect.id, table_parameters(*table->table.definition)});
       const auto balance = static_cast<std::size_t>(all.effects.back().parameters[1]);
       all.folding_error[balance] += table->error;
       all.folds.push_back(

@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cmath>
 #include <memory>
+#include <stdexcept>
 
 #include "host/catalogue/constants.hpp"
 #include "host/catalogue/defined.hpp"
@@ -123,12 +124,12 @@ model::Model model_from(const Note& note, const model::BlockHeader& header) {
   m.name = text_of(header.model);
   m.drive = note.drive;
   for (const EffectValues& e : note.effects) {
-    if (e.number == model::DriveModel<Fixed>::number_of<effects::TableEffect>()) {
-      const auto& p = e.parameters;
-      if (p.size() != effects::TableEffect::kParameters.size() || !(p[0] >= 0.0 && p[0] <= 12.0) ||
-          !(p[1] >= 0.0 && p[1] <= 2.0) || !(p[3] >= 2.0 && p[3] <= 256.0))
-        throw PackError(fmt::format("the block's note on the table {} cannot be read", e.id));
-      m.effects.push_back({std::string(catalogue::kTableEffect), e.id, {}, definition_of(p)});
+    if (e.number == table_number()) {
+      try {
+        m.effects.push_back({std::string(catalogue::kTableEffect), e.id, {}, definition_of(e.parameters)});
+      } catch (const std::invalid_argument& error) {
+        throw PackError(fmt::format("the block's note on {} cannot be read: {}", e.id, error.what()));
+      }
       continue;
     }
     const auto all = catalogue::all();
