@@ -6,6 +6,7 @@
 #include <numbers>
 
 #include "host/catalogue/constants.hpp"
+#include "host/catalogue/defined.hpp"
 #include "host/deployment/pack.hpp"
 #include "shared/fixed/coefficients.hpp"
 
@@ -29,7 +30,7 @@ double rated_torsion(const model::Model& model, double rated_torque) {
   const auto drive = catalogue::constants_of(model.drive);
   std::vector<std::unique_ptr<catalogue::Instance>> springs;
   for (const model::Effect& effect : model.effects) {
-    const catalogue::Entry& entry = catalogue::get(effect.type);
+    const catalogue::Entry& entry = catalogue::entry_of(effect);
     if (entry.info->balance != effects::Balance::transmission || entry.has_state) continue;
     springs.push_back(entry.make(catalogue::values_of(effect, entry).data(), drive));
   }

@@ -11,6 +11,7 @@
 #include <set>
 
 #include "host/catalogue/constants.hpp"
+#include "host/catalogue/defined.hpp"
 #include "host/deployment/pack.hpp"
 #include "host/text/toml.hpp"
 
@@ -131,7 +132,7 @@ double largest_stiffness(const model::Model& model, double torsion) {
   const auto drive = catalogue::constants_of(model.drive);
   std::vector<std::unique_ptr<catalogue::Instance>> springs;
   for (const model::Effect& effect : model.effects) {
-    const catalogue::Entry& entry = catalogue::get(effect.type);
+    const catalogue::Entry& entry = catalogue::entry_of(effect);
     if (entry.info->balance != effects::Balance::transmission || entry.has_state) continue;
     springs.push_back(entry.make(catalogue::values_of(effect, entry).data(), drive));
   }

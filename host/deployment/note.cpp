@@ -11,7 +11,7 @@
 namespace flexspline::deployment {
 namespace {
 
-constexpr std::size_t kMostBytes = 8192;
+constexpr std::size_t kMostBytes = 12288;
 constexpr std::size_t kMostText = 64;
 
 std::array<model::Quantity*, 7> quantities(model::Drive& d) {

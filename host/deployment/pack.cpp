@@ -8,7 +8,9 @@
 #include <numbers>
 
 #include "host/catalogue/constants.hpp"
+#include "host/catalogue/defined.hpp"
 #include "host/deployment/bases.hpp"
+#include "host/deployment/fold.hpp"
 #include "host/deployment/note.hpp"
 #include "host/deployment/sha256.hpp"
 #include "host/deployment/trial.hpp"
@@ -31,31 +33,56 @@ constexpr double kOverspeed = 1.25;
 constexpr double kDirectionBand = 1.0 / 200.0;
 constexpr double kTorsionLimit = 2.0;
 
-std::vector<EffectValues> values_of(const model::Model& model, const PackOptions& options) {
-  std::vector<EffectValues> all;
+// The effects of a model as a drive runs them, with tables for those that the image lacks.
+struct OnDrive {
+  std::vector<EffectValues> effects;
+  std::array<double, 3> folding_error{};  // N m on each balance, of all tables together
+  std::vector<ProofPart> folds;
+};
+OnDrive on_drive(const model::Model& model, const PackOptions& options) {
+  OnDrive all;
   std::vector<std::string> missing;
+  const auto has = [&](std::string_view type) {
+    return options.image.empty() || std::find(options.image.begin(), options.image.end(), type) != options.image.end();
+  };
+  for (const model::Effect& effect : model.effects)
+    for (const std::string& name : catalogue::missing_values(effect)) missing.push_back(effect.id + "." + name);
+  if (!missing.empty())
+    throw PackError(fmt::format("the model has no value for {}; identify it first", output::listed(missing)));
   for (const model::Effect& effect : model.effects) {
-    const catalogue::Entry& entry = catalogue::get(effect.type);
-    const bool in_image = options.image.empty() ||
-                          std::find(options.image.begin(), options.image.end(), effect.type) != options.image.end();
-    if (entry.info->host_only)
+    const catalogue::Entry& entry = catalogue::entry_of(effect);
+    if (entry.info->host_only && effect.type != catalogue::kExpressionEffect)
       throw PackError(
           fmt::format("{} does not fit: it is too large for a drive, and has a memory that no table holds; "
                       "replace it by one of {}",
                       effect.id, entry.info->rivals));
-    if (!in_image)
-      throw PackError(
-          fmt::format("{} does not fit: the firmware image lacks it; take it out of the model, or build an "
-                      "image with it",
-                      effect.id));
-    for (const model::Parameter& p : effect.parameters)
-      if (!p.value) missing.push_back(effect.id + "." + p.name);
-    all.push_back({entry.id, effect.id, catalogue::values_of(effect, entry)});
+    if (effect.type == catalogue::kTableEffect && has(effect.type)) {
+      all.effects.push_back({table_number(), effect.id, table_parameters(*effect.definition)});
+    } else if (effect.type != catalogue::kExpressionEffect && effect.type != catalogue::kTableEffect &&
+               has(effect.type)) {
+      all.effects.push_back({entry.id, effect.id, catalogue::values_of(effect, entry)});
+    } else {
+      const auto table = has(catalogue::kTableEffect)
+                             ? folded(effect, model.drive, bases_of(model, 1.0 / options.tick_hz, 1.0))
+                             : std::nullopt;
+      if (!table)
+        throw PackError(fmt::format(
+            "{} does not fit: the firmware image lacks it, and {}; take it out of the model, or build an "
+            "image with it",
+            effect.id,
+            has(catalogue::kTableEffect) ? "it depends on more than one signal or on what was before, which "
+                                           "no table holds"
+                                         : "table_effect, which it could be folded into"));
+      all.effects.push_back({table_number(), effect.id, table_parameters(*table->table.definition)});
+      const auto balance = static_cast<std::size_t>(all.effects.back().parameters[1]);
+      all.folding_error[balance] += table->error;
+      all.folds.push_back(
+          {effect.id, "interpolation", table->error, model.drive.axis == data::Axis::linear ? "N" : "N*m"});
+    }
   }
-  if (!missing.empty())
-    throw PackError(fmt::format("the model has no value for {}; identify it first", output::listed(missing)));
   // As drives read them, by rising number; the order of those of one kind is the model's.
-  std::stable_sort(all.begin(), all.end(), [](const auto& a, const auto& b) { return a.number < b.number; });
+  std::stable_sort(all.effects.begin(), all.effects.end(),
+                   [](const auto& a, const auto& b) { return a.number < b.number; });
   return all;
 }
 
@@ -161,14 +188,15 @@ void prove_parts(const std::vector<EffectValues>& effects, const Tried& tried, c
     const Bounds alone = prove({e}, tried.drive);
     double most = 0.0;
     for (std::size_t b = 0; b < bases.size(); ++b) most = std::max(most, alone.torque[b] * bases[b]);
-    packed.proof.push_back({e.id, entry->has_state ? "invariant" : "interval", most, unit});
+    packed.proof.push_back({e.id, entry != entries.end() && entry->has_state ? "invariant" : "interval", most, unit});
   }
   for (std::size_t b = 0; b < bases.size(); ++b)
     packed.proof.push_back({fmt::format("{}_balance", kBalances[b]), "range", tried.bounds.torque[b] * bases[b], unit});
 }
 
 void measure_error(const std::vector<EffectValues>& effects, const Tried& tried, const model::Model& model,
-                   const PackOptions& options, const std::string& unit, Packed& packed) {
+                   const PackOptions& options, const std::string& unit, const std::array<double, 3>& folding_error,
+                   Packed& packed) {
   const Difference d = compare(effects, tried.drive, tried.bounds, options.samples, options.seed);
   if (!d.finding.empty() || !d.within)
     throw PackError(fmt::format("the proof does not hold on a sample: {}",
@@ -177,7 +205,7 @@ void measure_error(const std::vector<EffectValues>& effects, const Tried& tried,
   const std::array<double, 3> rated_of = {rated / tried.drive.gear_ratio, rated, rated};
   const auto bases = torque_bases(tried.drive);
   for (std::size_t b = 0; b < bases.size(); ++b) {
-    const double error = d.worst[b] * bases[b];
+    const double error = d.worst[b] * bases[b] + folding_error[b];
     packed.proof.push_back({fmt::format("{}_balance", kBalances[b]), "measured_error", error, unit});
     if (error / rated_of[b] < packed.max_error_share_of_rated) continue;
     packed.max_error_share_of_rated = error / rated_of[b];
@@ -185,10 +213,11 @@ void measure_error(const std::vector<EffectValues>& effects, const Tried& tried,
     packed.worst_balance = kBalances[b];
   }
   if (packed.max_error_share_of_rated > options.bound)
-    throw BoundError(
-        fmt::format("the block is off by {:.2g} of rated torque on the {} balance, more than {:.2g}; the "
-                    "model's torques are far above the ratings in [drive], or --bound is too small",
-                    packed.max_error_share_of_rated, packed.worst_balance, options.bound));
+    throw BoundError(fmt::format(
+        "the block is off by {:.2g} of rated torque on the {} balance, more than {:.2g}; the "
+        "model's torques are far above the ratings in [drive], effects were folded into tables, or --bound is "
+        "too small",
+        packed.max_error_share_of_rated, packed.worst_balance, options.bound));
 }
 
 }  // namespace
@@ -198,12 +227,14 @@ Packed pack(const model::Model& model, const PackOptions& options) {
     throw PackError(fmt::format("a tick of {:g} Hz is not between 1 Hz and 1 MHz", options.tick_hz));
   if (options.encoder_counts && !(*options.encoder_counts >= 4.0 && *options.encoder_counts <= 0x1p30))
     throw PackError("encoder counts are not between 4 and 2^30 a turn");
-  const std::vector<EffectValues> effects = values_of(model, options);
+  const OnDrive run = on_drive(model, options);
+  const std::vector<EffectValues>& effects = run.effects;
   const std::string unit = model.drive.axis == data::Axis::linear ? "N" : "N*m";
   Packed packed;
   const Tried tried = proven(model, effects, options, packed);
   prove_parts(effects, tried, unit, packed);
-  measure_error(effects, tried, model, options, unit, packed);
+  packed.proof.insert(packed.proof.end(), run.folds.begin(), run.folds.end());
+  measure_error(effects, tried, model, options, unit, run.folding_error, packed);
 
   packed.bytes.resize(model::kLargestBlock);
   model::BlockHeader header = header_of(model, tried.drive, options);

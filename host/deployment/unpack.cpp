@@ -3,9 +3,12 @@
 #include <algorithm>
 #include <cmath>
 #include <memory>
+#include <stdexcept>
 
 #include "host/catalogue/constants.hpp"
+#include "host/catalogue/defined.hpp"
 #include "host/deployment/bases.hpp"
+#include "host/deployment/fold.hpp"
 #include "host/deployment/note.hpp"
 #include "host/deployment/pack.hpp"
 #include "shared/control/drive_block.hpp"
@@ -121,6 +124,14 @@ model::Model model_from(const Note& note, const model::BlockHeader& header) {
   m.name = text_of(header.model);
   m.drive = note.drive;
   for (const EffectValues& e : note.effects) {
+    if (e.number == table_number()) {
+      try {
+        m.effects.push_back({std::string(catalogue::kTableEffect), e.id, {}, definition_of(e.parameters)});
+      } catch (const std::invalid_argument& error) {
+        throw PackError(fmt::format("the block's note on {} cannot be read: {}", e.id, error.what()));
+      }
+      continue;
+    }
     const auto all = catalogue::all();
     const auto entry = std::find_if(all.begin(), all.end(), [&](const auto& x) { return x.id == e.number; });
     if (entry == all.end() || entry->parameters.size() != e.parameters.size())

@@ -65,6 +65,7 @@ struct ScalarSystem {
   static S widen(const S& x) { return x; }
   static S bounded(const S& x) { return x; }
   static S times(const S& a, const S& b) { return a * b; }
+  static S times_gain(const S& a, const S& b) { return a * b; }
   static S scaled(const S& gain, const S& x) { return gain * x; }
   static S ratio(const S& gain, const S& x) { return gain * x; }
   static S signal(const S& gain, const S& x) { return gain * x; }

@@ -67,12 +67,18 @@ struct SpeedGuard {
     return {N::value(torque_limit), N::value(overspeed), N::value(overspeed + overspeed),
             N::gain(torque_limit / (overspeed - velocity_limit))};
   }
-  // What a torque may be at a measured velocity: low <= high, both within the torque limit.
+  // What a torque may be at a measured velocity: low <= high, both within the torque limit. Of both lines only the one
+  // on the side of the velocity can be below the limit; the other passes it at the velocity limit of that side already.
   template <class N>
   static constexpr Bounds<N> bounds(const Coefficients<N>& c, typename N::Value velocity) {
-    const auto v = N::clamp(velocity, c.largest_velocity);
-    return {N::clamp(N::scaled(c.slope, -c.overspeed - v), c.torque_limit),
-            N::clamp(N::scaled(c.slope, c.overspeed - v), c.torque_limit)};
+    return bounds_within<N>(c, N::clamp(velocity, c.largest_velocity));
+  }
+  // Of a velocity that is limited already.
+  template <class N>
+  static constexpr Bounds<N> bounds_within(const Coefficients<N>& c, typename N::Value velocity) {
+    const auto most = N::clamp(N::scaled(c.slope, c.overspeed - N::magnitude(velocity)), c.torque_limit);
+    if (velocity < typename N::Value{}) return {-most, c.torque_limit};
+    return {-c.torque_limit, most};
   }
 };
 

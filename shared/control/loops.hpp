@@ -103,17 +103,17 @@ struct Loops {
     const auto w = N::clamp(velocity, c.largest_velocity);
     const auto feedforward = N::clamp(command.torque, c.largest_torque);
     typename N::Value error{};
-    typename N::Sum wanted = N::sum(feedforward);
+    auto torque = feedforward;
     if (command.mode != Mode::torque) {
       error = velocity_set_point<N>(c, command, angle) - w;
-      const typename N::Sum proportional = c.velocity * error;
-      if (command.mode != s.mode) s.integral = taken_over<N>(c, s.torque, N::narrow(proportional), feedforward);
-      wanted += proportional;
-      wanted += N::sum(N::narrow(s.integral));
+      // Within eight, beside four of the feedforward and two of the integral: the sum fits a value, and where it was
+      // held there it is beyond every limit.
+      const auto proportional = N::clamp(N::scaled(c.velocity, error), most_proportional<N>());
+      if (command.mode != s.mode) s.integral = taken_over<N>(c, s.torque, proportional, feedforward);
+      torque = torque + N::narrow(s.integral) + proportional;
     }
     s.mode = command.mode;
-    const auto bounds = SpeedGuard::bounds<N>(c.guard, w);
-    const auto torque = N::narrow(wanted);
+    const auto bounds = SpeedGuard::bounds_within<N>(c.guard, w);
     const bool above = torque > bounds.high, below = torque < bounds.low;
     s.torque = N::between(torque, bounds.low, bounds.high);
     if (command.mode != Mode::torque && !(above && error > typename N::Value{}) &&
@@ -132,14 +132,16 @@ struct Loops {
     const auto from_position = N::narrow(N::signal(c.position, command.position - angle));
     return N::clamp(from_position + forward, c.velocity_limit);
   }
-  // As sums, of which each step fits, limited where it becomes a state.
+  template <class N>
+  static constexpr typename N::Value most_proportional() {
+    const auto two = N::one() + N::one();
+    return two + two + two + two;
+  }
+  // Limited where it becomes a state; before it is within two, eight and four.
   template <class N>
   static constexpr typename N::State taken_over(const Coefficients<N>& c, typename N::Value torque,
                                                 typename N::Value proportional, typename N::Value feedforward) {
-    typename N::Sum rest = N::sum(torque);
-    rest += N::sum(-proportional);
-    rest += N::sum(-feedforward);
-    return N::widen(N::clamp(N::narrow(rest), c.torque_limit));
+    return N::widen(N::clamp(torque - proportional - feedforward, c.torque_limit));
   }
 };
 

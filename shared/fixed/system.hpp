@@ -269,6 +269,15 @@ struct FixedSystem {
                                multiply_high(static_cast<std::uint32_t>(a.raw), static_cast<std::uint32_t>(whole));
     return {{(long_product(high, whole) + lower) * 2}};
   }
+  // With the upper word of the share alone: the share of an observer's gain, which need not be known to more than
+  // 2^-31.
+  static constexpr State times_gain(State a, const Share& b) {
+    const std::int32_t high = as_word(static_cast<std::int32_t>(a.raw >> 32));
+    const auto whole = static_cast<std::int32_t>(b.raw >> 32);
+    return {{(long_product(high, whole) +
+              multiply_high(static_cast<std::uint32_t>(a.raw), static_cast<std::uint32_t>(whole))) *
+             2}};
+  }
   // Takes what it loses off the distance, of which 28 fractional bits count: so it may pass the target by a unit.
   static constexpr State relax(State from, State target, Kept kept) {
     const std::int64_t away = Policy::state_difference(from.raw, target.raw);

@@ -111,6 +111,8 @@ const Reasons& reasons() {
       {"host/cli/base_model.cpp", "a first model has the effects that every drive has"},
       {"host/cli/command_demo.cpp",
        "what the demo may hide is chosen, so that a newcomer sees something that he knows"},
+      {"host/deployment/drive_settings.cpp",
+       "loops are laid out for an inertia, and the lead of a feedforward is as slow as the damping lets it"},
       {"host/diagnosis/diagnose.cpp",
        "sublinear friction has two formulas, of which one is named as the other's rival"},
       {"host/diagnosis/trials.cpp", "likewise"},

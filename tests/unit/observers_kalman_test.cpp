@@ -147,7 +147,8 @@ TEST(EncoderKalman, CornerAndJerkDensityAreTwoNamesOfOneSetup) {
   const auto setup = observers::setup_for_corner(kCounts, corner, d);
   // sigma^2 = q^2/12, S = T sigma^2 w^6
   EXPECT_NEAR(setup.jerk_density / (kTickS * std::pow(kTurn / kCounts, 2) / 12.0 * std::pow(corner, 6)), 1.0, 1e-12);
-  EXPECT_NEAR((EncoderKalman::derive<Real>(setup, d).tick) / (corner * kTickS), 1.0, 1e-12);
+  // Shares count in 2^-31, the tick in twice that.
+  EXPECT_NEAR((EncoderKalman::derive<Real>(setup, d).tick) / (corner * kTickS), 1.0, 0x1p-31 / (corner * kTickS));
 }
 
 TEST(EncoderKalman, ACornerAboveOneRadianATickIsFound) {
