@@ -3,25 +3,10 @@
 #include <Eigen/Cholesky>
 #include <Eigen/QR>
 #include <algorithm>
-#include <array>
 #include <cmath>
-#include <string_view>
 
 namespace flexspline::diagnosis {
 namespace {
-
-// Laws of the same surfaces: what a warmer or drier grease scales together.
-struct Surface {
-  std::string_view name;
-  std::array<std::string_view, 3> laws;
-};
-constexpr Surface kSurfaces[] = {
-    {"viscous friction", {"viscous_friction", "power_law_friction"}},
-    {"dry friction", {"coulomb_friction", "dahl_friction", "lugre_friction"}},
-    {"the output's viscous friction", {"output_viscous_friction"}},
-    {"the output's dry friction", {"output_coulomb_friction"}},
-};
-static_assert(std::size(kSurfaces) <= kMostGroups);
 
 constexpr double kLargestSpread = 0.5;
 constexpr double kSmallestSpread = 1e-4;
@@ -125,20 +110,6 @@ Spread estimate(const std::vector<RecordSums>& records, const SmallVector* given
 }
 
 }  // namespace
-
-std::vector<Group> friction_groups(const regression::Terms& terms, const std::vector<regression::Slot>& linear) {
-  std::vector<Group> groups;
-  for (const Surface& surface : kSurfaces) {
-    Group group{std::string(surface.name), {}};
-    for (std::size_t j = 0; j < linear.size(); ++j) {
-      const std::string_view law = terms[linear[j].term].entry->name();
-      if (std::find(surface.laws.begin(), surface.laws.end(), law) != surface.laws.end())
-        group.columns.push_back(static_cast<Eigen::Index>(j));
-    }
-    if (!group.columns.empty()) groups.push_back(std::move(group));
-  }
-  return groups;
-}
 
 Spread estimate_spread(const std::vector<RecordSums>& records, double tau, double least_variance) {
   return estimate(records, nullptr, tau, least_variance);
