@@ -4,7 +4,6 @@
 #include <Eigen/QR>
 #include <algorithm>
 #include <cmath>
-#include <string_view>
 
 namespace flexspline::diagnosis {
 namespace {
@@ -111,18 +110,6 @@ Spread estimate(const std::vector<RecordSums>& records, const SmallVector* given
 }
 
 }  // namespace
-
-std::vector<Group> friction_groups(const regression::Terms& terms, const std::vector<regression::Slot>& linear) {
-  std::vector<Group> groups;
-  for (std::size_t j = 0; j < linear.size(); ++j) {
-    const std::string_view surface = terms[linear[j].term].entry->info->surface;
-    if (surface.empty()) continue;
-    auto group = std::find_if(groups.begin(), groups.end(), [&](const Group& g) { return g.name == surface; });
-    if (group == groups.end()) group = groups.insert(groups.end(), {std::string(surface), {}});
-    group->columns.push_back(static_cast<Eigen::Index>(j));
-  }
-  return groups;
-}
 
 Spread estimate_spread(const std::vector<RecordSums>& records, double tau, double least_variance) {
   return estimate(records, nullptr, tau, least_variance);

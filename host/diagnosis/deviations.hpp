@@ -8,21 +8,14 @@
 #include <vector>
 
 #include "host/diagnosis/triangles.hpp"
-#include "host/regression/terms.hpp"
+#include "host/regression/between_records.hpp"
 
 namespace flexspline::diagnosis {
 
-// Friction that varies as one: its columns of the regression.
-struct Group {
-  std::string name;  // "viscous friction"
-  std::vector<Eigen::Index> columns;
-};
-inline constexpr Eigen::Index kMostGroups = 4;
-// Fewer records than that do not tell a spread.
-inline constexpr std::size_t kFewestRecords = 3;
-
-// Groups among the linear parameters that a regression estimates.
-std::vector<Group> friction_groups(const regression::Terms& terms, const std::vector<regression::Slot>& linear);
+using regression::friction_groups;
+using regression::Group;
+using regression::kFewestRecords;
+using regression::kMostGroups;
 
 using SmallVector = Eigen::Matrix<double, Eigen::Dynamic, 1, 0, kMostGroups, 1>;
 using SmallMatrix = Eigen::Matrix<double, Eigen::Dynamic, Eigen::Dynamic, 0, kMostGroups, kMostGroups>;

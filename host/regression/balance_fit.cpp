@@ -2,6 +2,7 @@
 
 #include <cmath>
 
+#include "host/regression/between_records.hpp"
 #include "host/regression/least_squares.hpp"
 #include "host/regression/shapes.hpp"
 
@@ -92,11 +93,22 @@ BalanceFit fit_balance(BalanceData& data, Terms& terms) {
   std::vector<Eigen::Index> told;
   for (Eigen::Index j = 0; j < J.cols(); ++j)
     if (std::isfinite(joint.unit_covariance(j, j))) told.push_back(j);
-  const Eigen::MatrixXd middle = robust_middle(data.records(), fit.root_weights.asDiagonal() * J(Eigen::all, told),
-                                               weighted, robust_lags(fit.autocorrelation_time, data.rows())) *
-                                 (static_cast<double>(data.rows()) / freedom);
+  // Of the rows without what friction that differs from record to record does to them; that is added after.
+  const std::vector<Group> groups = friction_groups(terms, fit.linear);
+  Eigen::MatrixXd torques = Eigen::MatrixXd::Zero(data.rows(), static_cast<Eigen::Index>(groups.size()));
+  for (std::size_t g = 0; g < groups.size(); ++g)
+    for (const Eigen::Index j : groups[g].columns) {
+      const Slot& slot = fit.linear[static_cast<std::size_t>(j)];
+      torques.col(static_cast<Eigen::Index>(g)) +=
+          terms[slot.term].values[slot.parameter] * fit.root_weights.cwiseProduct(J.col(j));
+    }
+  const BetweenRecords between = between_records(data, torques, weighted);
+  const Eigen::MatrixXd columns = fit.root_weights.asDiagonal() * J(Eigen::all, told);
+  const Eigen::MatrixXd middle =
+      robust_middle(data.records(), columns, between.left, robust_lags(between.autocorrelation_time, data.rows())) *
+      (static_cast<double>(data.rows()) / freedom);
   const Eigen::MatrixXd unit = joint.unit_covariance(told, told);
-  fit.covariance(told, told) = unit * middle * unit;
+  fit.covariance(told, told) = with_differences(between, data, torques, columns, unit, unit * middle * unit);
   fit.own_share = joint.own_share;
   fit.excitation = joint.share_beside_all;
   fit.white_variance = joint.unit_covariance.diagonal() * (weighted.squaredNorm() / freedom);

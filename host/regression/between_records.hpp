@@ -1,0 +1,45 @@
+// Friction that differs from record to record (temperature, grease, run-in): by how much, and what that does to
+// estimates that were made as if it did not.
+#pragma once
+
+#include <Eigen/Core>
+#include <string>
+#include <vector>
+
+#include "host/regression/balance_data.hpp"
+
+namespace flexspline::regression {
+
+// Friction that varies as one: its columns of the regression.
+struct Group {
+  std::string name;  // "viscous friction"
+  std::vector<Eigen::Index> columns;
+};
+inline constexpr Eigen::Index kMostGroups = 4;
+// Fewer records than that do not tell a spread.
+inline constexpr std::size_t kFewestRecords = 3;
+
+// Groups among the linear parameters that a regression estimates.
+std::vector<Group> friction_groups(const Terms& terms, const std::vector<Slot>& linear);
+
+// Each record has a factor 1 + b on the torque of each group, b of mean nought.
+struct BetweenRecords {
+  Eigen::VectorXd std;                // of b, by group; nought where records do not differ for certain
+  Eigen::VectorXd freedom;            // of that estimate: records that tell it, less one
+  Eigen::VectorXd left;               // residual without the records' own factors
+  double autocorrelation_time = 1.0;  // of what is left
+};
+
+// From a fit's residual and the friction torques (a column a group), both weighted. The variance of b is the one at
+// which the factors of the records scatter as they should, after their own errors (Paule and Mandel, 1982).
+BetweenRecords between_records(const BalanceData& data, const Eigen::MatrixXd& torques,
+                               const Eigen::VectorXd& residual);
+
+// Covariance of the estimates (`unit` is (X'WX)^-1, `columns` W^1/2 X), `within` being what it is without differences
+// between records: what those add, and all of it widened so far that 1.96 standard errors hold 95 % although the
+// spread is known from few records (Student's t, degrees of freedom after Satterthwaite).
+Eigen::MatrixXd with_differences(const BetweenRecords& between, const BalanceData& data, const Eigen::MatrixXd& torques,
+                                 const Eigen::MatrixXd& columns, const Eigen::MatrixXd& unit,
+                                 const Eigen::MatrixXd& within);
+
+}  // namespace flexspline::regression
