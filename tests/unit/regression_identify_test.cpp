@@ -346,6 +346,32 @@ TEST(Identify, IntervalsOfWhiteNoiseCoverTheTruth) {
   }
 }
 
+// Records of one motion and noise count alike, so that the mean over them has the deviation of one over the root of
+// their number. The noise is so loud that the differences do not show in it.
+TEST(Identify, IntervalsGrowWithTheDifferencesOfFrictionBetweenRecords) {
+  const std::vector<double> factors{0.94, 0.97, 1.0, 1.03, 1.06};
+  constexpr double kDeviation = 0.0474342;  // of these, with n-1
+  constexpr double kStudent = 2.776445;     // four degrees of freedom, 95 %
+  for (const bool differs : {true, false}) {
+    std::vector<data::Experiment> records;
+    for (std::size_t i = 0; i < factors.size(); ++i) {
+      const double viscous = kViscous * (differs ? factors[i] : 1.0);
+      std::mt19937 random(static_cast<unsigned>(401 + i));
+      std::normal_distribution<double> noise(0.0, 0.02);
+      records.push_back(experiment("r" + std::to_string(i), kLively, [&](double, double w, double a) {
+        return kInertia * a + viscous * w + kCoulomb * sign(w) + noise(random);
+      }));
+    }
+    const auto found = identify(dataset_of(std::move(records)), model_of(kPlain), kOptions);
+    const Estimate& e = estimate(*found, "viscous_friction", "coefficient");
+    const double half = 0.5 * (*e.high - *e.low) / kViscous;
+    if (differs)
+      EXPECT_NEAR(half, kStudent * kDeviation / std::sqrt(5.0), 0.25 * half);
+    else
+      EXPECT_LT(half, 0.02);
+  }
+}
+
 TEST(Reconcile, TheModelWinsOverTheDataSetWithAWarningAboveAThousandth) {
   model::Drive drive;
   drive.gear_ratio.value = 100.0;
