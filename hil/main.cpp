@@ -153,6 +153,12 @@ int main(int argc, char** argv) {
   CLI::App* twin_command = app.add_subcommand("twin", "a drive for `flexspline --drive`, until it is stopped");
   twin_command->add_option("--serve", twin_options.port, "port on 127.0.0.1 (default and 0: any that is free)")
       ->check(CLI::Range(0, 65535));
+  twin_command
+      ->add_option("--usbip", twin_options.usbip,
+                   "a USB device in its place: port of its USB/IP server, 0 any (3240 is usual)")
+      ->check(CLI::Range(0, 65535));
+  twin_command->add_option("--seconds", twin_options.seconds, "ends after so long (default: never)")
+      ->check(CLI::PositiveNumber);
   twin_command->add_flag("--pty", twin_options.pty, "a serial line (pseudo terminal) in the place of a port");
   twin_command->add_flag("--inherit", twin_options.inherits, "a socket that stands as standard input");
   twin_command->add_option("--plant", twin_options.plant_file, "plant file (default: the demo's drive, built in)");

@@ -6,7 +6,9 @@
 #include <algorithm>
 #include <chrono>
 #include <cmath>
+#include <csignal>
 #include <cstdio>
+#include <memory>
 #include <optional>
 #include <stdexcept>
 
@@ -14,6 +16,7 @@
 #include "hil/plant/parameters.hpp"
 #include "hil/twin/line.hpp"
 #include "hil/twin/twin_drive.hpp"
+#include "hil/twin/usb_line.hpp"
 
 namespace flexspline::twin {
 namespace {
@@ -34,9 +37,21 @@ TwinSetup setup_of(const TwinOptions& options) {
   return setup;
 }
 
-Line line_of(const TwinOptions& options) {
-  if (options.inherits) return Line::inherited(STDIN_FILENO);
-  return options.pty ? Line::terminal() : Line::listening(std::max(options.port, 0));
+std::unique_ptr<HostLine> line_of(const TwinOptions& options) {
+  if (options.inherits) return std::make_unique<Line>(Line::inherited(STDIN_FILENO));
+  if (options.pty) return std::make_unique<Line>(Line::terminal());
+  if (options.usbip >= 0) {
+    auto line = std::make_unique<UsbLine>(options.usbip, options.serial);
+    fmt::print("port {}\nattach with: sudo usbip --tcp-port {} attach -r 127.0.0.1 -b {}\n", line->port(), line->port(),
+               UsbLine::kBusId);
+    return line;
+  }
+  return std::make_unique<Line>(Line::listening(std::max(options.port, 0)));
+}
+
+volatile std::sig_atomic_t asked_to_end = 0;
+void note_signal(int) {
+  asked_to_end = 1;
 }
 
 class Server {
@@ -51,12 +66,16 @@ class Server {
 
   void run() {
     if (!options_.inherits) {
-      fmt::print("drive {} at {}\n", options_.serial, line_.name());
+      fmt::print("drive {} at {}\n", options_.serial, line_->name());
       std::fflush(stdout);
     }
+    const auto end = Clock::now() + std::chrono::duration_cast<Clock::duration>(
+                                        std::chrono::duration<double>(std::max(options_.seconds, 0.0)));
+    std::signal(SIGINT, note_signal);
+    std::signal(SIGTERM, note_signal);
     int wait_ms = 0;
-    while (!line_.ended()) {
-      if (line_.turn(wait_ms)) drive_.service().disconnected();
+    while (!line_->ended() && asked_to_end == 0 && (options_.seconds <= 0.0 || Clock::now() < end)) {
+      if (line_->turn(wait_ms)) drive_.service().disconnected();
       const std::uint32_t ticks = ticks_now();
       for (std::uint32_t i = 0; i < ticks; ++i) tick();
       exchange();
@@ -69,12 +88,12 @@ class Server {
   // An armed drive without its host for 0.1 s stops: an armed twin that runs fast waits for its host well before.
   static constexpr std::uint32_t kMostAhead = 1'000;
 
-  bool runs_fast() const { return options_.fast && is_armed(drive_.status().mode) && line_.has_host(); }
+  bool runs_fast() const { return options_.fast && is_armed(drive_.status().mode) && line_->has_host(); }
   std::uint32_t ticks_now() {
     const auto now = Clock::now();
     if (runs_fast()) {
       due_ = now;
-      if (since_message_ >= kMostAhead || (!options_.lossy && !line_.has_room())) return 0;
+      if (since_message_ >= kMostAhead || (!options_.lossy && !line_->has_room())) return 0;
       return kBurst;
     }
     const auto late = std::chrono::duration<double>(now - due_).count();
@@ -93,18 +112,17 @@ class Server {
     if (drive_.status().tick % 20 == 0) exchange();
   }
   void exchange() {
-    while (!line_.arrived().empty() && drive_.service().take(line_.arrived().front())) {
-      line_.arrived().pop_front();
+    for (const protocol::Message* m = line_->front(); m != nullptr && drive_.service().take(*m); m = line_->front()) {
+      line_->drop();
       since_message_ = 0;
     }
     protocol::Message m;
-    while (line_.has_room() && drive_.service().next(m))
-      if (line_.has_host()) line_.send(m);
+    while (line_->has_room() && drive_.service().next(m)) line_->send(m);
   }
 
   TwinOptions options_;
   TwinDrive drive_;
-  Line line_;
+  std::unique_ptr<HostLine> line_;
   Clock::time_point due_;
   std::optional<board::Injection> injection_;
   std::uint32_t since_message_ = 0;
