@@ -8,6 +8,7 @@
 #include <cmath>
 #include <csignal>
 #include <cstdio>
+#include <fstream>
 #include <memory>
 #include <optional>
 #include <stdexcept>
@@ -40,13 +41,30 @@ TwinSetup setup_of(const TwinOptions& options) {
 std::unique_ptr<HostLine> line_of(const TwinOptions& options) {
   if (options.inherits) return std::make_unique<Line>(Line::inherited(STDIN_FILENO));
   if (options.pty) return std::make_unique<Line>(Line::terminal());
-  if (options.usbip >= 0) {
-    auto line = std::make_unique<UsbLine>(options.usbip, options.serial);
-    fmt::print("port {}\nattach with: sudo usbip --tcp-port {} attach -r 127.0.0.1 -b {}\n", line->port(), line->port(),
-               UsbLine::kBusId);
-    return line;
-  }
+  if (options.usbip >= 0) return std::make_unique<UsbLine>(options.usbip, options.serial);
   return std::make_unique<Line>(Line::listening(std::max(options.port, 0)));
+}
+
+// Where it is, for a person or for a program.
+void say_where(const TwinOptions& options, const HostLine& line) {
+  const auto* usb = dynamic_cast<const UsbLine*>(&line);
+  if (options.json_file != "-") {
+    if (usb != nullptr)
+      fmt::print("port {}\nattach with: sudo usbip --tcp-port {} attach -r 127.0.0.1 -b {}\n", usb->port(), usb->port(),
+                 UsbLine::kBusId);
+    fmt::print("drive {} at {}\n", options.serial, line.name());
+  }
+  // Neither a serial number nor a name has letters that JSON writes otherwise.
+  const std::string json =
+      fmt::format("{{\"format\": \"flexspline-twin/1\", \"serial\": \"{}\", \"drive\": \"{}\", \"usbip_port\": {}}}\n",
+                  options.serial, line.name(), usb != nullptr ? std::to_string(usb->port()) : "null");
+  if (options.json_file == "-") {
+    fmt::print("{}", json);
+  } else if (!options.json_file.empty()) {
+    std::ofstream out(options.json_file);
+    if (!(out << json << std::flush)) throw std::runtime_error(options.json_file + ": cannot be written");
+  }
+  std::fflush(stdout);
 }
 
 volatile std::sig_atomic_t asked_to_end = 0;
@@ -65,10 +83,7 @@ class Server {
   }
 
   void run() {
-    if (!options_.inherits) {
-      fmt::print("drive {} at {}\n", options_.serial, line_->name());
-      std::fflush(stdout);
-    }
+    if (!options_.inherits) say_where(options_, *line_);
     const auto end = Clock::now() + std::chrono::duration_cast<Clock::duration>(
                                         std::chrono::duration<double>(std::max(options_.seconds, 0.0)));
     std::signal(SIGINT, note_signal);
