@@ -84,6 +84,18 @@ std::vector<Found> find_hid() {
   return found;
 }
 
+namespace {
+
+bool is_there(const std::string& path) {
+  hid_device_info* all = hid_enumerate(Identity::kVendorId, Identity::kProductId);
+  bool found = false;
+  for (const hid_device_info* one = all; one != nullptr; one = one->next) found = found || path == one->path;
+  hid_free_enumeration(all);
+  return found;
+}
+
+}  // namespace
+
 std::unique_ptr<Link> open_hid(const std::string& serial) {
   start();
   hid_device_info* all = hid_enumerate(Identity::kVendorId, Identity::kProductId);
@@ -106,6 +118,8 @@ std::unique_ptr<Link> open_hid(const std::string& serial) {
   if (count > 1)
     throw LinkError(fmt::format("USB: there is more than one drive ({}); say which: --drive SERIAL", others));
   hid_device* device = hid_open_path(path.c_str());
+  if (device == nullptr && !is_there(path))
+    throw LinkError(fmt::format("hid:{}: the drive is gone; plug it in again and try again", its_serial));
   if (device == nullptr) throw LinkError(fmt::format("hid:{}: {} cannot be opened; {}", its_serial, path, kRemedy));
   return std::make_unique<Hid>(device, its_serial);
 }
