@@ -23,7 +23,6 @@ timed() {
   took=$(echo "$start $(uptime_s)" | awk '{printf "%.2f", $2 - $1}')
   echo "  $name: $took s"
 }
-# libusb takes the device from the kernel's own driver.
 hidraw_again() {
   [ -e /dev/hidraw0 ] || { echo 1-1:1.0 >/sys/bus/usb/drivers/usbhid/bind; until_true 5 drive_is_there || fail "no driver"; }
 }
@@ -56,18 +55,28 @@ everything() { # TOOL
   unexpected "lost" said.txt
 }
 
-is_open() { ls -l "/proc/$command/fd" 2>/dev/null | grep -qE 'hidraw|bus/usb'; }
+# libusb takes the device from the kernel's own driver, hidraw holds it open.
+is_open() { ls -l "/proc/$command/fd" 2>/dev/null | grep -q hidraw || [ ! -e /dev/hidraw0 ]; }
 # pulled MICROSECONDS COMMAND...: pulls the plug so long after the command opened the drive; sets `code`, and puts the
-# plug in again.
+# plug in again. The command stands still while this script looks and pulls, so that a slow guest does not matter.
 pulled() {
   delay=$1
   shift
   code=0
+  hidraw_again
   "$@" >said.txt 2>&1 &
   command=$!
-  until_true 10 is_open || fail "$* does not open the drive"
+  until is_open; do
+    [ -d "/proc/$command" ] || fail "$* does not open the drive"
+    kill -CONT $command
+    usleep 10000
+    kill -STOP $command
+  done
+  kill -CONT $command
   usleep "$delay"
+  kill -STOP $command
   detach 00
+  kill -CONT $command
   wait $command || code=$?
   attach 1-1
 }
@@ -75,7 +84,7 @@ pulled() {
 cut_short() { # TOOL
   cut=0
   # What is not there yet is flashed, so that there is an old block and a new one.
-  for delay in 1000 120000 240000; do
+  for delay in 1000 40000; do
     must "$1" backup --out old.block
     other=made.block
     is_block old.block made.block && other=new.block
@@ -125,7 +134,7 @@ for way in hidraw libusb; do
   [ $way = hidraw ] || chmod 644 /dev/bus/usb/*/*
   for line in "drives" "backup --out no.block" "backup --drive TWIN --out no.block"; do
     code=0
-    setuidgid user by_$way $line >said.txt 2>&1 || code=$?
+    su user -c "by_$way $line" >said.txt 2>&1 || code=$?
     echo "as a user by $way, $line: $(cat said.txt)"
     [ "$line" = drives ] || [ $code -eq 2 ] || fail "ended with $code"
     expect "70-flexspline.rules" said.txt
