@@ -153,6 +153,13 @@ int main(int argc, char** argv) {
   CLI::App* twin_command = app.add_subcommand("twin", "a drive for `flexspline --drive`, until it is stopped");
   twin_command->add_option("--serve", twin_options.port, "port on 127.0.0.1 (default and 0: any that is free)")
       ->check(CLI::Range(0, 65535));
+  twin_command
+      ->add_option("--usbip", twin_options.usbip,
+                   "a USB device in its place: port of its USB/IP server, 0 any (3240 is usual)")
+      ->check(CLI::Range(0, 65535));
+  twin_command->add_option("--seconds", twin_options.seconds, "ends after so long (default: never)")
+      ->check(CLI::PositiveNumber);
+  twin_command->add_option("--json", twin_options.json_file, "writes where it is into this file; - is standard output");
   twin_command->add_flag("--pty", twin_options.pty, "a serial line (pseudo terminal) in the place of a port");
   twin_command->add_flag("--inherit", twin_options.inherits, "a socket that stands as standard input");
   twin_command->add_option("--plant", twin_options.plant_file, "plant file (default: the demo's drive, built in)");
@@ -160,7 +167,12 @@ int main(int argc, char** argv) {
       ->delimiter(',');
   twin_command->add_option("--hide", twin_options.hide, "effect that the drive has and its maker does not know");
   twin_command->add_option("--flash", twin_options.flash_file, "file that holds its flash memory (default: none)");
-  twin_command->add_option("--serial", twin_options.serial, "serial number (default TWIN)");
+  twin_command->add_option("--serial", twin_options.serial, "serial number (default TWIN)")
+      ->check([](const std::string& text) -> std::string {
+        constexpr const char* kLetters = "abcdefghijklmnopqrstuvwxyzABCDEFGHIJKLMNOPQRSTUVWXYZ0123456789-_.";
+        const bool good = !text.empty() && text.size() <= 16 && text.find_first_not_of(kLetters) == std::string::npos;
+        return good ? "" : "a serial number has 1 to 16 letters, digits, - _ .";
+      });
   twin_command->add_option("--inject", twin_options.inject, "what goes wrong once it is armed, as motor-encoder-stuck");
   twin_command->add_option("--inject-at", twin_options.inject_at_s, "how long it was armed then, s (default 1)");
   twin_command->add_option("--seed", twin_options.seed, "of the sensors' noise (default 1)");

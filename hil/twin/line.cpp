@@ -148,6 +148,7 @@ void Line::lose_host() {
 }
 
 void Line::send(const protocol::Message& m) {
+  if (!has_host()) return;
   const protocol::SerialFrame frame = protocol::serial_frame(m);
   out_.insert(out_.end(), frame.bytes.begin(), frame.bytes.begin() + static_cast<std::ptrdiff_t>(frame.size));
 }

@@ -2,40 +2,37 @@
 
 #include <cstdint>
 #include <deque>
-#include <optional>
 #include <string>
 #include <vector>
 
+#include "hil/twin/host_line.hpp"
 #include "shared/protocol/serial_frame.hpp"
 
 namespace flexspline::twin {
 
 /// The drive's end of a line of bytes: a socket that hosts connect to, a pseudo terminal, or one that is open already.
-class Line {
+class Line final : public HostLine {
  public:
   /// Throw std::runtime_error with the reason.
   static Line listening(int port);
   static Line terminal();
   static Line inherited(int fd);
-  ~Line();
+  ~Line() override;
   Line(Line&& other) noexcept;
   Line(const Line&) = delete;
   Line& operator=(const Line&) = delete;
   Line& operator=(Line&&) = delete;
 
-  /// How a host names it, as "tcp:127.0.0.1:4711".
-  const std::string& name() const { return name_; }
-  /// Moves bytes both ways; waits up to so long for something to come. Returns whether the host at the other end went,
-  /// or another came, since the last call.
-  bool turn(int wait_ms);
-  bool has_host() const { return host_ >= 0; }
+  std::string name() const override { return name_; }
+  bool turn(int wait_ms) override;
+  bool has_host() const override { return host_ >= 0; }
   /// An inherited line whose other end is gone.
-  bool ended() const { return ended_; }
-
-  std::deque<protocol::Message>& arrived() { return arrived_; }
-  /// Whether send() has room; what is sent without waits in this process.
-  bool has_room() const { return out_.size() < kMostWaiting; }
-  void send(const protocol::Message& m);
+  bool ended() const override { return ended_; }
+  const protocol::Message* front() override { return arrived_.empty() ? nullptr : &arrived_.front(); }
+  void drop() override { arrived_.pop_front(); }
+  /// What is sent without room waits in this process.
+  bool has_room() const override { return out_.size() < kMostWaiting; }
+  void send(const protocol::Message& m) override;
 
  private:
   static constexpr std::size_t kMostWaiting = 4096;

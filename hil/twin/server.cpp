@@ -6,7 +6,10 @@
 #include <algorithm>
 #include <chrono>
 #include <cmath>
+#include <csignal>
 #include <cstdio>
+#include <fstream>
+#include <memory>
 #include <optional>
 #include <stdexcept>
 
@@ -14,6 +17,7 @@
 #include "hil/plant/parameters.hpp"
 #include "hil/twin/line.hpp"
 #include "hil/twin/twin_drive.hpp"
+#include "hil/twin/usb_line.hpp"
 
 namespace flexspline::twin {
 namespace {
@@ -34,9 +38,38 @@ TwinSetup setup_of(const TwinOptions& options) {
   return setup;
 }
 
-Line line_of(const TwinOptions& options) {
-  if (options.inherits) return Line::inherited(STDIN_FILENO);
-  return options.pty ? Line::terminal() : Line::listening(std::max(options.port, 0));
+std::unique_ptr<HostLine> line_of(const TwinOptions& options) {
+  if (options.inherits) return std::make_unique<Line>(Line::inherited(STDIN_FILENO));
+  if (options.pty) return std::make_unique<Line>(Line::terminal());
+  if (options.usbip >= 0) return std::make_unique<UsbLine>(options.usbip, options.serial);
+  return std::make_unique<Line>(Line::listening(std::max(options.port, 0)));
+}
+
+// Where it is, for a person or for a program.
+void say_where(const TwinOptions& options, const HostLine& line) {
+  const auto* usb = dynamic_cast<const UsbLine*>(&line);
+  if (options.json_file != "-") {
+    if (usb != nullptr)
+      fmt::print("port {}\nattach with: sudo usbip --tcp-port {} attach -r 127.0.0.1 -b {}\n", usb->port(), usb->port(),
+                 UsbLine::kBusId);
+    fmt::print("drive {} at {}\n", options.serial, line.name());
+  }
+  // Neither a serial number nor a name has letters that JSON writes otherwise.
+  const std::string json =
+      fmt::format("{{\"format\": \"flexspline-twin/1\", \"serial\": \"{}\", \"drive\": \"{}\", \"usbip_port\": {}}}\n",
+                  options.serial, line.name(), usb != nullptr ? std::to_string(usb->port()) : "null");
+  if (options.json_file == "-") {
+    fmt::print("{}", json);
+  } else if (!options.json_file.empty()) {
+    std::ofstream out(options.json_file);
+    if (!(out << json << std::flush)) throw std::runtime_error(options.json_file + ": cannot be written");
+  }
+  std::fflush(stdout);
+}
+
+volatile std::sig_atomic_t asked_to_end = 0;
+void note_signal(int) {
+  asked_to_end = 1;
 }
 
 class Server {
@@ -50,13 +83,14 @@ class Server {
   }
 
   void run() {
-    if (!options_.inherits) {
-      fmt::print("drive {} at {}\n", options_.serial, line_.name());
-      std::fflush(stdout);
-    }
+    if (!options_.inherits) say_where(options_, *line_);
+    const auto end = Clock::now() + std::chrono::duration_cast<Clock::duration>(
+                                        std::chrono::duration<double>(std::max(options_.seconds, 0.0)));
+    std::signal(SIGINT, note_signal);
+    std::signal(SIGTERM, note_signal);
     int wait_ms = 0;
-    while (!line_.ended()) {
-      if (line_.turn(wait_ms)) drive_.service().disconnected();
+    while (!line_->ended() && asked_to_end == 0 && (options_.seconds <= 0.0 || Clock::now() < end)) {
+      if (line_->turn(wait_ms)) drive_.service().disconnected();
       const std::uint32_t ticks = ticks_now();
       for (std::uint32_t i = 0; i < ticks; ++i) tick();
       exchange();
@@ -69,12 +103,12 @@ class Server {
   // An armed drive without its host for 0.1 s stops: an armed twin that runs fast waits for its host well before.
   static constexpr std::uint32_t kMostAhead = 1'000;
 
-  bool runs_fast() const { return options_.fast && is_armed(drive_.status().mode) && line_.has_host(); }
+  bool runs_fast() const { return options_.fast && is_armed(drive_.status().mode) && line_->has_host(); }
   std::uint32_t ticks_now() {
     const auto now = Clock::now();
     if (runs_fast()) {
       due_ = now;
-      if (since_message_ >= kMostAhead || (!options_.lossy && !line_.has_room())) return 0;
+      if (since_message_ >= kMostAhead || (!options_.lossy && !line_->has_room())) return 0;
       return kBurst;
     }
     const auto late = std::chrono::duration<double>(now - due_).count();
@@ -93,18 +127,17 @@ class Server {
     if (drive_.status().tick % 20 == 0) exchange();
   }
   void exchange() {
-    while (!line_.arrived().empty() && drive_.service().take(line_.arrived().front())) {
-      line_.arrived().pop_front();
+    for (const protocol::Message* m = line_->front(); m != nullptr && drive_.service().take(*m); m = line_->front()) {
+      line_->drop();
       since_message_ = 0;
     }
     protocol::Message m;
-    while (line_.has_room() && drive_.service().next(m))
-      if (line_.has_host()) line_.send(m);
+    while (line_->has_room() && drive_.service().next(m)) line_->send(m);
   }
 
   TwinOptions options_;
   TwinDrive drive_;
-  Line line_;
+  std::unique_ptr<HostLine> line_;
   Clock::time_point due_;
   std::optional<board::Injection> injection_;
   std::uint32_t since_message_ = 0;

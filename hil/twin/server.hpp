@@ -12,10 +12,13 @@ struct TwinOptions {
   std::string hide;
   std::string flash_file;
   std::string serial = "TWIN";
+  std::string json_file;  ///< takes where it is, once it listens; - is standard output
   std::string inject;
   double inject_at_s = 1.0;  ///< after the drive was armed first
   std::uint64_t seed = 1;
   int port = -1;          ///< on 127.0.0.1; nought: any that is free
+  int usbip = -1;         ///< on 127.0.0.1, a USB device there; nought: any port that is free
+  double seconds = 0.0;   ///< nought: until it is stopped
   bool pty = false;       ///< a serial line
   bool inherits = false;  ///< a line that the caller left as standard input
   bool empty = false;
@@ -24,9 +27,10 @@ struct TwinOptions {
   bool lossy = false;
 };
 
-/// Runs a drive for hosts that come by, one at a time, over a line of bytes with the serial framing. In real time; with
-/// `fast` an armed drive runs as fast as it can, but no further ahead than its host keeps up with. Returns where the
-/// line that it inherited ends; else never. Throws std::runtime_error with what cannot be opened.
+/// Runs a drive for hosts that come by, one at a time, over a line of bytes with the serial framing or over USB. In
+/// real time; with `fast` an armed drive runs as fast as it can, but no further ahead than its host keeps up with.
+/// Returns where the line that it inherited ends, at SIGINT and SIGTERM, and after `seconds`. Throws std::runtime_error
+/// with what cannot be opened.
 void run_twin(const TwinOptions& options);
 
 }  // namespace flexspline::twin

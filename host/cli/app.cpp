@@ -448,6 +448,15 @@ class App {
     record->add_flag("--force", record_options->force, "write into a folder that is not empty");
     record->add_flag("--clear-fault", record_options->clear_fault, "the cause of the fault it stands in is gone");
     take_yes(record, record_options->yes);
+    const auto [twin, twin_options] = command<TwinOptions>("twin");
+    twin->add_option("--plant", twin_options->plant, "plant file (default: the demo's drive)")->type_name("FILE");
+    twin->add_option("--flash", twin_options->flash, "holds its flash memory (default: none)")->type_name("FILE");
+    twin->add_option("--serial", twin_options->serial, "serial number")->capture_default_str()->type_name("TEXT");
+    twin->add_option("--serve", twin_options->serve, "port on 127.0.0.1 (default: any that is free)")
+        ->type_name("PORT");
+    twin->add_option("--usbip", twin_options->usbip, "a USB device behind this port of USB/IP")->type_name("PORT");
+    twin->add_option("--seconds", twin_options->seconds, "ends after so long (default: at Ctrl-C)")->type_name("S");
+    twin->add_flag("--fast", twin_options->fast, "while armed faster than real time, as its host keeps up");
   }
 
   void add_not_built() {

@@ -61,6 +61,19 @@ struct RecordOptions {
 };
 int run(const RecordOptions& options, Console& console);
 
+struct TwinOptions {
+  std::filesystem::path plant;  // empty: the demo's drive
+  std::filesystem::path flash;  // empty: what is flashed ends with the twin
+  std::string serial = "TWIN";
+  int serve = 0;   // port; nought: any that is free
+  int usbip = -1;  // port of a USB device; below nought: none
+  double seconds = 0.0;
+  bool fast = false;
+  std::string json;
+};
+// Does not come back: the process is the twin from then on.
+int run(const TwinOptions& options, Console& console);
+
 // Opens what --drive names and identifies it.
 drive::Session open_drive(const std::string& drive);
 // "drive SERIAL (BOARD) at NAME".

@@ -221,9 +221,18 @@ const std::array kHelp = {
          "flexspline plan --model fitted.toml --run-s 2 --motions 1 --without off,locked,load,temperature --out "
          "plan.toml",
          "flexspline record --drive twin --plan plan.toml --out recorded"}},
+    CommandHelp{
+        "twin",
+        "a virtual drive: a plant, its sensors and the firmware",
+        "Runs until Ctrl-C and says as what --drive finds it: a socket (tcp:127.0.0.1:PORT), or with --usbip a USB "
+        "device, which Linux takes for a real one once it is attached: sudo modprobe vhci-hcd; sudo usbip --tcp-port "
+        "PORT attach -r 127.0.0.1 -b 1-1. --drive twin starts one of its own and needs none of this. "
+        "flexspline-hil twin, which this starts, has more options: hidden effects, faults, a serial line. --json "
+        "writes where it is once it listens.",
+        {"flexspline twin --seconds 0.5"}},
 };
 
-constexpr auto kNotBuilt = std::to_array<std::string_view>({"export", "twin", "hil", "workbench"});
+constexpr auto kNotBuilt = std::to_array<std::string_view>({"hil", "workbench"});
 
 }  // namespace
 

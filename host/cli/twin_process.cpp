@@ -6,6 +6,8 @@
 #include <sys/wait.h>
 #include <unistd.h>
 
+#include <cerrno>
+#include <cstdio>
 #include <cstring>
 #include <stdexcept>
 
@@ -21,18 +23,29 @@ std::filesystem::path beside_this_program() {
   return self.parent_path() / "flexspline-hil";
 }
 
-}  // namespace
-
-void run_twin(const std::vector<std::string>& arguments) {
+std::string program_there() {
   const std::string program = beside_this_program().string();
   if (access(program.c_str(), X_OK) != 0)
     throw std::runtime_error(
         fmt::format("{} is not there; build it with ./dev build, and keep both programs in one folder", program));
-  std::vector<std::string> words{program};
-  words.insert(words.end(), arguments.begin(), arguments.end());
+  return program;
+}
+
+// The words of a command line; what is pointed at is `words`.
+std::vector<char*> pointers(std::vector<std::string>& words) {
   std::vector<char*> argv;
   for (std::string& word : words) argv.push_back(word.data());
   argv.push_back(nullptr);
+  return argv;
+}
+
+}  // namespace
+
+void run_twin(const std::vector<std::string>& arguments) {
+  const std::string program = program_there();
+  std::vector<std::string> words{program};
+  words.insert(words.end(), arguments.begin(), arguments.end());
+  const std::vector<char*> argv = pointers(words);
   // Standard output may belong to a machine (`--json -`).
   posix_spawn_file_actions_t actions;
   posix_spawn_file_actions_init(&actions);
@@ -47,6 +60,16 @@ void run_twin(const std::vector<std::string>& arguments) {
   if (!WIFEXITED(status) || WEXITSTATUS(status) != 0)
     throw std::runtime_error(fmt::format("{} {} did not succeed; its message stands above", program,
                                          arguments.empty() ? "" : arguments.front()));
+}
+
+void become_twin(const std::vector<std::string>& arguments) {
+  const std::string program = program_there();
+  std::vector<std::string> words{program};
+  words.insert(words.end(), arguments.begin(), arguments.end());
+  const std::vector<char*> argv = pointers(words);
+  std::fflush(nullptr);
+  execv(program.c_str(), argv.data());
+  throw std::runtime_error(fmt::format("cannot start {}: {}", program, std::strerror(errno)));
 }
 
 }  // namespace flexspline::cli

@@ -25,6 +25,11 @@ std::string narrow(const wchar_t* text) {
   return out;
 }
 
+// As --drive takes it. A user who may not open a drive may not read its serial number either, with libusb.
+std::string drive_named(const std::string& serial) {
+  return serial.empty() ? "USB" : "hid:" + serial;
+}
+
 // hidapi's own state, which has to be there as long as a device is open.
 void start() {
   if (hid_init() != 0) throw LinkError("USB: hidapi cannot be started; is /sys mounted?");
@@ -56,8 +61,10 @@ class Hid : public Link {
 
  private:
   [[noreturn]] void gone() const {
-    throw LinkError(
-        fmt::format("{}: the drive is gone ({}); plug it in again and try again", name(), narrow(hid_error(device_))));
+    // The libusb back end before hidapi 0.14 knows no reasons.
+    std::string why = narrow(hid_error(device_));
+    if (why.empty() || why.find("not implemented") != std::string::npos) why = "USB lost it";
+    throw LinkError(fmt::format("{}: the drive is gone ({}); plug it in again and try again", name(), why));
   }
   hid_device* device_;
   std::string serial_;
@@ -71,7 +78,7 @@ std::vector<Found> find_hid() {
   hid_device_info* all = hid_enumerate(Identity::kVendorId, Identity::kProductId);
   for (const hid_device_info* one = all; one != nullptr; one = one->next) {
     const std::string serial = narrow(one->serial_number);
-    Found drive{"hid:" + serial, narrow(one->product_string) + " on USB, " + one->path, true, {}};
+    Found drive{drive_named(serial), narrow(one->product_string) + " on USB, " + one->path, true, {}};
     if (hid_device* device = hid_open_path(one->path)) {
       hid_close(device);
     } else {
@@ -84,13 +91,27 @@ std::vector<Found> find_hid() {
   return found;
 }
 
+namespace {
+
+bool is_there(const std::string& path) {
+  hid_device_info* all = hid_enumerate(Identity::kVendorId, Identity::kProductId);
+  bool found = false;
+  for (const hid_device_info* one = all; one != nullptr; one = one->next) found = found || path == one->path;
+  hid_free_enumeration(all);
+  return found;
+}
+
+}  // namespace
+
 std::unique_ptr<Link> open_hid(const std::string& serial) {
   start();
   hid_device_info* all = hid_enumerate(Identity::kVendorId, Identity::kProductId);
   std::string path, its_serial, others;
   std::size_t count = 0;
+  bool hides_serial = false;
   for (const hid_device_info* one = all; one != nullptr; one = one->next) {
     const std::string this_serial = narrow(one->serial_number);
+    hides_serial = hides_serial || this_serial.empty();
     others += (others.empty() ? "" : ", ") + this_serial;
     if (!serial.empty() && this_serial != serial) continue;
     path = one->path;
@@ -98,15 +119,20 @@ std::unique_ptr<Link> open_hid(const std::string& serial) {
     ++count;
   }
   hid_free_enumeration(all);
+  if (count == 0 && hides_serial)
+    throw LinkError(fmt::format("hid:{}: a drive on USB does not tell its serial number; {}", serial, kRemedy));
   if (count == 0) {
     const std::string there = others.empty() ? "no drive is on USB" : "those on USB are " + others;
-    throw LinkError(fmt::format("{}: {}; check cable and power, or use --drive twin without hardware",
-                                serial.empty() ? "USB" : "hid:" + serial, there));
+    throw LinkError(
+        fmt::format("{}: {}; check cable and power, or use --drive twin without hardware", drive_named(serial), there));
   }
   if (count > 1)
     throw LinkError(fmt::format("USB: there is more than one drive ({}); say which: --drive SERIAL", others));
   hid_device* device = hid_open_path(path.c_str());
-  if (device == nullptr) throw LinkError(fmt::format("hid:{}: {} cannot be opened; {}", its_serial, path, kRemedy));
+  if (device == nullptr && !is_there(path))
+    throw LinkError(fmt::format("{}: the drive is gone; plug it in again and try again", drive_named(its_serial)));
+  if (device == nullptr)
+    throw LinkError(fmt::format("{}: {} cannot be opened; {}", drive_named(its_serial), path, kRemedy));
   return std::make_unique<Hid>(device, its_serial);
 }
 

@@ -11,8 +11,8 @@ namespace {
 constexpr const char* kBuilt[] = {"demo",     "new",     "check",    "effects", "measure", "identify",
                                   "simulate", "compare", "diagnose", "add",     "remove",  "sensitivity",
                                   "plan",     "pack",    "unpack",   "export",  "drives",  "flash",
-                                  "backup",   "restore", "monitor",  "record"};
-constexpr const char* kToCome[] = {"twin", "hil", "workbench"};
+                                  "backup",   "restore", "monitor",  "record",  "twin"};
+constexpr const char* kToCome[] = {"hil", "workbench"};
 
 std::vector<std::string> example_lines(const std::string& help) {
   std::vector<std::string> lines;

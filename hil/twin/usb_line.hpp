@@ -1,0 +1,65 @@
+#pragma once
+
+#include <cstdint>
+#include <string>
+#include <vector>
+
+#include "hil/twin/host_line.hpp"
+#include "hil/usbip/core_device.hpp"
+#include "hil/usbip/server.hpp"
+#include "shared/usb/hid.hpp"
+#include "shared/usb/identity.hpp"
+
+namespace flexspline::twin {
+
+/// A drive's USB connector, which hosts reach by USB/IP: the drive's own device core, a message in each report. Whoever
+/// detaches, configures the device away or resets it is a lost host.
+class UsbLine final : public HostLine {
+ public:
+  static constexpr const char* kBusId = "1-1";
+
+  /// Port 0: any that is free. Throws std::runtime_error where it cannot listen.
+  UsbLine(int port, const std::string& serial);
+
+  std::uint16_t port() const { return server_.port(); }
+  std::string name() const override { return "hid:" + serial_; }
+  bool turn(int wait_ms) override;
+  bool has_host() const override { return connector_.device.configured(); }
+  const protocol::Message* front() override;
+  void drop() override { is_waiting_ = false; }
+  bool has_room() const override;
+  void send(const protocol::Message& m) override;
+
+ private:
+  // As many reports as telemetry makes between two frames of the bus, and more requests than a host has open.
+  using Reports = usb::Hid<16, 4>;
+
+  // The device as the bus sees it. A host that leaves and another that comes between two turns are seen by their
+  // resets.
+  struct Connector final : usbip::BusDevice {
+    explicit Connector(const std::string& serial) : device(serial) {}
+    void reset() override {
+      device.reset();
+      was_reset = true;
+    }
+    void setup(std::span<const std::uint8_t, 8> bytes) override { device.setup(bytes); }
+    usbip::Handshake in(std::uint8_t endpoint, std::vector<std::uint8_t>& packet) override {
+      return device.in(endpoint, packet);
+    }
+    usbip::Handshake out(std::uint8_t endpoint, std::span<const std::uint8_t> packet) override {
+      return device.out(endpoint, packet);
+    }
+    usbip::CoreDevice<usb::FlexsplineIdentity, Reports> device;
+    bool was_reset = false;
+  };
+
+  std::string serial_;
+  Connector connector_;
+  Reports& reports_ = connector_.device.get<Reports>();
+  usbip::Server server_;
+  protocol::Message waiting_{};
+  bool is_waiting_ = false;
+  bool had_host_ = false;
+};
+
+}  // namespace flexspline::twin
