@@ -91,6 +91,8 @@ class Server {
     int wait_ms = 0;
     while (!line_->ended() && asked_to_end == 0 && (options_.seconds <= 0.0 || Clock::now() < end)) {
       if (line_->turn(wait_ms)) drive_.service().disconnected();
+      // What waits in the drive takes its place on the line before that counts as room for more time.
+      exchange();
       const std::uint32_t ticks = ticks_now();
       for (std::uint32_t i = 0; i < ticks; ++i) tick();
       exchange();

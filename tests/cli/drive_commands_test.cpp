@@ -55,6 +55,17 @@ TEST(Drives, SaysWhatStandsBehindASocketAndWhatCannotBeReached) {
   EXPECT_TRUE(contains(answer["drives"][1]["problem"].get<std::string>(), "is the twin running?"));
 }
 
+TEST(Twin, SaysWhereItIsAndWhatItCannotDo) {
+  const Shell shell;
+  EXPECT_TRUE(contains(shell.must("flexspline twin --seconds 0.2 --serial SN-42"), "drive SN-42 at tcp:127.0.0.1:"));
+  const json usb = shell.json("flexspline twin --seconds 0.2 --usbip 0");
+  EXPECT_EQ(usb["format"], "flexspline-twin/1");
+  EXPECT_EQ(usb["drive"], "hid:TWIN");
+  EXPECT_GT(usb["usbip_port"].get<int>(), 0);
+  for (const char* line : {"--plant missing.toml", "--usbip 70000", "--serial 'a b'", "--seconds 0.1 --json no/folder"})
+    EXPECT_EQ(shell.run(std::string("flexspline twin ") + line).code, 2) << line;
+}
+
 TEST(Flash, SaysWhatChangesFlashesAndRestoreGoesBack) {
   const Shell shell;
   shell.write("a.toml", model_with(1.0));

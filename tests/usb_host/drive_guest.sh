@@ -56,7 +56,12 @@ everything() { # TOOL
 }
 
 # libusb takes the device from the kernel's own driver, hidraw holds it open.
-is_open() { ls -l "/proc/$command/fd" 2>/dev/null | grep -q hidraw || [ ! -e /dev/hidraw0 ]; }
+is_open() {
+  for handle in "/proc/$command/fd"/*; do
+    case $(readlink "$handle") in /dev/hidraw*) return 0 ;; esac
+  done
+  [ ! -e /dev/hidraw0 ]
+}
 # pulled MICROSECONDS COMMAND...: pulls the plug so long after the command opened the drive; sets `code`, and puts the
 # plug in again. The command stands still while this script looks and pulls, so that a slow guest does not matter.
 pulled() {
