@@ -36,20 +36,6 @@ std::string key_of(const model::Effect& effect) {
   return key;
 }
 
-// All parameters of a table as the effect takes them.
-std::vector<double> stated_parameters(const Definition& d, const Entry& base) {
-  std::vector<double> all(base.parameters.size(), 0.0);
-  all[base.index_of("variable")] = static_cast<double>(find_variable(d.variable)->variable);
-  all[base.index_of("balance")] = static_cast<double>(balance_named(d.balance));
-  all[base.index_of("times_direction")] = d.times_direction ? 1.0 : 0.0;
-  all[base.index_of("points")] = static_cast<double>(d.table.value.size());
-  all[base.index_of("from")] = d.table.at.front();
-  all[base.index_of("to")] = d.table.at.back();
-  std::copy(d.table.value.begin(), d.table.value.end(),
-            all.begin() + static_cast<std::ptrdiff_t>(base.index_of("value")));
-  return all;
-}
-
 // Nothing: of a table that is still to be learnt.
 template <class N>
 Along<N> no_torque() {
@@ -98,7 +84,7 @@ void make_table(Made& made) {
     };
     return;
   }
-  const std::vector<double> stated = stated_parameters(d, base);
+  const std::vector<double> stated = table_parameters(d);
   made.entry.real = with_stated(base.real, stated);
   made.entry.dual = with_stated(base.dual, stated);
   made.entry.make = [stated, make = base.make](const double*, const DriveConstants<double>& drive) {
@@ -136,6 +122,20 @@ std::optional<Objection> objection_to_table(const Definition& d) {
 }
 
 }  // namespace
+
+std::vector<double> table_parameters(const Definition& d) {
+  const Entry& base = *find_made_by_user(kTableEffect);
+  std::vector<double> all(base.parameters.size(), 0.0);
+  all[base.index_of("variable")] = static_cast<double>(find_variable(d.variable)->variable);
+  all[base.index_of("balance")] = static_cast<double>(balance_named(d.balance));
+  all[base.index_of("times_direction")] = d.times_direction ? 1.0 : 0.0;
+  all[base.index_of("points")] = static_cast<double>(d.table.value.size());
+  all[base.index_of("from")] = d.table.at.front();
+  all[base.index_of("to")] = d.table.at.back();
+  std::copy(d.table.value.begin(), d.table.value.end(),
+            all.begin() + static_cast<std::ptrdiff_t>(base.index_of("value")));
+  return all;
+}
 
 const effects::Description* description_of(std::string_view made_by_user) {
   if (made_by_user == kExpressionEffect) return &kExpression;

@@ -23,6 +23,9 @@ const effects::Description* description_of(std::string_view made_by_user);
 // Throws model::ModelError where it cannot be used, std::out_of_range where there is no effect of that name.
 const Entry& entry_of(const model::Effect& effect);
 
+// The parameters of a table as its coefficients are derived from them: those that are stated, then the values.
+std::vector<double> table_parameters(const model::Definition& definition);
+
 // What is wrong with an effect that a user made; nothing where `entry_of` takes it.
 std::optional<model::Objection> objection_to(const model::Effect& effect);
 

@@ -78,21 +78,6 @@ std::optional<Folded> folded(const model::Effect& effect, const model::Drive& dr
   return result;
 }
 
-std::vector<double> table_parameters(const model::Definition& d) {
-  const catalogue::Entry& entry = table_entry();
-  std::vector<double> all(entry.parameters.size(), 0.0);
-  const auto balance = std::find(kBalanceNames.begin(), kBalanceNames.end(), d.balance);
-  all[entry.index_of("variable")] = static_cast<double>(catalogue::find_variable(d.variable)->variable);
-  all[entry.index_of("balance")] = static_cast<double>(balance - kBalanceNames.begin());
-  all[entry.index_of("times_direction")] = d.times_direction ? 1.0 : 0.0;
-  all[entry.index_of("points")] = static_cast<double>(d.table.value.size());
-  all[entry.index_of("from")] = d.table.at.front();
-  all[entry.index_of("to")] = d.table.at.back();
-  std::copy(d.table.value.begin(), d.table.value.end(),
-            all.begin() + static_cast<std::ptrdiff_t>(entry.index_of("value")));
-  return all;
-}
-
 model::Definition definition_of(const std::vector<double>& p) {
   const catalogue::Entry& entry = table_entry();
   const auto stated = [&](const char* name, double least, double most) {

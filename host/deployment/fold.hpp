@@ -22,9 +22,7 @@ std::optional<Folded> folded(const model::Effect& effect, const model::Drive& dr
 // The number of table effects in a block.
 std::size_t table_number();
 
-// The parameters of a table effect as a drive's coefficients are derived from them; and back.
-std::vector<double> table_parameters(const model::Definition& definition);
-// Throws std::invalid_argument where they are none.
+// What catalogue::table_parameters gives, back. Throws std::invalid_argument where they are none.
 model::Definition definition_of(const std::vector<double>& table_parameters);
 
 }  // namespace flexspline::deployment

@@ -57,7 +57,7 @@ OnDrive on_drive(const model::Model& model, const PackOptions& options) {
                       "replace it by one of {}",
                       effect.id, entry.info->rivals));
     if (effect.type == catalogue::kTableEffect && has(effect.type)) {
-      all.effects.push_back({table_number(), effect.id, table_parameters(*effect.definition)});
+      all.effects.push_back({table_number(), effect.id, catalogue::table_parameters(*effect.definition)});
     } else if (effect.type != catalogue::kExpressionEffect && effect.type != catalogue::kTableEffect &&
                has(effect.type)) {
       all.effects.push_back({entry.id, effect.id, catalogue::values_of(effect, entry)});
@@ -73,7 +73,7 @@ OnDrive on_drive(const model::Model& model, const PackOptions& options) {
             has(catalogue::kTableEffect) ? "it depends on more than one signal or on what was before, which "
                                            "no table holds"
                                          : "table_effect, which it could be folded into"));
-      all.effects.push_back({table_number(), effect.id, table_parameters(*table->table.definition)});
+      all.effects.push_back({table_number(), effect.id, catalogue::table_parameters(*table->table.definition)});
       const auto balance = static_cast<std::size_t>(all.effects.back().parameters[1]);
       all.folding_error[balance] += table->error;
       all.folds.push_back(

@@ -106,10 +106,11 @@ class AuthorOf final : public Author {
   typename E::template State<Written> state_{};
 };
 
-std::unique_ptr<Author> author_of(std::size_t id, const std::vector<double>& parameters, const Constants& constants) {
+std::unique_ptr<Author> author_of(std::string_view name, const std::vector<double>& parameters,
+                                  const Constants& constants) {
   std::unique_ptr<Author> author;
-  effects::for_each_effect([&]<class E>(std::size_t number) {
-    if (number == id) author = std::make_unique<AuthorOf<E>>(parameters.data(), constants);
+  effects::for_each_effect([&]<class E>(std::size_t) {
+    if (E::kInfo.name == name) author = std::make_unique<AuthorOf<E>>(parameters.data(), constants);
   });
   return author;
 }
@@ -129,7 +130,11 @@ std::vector<Placed> authors_of(const model::Model& model, const Constants& const
           fmt::format("\"{}\" is a formula of yours, which has no C form yet; learn a table of it (add "
                       "table_effect:VARIABLE) or write it beside the header",
                       effect.id));
-    all.push_back({effect.id, entry.info, author_of(entry.id, catalogue::values_of(effect, entry), constants)});
+    all.push_back({effect.id, entry.info,
+                   author_of(effect.type,
+                             effect.type == catalogue::kTableEffect ? catalogue::table_parameters(*effect.definition)
+                                                                    : catalogue::values_of(effect, entry),
+                             constants)});
   }
   return all;
 }

@@ -40,9 +40,9 @@ class Twister {
     now.torque = torque_;
     now.torque_magnitude = std::abs(torque_);
     balances_.change(now);
-    balances_.advance(now, before_);
     Torques sums;
-    balances_.add_transmission(now, now, sums);
+    balances_.add_transmission(now, before_, sums);
+    balances_.advance(now, before_);
     before_ = now;
     torsion_ = torsion;
     return torque_ = sums.transmission;
@@ -84,12 +84,12 @@ SteadyTorque Sweeps::at_speed(double velocity) const {
     now.angle = k * step;
     now.output_angle = now.angle / constants_.gear_ratio;
     balances.change(now);
+    Torques sums;
+    balances.add_motor(now, before, sums);
+    balances.add_load(now, before, sums);
     balances.advance(now, before);
     before = now;
     if (k <= kSteps) continue;
-    Torques sums;
-    balances.add_motor(now, now, sums);
-    balances.add_load(now, now, sums);
     mean.motor += sums.motor / kSteps;
     mean.load += sums.load / kSteps;
   }

@@ -210,17 +210,17 @@ TEST(Expression, LinearFormulaGivesTheEstimatesOfTheEffectThatItWrites) {
   model::Model published, written;
   for (const char* type : {"inertia", "viscous_friction", "coulomb_friction"}) {
     published.effects.push_back(blank_effect(get(type), data::Axis::rotary));
-    if (std::string_view(type) != "viscous_friction") written.effects.push_back(published.effects.back());
+    if (std::string_view(type) != "inertia") written.effects.push_back(published.effects.back());
   }
-  written.effects.push_back(formula_of("c*velocity", {parameter("c", "N*m*s/rad", 0.0)}));
+  written.effects.push_back(formula_of("c*acceleration", {parameter("c", "kg*m^2", 0.0)}));
   const auto theirs = regression::identify(dataset, published, {40.0, true});
   const auto ours = regression::identify(dataset, written, {40.0, true});
-  const auto& a = estimate(*theirs, "viscous_friction", "coefficient");
+  const auto& a = estimate(*theirs, "inertia", "inertia");
   const auto& b = estimate(*ours, "mine", "c");
   EXPECT_NEAR(b.value / a.value, 1.0, 1e-12);
   EXPECT_NEAR(*b.std / *a.std, 1.0, 1e-9);
   EXPECT_NEAR(*b.spread_percent / *a.spread_percent, 1.0, 1e-9);
-  EXPECT_EQ(b.unit, "N*m*s/rad");
+  EXPECT_EQ(b.unit, "kg*m^2");
   EXPECT_NEAR(estimate(*ours, "coulomb_friction", "torque").value,
               estimate(*theirs, "coulomb_friction", "torque").value, 1e-12);
 }
