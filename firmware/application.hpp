@@ -123,6 +123,12 @@ class Application {
     return true;
   }
 
+  // What the bins mean: of the parameters, which background work alone changes. None where there are none.
+  const control::ResidualMap::Coefficients* map_coefficients() const {
+    return has_parameters() ? &parameters_.residual_map : nullptr;
+  }
+  std::uint32_t map_version() const { return residual_map_.version(); }
+
   Ring& telemetry() { return telemetry_; }
   const Status& status() const { return status_; }
 

@@ -14,6 +14,7 @@
 
 #include "firmware/application.hpp"
 #include "firmware/excitation_intake.hpp"
+#include "firmware/map_messages.hpp"
 #include "firmware/telemetry_messages.hpp"
 #include "shared/protocol/payloads.hpp"
 #include "shared/storage/parameter_store.hpp"
@@ -172,11 +173,13 @@ class Service {
         return identify(m);
       case Kind::status:
       case Kind::effects:
-      case Kind::block_commit: {
+      case Kind::block_commit:
+      case Kind::map_info: {
         protocol::Empty empty;
         if (!taken(m, empty)) return;
         if (m.request() == Kind::status) return status();
         if (m.request() == Kind::effects) return effects();
+        if (m.request() == Kind::map_info) return map_info();
         return commit();
       }
       case Kind::block_begin:
@@ -196,6 +199,10 @@ class Service {
         return finish(excitation_.take(application_, m));
       case Kind::telemetry:
         return telemetry(m);
+      case Kind::map_bins:
+        return map_bins(m);
+      case Kind::map_command:
+        return map_command(m);
       default:
         return finish(Code::unknown_request);
     }
@@ -307,8 +314,34 @@ class Service {
                 N::Value{{c.velocity}},
                 N::Value{{c.acceleration}},
                 N::Value{{c.current}}};
+    submit();
+  }
+  void submit() {
     application_.answer();  // to a command that nobody asks about any more
     waits_for_ = application_.submit(command_) ? Wait::command : Wait::room;
+  }
+
+  // The residual map.
+
+  void map_info() {
+    protocol::MapInfo info;
+    const Code code = MapMessages::info(application_, info);
+    return code == Code::done ? finish(code, info) : finish(code);
+  }
+  void map_bins(const protocol::Message& m) {
+    protocol::MapFirst wanted;
+    if (!taken(m, wanted)) return;
+    protocol::MapBins bins;
+    const Code code = MapMessages::bins(application_, wanted.first, bins);
+    return code == Code::done ? finish(code, bins) : finish(code);
+  }
+  void map_command(const protocol::Message& m) {
+    protocol::MapCommand wanted;
+    if (!taken(m, wanted)) return;
+    command_ = {};
+    command_.kind = MapMessages::command_of(wanted.action);
+    command_.number = ++command_number_;
+    submit();
   }
 
   // Telemetry.

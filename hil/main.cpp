@@ -8,14 +8,16 @@
 #include <cstdio>
 #include <exception>
 #include <filesystem>
+#include <fstream>
 #include <stdexcept>
 #include <string>
 #include <vector>
 
-#include "hil/board/command_drive.hpp"
 #include "hil/plant/parameters.hpp"
 #include "hil/plant/recorder.hpp"
 #include "hil/rhs100/data_set.hpp"
+#include "hil/scenario/command_drive.hpp"
+#include "hil/twin/image.hpp"
 #include "hil/twin/server.hpp"
 
 namespace {
@@ -75,6 +77,25 @@ void make_rhs_100(const RecordOptions& options) {
   fmt::print("{} experiments in {}\n", written, options.out);
 }
 
+struct ImageOptions {
+  std::string out;
+  int major = 0;
+  int minor = 1;
+  std::size_t bytes = 24'000;
+  bool hangs = false;
+};
+
+void make_image(const ImageOptions& options) {
+  const flexspline::boot::Version version{static_cast<std::uint8_t>(options.major),
+                                          static_cast<std::uint8_t>(options.minor)};
+  const auto image = flexspline::twin::twin_image(version, options.bytes, options.hangs);
+  std::ofstream out(options.out, std::ios::binary);
+  out.write(reinterpret_cast<const char*>(image.data()), static_cast<std::streamsize>(image.size()));
+  if (!out.flush()) throw std::runtime_error(options.out + ": cannot be written");
+  fmt::print("{}: firmware {}.{} for board {}, {} bytes\n", options.out, options.major, options.minor,
+             flexspline::twin::kBoardName, image.size());
+}
+
 void list_effects(const std::string& plant_file) {
   const plant::PlantFile file = open_plant(plant_file);
   fmt::print("effects of {} (* = part of the drive as it is):\n", file.drive.name);
@@ -125,12 +146,12 @@ int main(int argc, char** argv) {
   rhs_command->add_flag("--force", options.force, "write into a folder that is not empty");
   rhs_command->footer("Example: flexspline-hil rhs-100 --out rhs-100");
   rhs_command->callback([&] { make_rhs_100(options); });
-  flexspline::board::DriveOptions drive_options;
+  flexspline::scenario::DriveOptions drive_options;
   CLI::App* drive_command = app.add_subcommand(
       "drive", "runs the firmware's application on a simulated drive, with and without compensation");
   drive_command->add_option("--scenario", drive_options.scenario,
-                            "slow-reversals, sine, trapezoid, joint-trajectory or constant-slow (default sine)");
-  drive_command->add_option("--seconds", drive_options.seconds, "simulated time (default 10)")
+                            "a file, or one of `flexspline-hil scenarios` (default sine)");
+  drive_command->add_option("--seconds", drive_options.seconds, "simulated time (default: the scenario's)")
       ->check(CLI::Range(0.01, 36000.0));
   drive_command->add_option("--plant", drive_options.plant_file, "plant file (default: the demo's drive, built in)");
   drive_command->add_option("--with", drive_options.with, "effects that the drive has and its model knows, A,B")
@@ -145,10 +166,24 @@ int main(int argc, char** argv) {
       "parameter block of `flexspline pack --tick-hz 20000`: the drive's model (default: the plant's)");
   drive_command->add_option("--processor", drive_options.processor_image,
                             "firmware image to run it on, in QEMU (boards/qemu_stm32f405)");
+  drive_command->add_option("--trace", drive_options.trace_file, "CSV of one run, a line a millisecond");
   drive_command->add_option("--json", drive_options.json, "file for the result; - is standard output");
   drive_command->add_option("--seed", drive_options.seed, "of the sensors' noise (default 1)");
   drive_command->footer("Example: flexspline-hil drive --scenario slow-reversals --seconds 4");
-  drive_command->callback([&] { flexspline::board::run_drive(drive_options); });
+  drive_command->callback([&] { flexspline::scenario::run_drive(drive_options); });
+  flexspline::scenario::DataSheetOptions sheet;
+  CLI::App* sheet_command = app.add_subcommand(
+      "data-sheet", "writes what the maker says of a drive: settings, and models with its true values");
+  sheet_command->add_option("--scenario", sheet.scenario, "whose drive it is (default: none)");
+  sheet_command->add_option("--plant", sheet.plant_file, "plant file (default: the demo's drive, built in)");
+  sheet_command->add_option("--with", sheet.with, "effects that the drive has and its maker knows, A,B")
+      ->delimiter(',');
+  sheet_command->add_option("--hide", sheet.hide, "effect that its maker does not know");
+  sheet_command->add_option("--out", sheet.out, "folder to write into")->required();
+  sheet_command->footer("Example: flexspline-hil data-sheet --hide gravity --out sheet");
+  sheet_command->callback([&] { flexspline::scenario::write_data_sheet(sheet); });
+  CLI::App* scenarios_command = app.add_subcommand("scenarios", "lists the scenarios that come with the tool");
+  scenarios_command->callback([&] { flexspline::scenario::list_scenarios(); });
   flexspline::twin::TwinOptions twin_options;
   CLI::App* twin_command = app.add_subcommand("twin", "a drive for `flexspline --drive`, until it is stopped");
   twin_command->add_option("--serve", twin_options.port, "port on 127.0.0.1 (default and 0: any that is free)")
@@ -173,6 +208,8 @@ int main(int argc, char** argv) {
         const bool good = !text.empty() && text.size() <= 16 && text.find_first_not_of(kLetters) == std::string::npos;
         return good ? "" : "a serial number has 1 to 16 letters, digits, - _ .";
       });
+  twin_command->add_option("--cable", twin_options.cable_file,
+                           "file that pulls its plug: holds in, out, or out N (after N more messages of the host)");
   twin_command->add_option("--inject", twin_options.inject, "what goes wrong once it is armed, as motor-encoder-stuck");
   twin_command->add_option("--inject-at", twin_options.inject_at_s, "how long it was armed then, s (default 1)");
   twin_command->add_option("--seed", twin_options.seed, "of the sensors' noise (default 1)");
@@ -182,6 +219,19 @@ int main(int argc, char** argv) {
   twin_command->add_flag("--lossy", twin_options.lossy, "with --fast: does not wait for a host that reads slowly");
   twin_command->footer("Example: flexspline-hil twin --serve 4711 --flash twin.flash");
   twin_command->callback([&] { flexspline::twin::run_twin(twin_options); });
+  ImageOptions image_options;
+  CLI::App* image_command =
+      app.add_subcommand("image", "makes a firmware image for the twin, to be sent by `flexspline flash --firmware`");
+  image_command->add_option("--out", image_options.out, "file to write")->required();
+  image_command->add_option("--major", image_options.major, "version, before the point (default 0)")
+      ->check(CLI::Range(0, 255));
+  image_command->add_option("--minor", image_options.minor, "version, behind the point (default 1)")
+      ->check(CLI::Range(0, 255));
+  image_command->add_option("--bytes", image_options.bytes, "behind its header (default 24000)")
+      ->check(CLI::Range(64, 64'000));
+  image_command->add_flag("--hangs", image_options.hangs, "it never confirms itself, and is taken back");
+  image_command->footer("Example: flexspline-hil image --minor 2 --out twin-0.2.image");
+  image_command->callback([&] { make_image(image_options); });
   CLI::App* effects_command = app.add_subcommand("effects", "lists what can be hidden");
   effects_command->add_option("--plant", options.plant_file, "plant file (default: the demo's drive, built in)");
   effects_command->callback([&] { list_effects(options.plant_file); });

@@ -2,14 +2,13 @@
 
 #include <algorithm>
 #include <cmath>
-#include <numbers>
 
 #include "hil/plant/sensors.hpp"
+#include "shared/fixed/turn.hpp"
 
 namespace flexspline::board {
 namespace {
 
-constexpr double kTurn = 2.0 * std::numbers::pi;
 constexpr double kSurgeA = 2.0;
 enum Stream : std::uint64_t { kSensorNoise = 17 };
 
@@ -33,7 +32,11 @@ DriveRig::DriveRig(const RigSetup& setup)
       errors_(plant::sensor_errors_of(setup.drive)),
       plant_(plant::physics_of(setup.drive), setup.locked),
       generator_(plant::stream_seed(setup.seed, 0, kSensorNoise)),
-      temperature_c_(setup.drive.temperature_reference_c) {}
+      temperature_c_(setup.drive.thermal.start_c.value_or(
+          setup.drive.thermal.ambient_c.value_or(setup.drive.temperature_reference_c))) {
+  const double corner_hz = setup.drive.amplifier.bandwidth_hz;
+  if (corner_hz > 0.0) lag_ = 1.0 - std::exp(-kTurn * corner_hz * setup.tick_s);
+}
 
 double DriveRig::noise(const plant::Sensor& sensor, double rated) {
   // Drawn even where it is not used: a fault that is injected does not change the noise of what follows.
@@ -50,7 +53,7 @@ firmware::Readings DriveRig::sense() {
   const plant::Sensors& sensors = setup_.drive.sensors;
   firmware::Readings r = last_;
   const double current = current_a_ + noise(sensors.current, setup_.drive.rated_current_a);
-  double torque = errors_.torque_gain * plant_.torque() + errors_.torque_offset_nm;
+  double torque = errors_.torque_gain * plant_.torque() + errors_.torque_offset_nm + disturbances_.torque_offset_nm;
   for (const plant::Ripple& ripple : errors_.torque_ripple) {
     const double phase = ripple.order * state.motor_angle;
     torque += ripple.cosine * std::cos(phase) + ripple.sine * std::sin(phase);
@@ -62,11 +65,15 @@ firmware::Readings DriveRig::sense() {
     ++r.motor_samples;
     const double zero = errors_.torsion_zero_rad * setup_.drive.gear_ratio;
     if (!has(Injection::motor_encoder_stuck)) r.motor_counter = counter(state.motor_angle - zero, sensors.motor_counts);
+    // The line that is left goes up and down at the same edge.
+    if (has(Injection::encoder_line_lost))
+      r.motor_counter =
+          (last_.motor_counter & ~1U) | (counter(state.motor_angle - zero, sensors.motor_counts) >> 1U & 1U);
     if (has(Injection::motor_encoder_jump)) r.motor_counter += static_cast<std::uint32_t>(sensors.motor_counts / 4);
   }
   if (!has(Injection::output_encoder_stale)) {
     ++r.output_samples;
-    r.output_counter = counter(state.output_angle, sensors.output_counts);
+    r.output_counter = counter(state.output_angle + disturbances_.output_offset_rad, sensors.output_counts);
   }
   if (!has(Injection::analog_stale)) {
     ++r.analog_samples;
@@ -82,23 +89,46 @@ firmware::Readings DriveRig::sense() {
   return r;
 }
 
+// What flows, as the amplifier's reading has it.
+double DriveRig::flowing(bool enabled) {
+  if (!enabled) return made_a_ = 0.0;
+  const double most =
+      disturbances_.amplifier_limit_a > 0.0 ? disturbances_.amplifier_limit_a : setup_.drive.amplifier.saturation_a;
+  made_a_ += lag_ * (current_a_ - made_a_);
+  if (most > 0.0) made_a_ = std::clamp(made_a_, -most, most);
+  return made_a_;
+}
+
+// The housing: what goes in and does not come out again warms it.
+void DriveRig::warm(double current_a) {
+  const plant::Thermal& thermal = setup_.drive.thermal;
+  if (thermal.capacity_j_c <= 0.0) return;
+  const plant::State& state = plant_.state();
+  const double lost_w = setup_.drive.torque_constant_nm_a * current_a * state.motor_velocity -
+                        plant_.torque() * state.output_velocity + thermal.winding_ohm * current_a * current_a;
+  const double to_air_w =
+      (temperature_c_ - thermal.ambient_c.value_or(setup_.drive.temperature_reference_c)) / thermal.resistance_c_w;
+  temperature_c_ += setup_.tick_s * (lost_w - to_air_w) / thermal.capacity_j_c;
+}
+
 void DriveRig::act(const firmware::Actuation& actuation) {
   current_a_ = actuation.enabled ? actuation.current / 32768.0 * scales_.amplifier_a : 0.0;
-  bool flows = actuation.enabled;
-  if (has(Injection::amplifier_dead)) {
-    current_a_ = 0.0;
-    flows = false;
-  }
+  bool flows = actuation.enabled && !has(Injection::amplifier_dead);
+  double reading_a = flowing(flows);
   if (has(Injection::current_surge)) {
-    current_a_ = scales_.amplifier_a + kSurgeA;
+    reading_a = scales_.amplifier_a + kSurgeA;
     flows = true;
   }
+  current_a_ = reading_a;
   plant::Inputs inputs;
   // The amplifier makes its (biased) reading follow the command.
-  inputs.current_a = flows ? current_a_ - errors_.current_offset_a : 0.0;
+  inputs.current_a =
+      flows ? reading_a - errors_.current_offset_a - disturbances_.current_offset_a + setup_.drive.amplifier.offset_a
+            : 0.0;
   inputs.temperature_c = temperature_c_;
   inputs.load_torque_nm = load_torque_nm_;
   plant_.advance(inputs, setup_.tick_s, 1);
+  warm(inputs.current_a);
 }
 
 }  // namespace flexspline::board

@@ -3,7 +3,6 @@
 #include <cstdint>
 #include <optional>
 #include <random>
-#include <set>
 
 #include "firmware/board.hpp"
 #include "hil/plant/parameters.hpp"
@@ -19,6 +18,7 @@ enum class Injection {
   analog_stale,
   motor_encoder_stuck,   ///< samples come, the count stands still
   motor_encoder_jump,    ///< the count is off by a quarter of a turn
+  encoder_line_lost,     ///< one of the motor encoder's two lines: the count goes to and fro by one
   current_out_of_range,  ///< the converter's input is open
   torque_out_of_range,
   temperature_out_of_range,
@@ -34,6 +34,14 @@ struct AnalogScales {
   double torque_nm = 0.0;
   double temperature_c = 0.0;
   double amplifier_a = 0.0;
+};
+
+/// What is wrong with sensors and amplifier, by how much.
+struct Disturbances {
+  double current_offset_a = 0.0;   ///< of the reading, which the amplifier follows
+  double torque_offset_nm = 0.0;   ///< of the reading
+  double output_offset_rad = 0.0;  ///< of the reading
+  double amplifier_limit_a = 0.0;  ///< that it gives at most; nought: what the drive's can
 };
 
 struct RigSetup {
@@ -56,21 +64,27 @@ class DriveRig {
   /// What the amplifier does until the next tick; moves the plant on by one.
   void act(const firmware::Actuation& actuation);
 
-  void inject(Injection what) { injected_.insert(what); }
-  void clear(Injection what) { injected_.erase(what); }
-  bool has(Injection what) const { return injected_.contains(what); }
+  void inject(Injection what) { injected_ |= bit(what); }
+  void clear(Injection what) { injected_ &= ~bit(what); }
+  bool has(Injection what) const { return (injected_ & bit(what)) != 0; }
+  void disturb(const Disturbances& what) { disturbances_ = what; }
   void set_temperature(double celsius) { temperature_c_ = celsius; }
+  double temperature_c() const { return temperature_c_; }
   /// On the output; positive resists positive motion.
   void set_load_torque(double nm) { load_torque_nm_ = nm; }
+  double load_torque_nm() const { return load_torque_nm_; }
 
   const plant::State& truth() const { return plant_.state(); }
   /// Through the flexspline, output side, N m.
   double torque_nm() const { return plant_.torque(); }
-  /// As the amplifier commanded it in the last tick, A; what flows is less by the drive's current offset.
+  /// As the amplifier's own reading has it in the last tick, A; what flows is less by the offsets.
   double current_a() const { return current_a_; }
 
  private:
+  static constexpr std::uint64_t bit(Injection what) { return std::uint64_t{1} << static_cast<int>(what); }
   double noise(const plant::Sensor& sensor, double rated);
+  double flowing(bool enabled);
+  void warm(double current_a);
   std::int16_t share(double value, double full_scale) const;
 
   RigSetup setup_;
@@ -79,10 +93,13 @@ class DriveRig {
   plant::TwoMass plant_;
   std::mt19937_64 generator_;
   std::normal_distribution<double> normal_;
-  std::set<Injection> injected_;
+  std::uint64_t injected_ = 0;  // a bit for each
+  Disturbances disturbances_;
+  double lag_ = 1.0;  // share of its way that the amplifier's current goes in a tick
   firmware::Readings last_;
   double temperature_c_;
   double load_torque_nm_ = 0.0;
+  double made_a_ = 0.0;  // by the amplifier, before its offset
   double current_a_ = 0.0;
 };
 

@@ -2,7 +2,6 @@
 
 #include <algorithm>
 #include <cmath>
-#include <numbers>
 #include <stdexcept>
 #include <string>
 #include <string_view>
@@ -12,11 +11,11 @@
 #include "hil/board/brain.hpp"
 #include "hil/board/drive_rig.hpp"
 #include "shared/fixed/findings.hpp"
+#include "shared/fixed/turn.hpp"
 
 namespace flexspline::board {
 namespace {
 
-constexpr double kTurn = 2.0 * std::numbers::pi;
 using N = firmware::N;
 
 double stiffness_of(const plant::Drive& drive) {

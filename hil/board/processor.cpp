@@ -59,18 +59,24 @@ Processor::Processor(std::filesystem::path image) : image_(std::filesystem::abso
 }
 
 Processor::~Processor() {
+  end();
+}
+
+void Processor::end() {
   if (child_ > 0) {
     kill(child_, SIGKILL);
     waitpid(child_, nullptr, 0);
   }
   if (down_ >= 0) close(down_);
   if (up_ >= 0) close(up_);
+  child_ = down_ = up_ = -1;
   std::error_code ignored;
   if (!folder_.empty()) std::filesystem::remove_all(folder_, ignored);
+  folder_.clear();
 }
 
 void Processor::start(const Block& block, const firmware::TelemetrySetup& telemetry, firmware::ResetCause) {
-  if (child_ > 0) throw std::logic_error("the processor runs already");
+  end();  // a supply that came back
   std::string folder = (std::filesystem::temp_directory_path() / "flexspline-processor-XXXXXX").string();
   if (mkdtemp(folder.data()) == nullptr) throw std::runtime_error(folder + ": cannot be made: " + std::strerror(errno));
   folder_ = folder;

@@ -34,6 +34,7 @@ class Processor : public Brain {
   std::uint32_t stack_bytes() const { return stack_bytes_; }
 
  private:
+  void end();
   void send(const void* bytes, std::size_t count);
   void receive(void* bytes, std::size_t count);
   [[noreturn]] void fail(const char* what);

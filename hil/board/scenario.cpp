@@ -1,88 +1,20 @@
 #include "hil/board/scenario.hpp"
 
 #include <algorithm>
-#include <array>
 #include <chrono>
 #include <cmath>
-#include <numbers>
 #include <stdexcept>
 #include <utility>
 
 #include "firmware/fault_texts.hpp"
 #include "hil/board/drive_setup.hpp"
+#include "shared/fixed/turn.hpp"
 
 namespace flexspline::board {
 namespace {
 
-constexpr double kTurn = 2.0 * std::numbers::pi;
 using firmware::Channel;
 using firmware::N;
-
-Reference sine(double amplitude, double frequency_hz, double time_s) {
-  const double w = kTurn * frequency_hz;
-  return {amplitude * std::sin(w * time_s), amplitude * w * std::cos(w * time_s),
-          -amplitude * w * w * std::sin(w * time_s)};
-}
-// From rest: the first second fades the motion in by 3 x^2 - 2 x^3.
-template <class Motion>
-Reference faded_in(double time_s, Motion motion) {
-  const Reference r = motion(time_s);
-  if (time_s >= 1.0) return r;
-  const double x = time_s, f = x * x * (3.0 - 2.0 * x), df = 6.0 * x * (1.0 - x), ddf = 6.0 - 12.0 * x;
-  return {f * r.position, f * r.velocity + df * r.position,
-          f * r.acceleration + 2.0 * df * r.velocity + ddf * r.position};
-}
-Reference sum(const Reference& a, const Reference& b) {
-  return {a.position + b.position, a.velocity + b.velocity, a.acceleration + b.acceleration};
-}
-
-Reference slow_reversals(double time_s) {
-  return faded_in(time_s, [](double t) { return sine(0.02, 0.25, t); });
-}
-Reference plain_sine(double time_s) {
-  return faded_in(time_s, [](double t) { return sine(0.2, 0.5, t); });
-}
-Reference joint_trajectory(double time_s) {
-  return faded_in(time_s, [](double t) {
-    return sum(sine(0.25, 0.2, t), sum(sine(0.08, 0.55, t + 0.3), sine(0.02, 1.3, t + 0.1)));
-  });
-}
-Reference constant_slow(double time_s) {
-  constexpr double kSpeed = 0.005, kRampS = 0.5;
-  if (time_s >= kRampS) return {kSpeed * (time_s - kRampS / 2.0), kSpeed, 0.0};
-  return {kSpeed * time_s * time_s / (2.0 * kRampS), kSpeed * time_s / kRampS, kSpeed / kRampS};
-}
-// To and fro with constant accelerations: speed up, go, slow down, and back the same way.
-Reference trapezoid(double time_s) {
-  constexpr double kPeriodS = 2.0, kAcceleration = 4.0;
-  constexpr std::array<std::pair<double, double>, 6> kParts{
-      {{0.125, 1.0}, {0.25, 0.0}, {0.125, -1.0}, {0.125, -1.0}, {0.25, 0.0}, {0.125, 1.0}}};
-  double left = std::fmod(time_s, kPeriodS);
-  Reference r;
-  for (const auto& [share, sign] : kParts) {
-    const double t = std::min(left, share * kPeriodS);
-    r.acceleration = sign * kAcceleration;
-    r.position += r.velocity * t + r.acceleration * t * t / 2.0;
-    r.velocity += r.acceleration * t;
-    left -= t;
-    if (left <= 0.0) break;
-  }
-  return r;
-}
-
-constexpr std::array<std::pair<std::string_view, Injection>, 12> kInjections{
-    {{"motor-encoder-stale", Injection::motor_encoder_stale},
-     {"output-encoder-stale", Injection::output_encoder_stale},
-     {"analog-stale", Injection::analog_stale},
-     {"motor-encoder-stuck", Injection::motor_encoder_stuck},
-     {"motor-encoder-jump", Injection::motor_encoder_jump},
-     {"current-out-of-range", Injection::current_out_of_range},
-     {"torque-out-of-range", Injection::torque_out_of_range},
-     {"temperature-out-of-range", Injection::temperature_out_of_range},
-     {"torque-stuck", Injection::torque_stuck},
-     {"amplifier-dead", Injection::amplifier_dead},
-     {"current-surge", Injection::current_surge},
-     {"tick-overrun", Injection::tick_overrun}}};
 
 firmware::TelemetrySetup telemetry() {
   return {
@@ -95,11 +27,9 @@ firmware::TelemetrySetup telemetry() {
 
 class Host {
  public:
-  Host(const effects::DriveConstants<double>& d, const Scenario& scenario, bool compensation)
-      : d_(d), scenario_(scenario), compensation_(compensation) {}
+  Host(const effects::DriveConstants<double>& d, bool compensation) : d_(d), compensation_(compensation) {}
 
-  firmware::Command command(firmware::Command::Kind kind, double time_s) const {
-    const Reference r = scenario_.at(time_s);
+  firmware::Command command(firmware::Command::Kind kind, const Reference& r) const {
     firmware::Command c;
     c.kind = kind;
     c.mode = firmware::Mode::position;
@@ -110,22 +40,130 @@ class Host {
     c.acceleration = N::value(r.acceleration * d_.gear_ratio / d_.acceleration_base);
     return c;
   }
+  // What a host does in a millisecond that it has heard this status in: it takes up a drive that was away.
+  firmware::Command next(const firmware::Status& status, const Reference& r) const {
+    using Kind = firmware::Command::Kind;
+    if (status.mode == firmware::Mode::idle) return command(Kind::arm, r);
+    if (status.mode == firmware::Mode::fault && status.fault.fault == firmware::Fault::host_lost)
+      return command(Kind::clear_fault, r);
+    return command(Kind::set, r);
+  }
 
  private:
   effects::DriveConstants<double> d_;
-  const Scenario& scenario_;
   bool compensation_;
 };
+
+// The motion, and after it the hold: from the velocity at its end to rest within a quarter of a second.
+class Course {
+ public:
+  Course(const Scenario& motion, double duration_s) : motion_(motion), duration_s_(duration_s) {}
+  Reference at(double time_s) const {
+    if (time_s <= duration_s_) return motion_.at(time_s);
+    constexpr double kStopS = 0.25;
+    const Reference end = motion_.at(duration_s_);
+    const double t = std::min(time_s - duration_s_, kStopS);
+    const double stopping = t < kStopS ? -end.velocity / kStopS : 0.0;
+    return {end.position + end.velocity * (t - t * t / (2.0 * kStopS)), end.velocity * (1.0 - t / kStopS), stopping};
+  }
+
+ private:
+  const Scenario& motion_;
+  double duration_s_;
+};
+
+// What becomes of the measurements of a run, one a millisecond.
+class Judge {
+ public:
+  Judge(const ScenarioPlan& plan, ScenarioResult& result) : plan_(plan), result_(result) {}
+
+  void see(double time_s, const Reference& set, const DriveRig& rig) {
+    const plant::State& state = rig.truth();
+    const double error = state.output_angle - set.position, current = rig.current_a();
+    result_.peak_current_a = std::max(result_.peak_current_a, std::abs(current));
+    fastest_ = std::max(fastest_, std::abs(set.velocity));
+    if (time_s <= plan_.duration_s) {
+      if (time_s <= kSettleS) return;
+      error_squares_ += error * error;
+      result_.peak_error_rad = std::max(result_.peak_error_rad, std::abs(error));
+      current_squares_ += current * current;
+      ++judged_;
+      const bool rests = state.motor_velocity == 0.0;
+      if (rests && !rested_ && std::abs(set.velocity) > 0.1 * fastest_) ++result_.stops;
+      rested_ = rests;
+    } else if (time_s > plan_.duration_s + plan_.hold_s / 2.0) {
+      low_ = std::min(low_, state.output_angle);
+      high_ = std::max(high_, state.output_angle);
+      error_sum_ += error;
+      ++held_;
+      if (state.motor_direction != 0) {
+        if (direction_ != 0 && state.motor_direction != direction_) ++result_.hold_reversals;
+        direction_ = state.motor_direction;
+      }
+    }
+  }
+  void finish() {
+    const double count = judged_ > 0 ? static_cast<double>(judged_) : 1.0;
+    result_.rms_error_rad = std::sqrt(error_squares_ / count);
+    result_.rms_current_a = std::sqrt(current_squares_ / count);
+    if (held_ == 0) return;
+    result_.hold_swing_rad = 0.5 * (high_ - low_);
+    result_.hold_error_rad = error_sum_ / static_cast<double>(held_);
+  }
+
+ private:
+  static constexpr double kSettleS = 1.0;
+  const ScenarioPlan& plan_;
+  ScenarioResult& result_;
+  double error_squares_ = 0.0, current_squares_ = 0.0, error_sum_ = 0.0, fastest_ = 0.0;
+  double low_ = 1e300, high_ = -1e300;
+  std::uint64_t judged_ = 0, held_ = 0;
+  int direction_ = 0;
+  bool rested_ = false;
+};
+
+Motion of_sines(std::vector<Motion::Sine> sines) {
+  Motion m;
+  m.sines = std::move(sines);
+  return m;
+}
+Motion constant_slow() {
+  Motion m;
+  m.kind = Motion::Kind::constant;
+  m.velocity_rad_s = 0.005;
+  return m;
+}
+Motion trapezoid() {
+  Motion m;
+  m.kind = Motion::Kind::trapezoid;
+  m.acceleration_rad_s2 = 4.0;
+  m.period_s = 2.0;
+  return m;
+}
+
+TracePoint traced(double time_s, const Reference& set, const VirtualDrive& drive, double load_torque_nm) {
+  const DriveRig& rig = drive.rig();
+  return {time_s,
+          set,
+          rig.truth().output_angle,
+          rig.truth().motor_velocity,
+          rig.torque_nm(),
+          rig.current_a(),
+          rig.temperature_c(),
+          load_torque_nm,
+          drive.status().mode};
+}
 
 }  // namespace
 
 const std::vector<Scenario>& scenarios() {
   static const std::vector<Scenario> all = {
-      {"slow-reversals", "sine of 0.02 rad and 0.25 Hz: friction changes its side", slow_reversals},
-      {"sine", "sine of 0.2 rad and 0.5 Hz", plain_sine},
-      {"trapezoid", "to and fro by 1.5 rad, with accelerations of 4 rad/s^2", trapezoid},
-      {"joint-trajectory", "three sines at once, as a robot's joint moves", joint_trajectory},
-      {"constant-slow", "0.005 rad/s one way: ripple and stick-slip", constant_slow},
+      {"slow-reversals", "sine of 0.02 rad and 0.25 Hz: friction changes its side", of_sines({{0.02, 0.25, 0.0}})},
+      {"sine", "sine of 0.2 rad and 0.5 Hz", of_sines({{0.2, 0.5, 0.0}})},
+      {"trapezoid", "to and fro by 1.5 rad, with accelerations of 4 rad/s^2", trapezoid()},
+      {"joint-trajectory", "three sines at once, as a robot's joint moves",
+       of_sines({{0.25, 0.2, 0.0}, {0.08, 0.55, 0.3}, {0.02, 1.3, 0.1}})},
+      {"constant-slow", "0.005 rad/s one way: ripple and stick-slip", constant_slow()},
   };
   return all;
 }
@@ -134,68 +172,64 @@ const Scenario& scenario(std::string_view name) {
   std::string known;
   for (const Scenario& s : scenarios()) {
     if (s.name == name) return s;
-    known += (known.empty() ? "" : ", ") + std::string(s.name);
+    known += (known.empty() ? "" : ", ") + s.name;
   }
   throw std::invalid_argument("no scenario '" + std::string(name) + "'; there are " + known);
 }
 
 ScenarioResult run_scenario(const ScenarioPlan& plan, std::unique_ptr<Brain> brain) {
   constexpr std::uint32_t kBootTicks = 100, kHostTicks = SoftwareBoard::kTickHz / 1000;
-  const Scenario& motion = scenario(plan.scenario);
+  const Scenario motion = plan.motion ? *plan.motion : scenario(plan.scenario);
+  const Course course(motion, plan.duration_s);
   const effects::DriveConstants<double> constants = plan.packed ? plan.packed->constants : constants_of(plan.drive);
   if (std::abs(constants.gear_ratio - plan.drive.gear_ratio) > 1e-6 * plan.drive.gear_ratio)
     throw std::runtime_error("the block was packed for a gear of " + std::to_string(constants.gear_ratio) +
                              ", the drive has one of " + std::to_string(plan.drive.gear_ratio));
-  const Host host(constants, motion, plan.compensation);
+  const Host host(constants, plan.compensation);
   const auto started = std::chrono::steady_clock::now();
   const Block block =
       plan.packed ? Block(plan.packed->bytes) : Block(parameters_of(plan.drive, setup_of(plan.drive)), constants);
-  VirtualDrive drive({.drive = plan.drive, .seed = plan.seed}, block, telemetry(), std::move(brain));
+  VirtualDrive drive({.drive = plan.drive, .seed = plan.seed, .noise = plan.noise}, block, telemetry(),
+                     std::move(brain));
+  drive.rig().set_load_torque(plan.load_torque_nm);
   drive.run(kBootTicks);
-  const firmware::Answer armed = drive.command(host.command(firmware::Command::Kind::arm, 0.0));
+  const firmware::Answer armed = drive.command(host.command(firmware::Command::Kind::arm, course.at(0.0)));
   if (armed.refusal != firmware::Refusal::none)
     throw std::runtime_error("the drive cannot be armed: fault " +
                              std::string(firmware::info_of(drive.status().fault.fault).name));
 
   ScenarioResult result;
   result.compensation = plan.compensation;
-  const auto ticks = static_cast<std::uint64_t>(std::llround(plan.duration_s * SoftwareBoard::kTickHz));
+  EventScript script(plan.events);
+  Judge judge(plan, result);
+  const auto ticks = static_cast<std::uint64_t>(std::llround((plan.duration_s + plan.hold_s) * SoftwareBoard::kTickHz));
   const auto inject_at = static_cast<std::uint64_t>(std::llround(plan.injection_s * SoftwareBoard::kTickHz));
-  double error_squares = 0.0, current_squares = 0.0;
-  std::uint64_t judged = 0;
   for (std::uint64_t k = 1; k <= ticks; ++k) {
     const double time_s = static_cast<double>(k) / SoftwareBoard::kTickHz;
     if (plan.injection && k == inject_at) drive.rig().inject(*plan.injection);
-    if (k % kHostTicks == 0) drive.post(host.command(firmware::Command::Kind::set, time_s));
-    const double output = drive.rig().truth().output_angle;
+    if (k % kHostTicks == 0) {
+      const Reference set = course.at(time_s);
+      if (!script.empty()) {
+        script.apply(time_s, plan.load_torque_nm, drive.rig());
+        drive.power(!script.acts(Event::Kind::power_cut, time_s));
+      }
+      if (!script.acts(Event::Kind::usb_unplugged, time_s))
+        drive.post(script.empty() ? host.command(firmware::Command::Kind::set, set) : host.next(drive.status(), set));
+      judge.see(time_s, set, drive.rig());
+      if (plan.keeps_trace) result.trace.push_back(traced(time_s, set, drive, drive.rig().load_torque_nm()));
+      if (result.first_fault.fault == firmware::Fault::none) result.first_fault = drive.status().fault;
+    }
     drive.run(1);
-    if (time_s <= 1.0) continue;
-    const double error = output - motion.at(time_s).position;
-    error_squares += error * error;
-    result.peak_error_rad = std::max(result.peak_error_rad, std::abs(error));
-    current_squares += drive.rig().current_a() * drive.rig().current_a();
-    ++judged;
   }
-  const double count = judged > 0 ? static_cast<double>(judged) : 1.0;
-  result.rms_error_rad = std::sqrt(error_squares / count);
-  result.rms_current_a = std::sqrt(current_squares / count);
-  result.ticks = drive.status().tick;
+  judge.finish();
+  result.ticks = kBootTicks + 1 + ticks;
   result.frames = drive.frame_count();
   result.telemetry_hash = drive.telemetry_hash();
   result.end = drive.status();
+  result.final_temperature_c = drive.rig().temperature_c();
+  if (result.first_fault.fault == firmware::Fault::none) result.first_fault = result.end.fault;
   result.wall_s = std::chrono::duration<double>(std::chrono::steady_clock::now() - started).count();
   return result;
-}
-
-std::optional<Injection> injection_named(std::string_view name) {
-  for (const auto& [known, injection] : kInjections)
-    if (known == name) return injection;
-  return {};
-}
-std::vector<std::string_view> injection_names() {
-  std::vector<std::string_view> names;
-  for (const auto& [name, injection] : kInjections) names.push_back(name);
-  return names;
 }
 
 }  // namespace flexspline::board

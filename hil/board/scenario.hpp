@@ -7,23 +7,19 @@
 #include <string_view>
 #include <vector>
 
+#include "hil/board/events.hpp"
+#include "hil/board/motion.hpp"
 #include "hil/board/packed_model.hpp"
 #include "hil/board/virtual_drive.hpp"
 
 namespace flexspline::board {
 
-/// Where the output shall be: rad, rad/s, rad/s^2.
-struct Reference {
-  double position = 0.0;
-  double velocity = 0.0;
-  double acceleration = 0.0;
-};
-
 /// A motion of the output that a host streams to the drive every millisecond.
 struct Scenario {
-  std::string_view name;
-  std::string_view what;
-  Reference (*at)(double time_s);
+  std::string name;
+  std::string what;
+  Motion motion{};
+  Reference at(double time_s) const { return motion.at(time_s); }
 };
 const std::vector<Scenario>& scenarios();
 /// Throws std::invalid_argument naming all there are.
@@ -31,13 +27,33 @@ const Scenario& scenario(std::string_view name);
 
 struct ScenarioPlan {
   plant::Drive drive{};  ///< what the plant has, and what the drive is told of
-  std::string_view scenario = "sine";
+  std::string scenario = "sine";
+  std::optional<Scenario> motion{};  ///< in the place of the one that is named
   double duration_s = 10.0;
+  /// After the motion the output is held where it shall be; the second half shows whether the loops come to rest.
+  double hold_s = 0.0;
   std::uint64_t seed = 1;
   bool compensation = true;
   std::optional<Injection> injection{};
   double injection_s = 0.0;
+  std::vector<Event> events{};
+  double load_torque_nm = 0.0;          ///< on the output all the time, positive resists
   std::optional<PackedModel> packed{};  ///< what the drive is given; else the plant's own values
+  bool keeps_trace = false;
+  bool noise = true;  ///< of the sensors
+};
+
+/// What a run looked like, every millisecond.
+struct TracePoint {
+  double time_s = 0.0;
+  Reference reference{};
+  double output_rad = 0.0;  ///< the true one
+  double motor_velocity_rad_s = 0.0;
+  double torque_nm = 0.0;
+  double current_a = 0.0;
+  double temperature_c = 0.0;
+  double load_torque_nm = 0.0;
+  firmware::Mode mode{};
 };
 
 /// What happened. Errors are those of the true output position against the reference, after the first second.
@@ -46,11 +62,24 @@ struct ScenarioResult {
   double rms_error_rad = 0.0;
   double peak_error_rad = 0.0;
   double rms_current_a = 0.0;
+  double peak_current_a = 0.0;
+  /// While the set point moves at a tenth of its top speed or more: how often the shaft came to rest (stick and slip).
+  int stops = 0;
+  /// Half of the output's way to and fro in the second half of the hold, and how often the motor turned round there.
+  double hold_swing_rad = 0.0;
+  int hold_reversals = 0;
+  double hold_error_rad = 0.0;  ///< mean over that half
+  double final_temperature_c = 0.0;
   std::uint64_t ticks = 0;
   std::uint64_t frames = 0;
   std::uint64_t telemetry_hash = 0;
   double wall_s = 0.0;
   firmware::Status end{};
+  firmware::FaultRecord first_fault{};  ///< that the drive had, even where it went on
+  std::vector<TracePoint> trace{};
+
+  /// The loops hunt at rest: the shaft keeps turning round, by more than the encoder's counts.
+  bool limit_cycle(double count_rad) const { return hold_reversals >= 2 && hold_swing_rad > 2.0 * count_rad; }
 };
 /// Runs it on the software board, or on `brain`. Throws std::runtime_error where the drive cannot be armed.
 ScenarioResult run_scenario(const ScenarioPlan& plan, std::unique_ptr<Brain> brain = nullptr);

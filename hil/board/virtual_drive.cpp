@@ -7,20 +7,36 @@
 namespace flexspline::board {
 
 void FrameHash::add(std::uint32_t word) {
-  for (int byte = 0; byte < 4; ++byte) {
-    hash_ ^= (word >> (8 * byte)) & 0xFFU;
-    hash_ *= 0x100000001b3U;
-  }
+  hash_ ^= word;
+  hash_ *= 0x100000001b3U;
+  // Of a whole word at a time the upper bits would reach the lower ones never.
+  hash_ ^= hash_ >> 29U;
 }
 
 VirtualDrive::VirtualDrive(const RigSetup& setup, const Block& block, const firmware::TelemetrySetup& telemetry,
                            std::unique_ptr<Brain> brain)
-    : rig_(setup), brain_(brain ? std::move(brain) : std::make_unique<SoftwareBrain>()) {
-  brain_->start(block, telemetry, firmware::ResetCause::power);
+    : rig_(setup),
+      brain_(brain ? std::move(brain) : std::make_unique<SoftwareBrain>()),
+      flash_(block),
+      telemetry_(telemetry) {
+  brain_->start(flash_, telemetry_, firmware::ResetCause::power);
+}
+
+void VirtualDrive::power(bool on) {
+  if (on == powered_) return;
+  powered_ = on;
+  posted_.reset();
+  up_ = {};
+  if (on) brain_->start(flash_, telemetry_, firmware::ResetCause::power);
 }
 
 void VirtualDrive::run(std::uint32_t ticks) {
   for (std::uint32_t k = 0; k < ticks; ++k) {
+    if (!powered_) {
+      posted_.reset();
+      rig_.act({});
+      continue;
+    }
     firmware::LockStepDown down;
     down.readings = rig_.sense();
     down.overrun = rig_.has(Injection::tick_overrun);

@@ -17,7 +17,7 @@ struct Frame {
   std::vector<std::uint32_t> values;
 };
 
-/// A hash of frames (FNV-1a of their words): the same bits, the same number.
+/// A hash of frames (FNV-1a on words, with a shift): the same bits, the same number.
 class FrameHash {
  public:
   void add(std::uint32_t word);
@@ -44,12 +44,16 @@ class VirtualDrive {
   /// Offers a block and runs until the drive has decided on it.
   firmware::BlockFinding commit(const Block& block);
 
+  /// Without power amplifier and processor do nothing; with it again the drive starts from its flash memory.
+  void power(bool on);
+
   /// Frames are hashed as they come; kept ones are in frames() as well.
   void keep_frames(bool keep) { keep_ = keep; }
   /// When nobody reads the telemetry, the drive's ring fills up.
   void read_frames(bool read) { reads_ = read; }
 
   DriveRig& rig() { return rig_; }
+  const DriveRig& rig() const { return rig_; }
   Brain& brain() { return *brain_; }
   const firmware::Status& status() const { return up_.status; }
   const firmware::LockStepUp& last() const { return up_; }
@@ -62,6 +66,8 @@ class VirtualDrive {
 
   DriveRig rig_;
   std::unique_ptr<Brain> brain_;
+  Block flash_;
+  firmware::TelemetrySetup telemetry_;
   Block offered_;
   firmware::LockStepUp up_{};
   std::optional<firmware::Command> posted_;
@@ -70,6 +76,7 @@ class VirtualDrive {
   std::uint64_t frame_count_ = 0;
   bool keep_ = false;
   bool reads_ = true;
+  bool powered_ = true;
 };
 
 }  // namespace flexspline::board

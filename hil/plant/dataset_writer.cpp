@@ -102,16 +102,12 @@ Text base_model(const Drive& drive) {
   return text;
 }
 
-Text truth(const std::vector<Record>& records, const Drive& drive) {
-  Text text;
-  line(text, "# What the plant really is. Not for the eyes of an identification.");
-  line(text, "format = \"flexspline-model/1\"\nname = \"{}-truth\"", drive.name);
-  line(text, "hidden = \"{}\"\nseed = {}\nscale = {}", drive.hidden(), records.empty() ? 0 : records.front().seed,
-       real(drive.hidden_scale));
-  write_drive_section(text, drive);
-  const bool bristle = drive.find("dahl_friction") != nullptr;
+// A bristle stands in for Coulomb friction.
+void write_effects(Text& text, const Drive& drive, bool with_hidden) {
+  const Effect* dahl = drive.find("dahl_friction");
+  const bool bristle = dahl != nullptr && (with_hidden || !dahl->hidden);
   for (const Effect& effect : drive.effects) {
-    if (!effect.present || (bristle && effect.type == "coulomb_friction")) continue;
+    if (!effect.present || (bristle && effect.type == "coulomb_friction") || (effect.hidden && !with_hidden)) continue;
     line(text, "\n[[effect]]\ntype = \"{}\"", effect.type);
     if (effect.has("order")) line(text, "id = \"{}_{:g}\"", effect.type, effect.value("order"));
     if (!effect.catalogue) line(text, "catalogue = false");
@@ -124,6 +120,16 @@ Text truth(const std::vector<Record>& records, const Drive& drive) {
       }
     }
   }
+}
+
+Text truth(const std::vector<Record>& records, const Drive& drive) {
+  Text text;
+  line(text, "# What the plant really is. Not for the eyes of an identification.");
+  line(text, "format = \"flexspline-model/1\"\nname = \"{}-truth\"", drive.name);
+  line(text, "hidden = \"{}\"\nseed = {}\nscale = {}", drive.hidden(), records.empty() ? 0 : records.front().seed,
+       real(drive.hidden_scale));
+  write_drive_section(text, drive);
+  write_effects(text, drive, true);
   for (const Record& record : records) {
     line(text, "\n[[run]]                          # friction of this run against the values above\nname = \"{}\"",
          record.name);
@@ -133,6 +139,15 @@ Text truth(const std::vector<Record>& records, const Drive& drive) {
 }
 
 }  // namespace
+
+std::string model_text(const Drive& drive, bool with_hidden) {
+  Text text;
+  line(text, "# The true values.");
+  line(text, "format = \"flexspline-model/1\"\nname = \"{}\"", drive.name);
+  write_drive_section(text, drive);
+  write_effects(text, drive, with_hidden);
+  return {text.data(), text.size()};
+}
 
 void write_dataset(const std::vector<Record>& records, const Drive& drive, const std::filesystem::path& folder) {
   make_folder(folder);

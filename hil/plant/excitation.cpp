@@ -2,12 +2,12 @@
 
 #include <algorithm>
 #include <cmath>
-#include <numbers>
+
+#include "shared/fixed/turn.hpp"
 
 namespace flexspline::plant {
 namespace {
 
-constexpr double kTurn = 2.0 * std::numbers::pi;
 constexpr double kFadeIn_s = 0.25;
 constexpr double kRamp = 0.1;
 

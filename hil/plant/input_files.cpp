@@ -24,6 +24,7 @@
 #pragma pop_macro("NDEBUG")
 
 #include "hil/plant/demo_drive.hpp"
+#include "hil/plant/tables.hpp"
 
 namespace flexspline::plant {
 namespace {
@@ -326,9 +327,25 @@ PlantFile parse_plant(std::string_view text, std::string_view origin) {
     loop.not_negative("integral_a_rad", drive.loop.integral);
     loop.done();
   }
+  if (const toml::table* table = top.table("amplifier")) {
+    Section amplifier(*table, origin, "[amplifier]");
+    amplifier.not_negative("saturation_a", drive.amplifier.saturation_a);
+    amplifier.not_negative("bandwidth_hz", drive.amplifier.bandwidth_hz);
+    amplifier.number("offset_a", drive.amplifier.offset_a);
+    amplifier.done();
+  }
+  if (const toml::table* table = top.table("thermal")) {
+    Section thermal(*table, origin, "[thermal]");
+    thermal.positive("capacity_j_c", drive.thermal.capacity_j_c, true);
+    thermal.positive("resistance_c_w", drive.thermal.resistance_c_w, true);
+    thermal.not_negative("winding_ohm", drive.thermal.winding_ohm);
+    double ambient_c = drive.temperature_reference_c;
+    drive.thermal.ambient_c = thermal.number("ambient_c", ambient_c);
+    thermal.done();
+  }
   for (const auto& [key, node] : root) {
-    static constexpr std::string_view kKnown[] = {"format",        "name",   "drive",     "sensors",
-                                                  "velocity_loop", "effect", "experiment"};
+    static constexpr std::string_view kKnown[] = {"format",    "name",    "drive",  "sensors",   "velocity_loop",
+                                                  "amplifier", "thermal", "effect", "experiment"};
     if (std::find(std::begin(kKnown), std::end(kKnown), key.str()) == std::end(kKnown)) {
       top.fail(&node, fmt::format("unknown key \"{}\"; take it out or correct its spelling", key.str()));
     }
@@ -372,6 +389,54 @@ std::vector<ExperimentPlan> load_plan(const std::filesystem::path& file, Drive& 
   std::vector<ExperimentPlan> runs;
   for_each_table(root, "run", origin, [&](const toml::table& t) { runs.push_back(read_run(t, origin, drive)); });
   return runs;
+}
+
+namespace {
+
+std::vector<double> numbers_in(const toml::array& list) {
+  std::vector<double> all;
+  for (const toml::node& node : list) {
+    const auto x = node.value<double>();
+    if (!x || !std::isfinite(*x)) return {};
+    all.push_back(*x);
+  }
+  return all;
+}
+
+Entries entries_of(const toml::table& table) {
+  Entries out;
+  out.line = static_cast<std::size_t>(table.source().begin.line);
+  for (const auto& [key, node] : table) {
+    Entry entry;
+    entry.name = key.str();
+    entry.line = static_cast<std::size_t>(node.source().begin.line);
+    if (const toml::table* inner = node.as_table()) {
+      entry.tables.push_back(entries_of(*inner));
+    } else if (const toml::array* list = node.as_array()) {
+      entry.is_list = true;
+      entry.numbers = numbers_in(*list);
+      for (const toml::node& element : *list) {
+        if (const toml::table* one = element.as_table()) entry.tables.push_back(entries_of(*one));
+        if (const toml::array* row = element.as_array()) entry.rows.push_back(numbers_in(*row));
+        if (const auto text = element.value<std::string>()) entry.texts.push_back(*text);
+      }
+    } else {
+      if (const auto x = node.value<double>(); x && std::isfinite(*x) && !node.is_boolean()) entry.numbers = {*x};
+      if (const auto text = node.value<std::string>(); text && node.is_string()) entry.texts = {*text};
+    }
+    out.entries.push_back(std::move(entry));
+  }
+  return out;
+}
+
+}  // namespace
+
+Entries read_entries(std::string_view text, std::string_view origin) {
+  return entries_of(parse_ascii(text, origin));
+}
+
+std::string read_text(const std::filesystem::path& file, std::string_view kind) {
+  return text_of(file, kind);
 }
 
 }  // namespace flexspline::plant

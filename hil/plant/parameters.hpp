@@ -2,6 +2,7 @@
 
 #include <cstdint>
 #include <filesystem>
+#include <optional>
 #include <string>
 #include <string_view>
 #include <vector>
@@ -60,6 +61,22 @@ struct VelocityLoop {
   double integral = 0.0;
 };
 
+/// Makes the current that a drive commands. Nought: without that limit.
+struct Amplifier {
+  double saturation_a = 0.0;  ///< of a supply that is too low; what it saturates at is measured as such
+  double bandwidth_hz = 0.0;
+  double offset_a = 0.0;  ///< flows beside what is measured
+};
+
+/// Lumped: one temperature of housing, gear and motor. Without a capacity it is what the experiment says.
+struct Thermal {
+  double capacity_j_c = 0.0;
+  double resistance_c_w = 1.0;  ///< to the air
+  double winding_ohm = 0.0;
+  std::optional<double> ambient_c{};  ///< else the reference
+  std::optional<double> start_c{};    ///< of the drive, else that of the air
+};
+
 struct Drive {
   std::string name;
   double gear_ratio = 100.0;
@@ -75,6 +92,8 @@ struct Drive {
   double friction_variation = 0.0;
   Sensors sensors;
   VelocityLoop loop;
+  Amplifier amplifier;
+  Thermal thermal;
   std::vector<Effect> effects;
   double hidden_scale = 1.0;
 

@@ -65,4 +65,7 @@ std::vector<Record> record_all(const Drive& drive, const std::vector<ExperimentP
 /// Throws std::runtime_error naming the file that could not be written.
 void write_dataset(const std::vector<Record>& records, const Drive& drive, const std::filesystem::path& folder);
 
+/// The drive as a model file, with the true values of its effects; without the hidden one unless `with_hidden`.
+std::string model_text(const Drive& drive, bool with_hidden);
+
 }  // namespace flexspline::plant

@@ -1,38 +1,52 @@
 #pragma once
 
-#include <array>
 #include <cstddef>
 #include <cstdint>
 #include <filesystem>
-#include <memory>
 #include <span>
+#include <vector>
 
+#include "shared/boot/slots.hpp"
 #include "shared/storage/flash_port.hpp"
 
 namespace flexspline::twin {
 
-/// The twin's flash memory: in this process, and, where a file is named, in that file as well, word by word as it is
-/// written. So a twin that was killed finds at its next start what a drive would find after a power cut.
-class FlashFile {
+/// Flash memory in this process, and, where a file is named, in that file as well, word by word as it is written. So a
+/// twin that was killed finds at its next start what a drive would find after a power cut.
+class FlashMemory {
  public:
-  static constexpr std::size_t kSectorBytes = 16384;
-
   /// An empty path: no file. Throws std::runtime_error where the file cannot be opened or is no such memory.
-  explicit FlashFile(const std::filesystem::path& file = {});
-  ~FlashFile();
-  FlashFile(const FlashFile&) = delete;
-  FlashFile& operator=(const FlashFile&) = delete;
+  FlashMemory(std::size_t sector_bytes, std::size_t sectors, const std::filesystem::path& file);
+  ~FlashMemory();
+  FlashMemory(const FlashMemory&) = delete;
+  FlashMemory& operator=(const FlashMemory&) = delete;
 
   bool erase(std::size_t sector);
   bool program(std::size_t sector, std::size_t word, std::uint32_t value);
-  std::span<const std::uint8_t> bytes(std::size_t sector) const { return cells_->at(sector); }
+  std::span<const std::uint8_t> bytes(std::size_t sector) const {
+    return std::span(cells_).subspan(sector * sector_bytes_, sector_bytes_);
+  }
 
  private:
-  bool save(std::size_t sector, std::size_t at, std::size_t count);
+  bool save(std::size_t at, std::size_t count);
 
-  struct alignas(8) Sector : std::array<std::uint8_t, kSectorBytes> {};
-  std::unique_ptr<std::array<Sector, storage::kSectors>> cells_;
+  std::size_t sector_bytes_;
+  std::vector<std::uint8_t> cells_;  ///< the heap's alignment is that of a flash word and more
   int file_ = -1;
+};
+
+/// The twin's parameters.
+class FlashFile : public FlashMemory {
+ public:
+  static constexpr std::size_t kSectorBytes = 16'384;
+  explicit FlashFile(const std::filesystem::path& file = {}) : FlashMemory(kSectorBytes, storage::kSectors, file) {}
+};
+
+/// Its firmware images.
+class ImageFlash : public FlashMemory {
+ public:
+  static constexpr std::size_t kSectorBytes = 65'536;
+  explicit ImageFlash(const std::filesystem::path& file = {}) : FlashMemory(kSectorBytes, boot::kSlots, file) {}
 };
 
 }  // namespace flexspline::twin

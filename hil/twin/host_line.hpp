@@ -16,6 +16,8 @@ class HostLine {
   /// end went, or another came, since the last call.
   virtual bool turn(int wait_ms) = 0;
   virtual bool has_host() const = 0;
+  /// Pulls the plug, or puts it in again: whoever is there is gone, and until then nobody can come.
+  virtual void plug(bool in) = 0;
   /// No host can come any more.
   virtual bool ended() const { return false; }
 

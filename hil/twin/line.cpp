@@ -90,6 +90,7 @@ bool Line::turn(int wait_ms) {
   pollfd all[2] = {{listener_, POLLIN, 0}, {host_, static_cast<short>(out_.empty() ? POLLIN : POLLIN | POLLOUT), 0}};
   poll(all, 2, wait_ms);
   if (listener_ >= 0 && (all[0].revents & POLLIN) != 0) accept_host();
+  if (!plugged_ && is_terminal_) tcflush(keeps_open_, TCIOFLUSH);
   if (host_ >= 0) read_bytes();
   if (host_ >= 0) write_bytes();
   return std::exchange(changed_, false);
@@ -100,6 +101,10 @@ void Line::accept_host() {
   const int host = accept(listener_, nullptr, nullptr);
   if (host < 0) return;
   lose_host();
+  if (!plugged_) {
+    close(host);
+    return;
+  }
   host_ = host;
   make_nonblocking(host_);
   const int on = 1, bytes = 4096;
@@ -114,7 +119,7 @@ void Line::read_bytes() {
     if (got > 0) {
       protocol::Message m;
       for (ssize_t i = 0; i < got; ++i)
-        if (reader_.take(bytes[i], m)) arrived_.push_back(m);
+        if (plugged_ && reader_.take(bytes[i], m)) arrived_.push_back(m);
       continue;
     }
     const bool waits = got < 0 && (errno == EAGAIN || errno == EWOULDBLOCK || errno == EINTR);
@@ -134,6 +139,16 @@ void Line::write_bytes() {
     if (errno != EAGAIN && errno != EWOULDBLOCK && errno != EINTR && !is_terminal_) lose_host();
     return;
   }
+}
+
+// Of a terminal both ends stay: bytes are lost on the way, as they are where a serial line is pulled.
+void Line::plug(bool in) {
+  if (in == std::exchange(plugged_, in)) return;
+  if (!is_terminal_) return lose_host();
+  changed_ = true;
+  reader_.restart();
+  arrived_.clear();
+  out_.clear();
 }
 
 void Line::lose_host() {

@@ -25,7 +25,8 @@ class Line final : public HostLine {
 
   std::string name() const override { return name_; }
   bool turn(int wait_ms) override;
-  bool has_host() const override { return host_ >= 0; }
+  void plug(bool in) override;
+  bool has_host() const override { return host_ >= 0 && plugged_; }
   /// An inherited line whose other end is gone.
   bool ended() const override { return ended_; }
   const protocol::Message* front() override { return arrived_.empty() ? nullptr : &arrived_.front(); }
@@ -49,6 +50,7 @@ class Line final : public HostLine {
   bool changed_ = false;
   bool ended_ = false;
   bool is_terminal_ = false;
+  bool plugged_ = true;
   protocol::SerialReader reader_;
   std::deque<protocol::Message> arrived_;
   std::vector<std::uint8_t> out_;

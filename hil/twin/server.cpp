@@ -12,10 +12,14 @@
 #include <memory>
 #include <optional>
 #include <stdexcept>
+#include <utility>
 
+#include "firmware/update_watch.hpp"
 #include "hil/board/scenario.hpp"
 #include "hil/plant/parameters.hpp"
+#include "hil/twin/cable.hpp"
 #include "hil/twin/line.hpp"
+#include "hil/twin/machine.hpp"
 #include "hil/twin/twin_drive.hpp"
 #include "hil/twin/usb_line.hpp"
 
@@ -25,12 +29,14 @@ namespace {
 using Clock = std::chrono::steady_clock;
 constexpr std::uint32_t kTickHz = board::SoftwareBoard::kTickHz;
 
+constexpr auto kAfterDetach = std::chrono::milliseconds(100);  // so that the host has its answer
+constexpr auto kWatchdog = std::chrono::milliseconds(200);
+
 TwinSetup setup_of(const TwinOptions& options) {
   TwinSetup setup;
   setup.drive = options.plant_file.empty() ? plant::demo_plant().drive : plant::load_plant(options.plant_file).drive;
   for (const std::string& effect : options.with) plant::with(setup.drive, effect);
   if (!options.hide.empty()) plant::hide(setup.drive, options.hide);
-  setup.flash_file = options.flash_file;
   setup.serial = options.serial;
   setup.seed = options.seed;
   setup.as_made = !options.empty;
@@ -75,7 +81,17 @@ void note_signal(int) {
 class Server {
  public:
   explicit Server(const TwinOptions& options)
-      : options_(options), drive_(setup_of(options)), line_(line_of(options)), due_(Clock::now()) {
+      : options_(options),
+        flash_(options.flash_file),
+        setup_(setup_of(options)),
+        line_(line_of(options)),
+        cable_(options.cable_file) {
+    setup_.flash = &flash_;
+    usb_ = dynamic_cast<UsbLine*>(line_.get());
+    if (usb_ != nullptr)
+      machine_ =
+          std::make_unique<Machine>(options.flash_file.empty() ? "" : options.flash_file + ".images", !options.empty);
+    drive_ = std::make_unique<TwinDrive>(setup_);
     if (!options.inject.empty()) {
       injection_ = board::injection_named(options.inject);
       if (!injection_) throw std::runtime_error("there is no injection '" + options.inject + "'");
@@ -84,19 +100,29 @@ class Server {
 
   void run() {
     if (!options_.inherits) say_where(options_, *line_);
-    const auto end = Clock::now() + std::chrono::duration_cast<Clock::duration>(
-                                        std::chrono::duration<double>(std::max(options_.seconds, 0.0)));
+    end_ = Clock::now() +
+           std::chrono::duration_cast<Clock::duration>(std::chrono::duration<double>(std::max(options_.seconds, 0.0)));
     std::signal(SIGINT, note_signal);
     std::signal(SIGTERM, note_signal);
-    int wait_ms = 0;
-    while (!line_->ended() && asked_to_end == 0 && (options_.seconds <= 0.0 || Clock::now() < end)) {
-      if (line_->turn(wait_ms)) drive_.service().disconnected();
-      // What waits in the drive takes its place on the line before that counts as room for more time.
-      exchange();
-      const std::uint32_t ticks = ticks_now();
-      for (std::uint32_t i = 0; i < ticks; ++i) tick();
-      exchange();
-      wait_ms = ticks > 0 && runs_fast() ? 0 : 1;
+    if (machine_ == nullptr) return run_application(nullptr);
+    // One turn from each reset to the next.
+    while (!over()) {
+      if (!machine_->start()) {
+        usb_->pull_out();
+        machine_->serve_loader(usb_->bus(), UsbLine::kBusId, options_.serial, [this] { return over(); });
+      } else if (machine_->hangs()) {
+        usb_->pull_out();
+        wait_for_watchdog();
+      } else {
+        setup_.version = machine_->version();
+        drive_.reset();
+        drive_ = std::make_unique<TwinDrive>(setup_);
+        usb_->plug_in();
+        Watch watch(machine_->slots(), kTickHz);
+        run_application(&watch);
+        machine_->ask_for_loader();
+        usb_->pull_out();
+      }
     }
   }
 
@@ -105,7 +131,38 @@ class Server {
   // An armed drive without its host for 0.1 s stops: an armed twin that runs fast waits for its host well before.
   static constexpr std::uint32_t kMostAhead = 1'000;
 
-  bool runs_fast() const { return options_.fast && is_armed(drive_.status().mode) && line_->has_host(); }
+  using Watch = firmware::UpdateWatch<Machine::Slots>;
+
+  bool over() const { return line_->ended() || asked_to_end != 0 || (options_.seconds > 0.0 && Clock::now() >= end_); }
+  // Until the twin ends, or a host asked for the boot loader.
+  void run_application(Watch* watch) {
+    due_ = Clock::now();
+    std::optional<Clock::time_point> leaves_at;
+    int wait_ms = 0;
+    while (!over() && (!leaves_at || Clock::now() < *leaves_at)) {
+      cable_.look();
+      follow_cable();
+      if (line_->turn(wait_ms)) drive_->service().disconnected();
+      // What waits in the drive takes its place on the line before that counts as room for more time.
+      exchange();
+      const std::uint32_t ticks = ticks_now();
+      for (std::uint32_t i = 0; i < ticks; ++i) tick();
+      exchange();
+      if (watch != nullptr && watch->turn(drive_->status(), line_->has_host(), usb_->dfu()) && !leaves_at)
+        leaves_at = Clock::now() + kAfterDetach;
+      wait_ms = ticks > 0 && runs_fast() ? 0 : 1;
+    }
+  }
+  void wait_for_watchdog() {
+    const auto until = Clock::now() + kWatchdog;
+    while (!over() && Clock::now() < until) usb_->bus().serve(5);
+  }
+  bool runs_fast() const { return options_.fast && is_armed(drive_->status().mode) && line_->has_host(); }
+  void follow_cable() {
+    if (cable_.plugged() == std::exchange(was_plugged_, cable_.plugged())) return;
+    line_->plug(cable_.plugged());
+    drive_->service().disconnected();
+  }
   std::uint32_t ticks_now() {
     const auto now = Clock::now();
     if (runs_fast()) {
@@ -121,29 +178,39 @@ class Server {
     return ticks;
   }
   void tick() {
-    drive_.tick();
+    drive_->tick();
     ++since_message_;
-    if (injection_ && is_armed(drive_.status().mode) && ++armed_ticks_ == std::llround(options_.inject_at_s * kTickHz))
-      drive_.rig().inject(*injection_);
+    if (injection_ && is_armed(drive_->status().mode) && ++armed_ticks_ == std::llround(options_.inject_at_s * kTickHz))
+      drive_->rig().inject(*injection_);
     // Answers and frames leave as they come, so that the drive's ring holds what a real one would.
-    if (drive_.status().tick % 20 == 0) exchange();
+    if (drive_->status().tick % 20 == 0) exchange();
   }
   void exchange() {
-    for (const protocol::Message* m = line_->front(); m != nullptr && drive_.service().take(*m); m = line_->front()) {
+    for (const protocol::Message* m = line_->front(); m != nullptr && drive_->service().take(*m); m = line_->front()) {
       line_->drop();
       since_message_ = 0;
+      cable_.count();
+      if (!cable_.plugged()) break;
     }
+    follow_cable();
     protocol::Message m;
-    while (line_->has_room() && drive_.service().next(m)) line_->send(m);
+    while (line_->has_room() && drive_->service().next(m)) line_->send(m);
   }
 
   TwinOptions options_;
-  TwinDrive drive_;
+  FlashFile flash_;
+  TwinSetup setup_;
+  std::unique_ptr<TwinDrive> drive_;
   std::unique_ptr<HostLine> line_;
-  Clock::time_point due_;
+  UsbLine* usb_ = nullptr;            ///< the line, where it is one
+  std::unique_ptr<Machine> machine_;  ///< with it
+  Clock::time_point due_{};
+  Clock::time_point end_{};
   std::optional<board::Injection> injection_;
   std::uint32_t since_message_ = 0;
   std::int64_t armed_ticks_ = 0;
+  Cable cable_;
+  bool was_plugged_ = true;
 };
 
 }  // namespace

@@ -12,7 +12,8 @@ struct TwinOptions {
   std::string hide;
   std::string flash_file;
   std::string serial = "TWIN";
-  std::string json_file;  ///< takes where it is, once it listens; - is standard output
+  std::string json_file;   ///< takes where it is, once it listens; - is standard output
+  std::string cable_file;  ///< pulls its plug (cable.hpp); empty: none
   std::string inject;
   double inject_at_s = 1.0;  ///< after the drive was armed first
   std::uint64_t seed = 1;

@@ -21,7 +21,8 @@ std::array<std::uint8_t, Size> text_in(const std::string& text) {
 TwinDrive::TwinDrive(const TwinSetup& setup)
     : setup_(setup),
       rig_({.drive = setup.drive, .seed = setup.seed, .locked = setup.locked}),
-      flash_(setup.flash_file) {
+      own_flash_(setup.flash == nullptr ? std::make_unique<FlashFile>(setup.flash_file) : nullptr),
+      store_(setup.flash == nullptr ? *own_flash_ : *setup.flash) {
   const auto validate = [this](std::span<const std::uint8_t> block) { return blocks_.validate(block); };
   if (setup_.as_made && store_.boot(validate) == storage::StoreState::empty) {
     const std::vector<std::uint8_t> block = factory_block(setup_.drive);
@@ -31,7 +32,8 @@ TwinDrive::TwinDrive(const TwinSetup& setup)
         store_.commit(validate, reason) != storage::StoreError::none)
       throw std::runtime_error("the block of the drive's maker cannot be stored; is the flash file writable?");
   }
-  const firmware::DriveInfo info{{0, 1}, text_in<16>("twin"), text_in<16>(setup_.serial)};
+  const firmware::DriveInfo info{
+      {setup_.version.major, setup_.version.minor}, text_in<16>(std::string(kBoardName)), text_in<16>(setup_.serial)};
   service_ = std::make_unique<Service>(application_, store_, blocks_, board::SoftwareBoard::kTickHz, info);
   service_->start();
   application_.background();

@@ -9,6 +9,7 @@
 #include "hil/board/brain.hpp"
 #include "hil/board/drive_rig.hpp"
 #include "hil/twin/flash_file.hpp"
+#include "hil/twin/image.hpp"
 
 namespace flexspline::twin {
 
@@ -19,6 +20,8 @@ struct TwinSetup {
   std::filesystem::path flash_file{};  ///< empty: what is flashed ends with the twin
   bool as_made = true;                 ///< an empty flash memory gets the block of the drive's maker
   bool locked = false;                 ///< the output
+  FlashFile* flash = nullptr;          ///< memory that outlives the drive, in the place of the file
+  boot::Version version = kFactoryVersion;
 };
 
 using TwinApplication = firmware::Application<board::SoftwareBoard>;
@@ -49,8 +52,8 @@ class TwinDrive {
   board::DriveRig rig_;
   board::SoftwareBoard board_;
   TwinApplication application_{board_};
-  FlashFile flash_;
-  Store store_{flash_};
+  std::unique_ptr<FlashFile> own_flash_;
+  Store store_;
   TwinBlocks blocks_{application_};
   std::unique_ptr<Service> service_;
 };

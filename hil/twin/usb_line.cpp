@@ -6,32 +6,52 @@
 namespace flexspline::twin {
 
 UsbLine::UsbLine(int port, const std::string& serial)
-    : serial_(serial), connector_(serial), server_(static_cast<std::uint16_t>(port)) {
-  server_.plug(kBusId, connector_);
+    : serial_(serial), connector_(std::make_unique<Connector>(serial)), server_(static_cast<std::uint16_t>(port)) {
+  server_.plug(kBusId, *connector_);
+}
+
+void UsbLine::pull_out() {
+  server_.unplug(kBusId);
+}
+
+void UsbLine::plug_in() {
+  server_.unplug(kBusId);
+  connector_ = std::make_unique<Connector>(serial_);
+  is_waiting_ = had_host_ = false;
+  if (plugged_) server_.plug(kBusId, *connector_);
 }
 
 bool UsbLine::turn(int wait_ms) {
   server_.serve(wait_ms);
   const bool had_host = std::exchange(had_host_, has_host());
-  const bool changed = std::exchange(connector_.was_reset, false) || had_host != had_host_;
+  const bool changed = std::exchange(connector_->was_reset, false) || had_host != had_host_;
   if (changed) is_waiting_ = false;
   return changed;
+}
+
+void UsbLine::plug(bool in) {
+  if (in == std::exchange(plugged_, in)) return;
+  if (in) {
+    server_.plug(kBusId, *connector_);
+  } else {
+    server_.unplug(kBusId);
+  }
 }
 
 const protocol::Message* UsbLine::front() {
   // A report that holds no message is passed over, as the drive does.
   usb::Report report;
-  while (!is_waiting_ && reports_.receive(report)) is_waiting_ = protocol::decode(report, waiting_);
+  while (!is_waiting_ && reports().receive(report)) is_waiting_ = protocol::decode(report, waiting_);
   return is_waiting_ ? &waiting_ : nullptr;
 }
 
 bool UsbLine::has_room() const {
-  return !has_host() || reports_.room() > 0;
+  return !has_host() || reports().room() > 0;
 }
 
 void UsbLine::send(const protocol::Message& m) {
-  reports_.send(protocol::encode(m));
-  connector_.device.poll();
+  reports().send(protocol::encode(m));
+  connector_->device.poll();
 }
 
 }  // namespace flexspline::twin

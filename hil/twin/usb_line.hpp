@@ -1,12 +1,14 @@
 #pragma once
 
 #include <cstdint>
+#include <memory>
 #include <string>
 #include <vector>
 
 #include "hil/twin/host_line.hpp"
 #include "hil/usbip/core_device.hpp"
 #include "hil/usbip/server.hpp"
+#include "shared/usb/dfu.hpp"
 #include "shared/usb/hid.hpp"
 #include "shared/usb/identity.hpp"
 
@@ -22,9 +24,16 @@ class UsbLine final : public HostLine {
   UsbLine(int port, const std::string& serial);
 
   std::uint16_t port() const { return server_.port(); }
+  /// The drive leaves the bus and comes back as one that was just switched on.
+  void pull_out();
+  void plug_in();
+  usbip::Server& bus() { return server_; }
+  /// Its run-time interface for firmware updates.
+  usb::DfuRuntime& dfu() { return connector_->device.get<usb::DfuRuntime>(); }
   std::string name() const override { return "hid:" + serial_; }
   bool turn(int wait_ms) override;
-  bool has_host() const override { return connector_.device.configured(); }
+  void plug(bool in) override;
+  bool has_host() const override { return connector_->device.configured(); }
   const protocol::Message* front() override;
   void drop() override { is_waiting_ = false; }
   bool has_room() const override;
@@ -49,17 +58,19 @@ class UsbLine final : public HostLine {
     usbip::Handshake out(std::uint8_t endpoint, std::span<const std::uint8_t> packet) override {
       return device.out(endpoint, packet);
     }
-    usbip::CoreDevice<usb::FlexsplineIdentity, Reports> device;
+    usbip::CoreDevice<usb::FlexsplineIdentity, Reports, usb::DfuRuntime> device;
     bool was_reset = false;
   };
 
   std::string serial_;
-  Connector connector_;
-  Reports& reports_ = connector_.device.get<Reports>();
+  Reports& reports() const { return connector_->device.get<Reports>(); }
+
+  std::unique_ptr<Connector> connector_;
   usbip::Server server_;
   protocol::Message waiting_{};
   bool is_waiting_ = false;
   bool had_host_ = false;
+  bool plugged_ = true;
 };
 
 }  // namespace flexspline::twin

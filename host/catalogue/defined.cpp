@@ -6,11 +6,11 @@
 #include <cmath>
 #include <map>
 #include <mutex>
-#include <numbers>
 
 #include "host/catalogue/constants.hpp"
 #include "host/catalogue/formula_entry.hpp"
 #include "host/text/nearest.hpp"
+#include "shared/fixed/turn.hpp"
 
 namespace flexspline::catalogue {
 namespace {
@@ -18,7 +18,6 @@ namespace {
 using model::Definition;
 using model::Objection;
 
-constexpr double kTurn = 2.0 * std::numbers::pi;
 // Steps of a table are even to this share of one: what nine digits leave of a number.
 constexpr double kUneven = 1e-4;
 constexpr std::size_t kFirstId = 1000;  // beyond those of the catalogue

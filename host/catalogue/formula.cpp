@@ -13,16 +13,16 @@
 namespace flexspline::catalogue {
 namespace {
 
-using Inputs = effects::Inputs<numbers::Real>;
+using RealInputs = effects::Inputs<numbers::Real>;
 
 struct Direction {
   const char* name;
-  double Inputs::*signal;
+  double RealInputs::*signal;
   unsigned reads;
 };
-constexpr Direction kDirections[] = {{"direction", &Inputs::direction, effects::kMotorMotion},
-                                     {"output_direction", &Inputs::output_direction, effects::kOutputMotion},
-                                     {"torsion_direction", &Inputs::torsion_direction, effects::kTorsion}};
+constexpr Direction kDirections[] = {{"direction", &RealInputs::direction, effects::kMotorMotion},
+                                     {"output_direction", &RealInputs::output_direction, effects::kOutputMotion},
+                                     {"torsion_direction", &RealInputs::torsion_direction, effects::kTorsion}};
 
 double within_turn(double angle) {
   return angle - 2.0 * std::numbers::pi * std::floor(angle / (2.0 * std::numbers::pi));
@@ -32,13 +32,13 @@ double within_turn(double angle) {
 struct Name {
   std::string name;
   unsigned reads = 0;
-  double Inputs::*direction = nullptr;
+  double RealInputs::*direction = nullptr;
   effects::Variable variable{};
   std::size_t parameter = 0;
   bool is_parameter = false;
   double value = 0.0;
 
-  double of(const Inputs& in, double turn_angle_scale) const {
+  double of(const RealInputs& in, double turn_angle_scale) const {
     if (direction != nullptr) return in.*direction;
     if (variable == effects::Variable::motor_angle) return within_turn(in.angle * turn_angle_scale);
     if (variable == effects::Variable::output_angle) return within_turn(in.output_angle);
@@ -99,7 +99,7 @@ class Formula::Parser {
                            "take it out of the parameters, or put it into the formula");
   }
 
-  void add(std::span<const double> parameters, double turn_angle_scale, std::span<const Inputs> inputs,
+  void add(std::span<const double> parameters, double turn_angle_scale, std::span<const RealInputs> inputs,
            double* torque) {
     for (Name& n : names_)
       if (n.is_parameter) n.value = parameters[n.parameter];
@@ -173,7 +173,7 @@ Formula::Formula(const std::string& text, const std::vector<std::string>& parame
 Formula::~Formula() = default;
 Formula::Formula(Formula&&) noexcept = default;
 
-void Formula::add(std::span<const double> parameters, double turn_angle_scale, std::span<const Inputs> inputs,
+void Formula::add(std::span<const double> parameters, double turn_angle_scale, std::span<const RealInputs> inputs,
                   double* torque) {
   parser_->add(parameters, turn_angle_scale, inputs, torque);
 }

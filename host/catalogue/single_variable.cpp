@@ -8,9 +8,9 @@ namespace flexspline::catalogue {
 namespace {
 
 using effects::Variable;
-using Inputs = effects::Inputs<Real>;
+using RealInputs = effects::Inputs<Real>;
 
-void set(Inputs& in, Variable variable, double x) {
+void set(RealInputs& in, Variable variable, double x) {
   switch (variable) {
     case Variable::velocity:
       in.velocity = x;
@@ -87,7 +87,7 @@ double usual_size(Variable variable) {
   return 1.0;
 }
 
-void turn(Inputs& in, double direction) {
+void turn(RealInputs& in, double direction) {
   in.direction = in.output_direction = in.torsion_direction = direction;
 }
 
@@ -96,7 +96,7 @@ void turn(Inputs& in, double direction) {
 std::vector<double> torque_over(const Entry& entry, std::span<const double> parameters,
                                 const DriveConstants<double>& drive, Variable variable, std::span<const double> x,
                                 double direction) {
-  std::vector<Inputs> inputs(x.size());
+  std::vector<RealInputs> inputs(x.size());
   for (std::size_t k = 0; k < x.size(); ++k) {
     inputs[k].viscous_scale = inputs[k].coulomb_scale = 1.0;
     inputs[k].temperature = drive.reference_temperature;
@@ -115,7 +115,7 @@ std::optional<SingleVariable> single_variable(const Entry& entry, std::span<cons
   if (entry.has_state || !entry.adds_torque() || entry.info->phase != Phase::source) return std::nullopt;
   std::mt19937 random(3);
   std::uniform_real_distribution<double> unit(-1.0, 1.0);
-  const auto torque = [&](const Inputs& in) {
+  const auto torque = [&](const RealInputs& in) {
     double sum = 0.0;
     entry.real.torque(parameters.data(), drive, entry.info->balance, {&in, 1}, &sum);
     return sum;
@@ -123,7 +123,7 @@ std::optional<SingleVariable> single_variable(const Entry& entry, std::span<cons
   std::array<bool, std::size(effects::kVariables)> depends{};
   bool turns = false, odd = true;
   for (int trial = 0; trial < kTrials; ++trial) {
-    Inputs in;
+    RealInputs in;
     in.viscous_scale = in.coulomb_scale = 1.0;
     turn(in, unit(random) < 0.0 ? -1.0 : 1.0);
     // What is a magnitude of another comes with it.
@@ -135,7 +135,7 @@ std::optional<SingleVariable> single_variable(const Entry& entry, std::span<cons
     for (std::size_t v = 0; v < depends.size(); ++v) {
       const Variable variable = effects::kVariables[v].variable;
       if (variable == Variable::speed || variable == Variable::torque_magnitude) continue;
-      const Inputs kept = in;
+      const RealInputs kept = in;
       draw(variable);
       const double after = torque(in);
       depends[v] = depends[v] || std::abs(after - before) > kRounding * (std::abs(after) + std::abs(before));

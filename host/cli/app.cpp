@@ -13,10 +13,17 @@
 #include <vector>
 
 #include "host/cli/commands.hpp"
-#include "host/cli/drive_commands.hpp"
+#include "host/cli/drive_options.hpp"
+#include "host/cli/export_options.hpp"
+#include "host/cli/firmware_options.hpp"
+#include "host/cli/fleet.hpp"
 #include "host/cli/help.hpp"
+#include "host/cli/hil_options.hpp"
+#include "host/cli/manual.hpp"
+#include "host/cli/workbench_options.hpp"
 #include "host/data/findings.hpp"
 #include "host/output/text.hpp"
+#include "host/text/build_identity.hpp"
 #include "host/text/nearest.hpp"
 
 namespace flexspline::cli {
@@ -36,6 +43,7 @@ class App {
     app_.description(
         "Flexspline finds out which physical effects a drive with strain-wave gear has, and which its model lacks.");
     app_.require_subcommand(1);
+    app_.set_version_flag("--version", text::tool_name(), "which build this is");
     add_demo();
     add_new();
     add_check();
@@ -52,11 +60,14 @@ class App {
     add_export();
     add_plan();
     add_drive_commands();
-    add_not_built();
-    std::vector<std::string> to_come(not_built_yet().begin(), not_built_yet().end());
-    app_.footer(output::wrapped(fmt::format("Not built yet: {}.", output::listed(to_come)), 0) +
-                "\n\nflexspline COMMAND --help explains each with an example. Exit codes: 0 done, 1 a limit that was "
-                "given is not met,\n2 unusable input or arguments.");
+    const auto [hil, hil_options] = command<HilOptions>("hil");
+    take_hil(hil, *hil_options);
+    add_manual();
+    take_fleet(command<FleetOptions>("fleet"));
+    add_workbench();
+    app_.footer(
+        "flexspline COMMAND --help explains each with an example. Exit codes: 0 done, 1 a limit that was "
+        "given is not met,\n2 unusable input or arguments.");
   }
 
   int run(int argc, char** argv) {
@@ -157,7 +168,7 @@ class App {
   void add_demo() {
     const auto [sub, options] = command<DemoOptions>("demo");
     sub->add_option("--hidden", options->hidden, "effect that the twin hides, or none (default: by chance)")
-        ->type_name("NAME");
+        ->type_name("EFFECT");
     sub->add_option("--seed", options->seed, "of all chance (default: another one each time)")->type_name("N");
     sub->add_option("--out", options->out, "folder for recording and models (default: demo-out)")->type_name("DIR");
   }
@@ -320,12 +331,13 @@ class App {
   }
 
   void add_export() {
-    const auto [sub, options] = command<ExportOptions>("export");
-    take_model(sub, options->model);
+    const auto [sub, options] = command<ExportCommandOptions>("export");
+    sub->add_option("--model", options->model, "model file")->type_name("MODEL");
+    sub->add_flag("--protocol-header", options->protocol_header,
+                  "no model, but messages and parameter block of a drive as a C header");
     sub->add_option("--as", options->as, "c: a C header; csv: tables; mujoco, urdf: a joint for a physics engine")
-        ->required()
         ->check(CLI::IsMember({"c", "csv", "mujoco", "urdf"}))
-        ->type_name("c|csv|mujoco|urdf");
+        ->type_name("");
     sub->add_option("--out", options->out, "the file, or the folder of tables (default: print; csv needs it)")
         ->type_name("PATH");
   }
@@ -341,6 +353,8 @@ class App {
         ->check(CLI::PositiveNumber)
         ->capture_default_str()
         ->type_name("SHARE");
+    pack->add_flag("--measured", options->pack.measured,
+                   "where the error cannot be proven, take the largest one along samples of the envelope");
     pack->add_option("--drive", options->drive, "settings of the drive: its loops, limits and sensors")
         ->type_name("FILE.toml");
     pack->add_option("--drive-name", options->pack.drive, "name of the drive that the block is for (default: any)")
@@ -399,12 +413,6 @@ class App {
     take_pipeline(sub, options->pipeline);
   }
 
-  static void take_drive(CLI::App* sub, std::string& drive) {
-    sub->add_option("--drive", drive, fmt::format("{} (default: the only one on USB)", transport::kDriveHelp))
-        ->type_name("DRIVE");
-  }
-  static void take_yes(CLI::App* sub, bool& yes) { sub->add_flag("--yes", yes, "ask nothing"); }
-
   void add_drive_commands() {
     const auto [drives, drives_options] = command<DrivesOptions>("drives");
     drives->add_option("--also", drives_options->also, "look here, too: serial:PORT, tcp:HOST:PORT; may be repeated")
@@ -418,7 +426,14 @@ class App {
         ->add_option("--settings", flash_options->settings,
                      "of the drive, as pack --drive takes them (default: those of its active block)")
         ->type_name("FILE.toml");
+    take_firmware(*flash, *flash_options);
+    flash->add_option("--draws", flash_options->draws, "simulated drives of the prediction; 0: none")
+        ->check(CLI::IsMember({0, 3, 4, 5, 6, 8, 12, 20}))
+        ->capture_default_str();
+    flash->add_flag("--measured", flash_options->measured, "as pack --measured takes it");
     take_yes(flash, flash_options->yes);
+    const auto [image, image_options] = command<ImageOptions>("image");
+    take_image(*image, *image_options);
     const auto [backup, backup_options] = command<BackupOptions>("backup");
     take_drive(backup, backup_options->drive);
     backup->add_option("--out", backup_options->out, "file for the block")->required()->type_name("BLOCK");
@@ -427,49 +442,27 @@ class App {
     take_drive(restore, restore_options->drive);
     take_yes(restore, restore_options->yes);
     const auto [monitor, monitor_options] = command<MonitorOptions>("monitor");
-    take_drive(monitor, monitor_options->drive);
-    monitor->add_option("--seconds", monitor_options->seconds, "how long (default: until Ctrl-C)")
-        ->check(CLI::PositiveNumber)
-        ->type_name("S");
-    monitor->add_option("--rate-hz", monitor_options->rate_hz, "lines a second")
-        ->check(CLI::Range(0.5, 100.0))
-        ->capture_default_str()
-        ->type_name("HZ");
-    monitor->add_option("--channels", monitor_options->channels, "which signals, at most 12 (default: the main ones)")
-        ->delimiter(',')
-        ->type_name("NAME")
-        ->allow_extra_args(false);
+    take_monitor(monitor, *monitor_options);
     const auto [record, record_options] = command<RecordOptions>("record");
-    take_drive(record, record_options->drive);
-    record->add_option("--plan", record_options->plan, "motions: of flexspline plan, or by hand")
-        ->required()
-        ->type_name("PLAN");
-    record->add_option("--out", record_options->out, "folder for the measurements")->required()->type_name("DIR");
-    record->add_flag("--force", record_options->force, "write into a folder that is not empty");
-    record->add_flag("--clear-fault", record_options->clear_fault, "the cause of the fault it stands in is gone");
-    take_yes(record, record_options->yes);
+    take_record(record, *record_options);
     const auto [twin, twin_options] = command<TwinOptions>("twin");
-    twin->add_option("--plant", twin_options->plant, "plant file (default: the demo's drive)")->type_name("FILE");
-    twin->add_option("--flash", twin_options->flash, "holds its flash memory (default: none)")->type_name("FILE");
-    twin->add_option("--serial", twin_options->serial, "serial number")->capture_default_str()->type_name("TEXT");
-    twin->add_option("--serve", twin_options->serve, "port on 127.0.0.1 (default: any that is free)")
-        ->type_name("PORT");
-    twin->add_option("--usbip", twin_options->usbip, "a USB device behind this port of USB/IP")->type_name("PORT");
-    twin->add_option("--seconds", twin_options->seconds, "ends after so long (default: at Ctrl-C)")->type_name("S");
-    twin->add_flag("--fast", twin_options->fast, "while armed faster than real time, as its host keeps up");
+    take_twin(twin, *twin_options);
   }
 
-  void add_not_built() {
-    for (const std::string_view name : not_built_yet()) {
-      CLI::App* sub = app_.add_subcommand(std::string(name), "not built yet");
-      sub->group("");  // not in the list of commands
-      sub->prefix_command();
-      sub->callback([this] {
-        chosen_.run = [](Console&) -> int {
-          throw UsageError("this command is not built yet; flexspline --help lists those that are");
-        };
-      });
-    }
+  void add_manual() {
+    const auto [completion, completion_options] = command<CompletionOptions>("completion");
+    take_manual(completion, *completion_options);
+    const auto [man, man_options] = command<ManOptions>("man");
+    completion_options->tree = man_options->tree = [this] { return option_tree_of(app_); };
+  }
+
+  void add_workbench() {
+    const auto [sub, options] = command<WorkbenchOptions>("workbench");
+    take_data(sub, options->data);
+    take_model(sub, options->model);
+    take_workbench(*sub, *options);
+    take_holdout(sub, options->data);
+    take_pipeline(sub, options->pipeline);
   }
 
   CLI::App app_;

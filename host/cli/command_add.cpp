@@ -6,6 +6,7 @@
 #include "host/cli/commands.hpp"
 #include "host/cli/report_option.hpp"
 #include "host/diagnosis/add.hpp"
+#include "host/model/signature.hpp"
 #include "host/output/json.hpp"
 #include "host/output/learned_table.hpp"
 #include "host/output/text.hpp"
@@ -103,7 +104,7 @@ int change_model(const ChangeOptions& options, const std::string& command, const
   // What only the data set knows of the drive stays there: the file keeps what its author wrote.
   model::Model stored = changed.model;
   stored.drive = file.model.drive;
-  model::save(options.out, model::rewrite(file, stored));
+  model::save(options.out, model::signed_by_tool(model::rewrite(file, stored)));
   print(changed, what, console);
   console.line();
   console.line(fmt::format("{} holds the model. Next:", options.out.string()));

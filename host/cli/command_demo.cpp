@@ -7,6 +7,8 @@
 #include <utility>
 
 #include "host/cli/commands.hpp"
+#include "host/cli/drive_commands.hpp"
+#include "host/cli/hil_options.hpp"
 #include "host/cli/report_option.hpp"
 #include "host/cli/twin_process.hpp"
 #include "host/comparison/compare.hpp"
@@ -70,6 +72,28 @@ void print_free_runs(const comparison::Comparison& before, const comparison::Com
         output::wrapped("A free run has no feedback. Where friction falls with speed, slow motion under a given "
                         "current is unstable: the "
                         "smallest difference grows, and no model follows it for long."));
+}
+
+// On the drive, and a motion that was never recorded: without compensation, with the base model, with the added effect.
+json close_the_loop(const std::filesystem::path& folder, const std::filesystem::path& base,
+                    const std::filesystem::path& better, const std::string& hidden, std::uint64_t seed,
+                    Console& console) {
+  console.line(console.bold("5. Put it on the drive"));
+  FlashOptions flash;
+  flash.drive = "twin";
+  flash.model = better;
+  flash.yes = true;
+  run(flash, console);
+  console.line();
+  console.line(console.bold("6. A motion that was never recorded, in closed loop on the drive with its hidden effect"));
+  HilOptions loop;
+  loop.scenario = "slow-reversals";
+  loop.model = better;
+  loop.base = base;
+  loop.hide = hidden == "none" ? "" : hidden;
+  loop.seed = seed;
+  loop.report = folder / "closed-loop.html";
+  return closed_loop::to_json(run_closed_loop(loop, console));
 }
 
 }  // namespace
@@ -159,7 +183,8 @@ int run(const DemoOptions& options, Console& console) {
                  {"error_after", nullptr},
                  {"noise_floor", output::json_number(found.noise_floor)},
                  {"unit", found.unit},
-                 {"report", nullptr}};
+                 {"report", nullptr},
+                 {"closed_loop", nullptr}};
   bool right = hidden == "none" && found.named.empty();
   report::Subject page{.command = "demo",
                        .data_name = recording.string(),
@@ -213,13 +238,19 @@ int run(const DemoOptions& options, Console& console) {
     page.before = std::exchange(page.model, added.model);
     page.estimates = added.estimates;
     page.addition = added;
+    console.line();
+    try {
+      answer["closed_loop"] = close_the_loop(folder, base_path, path, hidden, seed, console);
+    } catch (const std::runtime_error& error) {
+      console.warn(fmt::format("the model does not go on the drive: {}", error.what()));
+    }
   }
   const std::filesystem::path report = folder / "report.html";
   console.progress("writing the report");
   report::write(report, page);
   answer["report"] = report.string();
   console.line();
-  console.line(console.bold("5. What the twin had hidden"));
+  console.line(console.bold(found.named.empty() ? "4. What the twin had hidden" : "7. What the twin had hidden"));
   if (hidden == "none")
     console.line(
         fmt::format("  Nothing. {}", right ? console.good("Right.") : console.bad("The name above is a false alarm.")));
@@ -228,7 +259,9 @@ int run(const DemoOptions& options, Console& console) {
                              right ? console.good("named right") : console.bad("named wrong"),
                              (recording / "truth.toml").string()));
   console.line();
-  console.line(fmt::format("All of this with plots: {}, for a browser.", report.string()));
+  console.line(fmt::format("All of this with plots: {}, for a browser. With the mouse:", report.string()));
+  console.line(fmt::format("  flexspline workbench --model {} {} --drive twin", quoted(base_path.string()),
+                           quoted(recording.string())));
   output::save_json(options.json, answer);
   return kDone;
 }

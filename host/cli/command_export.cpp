@@ -3,9 +3,11 @@
 #include <nlohmann/json.hpp>
 
 #include "host/catalogue/defined.hpp"
-#include "host/cli/commands.hpp"
+#include "host/cli/export_options.hpp"
 #include "host/interchange/export.hpp"
+#include "host/interchange/protocol_header.hpp"
 #include "host/output/json.hpp"
+#include "host/text/build_identity.hpp"
 
 namespace flexspline::cli {
 namespace {
@@ -25,9 +27,34 @@ void needs_values(const model::Model& model, const std::filesystem::path& path) 
         fmt::format("{}: the model has no effects, so there is nothing to write", path.string()));
 }
 
+// Into --out, else onto standard output.
+void put_text(const ExportOptions& options, const std::string& text, json& files, Console& console) {
+  if (!options.out.empty()) {
+    model::save(options.out, text);
+    console.line(fmt::format("{}: {} bytes", options.out.string(), text.size()));
+    files.push_back(options.out.string());
+  } else if (options.json == "-") {
+    throw UsageError("the file and the answer cannot both go to standard output; give --out FILE");
+  } else {
+    fmt::print("{}", text);
+  }
+}
+
 }  // namespace
 
-int run(const ExportOptions& options, Console& console) {
+int run(const ExportCommandOptions& options, Console& console) {
+  if (options.protocol_header) {
+    if (!options.model.empty() || !options.as.empty())
+      throw UsageError("--protocol-header is of every drive; leave out --model and --as");
+    json files = json::array();
+    put_text(options, interchange::protocol_header(text::tool_name()), files, console);
+    output::save_json(
+        options.json,
+        {{"format", "flexspline-export/1"}, {"as", "protocol-header"}, {"model", nullptr}, {"files", files}});
+    return kDone;
+  }
+  if (options.model.empty() || options.as.empty())
+    throw UsageError("give --model MODEL and --as c, csv, mujoco or urdf; or --protocol-header");
   const model::Model model = load_model(options.model).model;
   needs_values(model, options.model);
   const std::string source = options.model.filename().string();
@@ -45,15 +72,7 @@ int run(const ExportOptions& options, Console& console) {
     const std::string text = options.as == "c"        ? interchange::c_header(model, source)
                              : options.as == "mujoco" ? interchange::mujoco(model, source)
                                                       : interchange::urdf(model, source);
-    if (!options.out.empty()) {
-      model::save(options.out, text);
-      console.line(fmt::format("{}: {} bytes", options.out.string(), text.size()));
-      files.push_back(options.out.string());
-    } else if (options.json == "-") {
-      throw UsageError("the file and the answer cannot both go to standard output; give --out FILE");
-    } else {
-      fmt::print("{}", text);
-    }
+    put_text(options, text, files, console);
   }
   json answer = {{"format", "flexspline-export/1"}, {"as", options.as}, {"model", model.name}, {"files", files}};
   if (options.as == "mujoco" || options.as == "urdf") {

@@ -2,21 +2,17 @@
 #include <fmt/format.h>
 #include <unistd.h>
 
-#include <cmath>
 #include <fstream>
 #include <iterator>
 #include <nlohmann/json.hpp>
 
 #include "host/cli/drive_commands.hpp"
-#include "host/deployment/bases.hpp"
-#include "host/deployment/pack.hpp"
+#include "host/cli/firmware_commands.hpp"
+#include "host/cli/flash_prediction.hpp"
 #include "host/drive/block_changes.hpp"
-#include "host/drive/scales.hpp"
-#include "host/drive/settings_text.hpp"
+#include "host/drive/model_block.hpp"
 #include "host/output/json.hpp"
 #include "host/output/text.hpp"
-#include "shared/fixed/system.hpp"
-#include "shared/model/drive_model.hpp"
 #include "shared/protocol/texts.hpp"
 
 namespace flexspline::cli {
@@ -69,68 +65,31 @@ void print(const std::vector<BlockChange>& changes, Console& console) {
   if (!same.empty()) console.line(fmt::format("  {:<9} {}", "same", fmt::format("{}", fmt::join(same, ", "))));
 }
 
-// Names of the effects in an image, for the packer to refuse others with their names.
-std::vector<std::string> effects_of(const protocol::Effects& effects) {
-  std::vector<std::string> names;
-  using Every = model::DriveModel<fixed::Fixed, model::EveryEffect>;
-  Every{}.for_each([&]<class Effect>(const auto&) {
-    if (effects.has(static_cast<std::uint8_t>(Every::number_of<Effect>()))) names.emplace_back(Effect::kInfo.name);
-  });
-  return names;
-}
-
 std::string text_of_file(const std::filesystem::path& path) {
   std::ifstream in(path, std::ios::binary);
   if (!in) throw UsageError(fmt::format("{} cannot be read; is the path right?", path.string()));
   return {std::istreambuf_iterator<char>(in), std::istreambuf_iterator<char>()};
 }
 
-// A model of another gear would turn the drive by other angles than are commanded.
-void require_same_gear(const Bytes& active, const Bytes& block) {
-  const auto old = drive::scales_of(active), now = drive::scales_of(block);
-  if (!old || !now) return;
-  const double before = old->constants.gear_ratio, after = now->constants.gear_ratio;
-  if (std::abs(after - before) > 1e-3 * before)
-    throw UsageError(
-        fmt::format("the model is of a gear of {:g}, the drive's active block of {:g}; take the drive's own "
-                    "model, or pack a block and flash it with --block",
-                    after, before));
-}
-
 Bytes block_of(const FlashOptions& options, drive::Session& session, const Bytes& active, Console& console) {
   if (!options.block.empty()) return read_block_file(options.block);
   const model::ModelFile file = load_model(options.model);
-  deployment::PackOptions pack;
-  pack.tick_hz = session.identity().tick_hz;
-  pack.image = effects_of(session.effects());
-  if (!options.settings.empty()) {
-    pack.settings = text_of_file(options.settings);
-    pack.settings_origin = options.settings.string();
-  } else if (!active.empty()) {
-    // Signals are limited to two bases where they enter a drive.
-    const double most_a = 1.99 * deployment::bases_of(file.model, 1.0 / pack.tick_hz, 1.0).current_base;
-    std::optional<double> lowered_from_a;
-    pack.settings = drive::settings_text(deployment::unpack(active), most_a, lowered_from_a);
-    if (lowered_from_a)
-      console.warn(
-          fmt::format("overcurrent is lowered from {:.4g} A to {:.4g} A: with this model's rated current the "
-                      "drive measures no more; a higher rated_current_a in [drive] keeps it",
-                      *lowered_from_a, most_a));
-    pack.settings_origin = "the active block's settings";
-  } else {
-    throw UsageError("the drive has no block to take its settings from; state them: --settings FILE.toml");
-  }
+  std::optional<drive::SettingsFile> settings;
+  if (!options.settings.empty()) settings = {text_of_file(options.settings), options.settings.string()};
   console.progress("proving the block and comparing it with double");
-  const Bytes block = deployment::pack(file.model, pack).bytes;
-  require_same_gear(active, block);
-  return block;
+  const drive::ModelBlock made = drive::model_block(session, active, file.model, settings, options.measured);
+  for (const std::string& warning : made.warnings) console.warn(warning);
+  return made.bytes;
 }
 
 }  // namespace
 
 int run(const FlashOptions& options, Console& console) {
+  if (!options.firmware.empty()) return flash_firmware(options, console);
+  if (options.older) throw UsageError("--older is for --firmware; backup and restore go back to an older block");
   if (options.model.empty() == options.block.empty())
-    throw UsageError("say what to flash: --model MODEL, or --block BLOCK of flexspline pack or backup");
+    throw UsageError(
+        "say what to flash: --model MODEL, --block BLOCK of flexspline pack or backup, or --firmware IMAGE");
   drive::Session session = open_drive(options.drive);
   const Bytes active = session.read_block(protocol::Which::active);
   const Bytes block = block_of(options, session, active, console);
@@ -142,6 +101,9 @@ int run(const FlashOptions& options, Console& console) {
   print(changes, console);
   const bool is_new = block != active;
   if (!is_new) console.line("The drive has this block already; nothing to do.");
+  json predicted;
+  if (is_new && !options.model.empty())
+    predicted = predict_flash(load_model(options.model).model, block, active, options.draws, console);
   const bool flashes = is_new && confirmed("Flash it?", options.yes);
   if (is_new && !flashes) console.line("Nothing was changed.");
   if (flashes) {
@@ -156,6 +118,7 @@ int run(const FlashOptions& options, Console& console) {
                                    {"before", json_of(before)},
                                    {"after", json_of(after)},
                                    {"changes", json_of(changes)},
+                                   {"predicted", predicted},
                                    {"flashed", flashes}});
   return kDone;
 }

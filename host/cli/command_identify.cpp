@@ -8,6 +8,7 @@
 #include "host/cli/commands.hpp"
 #include "host/cli/report_option.hpp"
 #include "host/estimation/estimate.hpp"
+#include "host/model/signature.hpp"
 #include "host/output/identification.hpp"
 #include "host/output/json.hpp"
 #include "host/output/text.hpp"
@@ -69,7 +70,7 @@ int run(const IdentifyOptions& options, Console& console) {
     // What only the data set knows of the drive stays there: the file keeps what its author wrote.
     model::Model changed = known;
     regression::store(changed, found->estimates);
-    model::save(options.out, model::rewrite(file, changed));
+    model::save(options.out, model::signed_by_tool(model::rewrite(file, changed)));
     console.line();
     console.line(fmt::format("{} holds these values.", options.out.string()));
     console.line("Next:");

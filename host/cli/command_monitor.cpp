@@ -121,6 +121,7 @@ class Screen {
 }  // namespace
 
 int run(const MonitorOptions& options, Console& console) {
+  if (options.residual_map) return run_residual_map(options, console);
   const std::vector<Channel> channels = channels_of(options.channels);
   drive::Session session = open_drive(options.drive);
   const drive::Scales scales = drive::scales_of(session);

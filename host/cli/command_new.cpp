@@ -5,6 +5,7 @@
 #include "host/cli/base_model.hpp"
 #include "host/cli/commands.hpp"
 #include "host/cli/project_draft.hpp"
+#include "host/model/signature.hpp"
 #include "host/output/json.hpp"
 #include "host/output/text.hpp"
 
@@ -65,7 +66,7 @@ int run(const NewOptions& options, Console& console) {
   for (const std::string& reason : base.reasons) model += fmt::format("# {}\n", reason);
   model += "\n" + model::write(base.model);
   model::save(dataset_file, toml);
-  model::save(model_file, model);
+  model::save(model_file, model::signed_by_tool(model));
 
   console.line(console.bold("Guessed or decided; mend it in the files where it is wrong:"));
   for (const std::string& note : draft.notes) console.line(output::wrapped("- " + note, 2, 2));

@@ -1,5 +1,6 @@
 #include <fmt/format.h>
 
+#include <cmath>
 #include <fstream>
 #include <iterator>
 #include <nlohmann/json.hpp>
@@ -7,6 +8,8 @@
 #include "host/catalogue/constants.hpp"
 #include "host/cli/commands.hpp"
 #include "host/deployment/bases.hpp"
+#include "host/deployment/maker.hpp"
+#include "host/model/signature.hpp"
 #include "host/output/json.hpp"
 #include "host/output/text.hpp"
 
@@ -16,7 +19,7 @@ namespace {
 using nlohmann::json;
 using output::number;
 
-constexpr int kDigits = 3;
+constexpr int kErrorDigits = 3;
 
 std::string text_of(const model::Name& name) {
   return {name.begin(), std::find(name.begin(), name.end(), '\0')};
@@ -34,9 +37,16 @@ std::vector<std::uint8_t> read_bytes(const std::filesystem::path& path) {
 
 json json_of(const deployment::Packed& packed) {
   json proof = json::array();
-  for (const auto& part : packed.proof)
-    proof.push_back(
-        {{"part", part.part}, {"kind", part.kind}, {"bound", output::json_number(part.bound)}, {"unit", part.unit}});
+  for (const auto& part : packed.proof) {
+    json entry = {
+        {"part", part.part}, {"kind", part.kind}, {"bound", output::json_number(part.bound)}, {"unit", part.unit}};
+    if (part.observed) {
+      entry["share_of_rated"] = output::json_number(*part.share_of_rated);
+      entry["observed"] = output::json_number(*part.observed);
+      entry["unproven"] = part.unproven.empty() ? json() : json(part.unproven);
+    }
+    proof.push_back(std::move(entry));
+  }
   return {{"format", "flexspline-pack/1"},
           {"bytes", packed.bytes.size()},
           {"sha256", packed.sha256},
@@ -44,7 +54,24 @@ json json_of(const deployment::Packed& packed) {
           {"max_error_share_of_rated", packed.max_error_share_of_rated},
           {"worst_balance", packed.worst_balance},
           {"torque_scale", packed.torque_scale},
+          {"error_is_proven", packed.error_is_proven},
+          {"error_bound_share_of_rated", output::json_number(packed.error_bound_share_of_rated)},
           {"proof", proof}};
+}
+
+// Of each effect and of the sum: what is proven beside what was seen.
+void print_errors(const deployment::Packed& packed, Console& console) {
+  console.line();
+  console.line(
+      console.bold(fmt::format("{:<32}{:>12}{:>16}{:>14}  {}", "error of", "at most", "of rated", "seen", "unit")));
+  const auto bound = [](double x) { return std::isfinite(x) ? number(x, kErrorDigits) : std::string("not proven"); };
+  for (const auto& part : packed.proof)
+    if (part.observed)
+      console.line(fmt::format("{:<32}{:>12}{:>16}{:>14}  {}", part.part, bound(part.bound),
+                               bound(*part.share_of_rated), number(*part.observed, kErrorDigits), part.unit));
+  for (const auto& part : packed.proof)
+    if (!part.unproven.empty() && part.part.find("_balance") == std::string::npos)
+      console.line(fmt::format("{}: not proven, as {}", part.part, part.unproven));
 }
 
 struct Named {
@@ -155,31 +182,36 @@ int run(const PackCommandOptions& options, Console& console) {
   model::save(options.out, std::string(packed.bytes.begin(), packed.bytes.end()));
   console.line(fmt::format("{}: {} bytes, SHA-256 {}", options.out.string(), packed.bytes.size(), packed.sha256));
   console.line(fmt::format("Largest error against double: {} {} on the {} balance, {} of rated torque",
-                           number(packed.max_error_nm, kDigits), packed.proof.front().unit, packed.worst_balance,
-                           number(packed.max_error_share_of_rated, kDigits)));
+                           number(packed.max_error_nm, kErrorDigits), packed.proof.front().unit, packed.worst_balance,
+                           number(packed.max_error_share_of_rated, kErrorDigits)));
   if (packed.torque_scale > 1.0)
     console.line(fmt::format("Torques go up to more than 16 times the rated one: their bases are {:g} times as wide",
                              packed.torque_scale));
   console.line();
   console.line(console.bold(fmt::format("{:<32}{:<18}{:>12}  {}", "part", "bound by", "bound", "unit")));
   for (const auto& part : packed.proof)
-    console.line(fmt::format("{:<32}{:<18}{:>12}  {}", part.part, part.kind, number(part.bound, kDigits), part.unit));
+    if (!part.observed)
+      console.line(fmt::format("{:<32}{:<18}{:>12}  {}", part.part, part.kind, number(part.bound, kErrorDigits), part.unit));
+  print_errors(packed, console);
   output::save_json(options.json, json_of(packed));
   return kDone;
 }
 
 int run(const UnpackOptions& options, Console& console) {
-  const deployment::Unpacked block = deployment::unpack(read_bytes(options.block));
+  const std::vector<std::uint8_t> bytes = read_bytes(options.block);
+  const deployment::Unpacked block = deployment::unpack(bytes);
+  const std::string maker = deployment::maker_of(bytes);
   if (!options.out.empty()) {
     if (!block.model)
       throw deployment::PackError(
           fmt::format("{} has no note of the model that it was made from, so there is none to write; leave out --out",
                       options.block.string()));
-    model::save(options.out, model::write(*block.model));
+    model::save(options.out, model::signed_by_tool(model::write(*block.model)));
   }
   const std::string drive = text_of(block.header.drive);
   console.line(fmt::format("{}: a good block of model \"{}\" for {}", options.block.string(),
                            text_of(block.header.model), drive.empty() ? "any drive" : "drive \"" + drive + "\""));
+  if (!maker.empty()) console.line(fmt::format("Made by {}", maker));
   const auto table = [&](const char* title, const std::vector<Named>& all) {
     console.line();
     console.line(console.bold(title));
@@ -206,7 +238,9 @@ int run(const UnpackOptions& options, Console& console) {
     console.line(block.coefficients_follow
                      ? "The coefficients are, to the bit, what the parameters in the block's note give."
                      : "The block was made by another version: its parameters now give other coefficients.");
-  output::save_json(options.json, json_of(block));
+  json answer = json_of(block);
+  answer["made_by"] = maker.empty() ? json() : json(maker);
+  output::save_json(options.json, answer);
   return kDone;
 }
 

@@ -2,6 +2,7 @@
 #include <unistd.h>
 
 #include <algorithm>
+#include <cmath>
 #include <cstdio>
 #include <iostream>
 #include <nlohmann/json.hpp>
@@ -11,6 +12,8 @@
 #include "host/drive/dataset_writer.hpp"
 #include "host/drive/recorder.hpp"
 #include "host/output/json.hpp"
+#include "host/planning/report_plans.hpp"
+#include "host/text/nearest.hpp"
 
 namespace flexspline::cli {
 namespace {
@@ -71,10 +74,50 @@ void say(const drive::Recording& r, Console& console) {
                     r.run.name, r.lost, r.gaps.size(), r.dropped));
 }
 
+// Only the runs that were named, in the plan's order.
+void keep_runs(planning::Plan& plan, const std::vector<std::string>& names) {
+  std::vector<std::string_view> known;
+  for (const planning::Run& run : plan.runs) known.push_back(run.name);
+  for (const std::string& name : names)
+    if (std::ranges::find(known, name) == known.end()) {
+      const std::string near = text::nearest(name, known);
+      throw UsageError(fmt::format(
+          "the plan has no run \"{}\"; {}", name,
+          near.empty() ? fmt::format("it has {}", fmt::join(known, ", ")) : fmt::format("did you mean {}?", near)));
+    }
+  if (!names.empty())
+    std::erase_if(plan.runs, [&](const planning::Run& r) { return std::ranges::find(names, r.name) == names.end(); });
+}
+
+constexpr double kShareOfLimits = 0.9;  // is 100 % of the report
+
+planning::FullScale full_scale_of(const drive::Scales& scales) {
+  const auto of = [](fixed::Value share, double base) { return std::ldexp(share.raw, -fixed::kValueBits) * base; };
+  const model::Limits& limits = scales.header.limits;
+  return {kShareOfLimits * of(limits.velocity, scales.constants.velocity_base),
+          kShareOfLimits * of(limits.current, scales.constants.current_base)};
+}
+planning::Plan report_plan_of(const RecordOptions& options, planning::FullScale full) {
+  full.velocity_rad_s = options.full_velocity_rad_s.value_or(full.velocity_rad_s);
+  full.current_a = options.full_current_a.value_or(full.current_a);
+  const auto plan = planning::report_plan(options.plan.string(), full);
+  if (plan) return *plan;
+  std::string known;
+  for (const planning::ReportPlan& one : planning::report_plans())
+    known += fmt::format("{}{} ({})", known.empty() ? "" : "; ", one.name, one.title);
+  throw UsageError(
+      fmt::format("there is no file {} and no such plan of the report; there are {}", options.plan.string(), known));
+}
+
 }  // namespace
 
 int run(const RecordOptions& options, Console& console) {
-  const planning::Plan plan = planning::read(options.plan);
+  const bool is_report = options.plan.string().starts_with("report-") && !fs::exists(options.plan);
+  planning::Plan plan = is_report ? report_plan_of(options, {100.0, 1.0}) : planning::read(options.plan);
+  if (!is_report && (options.full_velocity_rad_s || options.full_current_a))
+    throw UsageError(
+        "--full-velocity-rad-s and --full-current-a are for the report's plans; another plan has its own sizes");
+  keep_runs(plan, options.runs);
   if (plan.runs.empty()) throw UsageError(options.plan.string() + ": the plan has no [[run]]: nothing to record");
   if (!options.force && fs::exists(options.out) && !fs::is_empty(options.out))
     throw UsageError(options.out.string() + ": is there and not empty; give another folder, or --force");
@@ -82,7 +125,11 @@ int run(const RecordOptions& options, Console& console) {
   drive::Session session = open_drive(options.drive);
   const drive::Bytes block = session.read_block(protocol::Which::active);
   const drive::Scales scales = drive::scales_of(session);
-  drive::Recorder recorder(session, scales, plan);
+  if (is_report) {
+    plan = report_plan_of(options, full_scale_of(scales));
+    keep_runs(plan, options.runs);
+  }
+  drive::Recorder recorder(session, scales, plan, options.compensate);
   const protocol::Identity& id = session.identity();
   const drive::Origin origin{session.serial(), session.board(), fmt::format("{}.{}", id.firmware[0], id.firmware[1]),
                              deployment::sha256(block)};

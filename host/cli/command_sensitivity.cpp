@@ -18,7 +18,7 @@ using sensitivity::Sensitivity;
 using sensitivity::SignalError;
 using sensitivity::Variant;
 
-constexpr int kDigits = 3;
+constexpr int kShareDigits = 3;
 constexpr std::size_t kSignalsOfOne = 3;
 constexpr std::size_t kSentences = 3;
 // Less growth, in shares of the signal, is not worth a line.
@@ -34,7 +34,7 @@ std::string signal_name(const SignalError& s) {
 }
 
 std::string error_text(const SignalError& s) {
-  return std::isnan(s.rmse) ? "diverges" : number(s.rmse, kDigits);
+  return std::isnan(s.rmse) ? "diverges" : number(s.rmse, kShareDigits);
 }
 // "+12 %", "-0.4 deg", "0.0 deg"
 std::string change_text(double change, const char* unit) {

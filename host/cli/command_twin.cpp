@@ -13,6 +13,7 @@ int run(const TwinOptions& options, Console&) {
   };
   give("--plant", options.plant.string());
   give("--flash", options.flash.string());
+  give("--cable", options.cable.string());
   give("--json", options.json);
   if (options.usbip >= 0) give("--usbip", std::to_string(options.usbip));
   if (options.usbip < 0) give("--serve", std::to_string(options.serve));

@@ -2,6 +2,7 @@
 #pragma once
 
 #include <filesystem>
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -21,6 +22,10 @@ struct FlashOptions {
   std::filesystem::path model;
   std::filesystem::path block;
   std::filesystem::path settings;  // empty: those of the active block
+  std::filesystem::path firmware;
+  bool older = false;     // firmware
+  int draws = 4;          // of the prediction; nought: none
+  bool measured = false;  // as pack --measured
   bool yes = false;
   std::string json;
 };
@@ -46,9 +51,13 @@ struct MonitorOptions {
   double seconds = 0.0;  // nought: until Ctrl-C
   double rate_hz = 10.0;
   std::vector<std::string> channels;
+  bool residual_map = false;  // that, and not the signals
+  bool reset = false;
+  std::optional<double> limit_nm;
   std::string json;
 };
 int run(const MonitorOptions& options, Console& console);
+int run_residual_map(const MonitorOptions& options, Console& console);
 
 struct RecordOptions {
   std::string drive;
@@ -57,6 +66,10 @@ struct RecordOptions {
   bool yes = false;
   bool force = false;
   bool clear_fault = false;
+  bool compensate = false;
+  std::vector<std::string> runs;              // of the plan, by name; none: all
+  std::optional<double> full_velocity_rad_s;  // of the report's plans
+  std::optional<double> full_current_a;
   std::string json;
 };
 int run(const RecordOptions& options, Console& console);
@@ -64,6 +77,7 @@ int run(const RecordOptions& options, Console& console);
 struct TwinOptions {
   std::filesystem::path plant;  // empty: the demo's drive
   std::filesystem::path flash;  // empty: what is flashed ends with the twin
+  std::filesystem::path cable;  // pulls its plug while it says so; empty: none
   std::string serial = "TWIN";
   int serve = 0;   // port; nought: any that is free
   int usbip = -1;  // port of a USB device; below nought: none

@@ -131,9 +131,11 @@ const std::array kHelp = {
         "makes the parameter block of a drive from a model, with its proof",
         "Turns a model into the bytes that a drive computes with: bases from the ratings in [drive], coefficients as "
         "integers, and a checksum. Proves that no number can leave its range whatever the drive measures within twice "
-        "its ratings, and compares the block with double along a hundred thousand samples of the whole envelope. A "
-        "model that does not fit, or whose error is above --bound, is refused with the reason (exit code 1 for the "
-        "bound, 2 for all else). The model's parameters go into the block too, for unpack. With --drive the block has "
+        "its ratings, bounds for each effect and for the sum how far the drive can be from the equations, and compares "
+        "the block with double along a hundred thousand samples of the whole envelope. A model that does not fit, "
+        "whose error along the samples is above --bound, or whose error has no bound that can be proven (unless "
+        "--measured goes without one), is refused with the reason (exit code 1 for the error, 2 for all else). The "
+        "model's parameters go into the block too, for unpack. With --drive the block has "
         "all that a drive needs: loops (50 Hz velocity with integral, 10 Hz position), limits, sensors, feedforward "
         "and observers, as a TOML file states them (host/deployment/README.md has the keys) and else as the ratings "
         "and the model suggest. Without it a block is good to simulate with; a drive refuses it.",
@@ -156,8 +158,10 @@ const std::array kHelp = {
         "are those of simulate, to rounding. csv: a folder with the parameters, the friction over speed, the "
         "transmission's loop, and the curve of each effect that depends on one signal. mujoco, urdf: a joint with "
         "armature, the straight line nearest to the friction, and stiffness; what a joint cannot hold is said in a "
-        "comment.",
-        {kMakeData, kIdentify, "flexspline export --model fitted.toml --as c --out drive_model.h",
+        "comment. --protocol-header writes what travels between host and drive, for programs of your own: message "
+        "kinds, codes, channels, layouts, and the parameter block with the places of its fields.",
+        {kMakeData, kIdentify, "flexspline export --protocol-header --out flexspline_protocol.h",
+         "flexspline export --model fitted.toml --as c --out drive_model.h",
          "flexspline export --model fitted.toml --as csv --out tables"}},
     CommandHelp{
         "plan",
@@ -183,12 +187,24 @@ const std::array kHelp = {
         {"flexspline drives --also twin"}},
     CommandHelp{
         "flash",
-        "puts a model or a parameter block on a drive",
+        "puts a model, a parameter block or new firmware on a drive",
         "Packs the model for this drive (its tick rate, its effects), or takes a block as it is, and says what that "
         "changes against the block in use, parameter by parameter. The drive keeps the old block until the new one has "
-        "arrived whole and was found good, and has it for restore afterwards; it refuses while it is armed. On a "
-        "terminal it asks first; without one, or with --yes, it does not.",
+        "arrived whole and was found good, and has it for restore afterwards; it refuses while it is armed. What the "
+        "model will be worth at slow reversals is predicted from its values and their uncertainty and said before. On "
+        "a terminal it asks first; without one, or with --yes, it does not. --firmware takes an image of flexspline "
+        "image to a drive on USB: it goes to its boot loader, gets the image and tries it; one that does not do well "
+        "is taken back (exit code 1). Images for other boards, damaged ones and, without --older, older ones are "
+        "refused before anything is sent.",
         {kMakeData, kIdentify, "flexspline flash --drive twin --model fitted.toml --yes"}},
+    CommandHelp{
+        "image",
+        "makes a firmware image of a program",
+        "Puts before a program (BIN file) the header that boot loader and flash --firmware look at: length, checksum, "
+        "board and version. The program has to be linked to begin 512 bytes behind its slot. --dfu adds the suffix "
+        "that dfu-util looks for. flexspline-hil image makes images for the twin.",
+        {"echo a program | tee program.bin",
+         "flexspline image --program program.bin --board stm32f405-dac --version 1.2 --out firmware.image"}},
     CommandHelp{
         "backup",
         "saves the parameter block of a drive",
@@ -206,12 +222,17 @@ const std::array kHelp = {
         "monitor",
         "live signals of a drive",
         "Shows mode, faults and signals as they are; on a terminal with a curve of the last seconds behind each, "
-        "else a line at a time. --json writes the samples at the end. It only looks: nothing is armed.",
-        {"flexspline monitor --drive twin --seconds 0.5"}},
+        "else a line at a time. --json writes the samples at the end. It only looks: nothing is armed. --residual-map "
+        "shows where over velocity "
+        "and motor angle the model on the drive fails, and how certain that is: the drive counts it by itself while "
+        "its "
+        "model is fed forward (record --compensate); the first call starts the count.",
+        {"flexspline monitor --drive twin --seconds 0.5", "flexspline monitor --drive twin --residual-map"}},
     CommandHelp{
         "record",
         "runs the motions of a plan on a drive and saves the measurements",
-        "Runs each motion of a plan as an excitation on the drive itself, at most at the plan's limits and the "
+        "Runs each motion of a plan on the drive itself (currents and velocities as its excitation, positions by its "
+        "trajectory, from where the shaft stands), at most at the plan's limits and the "
         "drive's, "
         "and writes a data set: a CSV file for each run with the drive's identity and its block's hash, and "
         "dataset.toml. Frames that got lost are counted and named in the file. Ctrl-C, a limit or a fault brings the "
@@ -220,7 +241,8 @@ const std::array kHelp = {
         {kMakeData, kIdentify,
          "flexspline plan --model fitted.toml --run-s 2 --motions 1 --without off,locked,load,temperature --out "
          "plan.toml",
-         "flexspline record --drive twin --plan plan.toml --out recorded"}},
+         "flexspline record --drive twin --plan plan.toml --out recorded",
+         "flexspline record --drive twin --plan report-friction --runs 50-1-10 --out recorded-as-in-the-report"}},
     CommandHelp{
         "twin",
         "a virtual drive: a plant, its sensors and the firmware",
@@ -230,9 +252,50 @@ const std::array kHelp = {
         "flexspline-hil twin, which this starts, has more options: hidden effects, faults, a serial line. --json "
         "writes where it is once it listens.",
         {"flexspline twin --seconds 0.5"}},
+    CommandHelp{
+        "hil",
+        "a drive in closed loop, with and without compensation",
+        "Runs the drive's own firmware on a simulated drive along a motion, with the same loops each time: without "
+        "compensation, with a model, and with the model that an effect was added to (--base and --model). Says how far "
+        "the output is from where it shall be, what current that takes, and whether the loops hunt; and beside it what "
+        "was predicted from the model and the uncertainty of its parameters alone. A scenario is a name "
+        "(flexspline-hil scenarios lists them) or a file that says motion, drive, surroundings and what goes wrong. "
+        "Without --model the maker's values of the drive are taken. --processor runs the controller as the image of "
+        "an ARM processor.",
+        {"flexspline hil --scenario slow-reversals --hide stribeck_gaussian --seconds 4"}},
+    CommandHelp{
+        "workbench",
+        "all of it with the mouse: a page in the browser of this machine",
+        "Serves a page on 127.0.0.1 and opens it: how good the model is, where it fails, what is missing, and what "
+        "becomes of the error with that added; steps can be taken back and compared. Models, reports and blocks are "
+        "saved into the model's folder, and flashed to a drive or the twin. The address has a token in it: who does "
+        "not know it is refused. Runs until Ctrl-C; --json writes the address once it listens.",
+        {kMakeData, "flexspline workbench demo-out --model demo-out/base-model.toml --no-open --seconds 0.5"}},
+    CommandHelp{
+        "fleet",
+        "many drives: one command a drive, then which of them differs from its siblings",
+        "run identifies a drive (with --diagnose diagnoses it, too) and puts the answer as fleet-result.json beside "
+        "its "
+        "measurements; where that is there already, of the same files and the same build, nothing is done, so the "
+        "command can be given again after a stop. It is for a scheduler: parallel flexspline fleet run {} ::: "
+        "drives/*, "
+        "or in a Slurm array job: all=(drives/*); flexspline fleet run \"${all[$SLURM_ARRAY_TASK_ID]}\". merge reads "
+        "the results, says how each parameter and each error lies over the drives, and names drives that lie further "
+        "off than their siblings' scatter explains; at least five drives are needed.",
+        {"flexspline-hil record --out drives/one --seed 1", "flexspline fleet run drives/one",
+         "flexspline fleet merge drives"}},
+    CommandHelp{"completion",
+                "a script by which a shell completes commands, options and effects",
+                "Prints the script for bash, zsh or fish, made from the options that --help shows. bash: flexspline "
+                "completion bash > /etc/bash_completion.d/flexspline; zsh: into a folder of $fpath as _flexspline; "
+                "fish: ~/.config/fish/completions/flexspline.fish. An installed package brings all three.",
+                {"flexspline completion bash"}},
+    CommandHelp{"man",
+                "this help as a man page",
+                "Prints the page in roff, made from the texts and options that --help shows: flexspline man > "
+                "flexspline.1, then man -l flexspline.1. An installed package brings it: man flexspline.",
+                {"flexspline man"}},
 };
-
-constexpr auto kNotBuilt = std::to_array<std::string_view>({"hil", "workbench"});
 
 }  // namespace
 
@@ -240,10 +303,6 @@ const CommandHelp& help_of(std::string_view command) {
   for (const CommandHelp& help : kHelp)
     if (help.name == command) return help;
   throw std::logic_error(fmt::format("no help is written for {}", command));
-}
-
-std::span<const std::string_view> not_built_yet() {
-  return kNotBuilt;
 }
 
 std::string example_text(const CommandHelp& help) {

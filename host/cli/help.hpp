@@ -1,7 +1,6 @@
 // What --help says of each command, and the examples in it, which a test runs.
 #pragma once
 
-#include <span>
 #include <string>
 #include <string_view>
 #include <vector>
@@ -17,9 +16,6 @@ struct CommandHelp {
 };
 
 const CommandHelp& help_of(std::string_view command);
-
-// Commands of the contract that are still to come.
-std::span<const std::string_view> not_built_yet();
 
 // "Example:" and the lines of `examples`.
 std::string example_text(const CommandHelp& help);

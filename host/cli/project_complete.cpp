@@ -19,10 +19,6 @@ using data::Column;
 // Each part of a split record must hold enough to be judged.
 constexpr std::size_t kFewestSamplesOfAPart = 500;
 
-data::KeyValue text_value(const std::string& text) {
-  return {text, std::nullopt, "", 0};
-}
-
 class TemporaryFolder {
  public:
   TemporaryFolder() {

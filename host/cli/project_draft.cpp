@@ -31,9 +31,6 @@ std::optional<fs::path> toml_of(const fs::path& path) {
   return std::nullopt;
 }
 
-data::KeyValue text_value(const std::string& text) {
-  return {text, std::nullopt, "", 0};
-}
 data::KeyValue number_value(double value) {
   return {model::exact_text(value), value, "", 0};
 }

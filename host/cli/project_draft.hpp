@@ -35,4 +35,9 @@ void complete(Draft& draft, data::Dataset& dataset);
 // The text of dataset.toml in `folder`; files are named relative to it.
 std::string text_of(const Draft& draft, const std::filesystem::path& folder);
 
+// A key's value that is text.
+inline data::KeyValue text_value(const std::string& text) {
+  return {text, std::nullopt, "", 0};
+}
+
 }  // namespace flexspline::cli

@@ -10,6 +10,7 @@
 #include <utility>
 
 #include "host/comparison/full_rate.hpp"
+#include "host/comparison/score.hpp"
 
 namespace flexspline::comparison {
 namespace {
@@ -20,7 +21,6 @@ using regression::Balance;
 using regression::Prepared;
 using regression::Record;
 
-constexpr double kUnknown = std::numeric_limits<double>::quiet_NaN();
 
 using Input = double (*)(const effects::Inputs<regression::Real>&);
 
@@ -98,12 +98,12 @@ void drop_dead_inputs(BesideSignal& signal) {
   }
 }
 
-// Sums over judged samples beyond the memory of a black box.
-struct Sums {
+// SquareSums over judged samples beyond the memory of a black box.
+struct SquareSums {
   blackbox::Errors box;
   double model_squared = 0.0;
 
-  void add(const Sums& other) {
+  void add(const SquareSums& other) {
     box.add(other.box);
     model_squared += other.model_squared;
   }
@@ -113,8 +113,8 @@ struct Sums {
   }
 };
 
-Sums sums_of(const LinearModel& model, const BesideSignal::Stretch& stretch) {
-  Sums sums{blackbox::errors_of(model, stretch.record), 0.0};
+SquareSums sums_of(const LinearModel& model, const BesideSignal::Stretch& stretch) {
+  SquareSums sums{blackbox::errors_of(model, stretch.record), 0.0};
   for (std::size_t k = model.orders.memory(); k < stretch.model_error.size(); ++k)
     if (stretch.record.is_judged(k)) sums.model_squared += stretch.model_error[k] * stretch.model_error[k];
   return sums;
@@ -133,12 +133,12 @@ BesideResult result_of(const BesideSignal& signal, const blackbox::Specification
   r.sample_s = signal.sample_s[stretches[0]];
   r.largest_pole = model.largest_pole();
   r.stable = model.stable();
-  std::vector<Sums> by_experiment(signal.experiments.size());
+  std::vector<SquareSums> by_experiment(signal.experiments.size());
   for (const std::size_t i : stretches)
     by_experiment[signal.stretches[i].record.experiment].add(sums_of(model, signal.stretches[i]));
-  Sums all, fit, holdout;
+  SquareSums all, fit, holdout;
   for (std::size_t e = 0; e < by_experiment.size(); ++e) {
-    const Sums& sums = by_experiment[e];
+    const SquareSums& sums = by_experiment[e];
     if (sums.box.samples == 0) continue;
     all.add(sums);
     (signal.roles[e] == Role::fit ? fit : holdout).add(sums);

@@ -29,7 +29,6 @@ using regression::BalanceData;
 using regression::Prepared;
 using regression::Record;
 
-constexpr double kUnknown = std::numeric_limits<double>::quiet_NaN();
 constexpr std::size_t kFewestBins = 12;
 constexpr std::size_t kMostBins = 24;
 constexpr std::size_t kFewestInRegion = 30;
@@ -71,7 +70,7 @@ class Comparer {
     result_.pipeline = prepared_.pipeline;
   }
 
-  Comparison all() {
+  Comparison all(bool free_runs) {
     for (const Balance balance : {Balance::motor, Balance::transmission, Balance::load}) {
       if (balance != Balance::motor && !prepared_.torque_measured) continue;
       if (regression::terms_on(terms_, balance, prepared_.torque_measured).empty()) continue;
@@ -85,7 +84,7 @@ class Comparer {
       throw data::DataError({{data::Severity::error, "missing_column", "", 0, "",
                               "no torque balance of the model can be formed from these columns",
                               "record current (or torque) and motor position together"}});
-    for (std::size_t i = 0; i < all_.size(); ++i) free_run(i);
+    for (std::size_t i = 0; free_runs && i < all_.size(); ++i) free_run(i);
     for (const Together& t : together_) {
       if (std::any_of(result_.overall.begin(), result_.overall.end(), [&](auto& s) { return s.signal == t.signal; }))
         continue;
@@ -289,8 +288,8 @@ const SignalResult* Comparison::find_overall(std::string_view signal) const {
 }
 
 Comparison compare(const data::Dataset& dataset, const model::Model& model, const regression::PipelineOptions& options,
-                   const std::vector<blackbox::Specification>& beside) {
-  return Comparer(dataset, model, options, beside).all();
+                   const std::vector<blackbox::Specification>& beside, bool free_runs) {
+  return Comparer(dataset, model, options, beside).all(free_runs);
 }
 
 }  // namespace flexspline::comparison

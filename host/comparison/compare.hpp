@@ -70,10 +70,10 @@ struct Comparison {
 // Inverse model: each torque balance on the rows of the regression, with the motion as measured. Free run: what the
 // model does with the measured effort alone, from the measured state at the start of each segment; nothing is taken out
 // of the positions, as drift is an error. The cut-off is chosen from the experiments of role fit, where there are any.
-// `beside`: black boxes that are fitted to the same signals, see beside.hpp.
+// `beside`: black boxes that are fitted to the same signals, see beside.hpp. Without `free_runs` the balances alone.
 // Throws model::ModelError naming parameters without a value, data::DataError where no balance can be formed.
 Comparison compare(const data::Dataset& dataset, const model::Model& model, const regression::PipelineOptions& options,
-                   const std::vector<blackbox::Specification>& beside = {});
+                   const std::vector<blackbox::Specification>& beside = {}, bool free_runs = true);
 
 // Throws model::ModelError naming the parameters without a value, if there are any.
 void require_values(const model::Model& model);

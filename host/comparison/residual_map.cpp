@@ -21,8 +21,8 @@ using regression::RowRange;
 constexpr double kSignificant = 1e-3;
 constexpr int kOrders = 24;
 constexpr double kWholeWaves = 2.0;
-constexpr std::size_t kMostBins = 24;
-constexpr std::size_t kRowsPerBin = 16;
+constexpr std::size_t kMostMapBins = 24;
+constexpr std::size_t kRowsPerMapBin = 16;
 
 // A map or wave: what it predicts in each row (nought where it has no say), with so many free numbers beside the mean.
 struct Explained {
@@ -177,7 +177,7 @@ std::vector<Share> localise(const BalanceData& data, const Eigen::VectorXd& resi
   std::vector<Share> shares;
   if (residual.size() != data.rows() || residual.size() < 16) return shares;
   const double tau = std::max(1.0, autocorrelation_time);
-  const auto wanted = std::clamp<std::size_t>(static_cast<std::size_t>(residual.size()) / kRowsPerBin, 4, kMostBins);
+  const auto wanted = std::clamp<std::size_t>(static_cast<std::size_t>(residual.size()) / kRowsPerMapBin, 4, kMostMapBins);
   const Eigen::VectorXd directions = row_directions(data);
   const auto add = [&](std::string name, const Explained& explained, double level) {
     if (const auto share = significant_share(residual, explained, tau, level))

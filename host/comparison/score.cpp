@@ -10,7 +10,6 @@
 namespace flexspline::comparison {
 namespace {
 
-constexpr double kUnknown = std::numeric_limits<double>::quiet_NaN();
 constexpr std::size_t kShortest = 64;
 constexpr std::size_t kWantedWindows = 4;
 constexpr double kExcited = 1e-3;

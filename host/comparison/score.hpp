@@ -2,11 +2,15 @@
 #pragma once
 
 #include <cstddef>
+#include <limits>
 #include <vector>
 
 #include "host/data/dataset.hpp"
 
 namespace flexspline::comparison {
+
+// What a figure is that has no meaning, or that nobody has worked out.
+inline constexpr double kUnknown = std::numeric_limits<double>::quiet_NaN();
 
 // Sums over samples of a measured signal y and its error e = y - yhat. Figures are NaN where they have no meaning: no
 // samples, or a signal that does not vary.

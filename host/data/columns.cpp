@@ -11,7 +11,7 @@
 namespace flexspline::data {
 namespace {
 
-std::string listed(const std::vector<std::string>& names) {
+std::string quoted_list(const std::vector<std::string>& names) {
   constexpr std::size_t kMost = 40;  // a MAT file may hold hundreds
   std::string text;
   for (std::size_t i = 0; i < std::min(names.size(), kMost); ++i)
@@ -38,7 +38,7 @@ class Planner {
     list_unused();
     if (has_time_ && plan_.columns.empty())
       findings_.add(Severity::error, "missing_column", file_, recording_.header_line(), "",
-                    fmt::format("beside time, none of the columns is known; not used: {}", listed(plan_.unused)),
+                    fmt::format("beside time, none of the columns is known; not used: {}", quoted_list(plan_.unused)),
                     "map them in dataset.toml: [columns.current_a] with source = \"NAME IN THE FILE\" and unit");
     if (!has_time_ || plan_.columns.empty()) return std::nullopt;
     return std::move(plan_);
@@ -67,7 +67,7 @@ class Planner {
     return plan_.wanted.size() - 1;
   }
 
-  std::string near_first(std::string_view name) const { return listed(text::nearest_first(name, recording_.names())); }
+  std::string near_first(std::string_view name) const { return quoted_list(text::nearest_first(name, recording_.names())); }
 
   // Something of this name is there, but no column can be made of it.
   bool is_no_column(const std::string& theirs, const std::string& ours) {
@@ -142,7 +142,7 @@ class Planner {
     }
     if (plan_.unused.empty()) return;
     findings_.add(nearly.empty() ? Severity::note : Severity::warning, "unused_column", file_, recording_.header_line(),
-                  "", fmt::format("not used: {}", listed(plan_.unused)),
+                  "", fmt::format("not used: {}", quoted_list(plan_.unused)),
                   nearly.empty() ? "map those that matter in dataset.toml" : fmt::format("did you mean {}?", nearly));
   }
 

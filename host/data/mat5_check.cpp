@@ -18,7 +18,7 @@ namespace flexspline::data {
 namespace {
 
 constexpr std::size_t kHeader = 128;
-constexpr int kDeepest = 32;
+constexpr int kDeepestElement = 32;
 constexpr std::size_t kMostDimensions = 32;
 constexpr std::size_t kMostBytesInflated = std::size_t{1} << 32;
 
@@ -82,7 +82,7 @@ class Checker {
   // What is wrong with an array, or nothing.
   std::string array(std::string_view bytes, int depth, std::string* name_of_it = nullptr) {
     if (bytes.empty()) return {};  // as MATLAB writes an empty element of a cell or struct
-    if (depth > kDeepest) return "nests too deeply";
+    if (depth > kDeepestElement) return "nests too deeply";
     Elements parts(bytes, swapped_);
     const auto flags = parts.next();
     if (!flags || (flags->type != kUint32 && flags->type != kInt32) || flags->data.size() != 8)

@@ -14,6 +14,18 @@
 #include "host/data/mat5_check.hpp"
 #include "host/data/mat_contents.hpp"
 
+// GCC and Clang say it in different ways.
+#if defined(__SANITIZE_ADDRESS__)
+#define FLEXSPLINE_ADDRESS_SANITIZER 1
+#elif defined(__has_feature)
+#if __has_feature(address_sanitizer)
+#define FLEXSPLINE_ADDRESS_SANITIZER 1
+#endif
+#endif
+#ifndef FLEXSPLINE_ADDRESS_SANITIZER
+#define FLEXSPLINE_ADDRESS_SANITIZER 0
+#endif
+
 namespace flexspline::data {
 namespace {
 
@@ -160,7 +172,7 @@ void limit_resources(std::uintmax_t file_bytes) {
   ::setrlimit(RLIMIT_CPU, &time);
   rlimit no_core{0, 0};
   ::setrlimit(RLIMIT_CORE, &no_core);
-#ifndef __SANITIZE_ADDRESS__  // which takes terabytes of addresses for itself
+#if !FLEXSPLINE_ADDRESS_SANITIZER  // which takes terabytes of addresses for itself
   // deflate makes at most 1032 bytes of one, but signals with any noise are not packed 20 to 1; and as double each byte
   // becomes eight.
   const rlim_t bytes = (rlim_t{4} << 30) + 160 * static_cast<rlim_t>(file_bytes);

@@ -13,19 +13,19 @@ namespace {
 
 namespace fs = std::filesystem;
 
-std::string lower_extension(const fs::path& path) {
-  std::string extension = path.extension().string();
-  std::transform(extension.begin(), extension.end(), extension.begin(),
-                 [](char c) { return static_cast<char>(c >= 'A' && c <= 'Z' ? c - 'A' + 'a' : c); });
-  return extension;
-}
-
 bool is_recording(const fs::path& path) {
   const std::string extension = lower_extension(path);
   return extension == ".csv" || extension == ".tsv" || extension == ".mat";
 }
 
 }  // namespace
+
+std::string lower_extension(const fs::path& path) {
+  std::string extension = path.extension().string();
+  std::transform(extension.begin(), extension.end(), extension.begin(),
+                 [](unsigned char c) { return static_cast<char>(c >= 'A' && c <= 'Z' ? c - 'A' + 'a' : c); });
+  return extension;
+}
 
 std::string Table::place(std::size_t row) const {
   return lines.empty() ? fmt::format("sample {}: ", row + 1) : "";

@@ -14,6 +14,9 @@
 
 namespace flexspline::data {
 
+// ".csv" of "A.CSV"; the same in any locale.
+std::string lower_extension(const std::filesystem::path& path);
+
 struct HeaderKey {  // "# key: value" of a CSV file, or a variable of that name in a MAT file
   std::string key;
   std::string value;

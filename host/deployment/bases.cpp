@@ -3,19 +3,18 @@
 #include <fmt/format.h>
 
 #include <cmath>
-#include <numbers>
 
 #include "host/catalogue/constants.hpp"
 #include "host/catalogue/defined.hpp"
 #include "host/deployment/pack.hpp"
 #include "shared/fixed/coefficients.hpp"
+#include "shared/fixed/turn.hpp"
 
 namespace flexspline::deployment {
 namespace {
 
 using effects::DriveConstants;
 
-constexpr double kTurn = 2.0 * std::numbers::pi;
 constexpr double kFullSpeedAfterS = 0.05;
 constexpr double kTemperatureBase = 50.0;
 

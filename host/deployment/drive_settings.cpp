@@ -7,13 +7,13 @@
 #include <cmath>
 #include <map>
 #include <memory>
-#include <numbers>
 #include <set>
 
 #include "host/catalogue/constants.hpp"
 #include "host/catalogue/defined.hpp"
 #include "host/deployment/pack.hpp"
 #include "host/text/toml.hpp"
+#include "shared/fixed/turn.hpp"
 
 namespace flexspline::deployment {
 namespace {
@@ -22,7 +22,6 @@ using effects::DriveConstants;
 using text::Node;
 using text::NodeKind;
 
-constexpr double kTurn = 2.0 * std::numbers::pi;
 constexpr double kMost = 1e12;
 constexpr double kLeast = 1e-12;  // of what has to be above nought
 

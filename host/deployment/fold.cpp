@@ -16,7 +16,7 @@ constexpr std::array<const char*, 3> kBalanceNames = {"motor", "transmission", "
 // An odd number of points has one at nought, where most laws bend.
 constexpr std::size_t kPoints = 255, kPointsOfTurn = 256;
 constexpr std::size_t kChecked = 16;  // places between two points at which the error is measured
-constexpr double kEnvelope = 2.0;     // bases
+constexpr double kFoldedRange = 2.0;     // bases
 
 const effects::VariableInfo& info_of(effects::Variable variable) {
   return *std::find_if(std::begin(effects::kVariables), std::end(effects::kVariables),
@@ -43,7 +43,7 @@ std::optional<Folded> folded(const model::Effect& effect, const model::Drive& dr
   const effects::VariableInfo& variable = info_of(single->variable);
   const bool magnitude =
       single->variable == effects::Variable::speed || single->variable == effects::Variable::torque_magnitude;
-  const double most = kEnvelope * effects::base_of(single->variable, bases);
+  const double most = kFoldedRange * effects::base_of(single->variable, bases);
   const std::vector<double> at = variable.periodic ? catalogue::points_of_turn(kPointsOfTurn)
                                                    : catalogue::even_points(magnitude ? 0.0 : -most, most, kPoints);
   const auto torque = [&](std::span<const double> x) {

@@ -5,18 +5,21 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
-#include <numbers>
+#include <limits>
 
 #include "host/catalogue/constants.hpp"
 #include "host/catalogue/defined.hpp"
 #include "host/deployment/bases.hpp"
+#include "host/deployment/error_proof.hpp"
 #include "host/deployment/fold.hpp"
+#include "host/deployment/maker.hpp"
 #include "host/deployment/note.hpp"
 #include "host/deployment/sha256.hpp"
 #include "host/deployment/trial.hpp"
 #include "host/output/text.hpp"
 #include "shared/control/drive_block.hpp"
 #include "shared/fixed/system.hpp"
+#include "shared/fixed/turn.hpp"
 #include "shared/observers/encoder_kalman.hpp"
 
 namespace flexspline::deployment {
@@ -27,7 +30,6 @@ using fixed::Findings;
 using fixed::Fixed;
 
 constexpr std::array<double, 4> kTorqueScales = {1.0, 2.0, 4.0, 8.0};
-constexpr double kTurn = 2.0 * std::numbers::pi;
 // Limits in bases: those of torque and current are the ratings, so that they hold where nothing else is known.
 constexpr double kOverspeed = 1.25;
 constexpr double kDirectionBand = 1.0 / 200.0;
@@ -194,21 +196,36 @@ void prove_parts(const std::vector<EffectValues>& effects, const Tried& tried, c
     packed.proof.push_back({fmt::format("{}_balance", kBalances[b]), "range", tried.bounds.torque[b] * bases[b], unit});
 }
 
-void measure_error(const std::vector<EffectValues>& effects, const Tried& tried, const model::Model& model,
-                   const PackOptions& options, const std::string& unit, const std::array<double, 3>& folding_error,
-                   Packed& packed) {
-  const Difference d = compare(effects, tried.drive, tried.bounds, options.samples, options.seed);
+// What an error means on each balance: at the motor, rated torque is that of the output over the gear ratio.
+struct Scale {
+  std::array<double, 3> bases;
+  std::array<double, 3> rated;
+  std::string unit;
+  // The balance on which an error in bases is the largest share of rated torque, that share, and it in N m.
+  struct Worst {
+    std::size_t balance = 0;
+    double share = 0.0;
+    double torque = 0.0;
+  };
+  Worst worst(const std::array<double, 3>& error) const {
+    Worst all;
+    for (std::size_t b = 0; b < bases.size(); ++b)
+      if (const double share = error[b] * bases[b] / rated[b]; share >= all.share)
+        all = {b, share, error[b] * bases[b]};
+    return all;
+  }
+};
+
+void measure_error(const Difference& d, const PackOptions& options, const Scale& scale,
+                   const std::array<double, 3>& folding_error, Packed& packed) {
   if (!d.finding.empty() || !d.within)
     throw PackError(fmt::format("the proof does not hold on a sample: {}",
                                 d.finding.empty() ? "a torque is beyond its bound" : d.finding));
-  const double rated = rated_output_torque(model.drive);
-  const std::array<double, 3> rated_of = {rated / tried.drive.gear_ratio, rated, rated};
-  const auto bases = torque_bases(tried.drive);
-  for (std::size_t b = 0; b < bases.size(); ++b) {
-    const double error = d.worst[b] * bases[b] + folding_error[b];
-    packed.proof.push_back({fmt::format("{}_balance", kBalances[b]), "measured_error", error, unit});
-    if (error / rated_of[b] < packed.max_error_share_of_rated) continue;
-    packed.max_error_share_of_rated = error / rated_of[b];
+  for (std::size_t b = 0; b < scale.bases.size(); ++b) {
+    const double error = d.worst[b] * scale.bases[b] + folding_error[b];
+    packed.proof.push_back({fmt::format("{}_balance", kBalances[b]), "measured_error", error, scale.unit});
+    if (error / scale.rated[b] < packed.max_error_share_of_rated) continue;
+    packed.max_error_share_of_rated = error / scale.rated[b];
     packed.max_error_nm = error;
     packed.worst_balance = kBalances[b];
   }
@@ -218,6 +235,38 @@ void measure_error(const std::vector<EffectValues>& effects, const Tried& tried,
         "model's torques are far above the ratings in [drive], effects were folded into tables, or --bound is "
         "too small",
         packed.max_error_share_of_rated, packed.worst_balance, options.bound));
+}
+
+// The proof of the error, by parts, beside what was measured of each.
+void prove_errors(const OnDrive& run, const Tried& tried, const Difference& measured, const PackOptions& options,
+                  const Scale& scale, Packed& packed) {
+  constexpr double kNone = std::numeric_limits<double>::infinity();
+  ErrorProof proof = prove_error(run.effects, tried.drive);
+  for (ErrorPart& part : proof.parts)
+    for (const ProofPart& fold : run.folds)
+      if (fold.part == part.id)
+        part.unproven = "it was folded into a table, and what that is off between its points is measured";
+  std::string why;
+  for (std::size_t e = 0; e < proof.parts.size(); ++e) {
+    const ErrorPart& part = proof.parts[e];
+    const auto worst = scale.worst(part.bound);
+    const bool proven = part.unproven.empty();
+    packed.proof.push_back({part.id, "error", proven ? worst.torque : kNone, scale.unit, proven ? worst.share : kNone,
+                            scale.worst(measured.parts[e]).torque, part.unproven});
+    if (!proven && why.empty()) why = fmt::format("{}: {}", part.id, part.unproven);
+  }
+  packed.error_is_proven = why.empty();
+  for (std::size_t b = 0; b < scale.bases.size(); ++b) {
+    const double bound = why.empty() ? proof.sum[b] * scale.bases[b] : kNone;
+    packed.proof.push_back({fmt::format("{}_balance", kBalances[b]), "error", bound, scale.unit, bound / scale.rated[b],
+                            measured.worst[b] * scale.bases[b], why});
+  }
+  packed.error_bound_share_of_rated = why.empty() ? scale.worst(proof.sum).share : kNone;
+  if (!why.empty() && !options.measured)
+    throw UnprovenError(
+        fmt::format("how far the drive is from double cannot be proven for {}; give --measured to go by the "
+                    "largest error along {} samples, {:.2g} of rated torque, or take it out of the model",
+                    why, options.samples, packed.max_error_share_of_rated));
 }
 
 }  // namespace
@@ -234,7 +283,11 @@ Packed pack(const model::Model& model, const PackOptions& options) {
   const Tried tried = proven(model, effects, options, packed);
   prove_parts(effects, tried, unit, packed);
   packed.proof.insert(packed.proof.end(), run.folds.begin(), run.folds.end());
-  measure_error(effects, tried, model, options, unit, run.folding_error, packed);
+  const double rated = rated_output_torque(model.drive);
+  const Scale scale{torque_bases(tried.drive), {rated / tried.drive.gear_ratio, rated, rated}, unit};
+  const Difference measured = compare(effects, tried.drive, tried.bounds, options.samples, options.seed);
+  measure_error(measured, options, scale, run.folding_error, packed);
+  prove_errors(run, tried, measured, options, scale, packed);
 
   packed.bytes.resize(model::kLargestBlock);
   model::BlockHeader header = header_of(model, tried.drive, options);
@@ -253,6 +306,7 @@ Packed pack(const model::Model& model, const PackOptions& options) {
     packed.proof.push_back(add_encoder_filter(writer, tried.drive, options));
   }
   writer.add_bytes(model::kParametersNote, note_of(model.drive, effects));
+  writer.add_bytes(kMakerNote, maker_note());
   const std::size_t size = writer.end();
   if (size == 0) throw PackError(fmt::format("the block is larger than {} bytes", model::kLargestBlock));
   packed.bytes.resize(size);

@@ -21,10 +21,14 @@ class PackError : public std::runtime_error {
   using std::runtime_error::runtime_error;
 };
 
-// Everything fits, but the error is above the bound. Exit 1.
+// Everything fits, but the error is above the bound, or has none that can be proven. Exit 1.
 class BoundError : public PackError {
  public:
   using PackError::PackError;
+};
+class UnprovenError : public BoundError {
+ public:
+  using BoundError::BoundError;
 };
 
 struct PackOptions {
@@ -39,16 +43,24 @@ struct PackOptions {
   std::vector<std::string> image;  // effects that the firmware has; empty: all that a drive can run
   std::size_t samples = 100'000;
   std::uint64_t seed = 1;
+  bool measured = false;  // the error along the samples is enough where it cannot be proven
 };
 
 // A bound that holds for every input within the envelope, and how it was found: "interval" (of an effect without
 // memory), "invariant" (of one with: its states cannot grow beyond), "impulse_response" (of a linear observer), "range"
-// (of the sum on a balance), "measured_error" (largest difference to double along the samples).
+// (of the sum on a balance), "error" (how far it is from the equations at most: PROOF.md), "interpolation" (of a table
+// that an effect was folded into, measured between its points), "measured_error" (largest difference to double along
+// the samples, with the interpolation).
 struct ProofPart {
   std::string part;
   std::string kind;
-  double bound = 0.0;
+  double bound = 0.0;  // of an error that is not proven infinite
   std::string unit;
+  // Of an error: its share of rated torque on the balance where that is the largest, the largest along the samples, and
+  // why it is not proven; empty where it is.
+  std::optional<double> share_of_rated{};
+  std::optional<double> observed{};
+  std::string unproven{};
 };
 
 struct Packed {
@@ -57,7 +69,9 @@ struct Packed {
   double max_error_nm = 0.0;  // on the balance where it is the largest share
   double max_error_share_of_rated = 0.0;
   std::string worst_balance;
-  double torque_scale = 1.0;  // by which the bases of torque were widened
+  bool error_is_proven = false;
+  double error_bound_share_of_rated = 0.0;  // proven; infinite where it is not
+  double torque_scale = 1.0;                // by which the bases of torque were widened
   std::vector<ProofPart> proof;
 };
 

@@ -9,10 +9,10 @@ namespace {
 
 using fixed::Fixed;
 constexpr std::int32_t kOne = std::int32_t{1} << fixed::kValueBits;
-constexpr std::int32_t kMost = 2 * kOne;
+constexpr std::int32_t kFarthest = 2 * kOne;
 
 Fixed::Value raw(std::int64_t x) {
-  return {{static_cast<std::int32_t>(std::clamp<std::int64_t>(x, -kMost, kMost))}};
+  return {{static_cast<std::int32_t>(std::clamp<std::int64_t>(x, -kFarthest, kFarthest))}};
 }
 Fixed::Value direction(Fixed::Value x) {
   return {{x.raw > 0 ? kOne : x.raw < 0 ? -kOne : 0}};
@@ -32,7 +32,7 @@ double Samples::between(double low, double high) {
 }
 
 void Samples::start() {
-  constexpr std::array<std::int32_t, 9> kCorners = {-kMost, -kOne, -1, 0, 0, 0, 1, kOne, kMost};
+  constexpr std::array<std::int32_t, 9> kCorners = {-kFarthest, -kOne, -1, 0, 0, 0, 1, kOne, kFarthest};
   left_ = static_cast<int>(random_() % 200) + 20;
   for (Swing& s : swings_) {
     s.rate = std::exp(between(std::log(1e-7), std::log(0.02)));
@@ -47,7 +47,7 @@ std::int32_t Samples::step(int channel) {
   if (s.stands && channel == torsion) return torsion_;
   if (s.stands) return s.corner;
   s.phase += s.rate;
-  return static_cast<std::int32_t>(std::lround(kMost * std::sin(s.phase)));
+  return static_cast<std::int32_t>(std::lround(kFarthest * std::sin(s.phase)));
 }
 
 effects::Inputs<Fixed> Samples::next() {
@@ -67,7 +67,7 @@ effects::Inputs<Fixed> Samples::next() {
   in.torsion = raw(torsion_);
   const double rate =
       (static_cast<double>(torsion_) - before) * drive_.torsion_base / (drive_.time_base * drive_.torsion_rate_base);
-  in.torsion_rate = raw(std::llround(std::clamp(rate, -2.0 * kMost, 2.0 * kMost)));
+  in.torsion_rate = raw(std::llround(std::clamp(rate, -2.0 * kFarthest, 2.0 * kFarthest)));
   in.torsion_direction = direction(in.torsion_rate);
   in.torque = raw(step(torque));
   in.current = raw(step(current));

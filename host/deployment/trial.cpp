@@ -1,12 +1,9 @@
 #include "host/deployment/trial.hpp"
 
-#include <fmt/format.h>
-
 #include <algorithm>
 #include <cmath>
-#include <memory>
 
-#include "host/deployment/pack.hpp"
+#include "host/deployment/on_numbers.hpp"
 #include "host/deployment/samples.hpp"
 #include "shared/fixed/checked.hpp"
 #include "shared/model/proof.hpp"
@@ -23,30 +20,6 @@ using numbers::Real;
 
 // Where a law is infinitely steep at rest an error means: no rate of torsion within this many units gives that torque.
 constexpr double kUnitsOfRate = 3.0;
-
-template <class N>
-void add(model::DriveModel<N>& model, const EffectValues& e, const DriveConstants<double>& drive) {
-  effects::for_each_effect([&]<class Effect>(std::size_t number) {
-    if constexpr (!Effect::kInfo.host_only) {
-      if (number != e.number) return;
-      Findings::clear();
-      const bool placed = model.template add<Effect>(Effect::template derive<N>(e.parameters.data(), drive));
-      if (Findings::count() != 0) throw PackError(fmt::format("{} does not fit: {}", e.id, Findings::first()));
-      if (!placed)
-        throw PackError(
-            fmt::format("{} does not fit: a drive has no place for more of its kind; take some out of "
-                        "the model",
-                        e.id));
-    }
-  });
-}
-template <class N>
-std::unique_ptr<model::DriveModel<N>> model_of(const std::vector<EffectValues>& effects,
-                                               const DriveConstants<double>& drive) {
-  auto model = std::make_unique<model::DriveModel<N>>();
-  for (const EffectValues& e : effects) add(*model, e, drive);
-  return model;
-}
 
 template <class To, class From>
 effects::Inputs<To> copied(const effects::Inputs<From>& in) {
@@ -72,11 +45,31 @@ effects::Inputs<To> copied(const effects::Inputs<From>& in) {
 double real(std::int64_t sum) {
   return std::ldexp(static_cast<double>(sum), -fixed::kSumBits);
 }
-std::array<double, 3> bases_of(const effects::Torques<Real>& t) {
-  return {t.motor, t.transmission, t.load};
+template <class N>
+std::array<double, 3> bases_of(const effects::Torques<N>& t) {
+  const auto plain = [](const auto& sum) {
+    if constexpr (std::is_same_v<N, Real>)
+      return sum;
+    else
+      return real(sum.raw);
+  };
+  return {plain(t.motor), plain(t.transmission), plain(t.load)};
 }
-std::array<double, 3> bases_of(const effects::Torques<Checked>& t) {
-  return {real(t.motor.raw), real(t.transmission.raw), real(t.load.raw)};
+// One tick; what each effect added, in bases, and their sum at the end.
+using Parts = std::vector<std::array<double, 3>>;
+template <class N>
+std::array<double, 3> tick(model::DriveModel<N>& model, const effects::Inputs<N>& in, Visited& visited, Parts& parts) {
+  visited.start();
+  return bases_of(
+      model.tick_by_effect(in, [&]<class Effect>(auto& state, const auto& coefficients, const effects::Inputs<N>& now,
+                                                 const effects::Inputs<N>& before, effects::Torques<N>& out) {
+        effects::Torques<N> part{};
+        model::DriveModel<N>::template run<Effect>(state, coefficients, now, before, part);
+        parts[visited.next(model::DriveModel<N>::template number_of<Effect>())] = bases_of(part);
+        out.motor += part.motor;
+        out.transmission += part.transmission;
+        out.load += part.load;
+      }));
 }
 double most(const Intervals::Sum& s) {
   return std::max(std::abs(real(s.low)), std::abs(real(s.high)));
@@ -103,20 +96,29 @@ Difference compare(const std::vector<EffectValues>& effects, const DriveConstant
   Samples motion(drive, seed);
   Findings::clear();
   Difference d;
+  d.parts.assign(effects.size(), {});
+  Visited visited(effects);
+  // Of the drive, of double, and of double at both ends of the resolution.
+  Parts given(effects.size()), middle = given, low = given, high = given;
+  const auto off = [](double x, double a, double b, double c) {
+    const auto [least, greatest] = std::minmax({a, b, c});
+    return std::max(least - x, x - greatest);
+  };
   for (std::size_t k = 0; k < samples; ++k) {
     const effects::Inputs<Fixed> in = motion.next();
-    const auto given = bases_of(drives->tick(copied<Checked>(in)));
+    const auto sum = tick(*drives, copied<Checked>(in), visited, given);
     effects::Inputs<Real> plain = in_double(in, drive);
-    const auto middle = bases_of(exact->tick(plain));
+    const auto exactly = tick(*exact, plain, visited, middle);
     plain.torsion_rate -= std::ldexp(kUnitsOfRate, -fixed::kValueBits);
-    const auto low = bases_of(slower->tick(plain));
+    const auto slow = tick(*slower, plain, visited, low);
     plain.torsion_rate += std::ldexp(2.0 * kUnitsOfRate, -fixed::kValueBits);
-    const auto high = bases_of(faster->tick(plain));
+    const auto fast = tick(*faster, plain, visited, high);
     for (std::size_t b = 0; b < kBalances.size(); ++b) {
-      const auto [least, greatest] = std::minmax({middle[b], low[b], high[b]});
-      d.worst[b] = std::max({d.worst[b], least - given[b], given[b] - greatest});
-      d.largest[b] = std::max(d.largest[b], std::abs(middle[b]));
-      d.within = d.within && std::abs(given[b]) <= bounds.torque[b];
+      d.worst[b] = std::max(d.worst[b], off(sum[b], exactly[b], slow[b], fast[b]));
+      d.largest[b] = std::max(d.largest[b], std::abs(exactly[b]));
+      d.within = d.within && std::abs(sum[b]) <= bounds.torque[b];
+      for (std::size_t e = 0; e < effects.size(); ++e)
+        d.parts[e][b] = std::max(d.parts[e][b], off(given[e][b], middle[e][b], low[e][b], high[e][b]));
     }
   }
   d.finding = std::string(Findings::first());

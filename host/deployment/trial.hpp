@@ -29,11 +29,13 @@ struct Bounds {
 Bounds prove(const std::vector<EffectValues>& effects, const effects::DriveConstants<double>& drive);
 
 struct Difference {
-  std::array<double, 3> worst{};    // in bases
-  std::array<double, 3> largest{};  // torque
-  std::string finding;              // of a step that left its range; none: empty
-  bool within = true;               // the bounds
+  std::array<double, 3> worst{};             // in bases
+  std::array<double, 3> largest{};           // torque
+  std::string finding;                       // of a step that left its range; none: empty
+  bool within = true;                        // the bounds
+  std::vector<std::array<double, 3>> parts;  // of each effect, the worst in bases
 };
+// Along samples of the whole envelope.
 Difference compare(const std::vector<EffectValues>& effects, const effects::DriveConstants<double>& drive,
                    const Bounds& bounds, std::size_t samples, std::uint64_t seed);
 

@@ -9,6 +9,7 @@
 #include "host/catalogue/defined.hpp"
 #include "host/comparison/noise_floor.hpp"
 #include "host/diagnosis/candidates.hpp"
+#include "host/estimation/in_parallel.hpp"
 
 namespace flexspline::diagnosis {
 namespace {
@@ -54,9 +55,10 @@ Addition compare_models(const data::Dataset& dataset, const model::Model& before
                         const regression::PipelineOptions& options) {
   Addition result;
   result.effect = std::move(effect);
-  const auto base = regression::identify(dataset, before, options);
-  regression::PipelineOptions same = options;
-  const auto extended = regression::identify(dataset, after, same);
+  std::unique_ptr<Identification> both[2];
+  estimation::in_parallel(
+      2, [&](std::size_t i) { both[i] = regression::identify(dataset, i == 0 ? before : after, options); });
+  const auto& [base, extended] = both;
   std::size_t b = 0, x = 0;
   if (!find_balance(*base, own, b) || !find_balance(*extended, own, x))
     throw data::DataError({{data::Severity::error, "missing_column", "", 0, "",

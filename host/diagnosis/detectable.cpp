@@ -13,7 +13,6 @@ namespace {
 using effects::Kind;
 using regression::Term;
 
-constexpr std::size_t kGridPoints = 6;  // as the search has them, so that its columns are at hand
 // Nobody would call it an effect beyond that many times the usual size.
 constexpr double kLargestScale = 1e6;
 // Of the least shape that the search looks at: nothing is told of an effect that is that small.

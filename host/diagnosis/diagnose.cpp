@@ -19,9 +19,6 @@ namespace {
 
 using regression::Term;
 
-// Residual over noise floor: what the filters leave around reversals repeats with the motion, so a true model stands
-// some 15 % above its floor.
-constexpr double kAtFloor = 1.3;
 // Maps of a complete model show significant shares of a few percent, too.
 constexpr double kShownShare = 5.0;
 // A delay is reported from this many standard errors on.

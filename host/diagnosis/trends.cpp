@@ -11,7 +11,7 @@ namespace flexspline::diagnosis {
 namespace {
 
 constexpr std::size_t kFewest = 6;
-constexpr double kCertain = 1e-3;
+constexpr double kUnlikely = 1e-3;
 constexpr double kMatters = 0.03;
 
 struct Setting {
@@ -83,7 +83,8 @@ std::vector<Trend> parameter_trends(const regression::Identification& identified
       std::vector<double> x, y;
       for (const auto& [name, value] : e.per_experiment) {
         if (!value || *value <= 0.0) continue;
-        const auto at = std::find_if(records.begin(), records.end(), [&](const auto& r) { return r.name == name; });
+        const auto at =
+            std::find_if(records.begin(), records.end(), [&wanted = name](const auto& r) { return r.name == wanted; });
         if (at == records.end()) continue;
         const auto& setting_value = setting.by_record[static_cast<std::size_t>(at - records.begin())];
         if (!setting_value) continue;
@@ -101,7 +102,7 @@ std::vector<Trend> parameter_trends(const regression::Identification& identified
     std::for_each(trends.begin() + first, trends.end(),
                   [&](Trend& t) { t.p_value = std::min(1.0, t.p_value * tried); });
   }
-  std::erase_if(trends, [](const Trend& t) { return t.p_value > kCertain; });
+  std::erase_if(trends, [](const Trend& t) { return t.p_value > kUnlikely; });
   std::sort(trends.begin(), trends.end(), [](const Trend& a, const Trend& b) { return a.p_value < b.p_value; });
   return trends;
 }

@@ -15,7 +15,6 @@ namespace {
 
 using regression::Term;
 
-constexpr std::size_t kGridPoints = 6;
 // Relative change of the squares that ends the search: well below one by score.
 constexpr double kSameSquares = 1e-5;
 constexpr std::size_t kRefined = 4;  // candidates whose shapes are searched continuously

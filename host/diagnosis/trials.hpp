@@ -34,6 +34,11 @@ inline constexpr double kRivalMargin = 10.0;
 inline constexpr double kNamedFallPercent = 0.5;
 // A candidate of which the model can imitate all but this share is one with it in the data.
 inline constexpr double kOwnShare = 0.003;
+// Residual over noise floor: what the filters leave around reversals repeats with the motion, so a true model stands
+// some 15 % above its floor.
+inline constexpr double kAtFloor = 1.3;
+// Values of a shape that the search tries first; who asks for the same finds its columns at hand.
+inline constexpr std::size_t kGridPoints = 6;
 
 // Whether an effect may be named: admissible, certain, and large enough to matter.
 bool passes(const Trial& trial);

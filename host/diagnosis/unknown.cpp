@@ -24,7 +24,7 @@ constexpr double kCurveScore = 60.0;
 constexpr double kCurveFallPercent = 3.0;
 // What is named must recover this share, or something else is there: substitutes for unknown laws stay below, effects
 // of the catalogue that are the nearest to one above.
-constexpr double kRecovered = 0.9;
+constexpr double kShapeRecovered = 0.9;
 // Two that are right leave nothing to a curve; two that are not come closer to it than one.
 constexpr double kRecoveredByTwo = 0.98;
 constexpr std::size_t kScreenedPoints = 24;
@@ -220,7 +220,7 @@ void tell_unknown(Search& search, const Trial* named, Diagnosis& result) {
       return share_of(search.base, trial.judged, curve, unknown->curve.effective - numbers);
     };
     unknown->named_share_percent = 100.0 * share(*named, named->proposal.added);
-    if (*unknown->named_share_percent >= 100.0 * kRecovered) return;
+    if (*unknown->named_share_percent >= 100.0 * kShapeRecovered) return;
     // Two effects of the catalogue may explain what one does not.
     Search next{search.data, search.keep, named->judged};
     const std::vector<Trial> more = rank(next);

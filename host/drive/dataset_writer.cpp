@@ -5,6 +5,7 @@
 #include <iterator>
 
 #include "host/model/text.hpp"
+#include "host/text/build_identity.hpp"
 
 namespace flexspline::drive {
 namespace {
@@ -37,13 +38,16 @@ std::string csv_of(const Recording& r, const Scales& scales, const Origin& origi
   line("# drive_board: {}", origin.board);
   line("# drive_firmware: {}", origin.firmware);
   line("# block_sha256: {}", origin.block_sha256);
+  line("# recorded_by: {}", text::tool_name());
   line("# frames_lost: {}", r.lost);
   line("# frames_dropped_by_drive: {}", r.dropped);
   for (const Gap& gap : r.gaps) line("# gap_at_{:.4f}_s: {} frames", gap.from_s, gap.frames);
-  const bool is_velocity = r.run.mode == planning::Mode::velocity;
+  const char* command = r.run.mode == planning::Mode::velocity   ? "velocity_command_rad_s"
+                        : r.run.mode == planning::Mode::position ? "position_command_rad"
+                                                                 : "current_command_a";
   const bool has_load = r.run.load_torque_nm != 0.0;
-  line("time_s,current_a,motor_position_rad,output_position_rad,torque_nm,temperature_c,{}{}",
-       is_velocity ? "velocity_command_rad_s" : "current_command_a", has_load ? ",load_torque_nm" : "");
+  line("time_s,current_a,motor_position_rad,output_position_rad,torque_nm,temperature_c,{}{}", command,
+       has_load ? ",load_torque_nm" : "");
   for (std::size_t k = 0; k < r.time_s.size(); ++k) {
     fmt::format_to(std::back_inserter(text), "{:.9g},{:.7g},{:.10g},{:.10g},{:.7g},{:.6g},{:.7g}", r.time_s[k],
                    r.current_a[k], r.motor_position_rad[k], r.output_position_rad[k], r.torque_nm[k],
@@ -56,10 +60,11 @@ std::string csv_of(const Recording& r, const Scales& scales, const Origin& origi
 
 std::string dataset_toml_of(const std::vector<Recording>& recordings, const Scales& scales, const Origin& origin) {
   std::string text = fmt::format(
-      "# Recorded by flexspline record on drive {} (board {}, firmware {}),\n# with the parameter block {}.\n"
+      "# Recorded by flexspline record on drive {} (board {}, firmware {}),\n# with the parameter block {}.\n# {}\n"
       "format = \"flexspline-dataset/1\"\n\n[drive]\naxis = \"{}\"\ngear_ratio = {}\ntorque_constant_nm_a = {}\n",
-      origin.serial, origin.board, origin.firmware, origin.block_sha256, scales.header.axis == 1 ? "linear" : "rotary",
-      real(scales.constants.gear_ratio), real(scales.constants.torque_constant));
+      origin.serial, origin.board, origin.firmware, origin.block_sha256, text::tool_name(),
+      scales.header.axis == 1 ? "linear" : "rotary", real(scales.constants.gear_ratio),
+      real(scales.constants.torque_constant));
   for (const Recording& r : recordings)
     if (r.complete)
       text += fmt::format("\n[[experiment]]\nfile = {}\nname = {}\nload = \"{}\"\nrole = \"fit\"\n",

@@ -5,12 +5,13 @@
 #include <algorithm>
 #include <chrono>
 #include <cmath>
-#include <numbers>
+#include <optional>
 #include <thread>
 
 #include "host/planning/excitation.hpp"
 #include "shared/control/excitation.hpp"
 #include "shared/fixed/findings.hpp"
+#include "shared/fixed/turn.hpp"
 #include "shared/protocol/excitation_requests.hpp"
 #include "shared/protocol/texts.hpp"
 
@@ -21,12 +22,15 @@ using protocol::Channel;
 using protocol::Kind;
 using Clock = std::chrono::steady_clock;
 
-constexpr double kTurn = 2.0 * std::numbers::pi;
 // A host that is silent for 0.1 s counts as lost; it shows itself well before, by either clock.
 constexpr Milliseconds kHeartbeat{20};
-constexpr std::uint32_t kHeartbeatTicks = 400;
+constexpr double kHeartbeatTick_s = 0.02;
+// Set points of position go out more often.
+constexpr Milliseconds kSetPoint{5};
+constexpr double kSetPoint_s = 0.005;
 constexpr Milliseconds kSilence{2000};
-constexpr double kOver = 1.1;  // of a limit: noise is no reason to stop
+constexpr double kStart_s = 2.0;  // until a run of mode position has begun
+constexpr double kOver = 1.1;     // of a limit: noise is no reason to stop
 constexpr std::size_t kLongestGapList = 20;
 
 const std::vector<Channel> kChannels{Channel::motor_fraction, Channel::output_fraction, Channel::current,
@@ -34,6 +38,7 @@ const std::vector<Channel> kChannels{Channel::motor_fraction, Channel::output_fr
 std::vector<Channel> channels_of(const planning::Run& run) {
   std::vector<Channel> channels = kChannels;
   if (run.mode != planning::Mode::velocity) channels.back() = Channel::command_current;
+  if (run.mode == planning::Mode::position) channels.back() = Channel::set_fraction;
   return channels;
 }
 
@@ -51,7 +56,10 @@ class Unwrapped {
     rate_ = (now - turns_) / samples;
     return turns_ = now;
   }
-  double rate() const { return rate_; }
+  double now() const { return turns_; }
+  // It begins here, whole turns and all.
+  void begin(double turns) { known_ = true, turns_ = turns; }
+  bool known() const { return known_; }
 
  private:
   bool known_ = false;
@@ -90,13 +98,32 @@ class Recorder::Columns {
     out_.current_a.push_back(value(2));
     out_.torque_nm.push_back(value(3));
     out_.temperature_c.push_back(value(4));
-    out_.command.push_back(value(5));
+    out_.command.push_back(channels_[5] == Channel::set_fraction ? set_point(words[5], samples) : value(5));
     watch();
   }
+  // Of mode position, from where it began.
+  // Where the shaft stands when a run of mode position begins, turns.
+  void start_at(double turns) { start_turns_ = turns; }
+  bool is_set() const { return set_.known(); }
+  double set_point_rad() const { return set_.known() ? kTurn * (set_.now() - set_begin_) : 0.0; }
   std::uint32_t last_tick() const { return last_tick_; }
   const std::string& exceeded() const { return exceeded_; }
 
  private:
+  // A drive that is not armed has no set point and says nought; the first one is where the shaft stood.
+  double set_point(std::uint32_t word, double samples) {
+    if (!set_.known()) {
+      constexpr double kSame = 0.02;  // turns
+      const double begin = scales_.value(Channel::set_fraction, word);
+      const double from_start = begin - start_turns_;
+      if (std::abs(from_start - std::nearbyint(from_start)) > kSame) return out_.motor_position_rad.back();
+      const double off = begin - motor_.now();
+      set_begin_ = motor_.now() + off - std::nearbyint(off);
+      set_.begin(set_begin_);
+      return kTurn * set_begin_;
+    }
+    return kTurn * set_.next(scales_.value(Channel::set_fraction, word), samples);
+  }
   void note_gap(std::uint32_t frames, double from_s) {
     if (frames == 0) return;
     out_.lost += frames;
@@ -129,14 +156,15 @@ class Recorder::Columns {
   std::uint16_t every_;
   Recording& out_;
   std::vector<Channel> channels_;
-  Unwrapped motor_, output_;
+  Unwrapped motor_, output_, set_;
+  double set_begin_ = 0.0, start_turns_ = 0.0;
   std::uint32_t first_tick_ = 0, last_tick_ = 0, next_ = 0;
   double low_ = 1e300, high_ = -1e300;
   std::string exceeded_;
 };
 
-Recorder::Recorder(Session& session, const Scales& scales, const planning::Plan& plan)
-    : session_(session), scales_(scales), plan_(plan) {
+Recorder::Recorder(Session& session, const Scales& scales, const planning::Plan& plan, bool compensates)
+    : session_(session), scales_(scales), plan_(plan), compensates_(compensates) {
   const double ticks = plan.sample_s * session.identity().tick_hz;
   if (!(ticks >= 1.0 && ticks <= 65535.0) || std::abs(ticks - std::round(ticks)) > 1e-6 * ticks)
     session.fail(
@@ -145,9 +173,10 @@ Recorder::Recorder(Session& session, const Scales& scales, const planning::Plan&
                     plan.sample_s, session.identity().tick_hz));
   every_ = static_cast<std::uint16_t>(std::lround(ticks));
   for (const planning::Run& run : plan.runs) {
-    if (run.mode == planning::Mode::position)
-      throw planning::PlanError(fmt::format(
-          "run \"{}\": a drive makes excitations of current and velocity, not of position; plan a velocity", run.name));
+    if (run.mode == planning::Mode::position) {
+      const PositionMotion checked(run, plan.limits, scales);
+      continue;
+    }
     if (run.mode == planning::Mode::off) continue;
     const auto setup = planning::excitation_of(run, 1.0 / session.identity().tick_hz);
     const bool is_current = run.mode == planning::Mode::current;
@@ -191,13 +220,40 @@ void Recorder::clear_fault() {
   if (session_.status().mode == protocol::Mode::fault) session_.command({.kind = protocol::CommandKind::clear_fault});
 }
 
+// Where the shaft stands, 2^-32 turns; the drive says it in telemetry alone.
+std::int64_t Recorder::angle_now() {
+  session_.subscribe({Channel::motor_turns, Channel::motor_fraction}, 20);
+  std::optional<std::int64_t> angle;
+  const auto end = Clock::now() + kSilence;
+  while (!angle && Clock::now() < end) {
+    const auto m = session_.next(Milliseconds(20));
+    if (!m || !m->is_unasked()) continue;
+    protocol::for_each_frame(*m, [&](const auto&, auto, std::span<const std::uint32_t> words) {
+      if (words.size() == 2)
+        angle = std::int64_t{static_cast<std::int32_t>(words[0])} * (std::int64_t{1} << 32) + std::int64_t{words[1]};
+    });
+  }
+  if (!angle) session_.fail("it does not say where its shaft is; check cable and power, then try again");
+  return *angle;
+}
+
+protocol::Mode Recorder::start(const planning::Run& run, std::optional<PositionMotion>& position) {
+  if (run.mode == planning::Mode::position) {
+    session_.command(position->arm(compensates_));
+    return protocol::Mode::position;
+  }
+  session_.command({.kind = protocol::CommandKind::arm, .mode = protocol::Mode::excitation});
+  return protocol::Mode::excitation;
+}
+
 Recording Recorder::record(const planning::Run& run, const Watch& watch) {
   Recording out;
   out.run = run;
   const double tick_s = 1.0 / session_.identity().tick_hz;
   const bool moves = run.mode != planning::Mode::off;
   protocol::Status before = session_.status();
-  for (int i = 0; i < 50 && before.mode == protocol::Mode::boot; ++i) {
+  // It starts, or comes to rest from what was before.
+  for (int i = 0; i < 150 && (before.mode == protocol::Mode::boot || before.mode == protocol::Mode::stop); ++i) {
     std::this_thread::sleep_for(Milliseconds(10));
     before = session_.status();
   }
@@ -206,13 +262,25 @@ Recording Recorder::record(const planning::Run& run, const Watch& watch) {
                               protocol::fault_text(before.fault).reason));
   if (before.mode != protocol::Mode::idle)
     session_.fail(fmt::format("it is in mode {}, not idle; another program may have it", name_of(before.mode)));
-  if (moves) send_excitation(run);
+  std::optional<PositionMotion> position;
+  std::int64_t angle = 0;  // where it begins
+  if (run.mode == planning::Mode::position) {
+    position.emplace(run, plan_.limits, scales_);
+    angle = angle_now();
+    position->start_at(angle);
+  } else if (moves) {
+    send_excitation(run);
+  }
+  const Milliseconds say_every = position ? kSetPoint : kHeartbeat;
+  const auto say_ticks = static_cast<std::uint32_t>((position ? kSetPoint_s : kHeartbeatTick_s) / tick_s);
   Columns columns(scales_, plan_, tick_s, every_, out);
+  columns.start_at(std::ldexp(static_cast<double>(angle & 0xFFFFFFFF), -fixed::kAngleBits));
   try {
     session_.subscribe(channels_of(run), every_);
-    if (moves) session_.command({.kind = protocol::CommandKind::arm, .mode = protocol::Mode::excitation});
+    const protocol::Mode mode = moves ? start(run, position) : protocol::Mode::idle;
     auto said_at = Clock::now(), heard_at = said_at;
     std::uint32_t said_tick = 0;
+    std::optional<double> began_s;  // of position
     bool waits = false;
     std::uint8_t asked = 0;
     while (true) {
@@ -225,13 +293,18 @@ Recording Recorder::record(const planning::Run& run, const Watch& watch) {
       } else if (m && waits && m->number == asked) {
         waits = false;
         protocol::CommandAnswer answer;
-        if (moves && protocol::take_payload(m->content(), answer) == protocol::Code::done &&
-            answer.mode != protocol::Mode::excitation) {
-          out.complete = answer.mode == protocol::Mode::idle;
+        if (moves && protocol::take_payload(m->content(), answer) == protocol::Code::done && answer.mode != mode) {
+          out.complete = !position && answer.mode == protocol::Mode::idle;
           break;
         }
       }
       const double time_s = out.time_s.empty() ? 0.0 : out.time_s.back();
+      if (position && !began_s && columns.is_set()) began_s = time_s;
+      if (position && !began_s && time_s > kStart_s) session_.fail("it does not take up its position; try again");
+      if (began_s && time_s - *began_s >= run.duration_s) {
+        out.complete = true;
+        break;
+      }
       if (!moves && time_s >= run.duration_s) {
         out.complete = true;
         break;
@@ -241,9 +314,11 @@ Recording Recorder::record(const planning::Run& run, const Watch& watch) {
       if (!out.ended.empty()) break;
       if (now - heard_at > kSilence) session_.fail("the drive went silent; check cable and power");
       const bool is_late = now - said_at > Milliseconds(500);
-      if ((!waits || is_late) && (now - said_at >= kHeartbeat || columns.last_tick() - said_tick >= kHeartbeatTicks)) {
+      if ((!waits || is_late) && (now - said_at >= say_every || columns.last_tick() - said_tick >= say_ticks)) {
         waits = true;
-        asked = session_.post(protocol::request(Kind::command, 0, protocol::Command{}));
+        const protocol::Command said =
+            began_s ? position->at(time_s - *began_s, columns.set_point_rad()) : protocol::Command{};
+        asked = session_.post(protocol::request(Kind::command, 0, said));
         said_at = now;
         said_tick = columns.last_tick();
         if (watch.progress) watch.progress(time_s);

@@ -3,9 +3,11 @@
 
 #include <cstdint>
 #include <functional>
+#include <optional>
 #include <string>
 #include <vector>
 
+#include "host/drive/position_motion.hpp"
 #include "host/drive/scales.hpp"
 #include "host/drive/session.hpp"
 #include "host/planning/plan.hpp"
@@ -30,7 +32,8 @@ struct Recording {
 class Recorder {
  public:
   // Of a whole plan, before anything moves: throws DriveError or PlanError for a run that this drive cannot make.
-  Recorder(Session& session, const Scales& scales, const planning::Plan& plan);
+  // `compensates`: runs of mode position with the feedforward of the drive's model; excitations have none.
+  Recorder(Session& session, const Scales& scales, const planning::Plan& plan, bool compensates = false);
 
   struct Watch {
     std::function<bool()> stops;  // asked again and again: the user wants an end
@@ -44,10 +47,13 @@ class Recorder {
  private:
   class Columns;
   void send_excitation(const planning::Run& run);
+  std::int64_t angle_now();
+  protocol::Mode start(const planning::Run& run, std::optional<PositionMotion>& position);
 
   Session& session_;
   const Scales& scales_;
   const planning::Plan& plan_;
+  bool compensates_;
   std::uint16_t every_ = 1;
 };
 

@@ -116,7 +116,7 @@ std::unique_ptr<Identification> estimate(const data::Dataset& dataset, const mod
     }
     if (method == Method::output_error) {
       options.progress("fitting the free run");
-      refit_to_output(*result);
+      refit_to_output(*result, options.progress);
     }
     regression::assemble(*result);
   }

@@ -4,7 +4,6 @@
 #include <cmath>
 
 #include "host/estimation/in_parallel.hpp"
-#include "host/simulation/simulation.hpp"
 
 namespace flexspline::estimation {
 namespace {
@@ -24,11 +23,9 @@ bool replace(data::Experiment& experiment, Column column, const std::vector<doub
   return true;
 }
 
-bool simulate(const model::Model& model, const data::Experiment& measured, std::optional<double> initial_velocity,
+bool simulate(const model::Model& model, const data::Experiment& measured, const simulation::Options& options,
               data::Experiment& result) {
   simulation::FreeRun run;
-  simulation::Options options;
-  options.initial_motor_velocity = initial_velocity;
   try {
     run = simulation::run(model, measured, options);
   } catch (const simulation::ModelIncomplete&) {
@@ -65,23 +62,33 @@ model::Model model_with_values(const Identification& identification) {
   return model;
 }
 
-FreeMotion free_motion(const Identification& identification, std::span<const std::optional<double>> initial_velocity) {
+FreeMotion free_motion(const Identification& identification, const FreeMotionOptions& options) {
   const model::Model model = model_with_values(identification);
   const regression::Prepared& measured = identification.prepared;
+  const std::size_t records = measured.records.size();
   FreeMotion result;
-  for (const regression::Record& record : measured.records) result.experiments.push_back(*record.experiment);
-  result.simulated.assign(measured.records.size(), 0);
-  in_parallel(measured.records.size(), [&](std::size_t i) {
-    const std::optional<double> initial = initial_velocity.empty() ? std::nullopt : initial_velocity[i];
-    if (simulate(model, *measured.records[i].experiment, initial, result.experiments[i])) result.simulated[i] = 1;
+  result.experiments.resize(records);
+  result.prepared.pipeline = measured.pipeline;
+  result.prepared.constants = measured.constants;
+  result.prepared.torque_measured = measured.torque_measured;
+  result.prepared.effort_is_current = measured.effort_is_current;
+  result.prepared.rotary = measured.rotary;
+  result.prepared.records.resize(records);
+  result.simulated.assign(records, 0);
+  in_parallel(records, [&](std::size_t i) {
+    if (!options.only.empty() && !options.only[i]) return;
+    simulation::Options how;
+    how.step_s = options.step_s;
+    if (!options.initial_velocity.empty()) how.initial_motor_velocity = options.initial_velocity[i];
+    data::Experiment& experiment = result.experiments[i];
+    experiment = *measured.records[i].experiment;
+    if (simulate(model, *measured.records[i].experiment, how, experiment)) result.simulated[i] = 1;
+    regression::Record& record = result.prepared.records[i];
+    record = std::move(
+        regression::prepare_with({&experiment}, identification.model.drive, measured.pipeline).records.front());
+    record.rows = measured.records[i].rows;
+    record.at_rest = measured.records[i].at_rest;
   });
-  std::vector<const data::Experiment*> all;
-  for (const data::Experiment& e : result.experiments) all.push_back(&e);
-  result.prepared = regression::prepare_with(all, identification.model.drive, measured.pipeline);
-  for (std::size_t i = 0; i < all.size(); ++i) {
-    result.prepared.records[i].rows = measured.records[i].rows;
-    result.prepared.records[i].at_rest = measured.records[i].at_rest;
-  }
   return result;
 }
 

@@ -6,6 +6,7 @@
 #include <vector>
 
 #include "host/regression/identify.hpp"
+#include "host/simulation/simulation.hpp"
 
 namespace flexspline::estimation {
 
@@ -16,14 +17,19 @@ model::Model model_with_values(const Identification& identification);
 
 // Every record again, with motion and torque of the free run, made ready by the same pipeline with the same rows. A
 // record that cannot be simulated or diverges keeps what was measured and is not marked. Records run on all cores; the
-// result does not depend on their number. Initial motor velocities by record, where the caller knows better than the
-// first sample does; else empty.
+// result does not depend on their number.
 struct FreeMotion {
   std::vector<data::Experiment> experiments;
   regression::Prepared prepared;
   std::vector<std::uint8_t> simulated;  // by record
 };
-FreeMotion free_motion(const Identification& identification,
-                       std::span<const std::optional<double>> initial_velocity = {});
+struct FreeMotionOptions {
+  // Initial motor velocities by record, where the caller knows better than the first sample does; else empty.
+  std::span<const std::optional<double>> initial_velocity{};
+  // Records that are asked for, by record; the others stay empty. All where this is empty.
+  std::span<const std::uint8_t> only{};
+  double step_s = simulation::Options{}.step_s;  // longest integration step
+};
+FreeMotion free_motion(const Identification& identification, const FreeMotionOptions& options = {});
 
 }  // namespace flexspline::estimation

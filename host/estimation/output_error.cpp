@@ -2,7 +2,6 @@
 
 #include <fmt/format.h>
 
-#include <Eigen/QR>
 #include <algorithm>
 #include <cmath>
 #include <optional>
@@ -23,6 +22,13 @@ using regression::Slot;
 
 constexpr double kFar = 100.0;          // standard errors of least squares
 constexpr double kShownAtLeast = 1e-6;  // of the error's size, by a step of one standard error
+// Steps with one computation of the slopes, and how often these are computed.
+constexpr int kIterations = 12;
+constexpr int kRounds = 3;
+constexpr double kSettled = 0.1;  // in standard errors: slopes found before such a move serve after it
+// A move too short to tell slopes by: what is left of the search is rounding and standstills that come and go.
+constexpr double kTellingMove = 0.01;
+constexpr double kStep_s = 1.0 / 4000.0;  // of the integration
 
 // A free parameter, moved in units of its standard error from least squares.
 struct Free {
@@ -64,7 +70,7 @@ class OutputError {
         add(b, j < fit.linear.size() ? fit.linear[j] : fit.shapes[j - fit.linear.size()], static_cast<Eigen::Index>(j),
             j >= fit.linear.size());
     }
-    const FreeMotion motion = free_motion(all_);
+    const FreeMotion motion = run_free({});
     usable_ = motion.simulated;
     Eigen::Index rows = 0;
     for (std::size_t i = 0; i < all_.prepared.records.size(); ++i) {
@@ -97,16 +103,35 @@ class OutputError {
     for (std::size_t j = 0; j < free_.size(); ++j)
       all_.terms[free_[j].slot.term].values[free_[j].slot.parameter] = free_[j].start + x[j] * free_[j].unit;
   }
-  // Weighted errors of the terms as they stand; empty where a record that could be simulated no longer can.
-  Eigen::VectorXd weighted() {
-    const FreeMotion motion = free_motion(all_, initial_);
-    if (motion.simulated != usable_) return {};
+  // Weighted errors of the terms as they stand, nought in records other than those of `only` (empty: all). Empty where
+  // a record that could be simulated no longer can.
+  Eigen::VectorXd weighted(const std::vector<std::uint8_t>& only = {}) {
+    const std::vector<std::uint8_t>& run = only.empty() ? usable_ : only;
+    const FreeMotion motion = run_free(run);
+    if (motion.simulated != run) return {};
     Eigen::VectorXd e = errors(motion);
     for (const Part& part : parts_) e.segment(part.range.first, part.range.size()) *= part.weight;
     return e;
   }
+  // Records whose free run a parameter moves: what only the load feels does nothing where the load is locked.
+  std::vector<std::uint8_t> moved_by(const Free& free) const {
+    const catalogue::Entry& entry = *all_.terms[free.slot.term].entry;
+    const bool load_alone = entry.info->phase == effects::Phase::source && !entry.adds_to(Balance::motor) &&
+                            !entry.adds_to(Balance::transmission);
+    std::vector<std::uint8_t> records = usable_;
+    for (std::size_t i = 0; i < records.size(); ++i)
+      if (load_alone && all_.prepared.records[i].locked) records[i] = 0;
+    return records;
+  }
 
  private:
+  FreeMotion run_free(const std::vector<std::uint8_t>& only) const {
+    FreeMotionOptions how;
+    how.initial_velocity = initial_;
+    how.only = only;
+    how.step_s = kStep_s;
+    return free_motion(all_, how);
+  }
   void add(std::size_t b, Slot slot, Eigen::Index at, bool shape) {
     const regression::BalanceFit& fit = all_.fits[b];
     if (fit.own_share[at] < regression::kUndetermined) return;
@@ -153,8 +178,9 @@ class OutputError {
     return result;
   }
   Eigen::VectorXd errors(const FreeMotion& motion) const {
-    Eigen::VectorXd e(rows_);
+    Eigen::VectorXd e = Eigen::VectorXd::Zero(rows_);
     for (const Part& part : parts_) {
+      if (!motion.simulated[part.record]) continue;
       Eigen::Index row = part.range.first;
       for (const std::size_t k : samples(part.record))
         e[row++] = signal_of(all_.prepared.records[part.record], k, part.signal) -
@@ -188,24 +214,29 @@ class OutputError {
 
 // Slopes of the weighted errors by a step of `step` units each, from both sides. A first velocity matters to its own
 // record alone, so all of them are moved at once.
-Eigen::MatrixXd slopes(OutputError& problem, const std::vector<double>& x) {
+Eigen::MatrixXd slopes(OutputError& problem, const std::vector<double>& x,
+                       const std::function<void(std::string_view)>& progress) {
   constexpr double kStep = 0.05;
   const std::size_t parameters = problem.free().size();
   Eigen::MatrixXd J = Eigen::MatrixXd::Zero(problem.rows(), static_cast<Eigen::Index>(x.size()));
-  const auto slope = [&](std::size_t first, std::size_t last) -> Eigen::VectorXd {
+  const auto slope = [&](std::size_t first, std::size_t last,
+                         const std::vector<std::uint8_t>& records) -> Eigen::VectorXd {
     std::vector<double> moved = x;
     Eigen::VectorXd both[2];
     for (const int side : {0, 1}) {
       for (std::size_t j = first; j < last; ++j) moved[j] = x[j] + (side == 0 ? kStep : -kStep);
       problem.set(moved.data());
-      both[side] = problem.weighted();
+      both[side] = problem.weighted(records);
       if (both[side].size() == 0) return Eigen::VectorXd::Zero(problem.rows());
     }
     return (both[0] - both[1]) / (2.0 * kStep);
   };
-  for (std::size_t j = 0; j < parameters; ++j) J.col(static_cast<Eigen::Index>(j)) = slope(j, j + 1);
+  for (std::size_t j = 0; j < parameters; ++j) {
+    progress(fmt::format("fitting the free run: slopes by parameter {} of {}", j + 1, parameters));
+    J.col(static_cast<Eigen::Index>(j)) = slope(j, j + 1, problem.moved_by(problem.free()[j]));
+  }
   if (!problem.starts().empty()) {
-    const Eigen::VectorXd all = slope(parameters, x.size());
+    const Eigen::VectorXd all = slope(parameters, x.size(), problem.usable());
     for (std::size_t i = 0; i < problem.starts().size(); ++i)
       for (const Part& part : problem.parts())
         if (part.record == problem.starts()[i].record)
@@ -217,8 +248,7 @@ Eigen::MatrixXd slopes(OutputError& problem, const std::vector<double>& x) {
 }
 
 // (J'J)^-1 s^2, corrected for the autocorrelation of the errors, into the covariances of the fits.
-void take_covariance(Identification& identification, OutputError& problem, const std::vector<double>& x) {
-  const Eigen::MatrixXd J = slopes(problem, x);
+void take_covariance(Identification& identification, OutputError& problem, const Eigen::MatrixXd& J) {
   const Eigen::VectorXd e = problem.weighted();
   const regression::LinearFit joint = regression::least_squares(J, e, Eigen::VectorXd::Ones(e.size()));
   std::vector<RowRange> ranges;
@@ -257,7 +287,7 @@ void take_covariance(Identification& identification, OutputError& problem, const
 
 }  // namespace
 
-void refit_to_output(Identification& identification) {
+void refit_to_output(Identification& identification, const std::function<void(std::string_view)>& progress) {
   OutputError problem(identification);
   if (problem.empty()) {
     identification.warnings.push_back(
@@ -273,19 +303,50 @@ void refit_to_output(Identification& identification) {
     how.low.push_back(low > -kFar ? std::min(0.0, low) : -INFINITY);
     how.high.push_back(high < kFar ? std::max(0.0, high) : INFINITY);
   }
-  how.iterations = 12;
+  how.iterations = kIterations;
   how.function_tolerance = 1e-5;  // a hundredth of a standard error
   how.parameter_tolerance = 1e-5;
+  // Slopes cost two free runs a parameter and hardly change on the way: they are computed once, corrected by what each
+  // step shows (Broyden 1965), and computed again only where that led far.
+  Eigen::MatrixXd J;
+  std::vector<double> seen_at;
+  Eigen::VectorXd seen;
+  int runs = 0;
   const auto errors_at = [&](const std::vector<double>& at, Eigen::VectorXd& errors, Eigen::MatrixXd* slope) {
-    problem.set(at.data());
-    errors = problem.weighted();
-    if (errors.size() == 0) return false;
-    if (slope) *slope = slopes(problem, at);
+    if (at != seen_at) {
+      problem.set(at.data());
+      progress(fmt::format("fitting the free run: step {}", ++runs));
+      Eigen::VectorXd now = problem.weighted();
+      if (now.size() == 0) return false;
+      if (J.size() > 0) {
+        Eigen::VectorXd step(J.cols());
+        for (Eigen::Index j = 0; j < step.size(); ++j)
+          step[j] = at[static_cast<std::size_t>(j)] - seen_at[static_cast<std::size_t>(j)];
+        if (step.norm() > kTellingMove) {
+          const Eigen::VectorXd unforeseen = now - seen - J * step;
+          J += unforeseen * (step / step.squaredNorm()).transpose();
+        }
+      }
+      seen_at = at;
+      seen = std::move(now);
+    }
+    errors = seen;
+    if (!slope) return true;
+    if (J.size() == 0) J = slopes(problem, at, progress);
+    *slope = J;
     return true;
   };
-  regression::minimise(x, problem.rows(), errors_at, how);
+  for (int round = 0; round < kRounds; ++round) {
+    const std::vector<double> before = x;
+    regression::minimise(x, problem.rows(), errors_at, how);
+    double moved = 0.0;
+    for (std::size_t j = 0; j < problem.free().size(); ++j) moved = std::max(moved, std::abs(x[j] - before[j]));
+    if (round > 0 && moved < kSettled) break;
+    problem.set(x.data());
+    J = slopes(problem, x, progress);
+  }
   problem.set(x.data());
-  take_covariance(identification, problem, x);
+  take_covariance(identification, problem, J);
   problem.set(x.data());
   for (std::size_t b = 0; b < identification.fits.size(); ++b)
     identification.fits[b].residual = regression::residual_of(identification.data[b], identification.terms);

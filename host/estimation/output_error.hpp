@@ -1,6 +1,9 @@
 // Output error: the parameters with which the model's free run comes nearest to the measured motion and torque.
 #pragma once
 
+#include <functional>
+#include <string_view>
+
 #include "host/regression/identify.hpp"
 
 namespace flexspline::estimation {
@@ -11,6 +14,8 @@ using regression::Identification;
 // of the motor where the load is free, its position where it is locked (there the effort dictates the torque), and the
 // torque where it is measured, each over its error at the start. Parameters that the free run does not show keep their
 // values, with a warning. Replaces residuals and covariances of the fits.
-void refit_to_output(Identification& identification);
+// `progress` is told what is being worked at.
+void refit_to_output(
+    Identification& identification, const std::function<void(std::string_view)>& progress = [](std::string_view) {});
 
 }  // namespace flexspline::estimation

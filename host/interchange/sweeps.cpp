@@ -10,15 +10,15 @@ namespace flexspline::interchange {
 namespace {
 
 using simulation::Balances;
-using simulation::Inputs;
-using simulation::Torques;
+using RealInputs = simulation::Inputs;
+using RealTorques = simulation::Torques;
 
 double sign_of(double x) {
   return x > 0.0 ? 1.0 : x < 0.0 ? -1.0 : 0.0;
 }
 
-Inputs at_rest(const catalogue::DriveConstants<double>& constants) {
-  Inputs in;
+RealInputs at_rest(const catalogue::DriveConstants<double>& constants) {
+  RealInputs in;
   in.temperature = constants.reference_temperature;
   in.viscous_scale = in.coulomb_scale = 1.0;
   return in;
@@ -32,7 +32,7 @@ class Twister {
     balances_.change(before_);
   }
   double to(double torsion) {
-    Inputs now = at_rest(constants_);
+    RealInputs now = at_rest(constants_);
     now.torsion = torsion;
     now.output_angle = -torsion;
     now.torsion_direction = sign_of(torsion - torsion_);
@@ -40,7 +40,7 @@ class Twister {
     now.torque = torque_;
     now.torque_magnitude = std::abs(torque_);
     balances_.change(now);
-    Torques sums;
+    RealTorques sums;
     balances_.add_transmission(now, before_, sums);
     balances_.advance(now, before_);
     before_ = now;
@@ -52,7 +52,7 @@ class Twister {
 
  private:
   Balances balances_;
-  Inputs before_;
+  RealInputs before_;
   const catalogue::DriveConstants<double>& constants_;
   double torsion_ = 0.0;
   double torque_ = 0.0;
@@ -68,23 +68,23 @@ SteadyTorque Sweeps::at_speed(double velocity) const {
   Balances balances(model_, constants_);
   constexpr int kSteps = 128;
   const double step = 2.0 * std::numbers::pi / constants_.turn_angle_scale / kSteps * sign_of(velocity);
-  Inputs now = at_rest(constants_);
+  RealInputs now = at_rest(constants_);
   now.velocity = velocity;
   now.speed = std::abs(velocity);
   now.output_velocity = velocity / constants_.gear_ratio;
   now.direction = now.output_direction = sign_of(velocity);
   now.elapsed = velocity == 0.0 ? 0.0 : step / velocity;
-  const Inputs plain = now;
+  const RealInputs plain = now;
   balances.change(now);
   SteadyTorque mean;
-  Inputs before = now;
+  RealInputs before = now;
   // Presliding is over within a turn; the mean is over the second one.
   for (int k = 1; k <= 2 * kSteps; ++k) {
     now = plain;
     now.angle = k * step;
     now.output_angle = now.angle / constants_.gear_ratio;
     balances.change(now);
-    Torques sums;
+    RealTorques sums;
     balances.add_motor(now, before, sums);
     balances.add_load(now, before, sums);
     balances.advance(now, before);
@@ -141,11 +141,11 @@ std::vector<Twist> Sweeps::loop(double torque) const {
 
 double Sweeps::torque_at_rate(double rate) const {
   const Balances balances(model_, constants_);
-  Inputs still = at_rest(constants_);
-  Inputs twisting = still;
+  RealInputs still = at_rest(constants_);
+  RealInputs twisting = still;
   twisting.torsion_rate = rate;
   twisting.torsion_direction = sign_of(rate);
-  Torques with, without;
+  RealTorques with, without;
   balances.add_transmission(twisting, twisting, with);
   balances.add_transmission(still, still, without);
   return with.transmission - without.transmission;

@@ -12,7 +12,7 @@ namespace flexspline::measurement {
 namespace {
 
 constexpr double kProminenceDb = 3.0;
-constexpr std::size_t kFewestLines = 12;
+constexpr std::size_t kFewestResonanceLines = 12;
 constexpr double kFewestSpan = 1.5;    // highest over lowest frequency
 constexpr double kFitSpan = 1.5;       // lines from the extremum divided by this to the extremum times this
 constexpr std::size_t kFitLines = 10;  // at least
@@ -229,7 +229,7 @@ ResonanceSearch find_resonances(std::span<const ResponseLine> response, double r
     search.from_hz = lines.front().frequency_hz;
     search.to_hz = lines.back().frequency_hz;
   }
-  if (lines.size() < kFewestLines || search.to_hz < kFewestSpan * search.from_hz) {
+  if (lines.size() < kFewestResonanceLines || search.to_hz < kFewestSpan * search.from_hz) {
     const std::string count = lines.size() == 1 ? "one line" : fmt::format("{} lines", lines.size());
     search.why_not = lines.empty() ? "no line of the response can be trusted"
                                    : fmt::format(

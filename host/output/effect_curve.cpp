@@ -10,6 +10,7 @@
 #include <string_view>
 
 #include "host/output/json.hpp"
+#include "shared/fixed/turn.hpp"
 
 namespace flexspline::output {
 namespace {
@@ -106,7 +107,6 @@ Sweep sweep_of(unsigned reads, std::string x_label, double low, double high,
 Sweep loop_of(unsigned reads, std::string x_label, double top,
               const std::function<void(Inputs&, double x, double slope)>& set) {
   Sweep sweep{reads, std::move(x_label), {}, {}, (kCycles - 1) * kPoints, false};
-  constexpr double kTurn = 2.0 * std::numbers::pi;
   for (std::size_t k = 0; k <= kCycles * kPoints; ++k) {
     const double phase = kTurn * static_cast<double>(k) / static_cast<double>(kPoints);
     Inputs in = at_ease();

@@ -6,6 +6,7 @@
 #include <nlohmann/json.hpp>
 
 #include "host/model/model.hpp"
+#include "host/text/build_identity.hpp"
 
 namespace flexspline::output {
 
@@ -16,6 +17,11 @@ json json_number(double value) {
 }
 json json_number(const std::optional<double>& value) {
   return value ? json_number(*value) : json(nullptr);
+}
+json json_numbers(const std::vector<double>& values) {
+  json list = json::array();
+  for (const double v : values) list.push_back(json_number(v));
+  return list;
 }
 
 json json_parameter(const regression::Estimate& e) {
@@ -31,7 +37,10 @@ json json_parameter(const regression::Estimate& e) {
 void save_json(const std::string& where, const json& content) {
   if (where.empty()) return;
   // Names come from the user's files and may be in any encoding.
-  const std::string text = content.dump(2, ' ', false, nlohmann::json::error_handler_t::replace) + "\n";
+  json answer = content;
+  // Which build said it; beside what the contract lists.
+  if (answer.is_object() && !answer.contains("tool")) answer["tool"] = text::tool_name();
+  const std::string text = answer.dump(2, ' ', false, nlohmann::json::error_handler_t::replace) + "\n";
   if (where == "-") {
     fmt::print("{}", text);
     return;

@@ -12,6 +12,7 @@ namespace flexspline::output {
 
 nlohmann::json json_number(double value);
 nlohmann::json json_number(const std::optional<double>& value);
+nlohmann::json json_numbers(const std::vector<double>& values);
 
 // {"id","effect","parameter","value","unit","std","interval":[lo,hi]}: a parameter wherever one stands.
 nlohmann::json json_parameter(const regression::Estimate& estimate);

@@ -8,6 +8,7 @@
 
 #include "host/model/text.hpp"
 #include "host/planning/plan.hpp"
+#include "host/text/nearest.hpp"
 #include "host/text/toml.hpp"
 
 namespace flexspline::planning {
@@ -34,6 +35,19 @@ std::string number(double value) {
   return model::number_text(value, 6);
 }
 
+// Of a key's number, for messages.
+std::string_view unit_of(std::string_view key) {
+  constexpr std::pair<std::string_view, std::string_view> kEnds[] = {
+      {"_rad_s", "in rad/s"}, {"_hz", "in Hz"}, {"_nm", "in N*m"}, {"_rad", "in rad"},
+      {"_s", "in s"},         {"_a", "in A"},   {"_c", "in degC"}};
+  for (const auto& [end, unit] : kEnds)
+    if (key.ends_with(end)) return unit;
+  if (key == "slope_limit") return "in the unit of the amplitude per second";
+  if (key == "amplitude" || key == "offset")
+    return "in A (mode current), rad/s (velocity) or rad (position) at the motor";
+  return "as the plan's description says";
+}
+
 // A table of the file, whose keys are taken one after another; what nobody took is unknown.
 class Section {
  public:
@@ -50,7 +64,7 @@ class Section {
     return found;
   }
   std::optional<double> number(std::string_view key) {
-    const Node* found = find(key, NodeKind::number, "a number");
+    const Node* found = find(key, NodeKind::number, "a number alone, " + std::string(unit_of(key)));
     if (!found) return std::nullopt;
     if (!std::isfinite(found->number)) fail(found->line, fmt::format("{} must be finite", key));
     return found->number;
@@ -77,8 +91,16 @@ class Section {
   }
   void done() const {
     for (const text::Entry& e : node_.entries)
-      if (std::find(known_.begin(), known_.end(), e.key) == known_.end())
-        fail(e.line, fmt::format("unknown key \"{}\"; take it out or correct its spelling", e.key));
+      if (std::find(known_.begin(), known_.end(), e.key) == known_.end()) fail(e.line, unknown(e.key));
+  }
+  // A key with another unit at its end (frequency_rpm) is that one with its own.
+  std::string unknown(std::string_view key) const {
+    std::string meant = text::nearest(key, known_);
+    const auto stem = [](std::string_view k) { return k.substr(0, k.find('_')); };
+    for (const std::string_view known : known_)
+      if (meant.empty() && stem(known) == stem(key)) meant = known;
+    if (meant.empty()) return fmt::format("unknown key \"{}\"; take it out or correct its spelling", key);
+    return fmt::format("unknown key \"{}\"; did you mean {}, {}?", key, meant, unit_of(meant));
   }
   std::size_t line() const { return node_.line; }
 
@@ -86,7 +108,7 @@ class Section {
   const Node& node_;
   std::string_view origin_;
   std::string where_;
-  std::vector<std::string> known_;
+  std::vector<std::string_view> known_;
 };
 
 std::vector<Line> lines_of(Section& section) {

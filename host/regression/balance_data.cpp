@@ -296,12 +296,6 @@ void BalanceData::add_torque(const Terms& terms, const Term& term, const std::ve
 
 namespace {
 
-std::vector<std::vector<double>> values_of_all(const Terms& terms) {
-  std::vector<std::vector<double>> values;
-  for (const Term& term : terms) values.push_back(term.values);
-  return values;
-}
-
 // Linear parameters: all nought but one, which is one. Others as they stand.
 std::vector<double> unit_values(const Term& term, std::size_t parameter) {
   std::vector<double> values = term.values;
@@ -356,19 +350,62 @@ Eigen::VectorXd BalanceData::shape_column(const Terms& terms, const std::vector<
 
 Eigen::MatrixXd BalanceData::shape_columns(const Terms& terms, const std::vector<std::size_t>& on_balance,
                                            const std::vector<Slot>& shapes) {
+  Eigen::MatrixXd columns = Eigen::MatrixXd::Zero(rows(), static_cast<Eigen::Index>(shapes.size()));
+  std::vector<Slot> together;
+  std::vector<Eigen::Index> at;
+  for (std::size_t j = 0; j < shapes.size(); ++j) {
+    const auto column = static_cast<Eigen::Index>(j);
+    if (slopes_are_kept(terms, shapes[j])) {
+      columns.col(column) = kept_slope(terms, shapes[j]);
+    } else {
+      together.push_back(shapes[j]);
+      at.push_back(column);
+    }
+  }
+  if (together.empty()) return columns;
   std::vector<std::vector<Jet>> all;
   for (const Term& term : terms) all.emplace_back(term.values.begin(), term.values.end());
   std::vector<Jet> torque;
-  return along_rows(shapes.size(), [&](const RowRange& range, std::size_t j, std::span<double> signal) {
-    const Slot shape = shapes[j];
+  columns(Eigen::all, at) =
+      along_rows(together.size(), [&](const RowRange& range, std::size_t j, std::span<double> signal) {
+        const Slot shape = together[j];
+        all[shape.term][shape.parameter].v[0] = 1.0;
+        torque.assign(signal.size(), Jet(0.0));
+        for (const std::size_t t : on_balance)
+          if (terms[t].adds_torque() && (t == shape.term || changes(terms[shape.term], terms[t])))
+            add_torque<Dual>(terms, terms[t], all[t], prepared_->records[range.record], all, torque);
+        for (std::size_t k = 0; k < signal.size(); ++k) signal[k] = torque[k].v[0];
+        all[shape.term][shape.parameter].v[0] = 0.0;
+      });
+  return columns;
+}
+
+bool BalanceData::slopes_are_kept(const Terms& terms, Slot shape) const {
+  const Term& term = terms[shape.term];
+  return term.entry->info->phase == Phase::source && term.adds_torque() && term.entry->count(Kind::linear) == 1;
+}
+
+Eigen::VectorXd BalanceData::kept_slope(const Terms& terms, Slot shape) {
+  const Term& term = terms[shape.term];
+  std::size_t scale = 0;
+  while (term.entry->parameters[scale].kind != Kind::linear) ++scale;
+  const std::string key = fmt::format("slope {}:{}", shape.parameter, key_of(terms, {shape.term, scale}));
+  auto found = cache_.find(key);
+  if (found == cache_.end()) {
+    if (cache_.size() * static_cast<std::size_t>(rows()) > kCachedNumbers) cache_.clear();
+    std::vector<std::vector<Jet>> all;
+    for (const Term& other : terms) all.emplace_back(other.values.begin(), other.values.end());
+    all[shape.term][scale] = Jet(1.0);
     all[shape.term][shape.parameter].v[0] = 1.0;
-    torque.assign(signal.size(), Jet(0.0));
-    for (const std::size_t t : on_balance)
-      if (terms[t].adds_torque() && (t == shape.term || changes(terms[shape.term], terms[t])))
-        add_torque<Dual>(terms, terms[t], all[t], prepared_->records[range.record], all, torque);
-    for (std::size_t k = 0; k < signal.size(); ++k) signal[k] = torque[k].v[0];
-    all[shape.term][shape.parameter].v[0] = 0.0;
-  });
+    std::vector<Jet> torque;
+    const auto fill = [&](const RowRange& range, std::size_t, std::span<double> signal) {
+      torque.assign(signal.size(), Jet(0.0));
+      add_torque<Dual>(terms, term, all[shape.term], prepared_->records[range.record], all, torque);
+      for (std::size_t k = 0; k < signal.size(); ++k) signal[k] = torque[k].v[0];
+    };
+    found = cache_.emplace(key, along_rows(1, fill)).first;
+  }
+  return term.values[scale] * found->second;
 }
 
 Eigen::VectorXd BalanceData::known_torque(const Terms& terms, const std::vector<std::size_t>& on_balance) {

@@ -106,6 +106,10 @@ class BalanceData {
   void add_torque(const Terms& terms, const Term& term, const std::vector<typename N::Parameter>& values,
                   const Record& record, const std::vector<std::vector<typename N::Parameter>>& all_values,
                   std::span<typename N::Value> torque) const;
+  // Slopes by a shape of what one parameter alone scales: kept per unit of that, as a search asks for those of the
+  // model with each candidate again.
+  bool slopes_are_kept(const Terms& terms, Slot shape) const;
+  Eigen::VectorXd kept_slope(const Terms& terms, Slot shape);
   // Puts columns that are not there yet among those that are.
   void make_columns(const Terms& terms, const std::vector<Slot>& slots);
 

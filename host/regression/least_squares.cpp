@@ -97,13 +97,17 @@ Eigen::MatrixXd robust_middle(const std::vector<RowRange>& records, const Eigen:
                               const Eigen::VectorXd& residual, Eigen::Index lags) {
   const Eigen::MatrixXd scores = residual.asDiagonal() * columns;
   Eigen::MatrixXd middle = scores.transpose() * scores;
-  for (const RowRange& range : records)
+  for (const RowRange& range : records) {
+    // Neighbours are summed with their weights first: one product of matrices for all lags.
+    const auto own = scores.middleRows(range.first, range.size());
+    Eigen::MatrixXd later = Eigen::MatrixXd::Zero(own.rows(), own.cols());
     for (Eigen::Index lag = 1; lag <= std::min(lags, range.size() - 1); ++lag) {
       const double weight = 1.0 - static_cast<double>(lag) / static_cast<double>(lags + 1);
-      const Eigen::MatrixXd product = scores.middleRows(range.first, range.size() - lag).transpose() *
-                                      scores.middleRows(range.first + lag, range.size() - lag);
-      middle += weight * (product + product.transpose());
+      later.topRows(own.rows() - lag) += weight * own.bottomRows(own.rows() - lag);
     }
+    const Eigen::MatrixXd product = own.transpose() * later;
+    middle += product + product.transpose();
+  }
   return middle;
 }
 

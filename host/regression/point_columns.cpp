@@ -4,6 +4,7 @@
 #include <numbers>
 
 #include "host/regression/balance_data.hpp"
+#include "shared/fixed/turn.hpp"
 
 namespace flexspline::regression {
 namespace {
@@ -21,14 +22,7 @@ struct Reader {
   }
 };
 
-std::vector<std::vector<double>> values_of_all(const Terms& terms) {
-  std::vector<std::vector<double>> values;
-  for (const Term& term : terms) values.push_back(term.values);
-  return values;
-}
-
 double signal_of(const effects::Inputs<Real>& in, effects::Variable variable, double turn_angle_scale) {
-  constexpr double kTurn = 2.0 * std::numbers::pi;
   const auto within_turn = [](double angle) { return angle - kTurn * std::floor(angle / kTurn); };
   if (variable == effects::Variable::motor_angle) return within_turn(in.angle * turn_angle_scale);
   if (variable == effects::Variable::output_angle) return within_turn(in.output_angle);

@@ -6,6 +6,7 @@
 #include <cmath>
 #include <numeric>
 
+#include "host/regression/held_torque.hpp"
 #include "host/signals/butterworth.hpp"
 #include "host/signals/cutoff.hpp"
 #include "host/signals/differentiate.hpp"
@@ -354,12 +355,16 @@ Prepared prepare_with(const std::vector<const Experiment*>& experiments, const m
     prepared.torque_measured = prepared.torque_measured || e->has(Column::torque);
     prepared.effort_is_current = prepared.effort_is_current || e->has(Column::current);
   }
+  complete_held_torque(prepared, pipeline.torque_per_step);
   return prepared;
 }
 
 Prepared prepare(const std::vector<const Experiment*>& experiments, const model::Drive& drive,
                  const PipelineOptions& options) {
-  return prepare_with(experiments, drive, choose_pipeline(experiments, options));
+  Prepared prepared = prepare_with(experiments, drive, choose_pipeline(experiments, options));
+  prepared.pipeline.torque_per_step = torque_per_held_step(prepared);
+  complete_held_torque(prepared, prepared.pipeline.torque_per_step);
+  return prepared;
 }
 
 }  // namespace flexspline::regression

@@ -30,7 +30,8 @@ struct Pipeline {
   double row_cutoff_hz = 0.0;     // filter of the target and of every column, Butterworth of order five, zero phase
   double motion_cutoff_hz = 0.0;  // filter of positions before they are differentiated
   bool mask = true;
-  std::string reason;  // where the cut-off comes from
+  double torque_per_step = 0.0;  // of a held effort, that readings of the torque lack half of; see held_torque.hpp
+  std::string reason;            // where the cut-off comes from
 };
 
 // Samples of a record that one balance is fitted on.

@@ -37,6 +37,12 @@ struct Slot {
 
 using Terms = std::vector<Term>;
 
+inline std::vector<std::vector<double>> values_of_all(const Terms& terms) {
+  std::vector<std::vector<double>> values;
+  for (const Term& term : terms) values.push_back(term.values);
+  return values;
+}
+
 Term term_of(const model::Effect& effect);
 // A candidate: an effect of the catalogue with nothing known but the order, where it has one.
 Term candidate_term(const catalogue::Entry& entry, std::optional<double> order = std::nullopt);

@@ -15,6 +15,7 @@
 #include "host/report/page.hpp"
 #include "host/report/parts.hpp"
 #include "host/report/view.hpp"
+#include "host/text/build_identity.hpp"
 
 namespace flexspline::report {
 namespace {
@@ -64,7 +65,8 @@ json document(const Subject& subject) {
               {"command", subject.command},
               {"data_set", subject.data_name},
               {"model", {{"file", subject.model_name}, {"name", subject.model.name}, {"effects", effects}}},
-              {"tool_version", kToolVersion},
+              {"tool_version", std::string(kToolVersion)},
+              {"tool", text::tool_name()},
               {"created", fmt::format("{:%Y-%m-%d %H:%M UTC}", fmt::gmtime(now))},
               {"experiments", view.comparison.experiments.size()},
               {"held_out", held_out},

@@ -26,6 +26,7 @@ struct Subject {
   std::optional<model::Model> before{};  // without what was added
   regression::PipelineOptions pipeline{};
   std::vector<blackbox::Specification> beside{};  // black boxes to stand beside `model`
+  bool free_runs = true;                          // else the balances alone
   // Each only where the command has it.
   std::vector<regression::Estimate> estimates{};  // of `model`
   std::vector<diagnosis::Diagnosis> rounds{};     // the first of `before` where there is one

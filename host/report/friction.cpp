@@ -12,6 +12,7 @@ namespace {
 
 using nlohmann::json;
 using output::json_number;
+using output::json_numbers;
 using regression::Balance;
 
 constexpr std::size_t kBinsOfADirection = 30;
@@ -96,12 +97,6 @@ struct Averages {
   }
 };
 
-json numbers(const std::vector<double>& values) {
-  json list = json::array();
-  for (const double v : values) list.push_back(json_number(v));
-  return list;
-}
-
 }  // namespace
 
 json friction_curve(View& view) {
@@ -129,7 +124,7 @@ json friction_curve(View& view) {
     const Eigen::VectorXd torque = data.term_torque(view.terms, t);
     total += torque;
     parts.push_back(
-        {{"id", view.terms[t].id}, {"effect", view.terms[t].entry->name()}, {"torque", numbers(averages.of(torque))}});
+        {{"id", view.terms[t].id}, {"effect", view.terms[t].entry->name()}, {"torque", json_numbers(averages.of(torque))}});
   }
   // Measured friction is what the rest of the model leaves of the balance.
   const Eigen::VectorXd measured = total + balance->residual;
@@ -145,10 +140,10 @@ json friction_curve(View& view) {
     error[b] = std::sqrt(error[b] * std::min(balance->autocorrelation_time, averages.rows[b]) / averages.rows[b]);
   return {{"unit", balance->unit},
           {"velocity_unit", view.unit_of(data::Column::motor_velocity)},
-          {"velocity", numbers(averages.of(velocity))},
-          {"measured", numbers(mean)},
-          {"standard_error", numbers(error)},
-          {"model", numbers(averages.of(total))},
+          {"velocity", json_numbers(averages.of(velocity))},
+          {"measured", json_numbers(mean)},
+          {"standard_error", json_numbers(error)},
+          {"model", json_numbers(averages.of(total))},
           {"parts", std::move(parts)}};
 }
 

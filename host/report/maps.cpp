@@ -18,11 +18,12 @@ namespace {
 using comparison::Bins;
 using nlohmann::json;
 using output::json_number;
+using output::json_numbers;
 
 // As residual maps are judged (comparison/residual_map.cpp).
 constexpr std::size_t kMostBins = 24;
 constexpr std::size_t kRowsPerBin = 16;
-constexpr std::size_t kFewestInBin = 8;
+constexpr std::size_t kFewestInMapBin = 8;
 constexpr int kOrders = 24;
 constexpr double kWholeWaves = 2.0;
 
@@ -54,7 +55,7 @@ BinnedMean binned(const BalanceView& balance, const Eigen::VectorXd& residual, c
                                 std::max(balance.filter_time, balance.autocorrelation_time));
   BinnedMean result;
   for (std::size_t b = 0; b < bins.count(); ++b) {
-    const bool enough = rows[b] >= static_cast<double>(kFewestInBin);
+    const bool enough = rows[b] >= static_cast<double>(kFewestInMapBin);
     result.mean.push_back(enough ? sum[b] / rows[b] : kNone);
     result.standard_error.push_back(enough ? std::sqrt(squares[b] / rows[b] * std::min(tau, rows[b]) / rows[b])
                                            : kNone);
@@ -62,14 +63,8 @@ BinnedMean binned(const BalanceView& balance, const Eigen::VectorXd& residual, c
   return result;
 }
 
-json numbers(const std::vector<double>& values) {
-  json list = json::array();
-  for (const double v : values) list.push_back(json_number(v));
-  return list;
-}
-
 json mean_json(const BinnedMean& m) {
-  return {{"mean", numbers(m.mean)}, {"standard_error", numbers(m.standard_error)}};
+  return {{"mean", json_numbers(m.mean)}, {"standard_error", json_numbers(m.standard_error)}};
 }
 
 // Standard error of a bin's mean if the residual were noise alone.
@@ -143,9 +138,9 @@ json map_of(const View& view, const BalanceView& balance, const comparison::RowV
   if (bins.count() < 2) return nullptr;
   json map{{"variable", variable.name},
            {"unit", variable.unit},
-           {"x", numbers(centres(bins, variable.values))},
-           {"edges", numbers(bins.edges)},
-           {"noise", numbers(noise_of_means(balance, bins))},
+           {"x", json_numbers(centres(bins, variable.values))},
+           {"edges", json_numbers(bins.edges)},
+           {"noise", json_numbers(noise_of_means(balance, bins))},
            {"share_percent", share_of(shares, variable.name)},
            {"share_with_direction_percent", share_of(shares, variable.name + " x direction")},
            {"plain", mean_json(binned(balance, balance.residual, bins, nullptr))},
@@ -158,8 +153,8 @@ json map_of(const View& view, const BalanceView& balance, const comparison::RowV
     map["with_direction_before"] = mean_json(binned(balance, *balance.before, bins, &directions));
   }
   if (variable.name == "motor_angle") {
-    map["orders"] = {{"amplitude", numbers(order_amplitudes(view, balance, balance.residual))}, {"before", nullptr}};
-    if (balance.before) map["orders"]["before"] = numbers(order_amplitudes(view, balance, *balance.before));
+    map["orders"] = {{"amplitude", json_numbers(order_amplitudes(view, balance, balance.residual))}, {"before", nullptr}};
+    if (balance.before) map["orders"]["before"] = json_numbers(order_amplitudes(view, balance, *balance.before));
     for (int order = 1; order <= kOrders; ++order)
       map["share_percent"] =
           std::max(map["share_percent"].get<double>(), share_of(shares, fmt::format("motor_angle order {}", order)));

@@ -80,7 +80,7 @@ std::string embedded(const nlohmann::json& document) {
   return result;
 }
 
-std::string page(const nlohmann::json& document) {
+std::string page(const nlohmann::json& document, Script script) {
   // As valid UTF-8 as the document that follows.
   const auto text = [&](const char* name) {
     const std::string quoted = document.at(name).dump(-1, ' ', false, nlohmann::json::error_handler_t::replace);
@@ -90,7 +90,7 @@ std::string page(const nlohmann::json& document) {
       {"TITLE", text("title")},
       {"VERDICT", text("verdict")},
       {"STYLE", std::string(kStyle)},
-      {"SCRIPT", std::string(kScript)},
+      {"SCRIPT", std::string(script == Script::report ? kScript : kClosedLoopScript)},
       {"UPLOT_STYLE", std::string(kUplotStyle)},
       {"UPLOT_SCRIPT", std::string(kUplotScript)},
       {"UPLOT_LICENCE", std::string(kUplotLicence)},

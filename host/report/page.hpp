@@ -7,8 +7,12 @@
 
 namespace flexspline::report {
 
-// The page of a document (see document.hpp). Whatever stands in its texts, none of it becomes markup or script.
-std::string page(const nlohmann::json& document);
+// Which sections a page has.
+enum class Script { report, closed_loop };
+
+// The page of a document (see document.hpp; of `closed_loop`, host/closed_loop/page.hpp). Whatever stands in its texts,
+// none of it becomes markup or script.
+std::string page(const nlohmann::json& document, Script script = Script::report);
 
 // Text as it may stand between tags and in attributes of HTML.
 std::string escaped(std::string_view text);

@@ -46,7 +46,7 @@ const kNoiseSources = {
     fact("Data", `${report.data_set} (${report.experiments} experiments${report.held_out ? `, ${report.held_out} of them held out` : ""})`),
     fact("Model", report.model.file || report.model.name),
     fact("Effects in it", listed(report.model.effects)),
-    fact("Made by", `flexspline ${report.command}, version ${report.tool_version}, ${report.created}`),
+    fact("Made by", `flexspline ${report.command}, ${report.tool}, ${report.created}`),
   ].filter(Boolean));
   if (report.good) document.getElementById("verdict").classList.add("good");
   const h = report.headline;

@@ -23,11 +23,11 @@ regression::Prepared prepared_as_compared(const data::Dataset& dataset, const mo
 View::View(const Subject& subject) : dataset(*subject.dataset), model(subject.model), model_before(subject.before) {
   std::vector<std::string> said_already;
   model.drive = regression::reconcile(model.drive, dataset, said_already);
-  comparison = comparison::compare(dataset, model, subject.pipeline, subject.beside);
+  comparison = comparison::compare(dataset, model, subject.pipeline, subject.beside, subject.free_runs);
   terms = regression::terms_of(model);
   if (model_before) {
     model_before->drive = model.drive;
-    comparison_before = comparison::compare(dataset, *model_before, subject.pipeline);
+    comparison_before = comparison::compare(dataset, *model_before, subject.pipeline, {}, subject.free_runs);
     terms_before = regression::terms_of(*model_before);
   }
   prepared = prepared_as_compared(dataset, model, comparison);

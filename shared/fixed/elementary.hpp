@@ -53,7 +53,7 @@ constexpr std::uint64_t decay(std::uint64_t travel) {
   return ((std::uint64_t{1} << 60) - decay_lost(h.rest)) >> h.count;
 }
 
-// 2^x for x in Q31 from 0 to 1, in Q30; within 3 units of Q30.
+// 2^x for x in Q31 from 0 to 1, in Q30; within 3.2 units of Q30.
 constexpr std::uint32_t power_of_two(std::int32_t x) {
   // (2^x - 1)/x, as the whole would not fit a signed number at one.
   constexpr std::int32_t kCoefficients[] = {744261126, 257941089, 59598342, 10322487, 1441968, 153573, 23239};

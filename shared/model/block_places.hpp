@@ -48,9 +48,9 @@ struct EffectPlaces {
       constexpr Row kRow = row_of<C>();
       static_assert(size_in_memory(kRow) == sizeof(C), "the compiler lays this struct out in another way");
       static_assert(std::is_trivially_copyable_v<C>);
-      constexpr std::size_t kCount = std::tuple_size_v<decltype(Place::places.coefficients)>;
+      constexpr std::size_t kSets = std::tuple_size_v<decltype(Place::places.coefficients)>;
       all.at = aligned(all.at, alignof(Place));
-      all.places[all.count++] = {static_cast<std::uint16_t>(all.at),    sizeof(C),           Id, kCount,
+      all.places[all.count++] = {static_cast<std::uint16_t>(all.at),    sizeof(C),           Id, kSets,
                                  static_cast<std::uint8_t>(alignof(C)), all.rows.place(kRow)};
       all.at += sizeof(Place);
       if (alignof(Place) > all.widest) all.widest = alignof(Place);

@@ -209,6 +209,32 @@ class DriveModel {
     remember(in);
     return out;
   }
+  // The same, effect by effect, for a host that looks at each: `visit` is called for every effect in its turn, with
+  // operator()<Effect>(state, coefficients, in, before, out), and has to do what run<Effect>() does with these. Not
+  // what tick() is made of: compilers would take twice the stack for it.
+  template <class Visit>
+  effects::Torques<N> tick_by_effect(const effects::Inputs<N>& measured, Visit&& visit) {
+    effects::Inputs<N> in;
+    take(in, measured);
+    complete(in);
+    shift(in, measured.angle);
+    modulate(in);
+    const effects::Inputs<N> before = remembered(in);
+    effects::Torques<N> out{};
+    places_.for_each([&]<class Effect>(auto& places) {
+      for (std::size_t i = 0; i < places.count; ++i)
+        visit.template operator()<Effect>(places.states[i], places.coefficients[i], in, before, out);
+    });
+    remember(in);
+    return out;
+  }
+  template <class Effect>
+  static void run(auto& state, const auto& coefficients, const effects::Inputs<N>& in, const effects::Inputs<N>& before,
+                  effects::Torques<N>& out) {
+    Effect::advance(state, coefficients, in, before);
+    if constexpr (Effect::kInfo.phase == effects::Phase::source || Effect::kInfo.adds_to != 0)
+      Effect::evaluate(state, coefficients, in, out);
+  }
 
  private:
   template <class Effect, std::size_t Id = 0>

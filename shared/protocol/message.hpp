@@ -18,7 +18,7 @@
 namespace flexspline::protocol {
 
 inline constexpr std::uint8_t kMajor = 1;  // another one: nothing but `identify` is understood
-inline constexpr std::uint8_t kMinor = 0;  // grows with what is added
+inline constexpr std::uint8_t kMinor = 1;  // grows with what is added: 1 the residual map
 
 inline constexpr std::size_t kReportBytes = 64;
 inline constexpr std::size_t kHeadBytes = 4;
@@ -45,9 +45,9 @@ enum class Kind : std::uint8_t {
   excitation_lines = 0x23,
   excitation_use = 0x24,
   telemetry = 0x30,
-  map_info = 0x40,   // the residual map: kept free, not served yet
-  map_bins = 0x41,   //
-  map_reset = 0x42,  //
+  map_info = 0x40,  // the residual map: map_payloads.hpp
+  map_bins = 0x41,
+  map_command = 0x42,
   telemetry_frames = kFirstUnasked,
 };
 

@@ -43,6 +43,10 @@ enum class TransferType : std::uint8_t { control, isochronous, bulk, interrupt }
 
 // Of SET_FEATURE and CLEAR_FEATURE, to an endpoint.
 inline constexpr std::uint16_t kEndpointHalt = 0;
+// To the device (table 9-6), and where it is said (figures 9-4, table 9-10).
+inline constexpr std::uint16_t kDeviceRemoteWakeup = 1;
+inline constexpr std::uint8_t kStatusRemoteWakeup = 0x02;
+inline constexpr std::uint8_t kAttributeRemoteWakeup = 0x20;
 
 // The eight bytes that begin every control transfer.
 struct Setup {

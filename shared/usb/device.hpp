@@ -74,7 +74,11 @@ class Device {
 
  public:
   static constexpr Bytes<18> kDevice = device_descriptor<I>();
-  static constexpr auto& kConfiguration = Parts::kConfiguration;
+  static constexpr auto kConfiguration = [] {
+    auto bytes = Parts::kConfiguration;
+    if (kCanWake<P>) bytes[7] |= kAttributeRemoteWakeup;
+    return bytes;
+  }();
   static_assert(check_configuration(kConfiguration) == DescriptorFinding::none);
   static_assert(kDevice[0] == kDevice.size());
   static constexpr std::size_t kLongestString = 31;
@@ -90,9 +94,22 @@ class Device {
   bool configured() const { return configured_; }
   std::uint8_t address() const { return address_; }
 
+  // The bus sleeps: nothing goes, and what waits goes on afterwards. Address and configuration stay.
+  bool is_suspended() const { return suspended_; }
+  // Wakes a host that sleeps and has allowed it; false where it does not sleep or has not.
+  bool wake_host() {
+    if constexpr (kCanWake<P>) {
+      if (suspended_ && may_wake_) {
+        port_.wake();
+        return true;
+      }
+    }
+    return false;
+  }
+
   // Background: whatever the application gave its classes goes on its way.
   void poll() {
-    if (!configured_) return;
+    if (!configured_ || suspended_) return;
     for_each_class([&](auto& c, std::size_t i) {
       Link<P> link(port_, Parts::kPlaces[i], halted_);
       c.poll(link);
@@ -104,7 +121,10 @@ class Device {
     configure(false);
     address_ = 0;
     stage_ = Stage::idle;
+    suspended_ = may_wake_ = false;
   }
+  void suspended() { suspended_ = true; }
+  void resumed() { suspended_ = false; }
   void setup(std::span<const std::uint8_t, Setup::kBytes> bytes) {
     setup_ = Setup::of(bytes);
     stage_ = Stage::idle;
@@ -269,7 +289,8 @@ class Device {
     if (setup_.recipient() == Recipient::device) {
       if (request == StandardRequest::get_descriptor) return answer_descriptor();
       if (setup_.index != 0 || setup_.value != 0) return kRefused;
-      if (request == StandardRequest::get_status && setup_.length == 2) return made(1, 0);  // self powered
+      if (request == StandardRequest::get_status && setup_.length == 2)
+        return made(1 | (may_wake_ ? kStatusRemoteWakeup : 0), 0);  // self powered
       if (request == StandardRequest::get_configuration && setup_.length == 1 && address_ != 0)
         return made(configured_ ? 1 : 0);
     } else if (setup_.recipient() == Recipient::endpoint && request == StandardRequest::get_status &&
@@ -349,6 +370,11 @@ class Device {
       case Recipient::device:
         if (setup_.index != 0) return false;
         if (request == StandardRequest::set_address) return setup_.value < 128 && !configured_;
+        if (kCanWake<P> && setup_.value == kDeviceRemoteWakeup && address_ != 0 &&
+            (request == StandardRequest::set_feature || request == StandardRequest::clear_feature)) {
+          may_wake_ = request == StandardRequest::set_feature;
+          return true;
+        }
         if (request != StandardRequest::set_configuration || setup_.value > 1 || address_ == 0) return false;
         configure(setup_.value == 1);
         return true;
@@ -439,6 +465,8 @@ class Device {
   Stage stage_ = Stage::idle;
   bool configured_ = false;
   bool ends_empty_ = false;
+  bool suspended_ = false;
+  bool may_wake_ = false;
   std::uint8_t address_ = 0;
   std::uint32_t halted_ = 0;  // a bit for each endpoint number: OUT, and IN from bit 16 on
   std::size_t got_ = 0;

@@ -16,4 +16,10 @@ struct FlexsplineIdentity {
   static constexpr std::string_view kProduct = "Flexspline drive";
 };
 
+// The boot loader: DFU mode has a number of its own, so that no host takes it for a drive.
+struct LoaderIdentity : FlexsplineIdentity {
+  static constexpr std::uint16_t kProductId = 0x0002;
+  static constexpr std::string_view kProduct = "Flexspline boot loader";
+};
+
 }  // namespace flexspline::usb

@@ -6,6 +6,7 @@
 //   setup(bytes)             SETUP came on endpoint 0; whatever waited there is void
 //   received(number, bytes)  an OUT packet came on an endpoint that was asked to receive
 //   sent(number)             the host took the packet of send()
+//   suspended(), resumed()   nothing came for 3 ms; the bus is alive again. A reset ends a suspension, too
 #pragma once
 
 #include <concepts>
@@ -15,6 +16,13 @@
 #include "shared/usb/chapter9.hpp"
 
 namespace flexspline::usb {
+
+// A port that can wake a sleeping host: wake() drives the resume signal (7.1.7.7: not before 5 ms of suspension, for 1
+// to 15 ms, which is the port's business). Without it the device says that it cannot, and refuses the feature.
+template <class P>
+inline constexpr bool kCanWake = requires(P port) {
+  port.wake();
+};
 
 struct EndpointSetup {
   std::uint8_t address = 0;

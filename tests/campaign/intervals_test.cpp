@@ -79,10 +79,16 @@ TEST(Intervals, HoldTheMeanFrictionWhereItDiffersFromRecordToRecord) {
   EXPECT_LE(share, 0.98);
 }
 
-// Twenty short sets tell a coverage to 7 % only; what matters is the width, which is that of noise.
+const std::vector<std::string> kLoad = {"output_inertia.inertia", "output_viscous_friction.coefficient",
+                                        "output_coulomb_friction.torque"};
+
+// Twenty short sets tell a coverage to 7 % only; what matters is the width, which is that of noise. The load's come
+// from a torque sensor that is read just before the held current steps (host/regression/held_torque): 73 % of these 60
+// are covered, still too few.
 TEST(Intervals, AreNoWiderWhereFrictionIsTheSameInAllRecords) {
   const auto coverage = over_seeds(0.0, "", 20);
   EXPECT_GE(together(coverage, kFriction), 0.80);
+  EXPECT_GE(together(coverage, kLoad), 0.60);
   for (const std::string& name : kFriction) EXPECT_LT(coverage.at(name).width / coverage.at(name).all, 0.0015) << name;
 }
 

@@ -12,6 +12,7 @@
 
 #include "hil/plant/parameters.hpp"
 #include "hil/plant/recorder.hpp"
+#include "tests/support/campaign_size.hpp"
 
 namespace flexspline::plant {
 namespace {
@@ -61,7 +62,7 @@ std::vector<std::string> hidden_effects() {
   return names;
 }
 
-class PlantConvergence : public testing::TestWithParam<std::string> {};
+class PlantConvergence : public ::testing::TestWithParam<std::string> {};
 
 TEST_P(PlantConvergence, HalvingTheStepChangesLessThanSensorsCanTell) {
   const PlantFile file = demo_plant();
@@ -98,7 +99,7 @@ TEST_P(PlantConvergence, HalvingTheStepChangesLessThanSensorsCanTell) {
   RecordProperty("worst_output_position_counts", std::to_string(worst_output));
 }
 
-INSTANTIATE_TEST_SUITE_P(Hidden, PlantConvergence, testing::ValuesIn(hidden_effects()), [](const auto& test) {
+INSTANTIATE_TEST_SUITE_P(Hidden, PlantConvergence, ::testing::ValuesIn(testing::part_of(hidden_effects())), [](const auto& test) {
   std::string name = test.param;
   std::replace_if(
       name.begin(), name.end(), [](unsigned char c) { return std::isalnum(c) == 0; }, '_');

@@ -270,14 +270,12 @@ TEST(Record, StopsAtALimitOfThePlanAndAtAFaultAndSaysSo) {
 TEST(Record, RefusesAPlanThatTheDriveCannotRunBeforeAnythingMoves) {
   const Shell shell;
   shell.write("fast.toml", plan_of(run_of("triangle", kTriangle), "velocity_rad_s = 50\n"));
-  shell.write("position.toml", plan_of(run_of("p", "mode = \"position\"\namplitude = 1\nfrequency_hz = 1")));
   shell.write("locked.toml", plan_of(run_of("l", kSine + "\nload = \"locked\"")));
   shell.write("rate.toml", plan_of(run_of("r", kSine), "", 0.00037));
   shell.write("empty.toml", plan_of(""));
   const TwinProcess twin({"--serve", "0", "--fast"});
   for (const auto& [plan, expected] :
        std::vector<std::pair<std::string, std::string>>{{"fast", "beyond the plan's limit"},
-                                                        {"position", "not of position"},
                                                         {"locked", "needs a person"},
                                                         {"rate", "no whole number of its ticks"},
                                                         {"empty", "nothing to record"},

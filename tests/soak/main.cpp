@@ -14,6 +14,7 @@
 
 #include "tests/soak/campaign.hpp"
 #include "tests/soak/page.hpp"
+#include "tests/soak/proof.hpp"
 
 namespace {
 
@@ -56,8 +57,9 @@ void run_until(Clock::time_point end, const std::function<std::vector<Case>(std:
 int run_campaign(const std::string& name, double minutes, const std::string& results_file, const std::string& page,
                  const std::string& version) {
   const bool calibrates = name == "calibrate";
+  if (name == "proof") return judge_proof(minutes, page, version);
   if (!calibrates && name != "diagnose") {
-    fmt::print(stderr, "there is no campaign \"{}\"; known are diagnose and calibrate\n", name);
+    fmt::print(stderr, "there is no campaign \"{}\"; known are diagnose, calibrate and proof\n", name);
     return 2;
   }
   Results results(results_file, version);

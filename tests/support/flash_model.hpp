@@ -1,4 +1,4 @@
-// A NOR flash of two sectors whose power can be cut at any of its operations: before it, inside it or after it.
+// A NOR flash of two sectors (or as many as are wanted) whose power can be cut at any of its operations: before it, inside it or after it.
 #pragma once
 
 #include <array>
@@ -17,21 +17,21 @@ struct PowerCut {};
 enum class CutAt { before, inside, after };
 
 // What outlasts a power cut.
-template <std::size_t kBytes>
+template <std::size_t kBytes, std::size_t kCount = storage::kSectors>
 struct FlashCells {
-  alignas(8) std::array<std::array<std::uint8_t, kBytes>, storage::kSectors> sectors;
+  alignas(8) std::array<std::array<std::uint8_t, kBytes>, kCount> sectors;
   FlashCells() {
     for (auto& sector : sectors) sector.fill(0xFF);
   }
 };
 
 // The memory as the processor sees it, from one start to the next.
-template <std::size_t kBytes>
+template <std::size_t kBytes, std::size_t kCount = storage::kSectors>
 class FlashModel {
  public:
   static constexpr std::size_t kSectorBytes = kBytes;
 
-  explicit FlashModel(FlashCells<kBytes>& cells, std::uint64_t seed = 1) : cells_(cells), random_(seed) {}
+  explicit FlashModel(FlashCells<kBytes, kCount>& cells, std::uint64_t seed = 1) : cells_(cells), random_(seed) {}
   // The power goes at the operation of this number, from nought.
   void cut(std::size_t operation, CutAt where) {
     cut_ = static_cast<long>(operation);
@@ -86,7 +86,7 @@ class FlashModel {
     return true;
   }
 
-  FlashCells<kBytes>& cells_;
+  FlashCells<kBytes, kCount>& cells_;
   std::mt19937_64 random_;
   std::size_t operations_ = 0;
   long cut_ = -1;

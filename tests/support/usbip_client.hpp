@@ -87,18 +87,26 @@ struct Returned {
   Octets data{};
 };
 
+// A socket to a server on this machine, without delay. Throws std::runtime_error where nobody listens.
+inline int connected(std::uint16_t port) {
+  const int descriptor = socket(AF_INET, SOCK_STREAM | SOCK_CLOEXEC, 0);
+  sockaddr_in address{};
+  address.sin_family = AF_INET;
+  address.sin_addr.s_addr = htonl(INADDR_LOOPBACK);
+  address.sin_port = htons(port);
+  if (connect(descriptor, reinterpret_cast<const sockaddr*>(&address), sizeof(address)) != 0) {
+    close(descriptor);
+    throw std::runtime_error("nobody listens on port " + std::to_string(port));
+  }
+  const int on = 1;
+  setsockopt(descriptor, IPPROTO_TCP, TCP_NODELAY, &on, sizeof(on));
+  return descriptor;
+}
+
 class UsbIpClient {
  public:
   UsbIpClient(std::uint16_t port, std::function<void()> turn) : turn_(std::move(turn)) {
-    socket_ = socket(AF_INET, SOCK_STREAM | SOCK_CLOEXEC, 0);
-    sockaddr_in address{};
-    address.sin_family = AF_INET;
-    address.sin_addr.s_addr = htonl(INADDR_LOOPBACK);
-    address.sin_port = htons(port);
-    if (connect(socket_, reinterpret_cast<const sockaddr*>(&address), sizeof(address)) != 0)
-      throw std::runtime_error("cannot connect");
-    const int on = 1;
-    setsockopt(socket_, IPPROTO_TCP, TCP_NODELAY, &on, sizeof(on));
+    socket_ = connected(port);
     fcntl(socket_, F_SETFL, O_NONBLOCK);
   }
   ~UsbIpClient() { hang_up(); }

@@ -39,6 +39,7 @@ PackOptions options(double bound) {
   PackOptions o;
   o.samples = 2000;
   o.bound = bound;
+  o.measured = true;  // what a fold is off is measured, not proven
   return o;
 }
 // The motor's torque, N m, at a velocity and its direction, as a drive computes it from a block.

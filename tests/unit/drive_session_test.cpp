@@ -1,15 +1,13 @@
-// The host's side of a drive against the drive's own service, in one process: time passes while the host waits. The
-// line between them loses what the test says.
 #include "host/drive/session.hpp"
 
 #include <gtest/gtest.h>
 
-#include <deque>
 #include <functional>
 
 #include "hil/twin/factory_block.hpp"
 #include "hil/twin/twin_drive.hpp"
 #include "host/drive/recorder.hpp"
+#include "tests/support/loopback.hpp"
 
 namespace flexspline::drive {
 namespace {
@@ -28,38 +26,8 @@ Bytes other_block() {
   return twin::factory_block(drive);
 }
 
-// Decides of each answer whether it arrives.
-using Loss = std::function<bool(const protocol::Message&)>;
-
-class Loopback : public transport::Link {
- public:
-  Loopback(twin::TwinDrive& drive, Loss loses) : drive_(drive), loses_(std::move(loses)) {}
-  void send(const protocol::Message& m) override {
-    protocol::Message arrived;
-    ASSERT_TRUE(protocol::decode(protocol::encode(m), arrived));
-    while (!drive_.service().take(arrived)) drive_.tick();
-  }
-  // A tick lasts a millisecond at most, so that limits of time are not waited for.
-  std::optional<protocol::Message> receive(transport::Milliseconds limit) override {
-    for (auto i = 0; i < 20 * std::min<long>(limit.count(), 20); ++i) {
-      protocol::Message m;
-      if (drive_.service().next(m)) {
-        if (m.is_unasked() || !loses_ || !loses_(m)) return m;
-      }
-      drive_.tick();
-    }
-    return {};
-  }
-  std::string name() const override { return "loopback"; }
-
- private:
-  twin::TwinDrive& drive_;
-  Loss loses_;
-};
-Session open(twin::TwinDrive& drive, Loss loses = {}) {
-  drive.run(200);
-  return Session(std::make_unique<Loopback>(drive, std::move(loses)), Milliseconds(50));
-}
+using tests::open_session;
+using Loss = tests::OnAnswer;
 // Loses the first `times` answers of a kind.
 Loss lose(Kind kind, int times) {
   return [kind, times](const protocol::Message& m) mutable { return m.request() == kind && times-- > 0; };
@@ -75,7 +43,7 @@ std::string error_of(const std::function<void()>& act) {
 
 TEST(Session, IdentifiesTheDriveAndReadsItsBlock) {
   twin::TwinDrive drive({.drive = demo(), .serial = "SN-9"});
-  Session session = open(drive);
+  Session session = open_session(drive);
   EXPECT_EQ(session.serial(), "SN-9");
   EXPECT_EQ(session.board(), "twin");
   EXPECT_EQ(session.read_block(protocol::Which::active), twin::factory_block(demo()));
@@ -85,7 +53,7 @@ TEST(Session, IdentifiesTheDriveAndReadsItsBlock) {
 TEST(Session, FlashesThroughLostAnswersOfEveryKind) {
   for (const Kind kind : {Kind::identify, Kind::block_chunk, Kind::block_commit, Kind::status, Kind::block_read}) {
     twin::TwinDrive drive({.drive = demo()});
-    Session session = open(drive, lose(kind, 1));
+    Session session = open_session(drive, lose(kind, 1));
     const Bytes block = other_block();
     session.write_block(block);
     EXPECT_TRUE(std::ranges::equal(drive.store().active(), block)) << static_cast<int>(kind);
@@ -95,7 +63,7 @@ TEST(Session, FlashesThroughLostAnswersOfEveryKind) {
 
 TEST(Session, ARestoreWhoseAnswerGotLostIsDoneOnce) {
   twin::TwinDrive drive({.drive = demo()});
-  Session session = open(drive, lose(Kind::block_restore, 1));
+  Session session = open_session(drive, lose(Kind::block_restore, 1));
   session.write_block(other_block());
   session.restore();
   EXPECT_TRUE(std::ranges::equal(drive.store().active(), twin::factory_block(demo())));
@@ -104,13 +72,14 @@ TEST(Session, ARestoreWhoseAnswerGotLostIsDoneOnce) {
 
 TEST(Session, ADriveThatDoesNotAnswerIsAnErrorThatSaysWhatToDo) {
   twin::TwinDrive drive({.drive = demo()});
-  EXPECT_NE(error_of([&] { open(drive, [](const auto&) { return true; }); }).find("loopback: nothing there answers"),
-            std::string::npos);
+  EXPECT_NE(
+      error_of([&] { open_session(drive, [](const auto&) { return true; }); }).find("loopback: nothing there answers"),
+      std::string::npos);
 }
 
 TEST(Session, WhatTheDriveRefusesIsSaidInWords) {
   twin::TwinDrive drive({.drive = demo()});
-  Session session = open(drive);
+  Session session = open_session(drive);
   Bytes damaged = other_block();
   damaged[200] ^= 1;
   EXPECT_NE(error_of([&] { session.write_block(damaged); }).find("validator refused the block"), std::string::npos);
@@ -133,7 +102,7 @@ planning::Plan plan_of(planning::Run run) {
 
 TEST(Recorder, RecordsARunAndLeavesTheDriveAtRest) {
   twin::TwinDrive drive({.drive = demo()});
-  Session session = open(drive);
+  Session session = open_session(drive);
   const Scales scales = scales_of(session);
   planning::Run run;
   run.name = "sine", run.waveform = planning::Waveform::sine;
@@ -159,7 +128,7 @@ TEST(Recorder, RecordsARunAndLeavesTheDriveAtRest) {
 
 TEST(Recorder, StopsWhenItIsToldToAndBrakesTheShaft) {
   twin::TwinDrive drive({.drive = demo()});
-  Session session = open(drive);
+  Session session = open_session(drive);
   const Scales scales = scales_of(session);
   planning::Run run;
   run.name = "long", run.waveform = planning::Waveform::square;
@@ -176,7 +145,7 @@ TEST(Recorder, StopsWhenItIsToldToAndBrakesTheShaft) {
 
 TEST(Recorder, AVelocityBeyondThePlansLimitEndsTheRun) {
   twin::TwinDrive drive({.drive = demo()});
-  Session session = open(drive);
+  Session session = open_session(drive);
   const Scales scales = scales_of(session);
   planning::Run run;
   run.name = "current", run.mode = planning::Mode::current, run.waveform = planning::Waveform::zero;

@@ -84,7 +84,7 @@ TEST(Service, NamesTheEffectsOfItsImage) {
 
 TEST(Service, RefusesByCodeWhatItDoesNotKnow) {
   Bench b;
-  for (const int kind : {0x00, 0x04, 0x40, 0x6F})
+  for (const int kind : {0x00, 0x04, 0x43, 0x6F})
     EXPECT_EQ(b.host.code(static_cast<Kind>(kind)), Code::unknown_request) << kind;
   EXPECT_EQ(b.host.code(Kind::status, protocol::Reason{}), Code::wrong_length);
   EXPECT_EQ(b.host.code(Kind::command), Code::wrong_length);

@@ -8,6 +8,7 @@
 #include <string>
 #include <vector>
 
+#include "shared/protocol/map_payloads.hpp"
 #include "shared/protocol/payloads.hpp"
 #include "shared/protocol/serial_frame.hpp"
 #include "shared/protocol/texts.hpp"
@@ -114,11 +115,30 @@ void randomise(std::mt19937& r, FrameHead& x) {
   x = {static_cast<std::uint32_t>(r()), static_cast<std::uint32_t>(r())};
 }
 
+void randomise(std::mt19937& r, MapInfo& x) {
+  x.counts = (r() & 1) != 0, x.angle_bins = below<std::uint8_t>(r, 256), x.version = r();
+  x.scale = static_cast<std::int64_t>((std::uint64_t{r()} << 32) | r());
+  x.edge_count = static_cast<std::uint8_t>(x.edges.size());
+  for (auto& edge : x.edges) edge = static_cast<std::int32_t>(r());
+}
+void randomise(std::mt19937& r, MapFirst& x) {
+  x.first = static_cast<std::uint16_t>(r());
+}
+void randomise(std::mt19937& r, MapBins& x) {
+  x.first = static_cast<std::uint16_t>(r());
+  x.count = kMapBinsAMessage;
+  for (auto& bin : x.bins)
+    bin = {static_cast<std::uint16_t>(r()), static_cast<std::int32_t>(r()), static_cast<std::uint32_t>(r())};
+}
+void randomise(std::mt19937& r, MapCommand& x) {
+  x.action = below<MapAction>(r, kMapActions);
+}
+
 template <class T>
 class Payload : public ::testing::Test {};
-using AllPayloads =
-    ::testing::Types<Empty, Hello, Identity, Effects, Status, BlockBegin, Chunk, BlockRead, BlockRestore, Reason,
-                     Command, CommandAnswer, Excitation, ExcitationGuard, ExcitationLines, Subscription, FrameHead>;
+using AllPayloads = ::testing::Types<Empty, Hello, Identity, Effects, Status, BlockBegin, Chunk, BlockRead,
+                                     BlockRestore, Reason, Command, CommandAnswer, Excitation, ExcitationGuard,
+                                     ExcitationLines, Subscription, FrameHead, MapInfo, MapFirst, MapBins, MapCommand>;
 TYPED_TEST_SUITE(Payload, AllPayloads);
 
 TYPED_TEST(Payload, ComesBackAsItWasSentAndEveryOtherLengthIsRefused) {
@@ -192,7 +212,7 @@ TEST(Protocol, BytesOnTheWireAreTheRecordedOnes) {
   id.tick_hz = 20'000, id.block_bytes = 16'128, id.effects = 43, id.channels = 21, id.most_channels = 12;
   id.most_lines = 32, id.has_output_encoder = 1;
   EXPECT_EQ(wire(answer_to(request(Kind::identify, 7, Hello{}), Code::done, id)),
-            "810732000100030462000000000000000000000000000000"
+            "810732000101030462000000000000000000000000000000"
             "41310000000000000000000000000000204e0000003f00002b00150c2001");
   Status s{0x01020304, Mode::fault, true, StoreState::fell_back, 13, 5, -2, 3, 4, 6, 8, {0x100, 0xA1B2C3D4}, {9, 10}};
   EXPECT_EQ(wire(answer_to(request(Kind::status, 1, Empty{}), Code::done, s)),

@@ -9,11 +9,13 @@
 
 #include "host/regression/identify.hpp"
 #include "host/regression/minimise.hpp"
+#include "tests/support/plain_model.hpp"
 
 namespace flexspline::regression {
 namespace {
 
 using data::Column;
+using testing::plain_model;
 
 constexpr double kPi = 3.14159265358979323846;
 constexpr double kInertia = 1e-3, kViscous = 4e-3, kCoulomb = 0.05;
@@ -47,13 +49,6 @@ data::Experiment experiment(std::string name, const Motion& motion, const Law& l
   }
   e.segments = {{0, e.size()}};
   return e;
-}
-
-model::Model plain_model() {
-  model::Model m;
-  for (const char* name : {"inertia", "viscous_friction", "coulomb_friction"})
-    m.effects.push_back(catalogue::blank_effect(catalogue::get(name), data::Axis::rotary));
-  return m;
 }
 
 data::Dataset dataset_of(std::vector<data::Experiment> experiments) {

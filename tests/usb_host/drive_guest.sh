@@ -52,7 +52,12 @@ everything() { # TOOL
   timed "record 2 s" "$1" record --plan /drive/plan.toml --out "recorded-$1"
   expect "1 of 1 runs" said.txt
   grep samples said.txt
-  unexpected "lost" said.txt
+  # hidapi holds so many reports and no more: what a guest that stands still for a while loses is counted, every frame.
+  samples=$(awk '/ samples, / {print $2; exit}' said.txt)
+  lost=$(awk '/ frames were lost / {for (i = 2; i <= NF; ++i) if ($i == "frames") print $(i - 1); exit}' said.txt)
+  [ $((samples + ${lost:-0})) -ge 2000 ] || { cat said.txt; fail "$samples samples and ${lost:-no} lost ones are not two seconds"; }
+  [ "$samples" -ge 1000 ] || { cat said.txt; fail "only $samples samples"; }
+  [ -z "$lost" ] || expect ", 0 of them on the drive" said.txt
 }
 
 # libusb takes the device from the kernel's own driver, hidraw holds it open.
@@ -111,7 +116,7 @@ cut_short() { # TOOL
     is_block $other now.block || fail "the second try did not flash"
   done
   [ $cut -ge 1 ] || fail "no flash was cut short"
-  pulled 1200000 "$1" record --plan /drive/plan.toml --out "cut-$1"
+  pulled 1200000 "$1" record --plan /drive/long.toml --out "cut-$1"
   echo "  pulled while recording: $(tail -n 1 said.txt)"
   [ $code -eq 2 ] || { cat said.txt; fail "record without a plug ended with $code"; }
   expect "the drive is gone" said.txt

@@ -4,7 +4,7 @@
 #
 #   guest.sh --work DIR --script FILE [--program PATH]... [--file PATH:IN_GUEST]... [--twin COMMAND] [--seconds N]
 #
-#   --work DIR      for what is made on the way; the kernel is fetched into DIR/../kernel once
+#   --work DIR      for what is made on the way; the kernel is fetched into DIR/../kernel once (kernel.sh)
 #   --script FILE   run by busybox's sh, with the functions and variables of guest_functions.sh
 #   --program PATH  into the guest's /bin, with the libraries that it loads
 #   --file PATH:IN_GUEST
@@ -47,53 +47,12 @@ skip() {
   echo "[  SKIPPED ]"
   exit 77
 }
-for tool in qemu-system-x86_64 busybox usbip lsusb cpio apt-get dpkg-deb; do
+for tool in qemu-system-x86_64 busybox usbip lsusb cpio; do
   PATH=$PATH:/usr/sbin:/sbin command -v "$tool" >/dev/null || skip "$tool is not installed; ./dev test installs it"
 done
 
-# In the order in which they are loaded.
-modules=(e1000 usb-common usbcore usbip-core vhci-hcd hid hid-generic usbhid)
-
-# The kernel of this Debian, taken out of its package.
 kernel=$(dirname "$work")/kernel
-# download_kernel FOLDER APT_OPTIONS...: sets `package`; false, with `reason`, where it did not come.
-download_kernel() {
-  local folder=$1
-  shift
-  package=$(apt-cache "$@" depends linux-image-amd64 2>/dev/null | awk '$1 == "Depends:" && $2 ~ /^linux-image-/ {print $2; exit}')
-  reason="apt knows no package linux-image-amd64; is this Debian, and is the network there?"
-  [[ -n $package ]] || return 1
-  (cd "$folder" && timeout 300 apt-get "$@" -q download "$package") >"$kernel/download.log" 2>&1 && return
-  reason="$package cannot be downloaded: $(grep -m 1 '^E:' "$kernel/download.log" || echo 'is the network there?')"
-  return 1
-}
-fetch_kernel() {
-  local package reason new=$kernel/new own=()
-  rm -rf "$new"
-  mkdir -p "$new"
-  if ! download_kernel "$new"; then
-    # Package lists that are missing, or older than the last update of Debian: own ones, which nobody has to be root for.
-    mkdir -p "$kernel"/apt/{lists,cache/archives}/partial
-    own=(-o "Dir::State::Lists=$kernel/apt/lists" -o "Dir::Cache=$kernel/apt/cache")
-    timeout 300 apt-get "${own[@]}" -q update >"$kernel/update.log" 2>&1 || true
-    download_kernel "$new" "${own[@]}" || skip "no kernel: $reason"
-    rm -rf "$kernel/apt"
-  fi
-  local wanted=('./boot/vmlinuz-*')
-  for module in "${modules[@]}"; do wanted+=("*/$module.ko"); done
-  # Those that are built in are not found, which is no error.
-  dpkg-deb --fsys-tarfile "$new"/*.deb | tar -x -C "$new" --wildcards "${wanted[@]}" 2>/dev/null || true
-  mv "$new"/boot/vmlinuz-* "$new/vmlinuz" || skip "no kernel: $package holds none"
-  find "$new" -name '*.ko' -exec mv {} "$new" \;
-  rm -rf "$new"/*.deb "$new/boot" "$new/lib"
-  mv "$new"/* "$kernel"
-  echo "$package" >"$kernel/version"
-}
-mkdir -p "$kernel"
-exec 9>"$kernel/.lock"
-flock 9
-[[ -f $kernel/version ]] || fetch_kernel
-exec 9>&-
+"$here/kernel.sh" "$kernel" || exit
 
 # What the guest finds at its root.
 root=$work/root
@@ -126,11 +85,12 @@ for names in /usr/share/misc/usb.ids /var/lib/usbutils/usb.ids; do
   mkdir -p "$root$(dirname "$names")"
   cp -L "$names" "$root$names"
 done
+mapfile -t modules <"$kernel/modules"
 for module in "${modules[@]}"; do
   # Some kernels have one or the other built in.
   [[ ! -f $kernel/$module.ko ]] || cp "$kernel/$module.ko" "$root/modules"
 done
-printf '%s\n' "${modules[@]}" >"$root/modules/order"
+cp "$kernel/modules" "$root/modules/order"
 for pair in "${files[@]}"; do
   mkdir -p "$root$(dirname "${pair#*:}")"
   cp -rL "${pair%%:*}" "$root${pair#*:}"

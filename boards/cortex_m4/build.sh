@@ -1,0 +1,27 @@
+#!/bin/sh
+# build.sh OUT_DIR NAME SCRIPT.ld SOURCE...: builds OUT_DIR/NAME.elf, .bin and .map for a Cortex-M4; flags in FLAGS.
+# Exit 3 where there is no ARM compiler.
+set -eu
+here=$(cd -- "$(dirname -- "$0")" && pwd)
+root=$(cd -- "$here/../.." && pwd)
+out=$1 name=$2 script=$3
+shift 3
+compiler=${ARM_GXX:-arm-none-eabi-g++}
+command -v "$compiler" >/dev/null || {
+  echo "no $compiler: install gcc-arm-none-eabi, libnewlib-arm-none-eabi and libstdc++-arm-none-eabi-newlib" >&2
+  exit 3
+}
+mkdir -p "$out"
+new=$out/$name.elf.new
+# As a whole; without scheduling, from which these processors gain little and which takes registers; without copies of
+# functions for constant arguments: all of that saves flash.
+# shellcheck disable=SC2086
+"$compiler" -std=c++20 -Os -flto=1 -fno-schedule-insns -fno-schedule-insns2 -fno-ipa-cp \
+  -fno-reorder-blocks -fno-tree-ch -mcpu=cortex-m4 -mthumb -mfloat-abi=soft \
+  -ffunction-sections -fdata-sections -fno-exceptions -fno-rtti -fno-threadsafe-statics -fno-unwind-tables \
+  -fno-asynchronous-unwind-tables -Wall -Wextra -Wpedantic -Wshadow -Werror -Wno-volatile \
+  -nostartfiles -Wl,--gc-sections -Wl,-Map="$out/$name.map" -T "$script" -L "$(dirname -- "$script")" -I "$root" \
+  ${FLAGS:-} "$here/start.cpp" "$here/library.cpp" "$@" -o "$new" --specs=nano.specs --specs=nosys.specs
+"$here/integers_only.sh" "${compiler%g++}nm" "$new"
+"${compiler%g++}objcopy" -O binary "$new" "$out/$name.bin"
+mv "$new" "$out/$name.elf"

@@ -1,0 +1,46 @@
+// What every Cortex-M4 has (ARMv7-M Architecture Reference Manual), as far as the boards use it, and how registers are
+// reached.
+#pragma once
+
+#include <cstdint>
+
+namespace flexspline::cortex_m4 {
+
+// A register, by its address.
+inline volatile std::uint32_t& hardware(std::uint32_t address) {
+  return *reinterpret_cast<volatile std::uint32_t*>(static_cast<std::uintptr_t>(address));
+}
+inline void set_bits(std::uint32_t address, std::uint32_t bits) {
+  hardware(address) = hardware(address) | bits;
+}
+inline void clear_bits(std::uint32_t address, std::uint32_t bits) {
+  hardware(address) = hardware(address) & ~bits;
+}
+inline void change_bits(std::uint32_t address, std::uint32_t field, std::uint32_t value) {
+  hardware(address) = (hardware(address) & ~field) | value;
+}
+// Waits until these bits of a register are as wanted, but only so often: hardware that is dead must not hang a drive.
+inline bool wait_for(std::uint32_t address, std::uint32_t field, std::uint32_t value, std::uint32_t tries) {
+  for (; tries > 0; --tries)
+    if ((hardware(address) & field) == value) return true;
+  return false;
+}
+// At least so many cycles of the core.
+inline void spend_cycles(std::uint32_t cycles) {
+  for (std::uint32_t turn = 0; turn < cycles / 3; ++turn) asm volatile("nop");
+}
+
+inline constexpr std::uint32_t kInterruptEnable = 0xE000E100;  // NVIC_ISER0: 32 interrupts to a word
+inline constexpr std::uint32_t kVectorTable = 0xE000ED08;      // SCB_VTOR
+inline constexpr std::uint32_t kResetControl = 0xE000ED0C;     // SCB_AIRCR
+
+inline void enable_interrupt(std::uint32_t number) {
+  hardware(kInterruptEnable + 4 * (number / 32)) = std::uint32_t{1} << (number % 32);
+}
+[[noreturn]] inline void reset_processor() {
+  asm volatile("dsb" ::: "memory");
+  hardware(kResetControl) = 0x05FA0004;  // key, SYSRESETREQ
+  for (;;) asm volatile("nop");
+}
+
+}  // namespace flexspline::cortex_m4

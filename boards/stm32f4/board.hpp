@@ -1,0 +1,103 @@
+// The board that the application is a template over (firmware/board.hpp), from what a description of a board says. A
+// description has: kClock, kPins, kAnalog, kParameterSector, kMotorReversed, kOutputReversed, kName, and types
+// MotorEncoder, OutputEncoder, Amplifier, Serial and Usb (NoUsb where there is none).
+#pragma once
+
+#include <cstdint>
+
+#include "boards/stm32f4/amplifier.hpp"
+#include "boards/stm32f4/analog.hpp"
+#include "boards/stm32f4/clock.hpp"
+#include "boards/stm32f4/encoder.hpp"
+#include "boards/stm32f4/flash.hpp"
+#include "boards/stm32f4/otg_fs.hpp"
+#include "boards/stm32f4/pins.hpp"
+#include "boards/stm32f4/usart.hpp"
+#include "boards/stm32f4/watchdog.hpp"
+#include "firmware/board.hpp"
+
+namespace flexspline::stm32f4 {
+
+template <class Description>
+class DriveBoard {
+ public:
+  static constexpr std::uint32_t kTickHz = 20'000;
+  static constexpr std::uint32_t kTelemetryWords = 4096;
+
+  // Pins and clock first: the amplifier is off from the first instructions on. False: there is no clock for a drive.
+  bool start_clock() {
+    cause_ = watchdog_was_the_reset() ? firmware::ResetCause::watchdog : firmware::ResetCause::power;
+    set_up(Description::kPins);
+    source_ = Clock::start(Description::kClock);
+    return source_ != ClockSource::bare;
+  }
+  // The control tick runs from here on.
+  void start_tick() {
+    motor_.start(Description::kMotorReversed);
+    output_.start(Description::kOutputReversed);
+    Analog::start(Description::kAnalog);
+    watchdog_.start();
+    amplifier_.start(Description::kClock.core_hz / kTickHz / 2);
+  }
+  bool clock_is_exact() const { return source_ == ClockSource::crystal; }
+
+  // Of the tick.
+
+  firmware::Readings read() {
+    if (Analog::ended()) {
+      Analog::take();
+      readings_.current = bipolar_share(Analog::result(0), Description::kAnalog.current_falls);
+      readings_.torque = bipolar_share(Analog::result(1), Description::kAnalog.torque_falls);
+      readings_.temperature = unipolar_share(Analog::result(2));
+      ++readings_.analog_samples;
+    }
+    readings_.motor_counter = motor_.count();
+    readings_.output_counter = output_.count();
+    ++readings_.motor_samples;
+    ++readings_.output_samples;
+    return readings_;
+  }
+  void actuate(const firmware::Actuation& wanted) {
+    amplifier_.actuate(wanted, readings_.current);
+    enabled_ = wanted.enabled;
+  }
+  // The next set of samples is there already.
+  bool tick_overrun() {
+    if (late_ticks_ > 0) {
+      late_ticks_ = static_cast<std::uint8_t>(late_ticks_ - 1);
+      return false;
+    }
+    return Analog::ended();
+  }
+
+  // Of background work.
+
+  void feed_watchdog() { watchdog_.feed(enabled_); }
+  firmware::ResetCause reset_cause() const { return cause_; }
+  // The flash memory stops the processor: the ticks after that begin late, which is no fault of theirs. The service
+  // writes only while the amplifier is off.
+  void flash_works() { late_ticks_ = 2; }
+
+ private:
+  typename Description::MotorEncoder motor_{};
+  typename Description::OutputEncoder output_{};
+  typename Description::Amplifier amplifier_{};
+  IndependentWatchdog<kTickHz> watchdog_{};
+  firmware::Readings readings_{};
+  ClockSource source_ = ClockSource::bare;
+  firmware::ResetCause cause_ = firmware::ResetCause::power;
+  volatile bool enabled_ = false;
+  volatile std::uint8_t late_ticks_ = 0;
+};
+
+// Twelve hexadecimal digits of the chip's number, those that the ROM's boot loader shows as well.
+inline void serial_number(char (&text)[13]) {
+  const std::uint32_t words[] = {hardware(kUniqueId) + hardware(kUniqueId + 8), hardware(kUniqueId + 4) >> 16};
+  for (std::uint32_t i = 0; i < 12; ++i) {
+    const std::uint32_t digit = i < 8 ? words[0] >> (28 - 4 * i) & 15 : words[1] >> (44 - 4 * i) & 15;
+    text[i] = static_cast<char>(digit < 10 ? '0' + digit : 'A' + digit - 10);
+  }
+  text[12] = 0;
+}
+
+}  // namespace flexspline::stm32f4

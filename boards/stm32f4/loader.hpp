@@ -1,0 +1,80 @@
+// The boot loader on one of these processors (firmware/boot_loader.hpp): main() of its image is run(), SysTick its
+// clock.
+#pragma once
+
+#include <cstdint>
+#include <string_view>
+
+#include "boards/stm32f4/board.hpp"
+#include "boards/stm32f4/handover.hpp"
+#include "firmware/boot_loader.hpp"
+#include "shared/usb/device.hpp"
+#include "shared/usb/identity.hpp"
+
+namespace flexspline::stm32f4 {
+
+template <class Description>
+class Loader {
+ public:
+  [[noreturn]] void run() {
+    set_up(Description::kPins);  // the amplifier is held off
+    const ClockSource source = Clock::start(Description::kClock);
+    static Board board;
+    static firmware::BootLoader<Board> loader(board);
+    const boot::Start start = loader.start();
+    if (start != boot::Start::none) {
+      // An image on trial that hangs before it starts its own watchdog: it runs already, with its longest limit.
+      if (start == boot::Start::trial) board.watchdog.start();
+      jump_to(sector_address(Description::kApplicationSector) + boot::kHeaderBytes);
+    }
+    static char serial[13];
+    serial_number(serial);
+    static OtgFs port;
+    using Dfu = typename firmware::BootLoader<Board>::Dfu;
+    static usb::Device<usb::LoaderIdentity, OtgFs, Dfu> device(port, serial);
+    loader.serve(device.template get<Dfu>());
+    // Without a crystal there is no USB: a debugger has to help.
+    const bool usb = source == ClockSource::crystal && port.start(Description::kClock.core_hz);
+    hardware(kSysTickReload) = Description::kClock.core_hz / kTurnsHz - 1;
+    hardware(kSysTick) = 7;
+    for (;;) {
+      if (usb) port.poll(device);
+      device.poll();
+      if (loader.turn(device.template get<Dfu>(), port.was_reset(), turns_ / (kTurnsHz / 1000))) {
+        port.stop();
+        cortex_m4::reset_processor();
+      }
+      board.flash_works();
+      asm volatile("wfi");
+    }
+  }
+  // The interrupt.
+  void tick() { turns_ = turns_ + 1; }
+
+ private:
+  static constexpr std::uint32_t kSysTick = 0xE000E010, kSysTickReload = 0xE000E014, kTurnsHz = 8'000;
+
+  struct Board {
+    static constexpr std::string_view kName = Description::kName;
+    using Slots = typename Description::template Images<Board>;
+    // RM0090 and the data sheet: 2 s for 128 KB, 100 us a word.
+    static constexpr std::uint32_t kEraseMs = 2'200, kBlockMs = 30, kCheckMs = 100;
+    Slots& slots() { return images; }
+    bool takes_loader_request() { return loader_is_wanted(); }
+    // Before and after each operation: feeds a watchdog that runs.
+    void flash_works() { watchdog.feed(false); }
+
+    IndependentWatchdog<20'000> watchdog{};
+    Slots images{*this};
+  };
+  [[noreturn]] static void jump_to(std::uint32_t vectors) {
+    hardware(cortex_m4::kVectorTable) = vectors;
+    const std::uint32_t stack = hardware(vectors), entry = hardware(vectors + 4);
+    asm volatile("msr msp, %0 \n bx %1" ::"r"(stack), "r"(entry));
+    __builtin_unreachable();
+  }
+
+  volatile std::uint32_t turns_ = 0;
+};
+
+}  // namespace flexspline::stm32f4

@@ -1,0 +1,43 @@
+// Pins, as a table of a board says (RM0090, 8).
+#pragma once
+
+#include <cstdint>
+#include <span>
+
+#include "boards/stm32f4/registers.hpp"
+
+namespace flexspline::stm32f4 {
+
+enum class PinMode : std::uint8_t { input, output, alternate, analog };
+enum class Pull : std::uint8_t { none, up, down };
+
+struct Pin {
+  char port;            // 'A' to 'H'
+  std::uint8_t number;  // 0 to 15
+  PinMode mode = PinMode::analog;
+  std::uint8_t function = 0;  // of an alternate one
+  Pull pull = Pull::none;
+
+  constexpr std::uint32_t base() const { return kGpioA + kGpioBytes * static_cast<std::uint32_t>(port - 'A'); }
+};
+
+inline void set_up(const Pin& p) {
+  constexpr std::uint32_t kSpeed = 0x08, kPull = 0x0C, kFunction = 0x20;
+  switch_clock_on(p.base());
+  const std::uint32_t two = 2U * p.number, four = 4U * (p.number % 8);
+  change_bits(p.base() + kPull, 3U << two, static_cast<std::uint32_t>(p.pull) << two);
+  // Fast edges where a timer or USB drives the pin.
+  if (p.mode == PinMode::alternate) change_bits(p.base() + kSpeed, 3U << two, 2U << two);
+  change_bits(p.base() + kFunction + 4U * (p.number / 8), 15U << four, std::uint32_t{p.function} << four);
+  // The mode last: a pin that a peripheral takes over has its function by then, an output its level.
+  change_bits(p.base(), 3U << two, static_cast<std::uint32_t>(p.mode) << two);
+}
+inline void set_up(std::span<const Pin> pins) {
+  for (const Pin& p : pins) set_up(p);
+}
+// One write, atomic (BSRR). The port's clock has to be on.
+inline void write(const Pin& p, bool high) {
+  hardware(p.base() + 0x18) = std::uint32_t{1} << (p.number + (high ? 0U : 16U));
+}
+
+}  // namespace flexspline::stm32f4

@@ -1,0 +1,77 @@
+// What this board is: clock, pins, timers, amplifier. README.md has the pins as a table.
+#pragma once
+
+#include <array>
+#include <cstdint>
+#include <string_view>
+
+#include "boards/stm32f4/board.hpp"
+
+namespace flexspline::stm32f405 {
+
+using stm32f4::Pin, stm32f4::PinMode, stm32f4::Pull;
+
+// Low: the amplifier is off. A resistor on the board pulls it down as well, for the time before the first instruction.
+inline constexpr Pin kEnable{'C', 6, PinMode::output, 0, Pull::down};
+
+#ifdef FLEXSPLINE_PWM
+// To be set for the motor and the supply, README.md says how. These are for 0.25 mH and 0.5 ohm, 5 A, 24 V, corner 6280
+// rad/s.
+inline constexpr stm32f4::BridgeSetup kBridge{.dead_time_cycles = 84,  // 500 ns
+                                              .most_duty_percent = 94,
+                                              .loop = {.proportional = 84, .integral = 2143, .limit = 30'800},
+                                              .sensor_over_amplifier_q12 = 6554};  // 8 A over 5 A
+#endif
+
+struct Description {
+  // An image for the other amplifier is refused.
+#ifdef FLEXSPLINE_PWM
+  static constexpr std::string_view kName = "stm32f405-pwm";
+#else
+  static constexpr std::string_view kName = "stm32f405-dac";
+#endif
+  static constexpr stm32f4::ClockSetup kClock{.crystal_hz = 8'000'000, .core_hz = 168'000'000};
+  static constexpr std::array kPins{
+      kEnable,
+      Pin{'A', 0, PinMode::alternate, 2, Pull::up},   // TIM5_CH1, output encoder A
+      Pin{'A', 1, PinMode::alternate, 2, Pull::up},   // TIM5_CH2, output encoder B
+      Pin{'A', 15, PinMode::alternate, 1, Pull::up},  // TIM2_CH1, motor encoder A
+      Pin{'B', 3, PinMode::alternate, 1, Pull::up},   // TIM2_CH2, motor encoder B
+      Pin{'C', 0, PinMode::analog},                   // ADC1_IN10, current
+      Pin{'C', 1, PinMode::analog},                   // ADC1_IN11, torque
+      Pin{'C', 2, PinMode::analog},                   // ADC1_IN12, temperature
+      Pin{'C', 10, PinMode::alternate, 7},            // USART3_TX
+      Pin{'C', 11, PinMode::alternate, 7, Pull::up},  // USART3_RX
+      Pin{'A', 9, PinMode::input},                    // OTG_FS_VBUS
+      Pin{'A', 11, PinMode::alternate, 10},           // OTG_FS_DM
+      Pin{'A', 12, PinMode::alternate, 10},           // OTG_FS_DP
+#ifdef FLEXSPLINE_PWM
+      Pin{'A', 8, PinMode::alternate, 1, Pull::down},   // TIM1_CH1, leg A high
+      Pin{'B', 13, PinMode::alternate, 1, Pull::down},  // TIM1_CH1N, leg A low
+      Pin{'A', 10, PinMode::alternate, 1, Pull::down},  // TIM1_CH3, leg B high
+      Pin{'B', 15, PinMode::alternate, 1, Pull::down},  // TIM1_CH3N, leg B low
+      Pin{'B', 12, PinMode::alternate, 1, Pull::up},    // TIM1_BKIN, low: the bridge is in trouble
+#else
+      Pin{'A', 4, PinMode::analog},  // DAC_OUT1, current command
+#endif
+  };
+  static constexpr stm32f4::AnalogInputs kAnalog{.current = 10, .torque = 11, .temperature = 12};
+  using MotorEncoder = stm32f4::Encoder<stm32f4::kTim2, stm32f4::CounterBits::thirty_two>;
+  using OutputEncoder = stm32f4::Encoder<stm32f4::kTim5, stm32f4::CounterBits::thirty_two>;
+  static constexpr bool kMotorReversed = false, kOutputReversed = false;
+#ifdef FLEXSPLINE_PWM
+  using Amplifier = stm32f4::HBridge<kEnable, kBridge>;
+#else
+  using Amplifier = stm32f4::ServoAmplifier<kEnable>;
+#endif
+  using Serial = stm32f4::Usart<stm32f4::kUsart3>;
+  static constexpr std::uint32_t kBaud = 115'200;
+  static constexpr bool kHasUsb = true;
+  static constexpr std::uint32_t kParameterSector = 1;  // and the next
+  static constexpr std::uint32_t kApplicationSector = 4;
+  // Application, download and the application before, 64 KB each (application.ld).
+  template <class Busy>
+  using Images = stm32f4::ImageFlash<Busy, 0x10000, 4, 5, 6>;
+};
+
+}  // namespace flexspline::stm32f405

@@ -1,0 +1,139 @@
+// The boot loader over a board: starts the application, or takes a new one over USB. README.md says how a board makes
+// one of it.
+#pragma once
+
+#include <concepts>
+#include <cstddef>
+#include <cstdint>
+#include <span>
+#include <string_view>
+
+#include "shared/boot/slots.hpp"
+#include "shared/usb/dfu.hpp"
+
+namespace flexspline::firmware {
+
+// What the boot loader asks of a board.
+template <class B>
+concept LoaderBoard = requires(B board) {
+  { B::kName } -> std::convertible_to<std::string_view>;  // that images are made for; at most fifteen letters
+  // A storage::FlashPort of boot::kSlots sectors; a sector may be several of the memory's. It feeds a watchdog that
+  // runs.
+  typename B::Slots;
+  { board.slots() } -> std::same_as<typename B::Slots&>;
+  // How long the memory may take: to erase a slot, to write a block of DFU, to check an image.
+  { B::kEraseMs } -> std::convertible_to<std::uint32_t>;
+  { B::kBlockMs } -> std::convertible_to<std::uint32_t>;
+  { B::kCheckMs } -> std::convertible_to<std::uint32_t>;
+  // The application asked for the boot loader before it made the reset, or somebody holds a button. Asking forgets it.
+  { board.takes_loader_request() } -> std::same_as<bool>;
+};
+
+// An image on its way by DFU.
+template <LoaderBoard B>
+class UpdateMemory {
+ public:
+  using Slots = boot::Slots<typename B::Slots>;
+  static constexpr std::string_view kName = B::kName;
+
+  explicit UpdateMemory(Slots& slots) : slots_(slots) {}
+
+  usb::DfuStatus write(std::size_t at, std::span<const std::uint8_t> block) {
+    if (at == 0) {
+      // What is no image for this board does not cost the one that was downloaded before.
+      boot::ImageHeader header;
+      if (block.size() >= boot::kHeaderBytes) {
+        const auto finding = boot::check_header(block, B::kName, Slots::kImageBytes, header);
+        if (finding != boot::ImageFinding::none) return status_of(finding);
+      }
+      if (const auto error = slots_.begin(); error != boot::SlotError::none) return status_of(error);
+    }
+    return at == slots_.staged() ? status_of(slots_.write(block)) : usb::DfuStatus::address;
+  }
+  std::uint32_t write_ms(std::size_t at) const { return at == 0 ? B::kEraseMs + B::kBlockMs : B::kBlockMs; }
+  bool has_all() const { return slots_.has_all(); }
+  usb::DfuStatus install() { return status_of(slots_.finish()); }
+  std::uint32_t install_ms() const { return B::kCheckMs; }
+  void abort() { slots_.abort(); }
+  std::span<const std::uint8_t> read() const { return slots_.image(boot::Slot::application); }
+
+ private:
+  usb::DfuStatus status_of(boot::ImageFinding finding) const {
+    switch (finding) {
+      case boot::ImageFinding::none:
+        return usb::DfuStatus::ok;
+      case boot::ImageFinding::wrong_board:
+        return usb::DfuStatus::target;
+      case boot::ImageFinding::incomplete:
+        return usb::DfuStatus::not_done;
+      case boot::ImageFinding::damaged:
+        return usb::DfuStatus::verify;
+      default:
+        return usb::DfuStatus::file;
+    }
+  }
+  usb::DfuStatus status_of(boot::SlotError error) const {
+    switch (error) {
+      case boot::SlotError::none:
+        return usb::DfuStatus::ok;
+      case boot::SlotError::erase:
+        return usb::DfuStatus::erase;
+      case boot::SlotError::not_blank:
+        return usb::DfuStatus::check_erased;
+      case boot::SlotError::program:
+        return usb::DfuStatus::program;
+      case boot::SlotError::out_of_order:
+      case boot::SlotError::too_long:
+        return usb::DfuStatus::address;
+      case boot::SlotError::image:
+        return status_of(slots_.finding());
+    }
+    return usb::DfuStatus::unknown;
+  }
+  Slots& slots_;
+};
+
+template <LoaderBoard B>
+class BootLoader {
+ public:
+  using Memory = UpdateMemory<B>;
+  using Slots = typename Memory::Slots;
+  using Dfu = usb::DfuMode<Memory>;
+
+  explicit BootLoader(B& board) : slots_(board.slots(), B::kName), memory_(slots_), board_(board) {}
+  BootLoader(const BootLoader&) = delete;
+
+  // Once, after reset: finishes an update that was begun and says what to start; `none`: open the bus and call turn().
+  boot::Start start() { return board_.takes_loader_request() ? boot::Start::none : slots_.resume(); }
+
+  // The device's class, before the bus is opened.
+  void serve(Dfu& dfu) { dfu.use(memory_); }
+  // Again and again beside the device's poll(); `was_reset`: the bus was reset since the last turn. True: let go of the
+  // bus and reset the processor. A time passes in between, so that the host's program can end as it likes to.
+  bool turn(const Dfu& dfu, bool was_reset, std::uint32_t now_ms) {
+    if (was_reset && dfu.was_used() && can_start()) return true;
+    if (!dfu.installed()) {
+      waits_ = false;
+      return false;
+    }
+    if (!waits_) since_ms_ = now_ms;
+    waits_ = true;
+    return now_ms - since_ms_ >= (dfu.told() ? kLeaveMs : kLeaveUntoldMs);
+  }
+  const Slots& slots() const { return slots_; }
+
+ private:
+  static constexpr std::uint32_t kLeaveMs = 500, kLeaveUntoldMs = 10'000;
+  bool can_start() const {
+    return !slots_.image(boot::Slot::application).empty() || !slots_.image(boot::Slot::old).empty() ||
+           !slots_.image(boot::Slot::download).empty();
+  }
+
+  Slots slots_;
+  Memory memory_;
+  B& board_;
+  std::uint32_t since_ms_ = 0;
+  bool waits_ = false;
+};
+
+}  // namespace flexspline::firmware

@@ -1,0 +1,46 @@
+#pragma once
+
+#include <cstdint>
+#include <string>
+#include <vector>
+
+namespace flexspline::scenario {
+
+/// The arguments of `flexspline-hil drive`.
+struct DriveOptions {
+  std::string scenario = "sine";  ///< a name or a file
+  double seconds = 0.0;           ///< nought: what the scenario says
+  std::string plant_file;
+  std::vector<std::string> with;
+  std::string hide;
+  std::string compensation = "both";
+  std::string inject;
+  double inject_at_s = -1.0;
+  std::string processor_image;
+  std::string block_file;
+  std::string trace_file;  ///< of one run
+  std::string json;
+  std::uint64_t seed = 1;
+};
+
+/// Runs the scenario and prints what happened. Throws std::exception with the reason where it cannot.
+void run_drive(const DriveOptions& options);
+
+/// The arguments of `flexspline-hil data-sheet`.
+struct DataSheetOptions {
+  std::string scenario;  ///< whose drive; empty: none
+  std::string plant_file;
+  std::vector<std::string> with;
+  std::string hide;
+  std::string out;
+};
+
+/// Writes what the maker of a scenario's drive says of it into a folder: settings.toml for `flexspline pack --drive`,
+/// known-model.toml with its effects and their true values but for the hidden one, and whole-model.toml with that, too,
+/// where a model can hold it. Throws std::exception with the reason where it cannot.
+void write_data_sheet(const DataSheetOptions& options);
+
+/// Prints the scenarios that come with the tool.
+void list_scenarios();
+
+}  // namespace flexspline::scenario

@@ -1,0 +1,240 @@
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <fstream>
+#include <iterator>
+#include <nlohmann/json.hpp>
+
+#include "host/cli/fleet.hpp"
+#include "host/comparison/compare.hpp"
+#include "host/deployment/sha256.hpp"
+#include "host/diagnosis/diagnosis.hpp"
+#include "host/estimation/estimate.hpp"
+#include "host/fleet/siblings.hpp"
+#include "host/output/diagnosis.hpp"
+#include "host/output/identification.hpp"
+#include "host/output/json.hpp"
+#include "host/output/text.hpp"
+#include "host/text/build_identity.hpp"
+
+namespace flexspline::cli {
+namespace {
+
+namespace fs = std::filesystem;
+using nlohmann::json;
+
+constexpr int kFleetDigits = 4;
+
+std::string content_of(const fs::path& file) {
+  std::ifstream in(file, std::ios::binary);
+  if (!in) throw UsageError(fmt::format("{} cannot be read; is the path right?", file.string()));
+  return {std::istreambuf_iterator<char>(in), {}};
+}
+std::string hash_of(const std::string& text) {
+  return deployment::sha256({reinterpret_cast<const std::uint8_t*>(text.data()), text.size()});
+}
+
+struct Task {
+  fs::path folder;
+  fs::path model;
+  fs::path out;
+  std::string name;
+  std::string fingerprint;  // of all that the result depends on
+};
+
+Task task_of(const FleetOptions& options, const fs::path& folder) {
+  std::error_code error;
+  if (!fs::is_directory(folder, error))
+    throw UsageError(
+        fmt::format("{} is no folder; fleet run takes the folder of one drive's measurements", folder.string()));
+  Task task{folder,
+            options.model.empty() ? folder / "base-model.toml" : options.model,
+            options.out.empty() ? folder / fleet::kResultName : options.out,
+            {},
+            {}};
+  const fs::path whole = fs::absolute(folder).lexically_normal();
+  task.name = (whole.has_filename() ? whole : whole.parent_path()).filename().string();
+  if (!fs::exists(task.model, error))
+    throw UsageError(fmt::format("there is no model {}; give --model MODEL, or put base-model.toml into the folder",
+                                 task.model.string()));
+  std::vector<fs::path> files;
+  for (const fs::directory_entry& entry : fs::directory_iterator(folder)) {
+    const std::string kind = entry.path().extension().string();
+    if (entry.is_regular_file() && (kind == ".csv" || kind == ".mat" || entry.path().filename() == "dataset.toml"))
+      files.push_back(entry.path());
+  }
+  std::sort(files.begin(), files.end());
+  std::string all = fmt::format("{} {} {} {}", text::tool_name(), options.diagnose,
+                                options.pipeline.cutoff_hz.value_or(0.0), fmt::join(options.tolerate, ","));
+  all += hash_of(content_of(task.model));
+  for (const fs::path& file : files) all += file.filename().string() + hash_of(content_of(file));
+  task.fingerprint = hash_of(all);
+  return task;
+}
+
+// Whether a result of the very same files is there. A drive that failed is tried again.
+bool is_done(const Task& task) {
+  std::ifstream in(task.out, std::ios::binary);
+  if (!in) return false;
+  const json content = json::parse(in, nullptr, false);
+  return content.is_object() && content.value("format", json()) == json(fleet::kResultFormat) &&
+         content.value("fingerprint", json()) == json(task.fingerprint) && content.value("failed", json("?")).is_null();
+}
+
+json result_of(const FleetOptions& options, const Task& task, Console& console) {
+  DataInputs inputs;
+  inputs.data = {task.folder};
+  inputs.tolerate = options.tolerate;
+  const data::Dataset dataset = load(inputs, console);
+  const model::ModelFile file = load_model(task.model);
+  const regression::PipelineOptions pipeline = options.pipeline.options();
+  console.progress("estimating the parameters");
+  const auto found = estimation::estimate(dataset, file.model, pipeline);
+  const auto method = estimation::method_for(file.model);
+  const json identified = output::identification_json(*found, std::string(estimation::name_of(method)), "standard");
+  console.progress("comparing model and measurement");
+  json errors = json::array();
+  try {
+    errors = comparison::to_json(comparison::compare(dataset, found->model, pipeline))["overall"];
+  } catch (const model::ModelError& error) {
+    // Measurements that do not show every effect of the model still tell the other parameters.
+    console.warn(fmt::format("{}: {}", task.name, error.what()));
+  }
+  json answer = {{"parameters", identified["parameters"]},
+                 {"errors", errors},
+                 {"warnings", identified["warnings"]},
+                 {"diagnosis", nullptr}};
+  if (options.diagnose) {
+    diagnosis::Options how;
+    how.pipeline = pipeline;
+    how.progress = [&](std::string_view stage) { console.progress(stage); };
+    const json diagnosed = output::diagnosis_json(diagnosis::diagnose(dataset, file.model, how));
+    answer["diagnosis"] = {
+        {"verdict", diagnosed["verdict"]}, {"named", diagnosed["named"]}, {"base", diagnosed["base"]}};
+  }
+  return answer;
+}
+
+// Whether the drive has a result now.
+bool run_one(const FleetOptions& options, const fs::path& folder, Console& console, json& answers) {
+  const Task task = task_of(options, folder);
+  if (!options.again && is_done(task)) {
+    console.line(fmt::format("{}: done before ({})", task.name, task.out.string()));
+    answers.push_back({{"drive", task.name}, {"file", task.out.string()}, {"skipped", true}, {"failed", nullptr}});
+    return true;
+  }
+  json result;
+  std::string failed;
+  try {
+    result = result_of(options, task, console);
+  } catch (const std::exception& error) {
+    failed = error.what();
+    console.error(fmt::format("{}: {}", task.name, failed));
+  }
+  result["format"] = fleet::kResultFormat;
+  result["drive"] = task.name;
+  result["fingerprint"] = task.fingerprint;
+  result["failed"] = failed.empty() ? json() : json(failed);
+  output::save_json(task.out.string(), result);
+  if (failed.empty()) console.line(fmt::format("{}: {}", task.name, task.out.string()));
+  answers.push_back(
+      {{"drive", task.name}, {"file", task.out.string()}, {"skipped", false}, {"failed", result["failed"]}});
+  return failed.empty();
+}
+
+int run_drives(const FleetOptions& options, Console& console) {
+  if (options.limit) throw UsageError("--limit is of fleet merge");
+  if (!options.out.empty() && options.places.size() > 1)
+    throw UsageError("--out is one file, for one drive; leave it out, and each folder gets its result");
+  json answers = json::array();
+  bool all = true;
+  for (const fs::path& folder : options.places) all = run_one(options, folder, console, answers) && all;
+  output::save_json(options.json, {{"format", "flexspline-fleet-run/1"}, {"drives", answers}});
+  return all ? kDone : kUnusable;
+}
+
+std::string in_words(const fleet::Difference& d) {
+  return fmt::format(
+      "{}: {} is {}, {} the median {} of its siblings by {} times {} (their scatter or, where that is larger, its own "
+      "uncertainty).",
+      d.drive, d.name, output::with_unit(d.value, d.unit), d.z > 0.0 ? "above" : "below",
+      output::with_unit(d.median, d.unit), output::number(std::abs(d.z), 3), output::with_unit(d.deviation, d.unit));
+}
+std::string verdict_of(const fleet::DriveResult& result) {
+  std::string text = result.verdict;
+  for (const std::string& effect : result.named) text += " " + effect;
+  return text;
+}
+
+json json_of(const fleet::Merged& merged, std::size_t drives) {
+  json answer = {
+      {"format", "flexspline-fleet/1"},  {"drives", drives},           {"limit", output::json_number(merged.limit)},
+      {"quantities", json::array()},     {"different", json::array()}, {"usual_verdict", nullptr},
+      {"other_verdicts", json::array()}, {"failed", json::array()}};
+  for (const fleet::Spread& s : merged.spreads)
+    answer["quantities"].push_back({{"name", s.name},
+                                    {"unit", s.unit},
+                                    {"drives", s.drives},
+                                    {"median", output::json_number(s.median)},
+                                    {"deviation", output::json_number(s.deviation)}});
+  for (const fleet::Difference& d : merged.differences)
+    answer["different"].push_back({{"drive", d.drive},
+                                   {"name", d.name},
+                                   {"unit", d.unit},
+                                   {"value", output::json_number(d.value)},
+                                   {"median", output::json_number(d.median)},
+                                   {"deviation", output::json_number(d.deviation)},
+                                   {"z", output::json_number(d.z)}});
+  if (!merged.usual_verdict.empty()) answer["usual_verdict"] = merged.usual_verdict;
+  for (const fleet::DriveResult* r : merged.verdicts)
+    answer["other_verdicts"].push_back({{"drive", r->drive}, {"verdict", r->verdict}, {"named", r->named}});
+  for (const fleet::DriveResult* r : merged.failed)
+    answer["failed"].push_back({{"drive", r->drive}, {"reason", r->failed}});
+  return answer;
+}
+
+int merge_results(const FleetOptions& options, Console& console) {
+  if (!options.model.empty() || !options.out.empty() || options.diagnose || options.again)
+    throw UsageError("fleet merge takes results, --limit and --json alone");
+  if (options.limit && !(*options.limit > 0.0)) throw UsageError("--limit is a number above nought, as in --limit 6");
+  const std::vector<fleet::DriveResult> results = fleet::read_results(options.places);
+  const fleet::Merged merged = fleet::merge(results, options.limit);
+  output::Table table({"quantity", "drives", "median", "deviation", "unit"}, "lrrrl");
+  for (const fleet::Spread& s : merged.spreads)
+    table.row(
+        {s.name, std::to_string(s.drives), output::number(s.median, kFleetDigits), output::number(s.deviation, 3), s.unit});
+  console.line(fmt::format("{} drives, {} of them without a result", results.size(), merged.failed.size()));
+  if (!merged.spreads.empty()) console.line(table.text());
+  console.line();
+  const std::size_t good = results.size() - merged.failed.size();
+  if (good < fleet::kFewestDrives) {
+    console.line(output::wrapped(
+        fmt::format("With {} drives none can be told from its siblings: {} are needed.", good, fleet::kFewestDrives),
+        0));
+  } else if (merged.differences.empty() && merged.verdicts.empty()) {
+    console.line(
+        fmt::format("No drive differs from its siblings (limit: {} deviations).", output::number(merged.limit, 3)));
+  } else {
+    console.line(console.bold(fmt::format("Different (limit: {} deviations)", output::number(merged.limit, 3))));
+  }
+  for (const fleet::Difference& d : merged.differences) console.line(output::wrapped(in_words(d), 2, 2));
+  for (const fleet::DriveResult* r : merged.verdicts)
+    console.line(output::wrapped(
+        fmt::format("{}: diagnose says {}; of most it says {}.", r->drive, verdict_of(*r), merged.usual_verdict), 2,
+        2));
+  for (const fleet::DriveResult* r : merged.failed)
+    console.line(output::wrapped(fmt::format("{} has no result: {}", r->drive, r->failed), 2, 2));
+  output::save_json(options.json, json_of(merged, results.size()));
+  return kDone;
+}
+
+}  // namespace
+
+int run(const FleetOptions& options, Console& console) {
+  if (options.action == "run") return run_drives(options, console);
+  if (options.action == "merge") return merge_results(options, console);
+  throw UsageError(
+      fmt::format("there is no \"fleet {}\"; it is fleet run FOLDER, or fleet merge RESULTS", options.action));
+}
+
+}  // namespace flexspline::cli

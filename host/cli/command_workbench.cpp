@@ -1,0 +1,71 @@
+#include <fmt/format.h>
+#include <sys/wait.h>
+#include <unistd.h>
+
+#include <chrono>
+#include <cstdio>
+#include <cstdlib>
+#include <nlohmann/json.hpp>
+
+#include "host/cli/drive_commands.hpp"
+#include "host/cli/workbench_command.hpp"
+#include "host/output/json.hpp"
+#include "host/workbench/server.hpp"
+#include "host/workbench/work.hpp"
+
+namespace flexspline::cli {
+namespace {
+
+// The desktop's own way to open an address; without a desktop nobody is bothered.
+bool open_browser(const std::string& address) {
+  if (!std::getenv("DISPLAY") && !std::getenv("WAYLAND_DISPLAY")) return false;
+  const pid_t child = fork();
+  if (child < 0) return false;
+  if (child == 0) {
+    // Twice, so that nobody has to wait for the browser.
+    if (fork() == 0) {
+      execlp("xdg-open", "xdg-open", address.c_str(), nullptr);
+      _exit(1);
+    }
+    _exit(0);
+  }
+  waitpid(child, nullptr, 0);
+  return true;
+}
+
+}  // namespace
+
+int run(const WorkbenchOptions& options, Console& console) {
+  const model::ModelFile file = load_model(options.model);
+  const auto dataset = std::make_shared<const data::Dataset>(load(options.data, console));
+  workbench::Setup setup;
+  setup.pipeline = options.pipeline.options();
+  setup.first = workbench::open(dataset, file, setup.pipeline, [&](std::string_view stage) {
+    if (!stage.empty()) console.progress(stage);
+  });
+  setup.data_name = as_arguments(options.data.data);
+  setup.model_name = options.model.string();
+  setup.folder = std::filesystem::absolute(options.model).parent_path();
+  setup.drive = options.drive;
+  const Interruptible interruptible;
+  const auto begin = std::chrono::steady_clock::now();
+  const auto is_over = [&] {
+    const double passed = std::chrono::duration<double>(std::chrono::steady_clock::now() - begin).count();
+    return Interruptible::interrupted() || (options.seconds > 0.0 && passed >= options.seconds);
+  };
+  workbench::serve(std::move(setup), {.port = options.port,
+                                      .listening =
+                                          [&](const std::string& address) {
+                                            console.line(fmt::format("Workbench: {}", address));
+                                            console.line("The address is for you alone. Ctrl-C ends it.");
+                                            std::fflush(stdout);  // a program may wait for it
+                                            output::save_json(options.json, {{"format", "flexspline-workbench/1"},
+                                                                             {"address", address},
+                                                                             {"pid", getpid()}});
+                                            if (!options.no_open) open_browser(address);
+                                          },
+                                      .ends = is_over});
+  return kDone;
+}
+
+}  // namespace flexspline::cli

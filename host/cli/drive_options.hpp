@@ -1,0 +1,93 @@
+// The options of the commands that work with a drive. Templates over CLI11's command: app.cpp alone has its header, and
+// includes it before this one.
+#pragma once
+
+#include <fmt/format.h>
+
+#include <string>
+
+#include "host/cli/drive_commands.hpp"
+#include "host/planning/report_plans.hpp"
+#include "host/transport/link.hpp"
+
+namespace flexspline::cli {
+
+template <class Parser>
+void take_drive(Parser* sub, std::string& drive) {
+  sub->add_option("--drive", drive, fmt::format("{} (default: the only one on USB)", transport::kDriveHelp))
+      ->type_name("DRIVE");
+}
+template <class Parser>
+void take_yes(Parser* sub, bool& yes) {
+  sub->add_flag("--yes", yes, "ask nothing");
+}
+
+template <class Parser>
+void take_monitor(Parser* sub, MonitorOptions& options) {
+  take_drive(sub, options.drive);
+  sub->add_option("--seconds", options.seconds, "how long (default: until Ctrl-C; of --residual-map: not at all)")
+      ->check(CLI::PositiveNumber)
+      ->type_name("S");
+  auto* rate = sub->add_option("--rate-hz", options.rate_hz, "lines a second")
+                   ->check(CLI::Range(0.5, 100.0))
+                   ->capture_default_str()
+                   ->type_name("HZ");
+  auto* channels = sub->add_option("--channels", options.channels, "which signals, at most 12 (default: the main ones)")
+                       ->delimiter(',')
+                       ->type_name("NAME")
+                       ->allow_extra_args(false);
+  auto* map = sub->add_flag("--residual-map", options.residual_map,
+                            "where the model fails: the drive's own map over velocity and motor angle")
+                  ->excludes(rate)
+                  ->excludes(channels);
+  sub->add_flag("--reset", options.reset, "empties the residual map once it was shown")->needs(map);
+  sub->add_option("--limit-nm", options.limit_nm,
+                  "residuals below are no failure (default: a hundredth of the motor's torque limit)")
+      ->check(CLI::PositiveNumber)
+      ->type_name("NM")
+      ->needs(map);
+}
+
+template <class Parser>
+void take_record(Parser* sub, RecordOptions& options) {
+  std::string names;
+  for (const planning::ReportPlan& plan : planning::report_plans())
+    names += (names.empty() ? "" : ", ") + std::string(plan.name);
+  take_drive(sub, options.drive);
+  sub->add_option("--plan", options.plan, "motions: of flexspline plan, by hand, or the report's by name: " + names)
+      ->required()
+      ->type_name("PLAN");
+  sub->add_option("--out", options.out, "folder for the measurements")->required()->type_name("DIR");
+  sub->add_flag("--force", options.force, "write into a folder that is not empty");
+  sub->add_option("--runs", options.runs, "only these runs of the plan, by name (default: all)")
+      ->delimiter(',')
+      ->type_name("NAME")
+      ->allow_extra_args(false);
+  sub->add_flag("--compensate", options.compensate, "runs of mode position with the model on the drive fed forward");
+  sub->add_option("--full-velocity-rad-s", options.full_velocity_rad_s,
+                  "motor velocity that is 100 % in the report's plans (default: nine tenths of the drive's limit)")
+      ->check(CLI::PositiveNumber)
+      ->type_name("RAD/S");
+  sub->add_option("--full-current-a", options.full_current_a,
+                  "current that is 100 % in them (default: nine tenths of the drive's limit)")
+      ->check(CLI::PositiveNumber)
+      ->type_name("A");
+  sub->add_flag("--clear-fault", options.clear_fault, "the cause of the fault it stands in is gone");
+  take_yes(sub, options.yes);
+}
+
+template <class Parser>
+void take_twin(Parser* sub, TwinOptions& options) {
+  sub->add_option("--plant", options.plant, "plant file (default: the demo's drive)")->type_name("FILE");
+  sub->add_option("--flash", options.flash, "holds its flash memory (default: none)")->type_name("FILE");
+  sub->add_option("--cable", options.cable,
+                  "pulls its plug: a file that holds in, out, or out N (after N more messages)")
+      ->type_name("FILE");
+  sub->add_option("--serial", options.serial, "serial number")->capture_default_str()->type_name("TEXT");
+  sub->add_option("--serve", options.serve, "port on 127.0.0.1 (default: any that is free)")->type_name("PORT");
+  sub->add_option("--usbip", options.usbip, "a USB device behind this port of USB/IP")->type_name("PORT");
+  sub->add_option("--seconds", options.seconds, "ends after so long (default: at Ctrl-C)")->type_name("S");
+  sub->add_flag("--fast", options.fast, "while armed faster than real time, as its host keeps up");
+}
+
+}  // namespace flexspline::cli

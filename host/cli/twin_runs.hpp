@@ -1,0 +1,29 @@
+// Closed loops on the twin, each in a process of its own, as many at a time as there are cores.
+#pragma once
+
+#include <filesystem>
+#include <string>
+
+#include "host/closed_loop/runs.hpp"
+
+namespace flexspline::cli {
+
+// A folder of its own for as long as it lives.
+class ScratchFolder {
+ public:
+  ScratchFolder();
+  ~ScratchFolder();
+  ScratchFolder(const ScratchFolder&) = delete;
+  ScratchFolder& operator=(const ScratchFolder&) = delete;
+  const std::filesystem::path& path() const { return path_; }
+
+ private:
+  std::filesystem::path path_;
+};
+
+closed_loop::Runner twin_runner();
+// What the maker of the drive of a job says of it, written into `folder` by the twin (settings.toml, known-model.toml
+// and, with a hidden effect, whole-model.toml).
+void fetch_data_sheet(const closed_loop::Job& job, const std::filesystem::path& folder);
+
+}  // namespace flexspline::cli

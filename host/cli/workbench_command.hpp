@@ -1,0 +1,23 @@
+// What flexspline workbench takes.
+#pragma once
+
+#include <filesystem>
+#include <string>
+
+#include "host/cli/inputs.hpp"
+
+namespace flexspline::cli {
+
+struct WorkbenchOptions {
+  DataInputs data;
+  PipelineInputs pipeline;
+  std::filesystem::path model;
+  std::string drive;     // empty: none yet
+  int port = 0;          // nought: any that is free
+  double seconds = 0.0;  // nought: until Ctrl-C
+  bool no_open = false;
+  std::string json;
+};
+int run(const WorkbenchOptions& options, Console& console);
+
+}  // namespace flexspline::cli

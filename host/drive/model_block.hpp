@@ -1,0 +1,30 @@
+// A model packed for the drive at hand: its tick rate, the effects of its image, its settings.
+#pragma once
+
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "host/drive/session.hpp"
+#include "host/model/model.hpp"
+
+namespace flexspline::drive {
+
+// Settings as `pack --drive` takes them, and where they come from.
+struct SettingsFile {
+  std::string text;
+  std::string origin;
+};
+
+struct ModelBlock {
+  Bytes bytes;
+  std::vector<std::string> warnings;
+};
+
+// `active`: the drive's active block, empty where it has none; its settings are taken where `settings` are none.
+// `measured`: also where the block's error has no bound that can be proven. Throws deployment::PackError where the
+// model cannot be packed for this drive, or is of another gear.
+ModelBlock model_block(Session& session, const Bytes& active, const model::Model& model,
+                       const std::optional<SettingsFile>& settings = {}, bool measured = false);
+
+}  // namespace flexspline::drive

@@ -1,0 +1,301 @@
+#include "host/interchange/protocol_header.hpp"
+
+#include <fmt/format.h>
+
+#include <array>
+#include <cctype>
+#include <initializer_list>
+#include <map>
+#include <string_view>
+#include <type_traits>
+#include <vector>
+
+#include "host/interchange/enumerators.hpp"
+#include "shared/control/drive_block.hpp"
+#include "shared/effects/list.hpp"
+#include "shared/fixed/system.hpp"
+#include "shared/model/block.hpp"
+#include "shared/model/block_texts.hpp"
+#include "shared/protocol/payloads.hpp"
+#include "shared/protocol/serial_frame.hpp"
+#include "shared/protocol/texts.hpp"
+#include "shared/usb/identity.hpp"
+
+namespace flexspline::interchange {
+namespace {
+
+std::string upper(std::string_view name) {
+  std::string text;
+  for (const char c : name) text += static_cast<char>(std::toupper(static_cast<unsigned char>(c)));
+  return text;
+}
+
+// One field of a payload on the wire.
+struct Place {
+  std::size_t at;
+  std::size_t width;  // bytes of an element
+  std::size_t times;
+  bool is_signed;
+};
+
+// A codec that writes down where fields go, in place of putting or taking them.
+class Layout {
+ public:
+  template <class T>
+  void operator()(T&) {
+    add(std::is_same_v<T, bool> ? 1 : sizeof(T), 1, std::is_signed_v<T> && !std::is_same_v<T, bool>);
+  }
+  template <class T, std::size_t kSize>
+  void operator()(std::array<T, kSize>&) {
+    add(sizeof(T), kSize, std::is_signed_v<T>);
+  }
+  template <class T>
+  void within(T& x, std::uint32_t) {
+    (*this)(x);
+  }
+  template <class T, std::size_t kSize>
+  void some(std::array<T, kSize>& all, std::uint8_t& count) {
+    (*this)(count);
+    if constexpr (std::is_class_v<T>) {
+      Layout one;
+      all[0].fields(one);
+      add(1, one.size() * kSize, false);
+    } else {
+      (*this)(all);
+    }
+  }
+  template <std::size_t kSize>
+  void rest(std::array<std::uint8_t, kSize>& bytes, std::uint8_t&) {
+    (*this)(bytes);
+  }
+  std::size_t size() const { return size_; }
+  const std::vector<Place>& places() const { return places_; }
+
+ private:
+  void add(std::size_t width, std::size_t times, bool is_signed) {
+    places_.push_back({size_, width, times, is_signed});
+    size_ += width * times;
+  }
+  std::vector<Place> places_;
+  std::size_t size_ = 0;
+};
+
+class Writer {
+ public:
+  void line(std::string_view text = {}) { text_ += std::string(text) + "\n"; }
+  void title(std::string_view text) { line(fmt::format("\n/* {} */", text)); }
+  void number(std::string_view name, std::uint64_t value, std::string_view comment = {}) {
+    line(fmt::format("#define FLEXSPLINE_{:<44} {}{}", upper(name),
+                     value > 0xFFFF ? fmt::format("0x{:08X}u", value) : fmt::format("{}u", value),
+                     comment.empty() ? "" : fmt::format(" /* {} */", comment)));
+  }
+  template <class Enum, std::size_t kFrom = 0, std::size_t kCount = 256, class Comment>
+  void numbers(std::string_view prefix, Comment&& comment) {
+    for_each_enumerator<Enum, kFrom, kCount>([&](std::string_view name, std::size_t value) {
+      number(fmt::format("{}_{}", prefix, name), value, comment(static_cast<Enum>(value)));
+    });
+  }
+
+  // A payload: offsets and a packed struct. `names` are of its fields in their order; a field that was added since and
+  // has no name here yet is called by its place.
+  template <class Payload>
+  void payload(std::string_view name, std::string_view comment, std::initializer_list<std::string_view> names) {
+    Layout layout;
+    Payload empty{};
+    empty.fields(layout);
+    title(comment);
+    std::string members;
+    std::size_t i = 0;
+    for (const Place& place : layout.places()) {
+      const std::string field = i < names.size() ? std::string(names.begin()[i]) : fmt::format("field_{}", i);
+      number(fmt::format("{}_{}_AT", name, field), place.at);
+      members += fmt::format("  {}int{}_t {}{};\n", place.is_signed ? "" : "u", 8 * place.width, field,
+                             place.times > 1 ? fmt::format("[{}]", place.times) : "");
+      ++i;
+    }
+    number(fmt::format("{}_BYTES", name), layout.size());
+    line(
+        fmt::format("FLEXSPLINE_PACKED_BEGIN\ntypedef struct FLEXSPLINE_PACKED {{\n{}}} flexspline_{}_t;\n"
+                    "FLEXSPLINE_PACKED_END",
+                    members, name));
+  }
+
+  // Where the fields of an entry's row stand, counted as a validator's verdict counts them.
+  void row(std::string_view name, const std::uint8_t* parts) {
+    std::size_t at = 0, field = 0;
+    for (; *parts != 0; ++parts)
+      for (int k = 0; k < model::often(*parts); ++k, ++field) {
+        const model::Field kind = model::field_of(*parts);
+        number(fmt::format("{}_FIELD_{}_AT", name, field), at, kind_name(kind));
+        at += model::detail::size_of(kind).in_block;
+      }
+    number(fmt::format("{}_BYTES", name), at);
+  }
+  const std::string& text() const { return text_; }
+
+ private:
+  static std::string kind_name(model::Field kind) {
+    std::string found;
+    for_each_enumerator<model::Field, 0, 32>([&](std::string_view name, std::size_t value) {
+      if (value == static_cast<std::size_t>(kind)) found = name;
+    });
+    return found;
+  }
+  std::string text_;
+};
+
+constexpr auto kNoComment = [](auto) { return std::string_view(); };
+
+void write_numbers(Writer& w) {
+  using namespace protocol;
+  w.title("The protocol. Messages are little-endian: kind, number, length of the payload, code, payload");
+  w.number("PROTOCOL_MAJOR", kMajor);
+  w.number("PROTOCOL_MINOR", kMinor);
+  w.number("USB_VENDOR", usb::FlexsplineIdentity::kVendorId);
+  w.number("USB_PRODUCT", usb::FlexsplineIdentity::kProductId);
+  w.number("REPORT_BYTES", kReportBytes, "a message over HID, filled up with noughts");
+  w.number("HEAD_BYTES", kHeadBytes);
+  w.number("MOST_PAYLOAD", kMostPayload);
+  w.number("HEAD_KIND_AT", 0);
+  w.number("HEAD_NUMBER_AT", 1, "comes back with the answer; of telemetry: channels of a frame");
+  w.number("HEAD_LENGTH_AT", 2);
+  w.number("HEAD_CODE_AT", 3, "of an answer; of telemetry: how many frames");
+  w.number("ANSWER_BIT", kAnswerBit, "an answer has the request's kind with this");
+  w.number("FIRST_UNASKED", kFirstUnasked);
+  w.number("MOST_CHANNELS", kMostChannels);
+  w.number("MOST_SERIAL", kMostSerial, "bytes of a frame on a serial line: COBS of message and CRC-32, then a nought");
+  w.title("Kinds of messages");
+  w.numbers<Kind>("KIND", kNoComment);
+  w.title("Codes of answers");
+  w.numbers<Code>("CODE", [](Code code) { return text_of(code); });
+  w.title("Modes of a drive");
+  w.numbers<Mode>("MODE", kNoComment);
+  w.title("Commands, and why one is refused");
+  w.numbers<CommandKind>("COMMAND", kNoComment);
+  w.numbers<Refusal>("REFUSAL", [](Refusal refusal) { return text_of(refusal); });
+  w.title("What a drive found of its stored blocks when it started");
+  w.numbers<StoreState>("STORE", kNoComment);
+  w.numbers<Which>("BLOCK", kNoComment);
+  w.title("Channels of telemetry: 32-bit words, shares of a base (2^-27) where a unit stands");
+  w.numbers<Channel>("CHANNEL", [](Channel channel) { return text_of(channel).unit; });
+  w.title("Faults");
+  for (std::uint8_t fault = 0; fault < kFaults; ++fault)
+    w.number(fmt::format("FAULT_{}", fault_text(fault).name), fault, fault_text(fault).reason);
+}
+
+void write_payloads(Writer& w) {
+  using namespace protocol;
+  w.line(
+      "\n/* Payloads: offsets from the payload's begin, and structs without padding for compilers that know how. */\n"
+      "#if defined(__GNUC__) || defined(__clang__)\n#define FLEXSPLINE_PACKED_BEGIN\n#define FLEXSPLINE_PACKED "
+      "__attribute__((packed))\n#define FLEXSPLINE_PACKED_END\n#else\n#define FLEXSPLINE_PACKED_BEGIN "
+      "__pragma(pack(push, 1))\n#define FLEXSPLINE_PACKED\n#define FLEXSPLINE_PACKED_END __pragma(pack(pop))\n#endif");
+  w.payload<Hello>("hello", "identify, to the drive", {"major", "minor"});
+  w.payload<Identity>("identity", "identify, from the drive",
+                      {"major", "minor", "firmware", "board", "serial", "tick_hz", "block_bytes", "effects", "channels",
+                       "most_channels", "most_lines", "has_output_encoder"});
+  w.payload<Effects>("effects", "effects, from the drive: bit n % 8 of byte n / 8", {"bits"});
+  w.payload<Status>("status", "status, from the drive",
+                    {"tick", "mode", "has_parameters", "store", "fault", "fault_tick", "fault_seen", "fault_limit",
+                     "dropped", "sequence", "staged", "active_bytes", "active_crc", "previous_bytes", "previous_crc"});
+  w.payload<BlockBegin>("block_begin", "block_begin, to the drive", {"bytes", "crc"});
+  w.payload<Chunk>("chunk", "block_chunk to the drive, block_read from it; as many bytes as the length says",
+                   {"offset", "bytes"});
+  w.payload<BlockRead>("block_read", "block_read, to the drive", {"which", "offset"});
+  w.payload<BlockRestore>("block_restore", "block_restore, to the drive", {"sequence"});
+  w.payload<Reason>("reason", "block_commit and block_restore, from the drive", {"reason"});
+  w.payload<Command>("command", "command, to the drive",
+                     {"kind", "mode", "compensate", "stream", "position", "velocity", "acceleration", "current"});
+  w.payload<CommandAnswer>("command_answer", "command, from the drive", {"refusal", "mode"});
+  w.payload<Excitation>("excitation", "excitation, to the drive",
+                        {"shape", "is_torque", "line_count", "ticks", "fade_ticks", "step", "step_change", "positive",
+                         "negative", "offset", "limit", "rate"});
+  w.payload<ExcitationGuard>("excitation_guard", "excitation_guard, to the drive",
+                             {"torque_limit", "overspeed", "largest_velocity", "slope_mantissa", "slope_exponent"});
+  w.payload<ExcitationLine>("excitation_line", "a line of an excitation",
+                            {"harmonic", "exponent", "mantissa", "phase"});
+  w.payload<ExcitationLines>("excitation_lines", "excitation_lines, to the drive", {"first", "count", "lines"});
+  w.payload<Subscription>("subscription", "telemetry, to the drive; without channels it ends",
+                          {"every", "count", "channels"});
+  w.payload<FrameHead>("frame_head", "telemetry_frames, from the drive; words of the frames follow",
+                       {"sequence", "tick"});
+}
+
+void write_block(Writer& w) {
+  namespace d = model::detail;
+  w.title("The parameter block. A number is an int32 mantissa and an int32 exponent: mantissa 2^(exponent - 30)");
+  w.number("BLOCK_MAGIC", model::kBlockMagic);
+  w.number("BLOCK_VERSION", model::kBlockVersion);
+  w.number("LARGEST_BLOCK", model::kLargestBlock);
+  w.number("MOST_ENTRIES", model::kMostEntries);
+  w.number("VALUE_FRACTION_BITS", fixed::kValueBits, "a value is an int32 in 2^-27 of its base");
+  w.number("BLOCK_MAGIC_AT", 0);
+  w.number("BLOCK_VERSION_AT", 4);
+  w.number("BLOCK_ENTRY_COUNT_AT", 6);
+  w.number("BLOCK_TOTAL_BYTES_AT", 8);
+  std::size_t at = d::kBlockStart;
+  w.number("BLOCK_DRIVE_NAME_AT", at);
+  at += sizeof(model::Name);
+  w.number("BLOCK_MODEL_NAME_AT", at);
+  at += sizeof(model::Name);
+  w.number("BLOCK_NAME_BYTES", sizeof(model::Name));
+  w.number("BLOCK_AXIS_AT", at, "0 rotary, 1 linear");
+  w.number("BLOCK_ENCODER_COUNTS_AT", at + 4);
+  at += 8;
+  for (const std::string_view base :
+       {"gear_ratio", "torque_constant", "rated_velocity", "reference_temperature", "turn_angle_scale", "torque",
+        "output_torque", "velocity", "output_velocity", "acceleration", "output_acceleration", "angle", "torsion",
+        "torsion_rate", "temperature", "current", "time"}) {
+    w.number(fmt::format("BASE_{}_AT", base), at, "number");
+    at += 8;
+  }
+  for (const std::string_view limit :
+       {"torque", "load", "velocity", "overspeed", "current", "torsion", "direction_band"}) {
+    w.number(fmt::format("LIMIT_{}_AT", limit), at, "value");
+    at += 4;
+  }
+  w.number("BLOCK_ENTRIES_AT", d::kBlockStart + d::kHeaderBytes, "uint16 kind, uint16 nought, uint32 bytes, bytes");
+  w.number("ENTRY_HEAD_BYTES", d::kEntryHeader);
+  w.number("BLOCK_CHECKSUM_BYTES", d::kChecksum, "CRC-32 of all before it, at the end");
+  w.number("FIRST_NOTE", model::kFirstNote, "entries from here on are for people and hosts");
+  w.title("What a validator says of a block");
+  w.numbers<model::BlockFault>("REASON", [](model::BlockFault fault) { return model::text_of(fault); });
+  w.title(
+      "Entries of effects: their number, and where their coefficients stand; behind the last a table has its points, 4 "
+      "bytes each");
+  static constexpr model::BlockPlaces kPlaces =
+      control::block_places<decltype(control::DriveParameters<fixed::Fixed>::model)>();
+  std::map<std::size_t, std::string_view> names;
+  effects::for_each_effect([&]<class Effect>(std::size_t id) { names.emplace(id, Effect::kInfo.name); });
+  for (const auto& [id, effect] : names) {
+    const std::string name = fmt::format("EFFECT_{}", effect);
+    w.number(name, id);
+    for (const model::EffectPlace& place : kPlaces.effects)
+      if (place.number == id) w.row(name, kPlaces.effect_rows + place.row);
+  }
+  w.title("Entries of sections");
+  for_each_enumerator<model::Section, 0x100, 0x40>([&](std::string_view name, std::size_t value) {
+    const std::string section = fmt::format("SECTION_{}", name);
+    w.number(section, value);
+    for (const auto& plan : control::detail::kSections)
+      if (static_cast<std::size_t>(plan.kind) == value) w.row(section, plan.row.parts.data());
+  });
+}
+
+}  // namespace
+
+std::string protocol_header(const std::string& made_by) {
+  Writer w;
+  w.line(
+      fmt::format("/* Messages and parameter block of a Flexspline drive. Made by {}:\n * flexspline export "
+                  "--protocol-header. Do not edit.\n */\n#ifndef FLEXSPLINE_PROTOCOL_H\n#define "
+                  "FLEXSPLINE_PROTOCOL_H\n\n#include <stdint.h>",
+                  made_by));
+  write_numbers(w);
+  write_payloads(w);
+  write_block(w);
+  w.line("\n#endif /* FLEXSPLINE_PROTOCOL_H */");
+  return w.text();
+}
+
+}  // namespace flexspline::interchange

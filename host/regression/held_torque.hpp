@@ -1,0 +1,20 @@
+// Torque readings beside an effort that the drive holds for a sample.
+#pragma once
+
+#include "host/regression/record.hpp"
+
+namespace flexspline::regression {
+
+// A held effort accelerates the motor in steps, and through a transmission whose damping follows within the sample the
+// load, too. A sensor that is read as the new value begins then shows the torque before its step, where positions give
+// the mean acceleration of both sides: the reading lacks half a step. With rigid shafts a step of the effort E makes
+// one of J/(N J_all) in the torque, J being the output's inertia and J_all that of all, at the motor.
+//
+// Both inertias are estimated from all free records together, and so is how much of the half step the readings lack.
+// Where that is more than half of it for certain, returns the step of the torque per step of the effort; else, as
+// behind a soft gear, nought. `prepared.pipeline.torque_per_step` must be nought still.
+double torque_per_held_step(const Prepared& prepared);
+// Adds the other half of the steps to `torque` of each free record (not to the inputs of effects).
+void complete_held_torque(Prepared& prepared, double torque_per_step);
+
+}  // namespace flexspline::regression

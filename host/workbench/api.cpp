@@ -1,0 +1,327 @@
+#include "host/workbench/api.hpp"
+
+#include <fmt/format.h>
+
+#include <charconv>
+#include <cstdlib>
+#include <fstream>
+#include <nlohmann/json.hpp>
+#include <set>
+
+#include "host/workbench/gate.hpp"
+#include "host/workbench/work.hpp"
+
+namespace flexspline::workbench {
+namespace {
+
+using nlohmann::json;
+
+constexpr std::size_t kMostTabs = 24;
+constexpr std::size_t kMostFiles = 200;
+// Ends with the server, so it is short.
+constexpr auto kLongestWait = std::chrono::milliseconds(1500);
+
+// What is not there: 404.
+class NotFound : public std::runtime_error {
+ public:
+  using std::runtime_error::runtime_error;
+};
+
+const std::string& text(const Request& request, const std::string& key) {
+  const auto found = request.query.find(key);
+  if (found == request.query.end()) throw AskedError(fmt::format("\"{}\" is missing in the request", key));
+  return found->second;
+}
+
+double number(const Request& request, const std::string& key) {
+  const std::string& value = text(request, key);
+  double parsed = 0.0;
+  const auto [end, error] = std::from_chars(value.data(), value.data() + value.size(), parsed);
+  if (error != std::errc() || end != value.data() + value.size() || parsed != parsed)
+    throw AskedError(fmt::format("\"{}\" is no number, in {}", value, key));
+  return parsed;
+}
+
+std::size_t whole(const Request& request, const std::string& key, double most = 1e9) {
+  const double value = number(request, key);
+  if (!(value >= 0.0 && value <= most)) throw AskedError(fmt::format("{} is out of range", key));
+  return static_cast<std::size_t>(value);
+}
+
+std::string field(const json& asked, const char* key) {
+  if (!asked.contains(key) || !asked[key].is_string())
+    throw AskedError(fmt::format("\"{}\" is missing in the request", key));
+  return asked[key].get<std::string>();
+}
+
+std::string ending_of(const std::string& what) {
+  if (what == "model") return ".toml";
+  if (what == "report") return ".html";
+  if (what == "block") return ".block";
+  throw AskedError(fmt::format("there is no \"{}\" to save; model, report and block are", what));
+}
+
+std::filesystem::path own_folder() {
+  std::string name = (std::filesystem::temp_directory_path() / "flexspline-workbench-XXXXXX").string();
+  if (!mkdtemp(name.data())) throw std::runtime_error(fmt::format("no folder can be made at {}", name));
+  return name;
+}
+
+json reply_of(const std::string& what) {
+  return {{"what", what}};
+}
+
+}  // namespace
+
+Api::Api(Setup setup) : setup_(std::move(setup)), dropped_(own_folder()), drive_(setup_.drive) {}
+
+Api::~Api() {
+  tabs_.clear();  // work ends before what it works with
+  std::error_code error;
+  std::filesystem::remove_all(dropped_, error);
+}
+
+Answer Api::answer(const Request& request) {
+  Answer answer;
+  try {
+    if (request.method == "GET" && request.path == "/api/file") return file(request);
+    if (request.method == "GET")
+      answer.body = get(request).dump();
+    else if (request.method == "POST")
+      answer.body = post(request).dump();
+    else
+      throw NotFound("only GET and POST are known");
+  } catch (const NotFound& error) {
+    answer.status = 404;
+    answer.body = reply_of(error.what()).dump();
+  } catch (const BusyError& error) {
+    answer.status = 409;
+    answer.body = reply_of(error.what()).dump();
+  } catch (const std::exception& error) {
+    answer.status = 400;
+    answer.body = reply_of(error.what()).dump(-1, ' ', false, json::error_handler_t::replace);
+  }
+  return answer;
+}
+
+std::shared_ptr<Session> Api::open_tab(const std::string& like) {
+  const std::lock_guard lock(mutex_);
+  std::shared_ptr<Session> made = std::make_shared<Session>(new_token(), setup_.first);
+  for (const auto& s : tabs_)
+    if (s->id() == like) {
+      const History<std::shared_ptr<Step>> history = s->history();
+      made->change([&](History<std::shared_ptr<Step>>& own) { own = history; });
+    }
+  tabs_.push_front(made);
+  if (tabs_.size() > kMostTabs) tabs_.pop_back();
+  return made;
+}
+
+std::shared_ptr<Session> Api::session_of(const Request& request) {
+  const std::string& id = text(request, "tab");
+  const std::lock_guard lock(mutex_);
+  for (auto s = tabs_.begin(); s != tabs_.end(); ++s)
+    if ((*s)->id() == id) {
+      tabs_.splice(tabs_.begin(), tabs_, s);
+      return tabs_.front();
+    }
+  throw NotFound("this tab is not known; load the page again");
+}
+
+json Api::get(const Request& request) {
+  if (request.path == "/api/drive") return {{"status", drive_.status()}, {"in_reach", drive_.in_reach()}};
+  if (request.path == "/api/live") return drive_.live(whole(request, "since", 1e15));
+  const std::shared_ptr<Session> session = session_of(request);
+  if (request.path == "/api/state") {
+    const std::uint64_t seen = whole(request, "seen", 1e15);
+    if (session->wait(seen, kLongestWait) <= seen) return {{"changes", seen}};
+    json state = session->state();
+    state["data_name"] = setup_.data_name;
+    state["model_file"] = setup_.model_name;
+    state["folder"] = setup_.folder.string();
+    return state;
+  }
+  const History<std::shared_ptr<Step>> history = session->history();
+  const std::size_t at = request.query.contains("step") ? whole(request, "step") : history.at();
+  if (at >= history.size()) throw AskedError("there is no such step");
+  const std::shared_ptr<Look> look = history[at]->look();
+  if (request.path == "/api/trace")
+    return look->trace({.experiment = text(request, "experiment"),
+                        .signal = text(request, "signal"),
+                        .from_s = number(request, "from"),
+                        .to_s = number(request, "to"),
+                        .points = whole(request, "points")});
+  if (request.path == "/api/maps") return {{"maps", look->maps()}, {"loops", look->loops()}};
+  if (request.path == "/api/stretches")
+    return look->stretches_of(text(request, "signal"), text(request, "variable"), number(request, "low"),
+                              number(request, "high"));
+  throw NotFound("there is nothing under this address");
+}
+
+json Api::post(const Request& request) {
+  if (request.path == "/api/tab") {
+    const auto like = request.query.find("like");
+    return {{"tab", open_tab(like == request.query.end() ? "" : like->second)->id()}};
+  }
+  const std::shared_ptr<Session> session = session_of(request);
+  if (request.path == "/api/drop") {
+    start_drop(session, request.files);
+    return json::object();
+  }
+  if (request.path == "/api/do") return act(session, json::parse(request.body));
+  throw NotFound("there is nothing under this address");
+}
+
+json Api::act(const std::shared_ptr<Session>& session, const json& asked) {
+  const std::string what = field(asked, "do");
+  const auto pipeline = setup_.pipeline;
+  if (what == "cancel") {
+    session->cancel();
+  } else if (what == "dismiss") {
+    session->set("problem", nullptr);
+  } else if (what == "undo" || what == "redo" || what == "go") {
+    if (session->works()) throw BusyError("something is still running; wait, or cancel it");
+    session->change([&](auto& history) {
+      if (what == "undo") history.undo();
+      if (what == "redo") history.redo();
+      if (what == "go") history.go(asked.at("step").get<std::size_t>());
+    });
+  } else if (what == "diagnose") {
+    start_diagnosis(session);
+  } else if (what == "add") {
+    start_step(session, fmt::format("Adding {}", field(asked, "effect")),
+               [pipeline, effect = field(asked, "effect")](const Step& now, const Progress& say) {
+                 return with_effect(now, effect, pipeline, say);
+               });
+  } else if (what == "remove") {
+    start_step(session, fmt::format("Removing {}", field(asked, "effect")),
+               [pipeline, id = field(asked, "effect")](const Step& now, const Progress& say) {
+                 return without_effect(now, id, pipeline, say);
+               });
+  } else if (what == "refit") {
+    start_step(session, "Identifying",
+               [pipeline](const Step& now, const Progress& say) { return refitted(now, pipeline, say); });
+  } else if (what == "pack") {
+    start_pack(session);
+  } else if (what == "save") {
+    start_save(session, asked);
+  } else if (what == "connect") {
+    const std::string drive = field(asked, "drive");
+    session->start("Connecting", [this, drive](const Progress& say) {
+      say(drive);
+      drive_.connect(drive);
+    });
+  } else if (what == "disconnect") {
+    drive_.disconnect();
+    session->set("flash", nullptr);
+  } else if (what == "flash") {
+    session->start("Flashing", [this, session = session.get()](const Progress& say) {
+      const std::shared_ptr<Step> step = session->history().current();
+      session->set("flash", drive_.flash(step->model, say));
+    });
+  } else if (what == "restore") {
+    session->start("Restoring", [this, session = session.get()](const Progress&) {
+      drive_.restore();
+      session->set("flash", nullptr);
+    });
+  } else {
+    throw AskedError(fmt::format("\"{}\" cannot be done", what));
+  }
+  return json::object();
+}
+
+void Api::start_step(const std::shared_ptr<Session>& session, const std::string& what,
+                     std::function<std::shared_ptr<Step>(const Step&, const Progress&)> make) {
+  // The thread is joined before its session ends.
+  session->start(what, [session = session.get(), make = std::move(make)](const Progress& say) {
+    const std::shared_ptr<Step> now = session->history().current();
+    const std::shared_ptr<Step> next = make(*now, say);
+    session->change([&](auto& history) { history.take(next); });
+  });
+}
+
+void Api::start_diagnosis(const std::shared_ptr<Session>& session) {
+  session->start("Looking for what is missing",
+                 [pipeline = setup_.pipeline, session = session.get()](const Progress& say) {
+                   const std::shared_ptr<Step> step = session->history().current();
+                   if (step->diagnosed()) return;
+                   diagnosis::Options how;
+                   how.pipeline = pipeline;
+                   how.progress = say;
+                   step->found(diagnosis::diagnose(*step->dataset, step->model, how));
+                 });
+}
+
+void Api::start_pack(const std::shared_ptr<Session>& session) {
+  session->start("Packing", [session = session.get()](const Progress& say) {
+    say("proving the block and comparing it with double");
+    const deployment::Packed packed = deployment::pack(session->history().current()->model);
+    say("");
+    session->set("pack", pack_json(packed));
+  });
+}
+
+std::string Api::content(const Session& session, const std::string& what) const {
+  const auto history = session.history();
+  const Step& step = *history.current();
+  if (what == "model") return model_file(step);
+  if (what == "report")
+    return report_page(step, history.at() > 0 ? history[history.at() - 1].get() : nullptr, setup_.data_name,
+                       setup_.pipeline);
+  const auto bytes = deployment::pack(step.model).bytes;
+  return {bytes.begin(), bytes.end()};
+}
+
+void Api::start_save(const std::shared_ptr<Session>& session, const json& asked) {
+  const std::string what = field(asked, "what");
+  const std::filesystem::path path = inside(setup_.folder, field(asked, "name"), ending_of(what));
+  std::error_code error;
+  if (std::filesystem::exists(path, error) && !asked.value("replace", false))
+    throw NameError(fmt::format("{} is there already; take another name, or replace it", path.filename().string()));
+  session->start("Saving", [this, what, path, session = session.get()](const Progress& say) {
+    say(path.filename().string());
+    const std::string text = content(*session, what);
+    say("");
+    model::save(path, text);
+    session->set("saved", {{"what", what}, {"file", path.string()}});
+  });
+}
+
+Answer Api::file(const Request& request) {
+  const std::shared_ptr<Session> session = session_of(request);
+  const std::string what = text(request, "what");
+  Answer answer;
+  answer.download = "flexspline-" + what + ending_of(what);
+  answer.body = content(*session, what);
+  answer.type = what == "model"    ? "application/toml"
+                : what == "report" ? "text/html; charset=utf-8"
+                                   : "application/octet-stream";
+  return answer;
+}
+
+void Api::start_drop(const std::shared_ptr<Session>& session, const std::vector<Upload>& files) {
+  if (files.empty()) throw AskedError("no file came");
+  if (files.size() > kMostFiles) throw AskedError(fmt::format("at most {} files at a time", kMostFiles));
+  const std::filesystem::path folder = dropped_ / std::to_string([&] {
+                                         const std::lock_guard lock(mutex_);
+                                         return drops_++;
+                                       }());
+  std::filesystem::create_directory(folder);
+  for (const Upload& file : files) {
+    const std::string ending = std::filesystem::path(file.name).extension().string();
+    if (ending != ".csv" && ending != ".mat" && ending != ".CSV" && ending != ".MAT")
+      throw AskedError(
+          fmt::format("{} is no measurement; drop CSV or MAT files. A dataset.toml names files by their "
+                      "place: start the workbench with it",
+                      file.name));
+    std::ofstream out(inside(folder, file.name, ending), std::ios::binary);
+    out.write(file.content.data(), static_cast<std::streamsize>(file.content.size()));
+    if (!out.flush()) throw std::runtime_error("the files cannot be kept: is the disk full?");
+  }
+  start_step(session, fmt::format("Reading {} file{}", files.size(), files.size() == 1 ? "" : "s"),
+             [folder, pipeline = setup_.pipeline](const Step& now, const Progress& say) {
+               return with_files(now, folder, pipeline, say);
+             });
+}
+
+}  // namespace flexspline::workbench

@@ -1,0 +1,80 @@
+// The requests of the page and their answers, without any socket.
+#pragma once
+
+#include <filesystem>
+#include <list>
+#include <map>
+#include <memory>
+#include <mutex>
+#include <nlohmann/json_fwd.hpp>
+#include <string>
+#include <vector>
+
+#include "host/workbench/live_drive.hpp"
+#include "host/workbench/session.hpp"
+
+namespace flexspline::workbench {
+
+struct Upload {
+  std::string name;
+  std::string content;
+};
+
+// A request that passed the gate.
+struct Request {
+  std::string method;  // "GET", "POST"
+  std::string path;    // behind the token: "/api/state"
+  std::map<std::string, std::string> query;
+  std::string body;
+  std::vector<Upload> files;
+};
+
+struct Answer {
+  int status = 200;
+  std::string type = "application/json";
+  std::string body;
+  std::string download;  // file name for a download; empty: to be shown
+};
+
+// What the workbench was started with.
+struct Setup {
+  std::shared_ptr<Step> first;
+  std::string data_name;         // as the user named the data
+  std::string model_name;        // likewise
+  std::filesystem::path folder;  // where models, reports and blocks are saved
+  regression::PipelineOptions pipeline;
+  std::string drive;  // --drive; empty: none
+};
+
+class Api {
+ public:
+  explicit Api(Setup setup);
+  ~Api();
+
+  // Never throws: errors become answers with {"what"} and a status.
+  Answer answer(const Request& request);
+
+ private:
+  nlohmann::json get(const Request& request);
+  nlohmann::json post(const Request& request);
+  Answer file(const Request& request);
+  nlohmann::json act(const std::shared_ptr<Session>& session, const nlohmann::json& asked);
+  void start_step(const std::shared_ptr<Session>& session, const std::string& what,
+                  std::function<std::shared_ptr<Step>(const Step&, const Progress&)> make);
+  void start_diagnosis(const std::shared_ptr<Session>& session);
+  void start_pack(const std::shared_ptr<Session>& session);
+  void start_save(const std::shared_ptr<Session>& session, const nlohmann::json& asked);
+  void start_drop(const std::shared_ptr<Session>& session, const std::vector<Upload>& files);
+  std::string content(const Session& session, const std::string& what) const;
+  std::shared_ptr<Session> session_of(const Request& request);
+  std::shared_ptr<Session> open_tab(const std::string& like);
+
+  Setup setup_;
+  std::filesystem::path dropped_;  // folder of dropped files; ends with the workbench
+  LiveDrive drive_;
+  std::mutex mutex_;
+  std::list<std::shared_ptr<Session>> tabs_;  // latest used first
+  std::size_t drops_ = 0;
+};
+
+}  // namespace flexspline::workbench

@@ -1,0 +1,72 @@
+// What is to be seen of one model against one data set: curves over time, maps, loops. Made once for a step, its parts
+// when they are asked for.
+#pragma once
+
+#include <list>
+#include <memory>
+#include <mutex>
+#include <nlohmann/json_fwd.hpp>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "host/data/dataset.hpp"
+#include "host/model/model.hpp"
+#include "host/report/view.hpp"
+
+namespace flexspline::workbench {
+
+// What was asked for is not there: which, and what is.
+class AskedError : public std::runtime_error {
+ public:
+  using std::runtime_error::runtime_error;
+};
+
+struct TraceRequest {
+  std::string experiment;
+  std::string signal;  // "motor_balance", ..., or a free run: "motor_velocity", ...
+  double from_s = 0.0, to_s = 0.0;
+  std::size_t points = 1000;
+};
+
+// Safe to use from several threads.
+class Look {
+ public:
+  // The model needs values. Throws what comparison::compare throws.
+  Look(std::shared_ptr<const data::Dataset> dataset, const model::Model& model,
+       const regression::PipelineOptions& pipeline, std::vector<regression::Estimate> estimates);
+
+  // {"experiments": [{"name", "role", "load", "duration_s", "samples", "begin_s", "signals": [{"signal", "unit",
+  // "rmse", "nrmse", "noise_floor", "excess", "free_run"}]}], "balances": [{"signal", "unit", "fit", "holdout",
+  // "noise_floor_fit", "noise_floor_holdout", "noise_floor_from"}], "warnings"}; errors of free runs are null.
+  nlohmann::json errors() const;
+  nlohmann::json parameters() const;
+  // Curves "measured", "model", "residual" of window.hpp with "unit", "noise_floor", "rmse". Throws AskedError.
+  nlohmann::json trace(const TraceRequest& request);
+  // As the report's maps and loops (host/report/README.md).
+  nlohmann::json maps();
+  nlohmann::json loops();
+  // Where in time the rows lie whose variable is in [low, high]: [{"experiment", "stretches": [[from_s, to_s], ...]}].
+  nlohmann::json stretches_of(const std::string& signal, const std::string& variable, double low, double high);
+
+ private:
+  struct Curves {
+    std::string experiment, signal, unit;
+    std::vector<double> measured, model, residual;
+    std::vector<std::uint8_t> valid;
+  };
+  const Curves& curves(std::size_t record, const std::string& signal);
+  Curves balance_curves(std::size_t record, const report::BalanceView& balance);
+  Curves free_run_curves(std::size_t record, const std::string& signal);
+  std::size_t record_of(const std::string& experiment) const;
+  const report::BalanceView* balance_of(const std::string& signal) const;
+
+  std::shared_ptr<const data::Dataset> dataset_;
+  report::Subject subject_;
+  report::View view_;
+  mutable std::mutex mutex_;
+  std::list<Curves> cache_;  // latest first
+  std::unique_ptr<nlohmann::json> maps_, loops_;
+};
+
+}  // namespace flexspline::workbench

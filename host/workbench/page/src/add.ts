@@ -1,0 +1,109 @@
+// 4. Add it. Steps with their errors, to be taken back and compared; parameters; files and the drive.
+import { act, download, type Balance, type State, type Step } from "./api";
+import { bar, button, el, fill, num, times, unit, withUnit, words } from "./dom";
+import { errorOf, excessOf, floorOf, view, worstBalance } from "./store";
+import { DrivePart } from "./drive";
+
+type Do = (what: string, more?: Record<string, unknown>) => void;
+
+export class Add {
+  private readonly tabs = el("div", { class: "tabs", role: "tablist", "aria-label": "Parts of the fourth question" });
+  private readonly body = el("div", { class: "tabbody", role: "tabpanel", "aria-label": "Steps, parameters, files or drive" });
+  private readonly element_ = el("section", { class: "panel add", "aria-labelledby": "q4" }, el("div", { class: "row" }, el("h2", { id: "q4" }, el("b", {}, "4"), " Add it"), this.tabs), this.body);
+  private part = "Steps";
+  private state: State | null = null;
+  private readonly drive: DrivePart;
+  private name = "";
+
+  constructor(private readonly run: Do) {
+    this.drive = new DrivePart(run);
+    this.tabs.addEventListener("keydown", (e) => {
+      const all = Array.from(this.tabs.querySelectorAll<HTMLElement>("[role=tab]"));
+      const next = all[all.indexOf(document.activeElement as HTMLElement) + (e.key === "ArrowRight" ? 1 : e.key === "ArrowLeft" ? -1 : NaN)];
+      if (next) { next.click(); this.tabs.querySelector<HTMLElement>("[aria-selected=true]")?.focus(); }
+    });
+  }
+
+  get element(): HTMLElement { return this.element_; }
+
+  render(state: State): void {
+    this.state = state;
+    fill(this.tabs, ["Steps", "Parameters", "Save", "Drive"].map((t) => el("button", { type: "button", role: "tab", "aria-selected": t === this.part ? "true" : "false", tabindex: t === this.part ? 0 : -1, "data-key": `tab ${t}`,
+      click: () => { this.part = t; if (this.state) this.render(this.state); } }, t)));
+    this.drive.visible = this.part === "Drive";
+    if (this.part === "Steps") fill(this.body, this.steps(state));
+    else if (this.part === "Parameters") fill(this.body, this.parameters(state));
+    else if (this.part === "Save") fill(this.body, this.save(state));
+    else {
+      if (!this.body.contains(this.drive.element)) this.body.replaceChildren(this.drive.element);
+      this.drive.render(state);
+    }
+  }
+
+  private steps(state: State): HTMLElement {
+    const about = state.steps[0]?.balances.some((b) => b.signal === view.signal) ? view.signal : worstBalance(state.steps[0]?.balances ?? [])?.signal ?? "";
+    const of = (s: Step | undefined): Balance | undefined => s?.balances.find((b) => b.signal === about);
+    const now = of(state.steps[state.at]), before = state.at > 0 ? of(state.steps[state.at - 1]) : undefined;
+    const worst = Math.max(2, ...state.steps.map((s) => excessOf(of(s)) ?? 0));
+    const largest = Math.max(...state.steps.map((s) => { const b = of(s); return b ? errorOf(b) ?? 0 : 0; }));
+    const length = (b: Balance | undefined) => { const e = excessOf(b); return e !== null ? Math.log(Math.max(1.02, e)) / Math.log(worst) : b ? (errorOf(b) ?? 0) / (largest || 1) : 0; };
+    const excess = excessOf(now);
+    return el("div", { class: "steps" },
+      el("div", { class: "headline" },
+        el("div", { class: "big", "data-excess": excess === null ? "" : excess.toFixed(4) }, before ? el("span", { class: "was" }, times(excessOf(before)), " → ") : null, excess !== null ? times(excess) : now ? withUnit(errorOf(now), now.unit) : "–"),
+        el("p", {}, excess !== null ? "the noise: " : "", el("strong", {}, `error of the ${words(about)}`), now?.holdout !== null && now ? " on motions that the fit never saw" : " on fitted data (none are held out)",
+          now ? `: ${withUnit(errorOf(now), now.unit)}${floorOf(now) ? `; noise alone ${withUnit(floorOf(now), now.unit)}` : ""}` : "")),
+      el("ol", { class: "history", "aria-label": "Steps" }, state.steps.map((s, k) => el("li", { class: k === state.at ? "now" : k > state.at ? "later" : "", "aria-current": k === state.at ? "step" : null },
+        el("button", { type: "button", "data-key": `step ${k}`, "data-step": k, disabled: state.work !== null, click: () => this.run("go", { step: k }), title: k === state.at ? "the present model" : "go to this step" },
+          el("span", { class: "name" }, title(s)), el("span", { class: "figure" }, excessOf(of(s)) !== null ? times(excessOf(of(s))) : num(of(s) ? errorOf(of(s) as Balance) : null, 3)), bar(length(of(s)), (excessOf(of(s)) ?? 9) <= 1.3 ? "fine" : "bad"))))),
+      el("div", { class: "row actions" }, button("Undo", () => this.run("undo"), { disabled: state.at === 0 || state.work !== null, title: "Ctrl+Z" }), button("Redo", () => this.run("redo"), { disabled: state.at + 1 >= state.steps.length || state.work !== null, title: "Ctrl+Y" }),
+        button("Identify again", () => this.run("refit"), { disabled: state.work !== null })));
+  }
+
+  private parameters(state: State): HTMLElement {
+    let last = "";
+    return el("div", { class: "scroll", "data-scroll": "parameters", tabindex: 0, role: "region", "aria-label": "Parameters" }, el("table", {},
+      el("thead", {}, el("tr", {}, ["effect", "parameter"].map((t) => el("th", { scope: "col" }, t)), ["value", "± 95 %", "spread"].map((t) => el("th", { scope: "col", class: "n" }, t)), el("th", { scope: "col" }, "unit"), el("td", {}))),
+      el("tbody", {}, state.parameters.map((p) => {
+        const isFirst = p.id !== last;
+        last = p.id;
+        const half = p.interval[0] !== null && p.interval[1] !== null ? (p.interval[1] - p.interval[0]) / 2 : null;
+        return el("tr", { class: isFirst ? "first" : "" }, el("th", { scope: "row" }, isFirst ? words(p.id) : ""), el("td", {}, words(p.parameter)), el("td", { class: "n" }, num(p.value, 5)), el("td", { class: "n" }, num(half, 2)),
+          el("td", { class: `n ${p.reliable ? "" : "high"}`, title: p.reliable ? "" : "differs too much between experiments" }, p.spread_percent === null ? "–" : `${num(p.spread_percent, 3)} %${p.reliable ? "" : " !"}`), el("td", {}, unit(p.unit)),
+          el("td", {}, isFirst ? el("button", { type: "button", class: "quiet", "data-key": `remove ${p.id}`, "aria-label": `Remove ${words(p.id)} and refit`, title: "Remove and refit", disabled: state.work !== null, click: () => this.run("remove", { effect: p.id }) }, "✕") : null));
+      }))));
+  }
+
+  private save(state: State): HTMLElement {
+    const stem = this.name || `${(state.model_file.split("/").pop() ?? "model").replace(/\.toml$/, "")}-better`;
+    const input = el("input", { type: "text", value: stem, "data-key": "name", "aria-label": "Name of the file without its ending", input: () => { this.name = input.value; } });
+    const kinds: [string, string, string][] = [["model", ".toml", "Save model"], ["report", ".html", "Save report"], ["block", ".block", "Save block"]];
+    const p = state.pack;
+    return el("div", { class: "save" },
+      el("label", { class: "row" }, "Name ", input),
+      el("div", { class: "row actions" }, kinds.map(([what, ending, text]) => button(text, () => void this.keep(what, `${input.value}${ending}`), { "data-save": what, disabled: state.work !== null }))),
+      el("p", { class: "soft" }, `Into ${state.folder}`), state.saved ? el("p", { class: "done", "data-saved": state.saved.what }, `✓ ${state.saved.file}`) : null,
+      el("div", { class: "row actions" }, "Download: ", kinds.map(([what]) => button(what, () => download(what), { class: "quiet", "aria-label": `Download ${what}`, "data-key": `download ${what}` }))),
+      el("div", { class: "row actions" }, button("Pack for a drive", () => this.run("pack"), { "data-pack": "", disabled: state.work !== null }),
+        p ? el("span", { class: "done", "data-packed": "" }, `${p.bytes} bytes; fixed point is off by at most ${num(p.max_error_nm, 3)} N·m, ${num(100 * p.max_error_share_of_rated, 2)} % of rated torque (${words(p.worst_balance)} balance); ${p.bounds} bounds proven`) : null));
+  }
+
+  private async keep(what: string, name: string): Promise<void> {
+    const exists = await act("save", { what, name }).then(() => null, (error: Error) => error);
+    if (!exists) return;
+    if (exists.message.includes("is there already")) {
+      if (confirm(`${name} is there already. Replace it?`)) this.run("save", { what, name, replace: true });
+    } else this.run("complain", { what: exists.message });
+  }
+}
+
+function title(s: Step): string {
+  switch (s.action) {
+    case "open": return "as opened";
+    case "identify": return "identified again";
+    case "add": return `+ ${words(s.what)}`;
+    case "remove": return `− ${words(s.what)}`;
+    default: return `+ data: ${s.what}`;
+  }
+}
+

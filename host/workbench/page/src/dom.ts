@@ -1,0 +1,82 @@
+// Elements, numbers and words. Texts come into the page here alone, as text nodes: none of them becomes markup.
+type Child = Node | string | number | null | undefined | false | Child[];
+type Attributes = { [name: string]: string | number | boolean | null | undefined | ((event: never) => void) };
+
+export function el<K extends keyof HTMLElementTagNameMap>(tag: K, attributes: Attributes = {}, ...children: Child[]): HTMLElementTagNameMap[K] {
+  const element = document.createElement(tag);
+  for (const [name, value] of Object.entries(attributes)) {
+    if (value === null || value === undefined || value === false) continue;
+    if (typeof value === "function") element.addEventListener(name, value as EventListener);
+    else if (name.startsWith("--")) element.style.setProperty(name, String(value));
+    else element.setAttribute(name, value === true ? "" : String(value));
+  }
+  append(element, children);
+  return element;
+}
+
+function append(element: HTMLElement, children: Child[]): void {
+  for (const child of children) {
+    if (child === null || child === undefined || child === false) continue;
+    if (Array.isArray(child)) append(element, child);
+    else element.append(child instanceof Node ? child : String(child));
+  }
+}
+
+// Puts new content into an element; what had the focus has it again where it has a key (data-key).
+export function fill(element: HTMLElement, ...children: Child[]): void {
+  const focused = element.contains(document.activeElement) ? (document.activeElement as HTMLElement).dataset.key : undefined;
+  const scrolled = Array.from(element.querySelectorAll<HTMLElement>("[data-scroll]")).map((e) => [e.dataset.scroll, e.scrollTop] as const);
+  element.replaceChildren();
+  append(element, children);
+  for (const [key, top] of scrolled) {
+    const again = element.querySelector<HTMLElement>(`[data-scroll="${key}"]`);
+    if (again) again.scrollTop = top;
+  }
+  if (focused) element.querySelector<HTMLElement>(`[data-key="${CSS.escape(focused)}"]`)?.focus({ preventScroll: true });
+}
+
+const kSuperscript = "⁰¹²³⁴⁵⁶⁷⁸⁹";
+
+export function num(value: number | null | undefined, digits = 4): string {
+  if (value === null || value === undefined || !Number.isFinite(value)) return "–";
+  if (value === 0) return "0";
+  const size = Math.abs(value);
+  if (size >= 1e5 || size < 1e-3) {
+    const [mantissa, power] = value.toExponential(digits - 1).split("e") as [string, string];
+    const raised = String(Math.abs(Number(power))).replace(/\d/g, (d) => kSuperscript[Number(d)] ?? d);
+    return `${mantissa.replace("-", "−")}·10${Number(power) < 0 ? "⁻" : ""}${raised}`;
+  }
+  return Number(value.toPrecision(digits)).toString().replace("-", "−");
+}
+
+export function unit(text: string): string {
+  return text.replace(/\*/g, "·").replace(/\^2/g, "²").replace(/\^3/g, "³").replace("degC", "°C");
+}
+
+export function withUnit(value: number | null | undefined, of: string, digits = 4): string {
+  return `${num(value, digits)} ${unit(of)}`.trim();
+}
+
+// "motor_balance" as people say it.
+export function words(name: string): string {
+  return name.replace(/_/g, " ");
+}
+
+export function times(excess: number | null | undefined): string {
+  return excess === null || excess === undefined ? "–" : `${excess >= 100 ? excess.toFixed(0) : excess >= 10 ? excess.toFixed(1) : excess.toFixed(2)}×`;
+}
+
+// A bar of a length between nought and one.
+export function bar(share: number, kind: string): HTMLElement {
+  return el("span", { class: `bar ${kind}`, "--share": Math.max(0, Math.min(1, share)).toFixed(4), "aria-hidden": "true" });
+}
+
+export function button(text: string, press: () => void, attributes: Attributes = {}): HTMLButtonElement {
+  return el("button", { type: "button", click: press, "data-key": text, ...attributes }, text);
+}
+
+// Tells a screen reader.
+export function announce(text: string): void {
+  const said = document.getElementById("said");
+  if (said) said.textContent = text;
+}

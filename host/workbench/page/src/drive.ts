@@ -1,0 +1,94 @@
+// The drive: connect, flash, go back, and its signals live.
+import type uPlot from "uplot";
+import { get, type BlockView, type State } from "./api";
+import { button, el, fill, num, unit, words } from "./dom";
+import { axes, Figure, line } from "./plots";
+
+interface Status { status: { given: string; connected: boolean; name?: string; serial?: string; board?: string; block: BlockView | null; problem: string }; in_reach: { drive: string; what: string; usable: boolean; problem: string }[] }
+interface Live { connected: boolean; problem: string; channels: { name: string; unit: string }[]; next: number; mode: string; samples: number[][] }
+
+export class DrivePart {
+  private readonly head = el("div", { class: "column" });
+  private readonly readout = el("dl", { class: "live" });
+  private readonly figure = new Figure(el("div", { class: "plot", role: "img", "aria-label": "Live signal of the drive" }));
+  private readonly live = el("div", { class: "column grow" }, this.readout, this.figure.holder);
+  readonly element = el("div", { class: "drive" }, this.head, this.live);
+  visible = false;
+  private status: Status | null = null;
+  private samples: number[][] = [];
+  private channels: { name: string; unit: string }[] = [];
+  private channel = 0;
+  private next = 0;
+  private timer = 0;
+  private working = false;
+
+  constructor(private readonly run: (what: string, more?: Record<string, unknown>) => void) {}
+
+  render(state: State): void {
+    const working = state.work !== null;
+    if (!this.status || this.working !== working) void this.refresh(state);
+    this.working = working;
+    this.draw(state);
+    if (this.visible && !this.timer) this.listen();
+  }
+
+  private async refresh(state: State): Promise<void> {
+    try {
+      this.status = await get<Status>("drive");
+    } catch (error) {
+      this.status = null;
+      fill(this.head, el("p", { class: "empty" }, (error as Error).message));
+      return;
+    }
+    this.draw(state);
+  }
+
+  private draw(state: State): void {
+    const s = this.status?.status;
+    if (!this.status || !s) return fill(this.head, el("p", { class: "empty" }, "Looking for drives …"));
+    this.live.hidden = !s.connected;
+    const off = state.work !== null;
+    if (!s.connected) {
+      fill(this.head, el("p", {}, "No drive is connected."), s.problem ? el("p", { class: "high" }, s.problem) : null,
+        el("ul", { class: "reach" }, this.status.in_reach.map((d) => el("li", {}, button(`Connect ${d.drive}`, () => this.run("connect", { drive: d.drive }), { disabled: off || !d.usable, "data-connect": d.drive }), el("span", { class: "soft" }, d.usable ? d.what : d.problem)))));
+      return;
+    }
+    const f = state.flash;
+    const changed = f?.changes.filter((c) => c.change !== "same") ?? [];
+    fill(this.head, el("p", {}, el("strong", {}, `${s.serial} `), el("span", { class: "soft" }, `${s.board}; ${s.block ? `block “${s.block.model}”, ${s.block.bytes} bytes` : "no block"}`)),
+      el("div", { class: "row actions" }, button("Flash this model", () => this.run("flash"), { class: "main", disabled: off, "data-flash": "" }), button("Go back to the block before", () => this.run("restore"), { disabled: off }), button("Disconnect", () => { this.status = null; this.run("disconnect"); }, { class: "quiet", disabled: off })),
+      f ? el("div", { class: "done", "data-flashed": f.flashed ? "yes" : "no" }, el("p", {}, f.flashed ? "✓ flashed, read back and in use" : "The drive has this block already."), f.warnings.map((w) => el("p", { class: "high" }, w)),
+        el("ul", { class: "changes" }, changed.slice(0, 8).map((c) => el("li", {}, `${c.change} ${words(c.effect)}${c.parameter ? ` ${words(c.parameter)}: ${num(c.before, 5)} → ${num(c.after, 5)} ${unit(c.unit)}` : ""}`)), changed.length > 8 ? el("li", {}, `and ${changed.length - 8} more`) : null)) : null);
+  }
+
+  private listen(): void {
+    const round = async () => {
+      this.timer = 0;
+      if (!this.visible) return;
+      try {
+        const answer = await get<Live>("live", { since: this.next });
+        if (answer.connected) this.take(answer);
+      } catch { /* said elsewhere */ }
+      this.timer = window.setTimeout(() => void round(), 200);
+    };
+    this.timer = window.setTimeout(() => void round(), 0);
+  }
+
+  private take(answer: Live): void {
+    this.channels = answer.channels;
+    this.next = answer.next;
+    this.samples.push(...answer.samples);
+    const last = this.samples[this.samples.length - 1];
+    this.samples = this.samples.filter((s) => last && (s[0] ?? 0) > (last[0] ?? 0) - 20 && (s[0] ?? 0) <= (last[0] ?? 0));
+    fill(this.readout, el("div", {}, el("dt", {}, "mode"), el("dd", {}, answer.mode || "–")), this.channels.map((c, k) => el("div", { class: k === this.channel ? "chosen" : "" },
+      el("dt", {}, el("button", { type: "button", class: "quiet", "data-key": `channel ${c.name}`, "aria-pressed": k === this.channel ? "true" : "false", click: () => { this.channel = k; } }, words(c.name))), el("dd", {}, `${num(last?.[k + 1], 3)} ${unit(c.unit)}`))));
+    this.readout.dataset.samples = String(this.samples.length);
+    const chosen = this.channels[this.channel];
+    const data = [this.samples.map((s) => s[0] ?? 0), this.samples.map((s) => s[this.channel + 1] ?? null)] as uPlot.AlignedData;
+    if (this.figure.plot && this.figure.holder.dataset.channel === chosen?.name) this.figure.plot.setData(data);
+    else {
+      this.figure.holder.dataset.channel = chosen?.name ?? "";
+      this.figure.show(() => ({ data, options: { scales: { x: { time: false } }, axes: axes("time (s)", chosen ? unit(chosen.unit) : ""), series: [{}, line("residual")], cursor: { show: false } } }));
+    }
+  }
+}

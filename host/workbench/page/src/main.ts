@@ -1,0 +1,179 @@
+// The page: what the server says is drawn by four panels; what the user does goes to the server.
+import { act, get, openTab, Refusal, sendFiles, type Problem, type State } from "./api";
+import { Add } from "./add";
+import { announce, button, el, fill, words } from "./dom";
+import { Good } from "./good";
+import { Missing } from "./missing";
+import { redrawAll } from "./plots";
+import { onLook, view } from "./store";
+import "./style.css";
+import { Where } from "./where";
+
+const top_ = document.getElementById("top") as HTMLElement;
+const panels = document.getElementById("panels") as HTMLElement;
+const drop = document.getElementById("drop") as HTMLElement;
+const note = el("div", { class: "note", role: "alert", hidden: true });
+const help = el("dialog", { "aria-label": "Keys" });
+
+let state: State | null = null;
+let local: Problem | null = null;  // said by a request, not by work
+let wasDiagnosing = "";
+let shownAt = -1;
+
+function complain(error: Error): void {
+  local = { during: "", what: error.message, findings: [] };
+  render();
+}
+
+function run(what: string, more: Record<string, unknown> = {}): void {
+  local = null;
+  if (what === "complain") return complain(new Error(String(more["what"])));
+  // A search for what is missing gives way to what the user wants.
+  const searching = state?.work?.what.startsWith("Looking") && what !== "cancel" && what !== "diagnose";
+  (searching ? act("cancel").then(() => act(what, more)) : act(what, more)).catch(complain);
+}
+
+const good = new Good(), where = new Where();
+const missing = new Missing((effect) => run("add", { effect }), () => run("diagnose"));
+const add = new Add(run);
+
+function header(s: State): void {
+  fill(top_,
+    el("h1", {}, "Flexspline"), el("p", { class: "about clip" }, el("strong", {}, s.model_name || s.model_file), el("span", { class: "soft" }, ` on ${s.data_name}: ${s.experiments.length} experiments, ${s.experiments.filter((e) => e.role === "holdout").length} held out`)),
+    s.work ? el("div", { class: "work", role: "status", "data-work": s.work.what }, el("span", { class: "busy" }), el("span", { class: "clip" }, `${words(s.work.what)}${s.work.stage ? `: ${words(s.work.stage)}` : ""}`), button("Cancel", () => run("cancel"))) : null,
+    s.warnings.length ? button(`${s.warnings.length} warning${s.warnings.length > 1 ? "s" : ""}`, () => tell("Warnings", s.warnings), { class: "quiet" }) : null,
+    el("label", { class: "file" }, "Add files", filePicker()), button("Light or dark", toggleTheme, { class: "quiet", title: "Light or dark" }), button("Keys", () => help.showModal(), { class: "quiet", title: "?" }));
+}
+
+const picker = el("input", { type: "file", multiple: true, accept: ".csv,.mat", class: "unseen", "aria-label": "Add files", "data-key": "files" });
+picker.addEventListener("change", () => { void send(Array.from(picker.files ?? [])); picker.value = ""; });
+function filePicker(): HTMLElement { return picker; }
+
+function tell(title: string, lines: string[]): void {
+  const dialog = el("dialog", { "aria-label": title });
+  dialog.append(el("h2", {}, title), el("ul", {}, lines.map((l) => el("li", {}, l))), button("Close", () => dialog.close()));
+  dialog.addEventListener("close", () => dialog.remove());
+  document.body.append(dialog);
+  dialog.showModal();
+}
+
+function problem(p: Problem | null): void {
+  note.hidden = !p;
+  if (!p) return fill(note);
+  const place = (f: Problem["findings"][number]) => f.file + (f.line ? `:${f.line}` : "") + (f.column ? `, column ${f.column}` : "");
+  fill(note, el("div", { class: "row" }, el("strong", {}, p.during ? `${words(p.during)}: ${p.what}` : p.what), button("Dismiss", () => { local = null; run("dismiss"); })),
+    p.findings.length ? el("ul", {}, p.findings.slice(0, 8).map((f) => el("li", {}, f.file ? el("code", {}, place(f)) : null, f.file ? " " : "", `${f.what}. `, el("em", {}, f.remedy)))) : null);
+}
+
+function render(): void {
+  const s = state;
+  if (!s) return;
+  header(s);
+  problem(local ?? s.problem ?? null);
+  if (shownAt !== s.at) announce(`step ${s.at + 1} of ${s.steps.length}`);
+  shownAt = s.at;
+  good.render(s);
+  where.render(s);
+  missing.render(s);
+  add.render(s);
+  document.body.dataset.ready = "yes";
+  document.body.dataset.step = String(s.at);
+}
+
+// What is missing is looked for by itself, once for each step.
+function lookByItself(s: State): void {
+  const key = `${s.at} ${s.steps.length} ${s.steps[s.at]?.what ?? ""}`;
+  if (s.diagnosis || s.work || wasDiagnosing === key) return;
+  wasDiagnosing = key;
+  run("diagnose");
+}
+
+async function follow(): Promise<void> {
+  for (let seen = 0; ;) {
+    try {
+      const next = await get<State>("state", { seen });
+      document.body.classList.remove("lost");
+      if (next.changes === seen) continue;
+      state = next;
+      seen = next.changes;
+      render();
+      lookByItself(state);
+    } catch (error) {
+      if (error instanceof Refusal && error.status === 404) return location.reload();
+      document.body.classList.add("lost");
+      local = { during: "", what: "The workbench does not answer. Was it ended? This page goes on where it was when it answers again.", findings: [] };
+      problem(local);
+      await new Promise((later) => setTimeout(later, 1500));
+      local = null;
+    }
+  }
+}
+
+async function send(files: File[]): Promise<void> {
+  local = null;
+  if (!files.length) return;
+  try {
+    if (state?.work?.what.startsWith("Looking")) await act("cancel");
+    await sendFiles(files);
+  } catch (error) {
+    complain(error as Error);
+  }
+}
+
+function theme(dark: boolean): void {
+  document.documentElement.dataset.theme = dark ? "dark" : "light";
+  redrawAll();
+}
+function toggleTheme(): void {
+  const dark = document.documentElement.dataset.theme !== "dark";
+  localStorage.setItem("theme", dark ? "dark" : "light");
+  theme(dark);
+}
+
+function keys(): void {
+  fill(help, el("h2", {}, "Keys"), el("dl", {}, [["1 2 3 4", "to the four questions"], ["Tab, arrows", "through experiments, maps, candidates"], ["in curves: ← →  + −  0", "pan, zoom, show all; wheel and drag zoom, Shift and drag pans"],
+    ["in a map: ← →", "mark a region; it shows in the curves; Esc clears it"], ["Ctrl+Z, Ctrl+Y", "undo, redo"], ["?", "this"]].map(([k, t]) => el("div", {}, el("dt", {}, k), el("dd", {}, t)))), button("Close", () => help.close()));
+  addEventListener("keydown", (e) => {
+    const typing = e.target instanceof HTMLInputElement || e.target instanceof HTMLSelectElement;
+    if ((e.ctrlKey || e.metaKey) && !typing) {
+      if (e.key === "z" && !e.shiftKey) { e.preventDefault(); run("undo"); }
+      if (e.key === "y" || (e.key === "Z" && e.shiftKey)) { e.preventDefault(); run("redo"); }
+      return;
+    }
+    if (typing || e.altKey) return;
+    if (e.key === "?") help.showModal();
+    const panel = panels.children[Number(e.key) - 1];
+    if (/^[1-4]$/.test(e.key) && panel) (panel.querySelector<HTMLElement>("[tabindex='0'], button:not(:disabled), [role=tab]") ?? (panel as HTMLElement)).focus();
+  });
+}
+
+function dropping(): void {
+  fill(drop, el("p", {}, "Drop recordings here: CSV or MAT"));
+  addEventListener("dragover", (e) => { e.preventDefault(); drop.hidden = false; });
+  addEventListener("dragleave", (e) => { if (!e.relatedTarget) drop.hidden = true; });
+  addEventListener("drop", (e) => { e.preventDefault(); drop.hidden = true; void send(Array.from(e.dataTransfer?.files ?? [])); });
+}
+
+async function begin(): Promise<void> {
+  const dark = matchMedia("(prefers-color-scheme: dark)");
+  const kept = localStorage.getItem("theme");
+  theme(kept ? kept === "dark" : dark.matches);
+  dark.addEventListener("change", () => { if (!localStorage.getItem("theme")) theme(dark.matches); });
+  top_.append(el("h1", {}, "Flexspline"), el("p", { class: "about" }, "Loading …"));
+  panels.append(good.element, where.element, missing.element, add.element);
+  document.body.append(help);
+  top_.after(note);
+  keys();
+  dropping();
+  onLook(() => { if (state) { good.render(state); where.render(state); add.render(state); } });
+  try {
+    await openTab();
+  } catch (error) {
+    fill(top_, el("h1", {}, "Flexspline"), el("p", { class: "about" }, (error as Error).message));
+    return;
+  }
+  await follow();
+}
+
+void begin();
+export { view };

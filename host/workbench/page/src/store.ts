@@ -1,0 +1,35 @@
+// What the page is looking at, shared by its panels.
+import type { Balance, Experiment, State } from "./api";
+
+export interface Brush { variable: string; low: number; high: number; unit: string; list: { experiment: string; rows: number; stretches: [number, number][] }[] }
+
+export const view = {
+  signal: "",       // a balance or a free run
+  experiment: "",
+  brush: null as Brush | null,
+};
+
+type Listener = () => void;
+const listeners = new Set<Listener>();
+export function onLook(listener: Listener): void { listeners.add(listener); }
+export function looked(): void { for (const listener of listeners) listener(); }
+
+// On motions that the fit never saw, where there are any.
+export function errorOf(b: Balance): number | null { return b.holdout ?? b.fit; }
+export function floorOf(b: Balance): number | null { return b.holdout === null ? b.noise_floor_fit : b.noise_floor_holdout; }
+export function excessOf(b: Balance | undefined): number | null {
+  if (!b) return null;
+  const error = errorOf(b), floor = floorOf(b);
+  return error !== null && floor ? error / floor : null;
+}
+export function worstBalance(balances: Balance[]): Balance | undefined {
+  return [...balances].sort((a, b) => (excessOf(b) ?? 0) - (excessOf(a) ?? 0))[0];
+}
+// The balance that the present look is about; free runs have none of their own.
+export function balanceInView(state: State): Balance | undefined {
+  return state.balances.find((b) => b.signal === view.signal) ?? worstBalance(state.balances);
+}
+export function badness(e: Experiment, signal: string): number {
+  const s = e.signals.find((x) => x.signal === signal);
+  return s ? s.excess ?? s.nrmse ?? -1 : -2;
+}

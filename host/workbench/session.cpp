@@ -1,0 +1,214 @@
+#include "host/workbench/session.hpp"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <nlohmann/json.hpp>
+
+#include "host/output/diagnosis.hpp"
+#include "host/output/json.hpp"
+
+namespace flexspline::workbench {
+namespace {
+
+using nlohmann::json;
+using output::json_number;
+
+json diagnosis_json(const diagnosis::Diagnosis& found) {
+  json answer = output::diagnosis_json(found);
+  answer["verdict_in_words"] = output::verdict_in_words(found);
+  for (json& candidate : answer["candidates"]) {
+    const catalogue::Entry* entry = catalogue::find(candidate["effect"].get<std::string>());
+    candidate["equation"] = entry ? json(entry->info->equation) : json(nullptr);
+  }
+  return answer;
+}
+
+json step_json(const Step& step) {
+  return {{"action", step.action},
+          {"what", step.what},
+          {"balances", (*step.errors)["balances"]},
+          {"effects", [&] {
+             json ids = json::array();
+             for (const model::Effect& e : step.model.effects) ids.push_back(e.id);
+             return ids;
+           }()}};
+}
+
+}  // namespace
+
+json problem_json(const std::string& during, const std::exception_ptr& error) {
+  json findings = json::array();
+  std::string what = "something unexpected went wrong";
+  try {
+    std::rethrow_exception(error);
+  } catch (const data::DataError& unusable) {
+    for (const data::Finding& f : unusable.findings())
+      if (f.severity == data::Severity::error)
+        findings.push_back({{"file", std::filesystem::path(f.file).filename().string()},
+                            {"line", f.line},
+                            {"column", f.column},
+                            {"what", f.what},
+                            {"remedy", f.remedy}});
+    what = findings.size() == 1 ? "the data cannot be used"
+                                : fmt::format("{} things make the data unusable", findings.size());
+  } catch (const std::exception& e) {
+    what = e.what();
+  } catch (...) {
+  }
+  return {{"during", during}, {"what", what}, {"findings", std::move(findings)}};
+}
+
+Step::Step() = default;
+Step::~Step() = default;
+
+std::shared_ptr<Look> Step::look() const {
+  const std::lock_guard lock(mutex_);
+  if (!look_) look_ = std::make_shared<Look>(dataset, model, pipeline, estimates);
+  return look_;
+}
+void Step::forget_look() const {
+  const std::lock_guard lock(mutex_);
+  look_.reset();
+}
+
+std::shared_ptr<const diagnosis::Diagnosis> Step::diagnosed() const {
+  const std::lock_guard lock(mutex_);
+  return diagnosis_;
+}
+void Step::found(diagnosis::Diagnosis diagnosis) {
+  const std::lock_guard lock(mutex_);
+  diagnosis_ = std::make_shared<const diagnosis::Diagnosis>(std::move(diagnosis));
+}
+
+Session::Session(std::string id, std::shared_ptr<Step> first)
+    : id_(std::move(id)), history_(std::move(first)), parts_(std::make_unique<json>(json::object())) {}
+
+Session::~Session() {
+  cancel();
+  for (const auto& work : ended_)
+    if (work->thread.joinable()) work->thread.join();
+}
+
+void Session::changed() {
+  ++changes_;
+  told_.notify_all();
+}
+
+History<std::shared_ptr<Step>> Session::history() const {
+  const std::lock_guard lock(mutex_);
+  return history_;
+}
+
+void Session::change(const std::function<void(History<std::shared_ptr<Step>>&)>& change) {
+  const std::lock_guard lock(mutex_);
+  change(history_);
+  // The one before stands beside the present one; others are seldom looked at.
+  for (std::size_t k = 0; k < history_.size(); ++k)
+    if (k > history_.at() || k + 1 < history_.at()) history_[k]->forget_look();
+  parts_->erase("pack");
+  parts_->erase("problem");
+  changed();
+}
+
+void Session::set(const std::string& part, json value) {
+  const std::lock_guard lock(mutex_);
+  if (value.is_null())
+    parts_->erase(part);
+  else
+    (*parts_)[part] = std::move(value);
+  changed();
+}
+
+void Session::set_problem(const std::string& during, const std::exception_ptr& error) {
+  set("problem", problem_json(during, error));
+}
+
+void Session::start(const std::string& what, std::function<void(const Progress&)> run) {
+  const std::lock_guard lock(mutex_);
+  if (work_) throw BusyError(fmt::format("{} is still running; wait, or cancel it", work_->what));
+  std::erase_if(ended_, [](const std::shared_ptr<Work>& w) {
+    if (!w->done) return false;
+    w->thread.join();
+    return true;
+  });
+  auto work = std::make_shared<Work>();
+  work->what = what;
+  work->began = std::chrono::steady_clock::now();
+  work_ = work;
+  parts_->erase("problem");
+  changed();
+  work->thread = std::thread([this, work, run = std::move(run)] {
+    const Progress say = [&](std::string_view stage) {
+      const std::lock_guard inner(mutex_);
+      if (work->cancelled) throw Cancelled{};
+      work->stage = stage;
+      changed();
+    };
+    std::exception_ptr error;
+    try {
+      run(say);
+    } catch (const Cancelled&) {
+    } catch (...) {
+      error = std::current_exception();
+    }
+    const std::lock_guard inner(mutex_);
+    if (work_ == work) {
+      work_.reset();
+      ended_.push_back(work);
+      if (error) (*parts_)["problem"] = problem_json(work->what, error);
+    }
+    changed();
+    work->done = true;
+  });
+}
+
+void Session::cancel() {
+  const std::lock_guard lock(mutex_);
+  if (!work_) return;
+  work_->cancelled = true;
+  ended_.push_back(std::move(work_));
+  work_.reset();
+  changed();
+}
+
+bool Session::works() const {
+  const std::lock_guard lock(mutex_);
+  return work_ != nullptr;
+}
+
+std::uint64_t Session::wait(std::uint64_t seen, std::chrono::milliseconds limit) const {
+  std::unique_lock lock(mutex_);
+  told_.wait_for(lock, limit, [&] { return changes_ > seen; });
+  return changes_;
+}
+
+json Session::state() const {
+  const std::lock_guard lock(mutex_);
+  const Step& now = *history_.current();
+  json steps = json::array();
+  for (std::size_t k = 0; k < history_.size(); ++k) steps.push_back(step_json(*history_[k]));
+  const auto found = now.diagnosed();
+  json answer = *now.errors;
+  json warnings = answer["warnings"];
+  for (const data::Finding& f : now.dataset->findings)
+    if (f.severity == data::Severity::warning) warnings.push_back(f.text());
+  for (const std::string& w : now.warnings) warnings.push_back(w);
+  answer["warnings"] = std::move(warnings);
+  answer["changes"] = changes_;
+  answer["model_name"] = now.model.name;
+  answer["steps"] = std::move(steps);
+  answer["at"] = history_.at();
+  answer["parameters"] = now.look()->parameters();
+  answer["diagnosis"] = found ? diagnosis_json(*found) : json(nullptr);
+  answer["work"] = nullptr;
+  if (work_)
+    answer["work"] = {
+        {"what", work_->what},
+        {"stage", work_->stage},
+        {"seconds", std::chrono::duration<double>(std::chrono::steady_clock::now() - work_->began).count()}};
+  for (const auto& [part, value] : parts_->items()) answer[part] = value;
+  return answer;
+}
+
+}  // namespace flexspline::workbench

@@ -1,0 +1,112 @@
+// What one tab of the browser works on: the history of its model, the work that runs for it. A reload finds it again.
+#pragma once
+
+#include <atomic>
+#include <condition_variable>
+#include <functional>
+#include <memory>
+#include <mutex>
+#include <nlohmann/json_fwd.hpp>
+#include <optional>
+#include <string>
+#include <thread>
+#include <vector>
+
+#include "host/diagnosis/diagnosis.hpp"
+#include "host/workbench/history.hpp"
+#include "host/workbench/look.hpp"
+
+namespace flexspline::workbench {
+
+// A model with its data. All but what is found later is fixed once it is made.
+struct Step {
+  std::string action;  // "open", "identify", "add", "remove", "data"
+  std::string what;    // "stribeck_gaussian", "two more files"
+  std::shared_ptr<const data::Dataset> dataset;
+  model::Model model;      // with values
+  std::string model_text;  // of its file, comments of the user's file in it
+  std::vector<regression::Estimate> estimates;
+  std::vector<std::string> warnings;
+  regression::PipelineOptions pipeline;
+  std::unique_ptr<const nlohmann::json> errors;  // Look::errors()
+
+  Step();
+  ~Step();
+  // A look takes much memory: it is made again where it was forgotten.
+  std::shared_ptr<Look> look() const;
+  void forget_look() const;
+  // Found once for all tabs that have this step.
+  std::shared_ptr<const diagnosis::Diagnosis> diagnosed() const;
+  void found(diagnosis::Diagnosis diagnosis);
+
+ private:
+  mutable std::mutex mutex_;
+  mutable std::shared_ptr<Look> look_;
+  std::shared_ptr<const diagnosis::Diagnosis> diagnosis_;
+};
+
+// Thrown out of work that was cancelled; nobody is told.
+struct Cancelled {};
+
+// What work says of itself; every call may throw Cancelled.
+using Progress = std::function<void(std::string_view)>;
+
+// Asked for while something else runs.
+class BusyError : public std::runtime_error {
+ public:
+  using std::runtime_error::runtime_error;
+};
+
+class Session {
+ public:
+  Session(std::string id, std::shared_ptr<Step> first);
+  ~Session();
+  Session(const Session&) = delete;
+  Session& operator=(const Session&) = delete;
+
+  const std::string& id() const { return id_; }
+
+  // Of the history; `change` is told to those who wait.
+  History<std::shared_ptr<Step>> history() const;
+  void change(const std::function<void(History<std::shared_ptr<Step>>&)>& change);
+
+  // Runs `work` beside the server. What it throws becomes the session's problem. Throws BusyError while other work
+  // runs.
+  void start(const std::string& what, std::function<void(const Progress&)> work);
+  // Work that cannot stop at once goes on unseen; what it makes is thrown away by its next word to Progress.
+  void cancel();
+  bool works() const;
+
+  // A part of the answer that changes with work: "pack", "flash", "saved". Null takes it away.
+  void set(const std::string& part, nlohmann::json value);
+  void set_problem(const std::string& during, const std::exception_ptr& error);
+
+  // Number of changes so far. Waits until there are more than `seen`, at most so long.
+  std::uint64_t wait(std::uint64_t seen, std::chrono::milliseconds limit) const;
+  // All that the page shows beside curves and maps; README.md says what is in it.
+  nlohmann::json state() const;
+
+ private:
+  struct Work {
+    std::string what, stage;
+    std::atomic<bool> cancelled{false};
+    std::chrono::steady_clock::time_point began;
+    std::thread thread;
+    std::atomic<bool> done{false};
+  };
+  void changed();
+
+  const std::string id_;
+  mutable std::mutex mutex_;
+  mutable std::condition_variable told_;
+  std::uint64_t changes_ = 1;
+  History<std::shared_ptr<Step>> history_;
+  std::shared_ptr<Work> work_;                // running; else null
+  std::vector<std::shared_ptr<Work>> ended_;  // with threads still to be joined
+  std::unique_ptr<nlohmann::json> parts_;
+};
+
+// {"what", "findings": [{"file", "line", "column", "what", "remedy"}]} of an error.
+nlohmann::json problem_json(const std::string& during, const std::exception_ptr& error);
+
+}  // namespace flexspline::workbench

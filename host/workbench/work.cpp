@@ -1,0 +1,155 @@
+#include "host/workbench/work.hpp"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cmath>
+#include <nlohmann/json.hpp>
+
+#include "host/catalogue/defined.hpp"
+#include "host/comparison/compare.hpp"
+#include "host/diagnosis/add.hpp"
+#include "host/output/json.hpp"
+#include "host/report/page.hpp"
+
+namespace flexspline::workbench {
+namespace {
+
+using nlohmann::json;
+
+// What only the data set knows of the drive stays there: the file keeps what its author wrote.
+std::string rewritten(const std::string& text, const model::Model& changed) {
+  const model::ModelFile file = model::parse(text, "the model", catalogue::known_effects());
+  model::Model stored = changed;
+  stored.drive = file.model.drive;
+  return model::rewrite(file, stored);
+}
+
+std::shared_ptr<Step> made(std::string action, std::string what, std::shared_ptr<const data::Dataset> dataset,
+                           const model::Model& model, const std::string& text_before,
+                           std::vector<regression::Estimate> estimates, std::vector<std::string> warnings,
+                           const regression::PipelineOptions& pipeline, const Progress& say) {
+  say("comparing with the measurement");
+  auto step = std::make_shared<Step>();
+  step->action = std::move(action);
+  step->what = std::move(what);
+  step->dataset = std::move(dataset);
+  step->model = model;
+  step->model_text = rewritten(text_before, model);
+  step->estimates = std::move(estimates);
+  step->warnings = std::move(warnings);
+  step->pipeline = pipeline;
+  step->errors = std::make_unique<const json>(step->look()->errors());
+  say("");  // a last chance to cancel
+  return step;
+}
+
+bool has_values(const model::Model& model) {
+  return std::all_of(model.effects.begin(), model.effects.end(),
+                     [](const model::Effect& e) { return catalogue::missing_values(e).empty(); });
+}
+
+std::shared_ptr<Step> identified(std::string action, std::string what, std::shared_ptr<const data::Dataset> dataset,
+                                 const model::Model& model, const std::string& text,
+                                 const regression::PipelineOptions& pipeline, const Progress& say) {
+  say("identifying the model");
+  const auto found = regression::identify(*dataset, model, pipeline);
+  return made(std::move(action), std::move(what), std::move(dataset), found->model, text, found->estimates,
+              found->warnings, pipeline, say);
+}
+
+std::shared_ptr<Step> of_change(std::string action, const std::string& what, const Step& before,
+                                const diagnosis::Addition& change, const regression::PipelineOptions& pipeline,
+                                const Progress& say) {
+  return made(std::move(action), what, before.dataset, change.model, before.model_text, change.estimates,
+              change.warnings, pipeline, say);
+}
+
+void require_same(const std::optional<double>& ours, const std::optional<double>& theirs, const char* name) {
+  if (ours && theirs && std::abs(*ours - *theirs) > 1e-3 * std::abs(*ours))
+    throw data::DataError(
+        {{data::Severity::error, "conflict", "", 0, "",
+          fmt::format("{} is {:g} in these files and {:g} in the data that are open", name, *theirs, *ours),
+          "drop measurements of the same drive"}});
+}
+
+}  // namespace
+
+std::shared_ptr<Step> open(std::shared_ptr<const data::Dataset> dataset, const model::ModelFile& file,
+                           const regression::PipelineOptions& pipeline, const Progress& say) {
+  if (!has_values(file.model)) return identified("open", "", dataset, file.model, file.text, pipeline, say);
+  return made("open", "", std::move(dataset), file.model, file.text, {}, {}, pipeline, say);
+}
+
+std::shared_ptr<Step> with_effect(const Step& before, const std::string& effect,
+                                  const regression::PipelineOptions& pipeline, const Progress& say) {
+  say(fmt::format("adding {} and refitting", effect));
+  return of_change("add", effect, before, diagnosis::add(*before.dataset, before.model, effect, pipeline), pipeline,
+                   say);
+}
+
+std::shared_ptr<Step> without_effect(const Step& before, const std::string& id,
+                                     const regression::PipelineOptions& pipeline, const Progress& say) {
+  say(fmt::format("taking {} out and refitting", id));
+  return of_change("remove", id, before, diagnosis::remove(*before.dataset, before.model, id, pipeline), pipeline, say);
+}
+
+std::shared_ptr<Step> refitted(const Step& before, const regression::PipelineOptions& pipeline, const Progress& say) {
+  return identified("identify", "", before.dataset, before.model, before.model_text, pipeline, say);
+}
+
+std::shared_ptr<Step> with_files(const Step& before, const std::filesystem::path& folder,
+                                 const regression::PipelineOptions& pipeline, const Progress& say) {
+  say("reading the files");
+  data::Dataset more = data::load({folder});
+  require_same(before.dataset->drive.gear_ratio, more.drive.gear_ratio, "gear_ratio");
+  require_same(before.dataset->drive.torque_constant_nm_a, more.drive.torque_constant_nm_a, "torque_constant_nm_a");
+  auto all = std::make_shared<data::Dataset>(*before.dataset);
+  std::string names;
+  for (data::Experiment& e : more.experiments) {
+    const std::string name = e.name;
+    const auto taken = [&] {
+      return std::any_of(all->experiments.begin(), all->experiments.end(),
+                         [&](const auto& x) { return x.name == e.name; });
+    };
+    for (int number = 2; taken(); ++number) e.name = fmt::format("{}-{}", name, number);
+    names += (names.empty() ? "" : ", ") + e.name;
+    all->experiments.push_back(std::move(e));
+  }
+  for (data::Finding& finding : more.findings) {
+    finding.file = std::filesystem::path(finding.file).filename().string();
+    all->findings.push_back(std::move(finding));
+  }
+  return identified("data", names, all, before.model, before.model_text, pipeline, say);
+}
+
+std::string model_file(const Step& step) {
+  return step.model_text;
+}
+
+std::string report_page(const Step& step, const Step* before, const std::string& data_name,
+                        const regression::PipelineOptions& pipeline) {
+  report::Subject subject;
+  subject.command = "workbench";
+  subject.data_name = data_name;
+  subject.model_name = step.model.name;
+  subject.dataset = step.dataset.get();
+  subject.model = step.model;
+  subject.pipeline = pipeline;
+  subject.estimates = step.estimates;
+  if (before && before->dataset == step.dataset) subject.before = before->model;
+  if (before && before->diagnosed() && step.action == "add") subject.rounds.push_back(*before->diagnosed());
+  if (const auto found = step.diagnosed()) subject.rounds.push_back(*found);
+  return report::page(report::document(subject));
+}
+
+json pack_json(const deployment::Packed& packed) {
+  return {{"bytes", packed.bytes.size()},
+          {"sha256", packed.sha256},
+          {"max_error_nm", output::json_number(packed.max_error_nm)},
+          {"max_error_share_of_rated", output::json_number(packed.max_error_share_of_rated)},
+          {"worst_balance", packed.worst_balance},
+          {"bounds", packed.proof.size()}};
+}
+
+}  // namespace flexspline::workbench

@@ -1,0 +1,124 @@
+// A firmware image: a header of 512 bytes, then what the processor runs. README.md has the layout. Whoever makes an
+// image, sends it, stores it or starts it reads it by these functions.
+#pragma once
+
+#include <array>
+#include <compare>
+#include <cstddef>
+#include <cstdint>
+#include <span>
+#include <string_view>
+
+#include "shared/model/encoding.hpp"
+
+namespace flexspline::boot {
+
+// As long as a Cortex-M wants its vectors aligned: they begin right behind it.
+inline constexpr std::size_t kHeaderBytes = 512;
+inline constexpr std::uint32_t kImageMagic = 0x4D495846;  // "FXIM"
+inline constexpr std::uint16_t kImageFormat = 1;
+inline constexpr std::size_t kBoardBytes = 16;  // its name, with at least one nought behind it
+inline constexpr std::size_t kSignatureBytes = 64;
+
+// As a drive tells its hosts.
+struct Version {
+  std::uint8_t major = 0;
+  std::uint8_t minor = 0;
+  constexpr auto operator<=>(const Version&) const = default;
+};
+
+struct ImageHeader {
+  std::uint32_t bytes = 0;  // behind the header
+  std::uint32_t crc = 0;    // CRC-32 of these
+  std::array<std::uint8_t, kBoardBytes> board{};
+  Version version{};
+  // Room: nothing signs or checks yet. Kind nought: none.
+  std::uint32_t signature_kind = 0;
+  std::array<std::uint8_t, kSignatureBytes> signature{};
+
+  constexpr std::size_t whole_bytes() const { return kHeaderBytes + bytes; }
+  std::string_view board_name() const {
+    std::size_t n = 0;
+    while (n < kBoardBytes && board[n] != 0) ++n;
+    return {reinterpret_cast<const char*>(board.data()), n};
+  }
+};
+
+enum class ImageFinding : std::uint8_t {
+  none,
+  no_image,        // it does not begin as one
+  unknown_format,  // of a newer tool
+  damaged_header,
+  incomplete,  // shorter than its header says
+  too_long,    // longer than that, or than the slot
+  damaged,     // the checksum is another one
+  wrong_board,
+};
+
+// What is cut off counts as none: a name is at most fifteen letters.
+constexpr std::array<std::uint8_t, kBoardBytes> board_bytes(std::string_view name) {
+  std::array<std::uint8_t, kBoardBytes> bytes{};
+  for (std::size_t i = 0; i + 1 < kBoardBytes && i < name.size(); ++i) bytes[i] = static_cast<std::uint8_t>(name[i]);
+  return bytes;
+}
+
+constexpr void write_header(std::span<std::uint8_t, kHeaderBytes> room, const ImageHeader& header) {
+  for (std::uint8_t& byte : room) byte = 0;
+  model::Writer w(room);
+  w.put(kImageMagic);
+  w.put(kImageFormat);
+  w.put(static_cast<std::uint16_t>(kHeaderBytes));
+  w.put(header.bytes);
+  w.put(header.crc);
+  for (const std::uint8_t byte : header.board) w.put(byte);
+  w.put(header.version.major);
+  w.put(header.version.minor);
+  w.put(std::uint16_t{0});
+  w.put(header.signature_kind);
+  for (const std::uint8_t byte : header.signature) w.put(byte);
+  const std::uint32_t crc = model::crc32(room.first(kHeaderBytes - 4));
+  model::Writer end(room.subspan(kHeaderBytes - 4));
+  end.put(crc);
+}
+
+// Reads the header alone: what stands behind it may be missing. `header` is that of an image where the finding is none.
+constexpr ImageFinding read_header(std::span<const std::uint8_t> bytes, ImageHeader& header) {
+  model::Reader r(bytes);
+  if (bytes.size() < 4 || r.take<std::uint32_t>() != kImageMagic) return ImageFinding::no_image;
+  if (bytes.size() < kHeaderBytes) return ImageFinding::incomplete;
+  model::Reader end(bytes.subspan(kHeaderBytes - 4, 4));
+  if (end.take<std::uint32_t>() != model::crc32(bytes.first(kHeaderBytes - 4))) return ImageFinding::damaged_header;
+  if (r.take<std::uint16_t>() != kImageFormat || r.take<std::uint16_t>() != kHeaderBytes)
+    return ImageFinding::unknown_format;
+  header.bytes = r.take<std::uint32_t>();
+  header.crc = r.take<std::uint32_t>();
+  for (std::uint8_t& byte : header.board) byte = r.take<std::uint8_t>();
+  header.version.major = r.take<std::uint8_t>();
+  header.version.minor = r.take<std::uint8_t>();
+  r.skip(2);
+  header.signature_kind = r.take<std::uint32_t>();
+  for (std::uint8_t& byte : header.signature) byte = r.take<std::uint8_t>();
+  // So that no sum of lengths runs over.
+  return header.bytes == 0 || header.bytes > 0x7FFFFFFF - kHeaderBytes ? ImageFinding::damaged_header
+                                                                       : ImageFinding::none;
+}
+
+// The same, and whether it is for this board and no longer than there is room.
+constexpr ImageFinding check_header(std::span<const std::uint8_t> bytes, std::string_view board, std::size_t room,
+                                    ImageHeader& header) {
+  const ImageFinding finding = read_header(bytes, header);
+  if (finding != ImageFinding::none) return finding;
+  if (header.board != board_bytes(board)) return ImageFinding::wrong_board;
+  return header.whole_bytes() > room ? ImageFinding::too_long : ImageFinding::none;
+}
+
+// A whole image, whatever its board, at the start of `bytes`; what follows it is not looked at.
+constexpr ImageFinding read_image(std::span<const std::uint8_t> bytes, ImageHeader& header) {
+  const ImageFinding finding = read_header(bytes, header);
+  if (finding != ImageFinding::none) return finding;
+  if (header.whole_bytes() > bytes.size()) return ImageFinding::incomplete;
+  return model::crc32(bytes.subspan(kHeaderBytes, header.bytes)) == header.crc ? ImageFinding::none
+                                                                               : ImageFinding::damaged;
+}
+
+}  // namespace flexspline::boot

@@ -1,0 +1,48 @@
+#include "tests/board/chip.hpp"
+
+namespace flexspline::tests {
+
+Chip::Chip(const std::filesystem::path& image, const WrittenFlash& written)
+    : machine(image), flash(machine, clock, written.sectors) {
+  machine.is_clocked = [this](std::uint32_t address) { return clock.gate(address); };
+  machine.attach(0x40023800, clock);
+  machine.attach(0x40023C00, flash);
+  const auto bytes = static_cast<std::uint32_t>(flash.bytes.size());
+  machine.attach_memory(written.address, bytes, flash.cells);
+  // The slot of a download, which the application looks at.
+  if (written.address + bytes <= 0x08020000) machine.map_erased(0x08020000, 0x20000);
+  machine.attach(0x40012000, converter);
+  machine.attach(0x40010000, tim1);
+  machine.attach(0x40000000, tim2);
+  machine.attach(0x40000400, tim3);
+  machine.attach(0x40000800, tim4);
+  machine.attach(0x40000C00, tim5);
+  machine.attach(0x40003000, watchdog);
+  machine.attach(0x40004400, usart2);
+  machine.attach(0x40004800, usart3);
+  machine.attach(0x40007000, power);
+  machine.attach(0x40007400, dac);
+  for (std::uint32_t i = 0; i < ports.size(); ++i) machine.attach(0x40020000 + 0x400 * i, ports[i]);
+  machine.attach(0x50000000, otg, 0x5000);
+  for (std::uint32_t& input : converter.inputs) input = 2048;
+}
+
+Stop Chip::tick() {
+  constexpr std::uint32_t kConverterInterrupt = 16 + 18;
+  if (senses) senses();
+  usart2.pass();
+  usart3.pass();
+  watchdog.pass(50e-6);
+  if (machine.ticks_itself()) {
+    const Stop stop = machine.interrupt(15);
+    if (stop != Stop::waits) return stop;
+  }
+  if (tim1.triggers() && !converter_is_dead && converter.trigger() && machine.interrupt_is_enabled(18)) {
+    const Stop stop = machine.interrupt(kConverterInterrupt);
+    if (stop != Stop::waits) return stop;
+  }
+  if (acts) acts();
+  return machine.run();
+}
+
+}  // namespace flexspline::tests

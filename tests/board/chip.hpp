@@ -1,0 +1,51 @@
+// A board around the emulated processor: its peripherals, and time, which passes in ticks of the drive and nowhere
+// else.
+#pragma once
+
+#include <filesystem>
+
+#include "tests/board/chip_models.hpp"
+#include "tests/board/machine.hpp"
+#include "tests/board/otg_model.hpp"
+
+namespace flexspline::tests {
+
+// What of the flash memory the image writes.
+struct WrittenFlash {
+  std::uint32_t address = 0x08004000;
+  std::vector<FlashSector> sectors{{1, 0, 0x4000}, {2, 0x4000, 0x4000}};
+};
+
+class Chip {
+ public:
+  explicit Chip(const std::filesystem::path& image, const WrittenFlash& written = {});
+
+  // Start-up and the first turn of the main loop.
+  Stop start() { return machine.run(); }
+  // 50 us: TIM1 triggers the converter, its end interrupts, the main loop turns once.
+  Stop tick();
+  Stop ticks(int n) {
+    Stop stop = Stop::waits;
+    for (int i = 0; i < n && stop == Stop::waits; ++i) stop = tick();
+    return stop;
+  }
+  // What the drive's share of full scale would be of the DAC, where it is enabled.
+  double command() const { return dac.at(0x08) / 2048.0 - 1.0; }
+
+  Machine machine;
+  ClockModel clock{machine};
+  FlashModel flash;
+  ConverterModel converter;
+  AdvancedTimerModel tim1{machine};
+  EncoderModel tim2, tim3{0xFFFF}, tim4{0xFFFF}, tim5;
+  Registers dac, power;
+  WatchdogModel watchdog{machine};
+  LineModel usart2, usart3;
+  std::array<PortModel, 8> ports;
+  OtgModel otg{machine};
+  bool converter_is_dead = false;
+  // What the world does before a tick, and what comes of it.
+  std::function<void()> senses, acts;
+};
+
+}  // namespace flexspline::tests

@@ -1,0 +1,134 @@
+// The real image on its register model, wired to a simulated drive: converter, encoders and amplifier. The host is on
+// the bus.
+#pragma once
+
+#include <algorithm>
+#include <cmath>
+#include <cstdint>
+#include <memory>
+#include <random>
+#include <string>
+
+#include "hil/board/drive_rig.hpp"
+#include "hil/board/drive_setup.hpp"
+#include "hil/twin/factory_block.hpp"
+#include "shared/storage/parameter_store.hpp"
+#include "tests/board/usb_bus.hpp"
+
+namespace flexspline::tests {
+
+inline const plant::Drive& demo() {
+  static const plant::Drive drive = plant::demo_plant().drive;
+  return drive;
+}
+
+// The parameter sectors of a chip, for a test that fills them before it is switched on.
+class CellsPort {
+ public:
+  static constexpr std::size_t kSectorBytes = 0x4000;
+  explicit CellsPort(FlashModel& flash) : flash_(flash) {}
+  bool erase(std::size_t) { return true; }
+  bool program(std::size_t sector, std::size_t word, std::uint32_t value) {
+    for (std::size_t i = 0; i < 4; ++i)
+      flash_.bytes[sector * kSectorBytes + 4 * word + i] = static_cast<std::uint8_t>(value >> (8 * i));
+    return true;
+  }
+  std::span<const std::uint8_t> bytes(std::size_t sector) const {
+    return std::span<const std::uint8_t>(flash_.bytes).subspan(sector * kSectorBytes, kSectorBytes);
+  }
+
+ private:
+  FlashModel& flash_;
+};
+
+class DriveBench {
+ public:
+  // `image`: dac or pwm. An empty flash memory without `parameters`.
+  explicit DriveBench(const std::string& variant, bool parameters = true)
+      : chip(std::string(FLEXSPLINE_BOARDS) + "/stm32f405/f405-" + variant + ".elf"), is_bridge_(variant == "pwm") {
+    if (parameters) store(twin::factory_block(demo()));
+    chip.senses = [this] { sense(); };
+    chip.acts = [this] { act(); };
+  }
+  void store(const std::vector<std::uint8_t>& block) {
+    CellsPort port(chip.flash);
+    storage::ParameterStore<CellsPort> into(port);
+    const auto good = [](std::span<const std::uint8_t>) { return 0U; };
+    std::uint32_t reason = 0;
+    into.boot(good);
+    EXPECT_EQ(into.begin(block.size(), model::crc32(block)), storage::StoreError::none);
+    EXPECT_EQ(into.write(0, block), storage::StoreError::none);
+    EXPECT_EQ(into.commit(good, reason), storage::StoreError::none);
+  }
+  // Started, enumerated, identified, and idle.
+  void come_up() {
+    ASSERT_EQ(chip.start(), Stop::waits) << chip.machine.where();
+    ASSERT_TRUE(bus.enumerate());
+    chip.ticks(100);
+    ASSERT_EQ(bus.code(protocol::Kind::identify, protocol::Hello{}), protocol::Code::done);
+    ASSERT_EQ(bus.status().mode, protocol::Mode::idle);
+  }
+  protocol::CommandAnswer command(const protocol::Command& c) {
+    protocol::CommandAnswer answer;
+    EXPECT_EQ(protocol::take_payload(bus.ask(protocol::Kind::command, c).content(), answer), protocol::Code::done);
+    return answer;
+  }
+  // With a host that says each two milliseconds that it is there.
+  void run_with_host(double seconds) {
+    for (int left = static_cast<int>(std::lround(seconds * 20'000)); left > 0; left -= 40) {
+      command({.kind = protocol::CommandKind::heartbeat});
+      chip.ticks(std::min(left, 40));
+    }
+  }
+  static std::int32_t per_unit(double value, double base) {
+    return static_cast<std::int32_t>(std::lround(std::ldexp(value / base, 27)));
+  }
+  bool enabled() const { return is_bridge_ ? chip.tim1.outputs_on() && chip.ports[2].high(6) : chip.ports[2].high(6); }
+
+  Chip chip;
+  UsbBus bus{chip};
+  board::DriveRig rig{{.drive = demo(), .seed = 3}};
+  bool wired = true;      // to the simulated drive; else the test sets the inputs
+  double bridge_a = 0.0;  // what flows out of the bridge
+
+ private:
+  // A converter of 12 bits with noise of its own, as real ones have.
+  std::uint32_t converted(double share) {
+    const double raw = (share + 1.0) * 2047.5 + noise_(random_);
+    return static_cast<std::uint32_t>(std::clamp(std::lround(raw), 0L, 4095L));
+  }
+  void sense() {
+    if (!wired) return;
+    const firmware::Readings r = rig.sense();
+    chip.converter.inputs[10] = converted(r.current / 32768.0);
+    chip.converter.inputs[11] = converted(r.torque / 32768.0);
+    chip.converter.inputs[12] = static_cast<std::uint32_t>(std::clamp(r.temperature / 8, 0, 4095));
+    chip.tim2.move_to(r.motor_counter);
+    chip.tim5.move_to(r.output_counter);
+  }
+  void act() {
+    if (!wired) return;
+    firmware::Actuation a;
+    a.enabled = enabled();
+    a.current = static_cast<std::int16_t>(std::clamp(std::lround(chip.command() * 32768.0), -32768L, 32767L));
+    if (is_bridge_) a = bridge(a.enabled);
+    rig.act(a);
+  }
+  // A winding of 0.5 ohm and 0.25 mH on 24 V.
+  firmware::Actuation bridge(bool enabled) {
+    constexpr double kTick = 50e-6;
+    if (!enabled) {
+      bridge_a = 0.0;
+      return {};
+    }
+    bridge_a += (24.0 * chip.tim1.duty() - 0.5 * bridge_a) / 0.25e-3 * kTick;
+    const double share = bridge_a / board::scales_of(demo()).amplifier_a;
+    return {static_cast<std::int16_t>(std::clamp(std::lround(share * 32768.0), -32768L, 32767L)), true};
+  }
+
+  bool is_bridge_;
+  std::mt19937 random_{7};
+  std::uniform_real_distribution<double> noise_{-1.5, 1.5};
+};
+
+}  // namespace flexspline::tests

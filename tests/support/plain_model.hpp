@@ -1,0 +1,16 @@
+#pragma once
+
+#include "host/catalogue/catalogue.hpp"
+#include "host/catalogue/constants.hpp"
+
+namespace flexspline::testing {
+
+// Inertia, viscous and Coulomb friction of a rotary axis, without values: what most axes are first described by.
+inline model::Model plain_model() {
+  model::Model m;
+  for (const char* name : {"inertia", "viscous_friction", "coulomb_friction"})
+    m.effects.push_back(catalogue::blank_effect(catalogue::get(name), data::Axis::rotary));
+  return m;
+}
+
+}  // namespace flexspline::testing

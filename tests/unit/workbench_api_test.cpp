@@ -1,0 +1,245 @@
+// host/workbench: what the page asks for, without a socket.
+#include "host/workbench/api.hpp"
+
+#include <gtest/gtest.h>
+
+#include <chrono>
+#include <filesystem>
+#include <fstream>
+#include <future>
+#include <nlohmann/json.hpp>
+
+#include "host/workbench/work.hpp"
+#include "tests/unit/comparison_test_drive.hpp"
+
+namespace flexspline::workbench {
+namespace {
+
+namespace fs = std::filesystem;
+using nlohmann::json;
+using plant::Mode;
+using plant::Waveform;
+
+// Small data of the twin, and a folder to save into that is gone afterwards.
+class WorkbenchApi : public ::testing::Test {
+ protected:
+  static std::shared_ptr<Step> first() {
+    static const std::shared_ptr<Step> step = [] {
+      const plant::Drive drive = plant::demo_plant().drive;
+      auto dataset = std::make_shared<data::Dataset>(
+          comparison::record(drive,
+                             {comparison::plan("free", Mode::velocity, Waveform::sine, 60.0, 1.0, 3.0),
+                              comparison::plan("locked", Mode::current, Waveform::sine, 2.0, 0.5, 4.0, true)},
+                             1));
+      dataset->experiments[1].role = data::Role::holdout;
+      model::ModelFile file{comparison::known_model(drive), ""};
+      file.text = model::write(file.model);
+      return open(dataset, file, {}, [](std::string_view) {});
+    }();
+    return step;
+  }
+
+  WorkbenchApi() {
+    std::string name = (fs::temp_directory_path() / "flexspline-api-XXXXXX").string();
+    if (!mkdtemp(name.data())) throw std::runtime_error("no temporary folder");
+    folder_ = name;
+    struct Setup setup;
+    setup.first = first();
+    setup.data_name = "data";
+    setup.folder = folder_;
+    api_ = std::make_unique<Api>(std::move(setup));
+  }
+  ~WorkbenchApi() override {
+    api_.reset();
+    fs::remove_all(folder_);
+  }
+
+  json ask(const std::string& method, const std::string& path, std::map<std::string, std::string> query = {},
+           const json& body = nullptr, int status = 200) {
+    const Answer answer = api_->answer({method, path, std::move(query), body.is_null() ? "" : body.dump(), {}});
+    EXPECT_EQ(answer.status, status) << path << ": " << answer.body;
+    return json::parse(answer.body);
+  }
+  std::string new_tab() { return ask("POST", "/api/tab")["tab"].get<std::string>(); }
+  json act(const std::string& tab, const json& what, int status = 200) {
+    return ask("POST", "/api/do", {{"tab", tab}}, what, status);
+  }
+  // The state once no work runs any more.
+  json settled(const std::string& tab) {
+    for (std::uint64_t seen = 0;;) {
+      json state = ask("GET", "/api/state", {{"tab", tab}, {"seen", std::to_string(seen)}});
+      if (state.contains("work") && state["work"].is_null()) return state;
+      seen = state["changes"].get<std::uint64_t>();
+    }
+  }
+
+  fs::path folder_;
+  std::unique_ptr<Api> api_;
+};
+
+TEST_F(WorkbenchApi, SaysHowGoodTheModelIsByExperiment) {
+  const json state = settled(new_tab());
+  ASSERT_EQ(state["experiments"].size(), 2u);
+  EXPECT_EQ(state["experiments"][1]["role"], "holdout");
+  EXPECT_EQ(state["steps"].size(), 1u);
+  const json& motor = state["experiments"][0]["signals"][0];
+  EXPECT_EQ(motor["signal"], "motor_balance");
+  // The model is the twin's truth: what is left is noise.
+  EXPECT_LT(motor["excess"].get<double>(), 1.6);
+  EXPECT_EQ(state["experiments"][0]["signals"][0]["free_run"], false);
+}
+
+TEST_F(WorkbenchApi, GivesCurvesAndWhereTheRowsOfARegionLieInTime) {
+  const std::string tab = new_tab();
+  const json trace = ask("GET", "/api/trace",
+                         {{"tab", tab},
+                          {"experiment", "free"},
+                          {"signal", "motor_balance"},
+                          {"from", "1"},
+                          {"to", "2"},
+                          {"points", "200"}});
+  EXPECT_GT(trace["measured"]["count"].get<int>(), 150);
+  EXPECT_EQ(trace["measured"]["count"], trace["residual"]["count"]);
+  const json velocity = ask("GET", "/api/trace",
+                            {{"tab", tab},
+                             {"experiment", "free"},
+                             {"signal", "motor_velocity"},
+                             {"from", "0"},
+                             {"to", "3"},
+                             {"points", "200"}});
+  EXPECT_EQ(velocity["unit"], "rad/s");
+  // Above 50 of a sine of 60 rad/s at 1 Hz: once around each crest.
+  const json fast =
+      ask("GET", "/api/stretches",
+          {{"tab", tab}, {"signal", "motor_balance"}, {"variable", "velocity"}, {"low", "50"}, {"high", "1000"}});
+  ASSERT_EQ(fast.size(), 1u);
+  EXPECT_EQ(fast[0]["experiment"], "free");
+  EXPECT_GE(fast[0]["stretches"].size(), 2u);
+  EXPECT_LE(fast[0]["stretches"].size(), 4u);
+  EXPECT_FALSE(ask("GET", "/api/maps", {{"tab", tab}})["maps"].empty());
+}
+
+TEST_F(WorkbenchApi, AnswersWhatCannotBeWithWordsNotWithAnEnd) {
+  const std::string tab = new_tab();
+  ask("GET", "/api/state", {{"tab", "no-such-tab"}, {"seen", "0"}}, nullptr, 404);
+  ask("GET", "/api/state", {{"seen", "0"}}, nullptr, 400);
+  ask("GET", "/../../etc/passwd", {{"tab", tab}}, nullptr, 404);
+  ask("GET", "/api/maps", {{"tab", tab}, {"step", "99"}}, nullptr, 400);
+  ask("GET", "/api/maps", {{"tab", tab}, {"step", "-1"}}, nullptr, 400);
+  for (const char* points : {"x", "", "nan", "-5", "1e300"})
+    ask("GET", "/api/trace",
+        {{"tab", tab},
+         {"experiment", "free"},
+         {"signal", "motor_balance"},
+         {"from", "0"},
+         {"to", "1"},
+         {"points", points}},
+        nullptr, 400);
+  ask("GET", "/api/trace",
+      {{"tab", tab}, {"experiment", "none"}, {"signal", "x"}, {"from", "0"}, {"to", "1"}, {"points", "10"}}, nullptr,
+      400);
+  act(tab, {{"do", "format the disk"}}, 400);
+  act(tab, {{"do", 7}}, 400);
+  act(tab, json::array(), 400);
+  EXPECT_EQ(api_->answer({"POST", "/api/do", {{"tab", tab}}, "{", {}}).status, 400);
+  EXPECT_EQ(api_->answer({"DELETE", "/api/do", {{"tab", tab}}, "", {}}).status, 404);
+}
+
+TEST_F(WorkbenchApi, RemovesAnEffectTakesThatBackAndLeavesTheOtherTabAlone) {
+  const std::string tab = new_tab(), other = new_tab();
+  act(tab, {{"do", "remove"}, {"effect", "coulomb_friction"}});
+  json state = settled(tab);
+  ASSERT_FALSE(state.contains("problem")) << state["problem"];
+  ASSERT_EQ(state["steps"].size(), 2u);
+  EXPECT_EQ(state["at"], 1);
+  const auto fit = [](const json& step) { return step["balances"][0]["fit"].get<double>(); };
+  EXPECT_GT(fit(state["steps"][1]), 3.0 * fit(state["steps"][0]));
+  act(tab, {{"do", "undo"}});
+  EXPECT_EQ(settled(tab)["at"], 0);
+  act(tab, {{"do", "redo"}});
+  EXPECT_EQ(settled(tab)["at"], 1);
+  act(tab, {{"do", "go"}, {"step", 5}}, 400);
+  EXPECT_EQ(settled(other)["steps"].size(), 1u);
+  // A tab that was duplicated begins where the first one stands.
+  const std::string copy = ask("POST", "/api/tab", {{"like", tab}})["tab"].get<std::string>();
+  EXPECT_EQ(settled(copy)["steps"].size(), 2u);
+}
+
+TEST_F(WorkbenchApi, SaysWhyAnEffectCannotBeAdded) {
+  const std::string tab = new_tab();
+  act(tab, {{"do", "add"}, {"effect", "no_such_effect"}});
+  const json state = settled(tab);
+  ASSERT_TRUE(state.contains("problem"));
+  EXPECT_NE(state["problem"]["what"].get<std::string>().find("no_such_effect"), std::string::npos);
+  EXPECT_EQ(state["steps"].size(), 1u);
+}
+
+TEST_F(WorkbenchApi, SavesIntoItsFolderAloneAndReplacesOnlyWhenTold) {
+  const std::string tab = new_tab();
+  act(tab, {{"do", "save"}, {"what", "model"}, {"name", "mine.toml"}});
+  EXPECT_EQ(settled(tab)["saved"]["file"], (folder_ / "mine.toml").string());
+  const auto& known = catalogue::known_effects();
+  EXPECT_EQ(model::read(folder_ / "mine.toml", known).model.effects.size(), first()->model.effects.size());
+  act(tab, {{"do", "save"}, {"what", "model"}, {"name", "mine.toml"}}, 400);
+  act(tab, {{"do", "save"}, {"what", "model"}, {"name", "mine.toml"}, {"replace", true}});
+  settled(tab);
+  for (const char* name : {"../x.toml", "/tmp/x.toml", "x.sh", ".x.toml", "a/b.toml"})
+    act(tab, {{"do", "save"}, {"what", "model"}, {"name", name}}, 400);
+  act(tab, {{"do", "save"}, {"what", "passwd"}, {"name", "x.toml"}}, 400);
+  EXPECT_EQ(std::distance(fs::directory_iterator(folder_), fs::directory_iterator()), 1);
+}
+
+TEST_F(WorkbenchApi, SaysWhatIsWrongWithADroppedFile) {
+  const std::string tab = new_tab();
+  const auto drop = [&](const std::string& name, const std::string& content) {
+    return api_->answer({"POST", "/api/drop", {{"tab", tab}}, "", {{name, content}}}).status;
+  };
+  ASSERT_EQ(drop("bad.csv", "time_s,current_a,motor_position_rad\n0,1,2\n0.001,oops,2\n"), 200);
+  const json state = settled(tab);
+  ASSERT_TRUE(state.contains("problem"));
+  const json& finding = state["problem"]["findings"].at(0);
+  EXPECT_EQ(finding["file"], "bad.csv");
+  EXPECT_EQ(finding["line"], 3);
+  EXPECT_EQ(finding["column"], "current_a");
+  EXPECT_FALSE(finding["remedy"].get<std::string>().empty());
+  EXPECT_EQ(state["experiments"].size(), 2u);
+  EXPECT_EQ(drop("dataset.toml", "format = \"flexspline-dataset/1\"\n"), 400);
+  EXPECT_EQ(drop("../evil.csv", "time_s\n"), 400);
+  EXPECT_EQ(drop("run.sh", "#!/bin/sh\n"), 400);
+}
+
+TEST_F(WorkbenchApi, ADriveThatIsNotInReachIsNotOpened) {
+  const std::string tab = new_tab();
+  act(tab, {{"do", "connect"}, {"drive", "tcp:192.0.2.1:4711"}});
+  const json state = settled(tab);
+  ASSERT_TRUE(state.contains("problem"));
+  EXPECT_EQ(ask("GET", "/api/drive")["status"]["connected"], false);
+  act(tab, {{"do", "flash"}});
+  EXPECT_TRUE(settled(tab).contains("problem"));
+}
+
+TEST(WorkbenchSession, WorkThatIsCancelledChangesNothingAndIsNotInTheWay) {
+  Session session("tab", std::make_shared<Step>());
+  std::promise<void> go, began;
+  bool changed = false;
+  session.start("slow", [&](const Progress& say) {
+    began.set_value();
+    go.get_future().wait();
+    say("");  // throws: it was cancelled
+    changed = true;
+  });
+  began.get_future().wait();
+  EXPECT_TRUE(session.works());
+  EXPECT_THROW(session.start("second", [](const Progress&) {}), BusyError);
+  session.cancel();
+  EXPECT_FALSE(session.works());
+  std::promise<void> ran;
+  session.start("third", [&](const Progress&) { ran.set_value(); });
+  EXPECT_EQ(ran.get_future().wait_for(std::chrono::seconds(60)), std::future_status::ready);
+  go.set_value();
+  session.cancel();
+  EXPECT_FALSE(changed);
+}
+
+}  // namespace
+}  // namespace flexspline::workbench
