@@ -11,8 +11,8 @@
 namespace flexspline::diagnosis {
 namespace {
 
-// Of the first fall: what comes after that is a matter of how well the formula fits, unless the error still stands above
-// the noise (kAtFloor): beside a first effect that is huge, one that matters takes off little of it.
+// Of the first fall: what comes after that is a matter of how well the formula fits, unless the error still stands
+// above the noise (kAtFloor): beside a first effect that is huge, one that matters takes off little of it.
 constexpr double kWorthAdding = 0.003;
 
 // Fall of chi-square over rows, in units of the noise where that is known: comparable between balances.

@@ -59,6 +59,7 @@ Candidate report(const Trial& trial, const Search& search, data::Axis axis) {
         "slowly with speed (see power_law_friction), and no Stribeck friction.";
   else if (is_rising(trial))
     c.note = "Both amplitudes are negative: friction rises out of standstill, so that slow motion starts smoothly.";
+  if (!trial.note.empty()) c.note = trial.note;
   const std::size_t added = trial.judged.terms.size() - 1;
   const Term& term = trial.judged.terms[added];
   const std::vector<double> natural = catalogue::natural(*term.entry, term.values);
@@ -125,13 +126,14 @@ std::vector<Examined> examine(regression::Identification& base, const std::vecto
       result.warnings.push_back(std::move(warning));
     one.floor = comparison::pooled(comparison::noise_floors(data, one.search.base.terms, experiments, base.model.drive),
                                    data.records());
+    one.search.floor = one.floor.rmse;
     all.push_back(std::move(one));
   }
   std::vector<Search*> searches;
   for (Examined& one : all) searches.push_back(&one.search);
   for (Examined& one : all) {
     hear_other_balances(searches, one.search, one.trials);
-    doubt_orders(one.search, one.trials);
+    doubt_orders(searches, one.search, one.trials);
   }
   return all;
 }

@@ -5,9 +5,12 @@
 #include <Eigen/QR>
 #include <algorithm>
 #include <cmath>
+#include <map>
 
 #include "host/comparison/row_variables.hpp"
 #include "host/diagnosis/imitation.hpp"
+#include "host/diagnosis/other_balances.hpp"
+#include "host/regression/both_balances.hpp"
 
 namespace flexspline::diagnosis {
 namespace {
@@ -18,6 +21,9 @@ using effects::Kind;
 constexpr double kFirstControl = 0.63;
 constexpr int kControls = 24;
 constexpr double kBeats = 1.5;
+// Where nothing but noise is left, the likelihood tells orders, although a wrong one may explain most of it, too: twice
+// its logarithm by this much.
+constexpr double kSurer = 3.0 * kNamedScore;
 // Parts that all rows are cut into, in which a true order shows again and again.
 constexpr Eigen::Index kParts = 8;
 constexpr int kSeenIn = 5;
@@ -50,29 +56,92 @@ Eigen::MatrixXd waves(BalanceData& data, Terms terms, double order) {
   return columns;
 }
 
-// Weighted squares that an order takes off the base model's residual.
-double explained(Search& search, const Imitation& imitation, const Terms& terms, double order) {
-  const Eigen::MatrixXd own =
-      search.base.root_weights.asDiagonal() * imitation.own_part(waves(*search.data, terms, order));
-  const Eigen::VectorXd residual = search.base.root_weights.cwiseProduct(search.base.residual);
+// A balance on which the effect of a trial acts, and what its model could imitate there.
+struct Witness {
+  Search* search = nullptr;
+  const Imitation* imitation = nullptr;
+  const Judged* noise = nullptr;  // whose weights count
+};
+
+// Squares in units of the noise that an order takes off the residuals of all balances on which it acts, its own first.
+double explained(const std::vector<Witness>& witnesses, const Terms& terms, double order) {
+  std::vector<Eigen::MatrixXd> parts;
+  std::vector<Eigen::VectorXd> residuals;
+  Eigen::Index rows = 0;
+  for (const Witness& w : witnesses) {
+    Terms tried = terms;
+    regression::Term& added = tried.back();
+    added.values[order_place(*added.entry)] = order;
+    Eigen::MatrixXd columns;
+    if (parts.empty()) {
+      columns = waves(*w.search->data, terms, order);
+    } else {
+      std::vector<std::size_t> parameters;
+      for (std::size_t p = 0; p < added.values.size(); ++p)
+        if (added.free_linear(p) || added.free_shape(p)) {
+          parameters.push_back(p);
+          added.values[p] = 0.0;
+        }
+      columns = regression::reaching_columns(*w.search->data, tried, tried.size() - 1, parameters);
+    }
+    const Eigen::VectorXd weights = w.noise->root_weights / std::sqrt(std::max(1.0, w.noise->autocorrelation_time));
+    parts.push_back(weights.asDiagonal() * w.imitation->own_part(columns));
+    residuals.push_back(weights.cwiseProduct(w.search->base.residual));
+    rows += residuals.back().size();
+  }
+  Eigen::MatrixXd own(rows, parts.front().cols());
+  Eigen::VectorXd residual(rows);
+  for (std::size_t i = 0, at = 0; i < parts.size(); at += static_cast<std::size_t>(parts[i].rows()), ++i) {
+    own.middleRows(static_cast<Eigen::Index>(at), parts[i].rows()) = parts[i];
+    residual.segment(static_cast<Eigen::Index>(at), parts[i].rows()) = residuals[i];
+  }
+  // Parameters differ in size by their units.
+  for (auto column : own.colwise()) column /= std::max(column.norm(), 1e-300);
   Eigen::ColPivHouseholderQR<Eigen::MatrixXd> qr(own);
   qr.setThreshold(1e-7);
   const Eigen::VectorXd left = residual - own * qr.solve(residual);
   return residual.squaredNorm() - left.squaredNorm();
 }
 
-std::string doubt(Search& search, const Imitation& imitation, const Trial& trial) {
+// Whether the order is surer than any that no drive has, by the noise that is left with it.
+bool surer(std::vector<Witness> witnesses, const Trial& trial) {
+  Search& told = *witnesses.front().search;
+  if (!told.at_floor(trial.judged) || (witnesses.size() > 1 && !trial.at_floor_elsewhere)) return false;
+  const Imitation imitation(model_columns(*told.data, told.base.terms), trial.judged.root_weights);
+  witnesses.front() = {&told, &imitation, &trial.judged};
+  const double true_fall = explained(witnesses, trial.judged.terms, *trial.proposal.order);
+  for (int i = 0; i < kControls; ++i)
+    if (explained(witnesses, trial.judged.terms, kFirstControl + i) > true_fall - kSurer) return false;
+  return true;
+}
+
+// That an effect is there is certain where two balances say so; its order may then be taken for the common one, if none
+// of the others that were tried fits better.
+bool expected(const std::vector<Trial>& trials, const Trial& trial) {
+  const catalogue::Entry& entry = *trial.proposal.entry;
+  return trial.elsewhere > kNamedScore && *trial.proposal.order == entry.parameters[order_place(entry)].usual &&
+         std::none_of(trials.begin(), trials.end(), [&](const Trial& other) {
+           return other.proposal.entry == &entry && other.score() > trial.score();
+         });
+}
+
+std::string doubt(const std::vector<Witness>& witnesses, const Trial& trial) {
+  Search& search = *witnesses.front().search;
   const double order = *trial.proposal.order;
-  const double true_fall = explained(search, imitation, trial.judged.terms, order);
+  const double true_fall = explained(witnesses, trial.judged.terms, order);
+  double best_fall = 0.0, best_control = 0.0;
   for (int i = 0; i < kControls; ++i) {
     const double control = kFirstControl + i;
-    const double fall = explained(search, imitation, trial.judged.terms, control);
-    if (fall * kBeats > true_fall)
-      return fmt::format(
-          "order {:g} explains {:.0f} % of what this one does, and no drive has that: the data are too "
-          "short to tell orders",
-          control, 100.0 * fall / std::max(true_fall, 1e-300));
+    const double fall = explained(witnesses, trial.judged.terms, control);
+    if (fall <= best_fall) continue;
+    best_fall = fall;
+    best_control = control;
   }
+  if (best_fall * kBeats > true_fall && !surer(witnesses, trial))
+    return fmt::format(
+        "order {:g} explains {:.0f} % of what this one does, and no drive has that: the data are too "
+        "short to tell orders",
+        best_control, 100.0 * best_fall / std::max(true_fall, 1e-300));
   int seen = 0;
   double whole = 0.0, largest = 0.0;
   const Eigen::Index rows = search.base.residual.size();
@@ -95,15 +164,32 @@ std::string doubt(Search& search, const Imitation& imitation, const Trial& trial
 
 }  // namespace
 
-void doubt_orders(Search& search, std::vector<Trial>& trials) {
-  if (std::none_of(trials.begin(), trials.end(), [](const Trial& t) { return t.proposal.order && passes(t); })) return;
-  const Imitation imitation(model_columns(*search.data, search.base.terms), search.base.root_weights);
+void doubt_orders(const std::vector<Search*>& all, Search& told, std::vector<Trial>& trials) {
+  std::map<const Search*, Imitation> imitations;
+  const auto witness = [&](Search& search) {
+    auto at = imitations.find(&search);
+    if (at == imitations.end())
+      at = imitations
+               .emplace(&search, Imitation(model_columns(*search.data, search.base.terms), search.base.root_weights))
+               .first;
+    return Witness{&search, &at->second, &search.base};
+  };
   for (Trial& t : trials) {
     if (!t.proposal.order || !passes(t)) continue;
-    t.why_not = doubt(search, imitation, t);
+    std::vector<Witness> witnesses = {witness(told)};
+    for (Search* other : others_of(all, told, t)) witnesses.push_back(witness(*other));
+    t.why_not = doubt(witnesses, t);
     t.admissible = t.why_not.empty();
+    if (t.admissible || !expected(trials, t)) continue;
+    t.note = fmt::format(
+        "These data are too short to tell its order: {:g} a turn is what such effects mostly have, and fits best of "
+        "the "
+        "whole orders; {} would tell.",
+        *t.proposal.order, t.proposal.entry->info->separated_by);
+    t.admissible = true;
+    t.why_not.clear();
   }
-  std::stable_partition(trials.begin(), trials.end(), [](const Trial& t) { return t.admissible; });
+  put_in_order(told.base, trials);
 }
 
 std::string one_way_warning(const BalanceData& data) {

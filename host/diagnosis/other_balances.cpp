@@ -1,8 +1,11 @@
 #include "host/diagnosis/other_balances.hpp"
 
 #include <algorithm>
+#include <cmath>
 
+#include "host/diagnosis/imitation.hpp"
 #include "host/estimation/in_parallel.hpp"
+#include "host/regression/both_balances.hpp"
 
 namespace flexspline::diagnosis {
 namespace {
@@ -19,32 +22,87 @@ Terms as_seen_by(const Search& other, const Trial& trial) {
   return terms;
 }
 
-bool acts_on(const Trial& trial, const Search& told, const Search& other) {
-  return &other != &told && trial.proposal.entry->adds_to(other.data->balance());
+// Free parameters of the added effect that its balance determines, with their values and their places in the
+// covariance.
+struct Found {
+  std::vector<std::size_t> parameters;
+  std::vector<Eigen::Index> at;
+};
+Found found_of(const Search& told, Trial& trial) {
+  Found found;
+  Judged& judged = trial.judged;
+  const std::size_t added = judged.terms.size() - 1;
+  const auto on_balance =
+      regression::terms_on(judged.terms, told.data->balance(), told.data->prepared().torque_measured);
+  std::vector<Slot> slots = judged.linear;
+  const std::vector<Slot> shapes = regression::free_shape_slots(judged.terms, on_balance);
+  slots.insert(slots.end(), shapes.begin(), shapes.end());
+  for (std::size_t j = 0; j < slots.size(); ++j) {
+    const auto at = static_cast<Eigen::Index>(j);
+    if (slots[j].term != added || !std::isfinite(judged.covariance(at, at))) continue;
+    found.parameters.push_back(slots[j].parameter);
+    found.at.push_back(at);
+    // Shapes stand where they were searched; the fit moved them from there.
+    if (j >= judged.linear.size()) {
+      judged.terms[added].values[slots[j].parameter] += judged.theta[at];
+      judged.theta[at] = 0.0;
+    }
+  }
+  return found;
+}
+
+// Moves the added effect's parameters to where both balances have them, and returns the score there less what the move
+// costs where they are told.
+double score_on(Search& other, Trial& trial, const Found& found) {
+  BalanceData data = *other.data;
+  Terms terms = as_seen_by(other, trial);
+  const std::size_t added = terms.size() - 1;
+  const double tau = std::max(1.0, other.base.autocorrelation_time);
+  const Eigen::VectorXd residual = other.base.residual - data.term_torque(terms, added);
+  const regression::Testimony says =
+      regression::testimony_of(regression::reaching_columns(data, terms, added, found.parameters),
+                               model_columns(data, other.base.terms), residual, other.base.root_weights, tau);
+  const regression::Agreement both =
+      regression::agree(regression::scaled_inverse(trial.judged.covariance(found.at, found.at)), says);
+  if (!both.change.allFinite()) return 0.0;
+  for (std::size_t k = 0; k < found.parameters.size(); ++k)
+    terms[added].values[found.parameters[k]] += both.change[static_cast<Eigen::Index>(k)];
+  trial.judged.terms.back().values = terms[added].values;
+  // No parameter is free there, so none is paid for.
+  const Judged judged = judge(data, terms, other.keep);
+  trial.at_floor_elsewhere = trial.at_floor_elsewhere && other.at_floor(judged);
+  return fall_of(other.base, judged, 0.0).score - both.cost;
+}
+
+bool acts_on(const catalogue::Entry& entry, const Search& told, const Search& other) {
+  return &other != &told && entry.adds_to(other.data->balance());
 }
 
 }  // namespace
 
+std::vector<Search*> others_of(const std::vector<Search*>& all, const Search& told, const Trial& trial) {
+  std::vector<Search*> others;
+  if (!told.data->prepared().torque_measured) return others;  // the motor's balance is the only one
+  for (Search* other : all)
+    if (acts_on(*trial.proposal.entry, told, *other)) others.push_back(other);
+  return others;
+}
+
 void hear_other_balances(const std::vector<Search*>& all, Search& told, std::vector<Trial>& trials) {
-  if (!told.data->prepared().torque_measured) return;  // the motor's balance is the only one
-  std::vector<std::pair<Trial*, Search*>> heard;
+  std::vector<Trial*> heard;
   for (Trial& trial : trials)
-    for (Search* other : all)
-      if (trial.fall.score > kNamedScore && acts_on(trial, told, *other)) heard.emplace_back(&trial, other);
-  std::vector<double> scores(heard.size());
+    if (trial.fall.score > kNamedScore && !others_of(all, told, trial).empty()) heard.push_back(&trial);
+  if (heard.empty()) return;
   estimation::in_parallel(heard.size(), [&](std::size_t i) {
-    const auto& [trial, other] = heard[i];
-    BalanceData data = *other->data;
-    // No parameter is free there, so none is paid for.
-    scores[i] = fall_of(other->base, judge(data, as_seen_by(*other, *trial), other->keep), 0.0).score;
-  });
-  for (std::size_t i = 0; i < heard.size(); ++i) heard[i].first->elsewhere += scores[i];
-  for (Trial& trial : trials) {
-    if (!trial.admissible || trial.fall.score <= kNamedScore || trial.score() > kNamedScore) continue;
+    Trial& trial = *heard[i];
+    const Found found = found_of(told, trial);
+    if (found.parameters.empty()) return;
+    for (Search* other : others_of(all, told, trial)) trial.elsewhere += score_on(*other, trial, found);
+    if (!trial.admissible || trial.score() > kNamedScore) return;
     trial.admissible = false;
     trial.why_not = "it acts on another torque balance as well, and that one fits worse with it";
-  }
-  if (!heard.empty()) put_in_order(told.base, trials);
+  });
+  put_in_order(told.base, trials);
 }
 
 }  // namespace flexspline::diagnosis

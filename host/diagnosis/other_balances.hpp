@@ -7,11 +7,13 @@
 
 namespace flexspline::diagnosis {
 
-// For each trial of `told` above the limit, judges its effect on every other balance that it acts on, with the
-// parameters that `told` found: a ripple of the torque sensor and an error of the gear look alike where the spring
-// twists, but only the gear's error turns the motor. The scores go to `Trial::elsewhere`, what is refuted there is
-// refused, and the trials are put in order again. `all` holds the searches of every balance, `told` the one whose
-// trials these are.
+// The searches among `all`, other than `told`, on whose balances the effect of a trial acts as well.
+std::vector<Search*> others_of(const std::vector<Search*>& all, const Search& told, const Trial& trial);
+
+// For each trial of `told` above the limit, judges its effect on every other balance that it acts on, with parameters
+// on which both agree: a ripple of the torque sensor and an error of the gear look alike where the spring twists, but
+// only the gear's error turns the motor. The scores go to `Trial::elsewhere`, what is refuted there is refused, and the
+// trials are put in order again. `all` holds the searches of every balance, `told` the one whose trials these are.
 void hear_other_balances(const std::vector<Search*>& all, Search& told, std::vector<Trial>& trials);
 
 }  // namespace flexspline::diagnosis

@@ -189,6 +189,8 @@ Judged judge(BalanceData& data, Terms terms, const Eigen::VectorXd& keep) {
   // Noise counts `tau` rows as one already, in the triangles' weights.
   const double counted = (keep.array() > 0.0).count();
   const double freedom = counted / std::max(1.0, counted - static_cast<double>(X.cols()));
+  judged.covariance = triangles.size.cwiseInverse().asDiagonal() * fit.linear.unit_covariance *
+                      triangles.size.cwiseInverse().asDiagonal() * (freedom * judged.autocorrelation_time / tau);
   judged.std = (fit.linear.unit_covariance.diagonal() * freedom * (judged.autocorrelation_time / tau))
                    .cwiseSqrt()
                    .cwiseQuotient(triangles.size);

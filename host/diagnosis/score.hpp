@@ -28,8 +28,9 @@ struct LeftOut {
 struct Judged {
   Terms terms;  // with fitted values
   std::vector<Slot> linear;
-  Eigen::VectorXd theta;  // linear parameters, then shifts of shapes, then the delay in s
-  Eigen::VectorXd std;    // likewise; corrected for autocorrelation
+  Eigen::VectorXd theta;       // linear parameters, then shifts of shapes, then the delay in s
+  Eigen::VectorXd std;         // likewise; corrected for autocorrelation
+  Eigen::MatrixXd covariance;  // likewise; infinite on what is not determined
   Eigen::VectorXd own_share;
   Eigen::VectorXd residual;      // in-sample, less the records' deviations
   Eigen::VectorXd root_weights;  // nought where a disturbance is left out

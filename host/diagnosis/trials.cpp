@@ -150,6 +150,10 @@ std::optional<std::size_t> position(const Judged& judged, std::string_view id, s
   return std::nullopt;
 }
 
+bool Search::at_floor(const Judged& judged) const {
+  return floor && judged.rmse() < kAtFloor * *floor;
+}
+
 bool passes(const Trial& t) {
   return t.admissible && t.fall.score > kNamedScore && t.fall.chi2_percent > kNamedFallPercent;
 }

@@ -17,16 +17,21 @@ struct Search {
   BalanceData* data = nullptr;
   Eigen::VectorXd keep;  // nought for rows in which a disturbance acted
   Judged base;
+  std::optional<double> floor = std::nullopt;  // RMS of the noise, N m, where it is known
+
+  bool at_floor(const Judged& judged) const;
 };
 
 struct Trial {
   Proposal proposal;
   Judged judged;
   Fall fall;
-  double elsewhere = 0.0;  // score on the other balances that the effect acts on, with the same parameters
+  bool at_floor_elsewhere = true;  // on those
+  double elsewhere = 0.0;          // score on the other balances that the effect acts on, with the same parameters
   bool admissible = true;
   std::string why_not;
   std::string imitated_by;  // the effect of the model that the data cannot tell it from
+  std::string note;         // what is to be known of it if it is named
 
   double score() const { return fall.score + elsewhere; }
 };

@@ -9,7 +9,9 @@
 #include <tuple>
 
 #include "host/catalogue/defined.hpp"
+#include "host/regression/both_balances.hpp"
 #include "host/regression/record_constants.hpp"
+#include "host/regression/shapes.hpp"
 
 namespace flexspline::regression {
 namespace {
@@ -45,6 +47,74 @@ std::pair<BalanceFit, std::vector<Slot>> fit_within_bounds(BalanceData& data, Te
   }
 }
 
+// Slots of a fit that show on the balance of other data as well, with their places in the fit's covariance. Of what the
+// fit does not tell, nothing is asked elsewhere either.
+struct Shared {
+  std::vector<Slot> slots;
+  std::vector<Eigen::Index> at;
+};
+Shared shared_with(const BalanceFit& fit, const Terms& terms, Balance other) {
+  Shared shared;
+  std::vector<Slot> all = fit.linear;
+  all.insert(all.end(), fit.shapes.begin(), fit.shapes.end());
+  for (std::size_t j = 0; j < all.size(); ++j) {
+    const auto at = static_cast<Eigen::Index>(j);
+    if (!terms[all[j].term].entry->adds_to(other) || !std::isfinite(fit.covariance(at, at))) continue;
+    shared.slots.push_back(all[j]);
+    shared.at.push_back(at);
+  }
+  return shared;
+}
+
+// Estimates the parameters that two balances show on both: what the telling balance found, with its covariance, and
+// what the other one says. Where they contradict each other, one of them lacks something, and the telling one is
+// believed.
+bool settle_on_both(Identification& result, std::size_t told, std::size_t other) {
+  constexpr double kContradiction = 16.0;  // squared standard errors a parameter
+  BalanceFit& fit = result.fits[told];
+  const Shared shared = shared_with(fit, result.terms, result.data[other].balance());
+  if (shared.slots.empty()) return false;
+  BalanceData& data = result.data[other];
+  const BalanceFit& its = result.fits[other];
+  Eigen::MatrixXd reaching(data.rows(), 0),
+      own(data.rows(), static_cast<Eigen::Index>(its.linear.size() + its.shapes.size()));
+  for (const Slot& slot : shared.slots) {
+    reaching.conservativeResize(Eigen::NoChange, reaching.cols() + 1);
+    reaching.rightCols(1) = reaching_columns(data, result.terms, slot.term, {slot.parameter});
+  }
+  own << columns_of(data, result.terms, its.linear), shape_columns(data, result.terms, its.on_balance, its.shapes);
+  const Testimony says = testimony_of(reaching, own, residual_of(data, result.terms), its.root_weights,
+                                      std::max(1.0, its.autocorrelation_time));
+  const Eigen::MatrixXd before = fit.covariance(shared.at, shared.at);
+  const Eigen::MatrixXd precision = scaled_inverse(before);
+  const Agreement both = agree(precision, says);
+  if (!both.change.allFinite() || both.cost > kContradiction * static_cast<double>(shared.slots.size())) {
+    result.warnings.push_back(
+        fmt::format("{}: the torque balance that tells its values and the motor's contradict each other; one of them "
+                    "lacks an effect (see `flexspline diagnose`)",
+                    result.terms[shared.slots.front().term].id));
+    return false;
+  }
+  // The telling balance's other parameters move along.
+  std::vector<Slot> all = fit.linear;
+  all.insert(all.end(), fit.shapes.begin(), fit.shapes.end());
+  std::vector<Eigen::Index> known;
+  for (Eigen::Index j = 0; j < fit.covariance.rows(); ++j)
+    if (std::isfinite(fit.covariance(j, j))) known.push_back(j);
+  const Eigen::MatrixXd gain = fit.covariance(known, shared.at) * precision;
+  const Eigen::VectorXd change = gain * both.change;
+  for (std::size_t k = 0; k < known.size(); ++k) {
+    const Slot& slot = all[static_cast<std::size_t>(known[k])];
+    result.terms[slot.term].values[slot.parameter] += change[static_cast<Eigen::Index>(k)];
+  }
+  const Eigen::MatrixXd less = gain * (before - both.covariance) * gain.transpose();
+  for (std::size_t i = 0; i < known.size(); ++i)
+    for (std::size_t j = 0; j < known.size(); ++j)
+      fit.covariance(known[i], known[j]) -= less(static_cast<Eigen::Index>(i), static_cast<Eigen::Index>(j));
+  fit.residual = residual_of(result.data[told], result.terms);
+  return true;
+}
+
 // Fits all balances. What an effect adds to a balance that does not tell its parameters is known there, so the balance
 // that tells comes first: the transmission's before the motor's, and, where the motor's tells of others, both again.
 // Returns what was held at a bound on each.
@@ -67,6 +137,13 @@ std::vector<std::vector<Slot>> fit_all(Identification& result, data::Axis axis) 
       std::tie(result.fits[b], held[b]) = fit_within_bounds(result.data[b], result.terms, axis, warnings);
       if (pass > 0 || !told_elsewhere) std::ranges::move(warnings, std::back_inserter(result.warnings));
     }
+  for (std::size_t b = 0; b < result.data.size() && reach && result.prepared.torque_measured; ++b)
+    for (std::size_t other = 0; other < result.data.size(); ++other)
+      if (other != b && result.data[other].balance() == Balance::motor && settle_on_both(result, b, other)) {
+        std::vector<std::string> said_before;
+        std::tie(result.fits[other], held[other]) =
+            fit_within_bounds(result.data[other], result.terms, axis, said_before);
+      }
   return held;
 }
 

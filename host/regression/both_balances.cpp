@@ -1,0 +1,59 @@
+#include "host/regression/both_balances.hpp"
+
+#include <Eigen/LU>
+#include <Eigen/QR>
+#include <algorithm>
+#include <cmath>
+
+namespace flexspline::regression {
+
+Eigen::MatrixXd reaching_columns(BalanceData& data, const Terms& terms, std::size_t t,
+                                 const std::vector<std::size_t>& parameters) {
+  constexpr double kStep = 1e-3;  // of the usual value
+  Eigen::MatrixXd columns = Eigen::MatrixXd::Zero(data.rows(), static_cast<Eigen::Index>(parameters.size()));
+  if (!terms[t].entry->adds_to(data.balance())) return columns;
+  const Eigen::VectorXd at = data.term_torque(terms, t);
+  for (std::size_t k = 0; k < parameters.size(); ++k) {
+    Terms moved = terms;
+    const double usual = std::abs(terms[t].entry->parameters[parameters[k]].usual);
+    double step = kStep * std::max(usual, std::abs(terms[t].values[parameters[k]]));
+    // Parts of a wave of which one is usually nought: as large as the other.
+    for (const auto& info : terms[t].entry->parameters)
+      if (info.kind == terms[t].entry->parameters[parameters[k]].kind)
+        step = std::max(step, kStep * std::abs(info.usual));
+    moved[t].values[parameters[k]] += step;
+    columns.col(static_cast<Eigen::Index>(k)) = (data.term_torque(moved, t) - at) / step;
+  }
+  return columns;
+}
+
+Testimony testimony_of(const Eigen::MatrixXd& reaching, const Eigen::MatrixXd& own, const Eigen::VectorXd& residual,
+                       const Eigen::VectorXd& root_weights, double autocorrelation_time) {
+  Eigen::MatrixXd left = root_weights.asDiagonal() * reaching;
+  Eigen::MatrixXd scaled = root_weights.asDiagonal() * own;
+  for (auto column : scaled.colwise()) column /= std::max(column.norm(), 1e-300);
+  if (scaled.cols() > 0) {
+    Eigen::ColPivHouseholderQR<Eigen::MatrixXd> qr(scaled);
+    qr.setThreshold(1e-7);
+    const Eigen::MatrixXd span = qr.householderQ() * Eigen::MatrixXd::Identity(scaled.rows(), qr.rank());
+    left -= span * (span.transpose() * left);
+  }
+  return {left.transpose() * root_weights.cwiseProduct(residual) / autocorrelation_time,
+          left.transpose() * left / autocorrelation_time};
+}
+
+Eigen::MatrixXd scaled_inverse(const Eigen::MatrixXd& symmetric) {
+  const Eigen::VectorXd scale = symmetric.diagonal().cwiseMax(1e-300).cwiseSqrt().cwiseInverse();
+  return scale.asDiagonal() * (scale.asDiagonal() * symmetric * scale.asDiagonal()).fullPivLu().inverse() *
+         scale.asDiagonal();
+}
+
+Agreement agree(const Eigen::MatrixXd& precision, const Testimony& other) {
+  Agreement result;
+  result.covariance = scaled_inverse(precision + other.information);
+  result.change = result.covariance * other.slope;
+  result.cost = result.change.dot(precision * result.change);
+  return result;
+}
+
+}  // namespace flexspline::regression

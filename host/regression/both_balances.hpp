@@ -1,0 +1,40 @@
+// Parameters that show on two torque balances: an error of the gear twists the spring and turns the motor.
+#pragma once
+
+#include <Eigen/Core>
+#include <vector>
+
+#include "host/regression/balance_data.hpp"
+
+namespace flexspline::regression {
+
+// What a balance says of parameters that another one tells, about where they stand: slope and (minus) curvature of its
+// log likelihood, the balance's own parameters free.
+struct Testimony {
+  Eigen::VectorXd slope;
+  Eigen::MatrixXd information;
+};
+
+// Slopes of the torque of term `t` on `data` by its parameters, a column each, about the values in `terms`. By
+// differences: what reaches over to another balance does so in proportion.
+Eigen::MatrixXd reaching_columns(BalanceData& data, const Terms& terms, std::size_t t,
+                                 const std::vector<std::size_t>& parameters);
+
+// `reaching`: slopes of the parameters asked for; `own`: of the balance's own parameters; `residual` at the present
+// values. `root_weights` are one over the noise, of which `autocorrelation_time` rows count as one.
+Testimony testimony_of(const Eigen::MatrixXd& reaching, const Eigen::MatrixXd& own, const Eigen::VectorXd& residual,
+                       const Eigen::VectorXd& root_weights, double autocorrelation_time);
+
+// Inverse of a covariance or a precision whose parameters differ much in size by their units.
+Eigen::MatrixXd scaled_inverse(const Eigen::MatrixXd& symmetric);
+
+// The most likely change of parameters of which the telling balance has this precision (inverse covariance), with what
+// that costs there (twice the log likelihood) and their covariance then.
+struct Agreement {
+  Eigen::VectorXd change;
+  double cost = 0.0;
+  Eigen::MatrixXd covariance;
+};
+Agreement agree(const Eigen::MatrixXd& precision, const Testimony& other);
+
+}  // namespace flexspline::regression
