@@ -163,6 +163,7 @@ bool passes(const Trial& t) {
 void prefer_simple(const Judged& base, std::vector<Trial>& trials) {
   constexpr double kSameError = 1.1;
   constexpr double kSameFall = 0.005;
+  constexpr double kDozens = 12.0;
   if (trials.empty() || !passes(trials.front())) return;
   // Left-out squares over the noise of each record as the best one has it: a loud record must not decide alone.
   const std::vector<LeftOut> noise = trials.front().judged.left_out;
@@ -177,9 +178,11 @@ void prefer_simple(const Judged& base, std::vector<Trial>& trials) {
   for (std::size_t i = 1; i < trials.size(); ++i) {
     const double left = chi2(trials[i].judged);
     const catalogue::Entry &best = *trials.front().proposal.entry, &other = *trials[i].proposal.entry;
-    if (!catalogue::names_contain(best.info->rivals, other.name()) &&
-        !catalogue::names_contain(other.info->rivals, best.name()))
-      continue;
+    // A law of dozens of parameters is everyone's rival.
+    const bool rivals = catalogue::names_contain(best.info->rivals, other.name()) ||
+                        catalogue::names_contain(other.info->rivals, best.name()) ||
+                        trials.front().proposal.added >= trials[i].proposal.added + kDozens;
+    if (!rivals) continue;
     if (passes(trials[i]) && left <= kSameError * kSameError * least && left - least <= kSameFall * fall &&
         trials[i].proposal.added < trials[simplest].proposal.added)
       simplest = i;
