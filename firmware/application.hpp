@@ -235,6 +235,7 @@ class Application {
     demand_.compensate = command.compensate;
     take_set_point(command);
     control_.start(demand_, estimate);
+    safety_.begin_mode();
     return Refusal::none;
   }
   void take_set_point(const Command& command) {

@@ -43,6 +43,7 @@ struct Output {
   N::Value feedforward{};
   N::Value torque{};
   N::Value current{};
+  N::Step lag{};  // mode position: the set point of the loop, less where the shaft is
   bool limited = false;
   bool at_rest = false;   // modes velocity and stop: the set point is nought and so is the shaft's velocity
   bool finished = false;  // the excitation is over
@@ -158,6 +159,7 @@ class Control {
     nominal_ = {};
     compensates_ = demand.compensate && uses_trajectory(demand.mode);
     if (compensates_) compensate(e, out, command);
+    if (demand.mode == Mode::position) out.lag = command.position - e.angle;
     const auto loops = control::Loops::update<N>(loops_, p_->loops, command, e.angle, e.velocity);
     out.torque = loops.torque;
     out.current = loops.current;

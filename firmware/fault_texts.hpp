@@ -59,6 +59,7 @@ inline constexpr std::array<FaultInfo, kFaults> kFaultTable = [] {
 constexpr const FaultInfo& info_of(Fault fault) {
   return kFaultTable[static_cast<std::size_t>(fault)];
 }
-static_assert(info_of(Fault::stop_failed).name == "stop_failed" && info_of(Fault::overspeed).name == "overspeed");
+static_assert(info_of(Fault::stop_failed).name == "stop_failed" && info_of(Fault::overspeed).name == "overspeed" &&
+              info_of(Fault::output_encoder_stuck).name == "output_encoder_stuck");
 
 }  // namespace flexspline::firmware

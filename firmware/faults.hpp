@@ -27,8 +27,10 @@ enum class Fault : std::uint8_t {
   tick_overrun,
   watchdog,
   stop_failed,
+  following_error,
+  output_encoder_stuck,
 };
-inline constexpr std::size_t kFaults = 19;
+inline constexpr std::size_t kFaults = 21;
 
 enum class SafeState : std::uint8_t {
   off,   // the amplifier is off, the shaft coasts
@@ -43,13 +45,15 @@ inline constexpr std::uint32_t kOvercurrentTicks = 2;
 inline constexpr std::uint32_t kHotTicks = 200;
 inline constexpr std::uint32_t kWatchdogTicks = 200;  // what a board's watchdog has to be set to
 
-// Where a drive can still be trusted to come to rest by itself, it does.
+// Where a drive can still be trusted to come to rest by itself, it does: loops that do not follow are not, those of the
+// motor do not need the output's encoder.
 constexpr SafeState ends_in(Fault fault) {
   switch (fault) {
     case Fault::temperature_out_of_range:
     case Fault::torque_stuck:
     case Fault::overtemperature:
     case Fault::host_lost:
+    case Fault::output_encoder_stuck:
       return SafeState::stop;
     default:
       return SafeState::off;

@@ -36,7 +36,9 @@ class Safety {
     check_ranges(found, r, p);
     check_always(found, e, p.safety);
     if (is_armed(mode)) {
+      check_output(found, r, e, p.following);
       check_motion(found, e, last, p.safety);
+      check_following(found, e, last, p.following, mode);
     } else {
       forget_motion();
     }
@@ -47,6 +49,8 @@ class Safety {
   }
   // A command came.
   void host_is_there() { host_age_ = 0; }
+  // The host armed a mode, be it from another one or the same.
+  void begin_mode() { mode_ = Mode::boot; }
 
  private:
   template <class Seen, class Limit>
@@ -107,6 +111,35 @@ class Safety {
     if (span > limits.stuck_torque) ++unmoved_;
     expect(found, Fault::motor_encoder_stuck, unmoved_ < limits.stuck_ticks, span.raw, limits.stuck_torque.raw);
   }
+  // The output moves with the motor, but for torsion and backlash. A line that is lost leaves a count that goes to and
+  // fro, so a few counts are no motion. Without limits any count is enough, and nothing is watched.
+  void check_output(FaultRecord& found, const Readings& r, const Estimate& e,
+                    const control::FollowingLimits<N>& limits) {
+    turned_ += static_cast<std::uint32_t>(e.moved);
+    const auto output = static_cast<std::int32_t>(r.output_counter - output_from_);
+    if (output >= limits.output_counts || output <= -limits.output_counts || !watches_) {
+      output_from_ = r.output_counter;
+      turned_ = 0;
+    }
+    const auto turned = static_cast<std::int32_t>(turned_);
+    const std::int32_t most = limits.motor_counts;
+    expect(found, Fault::output_encoder_stuck, turned <= most && turned >= -most, turned, most);
+  }
+  // A host may begin a stream far from where the shaft is; the shaft is watched from when it has got there. In mode
+  // velocity there is no position to follow, and in mode position another velocity than that of the set point is how
+  // the loop works.
+  void check_following(FaultRecord& found, const Estimate& e, const Output& last,
+                       const control::FollowingLimits<N>& limits, Mode mode) {
+    const auto lag = static_cast<std::int64_t>(fixed::size_of(last.lag.raw));
+    bool behind = lag > limits.position;
+    if (mode == Mode::velocity) behind = N::magnitude(last.velocity - e.velocity) > limits.velocity;
+    // When a mode begins, what was wanted last was wanted before.
+    follows_ = mode == mode_ && (follows_ || !behind);
+    mode_ = mode;
+    lagging_ = behind && follows_ ? lagging_ + 1 : 0;
+    expect(found, Fault::following_error, limits.ticks == 0 || lagging_ < limits.ticks, lag >> 16,
+           limits.position >> 16);
+  }
   void forget_motion() {
     watches_ = false;
     mismatch_ = 0;
@@ -123,12 +156,17 @@ class Safety {
   std::uint32_t hot_ = 0;
   std::uint32_t mismatch_ = 0;
   std::uint32_t unmoved_ = 0;
+  std::uint32_t lagging_ = 0;
+  std::uint32_t output_from_ = 0;
+  std::uint32_t turned_ = 0;  // of the motor since then, counts; wraps
   N::Value lowest_{};
   N::Value highest_{};
   std::uint8_t current_outside_ = 0;
   std::uint8_t torque_outside_ = 0;
   std::uint8_t temperature_outside_ = 0;
   bool watches_ = false;
+  bool follows_ = false;
+  Mode mode_{};
 };
 
 }  // namespace flexspline::firmware

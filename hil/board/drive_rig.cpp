@@ -15,6 +15,10 @@ enum Stream : std::uint64_t { kSensorNoise = 17 };
 std::uint32_t counter(double angle_rad, int counts) {
   return static_cast<std::uint32_t>(std::llround(angle_rad / kTurn * counts));
 }
+// The line that is left goes up and down at the same edge.
+std::uint32_t on_one_line(std::uint32_t before, std::uint32_t count) {
+  return (before & ~1U) | (count >> 1U & 1U);
+}
 
 }  // namespace
 
@@ -65,15 +69,18 @@ firmware::Readings DriveRig::sense() {
     ++r.motor_samples;
     const double zero = errors_.torsion_zero_rad * setup_.drive.gear_ratio;
     if (!has(Injection::motor_encoder_stuck)) r.motor_counter = counter(state.motor_angle - zero, sensors.motor_counts);
-    // The line that is left goes up and down at the same edge.
     if (has(Injection::encoder_line_lost))
-      r.motor_counter =
-          (last_.motor_counter & ~1U) | (counter(state.motor_angle - zero, sensors.motor_counts) >> 1U & 1U);
+      r.motor_counter = on_one_line(last_.motor_counter, counter(state.motor_angle - zero, sensors.motor_counts));
     if (has(Injection::motor_encoder_jump)) r.motor_counter += static_cast<std::uint32_t>(sensors.motor_counts / 4);
   }
   if (!has(Injection::output_encoder_stale)) {
     ++r.output_samples;
-    r.output_counter = counter(state.output_angle + disturbances_.output_offset_rad, sensors.output_counts);
+    const std::uint32_t count = counter(state.output_angle + disturbances_.output_offset_rad, sensors.output_counts);
+    if (has(Injection::output_line_lost)) {
+      r.output_counter = on_one_line(last_.output_counter, count);
+    } else if (!has(Injection::output_encoder_stuck)) {
+      r.output_counter = count;
+    }
   }
   if (!has(Injection::analog_stale)) {
     ++r.analog_samples;

@@ -17,8 +17,10 @@ enum class Injection {
   output_encoder_stale,
   analog_stale,
   motor_encoder_stuck,   ///< samples come, the count stands still
+  output_encoder_stuck,  ///< the same of the output
   motor_encoder_jump,    ///< the count is off by a quarter of a turn
   encoder_line_lost,     ///< one of the motor encoder's two lines: the count goes to and fro by one
+  output_line_lost,      ///< the same of the output
   current_out_of_range,  ///< the converter's input is open
   torque_out_of_range,
   temperature_out_of_range,

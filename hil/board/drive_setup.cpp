@@ -126,6 +126,10 @@ control::DriveSetup<double> setup_of(const plant::Drive& drive, const effects::D
   s.safety.acceleration = 10.0 * most_torque / inertia;
   s.safety.stuck_torque = 0.75 * most_torque;
   s.safety.current_mismatch = 0.2 * drive.current_limit_a;
+  s.safety.following_error = 2.0 * drive.rated_velocity_rad_s / s.loops.position_gain;
+  s.safety.following_velocity = 0.75 * drive.rated_velocity_rad_s;
+  // Torsion swings by less than four of its bases.
+  s.safety.output_stuck = 8.0 * d.torsion_base;
   return s;
 }
 

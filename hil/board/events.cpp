@@ -7,13 +7,15 @@
 namespace flexspline::board {
 namespace {
 
-constexpr std::array<std::pair<std::string_view, Injection>, 13> kInjections{
+constexpr std::array<std::pair<std::string_view, Injection>, 15> kInjections{
     {{"motor-encoder-stale", Injection::motor_encoder_stale},
      {"output-encoder-stale", Injection::output_encoder_stale},
      {"analog-stale", Injection::analog_stale},
      {"motor-encoder-stuck", Injection::motor_encoder_stuck},
+     {"output-encoder-stuck", Injection::output_encoder_stuck},
      {"motor-encoder-jump", Injection::motor_encoder_jump},
      {"encoder-line-lost", Injection::encoder_line_lost},
+     {"output-line-lost", Injection::output_line_lost},
      {"current-out-of-range", Injection::current_out_of_range},
      {"torque-out-of-range", Injection::torque_out_of_range},
      {"temperature-out-of-range", Injection::temperature_out_of_range},

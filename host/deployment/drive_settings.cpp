@@ -24,6 +24,10 @@ using text::NodeKind;
 
 constexpr double kMost = 1e12;
 constexpr double kLeast = 1e-12;  // of what has to be above nought
+// The motor may turn before the output's encoder has to show it: torsion swings by less than four of its bases, and a
+// quarter of this has to be seen (shared/control/drive_parameters_setup.hpp).
+constexpr double kTorsionsBeforeStuck = 8.0;
+constexpr double kCountsBeforeStuck = 32.0;
 
 // The file's tables, whose keys are taken one after another; what nobody took is no setting.
 class Settings {
@@ -314,6 +318,15 @@ control::DriveSetup<double> parse_drive_setup(const std::string& toml, const std
   f.standstill = s.positive("faults", "standstill_rad_s", 5e-3 * d.velocity_base);
   f.host_s = s.positive("faults", "host_s", f.host_s, 3600.0);
   f.stop_s = s.positive("faults", "stop_s", f.stop_s, 3600.0);
+  // Twice where the position loop asks for all of the velocity: it no longer follows but catches up.
+  const double farthest = 30'000.0 * d.angle_base;
+  f.following_error = s.positive("faults", "following_error_rad",
+                                 std::min(2.0 * velocity / setup.loops.position_gain, farthest), farthest);
+  f.following_velocity = s.positive("faults", "following_velocity_rad_s", 0.75 * velocity, 15.0 * d.velocity_base);
+  f.following_s = s.positive("faults", "following_s", f.following_s, 3.0);
+  const double by_counts = setup.output_counts != 0 ? kCountsBeforeStuck * d.angle_base / setup.output_counts : 0.0;
+  f.output_stuck = s.positive("faults", "output_stuck_rad", std::max(kTorsionsBeforeStuck * d.torsion_base, by_counts),
+                              100.0 * d.angle_base);
 
   setup.excitation = excitation(s, d, setup.excites_torque, most_torque, velocity, overspeed);
   s.done();
@@ -368,6 +381,10 @@ std::vector<NamedQuantity> described(const control::DriveSettings<fixed::Fixed>&
       {"fault_acceleration", in(s.safety.acceleration, d.acceleration_base), "rad/s^2"},
       {"fault_host", seconds(s.safety.host_ticks), "s"},
       {"fault_stop", seconds(s.safety.stop_ticks), "s"},
+      {"fault_following_error", std::ldexp(static_cast<double>(s.following.position), -32) * d.angle_base, "rad"},
+      {"fault_following_velocity", in(s.following.velocity, d.velocity_base), "rad/s"},
+      {"fault_following", seconds(s.following.ticks), "s"},
+      {"fault_output_stuck", s.following.motor_counts * d.angle_base / (d.gear_ratio * s.motor_encoder.counts), "rad"},
       {"residual_map_largest",
        s.residual_map.scale == 0
            ? 0.0

@@ -40,6 +40,10 @@ constexpr Place kPlaces[] = {{"motor_encoder_counts", "motor_encoder", "counts"}
                              {"fault_acceleration", "faults", "acceleration_rad_s2"},
                              {"fault_host", "faults", "host_s"},
                              {"fault_stop", "faults", "stop_s"},
+                             {"fault_following_error", "faults", "following_error_rad"},
+                             {"fault_following_velocity", "faults", "following_velocity_rad_s"},
+                             {"fault_following", "faults", "following_s"},
+                             {"fault_output_stuck", "faults", "output_stuck_rad"},
                              {"residual_map_largest", "residual_map", "largest_nm"}};
 
 }  // namespace

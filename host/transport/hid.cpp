@@ -5,8 +5,10 @@
 
 #include <algorithm>
 #include <array>
+#include <chrono>
 #include <span>
 #include <string>
+#include <thread>
 
 #include "host/transport/link.hpp"
 #include "shared/usb/identity.hpp"
@@ -70,6 +72,18 @@ class Hid : public Link {
   std::string serial_;
 };
 
+// A plug that is pulled while somebody looks leaves a device that hides its serial number and cannot be opened; for a
+// moment it is listed still.
+bool is_there(const std::string& path) {
+  constexpr std::chrono::milliseconds kListedStill{100};
+  std::this_thread::sleep_for(kListedStill);
+  hid_device_info* all = hid_enumerate(Identity::kVendorId, Identity::kProductId);
+  bool found = false;
+  for (const hid_device_info* one = all; one != nullptr; one = one->next) found = found || path == one->path;
+  hid_free_enumeration(all);
+  return found;
+}
+
 }  // namespace
 
 std::vector<Found> find_hid() {
@@ -83,7 +97,7 @@ std::vector<Found> find_hid() {
       hid_close(device);
     } else {
       drive.usable = false;
-      drive.problem = kRemedy;
+      drive.problem = is_there(one->path) ? kRemedy : "it is gone; plug it in again";
     }
     found.push_back(std::move(drive));
   }
@@ -91,27 +105,15 @@ std::vector<Found> find_hid() {
   return found;
 }
 
-namespace {
-
-bool is_there(const std::string& path) {
-  hid_device_info* all = hid_enumerate(Identity::kVendorId, Identity::kProductId);
-  bool found = false;
-  for (const hid_device_info* one = all; one != nullptr; one = one->next) found = found || path == one->path;
-  hid_free_enumeration(all);
-  return found;
-}
-
-}  // namespace
-
 std::unique_ptr<Link> open_hid(const std::string& serial) {
   start();
   hid_device_info* all = hid_enumerate(Identity::kVendorId, Identity::kProductId);
   std::string path, its_serial, others;
   std::size_t count = 0;
-  bool hides_serial = false;
+  std::string hidden;  // where a drive is that hides its serial number
   for (const hid_device_info* one = all; one != nullptr; one = one->next) {
     const std::string this_serial = narrow(one->serial_number);
-    hides_serial = hides_serial || this_serial.empty();
+    if (this_serial.empty()) hidden = one->path;
     others += (others.empty() ? "" : ", ") + this_serial;
     if (!serial.empty() && this_serial != serial) continue;
     path = one->path;
@@ -119,7 +121,9 @@ std::unique_ptr<Link> open_hid(const std::string& serial) {
     ++count;
   }
   hid_free_enumeration(all);
-  if (count == 0 && hides_serial)
+  if (count == 0 && !hidden.empty() && !is_there(hidden))
+    throw LinkError(fmt::format("{}: the drive is gone; plug it in again and try again", drive_named(serial)));
+  if (count == 0 && !hidden.empty())
     throw LinkError(fmt::format("hid:{}: a drive on USB does not tell its serial number; {}", serial, kRemedy));
   if (count == 0) {
     const std::string there = others.empty() ? "no drive is on USB" : "those on USB are " + others;

@@ -108,6 +108,8 @@ inline constexpr Row kLine =
     row_for<Excitation::DriveLine<Numbers>>(Row{}.add(Field::harmonics).add(Field::number).add(Field::gain));
 inline constexpr Row kSafety = row_for<SafetyLimits<Numbers>>(
     Row{}.add(Field::positive, 7).add(Field::ticks, 3).add(Field::short_ticks, 2).add(Field::short_ticks_or_none));
+inline constexpr Row kFollowing = row_for<FollowingLimits<Numbers>>(
+    Row{}.add(Field::speed).add(Field::positive).add(Field::ticks_or_none, 2).add(Field::short_ticks));
 inline constexpr Row kResidualMap =
     row_for<ResidualMap::Coefficients>(Row{}.add(Field::positive, 7).add(Field::factor));
 
@@ -185,6 +187,7 @@ inline constexpr SectionPlan kSections[] = {
     {Section::excitation, offsetof(Settings, excitation), kExcitation, &excitation_agrees, 1},
     {Section::excitation_lines, offsetof(Settings, excitation.lines), kLine, nullptr, kMostLines},
     {Section::safety, offsetof(Settings, safety), kSafety, nullptr, 1},
+    {Section::following, offsetof(Settings, following), kFollowing, nullptr, 1},
     {Section::residual_map, offsetof(Settings, residual_map), kResidualMap, &residual_map_agrees, 1},
 };
 inline constexpr std::size_t kSectionCount = std::size(kSections);
@@ -277,6 +280,7 @@ inline void add_settings(model::BlockWriter& writer, const DriveSettings<fixed::
   std::uint32_t wanted = detail::kAlways;
   wanted |= settings.has_output_encoder ? detail::kWithOutputEncoder : detail::kWithoutOutputEncoder;
   if (settings.has_torque_sensor) wanted |= detail::kWithTorqueSensor;
+  if (settings.following.ticks > 0) wanted |= detail::bits_of({model::Section::following});
   if (settings.excitation.ticks > 0) {
     wanted |= detail::bits_of({model::Section::excitation});
     if (settings.excitation.line_count > 0) wanted |= detail::bits_of({model::Section::excitation_lines});

@@ -47,6 +47,17 @@ struct SafetyLimits {
   std::uint16_t torque_same_ticks = 0;  // the torque sensor's noise changes its reading within these; nought: no sensor
 };
 
+// How far motor and output may be from where they have to be. All nought in a block that does not state them: then it
+// is not watched.
+template <class N>
+struct FollowingLimits {
+  std::int64_t position = 0;       // mode position: of the motor behind its set point, 2^-32 turns
+  typename N::Value velocity{};    // mode velocity: the same
+  std::int32_t motor_counts = 0;   // that the motor may turn ...
+  std::int32_t output_counts = 0;  // ... while the output's encoder moves by less than this
+  std::uint16_t ticks = 0;         // that the motor may be behind for
+};
+
 template <class N>
 struct DriveSettings {
   std::uint32_t tick_hz = 0;
@@ -75,6 +86,7 @@ struct DriveSettings {
   Feedforward::Coefficients<N> feedforward{};
   Excitation::Coefficients<N> excitation{};
   SafetyLimits<N> safety{};
+  FollowingLimits<N> following{};
   ResidualMap::Coefficients residual_map{};
 };
 

@@ -28,6 +28,10 @@ struct SafetySetup {
   P standstill{P(1.0)};      // rad/s
   P host_s{P(0.1)};          // s
   P stop_s{P(1.0)};          // s
+  P following_error{};       // rad of the motor, mode position; nought: none of these is watched
+  P following_velocity{};    // rad/s, mode velocity
+  P following_s{P(0.02)};    // s
+  P output_stuck{};          // rad of the output, more than torsion and backlash
 };
 
 template <class P>
@@ -87,6 +91,34 @@ SafetyLimits<N> safety_limits(const SafetySetup<P>& s, std::uint32_t counts, con
           "at twice the overspeed the motor turns by half a turn a tick");
   return limits;
 }
+template <class N, class P>
+FollowingLimits<N> following_limits(const SafetySetup<P>& s, std::uint32_t motor_counts, std::uint32_t output_counts,
+                                    const effects::DriveConstants<P>& d) {
+  FollowingLimits<N> limits;
+  const auto whole = [](const P& x) { return static_cast<std::int64_t>(static_cast<double>(x) + 0.5); };
+  if (!(s.following_error > P(0.0))) return limits;
+  const P error = s.following_error / d.angle_base * P(0x1p32);
+  const std::uint32_t ticks = ticks_of(s.following_s, d.time_base);
+  const bool fits = error >= P(1.0) && error < P(0x1p47) && ticks >= 1 && ticks <= UINT16_MAX;
+  require(fits, "a following error is at most 32768 turns of the motor, for at least a tick and at most 65535");
+  require(s.following_velocity > P(0.0), "the following error of the velocity has to be positive");
+  if (!fits) return limits;
+  limits.position = whole(error);
+  limits.velocity = N::value(s.following_velocity / d.velocity_base);
+  limits.ticks = static_cast<std::uint16_t>(ticks);
+  if (output_counts != 0 && s.output_stuck > P(0.0)) {
+    const P turns = s.output_stuck / d.angle_base;
+    const P motor = turns * d.gear_ratio * P(static_cast<double>(motor_counts));
+    // What the motor turns goes into torsion first: of the rest a part has to be seen.
+    const P output = turns * P(0.25) * P(static_cast<double>(output_counts));
+    const bool in_counts = motor >= P(2.0) && motor < P(0x1p30) && output >= P(2.0) && output < P(0x1p30);
+    require(in_counts, "a stuck output's angle is at least 8 counts of the output's encoder and 2 of the motor's");
+    if (!in_counts) return limits;
+    limits.motor_counts = static_cast<std::int32_t>(whole(motor));
+    limits.output_counts = static_cast<std::int32_t>(whole(output));
+  }
+  return limits;
+}
 }  // namespace detail
 
 // Notes what does not fit. The model is the caller's to fill: `parameters.model.add<Effect>(...)` with the same `d`.
@@ -134,6 +166,7 @@ DriveParameters<N> derive(const DriveSetup<P>& s, const effects::DriveConstants<
     p.excitation = Excitation::derive<N>(s.excitation, s.excites_torque ? d.torque_base : d.velocity_base, d);
   p.residual_map = ResidualMap::derive<N>(s.residual_map, d);
   p.safety = detail::safety_limits<N>(s.safety, s.motor_counts, d);
+  p.following = detail::following_limits<N>(s.safety, s.motor_counts, s.output_counts, d);
   return p;
 }
 

@@ -41,6 +41,7 @@ enum class Section : std::uint16_t {
   excitation_lines = 0x118,
   safety = 0x119,
   residual_map = 0x11A,
+  following = 0x11B,
 };
 inline constexpr std::uint16_t kFirstNote = 0xF000;
 inline constexpr std::uint16_t kParametersNote = 0xF000;  // what the effects were derived from, for `unpack`

@@ -117,6 +117,12 @@ inline constexpr std::array<FaultText, kFaults> kFaultTexts{{
     {"tick_overrun", "a control tick did not end before the next one was due"},
     {"watchdog", "the watchdog reset the drive: a part of the application had stopped reporting"},
     {"stop_failed", "the shaft did not come to rest in time (stop_s)"},
+    {"following_error",
+     "the motor stays behind its set point: it is blocked, overloaded or set points jump (following_error, "
+     "following_velocity, following_s)"},
+    {"output_encoder_stuck",
+     "the motor turned and the output's encoder shows no motion: encoder, its line, coupling or gear broken "
+     "(output_stuck)"},
 }};
 constexpr FaultText fault_text(std::uint8_t number) {
   return number < kFaults ? kFaultTexts[number] : FaultText{"unknown", "a fault that this tool does not know"};

@@ -10,8 +10,9 @@ root=$here/../..
 memory() { # flash at, length; RAM at, length
   echo "-Wl,--defsym=flash_origin=$1,--defsym=flash_length=$2,--defsym=ram_origin=$3,--defsym=ram_length=$4"
 }
-# No scheduling before registers are given out: these processors gain nothing from it, and spill.
-common=(-std=c++20 -O2 -fno-schedule-insns -Wall -Wextra -Werror -fno-exceptions -fno-rtti -fno-threadsafe-statics
+# No scheduling before registers are given out, and no values kept for another branch: these processors gain nothing from
+# it, and spill.
+common=(-std=c++20 -O2 -fno-schedule-insns -fno-tree-pre -Wall -Wextra -Werror -fno-exceptions -fno-rtti -fno-threadsafe-statics
   -ffunction-sections -fdata-sections -nostartfiles -Wl,--gc-sections -T "$here/bare.ld" -I"$root")
 # The RISC-V compiler of Debian has no C++ headers; those of the ARM one are of the same library, and the few that are
 # used here need nothing else.

@@ -163,8 +163,8 @@ Drive drive;
                                                 const Loops::Command<Fixed>& set) {
   const auto estimate = EncoderKalman::update<Fixed>(d.filter_state, d.filter, measured.angle);
   Inputs<Fixed> in;
-  in.angle = measured.angle;
-  in.velocity = estimate.velocity;
+  in.angle.raw = measured.angle.raw;
+  in.velocity.raw = estimate.velocity.raw;
   in.direction.raw = measured.direction.raw;
   in.torsion.raw = measured.torsion.raw;
   in.torsion_rate.raw = measured.torsion_rate.raw;

@@ -66,6 +66,11 @@ TEST(DriveSettings, FollowFromTheRatingsWhereTheFileDoesNotStateThem) {
   EXPECT_NEAR(s.trajectory.acceleration_limit, 0.5 * 0.1 / 1e-4, 0.1);
   EXPECT_NEAR(s.feedforward.stiffness, 6300.0, 0.1);
   EXPECT_NEAR(s.torsion.output_inertia, 0.06, 1e-12);
+  // Twice where the position loop asks for the limit of the velocity.
+  EXPECT_NEAR(s.safety.following_error, 2.0 * 200.0 / (kTurn * 10.0), 1e-9);
+  EXPECT_NEAR(s.safety.following_velocity, 150.0, 1e-9);
+  // Eight times what rated torque twists the gear by.
+  EXPECT_NEAR(s.safety.output_stuck, 8.0 * 40.0 / 6300.0, 1e-4);
 }
 
 TEST(DriveSettings, AreThoseOfTheFile) {
@@ -73,7 +78,8 @@ TEST(DriveSettings, AreThoseOfTheFile) {
       "[motor_encoder]\ncounts = 8192\ncorner_hz = 80\n[output_encoder]\ncounts = 65536\n[velocity_loop]\n"
       "bandwidth_hz = 30\nintegral_nm_rad = 0\n[position_loop]\nbandwidth_hz = 4\n[limits]\ncurrent_a = 1.5\n"
       "velocity_rad_s = 100\nlowest_rad = -6.283185307179586\nhighest_rad = 12.566370614359172\n[torque_sensor]\n"
-      "full_scale_nm = 90\nripple_order = 4\n[faults]\nhost_s = 0.5\n[excitation]\nshape = \"composite\"\n"
+      "full_scale_nm = 90\nripple_order = 4\n[faults]\nhost_s = 0.5\nfollowing_error_rad = 2.5\n"
+      "following_velocity_rad_s = 30\nfollowing_s = 0.1\noutput_stuck_rad = 0.02\n[excitation]\nshape = \"composite\"\n"
       "amplitude = 0.05\nduration_s = 2\n");
   EXPECT_NEAR(s.motor_corner, kTurn * 80.0, 1e-9);
   EXPECT_EQ(s.output_counts, 65536u);
@@ -89,6 +95,10 @@ TEST(DriveSettings, AreThoseOfTheFile) {
   EXPECT_EQ(s.torque.full_scale, 90.0);
   EXPECT_EQ(s.ripple.order, 4.0);
   EXPECT_EQ(s.safety.host_s, 0.5);
+  EXPECT_EQ(s.safety.following_error, 2.5);
+  EXPECT_EQ(s.safety.following_velocity, 30.0);
+  EXPECT_EQ(s.safety.following_s, 0.1);
+  EXPECT_EQ(s.safety.output_stuck, 0.02);
   EXPECT_EQ(s.excitation.line_count, 3u);
   EXPECT_EQ(s.excitation.ticks, 40'000u);
 }
@@ -110,6 +120,10 @@ TEST(DriveSettings, ThatAreWrongAreRefusedWithTheirPlace) {
   expect(error_of("[motor_encoder]\ncounts = 3\n"), {"d.toml:3:", "between 4 and"});
   expect(error_of(kCounts + "[output_encoder]\n"), {"[output_encoder] needs counts"});
   expect(error_of(kCounts + "[excitation]\nshape = \"round\"\n"), {"d.toml:5:", "round", "multi_sine"});
+  expect(error_of(kCounts + "[faults]\nfollowing_error_rad = 0\n"),
+         {"d.toml:5:", "following_error_rad", "above nought"});
+  expect(error_of(kCounts + "[faults]\nfollowing_s = 4\n"), {"d.toml:5:", "following_s is 4", "at most 3"});
+  expect(error_of(kCounts + "[faults]\noutput_stuck_rad = -1\n"), {"d.toml:5:", "output_stuck_rad"});
   expect(error_of("[motor_encoder\n"), {"d.toml:2:"});
   model::Model m = some_model();
   m.effects.erase(m.effects.begin());
@@ -130,6 +144,11 @@ TEST(DriveSettings, ThatContradictEachOtherDoNotFit) {
   const auto d = deployment::bases_of(some_model(), 1.0 / 20'000.0, 1.0);
   const auto s = parsed(kCounts + "[limits]\nvelocity_rad_s = 150\noverspeed_rad_s = 100\n");
   EXPECT_THROW(deployment::settings_of(s, d, "d.toml"), PackError);
+  // An encoder too coarse to show the stated angle: a turn over 1000, of which 8 counts are 0.05 rad.
+  const std::string coarse = kCounts + "[output_encoder]\ncounts = 1000\n";
+  EXPECT_NO_THROW(deployment::settings_of(parsed(coarse), d, "d.toml"));
+  EXPECT_NO_THROW(deployment::settings_of(parsed(coarse + "[faults]\noutput_stuck_rad = 0.051\n"), d, "d.toml"));
+  EXPECT_THROW(deployment::settings_of(parsed(coarse + "[faults]\noutput_stuck_rad = 0.05\n"), d, "d.toml"), PackError);
 }
 
 // What is packed is what a drive takes, and unpack says it again.
@@ -160,6 +179,10 @@ TEST(DriveSettings, ComeBackFromABlock) {
     EXPECT_NEAR(value("acceleration_limit"), 500.0, 0.1);
     EXPECT_NEAR(value("fault_host"), 0.1, 1e-9);
     EXPECT_NEAR(value("residual_map_largest"), 0.025, 1e-6);
+    EXPECT_NEAR(value("fault_following_error"), 2.0 * 200.0 / (kTurn * 10.0), 1e-6);
+    EXPECT_NEAR(value("fault_following_velocity"), 150.0, 1e-4);
+    EXPECT_NEAR(value("fault_following"), 0.02, 1e-9);
+    EXPECT_NEAR(value("fault_output_stuck"), *more == '\0' ? 0.0 : 8.0 * 40.0 / 6300.0, 1e-4);
   }
 }
 

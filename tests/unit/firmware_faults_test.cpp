@@ -36,6 +36,11 @@ std::uint32_t ticks_of(double seconds) {
   return static_cast<std::uint32_t>(std::lround(seconds * kTickHz));
 }
 
+// By how much the output may turn before its encoder has to show it, and a twentieth for the velocity's waves.
+std::uint32_t stuck_output_ticks(double motor_rad_s) {
+  return ticks_of(1.05 * demo_setup().safety.output_stuck * demo_drive().gear_ratio / motor_rad_s);
+}
+
 std::vector<Case> cases() {
   const auto& s = demo_setup().safety;
   const auto stated = [](Fault fault) { return firmware::info_of(fault).ticks; };
@@ -64,6 +69,11 @@ std::vector<Case> cases() {
        stated(Fault::overtemperature)},
       {Fault::host_lost, [](VirtualDrive&) {}, ticks_of(s.host_s) + 1, false},
       {Fault::tick_overrun, injected(Injection::tick_overrun), stated(Fault::tick_overrun)},
+      // At 60 rad/s the motor has turned by so much within:
+      {Fault::output_encoder_stuck, injected(Injection::output_encoder_stuck), stuck_output_ticks(60.0)},
+      // More than the drive can hold turns it backwards.
+      {Fault::following_error, [](VirtualDrive& drive) { drive.rig().set_load_torque(45.0); },
+       kSpeedUp + ticks_of(s.following_s)},
   };
 }
 
@@ -118,6 +128,92 @@ TEST(Fault, AnEncoderThatIsStuckFromTheStartIsFoundByTheTorqueThatMovesNothing) 
   EXPECT_EQ(drive->status().fault.fault, Fault::motor_encoder_stuck);
   // It drove for as long as the torque took to rise, and then for the stated time.
   EXPECT_LT(drive->status().fault.tick, 100 + ticks_of(0.4 + demo_setup().safety.stuck_s));
+}
+
+// Of two lines that are a quarter of a period apart one is lost: the count goes to and fro by one.
+TEST(Fault, ALostLineOfTheOutputsEncoderIsFoundAsOneThatIsStuckAndTheShaftComesToRest) {
+  for (const double velocity : {60.0, -10.0}) {
+    const auto drive = idle_drive();
+    drive->command(arm_velocity(velocity));
+    run_with_host(*drive, 0.3);
+    drive->rig().inject(Injection::output_line_lost);
+    const std::uint32_t from = drive->status().tick;
+    run_with_host(*drive, 1.0);
+    EXPECT_EQ(name_of(drive->status().fault.fault), "output_encoder_stuck");
+    EXPECT_LE(drive->status().fault.tick - from, stuck_output_ticks(std::abs(velocity)));
+    EXPECT_EQ(drive->status().mode, Mode::fault);
+    EXPECT_EQ(drive->rig().truth().motor_velocity, 0.0);
+  }
+}
+
+// Locked, the motor twists the gear by all that it can, to and fro.
+TEST(Fault, ALockedOutputIsNoStuckEncoder) {
+  VirtualDrive drive({.drive = demo_drive(), .seed = 1, .locked = true}, demo_block());
+  drive.run(100);
+  drive.command(arm_current(0.0));
+  for (int k = 0; k < 10; ++k) {
+    drive.command(as_set_point(arm_current(k % 2 == 0 ? 3.5 : -3.5)));
+    run_with_host(drive, 0.1);
+    ASSERT_EQ(drive.status().mode, Mode::current) << name_of(drive.status().fault.fault);
+  }
+}
+
+// A load that the drive cannot hold drags it from where it shall be.
+TEST(Fault, AFollowingErrorIsFoundTheStatedTimeAfterItsLimitWasPassed) {
+  const auto& s = demo_setup().safety;
+  for (const double load : {-45.0, 30.0}) {
+    const auto drive = idle_drive();
+    drive->command(arm_position(0.0));
+    run_with_host(*drive, 0.2);
+    const double held = drive->rig().truth().motor_angle;
+    drive->rig().set_load_torque(load);
+    std::uint32_t passed = 0;
+    while (drive->status().fault.fault == Fault::none && drive->status().tick < 40'000) {
+      if (passed == 0 && std::abs(drive->rig().truth().motor_angle - held) > s.following_error)
+        passed = drive->status().tick;
+      drive->post(of_kind(Command::Kind::heartbeat));
+      drive->run(1);
+    }
+    EXPECT_EQ(name_of(drive->status().fault.fault), "following_error");
+    EXPECT_EQ(drive->status().mode, Mode::fault);
+    EXPECT_FALSE(drive->last().actuation.enabled);
+    EXPECT_NEAR(drive->status().fault.tick - passed, ticks_of(s.following_s), 3.0);
+    // What was seen and what its limit was, in 2^-16 turns of the motor.
+    EXPECT_NEAR(drive->status().fault.limit / 65536.0 * kTurn, s.following_error, 1e-3);
+    EXPECT_GT(drive->status().fault.seen, drive->status().fault.limit);
+  }
+}
+
+TEST(Fault, AStreamThatBeginsFarAwayIsReachedAndOneThatJumpsThenIsAFollowingError) {
+  const auto drive = idle_drive();
+  const auto stream = [](double turns) {
+    Command c = arm_position(turns);
+    c.stream = true;
+    return c;
+  };
+  const double far = 5.0 * demo_setup().safety.following_error / kTurn;
+  ASSERT_EQ(drive->command(stream(far)).refusal, Refusal::none);
+  run_with_host(*drive, 1.0);
+  ASSERT_EQ(drive->status().mode, Mode::position) << name_of(drive->status().fault.fault);
+  EXPECT_NEAR(drive->rig().truth().motor_angle / kTurn, far, 0.01);
+  drive->command(as_set_point(stream(0.0)));
+  run_with_host(*drive, 2.0 * demo_setup().safety.following_s);
+  EXPECT_EQ(name_of(drive->status().fault.fault), "following_error");
+}
+
+// Blocks of drives that were packed before there were these limits.
+TEST(Fault, ABlockWithoutLimitsOfFollowingIsTakenAndTheyAreNotWatched) {
+  auto setup = demo_setup();
+  setup.safety.following_error = 0.0;
+  const auto drive = idle_drive(setup);
+  drive->rig().inject(Injection::output_encoder_stuck);
+  drive->command(arm_velocity(60.0));
+  run_with_host(*drive, 1.0);
+  EXPECT_EQ(drive->status().mode, Mode::velocity) << name_of(drive->status().fault.fault);
+  drive->command(arm_position(20.0));
+  drive->rig().set_load_torque(21.0);
+  run_with_host(*drive, 0.3);
+  EXPECT_NE(drive->status().fault.fault, Fault::following_error);
 }
 
 TEST(Fault, AStopThatDoesNotComeToRestSwitchesOffInTheStatedTime) {
@@ -193,6 +289,13 @@ TEST(Fault, HardUseIsNone) {
     drive->rig().set_load_torque(k % 2 == 0 ? 8.0 : -8.0);
     run_with_host(*drive, 0.3);
     ASSERT_EQ(drive->status().mode, Mode::velocity) << name_of(drive->status().fault.fault);
+  }
+  // From turn to turn as fast as the limits allow, and held against a load.
+  for (int k = 0; k < 8; ++k) {
+    ASSERT_EQ(drive->command(arm_position(k % 2 == 0 ? 8.0 : -3.0)).refusal, Refusal::none);
+    drive->rig().set_load_torque(k % 3 == 0 ? 3.0 : -3.0);
+    run_with_host(*drive, 0.5);
+    ASSERT_EQ(drive->status().mode, Mode::position) << name_of(drive->status().fault.fault);
   }
   // At rest against friction for long.
   drive->command(arm_current(0.3));

@@ -121,5 +121,25 @@ TEST(Scenarios, ALostEncoderLineSwitchesTheDriveOff) {
   EXPECT_EQ(lost.end.mode, firmware::Mode::fault);
 }
 
+// The sine passes its middle at 0.63 rad/s: 51 mrad, which a stuck output may turn by, take 81 ms.
+TEST(Scenarios, AnOutputEncoderThatIsStuckOrLosesALineBringsTheDriveToRest) {
+  for (const char* what : {"output-encoder-stuck", "output-line-lost"}) {
+    const auto lost = run(with_event(std::string("what = \"") + what + "\"\nat_s = 1.0\n"), true);
+    EXPECT_EQ(lost.first_fault.fault, firmware::Fault::output_encoder_stuck) << what;
+    EXPECT_GE(lost.first_fault.tick, 20'000u) << what;
+    EXPECT_LE(lost.first_fault.tick, 20'000u + 101 + 1700) << what;
+    EXPECT_EQ(lost.end.mode, firmware::Mode::fault) << what;
+    EXPECT_EQ(lost.trace.back().motor_velocity_rad_s, 0.0) << what;
+  }
+}
+
+TEST(Scenarios, ALoadBeyondTheDrivesTorqueIsAFollowingErrorAndABlowIsNone) {
+  const auto dragged = run(with_event("what = \"load-shock\"\nat_s = 0.5\nvalue = 40.0\n"));
+  EXPECT_EQ(dragged.first_fault.fault, firmware::Fault::following_error);
+  EXPECT_EQ(dragged.end.mode, firmware::Mode::fault);
+  const auto hit = run(with_event("what = \"load-shock\"\nat_s = 0.5\nduration_s = 0.05\nvalue = 25.0\n"));
+  EXPECT_EQ(hit.first_fault.fault, firmware::Fault::none);
+}
+
 }  // namespace
 }  // namespace flexspline::tests

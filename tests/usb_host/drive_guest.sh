@@ -68,7 +68,10 @@ is_open() {
   [ ! -e /dev/hidraw0 ]
 }
 # pulled MICROSECONDS COMMAND...: pulls the plug so long after the command opened the drive; sets `code`, and puts the
-# plug in again. The command stands still while this script looks and pulls, so that a slow guest does not matter.
+# plug in again. The command stands still while this script looks and pulls, so that a slow guest does not matter; it
+# runs for `step` microseconds between two looks.
+step=10000
+send() { kill -"$1" $command 2>/dev/null || :; }
 pulled() {
   delay=$1
   shift
@@ -77,49 +80,85 @@ pulled() {
   "$@" >said.txt 2>&1 &
   command=$!
   until is_open; do
-    [ -d "/proc/$command" ] || fail "$* does not open the drive"
-    kill -CONT $command
-    usleep 10000
-    kill -STOP $command
+    if ! [ -d "/proc/$command" ]; then
+      # A short one may be done before it is looked at.
+      wait $command && return
+      cat said.txt
+      fail "$* does not open the drive"
+    fi
+    send CONT
+    usleep $step
+    send STOP
   done
-  kill -CONT $command
-  usleep "$delay"
-  kill -STOP $command
+  if [ "$delay" -gt 0 ]; then
+    send CONT
+    usleep "$delay"
+    send STOP
+  fi
   detach 00
-  kill -CONT $command
+  send CONT
   wait $command || code=$?
   attach 1-1
+}
+
+# was_cut WHAT: the command that was pulled says that the drive is gone and what to do, or it was done before.
+was_cut() {
+  echo "  pulled during $1: $code, $(tail -n 1 said.txt)"
+  [ $code -eq 0 ] && return 1
+  [ $code -eq 2 ] || { cat said.txt; fail "$1 without a plug ended with $code"; }
+  expect "the drive is gone" said.txt
+  expect "plug it in again" said.txt
+}
+# What the drive has in use: one of both blocks, whatever was cut short.
+now_in_use() { # TOOL
+  must "$1" backup --out now.block
+  is_block made.block now.block && { now=made.block; other=new.block; return; }
+  is_block new.block now.block || fail "the block is neither the old nor the new one"
+  now=new.block other=made.block
 }
 
 cut_short() { # TOOL
   cut=0
   # What is not there yet is flashed, so that there is an old block and a new one.
   for delay in 1000 40000; do
-    must "$1" backup --out old.block
-    other=made.block
-    is_block old.block made.block && other=new.block
-    pulled $delay "$1" flash --block $other
-    case $code in
-      0) echo "  pulled $delay us after a flash began: it was done" ;;
-      2)
-        cut=$((cut + 1))
-        echo "  pulled $delay us after a flash began: $(tail -n 1 said.txt)"
-        expect "hid:TWIN: the drive is gone" said.txt
-        expect "plug it in again" said.txt
-        ;;
-      *) cat said.txt; fail "flash without a plug ended with $code" ;;
-    esac
-    must "$1" backup --out now.block
-    is_block old.block now.block || is_block $other now.block || fail "the block is neither the old nor the new one"
-    must "$1" flash --block $other
-    must "$1" backup --out now.block
-    is_block $other now.block || fail "the second try did not flash"
+    now_in_use "$1"
+    wanted=$other
+    pulled $delay "$1" flash --block $wanted
+    was_cut "a flash, after $delay us" && cut=$((cut + 1))
+    now_in_use "$1"
+    must "$1" flash --block $wanted
+    now_in_use "$1"
+    [ $now = $wanted ] || fail "the second try did not flash"
   done
   [ $cut -ge 1 ] || fail "no flash was cut short"
+  # Shorter than a flash: the plug is pulled as soon as they have opened the drive.
+  step=2000 cut=0
+  pulled 0 "$1" restore
+  was_cut "a restore" && cut=$((cut + 1))
+  now_in_use "$1"
+  wanted=$other
+  must "$1" restore
+  pulled 0 "$1" backup --out cut.block
+  if was_cut "a backup"; then
+    cut=$((cut + 1))
+    [ ! -e cut.block ] || fail "half a backup was left behind"
+  fi
+  [ $cut -ge 1 ] || fail "neither restore nor backup was cut short"
+  now_in_use "$1"
+  [ $now = $wanted ] || fail "the second try did not restore"
+  # It lists what it has found, or says that it is gone.
+  pulled 0 "$1" drives
+  echo "  pulled during drives: $code, $(head -n 1 said.txt)"
+  expect "TWIN" said.txt
+  unexpected "your user may not|assert|terminate" said.txt
+  must "$1" drives
+  expect "hid:TWIN" said.txt
+  pulled 300000 "$1" monitor
+  was_cut "monitor" || fail "monitor went on without a plug"
+  must "$1" monitor --seconds 0.3
+  step=10000
   pulled 1200000 "$1" record --plan /drive/long.toml --out "cut-$1"
-  echo "  pulled while recording: $(tail -n 1 said.txt)"
-  [ $code -eq 2 ] || { cat said.txt; fail "record without a plug ended with $code"; }
-  expect "the drive is gone" said.txt
+  was_cut "record" || fail "record went on without a plug"
   # A drive that lost its host while it was armed says so until somebody has seen it.
   must "$1" drives
   expect ", fault" said.txt
