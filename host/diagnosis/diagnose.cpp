@@ -9,6 +9,7 @@
 #include "host/diagnosis/diagnosis.hpp"
 #include "host/diagnosis/disturbances.hpp"
 #include "host/diagnosis/doubts.hpp"
+#include "host/diagnosis/other_balances.hpp"
 #include "host/diagnosis/rivals.hpp"
 #include "host/diagnosis/trials.hpp"
 #include "host/estimation/in_parallel.hpp"
@@ -44,6 +45,7 @@ Candidate report(const Trial& trial, const Search& search, data::Axis axis) {
   c.order = trial.proposal.order;
   c.balance = search.data->balance();
   c.score = trial.fall.score;
+  c.score_elsewhere = trial.elsewhere;
   c.chi2_fall_percent = trial.fall.chi2_percent;
   c.rmse_cv_before = search.base.rmse_cv();
   c.rmse_cv_after = trial.judged.rmse_cv();
@@ -119,12 +121,17 @@ std::vector<Examined> examine(regression::Identification& base, const std::vecto
     one.search.base = one.search.keep.minCoeff() < 1.0 ? judge(data, base.terms, one.search.keep) : std::move(whole);
     settle_shapes(one.search);
     one.trials = rank(one.search);
-    doubt_orders(one.search, one.trials);
     if (std::string warning = one_way_warning(data); data.balance() == regression::Balance::motor && !warning.empty())
       result.warnings.push_back(std::move(warning));
     one.floor = comparison::pooled(comparison::noise_floors(data, one.search.base.terms, experiments, base.model.drive),
                                    data.records());
     all.push_back(std::move(one));
+  }
+  std::vector<Search*> searches;
+  for (Examined& one : all) searches.push_back(&one.search);
+  for (Examined& one : all) {
+    hear_other_balances(searches, one.search, one.trials);
+    doubt_orders(one.search, one.trials);
   }
   return all;
 }
@@ -132,7 +139,7 @@ std::vector<Examined> examine(regression::Identification& base, const std::vecto
 // The balance whose named effect scores best; where none is named, the one that stands highest above its floor.
 Examined& most_telling(std::vector<Examined>& all) {
   const auto importance = [](const Examined& e) {
-    if (e.names_one()) return 1e9 + e.trials.front().fall.score;
+    if (e.names_one()) return 1e9 + e.trials.front().score();
     return e.floor.rmse ? e.search.base.rmse() / *e.floor.rmse : 0.0;
   };
   return *std::max_element(all.begin(), all.end(),
@@ -163,7 +170,7 @@ void name_effects(const Examined& chosen, const std::string& alias, Diagnosis& r
   for (const Trial& t : list) {
     // A law with more parameters that leaves the same error is no rival of the simpler one: it can do no worse.
     const bool wider = t.proposal.added > list.front().proposal.added;
-    const bool close = passes(t) && !wider && t.fall.score >= list.front().fall.score - kRivalMargin;
+    const bool close = passes(t) && !wider && t.score() >= list.front().score() - kRivalMargin;
     if (close || t.proposal.entry->name() == alias)
       result.named.push_back({std::string(t.proposal.entry->name()), t.proposal.order});
   }
@@ -200,7 +207,7 @@ void list_candidates(std::vector<Examined>& all, data::Axis axis, Diagnosis& res
     }
   }
   std::stable_sort(result.candidates.begin(), result.candidates.end(), [](const Candidate& a, const Candidate& b) {
-    return a.admissible != b.admissible ? a.admissible : a.score > b.score;
+    return a.admissible != b.admissible ? a.admissible : a.score + a.score_elsewhere > b.score + b.score_elsewhere;
   });
 }
 

@@ -53,6 +53,7 @@ struct Candidate {
   std::optional<double> order;
   regression::Balance balance = regression::Balance::motor;
   double score = 0.0;              // fall of cross-validated chi-square over the autocorrelation time, less k ln(n_eff)
+  double score_elsewhere = 0.0;    // on the other balances that the effect acts on, with the same parameters
   double chi2_fall_percent = 0.0;  // cross-validated
   double rmse_cv_before = 0.0;
   double rmse_cv_after = 0.0;

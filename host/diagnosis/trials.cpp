@@ -137,7 +137,7 @@ Trial best_admissible(Search& search, Proposal proposal, Trial refused) {
 
 bool better(const Trial& a, const Trial& b) {
   if (a.admissible != b.admissible) return a.admissible;
-  return a.fall.score > b.fall.score;
+  return a.score() > b.score();
 }
 
 }  // namespace
@@ -221,9 +221,13 @@ std::vector<Trial> rank(Search& search) {
     Trial again = evaluate(own, std::move(refined));
     if (better(again, trial) || !trial.admissible) trial = std::move(again);
   });
-  std::stable_sort(trials.begin(), trials.end(), better);
-  prefer_simple(search.base, trials);
+  put_in_order(search.base, trials);
   return trials;
+}
+
+void put_in_order(const Judged& base, std::vector<Trial>& trials) {
+  std::stable_sort(trials.begin(), trials.end(), better);
+  prefer_simple(base, trials);
 }
 
 bool is_rising(const Trial& trial) {

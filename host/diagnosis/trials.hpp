@@ -23,9 +23,12 @@ struct Trial {
   Proposal proposal;
   Judged judged;
   Fall fall;
+  double elsewhere = 0.0;  // score on the other balances that the effect acts on, with the same parameters
   bool admissible = true;
   std::string why_not;
   std::string imitated_by;  // the effect of the model that the data cannot tell it from
+
+  double score() const { return fall.score + elsewhere; }
 };
 
 // Margin of score within which two effects are rivals.
@@ -45,6 +48,8 @@ bool passes(const Trial& trial);
 
 // All effects that could be added, best first; the best ones with their shapes searched continuously.
 std::vector<Trial> rank(Search& search);
+// Best first: admissible ones before others, by score; of rivals that leave all but the same error, the simplest.
+void put_in_order(const Judged& base, std::vector<Trial>& trials);
 
 // Forward once more and back: an effect that was named because it resembles the true one is dropped when the true one
 // is in. Returns the trial to name in the place of `first`, or nothing.

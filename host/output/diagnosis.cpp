@@ -189,6 +189,7 @@ json candidate_json(const Candidate& c, std::size_t rank, const std::string& uni
           {"balance", balance_name(c.balance)},
           {"rank", rank},
           {"score", json_number(c.score)},
+          {"score_elsewhere", json_number(c.score_elsewhere)},
           {"chi2_fall_percent", json_number(c.chi2_fall_percent)},
           {"rmse_cv_before", json_number(c.rmse_cv_before)},
           {"rmse_cv_after", json_number(c.rmse_cv_after)},
