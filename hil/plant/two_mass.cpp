@@ -291,11 +291,9 @@ TwoMass::Event TwoMass::first_event(const State& from, double h, State& to, doub
   Event first = Event::none;
   for (const Event event : kEvents) {
     if (event == first || margin(event, to) >= 0.0) continue;
-    taken = locate(event, from, taken, to);
-    if (!try_step(from, taken, to)) {
-      taken = 0.0;
-      return Event::none;
-    }
+    const double at = locate(event, from, taken, to);
+    if (!try_step(from, at, to)) throw std::runtime_error("plant: a step to an event did not converge");
+    taken = at;
     first = event;
   }
   return first;
@@ -309,13 +307,11 @@ void TwoMass::take_step(double h) {
     piece = std::min(piece, remaining);
     resolve_resting(state_, piece);
     State to;
-    const auto shorter = [&] {
-      piece *= 0.25;
-      if (piece < 1e-12 * h)
-        throw std::runtime_error("plant: the implicit step does not converge; check the effects' parameters");
-    };
     if (!try_step(state_, piece, to)) {
-      shorter();
+      piece *= 0.25;
+      if (piece < 1e-12 * h) {
+        throw std::runtime_error("plant: the implicit step does not converge; check the effects' parameters");
+      }
       continue;
     }
     if (events > kEventLimit) {
@@ -329,10 +325,6 @@ void TwoMass::take_step(double h) {
     }
     double taken = piece;
     const Event event = first_event(state_, piece, to, taken);
-    if (taken <= 0.0) {
-      shorter();
-      continue;
-    }
     state_ = to;
     if (event == Event::motor_stop || event == Event::output_stop) {
       (event == Event::motor_stop ? state_.motor_velocity : state_.output_velocity) = 0.0;

@@ -85,7 +85,6 @@ class TwoMass {
   bool try_step(const State& from, double h, State& to) const;
   void take_step(double h);
   double margin(Event event, const State& s) const;
-  // `taken` is nought where no step to the event converges.
   Event first_event(const State& from, double h, State& to, double& taken) const;
   double locate(Event event, const State& from, double h, const State& at_h) const;
   void settle(State& s) const;
