@@ -107,13 +107,14 @@ control::DriveSetup<double> setup_of(const plant::Drive& drive, const effects::D
              .torque_limit = most_torque,
              .current_limit = drive.current_limit_a};
   s.trajectory = {.velocity_limit = drive.rated_velocity_rad_s, .acceleration_limit = 0.5 * most_torque / inertia};
-  s.feedforward = {.direction_band = 0.2,
+  s.feedforward = {.direction_band = 1e-4 * d.velocity_base,
                    .torque_limit = 1.9 * d.torque_base,
                    .load_limit = 1.9 * drive.rated_torque_nm,
                    .stiffness = stiffness,
                    .torsion_limit = 1.9 * d.torsion_base,
                    .torsion_rate_limit = 0.5 * d.velocity_base / d.gear_ratio};
-  if (const plant::Effect* damping = drive.find("structural_damping")) {
+  // Of what is hidden the drive is not told.
+  if (const plant::Effect* damping = drive.find("structural_damping"); damping != nullptr && !damping->hidden) {
     s.feedforward.damping_torque = damping->value("torque");
     s.feedforward.damping_exponent = damping->value("exponent");
   }

@@ -17,6 +17,7 @@
 #include <iterator>
 #include <stdexcept>
 #include <string>
+#include <string_view>
 #include <utility>
 
 extern char** environ;
@@ -43,6 +44,18 @@ std::string text_of(const std::filesystem::path& file) {
   return {std::istreambuf_iterator<char>(in), std::istreambuf_iterator<char>()};
 }
 
+constexpr const char* kMakes = "boards/qemu_stm32f405/build.sh makes one";
+
+// By the header: an ELF file of 32 bits for machine 40.
+bool is_arm_program(const std::filesystem::path& file) {
+  std::array<char, 20> head{};
+  std::ifstream(file, std::ios::binary).read(head.data(), head.size());
+  return std::string_view(head.data(), 5) ==
+             "\x7f"
+             "ELF\x01" &&
+         head[18] == 40 && head[19] == 0;
+}
+
 }  // namespace
 
 bool Processor::is_installed() {
@@ -51,7 +64,8 @@ bool Processor::is_installed() {
 
 Processor::Processor(std::filesystem::path image) : image_(std::filesystem::absolute(std::move(image))) {
   if (!std::filesystem::is_regular_file(image_))
-    throw std::runtime_error(image_.string() + ": no such firmware image; boards/qemu_stm32f405/build.sh makes it");
+    throw std::runtime_error(image_.string() + ": no such firmware image; " + kMakes);
+  if (!is_arm_program(image_)) throw std::runtime_error(image_.string() + ": is no ARM program (ELF); " + kMakes);
   if (!is_installed())
     throw std::runtime_error(std::string(kEmulator) + " is not installed; it is in the Debian package of that name");
   // A pipe whose reader went away is an error of write(), not the end of this program.
@@ -187,7 +201,10 @@ void Processor::receive(void* bytes, std::size_t count) {
 
 void Processor::fail(const char* what) {
   const std::string said = text_of(folder_ / "log");
-  throw std::runtime_error("the emulated processor " + std::string(what) + (said.empty() ? "" : ": " + said));
+  // Of a processor that stops at a fault the emulator lists all registers.
+  throw std::runtime_error("the emulated processor " + std::string(what) +
+                           (said.empty() ? "" : ": " + said.substr(0, said.find('\n'))) + "; is " + image_.string() +
+                           " the image of boards/qemu_stm32f405?");
 }
 
 }  // namespace flexspline::board

@@ -107,7 +107,7 @@ void print(const Comparison& c, Console& console) {
   for (const ComparedRun& run : c.runs)
     if (!run.model.empty()) console.line(fmt::format("  {:<6} {}", run.label, run.model));
   if (!c.no_prediction.empty()) console.line(output::wrapped("No prediction: " + c.no_prediction));
-  console.line(fmt::format("  {:.0f} times real time.", c.realtime_factor));
+  console.line(fmt::format("  {} times real time.", number(c.realtime_factor, 2)));
 }
 
 }  // namespace

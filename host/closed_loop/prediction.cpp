@@ -6,12 +6,24 @@
 #include <random>
 #include <stdexcept>
 
+#include "host/catalogue/catalogue.hpp"
+
 namespace flexspline::closed_loop {
 namespace {
 
 constexpr double kMostDeviations = 3.0;
 // What draws do not show: that a fit's own parameters are not the drive's where two effects stand in for each other.
 constexpr double kLeastSpread = 0.05;
+
+// What cannot be, a fit would not have found either: an exponent near nought, say, makes a plant that no step is short
+// enough for. Bounds of shapes that are searched as ratios are not those of their values.
+double within_bounds(const model::Effect& effect, const model::Parameter& p, double value) {
+  const catalogue::Entry* entry = catalogue::find(effect.type);
+  if (entry == nullptr) return value;
+  for (const effects::ParameterInfo& info : entry->parameters)
+    if (info.name == p.name && info.per.empty() && info.root_of.empty()) return std::clamp(value, info.low, info.high);
+  return value;
+}
 
 }  // namespace
 
@@ -26,7 +38,7 @@ model::Model drawn(const model::Model& model, std::uint64_t seed, std::uint64_t 
       if (!p.value || !p.std || p.fixed || !(*p.std > 0.0)) continue;
       const double moved = *p.value + deviation * *p.std;
       // A sign is physics.
-      p.value = moved * *p.value > 0.0 ? moved : 0.1 * *p.value;
+      p.value = within_bounds(effect, p, moved * *p.value > 0.0 ? moved : 0.1 * *p.value);
     }
   return out;
 }

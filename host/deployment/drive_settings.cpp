@@ -272,7 +272,7 @@ control::DriveSetup<double> parse_drive_setup(const std::string& toml, const std
   setup.trajectory.highest = turns("highest_rad", setup.trajectory.highest);
 
   setup.feedforward = {
-      .direction_band = s.positive("feedforward", "direction_band_rad_s", 1e-3 * d.velocity_base),
+      .direction_band = s.positive("feedforward", "direction_band_rad_s", 1e-4 * d.velocity_base),
       .torque_limit = 1.9 * d.torque_base,
       .load_limit = 1.9 * d.output_torque_base,
       .stiffness = stiffness,

@@ -42,6 +42,10 @@ std::vector<Channel> channels_of(const planning::Run& run) {
   return channels;
 }
 
+double turns_of(std::int64_t angle) {
+  return std::ldexp(static_cast<double>(angle), -fixed::kAngleBits);
+}
+
 // A position whose whole turns are counted here: the next one is the nearest to where the motion would lead.
 class Unwrapped {
  public:
@@ -102,8 +106,12 @@ class Recorder::Columns {
     watch();
   }
   // Of mode position, from where it began.
-  // Where the shaft stands when a run of mode position begins, turns.
-  void start_at(double turns) { start_turns_ = turns; }
+  // Where motor and output stand when the run begins, turns.
+  void start_at(double motor, double output) {
+    start_turns_ = motor;
+    motor_.begin(motor);
+    output_.begin(output);
+  }
   bool is_set() const { return set_.known(); }
   double set_point_rad() const { return set_.known() ? kTurn * (set_.now() - set_begin_) : 0.0; }
   std::uint32_t last_tick() const { return last_tick_; }
@@ -220,21 +228,24 @@ void Recorder::clear_fault() {
   if (session_.status().mode == protocol::Mode::fault) session_.command({.kind = protocol::CommandKind::clear_fault});
 }
 
-// Where the shaft stands, 2^-32 turns; the drive says it in telemetry alone.
-std::int64_t Recorder::angle_now() {
-  session_.subscribe({Channel::motor_turns, Channel::motor_fraction}, 20);
-  std::optional<std::int64_t> angle;
+// Where motor and output stand, whole turns and all; the drive says it in telemetry alone.
+Recorder::Standing Recorder::standing_now() {
+  session_.subscribe({Channel::motor_turns, Channel::motor_fraction, Channel::output_turns, Channel::output_fraction},
+                     20);
+  std::optional<Standing> standing;
   const auto end = Clock::now() + kSilence;
-  while (!angle && Clock::now() < end) {
+  while (!standing && Clock::now() < end) {
     const auto m = session_.next(Milliseconds(20));
     if (!m || !m->is_unasked()) continue;
     protocol::for_each_frame(*m, [&](const auto&, auto, std::span<const std::uint32_t> words) {
-      if (words.size() == 2)
-        angle = std::int64_t{static_cast<std::int32_t>(words[0])} * (std::int64_t{1} << 32) + std::int64_t{words[1]};
+      const auto angle = [&](std::size_t i) {
+        return std::int64_t{static_cast<std::int32_t>(words[i])} * (std::int64_t{1} << 32) + std::int64_t{words[i + 1]};
+      };
+      if (words.size() == 4) standing = {angle(0), angle(2)};
     });
   }
-  if (!angle) session_.fail("it does not say where its shaft is; check cable and power, then try again");
-  return *angle;
+  if (!standing) session_.fail("it does not say where its shaft is; check cable and power, then try again");
+  return *standing;
 }
 
 protocol::Mode Recorder::start(const planning::Run& run, std::optional<PositionMotion>& position) {
@@ -263,18 +274,18 @@ Recording Recorder::record(const planning::Run& run, const Watch& watch) {
   if (before.mode != protocol::Mode::idle)
     session_.fail(fmt::format("it is in mode {}, not idle; another program may have it", name_of(before.mode)));
   std::optional<PositionMotion> position;
-  std::int64_t angle = 0;  // where it begins
+  // Fractions of turns alone would put each run somewhere else, and the torsion between motor and output with it.
+  const Standing standing = standing_now();
   if (run.mode == planning::Mode::position) {
     position.emplace(run, plan_.limits, scales_);
-    angle = angle_now();
-    position->start_at(angle);
+    position->start_at(standing.motor);
   } else if (moves) {
     send_excitation(run);
   }
   const Milliseconds say_every = position ? kSetPoint : kHeartbeat;
   const auto say_ticks = static_cast<std::uint32_t>((position ? kSetPoint_s : kHeartbeatTick_s) / tick_s);
   Columns columns(scales_, plan_, tick_s, every_, out);
-  columns.start_at(std::ldexp(static_cast<double>(angle & 0xFFFFFFFF), -fixed::kAngleBits));
+  columns.start_at(turns_of(standing.motor), turns_of(standing.output));
   try {
     session_.subscribe(channels_of(run), every_);
     const protocol::Mode mode = moves ? start(run, position) : protocol::Mode::idle;

@@ -47,7 +47,11 @@ class Recorder {
  private:
   class Columns;
   void send_excitation(const planning::Run& run);
-  std::int64_t angle_now();
+  // 2^-32 turns.
+  struct Standing {
+    std::int64_t motor = 0, output = 0;
+  };
+  Standing standing_now();
   protocol::Mode start(const planning::Run& run, std::optional<PositionMotion>& position);
 
   Session& session_;
