@@ -62,9 +62,11 @@ class Drive {
       static firmware::ReportLink<Service, Reports> report_link(service, device.template get<Reports>());
       board_.start_tick();
       for (;;) {
-        if (usb) port.poll(device);
-        if (usb) report_link.turn(device.configured());
-        if (usb) device.poll();
+        if (usb) {
+          port.poll(device);
+          report_link.turn(device.configured());
+          device.poll();
+        }
         if (!device.configured()) serial_link.turn();
         if (update.turn(application_.status(), device.configured(), device.template get<usb::DfuRuntime>())) {
           port.stop();

@@ -145,14 +145,14 @@ Orders choose_orders(const std::vector<Record>& records, Family family) {
   const std::vector<Orders> all = candidates(family);
   std::vector<double> rms;
   for (const Orders& o : all) rms.push_back(held_out_rms_of(folds, o));
-  const double best = *std::min_element(rms.begin(), rms.end());
+  auto chosen = static_cast<std::size_t>(std::min_element(rms.begin(), rms.end()) - rms.begin());
+  const double best = rms[chosen];
   if (!std::isfinite(best))
     throw std::invalid_argument(
         "no order gives a stable model on data left out; give orders, or longer records that move");
-  std::size_t chosen = all.size();
   for (std::size_t k = 0; k < all.size(); ++k) {
     if (rms[k] > kAsGood * best) continue;
-    if (chosen == all.size() || all[k].parameters(inputs) < all[chosen].parameters(inputs) ||
+    if (all[k].parameters(inputs) < all[chosen].parameters(inputs) ||
         (all[k].parameters(inputs) == all[chosen].parameters(inputs) && rms[k] < rms[chosen]))
       chosen = k;
   }

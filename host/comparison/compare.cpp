@@ -225,8 +225,8 @@ class Comparer {
       result_.warnings.push_back(fmt::format("no free run: {}", unusable.what()));
       return;
     }
-    for (const FreeRunSignal& signal : free_run_signals(prepared_, i, std::move(run)))
-      add_free_run(i, signal.name, signal.measured, signal.simulated);
+    const auto signals = free_run_signals(prepared_, i, std::move(run));
+    for (const FreeRunSignal& signal : signals) add_free_run(i, signal.name, signal.measured, signal.simulated);
   }
 
   void add_free_run(std::size_t i, const std::string& signal, const std::vector<double>& measured,

@@ -37,6 +37,7 @@ class Loader {
       findings_.fail("file", "", 0, "no measurements were given", "give files, folders or a dataset.toml");
     for (const fs::path& path : paths) read_path(path);
     findings_.throw_if_errors();
+    cached_.reset();  // a file's numbers are as large as all that was made of them
     for (Experiment& experiment : data_.experiments) {
       if (options_.holdout) experiment.role = Role::holdout;
       check_part(experiment, data_.drive, findings_);

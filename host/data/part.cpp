@@ -4,6 +4,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <cstdint>
 #include <limits>
 #include <map>
 
@@ -32,8 +33,11 @@ class Part {
     select(bounds, *time);
     if (!remove_bad_rows() || !time_increases()) return false;
     if (rows_.size() < kMinimumSamples) return fail_too_few(bounds);
+    // Before there are columns, so that its own array does not stand beside them in memory.
+    take_time();
+    const TimeBase base = time_base(experiment_.time_s);
     for (const PlannedColumn& planned : plan_.columns) convert(planned, axis);
-    return set_time_base(axis);
+    return set_time_base(base, axis);
   }
 
  private:
@@ -101,8 +105,9 @@ class Part {
                     "it is empty throughout and counts as not measured", "");
     for (const auto& [key, first] : cells) usable = report(*first.cell, first.count) && usable;
     usable = report_bad_rows(keep) && usable;
+    rows_.reserve(static_cast<std::size_t>(std::count(keep.begin(), keep.end(), 1)));
     for (std::size_t row = 0; row < keep.size(); ++row)
-      if (keep[row] != 0) rows_.push_back(row);
+      if (keep[row] != 0) rows_.push_back(static_cast<std::uint32_t>(row));
     return usable;
   }
 
@@ -172,11 +177,14 @@ class Part {
     for (const std::size_t row : rows_) ours.push_back((*conversion)(theirs[row]));
   }
 
-  bool set_time_base(Axis axis) {
-    experiment_.time_s.reserve(rows_.size());
-    for (const std::size_t row : rows_) experiment_.time_s.push_back(time_[row]);
+  void take_time() {
+    for (std::size_t i = 0; i < rows_.size(); ++i) time_[i] = time_[rows_[i]];
+    time_.resize(rows_.size());
+    experiment_.time_s = std::move(time_);
+  }
+
+  bool set_time_base(const TimeBase& base, Axis axis) {
     experiment_.masked.assign(rows_.size(), 0);
-    const TimeBase base = time_base(experiment_.time_s);
     experiment_.sample_s = base.sample_s;
     experiment_.segments = base.segments;
 
@@ -246,7 +254,7 @@ class Part {
   std::string file_;
   std::vector<double> time_;
   std::vector<std::uint8_t> selected_;
-  std::vector<std::size_t> rows_;
+  std::vector<std::uint32_t> rows_;  // those taken; as many as Table::lines can number
   std::vector<std::size_t> empty_columns_;
   double file_begin_ = 0.0;
   double file_end_ = 0.0;

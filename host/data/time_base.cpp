@@ -47,33 +47,34 @@ std::vector<double> held(std::span<const double> time_s, std::span<const double>
 TimeBase time_base(std::span<const double> time_s) {
   TimeBase base;
   const std::size_t steps = time_s.size() - 1;
-  std::vector<double> step(steps);
-  for (std::size_t i = 0; i < steps; ++i) step[i] = time_s[i + 1] - time_s[i];
-  std::vector<double> sorted = step;
+  const auto step = [&](std::size_t i) { return time_s[i + 1] - time_s[i]; };
+  // Long recordings are what fills memory: one array, used twice.
+  std::vector<double> sorted(steps);
+  for (std::size_t i = 0; i < steps; ++i) sorted[i] = step(i);
   const auto middle = sorted.begin() + static_cast<std::ptrdiff_t>(steps / 2);
   std::nth_element(sorted.begin(), middle, sorted.end());
   const double median = *middle;
 
   double duration = 0.0;
   double samples = 0.0;
-  for (const double s : step)
-    if (s <= kGapSamples * median) {
+  for (std::size_t i = 0; i < steps; ++i)
+    if (const double s = step(i); s <= kGapSamples * median) {
       duration += s;
       samples += std::max(1.0, std::round(s / median));
     }
   base.sample_s = duration / samples;
 
-  std::vector<double> deviation;
-  deviation.reserve(steps);
+  std::vector<double>& deviation = sorted;
+  deviation.clear();
   Segment segment{0, 0};
   for (std::size_t i = 0; i < steps; ++i) {
-    const double in_samples = step[i] / base.sample_s;
+    const double in_samples = step(i) / base.sample_s;
     if (in_samples > kGapSamples) {
       segment.last = i + 1;
       base.segments.push_back(segment);
       segment.first = i + 1;
-      if (step[i] > base.longest_gap_s) {
-        base.longest_gap_s = step[i];
+      if (step(i) > base.longest_gap_s) {
+        base.longest_gap_s = step(i);
         base.longest_gap_at_s = time_s[i];
       }
       continue;

@@ -127,7 +127,7 @@ void search_from_several_starts(Identification& identification, int starts, std:
     if (least > (1.0 - 1e-6) * swept) continue;
     // From the better place, as if the model stated it.
     for (const Slot& slot : open) {
-      Term& term = best[slot.term];
+      const Term& term = best[slot.term];
       identification.terms[slot.term].values[slot.parameter] = term.values[slot.parameter];
       identification.terms[slot.term].stated[slot.parameter] = 1;
     }

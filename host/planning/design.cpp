@@ -29,7 +29,7 @@ struct Factors {
 
 std::vector<Factors> factors_of(Bench& bench, const Layout& layout) {
   std::vector<Factors> all;
-  for (Bench::Side& side : bench.sides()) {
+  for (const Bench::Side& side : bench.sides()) {
     Factors f;
     f.noise = side.noise;
     if (side.recorded) {

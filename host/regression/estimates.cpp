@@ -222,8 +222,10 @@ void assemble(Identification& result) {
         }
       summarise(e);
       // It is meant to differ.
-      if (per_record) e.spread_percent.reset();
-      if (per_record) e.reliable = true;
+      if (per_record) {
+        e.spread_percent.reset();
+        e.reliable = true;
+      }
     }
     for (const Slot& slot : held) result.estimates.push_back(estimate_of(result.terms, slot, axis));
     for (const std::size_t t : fit.on_balance) touched[t] = 1;

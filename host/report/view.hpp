@@ -25,7 +25,7 @@ struct BalanceView {
 
 // Stays where it is: balances refer to `prepared`.
 struct View {
-  View(const Subject& subject);
+  explicit View(const Subject& subject);
   View(const View&) = delete;
   View& operator=(const View&) = delete;
 

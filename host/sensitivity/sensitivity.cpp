@@ -183,7 +183,7 @@ class Analysis {
         variant.note = fmt::format("no free run: {}", impossible.what());
         return;
       }
-      for (comparison::FreeRunSignal& signal : signals) judge_free_run(i, signal, variant, together);
+      for (const comparison::FreeRunSignal& signal : signals) judge_free_run(i, signal, variant, together);
     }
 
     void judge_free_run(std::size_t i, const comparison::FreeRunSignal& signal, Variant& variant,

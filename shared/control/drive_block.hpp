@@ -219,11 +219,12 @@ inline constexpr SectionTables kTables = [] {
   }
   return tables;
 }();
-inline constexpr auto kSectionRows = [] {
+constexpr auto section_rows() {
   std::array<std::uint8_t, kTables.rows.size> rows{};
   for (std::size_t i = 0; i < rows.size(); ++i) rows[i] = kTables.rows.bytes[i];
   return rows;
-}();
+}
+inline constexpr auto kSectionRows = section_rows();
 inline constexpr auto kSectionPlaces = kTables.places;
 }  // namespace detail
 

@@ -101,10 +101,9 @@ struct AllPlaces<N, Image, std::index_sequence<Ids...>> : PlaceAt<Ids, N, Image>
   static constexpr unsigned remembered_by() {
     if constexpr (PlaceAt<Id, N, Image>::kExists) {
       using Effect = typename PlaceAt<Id, N, Image>::Effect;
-      return std::is_empty_v<typename Effect::template State<N>> ? 0U : Effect::kInfo.reads;
-    } else {
-      return 0U;
+      if constexpr (!std::is_empty_v<typename Effect::template State<N>>) return Effect::kInfo.reads;
     }
+    return 0U;
   }
 };
 // Rest is nought in every state of every effect. Said so, it takes a processor a call and not a page of stores.

@@ -5,6 +5,7 @@ The recipe: a column for each linear parameter from the signals at full rate; co
 Butterworth filter, then the rows; a triangle of [X y] for each record and fifth; least squares with weights by record,
 the noise settled in three rounds; each fifth predicted from the others. A shape is chosen on a grid by what a fit on all
 rows leaves, and its slope stands in the regression, as does that of a delay."""
+import os
 import sys
 import time
 from pathlib import Path
@@ -158,9 +159,9 @@ def search():
 
 times = []
 for _ in range(RUNS):
-    start = time.perf_counter()
+    start = time.process_time()
     falls, shape = search()
-    times.append(1e3 * (time.perf_counter() - start))
+    times.append(1e3 * (time.process_time() - start))
 answer = (folder / "answer.txt").read_text().splitlines()
 ours_ms, ours_shape = map(float, answer[0].split())
 ours = np.array(list(map(float, answer[1:])))
@@ -171,4 +172,7 @@ print(f"  NumPy, SciPy      {np.median(times):8.1f} ms   ratio {np.median(times)
       f"{'the same' if same else 'ANOTHER'} ranking, falls of the error differ by {away:.1e} % at most")
 best = np.argsort(-ours)[:3]
 print("  first: " + ", ".join(f"{questions[i][0]} {ours[i]:.3f} %" for i in best))
+if "FLEXSPLINE_BENCH_ROWS" in os.environ:
+    with open(os.environ["FLEXSPLINE_BENCH_ROWS"], "a") as rows:
+        print(f"diagnosis, {len(questions)} effects | NumPy, SciPy | at least 20 | {np.median(times) / ours_ms:.3g}", file=rows)
 sys.exit(0 if same and away < 1e-3 else 1)

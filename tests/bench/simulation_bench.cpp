@@ -3,9 +3,9 @@
 #include <fmt/format.h>
 
 #include <algorithm>
-#include <chrono>
 #include <cmath>
 #include <cstdio>
+#include <ctime>
 #include <filesystem>
 #include <fstream>
 #include <functional>
@@ -16,6 +16,7 @@
 #include "host/catalogue/constants.hpp"
 #include "host/simulation/simulation.hpp"
 #include "tests/bench/plain_c_loop.hpp"
+#include "tests/bench/rows.hpp"
 
 namespace flexspline {
 namespace {
@@ -72,9 +73,9 @@ data::Experiment record(bool locked) {
 double median_ms(const std::function<void()>& work) {
   std::vector<double> times;
   for (int i = 0; i < kRuns; ++i) {
-    const auto start = std::chrono::steady_clock::now();
+    const std::clock_t start = std::clock();
     work();
-    times.push_back(1e3 * std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count());
+    times.push_back(1e3 * static_cast<double>(std::clock() - start) / CLOCKS_PER_SEC);
   }
   std::nth_element(times.begin(), times.begin() + kRuns / 2, times.end());
   return times[kRuns / 2];
@@ -110,6 +111,8 @@ void compare(bool locked, const std::string& python, const std::string& script) 
   fmt::print("  plain C loop      {:8.1f} ms   ratio {:.2f}   positions differ by {:.1e}\n", plain, ours / plain,
              difference(run.motor_position, q));
   fmt::print("  error of both against steps sixteen times finer: {:.1e} of the largest position\n", error);
+  bench::row(fmt::format("simulation, {} load, time", locked ? "locked" : "free"), "plain C loop", "at most 1.5",
+             ours / plain);
   if (python.empty()) return;
   const std::filesystem::path folder = std::filesystem::temp_directory_path();
   const std::filesystem::path file = folder / "flexspline-bench.csv";

@@ -1,6 +1,10 @@
 // host/data: CSV as loggers write it, and what is refused.
 #include <gtest/gtest.h>
 
+#include <bit>
+#include <cstdlib>
+#include <random>
+
 #include "tests/unit/data_test_files.hpp"
 
 namespace flexspline::data {
@@ -211,6 +215,44 @@ TEST(Csv, PathsThatLeadNowhereAreSaid) {
     EXPECT_FALSE(errors[0].remedy.empty());
   }
   EXPECT_EQ(errors_of({}).size(), 1u);
+}
+
+// Digits with a point take a path of their own; both sides of its limits, and ways to write that it must not take.
+TEST(Csv, NumbersAreReadToTheLastBitHoweverTheyAreWritten) {
+  std::vector<std::string> written = {"0",
+
+                                      "5.",
+                                      ".5",
+                                      "-.25",
+                                      "007.50",
+                                      "9007199254740991",
+                                      "9007199254740993",
+                                      "0.1",
+                                      "1e-3",
+                                      "2.5E2",
+                                      "123456789.123456789",
+                                      "0.1234567890123456789",
+                                      "0.00000000000000000000123",
+                                      "18446744073709551617",
+                                      "99999999999999999999.5"};
+  std::mt19937_64 random(1);
+  for (int k = 0; k < 20000; ++k) {
+    const double x = std::ldexp(static_cast<double>(random()) - 9.2e18, -static_cast<int>(random() % 70));
+    written.push_back(fmt::format("{:.{}f}", x, random() % 12));
+    written.push_back(fmt::format("{:.17g}", x));
+    written.push_back(fmt::format("{:.6g}", x));
+  }
+  std::string text = "time_s,current_a\n";
+  for (std::size_t k = 0; k < written.size(); ++k)
+    text += fmt::format("{:.3f},{}\n", 1e-3 * static_cast<double>(k), written[k]);
+  const TestFolder folder;
+  const Dataset data = load({folder.write("numbers.csv", text)});
+  const std::vector<double>& read = data.experiments.at(0)[Column::current];
+  ASSERT_EQ(read.size(), written.size());
+  for (std::size_t k = 0; k < written.size(); ++k) {
+    const double expected = std::strtod(written[k].c_str(), nullptr) + 0.0;  // a nought has no sign
+    ASSERT_EQ(std::bit_cast<std::uint64_t>(read[k]), std::bit_cast<std::uint64_t>(expected)) << written[k];
+  }
 }
 
 TEST(Csv, AllErrorsOfAllFilesAreToldAtOnce) {
