@@ -10,11 +10,7 @@
 #include "host/cli/hil_options.hpp"
 #include "host/cli/report_option.hpp"
 #include "host/cli/twin_runs.hpp"
-#include "host/closed_loop/page.hpp"
-#include "host/closed_loop/prediction.hpp"
-#include "host/deployment/bases.hpp"
-#include "host/deployment/pack.hpp"
-#include "host/drive/settings_text.hpp"
+#include "host/closed_loop/compare.hpp"
 #include "host/output/json.hpp"
 #include "host/output/text.hpp"
 
@@ -23,11 +19,9 @@ namespace {
 
 using closed_loop::ComparedRun;
 using closed_loop::Comparison;
+using closed_loop::Contender;
 using nlohmann::json;
 using output::number;
-
-// The twin's.
-constexpr double kTickHz = 20'000.0;
 
 std::string text_of(const std::filesystem::path& path) {
   std::ifstream in(path, std::ios::binary);
@@ -35,34 +29,10 @@ std::string text_of(const std::filesystem::path& path) {
   return {std::istreambuf_iterator<char>(in), std::istreambuf_iterator<char>()};
 }
 
-struct Given {
-  std::string label;
-  std::string name;
-  model::Model model;
-  std::vector<std::uint8_t> block;
-};
-
-// The first model's settings set the loops; the others get the same, whatever inertia they hold.
-void pack_all(std::vector<Given>& all, const std::filesystem::path& settings) {
-  std::string text = text_of(settings);
-  for (Given& one : all) {
-    deployment::PackOptions pack;
-    pack.tick_hz = kTickHz;
-    pack.samples = 20'000;
-    pack.settings = text;
-    pack.settings_origin = settings.string();
-    one.block = deployment::pack(one.model, pack).bytes;
-    if (&one != all.data()) continue;
-    const double most_a = 1.99 * deployment::bases_of(one.model, 1.0 / kTickHz, 1.0).current_base;
-    std::optional<double> lowered_from_a;
-    text = drive::settings_text(deployment::unpack(one.block), most_a, lowered_from_a);
-  }
-}
-
-std::vector<Given> models_of(const HilOptions& options, const std::filesystem::path& sheet) {
-  std::vector<Given> all;
+std::vector<Contender> models_of(const HilOptions& options, const std::filesystem::path& sheet) {
+  std::vector<Contender> all;
   const auto take = [&](std::string label, const std::filesystem::path& path, std::string name) {
-    all.push_back({std::move(label), std::move(name), load_model(path).model, {}});
+    all.push_back({std::move(label), std::move(name), load_model(path).model});
   };
   if (!options.base.empty() && options.model.empty())
     throw UsageError("--base is the model before an effect was added; name the one with it: --model MODEL");
@@ -118,7 +88,8 @@ closed_loop::Comparison run_closed_loop(const HilOptions& options, Console& cons
   if (options.draws != 0 && (options.draws < 3 || options.draws > 200))
     throw UsageError("--draws has to be 0, or 3 to 200");
   require_report_place(options.report);
-  closed_loop::Job job;
+  closed_loop::Contest contest;
+  closed_loop::Job& job = contest.job;
   job.scenario = options.scenario;
   job.plant_file = options.plant.string();
   job.with = options.with;
@@ -126,57 +97,16 @@ closed_loop::Comparison run_closed_loop(const HilOptions& options, Console& cons
   job.seconds = options.seconds;
   job.seed = options.seed;
   job.processor = options.processor.string();
+  job.keeps_trace = !options.report.empty() || !options.picture.empty();
   const ScratchFolder sheet;
   fetch_data_sheet(job, sheet.path());
-  console.progress("packing the models");
-  std::vector<Given> models = models_of(options, sheet.path());
+  contest.contenders = models_of(options, sheet.path());
   const std::filesystem::path settings = options.settings.empty() ? sheet.path() / "settings.toml" : options.settings;
-  pack_all(models, settings);
-  const deployment::Unpacked first = deployment::unpack(models.front().block);
-
-  Comparison c;
-  c.scenario = options.scenario;
-  c.processor = options.processor.string();
-  c.take_gains(deployment::parse_drive_setup(text_of(settings), settings.string(), models.front().model,
-                                             deployment::bases_of(models.front().model, 1.0 / kTickHz, 1.0)));
-  const closed_loop::Runner runner = twin_runner();
-  std::vector<closed_loop::Prediction> predicted;
-  if (options.draws > 0) {
-    console.progress("predicting the gain");
-    try {
-      closed_loop::Question question;
-      question.believed = models.back().model;
-      question.bench = closed_loop::bench_of(first);
-      for (const Given& one : models) question.candidates.push_back({one.label, one.block});
-      question.scenario = options.scenario;
-      question.seconds = options.seconds;
-      question.draws = options.draws;
-      question.seed = options.seed;
-      predicted = closed_loop::predict(question, runner);
-    } catch (const std::runtime_error& error) {
-      c.no_prediction = error.what();
-    }
-  }
-  console.progress("running the drive");
-  job.keeps_trace = !options.report.empty() || !options.picture.empty();
-  std::vector<closed_loop::Job> jobs;
-  job.block = models.front().block;
-  jobs.push_back(job);
-  job.compensation = true;
-  for (const Given& one : models) {
-    job.block = one.block;
-    jobs.push_back(job);
-  }
-  std::vector<closed_loop::Outcome> outcomes = runner(jobs);
-  for (std::size_t i = 0; i < outcomes.size(); ++i) {
-    ComparedRun run;
-    run.label = i == 0 ? "none" : models[i - 1].label;
-    run.model = i == 0 ? "" : models[i - 1].name;
-    run.outcome = std::move(outcomes[i]);
-    if (i > 0 && i <= predicted.size()) run.predicted = predicted[i - 1];
-    c.runs.push_back(std::move(run));
-  }
-  c.finish();
+  contest.settings = text_of(settings);
+  contest.settings_origin = settings.string();
+  contest.draws = options.draws;
+  const Comparison c =
+      closed_loop::compare(std::move(contest), twin_runner(), [&](std::string_view stage) { console.progress(stage); });
   print(c, console);
   if (!options.report.empty()) {
     closed_loop::write_page(options.report, c);

@@ -8,7 +8,7 @@
 #include <thread>
 
 #include "host/cli/drive_commands.hpp"
-#include "host/drive/residual_map.hpp"
+#include "host/drive/residual_map_json.hpp"
 #include "host/output/json.hpp"
 #include "host/output/text.hpp"
 
@@ -20,11 +20,6 @@ using drive::MapVerdict;
 using drive::ResidualMap;
 using nlohmann::json;
 
-constexpr double kLimitShare = 0.01;  // of the motor's torque limit: what no compensation is better than
-
-json finite(double value) {
-  return std::isfinite(value) ? json(value) : json();
-}
 std::string text_of(const ResidualMap::Range& v) {
   if (std::isinf(v.low)) return fmt::format("below {}", output::number(v.high, 3));
   if (std::isinf(v.high)) return fmt::format("above {}", output::number(v.low, 3));
@@ -84,31 +79,6 @@ void say(const drive::MapJudgement& j, double limit_nm, Console& console) {
   }
 }
 
-json json_of(const ResidualMap& map, const drive::MapJudgement& j) {
-  json rows = json::array(), findings = json::array();
-  for (std::size_t v = 0; v < map.velocity_bins(); ++v) {
-    json ticks = json::array(), mean = json::array(), std = json::array();
-    for (std::size_t a = 0; a < map.angle_bins; ++a) {
-      const drive::ResidualBin& bin = map.at(v, a);
-      ticks.push_back(bin.ticks);
-      mean.push_back(bin.ticks == 0 ? json() : json(bin.mean_nm));
-      std.push_back(bin.ticks == 0 ? json() : json(bin.std_nm));
-    }
-    const ResidualMap::Range range = map.velocity(v);
-    rows.push_back({{"velocity_rad_s", {finite(range.low), finite(range.high)}},
-                    {"ticks", ticks},
-                    {"mean_nm", mean},
-                    {"std_nm", std}});
-  }
-  for (const MapFinding& f : j.findings)
-    findings.push_back({{"order", f.order == 0 ? json() : json(f.order)},
-                        {"velocity_rad_s", {finite(f.velocity.low), finite(f.velocity.high)}},
-                        {"size_nm", f.size_nm},
-                        {"std_nm", f.std_nm},
-                        {"p_value", f.p_value}});
-  return {{"rows", rows}, {"findings", findings}};
-}
-
 }  // namespace
 
 int run_residual_map(const MonitorOptions& options, Console& console) {
@@ -121,9 +91,7 @@ int run_residual_map(const MonitorOptions& options, Console& console) {
   while (std::chrono::steady_clock::now() < end && !Interruptible::interrupted())
     std::this_thread::sleep_for(transport::Milliseconds(20));
   const ResidualMap map = drive::read_residual_map(session, scales);
-  const double torque_limit =
-      std::ldexp(scales.header.limits.torque.raw, -fixed::kValueBits) * scales.constants.torque_base;
-  const double limit_nm = options.limit_nm.value_or(kLimitShare * torque_limit);
+  const double limit_nm = options.limit_nm.value_or(drive::usual_map_limit_nm(scales));
   const drive::MapJudgement judgement = drive::judge(map, limit_nm);
   if (started)
     console.line("The residual map did not count (it was never asked, or the block is new): it does from now.");
@@ -133,20 +101,12 @@ int run_residual_map(const MonitorOptions& options, Console& console) {
     drive::reset_residual_map(session);
     console.line("The residual map is empty again.");
   }
-  json parts = json_of(map, judgement);
-  output::save_json(options.json, {{"format", "flexspline-residual-map/1"},
-                                   {"drive", {{"serial", session.serial()}, {"board", session.board()}}},
-                                   {"unit", "N*m"},
-                                   {"started", started},
-                                   {"reset", options.reset},
-                                   {"of_one_moment", map.of_one_moment},
-                                   {"seconds", map.seconds()},
-                                   {"angle_bins", map.angle_bins},
-                                   {"rows", parts["rows"]},
-                                   {"verdict", drive::name_of(judgement.verdict)},
-                                   {"limit_nm", limit_nm},
-                                   {"judged_velocities", judgement.judged_bins},
-                                   {"findings", parts["findings"]}});
+  json answer = drive::map_json(map, judgement, limit_nm);
+  answer["format"] = "flexspline-residual-map/1";
+  answer["drive"] = {{"serial", session.serial()}, {"board", session.board()}};
+  answer["started"] = started;
+  answer["reset"] = options.reset;
+  output::save_json(options.json, answer);
   return kDone;
 }
 

@@ -5,9 +5,12 @@
 #include <chrono>
 #include <cstdio>
 #include <cstdlib>
+#include <fstream>
+#include <iterator>
 #include <nlohmann/json.hpp>
 
 #include "host/cli/drive_commands.hpp"
+#include "host/cli/twin_runs.hpp"
 #include "host/cli/workbench_command.hpp"
 #include "host/output/json.hpp"
 #include "host/workbench/server.hpp"
@@ -33,6 +36,22 @@ bool open_browser(const std::string& address) {
   return true;
 }
 
+// The drive that closed loops are run on.
+workbench::Rig rig_of(const WorkbenchOptions& options, const data::Dataset& dataset) {
+  if (options.plant.empty()) return workbench::rig_beside(options.data.data, dataset);
+  closed_loop::Job job;
+  job.plant_file = options.plant.string();
+  const ScratchFolder sheet;
+  fetch_data_sheet(job, sheet.path());
+  std::ifstream in(sheet.path() / "settings.toml", std::ios::binary);
+  workbench::Rig rig;
+  rig.plant_file = std::filesystem::absolute(options.plant).string();
+  rig.settings = {std::istreambuf_iterator<char>(in), std::istreambuf_iterator<char>()};
+  rig.settings_origin = options.plant.string();
+  rig.what = fmt::format("the simulated drive of {}", options.plant.filename().string());
+  return rig;
+}
+
 }  // namespace
 
 int run(const WorkbenchOptions& options, Console& console) {
@@ -47,6 +66,8 @@ int run(const WorkbenchOptions& options, Console& console) {
   setup.model_name = options.model.string();
   setup.folder = std::filesystem::absolute(options.model).parent_path();
   setup.drive = options.drive;
+  setup.rig = rig_of(options, *dataset);
+  setup.run = twin_runner();
   const Interruptible interruptible;
   const auto begin = std::chrono::steady_clock::now();
   const auto is_over = [&] {

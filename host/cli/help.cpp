@@ -268,7 +268,8 @@ const std::array kHelp = {
         "all of it with the mouse: a page in the browser of this machine",
         "Serves a page on 127.0.0.1 and opens it: how good the model is, where it fails, what is missing, and what "
         "becomes of the error with that added; steps can be taken back and compared. Models, reports and blocks are "
-        "saved into the model's folder, and flashed to a drive or the twin. The address has a token in it: who does "
+        "saved into the model's folder, run in closed loop on a simulated drive (--plant), and flashed to a drive or "
+        "the twin, whose signals and residual map are shown. The address has a token in it: who does "
         "not know it is refused. Runs until Ctrl-C; --json writes the address once it listens.",
         {kMakeData, "flexspline workbench demo-out --model demo-out/base-model.toml --no-open --seconds 0.5"}},
     CommandHelp{

@@ -12,9 +12,10 @@ struct WorkbenchOptions {
   DataInputs data;
   PipelineInputs pipeline;
   std::filesystem::path model;
-  std::string drive;     // empty: none yet
-  int port = 0;          // nought: any that is free
-  double seconds = 0.0;  // nought: until Ctrl-C
+  std::string drive;            // empty: none yet
+  std::filesystem::path plant;  // for closed loops; empty: what made the data, or the model
+  int port = 0;                 // nought: any that is free
+  double seconds = 0.0;         // nought: until Ctrl-C
   bool no_open = false;
   std::string json;
 };

@@ -14,6 +14,13 @@ template <class Parser>
 void take_workbench(Parser& command, WorkbenchOptions& options) {
   command.add_option("--drive", options.drive, fmt::format("{} (default: choose on the page)", transport::kDriveHelp))
       ->type_name("DRIVE");
+  command
+      .add_option(
+          "--plant", options.plant,
+          "plant file of the drive that closed loops are run on (default: the twin that made the data, else one "
+          "of which the model is true)")
+      ->check(CLI::ExistingFile)
+      ->type_name("FILE");
   command.add_option("--port", options.port, "of 127.0.0.1 (default: any that is free)")
       ->check(CLI::Range(1, 65535))
       ->type_name("PORT");

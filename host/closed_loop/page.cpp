@@ -105,6 +105,12 @@ json to_json(const Comparison& c) {
           {"realtime_factor", json_number(c.realtime_factor)}};
 }
 
+json traces_json(const Comparison& c) {
+  json traces = json::array();
+  for (const ComparedRun& run : c.runs) traces.push_back(traces_of(run.outcome.trace));
+  return traces;
+}
+
 void write_page(const std::filesystem::path& file, const Comparison& c) {
   json document = to_json(c);
   document["format"] = "flexspline-hil-report/1";
@@ -114,8 +120,7 @@ void write_page(const std::filesystem::path& file, const Comparison& c) {
       c.runs.back().outcome.fault.empty() && c.runs.back().outcome.rms_error_rad < c.runs.front().outcome.rms_error_rad;
   document["tool_version"] = report::kToolVersion;
   document["created"] = fmt::format("{:%Y-%m-%d}", fmt::localtime(std::time(nullptr)));
-  document["traces"] = json::array();
-  for (const ComparedRun& run : c.runs) document["traces"].push_back(traces_of(run.outcome.trace));
+  document["traces"] = traces_json(c);
   model::save(file, report::page(document, report::Script::closed_loop));
 }
 

@@ -38,6 +38,9 @@ struct Comparison {
 };
 
 nlohmann::json to_json(const Comparison& comparison);
+// The runs' traces, few enough points for a screen, in their order: packed "time", "command", "output", "error",
+// "velocity", "current", "temperature" (host/report/README.md).
+nlohmann::json traces_json(const Comparison& comparison);
 // Whole or not at all; the runs need their traces.
 void write_page(const std::filesystem::path& file, const Comparison& comparison);
 // The error over time as an SVG, for a README. The runs need their traces.

@@ -333,6 +333,7 @@ Recording Recorder::record(const planning::Run& run, const Watch& watch) {
         said_at = now;
         said_tick = columns.last_tick();
         if (watch.progress) watch.progress(time_s);
+        if (watch.seen) watch.seen(out);
       }
     }
     session_.stop();

@@ -38,6 +38,7 @@ class Recorder {
   struct Watch {
     std::function<bool()> stops;  // asked again and again: the user wants an end
     std::function<void(double time_s)> progress{};
+    std::function<void(const Recording& so_far)> seen{};
   };
   // A fault that the drive stands in, as the user says that its cause is gone.
   void clear_fault();

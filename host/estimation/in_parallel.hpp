@@ -8,6 +8,8 @@
 #include <thread>
 #include <vector>
 
+#include "host/regression/giving_up.hpp"
+
 namespace flexspline::estimation {
 
 // Calls work(i) for each i below count, on as many threads as there are cores. The first exception is thrown again
@@ -17,7 +19,9 @@ void in_parallel(std::size_t count, const Work& work) {
   std::atomic<std::size_t> next{0};
   std::exception_ptr failure;
   std::mutex guard;
+  const regression::Asking* const asked = regression::asked_here();
   const auto run = [&] {
+    const regression::MayGiveUp as_the_caller(asked);
     for (std::size_t i = next++; i < count; i = next++) {
       try {
         work(i);

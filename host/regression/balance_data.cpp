@@ -2,6 +2,7 @@
 
 #include <fmt/format.h>
 
+#include "host/regression/giving_up.hpp"
 #include "host/signals/differentiate.hpp"
 
 namespace flexspline::regression {
@@ -312,6 +313,7 @@ const Eigen::VectorXd& BalanceData::column(const Terms& terms, Slot slot) {
 }
 
 Eigen::MatrixXd BalanceData::columns(const Terms& terms, const std::vector<Slot>& slots) {
+  ask_whether_to_give_up();
   make_columns(terms, slots);
   Eigen::MatrixXd X(rows(), static_cast<Eigen::Index>(slots.size()));
   for (std::size_t j = 0; j < slots.size(); ++j)

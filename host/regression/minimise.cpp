@@ -3,6 +3,7 @@
 #include <ceres/ceres.h>
 
 #include <cmath>
+#include <exception>
 
 namespace flexspline::regression {
 namespace {
@@ -15,7 +16,19 @@ class Cost final : public ceres::CostFunction {
     mutable_parameter_block_sizes()->push_back(static_cast<int>(unknowns));
   }
   bool Evaluate(double const* const* parameters, double* residuals, double** jacobians) const override {
-    const std::vector<double> x(parameters[0], parameters[0] + unknowns_);
+    if (failure_) return false;
+    try {
+      return evaluate(parameters[0], residuals, jacobians);
+    } catch (...) {  // not through the solver, which expects none
+      failure_ = std::current_exception();
+      return false;
+    }
+  }
+  const std::exception_ptr& failure() const { return failure_; }
+
+ private:
+  bool evaluate(const double* parameters, double* residuals, double** jacobians) const {
+    const std::vector<double> x(parameters, parameters + unknowns_);
     const bool wants_slopes = jacobians && jacobians[0];
     // The solver asks again where its line search has been: for the values, then for the slopes.
     if (x != at_ || (wants_slopes && slopes_.size() == 0)) {
@@ -30,8 +43,6 @@ class Cost final : public ceres::CostFunction {
     if (wants_slopes) Eigen::Map<RowMajor>(jacobians[0], count_, static_cast<Eigen::Index>(unknowns_)) = slopes_;
     return true;
   }
-
- private:
   // What stands at a bound and would go beyond stays there, and the step of the others is made without it: a step that
   // counted on it and was cut back after would be a poor one for them, too.
   void hold_at_bounds(const std::vector<double>& x) const {
@@ -43,6 +54,7 @@ class Cost final : public ceres::CostFunction {
     }
   }
 
+  mutable std::exception_ptr failure_;
   mutable std::vector<double> at_;
   mutable Eigen::VectorXd values_;
   mutable Eigen::MatrixXd slopes_;
@@ -56,7 +68,8 @@ class Cost final : public ceres::CostFunction {
 
 double minimise(std::vector<double>& x, Eigen::Index count, const Residuals& residuals, const Minimisation& how) {
   ceres::Problem problem;
-  problem.AddResidualBlock(new Cost(residuals, count, x.size(), how), nullptr, x.data());
+  auto* const cost = new Cost(residuals, count, x.size(), how);  // the problem's from here on
+  problem.AddResidualBlock(cost, nullptr, x.data());
   for (std::size_t j = 0; j < x.size(); ++j) {
     const int at = static_cast<int>(j);
     if (j < how.low.size() && std::isfinite(how.low[j])) problem.SetParameterLowerBound(x.data(), at, how.low[j]);
@@ -72,6 +85,7 @@ double minimise(std::vector<double>& x, Eigen::Index count, const Residuals& res
   options.logging_type = ceres::SILENT;
   ceres::Solver::Summary summary;
   ceres::Solve(options, &problem, &summary);
+  if (cost->failure()) std::rethrow_exception(cost->failure());
   return summary.final_cost;
 }
 

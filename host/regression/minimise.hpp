@@ -20,7 +20,7 @@ struct Minimisation {
 };
 
 // Moves `x` to where the sum of squares of `count` residuals is least nearby (Levenberg and Marquardt). Returns half of
-// that sum.
+// that sum. Throws what `residuals` throws.
 double minimise(std::vector<double>& x, Eigen::Index count, const Residuals& residuals, const Minimisation& how);
 
 }  // namespace flexspline::regression

@@ -6,6 +6,7 @@
 #include <cmath>
 #include <numeric>
 
+#include "host/regression/giving_up.hpp"
 #include "host/regression/held_torque.hpp"
 #include "host/signals/butterworth.hpp"
 #include "host/signals/cutoff.hpp"
@@ -350,6 +351,7 @@ Prepared prepare_with(const std::vector<const Experiment*>& experiments, const m
   prepared.constants = catalogue::constants_of(drive);
   prepared.rotary = drive.axis == data::Axis::rotary;
   for (const Experiment* e : experiments) {
+    ask_whether_to_give_up();
     if (!e->has(Column::current)) prepared.constants.torque_constant = drive.torque_constant_nm_a.value.value_or(1.0);
     prepared.records.push_back(prepare_one(*e, prepared.constants, pipeline));
     prepared.torque_measured = prepared.torque_measured || e->has(Column::torque);

@@ -2,6 +2,7 @@
 
 #include <fmt/format.h>
 
+#include <algorithm>
 #include <charconv>
 #include <cstdlib>
 #include <fstream>
@@ -130,6 +131,7 @@ std::shared_ptr<Session> Api::session_of(const Request& request) {
 
 json Api::get(const Request& request) {
   if (request.path == "/api/drive") return {{"status", drive_.status()}, {"in_reach", drive_.in_reach()}};
+  if (request.path == "/api/map") return drive_.residual_map();
   if (request.path == "/api/live") return drive_.live(whole(request, "since", 1e15));
   const std::shared_ptr<Session> session = session_of(request);
   if (request.path == "/api/state") {
@@ -139,7 +141,14 @@ json Api::get(const Request& request) {
     state["data_name"] = setup_.data_name;
     state["model_file"] = setup_.model_name;
     state["folder"] = setup_.folder.string();
+    state["scenarios"] = setup_.run ? trial_scenarios() : std::vector<std::string>();
+    state["rig"] = setup_.rig.what;
     return state;
+  }
+  if (request.path == "/api/closed_loop") {
+    const auto traces = session->kept("closed_loop");
+    if (!traces) throw NotFound("no closed loop was run in this tab");
+    return *traces;
   }
   const History<std::shared_ptr<Step>> history = session->history();
   const std::size_t at = request.query.contains("step") ? whole(request, "step") : history.at();
@@ -203,6 +212,8 @@ json Api::act(const std::shared_ptr<Session>& session, const json& asked) {
                [pipeline](const Step& now, const Progress& say) { return refitted(now, pipeline, say); });
   } else if (what == "pack") {
     start_pack(session);
+  } else if (what == "try") {
+    start_trial(session, field(asked, "scenario"));
   } else if (what == "save") {
     start_save(session, asked);
   } else if (what == "connect") {
@@ -224,6 +235,10 @@ json Api::act(const std::shared_ptr<Session>& session, const json& asked) {
       drive_.restore();
       session->set("flash", nullptr);
     });
+  } else if (what == "move") {
+    session->start("Moving the twin", [this](const Progress& say) { drive_.move(say); });
+  } else if (what == "empty-map") {
+    drive_.reset_residual_map();
   } else {
     throw AskedError(fmt::format("\"{}\" cannot be done", what));
   }
@@ -270,6 +285,25 @@ std::string Api::content(const Session& session, const std::string& what) const 
                        setup_.pipeline);
   const auto bytes = deployment::pack(step.model).bytes;
   return {bytes.begin(), bytes.end()};
+}
+
+void Api::start_trial(const std::shared_ptr<Session>& session, const std::string& scenario) {
+  if (!setup_.run) throw AskedError("there is nothing here to run a closed loop on");
+  // Names alone: a scenario may be a file, and requests name no paths.
+  if (std::ranges::find(trial_scenarios(), scenario) == trial_scenarios().end())
+    throw AskedError(
+        fmt::format("there is no scenario \"{}\"; there are {}", scenario, fmt::join(trial_scenarios(), ", ")));
+  session->start("Running the closed loop", [this, scenario, session = session.get()](const Progress& say) {
+    const auto history = session->history();
+    Rig rig = setup_.rig;
+    const bool is_model = !rig.is_known();
+    const auto made = try_out(*history[0], *history.current(), rig, scenario, setup_.run, say);
+    say("");
+    session->keep("closed_loop", closed_loop::traces_json(made));
+    json told = trial_json(made, rig, is_model);
+    told["step"] = {{"at", history.at()}, {"action", history.current()->action}, {"what", history.current()->what}};
+    session->set("closed_loop", std::move(told));
+  });
 }
 
 void Api::start_save(const std::shared_ptr<Session>& session, const json& asked) {

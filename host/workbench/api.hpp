@@ -12,6 +12,7 @@
 
 #include "host/workbench/live_drive.hpp"
 #include "host/workbench/session.hpp"
+#include "host/workbench/trial.hpp"
 
 namespace flexspline::workbench {
 
@@ -43,7 +44,9 @@ struct Setup {
   std::string model_name;        // likewise
   std::filesystem::path folder;  // where models, reports and blocks are saved
   regression::PipelineOptions pipeline;
-  std::string drive;  // --drive; empty: none
+  std::string drive;        // --drive; empty: none
+  Rig rig;                  // for closed loops; none known: the present model
+  closed_loop::Runner run;  // of closed loops; empty: there are none
 };
 
 class Api {
@@ -63,6 +66,7 @@ class Api {
                   std::function<std::shared_ptr<Step>(const Step&, const Progress&)> make);
   void start_diagnosis(const std::shared_ptr<Session>& session);
   void start_pack(const std::shared_ptr<Session>& session);
+  void start_trial(const std::shared_ptr<Session>& session, const std::string& scenario);
   void start_save(const std::shared_ptr<Session>& session, const nlohmann::json& asked);
   void start_drop(const std::shared_ptr<Session>& session, const std::vector<Upload>& files);
   std::string content(const Session& session, const std::string& what) const;

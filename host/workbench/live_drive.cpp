@@ -4,11 +4,15 @@
 
 #include <algorithm>
 #include <cmath>
+#include <exception>
+#include <limits>
 #include <nlohmann/json.hpp>
 
 #include "host/drive/block_changes.hpp"
 #include "host/drive/model_block.hpp"
+#include "host/drive/residual_map_json.hpp"
 #include "host/output/json.hpp"
+#include "shared/fixed/turn.hpp"
 #include "shared/protocol/texts.hpp"
 
 namespace flexspline::workbench {
@@ -44,6 +48,27 @@ json changes_json(const std::vector<drive::BlockChange>& changes) {
   return list;
 }
 
+// Fast and slower sines, and a shaft that creeps to and fro, so that the map has all velocities in it for long enough.
+planning::Plan motion_of(const drive::Scales& scales) {
+  const double limit =
+      std::ldexp(scales.header.limits.velocity.raw, -fixed::kValueBits) * scales.constants.velocity_base;
+  planning::Plan plan;
+  const auto add = [&](std::string name, planning::Waveform waveform, double amplitude, double hz, double duration_s) {
+    planning::Run run;
+    run.name = std::move(name);
+    run.mode = planning::Mode::position;
+    run.waveform = waveform;
+    run.frequency_hz = hz;
+    run.amplitude = amplitude;
+    run.duration_s = duration_s;
+    plan.runs.push_back(std::move(run));
+  };
+  add("fast", planning::Waveform::sine, 0.4 * limit / (kTurn * 0.5), 0.5, 4.0);
+  add("slower", planning::Waveform::sine, 0.1 * limit / (kTurn * 0.5), 0.5, 4.0);
+  add("creeping", planning::Waveform::triangle, 0.015 * limit / (4.0 * 0.25), 0.25, 8.0);
+  return plan;
+}
+
 // Lets requests pass before the listener, which takes the lock again and again.
 class Turn {
  public:
@@ -70,6 +95,7 @@ LiveDrive::~LiveDrive() {
 }
 
 void LiveDrive::require() const {
+  if (away_) throw drive::DriveError("the drive is moving; wait until it is at rest, or cancel that");
   if (!session_) throw drive::DriveError("no drive is connected; connect one first");
 }
 
@@ -91,7 +117,10 @@ void LiveDrive::connect(const std::string& drive) {
   if (std::none_of(reach.begin(), reach.end(), [&](const json& d) { return d["drive"] == drive; }))
     throw drive::DriveError(fmt::format("\"{}\" is not in reach; start the workbench with --drive {}", drive, drive));
   const Turn turn(mutex_, waiting_);
+  if (away_) require();
   lose("");
+  // A socket is a twin's (host/transport/link.hpp).
+  simulated_ = drive == "twin" || drive.starts_with("tcp:");
   try {
     session_ = std::make_unique<drive::Session>(transport::open_link(drive));
     read_block();
@@ -103,6 +132,7 @@ void LiveDrive::connect(const std::string& drive) {
 
 void LiveDrive::disconnect() {
   const Turn turn(mutex_, waiting_);
+  if (away_) require();
   lose("");
 }
 
@@ -120,7 +150,12 @@ json LiveDrive::in_reach() const {
 
 json LiveDrive::status() const {
   const Turn turn(mutex_, waiting_);
-  json answer{{"given", given_}, {"connected", session_ != nullptr}, {"problem", problem_}, {"block", nullptr}};
+  return away_ ? *away_ : told();
+}
+
+json LiveDrive::told() const {
+  json answer{{"given", given_}, {"connected", session_ != nullptr}, {"problem", problem_}, {"block", nullptr},
+              {"moving", false}, {"simulated", simulated_}};
   if (session_) {
     answer["name"] = session_->name();
     answer["serial"] = session_->serial();
@@ -158,6 +193,98 @@ json LiveDrive::restore() {
   return {{"before", view_json(before)}, {"after", view_json(drive::view_of(active_))}};
 }
 
+json LiveDrive::residual_map() {
+  const Turn turn(mutex_, waiting_);
+  try {
+    require();
+    if (!scales_) throw drive::DriveError("the drive has no block, so nothing to compare its torque with; flash one");
+    const bool started = drive::start_residual_map(*session_);
+    const drive::ResidualMap map = drive::read_residual_map(*session_, *scales_);
+    const double limit_nm = drive::usual_map_limit_nm(*scales_);
+    json answer = drive::map_json(map, drive::judge(map, limit_nm), limit_nm);
+    answer["started"] = started;
+    answer["model"] = drive::view_of(active_).model;
+    return answer;
+  } catch (const std::runtime_error& error) {
+    return {{"problem", error.what()}};
+  }
+}
+
+void LiveDrive::reset_residual_map() {
+  const Turn turn(mutex_, waiting_);
+  require();
+  drive::reset_residual_map(*session_);
+}
+
+// A recording has fewer signals than the page shows; the others stay empty while it moves.
+void LiveDrive::show(const drive::Recording& so_far, double after_s) {
+  constexpr std::size_t kSpan = 10;  // samples over which position is differentiated
+  const std::size_t n = so_far.time_s.size();
+  if (n <= kSpan) return;
+  const double now_s = so_far.time_s.back();
+  const double velocity = (so_far.motor_position_rad[n - 1] - so_far.motor_position_rad[n - 1 - kSpan]) /
+                          (now_s - so_far.time_s[n - 1 - kSpan]);
+  const Turn turn(mutex_, waiting_);
+  if (!samples_.empty() && after_s + now_s < samples_.back().time_s + 1.0 / kRateHz) return;
+  Sample s{after_s + now_s, {}};
+  for (const Channel c : kChannels)
+    s.values.push_back(c == Channel::velocity  ? velocity
+                       : c == Channel::current ? so_far.current_a.back()
+                       : c == Channel::torque  ? so_far.torque_nm.back()
+                                               : std::numeric_limits<double>::quiet_NaN());
+  samples_.push_back(std::move(s));
+  ++count_;
+  if (samples_.size() > kKept) samples_.pop_front();
+}
+
+void LiveDrive::move(const std::function<void(std::string_view)>& say) {
+  std::unique_ptr<drive::Session> session;
+  drive::Scales scales;
+  {
+    const Turn turn(mutex_, waiting_);
+    require();
+    if (!simulated_)
+      throw drive::DriveError(
+          "only a simulated drive is moved from here; move this one with flexspline record --compensate, where you see "
+          "what is in its way");
+    if (!scales_) throw drive::DriveError("the drive has no block, so it cannot move; flash one");
+    drive::start_residual_map(*session_);
+    scales = *scales_;
+    away_ = std::make_unique<json>(told());
+    (*away_)["moving"] = true;
+    session = std::move(session_);
+    subscribed_ = false;
+    mode_ = protocol::name_of(protocol::Mode::position);
+    samples_.clear();
+  }
+  std::exception_ptr failure;
+  try {
+    const planning::Plan plan = motion_of(scales);
+    drive::Recorder recorder(*session, scales, plan, true);
+    recorder.clear_fault();  // nothing is in a simulated drive's way
+    double after_s = 0.0;
+    for (const planning::Run& run : plan.runs) {
+      // The link's own errors aside, it is at rest when it comes back.
+      const drive::Recording made = recorder.record(
+          run, {.stops = [] { return false; },
+                .progress =
+                    [&](double time_s) { say(fmt::format("{}: {:.1f} of {:g} s", run.name, time_s, run.duration_s)); },
+                .seen = [&](const drive::Recording& so_far) { show(so_far, after_s); }});
+      after_s += made.time_s.empty() ? 0.0 : made.time_s.back();
+      if (!made.complete) throw drive::DriveError(fmt::format("the motion ended early: {}", made.ended));
+    }
+  } catch (...) {
+    failure = std::current_exception();
+    session->stop();
+  }
+  {
+    const Turn turn(mutex_, waiting_);
+    session_ = std::move(session);
+    away_.reset();
+  }
+  if (failure) std::rethrow_exception(failure);
+}
+
 json LiveDrive::live(std::uint64_t since) {
   const Turn turn(mutex_, waiting_);
   asked_ = Clock::now();
@@ -171,7 +298,7 @@ json LiveDrive::live(std::uint64_t since) {
     for (const double v : s.values) one.push_back(output::json_number(v));
     samples.push_back(std::move(one));
   }
-  return {{"connected", session_ != nullptr},
+  return {{"connected", session_ != nullptr || away_ != nullptr},
           {"has_block", scales_.has_value()},
           {"problem", problem_},
           {"channels", std::move(channels)},

@@ -10,6 +10,7 @@
 #include <thread>
 #include <vector>
 
+#include "host/drive/recorder.hpp"
 #include "host/drive/scales.hpp"
 #include "host/drive/session.hpp"
 #include "host/model/model.hpp"
@@ -28,7 +29,8 @@ class LiveDrive {
   // DriveError.
   void connect(const std::string& drive);
   void disconnect();
-  // {"given", "connected", "name", "serial", "board", "block": {"model", "bytes", "sha256"}, "problem"}.
+  // {"given", "connected", "name", "serial", "board", "block": {"model", "bytes", "sha256"}, "problem", "moving",
+  // "simulated"}.
   nlohmann::json status() const;
   // Drives in reach: [{"drive", "what", "usable", "problem"}]; a twin always.
   nlohmann::json in_reach() const;
@@ -36,6 +38,13 @@ class LiveDrive {
   // {"before", "after", "changes", "warnings", "flashed"} as `flexspline flash` says it. Throws as it does.
   nlohmann::json flash(const model::Model& model, const std::function<void(std::string_view)>& say);
   nlohmann::json restore();
+
+  // What `monitor --residual-map` says, and "started": it counts only from now; {"problem"} where there is none.
+  nlohmann::json residual_map();
+  void reset_residual_map();
+  // Moves a simulated drive to and fro with its model fed forward, so that its map fills and its signals are seen.
+  // Others are moved by a person, with `flexspline record`. Throws DriveError, and what `say` throws, at rest.
+  void move(const std::function<void(std::string_view)>& say);
 
   // {"channels": [{"name", "unit"}], "rate_hz", "next", "mode", "samples": [[time_s, value, ...]]} from number `since`
   // on; the first call begins to listen. Nothing is armed.
@@ -46,6 +55,8 @@ class LiveDrive {
   void listen();
   void read_block();
   void lose(const std::string& why);
+  void show(const drive::Recording& so_far, double after_s);
+  nlohmann::json told() const;
 
   const std::string given_;
   mutable std::mutex mutex_;             // of all below
@@ -54,6 +65,8 @@ class LiveDrive {
   std::optional<drive::Scales> scales_;
   drive::Bytes active_;
   std::string problem_;
+  std::unique_ptr<nlohmann::json> away_;  // what status() says while a motion has the session; else null
+  bool simulated_ = false;
   struct Sample {
     double time_s = 0.0;
     std::vector<double> values;

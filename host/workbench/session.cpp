@@ -7,6 +7,7 @@
 
 #include "host/output/diagnosis.hpp"
 #include "host/output/json.hpp"
+#include "host/regression/giving_up.hpp"
 
 namespace flexspline::workbench {
 namespace {
@@ -86,8 +87,26 @@ Session::Session(std::string id, std::shared_ptr<Step> first)
 
 Session::~Session() {
   cancel();
-  for (const auto& work : ended_)
-    if (work->thread.joinable()) work->thread.join();
+  join();
+}
+
+void Session::join() {
+  std::vector<std::shared_ptr<Work>> all;
+  {
+    const std::lock_guard lock(mutex_);
+    all = ended_;
+    if (work_) all.push_back(work_);
+  }
+  // A thread is joined once, here or by start().
+  for (const auto& work : all) {
+    while (!work->done) std::this_thread::sleep_for(std::chrono::milliseconds(1));
+  }
+  const std::lock_guard lock(mutex_);
+  std::erase_if(ended_, [](const std::shared_ptr<Work>& w) {
+    if (!w->done) return false;
+    w->thread.join();
+    return true;
+  });
 }
 
 void Session::changed() {
@@ -120,6 +139,17 @@ void Session::set(const std::string& part, json value) {
   changed();
 }
 
+void Session::keep(const std::string& part, json value) {
+  auto kept = std::make_shared<const json>(std::move(value));
+  const std::lock_guard lock(mutex_);
+  kept_[part] = std::move(kept);
+}
+std::shared_ptr<const json> Session::kept(const std::string& part) const {
+  const std::lock_guard lock(mutex_);
+  const auto found = kept_.find(part);
+  return found == kept_.end() ? nullptr : found->second;
+}
+
 void Session::set_problem(const std::string& during, const std::exception_ptr& error) {
   set("problem", problem_json(during, error));
 }
@@ -146,6 +176,10 @@ void Session::start(const std::string& what, std::function<void(const Progress&)
       changed();
     };
     std::exception_ptr error;
+    const regression::Asking ask = [&work = *work] {
+      if (work.cancelled) throw Cancelled{};
+    };
+    const regression::MayGiveUp may_give_up(&ask);
     try {
       run(say);
     } catch (const Cancelled&) {

@@ -4,6 +4,7 @@
 #include <atomic>
 #include <condition_variable>
 #include <functional>
+#include <map>
 #include <memory>
 #include <mutex>
 #include <nlohmann/json_fwd.hpp>
@@ -73,12 +74,17 @@ class Session {
   // Runs `work` beside the server. What it throws becomes the session's problem. Throws BusyError while other work
   // runs.
   void start(const std::string& what, std::function<void(const Progress&)> work);
-  // Work that cannot stop at once goes on unseen; what it makes is thrown away by its next word to Progress.
+  // Work ends at its next word to Progress, fits at their next set of columns; what it makes is thrown away.
   void cancel();
   bool works() const;
+  // Waits until all work that was started has ended, also what was cancelled.
+  void join();
 
-  // A part of the answer that changes with work: "pack", "flash", "saved". Null takes it away.
+  // A part of the answer that changes with work: "pack", "flash", "saved", "closed_loop". Null takes it away.
   void set(const std::string& part, nlohmann::json value);
+  // What is too large to be told with each change: the page asks for it. Null where there is none.
+  void keep(const std::string& part, nlohmann::json value);
+  std::shared_ptr<const nlohmann::json> kept(const std::string& part) const;
   void set_problem(const std::string& during, const std::exception_ptr& error);
 
   // Number of changes so far. Waits until there are more than `seen`, at most so long.
@@ -104,6 +110,7 @@ class Session {
   std::shared_ptr<Work> work_;                // running; else null
   std::vector<std::shared_ptr<Work>> ended_;  // with threads still to be joined
   std::unique_ptr<nlohmann::json> parts_;
+  std::map<std::string, std::shared_ptr<const nlohmann::json>> kept_;
 };
 
 // {"what", "findings": [{"file", "line", "column", "what", "remedy"}]} of an error.

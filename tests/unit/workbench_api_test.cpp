@@ -3,6 +3,7 @@
 
 #include <gtest/gtest.h>
 
+#include <atomic>
 #include <chrono>
 #include <filesystem>
 #include <fstream>
@@ -47,6 +48,7 @@ class WorkbenchApi : public ::testing::Test {
     setup.first = first();
     setup.data_name = "data";
     setup.folder = folder_;
+    setup.run = [this](const std::vector<closed_loop::Job>& jobs) { return run_(jobs); };
     api_ = std::make_unique<Api>(std::move(setup));
   }
   ~WorkbenchApi() override {
@@ -74,6 +76,7 @@ class WorkbenchApi : public ::testing::Test {
   }
 
   fs::path folder_;
+  closed_loop::Runner run_;  // what closed loops of this test are run by
   std::unique_ptr<Api> api_;
 };
 
@@ -208,6 +211,82 @@ TEST_F(WorkbenchApi, SaysWhatIsWrongWithADroppedFile) {
   EXPECT_EQ(drop("run.sh", "#!/bin/sh\n"), 400);
 }
 
+TEST_F(WorkbenchApi, RunsTheClosedLoopWithoutCompensationWithTheModelAsOpenedAndWithThePresentOne) {
+  std::vector<closed_loop::Job> ran;
+  run_ = [&](const std::vector<closed_loop::Job>& jobs) {
+    std::vector<closed_loop::Outcome> outcomes;
+    for (const closed_loop::Job& job : jobs) {
+      ran.push_back(job);
+      closed_loop::Outcome o;
+      o.what = "made up";
+      o.seconds = 2.0;
+      o.tick_hz = closed_loop::kTwinTickHz;
+      // Worse without compensation than with; the block tells the two models apart.
+      o.rms_error_rad = !job.compensation ? 1e-3 : job.block == ran.front().block ? 4e-4 : 2e-4;
+      o.trace.time_s = {0.0, 1.0, 2.0};
+      o.trace.error_rad = {0.0, o.rms_error_rad, -o.rms_error_rad};
+      o.trace.position_command_rad = o.trace.output_position_rad = o.trace.motor_velocity_rad_s = o.trace.current_a =
+          o.trace.temperature_c = {0.0, 0.0, 0.0};
+      outcomes.push_back(std::move(o));
+    }
+    return outcomes;
+  };
+  const std::string tab = new_tab();
+  ask("GET", "/api/closed_loop", {{"tab", tab}}, nullptr, 404);
+  act(tab, {{"do", "remove"}, {"effect", "viscous_friction"}});
+  settled(tab);
+  act(tab, {{"do", "try"}, {"scenario", "sine"}});
+  const json state = settled(tab);
+  ASSERT_FALSE(state.contains("problem")) << state["problem"];
+  const json& found = state["closed_loop"];
+  ASSERT_EQ(found["runs"].size(), 3u);
+  EXPECT_EQ(found["runs"][0]["compensation"], "none");
+  EXPECT_EQ(found["runs"][1]["compensation"], "base");
+  EXPECT_EQ(found["runs"][2]["compensation"], "now");
+  EXPECT_DOUBLE_EQ(found["runs"][1]["ratio_to_none"].get<double>(), 0.4);
+  EXPECT_DOUBLE_EQ(found["runs"][2]["ratio_to_none"].get<double>(), 0.2);
+  EXPECT_EQ(found["step"]["what"], "viscous_friction");
+  // No true drive is known: it is the present model, and that is said.
+  EXPECT_EQ(found["is_model"], true);
+  ASSERT_EQ(ran.size(), 3u);
+  for (const closed_loop::Job& job : ran) {
+    EXPECT_EQ(job.plant.find("\"viscous_friction\""), std::string::npos);
+    EXPECT_NE(job.plant.find("\"coulomb_friction\""), std::string::npos);
+    EXPECT_EQ(job.scenario, "sine");
+  }
+  EXPECT_NE(ran[1].block, ran[2].block);
+  const json traces = ask("GET", "/api/closed_loop", {{"tab", tab}});
+  ASSERT_EQ(traces.size(), 3u);
+  EXPECT_EQ(traces[0]["error"]["count"], 3);
+  // A scenario may be a file, which no request may name.
+  act(tab, {{"do", "try"}, {"scenario", "/etc/passwd"}}, 400);
+  EXPECT_EQ(ran.size(), 3u);
+}
+
+TEST_F(WorkbenchApi, AClosedLoopThatIsCancelledMidwayLeavesNothingBehind) {
+  std::promise<void> began, go;
+  run_ = [&](const std::vector<closed_loop::Job>& jobs) {
+    began.set_value();  // a second group would throw
+    go.get_future().wait();
+    closed_loop::Outcome o;
+    o.rms_error_rad = 1.0;
+    return std::vector<closed_loop::Outcome>(jobs.size(), o);
+  };
+  const std::string tab = new_tab();
+  act(tab, {{"do", "try"}, {"scenario", "sine"}});
+  began.get_future().wait();
+  act(tab, {{"do", "undo"}}, 409);
+  act(tab, {{"do", "cancel"}});
+  EXPECT_TRUE(settled(tab)["work"].is_null());
+  go.set_value();
+  // Work after it is not disturbed by what comes of it late.
+  act(tab, {{"do", "refit"}});
+  const json state = settled(tab);
+  EXPECT_EQ(state["at"], 1);
+  EXPECT_FALSE(state.contains("closed_loop"));
+  EXPECT_FALSE(state.contains("problem"));
+}
+
 TEST_F(WorkbenchApi, ADriveThatIsNotInReachIsNotOpened) {
   const std::string tab = new_tab();
   act(tab, {{"do", "connect"}, {"drive", "tcp:192.0.2.1:4711"}});
@@ -239,6 +318,28 @@ TEST(WorkbenchSession, WorkThatIsCancelledChangesNothingAndIsNotInTheWay) {
   go.set_value();
   session.cancel();
   EXPECT_FALSE(changed);
+}
+
+TEST_F(WorkbenchApi, ARefitThatIsCancelledEndsWithinTheFit) {
+  Session session("tab", first());
+  std::promise<void> go, began;
+  std::atomic<bool> fitted{false};
+  session.start("slow", [&](const Progress& say) {
+    began.set_value();
+    go.get_future().wait();
+    const std::shared_ptr<Step> next = refitted(*session.history().current(), {}, [](std::string_view) {});
+    fitted = true;
+    say("");
+  });
+  began.get_future().wait();
+  session.cancel();
+  go.set_value();
+  std::promise<void> ran;
+  session.start("next", [&](const Progress&) { ran.set_value(); });
+  ran.get_future().wait();
+  session.join();
+  EXPECT_FALSE(fitted) << "it was done to its end for nobody";
+  EXPECT_EQ(session.history().size(), 1u);
 }
 
 }  // namespace

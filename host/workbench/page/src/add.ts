@@ -2,21 +2,24 @@
 import { act, download, type Balance, type State, type Step } from "./api";
 import { bar, button, el, fill, num, times, unit, withUnit, words } from "./dom";
 import { errorOf, excessOf, floorOf, view, worstBalance } from "./store";
+import { ClosedPart } from "./closed";
 import { DrivePart } from "./drive";
 
 type Do = (what: string, more?: Record<string, unknown>) => void;
 
 export class Add {
   private readonly tabs = el("div", { class: "tabs", role: "tablist", "aria-label": "Parts of the fourth question" });
-  private readonly body = el("div", { class: "tabbody", role: "tabpanel", "aria-label": "Steps, parameters, files or drive" });
+  private readonly body = el("div", { class: "tabbody", role: "tabpanel", "aria-label": "Steps, parameters, files, closed loop or drive" });
   private readonly element_ = el("section", { class: "panel add", "aria-labelledby": "q4" }, el("div", { class: "row" }, el("h2", { id: "q4" }, el("b", {}, "4"), " Add it"), this.tabs), this.body);
   private part = "Steps";
   private state: State | null = null;
   private readonly drive: DrivePart;
-  private name = "";
+  private readonly closed: ClosedPart;
+  private readonly name = el("input", { type: "text", "data-key": "name", "aria-label": "Name of the file without its ending" });
 
   constructor(private readonly run: Do) {
     this.drive = new DrivePart(run);
+    this.closed = new ClosedPart(run);
     this.tabs.addEventListener("keydown", (e) => {
       const all = Array.from(this.tabs.querySelectorAll<HTMLElement>("[role=tab]"));
       const next = all[all.indexOf(document.activeElement as HTMLElement) + (e.key === "ArrowRight" ? 1 : e.key === "ArrowLeft" ? -1 : NaN)];
@@ -28,13 +31,16 @@ export class Add {
 
   render(state: State): void {
     this.state = state;
-    fill(this.tabs, ["Steps", "Parameters", "Save", "Drive"].map((t) => el("button", { type: "button", role: "tab", "aria-selected": t === this.part ? "true" : "false", tabindex: t === this.part ? 0 : -1, "data-key": `tab ${t}`,
+    fill(this.tabs, ["Steps", "Parameters", "Save", "Closed loop", "Drive"].map((t) => el("button", { type: "button", role: "tab", "aria-selected": t === this.part ? "true" : "false", tabindex: t === this.part ? 0 : -1, "data-key": `tab ${t}`,
       click: () => { this.part = t; if (this.state) this.render(this.state); } }, t)));
     this.drive.visible = this.part === "Drive";
     if (this.part === "Steps") fill(this.body, this.steps(state));
     else if (this.part === "Parameters") fill(this.body, this.parameters(state));
     else if (this.part === "Save") fill(this.body, this.save(state));
-    else {
+    else if (this.part === "Closed loop") {
+      if (!this.body.contains(this.closed.element)) this.body.replaceChildren(this.closed.element);
+      this.closed.render(state);
+    } else {
       if (!this.body.contains(this.drive.element)) this.body.replaceChildren(this.drive.element);
       this.drive.render(state);
     }
@@ -75,8 +81,8 @@ export class Add {
   }
 
   private save(state: State): HTMLElement {
-    const stem = this.name || `${(state.model_file.split("/").pop() ?? "model").replace(/\.toml$/, "")}-better`;
-    const input = el("input", { type: "text", value: stem, "data-key": "name", "aria-label": "Name of the file without its ending", input: () => { this.name = input.value; } });
+    const input = this.name;
+    if (!input.value && document.activeElement !== input) input.value = `${(state.model_file.split("/").pop() ?? "model").replace(/\.toml$/, "")}-better`;
     const kinds: [string, string, string][] = [["model", ".toml", "Save model"], ["report", ".html", "Save report"], ["block", ".block", "Save block"]];
     const p = state.pack;
     return el("div", { class: "save" },

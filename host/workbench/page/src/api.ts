@@ -42,6 +42,17 @@ export interface State {
   work: { what: string; stage: string; seconds: number } | null; problem?: Problem;
   pack?: { bytes: number; sha256: string; max_error_nm: number; max_error_share_of_rated: number; worst_balance: string; bounds: number };
   saved?: { what: string; file: string }; flash?: Flash;
+  scenarios: string[]; rig: string; closed_loop?: ClosedLoop;
+}
+
+// Errors in rad, currents in A; see host/output/JSON.md.
+export interface ClosedRun {
+  compensation: "none" | "base" | "now"; rms_error_rad: number | null; peak_error_rad: number | null; rms_current_a: number | null; ratio_to_none: number | null;
+  fault: string | null; ends_in_fault: boolean; predicted: { ratio: number; interval: [number, number] } | null;
+}
+export interface ClosedLoop {
+  scenario: string; what: string; seconds: number; gains: { velocity_loop_hz: number; position_loop_hz: number }; runs: ClosedRun[]; plant: string; is_model: boolean;
+  step: { at: number; action: string; what: string };
 }
 
 export class Refusal extends Error {

@@ -22,8 +22,26 @@ function append(element: HTMLElement, children: Child[]): void {
   }
 }
 
+// What the pointer holds down. A button that is made again before it is let go of would never be clicked, so what holds
+// it gets its new content then.
+let held: Node | null = null;
+const late = new Map<HTMLElement, Child[]>();
+addEventListener("pointerdown", (e) => { held = e.target as Node; }, { capture: true });
+for (const end of ["pointerup", "pointercancel", "dragend"])
+  addEventListener(end, () => setTimeout(() => {
+    held = null;
+    const all = [...late];
+    late.clear();
+    for (const [element, children] of all) fill(element, ...children);
+  }), { capture: true });
+
 // Puts new content into an element; what had the focus has it again where it has a key (data-key).
 export function fill(element: HTMLElement, ...children: Child[]): void {
+  if (held && held !== element && element.contains(held)) {
+    late.set(element, children);
+    return;
+  }
+  late.delete(element);
   const focused = element.contains(document.activeElement) ? (document.activeElement as HTMLElement).dataset.key : undefined;
   const scrolled = Array.from(element.querySelectorAll<HTMLElement>("[data-scroll]")).map((e) => [e.dataset.scroll, e.scrollTop] as const);
   element.replaceChildren();
@@ -33,6 +51,13 @@ export function fill(element: HTMLElement, ...children: Child[]): void {
     if (again) again.scrollTop = top;
   }
   if (focused) element.querySelector<HTMLElement>(`[data-key="${CSS.escape(focused)}"]`)?.focus({ preventScroll: true });
+}
+
+// The same, where it is other content than before: a list that is open stays open.
+export function fillOnce(element: HTMLElement, key: string, ...children: Child[]): void {
+  if (element.dataset.content === key) return;
+  element.dataset.content = key;
+  fill(element, ...children);
 }
 
 const kSuperscript = "⁰¹²³⁴⁵⁶⁷⁸⁹";

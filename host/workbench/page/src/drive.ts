@@ -2,9 +2,10 @@
 import type uPlot from "uplot";
 import { get, type BlockView, type State } from "./api";
 import { button, el, fill, num, unit, words } from "./dom";
+import { MapPart } from "./map";
 import { axes, Figure, line } from "./plots";
 
-interface Status { status: { given: string; connected: boolean; name?: string; serial?: string; board?: string; block: BlockView | null; problem: string }; in_reach: { drive: string; what: string; usable: boolean; problem: string }[] }
+interface Status { status: { given: string; connected: boolean; name?: string; serial?: string; board?: string; block: BlockView | null; problem: string; moving: boolean; simulated: boolean }; in_reach: { drive: string; what: string; usable: boolean; problem: string }[] }
 interface Live { connected: boolean; problem: string; channels: { name: string; unit: string }[]; next: number; mode: string; samples: number[][] }
 
 export class DrivePart {
@@ -12,8 +13,12 @@ export class DrivePart {
   private readonly readout = el("dl", { class: "live" });
   private readonly figure = new Figure(el("div", { class: "plot", role: "img", "aria-label": "Live signal of the drive" }));
   private readonly live = el("div", { class: "column grow" }, this.readout, this.figure.holder);
-  readonly element = el("div", { class: "drive" }, this.head, this.live);
+  private readonly choice = el("div", { class: "choice" });
+  private readonly map: MapPart;
+  private readonly right: HTMLElement;
+  readonly element: HTMLElement;
   visible = false;
+  private showsMap = false;
   private status: Status | null = null;
   private samples: number[][] = [];
   private channels: { name: string; unit: string }[] = [];
@@ -22,7 +27,11 @@ export class DrivePart {
   private timer = 0;
   private working = false;
 
-  constructor(private readonly run: (what: string, more?: Record<string, unknown>) => void) {}
+  constructor(private readonly run: (what: string, more?: Record<string, unknown>) => void) {
+    this.map = new MapPart(run);
+    this.right = el("div", { class: "column grow" }, this.choice, this.live, this.map.element);
+    this.element = el("div", { class: "drive" }, this.head, this.right);
+  }
 
   render(state: State): void {
     const working = state.work !== null;
@@ -46,7 +55,13 @@ export class DrivePart {
   private draw(state: State): void {
     const s = this.status?.status;
     if (!this.status || !s) return fill(this.head, el("p", { class: "empty" }, "Looking for drives …"));
-    this.live.hidden = !s.connected;
+    this.right.hidden = !s.connected;
+    this.live.hidden = this.showsMap;
+    this.map.element.hidden = !this.showsMap;
+    this.map.visible = this.visible && this.showsMap && s.connected;
+    const part = (text: string, map: boolean) => button(text, () => { this.showsMap = map; this.draw(state); }, { "aria-pressed": this.showsMap === map ? "true" : "false", "data-part": text });
+    fill(this.choice, part("Live signals", false), part("Residual map", true), this.showsMap && s.connected ? this.map.actions : null);
+    if (!s.connected) this.map.forget(); else if (this.showsMap) this.map.render(state, s.simulated, s.given || s.serial || "");
     const off = state.work !== null;
     if (!s.connected) {
       fill(this.head, el("p", {}, "No drive is connected."), s.problem ? el("p", { class: "high" }, s.problem) : null,

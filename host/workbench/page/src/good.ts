@@ -1,6 +1,6 @@
 // 1. How good is it? Experiments with their errors against the noise, worst first; one of them over time.
 import type { Experiment, State } from "./api";
-import { bar, el, fill, num, times, unit, words } from "./dom";
+import { bar, el, fill, fillOnce, num, times, unit, words } from "./dom";
 import { badness, balanceInView, looked, view, worstBalance } from "./store";
 import { TimeView } from "./time_view";
 
@@ -33,8 +33,9 @@ export class Good {
     if (!signals.has(view.signal)) view.signal = worstBalance(state.balances)?.signal ?? [...signals.keys()][0] ?? "";
     const option = ([name]: [string, boolean]) => el("option", { value: name, selected: name === view.signal }, words(name));
     const all = [...signals];
-    fill(this.choice, el("optgroup", { label: "Torque balance" }, all.filter(([, free]) => !free).map(option)),
+    fillOnce(this.choice, JSON.stringify(all), el("optgroup", { label: "Torque balance" }, all.filter(([, free]) => !free).map(option)),
       el("optgroup", { label: "Free run, the effort alone goes in" }, all.filter(([, free]) => free).map(option)));
+    this.choice.value = view.signal;
 
     const sorted = state.experiments.filter((e) => e.signals.some((s) => s.signal === view.signal)).sort((a, b) => badness(b, view.signal) - badness(a, view.signal));
     if (!sorted.some((e) => e.name === view.experiment)) view.experiment = sorted[0]?.name ?? "";

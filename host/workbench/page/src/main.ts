@@ -1,7 +1,7 @@
 // The page: what the server says is drawn by four panels; what the user does goes to the server.
 import { act, get, openTab, Refusal, sendFiles, type Problem, type State } from "./api";
 import { Add } from "./add";
-import { announce, button, el, fill, words } from "./dom";
+import { announce, button, el, fill, fillOnce, words } from "./dom";
 import { Good } from "./good";
 import { Missing } from "./missing";
 import { redrawAll } from "./plots";
@@ -37,12 +37,20 @@ const good = new Good(), where = new Where();
 const missing = new Missing((effect) => run("add", { effect }), () => run("diagnose"));
 const add = new Add(run);
 
+// Parts that stay: what work says changes many times a second, and its button shall be there to be pressed.
+const title = el("p", { class: "about clip" }), warned = el("span"), stage = el("span", { class: "clip" });
+const working = el("div", { class: "work", role: "status" }, el("span", { class: "busy" }), stage, button("Cancel", () => run("cancel")));
+
 function header(s: State): void {
-  fill(top_,
-    el("h1", {}, "Flexspline"), el("p", { class: "about clip" }, el("strong", {}, s.model_name || s.model_file), el("span", { class: "soft" }, ` on ${s.data_name}: ${s.experiments.length} experiments, ${s.experiments.filter((e) => e.role === "holdout").length} held out`)),
-    s.work ? el("div", { class: "work", role: "status", "data-work": s.work.what }, el("span", { class: "busy" }), el("span", { class: "clip" }, `${words(s.work.what)}${s.work.stage ? `: ${words(s.work.stage)}` : ""}`), button("Cancel", () => run("cancel"))) : null,
-    s.warnings.length ? button(`${s.warnings.length} warning${s.warnings.length > 1 ? "s" : ""}`, () => tell("Warnings", s.warnings), { class: "quiet" }) : null,
-    el("label", { class: "file" }, "Add files", filePicker()), button("Light or dark", toggleTheme, { class: "quiet", title: "Light or dark" }), button("Keys", () => help.showModal(), { class: "quiet", title: "?" }));
+  if (!title.isConnected)
+    fill(top_, el("h1", {}, "Flexspline"), title, warned, el("label", { class: "file" }, "Add files", filePicker()), button("Light or dark", toggleTheme, { class: "quiet", title: "Light or dark" }), button("Keys", () => help.showModal(), { class: "quiet", title: "?" }));
+  fill(title, el("strong", {}, s.model_name || s.model_file), el("span", { class: "soft" }, ` on ${s.data_name}: ${s.experiments.length} experiments, ${s.experiments.filter((e) => e.role === "holdout").length} held out`));
+  if (s.work) {
+    stage.textContent = `${words(s.work.what)}${s.work.stage ? `: ${words(s.work.stage)}` : ""}`;
+    working.dataset.work = s.work.what;
+    if (!working.isConnected) title.after(working);
+  } else working.remove();
+  fillOnce(warned, String(s.warnings.length), s.warnings.length ? button(`${s.warnings.length} warning${s.warnings.length > 1 ? "s" : ""}`, () => tell("Warnings", state?.warnings ?? []), { class: "quiet" }) : null);
 }
 
 const picker = el("input", { type: "file", multiple: true, accept: ".csv,.mat", class: "unseen", "aria-label": "Add files", "data-key": "files" });

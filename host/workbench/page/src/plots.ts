@@ -17,6 +17,7 @@ export class Figure {
   private make: (() => Drawn | null) | null = null;
   private dragged = false;
   private late = false;
+  private text = 0;  // size of its letters, px
 
   constructor(readonly holder: HTMLElement) {
     new ResizeObserver(() => this.resized()).observe(holder);
@@ -44,6 +45,7 @@ export class Figure {
     if (!this.make || width < 40 || height < 30) return;
     const drawn = this.make();
     if (!drawn) return;
+    this.text = rem();
     this.plot = new uPlot({ width, height, legend: { show: false }, ...drawn.options } as uPlot.Options, drawn.data, this.holder);
   }
 
@@ -60,7 +62,7 @@ export class Figure {
   private resized(): void {
     if (this.dragged) return;
     const width = this.holder.clientWidth, height = this.holder.clientHeight;
-    if (this.plot && width >= 40 && height >= 30) {
+    if (this.plot && width >= 40 && height >= 30 && this.text === rem()) {
       if (this.plot.width !== width || this.plot.height !== height) this.plot.setSize({ width, height });
     } else this.redraw();
   }
@@ -68,7 +70,8 @@ export class Figure {
 
 const all = new Set<Figure>();
 export function redrawAll(): void {
-  for (const figure of all) if (figure.holder.isConnected) figure.redraw(); else all.delete(figure);
+  // One that is not in the page now is made when it comes back.
+  for (const figure of all) figure.redraw();
 }
 
 function short(value: number): string {

@@ -1,0 +1,43 @@
+// Models side by side in closed loop on one drive, with the same loops each time: what is predicted, and what comes.
+#pragma once
+
+#include <functional>
+#include <string>
+#include <string_view>
+#include <vector>
+
+#include "host/closed_loop/page.hpp"
+
+namespace flexspline::closed_loop {
+
+// The twin's.
+inline constexpr double kTwinTickHz = 20'000.0;
+
+struct Contender {
+  std::string label;  // "base", "added", ...
+  std::string name;   // where the model comes from, for a reader
+  model::Model model;
+  std::vector<std::uint8_t> block{};  // made by compare()
+};
+
+struct Contest {
+  Job job;  // drive, motion, seed; what is to be kept. Its block and compensation are set for each run
+  // Settings of the drive (text of a "flexspline-drive/1" file), and where they are from.
+  std::string settings;
+  std::string settings_origin;
+  // The first one's model sets the loops; the others get the same, whatever inertia they hold. The last one is the best
+  // that is known of the drive: what is predicted is predicted from it.
+  std::vector<Contender> contenders;
+  int draws = 0;  // of the prediction; nought: none
+};
+
+// Runs without compensation, then with each contender's. `say` hears each stage, and may throw to give up. Throws
+// deployment::PackError where a model does not fit the drive, and what `run` throws; where there can be no prediction,
+// the reason is in the comparison.
+Comparison compare(Contest contest, const Runner& run, const std::function<void(std::string_view)>& say);
+
+// The same runner, for groups of at most `size` jobs, one after the other. `told` hears how many are done before each
+// group, and may throw to give up.
+Runner in_groups(Runner run, std::size_t size, std::function<void(std::size_t done)> told);
+
+}  // namespace flexspline::closed_loop

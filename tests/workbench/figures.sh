@@ -1,0 +1,21 @@
+#!/usr/bin/env bash
+# Times of the workbench's page in headless Chromium. figures.sh TOOL WORK; 77 where Chromium, Node.js or npm cannot be had.
+set -euo pipefail
+here=$(cd -- "$(dirname -- "${BASH_SOURCE[0]}")" && pwd)
+tool=$1 work=$2
+skip() {
+  echo "figures.sh: Skipped"
+  echo "$*"
+  echo "[  SKIPPED ]"
+  exit 77
+}
+chromium=$(command -v chromium || command -v chromium-browser || command -v google-chrome) ||
+  skip "there is no Chromium (Debian: chromium)"
+command -v npm >/dev/null && command -v node >/dev/null || skip "there is no Node.js with npm (Debian: nodejs npm)"
+mkdir -p "$work/npm"
+cp "$here/package.json" "$work/npm/"
+if [[ ! -f $work/npm/node_modules/axe-core/axe.min.js || ! -d $work/npm/node_modules/playwright-core ]]; then
+  (cd "$work/npm" && timeout 300 npm install --no-save --no-audit --no-fund --no-package-lock --ignore-scripts >npm.log 2>&1) ||
+    skip "the packages of package.json cannot be had from npm: $(tail -n 1 "$work/npm/npm.log")"
+fi
+exec node "$here/figures.mjs" "$tool" "$work/npm" "$work/figures" "$chromium"
