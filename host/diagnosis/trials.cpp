@@ -105,9 +105,23 @@ void check_admissible(BalanceData& data, const Judged& base, Trial& trial) {
   }
 }
 
+// Shapes that begin at nought, where the fit moved them: the model is all but linear in them there.
+void take_first_step(const BalanceData& data, Judged& judged) {
+  const auto on_balance = regression::terms_on(judged.terms, data.balance(), data.prepared().torque_measured);
+  const std::vector<Slot> shapes = regression::free_shape_slots(judged.terms, on_balance);
+  for (std::size_t k = 0; k < shapes.size(); ++k) {
+    Term& added = judged.terms.back();
+    double& step = judged.theta[static_cast<Eigen::Index>(judged.linear.size() + k)];
+    if (&judged.terms[shapes[k].term] != &added || !begins_at_nought(added, shapes[k].parameter)) continue;
+    added.values[shapes[k].parameter] += step;
+    step = 0.0;
+  }
+}
+
 Trial evaluate(Search& search, Proposal proposal) {
   Trial trial;
   trial.judged = judge(*search.data, proposal.extended, search.keep);
+  take_first_step(*search.data, trial.judged);
   trial.fall = fall_of(search.base, trial.judged, proposal.added);
   trial.proposal = std::move(proposal);
   check_admissible(*search.data, search.base, trial);
