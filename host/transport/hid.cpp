@@ -2,6 +2,7 @@
 // both behave alike but for what a device without permission looks like.
 #include <fmt/format.h>
 #include <hidapi/hidapi.h>
+#include <unistd.h>
 
 #include <algorithm>
 #include <array>
@@ -17,9 +18,14 @@ namespace flexspline::transport {
 namespace {
 
 using Identity = usb::FlexsplineIdentity;
-constexpr const char* kRemedy =
+constexpr const char* kNotAllowed =
     "your user may not open it: sudo cp 70-flexspline.rules /etc/udev/rules.d/ && sudo udevadm control --reload, then "
     "plug the drive in again (the file stands in host/drive)";
+
+// What may help where a drive that is there cannot be opened. hidapi does not say why; root is allowed everything.
+const char* remedy() {
+  return geteuid() == 0 ? "plug it in again, and end other programs that use it" : kNotAllowed;
+}
 
 std::string narrow(const wchar_t* text) {
   std::string out;
@@ -73,14 +79,18 @@ class Hid : public Link {
 };
 
 // A plug that is pulled while somebody looks leaves a device that hides its serial number and cannot be opened; for a
-// moment it is listed still.
+// moment it is listed still. A machine that has much to do takes its time.
 bool is_there(const std::string& path) {
-  constexpr std::chrono::milliseconds kListedStill{100};
-  std::this_thread::sleep_for(kListedStill);
-  hid_device_info* all = hid_enumerate(Identity::kVendorId, Identity::kProductId);
-  bool found = false;
-  for (const hid_device_info* one = all; one != nullptr; one = one->next) found = found || path == one->path;
-  hid_free_enumeration(all);
+  constexpr std::chrono::milliseconds kStep{100};
+  constexpr int kSteps = 10;
+  bool found = true;
+  for (int k = 0; k < kSteps && found; ++k) {
+    std::this_thread::sleep_for(kStep);
+    hid_device_info* all = hid_enumerate(Identity::kVendorId, Identity::kProductId);
+    found = false;
+    for (const hid_device_info* one = all; one != nullptr; one = one->next) found = found || path == one->path;
+    hid_free_enumeration(all);
+  }
   return found;
 }
 
@@ -97,7 +107,7 @@ std::vector<Found> find_hid() {
       hid_close(device);
     } else {
       drive.usable = false;
-      drive.problem = is_there(one->path) ? kRemedy : "it is gone; plug it in again";
+      drive.problem = is_there(one->path) ? remedy() : "it is gone; plug it in again";
     }
     found.push_back(std::move(drive));
   }
@@ -124,7 +134,7 @@ std::unique_ptr<Link> open_hid(const std::string& serial) {
   if (count == 0 && !hidden.empty() && !is_there(hidden))
     throw LinkError(fmt::format("{}: the drive is gone; plug it in again and try again", drive_named(serial)));
   if (count == 0 && !hidden.empty())
-    throw LinkError(fmt::format("hid:{}: a drive on USB does not tell its serial number; {}", serial, kRemedy));
+    throw LinkError(fmt::format("hid:{}: a drive on USB does not tell its serial number; {}", serial, remedy()));
   if (count == 0) {
     const std::string there = others.empty() ? "no drive is on USB" : "those on USB are " + others;
     throw LinkError(
@@ -136,7 +146,7 @@ std::unique_ptr<Link> open_hid(const std::string& serial) {
   if (device == nullptr && !is_there(path))
     throw LinkError(fmt::format("{}: the drive is gone; plug it in again and try again", drive_named(its_serial)));
   if (device == nullptr)
-    throw LinkError(fmt::format("{}: {} cannot be opened; {}", drive_named(its_serial), path, kRemedy));
+    throw LinkError(fmt::format("{}: {} cannot be opened; {}", drive_named(its_serial), path, remedy()));
   return std::make_unique<Hid>(device, its_serial);
 }
 
