@@ -130,6 +130,9 @@ class Server {
   static constexpr std::uint32_t kBurst = 100;
   // An armed drive without its host for 0.1 s stops: an armed twin that runs fast waits for its host well before.
   static constexpr std::uint32_t kMostAhead = 1'000;
+  // Set points are streamed by what the host has heard of the drive's time: two messages of a host in time, or each is
+  // late by as much as the machine is busy, and the shaft goes on where it should have turned.
+  static constexpr std::uint32_t kMostAheadOfSetPoints = 200;
 
   using Watch = firmware::UpdateWatch<Machine::Slots>;
 
@@ -158,6 +161,11 @@ class Server {
     while (!over() && Clock::now() < until) usb_->bus().serve(5);
   }
   bool runs_fast() const { return options_.fast && is_armed(drive_->status().mode) && line_->has_host(); }
+  std::uint32_t most_ahead() const {
+    const firmware::Mode mode = drive_->status().mode;
+    const bool streams = mode == firmware::Mode::position || mode == firmware::Mode::velocity;
+    return streams ? kMostAheadOfSetPoints : kMostAhead;
+  }
   void follow_cable() {
     if (cable_.plugged() == std::exchange(was_plugged_, cable_.plugged())) return;
     line_->plug(cable_.plugged());
@@ -167,7 +175,7 @@ class Server {
     const auto now = Clock::now();
     if (runs_fast()) {
       due_ = now;
-      if (since_message_ >= kMostAhead || (!options_.lossy && !line_->has_room())) return 0;
+      if (since_message_ >= most_ahead() || (!options_.lossy && !line_->has_room())) return 0;
       return kBurst;
     }
     const auto late = std::chrono::duration<double>(now - due_).count();

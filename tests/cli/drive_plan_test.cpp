@@ -57,10 +57,8 @@ TEST(RecordPositions, TheShaftGoesWhereThePlanSaysAndKeepsToItsLimit) {
     ASSERT_GE(set.size(), 4000U);
     ASSERT_EQ(set.size(), shaft.size());
     const auto [low, high] = std::ranges::minmax(shaft);
-    // The host's messages are 5 ms apart; on a machine that has much to do one may come as late as they look ahead, 0.2
-    // s. Sent 0.1 s before the sine turns, the shaft goes on by 0.2 s * 20 rad * pi/s * sin(0.1 pi) instead of the 20
-    // rad * (1 - cos(0.1 pi)) that were left: 2.9 rad too far, on either side.
-    EXPECT_NEAR(high - low, 40.0, 6.0) << how;
+    // The host's messages are 5 ms apart, or 50 ms on a machine that has much to do.
+    EXPECT_NEAR(high - low, 40.0, 4.0) << how;
     double most = 0.0, fastest = 0.0;
     for (std::size_t k = 20; k < set.size(); ++k) {
       most = std::max(most, std::abs(set[k] - shaft[k]));
