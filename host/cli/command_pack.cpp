@@ -7,6 +7,7 @@
 
 #include "host/catalogue/constants.hpp"
 #include "host/cli/commands.hpp"
+#include "host/cli/drive_commands.hpp"
 #include "host/deployment/bases.hpp"
 #include "host/deployment/maker.hpp"
 #include "host/model/signature.hpp"
@@ -23,16 +24,6 @@ constexpr int kErrorDigits = 3;
 
 std::string text_of(const model::Name& name) {
   return {name.begin(), std::find(name.begin(), name.end(), '\0')};
-}
-
-std::vector<std::uint8_t> read_bytes(const std::filesystem::path& path) {
-  std::ifstream in(path, std::ios::binary);
-  if (!in) throw deployment::PackError(fmt::format("{} cannot be read; is the path right?", path.string()));
-  // One more than the largest block tells that a file is larger.
-  std::vector<std::uint8_t> bytes(model::kLargestBlock + 1);
-  in.read(reinterpret_cast<char*>(bytes.data()), static_cast<std::streamsize>(bytes.size()));
-  bytes.resize(static_cast<std::size_t>(in.gcount()));
-  return bytes;
 }
 
 json json_of(const deployment::Packed& packed) {
@@ -191,14 +182,15 @@ int run(const PackCommandOptions& options, Console& console) {
   console.line(console.bold(fmt::format("{:<32}{:<18}{:>12}  {}", "part", "bound by", "bound", "unit")));
   for (const auto& part : packed.proof)
     if (!part.observed)
-      console.line(fmt::format("{:<32}{:<18}{:>12}  {}", part.part, part.kind, number(part.bound, kErrorDigits), part.unit));
+      console.line(
+          fmt::format("{:<32}{:<18}{:>12}  {}", part.part, part.kind, number(part.bound, kErrorDigits), part.unit));
   print_errors(packed, console);
   output::save_json(options.json, json_of(packed));
   return kDone;
 }
 
 int run(const UnpackOptions& options, Console& console) {
-  const std::vector<std::uint8_t> bytes = read_bytes(options.block);
+  const std::vector<std::uint8_t> bytes = read_block_file(options.block);
   const deployment::Unpacked block = deployment::unpack(bytes);
   const std::string maker = deployment::maker_of(bytes);
   if (!options.out.empty()) {

@@ -8,6 +8,7 @@
 #include <fstream>
 #include <iostream>
 
+#include "host/deployment/pack.hpp"
 #include "shared/model/block.hpp"
 
 namespace flexspline::cli {
@@ -40,9 +41,15 @@ bool confirmed(const std::string& question, bool yes) {
 drive::Bytes read_block_file(const std::filesystem::path& path) {
   std::ifstream in(path, std::ios::binary);
   if (!in) throw UsageError(fmt::format("{} cannot be read; is the path right?", path.string()));
+  // One more than the largest block tells that a file is larger.
   drive::Bytes bytes(model::kLargestBlock + 1);
   in.read(reinterpret_cast<char*>(bytes.data()), static_cast<std::streamsize>(bytes.size()));
   bytes.resize(static_cast<std::size_t>(in.gcount()));
+  try {
+    deployment::unpack(bytes);
+  } catch (const deployment::PackError& error) {
+    throw deployment::PackError(fmt::format("{}: {}", path.string(), error.what()));
+  }
   return bytes;
 }
 

@@ -94,7 +94,8 @@ drive::Session open_drive(const std::string& drive);
 std::string named(const drive::Session& session);
 // Asks on a terminal, unless `yes`; without a terminal nobody is asked and it is true.
 bool confirmed(const std::string& question, bool yes);
-// A block from a file, at most one byte more than any block may have.
+// A good parameter block from a file. Throws UsageError where it cannot be read, deployment::PackError with the file
+// and the place where the block is bad.
 drive::Bytes read_block_file(const std::filesystem::path& path);
 
 // True once Ctrl-C was pressed (or the process was told to end) while one of these lives.

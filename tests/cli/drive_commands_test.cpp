@@ -131,7 +131,7 @@ TEST(Flash, RefusesWhatDoesNotFitAndTheDriveKeepsItsBlock) {
   for (const auto& [line, expected] :
        std::vector<std::pair<std::string, std::string>>{{"flash --model gear.toml", "a gear of 50"},
                                                         {"flash --block model.block", "settings of the drive"},
-                                                        {"flash --block no.block", "no good parameter block"},
+                                                        {"flash --block no.block", "no.block: this is no good parameter block"},
                                                         {"flash --block missing.block", "cannot be read"},
                                                         {"flash", "--model MODEL"},
                                                         {"restore", "no valid block before"},
