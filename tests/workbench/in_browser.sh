@@ -1,10 +1,11 @@
 #!/usr/bin/env bash
-# The workbench's story in headless Chromium. story.sh TOOL WORK; 77 where Chromium, Node.js or npm cannot be had.
+# The workbench in headless Chromium: in_browser.sh story|figures TOOL WORK runs what its user does, or takes times. 77 where
+# Chromium, Node.js or npm cannot be had.
 set -euo pipefail
 here=$(cd -- "$(dirname -- "${BASH_SOURCE[0]}")" && pwd)
-tool=$1 work=$2
+what=$1 tool=$(realpath -- "$2") work=$(realpath -m -- "$3")
 skip() {
-  echo "story.sh: Skipped"
+  echo "in_browser.sh: Skipped"
   echo "$*"
   echo "[  SKIPPED ]"
   exit 77
@@ -18,4 +19,4 @@ if [[ ! -f $work/npm/node_modules/axe-core/axe.min.js || ! -d $work/npm/node_mod
   (cd "$work/npm" && timeout 300 npm install --no-save --no-audit --no-fund --no-package-lock --ignore-scripts >npm.log 2>&1) ||
     skip "the packages of package.json cannot be had from npm: $(tail -n 1 "$work/npm/npm.log")"
 fi
-exec node "$here/story.mjs" "$tool" "$work/npm" "$work/story" "$chromium"
+exec node "$here/$what.mjs" "$tool" "$work/npm" "$work/$what" "$chromium"
