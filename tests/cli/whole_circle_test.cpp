@@ -88,12 +88,21 @@ TEST(WholeCircle, FromRecordingsOfADriveWithAHiddenEffectToACloserMotion) {
   const json loop = shell.json("flexspline hil --scenario slow-reversals --seconds 5 --draws 4 --hide " + hidden +
                                " --base base.toml --model added.toml");
   ASSERT_EQ(loop["runs"].size(), 3U);
+  const auto mrad = [&](const char* of) {
+    std::string all;
+    for (const json& run : loop["runs"]) all += std::to_string(1e3 * run[of].get<double>()) + " ";
+    return all;
+  };
   const double none = loop["runs"][0]["rms_error_rad"], with_base = loop["runs"][1]["rms_error_rad"],
                with_added = loop["runs"][2]["rms_error_rad"];
-  RecordProperty("hil_mrad", std::to_string(1e3 * none) + " " + std::to_string(1e3 * with_base) + " " +
-                                 std::to_string(1e3 * with_added));
+  const double base_peak = loop["runs"][1]["peak_error_rad"], added_peak = loop["runs"][2]["peak_error_rad"];
+  RecordProperty("hil_rms_mrad", mrad("rms_error_rad"));
+  RecordProperty("hil_peak_mrad", mrad("peak_error_rad"));
   EXPECT_LT(with_base, 0.5 * none);
-  EXPECT_LT(with_added, 0.5 * with_base);
+  // Friction that falls with speed shows where the motion turns: in the peak. What is left between the reversals is
+  // the gear's damping as far as two short locked runs tell it (its 95 % interval is worth 0.003 mrad), and is in both.
+  EXPECT_LT(added_peak, 0.3 * base_peak);
+  EXPECT_LT(with_added, with_base);
   EXPECT_GT(with_added, 5e-8);
 }
 
