@@ -43,6 +43,10 @@ inline constexpr std::uint32_t kStaleTicks = 3;
 inline constexpr std::uint32_t kRangeTicks = 3;
 inline constexpr std::uint32_t kOvercurrentTicks = 2;
 inline constexpr std::uint32_t kHotTicks = 200;
+// What a shaft feels of a torque: smoothed over so many ticks. A free shaft follows slower torque by a count.
+inline constexpr unsigned kFeltTicksLog2 = 6;
+// Share of the time before a motor's encoder counts as stuck, in which a shaft comes to rest after its last count.
+inline constexpr std::uint32_t kSettlingShare = 8;
 inline constexpr std::uint32_t kWatchdogTicks = 200;  // what a board's watchdog has to be set to
 
 // Where a drive can still be trusted to come to rest by itself, it does: loops that do not follow are not, those of the

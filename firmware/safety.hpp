@@ -98,18 +98,23 @@ class Safety {
     check_stuck(found, e, last, limits);
   }
   // A shaft that friction holds stays within twice its breakaway torque; beyond that it moves, if only by the torsion
-  // of the gear.
+  // of the gear. Torque that goes to and fro faster than the shaft follows is none that it feels, and what braked it
+  // may last until it has come to rest within its last count: so the torque is smoothed, and counts from a little after
+  // the last motion, or from when the drive was armed.
   void check_stuck(FaultRecord& found, const Estimate& e, const Output& last, const control::SafetyLimits<N>& limits) {
-    if (e.moved != 0 || !watches_) {
-      lowest_ = highest_ = last.torque;
-      unmoved_ = 0;
-      watches_ = true;
-    }
-    if (last.torque < lowest_) lowest_ = last.torque;
-    if (last.torque > highest_) highest_ = last.torque;
+    const std::uint32_t settles = limits.stuck_ticks / kSettlingShare + 1U;
+    const bool begins = !watches_;
+    watches_ = true;
+    felt_.raw = begins ? last.torque.raw : felt_.raw + ((last.torque.raw - felt_.raw) >> kFeltTicksLog2);
+    if (begins) unmoved_ = settles;
+    if (e.moved != 0) unmoved_ = 0;
+    if (begins || unmoved_ < settles) lowest_ = highest_ = felt_;
+    if (felt_ < lowest_) lowest_ = felt_;
+    if (felt_ > highest_) highest_ = felt_;
     const N::Value span = highest_ - lowest_;
-    if (span > limits.stuck_torque) ++unmoved_;
-    expect(found, Fault::motor_encoder_stuck, unmoved_ < limits.stuck_ticks, span.raw, limits.stuck_torque.raw);
+    if (unmoved_ < settles || span > limits.stuck_torque) ++unmoved_;
+    expect(found, Fault::motor_encoder_stuck, unmoved_ < settles + limits.stuck_ticks, span.raw,
+           limits.stuck_torque.raw);
   }
   // The output moves with the motor, but for torsion and backlash. A line that is lost leaves a count that goes to and
   // fro, so a few counts are no motion. Without limits any count is enough, and nothing is watched.
@@ -159,6 +164,7 @@ class Safety {
   std::uint32_t lagging_ = 0;
   std::uint32_t output_from_ = 0;
   std::uint32_t turned_ = 0;  // of the motor since then, counts; wraps
+  N::Value felt_{};           // torque, smoothed
   N::Value lowest_{};
   N::Value highest_{};
   std::uint8_t current_outside_ = 0;

@@ -22,6 +22,14 @@ double stiffness_of(const plant::Drive& drive) {
   const plant::Effect* spring = drive.find("linear_stiffness");
   return spring == nullptr ? 0.0 : spring->value("stiffness");
 }
+// As far as the maker knows it.
+double breakaway_torque_of(const plant::Drive& drive) {
+  const auto known = [&](const char* effect, const char* parameter) {
+    const plant::Effect* found = drive.find(effect);
+    return found == nullptr || found->hidden ? 0.0 : found->value(parameter);
+  };
+  return known("coulomb_friction", "torque") + std::max(0.0, known("stribeck_gaussian", "amplitude_positive"));
+}
 double inertia_of(const plant::Drive& drive) {
   const plant::Effect* inertia = drive.find("inertia");
   if (inertia == nullptr) throw std::runtime_error("the drive has no effect 'inertia'; its loops cannot be laid out");
@@ -125,7 +133,7 @@ control::DriveSetup<double> setup_of(const plant::Drive& drive, const effects::D
   s.safety.overcurrent = 1.2 * drive.current_limit_a;
   s.safety.overtemperature = 80.0;
   s.safety.acceleration = 10.0 * most_torque / inertia;
-  s.safety.stuck_torque = 0.75 * most_torque;
+  s.safety.stuck_torque = std::max(0.75 * most_torque, 2.5 * breakaway_torque_of(drive));
   s.safety.current_mismatch = 0.2 * drive.current_limit_a;
   s.safety.following_error = 2.0 * drive.rated_velocity_rad_s / s.loops.position_gain;
   s.safety.following_velocity = 0.75 * drive.rated_velocity_rad_s;

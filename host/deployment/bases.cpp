@@ -7,6 +7,7 @@
 #include "host/catalogue/constants.hpp"
 #include "host/catalogue/defined.hpp"
 #include "host/deployment/pack.hpp"
+#include "host/deployment/statics.hpp"
 #include "shared/fixed/coefficients.hpp"
 #include "shared/fixed/turn.hpp"
 
@@ -26,21 +27,8 @@ double needed(const model::Quantity& q, const char* key) {
 
 // The torsion at which the transmission carries rated torque: how far effects without memory have to be twisted.
 double rated_torsion(const model::Model& model, double rated_torque) {
-  const auto drive = catalogue::constants_of(model.drive);
-  std::vector<std::unique_ptr<catalogue::Instance>> springs;
-  for (const model::Effect& effect : model.effects) {
-    const catalogue::Entry& entry = catalogue::entry_of(effect);
-    if (entry.info->balance != effects::Balance::transmission || entry.has_state) continue;
-    springs.push_back(entry.make(catalogue::values_of(effect, entry).data(), drive));
-  }
-  const auto torque_at = [&](double torsion) {
-    effects::Inputs<catalogue::Real> in{};
-    in.torsion = torsion;
-    in.viscous_scale = in.coulomb_scale = 1.0;
-    effects::Torques<catalogue::Real> out{};
-    for (const auto& spring : springs) spring->evaluate(in, out);
-    return std::abs(out.transmission);
-  };
+  const Springs springs(model);
+  const auto torque_at = [&](double torsion) { return std::abs(springs.torque_at(torsion)); };
   constexpr double kLeast = 1e-7, kMost = 1.0;
   double high = kLeast;
   while (high < kMost && torque_at(high) < rated_torque) high *= 2.0;

@@ -6,12 +6,12 @@
 #include <array>
 #include <cmath>
 #include <map>
-#include <memory>
 #include <set>
 
 #include "host/catalogue/constants.hpp"
 #include "host/catalogue/defined.hpp"
 #include "host/deployment/pack.hpp"
+#include "host/deployment/statics.hpp"
 #include "host/text/toml.hpp"
 #include "shared/fixed/turn.hpp"
 
@@ -28,6 +28,11 @@ constexpr double kLeast = 1e-12;  // of what has to be above nought
 // quarter of this has to be seen (shared/control/drive_parameters_setup.hpp).
 constexpr double kTorsionsBeforeStuck = 8.0;
 constexpr double kCountsBeforeStuck = 32.0;
+// The motor's encoder: friction may hold a quarter more than the model says, and three quarters of what the drive has
+// may come of what is no friction. The time in which full torque turns a free shaft by a count passes so often first.
+constexpr double kHeldBeforeStuck = 1.25;
+constexpr double kTorqueBeforeStuck = 0.75;
+constexpr double kCountsTimesBeforeStuck = 16.0;
 
 // The file's tables, whose keys are taken one after another; what nobody took is no setting.
 class Settings {
@@ -132,25 +137,12 @@ std::optional<double> parameter(const model::Model& model, const char* effect, c
 // The largest slope of what the transmission carries without memory, within a torsion; nought without such effects.
 double largest_stiffness(const model::Model& model, double torsion) {
   constexpr int kSteps = 400;
-  const auto drive = catalogue::constants_of(model.drive);
-  std::vector<std::unique_ptr<catalogue::Instance>> springs;
-  for (const model::Effect& effect : model.effects) {
-    const catalogue::Entry& entry = catalogue::entry_of(effect);
-    if (entry.info->balance != effects::Balance::transmission || entry.has_state) continue;
-    springs.push_back(entry.make(catalogue::values_of(effect, entry).data(), drive));
-  }
-  const auto torque_at = [&](double x) {
-    effects::Inputs<catalogue::Real> in{};
-    in.torsion = x;
-    in.viscous_scale = in.coulomb_scale = 1.0;
-    effects::Torques<catalogue::Real> out{};
-    for (const auto& spring : springs) spring->evaluate(in, out);
-    return out.transmission;
-  };
+  const Springs springs(model);
   double steepest = 0.0;
   for (int k = -kSteps; k < kSteps; ++k)
-    steepest = std::max(steepest,
-                        (torque_at(torsion * (k + 1) / kSteps) - torque_at(torsion * k / kSteps)) / (torsion / kSteps));
+    steepest =
+        std::max(steepest, (springs.torque_at(torsion * (k + 1) / kSteps) - springs.torque_at(torsion * k / kSteps)) /
+                               (torsion / kSteps));
   return steepest;
 }
 
@@ -310,8 +302,12 @@ control::DriveSetup<double> parse_drive_setup(const std::string& toml, const std
   f.overtemperature = s.positive("faults", "overtemperature_c", 80.0, 2.0 * d.temperature_base);
   f.acceleration = s.positive("faults", "acceleration_rad_s2",
                               std::min(10.0 * most_torque / inertia, largest_acceleration), largest_acceleration);
-  f.stuck_torque = s.positive("faults", "stuck_torque_nm", 0.75 * most_torque);
-  f.stuck_s = s.positive("faults", "stuck_s", f.stuck_s, 3.0);
+  f.stuck_torque =
+      s.positive("faults", "stuck_torque_nm",
+                 std::max(kHeldBeforeStuck * torque_held_by_friction(model), kTorqueBeforeStuck * most_torque));
+  // A coarse encoder needs longer to show that the shaft follows its torque.
+  const double a_count_s = std::sqrt(2.0 * inertia * d.angle_base / setup.motor_counts / most_torque);
+  f.stuck_s = s.positive("faults", "stuck_s", std::clamp(kCountsTimesBeforeStuck * a_count_s, f.stuck_s, 3.0), 3.0);
   f.current_mismatch = s.positive("faults", "current_mismatch_a", 0.2 * current);
   f.mismatch_s = s.positive("faults", "mismatch_s", f.mismatch_s, 3.0);
   f.torque_same_s = s.positive("faults", "torque_same_s", f.torque_same_s, 3.0);

@@ -15,8 +15,7 @@ namespace flexspline::workbench {
 namespace {
 
 constexpr int kDraws = 8;
-// Peak over rated current where nothing says it. With less a drive that holds its place against friction looks like one
-// whose encoder is stuck.
+// Peak over rated current where nothing says it: few servo drives allow less.
 constexpr double kPeakCurrent = 1.6;
 
 // A truth.toml without what a model does not have: what was hidden, and how each run was.

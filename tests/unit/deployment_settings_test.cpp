@@ -2,8 +2,11 @@
 #include <gtest/gtest.h>
 
 #include <cmath>
+#include <initializer_list>
 #include <numbers>
 #include <string>
+#include <utility>
+#include <vector>
 
 #include "host/catalogue/constants.hpp"
 #include "host/deployment/bases.hpp"
@@ -71,6 +74,40 @@ TEST(DriveSettings, FollowFromTheRatingsWhereTheFileDoesNotStateThem) {
   EXPECT_NEAR(s.safety.following_velocity, 150.0, 1e-9);
   // Eight times what rated torque twists the gear by.
   EXPECT_NEAR(s.safety.output_stuck, 8.0 * 40.0 / 6300.0, 1e-4);
+}
+
+model::Model with_friction(std::initializer_list<std::pair<const char*, std::vector<double>>> effects) {
+  model::Model m = some_model();
+  for (const auto& [type, values] : effects) {
+    model::Effect effect = catalogue::blank_effect(catalogue::get(type), m.drive.axis);
+    effect.id = type;
+    for (std::size_t k = 0; k < values.size(); ++k) effect.parameters[k].value = values[k];
+    m.effects.push_back(effect);
+  }
+  return m;
+}
+
+// The motor has 0.1 N m. What friction holds is its height on both sides; of what acts alike on both it holds nothing.
+TEST(DriveSettings, AStuckEncoderIsToldFromFrictionThatHoldsMostOfTheTorque) {
+  const auto stuck_torque = [](const model::Model& m) { return parsed(kCounts, m).safety.stuck_torque; };
+  EXPECT_NEAR(stuck_torque(some_model()), 0.075, 1e-6);
+  EXPECT_NEAR(stuck_torque(with_friction({{"coulomb_friction", {0.01}}})), 0.075, 1e-6);
+  EXPECT_NEAR(stuck_torque(with_friction({{"coulomb_friction", {0.045}}})), 1.25 * 0.09, 1e-6);
+  EXPECT_NEAR(stuck_torque(with_friction({{"coulomb_friction", {0.045}}, {"coulomb_asymmetry", {0.01}}})), 1.25 * 0.09,
+              1e-6);
+  EXPECT_NEAR(stuck_torque(with_friction({{"coulomb_friction", {0.03}}, {"stribeck_gaussian", {0.01, 0.02, 3.0}}})),
+              1.25 * (0.04 + 0.05), 1e-6);
+  EXPECT_NEAR(stuck_torque(with_friction({{"dahl_friction", {0.045, 0.05}}})), 1.25 * 0.09, 1e-6);
+  EXPECT_NEAR(stuck_torque(with_friction({{"lugre_friction", {0.045, 0.055, 3.0, 0.4, 0.0}}})), 1.25 * 0.11, 1e-5);
+  // A tenth of the load of 40 N m behind a gear of 100.
+  EXPECT_NEAR(stuck_torque(with_friction({{"load_dependent_friction", {0.1}}})), 1.25 * 2.0 * 0.04, 1e-6);
+}
+
+// Full torque turns 1e-4 kg m^2 by a 64th of a turn in 14 ms, by a 4096th in 1.8 ms.
+TEST(DriveSettings, ACoarseEncoderIsGivenLongerToShowThatTheShaftFollows) {
+  EXPECT_NEAR(parsed("[motor_encoder]\ncounts = 64\n").safety.stuck_s, 16.0 * std::sqrt(2.0 * 1e-4 * kTurn / 64 / 0.1),
+              1e-9);
+  EXPECT_NEAR(parsed("[motor_encoder]\ncounts = 65536\n").safety.stuck_s, 0.05, 1e-9);
 }
 
 TEST(DriveSettings, AreThoseOfTheFile) {

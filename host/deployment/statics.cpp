@@ -1,0 +1,81 @@
+#include "host/deployment/statics.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <numbers>
+
+#include "host/catalogue/constants.hpp"
+#include "host/catalogue/defined.hpp"
+
+namespace flexspline::deployment {
+namespace {
+
+using catalogue::Real;
+
+// Memory of friction has settled after a turn; a step of it is short beside presliding.
+constexpr int kStepsATurn = 4096;
+constexpr double kCreepShare = 1e-6;  // of rated velocity
+
+// Motor's torque of one effect after a turn of creeping one way, at the angle where it began.
+double creeping_torque(catalogue::Instance& effect, bool has_state, effects::Inputs<Real> in) {
+  const double turn = std::copysign(2.0 * std::numbers::pi, in.velocity);
+  in.elapsed = turn / kStepsATurn / in.velocity;
+  for (int k = 1; k <= kStepsATurn && has_state; ++k) {
+    effects::Inputs<Real> now = in;
+    now.angle = turn * k / kStepsATurn;
+    effect.advance(now, in);
+    in = now;
+  }
+  in.angle = 0.0;
+  effects::Torques<Real> torques{};
+  effect.evaluate(in, torques);
+  return torques.motor;
+}
+
+}  // namespace
+
+Springs::Springs(const model::Model& model) {
+  const auto drive = catalogue::constants_of(model.drive);
+  for (const model::Effect& effect : model.effects) {
+    const catalogue::Entry& entry = catalogue::entry_of(effect);
+    if (entry.info->balance != effects::Balance::transmission || entry.has_state) continue;
+    effects_.push_back(entry.make(catalogue::values_of(effect, entry).data(), drive));
+  }
+}
+
+double Springs::torque_at(double torsion) const {
+  effects::Inputs<Real> in{};
+  in.torsion = torsion;
+  in.viscous_scale = in.coulomb_scale = 1.0;
+  effects::Torques<Real> out{};
+  for (const auto& effect : effects_) effect->evaluate(in, out);
+  return out.transmission;
+}
+
+double torque_held_by_friction(const model::Model& model) {
+  const auto drive = catalogue::constants_of(model.drive);
+  double most = 0.0;
+  for (const double load : {0.0, model.drive.rated_torque_nm.value.value_or(0.0)}) {
+    double held = 0.0;
+    for (const model::Effect& effect : model.effects) {
+      const catalogue::Entry& entry = catalogue::entry_of(effect);
+      if (!entry.adds_to(effects::Balance::motor)) continue;
+      const std::vector<double> values = catalogue::values_of(effect, entry);
+      for (const double way : {1.0, -1.0}) {
+        effects::Inputs<Real> in{};
+        in.direction = in.output_direction = way;
+        in.velocity = way * kCreepShare * drive.rated_velocity;
+        in.speed = std::abs(in.velocity);
+        in.output_velocity = in.velocity / drive.gear_ratio;
+        in.torque = in.torque_magnitude = load;
+        in.temperature = drive.reference_temperature;
+        in.viscous_scale = in.coulomb_scale = 1.0;
+        held += way * creeping_torque(*entry.make(values.data(), drive), entry.has_state, in);
+      }
+    }
+    most = std::max(most, held);
+  }
+  return most;
+}
+
+}  // namespace flexspline::deployment
