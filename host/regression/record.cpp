@@ -28,6 +28,9 @@ constexpr double kRowsOverCutoff = 4.0;
 
 // How far, in periods of the row cut-off, the step of friction at a reversal rings through the row filter.
 constexpr double kMaskReach = 1.5;
+// Records of less coherent power than this share of the strongest one's do not shape the pipeline.
+constexpr double kCountingPowerShare = 0.01;
+constexpr double kMostMaskedShare = 0.5;
 
 template <class Process>
 std::vector<double> by_segment(const std::vector<double>& signal, const std::vector<Segment>& segments,
@@ -300,6 +303,38 @@ Record prepare_one(const Experiment& e, const catalogue::DriveConstants<double>&
   return r;
 }
 
+// Each reversal masks a stretch that is as long as the rows' filter rings: a cut-off that serves the slow records may
+// leave a fast one nothing at all. Raises it until half of each record that counts is left.
+void leave_rows_between_reversals(Pipeline& pipeline, const std::vector<const Experiment*>& experiments,
+                                  const std::vector<signals::CutoffChoice>& choices, double highest_hz) {
+  double strongest = 0.0;
+  for (const signals::CutoffChoice& c : choices) strongest = std::max(strongest, c.coherent_power);
+  double wanted = 0.0;
+  const Experiment* fastest = nullptr;
+  for (std::size_t i = 0; i < choices.size(); ++i) {
+    const Experiment& e = *experiments[i];
+    if (!e.has(Column::motor_position) || !(choices[i].coherent_power > kCountingPowerShare * strongest)) continue;
+    const double own_hz = kMotionOverRow * std::max(pipeline.row_cutoff_hz, choices[i].cutoff_hz);
+    const double window_s = std::max(e.sample_s, 1.0 / own_hz);
+    double reversals = 0.0, length_s = 0.0;
+    for (const Segment& s : e.segments) {
+      const double part_s = static_cast<double>(s.last - s.first) * e.sample_s;
+      const std::span<const double> position(e[Column::motor_position].data() + s.first, s.last - s.first);
+      reversals += part_s * signals::reversals_hz(position, e.sample_s, window_s);
+      length_s += part_s;
+    }
+    const double needs = length_s > 0.0 ? 2.0 * kMaskReach / kMostMaskedShare * reversals / length_s : 0.0;
+    if (needs > wanted) {
+      wanted = needs;
+      fastest = &e;
+    }
+  }
+  if (wanted <= pipeline.row_cutoff_hz || pipeline.row_cutoff_hz >= highest_hz) return;
+  pipeline.row_cutoff_hz = std::min(std::ceil(wanted), highest_hz);
+  pipeline.reason += fmt::format("; raised to {:.4g} Hz, so that rows are left between the reversals of {}",
+                                 pipeline.row_cutoff_hz, fastest->name);
+}
+
 Pipeline choose_pipeline(const std::vector<const Experiment*>& experiments, const PipelineOptions& options) {
   Pipeline pipeline;
   pipeline.mask = options.mask;
@@ -316,6 +351,7 @@ Pipeline choose_pipeline(const std::vector<const Experiment*>& experiments, cons
     return pipeline;
   }
   std::vector<signals::CutoffChoice> choices;
+  std::vector<const Experiment*> of_choice;
   for (const Experiment* e : experiments) {
     const bool current = e->has(Column::current);
     if (!current && !e->has(Column::motor_torque)) continue;
@@ -330,6 +366,7 @@ Pipeline choose_pipeline(const std::vector<const Experiment*>& experiments, cons
     else
       continue;
     choices.push_back(signals::choose_cutoff(effort, velocity, sample_hz));
+    of_choice.push_back(e);
   }
   if (choices.empty())
     throw data::DataError({{data::Severity::error, "missing_column", "", 0, "current_a",
@@ -337,8 +374,9 @@ Pipeline choose_pipeline(const std::vector<const Experiment*>& experiments, cons
                             "record both, or map their columns in dataset.toml"}});
   const signals::CutoffChoice choice = signals::combine_cutoffs(choices);
   pipeline.row_cutoff_hz = std::min(choice.cutoff_hz, slowest_hz / 10.0);
-  pipeline.motion_cutoff_hz = std::min(kMotionOverRow * pipeline.row_cutoff_hz, 0.45 * slowest_hz);
   pipeline.reason = choice.reason;
+  if (pipeline.mask) leave_rows_between_reversals(pipeline, of_choice, choices, slowest_hz / 10.0);
+  pipeline.motion_cutoff_hz = std::min(kMotionOverRow * pipeline.row_cutoff_hz, 0.45 * slowest_hz);
   return pipeline;
 }
 

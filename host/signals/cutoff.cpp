@@ -16,6 +16,7 @@ constexpr double kPowerShare = 0.999;
 constexpr double kGapRatio = 3.2;
 constexpr double kMargin = 1.25;
 constexpr double kBandsPerOctave = 6.0;
+constexpr double kClearShare = 0.2;
 constexpr double kFinestResolutionHz = 0.5;
 constexpr std::size_t kWantedSegments = 8;
 constexpr std::size_t kShortestSegment = 64;
@@ -124,6 +125,27 @@ CutoffChoice choose_cutoff(std::span<const double> effort, std::span<const doubl
       "({} segments of {} samples)",
       choice.cutoff_hz, 100.0 * below / total, choice.coherent_to_hz, bound, spectrum.averages, segment);
   return choice;
+}
+
+double reversals_hz(std::span<const double> position, double sample_s, double window_s) {
+  if (!(sample_s > 0.0) || !(window_s >= sample_s))
+    throw std::invalid_argument(fmt::format("reversals: a window of {} s, sampled each {} s", window_s, sample_s));
+  const auto window = static_cast<std::size_t>(std::lround(window_s / sample_s));
+  if (position.size() <= 8 * window) return 0.0;
+  const std::size_t n = position.size() - window;
+  const auto travel = [&](std::size_t k) { return position[k + window] - position[k]; };
+  double squares = 0.0;
+  for (std::size_t k = 0; k < n; ++k) squares += travel(k) * travel(k);
+  const double clear = kClearShare * std::sqrt(squares / static_cast<double>(n));
+  std::size_t reversals = 0;
+  double way = 0.0;
+  for (std::size_t k = 0; k < n; ++k) {
+    const double moved = travel(k);
+    if (!(std::abs(moved) > clear)) continue;
+    if (moved * way < 0.0) ++reversals;
+    way = moved;
+  }
+  return static_cast<double>(reversals) / (static_cast<double>(n) * sample_s);
 }
 
 CutoffChoice combine_cutoffs(std::span<const CutoffChoice> records, CutoffCombination combination) {

@@ -32,6 +32,11 @@ inline constexpr double kLowestCutoffHz = 5.0;
 CutoffChoice choose_cutoff(std::span<const double> effort, std::span<const double> motion_velocity_or_acceleration,
                            double sample_hz);
 
+/// How often a motion turns back, Hz: its velocity over `window_s`, beyond a fifth of its root mean square on either
+/// side. Positions of one uninterrupted stretch, in any unit. 0 where it is shorter than eight windows or nothing
+/// moves. Throws std::invalid_argument unless 0 < sample_s <= window_s.
+double reversals_hz(std::span<const double> position, double sample_s, double window_s);
+
 enum class CutoffCombination {
   kWeightedMedian,  ///< half of the coherent power lies in records with this cut-off or a lower one
   kLargest,         ///< enough for each record that holds at least 1 % of the strongest one's coherent power

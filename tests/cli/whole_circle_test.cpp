@@ -46,7 +46,8 @@ TEST(WholeCircle, FromRecordingsOfADriveWithAHiddenEffectToACloserMotion) {
                                    run_of("triangle", velocity("triangle", "60", "0.5")) +
                                    run_of("unseen", velocity("asymmetric_sine", "8", "0.25"))));
   shell.write("locked.toml", plan_of(run_of("locked-sine", locked("sine", "3", "0.5")) +
-                                     run_of("locked-triangle", locked("triangle", "2", "0.5"))));
+                                     run_of("locked-triangle", locked("triangle", "2", "0.5")) +
+                                     run_of("locked-fast", locked("sine", "3", "4"))));
   const TwinProcess twin({"--serve", "0", "--fast", "--hide", hidden});
   const std::string drive = " --drive " + twin.name();
   {
@@ -67,6 +68,9 @@ TEST(WholeCircle, FromRecordingsOfADriveWithAHiddenEffectToACloserMotion) {
   // Runs begin where the shaft stands, whole turns and all: else there would be a turn of torsion in one of them.
   EXPECT_NEAR(value_of(base, "linear_stiffness", "stiffness"), 6300.0, 0.05 * 6300.0);
   EXPECT_NEAR(value_of(base, "inertia", "inertia"), 1.04e-4, 0.02e-4);
+  // What the gear's damping makes of speed is told by the locked runs' two frequencies; else it would be in both models.
+  EXPECT_NEAR(value_of(base, "structural_damping", "torque"), 57.0, 0.05 * 57.0);
+  EXPECT_NEAR(value_of(base, "structural_damping", "exponent"), 0.5, 0.01);
   shell.must("flexspline compare --model base.toml project");
   const json found = shell.json("flexspline diagnose --model base.toml project --holdout free/unseen.csv");
   EXPECT_EQ(found["verdict"], "missing_effect");
@@ -99,10 +103,9 @@ TEST(WholeCircle, FromRecordingsOfADriveWithAHiddenEffectToACloserMotion) {
   RecordProperty("hil_rms_mrad", mrad("rms_error_rad"));
   RecordProperty("hil_peak_mrad", mrad("peak_error_rad"));
   EXPECT_LT(with_base, 0.5 * none);
-  // Friction that falls with speed shows where the motion turns: in the peak. What is left between the reversals is
-  // the gear's damping as far as two short locked runs tell it (its 95 % interval is worth 0.003 mrad), and is in both.
+  // Friction that falls with speed shows where the motion turns: in the peak.
   EXPECT_LT(added_peak, 0.3 * base_peak);
-  EXPECT_LT(with_added, with_base);
+  EXPECT_LT(with_added, 0.5 * with_base);
   EXPECT_GT(with_added, 5e-8);
 }
 

@@ -3,6 +3,7 @@
 #include "shared/model/block.hpp"
 #include "tests/counts/bare.hpp"
 #include "tests/same_bits/adversarial.hpp"
+#include "tests/same_bits/drive_parts.hpp"
 
 namespace flexspline {
 namespace {
@@ -40,16 +41,22 @@ struct FromBlock {
 
 int main() {
   using namespace flexspline;
-  if (!model::check_start(kBlock).good()) {
+  using Model = model::DriveModel<fixed::Fixed>;
+  static same_bits::Settings settings;
+  std::uint32_t seen = 0;
+  if (!model::read_block<Model::kTables>(kBlock, control::block_places<Model>(), nullptr, &settings, seen, nullptr)
+           .good()) {
     bare::print("no good block");
     return 4;
   }
-  same_bits::run<FromBlock>(200, 2'000, [](std::string_view name, std::uint64_t hash) {
+  const auto print = [](std::string_view name, std::uint64_t hash) {
     // A catalogue's names end with a nought.
     bare::print(name.data());
     bare::print(" ");
     bare::print_hex(hash);
     bare::print("\n");
-  });
+  };
+  same_bits::run<FromBlock>(200, 2'000, print);
+  same_bits::run_parts<FromBlock>(settings, 200, print);
   return 0;
 }

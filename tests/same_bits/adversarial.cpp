@@ -1,12 +1,13 @@
 // Prints the hashes of a million ticks, to be compared between compilers and levels of optimisation. `few`: those of
 // few ticks, as machines in QEMU give them. `block`: the coefficients as a parameter block, a C++ array, for those
 // machines, which then need no floating point.
-#include "tests/same_bits/adversarial.hpp"
-
 #include <cstdio>
+#include <string>
 #include <string_view>
 
 #include "shared/model/block.hpp"
+#include "tests/same_bits/adversarial.hpp"
+#include "tests/same_bits/drive_parts.hpp"
 
 namespace {
 
@@ -31,8 +32,7 @@ void print_block() {
     if constexpr (!Effect::kInfo.host_only)
       writer.add(static_cast<std::uint16_t>(number), same_bits::Derived::effect<Effect>());
   });
-  writer.add(static_cast<std::uint16_t>(model::Section::encoder_filter), same_bits::Derived::encoder_filter());
-  writer.add(static_cast<std::uint16_t>(model::Section::torque_ripple_filter), same_bits::Derived::ripple_filter());
+  control::add_settings(writer, same_bits::settings());
   const std::size_t size = writer.end();
   for (std::size_t i = 0; i < size; ++i) std::printf("%u,%s", bytes[i], i % 20 == 19 ? "\n" : "");
 }
@@ -46,9 +46,14 @@ int main(int argc, char** argv) {
     return 0;
   }
   const bool few = what == "few";
-  same_bits::run<same_bits::Derived>(few ? 200 : 20'000, few ? 2'000 : 1'000'000,
-                                     [](std::string_view name, std::uint64_t hash) {
-                                       std::printf("%.*s %016llx\n", static_cast<int>(name.size()), name.data(),
-                                                   static_cast<unsigned long long>(hash));
-                                     });
+  const int many = few ? 2'000 : 1'000'000;
+  const auto print = [](std::string_view name, std::uint64_t hash) {
+    std::printf("%.*s %016llx\n", static_cast<int>(name.size()), name.data(), static_cast<unsigned long long>(hash));
+  };
+  same_bits::run<same_bits::Derived>(few ? 200 : 20'000, many, print);
+  same_bits::run_parts<same_bits::Derived>(same_bits::settings(), many / 10, print);
+  if (fixed::Findings::count() != 0) {
+    std::fprintf(stderr, "%s\n", std::string(fixed::Findings::first()).c_str());
+    return 1;
+  }
 }

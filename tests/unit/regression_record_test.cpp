@@ -204,6 +204,19 @@ TEST(Prepare, SaysWhichColumnsAreMissing) {
   }
 }
 
+// Sixteen reversals a second, each of which masks one and a half periods of the cut-off to either side.
+TEST(Prepare, ASlowRecordLeavesAFastOneHalfOfItsRows) {
+  const data::Experiment slow = sine(400.0, 0.5, 8.0), fast = sine(2.0, 8.0, 8.0);
+  EXPECT_LT(prepare({&slow}, {}, {}).pipeline.row_cutoff_hz, 10.0);
+  const Prepared both = prepare({&slow, &fast}, {}, {});
+  EXPECT_NEAR(both.pipeline.row_cutoff_hz, 96.0, 2.0) << both.pipeline.reason;
+  const Rows& rows = both.records[1].rows[index(Balance::motor)];
+  EXPECT_NEAR(static_cast<double>(rows.masked), static_cast<double>(rows.samples.size()),
+              0.1 * static_cast<double>(rows.samples.size()));
+  EXPECT_NE(both.pipeline.reason.find("between the reversals of sine"), std::string::npos) << both.pipeline.reason;
+  EXPECT_LT(prepare({&slow, &fast}, {}, {std::nullopt, false}).pipeline.row_cutoff_hz, 20.0);
+}
+
 TEST(Prepare, WithoutACutOffPositionsAreFilteredWiderThanRowsAndTheReasonIsTold) {
   const data::Experiment e = sine(10.0, 1.0, 5.0);
   const Pipeline p = prepare({&e}, {}, {}).pipeline;

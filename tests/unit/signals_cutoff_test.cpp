@@ -135,6 +135,27 @@ TEST(Cutoff, OfSeveralRecordsIsTheMedianOrTheLargestByPower) {
   EXPECT_THROW(combine_cutoffs({}), std::invalid_argument);
 }
 
+TEST(Reversals, OfASineAreTwoInAPeriodHoweverCoarseTheEncoder) {
+  for (const double quantum : {0.0, 0.01, 0.2}) {
+    std::vector<double> position(8000);
+    for (std::size_t k = 0; k < position.size(); ++k) {
+      const double x = std::sin(kTwoPi * 4.0 * static_cast<double>(k) / kSampleHz);
+      position[k] = quantum > 0.0 ? quantum * std::round(x / quantum) : x;
+    }
+    EXPECT_NEAR(reversals_hz(position, 1.0 / kSampleHz, 0.04), 8.0, 0.2) << quantum;
+  }
+}
+
+TEST(Reversals, AreNoneWhereNothingTurnsBack) {
+  std::vector<double> position(4000);
+  EXPECT_EQ(reversals_hz(position, 1e-3, 0.01), 0.0);
+  for (std::size_t k = 0; k < position.size(); ++k) position[k] = 1e-3 * static_cast<double>(k);
+  EXPECT_EQ(reversals_hz(position, 1e-3, 0.01), 0.0);
+  EXPECT_EQ(reversals_hz(std::vector<double>(40, 1.0), 1e-3, 0.01), 0.0);
+  EXPECT_THROW(reversals_hz(position, 1e-3, 1e-4), std::invalid_argument);
+  EXPECT_THROW(reversals_hz(position, 0.0, 0.01), std::invalid_argument);
+}
+
 TEST(Cutoff, SignalsOfUnequalLengthAreRefused) {
   EXPECT_THROW(choose_cutoff(std::vector<double>(1000), std::vector<double>(999), kSampleHz), std::invalid_argument);
   EXPECT_THROW(choose_cutoff(std::vector<double>(1000), std::vector<double>(1000), 0.0), std::invalid_argument);
