@@ -35,9 +35,7 @@ class CatalogueEffects final : public model::KnownEffects {
     for (const auto& known : effects_) names.push_back(known.name);
     return names;
   }
-  std::optional<model::Objection> objection(const model::Effect& effect) const override {
-    return objection_to(effect);
-  }
+  std::optional<model::Objection> objection(const model::Effect& effect) const override { return objection_to(effect); }
 
  private:
   std::vector<model::KnownEffect> effects_;

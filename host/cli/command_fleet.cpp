@@ -201,8 +201,8 @@ int merge_results(const FleetOptions& options, Console& console) {
   const fleet::Merged merged = fleet::merge(results, options.limit);
   output::Table table({"quantity", "drives", "median", "deviation", "unit"}, "lrrrl");
   for (const fleet::Spread& s : merged.spreads)
-    table.row(
-        {s.name, std::to_string(s.drives), output::number(s.median, kFleetDigits), output::number(s.deviation, 3), s.unit});
+    table.row({s.name, std::to_string(s.drives), output::number(s.median, kFleetDigits), output::number(s.deviation, 3),
+               s.unit});
   console.line(fmt::format("{} drives, {} of them without a result", results.size(), merged.failed.size()));
   if (!merged.spreads.empty()) console.line(table.text());
   console.line();

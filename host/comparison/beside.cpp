@@ -21,7 +21,6 @@ using regression::Balance;
 using regression::Prepared;
 using regression::Record;
 
-
 using Input = double (*)(const effects::Inputs<regression::Real>&);
 
 struct NamedInput {

@@ -177,7 +177,8 @@ std::vector<Share> localise(const BalanceData& data, const Eigen::VectorXd& resi
   std::vector<Share> shares;
   if (residual.size() != data.rows() || residual.size() < 16) return shares;
   const double tau = std::max(1.0, autocorrelation_time);
-  const auto wanted = std::clamp<std::size_t>(static_cast<std::size_t>(residual.size()) / kRowsPerMapBin, 4, kMostMapBins);
+  const auto wanted =
+      std::clamp<std::size_t>(static_cast<std::size_t>(residual.size()) / kRowsPerMapBin, 4, kMostMapBins);
   const Eigen::VectorXd directions = row_directions(data);
   const auto add = [&](std::string name, const Explained& explained, double level) {
     if (const auto share = significant_share(residual, explained, tau, level))

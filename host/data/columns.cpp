@@ -67,7 +67,9 @@ class Planner {
     return plan_.wanted.size() - 1;
   }
 
-  std::string near_first(std::string_view name) const { return quoted_list(text::nearest_first(name, recording_.names())); }
+  std::string near_first(std::string_view name) const {
+    return quoted_list(text::nearest_first(name, recording_.names()));
+  }
 
   // Something of this name is there, but no column can be made of it.
   bool is_no_column(const std::string& theirs, const std::string& ours) {

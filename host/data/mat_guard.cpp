@@ -4,6 +4,7 @@
 #include <sys/wait.h>
 #include <unistd.h>
 
+#include <algorithm>
 #include <cerrno>
 #include <cstdint>
 #include <cstring>
@@ -141,6 +142,16 @@ bool pack(const MatContents& contents, int file) {
   return packer.good();
 }
 
+// Whoever takes columns out of an array goes by its dimensions.
+bool fits(const MatArray& array) {
+  std::size_t left = array.values.size();
+  for (const std::size_t d : array.dims) {
+    if (d == 0 || left % d != 0) return false;
+    left /= d;
+  }
+  return left == 1;
+}
+
 bool unpack(std::string_view bytes, MatContents& contents) {
   Unpacker unpacker(bytes);
   // A name and two counts are the least that an array takes, two counts the least of the others.
@@ -163,7 +174,7 @@ bool unpack(std::string_view bytes, MatContents& contents) {
     refused.why = unpacker.text();
   }
   contents.failure = unpacker.text();
-  return unpacker.is_whole();
+  return unpacker.is_whole() && std::all_of(contents.arrays.begin(), contents.arrays.end(), fits);
 }
 
 void limit_resources(std::uintmax_t file_bytes) {

@@ -16,7 +16,7 @@ constexpr std::array<const char*, 3> kBalanceNames = {"motor", "transmission", "
 // An odd number of points has one at nought, where most laws bend.
 constexpr std::size_t kPoints = 255, kPointsOfTurn = 256;
 constexpr std::size_t kChecked = 16;  // places between two points at which the error is measured
-constexpr double kFoldedRange = 2.0;     // bases
+constexpr double kFoldedRange = 2.0;  // bases
 
 const effects::VariableInfo& info_of(effects::Variable variable) {
   return *std::find_if(std::begin(effects::kVariables), std::end(effects::kVariables),

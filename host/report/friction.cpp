@@ -123,8 +123,9 @@ json friction_curve(View& view) {
   for (const std::size_t t : friction) {
     const Eigen::VectorXd torque = data.term_torque(view.terms, t);
     total += torque;
-    parts.push_back(
-        {{"id", view.terms[t].id}, {"effect", view.terms[t].entry->name()}, {"torque", json_numbers(averages.of(torque))}});
+    parts.push_back({{"id", view.terms[t].id},
+                     {"effect", view.terms[t].entry->name()},
+                     {"torque", json_numbers(averages.of(torque))}});
   }
   // Measured friction is what the rest of the model leaves of the balance.
   const Eigen::VectorXd measured = total + balance->residual;

@@ -153,7 +153,8 @@ json map_of(const View& view, const BalanceView& balance, const comparison::RowV
     map["with_direction_before"] = mean_json(binned(balance, *balance.before, bins, &directions));
   }
   if (variable.name == "motor_angle") {
-    map["orders"] = {{"amplitude", json_numbers(order_amplitudes(view, balance, balance.residual))}, {"before", nullptr}};
+    map["orders"] = {{"amplitude", json_numbers(order_amplitudes(view, balance, balance.residual))},
+                     {"before", nullptr}};
     if (balance.before) map["orders"]["before"] = json_numbers(order_amplitudes(view, balance, *balance.before));
     for (int order = 1; order <= kOrders; ++order)
       map["share_percent"] =

@@ -28,9 +28,15 @@ class NotFound : public std::runtime_error {
   using std::runtime_error::runtime_error;
 };
 
+// What a message quotes would end there, and with it the message.
+void require_text(std::string_view value, std::string_view what) {
+  if (value.find('\0') != value.npos) throw AskedError(fmt::format("{} holds a byte that is no text", what));
+}
+
 const std::string& text(const Request& request, const std::string& key) {
   const auto found = request.query.find(key);
   if (found == request.query.end()) throw AskedError(fmt::format("\"{}\" is missing in the request", key));
+  require_text(found->second, key);
   return found->second;
 }
 
@@ -52,7 +58,9 @@ std::size_t whole(const Request& request, const std::string& key, double most = 
 std::string field(const json& asked, const char* key) {
   if (!asked.contains(key) || !asked[key].is_string())
     throw AskedError(fmt::format("\"{}\" is missing in the request", key));
-  return asked[key].get<std::string>();
+  const auto value = asked[key].get<std::string>();
+  require_text(value, key);
+  return value;
 }
 
 std::string ending_of(const std::string& what) {
@@ -342,6 +350,7 @@ void Api::start_drop(const std::shared_ptr<Session>& session, const std::vector<
                                        }());
   std::filesystem::create_directory(folder);
   for (const Upload& file : files) {
+    require_text(file.name, "the name of a file");
     const std::string ending = std::filesystem::path(file.name).extension().string();
     if (ending != ".csv" && ending != ".mat" && ending != ".CSV" && ending != ".MAT")
       throw AskedError(

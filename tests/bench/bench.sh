@@ -14,6 +14,7 @@ export FLEXSPLINE_BENCH_ROWS=$out/rows.txt
 "$build/tests/flexspline_identify_bench" $python octave-cli "$here" || status=1
 "$build/tests/flexspline_diagnosis_bench" $python "$here/scipy_diagnosis.py" || status=1
 "$build/tests/flexspline_simulation_bench" $python "$here/scipy_simulation.py" || status=1
+"$build/tests/flexspline_round_trips_bench" "$build/flexspline-hil" "$build/tests/flexspline_echo_bench" || status=1
 
 # Instructions, which are counted: the same in every run.
 if "$here/../counts/measure.sh" "$out/counts" "$build/tests/counts/flexspline_adversarial" >"$out/counts.txt" 2>&1; then

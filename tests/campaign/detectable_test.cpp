@@ -82,10 +82,10 @@ Shown shown(const std::string& label, std::uint64_t seed, int seeds) {
 // Effects of temperature are not judged: between records they look like friction that differs from run to run, which
 // takes them up, and the size that is said for them does not count with that (host/diagnosis/README.md).
 TEST(Detectable, EffectsHalfAsLargeAgainAreNamedAndAThirdOfThemAreNot) {
-  const std::vector<std::string> labels = testing::part_of({
-      "viscous_asymmetry",          "coulomb_asymmetry", "stribeck_gaussian", "load_dependent_friction",
-      "power_law_friction",         "gravity",           "current_offset",    "torque_ripple:2",
-      "torque_constant_saturation", "cubic_stiffness",   "backlash",          "quadratic_drag"});
+  const std::vector<std::string> labels =
+      testing::part_of({"viscous_asymmetry", "coulomb_asymmetry", "stribeck_gaussian", "load_dependent_friction",
+                        "power_law_friction", "gravity", "current_offset", "torque_ripple:2",
+                        "torque_constant_saturation", "cubic_stiffness", "backlash", "quadratic_drag"});
   constexpr int kSeeds = 1;
   std::vector<Shown> all(labels.size());
   std::atomic<std::size_t> next{0};

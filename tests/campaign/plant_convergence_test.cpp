@@ -99,12 +99,13 @@ TEST_P(PlantConvergence, HalvingTheStepChangesLessThanSensorsCanTell) {
   RecordProperty("worst_output_position_counts", std::to_string(worst_output));
 }
 
-INSTANTIATE_TEST_SUITE_P(Hidden, PlantConvergence, ::testing::ValuesIn(testing::part_of(hidden_effects())), [](const auto& test) {
-  std::string name = test.param;
-  std::replace_if(
-      name.begin(), name.end(), [](unsigned char c) { return std::isalnum(c) == 0; }, '_');
-  return name;
-});
+INSTANTIATE_TEST_SUITE_P(Hidden, PlantConvergence, ::testing::ValuesIn(testing::part_of(hidden_effects())),
+                         [](const auto& test) {
+                           std::string name = test.param;
+                           std::replace_if(
+                               name.begin(), name.end(), [](unsigned char c) { return std::isalnum(c) == 0; }, '_');
+                           return name;
+                         });
 
 }  // namespace
 }  // namespace flexspline::plant

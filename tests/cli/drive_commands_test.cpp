@@ -128,14 +128,14 @@ TEST(Flash, RefusesWhatDoesNotFitAndTheDriveKeepsItsBlock) {
   const TwinProcess twin({"--serve", "0"});
   const std::string drive = " --drive " + twin.name();
   const std::string made = sha_of(shell, twin);
-  for (const auto& [line, expected] :
-       std::vector<std::pair<std::string, std::string>>{{"flash --model gear.toml", "a gear of 50"},
-                                                        {"flash --block model.block", "settings of the drive"},
-                                                        {"flash --block no.block", "no.block: this is no good parameter block"},
-                                                        {"flash --block missing.block", "cannot be read"},
-                                                        {"flash", "--model MODEL"},
-                                                        {"restore", "no valid block before"},
-                                                        {"backup --previous --out x", "no block before"}}) {
+  for (const auto& [line, expected] : std::vector<std::pair<std::string, std::string>>{
+           {"flash --model gear.toml", "a gear of 50"},
+           {"flash --block model.block", "settings of the drive"},
+           {"flash --block no.block", "no.block: this is no good parameter block"},
+           {"flash --block missing.block", "cannot be read"},
+           {"flash", "--model MODEL"},
+           {"restore", "no valid block before"},
+           {"backup --previous --out x", "no block before"}}) {
     const Answer answer = shell.run("flexspline " + line + drive);
     EXPECT_EQ(answer.code, 2) << line;
     EXPECT_TRUE(contains(answer.err, expected)) << line << ": " << answer.err;

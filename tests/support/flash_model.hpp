@@ -1,4 +1,5 @@
-// A NOR flash of two sectors (or as many as are wanted) whose power can be cut at any of its operations: before it, inside it or after it.
+// A NOR flash of two sectors (or as many as are wanted) whose power can be cut at any of its operations: before it,
+// inside it or after it.
 #pragma once
 
 #include <array>

@@ -44,7 +44,9 @@ inline data::Dataset record(const plant::Drive& drive, const std::vector<plant::
 }
 
 // All effects that are present and not hidden, with their true values.
-inline model::Model known_model(const plant::Drive& drive) { return testing::model_of(drive, false, true); }
+inline model::Model known_model(const plant::Drive& drive) {
+  return testing::model_of(drive, false, true);
+}
 
 inline std::vector<const data::Experiment*> pointers(const data::Dataset& dataset) {
   std::vector<const data::Experiment*> all;

@@ -214,7 +214,9 @@ TEST(Plant, BacklashFreesTheMotorInsideTheGap) {
   EXPECT_EQ(plant.torque(), 0.0);
   EXPECT_NEAR(plant.state().motor_velocity, 1.0, 1e-12);
   plant.advance({}, 5e-3, 80);
-  EXPECT_NEAR(plant.torque(), p.transmission.stiffness * (plant.state().motor_angle / p.gear_ratio - p.transmission.backlash_half_width), 1e-9);
+  EXPECT_NEAR(
+      plant.torque(),
+      p.transmission.stiffness * (plant.state().motor_angle / p.gear_ratio - p.transmission.backlash_half_width), 1e-9);
   EXPECT_GT(plant.torque(), 0.1);
 }
 

@@ -211,6 +211,23 @@ TEST_F(WorkbenchApi, SaysWhatIsWrongWithADroppedFile) {
   EXPECT_EQ(drop("run.sh", "#!/bin/sh\n"), 400);
 }
 
+TEST_F(WorkbenchApi, ARefusalHasAReasonWhateverTheNamesInTheRequest) {
+  using namespace std::string_literals;
+  const std::string tab = new_tab();
+  const auto reason = [&](Request request) {
+    request.query["tab"] = tab;
+    const Answer answer = api_->answer(request);
+    EXPECT_EQ(answer.status, 400) << answer.body;
+    return json::parse(answer.body)["what"].get<std::string>();
+  };
+  // A text in C ends at its first nought, and a message that begins with such a name is empty.
+  EXPECT_EQ(reason({"POST", "/api/drop", {}, "", {{"\0\0../a.csv(x"s, "time_s\n"}}}),
+            "the name of a file holds a byte that is no text");
+  EXPECT_EQ(reason({"GET", "/api/live", {{"since", "\0"s}}, "", {}}), "since holds a byte that is no text");
+  EXPECT_EQ(reason({"POST", "/api/do", {}, R"({"do": "\u0000"})", {}}), "do holds a byte that is no text");
+  EXPECT_FALSE(reason({"POST", "/api/do", {}, "{\"do\": \"\xE7\xE7", {}}).empty());
+}
+
 TEST_F(WorkbenchApi, RunsTheClosedLoopWithoutCompensationWithTheModelAsOpenedAndWithThePresentOne) {
   std::vector<closed_loop::Job> ran;
   run_ = [&](const std::vector<closed_loop::Job>& jobs) {

@@ -2,12 +2,14 @@
 # Boots Debian's kernel in QEMU and runs a script in it, beside a twin that offers USB devices on this machine's loopback.
 # What the script prints comes out here; its exit code is this one's. Nothing is installed and nobody has to be root.
 #
-#   guest.sh --work DIR --script FILE [--program PATH]... [--file PATH:IN_GUEST]... [--twin COMMAND] [--seconds N]
+#   guest.sh --work DIR --script FILE [--program PATH]... [--file PATH:IN_GUEST]... [--python MODULE]...
+#            [--twin COMMAND] [--seconds N]
 #
 #   --work DIR      for what is made on the way; the kernel is fetched into DIR/../kernel once (kernel.sh)
 #   --script FILE   run by busybox's sh, with the functions and variables of guest_functions.sh
 #   --program PATH  into the guest's /bin, with the libraries that it loads
 #   --file PATH:IN_GUEST
+#   --python MODULE into the guest, with Debian's Python and all that the module imports; PYTHONHOME is /python
 #   --twin COMMAND  started by sh; prints `port N` once it listens, ends with 0 at SIGTERM. Runs outside of the guest, so
 #                   it may be built with sanitizers
 #   --seconds N     time limit of the guest (60)
@@ -17,13 +19,14 @@
 set -euo pipefail
 here=$(cd -- "$(dirname -- "${BASH_SOURCE[0]}")" && pwd)
 
-work='' script='' twin='' seconds=60 programs=() files=()
+work='' script='' twin='' seconds=60 programs=() files=() python=()
 while (($#)); do
   case $1 in
     --work) work=$2 ;;
     --script) script=$2 ;;
     --program) programs+=("$2") ;;
     --file) files+=("$2") ;;
+    --python) python+=("$2") ;;
     --twin) twin=$2 ;;
     --seconds) seconds=$2 ;;
     *)
@@ -73,6 +76,10 @@ with_libraries() { # FILE TARGET_NAME
   done
 }
 for program in busybox usbip lsusb "${programs[@]}"; do with_libraries "$program" "$(basename "$program")"; done
+if ((${#python[@]})); then
+  with_libraries /usr/bin/python3 python3
+  /usr/bin/python3 "$here/guest_python.py" "$root/python" "${python[@]}" || skip "Python has no ${python[*]}; ./dev test installs it"
+fi
 # hidapi over libusb turns strings into wide characters by the C library's converters.
 gconv=$(dirname "$(find /usr/lib -path '*gconv/UTF-16.so' 2>/dev/null | head -n 1)")
 if [[ -d $gconv ]]; then

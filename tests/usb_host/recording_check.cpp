@@ -2,9 +2,6 @@
 // the drive's time, as fast as both can: nothing may be lost. Then a host that reads too slowly: what is lost is
 // counted, and named in the file. TWIN is flexspline-hil. Exit code 0 where all of it holds.
 #include <fmt/format.h>
-#include <signal.h>
-#include <sys/wait.h>
-#include <unistd.h>
 
 #include <chrono>
 #include <cmath>
@@ -14,6 +11,7 @@
 
 #include "host/drive/dataset_writer.hpp"
 #include "host/drive/recorder.hpp"
+#include "tests/support/port_process.hpp"
 #include "tests/support/usbip_link.hpp"
 
 namespace {
@@ -28,42 +26,16 @@ void expect(bool holds, const std::string& what) {
 }
 
 // flexspline-hil twin --usbip 0, until it is gone with this.
-class Twin {
+class Twin : public tests::PortProcess {
  public:
-  Twin(const char* program, std::vector<std::string> more) {
-    std::vector<std::string> words{program, "twin", "--usbip", "0"};
-    words.insert(words.end(), more.begin(), more.end());
-    std::vector<char*> argv;
-    for (std::string& word : words) argv.push_back(word.data());
-    argv.push_back(nullptr);
-    int ends[2];
-    if (pipe(ends) != 0) throw std::runtime_error("no pipe");
-    child_ = fork();
-    if (child_ == 0) {
-      dup2(ends[1], STDOUT_FILENO);
-      execv(program, argv.data());
-      _exit(127);
-    }
-    close(ends[1]);
-    out_ = ends[0];
-    std::string line;
-    for (char c = 0; read(out_, &c, 1) == 1 && c != '\n';) line += c;
-    if (!line.starts_with("port ")) throw std::runtime_error("the twin does not start: " + line);
-    port_ = static_cast<std::uint16_t>(std::stoi(line.substr(5)));
-  }
-  ~Twin() {
-    kill(child_, SIGTERM);
-    waitpid(child_, nullptr, 0);
-    close(out_);
-  }
-  Twin(const Twin&) = delete;
-  Twin& operator=(const Twin&) = delete;
-  std::uint16_t port() const { return port_; }
+  Twin(const char* program, const std::vector<std::string>& more) : PortProcess(program, words(more)) {}
 
  private:
-  pid_t child_ = 0;
-  int out_ = -1;
-  std::uint16_t port_ = 0;
+  static std::vector<std::string> words(const std::vector<std::string>& more) {
+    std::vector<std::string> all{"twin", "--usbip", "0"};
+    all.insert(all.end(), more.begin(), more.end());
+    return all;
+  }
 };
 
 struct Made {

@@ -36,15 +36,22 @@ class Usb:
     def __init__(self, numbers, serial):
         import hid
         self.device = hid.device()
-        self.device.open(numbers["USB_VENDOR"], numbers["USB_PRODUCT"], serial)
+        try:
+            self.device.open(numbers["USB_VENDOR"], numbers["USB_PRODUCT"], serial)
+        except OSError:
+            sys.exit("no drive is on USB, or your user may not open it: flexspline drives says which, and what to do")
         self.report = numbers["REPORT_BYTES"]
 
     def send(self, message):
         # The first byte is the report's number: these have none.
-        self.device.write(b"\0" + message.ljust(self.report, b"\0"))
+        if self.device.write(b"\0" + message.ljust(self.report, b"\0")) < 0:
+            sys.exit("the drive is gone")
 
     def receive(self, timeout_s):
-        return bytes(self.device.read(self.report, max(1, int(1000 * timeout_s))))
+        try:
+            return bytes(self.device.read(self.report, max(1, int(1000 * timeout_s))))
+        except OSError:
+            sys.exit("the drive is gone")
 
 
 class Line:
