@@ -16,7 +16,7 @@ void FrameHash::add(std::uint32_t word) {
 VirtualDrive::VirtualDrive(const RigSetup& setup, const Block& block, const firmware::TelemetrySetup& telemetry,
                            std::unique_ptr<Brain> brain)
     : rig_(setup),
-      brain_(brain ? std::move(brain) : std::make_unique<SoftwareBrain>()),
+      brain_(brain ? std::move(brain) : std::make_unique<SoftwareBrain>(setup.tick_hz)),
       flash_(block),
       telemetry_(telemetry) {
   brain_->start(flash_, telemetry_, firmware::ResetCause::power);
@@ -53,7 +53,7 @@ void VirtualDrive::run(std::uint32_t ticks) {
 }
 
 void VirtualDrive::run_seconds(double seconds) {
-  run(static_cast<std::uint32_t>(std::llround(seconds * SoftwareBoard::kTickHz)));
+  run(static_cast<std::uint32_t>(std::llround(seconds * rig_.tick_hz())));
 }
 
 firmware::Answer VirtualDrive::command(const firmware::Command& command) {
