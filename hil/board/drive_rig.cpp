@@ -10,11 +10,17 @@ namespace flexspline::board {
 namespace {
 
 constexpr double kSurgeA = 2.0;
-constexpr double kLongestStepS = 62.6e-6;  // of the plant: hil/plant/README.md, Numerics
+constexpr double kLongestStepS = 125.1e-6;  // of the plant: hil/plant/README.md, Numerics
 enum Stream : std::uint64_t { kSensorNoise = 17 };
 
+// As std::llround() does it, which is a call, for all that an encoder or a converter can hold.
+std::int64_t nearest(double x) {
+  const auto whole = static_cast<std::int64_t>(x);
+  const double rest = x - static_cast<double>(whole);
+  return whole + (rest >= 0.5 ? 1 : 0) - (rest <= -0.5 ? 1 : 0);
+}
 std::uint32_t counter(double angle_rad, int counts) {
-  return static_cast<std::uint32_t>(std::llround(angle_rad / kTurn * counts));
+  return static_cast<std::uint32_t>(nearest(angle_rad / kTurn * counts));
 }
 // The line that is left goes up and down at the same edge.
 std::uint32_t on_one_line(std::uint32_t before, std::uint32_t count) {
@@ -52,7 +58,7 @@ double DriveRig::noise(const plant::Sensor& sensor, double rated) {
 }
 
 std::int16_t DriveRig::share(double value, double full_scale) const {
-  return static_cast<std::int16_t>(std::clamp(std::lround(value / full_scale * 32768.0), -32768L, 32767L));
+  return static_cast<std::int16_t>(nearest(std::clamp(value / full_scale * 32768.0, -32768.0, 32767.0)));
 }
 
 firmware::Readings DriveRig::sense() {

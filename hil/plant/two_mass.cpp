@@ -306,6 +306,10 @@ double TwoMass::locate(Event event, const State& from, double h, const State& at
 TwoMass::Event TwoMass::first_event(const State& from, double h, State& to, double& taken) const {
   constexpr Event kEvents[] = {Event::motor_stop, Event::output_stop, Event::motor_break, Event::output_break};
   taken = h;
+  // Most steps: what turns goes on turning its way.
+  if (to.motor_direction != 0 && to.motor_direction * to.motor_velocity >= 0.0 &&
+      (locked_ || (to.output_direction != 0 && to.output_direction * to.output_velocity >= 0.0)))
+    return Event::none;
   Event first = Event::none;
   for (const Event event : kEvents) {
     if (event == first || margin(event, to) >= 0.0) continue;

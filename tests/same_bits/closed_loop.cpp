@@ -56,11 +56,7 @@ std::vector<Case> cases() {
 
 class Bits {
  public:
-  void add(double x) {
-    const auto bits = std::bit_cast<std::uint64_t>(x);
-    hash_.add(static_cast<std::uint32_t>(bits));
-    hash_.add(static_cast<std::uint32_t>(bits >> 32U));
-  }
+  void add(double x) { hash_.add(std::bit_cast<std::uint64_t>(x)); }
   unsigned long long value() const { return hash_.value(); }
 
  private:
