@@ -19,7 +19,6 @@ namespace {
 
 constexpr double kShareOfNoise = 0.1;
 constexpr double kShareOfCount = 0.1;
-constexpr double kLongStepShareOfTorqueNoise = 0.25;
 
 std::vector<double> difference(const std::vector<double>& a, const std::vector<double>& b) {
   std::vector<double> d(a.size());
@@ -122,7 +121,7 @@ TEST_P(PlantConvergence, AStepOfAnEighthOfAMillisecondDiffersByLessThanSensorsCa
   fine.steps_per_sample = 4 * coarse.steps_per_sample;
   const Worst worst = worst_between(file, coarse, fine);
   EXPECT_LT(worst.velocity, kShareOfNoise);
-  EXPECT_LT(worst.torque, kLongStepShareOfTorqueNoise);
+  EXPECT_LT(worst.torque, kShareOfNoise);
   EXPECT_LT(worst.motor, kShareOfCount);
   EXPECT_LT(worst.output, kShareOfCount);
 }
