@@ -88,7 +88,7 @@ class Application {
   // Before the first tick: takes the block that lies in flash, at once. Where it is not good the drive has no
   // parameters.
   void boot_with(std::span<const std::byte> block) {
-    const BlockFinding finding = check_block(block, B::kTickHz);
+    const BlockFinding finding = check_block(block, tick_hz_of(*board_));
     if (finding == BlockFinding::none) {
       load_block(block, parameters_);
       new_parameters_ = true;
@@ -157,7 +157,7 @@ class Application {
   // Background work's half: nothing reaches the parameters before the whole block was looked at.
   void take_block() {
     if (block_step_ == BlockStep::check) {
-      const BlockFinding finding = check_block(block_, B::kTickHz);
+      const BlockFinding finding = check_block(block_, tick_hz_of(*board_));
       if (finding != BlockFinding::none) return block_done(finding);
       owner_.store(Owner::wanted, std::memory_order_release);
       asked_at_ = status_.tick;

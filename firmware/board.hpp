@@ -44,4 +44,14 @@ concept Board = requires(B board, const Actuation& actuation) {
   { board.reset_cause() } -> std::same_as<ResetCause>;
 };
 
+// How often a board ticks: kTickHz, but for one that is told when it starts.
+template <Board B>
+constexpr std::uint32_t tick_hz_of(const B& board) {
+  if constexpr (requires { board.tick_hz; }) {
+    return board.tick_hz;
+  } else {
+    return B::kTickHz;
+  }
+}
+
 }  // namespace flexspline::firmware

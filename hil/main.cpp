@@ -163,11 +163,13 @@ int main(int argc, char** argv) {
   drive_command->add_option("--inject-at", drive_options.inject_at_s, "when, in seconds (default: half the time)");
   drive_command->add_option(
       "--block", drive_options.block_file,
-      "parameter block of `flexspline pack --tick-hz 20000`: the drive's model (default: the plant's)");
+      "parameter block of `flexspline pack` for this --tick-hz: the drive's model (default: the plant's)");
   drive_command->add_option("--processor", drive_options.processor_image,
                             "firmware image to run it on, in QEMU (boards/qemu_stm32f405)");
   drive_command->add_option("--trace", drive_options.trace_file, "CSV of one run, a line a millisecond");
   drive_command->add_option("--json", drive_options.json, "file for the result; - is standard output");
+  drive_command->add_option("--tick-hz", drive_options.tick_hz, "ticks of the drive a second, whole in a millisecond")
+      ->capture_default_str();
   drive_command->add_option("--seed", drive_options.seed, "of the sensors' noise (default 1)");
   drive_command->footer("Example: flexspline-hil drive --scenario slow-reversals --seconds 4");
   drive_command->callback([&] { flexspline::scenario::run_drive(drive_options); });

@@ -60,7 +60,9 @@ Block::Block(const firmware::Parameters& parameters, const effects::DriveConstan
 void SoftwareBrain::start(const Block& block, const firmware::TelemetrySetup& telemetry, firmware::ResetCause cause) {
   flash_ = block;
   telemetry_ = telemetry;
+  const std::uint32_t tick_hz = board_.tick_hz;
   board_ = {};
+  board_.tick_hz = tick_hz;
   board_.cause = cause;
   application_ = std::make_unique<firmware::Application<SoftwareBoard>>(board_);
   application_->telemetry().configure(telemetry_);

@@ -45,7 +45,7 @@ class Brain {
 /// The board of the desktop: samples are put in, the actuation is taken out.
 class SoftwareBoard {
  public:
-  static constexpr std::uint32_t kTickHz = 20'000;
+  static constexpr std::uint32_t kTickHz = 20'000;  ///< unless it is told otherwise
   static constexpr std::uint32_t kTelemetryWords = 2048;
 
   firmware::Readings read() const { return readings; }
@@ -54,6 +54,7 @@ class SoftwareBoard {
   void feed_watchdog() { ticks_since_fed = 0; }
   firmware::ResetCause reset_cause() const { return cause; }
 
+  std::uint32_t tick_hz = kTickHz;
   firmware::Readings readings{};
   firmware::Actuation actuation{};
   bool overrun = false;
@@ -64,6 +65,7 @@ class SoftwareBoard {
 /// The application in this process, on the software board.
 class SoftwareBrain : public Brain {
  public:
+  explicit SoftwareBrain(std::uint32_t tick_hz = SoftwareBoard::kTickHz) { board_.tick_hz = tick_hz; }
   void start(const Block& block, const firmware::TelemetrySetup& telemetry, firmware::ResetCause cause) override;
   firmware::LockStepUp tick(const firmware::LockStepDown& down) override;
   void offer(std::span<const std::byte> block) override { application_->offer(block); }

@@ -10,10 +10,17 @@ namespace flexspline::board {
 namespace {
 
 constexpr double kSurgeA = 2.0;
+constexpr double kLongestStepS = 125.1e-6;  // of the plant: hil/plant/README.md, Numerics
 enum Stream : std::uint64_t { kSensorNoise = 17 };
 
+// As std::llround() does it, which is a call, for all that an encoder or a converter can hold.
+std::int64_t nearest(double x) {
+  const auto whole = static_cast<std::int64_t>(x);
+  const double rest = x - static_cast<double>(whole);
+  return whole + (rest >= 0.5 ? 1 : 0) - (rest <= -0.5 ? 1 : 0);
+}
 std::uint32_t counter(double angle_rad, int counts) {
-  return static_cast<std::uint32_t>(std::llround(angle_rad / kTurn * counts));
+  return static_cast<std::uint32_t>(nearest(angle_rad / kTurn * counts));
 }
 // The line that is left goes up and down at the same edge.
 std::uint32_t on_one_line(std::uint32_t before, std::uint32_t count) {
@@ -34,12 +41,14 @@ DriveRig::DriveRig(const RigSetup& setup)
     : setup_(setup),
       scales_(scales_of(setup.drive)),
       errors_(plant::sensor_errors_of(setup.drive)),
+      tick_s_(1.0 / setup.tick_hz),
+      plant_steps_(static_cast<int>(std::ceil(tick_s_ / kLongestStepS))),
       plant_(plant::physics_of(setup.drive), setup.locked),
       generator_(plant::stream_seed(setup.seed, 0, kSensorNoise)),
       temperature_c_(setup.drive.thermal.start_c.value_or(
           setup.drive.thermal.ambient_c.value_or(setup.drive.temperature_reference_c))) {
   const double corner_hz = setup.drive.amplifier.bandwidth_hz;
-  if (corner_hz > 0.0) lag_ = 1.0 - std::exp(-kTurn * corner_hz * setup.tick_s);
+  if (corner_hz > 0.0) lag_ = 1.0 - std::exp(-kTurn * corner_hz * tick_s_);
 }
 
 double DriveRig::noise(const plant::Sensor& sensor, double rated) {
@@ -49,7 +58,7 @@ double DriveRig::noise(const plant::Sensor& sensor, double rated) {
 }
 
 std::int16_t DriveRig::share(double value, double full_scale) const {
-  return static_cast<std::int16_t>(std::clamp(std::lround(value / full_scale * 32768.0), -32768L, 32767L));
+  return static_cast<std::int16_t>(nearest(std::clamp(value / full_scale * 32768.0, -32768.0, 32767.0)));
 }
 
 firmware::Readings DriveRig::sense() {
@@ -115,7 +124,7 @@ void DriveRig::warm(double current_a) {
                         plant_.torque() * state.output_velocity + thermal.winding_ohm * current_a * current_a;
   const double to_air_w =
       (temperature_c_ - thermal.ambient_c.value_or(setup_.drive.temperature_reference_c)) / thermal.resistance_c_w;
-  temperature_c_ += setup_.tick_s * (lost_w - to_air_w) / thermal.capacity_j_c;
+  temperature_c_ += tick_s_ * (lost_w - to_air_w) / thermal.capacity_j_c;
 }
 
 void DriveRig::act(const firmware::Actuation& actuation) {
@@ -134,7 +143,7 @@ void DriveRig::act(const firmware::Actuation& actuation) {
             : 0.0;
   inputs.temperature_c = temperature_c_;
   inputs.load_torque_nm = load_torque_nm_;
-  plant_.advance(inputs, setup_.tick_s, 1);
+  plant_.advance(inputs, tick_s_, plant_steps_);
   warm(inputs.current_a);
 }
 

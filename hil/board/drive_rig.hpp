@@ -5,6 +5,7 @@
 #include <random>
 
 #include "firmware/board.hpp"
+#include "hil/plant/normal.hpp"
 #include "hil/plant/parameters.hpp"
 #include "hil/plant/physics.hpp"
 #include "hil/plant/two_mass.hpp"
@@ -49,7 +50,7 @@ struct Disturbances {
 struct RigSetup {
   plant::Drive drive;
   std::uint64_t seed = 1;
-  double tick_s = 1.0 / 20'000.0;
+  std::uint32_t tick_hz = 20'000;
   bool noise = true;
   bool locked = false;
 };
@@ -76,6 +77,7 @@ class DriveRig {
   void set_load_torque(double nm) { load_torque_nm_ = nm; }
   double load_torque_nm() const { return load_torque_nm_; }
 
+  std::uint32_t tick_hz() const { return setup_.tick_hz; }
   const plant::State& truth() const { return plant_.state(); }
   /// Through the flexspline, output side, N m.
   double torque_nm() const { return plant_.torque(); }
@@ -92,9 +94,11 @@ class DriveRig {
   RigSetup setup_;
   AnalogScales scales_;
   plant::SensorErrors errors_;
+  double tick_s_;
+  int plant_steps_;  // of each tick
   plant::TwoMass plant_;
   std::mt19937_64 generator_;
-  std::normal_distribution<double> normal_;
+  plant::Normal normal_;
   std::uint64_t injected_ = 0;  // a bit for each
   Disturbances disturbances_;
   double lag_ = 1.0;  // share of its way that the amplifier's current goes in a tick

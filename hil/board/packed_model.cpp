@@ -52,12 +52,12 @@ PackedModel read_packed_model(std::span<const std::uint8_t> bytes, std::uint32_t
   return {{bytes.begin(), bytes.end()}, constants_of(model::header_of(bytes).bases)};
 }
 
-PackedModel load_packed_model(const std::string& file) {
+PackedModel load_packed_model(const std::string& file, std::uint32_t tick_hz) {
   std::ifstream in(file, std::ios::binary);
   if (!in) throw std::runtime_error(file + ": cannot be read");
   const std::vector<std::uint8_t> bytes{std::istreambuf_iterator<char>(in), std::istreambuf_iterator<char>()};
   try {
-    return read_packed_model(bytes);
+    return read_packed_model(bytes, tick_hz);
   } catch (const std::runtime_error& error) {
     throw std::runtime_error(file + ": " + error.what());
   }

@@ -19,6 +19,6 @@ struct PackedModel {
 /// Reads a block as a drive does that ticks `tick_hz` times a second. Throws std::runtime_error with what is wrong.
 PackedModel read_packed_model(std::span<const std::uint8_t> bytes, std::uint32_t tick_hz = SoftwareBoard::kTickHz);
 /// The same from a file, which errors name.
-PackedModel load_packed_model(const std::string& file);
+PackedModel load_packed_model(const std::string& file, std::uint32_t tick_hz = SoftwareBoard::kTickHz);
 
 }  // namespace flexspline::board

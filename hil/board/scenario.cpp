@@ -178,19 +178,24 @@ const Scenario& scenario(std::string_view name) {
 }
 
 ScenarioResult run_scenario(const ScenarioPlan& plan, std::unique_ptr<Brain> brain) {
-  constexpr std::uint32_t kBootTicks = 100, kHostTicks = SoftwareBoard::kTickHz / 1000;
+  constexpr std::uint32_t kBootTicks = 100;
+  if (plan.tick_hz < 4'000 || plan.tick_hz > 40'000 || plan.tick_hz % 1000 != 0)
+    throw std::invalid_argument("a drive of " + std::to_string(plan.tick_hz) +
+                                " ticks a second cannot be simulated; take a multiple of 1000 from 4000 to 40000");
+  const std::uint32_t host_ticks = plan.tick_hz / 1000;
   const Scenario motion = plan.motion ? *plan.motion : scenario(plan.scenario);
   const Course course(motion, plan.duration_s);
-  const effects::DriveConstants<double> constants = plan.packed ? plan.packed->constants : constants_of(plan.drive);
+  const effects::DriveConstants<double> constants =
+      plan.packed ? plan.packed->constants : constants_of(plan.drive, plan.tick_hz);
   if (std::abs(constants.gear_ratio - plan.drive.gear_ratio) > 1e-6 * plan.drive.gear_ratio)
     throw std::runtime_error("the block was packed for a gear of " + std::to_string(constants.gear_ratio) +
                              ", the drive has one of " + std::to_string(plan.drive.gear_ratio));
   const Host host(constants, plan.compensation);
   const auto started = std::chrono::steady_clock::now();
-  const Block block =
-      plan.packed ? Block(plan.packed->bytes) : Block(parameters_of(plan.drive, setup_of(plan.drive)), constants);
-  VirtualDrive drive({.drive = plan.drive, .seed = plan.seed, .noise = plan.noise}, block, telemetry(),
-                     std::move(brain));
+  const Block block = plan.packed ? Block(plan.packed->bytes)
+                                  : Block(parameters_of(plan.drive, setup_of(plan.drive, constants)), constants);
+  VirtualDrive drive({.drive = plan.drive, .seed = plan.seed, .tick_hz = plan.tick_hz, .noise = plan.noise}, block,
+                     telemetry(), std::move(brain));
   drive.rig().set_load_torque(plan.load_torque_nm);
   drive.run(kBootTicks);
   const firmware::Answer armed = drive.command(host.command(firmware::Command::Kind::arm, course.at(0.0)));
@@ -202,12 +207,12 @@ ScenarioResult run_scenario(const ScenarioPlan& plan, std::unique_ptr<Brain> bra
   result.compensation = plan.compensation;
   EventScript script(plan.events);
   Judge judge(plan, result);
-  const auto ticks = static_cast<std::uint64_t>(std::llround((plan.duration_s + plan.hold_s) * SoftwareBoard::kTickHz));
-  const auto inject_at = static_cast<std::uint64_t>(std::llround(plan.injection_s * SoftwareBoard::kTickHz));
+  const auto ticks = static_cast<std::uint64_t>(std::llround((plan.duration_s + plan.hold_s) * plan.tick_hz));
+  const auto inject_at = static_cast<std::uint64_t>(std::llround(plan.injection_s * plan.tick_hz));
   for (std::uint64_t k = 1; k <= ticks; ++k) {
-    const double time_s = static_cast<double>(k) / SoftwareBoard::kTickHz;
+    const double time_s = static_cast<double>(k) / plan.tick_hz;
     if (plan.injection && k == inject_at) drive.rig().inject(*plan.injection);
-    if (k % kHostTicks == 0) {
+    if (k % host_ticks == 0) {
       const Reference set = course.at(time_s);
       if (!script.empty()) {
         script.apply(time_s, plan.load_torque_nm, drive.rig());

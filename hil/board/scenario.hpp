@@ -32,6 +32,7 @@ struct ScenarioPlan {
   double duration_s = 10.0;
   /// After the motion the output is held where it shall be; the second half shows whether the loops come to rest.
   double hold_s = 0.0;
+  std::uint32_t tick_hz = SoftwareBoard::kTickHz;  ///< of the drive; whole ticks in a millisecond
   std::uint64_t seed = 1;
   bool compensation = true;
   std::optional<Injection> injection{};
@@ -81,7 +82,8 @@ struct ScenarioResult {
   /// The loops hunt at rest: the shaft keeps turning round, by more than the encoder's counts.
   bool limit_cycle(double count_rad) const { return hold_reversals >= 2 && hold_swing_rad > 2.0 * count_rad; }
 };
-/// Runs it on the software board, or on `brain`. Throws std::runtime_error where the drive cannot be armed.
+/// Runs it on the software board, or on `brain`. Throws std::runtime_error where the drive cannot be armed,
+/// std::invalid_argument for a rate of ticks that is none for it.
 ScenarioResult run_scenario(const ScenarioPlan& plan, std::unique_ptr<Brain> brain = nullptr);
 
 /// The names that `--inject` knows.

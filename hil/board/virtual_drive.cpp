@@ -6,8 +6,8 @@
 
 namespace flexspline::board {
 
-void FrameHash::add(std::uint32_t word) {
-  hash_ ^= word;
+void FrameHash::add(std::uint64_t words) {
+  hash_ ^= words;
   hash_ *= 0x100000001b3U;
   // Of a whole word at a time the upper bits would reach the lower ones never.
   hash_ ^= hash_ >> 29U;
@@ -16,7 +16,7 @@ void FrameHash::add(std::uint32_t word) {
 VirtualDrive::VirtualDrive(const RigSetup& setup, const Block& block, const firmware::TelemetrySetup& telemetry,
                            std::unique_ptr<Brain> brain)
     : rig_(setup),
-      brain_(brain ? std::move(brain) : std::make_unique<SoftwareBrain>()),
+      brain_(brain ? std::move(brain) : std::make_unique<SoftwareBrain>(setup.tick_hz)),
       flash_(block),
       telemetry_(telemetry) {
   brain_->start(flash_, telemetry_, firmware::ResetCause::power);
@@ -53,7 +53,7 @@ void VirtualDrive::run(std::uint32_t ticks) {
 }
 
 void VirtualDrive::run_seconds(double seconds) {
-  run(static_cast<std::uint32_t>(std::llround(seconds * SoftwareBoard::kTickHz)));
+  run(static_cast<std::uint32_t>(std::llround(seconds * rig_.tick_hz())));
 }
 
 firmware::Answer VirtualDrive::command(const firmware::Command& command) {
@@ -76,7 +76,9 @@ firmware::BlockFinding VirtualDrive::commit(const Block& block) {
 
 void VirtualDrive::take_frame() {
   if (up_.frame_words == 0) return;
-  for (std::size_t i = 0; i < up_.frame_words; ++i) hash_.add(up_.frame[i]);
+  std::size_t i = 0;
+  for (; i + 1 < up_.frame_words; i += 2) hash_.add(up_.frame[i] | std::uint64_t{up_.frame[i + 1]} << 32U);
+  if (i < up_.frame_words) hash_.add(up_.frame[i]);
   ++frame_count_;
   if (keep_)
     frames_.push_back({up_.frame[0], up_.frame[1], {up_.frame.begin() + 2, up_.frame.begin() + up_.frame_words}});

@@ -17,10 +17,10 @@ struct Frame {
   std::vector<std::uint32_t> values;
 };
 
-/// A hash of frames (FNV-1a on words, with a shift): the same bits, the same number.
+/// A hash of frames (FNV-1a on two words at a time, with a shift): the same bits, the same number.
 class FrameHash {
  public:
-  void add(std::uint32_t word);
+  void add(std::uint64_t words);
   std::uint64_t value() const { return hash_; }
 
  private:

@@ -46,11 +46,18 @@ void add_onset(const Onset& term, const FrictionPoint& at, double speed, Frictio
 
 }  // namespace
 
+bool MotorFriction::is_plain() const {
+  return !has_bristle() && power_torque == 0.0 && hess_soom.empty() && stribeck.empty() && load.empty() &&
+         ripple.empty() && load_ripple.empty() && triangle_ripple.empty() && bumps.empty() && onsets.empty();
+}
+
 double MotorFriction::viscous_factor(double temperature_c) const {
+  if (temperature_coefficient == 0.0) return 1.0;
   return std::exp(-temperature_coefficient * (temperature_c - temperature_reference));
 }
 
 double MotorFriction::coulomb_factor(double temperature_c) const {
+  if (coulomb_temperature_coefficient == 0.0) return 1.0;
   return std::exp(-coulomb_temperature_coefficient * (temperature_c - temperature_reference));
 }
 
@@ -73,8 +80,7 @@ double MotorFriction::bristle(const FrictionPoint& at) const {
 
 FrictionTorque MotorFriction::evaluate(const FrictionPoint& at, double viscous_now) const {
   const double s = at.direction;
-  // On its branch the law goes on smoothly past w = 0, so that a solver can look beyond an event before it locates it.
-  const double along = s * at.velocity;
+  const double along = s * at.velocity;  // negative where a solver looks beyond an event
   const double speed = std::abs(at.velocity);
   FrictionTorque sum;
   sum.torque = viscous_now * at.velocity + viscous_asymmetry * along + coulomb_asymmetry;

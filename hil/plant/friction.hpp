@@ -118,6 +118,21 @@ struct MotorFriction {
   /// The same on Coulomb friction and on what takes its place.
   double coulomb_factor(double temperature_c) const;
   bool has_bristle() const { return dahl_torque > 0.0 || lugre.stiffness > 0.0; }
+  /// Nothing but viscous, quadratic and Coulomb friction.
+  bool is_plain() const;
+  /// What is left of evaluate() where the friction is plain.
+  FrictionTorque evaluate_plain(double direction, double velocity, double viscous_now) const {
+    // On its branch the law goes on smoothly past w = 0, so that a solver can look beyond an event before it locates
+    // it.
+    const double along = direction * velocity;
+    FrictionTorque sum;
+    sum.torque = viscous_now * velocity + viscous_asymmetry * along + coulomb_asymmetry;
+    sum.by_velocity = viscous_now + viscous_asymmetry * direction;
+    sum.torque += quadratic * velocity * along;
+    sum.by_velocity += 2.0 * quadratic * (along < 0.0 ? -along : along);
+    sum.torque += direction * coulomb * dry_share;
+    return sum;
+  }
   /// `viscous_now` is the viscous coefficient at the present temperature.
   FrictionTorque evaluate(const FrictionPoint& at, double viscous_now) const;
   /// Bristle deflection after the shaft went, in one direction, from the anchor to `angle`: the rate-independent law

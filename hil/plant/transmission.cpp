@@ -40,8 +40,7 @@ TorqueSlope Transmission::spring(double torsion) const {
     stretch = torsion > gap ? torsion - gap : (torsion < -gap ? torsion + gap : 0.0);
     if (stretch == 0.0) open = 0.0;
   }
-  TorqueSlope sum{stretch * (stiffness + stretch * (quadratic_stiffness + cubic_stiffness * stretch)),
-                  stiffness + stretch * (2.0 * quadratic_stiffness + 3.0 * cubic_stiffness * stretch)};
+  TorqueSlope sum = polynomial(stretch);
   if (slopes.stiffness_1 > 0.0) {
     const TorqueSlope more = three_slopes(slopes, stretch);
     sum.torque += more.torque;

@@ -33,6 +33,14 @@ struct Transmission {
   double error_slope(double motor_angle) const;
   /// Of the spring alone, without loops.
   TorqueSlope spring(double torsion) const;
+  /// Neither backlash nor corners nor an error of the gear: spring() is polynomial().
+  bool is_polynomial() const {
+    return !(backlash_half_width > 0.0) && !(slopes.stiffness_1 > 0.0) && kinematic_error.empty();
+  }
+  TorqueSlope polynomial(double stretch) const {
+    return {stretch * (stiffness + stretch * (quadratic_stiffness + cubic_stiffness * stretch)),
+            stiffness + stretch * (2.0 * quadratic_stiffness + 3.0 * cubic_stiffness * stretch)};
+  }
   /// Energy of the spring, J; backlash and three slopes included.
   double energy(double torsion) const;
 };

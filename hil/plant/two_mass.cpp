@@ -23,7 +23,18 @@ constexpr double kBreakTolerance = 1e-12;       // N m
 }  // namespace
 
 TwoMass::TwoMass(Physics physics, bool locked, State initial)
-    : physics_(std::move(physics)), locked_(locked), state_(initial) {
+    : physics_(std::move(physics)),
+      locked_(locked),
+      has_loops_(!physics_.transmission.loops.empty()),
+      has_plain_spring_(physics_.transmission.is_polynomial() && !has_loops_),
+      has_plain_friction_(physics_.friction.is_plain()),
+      has_gravity_(physics_.gravity_cosine != 0.0 || physics_.gravity_sine != 0.0),
+      has_root_damping_(physics_.damping_exponent == 0.5),
+      is_linear_(has_plain_spring_ && physics_.transmission.quadratic_stiffness == 0.0 &&
+                 physics_.transmission.cubic_stiffness == 0.0 && has_plain_friction_ &&
+                 physics_.friction.quadratic == 0.0 && !has_gravity_ &&
+                 (physics_.damping_torque == 0.0 || has_root_damping_ || physics_.damping_exponent == 1.0)),
+      state_(initial) {
   const bool usable = physics_.motor_inertia > 0.0 && physics_.transmission.has_spring() && physics_.gear_ratio > 0.0 &&
                       physics_.damping_exponent > 0.0 && (locked_ || physics_.output_inertia > 0.0);
   if (!usable) {
@@ -42,19 +53,11 @@ TwoMass::TwoMass(Physics physics, bool locked, State initial)
   state_.loops.torsion = torsion(state_);
 }
 
-double TwoMass::ratio(double motor_angle) const {
-  return 1.0 / physics_.gear_ratio + physics_.transmission.error_slope(motor_angle);
-}
-
-double TwoMass::torsion(const State& s) const {
-  return s.motor_angle / physics_.gear_ratio - s.output_angle + physics_.transmission.error(s.motor_angle);
-}
-
-TorqueSlope TwoMass::elastic(const State& s) const {
+TorqueSlope TwoMass::elastic_with_loops(const State& s) const {
   const double x = torsion(s);
-  TorqueSlope sum = physics_.transmission.spring(x);
+  const TorqueSlope sum = physics_.transmission.spring(x);
+  if (!has_loops_) return sum;
   const Loops& loops = physics_.transmission.loops;
-  if (loops.empty()) return sum;
   const TorqueSlope more = loops.torque(loops.ahead(s.loops, x, false), x >= s.loops.torsion ? 1.0 : -1.0);
   return {sum.torque + more.torque, sum.slope + more.slope};
 }
@@ -67,7 +70,7 @@ double TwoMass::drive_torque(const Inputs& inputs) const {
 
 double TwoMass::rate_of(double damping) const {
   const double magnitude = std::abs(damping);
-  if (physics_.damping_exponent == 0.5) return damping * magnitude;
+  if (has_root_damping_) return damping * magnitude;
   return std::copysign(std::pow(magnitude, 1.0 / physics_.damping_exponent), damping);
 }
 
@@ -80,7 +83,7 @@ double TwoMass::torque(const State& s) const {
 }
 
 double TwoMass::gravity(double angle) const {
-  if (physics_.gravity_cosine == 0.0 && physics_.gravity_sine == 0.0) return 0.0;
+  if (!has_gravity_) return 0.0;
   return physics_.gravity_cosine * std::cos(angle) + physics_.gravity_sine * std::sin(angle);
 }
 
@@ -89,7 +92,8 @@ FrictionPoint TwoMass::friction_point(const State& s, double direction) const {
 }
 
 // Newton's method on motor velocity, output velocity and signed damping power. Using the power as the unknown keeps the
-// equations smooth where |v|^alpha has an infinite slope, and well scaled where the torsion rate is next to nothing.
+// equations smooth where |v|^alpha has an infinite slope, and well scaled where the torsion rate is next to nothing. A
+// square root is solved for exactly in each step: where nothing else bends, the first one is the solution.
 bool TwoMass::solve_stage(const Stage& stage, const State& start, State& s) const {
   const double g = stage.weight;
   const bool motor_moves = s.motor_direction != 0;
@@ -116,10 +120,12 @@ bool TwoMass::solve_stage(const Stage& stage, const State& start, State& s) cons
     // Newton step: dw = motor_free - motor_gain dT, dwo = output_free + output_gain dT, dT = ks dv + c du.
     double motor_free = 0.0, motor_gain = 0.0, output_free = 0.0, output_gain = 0.0;
     if (motor_moves) {
+      const auto direction = static_cast<double>(s.motor_direction);
       const FrictionTorque f =
-          physics_.friction.evaluate({static_cast<double>(s.motor_direction), s.motor_velocity, t, s.motor_angle,
-                                      start.motor_angle, start.bristle, start.motor_velocity},
-                                     viscous_);
+          has_plain_friction_ ? physics_.friction.evaluate_plain(direction, s.motor_velocity, viscous_)
+                              : physics_.friction.evaluate({direction, s.motor_velocity, t, s.motor_angle,
+                                                            start.motor_angle, start.bristle, start.motor_velocity},
+                                                           viscous_);
       const double residual =
           physics_.motor_inertia * (s.motor_velocity - stage.motor_velocity) - g * (motor_drive_ - f.torque - t * n);
       const double slope = physics_.motor_inertia + g * (f.by_velocity + g * f.by_angle);
@@ -130,27 +136,38 @@ bool TwoMass::solve_stage(const Stage& stage, const State& start, State& s) cons
       const double residual = physics_.output_inertia * (s.output_velocity - stage.output_velocity) -
                               g * (t - physics_.output_viscous * s.output_velocity - coulomb - gravity(s.output_angle) -
                                    inputs_.load_torque_nm);
-      const double gravity_slope =
-          physics_.gravity_sine * std::cos(s.output_angle) - physics_.gravity_cosine * std::sin(s.output_angle);
+      const double gravity_slope = has_gravity_ ? physics_.gravity_sine * std::cos(s.output_angle) -
+                                                      physics_.gravity_cosine * std::sin(s.output_angle)
+                                                : 0.0;
       const double slope = physics_.output_inertia + g * (physics_.output_viscous + g * gravity_slope);
       output_free = -residual / slope;
       output_gain = g / slope;
     }
+    const double rate = s.motor_velocity * n - s.output_velocity;
     const double rate_free = motor_free * n - output_free;
     const double rate_gain = motor_gain * n + output_gain;
     const double ks = spring.slope * g;
     double torque_step = 0.0;
     double damping_step = 0.0;
-    if (damped) {
-      const double mismatch = s.motor_velocity * n - s.output_velocity - rate_of(s.damping);
+    if (!damped) {
+      torque_step = ks * rate_free / (1.0 + rate_gain * ks);
+    } else if (has_root_damping_ && rate_gain >= 0.0 && ks >= 0.0) {
+      // Of the new power u, whose rate is u|u|, (1 + gain ks) u|u| + gain c u is known: a square root.
+      const double by_rate = 1.0 + rate_gain * ks, by_power = rate_gain * c;
+      const double known = by_rate * rate + rate_free + by_power * s.damping;
+      const double size = std::abs(known);
+      const double root = std::sqrt(by_power * by_power + 4.0 * by_rate * size);
+      const double power = root > 0.0 ? 2.0 * known / (by_power + root) : 0.0;
+      damping_step = power - s.damping;
+      torque_step = ks * (rate_of(power) - rate) + c * damping_step;
+    } else {
+      const double mismatch = rate - rate_of(s.damping);
       const double magnitude = std::abs(s.damping);
-      const double slope = physics_.damping_exponent == 0.5
+      const double slope = has_root_damping_
                                ? 2.0 * magnitude
                                : inverse_exponent * std::pow(std::max(magnitude, 1e-12), inverse_exponent - 1.0);
       damping_step = (rate_free + mismatch * (1.0 + rate_gain * ks)) / (slope + rate_gain * (ks * slope + c));
       torque_step = ks * (slope * damping_step - mismatch) + c * damping_step;
-    } else {
-      torque_step = ks * rate_free / (1.0 + rate_gain * ks);
     }
     const double motor_step = motor_free - motor_gain * torque_step;
     const double output_step = output_free + output_gain * torque_step;
@@ -158,8 +175,8 @@ bool TwoMass::solve_stage(const Stage& stage, const State& start, State& s) cons
     s.output_velocity += output_step;
     s.damping += damping_step;
     if (!std::isfinite(s.motor_velocity + s.output_velocity + s.damping)) return false;
-    if (std::abs(motor_step) <= 1e-8 * (1.0 + 1e-3 * std::abs(s.motor_velocity)) && std::abs(output_step) <= 1e-10 &&
-        std::abs(damping_step) <= 1e-8) {
+    if (is_linear_ || (std::abs(motor_step) <= 1e-8 * (1.0 + 1e-3 * std::abs(s.motor_velocity)) &&
+                       std::abs(output_step) <= 1e-10 && std::abs(damping_step) <= 1e-8)) {
       s.motor_angle = stage.motor_angle + g * s.motor_velocity;
       s.output_angle = stage.output_angle + g * s.output_velocity;
       return true;
@@ -170,21 +187,21 @@ bool TwoMass::solve_stage(const Stage& stage, const State& start, State& s) cons
 
 bool TwoMass::try_step(const State& from, double h, State& to) const {
   const double g = kGamma * h;
-  to = from;
+  copy(from, to);
   const Stage first{from.motor_angle, from.motor_velocity, from.output_angle, from.output_velocity, g};
   if (!solve_stage(first, from, to)) return false;
   const auto carry = [](double before, double after) { return before + kCarry * (after - before); };
   const Stage second{carry(from.motor_angle, to.motor_angle), carry(from.motor_velocity, to.motor_velocity),
                      carry(from.output_angle, to.output_angle), carry(from.output_velocity, to.output_velocity), g};
   if (!solve_stage(second, from, to)) return false;
-  if (to.motor_direction != 0) {
+  if (to.motor_direction != 0 && !has_plain_friction_) {
     FrictionPoint at = friction_point(to, to.motor_direction);
     at.anchor = from.motor_angle;
     at.bristle = from.bristle;
     at.anchor_velocity = from.motor_velocity;
     to.bristle = physics_.friction.bristle(at);
   }
-  if (!physics_.transmission.loops.empty()) {
+  if (has_loops_) {
     to.loops = physics_.transmission.loops.ahead(from.loops, torsion(to), true);
     to.loops.total_torque = torque(to);
   }
@@ -240,6 +257,7 @@ void TwoMass::settle(State& s) const {
 // A shaft released at the start of a step may come out moving against its branch, where a stiff torque decays within
 // the step. Then it sticks for this step if friction can hold it at the end, else it leaves the other way.
 void TwoMass::resolve_resting(State& s, double h) const {
+  if (s.motor_velocity != 0.0 && s.output_velocity != 0.0) return;
   State end;
   const auto retry = [&](int State::*direction, double State::*velocity, Event stop, Event breaks) {
     if (s.*velocity != 0.0 || s.*direction == 0) return;
@@ -288,6 +306,10 @@ double TwoMass::locate(Event event, const State& from, double h, const State& at
 TwoMass::Event TwoMass::first_event(const State& from, double h, State& to, double& taken) const {
   constexpr Event kEvents[] = {Event::motor_stop, Event::output_stop, Event::motor_break, Event::output_break};
   taken = h;
+  // Most steps: what turns goes on turning its way.
+  if (to.motor_direction != 0 && to.motor_direction * to.motor_velocity >= 0.0 &&
+      (locked_ || (to.output_direction != 0 && to.output_direction * to.output_velocity >= 0.0)))
+    return Event::none;
   Event first = Event::none;
   for (const Event event : kEvents) {
     if (event == first || margin(event, to) >= 0.0) continue;
@@ -306,7 +328,7 @@ void TwoMass::take_step(double h) {
     settle(state_);
     piece = std::min(piece, remaining);
     resolve_resting(state_, piece);
-    State to;
+    State& to = next_;
     if (!try_step(state_, piece, to)) {
       piece *= 0.25;
       if (piece < 1e-12 * h) {
@@ -318,14 +340,14 @@ void TwoMass::take_step(double h) {
       // Events accumulate: stop whatever turned round and go on with the end of the piece.
       if (margin(Event::motor_stop, to) < 0.0) to.motor_velocity = 0.0;
       if (margin(Event::output_stop, to) < 0.0) to.output_velocity = 0.0;
-      state_ = to;
+      copy(to, state_);
       remaining -= piece;
       piece = remaining;
       continue;
     }
     double taken = piece;
     const Event event = first_event(state_, piece, to, taken);
-    state_ = to;
+    copy(to, state_);
     if (event == Event::motor_stop || event == Event::output_stop) {
       (event == Event::motor_stop ? state_.motor_velocity : state_.output_velocity) = 0.0;
       state_.damping = damping_of(state_.motor_velocity * ratio(state_.motor_angle) - state_.output_velocity);

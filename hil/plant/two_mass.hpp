@@ -25,16 +25,18 @@ struct Physics {
 
 /// Positions and velocities of both shafts. `damping` is the signed power |v|^alpha s(v) of the torsion rate; it is
 /// carried along because it keeps its precision where v itself is too small to.
-struct State {
+struct Shafts {
   double motor_angle = 0.0;
   double motor_velocity = 0.0;
   double output_angle = 0.0;
   double output_velocity = 0.0;
   double damping = 0.0;
   double bristle = 0.0;
-  LoopState loops;
   int motor_direction = 0;  ///< branch of the friction: +1, -1, or 0 for exact sticking
   int output_direction = 0;
+};
+struct State : Shafts {
+  LoopState loops;
 };
 
 struct Inputs {
@@ -70,12 +72,29 @@ class TwoMass {
   };
   enum class Event { none, motor_stop, output_stop, motor_break, output_break };
 
-  double torsion(const State& s) const;
+  double torsion(const State& s) const {
+    const double twist = s.motor_angle / physics_.gear_ratio - s.output_angle;
+    return has_plain_spring_ ? twist : twist + physics_.transmission.error(s.motor_angle);
+  }
   /// Spring and loops where the torsion of `s` is, from the loops' state as it stands.
-  TorqueSlope elastic(const State& s) const;
+  TorqueSlope elastic(const State& s) const {
+    return has_plain_spring_ ? physics_.transmission.polynomial(torsion(s)) : elastic_with_loops(s);
+  }
+  TorqueSlope elastic_with_loops(const State& s) const;
   double torque(const State& s) const;
+  /// The state of a drive without loops is its shafts: the rest, large, is not copied at each step.
+  void copy(const State& from, State& to) const {
+    if (has_loops_) {
+      to = from;
+    } else {
+      static_cast<Shafts&>(to) = from;
+    }
+  }
   /// How much faster the spring twists than the output, for each rad/s of the motor.
-  double ratio(double motor_angle) const;
+  double ratio(double motor_angle) const {
+    const double gear = 1.0 / physics_.gear_ratio;
+    return has_plain_spring_ ? gear : gear + physics_.transmission.error_slope(motor_angle);
+  }
   double drive_torque(const Inputs& inputs) const;
   double rate_of(double damping) const;
   double damping_of(double rate) const;
@@ -95,7 +114,15 @@ class TwoMass {
 
   Physics physics_;
   bool locked_;
+  // What the drive has none of costs a step nothing.
+  bool has_loops_;
+  bool has_plain_spring_;  ///< a polynomial of the torsion, and no error of the gear
+  bool has_plain_friction_;
+  bool has_gravity_;
+  bool has_root_damping_;  ///< of exponent 0.5
+  bool is_linear_;         ///< but for that and the signs
   State state_;
+  State next_;  ///< at the end of the step that is being taken
   Inputs inputs_;
   double motor_drive_ = 0.0;  // Km i
   double viscous_ = 0.0;

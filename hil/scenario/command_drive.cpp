@@ -30,12 +30,16 @@ board::Injection chosen_injection(const std::string& name) {
 ScenarioPlan plan_of(const DriveOptions& options) {
   const ScenarioFile file = find_scenario(options.scenario);
   ScenarioPlan plan = plan_of(file, drive_of(file, options.plant_file, options.with, options.hide));
-  if (!options.block_file.empty()) plan.packed = board::load_packed_model(options.block_file);
+  if (!options.block_file.empty()) plan.packed = board::load_packed_model(options.block_file, options.tick_hz);
   if (options.seconds > 0.0) {
     plan.duration_s = options.seconds;
     plan.hold_s = 0.0;
   }
   plan.seed = options.seed;
+  plan.tick_hz = options.tick_hz;
+  if (!options.processor_image.empty() && options.tick_hz != board::SoftwareBoard::kTickHz)
+    throw std::invalid_argument(fmt::format("the image of a processor ticks {} times a second; leave --tick-hz out",
+                                            board::SoftwareBoard::kTickHz));
   plan.keeps_trace = !options.trace_file.empty();
   if (!options.inject.empty()) {
     plan.injection = chosen_injection(options.inject);
@@ -81,12 +85,12 @@ std::string json_of(const ScenarioPlan& plan, const std::vector<ScenarioResult>&
   }
   const double simulated_s = (plan.duration_s + plan.hold_s) * static_cast<double>(runs.size());
   return text + fmt::format("],\"seconds\":{:g},\"ticks\":{},\"tick_hz\":{},\"realtime_factor\":{:.3g}}}\n",
-                            plan.duration_s, runs.front().ticks, board::SoftwareBoard::kTickHz, simulated_s / wall_s);
+                            plan.duration_s, runs.front().ticks, plan.tick_hz, simulated_s / wall_s);
 }
 
 void print(const DriveOptions& options, const ScenarioPlan& plan, const std::vector<ScenarioResult>& runs) {
   fmt::print("{}: {}, {:g} s at {} ticks a second, {}\n", plan.scenario, plan.motion->what, plan.duration_s,
-             board::SoftwareBoard::kTickHz, options.processor_image.empty() ? "software board" : "emulated processor");
+             plan.tick_hz, options.processor_image.empty() ? "software board" : "emulated processor");
   fmt::print("{:<13} {:>14} {:>14} {:>13} {:>18} {:>9}\n", "compensation", "rms error rad", "peak error",
              "rms current A", "telemetry hash", "real time");
   for (const ScenarioResult& r : runs) {

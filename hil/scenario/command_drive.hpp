@@ -20,6 +20,7 @@ struct DriveOptions {
   std::string block_file;
   std::string trace_file;  ///< of one run
   std::string json;
+  std::uint32_t tick_hz = 20'000;
   std::uint64_t seed = 1;
 };
 

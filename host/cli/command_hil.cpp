@@ -96,6 +96,7 @@ closed_loop::Comparison run_closed_loop(const HilOptions& options, Console& cons
   job.hide = options.hide;
   job.seconds = options.seconds;
   job.seed = options.seed;
+  job.tick_hz = options.tick_hz;
   job.processor = options.processor.string();
   job.keeps_trace = !options.report.empty() || !options.picture.empty();
   const ScratchFolder sheet;

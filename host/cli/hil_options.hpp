@@ -24,6 +24,7 @@ struct HilOptions {
   std::string hide;
   double seconds = 0.0;
   std::uint64_t seed = 1;
+  std::uint32_t tick_hz = closed_loop::kTwinTickHz;
   int draws = 8;  // of the prediction; nought: none
   std::string json;
 };
@@ -54,6 +55,9 @@ void take_hil(Parser* sub, HilOptions& options) {
       ->capture_default_str()
       ->type_name("N");
   sub->add_option("--seed", options.seed, "of the sensors' noise")->capture_default_str()->type_name("N");
+  sub->add_option("--tick-hz", options.tick_hz, "ticks of the drive a second, whole in a millisecond")
+      ->capture_default_str()
+      ->type_name("HZ");
   sub->add_option("--picture", options.picture, "write the tracking errors as a picture into this file")
       ->type_name("SVG");
   sub->add_option("--report", options.report, "write a page with plots into this file")->type_name("HTML");

@@ -49,6 +49,7 @@ Outcome run_one(const Job& job, const fs::path& stem) {
   std::vector<std::string> words{"drive", "--block", at + ".block", "--json", at + ".json"};
   name_drive(job, plant_file, words);
   words.insert(words.end(), {"--compensation", job.compensation ? "on" : "off", "--seed", std::to_string(job.seed)});
+  if (job.tick_hz != closed_loop::kTwinTickHz) words.insert(words.end(), {"--tick-hz", std::to_string(job.tick_hz)});
   if (job.seconds > 0.0) words.insert(words.end(), {"--seconds", fmt::format("{:g}", job.seconds)});
   if (!job.processor.empty()) words.insert(words.end(), {"--processor", job.processor});
   if (job.keeps_trace) words.insert(words.end(), {"--trace", at + ".csv"});

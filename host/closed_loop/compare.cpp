@@ -18,13 +18,13 @@ void pack_all(Contest& contest) {
   std::string settings = contest.settings;
   for (Contender& one : contest.contenders) {
     deployment::PackOptions pack;
-    pack.tick_hz = kTwinTickHz;
+    pack.tick_hz = contest.job.tick_hz;
     pack.samples = kSamples;
     pack.settings = settings;
     pack.settings_origin = contest.settings_origin;
     one.block = deployment::pack(one.model, pack).bytes;
     if (&one != contest.contenders.data()) continue;
-    const double most_a = 1.99 * deployment::bases_of(one.model, 1.0 / kTwinTickHz, 1.0).current_base;
+    const double most_a = 1.99 * deployment::bases_of(one.model, 1.0 / contest.job.tick_hz, 1.0).current_base;
     std::optional<double> lowered_from_a;
     settings = drive::settings_text(deployment::unpack(one.block), most_a, lowered_from_a);
   }
@@ -40,6 +40,7 @@ std::vector<Prediction> predicted_of(const Contest& contest, const Runner& run, 
     question.seconds = contest.job.seconds;
     question.draws = contest.draws;
     question.seed = contest.job.seed;
+    question.tick_hz = contest.job.tick_hz;
     return predict(question, run);
   } catch (const std::runtime_error& error) {
     why_not = error.what();
@@ -58,7 +59,7 @@ Comparison compare(Contest contest, const Runner& run, const std::function<void(
   c.scenario = contest.job.scenario;
   c.processor = contest.job.processor;
   c.take_gains(deployment::parse_drive_setup(contest.settings, contest.settings_origin, first,
-                                             deployment::bases_of(first, 1.0 / kTwinTickHz, 1.0)));
+                                             deployment::bases_of(first, 1.0 / contest.job.tick_hz, 1.0)));
   std::vector<Prediction> predicted;
   if (contest.draws > 0) {
     say("predicting the gain");

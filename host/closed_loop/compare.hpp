@@ -10,9 +10,6 @@
 
 namespace flexspline::closed_loop {
 
-// The twin's.
-inline constexpr double kTwinTickHz = 20'000.0;
-
 struct Contender {
   std::string label;  // "base", "added", ...
   std::string name;   // where the model comes from, for a reader

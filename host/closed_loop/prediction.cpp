@@ -52,6 +52,7 @@ std::vector<Prediction> predict(const Question& question, const Runner& run) {
     job.scenario = question.scenario;
     job.plant = plant_text(drawn(question.believed, question.seed, static_cast<std::uint64_t>(k)), question.bench);
     job.seconds = question.seconds;
+    job.tick_hz = question.tick_hz;
     job.seed = question.seed + 1000 + static_cast<std::uint64_t>(k);
     job.block = question.candidates.front().block;
     jobs.push_back(job);

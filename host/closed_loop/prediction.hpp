@@ -26,6 +26,7 @@ struct Question {
   double seconds = 0.0;  // nought: what the scenario says
   int draws = 8;
   std::uint64_t seed = 1;
+  std::uint32_t tick_hz = kTwinTickHz;  // of the candidates' blocks
 };
 
 // RMS error with this candidate's compensation over that without any, same loops: its expectation and the interval in

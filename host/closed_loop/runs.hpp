@@ -9,6 +9,9 @@
 
 namespace flexspline::closed_loop {
 
+// The twin's, unless it is told otherwise.
+inline constexpr std::uint32_t kTwinTickHz = 20'000;
+
 // One run of one drive.
 struct Job {
   std::string scenario;    // name or file
@@ -20,6 +23,7 @@ struct Job {
   bool compensation = false;
   double seconds = 0.0;  // nought: what the scenario says
   std::uint64_t seed = 1;
+  std::uint32_t tick_hz = kTwinTickHz;
   std::string processor;  // firmware image; empty: the software board
   bool keeps_trace = false;
 };

@@ -32,13 +32,7 @@ else
 fi
 
 # The twin runs the drive's own code beside its plant.
-if "$build/flexspline" hil --scenario sine --json "$out/hil.json" >"$out/hil.txt" 2>&1; then
-  "$python" -c 'import json, sys; print("the twin, scenario sine | real time | - | %.3g" % json.load(open(sys.argv[1]))["realtime_factor"])' \
-    "$out/hil.json" >>"$FLEXSPLINE_BENCH_ROWS"
-else
-  tail -n 5 "$out/hil.txt" >&2
-  status=1
-fi
+"$python" "$here/twin.py" "$build" >>"$FLEXSPLINE_BENCH_ROWS" || status=1
 
 awk -F ' [|] ' '
   BEGIN { print "| what | beside | goal | measured | |"; print "| --- | --- | --- | ---: | --- |" }

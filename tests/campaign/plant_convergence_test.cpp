@@ -64,39 +64,66 @@ std::vector<std::string> hidden_effects() {
 
 class PlantConvergence : public ::testing::TestWithParam<std::string> {};
 
+/// By how much two ways to step through the same experiments differ at the worst, in what sensors can tell.
+struct Worst {
+  double velocity = 0.0, torque = 0.0;  // of the noise
+  double motor = 0.0, output = 0.0;     // counts
+};
+Worst worst_between(const PlantFile& file, const Drive& one, const Drive& other) {
+  Worst worst;
+  for (std::size_t i = 0; i < file.experiments.size(); ++i) {
+    const Record a = record_one(one, file.experiments[i], 1, i);
+    const Record b = record_one(other, file.experiments[i], 1, i);
+    const double turn = 2.0 * std::numbers::pi;
+    worst.velocity =
+        std::max(worst.velocity,
+                 rms(difference(a.truth.motor_velocity_rad_s, b.truth.motor_velocity_rad_s)) / a.tachometer_noise_std);
+    worst.torque = std::max(worst.torque, rms(difference(a.truth.torque_nm, b.truth.torque_nm)) / a.torque_noise_std);
+    worst.motor = std::max(worst.motor,
+                           largest_without_drift(difference(a.truth.motor_position_rad, b.truth.motor_position_rad)) *
+                               one.sensors.motor_counts / turn);
+    worst.output = std::max(
+        worst.output, largest_without_drift(difference(a.truth.output_position_rad, b.truth.output_position_rad)) *
+                          one.sensors.output_counts / turn);
+  }
+  ::testing::Test::RecordProperty("worst_velocity_share_of_noise", std::to_string(worst.velocity));
+  ::testing::Test::RecordProperty("worst_torque_share_of_noise", std::to_string(worst.torque));
+  ::testing::Test::RecordProperty("worst_motor_position_counts", std::to_string(worst.motor));
+  ::testing::Test::RecordProperty("worst_output_position_counts", std::to_string(worst.output));
+  return worst;
+}
+Drive drive_of(const PlantFile& file, const std::string& hidden) {
+  Drive drive = file.drive;
+  if (hidden != "nothing") hide(drive, hidden);
+  drive.sensors.has_tachometer = true;
+  return drive;
+}
+
 TEST_P(PlantConvergence, HalvingTheStepChangesLessThanSensorsCanTell) {
   const PlantFile file = demo_plant();
-  Drive drive = file.drive;
-  if (GetParam() != "nothing") hide(drive, GetParam());
-  drive.sensors.has_tachometer = true;
+  const Drive drive = drive_of(file, GetParam());
   Drive halved = drive;
   halved.steps_per_sample = 2 * drive.steps_per_sample;
   ASSERT_LE(drive.sample_s / drive.steps_per_sample, 1e-3 / 16.0 * (1.0 + 1e-12));
-  double worst_velocity = 0.0, worst_torque = 0.0, worst_motor = 0.0, worst_output = 0.0;
-  for (std::size_t i = 0; i < file.experiments.size(); ++i) {
-    const Record a = record_one(drive, file.experiments[i], 1, i);
-    const Record b = record_one(halved, file.experiments[i], 1, i);
-    const double velocity =
-        rms(difference(a.truth.motor_velocity_rad_s, b.truth.motor_velocity_rad_s)) / a.tachometer_noise_std;
-    const double torque = rms(difference(a.truth.torque_nm, b.truth.torque_nm)) / a.torque_noise_std;
-    const double turn = 2.0 * std::numbers::pi;
-    const double motor = largest_without_drift(difference(a.truth.motor_position_rad, b.truth.motor_position_rad)) *
-                         drive.sensors.motor_counts / turn;
-    const double output = largest_without_drift(difference(a.truth.output_position_rad, b.truth.output_position_rad)) *
-                          drive.sensors.output_counts / turn;
-    EXPECT_LT(velocity, kShareOfNoise) << a.name;
-    EXPECT_LT(torque, kShareOfNoise) << a.name;
-    EXPECT_LT(motor, kShareOfCount) << a.name;
-    EXPECT_LT(output, kShareOfCount) << a.name;
-    worst_velocity = std::max(worst_velocity, velocity);
-    worst_torque = std::max(worst_torque, torque);
-    worst_motor = std::max(worst_motor, motor);
-    worst_output = std::max(worst_output, output);
-  }
-  RecordProperty("worst_velocity_share_of_noise", std::to_string(worst_velocity));
-  RecordProperty("worst_torque_share_of_noise", std::to_string(worst_torque));
-  RecordProperty("worst_motor_position_counts", std::to_string(worst_motor));
-  RecordProperty("worst_output_position_counts", std::to_string(worst_output));
+  const Worst worst = worst_between(file, drive, halved);
+  EXPECT_LT(worst.velocity, kShareOfNoise);
+  EXPECT_LT(worst.torque, kShareOfNoise);
+  EXPECT_LT(worst.motor, kShareOfCount);
+  EXPECT_LT(worst.output, kShareOfCount);
+}
+
+// A drive in closed loop whose tick is an eighth of a millisecond takes one step for each (hil/board/drive_rig.cpp).
+TEST_P(PlantConvergence, AStepOfAnEighthOfAMillisecondDiffersByLessThanSensorsCanTell) {
+  const PlantFile file = demo_plant();
+  Drive coarse = drive_of(file, GetParam());
+  Drive fine = coarse;
+  coarse.steps_per_sample = static_cast<int>(std::lround(coarse.sample_s / 125e-6));
+  fine.steps_per_sample = 4 * coarse.steps_per_sample;
+  const Worst worst = worst_between(file, coarse, fine);
+  EXPECT_LT(worst.velocity, kShareOfNoise);
+  EXPECT_LT(worst.torque, kShareOfNoise);
+  EXPECT_LT(worst.motor, kShareOfCount);
+  EXPECT_LT(worst.output, kShareOfCount);
 }
 
 INSTANTIATE_TEST_SUITE_P(Hidden, PlantConvergence, ::testing::ValuesIn(testing::part_of(hidden_effects())),
