@@ -49,18 +49,22 @@ void torque_along(const typename N::Parameter* parameters, const DriveConstants<
 
 template <class E, class N>
 void torque_along_plain(const typename N::Parameter* parameters, const DriveConstants<typename N::Parameter>& drive,
-                        Balance balance, std::span<const Inputs<Real>> inputs, typename N::Value* torque) {
+                        Balance balance, const PlainInputs& inputs, typename N::Value* torque) {
   const auto coefficients = coefficients_of<E, N>(parameters, drive);
   typename E::template State<N> state{};
   Inputs<N> before;
-  for (std::size_t k = 0; k < inputs.size(); ++k) {
-    const Inputs<N> now = lifted<N>(inputs[k]);
-    if (k > 0) E::advance(state, coefficients, now, before);
-    Torques<N> sums{};
-    E::evaluate(state, coefficients, now, sums);
-    torque[k] += on_balance(sums, balance);
-    before = now;
-  }
+  inputs.each_stretch([&](std::size_t first, std::span<const Inputs<Real>> stretch) {
+    for (std::size_t k = 0; k < stretch.size(); ++k) {
+      const Inputs<N> now = lifted<N>(stretch[k]);
+      if constexpr (!std::is_empty_v<typename E::template State<N>>) {
+        if (first + k > 0) E::advance(state, coefficients, now, before);
+        before = now;
+      }
+      Torques<N> sums{};
+      E::evaluate(state, coefficients, now, sums);
+      torque[first + k] += on_balance(sums, balance);
+    }
+  });
 }
 
 template <class E, class N>

@@ -1,6 +1,7 @@
 // The effects of shared/effects as data: what the host does with an effect whose name it learns at run time.
 #pragma once
 
+#include <algorithm>
 #include <functional>
 #include <memory>
 #include <span>
@@ -39,6 +40,44 @@ class Instance {
   virtual void advance(const effects::Inputs<Real>& now, const effects::Inputs<Real>& before) = 0;
 };
 
+// Plain inputs of a record, given a stretch at a time: a record keeps its signals in a form of its own.
+class PlainInputs {
+ public:
+  using Inputs = effects::Inputs<Real>;
+  static constexpr std::size_t kStretch = 256;  // what stays in the processor's cache
+  // Writes the inputs from `first` on, at least the signals that `reads` (bits of effects::Signals) names.
+  using Copy = void (*)(const void* record, std::size_t first, std::span<Inputs> to, unsigned reads);
+
+  PlainInputs(const Inputs* inputs, std::size_t count) : inputs_(inputs), size_(count) {}
+  PlainInputs(std::span<const Inputs> inputs) : PlainInputs(inputs.data(), inputs.size()) {}
+  PlainInputs(const std::vector<Inputs>& inputs) : PlainInputs(inputs.data(), inputs.size()) {}
+  PlainInputs(const void* record, std::size_t size, unsigned reads, Copy copy)
+      : record_(record), size_(size), reads_(reads), copy_(copy) {}
+
+  std::size_t size() const { return size_; }
+  // Calls work(first, inputs) for one stretch after the other.
+  template <class Work>
+  void each_stretch(Work work) const {
+    if (!copy_) {
+      work(std::size_t{0}, std::span<const Inputs>(inputs_, size_));
+      return;
+    }
+    std::vector<Inputs> stretch(std::min(kStretch, size_));
+    for (std::size_t first = 0; first < size_; first += kStretch) {
+      const std::span<Inputs> part = std::span(stretch).first(std::min(kStretch, size_ - first));
+      copy_(record_, first, part, reads_);
+      work(first, std::span<const Inputs>(part));
+    }
+  }
+
+ private:
+  const Inputs* inputs_ = nullptr;
+  const void* record_ = nullptr;
+  std::size_t size_ = 0;
+  unsigned reads_ = 0;
+  Copy copy_ = nullptr;
+};
+
 // What can be done with an effect along a whole record in number system N. `parameters` are in the order of the
 // catalogue; inner states start from rest at each call.
 template <class N>
@@ -51,7 +90,7 @@ struct Along {
       torque;
   // The same along plain inputs.
   std::function<void(const Parameter* parameters, const DriveConstants<Parameter>& drive, Balance balance,
-                     std::span<const effects::Inputs<Real>> inputs, typename N::Value* torque)>
+                     const PlainInputs& inputs, typename N::Value* torque)>
       torque_of_plain;
   // Changes the inputs in place, as shifts and modulations do. Null for sources.
   std::function<void(const Parameter* parameters, const DriveConstants<Parameter>& drive,

@@ -60,8 +60,7 @@ Along<N> with_stated(const Along<N>& base, const std::vector<double>& stated) {
     torque(all.data(), drive, balance, inputs, sum);
   };
   functions.torque_of_plain = [all, torque = base.torque_of_plain](
-                                  const P*, const DriveConstants<P>& drive, Balance balance,
-                                  std::span<const effects::Inputs<Real>> inputs,
+                                  const P*, const DriveConstants<P>& drive, Balance balance, const PlainInputs& inputs,
                                   typename N::Value* sum) { torque(all.data(), drive, balance, inputs, sum); };
   return functions;
 }

@@ -42,15 +42,15 @@ class FormulaAlong {
   // A parser of its own for each call, so that threads need not share one.
   Formula formula() const { return {text_, parameters_}; }
 
-  void add(const double* parameters, const DriveConstants<double>& drive, Balance balance,
-           std::span<const effects::Inputs<Real>> inputs, double* sum) const {
+  void add(const double* parameters, const DriveConstants<double>& drive, Balance balance, const PlainInputs& inputs,
+           double* sum) const {
     if (balance != balance_) return;
     Formula f = formula();
     add(f, {parameters, parameters_.size()}, drive.turn_angle_scale, inputs, sum);
   }
 
   void add(const numbers::Jet* parameters, const DriveConstants<numbers::Jet>& drive, Balance balance,
-           std::span<const effects::Inputs<Real>> inputs, numbers::Jet* sum) const {
+           const PlainInputs& inputs, numbers::Jet* sum) const {
     if (balance != balance_) return;
     Formula f = formula();
     const double step = step_of(parameters);
@@ -91,10 +91,12 @@ class FormulaAlong {
   }
 
  private:
-  static void add(Formula& f, std::span<const double> parameters, double turn_angle_scale,
-                  std::span<const effects::Inputs<Real>> inputs, double* sum) {
+  static void add(Formula& f, std::span<const double> parameters, double turn_angle_scale, const PlainInputs& inputs,
+                  double* sum) {
     try {
-      f.add(parameters, turn_angle_scale, inputs, sum);
+      inputs.each_stretch([&](std::size_t first, std::span<const effects::Inputs<Real>> stretch) {
+        f.add(parameters, turn_angle_scale, stretch, sum + first);
+      });
     } catch (const FormulaError& error) {
       throw model::ModelError(fmt::format("{}; {}", error.what(), error.remedy()));
     }
@@ -288,11 +290,13 @@ void make_formula(Made& made, const model::Effect& effect) {
   made.equation = d.formula;
   made.entry.label = fmt::format("{}:{}", kExpression.name, d.formula);
   made.entry.parameters = made.parameters;
-  made.entry.real.torque = made.entry.real.torque_of_plain =
-      [along](const double* p, const DriveConstants<double>& drive, Balance to,
-              std::span<const effects::Inputs<Real>> in, double* sum) { along.add(p, drive, to, in, sum); };
+  made.entry.real.torque = [along](const double* p, const DriveConstants<double>& drive, Balance to,
+                                   std::span<const effects::Inputs<Real>> in,
+                                   double* sum) { along.add(p, drive, to, in, sum); };
+  made.entry.real.torque_of_plain = [along](const double* p, const DriveConstants<double>& drive, Balance to,
+                                            const PlainInputs& in, double* sum) { along.add(p, drive, to, in, sum); };
   made.entry.dual.torque_of_plain = [along](const numbers::Jet* p, const DriveConstants<numbers::Jet>& drive,
-                                            Balance to, std::span<const effects::Inputs<Real>> in,
+                                            Balance to, const PlainInputs& in,
                                             numbers::Jet* sum) { along.add(p, drive, to, in, sum); };
   made.entry.dual.torque = [along](const numbers::Jet* p, const DriveConstants<numbers::Jet>& drive, Balance to,
                                    std::span<const effects::Inputs<Dual>> in,

@@ -179,7 +179,9 @@ BesideSignal balance_signal(const Prepared& prepared, const regression::BalanceD
     for (const std::size_t k : record.rows[regression::index(data.balance())].samples) series.judged[k] = 1;
     for (const NamedInput& input : inputs) {
       std::vector<double> values(record.inputs.size());
-      std::transform(record.inputs.begin(), record.inputs.end(), values.begin(), input.of);
+      record.inputs.all().each_stretch([&](std::size_t first, auto stretch) {
+        std::transform(stretch.begin(), stretch.end(), values.begin() + static_cast<std::ptrdiff_t>(first), input.of);
+      });
       series.inputs.push_back(filtered(prepared, record, std::move(values)));
     }
     add_stretches(signal, record, series);
@@ -204,7 +206,7 @@ void add_free_run_signal(const Prepared& prepared, std::size_t index, const std:
   series.output = filtered(prepared, record, measured);
   // An error that is not finite stays so along its whole stretch, as does the figure.
   series.model_error = filtered(prepared, record, model_error);
-  series.inputs = {filtered(prepared, record, record.effort)};
+  series.inputs = {filtered(prepared, record, record.effort.values())};
   series.judged.assign(measured.size(), 1);
   const std::vector<std::uint8_t>& masked = record.experiment->masked;
   for (std::size_t k = 0; k < masked.size(); ++k)

@@ -20,7 +20,7 @@ std::vector<FreeRunSignal> free_run_signals(const regression::Prepared& prepared
   };
   if (!run.motor_velocity.empty() && record.has_motor_motion) {
     std::vector<double> measured(e.size());
-    for (std::size_t k = 0; k < e.size(); ++k) measured[k] = record.inputs[k].velocity;
+    for (std::size_t k = 0; k < e.size(); ++k) measured[k] = record.inputs.velocity_at(k);
     const double sample_hz = 1.0 / e.sample_s;
     const signals::ZeroPhaseFilter filter(signals::ZeroPhaseFilter::kDefaultOrder,
                                           std::min(prepared.pipeline.motion_cutoff_hz, 0.45 * sample_hz), sample_hz);

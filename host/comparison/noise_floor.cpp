@@ -43,10 +43,11 @@ struct SameMotion {
 SameMotion same_motion(const Record& record, const Prepared& prepared, bool turns_known) {
   double mean = 0.0, position = 0.0, velocity = 0.0;
   const auto n = static_cast<double>(record.inputs.size());
-  for (const auto& in : record.inputs) mean += in.angle / n;
-  for (const auto& in : record.inputs) {
-    position += (in.angle - mean) * (in.angle - mean) / n;
-    velocity += in.velocity * in.velocity / n;
+  const regression::RecordSignals& in = record.inputs;
+  for (std::size_t k = 0; k < in.size(); ++k) mean += in.angle_at(k) / n;
+  for (std::size_t k = 0; k < in.size(); ++k) {
+    position += (in.angle_at(k) - mean) * (in.angle_at(k) - mean) / n;
+    velocity += in.velocity_at(k) * in.velocity_at(k) / n;
   }
   SameMotion same;
   same.position = (turns_known ? kSamePosition : kSamePositionUnknownPitch) * std::sqrt(position);
@@ -83,11 +84,10 @@ struct Pairs {
       if (j + 2 >= b.residual.size()) break;
       ++offered;
       if (!b.valid[j] || !b.valid[j + 1]) continue;
-      const auto& p = rb.inputs[j];
-      const auto& q = rb.inputs[j + 1];
-      const auto& own = ra.inputs[k];
-      if (std::abs(p.angle + fraction * (q.angle - p.angle) - own.angle) > same.position ||
-          std::abs(p.velocity + fraction * (q.velocity - p.velocity) - own.velocity) > same.velocity)
+      const auto away = [&](double p, double q, double own) { return std::abs(p + fraction * (q - p) - own); };
+      const regression::RecordSignals &own = ra.inputs, &other = rb.inputs;
+      if (away(other.angle_at(j), other.angle_at(j + 1), own.angle_at(k)) > same.position ||
+          away(other.velocity_at(j), other.velocity_at(j + 1), own.velocity_at(k)) > same.velocity)
         continue;
       const double d = at(b.residual, j, fraction) - a.residual[k];
       sum += d * d;
@@ -166,7 +166,7 @@ Experiment with_noise(const Record& record, std::uint64_t seed) {
       std = std::sqrt(std::max(0.0, std * std - *quantum * *quantum / 12.0));
       std::vector<double> smooth(e.size());
       for (std::size_t k = 0; k < smooth.size(); ++k)
-        smooth[k] = motor ? record.inputs[k].angle : record.inputs[k].output_angle;
+        smooth[k] = motor ? record.inputs.angle_at(k) : record.inputs.output_angle_at(k);
       const double share = std::uniform_real_distribution<double>(0.0, 1.0)(generator);
       if (motor || !record.locked) add_quantisation(e[column], smooth, *quantum, share * *quantum);
       // A share of the stated figure that rounding leaves over by rounding of its digits is no noise.

@@ -63,7 +63,7 @@ std::vector<RowVariable> row_variables(const BalanceData& data, data::Axis axis)
     if (varies(rows)) variables.push_back({name, std::move(unit), std::move(rows)});
   };
   const auto speed_of = [&](const Record& r, std::size_t k) {
-    return on_load ? r.inputs[k].output_velocity : r.inputs[k].velocity;
+    return on_load ? r.inputs.output_velocity_at(k) : r.inputs.velocity_at(k);
   };
   add("velocity", velocity, speed_of);
   add("speed", velocity, [&](const Record& r, std::size_t k) { return std::abs(speed_of(r, k)); });
@@ -73,24 +73,24 @@ std::vector<RowVariable> row_variables(const BalanceData& data, data::Axis axis)
   if (axis == data::Axis::rotary || turns != 1.0)
     add("motor_angle", "rad", [&](const Record& r, std::size_t k) {
       if (!r.has_motor_motion) return kNone;
-      const double angle = std::remainder(r.inputs[k].angle * turns, 2.0 * M_PI);
+      const double angle = std::remainder(r.inputs.angle_at(k) * turns, 2.0 * M_PI);
       return angle < 0.0 ? angle + 2.0 * M_PI : angle;
     });
   // A free output without a sensor follows the motor.
   add("output_angle", position,
-      [&](const Record& r, std::size_t k) { return r.locked ? kNone : r.inputs[k].output_angle; });
+      [&](const Record& r, std::size_t k) { return r.locked ? kNone : r.inputs.output_angle_at(k); });
   add("current", "A",
       [&](const Record& r, std::size_t k) { return r.experiment->has(Column::current) ? r.inputs[k].current : kNone; });
   add("torque", data::unit_of(Column::torque, axis),
-      [&](const Record& r, std::size_t k) { return r.torque.empty() ? kNone : r.inputs[k].torque; });
+      [&](const Record& r, std::size_t k) { return r.torque.empty() ? kNone : r.inputs.torque_at(k); });
   const auto has_torsion = [](const Record& r) { return r.has_motor_motion && r.has_output_motion; };
   add("torsion", position,
-      [&](const Record& r, std::size_t k) { return has_torsion(r) ? r.inputs[k].torsion : kNone; });
+      [&](const Record& r, std::size_t k) { return has_torsion(r) ? r.inputs.torsion_at(k) : kNone; });
   if (balance == Balance::transmission)
     add("torsion_rate", velocity,
-        [&](const Record& r, std::size_t k) { return has_torsion(r) ? r.inputs[k].torsion_rate : kNone; });
+        [&](const Record& r, std::size_t k) { return has_torsion(r) ? r.inputs.torsion_rate_at(k) : kNone; });
   add("temperature", "degC",
-      [&](const Record& r, std::size_t k) { return r.has_temperature ? r.inputs[k].temperature : kNone; });
+      [&](const Record& r, std::size_t k) { return r.has_temperature ? r.inputs.temperature_at(k) : kNone; });
   add("time", "s", [&](const Record& r, std::size_t k) { return r.experiment->time_s[k]; });
   const Record* travelled = nullptr;
   std::vector<double> travel;

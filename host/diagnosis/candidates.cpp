@@ -51,7 +51,7 @@ bool knows_torque_scale(const BalanceData& data, const Terms& terms) {
   for (const auto& range : data.records()) {
     const regression::Record& r = data.prepared().records[range.record];
     for (std::size_t k = 0; k < r.inputs.size() && !r.effort.empty(); ++k) {
-      sensor += r.inputs[k].torque * r.inputs[k].torque;
+      sensor += r.inputs.torque_at(k) * r.inputs.torque_at(k);
       effort += r.effort[k] * r.effort[k];
     }
   }
@@ -85,9 +85,9 @@ bool visible(const BalanceData& data, const Terms& terms, const catalogue::Entry
     for (const auto& range : data.records()) {
       const regression::Record& r = p.records[range.record];
       if (!r.has_temperature) return false;
-      for (const auto& in : r.inputs) {
-        low = std::min(low, in.temperature);
-        high = std::max(high, in.temperature);
+      for (std::size_t k = 0; k < r.inputs.size(); ++k) {
+        low = std::min(low, r.inputs.temperature_at(k));
+        high = std::max(high, r.inputs.temperature_at(k));
       }
     }
     if (high - low < kTemperatureSpan) return false;

@@ -108,8 +108,8 @@ std::vector<Disturbance> find_disturbances(const BalanceData& data, const Eigen:
       size[at] = std::abs(fast[at]);
       signals[0][at] = r.direction_variable(data.balance(), k);
       signals[1][at] = r.experiment->time_s[k] - reversal;
-      signals[2][at] = r.inputs[k].angle;
-      signals[3][at] = r.inputs[k].torsion;
+      signals[2][at] = r.inputs.angle_at(k);
+      signals[3][at] = r.inputs.torsion_at(k);
       ++at;
     }
     const double far = kFarOut * 1.4826 * median(size);

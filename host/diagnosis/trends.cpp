@@ -26,12 +26,14 @@ std::vector<Setting> settings_of(const regression::Prepared& prepared) {
   double order = 0.0;
   for (const regression::Record& r : prepared.records) {
     double speed = 0.0, acceleration = 0.0, temperature = 0.0, torque = 0.0;
-    for (const auto& in : r.inputs) {
-      speed += in.velocity * in.velocity;
-      acceleration += in.acceleration * in.acceleration;
-      temperature += in.temperature;
-      torque += in.torque_magnitude;
-    }
+    r.inputs.all().each_stretch([&](std::size_t, auto stretch) {
+      for (const auto& in : stretch) {
+        speed += in.velocity * in.velocity;
+        acceleration += in.acceleration * in.acceleration;
+        temperature += in.temperature;
+        torque += in.torque_magnitude;
+      }
+    });
     const auto n = static_cast<double>(r.inputs.size());
     const bool moves = !r.at_rest && speed > 0.0;
     const auto known = [&](bool is, double value) { return is && moves ? std::optional(value) : std::nullopt; };

@@ -57,8 +57,10 @@ struct Part {
 };
 
 double signal_of(const Record& record, std::size_t sample, Signal signal) {
-  const auto& in = record.inputs[sample];
-  return signal == Signal::velocity ? in.velocity : signal == Signal::position ? in.angle : in.torque;
+  const auto& in = record.inputs;
+  return signal == Signal::velocity   ? in.velocity_at(sample)
+         : signal == Signal::position ? in.angle_at(sample)
+                                      : in.torque_at(sample);
 }
 
 class OutputError {

@@ -40,9 +40,10 @@ std::vector<double> half_steps(const Record& r, double torque_constant) {
 
 template <class Value>
 std::vector<double> along(const Record& r, Value value) {
-  std::vector<double> signal;
-  signal.reserve(r.inputs.size());
-  for (const auto& in : r.inputs) signal.push_back(value(in));
+  std::vector<double> signal(r.inputs.size());
+  r.inputs.all().each_stretch([&](std::size_t first, auto stretch) {
+    std::transform(stretch.begin(), stretch.end(), signal.begin() + static_cast<std::ptrdiff_t>(first), value);
+  });
   return signal;
 }
 
@@ -118,7 +119,7 @@ double torque_per_held_step(const Prepared& prepared) {
       motor.push_back(signal);
       load.push_back(signal);
     }
-    motor.push_back(r.effort);
+    motor.push_back(r.effort.values());
     load.push_back(half_steps(r, prepared.constants.torque_constant));
     load.push_back(r.torque);
     for (std::size_t k = 0; k < r.load_torque.size(); ++k) load.back()[k] -= r.load_torque[k];

@@ -46,20 +46,24 @@ Eigen::MatrixXd BalanceData::point_columns(const Terms& terms, const Points& poi
     if (weight == 0.0) continue;
     std::vector<effects::Inputs<Real>> changed;
     const bool any = change_inputs<Real>(terms, reader.term, r, all, changed);
-    const std::vector<effects::Inputs<Real>>& inputs = any ? changed : r.inputs;
+    const catalogue::PlainInputs inputs = any ? catalogue::PlainInputs(changed) : r.inputs.all();
     struct Place {
       Eigen::Index point;
       double share, size;
     };
     std::vector<Place> places(inputs.size());
-    for (std::size_t k = 0; k < inputs.size(); ++k) {
-      const double x = signal_of(inputs[k], points.variable, prepared_->constants.turn_angle_scale);
-      const double most = static_cast<double>(closed ? count : count - 1);
-      const double at = std::clamp(closed ? x * per_signal : (x - points.low) * per_signal, 0.0, most);
-      const auto point = std::min<Eigen::Index>(static_cast<Eigen::Index>(at), closed ? count - 1 : count - 2);
-      places[k] = {point, at - static_cast<double>(point),
-                   points.times_direction ? weight * effects::direction_on<Real>(points.balance, inputs[k]) : weight};
-    }
+    inputs.each_stretch([&](std::size_t first, std::span<const effects::Inputs<Real>> stretch) {
+      for (std::size_t k = 0; k < stretch.size(); ++k) {
+        const effects::Inputs<Real>& in = stretch[k];
+        const double x = signal_of(in, points.variable, prepared_->constants.turn_angle_scale);
+        const double most = static_cast<double>(closed ? count : count - 1);
+        const double at = std::clamp(closed ? x * per_signal : (x - points.low) * per_signal, 0.0, most);
+        const auto point = std::min<Eigen::Index>(static_cast<Eigen::Index>(at), closed ? count - 1 : count - 2);
+        places[first + k] = {
+            point, at - static_cast<double>(point),
+            points.times_direction ? weight * effects::direction_on<Real>(points.balance, in) : weight};
+      }
+    });
     const auto& samples = r.rows[index(balance_)].samples;
     if (!filtered) {
       for (std::size_t k = 0; k < samples.size(); ++k) {
@@ -112,7 +116,7 @@ Eigen::VectorXd BalanceData::signal_at_rows(const Terms& terms, effects::Variabl
     const auto& samples = r.rows[index(balance_)].samples;
     for (std::size_t k = 0; k < samples.size(); ++k)
       signal[range.first + static_cast<Eigen::Index>(k)] =
-          signal_of((any ? changed : r.inputs)[samples[k]], variable, prepared_->constants.turn_angle_scale);
+          signal_of(any ? changed[samples[k]] : r.inputs[samples[k]], variable, prepared_->constants.turn_angle_scale);
   }
   return signal;
 }

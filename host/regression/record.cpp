@@ -32,19 +32,23 @@ constexpr double kMaskReach = 1.5;
 constexpr double kCountingPowerShare = 0.01;
 constexpr double kMostMaskedShare = 0.5;
 
-template <class Process>
-std::vector<double> by_segment(const std::vector<double>& signal, const std::vector<Segment>& segments,
-                               Process process) {
+std::vector<double> filtered(const std::vector<double>& signal, const std::vector<Segment>& segments,
+                             const ZeroPhaseFilter& filter) {
+  std::vector<double> result = signal;
+  for (const Segment& s : segments) filter.apply_in_place(std::span<double>(result.data() + s.first, s.last - s.first));
+  return result;
+}
+
+std::vector<double> slope_of(const std::vector<double>& signal, const std::vector<Segment>& segments, double sample_s) {
   std::vector<double> result(signal.size(), 0.0);
-  for (const Segment& s : segments) {
-    const std::vector<double> part = process(std::span<const double>(signal.data() + s.first, s.last - s.first));
-    std::copy(part.begin(), part.end(), result.begin() + static_cast<std::ptrdiff_t>(s.first));
-  }
+  for (const Segment& s : segments)
+    signals::central_derivative(std::span<const double>(signal.data() + s.first, s.last - s.first), sample_s,
+                                std::span<double>(result.data() + s.first, s.last - s.first));
   return result;
 }
 
 struct Motion {
-  std::vector<double> position, velocity, acceleration;
+  std::vector<double> position, velocity;
   double position_noise = 0.0;  // white, before the filter
 };
 
@@ -77,32 +81,29 @@ double derivative_noise_gain(const ZeroPhaseFilter& filter, double sample_s) {
   return std::sqrt(std::inner_product(slope.begin(), slope.end(), slope.begin(), 0.0));
 }
 
-double root_mean_square(const std::vector<double>& x) {
-  return x.empty() ? 0.0
-                   : std::sqrt(std::inner_product(x.begin(), x.end(), x.begin(), 0.0) / static_cast<double>(x.size()));
+// Root mean square of what a filter has taken away.
+double root_mean_square_of_rest(const std::vector<double>& raw, const std::vector<double>& kept) {
+  if (raw.empty()) return 0.0;
+  double sum = 0.0;
+  for (std::size_t k = 0; k < raw.size(); ++k) sum += (raw[k] - kept[k]) * (raw[k] - kept[k]);
+  return std::sqrt(sum / static_cast<double>(raw.size()));
 }
 
 Motion motion_from_position(const std::vector<double>& raw, const std::vector<Segment>& segments,
                             const ZeroPhaseFilter& filter, double sample_s) {
   Motion m;
-  m.position = by_segment(raw, segments, [&](auto part) { return filter.apply(part); });
-  m.velocity = by_segment(m.position, segments, [&](auto part) { return signals::central_derivative(part, sample_s); });
-  m.acceleration =
-      by_segment(m.velocity, segments, [&](auto part) { return signals::central_derivative(part, sample_s); });
-  std::vector<double> rest(raw.size());
-  for (std::size_t k = 0; k < raw.size(); ++k) rest[k] = raw[k] - m.position[k];
+  m.position = filtered(raw, segments, filter);
+  m.velocity = slope_of(m.position, segments, sample_s);
   // The filter keeps a share of the noise; what it takes away stands for the rest.
   const double kept = std::min(0.8, 2.0 * filter.cutoff_hz() * sample_s);
-  m.position_noise = root_mean_square(rest) / std::sqrt(1.0 - kept);
+  m.position_noise = root_mean_square_of_rest(raw, m.position) / std::sqrt(1.0 - kept);
   return m;
 }
 
 Motion motion_from_velocity(const std::vector<double>& raw, const std::vector<Segment>& segments,
                             const ZeroPhaseFilter& filter, double sample_s) {
   Motion m;
-  m.velocity = by_segment(raw, segments, [&](auto part) { return filter.apply(part); });
-  m.acceleration =
-      by_segment(m.velocity, segments, [&](auto part) { return signals::central_derivative(part, sample_s); });
+  m.velocity = filtered(raw, segments, filter);
   m.position.resize(raw.size(), 0.0);
   for (const Segment& s : segments)
     for (std::size_t k = s.first + 1; k < s.last; ++k)
@@ -140,7 +141,8 @@ std::vector<std::uint8_t> spread(const std::vector<std::uint8_t>& bad, std::size
 bool is_at_rest(const Record& record, double motion_span, double resolution) {
   if (record.locked || record.effort.size() < 16 || motion_span > 2.0 * resolution) return false;
   double mean = 0.0, steps = 0.0, spread_squared = 0.0;
-  for (const double x : record.effort) mean += x / static_cast<double>(record.effort.size());
+  for (std::size_t k = 0; k < record.effort.size(); ++k)
+    mean += record.effort[k] / static_cast<double>(record.effort.size());
   for (std::size_t k = 1; k < record.effort.size(); ++k) {
     steps += (record.effort[k] - record.effort[k - 1]) * (record.effort[k] - record.effort[k - 1]);
     spread_squared += (record.effort[k] - mean) * (record.effort[k] - mean);
@@ -194,8 +196,12 @@ Record prepare_one(const Experiment& e, const catalogue::DriveConstants<double>&
   const ZeroPhaseFilter filter(ZeroPhaseFilter::kDefaultOrder, std::min(pipeline.motion_cutoff_hz, 0.45 * sample_hz),
                                sample_hz);
   const double slope_noise = derivative_noise_gain(filter, e.sample_s);
-  const std::size_t n = e.size();
-  r.inputs.resize(n);
+  r.inputs.resize(e.size());
+  r.inputs.segments = e.segments;
+  r.inputs.sample_s = e.sample_s;
+  r.inputs.gear_ratio = drive.gear_ratio;
+  r.inputs.reference_temperature = drive.reference_temperature;
+  r.inputs.locked = r.locked;
 
   Motion motor, output;
   double motor_velocity_noise = 0.0, output_velocity_noise = 0.0;
@@ -208,10 +214,9 @@ Record prepare_one(const Experiment& e, const catalogue::DriveConstants<double>&
     r.has_motor_motion = true;
   } else if (e.has(Column::motor_velocity)) {
     motor = motion_from_velocity(e[Column::motor_velocity], r.segments, filter, e.sample_s);
-    std::vector<double> rest(n);
-    for (std::size_t k = 0; k < n; ++k) rest[k] = e[Column::motor_velocity][k] - motor.velocity[k];
     const double kept = std::min(0.8, 2.0 * filter.cutoff_hz() * e.sample_s);
-    motor_velocity_noise = root_mean_square(rest) * std::sqrt(kept / (1.0 - kept));
+    motor_velocity_noise =
+        root_mean_square_of_rest(e[Column::motor_velocity], motor.velocity) * std::sqrt(kept / (1.0 - kept));
     r.has_motor_motion = true;
   }
   if (!r.locked && e.has(Column::output_position)) {
@@ -227,55 +232,26 @@ Record prepare_one(const Experiment& e, const catalogue::DriveConstants<double>&
   }
   r.has_output_motion = r.has_output_motion || r.locked;
 
-  std::vector<double> torque_input;
   if (e.has(Column::torque)) {
     r.torque = e[Column::torque];
-    torque_input = by_segment(r.torque, r.segments, [&](auto part) { return filter.apply(part); });
+    r.inputs.torque = filtered(r.torque, r.segments, filter);
   }
   if (e.has(Column::load_torque)) r.load_torque = e[Column::load_torque];
-  std::vector<double> temperature;
   if (e.has(Column::temperature)) {
     // Housings warm up over minutes: all that is faster is noise.
     const ZeroPhaseFilter slow(2, std::min(0.5, 0.4 * sample_hz), sample_hz);
-    temperature = by_segment(e[Column::temperature], r.segments, [&](auto part) { return slow.apply(part); });
+    r.inputs.temperature = filtered(e[Column::temperature], r.segments, slow);
     r.has_temperature = true;
   }
-  const bool held = e.current_hold == data::CurrentHold::zoh;
-  std::vector<double> current;
+  const auto aligned = [&](const std::vector<double>& measured) {
+    return e.current_hold == data::CurrentHold::zoh ? ScaledSignal(align_held(measured, r.segments))
+                                                    : ScaledSignal(measured);
+  };
   if (e.has(Column::current)) {
-    current = held ? align_held(e[Column::current], r.segments) : e[Column::current];
-    r.effort.resize(n);
-    for (std::size_t k = 0; k < n; ++k) r.effort[k] = drive.torque_constant * current[k];
+    r.inputs.current = aligned(e[Column::current]);
+    r.effort = r.inputs.current.times(drive.torque_constant);
   } else if (e.has(Column::motor_torque)) {
-    r.effort = held ? align_held(e[Column::motor_torque], r.segments) : e[Column::motor_torque];
-  }
-
-  for (std::size_t k = 0; k < n; ++k) {
-    auto& in = r.inputs[k];
-    if (r.has_motor_motion) {
-      in.angle = motor.position[k];
-      in.velocity = motor.velocity[k];
-      in.speed = std::abs(in.velocity);
-      in.acceleration = motor.acceleration[k];
-    }
-    if (!output.velocity.empty()) {
-      in.output_angle = output.position[k];
-      in.output_velocity = output.velocity[k];
-      in.output_acceleration = output.acceleration[k];
-    } else if (!r.locked) {
-      // Without a sensor the output follows the motor through a rigid gear.
-      in.output_angle = in.angle / drive.gear_ratio;
-      in.output_velocity = in.velocity / drive.gear_ratio;
-      in.output_acceleration = in.acceleration / drive.gear_ratio;
-    }
-    in.torsion = in.angle / drive.gear_ratio - in.output_angle;
-    in.torsion_rate = in.velocity / drive.gear_ratio - in.output_velocity;
-    if (!torque_input.empty()) in.torque = torque_input[k];
-    in.torque_magnitude = std::abs(in.torque);
-    if (!current.empty()) in.current = current[k];
-    in.temperature = r.has_temperature ? temperature[k] : drive.reference_temperature;
-    in.viscous_scale = in.coulomb_scale = 1.0;
-    in.elapsed = e.sample_s;
+    r.effort = aligned(e[Column::motor_torque]);
   }
   r.velocity_noise[index(Balance::motor)] = motor_velocity_noise;
   r.velocity_noise[index(Balance::load)] = r.has_output_motion && output_velocity_noise > 0.0
@@ -289,16 +265,13 @@ Record prepare_one(const Experiment& e, const catalogue::DriveConstants<double>&
     const auto [low, high] = std::minmax_element(p.begin(), p.end());
     r.at_rest = is_at_rest(r, *high - *low, std::max(r.motor_quantum.value_or(0.0), motor.position_noise));
   }
-  for (auto& in : r.inputs) {
-    const auto smooth_sign = [&](double v, Balance b) {
-      if (r.at_rest) return 0.0;
-      const double width = r.velocity_noise[index(b)];
-      return width > 0.0 ? std::tanh(v / width) : Real::sign(v);
-    };
-    in.direction = smooth_sign(in.velocity, Balance::motor);
-    in.torsion_direction = smooth_sign(in.torsion_rate, Balance::transmission);
-    in.output_direction = smooth_sign(in.output_velocity, Balance::load);
-  }
+  r.inputs.angle = std::move(motor.position);
+  r.inputs.velocity = std::move(motor.velocity);
+  r.inputs.output_angle = std::move(output.position);
+  r.inputs.output_velocity = std::move(output.velocity);
+  r.inputs.at_rest = r.at_rest;
+  r.inputs.velocity_noise = r.velocity_noise;
+  r.inputs.keep_directions();
   choose_rows(r, pipeline, filter.settling_samples());
   return r;
 }
@@ -359,8 +332,7 @@ Pipeline choose_pipeline(const std::vector<const Experiment*>& experiments, cons
     const double sample_hz = 1.0 / e->sample_s;
     std::vector<double> velocity;
     if (e->has(Column::motor_position))
-      velocity = by_segment((*e)[Column::motor_position], e->segments,
-                            [&](auto part) { return signals::central_derivative(part, e->sample_s); });
+      velocity = slope_of((*e)[Column::motor_position], e->segments, e->sample_s);
     else if (e->has(Column::motor_velocity))
       velocity = (*e)[Column::motor_velocity];
     else

@@ -10,6 +10,7 @@
 
 #include "host/catalogue/constants.hpp"
 #include "host/data/dataset.hpp"
+#include "host/regression/record_signals.hpp"
 
 namespace flexspline::regression {
 
@@ -48,8 +49,8 @@ struct Record {
   double sample_s = 0.0;
   std::size_t decimation = 1;
   std::vector<data::Segment> segments;
-  std::vector<effects::Inputs<Real>> inputs;
-  std::vector<double> effort;  // motor torque (or force), aligned to the instants of the positions; empty: not measured
+  RecordSignals inputs;
+  ScaledSignal effort;         // motor torque (or force), aligned to the instants of the positions; empty: not measured
   std::vector<double> torque;  // as measured
   std::vector<double> load_torque;
   double torsion_zero_rad = 0.0;  // by how much the torsion was moved, see record_constants.hpp
@@ -65,8 +66,9 @@ struct Record {
 
   // The variable whose sign is the direction of a balance's friction.
   double direction_variable(Balance balance, std::size_t sample) const {
-    const auto& in = inputs[sample];
-    return balance == Balance::motor ? in.velocity : balance == Balance::load ? in.output_velocity : in.torsion_rate;
+    return balance == Balance::motor  ? inputs.velocity_at(sample)
+           : balance == Balance::load ? inputs.output_velocity_at(sample)
+                                      : inputs.torsion_rate_at(sample);
   }
 };
 

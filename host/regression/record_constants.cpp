@@ -47,7 +47,7 @@ bool settle_record_constants(Prepared& prepared, BalanceData& data, const Terms&
     Record& record = prepared.records[data.records()[static_cast<std::size_t>(r)].record];
     const double move = constant[r] - mean;
     record.torsion_zero_rad += move;
-    for (auto& in : record.inputs) in.torsion += move;
+    record.inputs.torsion_zero += move;
   }
   return true;
 }

@@ -37,14 +37,15 @@ double shortest_stroke(const BalanceData& data) {
   for (const RowRange& range : data.records()) {
     const Record& r = data.prepared().records[range.record];
     if (r.at_rest) continue;
-    double start = r.inputs.front().angle;
+    double start = r.inputs.angle_at(0);
     double last_sign = 0.0;
-    for (const auto& in : r.inputs) {
-      if (in.speed < 3.0 * r.velocity_noise[index(Balance::motor)]) continue;
-      const double sign = in.velocity > 0.0 ? 1.0 : -1.0;
+    for (std::size_t k = 0; k < r.inputs.size(); ++k) {
+      const double velocity = r.inputs.velocity_at(k);
+      if (std::abs(velocity) < 3.0 * r.velocity_noise[index(Balance::motor)]) continue;
+      const double sign = velocity > 0.0 ? 1.0 : -1.0;
       if (last_sign != 0.0 && sign != last_sign) {
-        strokes.push_back(std::abs(in.angle - start));
-        start = in.angle;
+        strokes.push_back(std::abs(r.inputs.angle_at(k) - start));
+        start = r.inputs.angle_at(k);
       }
       last_sign = sign;
     }
@@ -61,7 +62,7 @@ double unseen_travel(const BalanceData& data) {
     counts = std::max(counts, 4.0 * r.motor_quantum.value_or(0.0));
     const double masked_s = 1.0 / data.prepared().pipeline.row_cutoff_hz;
     for (std::size_t k = 1; k < r.inputs.size(); ++k)
-      if (r.inputs[k].velocity * r.inputs[k - 1].velocity < 0.0)
+      if (r.inputs.velocity_at(k) * r.inputs.velocity_at(k - 1) < 0.0)
         travel.push_back(0.5 * std::abs(r.inputs[k].acceleration) * masked_s * masked_s);
   }
   return std::max(counts, quantile(travel, 0.1));

@@ -43,14 +43,11 @@ BalanceData BalanceData::thinned(Prepared& few) const {
     auto& taken = f.rows[index(balance_)].samples;
     auto row = static_cast<std::size_t>(ranges_[i].first);
     std::size_t next = 0;
-    for (const data::Segment& s : r.segments) {
-      const std::size_t first = f.inputs.size();
-      for (std::size_t k = s.first; k < s.last; k += step) {
-        f.inputs.push_back(r.inputs[k]);
-        f.inputs.back().elapsed *= static_cast<double>(step);
-      }
-      f.segments.push_back({first, f.inputs.size()});
-      const std::size_t last = f.inputs.size() - 1;
+    f.inputs = r.inputs.every(step);
+    f.segments = f.inputs.segments;
+    for (std::size_t at_segment = 0; at_segment < r.segments.size(); ++at_segment) {
+      const data::Segment& s = r.segments[at_segment];
+      const std::size_t first = f.segments[at_segment].first, last = f.segments[at_segment].last - 1;
       for (; next < samples.size() && samples[next] < s.last; ++next, ++row) {
         // Interpolation takes a sample before and two behind; at the ends of a segment the nearest one serves.
         const std::size_t at = first + (samples[next] - s.first) / step;

@@ -53,7 +53,7 @@ json hysteresis_loops(const View& view) {
     std::vector<double> torsion, measured, modelled;
     for (const data::Segment& s : record.segments) {
       for (std::size_t k = s.first; k < s.last; k += step) {
-        torsion.push_back(record.inputs[k].torsion);
+        torsion.push_back(record.inputs.torsion_at(k));
         measured.push_back(full->target[k]);
         modelled.push_back(full->target[k] - full->residual[k]);
       }

@@ -106,13 +106,13 @@ std::vector<double> order_amplitudes(const View& view, const BalanceView& balanc
       if (!record.has_motor_motion) continue;
       Eigen::MatrixX3d x(range.size(), 3);
       for (Eigen::Index k = 0; k < range.size(); ++k) {
-        const double wave = per_unit * record.inputs[record.rows[at].samples[static_cast<std::size_t>(k)]].angle;
+        const double wave = per_unit * record.inputs.angle_at(record.rows[at].samples[static_cast<std::size_t>(k)]);
         x.row(k) << 1.0, std::cos(wave), std::sin(wave);
       }
       double low = std::numeric_limits<double>::infinity(), high = -low;
       for (const std::size_t sample : record.rows[at].samples) {
-        low = std::min(low, record.inputs[sample].angle);
-        high = std::max(high, record.inputs[sample].angle);
+        low = std::min(low, record.inputs.angle_at(sample));
+        high = std::max(high, record.inputs.angle_at(sample));
       }
       if (per_unit * (high - low) < kWholeWaves * 2.0 * M_PI) continue;
       const Eigen::Vector3d theta = x.colPivHouseholderQr().solve(residual.segment(range.first, range.size()));

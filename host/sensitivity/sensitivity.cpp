@@ -290,9 +290,9 @@ class Analysis {
       std::vector<double> motion;
       for (std::size_t k = lines.segment.first; k < lines.segment.last && !record.at_rest; ++k) {
         if (record.has_motor_motion)
-          motion.push_back(record.inputs[k].velocity);
+          motion.push_back(record.inputs.velocity_at(k));
         else if (record.has_output_motion && !record.locked)
-          motion.push_back(record.inputs[k].output_velocity);
+          motion.push_back(record.inputs.output_velocity_at(k));
         else if (!record.effort.empty())
           motion.push_back(record.effort[k]);
       }

@@ -134,7 +134,7 @@ TEST(PreparedRecord, KeepsARecordWithTheDriveOffAndGivesItNoDirection) {
     EXPECT_TRUE(r.at_rest);
     EXPECT_EQ(r.rows[index(Balance::motor)].masked, 0u);
     EXPECT_GT(motor_rows(r).size(), 350u);
-    for (const auto& in : r.inputs) ASSERT_EQ(in.direction, 0.0);
+    for (std::size_t k = 0; k < r.inputs.size(); ++k) ASSERT_EQ(r.inputs[k].direction, 0.0);
   }
 }
 
@@ -150,7 +150,7 @@ TEST(PreparedRecord, AStuckAxisUnderAChangingEffortIsNotAtRestAndIsMasked) {
 TEST(PreparedRecord, AHeldEffortIsPutHalfASampleLater) {
   data::Experiment e = sine(10.0, 1.0, 2.0);
   const std::vector<double> logged = e[Column::motor_torque];
-  EXPECT_EQ(prepared(e).effort, logged);
+  EXPECT_EQ(prepared(e).effort.values(), logged);
   e.current_hold = data::CurrentHold::zoh;
   const Record r = prepared(e);
   EXPECT_EQ(r.effort[0], logged[0]) << "nothing is known before the first sample";

@@ -1,0 +1,121 @@
+// The signals of a record: what is kept and what is made of it gives the same, however it is asked for.
+#include "host/regression/record_signals.hpp"
+
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <cstring>
+#include <limits>
+#include <random>
+
+#include "host/signals/differentiate.hpp"
+
+namespace flexspline::regression {
+namespace {
+
+using Inputs = RecordSignals::Inputs;
+
+RecordSignals two_segments(std::size_t samples) {
+  RecordSignals s;
+  s.resize(samples);
+  s.segments = {{3, samples / 3}, {samples / 3 + 5, samples}};
+  s.sample_s = 1e-3;
+  s.gear_ratio = 100.0;
+  s.velocity_noise = {0.3, 0.003, 0.002};
+  for (std::size_t k = 0; k < samples; ++k) {
+    const double t = 1e-3 * static_cast<double>(k);
+    s.angle.push_back(5.0 * std::sin(3.0 * t));
+    s.velocity.push_back(15.0 * std::cos(3.0 * t));
+    s.output_angle.push_back(0.05 * std::sin(3.0 * t + 0.1));
+    s.output_velocity.push_back(0.15 * std::cos(3.0 * t + 0.1));
+    s.torque.push_back(4.0 * std::sin(t));
+  }
+  return s;
+}
+
+TEST(RecordSignals, AccelerationsAreSlopesOfTheVelocitiesWithinEachSegment) {
+  const RecordSignals s = two_segments(1500);
+  for (const data::Segment& segment : s.segments) {
+    const auto part = [&](const std::vector<double>& x) {
+      return signals::central_derivative(std::span(x).subspan(segment.first, segment.last - segment.first), s.sample_s);
+    };
+    const std::vector<double> motor = part(s.velocity), output = part(s.output_velocity);
+    for (std::size_t k = segment.first; k < segment.last; ++k) {
+      const Inputs in = s[k];
+      ASSERT_EQ(in.acceleration, motor[k - segment.first]) << k;
+      ASSERT_EQ(in.output_acceleration, output[k - segment.first]) << k;
+    }
+  }
+}
+
+TEST(RecordSignals, AreTheSameAloneInStretchesAndWithDirectionsThatAreKept) {
+  RecordSignals s = two_segments(1500);
+  const RecordSignals made = s;
+  s.keep_directions();
+  s.all().each_stretch([&](std::size_t first, std::span<const Inputs> stretch) {
+    for (std::size_t k = 0; k < stretch.size(); ++k) {
+      const Inputs alone = made[first + k];
+      ASSERT_EQ(std::memcmp(&alone, &stretch[k], sizeof alone), 0) << first + k;
+      ASSERT_EQ(alone.direction, std::tanh(s.velocity[first + k] / 0.3));
+      ASSERT_EQ(alone.torsion, s.angle[first + k] / 100.0 - s.output_angle[first + k]);
+    }
+  });
+}
+
+TEST(RecordSignals, AnOutputThatIsNotMeasuredFollowsTheMotorOrIsLocked) {
+  RecordSignals s = two_segments(600);
+  s.output_angle.clear();
+  s.output_velocity.clear();
+  const Inputs follows = s[100];
+  EXPECT_EQ(follows.output_angle, follows.angle / 100.0);
+  EXPECT_EQ(follows.output_acceleration, follows.acceleration / 100.0);
+  EXPECT_EQ(follows.torsion, 0.0);
+  s.locked = true;
+  const Inputs locked = s[100];
+  EXPECT_EQ(locked.output_angle, 0.0);
+  EXPECT_EQ(locked.output_acceleration, 0.0);
+  EXPECT_EQ(locked.torsion, locked.angle / 100.0);
+}
+
+TEST(RecordSignals, EveryFewSamplesKeepTheDerivativesOfAll) {
+  const RecordSignals s = two_segments(1500);
+  const RecordSignals few = s.every(4);
+  ASSERT_EQ(few.segments.size(), 2u);
+  EXPECT_EQ(few.sample_s, 4e-3);
+  std::size_t at = 0;
+  for (const data::Segment& segment : s.segments)
+    for (std::size_t k = segment.first; k < segment.last; k += 4, ++at) {
+      Inputs expected = s[k];
+      expected.elapsed = few.sample_s;
+      const Inputs in = few[at];
+      ASSERT_EQ(std::memcmp(&expected, &in, sizeof in), 0) << k;
+    }
+  EXPECT_EQ(few.size(), at);
+}
+
+// A record makes only the signals that an effect states; what it does not state may hold anything.
+TEST(RecordSignals, EffectsReadNoSignalThatTheyDoNotState) {
+  RecordSignals s = two_segments(200);
+  s.current = ScaledSignal(std::vector<double>(200, 1.3));
+  s.temperature.assign(200, 41.0);
+  const double nothing = std::numeric_limits<double>::quiet_NaN();
+  for (const catalogue::Entry& entry : catalogue::all()) {
+    if (!entry.adds_torque()) continue;
+    std::vector<double> parameters;
+    for (const auto& p : entry.parameters) parameters.push_back(p.usual == 0.0 ? 0.5 : p.usual);
+    for (const effects::Balance balance :
+         {effects::Balance::motor, effects::Balance::transmission, effects::Balance::load}) {
+      std::vector<Inputs> stated(200);
+      for (Inputs& in : stated)
+        for (double *x = &in.angle, *end = x + sizeof(Inputs) / sizeof(double); x < end; ++x) *x = nothing;
+      s.copy(0, stated, entry.info->reads);
+      std::vector<double> of_stated(200, 0.0), of_all(200, 0.0);
+      entry.real.torque_of_plain(parameters.data(), {}, balance, stated, of_stated.data());
+      entry.real.torque_of_plain(parameters.data(), {}, balance, s.all(), of_all.data());
+      for (std::size_t k = 0; k < 200; ++k) ASSERT_EQ(of_stated[k], of_all[k]) << entry.name() << ", sample " << k;
+    }
+  }
+}
+
+}  // namespace
+}  // namespace flexspline::regression
