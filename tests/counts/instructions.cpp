@@ -1,5 +1,6 @@
 // Counts the instructions of a control tick, exactly: least and most of each part over motions of the whole envelope.
-// Prints "part least most". With FLEXSPLINE_PEERS also of the same effects in floating point.
+// Prints "part least most". With FLEXSPLINE_PEERS also of the same effects in floating point; with FLEXSPLINE_CYCLES no
+// effect alone, and fewer ticks, for cycles.py.
 #include "shared/control/loops.hpp"
 #include "shared/fixed/system.hpp"
 #include "shared/model/block.hpp"
@@ -21,7 +22,11 @@ using observers::EncoderKalman;
 constexpr std::uint8_t kBlock[] = {
 #include <block.inc>
 };
+#if defined(FLEXSPLINE_CYCLES)  // each instruction is looked at, which takes its time
+constexpr int kTicks = 80;
+#else
 constexpr int kTicks = 1500;
+#endif
 constexpr std::int32_t kOne = std::int32_t{1} << fixed::kValueBits;
 
 template <class T>
@@ -248,11 +253,13 @@ int main() {
   Torques<Fixed> out;
   measure(
       "", [&](const Inputs<Fixed>& in, const Loops::Command<Fixed>&) { nothing(in, out); }, false);
+#if !defined(FLEXSPLINE_CYCLES)
   Lone<model::TheseEffects<>>::count("no_effect");
   effects::for_each_effect([]<class Effect>(std::size_t) {
     constexpr std::size_t kNumber = model::DriveModel<Fixed>::number_of<Effect>();
     if constexpr (!Effect::kInfo.host_only) Lone<model::TheseEffects<kNumber>>::count(Effect::kInfo.name.data());
   });
+#endif
   fill(six);
   measure("six_effects", [&](const Inputs<Fixed>& in, const Loops::Command<Fixed>&) { six_effects_tick(in, out); });
   sink = out.motor.raw ^ out.transmission.raw;
