@@ -52,6 +52,7 @@ int main(int argc, char** argv) {
   };
   same_bits::run<same_bits::Derived>(few ? 200 : 20'000, many, print);
   same_bits::run_parts<same_bits::Derived>(same_bits::settings(), many / 10, print);
+  if (!few) print("drawn_blocks", same_bits::hash_of_drawn_blocks(100, many / 1'000));
   if (fixed::Findings::count() != 0) {
     std::fprintf(stderr, "%s\n", std::string(fixed::Findings::first()).c_str());
     return 1;

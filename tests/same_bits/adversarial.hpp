@@ -162,6 +162,39 @@ inline std::uint64_t hash_of_ripple_filter(const observers::RippleFilter::Coeffi
   return hash.value();
 }
 
+// Coefficients as the host derives them from parameters between a half and three halves of the usual ones.
+struct Drawn {
+  static inline Random random;
+  template <class Effect>
+  static typename Effect::template Coefficients<Fixed> effect() {
+    double parameters[sizeof(Effect::kParameters) / sizeof(Effect::kParameters[0])];
+    double* next = parameters;
+    for (const effects::ParameterInfo& p : Effect::kParameters) {
+      const double usual = p.usual != 0.0 ? p.usual : 0.0625;
+      const double drawn = usual * (0.5 + static_cast<double>(random.next() >> 40) * 0x1p-24);
+      *next++ = drawn < p.low || drawn > p.high ? usual : drawn;
+    }
+    const auto coefficients = Effect::template derive<Fixed>(parameters, drive());
+    if (fixed::Findings::count() == 0) return coefficients;
+    fixed::Findings::clear();  // these do not fit a drive
+    return Derived::effect<Effect>();
+  }
+};
+
+// All effects, with other coefficients in each of so many blocks.
+inline std::uint64_t hash_of_drawn_blocks(int blocks, int ticks) {
+  Hash hash;
+  for (int k = 0; k < blocks; ++k) {
+    model::DriveModel<Fixed>& model = scratch();
+    model.clear();
+    effects::for_each_effect([&]<class Effect>(std::size_t) {
+      if constexpr (!Effect::kInfo.host_only) add<Drawn, Effect>(model);
+    });
+    hash.take(static_cast<std::int64_t>(hash_of(model, ticks)));
+  }
+  return hash.value();
+}
+
 // Calls print(name, hash) for each; `ticks` of an effect alone, `many` of the others.
 template <class Coefficients, class Print>
 void run(int ticks, int many, Print&& print) {

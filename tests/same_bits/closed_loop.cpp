@@ -2,7 +2,7 @@
 // closed_loop.cmake builds it by two compilers and compares. All sources it needs are compiled as one, which takes each
 // compiler half a minute.
 //
-//   closed_loop SEED      a line each half second of each case, and one of its telemetry
+//   closed_loop SEED SECONDS      a line each half second of each case, and one of its telemetry
 #include <bit>
 #include <cstdio>
 #include <cstdlib>
@@ -63,13 +63,13 @@ class Bits {
   board::FrameHash hash_;
 };
 
-void run(const Case& one, std::uint64_t seed) {
+void run(const Case& one, std::uint64_t seed, double seconds) {
   const scenario::ScenarioFile file = scenario::find_scenario(one.scenario);
   board::ScenarioPlan plan = scenario::plan_of(file, scenario::drive_of(file, "", one.with, one.hide));
   plan.seed = seed;
   plan.compensation = one.compensation;
   plan.tick_hz = one.tick_hz;
-  plan.duration_s = 3.0;
+  plan.duration_s = seconds;
   plan.hold_s = 0.0;
   plan.keeps_trace = true;
   const board::ScenarioResult result = board::run_scenario(plan);
@@ -95,6 +95,7 @@ void run(const Case& one, std::uint64_t seed) {
 
 int main(int count, char** words) {
   const std::uint64_t seed = count > 1 ? std::strtoull(words[1], nullptr, 10) : 1;
-  for (const Case& one : cases()) run(one, seed);
+  const double seconds = count > 2 ? std::strtod(words[2], nullptr) : 9.0;
+  for (const Case& one : cases()) run(one, seed, seconds);
   return 0;
 }
