@@ -70,7 +70,7 @@ void make_table(Made& made) {
   const Entry& base = *find_made_by_user(kTableEffect);
   const effects::VariableInfo& variable = *find_variable(d.variable);
   made.info = *base.info;
-  made.info.reads = variable.reads;
+  made.info.reads = variable.reads | (d.times_direction ? unsigned{effects::kMotorMotion} : 0U);
   made.equation = fmt::format("f({}){}", d.variable, d.times_direction ? " s(w)" : "");
   made.info.shows_over = variable.name;
   made.entry.label = fmt::format("{}:{}{}", kTableEffect, d.variable, d.times_direction ? "*direction" : "");

@@ -30,7 +30,8 @@ constexpr double kRowsOverCutoff = 4.0;
 constexpr double kMaskReach = 1.5;
 // Records of less coherent power than this share of the strongest one's do not shape the pipeline.
 constexpr double kCountingPowerShare = 0.01;
-constexpr double kMostMaskedShare = 0.5;
+constexpr double kMostMaskedShare = 0.75;
+constexpr double kMaskedShareThen = 0.5;  // where it was more than that
 
 std::vector<double> filtered(const std::vector<double>& signal, const std::vector<Segment>& segments,
                              const ZeroPhaseFilter& filter) {
@@ -277,7 +278,8 @@ Record prepare_one(const Experiment& e, const catalogue::DriveConstants<double>&
 }
 
 // Each reversal masks a stretch that is as long as the rows' filter rings: a cut-off that serves the slow records may
-// leave a fast one nothing at all. Raises it until half of each record that counts is left.
+// leave a fast one nothing at all. Where less than a quarter of a record that counts would be left, raises it until
+// half is.
 void leave_rows_between_reversals(Pipeline& pipeline, const std::vector<const Experiment*>& experiments,
                                   const std::vector<signals::CutoffChoice>& choices, double highest_hz) {
   double strongest = 0.0;
@@ -303,7 +305,7 @@ void leave_rows_between_reversals(Pipeline& pipeline, const std::vector<const Ex
     }
   }
   if (wanted <= pipeline.row_cutoff_hz || pipeline.row_cutoff_hz >= highest_hz) return;
-  pipeline.row_cutoff_hz = std::min(std::ceil(wanted), highest_hz);
+  pipeline.row_cutoff_hz = std::min(std::ceil(wanted * kMostMaskedShare / kMaskedShareThen), highest_hz);
   pipeline.reason += fmt::format("; raised to {:.4g} Hz, so that rows are left between the reversals of {}",
                                  pipeline.row_cutoff_hz, fastest->name);
 }
