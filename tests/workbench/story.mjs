@@ -224,7 +224,21 @@ try {
 
   say("flash to the twin, its signals, and where its model fails before and after");
   await page.getByRole("tab", { name: "Drive" }).click();
+  // What was asked before it was connected is answered last: the page must not believe it.
+  let early = true, late = () => undefined;
+  const connected = new Promise((done) => { late = done; });
+  await page.route("**/api/drive*", async (route) => {
+    const isFirst = early;
+    early = false;
+    const answer = await route.fetch();
+    if (isFirst) await connected;
+    await route.fulfill({ response: answer });
+  });
   await page.locator(`[data-connect="${drive}"]`).click();
+  await page.waitForSelector("[data-flash]");
+  late();
+  await idle(page);
+  await page.unroute("**/api/drive*");
   await until(page, () => Number(document.querySelector(".live")?.dataset.samples) > 20);
   await page.getByRole("button", { name: "Residual map" }).click();
   await page.waitForSelector("[data-map=too_little_data]");

@@ -55,12 +55,14 @@ export class ClosedPart {
   }
 
   private async fetch(runs: ClosedRun[], key: string): Promise<void> {
+    let traces: Traces[];
     try {
-      this.traces = await get<Traces[]>("closed_loop");
+      traces = await get<Traces[]>("closed_loop");
     } catch {
       return;  // gone with the session: the table alone stays
     }
     if (key !== this.shown) return;
+    this.traces = traces;
     const time = unpack(this.traces[0]?.time ?? { offset: 0, scale: 0, count: 0, codes: "" });
     // Runs are thinned by themselves: each has its own times.
     this.figure.holder.setAttribute("aria-label", "Error of the output position over time, without compensation and with each model");

@@ -26,6 +26,8 @@ export class DrivePart {
   private next = 0;
   private timer = 0;
   private working = false;
+  private asked = 0;
+  private state: State | null = null;
 
   constructor(private readonly run: (what: string, more?: Record<string, unknown>) => void) {
     this.map = new MapPart(run);
@@ -34,6 +36,7 @@ export class DrivePart {
   }
 
   render(state: State): void {
+    this.state = state;
     const working = state.work !== null;
     if (!this.status || this.working !== working) void this.refresh(state);
     this.working = working;
@@ -41,10 +44,15 @@ export class DrivePart {
     if (this.visible && !this.timer) this.listen();
   }
 
+  // Of two answers that are on their way the one that was asked for last holds, whichever comes first.
   private async refresh(state: State): Promise<void> {
+    const asked = ++this.asked;
     try {
-      this.status = await get<Status>("drive");
+      const status = await get<Status>("drive");
+      if (asked !== this.asked) return;
+      this.status = status;
     } catch (error) {
+      if (asked !== this.asked) return;
       this.status = null;
       fill(this.head, el("p", { class: "empty" }, (error as Error).message));
       return;
@@ -83,6 +91,8 @@ export class DrivePart {
       try {
         const answer = await get<Live>("live", { since: this.next });
         if (answer.connected) this.take(answer);
+        // A drive that went away while nobody did anything.
+        if (this.state && this.status && answer.connected !== this.status.status.connected) await this.refresh(this.state);
       } catch { /* said elsewhere */ }
       this.timer = window.setTimeout(() => void round(), 200);
     };

@@ -75,6 +75,7 @@ export class Where {
         this.draw();
       }
     } catch (error) {
+      if (key !== this.key) return;
       this.problem = (error as Error).message;
       this.draw();
     }
