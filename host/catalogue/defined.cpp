@@ -65,12 +65,19 @@ Along<N> with_stated(const Along<N>& base, const std::vector<double>& stated) {
   return functions;
 }
 
+// The signals that hold a balance's direction.
+unsigned motion_on(Balance balance) {
+  return balance == Balance::motor  ? effects::kMotorMotion
+         : balance == Balance::load ? effects::kOutputMotion
+                                    : effects::kTorsion;
+}
+
 void make_table(Made& made) {
   const Definition& d = made.definition;
   const Entry& base = *find_made_by_user(kTableEffect);
   const effects::VariableInfo& variable = *find_variable(d.variable);
   made.info = *base.info;
-  made.info.reads = variable.reads | (d.times_direction ? unsigned{effects::kMotorMotion} : 0U);
+  made.info.reads = variable.reads | (d.times_direction ? motion_on(balance_named(d.balance)) : 0U);
   made.equation = fmt::format("f({}){}", d.variable, d.times_direction ? " s(w)" : "");
   made.info.shows_over = variable.name;
   made.entry.label = fmt::format("{}:{}{}", kTableEffect, d.variable, d.times_direction ? "*direction" : "");

@@ -2,35 +2,17 @@
 
 #include <algorithm>
 #include <cmath>
-#include <numbers>
 
 #include "host/catalogue/constants.hpp"
 #include "host/catalogue/defined.hpp"
+#include "host/catalogue/settled.hpp"
 
 namespace flexspline::deployment {
 namespace {
 
 using catalogue::Real;
 
-// Memory of friction has settled after a turn; a step of it is short beside presliding.
-constexpr int kStepsATurn = 4096;
 constexpr double kCreepShare = 1e-6;  // of rated velocity
-
-// Motor's torque of one effect after a turn of creeping one way, at the angle where it began.
-double creeping_torque(catalogue::Instance& effect, bool has_state, effects::Inputs<Real> in) {
-  const double turn = std::copysign(2.0 * std::numbers::pi, in.velocity);
-  in.elapsed = turn / kStepsATurn / in.velocity;
-  for (int k = 1; k <= kStepsATurn && has_state; ++k) {
-    effects::Inputs<Real> now = in;
-    now.angle = turn * k / kStepsATurn;
-    effect.advance(now, in);
-    in = now;
-  }
-  in.angle = 0.0;
-  effects::Torques<Real> torques{};
-  effect.evaluate(in, torques);
-  return torques.motor;
-}
 
 }  // namespace
 
@@ -70,7 +52,7 @@ double torque_held_by_friction(const model::Model& model) {
         in.torque = in.torque_magnitude = load;
         in.temperature = drive.reference_temperature;
         in.viscous_scale = in.coulomb_scale = 1.0;
-        held += way * creeping_torque(*entry.make(values.data(), drive), entry.has_state, in);
+        held += way * catalogue::settled_torques(*entry.make(values.data(), drive), entry.has_state, in).motor;
       }
     }
     most = std::max(most, held);

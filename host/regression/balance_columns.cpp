@@ -1,7 +1,6 @@
 // Columns of a balance: what the parameters of effects add to it.
 #include <fmt/format.h>
 
-#include <array>
 #include <functional>
 
 #include "host/regression/along_rows.hpp"
@@ -84,28 +83,21 @@ unsigned reads_of(const Terms& terms, const Term& term) {
   return term.entry->info->reads;
 }
 
-// A term's torque at parameters that stay, along stretches of records.
-template <class N>
-struct TorqueOfTerm {
-  const Term* term = nullptr;
-  std::vector<typename N::Parameter> natural;
-  DriveConstants<typename N::Parameter> constants;
-
-  void add(const std::array<double, kBalances>& shares, std::span<const effects::Inputs<Real>> inputs,
-           std::span<typename N::Value> torque) const {
-    for (const Balance to : {Balance::motor, Balance::transmission, Balance::load}) {
-      const double weight = term->entry->adds_to(to) ? shares[index(to)] : 0.0;
-      if (weight == 0.0) continue;
-      if (weight == 1.0) {
-        along<N>(*term->entry).torque_of_plain(natural.data(), constants, to, inputs, torque.data());
-        continue;
-      }
-      std::array<typename N::Value, catalogue::PlainInputs::kStretch> through{};
-      along<N>(*term->entry).torque_of_plain(natural.data(), constants, to, inputs, through.data());
-      for (std::size_t k = 0; k < torque.size(); ++k) torque[k] += through[k] * weight;
+// Calls add(balance, sum) for each balance that the term acts on, and weighs what comes of it by share(balance).
+template <class V, class Share, class Add>
+void add_by_shares(const Term& term, Share share, std::span<V> torque, Add add) {
+  for (const Balance to : {Balance::motor, Balance::transmission, Balance::load}) {
+    const double weight = term.entry->adds_to(to) ? share(to) : 0.0;
+    if (weight == 0.0) continue;
+    if (weight == 1.0) {
+      add(to, torque.data());
+      continue;
     }
+    std::vector<V> through(torque.size(), V(0.0));
+    add(to, through.data());
+    for (std::size_t k = 0; k < torque.size(); ++k) torque[k] += through[k] * weight;
   }
-};
+}
 
 }  // namespace
 
@@ -149,24 +141,14 @@ void BalanceData::add_torque(const Terms& terms, const Term& term, const std::ve
   std::vector<effects::Inputs<N>> changed;
   const bool any = change_inputs<N>(terms, term, r, all_values, changed);
   const std::vector<P> natural = catalogue::natural(*term.entry, values);
-  for (const Balance to : {Balance::motor, Balance::transmission, Balance::load}) {
-    const double weight = term.entry->adds_to(to) ? share(r, to) : 0.0;
-    if (weight == 0.0) continue;
-    const auto add = [&](typename N::Value* sum) {
-      const catalogue::Along<N>& functions = along<N>(*term.entry);
-      if (any)
-        functions.torque(natural.data(), constants, to, changed, sum);
-      else
-        functions.torque_of_plain(natural.data(), constants, to, r.inputs.all(term.entry->info->reads), sum);
-    };
-    if (weight == 1.0) {
-      add(torque.data());
-      continue;
-    }
-    std::vector<typename N::Value> through(torque.size(), typename N::Value(0.0));
-    add(through.data());
-    for (std::size_t k = 0; k < torque.size(); ++k) torque[k] += through[k] * weight;
-  }
+  const auto share_of = [&](Balance to) { return share(r, to); };
+  add_by_shares(term, share_of, torque, [&](Balance to, typename N::Value* sum) {
+    const catalogue::Along<N>& functions = along<N>(*term.entry);
+    if (any)
+      functions.torque(natural.data(), constants, to, changed, sum);
+    else
+      functions.torque_of_plain(natural.data(), constants, to, r.inputs.all(term.entry->info->reads), sum);
+  });
 }
 
 namespace {
@@ -210,18 +192,14 @@ void BalanceData::make_columns(const Terms& terms, const std::vector<Slot>& slot
     wanted = missing();
   }
   const auto all = values_of_all(terms);
-  std::vector<TorqueOfTerm<Real>> torques;
-  std::vector<std::vector<double>> values;
+  std::vector<std::vector<double>> values, natural;
   std::vector<unsigned> reads;
   for (const Slot& slot : wanted) {
     const Term& term = terms[slot.term];
     values.push_back(unit_values(term, slot.parameter));
-    torques.push_back({&term, catalogue::natural(*term.entry, values.back()), prepared_->constants});
+    natural.push_back(catalogue::natural(*term.entry, values.back()));
     reads.push_back(term.adds_torque() ? reads_of(terms, term) : 0);
   }
-  std::vector<std::array<double, kBalances>> shares;
-  for (const Record& r : prepared_->records)
-    shares.push_back({share(r, Balance::motor), share(r, Balance::transmission), share(r, Balance::load)});
   struct Fill {
     const std::vector<unsigned>* of;
     std::function<void(const RowRange&, std::size_t, const ColumnStretch&)> work;
@@ -237,7 +215,12 @@ void BalanceData::make_columns(const Terms& terms, const std::vector<Slot>& slot
                                        if (reads[j] == kWhole)
                                          add_torque<Real>(terms, term, values[j], r, all, stretch.signal);
                                        else if (term.adds_torque())
-                                         torques[j].add(shares[range.record], stretch.inputs, stretch.signal);
+                                         add_by_shares(
+                                             term, [&](Balance to) { return share(r, to); }, stretch.signal,
+                                             [&](Balance to, double* sum) {
+                                               term.entry->real.torque_of_plain(natural[j].data(), prepared_->constants,
+                                                                                to, stretch.inputs, sum);
+                                             });
                                      }});
   for (std::size_t j = 0; j < wanted.size(); ++j)
     cache_.insert_or_assign(key_of(terms, wanted[j]), made.col(static_cast<Eigen::Index>(j)));

@@ -2,6 +2,7 @@
 #include <cmath>
 #include <nlohmann/json.hpp>
 
+#include "host/catalogue/settled.hpp"
 #include "host/comparison/row_variables.hpp"
 #include "host/output/json.hpp"
 #include "host/regression/least_squares.hpp"
@@ -18,7 +19,8 @@ using regression::Balance;
 constexpr std::size_t kBinsOfADirection = 30;
 constexpr double kFewestInBin = 8.0;
 
-// Torque on the motor of an effect in steady motion of a loaded drive, once its memory has settled.
+// Torque on the motor of an effect in steady motion of a loaded drive, once its memory has settled. The angle is the
+// same in all: what follows it is no friction.
 double steady_torque(const regression::Term& term, const View& view, double velocity) {
   const std::vector<double> values = catalogue::natural(*term.entry, term.values);
   const auto instance = term.entry->make(values.data(), view.prepared.constants);
@@ -32,20 +34,7 @@ double steady_torque(const regression::Term& term, const View& view, double velo
   in.current = 1.0;
   in.temperature = view.prepared.constants.reference_temperature;
   in.viscous_scale = in.coulomb_scale = 1.0;
-  in.elapsed = 0.01;
-  effects::Torques<catalogue::Real> torques{};
-  constexpr int kSteps = 1000;
-  const double travel = velocity * in.elapsed;
-  for (int k = 1; k <= kSteps && term.entry->has_state; ++k) {
-    effects::Inputs<catalogue::Real> now = in;
-    now.angle = in.angle + travel;
-    now.output_angle = now.angle / gear;
-    instance->advance(now, in);
-    in = now;
-  }
-  // The angle is the same in all: what follows it is no friction.
-  in.angle = in.output_angle = 0.0;
-  instance->evaluate(in, torques);
+  const effects::Torques<catalogue::Real> torques = catalogue::settled_torques(*instance, term.entry->has_state, in);
   return torques.motor + (view.prepared.torque_measured ? 0.0 : torques.load / gear);
 }
 

@@ -20,7 +20,6 @@ void both_passes(const std::vector<double>& a1, const std::vector<double>& a2, d
   const std::size_t pad = std::min(n - 1, pad_length);
   Cascade<Order, V> cascade(a1, a2, gain);
 
-  // Everything is relative to the first sample, so that a constant is exactly zero inside.
   V origin, last;
   x.load(0, origin);
   x.load(n - 1, last);
@@ -32,44 +31,16 @@ void both_passes(const std::vector<double>& a1, const std::vector<double>& a2, d
       after.data[l][k] = (get(last, l) - x.data[l][n - 2 - k]) + (get(last, l) - get(origin, l));
   }
 
-  V value;
-  x.load(pad, value);
-  value = origin - value;
-  cascade.settle(value);
-  in_blocks(cascade, pad, [&](auto& c, std::size_t i) {
-    V v;
-    x.load(pad - i, v);
-    v = origin - v;
-    c.step(v);
-  });
-  in_blocks(cascade, n, [&](auto& c, std::size_t i) {
-    V v;
-    x.load(i, v);
-    v = v - origin;
-    c.step(v);
-    x.store(i, v);
-  });
+  begin_forward(cascade, x, pad, origin);
+  pass_forward(cascade, x, 0, n, origin);
   in_blocks(cascade, pad, [&](auto& c, std::size_t i) {
     V v;
     after.load(i, v);
     c.step(v);
     after.store(i, v);
   });
-
-  after.load(pad - 1, value);
-  cascade.settle(value);
-  in_blocks(cascade, pad, [&](auto& c, std::size_t i) {
-    V v;
-    after.load(pad - 1 - i, v);
-    c.step(v);
-  });
-  in_blocks(cascade, n, [&](auto& c, std::size_t i) {
-    V v;
-    x.load(n - 1 - i, v);
-    c.step(v);
-    v = v + origin;
-    x.store(n - 1 - i, v);
-  });
+  begin_backward(cascade, after, 0, pad);
+  pass_backward(cascade, x, n, origin);
 }
 
 template <typename V, int... Less>

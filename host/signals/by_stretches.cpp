@@ -41,26 +41,11 @@ void by_stretches(const Sections& sections, std::size_t n, std::size_t pad, std:
     for (std::size_t g = 0; g < groups; ++g) {
       const Columns<V> part = lanes(x, g), tail = lanes(after, g);
       V& origin = origins[g];
-      V value;
       if (have == 0) {
         part.load(0, origin);
-        part.load(pad, value);
-        value = origin - value;
-        forward[g].settle(value);
-        in_blocks(forward[g], pad, [&](auto& c, std::size_t i) {
-          V v;
-          part.load(pad - i, v);
-          v = origin - v;
-          c.step(v);
-        });
+        begin_forward(forward[g], part, pad, origin);
       }
-      in_blocks(forward[g], to - from, [&](auto& c, std::size_t i) {
-        V v;
-        part.load(from + i, v);
-        v = v - origin;
-        c.step(v);
-        part.store(from + i, v);
-      });
+      pass_forward(forward[g], part, from, to, origin);
       Cascade<Order, V> backward(sections.a1, sections.a2, sections.gain);
       std::size_t kept = to;
       if (end == n) {
@@ -74,30 +59,12 @@ void by_stretches(const Sections& sections, std::size_t n, std::size_t pad, std:
           c.step(v);
           tail.store(i, v);
         });
-        tail.load(pad - 1, value);
-        backward.settle(value);
-        in_blocks(backward, pad, [&](auto& c, std::size_t i) {
-          V v;
-          tail.load(pad - 1 - i, v);
-          c.step(v);
-        });
+        begin_backward(backward, tail, 0, pad);
       } else {
         kept = stretch;
-        part.load(to - 1, value);
-        backward.settle(value);
-        in_blocks(backward, to - kept, [&](auto& c, std::size_t i) {
-          V v;
-          part.load(to - 1 - i, v);
-          c.step(v);
-        });
+        begin_backward(backward, part, kept, to);
       }
-      in_blocks(backward, kept, [&](auto& c, std::size_t i) {
-        V v;
-        part.load(kept - 1 - i, v);
-        c.step(v);
-        v = v + origin;
-        part.store(kept - 1 - i, v);
-      });
+      pass_backward(backward, part, kept, origin);
     }
     work.take(first, x.block(0, 0, static_cast<Eigen::Index>(end == n ? to : stretch), columns));
     if (end == n) return;

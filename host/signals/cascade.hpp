@@ -121,6 +121,56 @@ inline void in_blocks(C& cascade, std::size_t count, Body&& body) {
   }
 }
 
+// What both passes of a zero-phase filter consist of; all of it relative to the first sample, `origin`, so that a
+// constant is exactly nought inside.
+
+// The state that `pad` samples before the signal leave behind: those after its first one, turned about it.
+template <typename C, typename V>
+void begin_forward(C& cascade, const Columns<V>& x, std::size_t pad, const V& origin) {
+  V value;
+  x.load(pad, value);
+  value = origin - value;
+  cascade.settle(value);
+  in_blocks(cascade, pad, [&](auto& c, std::size_t i) {
+    V v;
+    x.load(pad - i, v);
+    v = origin - v;
+    c.step(v);
+  });
+}
+template <typename C, typename V>
+void pass_forward(C& cascade, const Columns<V>& x, std::size_t from, std::size_t to, const V& origin) {
+  in_blocks(cascade, to - from, [&](auto& c, std::size_t i) {
+    V v;
+    x.load(from + i, v);
+    v = v - origin;
+    c.step(v);
+    x.store(from + i, v);
+  });
+}
+// The state that samples end-1 .. begin, filtered once already, leave behind.
+template <typename C, typename V>
+void begin_backward(C& cascade, const Columns<V>& after, std::size_t begin, std::size_t end) {
+  V value;
+  after.load(end - 1, value);
+  cascade.settle(value);
+  in_blocks(cascade, end - begin, [&](auto& c, std::size_t i) {
+    V v;
+    after.load(end - 1 - i, v);
+    c.step(v);
+  });
+}
+template <typename C, typename V>
+void pass_backward(C& cascade, const Columns<V>& x, std::size_t count, const V& origin) {
+  in_blocks(cascade, count, [&](auto& c, std::size_t i) {
+    V v;
+    x.load(count - 1 - i, v);
+    c.step(v);
+    v = v + origin;
+    x.store(count - 1 - i, v);
+  });
+}
+
 struct Sections {
   std::vector<double> a1, a2;
   double gain = 1.0;

@@ -19,6 +19,22 @@ inline void require(bool holds, const std::string& what) {
   std::abort();
 }
 
+// How a model begins; further effects may follow.
+inline const std::string kBeginningOfModel = R"(format = "flexspline-model/1"
+[drive]
+gear_ratio = 100
+torque_constant_nm_a = 0.05
+rated_current_a = 2
+rated_velocity_rad_s = 200
+rated_torque_nm = 40
+[[effect]]
+type = "inertia"
+parameters.inertia = 1e-4
+[[effect]]
+type = "viscous_friction"
+parameters.coefficient = 3.6e-4
+)";
+
 // In memory, where the system has such a place: targets write thousands of files a second.
 class ScratchFolder {
  public:

@@ -87,20 +87,7 @@ void read_dataset(const std::string& text) {
 
 const model::Model& some_model() {
   static const model::Model model = [] {
-    return model::parse(R"(format = "flexspline-model/1"
-[drive]
-gear_ratio = 100
-torque_constant_nm_a = 0.05
-rated_current_a = 2
-rated_velocity_rad_s = 200
-rated_torque_nm = 40
-[[effect]]
-type = "inertia"
-parameters.inertia = 1e-4
-[[effect]]
-type = "viscous_friction"
-parameters.coefficient = 3.6e-4
-[[effect]]
+    return model::parse(kBeginningOfModel + R"([[effect]]
 type = "linear_stiffness"
 parameters.stiffness = 6300
 [[effect]]

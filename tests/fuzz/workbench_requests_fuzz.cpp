@@ -30,19 +30,7 @@ constexpr const char* kToken = "0123456789abcdef0123456789abcdef";
 constexpr int kPort = 4711;
 constexpr std::size_t kMostRequests = 24;
 
-constexpr const char* kModel = R"(format = "flexspline-model/1"
-[drive]
-gear_ratio = 100
-torque_constant_nm_a = 0.05
-rated_velocity_rad_s = 200
-rated_torque_nm = 40
-[[effect]]
-type = "inertia"
-parameters.inertia = 1e-4
-[[effect]]
-type = "viscous_friction"
-parameters.coefficient = 3.6e-4
-[[effect]]
+const std::string kModel = kBeginningOfModel + R"([[effect]]
 type = "coulomb_friction"
 parameters.torque = 0.02
 )";

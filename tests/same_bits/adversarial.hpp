@@ -122,44 +122,44 @@ void add(model::DriveModel<Fixed>& model) {
   model.add<Effect>(Coefficients::template effect<Effect>());
 }
 
-inline std::uint64_t hash_of(model::DriveModel<Fixed>& model, int ticks) {
+// What tick(k, random, hash) takes, over so many of them.
+template <class Tick>
+std::uint64_t hash_over(int ticks, Tick tick) {
   Random random;
   Hash hash;
-  for (int k = 0; k < ticks; ++k) {
+  for (int k = 0; k < ticks; ++k) tick(k, random, hash);
+  return hash.value();
+}
+
+inline std::uint64_t hash_of(model::DriveModel<Fixed>& model, int ticks) {
+  return hash_over(ticks, [&](int, Random& random, Hash& hash) {
     const auto torques = model.tick(adversarial(random));
     hash.take(torques.motor.raw);
     hash.take(torques.transmission.raw);
     hash.take(torques.load.raw);
-  }
-  return hash.value();
+  });
 }
 
 inline std::uint64_t hash_of_encoder_kalman(const observers::EncoderKalman::Coefficients<Fixed>& c, int ticks) {
   using observers::EncoderKalman;
   EncoderKalman::State<Fixed> state;
-  Random random;
-  Hash hash;
-  for (int k = 0; k < ticks; ++k) {
+  return hash_over(ticks, [&](int, Random& random, Hash& hash) {
     const auto now = EncoderKalman::update<Fixed>(state, c, {random.angle()});
     hash.take(now.velocity.raw);
     hash.take(now.acceleration.raw);
     hash.take(state.position_error.raw);
-  }
-  return hash.value();
+  });
 }
 
 inline std::uint64_t hash_of_ripple_filter(const observers::RippleFilter::Coefficients<Fixed>& c, int ticks) {
   using observers::RippleFilter;
   RippleFilter::State<Fixed> state;
-  Random random;
-  Hash hash;
-  for (int k = 0; k < ticks; ++k) {
+  return hash_over(ticks, [&](int, Random& random, Hash& hash) {
     const fixed::Angle angle{random.angle()};
     hash.take(RippleFilter::update<Fixed>(state, c, angle, {{random.signal()}}).raw);
     hash.take(state.cosine.raw);
     hash.take(state.sine.raw);
-  }
-  return hash.value();
+  });
 }
 
 // Coefficients as the host derives them from parameters between a half and three halves of the usual ones.

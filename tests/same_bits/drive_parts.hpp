@@ -40,52 +40,41 @@ inline Fixed::Angle angle(Random& random) {
 inline std::uint64_t hash_of_encoder_angle(const Settings& s, int ticks) {
   using observers::EncoderAngle;
   EncoderAngle::State state;
-  Random random;
-  Hash hash;
   std::uint32_t counter = 0;
-  for (int k = 0; k < ticks; ++k) {
+  return hash_over(ticks, [&](int, Random& random, Hash& hash) {
     // Now and then a jump, else what a shaft does.
     const std::uint64_t bits = random.next();
     counter += static_cast<std::uint32_t>(static_cast<std::int32_t>(bits >> 32) >> ((bits & 7) == 0 ? 0 : 22));
     take(hash, EncoderAngle::moved(state, counter));
     take(hash, EncoderAngle::update(state, s.motor_encoder, counter));
-  }
-  return hash.value();
+  });
 }
 
 inline std::uint64_t hash_of_disturbance(const Settings& s, int ticks) {
   observers::DisturbanceObserver::State<Fixed> state;
-  Random random;
-  Hash hash;
-  for (int k = 0; k < ticks; ++k) {
+  return hash_over(ticks, [&](int, Random& random, Hash& hash) {
     const auto applied = value(random), modelled = value(random), acceleration = value(random);
     take(hash, observers::DisturbanceObserver::update<Fixed>(state, s.disturbance, Fixed::clamp(applied, two()),
                                                              Fixed::clamp(modelled, two()),
                                                              Fixed::clamp(acceleration, two())));
     take(hash, state.residual);
-  }
-  return hash.value();
+  });
 }
 
 inline std::uint64_t hash_of_torsion(const Settings& s, int ticks) {
   observers::TorsionObserver::State<Fixed> state;
-  Random random;
-  Hash hash;
-  for (int k = 0; k < ticks; ++k) {
+  return hash_over(ticks, [&](int k, Random& random, Hash& hash) {
     const auto torque = Fixed::clamp(value(random), two()), velocity = Fixed::clamp(value(random), two());
     const auto now = observers::TorsionObserver::update<Fixed>(state, s.torsion, torque, velocity, k % 16 != 0);
     take_all(hash, now.torsion, now.output_velocity, now.load);
-  }
-  return hash.value();
+  });
 }
 
 inline std::uint64_t hash_of_loops(const Settings& s, int ticks) {
   using control::Mode;
   control::Loops::State<Fixed> state;
-  Random random;
-  Hash hash;
   constexpr Mode kModes[] = {Mode::off, Mode::torque, Mode::velocity, Mode::position};
-  for (int k = 0; k < ticks; ++k) {
+  return hash_over(ticks, [&](int k, Random& random, Hash& hash) {
     // A mode for a while, seldom off.
     const std::uint32_t period = static_cast<std::uint32_t>(k) / 13;
     const Mode mode = kModes[period % 19 == 0 ? 0 : 1 + period % 3];
@@ -93,17 +82,14 @@ inline std::uint64_t hash_of_loops(const Settings& s, int ticks) {
     const auto measured = angle(random);
     const auto out = control::Loops::update<Fixed>(state, s.loops, command, measured, value(random));
     take_all(hash, out.torque, out.current, std::int64_t{out.limited}, state.integral);
-  }
-  return hash.value();
+  });
 }
 
 inline std::uint64_t hash_of_trajectory(const Settings& s, int ticks) {
   using control::Trajectory;
   Trajectory::State state;
-  Random random;
-  Hash hash;
   std::int64_t target = 0, speed = s.trajectory.velocity;
-  for (int k = 0; k < ticks; ++k) {
+  return hash_over(ticks, [&](int k, Random& random, Hash& hash) {
     if (k % 50 == 0) {
       target = random.angle() >> 16;
       speed = Trajectory::speed_of<Fixed>(s.trajectory, Fixed::magnitude(value(random)));
@@ -114,16 +100,13 @@ inline std::uint64_t hash_of_trajectory(const Settings& s, int ticks) {
     }
     const auto point = Trajectory::update<Fixed>(state, s.trajectory, target, speed);
     take_all(hash, point.position, point.velocity, point.acceleration);
-  }
-  return hash.value();
+  });
 }
 
 inline std::uint64_t hash_of_stream(const Settings& s, int ticks) {
   using control::Stream;
   Stream::State state;
-  Random random;
-  Hash hash;
-  for (int k = 0; k < ticks; ++k) {
+  return hash_over(ticks, [&](int k, Random& random, Hash& hash) {
     if (k % 20 == 0) {
       const auto position = angle(random);
       const auto velocity = value(random);
@@ -131,15 +114,12 @@ inline std::uint64_t hash_of_stream(const Settings& s, int ticks) {
     }
     const auto point = Stream::update<Fixed>(state, s.trajectory);
     take_all(hash, point.position, point.velocity, point.acceleration);
-  }
-  return hash.value();
+  });
 }
 
 inline std::uint64_t hash_of_feedforward(const Settings& s, model::DriveModel<Fixed>& model, int ticks) {
   control::Feedforward::State<Fixed> state;
-  Random random;
-  Hash hash;
-  for (int k = 0; k < ticks; ++k) {
+  return hash_over(ticks, [&](int, Random& random, Hash& hash) {
     const auto position = angle(random);
     const auto velocity = Fixed::clamp(value(random), two());
     const auto acceleration = Fixed::clamp(value(random), two());
@@ -148,8 +128,7 @@ inline std::uint64_t hash_of_feedforward(const Settings& s, model::DriveModel<Fi
     const auto out = control::Feedforward::update<Fixed>(
         state, s.feedforward, model, {position, velocity, acceleration}, {at, temperature, value(random)});
     take_all(hash, out.torque, out.lead, out.velocity);
-  }
-  return hash.value();
+  });
 }
 
 inline std::uint64_t hash_of_excitation(control::Excitation::Coefficients<Fixed> c, int ticks) {
@@ -190,13 +169,10 @@ inline std::uint64_t hash_of_residual_map(const Settings& s, int ticks) {
 inline std::uint64_t hash_of_current_loop(int ticks) {
   control::CurrentLoop loop;
   const control::CurrentLoopSetup setup{.proportional = 900, .integral = 450, .limit = 30'000};
-  Random random;
-  Hash hash;
-  for (int k = 0; k < ticks; ++k) {
+  return hash_over(ticks, [&](int, Random& random, Hash& hash) {
     const auto wanted = static_cast<std::int16_t>(random.signal() >> 16);
     take(hash, loop.update(setup, wanted, static_cast<std::int16_t>(random.signal() >> 16)));
-  }
-  return hash.value();
+  });
 }
 
 // A drive without an encoder at its output, with a torque sensor and an excitation: all sections but the output

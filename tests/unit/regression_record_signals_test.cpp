@@ -6,8 +6,9 @@
 #include <cmath>
 #include <cstring>
 #include <limits>
-#include <random>
+#include <numbers>
 
+#include "host/catalogue/defined.hpp"
 #include "host/signals/differentiate.hpp"
 
 namespace flexspline::regression {
@@ -93,27 +94,58 @@ TEST(RecordSignals, EveryFewSamplesKeepTheDerivativesOfAll) {
   EXPECT_EQ(few.size(), at);
 }
 
-// A record makes only the signals that an effect states; what it does not state may hold anything.
+// What an effect adds to a balance, of all signals, is the same where those that it does not state hold nothing.
+void expect_reads_what_it_states(const catalogue::Entry& entry, const std::vector<double>& parameters) {
+  constexpr std::size_t kSamples = 200;
+  RecordSignals s = two_segments(kSamples);
+  s.current = ScaledSignal(std::vector<double>(kSamples, 1.3));
+  s.temperature.assign(kSamples, 41.0);
+  for (const effects::Balance balance :
+       {effects::Balance::motor, effects::Balance::transmission, effects::Balance::load}) {
+    std::vector<Inputs> stated(kSamples);
+    for (Inputs& in : stated)
+      for (double *x = &in.angle, *end = x + sizeof(Inputs) / sizeof(double); x < end; ++x)
+        *x = std::numeric_limits<double>::quiet_NaN();
+    s.copy(0, stated, entry.info->reads);
+    std::vector<double> of_stated(kSamples, 0.0), of_all(kSamples, 0.0);
+    entry.real.torque_of_plain(parameters.data(), {}, balance, stated, of_stated.data());
+    entry.real.torque_of_plain(parameters.data(), {}, balance, s.all(), of_all.data());
+    for (std::size_t k = 0; k < kSamples; ++k)
+      ASSERT_EQ(of_stated[k], of_all[k]) << entry.name() << " " << entry.label << ", sample " << k;
+  }
+}
+
 TEST(RecordSignals, EffectsReadNoSignalThatTheyDoNotState) {
-  RecordSignals s = two_segments(200);
-  s.current = ScaledSignal(std::vector<double>(200, 1.3));
-  s.temperature.assign(200, 41.0);
-  const double nothing = std::numeric_limits<double>::quiet_NaN();
   for (const catalogue::Entry& entry : catalogue::all()) {
     if (!entry.adds_torque()) continue;
     std::vector<double> parameters;
     for (const auto& p : entry.parameters) parameters.push_back(p.usual == 0.0 ? 0.5 : p.usual);
-    for (const effects::Balance balance :
-         {effects::Balance::motor, effects::Balance::transmission, effects::Balance::load}) {
-      std::vector<Inputs> stated(200);
-      for (Inputs& in : stated)
-        for (double *x = &in.angle, *end = x + sizeof(Inputs) / sizeof(double); x < end; ++x) *x = nothing;
-      s.copy(0, stated, entry.info->reads);
-      std::vector<double> of_stated(200, 0.0), of_all(200, 0.0);
-      entry.real.torque_of_plain(parameters.data(), {}, balance, stated, of_stated.data());
-      entry.real.torque_of_plain(parameters.data(), {}, balance, s.all(), of_all.data());
-      for (std::size_t k = 0; k < 200; ++k) ASSERT_EQ(of_stated[k], of_all[k]) << entry.name() << ", sample " << k;
-    }
+    expect_reads_what_it_states(entry, parameters);
+  }
+}
+
+TEST(RecordSignals, TablesReadTheirVariableAndTheDirectionOfTheirBalance) {
+  for (const effects::VariableInfo& variable : effects::kVariables)
+    for (const char* balance : {"motor", "transmission", "load"})
+      for (const bool times_direction : {false, true}) {
+        model::Effect effect{"table_effect", "table", {}, model::Definition{}};
+        effect.definition->variable = variable.name;
+        effect.definition->balance = balance;
+        effect.definition->times_direction = times_direction;
+        const double turn = 2.0 * std::numbers::pi;
+        effect.definition->table.at = {0.0, 0.25 * turn, 0.5 * turn, 0.75 * turn};
+        effect.definition->table.value = {1.0, 2.0, 4.0, 3.0};
+        expect_reads_what_it_states(catalogue::entry_of(effect), {});
+      }
+}
+
+TEST(RecordSignals, FormulasReadWhatTheyName) {
+  for (const char* formula : {"direction*abs(torsion)", "velocity*output_direction", "torsion_direction + temperature",
+                              "sin(motor_angle)*current", "torque_magnitude*speed*sin(output_angle)"}) {
+    model::Effect effect{"expression_effect", "formula", {}, model::Definition{}};
+    effect.definition->balance = "motor";
+    effect.definition->formula = formula;
+    expect_reads_what_it_states(catalogue::entry_of(effect), {});
   }
 }
 
