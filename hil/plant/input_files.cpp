@@ -216,7 +216,20 @@ Effect read_effect(const toml::table& table, std::string_view origin) {
   return effect;
 }
 
-ExperimentPlan read_experiment(const toml::table& table, std::string_view origin) {
+// Half a day at a thousand samples a second: what is longer was meant in another unit.
+constexpr double kMostSamples = 5e7;
+
+void read_duration(Section& section, const toml::table& table, const Drive& drive, ExperimentPlan& plan) {
+  section.positive("duration_s", plan.duration_s);
+  if (plan.duration_s > kMostSamples * drive.sample_s)
+    section.fail(
+        table.get("duration_s"),
+        fmt::format("duration_s is {:g}, with a sample each {:g} s more than {:g} samples; make it shorter, or "
+                    "several runs of it",
+                    plan.duration_s, drive.sample_s, kMostSamples));
+}
+
+ExperimentPlan read_experiment(const toml::table& table, std::string_view origin, const Drive& drive) {
   ExperimentPlan plan;
   Section section(table, origin, "[[experiment]]");
   section.text("name", plan.name, true);
@@ -234,7 +247,7 @@ ExperimentPlan read_experiment(const toml::table& table, std::string_view origin
                   {"composite", Waveform::composite}});
   section.number("amplitude", plan.amplitude);
   section.not_negative("frequency_hz", plan.frequency_hz);
-  section.positive("duration_s", plan.duration_s);
+  read_duration(section, table, drive, plan);
   section.flag("locked", plan.locked);
   section.choice("role", plan.holdout, {{"fit", false}, {"holdout", true}});
   section.number("temperature_c", plan.temperature_c);
@@ -284,7 +297,7 @@ ExperimentPlan read_run(const toml::table& table, std::string_view origin, const
   section.not_negative("frequency_hz", plan.frequency_hz);
   section.number("end_frequency_hz", plan.end_frequency_hz);
   section.not_negative("slope_limit", plan.slope_limit);
-  section.positive("duration_s", plan.duration_s);
+  read_duration(section, table, drive, plan);
   section.choice("load", plan.locked, {{"free", false}, {"locked", true}});
   section.number("load_torque_nm", plan.load_torque_nm);
   section.number("temperature_c", plan.temperature_c);
@@ -353,7 +366,7 @@ PlantFile parse_plant(std::string_view text, std::string_view origin) {
   for_each_table(root, "effect", origin,
                  [&](const toml::table& t) { drive.effects.push_back(read_effect(t, origin)); });
   for_each_table(root, "experiment", origin,
-                 [&](const toml::table& t) { plant.experiments.push_back(read_experiment(t, origin)); });
+                 [&](const toml::table& t) { plant.experiments.push_back(read_experiment(t, origin, drive)); });
   return plant;
 }
 

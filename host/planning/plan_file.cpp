@@ -128,7 +128,10 @@ std::vector<Line> lines_of(Section& section) {
   return lines;
 }
 
-Run run_of(const Node& node, std::string_view origin) {
+// Half a day at a thousand samples a second: what is longer was meant in another unit.
+constexpr double kMostSamples = 5e7;
+
+Run run_of(const Node& node, std::string_view origin, double sample_s) {
   Section section(node, origin, "[[run]]");
   Run run;
   run.name = section.text("name");
@@ -144,6 +147,10 @@ Run run_of(const Node& node, std::string_view origin) {
   run.slope_limit = section.number("slope_limit");
   run.duration_s = section.number("duration_s", run.duration_s, 0.0);
   if (!(run.duration_s > 0.0)) section.fail(node.line, "duration_s must be positive");
+  if (run.duration_s > kMostSamples * sample_s)
+    section.fail(node.line, fmt::format("duration_s is {:g}, with a sample each {:g} s more than {:g} samples; make it "
+                                        "shorter, or several runs of it",
+                                        run.duration_s, sample_s, kMostSamples));
   if (run.slope_limit && !(*run.slope_limit > 0.0)) section.fail(node.line, "slope_limit must be positive");
   constexpr std::pair<std::string_view, bool> kLoads[] = {{"free", false}, {"locked", true}};
   run.locked = section.choice("load", kLoads, false);
@@ -235,7 +242,7 @@ Plan parse(const std::string& text, std::string_view origin) {
     section.done();
   }
   if (const Node* runs = top.find("run", NodeKind::array, "written as [[run]]"))
-    for (const Node& run : runs->items) plan.runs.push_back(run_of(run, origin));
+    for (const Node& run : runs->items) plan.runs.push_back(run_of(run, origin, plan.sample_s));
   top.done();
   return plan;
 }

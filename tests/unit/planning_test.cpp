@@ -73,6 +73,7 @@ TEST(Plan, SaysWhereAFileIsWrong) {
   EXPECT_NE(error_of(head + "waveform = \"multi_sine\"\n").find("needs lines"), std::string::npos);
   EXPECT_NE(error_of("format = \"flexspline-plan/2\"\n").find("format must be"), std::string::npos);
   EXPECT_NE(error_of(head + "duration_s = -1.0\n").find("duration_s"), std::string::npos);
+  EXPECT_NE(error_of(head + "duration_s = 1e15\n").find("more than 5e+07 samples"), std::string::npos);
 }
 
 // The plant reads plans and makes their waveforms by itself.

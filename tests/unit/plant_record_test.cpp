@@ -69,6 +69,23 @@ TEST(PlantFile, ErrorsNameLineKeyAndCause) {
   EXPECT_THROW(load_plant("/no/such/plant.toml"), std::runtime_error);
 }
 
+TEST(PlantFile, ARunThatIsFarTooLongIsRefusedWithItsPlace) {
+  const auto file = std::filesystem::temp_directory_path() / "flexspline-too-long.toml";
+  std::ofstream(file)
+      << "format = \"flexspline-plan/1\"\nsample_s = 0.001\n[[run]]\nname = \"a\"\nmode = \"velocity\"\n"
+         "waveform = \"sine\"\namplitude = 10\nfrequency_hz = 1\nduration_s = 1e15\n";
+  Drive drive = demo_plant().drive;
+  try {
+    load_plan(file, drive);
+    FAIL() << "a run of a thousand years passed";
+  } catch (const std::runtime_error& error) {
+    const std::string what = error.what();
+    EXPECT_NE(what.find("too-long.toml:9: [[run]]: duration_s is 1e+15"), std::string::npos) << what;
+    EXPECT_NE(what.find("make it shorter"), std::string::npos) << what;
+  }
+  std::filesystem::remove(file);
+}
+
 TEST(PlantFile, HidingScalesTheTorqueAndTakesAnyOrder) {
   Drive drive = demo_plant().drive;
   hide(drive, "torque_ripple:12", 0.5);
