@@ -1,7 +1,9 @@
 // Prints the hashes of a million ticks, to be compared between compilers and levels of optimisation. `few`: those of
 // few ticks, as machines in QEMU give them. `block`: the coefficients as a parameter block, a C++ array, for those
-// machines, which then need no floating point.
+// machines, which then need no floating point. `drawn SEED BLOCKS`: a thousand ticks of all effects with each of so
+// many blocks of drawn coefficients.
 #include <cstdio>
+#include <cstdlib>
 #include <string>
 #include <string_view>
 
@@ -43,6 +45,12 @@ int main(int argc, char** argv) {
   const std::string_view what = argc > 1 ? argv[1] : "";
   if (what == "block") {
     print_block();
+    return 0;
+  }
+  if (what == "drawn" && argc == 4) {
+    same_bits::Drawn::random.skip(std::strtoul(argv[2], nullptr, 10));
+    std::printf("%016llx\n", static_cast<unsigned long long>(same_bits::hash_of_drawn_blocks(
+                                 static_cast<int>(std::strtol(argv[3], nullptr, 10)), 1'000)));
     return 0;
   }
   const bool few = what == "few";

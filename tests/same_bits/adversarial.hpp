@@ -47,6 +47,11 @@ class Random {
     const std::uint64_t bits = next();
     return static_cast<std::int64_t>(bits) >> ((next() >> 8) & 63);
   }
+  // To another sequence.
+  void skip(std::uint64_t seed) {
+    state_ ^= 0x9E3779B97F4A7C15U * seed;
+    next();
+  }
 
  private:
   std::uint64_t state_ = 88172645463325252;
@@ -124,20 +129,20 @@ void add(model::DriveModel<Fixed>& model) {
 
 // What tick(k, random, hash) takes, over so many of them.
 template <class Tick>
-std::uint64_t hash_over(int ticks, Tick tick) {
-  Random random;
+std::uint64_t hash_over(int ticks, Tick tick, Random random = {}) {
   Hash hash;
   for (int k = 0; k < ticks; ++k) tick(k, random, hash);
   return hash.value();
 }
 
-inline std::uint64_t hash_of(model::DriveModel<Fixed>& model, int ticks) {
-  return hash_over(ticks, [&](int, Random& random, Hash& hash) {
+inline std::uint64_t hash_of(model::DriveModel<Fixed>& model, int ticks, const Random& inputs = {}) {
+  const auto tick = [&](int, Random& random, Hash& hash) {
     const auto torques = model.tick(adversarial(random));
     hash.take(torques.motor.raw);
     hash.take(torques.transmission.raw);
     hash.take(torques.load.raw);
-  });
+  };
+  return hash_over(ticks, tick, inputs);
 }
 
 inline std::uint64_t hash_of_encoder_kalman(const observers::EncoderKalman::Coefficients<Fixed>& c, int ticks) {
@@ -190,7 +195,7 @@ inline std::uint64_t hash_of_drawn_blocks(int blocks, int ticks) {
     effects::for_each_effect([&]<class Effect>(std::size_t) {
       if constexpr (!Effect::kInfo.host_only) add<Drawn, Effect>(model);
     });
-    hash.take(static_cast<std::int64_t>(hash_of(model, ticks)));
+    hash.take(static_cast<std::int64_t>(hash_of(model, ticks, Drawn::random)));
   }
   return hash.value();
 }

@@ -1,6 +1,7 @@
 #!/usr/bin/env bash
-# bits.sh BUILD MINUTES FOLDER: drives in closed loop by two compilers, a minute of each case from seed after seed, and
-# all bits of both compared. FOLDER/seeds.txt names the seeds that were the same; a next run goes on behind them.
+# bits.sh BUILD MINUTES FOLDER: seed after seed drives in closed loop by two compilers, a minute of each case, and a
+# million adversarial ticks of all effects over a thousand drawn blocks by each compiler at two levels of optimisation;
+# all bits compared. FOLDER/seeds.txt names the seeds that were the same; a next run goes on behind them.
 set -euo pipefail
 build=$1 minutes=$2 folder=$3
 seconds=60
@@ -20,9 +21,20 @@ while (($(date +%s) < end)); do
     exit 1
   fi
   rm "$folder/differs-$seed.txt"
+  for level in g++-O0 g++-O3 clang++-O0 clang++-O3; do
+    "$build/tests/same_bits/adversarial-$level" drawn $seed 1000
+  done >"$folder/drawn.txt"
+  if (($(sort -u "$folder/drawn.txt" | wc -l) != 1)); then
+    echo "bits: the drawn blocks of seed $seed differ between g++ -O0, -O3, clang++ -O0, -O3:" >&2
+    cat "$folder/drawn.txt" >&2
+    exit 1
+  fi
   echo "$seed $(grep -c telemetry "$folder/one.txt")" >>"$folder/seeds.txt"
 done
 awk -v seconds=$seconds '
   { runs += $2 }
-  END { printf "bits: %d seeds, %d runs, %.2f hours in closed loop: the same bits by g++ and clang++\n", NR, runs, runs * seconds / 3600 }
+  END {
+    printf "bits: %d seeds, %d runs, %.2f hours in closed loop: the same bits by g++ and clang++\n", NR, runs, runs * seconds / 3600
+    printf "bits: %g adversarial ticks over %d drawn blocks: the same by both at -O0 and -O3\n", 1e6 * NR, 1000 * NR
+  }
 ' "$folder/seeds.txt"
