@@ -87,7 +87,7 @@ void read_dataset(const std::string& text) {
 
 const model::Model& some_model() {
   static const model::Model model = [] {
-    return model::parse(kBeginningOfModel + R"([[effect]]
+    return model::parse(tests::kBeginningOfModel + R"([[effect]]
 type = "linear_stiffness"
 parameters.stiffness = 6300
 [[effect]]

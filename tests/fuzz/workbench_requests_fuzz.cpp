@@ -30,7 +30,7 @@ constexpr const char* kToken = "0123456789abcdef0123456789abcdef";
 constexpr int kPort = 4711;
 constexpr std::size_t kMostRequests = 24;
 
-const std::string kModel = kBeginningOfModel + R"([[effect]]
+const std::string kModel = tests::kBeginningOfModel + R"([[effect]]
 type = "coulomb_friction"
 parameters.torque = 0.02
 )";
