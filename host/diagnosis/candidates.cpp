@@ -96,10 +96,11 @@ bool visible(const BalanceData& data, const Terms& terms, const catalogue::Entry
 }
 
 // Orders of an effect that the residual holds most of, by its waves at the rows alone: without the filter, which costs
-// far more than it could change in the ranking of neighbours.
-std::vector<double> likely_orders(const BalanceData& data, const catalogue::Entry& entry,
-                                  const Eigen::VectorXd& residual) {
+// far more than it could change in the ranking of neighbours. Where the motor hardly turns, the waves of all orders
+// look like the offset that the model may have, so that only what it has not counts.
+std::vector<double> likely_orders(const BalanceData& data, const catalogue::Entry& entry, const Unexplained& left) {
   constexpr std::size_t kTried = 3;
+  constexpr double kAsGood = 0.9;
   std::vector<std::pair<double, double>> found;  // minus the fall, order
   std::vector<effects::Inputs<catalogue::Real>> rows;
   for (const auto& range : data.records()) {
@@ -110,7 +111,7 @@ std::vector<double> likely_orders(const BalanceData& data, const catalogue::Entr
                                                                   [](const auto& p) { return p.kind == Kind::given; }) -
                                                      entry.parameters.begin());
   for (int order = 1; order <= kHighestOrder; ++order) {
-    Eigen::MatrixXd waves(residual.size(), 0);
+    Eigen::MatrixXd waves(left.residual.size(), 0);
     for (std::size_t p = 0; p < entry.parameters.size(); ++p) {
       if (p == given) continue;
       std::vector<double> values(entry.parameters.size(), 0.0), wave(rows.size(), 0.0);
@@ -125,14 +126,20 @@ std::vector<double> likely_orders(const BalanceData& data, const catalogue::Entr
         entry.real.torque(values.data(), data.prepared().constants, data.balance(), rows, wave.data());
       }
       waves.conservativeResize(Eigen::NoChange, waves.cols() + 1);
-      waves.rightCols(1) = Eigen::Map<const Eigen::VectorXd>(wave.data(), residual.size());
+      waves.rightCols(1) =
+          left.root_weights.cwiseProduct(Eigen::Map<const Eigen::VectorXd>(wave.data(), left.residual.size()));
     }
-    const Eigen::VectorXd explained = waves * Eigen::ColPivHouseholderQR<Eigen::MatrixXd>(waves).solve(residual);
+    if (left.own.cols() > 0) waves -= left.own * (left.own.transpose() * waves);
+    const Eigen::VectorXd explained = waves * Eigen::ColPivHouseholderQR<Eigen::MatrixXd>(waves).solve(left.residual);
     found.emplace_back(-explained.squaredNorm(), order);
   }
   std::sort(found.begin(), found.end());
   std::vector<double> orders;
   for (std::size_t i = 0; i < kTried; ++i) orders.push_back(found[i].second);
+  // Where these data hardly tell orders, the one that such effects mostly have is tried, too; another balance may tell.
+  for (std::size_t i = kTried; i < found.size(); ++i)
+    if (found[i].second == entry.parameters[given].usual && found[i].first <= kAsGood * found[0].first)
+      orders.push_back(found[i].second);
   std::sort(orders.begin(), orders.end());
   return orders;
 }
@@ -169,7 +176,7 @@ bool begins_at_nought(const Term& term, std::size_t p) {
   return info.low < 0.0 && info.per.empty() && term.entry->info->phase != Phase::modulate;
 }
 
-std::vector<Proposal> proposals(const BalanceData& data, const Terms& terms, const Eigen::VectorXd& residual) {
+std::vector<Proposal> proposals(const BalanceData& data, const Terms& terms, const Unexplained& left) {
   std::vector<Proposal> list;
   const bool collapsed = !data.prepared().torque_measured && data.balance() == regression::Balance::motor;
   for (const catalogue::Entry& entry : catalogue::all()) {
@@ -182,7 +189,7 @@ std::vector<Proposal> proposals(const BalanceData& data, const Terms& terms, con
     // Orders are counted by turn: a linear axis has turns where its pitch is known.
     const bool turns = data.prepared().rotary || data.prepared().constants.turn_angle_scale != 1.0;
     if (ordered && !turns) continue;
-    const std::vector<double> orders = ordered ? likely_orders(data, entry, residual) : std::vector<double>{0.0};
+    const std::vector<double> orders = ordered ? likely_orders(data, entry, left) : std::vector<double>{0.0};
     for (const double order : orders) {
       Proposal proposal;
       proposal.entry = &entry;

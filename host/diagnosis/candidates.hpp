@@ -1,6 +1,7 @@
 // Effects of the catalogue that a model does not have and the data could show.
 #pragma once
 
+#include <Eigen/Core>
 #include <optional>
 #include <string>
 #include <vector>
@@ -17,10 +18,17 @@ struct Proposal {
   double added = 0.0;          // parameters more than before
 };
 
+// What a model leaves, one a row over the row's noise, and the directions in which its own parameters can move that.
+struct Unexplained {
+  Eigen::VectorXd residual;
+  Eigen::VectorXd root_weights;  // the factors that put a row over its noise
+  Eigen::MatrixXd own;           // orthonormal, in the same rows; no columns: nothing is taken out
+};
+
 // All effects that may be added on this balance; shapes are in the middle of their range. Of an effect that comes in
-// orders per turn, those that the residual (one a row) shows most.
+// orders per turn, those that the residual shows most by what the model's own parameters cannot draw.
 std::vector<Proposal> proposals(const regression::BalanceData& data, const regression::Terms& terms,
-                                const Eigen::VectorXd& residual);
+                                const Unexplained& left);
 
 // A model with an effect more. Throws model::ModelError where it cannot be (what it modulates or replaces is missing,
 // or it is there already).

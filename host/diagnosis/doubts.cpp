@@ -115,11 +115,11 @@ bool surer(std::vector<Witness> witnesses, const Trial& trial) {
   return true;
 }
 
-// That an effect is there is certain where two balances say so; its order may then be taken for the common one, if none
-// of the others that were tried fits better.
+// Its own balance says that the effect is there. Where another says so, too, its order may be taken for the common one,
+// if none of the others that were tried fits better.
 bool expected(const std::vector<Trial>& trials, const Trial& trial) {
   const catalogue::Entry& entry = *trial.proposal.entry;
-  return trial.elsewhere > kNamedScore && *trial.proposal.order == entry.parameters[order_place(entry)].usual &&
+  return trial.elsewhere > kRivalMargin && *trial.proposal.order == entry.parameters[order_place(entry)].usual &&
          std::none_of(trials.begin(), trials.end(), [&](const Trial& other) {
            return other.proposal.entry == &entry && other.score() > trial.score();
          });

@@ -55,7 +55,7 @@ struct MixedFit {
   Eigen::MatrixXd u;
   Spread spread;
 };
-MixedFit fit_all(const Triangles& triangles, const std::vector<Group>& groups, double tau) {
+MixedFit fit_all(const Triangles& triangles, const std::vector<Group>& groups, Eigen::Index first_shape, double tau) {
   MixedFit fit;
   const Eigen::Index columns = triangles.columns();
   const auto solve = [&] {
@@ -68,7 +68,7 @@ MixedFit fit_all(const Triangles& triangles, const std::vector<Group>& groups, d
     for (const Eigen::MatrixXd& r : reduced) blocks.push_back(&r);
     const Eigen::MatrixXd all = stacked(blocks);
     fit.linear = regression::least_squares(all.leftCols(columns), all.col(columns), Eigen::VectorXd::Ones(all.rows()));
-    fit.u = directions(groups, fit.linear.theta);
+    fit.u = directions(groups, fit.linear.theta, triangles.size, first_shape);
   };
   solve();
   // Parameters, spread and noise settle each other.
@@ -146,17 +146,19 @@ Judged judge(BalanceData& data, Terms terms, const Eigen::VectorXd& keep) {
   Judged judged;
   const auto on_balance = regression::terms_on(terms, data.balance(), data.prepared().torque_measured);
   judged.linear = regression::free_linear_slots(terms, on_balance);
-  judged.groups = friction_groups(terms, judged.linear);
+  const std::vector<Slot> shapes = regression::free_shape_slots(terms, on_balance);
+  const auto first_shape = static_cast<Eigen::Index>(judged.linear.size());
+  judged.groups = friction_groups(terms, judged.linear, shapes);
   const Eigen::VectorXd y = data.target() - data.known_torque(terms, on_balance);
   const auto set = [&](const Eigen::VectorXd& theta) {
     for (std::size_t j = 0; j < judged.linear.size(); ++j)
       terms[judged.linear[j].term].values[judged.linear[j].parameter] = theta[static_cast<Eigen::Index>(j)];
   };
   double tau = data.filter_autocorrelation_time();
-  if (!regression::free_shape_slots(terms, on_balance).empty()) {
+  if (!shapes.empty()) {
     // Slopes by shapes need the linear parameters.
     const Triangles linear = triangles_of(data, regression::columns_of(data, terms, judged.linear), y, keep, 1);
-    set(fit_all(linear, judged.groups, tau).linear.theta.cwiseQuotient(linear.size));
+    set(fit_all(linear, judged.groups, first_shape, tau).linear.theta.cwiseQuotient(linear.size));
   }
   const Eigen::MatrixXd X = design(data, terms, judged.linear);
   const Triangles triangles = triangles_of(data, X, y, keep, kFolds);
@@ -164,7 +166,7 @@ Judged judge(BalanceData& data, Terms terms, const Eigen::VectorXd& keep) {
   judged.root_weights.resize(data.rows());
   // What deviations explain depends on how many rows count, which depends on what they leave.
   for (int round = 0; round < 2; ++round) {
-    fit = fit_all(triangles, judged.groups, tau);
+    fit = fit_all(triangles, judged.groups, first_shape, tau);
     judged.theta = fit.linear.theta.cwiseQuotient(triangles.size);
     judged.residual = y - X * judged.theta;
     for (std::size_t i = 0; i < data.records().size(); ++i) {
@@ -216,10 +218,15 @@ SmallVector spread_for(const std::vector<Group>& groups, const Judged& judged) {
 regression::Whitening whitening_of(BalanceData& data, const Judged& judged) {
   regression::Whitening whitening(judged.root_weights);
   if (judged.groups.empty() || judged.deviations.std.maxCoeff() <= 0.0) return whitening;
-  const Eigen::MatrixXd X = regression::columns_of(data, judged.terms, judged.linear);
+  const auto first_shape = static_cast<Eigen::Index>(judged.linear.size());
+  const bool stays =
+      std::any_of(judged.groups.begin(), judged.groups.end(), [](const Group& g) { return !g.stays.empty(); });
+  const Eigen::MatrixXd X =
+      stays ? design(data, judged.terms, judged.linear) : regression::columns_of(data, judged.terms, judged.linear);
   const Eigen::VectorXd theta = judged.theta.head(X.cols());
-  const Eigen::MatrixXd along = judged.root_weights.asDiagonal() * (X * directions(judged.groups, theta)) *
-                                judged.deviations.std.asDiagonal() / std::sqrt(judged.autocorrelation_time);
+  const Eigen::MatrixXd u = directions(judged.groups, theta, Eigen::VectorXd::Ones(X.cols()), first_shape);
+  const Eigen::MatrixXd along = judged.root_weights.asDiagonal() * (X * u) * judged.deviations.std.asDiagonal() /
+                                std::sqrt(judged.autocorrelation_time);
   for (const RowRange& range : data.records()) whitening.vary(range, along.middleRows(range.first, range.size()));
   return whitening;
 }
@@ -237,7 +244,7 @@ double squares_left(BalanceData& data, const Terms& terms, const Judged& judged)
   double left = 0.0;
   // The groups' torques come from a fit without deviations.
   for (int round = 0; round < 2; ++round) {
-    const Eigen::MatrixXd u = directions(groups, theta);
+    const Eigen::MatrixXd u = directions(groups, theta, triangles.size, columns);
     std::vector<Eigen::MatrixXd> reduced;
     std::vector<const Eigen::MatrixXd*> blocks;
     for (std::size_t i = 0; i < triangles.whole.size(); ++i)

@@ -2,6 +2,7 @@
 
 #include <fmt/format.h>
 
+#include <Eigen/QR>
 #include <algorithm>
 #include <cmath>
 #include <limits>
@@ -149,6 +150,17 @@ Trial best_admissible(Search& search, Proposal proposal, Trial refused) {
   return refused;
 }
 
+// Of the base model, for the choice of orders.
+Unexplained left_by(BalanceData& data, const Judged& base) {
+  Unexplained left;
+  left.root_weights = base.root_weights;
+  left.residual = base.root_weights.cwiseProduct(base.residual);
+  const Eigen::MatrixXd X = base.root_weights.asDiagonal() * regression::columns_of(data, base.terms, base.linear);
+  const Eigen::ColPivHouseholderQR<Eigen::MatrixXd> qr(X);
+  left.own = qr.householderQ() * Eigen::MatrixXd::Identity(X.rows(), qr.rank());
+  return left;
+}
+
 bool better(const Trial& a, const Trial& b) {
   if (a.admissible != b.admissible) return a.admissible;
   return a.score() > b.score();
@@ -206,7 +218,7 @@ void prefer_simple(const Judged& base, std::vector<Trial>& trials) {
 }
 
 std::vector<Trial> rank(Search& search) {
-  std::vector<Proposal> tried = proposals(*search.data, search.base.terms, search.base.residual);
+  std::vector<Proposal> tried = proposals(*search.data, search.base.terms, left_by(*search.data, search.base));
   std::vector<Trial> trials(tried.size());
   regression::Prepared few;
   BalanceData thinned = search.data->thinned(few);

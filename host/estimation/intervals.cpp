@@ -32,17 +32,16 @@ double natural(const Terms& terms, const Slot& slot) {
   return catalogue::natural(*term.entry, term.values)[slot.parameter];
 }
 
-// Fits all that is free on the balance at these weights, from where the terms stand, and returns the weighted sum of
-// squares.
+// Fits all that is free on the balance from where the terms stand, and returns the sum of squares of white errors.
 double fit_rest(BalanceData& data, Terms& terms, const std::vector<std::size_t>& on_balance,
-                const Eigen::VectorXd& root_weights) {
-  regression::refine_shapes(data, terms, on_balance, root_weights);
+                const regression::Whitening& whitening) {
+  regression::refine_shapes(data, terms, on_balance, whitening);
   const std::vector<Slot> linear = regression::free_linear_slots(terms, on_balance);
   const regression::LinearFit fit = regression::least_squares(
-      regression::columns_of(data, terms, linear), data.target() - data.known_torque(terms, on_balance), root_weights);
+      regression::columns_of(data, terms, linear), data.target() - data.known_torque(terms, on_balance), whitening);
   for (std::size_t j = 0; j < linear.size(); ++j)
     terms[linear[j].term].values[linear[j].parameter] = fit.theta[static_cast<Eigen::Index>(j)];
-  return root_weights.cwiseProduct(fit.residual).squaredNorm();
+  return (whitening * fit.residual).squaredNorm();
 }
 
 // The value of one parameter at which the sum of squares, with all others fitted, has grown by `allowed`; `side` -1
@@ -54,7 +53,7 @@ std::optional<double> end_of_profile(BalanceData& data, const Terms& best, const
   terms[slot.term].known[slot.parameter] = 1;
   const auto excess_at = [&](double value) {
     terms[slot.term].values[slot.parameter] = value;
-    return fit_rest(data, terms, fit.on_balance, fit.root_weights) - least - allowed;
+    return fit_rest(data, terms, fit.on_balance, fit.whitening) - least - allowed;
   };
   // Outward in growing steps, then by halving.
   double inside = start, outside = start;
@@ -71,7 +70,7 @@ std::optional<double> end_of_profile(BalanceData& data, const Terms& best, const
     (excess_at(middle) > 0.0 ? outside : inside) = middle;
   }
   terms[slot.term].values[slot.parameter] = 0.5 * (inside + outside);
-  fit_rest(data, terms, fit.on_balance, fit.root_weights);
+  fit_rest(data, terms, fit.on_balance, fit.whitening);
   return natural(terms, slot);
 }
 
@@ -88,7 +87,7 @@ void profile(Identification& identification, const Progress& progress) {
     const BalanceFit& fit = identification.fits[b];
     BalanceData& data = identification.data[b];
     Terms best = identification.terms;
-    const double least = fit_rest(data, best, fit.on_balance, fit.root_weights);
+    const double least = fit_rest(data, best, fit.on_balance, fit.whitening);
     const auto slots = slots_of(fit);
     const double freedom = std::max(1.0, static_cast<double>(data.rows()) - static_cast<double>(slots.size()));
     for (std::size_t j = 0; j < slots.size(); ++j) {
@@ -143,11 +142,11 @@ void bootstrap(Identification& identification, int replicates, std::uint64_t see
       if (r % 20 == 0) progress(fmt::format("bootstrap: {} of {}", r, replicates));
       std::vector<int> times(blocks.size(), 0);
       for (std::size_t k = 0; k < blocks.size(); ++k) ++times[random() % blocks.size()];
-      Eigen::VectorXd weights = fit.root_weights;
+      Eigen::VectorXd counts(data.rows());
       for (std::size_t k = 0; k < blocks.size(); ++k)
-        weights.segment(blocks[k].first, blocks[k].size()) *= std::sqrt(static_cast<double>(times[k]));
+        counts.segment(blocks[k].first, blocks[k].size()).setConstant(std::sqrt(static_cast<double>(times[k])));
       Terms terms = identification.terms;
-      fit_rest(data, terms, fit.on_balance, weights);
+      fit_rest(data, terms, fit.on_balance, fit.whitening.counted(counts));
       for (std::size_t j = 0; j < slots.size(); ++j) drawn[j].push_back(natural(terms, slots[j]));
     }
     for (std::size_t j = 0; j < slots.size(); ++j) {

@@ -56,6 +56,64 @@ static Eigen::MatrixXd columns_beside(BalanceData& data, const Terms& terms, con
   return X;
 }
 
+namespace {
+
+// A fit as it proceeds: columns and residual at the values that the terms have.
+class Fitting {
+ public:
+  Fitting(BalanceData& data, Terms& terms, BalanceFit& fit) : data_(data), terms_(terms), fit_(fit) {}
+
+  // Linear parameters at given shapes; `whitening` says what each row's error counts.
+  void solve(const Whitening& whitening) {
+    const Eigen::VectorXd target = data_.target() - data_.known_torque(terms_, fit_.on_balance);
+    const Eigen::MatrixXd X = columns_beside(data_, terms_, fit_.linear, target);
+    const LinearFit linear = least_squares(X, target, whitening);
+    for (std::size_t j = 0; j < fit_.linear.size(); ++j)
+      terms_[fit_.linear[j].term].values[fit_.linear[j].parameter] = linear.theta[static_cast<Eigen::Index>(j)];
+    fit_.residual = linear.residual;
+  }
+
+  // Columns of linear parameters and shapes.
+  Eigen::MatrixXd columns() {
+    Eigen::MatrixXd J(data_.rows(), static_cast<Eigen::Index>(fit_.linear.size() + fit_.shapes.size()));
+    J << columns_beside(data_, terms_, fit_.linear, data_.target() - data_.known_torque(terms_, fit_.on_balance)),
+        shape_columns(data_, terms_, fit_.on_balance, fit_.shapes);
+    return J;
+  }
+
+  // What a factor of each group of friction does to the torque, of `columns`.
+  Eigen::MatrixXd friction(const Eigen::MatrixXd& columns) const {
+    const std::vector<Group> groups = friction_groups(terms_, fit_.linear, fit_.shapes);
+    Eigen::MatrixXd torques = Eigen::MatrixXd::Zero(columns.rows(), static_cast<Eigen::Index>(groups.size()));
+    for (std::size_t g = 0; g < groups.size(); ++g) {
+      auto torque = torques.col(static_cast<Eigen::Index>(g));
+      for (const Eigen::Index j : groups[g].columns) {
+        const Slot& slot = fit_.linear[static_cast<std::size_t>(j)];
+        torque += terms_[slot.term].values[slot.parameter] * columns.col(j);
+      }
+      for (const Group::Stays& s : groups[g].stays)
+        torque -= s.ratio * columns.col(static_cast<Eigen::Index>(fit_.linear.size()) + s.shape);
+    }
+    return torques;
+  }
+
+ private:
+  BalanceData& data_;
+  Terms& terms_;
+  BalanceFit& fit_;
+};
+
+// Errors at these weights that records have in common by their own friction, `torques` (weighted) being its directions.
+Whitening whitening_of(const BalanceData& data, const Eigen::VectorXd& root_weights, const Eigen::MatrixXd& torques,
+                       const BetweenRecords& between) {
+  Whitening whitening(root_weights);
+  const Eigen::MatrixXd along = torques * between.std.asDiagonal() / std::sqrt(between.autocorrelation_time);
+  for (const RowRange& range : data.records()) whitening.vary(range, along.middleRows(range.first, range.size()));
+  return whitening;
+}
+
+}  // namespace
+
 BalanceFit fit_balance(BalanceData& data, Terms& terms) {
   BalanceFit fit;
   fit.balance = data.balance();
@@ -63,55 +121,60 @@ BalanceFit fit_balance(BalanceData& data, Terms& terms) {
   fit.linear = free_linear_slots(terms, fit.on_balance);
   fit.shapes = free_shape_slots(terms, fit.on_balance);
   fit.root_weights = Eigen::VectorXd::Ones(data.rows());
+  fit.whitening = fit.root_weights;
   if (data.empty()) return fit;
   settle_grids(data, terms, fit.on_balance);
-  const auto solve = [&] {
-    const Eigen::VectorXd target = data.target() - data.known_torque(terms, fit.on_balance);
-    const LinearFit linear = least_squares(columns_beside(data, terms, fit.linear, target), target, fit.root_weights);
-    for (std::size_t j = 0; j < fit.linear.size(); ++j)
-      terms[fit.linear[j].term].values[fit.linear[j].parameter] = linear.theta[static_cast<Eigen::Index>(j)];
-    return linear;
-  };
+  Fitting fitting(data, terms, fit);
   // Weights and parameters depend on each other; two rounds settle them.
   sweep_shapes(data, terms, fit.on_balance, fit.root_weights);
   for (int round = 0; round < 2; ++round) {
-    fit.root_weights = record_weights(data.records(), solve().residual);
+    fitting.solve(fit.root_weights);
+    fit.root_weights = record_weights(data.records(), fit.residual);
     if (!fit.shapes.empty()) refine_shapes(data, terms, fit.on_balance, fit.root_weights);
   }
-  fit.residual = solve().residual;
+  fitting.solve(fit.root_weights);
+  fit.whitening = fit.root_weights;
+
+  // Weights, and friction times them, of the rows without what the records' own friction does to them.
+  Eigen::VectorXd noise_weights = fit.root_weights;
+  Eigen::MatrixXd J = fitting.columns();
+  Eigen::MatrixXd torques = noise_weights.asDiagonal() * fitting.friction(J);
+  BetweenRecords between = between_records(data, torques, noise_weights.cwiseProduct(fit.residual));
+  constexpr int kGeneralised = 3;
+  for (int round = 0; round < kGeneralised && between.std.size() > 0 && between.std.maxCoeff() > 0.0; ++round) {
+    noise_weights = record_weights(data.records(), between.left.cwiseQuotient(noise_weights));
+    torques = noise_weights.asDiagonal() * fitting.friction(J);
+    fit.whitening = whitening_of(data, noise_weights, torques, between);
+    if (!fit.shapes.empty()) refine_shapes(data, terms, fit.on_balance, fit.whitening);
+    fitting.solve(fit.whitening);
+    fit.root_weights = record_weights(data.records(), fit.residual);
+    J = fitting.columns();
+    torques = noise_weights.asDiagonal() * fitting.friction(J);
+    between = between_records(data, torques, noise_weights.cwiseProduct(fit.residual));
+  }
 
   // Uncertainty of linear parameters and shapes together, to first order.
-  Eigen::MatrixXd J(data.rows(), static_cast<Eigen::Index>(fit.linear.size() + fit.shapes.size()));
-  J << columns_beside(data, terms, fit.linear, data.target() - data.known_torque(terms, fit.on_balance)),
-      shape_columns(data, terms, fit.on_balance, fit.shapes);
-  const LinearFit joint = least_squares(J, fit.residual, fit.root_weights);
   const Eigen::VectorXd weighted = fit.root_weights.cwiseProduct(fit.residual);
   fit.autocorrelation_time =
       std::max(autocorrelation_time(data.records(), weighted), data.filter_autocorrelation_time());
+  fit.noise_autocorrelation_time = between.autocorrelation_time;
+  const LinearFit joint = least_squares(J, fit.residual, fit.root_weights);
+  const LinearFit white = fit.whitening.weights_only() ? joint : least_squares(J, fit.residual, fit.whitening);
   const double freedom = std::max(1.0, static_cast<double>(data.rows() - J.cols()));
-  fit.covariance = joint.unit_covariance;
+  fit.covariance = white.unit_covariance;
   std::vector<Eigen::Index> told;
   for (Eigen::Index j = 0; j < J.cols(); ++j)
-    if (std::isfinite(joint.unit_covariance(j, j))) told.push_back(j);
+    if (std::isfinite(white.unit_covariance(j, j))) told.push_back(j);
   // Of the rows without what friction that differs from record to record does to them; that is added after.
-  const std::vector<Group> groups = friction_groups(terms, fit.linear);
-  Eigen::MatrixXd torques = Eigen::MatrixXd::Zero(data.rows(), static_cast<Eigen::Index>(groups.size()));
-  for (std::size_t g = 0; g < groups.size(); ++g)
-    for (const Eigen::Index j : groups[g].columns) {
-      const Slot& slot = fit.linear[static_cast<std::size_t>(j)];
-      torques.col(static_cast<Eigen::Index>(g)) +=
-          terms[slot.term].values[slot.parameter] * fit.root_weights.cwiseProduct(J.col(j));
-    }
-  const BetweenRecords between = between_records(data, torques, weighted);
-  const Eigen::MatrixXd columns = fit.root_weights.asDiagonal() * J(Eigen::all, told);
+  const Eigen::MatrixXd columns = fit.whitening.twice(J(Eigen::all, told));
   const Eigen::MatrixXd middle =
       robust_middle(data.records(), columns, between.left, robust_lags(between.autocorrelation_time, data.rows())) *
       (static_cast<double>(data.rows()) / freedom);
-  const Eigen::MatrixXd unit = joint.unit_covariance(told, told);
+  const Eigen::MatrixXd unit = white.unit_covariance(told, told);
   fit.covariance(told, told) = with_differences(between, data, torques, columns, unit, unit * middle * unit);
   fit.own_share = joint.own_share;
   fit.excitation = joint.share_beside_all;
-  fit.white_variance = joint.unit_covariance.diagonal() * (weighted.squaredNorm() / freedom);
+  fit.white_variance = white.unit_covariance.diagonal() * ((fit.whitening * fit.residual).squaredNorm() / freedom);
   fit.condition_number = joint.condition_number;
   return fit;
 }

@@ -1,4 +1,5 @@
-// One balance fitted: shapes and linear parameters together, with weights by record and their uncertainty.
+// One balance fitted: shapes and linear parameters together, with weights by record and their uncertainty. Where
+// friction differs from record to record, by generalised least squares, so that this does not pass for an effect.
 #pragma once
 
 #include <Eigen/Core>
@@ -6,6 +7,7 @@
 #include <vector>
 
 #include "host/regression/balance_data.hpp"
+#include "host/regression/whitening.hpp"
 
 namespace flexspline::regression {
 
@@ -14,13 +16,16 @@ struct BalanceFit {
   std::vector<std::size_t> on_balance;  // terms
   std::vector<Slot> linear;             // free parameters that the torque is proportional to
   std::vector<Slot> shapes;
-  Eigen::VectorXd residual;  // target minus model, N m
-  Eigen::VectorXd root_weights;
+  Eigen::VectorXd residual;      // target minus model, N m
+  Eigen::VectorXd root_weights;  // one over the residual's RMS of each record
+  // What the parameters were found with: weights, and friction that differs from record to record taken down.
+  Whitening whitening = Eigen::VectorXd();
   Eigen::MatrixXd covariance;      // of linear, then shapes; corrected for autocorrelation
   Eigen::VectorXd own_share;       // likewise; see LinearFit
   Eigen::VectorXd excitation;      // likewise: LinearFit::share_beside_all
   Eigen::VectorXd white_variance;  // likewise: what the variances would be without autocorrelation
   double autocorrelation_time = 1.0;
+  double noise_autocorrelation_time = 1.0;  // of what is left without each record's own friction
   double condition_number = 0.0;
   double rmse() const {
     return residual.size() ? std::sqrt(residual.squaredNorm() / static_cast<double>(residual.size())) : 0.0;

@@ -70,14 +70,23 @@ std::pair<double, double> variance_between(const std::vector<Own>& records, Eige
 
 }  // namespace
 
-std::vector<Group> friction_groups(const Terms& terms, const std::vector<Slot>& linear) {
+std::vector<Group> friction_groups(const Terms& terms, const std::vector<Slot>& linear,
+                                   const std::vector<Slot>& shapes) {
   std::vector<Group> groups;
   for (std::size_t j = 0; j < linear.size(); ++j) {
     const std::string_view surface = terms[linear[j].term].entry->info->surface;
     if (surface.empty()) continue;
     auto group = std::find_if(groups.begin(), groups.end(), [&](const Group& g) { return g.name == surface; });
-    if (group == groups.end()) group = groups.insert(groups.end(), {std::string(surface), {}});
+    if (group == groups.end()) group = groups.insert(groups.end(), {std::string(surface), {}, {}});
     group->columns.push_back(static_cast<Eigen::Index>(j));
+    const Term& term = terms[linear[j].term];
+    const auto& varies = term.entry->parameters[linear[j].parameter];
+    for (std::size_t k = 0; k < shapes.size(); ++k) {
+      const auto& shape = term.entry->parameters[shapes[k].parameter];
+      // One in the same unit is a share of the friction, and varies with it.
+      if (shapes[k].term == linear[j].term && shape.per == varies.name && shape.unit.rotary != varies.unit.rotary)
+        group->stays.push_back({static_cast<Eigen::Index>(k), term.values[shapes[k].parameter]});
+    }
   }
   return groups;
 }
@@ -87,30 +96,38 @@ BetweenRecords between_records(const BalanceData& data, const Eigen::MatrixXd& t
   BetweenRecords between;
   between.std = between.freedom = Eigen::VectorXd::Zero(torques.cols());
   between.left = residual;
+  const auto tau = [&] {
+    return std::max(autocorrelation_time(data.records(), between.left), data.filter_autocorrelation_time());
+  };
+  const auto take_off = [&](const RowRange& range, const Eigen::VectorXd& factors) {
+    between.left.segment(range.first, range.size()) =
+        residual.segment(range.first, range.size()) - torques.middleRows(range.first, range.size()) * factors;
+  };
+  // Differences of friction are slow: taken for noise, they would make noise look so slow that no difference is
+  // certain. So the first look at the noise is at what each record leaves beside factors of its own.
+  if (torques.cols() > 0) {
+    const std::vector<Own> records = factors(data, torques, residual, residual, 1.0);
+    for (std::size_t i = 0; i < records.size(); ++i) take_off(data.records()[i], records[i].value);
+  }
   // Noise and its autocorrelation are those of what the factors leave, which depends on both.
   constexpr int kRounds = 3;
-  for (int round = 0; round <= kRounds; ++round) {
-    between.autocorrelation_time =
-        std::max(autocorrelation_time(data.records(), between.left), data.filter_autocorrelation_time());
-    if (torques.cols() == 0 || round == kRounds) break;
-    const std::vector<Own> records = factors(data, torques, residual, between.left, between.autocorrelation_time);
+  for (int round = 0; round < kRounds && torques.cols() > 0; ++round) {
+    const std::vector<Own> records = factors(data, torques, residual, between.left, tau());
     for (Eigen::Index g = 0; g < torques.cols(); ++g) {
       const auto [variance, freedom] = variance_between(records, g);
       between.std[g] = std::sqrt(variance);
       between.freedom[g] = freedom;
     }
-    if (between.std.maxCoeff() <= 0.0) break;
     // The likeliest factors: (I + S Z'Z S)^-1 S Z'e, times S.
     for (std::size_t i = 0; i < records.size(); ++i) {
-      const RowRange& range = data.records()[i];
       Eigen::MatrixXd inner = between.std.asDiagonal() * records[i].torques * between.std.asDiagonal();
       inner.diagonal().array() += 1.0;
       const Eigen::VectorXd scaled = between.std.cwiseProduct(records[i].along);
-      const Eigen::VectorXd b = between.std.cwiseProduct(inner.llt().solve(scaled));
-      between.left.segment(range.first, range.size()) =
-          residual.segment(range.first, range.size()) - torques.middleRows(range.first, range.size()) * b;
+      take_off(data.records()[i], between.std.cwiseProduct(inner.llt().solve(scaled)));
     }
+    if (between.std.maxCoeff() <= 0.0) break;
   }
+  between.autocorrelation_time = tau();
   return between;
 }
 

@@ -14,13 +14,21 @@ namespace flexspline::regression {
 struct Group {
   std::string name;  // "viscous friction"
   std::vector<Eigen::Index> columns;
+  // Shapes that are searched for by unit of a friction that varies, and do not vary with it: the stiffness of the
+  // contacts remains what it is where they slide harder, so that its ratio to the friction falls.
+  struct Stays {
+    Eigen::Index shape;  // its place among the free shapes
+    double ratio;        // its value
+  };
+  std::vector<Stays> stays;
 };
 inline constexpr Eigen::Index kMostGroups = 4;
 // Fewer records than that do not tell a spread.
 inline constexpr std::size_t kFewestRecords = 3;
 
-// Groups among the linear parameters that a regression estimates.
-std::vector<Group> friction_groups(const Terms& terms, const std::vector<Slot>& linear);
+// Groups among the linear parameters that a regression estimates; `shapes` are those that it estimates besides.
+std::vector<Group> friction_groups(const Terms& terms, const std::vector<Slot>& linear,
+                                   const std::vector<Slot>& shapes = {});
 
 // Each record has a factor 1 + b on the torque of each group, b of mean nought.
 struct BetweenRecords {

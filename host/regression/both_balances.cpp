@@ -28,9 +28,9 @@ Eigen::MatrixXd reaching_columns(BalanceData& data, const Terms& terms, std::siz
 }
 
 Testimony testimony_of(const Eigen::MatrixXd& reaching, const Eigen::MatrixXd& own, const Eigen::VectorXd& residual,
-                       const Eigen::VectorXd& root_weights, double autocorrelation_time) {
-  Eigen::MatrixXd left = root_weights.asDiagonal() * reaching;
-  Eigen::MatrixXd scaled = root_weights.asDiagonal() * own;
+                       const Whitening& whitening, double autocorrelation_time) {
+  Eigen::MatrixXd left = whitening * reaching;
+  Eigen::MatrixXd scaled = whitening * own;
   for (auto column : scaled.colwise()) column /= std::max(column.norm(), 1e-300);
   if (scaled.cols() > 0) {
     Eigen::ColPivHouseholderQR<Eigen::MatrixXd> qr(scaled);
@@ -38,7 +38,7 @@ Testimony testimony_of(const Eigen::MatrixXd& reaching, const Eigen::MatrixXd& o
     const Eigen::MatrixXd span = qr.householderQ() * Eigen::MatrixXd::Identity(scaled.rows(), qr.rank());
     left -= span * (span.transpose() * left);
   }
-  return {left.transpose() * root_weights.cwiseProduct(residual) / autocorrelation_time,
+  return {left.transpose() * (whitening * residual).col(0) / autocorrelation_time,
           left.transpose() * left / autocorrelation_time};
 }
 

@@ -5,6 +5,7 @@
 #include <vector>
 
 #include "host/regression/balance_data.hpp"
+#include "host/regression/whitening.hpp"
 
 namespace flexspline::regression {
 
@@ -21,9 +22,9 @@ Eigen::MatrixXd reaching_columns(BalanceData& data, const Terms& terms, std::siz
                                  const std::vector<std::size_t>& parameters);
 
 // `reaching`: slopes of the parameters asked for; `own`: of the balance's own parameters; `residual` at the present
-// values. `root_weights` are one over the noise, of which `autocorrelation_time` rows count as one.
+// values. `whitening` makes the rows' errors noise of one, of which `autocorrelation_time` rows count as one.
 Testimony testimony_of(const Eigen::MatrixXd& reaching, const Eigen::MatrixXd& own, const Eigen::VectorXd& residual,
-                       const Eigen::VectorXd& root_weights, double autocorrelation_time);
+                       const Whitening& whitening, double autocorrelation_time);
 
 // Inverse of a covariance or a precision whose parameters differ much in size by their units.
 Eigen::MatrixXd scaled_inverse(const Eigen::MatrixXd& symmetric);

@@ -72,6 +72,13 @@ LinearFit least_squares(const Eigen::MatrixXd& X, const Eigen::VectorXd& y, cons
   }
 }
 
+LinearFit least_squares(const Eigen::MatrixXd& X, const Eigen::VectorXd& y, const Whitening& whitening) {
+  if (whitening.weights_only()) return least_squares(X, y, whitening.root_weights());
+  LinearFit fit = least_squares(whitening * X, (whitening * y).col(0), Eigen::VectorXd::Ones(y.size()));
+  fit.residual = y - X * fit.theta;
+  return fit;
+}
+
 Eigen::VectorXd record_weights(const std::vector<RowRange>& records, const Eigen::VectorXd& residual) {
   Eigen::VectorXd weights = Eigen::VectorXd::Ones(residual.size());
   std::vector<double> noise;

@@ -5,6 +5,7 @@
 #include <vector>
 
 #include "host/regression/balance_data.hpp"
+#include "host/regression/whitening.hpp"
 
 namespace flexspline::regression {
 
@@ -23,6 +24,9 @@ inline constexpr double kUndetermined = 1e-3;
 // Minimises |W^(1/2) (y - X theta)| by a Householder factorisation with column pivoting of the scaled columns.
 // `root_weights`: square roots of the weights, one a row. A column of noughts is undetermined.
 LinearFit least_squares(const Eigen::MatrixXd& X, const Eigen::VectorXd& y, const Eigen::VectorXd& root_weights);
+
+// The same with errors that rows of a record have in common taken down: generalised least squares.
+LinearFit least_squares(const Eigen::MatrixXd& X, const Eigen::VectorXd& y, const Whitening& whitening);
 
 // One over the residual's RMS of each record, repeated along its rows: records with more noise count less. A record is
 // never weighted more than ten times the median one, so that a silent record does not rule the fit.

@@ -240,9 +240,9 @@ void sweep_shapes(BalanceData& data, Terms& terms, const std::vector<std::size_t
 }
 
 double refine_shapes(BalanceData& data, Terms& terms, const std::vector<std::size_t>& on_balance,
-                     const Eigen::VectorXd& root_weights) {
+                     const Whitening& whitening) {
   constexpr double kTolerance = 1e-9;
-  return refine_shapes(data, terms, on_balance, Whitening(root_weights), kTolerance);
+  return refine_shapes(data, terms, on_balance, whitening, kTolerance);
 }
 
 double refine_shapes(BalanceData& data, Terms& terms, const std::vector<std::size_t>& on_balance,

@@ -30,8 +30,8 @@ Eigen::MatrixXd columns_of(BalanceData& data, const Terms& terms, const std::vec
 // eliminated at each step; Jacobian after Kaufman), from the values in `terms`, within their ranges. Writes the result
 // into `terms`. Returns the weighted sum of squares.
 double refine_shapes(BalanceData& data, Terms& terms, const std::vector<std::size_t>& on_balance,
-                     const Eigen::VectorXd& root_weights);
-// The same with errors that rows have in common, to a relative change of the sum below `tolerance`. Where `coarse`
+                     const Whitening& whitening);
+// The same to a relative change of the sum below `tolerance`. Where `coarse`
 // (BalanceData::thinned) is given, the search begins on that.
 double refine_shapes(BalanceData& data, Terms& terms, const std::vector<std::size_t>& on_balance,
                      const Whitening& whitening, double tolerance, BalanceData* coarse = nullptr);

@@ -18,12 +18,29 @@ void Whitening::vary(const RowRange& rows, const Eigen::MatrixXd& columns) {
   common_.push_back(std::move(common));
 }
 
-Eigen::MatrixXd Whitening::operator*(const Eigen::MatrixXd& rows) const {
-  Eigen::MatrixXd white = root_weights_.asDiagonal() * rows;
+void Whitening::take_off_common(Eigen::MatrixXd& rows) const {
   for (const Common& c : common_) {
-    auto part = white.middleRows(c.rows.first, c.rows.size());
+    auto part = rows.middleRows(c.rows.first, c.rows.size());
     part -= c.basis * (c.taken.asDiagonal() * (c.basis.transpose() * part)).eval();
   }
+}
+
+Eigen::MatrixXd Whitening::operator*(const Eigen::MatrixXd& rows) const {
+  Eigen::MatrixXd white = root_weights_.asDiagonal() * rows;
+  take_off_common(white);
+  if (root_counts_.size() > 0) white = root_counts_.asDiagonal() * white;
+  return white;
+}
+
+Whitening Whitening::counted(const Eigen::VectorXd& root_counts) const {
+  Whitening other = *this;
+  other.root_counts_ = root_counts;
+  return other;
+}
+
+Eigen::MatrixXd Whitening::twice(const Eigen::MatrixXd& rows) const {
+  Eigen::MatrixXd white = *this * rows;
+  take_off_common(white);
   return white;
 }
 

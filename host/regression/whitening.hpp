@@ -20,8 +20,17 @@ class Whitening {
   // The record's rows vary along `columns` of their weighted values, each by one standard deviation of the noise.
   void vary(const RowRange& rows, const Eigen::MatrixXd& columns);
 
+  // No record's errors have anything in common.
+  bool weights_only() const { return common_.empty() && root_counts_.size() == 0; }
+  const Eigen::VectorXd& root_weights() const { return root_weights_; }
+
   // `rows` (one for each row of the data), made white.
   Eigen::MatrixXd operator*(const Eigen::MatrixXd& rows) const;
+  // (I + B B')^-1 W^1/2 times `rows`: what generalised least squares multiplies weighted errors by.
+  Eigen::MatrixXd twice(const Eigen::MatrixXd& rows) const;
+
+  // The same with every white row counted so many times; `root_counts` are the roots, one a row.
+  Whitening counted(const Eigen::VectorXd& root_counts) const;
 
  private:
   struct Common {
@@ -29,7 +38,10 @@ class Whitening {
     Eigen::MatrixXd basis;  // orthonormal
     Eigen::VectorXd taken;  // share of each that is taken off
   };
+  void take_off_common(Eigen::MatrixXd& rows) const;
+
   Eigen::VectorXd root_weights_;
+  Eigen::VectorXd root_counts_;  // none: each row once
   std::vector<Common> common_;
 };
 

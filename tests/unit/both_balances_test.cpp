@@ -75,7 +75,7 @@ TEST(BothBalances, ABalanceThatDoesNotShowTheParametersChangesNothing) {
   const Balance told = balance(random, 100, b, 0.1), other = balance(random, 100, b, 0.1);
   const Whole alone = fit({told}, 2);
   const Testimony says =
-      testimony_of(Eigen::MatrixXd::Zero(100, 2), other.own, other.y, Eigen::VectorXd::Ones(100), 1.0);
+      testimony_of(Eigen::MatrixXd::Zero(100, 2), other.own, other.y, Eigen::VectorXd(Eigen::VectorXd::Ones(100)), 1.0);
   const Agreement found = agree(scaled_inverse(alone.covariance), says);
   EXPECT_EQ(found.change.norm(), 0.0);
   EXPECT_EQ(found.cost, 0.0);

@@ -101,6 +101,10 @@ TEST(Extend, PutsTheNewEffectLastAndTakesOutWhatItReplaces) {
             (std::vector<std::string>{"inertia", "viscous_friction", "dahl_friction"}));
 }
 
+Unexplained whole(const regression::BalanceData& data) {
+  return {data.target(), Eigen::VectorXd::Ones(data.rows()), {}};
+}
+
 TEST(Extend, RefusesToScaleWhatIsNotThere) {
   const Terms without = regression::terms_of(model_of({"inertia", "coulomb_friction"}));
   const std::string error = error_of([&] { extend(without, catalogue::get("temperature_viscous"), {}); });
@@ -127,7 +131,7 @@ TEST(Proposals, HoldWhatTheSignalsCanShowAndTheModelLacks) {
     const regression::Prepared prepared = regression::prepare({&e}, {}, kOptions);
     const regression::BalanceData data(prepared, regression::Balance::motor);
     std::vector<std::string> names;
-    for (const Proposal& p : proposals(data, terms, data.target())) names.push_back(p.extended.back().label());
+    for (const Proposal& p : proposals(data, terms, whole(data))) names.push_back(p.extended.back().label());
     return names;
   };
   const auto has = [](const std::vector<std::string>& names, std::string_view name) {
@@ -159,7 +163,7 @@ TEST(Proposals, CountTheParametersThatTheyAdd) {
   const regression::Prepared prepared = regression::prepare({&e}, {}, kOptions);
   const regression::BalanceData data(prepared, regression::Balance::motor);
   std::map<std::string_view, double> added;
-  for (const Proposal& p : proposals(data, regression::terms_of(model_of(kPlain)), data.target()))
+  for (const Proposal& p : proposals(data, regression::terms_of(model_of(kPlain)), whole(data)))
     added[p.entry->name()] = p.added;
   EXPECT_EQ(added.at("viscous_asymmetry"), 1.0);
   EXPECT_EQ(added.at("stribeck_gaussian"), 3.0);
