@@ -36,6 +36,12 @@ model::BlockHeader header_of(const firmware::Parameters& p, const effects::Drive
   return h;
 }
 
+// One body: what a tick's parts hand to one another stays in registers.
+[[gnu::flatten]] firmware::LockStepUp control_tick(firmware::Application<SoftwareBoard>& application,
+                                                   const firmware::LockStepDown& down) {
+  return firmware::lock_step(application, down);
+}
+
 }  // namespace
 
 Block::Block(std::span<const std::uint8_t> packed) : words_((packed.size() + 7) / 8), size_(packed.size()) {
@@ -70,10 +76,9 @@ void SoftwareBrain::start(const Block& block, const firmware::TelemetrySetup& te
 }
 
 firmware::LockStepUp SoftwareBrain::tick(const firmware::LockStepDown& down) {
-  board_.readings = down.readings;
+  board_.readings = &down.readings;
   board_.overrun = down.overrun;
-  firmware::LockStepUp up;
-  if (!tick_hangs_) up = firmware::lock_step(*application_, down);
+  firmware::LockStepUp up = tick_hangs_ ? firmware::LockStepUp{} : control_tick(*application_, down);
   up.actuation = board_.actuation;
   if (!background_hangs_) application_->background();
   if (++board_.ticks_since_fed > firmware::kWatchdogTicks) {

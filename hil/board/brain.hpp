@@ -42,20 +42,21 @@ class Brain {
   virtual void offer(std::span<const std::byte> block) = 0;
 };
 
-/// The board of the desktop: samples are put in, the actuation is taken out.
+/// The board of the desktop: it is told where samples are, the actuation is taken out.
 class SoftwareBoard {
  public:
   static constexpr std::uint32_t kTickHz = 20'000;  ///< unless it is told otherwise
   static constexpr std::uint32_t kTelemetryWords = 2048;
 
-  firmware::Readings read() const { return readings; }
+  firmware::Readings read() const { return *readings; }
   void actuate(const firmware::Actuation& wanted) { actuation = wanted; }
   bool tick_overrun() const { return overrun; }
   void feed_watchdog() { ticks_since_fed = 0; }
   firmware::ResetCause reset_cause() const { return cause; }
 
   std::uint32_t tick_hz = kTickHz;
-  firmware::Readings readings{};
+  static constexpr firmware::Readings kNone{};
+  const firmware::Readings* readings = &kNone;  ///< not a copy: what was just written in parts is slow to copy at once
   firmware::Actuation actuation{};
   bool overrun = false;
   std::uint32_t ticks_since_fed = 0;

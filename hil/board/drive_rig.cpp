@@ -13,11 +13,14 @@ constexpr double kSurgeA = 2.0;
 constexpr double kLongestStepS = 125.1e-6;  // of the plant: hil/plant/README.md, Numerics
 enum Stream : std::uint64_t { kSensorNoise = 17 };
 
-// As std::llround() does it, which is a call, for all that an encoder or a converter can hold.
+// As std::llround() does it, which is a call, for all that an encoder or a converter can hold. With the number below a
+// half the largest that is rounded down stays below the next whole one, and a half itself does not.
 std::int64_t nearest(double x) {
-  const auto whole = static_cast<std::int64_t>(x);
-  const double rest = x - static_cast<double>(whole);
-  return whole + (rest >= 0.5 ? 1 : 0) - (rest <= -0.5 ? 1 : 0);
+  constexpr double kBelowHalf = 0.5 - 0x1p-54;
+  return static_cast<std::int64_t>(x + std::copysign(kBelowHalf, x));
+}
+double noise_of(const plant::Sensor& sensor, double rated) {
+  return std::max(sensor.noise_share * rated, sensor.noise_floor);
 }
 std::uint32_t counter(double angle_rad, int counts) {
   return static_cast<std::uint32_t>(nearest(angle_rad / kTurn * counts));
@@ -44,49 +47,52 @@ DriveRig::DriveRig(const RigSetup& setup)
       tick_s_(1.0 / setup.tick_hz),
       plant_steps_(static_cast<int>(std::ceil(tick_s_ / kLongestStepS))),
       plant_(plant::physics_of(setup.drive), setup.locked),
-      generator_(plant::stream_seed(setup.seed, 0, kSensorNoise)),
+      normal_(plant::stream_seed(setup.seed, 0, kSensorNoise)),
+      current_noise_a_(noise_of(setup.drive.sensors.current, setup.drive.rated_current_a)),
+      torque_noise_nm_(noise_of(setup.drive.sensors.torque, setup.drive.rated_torque_nm)),
+      temperature_noise_c_(noise_of(setup.drive.sensors.temperature, 0.0)),
       temperature_c_(setup.drive.thermal.start_c.value_or(
           setup.drive.thermal.ambient_c.value_or(setup.drive.temperature_reference_c))) {
   const double corner_hz = setup.drive.amplifier.bandwidth_hz;
   if (corner_hz > 0.0) lag_ = 1.0 - std::exp(-kTurn * corner_hz * tick_s_);
 }
 
-double DriveRig::noise(const plant::Sensor& sensor, double rated) {
-  // Drawn even where it is not used: a fault that is injected does not change the noise of what follows.
-  const double drawn = normal_(generator_);
-  return setup_.noise ? std::max(sensor.noise_share * rated, sensor.noise_floor) * drawn : 0.0;
+// Drawn even where it is not used: a fault that is injected does not change the noise of what follows.
+double DriveRig::noise(double standard_deviation) {
+  const double drawn = normal_();
+  return setup_.noise ? standard_deviation * drawn : 0.0;
 }
 
 std::int16_t DriveRig::share(double value, double full_scale) const {
   return static_cast<std::int16_t>(nearest(std::clamp(value / full_scale * 32768.0, -32768.0, 32767.0)));
 }
 
-firmware::Readings DriveRig::sense() {
+void DriveRig::sense(firmware::Readings& r) {
   const plant::State& state = plant_.state();
   const plant::Sensors& sensors = setup_.drive.sensors;
-  firmware::Readings r = last_;
-  const double current = current_a_ + noise(sensors.current, setup_.drive.rated_current_a);
+  const double current = current_a_ + noise(current_noise_a_);
   double torque = errors_.torque_gain * plant_.torque() + errors_.torque_offset_nm + disturbances_.torque_offset_nm;
   for (const plant::Ripple& ripple : errors_.torque_ripple) {
     const double phase = ripple.order * state.motor_angle;
     torque += ripple.cosine * std::cos(phase) + ripple.sine * std::sin(phase);
   }
-  torque += noise(sensors.torque, setup_.drive.rated_torque_nm);
-  const double temperature = temperature_c_ + noise(sensors.temperature, 0.0);
+  torque += noise(torque_noise_nm_);
+  const double temperature = temperature_c_ + noise(temperature_noise_c_);
 
   if (!has(Injection::motor_encoder_stale)) {
     ++r.motor_samples;
+    const std::uint32_t before = r.motor_counter;
     const double zero = errors_.torsion_zero_rad * setup_.drive.gear_ratio;
     if (!has(Injection::motor_encoder_stuck)) r.motor_counter = counter(state.motor_angle - zero, sensors.motor_counts);
     if (has(Injection::encoder_line_lost))
-      r.motor_counter = on_one_line(last_.motor_counter, counter(state.motor_angle - zero, sensors.motor_counts));
+      r.motor_counter = on_one_line(before, counter(state.motor_angle - zero, sensors.motor_counts));
     if (has(Injection::motor_encoder_jump)) r.motor_counter += static_cast<std::uint32_t>(sensors.motor_counts / 4);
   }
   if (!has(Injection::output_encoder_stale)) {
     ++r.output_samples;
     const std::uint32_t count = counter(state.output_angle + disturbances_.output_offset_rad, sensors.output_counts);
     if (has(Injection::output_line_lost)) {
-      r.output_counter = on_one_line(last_.output_counter, count);
+      r.output_counter = on_one_line(r.output_counter, count);
     } else if (!has(Injection::output_encoder_stuck)) {
       r.output_counter = count;
     }
@@ -101,8 +107,6 @@ firmware::Readings DriveRig::sense() {
       r.torque = share(torque, scales_.torque_nm);
     }
   }
-  last_ = r;
-  return r;
 }
 
 // What flows, as the amplifier's reading has it.

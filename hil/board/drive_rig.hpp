@@ -2,7 +2,6 @@
 
 #include <cstdint>
 #include <optional>
-#include <random>
 
 #include "firmware/board.hpp"
 #include "hil/plant/normal.hpp"
@@ -62,8 +61,13 @@ class DriveRig {
  public:
   explicit DriveRig(const RigSetup& setup);
 
-  /// Samples of all sensors, taken now.
-  firmware::Readings sense();
+  /// Samples of all sensors, taken now: brings those of the tick before up to date.
+  void sense(firmware::Readings& readings);
+  /// The same where the rig keeps them, until the next tick.
+  const firmware::Readings& sense() {
+    sense(last_);
+    return last_;
+  }
   /// What the amplifier does until the next tick; moves the plant on by one.
   void act(const firmware::Actuation& actuation);
 
@@ -86,7 +90,7 @@ class DriveRig {
 
  private:
   static constexpr std::uint64_t bit(Injection what) { return std::uint64_t{1} << static_cast<int>(what); }
-  double noise(const plant::Sensor& sensor, double rated);
+  double noise(double standard_deviation);
   double flowing(bool enabled);
   void warm(double current_a);
   std::int16_t share(double value, double full_scale) const;
@@ -97,8 +101,11 @@ class DriveRig {
   double tick_s_;
   int plant_steps_;  // of each tick
   plant::TwoMass plant_;
-  std::mt19937_64 generator_;
   plant::Normal normal_;
+  // Standard deviations.
+  double current_noise_a_;
+  double torque_noise_nm_;
+  double temperature_noise_c_;
   std::uint64_t injected_ = 0;  // a bit for each
   Disturbances disturbances_;
   double lag_ = 1.0;  // share of its way that the amplifier's current goes in a tick

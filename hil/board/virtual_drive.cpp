@@ -1,6 +1,7 @@
 #include "hil/board/virtual_drive.hpp"
 
 #include <cmath>
+#include <new>
 #include <stdexcept>
 #include <utility>
 
@@ -37,16 +38,16 @@ void VirtualDrive::run(std::uint32_t ticks) {
       rig_.act({});
       continue;
     }
-    firmware::LockStepDown down;
-    down.readings = rig_.sense();
-    down.overrun = rig_.has(Injection::tick_overrun);
-    down.reads_frame = reads_;
+    rig_.sense(down_.readings);
+    down_.overrun = rig_.has(Injection::tick_overrun);
+    down_.reads_frame = reads_;
+    down_.has_command = posted_.has_value();
     if (posted_) {
-      down.command = *posted_;
-      down.has_command = true;
+      down_.command = *posted_;
       posted_.reset();
     }
-    up_ = brain_->tick(down);
+    // Made where it stays.
+    ::new (static_cast<void*>(&up_)) firmware::LockStepUp(brain_->tick(down_));
     rig_.act(up_.actuation);
     take_frame();
   }

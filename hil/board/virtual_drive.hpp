@@ -69,6 +69,7 @@ class VirtualDrive {
   Block flash_;
   firmware::TelemetrySetup telemetry_;
   Block offered_;
+  firmware::LockStepDown down_{};
   firmware::LockStepUp up_{};
   std::optional<firmware::Command> posted_;
   std::vector<Frame> frames_;

@@ -1,42 +1,36 @@
 #pragma once
 
-#include <cmath>
+#include <array>
+#include <cstddef>
 #include <cstdint>
 #include <random>
 
 namespace flexspline::plant {
 
-/// Numbers of a standard normal distribution by Marsaglia's polar method, two at a time. Unlike
-/// std::normal_distribution, whose method each library chooses, the same generator gives the same numbers everywhere.
+/// Numbers of a standard normal distribution by Marsaglia's polar method from the words of std::mt19937_64. Unlike
+/// std::normal_distribution, whose method each library chooses, the same seed gives the same numbers everywhere. They
+/// are made some hundred at a time: one by one, each second word and each pair that is thrown away is a branch that no
+/// processor foresees.
 class Normal {
  public:
-  double operator()(std::mt19937_64& generator) {
-    if (has_second_) {
-      has_second_ = false;
-      return second_;
-    }
-    double x = 0.0, y = 0.0, square = 0.0;
-    do {
-      x = 2.0 * share(generator()) - 1.0;
-      y = 2.0 * share(generator()) - 1.0;
-      square = x * x + y * y;
-    } while (square > 1.0 || square == 0.0);
-    const double factor = std::sqrt(-2.0 * std::log(square) / square);
-    second_ = x * factor;
-    has_second_ = true;
-    return y * factor;
+  explicit Normal(std::uint64_t seed);
+  double operator()() {
+    if (next_ == made_) make();
+    return numbers_[next_++];
   }
 
  private:
-  /// From 0 to just below 1.
-  static double share(std::uint64_t drawn) {
-    constexpr double kJustBelow = 1.0 - 0x1p-53;
-    const double share = static_cast<double>(drawn) * 0x1p-64;
-    return share < 1.0 ? share : kJustBelow;
-  }
+  using Engine = std::mt19937_64;  // of which only the numbers are taken that define it
+  static constexpr std::size_t kWords = Engine::state_size;
+  static_assert(kWords % 2 == 0, "a pair of words is of one round");
 
-  double second_ = 0.0;
-  bool has_second_ = false;
+  void turn();
+  void make();
+
+  std::array<std::uint64_t, kWords> state_{};
+  std::array<double, kWords> numbers_{};
+  std::size_t next_ = 0;
+  std::size_t made_ = 0;
 };
 
 }  // namespace flexspline::plant

@@ -34,6 +34,8 @@ TwoMass::TwoMass(Physics physics, bool locked, State initial)
                  physics_.transmission.cubic_stiffness == 0.0 && has_plain_friction_ &&
                  physics_.friction.quadratic == 0.0 && !has_gravity_ &&
                  (physics_.damping_torque == 0.0 || has_root_damping_ || physics_.damping_exponent == 1.0)),
+      is_straight_(is_linear_ && has_root_damping_ && physics_.damping_torque > 0.0 && !locked_),
+      per_gear_(1.0 / physics_.gear_ratio),
       state_(initial) {
   const bool usable = physics_.motor_inertia > 0.0 && physics_.transmission.has_spring() && physics_.gear_ratio > 0.0 &&
                       physics_.damping_exponent > 0.0 && (locked_ || physics_.output_inertia > 0.0);
@@ -76,10 +78,6 @@ double TwoMass::rate_of(double damping) const {
 
 double TwoMass::damping_of(double rate) const {
   return std::copysign(std::pow(std::abs(rate), physics_.damping_exponent), rate);
-}
-
-double TwoMass::torque(const State& s) const {
-  return elastic(s).torque + physics_.damping_torque * s.damping;
 }
 
 double TwoMass::gravity(double angle) const {
@@ -185,15 +183,94 @@ bool TwoMass::solve_stage(const Stage& stage, const State& start, State& s) cons
   return false;
 }
 
+const TwoMass::Straight& TwoMass::straight(double weight) {
+  Straight& k = straight_;
+  if (k.weight == weight && k.viscous == viscous_ && k.motor_direction == state_.motor_direction) return k;
+  const MotorFriction& friction = physics_.friction;
+  k.weight = weight;
+  k.viscous = viscous_;
+  k.motor_direction = state_.motor_direction;
+  k.motor_slope =
+      physics_.motor_inertia + weight * friction.evaluate_plain(k.motor_direction, 0.0, viscous_).by_velocity;
+  k.output_slope = physics_.output_inertia + weight * physics_.output_viscous;
+  k.motor_gain = weight * per_gear_ / k.motor_slope;
+  k.output_gain = weight / k.output_slope;
+  const double rate_gain = k.motor_gain * per_gear_ + k.output_gain;
+  k.by_torsion = physics_.transmission.stiffness * weight;
+  k.by_rate = 1.0 + rate_gain * k.by_torsion;
+  k.by_power = rate_gain * physics_.damping_torque;
+  k.discriminant = k.by_power * k.by_power;
+  k.four_by_rate = 4.0 * k.by_rate;
+  k.has_closed_form = rate_gain >= 0.0 && k.by_torsion >= 0.0;
+  return k;
+}
+
+// What solve_stage() does of a drive that is straight while both of its shafts turn, to the bit: its first step of
+// Newton's method, without what is nought in it. The known numbers of both stages are not divided for again.
+[[gnu::always_inline]] inline Shafts TwoMass::solve_straight(const Straight& k, const Stage& stage,
+                                                             const Shafts& start) const {
+  Shafts s = start;
+  const double g = k.weight, c = physics_.damping_torque;
+  const auto direction = static_cast<double>(k.motor_direction);
+  const double coulomb = s.output_direction * physics_.output_coulomb;
+  const double twist =
+      (stage.motor_angle + g * s.motor_velocity) / physics_.gear_ratio - (stage.output_angle + g * s.output_velocity);
+  const double t = twist * physics_.transmission.stiffness + c * s.damping;
+  const double friction = physics_.friction.evaluate_plain(direction, s.motor_velocity, viscous_).torque;
+  const double motor_residual = physics_.motor_inertia * (s.motor_velocity - stage.motor_velocity) -
+                                g * (motor_drive_ - friction - t * per_gear_);
+  const double output_residual =
+      physics_.output_inertia * (s.output_velocity - stage.output_velocity) -
+      g * (t - physics_.output_viscous * s.output_velocity - coulomb - inputs_.load_torque_nm);
+  const double motor_free = -motor_residual / k.motor_slope;
+  const double output_free = -output_residual / k.output_slope;
+  const double rate = s.motor_velocity * per_gear_ - s.output_velocity;
+  const double known = k.by_rate * rate + (motor_free * per_gear_ - output_free) + k.by_power * s.damping;
+  const double root = std::sqrt(k.discriminant + k.four_by_rate * std::abs(known));
+  const double power = root > 0.0 ? 2.0 * known / (k.by_power + root) : 0.0;
+  const double damping_step = power - s.damping;
+  const double torque_step = k.by_torsion * (power * std::abs(power) - rate) + c * damping_step;
+  s.motor_velocity += motor_free - k.motor_gain * torque_step;
+  s.output_velocity += output_free + k.output_gain * torque_step;
+  s.damping += damping_step;
+  s.motor_angle = stage.motor_angle + g * s.motor_velocity;
+  s.output_angle = stage.output_angle + g * s.output_velocity;
+  return s;
+}
+
+// A step in which both shafts go on turning their way. False, and nothing done, where that is not so.
+bool TwoMass::take_straight_step(double h) {
+  if (state_.motor_velocity == 0.0 || state_.output_velocity == 0.0 || state_.motor_direction == 0 ||
+      state_.output_direction == 0)
+    return false;
+  const Shafts from = state_;
+  const Straight& known = straight(kGamma * h);
+  if (!known.has_closed_form) return false;
+  const Shafts middle = solve_straight(
+      known, {from.motor_angle, from.motor_velocity, from.output_angle, from.output_velocity, known.weight}, from);
+  const Shafts to = solve_straight(known, carried(from, middle, known.weight), middle);
+  const bool goes_on = to.motor_direction * to.motor_velocity >= 0.0 && to.output_direction * to.output_velocity >= 0.0;
+  if (!goes_on || !std::isfinite(to.motor_velocity + to.output_velocity + to.damping)) return false;
+  state_.motor_angle = to.motor_angle;
+  state_.motor_velocity = to.motor_velocity;
+  state_.output_angle = to.output_angle;
+  state_.output_velocity = to.output_velocity;
+  state_.damping = to.damping;
+  return true;
+}
+
+TwoMass::Stage TwoMass::carried(const Shafts& before, const Shafts& after, double weight) {
+  const auto carry = [](double from, double to) { return from + kCarry * (to - from); };
+  return {carry(before.motor_angle, after.motor_angle), carry(before.motor_velocity, after.motor_velocity),
+          carry(before.output_angle, after.output_angle), carry(before.output_velocity, after.output_velocity), weight};
+}
+
 bool TwoMass::try_step(const State& from, double h, State& to) const {
   const double g = kGamma * h;
   copy(from, to);
   const Stage first{from.motor_angle, from.motor_velocity, from.output_angle, from.output_velocity, g};
   if (!solve_stage(first, from, to)) return false;
-  const auto carry = [](double before, double after) { return before + kCarry * (after - before); };
-  const Stage second{carry(from.motor_angle, to.motor_angle), carry(from.motor_velocity, to.motor_velocity),
-                     carry(from.output_angle, to.output_angle), carry(from.output_velocity, to.output_velocity), g};
-  if (!solve_stage(second, from, to)) return false;
+  if (!solve_stage(carried(from, to, g), from, to)) return false;
   if (to.motor_direction != 0 && !has_plain_friction_) {
     FrictionPoint at = friction_point(to, to.motor_direction);
     at.anchor = from.motor_angle;
@@ -322,6 +399,7 @@ TwoMass::Event TwoMass::first_event(const State& from, double h, State& to, doub
 }
 
 void TwoMass::take_step(double h) {
+  if (is_straight_ && take_straight_step(h)) return;
   double remaining = h;
   double piece = h;
   for (int events = 0; remaining > 1e-13; ++events) {

@@ -70,6 +70,18 @@ class TwoMass {
   struct Stage {
     double motor_angle, motor_velocity, output_angle, output_velocity, weight;
   };
+  /// What both stages of a step of a straight drive, both shafts turning, have in common.
+  struct Straight {
+    double weight = 0.0;  ///< nought: not made yet
+    double viscous = 0.0;
+    int motor_direction = 0;
+    double motor_slope = 0.0, output_slope = 0.0;  ///< of the residuals over the velocities
+    double motor_gain = 0.0, output_gain = 0.0;    ///< of the velocities over the torque
+    double by_torsion = 0.0;                       ///< torque over the rate of torsion, of the spring
+    double by_rate = 0.0, by_power = 0.0;          ///< of the equation for the damping's power
+    double discriminant = 0.0, four_by_rate = 0.0;
+    bool has_closed_form = false;
+  };
   enum class Event { none, motor_stop, output_stop, motor_break, output_break };
 
   double torsion(const State& s) const {
@@ -81,7 +93,7 @@ class TwoMass {
     return has_plain_spring_ ? physics_.transmission.polynomial(torsion(s)) : elastic_with_loops(s);
   }
   TorqueSlope elastic_with_loops(const State& s) const;
-  double torque(const State& s) const;
+  double torque(const State& s) const { return elastic(s).torque + physics_.damping_torque * s.damping; }
   /// The state of a drive without loops is its shafts: the rest, large, is not copied at each step.
   void copy(const State& from, State& to) const {
     if (has_loops_) {
@@ -92,8 +104,7 @@ class TwoMass {
   }
   /// How much faster the spring twists than the output, for each rad/s of the motor.
   double ratio(double motor_angle) const {
-    const double gear = 1.0 / physics_.gear_ratio;
-    return has_plain_spring_ ? gear : gear + physics_.transmission.error_slope(motor_angle);
+    return has_plain_spring_ ? per_gear_ : per_gear_ + physics_.transmission.error_slope(motor_angle);
   }
   double drive_torque(const Inputs& inputs) const;
   double rate_of(double damping) const;
@@ -101,6 +112,10 @@ class TwoMass {
   FrictionPoint friction_point(const State& s, double direction) const;
   double gravity(double angle) const;
   bool solve_stage(const Stage& stage, const State& start, State& s) const;
+  const Straight& straight(double weight);
+  Shafts solve_straight(const Straight& known, const Stage& stage, const Shafts& start) const;
+  bool take_straight_step(double h);
+  static Stage carried(const Shafts& before, const Shafts& after, double weight);  ///< the second of a step
   bool try_step(const State& from, double h, State& to) const;
   void take_step(double h);
   double margin(Event event, const State& s) const;
@@ -121,11 +136,14 @@ class TwoMass {
   bool has_gravity_;
   bool has_root_damping_;  ///< of exponent 0.5
   bool is_linear_;         ///< but for that and the signs
+  bool is_straight_;       ///< is linear, with that damping, and free
+  double per_gear_;        ///< of the gear's ratio
   State state_;
   State next_;  ///< at the end of the step that is being taken
   Inputs inputs_;
   double motor_drive_ = 0.0;  // Km i
   double viscous_ = 0.0;
+  Straight straight_;
 };
 
 }  // namespace flexspline::plant

@@ -40,7 +40,7 @@ TwinDrive::TwinDrive(const TwinSetup& setup)
 }
 
 void TwinDrive::tick() {
-  board_.readings = rig_.sense();
+  board_.readings = &rig_.sense();
   board_.overrun = rig_.has(board::Injection::tick_overrun);
   application_.tick();
   rig_.act(board_.actuation);

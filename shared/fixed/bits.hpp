@@ -12,12 +12,22 @@ struct Product {
   std::uint64_t high = 0;
   std::uint64_t low = 0;
 };
-constexpr Product multiply(std::uint64_t a, std::uint64_t b) {
+constexpr Product multiply_by_words(std::uint64_t a, std::uint64_t b) {
   constexpr std::uint64_t kLow = 0xFFFFFFFF;
   const std::uint64_t low = (a & kLow) * (b & kLow);
   const std::uint64_t cross = (a >> 32) * (b & kLow) + (low >> 32);
   const std::uint64_t other = (a & kLow) * (b >> 32) + (cross & kLow);
   return {(a >> 32) * (b >> 32) + (cross >> 32) + (other >> 32), (other << 32) | (low & kLow)};
+}
+// The same; processors of 64 bits have an instruction for it.
+constexpr Product multiply(std::uint64_t a, std::uint64_t b) {
+#if defined(__SIZEOF_INT128__)
+  __extension__ using Wide = unsigned __int128;
+  const Wide product = Wide{a} * b;
+  return {static_cast<std::uint64_t>(product >> 64), static_cast<std::uint64_t>(product)};
+#else
+  return multiply_by_words(a, b);
+#endif
 }
 
 // a b 2^-bits rounded down, for 0 < bits < 64; the caller knows that it fits.

@@ -20,6 +20,7 @@
 #include "hil/plant/friction.cpp"
 #include "hil/plant/hysteresis.cpp"
 #include "hil/plant/input_files.cpp"
+#include "hil/plant/normal.cpp"
 #include "hil/plant/parameters.cpp"
 #include "hil/plant/physics.cpp"
 #include "hil/plant/sensors.cpp"

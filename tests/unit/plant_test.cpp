@@ -267,5 +267,42 @@ TEST(Plant, ConvergesWithSecondOrderThroughReversals) {
   EXPECT_LT(coarse, 1e-5);
 }
 
+// A cubic stiffness of which no torsion sees anything, and the same drive is solved by iteration.
+TEST(Plant, ADriveThatBendsNowhereMovesAsOneThatIsSolvedByIteration) {
+  Physics straight = demo();
+  straight.friction.viscous_asymmetry = 1e-5;
+  straight.friction.temperature_coefficient = 0.02;
+  straight.friction.temperature_reference = 25.0;
+  Physics iterated = straight;
+  ASSERT_EQ(straight.transmission.cubic_stiffness, 0.0);
+  ASSERT_EQ(straight.damping_exponent, 0.5);
+  ASSERT_GT(straight.damping_torque, 0.0);
+  iterated.transmission.cubic_stiffness = 1e-9;
+  TwoMass one(straight, false), other(iterated, false);
+  int turned = 0, rested = 0;
+  double farthest = 0.0;
+  for (int k = 0; k < 4000; ++k) {
+    const double t = k * kSample;
+    const Inputs inputs{.current_a = 1.6 * std::sin(9.0 * t) + 0.5 * std::sin(200.0 * t),
+                        .temperature_c = 30.0 + k / 70,
+                        .load_torque_nm = 2.0 * std::sin(3.0 * t)};
+    const int before = one.state().motor_direction;
+    // Steps of two sizes, and warmer by a degree at other times: nothing of one is left in the other.
+    const int steps = 8 + k / 50 % 2;
+    one.advance(inputs, kSample, steps);
+    other.advance(inputs, kSample, steps);
+    turned += one.state().motor_direction == -before && before != 0 ? 1 : 0;
+    rested += one.state().motor_direction == 0 ? 1 : 0;
+    farthest = std::max(farthest, std::abs(one.state().motor_angle));
+    ASSERT_NEAR(one.state().motor_velocity, other.state().motor_velocity, 1e-6) << t;
+    ASSERT_NEAR(one.state().output_velocity, other.state().output_velocity, 1e-8) << t;
+    ASSERT_NEAR(one.state().motor_angle, other.state().motor_angle, 1e-8) << t;
+    ASSERT_NEAR(one.state().output_angle, other.state().output_angle, 1e-10) << t;
+    ASSERT_NEAR(one.torque(), other.torque(), 1e-6) << t;
+  }
+  EXPECT_GT(turned + rested, 10);
+  EXPECT_GT(farthest, 0.1);
+}
+
 }  // namespace
 }  // namespace flexspline::plant
