@@ -77,9 +77,30 @@ std::shared_ptr<const diagnosis::Diagnosis> Step::diagnosed() const {
   const std::lock_guard lock(mutex_);
   return diagnosis_;
 }
-void Step::found(diagnosis::Diagnosis diagnosis) {
-  const std::lock_guard lock(mutex_);
-  diagnosis_ = std::make_shared<const diagnosis::Diagnosis>(std::move(diagnosis));
+void Step::diagnose(const std::function<diagnosis::Diagnosis()>& search, const std::function<void()>& wait) {
+  std::unique_lock lock(mutex_);
+  while (searching_ && !diagnosis_) {
+    searched_.wait_for(lock, std::chrono::milliseconds(50));
+    lock.unlock();
+    wait();
+    lock.lock();
+  }
+  if (diagnosis_) return;
+  searching_ = true;
+  lock.unlock();
+  std::shared_ptr<const diagnosis::Diagnosis> found;
+  std::exception_ptr failure;
+  try {
+    found = std::make_shared<const diagnosis::Diagnosis>(search());
+  } catch (...) {
+    failure = std::current_exception();
+  }
+  lock.lock();
+  diagnosis_ = std::move(found);
+  searching_ = false;
+  searched_.notify_all();
+  lock.unlock();
+  if (failure) std::rethrow_exception(failure);
 }
 
 Session::Session(std::string id, std::shared_ptr<Step> first)
