@@ -4,8 +4,8 @@
 #include <cmath>
 
 #include "host/diagnosis/imitation.hpp"
-#include "host/regression/in_parallel.hpp"
 #include "host/regression/both_balances.hpp"
+#include "host/regression/in_parallel.hpp"
 
 namespace flexspline::diagnosis {
 namespace {

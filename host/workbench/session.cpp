@@ -175,7 +175,7 @@ void Session::set_problem(const std::string& during, const std::exception_ptr& e
   set("problem", problem_json(during, error));
 }
 
-void Session::start(const std::string& what, std::function<void(const Progress&)> run) {
+void Session::start(const std::string& what, std::function<void(const Progress&)> run, bool by_itself) {
   const std::lock_guard lock(mutex_);
   if (work_) throw BusyError(fmt::format("{} is still running; wait, or cancel it", work_->what));
   std::erase_if(ended_, [](const std::shared_ptr<Work>& w) {
@@ -187,7 +187,7 @@ void Session::start(const std::string& what, std::function<void(const Progress&)
   work->what = what;
   work->began = std::chrono::steady_clock::now();
   work_ = work;
-  parts_->erase("problem");
+  if (!by_itself) parts_->erase("problem");
   changed();
   work->thread = std::thread([this, work, run = std::move(run)] {
     const Progress say = [&](std::string_view stage) {

@@ -77,8 +77,8 @@ class Session {
   void change(const std::function<void(History<std::shared_ptr<Step>>&)>& change);
 
   // Runs `work` beside the server. What it throws becomes the session's problem. Throws BusyError while other work
-  // runs.
-  void start(const std::string& what, std::function<void(const Progress&)> work);
+  // runs. The problem before is forgotten, unless the work begins by itself: then nobody may have read it yet.
+  void start(const std::string& what, std::function<void(const Progress&)> work, bool by_itself = false);
   // Work ends at its next word to Progress, fits at their next set of columns; what it makes is thrown away.
   void cancel();
   bool works() const;

@@ -7,8 +7,8 @@
 #include <string>
 
 #include "host/diagnosis/add.hpp"
-#include "host/regression/in_parallel.hpp"
 #include "host/regression/identify.hpp"
+#include "host/regression/in_parallel.hpp"
 #include "tests/support/twin_data.hpp"
 
 namespace flexspline {

@@ -208,6 +208,10 @@ TEST_F(WorkbenchApi, SaysWhatIsWrongWithADroppedFile) {
   EXPECT_EQ(finding["column"], "current_a");
   EXPECT_FALSE(finding["remedy"].get<std::string>().empty());
   EXPECT_EQ(state["experiments"].size(), 2u);
+  // The search that begins by itself does not take the message away.
+  act(tab, {{"do", "diagnose"}});
+  act(tab, {{"do", "cancel"}});
+  EXPECT_TRUE(settled(tab).contains("problem"));
   EXPECT_EQ(drop("dataset.toml", "format = \"flexspline-dataset/1\"\n"), 400);
   EXPECT_EQ(drop("../evil.csv", "time_s\n"), 400);
   EXPECT_EQ(drop("run.sh", "#!/bin/sh\n"), 400);
