@@ -186,13 +186,14 @@ int run(const DemoOptions& options, Console& console) {
                  {"report", nullptr},
                  {"closed_loop", nullptr}};
   bool right = hidden == "none" && found.named.empty();
-  report::Subject page{.command = "demo",
-                       .data_name = recording.string(),
-                       .model_name = base_path.string(),
-                       .dataset = &dataset,
-                       .model = base->model,
-                       .estimates = base->estimates,
-                       .rounds = {found}};
+  report::Subject page;
+  page.command = "demo";
+  page.data_name = recording.string();
+  page.model_name = base_path.string();
+  page.dataset = &dataset;
+  page.model = base->model;
+  page.estimates = base->estimates;
+  page.rounds = {found};
   if (found.named.empty()) {
     console.line(console.bold("  Nothing is missing that these data could show."));
   } else {

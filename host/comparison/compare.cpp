@@ -16,6 +16,7 @@
 #include "host/comparison/score.hpp"
 #include "host/regression/balance_fit.hpp"
 #include "host/regression/identify.hpp"
+#include "host/regression/in_parallel.hpp"
 #include "host/regression/record_constants.hpp"
 #include "host/simulation/simulation.hpp"
 
@@ -57,20 +58,15 @@ class Comparer {
     require_values(model);
     model_.drive = regression::reconcile(model.drive, dataset, result_.warnings);
     terms_ = regression::terms_of(model_);
-    std::vector<const Experiment*> fit;
     for (const Experiment& e : dataset.experiments) {
       all_.push_back(&e);
-      if (e.role == data::Role::fit) fit.push_back(&e);
       result_.experiments.push_back({e.name, e.role, {}});
     }
-    // The pipeline of the identification, so that its errors can be compared with these.
-    prepared_ = regression::prepare(fit.empty() ? all_ : fit, model_.drive, options);
-    if (!fit.empty() && fit.size() < all_.size())
-      prepared_ = regression::prepare_with(all_, model_.drive, prepared_.pipeline);
+    prepared_ = regression::prepare_all(dataset, model_.drive, options);
     result_.pipeline = prepared_.pipeline;
   }
 
-  Comparison all(bool free_runs) {
+  Comparison all(const Extent& extent) {
     for (const Balance balance : {Balance::motor, Balance::transmission, Balance::load}) {
       if (balance != Balance::motor && !prepared_.torque_measured) continue;
       if (regression::terms_on(terms_, balance, prepared_.torque_measured).empty()) continue;
@@ -78,13 +74,13 @@ class Comparer {
       if (data.empty()) continue;
       if (regression::settle_record_constants(prepared_, data, terms_, {}, Eigen::VectorXd::Ones(data.rows())))
         data = BalanceData(prepared_, balance);
-      inverse(data);
+      inverse(data, extent.regions_and_gains);
     }
     if (result_.experiments.empty() || together_.empty())
       throw data::DataError({{data::Severity::error, "missing_column", "", 0, "",
                               "no torque balance of the model can be formed from these columns",
                               "record current (or torque) and motor position together"}});
-    for (std::size_t i = 0; free_runs && i < all_.size(); ++i) free_run(i);
+    for (std::size_t i = 0; extent.free_runs && i < all_.size(); ++i) free_run(i);
     for (const Together& t : together_) {
       if (std::any_of(result_.overall.begin(), result_.overall.end(), [&](auto& s) { return s.signal == t.signal; }))
         continue;
@@ -136,12 +132,31 @@ class Comparer {
     result_.experiments[experiment].signals.push_back(std::move(s));
   }
 
-  void inverse(BalanceData& data) {
+  // Of the balance at full rate, by range of its rows.
+  std::vector<double> worst_case_gains(const BalanceData& data) const {
+    std::vector<double> gains(data.records().size(), kUnknown);
+    regression::in_parallel(gains.size(), [&](std::size_t i) {
+      const Record& record = prepared_.records[data.records()[i].record];
+      // A drive that is off excites no lines.
+      const auto full = record.at_rest ? std::nullopt : full_rate(prepared_, record, data.balance(), terms_);
+      if (!full) return;
+      std::vector<double> error = full->residual;
+      for (std::size_t k = 0; k < error.size(); ++k)
+        if (!full->valid[k]) error[k] = 0.0;
+      gains[i] = worst_case_gain(full->target, error, record.segments, 1.0 / record.sample_s,
+                                 prepared_.pipeline.row_cutoff_hz);
+    });
+    return gains;
+  }
+
+  void inverse(BalanceData& data, bool regions_and_gains) {
     const Eigen::VectorXd residual = regression::residual_of(data, terms_);
     const std::vector<NoiseFloor> floors = noise_floors(data, terms_, all_, model_.drive);
     const std::string signal = signal_name(data.balance());
     const bool collapsed = data.balance() == Balance::motor && !prepared_.torque_measured;
     Eigen::VectorXd floor_squared = Eigen::VectorXd::Constant(data.rows(), kUnknown);
+    const std::vector<double> gains =
+        regions_and_gains ? worst_case_gains(data) : std::vector<double>(data.records().size(), kUnknown);
     for (std::size_t i = 0; i < data.records().size(); ++i) {
       const regression::RowRange& range = data.records()[i];
       const Record& record = prepared_.records[range.record];
@@ -151,15 +166,7 @@ class Comparer {
       s.noise_floor = floors[i].rmse;
       s.noise_floor_from = floors[i].from;
       s.collapsed = collapsed;
-      // A drive that is off excites no lines.
-      const auto full = record.at_rest ? std::nullopt : full_rate(prepared_, record, data.balance(), terms_);
-      if (full) {
-        std::vector<double> error = full->residual;
-        for (std::size_t k = 0; k < error.size(); ++k)
-          if (!full->valid[k]) error[k] = 0.0;
-        s.worst_case_gain = worst_case_gain(full->target, error, record.segments, 1.0 / record.sample_s,
-                                            prepared_.pipeline.row_cutoff_hz);
-      }
+      s.worst_case_gain = gains[i];
       if (floors[i].rmse)
         floor_squared.segment(range.first, range.size()).setConstant(*floors[i].rmse * *floors[i].rmse);
       keep(range.record, std::move(s), score);
@@ -173,7 +180,7 @@ class Comparer {
     overall.noise_floor_from = floor.from;
     overall.collapsed = collapsed;
     result_.overall.push_back(std::move(overall));
-    add_regions(data, signal, residual, floor_squared);
+    if (regions_and_gains) add_regions(data, signal, residual, floor_squared);
   }
 
   void add_regions(const BalanceData& data, const std::string& signal, const Eigen::VectorXd& residual,
@@ -288,8 +295,8 @@ const SignalResult* Comparison::find_overall(std::string_view signal) const {
 }
 
 Comparison compare(const data::Dataset& dataset, const model::Model& model, const regression::PipelineOptions& options,
-                   const std::vector<blackbox::Specification>& beside, bool free_runs) {
-  return Comparer(dataset, model, options, beside).all(free_runs);
+                   const std::vector<blackbox::Specification>& beside, Extent extent) {
+  return Comparer(dataset, model, options, beside).all(extent);
 }
 
 }  // namespace flexspline::comparison

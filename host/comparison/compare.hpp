@@ -67,13 +67,19 @@ struct Comparison {
   const SignalResult* find_overall(std::string_view signal) const;
 };
 
+// What is compared: what takes longer than errors by experiment, and is not always asked for.
+struct Extent {
+  bool free_runs = true;          // else the balances alone
+  bool regions_and_gains = true;  // else neither `regions` nor worst_case_gain of balances
+};
+
 // Inverse model: each torque balance on the rows of the regression, with the motion as measured. Free run: what the
 // model does with the measured effort alone, from the measured state at the start of each segment; nothing is taken out
 // of the positions, as drift is an error. The cut-off is chosen from the experiments of role fit, where there are any.
-// `beside`: black boxes that are fitted to the same signals, see beside.hpp. Without `free_runs` the balances alone.
+// `beside`: black boxes that are fitted to the same signals, see beside.hpp.
 // Throws model::ModelError naming parameters without a value, data::DataError where no balance can be formed.
 Comparison compare(const data::Dataset& dataset, const model::Model& model, const regression::PipelineOptions& options,
-                   const std::vector<blackbox::Specification>& beside = {}, bool free_runs = true);
+                   const std::vector<blackbox::Specification>& beside = {}, Extent extent = {});
 
 // Throws model::ModelError naming the parameters without a value, if there are any.
 void require_values(const model::Model& model);

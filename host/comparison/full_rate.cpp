@@ -8,8 +8,13 @@ namespace flexspline::comparison {
 
 std::optional<FullRate> full_rate(const regression::Prepared& prepared, const regression::Record& record,
                                   regression::Balance balance, const regression::Terms& terms) {
-  regression::Prepared all{
-      prepared.pipeline, {record}, prepared.constants, prepared.torque_measured, prepared.effort_is_current};
+  regression::Prepared all;
+  all.pipeline = prepared.pipeline;
+  all.records = {record};
+  all.constants = prepared.constants;
+  all.torque_measured = prepared.torque_measured;
+  all.effort_is_current = prepared.effort_is_current;
+  all.rotary = prepared.rotary;
   const std::vector<std::size_t>& rows = record.rows[regression::index(balance)].samples;
   std::vector<std::size_t>& samples = all.records[0].rows[regression::index(balance)].samples;
   samples.clear();

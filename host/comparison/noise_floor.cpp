@@ -8,6 +8,7 @@
 
 #include "host/comparison/full_rate.hpp"
 #include "host/regression/balance_fit.hpp"
+#include "host/regression/in_parallel.hpp"
 #include "host/signals/spectrum.hpp"
 
 namespace flexspline::comparison {
@@ -197,14 +198,17 @@ class Floors {
 
   std::vector<NoiseFloor> all() {
     const Eigen::VectorXd residual = regression::residual_of(data_, terms_);
-    std::vector<NoiseFloor> floors;
-    for (const regression::RowRange& range : data_.records())
-      floors.push_back(of(prepared_.records[range.record], residual.segment(range.first, range.size())));
+    std::vector<NoiseFloor> floors(data_.records().size());
+    regression::in_parallel(floors.size(), [&](std::size_t i) {
+      const regression::RowRange& range = data_.records()[i];
+      floors[i] = of(prepared_.records[range.record], residual.segment(range.first, range.size()));
+    });
     return floors;
   }
 
  private:
-  NoiseFloor of(const Record& record, const Eigen::VectorXd& residual) {
+  // Called from several threads.
+  NoiseFloor of(const Record& record, const Eigen::VectorXd& residual) const {
     if (record.at_rest) {
       // Standstill repeats with any period.
       const double n = static_cast<double>(residual.size());
@@ -217,9 +221,9 @@ class Floors {
     return {};
   }
 
-  std::optional<double> by_periods(const Record& record) {
+  std::optional<double> by_periods(const Record& record) const {
     if (!record.has_motor_motion) return std::nullopt;
-    const std::optional<double> period = period_of(*record.experiment);
+    const std::optional<double> period = record.period->get([&] { return period_of(*record.experiment); });
     if (!period) return std::nullopt;
     const auto full = full_rate(prepared_, record, data_.balance(), terms_);
     if (!full) return std::nullopt;
@@ -228,7 +232,7 @@ class Floors {
     return pairs.rmse(record.decimation);
   }
 
-  std::optional<double> by_replicates(const Record& record) {
+  std::optional<double> by_replicates(const Record& record) const {
     Pairs pairs;
     for (const Experiment* other : experiments_) {
       if (other == record.experiment || other->name == record.name || !are_replicates(*record.experiment, *other))
@@ -244,7 +248,7 @@ class Floors {
   }
 
   // The record carries its noise already; as much again shows, as the difference, what it does to the residual.
-  std::optional<double> by_propagation(const Record& record, const Eigen::VectorXd& residual) {
+  std::optional<double> by_propagation(const Record& record, const Eigen::VectorXd& residual) const {
     double sum = 0.0;
     for (int realisation = 0; realisation < kRealisations; ++realisation) {
       const Experiment noisy = with_noise(record, static_cast<std::uint64_t>(realisation) + 1);

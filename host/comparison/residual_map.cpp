@@ -6,10 +6,13 @@
 #include <algorithm>
 #include <boost/math/distributions/fisher_f.hpp>
 #include <cmath>
+#include <functional>
+#include <iterator>
 #include <limits>
 #include <optional>
 
 #include "host/comparison/row_variables.hpp"
+#include "host/regression/in_parallel.hpp"
 #include "host/regression/least_squares.hpp"
 
 namespace flexspline::comparison {
@@ -134,9 +137,9 @@ Explained wave_of(const BalanceData& data, const Eigen::VectorXd& residual, int 
     const auto& samples = record.rows[balance].samples;
     double low = std::numeric_limits<double>::infinity(), high = -low;
     for (Eigen::Index k = range.first; k < range.last; ++k) {
-      const auto& in = record.inputs[samples[static_cast<std::size_t>(k - range.first)]];
-      const double wave = per_unit * in.angle;
-      const double frequency_hz = std::abs(per_unit * in.velocity) / (2.0 * M_PI);
+      const std::size_t sample = samples[static_cast<std::size_t>(k - range.first)];
+      const double wave = per_unit * record.inputs.angle_at(sample);
+      const double frequency_hz = std::abs(per_unit * record.inputs.velocity_at(sample)) / (2.0 * M_PI);
       const double gain = 1.0 / (1.0 + std::pow(frequency_hz / prepared.pipeline.row_cutoff_hz,
                                                 2.0 * static_cast<double>(signals::ZeroPhaseFilter::kDefaultOrder)));
       low = std::min(low, wave);
@@ -174,28 +177,45 @@ Explained wave_of(const BalanceData& data, const Eigen::VectorXd& residual, int 
 
 std::vector<Share> localise(const BalanceData& data, const Eigen::VectorXd& residual, double autocorrelation_time,
                             data::Axis axis) {
-  std::vector<Share> shares;
-  if (residual.size() != data.rows() || residual.size() < 16) return shares;
+  if (residual.size() != data.rows() || residual.size() < 16) return {};
   const double tau = std::max(1.0, autocorrelation_time);
   const auto wanted =
       std::clamp<std::size_t>(static_cast<std::size_t>(residual.size()) / kRowsPerMapBin, 4, kMostMapBins);
   const Eigen::VectorXd directions = row_directions(data);
-  const auto add = [&](std::string name, const Explained& explained, double level) {
+  // One question each; asked on all cores, answered in this order.
+  std::vector<std::function<std::vector<Share>()>> questions;
+  const auto share_of = [&](std::vector<Share>& shares, std::string name, const Explained& explained, double level) {
     if (const auto share = significant_share(residual, explained, tau, level))
       shares.push_back({std::move(name), 100.0 * *share});
   };
-  const auto add_maps = [&](const std::string& name, const Bins& bins) {
-    add(name, map_of(data, bins, residual, nullptr), kSignificant);
-    add(name + " x direction", map_of(data, bins, residual, &directions), kSignificant);
+  const auto maps_of = [&](const std::string& name, const Bins& bins) {
+    std::vector<Share> shares;
+    share_of(shares, name, map_of(data, bins, residual, nullptr), kSignificant);
+    share_of(shares, name + " x direction", map_of(data, bins, residual, &directions), kSignificant);
+    return shares;
   };
-  for (const RowVariable& variable : row_variables(data, axis))
-    add_maps(variable.name, equal_count_bins(variable.values, wanted));
-  add("direction", map_of(data, direction_bins(directions), residual, nullptr), kSignificant);
-  if (data.records().size() > 1) add_maps("record", record_bins(data));
+  const std::vector<RowVariable> variables = row_variables(data, axis);
+  for (const RowVariable& variable : variables)
+    questions.emplace_back([&] { return maps_of(variable.name, equal_count_bins(variable.values, wanted)); });
+  questions.emplace_back([&] {
+    std::vector<Share> shares;
+    share_of(shares, "direction", map_of(data, direction_bins(directions), residual, nullptr), kSignificant);
+    return shares;
+  });
+  if (data.records().size() > 1) questions.emplace_back([&] { return maps_of("record", record_bins(data)); });
   // The turn of a linear axis is known by its pitch alone.
   const bool turns = axis == data::Axis::rotary || data.prepared().constants.turn_angle_scale != 1.0;
   for (int order = 1; turns && order <= kOrders; ++order)
-    add(fmt::format("motor_angle order {}", order), wave_of(data, residual, order), kSignificant / kOrders);
+    questions.emplace_back([&, order] {
+      std::vector<Share> shares;
+      share_of(shares, fmt::format("motor_angle order {}", order), wave_of(data, residual, order),
+               kSignificant / kOrders);
+      return shares;
+    });
+  std::vector<std::vector<Share>> answers(questions.size());
+  regression::in_parallel(questions.size(), [&](std::size_t i) { answers[i] = questions[i](); });
+  std::vector<Share> shares;
+  for (std::vector<Share>& answer : answers) std::ranges::move(answer, std::back_inserter(shares));
   std::stable_sort(shares.begin(), shares.end(),
                    [](const Share& a, const Share& b) { return a.share_percent > b.share_percent; });
   return shares;

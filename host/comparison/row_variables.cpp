@@ -68,7 +68,8 @@ std::vector<RowVariable> row_variables(const BalanceData& data, data::Axis axis)
   add("velocity", velocity, speed_of);
   add("speed", velocity, [&](const Record& r, std::size_t k) { return std::abs(speed_of(r, k)); });
   add("acceleration", velocity + "^2", [&](const Record& r, std::size_t k) {
-    return on_load ? r.inputs[k].output_acceleration : r.inputs[k].acceleration;
+    return on_load ? r.inputs.at(k, effects::kOutputMotion).output_acceleration
+                   : r.inputs.at(k, effects::kMotorMotion).acceleration;
   });
   if (axis == data::Axis::rotary || turns != 1.0)
     add("motor_angle", "rad", [&](const Record& r, std::size_t k) {
@@ -80,7 +81,7 @@ std::vector<RowVariable> row_variables(const BalanceData& data, data::Axis axis)
   add("output_angle", position,
       [&](const Record& r, std::size_t k) { return r.locked ? kNone : r.inputs.output_angle_at(k); });
   add("current", "A",
-      [&](const Record& r, std::size_t k) { return r.experiment->has(Column::current) ? r.inputs[k].current : kNone; });
+      [&](const Record& r, std::size_t k) { return r.experiment->has(Column::current) ? r.inputs.current[k] : kNone; });
   add("torque", data::unit_of(Column::torque, axis),
       [&](const Record& r, std::size_t k) { return r.torque.empty() ? kNone : r.inputs.torque_at(k); });
   const auto has_torsion = [](const Record& r) { return r.has_motor_motion && r.has_output_motion; };

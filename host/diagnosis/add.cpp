@@ -9,7 +9,7 @@
 #include "host/catalogue/defined.hpp"
 #include "host/comparison/noise_floor.hpp"
 #include "host/diagnosis/candidates.hpp"
-#include "host/estimation/in_parallel.hpp"
+#include "host/regression/in_parallel.hpp"
 
 namespace flexspline::diagnosis {
 namespace {
@@ -28,11 +28,12 @@ struct Holdout {
   regression::Prepared prepared;
   std::unique_ptr<BalanceData> data;
 
-  Holdout(const data::Dataset& dataset, const Identification& fitted, Balance balance) {
+  Holdout(const data::Dataset& dataset, const Identification& fitted, Balance balance,
+          const regression::Prepared* ready) {
     for (const data::Experiment& e : dataset.experiments)
       if (e.role == data::Role::holdout) experiments.push_back(&e);
     if (experiments.empty()) return;
-    prepared = regression::prepare_with(experiments, fitted.model.drive, fitted.prepared.pipeline);
+    prepared = regression::prepare_with(experiments, fitted.model.drive, fitted.prepared.pipeline, ready);
     prepared.torque_measured = fitted.prepared.torque_measured;
     data = std::make_unique<BalanceData>(prepared, balance);
     if (data->empty()) data.reset();
@@ -56,7 +57,7 @@ Addition compare_models(const data::Dataset& dataset, const model::Model& before
   Addition result;
   result.effect = std::move(effect);
   std::unique_ptr<Identification> both[2];
-  estimation::in_parallel(
+  regression::in_parallel(
       2, [&](std::size_t i) { both[i] = regression::identify(dataset, i == 0 ? before : after, options); });
   const auto& [base, extended] = both;
   std::size_t b = 0, x = 0;
@@ -70,7 +71,7 @@ Addition compare_models(const data::Dataset& dataset, const model::Model& before
   result.unit = before.drive.axis == data::Axis::linear ? "N" : "N*m";
   result.before.rmse_fit = root_mean_square(regression::residual_of(base->data[b], base->terms));
   result.after.rmse_fit = root_mean_square(regression::residual_of(extended->data[x], extended->terms));
-  Holdout holdout(dataset, *base, balance);
+  Holdout holdout(dataset, *base, balance, options.ready.get());
   std::vector<const data::Experiment*> fitted, judged;
   for (const data::Experiment& e : dataset.experiments)
     if (e.role == data::Role::fit) fitted.push_back(&e);

@@ -12,7 +12,7 @@
 #include "host/diagnosis/other_balances.hpp"
 #include "host/diagnosis/rivals.hpp"
 #include "host/diagnosis/trials.hpp"
-#include "host/estimation/in_parallel.hpp"
+#include "host/regression/in_parallel.hpp"
 #include "host/regression/shapes.hpp"
 
 namespace flexspline::diagnosis {
@@ -193,7 +193,7 @@ void list_candidates(std::vector<Examined>& all, data::Axis axis, Diagnosis& res
   for (Examined& e : all) {
     const Detection detection(e.search);
     std::vector<std::optional<Detectable>> smallest(e.trials.size());
-    estimation::in_parallel(e.trials.size(), [&](std::size_t i) {
+    regression::in_parallel(e.trials.size(), [&](std::size_t i) {
       BalanceData data = *e.search.data;
       smallest[i] = detection.smallest(e.trials[i], data);
     });

@@ -4,8 +4,8 @@
 #include <cmath>
 
 #include "host/diagnosis/imitation.hpp"
-#include "host/estimation/in_parallel.hpp"
 #include "host/regression/both_balances.hpp"
+#include "host/regression/in_parallel.hpp"
 
 namespace flexspline::diagnosis {
 namespace {
@@ -93,7 +93,7 @@ void hear_other_balances(const std::vector<Search*>& all, Search& told, std::vec
   for (Trial& trial : trials)
     if (trial.fall.score > kNamedScore && !others_of(all, told, trial).empty()) heard.push_back(&trial);
   if (heard.empty()) return;
-  estimation::in_parallel(heard.size(), [&](std::size_t i) {
+  regression::in_parallel(heard.size(), [&](std::size_t i) {
     Trial& trial = *heard[i];
     const Found found = found_of(told, trial);
     if (found.parameters.empty()) return;

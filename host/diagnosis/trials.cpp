@@ -7,7 +7,7 @@
 #include <cmath>
 #include <limits>
 
-#include "host/estimation/in_parallel.hpp"
+#include "host/regression/in_parallel.hpp"
 #include "host/regression/least_squares.hpp"
 #include "host/regression/shapes.hpp"
 
@@ -224,7 +224,7 @@ std::vector<Trial> rank(Search& search) {
   BalanceData thinned = search.data->thinned(few);
   thinned.columns(search.base.terms, search.base.linear);
   // Each on its own copy of the data, with the columns that are there: the result is that of one thread.
-  estimation::in_parallel(tried.size(), [&](std::size_t i) {
+  regression::in_parallel(tried.size(), [&](std::size_t i) {
     BalanceData data = *search.data, coarse = thinned;
     Search own{&data, search.keep, search.base};
     Proposal& proposal = tried[i];
@@ -242,7 +242,7 @@ std::vector<Trial> rank(Search& search) {
     for (std::size_t p = 0; p < added.values.size(); ++p) has_shape = has_shape || added.free_shape(p);
     if (has_shape && trial.fall.score >= kNamedScore && unrefined.size() < kRefined) unrefined.push_back(&trial);
   }
-  estimation::in_parallel(unrefined.size(), [&](std::size_t i) {
+  regression::in_parallel(unrefined.size(), [&](std::size_t i) {
     Trial& trial = *unrefined[i];
     BalanceData data = *search.data, coarse = thinned;
     Search own{&data, search.keep, search.base};

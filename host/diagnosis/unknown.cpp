@@ -8,7 +8,7 @@
 #include "host/catalogue/defined.hpp"
 #include "host/diagnosis/diagnosis.hpp"
 #include "host/diagnosis/trials.hpp"
-#include "host/estimation/in_parallel.hpp"
+#include "host/regression/in_parallel.hpp"
 
 namespace flexspline::diagnosis {
 namespace {
@@ -106,7 +106,7 @@ std::vector<TableQuestion> questions(BalanceData& data, const Terms& model) {
 std::vector<Screened> curves(BalanceData& data, const Terms& model, const std::vector<TableQuestion>& asked,
                              const Eigen::VectorXd& weights) {
   std::vector<std::optional<LearnedTable>> learned(asked.size());
-  estimation::in_parallel(asked.size(), [&](std::size_t i) {
+  regression::in_parallel(asked.size(), [&](std::size_t i) {
     BalanceData own = data;
     learned[i] = regression::learn_table(own, model, asked[i], weights);
   });

@@ -3,7 +3,7 @@
 #include <algorithm>
 #include <cmath>
 
-#include "host/estimation/in_parallel.hpp"
+#include "host/regression/in_parallel.hpp"
 
 namespace flexspline::estimation {
 namespace {
@@ -75,7 +75,7 @@ FreeMotion free_motion(const Identification& identification, const FreeMotionOpt
   result.prepared.rotary = measured.rotary;
   result.prepared.records.resize(records);
   result.simulated.assign(records, 0);
-  in_parallel(records, [&](std::size_t i) {
+  regression::in_parallel(records, [&](std::size_t i) {
     if (!options.only.empty() && !options.only[i]) return;
     simulation::Options how;
     how.step_s = options.step_s;

@@ -7,6 +7,7 @@
 #include <span>
 #include <vector>
 
+#include "host/regression/in_parallel.hpp"
 #include "host/signals/butterworth.hpp"
 
 namespace flexspline::regression {
@@ -58,15 +59,22 @@ class Fit {
     for (std::vector<double>& signal : signals)
       for (const data::Segment& s : r.segments)
         filter.apply_in_place(std::span<double>(signal.data() + s.first, s.last - s.first));
-    Eigen::VectorXd row(along_.size());
-    for (const std::size_t k : r.rows[index(balance)].samples) {
-      for (Eigen::Index j = 0; j < row.size(); ++j) row[j] = signals[static_cast<std::size_t>(j)][k];
-      const double y = signals.back()[k];
-      products_ += row * row.transpose();
-      along_ += y * row;
-      squares_ += y * y;
-      rows_ += 1.0;
-    }
+    const std::vector<std::size_t>& samples = r.rows[index(balance)].samples;
+    Eigen::MatrixXd rows(static_cast<Eigen::Index>(samples.size()), along_.size() + 1);
+    for (Eigen::Index j = 0; j < rows.cols(); ++j)
+      for (std::size_t k = 0; k < samples.size(); ++k)
+        rows(static_cast<Eigen::Index>(k), j) = signals[static_cast<std::size_t>(j)][samples[k]];
+    const auto left = rows.leftCols(along_.size());
+    products_.noalias() += left.transpose() * left;
+    along_.noalias() += left.transpose() * rows.rightCols(1);
+    squares_ += rows.rightCols(1).squaredNorm();
+    rows_ += static_cast<double>(samples.size());
+  }
+  void add(const Fit& other) {
+    products_ += other.products_;
+    along_ += other.along_;
+    squares_ += other.squares_;
+    rows_ += other.rows_;
   }
 
   struct Result {
@@ -100,9 +108,14 @@ class Fit {
 double torque_per_held_step(const Prepared& prepared) {
   // Beside what moves: friction, an offset, and what a weight on the output would do, which looks like an inertia where
   // the motion is a sine.
-  Fit all(6), output(7);
-  for (const Record& r : prepared.records) {
-    if (!steps_with_effort(r)) continue;
+  struct Fits {
+    Fit all{6}, output{7};
+  };
+  std::vector<Fits> of_records(prepared.records.size());
+  in_parallel(prepared.records.size(), [&](std::size_t i) {
+    const Record& r = prepared.records[i];
+    auto& [all, output] = of_records[i];
+    if (!steps_with_effort(r)) return;
     const double sample_hz = 1.0 / r.sample_s;
     const signals::ZeroPhaseFilter filter(signals::ZeroPhaseFilter::kDefaultOrder,
                                           std::min(prepared.pipeline.row_cutoff_hz, 0.45 * sample_hz), sample_hz);
@@ -125,8 +138,13 @@ double torque_per_held_step(const Prepared& prepared) {
     for (std::size_t k = 0; k < r.load_torque.size(); ++k) load.back()[k] -= r.load_torque[k];
     all.add(r, filter, std::move(motor), Balance::motor);
     output.add(r, filter, std::move(load), Balance::load);
+  });
+  Fits together;
+  for (const Fits& one : of_records) {
+    together.all.add(one.all);
+    together.output.add(one.output);
   }
-  const auto motor = all.solve(), load = output.solve();
+  const auto motor = together.all.solve(), load = together.output.solve();
   if (!motor || !load) return 0.0;
   const double inertia_of_all = motor->value[0], output_inertia = load->value[0];
   const bool known = inertia_of_all > kCertainErrors * motor->std[0] && output_inertia > kCertainErrors * load->std[0];
@@ -137,13 +155,10 @@ double torque_per_held_step(const Prepared& prepared) {
   return lacking - kCertainErrors * doubt > 0.5 ? per_step : 0.0;
 }
 
-void complete_held_torque(Prepared& prepared, double torque_per_step) {
-  if (torque_per_step == 0.0) return;
-  for (Record& r : prepared.records) {
-    if (!steps_with_effort(r)) continue;
-    const std::vector<double> steps = half_steps(r, prepared.constants.torque_constant);
-    for (std::size_t k = 0; k < steps.size(); ++k) r.torque[k] += torque_per_step * steps[k];
-  }
+void complete_held_torque(Record& r, const catalogue::DriveConstants<double>& constants, double torque_per_step) {
+  if (torque_per_step == 0.0 || !steps_with_effort(r)) return;
+  const std::vector<double> steps = half_steps(r, constants.torque_constant);
+  for (std::size_t k = 0; k < steps.size(); ++k) r.torque[k] += torque_per_step * steps[k];
 }
 
 }  // namespace flexspline::regression

@@ -14,7 +14,7 @@ namespace flexspline::regression {
 // Where that is more than half of it for certain, returns the step of the torque per step of the effort; else, as
 // behind a soft gear, nought. `prepared.pipeline.torque_per_step` must be nought still.
 double torque_per_held_step(const Prepared& prepared);
-// Adds the other half of the steps to `torque` of each free record (not to the inputs of effects).
-void complete_held_torque(Prepared& prepared, double torque_per_step);
+// Adds the other half of the steps to `torque` of a record (not to the inputs of effects), where it is free.
+void complete_held_torque(Record& record, const catalogue::DriveConstants<double>& constants, double torque_per_step);
 
 }  // namespace flexspline::regression

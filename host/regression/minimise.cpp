@@ -2,6 +2,7 @@
 
 #include <ceres/ceres.h>
 
+#include <algorithm>
 #include <cmath>
 #include <exception>
 
@@ -16,13 +17,15 @@ class Cost final : public ceres::CostFunction {
     mutable_parameter_block_sizes()->push_back(static_cast<int>(unknowns));
   }
   bool Evaluate(double const* const* parameters, double* residuals, double** jacobians) const override {
-    if (failure_) return false;
     try {
-      return evaluate(parameters[0], residuals, jacobians);
+      if (!failure_) return evaluate(parameters[0], residuals, jacobians);
     } catch (...) {  // not through the solver, which expects none
       failure_ = std::current_exception();
-      return false;
     }
+    // Nothing is left to do: it ends at once, and has nothing to say about it on the terminal.
+    std::fill_n(residuals, count_, 0.0);
+    if (jacobians && jacobians[0]) std::fill_n(jacobians[0], count_ * static_cast<Eigen::Index>(unknowns_), 0.0);
+    return true;
   }
   const std::exception_ptr& failure() const { return failure_; }
 

@@ -5,9 +5,11 @@
 #include <algorithm>
 #include <cmath>
 #include <numeric>
+#include <utility>
 
 #include "host/regression/giving_up.hpp"
 #include "host/regression/held_torque.hpp"
+#include "host/regression/in_parallel.hpp"
 #include "host/signals/butterworth.hpp"
 #include "host/signals/cutoff.hpp"
 #include "host/signals/differentiate.hpp"
@@ -325,23 +327,20 @@ Pipeline choose_pipeline(const std::vector<const Experiment*>& experiments, cons
             fmt::format("give --cutoff-hz between 0.1 and {:.4g}", 0.45 * slowest_hz)}});
     return pipeline;
   }
-  std::vector<signals::CutoffChoice> choices;
   std::vector<const Experiment*> of_choice;
-  for (const Experiment* e : experiments) {
-    const bool current = e->has(Column::current);
-    if (!current && !e->has(Column::motor_torque)) continue;
-    const std::vector<double>& effort = current ? (*e)[Column::current] : (*e)[Column::motor_torque];
-    const double sample_hz = 1.0 / e->sample_s;
-    std::vector<double> velocity;
-    if (e->has(Column::motor_position))
-      velocity = slope_of((*e)[Column::motor_position], e->segments, e->sample_s);
-    else if (e->has(Column::motor_velocity))
-      velocity = (*e)[Column::motor_velocity];
-    else
-      continue;
-    choices.push_back(signals::choose_cutoff(effort, velocity, sample_hz));
-    of_choice.push_back(e);
-  }
+  for (const Experiment* e : experiments)
+    if ((e->has(Column::current) || e->has(Column::motor_torque)) &&
+        (e->has(Column::motor_position) || e->has(Column::motor_velocity)))
+      of_choice.push_back(e);
+  std::vector<signals::CutoffChoice> choices(of_choice.size());
+  in_parallel(of_choice.size(), [&](std::size_t i) {
+    const Experiment& e = *of_choice[i];
+    const std::vector<double>& effort = e[e.has(Column::current) ? Column::current : Column::motor_torque];
+    const std::vector<double> velocity = e.has(Column::motor_position)
+                                             ? slope_of(e[Column::motor_position], e.segments, e.sample_s)
+                                             : e[Column::motor_velocity];
+    choices[i] = signals::choose_cutoff(effort, velocity, 1.0 / e.sample_s);
+  });
   if (choices.empty())
     throw data::DataError({{data::Severity::error, "missing_column", "", 0, "current_a",
                             "no experiment has both an effort (current_a or motor_torque_nm) and a motion of the motor",
@@ -354,30 +353,89 @@ Pipeline choose_pipeline(const std::vector<const Experiment*>& experiments, cons
   return pipeline;
 }
 
-}  // namespace
+// Facts of the drive that a record is made with.
+bool are_alike(const catalogue::DriveConstants<double>& a, const catalogue::DriveConstants<double>& b) {
+  return a.gear_ratio == b.gear_ratio && a.torque_constant == b.torque_constant &&
+         a.reference_temperature == b.reference_temperature && a.turn_angle_scale == b.turn_angle_scale;
+}
 
-Prepared prepare_with(const std::vector<const Experiment*>& experiments, const model::Drive& drive,
-                      const Pipeline& pipeline) {
+// All but the records. Where efforts are torques, the constant counts from the first such experiment on.
+Prepared without_records(const std::vector<const Experiment*>& experiments, const model::Drive& drive,
+                         const Pipeline& pipeline) {
   Prepared prepared;
   prepared.pipeline = pipeline;
   prepared.constants = catalogue::constants_of(drive);
   prepared.rotary = drive.axis == data::Axis::rotary;
   for (const Experiment* e : experiments) {
-    ask_whether_to_give_up();
     if (!e->has(Column::current)) prepared.constants.torque_constant = drive.torque_constant_nm_a.value.value_or(1.0);
-    prepared.records.push_back(prepare_one(*e, prepared.constants, pipeline));
     prepared.torque_measured = prepared.torque_measured || e->has(Column::torque);
     prepared.effort_is_current = prepared.effort_is_current || e->has(Column::current);
   }
-  complete_held_torque(prepared, pipeline.torque_per_step);
+  return prepared;
+}
+
+}  // namespace
+
+Prepared prepare_with(const std::vector<const Experiment*>& experiments, const model::Drive& drive,
+                      const Pipeline& pipeline, const Prepared* ready) {
+  Prepared prepared = without_records(experiments, drive, pipeline);
+  prepared.records.resize(experiments.size());
+  const bool is_ready =
+      ready != nullptr && ready->pipeline == pipeline && are_alike(ready->constants, prepared.constants);
+  std::vector<std::size_t> missing;
+  std::vector<catalogue::DriveConstants<double>> constants;
+  catalogue::DriveConstants<double> so_far = catalogue::constants_of(drive);
+  for (std::size_t i = 0; i < experiments.size(); ++i) {
+    if (!experiments[i]->has(Column::current)) so_far.torque_constant = prepared.constants.torque_constant;
+    if (is_ready) {
+      const auto found = std::ranges::find(ready->records, experiments[i], &Record::experiment);
+      if (found != ready->records.end()) {
+        prepared.records[i] = *found;
+        continue;
+      }
+    }
+    missing.push_back(i);
+    constants.push_back(so_far);
+  }
+  std::vector<Record> made(missing.size());
+  in_parallel(missing.size(), [&](std::size_t m) {
+    ask_whether_to_give_up();
+    made[m] = prepare_one(*experiments[missing[m]], constants[m], pipeline);
+    complete_held_torque(made[m], prepared.constants, pipeline.torque_per_step);
+  });
+  for (std::size_t m = 0; m < made.size(); ++m) prepared.records[missing[m]] = std::move(made[m]);
   return prepared;
 }
 
 Prepared prepare(const std::vector<const Experiment*>& experiments, const model::Drive& drive,
                  const PipelineOptions& options) {
+  if (options.ready && options.ready->chosen_on == experiments &&
+      are_alike(options.ready->constants, without_records(experiments, drive, {}).constants)) {
+    Prepared prepared = prepare_with(experiments, drive, options.ready->pipeline, options.ready.get());
+    prepared.chosen_on = experiments;
+    return prepared;
+  }
   Prepared prepared = prepare_with(experiments, drive, choose_pipeline(experiments, options));
   prepared.pipeline.torque_per_step = torque_per_held_step(prepared);
-  complete_held_torque(prepared, prepared.pipeline.torque_per_step);
+  for (Record& record : prepared.records)
+    complete_held_torque(record, prepared.constants, prepared.pipeline.torque_per_step);
+  prepared.chosen_on = experiments;
+  return prepared;
+}
+
+Prepared prepare_all(const data::Dataset& dataset, const model::Drive& drive, const PipelineOptions& options) {
+  std::vector<const Experiment*> all, fit;
+  for (const Experiment& e : dataset.experiments) {
+    all.push_back(&e);
+    if (e.role == data::Role::fit) fit.push_back(&e);
+  }
+  if (fit.empty()) fit = all;
+  Prepared prepared = prepare(fit, drive, options);
+  if (fit.size() == all.size()) return prepared;
+  const Prepared* ready =
+      options.ready && options.ready->records.size() == all.size() ? options.ready.get() : &prepared;
+  prepared = prepare_with(all, drive, prepared.pipeline, ready);
+  prepared.chosen_on = std::move(fit);
   return prepared;
 }
 

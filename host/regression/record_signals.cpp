@@ -127,9 +127,9 @@ void RecordSignals::copy(std::size_t first, std::span<Inputs> to, unsigned reads
   if (reads & kTemperature) along([&](Inputs& in, std::size_t k) { in.temperature = temperature_at(k); });
 }
 
-RecordSignals::Inputs RecordSignals::operator[](std::size_t sample) const {
+RecordSignals::Inputs RecordSignals::at(std::size_t sample, unsigned reads) const {
   Inputs in;
-  copy(sample, {&in, 1});
+  copy(sample, {&in, 1}, reads);
   return in;
 }
 

@@ -60,8 +60,9 @@ class RecordSignals {
   void resize(std::size_t samples) { size_ = samples; }
   std::size_t size() const { return size_; }
 
-  // All signals of a sample: for single samples; `copy` costs less along many.
-  Inputs operator[](std::size_t sample) const;
+  // Signals of a sample, all or at least those that `reads` names: for single samples; `copy` costs less along many.
+  Inputs operator[](std::size_t sample) const { return at(sample, ~0U); }
+  Inputs at(std::size_t sample, unsigned reads) const;
   // Signals of the samples from `first` on; at least those that `reads` (bits of effects::Signals) names.
   void copy(std::size_t first, std::span<Inputs> to, unsigned reads = ~0U) const;
   // The same for what takes inputs a stretch at a time. Not to be used any longer than this.

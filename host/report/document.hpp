@@ -8,6 +8,7 @@
 #include <vector>
 
 #include "host/blackbox/specification.hpp"
+#include "host/comparison/compare.hpp"
 #include "host/data/dataset.hpp"
 #include "host/diagnosis/add.hpp"
 #include "host/diagnosis/diagnosis.hpp"
@@ -26,7 +27,7 @@ struct Subject {
   std::optional<model::Model> before{};  // without what was added
   regression::PipelineOptions pipeline{};
   std::vector<blackbox::Specification> beside{};  // black boxes to stand beside `model`
-  bool free_runs = true;                          // else the balances alone
+  comparison::Extent extent{};                    // of what is compared
   // Each only where the command has it.
   std::vector<regression::Estimate> estimates{};  // of `model`
   std::vector<diagnosis::Diagnosis> rounds{};     // the first of `before` where there is one

@@ -9,6 +9,7 @@
 #include "host/comparison/residual_map.hpp"
 #include "host/comparison/row_variables.hpp"
 #include "host/output/json.hpp"
+#include "host/regression/in_parallel.hpp"
 #include "host/regression/least_squares.hpp"
 #include "host/report/parts.hpp"
 
@@ -96,9 +97,10 @@ std::vector<double> centres(const Bins& bins, const Eigen::VectorXd& values) {
 // Each record has a phase of its own, so that no common zero of the angle is needed; one that sees less than some whole
 // waves stands aside.
 std::vector<double> order_amplitudes(const View& view, const BalanceView& balance, const Eigen::VectorXd& residual) {
-  std::vector<double> amplitudes;
+  std::vector<double> amplitudes(kOrders);
   const auto at = regression::index(balance.data->balance());
-  for (int order = 1; order <= kOrders; ++order) {
+  regression::in_parallel(amplitudes.size(), [&](std::size_t of_order) {
+    const auto order = static_cast<double>(of_order + 1);
     const double per_unit = order * view.prepared.constants.turn_angle_scale;
     double squares = 0.0, rows = 0.0;
     for (const regression::RowRange& range : balance.data->records()) {
@@ -119,8 +121,8 @@ std::vector<double> order_amplitudes(const View& view, const BalanceView& balanc
       squares += 0.5 * (theta[1] * theta[1] + theta[2] * theta[2]) * static_cast<double>(range.size());
       rows += static_cast<double>(range.size());
     }
-    amplitudes.push_back(rows > 0.0 ? std::sqrt(2.0 * squares / rows) : std::numeric_limits<double>::quiet_NaN());
-  }
+    amplitudes[of_order] = rows > 0.0 ? std::sqrt(2.0 * squares / rows) : std::numeric_limits<double>::quiet_NaN();
+  });
   return amplitudes;
 }
 
@@ -171,10 +173,11 @@ json residual_maps(const View& view) {
     const Eigen::VectorXd directions = comparison::row_directions(*balance.data);
     const std::vector<comparison::Share> shares =
         comparison::localise(*balance.data, View::shown(balance), balance.autocorrelation_time, view.axis());
-    std::vector<json> maps;
-    for (const comparison::RowVariable& variable : comparison::row_variables(*balance.data, view.axis()))
-      if (json map = map_of(view, balance, variable, shares, directions); !map.is_null())
-        maps.push_back(std::move(map));
+    const std::vector<comparison::RowVariable> variables = comparison::row_variables(*balance.data, view.axis());
+    std::vector<json> maps(variables.size());
+    regression::in_parallel(maps.size(),
+                            [&](std::size_t v) { maps[v] = map_of(view, balance, variables[v], shares, directions); });
+    std::erase_if(maps, [](const json& map) { return map.is_null(); });
     const auto strength = [](const json& m) {
       return std::max(m["share_percent"].get<double>(), m["share_with_direction_percent"].get<double>());
     };

@@ -13,6 +13,7 @@
 namespace flexspline::report {
 
 struct BalanceView {
+  regression::Balance balance = regression::Balance::motor;
   std::unique_ptr<regression::BalanceData> data;
   std::string signal;  // "motor_balance"
   std::string unit;
@@ -40,9 +41,11 @@ struct View {
   const data::Dataset& dataset;
   model::Model model;
   std::optional<model::Model> model_before;
+  // What is compared, too: made once, and not at all where the subject's pipeline brings it along.
+  std::shared_ptr<const regression::Prepared> ready;
+  const regression::Prepared& prepared;
   comparison::Comparison comparison;
   std::optional<comparison::Comparison> comparison_before;
-  regression::Prepared prepared;
   regression::Terms terms;
   std::optional<regression::Terms> terms_before;
   std::vector<BalanceView> balances;

@@ -8,7 +8,9 @@
 #include <fstream>
 #include <nlohmann/json.hpp>
 #include <set>
+#include <utility>
 
+#include "host/regression/giving_up.hpp"
 #include "host/workbench/gate.hpp"
 #include "host/workbench/work.hpp"
 
@@ -264,15 +266,23 @@ void Api::start_step(const std::shared_ptr<Session>& session, const std::string&
 }
 
 void Api::start_diagnosis(const std::shared_ptr<Session>& session) {
-  session->start("Looking for what is missing",
-                 [pipeline = setup_.pipeline, session = session.get()](const Progress& say) {
-                   const std::shared_ptr<Step> step = session->history().current();
-                   if (step->diagnosed()) return;
-                   diagnosis::Options how;
-                   how.pipeline = pipeline;
-                   how.progress = say;
-                   step->found(diagnosis::diagnose(*step->dataset, step->model, how));
-                 });
+  session->start(
+      "Looking for what is missing",
+      [session = session.get()](const Progress& say) {
+        const std::shared_ptr<Step> step = session->history().current();
+        step->diagnose(
+            [&] {
+              diagnosis::Options how;
+              how.pipeline = step->pipeline;
+              how.progress = say;
+              return diagnosis::diagnose(*step->dataset, step->model, how);
+            },
+            [&, is_told = false]() mutable {
+              regression::ask_whether_to_give_up();
+              if (!std::exchange(is_told, true)) say("another tab is at it");
+            });
+      },
+      true);
 }
 
 void Api::start_pack(const std::shared_ptr<Session>& session) {

@@ -85,7 +85,7 @@ class Turn {
 
 }  // namespace
 
-LiveDrive::LiveDrive(std::string drive) : given_(std::move(drive)) {
+LiveDrive::LiveDrive(std::string drive, Reaching reaching) : given_(std::move(drive)), reaching_(std::move(reaching)) {
   listener_ = std::thread([this] { listen(); });
 }
 
@@ -104,12 +104,79 @@ void LiveDrive::read_block() {
   scales_ = drive::scales_of(active_);
 }
 
-void LiveDrive::lose(const std::string& why) {
+void LiveDrive::forget(const std::string& why) {
   session_.reset();
   scales_.reset();
   active_.clear();
-  subscribed_ = false;
+  again_.reset();
+  subscribed_ = came_back_ = false;
   problem_ = why;
+}
+
+// The drive is gone and nobody wanted that.
+void LiveDrive::lose(const std::string& why) {
+  if (!session_) return;
+  // One that does not stay is not tried as often.
+  pause_ = Clock::now() - back_ < reaching_.most ? std::min(2 * pause_, reaching_.most) : reaching_.first;
+  Again again{drive_, session_->serial(), 0, "", Clock::now() + pause_};
+  forget(why);
+  again_ = std::move(again);
+}
+
+// What a drive is asked for; that it is gone is seen here, also while nobody looks at its signals.
+template <class Act>
+auto LiveDrive::seeing_losses(const Act& act) {
+  try {
+    return act();
+  } catch (const transport::LinkError& gone) {
+    lose(gone.what());
+    throw;
+  }
+}
+
+void LiveDrive::try_again() {
+  std::string drive;
+  std::uint64_t wish = 0;
+  {
+    const std::lock_guard lock(mutex_);
+    if (!again_ || Clock::now() < again_->next) return;
+    drive = again_->drive;
+    wish = wishes_;
+  }
+  // Others go on while it is opened: that may take seconds.
+  std::unique_ptr<drive::Session> session;
+  std::string why;
+  try {
+    session = std::make_unique<drive::Session>(reaching_.open(drive));
+  } catch (const std::exception& error) {
+    why = error.what();
+  }
+  const Turn turn(mutex_, waiting_);
+  if (!again_ || wish != wishes_) return;
+  if (session && session->serial() != again_->serial)
+    return forget(fmt::format("{} was lost; at {} there is another drive now, {}: connect it if you want that one",
+                              again_->serial, drive, session->serial()));
+  if (session) {
+    const Again before = *again_;
+    const std::string lost = problem_;
+    try {
+      session_ = std::move(session);
+      read_block();
+      again_.reset();
+      problem_.clear();
+      came_back_ = true;
+      back_ = Clock::now();
+      return;
+    } catch (const std::exception& error) {
+      forget(lost);
+      again_ = before;
+      why = error.what();
+    }
+  }
+  ++again_->attempts;
+  again_->why = why;
+  pause_ = std::min(2 * pause_, reaching_.most);
+  again_->next = Clock::now() + pause_;
 }
 
 void LiveDrive::connect(const std::string& drive) {
@@ -118,14 +185,16 @@ void LiveDrive::connect(const std::string& drive) {
     throw drive::DriveError(fmt::format("\"{}\" is not in reach; start the workbench with --drive {}", drive, drive));
   const Turn turn(mutex_, waiting_);
   if (away_) require();
-  lose("");
+  ++wishes_;
+  forget("");
+  drive_ = drive;
   // A socket is a twin's (host/transport/link.hpp).
   simulated_ = drive == "twin" || drive.starts_with("tcp:");
   try {
-    session_ = std::make_unique<drive::Session>(transport::open_link(drive));
+    session_ = std::make_unique<drive::Session>(reaching_.open(drive));
     read_block();
   } catch (const std::exception& error) {
-    lose(error.what());
+    forget(error.what());
     throw;
   }
 }
@@ -133,7 +202,8 @@ void LiveDrive::connect(const std::string& drive) {
 void LiveDrive::disconnect() {
   const Turn turn(mutex_, waiting_);
   if (away_) require();
-  lose("");
+  ++wishes_;
+  forget("");
 }
 
 json LiveDrive::in_reach() const {
@@ -154,8 +224,9 @@ json LiveDrive::status() const {
 }
 
 json LiveDrive::told() const {
-  json answer{{"given", given_}, {"connected", session_ != nullptr}, {"problem", problem_}, {"block", nullptr},
-              {"moving", false}, {"simulated", simulated_}};
+  json answer{{"given", given_}, {"connected", session_ != nullptr}, {"problem", problem_},     {"block", nullptr},
+              {"moving", false}, {"simulated", simulated_},          {"came_back", came_back_}, {"again", nullptr}};
+  if (again_) answer["again"] = {{"drive", again_->drive}, {"attempts", again_->attempts}, {"why", again_->why}};
   if (session_) {
     answer["name"] = session_->name();
     answer["serial"] = session_->serial();
@@ -168,29 +239,33 @@ json LiveDrive::told() const {
 json LiveDrive::flash(const model::Model& model, const std::function<void(std::string_view)>& say) {
   const Turn turn(mutex_, waiting_);
   require();
-  say("proving the block and comparing it with double");
-  read_block();
-  const drive::ModelBlock made = drive::model_block(*session_, active_, model);
-  const auto changes = drive::changes(active_, made.bytes);
-  const drive::BlockView before = drive::view_of(active_), after = drive::view_of(made.bytes);
-  const bool is_new = made.bytes != active_;
-  if (is_new)
-    session_->write_block(
-        made.bytes, [&](std::size_t sent) { say(fmt::format("flashing: {} of {} bytes", sent, made.bytes.size())); });
-  read_block();
-  subscribed_ = false;
-  return {{"before", view_json(before)}, {"after", view_json(after)}, {"changes", changes_json(changes)},
-          {"warnings", made.warnings},   {"flashed", is_new},         {"drive", session_->serial()}};
+  return seeing_losses([&]() -> json {
+    say("proving the block and comparing it with double");
+    read_block();
+    const drive::ModelBlock made = drive::model_block(*session_, active_, model);
+    const auto changes = drive::changes(active_, made.bytes);
+    const drive::BlockView before = drive::view_of(active_), after = drive::view_of(made.bytes);
+    const bool is_new = made.bytes != active_;
+    if (is_new)
+      session_->write_block(
+          made.bytes, [&](std::size_t sent) { say(fmt::format("flashing: {} of {} bytes", sent, made.bytes.size())); });
+    read_block();
+    subscribed_ = came_back_ = false;
+    return {{"before", view_json(before)}, {"after", view_json(after)}, {"changes", changes_json(changes)},
+            {"warnings", made.warnings},   {"flashed", is_new},         {"drive", session_->serial()}};
+  });
 }
 
 json LiveDrive::restore() {
   const Turn turn(mutex_, waiting_);
   require();
-  const drive::BlockView before = drive::view_of(active_);
-  session_->restore();
-  read_block();
-  subscribed_ = false;
-  return {{"before", view_json(before)}, {"after", view_json(drive::view_of(active_))}};
+  return seeing_losses([&]() -> json {
+    const drive::BlockView before = drive::view_of(active_);
+    session_->restore();
+    read_block();
+    subscribed_ = came_back_ = false;
+    return {{"before", view_json(before)}, {"after", view_json(drive::view_of(active_))}};
+  });
 }
 
 json LiveDrive::residual_map() {
@@ -198,13 +273,15 @@ json LiveDrive::residual_map() {
   try {
     require();
     if (!scales_) throw drive::DriveError("the drive has no block, so nothing to compare its torque with; flash one");
-    const bool started = drive::start_residual_map(*session_);
-    const drive::ResidualMap map = drive::read_residual_map(*session_, *scales_);
-    const double limit_nm = drive::usual_map_limit_nm(*scales_);
-    json answer = drive::map_json(map, drive::judge(map, limit_nm), limit_nm);
-    answer["started"] = started;
-    answer["model"] = drive::view_of(active_).model;
-    return answer;
+    return seeing_losses([&]() -> json {
+      const bool started = drive::start_residual_map(*session_);
+      const drive::ResidualMap map = drive::read_residual_map(*session_, *scales_);
+      const double limit_nm = drive::usual_map_limit_nm(*scales_);
+      json answer = drive::map_json(map, drive::judge(map, limit_nm), limit_nm);
+      answer["started"] = started;
+      answer["model"] = drive::view_of(active_).model;
+      return answer;
+    });
   } catch (const std::runtime_error& error) {
     return {{"problem", error.what()}};
   }
@@ -213,7 +290,7 @@ json LiveDrive::residual_map() {
 void LiveDrive::reset_residual_map() {
   const Turn turn(mutex_, waiting_);
   require();
-  drive::reset_residual_map(*session_);
+  seeing_losses([&] { drive::reset_residual_map(*session_); });
 }
 
 // A recording has fewer signals than the page shows; the others stay empty while it moves.
@@ -281,8 +358,13 @@ void LiveDrive::move(const std::function<void(std::string_view)>& say) {
     const Turn turn(mutex_, waiting_);
     session_ = std::move(session);
     away_.reset();
+    try {
+      if (failure) std::rethrow_exception(failure);
+    } catch (const transport::LinkError& gone) {
+      lose(gone.what());
+      throw;
+    }
   }
-  if (failure) std::rethrow_exception(failure);
 }
 
 json LiveDrive::live(std::uint64_t since) {
@@ -301,6 +383,7 @@ json LiveDrive::live(std::uint64_t since) {
   return {{"connected", session_ != nullptr || away_ != nullptr},
           {"has_block", scales_.has_value()},
           {"problem", problem_},
+          {"attempts", again_ ? again_->attempts : 0},
           {"channels", std::move(channels)},
           {"rate_hz", kRateHz},
           {"next", count_},
@@ -310,6 +393,7 @@ json LiveDrive::live(std::uint64_t since) {
 
 void LiveDrive::listen() {
   while (!ends_) {
+    try_again();
     std::unique_lock lock(mutex_, std::defer_lock);
     if (waiting_ == 0) lock.lock();
     const bool wanted = lock.owns_lock() && session_ && scales_ && Clock::now() - asked_ < kIdle;

@@ -2,10 +2,13 @@
 #pragma once
 
 #include <atomic>
+#include <chrono>
 #include <deque>
+#include <functional>
 #include <memory>
 #include <mutex>
 #include <nlohmann/json_fwd.hpp>
+#include <optional>
 #include <string>
 #include <thread>
 #include <vector>
@@ -17,10 +20,18 @@
 
 namespace flexspline::workbench {
 
+// How a way to a drive is opened, and how often one that was lost is tried again: the pause doubles each time.
+struct Reaching {
+  std::function<std::unique_ptr<transport::Link>(const std::string&)> open = transport::open_link;
+  std::chrono::milliseconds first{1000}, most{10000};
+};
+
+// A drive that is lost (cable, power, a twin that ended) is connected again when it comes back, if it is the same one.
+// That alone: nothing that changes a drive is ever done a second time.
 class LiveDrive {
  public:
   // `drive` as --drive names it; empty: none was given.
-  explicit LiveDrive(std::string drive);
+  explicit LiveDrive(std::string drive, Reaching reaching = {});
   ~LiveDrive();
   LiveDrive(const LiveDrive&) = delete;
   LiveDrive& operator=(const LiveDrive&) = delete;
@@ -30,7 +41,8 @@ class LiveDrive {
   void connect(const std::string& drive);
   void disconnect();
   // {"given", "connected", "name", "serial", "board", "block": {"model", "bytes", "sha256"}, "problem", "moving",
-  // "simulated"}.
+  // "simulated", "came_back": it was lost meanwhile, "again": {"drive", "attempts", "why"} while a drive that was lost
+  // is tried, else null}.
   nlohmann::json status() const;
   // Drives in reach: [{"drive", "what", "usable", "problem"}]; a twin always.
   nlohmann::json in_reach() const;
@@ -46,26 +58,44 @@ class LiveDrive {
   // Others are moved by a person, with `flexspline record`. Throws DriveError, and what `say` throws, at rest.
   void move(const std::function<void(std::string_view)>& say);
 
-  // {"channels": [{"name", "unit"}], "rate_hz", "next", "mode", "samples": [[time_s, value, ...]]} from number `since`
-  // on; the first call begins to listen. Nothing is armed.
+  // {"channels": [{"name", "unit"}], "attempts": of a drive that was lost, "rate_hz", "next", "mode", "samples":
+  // [[time_s, value, ...]]} from number `since` on; the first call begins to listen. Nothing is armed.
   nlohmann::json live(std::uint64_t since);
 
  private:
   void require() const;
   void listen();
   void read_block();
+  void forget(const std::string& why);
   void lose(const std::string& why);
+  void try_again();
+  template <class Act>
+  auto seeing_losses(const Act& act);
   void show(const drive::Recording& so_far, double after_s);
   nlohmann::json told() const;
 
+  struct Again {
+    std::string drive, serial;
+    int attempts = 0;
+    std::string why;  // it did not work the last time
+    std::chrono::steady_clock::time_point next;
+  };
+
   const std::string given_;
+  const Reaching reaching_;
   mutable std::mutex mutex_;             // of all below
   mutable std::atomic<int> waiting_{0};  // requests that the listener lets pass first
   std::unique_ptr<drive::Session> session_;
   std::optional<drive::Scales> scales_;
   drive::Bytes active_;
   std::string problem_;
-  std::unique_ptr<nlohmann::json> away_;  // what status() says while a motion has the session; else null
+  std::string drive_;           // as it was named when it was connected
+  std::optional<Again> again_;  // while a drive that was lost is tried
+  std::uint64_t wishes_ = 0;    // how often a person connected or disconnected: an attempt that is on its way gives way
+  bool came_back_ = false;
+  std::chrono::steady_clock::time_point back_;  // when it did
+  std::chrono::milliseconds pause_{0};          // before the next attempt
+  std::unique_ptr<nlohmann::json> away_;        // what status() says while a motion has the session; else null
   bool simulated_ = false;
   struct Sample {
     double time_s = 0.0;

@@ -35,7 +35,8 @@ report::Subject subject_of(const data::Dataset& dataset, const model::Model& mod
   subject.pipeline = pipeline;
   subject.estimates = std::move(estimates);
   // Runs of all records take longer than all else; one that is looked at is made then.
-  subject.free_runs = false;
+  // Regions are seen in maps; how the error goes with frequency is not shown.
+  subject.extent = {.free_runs = false, .regions_and_gains = false};
   return subject;
 }
 

@@ -3,6 +3,7 @@
 #include <fmt/format.h>
 #include <httplib.h>
 
+#include <memory>
 #include <nlohmann/json.hpp>
 #include <thread>
 
@@ -37,9 +38,21 @@ Request request_of(const httplib::Request& http) {
   return request;
 }
 
+// As it is: what httplib has whole it compresses as small as can be, which takes longer than all else that an answer
+// does, and nothing of it has to go through a network. `owner` keeps the content.
+void put(httplib::Response& response, std::string_view content, const std::string& type,
+         std::shared_ptr<const void> owner = nullptr) {
+  if (content.empty()) return response.set_content("", type);
+  response.set_content_provider(
+      content.size(), type,
+      [content, owner = std::move(owner)](std::size_t offset, std::size_t length, httplib::DataSink& sink) {
+        return sink.write(content.data() + offset, length);
+      });
+}
+
 bool send_asset(const std::string& path, httplib::Response& response) {
   const auto send = [&](std::string_view content, const char* type) {
-    response.set_content(content.data(), content.size(), type);
+    put(response, content, type);
     return true;
   };
   if (path == "/") return send(kPage, "text/html; charset=utf-8");
@@ -76,11 +89,11 @@ void serve(Setup setup, const Serving& serving) {
   const auto handle = [&](const httplib::Request& http, httplib::Response& response) {
     const Request request = request_of(http);
     if (request.method == "GET" && send_asset(request.path, response)) return;
-    const Answer answer = api.answer(request);
-    response.status = answer.status;
-    if (!answer.download.empty())
-      response.set_header("Content-Disposition", fmt::format("attachment; filename=\"{}\"", answer.download));
-    response.set_content(answer.body, answer.type.c_str());
+    const auto answer = std::make_shared<const Answer>(api.answer(request));
+    response.status = answer->status;
+    if (!answer->download.empty())
+      response.set_header("Content-Disposition", fmt::format("attachment; filename=\"{}\"", answer->download));
+    put(response, answer->body, answer->type, answer);
   };
   server.Get(".*", handle);
   server.Post(".*", handle);

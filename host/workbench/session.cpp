@@ -77,9 +77,30 @@ std::shared_ptr<const diagnosis::Diagnosis> Step::diagnosed() const {
   const std::lock_guard lock(mutex_);
   return diagnosis_;
 }
-void Step::found(diagnosis::Diagnosis diagnosis) {
-  const std::lock_guard lock(mutex_);
-  diagnosis_ = std::make_shared<const diagnosis::Diagnosis>(std::move(diagnosis));
+void Step::diagnose(const std::function<diagnosis::Diagnosis()>& search, const std::function<void()>& wait) {
+  std::unique_lock lock(mutex_);
+  while (searching_ && !diagnosis_) {
+    searched_.wait_for(lock, std::chrono::milliseconds(50));
+    lock.unlock();
+    wait();
+    lock.lock();
+  }
+  if (diagnosis_) return;
+  searching_ = true;
+  lock.unlock();
+  std::shared_ptr<const diagnosis::Diagnosis> found;
+  std::exception_ptr failure;
+  try {
+    found = std::make_shared<const diagnosis::Diagnosis>(search());
+  } catch (...) {
+    failure = std::current_exception();
+  }
+  lock.lock();
+  diagnosis_ = std::move(found);
+  searching_ = false;
+  searched_.notify_all();
+  lock.unlock();
+  if (failure) std::rethrow_exception(failure);
 }
 
 Session::Session(std::string id, std::shared_ptr<Step> first)
@@ -154,7 +175,7 @@ void Session::set_problem(const std::string& during, const std::exception_ptr& e
   set("problem", problem_json(during, error));
 }
 
-void Session::start(const std::string& what, std::function<void(const Progress&)> run) {
+void Session::start(const std::string& what, std::function<void(const Progress&)> run, bool by_itself) {
   const std::lock_guard lock(mutex_);
   if (work_) throw BusyError(fmt::format("{} is still running; wait, or cancel it", work_->what));
   std::erase_if(ended_, [](const std::shared_ptr<Work>& w) {
@@ -166,7 +187,7 @@ void Session::start(const std::string& what, std::function<void(const Progress&)
   work->what = what;
   work->began = std::chrono::steady_clock::now();
   work_ = work;
-  parts_->erase("problem");
+  if (!by_itself) parts_->erase("problem");
   changed();
   work->thread = std::thread([this, work, run = std::move(run)] {
     const Progress say = [&](std::string_view stage) {

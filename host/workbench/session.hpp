@@ -28,7 +28,7 @@ struct Step {
   std::string model_text;  // of its file, comments of the user's file in it
   std::vector<regression::Estimate> estimates;
   std::vector<std::string> warnings;
-  regression::PipelineOptions pipeline;
+  regression::PipelineOptions pipeline;          // with the records of `dataset`
   std::unique_ptr<const nlohmann::json> errors;  // Look::errors()
 
   Step();
@@ -36,12 +36,17 @@ struct Step {
   // A look takes much memory: it is made again where it was forgotten.
   std::shared_ptr<Look> look() const;
   void forget_look() const;
-  // Found once for all tabs that have this step.
+  // Null while it is not known.
   std::shared_ptr<const diagnosis::Diagnosis> diagnosed() const;
-  void found(diagnosis::Diagnosis diagnosis);
+  // Found once for all tabs that have this step: who comes while another one searches waits for what that finds, and
+  // searches itself where that one gave up. `wait` is called again and again meanwhile; what it throws ends the
+  // waiting.
+  void diagnose(const std::function<diagnosis::Diagnosis()>& search, const std::function<void()>& wait);
 
  private:
   mutable std::mutex mutex_;
+  std::condition_variable searched_;
+  bool searching_ = false;
   mutable std::shared_ptr<Look> look_;
   std::shared_ptr<const diagnosis::Diagnosis> diagnosis_;
 };
@@ -72,8 +77,8 @@ class Session {
   void change(const std::function<void(History<std::shared_ptr<Step>>&)>& change);
 
   // Runs `work` beside the server. What it throws becomes the session's problem. Throws BusyError while other work
-  // runs.
-  void start(const std::string& what, std::function<void(const Progress&)> work);
+  // runs. The problem before is forgotten, unless the work begins by itself: then nobody may have read it yet.
+  void start(const std::string& what, std::function<void(const Progress&)> work, bool by_itself = false);
   // Work ends at its next word to Progress, fits at their next set of columns; what it makes is thrown away.
   void cancel();
   bool works() const;

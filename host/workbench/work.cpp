@@ -49,6 +49,28 @@ bool has_values(const model::Model& model) {
                      [](const model::Effect& e) { return catalogue::missing_values(e).empty(); });
 }
 
+// The records of a data set, made once for all its steps: a fit, a comparison and a search begin with them.
+regression::PipelineOptions with_records(const std::shared_ptr<const data::Dataset>& dataset, const model::Model& model,
+                                         regression::PipelineOptions pipeline, const Progress& say) {
+  struct Kept {
+    std::shared_ptr<const data::Dataset> dataset;  // records point into it
+    regression::Prepared records;
+  };
+  say("filtering the measurements");
+  std::vector<std::string> said_by_the_fit;
+  pipeline.ready = nullptr;
+  const model::Drive drive = regression::reconcile(model.drive, *dataset, said_by_the_fit);
+  const auto kept = std::make_shared<const Kept>(Kept{dataset, regression::prepare_all(*dataset, drive, pipeline)});
+  pipeline.ready = {kept, &kept->records};
+  return pipeline;
+}
+
+// Those of the step before, whose data are the same.
+regression::PipelineOptions as_before(const Step& before, regression::PipelineOptions pipeline) {
+  pipeline.ready = before.pipeline.ready;
+  return pipeline;
+}
+
 std::shared_ptr<Step> identified(std::string action, std::string what, std::shared_ptr<const data::Dataset> dataset,
                                  const model::Model& model, const std::string& text,
                                  const regression::PipelineOptions& pipeline, const Progress& say) {
@@ -77,25 +99,27 @@ void require_same(const std::optional<double>& ours, const std::optional<double>
 
 std::shared_ptr<Step> open(std::shared_ptr<const data::Dataset> dataset, const model::ModelFile& file,
                            const regression::PipelineOptions& pipeline, const Progress& say) {
-  if (!has_values(file.model)) return identified("open", "", dataset, file.model, file.text, pipeline, say);
-  return made("open", "", std::move(dataset), file.model, file.text, {}, {}, pipeline, say);
+  const regression::PipelineOptions own = with_records(dataset, file.model, pipeline, say);
+  if (!has_values(file.model)) return identified("open", "", dataset, file.model, file.text, own, say);
+  return made("open", "", std::move(dataset), file.model, file.text, {}, {}, own, say);
 }
 
 std::shared_ptr<Step> with_effect(const Step& before, const std::string& effect,
                                   const regression::PipelineOptions& pipeline, const Progress& say) {
   say(fmt::format("adding {} and refitting", effect));
-  return of_change("add", effect, before, diagnosis::add(*before.dataset, before.model, effect, pipeline), pipeline,
-                   say);
+  const regression::PipelineOptions own = as_before(before, pipeline);
+  return of_change("add", effect, before, diagnosis::add(*before.dataset, before.model, effect, own), own, say);
 }
 
 std::shared_ptr<Step> without_effect(const Step& before, const std::string& id,
                                      const regression::PipelineOptions& pipeline, const Progress& say) {
   say(fmt::format("taking {} out and refitting", id));
-  return of_change("remove", id, before, diagnosis::remove(*before.dataset, before.model, id, pipeline), pipeline, say);
+  const regression::PipelineOptions own = as_before(before, pipeline);
+  return of_change("remove", id, before, diagnosis::remove(*before.dataset, before.model, id, own), own, say);
 }
 
 std::shared_ptr<Step> refitted(const Step& before, const regression::PipelineOptions& pipeline, const Progress& say) {
-  return identified("identify", "", before.dataset, before.model, before.model_text, pipeline, say);
+  return identified("identify", "", before.dataset, before.model, before.model_text, as_before(before, pipeline), say);
 }
 
 std::shared_ptr<Step> with_files(const Step& before, const std::filesystem::path& folder,
@@ -120,7 +144,8 @@ std::shared_ptr<Step> with_files(const Step& before, const std::filesystem::path
     finding.file = std::filesystem::path(finding.file).filename().string();
     all->findings.push_back(std::move(finding));
   }
-  return identified("data", names, all, before.model, before.model_text, pipeline, say);
+  return identified("data", names, all, before.model, before.model_text, with_records(all, before.model, pipeline, say),
+                    say);
 }
 
 std::string model_file(const Step& step) {
@@ -135,7 +160,7 @@ std::string report_page(const Step& step, const Step* before, const std::string&
   subject.model_name = step.model.name;
   subject.dataset = step.dataset.get();
   subject.model = step.model;
-  subject.pipeline = pipeline;
+  subject.pipeline = as_before(step, pipeline);
   subject.estimates = step.estimates;
   if (before && before->dataset == step.dataset) subject.before = before->model;
   if (before && before->diagnosed() && step.action == "add") subject.rounds.push_back(*before->diagnosed());

@@ -6,7 +6,7 @@
 #include <map>
 
 #include "host/estimation/estimate.hpp"
-#include "host/estimation/in_parallel.hpp"
+#include "host/regression/in_parallel.hpp"
 #include "tests/support/noisy_motor.hpp"
 
 namespace flexspline::testing {
@@ -43,7 +43,7 @@ struct Summary {
 std::map<std::string, Summary> over_seeds(const NoisyMotor& motor, Method method, int seeds,
                                           const regression::PipelineOptions& pipeline) {
   std::vector<std::map<std::string, Found>> all(static_cast<std::size_t>(seeds));
-  estimation::in_parallel(all.size(), [&](std::size_t s) { all[s] = fit(motor, method, 7001 + s, pipeline); });
+  regression::in_parallel(all.size(), [&](std::size_t s) { all[s] = fit(motor, method, 7001 + s, pipeline); });
   const std::map<std::string, double> truth = {
       {"inertia", motor.inertia}, {"viscous_friction", motor.viscous}, {"coulomb_friction", motor.coulomb}};
   std::map<std::string, Summary> result;

@@ -7,8 +7,8 @@
 #include <string>
 
 #include "host/diagnosis/add.hpp"
-#include "host/estimation/in_parallel.hpp"
 #include "host/regression/identify.hpp"
+#include "host/regression/in_parallel.hpp"
 #include "tests/support/twin_data.hpp"
 
 namespace flexspline {
@@ -38,7 +38,7 @@ std::map<std::string, Coverage> over_seeds(double friction_variation, const std:
   std::erase_if(demo.experiments, [](const plant::ExperimentPlan& e) { return e.holdout; });
   for (plant::ExperimentPlan& e : demo.experiments) e.duration_s = 6.0;
   truth = truth_of(testing::model_of(demo.drive, true, true));
-  estimation::in_parallel(seeds, [&](std::size_t s) {
+  regression::in_parallel(seeds, [&](std::size_t s) {
     const auto records = plant::record_all(demo.drive, demo.experiments, 7001 + s);
     const data::Dataset dataset = testing::dataset_of(demo.drive, records);
     const model::Model model = testing::model_of(demo.drive, false, false);

@@ -9,7 +9,9 @@
 #include <fstream>
 #include <future>
 #include <nlohmann/json.hpp>
+#include <thread>
 
+#include "host/diagnosis/add.hpp"
 #include "host/workbench/work.hpp"
 #include "tests/unit/comparison_test_drive.hpp"
 
@@ -206,6 +208,10 @@ TEST_F(WorkbenchApi, SaysWhatIsWrongWithADroppedFile) {
   EXPECT_EQ(finding["column"], "current_a");
   EXPECT_FALSE(finding["remedy"].get<std::string>().empty());
   EXPECT_EQ(state["experiments"].size(), 2u);
+  // The search that begins by itself does not take the message away.
+  act(tab, {{"do", "diagnose"}});
+  act(tab, {{"do", "cancel"}});
+  EXPECT_TRUE(settled(tab).contains("problem"));
   EXPECT_EQ(drop("dataset.toml", "format = \"flexspline-dataset/1\"\n"), 400);
   EXPECT_EQ(drop("../evil.csv", "time_s\n"), 400);
   EXPECT_EQ(drop("run.sh", "#!/bin/sh\n"), 400);
@@ -335,6 +341,57 @@ TEST(WorkbenchSession, WorkThatIsCancelledChangesNothingAndIsNotInTheWay) {
   go.set_value();
   session.cancel();
   EXPECT_FALSE(changed);
+}
+
+TEST_F(WorkbenchApi, StepsOfOneDataSetShareItsRecordsAndFitAsWithoutThem) {
+  const Step& opened = *first();
+  const auto say = [](std::string_view) {};
+  ASSERT_NE(opened.pipeline.ready, nullptr);
+  EXPECT_EQ(opened.pipeline.ready->records.size(), 2u);
+  const std::shared_ptr<Step> shared = without_effect(opened, "viscous_friction", {}, say);
+  EXPECT_EQ(shared->pipeline.ready, opened.pipeline.ready);
+  const diagnosis::Addition alone = diagnosis::remove(*opened.dataset, opened.model, "viscous_friction", {});
+  ASSERT_EQ(shared->model.effects.size(), alone.model.effects.size());
+  for (std::size_t e = 0; e < alone.model.effects.size(); ++e)
+    for (std::size_t p = 0; p < alone.model.effects[e].parameters.size(); ++p)
+      EXPECT_EQ(shared->model.effects[e].parameters[p].value, alone.model.effects[e].parameters[p].value);
+  EXPECT_DOUBLE_EQ((*shared->errors)["balances"][0]["holdout"].get<double>(), *alone.after.rmse_holdout);
+}
+
+TEST(WorkbenchStep, WhatIsMissingIsSearchedOnceForAllTabsAndAgainWhereASearchGaveUp) {
+  Step step;
+  struct GaveUp {};
+  std::promise<void> began, go;
+  std::atomic<int> searches{0}, waited{0};
+  std::thread first([&] {
+    EXPECT_THROW(step.diagnose(
+                     [&]() -> diagnosis::Diagnosis {
+                       ++searches;
+                       began.set_value();
+                       go.get_future().wait();
+                       throw GaveUp{};
+                     },
+                     [] {}),
+                 GaveUp);
+  });
+  began.get_future().wait();
+  // Who waits may go away.
+  EXPECT_THROW(step.diagnose([] { return diagnosis::Diagnosis{}; }, [] { throw GaveUp{}; }), GaveUp);
+  EXPECT_EQ(step.diagnosed(), nullptr);
+  const auto search = [&] {
+    ++searches;
+    return diagnosis::Diagnosis{};
+  };
+  std::thread second([&] { step.diagnose(search, [&] { ++waited; }); });
+  while (waited == 0) std::this_thread::yield();
+  EXPECT_EQ(searches, 1);
+  go.set_value();
+  first.join();
+  second.join();
+  EXPECT_EQ(searches, 2);
+  EXPECT_NE(step.diagnosed(), nullptr);
+  step.diagnose(search, [] {});
+  EXPECT_EQ(searches, 2) << "it is known";
 }
 
 TEST_F(WorkbenchApi, ARefitThatIsCancelledEndsWithinTheFit) {

@@ -50,7 +50,8 @@ function status(url, headers = {}) {
 const hil = join(tool, "..", "flexspline-hil");
 await run(hil, ["record", "--out", "rec", "--seed", "7", "--hide", "stribeck_gaussian", "--force"]);
 // A drive with the same hidden effect, which is asked over a socket; it goes faster than real time.
-const twin = spawn(hil, ["twin", "--serve", "0", "--fast", "--hide", "stribeck_gaussian", "--json", "twin.json"], { cwd: work, stdio: ["ignore", "ignore", "inherit"] });
+const serve = (port) => spawn(hil, ["twin", "--serve", port, "--fast", "--hide", "stribeck_gaussian", "--json", "twin.json"], { cwd: work, stdio: ["ignore", "ignore", "inherit"] });
+let twin = serve("0");
 let drive = "";
 while (!drive) {
   await new Promise((later) => setTimeout(later, 50));
@@ -260,6 +261,24 @@ try {
   await shot(page, "11-flashed");
   await accessible(page, "with a drive");
 
+  say("the drive is switched off and on again: it is connected by itself, and nothing is flashed by itself");
+  const off = new Promise((done) => twin.on("exit", done));
+  twin.kill("SIGINT");
+  await off;
+  await page.waitForSelector("[data-again]");
+  assert.match(await page.locator("[data-again]").innerText(), /The drive was lost.*as soon as it answers.*Stop trying/s);
+  await until(page, () => Number(document.querySelector("[data-again]")?.dataset.again) > 0);
+  await shot(page, "12-lost");
+  await accessible(page, "with a lost drive");
+  twin = serve(drive.split(":").pop());
+  await page.waitForSelector("[data-back]");
+  await until(page, () => Number(document.querySelector(".live")?.dataset.samples) > 20);
+  // A twin without a file for its flash memory begins with the block of its maker.
+  await page.locator("[data-flash]").click();
+  await page.waitForSelector("[data-flashed=yes]");
+  assert.equal(await page.locator("[data-back]").count(), 0);
+  await idle(page);
+
   say("a bad file is dropped");
   const transfer = await page.evaluateHandle(() => {
     const t = new DataTransfer();
@@ -269,13 +288,13 @@ try {
   await page.dispatchEvent("body", "drop", { dataTransfer: transfer });
   await page.waitForSelector(".note code");
   assert.match(await page.locator(".note").innerText(), /bad\.csv:3.*current_a/);
-  await shot(page, "12-bad-file");
+  await shot(page, "13-bad-file");
   assert.equal(await page.locator("body").getAttribute("data-step"), "1");
 
   if (process.env.FLEXSPLINE_LARGE_SHOT) {
     await page.setViewportSize({ width: 3840, height: 2160 });
     await page.getByRole("button", { name: "Dismiss" }).click();
-    for (const [tab, file] of [["Steps", "13-4k"], ["Closed loop", "14-4k-closed-loop"], ["Drive", "15-4k-drive"]]) {
+    for (const [tab, file] of [["Steps", "14-4k"], ["Closed loop", "15-4k-closed-loop"], ["Drive", "16-4k-drive"]]) {
       await page.getByRole("tab", { name: tab }).click();
       if (tab === "Drive") await page.getByRole("button", { name: "Residual map" }).click();
       await place(page.locator(".add"));
@@ -284,10 +303,10 @@ try {
     await page.setViewportSize({ width: 1280, height: 720 });
     await page.getByRole("button", { name: "Light or dark" }).click();
     await place(page.locator(".add"));
-    await shot(page, "16-dark-map");
+    await shot(page, "17-dark-map");
     await page.getByRole("tab", { name: "Closed loop" }).click();
     await place(page.locator(".add"));
-    await shot(page, "17-dark-closed-loop");
+    await shot(page, "18-dark-closed-loop");
     await accessible(page, "dark, with a closed loop");
   }
   assert.deepEqual(complaints, []);

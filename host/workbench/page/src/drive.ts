@@ -1,12 +1,12 @@
 // The drive: connect, flash, go back, and its signals live.
 import type uPlot from "uplot";
 import { get, type BlockView, type State } from "./api";
-import { button, el, fill, num, unit, words } from "./dom";
+import { announce, button, el, fill, num, unit, words } from "./dom";
 import { MapPart } from "./map";
 import { axes, Figure, line } from "./plots";
 
-interface Status { status: { given: string; connected: boolean; name?: string; serial?: string; board?: string; block: BlockView | null; problem: string; moving: boolean; simulated: boolean }; in_reach: { drive: string; what: string; usable: boolean; problem: string }[] }
-interface Live { connected: boolean; problem: string; channels: { name: string; unit: string }[]; next: number; mode: string; samples: number[][] }
+interface Status { status: { given: string; connected: boolean; name?: string; serial?: string; board?: string; block: BlockView | null; problem: string; moving: boolean; simulated: boolean; came_back: boolean; again: { drive: string; attempts: number; why: string } | null }; in_reach: { drive: string; what: string; usable: boolean; problem: string }[] }
+interface Live { connected: boolean; problem: string; attempts: number; channels: { name: string; unit: string }[]; next: number; mode: string; samples: number[][] }
 
 export class DrivePart {
   private readonly head = el("div", { class: "column" });
@@ -27,6 +27,7 @@ export class DrivePart {
   private timer = 0;
   private working = false;
   private asked = 0;
+  private lost = false;
   private state: State | null = null;
 
   constructor(private readonly run: (what: string, more?: Record<string, unknown>) => void) {
@@ -50,6 +51,10 @@ export class DrivePart {
     try {
       const status = await get<Status>("drive");
       if (asked !== this.asked) return;
+      const lost = status.status.again !== null;
+      if (lost && !this.lost) announce("The drive was lost. It is connected again when it answers.");
+      if (!lost && this.lost && status.status.connected) announce("The drive is connected again.");
+      this.lost = lost;
       this.status = status;
     } catch (error) {
       if (asked !== this.asked) return;
@@ -71,15 +76,23 @@ export class DrivePart {
     fill(this.choice, part("Live signals", false), part("Residual map", true), this.showsMap && s.connected ? this.map.actions : null);
     if (!s.connected) this.map.forget(); else if (this.showsMap) this.map.render(state, s.simulated, s.given || s.serial || "");
     const off = state.work !== null;
+    if (s.again) {
+      const tried = s.again.attempts ? ` Tried ${s.again.attempts} time${s.again.attempts > 1 ? "s" : ""}${s.again.why ? `, at last: ${s.again.why}` : ""}.` : "";
+      fill(this.head, el("div", { "data-again": s.again.attempts }, el("p", { class: "high" }, el("strong", {}, "The drive was lost. "), s.problem),
+        el("p", {}, `${s.again.drive} is connected again by itself as soon as it answers; what was being done to it is not done again.`, el("span", { class: "soft" }, tried)),
+        el("div", { class: "row actions" }, button("Stop trying", () => { this.status = null; this.run("disconnect"); }, { "data-stop": "" }))));
+      return;
+    }
     if (!s.connected) {
       fill(this.head, el("p", {}, "No drive is connected."), s.problem ? el("p", { class: "high" }, s.problem) : null,
         el("ul", { class: "reach" }, this.status.in_reach.map((d) => el("li", {}, button(`Connect ${d.drive}`, () => this.run("connect", { drive: d.drive }), { disabled: off || !d.usable, "data-connect": d.drive }), el("span", { class: "soft" }, d.usable ? d.what : d.problem)))));
       return;
     }
-    const f = state.flash;
+    const f = s.came_back ? undefined : state.flash;  // what it has in it now may be something else
     const changed = f?.changes.filter((c) => c.change !== "same") ?? [];
     fill(this.head, el("p", {}, el("strong", {}, `${s.serial} `), el("span", { class: "soft" }, `${s.board}; ${s.block ? `block “${s.block.model}”, ${s.block.bytes} bytes` : "no block"}`)),
       el("div", { class: "row actions" }, button("Flash this model", () => this.run("flash"), { class: "main", disabled: off, "data-flash": "" }), button("Go back to the block before", () => this.run("restore"), { disabled: off }), button("Disconnect", () => { this.status = null; this.run("disconnect"); }, { class: "quiet", disabled: off })),
+      s.came_back ? el("p", { class: "soft", "data-back": "" }, "It was lost and is connected again. Nothing was done to it meanwhile: look whether its block is the one that you want.") : null,
       f ? el("div", { class: "done", "data-flashed": f.flashed ? "yes" : "no" }, el("p", {}, f.flashed ? "✓ flashed, read back and in use" : "The drive has this block already."), f.warnings.map((w) => el("p", { class: "high" }, w)),
         el("ul", { class: "changes" }, changed.slice(0, 8).map((c) => el("li", {}, `${c.change} ${words(c.effect)}${c.parameter ? ` ${words(c.parameter)}: ${num(c.before, 5)} → ${num(c.after, 5)} ${unit(c.unit)}` : ""}`)), changed.length > 8 ? el("li", {}, `and ${changed.length - 8} more`) : null)) : null);
   }
@@ -92,7 +105,8 @@ export class DrivePart {
         const answer = await get<Live>("live", { since: this.next });
         if (answer.connected) this.take(answer);
         // A drive that went away while nobody did anything.
-        if (this.state && this.status && answer.connected !== this.status.status.connected) await this.refresh(this.state);
+        const known = this.status?.status;
+        if (this.state && known && (answer.connected !== known.connected || answer.attempts !== (known.again?.attempts ?? 0))) await this.refresh(this.state);
       } catch { /* said elsewhere */ }
       this.timer = window.setTimeout(() => void round(), 200);
     };

@@ -28,12 +28,13 @@ function complain(error: Error): void {
 function run(what: string, more: Record<string, unknown> = {}): void {
   local = null;
   if (what === "complain") return complain(new Error(String(more["what"])));
-  // A search for what is missing gives way to what the user wants.
-  const searching = state?.work?.what.startsWith("Looking") && what !== "cancel" && what !== "diagnose";
-  (searching ? act("cancel").then(() => act(what, more)) : act(what, more)).catch(complain);
+  // A search for what is missing gives way to what the user wants, and begins again where the model is the same then.
+  const searching = state?.work?.what.startsWith("Looking") && !["cancel", "diagnose", "dismiss", "disconnect", "empty-map"].includes(what);
+  (searching ? act("cancel").then(() => act(what, more)).finally(again) : act(what, more)).catch(complain);
 }
 
-const good = new Good(), where = new Where();
+// The search takes all cores, so what is to be seen first is drawn before it begins.
+const good = new Good(), where = new Where(() => setTimeout(() => { if (state) lookByItself(state); }, 50));
 const missing = new Missing((effect) => run("add", { effect }), () => run("diagnose"));
 const add = new Add(run);
 
@@ -91,9 +92,15 @@ function render(): void {
 // What is missing is looked for by itself, once for each step.
 function lookByItself(s: State): void {
   const key = `${s.at} ${s.steps.length} ${s.steps[s.at]?.what ?? ""}`;
-  if (s.diagnosis || s.work || wasDiagnosing === key) return;
+  if (s.diagnosis || s.work || !where.isShown || wasDiagnosing === key) return;
   wasDiagnosing = key;
-  run("diagnose");
+  // Something else may have begun meanwhile: then it is looked for after that.
+  act("diagnose").catch((error: Error) => { if (error instanceof Refusal && error.status === 409) wasDiagnosing = ""; else complain(error); });
+}
+// A search that gave way begins again.
+function again(): void {
+  wasDiagnosing = "";
+  if (state) lookByItself(state);
 }
 
 async function follow(): Promise<void> {
@@ -109,7 +116,9 @@ async function follow(): Promise<void> {
     } catch (error) {
       if (error instanceof Refusal && error.status === 404) return location.reload();
       document.body.classList.add("lost");
-      local = { during: "", what: "The workbench does not answer. Was it ended? This page goes on where it was when it answers again.", findings: [] };
+      const isOther = error instanceof Refusal && error.status === 403;
+      local = { during: "", what: isOther ? "Another workbench answers here: the one of this page has ended. Open the address that the new one printed."
+        : "The workbench does not answer. If it was ended, start it again and open the address that it prints; else this page goes on where it was when it answers.", findings: [] };
       problem(local);
       await new Promise((later) => setTimeout(later, 1500));
       local = null;
@@ -121,8 +130,9 @@ async function send(files: File[]): Promise<void> {
   local = null;
   if (!files.length) return;
   try {
-    if (state?.work?.what.startsWith("Looking")) await act("cancel");
-    await sendFiles(files);
+    const searching = state?.work?.what.startsWith("Looking");
+    if (searching) await act("cancel");
+    await sendFiles(files).finally(() => { if (searching) again(); });
   } catch (error) {
     complain(error as Error);
   }

@@ -36,7 +36,8 @@ export class Where {
   private state: State | null = null;
   private problem = "";
 
-  constructor() {
+  // `shown`: once the maps of a step are there, or cannot be.
+  constructor(private readonly shown: () => void) {
     this.figure.holder.addEventListener("keydown", (e) => this.pressed(e));
     this.list.addEventListener("keydown", (e) => {
       const rows = Array.from(this.list.querySelectorAll<HTMLElement>("[role=option]"));
@@ -62,12 +63,15 @@ export class Where {
     this.draw();
   }
 
+  get isShown(): boolean { return this.maps !== null || this.problem !== ""; }
+
   private async fetch(state: State, key: string): Promise<void> {
     try {
       const now = await get<Maps>("maps");
       if (key !== this.key) return;
       this.maps = now;
       this.draw();
+      this.shown();
       if (state.at > 0) {
         const before = await get<Maps>("maps", { step: state.at - 1 });
         if (key !== this.key) return;
@@ -78,6 +82,7 @@ export class Where {
       if (key !== this.key) return;
       this.problem = (error as Error).message;
       this.draw();
+      this.shown();
     }
   }
 

@@ -1,8 +1,9 @@
-// Independent pieces of work on all cores.
+// Independent pieces of work on all cores: records, balances, models. Results do not depend on how many there are.
 #pragma once
 
 #include <algorithm>
 #include <atomic>
+#include <cstddef>
 #include <exception>
 #include <mutex>
 #include <thread>
@@ -10,24 +11,28 @@
 
 #include "host/regression/giving_up.hpp"
 
-namespace flexspline::estimation {
+namespace flexspline::regression {
 
-// Calls work(i) for each i below count, on as many threads as there are cores. The first exception is thrown again
-// after all have ended.
+// Calls work(i) for each i below count, on as many threads as there are cores. After all have ended the exception of
+// the lowest i is thrown again: the one that a loop would have met.
 template <class Work>
 void in_parallel(std::size_t count, const Work& work) {
   std::atomic<std::size_t> next{0};
   std::exception_ptr failure;
+  std::size_t failed = count;
   std::mutex guard;
-  const regression::Asking* const asked = regression::asked_here();
+  const Asking* const asked = asked_here();
   const auto run = [&] {
-    const regression::MayGiveUp as_the_caller(asked);
+    const MayGiveUp as_the_caller(asked);
     for (std::size_t i = next++; i < count; i = next++) {
       try {
         work(i);
       } catch (...) {
         const std::lock_guard lock(guard);
-        if (!failure) failure = std::current_exception();
+        if (i < failed) {
+          failed = i;
+          failure = std::current_exception();
+        }
       }
     }
   };
@@ -39,4 +44,4 @@ void in_parallel(std::size_t count, const Work& work) {
   if (failure) std::rethrow_exception(failure);
 }
 
-}  // namespace flexspline::estimation
+}  // namespace flexspline::regression

@@ -1,0 +1,171 @@
+// host/workbench/live_drive: a drive that goes away and comes back.
+#include "host/workbench/live_drive.hpp"
+
+#include <gtest/gtest.h>
+
+#include <atomic>
+#include <nlohmann/json.hpp>
+#include <thread>
+
+#include "hil/twin/factory_block.hpp"
+#include "hil/twin/twin_drive.hpp"
+#include "host/deployment/bases.hpp"
+#include "tests/support/loopback.hpp"
+#include "tests/unit/comparison_test_drive.hpp"
+
+namespace flexspline::workbench {
+namespace {
+
+using nlohmann::json;
+using namespace std::chrono_literals;
+using protocol::Kind;
+
+constexpr const char* kPlace = "tcp:here";
+
+// A drive with a plug that can be pulled; counts what reaches the drive.
+struct Bench {
+  explicit Bench(std::string serial = "SN-1")
+      : drive({.drive = plant::demo_plant().drive, .serial = std::move(serial)}) {
+    drive.run(200);
+  }
+  twin::TwinDrive drive;
+  std::atomic<bool> plugged{true};
+  std::atomic<int> opened{0}, asked_to_open{0}, changes{0};
+  std::atomic<int> pulled_at_chunk{-1};  // of a block on its way to the drive
+};
+
+class Cable final : public transport::Link {
+ public:
+  explicit Cable(Bench& bench) : bench_(bench), line_(bench.drive, {}) {}
+  void send(const protocol::Message& m) override {
+    if (m.request() == Kind::block_chunk && bench_.pulled_at_chunk-- == 0) bench_.plugged = false;
+    require();
+    if (m.request() == Kind::block_chunk || m.request() == Kind::block_commit || m.request() == Kind::block_restore)
+      ++bench_.changes;
+    line_.send(m);
+  }
+  std::optional<protocol::Message> receive(transport::Milliseconds limit) override {
+    require();
+    return line_.receive(limit);
+  }
+  std::string name() const override { return kPlace; }
+
+ private:
+  void require() const {
+    if (!bench_.plugged) throw transport::LinkError("the plug was pulled");
+  }
+  Bench& bench_;
+  tests::Loopback line_;
+};
+
+Reaching reaching(const std::shared_ptr<std::atomic<Bench*>>& there) {
+  return {.open = [there](const std::string&) -> std::unique_ptr<transport::Link> {
+            Bench& bench = **there;
+            ++bench.asked_to_open;
+            if (!bench.plugged) throw transport::LinkError("nothing is plugged in");
+            ++bench.opened;
+            return std::make_unique<Cable>(bench);
+          },
+          .first = 1ms,
+          .most = 4ms};
+}
+
+class WorkbenchLiveDrive : public ::testing::Test {
+ protected:
+  WorkbenchLiveDrive() { live_.connect(kPlace); }
+  // Looks at the drive, as a page does, until this holds.
+  template <class Holds>
+  json until(Holds holds) {
+    for (;;) {
+      live_.live(0);
+      json status = live_.status();
+      if (holds(status)) return status;
+      std::this_thread::sleep_for(1ms);
+    }
+  }
+  static bool is_connected(const json& status) { return status["connected"].get<bool>(); }
+  static bool is_tried(const json& status) { return !status["again"].is_null() && status["again"]["attempts"] > 2; }
+
+  Bench bench_;
+  std::shared_ptr<std::atomic<Bench*>> there_ = std::make_shared<std::atomic<Bench*>>(&bench_);
+  LiveDrive live_{kPlace, reaching(there_)};
+};
+
+model::Model other_model() {
+  model::Model model = comparison::known_model(plant::demo_plant().drive);
+  for (model::Effect& effect : model.effects)
+    if (effect.type == "viscous_friction")
+      for (model::Parameter& p : effect.parameters) p.value = 1.2 * *p.value;
+  return model;
+}
+
+TEST_F(WorkbenchLiveDrive, ADriveThatWasLostIsConnectedAgainWhenItComesBackAndThatIsSaid) {
+  bench_.plugged = false;
+  json status = until(is_tried);
+  EXPECT_FALSE(is_connected(status));
+  EXPECT_EQ(status["problem"], "the plug was pulled");
+  EXPECT_EQ(status["again"]["drive"], kPlace);
+  EXPECT_EQ(status["again"]["why"], "nothing is plugged in");
+  EXPECT_EQ(bench_.opened, 1);
+  bench_.plugged = true;
+  status = until(is_connected);
+  EXPECT_EQ(status["came_back"], true);
+  EXPECT_EQ(status["problem"], "");
+  EXPECT_TRUE(status["again"].is_null());
+  EXPECT_EQ(status["serial"], "SN-1");
+  EXPECT_FALSE(status["block"].is_null());
+  // Its signals come again.
+  for (json live = live_.live(0); live["samples"].empty(); live = live_.live(0)) std::this_thread::sleep_for(1ms);
+  EXPECT_EQ(bench_.changes, 0);
+}
+
+TEST_F(WorkbenchLiveDrive, ADisconnectEndsTheAttempts) {
+  bench_.plugged = false;
+  until(is_tried);
+  live_.disconnect();
+  const json status = live_.status();
+  EXPECT_TRUE(status["again"].is_null());
+  EXPECT_EQ(status["problem"], "");
+  bench_.plugged = true;
+  // An attempt that was on its way may have been let in; what it brought is not taken.
+  for (int k = 0; k < 50; ++k) {
+    live_.live(0);
+    EXPECT_FALSE(is_connected(live_.status()));
+    std::this_thread::sleep_for(1ms);
+  }
+  EXPECT_LE(bench_.opened, 2);
+}
+
+TEST_F(WorkbenchLiveDrive, AFlashThatLostItsDriveIsAnErrorAndIsNotDoneAgain) {
+  const std::vector<std::uint8_t> before(bench_.drive.store().active().begin(), bench_.drive.store().active().end());
+  bench_.pulled_at_chunk = 2;
+  EXPECT_THROW(live_.flash(other_model(), [](std::string_view) {}), transport::LinkError);
+  EXPECT_FALSE(is_connected(live_.status())) << "seen where it happened";
+  EXPECT_EQ(bench_.changes, 2);
+  bench_.plugged = true;
+  until(is_connected);
+  for (json live = live_.live(0); live["samples"].empty(); live = live_.live(0)) std::this_thread::sleep_for(1ms);
+  EXPECT_EQ(bench_.changes, 2) << "nothing that changes the drive went to it by itself";
+  EXPECT_EQ(bench_.drive.store().sequence(), 1U);
+  EXPECT_TRUE(std::ranges::equal(bench_.drive.store().active(), before));
+  // A person may do it again.
+  EXPECT_EQ(live_.flash(other_model(), [](std::string_view) {})["flashed"], true);
+  EXPECT_EQ(bench_.drive.store().sequence(), 2U);
+}
+
+TEST_F(WorkbenchLiveDrive, AnotherDriveInItsPlaceIsNotConnected) {
+  Bench other("SN-2");
+  bench_.plugged = false;
+  until(is_tried);
+  *there_ = &other;
+  const json status = until([](const json& s) { return s["again"].is_null(); });
+  EXPECT_FALSE(is_connected(status));
+  EXPECT_NE(status["problem"].get<std::string>().find("another drive now, SN-2"), std::string::npos) << status;
+  // A person may.
+  live_.connect(kPlace);
+  EXPECT_EQ(live_.status()["serial"], "SN-2");
+  live_.disconnect();
+}
+
+}  // namespace
+}  // namespace flexspline::workbench
