@@ -55,8 +55,9 @@ TEST(BothBalances, AgreeOnWhatOneFitOfBothWouldFind) {
     const Eigen::Vector2d b(1.5, -0.7);
     const Balance told = balance(random, 200, b, 0.3), other = balance(random, 80, b, 0.05);
     const Whole alone = fit({told}, 2), both = fit({told, other}, 2), elsewhere = fit({other}, 2);
-    const Testimony says = testimony_of(other.shared, other.own, other.y - other.shared * alone.b,
-                                        Eigen::VectorXd::Constant(other.y.size(), 1.0 / other.noise), 1.0);
+    const Testimony says =
+        testimony_of(other.shared, other.own, other.y - other.shared * alone.b,
+                     Eigen::VectorXd(Eigen::VectorXd::Constant(other.y.size(), 1.0 / other.noise)), 1.0);
     const Agreement found = agree(scaled_inverse(alone.covariance), says);
     EXPECT_LT((alone.b + found.change - both.b).norm(), 1e-9 * both.b.norm());
     EXPECT_LT((found.covariance - both.covariance).norm(), 1e-9 * both.covariance.norm());
