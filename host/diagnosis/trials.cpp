@@ -155,6 +155,7 @@ Unexplained left_by(BalanceData& data, const Judged& base) {
   Unexplained left;
   left.root_weights = base.root_weights;
   left.residual = base.root_weights.cwiseProduct(base.residual);
+  if (base.linear.empty()) return left;
   const Eigen::MatrixXd X = base.root_weights.asDiagonal() * regression::columns_of(data, base.terms, base.linear);
   const Eigen::ColPivHouseholderQR<Eigen::MatrixXd> qr(X);
   left.own = qr.householderQ() * Eigen::MatrixXd::Identity(X.rows(), qr.rank());
