@@ -251,11 +251,7 @@ bool TwoMass::take_straight_step(double h) {
   const Shafts to = solve_straight(known, carried(from, middle, known.weight), middle);
   const bool goes_on = to.motor_direction * to.motor_velocity >= 0.0 && to.output_direction * to.output_velocity >= 0.0;
   if (!goes_on || !std::isfinite(to.motor_velocity + to.output_velocity + to.damping)) return false;
-  state_.motor_angle = to.motor_angle;
-  state_.motor_velocity = to.motor_velocity;
-  state_.output_angle = to.output_angle;
-  state_.output_velocity = to.output_velocity;
-  state_.damping = to.damping;
+  static_cast<Shafts&>(state_) = to;
   return true;
 }
 

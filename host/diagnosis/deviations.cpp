@@ -164,16 +164,4 @@ void add_sums(const Eigen::MatrixXd& triangle, const Eigen::VectorXd& theta, con
   sums.own += z.transpose() * z;
 }
 
-Eigen::MatrixXd directions(const std::vector<Group>& groups, const Eigen::VectorXd& theta, const Eigen::VectorXd& size,
-                           Eigen::Index first_shape) {
-  Eigen::MatrixXd u = Eigen::MatrixXd::Zero(theta.size(), static_cast<Eigen::Index>(groups.size()));
-  for (std::size_t g = 0; g < groups.size(); ++g) {
-    const auto column = static_cast<Eigen::Index>(g);
-    for (const Eigen::Index j : groups[g].columns) u(j, column) = theta[j];
-    for (const Group::Stays& s : groups[g].stays)
-      if (const Eigen::Index j = first_shape + s.shape; j < theta.size()) u(j, column) = -s.ratio * size[j];
-  }
-  return u;
-}
-
 }  // namespace flexspline::diagnosis

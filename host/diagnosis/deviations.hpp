@@ -12,6 +12,7 @@
 
 namespace flexspline::diagnosis {
 
+using regression::directions;
 using regression::friction_groups;
 using regression::Group;
 using regression::kFewestRecords;
@@ -61,9 +62,5 @@ Eigen::MatrixXd without_deviations(const Eigen::MatrixXd& triangle, const Eigen:
 // Sums of the error that `theta` (of the scaled columns) leaves in a triangle; adds to `sums`.
 void add_sums(const Eigen::MatrixXd& triangle, const Eigen::VectorXd& theta, const Eigen::MatrixXd& u, double rows,
               RecordSums& sums);
-// The groups' torques: columns of u are the groups' parameters (of columns over `size`), nought elsewhere. Columns of
-// free shapes, where there are any, begin at `first_shape`.
-Eigen::MatrixXd directions(const std::vector<Group>& groups, const Eigen::VectorXd& theta, const Eigen::VectorXd& size,
-                           Eigen::Index first_shape);
 
 }  // namespace flexspline::diagnosis

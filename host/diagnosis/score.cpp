@@ -216,19 +216,16 @@ SmallVector spread_for(const std::vector<Group>& groups, const Judged& judged) {
 }  // namespace
 
 regression::Whitening whitening_of(BalanceData& data, const Judged& judged) {
-  regression::Whitening whitening(judged.root_weights);
-  if (judged.groups.empty() || judged.deviations.std.maxCoeff() <= 0.0) return whitening;
+  if (judged.groups.empty()) return judged.root_weights;
   const auto first_shape = static_cast<Eigen::Index>(judged.linear.size());
   const bool stays =
       std::any_of(judged.groups.begin(), judged.groups.end(), [](const Group& g) { return !g.stays.empty(); });
   const Eigen::MatrixXd X =
       stays ? design(data, judged.terms, judged.linear) : regression::columns_of(data, judged.terms, judged.linear);
-  const Eigen::VectorXd theta = judged.theta.head(X.cols());
-  const Eigen::MatrixXd u = directions(judged.groups, theta, Eigen::VectorXd::Ones(X.cols()), first_shape);
-  const Eigen::MatrixXd along = judged.root_weights.asDiagonal() * (X * u) * judged.deviations.std.asDiagonal() /
-                                std::sqrt(judged.autocorrelation_time);
-  for (const RowRange& range : data.records()) whitening.vary(range, along.middleRows(range.first, range.size()));
-  return whitening;
+  const Eigen::MatrixXd u =
+      directions(judged.groups, judged.theta.head(X.cols()), Eigen::VectorXd::Ones(X.cols()), first_shape);
+  return regression::whitening_of(data, judged.root_weights, judged.root_weights.asDiagonal() * (X * u),
+                                  judged.deviations.std, judged.autocorrelation_time);
 }
 
 double squares_left(BalanceData& data, const Terms& terms, const Judged& judged) {

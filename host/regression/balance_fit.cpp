@@ -83,18 +83,11 @@ class Fitting {
 
   // What a factor of each group of friction does to the torque, of `columns`.
   Eigen::MatrixXd friction(const Eigen::MatrixXd& columns) const {
-    const std::vector<Group> groups = friction_groups(terms_, fit_.linear, fit_.shapes);
-    Eigen::MatrixXd torques = Eigen::MatrixXd::Zero(columns.rows(), static_cast<Eigen::Index>(groups.size()));
-    for (std::size_t g = 0; g < groups.size(); ++g) {
-      auto torque = torques.col(static_cast<Eigen::Index>(g));
-      for (const Eigen::Index j : groups[g].columns) {
-        const Slot& slot = fit_.linear[static_cast<std::size_t>(j)];
-        torque += terms_[slot.term].values[slot.parameter] * columns.col(j);
-      }
-      for (const Group::Stays& s : groups[g].stays)
-        torque -= s.ratio * columns.col(static_cast<Eigen::Index>(fit_.linear.size()) + s.shape);
-    }
-    return torques;
+    Eigen::VectorXd theta = Eigen::VectorXd::Zero(columns.cols());
+    for (std::size_t j = 0; j < fit_.linear.size(); ++j)
+      theta[static_cast<Eigen::Index>(j)] = terms_[fit_.linear[j].term].values[fit_.linear[j].parameter];
+    return columns * directions(friction_groups(terms_, fit_.linear, fit_.shapes), theta,
+                                Eigen::VectorXd::Ones(columns.cols()), static_cast<Eigen::Index>(fit_.linear.size()));
   }
 
  private:
@@ -102,15 +95,6 @@ class Fitting {
   Terms& terms_;
   BalanceFit& fit_;
 };
-
-// Errors at these weights that records have in common by their own friction, `torques` (weighted) being its directions.
-Whitening whitening_of(const BalanceData& data, const Eigen::VectorXd& root_weights, const Eigen::MatrixXd& torques,
-                       const BetweenRecords& between) {
-  Whitening whitening(root_weights);
-  const Eigen::MatrixXd along = torques * between.std.asDiagonal() / std::sqrt(between.autocorrelation_time);
-  for (const RowRange& range : data.records()) whitening.vary(range, along.middleRows(range.first, range.size()));
-  return whitening;
-}
 
 }  // namespace
 
@@ -135,23 +119,27 @@ BalanceFit fit_balance(BalanceData& data, Terms& terms) {
   fitting.solve(fit.root_weights);
   fit.whitening = fit.root_weights;
 
-  // Weights, and friction times them, of the rows without what the records' own friction does to them.
+  // Of the rows without what the records' own friction does to them.
   Eigen::VectorXd noise_weights = fit.root_weights;
-  Eigen::MatrixXd J = fitting.columns();
-  Eigen::MatrixXd torques = noise_weights.asDiagonal() * fitting.friction(J);
-  BetweenRecords between = between_records(data, torques, noise_weights.cwiseProduct(fit.residual));
+  Eigen::MatrixXd J, friction, torques;
+  BetweenRecords between;
+  const auto look_between = [&] {
+    J = fitting.columns();
+    friction = fitting.friction(J);
+    torques = noise_weights.asDiagonal() * friction;
+    between = between_records(data, torques, noise_weights.cwiseProduct(fit.residual));
+  };
+  look_between();
   constexpr int kGeneralised = 3;
   for (int round = 0; round < kGeneralised && between.std.size() > 0 && between.std.maxCoeff() > 0.0; ++round) {
     noise_weights = record_weights(data.records(), between.left.cwiseQuotient(noise_weights));
-    torques = noise_weights.asDiagonal() * fitting.friction(J);
-    fit.whitening = whitening_of(data, noise_weights, torques, between);
+    fit.whitening = whitening_of(data, noise_weights, noise_weights.asDiagonal() * friction, between.std,
+                                 between.autocorrelation_time);
     if (!fit.shapes.empty()) refine_shapes(data, terms, fit.on_balance, fit.whitening);
     fitting.solve(fit.whitening);
-    fit.root_weights = record_weights(data.records(), fit.residual);
-    J = fitting.columns();
-    torques = noise_weights.asDiagonal() * fitting.friction(J);
-    between = between_records(data, torques, noise_weights.cwiseProduct(fit.residual));
+    look_between();
   }
+  if (!fit.whitening.weights_only()) fit.root_weights = record_weights(data.records(), fit.residual);
 
   // Uncertainty of linear parameters and shapes together, to first order.
   const Eigen::VectorXd weighted = fit.root_weights.cwiseProduct(fit.residual);

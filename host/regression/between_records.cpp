@@ -131,6 +131,27 @@ BetweenRecords between_records(const BalanceData& data, const Eigen::MatrixXd& t
   return between;
 }
 
+Eigen::MatrixXd directions(const std::vector<Group>& groups, const Eigen::VectorXd& theta, const Eigen::VectorXd& size,
+                           Eigen::Index first_shape) {
+  Eigen::MatrixXd u = Eigen::MatrixXd::Zero(theta.size(), static_cast<Eigen::Index>(groups.size()));
+  for (std::size_t g = 0; g < groups.size(); ++g) {
+    const auto column = static_cast<Eigen::Index>(g);
+    for (const Eigen::Index j : groups[g].columns) u(j, column) = theta[j];
+    for (const Group::Stays& s : groups[g].stays)
+      if (const Eigen::Index j = first_shape + s.shape; j < theta.size()) u(j, column) = -s.ratio * size[j];
+  }
+  return u;
+}
+
+Whitening whitening_of(const BalanceData& data, const Eigen::VectorXd& root_weights, const Eigen::MatrixXd& torques,
+                       const Eigen::VectorXd& std, double autocorrelation_time) {
+  Whitening whitening(root_weights);
+  if (std.size() == 0 || std.maxCoeff() <= 0.0) return whitening;
+  const Eigen::MatrixXd along = torques * std.asDiagonal() / std::sqrt(autocorrelation_time);
+  for (const RowRange& range : data.records()) whitening.vary(range, along.middleRows(range.first, range.size()));
+  return whitening;
+}
+
 Eigen::MatrixXd with_differences(const BetweenRecords& between, const BalanceData& data, const Eigen::MatrixXd& torques,
                                  const Eigen::MatrixXd& columns, const Eigen::MatrixXd& unit,
                                  const Eigen::MatrixXd& within) {

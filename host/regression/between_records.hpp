@@ -7,6 +7,7 @@
 #include <vector>
 
 #include "host/regression/balance_data.hpp"
+#include "host/regression/whitening.hpp"
 
 namespace flexspline::regression {
 
@@ -30,6 +31,11 @@ inline constexpr std::size_t kFewestRecords = 3;
 std::vector<Group> friction_groups(const Terms& terms, const std::vector<Slot>& linear,
                                    const std::vector<Slot>& shapes = {});
 
+// What a factor of each group does to the torque is X times these, `theta` being the values of the columns of X times
+// `size`, which X was divided by. Columns of free shapes, where there are any, begin at `first_shape`.
+Eigen::MatrixXd directions(const std::vector<Group>& groups, const Eigen::VectorXd& theta, const Eigen::VectorXd& size,
+                           Eigen::Index first_shape);
+
 // Each record has a factor 1 + b on the torque of each group, b of mean nought.
 struct BetweenRecords {
   Eigen::VectorXd std;                // of b, by group; nought where records do not differ for certain
@@ -42,6 +48,11 @@ struct BetweenRecords {
 // which the factors of the records scatter as they should, after their own errors (Paule and Mandel, 1982).
 BetweenRecords between_records(const BalanceData& data, const Eigen::MatrixXd& torques,
                                const Eigen::VectorXd& residual);
+
+// Errors of rows at these weights that records have in common by their own friction: `torques` (weighted, a column a
+// group) vary by `std`, noise of which `autocorrelation_time` rows count as one by one.
+Whitening whitening_of(const BalanceData& data, const Eigen::VectorXd& root_weights, const Eigen::MatrixXd& torques,
+                       const Eigen::VectorXd& std, double autocorrelation_time);
 
 // Covariance of the estimates (`unit` is (X'WX)^-1, `columns` W^1/2 X), `within` being what it is without differences
 // between records: what those add, and all of it widened so far that 1.96 standard errors hold 95 % although the
