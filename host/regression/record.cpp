@@ -359,7 +359,7 @@ bool are_alike(const catalogue::DriveConstants<double>& a, const catalogue::Driv
          a.reference_temperature == b.reference_temperature && a.turn_angle_scale == b.turn_angle_scale;
 }
 
-// All but the records. Where efforts are torques, the constant counts from the first such experiment on.
+// All but the records.
 Prepared without_records(const std::vector<const Experiment*>& experiments, const model::Drive& drive,
                          const Pipeline& pipeline) {
   Prepared prepared;
@@ -367,7 +367,6 @@ Prepared without_records(const std::vector<const Experiment*>& experiments, cons
   prepared.constants = catalogue::constants_of(drive);
   prepared.rotary = drive.axis == data::Axis::rotary;
   for (const Experiment* e : experiments) {
-    if (!e->has(Column::current)) prepared.constants.torque_constant = drive.torque_constant_nm_a.value.value_or(1.0);
     prepared.torque_measured = prepared.torque_measured || e->has(Column::torque);
     prepared.effort_is_current = prepared.effort_is_current || e->has(Column::current);
   }
@@ -383,10 +382,7 @@ Prepared prepare_with(const std::vector<const Experiment*>& experiments, const m
   const bool is_ready =
       ready != nullptr && ready->pipeline == pipeline && are_alike(ready->constants, prepared.constants);
   std::vector<std::size_t> missing;
-  std::vector<catalogue::DriveConstants<double>> constants;
-  catalogue::DriveConstants<double> so_far = catalogue::constants_of(drive);
   for (std::size_t i = 0; i < experiments.size(); ++i) {
-    if (!experiments[i]->has(Column::current)) so_far.torque_constant = prepared.constants.torque_constant;
     if (is_ready) {
       const auto found = std::ranges::find(ready->records, experiments[i], &Record::experiment);
       if (found != ready->records.end()) {
@@ -395,12 +391,11 @@ Prepared prepare_with(const std::vector<const Experiment*>& experiments, const m
       }
     }
     missing.push_back(i);
-    constants.push_back(so_far);
   }
   std::vector<Record> made(missing.size());
   in_parallel(missing.size(), [&](std::size_t m) {
     ask_whether_to_give_up();
-    made[m] = prepare_one(*experiments[missing[m]], constants[m], pipeline);
+    made[m] = prepare_one(*experiments[missing[m]], prepared.constants, pipeline);
     complete_held_torque(made[m], prepared.constants, pipeline.torque_per_step);
   });
   for (std::size_t m = 0; m < made.size(); ++m) prepared.records[missing[m]] = std::move(made[m]);
