@@ -1,7 +1,6 @@
 #include "hil/board/virtual_drive.hpp"
 
 #include <cmath>
-#include <new>
 #include <stdexcept>
 #include <utility>
 
@@ -46,8 +45,7 @@ void VirtualDrive::run(std::uint32_t ticks) {
       down_.command = *posted_;
       posted_.reset();
     }
-    // Made where it stays.
-    ::new (static_cast<void*>(&up_)) firmware::LockStepUp(brain_->tick(down_));
+    up_ = brain_->tick(down_);
     rig_.act(up_.actuation);
     take_frame();
   }
