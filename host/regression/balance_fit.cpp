@@ -130,6 +130,8 @@ BalanceFit fit_balance(BalanceData& data, Terms& terms) {
     between = between_records(data, torques, noise_weights.cwiseProduct(fit.residual));
   };
   look_between();
+  const Terms weighted_terms = terms;
+  const Eigen::VectorXd weighted_residual = fit.residual;
   constexpr int kGeneralised = 3;
   for (int round = 0; round < kGeneralised && between.std.size() > 0 && between.std.maxCoeff() > 0.0; ++round) {
     noise_weights = record_weights(data.records(), between.left.cwiseQuotient(noise_weights));
@@ -139,13 +141,25 @@ BalanceFit fit_balance(BalanceData& data, Terms& terms) {
     fitting.solve(fit.whitening);
     look_between();
   }
-  if (!fit.whitening.weights_only()) fit.root_weights = record_weights(data.records(), fit.residual);
+  // A missing effect differs from record to record, too, and to take that for friction ruins what the model knows of
+  // friction. Differences of friction alone leave noise.
+  constexpr double kNoise = 2.0;
+  const bool is_noise = between.autocorrelation_time <= kNoise * data.filter_autocorrelation_time();
+  if (!fit.whitening.weights_only() && is_noise) {
+    fit.root_weights = record_weights(data.records(), fit.residual);
+  } else if (!fit.whitening.weights_only()) {
+    terms = weighted_terms;
+    fit.residual = weighted_residual;
+    fit.whitening = noise_weights = fit.root_weights;
+    look_between();
+  }
 
   // Uncertainty of linear parameters and shapes together, to first order.
   const Eigen::VectorXd weighted = fit.root_weights.cwiseProduct(fit.residual);
   fit.autocorrelation_time =
       std::max(autocorrelation_time(data.records(), weighted), data.filter_autocorrelation_time());
-  fit.noise_autocorrelation_time = between.autocorrelation_time;
+  fit.white_autocorrelation_time =
+      fit.whitening.weights_only() ? fit.autocorrelation_time : between.autocorrelation_time;
   const LinearFit joint = least_squares(J, fit.residual, fit.root_weights);
   const LinearFit white = fit.whitening.weights_only() ? joint : least_squares(J, fit.residual, fit.whitening);
   const double freedom = std::max(1.0, static_cast<double>(data.rows() - J.cols()));

@@ -1,5 +1,5 @@
 // One balance fitted: shapes and linear parameters together, with weights by record and their uncertainty. Where
-// friction differs from record to record, by generalised least squares, so that this does not pass for an effect.
+// friction differs from record to record and nothing but noise is left beside that, by generalised least squares.
 #pragma once
 
 #include <Eigen/Core>
@@ -25,7 +25,7 @@ struct BalanceFit {
   Eigen::VectorXd excitation;      // likewise: LinearFit::share_beside_all
   Eigen::VectorXd white_variance;  // likewise: what the variances would be without autocorrelation
   double autocorrelation_time = 1.0;
-  double noise_autocorrelation_time = 1.0;  // of what is left without each record's own friction
+  double white_autocorrelation_time = 1.0;  // of what `whitening` leaves
   double condition_number = 0.0;
   double rmse() const {
     return residual.size() ? std::sqrt(residual.squaredNorm() / static_cast<double>(residual.size())) : 0.0;

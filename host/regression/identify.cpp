@@ -84,7 +84,7 @@ bool settle_on_both(Identification& result, std::size_t told, std::size_t other)
   }
   own << columns_of(data, result.terms, its.linear), shape_columns(data, result.terms, its.on_balance, its.shapes);
   const Testimony says = testimony_of(reaching, own, residual_of(data, result.terms), its.whitening,
-                                      std::max(1.0, its.noise_autocorrelation_time));
+                                      std::max(1.0, its.white_autocorrelation_time));
   const Eigen::MatrixXd before = fit.covariance(shared.at, shared.at);
   const Eigen::MatrixXd precision = scaled_inverse(before);
   const Agreement both = agree(precision, says);
