@@ -69,7 +69,7 @@ Completion complete(const data::Dataset& dataset, const model::Model& model, con
   for (;;) {
     Diagnosis found = diagnose(dataset, result.model, options);
     bool more = found.verdict == Verdict::missing_effect && result.rounds.size() + 1 < most_rounds;
-    const bool above = found.noise_floor && found.base_rmse > kAtFloor * *found.noise_floor;
+    const bool above = found.noise_floor && found.base_rmse_own_friction > kAtFloor * *found.noise_floor;
     if (more && !above && !result.rounds.empty() && fall_of(found) < kWorthAdding * fall_of(result.rounds.front())) {
       found.warnings.push_back(
           fmt::format("{} is not added: it takes off less than {:g} % of what the first effect did",

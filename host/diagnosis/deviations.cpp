@@ -79,20 +79,30 @@ void settle(const std::vector<RecordSums>& records, double tau, double least_var
   }
 }
 
-Spread estimate(const std::vector<RecordSums>& records, const SmallVector* given, double tau, double least_variance) {
-  Spread spread;
+// Groups whose spread the records tell.
+std::vector<std::uint8_t> told_by(const std::vector<RecordSums>& records) {
   const Eigen::Index groups = records.empty() ? 0 : records.front().along.size();
-  spread.std = given ? *given : SmallVector(SmallVector::Zero(groups));
-  spread.by_record.assign(records.size(), SmallVector::Zero(groups));
-  spread.squares.assign(records.size(), 0.0);
-  for (const RecordSums& r : records)
-    spread.variance.push_back(std::max({r.squares / std::max(1.0, r.rows), least_variance, 1e-300}));
-  for (const RecordSums& r : records) spread.deviance.push_back(r.rows);
   std::vector<std::uint8_t> told;
   for (Eigen::Index g = 0; g < groups; ++g)
     told.push_back(static_cast<std::size_t>(std::count_if(records.begin(), records.end(), [&](const RecordSums& r) {
                      return r.own(g, g) > 0.0;
                    })) >= kFewestRecords);
+  return told;
+}
+
+Spread estimate(const std::vector<RecordSums>& records, const SmallVector* given, double tau, double least_variance,
+                const std::vector<double>& variance) {
+  Spread spread;
+  const Eigen::Index groups = records.empty() ? 0 : records.front().along.size();
+  spread.std = given ? *given : SmallVector(SmallVector::Zero(groups));
+  spread.by_record.assign(records.size(), SmallVector::Zero(groups));
+  spread.squares.assign(records.size(), 0.0);
+  for (std::size_t i = 0; i < records.size(); ++i)
+    spread.variance.push_back(
+        std::max({variance.empty() ? records[i].squares / std::max(1.0, records[i].rows) : variance[i], least_variance,
+                  1e-300}));
+  for (const RecordSums& r : records) spread.deviance.push_back(r.rows);
+  const std::vector<std::uint8_t> told = told_by(records);
   constexpr int kRounds = 5;
   for (int round = 0; round < (groups > 0 ? kRounds : 1); ++round) {
     std::vector<double> noise;
@@ -111,12 +121,20 @@ Spread estimate(const std::vector<RecordSums>& records, const SmallVector* given
 
 }  // namespace
 
-Spread estimate_spread(const std::vector<RecordSums>& records, double tau, double least_variance) {
-  return estimate(records, nullptr, tau, least_variance);
+Spread estimate_spread(const std::vector<RecordSums>& records, double tau, double least_variance,
+                       const std::vector<double>& variance) {
+  return estimate(records, nullptr, tau, least_variance, variance);
 }
 
 Spread with_spread(const std::vector<RecordSums>& records, const SmallVector& std, double tau, double least_variance) {
-  return estimate(records, &std, tau, least_variance);
+  return estimate(records, &std, tau, least_variance, {});
+}
+
+Spread with_largest_spread(const std::vector<RecordSums>& records, double tau, double least_variance) {
+  const std::vector<std::uint8_t> told = told_by(records);
+  SmallVector std = SmallVector::Zero(static_cast<Eigen::Index>(told.size()));
+  for (std::size_t g = 0; g < told.size(); ++g) std[static_cast<Eigen::Index>(g)] = told[g] ? kLargestSpread : 0.0;
+  return estimate(records, &std, tau, least_variance, {});
 }
 
 SmallVector best_deviations(const RecordSums& r, const SmallVector& std, double v) {

@@ -41,10 +41,13 @@ struct Spread {
 };
 // Maximises the likelihood of e ~ N(0, variance tau + Z std^2 Z') over the spreads and the records' variances, which
 // are not taken smaller than `least_variance`. Fewer than kFewestRecords records with the group have a spread of
-// nought.
-Spread estimate_spread(const std::vector<RecordSums>& records, double tau, double least_variance);
+// nought. The search begins at `variance`, or at errors that are all noise where that is empty.
+Spread estimate_spread(const std::vector<RecordSums>& records, double tau, double least_variance,
+                       const std::vector<double>& variance = {});
 // The same with the spreads given.
 Spread with_spread(const std::vector<RecordSums>& records, const SmallVector& std, double tau, double least_variance);
+// With the largest that a spread may be, of all groups that have enough records.
+Spread with_largest_spread(const std::vector<RecordSums>& records, double tau, double least_variance);
 // The deviations that are likeliest in noise of this variance (tau in it).
 SmallVector best_deviations(const RecordSums& record, const SmallVector& std, double noise_variance);
 // What they cost: their squares over those of the spread, and the log determinant of the spread over the noise.

@@ -47,8 +47,8 @@ Candidate report(const Trial& trial, const Search& search, data::Axis axis) {
   c.score = trial.fall.score;
   c.score_elsewhere = trial.elsewhere;
   c.chi2_fall_percent = trial.fall.chi2_percent;
-  c.rmse_cv_before = search.base.rmse_cv();
-  c.rmse_cv_after = trial.judged.rmse_cv();
+  c.rmse_cv_before = search.base.rmse_cv_alike();
+  c.rmse_cv_after = trial.judged.rmse_cv_alike();
   c.p_value = trial.fall.p_value;
   c.admissible = trial.admissible;
   c.why_not = trial.why_not;
@@ -82,10 +82,11 @@ Candidate report(const Trial& trial, const Search& search, data::Axis axis) {
   return c;
 }
 
-std::vector<Localised> shares(const BalanceData& data, const Judged& judged, double least = kShownShare) {
+std::vector<Localised> shares(const BalanceData& data, const Judged& judged, const Eigen::VectorXd& residual,
+                              double least = kShownShare) {
   std::vector<Localised> list;
   const data::Axis axis = data.prepared().rotary ? data::Axis::rotary : data::Axis::linear;
-  for (const auto& share : comparison::localise(data, judged.residual, judged.autocorrelation_time, axis))
+  for (const auto& share : comparison::localise(data, residual, judged.autocorrelation_time, axis))
     if (share.share_percent >= least) list.push_back({share.variable, share.share_percent});
   return list;
 }
@@ -169,24 +170,34 @@ std::string settle(Examined& chosen) {
 
 void name_effects(const Examined& chosen, const std::string& alias, Diagnosis& result) {
   const auto& list = chosen.trials;
+  const auto is = [](const Candidate& c, const Named& n) { return c.effect == n.effect && c.order == n.order; };
   for (const Trial& t : list) {
+    const Named name{std::string(t.proposal.entry->name()), t.proposal.order};
+    const bool near = t.score() >= list.front().score() - kRivalMargin;
     // A law with more parameters that leaves the same error is no rival of the simpler one: it can do no worse.
     const bool wider = t.proposal.added > list.front().proposal.added;
-    const bool close = passes(t) && !wider && t.score() >= list.front().score() - kRivalMargin;
-    if (close || t.proposal.entry->name() == alias)
-      result.named.push_back({std::string(t.proposal.entry->name()), t.proposal.order});
+    if ((passes(t) && !wider && near) || name.effect == alias) result.named.push_back(name);
+    // Its order is not told, but neither is that it is the other effect.
+    if (!t.doubtful_order || !near || t.proposal.entry == list.front().proposal.entry) continue;
+    result.named.push_back(name);
+    for (Candidate& c : result.candidates)
+      if (is(c, name)) {
+        c.admissible = true;
+        c.why_not.clear();
+      }
   }
   result.verdict = result.named.size() > 1 ? Verdict::confusable_effects : Verdict::missing_effect;
-  const auto is = [](const Candidate& c, const Named& n) { return c.effect == n.effect && c.order == n.order; };
   for (Candidate& c : result.candidates) {
     if (std::none_of(result.named.begin(), result.named.end(), [&](const Named& n) { return is(c, n); })) continue;
     for (const Named& other : result.named)
       if (!is(c, other)) c.rivals.push_back(other.effect);
   }
   // The named effect leads the list, whatever a refused candidate scores.
-  const auto first = std::find_if(result.candidates.begin(), result.candidates.end(),
-                                  [&](const Candidate& c) { return is(c, result.named.front()); });
-  std::rotate(result.candidates.begin(), first, first + 1);
+  auto begin = result.candidates.begin();
+  for (const Named& n : result.named) {
+    const auto at = std::find_if(begin, result.candidates.end(), [&](const Candidate& c) { return is(c, n); });
+    if (at != result.candidates.end()) std::rotate(begin++, at, at + 1);
+  }
 }
 
 void list_candidates(std::vector<Examined>& all, data::Axis axis, Diagnosis& result) {
@@ -236,7 +247,8 @@ void judge_rest(const Examined& chosen, Diagnosis& result) {
       result.recovered_percent = std::clamp(100.0 * (1.0 - above(after) / above(chosen.search.base)), 0.0, 100.0);
     enough = at_floor || result.recovered_percent.value_or(100.0) >= kRecovered;
   }
-  const std::vector<Localised> remaining = shares(*chosen.search.data, after, enough ? kShownShare : kLeastShare);
+  const std::vector<Localised> remaining =
+      shares(*chosen.search.data, after, after.residual, enough ? kShownShare : kLeastShare);
   if (!at_floor) result.remaining_structure = remaining;
   if (!result.named.empty()) return;
   if (at_floor)
@@ -285,11 +297,15 @@ Diagnosis diagnose(const data::Dataset& dataset, const model::Model& model, cons
     alias = settle(chosen);
   }
   result.balance = chosen.search.data->balance();
-  result.base_rmse = chosen.search.base.rmse();
-  result.base_rmse_cv = chosen.search.base.rmse_cv();
+  const Judged& judged = chosen.search.base;
+  result.base_rmse = judged.rmse_alike();
+  result.base_rmse_cv = judged.rmse_cv_alike();
+  result.base_rmse_own_friction = judged.rmse();
   result.noise_floor = chosen.floor.rmse;
   result.noise_floor_from = chosen.floor.from;
-  result.localised = shares(*chosen.search.data, chosen.search.base);
+  // Where nothing is missing, friction that differs between runs is no structure to look for.
+  result.localised =
+      shares(*chosen.search.data, judged, chosen.names_one() ? judged.residual_alike() : judged.residual);
   list_candidates(all, model.drive.axis, result);
   if (chosen.names_one()) {
     name_effects(chosen, alias, result);

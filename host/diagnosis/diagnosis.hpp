@@ -97,8 +97,9 @@ struct Diagnosis {
   std::vector<Named> named;
   std::optional<regression::Balance> balance;  // of the named effect, else of the largest excess
   std::string unit;                            // of the balances' errors
-  double base_rmse = 0.0;
+  double base_rmse = 0.0;                      // with one friction for all runs, as all errors of candidates are
   double base_rmse_cv = 0.0;
+  double base_rmse_own_friction = 0.0;  // with each run's own friction where it differs from run to run
   std::optional<double> noise_floor;
   std::string noise_floor_from = "none";
   std::vector<Localised> localised;

@@ -115,11 +115,10 @@ bool surer(std::vector<Witness> witnesses, const Trial& trial) {
   return true;
 }
 
-// Its own balance says that the effect is there. Where another says so, too, its order may be taken for the common one,
-// if none of the others that were tried fits better.
-bool expected(const std::vector<Trial>& trials, const Trial& trial) {
+// The order that such effects mostly have, if none of the others that were tried fits better.
+bool usual_and_best(const std::vector<Trial>& trials, const Trial& trial) {
   const catalogue::Entry& entry = *trial.proposal.entry;
-  return trial.elsewhere > kRivalMargin && *trial.proposal.order == entry.parameters[order_place(entry)].usual &&
+  return *trial.proposal.order == entry.parameters[order_place(entry)].usual &&
          std::none_of(trials.begin(), trials.end(), [&](const Trial& other) {
            return other.proposal.entry == &entry && other.score() > trial.score();
          });
@@ -180,16 +179,19 @@ void doubt_orders(const std::vector<Search*>& all, Search& told, std::vector<Tri
     for (Search* other : others_of(all, told, t)) witnesses.push_back(witness(*other));
     t.why_not = doubt(witnesses, t);
     t.admissible = t.why_not.empty();
-    if (t.admissible || !expected(trials, t)) continue;
+    if (t.admissible || !usual_and_best(trials, t)) continue;
     t.note = fmt::format(
         "These data are too short to tell its order: {:g} a turn is what such effects mostly have, and fits best of "
         "the "
         "whole orders; {} would tell.",
         *t.proposal.order, t.proposal.entry->info->separated_by);
+    // Its own balance says that the effect is there; where another says so, too, its order is taken for the usual one.
+    t.doubtful_order = t.elsewhere <= kRivalMargin;
+    if (t.doubtful_order) continue;
     t.admissible = true;
     t.why_not.clear();
   }
-  put_in_order(told.base, trials);
+  put_in_order(told, trials);
 }
 
 std::string one_way_warning(const BalanceData& data) {

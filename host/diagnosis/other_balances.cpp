@@ -102,7 +102,7 @@ void hear_other_balances(const std::vector<Search*>& all, Search& told, std::vec
     trial.admissible = false;
     trial.why_not = "it acts on another torque balance as well, and that one fits worse with it";
   });
-  put_in_order(told.base, trials);
+  put_in_order(told, trials);
 }
 
 }  // namespace flexspline::diagnosis

@@ -55,7 +55,9 @@ RivalReason compare(Search& search, const Trial& first, const Trial& second) {
 // shows more), beside what the effect makes of it.
 std::optional<Evidence> evidence(Search& search, const Trial& trial, data::Axis axis) {
   BalanceData& data = *search.data;
-  const Imitation by_model(model_columns(data, search.base.terms), search.base.root_weights);
+  // With one friction for all runs: what is missing may pass for friction that differs.
+  const Eigen::VectorXd &weights = search.base.root_weights_alike(), &lacking = search.base.residual_alike();
+  const Imitation by_model(model_columns(data, search.base.terms), weights);
   const Eigen::VectorXd own = own_torque(search, trial, by_model);
   const auto shares = comparison::localise(data, own, 1.0, axis);
   const std::vector<comparison::RowVariable> variables = comparison::row_variables(data, axis);
@@ -73,11 +75,10 @@ std::optional<Evidence> evidence(Search& search, const Trial& trial, data::Axis 
       Evidence::Bin bin{bins.edges[b], bins.edges[b + 1], 0.0, 0.0};
       double count = 0.0;
       for (Eigen::Index k = 0; k < data.rows(); ++k) {
-        if (bins.bin[static_cast<std::size_t>(k)] != static_cast<int>(b) || !(search.base.root_weights[k] > 0.0))
-          continue;
+        if (bins.bin[static_cast<std::size_t>(k)] != static_cast<int>(b) || !(weights[k] > 0.0)) continue;
         const double sign = resisting ? directions[k] : 1.0;
         if (!std::isfinite(sign)) continue;
-        bin.lacking += sign * search.base.residual[k];
+        bin.lacking += sign * lacking[k];
         bin.effect += sign * own[k];
         count += 1.0;
       }

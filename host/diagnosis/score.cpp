@@ -54,8 +54,12 @@ struct MixedFit {
   regression::LinearFit linear;  // of the scaled columns
   Eigen::MatrixXd u;
   Spread spread;
+  double deviance() const { return std::accumulate(spread.deviance.begin(), spread.deviance.end(), 0.0); }
 };
-MixedFit fit_all(const Triangles& triangles, const std::vector<Group>& groups, Eigen::Index first_shape, double tau) {
+// From noise that holds all deviations, or from deviations that are as large as they may be.
+enum class Start { alike, apart };
+MixedFit fit_from(Start start, const Triangles& triangles, const std::vector<Group>& groups, Eigen::Index first_shape,
+                  double tau) {
   MixedFit fit;
   const Eigen::Index columns = triangles.columns();
   const auto solve = [&] {
@@ -71,21 +75,33 @@ MixedFit fit_all(const Triangles& triangles, const std::vector<Group>& groups, E
     fit.u = directions(groups, fit.linear.theta, triangles.size, first_shape);
   };
   solve();
+  if (start == Start::apart) {
+    const std::vector<RecordSums> sums = sums_of(triangles, fit.linear.theta, fit.u);
+    fit.spread = with_largest_spread(sums, tau, least_of(raw_variances(sums)));
+    solve();
+  }
   // Parameters, spread and noise settle each other.
   constexpr int kMostRounds = 12;
   constexpr double kSame = 0.02;
   for (int round = 0; round < kMostRounds; ++round) {
     const std::vector<RecordSums> sums = sums_of(triangles, fit.linear.theta, fit.u);
     // Deviations are no noise: the limit follows what is left without them.
-    const double least = least_of(round == 0 ? raw_variances(sums) : fit.spread.variance);
+    const double least = least_of(fit.spread.variance.empty() ? raw_variances(sums) : fit.spread.variance);
     const SmallVector before = fit.spread.std;
-    fit.spread = estimate_spread(sums, tau, least);
+    fit.spread = estimate_spread(sums, tau, least, fit.spread.variance);
     solve();
     if (round > 1 && (groups.empty() ||
                       (fit.spread.std - before).cwiseAbs().maxCoeff() <= kSame * fit.spread.std.cwiseAbs().maxCoeff()))
       break;
   }
   return fit;
+}
+// Of both starts the likelier end: what is missing from the model may be noise or deviations to it.
+MixedFit fit_all(const Triangles& triangles, const std::vector<Group>& groups, Eigen::Index first_shape, double tau) {
+  MixedFit fit = fit_from(Start::alike, triangles, groups, first_shape, tau);
+  if (groups.empty()) return fit;
+  MixedFit other = fit_from(Start::apart, triangles, groups, first_shape, tau);
+  return other.deviance() < fit.deviance() ? other : fit;
 }
 
 // Predicts each part of all records from the others. What the whole data do not determine, a part of them does still
@@ -124,6 +140,17 @@ std::vector<LeftOut> predict_left_out(const Triangles& triangles, const MixedFit
   return records;
 }
 
+// By the noise of each record; nought where `keep` is.
+Eigen::VectorXd root_weights_of(const BalanceData& data, const Eigen::VectorXd& keep,
+                                const std::vector<double>& variance) {
+  Eigen::VectorXd weights(keep.size());
+  for (std::size_t i = 0; i < data.records().size(); ++i) {
+    const RowRange& range = data.records()[i];
+    weights.segment(range.first, range.size()) = keep.segment(range.first, range.size()) / std::sqrt(variance[i]);
+  }
+  return weights;
+}
+
 double rows_of(const std::vector<LeftOut>& records) {
   return std::accumulate(records.begin(), records.end(), 0.0,
                          [](double sum, const LeftOut& r) { return sum + r.rows; });
@@ -131,15 +158,15 @@ double rows_of(const std::vector<LeftOut>& records) {
 
 }  // namespace
 
-double Judged::rmse() const {
+double rmse_of(const Eigen::VectorXd& residual, const Eigen::VectorXd& root_weights) {
   const double rows = (root_weights.array() > 0.0).count();
   return std::sqrt((root_weights.array() > 0.0).select(residual.array().square(), 0.0).sum() / std::max(1.0, rows));
 }
 
-double Judged::rmse_cv() const {
-  const double squares = std::accumulate(left_out.begin(), left_out.end(), 0.0,
+double rmse_of(const std::vector<LeftOut>& records) {
+  const double squares = std::accumulate(records.begin(), records.end(), 0.0,
                                          [](double sum, const LeftOut& r) { return sum + r.squares; });
-  return std::sqrt(squares / std::max(1.0, rows_of(left_out)));
+  return std::sqrt(squares / std::max(1.0, rows_of(records)));
 }
 
 Judged judge(BalanceData& data, Terms terms, const Eigen::VectorXd& keep) {
@@ -163,7 +190,6 @@ Judged judge(BalanceData& data, Terms terms, const Eigen::VectorXd& keep) {
   const Eigen::MatrixXd X = design(data, terms, judged.linear);
   const Triangles triangles = triangles_of(data, X, y, keep, kFolds);
   MixedFit fit;
-  judged.root_weights.resize(data.rows());
   // What deviations explain depends on how many rows count, which depends on what they leave.
   for (int round = 0; round < 2; ++round) {
     fit = fit_all(triangles, judged.groups, first_shape, tau);
@@ -175,9 +201,8 @@ Judged judge(BalanceData& data, Terms terms, const Eigen::VectorXd& keep) {
       if (b.size() > 0 && b.cwiseAbs().maxCoeff() > 0.0)
         judged.residual.segment(range.first, range.size()) -=
             X.middleRows(range.first, range.size()) * (fit.u * b).cwiseQuotient(triangles.size);
-      judged.root_weights.segment(range.first, range.size()) =
-          keep.segment(range.first, range.size()) / std::sqrt(fit.spread.variance[i]);
     }
+    judged.root_weights = root_weights_of(data, keep, fit.spread.variance);
     judged.autocorrelation_time =
         std::max(regression::autocorrelation_time(data.records(), judged.root_weights.cwiseProduct(judged.residual)),
                  data.filter_autocorrelation_time());
@@ -197,6 +222,12 @@ Judged judge(BalanceData& data, Terms terms, const Eigen::VectorXd& keep) {
                    .cwiseSqrt()
                    .cwiseQuotient(triangles.size);
   judged.left_out = predict_left_out(triangles, fit, tau);
+  if (!judged.groups.empty() && judged.deviations.std.maxCoeff() > 0.0) {
+    const MixedFit alike = fit_all(triangles, {}, first_shape, tau);
+    judged.alike.residual = y - X * alike.linear.theta.cwiseQuotient(triangles.size);
+    judged.alike.root_weights = root_weights_of(data, keep, alike.spread.variance);
+    judged.alike.left_out = predict_left_out(triangles, alike, tau);
+  }
   judged.terms = std::move(terms);
   return judged;
 }
@@ -259,6 +290,22 @@ double squares_left(BalanceData& data, const Terms& terms, const Judged& judged)
   return left;
 }
 
+namespace {
+
+// Noise is each record's own, as the extended model leaves it.
+double fall_alike_percent(const Judged& base, const Judged& extended) {
+  const std::vector<LeftOut>&before = base.left_out_alike(), &after = extended.left_out_alike();
+  double chi2_before = 0.0, chi2_after = 0.0;
+  for (std::size_t i = 0; i < after.size(); ++i) {
+    const double noise = std::max(after[i].squares / std::max(1.0, after[i].rows), 1e-300);
+    chi2_before += before[i].squares / noise;
+    chi2_after += after[i].squares / noise;
+  }
+  return chi2_before > 0.0 ? 100.0 * (1.0 - chi2_after / chi2_before) : 0.0;
+}
+
+}  // namespace
+
 Fall fall_of(const Judged& base, const Judged& extended, double added) {
   const double tau = std::max(1.0, std::min(base.autocorrelation_time, extended.autocorrelation_time));
   std::vector<double> after;
@@ -280,6 +327,7 @@ Fall fall_of(const Judged& base, const Judged& extended, double added) {
   Fall fall;
   fall.score = ratio - added * std::log(std::max(2.0, effective));
   fall.chi2_percent = chi2_before > 0.0 ? 100.0 * (1.0 - chi2_after / chi2_before) : 0.0;
+  fall.alike_percent = fall_alike_percent(base, extended);
   const boost::math::chi_squared_distribution<double> distribution(std::max(1.0, added));
   fall.p_value = ratio > 0.0 ? boost::math::cdf(boost::math::complement(distribution, ratio)) : 1.0;
   return fall;

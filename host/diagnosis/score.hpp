@@ -23,6 +23,18 @@ struct LeftOut {
   double squares = 0.0;
 };
 
+// What is left of rows that count, as a root mean square.
+double rmse_of(const Eigen::VectorXd& residual, const Eigen::VectorXd& root_weights);
+double rmse_of(const std::vector<LeftOut>& records);
+
+// The same model where friction is taken to be the same in all records: what a drive that runs it would see. A missing
+// effect that differs from record to record may pass for deviations of friction; this is what shows it then.
+struct AllAlike {
+  Eigen::VectorXd residual;
+  Eigen::VectorXd root_weights;
+  std::vector<LeftOut> left_out;
+};
+
 // A model on one balance, fitted with weights by record and judged by cross-validation. Its shapes are free to first
 // order, and so is a delay of the effort.
 struct Judged {
@@ -39,8 +51,15 @@ struct Judged {
   Spread deviations;              // in-sample
   std::vector<RecordSums> sums;   // of each record, in-sample, deviations in
   std::vector<LeftOut> left_out;  // of each record
-  double rmse() const;
-  double rmse_cv() const;
+  AllAlike alike;                 // empty where nothing deviates
+  double rmse() const { return rmse_of(residual, root_weights); }
+  double rmse_cv() const { return rmse_of(left_out); }
+  bool deviates() const { return !alike.left_out.empty(); }
+  const Eigen::VectorXd& residual_alike() const { return deviates() ? alike.residual : residual; }
+  const Eigen::VectorXd& root_weights_alike() const { return deviates() ? alike.root_weights : root_weights; }
+  const std::vector<LeftOut>& left_out_alike() const { return deviates() ? alike.left_out : left_out; }
+  double rmse_alike() const { return rmse_of(residual_alike(), root_weights); }
+  double rmse_cv_alike() const { return rmse_of(left_out_alike()); }
 };
 
 // Fits and judges `terms` on `data`. `keep` holds one a row, or nought for rows that must not count.
@@ -55,7 +74,8 @@ double squares_left(BalanceData& data, const Terms& terms, const Judged& judged)
 struct Fall {
   double score =
       0.0;  // twice the log likelihood ratio of left-out rows over the autocorrelation time, less k ln(n_eff)
-  double chi2_percent = 0.0;  // of the left-out chi-square
+  double chi2_percent = 0.0;   // of the left-out chi-square
+  double alike_percent = 0.0;  // the same with one friction for all records
   double p_value = 1.0;
 };
 // From `base` to `extended`, which has `added` parameters more. Noise is each record's own, and so is the spread of

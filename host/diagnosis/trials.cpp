@@ -182,14 +182,32 @@ bool Search::at_floor(const Judged& judged) const {
 }
 
 bool passes(const Trial& t) {
-  return t.admissible && t.fall.score > kNamedScore && t.fall.chi2_percent > kNamedFallPercent;
+  // What differs from record to record only, as temperature does, takes from the deviations and hardly from the rest.
+  return t.admissible && t.fall.score > kNamedScore &&
+         std::max(t.fall.chi2_percent, t.fall.alike_percent) > kNamedFallPercent;
+}
+
+// Whether the law bends over a travel that the encoder resolves in few steps: what it leaves there is the encoder's.
+bool is_smeared(const BalanceData& data, const Trial& trial) {
+  constexpr double kFewQuanta = 20.0;
+  const Term& added = trial.judged.terms.back();
+  for (std::size_t p = 0; p < added.values.size(); ++p) {
+    if (!added.free_shape(p) || added.entry->parameters[p].limit != effects::Limit::travel) continue;
+    for (const RowRange& range : data.records()) {
+      const std::optional<double>& quantum = data.prepared().records[range.record].motor_quantum;
+      if (quantum && added.values[p] < kFewQuanta * *quantum) return true;
+    }
+  }
+  return false;
 }
 
 // A law that contains another fits at least as well. Of the best one and its rivals in the catalogue that leave all but
 // the same error, by the error itself and by what was missing, the one with the fewest parameters comes first.
-void prefer_simple(const Judged& base, std::vector<Trial>& trials) {
-  constexpr double kSameError = 1.1;
-  constexpr double kSameFall = 0.005;
+void prefer_simple(const Search& search, std::vector<Trial>& trials) {
+  const Judged& base = search.base;
+  // Of a law that the encoder smears, more is left than of one with more to bend.
+  constexpr double kSameError = 1.1, kSameErrorSmeared = 1.7;
+  constexpr double kSameFall = 0.005, kSameFallSmeared = 0.01;
   constexpr double kDozens = 12.0;
   if (trials.empty() || !passes(trials.front())) return;
   // Left-out squares over the noise of each record as the best one has it: a loud record must not decide alone.
@@ -210,7 +228,10 @@ void prefer_simple(const Judged& base, std::vector<Trial>& trials) {
                         catalogue::names_contain(other.info->rivals, best.name()) ||
                         trials.front().proposal.added >= trials[i].proposal.added + kDozens;
     if (!rivals) continue;
-    if (passes(trials[i]) && left <= kSameError * kSameError * least && left - least <= kSameFall * fall &&
+    const bool smeared = is_smeared(*search.data, trials[i]);
+    const double same = smeared ? kSameErrorSmeared : kSameError;
+    if (passes(trials[i]) && left <= same * same * least &&
+        left - least <= (smeared ? kSameFallSmeared : kSameFall) * fall &&
         trials[i].proposal.added < trials[simplest].proposal.added)
       simplest = i;
   }
@@ -255,13 +276,13 @@ std::vector<Trial> rank(Search& search) {
     Trial again = evaluate(own, std::move(refined));
     if (better(again, trial) || !trial.admissible) trial = std::move(again);
   });
-  put_in_order(search.base, trials);
+  put_in_order(search, trials);
   return trials;
 }
 
-void put_in_order(const Judged& base, std::vector<Trial>& trials) {
+void put_in_order(const Search& search, std::vector<Trial>& trials) {
   std::stable_sort(trials.begin(), trials.end(), better);
-  prefer_simple(base, trials);
+  prefer_simple(search, trials);
 }
 
 bool is_rising(const Trial& trial) {

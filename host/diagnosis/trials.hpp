@@ -30,8 +30,9 @@ struct Trial {
   double elsewhere = 0.0;          // score on the other balances that the effect acts on, with the same parameters
   bool admissible = true;
   std::string why_not;
-  std::string imitated_by;  // the effect of the model that the data cannot tell it from
-  std::string note;         // what is to be known of it if it is named
+  std::string imitated_by;      // the effect of the model that the data cannot tell it from
+  std::string note;             // what is to be known of it if it is named
+  bool doubtful_order = false;  // not admissible for that alone: the usual order, and the best of those that were tried
 
   double score() const { return fall.score + elsewhere; }
 };
@@ -54,7 +55,7 @@ bool passes(const Trial& trial);
 // All effects that could be added, best first; the best ones with their shapes searched continuously.
 std::vector<Trial> rank(Search& search);
 // Best first: admissible ones before others, by score; of rivals that leave all but the same error, the simplest.
-void put_in_order(const Judged& base, std::vector<Trial>& trials);
+void put_in_order(const Search& search, std::vector<Trial>& trials);
 
 // Forward once more and back: an effect that was named because it resembles the true one is dropped when the true one
 // is in. Returns the trial to name in the place of `first`, or nothing.

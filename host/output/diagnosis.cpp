@@ -23,6 +23,8 @@ using diagnosis::Verdict;
 using nlohmann::json;
 
 constexpr std::size_t kRowsShown = 10;
+// Errors that differ by less are told as one.
+constexpr double kAsGoodAsAlike = 0.95;
 
 std::string evidence(const Diagnosis& d) {
   std::string text;
@@ -34,6 +36,10 @@ std::string evidence(const Diagnosis& d) {
                         with_unit(*d.noise_floor, d.unit), d.noise_floor_from, d.base_rmse / *d.noise_floor);
   else
     text += "; noise not known (state noise_std_COLUMN in dataset.toml, or record a periodic motion)";
+  // What is named may pass for friction that differs; only where nothing is, the difference is the runs' own.
+  if (d.named.empty() && d.base_rmse_own_friction < kAsGoodAsAlike * d.base_rmse)
+    text += fmt::format("; with friction that is each run's own {}{}", with_unit(d.base_rmse_own_friction, d.unit),
+                        d.noise_floor ? fmt::format(", {:.2f} times", d.base_rmse_own_friction / *d.noise_floor) : "");
   return text;
 }
 
@@ -291,6 +297,7 @@ json diagnosis_json(const Diagnosis& d) {
           {"base",
            {{"rmse", json_number(d.base_rmse)},
             {"rmse_cv", json_number(d.base_rmse_cv)},
+            {"rmse_own_friction", json_number(d.base_rmse_own_friction)},
             {"noise_floor", json_number(d.noise_floor)},
             {"noise_floor_from", d.noise_floor_from},
             {"unit", d.unit}}},

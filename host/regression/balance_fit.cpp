@@ -141,11 +141,7 @@ BalanceFit fit_balance(BalanceData& data, Terms& terms) {
     fitting.solve(fit.whitening);
     look_between();
   }
-  // A missing effect differs from record to record, too, and to take that for friction ruins what the model knows of
-  // friction. Differences of friction alone leave noise.
-  constexpr double kNoise = 2.0;
-  const bool is_noise = between.autocorrelation_time <= kNoise * data.filter_autocorrelation_time();
-  if (!fit.whitening.weights_only() && is_noise) {
+  if (!fit.whitening.weights_only() && leaves_noise(between, data)) {
     fit.root_weights = record_weights(data.records(), fit.residual);
   } else if (!fit.whitening.weights_only()) {
     terms = weighted_terms;
@@ -158,8 +154,6 @@ BalanceFit fit_balance(BalanceData& data, Terms& terms) {
   const Eigen::VectorXd weighted = fit.root_weights.cwiseProduct(fit.residual);
   fit.autocorrelation_time =
       std::max(autocorrelation_time(data.records(), weighted), data.filter_autocorrelation_time());
-  fit.white_autocorrelation_time =
-      fit.whitening.weights_only() ? fit.autocorrelation_time : between.autocorrelation_time;
   const LinearFit joint = least_squares(J, fit.residual, fit.root_weights);
   const LinearFit white = fit.whitening.weights_only() ? joint : least_squares(J, fit.residual, fit.whitening);
   const double freedom = std::max(1.0, static_cast<double>(data.rows() - J.cols()));

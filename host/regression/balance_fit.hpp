@@ -25,7 +25,6 @@ struct BalanceFit {
   Eigen::VectorXd excitation;      // likewise: LinearFit::share_beside_all
   Eigen::VectorXd white_variance;  // likewise: what the variances would be without autocorrelation
   double autocorrelation_time = 1.0;
-  double white_autocorrelation_time = 1.0;  // of what `whitening` leaves
   double condition_number = 0.0;
   double rmse() const {
     return residual.size() ? std::sqrt(residual.squaredNorm() / static_cast<double>(residual.size())) : 0.0;

@@ -143,6 +143,11 @@ Eigen::MatrixXd directions(const std::vector<Group>& groups, const Eigen::Vector
   return u;
 }
 
+bool leaves_noise(const BetweenRecords& between, const BalanceData& data) {
+  constexpr double kNoise = 2.0;
+  return between.autocorrelation_time <= kNoise * data.filter_autocorrelation_time();
+}
+
 Whitening whitening_of(const BalanceData& data, const Eigen::VectorXd& root_weights, const Eigen::MatrixXd& torques,
                        const Eigen::VectorXd& std, double autocorrelation_time) {
   Whitening whitening(root_weights);

@@ -49,6 +49,10 @@ struct BetweenRecords {
 BetweenRecords between_records(const BalanceData& data, const Eigen::MatrixXd& torques,
                                const Eigen::VectorXd& residual);
 
+// Whether differences of friction leave nothing but noise. A missing effect differs from record to record, too, and to
+// take that for friction ruins what the model knows of friction.
+bool leaves_noise(const BetweenRecords& between, const BalanceData& data);
+
 // Errors of rows at these weights that records have in common by their own friction: `torques` (weighted, a column a
 // group) vary by `std`, noise of which `autocorrelation_time` rows count as one by one.
 Whitening whitening_of(const BalanceData& data, const Eigen::VectorXd& root_weights, const Eigen::MatrixXd& torques,

@@ -5,6 +5,9 @@
 #include <algorithm>
 #include <cmath>
 
+#include "host/regression/between_records.hpp"
+#include "host/regression/least_squares.hpp"
+
 namespace flexspline::regression {
 
 Eigen::MatrixXd reaching_columns(BalanceData& data, const Terms& terms, std::size_t t,
@@ -40,6 +43,42 @@ Testimony testimony_of(const Eigen::MatrixXd& reaching, const Eigen::MatrixXd& o
   }
   return {left.transpose() * (whitening * residual).col(0) / autocorrelation_time,
           left.transpose() * left / autocorrelation_time};
+}
+
+White white_beside(const Eigen::MatrixXd& reaching, const Eigen::MatrixXd& own, const BalanceData& data,
+                   const Terms& terms, const BalanceFit& fit, const Eigen::VectorXd& residual) {
+  Eigen::MatrixXd all(own.rows(), own.cols() + reaching.cols());
+  all << own, reaching;
+  Eigen::VectorXd weights = fit.root_weights;
+  LinearFit moved = least_squares(all, residual, weights);
+  weights = record_weights(data.records(), moved.residual);
+  moved = least_squares(all, residual, weights);
+  const White alike{weights, std::max(autocorrelation_time(data.records(), weights.cwiseProduct(moved.residual)),
+                                      data.filter_autocorrelation_time())};
+  const std::vector<Group> groups = friction_groups(terms, fit.linear, fit.shapes);
+  const auto friction = [&] {
+    Eigen::VectorXd theta = moved.theta.head(own.cols());
+    for (std::size_t j = 0; j < fit.linear.size(); ++j)
+      theta[static_cast<Eigen::Index>(j)] += terms[fit.linear[j].term].values[fit.linear[j].parameter];
+    return Eigen::MatrixXd(own * directions(groups, theta, Eigen::VectorXd::Ones(own.cols()),
+                                            static_cast<Eigen::Index>(fit.linear.size())));
+  };
+  const auto differences = [&](const Eigen::MatrixXd& torques) {
+    return between_records(data, weights.asDiagonal() * torques, weights.cwiseProduct(moved.residual));
+  };
+  Eigen::MatrixXd torques = friction();
+  BetweenRecords between = differences(torques);
+  Whitening whitening = weights;
+  constexpr int kRounds = 3;
+  for (int round = 0; round < kRounds && between.std.size() > 0 && between.std.maxCoeff() > 0.0; ++round) {
+    weights = record_weights(data.records(), between.left.cwiseQuotient(weights));
+    whitening = whitening_of(data, weights, weights.asDiagonal() * torques, between.std, between.autocorrelation_time);
+    moved = least_squares(all, residual, whitening);
+    torques = friction();
+    between = differences(torques);
+  }
+  if (whitening.weights_only() || !leaves_noise(between, data)) return alike;
+  return {whitening, between.autocorrelation_time};
 }
 
 Eigen::MatrixXd scaled_inverse(const Eigen::MatrixXd& symmetric) {

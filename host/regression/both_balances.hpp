@@ -5,6 +5,7 @@
 #include <vector>
 
 #include "host/regression/balance_data.hpp"
+#include "host/regression/balance_fit.hpp"
 #include "host/regression/whitening.hpp"
 
 namespace flexspline::regression {
@@ -25,6 +26,15 @@ Eigen::MatrixXd reaching_columns(BalanceData& data, const Terms& terms, std::siz
 // values. `whitening` makes the rows' errors noise of one, of which `autocorrelation_time` rows count as one.
 Testimony testimony_of(const Eigen::MatrixXd& reaching, const Eigen::MatrixXd& own, const Eigen::VectorXd& residual,
                        const Whitening& whitening, double autocorrelation_time);
+
+// How errors of a balance are made noise where `reaching` are not where they will be: those and the balance's own are
+// fitted to first order for the moment, so that what is amiss with them is not taken for friction that differs.
+struct White {
+  Whitening whitening;
+  double autocorrelation_time;
+};
+White white_beside(const Eigen::MatrixXd& reaching, const Eigen::MatrixXd& own, const BalanceData& data,
+                   const Terms& terms, const BalanceFit& fit, const Eigen::VectorXd& residual);
 
 // Inverse of a covariance or a precision whose parameters differ much in size by their units.
 Eigen::MatrixXd scaled_inverse(const Eigen::MatrixXd& symmetric);

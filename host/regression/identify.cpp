@@ -83,8 +83,10 @@ bool settle_on_both(Identification& result, std::size_t told, std::size_t other)
     reaching.rightCols(1) = reaching_columns(data, result.terms, slot.term, {slot.parameter});
   }
   own << columns_of(data, result.terms, its.linear), shape_columns(data, result.terms, its.on_balance, its.shapes);
-  const Testimony says = testimony_of(reaching, own, residual_of(data, result.terms), its.whitening,
-                                      std::max(1.0, its.white_autocorrelation_time));
+  const Eigen::VectorXd residual = residual_of(data, result.terms);
+  const White white = white_beside(reaching, own, data, result.terms, its, residual);
+  const Testimony says =
+      testimony_of(reaching, own, residual, white.whitening, std::max(1.0, white.autocorrelation_time));
   const Eigen::MatrixXd before = fit.covariance(shared.at, shared.at);
   const Eigen::MatrixXd precision = scaled_inverse(before);
   const Agreement both = agree(precision, says);

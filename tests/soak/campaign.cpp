@@ -13,18 +13,64 @@ constexpr double kScales[] = {1.0, 0.5, 0.2, 0.1, 0.05, 0.02, 0.01};
 constexpr double kVariations[] = {0.0, 0.03};
 constexpr double kCorrelation = 0.9;
 
-const std::vector<std::string> kHidden = {"viscous_asymmetry",       "coulomb_asymmetry",  "stribeck_gaussian",
-                                          "load_dependent_friction", "power_law_friction", "gravity",
-                                          "current_offset",          "torque_ripple:2",    "torque_ripple:7",
-                                          "temperature_viscous",     "dahl_friction",      "backlash",
-                                          "structural_damping",      "cubic_stiffness",    "kinematic_error",
-                                          "temperature_coulomb"};
+// Effects whose size can be chosen.
+const std::vector<std::string> kHidden = {
+    "viscous_asymmetry",
+    "coulomb_asymmetry",
+    "stribeck_gaussian",
+    "load_dependent_friction",
+    "power_law_friction",
+    "gravity",
+    "current_offset",
+    "torque_ripple:2",
+    "torque_ripple:7",
+    "temperature_viscous",
+    "dahl_friction",
+    "backlash",
+    "structural_damping",
+    "cubic_stiffness",
+    "kinematic_error",
+    "temperature_coulomb",
+    "stribeck_hess_soom",
+    "quadratic_drag",
+    "load_scaled_ripple",
+    "torque_constant_error",
+    "torque_constant_saturation",
+    "current_delay",
+    "quadratic_stiffness",
+    "dahl_hysteresis",
+    "modified_dahl_hysteresis",
+    "bouc_wen_hysteresis",
+    "torque_proportional_hysteresis",
+    "torque_offset",
+    "torque_sensor_gain",
+    "torque_sensor_ripple",
+    "torsion_zero",
+};
+// Those that are there or not: laws whose size is one with their shape, and what every drive has.
+const std::vector<std::string> kWhole = {
+    "lugre_friction",
+    "current_saturation",
+    "piecewise_stiffness",
+    "duhem_hysteresis",
+    "prandtl_ishlinskii_hysteresis",
+    "preisach_hysteresis",
+    "inertia",
+    "viscous_friction",
+    "coulomb_friction",
+    "linear_stiffness",
+    "output_inertia",
+    "output_viscous_friction",
+    "output_coulomb_friction",
+};
 const std::vector<std::string> kPairs = {
     "viscous_asymmetry+current_offset", "coulomb_asymmetry+torque_ripple:2",
     "stribeck_gaussian+gravity",        "load_dependent_friction+temperature_viscous",
     "gravity+torque_ripple:7",          "stribeck_gaussian+load_dependent_friction",
     "current_offset+coulomb_asymmetry", "structural_damping+viscous_asymmetry"};
-const std::vector<std::string> kUnknown = {"stribeck_exponent", "load_power_friction", "triangle_ripple"};
+const std::vector<std::string> kUnknown = {"stribeck_exponent", "load_power_friction", "triangle_ripple",
+                                           "damaged_tooth",     "tight_spot",          "speed_onset"};
+constexpr std::size_t kWholeInARound = 4, kPairsInARound = 2, kUnknownInARound = 2, kNothingOfAKind = 4;
 
 nlohmann::json to_json(const Outcome& o) {
   nlohmann::json j = {{"hidden", o.what.hidden},
@@ -72,17 +118,21 @@ std::vector<Case> judging_round(std::uint64_t round) {
   std::vector<Case> cases;
   const std::uint64_t seed = kFirstJudgingSeed + 100 * round;
   // Nothing hidden, in the four ways that have fooled a diagnosis.
-  for (std::uint64_t s = 0; s < 2; ++s)
+  for (std::uint64_t s = 0; s < kNothingOfAKind; ++s)
     for (const double variation : kVariations)
       for (const double correlation : {0.0, kCorrelation})
         cases.push_back({"", 1.0, seed + 10 + s, variation, correlation, ""});
   for (std::size_t h = 0; h < kHidden.size(); ++h)
     cases.push_back({kHidden[h], kScales[(round + h) % std::size(kScales)], seed + 20 + h,
                      kVariations[(round / std::size(kScales) + h + 1) % std::size(kVariations)], 0.0, ""});
-  for (std::size_t k = 0; k < 2; ++k)
+  // The n-th of a list that goes on from round to round; what begins anew meets the other friction.
+  const auto nth = [&](const std::vector<std::string>& list, std::size_t n, std::uint64_t own) {
     cases.push_back(
-        {kPairs[(2 * round + k) % kPairs.size()], 1.0, seed + 60 + k, kVariations[(round + k) % 2], 0.0, ""});
-  cases.push_back({kUnknown[round % kUnknown.size()], 1.0, seed + 70, kVariations[round % 2], 0.0, ""});
+        {list[n % list.size()], 1.0, own, kVariations[(n + n / list.size()) % std::size(kVariations)], 0.0, ""});
+  };
+  for (std::size_t k = 0; k < kWholeInARound; ++k) nth(kWhole, kWholeInARound * round + k, seed + 55 + k);
+  for (std::size_t k = 0; k < kPairsInARound; ++k) nth(kPairs, kPairsInARound * round + k, seed + 60 + k);
+  for (std::size_t k = 0; k < kUnknownInARound; ++k) nth(kUnknown, kUnknownInARound * round + k, seed + 70 + k);
   return cases;
 }
 

@@ -110,19 +110,43 @@ std::string power(const std::vector<Outcome>& all) {
   return text + fmt::format("\nRight when one effect was named: {}.\n\n", share(count_right(told), told.size()));
 }
 
+// What became of drives of one cell: "right", a wrong name or a verdict, with how often.
+std::string named(const Selection& some) {
+  std::map<std::string, std::size_t> names;
+  for (const Outcome* o : some)
+    ++names[o->right                            ? "right"
+            : o->named != "-"                   ? o->named
+            : o->verdict == "at_noise_floor"    ? "nothing"
+            : o->verdict == "unknown_structure" ? "unknown"
+                                                : o->verdict];
+  std::string list;
+  for (const auto& [name, count] : names)
+    list += fmt::format("{}{}{}", list.empty() ? "" : ", ", name, count > 1 ? fmt::format(" x {}", count) : "");
+  return list.empty() ? "-" : list;
+}
+
 std::string confusion(const std::vector<Outcome>& all) {
-  std::map<std::string, std::map<std::string, std::size_t>> table;
+  constexpr double kScales[] = {1.0, 0.5, 0.2, 0.1, 0.05, 0.02, 0.01};
+  std::string text =
+      "## What was named\n\nBy size over the usual one; nothing: the error was taken for noise.\n\n| hidden |";
+  std::string rule = "\n| --- |";
+  for (const double scale : kScales) {
+    text += fmt::format(" {:g} |", scale);
+    rule += " --- |";
+  }
+  text += rule + "\n";
+  std::map<std::string, Selection> by_effect;
   for (const Outcome& o : all)
-    if (!o.what.hidden.empty())
-      ++table[fmt::format("{} x {:g}", o.what.hidden, o.what.scale)][o.right          ? "right"
-                                                                     : o.named == "-" ? o.verdict
-                                                                                      : o.named];
-  std::string text = "## What was named\n\n| hidden, size over its usual one | named |\n| --- | --- |\n";
-  for (const auto& [hidden, names] : table) {
-    std::string list;
-    for (const auto& [name, count] : names)
-      list += fmt::format("{}{}{}", list.empty() ? "" : ", ", name, count > 1 ? fmt::format(" x {}", count) : "");
-    text += fmt::format("| {} | {} |\n", hidden, list);
+    if (!o.what.hidden.empty()) by_effect[o.what.hidden].push_back(&o);
+  for (const auto& [hidden, some] : by_effect) {
+    text += fmt::format("| {} |", hidden);
+    for (const double scale : kScales) {
+      Selection of_size;
+      std::copy_if(some.begin(), some.end(), std::back_inserter(of_size),
+                   [&](const Outcome* o) { return o->what.scale == scale; });
+      text += fmt::format(" {} |", named(of_size));
+    }
+    text += "\n";
   }
   return text + "\n";
 }
