@@ -115,12 +115,12 @@ bool surer(std::vector<Witness> witnesses, const Trial& trial) {
   return true;
 }
 
-// The order that such effects mostly have, if none of the others that were tried fits better.
-bool usual_and_best(const std::vector<Trial>& trials, const Trial& trial) {
+// The order that such effects mostly have, if none of the others that were tried fits better by more than that.
+bool usual_and_best(const std::vector<Trial>& trials, const Trial& trial, double better_by) {
   const catalogue::Entry& entry = *trial.proposal.entry;
   return *trial.proposal.order == entry.parameters[order_place(entry)].usual &&
          std::none_of(trials.begin(), trials.end(), [&](const Trial& other) {
-           return other.proposal.entry == &entry && other.score() > trial.score();
+           return other.proposal.entry == &entry && other.score() > trial.score() + better_by;
          });
 }
 
@@ -179,14 +179,14 @@ void doubt_orders(const std::vector<Search*>& all, Search& told, std::vector<Tri
     for (Search* other : others_of(all, told, t)) witnesses.push_back(witness(*other));
     t.why_not = doubt(witnesses, t);
     t.admissible = t.why_not.empty();
-    if (t.admissible || !usual_and_best(trials, t)) continue;
+    if (t.admissible || !usual_and_best(trials, t, kRivalMargin)) continue;
     t.note = fmt::format(
         "These data are too short to tell its order: {:g} a turn is what such effects mostly have, and fits best of "
         "the "
         "whole orders; {} would tell.",
         *t.proposal.order, t.proposal.entry->info->separated_by);
     // Its own balance says that the effect is there; where another says so, too, its order is taken for the usual one.
-    t.doubtful_order = t.elsewhere <= kRivalMargin;
+    t.doubtful_order = t.elsewhere <= kRivalMargin || !usual_and_best(trials, t, 0.0);
     if (t.doubtful_order) continue;
     t.admissible = true;
     t.why_not.clear();

@@ -138,9 +138,21 @@ class Guard {
   // quotes that follow without a space.
   void skip_quotes() {
     const std::size_t end = end_of_quotes(text_, at_);
-    const bool stands_free = at_ == 0 || std::string_view(" \t\n=,[{").find(text_[at_ - 1]) != std::string_view::npos;
+    const bool stands_free = at_ == 0 || std::string_view(" \t\n,[{").find(text_[at_ - 1]) != std::string_view::npos ||
+                             (text_[at_ - 1] == '=' && key_precedes());
     if (!stands_free && !is_ascii(text_.substr(at_, end - at_))) fail_not_ascii();
     at_ = end;
+  }
+
+  // Before the equals sign at at_-1: a number that runs into it is looked ahead from, too.
+  bool key_precedes() const {
+    std::size_t begin = at_ - 1;
+    const auto in_key = [](char c) {
+      return std::isalnum(static_cast<unsigned char>(c)) != 0 ||
+             std::string_view("_-. \t\"'").find(c) != std::string_view::npos;
+    };
+    while (begin > 0 && in_key(text_[begin - 1])) --begin;
+    return begin == 0 || std::string_view("\n,{").find(text_[begin - 1]) != std::string_view::npos;
   }
 
   [[noreturn]] void fail_not_ascii() const {

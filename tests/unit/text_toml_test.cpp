@@ -77,6 +77,13 @@ TEST(Nearest, AllowsAThirdOfTheWord) {
   EXPECT_EQ(nearest("", {"abc"}), "");
 }
 
+TEST(Toml, ANumberThatRunsIntoQuotesBeyondAsciiIsAnError) {
+  // The reader looks ahead from the number into what follows it.
+  for (const std::string text : {"scale = 0format=\"\u00e9\"\n", "a = 0\x01 x=\"\uFDFF\"\n"})
+    EXPECT_THROW(parse_toml(text), TomlError) << text;
+  EXPECT_NO_THROW(parse_toml("a=\"\u00e9\"\nb.c=\"\u00e9\"\nd={e=\"\u00e9\",f=\"\u00e9\"}\n"));
+}
+
 TEST(UnitSigns, BecomeAsciiAndAllElseStays) {
   EXPECT_EQ(unit_in_ascii("kg\u00B7m\u00B2"), "kg*m^2");
   EXPECT_EQ(unit_in_ascii("1/\u00B0C"), "1/degC");
