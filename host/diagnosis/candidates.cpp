@@ -42,9 +42,7 @@ bool stands_in(const Terms& terms, std::string_view name) {
 // All torques of the motor balance could be scaled alike, unless one of them is known: a parameter that the user gave,
 // or the torque of a loaded sensor.
 bool knows_torque_scale(const BalanceData& data, const Terms& terms) {
-  for (const Term& t : terms)
-    for (std::size_t p = 0; p < t.known.size(); ++p)
-      if (t.known[p] && t.entry->parameters[p].kind == Kind::linear && t.values[p] != 0.0) return true;
+  if (states_a_torque(terms)) return true;
   if (!data.prepared().torque_measured) return false;
   constexpr double kLoaded = 0.1;  // of the motor's torque
   double sensor = 0.0, effort = 0.0;
@@ -152,6 +150,13 @@ std::size_t free_count(const Terms& terms) {
 }
 
 }  // namespace
+
+bool states_a_torque(const Terms& terms) {
+  for (const Term& t : terms)
+    for (std::size_t p = 0; p < t.known.size(); ++p)
+      if (t.known[p] && t.entry->parameters[p].kind == Kind::linear && t.values[p] != 0.0) return true;
+  return false;
+}
 
 Terms extend(const Terms& terms, const catalogue::Entry& entry, std::optional<double> order) {
   const bool ordered = entry.count(Kind::given) > 0;

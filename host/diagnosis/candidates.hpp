@@ -30,6 +30,9 @@ struct Unexplained {
 std::vector<Proposal> proposals(const regression::BalanceData& data, const regression::Terms& terms,
                                 const Unexplained& left);
 
+// Whether the model states a linear parameter: a torque that the data need not tell.
+bool states_a_torque(const regression::Terms& terms);
+
 // A model with an effect more. Throws model::ModelError where it cannot be (what it modulates or replaces is missing,
 // or it is there already).
 regression::Terms extend(const regression::Terms& terms, const catalogue::Entry& entry, std::optional<double> order);

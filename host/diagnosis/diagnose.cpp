@@ -176,7 +176,8 @@ void name_effects(const Examined& chosen, const std::string& alias, Diagnosis& r
     const bool near = t.score() >= list.front().score() - kRivalMargin;
     // A law with more parameters that leaves the same error is no rival of the simpler one: it can do no worse.
     const bool wider = t.proposal.added > list.front().proposal.added;
-    if ((passes(t) && !wider && near) || name.effect == alias) result.named.push_back(name);
+    if ((passes(t) && !wider && (near || scale_alike(chosen.search, list.front(), t))) || name.effect == alias)
+      result.named.push_back(name);
     // Its order is not told, but neither is that it is the other effect.
     if (!t.doubtful_order || !near || t.proposal.entry == list.front().proposal.entry) continue;
     result.named.push_back(name);

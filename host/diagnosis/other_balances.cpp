@@ -71,7 +71,9 @@ double score_on(Search& other, Trial& trial, const Found& found) {
   // No parameter is free there, so none is paid for.
   const Judged judged = judge(data, terms, other.keep);
   trial.at_floor_elsewhere = trial.at_floor_elsewhere && other.at_floor(judged);
-  return fall_of(other.base, judged, 0.0).score - both.cost;
+  const Fall fall = fall_of(other.base, judged, 0.0);
+  trial.elsewhere_percent = std::max(trial.elsewhere_percent, fall.chi2_percent);
+  return fall.score - both.cost;
 }
 
 bool acts_on(const catalogue::Entry& entry, const Search& told, const Search& other) {
@@ -89,16 +91,18 @@ std::vector<Search*> others_of(const std::vector<Search*>& all, const Search& to
 }
 
 void hear_other_balances(const std::vector<Search*>& all, Search& told, std::vector<Trial>& trials) {
+  // Those as well of which the own balance hardly tells: a sensor's offset is a small one to the spring, and all to a
+  // load that moves freely.
   std::vector<Trial*> heard;
   for (Trial& trial : trials)
-    if (trial.fall.score > kNamedScore && !others_of(all, told, trial).empty()) heard.push_back(&trial);
+    if (trial.admissible && !others_of(all, told, trial).empty()) heard.push_back(&trial);
   if (heard.empty()) return;
   regression::in_parallel(heard.size(), [&](std::size_t i) {
     Trial& trial = *heard[i];
     const Found found = found_of(told, trial);
     if (found.parameters.empty()) return;
     for (Search* other : others_of(all, told, trial)) trial.elsewhere += score_on(*other, trial, found);
-    if (!trial.admissible || trial.score() > kNamedScore) return;
+    if (trial.fall.score <= kNamedScore || trial.score() > kNamedScore) return;
     trial.admissible = false;
     trial.why_not = "it acts on another torque balance as well, and that one fits worse with it";
   });

@@ -109,6 +109,11 @@ RivalReason compare_with_model(Search& search, const Trial& candidate) {
   return reason;
 }
 
+bool scale_alike(const Search& search, const Trial& first, const Trial& second) {
+  const unsigned both = first.proposal.entry->info->reads & second.proposal.entry->info->reads;
+  return (both & effects::kTorqueScale) != 0 && !states_a_torque(search.base.terms);
+}
+
 void explain_named(Search& search, const std::vector<Trial>& trials, data::Axis axis, Diagnosis& result) {
   const auto trial_of = [&](const Named& n) {
     return std::find_if(trials.begin(), trials.end(), [&](const Trial& t) {

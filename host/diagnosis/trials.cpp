@@ -18,6 +18,9 @@ using regression::Term;
 
 // Relative change of the squares that ends the search: well below one by score.
 constexpr double kSameSquares = 1e-5;
+constexpr std::size_t kFineGridPoints = 24;
+// A candidate that takes as much off the left-out chi-square may change the base model as it likes.
+constexpr double kAllExplainedPercent = 99.0;
 constexpr std::size_t kRefined = 4;  // candidates whose shapes are searched continuously
 
 // On `coarse`, the same rows from fewer samples.
@@ -26,7 +29,9 @@ void choose_shapes(Search& search, BalanceData& coarse, Proposal& proposal) {
   for (std::size_t p = 0; p < added.values.size(); ++p) {
     if (!added.free_shape(p) || begins_at_nought(added, p)) continue;
     double best = added.values[p], least = std::numeric_limits<double>::infinity();
-    for (const double value : regression::shape_grid(regression::shape_range(*search.data, added, p), kGridPoints)) {
+    // What no linear parameter scales fits at its place only.
+    const std::size_t points = added.entry->count(effects::Kind::linear) == 0 ? kFineGridPoints : kGridPoints;
+    for (const double value : regression::shape_grid(regression::shape_range(*search.data, added, p), points)) {
       added.values[p] = value;
       const double squares = squares_left(coarse, proposal.extended, search.base);
       if (squares < least) {
@@ -57,6 +62,11 @@ std::string imitator(BalanceData& data, const Judged& judged, std::size_t added)
     }
   }
   return best;
+}
+
+bool scales_torques(const Terms& terms) {
+  return std::any_of(terms.begin(), terms.end(),
+                     [](const Term& t) { return (t.entry->info->reads & effects::kTorqueScale) != 0; });
 }
 
 // A candidate that needs an impossible value, or that makes the base model impossible, is a fit and no explanation.
@@ -93,6 +103,8 @@ void check_admissible(BalanceData& data, const Judged& base, Trial& trial) {
     const Eigen::VectorXd torque = data.term_torque(base.terms, old);
     // An effect that is hardly larger than what is missing is not known well enough to rule anything out.
     if (torque.norm() < 2.0 * base.residual.norm()) continue;
+    // Where all but nothing is left the base model was worth nothing; unless all torques shrank together.
+    if (trial.fall.chi2_percent > kAllExplainedPercent && !scales_torques(judged.terms)) continue;
     // Of the larger one: without what is missing an effect may be found half as large as it is, or twice.
     const Eigen::VectorXd now = data.term_torque(judged.terms, judged.linear[j].term);
     const double change = (now - torque).norm() / std::max(torque.norm(), now.norm());
@@ -183,8 +195,8 @@ bool Search::at_floor(const Judged& judged) const {
 
 bool passes(const Trial& t) {
   // What differs from record to record only, as temperature does, takes from the deviations and hardly from the rest.
-  return t.admissible && t.fall.score > kNamedScore &&
-         std::max(t.fall.chi2_percent, t.fall.alike_percent) > kNamedFallPercent;
+  return t.admissible && t.score() > kNamedScore &&
+         std::max({t.fall.chi2_percent, t.fall.alike_percent, t.elsewhere_percent}) > kNamedFallPercent;
 }
 
 // Whether the law bends over a travel that the encoder resolves in few steps: what it leaves there is the encoder's.

@@ -26,8 +26,9 @@ struct Trial {
   Proposal proposal;
   Judged judged;
   Fall fall;
-  bool at_floor_elsewhere = true;  // on those
   double elsewhere = 0.0;          // score on the other balances that the effect acts on, with the same parameters
+  double elsewhere_percent = 0.0;  // largest fall of left-out chi-square on those
+  bool at_floor_elsewhere = true;  // on those
   bool admissible = true;
   std::string why_not;
   std::string imitated_by;      // the effect of the model that the data cannot tell it from

@@ -229,6 +229,9 @@ void tell_unknown(Search& search, const Trial* named, Diagnosis& result) {
       return;
     result.named.clear();
     result.remaining_structure = result.localised;
+  } else if (fall_of(search.base, with_curve(search, *unknown), unknown->curve.effective).score < kCurveScore) {
+    // What one or two records have alone is their own friction.
+    return;
   }
   result.verdict = Verdict::unknown_structure;
   result.unknown = std::move(unknown);

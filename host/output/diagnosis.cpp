@@ -235,6 +235,9 @@ std::string verdict_in_words(const Diagnosis& d) {
     case Verdict::confusable_effects:
       return fmt::format("The model lacks one of {}; these data cannot tell which.", listed(names, "or"));
     case Verdict::at_noise_floor:
+      if (d.base_rmse_own_friction < kAsGoodAsAlike * d.base_rmse)
+        return "Nothing is missing: friction differs from run to run, and beside that the model's error is the noise "
+               "of the measurement.";
       return "Nothing is missing: the model's error is the noise of the measurement.";
     case Verdict::nothing_significant:
       return "No effect of the catalogue improves the model. How large the noise is is not known, so something small "

@@ -183,7 +183,7 @@ Outcome run(const Case& what) {
     if (i < 4)
       outcome.detail += fmt::format(" {}({:.1f},{:.2f}%{})", label(c.effect, c.order), c.score, c.chi2_fall_percent,
                                     c.admissible ? "" : ",x");
-    if (c.admissible) outcome.best_score = std::max(outcome.best_score, c.score);
+    if (c.admissible) outcome.best_score = std::max(outcome.best_score, c.score + c.score_elsewhere);
   }
   const std::vector<std::string> hidden = split(what.hidden, '+');
   if (hidden.empty()) {

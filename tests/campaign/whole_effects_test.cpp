@@ -1,0 +1,48 @@
+// Effects that a drive has or has not, and those that one torque balance hardly shows and another one does.
+#include <gtest/gtest.h>
+
+#include <string>
+
+#include "host/diagnosis/diagnosis.hpp"
+#include "tests/support/twin_data.hpp"
+
+namespace flexspline {
+namespace {
+
+std::string named(const std::string& hidden, double scale, std::uint64_t seed, double variation = 0.0) {
+  plant::PlantFile demo = plant::demo_plant();
+  plant::hide(demo.drive, hidden, scale);
+  demo.drive.friction_variation = variation;
+  const data::Dataset dataset = testing::dataset_of(demo.drive, plant::record_all(demo.drive, demo.experiments, seed));
+  std::string list;
+  for (const auto& n : diagnosis::diagnose(dataset, testing::model_of(demo.drive, false, false), {}).named)
+    list += (list.empty() ? "" : " ") + n.effect;
+  return list;
+}
+
+class WholeEffects : public ::testing::TestWithParam<const char*> {};
+
+TEST_P(WholeEffects, AreNamedThoughTheBaseModelIsWorthLittleWithoutThem) {
+  EXPECT_EQ(named(GetParam(), 1.0, 8401, 0.03), GetParam());
+}
+
+// A limit of the current has no size of its own: it fits at its place only.
+INSTANTIATE_TEST_SUITE_P(Hidden, WholeEffects,
+                         ::testing::Values("linear_stiffness", "output_coulomb_friction", "current_saturation",
+                                           "bouc_wen_hysteresis"));
+
+TEST(SmallOffset, OfTheTorqueSensorIsNamedByTheLoadThatMovesFreely) {
+  // A hundredth of a spring's noise, and two thirds of the load balance's.
+  EXPECT_EQ(named("torque_offset", 0.01, 8402), "torque_offset");
+}
+
+TEST(TorqueScale, OfMotorAndSensorIsNotToldWithoutATorqueThatIsKnown) {
+  for (const char* hidden : {"torque_constant_error", "torque_sensor_gain"}) {
+    const std::string names = named(hidden, 1.0, 8403);
+    EXPECT_NE(names.find("torque_constant_error"), std::string::npos) << names;
+    EXPECT_NE(names.find("torque_sensor_gain"), std::string::npos) << names;
+  }
+}
+
+}  // namespace
+}  // namespace flexspline
