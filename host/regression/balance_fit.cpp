@@ -137,6 +137,8 @@ BalanceFit fit_balance(BalanceData& data, Terms& terms) {
     noise_weights = record_weights(data.records(), between.left.cwiseQuotient(noise_weights));
     fit.whitening = whitening_of(data, noise_weights, noise_weights.asDiagonal() * friction, between.std,
                                  between.autocorrelation_time);
+    // Beside friction that differs a small effect has another best shape than without, and far away.
+    if (round == 0) sweep_shapes(data, terms, fit.on_balance, fit.whitening, SweepFrom::values);
     if (!fit.shapes.empty()) refine_shapes(data, terms, fit.on_balance, fit.whitening);
     fitting.solve(fit.whitening);
     look_between();

@@ -205,13 +205,14 @@ Eigen::MatrixXd columns_of(BalanceData& data, const Terms& terms, const std::vec
 }
 
 void sweep_shapes(BalanceData& data, Terms& terms, const std::vector<std::size_t>& on_balance,
-                  const Eigen::VectorXd& root_weights) {
+                  const Whitening& whitening, SweepFrom from) {
   const std::vector<Slot> shapes = free_shape_slots(terms, on_balance);
   const std::vector<Slot> linear = free_linear_slots(terms, on_balance);
   std::vector<Slot> open;
   for (const Slot& s : shapes) {
     if (terms[s.term].stated[s.parameter]) continue;
     open.push_back(s);
+    if (from == SweepFrom::values) continue;
     const auto& info = terms[s.term].entry->parameters[s.parameter];
     // A ratio or an exponent begins at its usual value, what has a size at the middle of its range.
     terms[s.term].values[s.parameter] = info.limit == Limit::stated || info.limit == Limit::scale
@@ -221,7 +222,7 @@ void sweep_shapes(BalanceData& data, Terms& terms, const std::vector<std::size_t
   constexpr std::size_t kGrid = 6;
   const auto cost_now = [&] {
     return projected_cost(columns_of(data, terms, linear), data.target() - data.known_torque(terms, on_balance),
-                          root_weights);
+                          whitening);
   };
   for (int around = 0; around < (open.size() > 1 ? 2 : 1); ++around)
     for (const Slot& s : open) {

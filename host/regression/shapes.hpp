@@ -36,8 +36,10 @@ double refine_shapes(BalanceData& data, Terms& terms, const std::vector<std::siz
 double refine_shapes(BalanceData& data, Terms& terms, const std::vector<std::size_t>& on_balance,
                      const Whitening& whitening, double tolerance, BalanceData* coarse = nullptr);
 
-// Chooses starting values for shapes that the model does not state: sweeps each over its grid, twice around.
+// Chooses starting values for shapes that the model does not state: sweeps each over its grid, twice around; from the
+// usual ones or the middle of their ranges, or from those that `terms` has, which stay where none is better.
+enum class SweepFrom { usual, values };
 void sweep_shapes(BalanceData& data, Terms& terms, const std::vector<std::size_t>& on_balance,
-                  const Eigen::VectorXd& root_weights);
+                  const Whitening& whitening, SweepFrom from = SweepFrom::usual);
 
 }  // namespace flexspline::regression
