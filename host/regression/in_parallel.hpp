@@ -14,7 +14,8 @@
 namespace flexspline::regression {
 
 // Calls work(i) for each i below count, on as many threads as there are cores. After all have ended the exception of
-// the lowest i is thrown again: the one that a loop would have met.
+// the lowest i is thrown again: the one that a loop would have met. Once giving up was asked for, none goes on or
+// begins.
 template <class Work>
 void in_parallel(std::size_t count, const Work& work) {
   std::atomic<std::size_t> next{0};
@@ -22,9 +23,22 @@ void in_parallel(std::size_t count, const Work& work) {
   std::size_t failed = count;
   std::mutex guard;
   const Asking* const asked = asked_here();
+  std::atomic<bool> given_up{false};
+  std::exception_ptr why;
+  const Asking ask = [&] {
+    if (given_up) std::rethrow_exception(why);
+    try {
+      if (*asked) (*asked)();
+    } catch (...) {
+      const std::lock_guard lock(guard);
+      if (!why) why = std::current_exception();
+      given_up = true;
+      throw;
+    }
+  };
   const auto run = [&] {
-    const MayGiveUp as_the_caller(asked);
-    for (std::size_t i = next++; i < count; i = next++) {
+    const MayGiveUp as_the_caller(asked != nullptr ? &ask : nullptr);
+    for (std::size_t i = next++; i < count && !given_up; i = next++) {
       try {
         work(i);
       } catch (...) {

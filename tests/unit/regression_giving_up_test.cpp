@@ -36,12 +36,11 @@ const Case& a_case() {
   return made;
 }
 
-// How often is asked when an effect with shapes is added; from the ask of this number on all throw, as whoever gave up
-// does not come back (nought: none does). Both fits, before and after, may be at work then.
+// How often is asked when an effect with shapes is added; the ask of this number throws (nought: none does).
 int asked_until(int last) {
   std::atomic<int> count{0};
   const Asking ask = [&] {
-    if (++count >= last && last > 0) throw Enough{};
+    if (++count == last) throw Enough{};
   };
   const MayGiveUp may_give_up(&ask);
   const auto add = [] { diagnosis::add(a_case().dataset, a_case().model, "stribeck_gaussian", {}); };
