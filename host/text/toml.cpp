@@ -115,16 +115,13 @@ class Guard {
     bool line_begins = true;
     while (at_ < text_.size()) {
       const char c = text_[at_];
-      if (c == '[' && line_begins && depth_ == 0) require_name_in_header();
+      if (c == '[' && line_begins && open_.empty()) require_name_in_header();
       if (c == '#') {
         at_ = std::min(text_.find('\n', at_), text_.size());
       } else if (c == '"' || c == '\'') {
         skip_quotes();
       } else {
-        if (static_cast<unsigned char>(c) >= 0x80U) fail_not_ascii();
-        if (c == '[') ++depth_;
-        if (c == ']' && depth_ > 0) --depth_;
-        ++at_;
+        skip(c);
       }
       line_begins = c == '\n' || (line_begins && (c == ' ' || c == '\t'));
     }
@@ -133,26 +130,29 @@ class Guard {
  private:
   std::size_t line() const { return 1 + static_cast<std::size_t>(std::ranges::count(text_.substr(0, at_), '\n')); }
 
+  void skip(char c) {
+    if (static_cast<unsigned char>(c) >= 0x80U) fail_not_ascii();
+    if (static_cast<unsigned char>(c) < 0x20U && c != '\n' && c != '\r' && c != '\t')
+      throw TomlError(line(), 0, "a control character stands outside quotes", "remove it");
+    if (c == '[' || c == '{') open_ += c;
+    if (c == (in('[') ? ']' : '}') && !open_.empty()) open_.pop_back();
+    if (c == '\n' || c == ',' || c == '[' || c == '{') key_done_ = in('[');
+    const bool begins_value = c == '=' && !key_done_;
+    if (c == '=') key_done_ = true;
+    value_at_ = begins_value ? at_ + 1 : value_at_;
+    ++at_;
+  }
+  bool in(char bracket) const { return !open_.empty() && open_.back() == bracket; }
+
   // TOML knows letters beyond ASCII only in quotes and comments. The reader would say so, but not for all of them: for
   // those from U+00A1 up to some hundred its behaviour is undefined, also where it looks ahead from a number into
-  // quotes that follow without a space.
+  // quotes that follow without a space, or with no more than a name and an equals sign between them.
   void skip_quotes() {
     const std::size_t end = end_of_quotes(text_, at_);
-    const bool stands_free = at_ == 0 || std::string_view(" \t\n,[{").find(text_[at_ - 1]) != std::string_view::npos ||
-                             (text_[at_ - 1] == '=' && key_precedes());
+    const bool stands_free =
+        at_ == 0 || at_ == value_at_ || std::string_view(" \t\n,[{").find(text_[at_ - 1]) != std::string_view::npos;
     if (!stands_free && !is_ascii(text_.substr(at_, end - at_))) fail_not_ascii();
     at_ = end;
-  }
-
-  // Before the equals sign at at_-1: a number that runs into it is looked ahead from, too.
-  bool key_precedes() const {
-    std::size_t begin = at_ - 1;
-    const auto in_key = [](char c) {
-      return std::isalnum(static_cast<unsigned char>(c)) != 0 ||
-             std::string_view("_-. \t\"'").find(c) != std::string_view::npos;
-    };
-    while (begin > 0 && in_key(text_[begin - 1])) --begin;
-    return begin == 0 || std::string_view("\n,{").find(text_[begin - 1]) != std::string_view::npos;
   }
 
   [[noreturn]] void fail_not_ascii() const {
@@ -176,7 +176,9 @@ class Guard {
 
   std::string_view text_;
   std::size_t at_ = 0;
-  std::size_t depth_ = 0;  // of brackets
+  std::string open_;          // brackets and braces
+  bool key_done_ = false;     // an equals sign more in this entry begins no value; in an array none does
+  std::size_t value_at_ = 0;  // right after the equals sign that does
 };
 
 }  // namespace

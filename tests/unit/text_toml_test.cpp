@@ -79,9 +79,13 @@ TEST(Nearest, AllowsAThirdOfTheWord) {
 
 TEST(Toml, ANumberThatRunsIntoQuotesBeyondAsciiIsAnError) {
   // The reader looks ahead from the number into what follows it.
-  for (const std::string text : {"scale = 0format=\"\u00e9\"\n", "a = 0\x01 x=\"\uFDFF\"\n"})
+  for (const std::string text : {"a = 0b=\"\u00e9\"\n", "a = [\n0b=\"\u00e9\"]\n", "a = {b=0c=\"\u00e9\"}\n"})
     EXPECT_THROW(parse_toml(text), TomlError) << text;
-  EXPECT_NO_THROW(parse_toml("a=\"\u00e9\"\nb.c=\"\u00e9\"\nd={e=\"\u00e9\",f=\"\u00e9\"}\n"));
+  EXPECT_EQ(error_line("a = 1\nb = 0\x01 c=\"\uFDFF\"\n"), 2u);
+  for (const std::string text :
+       {"a=\"\u00e9\"\nb.c=\"\u00e9\"\n", "d={e=\"\u00e9\",f=\"\u00e9\"}\n", "\"\u00e9\"=\"\u00e9\"\n",
+        "\"a:b\"='\u00e9'\n", "g=[\"\u00e9\",\n\"\u00e9\",{h=\"\u00e9\"}]\n", "[x]\r\ni=\"\u00e9\"\r\n"})
+    EXPECT_NO_THROW(parse_toml(text)) << text;
 }
 
 TEST(UnitSigns, BecomeAsciiAndAllElseStays) {
