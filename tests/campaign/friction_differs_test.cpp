@@ -10,41 +10,20 @@
 #include <string>
 
 #include "host/diagnosis/add.hpp"
-#include "host/diagnosis/diagnosis.hpp"
-#include "tests/support/twin_data.hpp"
+#include "tests/support/hidden_twin.hpp"
 
 namespace flexspline {
 namespace {
 
+using testing::HiddenTwin;
+using testing::names;
+
 constexpr double kVariation = 0.03;
-
-struct Drive {
-  plant::PlantFile plant = plant::demo_plant();
-  data::Dataset dataset;
-  model::Model base;
-  Drive(const std::string& hidden, double scale, std::uint64_t seed, double variation) {
-    plant::hide(plant.drive, hidden, scale);
-    plant.drive.friction_variation = variation;
-    dataset = testing::dataset_of(plant.drive, plant::record_all(plant.drive, plant.experiments, seed));
-    base = testing::model_of(plant.drive, false, false);
-  }
-  const plant::Effect& truth() const {
-    return *std::find_if(plant.drive.effects.begin(), plant.drive.effects.end(),
-                         [](const auto& e) { return e.hidden; });
-  }
-  diagnosis::Diagnosis diagnose() const { return diagnosis::diagnose(dataset, base, {}); }
-};
-
-std::string names(const diagnosis::Diagnosis& found) {
-  std::string list;
-  for (const diagnosis::Named& n : found.named) list += (list.empty() ? "" : " ") + n.effect;
-  return list;
-}
 
 // Largest error of the hidden effect's parameters after it was added, over the truth; the two parts of a wave over its
 // height.
 double worst_error(const std::string& hidden, double scale, std::uint64_t seed) {
-  const Drive drive(hidden, scale, seed, kVariation);
+  const HiddenTwin drive(hidden, scale, seed, kVariation);
   const diagnosis::Addition added = diagnosis::add(drive.dataset, drive.base, hidden, {});
   const plant::Effect* truth = &drive.truth();
   double height = 0.0;
@@ -77,7 +56,7 @@ INSTANTIATE_TEST_SUITE_P(Effects, FrictionDiffers,
 
 TEST(FrictionThatDiffers, DoesNotHideWhatIsMissingFromTheErrorAndItsMap) {
   // With friction of each run its own the error would be a fifth.
-  const diagnosis::Diagnosis found = Drive("stribeck_gaussian", 1.0, 8202, 0.0).diagnose();
+  const diagnosis::Diagnosis found = HiddenTwin("stribeck_gaussian", 1.0, 8202, 0.0).diagnose();
   ASSERT_EQ(names(found), "stribeck_gaussian");
   EXPECT_GT(found.base_rmse, 15.0 * *found.noise_floor);
   EXPECT_LT(found.base_rmse_own_friction, 0.5 * found.base_rmse);
@@ -95,7 +74,7 @@ TEST(FrictionThatDiffers, DoesNotHideWhatIsMissingFromTheErrorAndItsMap) {
 
 TEST(FrictionThatDiffers, IsNoWorseBesideAnEffectThatIsNotThere) {
   // An effect that the model does not have leaves at least as good a fit; its one or two numbers cost some.
-  const diagnosis::Diagnosis found = Drive("stribeck_gaussian", 1.0, 8203, 0.0).diagnose();
+  const diagnosis::Diagnosis found = HiddenTwin("stribeck_gaussian", 1.0, 8203, 0.0).diagnose();
   for (const char* name : {"load_dependent_friction", "quadratic_drag", "torque_constant_saturation"})
     for (const diagnosis::Candidate& c : found.candidates)
       if (c.effect == name) {
@@ -105,12 +84,12 @@ TEST(FrictionThatDiffers, IsNoWorseBesideAnEffectThatIsNotThere) {
 
 TEST(FrictionThatDiffers, DoesNotStandForAnEffectOfTemperature) {
   // What a record has in common shows from record to record only: of the rest it takes a few thousandths.
-  EXPECT_EQ(names(Drive("temperature_coulomb", 0.07, 8204, 0.0).diagnose()), "temperature_coulomb");
+  EXPECT_EQ(names(HiddenTwin("temperature_coulomb", 0.07, 8204, 0.0).diagnose()), "temperature_coulomb");
 }
 
 TEST(FrictionThatDiffers, LeavesAKinematicErrorOnBothBalances) {
   for (const std::uint64_t seed : {8205U, 8305U}) {
-    const Drive drive("kinematic_error", 0.1, seed, kVariation);
+    const HiddenTwin drive("kinematic_error", 0.1, seed, kVariation);
     // The locked flexspline sees a constant; what the motor feels is a few parts in ten of its noise.
     EXPECT_NE(names(drive.diagnose()).find("kinematic_error"), std::string::npos) << seed;
     const diagnosis::Addition added = diagnosis::add(drive.dataset, drive.base, "kinematic_error:2", {});
@@ -127,7 +106,7 @@ TEST(FrictionThatDiffers, LeavesAKinematicErrorOnBothBalances) {
 TEST(FrictionThatDiffers, DoesNotMakeASmearedDahlLawALugre) {
   // A presliding of 13 encoder counts: what the encoder leaves, a law of five parameters bends to.
   for (const std::uint64_t seed : {8206U, 8306U})
-    EXPECT_EQ(names(Drive("dahl_friction", 0.1, seed, kVariation).diagnose()), "dahl_friction") << seed;
+    EXPECT_EQ(names(HiddenTwin("dahl_friction", 0.1, seed, kVariation).diagnose()), "dahl_friction") << seed;
 }
 
 }  // namespace

@@ -9,41 +9,23 @@
 #include "host/diagnosis/add.hpp"
 #include "host/diagnosis/diagnosis.hpp"
 #include "tests/support/campaign_size.hpp"
-#include "tests/support/twin_data.hpp"
+#include "tests/support/hidden_twin.hpp"
 
 namespace flexspline {
 namespace {
 
+using testing::HiddenTwin;
 using testing::in_campaign;
+using testing::names;
 
 constexpr std::uint64_t kFirstSeed = 9100;
-
-struct Twin {
-  plant::PlantFile file = plant::demo_plant();
-  data::Dataset dataset;
-  model::Model base;
-
-  Twin(const std::string& hidden, double scale, std::uint64_t seed, double friction_variation) {
-    plant::hide(file.drive, hidden, scale);
-    file.drive.friction_variation = friction_variation;
-    dataset = testing::dataset_of(file.drive, plant::record_all(file.drive, file.experiments, seed));
-    base = testing::model_of(file.drive, false, false);
-  }
-};
-
-std::string names(const diagnosis::Diagnosis& d) {
-  std::string list;
-  for (const auto& n : d.named)
-    list += (list.empty() ? "" : "+") + n.effect + (n.order ? fmt::format(":{:g}", *n.order) : "");
-  return list;
-}
 
 // In these data the spring is twisted with the motor all but at rest, so that a wave over the motor angle is a constant
 // there, as is a wrong zero of torsion or torque; only the motor's balance knows better.
 void expect_named(const std::string& hidden, double scale, double friction_variation) {
   for (std::uint64_t seed = kFirstSeed; seed < kFirstSeed + in_campaign(2, 12); ++seed) {
-    const Twin twin(hidden, scale, seed, friction_variation);
-    const diagnosis::Diagnosis d = diagnosis::diagnose(twin.dataset, twin.base, {});
+    const HiddenTwin twin(hidden, scale, seed, friction_variation);
+    const diagnosis::Diagnosis d = twin.diagnose();
     fmt::print("{} x {:g}, friction {:g}, seed {}: {}\n", hidden, scale, friction_variation, seed, names(d));
     EXPECT_EQ(names(d), hidden + ":2");
   }
@@ -63,7 +45,7 @@ TEST(OtherBalances, TellARippleOfTheTorqueSensorFromOneOfTheMotor) {
 }
 
 TEST(OtherBalances, GiveTheWaveOfTheGearItsPhase) {
-  const Twin twin("kinematic_error", 1.0, kFirstSeed + 50, 0.0);
+  const HiddenTwin twin("kinematic_error", 1.0, kFirstSeed + 50, 0.0);
   const diagnosis::Addition added = diagnosis::add(twin.dataset, twin.base, "kinematic_error:2", {});
   const plant::Effect* truth = nullptr;
   for (const plant::Effect& e : twin.file.drive.effects)

@@ -3,21 +3,13 @@
 
 #include <string>
 
-#include "host/diagnosis/diagnosis.hpp"
-#include "tests/support/twin_data.hpp"
+#include "tests/support/hidden_twin.hpp"
 
 namespace flexspline {
 namespace {
 
 std::string named(const std::string& hidden, double scale, std::uint64_t seed, double variation = 0.0) {
-  plant::PlantFile demo = plant::demo_plant();
-  plant::hide(demo.drive, hidden, scale);
-  demo.drive.friction_variation = variation;
-  const data::Dataset dataset = testing::dataset_of(demo.drive, plant::record_all(demo.drive, demo.experiments, seed));
-  std::string list;
-  for (const auto& n : diagnosis::diagnose(dataset, testing::model_of(demo.drive, false, false), {}).named)
-    list += (list.empty() ? "" : " ") + n.effect;
-  return list;
+  return testing::names(testing::HiddenTwin(hidden, scale, seed, variation).diagnose());
 }
 
 class WholeEffects : public ::testing::TestWithParam<const char*> {};

@@ -9,7 +9,6 @@
 namespace flexspline::soak {
 namespace {
 
-constexpr double kScales[] = {1.0, 0.5, 0.2, 0.1, 0.05, 0.02, 0.01};
 constexpr double kVariations[] = {0.0, 0.03};
 constexpr double kCorrelation = 0.9;
 

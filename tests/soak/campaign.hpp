@@ -9,6 +9,9 @@
 
 namespace flexspline::soak {
 
+// Sizes of hidden effects, over their usual ones.
+inline constexpr double kScales[] = {1.0, 0.5, 0.2, 0.1, 0.05, 0.02, 0.01};
+
 // Seeds below kFirstJudgingSeed were looked at while the diagnosis was written and set its limits; the others judge it.
 inline constexpr std::uint64_t kFirstTuningSeed = 1;
 inline constexpr std::uint64_t kLastTuningSeed = 1099;

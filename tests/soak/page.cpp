@@ -126,7 +126,6 @@ std::string named(const Selection& some) {
 }
 
 std::string confusion(const std::vector<Outcome>& all) {
-  constexpr double kScales[] = {1.0, 0.5, 0.2, 0.1, 0.05, 0.02, 0.01};
   std::string text =
       "## What was named\n\nBy size over the usual one; nothing: the error was taken for noise.\n\n| hidden |";
   std::string rule = "\n| --- |";
