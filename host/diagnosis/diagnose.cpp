@@ -174,8 +174,9 @@ void name_effects(const Examined& chosen, const std::string& alias, Diagnosis& r
   for (const Trial& t : list) {
     const Named name{std::string(t.proposal.entry->name()), t.proposal.order};
     const bool near = t.score() >= list.front().score() - kRivalMargin;
-    // A law with more parameters that leaves the same error is no rival of the simpler one: it can do no worse.
-    const bool wider = t.proposal.added > list.front().proposal.added;
+    // A law with more parameters that leaves the same error is no rival of the simpler one: it can do no worse. One
+    // that earns them, if by little, is.
+    const bool wider = t.proposal.added > list.front().proposal.added && !t.leads;
     if ((passes(t) && !wider && (near || scale_alike(chosen.search, list.front(), t))) || name.effect == alias)
       result.named.push_back(name);
     // Its order is not told, but neither is that it is the other effect.

@@ -31,8 +31,9 @@ struct Trial {
   bool at_floor_elsewhere = true;  // on those
   bool admissible = true;
   std::string why_not;
-  std::string imitated_by;      // the effect of the model that the data cannot tell it from
-  std::string note;             // what is to be known of it if it is named
+  std::string imitated_by;  // the effect of the model that the data cannot tell it from
+  std::string note;         // what is to be known of it if it is named
+  bool leads = false;       // scores more than a simpler rival that comes first, by too little to tell the two apart
   bool doubtful_order = false;  // not admissible for that alone: the usual order, and the best of those that were tried
 
   double score() const { return fall.score + elsewhere; }

@@ -1,7 +1,9 @@
 // Columns of a balance: what the parameters of effects add to it.
 #include <fmt/format.h>
 
+#include <algorithm>
 #include <functional>
+#include <memory>
 
 #include "host/regression/along_rows.hpp"
 #include "host/regression/balance_data.hpp"
@@ -161,6 +163,35 @@ std::vector<double> unit_values(const Term& term, std::size_t parameter) {
   return values;
 }
 
+// Whether the torque is straight in all linear parameters together, so that a slope by one of them is its column.
+bool straight_in_all(const catalogue::Entry& entry) {
+  return std::all_of(entry.parameters.begin(), entry.parameters.end(), [](const effects::ParameterInfo& p) {
+    return p.per.empty() && p.root_of.empty() && (p.kind != Kind::linear || !(p.low > 0.0));
+  });
+}
+
+// Columns of two linear parameters of a term by one evaluation, which finds the wave or bell that both multiply once:
+// the first parameter is one, the second nought with a slope of one.
+struct TwoAtOnce {
+  std::vector<Jet> parameters;
+  std::vector<Jet> torque;
+  const RowRange* of = nullptr;
+  std::size_t first = 0;
+
+  TwoAtOnce(const std::vector<double>& values_of_first, std::size_t second)
+      : parameters(values_of_first.begin(), values_of_first.end()) {
+    parameters[second].v[0] = 1.0;
+  }
+  bool holds(const RowRange& range, const ColumnStretch& stretch) const {
+    return of == &range && first == stretch.first && torque.size() == stretch.signal.size();
+  }
+  void begin(const RowRange& range, const ColumnStretch& stretch) {
+    of = &range;
+    first = stretch.first;
+    torque.assign(stretch.signal.size(), Jet(0.0));
+  }
+};
+
 }  // namespace
 
 const Eigen::VectorXd& BalanceData::column(const Terms& terms, Slot slot) {
@@ -194,11 +225,16 @@ void BalanceData::make_columns(const Terms& terms, const std::vector<Slot>& slot
   const auto all = values_of_all(terms);
   std::vector<std::vector<double>> values, natural;
   std::vector<unsigned> reads;
+  std::vector<std::unique_ptr<TwoAtOnce>> pairs(wanted.size());
   for (const Slot& slot : wanted) {
     const Term& term = terms[slot.term];
     values.push_back(unit_values(term, slot.parameter));
     natural.push_back(catalogue::natural(*term.entry, values.back()));
     reads.push_back(term.adds_torque() ? reads_of(terms, term) : 0);
+    const std::size_t j = reads.size() - 1;
+    if (j > 0 && !pairs[j - 1] && wanted[j - 1].term == slot.term && reads[j] != kWhole && term.adds_torque() &&
+        straight_in_all(*term.entry))
+      pairs[j] = std::make_unique<TwoAtOnce>(values[j - 1], slot.parameter);
   }
   struct Fill {
     const std::vector<unsigned>* of;
@@ -208,20 +244,31 @@ void BalanceData::make_columns(const Terms& terms, const std::vector<Slot>& slot
       work(range, column, stretch);
     }
   };
-  const Eigen::MatrixXd made =
-      along_rows(wanted.size(), Fill{&reads, [&](const RowRange& range, std::size_t j, const ColumnStretch& stretch) {
-                                       const Term& term = terms[wanted[j].term];
-                                       const Record& r = prepared_->records[range.record];
-                                       if (reads[j] == kWhole)
-                                         add_torque<Real>(terms, term, values[j], r, all, stretch.signal);
-                                       else if (term.adds_torque())
-                                         add_by_shares(
-                                             term, [&](Balance to) { return share(r, to); }, stretch.signal,
-                                             [&](Balance to, double* sum) {
-                                               term.entry->real.torque_of_plain(natural[j].data(), prepared_->constants,
-                                                                                to, stretch.inputs, sum);
-                                             });
-                                     }});
+  const DriveConstants<Jet> lifted_constants = lifted<Jet>(prepared_->constants);
+  const auto fill = [&](const RowRange& range, std::size_t j, const ColumnStretch& stretch) {
+    const Term& term = terms[wanted[j].term];
+    const Record& r = prepared_->records[range.record];
+    const auto share_of = [&](Balance to) { return share(r, to); };
+    if (reads[j] == kWhole) return add_torque<Real>(terms, term, values[j], r, all, stretch.signal);
+    if (!term.adds_torque()) return;
+    const bool begins = j + 1 < wanted.size() && pairs[j + 1];
+    if (begins || pairs[j]) {
+      TwoAtOnce& both = begins ? *pairs[j + 1] : *pairs[j];
+      if (!both.holds(range, stretch)) {
+        both.begin(range, stretch);
+        add_by_shares(term, share_of, std::span(both.torque), [&](Balance to, Jet* sum) {
+          term.entry->dual.torque_of_plain(both.parameters.data(), lifted_constants, to, stretch.inputs, sum);
+        });
+      }
+      for (std::size_t k = 0; k < stretch.signal.size(); ++k)
+        stretch.signal[k] = begins ? both.torque[k].a : both.torque[k].v[0];
+      return;
+    }
+    add_by_shares(term, share_of, stretch.signal, [&](Balance to, double* sum) {
+      term.entry->real.torque_of_plain(natural[j].data(), prepared_->constants, to, stretch.inputs, sum);
+    });
+  };
+  const Eigen::MatrixXd made = along_rows(wanted.size(), Fill{&reads, fill});
   for (std::size_t j = 0; j < wanted.size(); ++j)
     cache_.insert_or_assign(key_of(terms, wanted[j]), made.col(static_cast<Eigen::Index>(j)));
 }

@@ -128,6 +128,12 @@ std::size_t likest(const Eigen::MatrixXd& X, std::size_t j) {
   return best;
 }
 
+constexpr double kAtTheEnd = 0.005;  // of the range
+double share_of_range(const BalanceData& data, const Terms& terms, Slot shape) {
+  const Term& term = terms[shape.term];
+  return shape_range(data, term, shape.parameter).share(term.values[shape.parameter]);
+}
+
 void warn_of_excitation(BalanceData& data, const BalanceFit& fit, const Terms& terms, Identification& result) {
   const Eigen::MatrixXd X = columns_of(data, terms, fit.linear);
   for (std::size_t j = 0; j < fit.linear.size(); ++j) {
@@ -150,12 +156,11 @@ void warn_of_excitation(BalanceData& data, const BalanceFit& fit, const Terms& t
   }
   for (std::size_t j = 0; j < fit.shapes.size(); ++j) {
     const Term& term = terms[fit.shapes[j].term];
-    const double value = term.values[fit.shapes[j].parameter];
-    const double share = shape_range(data, term, fit.shapes[j].parameter).share(value);
-    if (share < 0.005 || share > 0.995)
+    const double share = share_of_range(data, terms, fit.shapes[j]);
+    if (share < kAtTheEnd || share > 1.0 - kAtTheEnd)
       result.warnings.push_back(fmt::format("{}.{} stopped at the end of what these data can show ({:.4g}); record {}",
-                                            term.id, term.entry->parameters[fit.shapes[j].parameter].name, value,
-                                            term.entry->info->separated_by));
+                                            term.id, term.entry->parameters[fit.shapes[j].parameter].name,
+                                            term.values[fit.shapes[j].parameter], term.entry->info->separated_by));
   }
 }
 
@@ -200,6 +205,7 @@ void assemble(Identification& result) {
     for (const std::vector<Slot>* slots : {&fit.linear, &fit.shapes})
       for (const Slot& slot : *slots) {
         Estimate e = estimate_of(result.terms, slot, axis);
+        const effects::ParameterInfo& info = result.terms[slot.term].entry->parameters[slot.parameter];
         e.identifiable = fit.own_share[at] >= kUndetermined;
         e.excitation = fit.excitation[at];
         const double variance = natural_value(result.terms[slot.term], slot, all, fit.covariance).variance;
@@ -207,6 +213,10 @@ void assemble(Identification& result) {
           e.std = std::sqrt(variance);
           e.low = e.value - 1.96 * *e.std;
           e.high = e.value + 1.96 * *e.std;
+          // A length that is shorter than these data can show stops at their end, and may as well be nothing.
+          const bool length = info.limit == effects::Limit::torsion || info.limit == effects::Limit::travel;
+          if (slots == &fit.shapes && length && info.low >= 0.0 && share_of_range(data, result.terms, slot) < kAtTheEnd)
+            e.low = std::min(*e.low, info.low);
         }
         result.estimates.push_back(std::move(e));
         ++at;

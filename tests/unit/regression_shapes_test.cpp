@@ -65,6 +65,28 @@ double value(const Identification& found, std::string_view effect, std::string_v
 const Motion kSlow{{1.5, 0.4, 0.3}, {0.2, 1.1, 1.0}};
 const Motion kFast{{6.0, 0.7, 0.3}, {0.5, 2.7, 1.0}};
 
+TEST(Columns, OfTwoParametersByOneEvaluationAreThoseOfEachAlone) {
+  const data::Dataset dataset = dataset_of({experiment("slow", kSlow, plain), experiment("fast", kFast, plain)});
+  const auto found = identify(dataset, plain_model(), kOptions);
+  int told = 0;
+  for (const catalogue::Entry& entry : catalogue::all()) {
+    const Terms terms{candidate_term(entry)};
+    std::vector<Slot> slots;
+    for (std::size_t p = 0; p < entry.parameters.size(); ++p)
+      if (entry.parameters[p].kind == effects::Kind::linear) slots.push_back({0, p});
+    if (slots.size() < 2 || !terms[0].adds_torque()) continue;
+    BalanceData together(found->prepared, Balance::motor);
+    const Eigen::MatrixXd all = together.columns(terms, slots);
+    for (std::size_t j = 0; j < slots.size(); ++j) {
+      BalanceData alone(found->prepared, Balance::motor);
+      const Eigen::VectorXd& column = alone.column(terms, slots[j]);
+      EXPECT_LE((all.col(static_cast<Eigen::Index>(j)) - column).norm(), 1e-13 * column.norm()) << entry.name() << j;
+      told += column.norm() > 0.0 ? 1 : 0;
+    }
+  }
+  EXPECT_GE(told, 6);  // ripple and both Stribeck laws at least
+}
+
 TEST(ShapeSearch, RecoversAStribeckVelocityFromExactData) {
   constexpr double kPositive = 0.03, kNegative = 0.02, kVelocity = 2.5;
   const Law law = [&](double q, double w, double a) {
