@@ -227,6 +227,7 @@ constexpr Same kTheSame{2.25, 0.001}, kHardlyMore{1.21, 0.005}, kTheSameSmeared{
 void prefer_simple(const Search& search, std::vector<Trial>& trials) {
   const Judged& base = search.base;
   constexpr double kDozens = 12.0;
+  for (Trial& trial : trials) trial.leads = false;
   if (trials.empty() || !passes(trials.front())) return;
   const Trial& best = trials.front();
   // Left-out squares over the noise of each record as the best one has it: a loud record must not decide alone.

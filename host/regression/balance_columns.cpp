@@ -182,15 +182,33 @@ struct TwoAtOnce {
       : parameters(values_of_first.begin(), values_of_first.end()) {
     parameters[second].v[0] = 1.0;
   }
-  bool holds(const RowRange& range, const ColumnStretch& stretch) const {
-    return of == &range && first == stretch.first && torque.size() == stretch.signal.size();
-  }
-  void begin(const RowRange& range, const ColumnStretch& stretch) {
+  // Whether this is a stretch that the other parameter's column has not made yet; its torque is nought then.
+  bool begins(const RowRange& range, const ColumnStretch& stretch) {
+    if (of == &range && first == stretch.first && torque.size() == stretch.signal.size()) return false;
     of = &range;
     first = stretch.first;
     torque.assign(stretch.signal.size(), Jet(0.0));
+    return true;
   }
 };
+
+// The column of one linear parameter.
+struct UnitColumn {
+  const Term* term;
+  std::vector<double> values;                      // as unit_values
+  unsigned reads;                                  // as reads_of
+  std::shared_ptr<TwoAtOnce> first_of, second_of;  // with the column after it, before it
+};
+
+UnitColumn unit_column(const Terms& terms, Slot slot) {
+  const Term& term = terms[slot.term];
+  return {&term, unit_values(term, slot.parameter), term.adds_torque() ? reads_of(terms, term) : 0, nullptr, nullptr};
+}
+
+bool together(const UnitColumn& first, const UnitColumn& second) {
+  return first.term == second.term && !first.second_of && first.term->adds_torque() && first.reads != kWhole &&
+         straight_in_all(*first.term->entry);
+}
 
 }  // namespace
 
@@ -223,52 +241,43 @@ void BalanceData::make_columns(const Terms& terms, const std::vector<Slot>& slot
     wanted = missing();
   }
   const auto all = values_of_all(terms);
-  std::vector<std::vector<double>> values, natural;
-  std::vector<unsigned> reads;
-  std::vector<std::unique_ptr<TwoAtOnce>> pairs(wanted.size());
+  const DriveConstants<Jet> lifted_constants = lifted<Jet>(prepared_->constants);
+  std::vector<UnitColumn> made_of;
   for (const Slot& slot : wanted) {
-    const Term& term = terms[slot.term];
-    values.push_back(unit_values(term, slot.parameter));
-    natural.push_back(catalogue::natural(*term.entry, values.back()));
-    reads.push_back(term.adds_torque() ? reads_of(terms, term) : 0);
-    const std::size_t j = reads.size() - 1;
-    if (j > 0 && !pairs[j - 1] && wanted[j - 1].term == slot.term && reads[j] != kWhole && term.adds_torque() &&
-        straight_in_all(*term.entry))
-      pairs[j] = std::make_unique<TwoAtOnce>(values[j - 1], slot.parameter);
+    UnitColumn column = unit_column(terms, slot);
+    if (!made_of.empty() && together(made_of.back(), column))
+      column.second_of = made_of.back().first_of = std::make_shared<TwoAtOnce>(made_of.back().values, slot.parameter);
+    made_of.push_back(std::move(column));
   }
   struct Fill {
-    const std::vector<unsigned>* of;
-    std::function<void(const RowRange&, std::size_t, const ColumnStretch&)> work;
-    unsigned reads(std::size_t column) const { return (*of)[column]; }
+    const std::vector<UnitColumn>* of;
+    std::function<void(const RowRange&, const UnitColumn&, const ColumnStretch&)> work;
+    unsigned reads(std::size_t column) const { return (*of)[column].reads; }
     void operator()(const RowRange& range, std::size_t column, const ColumnStretch& stretch) const {
-      work(range, column, stretch);
+      work(range, (*of)[column], stretch);
     }
   };
-  const DriveConstants<Jet> lifted_constants = lifted<Jet>(prepared_->constants);
-  const auto fill = [&](const RowRange& range, std::size_t j, const ColumnStretch& stretch) {
-    const Term& term = terms[wanted[j].term];
+  const auto fill = [&](const RowRange& range, const UnitColumn& column, const ColumnStretch& stretch) {
+    const Term& term = *column.term;
     const Record& r = prepared_->records[range.record];
     const auto share_of = [&](Balance to) { return share(r, to); };
-    if (reads[j] == kWhole) return add_torque<Real>(terms, term, values[j], r, all, stretch.signal);
+    if (column.reads == kWhole) return add_torque<Real>(terms, term, column.values, r, all, stretch.signal);
     if (!term.adds_torque()) return;
-    const bool begins = j + 1 < wanted.size() && pairs[j + 1];
-    if (begins || pairs[j]) {
-      TwoAtOnce& both = begins ? *pairs[j + 1] : *pairs[j];
-      if (!both.holds(range, stretch)) {
-        both.begin(range, stretch);
-        add_by_shares(term, share_of, std::span(both.torque), [&](Balance to, Jet* sum) {
-          term.entry->dual.torque_of_plain(both.parameters.data(), lifted_constants, to, stretch.inputs, sum);
+    if (TwoAtOnce* const both = column.second_of ? column.second_of.get() : column.first_of.get()) {
+      if (both->begins(range, stretch))
+        add_by_shares(term, share_of, std::span(both->torque), [&](Balance to, Jet* sum) {
+          term.entry->dual.torque_of_plain(both->parameters.data(), lifted_constants, to, stretch.inputs, sum);
         });
-      }
       for (std::size_t k = 0; k < stretch.signal.size(); ++k)
-        stretch.signal[k] = begins ? both.torque[k].a : both.torque[k].v[0];
+        stretch.signal[k] = column.second_of ? both->torque[k].v[0] : both->torque[k].a;
       return;
     }
+    const std::vector<double> natural = catalogue::natural(*term.entry, column.values);
     add_by_shares(term, share_of, stretch.signal, [&](Balance to, double* sum) {
-      term.entry->real.torque_of_plain(natural[j].data(), prepared_->constants, to, stretch.inputs, sum);
+      term.entry->real.torque_of_plain(natural.data(), prepared_->constants, to, stretch.inputs, sum);
     });
   };
-  const Eigen::MatrixXd made = along_rows(wanted.size(), Fill{&reads, fill});
+  const Eigen::MatrixXd made = along_rows(wanted.size(), Fill{&made_of, fill});
   for (std::size_t j = 0; j < wanted.size(); ++j)
     cache_.insert_or_assign(key_of(terms, wanted[j]), made.col(static_cast<Eigen::Index>(j)));
 }

@@ -174,8 +174,10 @@ std::string after_adding(const std::vector<Outcome>& all) {
                         100.0 * quantile(shape, 0.95), share(covered, intervals));
   }
   return text +
-         "\nOf drives that were named right; errors where the effect is a quarter of the noise or more. The floor is "
-         "the residual of the true model with its nominal parameters, so where friction differs from run to run it "
+         "\nOf drives that were named right; errors where the effect is a quarter of the noise or more. Weights of an "
+         "operator whose points are laid by the data (Prandtl and Ishlinskii) are not compared: the plant's stand at "
+         "others. The floor is the residual of the true model with its nominal parameters, so where friction differs "
+         "from run to run it "
          "holds the hold-out records' own deviations.\n\n";
 }
 

@@ -346,6 +346,25 @@ TEST(Identify, IntervalsOfWhiteNoiseCoverTheTruth) {
   }
 }
 
+TEST(Identify, IntervalsOfExactDataAreAsWideAsWhatFiltersLeave) {
+  const auto found =
+      identify(dataset_of({experiment("a", {{3.0, 1.0, 0.3}, {0.3, 3.1, 1.0}}, plain)}), model_of(kPlain), kOptions);
+  for (const Estimate& e : found->estimates) {
+    EXPECT_GE(*e.std, 5e-4 * std::abs(e.value)) << e.id;
+    EXPECT_LT(*e.std, 1e-3 * std::abs(e.value)) << e.id;
+  }
+}
+
+// Friction that jumps at the reversal has no presliding that could be told from nought.
+TEST(Identify, AnIntervalOfALengthThatStoppedAtTheShortEndBeginsAtNought) {
+  const auto found = identify(dataset_of({experiment("a", {{3.0, 1.0, 0.3}, {0.3, 3.1, 1.0}}, plain)}),
+                              model_of({"inertia", "viscous_friction", "dahl_friction"}), kOptions);
+  EXPECT_TRUE(warns_of(*found, "dahl_friction.presliding stopped at the end"));
+  const Estimate& presliding = estimate(*found, "dahl_friction", "presliding");
+  EXPECT_GT(presliding.value, 0.0);
+  EXPECT_LE(*presliding.low, catalogue::get("dahl_friction").parameters[1].low);
+}
+
 // Records of one motion and noise count alike, so that the mean over them has the deviation of one over the root of
 // their number. The noise is so loud that the differences do not show in it.
 TEST(Identify, IntervalsGrowWithTheDifferencesOfFrictionBetweenRecords) {
