@@ -19,6 +19,7 @@
 #include "firmware/messages.hpp"
 #include "firmware/parameter_block.hpp"
 #include "firmware/safety.hpp"
+#include "firmware/signals.hpp"
 #include "firmware/telemetry.hpp"
 #include "firmware/watchdog.hpp"
 
@@ -27,40 +28,52 @@ namespace flexspline::firmware {
 template <Board B>
 class Application {
  public:
-  using Ring = Telemetry<B::kTelemetryWords>;
+  using Ring = Telemetry<B::kTelemetryWords, Signals::Places>;
   static constexpr std::uint32_t kBootTicks = 50;
+  static constexpr std::uint32_t kRestTicks = 100;  // within two counts
 
   // An image's application is constinit and begins when main() says so.
   constexpr Application() = default;
   explicit Application(B& board) { begin(board); }
   Application(const Application&) = delete;
-  void begin(B& board) {
-    board_ = &board;
-    control_.attach(parameters_);
-  }
+  void begin(B& board) { board_ = &board; }
 
-  // The control tick: called by the board's timer, kTickHz times a second.
-  void tick() {
-    const Readings readings = board_->read();
+  // The control tick: called by the board's timer, kTickHz times a second. One body, as calls between its parts would
+  // take a sixth of it.
+  [[gnu::flatten]] void tick() {
+    const Readings& readings = board_->read();
     ++status_.tick;
+    watch_rest(readings.motor_counter);
     watchdog_.report(Part::sensors);
     lend_or_take_back();
-    Estimate estimate;
-    if (has_parameters()) estimate = control_.observe(readings);
-    if (status_.maps_residual && control_.has_residual())
-      residual_map_.add(parameters_.residual_map, estimate.velocity, estimate.angle, control_.residual());
+    const Turn turn = turn_of(status_.tick);
+    Estimate& estimate = signals_.estimate;
+    // Of the tick before, until this one has its own.
+    Output& output = signals_.output;
+    if (!is_armed(status_.mode)) output = {};
+    if (has_parameters()) {
+      control_.observe(readings, turn, estimate);
+    } else {
+      estimate = {};
+    }
+    if (turn == Turn::residual_map && status_.maps_residual && control_.has_residual())
+      residual_map_.add(parameters().residual_map, estimate.velocity, estimate.angle, control_.residual());
     take_command(estimate);
     judge(readings, estimate);
     watchdog_.report(Part::safety);
-    Output output;
-    if (is_armed(status_.mode)) output = control_.update(demand_, estimate);
+    if (is_armed(status_.mode)) {
+      control_.update(demand_, estimate, output);
+    } else {
+      output = {};
+    }
     watchdog_.report(Part::control);
     board_->actuate(actuation(output));
     watchdog_.report(Part::output);
-    last_ = output;
     follow_up(output);
-    telemetry_.record(status_.tick, channels(readings, estimate, output));
-    if (board_->tick_overrun()) enter_fault({Fault::tick_overrun, status_.tick, 0, 0});
+    record(readings);
+    // In a fault already, or on the way to it: what came first is what counts.
+    if (board_->tick_overrun() && status_.mode != Mode::fault)
+      enter_fault(status_.mode == Mode::stop ? status_.fault : FaultRecord{Fault::tick_overrun, status_.tick, 0, 0});
   }
 
   // What has time: called again and again from main(), and interrupted by the tick at any point.
@@ -90,7 +103,7 @@ class Application {
   void boot_with(std::span<const std::byte> block) {
     const BlockFinding finding = check_block(block, tick_hz_of(*board_));
     if (finding == BlockFinding::none) {
-      load_block(block, parameters_);
+      load_block(block, parameters());
       new_parameters_ = true;
     }
     block_done(finding);
@@ -110,7 +123,7 @@ class Application {
   template <class Edit>
   bool edit_excitation(Edit&& edit) {
     if (is_armed(status_.mode) || command_waits_.load(std::memory_order_acquire) || !has_parameters()) return false;
-    edit(parameters_.excitation, parameters_.excites_torque);
+    edit(parameters().excitation, parameters().excites_torque);
     return true;
   }
   // A bin of the residual map, for background work. False: there is no bin of this number.
@@ -125,9 +138,13 @@ class Application {
 
   // What the bins mean: of the parameters, which background work alone changes. None where there are none.
   const control::ResidualMap::Coefficients* map_coefficients() const {
-    return has_parameters() ? &parameters_.residual_map : nullptr;
+    return has_parameters() ? &parameters().residual_map : nullptr;
   }
   std::uint32_t map_version() const { return residual_map_.version(); }
+
+  // The motor's count has stood still for a while: flash memory may be written, which may stop the processor, without a
+  // turn being lost.
+  bool at_rest() const { return rest_ticks_ >= kRestTicks; }
 
   Ring& telemetry() { return telemetry_; }
   const Status& status() const { return status_; }
@@ -137,6 +154,17 @@ class Application {
   enum class Owner : std::uint8_t { tick, wanted, background };
 
   bool has_parameters() const { return status_.has_parameters; }
+  Parameters& parameters() { return control_.parameters(); }
+  const Parameters& parameters() const { return control_.parameters(); }
+  void watch_rest(std::uint32_t counter) {
+    const auto strayed = static_cast<std::int32_t>(counter - rest_counter_);
+    if (strayed > kRestCounts || strayed < -kRestCounts) {
+      rest_counter_ = counter;
+      rest_ticks_ = 0;
+    } else if (rest_ticks_ < kRestTicks) {
+      ++rest_ticks_;
+    }
+  }
 
   // Parameters.
 
@@ -164,7 +192,7 @@ class Application {
       block_step_ = BlockStep::wait;
     } else if (block_step_ == BlockStep::wait) {
       if (owner_.load(std::memory_order_acquire) == Owner::background) {
-        load_block(block_, parameters_);
+        load_block(block_, parameters());
         new_parameters_ = true;
         owner_.store(Owner::tick, std::memory_order_release);
         block_done(BlockFinding::none);
@@ -189,7 +217,8 @@ class Application {
     answer_waits_.store(true, std::memory_order_release);
     command_waits_.store(false, std::memory_order_release);
   }
-  Refusal obey(const Command& command, const Estimate& estimate) {
+  // What is rare is no part of the tick's one body.
+  [[gnu::noinline]] Refusal obey(const Command& command, const Estimate& estimate) {
     switch (command.kind) {
       case Command::Kind::heartbeat:
         return Refusal::none;
@@ -203,7 +232,12 @@ class Application {
         return Refusal::none;
       case Command::Kind::disarm:
         if (!is_armed(status_.mode)) return Refusal::not_armed;
-        enter_idle();
+        // A drive that comes to rest because of a fault stays in it.
+        if (status_.mode == Mode::stop) {
+          enter_fault(status_.fault);
+        } else {
+          enter_idle();
+        }
         return Refusal::none;
       case Command::Kind::clear_fault:
         // Back to boot: idle again once the sensors were found good for as long as after a reset.
@@ -228,8 +262,8 @@ class Application {
     if (status_.mode == Mode::fault || status_.mode == Mode::stop) return Refusal::fault;
     if (!may_be_commanded(command.mode)) return Refusal::no_mode;
     if (!has_parameters()) return Refusal::no_parameters;
-    if (command.mode == Mode::excitation && parameters_.excitation.ticks == 0) return Refusal::no_excitation;
-    if (status_.mode == Mode::idle && N::magnitude(estimate.velocity) > parameters_.safety.standstill)
+    if (command.mode == Mode::excitation && parameters().excitation.ticks == 0) return Refusal::no_excitation;
+    if (status_.mode == Mode::idle && N::magnitude(estimate.velocity) > parameters().safety.standstill)
       return Refusal::moving;
     status_.mode = command.mode;
     demand_.compensate = command.compensate;
@@ -239,6 +273,7 @@ class Application {
     return Refusal::none;
   }
   void take_set_point(const Command& command) {
+    safety_.set_point_is_there();
     demand_.mode = command.mode;
     demand_.stream = command.stream;
     demand_.position = command.position;
@@ -250,25 +285,31 @@ class Application {
   // Modes.
 
   void judge(const Readings& readings, const Estimate& estimate) {
-    const bool needs_output = has_parameters() && parameters_.has_output_encoder;
+    const bool needs_output = has_parameters() && parameters().has_output_encoder;
     FaultRecord found = safety_.check_samples(status_.tick, readings, needs_output);
     if (found.fault == Fault::none && has_parameters())
-      found = safety_.check(status_.tick, readings, estimate, last_, parameters_, status_.mode);
+      found = safety_.check(status_.tick, readings, estimate, signals_.output, parameters(), status_.mode,
+                            control_.streams_in_motion());
     if (found.fault != Fault::none) {
       boot_ticks_ = 0;
       return respond(found, estimate);
     }
     if (status_.mode == Mode::boot) boot();
+    if (is_armed(status_.mode) && amplifier_tripped_of(*board_)) {
+      const auto before = static_cast<std::int32_t>(status_.mode == Mode::stop ? status_.fault.fault : Fault::none);
+      enter_fault({Fault::amplifier_fault, status_.tick, before, 0});
+    }
   }
   void boot() {
     if (++boot_ticks_ < kBootTicks) return;
     status_.mode = Mode::idle;
-    if (board_->reset_cause() == ResetCause::watchdog && !told_reset_)
-      enter_fault({Fault::watchdog, status_.tick, 0, 0});
+    const ResetCause cause = board_->reset_cause();
+    if (cause != ResetCause::power && !told_reset_)
+      enter_fault({cause == ResetCause::watchdog ? Fault::watchdog : Fault::crashed, status_.tick, 0, 0});
     told_reset_ = true;
   }
   // A drive that is off stays off; one that comes to rest already is not told to do so again.
-  void respond(const FaultRecord& found, const Estimate& estimate) {
+  [[gnu::noinline]] void respond(const FaultRecord& found, const Estimate& estimate) {
     if (status_.mode == Mode::fault) return;
     if (!is_armed(status_.mode) || ends_in(found.fault) == SafeState::off) return enter_fault(found);
     if (status_.mode == Mode::stop) return;
@@ -278,7 +319,7 @@ class Application {
     stop_ticks_ = 0;
     control_.start(demand_, estimate);
   }
-  void enter_fault(const FaultRecord& found) {
+  [[gnu::noinline]] void enter_fault(const FaultRecord& found) {
     status_.fault = found;
     status_.mode = Mode::fault;
     amplifier_off();
@@ -289,7 +330,6 @@ class Application {
   }
   void amplifier_off() {
     demand_ = {};
-    last_ = {};
     control_.off();
     board_->actuate({});
   }
@@ -298,58 +338,35 @@ class Application {
     if (status_.mode == Mode::excitation && output.finished) enter_idle();
     if (status_.mode != Mode::stop) return;
     if (output.at_rest) return enter_fault(status_.fault);
-    if (++stop_ticks_ >= parameters_.safety.stop_ticks)
+    if (++stop_ticks_ >= parameters().safety.stop_ticks)
       enter_fault({Fault::stop_failed, status_.tick, static_cast<std::int32_t>(status_.fault.fault), 0});
   }
 
   Actuation actuation(const Output& output) const {
     if (!is_armed(status_.mode)) return {};
-    const N::Value share = N::scaled(parameters_.amplifier, output.current);
+    const N::Value share = N::scaled(parameters().amplifier, output.current);
     const std::int64_t most = 32767;
     return {
         static_cast<std::int16_t>(fixed::limited(fixed::shift_right(share.raw, fixed::kValueBits - 15), -most, most)),
         true};
   }
 
-  ChannelValues channels(const Readings& readings, const Estimate& e, const Output& out) const {
-    const auto turns = [](N::Angle a) { return static_cast<std::uint32_t>(static_cast<std::uint64_t>(a.raw) >> 32); };
-    const auto fraction = [](N::Angle a) { return static_cast<std::uint32_t>(static_cast<std::uint64_t>(a.raw)); };
-    const auto word = [](N::Value x) { return static_cast<std::uint32_t>(x.raw); };
-    const auto state = static_cast<std::uint32_t>(status_.mode) |
-                       (static_cast<std::uint32_t>(status_.fault.fault) << 8) | (out.limited ? 1U << 16 : 0U);
-    return {state,
-            readings.motor_counter,
-            turns(e.angle),
-            fraction(e.angle),
-            turns(e.output_angle),
-            fraction(e.output_angle),
-            word(e.velocity),
-            word(e.acceleration),
-            word(e.output_velocity),
-            word(e.torque),
-            word(e.current),
-            word(e.temperature),
-            word(e.disturbance),
-            word(e.torsion),
-            turns(out.position),
-            fraction(out.position),
-            word(out.velocity),
-            word(out.acceleration),
-            word(out.feedforward),
-            word(out.torque),
-            word(out.current)};
+  void record(const Readings& readings) {
+    signals_.state = static_cast<std::uint32_t>(status_.mode) | (static_cast<std::uint32_t>(status_.fault.fault) << 8) |
+                     (signals_.output.limited ? 1U << 16 : 0U);
+    signals_.motor_counter = readings.motor_counter;
+    telemetry_.record(status_.tick, signals_);
   }
 
   B* board_ = nullptr;
   Status status_{};
   Demand demand_{};
-  Output last_{};
+  Signals signals_{};
   Safety safety_{};
   Watchdog watchdog_{};
-  Ring telemetry_{};
-  control::ResidualMap residual_map_{};
-  Parameters parameters_{};
   Control control_{};
+  std::uint32_t rest_counter_ = 0;
+  std::uint32_t rest_ticks_ = 0;
   std::uint32_t boot_ticks_ = 0;
   std::uint32_t stop_ticks_ = 0;
   bool told_reset_ = false;
@@ -365,6 +382,10 @@ class Application {
   std::uint32_t asked_at_ = 0;
   std::atomic<Owner> owner_{Owner::tick};
   bool new_parameters_ = false;
+
+  // Last, as a tick reaches what lies near the beginning in fewer instructions.
+  Ring telemetry_{};
+  control::ResidualMap residual_map_{};
 };
 
 }  // namespace flexspline::firmware

@@ -27,7 +27,11 @@ struct Actuation {
   bool enabled = false;
 };
 
-enum class ResetCause : std::uint8_t { power, watchdog };
+enum class ResetCause : std::uint8_t {
+  power,
+  watchdog,
+  crash,  // the firmware gave up by itself
+};
 
 template <class B>
 concept Board = requires(B board, const Actuation& actuation) {
@@ -43,6 +47,17 @@ concept Board = requires(B board, const Actuation& actuation) {
   board.feed_watchdog();
   { board.reset_cause() } -> std::same_as<ResetCause>;
 };
+
+// Whether the amplifier switched itself off while it was told to be on. A board whose amplifier does not tell has no
+// such function.
+template <Board B>
+bool amplifier_tripped_of(B& board) {
+  if constexpr (requires { board.amplifier_tripped(); }) {
+    return board.amplifier_tripped();
+  } else {
+    return false;
+  }
+}
 
 // How often a board ticks: kTickHz, but for one that is told when it starts.
 template <Board B>

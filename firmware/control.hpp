@@ -6,6 +6,7 @@
 #include "firmware/board.hpp"
 #include "firmware/messages.hpp"
 #include "shared/control/drive_parameters.hpp"
+#include "shared/control/reachable.hpp"
 
 namespace flexspline::firmware {
 
@@ -22,6 +23,15 @@ struct Demand {
   N::Value current{};
 };
 
+// What is slow, or feeds no loop, is done at every fourth tick, each at another one, so that no tick is much longer
+// than another.
+enum class Turn : std::uint8_t { ripple_taken, residual_map, ripple_learnt, temperature_and_gear };
+inline constexpr std::uint32_t kTurns = 4;
+static_assert(control::ResidualMap::kEveryTicks == kTurns);
+constexpr Turn turn_of(std::uint32_t tick) {
+  return static_cast<Turn>(tick % kTurns);
+}
+
 struct Estimate {
   N::Angle angle{};  // of the motor
   N::Value velocity{};
@@ -32,6 +42,8 @@ struct Estimate {
   N::Value torque{};   // through the flexspline, without the sensor's ripple
   N::Value current{};
   N::Value temperature{};
+  N::Value shown_current{};  // as far as the sensor shows it, for limits; what a model reads ends at two bases
+  N::Value shown_temperature{};
   N::Value disturbance{};
   std::int32_t moved = 0;  // counts of the motor's encoder since the tick before
 };
@@ -43,7 +55,8 @@ struct Output {
   N::Value feedforward{};
   N::Value torque{};
   N::Value current{};
-  N::Step lag{};  // mode position: the set point of the loop, less where the shaft is
+  N::Step lag{};     // mode position: the set point of the loop, less where the shaft is
+  N::Value error{};  // of the velocity loop, where it is closed
   bool limited = false;
   bool at_rest = false;   // modes velocity and stop: the set point is nought and so is the shaft's velocity
   bool finished = false;  // the excitation is over
@@ -51,17 +64,22 @@ struct Output {
 
 class Control {
  public:
-  // The parameters stay the caller's. A pointer that is set later, so that a whole application is noughts until it
-  // begins, and costs an image neither a copy of it in flash nor a constructor.
-  constexpr void attach(Parameters& parameters) { p_ = &parameters; }
+  // Who writes them has to see to it that no tick reads them meanwhile, and has to call restart() then.
+  Parameters& parameters() { return p_; }
+  const Parameters& parameters() const { return p_; }
 
-  // At rest and knowing nothing: after the parameters changed.
-  void restart() {
-    motor_encoder_ = output_encoder_ = {};
+  // At rest and knowing nothing but where the shafts are: after the parameters changed. With another number of counts a
+  // turn an encoder begins anew.
+  [[gnu::noinline]] void restart() {
+    if (motor_counts_ != p_.motor_encoder.counts) motor_encoder_ = {};
+    if (output_counts_ != p_.output_encoder.counts) output_encoder_ = {};
+    motor_counts_ = p_.motor_encoder.counts;
+    output_counts_ = p_.output_encoder.counts;
     motor_motion_ = output_motion_ = {};
     disturbance_ = {};
     torsion_ = {};
     ripple_ = {};
+    torque_ripple_ = {};
     off();
   }
   // The amplifier is off: what the loops remember is void.
@@ -72,44 +90,47 @@ class Control {
     compensates_ = false;
   }
 
-  Estimate observe(const Readings& readings) {
-    Estimate e;
+  // What the sensors say, into `e`: fields of sensors that the drive does not have stay as they are, and those of slow
+  // signals but in their turn.
+  void observe(const Readings& readings, Turn turn, Estimate& e) {
     e.moved = observers::EncoderAngle::moved(motor_encoder_, readings.motor_counter);
-    e.angle = observers::EncoderAngle::update(motor_encoder_, p_->motor_encoder, readings.motor_counter);
-    const auto motor = observers::EncoderKalman::update<N>(motor_motion_, p_->motor_motion, e.angle);
+    e.angle = observers::EncoderAngle::update(motor_encoder_, p_.motor_encoder, readings.motor_counter);
+    const auto motor = observers::EncoderKalman::update<N>(motor_motion_, p_.motor_motion, e.angle);
     e.velocity = motor.velocity;
     e.acceleration = motor.acceleration;
-    if (p_->has_output_encoder) {
-      e.output_angle = observers::EncoderAngle::update(output_encoder_, p_->output_encoder, readings.output_counter);
+    if (p_.has_output_encoder) {
+      e.output_angle = observers::EncoderAngle::update(output_encoder_, p_.output_encoder, readings.output_counter);
       e.output_velocity =
-          observers::EncoderKalman::update<N>(output_motion_, p_->output_motion, e.output_angle).velocity;
+          observers::EncoderKalman::update<N>(output_motion_, p_.output_motion, e.output_angle).velocity;
     }
-    e.current = measured(p_->current, readings.current);
-    const N::Value applied = N::scaled(p_->torque_of_current, e.current);
-    if (!p_->has_output_encoder) estimate_output(applied, e);
-    e.temperature = measured(p_->temperature, readings.temperature);
-    if (p_->has_torque_sensor)
-      e.torque =
-          observers::RippleFilter::update<N>(ripple_, p_->ripple, e.angle, measured(p_->torque, readings.torque));
+    e.shown_current = control::shown(p_.current, readings.current);
+    e.current = N::clamp(e.shown_current, two_bases());
+    const N::Value applied = N::scaled(p_.torque_of_current, e.current);
+    if (!p_.has_output_encoder) estimate_output(applied, e);
+    if (turn == Turn::temperature_and_gear) {
+      e.shown_temperature = control::shown(p_.temperature, readings.temperature);
+      e.temperature = N::clamp(e.shown_temperature, two_bases());
+    }
+    if (p_.has_torque_sensor)
+      observe_torque(N::clamp(control::shown(p_.torque, readings.torque), two_bases()), turn, e);
     e.disturbance =
-        observers::DisturbanceObserver::update<N>(disturbance_, p_->disturbance, applied, nominal_.torque,
+        observers::DisturbanceObserver::update<N>(disturbance_, p_.disturbance, applied, nominal_.torque,
                                                   N::clamp(e.acceleration - nominal_.acceleration, two_bases()));
-    return e;
   }
 
   // Enters an armed mode where the shaft is, at the velocity that it has. The torque goes on from what it is.
-  void start(const Demand& demand, const Estimate& e) {
+  [[gnu::noinline]] void start(const Demand& demand, const Estimate& e) {
     const bool goes_on =
         uses_trajectory(last_mode_) && uses_trajectory(demand.mode) && loops_.mode != control::Mode::off;
     if (!goes_on) {
-      trajectory_ = control::Trajectory::moving<N>(p_->trajectory, e.angle.raw,
-                                                   control::Trajectory::speed_of<N>(p_->trajectory, e.velocity));
+      trajectory_ = control::Trajectory::moving<N>(p_.trajectory, e.angle.raw,
+                                                   control::Trajectory::speed_of<N>(p_.trajectory, e.velocity));
     }
-    if (demand.mode == Mode::excitation) control::Excitation::start<N>(excitation_, p_->excitation);
+    if (demand.mode == Mode::excitation) control::Excitation::start<N>(excitation_, p_.excitation);
     feedforward_ = {};
     nominal_ = {};
     torsion_ = {};
-    p_->model.reset();
+    p_.model.reset();
     last_mode_ = demand.mode;
     streams_ = false;
     take(demand);
@@ -119,26 +140,29 @@ class Control {
   void take(const Demand& demand) {
     if (demand.mode != Mode::position) return;
     if (demand.stream) {
-      stream_ =
-          control::Stream::at<N>(p_->stream, p_->trajectory, demand.position, demand.velocity, demand.acceleration);
+      stream_ = control::Stream::at<N>(p_.stream, p_.trajectory, demand.position, demand.velocity, demand.acceleration);
     } else if (streams_) {
-      trajectory_ = control::Trajectory::moving<N>(p_->trajectory, stream_.position, stream_.velocity);
+      trajectory_ = control::Trajectory::moving<N>(p_.trajectory, stream_.position, stream_.velocity);
     }
     streams_ = demand.stream;
   }
+
+  // A stream of set points moves on by itself, until the next one comes.
+  bool streams_in_motion() const { return streams_ && (stream_.velocity != 0 || stream_.change != 0); }
 
   // What the model of the tick before leaves over of the motor's torque, where there was one: off() and other modes
   // have none.
   bool has_residual() const { return compensates_; }
   N::Value residual() const { return disturbance_.residual; }
 
-  Output update(const Demand& demand, const Estimate& e) {
-    Output out;
+  // One armed tick: sets every field of `out`.
+  void update(const Demand& demand, const Estimate& e, Output& out) {
+    out = {};
     control::Loops::Command<N> command;
     switch (demand.mode) {
       case Mode::current:
         command.mode = control::Mode::torque;
-        command.torque = N::scaled(p_->torque_of_current, N::clamp(demand.current, p_->loops.current_limit));
+        command.torque = N::scaled(p_.torque_of_current, N::clamp(demand.current, p_.loops.current_limit));
         break;
       case Mode::velocity:
       case Mode::stop:
@@ -154,18 +178,18 @@ class Control {
         break;
       default:
         off();
-        return {};
+        return;
     }
     nominal_ = {};
     compensates_ = demand.compensate && uses_trajectory(demand.mode);
     if (compensates_) compensate(e, out, command);
     if (demand.mode == Mode::position) out.lag = command.position - e.angle;
-    const auto loops = control::Loops::update<N>(loops_, p_->loops, command, e.angle, e.velocity);
+    const auto loops = control::Loops::update<N>(loops_, p_.loops, command, e.angle, e.velocity);
     out.torque = loops.torque;
     out.current = loops.current;
+    out.error = loops.error;
     out.limited = loops.limited;
-    out.at_rest = out.velocity == N::Value{} && N::magnitude(e.velocity) <= p_->safety.standstill;
-    return out;
+    out.at_rest = out.velocity == N::Value{} && N::magnitude(e.velocity) <= p_.safety.standstill;
   }
 
  private:
@@ -173,40 +197,42 @@ class Control {
     return mode == Mode::velocity || mode == Mode::position || mode == Mode::stop;
   }
   static constexpr N::Value two_bases() { return N::one() + N::one(); }
-  // A signal is limited to two bases where it enters.
-  static constexpr N::Value measured(const control::AnalogScale<N>& scale, std::int16_t share) {
-    const N::Value part{{std::int32_t{share} * (1 << (fixed::kValueBits - 15))}};
-    return N::clamp(N::scaled(scale.gain, part) - scale.offset, two_bases());
+  // The ripple is that of at most five ticks ago.
+  void observe_torque(N::Value torque, Turn turn, Estimate& e) {
+    if (turn == Turn::ripple_taken) observers::RippleFilter::take<N>(ripple_, p_.ripple, e.angle, torque);
+    if (turn == Turn::ripple_learnt && ripple_.started)
+      torque_ripple_ = observers::RippleFilter::learn<N>(ripple_, p_.ripple);
+    e.torque = torque - torque_ripple_;
   }
   // The observer tells how the drive differs from its nominal motion. Without a model friction would count as torsion,
   // and around a reversal it does: a stiff gear is the better guess then.
   void estimate_output(N::Value applied, Estimate& e) {
-    const N::Value rest = p_->safety.standstill;
+    const N::Value rest = p_.safety.standstill;
     const bool forward = nominal_.velocity > rest && e.velocity > rest;
     const bool backward = nominal_.velocity < -rest && e.velocity < -rest;
     const auto difference = observers::TorsionObserver::update<N>(
-        torsion_, p_->torsion, N::clamp(applied - nominal_.torque, two_bases()),
+        torsion_, p_.torsion, N::clamp(applied - nominal_.torque, two_bases()),
         N::clamp(e.velocity - nominal_.velocity, two_bases()), forward || backward);
     e.torsion = nominal_.torsion + difference.torsion;
-    e.output_velocity = N::scaled(p_->output_of_velocity, nominal_.velocity) + difference.output_velocity;
-    e.output_angle = N::times_order(e.angle, p_->output_angle) + N::distance(p_->torsion_turns, -e.torsion);
+    e.output_velocity = N::scaled(p_.output_of_velocity, nominal_.velocity) + difference.output_velocity;
+    e.output_angle = N::times_order(e.angle, p_.output_angle) + N::distance(p_.torsion_turns, -e.torsion);
   }
   // The set point starts from where the shaft is at each tick, so that limits of position hold for the shaft.
   void follow_velocity(N::Value velocity, const Estimate& e, Output& out) {
     constexpr std::int64_t kFar = std::int64_t{4096} << fixed::kAngleBits;
     trajectory_.position = e.angle.raw;
     const N::Angle target = e.angle + N::Step{velocity.raw < 0 ? -kFar : kFar};
-    set(control::Trajectory::update<N>(trajectory_, p_->trajectory, target.raw,
-                                       control::Trajectory::speed_of<N>(p_->trajectory, N::magnitude(velocity))),
+    set(control::Trajectory::update<N>(trajectory_, p_.trajectory, target.raw,
+                                       control::Trajectory::speed_of<N>(p_.trajectory, N::magnitude(velocity))),
         out);
   }
   void follow_position(const Demand& demand, Output& out) {
-    if (streams_) return set(control::Stream::update<N>(stream_, p_->trajectory), out);
+    if (streams_) return set(control::Stream::update<N>(stream_, p_.trajectory), out);
     constexpr std::int64_t kAsFastAsAllowed = std::int64_t{1} << 62;
     const bool any = demand.velocity == N::Value{};
     set(control::Trajectory::update<N>(
-            trajectory_, p_->trajectory, demand.position.raw,
-            any ? kAsFastAsAllowed : control::Trajectory::speed_of<N>(p_->trajectory, N::magnitude(demand.velocity))),
+            trajectory_, p_.trajectory, demand.position.raw,
+            any ? kAsFastAsAllowed : control::Trajectory::speed_of<N>(p_.trajectory, N::magnitude(demand.velocity))),
         out);
   }
   static void set(const control::Trajectory::SetPoint<N>& point, Output& out) {
@@ -214,10 +240,10 @@ class Control {
     out.velocity = point.velocity;
     out.acceleration = point.acceleration;
   }
-  void excite(const Estimate& e, Output& out, control::Loops::Command<N>& command) {
-    const auto wanted = control::Excitation::update<N>(excitation_, p_->excitation, e.velocity);
+  [[gnu::noinline]] void excite(const Estimate& e, Output& out, control::Loops::Command<N>& command) {
+    const auto wanted = control::Excitation::update<N>(excitation_, p_.excitation, e.velocity);
     out.finished = control::Excitation::finished<N>(excitation_);
-    if (p_->excites_torque) {
+    if (p_.excites_torque) {
       command.mode = control::Mode::torque;
       command.torque = wanted;
     } else {
@@ -227,7 +253,7 @@ class Control {
   }
   void compensate(const Estimate& e, Output& out, control::Loops::Command<N>& command) {
     const auto forward =
-        control::Feedforward::update<N>(feedforward_, p_->feedforward, p_->model,
+        control::Feedforward::update<N>(feedforward_, p_.feedforward, p_.model,
                                         {out.position, out.velocity, out.acceleration}, {e.angle, e.temperature, {}});
     out.feedforward = forward.torque;
     nominal_ = {forward.torque, out.velocity + forward.velocity, out.acceleration, feedforward_.torsion};
@@ -236,7 +262,8 @@ class Control {
     command.velocity = command.velocity + forward.velocity;
   }
 
-  Parameters* p_ = nullptr;
+  // Here, and not behind a pointer: where a tick finds them is known when it is compiled.
+  Parameters p_{};
   observers::EncoderAngle::State motor_encoder_{};
   observers::EncoderAngle::State output_encoder_{};
   observers::EncoderKalman::State<N> motor_motion_{};
@@ -244,6 +271,7 @@ class Control {
   observers::DisturbanceObserver::State<N> disturbance_{};
   observers::TorsionObserver::State<N> torsion_{};
   observers::RippleFilter::State<N> ripple_{};
+  N::Value torque_ripple_{};
   control::Trajectory::State trajectory_{};
   control::Stream::State stream_{};
   control::Excitation::State<N> excitation_{};
@@ -257,6 +285,9 @@ class Control {
     N::Value torsion{};
   };
   Nominal nominal_{};
+  // Of the parameters that both encoders' angles were counted with.
+  std::uint32_t motor_counts_ = 0;
+  std::uint32_t output_counts_ = 0;
   Mode last_mode_ = Mode::boot;
   bool streams_ = false;
   bool compensates_ = false;

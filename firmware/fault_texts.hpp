@@ -36,6 +36,7 @@ constexpr FaultInfo fault_info(Fault fault) {
       case Fault::motor_encoder_jump:
       case Fault::overspeed:
       case Fault::tick_overrun:
+      case Fault::amplifier_fault:
         return 1;
       case Fault::overcurrent:
         return kOvercurrentTicks;

@@ -48,11 +48,14 @@ static_assert(std::is_trivially_copyable_v<LockStepStart> && std::is_trivially_c
               std::is_trivially_copyable_v<LockStepUp>);
 
 // One tick of an application whose board was given the readings; what a timer's interrupt does on such a board.
-template <class Application>
-LockStepUp lock_step(Application& application, const LockStepDown& down) {
+// `counted()` is a number that rises with every instruction, where the board has one.
+template <class Application, class Counted>
+LockStepUp lock_step(Application& application, const LockStepDown& down, Counted&& counted) {
   if (down.has_command) application.submit(down.command);
-  application.tick();
   LockStepUp up;
+  const std::uint32_t before = counted();
+  application.tick();
+  up.instructions = counted() - before;
   up.status = application.status();
   if (const auto answer = application.answer()) {
     up.answer = *answer;

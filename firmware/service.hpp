@@ -114,6 +114,7 @@ class Service {
   }
   // Call again and again, beside Application::background().
   void background() {
+    if (has_answer_) return;  // to a request that was refused meanwhile: it goes first
     if (waits_for_ == Wait::room) {
       if (application_.submit(command_)) waits_for_ = Wait::command;
     } else if (waits_for_ == Wait::command) {
@@ -252,6 +253,7 @@ class Service {
     protocol::BlockBegin begin;
     if (!taken(m, begin)) return;
     if (armed()) return finish(Code::armed);
+    if (!application_.at_rest()) return finish(Code::moving);
     finish(code_of(store_.begin(begin.bytes, begin.crc)));
   }
   void take_chunk(const protocol::Message& m) {
@@ -270,8 +272,7 @@ class Service {
     protocol::BlockRestore wanted;
     if (!taken(m, wanted)) return;
     if (armed()) return finish(Code::armed);
-    if (store_.sequence() == static_cast<std::uint16_t>(wanted.sequence + 1))
-      return finish(Code::done, protocol::Reason{});
+    if (store_.sequence() == Store::sequence_after(wanted.sequence)) return finish(Code::done, protocol::Reason{});
     if (store_.sequence() != wanted.sequence) return finish(Code::wrong_value);
     std::uint32_t reason = 0;
     const storage::StoreError error = store_.restore(validator(), reason);

@@ -11,6 +11,7 @@
 #include <atomic>
 #include <cstddef>
 #include <cstdint>
+#include <cstring>
 #include <span>
 
 namespace flexspline::firmware {
@@ -49,8 +50,13 @@ struct TelemetrySetup {
   std::array<Channel, kMost> channels{};
 };
 
-// `kWords` a power of two.
-template <std::size_t kWords>
+// Where a channel's word lies, in bytes: here one behind the other.
+struct ByNumber {
+  static constexpr std::uint8_t of(Channel channel) { return static_cast<std::uint8_t>(channel) * 4U; }
+};
+
+// `kWords` a power of two. The signals of a tick lie in a struct of the caller's; Places says where.
+template <std::size_t kWords, class Places = ByNumber>
 class Telemetry {
   static_assert(kWords >= 32 && (kWords & (kWords - 1)) == 0);
 
@@ -66,6 +72,7 @@ class Telemetry {
     // The tick interrupts background work, never the other way round: from here on it leaves the ring alone.
     running_.store(false);
     setup_ = setup;
+    for (std::size_t i = 0; i < setup.count; ++i) places_[i] = Places::of(setup.channels[i]);
     written_.store(0);
     read_.store(0);
     sequence_ = 0;
@@ -77,9 +84,12 @@ class Telemetry {
   const TelemetrySetup& setup() const { return setup_; }
   std::size_t frame_words() const { return setup_.count + kHeaderWords; }
 
-  // Tick.
-  void record(std::uint32_t tick, const ChannelValues& values) {
-    if (!running_.load(std::memory_order_relaxed)) return;
+  // Whether a frame is recorded at all.
+  bool is_running() const { return running_.load(std::memory_order_relaxed); }
+  // Tick: `signals` is the struct of the caller's, whose words are copied where a frame is due.
+  template <class Signals>
+  void record(std::uint32_t tick, const Signals& signals) {
+    if (!is_running()) return;
     if (until_next_ > 0) {
       --until_next_;
       return;
@@ -87,15 +97,20 @@ class Telemetry {
     until_next_ = setup_.every - 1U;
     const std::uint32_t sequence = sequence_++;
     const std::uint32_t at = written_.load(std::memory_order_relaxed);
-    if (at - read_.load(std::memory_order_acquire) + frame_words() > kWords) {
+    const auto words = static_cast<std::uint32_t>(frame_words());
+    if (at - read_.load(std::memory_order_acquire) + words > kWords) {
       dropped_ = dropped_ + 1;
       return;
     }
-    put(at, sequence);
-    put(at + 1, tick);
-    for (std::uint32_t i = 0; i < setup_.count; ++i)
-      put(at + 2 + i, values[static_cast<std::size_t>(setup_.channels[i])]);
-    written_.store(at + static_cast<std::uint32_t>(frame_words()), std::memory_order_release);
+    // A frame that does not reach the end of the ring, as nearly all, needs no look at each word.
+    const std::uint32_t from = at & (kWords - 1);
+    if (from + words <= kWords) {
+      copy(&ring_[from], tick, sequence, signals, [](std::uint32_t*& to, std::uint32_t word) { *to++ = word; });
+    } else {
+      copy(at, tick, sequence, signals,
+           [this](std::uint32_t& to, std::uint32_t word) { ring_[to++ & (kWords - 1)] = word; });
+    }
+    written_.store(at + words, std::memory_order_release);
   }
 
   // Background: takes the oldest frame. Returns its words (the front of `frame`), none where there is no frame or it
@@ -112,13 +127,25 @@ class Telemetry {
   std::uint32_t dropped() const { return dropped_; }
 
  private:
-  void put(std::uint32_t at, std::uint32_t word) { ring_[at & (kWords - 1)] = word; }
+  template <class To, class Signals, class Put>
+  void copy(To to, std::uint32_t tick, std::uint32_t sequence, const Signals& signals, Put&& put) {
+    put(to, sequence);
+    put(to, tick);
+    const auto* bytes = reinterpret_cast<const std::byte*>(&signals);
+    const std::uint8_t* place = places_.data();
+    for (const std::uint8_t* const end = place + setup_.count; place != end; ++place) {
+      std::uint32_t word = 0;
+      std::memcpy(&word, bytes + *place, sizeof(word));
+      put(to, word);
+    }
+  }
 
   std::array<std::uint32_t, kWords> ring_{};
   std::atomic<std::uint32_t> written_{0};
   std::atomic<std::uint32_t> read_{0};
   std::atomic<bool> running_{false};
   TelemetrySetup setup_{.every = 0};
+  std::array<std::uint8_t, TelemetrySetup::kMost> places_{};
   std::uint32_t sequence_ = 0;
   volatile std::uint32_t dropped_ = 0;
   std::uint32_t until_next_ = 0;

@@ -1,6 +1,6 @@
 #!/bin/sh
 # build.sh OUT_DIR NAME SCRIPT.ld SOURCE...: builds OUT_DIR/NAME.elf, .bin and .map for a Cortex-M4; flags in FLAGS.
-# Exit 3 where there is no ARM compiler.
+# FOR=speed for an application, whose tick counts; else what is built is small, as a boot loader has to be. Exit 3 where there is no ARM compiler.
 set -eu
 here=$(cd -- "$(dirname -- "$0")" && pwd)
 root=$(cd -- "$here/../.." && pwd)
@@ -13,11 +13,16 @@ command -v "$compiler" >/dev/null || {
 }
 mkdir -p "$out"
 new=$out/$name.elf.new
-# As a whole; without scheduling, from which these processors gain little and which takes registers; without copies of
-# functions for constant arguments: all of that saves flash.
+# As a whole; without scheduling, from which these processors gain little and which takes registers. Without copies of
+# functions for constant arguments where flash counts, and without values kept for another branch where time does.
+if [ "${FOR:-size}" = speed ]; then
+  optimise="-O2 -fno-tree-pre"
+else
+  optimise="-Os -fno-schedule-insns2 -fno-ipa-cp -fno-reorder-blocks -fno-tree-ch"
+fi
+# Debugging information is no part of what is programmed; it says which part of a tick an instruction belongs to.
 # shellcheck disable=SC2086
-"$compiler" -std=c++20 -Os -flto=1 -fno-schedule-insns -fno-schedule-insns2 -fno-ipa-cp \
-  -fno-reorder-blocks -fno-tree-ch -mcpu=cortex-m4 -mthumb -mfloat-abi=soft \
+"$compiler" -std=c++20 -g -ffile-prefix-map="$root"=. $optimise -flto=1 -fno-schedule-insns -mcpu=cortex-m4 -mthumb -mfloat-abi=soft \
   -ffunction-sections -fdata-sections -fno-exceptions -fno-rtti -fno-threadsafe-statics -fno-unwind-tables \
   -fno-asynchronous-unwind-tables -Wall -Wextra -Wpedantic -Wshadow -Werror -Wno-volatile \
   -nostartfiles -Wl,--gc-sections -Wl,-Map="$out/$name.map" -T "$script" -L "$(dirname -- "$script")" -I "$root" \

@@ -78,14 +78,12 @@ extern "C" void SysTick_Handler() {
     up_pipe->write(&last, sizeof(last));
     flexspline::qemu::leave(kExitDone);
   }
-  const std::uint32_t before = QemuBoard::instructions();
-  LockStepUp up = flexspline::firmware::lock_step(application, board.down);
-  up.instructions = QemuBoard::instructions() - before;
+  LockStepUp up = flexspline::firmware::lock_step(application, board.down, QemuBoard::instructions);
   up.actuation = board.actuation;
   if (!up_pipe->write(&up, sizeof(up))) flexspline::qemu::leave(kExitNoDesktop);
 }
 
-int main() {
+[[gnu::cold]] int main() {
   const HostFile down(kDown, sizeof(kDown) - 1, HostFile::For::reading);
   const HostFile up(kUp, sizeof(kUp) - 1, HostFile::For::writing);
   LockStepStart start;

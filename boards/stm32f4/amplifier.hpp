@@ -58,6 +58,7 @@ class ServoAmplifier {
   }
   // With nothing but registers, from wherever a fault was found.
   static void cut() { write(enable, false); }
+  static constexpr bool tripped() { return false; }  // it does not tell
 
  private:
   static constexpr std::uint32_t kRight1 = 0x08, kMiddle = 2048;
@@ -110,6 +111,8 @@ class HBridge {
     clear_bits(tim1::kBreak, kOutputsOn);
     write(enable, false);
   }
+  // The break input opened the switches (RM0090, 17.3.12): the outputs' bit is off, though nobody here switched it off.
+  bool tripped() const { return on_ && (hardware(tim1::kBreak) & kOutputsOn) == 0; }
 
  private:
   static constexpr std::uint32_t kBreakOn = 1U << 12, kOutputsOn = 1U << 15;

@@ -10,6 +10,7 @@
 #include "boards/stm32f4/clock.hpp"
 #include "boards/stm32f4/encoder.hpp"
 #include "boards/stm32f4/flash.hpp"
+#include "boards/stm32f4/handover.hpp"
 #include "boards/stm32f4/otg_fs.hpp"
 #include "boards/stm32f4/pins.hpp"
 #include "boards/stm32f4/usart.hpp"
@@ -26,9 +27,14 @@ class DriveBoard {
 
   // Pins and clock first: the amplifier is off from the first instructions on. False: there is no clock for a drive.
   bool start_clock() {
-    cause_ = watchdog_was_the_reset() ? firmware::ResetCause::watchdog : firmware::ResetCause::power;
+    const bool crashed = crash_was_noted();
+    cause_ = watchdog_was_the_reset() ? firmware::ResetCause::watchdog
+             : crashed                ? firmware::ResetCause::crash
+                                      : firmware::ResetCause::power;
     set_up(Description::kPins);
     source_ = Clock::start(Description::kClock);
+    // With its longest limit, from before there is a tick: what hangs until then is reset as well.
+    if (source_ != ClockSource::bare) watchdog_.start();
     return source_ != ClockSource::bare;
   }
   // The control tick runs from here on.
@@ -36,7 +42,6 @@ class DriveBoard {
     motor_.start(Description::kMotorReversed);
     output_.start(Description::kOutputReversed);
     Analog::start(Description::kAnalog);
-    watchdog_.start();
     amplifier_.start(Description::kClock.core_hz / kTickHz / 2);
   }
   bool clock_is_exact() const { return source_ == ClockSource::crystal; }
@@ -61,6 +66,7 @@ class DriveBoard {
     amplifier_.actuate(wanted, readings_.current);
     enabled_ = wanted.enabled;
   }
+  bool amplifier_tripped() const { return amplifier_.tripped(); }
   // The next set of samples is there already.
   bool tick_overrun() {
     if (late_ticks_ > 0) {

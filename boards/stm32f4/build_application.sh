@@ -4,9 +4,10 @@
 set -eu
 boards=$(cd -- "$(dirname -- "$0")/.." && pwd)
 board=$boards/$1 out=$2 name=$3
-"$boards/cortex_m4/build.sh" "$out" "$name" "$board/application.ld" "$boards/stm32f4/vectors.cpp" "$board/main.cpp"
+FOR=speed "$boards/cortex_m4/build.sh" "$out" "$name" "$board/application.ld" "$boards/stm32f4/vectors.cpp" "$board/main.cpp"
 compiler=${ARM_GXX:-arm-none-eabi-g++}
-"${compiler%g++}size" -A "$out/$name.elf" | awk -v name="$name" '
+limit=$((0x$("${compiler%g++}nm" "$out/$name.elf" | awk '$3 == "image_limit" { print $1 }')))
+"${compiler%g++}size" -A "$out/$name.elf" | awk -v name="$name" -v limit=$limit '
   $1 == ".text" || $1 == ".data" { flash += $2 }
   $1 == ".data" || $1 == ".bss" || $1 == ".stack" { ram += $2 }
-  END { printf "%-28s flash %5d of 49152 bytes, RAM %5d bytes\n", name, flash, ram }'
+  END { printf "%-28s flash %5d of %d bytes, RAM %5d bytes\n", name, flash, limit, ram }'

@@ -35,7 +35,7 @@ class Drive {
 
   constexpr Drive() = default;
 
-  [[noreturn]] void run() {
+  [[gnu::cold, noreturn]] void run() {
     hardware(cortex_m4::kVectorTable) = static_cast<std::uint32_t>(reinterpret_cast<std::uintptr_t>(vectors));
     // Without a clock for the loops the drive stays as reset left it, with its amplifier off.
     if (!board_.start_clock()) stay_off();

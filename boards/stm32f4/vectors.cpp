@@ -3,6 +3,7 @@
 #include <cstdint>
 
 #include "boards/cortex_m4/hardware.hpp"
+#include "boards/stm32f4/handover.hpp"
 
 extern "C" {
 extern std::uint32_t stack_top[];
@@ -18,6 +19,7 @@ void cut_amplifier();
 
 [[noreturn, gnu::used, gnu::noinline]] void give_up() {
   cut_amplifier();
+  flexspline::stm32f4::note_crash();
   flexspline::cortex_m4::reset_processor();
 }
 // The stack may be what went wrong: a new one first.

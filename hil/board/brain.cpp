@@ -39,7 +39,7 @@ model::BlockHeader header_of(const firmware::Parameters& p, const effects::Drive
 // One body: what a tick's parts hand to one another stays in registers.
 [[gnu::flatten]] firmware::LockStepUp control_tick(firmware::Application<SoftwareBoard>& application,
                                                    const firmware::LockStepDown& down) {
-  return firmware::lock_step(application, down);
+  return firmware::lock_step(application, down, [] { return std::uint32_t{0}; });
 }
 
 }  // namespace

@@ -59,6 +59,9 @@ class SoftwareBoard {
   const firmware::Readings* readings = &kNone;  ///< not a copy: what was just written in parts is slow to copy at once
   firmware::Actuation actuation{};
   bool overrun = false;
+  bool amplifier_tripped() const { return tripped; }
+
+  bool tripped = false;
   std::uint32_t ticks_since_fed = 0;
   firmware::ResetCause cause = firmware::ResetCause::power;
 };
@@ -76,6 +79,8 @@ class SoftwareBrain : public Brain {
   /// The control tick, or background work, does not run any more.
   void hang_tick(bool hangs) { tick_hangs_ = hangs; }
   void hang_background(bool hangs) { background_hangs_ = hangs; }
+  /// The amplifier switched itself off.
+  void trip_amplifier(bool trips) { board_.tripped = trips; }
   /// Of the watchdog, since the first start.
   int resets() const { return resets_; }
 

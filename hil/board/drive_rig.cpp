@@ -67,6 +67,15 @@ std::int16_t DriveRig::share(double value, double full_scale) const {
   return static_cast<std::int16_t>(nearest(std::clamp(value / full_scale * 32768.0, -32768.0, 32767.0)));
 }
 
+// What the motor's encoder would count, were its lines whole.
+std::uint32_t DriveRig::motor_count(std::uint32_t true_count) {
+  const std::uint32_t moved = true_count - motor_before_;
+  motor_before_ = true_count;
+  if (has(Injection::motor_encoder_swapped)) swapped_ += moved;
+  if (has(Injection::motor_encoder_slips)) motor_slipped_ += static_cast<std::int32_t>(moved);
+  return true_count - 2U * swapped_ - static_cast<std::uint32_t>(motor_slipped_ / 2);
+}
+
 void DriveRig::sense(firmware::Readings& r) {
   const plant::State& state = plant_.state();
   const plant::Sensors& sensors = setup_.drive.sensors;
@@ -79,22 +88,27 @@ void DriveRig::sense(firmware::Readings& r) {
   torque += noise(torque_noise_nm_);
   const double temperature = temperature_c_ + noise(temperature_noise_c_);
 
+  const double zero = errors_.torsion_zero_rad * setup_.drive.gear_ratio;
+  const std::uint32_t motor = motor_count(counter(state.motor_angle - zero, sensors.motor_counts));
   if (!has(Injection::motor_encoder_stale)) {
     ++r.motor_samples;
-    const std::uint32_t before = r.motor_counter;
-    const double zero = errors_.torsion_zero_rad * setup_.drive.gear_ratio;
-    if (!has(Injection::motor_encoder_stuck)) r.motor_counter = counter(state.motor_angle - zero, sensors.motor_counts);
-    if (has(Injection::encoder_line_lost))
-      r.motor_counter = on_one_line(before, counter(state.motor_angle - zero, sensors.motor_counts));
+    if (has(Injection::encoder_line_lost)) {
+      r.motor_counter = on_one_line(r.motor_counter, motor);
+    } else if (!has(Injection::motor_encoder_stuck)) {
+      r.motor_counter = motor;
+    }
     if (has(Injection::motor_encoder_jump)) r.motor_counter += static_cast<std::uint32_t>(sensors.motor_counts / 4);
   }
+  const std::uint32_t on_shaft = counter(state.output_angle + disturbances_.output_offset_rad, sensors.output_counts);
+  if (has(Injection::output_encoder_slips)) output_slipped_ += static_cast<std::int32_t>(on_shaft - output_before_);
+  output_before_ = on_shaft;
+  const std::uint32_t output = on_shaft - static_cast<std::uint32_t>(output_slipped_ / 2);
   if (!has(Injection::output_encoder_stale)) {
     ++r.output_samples;
-    const std::uint32_t count = counter(state.output_angle + disturbances_.output_offset_rad, sensors.output_counts);
     if (has(Injection::output_line_lost)) {
-      r.output_counter = on_one_line(r.output_counter, count);
+      r.output_counter = on_one_line(r.output_counter, output);
     } else if (!has(Injection::output_encoder_stuck)) {
-      r.output_counter = count;
+      r.output_counter = output;
     }
   }
   if (!has(Injection::analog_stale)) {

@@ -16,12 +16,15 @@ enum class Injection {
   motor_encoder_stale,  ///< no new sample: count and sample number stand still
   output_encoder_stale,
   analog_stale,
-  motor_encoder_stuck,   ///< samples come, the count stands still
-  output_encoder_stuck,  ///< the same of the output
-  motor_encoder_jump,    ///< the count is off by a quarter of a turn
-  encoder_line_lost,     ///< one of the motor encoder's two lines: the count goes to and fro by one
-  output_line_lost,      ///< the same of the output
-  current_out_of_range,  ///< the converter's input is open
+  motor_encoder_stuck,    ///< samples come, the count stands still
+  output_encoder_stuck,   ///< the same of the output
+  motor_encoder_jump,     ///< the count is off by a quarter of a turn
+  encoder_line_lost,      ///< one of the motor encoder's two lines: the count goes to and fro by one
+  output_line_lost,       ///< the same of the output
+  motor_encoder_swapped,  ///< the motor's count runs the other way from here on
+  motor_encoder_slips,    ///< the coupling of the motor's encoder: half of the motion reaches it
+  output_encoder_slips,   ///< the same of the output
+  current_out_of_range,   ///< the converter's input is open
   torque_out_of_range,
   temperature_out_of_range,
   torque_stuck,    ///< the torque's reading stands still
@@ -91,6 +94,7 @@ class DriveRig {
  private:
   static constexpr std::uint64_t bit(Injection what) { return std::uint64_t{1} << static_cast<int>(what); }
   double noise(double standard_deviation);
+  std::uint32_t motor_count(std::uint32_t true_count);
   double flowing(bool enabled);
   void warm(double current_a);
   std::int16_t share(double value, double full_scale) const;
@@ -110,6 +114,13 @@ class DriveRig {
   Disturbances disturbances_;
   double lag_ = 1.0;  // share of its way that the amplifier's current goes in a tick
   firmware::Readings last_;
+  // True counts of both encoders at the tick before.
+  std::uint32_t motor_before_ = 0;
+  std::uint32_t output_before_ = 0;
+  std::uint32_t swapped_ = 0;  // counts that a swapped encoder of the motor took the other way
+  // Counts during which a coupling slipped.
+  std::int32_t motor_slipped_ = 0;
+  std::int32_t output_slipped_ = 0;
   double temperature_c_;
   double load_torque_nm_ = 0.0;
   double made_a_ = 0.0;  // by the amplifier, before its offset

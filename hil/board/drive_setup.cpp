@@ -133,7 +133,8 @@ control::DriveSetup<double> setup_of(const plant::Drive& drive, const effects::D
   s.safety.overcurrent = 1.2 * drive.current_limit_a;
   s.safety.overtemperature = 80.0;
   s.safety.acceleration = 10.0 * most_torque / inertia;
-  s.safety.stuck_torque = std::max(0.75 * most_torque, 2.5 * breakaway_torque_of(drive));
+  // A torque changes by twice its limit at most.
+  s.safety.stuck_torque = std::min(std::max(0.5 * most_torque, 3.0 * breakaway_torque_of(drive)), 1.85 * most_torque);
   s.safety.current_mismatch = 0.2 * drive.current_limit_a;
   s.safety.following_error = 2.0 * drive.rated_velocity_rad_s / s.loops.position_gain;
   s.safety.following_velocity = 0.75 * drive.rated_velocity_rad_s;

@@ -7,7 +7,7 @@
 namespace flexspline::board {
 namespace {
 
-constexpr std::array<std::pair<std::string_view, Injection>, 15> kInjections{
+constexpr std::array<std::pair<std::string_view, Injection>, 18> kInjections{
     {{"motor-encoder-stale", Injection::motor_encoder_stale},
      {"output-encoder-stale", Injection::output_encoder_stale},
      {"analog-stale", Injection::analog_stale},
@@ -16,6 +16,9 @@ constexpr std::array<std::pair<std::string_view, Injection>, 15> kInjections{
      {"motor-encoder-jump", Injection::motor_encoder_jump},
      {"encoder-line-lost", Injection::encoder_line_lost},
      {"output-line-lost", Injection::output_line_lost},
+     {"motor-encoder-swapped", Injection::motor_encoder_swapped},
+     {"motor-encoder-slips", Injection::motor_encoder_slips},
+     {"output-encoder-slips", Injection::output_encoder_slips},
      {"current-out-of-range", Injection::current_out_of_range},
      {"torque-out-of-range", Injection::torque_out_of_range},
      {"temperature-out-of-range", Injection::temperature_out_of_range},

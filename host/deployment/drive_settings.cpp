@@ -11,6 +11,7 @@
 #include "host/catalogue/constants.hpp"
 #include "host/catalogue/defined.hpp"
 #include "host/deployment/pack.hpp"
+#include "host/deployment/reachable_limits.hpp"
 #include "host/deployment/statics.hpp"
 #include "host/text/toml.hpp"
 #include "shared/fixed/turn.hpp"
@@ -28,11 +29,11 @@ constexpr double kLeast = 1e-12;  // of what has to be above nought
 // quarter of this has to be seen (shared/control/drive_parameters_setup.hpp).
 constexpr double kTorsionsBeforeStuck = 8.0;
 constexpr double kCountsBeforeStuck = 32.0;
-// The motor's encoder: friction may hold a quarter more than the model says, and three quarters of what the drive has
-// may come of what is no friction. The time in which full torque turns a free shaft by a count passes so often first.
-constexpr double kHeldBeforeStuck = 1.25;
-constexpr double kTorqueBeforeStuck = 0.75;
+// The motor's encoder: friction may hold half more than the model says, and a half of what the drive has may come
+// of what is no friction. The time in which full torque turns a free shaft by a count passes so often first.
+constexpr double kHeldBeforeStuck = 1.5, kTorqueBeforeStuck = 0.5, kMostTorqueChange = 1.85;
 constexpr double kCountsTimesBeforeStuck = 16.0;
+constexpr double kShownOfStop = 0.25;  // less than the rule of reachable limits allows
 
 // The file's tables, whose keys are taken one after another; what nobody took is no setting.
 class Settings {
@@ -298,13 +299,17 @@ control::DriveSetup<double> parse_drive_setup(const std::string& toml, const std
   const double largest_acceleration = 15.0 * d.acceleration_base;
   control::SafetySetup<double>& f = setup.safety;
   f.overspeed = s.positive("faults", "overspeed_rad_s", 1.09 * overspeed, 15.0 * d.velocity_base);
-  f.overcurrent = s.positive("faults", "overcurrent_a", 1.2 * current, 2.0 * d.current_base);
-  f.overtemperature = s.positive("faults", "overtemperature_c", 80.0, 2.0 * d.temperature_base);
+  f.overcurrent = s.positive("faults", "overcurrent_a", 1.2 * current);
+  f.overtemperature = s.positive("faults", "overtemperature_c", 80.0);
+  // A slow filter of the encoder shows less of a count that stops.
+  const double shown_acceleration = kShownOfStop * setup.motor_corner * f.overspeed;
   f.acceleration = s.positive("faults", "acceleration_rad_s2",
-                              std::min(10.0 * most_torque / inertia, largest_acceleration), largest_acceleration);
+                              std::min({10.0 * most_torque / inertia, largest_acceleration, shown_acceleration}),
+                              largest_acceleration);
   f.stuck_torque =
       s.positive("faults", "stuck_torque_nm",
-                 std::max(kHeldBeforeStuck * torque_held_by_friction(model), kTorqueBeforeStuck * most_torque));
+                 std::min(std::max(kHeldBeforeStuck * torque_held_by_friction(model), kTorqueBeforeStuck * most_torque),
+                          kMostTorqueChange * most_torque));
   // A coarse encoder needs longer to show that the shaft follows its torque.
   const double a_count_s = std::sqrt(2.0 * inertia * d.angle_base / setup.motor_counts / most_torque);
   f.stuck_s = s.positive("faults", "stuck_s", std::clamp(kCountsTimesBeforeStuck * a_count_s, f.stuck_s, 3.0), 3.0);
@@ -343,6 +348,7 @@ control::DriveSettings<fixed::Fixed> settings_of(const control::DriveSetup<doubl
           fmt::format("{}: the states of an encoder's filter leave their range; choose another corner than "
                       "{:g} Hz",
                       origin, corner / kTurn));
+  require_reachable(settings, d, origin);
   return settings;
 }
 

@@ -8,6 +8,7 @@
 #include <numbers>
 #include <span>
 
+#include "shared/control/residual_map.hpp"
 #include "shared/fixed/turn.hpp"
 #include "shared/protocol/map_payloads.hpp"
 #include "shared/protocol/texts.hpp"
@@ -127,7 +128,7 @@ ResidualMap read_residual_map(Session& session, const Scales& scales) {
   const protocol::MapInfo info = info_of(session);
   ResidualMap map;
   map.counts = info.counts;
-  map.tick_s = 1.0 / session.identity().tick_hz;
+  map.tick_s = static_cast<double>(control::ResidualMap::kEveryTicks) / session.identity().tick_hz;
   map.angle_bins = info.angle_bins;
   map.unit_nm = std::ldexp(scales.constants.torque_base, fixed::kValueBits) / static_cast<double>(info.scale);
   for (std::size_t i = 0; i < info.edge_count; ++i)

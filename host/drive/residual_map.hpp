@@ -16,9 +16,9 @@ struct ResidualBin {
   double std_nm = 0.0;   // of single ticks
 };
 struct ResidualMap {
-  bool counts = false;         // it grows while it is read
-  bool of_one_moment = false;  // nothing was counted between its first and its last bin
-  double tick_s = 0.0;
+  bool counts = false;              // it grows while it is read
+  bool of_one_moment = false;       // nothing was counted between its first and its last bin
+  double tick_s = 0.0;              // from one residual that is counted to the next
   std::size_t angle_bins = 0;       // of a turn, from nought
   std::vector<double> edges_rad_s;  // of a direction, rising; the bin in the middle lies below the first
   double unit_nm = 0.0;             // steps in which the drive counts

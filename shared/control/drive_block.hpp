@@ -11,6 +11,7 @@
 #include <type_traits>
 
 #include "shared/control/drive_parameters.hpp"
+#include "shared/control/reachable.hpp"
 #include "shared/fixed/system.hpp"
 #include "shared/model/block_places.hpp"
 
@@ -115,9 +116,28 @@ inline constexpr Row kResidualMap =
 
 // What fields cannot say each by itself.
 
-// Hands on what says which other sections there have to be.
+// What sections have to do with one another: which others there have to be, and which limits what can reach.
+struct Noted {
+  General general{};
+  Limited limited{};
+};
 inline bool note_general(const void* section, void* context) {
-  if (context != nullptr) *static_cast<General*>(context) = *static_cast<const General*>(section);
+  if (context != nullptr) static_cast<Noted*>(context)->general = *static_cast<const General*>(section);
+  return true;
+}
+inline bool note_filter(const void* section, void* context) {
+  const auto& c = *static_cast<const observers::EncoderKalman::Coefficients<Numbers>*>(section);
+  if (context != nullptr) static_cast<Noted*>(context)->limited.acceleration_scale = c.acceleration_scale;
+  return true;
+}
+inline bool note_safety(const void* section, void* context) {
+  if (context != nullptr)
+    static_cast<Noted*>(context)->limited.safety = *static_cast<const SafetyLimits<Numbers>*>(section);
+  return true;
+}
+inline bool note_following(const void* section, void* context) {
+  const auto& c = *static_cast<const FollowingLimits<Numbers>*>(section);
+  if (context != nullptr) static_cast<Noted*>(context)->limited.following_velocity = c.velocity;
   return true;
 }
 // per_count is 2^56 over the counts, rounded.
@@ -127,16 +147,27 @@ inline bool encoder_agrees(const void* section, void*) {
   const auto off = static_cast<std::int64_t>(c.per_count * c.counts - (std::uint64_t{1} << 56));
   return fixed::size_of(off) <= c.counts / 2 + 1;
 }
-inline bool sensors_agree(const void* section, void*) {
+inline bool sensors_agree(const void* section, void* context) {
+  const auto* const scales = static_cast<const AnalogScale<Numbers>*>(section);
+  if (context != nullptr) {
+    static_cast<Noted*>(context)->limited.current = scales[0];
+    static_cast<Noted*>(context)->limited.temperature = scales[2];
+  }
   for (std::size_t i = 0; i < 3; ++i) {
-    const auto& scale = static_cast<const AnalogScale<Numbers>*>(section)[i];
+    const auto& scale = scales[i];
     const bool unused = scale.gain.mantissa == 0 && scale.lowest == scale.highest;
     if (scale.lowest >= scale.highest && !unused) return false;
   }
   return true;
 }
-inline bool loops_agree(const void* section, void*) {
+inline bool loops_agree(const void* section, void* context) {
   const auto& c = *static_cast<const Loops::Coefficients<Numbers>*>(section);
+  if (context != nullptr) {
+    Limited& limited = static_cast<Noted*>(context)->limited;
+    limited.velocity_limit = c.velocity_limit;
+    limited.torque_limit = c.torque_limit;
+    limited.current_limit = c.current_limit;
+  }
   return c.velocity_limit < c.guard.overspeed;
 }
 // The room to stop in, at most v (v/A + 5) + 4 A, fits.
@@ -175,7 +206,7 @@ inline constexpr SectionPlan kSections[] = {
     {Section::general, 0, kGeneral, &note_general, 1},
     {Section::motor_encoder, offsetof(Settings, motor_encoder), kEncoder, &encoder_agrees, 1},
     {Section::output_encoder, offsetof(Settings, output_encoder), kEncoder, &encoder_agrees, 1},
-    {Section::encoder_filter, offsetof(Settings, motor_motion), kEncoderFilter, nullptr, 1},
+    {Section::encoder_filter, offsetof(Settings, motor_motion), kEncoderFilter, &note_filter, 1},
     {Section::output_filter, offsetof(Settings, output_motion), kEncoderFilter, nullptr, 1},
     {Section::disturbance, offsetof(Settings, disturbance), kDisturbance, nullptr, 1},
     {Section::torsion, offsetof(Settings, torsion), kTorsion, nullptr, 1},
@@ -186,8 +217,8 @@ inline constexpr SectionPlan kSections[] = {
     {Section::feedforward, offsetof(Settings, feedforward), kFeedforward, nullptr, 1},
     {Section::excitation, offsetof(Settings, excitation), kExcitation, &excitation_agrees, 1},
     {Section::excitation_lines, offsetof(Settings, excitation.lines), kLine, nullptr, kMostLines},
-    {Section::safety, offsetof(Settings, safety), kSafety, nullptr, 1},
-    {Section::following, offsetof(Settings, following), kFollowing, nullptr, 1},
+    {Section::safety, offsetof(Settings, safety), kSafety, &note_safety, 1},
+    {Section::following, offsetof(Settings, following), kFollowing, &note_following, 1},
     {Section::residual_map, offsetof(Settings, residual_map), kResidualMap, &residual_map_agrees, 1},
 };
 inline constexpr std::size_t kSectionCount = std::size(kSections);
@@ -243,7 +274,10 @@ template <class Model>
 model::BlockVerdict load(std::span<const std::uint8_t> block, Model& model) {
   std::uint32_t seen = 0;
   model.clear();
-  return model::read_block<Model::kTables>(block, block_places<Model>(), model.memory(), nullptr, seen, nullptr);
+  const model::BlockVerdict verdict =
+      model::read_block<Model::kTables>(block, block_places<Model>(), model.memory(), nullptr, seen, nullptr);
+  model.note_effects();
+  return verdict;
 }
 
 // Checks all of a block for a drive of this tick rate, where it lies, in flash or in memory; nothing is written.
@@ -251,15 +285,17 @@ model::BlockVerdict load(std::span<const std::uint8_t> block, Model& model) {
 template <class Model = decltype(DriveParameters<fixed::Fixed>::model)>
 model::BlockVerdict check_for_drive(std::span<const std::uint8_t> block, std::uint32_t tick_hz) {
   std::uint32_t seen = 0;
-  detail::General general;
+  detail::Noted noted;
   const model::BlockVerdict v =
-      model::read_block<Model::kTables>(block, block_places<Model>(), nullptr, nullptr, seen, &general);
+      model::read_block<Model::kTables>(block, block_places<Model>(), nullptr, nullptr, seen, &noted);
   if (!v.good()) return v;
+  const detail::General& general = noted.general;
   std::uint32_t needed = detail::kAlways;
   needed |= general.has_output_encoder ? detail::kWithOutputEncoder : detail::kWithoutOutputEncoder;
   if (general.has_torque_sensor) needed |= detail::kWithTorqueSensor;
   if ((needed & ~seen) != 0) return {model::BlockFault::missing_section};
   if (general.tick_hz != tick_hz) return {model::BlockFault::other_tick_rate};
+  if (unreachable(noted.limited) != Limit::none) return {model::BlockFault::unreachable_limit};
   return {};
 }
 // Fills parameters from a block that was found good; the model stands at rest then.
@@ -274,6 +310,7 @@ void load_for_drive(std::span<const std::uint8_t> block, Parameters& parameters)
   std::memset(static_cast<void*>(settings), 0, sizeof(Settings));
   parameters.model.reset();
   model::read_block<Model::kTables>(block, block_places<Model>(), parameters.model.memory(), settings, seen, nullptr);
+  parameters.model.note_effects();
 }
 
 // Host only: adds all sections that these settings need to a block.

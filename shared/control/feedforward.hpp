@@ -139,9 +139,12 @@ struct Feedforward {
     in.velocity = set.velocity;
     in.acceleration = set.acceleration;
     in.direction = N::clamp(N::scaled(c.per_band, set.velocity), N::one());
-    in.output_angle = N::times_order(set.position + c.to_output_zero, c.output_angle);
-    in.output_velocity = N::scaled(c.output_velocity, set.velocity);
-    in.output_acceleration = N::scaled(c.output_acceleration, set.acceleration);
+    if (model.reads(effects::kOutputAngle))
+      in.output_angle = N::times_order(set.position + c.to_output_zero, c.output_angle);
+    if (model.reads(effects::kOutputMotion)) {
+      in.output_velocity = N::scaled(c.output_velocity, set.velocity);
+      in.output_acceleration = N::scaled(c.output_acceleration, set.acceleration);
+    }
     in.output_direction = in.direction;
     in.torsion = s.torsion;
     in.torque = s.load;

@@ -65,6 +65,7 @@ struct Loops {
   struct Output {
     typename N::Value torque{};   // of torque_base
     typename N::Value current{};  // of current_base, for the current controller
+    typename N::Value error{};    // of the velocity; zero in mode torque
     bool limited = false;         // the loops wanted more than they may
   };
 
@@ -119,7 +120,7 @@ struct Loops {
     if (command.mode != Mode::torque && !(above && error > typename N::Value{}) &&
         !(below && error < typename N::Value{}))
       s.integral = N::clamp(s.integral + N::times(N::widen(error), c.integral), c.torque_limit);
-    return {s.torque, N::clamp(N::scaled(c.current, s.torque), c.current_limit), above || below};
+    return {s.torque, N::clamp(N::scaled(c.current, s.torque), c.current_limit), error, above || below};
   }
 
  private:

@@ -34,6 +34,7 @@ class ResidualMap {
   static constexpr std::size_t kAngleBins = std::size_t{1} << kAngleBits;
   static constexpr std::int64_t kLargest = 511;
   static constexpr std::uint32_t kMostCount = 4094;
+  static constexpr std::uint32_t kEveryTicks = 4;  // a drive adds a residual as often
 
   struct Coefficients {
     std::array<std::int32_t, kEdges> edges{};  // raw values of velocity, rising
@@ -62,7 +63,7 @@ class ResidualMap {
     return c;
   }
 
-  // One tick.
+  // One residual.
   constexpr void add(const Coefficients& c, fixed::Value velocity, fixed::Angle angle, fixed::Value residual) {
     const std::int64_t units = units_of(c, residual);
     std::uint64_t& word = words_[index(velocity_bin(c, velocity), angle_bin(angle))];

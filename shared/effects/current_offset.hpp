@@ -6,7 +6,7 @@ namespace flexspline::effects {
 struct CurrentOffset : Stateless {
   static constexpr Description kInfo{
       .name = "current_offset",
-      .reads = kCurrent,
+      .reads = kCurrent | kBothDirections,
       .equation = "Km i0, i0 = what the sensor reads at zero current",
       .shows_over = "bias, also at rest",
       .source = "amplifier",

@@ -49,8 +49,9 @@ enum Signals : std::uint16_t {
   kTorque = 32,
   kCurrent = 64,
   kTemperature = 128,
-  kTorqueInput = 256,  // where effort is given as torque or force, not as current
-  kTorqueScale = 512,  // needs something that fixes the torque scale: a known parameter, or a loaded torque sensor
+  kTorqueInput = 256,      // where effort is given as torque or force, not as current
+  kBothDirections = 1024,  // motion both ways: else it is no more than a part of the friction of one
+  kTorqueScale = 512,      // needs something that fixes the torque scale: a known parameter, or a loaded torque sensor
 };
 
 // A unit on a rotary axis and its counterpart on a linear one.
@@ -108,7 +109,9 @@ struct Description {
   std::string_view separated_by{};  // the experiment that tells them apart
   std::string_view replaces{};      // effects that it stands in for, separated by commas
   std::string_view modulates{};     // the effect that it scales and needs in the model
-  std::string_view contains{};      // effects whose torque it can draw as a part of its own
+  // Laws of one curve that differ in its formula alone carry the same name here: most data cannot distinguish them.
+  std::string_view family{};
+  std::string_view contains{};  // effects whose torque it can draw as a part of its own
   // A surface whose friction differs from run to run, as grease warms or settles: what carries the same name scales
   // together.
   std::string_view surface{};

@@ -23,6 +23,7 @@ struct StribeckGaussian : Stateless {
           "amount of grease.",
       .rivals = "load_dependent_friction,power_law_friction",
       .separated_by = "a slow free triangle of velocity",
+      .family = "stribeck",
   };
   static constexpr ParameterInfo kParameters[] = {
       {.name = "amplitude_positive", .unit = units::kTorque, .usual = 0.012},

@@ -20,6 +20,7 @@ struct StribeckHessSoom : Stateless {
           "Creep at slow speeds and listen; run the axis warm and repeat; look at the age and the amount of grease.",
       .rivals = "stribeck_gaussian,load_dependent_friction,power_law_friction",
       .separated_by = "a slow free triangle of velocity that reaches five times the Stribeck velocity",
+      .family = "stribeck",
   };
   static constexpr ParameterInfo kParameters[] = {
       {.name = "amplitude_positive", .unit = units::kTorque, .usual = 0.012},

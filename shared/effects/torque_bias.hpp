@@ -6,7 +6,7 @@ namespace flexspline::effects {
 struct TorqueBias : Stateless {
   static constexpr Description kInfo{
       .name = "torque_bias",
-      .reads = kTorqueInput,
+      .reads = kTorqueInput | kBothDirections,
       .equation = "tau0",
       .shows_over = "bias",
       .source = "drives that report torque or force, not current",

@@ -6,7 +6,7 @@ namespace flexspline::effects {
 struct ViscousAsymmetry : Stateless {
   static constexpr Description kInfo{
       .name = "viscous_asymmetry",
-      .reads = kMotorMotion,
+      .reads = kMotorMotion | kBothDirections,
       .equation = "dTv abs(w)",
       .shows_over = "velocity, even",
       .source = "report eq. 27, 62",

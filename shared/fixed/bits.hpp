@@ -3,7 +3,11 @@
 #pragma once
 
 #include <bit>
+#include <cstddef>
 #include <cstdint>
+#include <type_traits>
+
+#include "shared/fixed/word.hpp"
 
 namespace flexspline::fixed {
 
@@ -25,9 +29,27 @@ constexpr Product multiply(std::uint64_t a, std::uint64_t b) {
   __extension__ using Wide = unsigned __int128;
   const Wide product = Wide{a} * b;
   return {static_cast<std::uint64_t>(product >> 64), static_cast<std::uint64_t>(product)};
+#elif defined(__ARM_FEATURE_DSP) && __ARM_FEATURE_DSP
+  if (std::is_constant_evaluated()) return multiply_by_words(a, b);
+  // UMAAL adds two words to a product, which no compiler finds by itself: four of them are all of it.
+  const auto a0 = static_cast<std::uint32_t>(a), a1 = static_cast<std::uint32_t>(a >> 32);
+  const auto b0 = static_cast<std::uint32_t>(b), b1 = static_cast<std::uint32_t>(b >> 32);
+  std::uint32_t word0 = 0, word1 = 0, word2 = 0, word3 = 0;
+  asm("umull %0, %1, %2, %3" : "=&r"(word0), "=&r"(word1) : "r"(a0), "r"(b0));
+  asm("umaal %0, %1, %2, %3" : "+&r"(word1), "+&r"(word2) : "r"(a1), "r"(b0));
+  asm("umaal %0, %1, %2, %3" : "+&r"(word1), "+&r"(word3) : "r"(a0), "r"(b1));
+  asm("umaal %0, %1, %2, %3" : "+&r"(word2), "+&r"(word3) : "r"(a1), "r"(b1));
+  return {(std::uint64_t{word3} << 32) | word2, (std::uint64_t{word1} << 32) | word0};
 #else
   return multiply_by_words(a, b);
 #endif
+}
+
+// The same with a second number of 32 bits, from two products.
+constexpr Product multiply(std::uint64_t a, std::uint32_t b) {
+  const std::uint64_t low = (a & 0xFFFFFFFF) * b;
+  const std::uint64_t high = (a >> 32) * b + (low >> 32);
+  return {high >> 32, (high << 32) | (low & 0xFFFFFFFF)};
 }
 
 // a b 2^-bits rounded down, for 0 < bits < 64; the caller knows that it fits.
@@ -68,11 +90,13 @@ constexpr std::int32_t multiply31(std::int32_t a, std::int32_t b) {
   return static_cast<std::int32_t>((std::int64_t{a} * b + (std::int64_t{1} << 30)) >> 31);
 }
 
-// A polynomial in x of 31 fractional bits, by Horner's rule; the result has the format of the coefficients.
+// A polynomial in x of 31 fractional bits, by Horner's rule; the result has the format of the coefficients. What is
+// multiplied on the way has to stay within 2^30, so that its double is a word and the rounded product one instruction.
 template <std::size_t Size>
 constexpr std::int32_t polynomial(const std::int32_t (&coefficients)[Size], std::int32_t x) {
   std::int32_t sum = coefficients[Size - 1];
-  for (std::size_t n = Size - 1; n > 0; --n) sum = coefficients[n - 1] + multiply31(sum, x);
+  for (std::size_t n = Size - 1; n > 0; --n)
+    sum = add_high(coefficients[n - 1], static_cast<std::int32_t>(static_cast<std::uint32_t>(sum) << 1), x);
   return sum;
 }
 

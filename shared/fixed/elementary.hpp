@@ -143,10 +143,11 @@ constexpr SineCosine sine_cosine(std::uint32_t phase) {
   constexpr std::int32_t kCosine[] = {1073741824, -331168967, 17023452, -349974, 3790};  // cos(pi/4 t) over t^2
   const std::uint32_t quarter = (phase + (std::uint32_t{1} << 29)) >> 30;
   const auto rest = static_cast<std::int32_t>(phase - (quarter << 30));  // an eighth of a turn to each side
-  const std::int64_t t = std::int64_t{rest} * 4;                         // Q31
+  const std::int32_t t = rest * 4;                                       // Q31
   // A square of exactly one would not fit; one unit less does.
-  const auto square = static_cast<std::int32_t>(limited<std::int64_t>((t * t) >> 31, 0, 0x7FFFFFFF));
-  const auto sine = static_cast<std::int32_t>((t * polynomial(kSine, square) + (std::int64_t{1} << 30)) >> 31);
+  const auto whole = static_cast<std::uint32_t>(static_cast<std::uint64_t>(long_product(t, t)) >> 31);
+  const auto square = static_cast<std::int32_t>(whole - (whole >> 31));
+  const std::int32_t sine = add_high(0, polynomial(kSine, square) * 2, t);
   const std::int32_t cosine = polynomial(kCosine, square);
   switch (quarter & 3) {
     case 0:

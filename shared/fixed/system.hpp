@@ -253,7 +253,7 @@ struct FixedSystem {
   }
   static constexpr State times(State a, Value b) {
     constexpr std::uint64_t kMost = std::uint64_t{1} << 63;
-    const Product p = multiply(size_of(a.raw), size_of(b.raw));
+    const Product p = multiply(size_of(a.raw), magnitude_of(b.raw));
     const bool fits = (p.high >> (kValueBits - 1)) == 0;
     Policy::expect(fits, "a product of a state leaves its range");
     const std::uint64_t size = (p.high << (64 - kValueBits)) | (p.low >> kValueBits);

@@ -120,6 +120,20 @@ constexpr std::uint32_t shift_up(std::uint32_t x, std::uint32_t bits) {
 #endif
   return bits > 31 ? 0 : x << bits;
 }
+// a - b, held to what a word shows.
+constexpr std::int32_t saturated_difference(std::int32_t a, std::int32_t b) {
+#if defined(__ARM_FEATURE_DSP) && __ARM_FEATURE_DSP
+  if (!std::is_constant_evaluated()) {
+    std::int32_t difference;
+    asm("qsub %0, %1, %2" : "=r"(difference) : "r"(a), "r"(b));
+    return difference;
+  }
+#endif
+  const std::int64_t difference = std::int64_t{a} - b;
+  return static_cast<std::int32_t>(difference > INT32_MAX   ? INT32_MAX
+                                   : difference < INT32_MIN ? INT32_MIN
+                                                            : difference);
+}
 // x within 0 and 2^Bits - 1.
 template <int Bits>
 constexpr std::uint32_t saturated(std::int32_t x) {

@@ -101,6 +101,7 @@ enum class BlockFault : std::uint8_t {
   missing_section,
   other_tick_rate,
   armed,  // good, but the drive is armed
+  unreachable_limit,  // of a protection: its signal cannot show that it was passed
 };
 // Where a block is wrong: which entry (from nought; of the header: -1), and which field in it where one is to blame.
 struct BlockVerdict {

@@ -51,6 +51,8 @@ constexpr const char* text_of(BlockFault fault) {
       return "it was made for another tick rate";
     case BlockFault::armed:
       return "parameters cannot change while the drive is armed; disarm it first";
+    case BlockFault::unreachable_limit:
+      return "a limit of [faults] lies beyond what its signal can show; pack the block anew, which says which one";
   }
   return "unknown fault";
 }

@@ -11,6 +11,7 @@
 #include <utility>
 
 #include "shared/effects/list.hpp"
+#include "shared/fixed/types.hpp"
 
 namespace flexspline::model {
 
@@ -85,10 +86,49 @@ struct AllPlaces<N, Image, std::index_sequence<Ids...>> : PlaceAt<Ids, N, Image>
   constexpr void for_each(Visit&& visit) const {
     (visit_one<Ids>(*this, visit), ...);
   }
+  // The same for those whose bit is set in `present`, by groups: a tick does not ask each effect whether it is there.
+  template <class Visit>
+  constexpr void for_each_present(std::uint64_t present, Visit&& visit) {
+    const auto low = static_cast<std::uint32_t>(present), high = static_cast<std::uint32_t>(present >> 32);
+    [&]<std::size_t... Groups>(std::index_sequence<Groups...>) {
+      (visit_group<Groups * kGroup>(Groups * kGroup < 32 ? low : high, visit), ...);
+    }
+    (std::make_index_sequence<(sizeof...(Ids) + kGroup - 1) / kGroup>{});
+  }
   // Signals that effects with memory read: those of the tick before are kept.
   static constexpr unsigned remembered() { return (0U | ... | remembered_by<Ids>()); }
 
  private:
+  static constexpr std::size_t kGroup = 4;
+  template <std::size_t First, class Visit>
+  constexpr void visit_group(std::uint32_t word, Visit& visit) {
+    constexpr std::uint32_t kBits = exists_from<First>() << (First % 32);
+    if constexpr (kBits != 0) {
+      if ((word & kBits) == 0) return;
+      [&]<std::size_t... I>(std::index_sequence<I...>) {
+        (visit_present<First + I>(word, visit), ...);
+      }
+      (std::make_index_sequence<kGroup>{});
+    }
+  }
+  template <std::size_t Id, class Visit>
+  constexpr void visit_present(std::uint32_t word, Visit& visit) {
+    if constexpr (exists<Id>()) {
+      if ((word & (std::uint32_t{1} << (Id % 32))) != 0) visit_one<Id>(*this, visit);
+    }
+  }
+  template <std::size_t Id>
+  static constexpr bool exists() {
+    if constexpr (Id < sizeof...(Ids)) return PlaceAt<Id, N, Image>::kExists;
+    return false;
+  }
+  template <std::size_t First>
+  static constexpr std::uint32_t exists_from() {
+    return []<std::size_t... I>(std::index_sequence<I...>) {
+      return (0U | ... | (exists<First + I>() ? 1U << I : 0U));
+    }
+    (std::make_index_sequence<kGroup>{});
+  }
   template <std::size_t Id, class Self, class Visit>
   static constexpr void visit_one(Self& self, Visit& visit) {
     using Place = PlaceAt<Id, N, Image>;
@@ -151,6 +191,7 @@ class DriveModel {
     places.coefficients[places.count] = coefficients;
     places.states[places.count] = {};
     ++places.count;
+    note_effects();
     return true;
   }
   // No effects.
@@ -159,8 +200,23 @@ class DriveModel {
       places.count = 0;
       places.coefficients = {};
     });
+    note_effects();
     reset();
   }
+  // Takes note of which effects there are; after the memory of the places was filled.
+  constexpr void note_effects() {
+    has_scales_ = false;
+    present_ = 0;
+    reads_ = 0;
+    places_.for_each([&]<class Effect>(auto& places) {
+      if (places.count == 0 && !Image::kFilled) return;
+      present_ |= std::uint64_t{1} << id_of<Effect>();
+      // What a table reads is one of its coefficients.
+      reads_ |= Effect::kInfo.made_by_user ? ~0U : Effect::kInfo.reads;
+    });
+  }
+  // Whether an effect of the model reads one of these signals (effects::Signals).
+  constexpr bool reads(unsigned signals) const { return Image::kFilled || (reads_ & signals) != 0; }
   // Calls visit.operator()<Effect>(places) for each effect that the image can run, by rising number.
   template <class Visit>
   constexpr void for_each(Visit&& visit) {
@@ -176,6 +232,7 @@ class DriveModel {
       if constexpr (!std::is_empty_v<typename Effect::template State<N>>) detail::set_to_rest(places.states);
     });
     started_ = false;
+    has_scales_ = false;
   }
 
   // One tick. `in` has what is measured or set: positions, velocities, accelerations, directions, torque, current,
@@ -194,7 +251,7 @@ class DriveModel {
     // Not const: compilers keep constants in memory.
     effects::Inputs<N> before = remembered(in);
     effects::Torques<N> out{};
-    places_.for_each([&]<class Effect>(auto& places) {
+    for_each_present(~std::uint64_t{0}, [&]<class Effect>(auto& places) {
       each_of<Effect>(places, [&](std::size_t i) {
         auto& state = places.states[i];
         const auto& coefficients = places.coefficients[i];
@@ -248,6 +305,23 @@ class DriveModel {
   static constexpr bool is_periodic() {
     return (Effect::kInfo.reads & effects::kMotorAngle) != 0 && std::is_empty_v<typename Effect::template State<N>>;
   }
+  // Of the effects in `among`, those that the model has.
+  template <class Visit>
+  constexpr void for_each_present(std::uint64_t among, Visit&& visit) {
+    if constexpr (Image::kFilled) {
+      places_.for_each(visit);
+    } else {
+      places_.for_each_present(present_ & among, visit);
+    }
+  }
+  template <effects::Phase phase>
+  static constexpr std::uint64_t of_phase() {
+    std::uint64_t found = 0;
+    effects::for_each_effect([&]<class Effect>(std::size_t id) {
+      if (Effect::kInfo.phase == phase) found |= std::uint64_t{1} << id;
+    });
+    return found;
+  }
   template <class Effect, class P, class Visit>
   static constexpr void each_of(P& places, Visit&& visit) {
     constexpr std::size_t kPlaces = std::tuple_size_v<decltype(places.coefficients)>;
@@ -257,7 +331,7 @@ class DriveModel {
       }
       (std::make_index_sequence<kPlaces>{});
     } else if constexpr (kPlaces == 1) {
-      if (places.count != 0) visit(0);
+      visit(0);
     } else {
       for (std::size_t i = 0; i < places.count; ++i) visit(i);
     }
@@ -288,13 +362,15 @@ class DriveModel {
   }
   // The dead zone of a backlash lies behind everything else that changes the torsion.
   constexpr void shift(effects::Inputs<N>& in, typename N::Angle periodic_angle) {
+    constexpr std::uint64_t kShifts = of_phase<effects::Phase::shift>();
+    if (!Image::kFilled && (present_ & kShifts) == 0) return;
     shift_those<false>(in, periodic_angle);
     shift_those<true>(in, periodic_angle);
   }
   template <bool kLast>
   constexpr void shift_those(effects::Inputs<N>& in, typename N::Angle periodic_angle) {
     const auto angle = in.angle;
-    places_.for_each([&]<class Effect>(auto& places) {
+    for_each_present(of_phase<effects::Phase::shift>(), [&]<class Effect>(auto& places) {
       if constexpr (Effect::kInfo.phase == effects::Phase::shift && Effect::kInfo.acts_last == kLast)
         each_of<Effect>(places, [&](std::size_t i) {
           in.angle = is_periodic<Effect>() ? periodic_angle : angle;
@@ -303,11 +379,31 @@ class DriveModel {
     });
     in.angle = angle;
   }
+  // What modulates follows from the temperature alone, which changes slowly: a tick that has the temperature of the one
+  // before takes its scales. There the effects see nothing but it, so that this holds for each.
   constexpr void modulate(effects::Inputs<N>& in) {
-    places_.for_each([&]<class Effect>(auto& places) {
-      if constexpr (Effect::kInfo.phase == effects::Phase::modulate)
-        each_of<Effect>(places, [&](std::size_t i) { Effect::modulate(places.coefficients[i], in); });
-    });
+    constexpr std::uint64_t kModulates = of_phase<effects::Phase::modulate>();
+    const auto modulate_all = [&](effects::Inputs<N>& seen) {
+      for_each_present(kModulates, [&]<class Effect>(auto& places) {
+        if constexpr (Effect::kInfo.phase == effects::Phase::modulate)
+          each_of<Effect>(places, [&](std::size_t i) { Effect::modulate(places.coefficients[i], seen); });
+      });
+    };
+    if constexpr (kKeepsScales) {
+      if ((present_ & kModulates) == 0) return;
+      if (!has_scales_ || scales_.temperature != in.temperature) {
+        effects::Inputs<N> seen;
+        seen.temperature = in.temperature;
+        seen.viscous_scale = seen.coulomb_scale = N::one();
+        modulate_all(seen);
+        scales_ = {seen.temperature, seen.viscous_scale, seen.coulomb_scale};
+        has_scales_ = true;
+      }
+      in.viscous_scale = scales_.viscous;
+      in.coulomb_scale = scales_.coulomb;
+    } else {
+      modulate_all(in);
+    }
   }
 
   using All = Memory;
@@ -343,6 +439,18 @@ class DriveModel {
   }
 
   All places_;
+  std::uint64_t present_ = 0;  // bits of the effects' numbers
+  unsigned reads_ = 0;
+  // Of the last temperature, on a drive. Other number systems have no temperature that is the same as another, and an
+  // image that runs all its effects at every tick asks nothing.
+  static constexpr bool kKeepsScales = !Image::kFilled && std::is_base_of_v<fixed::Value, typename N::Value>;
+  struct Scales {
+    typename N::Value temperature{};
+    typename N::Value viscous{};
+    typename N::Value coulomb{};
+  };
+  Scales scales_{};
+  bool has_scales_ = false;
   Remembered memory_{};
   bool started_ = false;
 };

@@ -32,6 +32,10 @@ struct RippleFilter {
     typename N::State mean{};
     typename N::State cosine{};
     typename N::State sine{};
+    // What take() found, for learn().
+    typename N::State step{};
+    typename N::Wave wave{};
+    typename N::Value torque{};
     bool started = false;
   };
 
@@ -52,23 +56,34 @@ struct RippleFilter {
   template <class N>
   static constexpr typename N::Value update(State<N>& s, const Coefficients<N>& c, typename N::Angle angle,
                                             typename N::Value torque) {
+    take<N>(s, c, angle, torque);
+    return torque - learn<N>(s, c);
+  }
+  // The same in two halves, for two ticks: what there is to learn from, and learning from it, which returns the ripple
+  // of the torque that was taken. As all counts by travel, it need not be done at every tick.
+  template <class N>
+  static constexpr void take(State<N>& s, const Coefficients<N>& c, typename N::Angle angle, typename N::Value torque) {
     if (!s.started) {
       s.before = angle;
       s.mean = N::bounded(N::widen(torque));
       s.started = true;
     }
     const typename N::Travel travel = N::travel(c.per_travel, N::magnitude(angle - s.before));
-    const typename N::State step = N::widen(N::one()) - N::exp_negative(travel);
+    s.step = N::widen(N::one()) - N::exp_negative(travel);
     s.before = angle;
-    const typename N::Wave wave = N::sincos(N::times_order(angle, c.order));
-    const auto surprise = torque - N::narrow(s.mean) - ripple<N>(s, wave);
+    s.wave = N::sincos(N::times_order(angle, c.order));
+    s.torque = torque;
+  }
+  template <class N>
+  static constexpr typename N::Value learn(State<N>& s, const Coefficients<N>& c) {
+    const auto surprise = s.torque - N::narrow(s.mean) - ripple<N>(s, s.wave);
     // Random walks hold what they know without end, and would drift where the phase does not tell them apart: so each
     // is held to its bound.
-    s.mean = N::bounded(s.mean + N::times(step, N::times(c.mean_part, surprise)));
+    s.mean = N::bounded(s.mean + N::times(s.step, N::times(c.mean_part, surprise)));
     const auto part = N::times(c.wave_part, surprise);
-    s.cosine = N::clamp(s.cosine + N::times(step, N::times(part, wave.cosine)), c.largest);
-    s.sine = N::clamp(s.sine + N::times(step, N::times(part, wave.sine)), c.largest);
-    return torque - ripple<N>(s, wave);
+    s.cosine = N::clamp(s.cosine + N::times(s.step, N::times(part, s.wave.cosine)), c.largest);
+    s.sine = N::clamp(s.sine + N::times(s.step, N::times(part, s.wave.sine)), c.largest);
+    return ripple<N>(s, s.wave);
   }
 
  private:

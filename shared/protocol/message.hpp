@@ -63,6 +63,7 @@ enum class Code : std::uint8_t {
   no_parameters,
   no_block,
   not_available,  // this drive cannot do that
+  moving,         // not while the shaft turns
   // Of the parameter store, in its order.
   too_long = 0x20,
   not_begun,

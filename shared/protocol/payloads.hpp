@@ -59,7 +59,7 @@ enum class Channel : std::uint8_t {
 };
 inline constexpr std::size_t kChannels = 21;
 inline constexpr std::size_t kMostChannels = 12;
-inline constexpr std::uint32_t kFaults = 21;
+inline constexpr std::uint32_t kFaults = 25;
 
 struct Empty {
   template <class Codec>

@@ -34,6 +34,8 @@ constexpr std::string_view text_of(Code code) {
       return "the drive has no such block";
     case Code::not_available:
       return "this drive cannot do that";
+    case Code::moving:
+      return "the shaft turns, and writing flash memory would lose counts of it; bring it to rest first";
     case Code::too_long:
       return "the block is empty or longer than the drive's flash has room for";
     case Code::not_begun:
@@ -101,8 +103,10 @@ inline constexpr std::array<FaultText, kFaults> kFaultTexts{{
     {"analog_stale", "the converter gave no new samples"},
     {"motor_encoder_jump", "the motor's encoder moved by more counts in a tick than at twice the overspeed"},
     {"motor_encoder_stuck",
-     "the torque changed by more than friction can hold, and the motor's encoder shows no motion (stuck_torque, "
-     "stuck_s)"},
+     "the motor's encoder shows no motion, though the torque changed by more than friction can hold, stays at its "
+     "limit, "
+     "or drove the shaft on a moment before: a line or the whole encoder is lost, or the shaft is blocked "
+     "(stuck_torque, stuck_s)"},
     {"implausible_motion", "the motor's encoder shows an acceleration that no torque can give (acceleration)"},
     {"current_out_of_range", "the current's converter is at its rail: sensor or wire broken"},
     {"torque_out_of_range", "the torque's converter is at its rail: sensor or wire broken"},
@@ -123,6 +127,12 @@ inline constexpr std::array<FaultText, kFaults> kFaultTexts{{
     {"output_encoder_stuck",
      "the motor turned and the output's encoder shows no motion: encoder, its line, coupling or gear broken "
      "(output_stuck)"},
+    {"encoders_disagree",
+     "the motor's and the output's encoder show motions that no gear between them allows: one lost its signal, counts "
+     "the other way, a coupling slips, or the gear ratio is wrong (output_stuck)"},
+    {"set_point_lost", "the host is there, but the stream of set points ended in motion (host_s)"},
+    {"amplifier_fault", "the amplifier switched itself off: its overcurrent protection or its supply tripped"},
+    {"crashed", "the drive was reset by itself: an exception (a failure of firmware or memory), or its crystal died"},
 }};
 constexpr FaultText fault_text(std::uint8_t number) {
   return number < kFaults ? kFaultTexts[number] : FaultText{"unknown", "a fault that this tool does not know"};

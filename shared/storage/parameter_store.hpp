@@ -24,7 +24,7 @@ enum class StoreError : std::uint8_t {
   invalid,         // the validator refused it; nothing was changed
   flash,           // the memory did not take what was written
   no_previous,     // there is no valid block before the active one
-  worn,            // no room for another sequence number; staging a block anew makes room
+  worn,            // no room to note another restore; staging a block anew makes room
 };
 
 // What boot() found.
@@ -56,10 +56,10 @@ class ParameterStore {
       committed[s] = word(s, 0) == kMagic && rank_[s] > 0;
       if (!committed[s] || !is_whole(s) || validate(block(s)) != 0) rank_[s] = 0;
     }
-    active_ = rank_[1] > rank_[0] ? 1 : 0;
+    active_ = is_newer(rank_[1], rank_[0]) ? 1 : 0;
     if (rank_[active_] == 0) return state_ = committed[0] || committed[1] ? StoreState::damaged : StoreState::empty;
     const std::size_t other = 1 - active_;
-    const bool lost_newer = committed[other] && rank_[other] == 0 && rank_of(other) > rank_[active_];
+    const bool lost_newer = committed[other] && rank_[other] == 0 && is_newer(rank_of(other), rank_[active_]);
     return state_ = lost_newer ? StoreState::fell_back : StoreState::good;
   }
   constexpr StoreState state() const { return state_; }
@@ -72,6 +72,10 @@ class ParameterStore {
   constexpr std::uint32_t previous_crc() const { return rank_[1 - active_] == 0 ? 0 : word(1 - active_, 2); }
   // One more with each commit and each restore; nought: there is no active block.
   constexpr std::uint16_t sequence() const { return rank_[active_]; }
+  // Of the next one: after the largest comes one again. All numbers of a store lie within a few hundred.
+  static constexpr std::uint16_t sequence_after(std::uint16_t rank) {
+    return rank >= kMostRank ? 1 : static_cast<std::uint16_t>(rank + 1);
+  }
   constexpr std::size_t staged() const { return staged_; }
 
   // Begins to stage a block of so many bytes with this CRC-32: erases the sector that is not active, which gives up the
@@ -121,7 +125,6 @@ class ParameterStore {
     if (model::crc32(bytes) != crc_) return StoreError::wrong_checksum;
     reason = validate(bytes);
     if (reason != 0) return StoreError::invalid;
-    if (rank_[active_] == kMostRank) return StoreError::worn;
     if (!put(s, 0, kMagic) || !put(s, 1, static_cast<std::uint32_t>(announced_)) || !put(s, 2, crc_)) return give_up();
     staging_ = false;
     return put_slot(s, kFirstSlot);
@@ -135,7 +138,6 @@ class ParameterStore {
     if (rank_[active_] == 0 || rank_[s] == 0 || !is_whole(s)) return StoreError::no_previous;
     reason = validate(block(s));
     if (reason != 0) return StoreError::invalid;
-    if (rank_[active_] == kMostRank) return StoreError::worn;
     std::size_t slot = kFirstSlot;
     while (slot < kSlotsEnd && (word(s, slot) != kErasedWord || word(s, slot + 1) != kErasedWord)) slot += 2;
     return slot == kSlotsEnd ? StoreError::worn : put_slot(s, slot);
@@ -148,6 +150,11 @@ class ParameterStore {
   static constexpr std::size_t kSlotsEnd = kHeaderBytes / 4;
   static constexpr std::uint16_t kMostRank = 0xFFFE;
 
+  // Of two numbers that wrap, of which zero is older than any.
+  static constexpr bool is_newer(std::uint16_t a, std::uint16_t b) {
+    if (a == 0 || b == 0) return a != 0;
+    return static_cast<std::int16_t>(static_cast<std::uint16_t>(a - b)) > 0;
+  }
   // Sixteen of its bits are nought. A write that was cut short leaves fewer, so it can never be another valid number.
   static constexpr std::uint32_t code_of(std::uint16_t rank) {
     return std::uint32_t{rank} | (std::uint32_t{static_cast<std::uint16_t>(~rank)} << 16);
@@ -158,17 +165,17 @@ class ParameterStore {
     model::Reader r(flash_.bytes(sector).subspan(4 * at, 4));
     return r.take<std::uint32_t>();
   }
-  // The largest number in the slots, nought where there is none.
+  // The newest number in the slots, zero where there is none.
   constexpr std::uint16_t rank_of(std::size_t sector) const {
-    std::uint16_t largest = 0;
+    std::uint16_t newest = 0;
     const std::uint32_t crc = word(sector, 2);
     for (std::size_t slot = kFirstSlot; slot < kSlotsEnd; slot += 2) {
       const std::uint32_t code = word(sector, slot + 1);
       const auto rank = static_cast<std::uint16_t>(code);
       const bool valid = code == code_of(rank) && word(sector, slot) == check_of(rank, crc) && rank <= kMostRank;
-      if (valid && rank > largest) largest = rank;
+      if (valid && is_newer(rank, newest)) newest = rank;
     }
-    return largest;
+    return newest;
   }
   constexpr bool is_whole(std::size_t sector) const {
     const std::uint32_t bytes = word(sector, 1);
@@ -197,7 +204,7 @@ class ParameterStore {
     return StoreError::flash;
   }
   constexpr StoreError put_slot(std::size_t sector, std::size_t slot) {
-    const auto rank = static_cast<std::uint16_t>(rank_[active_] + 1);
+    const std::uint16_t rank = sequence_after(rank_[active_]);
     if (!put(sector, slot, check_of(rank, word(sector, 2))) || !put(sector, slot + 1, code_of(rank)))
       return StoreError::flash;
     rank_[sector] = rank;

@@ -16,6 +16,9 @@ struct WrittenFlash {
   std::vector<FlashSector> sectors{{1, 0, 0x4000}, {2, 0x4000, 0x4000}};
 };
 
+// Where the linker script has the word that outlasts a reset.
+inline constexpr std::uint32_t kHandover = 0x2001FFF0;
+
 class Chip {
  public:
   explicit Chip(const std::filesystem::path& image, const WrittenFlash& written = {});

@@ -5,6 +5,7 @@
 #include <array>
 #include <cstdint>
 #include <deque>
+#include <functional>
 #include <string>
 #include <vector>
 
@@ -312,11 +313,13 @@ class WatchdogModel : public Peripheral {
   explicit WatchdogModel(Machine& machine) : machine_(machine) {}
   double oscillator_hz = 32'000;
   bool bit = false;
+  std::function<void()> started;
   int fed = 0;
 
   std::uint32_t read(std::uint32_t) override { return 0; }
   void write(std::uint32_t offset, std::uint32_t value) override {
     if (offset == 0x00) {
+      if (value == 0xCCCC && !running_ && started) started();
       if (value == 0xCCCC) running_ = true;
       if (value == 0x5555) unlocked_ = true;
       if (value == 0xAAAA) {

@@ -4,6 +4,7 @@
 #include <cmath>
 #include <string>
 
+#include "shared/protocol/texts.hpp"
 #include "tests/board/drive_bench.hpp"
 
 namespace flexspline::tests {
@@ -171,10 +172,28 @@ TEST(BoardBridge, ABreakStaysUntilTheHostArmsAgain) {
   bench.chip.tim1.break_input = false;
   bench.run_with_host(0.005);
   EXPECT_FALSE(bench.chip.tim1.outputs_on()) << "it does not come back by itself";
-  bench.command({.kind = CommandKind::disarm});
-  bench.chip.ticks(20);
+  const protocol::Status status = bench.bus.status();
+  EXPECT_EQ(status.mode, Mode::fault);
+  EXPECT_EQ(protocol::fault_text(status.fault).name, "amplifier_fault");
+  EXPECT_EQ(bench.command({.kind = CommandKind::arm, .mode = Mode::current}).refusal, protocol::Refusal::fault);
+  bench.command({.kind = CommandKind::clear_fault});
+  bench.run_with_host(0.005);
   bench.command({.kind = CommandKind::arm, .mode = Mode::current});
   EXPECT_TRUE(bench.chip.tim1.outputs_on());
+}
+
+TEST(BoardDrive, AStartAfterACrashEndsInAFaultThatTheHostHasToClear) {
+  DriveBench bench("dac");
+  bench.chip.machine.set_word(kHandover, 0x43525348);
+  ASSERT_EQ(bench.chip.start(), Stop::waits) << bench.chip.machine.where();
+  ASSERT_TRUE(bench.bus.enumerate());
+  bench.chip.ticks(100);
+  ASSERT_EQ(bench.bus.code(protocol::Kind::identify, protocol::Hello{}), protocol::Code::done);
+  EXPECT_EQ(bench.bus.status().mode, Mode::fault);
+  EXPECT_EQ(protocol::fault_text(bench.bus.status().fault).name, "crashed");
+  bench.command({.kind = CommandKind::clear_fault});
+  bench.chip.ticks(100);
+  EXPECT_EQ(bench.bus.status().mode, Mode::idle);
 }
 
 TEST(BoardWatchdog, IsFedWhileAllPartsReportAndBitesWhenTheTickStops) {

@@ -186,6 +186,9 @@ std::uint32_t Machine::word(std::uint32_t address) const {
   check(uc_mem_read(uc_, address, &value, sizeof(value)), "memory cannot be read");
   return value;
 }
+void Machine::set_word(std::uint32_t address, std::uint32_t value) {
+  check(uc_mem_write(uc_, address, &value, sizeof(value)), "memory cannot be written");
+}
 std::uint32_t Machine::reg(int number) const {
   std::uint32_t value = 0;
   check(uc_reg_read(uc_, number, &value), "a register cannot be read");

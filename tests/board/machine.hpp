@@ -64,6 +64,7 @@ class Machine {
   bool interrupt_is_enabled(std::uint32_t number) const;
 
   std::uint32_t word(std::uint32_t address) const;
+  void set_word(std::uint32_t address, std::uint32_t value);
   std::uint32_t reg(int number) const;
   void set_reg(int number, std::uint32_t value);
   std::uint32_t symbol(const std::string& name) const;  // throws where there is none

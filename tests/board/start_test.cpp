@@ -86,6 +86,20 @@ TEST(BoardStart, AnUnexpectedExceptionSwitchesTheAmplifierOffAndResetsEvenWithAB
   chip.machine.set_reg(UC_ARM_REG_SP, 0x1FFFFFF0);
   EXPECT_EQ(chip.machine.interrupt(kHardFault), Stop::reset) << chip.machine.where();
   EXPECT_TRUE(amplifier_is_off(chip));
+  EXPECT_EQ(chip.machine.word(kHandover), 0x43525348U) << "the next start is told";
+}
+
+TEST(BoardStart, TheWatchdogRunsBeforeStoreLinesAndTick) {
+  Chip chip(kDac);
+  int starts = 0;
+  // Clocks of TIM1, of the converter and of both serial lines.
+  chip.watchdog.started = [&] {
+    ++starts;
+    EXPECT_EQ(chip.clock.at(0x44) & (1U << 0 | 1U << 8), 0U);
+    EXPECT_EQ(chip.clock.at(0x40) & (1U << 17 | 1U << 18), 0U);
+  };
+  ASSERT_EQ(chip.start(), Stop::waits);
+  EXPECT_EQ(starts, 1);
 }
 
 TEST(BoardStart, AStackThatOverflowsLeavesTheRamInsteadOfWritingOverVariables) {

@@ -1,6 +1,7 @@
 #!/usr/bin/env bash
-# measure.sh FOLDER ADVERSARIAL: builds the counting images into FOLDER, runs them in QEMU, writes FOLDER/table.txt and
-# compares it with budget.txt, above and below. ADVERSARIAL is the program of tests/same_bits, which writes the block.
+# measure.sh FOLDER ADVERSARIAL TICK_INPUTS IMAGE: builds the counting images into FOLDER, runs them and the application's
+# IMAGE in QEMU, writes FOLDER/table.txt and compares it with budget.txt, above and below. ADVERSARIAL is the program of
+# tests/same_bits, which writes the block; TICK_INPUTS that of tick_inputs.cpp.
 # measure.sh bits FOLDER ADVERSARIAL: the hashes of bare machines against those recorded.
 set -euo pipefail
 here=$(cd -- "$(dirname -- "${BASH_SOURCE[0]}")" && pwd)
@@ -30,7 +31,7 @@ if [[ $1 == bits ]]; then
   exit $status
 fi
 
-folder=$1
+folder=$1 image=$(realpath "$4")
 mkdir -p "$folder"
 "$2" block >"$folder/block.inc"
 table=$folder/table.txt
@@ -102,6 +103,16 @@ for machine in m4 m3 m0; do
     "six_in_double=Library<double> >::tick" | sed "s/^/$machine-cycles /" >>"$table"
 done
 
+# The application's own control tick: all of them by the image's counter, and by part a hundred that were followed.
+"$3" record "$folder"
+for drive in demo demo_and_seven; do
+  rm -f "$folder/$drive/from_drive"
+  (cd "$folder/$drive" && timeout 120 qemu-system-arm -M netduinoplus2 -nographic -monitor none -serial none \
+    -semihosting-config enable=on,target=native -icount shift=0,sleep=off -kernel "$image" </dev/null >log 2>&1)
+  echo "tick $drive $("$3" counts "$folder/$drive/from_drive")" >>"$table"
+  python3 "$here/tick_parts.py" "$image" "$folder/$drive" 100 | sed "s/^/tick $drive./" >>"$table"
+done
+
 printf '%-9s %-32s %8s %8s %8s   %s\n' machine part least most mean budget
 awk '
   NR == FNR { if ($0 !~ /^#/ && NF >= 4) { low[$1 " " $2] = $3; high[$1 " " $2] = $4 } next }
@@ -117,6 +128,11 @@ awk '
   }
   END {
     for (key in high) if (!(key in seen)) { print "no " key " was measured"; bad = 1 }
+    # A tick has to be as long as another: the longest leaves no room that the mean would.
+    for (i = split("demo demo_and_seven", drives); i > 0; --i) {
+      key = "tick " drives[i]
+      if (most[key] > 1.15 * mean[key]) { print key ": the longest is more than 15 % above the mean"; bad = 1 }
+    }
     # Beside careful single precision: not above it where there is a unit for it, five times faster elsewhere.
     six = "-cycles six_effects"; peer = "-cycles six_in_careful_float"
     if (most["m4" six] > most["m4" peer]) { print "m4: six effects take more cycles than in floating point"; bad = 1 }

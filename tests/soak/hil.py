@@ -18,6 +18,9 @@ import threading
 import time
 from pathlib import Path
 
+sys.dont_write_bytecode = True  # leaves nothing in the sources
+from resumable import results_so_far
+
 SCENARIOS = ("slow-reversals", "sine", "trapezoid", "joint-trajectory", "constant-slow", "loaded-reversals", "pick-and-place")
 FIRST = 500  # drives, all off by up to FIRST_SHARE
 FIRST_SHARE = 0.3
@@ -28,24 +31,6 @@ tools, minutes, folder, version = Path(sys.argv[1]), float(sys.argv[2]), Path(sy
 plant = (Path(__file__).resolve().parents[2] / "hil/plant/demo-drive.toml").read_text()
 folder.mkdir(parents=True, exist_ok=True)
 results_file = folder / "hil.jsonl"
-
-
-def results_so_far():
-    """By number of the drive; those of another version are put aside."""
-    if not results_file.exists():
-        return {}
-    lines = results_file.read_text().splitlines()
-    if not lines or json.loads(lines[0]) != {"version": version}:
-        results_file.rename(str(results_file) + ".old")
-        return {}
-    known = {}
-    for line in lines[1:]:
-        try:
-            one = json.loads(line)
-        except json.JSONDecodeError:  # half written, by a run that was stopped
-            continue
-        known[one["drive"]] = one
-    return known
 
 
 def other_drive(share, chance):
@@ -162,7 +147,7 @@ def page():
     return "\n\n".join(parts) + "\n"
 
 
-results = results_so_far()
+results = results_so_far(results_file, version, lambda one: one["drive"])
 if not results_file.exists():
     results_file.write_text(json.dumps({"version": version}) + "\n")
 end = time.monotonic() + 60.0 * minutes

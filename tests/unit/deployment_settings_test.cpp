@@ -13,6 +13,7 @@
 #include "host/deployment/drive_settings.hpp"
 #include "host/deployment/pack.hpp"
 #include "shared/control/drive_block.hpp"
+#include "tests/support/two_ampere_drive.hpp"
 
 namespace flexspline::tests {
 namespace {
@@ -22,23 +23,7 @@ using deployment::PackError;
 constexpr double kTurn = 2.0 * std::numbers::pi;
 
 model::Model some_model() {
-  model::Model m;
-  m.name = "some";
-  m.drive.gear_ratio.value = 100.0;
-  m.drive.torque_constant_nm_a.value = 0.05;
-  m.drive.rated_current_a.value = 2.0;
-  m.drive.rated_velocity_rad_s.value = 200.0;
-  m.drive.rated_torque_nm.value = 40.0;
-  for (const auto& [type, value] : {std::pair{"inertia", 1e-4},
-                                    {"viscous_friction", 3.6e-4},
-                                    {"linear_stiffness", 6300.0},
-                                    {"output_inertia", 0.06}}) {
-    model::Effect effect = catalogue::blank_effect(catalogue::get(type), m.drive.axis);
-    effect.id = type;
-    effect.parameters[0].value = value;
-    m.effects.push_back(effect);
-  }
-  return m;
+  return testing::two_ampere_drive();
 }
 control::DriveSetup<double> parsed(const std::string& tables, const model::Model& m = some_model()) {
   const auto d = deployment::bases_of(m, 1.0 / 20'000.0, 1.0);
@@ -90,17 +75,17 @@ model::Model with_friction(std::initializer_list<std::pair<const char*, std::vec
 // The motor has 0.1 N m. What friction holds is its height on both sides; of what acts alike on both it holds nothing.
 TEST(DriveSettings, AStuckEncoderIsToldFromFrictionThatHoldsMostOfTheTorque) {
   const auto stuck_torque = [](const model::Model& m) { return parsed(kCounts, m).safety.stuck_torque; };
-  EXPECT_NEAR(stuck_torque(some_model()), 0.075, 1e-6);
-  EXPECT_NEAR(stuck_torque(with_friction({{"coulomb_friction", {0.01}}})), 0.075, 1e-6);
-  EXPECT_NEAR(stuck_torque(with_friction({{"coulomb_friction", {0.045}}})), 1.25 * 0.09, 1e-6);
-  EXPECT_NEAR(stuck_torque(with_friction({{"coulomb_friction", {0.045}}, {"coulomb_asymmetry", {0.01}}})), 1.25 * 0.09,
+  EXPECT_NEAR(stuck_torque(some_model()), 0.05, 1e-6);
+  EXPECT_NEAR(stuck_torque(with_friction({{"coulomb_friction", {0.01}}})), 0.05, 1e-6);
+  EXPECT_NEAR(stuck_torque(with_friction({{"coulomb_friction", {0.045}}})), 1.5 * 0.09, 1e-6);
+  EXPECT_NEAR(stuck_torque(with_friction({{"coulomb_friction", {0.045}}, {"coulomb_asymmetry", {0.01}}})), 1.5 * 0.09,
               1e-6);
   EXPECT_NEAR(stuck_torque(with_friction({{"coulomb_friction", {0.03}}, {"stribeck_gaussian", {0.01, 0.02, 3.0}}})),
-              1.25 * (0.04 + 0.05), 1e-6);
-  EXPECT_NEAR(stuck_torque(with_friction({{"dahl_friction", {0.045, 0.05}}})), 1.25 * 0.09, 1e-6);
-  EXPECT_NEAR(stuck_torque(with_friction({{"lugre_friction", {0.045, 0.055, 3.0, 0.4, 0.0}}})), 1.25 * 0.11, 1e-5);
+              1.5 * (0.04 + 0.05), 1e-6);
+  EXPECT_NEAR(stuck_torque(with_friction({{"dahl_friction", {0.045, 0.05}}})), 1.5 * 0.09, 1e-6);
+  EXPECT_NEAR(stuck_torque(with_friction({{"lugre_friction", {0.045, 0.055, 3.0, 0.4, 0.0}}})), 1.5 * 0.11, 1e-5);
   // A tenth of the load of 40 N m behind a gear of 100.
-  EXPECT_NEAR(stuck_torque(with_friction({{"load_dependent_friction", {0.1}}})), 1.25 * 2.0 * 0.04, 1e-6);
+  EXPECT_NEAR(stuck_torque(with_friction({{"load_dependent_friction", {0.1}}})), 1.5 * 2.0 * 0.04, 1e-6);
 }
 
 // Full torque turns 1e-4 kg m^2 by a 64th of a turn in 14 ms, by a 4096th in 1.8 ms.

@@ -44,7 +44,7 @@ double amplitude(VirtualDrive& drive, double order) {
     for (std::size_t a = 0; a < Map::kAngleBins; ++a) {
       MapBin bin;
       EXPECT_TRUE(software(drive).map_bin(static_cast<std::uint16_t>(v * Map::kAngleBins + a), bin));
-      if (bin.count < 200) continue;
+      if (bin.count * Map::kEveryTicks < 200) continue;
       const double mean = unit * bin.sum / bin.count;
       const double angle = kTurn * (static_cast<double>(a) + 0.5) / Map::kAngleBins;
       cosine += mean * std::cos(order * angle);
@@ -70,7 +70,7 @@ TEST(ResidualMapOnTheDrive, ShowsARippleThatTheModelLacks) {
     ASSERT_EQ(drive.command(of_kind(Command::Kind::start_map)).refusal, Refusal::none);
     EXPECT_TRUE(drive.status().maps_residual);
     turn(drive, 1.5);
-    EXPECT_GT(ticks_of(drive), 20'000u);
+    EXPECT_GT(ticks_of(drive) * Map::kEveryTicks, 20'000u);
     found[known ? 1 : 0] = amplitude(drive, 2.0);
   }
   // The plant's ripple has 4 mN m; the filter of the encoder, 150 Hz, lets it through at 20 and 35 rad/s.
@@ -92,7 +92,7 @@ TEST(ResidualMapOnTheDrive, CountsOnlyWhileItIsOnAndAModelIsFedForward) {
   run_with_host(*drive, 1.0);
   turn(*drive, 0.1);
   const std::uint64_t counted = ticks_of(*drive);
-  EXPECT_NEAR(static_cast<double>(counted), 0.4 * kTickHz, 100.0);
+  EXPECT_NEAR(static_cast<double>(counted * Map::kEveryTicks), 0.4 * kTickHz, 100.0);
   EXPECT_EQ(drive->command(of_kind(Command::Kind::clear_map)).refusal, Refusal::armed);
   drive->command(of_kind(Command::Kind::stop_map));
   const std::uint64_t stopped = ticks_of(*drive);

@@ -169,11 +169,26 @@ TEST(Watchdog, ResetsADriveWhoseTickOrBackgroundWorkHangsWhichThenSaysSo) {
   }
 }
 
+TEST(Watchdog, ADriveThatWasResetByItsOwnCrashSaysSo) {
+  board::SoftwareBrain brain;
+  brain.start(demo_block(), {}, firmware::ResetCause::crash);
+  firmware::LockStepDown down;
+  firmware::LockStepUp up;
+  for (int k = 0; k < 100; ++k) {
+    ++down.readings.motor_samples, ++down.readings.output_samples, ++down.readings.analog_samples;
+    down.readings.torque = static_cast<std::int16_t>(1 + k % 2);
+    up = brain.tick(down);
+  }
+  EXPECT_EQ(up.status.mode, Mode::fault);
+  EXPECT_EQ(up.status.fault.fault, Fault::crashed);
+}
+
 // Parameter block.
 
 control::DriveSetup<double> other_setup() {
   auto setup = demo_setup();
   setup.loops.current_limit = 1.0;
+  setup.safety.stuck_torque = demo_drive().torque_constant_nm_a;
   return setup;
 }
 double largest_current(VirtualDrive& drive) {

@@ -336,6 +336,30 @@ TEST(ParameterStore, AMemoryThatDoesNotTakeWhatIsWrittenIsReportedAndTheOldBlock
   }
 }
 
+// Whoever can write blocks cannot lock the store by writing many.
+TEST(ParameterStore, TakesBlocksWithoutEndAndItsNumbersWrap) {
+  Cells cells;
+  Flash flash(cells);
+  Store store(flash);
+  store.boot(validate);
+  std::uint16_t before = 0;
+  bool wrapped = false;
+  for (int k = 0; k < 70'000; ++k) {
+    const char name = k % 2 == 0 ? 'a' : 'b';
+    ASSERT_TRUE(store_block(store, block_named(name, 8))) << k;
+    ASSERT_EQ(store.sequence(), Store::sequence_after(before));
+    wrapped = wrapped || store.sequence() < before;
+    before = store.sequence();
+    if (k < 65'000 && k % 1000 != 0) continue;
+    // As after a start.
+    Store again(flash);
+    ASSERT_EQ(again.boot(validate), StoreState::good);
+    ASSERT_EQ(name_of(again.active()), name) << k;
+    ASSERT_EQ(again.sequence(), before);
+  }
+  EXPECT_TRUE(wrapped);
+}
+
 TEST(ParameterStore, RestoresGoBackAndForthUntilTheSlotsAreUsedUpAndACommitMakesRoom) {
   Cells cells;
   on(cells, storing('a'));

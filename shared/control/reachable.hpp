@@ -1,0 +1,108 @@
+// One rule for all limits that stop a drive: each lies where its signal can show that it was passed, with a margin. A
+// limit beyond what a signal shows is no protection. Asked by the host when it packs and by the drive's validator.
+#pragma once
+
+#include <cstdint>
+
+#include "shared/control/drive_parameters.hpp"
+#include "shared/fixed/system.hpp"
+
+namespace flexspline::control {
+
+using Shown = fixed::Fixed::Value;
+
+// An analogue reading in bases of its signal. Signals that a model reads are held to two bases; limits see all of it.
+inline Shown shown(const AnalogScale<fixed::Fixed>& scale, std::int16_t share) {
+  constexpr std::int32_t kMost = std::int32_t{15} << fixed::kValueBits;
+  const Shown part{{std::int32_t{share} * (1 << (fixed::kValueBits - 15))}};
+  const std::int32_t value = fixed::saturated_difference(fixed::Fixed::scaled(scale.gain, part).raw, scale.offset.raw);
+  return {{fixed::limited(value, -kMost, kMost)}};
+}
+
+enum class Limit : std::uint8_t {
+  none,
+  overspeed,
+  overcurrent,
+  overtemperature,
+  acceleration,
+  stuck_torque,
+  current_mismatch,
+  standstill,
+  following_velocity,
+};
+
+// What the rule is about.
+struct Limited {
+  using N = fixed::Fixed;
+  AnalogScale<N> current{};
+  AnalogScale<N> temperature{};
+  SafetyLimits<N> safety{};
+  Shown following_velocity{};  // zero: not watched
+  Shown velocity_limit{};
+  Shown torque_limit{};
+  Shown current_limit{};
+  N::Gain acceleration_scale{};  // of the motor's encoder filter
+
+  static Limited of(const DriveSettings<N>& s) {
+    return {s.current,
+            s.temperature,
+            s.safety,
+            s.following.velocity,
+            s.loops.velocity_limit,
+            s.loops.torque_limit,
+            s.loops.current_limit,
+            s.motor_motion.acceleration_scale};
+  }
+};
+
+// The largest that each limit may be, in its base.
+inline Shown largest(Limit limit, const Limited& d) {
+  const auto share = [](std::int64_t raw, int percent) {
+    return Shown{{static_cast<std::int32_t>(fixed::limited<std::int64_t>(raw * percent / 100, 0, INT32_MAX))}};
+  };
+  constexpr std::int64_t kTwoBases = std::int64_t{2} << fixed::kValueBits;  // where an encoder's velocity ends
+  switch (limit) {
+    case Limit::overspeed:
+      return share(kTwoBases, 95);
+    case Limit::overcurrent: {
+      const std::int64_t above = shown(d.current, d.current.highest).raw,
+                         below = -shown(d.current, d.current.lowest).raw;
+      return share(above < below ? above : below, 95);
+    }
+    case Limit::overtemperature: {
+      const std::int64_t a = shown(d.temperature, d.temperature.highest).raw;
+      const std::int64_t b = shown(d.temperature, d.temperature.lowest).raw;
+      return share(a > b ? a : b, 95);
+    }
+    case Limit::acceleration: {
+      // A count that stops at the overspeed; the filter shows the less of it, the slower it is.
+      const Shown stop = share(d.safety.overspeed.raw, 30);
+      return fixed::Fixed::scaled(d.acceleration_scale, stop);
+    }
+    case Limit::stuck_torque:
+      return share(2 * std::int64_t{d.torque_limit.raw}, 95);
+    case Limit::current_mismatch:
+      return share(d.current_limit.raw, 95);
+    case Limit::standstill:
+      return share(d.velocity_limit.raw, 50);
+    case Limit::following_velocity:
+      return d.velocity_limit;
+    default:
+      return {};
+  }
+}
+// The first limit that its signal cannot reach, or none.
+inline Limit unreachable(const Limited& d) {
+  const auto beyond = [&d](Limit limit, Shown is) { return is > largest(limit, d); };
+  if (beyond(Limit::overspeed, d.safety.overspeed)) return Limit::overspeed;
+  if (beyond(Limit::overcurrent, d.safety.overcurrent)) return Limit::overcurrent;
+  if (beyond(Limit::overtemperature, d.safety.overtemperature)) return Limit::overtemperature;
+  if (beyond(Limit::acceleration, d.safety.acceleration)) return Limit::acceleration;
+  if (beyond(Limit::stuck_torque, d.safety.stuck_torque)) return Limit::stuck_torque;
+  if (beyond(Limit::current_mismatch, d.safety.current_mismatch)) return Limit::current_mismatch;
+  if (beyond(Limit::standstill, d.safety.standstill)) return Limit::standstill;
+  if (beyond(Limit::following_velocity, d.following_velocity)) return Limit::following_velocity;
+  return Limit::none;
+}
+
+}  // namespace flexspline::control
