@@ -7,6 +7,7 @@
 #include <algorithm>
 #include <cmath>
 
+#include "host/regression/pivoted_qr.hpp"
 #include "host/regression/shapes.hpp"
 
 namespace flexspline::diagnosis {
@@ -62,13 +63,37 @@ bool covered(const Terms& terms, const catalogue::Entry& entry) {
                      [&](const Term& t) { return catalogue::names_contain(t.entry->info->replaces, entry.name()); });
 }
 
+// Some record moves in both directions (each a tenth of its rows), or stands still, or there are several for each: else
+// what differs between directions is what differs between records.
+bool moves_both_ways(const BalanceData& data) {
+  constexpr double kLeastShare = 0.1;
+  constexpr int kFewestEach = 3;
+  int forward_only = 0, backward_only = 0;
+  for (const auto& range : data.records()) {
+    const regression::Record& r = data.prepared().records[range.record];
+    if (r.at_rest) return true;
+    double forward = 0.0, backward = 0.0;
+    for (const std::size_t k : r.rows[regression::index(data.balance())].samples) {
+      const double v = r.direction_variable(data.balance(), k);
+      (v > 0.0 ? forward : backward) += v != 0.0 ? 1.0 : 0.0;
+    }
+    if (std::min(forward, backward) >= kLeastShare * (forward + backward) && forward + backward > 0.0) return true;
+    (forward > backward ? forward_only : backward_only) += 1;
+  }
+  return std::min(forward_only, backward_only) >= kFewestEach;
+}
+
 bool visible(const BalanceData& data, const Terms& terms, const catalogue::Entry& entry) {
   const unsigned reads = entry.info->reads;
   const regression::Prepared& p = data.prepared();
-  if ((reads & effects::kTorque) && !p.torque_measured) return false;
+  const bool has_torque =
+      p.torque_measured || std::any_of(p.records.begin(), p.records.end(),
+                                       [](const regression::Record& r) { return !r.inputs.torque.empty(); });
+  if ((reads & effects::kTorque) && !has_torque) return false;
   if ((reads & effects::kCurrent) && !p.effort_is_current) return false;
   if ((reads & effects::kTorqueInput) && p.effort_is_current) return false;
   if ((reads & effects::kTorqueScale) && !knows_torque_scale(data, terms)) return false;
+  if ((reads & effects::kBothDirections) && !moves_both_ways(data)) return false;
   const auto any = [&](auto what) {
     return std::any_of(data.records().begin(), data.records().end(),
                        [&](const regression::RowRange& range) { return what(p.records[range.record]); });
@@ -128,7 +153,7 @@ std::vector<double> likely_orders(const BalanceData& data, const catalogue::Entr
           left.root_weights.cwiseProduct(Eigen::Map<const Eigen::VectorXd>(wave.data(), left.residual.size()));
     }
     if (left.own.cols() > 0) waves -= left.own * (left.own.transpose() * waves);
-    const Eigen::VectorXd explained = waves * Eigen::ColPivHouseholderQR<Eigen::MatrixXd>(waves).solve(left.residual);
+    const Eigen::VectorXd explained = waves * regression::PivotedQr(waves).solve(left.residual);
     found.emplace_back(-explained.squaredNorm(), order);
   }
   std::sort(found.begin(), found.end());
@@ -150,6 +175,13 @@ std::size_t free_count(const Terms& terms) {
 }
 
 }  // namespace
+
+bool may_be_seen(const BalanceData& data, const Terms& terms, const catalogue::Entry& entry) {
+  if (!visible(data, terms, entry) || covered(terms, entry)) return false;
+  if (!entry.info->replaces.empty() && !replaced_in(terms, entry)) return false;
+  if (!entry.info->modulates.empty() && !stands_in(terms, entry.info->modulates)) return false;
+  return entry.count(Kind::given) > 0 || !has(terms, entry.name());
+}
 
 bool states_a_torque(const Terms& terms) {
   for (const Term& t : terms)

@@ -30,6 +30,9 @@ struct Unexplained {
 std::vector<Proposal> proposals(const regression::BalanceData& data, const regression::Terms& terms,
                                 const Unexplained& left);
 
+// Whether these signals can show an effect that this model may be given.
+bool may_be_seen(const regression::BalanceData& data, const regression::Terms& terms, const catalogue::Entry& entry);
+
 // Whether the model states a linear parameter: a torque that the data need not tell.
 bool states_a_torque(const regression::Terms& terms);
 

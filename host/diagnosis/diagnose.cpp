@@ -9,7 +9,9 @@
 #include "host/diagnosis/diagnosis.hpp"
 #include "host/diagnosis/disturbances.hpp"
 #include "host/diagnosis/doubts.hpp"
+#include "host/diagnosis/examined.hpp"
 #include "host/diagnosis/other_balances.hpp"
+#include "host/diagnosis/resampling.hpp"
 #include "host/diagnosis/rivals.hpp"
 #include "host/diagnosis/trials.hpp"
 #include "host/regression/in_parallel.hpp"
@@ -29,15 +31,6 @@ constexpr double kCertain = 5.0;
 constexpr double kRecovered = 80.0;
 // What is left after that is shown even where no single variable explains much of it.
 constexpr double kLeastShare = 1.0;
-
-// A balance and all that was found on it.
-struct Examined {
-  Search search;
-  std::vector<Trial> trials;  // best first
-  comparison::NoiseFloor floor;
-
-  bool names_one() const { return !trials.empty() && passes(trials.front()); }
-};
 
 Candidate report(const Trial& trial, const Search& search, data::Axis axis) {
   Candidate c;
@@ -292,9 +285,22 @@ Diagnosis diagnose(const data::Dataset& dataset, const model::Model& model, cons
     if (e.role == data::Role::fit) experiments.push_back(&e);
 
   std::vector<Examined> all = examine(*base, experiments, options, result);
-  Examined& chosen = most_telling(all);
+  const bool moves = std::any_of(base->prepared.records.begin(), base->prepared.records.end(),
+                                 [](const regression::Record& r) { return !r.at_rest; });
+  const auto motor = std::find_if(
+      all.begin(), all.end(), [](const Examined& e) { return e.search.data->balance() == regression::Balance::motor; });
+  if (moves && motor != all.end()) {
+    if (options.progress) options.progress("choosing effects on halves of the data");
+    std::vector<const data::Experiment*> with_held_out;
+    for (const data::Experiment& e : dataset.experiments)
+      if (e.role == data::Role::fit || e.role == data::Role::holdout) with_held_out.push_back(&e);
+    result.resampling = resample(with_held_out, base->model.drive, base->terms);
+    result.resampling->decides = &most_telling(all) == &*motor && resampling_decides(*result.resampling, *motor);
+  }
+  const bool by_resampling = result.resampling && result.resampling->decides;
+  Examined& chosen = by_resampling ? *motor : most_telling(all);
   std::string alias;
-  if (chosen.names_one()) {
+  if (chosen.names_one() && !by_resampling) {
     if (options.progress) options.progress("checking what else could explain it");
     alias = settle(chosen);
   }
@@ -306,19 +312,22 @@ Diagnosis diagnose(const data::Dataset& dataset, const model::Model& model, cons
   result.noise_floor = chosen.floor.rmse;
   result.noise_floor_from = chosen.floor.from;
   // Where nothing is missing, friction that differs between runs is no structure to look for.
+  const bool names_one = chosen.names_one() && !by_resampling;
   result.localised =
-      shares(*chosen.search.data, judged, chosen.names_one() ? judged.residual_alike() : judged.residual);
+      shares(*chosen.search.data, judged, names_one || by_resampling ? judged.residual_alike() : judged.residual);
   list_candidates(all, model.drive.axis, result);
-  if (chosen.names_one()) {
-    name_effects(chosen, alias, result);
-    explain_named(chosen.search, chosen.trials, model.drive.axis, result);
-  }
+  if (by_resampling) name_stable(chosen, result);
+  if (names_one) name_effects(chosen, alias, result);
+  if (!result.named.empty()) explain_named(chosen.search, chosen.trials, model.drive.axis, result);
   judge_rest(chosen, result);
-  if (options.progress) options.progress("looking for what no effect explains");
-  tell_unknown(chosen.search, chosen.names_one() ? &chosen.trials.front() : nullptr, result);
-  const bool moves = std::any_of(base->prepared.records.begin(), base->prepared.records.end(),
-                                 [](const regression::Record& r) { return !r.at_rest; });
-  if (!moves) result.verdict = Verdict::insufficient_excitation;
+  if (!by_resampling || result.named.empty()) {
+    if (options.progress) options.progress("looking for what no effect explains");
+    tell_unknown(chosen.search, names_one ? &chosen.trials.front() : nullptr, result);
+  }
+  if (result.resampling && result.resampling->too_little)
+    result.warnings.push_back(
+        "these data have too few rows to choose effects on halves of them; record longer, with several strokes");
+  if (!moves || (result.resampling && result.resampling->too_little)) result.verdict = Verdict::insufficient_excitation;
   return result;
 }
 

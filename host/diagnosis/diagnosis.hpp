@@ -82,6 +82,38 @@ struct Disturbance {
   std::string unit;
 };
 
+// What resampling says: how often a term is chosen on halves of the data, over bandwidths and with and without
+// reversals.
+struct Resampling {
+  struct Found {
+    std::vector<Named> group;    // more than one: these data cannot distinguish them; empty: in no catalogue
+    std::string name;            // of what is in no catalogue
+    double frequency = 0.0;      // of the subsamples
+    double share_percent = 0.0;  // of the squared error above the noise, median of the subsamples
+    double share_low_percent = 0.0, share_high_percent = 0.0;  // of 95 % of the subsamples
+    // Error on the experiments that are held out, with it over without it; nothing where none are.
+    std::optional<double> held_out_ratio;
+    bool refused_by_holdout = false;  // in the catalogue, but the held-out error rises with it
+  };
+  // How often a term was chosen, or was nearly as good as what was; zero for one that never was.
+  struct Support {
+    std::string effect;
+    std::optional<double> order;
+    double frequency = 0.0;
+  };
+  double subsamples = 0.0;
+  bool too_little = false;  // there are not enough rows for halves
+  double abstained = 0.0;   // saw nothing above the noise
+  double whiteness = 0.0;   // of what the best terms leave, reversals masked: 1 for noise, 0 for structure
+  double lowest_hz = 0.0, highest_hz = 0.0;
+  std::vector<Found> found;      // largest share first
+  std::vector<Support> support;  // of all terms that could be chosen
+  // The group that a name was found in.
+  std::vector<Named> found_group(const Named& name) const;
+  bool decides =
+      false;  // the model's error is no noise even with the likeliest effect, so that likelihood alone does not count
+};
+
 enum class Verdict {
   missing_effect,
   confusable_effects,
@@ -111,6 +143,8 @@ struct Diagnosis {
   std::optional<double> recovered_percent;
   std::vector<Disturbance> disturbances;
   std::vector<std::string> warnings;
+  std::optional<Resampling> resampling;     // of the motor's balance
+  bool partial = false;                     // more is missing than what is named
   std::optional<UnknownStructure> unknown;  // where the verdict is unknown_structure and a curve shows what it is
   std::optional<double> delay_s;            // of the effort against the motion, beyond the alignment, where significant
 };

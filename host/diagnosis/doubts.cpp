@@ -11,6 +11,7 @@
 #include "host/diagnosis/imitation.hpp"
 #include "host/diagnosis/other_balances.hpp"
 #include "host/regression/both_balances.hpp"
+#include "host/regression/pivoted_qr.hpp"
 
 namespace flexspline::diagnosis {
 namespace {
@@ -97,9 +98,7 @@ double explained(const std::vector<Witness>& witnesses, const Terms& terms, doub
   }
   // Parameters differ in size by their units.
   for (auto column : own.colwise()) column /= std::max(column.norm(), 1e-300);
-  Eigen::ColPivHouseholderQR<Eigen::MatrixXd> qr(own);
-  qr.setThreshold(1e-7);
-  const Eigen::VectorXd left = residual - own * qr.solve(residual);
+  const Eigen::VectorXd left = residual - own * regression::PivotedQr(own, 1e-7).solve(residual);
   return residual.squaredNorm() - left.squaredNorm();
 }
 

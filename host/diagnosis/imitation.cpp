@@ -4,6 +4,7 @@
 #include <algorithm>
 
 #include "host/regression/balance_fit.hpp"
+#include "host/regression/pivoted_qr.hpp"
 #include "host/regression/shapes.hpp"
 
 namespace flexspline::diagnosis {
@@ -37,9 +38,7 @@ Imitation::Imitation(const Eigen::MatrixXd& columns, const Eigen::VectorXd& root
     : root_weights_(root_weights) {
   Eigen::MatrixXd scaled = root_weights.asDiagonal() * columns;
   for (auto column : scaled.colwise()) column /= std::max(column.norm(), 1e-300);
-  Eigen::ColPivHouseholderQR<Eigen::MatrixXd> qr(scaled);
-  qr.setThreshold(1e-7);
-  span_ = qr.householderQ() * Eigen::MatrixXd::Identity(scaled.rows(), qr.rank());
+  span_ = regression::PivotedQr(scaled, 1e-7).span();
 }
 
 Eigen::MatrixXd Imitation::own_part(const Eigen::MatrixXd& torques) const {

@@ -9,6 +9,7 @@
 #include "host/diagnosis/triangles.hpp"
 #include "host/regression/balance_fit.hpp"
 #include "host/regression/least_squares.hpp"
+#include "host/regression/pivoted_qr.hpp"
 #include "host/regression/shapes.hpp"
 
 namespace flexspline::diagnosis {
@@ -125,8 +126,7 @@ std::vector<LeftOut> predict_left_out(const Triangles& triangles, const MixedFit
     for (const Eigen::MatrixXd& r : reduced) blocks.push_back(&r);
     const Eigen::MatrixXd all = stacked(blocks);
     Eigen::VectorXd theta = Eigen::VectorXd::Zero(columns);
-    theta(used) =
-        Eigen::ColPivHouseholderQR<Eigen::MatrixXd>(all(Eigen::all, used)).setThreshold(1e-5).solve(all.col(columns));
+    theta(used) = regression::PivotedQr(all(Eigen::all, used), 1e-5).solve(all.col(columns));
     for (std::size_t i = 0; i < records.size(); ++i) {
       RecordSums seen;
       add_sums(others[i], theta, whole.u, triangles.rows_of(i) - triangles.rows[i][out], seen);
@@ -280,9 +280,7 @@ double squares_left(BalanceData& data, const Terms& terms, const Judged& judged)
           without_deviations(triangles.whole[i], u, std, judged.deviations.variance[i] * judged.autocorrelation_time));
     for (const Eigen::MatrixXd& r : reduced) blocks.push_back(&r);
     const Eigen::MatrixXd all = stacked(blocks);
-    if (columns > 0)
-      theta =
-          Eigen::ColPivHouseholderQR<Eigen::MatrixXd>(all.leftCols(columns)).setThreshold(1e-5).solve(all.col(columns));
+    theta = regression::PivotedQr(all.leftCols(columns), 1e-5).solve(all.col(columns));
     left = (all.col(columns) - all.leftCols(columns) * theta).squaredNorm();
     std = spread_for(groups, judged);
     if (groups.empty() || std.maxCoeff() <= 0.0) break;

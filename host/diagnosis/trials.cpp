@@ -9,6 +9,7 @@
 
 #include "host/regression/in_parallel.hpp"
 #include "host/regression/least_squares.hpp"
+#include "host/regression/pivoted_qr.hpp"
 #include "host/regression/shapes.hpp"
 
 namespace flexspline::diagnosis {
@@ -169,8 +170,7 @@ Unexplained left_by(BalanceData& data, const Judged& base) {
   left.residual = base.root_weights.cwiseProduct(base.residual);
   if (base.linear.empty()) return left;
   const Eigen::MatrixXd X = base.root_weights.asDiagonal() * regression::columns_of(data, base.terms, base.linear);
-  const Eigen::ColPivHouseholderQR<Eigen::MatrixXd> qr(X);
-  left.own = qr.householderQ() * Eigen::MatrixXd::Identity(X.rows(), qr.rank());
+  left.own = regression::PivotedQr(X).span();
   return left;
 }
 

@@ -130,9 +130,11 @@ void bootstrap(Identification& identification, int replicates, std::uint64_t see
     BalanceData& data = identification.data[b];
     const auto slots = slots_of(fit);
     if (slots.empty()) continue;
-    // Blocks are long against what neighbours have in common, and there are at least twenty.
+    // Blocks are long against what neighbours have in common, and there are at least twenty where there are so many
+    // rows.
     const auto rows = static_cast<double>(data.rows());
-    const auto length = static_cast<Eigen::Index>(std::clamp(10.0 * fit.autocorrelation_time, 1.0, rows / 20.0));
+    const auto length =
+        static_cast<Eigen::Index>(std::clamp(10.0 * fit.autocorrelation_time, 1.0, std::max(1.0, rows / 20.0)));
     std::vector<RowRange> blocks;
     for (const RowRange& range : data.records())
       for (Eigen::Index first = range.first; first < range.last; first += length)

@@ -7,6 +7,7 @@
 
 #include "host/diagnosis/imitation.hpp"
 #include "host/regression/balance_fit.hpp"
+#include "host/regression/pivoted_qr.hpp"
 
 namespace flexspline::planning {
 namespace {
@@ -132,9 +133,7 @@ double unexplained(const Eigen::MatrixXd& factor, const Hypothesis& truth, const
   }
   const Eigen::VectorXd y =
       factor.col(static_cast<Eigen::Index>(truth.torque)) - factor.col(static_cast<Eigen::Index>(other.known));
-  Eigen::ColPivHouseholderQR<Eigen::MatrixXd> qr(X);
-  qr.setThreshold(1e-7);
-  return (y - X * qr.solve(y)).squaredNorm();
+  return (y - X * regression::PivotedQr(X, 1e-7).solve(y)).squaredNorm();
 }
 
 }  // namespace flexspline::planning

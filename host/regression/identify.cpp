@@ -199,6 +199,17 @@ std::unique_ptr<Identification> form(const data::Dataset& dataset, const model::
   std::erase_if(too_short, [&](const auto& record) { return used[record.first] != 0; });
   std::string list;
   for (const auto& [record, what] : too_short) list += (list.empty() ? "" : ", ") + what;
+  if (result->data.empty() && !too_short.empty() && options.mask && !options.cutoff_hz) {
+    PipelineOptions unmasked = options;
+    unmasked.mask = false;
+    unmasked.ready = nullptr;
+    auto kept = form(dataset, model, unmasked);
+    kept->warnings.push_back(
+        fmt::format("reversals are not left out, as too few rows would remain in {}: static friction laws do not hold "
+                    "there; record longer strokes",
+                    list));
+    return kept;
+  }
   if (result->data.empty() && !too_short.empty())
     throw data::DataError({{data::Severity::error, "too_few_samples", "", 0, "",
                             fmt::format("too few rows are left to fit on in {}", list),

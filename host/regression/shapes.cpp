@@ -6,6 +6,7 @@
 
 #include "host/regression/least_squares.hpp"
 #include "host/regression/minimise.hpp"
+#include "host/regression/pivoted_qr.hpp"
 
 namespace flexspline::regression {
 namespace {
@@ -94,8 +95,7 @@ ScaledColumns scaled_columns(const Eigen::MatrixXd& X, const Whitening& whitenin
 double projected_cost(const Eigen::MatrixXd& X, const Eigen::VectorXd& y, const Whitening& whitening) {
   const Eigen::MatrixXd A = scaled_columns(X, whitening).A;
   const Eigen::VectorXd b = whitening * y;
-  const Eigen::ColPivHouseholderQR<Eigen::MatrixXd> qr(A);
-  return (b - A * qr.solve(b)).squaredNorm();
+  return (b - A * PivotedQr(A).solve(b)).squaredNorm();
 }
 
 }  // namespace
@@ -153,8 +153,10 @@ ShapeRange shape_range(const BalanceData& data, const Term& term, std::size_t pa
     }
     case Limit::current: {
       const std::vector<double> all = magnitudes(data, [](const auto& in) { return in.current; });
-      const double largest = *std::max_element(all.begin(), all.end());
-      range = {std::max(0.1 * largest, info.low), largest, false};
+      const double largest = quantile(all, 1.0);
+      // A limit shows as a plateau at the peaks. One below half of the log would make of the model whatever was
+      // measured.
+      range = {std::max({0.25 * largest, quantile(all, 0.5), info.low}), largest, false};
       break;
     }
     case Limit::inverse_velocity: {
@@ -264,7 +266,7 @@ double refine_shapes(BalanceData& data, Terms& terms, const std::vector<std::siz
   std::vector<double> factored_at;
   Eigen::MatrixXd A;
   Eigen::VectorXd size, theta, left;
-  Eigen::ColPivHouseholderQR<Eigen::MatrixXd> qr;
+  PivotedQr qr;
   BalanceData* on = nullptr;
   const auto projected = [&](const std::vector<double>& x, Eigen::VectorXd& residual, Eigen::MatrixXd* slopes) {
     for (std::size_t j = 0; j < shapes.size(); ++j)
@@ -274,7 +276,7 @@ double refine_shapes(BalanceData& data, Terms& terms, const std::vector<std::siz
       A = std::move(columns.A);
       size = std::move(columns.size);
       const Eigen::VectorXd b = whitening * (on->target() - on->known_torque(terms, on_balance));
-      qr.compute(A);
+      qr = PivotedQr(A);
       theta = qr.solve(b);
       left = b - A * theta;
       factored_at = x;

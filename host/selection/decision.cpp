@@ -1,0 +1,76 @@
+#include "host/selection/decision.hpp"
+
+#include <algorithm>
+#include <set>
+
+namespace flexspline::selection {
+
+namespace {
+
+// A wave of an order that no drive has.
+bool is_placebo(const Frequency& f) {
+  return !f.entry && f.order;
+}
+
+}  // namespace
+
+std::vector<Found> decide(const Stability& stability, const SelectionPolicy& policy) {
+  std::vector<Found> all;
+  std::set<std::string> taken;
+  // Mostly abstaining: nothing stands above the noise.
+  if (stability.abstained > policy.most_abstaining * stability.subsamples) return all;
+  const auto find = [&](const std::string& name) {
+    return std::find_if(stability.frequencies.begin(), stability.frequencies.end(),
+                        [&](const Frequency& f) { return f.name == name; });
+  };
+  for (const Frequency& lead : stability.frequencies) {
+    if (taken.count(lead.name) != 0 || lead.near < policy.named_frequency ||
+        lead.frequency < policy.least_own_frequency)
+      continue;
+    Found found;
+    found.group.push_back(lead);
+    found.frequency = lead.frequency;
+    found.share = lead.share;
+    for (const auto& [name, often] : lead.alternatives) {
+      if (often < policy.group_frequency || taken.count(name) != 0) continue;
+      const auto other = find(name);
+      if (other == stability.frequencies.end()) continue;
+      found.group.push_back(*other);
+      found.frequency += other->frequency;
+    }
+    // A placebo wave that does as well says that no order can be told here. Where what leads is no wave, that is no
+    // reason against it, only against the waves.
+    if (lead.entry && !lead.order && lead.frequency >= policy.named_frequency &&
+        std::any_of(found.group.begin(), found.group.end(), is_placebo)) {
+      std::erase_if(found.group, [](const Frequency& f) { return f.order.has_value(); });
+      found.frequency = 0.0;
+      for (const Frequency& f : found.group) found.frequency += f.frequency;
+    }
+    found.frequency = std::min(found.frequency, lead.near);
+    if (found.frequency < policy.named_frequency) continue;
+    for (const Frequency& f : found.group) {
+      taken.insert(f.name);
+      if (!f.entry && f.name != kPresliding) found.in_catalogue = false;
+    }
+    all.push_back(std::move(found));
+  }
+  // Beside a structure that is in no catalogue, and for what takes off little, chance has to be ruled out better.
+  const bool unknown = std::any_of(all.begin(), all.end(), [](const Found& f) { return !f.in_catalogue; });
+  std::erase_if(all, [&](const Found& f) {
+    const bool presliding = f.group.front().name == kPresliding;
+    const double least =
+        !presliding && (unknown || f.share < policy.line_share) ? policy.certain_frequency : policy.named_frequency;
+    return f.in_catalogue && f.frequency < least;
+  });
+  // Waves that take off no more than a placebo wave found beside them are as real as that.
+  double placebo_share = 0.0;
+  for (const Found& f : all)
+    if (is_placebo(f.group.front())) placebo_share = std::max(placebo_share, f.share);
+  std::erase_if(all, [&](const Found& f) {
+    return f.in_catalogue && f.group.front().order && f.share < policy.alike_left * placebo_share;
+  });
+  std::stable_sort(all.begin(), all.end(), [](const Found& a, const Found& b) { return a.share > b.share; });
+  return all;
+}
+
+}  // namespace flexspline::selection

@@ -1,0 +1,232 @@
+#include "host/selection/stability_selection.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <map>
+#include <random>
+
+#include "host/regression/in_parallel.hpp"
+#include "host/regression/least_squares.hpp"
+
+namespace flexspline::selection {
+namespace {
+
+constexpr std::uint64_t kSeed = 1234;
+constexpr double kFewestRowsPerColumn = 10.0;
+
+double median(std::vector<double> x) {
+  if (x.empty()) return 0.0;
+  const auto middle = x.begin() + static_cast<std::ptrdiff_t>(x.size() / 2);
+  std::nth_element(x.begin(), middle, x.end());
+  return *middle;
+}
+
+double median_of_positive(std::vector<double> x) {
+  std::erase_if(x, [](double v) { return !(v > 0.0); });
+  return x.empty() ? 1.0 : median(std::move(x));
+}
+
+}  // namespace
+
+StabilitySelection::StabilitySelection(const std::vector<const data::Experiment*>& experiments,
+                                       const model::Drive& drive, const regression::Terms& terms, Balance balance,
+                                       const SelectionPolicy& policy)
+    : policy_(policy), tables_(make_tables(experiments, drive, terms, balance, policy)) {
+  if (tables_.sign.model_columns == 0) return;
+  looks_.resize(tables_.settings.size());
+  regression::in_parallel(looks_.size(), [&](std::size_t i) {
+    looks_[i] = look(tables_.settings[i].first, tables_.settings[i].second, kSeed + i);
+  });
+  count();
+}
+
+StabilitySelection::Look StabilitySelection::look(double cutoff_hz, bool mask, std::uint64_t seed) const {
+  Look result;
+  const RegressorTable& sign = tables_.sign;
+  const Setting one = make_setting(sign, cutoff_hz, mask, false, policy_);
+  std::optional<Setting> two;
+  if (tables_.presliding && !mask) two = make_setting(*tables_.presliding, cutoff_hz, mask, false, policy_);
+  if (one.blocks.size() < 4 ||
+      static_cast<double>(one.rows.rows()) < kFewestRowsPerColumn * static_cast<double>(sign.model_columns))
+    return result;
+  const bool has_second = two && two->blocks.size() == one.blocks.size();
+  const Setting* const second = has_second ? &*two : nullptr;
+  std::vector<double> weights = record_weights(sign, one);
+  for (const Term& term : sign.terms) result.may_enter.push_back(tables_.may_enter(term, cutoff_hz) ? 1 : 0);
+
+  // Noise as the best model of all data leaves it: first with one friction for all records, then with each record's
+  // own, which otherwise passes for slow noise.
+  Differences differences{sign.differences, {}, 0.0};
+  Noise noise;
+  for (int round = 0; round < 2; ++round) {
+    result.all = sum_of(one, second, weights, {}, 0, differences);
+    const Selected rough = select_forward(sign, result.all, result.all, noise, result.may_enter, policy_);
+    std::vector<int> chosen;
+    for (const Step& s : rough.steps) chosen.push_back(s.term);
+    const Fitted fitted = fit_terms(sign, chosen, result.all, result.all);
+    const bool z = std::find(chosen.begin(), chosen.end(), kPreslidingTerm) != chosen.end();
+    const Setting& seen = z ? *second : one;
+    const Eigen::VectorXd residual = weighted_residual(seen, fitted, weights, differences);
+    noise.variance = semivariance(one, residual);
+    std::vector<regression::RowRange> ranges;
+    for (const Run& run : one.runs) ranges.push_back({run.record, run.first, run.last});
+    noise.tau = std::max(2.0, regression::autocorrelation_time(ranges, residual));
+    const double left = residual.squaredNorm() / static_cast<double>(std::max<Eigen::Index>(1, residual.size()));
+    result.whiteness = residual.size() > 0 ? noise.variance / std::max(left, 1e-300) : -1.0;
+    if (sign.differences.empty() || round == 1) break;
+    differences.noise = noise.tau * std::max(left, 1e-12);
+    differences.variance = differences_of(z ? *tables_.presliding : sign, seen, weights, differences.noise, policy_);
+  }
+
+  std::mt19937_64 chance(seed);
+  std::size_t records = 0;
+  for (const double w : weights) records += w > 0.0 ? 1 : 0;
+  for (std::size_t pair = 0; pair < policy_.pairs; ++pair) {
+    const bool by_record = records >= policy_.fewest_records_to_split && pair % 2 == 1;
+    const std::vector<std::uint8_t> in = by_record ? half_of_records(one, chance) : half_of_blocks(one, chance);
+    const Half a = sum_of(one, second, weights, in, 0, differences),
+               b = sum_of(one, second, weights, in, 1, differences);
+    result.votes.push_back(select_forward(sign, a, b, noise, result.may_enter, policy_));
+    result.votes.push_back(select_forward(sign, b, a, noise, result.may_enter, policy_));
+  }
+
+  const Setting held = make_setting(sign, cutoff_hz, mask, true, policy_);
+  if (held.blocks.empty()) return result;
+  std::optional<Setting> held_second;
+  if (second) held_second = make_setting(*tables_.presliding, cutoff_hz, mask, true, policy_);
+  // A record that was not fitted on has no variance of its own: it counts as the median of the others.
+  const double usual = median_of_positive(weights);
+  for (double& w : weights) w = w > 0.0 ? w : usual;
+  result.held_out = sum_of(held, held_second ? &*held_second : nullptr, weights, {}, 0, differences);
+  return result;
+}
+
+void StabilitySelection::count() {
+  const RegressorTable& sign = tables_.sign;
+  struct Count {
+    Frequency f;
+    double could = 0.0, was = 0.0, first = 0.0, near = 0.0;
+    std::map<std::string, double> alternatives, members;
+    std::vector<double> shares;
+  };
+  std::map<std::string, Count> counts;
+  std::vector<double> explained;
+  for (std::size_t i = 0; i < looks_.size(); ++i) {
+    if (looks_[i].votes.empty()) continue;
+    std::map<std::string, const Term*> open;
+    for (std::size_t t = 0; t < sign.terms.size(); ++t)
+      if (looks_[i].may_enter[t]) open[sign.terms[t].name] = &sign.terms[t];
+    if (tables_.presliding && !tables_.settings[i].second) open["presliding"] = nullptr;
+    for (const Selected& vote : looks_[i].votes) {
+      result_.subsamples += 1.0;
+      if (vote.extrapolates) result_.extrapolated += 1.0;
+      if (vote.abstains) {
+        result_.abstained += 1.0;
+        continue;
+      }
+      for (const auto& [name, term] : open) {
+        Count& c = counts[name];
+        c.f.name = name;
+        if (term) {
+          c.f.entry = term->entry;
+          c.f.order = term->order;
+        }
+        c.could += 1.0;
+      }
+      double sum = 0.0;
+      for (std::size_t k = 0; k < vote.steps.size(); ++k) {
+        const Step& s = vote.steps[k];
+        Count& c = counts[s.term == kPreslidingTerm ? "presliding" : sign.terms[static_cast<std::size_t>(s.term)].name];
+        c.was += 1.0;
+        for (const std::string& other : s.alternatives) {
+          c.alternatives[other] += 1.0;
+          counts[other].near += 1.0;
+        }
+        if (k == 0) c.first += 1.0;
+        c.shares.push_back(s.of_all);
+        sum += s.of_all;
+      }
+      explained.push_back(sum);
+    }
+  }
+  const auto median = [](std::vector<double> x) {
+    if (x.empty()) return 0.0;
+    std::nth_element(x.begin(), x.begin() + static_cast<std::ptrdiff_t>(x.size() / 2), x.end());
+    return x[x.size() / 2];
+  };
+  result_.explained = median(explained);
+  std::vector<double> white;
+  for (std::size_t i = 0; i < looks_.size(); ++i)
+    if (tables_.settings[i].second && looks_[i].whiteness >= 0.0 &&
+        tables_.settings[i].first <= 1.01 * tables_.bandwidth.highest_hz)
+      white.push_back(std::min(1.0, looks_[i].whiteness));
+  result_.whiteness = median(white);
+  for (auto& named_count : counts) {
+    Count& c = named_count.second;
+    if (c.was == 0.0 || c.could == 0.0) continue;
+    c.f.frequency = c.was / c.could;
+    c.f.first = c.first / c.could;
+    c.f.near = std::min(1.0, (c.was + c.near) / c.could);
+    for (const auto& [other, times] : c.alternatives)
+      if (times >= 0.3 * c.was) c.f.alternatives.emplace_back(other, times / c.was);
+    std::sort(c.shares.begin(), c.shares.end());
+    const auto quantile = [&](double q) {
+      return c.shares[static_cast<std::size_t>(std::lround(q * static_cast<double>(c.shares.size() - 1)))];
+    };
+    c.f.share = quantile(0.5);
+    c.f.share_low = quantile(0.025);
+    c.f.share_high = quantile(0.975);
+    result_.frequencies.push_back(c.f);
+  }
+  std::sort(result_.frequencies.begin(), result_.frequencies.end(),
+            [](const Frequency& a, const Frequency& b) { return a.frequency > b.frequency; });
+}
+
+std::vector<int> StabilitySelection::terms_of(const Look& look, const std::vector<std::string>& names) const {
+  std::vector<int> chosen;
+  for (const std::string& name : names) {
+    if (name == kPresliding) {
+      if (look.all.presliding.size() == 0) return {};
+      chosen.push_back(kPreslidingTerm);
+      continue;
+    }
+    int best = -1;
+    double least = 0.0;
+    for (std::size_t t = 0; t < tables_.sign.terms.size(); ++t) {
+      if (tables_.sign.terms[t].name != name || !look.may_enter[t]) continue;
+      chosen.push_back(static_cast<int>(t));
+      const double squares = fit_terms(tables_.sign, chosen, look.all, look.all).on_fit;
+      chosen.pop_back();
+      if (best >= 0 && squares >= least) continue;
+      best = static_cast<int>(t);
+      least = squares;
+    }
+    if (best < 0) return {};
+    chosen.push_back(best);
+  }
+  return chosen;
+}
+
+std::vector<double> StabilitySelection::held_out_ratios(const std::vector<std::string>& names) const {
+  std::vector<std::vector<double>> ratios(names.size());
+  for (const Look& look : looks_) {
+    if (look.held_out.rows == 0.0) continue;
+    // What cannot be seen at this bandwidth, or with reversals left out, is left out of all fits.
+    std::vector<std::string> seen;
+    for (const std::string& name : names)
+      if (!terms_of(look, {name}).empty()) seen.push_back(name);
+    const double with_all = fit_terms(tables_.sign, terms_of(look, seen), look.all, look.held_out).on_judge;
+    for (std::size_t i = 0; i < names.size(); ++i) {
+      std::vector<std::string> others = seen;
+      if (std::erase(others, names[i]) == 0) continue;
+      const double without = fit_terms(tables_.sign, terms_of(look, others), look.all, look.held_out).on_judge;
+      if (without > 0.0) ratios[i].push_back(std::sqrt(with_all / without));
+    }
+  }
+  std::vector<double> medians;
+  for (const std::vector<double>& r : ratios)
+    if (!r.empty()) medians.push_back(median(r));
+  return medians.size() == names.size() ? medians : std::vector<double>{};
+}
+
+}  // namespace flexspline::selection

@@ -1,0 +1,65 @@
+// Stability selection over bandwidths, masks and halves of the data.
+#pragma once
+
+#include <string>
+#include <vector>
+
+#include "host/selection/candidate_tables.hpp"
+#include "host/selection/halves.hpp"
+
+namespace flexspline::selection {
+
+struct Frequency {
+  std::string name;
+  const catalogue::Entry* entry = nullptr;
+  std::optional<double> order;
+  double frequency = 0.0;                                    // of the subsamples that do not abstain
+  double share = 0.0;                                        // of the excess squares, median where it was selected
+  double share_low = 0.0, share_high = 0.0;                  // of 95 % of these subsamples
+  double first = 0.0;                                        // of the subsamples in which it came first
+  double near = 0.0;                                         // chosen, or nearly as good as what was
+  std::vector<std::pair<std::string, double>> alternatives;  // how often, of the times that it was chosen
+};
+
+struct Stability {
+  std::vector<Frequency> frequencies;  // largest first
+  double subsamples = 0.0, abstained = 0.0;
+  double extrapolated = 0.0;  // of the subsamples: the model alone does not carry over
+  double whiteness = 0.0;     // of what is left, reversals masked: semivariance over variance, median
+  double explained = 0.0;     // share of the excess that all steps take off, median
+};
+
+class StabilitySelection {
+ public:
+  // Experiments of role fit are chosen with; those of role holdout are kept for held_out_ratios().
+  StabilitySelection(const std::vector<const data::Experiment*>& experiments, const model::Drive& drive,
+                     const regression::Terms& terms, Balance balance, const SelectionPolicy& policy);
+
+  const CandidateTables& tables() const { return tables_; }
+  const Stability& result() const { return result_; }
+
+  // Of each of `names` (of frequencies): held-out error of the model with all of them over that with all others, the
+  // median of all settings; fitted on what is not held out. Empty where nothing is held out.
+  std::vector<double> held_out_ratios(const std::vector<std::string>& names) const;
+
+ private:
+  // One bandwidth, with or without reversals.
+  struct Look {
+    std::vector<Selected> votes;
+    std::vector<std::uint8_t> may_enter;  // by term
+    double whiteness = -1.0;
+    Half all, held_out;
+  };
+
+  Look look(double cutoff_hz, bool mask, std::uint64_t seed) const;
+  void count();
+  // The terms of these names that fit best together; none where one cannot be seen there.
+  std::vector<int> terms_of(const Look& look, const std::vector<std::string>& names) const;
+
+  SelectionPolicy policy_;
+  CandidateTables tables_;
+  std::vector<Look> looks_;  // one each setting
+  Stability result_;
+};
+
+}  // namespace flexspline::selection

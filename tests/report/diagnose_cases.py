@@ -1,0 +1,63 @@
+#!/usr/bin/env python3
+"""What `flexspline diagnose` names on the report's own tables: diagnose_cases.py TOOL CASES [--variants] [CASE...]
+
+CASES is the folder that flexspline_report_cases wrote. Each table as a whole and each row alone; a name is true where the effect is in
+the simulated drive and not in the base model, and for table 7 as a whole where it is sublinear friction, which its rows hold only
+together. Prints a table; exit code 1 where a name is false."""
+import re
+import sys
+import time
+from pathlib import Path
+
+sys.dont_write_bytecode = True  # leaves nothing in the sources
+sys.path.insert(0, str(Path(__file__).resolve().parents[1] / "support"))
+import diagnose_runs
+
+EXPECTED = {"table-7": ["power_law_friction"]}
+
+
+def effects_not_in_base(case):
+    drive = set(re.findall(r"^(\w+)\.\w+ = ", (case / "truth.toml").read_text(), re.M))
+    return drive - set(re.findall(r'^type = "(\w+)"', (case / "base-model.toml").read_text(), re.M))
+
+
+def main():
+    arguments = [a for a in sys.argv[1:] if a != "--variants"]
+    if len(arguments) < 2:
+        sys.exit(__doc__)
+    tool, root, wanted = arguments[0], Path(arguments[1]), arguments[2:]
+    cases = sorted(root.glob("table-?")) + sorted(root.glob("table-?-rows/*"))
+    false_answers = answers = met = 0
+    print("| case | verdict | named | result | s |\n| --- | --- | --- | --- | ---: |")
+    for case in cases:
+        name = str(case.relative_to(root))
+        if wanted and name not in wanted and name.split("/")[0] not in wanted:
+            continue
+        model, data = case / "base-model.toml", case / "dataset.toml"
+        expected = EXPECTED.get(name, [])
+        true = effects_not_in_base(case) | set(expected)
+        runs = [("", ())]
+        for label, more in runs:
+            started = time.monotonic()
+            answer = diagnose_runs.diagnose(tool, model, data, more=more)
+            seconds = time.monotonic() - started
+            if isinstance(answer, str):
+                print(f"| {name} {label} | refused | | {answer.splitlines()[-1]} | {seconds:.1f} |", flush=True)
+                continue
+            if "--variants" in sys.argv and not label:
+                runs += diagnose_runs.variants(tool, model, data, answer).items()
+            names = [effect for effect, _ in diagnose_runs.named(answer)]
+            false = [n for n in names if n not in true]
+            if answer["verdict"] == "confusable_effects" and len(false) < len(names):
+                false = []
+            answers += 1
+            false_answers += bool(false)
+            met += not label and bool(expected) and any(n in expected for n in names)
+            result = "FALSE" if false else "missed" if expected and not any(n in expected for n in names) else "right"
+            print(f"| {name} {label} | {answer['verdict']} | {', '.join(names) or '-'} | {result} | {seconds:.1f} |", flush=True)
+    print(f"\n{false_answers} of {answers} answers with a false name; {met} of {len(EXPECTED)} that should be named are.")
+    return 1 if false_answers else 0
+
+
+if __name__ == "__main__":
+    sys.exit(main())
