@@ -12,14 +12,17 @@
 #include <string_view>
 #include <vector>
 
+#include "host/cli/arguments.hpp"
 #include "host/cli/commands.hpp"
 #include "host/cli/drive_options.hpp"
 #include "host/cli/export_options.hpp"
 #include "host/cli/firmware_options.hpp"
 #include "host/cli/fleet.hpp"
 #include "host/cli/help.hpp"
+#include "host/cli/help_format.hpp"
 #include "host/cli/hil_options.hpp"
 #include "host/cli/manual.hpp"
+#include "host/cli/new_options.hpp"
 #include "host/cli/workbench_options.hpp"
 #include "host/data/findings.hpp"
 #include "host/output/text.hpp"
@@ -29,7 +32,8 @@
 namespace flexspline::cli {
 namespace {
 
-constexpr const char* kDataHelp = "measurements: any number of CSV or MAT files, folders, dataset.tomls";
+constexpr const char* kDataHelp =
+    "measurements: any number of recordings (CSV, MAT, HDF5, NumPy, ROS, MCAP), folders, dataset.tomls";
 
 // A command as it was parsed, ready to run.
 struct Chosen {
@@ -40,8 +44,11 @@ struct Chosen {
 class App {
  public:
   App() {
-    app_.description(
-        "Flexspline finds out which physical effects a drive with strain-wave gear has, and which its model lacks.");
+    app_.name("flexspline");
+    app_.description(output::wrapped(
+        "Flexspline finds out which physical effects a drive with strain-wave gear has, and which its model lacks.",
+        0));
+    app_.formatter(std::make_shared<HelpFormat>());
     app_.require_subcommand(1);
     app_.set_version_flag("--version", text::tool_name(), "which build this is");
     add_demo();
@@ -65,29 +72,42 @@ class App {
     add_manual();
     take_fleet(command<FleetOptions>("fleet"));
     add_workbench();
-    app_.footer(
+    app_.footer(output::wrapped(
         "flexspline COMMAND --help explains each with an example. Exit codes: 0 done, 1 a limit that was "
-        "given is not met,\n2 unusable input or arguments.");
+        "given is not met, 2 unusable input or arguments.",
+        0));
   }
 
   int run(int argc, char** argv) {
-    const std::string command = argc > 1 ? argv[1] : "";
+    const int code = parse_and_run(argc, argv);
+    const std::string reason = output::unwritten();
+    if (reason.empty() || code == kUnusable) return code;
+    fmt::print(stderr,
+               "flexspline: the answer could not be written to standard output: {}; make room, or send it elsewhere\n",
+               reason);
+    return code == kDone ? kUnusable : code;
+  }
+
+ private:
+  int parse_and_run(int argc, char** argv) {
+    std::vector<std::string> arguments = arguments_from(argc, argv);
+    const std::string command = arguments.empty() ? "" : arguments[0];
     if (const std::string problem = wrong_command(command); !problem.empty()) {
       fmt::print(stderr, "flexspline: {}\n", problem);
       return kUnusable;
     }
     try {
-      app_.parse(argc, argv);
+      app_.parse(std::vector<std::string>(arguments.rbegin(), arguments.rend()));  // which takes the last one first
     } catch (const CLI::ParseError& error) {
       if (error.get_exit_code() == 0) return app_.exit(error);
-      fmt::print(stderr, "flexspline {}: {}; flexspline {} --help shows what it takes\n", command, error.what(),
-                 command);
+      const std::string misspelt = misspelt_option(arguments, options_of(command));
+      fmt::print(stderr, "flexspline {}: {}; flexspline {} --help shows what it takes\n", command,
+                 misspelt.empty() ? error.what() : misspelt.c_str(), command);
       return kUnusable;
     }
     return run_chosen(command);
   }
 
- private:
   std::string wrong_command(const std::string& command) const {
     if (command.empty()) return "no command was given; flexspline --help lists them";
     if (command.starts_with("-")) return {};
@@ -100,6 +120,14 @@ class App {
     return fmt::format(
         "there is no command \"{}\"; {}", command,
         near.empty() ? std::string("flexspline --help lists them") : fmt::format("did you mean {}?", near));
+  }
+
+  std::vector<std::string> options_of(const std::string& command) const {
+    std::vector<std::string> names;
+    for (const CLI::App* sub : app_.get_subcommands([&](const CLI::App* one) { return one->get_name() == command; }))
+      for (const CLI::Option* option : sub->get_options())
+        for (const std::string& name : option->get_lnames()) names.push_back("--" + name);
+    return names;
   }
 
   int run_chosen(const std::string& command) {
@@ -176,23 +204,7 @@ class App {
   void add_new() {
     const auto [sub, options] = command<NewOptions>("new");
     sub->add_option("--from", options->data.data, kDataHelp)->required()->type_name("DATA");
-    sub->add_option("--out", options->out, "folder for dataset.toml and base-model.toml")->required()->type_name("DIR");
-    sub->add_option("--map", options->map, "a column of ours is theirs, in this unit; may be repeated")
-        ->type_name("OURS=THEIRS[:UNIT]")
-        ->allow_extra_args(false);
-    sub->add_option("--axis", options->axis, "rotary, or linear (m, m/s, N)")
-        ->check(CLI::IsMember({"rotary", "linear"}))
-        ->type_name("");
-    sub->add_option("--gear-ratio", options->gear_ratio, "motor turns per output turn")
-        ->check(CLI::PositiveNumber)
-        ->type_name("N");
-    sub->add_option("--torque-constant", options->torque_constant_nm_a, "motor torque per ampere, N*m/A")
-        ->check(CLI::PositiveNumber)
-        ->type_name("KM");
-    sub->add_option("--encoder-counts", options->encoder_counts, "counts per motor turn (per metre on a linear axis)")
-        ->check(CLI::PositiveNumber)
-        ->type_name("COUNTS");
-    sub->add_flag("--force", options->force, "write over a dataset.toml and base-model.toml that are there");
+    take_new(*sub, *options);
     take_tolerate(sub, options->data);
   }
 

@@ -3,10 +3,10 @@
 #include <fmt/format.h>
 
 #include <algorithm>
-#include <cctype>
 #include <cmath>
-#include <initializer_list>
+#include <map>
 #include <numbers>
+#include <set>
 #include <utility>
 
 namespace flexspline::cli {
@@ -14,115 +14,8 @@ namespace {
 
 using data::Quantity;
 
-// "motorPos_rad/s" to motor, pos, rad, s.
-std::vector<std::string> words_of(std::string_view name) {
-  std::vector<std::string> words(1);
-  bool lower_before = false;
-  for (const char c : name) {
-    const auto u = static_cast<unsigned char>(c);
-    if (std::isalnum(u) == 0) {
-      if (!words.back().empty()) words.emplace_back();
-      lower_before = false;
-      continue;
-    }
-    if (std::isupper(u) != 0 && lower_before && !words.back().empty()) words.emplace_back();
-    lower_before = std::islower(u) != 0;
-    words.back() += static_cast<char>(std::tolower(u));
-  }
-  if (words.back().empty()) words.pop_back();
-  return words;
-}
-
-bool has_any(const std::vector<std::string>& words, std::initializer_list<std::string_view> wanted) {
-  return std::any_of(words.begin(), words.end(), [&](const std::string& word) {
-    return std::find(wanted.begin(), wanted.end(), word) != wanted.end();
-  });
-}
-
-// Units whose usual spelling has capitals, which names of columns seldom keep.
-std::string unit_of_word(const std::string& word) {
-  static constexpr std::pair<std::string_view, std::string_view> kSpellings[] = {
-      {"a", "A"},        {"ma", "mA"},       {"amp", "A"},       {"amps", "A"},      {"n", "N"},
-      {"kn", "kN"},      {"nm", "N*m"},      {"mnm", "mN*m"},    {"ncm", "N*cm"},    {"nmm", "N*mm"},
-      {"knm", "kN*m"},   {"c", "degC"},      {"degc", "degC"},   {"k", "K"},         {"degf", "degF"},
-      {"rads", "rad/s"}, {"radps", "rad/s"}, {"degs", "deg/s"},  {"degps", "deg/s"}, {"mps", "m/s"},
-      {"seconds", "s"},  {"secs", "s"},      {"degrees", "deg"}, {"radians", "rad"}, {"millis", "ms"}};
-  for (const auto& [spelling, unit] : kSpellings)
-    if (spelling == word) return std::string(unit);
-  return data::unit_from_text(word) ? word : std::string();
-}
-
-enum class Kind { none, time, current, torque, position, velocity, temperature };
-
-Kind kind_of_quantity(Quantity quantity) {
-  switch (quantity) {
-    case Quantity::time:
-      return Kind::time;
-    case Quantity::current:
-      return Kind::current;
-    case Quantity::torque:
-    case Quantity::force:
-      return Kind::torque;
-    case Quantity::angle:
-    case Quantity::length:
-    case Quantity::counts:
-      return Kind::position;
-    case Quantity::angular_velocity:
-    case Quantity::velocity:
-    case Quantity::counts_rate:
-      return Kind::velocity;
-    case Quantity::temperature:
-      return Kind::temperature;
-  }
-  return Kind::none;
-}
-
-struct Reading {
-  Kind kind = Kind::none;
-  bool by_unit_only = false;
-  bool set_point = false;
-  bool output = false;
-  bool motor = false;
-  bool external = false;
-  bool sensor = false;
-  std::string unit;
-};
-
-Reading read(const std::string& name) {
-  const std::vector<std::string> words = words_of(name);
-  Reading r;
-  r.unit = unit_in_name(name);
-  const auto unit = data::unit_from_text(r.unit);
-  if (has_any(words, {"error", "err", "index", "voltage", "volt", "volts", "pwm", "status", "flag", "mode", "counter",
-                      "acceleration", "accel", "acc", "qdd", "jerk", "power", "id"}))
-    return r;
-  if (has_any(words, {"time", "t", "timestamp", "zeit"}))
-    r.kind = Kind::time;
-  else if (has_any(words, {"temperature", "temp"}))
-    r.kind = Kind::temperature;
-  else if (has_any(words, {"velocity", "vel", "speed", "omega", "w", "qd", "dq", "qdot", "rpm"}))
-    r.kind = Kind::velocity;
-  else if (has_any(words, {"torque", "force", "tau", "moment", "effort", "trq", "tq"}))
-    r.kind = Kind::torque;
-  else if (has_any(words, {"current", "iq", "i", "cur", "amps", "strom"}))
-    r.kind = Kind::current;
-  else if (has_any(words, {"position", "pos", "angle", "q", "theta", "phi", "enc", "encoder", "x"}))
-    r.kind = Kind::position;
-  else if (unit) {
-    r.kind = kind_of_quantity(unit->quantity);
-    r.by_unit_only = true;
-  }
-  if (unit && kind_of_quantity(unit->quantity) != r.kind) r.unit.clear();
-  r.set_point = has_any(words, {"ref", "reference", "cmd", "command", "commanded", "set", "setpoint", "target",
-                                "desired", "des", "sp", "demand", "soll"});
-  r.output = has_any(words, {"output", "out", "joint", "link", "load", "arm", "flange"});
-  r.motor = has_any(words, {"motor", "mot", "rotor", "wg"});
-  r.external = has_any(words, {"external", "ext", "disturbance"});
-  r.sensor = has_any(words, {"sensor", "transducer", "measured", "gear", "gearbox", "flexspline"});
-  return r;
-}
-
-std::string ours_for(const Reading& r, bool other_effort) {
+std::string ours_for(const ColumnReading& r, bool other_effort) {
+  const bool link = r.side == Side::link;
   switch (r.kind) {
     case Kind::none:
       return {};
@@ -133,26 +26,26 @@ std::string ours_for(const Reading& r, bool other_effort) {
     case Kind::current:
       return r.set_point ? "current_command_a" : "current_a";
     case Kind::position:
-      return r.set_point ? "position_command_rad" : r.output ? "output_position_rad" : "motor_position_rad";
+      return r.set_point ? "position_command_rad" : link ? "output_position_rad" : "motor_position_rad";
     case Kind::velocity:
-      return r.set_point ? "velocity_command_rad_s" : r.output ? "output_velocity_rad_s" : "motor_velocity_rad_s";
+      return r.set_point ? "velocity_command_rad_s" : link ? "output_velocity_rad_s" : "motor_velocity_rad_s";
     case Kind::torque:
       if (r.set_point) return {};
       if (r.external) return "load_torque_nm";
-      if (r.output || r.sensor) return "torque_nm";
-      return r.motor || !other_effort ? "motor_torque_nm" : "torque_nm";
+      if (link || r.sensor) return "torque_nm";
+      return r.side == Side::motor || !other_effort ? "motor_torque_nm" : "torque_nm";
   }
   return {};
 }
 
-std::string reason(const std::string& theirs, const Reading& r) {
+std::string reason(const std::string& theirs, const ColumnReading& r) {
   static constexpr std::string_view kNames[] = {"",           "a time",     "a current",    "a torque or force",
                                                 "a position", "a velocity", "a temperature"};
   const std::string_view kind = kNames[static_cast<std::size_t>(r.kind)];
   std::string text = fmt::format("\"{}\" reads as {}{}{}", theirs, kind, r.set_point ? ", a set point" : "",
-                                 r.output  ? ", of the output"
-                                 : r.motor ? ", of the motor"
-                                           : "");
+                                 r.side == Side::link    ? ", of the output"
+                                 : r.side == Side::motor ? ", of the motor"
+                                                         : "");
   if (r.by_unit_only) text += ", by its unit alone";
   return r.unit.empty() ? text + "; no unit in its name, taken as SI" : text;
 }
@@ -163,25 +56,38 @@ bool is_linear_unit(const std::string& text) {
                   unit->quantity == Quantity::force);
 }
 
+bool is_motion(const ColumnGuess& c) {
+  return c.ours == "motor_position_rad" || c.ours == "motor_velocity_rad_s" || c.ours == "output_position_rad" ||
+         c.ours == "output_velocity_rad_s";
+}
+
 class Guesser {
  public:
-  Guesser(const std::vector<std::string>& names, const std::vector<ColumnGuess>& stated) : names_(names) {
+  Guesser(const std::vector<LoggedColumn>& logged, const std::vector<ColumnGuess>& stated, const GuessOptions& options)
+      : options_(options) {
+    for (const LoggedColumn& column : logged) names_.push_back(column.name);
+    for (const LoggedColumn& column : logged) readings_[column.name] = read_name(column.name, column.unit, names_);
     for (const ColumnGuess& column : stated) result_.columns.push_back(column);
   }
 
-  HeaderGuess guess(std::optional<data::Axis> axis) {
+  HeaderGuess guess() {
     for (const std::string& name : names_)
       if (is_ours(name) && !is_mapped(name)) result_.native.push_back(name);
+    choose_joint();
     bool current = is_mapped("current_a") || is_native("current_a");
-    for (const std::string& name : names_) current = current || (is_free(name) && read(name).kind == Kind::current);
+    for (const std::string& name : names_)
+      current = current || (is_free(name) && readings_[name].kind == Kind::current);
     // Names that say more come first; a unit alone is the weakest sign.
+    std::vector<std::string> by_preference = names_;
+    std::stable_partition(by_preference.begin(), by_preference.end(),
+                          [&](const std::string& name) { return readings_[name].preferred; });
     for (const bool by_unit_only : {false, true})
-      for (const std::string& name : names_)
+      for (const std::string& name : by_preference)
         if (is_free(name)) take(name, by_unit_only, current);
     for (const std::string& name : names_)
       if (is_free(name) && !name.empty()) result_.unused.push_back(name);
-    take_output_for_motor();
-    find_axis(axis);
+    find_axis();
+    find_side();
     return std::move(result_);
   }
 
@@ -194,39 +100,40 @@ class Guesser {
   bool is_native(const std::string& name) const {
     return std::find(result_.native.begin(), result_.native.end(), name) != result_.native.end();
   }
+  bool is_there(const std::string& ours) const { return is_mapped(ours) || is_native(ours); }
   bool is_source(const std::string& name) const {
     return std::any_of(result_.columns.begin(), result_.columns.end(),
                        [&](const ColumnGuess& c) { return c.theirs == name; });
   }
   bool is_free(const std::string& name) const { return !is_ours(name) && !is_source(name); }
 
+  // Positions or velocities with numbers are those of several joints; one of them is looked at.
+  void choose_joint() {
+    std::set<int> joints;
+    for (const auto& [name, r] : readings_)
+      if (r.joint && !r.set_point && (r.kind == Kind::position || r.kind == Kind::velocity)) joints.insert(*r.joint);
+    if (joints.size() < 2 && !options_.joint) return;
+    result_.joints.assign(joints.begin(), joints.end());
+    if (joints.empty()) return;
+    joint_ = options_.joint ? *options_.joint : *joints.begin();
+    result_.joint = joint_;
+  }
+
   void take(const std::string& name, bool by_unit_only, bool current) {
-    const Reading r = read(name);
+    const ColumnReading& r = readings_[name];
     if (r.by_unit_only != by_unit_only) return;
-    const bool effort = current || is_mapped("motor_torque_nm") || is_native("motor_torque_nm");
+    if (joint_ && r.joint && r.kind != Kind::time && *r.joint != *joint_) return;
+    const bool effort = current || is_there("motor_torque_nm");
     const std::string ours = ours_for(r, effort);
-    if (ours.empty() || is_mapped(ours) || is_native(ours)) return;
-    result_.columns.push_back({ours, name, r.unit, reason(name, r)});
+    if (ours.empty() || is_there(ours)) return;
+    const double scale = r.electrical ? 1.0 / options_.pole_pairs.value_or(1) : 1.0;
+    if (r.electrical && !options_.pole_pairs) result_.needs_pole_pairs = name;
+    result_.columns.push_back({ours, name, r.unit, reason(name, r), scale});
   }
 
-  // Logs of a joint have no motor encoder: the joint's own columns are the motor's then, and the gear ratio is one.
-  void take_output_for_motor() {
-    const auto there = [&](const char* ours) { return is_mapped(ours) || is_native(ours); };
-    if (there("motor_position_rad") || there("motor_velocity_rad_s")) return;
-    if (there("current_a") || is_native("output_position_rad") || is_native("output_velocity_rad_s")) return;
-    for (ColumnGuess& c : result_.columns) {
-      const std::string before = c.ours;
-      if (c.why.empty()) continue;
-      if (c.ours == "output_position_rad") c.ours = "motor_position_rad";
-      if (c.ours == "output_velocity_rad_s") c.ours = "motor_velocity_rad_s";
-      if (c.ours == "torque_nm" && !there("motor_torque_nm")) c.ours = "motor_torque_nm";
-      result_.joint_side = result_.joint_side || c.ours != before;
-    }
-  }
-
-  void find_axis(std::optional<data::Axis> stated) {
-    if (stated) {
-      result_.axis = *stated;
+  void find_axis() {
+    if (options_.axis) {
+      result_.axis = *options_.axis;
       return;
     }
     for (const ColumnGuess& c : result_.columns)
@@ -237,37 +144,67 @@ class Guesser {
       }
   }
 
-  const std::vector<std::string>& names_;
+  // Which side of the gear the only position (or velocity) is of. Sides that the file's own names or the user state
+  // stay.
+  void find_side() {
+    bool motor = is_native("motor_position_rad") || is_native("motor_velocity_rad_s");
+    bool link = is_native("output_position_rad") || is_native("output_velocity_rad_s");
+    bool open = false;
+    for (const ColumnGuess& c : result_.columns) {
+      if (!is_motion(c)) continue;
+      const bool guessed = !c.why.empty();
+      (c.ours.starts_with("motor") ? motor : link) = true;
+      open = open || (guessed && readings_[c.theirs].side == Side::open);
+    }
+    const bool one_side = motor != link && (is_mapped_motion());
+    if (!one_side) return;
+    Side side = link ? Side::link : open ? Side::open : Side::motor;
+    if (options_.position_side != Side::open) side = options_.position_side;
+    result_.side = side;
+    if (side == Side::open && options_.gear_ratio && *options_.gear_ratio != 1.0) result_.side_is_asked_for = true;
+    if (side != Side::link) return set_motor_columns(1.0);
+    const double ratio = options_.gear_ratio.value_or(1.0);
+    if (ratio == 1.0 && is_native("output_position_rad")) return;
+    set_motor_columns(ratio);
+    result_.joint_side = ratio == 1.0;
+    result_.scaled_by = ratio;
+  }
+
+  bool is_mapped_motion() const {
+    return std::any_of(result_.columns.begin(), result_.columns.end(),
+                       [](const ColumnGuess& c) { return is_motion(c) && !c.why.empty(); });
+  }
+
+  // The motor's columns from those of the link, times the gear ratio: between them there is only the gear.
+  void set_motor_columns(double scale) {
+    for (ColumnGuess& c : result_.columns) {
+      if (c.why.empty()) continue;
+      const bool position = c.ours == "output_position_rad" || c.ours == "motor_position_rad";
+      const bool velocity = c.ours == "output_velocity_rad_s" || c.ours == "motor_velocity_rad_s";
+      if (position) c.ours = "motor_position_rad";
+      if (velocity) c.ours = "motor_velocity_rad_s";
+      if (position || velocity || c.ours == "position_command_rad" || c.ours == "velocity_command_rad_s")
+        c.scale *= scale;
+      // A torque of the joint, where there is no other effort.
+      if (c.ours == "torque_nm" && !is_there("motor_torque_nm") && !is_there("current_a")) {
+        c.ours = "motor_torque_nm";
+        c.scale = 1.0 / scale;
+      }
+    }
+  }
+
+  GuessOptions options_;
+  std::vector<std::string> names_;
+  std::map<std::string, ColumnReading> readings_;
+  std::optional<int> joint_;
   HeaderGuess result_;
 };
 
 }  // namespace
 
-std::string unit_in_name(std::string_view name) {
-  for (const auto& [open, close] : {std::pair{'[', ']'}, {'(', ')'}}) {
-    const std::size_t from = name.find(open), to = name.rfind(close);
-    if (from == std::string_view::npos || to == std::string_view::npos || to < from + 2) continue;
-    const std::string inner(name.substr(from + 1, to - from - 1));
-    if (data::unit_from_text(inner)) return inner;
-  }
-  std::vector<std::string> words = words_of(name);
-  std::erase(words, "per");
-  if (words.size() < 2) return {};
-  if (words.size() > 2) {
-    const std::string ratio = words[words.size() - 2] + "/" + words.back();
-    if (data::unit_from_text(ratio)) return ratio;
-  }
-  // Before its capitals make two words of mA.
-  const auto is_letter = [](char c) { return std::isalpha(static_cast<unsigned char>(c)) != 0; };
-  const auto tail = std::find_if_not(name.rbegin(), name.rend(), is_letter).base();
-  const std::string last(tail, name.end());
-  if (last.size() > 1 && tail != name.begin() && data::unit_from_text(last)) return last;
-  return unit_of_word(words.back());
-}
-
-HeaderGuess guess_columns(const std::vector<std::string>& names, const std::vector<ColumnGuess>& stated,
-                          std::optional<data::Axis> axis) {
-  return Guesser(names, stated).guess(axis);
+HeaderGuess guess_columns(const std::vector<LoggedColumn>& logged, const std::vector<ColumnGuess>& stated,
+                          const GuessOptions& options) {
+  return Guesser(logged, stated, options).guess();
 }
 
 std::optional<std::string> time_unit_by_values(const std::vector<double>& time) {
@@ -275,12 +212,8 @@ std::optional<std::string> time_unit_by_values(const std::vector<double>& time) 
   for (std::size_t k = 1; k < time.size(); ++k) steps.push_back(time[k] - time[k - 1]);
   if (steps.empty()) return std::nullopt;
   std::nth_element(steps.begin(), steps.begin() + static_cast<std::ptrdiff_t>(steps.size() / 2), steps.end());
-  const double step = steps[steps.size() / 2];
-  // A drive is sampled at 10 Hz to 20 kHz.
-  if (step >= 5e4) return "ns";
-  if (step >= 50.0) return "us";
-  if (step >= 0.5) return "ms";
-  return std::nullopt;
+  const auto unit = data::unit_of_time_step(steps[steps.size() / 2]);
+  return unit ? std::optional(std::string(*unit)) : std::nullopt;
 }
 
 std::optional<std::string> velocity_unit_by_values(const std::vector<double>& time_s,

@@ -96,7 +96,7 @@ void write_page(const ChangeOptions& options, const std::string& command, const 
 int change_model(const ChangeOptions& options, const std::string& command, const std::string& what,
                  const Change& change, Console& console) {
   require_report_place(options.report);
-  const model::ModelFile file = load_model(options.model);
+  const model::ModelFile file = load_searched_model(options.model);
   const data::Dataset dataset = load(options.data, console);
   console.progress("refitting the model");
   const Addition changed = change(dataset, file.model);
@@ -120,6 +120,7 @@ int change_model(const ChangeOptions& options, const std::string& command, const
 }  // namespace
 
 int run(const AddOptions& options, Console& console) {
+  require_effect(options.effect.substr(0, options.effect.find(':')));
   // A wrong name is said before files are read.
   if (diagnosis::names_made_effect(options.effect))
     diagnosis::made_effect(options.effect, options.made, {});

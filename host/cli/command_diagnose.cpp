@@ -46,7 +46,7 @@ void write_page(const DiagnoseOptions& options, const data::Dataset& dataset, co
 
 int run(const DiagnoseOptions& options, Console& console) {
   require_report_place(options.report);
-  const model::ModelFile file = load_model(options.model);
+  const model::ModelFile file = load_searched_model(options.model);
   const data::Dataset dataset = load(options.data, console);
   diagnosis::Options how;
   how.pipeline = options.pipeline.options();

@@ -8,7 +8,6 @@
 #include "host/output/identification.hpp"
 #include "host/output/json.hpp"
 #include "host/output/text.hpp"
-#include "host/text/nearest.hpp"
 
 namespace flexspline::cli {
 namespace {
@@ -100,7 +99,7 @@ void describe(const Entry& entry, Console& console) {
     table.row(
         {std::string(p.name), std::string(p.unit.rotary), std::string(p.unit.linear), how, output::number(p.usual)});
   }
-  console.line(table.text());
+  console.line(table.text_within(output::line_width()));
   console.line();
   console.line("At these values:");
   console.line(output::curve_text(output::effect_curve(entry), output::takes_braille()));
@@ -158,7 +157,7 @@ void describe_made(const effects::Description& info, Console& console) {
   output::Table table({"signal", "unit", "(linear axis)", ""}, "llll");
   for (const effects::VariableInfo& v : effects::kVariables)
     table.row({std::string(v.name), std::string(v.unit.rotary), std::string(v.unit.linear), std::string(v.meaning)});
-  console.line(table.text());
+  console.line(table.text_within(output::line_width()));
   if (info.name == catalogue::kExpressionEffect)
     console.line(output::wrapped(
         "direction, output_direction and torsion_direction are 1, -1, or 0 at rest. Functions: sin, cos, tan, tanh, "
@@ -177,20 +176,13 @@ void describe_made(const effects::Description& info, Console& console) {
 int run(const EffectsOptions& options, Console& console) {
   json list = json::array();
   if (!options.name.empty()) {
+    require_effect(options.name);
     const Entry* entry = catalogue::find(options.name);
     if (const effects::Description* made = catalogue::description_of(options.name)) {
       describe_made(*made, console);
       output::save_json(options.json,
                         {{"format", "flexspline-effects/1"}, {"effects", json::array({made_json(*made)})}});
       return kDone;
-    }
-    if (entry == nullptr) {
-      std::vector<std::string_view> names;
-      for (const Entry& e : catalogue::all()) names.push_back(e.name());
-      names.insert(names.end(), std::begin(kMadeByUsers), std::end(kMadeByUsers));
-      const std::string near = text::nearest(options.name, names);
-      throw UsageError(fmt::format("there is no effect \"{}\"; {}flexspline effects lists all", options.name,
-                                   near.empty() ? "" : fmt::format("did you mean {}? ", near)));
     }
     describe(*entry, console);
     list.push_back(entry_json(*entry));
@@ -206,7 +198,7 @@ int run(const EffectsOptions& options, Console& console) {
       table.row({std::string(name), "yours", std::string(info.equation), "", std::string(info.shows_over)});
       list.push_back(made_json(info));
     }
-    console.line(table.text(0));
+    console.line(table.text_within(output::line_width(), 0));
     console.line();
     console.line("flexspline effects NAME explains one.");
   }

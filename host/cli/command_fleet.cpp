@@ -7,6 +7,7 @@
 
 #include "host/cli/fleet.hpp"
 #include "host/comparison/compare.hpp"
+#include "host/data/recording.hpp"
 #include "host/deployment/sha256.hpp"
 #include "host/diagnosis/diagnosis.hpp"
 #include "host/estimation/estimate.hpp"
@@ -59,8 +60,7 @@ Task task_of(const FleetOptions& options, const fs::path& folder) {
                                  task.model.string()));
   std::vector<fs::path> files;
   for (const fs::directory_entry& entry : fs::directory_iterator(folder)) {
-    const std::string kind = entry.path().extension().string();
-    if (entry.is_regular_file() && (kind == ".csv" || kind == ".mat" || entry.path().filename() == "dataset.toml"))
+    if (entry.is_regular_file() && (data::is_recording(entry.path()) || entry.path().filename() == "dataset.toml"))
       files.push_back(entry.path());
   }
   std::sort(files.begin(), files.end());
@@ -123,6 +123,15 @@ bool run_one(const FleetOptions& options, const fs::path& folder, Console& conso
     answers.push_back({{"drive", task.name}, {"file", task.out.string()}, {"skipped", true}, {"failed", nullptr}});
     return true;
   }
+  const auto save = [&](json result, const json& failed) {
+    result["format"] = fleet::kResultFormat;
+    result["drive"] = task.name;
+    result["fingerprint"] = task.fingerprint;
+    result["failed"] = failed;
+    output::save_json(task.out.string(), result);
+  };
+  // What a job that is killed leaves behind; without it the drive would be missing and nobody told.
+  save(json::object(), "its run has not finished: it was stopped, or goes on still");
   json result;
   std::string failed;
   try {
@@ -131,14 +140,10 @@ bool run_one(const FleetOptions& options, const fs::path& folder, Console& conso
     failed = error.what();
     console.error(fmt::format("{}: {}", task.name, failed));
   }
-  result["format"] = fleet::kResultFormat;
-  result["drive"] = task.name;
-  result["fingerprint"] = task.fingerprint;
-  result["failed"] = failed.empty() ? json() : json(failed);
-  output::save_json(task.out.string(), result);
+  const json reason = failed.empty() ? json() : json(failed);
+  save(result, reason);
   if (failed.empty()) console.line(fmt::format("{}: {}", task.name, task.out.string()));
-  answers.push_back(
-      {{"drive", task.name}, {"file", task.out.string()}, {"skipped", false}, {"failed", result["failed"]}});
+  answers.push_back({{"drive", task.name}, {"file", task.out.string()}, {"skipped", false}, {"failed", reason}});
   return failed.empty();
 }
 
@@ -196,7 +201,7 @@ json json_of(const fleet::Merged& merged, std::size_t drives) {
 int merge_results(const FleetOptions& options, Console& console) {
   if (!options.model.empty() || !options.out.empty() || options.diagnose || options.again)
     throw UsageError("fleet merge takes results, --limit and --json alone");
-  if (options.limit && !(*options.limit > 0.0)) throw UsageError("--limit is a number above nought, as in --limit 6");
+  if (options.limit && !(*options.limit > 0.0)) throw UsageError("--limit is a number above zero, as in --limit 6");
   const std::vector<fleet::DriveResult> results = fleet::read_results(options.places);
   const fleet::Merged merged = fleet::merge(results, options.limit);
   output::Table table({"quantity", "drives", "median", "deviation", "unit"}, "lrrrl");

@@ -5,6 +5,7 @@
 #include "host/cli/base_model.hpp"
 #include "host/cli/commands.hpp"
 #include "host/cli/project_draft.hpp"
+#include "host/cli/unfinished_project.hpp"
 #include "host/model/signature.hpp"
 #include "host/output/json.hpp"
 #include "host/output/text.hpp"
@@ -39,26 +40,43 @@ json json_of(const NewOptions& options, const Draft& draft, const BaseModel& bas
           {"notes", draft.notes}};
 }
 
+// The base model, and in the draft what only the values show.
+BaseModel finish(Draft& draft, const NewOptions& options, Console& console) {
+  if (!draft.open_question.empty()) throw UsageError(draft.open_question);
+  data::Dataset dataset = load_draft(draft, options);
+  for (const data::Finding& finding : dataset.findings)
+    if (finding.severity == data::Severity::warning) console.warn(finding.text());
+  complete(draft, dataset);
+  for (const std::string& doubt : implausible_sides(draft, dataset)) console.warn(doubt);
+  BaseModel base = base_model(dataset, name_of(options.out));
+  if (base.model.effects.empty())
+    throw UsageError(fmt::format("no torque balance can be formed from these columns: {}; name the columns with --map",
+                                 output::listed(base.reasons, "and")));
+  return base;
+}
+
 }  // namespace
 
 int run(const NewOptions& options, Console& console) {
   const fs::path dataset_file = options.out / "dataset.toml";
   const fs::path model_file = options.out / "base-model.toml";
   for (const fs::path& file : {dataset_file, model_file})
-    if (!options.force && fs::exists(file))
+    if (!options.force && fs::exists(file) && !is_unfinished(file))
       throw UsageError(
           fmt::format("{} is there already; give another --out, or --force to write over it", file.string()));
 
   console.progress("reading the measurements");
   Draft draft = draft_of(options);
-  data::Dataset dataset = load_draft(draft, options);
-  for (const data::Finding& finding : dataset.findings)
-    if (finding.severity == data::Severity::warning) console.warn(finding.text());
-  complete(draft, dataset);
-  const BaseModel base = base_model(dataset, name_of(options.out));
-  if (base.model.effects.empty())
-    throw UsageError(fmt::format("no torque balance can be formed from these columns: {}; name the columns with --map",
-                                 output::listed(base.reasons, "and")));
+  BaseModel base;
+  try {
+    base = finish(draft, options, console);
+  } catch (const data::DataError& unusable) {
+    leave_unfinished(draft, options, unusable, console);
+    return kUnusable;
+  } catch (const UsageError& open) {
+    leave_unfinished(draft, options, open, console);
+    return kUnusable;
+  }
 
   make_folder(options.out);
   const std::string toml = text_of(draft, options.out);

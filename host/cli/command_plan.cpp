@@ -43,10 +43,30 @@ planning::Setting setting_of(const PlanOptions& options, const model::Model& mod
   return setting;
 }
 
+// In seconds: as the user states it, else that of the data. Logs of current loops are faster than any motion needs, and
+// each sample is rehearsed some hundred times.
+double sample_time(const PlanOptions& options, const data::Dataset* dataset, double run_s, Console& console) {
+  constexpr double kFastestHz = 20e3, kMostSamples = 1e6;
+  double hz = options.sample_hz.value_or(1000.0);
+  if (!options.sample_hz && dataset && !dataset->experiments.empty()) {
+    hz = 1.0 / dataset->experiments.front().sample_s;
+    if (hz > kFastestHz)
+      console.warn(fmt::format("the data have {:g} samples a second; the plan is for {:g}; --sample-hz states another",
+                               hz, kFastestHz));
+    hz = std::min(hz, kFastestHz);
+  }
+  if (run_s * hz > kMostSamples)
+    throw UsageError(
+        fmt::format("a run of {:g} s at {:g} Hz has more than {:g} samples; state a lower --sample-hz, or "
+                    "shorter runs by --run-s",
+                    run_s, hz, kMostSamples));
+  return 1.0 / hz;
+}
+
 }  // namespace
 
 int run(const PlanOptions& options, Console& console) {
-  const model::ModelFile file = load_model(options.model);
+  const model::ModelFile file = load_searched_model(options.model);
   std::optional<data::Dataset> dataset;
   if (!options.data.data.empty()) dataset = load(options.data, console);
   planning::Question question;
@@ -55,9 +75,7 @@ int run(const PlanOptions& options, Console& console) {
   question.pipeline = options.pipeline.options();
   question.setting = setting_of(options, file.model, question.dataset);
   question.sensors = planning::sensors_of(question.dataset);
-  question.sample_s = options.sample_hz                          ? 1.0 / *options.sample_hz
-                      : dataset && !dataset->experiments.empty() ? dataset->experiments.front().sample_s
-                                                                 : 1e-3;
+  question.sample_s = sample_time(options, dataset ? &*dataset : nullptr, question.setting.run_s, console);
   question.most_motions = static_cast<std::size_t>(options.motions);
   question.progress = [&](std::string_view stage) { console.progress(stage); };
   const planning::Design design = options.separate.empty()

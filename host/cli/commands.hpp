@@ -46,6 +46,9 @@ struct NewOptions {
   std::filesystem::path out;
   std::vector<std::string> map;  // OURS=THEIRS[:UNIT]
   std::string axis;              // empty: guessed
+  std::string position_side;     // "link", "motor"; empty: guessed
+  std::optional<int> pole_pairs;
+  std::optional<int> joint;  // of a file with several
   std::optional<double> gear_ratio;
   std::optional<double> torque_constant_nm_a;
   std::optional<double> encoder_counts;

@@ -27,13 +27,18 @@ const std::array kHelp = {
     CommandHelp{
         "new",
         "first dataset.toml and base model from the measurements that there are",
-        "Reads CSV and MAT files as a logger left them, finds out which column is what from names, units and motion, "
-        "and "
-        "writes "
+        "Reads recordings as a logger left them (CSV, also of scopes and compressed by gzip; MAT; HDF5; NumPy; bags of "
+        "ROS "
+        "1 and 2 and MCAP, by topic and field; logs of moteus), finds out which column is what from names, units and "
+        "motion, and writes "
         "two files into a new folder: dataset.toml, which maps the columns to ours, and base-model.toml, with the "
         "effects that these signals can show. The measurements stay where they are and as they are. What is guessed is "
-        "said, and stands as a comment in the files; --map and the other options overrule it. A single record is split "
-        "into a part to fit and a part to verify.",
+        "said, and stands as a comment in the files; --map and the other options overrule it. A robot's log, with the "
+        "position of the link beside the current of the motor, takes --position-side link --gear-ratio N. A single "
+        "record "
+        "is split into a part to fit and a part to verify. What cannot be finished is left as a draft, with the line "
+        "to go "
+        "on with.",
         {kMakeData, "flexspline new --from demo-out --out project"}},
     CommandHelp{
         "check",

@@ -6,6 +6,9 @@
 #include <cmath>
 
 #include "host/catalogue/constants.hpp"
+#include "host/catalogue/defined.hpp"
+#include "host/regression/terms.hpp"
+#include "host/text/nearest.hpp"
 
 namespace flexspline::cli {
 namespace {
@@ -64,6 +67,21 @@ model::ModelFile load_model(const fs::path& path) {
   return model::read(path, catalogue::known_effects());
 }
 
+model::ModelFile load_searched_model(const fs::path& path) {
+  // The time of a search grows with their square and more.
+  constexpr std::ptrdiff_t kMostEstimated = 250;
+  model::ModelFile file = load_model(path);
+  std::ptrdiff_t estimated = 0;
+  for (const regression::Term& term : regression::terms_of(file.model))
+    estimated += std::count(term.known.begin(), term.known.end(), 0);
+  if (estimated > kMostEstimated)
+    throw UsageError(
+        fmt::format("{}: {} parameters are to be estimated, and this command searches with at most {}; take "
+                    "effects out, or state those that you know with fixed = true",
+                    path.string(), estimated, kMostEstimated));
+  return file;
+}
+
 std::string quoted(const std::string& argument) {
   constexpr std::string_view kPlain = "abcdefghijklmnopqrstuvwxyzABCDEFGHIJKLMNOPQRSTUVWXYZ0123456789_-./:=,+@%";
   if (!argument.empty() && argument.find_first_not_of(kPlain) == std::string::npos) return argument;
@@ -76,6 +94,15 @@ std::string as_arguments(const std::vector<fs::path>& paths) {
   std::string text;
   for (const fs::path& path : paths) text += (text.empty() ? "" : " ") + quoted(path.string());
   return text;
+}
+
+void require_effect(const std::string& name) {
+  if (catalogue::find(name) != nullptr || catalogue::description_of(name) != nullptr) return;
+  std::vector<std::string_view> names = {catalogue::kTableEffect, catalogue::kExpressionEffect};
+  for (const catalogue::Entry& entry : catalogue::all()) names.push_back(entry.name());
+  const std::string near = text::nearest_or_first_words(name, names);
+  throw UsageError(fmt::format("there is no effect \"{}\"; {}flexspline effects lists all", name,
+                               near.empty() ? "" : fmt::format("did you mean {}? ", near)));
 }
 
 void make_folder(const fs::path& folder) {

@@ -45,10 +45,16 @@ data::Dataset load(const DataInputs& inputs, Console& console);
 
 // Throws model::ModelError.
 model::ModelFile load_model(const std::filesystem::path& path);
+// The same for commands that fit the model again and again; throws UsageError where it has so many parameters to be
+// estimated that none of them would answer.
+model::ModelFile load_searched_model(const std::filesystem::path& path);
 
 // Paths as they would be typed after a command.
 std::string as_arguments(const std::vector<std::filesystem::path>& paths);
 std::string quoted(const std::string& argument);
+
+// Throws UsageError with the nearest name where the catalogue has no such effect, nor is it one that users define.
+void require_effect(const std::string& name);
 
 void make_folder(const std::filesystem::path& folder);
 

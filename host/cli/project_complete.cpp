@@ -186,6 +186,29 @@ void complete(Draft& draft, data::Dataset& dataset) {
   }
 }
 
+std::vector<std::string> implausible_sides(const Draft& draft, const data::Dataset& dataset) {
+  // The fastest motors of strain-wave drives turn at some 14,000 rpm; an arm that never moves faster than a clock's
+  // second hand is none that friction is identified on.
+  constexpr double kFastestMotor_rad_s = 1500.0, kSlowestLink_rad_s = 0.02;
+  if (!draft.side || dataset.drive.axis == data::Axis::linear) return {};
+  const double ratio = dataset.drive.gear_ratio.value_or(1.0);
+  double fastest = 0.0;
+  for (const data::Experiment& e : dataset.experiments)
+    if (const auto speed = summary_of(e, data::Axis::rotary).highest_speed) fastest = std::max(fastest, *speed);
+  const bool scaled = *draft.side == Side::link && ratio != 1.0;
+  if (scaled && fastest > kFastestMotor_rad_s)
+    return {
+        fmt::format("with position and velocity of the link, the motor would turn at {:.3g} rad/s, faster than any of "
+                    "a strain-wave drive; if they are the motor's, give --position-side motor",
+                    fastest)};
+  if (!scaled && ratio > 1.0 && fastest > 0.0 && fastest / ratio < kSlowestLink_rad_s)
+    return {
+        fmt::format("with position and velocity of the motor, the link would move at {:.2g} rad/s at most; if they are "
+                    "the link's, give --position-side link",
+                    fastest / ratio)};
+  return {};
+}
+
 std::string text_of(const Draft& draft, const fs::path& folder) {
   std::string text = "format = \"flexspline-dataset/1\"\n\n[drive]\n";
   for (const auto& [key, value] : draft.toml.drive)
@@ -214,6 +237,7 @@ std::string text_of(const Draft& draft, const fs::path& folder) {
     text += fmt::format("\n[[experiment]]\nfile = {}\n",
                         model::toml_string((relative.empty() ? entry.file : relative).generic_string()));
     for (const auto& [key, value] : entry.keys) text += key_line(key == "experiment" ? "name" : key, value) + "\n";
+    if (entry.element) text += fmt::format("element = {}\n", *entry.element);
     if (entry.from_s) text += fmt::format("from_s = {}\n", model::exact_text(*entry.from_s));
     if (entry.to_s) text += fmt::format("to_s = {}\n", model::exact_text(*entry.to_s));
   }

@@ -72,10 +72,13 @@ ColumnGuess mapping_of(const std::string& text, const std::vector<std::string>& 
 // Values of some columns of one table in a file, by name; empty where it does not have one.
 std::vector<std::vector<double>> values_of(const data::Recording& recording, const std::vector<std::string>& names) {
   const std::vector<std::string>& there = recording.names();
+  const auto find_name = [&](const std::string& name) {
+    return std::find(there.begin(), there.end(), data::name_of_element(there, name, 1));
+  };
   std::vector<std::size_t> wanted;
   std::vector<std::optional<std::size_t>> slots;
   for (const std::string& name : names) {
-    const auto at = std::find(there.begin(), there.end(), name);
+    const auto at = find_name(name);
     slots.push_back(at == there.end() ? std::nullopt : std::optional(wanted.size()));
     if (at != there.end()) wanted.push_back(static_cast<std::size_t>(at - there.begin()));
   }
@@ -87,11 +90,36 @@ std::vector<std::vector<double>> values_of(const data::Recording& recording, con
 
 using Lengths = std::vector<std::pair<std::string, std::size_t>>;
 
+// The runs of a struct array have the same names, so that one mapping fits them all; here they have the first one's
+// lengths.
 Lengths lengths_of(const data::Recording& recording) {
   Lengths lengths;
-  for (std::size_t i = 0; i < recording.names().size(); ++i)
-    lengths.emplace_back(recording.names()[i], recording.length(i));
+  for (std::size_t i = 0; i < recording.names().size(); ++i) {
+    const data::ElementName name = data::without_element(recording.names()[i]);
+    if (name.element <= 1) lengths.emplace_back(name.name, recording.length(i));
+  }
   return lengths;
+}
+
+std::size_t elements_of(const data::Recording& recording) {
+  std::size_t most = 0;
+  for (const std::string& name : recording.names()) most = std::max(most, data::without_element(name).element);
+  return most;
+}
+
+// A file as one experiment, or each element of a struct array in it.
+std::vector<data::ExperimentEntry> entries_of(const fs::path& file, const data::Recording& recording) {
+  data::ExperimentEntry entry;
+  entry.file = fs::absolute(file);
+  const std::size_t elements = elements_of(recording);
+  if (elements == 0) return {entry};
+  std::vector<data::ExperimentEntry> entries;
+  for (std::size_t k = 1; k <= elements; ++k) {
+    entry.element = k;
+    entry.keys["experiment"] = text_value(fmt::format("{}-{}", file.stem().string(), k));
+    entries.push_back(entry);
+  }
+  return entries;
 }
 
 std::vector<std::string> of_length(std::size_t wanted, const Lengths& lengths) {
@@ -158,6 +186,45 @@ void add_options(Draft& draft, const NewOptions& options) {
   if (options.encoder_counts) draft.toml.defaults["encoder_counts"] = number_value(*options.encoder_counts);
 }
 
+std::vector<LoggedColumn> logged_columns(const std::vector<std::string>& names, const data::Recording& first) {
+  std::vector<LoggedColumn> logged;
+  for (const std::string& name : names) {
+    const auto at = std::find(first.names().begin(), first.names().end(), name);
+    const bool there = at != first.names().end();
+    logged.push_back({name, there ? first.unit(static_cast<std::size_t>(at - first.names().begin())) : ""});
+  }
+  return logged;
+}
+
+void take_side(Draft& draft, const HeaderGuess& guess) {
+  if (!guess.needs_pole_pairs.empty())
+    draft.notes.push_back(fmt::format(
+        "\"{}\" counts electrical turns; give --pole-pairs P, or it is taken for the motor's", guess.needs_pole_pairs));
+  if (guess.joint)
+    draft.notes.push_back(fmt::format("the file has the joints {}; joint {} was taken, --joint takes another",
+                                      fmt::join(guess.joints, ", "), *guess.joint));
+  if (guess.joint_side) {
+    draft.toml.drive["gear_ratio"] = number_value(1.0);
+    draft.gear_comment = "no motor sensors: the joint's columns stand for the motor's";
+    draft.notes.push_back(
+        "there are no motor sensors: the joint's own columns stand for the motor's, with gear ratio 1; give "
+        "--gear-ratio "
+        "N to have the motor's side of the gear");
+  } else if (guess.scaled_by != 1.0) {
+    draft.notes.push_back(fmt::format(
+        "the position is of the link, current or torque of the motor: the motor's position and velocity are "
+        "those of the link times the gear ratio {:g}",
+        guess.scaled_by));
+  } else if (guess.side == Side::open && guess.axis == data::Axis::rotary) {
+    draft.notes.push_back("the position is taken for the motor's; --position-side link says that it is the link's");
+  }
+  if (guess.side_is_asked_for)
+    draft.open_question =
+        "the names do not say whether position and velocity are of the motor or of the link, and with this gear ratio "
+        "that "
+        "makes a difference; give --position-side motor or --position-side link";
+}
+
 Draft draft_of_files(const std::vector<fs::path>& files, const NewOptions& options) {
   Draft draft;
   data::Findings findings;
@@ -170,28 +237,41 @@ Draft draft_of_files(const std::vector<fs::path>& files, const NewOptions& optio
   };
   for (const fs::path& file : files) {
     std::unique_ptr<data::Recording> recording = data::open_recording(file, findings);
-    add_new(recording->names(), names);
     lengths.push_back(lengths_of(*recording));
+    std::vector<std::string> of_file;
+    for (const auto& [name, length] : lengths.back()) of_file.push_back(name);
+    add_new(of_file, names);
+    for (data::ExperimentEntry& entry : entries_of(file, *recording))
+      draft.toml.experiments.push_back(std::move(entry));
     if (!first) first = std::move(recording);
-    data::ExperimentEntry entry;
-    entry.file = fs::absolute(file);
-    draft.toml.experiments.push_back(std::move(entry));
   }
   std::vector<ColumnGuess> stated;
   for (const std::string& text : options.map) stated.push_back(mapping_of(text, names, *first));
-  std::optional<data::Axis> axis;
-  if (!options.axis.empty()) axis = options.axis == "linear" ? data::Axis::linear : data::Axis::rotary;
+  GuessOptions how;
+  if (!options.axis.empty()) how.axis = options.axis == "linear" ? data::Axis::linear : data::Axis::rotary;
+  how.position_side = options.position_side == "link"    ? Side::link
+                      : options.position_side == "motor" ? Side::motor
+                                                         : Side::open;
+  how.gear_ratio = options.gear_ratio;
+  how.joint = options.joint;
+  how.pole_pairs = options.pole_pairs;
   const ColumnGuess* time = find(stated, "time_s");
   std::vector<std::string> of_one_table;
   for (const Lengths& of_file : lengths)
     add_new(table_with(time != nullptr ? time->theirs : "time_s", of_file), of_one_table);
-  HeaderGuess guess = guess_columns(of_one_table, stated, axis);
+  HeaderGuess guess = guess_columns(logged_columns(of_one_table, *first), stated, how);
+  if (options.joint && std::find(guess.joints.begin(), guess.joints.end(), *options.joint) == guess.joints.end())
+    throw UsageError(fmt::format("--joint {}: {}", *options.joint,
+                                 guess.joints.empty()
+                                     ? std::string("no position or velocity has the number of a joint")
+                                     : fmt::format("the joints are {}", fmt::join(guess.joints, ", "))));
   guess_units(guess.columns, *first);
 
   for (const ColumnGuess& c : guess.columns) {
     data::ColumnMapping mapping;
     mapping.source = c.theirs;
     mapping.unit = c.unit;
+    mapping.scale = c.scale;
     draft.toml.columns[c.ours] = mapping;
     draft.comments[c.ours] = c.why.empty() ? "stated" : fmt::format("guess: {}", c.why);
     draft.notes.push_back(fmt::format("{}: {}{}", c.ours,
@@ -205,12 +285,10 @@ Draft draft_of_files(const std::vector<fs::path>& files, const NewOptions& optio
       draft.notes.push_back(fmt::format("the axis is linear (m, m/s, N), as {}", guess.axis_why));
     }
   }
-  if (guess.joint_side) {
-    draft.toml.drive["gear_ratio"] = number_value(1.0);
-    draft.gear_comment = "no motor sensors: the joint's columns stand for the motor's";
-    draft.notes.push_back(
-        "there are no motor sensors: the joint's own columns stand for the motor's, with gear ratio 1");
-  }
+  take_side(draft, guess);
+  draft.side = guess.side;
+  draft.there = guess.native;
+  for (const ColumnGuess& c : guess.columns) draft.there.push_back(c.ours);
   draft.columns = guess.columns;
   draft.unused = guess.unused;
   add_options(draft, options);

@@ -3,6 +3,7 @@
 
 #include <filesystem>
 #include <map>
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -19,7 +20,10 @@ struct Draft {
   std::string gear_comment;
   std::vector<std::string> notes;    // what was guessed, for people
   std::vector<ColumnGuess> columns;  // guessed or mapped
+  std::vector<std::string> there;    // columns of ours that are there, by their name or mapped
   std::vector<std::string> unused;
+  std::optional<Side> side;   // of the only position, where there is one
+  std::string open_question;  // "what; what to do": without an answer there is nothing to go on with
 };
 
 // From CSV and MAT files and folders of them, or from one dataset.toml, whose facts are kept.
@@ -31,6 +35,9 @@ data::Dataset load_draft(const Draft& draft, const NewOptions& options);
 
 // Adds what only the values show: the gear ratio, and the split of a single record.
 void complete(Draft& draft, data::Dataset& dataset);
+
+// Why the only position may be of the other side of the gear: speeds that no motor, or no link of a robot, has.
+std::vector<std::string> implausible_sides(const Draft& draft, const data::Dataset& dataset);
 
 // The text of dataset.toml in `folder`; files are named relative to it.
 std::string text_of(const Draft& draft, const std::filesystem::path& folder);

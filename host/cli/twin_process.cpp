@@ -11,6 +11,8 @@
 #include <cstring>
 #include <stdexcept>
 
+#include "host/text/shortened.hpp"
+
 extern char** environ;
 
 namespace flexspline::cli {
@@ -39,6 +41,26 @@ std::vector<char*> pointers(std::vector<std::string>& words) {
   return argv;
 }
 
+std::string read_to_end(int file) {
+  std::string text;
+  char block[4096];
+  while (true) {
+    const ssize_t got = read(file, block, sizeof block);
+    if (got < 0 && errno == EINTR) continue;
+    if (got <= 0) return text;
+    text.append(block, static_cast<std::size_t>(got));
+  }
+}
+
+// Its own message is the reason, wherever this one is shown: on a terminal, or on a page that has none.
+std::string why_it_failed(const std::vector<std::string>& arguments, std::string said, int status) {
+  while (!said.empty() && (said.back() == '\n' || said.back() == ' ')) said.pop_back();
+  if (!said.empty()) return text::shortened(said, 2000);
+  const std::string how = WIFSIGNALED(status) ? fmt::format("was ended by signal {}", WTERMSIG(status))
+                                              : fmt::format("ended with exit code {}", WEXITSTATUS(status));
+  return fmt::format("flexspline-hil {} {} and said nothing", arguments.empty() ? "" : arguments.front(), how);
+}
+
 }  // namespace
 
 void run_twin(const std::vector<std::string>& arguments) {
@@ -46,20 +68,27 @@ void run_twin(const std::vector<std::string>& arguments) {
   std::vector<std::string> words{program};
   words.insert(words.end(), arguments.begin(), arguments.end());
   const std::vector<char*> argv = pointers(words);
+  int ends[2] = {-1, -1};
+  if (pipe2(ends, O_CLOEXEC) != 0)
+    throw std::runtime_error(fmt::format("cannot start {}: {}", program, std::strerror(errno)));
   // Standard output may belong to a machine (`--json -`).
   posix_spawn_file_actions_t actions;
   posix_spawn_file_actions_init(&actions);
   posix_spawn_file_actions_addopen(&actions, STDOUT_FILENO, "/dev/null", O_WRONLY, 0);
+  posix_spawn_file_actions_adddup2(&actions, ends[1], STDERR_FILENO);
   pid_t child = 0;
   const int failed = posix_spawn(&child, program.c_str(), &actions, nullptr, argv.data(), environ);
   posix_spawn_file_actions_destroy(&actions);
+  close(ends[1]);
+  const std::string said = failed == 0 ? read_to_end(ends[0]) : std::string();
+  close(ends[0]);
   if (failed != 0) throw std::runtime_error(fmt::format("cannot start {}: {}", program, std::strerror(failed)));
   int status = 0;
   while (waitpid(child, &status, 0) < 0)
     if (errno != EINTR) throw std::runtime_error(fmt::format("lost {}: {}", program, std::strerror(errno)));
-  if (!WIFEXITED(status) || WEXITSTATUS(status) != 0)
-    throw std::runtime_error(fmt::format("{} {} did not succeed; its message stands above", program,
-                                         arguments.empty() ? "" : arguments.front()));
+  if (!WIFEXITED(status) || WEXITSTATUS(status) != 0) throw std::runtime_error(why_it_failed(arguments, said, status));
+  // What it warned of.
+  fmt::print(stderr, "{}", said);
 }
 
 void become_twin(const std::vector<std::string>& arguments) {

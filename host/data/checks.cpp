@@ -6,6 +6,8 @@
 #include <array>
 #include <cmath>
 
+#include "host/data/units.hpp"
+
 namespace flexspline::data {
 namespace {
 
@@ -47,6 +49,8 @@ double usual_size(const std::vector<double>& signal) {
   return *at;
 }
 
+constexpr double kMostAmperes = 200.0;
+
 struct Range {
   Column column;
   double limit;  // in the column's unit; above it the unit cannot be right
@@ -55,8 +59,8 @@ struct Range {
 
 // Well beyond any strain-wave drive: 28,000 rpm, 570 rpm at the output, the largest gears' 9 kN*m.
 constexpr auto kRotary = std::to_array<Range>({
-    {Column::current, 200.0, "mA"},
-    {Column::current_command, 200.0, "mA"},
+    {Column::current, kMostAmperes, "mA"},
+    {Column::current_command, kMostAmperes, "mA"},
     {Column::motor_torque, 300.0, "mN*m"},
     {Column::motor_velocity, 3000.0, "rpm"},
     {Column::velocity_command, 3000.0, "rpm"},
@@ -65,8 +69,8 @@ constexpr auto kRotary = std::to_array<Range>({
     {Column::load_torque, 20000.0, "mN*m"},
 });
 constexpr auto kLinear = std::to_array<Range>({
-    {Column::current, 200.0, "mA"},
-    {Column::current_command, 200.0, "mA"},
+    {Column::current, kMostAmperes, "mA"},
+    {Column::current_command, kMostAmperes, "mA"},
     {Column::motor_position, 20.0, "mm"},
     {Column::output_position, 20.0, "mm"},
     {Column::position_command, 20.0, "mm"},
@@ -78,15 +82,16 @@ constexpr auto kLinear = std::to_array<Range>({
     {Column::load_torque, 1e6, "mN"},
 });
 
-bool are_counts(const std::vector<double>& signal) {
+// Whole numbers over more than `range`.
+bool are_whole(const std::vector<double>& signal, double range) {
   const auto [low, high] = std::minmax_element(signal.begin(), signal.end());
-  return *high - *low > 100.0 && std::all_of(signal.begin(), signal.end(), [](double v) { return v == std::round(v); });
+  return *high - *low > range && std::all_of(signal.begin(), signal.end(), [](double v) { return v == std::round(v); });
 }
 
 void warn_of_unit(const Experiment& experiment, std::string_view column, const std::string& what,
-                  std::string_view likely, Findings& findings) {
+                  std::string_view likely, Findings& findings, std::string_view or_else = "") {
   findings.add(Severity::warning, "unit", experiment.file.string(), 0, std::string(column),
-               fmt::format("in \"{}\" {}: that is likely {}", experiment.name, what, likely),
+               fmt::format("in \"{}\" {}: that is likely {}{}", experiment.name, what, likely, or_else),
                fmt::format("if so, write unit = \"{}\" under [columns.{}] in dataset.toml", likely, column));
 }
 
@@ -115,6 +120,25 @@ void check_clipping(Experiment& experiment, Findings& findings) {
                     100.0 * static_cast<double>(runs.extreme_samples) / static_cast<double>(signal.size()),
                     runs.at_extremes.size()),
         "raise the limit or the sensor's range, or move more gently");
+  }
+}
+
+void check_whole_numbers(const Experiment& experiment, Findings& findings) {
+  for (const Column column : {Column::motor_position, Column::output_position})
+    if (experiment.has(column) && are_whole(experiment[column], 100.0))
+      warn_of_unit(experiment, column_name(column), "it holds whole numbers only", "counts", findings,
+                   " (or mdeg, where a turn is 360000)");
+  for (const Column column : {Column::current, Column::motor_torque, Column::torque}) {
+    if (!experiment.has(column) || !are_whole(experiment[column], 20.0)) continue;
+    // Above that the range says mA.
+    if (usual_size(experiment[column]) > kMostAmperes) continue;
+    const std::string_view name = column_name(column);
+    findings.add(
+        Severity::warning, "unit", experiment.file.string(), 0, std::string(name),
+        fmt::format("in \"{}\" it holds whole numbers only: that is likely per cent or per mille of the rated "
+                    "value",
+                    experiment.name),
+        fmt::format("if so, write scale = RATED VALUE / 100 (or / 1000) under [columns.{}] in dataset.toml", name));
   }
 }
 
@@ -151,18 +175,14 @@ void check_ranges(const Experiment& experiment, Axis axis, Findings& findings) {
       warn_of_unit(experiment, column_name(range.column),
                    fmt::format("it reaches {:.4g} {}", size, unit_of(range.column, axis)), range.likely, findings);
   }
-  for (const Column column : {Column::motor_position, Column::output_position})
-    if (experiment.has(column) && are_counts(experiment[column]))
-      warn_of_unit(experiment, column_name(column), "it holds whole numbers only", "counts", findings);
   if (experiment.has(Column::temperature)) {
     const double size = usual_size(experiment[Column::temperature]);
     if (size > 200.0)
       warn_of_unit(experiment, "temperature_c", fmt::format("it reaches {:.4g} degC", size),
                    size > 240.0 && size < 450.0 ? "K" : "degF", findings);
   }
-  if (experiment.sample_s >= 0.5)
-    warn_of_unit(experiment, "time_s", fmt::format("a sample lasts {:.4g} s", experiment.sample_s),
-                 experiment.sample_s >= 50.0 ? "us" : "ms", findings);
+  if (const auto unit = unit_of_time_step(experiment.sample_s))
+    warn_of_unit(experiment, "time_s", fmt::format("a sample lasts {:.4g} s", experiment.sample_s), *unit, findings);
 }
 
 }  // namespace flexspline::data

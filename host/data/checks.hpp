@@ -14,11 +14,18 @@ namespace flexspline::data {
 void check_clipping(Experiment& experiment, Findings& findings);
 // Steps of a whole turn between samples: "wrapped_position"; where that is tolerated the turns are added.
 void check_wrapped_positions(Experiment& experiment, Axis axis, Findings& findings);
+// Positions and efforts in whole numbers only: "unit", with counts, thousandths or shares of a rated value as the
+// likely ones. Once resampled they are whole numbers no longer.
+void check_whole_numbers(const Experiment& experiment, Findings& findings);
 
 // On the uniform time base.
 
 // Velocity against the derivative of position: "velocity_position_mismatch".
 void check_velocities(const Experiment& experiment, const DriveFacts& drive, Findings& findings);
+// Velocity that is late against its position, as filtered ones are: "velocity_lag".
+void check_velocity_lag(const Experiment& experiment, Findings& findings);
+// Current or motor torque that takes energy out of the drive on its way there and back: "sign".
+void check_effort_sign(const Experiment& experiment, Findings& findings);
 // Output against motor position and gear ratio: "gear_ratio".
 void check_gear_ratio(const Experiment& experiment, const DriveFacts& drive, Findings& findings);
 // Long stretches without motion: "standstill", and masked unless the load is locked or all of it is at rest.

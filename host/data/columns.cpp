@@ -27,8 +27,9 @@ std::string near_column(std::string_view name) {
 
 class Planner {
  public:
-  Planner(const Recording& recording, std::string file, const DatasetToml* toml, Findings& findings)
-      : recording_(recording), file_(std::move(file)), toml_(toml), findings_(findings) {
+  Planner(const Recording& recording, std::string file, const DatasetToml* toml, std::optional<std::size_t> element,
+          Findings& findings)
+      : recording_(recording), file_(std::move(file)), toml_(toml), element_(element), findings_(findings) {
     if (toml_ != nullptr) plan_.mapping_file = toml_->file.string();
   }
 
@@ -52,12 +53,13 @@ class Planner {
   }
 
   // Slot of the column of theirs with this name.
-  std::optional<std::size_t> slot(std::string_view theirs) {
+  std::optional<std::size_t> slot(std::string_view wanted) {
     const std::vector<std::string>& names = recording_.names();
+    const std::string theirs = element_ ? name_of_element(names, wanted, *element_) : std::string(wanted);
     const auto at = std::find(names.begin(), names.end(), theirs);
     if (at == names.end()) return std::nullopt;
     if (std::find(at + 1, names.end(), theirs) != names.end())
-      findings_.add(Severity::error, "header", file_, recording_.header_line(), std::string(theirs),
+      findings_.add(Severity::error, "header", file_, recording_.header_line(), theirs,
                     "this name stands twice in the header", "rename one of the two");
     const std::size_t index = static_cast<std::size_t>(at - names.begin());
     const auto known = std::find(plan_.wanted.begin(), plan_.wanted.end(), index);
@@ -69,6 +71,12 @@ class Planner {
 
   std::string near_first(std::string_view name) const {
     return quoted_list(text::nearest_first(name, recording_.names()));
+  }
+
+  // A unit that stands in the file holds where nobody says otherwise.
+  void take_unit_of_file(std::size_t slot, ColumnMapping& mapping) const {
+    if (mapping.unit.empty() && mapping.scale == 1.0 && mapping.offset == 0.0)
+      mapping.unit = recording_.unit(plan_.wanted[slot]);
   }
 
   // Something of this name is there, but no column can be made of it.
@@ -107,6 +115,7 @@ class Planner {
       return false;
     }
     plan_.time_slot = *found;
+    take_unit_of_file(*found, plan_.time);
     return true;
   }
 
@@ -130,6 +139,7 @@ class Planner {
     }
     if (!has_length_of_time(*found, name)) return;
     planned.slot = *found;
+    take_unit_of_file(*found, planned.mapping);
     plan_.columns.push_back(planned);
   }
 
@@ -151,6 +161,7 @@ class Planner {
   const Recording& recording_;
   std::string file_;
   const DatasetToml* toml_;
+  std::optional<std::size_t> element_;
   Findings& findings_;
   ColumnPlan plan_;
   bool has_time_ = false;
@@ -159,8 +170,9 @@ class Planner {
 }  // namespace
 
 std::optional<ColumnPlan> plan_columns(const Recording& recording, const std::filesystem::path& path,
-                                       const DatasetToml* toml, Findings& findings) {
-  return Planner(recording, path.string(), toml, findings).plan();
+                                       const DatasetToml* toml, std::optional<std::size_t> element,
+                                       Findings& findings) {
+  return Planner(recording, path.string(), toml, element, findings).plan();
 }
 
 namespace {

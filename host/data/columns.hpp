@@ -30,9 +30,10 @@ struct ColumnPlan {
   std::vector<std::string> unused;
 };
 
-// Empty if the file has no time or no column of ours; the findings say what to map.
+// Empty if the file has no time or no column of ours; the findings say what to map. `element`: of struct arrays, where
+// "log.iq" stands for "log(2).iq" then.
 std::optional<ColumnPlan> plan_columns(const Recording& recording, const std::filesystem::path& path,
-                                       const DatasetToml* toml, Findings& findings);
+                                       const DatasetToml* toml, std::optional<std::size_t> element, Findings& findings);
 
 // Theirs to ours: the unit first, then scale and offset.
 struct Conversion {

@@ -178,6 +178,8 @@ class Reader {
         entry.from_s = number(key, value);
       else if (key == "to_s")
         entry.to_s = number(key, value);
+      else if (key == "element")
+        entry.element = element(value);
       else if (key == "name")
         take(entry.keys, "experiment", value);
       else if (is_experiment_key(key))
@@ -201,8 +203,15 @@ class Reader {
     toml_.experiments.push_back(std::move(entry));
   }
 
+  std::optional<std::size_t> element(const Node& node) {
+    const std::optional<double> value = number("element", node);
+    if (value && *value >= 1.0 && *value < 1e6 && *value == std::floor(*value)) return static_cast<std::size_t>(*value);
+    if (value) wrong_type(node, "element", "a whole number from 1 on");
+    return std::nullopt;
+  }
+
   static std::string near_experiment_key(std::string_view key) {
-    const std::string near = text::nearest(key, {"file", "name", "from_s", "to_s", "role", "load"});
+    const std::string near = text::nearest(key, {"file", "name", "from_s", "to_s", "element", "role", "load"});
     return near.empty() ? nearest_key(key) : near;
   }
 

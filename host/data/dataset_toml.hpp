@@ -25,6 +25,7 @@ struct ExperimentEntry {
   std::filesystem::path file;  // the folder of dataset.toml is put before a relative one
   std::optional<double> from_s;
   std::optional<double> to_s;
+  std::optional<std::size_t> element;  // of struct arrays in a MAT file, from one
   KeyMap keys;
   std::size_t line = 0;
 };

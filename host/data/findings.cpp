@@ -6,6 +6,7 @@
 #include <array>
 
 #include "host/text/nearest.hpp"
+#include "host/text/shortened.hpp"
 
 namespace flexspline::data {
 namespace {
@@ -20,11 +21,12 @@ constexpr std::array kKinds = {
     KindInfo{"text_in_number", Severity::error, false},
     KindInfo{"not_finite", Severity::error, true},
     KindInfo{"row_length", Severity::error, true},
-    KindInfo{"time_not_increasing", Severity::error, false},
+    KindInfo{"time_not_increasing", Severity::error, true},
     KindInfo{"missing_column", Severity::error, false},
     KindInfo{"too_few_samples", Severity::error, false},
     KindInfo{"velocity_position_mismatch", Severity::error, true},
     KindInfo{"wrapped_position", Severity::error, true},
+    KindInfo{"time_stamps", Severity::note, false},
     KindInfo{"jitter", Severity::warning, true},
     KindInfo{"conflict", Severity::error, true},
     KindInfo{"gap", Severity::warning, false},
@@ -32,6 +34,8 @@ constexpr std::array kKinds = {
     KindInfo{"standstill", Severity::warning, false},
     KindInfo{"constant_column", Severity::warning, false},
     KindInfo{"unit", Severity::warning, false},
+    KindInfo{"velocity_lag", Severity::warning, false},
+    KindInfo{"sign", Severity::warning, false},
     KindInfo{"gear_ratio", Severity::warning, false},
     KindInfo{"key_differs", Severity::warning, false},
     KindInfo{"unknown_key", Severity::warning, false},
@@ -39,6 +43,14 @@ constexpr std::array kKinds = {
     KindInfo{"unused_column", Severity::note, false},
     KindInfo{"empty_column", Severity::note, false},
 };
+
+// Names and values from files may be of any length.
+void shorten(Finding& finding) {
+  constexpr std::size_t kLongestColumn = 200, kLongestSentence = 4000;
+  finding.column = text::shortened(finding.column, kLongestColumn);
+  finding.what = text::shortened(finding.what, kLongestSentence);
+  finding.remedy = text::shortened(finding.remedy, kLongestSentence);
+}
 
 }  // namespace
 
@@ -80,6 +92,7 @@ bool Findings::tolerates(std::string_view kind) const {
 }
 
 Severity Findings::add(Finding finding) {
+  shorten(finding);
   if (finding.severity == Severity::error && tolerates(finding.kind)) {
     const auto kind =
         std::find_if(kKinds.begin(), kKinds.end(), [&](const KindInfo& k) { return k.name == finding.kind; });
@@ -101,9 +114,18 @@ Severity Findings::add(Severity severity, std::string kind, std::string file, st
       Finding{severity, std::move(kind), std::move(file), line, std::move(column), std::move(what), std::move(remedy)});
 }
 
+void Findings::fail_later(std::string kind, std::string file, std::size_t line, std::string column, std::string what,
+                          std::string remedy) {
+  Finding finding{Severity::error,   std::move(kind), std::move(file),  line,
+                  std::move(column), std::move(what), std::move(remedy)};
+  shorten(finding);
+  list_.push_back(std::move(finding));
+}
+
 void Findings::fail(std::string kind, std::string file, std::size_t line, std::string what, std::string remedy) {
-  list_.push_back(
-      Finding{Severity::error, std::move(kind), std::move(file), line, "", std::move(what), std::move(remedy)});
+  Finding finding{Severity::error, std::move(kind), std::move(file), line, "", std::move(what), std::move(remedy)};
+  shorten(finding);
+  list_.push_back(std::move(finding));
   throw DataError(list_);
 }
 

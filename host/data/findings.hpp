@@ -33,6 +33,9 @@ class Findings {
   Severity add(Finding finding);
   Severity add(Severity severity, std::string kind, std::string file, std::size_t line, std::string column,
                std::string what, std::string remedy);
+  // An error that stays one though its kind may be tolerated: here there is nothing to go on with.
+  void fail_later(std::string kind, std::string file, std::size_t line, std::string column, std::string what,
+                  std::string remedy);
   // Adds an error and throws it with all that was found so far.
   [[noreturn]] void fail(std::string kind, std::string file, std::size_t line, std::string what, std::string remedy);
   bool has_errors() const;

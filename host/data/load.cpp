@@ -77,7 +77,9 @@ class Loader {
         read_file(file, &toml, nullptr);
     for (const ExperimentEntry& entry : toml.experiments) read_file(entry.file, &toml, &entry);
     for (const auto& [name, mapping] : toml.columns)
-      if (name != "time_s" && found_mappings_.count({path.string(), name}) == 0 && !has_error_of(name))
+      // A file without its time was not looked at any further.
+      if (name != "time_s" && !has_error_of("time_s") && found_mappings_.count({path.string(), name}) == 0 &&
+          !has_error_of(name))
         findings_.add(Severity::error, "missing_column", path.string(), mapping.line, name,
                       fmt::format("no file has the column \"{}\" that this is mapped from", mapping.source),
                       "write source as it stands in the header of the files, or take the mapping out");
@@ -113,8 +115,9 @@ class Loader {
   };
 
   // Null if the file cannot be used; what is wrong is among the findings.
-  const Source* source(const fs::path& path, const DatasetToml* toml) {
-    const std::string key = (toml == nullptr ? "" : toml->file.string()) + "\n" + real_path(path).string();
+  const Source* source(const fs::path& path, const DatasetToml* toml, std::optional<std::size_t> element) {
+    const std::string key = fmt::format("{}\n{}\n{}", toml == nullptr ? "" : toml->file.string(),
+                                        real_path(path).string(), element.value_or(0));
     if (cached_key_ == key) return cached_.get();
     cached_key_ = key;
     cached_.reset();
@@ -127,7 +130,7 @@ class Loader {
     }
     const std::unique_ptr<Recording> recording = open_recording(path, findings_);
     KeyMap keys = keys_of_header(recording->keys(), path.string(), findings_);
-    std::optional<ColumnPlan> plan = plan_columns(*recording, path, toml, findings_);
+    std::optional<ColumnPlan> plan = plan_columns(*recording, path, toml, element, findings_);
     if (!plan) return nullptr;
     Table table = recording->read(plan->wanted);
     cached_ = std::make_unique<Source>(Source{std::move(*plan), std::move(table), std::move(keys)});
@@ -137,14 +140,15 @@ class Loader {
   void read_file(const fs::path& path, const DatasetToml* toml, const ExperimentEntry* entry) {
     PartBounds bounds;
     if (entry != nullptr) bounds = {entry->from_s, entry->to_s};
-    const std::string identity =
-        fmt::format("{} {} {}", real_path(path).string(), bounds.from_s.value_or(-1e300), bounds.to_s.value_or(1e300));
+    const std::optional<std::size_t> element = entry != nullptr ? entry->element : std::nullopt;
+    const std::string identity = fmt::format("{} {} {} {}", real_path(path).string(), bounds.from_s.value_or(-1e300),
+                                             bounds.to_s.value_or(1e300), element.value_or(0));
     if (!seen_.insert(identity).second) {
       findings_.add(Severity::warning, "duplicate", path.string(), 0, "",
                     "this measurement was given twice and is used once", "take one of them out");
       return;
     }
-    const Source* file = source(path, toml);
+    const Source* file = source(path, toml, element);
     if (file == nullptr) return;
     for (const PlannedColumn& column : file->plan.columns)
       if (toml != nullptr && column.mapped)

@@ -91,7 +91,7 @@ std::string text_of(const matvar_t& variable, std::size_t count) {
 
 class Flattener {
  public:
-  explicit Flattener(MatContents& contents) : contents_(contents) {}
+  explicit Flattener(FileContents& contents) : contents_(contents) {}
 
   void take(const matvar_t& variable, const std::string& name, int depth = 0) {
     const std::vector<std::size_t> dims = dims_of(variable);
@@ -163,7 +163,7 @@ class Flattener {
     }
   }
 
-  MatContents& contents_;
+  FileContents& contents_;
 };
 
 // MATLAB's own parts, such as what its objects refer to, have no name of a variable.
@@ -173,8 +173,8 @@ bool is_name(const char* name) {
 
 }  // namespace
 
-MatContents read_mat_unguarded(const std::filesystem::path& path) {
-  MatContents contents;
+FileContents read_mat_unguarded(const std::filesystem::path& path) {
+  FileContents contents;
   const File file(Mat_Open(path.c_str(), MAT_ACC_RDONLY));
   if (!file) {
     contents.failure = "is damaged or cut short: it cannot be opened";

@@ -25,6 +25,8 @@ std::string cause_of(double factor, const DriveFacts& drive) {
   if (near(size, 360.0 / kTurn_rad)) return "the velocity is in deg/s" + sign;
   if (near(size, 1.0 / kTurn_rad)) return "the velocity is in turns per second, or the position in turns" + sign;
   if (near(size, kTurn_rad / 360.0)) return "the position is in degrees" + sign;
+  if (near(size, 360e3 / kTurn_rad)) return "the velocity is in mdeg/s" + sign;
+  if (near(size, kTurn_rad / 360e3)) return "the position is in millidegrees" + sign;
   if (near(size, 6.0)) return "the velocity is in rpm and the position in turns or degrees" + sign;
   if (near(size, 1000.0)) return "the velocity is in thousandths (mm/s, mrad/s), or the time in ms" + sign;
   if (near(size, 1e-3)) return "the position is in thousandths (mm, mrad)" + sign;

@@ -7,6 +7,7 @@
 #include <cstdint>
 #include <limits>
 #include <map>
+#include <numeric>
 
 #include "host/data/checks.hpp"
 #include "host/data/time_base.hpp"
@@ -31,7 +32,10 @@ class Part {
                   "write all numbers one way, and without separators of thousands");
     if (!time) return false;
     select(bounds, *time);
-    if (!remove_bad_rows() || !time_increases()) return false;
+    if (table_.time_stamps)
+      findings_.add(Severity::note, "time_stamps", file_, 0, plan_.wanted_names[plan_.time_slot],
+                    "dates and times were read as seconds since the first", "");
+    if (!remove_bad_rows() || !order_rows() || !time_increases()) return false;
     if (rows_.size() < kMinimumSamples) return fail_too_few(bounds);
     // Before there are columns, so that its own array does not stand beside them in memory.
     take_time();
@@ -155,15 +159,59 @@ class Part {
     return tolerated;
   }
 
+  // Lines that a logger wrote twice, or a network brought in another order: where that is tolerated they are used once
+  // and in the order of time. Rows that lie further apart are another recording, and `time_increases` says so.
+  bool order_rows() {
+    if (!findings_.tolerates("time_not_increasing")) return true;
+    constexpr std::size_t kFurthest = 10;
+    std::vector<std::size_t> order(rows_.size());
+    std::iota(order.begin(), order.end(), std::size_t{0});
+    std::stable_sort(order.begin(), order.end(),
+                     [&](std::size_t a, std::size_t b) { return time_[rows_[a]] < time_[rows_[b]]; });
+    std::vector<std::uint32_t> sorted;
+    std::size_t moved = 0, repeated = 0, first = 0;
+    for (std::size_t i = 0; i < order.size(); ++i) {
+      const std::uint32_t row = rows_[order[i]];
+      if (std::max(order[i], i) - std::min(order[i], i) > kFurthest) return true;
+      if (!sorted.empty() && time_[sorted.back()] == time_[row] && is_repeated(sorted.back(), row)) {
+        ++repeated;
+      } else {
+        if (!sorted.empty() && row < sorted.back()) ++moved;
+        sorted.push_back(row);
+      }
+      if (first == 0 && repeated + moved > 0) first = row;
+    }
+    if (moved + repeated == 0) return true;
+    rows_ = std::move(sorted);
+    findings_.add(
+        Severity::error, "time_not_increasing", file_, table_.line(first), plan_.wanted_names[plan_.time_slot],
+        fmt::format("{}{} lines repeat the one before and {} stand out of order", table_.place(first), repeated, moved),
+        "they were used once, in the order of time");
+    return true;
+  }
+
+  bool is_repeated(std::uint32_t a, std::uint32_t b) const {
+    return std::all_of(table_.columns.begin(), table_.columns.end(), [&](const std::vector<double>& column) {
+      return column[a] == column[b] || (std::isnan(column[a]) && std::isnan(column[b]));
+    });
+  }
+
   bool time_increases() {
     for (std::size_t i = 1; i < rows_.size(); ++i) {
       const double before = time_[rows_[i - 1]];
       const double now = time_[rows_[i]];
       if (now > before) continue;
-      return fail("time_not_increasing", table_.line(rows_[i]), plan_.wanted_names[plan_.time_slot],
-                  fmt::format("{}the time {:.9g} s comes after {:.9g} s", table_.place(rows_[i]), now, before),
-                  now == before ? "log time with more digits, or take repeated lines out"
-                                : "if recordings follow each other in this file, split it");
+      const bool tolerated = findings_.tolerates("time_not_increasing");
+      const std::string repeated = tolerated
+                                       ? "; these lines differ, so they are not one line written twice"
+                                       : "; --tolerate time_not_increasing uses lines that are repeated exactly once";
+      const std::string swapped = tolerated ? "" : "; --tolerate time_not_increasing sorts lines that are swapped";
+      // Not tolerable here: there is no order to go on with.
+      findings_.fail_later("time_not_increasing", file_, table_.line(rows_[i]), plan_.wanted_names[plan_.time_slot],
+                           fmt::format("{}the time {:.9g} s comes after {:.9g} s", table_.place(rows_[i]), now, before),
+                           now == before ? "log time with more digits, or take repeated lines out" + repeated
+                                         : "if recordings follow each other in this file, split it" + swapped);
+      return false;
     }
     return true;
   }
@@ -178,8 +226,16 @@ class Part {
   }
 
   void take_time() {
-    for (std::size_t i = 0; i < rows_.size(); ++i) time_[i] = time_[rows_[i]];
-    time_.resize(rows_.size());
+    // In place where rows stand in order, as one array less is what long recordings need.
+    if (!std::is_sorted(rows_.begin(), rows_.end())) {
+      std::vector<double> ordered;
+      ordered.reserve(rows_.size());
+      for (const std::uint32_t row : rows_) ordered.push_back(time_[row]);
+      time_ = std::move(ordered);
+    } else {
+      for (std::size_t i = 0; i < rows_.size(); ++i) time_[i] = time_[rows_[i]];
+      time_.resize(rows_.size());
+    }
     experiment_.time_s = std::move(time_);
   }
 
@@ -200,6 +256,8 @@ class Part {
     report_gaps(base);
     check_wrapped_positions(experiment_, axis, findings_);
     check_clipping(experiment_, findings_);
+    // Between the samples nothing is a whole number any more.
+    check_whole_numbers(experiment_, findings_);
     if (!base.uniform()) resample(experiment_, base);
     return drop_short_segments();
   }
@@ -269,6 +327,8 @@ bool read_part(const Table& table, const ColumnPlan& plan, const PartBounds& bou
 
 void check_part(Experiment& experiment, const DriveFacts& drive, Findings& findings) {
   check_velocities(experiment, drive, findings);
+  check_velocity_lag(experiment, findings);
+  check_effort_sign(experiment, findings);
   check_gear_ratio(experiment, drive, findings);
   check_standstill(experiment, findings);
   check_constant_columns(experiment, findings);

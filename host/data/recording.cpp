@@ -3,22 +3,27 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <charconv>
+#include <iterator>
 
+#include "host/data/array_file.hpp"
 #include "host/data/csv.hpp"
-#include "host/data/mat.hpp"
-#include "host/data/mat5_check.hpp"
+#include "host/data/file_format.hpp"
 
 namespace flexspline::data {
 namespace {
 
 namespace fs = std::filesystem;
 
-bool is_recording(const fs::path& path) {
-  const std::string extension = lower_extension(path);
-  return extension == ".csv" || extension == ".tsv" || extension == ".mat";
-}
-
 }  // namespace
+
+bool is_recording(const fs::path& path) {
+  static constexpr std::string_view kEndings[] = {".csv", ".tsv", ".mat", ".h5",  ".hdf5",
+                                                  ".npz", ".npy", ".bag", ".db3", ".mcap"};
+  std::string extension = lower_extension(path);
+  if (extension == ".gz") extension = lower_extension(path.stem());
+  return std::find(std::begin(kEndings), std::end(kEndings), extension) != std::end(kEndings);
+}
 
 std::string lower_extension(const fs::path& path) {
   std::string extension = path.extension().string();
@@ -31,11 +36,33 @@ std::string Table::place(std::size_t row) const {
   return lines.empty() ? fmt::format("sample {}: ", row + 1) : "";
 }
 
+std::string name_of_element(const std::vector<std::string>& names, std::string_view name, std::size_t element) {
+  for (std::size_t dot = name.find('.'); dot != std::string_view::npos; dot = name.find('.', dot + 1)) {
+    const std::string of_element = fmt::format("{}({}){}", name.substr(0, dot), element, name.substr(dot));
+    if (std::find(names.begin(), names.end(), of_element) != names.end()) return of_element;
+  }
+  return std::string(name);
+}
+
+ElementName without_element(std::string_view name) {
+  const std::size_t open = name.find('('), close = name.find(").");
+  if (open == std::string_view::npos || close == std::string_view::npos || close <= open + 1)
+    return {std::string(name), 0};
+  std::size_t element = 0;
+  const char* const end = name.data() + close;
+  const auto [stop, error] = std::from_chars(name.data() + open + 1, end, element);
+  if (error != std::errc{} || stop != end) return {std::string(name), 0};
+  return {fmt::format("{}{}", name.substr(0, open), name.substr(close + 1)), element};
+}
+
 std::unique_ptr<Recording> open_recording(const fs::path& path, Findings& findings) {
-  const MatVersion version = mat_version(path);
-  if (lower_extension(path) == ".mat" || version == MatVersion::v5 || version == MatVersion::v7_3)
-    return std::make_unique<MatFile>(path, findings);
-  return std::make_unique<CsvFile>(path, findings);
+  const FileFormat format = format_of(path);
+  if (format == FileFormat::foreign) {
+    const WayOut way = way_out(path);
+    findings.fail("format", path.string(), 0, way.what, way.remedy);
+  }
+  if (format == FileFormat::text && lower_extension(path) != ".mat") return std::make_unique<CsvFile>(path, findings);
+  return std::make_unique<ArrayFile>(path, format, findings);
 }
 
 std::vector<fs::path> recordings_in(const fs::path& folder, Findings& findings) {
@@ -45,7 +72,7 @@ std::vector<fs::path> recordings_in(const fs::path& folder, Findings& findings) 
   std::sort(files.begin(), files.end());
   if (files.empty())
     findings.fail("file", folder.string(), 0, "the folder has no CSV or MAT file and no dataset.toml",
-                  "give a folder with .csv, .tsv or .mat files");
+                  "give a folder with .csv, .tsv, .mat, .h5, .npz, .npy, .bag, .db3 or .mcap files");
   return files;
 }
 

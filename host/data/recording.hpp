@@ -1,4 +1,4 @@
-// A file with columns of numbers under the names that a logger gave them: CSV text or a MAT file.
+// A file with columns of numbers under the names that a logger gave them: CSV text, MAT, HDF5, NumPy.
 #pragma once
 
 #include <cstddef>
@@ -43,6 +43,7 @@ struct Table {
   std::vector<std::uint32_t> lines;          // line in the file of each row; empty where the file has no lines
   std::vector<BadCell> bad_cells;            // in the order of rows
   std::vector<BadRow> bad_rows;
+  bool time_stamps = false;  // some fields are dates or times of day; their values are seconds since the first
   std::size_t mixed_decimals_line = 0;  // first decimal comma in a file that has decimal points as well; 0: none
 
   std::size_t rows() const { return columns.empty() ? 0 : columns.front().size(); }
@@ -63,6 +64,9 @@ class Recording {
   virtual const std::vector<HeaderKey>& keys() const = 0;
   virtual std::size_t header_line() const { return 0; }
 
+  // The unit that the file states for a name beside it; empty where it does not.
+  virtual std::string unit(std::size_t) const { return {}; }
+
   // Number of values under a name; columns of one length make one table. A CSV file is one table throughout, and says
   // 0.
   virtual std::size_t length(std::size_t) const { return 0; }
@@ -73,11 +77,23 @@ class Recording {
   virtual Table read(std::span<const std::size_t> wanted) const = 0;
 };
 
-// Opens a file as MAT by its first bytes or its ending, else as CSV. Throws DataError (with what `findings` holds) of
-// kind "file", "format" or "header".
+// "log.iq" as the names have it for element 2 of a struct array: "log(2).iq"; the name itself where there is none.
+std::string name_of_element(const std::vector<std::string>& names, std::string_view name, std::size_t element);
+// The other way round: "log.iq" and 2 of "log(2).iq"; the name itself and 0 where it is of no struct array.
+struct ElementName {
+  std::string name;
+  std::size_t element = 0;
+};
+ElementName without_element(std::string_view name);
+
+// Opens a file by its first bytes as what it is; what is of no known format as CSV. Throws DataError (with what
+// `findings` holds) of kind "file", "format" or "header".
 std::unique_ptr<Recording> open_recording(const std::filesystem::path& path, Findings& findings);
 
-// The recordings right in a folder, by name: .csv, .tsv and .mat in any case. Throws DataError of kind "file" if there
+// Whether a file is read as a recording where a folder is given: by its ending.
+bool is_recording(const std::filesystem::path& path);
+
+// The recordings right in a folder, by name. Throws DataError of kind "file" if there
 // are none.
 std::vector<std::filesystem::path> recordings_in(const std::filesystem::path& folder, Findings& findings);
 

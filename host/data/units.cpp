@@ -25,6 +25,7 @@ using enum Quantity;
 constexpr auto kUnits = std::to_array<Entry>({
     {"s", "s", {time, 1.0, 0.0}},
     {"sec", "", {time, 1.0, 0.0}},
+    {"seconds", "", {time, 1.0, 0.0}},
     {"ms", "ms", {time, 1e-3, 0.0}},
     {"us", "us", {time, 1e-6, 0.0}},
     {"ns", "ns", {time, 1e-9, 0.0}},
@@ -37,6 +38,10 @@ constexpr auto kUnits = std::to_array<Entry>({
     {"deg", "deg", {angle, kPi / 180.0, 0.0}},
     {"degree", "", {angle, kPi / 180.0, 0.0}},
     {"degrees", "", {angle, kPi / 180.0, 0.0}},
+    {"mdeg", "mdeg", {angle, kPi / 180000.0, 0.0}},
+    {"Grad",
+     "",
+     {angle, kPi / 180.0, 0.0}},  // German; the gon, which has the same name in small letters, drives never use
     {"arcmin", "arcmin", {angle, kPi / 10800.0, 0.0}},
     {"arcsec", "arcsec", {angle, kPi / 648000.0, 0.0}},
     {"rev", "rev", {angle, 2.0 * kPi, 0.0}},
@@ -45,6 +50,10 @@ constexpr auto kUnits = std::to_array<Entry>({
     {"rad/s", "rad/s", {angular_velocity, 1.0, 0.0}},
     {"mrad/s", "mrad/s", {angular_velocity, 1e-3, 0.0}},
     {"deg/s", "deg/s", {angular_velocity, kPi / 180.0, 0.0}},
+    {"mdeg/s", "mdeg/s", {angular_velocity, kPi / 180000.0, 0.0}},
+    {"Grad/s", "", {angular_velocity, kPi / 180.0, 0.0}},
+    {"degree/s", "", {angular_velocity, kPi / 180.0, 0.0}},
+    {"degrees/s", "", {angular_velocity, kPi / 180.0, 0.0}},
     {"dps", "", {angular_velocity, kPi / 180.0, 0.0}},
     {"rpm", "rpm", {angular_velocity, kPi / 30.0, 0.0}},
     {"RPM", "", {angular_velocity, kPi / 30.0, 0.0}},
@@ -96,6 +105,7 @@ constexpr auto kUnits = std::to_array<Entry>({
     {"ticks", "", {counts, 1.0, 0.0}},
     {"inc", "", {counts, 1.0, 0.0}},
     {"counts/s", "counts/s", {counts_rate, 1.0, 0.0}},
+    {"cnt/s", "", {counts_rate, 1.0, 0.0}},
     {"count/s", "", {counts_rate, 1.0, 0.0}},
     {"ticks/s", "", {counts_rate, 1.0, 0.0}},
     {"inc/s", "", {counts_rate, 1.0, 0.0}},
@@ -105,6 +115,7 @@ constexpr auto kUnits = std::to_array<Entry>({
 std::string normalised(std::string_view text) {
   std::string unit = text::unit_in_ascii(text);
   std::erase_if(unit, [](char c) { return c == '*' || c == ' '; });
+  if (unit.ends_with("/sec")) unit.resize(unit.size() - 2);
   return unit;
 }
 
@@ -128,6 +139,13 @@ std::string known_units(Quantity quantity) {
   if (quantity == angle || quantity == length) list(counts);
   if (quantity == angular_velocity || quantity == velocity) list(counts_rate);
   return text;
+}
+
+std::optional<std::string_view> unit_of_time_step(double step) {
+  if (step >= 5e4) return "ns";
+  if (step >= 50.0) return "us";
+  if (step >= 0.5) return "ms";
+  return std::nullopt;
 }
 
 Quantity quantity_of(Column column, Axis axis) {

@@ -36,6 +36,9 @@ std::optional<Unit> unit_from_text(std::string_view text);
 // "rpm, rad/s, deg/s, ...": the units that a quantity may be given in (with counts where an encoder may give it).
 std::string known_units(Quantity quantity);
 
+// The unit that a step between samples is likely in, where it cannot be seconds: a drive is sampled at 10 Hz to 20 kHz.
+std::optional<std::string_view> unit_of_time_step(double step);
+
 Quantity quantity_of(Column column, Axis axis);
 std::string_view si_unit(Quantity quantity);
 

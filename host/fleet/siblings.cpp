@@ -9,6 +9,8 @@
 #include <nlohmann/json.hpp>
 #include <random>
 
+#include "host/data/recording.hpp"
+
 namespace flexspline::fleet {
 namespace {
 
@@ -49,6 +51,27 @@ bool is_result(const json& content) {
   return content.is_object() && content.value("format", json()) == json(kResultFormat);
 }
 
+// A folder with a drive's measurements in it.
+bool is_of_a_drive(const fs::path& folder) {
+  std::error_code error;
+  if (!fs::is_directory(folder, error)) return false;
+  if (fs::exists(folder / "dataset.toml", error) || fs::exists(folder / "base-model.toml", error)) return true;
+  const auto entries = fs::directory_iterator(folder, error);
+  return !error && std::any_of(begin(entries), end(entries),
+                               [](const fs::directory_entry& entry) { return data::is_recording(entry.path()); });
+}
+
+// A drive whose job never wrote anything: it counts, or nobody notices that it is missing.
+DriveResult without_result(const fs::path& folder) {
+  const fs::path whole = fs::absolute(folder).lexically_normal();
+  DriveResult result;
+  result.drive = (whole.has_filename() ? whole : whole.parent_path()).filename().string();
+  result.file = folder;
+  result.failed =
+      fmt::format("there is no {} in {}; run flexspline fleet run {}", kResultName, folder.string(), folder.string());
+  return result;
+}
+
 // Results at a place that the user named.
 void gather(const fs::path& place, std::vector<DriveResult>& results) {
   std::error_code error;
@@ -63,6 +86,7 @@ void gather(const fs::path& place, std::vector<DriveResult>& results) {
   std::vector<fs::path> entries;
   for (const fs::directory_entry& entry : fs::directory_iterator(place)) entries.push_back(entry.path());
   std::sort(entries.begin(), entries.end());
+  const std::size_t before = results.size();
   for (const fs::path& entry : entries) {
     if (fs::exists(entry / kResultName, error)) {
       results.push_back(result_from(read_json(entry / kResultName), entry / kResultName));
@@ -70,8 +94,11 @@ void gather(const fs::path& place, std::vector<DriveResult>& results) {
       // Others may lie here, too.
       const json content = read_json(entry);
       if (is_result(content)) results.push_back(result_from(content, entry));
+    } else if (is_of_a_drive(entry)) {
+      results.push_back(without_result(entry));
     }
   }
+  if (results.size() == before && is_of_a_drive(place)) results.push_back(without_result(place));
 }
 
 }  // namespace
@@ -113,7 +140,10 @@ DriveResult result_from(const json& content, const fs::path& file) {
 std::vector<DriveResult> read_results(const std::vector<fs::path>& places) {
   std::vector<DriveResult> results;
   for (const fs::path& place : places) gather(place, results);
-  if (results.empty())
+  const bool none = std::all_of(results.begin(), results.end(), [](const DriveResult& result) {
+    return fs::is_directory(result.file);  // where no job wrote anything
+  });
+  if (none)
     throw FleetError(fmt::format("there are no results in {}; flexspline fleet run makes one a drive",
                                  places.empty() ? std::string("no place") : places.front().string()));
   // Folders of one name in different places.

@@ -41,8 +41,9 @@ struct DriveResult {
 
 // From "flexspline-fleet-drive/1". Throws FleetError.
 DriveResult result_from(const nlohmann::json& json, const std::filesystem::path& file);
-// Files as they are; of a folder its own result, or those of the folders and *.json files in it, by name. Throws
-// FleetError where there is none or one cannot be read.
+// Files as they are; of a folder its own result, or those of the folders and *.json files in it, by name. A folder with
+// measurements and without a result counts as a drive that failed: its job was killed or never ran. Throws FleetError
+// where there is no result at all or one cannot be read.
 std::vector<DriveResult> read_results(const std::vector<std::filesystem::path>& places);
 
 // How a quantity lies over the drives that have it.

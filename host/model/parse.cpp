@@ -162,7 +162,7 @@ class Reader {
     result.type = text(*type, "type");
     const KnownEffect* known = known_.find(result.type);
     if (!known) {
-      const std::string meant = text::nearest(result.type, known_.names(), kSlips);
+      const std::string meant = text::nearest_or_first_words(result.type, known_.names(), kSlips);
       fail(type->line, fmt::format("there is no effect \"{}\"", result.type),
            meant.empty() ? "\"flexspline effects\" lists the names" : fmt::format("did you mean \"{}\"?", meant));
     }

@@ -3,12 +3,20 @@
 #include <fmt/format.h>
 #include <unistd.h>
 
+#include <cerrno>
 #include <cstdio>
 #include <cstdlib>
+#include <cstring>
+#include <iostream>
 #include <utility>
+
+#include "host/text/shortened.hpp"
 
 namespace flexspline::output {
 namespace {
+
+// Whatever a message quotes, it stays one that can be read.
+constexpr std::size_t kLongestMessage = 20000;
 
 bool may_style(int descriptor) {
   if (::isatty(descriptor) == 0) return false;
@@ -43,7 +51,8 @@ void Console::warn(std::string_view text) {
 void Console::error(std::string_view text) {
   clear_progress();
   std::fflush(stdout);
-  fmt::print(stderr, "flexspline{}{}: {}\n", command_.empty() ? "" : " ", command_, text);
+  fmt::print(stderr, "flexspline{}{}: {}\n", command_.empty() ? "" : " ", command_,
+             text::shortened(text, kLongestMessage));
 }
 
 void Console::progress(std::string_view stage) {
@@ -62,6 +71,15 @@ void Console::clear_progress() {
   fmt::print(stderr, "\r\x1b[K");
   std::fflush(stderr);
   progress_open_ = false;
+}
+
+std::string unwritten() {
+  std::cout.flush();
+  errno = 0;
+  const bool flushed = std::fflush(stdout) == 0;
+  const int reason = errno;
+  if (flushed && std::ferror(stdout) == 0 && std::cout.good()) return {};
+  return reason != 0 ? std::strerror(reason) : "an earlier part of it was lost";
 }
 
 }  // namespace flexspline::output

@@ -40,4 +40,8 @@ class Console {
   bool progress_open_ = false;
 };
 
+// Why what was said on standard output did not all arrive there (a full disk, a closed file); empty where it did. To be
+// asked once, at the end: until then part of it is in memory.
+std::string unwritten();
+
 }  // namespace flexspline::output

@@ -250,9 +250,49 @@ std::string verdict_in_words(const Diagnosis& d) {
   return {};
 }
 
+// What the experiments that are held out say. They decide whether an effect is named, so that their error is no proof
+// of the gain.
+void print_held_out(Console& console, const diagnosis::Resampling& r) {
+  std::vector<std::string> better, worse;
+  for (const diagnosis::Resampling::Found& f : r.found) {
+    if (!f.held_out_ratio || f.group.empty()) continue;
+    const std::string name = effect_in_words(f.group.front().effect, f.group.front().order);
+    (f.refused_by_holdout ? worse : better).push_back(fmt::format("{} {:.3f}", name, *f.held_out_ratio));
+  }
+  if (better.empty() && worse.empty()) return;
+  std::string text = "Error on the experiments that are held out, with the effect over without it: ";
+  text += listed(better.empty() ? worse : better);
+  if (!better.empty() && !worse.empty()) text += fmt::format("; {}", listed(worse));
+  text += worse.empty() ? "."
+                        : fmt::format(". It rises with {}, so {} not named.", listed(worse),
+                                      worse.size() > 1 ? "these are" : "that is");
+  console.line(wrapped(text +
+                       " As it was used to decide, it does not prove the gain: judge that with `compare` on data of a "
+                       "later measurement."));
+}
+
+void print_resampling(Console& console, const diagnosis::Resampling& r) {
+  std::vector<std::string> found;
+  for (const diagnosis::Resampling::Found& f : r.found) {
+    std::vector<std::string> names;
+    for (const diagnosis::Named& n : f.group) names.push_back(effect_in_words(n.effect, n.order));
+    found.push_back(
+        fmt::format("{} in {:.0f} of 100 ({:.0f} % of the squared error above the noise, {:.0f} to {:.0f} %)",
+                    names.empty() ? f.name + ", which is in no catalogue," : listed(names, "or"), 100.0 * f.frequency,
+                    f.share_percent, f.share_low_percent, f.share_high_percent));
+  }
+  const std::string how =
+      fmt::format("{:.0f} subsamples at bandwidths from {:.3g} to {:.3g} Hz, with and without reversals", r.subsamples,
+                  r.lowest_hz, r.highest_hz);
+  console.line(wrapped(found.empty() ? fmt::format("Nothing is chosen in more than half of {}.", how)
+                                     : fmt::format("Of {}: {}.", how, listed(found))));
+  print_held_out(console, r);
+}
+
 void print_diagnosis(Console& console, const Diagnosis& d, const std::string& add_command) {
   console.line(console.bold(verdict_in_words(d)));
   console.line(wrapped(evidence(d)));
+  if (d.resampling && d.resampling->decides) print_resampling(console, *d.resampling);
   if (!d.localised.empty()) console.line(wrapped(fmt::format("The error goes with {}.", shares(d.localised))));
   if (d.delay_s)
     console.line(
@@ -283,6 +323,28 @@ void print_diagnosis(Console& console, const Diagnosis& d, const std::string& ad
   print_next(console, d, add_command);
 }
 
+json resampling_json(const Diagnosis& d) {
+  if (!d.resampling) return nullptr;
+  json found = json::array();
+  for (const diagnosis::Resampling::Found& f : d.resampling->found)
+    found.push_back({{"effects", named_json(f.group)},
+                     {"structure", f.group.empty() ? json(f.name) : json(nullptr)},
+                     {"frequency", json_number(f.frequency)},
+                     {"share_percent", json_number(f.share_percent)},
+                     {"share_low_percent", json_number(f.share_low_percent)},
+                     {"share_high_percent", json_number(f.share_high_percent)},
+                     {"held_out_ratio", json_number(f.held_out_ratio)},
+                     {"refused_by_holdout", f.refused_by_holdout}});
+  return {{"subsamples", d.resampling->subsamples},
+          {"abstained", d.resampling->abstained},
+          {"too_little", d.resampling->too_little},
+          {"whiteness", json_number(d.resampling->whiteness)},
+          {"lowest_hz", json_number(d.resampling->lowest_hz)},
+          {"highest_hz", json_number(d.resampling->highest_hz)},
+          {"decides", d.resampling->decides},
+          {"found", std::move(found)}};
+}
+
 json diagnosis_json(const Diagnosis& d) {
   json candidates = json::array();
   for (const Candidate& c : d.candidates) candidates.push_back(candidate_json(c, candidates.size() + 1, d.unit));
@@ -311,6 +373,8 @@ json diagnosis_json(const Diagnosis& d) {
           {"remaining_structure", localised_json(d.remaining_structure)},
           {"recovered_percent", json_number(d.recovered_percent)},
           {"disturbances", std::move(disturbances)},
+          {"partial", d.partial},
+          {"resampling", resampling_json(d)},
           {"unknown", unknown_json(d)},
           {"delay_s", json_number(d.delay_s)},
           {"warnings", d.warnings},

@@ -1,5 +1,7 @@
 #include "host/simulation/simulation.hpp"
 
+#include <fmt/format.h>
+
 #include <algorithm>
 #include <cmath>
 #include <limits>
@@ -17,6 +19,8 @@ using data::Column;
 
 // No drive in whatever unit is this fast; a model with negative friction may be.
 constexpr double kDiverged = 1e12;
+// As in the check of the time's unit.
+constexpr double kLongestSample_s = 0.5;
 
 // What the model is driven by, at any time of a segment; time counts in samples.
 class RecordInputs {
@@ -163,6 +167,13 @@ FreeRun run(const model::Model& model, const data::Experiment& experiment, const
   if (!(experiment.sample_s > 0.0))
     throw std::invalid_argument("experiment \"" + experiment.name +
                                 "\" cannot be simulated: it has no time between samples (sample_s)");
+
+  // At its own step the simulation would run for hours, and nobody controls a drive at this rate.
+  if (experiment.sample_s >= kLongestSample_s)
+    throw std::invalid_argument(fmt::format(
+        "experiment \"{}\" cannot be simulated: a sample lasts {:.4g} s, the longest is {:g} s. Is time_s in another "
+        "unit? Then write it as unit under [columns.time_s] in dataset.toml.",
+        experiment.name, experiment.sample_s, kLongestSample_s));
 
   catalogue::DriveConstants<double> constants = catalogue::constants_of(model.drive);
   if (effort == Column::motor_torque) constants.torque_constant = 1.0;

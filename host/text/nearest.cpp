@@ -36,6 +36,21 @@ std::string nearest(std::string_view word, std::span<const std::string_view> kno
   return best;
 }
 
+std::string nearest_or_first_words(std::string_view word, std::span<const std::string_view> known,
+                                   std::size_t always_allowed) {
+  std::string best = nearest(word, known, always_allowed);
+  if (!best.empty() || word.size() < 3) return best;
+  std::size_t fewest = std::max(always_allowed, word.size() / 3) + 1;
+  for (const std::string_view candidate : known)
+    for (std::size_t at = candidate.find('_'); at != std::string_view::npos; at = candidate.find('_', at + 1)) {
+      const std::size_t count = edits(word, candidate.substr(0, at));
+      if (count >= fewest) continue;
+      fewest = count;
+      best = candidate;
+    }
+  return best;
+}
+
 std::vector<std::string> nearest_first(std::string_view word, std::vector<std::string> known) {
   std::stable_sort(known.begin(), known.end(),
                    [&](const std::string& a, const std::string& b) { return edits(word, a) < edits(word, b); });

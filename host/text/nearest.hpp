@@ -16,6 +16,10 @@ std::string nearest(std::string_view word, std::span<const std::string_view> kno
 std::string nearest(std::string_view word, std::initializer_list<std::string_view> known,
                     std::size_t always_allowed = 1);
 
+// The same; where none is near as a whole, one whose first words are: "stribek" is near "stribeck_gaussian".
+std::string nearest_or_first_words(std::string_view word, std::span<const std::string_view> known,
+                                   std::size_t always_allowed = 1);
+
 // `known` by the number of such edits to `word`, the fewest first.
 std::vector<std::string> nearest_first(std::string_view word, std::vector<std::string> known);
 

@@ -12,6 +12,7 @@
 
 #include "host/regression/giving_up.hpp"
 #include "host/workbench/gate.hpp"
+#include "host/workbench/kept_tabs.hpp"
 #include "host/workbench/work.hpp"
 
 namespace flexspline::workbench {
@@ -21,11 +22,18 @@ using nlohmann::json;
 
 constexpr std::size_t kMostTabs = 24;
 constexpr std::size_t kMostFiles = 200;
+constexpr const char* kTabsFile = "tabs.json";
 // Ends with the server, so it is short.
 constexpr auto kLongestWait = std::chrono::milliseconds(1500);
 
 // What is not there: 404.
 class NotFound : public std::runtime_error {
+ public:
+  using std::runtime_error::runtime_error;
+};
+
+// A request that ended a worker process before: 500.
+class DeadlyError : public std::runtime_error {
  public:
   using std::runtime_error::runtime_error;
 };
@@ -84,17 +92,65 @@ json reply_of(const std::string& what) {
 
 }  // namespace
 
-Api::Api(Setup setup) : setup_(std::move(setup)), dropped_(own_folder()), drive_(setup_.drive) {}
+Api::Api(Setup setup)
+    : setup_(std::move(setup)), dropped_(setup_.scratch.empty() ? own_folder() : setup_.scratch), drive_(setup_.drive) {
+  go_on();
+}
 
 Api::~Api() {
   tabs_.clear();  // work ends before what it works with
   std::error_code error;
-  std::filesystem::remove_all(dropped_, error);
+  if (setup_.scratch.empty()) std::filesystem::remove_all(dropped_, error);
+}
+
+void Api::keep() {
+  const std::lock_guard lock(mutex_);
+  if (!setup_.scratch.empty()) keep_tabs(setup_.scratch / kTabsFile, tabs_);
+}
+
+// With the tabs of the worker before; those whose work ended it, or ended with it, are told.
+void Api::go_on() {
+  if (setup_.failures.empty()) return;
+  tabs_ = tabs_again(setup_.scratch / kTabsFile, setup_.first, setup_.pipeline, setup_.board, setup_.limits);
+  for (std::error_code error; std::filesystem::exists(dropped_ / std::to_string(drops_), error);) ++drops_;
+  for (const Failure& failure : setup_.failures)
+    if (failure.is_known && !failure.jobs.front().key.empty()) deadly_[failure.jobs.front().key] = failure.why;
+  const Failure& last = setup_.failures.back();
+  for (std::size_t k = 0; k < last.jobs.size(); ++k) {
+    const Job& job = last.jobs[k];
+    if (!job.is_work && !(last.is_known && k == 0)) continue;  // the page asks again by itself
+    for (const auto& tab : tabs_)
+      if (tab->id() == job.tab)
+        tab->set_problem(job.what, last.is_known && k > 0
+                                       ? fmt::format("it was ended by {}, which failed; start it again. A drive has to "
+                                                     "be connected again",
+                                                     last.jobs.front().what)
+                                       : fmt::format("{}. Your steps are as they were before; a drive has to be "
+                                                     "connected again",
+                                                     last.why));
+  }
+}
+
+void Api::refuse_again(const std::string& key) const {
+  if (const auto found = deadly_.find(key); found != deadly_.end())
+    throw DeadlyError(fmt::format("this was tried before, and {}; it is not tried again", found->second));
 }
 
 Answer Api::answer(const Request& request) {
   Answer answer;
+  const regression::Asking nobody;
+  const regression::MayGiveUp known_by(&nobody);
+  std::string key = request.path;
+  for (const auto& [name, value] : request.query)
+    if (name != "tab") key += fmt::format(" {}={}", name, value);
+  const auto tab = request.query.find("tab");
+  const bool computes = request.path != "/api/state" && request.method == "GET";
+  const JobBoard::Entry entry(
+      setup_.board,
+      {tab == request.query.end() ? "" : tab->second, "Showing " + request.path, computes ? key : "", false},
+      setup_.limits.request, &nobody);
   try {
+    if (computes) refuse_again(key);
     if (request.method == "GET" && request.path == "/api/file") return file(request);
     if (request.method == "GET")
       answer.body = get(request).dump();
@@ -108,6 +164,12 @@ Answer Api::answer(const Request& request) {
   } catch (const BusyError& error) {
     answer.status = 409;
     answer.body = reply_of(error.what()).dump();
+  } catch (const DeadlyError& error) {
+    answer.status = 500;
+    answer.body = reply_of(error.what()).dump();
+  } catch (const std::bad_alloc&) {
+    answer.status = 500;
+    answer.body = reply_of("there is not enough memory for it; take shorter records, or fewer").dump();
   } catch (const std::exception& error) {
     answer.status = 400;
     answer.body = reply_of(error.what()).dump(-1, ' ', false, json::error_handler_t::replace);
@@ -117,7 +179,7 @@ Answer Api::answer(const Request& request) {
 
 std::shared_ptr<Session> Api::open_tab(const std::string& like) {
   const std::lock_guard lock(mutex_);
-  std::shared_ptr<Session> made = std::make_shared<Session>(new_token(), setup_.first);
+  std::shared_ptr<Session> made = std::make_shared<Session>(new_token(), setup_.first, setup_.board, setup_.limits);
   for (const auto& s : tabs_)
     if (s->id() == like) {
       const History<std::shared_ptr<Step>> history = s->history();
@@ -180,7 +242,9 @@ json Api::get(const Request& request) {
 json Api::post(const Request& request) {
   if (request.path == "/api/tab") {
     const auto like = request.query.find("like");
-    return {{"tab", open_tab(like == request.query.end() ? "" : like->second)->id()}};
+    const std::string id = open_tab(like == request.query.end() ? "" : like->second)->id();
+    keep();
+    return {{"tab", id}};
   }
   const std::shared_ptr<Session> session = session_of(request);
   if (request.path == "/api/drop") {
@@ -205,6 +269,7 @@ json Api::act(const std::shared_ptr<Session>& session, const json& asked) {
       if (what == "redo") history.redo();
       if (what == "go") history.go(asked.at("step").get<std::size_t>());
     });
+    keep();
   } else if (what == "diagnose") {
     start_diagnosis(session);
   } else if (what == "add") {
@@ -258,14 +323,17 @@ json Api::act(const std::shared_ptr<Session>& session, const json& asked) {
 void Api::start_step(const std::shared_ptr<Session>& session, const std::string& what,
                      std::function<std::shared_ptr<Step>(const Step&, const Progress&)> make) {
   // The thread is joined before its session ends.
-  session->start(what, [session = session.get(), make = std::move(make)](const Progress& say) {
+  session->start(what, [this, session = session.get(), make = std::move(make)](const Progress& say) {
     const std::shared_ptr<Step> now = session->history().current();
     const std::shared_ptr<Step> next = make(*now, say);
     session->change([&](auto& history) { history.take(next); });
+    keep();
   });
 }
 
 void Api::start_diagnosis(const std::shared_ptr<Session>& session) {
+  const std::string key = "diagnose " + session->history().current()->id;
+  refuse_again(key);  // it begins by itself
   session->start(
       "Looking for what is missing",
       [session = session.get()](const Progress& say) {
@@ -282,7 +350,7 @@ void Api::start_diagnosis(const std::shared_ptr<Session>& session) {
               if (!std::exchange(is_told, true)) say("another tab is at it");
             });
       },
-      true);
+      true, key);
 }
 
 void Api::start_pack(const std::shared_ptr<Session>& session) {

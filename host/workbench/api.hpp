@@ -12,6 +12,7 @@
 
 #include "host/workbench/live_drive.hpp"
 #include "host/workbench/session.hpp"
+#include "host/workbench/supervisor.hpp"
 #include "host/workbench/trial.hpp"
 
 namespace flexspline::workbench {
@@ -47,6 +48,12 @@ struct Setup {
   std::string drive;        // --drive; empty: none
   Rig rig;                  // for closed loops; none known: the present model
   closed_loop::Runner run;  // of closed loops; empty: there are none
+  // What outlives a worker process: its jobs, a folder for dropped files and tabs, how those before it ended. Without
+  // these all of it ends with the Api.
+  JobBoard* board = nullptr;
+  JobLimits limits;
+  std::filesystem::path scratch;
+  std::vector<Failure> failures;
 };
 
 class Api {
@@ -72,6 +79,9 @@ class Api {
   std::string content(const Session& session, const std::string& what) const;
   std::shared_ptr<Session> session_of(const Request& request);
   std::shared_ptr<Session> open_tab(const std::string& like);
+  void keep();
+  void go_on();
+  void refuse_again(const std::string& key) const;
 
   Setup setup_;
   std::filesystem::path dropped_;  // folder of dropped files; ends with the workbench
@@ -79,6 +89,7 @@ class Api {
   std::mutex mutex_;
   std::list<std::shared_ptr<Session>> tabs_;  // latest used first
   std::size_t drops_ = 0;
+  std::map<std::string, std::string> deadly_;  // keys of jobs that ended a worker, and how
 };
 
 }  // namespace flexspline::workbench

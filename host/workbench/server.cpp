@@ -3,12 +3,15 @@
 #include <fmt/format.h>
 #include <httplib.h>
 
+#include <cstdlib>
+#include <filesystem>
 #include <memory>
 #include <nlohmann/json.hpp>
 #include <thread>
 
 #include "host/workbench/assets.hpp"
 #include "host/workbench/gate.hpp"
+#include "host/workbench/supervisor.hpp"
 
 namespace flexspline::workbench {
 namespace {
@@ -61,23 +64,26 @@ bool send_asset(const std::string& path, httplib::Response& response) {
   return false;
 }
 
-}  // namespace
+// Files that were dropped, and the tabs: for as long as the workbench runs.
+struct Scratch {
+  Scratch() {
+    std::string name = (std::filesystem::temp_directory_path() / "flexspline-workbench-XXXXXX").string();
+    if (!mkdtemp(name.data())) throw std::runtime_error(fmt::format("no folder can be made at {}", name));
+    path = name;
+  }
+  ~Scratch() {
+    std::error_code error;
+    std::filesystem::remove_all(path, error);
+  }
+  Scratch(const Scratch&) = delete;
+  Scratch& operator=(const Scratch&) = delete;
+  std::filesystem::path path;
+};
 
-void serve(Setup setup, const Serving& serving) {
-  httplib::Server server;
-  server.new_task_queue = [] { return new httplib::ThreadPool(kThreads); };
-  server.set_payload_max_length(kLargestBody);
-  server.set_default_headers(kHeaders);
-  server.set_tcp_nodelay(true);
-  server.set_keep_alive_max_count(1000);
-  server.set_keep_alive_timeout(2);  // a connection that is kept holds up the end
-  const std::string token = new_token();
-  const int port = serving.port > 0 ? (server.bind_to_port(kAddress, serving.port) ? serving.port : -1)
-                                    : server.bind_to_any_port(kAddress);
-  if (port <= 0)
-    throw std::runtime_error(
-        fmt::format("port {} of this machine is taken; give another --port, or none", serving.port));
-  Api api(std::move(setup));
+// In the worker process.
+void answer_until(httplib::Server& server, const Setup& setup, const std::function<bool()>& ends,
+                  const std::string& token, int port) {
+  Api api(setup);
   server.set_pre_routing_handler([&](const httplib::Request& http, httplib::Response& response) {
     const std::string host = http.get_header_value("Host"), origin = http.get_header_value("Origin");
     const std::string why = refusal({host, origin, http.path}, token, port);
@@ -98,12 +104,39 @@ void serve(Setup setup, const Serving& serving) {
   server.Get(".*", handle);
   server.Post(".*", handle);
   std::thread watch([&] {
-    while (!serving.ends()) std::this_thread::sleep_for(std::chrono::milliseconds(100));
+    while (!ends()) std::this_thread::sleep_for(std::chrono::milliseconds(100));
     server.stop();
   });
-  serving.listening(fmt::format("http://{}:{}/{}/", kAddress, port, token));
   server.listen_after_bind();
   watch.join();
+}
+
+}  // namespace
+
+void serve(Setup setup, const Serving& serving) {
+  httplib::Server server;
+  server.new_task_queue = [] { return new httplib::ThreadPool(kThreads); };
+  server.set_payload_max_length(kLargestBody);
+  server.set_default_headers(kHeaders);
+  server.set_tcp_nodelay(true);
+  server.set_keep_alive_max_count(1000);
+  server.set_keep_alive_timeout(2);  // a connection that is kept holds up the end
+  const std::string token = new_token();
+  const int port = serving.port > 0 ? (server.bind_to_port(kAddress, serving.port) ? serving.port : -1)
+                                    : server.bind_to_any_port(kAddress);
+  if (port <= 0)
+    throw std::runtime_error(
+        fmt::format("port {} of this machine is taken; give another --port, or none", serving.port));
+  const Scratch scratch;
+  JobBoard board;
+  setup.scratch = scratch.path;
+  setup.board = &board;
+  serving.listening(fmt::format("http://{}:{}/{}/", kAddress, port, token));
+  const auto work = [&](const std::vector<Failure>& failures) {
+    setup.failures = failures;
+    answer_until(server, setup, serving.ends, token, port);
+  };
+  supervise(board, {.work = work, .ends = serving.ends});
 }
 
 }  // namespace flexspline::workbench

@@ -3,6 +3,7 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <new>
 #include <nlohmann/json.hpp>
 
 #include "host/output/diagnosis.hpp"
@@ -53,6 +54,8 @@ json problem_json(const std::string& during, const std::exception_ptr& error) {
                             {"remedy", f.remedy}});
     what = findings.size() == 1 ? "the data cannot be used"
                                 : fmt::format("{} things make the data unusable", findings.size());
+  } catch (const std::bad_alloc&) {
+    what = "there is not enough memory for it; take shorter records, or fewer";
   } catch (const std::exception& e) {
     what = e.what();
   } catch (...) {
@@ -103,8 +106,12 @@ void Step::diagnose(const std::function<diagnosis::Diagnosis()>& search, const s
   if (failure) std::rethrow_exception(failure);
 }
 
-Session::Session(std::string id, std::shared_ptr<Step> first)
-    : id_(std::move(id)), history_(std::move(first)), parts_(std::make_unique<json>(json::object())) {}
+Session::Session(std::string id, std::shared_ptr<Step> first, JobBoard* board, JobLimits limits)
+    : id_(std::move(id)),
+      board_(board),
+      limits_(limits),
+      history_(std::move(first)),
+      parts_(std::make_unique<json>(json::object())) {}
 
 Session::~Session() {
   cancel();
@@ -151,6 +158,13 @@ void Session::change(const std::function<void(History<std::shared_ptr<Step>>&)>&
   changed();
 }
 
+void Session::restore(History<std::shared_ptr<Step>> history, std::uint64_t changes) {
+  const std::lock_guard lock(mutex_);
+  history_ = std::move(history);
+  changes_ = std::max(changes_, changes);
+  changed();
+}
+
 void Session::set(const std::string& part, json value) {
   const std::lock_guard lock(mutex_);
   if (value.is_null())
@@ -175,7 +189,12 @@ void Session::set_problem(const std::string& during, const std::exception_ptr& e
   set("problem", problem_json(during, error));
 }
 
-void Session::start(const std::string& what, std::function<void(const Progress&)> run, bool by_itself) {
+void Session::set_problem(const std::string& during, const std::string& what) {
+  set("problem", {{"during", during}, {"what", what}, {"findings", json::array()}});
+}
+
+void Session::start(const std::string& what, std::function<void(const Progress&)> run, bool by_itself,
+                    const std::string& key) {
   const std::lock_guard lock(mutex_);
   if (work_) throw BusyError(fmt::format("{} is still running; wait, or cancel it", work_->what));
   std::erase_if(ended_, [](const std::shared_ptr<Work>& w) {
@@ -189,7 +208,7 @@ void Session::start(const std::string& what, std::function<void(const Progress&)
   work_ = work;
   if (!by_itself) parts_->erase("problem");
   changed();
-  work->thread = std::thread([this, work, run = std::move(run)] {
+  work->thread = std::thread([this, work, run = std::move(run), key] {
     const Progress say = [&](std::string_view stage) {
       const std::lock_guard inner(mutex_);
       if (work->cancelled) throw Cancelled{};
@@ -201,6 +220,12 @@ void Session::start(const std::string& what, std::function<void(const Progress&)
       if (work.cancelled) throw Cancelled{};
     };
     const regression::MayGiveUp may_give_up(&ask);
+    JobBoard::Entry entry(board_, {id_, work->what, key, true}, limits_.work, &ask);
+    {
+      const std::lock_guard inner(mutex_);
+      work->entry = &entry;
+      if (work->cancelled) entry.hurry(limits_.cancelled);
+    }
     try {
       run(say);
     } catch (const Cancelled&) {
@@ -208,6 +233,7 @@ void Session::start(const std::string& what, std::function<void(const Progress&)
       error = std::current_exception();
     }
     const std::lock_guard inner(mutex_);
+    work->entry = nullptr;
     if (work_ == work) {
       work_.reset();
       ended_.push_back(work);
@@ -222,6 +248,7 @@ void Session::cancel() {
   const std::lock_guard lock(mutex_);
   if (!work_) return;
   work_->cancelled = true;
+  if (work_->entry) work_->entry->hurry(limits_.cancelled);
   ended_.push_back(std::move(work_));
   work_.reset();
   changed();

@@ -3,6 +3,7 @@
 
 #include <atomic>
 #include <condition_variable>
+#include <filesystem>
 #include <functional>
 #include <map>
 #include <memory>
@@ -15,14 +16,17 @@
 
 #include "host/diagnosis/diagnosis.hpp"
 #include "host/workbench/history.hpp"
+#include "host/workbench/jobs.hpp"
 #include "host/workbench/look.hpp"
 
 namespace flexspline::workbench {
 
 // A model with its data. All but what is found later is fixed once it is made.
 struct Step {
-  std::string action;  // "open", "identify", "add", "remove", "data"
-  std::string what;    // "stribeck_gaussian", "two more files"
+  std::string id;               // of its own
+  std::filesystem::path files;  // folder of the files that came with it; empty: none
+  std::string action;           // "open", "identify", "add", "remove", "data"
+  std::string what;             // "stribeck_gaussian", "two more files"
   std::shared_ptr<const data::Dataset> dataset;
   model::Model model;      // with values
   std::string model_text;  // of its file, comments of the user's file in it
@@ -65,20 +69,26 @@ class BusyError : public std::runtime_error {
 
 class Session {
  public:
-  Session(std::string id, std::shared_ptr<Step> first);
+  // `board`: where its work is written down; null: nowhere.
+  Session(std::string id, std::shared_ptr<Step> first, JobBoard* board = nullptr, JobLimits limits = {});
   ~Session();
   Session(const Session&) = delete;
   Session& operator=(const Session&) = delete;
 
   const std::string& id() const { return id_; }
 
+  // As it was in a worker process that ended, with all its changes and more.
+  void restore(History<std::shared_ptr<Step>> history, std::uint64_t changes);
+
   // Of the history; `change` is told to those who wait.
   History<std::shared_ptr<Step>> history() const;
   void change(const std::function<void(History<std::shared_ptr<Step>>&)>& change);
 
   // Runs `work` beside the server. What it throws becomes the session's problem. Throws BusyError while other work
-  // runs. The problem before is forgotten, unless the work begins by itself: then nobody may have read it yet.
-  void start(const std::string& what, std::function<void(const Progress&)> work, bool by_itself = false);
+  // runs. The problem before is forgotten, unless the work begins by itself: then nobody may have read it yet. `key`
+  // is equal for two pieces of work that compute the same.
+  void start(const std::string& what, std::function<void(const Progress&)> work, bool by_itself = false,
+             const std::string& key = {});
   // Work ends at its next word to Progress, fits at their next set of columns; what it makes is thrown away.
   void cancel();
   bool works() const;
@@ -91,6 +101,7 @@ class Session {
   void keep(const std::string& part, nlohmann::json value);
   std::shared_ptr<const nlohmann::json> kept(const std::string& part) const;
   void set_problem(const std::string& during, const std::exception_ptr& error);
+  void set_problem(const std::string& during, const std::string& what);
 
   // Number of changes so far. Waits until there are more than `seen`, at most so long.
   std::uint64_t wait(std::uint64_t seen, std::chrono::milliseconds limit) const;
@@ -104,10 +115,13 @@ class Session {
     std::chrono::steady_clock::time_point began;
     std::thread thread;
     std::atomic<bool> done{false};
+    JobBoard::Entry* entry = nullptr;  // while it runs
   };
   void changed();
 
   const std::string id_;
+  JobBoard* const board_;
+  const JobLimits limits_;
   mutable std::mutex mutex_;
   mutable std::condition_variable told_;
   std::uint64_t changes_ = 1;

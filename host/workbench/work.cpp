@@ -11,6 +11,7 @@
 #include "host/diagnosis/add.hpp"
 #include "host/output/json.hpp"
 #include "host/report/page.hpp"
+#include "host/workbench/gate.hpp"
 
 namespace flexspline::workbench {
 namespace {
@@ -31,6 +32,7 @@ std::shared_ptr<Step> made(std::string action, std::string what, std::shared_ptr
                            const regression::PipelineOptions& pipeline, const Progress& say) {
   say("comparing with the measurement");
   auto step = std::make_shared<Step>();
+  step->id = new_token();
   step->action = std::move(action);
   step->what = std::move(what);
   step->dataset = std::move(dataset);
@@ -95,6 +97,31 @@ void require_same(const std::optional<double>& ours, const std::optional<double>
           "drop measurements of the same drive"}});
 }
 
+// The data of a step and those of the files in `folder`, and the names of these.
+std::pair<std::shared_ptr<const data::Dataset>, std::string> joined(const data::Dataset& before,
+                                                                    const std::filesystem::path& folder) {
+  data::Dataset more = data::load({folder});
+  require_same(before.drive.gear_ratio, more.drive.gear_ratio, "gear_ratio");
+  require_same(before.drive.torque_constant_nm_a, more.drive.torque_constant_nm_a, "torque_constant_nm_a");
+  auto all = std::make_shared<data::Dataset>(before);
+  std::string names;
+  for (data::Experiment& e : more.experiments) {
+    const std::string name = e.name;
+    const auto taken = [&] {
+      return std::any_of(all->experiments.begin(), all->experiments.end(),
+                         [&](const auto& x) { return x.name == e.name; });
+    };
+    for (int number = 2; taken(); ++number) e.name = fmt::format("{}-{}", name, number);
+    names += (names.empty() ? "" : ", ") + e.name;
+    all->experiments.push_back(std::move(e));
+  }
+  for (data::Finding& finding : more.findings) {
+    finding.file = std::filesystem::path(finding.file).filename().string();
+    all->findings.push_back(std::move(finding));
+  }
+  return {all, names};
+}
+
 }  // namespace
 
 std::shared_ptr<Step> open(std::shared_ptr<const data::Dataset> dataset, const model::ModelFile& file,
@@ -125,27 +152,27 @@ std::shared_ptr<Step> refitted(const Step& before, const regression::PipelineOpt
 std::shared_ptr<Step> with_files(const Step& before, const std::filesystem::path& folder,
                                  const regression::PipelineOptions& pipeline, const Progress& say) {
   say("reading the files");
-  data::Dataset more = data::load({folder});
-  require_same(before.dataset->drive.gear_ratio, more.drive.gear_ratio, "gear_ratio");
-  require_same(before.dataset->drive.torque_constant_nm_a, more.drive.torque_constant_nm_a, "torque_constant_nm_a");
-  auto all = std::make_shared<data::Dataset>(*before.dataset);
-  std::string names;
-  for (data::Experiment& e : more.experiments) {
-    const std::string name = e.name;
-    const auto taken = [&] {
-      return std::any_of(all->experiments.begin(), all->experiments.end(),
-                         [&](const auto& x) { return x.name == e.name; });
-    };
-    for (int number = 2; taken(); ++number) e.name = fmt::format("{}-{}", name, number);
-    names += (names.empty() ? "" : ", ") + e.name;
-    all->experiments.push_back(std::move(e));
+  const auto [all, names] = joined(*before.dataset, folder);
+  auto step = identified("data", names, all, before.model, before.model_text,
+                         with_records(all, before.model, pipeline, say), say);
+  step->files = folder;
+  return step;
+}
+
+std::shared_ptr<Step> made_again(const KeptStep& kept, const Step& before,
+                                 const regression::PipelineOptions& pipeline) {
+  const Progress say = [](std::string_view) {};
+  const model::Model model = model::parse(kept.model_text, "the model", catalogue::known_effects()).model;
+  auto dataset = before.dataset;
+  regression::PipelineOptions own = as_before(before, pipeline);
+  if (!kept.files.empty()) {
+    dataset = joined(*before.dataset, kept.files).first;
+    own = with_records(dataset, model, pipeline, say);
   }
-  for (data::Finding& finding : more.findings) {
-    finding.file = std::filesystem::path(finding.file).filename().string();
-    all->findings.push_back(std::move(finding));
-  }
-  return identified("data", names, all, before.model, before.model_text, with_records(all, before.model, pipeline, say),
-                    say);
+  auto step = made(kept.action, kept.what, dataset, model, kept.model_text, kept.estimates, kept.warnings, own, say);
+  step->id = kept.id;
+  step->files = kept.files;
+  return step;
 }
 
 std::string model_file(const Step& step) {

@@ -25,6 +25,15 @@ std::shared_ptr<Step> refitted(const Step& before, const regression::PipelineOpt
 std::shared_ptr<Step> with_files(const Step& before, const std::filesystem::path& folder,
                                  const regression::PipelineOptions& pipeline, const Progress& say);
 
+// A step that was there before, from what was kept of it; `before` is the one before it.
+struct KeptStep {
+  std::string id, action, what, model_text;
+  std::filesystem::path files;
+  std::vector<regression::Estimate> estimates;
+  std::vector<std::string> warnings;
+};
+std::shared_ptr<Step> made_again(const KeptStep& kept, const Step& before, const regression::PipelineOptions& pipeline);
+
 // A model as it is written into files.
 std::string model_file(const Step& step);
 // The report page of a step, with what it was before where there is a step before.

@@ -17,7 +17,8 @@ export FLEXSPLINE_BENCH_ROWS=$out/rows.txt
 "$build/tests/flexspline_round_trips_bench" "$build/flexspline-hil" "$build/tests/flexspline_echo_bench" || status=1
 
 # Instructions, which are counted: the same in every run.
-if "$here/../counts/measure.sh" "$out/counts" "$build/tests/counts/flexspline_adversarial" >"$out/counts.txt" 2>&1; then
+if "$here/../counts/measure.sh" "$out/counts" "$build/tests/counts/flexspline_adversarial" "$build/tests/counts/flexspline_tick_inputs" \
+  "$build/boards/qemu_stm32f405/image.elf" >"$out/counts.txt" 2>&1; then
   awk '
     { most[$1 " " $2] = $4; mean[$1 " " $2] = $5 }
     END {

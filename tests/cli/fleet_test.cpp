@@ -79,6 +79,26 @@ TEST(Fleet, TheDriveThatDiffersIsNamedWithWhatDiffers) {
   EXPECT_EQ(after["failed"][0]["drive"], "drive-6");
 }
 
+TEST(Fleet, AJobThatWasKilledOrNeverRanCountsAsADriveWithoutAResult) {
+  const Shell shell;
+  shell.write("plan.toml", kPlan);
+  for (int drive = 1; drive <= 3; ++drive)
+    shell.must("flexspline-hil record --plan plan.toml --seed " + std::to_string(drive) + " --out drives/drive-" +
+               std::to_string(drive));
+  shell.must("flexspline fleet run drives/drive-1");
+  // Drive 2 is killed on its way; drive 3 was never begun.
+  shell.run("flexspline fleet run --diagnose drives/drive-2 & sleep 0.2; kill -9 $!; wait");
+  const nlohmann::json merged = shell.json("flexspline fleet merge drives");
+  EXPECT_EQ(merged["drives"], 3);
+  ASSERT_EQ(merged["failed"].size(), 2u) << merged.dump(1);
+  EXPECT_EQ(merged["failed"][1]["drive"], "drive-3");
+  EXPECT_TRUE(contains(shell.must("flexspline fleet merge drives"), "3 drives, 2 of them without a result"));
+  // So they do where each folder is named.
+  EXPECT_EQ(shell.json("flexspline fleet merge drives/*")["failed"].size(), 2u);
+  shell.must("flexspline fleet run drives/*");
+  EXPECT_TRUE(shell.json("flexspline fleet merge drives")["failed"].empty());
+}
+
 TEST(Fleet, SaysWhatIsWrong) {
   const Shell shell;
   EXPECT_EQ(shell.run("flexspline fleet run nowhere").code, 2);

@@ -14,7 +14,7 @@
 #include <string_view>
 #include <vector>
 
-#include "host/data/mat.hpp"
+#include "host/data/array_file.hpp"
 #include "host/data/mat5_check.hpp"
 #include "tests/fuzz/readers.hpp"
 
@@ -96,7 +96,7 @@ extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* bytes, std::size_t siz
   if (data::mat_version(path) == data::MatVersion::v5 && !damage.empty()) return 0;
   data::Findings findings;
   try {
-    const data::MatFile mat(path, findings);
+    const data::ArrayFile mat(path, data::format_of(path), findings);
     for (std::size_t k = 0; k < mat.names().size(); ++k) {
       const std::size_t wanted[] = {k};
       require(mat.read(wanted).rows() == mat.length(k), "a column is of another length");

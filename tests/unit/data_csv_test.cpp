@@ -99,15 +99,6 @@ TEST(Csv, TextInANumberIsNamedWithFileLineAndColumn) {
   EXPECT_NE(errors[0].text().find(":4, column current_a: \"oops"), std::string::npos) << errors[0].text();
 }
 
-TEST(Csv, ALineOfUnitsIsRefusedWithWhatToDo) {
-  const TestFolder folder;
-  const std::vector<Finding> errors =
-      errors_of({folder.write("units.csv", "time_s,current_a\ns,A\n" + rows("", ",", false, "\n").substr(1))});
-  ASSERT_EQ(errors.size(), 2u);
-  EXPECT_EQ(errors[0].line, 2u);
-  EXPECT_NE(errors[0].remedy.find("line of units"), std::string::npos);
-}
-
 TEST(Csv, NanInfinityAndMissingValuesAreErrorsAndToleratedTheyAreCutOutAsGaps) {
   for (const std::string bad : {"nan", "NaN", "inf", "-Infinity", "", "NA", "1e999"}) {
     const TestFolder folder;

@@ -6,8 +6,8 @@
 #include <iterator>
 #include <random>
 
+#include "host/data/contents_guard.hpp"
 #include "host/data/mat5_check.hpp"
-#include "host/data/mat_contents.hpp"
 #include "tests/unit/data_mat_writer.hpp"
 #include "tests/unit/data_test_files.hpp"
 
@@ -103,11 +103,12 @@ TEST(MatDamage, DamagedFilesEndInAMessageOrInNumbersOfTheSizeThatTheyState) {
   std::size_t failures = 0, reads = 0;
   for (const std::string& whole : {fixture("scipy_plain.mat"), fixture("scipy_packed.mat"),
                                    written(folder, MatFormat::v7_3), written(folder, MatFormat::v7_3_packed)}) {
-    EXPECT_EQ(read_mat(folder.write("a.mat", whole)).failure, "");
+    const FileFormat format = format_of(folder.write("a.mat", whole));
+    EXPECT_EQ(read_contents(folder.path() / "a.mat", format).failure, "");
     for (int i = 0; i < 20; ++i) {
-      const MatContents contents = read_mat(folder.write("a.mat", damaged(whole, random)));
+      const FileContents contents = read_contents(folder.write("a.mat", damaged(whole, random)), format);
       ++(contents.failure.empty() ? reads : failures);
-      for (const MatArray& array : contents.arrays) {
+      for (const NamedArray& array : contents.arrays) {
         std::size_t count = 1;
         for (const std::size_t d : array.dims) count *= d;
         ASSERT_EQ(array.values.size(), count);

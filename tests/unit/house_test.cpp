@@ -48,6 +48,8 @@ const std::map<std::string, std::set<std::string>, std::less<>> kHeavyHeaders = 
     {"CLI/CLI.hpp", {"host", "hil"}},
     {"ceres/ceres.h", {"host"}},
     {"matio.h", {"host", "tests"}},
+    {"hdf5.h", {"host", "tests"}},
+    {"sqlite3.h", {"host", "tests"}},
     {"hidapi/hidapi.h", {"host", "tests"}},
     {"httplib.h", {"host"}},
     {"libusb-1.0/libusb.h", {"host"}},

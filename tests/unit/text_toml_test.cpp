@@ -1,6 +1,8 @@
 // host/text: TOML as a tree with positions, the nearest name, signs of units.
 #include <gtest/gtest.h>
 
+#include <array>
+
 #include <string>
 #include <string_view>
 
@@ -75,6 +77,14 @@ TEST(Nearest, AllowsAThirdOfTheWord) {
   EXPECT_EQ(nearest("sdt", {"std"}, 2), "std");
   EXPECT_EQ(nearest("ab", {"xb", "ax"}), "xb");
   EXPECT_EQ(nearest("", {"abc"}), "");
+}
+
+TEST(Nearest, FirstWordsCountOnlyWhereNoWholeNameIsNear) {
+  constexpr std::array<std::string_view, 3> kKnown = {"stribeck_gaussian", "gravity", "stiffness_linear"};
+  EXPECT_EQ(nearest_or_first_words("stribek", kKnown), "stribeck_gaussian");
+  EXPECT_EQ(nearest_or_first_words("gravty", kKnown), "gravity");
+  EXPECT_EQ(nearest_or_first_words("backlash", kKnown), "");
+  EXPECT_EQ(nearest("stribek", kKnown), "");
 }
 
 TEST(Toml, ANumberThatRunsIntoQuotesBeyondAsciiIsAnError) {

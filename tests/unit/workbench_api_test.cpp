@@ -394,6 +394,50 @@ TEST(WorkbenchStep, WhatIsMissingIsSearchedOnceForAllTabsAndAgainWhereASearchGav
   EXPECT_EQ(searches, 2) << "it is known";
 }
 
+TEST_F(WorkbenchApi, TheNextProcessHasTheTabsOfTheOneThatEndedAndSaysWhatEndedIt) {
+  struct Setup setup;
+  setup.first = first();
+  setup.folder = setup.scratch = folder_;
+  api_ = std::make_unique<Api>(setup);
+  const std::string tab = new_tab(), other = new_tab();
+  act(tab, {{"do", "remove"}, {"effect", "viscous_friction"}});
+  const json before = settled(tab);
+  act(tab, {{"do", "undo"}});
+  act(tab, {{"do", "redo"}});
+  api_.reset();
+
+  const std::string diagnosis = [&] {
+    std::ifstream in(folder_ / "tabs.json");
+    const json all = json::parse(in);
+    for (const json& kept : all.at("tabs"))
+      if (kept.at("id") == tab) return "diagnose " + kept.at("steps").back().get<std::string>();
+    return std::string();
+  }();
+  setup.failures.push_back({"it crashed",
+                            {{tab, "Looking for what is missing", diagnosis, true},
+                             {other, "Identifying", "", true},
+                             {other, "Showing /api/maps", "", false}},
+                            true});
+  api_ = std::make_unique<Api>(setup);
+  const json after = settled(tab);
+  ASSERT_EQ(after["steps"].size(), 2U);
+  EXPECT_EQ(after["at"], 1);
+  EXPECT_EQ(after["steps"][1]["what"], "viscous_friction");
+  EXPECT_EQ(after["parameters"], before["parameters"]);
+  // The model comes from its file, which has six digits and more.
+  const double error = before["steps"][1]["balances"][0]["fit"].get<double>();
+  EXPECT_NEAR(after["steps"][1]["balances"][0]["fit"].get<double>(), error, 1e-6 * error);
+  EXPECT_GT(after["changes"].get<std::uint64_t>(), before["changes"].get<std::uint64_t>());
+  EXPECT_EQ(after["problem"]["during"], "Looking for what is missing");
+  EXPECT_EQ(after["problem"]["what"].get<std::string>().find("it crashed"), 0U);
+  EXPECT_NE(settled(other)["problem"]["what"].get<std::string>().find("Looking for what is missing, which failed"),
+            std::string::npos);
+  // What the page begins by itself is not begun again; all else may be tried.
+  act(tab, {{"do", "diagnose"}}, 500);
+  act(tab, {{"do", "refit"}});
+  EXPECT_EQ(settled(tab)["steps"].size(), 3U);
+}
+
 TEST_F(WorkbenchApi, ARefitThatIsCancelledEndsWithinTheFit) {
   Session session("tab", first());
   std::promise<void> go, began;

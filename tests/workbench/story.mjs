@@ -38,7 +38,7 @@ function workbench(args) {
     });
     child.on("exit", (code) => reject(new Error(`the workbench ended with ${code}: ${text}`)));
   });
-  return { address, end: async () => { child.kill("SIGINT"); return ended; } };
+  return { address, child, end: async () => { child.kill("SIGINT"); return ended; } };
 }
 
 function status(url, headers = {}) {
@@ -180,6 +180,26 @@ try {
   await accessible(other, "dark");
   await other.context().close();
 
+  say("the process that does the work crashes while it works: the page says so, and goes on with the steps that were there");
+  const worker = () => Number(readFileSync(`/proc/${served.child.pid}/task/${served.child.pid}/children`, "utf8").trim().split(" ")[0]);
+  const crashed = worker();
+  await page.getByRole("tab", { name: "Closed loop" }).click();
+  await page.getByLabel("Motion").selectOption("joint-trajectory");
+  await page.locator("[data-try]").click();
+  await until(page, () => /run \d+ of/.test(document.querySelector(".work")?.textContent ?? ""));
+  process.kill(crashed, "SIGSEGV");
+  await until(page, () => /Running the closed loop: it crashed \(signal 11/.test(document.querySelector(".note")?.textContent ?? ""));
+  assert.notEqual(worker(), crashed);
+  await shot(page, "5-crashed");
+  await page.getByRole("button", { name: "Dismiss" }).click();
+  await page.waitForSelector("body[data-step='1']");
+  await until(page, () => document.querySelectorAll(".note:not([hidden])").length === 0);
+  await page.waitForSelector("[data-verdict=at_noise_floor]");
+  await idle(page);
+  // What the browser says of the connections that the crash closed.
+  const closed = /ERR_(CONNECTION_|EMPTY_RESPONSE|SOCKET_NOT_CONNECTED|INCOMPLETE_CHUNKED)/;
+  complaints.splice(0, complaints.length, ...complaints.filter((c) => !closed.test(c)));
+
   say("parameters, save, pack");
   await page.getByRole("tab", { name: "Parameters" }).click();
   await page.waitForSelector("tbody tr");
@@ -309,6 +329,32 @@ try {
     await shot(page, "18-dark-closed-loop");
     await accessible(page, "dark, with a closed loop");
   }
+
+  say("plots as files");
+  const plain = await open(address);
+  await drawn(plain);
+  await plain.getByRole("button", { name: "Save plots" }).click();
+  for (const [ending, content] of [["png", /^.PNG/s], ["svg", /^<svg [^]*stroke-dasharray="7 4"[^]*<\/svg>/], ["csv", /^"[^"]*","measured, [^"]*","model, [^"]*"\n[-0-9.e]+,[-0-9.e]+,/]]) {
+    const [download] = await Promise.all([plain.waitForEvent("download"), plain.locator(`[data-save=${ending}]`).first().click()]);
+    assert.ok(download.suggestedFilename().endsWith(`.${ending}`));
+    assert.match(readFileSync(await download.path(), "latin1"), content, ending);
+  }
+  await plain.context().close();
+
+  say("phone, tablet and desk, light and dark");
+  for (const [width, height] of [[390, 844], [768, 1024], [1280, 720]])
+    for (const colorScheme of ["light", "dark"]) {
+      const small = await open(address, { viewport: { width, height }, colorScheme });
+      await drawn(small);
+      for (const tab of ["Steps", "Parameters", "Save", "Closed loop", "Drive"]) {
+        await small.getByRole("tab", { name: tab }).click();
+        assert.ok((await small.evaluate(() => document.documentElement.scrollWidth - innerWidth)) <= 0, `${tab} is wider than ${width} px`);
+      }
+      // It can be reached and pressed, too.
+      await small.getByRole("button", { name: "Flash this model" }).click({ trial: true });
+      await small.screenshot({ path: join(shots, `${width}-${colorScheme}.png`), fullPage: true });
+      await small.context().close();
+    }
   assert.deepEqual(complaints, []);
 } catch (error) {
   failed = true;

@@ -5,6 +5,7 @@ import { announce, button, el, fill, fillOnce, words } from "./dom";
 import { Good } from "./good";
 import { Missing } from "./missing";
 import { redrawAll } from "./plots";
+import { offerPlots } from "./plot_files";
 import { onLook, view } from "./store";
 import "./style.css";
 import { Where } from "./where";
@@ -44,7 +45,7 @@ const working = el("div", { class: "work", role: "status" }, el("span", { class:
 
 function header(s: State): void {
   if (!title.isConnected)
-    fill(top_, el("h1", {}, "Flexspline"), title, warned, el("label", { class: "file" }, "Add files", filePicker()), button("Light or dark", toggleTheme, { class: "quiet", title: "Light or dark" }), button("Keys", () => help.showModal(), { class: "quiet", title: "?" }));
+    fill(top_, el("h1", {}, "Flexspline"), title, warned, el("label", { class: "file" }, "Add files", filePicker()), button("Save plots", offerPlots, { class: "quiet" }), button("Light or dark", toggleTheme, { class: "quiet", title: "Light or dark" }), button("Keys", () => help.showModal(), { class: "quiet", title: "?" }));
   fill(title, el("strong", {}, s.model_name || s.model_file), el("span", { class: "soft" }, ` on ${s.data_name}: ${s.experiments.length} experiments, ${s.experiments.filter((e) => e.role === "holdout").length} held out`));
   if (s.work) {
     stage.textContent = `${words(s.work.what)}${s.work.stage ? `: ${words(s.work.stage)}` : ""}`;
@@ -54,7 +55,7 @@ function header(s: State): void {
   fillOnce(warned, String(s.warnings.length), s.warnings.length ? button(`${s.warnings.length} warning${s.warnings.length > 1 ? "s" : ""}`, () => tell("Warnings", state?.warnings ?? []), { class: "quiet" }) : null);
 }
 
-const picker = el("input", { type: "file", multiple: true, accept: ".csv,.mat", class: "unseen", "aria-label": "Add files", "data-key": "files" });
+const picker = el("input", { type: "file", multiple: true, accept: ".csv,.tsv,.gz,.mat,.h5,.hdf5,.npz,.npy,.bag,.db3,.mcap,.log", class: "unseen", "aria-label": "Add files", "data-key": "files" });
 picker.addEventListener("change", () => { void send(Array.from(picker.files ?? [])); picker.value = ""; });
 function filePicker(): HTMLElement { return picker; }
 
@@ -166,7 +167,7 @@ function keys(): void {
 }
 
 function dropping(): void {
-  fill(drop, el("p", {}, "Drop recordings here: CSV or MAT"));
+  fill(drop, el("p", {}, "Drop recordings here"));
   addEventListener("dragover", (e) => { e.preventDefault(); drop.hidden = false; });
   addEventListener("dragleave", (e) => { if (!e.relatedTarget) drop.hidden = true; });
   addEventListener("drop", (e) => { e.preventDefault(); drop.hidden = true; void send(Array.from(e.dataTransfer?.files ?? [])); });

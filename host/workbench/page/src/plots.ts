@@ -74,6 +74,11 @@ export function redrawAll(): void {
   for (const figure of all) figure.redraw();
 }
 
+// Those that are to be seen.
+export function drawnFigures(): Figure[] {
+  return [...all].filter((figure) => figure.plot && figure.holder.isConnected && figure.holder.offsetParent !== null);
+}
+
 function short(value: number): string {
   if (value === 0) return "0";
   const size = Math.abs(value);
@@ -92,7 +97,7 @@ export function axes(x: string, y: string, more: { x?: Partial<uPlot.Axis>; y?: 
 }
 
 export function line(name: string, more: Partial<uPlot.Series> = {}): uPlot.Series {
-  return { stroke: colour(name), width: Math.max(1.2, rem() / 11), points: { show: false }, ...more };
+  return { label: name, stroke: colour(name), width: Math.max(1.2, rem() / 11), points: { show: false }, ...more };
 }
 export const kHidden: uPlot.Series = { width: 0, points: { show: false }, stroke: "transparent" };
 

@@ -1,4 +1,6 @@
-// Reads a MAT file in a child process, which hands back plain values through a pipe.
+// Reads a file in a child process, which hands back plain values through a pipe.
+#include "host/data/contents_guard.hpp"
+
 #include <fcntl.h>
 #include <sys/resource.h>
 #include <sys/wait.h>
@@ -12,8 +14,11 @@
 #include <string>
 #include <string_view>
 
+#include "host/data/hdf5_contents.hpp"
 #include "host/data/mat5_check.hpp"
 #include "host/data/mat_contents.hpp"
+#include "host/data/message_logs.hpp"
+#include "host/data/numpy_contents.hpp"
 
 // GCC and Clang say it in different ways.
 #if defined(__SANITIZE_ADDRESS__)
@@ -117,10 +122,10 @@ class Unpacker {
   bool good_ = true;
 };
 
-bool pack(const MatContents& contents, int file) {
+bool pack(const FileContents& contents, int file) {
   Packer packer(file);
   packer.number(contents.arrays.size());
-  for (const MatArray& array : contents.arrays) {
+  for (const NamedArray& array : contents.arrays) {
     packer.text(array.name);
     packer.number(array.dims.size());
     for (const std::size_t d : array.dims) packer.number(d);
@@ -128,12 +133,12 @@ bool pack(const MatContents& contents, int file) {
     packer.bytes(array.values.data(), array.values.size() * sizeof(double));
   }
   packer.number(contents.texts.size());
-  for (const MatText& text : contents.texts) {
+  for (const NamedText& text : contents.texts) {
     packer.text(text.name);
     packer.text(text.text);
   }
   packer.number(contents.refused.size());
-  for (const MatRefused& refused : contents.refused) {
+  for (const NotAColumn& refused : contents.refused) {
     packer.text(refused.name);
     packer.text(refused.why);
   }
@@ -143,7 +148,7 @@ bool pack(const MatContents& contents, int file) {
 }
 
 // Whoever takes columns out of an array goes by its dimensions.
-bool fits(const MatArray& array) {
+bool fits(const NamedArray& array) {
   std::size_t left = array.values.size();
   for (const std::size_t d : array.dims) {
     if (d == 0 || left % d != 0) return false;
@@ -152,11 +157,11 @@ bool fits(const MatArray& array) {
   return left == 1;
 }
 
-bool unpack(std::string_view bytes, MatContents& contents) {
+bool unpack(std::string_view bytes, FileContents& contents) {
   Unpacker unpacker(bytes);
   // A name and two counts are the least that an array takes, two counts the least of the others.
   contents.arrays.resize(unpacker.count(24));
-  for (MatArray& array : contents.arrays) {
+  for (NamedArray& array : contents.arrays) {
     array.name = unpacker.text();
     array.dims.resize(unpacker.count(8));
     for (std::size_t& d : array.dims) d = unpacker.number();
@@ -164,12 +169,12 @@ bool unpack(std::string_view bytes, MatContents& contents) {
     unpacker.take(array.values.data(), array.values.size() * sizeof(double));
   }
   contents.texts.resize(unpacker.count(16));
-  for (MatText& text : contents.texts) {
+  for (NamedText& text : contents.texts) {
     text.name = unpacker.text();
     text.text = unpacker.text();
   }
   contents.refused.resize(unpacker.count(16));
-  for (MatRefused& refused : contents.refused) {
+  for (NotAColumn& refused : contents.refused) {
     refused.name = unpacker.text();
     refused.why = unpacker.text();
   }
@@ -200,7 +205,43 @@ std::string bytes_of(const std::filesystem::path& path, std::uintmax_t size) {
   return bytes;
 }
 
-[[noreturn]] void be_the_child(const std::filesystem::path& path, int file) {
+FileContents read_mat5(const std::filesystem::path& path, std::uintmax_t size) {
+  FileContents contents;
+  contents.failure = damage_of_mat5(bytes_of(path, size));
+  return contents.failure.empty() ? read_mat_unguarded(path) : contents;
+}
+
+FileContents read_unguarded(const std::filesystem::path& path, FileFormat format, std::uintmax_t size) {
+  switch (format) {
+    case FileFormat::mat5:
+      return read_mat5(path, size);
+    case FileFormat::mat7_3: {
+      FileContents contents = read_mat_unguarded(path);
+      return contents.arrays.empty() ? read_hdf5_unguarded(path, true) : contents;
+    }
+    case FileFormat::hdf5:
+      return read_hdf5_unguarded(path, false);
+    case FileFormat::npz:
+      return read_npz(path);
+    case FileFormat::npy:
+      return read_npy(path);
+    case FileFormat::ros1_bag:
+      return read_ros1_bag(path);
+    case FileFormat::ros2_bag:
+      return read_ros2_bag(path);
+    case FileFormat::mcap:
+      return read_mcap(path);
+    case FileFormat::mjlib_log:
+      return read_mjlib_log(path);
+    default: {
+      FileContents contents;
+      contents.failure = "is of no format that holds named arrays";
+      return contents;
+    }
+  }
+}
+
+[[noreturn]] void be_the_child(const std::filesystem::path& path, FileFormat format, int file) {
   // Libraries that stumble over damage say so; the parent says it better.
   const int nowhere = ::open("/dev/null", O_WRONLY | O_CLOEXEC);
   if (nowhere >= 0) ::dup2(nowhere, STDERR_FILENO);
@@ -210,10 +251,7 @@ std::string bytes_of(const std::filesystem::path& path, std::uintmax_t size) {
     std::uintmax_t size = std::filesystem::file_size(path, error);
     if (error) size = 0;
     limit_resources(size);
-    MatContents contents;
-    if (mat_version(path) == MatVersion::v5) contents.failure = damage_of_mat5(bytes_of(path, size));
-    if (contents.failure.empty()) contents = read_mat_unguarded(path);
-    code = pack(contents, file) ? 0 : 1;
+    code = pack(read_unguarded(path, format, size), file) ? 0 : 1;
   } catch (...) {  // out of memory: the code says enough
   }
   ::_exit(code);
@@ -221,15 +259,15 @@ std::string bytes_of(const std::filesystem::path& path, std::uintmax_t size) {
 
 }  // namespace
 
-MatContents read_mat(const std::filesystem::path& path) {
-  MatContents contents;
+FileContents read_contents(const std::filesystem::path& path, FileFormat format) {
+  FileContents contents;
   Pipe pipe;
   const pid_t child = pipe.is_open() ? ::fork() : -1;
   if (child < 0) {
     contents.failure = "cannot be read, as the system gives no process to read it in";
     return contents;
   }
-  if (child == 0) be_the_child(path, pipe.write_end());
+  if (child == 0) be_the_child(path, format, pipe.write_end());
   pipe.close(1);
 
   std::string bytes;

@@ -1,4 +1,5 @@
-// MAT files of versions 5 (compressed or not, as MATLAB's -v6 and -v7 write) and 7.3 as recordings.
+// Files with named arrays as recordings: MAT of versions 5 (compressed or not, as MATLAB's -v6 and -v7 write) and 7.3,
+// HDF5, NumPy's .npy and .npz.
 #pragma once
 
 #include <cstddef>
@@ -9,24 +10,26 @@
 #include <string_view>
 #include <vector>
 
+#include "host/data/file_contents.hpp"
+#include "host/data/file_format.hpp"
 #include "host/data/findings.hpp"
-#include "host/data/mat_contents.hpp"
 #include "host/data/recording.hpp"
 
 namespace flexspline::data {
 
 // Columns go by what MATLAB calls them: a vector by its name, "iq"; a field as "log.iq", of a struct array
 // "log(2).iq"; a matrix gives the columns "data(:,1)", "data(:,2)" ..., or the rows "data(1,:)" ... if it has more
-// columns than rows. Single numbers and texts are keys.
-class MatFile final : public Recording {
+// columns than rows. Other formats count from zero, "data[0]". Single numbers and texts are keys.
+class ArrayFile final : public Recording {
  public:
   // Throws DataError (with what `findings` holds) of kind "file", "format" or "header".
-  MatFile(const std::filesystem::path& path, Findings& findings);
+  ArrayFile(const std::filesystem::path& path, FileFormat format, Findings& findings);
 
   const std::vector<std::string>& names() const override { return names_; }
   const std::vector<HeaderKey>& keys() const override { return keys_; }
   std::size_t length(std::size_t name) const override { return views_[name].count; }
   std::string why_not(std::string_view name) const override;
+  std::string unit(std::size_t name) const override;
   Table read(std::span<const std::size_t> wanted) const override;
 
  private:
@@ -37,15 +40,17 @@ class MatFile final : public Recording {
     std::size_t count = 0;
   };
 
+  void name_by_labels();
   void take(std::size_t array);
   void take_matrix(std::size_t array, std::size_t rows, std::size_t columns);
   void add(std::string name, const View& view);
   void take_key(const std::string& name, const std::string& value, const char* what);
 
-  MatContents contents_;
+  FileContents contents_;
   std::vector<std::string> names_;
   std::vector<View> views_;  // as names_
   std::vector<HeaderKey> keys_;
+  std::map<std::string, std::string, std::less<>> units_;  // by name, where the file states one
   std::map<std::string, std::string, std::less<>> why_not_;
 };
 

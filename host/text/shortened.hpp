@@ -1,0 +1,14 @@
+// Foreign text in a message, at a length that can be read.
+#pragma once
+
+#include <cstddef>
+#include <string>
+#include <string_view>
+
+namespace flexspline::text {
+
+// At most `most` bytes of it, cut between characters of UTF-8; what is left out is counted: "abc... (20971517 more
+// characters)".
+std::string shortened(std::string_view text, std::size_t most);
+
+}  // namespace flexspline::text

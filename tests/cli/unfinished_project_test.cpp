@@ -1,0 +1,69 @@
+// `new` leaves what it could find where it cannot finish, and the line to go on with.
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <sstream>
+
+#include "tests/cli/tool.hpp"
+
+namespace flexspline::cli_test {
+namespace {
+
+std::string log_of(const std::string& header, int count = 2000) {
+  std::string text = header + "\n";
+  for (int k = 0; k < count; ++k) {
+    char line[120];
+    std::snprintf(line, sizeof line, "%.3f,%.6f,%.6f\n", 0.001 * k, std::cos(0.006 * k), 3.0 * std::sin(0.006 * k));
+    text += line;
+  }
+  return text;
+}
+
+// The command that a message ends with.
+std::string line_to_go_on_with(const std::string& message) {
+  const std::size_t at = message.rfind("\n  flexspline new");
+  return at == std::string::npos ? "" : message.substr(at + 3, message.find('\n', at + 3) - at - 3);
+}
+
+TEST(UnfinishedProject, HoldsWhatWasFoundAndTheLineOnStandardErrorGoesOn) {
+  const Shell shell;
+  shell.write("log.csv", log_of("clock,Iq,kappa"));
+  const Answer answer = shell.run("flexspline new --from log.csv --out project --torque-constant 0.1");
+  EXPECT_EQ(answer.code, 2);
+  EXPECT_TRUE(contains(shell.file("project/dataset.toml"), "[columns.current_a]"));
+  EXPECT_FALSE(fs::exists(shell.folder() / "project/base-model.toml"));
+  std::string line = line_to_go_on_with(answer.err);
+  EXPECT_TRUE(contains(line, "--torque-constant 0.1 --map time_s=")) << answer.err;
+  EXPECT_TRUE(contains(line, "--map motor_position_rad=")) << answer.err;
+  line = "flexspline new --from log.csv --out project --map time_s=clock --map motor_position_rad=kappa";
+  shell.must(line);  // without --force: the draft is written over
+  EXPECT_TRUE(fs::exists(shell.folder() / "project/base-model.toml"));
+}
+
+TEST(UnfinishedProject, MessagesNameLinesOfTheFileThatIsThere) {
+  const Shell shell;
+  shell.write("log.csv", log_of("time_s,current_a,motor_counts"));
+  const Answer answer =
+      shell.run("flexspline new --from log.csv --out project --map motor_position_rad=motor_counts:counts");
+  EXPECT_EQ(answer.code, 2);
+  const std::size_t at = answer.err.find("project/dataset.toml:");
+  ASSERT_NE(at, std::string::npos) << answer.err;
+  const int number = std::stoi(answer.err.substr(at + 21));
+  std::istringstream lines(shell.file("project/dataset.toml"));
+  std::string line;
+  for (int k = 0; k < number; ++k) std::getline(lines, line);
+  EXPECT_TRUE(contains(line, "columns.motor_position_rad")) << number << " " << shell.file("project/dataset.toml");
+}
+
+TEST(UnfinishedProject, WhatCanBeToleratedStandsInTheLine) {
+  const Shell shell;
+  shell.write("log.csv", log_of("time_s,current_a,motor_position_rad") + "2.000,nan,1.0\n2.001,0,1\n");
+  const Answer answer = shell.run("flexspline new --from log.csv --out project");
+  EXPECT_EQ(answer.code, 2);
+  const std::string line = line_to_go_on_with(answer.err);
+  EXPECT_TRUE(contains(line, "--tolerate not_finite")) << answer.err;
+  shell.must(line);
+}
+
+}  // namespace
+}  // namespace flexspline::cli_test
