@@ -117,7 +117,7 @@ struct Entry {
   bool adds_torque() const { return static_cast<bool>(real.torque); }
   bool adds_to(Balance balance) const { return info->balance == balance || (info->adds_to & on(balance)) != 0; }
   // The balance on which its parameters are estimated.
-  Balance told_by() const { return info->told_by_motor ? Balance::motor : info->balance; }
+  Balance identified_on() const { return info->identified_on_motor ? Balance::motor : info->balance; }
 };
 
 // Parameters as they are searched for (see effects::ParameterInfo), and back. Where a parameter that another is stated

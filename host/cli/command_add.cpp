@@ -5,18 +5,18 @@
 
 #include "host/cli/commands.hpp"
 #include "host/cli/report_option.hpp"
-#include "host/diagnosis/add.hpp"
 #include "host/model/signature.hpp"
 #include "host/output/json.hpp"
 #include "host/output/learned_table.hpp"
 #include "host/output/text.hpp"
+#include "host/selection/add.hpp"
 
 namespace flexspline::cli {
 namespace {
 
-using diagnosis::Addition;
 using nlohmann::json;
 using output::number;
+using selection::Addition;
 
 constexpr int kDigits = 5;  // an interval of 0.1 % is still one
 
@@ -40,7 +40,7 @@ void print(const Addition& change, const std::string& what, Console& console) {
     console.line("  No data were held out: --holdout DATA would show whether this holds on others.");
   console.line();
   output::Table values({"all parameters", "value", "95 % interval", "", "unit"}, "lrrrl");
-  for (const regression::Estimate& e : change.estimates)
+  for (const estimation::Estimate& e : change.estimates)
     values.row({fmt::format("{}.{}", e.id, e.parameter), number(e.value, kDigits), number(e.low, kDigits),
                 number(e.high, kDigits), e.unit});
   console.line(values.text());
@@ -50,14 +50,14 @@ void print(const Addition& change, const std::string& what, Console& console) {
   }
 }
 
-json errors_json(const diagnosis::Errors& errors) {
+json errors_json(const selection::Errors& errors) {
   return {{"rmse_fit", output::json_number(errors.rmse_fit)},
           {"rmse_holdout", output::json_number(errors.rmse_holdout)}};
 }
 
 json change_json(const Addition& change) {
   json parameters = json::array();
-  for (const regression::Estimate& e : change.estimates) parameters.push_back(output::json_parameter(e));
+  for (const estimation::Estimate& e : change.estimates) parameters.push_back(output::json_parameter(e));
   json tables = json::array();
   for (const auto& [id, learned] : change.tables)
     tables.push_back(output::learned_table_json(id, *change.model.find(id)->definition, learned, change.unit));
@@ -79,14 +79,14 @@ using Change = std::function<Addition(const data::Dataset&, const model::Model&)
 void write_page(const ChangeOptions& options, const std::string& command, const data::Dataset& dataset,
                 const model::Model& before, const Addition& changed, Console& console) {
   if (options.report.empty()) return;
-  const regression::PipelineOptions pipeline = options.pipeline.options();
+  const estimation::PipelineOptions pipeline = options.pipeline.options();
   write_report(options.report,
                {.command = command,
                 .data_name = as_arguments(options.data.data),
                 .model_name = options.out.string(),
                 .dataset = &dataset,
                 .model = changed.model,
-                .before = regression::identify(dataset, before, pipeline)->model,
+                .before = estimation::identify(dataset, before, pipeline)->model,
                 .pipeline = pipeline,
                 .estimates = changed.estimates,
                 .addition = changed},
@@ -122,14 +122,14 @@ int change_model(const ChangeOptions& options, const std::string& command, const
 int run(const AddOptions& options, Console& console) {
   require_effect(options.effect.substr(0, options.effect.find(':')));
   // A wrong name is said before files are read.
-  if (diagnosis::names_made_effect(options.effect))
-    diagnosis::made_effect(options.effect, options.made, {});
+  if (selection::names_user_defined_effect(options.effect))
+    selection::user_defined_effect(options.effect, options.made, {});
   else
-    diagnosis::parse_effect(options.effect);
+    selection::parse_effect(options.effect);
   return change_model(
       options, "add", fmt::format("{} added", options.effect),
       [&](const data::Dataset& dataset, const model::Model& model) {
-        return diagnosis::add(dataset, model, options.effect, options.pipeline.options(), options.made);
+        return selection::add(dataset, model, options.effect, options.pipeline.options(), options.made);
       },
       console);
 }
@@ -138,7 +138,7 @@ int run(const RemoveOptions& options, Console& console) {
   return change_model(
       options, "remove", fmt::format("{} taken out", options.effect),
       [&](const data::Dataset& dataset, const model::Model& model) {
-        return diagnosis::remove(dataset, model, options.effect, options.pipeline.options());
+        return selection::remove(dataset, model, options.effect, options.pipeline.options());
       },
       console);
 }

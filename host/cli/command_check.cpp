@@ -106,13 +106,13 @@ void print(const std::vector<data::Finding>& findings, Console& console) {
 }
 
 // Says which filters an identification would use; null where these data allow none.
-json print_pipeline(const data::Dataset& dataset, const BaseModel& base, const regression::PipelineOptions& options,
+json print_pipeline(const data::Dataset& dataset, const BaseModel& base, const estimation::PipelineOptions& options,
                     Console& console) {
   std::vector<const data::Experiment*> experiments;
   for (const data::Experiment& e : dataset.experiments) experiments.push_back(&e);
   try {
     console.progress("choosing the filters");
-    const regression::Prepared prepared = regression::prepare(experiments, base.model.drive, options);
+    const estimation::Prepared prepared = estimation::prepare(experiments, base.model.drive, options);
     console.line(output::wrapped(output::pipeline_text(prepared)));
     return {{"cutoff_hz", json_number(prepared.pipeline.row_cutoff_hz)},
             {"motion_cutoff_hz", json_number(prepared.pipeline.motion_cutoff_hz)},

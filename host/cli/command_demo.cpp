@@ -12,11 +12,11 @@
 #include "host/cli/report_option.hpp"
 #include "host/cli/twin_process.hpp"
 #include "host/comparison/compare.hpp"
-#include "host/diagnosis/add.hpp"
-#include "host/diagnosis/diagnosis.hpp"
+#include "host/estimation/identify.hpp"
 #include "host/output/json.hpp"
 #include "host/output/text.hpp"
-#include "host/regression/identify.hpp"
+#include "host/selection/add.hpp"
+#include "host/selection/diagnosis.hpp"
 
 namespace flexspline::cli {
 namespace {
@@ -30,12 +30,12 @@ constexpr std::string_view kMayHide[] = {
     "gravity",           "current_offset",    "torque_ripple:2",   "torque_ripple:7",         "temperature_viscous",
     "dahl_friction",     "backlash",          "structural_damping"};
 
-std::string label(const diagnosis::Named& named) {
+std::string label(const selection::Named& named) {
   return named.order ? fmt::format("{}:{:g}", named.effect, *named.order) : named.effect;
 }
 
 // The same effect, whether or not an order was given with it.
-bool is_the_hidden_one(const diagnosis::Named& named, const std::string& hidden) {
+bool is_the_hidden_one(const selection::Named& named, const std::string& hidden) {
   return label(named) == hidden || (named.effect == "torque_ripple" && hidden == "torque_ripple" && named.order == 2.0);
 }
 
@@ -139,7 +139,7 @@ int run(const DemoOptions& options, Console& console) {
   console.line(console.bold("2. Identify"));
   const model::ModelFile base_file = load_model(recording / "base-model.toml");
   console.progress("identifying the model");
-  const auto base = regression::identify(dataset, base_file.model, {});
+  const auto base = estimation::identify(dataset, base_file.model, {});
   const std::filesystem::path base_path = folder / "model.toml";
   model::Model stored = base->model;
   stored.drive = base_file.model.drive;
@@ -153,12 +153,12 @@ int run(const DemoOptions& options, Console& console) {
   console.line();
 
   console.line(console.bold("3. Where does it fail, and what is missing?"));
-  diagnosis::Options diagnose_options;
+  selection::Options diagnose_options;
   diagnose_options.progress = [&](std::string_view stage) { console.progress(stage); };
-  const diagnosis::Diagnosis found = diagnosis::diagnose(dataset, base->model, diagnose_options);
+  const selection::Diagnosis found = selection::diagnose(dataset, base->model, diagnose_options);
   if (found.noise_floor)
     console.line(output::wrapped(fmt::format("The {} is off by {}, {:.1f} times what noise alone would leave.",
-                                             found.balance ? diagnosis::balance_signal(*found.balance) : "model",
+                                             found.balance ? selection::balance_signal(*found.balance) : "model",
                                              output::with_unit(found.base_rmse, found.unit),
                                              found.base_rmse / *found.noise_floor)));
   for (std::size_t i = 0; i < std::min<std::size_t>(2, found.localised.size()); ++i)
@@ -169,7 +169,7 @@ int run(const DemoOptions& options, Console& console) {
     const auto& c = found.candidates[i];
     ranked.row({label({c.effect, c.order}), fmt::format("{:.0f}", c.score),
                 fmt::format("{:.1f} %", 100.0 * (1.0 - c.rmse_cv_after / c.rmse_cv_before)),
-                std::string(diagnosis::balance_signal(c.balance))});
+                std::string(selection::balance_signal(c.balance))});
   }
   console.line(ranked.text());
   console.line();
@@ -178,7 +178,7 @@ int run(const DemoOptions& options, Console& console) {
                  {"hidden", hidden == "none" ? json(nullptr) : json(hidden)},
                  {"seed", seed},
                  {"named", json::array()},
-                 {"verdict", diagnosis::verdict_name(found.verdict)},
+                 {"verdict", selection::verdict_name(found.verdict)},
                  {"error_before", nullptr},
                  {"error_after", nullptr},
                  {"noise_floor", output::json_number(found.noise_floor)},
@@ -213,7 +213,7 @@ int run(const DemoOptions& options, Console& console) {
 
     console.line(console.bold("4. Add it, and judge on motions that the fit never saw"));
     console.progress("adding the effect and refitting");
-    const diagnosis::Addition added = diagnosis::add(dataset, base->model, names.front(), {});
+    const selection::Addition added = selection::add(dataset, base->model, names.front(), {});
     const std::filesystem::path path = folder / "model-with-effect.toml";
     model::Model better = added.model;
     better.drive = base_file.model.drive;

@@ -4,9 +4,9 @@
 
 #include "host/cli/commands.hpp"
 #include "host/cli/report_option.hpp"
-#include "host/diagnosis/complete.hpp"
 #include "host/output/diagnosis.hpp"
 #include "host/output/json.hpp"
+#include "host/selection/add_until_complete.hpp"
 
 namespace flexspline::cli {
 namespace {
@@ -25,11 +25,11 @@ std::string add_command(const DiagnoseOptions& options) {
 
 // The model of the last round with values, beside the one that was asked about where effects were added.
 void write_page(const DiagnoseOptions& options, const data::Dataset& dataset, const model::Model& asked,
-                const model::Model& last, const std::vector<diagnosis::Diagnosis>& rounds, Console& console) {
+                const model::Model& last, const std::vector<selection::Diagnosis>& rounds, Console& console) {
   if (options.report.empty()) return;
   console.progress("fitting the model for the report");
-  const regression::PipelineOptions pipeline = options.pipeline.options();
-  const auto fitted = regression::identify(dataset, last, pipeline);
+  const estimation::PipelineOptions pipeline = options.pipeline.options();
+  const auto fitted = estimation::identify(dataset, last, pipeline);
   report::Subject subject{.command = "diagnose",
                           .data_name = as_arguments(options.data.data),
                           .model_name = options.model.string(),
@@ -38,7 +38,7 @@ void write_page(const DiagnoseOptions& options, const data::Dataset& dataset, co
                           .pipeline = pipeline,
                           .estimates = fitted->estimates,
                           .rounds = rounds};
-  if (rounds.size() > 1) subject.before = regression::identify(dataset, asked, pipeline)->model;
+  if (rounds.size() > 1) subject.before = estimation::identify(dataset, asked, pipeline)->model;
   write_report(options.report, subject, console);
 }
 
@@ -48,11 +48,11 @@ int run(const DiagnoseOptions& options, Console& console) {
   require_report_place(options.report);
   const model::ModelFile file = load_searched_model(options.model);
   const data::Dataset dataset = load(options.data, console);
-  diagnosis::Options how;
+  selection::Options how;
   how.pipeline = options.pipeline.options();
   how.progress = [&](std::string_view stage) { console.progress(stage); };
   std::size_t round = 0;
-  const auto say = [&](const diagnosis::Diagnosis& found) {
+  const auto say = [&](const selection::Diagnosis& found) {
     for (const std::string& warning : found.warnings) console.warn(warning);
     if (options.all) {
       console.line();
@@ -60,7 +60,8 @@ int run(const DiagnoseOptions& options, Console& console) {
     }
     output::print_diagnosis(console, found, add_command(options));
   };
-  const diagnosis::Completion done = diagnosis::complete(dataset, file.model, how, options.all ? kMostRounds : 1, say);
+  const selection::Completion done =
+      selection::add_until_complete(dataset, file.model, how, options.all ? kMostRounds : 1, say);
   for (const std::string& effect : done.removed)
     console.line(fmt::format("{} was needless once the others were in the model, and was removed.", effect));
   write_page(options, dataset, file.model, done.model, done.rounds, console);

@@ -9,13 +9,13 @@
 #include "host/comparison/compare.hpp"
 #include "host/data/recording.hpp"
 #include "host/deployment/sha256.hpp"
-#include "host/diagnosis/diagnosis.hpp"
 #include "host/estimation/estimate.hpp"
 #include "host/fleet/siblings.hpp"
 #include "host/output/diagnosis.hpp"
 #include "host/output/identification.hpp"
 #include "host/output/json.hpp"
 #include "host/output/text.hpp"
+#include "host/selection/diagnosis.hpp"
 #include "host/text/build_identity.hpp"
 
 namespace flexspline::cli {
@@ -87,7 +87,7 @@ json result_of(const FleetOptions& options, const Task& task, Console& console) 
   inputs.tolerate = options.tolerate;
   const data::Dataset dataset = load(inputs, console);
   const model::ModelFile file = load_model(task.model);
-  const regression::PipelineOptions pipeline = options.pipeline.options();
+  const estimation::PipelineOptions pipeline = options.pipeline.options();
   console.progress("estimating the parameters");
   const auto found = estimation::estimate(dataset, file.model, pipeline);
   const auto method = estimation::method_for(file.model);
@@ -105,10 +105,10 @@ json result_of(const FleetOptions& options, const Task& task, Console& console) 
                  {"warnings", identified["warnings"]},
                  {"diagnosis", nullptr}};
   if (options.diagnose) {
-    diagnosis::Options how;
+    selection::Options how;
     how.pipeline = pipeline;
     how.progress = [&](std::string_view stage) { console.progress(stage); };
-    const json diagnosed = output::diagnosis_json(diagnosis::diagnose(dataset, file.model, how));
+    const json diagnosed = output::diagnosis_json(selection::diagnose(dataset, file.model, how));
     answer["diagnosis"] = {
         {"verdict", diagnosed["verdict"]}, {"named", diagnosed["named"]}, {"base", diagnosed["base"]}};
   }

@@ -51,7 +51,7 @@ int run(const IdentifyOptions& options, Console& console) {
   const model::ModelFile file = load_model(options.model);
   const estimation::Options how = options_from(options, console);
   model::Model known = file.model;
-  std::unique_ptr<regression::Identification> found;
+  std::unique_ptr<estimation::Identification> found;
   const data::Dataset dataset = load(options.data, console);
   console.progress("estimating the parameters");
   try {
@@ -69,7 +69,7 @@ int run(const IdentifyOptions& options, Console& console) {
   } else {
     // What only the data set knows of the drive stays there: the file keeps what its author wrote.
     model::Model changed = known;
-    regression::store(changed, found->estimates);
+    estimation::store(changed, found->estimates);
     model::save(options.out, model::signed_by_tool(model::rewrite(file, changed)));
     console.line();
     console.line(fmt::format("{} holds these values.", options.out.string()));

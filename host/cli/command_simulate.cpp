@@ -6,10 +6,10 @@
 #include <nlohmann/json.hpp>
 
 #include "host/cli/commands.hpp"
+#include "host/estimation/identify.hpp"
 #include "host/model/text.hpp"
 #include "host/output/json.hpp"
 #include "host/output/text.hpp"
-#include "host/regression/identify.hpp"
 #include "host/simulation/simulation.hpp"
 
 namespace flexspline::cli {
@@ -107,7 +107,7 @@ int run(const SimulateOptions& options, Console& console) {
   model::Model model = load_model(options.model).model;
   const data::Dataset dataset = load(options.data, console);
   std::vector<std::string> warnings;
-  model.drive = regression::reconcile(model.drive, dataset, warnings);
+  model.drive = estimation::reconcile(model.drive, dataset, warnings);
   for (const std::string& warning : warnings) console.warn(warning);
 
   std::string toml = dataset_head(model.drive, options.model);

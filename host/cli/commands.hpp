@@ -9,7 +9,7 @@
 
 #include "host/cli/inputs.hpp"
 #include "host/deployment/pack.hpp"
-#include "host/diagnosis/made.hpp"
+#include "host/selection/user_defined_effects.hpp"
 
 namespace flexspline::cli {
 
@@ -135,7 +135,7 @@ struct ChangeOptions {
   std::string json;
 };
 struct AddOptions : ChangeOptions {
-  diagnosis::Made made;
+  selection::UserDefinition made;
 };
 struct RemoveOptions : ChangeOptions {};
 int run(const AddOptions& options, Console& console);

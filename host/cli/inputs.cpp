@@ -7,7 +7,7 @@
 
 #include "host/catalogue/constants.hpp"
 #include "host/catalogue/defined.hpp"
-#include "host/regression/terms.hpp"
+#include "host/estimation/terms.hpp"
 #include "host/text/nearest.hpp"
 
 namespace flexspline::cli {
@@ -72,7 +72,7 @@ model::ModelFile load_searched_model(const fs::path& path) {
   constexpr std::ptrdiff_t kMostEstimated = 250;
   model::ModelFile file = load_model(path);
   std::ptrdiff_t estimated = 0;
-  for (const regression::Term& term : regression::terms_of(file.model))
+  for (const estimation::Term& term : estimation::terms_of(file.model))
     estimated += std::count(term.known.begin(), term.known.end(), 0);
   if (estimated > kMostEstimated)
     throw UsageError(

@@ -8,9 +8,9 @@
 #include <vector>
 
 #include "host/data/dataset.hpp"
+#include "host/estimation/record.hpp"
 #include "host/model/model.hpp"
 #include "host/output/console.hpp"
-#include "host/regression/record.hpp"
 
 namespace flexspline::cli {
 
@@ -36,7 +36,7 @@ struct PipelineInputs {
   std::optional<double> cutoff_hz;
   std::string mask = "auto";
 
-  regression::PipelineOptions options() const { return {cutoff_hz, mask != "none"}; }
+  estimation::PipelineOptions options() const { return {cutoff_hz, mask != "none"}; }
 };
 
 // Reads all measurements; those of `holdout` are never fitted, whatever role they state, and an experiment that both

@@ -17,11 +17,11 @@ namespace {
 
 using blackbox::LinearModel;
 using data::Role;
-using regression::Balance;
-using regression::Prepared;
-using regression::Record;
+using estimation::Balance;
+using estimation::Prepared;
+using estimation::Record;
 
-using Input = double (*)(const effects::Inputs<regression::Real>&);
+using Input = double (*)(const effects::Inputs<estimation::Real>&);
 
 struct NamedInput {
   const char* name;
@@ -159,15 +159,15 @@ BesideResult result_of(const BesideSignal& signal, const blackbox::Specification
 
 }  // namespace
 
-BesideSignal balance_signal(const Prepared& prepared, const regression::BalanceData& data,
-                            const regression::Terms& terms, const std::string& name, const std::string& unit) {
+BesideSignal balance_signal(const Prepared& prepared, const estimation::BalanceData& data,
+                            const estimation::Terms& terms, const std::string& name, const std::string& unit) {
   BesideSignal signal;
   signal.signal = name;
   signal.unit = unit;
   const bool collapsed = data.balance() == Balance::motor && !prepared.torque_measured;
   const std::span<const NamedInput> inputs = inputs_of(data.balance(), collapsed);
   for (const NamedInput& input : inputs) signal.inputs.emplace_back(input.name);
-  for (const regression::RowRange& range : data.records()) {
+  for (const estimation::RowRange& range : data.records()) {
     const Record& record = prepared.records[range.record];
     const auto full = full_rate(prepared, record, data.balance(), terms);
     if (!full) continue;
@@ -176,7 +176,7 @@ BesideSignal balance_signal(const Prepared& prepared, const regression::BalanceD
     series.output = full->target;
     series.model_error = full->residual;
     series.judged.assign(record.inputs.size(), 0);
-    for (const std::size_t k : record.rows[regression::index(data.balance())].samples) series.judged[k] = 1;
+    for (const std::size_t k : record.rows[estimation::index(data.balance())].samples) series.judged[k] = 1;
     for (const NamedInput& input : inputs) {
       std::vector<double> values(record.inputs.size());
       record.inputs.all().each_stretch([&](std::size_t first, auto stretch) {

@@ -8,7 +8,7 @@
 
 #include "host/blackbox/specification.hpp"
 #include "host/data/dataset.hpp"
-#include "host/regression/balance_data.hpp"
+#include "host/estimation/balance_data.hpp"
 
 namespace flexspline::comparison {
 
@@ -64,14 +64,14 @@ struct BesideResult {
 // torsion and torsion rate (transmission), acceleration and velocity of the output (load); a motor balance that holds
 // the others takes the torsion too; what is nought throughout is left out. The motion of the same instant is known: a
 // delay of one means that one.
-BesideSignal balance_signal(const regression::Prepared& prepared, const regression::BalanceData& data,
-                            const regression::Terms& terms, const std::string& signal, const std::string& unit);
+BesideSignal balance_signal(const estimation::Prepared& prepared, const estimation::BalanceData& data,
+                            const estimation::Terms& terms, const std::string& signal, const std::string& unit);
 
 // Adds a record to the free run of motor_velocity or torque: what the measured effort makes of it (report, figure 4).
 // Locked and free records are different systems and become signals of their own. Other signals are not added: a
 // position is the endless sum of its input, which no finite response can be. `model_error` has one entry a sample of
 // the record.
-void add_free_run_signal(const regression::Prepared& prepared, std::size_t record, const std::string& signal,
+void add_free_run_signal(const estimation::Prepared& prepared, std::size_t record, const std::string& signal,
                          const std::string& unit, const std::vector<double>& measured,
                          const std::vector<double>& model_error, std::vector<BesideSignal>& signals);
 

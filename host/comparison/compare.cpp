@@ -14,10 +14,10 @@
 #include "host/comparison/noise_floor.hpp"
 #include "host/comparison/row_variables.hpp"
 #include "host/comparison/score.hpp"
-#include "host/regression/balance_fit.hpp"
-#include "host/regression/identify.hpp"
-#include "host/regression/in_parallel.hpp"
-#include "host/regression/record_constants.hpp"
+#include "host/estimation/balance_fit.hpp"
+#include "host/estimation/identify.hpp"
+#include "host/estimation/in_parallel.hpp"
+#include "host/estimation/record_constants.hpp"
 #include "host/simulation/simulation.hpp"
 
 namespace flexspline::comparison {
@@ -25,10 +25,10 @@ namespace {
 
 using data::Column;
 using data::Experiment;
-using regression::Balance;
-using regression::BalanceData;
-using regression::Prepared;
-using regression::Record;
+using estimation::Balance;
+using estimation::BalanceData;
+using estimation::Prepared;
+using estimation::Record;
 
 constexpr std::size_t kFewestBins = 12;
 constexpr std::size_t kMostBins = 24;
@@ -52,27 +52,27 @@ struct Together {
 
 class Comparer {
  public:
-  Comparer(const data::Dataset& dataset, const model::Model& model, const regression::PipelineOptions& options,
+  Comparer(const data::Dataset& dataset, const model::Model& model, const estimation::PipelineOptions& options,
            const std::vector<blackbox::Specification>& beside)
       : model_(model), beside_(beside) {
     require_values(model);
-    model_.drive = regression::reconcile(model.drive, dataset, result_.warnings);
-    terms_ = regression::terms_of(model_);
+    model_.drive = estimation::reconcile(model.drive, dataset, result_.warnings);
+    terms_ = estimation::terms_of(model_);
     for (const Experiment& e : dataset.experiments) {
       all_.push_back(&e);
       result_.experiments.push_back({e.name, e.role, {}});
     }
-    prepared_ = regression::prepare_all(dataset, model_.drive, options);
+    prepared_ = estimation::prepare_all(dataset, model_.drive, options);
     result_.pipeline = prepared_.pipeline;
   }
 
   Comparison all(const Extent& extent) {
     for (const Balance balance : {Balance::motor, Balance::transmission, Balance::load}) {
       if (balance != Balance::motor && !prepared_.torque_measured) continue;
-      if (regression::terms_on(terms_, balance, prepared_.torque_measured).empty()) continue;
+      if (estimation::terms_on(terms_, balance, prepared_.torque_measured).empty()) continue;
       BalanceData data(prepared_, balance);
       if (data.empty()) continue;
-      if (regression::settle_record_constants(prepared_, data, terms_, {}, Eigen::VectorXd::Ones(data.rows())))
+      if (estimation::refine_record_constants(prepared_, data, terms_, {}, Eigen::VectorXd::Ones(data.rows())))
         data = BalanceData(prepared_, balance);
       inverse(data, extent.regions_and_gains);
     }
@@ -135,7 +135,7 @@ class Comparer {
   // Of the balance at full rate, by range of its rows.
   std::vector<double> worst_case_gains(const BalanceData& data) const {
     std::vector<double> gains(data.records().size(), kUnknown);
-    regression::in_parallel(gains.size(), [&](std::size_t i) {
+    estimation::in_parallel(gains.size(), [&](std::size_t i) {
       const Record& record = prepared_.records[data.records()[i].record];
       // A drive that is off excites no lines.
       const auto full = record.at_rest ? std::nullopt : full_rate(prepared_, record, data.balance(), terms_);
@@ -150,7 +150,7 @@ class Comparer {
   }
 
   void inverse(BalanceData& data, bool regions_and_gains) {
-    const Eigen::VectorXd residual = regression::residual_of(data, terms_);
+    const Eigen::VectorXd residual = estimation::residual_of(data, terms_);
     const std::vector<NoiseFloor> floors = noise_floors(data, terms_, all_, model_.drive);
     const std::string signal = signal_name(data.balance());
     const bool collapsed = data.balance() == Balance::motor && !prepared_.torque_measured;
@@ -158,11 +158,11 @@ class Comparer {
     const std::vector<double> gains =
         regions_and_gains ? worst_case_gains(data) : std::vector<double>(data.records().size(), kUnknown);
     for (std::size_t i = 0; i < data.records().size(); ++i) {
-      const regression::RowRange& range = data.records()[i];
+      const estimation::RowRange& range = data.records()[i];
       const Record& record = prepared_.records[range.record];
       Score score;
       for (Eigen::Index k = range.first; k < range.last; ++k) score.add(data.target()[k], residual[k]);
-      SignalResult s = result_of(signal, score, record.rows[regression::index(data.balance())].masked, false);
+      SignalResult s = result_of(signal, score, record.rows[estimation::index(data.balance())].masked, false);
       s.noise_floor = floors[i].rmse;
       s.noise_floor_from = floors[i].from;
       s.collapsed = collapsed;
@@ -266,7 +266,7 @@ class Comparer {
   }
 
   model::Model model_;
-  regression::Terms terms_;
+  estimation::Terms terms_;
   std::vector<const Experiment*> all_;
   Prepared prepared_;
   std::vector<Together> together_;
@@ -294,7 +294,7 @@ const SignalResult* Comparison::find_overall(std::string_view signal) const {
   return nullptr;
 }
 
-Comparison compare(const data::Dataset& dataset, const model::Model& model, const regression::PipelineOptions& options,
+Comparison compare(const data::Dataset& dataset, const model::Model& model, const estimation::PipelineOptions& options,
                    const std::vector<blackbox::Specification>& beside, Extent extent) {
   return Comparer(dataset, model, options, beside).all(extent);
 }

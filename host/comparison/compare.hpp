@@ -8,8 +8,8 @@
 
 #include "host/comparison/beside.hpp"
 #include "host/data/dataset.hpp"
+#include "host/estimation/record.hpp"
 #include "host/model/model.hpp"
-#include "host/regression/record.hpp"
 
 namespace flexspline::comparison {
 
@@ -61,7 +61,7 @@ struct Comparison {
   std::vector<SignalResult> overall;          // all samples of all experiments together
   std::vector<Region> regions;
   std::vector<BesideResult> beside;  // black boxes, in the order asked for, each with its signals
-  regression::Pipeline pipeline;
+  estimation::Pipeline pipeline;
   std::vector<std::string> warnings;
 
   const SignalResult* find_overall(std::string_view signal) const;
@@ -78,7 +78,7 @@ struct Extent {
 // of the positions, as drift is an error. The cut-off is chosen from the experiments of role fit, where there are any.
 // `beside`: black boxes that are fitted to the same signals, see beside.hpp.
 // Throws model::ModelError naming parameters without a value, data::DataError where no balance can be formed.
-Comparison compare(const data::Dataset& dataset, const model::Model& model, const regression::PipelineOptions& options,
+Comparison compare(const data::Dataset& dataset, const model::Model& model, const estimation::PipelineOptions& options,
                    const std::vector<blackbox::Specification>& beside = {}, Extent extent = {});
 
 // Throws model::ModelError naming the parameters without a value, if there are any.

@@ -8,10 +8,10 @@
 
 namespace flexspline::comparison {
 
-std::vector<FreeRunSignal> free_run_signals(const regression::Prepared& prepared, std::size_t record_at,
+std::vector<FreeRunSignal> free_run_signals(const estimation::Prepared& prepared, std::size_t record_at,
                                             simulation::FreeRun run) {
   using data::Column;
-  const regression::Record& record = prepared.records[record_at];
+  const estimation::Record& record = prepared.records[record_at];
   const data::Experiment& e = *record.experiment;
   std::vector<FreeRunSignal> signals;
   const auto add = [&signals](const char* name, Column column, std::vector<double> measured,

@@ -4,7 +4,7 @@
 #include <string>
 #include <vector>
 
-#include "host/regression/record.hpp"
+#include "host/estimation/record.hpp"
 #include "host/simulation/simulation.hpp"
 
 namespace flexspline::comparison {
@@ -18,7 +18,7 @@ struct FreeRunSignal {
 // The signals that both the record and `run` have, in the order above. The measured velocity is filtered; the model's
 // likewise, or reversals would differ for that alone. A locked output has no position to compare. Empty where nothing
 // was simulated.
-std::vector<FreeRunSignal> free_run_signals(const regression::Prepared& prepared, std::size_t record,
+std::vector<FreeRunSignal> free_run_signals(const estimation::Prepared& prepared, std::size_t record,
                                             simulation::FreeRun run);
 
 }  // namespace flexspline::comparison

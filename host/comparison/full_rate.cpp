@@ -2,27 +2,27 @@
 
 #include <algorithm>
 
-#include "host/regression/balance_fit.hpp"
+#include "host/estimation/balance_fit.hpp"
 
 namespace flexspline::comparison {
 
-std::optional<FullRate> full_rate(const regression::Prepared& prepared, const regression::Record& record,
-                                  regression::Balance balance, const regression::Terms& terms) {
-  regression::Prepared all;
+std::optional<FullRate> full_rate(const estimation::Prepared& prepared, const estimation::Record& record,
+                                  estimation::Balance balance, const estimation::Terms& terms) {
+  estimation::Prepared all;
   all.pipeline = prepared.pipeline;
   all.records = {record};
   all.constants = prepared.constants;
   all.torque_measured = prepared.torque_measured;
   all.effort_is_current = prepared.effort_is_current;
   all.rotary = prepared.rotary;
-  const std::vector<std::size_t>& rows = record.rows[regression::index(balance)].samples;
-  std::vector<std::size_t>& samples = all.records[0].rows[regression::index(balance)].samples;
+  const std::vector<std::size_t>& rows = record.rows[estimation::index(balance)].samples;
+  std::vector<std::size_t>& samples = all.records[0].rows[estimation::index(balance)].samples;
   samples.clear();
   for (const data::Segment& s : record.segments)
     for (std::size_t k = s.first; k < s.last; ++k) samples.push_back(k);
-  regression::BalanceData data(all, balance);
+  estimation::BalanceData data(all, balance);
   if (data.empty()) return std::nullopt;
-  const Eigen::VectorXd residual = regression::residual_of(data, terms);
+  const Eigen::VectorXd residual = estimation::residual_of(data, terms);
   const std::size_t n = record.inputs.size();
   FullRate result{std::vector<double>(n, 0.0), std::vector<double>(n, 0.0), std::vector<std::uint8_t>(n, 0)};
   for (std::size_t k = 0; k < samples.size(); ++k) {

@@ -5,7 +5,7 @@
 #include <optional>
 #include <vector>
 
-#include "host/regression/balance_data.hpp"
+#include "host/estimation/balance_data.hpp"
 
 namespace flexspline::comparison {
 
@@ -16,7 +16,7 @@ struct FullRate {
 };
 
 // Nothing where the record lacks what the balance needs. `record` need not be one of `prepared`, which gives the rest.
-std::optional<FullRate> full_rate(const regression::Prepared& prepared, const regression::Record& record,
-                                  regression::Balance balance, const regression::Terms& terms);
+std::optional<FullRate> full_rate(const estimation::Prepared& prepared, const estimation::Record& record,
+                                  estimation::Balance balance, const estimation::Terms& terms);
 
 }  // namespace flexspline::comparison

@@ -7,8 +7,8 @@
 #include <stdexcept>
 
 #include "host/comparison/full_rate.hpp"
-#include "host/regression/balance_fit.hpp"
-#include "host/regression/in_parallel.hpp"
+#include "host/estimation/balance_fit.hpp"
+#include "host/estimation/in_parallel.hpp"
 #include "host/signals/spectrum.hpp"
 
 namespace flexspline::comparison {
@@ -16,10 +16,10 @@ namespace {
 
 using data::Column;
 using data::Experiment;
-using regression::BalanceData;
-using regression::Prepared;
-using regression::Record;
-using regression::Terms;
+using estimation::BalanceData;
+using estimation::Prepared;
+using estimation::Record;
+using estimation::Terms;
 
 // A motion counts as repeated, sample by sample, where the motor is back within this angle (a ripple of order ten then
 // cancels to a half) and within this share of the motion's RMS in position and in velocity.
@@ -44,7 +44,7 @@ struct SameMotion {
 SameMotion same_motion(const Record& record, const Prepared& prepared, bool turns_known) {
   double mean = 0.0, position = 0.0, velocity = 0.0;
   const auto n = static_cast<double>(record.inputs.size());
-  const regression::RecordSignals& in = record.inputs;
+  const estimation::RecordSignals& in = record.inputs;
   for (std::size_t k = 0; k < in.size(); ++k) mean += in.angle_at(k) / n;
   for (std::size_t k = 0; k < in.size(); ++k) {
     position += (in.angle_at(k) - mean) * (in.angle_at(k) - mean) / n;
@@ -56,7 +56,7 @@ SameMotion same_motion(const Record& record, const Prepared& prepared, bool turn
   // Resolution and noise of the encoder do not make a motion another one.
   same.position += 2.0 * record.motor_quantum.value_or(0.0);
   same.velocity =
-      kSameVelocity * std::sqrt(velocity) + 4.0 * record.velocity_noise[regression::index(regression::Balance::motor)];
+      kSameVelocity * std::sqrt(velocity) + 4.0 * record.velocity_noise[estimation::index(estimation::Balance::motor)];
   return same;
 }
 
@@ -86,7 +86,7 @@ struct Pairs {
       ++offered;
       if (!b.valid[j] || !b.valid[j + 1]) continue;
       const auto away = [&](double p, double q, double own) { return std::abs(p + fraction * (q - p) - own); };
-      const regression::RecordSignals &own = ra.inputs, &other = rb.inputs;
+      const estimation::RecordSignals &own = ra.inputs, &other = rb.inputs;
       if (away(other.angle_at(j), other.angle_at(j + 1), own.angle_at(k)) > same.position ||
           away(other.velocity_at(j), other.velocity_at(j + 1), own.velocity_at(k)) > same.velocity)
         continue;
@@ -178,14 +178,14 @@ Experiment with_noise(const Record& record, std::uint64_t seed) {
   return e;
 }
 
-bool noise_is_stated(const Record& record, regression::Balance balance, bool torque_measured) {
+bool noise_is_stated(const Record& record, estimation::Balance balance, bool torque_measured) {
   const auto stated = [&](Column column) {
     return record.experiment->noise_std[static_cast<std::size_t>(column)].has_value();
   };
-  if (balance == regression::Balance::motor &&
+  if (balance == estimation::Balance::motor &&
       !stated(record.experiment->has(Column::current) ? Column::current : Column::motor_torque))
     return false;
-  return !(balance != regression::Balance::motor || torque_measured) || stated(Column::torque);
+  return !(balance != estimation::Balance::motor || torque_measured) || stated(Column::torque);
 }
 
 class Floors {
@@ -197,10 +197,10 @@ class Floors {
   }
 
   std::vector<NoiseFloor> all() {
-    const Eigen::VectorXd residual = regression::residual_of(data_, terms_);
+    const Eigen::VectorXd residual = estimation::residual_of(data_, terms_);
     std::vector<NoiseFloor> floors(data_.records().size());
-    regression::in_parallel(floors.size(), [&](std::size_t i) {
-      const regression::RowRange& range = data_.records()[i];
+    estimation::in_parallel(floors.size(), [&](std::size_t i) {
+      const estimation::RowRange& range = data_.records()[i];
       floors[i] = of(prepared_.records[range.record], residual.segment(range.first, range.size()));
     });
     return floors;
@@ -237,7 +237,7 @@ class Floors {
     for (const Experiment* other : experiments_) {
       if (other == record.experiment || other->name == record.name || !are_replicates(*record.experiment, *other))
         continue;
-      Prepared theirs = regression::prepare_with({other}, drive_, prepared_.pipeline);
+      Prepared theirs = estimation::prepare_with({other}, drive_, prepared_.pipeline);
       theirs.torque_measured = prepared_.torque_measured;
       theirs.constants = prepared_.constants;
       const auto a = full_rate(prepared_, record, data_.balance(), terms_);
@@ -252,14 +252,14 @@ class Floors {
     double sum = 0.0;
     for (int realisation = 0; realisation < kRealisations; ++realisation) {
       const Experiment noisy = with_noise(record, static_cast<std::uint64_t>(realisation) + 1);
-      Prepared again = regression::prepare_with({&noisy}, drive_, prepared_.pipeline);
+      Prepared again = estimation::prepare_with({&noisy}, drive_, prepared_.pipeline);
       again.torque_measured = prepared_.torque_measured;
       again.constants = prepared_.constants;
       again.records[0].at_rest = record.at_rest;
       again.records[0].rows = record.rows;  // the mask depends on the noise
       BalanceData data(again, data_.balance());
       if (data.rows() != residual.size()) return std::nullopt;
-      sum += (regression::residual_of(data, terms_) - residual).squaredNorm();
+      sum += (estimation::residual_of(data, terms_) - residual).squaredNorm();
     }
     return std::sqrt(sum / (kRealisations * static_cast<double>(residual.size())));
   }
@@ -279,7 +279,7 @@ std::vector<NoiseFloor> noise_floors(BalanceData& data, const Terms& terms,
   return Floors(data, terms, experiments, drive).all();
 }
 
-NoiseFloor pooled(const std::vector<NoiseFloor>& floors, const std::vector<regression::RowRange>& records) {
+NoiseFloor pooled(const std::vector<NoiseFloor>& floors, const std::vector<estimation::RowRange>& records) {
   if (floors.size() != records.size()) throw std::invalid_argument("one noise floor a record is needed");
   // Worst source first; the pooled floor is as good as its worst part.
   constexpr std::array<const char*, 4> kSources{"stated", "propagated", "replicates", "periods"};

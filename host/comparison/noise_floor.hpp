@@ -5,7 +5,7 @@
 #include <string>
 #include <vector>
 
-#include "host/regression/balance_data.hpp"
+#include "host/estimation/balance_data.hpp"
 
 namespace flexspline::comparison {
 
@@ -18,11 +18,11 @@ struct NoiseFloor {
 // period-to-period variance where the motion repeats itself; replicates; stated noise and quantisation of the columns
 // propagated through the pipeline. Never extrapolated from above the band. Replicates of a record are looked for among
 // `experiments`: those that a key names as such, and those with the same position set points.
-std::vector<NoiseFloor> noise_floors(regression::BalanceData& data, const regression::Terms& terms,
+std::vector<NoiseFloor> noise_floors(estimation::BalanceData& data, const estimation::Terms& terms,
                                      const std::vector<const data::Experiment*>& experiments,
                                      const model::Drive& drive);
 
 // Of all records together, weighted by their rows; none where any record has none.
-NoiseFloor pooled(const std::vector<NoiseFloor>& floors, const std::vector<regression::RowRange>& records);
+NoiseFloor pooled(const std::vector<NoiseFloor>& floors, const std::vector<estimation::RowRange>& records);
 
 }  // namespace flexspline::comparison

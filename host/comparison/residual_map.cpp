@@ -12,14 +12,14 @@
 #include <optional>
 
 #include "host/comparison/row_variables.hpp"
-#include "host/regression/in_parallel.hpp"
-#include "host/regression/least_squares.hpp"
+#include "host/estimation/in_parallel.hpp"
+#include "host/estimation/least_squares.hpp"
 
 namespace flexspline::comparison {
 namespace {
 
-using regression::BalanceData;
-using regression::RowRange;
+using estimation::BalanceData;
+using estimation::RowRange;
 
 constexpr double kSignificant = 1e-3;
 constexpr int kOrders = 24;
@@ -46,7 +46,7 @@ std::optional<double> significant_share(const Eigen::VectorXd& residual, const E
   const double r2 = std::clamp(e.explained / e.total, 0.0, 1.0 - 1e-12);
   // What explains less than this at one degree of freedom a number is nothing under any autocorrelation.
   if (r2 * e.rows < e.parameters) return std::nullopt;
-  const double tau = std::clamp(regression::autocorrelation_time(e.records, residual - e.prediction), 1.0, longest_tau);
+  const double tau = std::clamp(estimation::autocorrelation_time(e.records, residual - e.prediction), 1.0, longest_tau);
   const double independent = e.rows / tau, freedom = independent - 1.0 - e.parameters;
   if (freedom < 4.0) return std::nullopt;
   const double f = (r2 / e.parameters) / ((1.0 - r2) / freedom);
@@ -118,7 +118,7 @@ Bins direction_bins(const Eigen::VectorXd& directions) {
 // not see some whole waves stand aside: a part of one looks like anything that is smooth.
 Explained wave_of(const BalanceData& data, const Eigen::VectorXd& residual, int order) {
   const auto& prepared = data.prepared();
-  const auto balance = regression::index(data.balance());
+  const auto balance = estimation::index(data.balance());
   const double per_unit = static_cast<double>(order) * prepared.constants.turn_angle_scale;
   struct Group {
     Eigen::Matrix3d normal = Eigen::Matrix3d::Zero();
@@ -213,7 +213,7 @@ std::vector<Share> localise(const BalanceData& data, const Eigen::VectorXd& resi
       return shares;
     });
   std::vector<std::vector<Share>> answers(questions.size());
-  regression::in_parallel(questions.size(), [&](std::size_t i) { answers[i] = questions[i](); });
+  estimation::in_parallel(questions.size(), [&](std::size_t i) { answers[i] = questions[i](); });
   std::vector<Share> shares;
   for (std::vector<Share>& answer : answers) std::ranges::move(answer, std::back_inserter(shares));
   std::stable_sort(shares.begin(), shares.end(),

@@ -9,18 +9,18 @@ namespace flexspline::comparison {
 namespace {
 
 using data::Column;
-using regression::Balance;
-using regression::BalanceData;
-using regression::Record;
+using estimation::Balance;
+using estimation::BalanceData;
+using estimation::Record;
 
 constexpr double kNone = std::numeric_limits<double>::quiet_NaN();
 
 template <class Value>
 Eigen::VectorXd along_rows(const BalanceData& data, Value value) {
   Eigen::VectorXd rows(data.rows());
-  for (const regression::RowRange& range : data.records()) {
+  for (const estimation::RowRange& range : data.records()) {
     const Record& record = data.prepared().records[range.record];
-    const std::vector<std::size_t>& samples = record.rows[regression::index(data.balance())].samples;
+    const std::vector<std::size_t>& samples = record.rows[estimation::index(data.balance())].samples;
     for (Eigen::Index k = range.first; k < range.last; ++k)
       rows[k] = value(record, samples[static_cast<std::size_t>(k - range.first)]);
   }
@@ -51,7 +51,7 @@ bool varies(const Eigen::VectorXd& values) {
 }  // namespace
 
 std::vector<RowVariable> row_variables(const BalanceData& data, data::Axis axis) {
-  const regression::Prepared& prepared = data.prepared();
+  const estimation::Prepared& prepared = data.prepared();
   const Balance balance = data.balance();
   const bool on_load = balance == Balance::load;
   const double turns = prepared.constants.turn_angle_scale;

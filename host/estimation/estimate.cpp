@@ -32,11 +32,11 @@ constexpr std::array<std::pair<std::string_view, Intervals>, 3> kIntervals = {{
 
 // A homogeneous balance (report 3.6): where the torque constant is open too, any multiple of a solution is one.
 void warn_of_scale(Identification& identification) {
-  for (const regression::Estimate& e : identification.estimates) {
+  for (const Estimate& e : identification.estimates) {
     const auto& info = *identification.terms[e.slot.term].entry->info;
     if (e.identifiable || e.fixed || (info.reads & effects::kTorqueScale) == 0) continue;
     identification.warnings.push_back(fmt::format(
-        "nothing fixes the scale of the torques, so {}.{} cannot be told: supply one parameter that you know "
+        "nothing fixes the scale of the torques, so {}.{} is not identifiable: supply one parameter that you know "
         "another way, such as --supply inertia.inertia=VALUE",
         e.id, e.parameter));
   }
@@ -85,14 +85,14 @@ Intervals intervals_from_name(std::string_view name) {
 }
 
 Method method_for(const model::Model& model) {
-  for (const regression::Term& term : regression::terms_of(model))
+  for (const Term& term : terms_of(model))
     for (std::size_t p = 0; p < term.values.size(); ++p)
       if (term.free_shape(p)) return Method::nls;
   return Method::ls;
 }
 
 std::unique_ptr<Identification> estimate(const data::Dataset& dataset, const model::Model& model,
-                                         const regression::PipelineOptions& pipeline, const Options& options) {
+                                         const PipelineOptions& pipeline, const Options& options) {
   model::Model known = model;
   for (const Supplied& supplied : options.supplied) supply(known, supplied);
   const Method method = options.method == Method::automatic ? method_for(known) : options.method;
@@ -104,8 +104,8 @@ std::unique_ptr<Identification> estimate(const data::Dataset& dataset, const mod
   if (method == Method::partitioned) {
     result = partitioned(dataset, known, pipeline);
   } else {
-    result = regression::form(dataset, known, pipeline);
-    regression::fit(*result);
+    result = form(dataset, known, pipeline);
+    fit(*result);
     if (method != Method::ls && options.starts > 1) {
       options.progress("searching from several starts");
       search_from_several_starts(*result, options.starts, options.seed);
@@ -118,7 +118,7 @@ std::unique_ptr<Identification> estimate(const data::Dataset& dataset, const mod
       options.progress("fitting the free run");
       refit_to_output(*result, options.progress);
     }
-    regression::assemble(*result);
+    assemble(*result);
   }
   warn_of_scale(*result);
   if (options.intervals == Intervals::standard) return result;

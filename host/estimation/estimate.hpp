@@ -8,11 +8,9 @@
 #include <string_view>
 #include <vector>
 
-#include "host/regression/identify.hpp"
+#include "host/estimation/identify.hpp"
 
 namespace flexspline::estimation {
-
-using regression::Identification;
 
 enum class Method : std::uint8_t {
   automatic,     // ls or nls, as the model needs
@@ -51,10 +49,10 @@ std::string_view name_of(Method method);
 Intervals intervals_from_name(std::string_view name);
 
 // Fits the model to the experiments of role fit. What the method could not do is among the warnings. Throws
-// data::DataError as regression::identify does, and std::invalid_argument where the options do not suit the model: ls
+// data::DataError as identify does, and std::invalid_argument where the options do not suit the model: ls
 // with free shapes, a supplied parameter that is not there; the text says what to do.
 std::unique_ptr<Identification> estimate(const data::Dataset& dataset, const model::Model& model,
-                                         const regression::PipelineOptions& pipeline, const Options& options = {});
+                                         const PipelineOptions& pipeline, const Options& options = {});
 
 // Puts a supplied value into a model, as one that is known. Throws std::invalid_argument where it has no place.
 void supply(model::Model& model, const Supplied& supplied);

@@ -3,7 +3,7 @@
 #include <algorithm>
 #include <cmath>
 
-#include "host/regression/in_parallel.hpp"
+#include "host/estimation/in_parallel.hpp"
 
 namespace flexspline::estimation {
 namespace {
@@ -48,7 +48,7 @@ bool simulate(const model::Model& model, const data::Experiment& measured, const
 
 model::Model model_with_values(const Identification& identification) {
   model::Model model = identification.model;
-  for (const regression::Term& term : identification.terms) {
+  for (const Term& term : identification.terms) {
     model::Effect* effect = model.find(term.id);
     if (!effect) continue;
     const std::vector<double> values = catalogue::natural(*term.entry, term.values);
@@ -64,7 +64,7 @@ model::Model model_with_values(const Identification& identification) {
 
 FreeMotion free_motion(const Identification& identification, const FreeMotionOptions& options) {
   const model::Model model = model_with_values(identification);
-  const regression::Prepared& measured = identification.prepared;
+  const Prepared& measured = identification.prepared;
   const std::size_t records = measured.records.size();
   FreeMotion result;
   result.experiments.resize(records);
@@ -75,7 +75,7 @@ FreeMotion free_motion(const Identification& identification, const FreeMotionOpt
   result.prepared.rotary = measured.rotary;
   result.prepared.records.resize(records);
   result.simulated.assign(records, 0);
-  regression::in_parallel(records, [&](std::size_t i) {
+  in_parallel(records, [&](std::size_t i) {
     if (!options.only.empty() && !options.only[i]) return;
     simulation::Options how;
     how.step_s = options.step_s;
@@ -83,9 +83,8 @@ FreeMotion free_motion(const Identification& identification, const FreeMotionOpt
     data::Experiment& experiment = result.experiments[i];
     experiment = *measured.records[i].experiment;
     if (simulate(model, *measured.records[i].experiment, how, experiment)) result.simulated[i] = 1;
-    regression::Record& record = result.prepared.records[i];
-    record = std::move(
-        regression::prepare_with({&experiment}, identification.model.drive, measured.pipeline).records.front());
+    Record& record = result.prepared.records[i];
+    record = std::move(prepare_with({&experiment}, identification.model.drive, measured.pipeline).records.front());
     record.rows = measured.records[i].rows;
     record.at_rest = measured.records[i].at_rest;
   });

@@ -5,12 +5,10 @@
 #include <span>
 #include <vector>
 
-#include "host/regression/identify.hpp"
+#include "host/estimation/identify.hpp"
 #include "host/simulation/simulation.hpp"
 
 namespace flexspline::estimation {
-
-using regression::Identification;
 
 // The model of an identification with the values of its terms.
 model::Model model_with_values(const Identification& identification);
@@ -20,7 +18,7 @@ model::Model model_with_values(const Identification& identification);
 // result does not depend on their number.
 struct FreeMotion {
   std::vector<data::Experiment> experiments;
-  regression::Prepared prepared;
+  Prepared prepared;
   std::vector<std::uint8_t> simulated;  // by record
 };
 struct FreeMotionOptions {

@@ -7,17 +7,11 @@
 #include <cmath>
 
 #include "host/estimation/free_motion.hpp"
-#include "host/regression/least_squares.hpp"
-#include "host/regression/shapes.hpp"
+#include "host/estimation/least_squares.hpp"
+#include "host/estimation/variable_projection.hpp"
 
 namespace flexspline::estimation {
 namespace {
-
-using regression::BalanceData;
-using regression::BalanceFit;
-using regression::RowRange;
-using regression::Slot;
-using regression::Terms;
 
 constexpr int kFreeRuns = 3;
 constexpr int kSteps = 4;
@@ -25,17 +19,16 @@ constexpr int kSteps = 4;
 // Slopes of the model by all free parameters, linear ones first.
 Eigen::MatrixXd slopes(BalanceData& data, const Terms& terms, const BalanceFit& fit) {
   Eigen::MatrixXd J(data.rows(), static_cast<Eigen::Index>(fit.linear.size() + fit.shapes.size()));
-  J << regression::columns_of(data, terms, fit.linear),
-      regression::shape_columns(data, terms, fit.on_balance, fit.shapes);
+  J << columns_of(data, terms, fit.linear), shape_columns(data, terms, fit.on_balance, fit.shapes);
   return J;
 }
 
 // Adds to a parameter, within its bounds.
 void move(BalanceData& data, Terms& terms, const Slot& slot, double by, bool shape) {
-  regression::Term& term = terms[slot.term];
+  Term& term = terms[slot.term];
   double& value = term.values[slot.parameter];
   if (shape) {
-    const regression::ShapeRange range = regression::shape_range(data, term, slot.parameter);
+    const ShapeRange range = shape_range(data, term, slot.parameter);
     value = std::clamp(value + by, range.low, range.high);
   } else {
     const auto& info = term.entry->parameters[slot.parameter];
@@ -47,8 +40,8 @@ void refit(BalanceData& data, const FreeMotion& motion, Terms& terms, BalanceFit
   BalanceData simulated(motion.prepared, data.balance());
   if (data.empty() || simulated.rows() != data.rows()) return;
   std::vector<Eigen::Index> kept;  // what the data determine
-  for (Eigen::Index j = 0; j < fit.own_share.size(); ++j)
-    if (fit.own_share[j] >= regression::kUndetermined) kept.push_back(j);
+  for (Eigen::Index j = 0; j < fit.root_tolerance.size(); ++j)
+    if (fit.root_tolerance[j] >= kUndetermined) kept.push_back(j);
   if (kept.empty()) return;
   const auto count = static_cast<Eigen::Index>(kept.size());
   const auto linear = static_cast<Eigen::Index>(fit.linear.size());
@@ -63,7 +56,7 @@ void refit(BalanceData& data, const FreeMotion& motion, Terms& terms, BalanceFit
       A.col(j) = fit.root_weights.cwiseProduct(own.col(kept[static_cast<std::size_t>(j)]));
       Z.col(j) = fit.root_weights.cwiseProduct(instruments.col(kept[static_cast<std::size_t>(j)]));
     }
-    fit.residual = regression::residual_of(data, terms);
+    fit.residual = residual_of(data, terms);
     const Eigen::VectorXd size = A.colwise().norm().transpose().array().max(1e-300);
     const Eigen::VectorXd instrument_size = Z.colwise().norm().transpose().array().max(1e-300);
     const Eigen::MatrixXd zs = Z * instrument_size.cwiseInverse().asDiagonal();
@@ -77,15 +70,14 @@ void refit(BalanceData& data, const FreeMotion& motion, Terms& terms, BalanceFit
       move(data, terms, slots[static_cast<std::size_t>(shape ? at - linear : at)], by[j] / size[j], shape);
     }
     if (step + 1 < kSteps) continue;
-    fit.residual = regression::residual_of(data, terms);
+    fit.residual = residual_of(data, terms);
     const Eigen::VectorXd weighted = fit.root_weights.cwiseProduct(fit.residual);
     fit.autocorrelation_time =
-        std::max(regression::autocorrelation_time(data.records(), weighted), data.filter_autocorrelation_time());
+        std::max(autocorrelation_time(data.records(), weighted), data.filter_autocorrelation_time());
     const double freedom = std::max(1.0, static_cast<double>(data.rows() - count));
     const Eigen::MatrixXd inverse = normal.inverse();
     const Eigen::MatrixXd middle =
-        regression::robust_middle(data.records(), zs, weighted,
-                                  regression::robust_lags(fit.autocorrelation_time, data.rows())) *
+        newey_west(data.records(), zs, weighted, newey_west_lags(fit.autocorrelation_time, data.rows())) *
         (static_cast<double>(data.rows()) / freedom);
     const Eigen::MatrixXd scaled = inverse * middle * inverse.transpose();
     for (Eigen::Index i = 0; i < count; ++i)

@@ -2,11 +2,9 @@
 // simulated motion are as close to the true ones and know nothing of the noise.
 #pragma once
 
-#include "host/regression/identify.hpp"
+#include "host/estimation/identify.hpp"
 
 namespace flexspline::estimation {
-
-using regression::Identification;
 
 // Refits all balances from the values that least squares found, which it replaces along with residuals and
 // covariances; (Z' W (y - f(theta))) = 0 with Z the model's slopes along its own free run, solved by Newton steps; the

@@ -6,18 +6,11 @@
 #include <cmath>
 #include <random>
 
-#include "host/regression/least_squares.hpp"
-#include "host/regression/shapes.hpp"
+#include "host/estimation/least_squares.hpp"
+#include "host/estimation/variable_projection.hpp"
 
 namespace flexspline::estimation {
 namespace {
-
-using regression::BalanceData;
-using regression::BalanceFit;
-using regression::Estimate;
-using regression::RowRange;
-using regression::Slot;
-using regression::Terms;
 
 constexpr double kLikelihoodRatio = 3.84;  // 95 % point of chi-square with one degree of freedom
 
@@ -28,17 +21,17 @@ Estimate* estimate_of(Identification& identification, const Slot& slot) {
 }
 
 double natural(const Terms& terms, const Slot& slot) {
-  const regression::Term& term = terms[slot.term];
+  const Term& term = terms[slot.term];
   return catalogue::natural(*term.entry, term.values)[slot.parameter];
 }
 
 // Fits all that is free on the balance from where the terms stand, and returns the sum of squares of white errors.
 double fit_rest(BalanceData& data, Terms& terms, const std::vector<std::size_t>& on_balance,
-                const regression::Whitening& whitening) {
-  regression::refine_shapes(data, terms, on_balance, whitening);
-  const std::vector<Slot> linear = regression::free_linear_slots(terms, on_balance);
-  const regression::LinearFit fit = regression::least_squares(
-      regression::columns_of(data, terms, linear), data.target() - data.known_torque(terms, on_balance), whitening);
+                const NoiseCovariance& whitening) {
+  refine_shapes(data, terms, on_balance, whitening);
+  const std::vector<Slot> linear = free_linear_slots(terms, on_balance);
+  const LinearFit fit =
+      least_squares(columns_of(data, terms, linear), data.target() - data.known_torque(terms, on_balance), whitening);
   for (std::size_t j = 0; j < linear.size(); ++j)
     terms[linear[j].term].values[linear[j].parameter] = fit.theta[static_cast<Eigen::Index>(j)];
   return (whitening * fit.residual).squaredNorm();
@@ -97,12 +90,12 @@ void profile(Identification& identification, const Progress& progress) {
       // Autocorrelation widens a profile as it widens the standard error.
       const double allowed =
           kLikelihoodRatio * least / freedom * variance / fit.white_variance[static_cast<Eigen::Index>(j)];
-      const regression::Term& term = best[slots[j].term];
+      const Term& term = best[slots[j].term];
       progress(fmt::format("profile of {}.{}", term.id, term.entry->parameters[slots[j].parameter].name));
       double low = term.entry->parameters[slots[j].parameter].low;
       double high = term.entry->parameters[slots[j].parameter].high;
       if (j >= fit.linear.size()) {
-        const regression::ShapeRange range = regression::shape_range(data, term, slots[j].parameter);
+        const ShapeRange range = shape_range(data, term, slots[j].parameter);
         low = range.low;
         high = range.high;
       }
@@ -148,7 +141,7 @@ void bootstrap(Identification& identification, int replicates, std::uint64_t see
       for (std::size_t k = 0; k < blocks.size(); ++k)
         counts.segment(blocks[k].first, blocks[k].size()).setConstant(std::sqrt(static_cast<double>(times[k])));
       Terms terms = identification.terms;
-      fit_rest(data, terms, fit.on_balance, fit.whitening.counted(counts));
+      fit_rest(data, terms, fit.on_balance, fit.whitening.with_counts(counts));
       for (std::size_t j = 0; j < slots.size(); ++j) drawn[j].push_back(natural(terms, slots[j]));
     }
     for (std::size_t j = 0; j < slots.size(); ++j) {

@@ -5,11 +5,10 @@
 #include <functional>
 #include <string_view>
 
-#include "host/regression/identify.hpp"
+#include "host/estimation/identify.hpp"
 
 namespace flexspline::estimation {
 
-using regression::Identification;
 using Progress = std::function<void(std::string_view)>;
 
 // Replaces the 95 % intervals of the estimates (not their standard errors) of an identification that is assembled.

@@ -4,30 +4,26 @@
 
 #include <algorithm>
 #include <cmath>
+#include <functional>
 #include <optional>
 
 #include "host/estimation/free_motion.hpp"
-#include "host/regression/least_squares.hpp"
-#include "host/regression/minimise.hpp"
-#include "host/regression/shapes.hpp"
+#include "host/estimation/least_squares.hpp"
+#include "host/estimation/minimise.hpp"
+#include "host/estimation/variable_projection.hpp"
 #include "host/simulation/initial_motion.hpp"
 
 namespace flexspline::estimation {
 namespace {
-
-using regression::Balance;
-using regression::Record;
-using regression::RowRange;
-using regression::Slot;
 
 constexpr double kFar = 100.0;          // standard errors of least squares
 constexpr double kShownAtLeast = 1e-6;  // of the error's size, by a step of one standard error
 // Steps with one computation of the slopes, and how often these are computed.
 constexpr int kIterations = 12;
 constexpr int kRounds = 3;
-constexpr double kSettled = 0.1;  // in standard errors: slopes found before such a move serve after it
+constexpr double kConverged = 0.1;  // in standard errors: slopes found before such a move serve after it
 // A move too short to tell slopes by: what is left of the search is rounding and standstills that come and go.
-constexpr double kTellingMove = 0.01;
+constexpr double kLeastMove = 0.01;
 constexpr double kStep_s = 1.0 / 4000.0;  // of the integration
 
 // A free parameter, moved in units of its standard error from least squares.
@@ -67,7 +63,7 @@ class OutputError {
  public:
   explicit OutputError(Identification& identification) : all_(identification) {
     for (std::size_t b = 0; b < all_.fits.size(); ++b) {
-      const regression::BalanceFit& fit = all_.fits[b];
+      const BalanceFit& fit = all_.fits[b];
       for (std::size_t j = 0; j < fit.linear.size() + fit.shapes.size(); ++j)
         add(b, j < fit.linear.size() ? fit.linear[j] : fit.shapes[j - fit.linear.size()], static_cast<Eigen::Index>(j),
             j >= fit.linear.size());
@@ -105,7 +101,7 @@ class OutputError {
     for (std::size_t j = 0; j < free_.size(); ++j)
       all_.terms[free_[j].slot.term].values[free_[j].slot.parameter] = free_[j].start + x[j] * free_[j].unit;
   }
-  // Weighted errors of the terms as they stand, nought in records other than those of `only` (empty: all). Empty where
+  // Weighted errors of the terms as they stand, zero in records other than those of `only` (empty: all). Empty where
   // a record that could be simulated no longer can.
   Eigen::VectorXd weighted(const std::vector<std::uint8_t>& only = {}) {
     const std::vector<std::uint8_t>& run = only.empty() ? usable_ : only;
@@ -135,16 +131,16 @@ class OutputError {
     return free_motion(all_, how);
   }
   void add(std::size_t b, Slot slot, Eigen::Index at, bool shape) {
-    const regression::BalanceFit& fit = all_.fits[b];
-    if (fit.own_share[at] < regression::kUndetermined) return;
-    const regression::Term& term = all_.terms[slot.term];
+    const BalanceFit& fit = all_.fits[b];
+    if (fit.root_tolerance[at] < kUndetermined) return;
+    const Term& term = all_.terms[slot.term];
     const auto& info = term.entry->parameters[slot.parameter];
     Free f{slot, b, at, term.values[slot.parameter], 0.0, info.low, info.high};
     const double variance = fit.covariance(at, at);
     f.unit = std::isfinite(variance) && variance > 0.0 ? std::sqrt(variance) : 0.01 * std::abs(f.start);
     f.unit = std::max(f.unit, 1e-4 * std::abs(f.start));
     if (shape) {
-      const regression::ShapeRange range = regression::shape_range(all_.data[b], term, slot.parameter);
+      const ShapeRange range = shape_range(all_.data[b], term, slot.parameter);
       f.low = range.low;
       f.high = range.high;
       f.unit = std::min(f.unit, 0.1 * (range.high - range.low));
@@ -170,7 +166,7 @@ class OutputError {
     parts_.push_back({record, signal, {parts_.size(), rows, rows + n}, 1.0});
     rows += n;
   }
-  // Every decimated sample counts: the free run is judged at reversals too.
+  // Every decimated sample counts: the free run is compared at reversals too.
   std::vector<std::size_t> samples(std::size_t record) const {
     const Record& r = all_.prepared.records[record];
     std::vector<std::size_t> result;
@@ -198,7 +194,7 @@ class OutputError {
       for (const Part& part : parts_)
         if (part.signal == signal) ranges.push_back(part.range);
       if (ranges.empty()) continue;
-      const Eigen::VectorXd some = regression::record_weights(ranges, error);
+      const Eigen::VectorXd some = record_weights(ranges, error);
       for (const RowRange& range : ranges)
         weights.segment(range.first, range.size()) = some.segment(range.first, range.size());
     }
@@ -252,26 +248,26 @@ Eigen::MatrixXd slopes(OutputError& problem, const std::vector<double>& x,
 // (J'J)^-1 s^2, corrected for the autocorrelation of the errors, into the covariances of the fits.
 void take_covariance(Identification& identification, OutputError& problem, const Eigen::MatrixXd& J) {
   const Eigen::VectorXd e = problem.weighted();
-  const regression::LinearFit joint = regression::least_squares(J, e, Eigen::VectorXd::Ones(e.size()));
+  const LinearFit joint = least_squares(J, e, Eigen::VectorXd::Ones(e.size()));
   std::vector<RowRange> ranges;
   for (const Part& part : problem.parts()) ranges.push_back(part.range);
-  const double time = regression::autocorrelation_time(ranges, e);
+  const double time = autocorrelation_time(ranges, e);
   const double freedom = std::max(1.0, static_cast<double>(e.size() - J.cols()));
-  std::vector<Eigen::Index> told;
+  std::vector<Eigen::Index> identified;
   for (Eigen::Index j = 0; j < J.cols(); ++j)
-    if (std::isfinite(joint.unit_covariance(j, j))) told.push_back(j);
+    if (std::isfinite(joint.unit_covariance(j, j))) identified.push_back(j);
   Eigen::MatrixXd covariance = joint.unit_covariance;
-  const Eigen::MatrixXd unit = joint.unit_covariance(told, told);
-  covariance(told, told) =
-      unit * regression::robust_middle(ranges, J(Eigen::all, told), e, regression::robust_lags(time, e.size())) * unit *
+  const Eigen::MatrixXd unit = joint.unit_covariance(identified, identified);
+  covariance(identified, identified) =
+      unit * newey_west(ranges, J(Eigen::all, identified), e, newey_west_lags(time, e.size())) * unit *
       (static_cast<double>(e.size()) / freedom);
   const std::vector<Free>& free = problem.free();
   std::string unseen;
   for (std::size_t i = 0; i < free.size(); ++i) {
-    regression::BalanceFit& fit = identification.fits[free[i].fit];
+    BalanceFit& fit = identification.fits[free[i].fit];
     const auto a = static_cast<Eigen::Index>(i);
     if (J.col(a).norm() < kShownAtLeast * e.norm()) {
-      const regression::Term& term = identification.terms[free[i].slot.term];
+      const Term& term = identification.terms[free[i].slot.term];
       unseen += (unseen.empty() ? "" : ", ") +
                 fmt::format("{}.{}", term.id, term.entry->parameters[free[i].slot.parameter].name);
       continue;
@@ -287,6 +283,65 @@ void take_covariance(Identification& identification, OutputError& problem, const
     identification.warnings.push_back(fmt::format("the free run does not show {}: as least squares found it", unseen));
 }
 
+// Errors and their slopes for the search. Slopes cost two free runs a parameter and hardly change on the way: they are
+// computed once, corrected by what each step shows (Broyden 1965), and computed again only where that led far.
+class BroydenErrors {
+ public:
+  BroydenErrors(OutputError& problem, const std::function<void(std::string_view)>& progress)
+      : problem_(problem), progress_(progress) {}
+
+  const Eigen::MatrixXd& slope() const { return J_; }
+  void compute_slopes(const std::vector<double>& at) { J_ = slopes(problem_, at, progress_); }
+
+  bool operator()(const std::vector<double>& at, Eigen::VectorXd& errors, Eigen::MatrixXd* slope) {
+    if (at != seen_at_) {
+      problem_.set(at.data());
+      progress_(fmt::format("fitting the free run: step {}", ++runs_));
+      Eigen::VectorXd now = problem_.weighted();
+      if (now.size() == 0) return false;
+      if (J_.size() > 0) correct(at, now);
+      seen_at_ = at;
+      seen_ = std::move(now);
+    }
+    errors = seen_;
+    if (!slope) return true;
+    if (J_.size() == 0) compute_slopes(at);
+    *slope = J_;
+    return true;
+  }
+
+ private:
+  void correct(const std::vector<double>& at, const Eigen::VectorXd& now) {
+    Eigen::VectorXd step(J_.cols());
+    for (Eigen::Index j = 0; j < step.size(); ++j)
+      step[j] = at[static_cast<std::size_t>(j)] - seen_at_[static_cast<std::size_t>(j)];
+    if (step.norm() <= kLeastMove) return;
+    const Eigen::VectorXd unforeseen = now - seen_ - J_ * step;
+    J_ += unforeseen * (step / step.squaredNorm()).transpose();
+  }
+
+  OutputError& problem_;
+  const std::function<void(std::string_view)>& progress_;
+  Eigen::MatrixXd J_;
+  std::vector<double> seen_at_;
+  Eigen::VectorXd seen_;
+  int runs_ = 0;
+};
+
+// In units from the start. Bounds make every step of the solver a search: those out of reach are left out.
+Minimisation search_of(OutputError& problem) {
+  Minimisation how;
+  for (const Free& f : problem.free()) {
+    const double low = (f.low - f.start) / f.unit, high = (f.high - f.start) / f.unit;
+    how.low.push_back(low > -kFar ? std::min(0.0, low) : -INFINITY);
+    how.high.push_back(high < kFar ? std::max(0.0, high) : INFINITY);
+  }
+  how.iterations = kIterations;
+  how.function_tolerance = 1e-5;  // a hundredth of a standard error
+  how.parameter_tolerance = 1e-5;
+  return how;
+}
+
 }  // namespace
 
 void refit_to_output(Identification& identification, const std::function<void(std::string_view)>& progress) {
@@ -298,60 +353,22 @@ void refit_to_output(Identification& identification, const std::function<void(st
     return;
   }
   std::vector<double> x(problem.unknowns(), 0.0);
-  regression::Minimisation how;
-  for (const Free& f : problem.free()) {
-    // In units from the start. Bounds make every step of the solver a search: those out of reach are left out.
-    const double low = (f.low - f.start) / f.unit, high = (f.high - f.start) / f.unit;
-    how.low.push_back(low > -kFar ? std::min(0.0, low) : -INFINITY);
-    how.high.push_back(high < kFar ? std::max(0.0, high) : INFINITY);
-  }
-  how.iterations = kIterations;
-  how.function_tolerance = 1e-5;  // a hundredth of a standard error
-  how.parameter_tolerance = 1e-5;
-  // Slopes cost two free runs a parameter and hardly change on the way: they are computed once, corrected by what each
-  // step shows (Broyden 1965), and computed again only where that led far.
-  Eigen::MatrixXd J;
-  std::vector<double> seen_at;
-  Eigen::VectorXd seen;
-  int runs = 0;
-  const auto errors_at = [&](const std::vector<double>& at, Eigen::VectorXd& errors, Eigen::MatrixXd* slope) {
-    if (at != seen_at) {
-      problem.set(at.data());
-      progress(fmt::format("fitting the free run: step {}", ++runs));
-      Eigen::VectorXd now = problem.weighted();
-      if (now.size() == 0) return false;
-      if (J.size() > 0) {
-        Eigen::VectorXd step(J.cols());
-        for (Eigen::Index j = 0; j < step.size(); ++j)
-          step[j] = at[static_cast<std::size_t>(j)] - seen_at[static_cast<std::size_t>(j)];
-        if (step.norm() > kTellingMove) {
-          const Eigen::VectorXd unforeseen = now - seen - J * step;
-          J += unforeseen * (step / step.squaredNorm()).transpose();
-        }
-      }
-      seen_at = at;
-      seen = std::move(now);
-    }
-    errors = seen;
-    if (!slope) return true;
-    if (J.size() == 0) J = slopes(problem, at, progress);
-    *slope = J;
-    return true;
-  };
+  const Minimisation how = search_of(problem);
+  BroydenErrors errors(problem, progress);
   for (int round = 0; round < kRounds; ++round) {
     const std::vector<double> before = x;
-    regression::minimise(x, problem.rows(), errors_at, how);
+    minimise(x, problem.rows(), std::ref(errors), how);
     double moved = 0.0;
     for (std::size_t j = 0; j < problem.free().size(); ++j) moved = std::max(moved, std::abs(x[j] - before[j]));
-    if (round > 0 && moved < kSettled) break;
+    if (round > 0 && moved < kConverged) break;
     problem.set(x.data());
-    J = slopes(problem, x, progress);
+    errors.compute_slopes(x);
   }
   problem.set(x.data());
-  take_covariance(identification, problem, J);
+  take_covariance(identification, problem, errors.slope());
   problem.set(x.data());
   for (std::size_t b = 0; b < identification.fits.size(); ++b)
-    identification.fits[b].residual = regression::residual_of(identification.data[b], identification.terms);
+    identification.fits[b].residual = residual_of(identification.data[b], identification.terms);
   std::string without;
   for (std::size_t i = 0; i < problem.usable().size(); ++i)
     if (!problem.usable()[i]) without += (without.empty() ? "" : ", ") + identification.prepared.records[i].name;

@@ -4,17 +4,15 @@
 #include <functional>
 #include <string_view>
 
-#include "host/regression/identify.hpp"
+#include "host/estimation/identify.hpp"
 
 namespace flexspline::estimation {
-
-using regression::Identification;
 
 // Refits all parameters together from the values that least squares found. What is minimised, for each record: velocity
 // of the motor where the load is free, its position where it is locked (there the effort dictates the torque), and the
 // torque where it is measured, each over its error at the start. Parameters that the free run does not show keep their
 // values, with a warning. Replaces residuals and covariances of the fits.
-// `progress` is told what is being worked at.
+// `progress` gets what is being worked at.
 void refit_to_output(
     Identification& identification, const std::function<void(std::string_view)>& progress = [](std::string_view) {});
 

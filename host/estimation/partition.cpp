@@ -7,16 +7,10 @@
 #include <limits>
 #include <random>
 
-#include "host/regression/shapes.hpp"
+#include "host/estimation/variable_projection.hpp"
 
 namespace flexspline::estimation {
 namespace {
-
-using regression::BalanceData;
-using regression::BalanceFit;
-using regression::Slot;
-using regression::Term;
-using regression::Terms;
 
 bool has_free_shape(const Term& term) {
   for (std::size_t p = 0; p < term.values.size(); ++p)
@@ -37,13 +31,13 @@ void put_before(BalanceFit& fit, const BalanceFit& first, const std::vector<std:
   covariance.topLeftCorner(before, before) = first.covariance.topLeftCorner(before, before);
   covariance.bottomRightCorner(after, after) = fit.covariance;
   Eigen::VectorXd own(before + after);
-  own << first.own_share.head(before), fit.own_share;
+  own << first.root_tolerance.head(before), fit.root_tolerance;
   Eigen::VectorXd excitation(before + after);
   excitation << first.excitation.head(before), fit.excitation;
   linear.insert(linear.end(), fit.linear.begin(), fit.linear.end());
   fit.linear = std::move(linear);
   fit.covariance = std::move(covariance);
-  fit.own_share = std::move(own);
+  fit.root_tolerance = std::move(own);
   fit.excitation = std::move(excitation);
   fit.condition_number = std::max(fit.condition_number, first.condition_number);
 }
@@ -51,18 +45,17 @@ void put_before(BalanceFit& fit, const BalanceFit& first, const std::vector<std:
 }  // namespace
 
 std::unique_ptr<Identification> partitioned(const data::Dataset& dataset, const model::Model& model,
-                                            const regression::PipelineOptions& pipeline) {
+                                            const PipelineOptions& pipeline) {
   model::Model simple = model;
-  std::erase_if(simple.effects,
-                [](const model::Effect& effect) { return has_free_shape(regression::term_of(effect)); });
-  auto all = regression::form(dataset, model, pipeline);
+  std::erase_if(simple.effects, [](const model::Effect& effect) { return has_free_shape(term_of(effect)); });
+  auto all = form(dataset, model, pipeline);
   if (simple.effects.empty() || simple.effects.size() == model.effects.size()) {
-    regression::fit(*all);
-    regression::assemble(*all);
+    fit(*all);
+    assemble(*all);
     return all;
   }
-  auto first = regression::form(dataset, simple, pipeline);
-  regression::fit(*first);
+  auto first = form(dataset, simple, pipeline);
+  fit(*first);
   std::vector<std::size_t> term_now(first->terms.size());
   std::vector<Slot> plugged_in;
   for (std::size_t t = 0; t < first->terms.size(); ++t)
@@ -76,13 +69,13 @@ std::unique_ptr<Identification> partitioned(const data::Dataset& dataset, const 
         plugged_in.push_back({now, p});
       }
     }
-  regression::fit(*all);
+  fit(*all);
   for (const Slot& slot : plugged_in) all->terms[slot.term].known[slot.parameter] = 0;
   for (BalanceFit& fit : all->fits)
     for (const BalanceFit& before : first->fits)
       if (before.balance == fit.balance) put_before(fit, before, term_now);
   all->warnings.insert(all->warnings.end(), first->warnings.begin(), first->warnings.end());
-  regression::assemble(*all);
+  assemble(*all);
   return all;
 }
 
@@ -99,28 +92,28 @@ void search_from_several_starts(Identification& identification, int starts, std:
       if (!identification.terms[slot.term].stated[slot.parameter]) open.push_back(slot);
     if (open.empty()) continue;
     Terms best = identification.terms;
-    double least = regression::refine_shapes(data, best, fit.on_balance, fit.root_weights);
+    double least = refine_shapes(data, best, fit.on_balance, fit.root_weights);
     const double swept = least;
-    bool elsewhere = false;
+    bool ends_apart = false;
     for (int start = 1; start < starts; ++start) {
-      Terms trial = identification.terms;
+      Terms candidate = identification.terms;
       for (const Slot& slot : open)
-        trial[slot.term].values[slot.parameter] =
-            regression::shape_range(data, trial[slot.term], slot.parameter).at(share(random));
-      const double cost = regression::refine_shapes(data, trial, fit.on_balance, fit.root_weights);
+        candidate[slot.term].values[slot.parameter] =
+            shape_range(data, candidate[slot.term], slot.parameter).at(share(random));
+      const double cost = refine_shapes(data, candidate, fit.on_balance, fit.root_weights);
       bool apart = false;
       for (const Slot& slot : open) {
-        const regression::ShapeRange range = regression::shape_range(data, trial[slot.term], slot.parameter);
-        apart = apart || std::abs(range.share(trial[slot.term].values[slot.parameter]) -
+        const ShapeRange range = shape_range(data, candidate[slot.term], slot.parameter);
+        apart = apart || std::abs(range.share(candidate[slot.term].values[slot.parameter]) -
                                   range.share(best[slot.term].values[slot.parameter])) > kApart;
       }
-      elsewhere = elsewhere || (apart && std::abs(cost - least) < kLike * least);
+      ends_apart = ends_apart || (apart && std::abs(cost - least) < kLike * least);
       if (cost < least) {
         least = cost;
-        best = trial;
+        best = candidate;
       }
     }
-    if (elsewhere)
+    if (ends_apart)
       identification.warnings.push_back(
           "searches from several starts end at different shape parameters with the same error: these data do not tell "
           "them (--intervals profile shows how far)");
@@ -131,7 +124,7 @@ void search_from_several_starts(Identification& identification, int starts, std:
       identification.terms[slot.term].values[slot.parameter] = term.values[slot.parameter];
       identification.terms[slot.term].stated[slot.parameter] = 1;
     }
-    fit = regression::fit_balance(data, identification.terms);
+    fit = fit_balance(data, identification.terms);
   }
 }
 

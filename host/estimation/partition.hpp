@@ -4,16 +4,14 @@
 #include <cstdint>
 #include <memory>
 
-#include "host/regression/identify.hpp"
+#include "host/estimation/identify.hpp"
 
 namespace flexspline::estimation {
-
-using regression::Identification;
 
 // First the linear parameters of all effects without a free shape, alone; then, with those known, the others. As the
 // report does it: simple and steady, but what the first part lacks goes into its parameters (compare with nls).
 std::unique_ptr<Identification> partitioned(const data::Dataset& dataset, const model::Model& model,
-                                            const regression::PipelineOptions& pipeline);
+                                            const PipelineOptions& pipeline);
 
 // Searches for the shapes that the model does not state again from random places of their ranges, and keeps the best.
 // Replaces the fits where one is better. Adds a warning where starts end at different places with like errors.

@@ -17,10 +17,10 @@
 namespace flexspline::output {
 namespace {
 
-using diagnosis::Candidate;
-using diagnosis::Diagnosis;
-using diagnosis::Verdict;
 using nlohmann::json;
+using selection::Candidate;
+using selection::Diagnosis;
+using selection::Verdict;
 
 constexpr std::size_t kRowsShown = 10;
 // Errors that differ by less are told as one.
@@ -43,10 +43,10 @@ std::string evidence(const Diagnosis& d) {
   return text;
 }
 
-std::string shares(const std::vector<diagnosis::Localised>& parts) {
+std::string shares(const std::vector<selection::Localised>& parts) {
   std::vector<std::string> texts;
   // Signals go together in any motion; the first few say it all.
-  for (const diagnosis::Localised& part : std::span(parts).first(std::min<std::size_t>(3, parts.size())))
+  for (const selection::Localised& part : std::span(parts).first(std::min<std::size_t>(3, parts.size())))
     texts.push_back(fmt::format("{} {:.1f} %", part.variable, part.share_percent));
   return listed(texts);
 }
@@ -64,7 +64,7 @@ std::string candidate_table(const Diagnosis& d) {
   return table.text();
 }
 
-const Candidate* candidate_of(const Diagnosis& d, const diagnosis::Named& named) {
+const Candidate* candidate_of(const Diagnosis& d, const selection::Named& named) {
   for (const Candidate& c : d.candidates)
     if (c.effect == named.effect && c.order == named.order) return &c;
   return nullptr;
@@ -76,7 +76,7 @@ std::string replaced(std::string text, std::string_view what, const std::string&
 }
 
 // Of the points that rows reach, the standard error of the one in the middle.
-double typical_error(const regression::LearnedTable& curve) {
+double typical_error(const estimation::LearnedTable& curve) {
   std::vector<double> errors;
   for (std::size_t k = 0; k < curve.table.std.size(); ++k)
     if (curve.visited[k]) errors.push_back(curve.table.std[k]);
@@ -90,7 +90,7 @@ void print_next(Console& console, const Diagnosis& d, const std::string& add_com
   switch (d.verdict) {
     case Verdict::missing_effect:
     case Verdict::confusable_effects:
-      for (const diagnosis::Named& n : d.named)
+      for (const selection::Named& n : d.named)
         if (const Candidate* c = candidate_of(d, n); c == nullptr || c->admissible)
           steps.push_back(replaced(add_command, "EFFECT", effect_label(n.effect, n.order)));
       if (d.named.size() > 1)
@@ -118,7 +118,7 @@ void print_next(Console& console, const Diagnosis& d, const std::string& add_com
 }
 
 void print_unknown(Console& console, const Diagnosis& d) {
-  const diagnosis::UnknownStructure& u = *d.unknown;
+  const selection::UnknownStructure& u = *d.unknown;
   console.line();
   console.line(
       wrapped(fmt::format("It goes with {}{}: a curve over it takes {:.1f} % off the squared error on data left out of "
@@ -141,7 +141,7 @@ void print_unknown(Console& console, const Diagnosis& d) {
 
 json unknown_json(const Diagnosis& d) {
   if (!d.unknown) return nullptr;
-  const diagnosis::UnknownStructure& u = *d.unknown;
+  const selection::UnknownStructure& u = *d.unknown;
   json answer = learned_table_json("unknown", u.definition, u.curve, d.unit);
   answer["effect"] = u.effect;
   answer["depends_on"] = json::array();
@@ -152,23 +152,23 @@ json unknown_json(const Diagnosis& d) {
   return answer;
 }
 
-json localised_json(const std::vector<diagnosis::Localised>& parts) {
+json localised_json(const std::vector<selection::Localised>& parts) {
   json list = json::array();
-  for (const diagnosis::Localised& part : parts)
+  for (const selection::Localised& part : parts)
     list.push_back({{"variable", part.variable}, {"share_percent", json_number(part.share_percent)}});
   return list;
 }
 
-json drift_json(const std::vector<diagnosis::Drift>& drifts) {
+json drift_json(const std::vector<selection::Drift>& drifts) {
   json list = json::array();
-  for (const diagnosis::Drift& drift : drifts)
+  for (const selection::Drift& drift : drifts)
     list.push_back({{"group", drift.group}, {"percent", json_number(drift.percent)}});
   return list;
 }
 
-json trends_json(const std::vector<diagnosis::Trend>& trends) {
+json trends_json(const std::vector<selection::Trend>& trends) {
   json list = json::array();
-  for (const diagnosis::Trend& t : trends)
+  for (const selection::Trend& t : trends)
     list.push_back({{"id", t.id},
                     {"parameter", t.parameter},
                     {"over", t.over},
@@ -177,15 +177,15 @@ json trends_json(const std::vector<diagnosis::Trend>& trends) {
   return list;
 }
 
-json named_json(const std::vector<diagnosis::Named>& named) {
+json named_json(const std::vector<selection::Named>& named) {
   json list = json::array();
-  for (const diagnosis::Named& n : named) list.push_back({{"effect", n.effect}, {"order", json_number(n.order)}});
+  for (const selection::Named& n : named) list.push_back({{"effect", n.effect}, {"order", json_number(n.order)}});
   return list;
 }
 
 json candidate_json(const Candidate& c, std::size_t rank, const std::string& unit) {
   json parameters = json::array();
-  for (const regression::Estimate& e : c.parameters) parameters.push_back(json_parameter(e));
+  for (const estimation::Estimate& e : c.parameters) parameters.push_back(json_parameter(e));
   const catalogue::Entry* entry = catalogue::find(c.effect);
   const auto text = [&](std::string_view effects::Description::*field) {
     return entry ? json(std::string(entry->info->*field)) : json(nullptr);
@@ -195,7 +195,7 @@ json candidate_json(const Candidate& c, std::size_t rank, const std::string& uni
           {"balance", balance_name(c.balance)},
           {"rank", rank},
           {"score", json_number(c.score)},
-          {"score_elsewhere", json_number(c.score_elsewhere)},
+          {"score_elsewhere", json_number(c.other_balance_score)},
           {"chi2_fall_percent", json_number(c.chi2_fall_percent)},
           {"rmse_cv_before", json_number(c.rmse_cv_before)},
           {"rmse_cv_after", json_number(c.rmse_cv_after)},
@@ -228,7 +228,7 @@ std::string effect_in_words(const std::string& effect, const std::optional<doubl
 
 std::string verdict_in_words(const Diagnosis& d) {
   std::vector<std::string> names;
-  for (const diagnosis::Named& n : d.named) names.push_back(effect_in_words(n.effect, n.order));
+  for (const selection::Named& n : d.named) names.push_back(effect_in_words(n.effect, n.order));
   switch (d.verdict) {
     case Verdict::missing_effect:
       return fmt::format("The model lacks {}.", listed(names));
@@ -252,9 +252,9 @@ std::string verdict_in_words(const Diagnosis& d) {
 
 // What the experiments that are held out say. They decide whether an effect is named, so that their error is no proof
 // of the gain.
-void print_held_out(Console& console, const diagnosis::Resampling& r) {
+void print_held_out(Console& console, const selection::Resampling& r) {
   std::vector<std::string> better, worse;
-  for (const diagnosis::Resampling::Found& f : r.found) {
+  for (const selection::Resampling::Found& f : r.found) {
     if (!f.held_out_ratio || f.group.empty()) continue;
     const std::string name = effect_in_words(f.group.front().effect, f.group.front().order);
     (f.refused_by_holdout ? worse : better).push_back(fmt::format("{} {:.3f}", name, *f.held_out_ratio));
@@ -271,11 +271,11 @@ void print_held_out(Console& console, const diagnosis::Resampling& r) {
                        "later measurement."));
 }
 
-void print_resampling(Console& console, const diagnosis::Resampling& r) {
+void print_resampling(Console& console, const selection::Resampling& r) {
   std::vector<std::string> found;
-  for (const diagnosis::Resampling::Found& f : r.found) {
+  for (const selection::Resampling::Found& f : r.found) {
     std::vector<std::string> names;
-    for (const diagnosis::Named& n : f.group) names.push_back(effect_in_words(n.effect, n.order));
+    for (const selection::Named& n : f.group) names.push_back(effect_in_words(n.effect, n.order));
     found.push_back(
         fmt::format("{} in {:.0f} of 100 ({:.0f} % of the squared error above the noise, {:.0f} to {:.0f} %)",
                     names.empty() ? f.name + ", which is in no catalogue," : listed(names, "or"), 100.0 * f.frequency,
@@ -299,14 +299,14 @@ void print_diagnosis(Console& console, const Diagnosis& d, const std::string& ad
         wrapped(fmt::format("The effort {} the motion by {:.3g} ms beyond the alignment: check the time stamps, or "
                             "current_hold.",
                             *d.delay_s > 0.0 ? "lags" : "leads", 1e3 * std::abs(*d.delay_s))));
-  for (const diagnosis::Named& named : d.named)
+  for (const selection::Named& named : d.named)
     if (const Candidate* c = candidate_of(d, named)) print_explanation(console, *c, d.unit);
   if (d.unknown) print_unknown(console, d);
   if (!d.candidates.empty()) {
     console.line();
     console.line(candidate_table(d));
   }
-  for (const diagnosis::Trend& t : d.parameter_trends)
+  for (const selection::Trend& t : d.parameter_trends)
     console.line(
         wrapped(fmt::format("{}.{} differs between experiments with {}: the model lacks something that goes with it.",
                             t.id, t.parameter, t.over)));
@@ -314,7 +314,7 @@ void print_diagnosis(Console& console, const Diagnosis& d, const std::string& ad
     console.line(wrapped(fmt::format("With that added, the error still goes with {}.", shares(d.remaining_structure))));
   if (!d.disturbances.empty()) {
     Table table({"disturbance in", "from", "to", "peak"}, "lrrr");
-    for (const diagnosis::Disturbance& x : d.disturbances)
+    for (const selection::Disturbance& x : d.disturbances)
       table.row({x.experiment, fmt::format("{:.3f} s", x.from_s), fmt::format("{:.3f} s", x.to_s),
                  with_unit(x.peak, x.unit)});
     console.line();
@@ -326,7 +326,7 @@ void print_diagnosis(Console& console, const Diagnosis& d, const std::string& ad
 json resampling_json(const Diagnosis& d) {
   if (!d.resampling) return nullptr;
   json found = json::array();
-  for (const diagnosis::Resampling::Found& f : d.resampling->found)
+  for (const selection::Resampling::Found& f : d.resampling->found)
     found.push_back({{"effects", named_json(f.group)},
                      {"structure", f.group.empty() ? json(f.name) : json(nullptr)},
                      {"frequency", json_number(f.frequency)},
@@ -349,14 +349,14 @@ json diagnosis_json(const Diagnosis& d) {
   json candidates = json::array();
   for (const Candidate& c : d.candidates) candidates.push_back(candidate_json(c, candidates.size() + 1, d.unit));
   json disturbances = json::array();
-  for (const diagnosis::Disturbance& x : d.disturbances)
+  for (const selection::Disturbance& x : d.disturbances)
     disturbances.push_back({{"experiment", x.experiment},
                             {"from_s", json_number(x.from_s)},
                             {"to_s", json_number(x.to_s)},
                             {"peak", json_number(x.peak)},
                             {"unit", x.unit}});
   return {{"format", "flexspline-diagnose/1"},
-          {"verdict", diagnosis::verdict_name(d.verdict)},
+          {"verdict", selection::verdict_name(d.verdict)},
           {"named", named_json(d.named)},
           {"balance", d.balance ? json(balance_name(*d.balance)) : json(nullptr)},
           {"base",
@@ -383,13 +383,13 @@ json diagnosis_json(const Diagnosis& d) {
 
 json rounds_json(const std::vector<Diagnosis>& rounds, const std::vector<std::string>& removed) {
   json result = diagnosis_json(rounds.front());
-  std::vector<diagnosis::Named> all;
+  std::vector<selection::Named> all;
   for (const Diagnosis& d : rounds) {
     // The last round ends the search; it names nothing that was added.
     if (&d != &rounds.back() || rounds.size() == 1) all.insert(all.end(), d.named.begin(), d.named.end());
     result["rounds"].push_back(diagnosis_json(d));
   }
-  std::erase_if(all, [&](const diagnosis::Named& n) {
+  std::erase_if(all, [&](const selection::Named& n) {
     return std::find(removed.begin(), removed.end(), effect_label(n.effect, n.order)) != removed.end();
   });
   if (!all.empty()) result["named"] = named_json(all);

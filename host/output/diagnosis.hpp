@@ -6,8 +6,8 @@
 #include <string>
 #include <vector>
 
-#include "host/diagnosis/diagnosis.hpp"
 #include "host/output/console.hpp"
+#include "host/selection/diagnosis.hpp"
 
 namespace flexspline::output {
 
@@ -17,15 +17,15 @@ std::string effect_label(const std::string& effect, const std::optional<double>&
 std::string effect_in_words(const std::string& effect, const std::optional<double>& order);
 
 // "The model lacks stribeck_gaussian."
-std::string verdict_in_words(const diagnosis::Diagnosis& found);
+std::string verdict_in_words(const selection::Diagnosis& found);
 
 // Verdict, evidence, candidates, rivals with the experiment that separates them, where the error lies, what to do next.
 // `add_command`: what to type to add the named effect, with EFFECT where its name goes.
-void print_diagnosis(Console& console, const diagnosis::Diagnosis& found, const std::string& add_command);
+void print_diagnosis(Console& console, const selection::Diagnosis& found, const std::string& add_command);
 
 // "flexspline-diagnose/1". With more than one round, `named` holds all that were added and not removed again.
-nlohmann::json diagnosis_json(const diagnosis::Diagnosis& found);
-nlohmann::json rounds_json(const std::vector<diagnosis::Diagnosis>& rounds,
+nlohmann::json diagnosis_json(const selection::Diagnosis& found);
+nlohmann::json rounds_json(const std::vector<selection::Diagnosis>& rounds,
                            const std::vector<std::string>& removed = {});
 
 }  // namespace flexspline::output

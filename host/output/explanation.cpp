@@ -14,9 +14,9 @@
 namespace flexspline::output {
 namespace {
 
-using diagnosis::Candidate;
-using diagnosis::Evidence;
 using nlohmann::json;
+using selection::Candidate;
+using selection::Evidence;
 
 constexpr int kBarWidth = 24;
 
@@ -51,7 +51,7 @@ void print_map(Console& console, const Evidence& map, const std::string& unit) {
 }
 
 void print_rivals(Console& console, const Candidate& c, std::string_view separated_by) {
-  for (const diagnosis::RivalReason& reason : c.rival_reasons)
+  for (const selection::ConfoundingReason& reason : c.rival_reasons)
     console.line(wrapped(fmt::format(
         "Not to be told from {} here: only {:.2g} % of what it does in these data is its own{}.", reason.effect,
         reason.own_percent,
@@ -73,7 +73,7 @@ void print_explanation(Console& console, const Candidate& c, const std::string& 
     if (!text.empty()) console.line(wrapped(fmt::format("{}{}", what, text)));
   };
   say("", info.explanation);
-  for (const regression::Estimate& e : c.parameters)
+  for (const estimation::Estimate& e : c.parameters)
     console.line(
         fmt::format("  {} = {}{}", e.parameter, with_unit(e.value, e.unit),
                     e.low && e.high ? fmt::format("   (95 %: {} to {})", number(*e.low), number(*e.high)) : ""));
@@ -87,7 +87,7 @@ void print_explanation(Console& console, const Candidate& c, const std::string& 
 
 std::string detectable_in_words(const Candidate& c) {
   if (!c.minimum_detectable) return "";
-  const regression::Estimate& e = c.minimum_detectable->size;
+  const estimation::Estimate& e = c.minimum_detectable->size;
   return fmt::format("{}{} {}", c.minimum_detectable->at_most ? "below " : "", e.parameter,
                      with_unit(std::stod(number(e.value, 2)), e.unit));
 }
@@ -97,13 +97,13 @@ json detectable_json(const Candidate& c) {
   json answer = json_parameter(c.minimum_detectable->size);
   answer["at_most"] = c.minimum_detectable->at_most;
   answer["at"] = json::array();
-  for (const regression::Estimate& e : c.minimum_detectable->at) answer["at"].push_back(json_parameter(e));
+  for (const estimation::Estimate& e : c.minimum_detectable->at) answer["at"].push_back(json_parameter(e));
   return answer;
 }
 
 json rival_reasons_json(const Candidate& c) {
   json list = json::array();
-  for (const diagnosis::RivalReason& r : c.rival_reasons)
+  for (const selection::ConfoundingReason& r : c.rival_reasons)
     list.push_back({{"effect", r.effect},
                     {"own_percent", json_number(r.own_percent)},
                     {"variable", r.variable.empty() ? json(nullptr) : json(r.variable)}});

@@ -4,20 +4,20 @@
 #include <nlohmann/json_fwd.hpp>
 #include <string>
 
-#include "host/diagnosis/diagnosis.hpp"
 #include "host/output/console.hpp"
+#include "host/selection/diagnosis.hpp"
 
 namespace flexspline::output {
 
 // `unit` of the balance's errors.
-void print_explanation(Console& console, const diagnosis::Candidate& candidate, const std::string& unit);
+void print_explanation(Console& console, const selection::Candidate& candidate, const std::string& unit);
 
 // "coefficient 8.2e-4"; empty where there is none.
-std::string detectable_in_words(const diagnosis::Candidate& candidate);
+std::string detectable_in_words(const selection::Candidate& candidate);
 
 // P with "at_most" and "at", a list of P; null where there is none.
-nlohmann::json detectable_json(const diagnosis::Candidate& candidate);
-nlohmann::json rival_reasons_json(const diagnosis::Candidate& candidate);
-nlohmann::json evidence_json(const diagnosis::Candidate& candidate, const std::string& unit);
+nlohmann::json detectable_json(const selection::Candidate& candidate);
+nlohmann::json rival_reasons_json(const selection::Candidate& candidate);
+nlohmann::json evidence_json(const selection::Candidate& candidate, const std::string& unit);
 
 }  // namespace flexspline::output

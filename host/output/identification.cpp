@@ -11,8 +11,8 @@
 namespace flexspline::output {
 namespace {
 
+using estimation::Estimate;
 using nlohmann::json;
-using regression::Estimate;
 
 constexpr std::size_t kExperimentsAbreast = 5;
 constexpr std::size_t kNameWidth = 13;
@@ -26,7 +26,7 @@ std::string shortened(const std::string& name) {
   return name.size() <= kNameWidth ? name : name.substr(0, kNameWidth - 2) + "..";
 }
 
-std::vector<std::string> experiment_names(const regression::Identification& found) {
+std::vector<std::string> experiment_names(const estimation::Identification& found) {
   std::vector<std::string> names;
   for (const Estimate& e : found.estimates)
     for (const auto& [name, value] : e.per_experiment)
@@ -40,7 +40,7 @@ std::optional<double> value_in(const Estimate& e, const std::string& experiment)
   return std::nullopt;
 }
 
-std::string by_experiment(const regression::Identification& found) {
+std::string by_experiment(const estimation::Identification& found) {
   const std::vector<std::string> names = experiment_names(found);
   if (names.empty()) return {};
   std::string text;
@@ -73,7 +73,7 @@ std::string by_experiment(const regression::Identification& found) {
   return text;
 }
 
-std::string pooled(const regression::Identification& found) {
+std::string pooled(const estimation::Identification& found) {
   Table table({"all together", "value", "95 % interval", "", "unit", "excited", ""}, "lrrrlrl");
   for (const Estimate& e : found.estimates)
     table.row({label(e), number(e.value, kDigits), number(e.low, kDigits), number(e.high, kDigits), e.unit,
@@ -83,9 +83,9 @@ std::string pooled(const regression::Identification& found) {
          "\n  excited: the share of a parameter's effect on these data that no other parameter can stand in for";
 }
 
-std::string errors(const regression::Identification& found) {
+std::string errors(const estimation::Identification& found) {
   Table table({"balance", "rmse", "of", "rows", "condition"}, "lrlrr");
-  for (const regression::BalanceFit& fit : found.fits)
+  for (const estimation::BalanceFit& fit : found.fits)
     table.row({balance_name(fit.balance), number(fit.rmse()), torque_unit(found.model.drive.axis),
                fmt::format("{}", fit.residual.size()), number(fit.condition_number)});
   return table.text();
@@ -97,25 +97,25 @@ std::string torque_unit(data::Axis axis) {
   return axis == data::Axis::rotary ? "N*m" : "N";
 }
 
-std::string balance_name(regression::Balance balance) {
+std::string balance_name(estimation::Balance balance) {
   switch (balance) {
-    case regression::Balance::motor:
+    case estimation::Balance::motor:
       return "motor";
-    case regression::Balance::transmission:
+    case estimation::Balance::transmission:
       return "transmission";
-    case regression::Balance::load:
+    case estimation::Balance::load:
       return "load";
   }
   return "";
 }
 
-std::string pipeline_text(const regression::Prepared& prepared) {
-  const regression::Pipeline& p = prepared.pipeline;
+std::string pipeline_text(const estimation::Prepared& prepared) {
+  const estimation::Pipeline& p = prepared.pipeline;
   std::size_t used = 0, masked = 0, held = 0, held_by_assumption = 0;
   std::vector<std::string> decimations;
-  for (const regression::Record& record : prepared.records) {
+  for (const estimation::Record& record : prepared.records) {
     if (!record.effort.empty()) {
-      const regression::Rows& rows = record.rows[regression::index(regression::Balance::motor)];
+      const estimation::Rows& rows = record.rows[estimation::index(estimation::Balance::motor)];
       used += rows.samples.size();
       masked += rows.masked;
     }
@@ -143,18 +143,18 @@ std::string pipeline_text(const regression::Prepared& prepared) {
   return text;
 }
 
-std::string identification_text(const regression::Identification& found) {
+std::string identification_text(const estimation::Identification& found) {
   std::string text = by_experiment(found);
   text += (text.empty() ? "" : "\n\n") + pooled(found);
   if (!found.derived.empty()) {
     Table table({"derived", "value", "unit"}, "lrl");
-    for (const regression::Derived& d : found.derived) table.row({d.name, number(d.value), d.unit});
+    for (const estimation::Derived& d : found.derived) table.row({d.name, number(d.value), d.unit});
     text += "\n\n" + table.text();
   }
   return text + "\n\n" + errors(found) + "\n\n" + wrapped(pipeline_text(found.prepared));
 }
 
-json identification_json(const regression::Identification& found, const std::string& method,
+json identification_json(const estimation::Identification& found, const std::string& method,
                          const std::string& intervals) {
   json parameters = json::array();
   for (const Estimate& e : found.estimates) {
@@ -171,16 +171,16 @@ json identification_json(const regression::Identification& found, const std::str
     parameters.push_back(std::move(parameter));
   }
   json derived = json::array();
-  for (const regression::Derived& d : found.derived)
+  for (const estimation::Derived& d : found.derived)
     derived.push_back({{"name", d.name}, {"value", json_number(d.value)}, {"unit", d.unit}});
   json balances = json::array();
-  for (const regression::BalanceFit& fit : found.fits)
+  for (const estimation::BalanceFit& fit : found.fits)
     balances.push_back({{"balance", balance_name(fit.balance)},
                         {"rmse", json_number(fit.rmse())},
                         {"unit", torque_unit(found.model.drive.axis)},
                         {"rows", fit.residual.size()},
                         {"autocorrelation_time", json_number(fit.autocorrelation_time)}});
-  const regression::Pipeline& p = found.prepared.pipeline;
+  const estimation::Pipeline& p = found.prepared.pipeline;
   return {{"format", "flexspline-identify/1"},
           {"method", method},
           {"intervals", intervals},

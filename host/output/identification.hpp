@@ -4,23 +4,23 @@
 #include <nlohmann/json_fwd.hpp>
 #include <string>
 
-#include "host/regression/identify.hpp"
+#include "host/estimation/identify.hpp"
 
 namespace flexspline::output {
 
 // How the data were prepared: cut-offs and where they come from, decimation, mask, alignment of the effort.
-std::string pipeline_text(const regression::Prepared& prepared);
+std::string pipeline_text(const estimation::Prepared& prepared);
 
 // Table by experiment (as the report's tables 3 to 8), pooled values with 95 % intervals, derived values, errors of
 // the balances.
-std::string identification_text(const regression::Identification& found);
+std::string identification_text(const estimation::Identification& found);
 
 // "flexspline-identify/1"; `method` and `intervals` by their names: nls, profile.
-nlohmann::json identification_json(const regression::Identification& found, const std::string& method,
+nlohmann::json identification_json(const estimation::Identification& found, const std::string& method,
                                    const std::string& intervals);
 
 // "N*m", or "N" on a linear axis.
 std::string torque_unit(data::Axis axis);
-std::string balance_name(regression::Balance balance);
+std::string balance_name(estimation::Balance balance);
 
 }  // namespace flexspline::output

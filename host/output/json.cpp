@@ -24,7 +24,7 @@ json json_numbers(const std::vector<double>& values) {
   return list;
 }
 
-json json_parameter(const regression::Estimate& e) {
+json json_parameter(const estimation::Estimate& e) {
   return {{"id", e.id},
           {"effect", e.effect},
           {"parameter", e.parameter},

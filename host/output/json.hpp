@@ -6,7 +6,7 @@
 #include <string>
 #include <string_view>
 
-#include "host/regression/identify.hpp"
+#include "host/estimation/identify.hpp"
 
 namespace flexspline::output {
 
@@ -15,7 +15,7 @@ nlohmann::json json_number(const std::optional<double>& value);
 nlohmann::json json_numbers(const std::vector<double>& values);
 
 // {"id","effect","parameter","value","unit","std","interval":[lo,hi]}: a parameter wherever one stands.
-nlohmann::json json_parameter(const regression::Estimate& estimate);
+nlohmann::json json_parameter(const estimation::Estimate& estimate);
 
 // Whole or not at all; `where` is a file, or "-" for standard output. Nothing is done where it is empty.
 // Throws std::runtime_error with path and reason.

@@ -36,7 +36,7 @@ EffectCurve curve_of_table(const model::Definition& definition, const model::Tab
 }
 
 std::string learned_table_text(const std::string& id, const std::string& variable,
-                               const regression::LearnedTable& learned, const std::string& torque_unit) {
+                               const estimation::LearnedTable& learned, const std::string& torque_unit) {
   const model::Table& table = learned.table;
   const auto [low, high] = std::minmax_element(table.value.begin(), table.value.end());
   double error = 0.0;
@@ -64,7 +64,7 @@ std::string learned_table_text(const std::string& id, const std::string& variabl
 }
 
 json learned_table_json(const std::string& id, const model::Definition& definition,
-                        const regression::LearnedTable& learned, const std::string& torque_unit) {
+                        const estimation::LearnedTable& learned, const std::string& torque_unit) {
   json points = json::array();
   const model::Table& table = learned.table;
   for (std::size_t k = 0; k < table.at.size(); ++k) {

@@ -5,20 +5,20 @@
 #include <string>
 #include <vector>
 
+#include "host/estimation/learned_table.hpp"
 #include "host/model/model.hpp"
 #include "host/output/effect_curve.hpp"
-#include "host/regression/learn_table.hpp"
 
 namespace flexspline::output {
 
 // What was learnt in a paragraph and a picture; `torque_unit` as "N*m".
 std::string learned_table_text(const std::string& id, const std::string& variable,
-                               const regression::LearnedTable& learned, const std::string& torque_unit);
+                               const estimation::LearnedTable& learned, const std::string& torque_unit);
 
 // {"id","effect","variable","variable_unit","times_direction","balance","unit","points":[{"at","value","std","interval",
 // "visited"}],"chi2_fall_percent","rmse_cv_before","rmse_cv_after","score","left_to":[]}
 nlohmann::json learned_table_json(const std::string& id, const model::Definition& definition,
-                                  const regression::LearnedTable& learned, const std::string& torque_unit);
+                                  const estimation::LearnedTable& learned, const std::string& torque_unit);
 
 // A table as a line.
 EffectCurve curve_of_table(const model::Definition& definition, const model::Table& table,

@@ -11,7 +11,7 @@ namespace flexspline::planning {
 namespace {
 
 using data::Column;
-using regression::Balance;
+using estimation::Balance;
 
 // Noise where there are no data to take it from: of the current's rated value, and of the torque's.
 constexpr double kCurrentNoise = 0.005;
@@ -38,7 +38,7 @@ double largest(const data::Dataset* dataset, Column column) {
   return most;
 }
 
-double stated_noise(const model::Drive& drive, const regression::Prepared& prepared, Balance balance, double sample_s) {
+double stated_noise(const model::Drive& drive, const estimation::Prepared& prepared, Balance balance, double sample_s) {
   const auto& c = prepared.constants;
   const double current = drive.rated_current_a.value.value_or(1.0) * c.torque_constant * kCurrentNoise;
   const double torque = drive.rated_torque_nm.value.value_or(0.0) * kTorqueNoise;
@@ -50,7 +50,7 @@ double stated_noise(const model::Drive& drive, const regression::Prepared& prepa
 }
 
 // How large the signals of a balance are in a record; noise of sensors often grows with what they measure.
-double loudness(const regression::Prepared& prepared, const regression::Record& record, Balance balance) {
+double loudness(const estimation::Prepared& prepared, const estimation::Record& record, Balance balance) {
   double sum = 0.0;
   const double gear = balance == Balance::motor ? prepared.constants.gear_ratio : 1.0;
   for (std::size_t k = 0; k < record.inputs.size(); ++k) {
@@ -63,7 +63,7 @@ double loudness(const regression::Prepared& prepared, const regression::Record& 
 
 double loudness(const BalanceData& data) {
   double sum = 0.0, rows = 0.0;
-  for (const regression::RowRange& range : data.records()) {
+  for (const estimation::RowRange& range : data.records()) {
     const double one = loudness(data.prepared(), data.prepared().records[range.record], data.balance());
     sum += one * one * static_cast<double>(range.size());
     rows += static_cast<double>(range.size());
@@ -128,7 +128,7 @@ Setting setting_of(const model::Model& model, const data::Dataset* dataset) {
 Bench::Bench(const Question& question) {
   if (question.dataset) {
     if (question.progress) question.progress("fitting the model");
-    identified_ = regression::identify(*question.dataset, *question.model, question.pipeline);
+    identified_ = estimation::identify(*question.dataset, *question.model, question.pipeline);
     model_ = identified_->model;
     terms_ = identified_->terms;
   } else {
@@ -137,7 +137,7 @@ Bench::Bench(const Question& question) {
       throw simulation::ModelIncomplete(fmt::format(
           "the model {} has parameters without a value; run flexspline identify first, or give measurements",
           model_.name));
-    terms_ = regression::terms_of(model_);
+    terms_ = estimation::terms_of(model_);
   }
   rehearse_all(question);
   prepare(question);
@@ -182,15 +182,15 @@ void Bench::rehearse_all(const Question& question) {
 void Bench::prepare(const Question& question) {
   std::vector<const data::Experiment*> list;
   for (const data::Experiment& e : experiments_) list.push_back(&e);
-  prepared_ = identified_ ? regression::prepare_with(list, model_.drive, identified_->prepared.pipeline)
-                          : regression::prepare(list, model_.drive, question.pipeline);
+  prepared_ = identified_ ? estimation::prepare_with(list, model_.drive, identified_->prepared.pipeline)
+                          : estimation::prepare(list, model_.drive, question.pipeline);
   for (const Balance balance : {Balance::motor, Balance::transmission, Balance::load}) {
     Side side;
     if (identified_) {
       for (std::size_t i = 0; i < identified_->data.size(); ++i)
         if (identified_->data[i].balance() == balance) {
           side.recorded = &identified_->data[i];
-          const regression::BalanceFit& fit = identified_->fits[i];
+          const estimation::BalanceFit& fit = identified_->fits[i];
           side.noise = fit.rmse() * fit.rmse() * fit.autocorrelation_time;
         }
       if (!side.recorded) continue;

@@ -4,9 +4,9 @@
 #include <memory>
 #include <vector>
 
+#include "host/estimation/identify.hpp"
 #include "host/planning/design.hpp"
 #include "host/planning/information.hpp"
-#include "host/regression/identify.hpp"
 
 namespace flexspline::planning {
 
@@ -16,7 +16,7 @@ class Bench {
   explicit Bench(const Question& question);
 
   const model::Model& model() const { return model_; }
-  const regression::Identification* identified() const { return identified_.get(); }
+  const estimation::Identification* identified() const { return identified_.get(); }
   // The model's effects, with values.
   const Terms& terms() const { return terms_; }
   const std::vector<Motion>& motions() const { return motions_; }
@@ -38,13 +38,13 @@ class Bench {
   void prepare(const Question& question);
 
   model::Model model_;
-  std::unique_ptr<regression::Identification> identified_;
+  std::unique_ptr<estimation::Identification> identified_;
   Terms terms_;
   std::vector<Motion> motions_;
   std::vector<std::vector<Design::Peak>> peaks_;
   std::vector<std::size_t> first_record_;
   std::vector<data::Experiment> experiments_;
-  regression::Prepared prepared_;
+  estimation::Prepared prepared_;
   std::vector<Side> sides_;
 };
 

@@ -121,7 +121,7 @@ class Parameters {
   Parameters(Bench& bench, const Hypothesis& model) : model_(&model) {
     for (std::size_t t = 0; t < model.terms.size(); ++t)
       for (std::size_t p = 0; p < model.terms[t].values.size(); ++p) {
-        const regression::Term& term = model.terms[t];
+        const estimation::Term& term = model.terms[t];
         if (!term.free_linear(p) && !term.free_shape(p)) continue;
         const auto& info = term.entry->parameters[p];
         // What is nought has no relative error; a tenth of the usual size stands in for its value.

@@ -8,18 +8,18 @@
 #include <vector>
 
 #include "host/data/dataset.hpp"
+#include "host/estimation/record.hpp"
 #include "host/model/model.hpp"
 #include "host/planning/motions.hpp"
 #include "host/planning/plan.hpp"
 #include "host/planning/rehearsal.hpp"
-#include "host/regression/record.hpp"
 
 namespace flexspline::planning {
 
 struct Question {
   const model::Model* model = nullptr;
   const data::Dataset* dataset = nullptr;  // what has been recorded; may be null
-  regression::PipelineOptions pipeline;
+  estimation::PipelineOptions pipeline;
   Setting setting;
   Sensors sensors;
   double sample_s = 1e-3;

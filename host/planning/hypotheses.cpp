@@ -3,17 +3,17 @@
 #include <algorithm>
 #include <cmath>
 
-#include "host/diagnosis/add.hpp"
-#include "host/diagnosis/imitation.hpp"
-#include "host/diagnosis/trials.hpp"
-#include "host/regression/shapes.hpp"
+#include "host/estimation/model_projection.hpp"
+#include "host/estimation/variable_projection.hpp"
+#include "host/selection/add.hpp"
+#include "host/selection/candidate_fits.hpp"
 
 namespace flexspline::planning {
 namespace {
 
 using effects::Kind;
-using regression::Balance;
-using regression::Term;
+using estimation::Balance;
+using estimation::Term;
 
 constexpr std::size_t kGridPoints = 7;
 
@@ -46,8 +46,8 @@ std::vector<std::vector<double>> grid_of(const BalanceData& data, const Term& te
   const std::vector<double> usual = usual_values(term);
   std::vector<std::vector<double>> grid{usual};
   for (const std::size_t p : grid_shapes(term)) {
-    const regression::ShapeRange range = regression::shape_range(data, term, p);
-    for (const double value : regression::shape_grid(range, kGridPoints)) {
+    const estimation::ShapeRange range = estimation::shape_range(data, term, p);
+    for (const double value : estimation::shape_grid(range, kGridPoints)) {
       grid.push_back(usual);
       grid.back()[p] = value;
     }
@@ -64,46 +64,45 @@ bool possible(const Term& term) {
 }
 
 // A model fitted to what was recorded; shapes of either sign follow their slopes.
-diagnosis::Judged fitted(BalanceData& data, Terms terms) {
+selection::CrossValidatedFit fitted(BalanceData& data, Terms terms) {
   const Eigen::VectorXd all = Eigen::VectorXd::Ones(data.rows());
-  diagnosis::Judged judged = diagnosis::judge(data, std::move(terms), all);
+  selection::CrossValidatedFit fit = selection::cross_validate(data, std::move(terms), all);
   for (int step = 0; step < 2; ++step) {
-    Term& added = judged.terms.back();
-    const auto on_balance = regression::terms_on(judged.terms, data.balance(), data.prepared().torque_measured);
-    const auto shapes = regression::free_shape_slots(judged.terms, on_balance);
+    Term& added = fit.terms.back();
+    const auto on_balance = estimation::terms_on(fit.terms, data.balance(), data.prepared().torque_measured);
+    const auto shapes = estimation::free_shape_slots(fit.terms, on_balance);
     bool moved = false;
     for (std::size_t i = 0; i < shapes.size(); ++i) {
       const auto& info = added.entry->parameters[shapes[i].parameter];
-      if (shapes[i].term + 1 != judged.terms.size() || !(info.low < 0.0 && info.per.empty())) continue;
+      if (shapes[i].term + 1 != fit.terms.size() || !(info.low < 0.0 && info.per.empty())) continue;
       double& value = added.values[shapes[i].parameter];
-      value =
-          std::clamp(value + judged.theta[static_cast<Eigen::Index>(judged.linear.size() + i)], info.low, info.high);
+      value = std::clamp(value + fit.theta[static_cast<Eigen::Index>(fit.linear.size() + i)], info.low, info.high);
       moved = true;
     }
     if (!moved) break;
-    judged = diagnosis::judge(data, judged.terms, all);
+    fit = selection::cross_validate(data, fit.terms, all);
   }
-  return judged;
+  return fit;
 }
 
 // How much of an effect of usual size may be there without these data showing it.
-double unseen_share(BalanceData& data, const Terms& base, const Terms& usual, const diagnosis::Imitation& imitation,
-                    double noise) {
+double unseen_share(BalanceData& data, const Terms& base, const Terms& usual,
+                    const estimation::ModelProjection& projection, double noise) {
   // With its own parameters alone: the others are as the base has them.
   Terms terms = usual;
   for (Term& t : terms)
     for (const Term& b : base)
       if (t.label() == b.label()) t.values = b.values;
-  const Eigen::VectorXd torque = diagnosis::model_torque(data, terms) - diagnosis::model_torque(data, base);
-  const double squares = imitation.own_part(torque).col(0).squaredNorm() / noise;
-  return squares > diagnosis::kNamedScore ? std::sqrt(diagnosis::kNamedScore / squares) : 1.0;
+  const Eigen::VectorXd torque = estimation::model_torque(data, terms) - estimation::model_torque(data, base);
+  const double squares = projection.orthogonal_part(torque).col(0).squaredNorm() / noise;
+  return squares > selection::kPolicy.named_score ? std::sqrt(selection::kPolicy.named_score / squares) : 1.0;
 }
 
 }  // namespace
 
 Terms without(const Terms& terms, std::string_view effect) {
-  const diagnosis::EffectName name = diagnosis::parse_effect(effect);
-  const std::string label = regression::candidate_term(*name.entry, name.order).label();
+  const selection::EffectName name = selection::parse_effect(effect);
+  const std::string label = estimation::candidate_term(*name.entry, name.order).label();
   Terms left;
   for (const Term& t : terms)
     if (t.label() != label) left.push_back(t);
@@ -111,13 +110,13 @@ Terms without(const Terms& terms, std::string_view effect) {
 }
 
 Contender contender(Bench& bench, Layout& layout, const Terms& model, std::string_view effect) {
-  const diagnosis::EffectName name = diagnosis::parse_effect(effect);
+  const selection::EffectName name = selection::parse_effect(effect);
   Contender c;
   c.label = std::string(effect);
-  Terms base = diagnosis::extend(model, *name.entry, name.order);
-  Bench::Side* side = side_of(bench, name.entry->told_by());
+  Terms base = selection::extend(model, *name.entry, name.order);
+  Bench::Side* side = side_of(bench, name.entry->identified_on());
   if (!side) side = side_of(bench, Balance::motor);
-  if (side) regression::settle_grids(*side->planned, base, {base.size() - 1});
+  if (side) estimation::set_grid_values(*side->planned, base, {base.size() - 1});
 
   Terms truth = base;
   truth.back().values = usual_values(truth.back());
@@ -134,21 +133,21 @@ Contender contender(Bench& bench, Layout& layout, const Terms& model, std::strin
       variants.push_back(terms);
       continue;
     }
-    const diagnosis::Judged judged = fitted(*side->recorded, terms);
-    if (const double rmse = judged.rmse(); rmse < least) {
+    const selection::CrossValidatedFit fit = fitted(*side->recorded, terms);
+    if (const double rmse = fit.rmse(); rmse < least) {
       least = rmse;
       const Eigen::VectorXd torque =
-          diagnosis::model_torque(*side->recorded, judged.terms) - diagnosis::model_torque(*side->recorded, model);
-      const diagnosis::Imitation imitation(diagnosis::model_columns(*side->recorded, model),
-                                           Eigen::VectorXd::Ones(side->recorded->rows()));
-      const double noise = rmse * rmse * judged.autocorrelation_time;
+          estimation::model_torque(*side->recorded, fit.terms) - estimation::model_torque(*side->recorded, model);
+      const estimation::ModelProjection projection(estimation::model_columns(*side->recorded, model),
+                                                   Eigen::VectorXd::Ones(side->recorded->rows()));
+      const double noise = rmse * rmse * fit.autocorrelation_time;
       side->noise = std::min(side->noise, noise);
-      c.seen = possible(judged.terms.back()) &&
-               imitation.own_part(torque).col(0).squaredNorm() / noise > diagnosis::kNamedScore;
-      if (c.seen) truth = judged.terms;
-      unseen = c.seen ? 1.0 : unseen_share(*side->recorded, model, truth, imitation, noise);
+      c.seen = possible(fit.terms.back()) &&
+               projection.orthogonal_part(torque).col(0).squaredNorm() / noise > selection::kPolicy.named_score;
+      if (c.seen) truth = fit.terms;
+      unseen = c.seen ? 1.0 : unseen_share(*side->recorded, model, truth, projection, noise);
     }
-    variants.push_back(judged.terms);
+    variants.push_back(fit.terms);
   }
   // An effect that the data do not show is no larger than what they would have shown.
   if (!c.seen)

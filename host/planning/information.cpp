@@ -5,15 +5,15 @@
 #include <Eigen/QR>
 #include <algorithm>
 
-#include "host/diagnosis/imitation.hpp"
-#include "host/regression/balance_fit.hpp"
-#include "host/regression/pivoted_qr.hpp"
+#include "host/estimation/balance_fit.hpp"
+#include "host/estimation/model_projection.hpp"
+#include "host/estimation/pivoted_qr.hpp"
 
 namespace flexspline::planning {
 namespace {
 
-using regression::Slot;
-using regression::Term;
+using estimation::Slot;
+using estimation::Term;
 
 // All that a column depends on besides the data: the term's own shapes, and those of what may change its inputs.
 std::string label_of(const Terms& terms, Slot slot) {
@@ -38,7 +38,7 @@ std::string label_of(const Terms& terms) {
 }
 
 std::vector<std::size_t> on_balance(const Terms& terms, const BalanceData& data) {
-  return regression::terms_on(terms, data.balance(), data.prepared().torque_measured);
+  return estimation::terms_on(terms, data.balance(), data.prepared().torque_measured);
 }
 
 bool is_on(const Terms& terms, const BalanceData& data, std::size_t term) {
@@ -73,7 +73,7 @@ Hypothesis Layout::add(Terms terms) {
     }
   h.columns.push_back(place("delay", [](BalanceData& data) -> Eigen::VectorXd { return data.delay_column(); }));
   h.torque = place("torque" + label_of(terms),
-                   [terms](BalanceData& data) -> Eigen::VectorXd { return diagnosis::model_torque(data, terms); });
+                   [terms](BalanceData& data) -> Eigen::VectorXd { return estimation::model_torque(data, terms); });
   h.known = place("known" + label_of(terms), [terms](BalanceData& data) -> Eigen::VectorXd {
     return data.known_torque(terms, on_balance(terms, data));
   });
@@ -89,7 +89,7 @@ Eigen::MatrixXd Layout::over(BalanceData& data) const {
 
 std::vector<Eigen::MatrixXd> factors(const BalanceData& data, const Eigen::MatrixXd& columns) {
   std::vector<Eigen::MatrixXd> all(data.prepared().records.size());
-  for (const regression::RowRange& range : data.records()) {
+  for (const estimation::RowRange& range : data.records()) {
     const Eigen::MatrixXd rows = columns.middleRows(range.first, range.size());
     all[range.record] = together({&rows});
   }
@@ -133,7 +133,7 @@ double unexplained(const Eigen::MatrixXd& factor, const Hypothesis& truth, const
   }
   const Eigen::VectorXd y =
       factor.col(static_cast<Eigen::Index>(truth.torque)) - factor.col(static_cast<Eigen::Index>(other.known));
-  return (y - X * regression::PivotedQr(X, 1e-7).solve(y)).squaredNorm();
+  return (y - X * estimation::PivotedQr(X, 1e-7).solve(y)).squaredNorm();
 }
 
 }  // namespace flexspline::planning

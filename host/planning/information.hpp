@@ -8,12 +8,12 @@
 #include <string_view>
 #include <vector>
 
-#include "host/regression/balance_data.hpp"
+#include "host/estimation/balance_data.hpp"
 
 namespace flexspline::planning {
 
-using regression::BalanceData;
-using regression::Terms;
+using estimation::BalanceData;
+using estimation::Terms;
 
 // A model with values for all parameters, and the columns that a fit of it may use.
 struct Hypothesis {

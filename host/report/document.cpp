@@ -38,7 +38,7 @@ json comparison_json(const comparison::Comparison& comparison) {
 }
 
 // Equations of the candidates, for the page alone.
-json diagnosis_json(const diagnosis::Diagnosis& found) {
+json diagnosis_json(const selection::Diagnosis& found) {
   json answer = output::diagnosis_json(found);
   answer["verdict_in_words"] = output::verdict_in_words(found);
   for (json& candidate : answer["candidates"]) {
@@ -58,7 +58,7 @@ json document(const Subject& subject) {
   std::vector<std::string> effects;
   for (const model::Effect& effect : subject.model.effects) effects.push_back(effect.id);
   json rounds = json::array();
-  for (const diagnosis::Diagnosis& round : subject.rounds) rounds.push_back(diagnosis_json(round));
+  for (const selection::Diagnosis& round : subject.rounds) rounds.push_back(diagnosis_json(round));
   const std::time_t now = std::time(nullptr);
   json answer{{"format", "flexspline-report/1"},
               {"title", title_of(subject)},

@@ -10,10 +10,10 @@
 #include "host/blackbox/specification.hpp"
 #include "host/comparison/compare.hpp"
 #include "host/data/dataset.hpp"
-#include "host/diagnosis/add.hpp"
-#include "host/diagnosis/diagnosis.hpp"
+#include "host/estimation/identify.hpp"
 #include "host/model/model.hpp"
-#include "host/regression/identify.hpp"
+#include "host/selection/add.hpp"
+#include "host/selection/diagnosis.hpp"
 
 namespace flexspline::report {
 
@@ -25,13 +25,13 @@ struct Subject {
   const data::Dataset* dataset = nullptr;
   model::Model model{};                  // that the page judges
   std::optional<model::Model> before{};  // without what was added
-  regression::PipelineOptions pipeline{};
+  estimation::PipelineOptions pipeline{};
   std::vector<blackbox::Specification> beside{};  // black boxes to stand beside `model`
   comparison::Extent extent{};                    // of what is compared
   // Each only where the command has it.
-  std::vector<regression::Estimate> estimates{};  // of `model`
-  std::vector<diagnosis::Diagnosis> rounds{};     // the first of `before` where there is one
-  std::optional<diagnosis::Addition> addition{};  // or removal, of the command `remove`
+  std::vector<estimation::Estimate> estimates{};  // of `model`
+  std::vector<selection::Diagnosis> rounds{};     // the first of `before` where there is one
+  std::optional<selection::Addition> addition{};  // or removal, of the command `remove`
 };
 
 // "flexspline-report/1"; README.md says what stands in it. Compares model and measurement once more, as `compare` does.

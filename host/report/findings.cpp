@@ -21,7 +21,7 @@ constexpr double kTwoSided95 = 1.96;
 // As identify judges it.
 constexpr double kReliableSpreadPercent = 30.0;
 
-json parameter_json(const regression::Estimate& e) {
+json parameter_json(const estimation::Estimate& e) {
   json parameter = output::json_parameter(e);
   parameter["average"] = json_number(e.average);
   parameter["spread_percent"] = json_number(e.spread_percent);
@@ -74,7 +74,7 @@ std::string against_noise(double error, const std::optional<double>& noise) {
              : fmt::format("that is {:.3g} times what noise alone would leave", error / *noise);
 }
 
-json of_addition(const diagnosis::Addition& a, bool removed) {
+json of_addition(const selection::Addition& a, bool removed) {
   const bool held_out = a.before.rmse_holdout && a.after.rmse_holdout;
   const double before = held_out ? *a.before.rmse_holdout : a.before.rmse_fit;
   const double after = held_out ? *a.after.rmse_holdout : a.after.rmse_fit;
@@ -88,18 +88,18 @@ json of_addition(const diagnosis::Addition& a, bool removed) {
           {"headline", headline(a.signal, a.unit, on, before, after, a.noise_floor, a.noise_floor_from)}};
 }
 
-json of_diagnosis(const diagnosis::Diagnosis& d) {
-  const std::string signal = d.balance ? std::string(diagnosis::balance_signal(*d.balance)) : "";
+json of_diagnosis(const selection::Diagnosis& d) {
+  const std::string signal = d.balance ? std::string(selection::balance_signal(*d.balance)) : "";
   json result{{"verdict", output::verdict_in_words(d)},
-              {"good", d.verdict == diagnosis::Verdict::at_noise_floor},
+              {"good", d.verdict == selection::Verdict::at_noise_floor},
               {"headline", nullptr}};
   if (signal.empty()) return result;
   result["headline"] =
       headline(signal, d.unit, "on the fitted data", std::nullopt, d.base_rmse, d.noise_floor, d.noise_floor_from);
   std::string sentence = fmt::format(" The error of the {} is {}; {}.", in_words(signal),
                                      with_unit(d.base_rmse, d.unit), against_noise(d.base_rmse, d.noise_floor));
-  if (d.verdict == diagnosis::Verdict::missing_effect && !d.named.empty())
-    for (const diagnosis::Candidate& c : d.candidates) {
+  if (d.verdict == selection::Verdict::missing_effect && !d.named.empty())
+    for (const selection::Candidate& c : d.candidates) {
       if (c.effect != d.named.front().effect || c.order != d.named.front().order) continue;
       const std::string on = "on data left out of the fit";
       result["headline"] =
@@ -151,14 +151,14 @@ json verdict(const Subject& subject, const View& view) {
 json parameters(const Subject& subject, const View& view) {
   json list = json::array();
   if (!subject.estimates.empty()) {
-    for (const regression::Estimate& e : subject.estimates) list.push_back(parameter_json(e));
+    for (const estimation::Estimate& e : subject.estimates) list.push_back(parameter_json(e));
     return list;
   }
   // What the model file states of them.
   for (const model::Effect& effect : view.model.effects)
     for (const model::Parameter& p : effect.parameters) {
       if (!p.value) continue;
-      regression::Estimate e;
+      estimation::Estimate e;
       e.id = effect.id;
       e.effect = effect.type;
       e.parameter = p.name;
@@ -178,7 +178,7 @@ json parameters(const Subject& subject, const View& view) {
 
 json addition(const Subject& subject, const View& view) {
   if (!subject.addition) return nullptr;
-  const diagnosis::Addition& a = *subject.addition;
+  const selection::Addition& a = *subject.addition;
   json bars = json::array();
   for (std::size_t i = 0; view.comparison_before && i < view.comparison.experiments.size(); ++i) {
     const comparison::SignalResult* after = view.result(i, a.signal);
@@ -191,7 +191,7 @@ json addition(const Subject& subject, const View& view) {
                         {"after", json_number(after->rmse)},
                         {"noise_floor", json_number(after->noise_floor)}});
   }
-  const auto errors = [](const diagnosis::Errors& e) -> json {
+  const auto errors = [](const selection::Errors& e) -> json {
     return {{"rmse_fit", json_number(e.rmse_fit)}, {"rmse_holdout", json_number(e.rmse_holdout)}};
   };
   return {{"effect", a.effect},

@@ -4,24 +4,24 @@
 
 #include "host/catalogue/settled.hpp"
 #include "host/comparison/row_variables.hpp"
+#include "host/estimation/least_squares.hpp"
 #include "host/output/json.hpp"
-#include "host/regression/least_squares.hpp"
 #include "host/report/parts.hpp"
 
 namespace flexspline::report {
 namespace {
 
+using estimation::Balance;
 using nlohmann::json;
 using output::json_number;
 using output::json_numbers;
-using regression::Balance;
 
 constexpr std::size_t kBinsOfADirection = 30;
 constexpr double kFewestInBin = 8.0;
 
 // Torque on the motor of an effect in steady motion of a loaded drive, once its memory has settled. The angle is the
 // same in all: what follows it is no friction.
-double steady_torque(const regression::Term& term, const View& view, double velocity) {
+double steady_torque(const estimation::Term& term, const View& view, double velocity) {
   const std::vector<double> values = catalogue::natural(*term.entry, term.values);
   const auto instance = term.entry->make(values.data(), view.prepared.constants);
   const double gear = view.prepared.constants.gear_ratio;
@@ -39,7 +39,7 @@ double steady_torque(const regression::Term& term, const View& view, double velo
 }
 
 // What depends on how fast, or in which direction, the motor turns.
-bool is_friction(const regression::Term& term, const View& view) {
+bool is_friction(const estimation::Term& term, const View& view) {
   if (!term.adds_torque()) return false;
   const double fast = 100.0 / view.prepared.constants.turn_angle_scale;
   const double reference = steady_torque(term, view, fast);
@@ -92,13 +92,13 @@ json friction_curve(View& view) {
   const auto balance = std::find_if(view.balances.begin(), view.balances.end(),
                                     [](const BalanceView& b) { return b.data->balance() == Balance::motor; });
   if (balance == view.balances.end()) return nullptr;
-  regression::BalanceData& data = *balance->data;
+  estimation::BalanceData& data = *balance->data;
   Eigen::VectorXd velocity;
   for (const comparison::RowVariable& v : comparison::row_variables(data, view.axis()))
     if (v.name == "velocity") velocity = v.values;
   std::vector<std::size_t> friction;
-  std::vector<std::size_t> all = regression::terms_on(view.terms, Balance::motor, view.prepared.torque_measured);
-  for (const std::size_t t : regression::terms_reaching(view.terms, Balance::motor, view.prepared.torque_measured))
+  std::vector<std::size_t> all = estimation::terms_on(view.terms, Balance::motor, view.prepared.torque_measured);
+  for (const std::size_t t : estimation::terms_reaching(view.terms, Balance::motor, view.prepared.torque_measured))
     all.push_back(t);
   for (const std::size_t t : all)
     if (is_friction(view.terms[t], view)) friction.push_back(t);

@@ -16,7 +16,7 @@ constexpr std::size_t kMostLoops = 8;
 // A free record is of interest where its load twists the gear about as much as others do.
 constexpr double kLoadedShare = 0.2;
 
-double largest_torque(const regression::Record& record) {
+double largest_torque(const estimation::Record& record) {
   double largest = 0.0;
   for (const double torque : record.torque)
     if (std::isfinite(torque)) largest = std::max(largest, std::abs(torque));
@@ -28,23 +28,23 @@ double largest_torque(const regression::Record& record) {
 json hysteresis_loops(const View& view) {
   json loops = json::array();
   const auto balance = std::find_if(view.balances.begin(), view.balances.end(), [](const BalanceView& b) {
-    return b.data->balance() == regression::Balance::transmission;
+    return b.data->balance() == estimation::Balance::transmission;
   });
   if (balance == view.balances.end()) return loops;
   double largest = 0.0;
-  for (const regression::Record& record : view.prepared.records) largest = std::max(largest, largest_torque(record));
+  for (const estimation::Record& record : view.prepared.records) largest = std::max(largest, largest_torque(record));
   // Locked records first: nothing else moves in them.
   std::vector<std::size_t> chosen;
   for (const bool locked : {true, false})
-    for (const regression::RowRange& range : balance->data->records()) {
-      const regression::Record& record = view.prepared.records[range.record];
+    for (const estimation::RowRange& range : balance->data->records()) {
+      const estimation::Record& record = view.prepared.records[range.record];
       if (record.locked == locked && (locked || largest_torque(record) > kLoadedShare * largest))
         chosen.push_back(range.record);
     }
   if (chosen.size() > kMostLoops) chosen.resize(kMostLoops);
   for (const std::size_t at : chosen) {
-    const regression::Record& record = view.prepared.records[at];
-    const auto full = comparison::full_rate(view.prepared, record, regression::Balance::transmission, view.terms);
+    const estimation::Record& record = view.prepared.records[at];
+    const auto full = comparison::full_rate(view.prepared, record, estimation::Balance::transmission, view.terms);
     if (!full) continue;
     std::size_t samples = 0;
     for (const data::Segment& s : record.segments) samples += s.last - s.first;

@@ -8,9 +8,9 @@
 
 #include "host/comparison/residual_map.hpp"
 #include "host/comparison/row_variables.hpp"
+#include "host/estimation/in_parallel.hpp"
+#include "host/estimation/least_squares.hpp"
 #include "host/output/json.hpp"
-#include "host/regression/in_parallel.hpp"
-#include "host/regression/least_squares.hpp"
 #include "host/report/parts.hpp"
 
 namespace flexspline::report {
@@ -52,7 +52,7 @@ BinnedMean binned(const BalanceView& balance, const Eigen::VectorXd& residual, c
     left[k] -= sign(k) * sum[b] / rows[b];
     squares[b] += left[k] * left[k];
   }
-  const double tau = std::clamp(regression::autocorrelation_time(balance.data->records(), left), balance.filter_time,
+  const double tau = std::clamp(estimation::autocorrelation_time(balance.data->records(), left), balance.filter_time,
                                 std::max(balance.filter_time, balance.autocorrelation_time));
   BinnedMean result;
   for (std::size_t b = 0; b < bins.count(); ++b) {
@@ -98,13 +98,13 @@ std::vector<double> centres(const Bins& bins, const Eigen::VectorXd& values) {
 // waves stands aside.
 std::vector<double> order_amplitudes(const View& view, const BalanceView& balance, const Eigen::VectorXd& residual) {
   std::vector<double> amplitudes(kOrders);
-  const auto at = regression::index(balance.data->balance());
-  regression::in_parallel(amplitudes.size(), [&](std::size_t of_order) {
+  const auto at = estimation::index(balance.data->balance());
+  estimation::in_parallel(amplitudes.size(), [&](std::size_t of_order) {
     const auto order = static_cast<double>(of_order + 1);
     const double per_unit = order * view.prepared.constants.turn_angle_scale;
     double squares = 0.0, rows = 0.0;
-    for (const regression::RowRange& range : balance.data->records()) {
-      const regression::Record& record = view.prepared.records[range.record];
+    for (const estimation::RowRange& range : balance.data->records()) {
+      const estimation::Record& record = view.prepared.records[range.record];
       if (!record.has_motor_motion) continue;
       Eigen::MatrixX3d x(range.size(), 3);
       for (Eigen::Index k = 0; k < range.size(); ++k) {
@@ -175,7 +175,7 @@ json residual_maps(const View& view) {
         comparison::localise(*balance.data, View::shown(balance), balance.autocorrelation_time, view.axis());
     const std::vector<comparison::RowVariable> variables = comparison::row_variables(*balance.data, view.axis());
     std::vector<json> maps(variables.size());
-    regression::in_parallel(maps.size(),
+    estimation::in_parallel(maps.size(),
                             [&](std::size_t v) { maps[v] = map_of(view, balance, variables[v], shares, directions); });
     std::erase_if(maps, [](const json& map) { return map.is_null(); });
     const auto strength = [](const json& m) {

@@ -30,7 +30,7 @@ bool differs(const std::vector<double>& a, const std::vector<double>& b) {
 }
 
 json balance_trace(const View& view, const BalanceView& balance, std::size_t record_at, std::size_t points) {
-  const regression::Record& record = view.prepared.records[record_at];
+  const estimation::Record& record = view.prepared.records[record_at];
   const auto full = comparison::full_rate(view.prepared, record, balance.data->balance(), view.terms);
   if (!full) return nullptr;
   const Thinning thinning(record.segments, points);

@@ -7,14 +7,14 @@
 #include <vector>
 
 #include "host/comparison/compare.hpp"
-#include "host/regression/balance_data.hpp"
+#include "host/estimation/balance_data.hpp"
 #include "host/report/document.hpp"
 
 namespace flexspline::report {
 
 struct BalanceView {
-  regression::Balance balance = regression::Balance::motor;
-  std::unique_ptr<regression::BalanceData> data;
+  estimation::Balance balance = estimation::Balance::motor;
+  std::unique_ptr<estimation::BalanceData> data;
   std::string signal;  // "motor_balance"
   std::string unit;
   Eigen::VectorXd residual;               // measured minus model, one a row
@@ -42,12 +42,12 @@ struct View {
   model::Model model;
   std::optional<model::Model> model_before;
   // What is compared, too: made once, and not at all where the subject's pipeline brings it along.
-  std::shared_ptr<const regression::Prepared> ready;
-  const regression::Prepared& prepared;
+  std::shared_ptr<const estimation::Prepared> ready;
+  const estimation::Prepared& prepared;
   comparison::Comparison comparison;
   std::optional<comparison::Comparison> comparison_before;
-  regression::Terms terms;
-  std::optional<regression::Terms> terms_before;
+  estimation::Terms terms;
+  std::optional<estimation::Terms> terms_before;
   std::vector<BalanceView> balances;
 };
 

@@ -21,15 +21,15 @@ struct CandidateTables {
   std::vector<std::pair<double, bool>> settings;  // bandwidth in Hz, reversals left out
 
   // Whether a term can be seen at a bandwidth: waves below it, and above the motion's bandwidth waves alone.
-  bool may_enter(const Term& term, double cutoff_hz) const;
+  bool may_enter(const CandidateTerm& term, double cutoff_hz) const;
 };
 
 // The simplest effect that puts a state of presliding in the place of the sign of an effect of the model; null where
 // none can.
-const catalogue::Entry* presliding_law(const regression::Terms& terms);
+const catalogue::Entry* presliding_law(const estimation::Terms& terms);
 
 // Of all experiments, those that are held out among them.
 CandidateTables make_tables(const std::vector<const data::Experiment*>& experiments, const model::Drive& drive,
-                            const regression::Terms& terms, Balance balance, const SelectionPolicy& policy);
+                            const estimation::Terms& terms, Balance balance, const SelectionPolicy& policy);
 
 }  // namespace flexspline::selection

@@ -38,7 +38,7 @@ std::vector<Found> decide(const Stability& stability, const SelectionPolicy& pol
       found.group.push_back(*other);
       found.frequency += other->frequency;
     }
-    // A placebo wave that does as well says that no order can be told here. Where what leads is no wave, that is no
+    // A placebo wave that does as well says that no order is identifiable here. Where what leads is no wave, that is no
     // reason against it, only against the waves.
     if (lead.entry && !lead.order && lead.frequency >= policy.named_frequency &&
         std::any_of(found.group.begin(), found.group.end(), is_placebo)) {

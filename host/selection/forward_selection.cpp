@@ -73,7 +73,7 @@ bool is_possible(const RegressorTable& table, const std::vector<int>& terms, con
   std::size_t at = table.model_low.size();
   for (const int t : terms) {
     if (t < 0) continue;
-    const Term& term = table.terms[static_cast<std::size_t>(t)];
+    const CandidateTerm& term = table.terms[static_cast<std::size_t>(t)];
     double sum = 0.0;
     for (const double low : term.low) {
       sum += fitted.theta[static_cast<Eigen::Index>(at)];

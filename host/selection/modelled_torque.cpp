@@ -8,10 +8,10 @@
 namespace flexspline::selection {
 
 using effects::Phase;
-using regression::Balance;
-using regression::Prepared;
-using regression::Record;
-using regression::Terms;
+using estimation::Balance;
+using estimation::Prepared;
+using estimation::Record;
+using estimation::Terms;
 
 void take_noise_off_torque(Prepared& prepared) {
   constexpr double kWhite =
@@ -45,18 +45,18 @@ void take_noise_off_torque(Prepared& prepared) {
 
 void take_torque_from_load(Prepared& prepared, const Terms& terms) {
   // A weight on the output, and what takes a torque to be accelerated: most of that is behind the gear.
-  const auto torque_of = [&](const regression::Term& t, const std::vector<double>& values, double acceleration) {
+  const auto torque_of = [&](const estimation::Term& t, const std::vector<double>& values, double acceleration) {
     effects::Inputs<catalogue::Real> in;
     in.acceleration = acceleration;
     double torque = 0.0;
     t.entry->real.torque(values.data(), prepared.constants, Balance::motor, std::span(&in, 1), &torque);
     return torque;
   };
-  const auto has_weight = [](const regression::Term& t) {
+  const auto has_weight = [](const estimation::Term& t) {
     return t.entry->info->balance == Balance::load && (t.entry->info->reads & effects::kOutputAngle) != 0;
   };
   if (std::none_of(terms.begin(), terms.end(), has_weight)) return;
-  for (const regression::Term& t : terms) {
+  for (const estimation::Term& t : terms) {
     if (t.entry->has_state || t.entry->info->phase != Phase::source || !t.entry->adds_torque()) continue;
     const std::vector<double> values = catalogue::natural(*t.entry, t.values);
     const bool inertia = t.entry->info->balance == Balance::motor && torque_of(t, values, 1.0) != 0.0;

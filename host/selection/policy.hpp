@@ -3,6 +3,8 @@
 
 #include <cstddef>
 
+#include "host/selection/named_score.hpp"
+
 namespace flexspline::selection {
 
 struct SelectionPolicy {
@@ -63,6 +65,114 @@ struct SelectionPolicy {
 
   // Presliding needs that many reversals.
   double fewest_reversals = 3.0;
+
+  // Resampling against likelihood on the motor's balance.
+  // Percent of the left-out chi-square from which on what resampling cannot choose counts by itself: what stood for
+  // another effect took off at most 96 % in robot-like twins, a limit of the current that is there 99 %.
+  double nearly_all_percent = 98.0;
+  double floor_uncertainty = 0.1;   // relative, of a floor of some ten periods
+  double filter_uncertainty = 0.2;  // relative, of an autocorrelation time
+
+  // Likelihood on one balance.
+  // Score (twice the log-likelihood gain less k ln n_eff) from which on an effect may be named: one in 1000 sets with
+  // nothing hidden passes it; calibrated by `./dev soak MINUTES calibrate`.
+  double named_score = kNamedScore;
+  // Percent of the left-out chi-square: an effect must matter, not only be there (METHOD, step 6).
+  double named_chi2_percent = 0.5;
+  // Score within which two effects are not distinguished (METHOD, step 6).
+  double confounded_margin = 10.0;
+  // Share of a candidate's torque that is orthogonal to the model: below, both are one in the data (by hand, on drives
+  // with an effect that the model has in another form).
+  double least_orthogonal_share = 0.003;
+  // Residual over noise floor: what the filters leave around reversals repeats with the motion, so a true model stands
+  // some 15 % above its floor on simulated drives.
+  double at_floor = 1.3;
+  // A candidate that takes as much off the left-out chi-square, in percent, may change the base model as it likes (by
+  // hand: loads that the model lacks wholly).
+  double all_explained_percent = 99.0;
+  // Else it may not change the torque of a base effect of physical sign by more than that share of the larger one, if
+  // that effect stands out by so many standard errors and is so many times what is missing (by hand, seeds below 1100).
+  double most_base_change = 0.5;
+  double known_base_errors = 5.0;
+  double known_base_over_missing = 2.0;
+  // Velocity over the end of its range (a quarter of the fast motion) from which on a negative law is wide (EFFECTS).
+  double wide_share_of_range = 0.4;
+
+  // A law that contains another one fits at least as well. How much more the simpler one may leave: of the error itself
+  // as a ratio of squares, and of what was missing as a share. On drives with laws of friction and hysteresis of which
+  // one contains the other: where the simpler one was the truth the other took 0.02 % of what was missing (0.8 % where
+  // an encoder smears it), by however much it led; where the wider one was, at least 0.2 %.
+  struct Same {
+    double left, share_of_missing;
+  };
+  Same same{2.25, 0.001};
+  Same same_smeared{2.89, 0.01};
+  Same hardly_more{1.21, 0.005};
+  double smeared_quanta = 20.0;   // travels of fewer encoder steps are smeared (the same drives)
+  double many_parameters = 12.0;  // a law of so many more is confounded with any
+
+  // Orders per motor turn.
+  int highest_order = 24;          // of gears and motors: the wave generator's, slots, poles and bearings
+  std::size_t orders_tried = 3;    // those that the residual holds most of
+  double usual_order_share = 0.9;  // of the best one's squares: from there the usual order is tried, too
+  // Placebo orders, which no gear, motor or bearing makes: in data of few turns they explain as much as any.
+  double first_placebo_order = 0.63;
+  int placebo_orders = 24;
+  double least_over_placebo = 1.5;  // squares over those of the best placebo (by hand, records of one to five turns)
+  // Where nothing but noise is left, likelihood distinguishes orders although a wrong one may explain most of it: score
+  // over that of any placebo.
+  double score_over_placebo = 3.0 * kNamedScore;
+  // A true order shows in so many of the parts of the data, and not in one of them mostly (by hand, bursts).
+  std::size_t order_parts = 8;
+  int order_parts_with_gain = 5;
+  double most_in_one_part = 0.7;
+
+  // Visibility.
+  double least_temperature_span = 3.0;  // degC: less shows no effect of temperature
+  double least_loaded_share = 0.1;      // torque of the sensor over the motor's: above, it fixes the torque scale
+  double least_direction_share = 0.1;   // rows of the rarer direction that make a record one of both directions
+  int fewest_one_way_records = 3;       // of each direction, where no record has both
+  double one_way_share = 0.01;          // rows of the rarer direction below which data count as one way
+
+  // Disturbances (by hand: pushes on a simulated axis, against bursts that filters make of friction at reversals).
+  double far_out = 6.0;           // robust standard deviations
+  double longest_burst_s = 0.15;  // what lasts longer is a state of the drive
+  double burst_repeats = 0.35;    // share of like rows that stand out too: above, it depends on that signal
+  std::size_t like_rows = 120;    // that count as like ones
+  double most_disturbed = 0.3;    // of a record: more is no exception
+
+  // What is said beside the name.
+  double shown_share_percent = 5.0;        // maps of a complete model show significant shares of a few percent
+  double least_shown_share_percent = 1.0;  // where much is left
+  double delay_errors = 5.0;               // standard errors from which on a delay is said
+  // Of the chi-square above the noise: the best substitute for an effect that is not in the catalogue takes off 60 %
+  // and less (METHOD).
+  double recovered_percent = 80.0;
+  double worth_adding = 0.003;  // of the first drop of chi-square: METHOD, step 8
+
+  // Structure outside the catalogue. A curve has many numbers and the best of some two dozen signals is taken, so it
+  // must show more than an effect of the catalogue; both limits were set on drives that lack nothing.
+  double curve_score = 60.0;
+  double curve_chi2_percent = 3.0;
+  // What is named must recover this share of what a curve does: substitutes for unknown laws stay below, effects of the
+  // catalogue that are the nearest to one above.
+  double shape_recovered = 0.9;
+  double recovered_by_two = 0.98;  // two that are right leave nothing to a curve
+  double simpler_curve = 0.02;     // of the left-out squares: a simpler curve is taken where it predicts as well
+  // A table that a user asks for: below that score it is noise that was fitted, and it must lower the left-out squares
+  // by that many percent.
+  double table_score = 20.0;
+  double least_table_percent = 0.1;
+
+  // Trends of parameters over experiments (METHOD, step 4).
+  std::size_t fewest_of_trend = 6;  // experiments
+  double trend_p_value = 1e-3;      // after the correction for what was tried
+  double trend_size = 0.03;         // of the parameter, over the records
+  double least_drift = 0.01;        // relative standard deviation of friction between records that is said
+  double drift_deviance = 12.0;     // twice the log-likelihood ratio of random effects against none
 };
+
+// The policy that all commands follow.
+inline constexpr SelectionPolicy kPolicy{};
 
 }  // namespace flexspline::selection

@@ -4,18 +4,18 @@
 #include <algorithm>
 #include <cmath>
 
-#include "host/regression/balance_data.hpp"
-#include "host/regression/in_parallel.hpp"
-#include "host/regression/pivoted_qr.hpp"
+#include "host/estimation/balance_data.hpp"
+#include "host/estimation/in_parallel.hpp"
+#include "host/estimation/pivoted_qr.hpp"
 #include "host/selection/bandwidth.hpp"
 
 namespace flexspline::selection {
 
-using regression::Balance;
-using regression::BalanceData;
-using regression::Prepared;
-using regression::Record;
-using regression::Terms;
+using estimation::Balance;
+using estimation::BalanceData;
+using estimation::Prepared;
+using estimation::Record;
+using estimation::Terms;
 
 std::vector<double> presliding_state(const Record& record, double travel) {
   const std::size_t n = record.inputs.size();
@@ -41,7 +41,7 @@ std::vector<double> presliding_state(const Record& record, double travel) {
 
 namespace {
 
-double median(std::vector<double> x) {
+double lower_median(std::vector<double> x) {
   const auto middle = x.begin() + static_cast<std::ptrdiff_t>((x.size() - 1) / 2);
   std::nth_element(x.begin(), middle, x.end());
   return *middle;
@@ -68,7 +68,7 @@ std::vector<double> presliding_travels(const Prepared& prepared, const Selection
     }
   }
   if (static_cast<double>(strokes.size()) < policy.fewest_reversals) return {};
-  const double high = 0.25 * median(strokes), low = std::max(4.0 * noise, 1e-4 * high);
+  const double high = 0.25 * lower_median(strokes), low = std::max(4.0 * noise, 1e-4 * high);
   std::vector<double> travels;
   constexpr int kTravels = 9;
   for (int i = 0; i < kTravels && high > low; ++i)
@@ -79,14 +79,14 @@ std::vector<double> presliding_travels(const Prepared& prepared, const Selection
 std::vector<double> squares_by_travel(const Prepared& original, const Terms& terms,
                                       const std::vector<double>& travels) {
   std::vector<double> squares(travels.size());
-  regression::in_parallel(travels.size(), [&](std::size_t i) {
+  estimation::in_parallel(travels.size(), [&](std::size_t i) {
     Prepared prepared = original;
     for (Record& r : prepared.records) r.inputs.directions[0] = presliding_state(r, travels[i]);
     BalanceData data(prepared, Balance::motor);
-    const auto on_balance = regression::terms_on(terms, Balance::motor, prepared.torque_measured);
-    const Eigen::MatrixXd X = data.columns(terms, regression::free_linear_slots(terms, on_balance));
+    const auto on_balance = estimation::terms_on(terms, Balance::motor, prepared.torque_measured);
+    const Eigen::MatrixXd X = data.columns(terms, estimation::free_linear_slots(terms, on_balance));
     const Eigen::VectorXd y = data.target() - data.known_torque(terms, on_balance);
-    squares[i] = (y - X * regression::PivotedQr(X).solve(y)).squaredNorm();
+    squares[i] = (y - X * estimation::PivotedQr(X).solve(y)).squaredNorm();
   });
   return squares;
 }

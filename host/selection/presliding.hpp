@@ -4,8 +4,8 @@
 #include <optional>
 #include <vector>
 
-#include "host/regression/record.hpp"
-#include "host/regression/terms.hpp"
+#include "host/estimation/record.hpp"
+#include "host/estimation/terms.hpp"
 #include "host/selection/policy.hpp"
 
 namespace flexspline::selection {
@@ -14,13 +14,13 @@ namespace flexspline::selection {
 using Presliding = std::optional<double>;  // rad of the motor
 
 // The state of Dahl's law along a record, -1 to 1, advanced by travel (exact for one direction).
-std::vector<double> presliding_state(const regression::Record& record, double travel);
+std::vector<double> presliding_state(const estimation::Record& record, double travel);
 
 // Squares that the model alone leaves with each travel of presliding, over the rows of the motor balance.
-std::vector<double> squares_by_travel(const regression::Prepared& prepared, const regression::Terms& terms,
+std::vector<double> squares_by_travel(const estimation::Prepared& prepared, const estimation::Terms& terms,
                                       const std::vector<double>& travels);
 
 // Travels of presliding that the data can show, motor side; empty where there are too few reversals.
-std::vector<double> presliding_travels(const regression::Prepared& prepared, const SelectionPolicy& policy);
+std::vector<double> presliding_travels(const estimation::Prepared& prepared, const SelectionPolicy& policy);
 
 }  // namespace flexspline::selection

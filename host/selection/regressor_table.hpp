@@ -8,22 +8,22 @@
 #include <string>
 #include <vector>
 
-#include "host/regression/balance_data.hpp"
-#include "host/regression/terms.hpp"
+#include "host/estimation/balance_data.hpp"
+#include "host/estimation/terms.hpp"
 #include "host/selection/policy.hpp"
 #include "host/selection/presliding.hpp"
 
 namespace flexspline::selection {
 
-using regression::Balance;
+using estimation::Balance;
 
 // A term that may be added, at one value of its nonlinear parameters.
-struct Term {
+struct CandidateTerm {
   const catalogue::Entry* entry = nullptr;  // null: a placebo order or a curve that is in no catalogue
   std::optional<double> order;
   // "torque_ripple:2"; the same for all values of its nonlinear parameters, and for laws of one family.
   std::string name;
-  std::vector<double> values;  // as regression::Term has them, where there is an entry
+  std::vector<double> values;  // as estimation::Term has them, where there is an entry
   std::vector<Eigen::Index> columns;
   std::vector<double> low;       // of each column's coefficient
   bool sum_is_positive = false;  // of the coefficients: amplitudes of a law that may differ by direction
@@ -50,7 +50,7 @@ struct RegressorTable {
   // Friction that may differ from run to run, by surface in common and by direction: columns of a relative change of
   // one.
   std::vector<Eigen::Index> differences;
-  std::vector<Term> terms;
+  std::vector<CandidateTerm> terms;
   std::vector<const catalogue::Entry*> not_visible;  // that these data could not show if they were there
   std::vector<Run> runs;
   std::size_t records = 0;
@@ -63,11 +63,11 @@ struct RegressorTable {
 };
 
 // `prepared` is at the highest bandwidth and not masked; `terms` have the values of a first fit.
-RegressorTable make_regressor_table(const regression::Prepared& prepared, Balance balance,
-                                    const regression::Terms& terms, Presliding presliding, double highest_law_hz,
+RegressorTable make_regressor_table(const estimation::Prepared& prepared, Balance balance,
+                                    const estimation::Terms& terms, Presliding presliding, double highest_law_hz,
                                     const SelectionPolicy& policy);
 
 // Highest frequency of an order of the motor's turn that counts, Hz, at the typical speed.
-double highest_order_hz(const regression::Prepared& prepared);
+double highest_order_hz(const estimation::Prepared& prepared);
 
 }  // namespace flexspline::selection

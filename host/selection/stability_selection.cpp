@@ -5,8 +5,8 @@
 #include <map>
 #include <random>
 
-#include "host/regression/in_parallel.hpp"
-#include "host/regression/least_squares.hpp"
+#include "host/estimation/in_parallel.hpp"
+#include "host/estimation/least_squares.hpp"
 
 namespace flexspline::selection {
 namespace {
@@ -29,12 +29,12 @@ double median_of_positive(std::vector<double> x) {
 }  // namespace
 
 StabilitySelection::StabilitySelection(const std::vector<const data::Experiment*>& experiments,
-                                       const model::Drive& drive, const regression::Terms& terms, Balance balance,
+                                       const model::Drive& drive, const estimation::Terms& terms, Balance balance,
                                        const SelectionPolicy& policy)
     : policy_(policy), tables_(make_tables(experiments, drive, terms, balance, policy)) {
   if (tables_.sign.model_columns == 0) return;
   looks_.resize(tables_.settings.size());
-  regression::in_parallel(looks_.size(), [&](std::size_t i) {
+  estimation::in_parallel(looks_.size(), [&](std::size_t i) {
     looks_[i] = look(tables_.settings[i].first, tables_.settings[i].second, kSeed + i);
   });
   count();
@@ -52,7 +52,7 @@ StabilitySelection::Look StabilitySelection::look(double cutoff_hz, bool mask, s
   const bool has_second = two && two->blocks.size() == one.blocks.size();
   const Setting* const second = has_second ? &*two : nullptr;
   std::vector<double> weights = record_weights(sign, one);
-  for (const Term& term : sign.terms) result.may_enter.push_back(tables_.may_enter(term, cutoff_hz) ? 1 : 0);
+  for (const CandidateTerm& term : sign.terms) result.may_enter.push_back(tables_.may_enter(term, cutoff_hz) ? 1 : 0);
 
   // Noise as the best model of all data leaves it: first with one friction for all records, then with each record's
   // own, which otherwise passes for slow noise.
@@ -68,9 +68,9 @@ StabilitySelection::Look StabilitySelection::look(double cutoff_hz, bool mask, s
     const Setting& seen = z ? *second : one;
     const Eigen::VectorXd residual = weighted_residual(seen, fitted, weights, differences);
     noise.variance = semivariance(one, residual);
-    std::vector<regression::RowRange> ranges;
+    std::vector<estimation::RowRange> ranges;
     for (const Run& run : one.runs) ranges.push_back({run.record, run.first, run.last});
-    noise.tau = std::max(2.0, regression::autocorrelation_time(ranges, residual));
+    noise.tau = std::max(2.0, estimation::autocorrelation_time(ranges, residual));
     const double left = residual.squaredNorm() / static_cast<double>(std::max<Eigen::Index>(1, residual.size()));
     result.whiteness = residual.size() > 0 ? noise.variance / std::max(left, 1e-300) : -1.0;
     if (sign.differences.empty() || round == 1) break;
@@ -101,22 +101,70 @@ StabilitySelection::Look StabilitySelection::look(double cutoff_hz, bool mask, s
   return result;
 }
 
+namespace {
+
+// How often a term was chosen, over the subsamples of all settings.
+struct Count {
+  Frequency f;
+  double could = 0.0, was = 0.0, first = 0.0, near = 0.0;
+  std::map<std::string, double> alternatives;
+  std::vector<double> shares;
+};
+using Counts = std::map<std::string, Count>;
+
+const std::string& name_of(const RegressorTable& table, int term) {
+  static const std::string presliding = kPresliding;
+  return term == kPreslidingTerm ? presliding : table.terms[static_cast<std::size_t>(term)].name;
+}
+
+// Of a subsample that does not abstain. Returns the share of the excess that its steps take off.
+double count_steps(const RegressorTable& table, const Selected& vote, Counts& counts) {
+  double sum = 0.0;
+  for (std::size_t k = 0; k < vote.steps.size(); ++k) {
+    const Step& s = vote.steps[k];
+    Count& c = counts[name_of(table, s.term)];
+    c.was += 1.0;
+    for (const std::string& other : s.alternatives) {
+      c.alternatives[other] += 1.0;
+      counts[other].near += 1.0;
+    }
+    if (k == 0) c.first += 1.0;
+    c.shares.push_back(s.of_all);
+    sum += s.of_all;
+  }
+  return sum;
+}
+
+// Of a term that was chosen at least once.
+Frequency frequency_of(Count& c) {
+  constexpr double kOften = 0.3;
+  c.f.frequency = c.was / c.could;
+  c.f.first = c.first / c.could;
+  c.f.near = std::min(1.0, (c.was + c.near) / c.could);
+  for (const auto& [other, times] : c.alternatives)
+    if (times >= kOften * c.was) c.f.alternatives.emplace_back(other, times / c.was);
+  std::sort(c.shares.begin(), c.shares.end());
+  const auto quantile_of_shares = [&](double q) {
+    return c.shares[static_cast<std::size_t>(std::lround(q * static_cast<double>(c.shares.size() - 1)))];
+  };
+  c.f.share = quantile_of_shares(0.5);
+  c.f.share_low = quantile_of_shares(0.025);
+  c.f.share_high = quantile_of_shares(0.975);
+  return c.f;
+}
+
+}  // namespace
+
 void StabilitySelection::count() {
   const RegressorTable& sign = tables_.sign;
-  struct Count {
-    Frequency f;
-    double could = 0.0, was = 0.0, first = 0.0, near = 0.0;
-    std::map<std::string, double> alternatives, members;
-    std::vector<double> shares;
-  };
-  std::map<std::string, Count> counts;
-  std::vector<double> explained;
+  Counts counts;
+  std::vector<double> explained, white;
   for (std::size_t i = 0; i < looks_.size(); ++i) {
     if (looks_[i].votes.empty()) continue;
-    std::map<std::string, const Term*> open;
+    std::map<std::string, const CandidateTerm*> open;
     for (std::size_t t = 0; t < sign.terms.size(); ++t)
       if (looks_[i].may_enter[t]) open[sign.terms[t].name] = &sign.terms[t];
-    if (tables_.presliding && !tables_.settings[i].second) open["presliding"] = nullptr;
+    if (tables_.presliding && !tables_.settings[i].second) open[kPresliding] = nullptr;
     for (const Selected& vote : looks_[i].votes) {
       result_.subsamples += 1.0;
       if (vote.extrapolates) result_.extrapolated += 1.0;
@@ -133,51 +181,17 @@ void StabilitySelection::count() {
         }
         c.could += 1.0;
       }
-      double sum = 0.0;
-      for (std::size_t k = 0; k < vote.steps.size(); ++k) {
-        const Step& s = vote.steps[k];
-        Count& c = counts[s.term == kPreslidingTerm ? "presliding" : sign.terms[static_cast<std::size_t>(s.term)].name];
-        c.was += 1.0;
-        for (const std::string& other : s.alternatives) {
-          c.alternatives[other] += 1.0;
-          counts[other].near += 1.0;
-        }
-        if (k == 0) c.first += 1.0;
-        c.shares.push_back(s.of_all);
-        sum += s.of_all;
-      }
-      explained.push_back(sum);
+      explained.push_back(count_steps(sign, vote, counts));
     }
   }
-  const auto median = [](std::vector<double> x) {
-    if (x.empty()) return 0.0;
-    std::nth_element(x.begin(), x.begin() + static_cast<std::ptrdiff_t>(x.size() / 2), x.end());
-    return x[x.size() / 2];
-  };
-  result_.explained = median(explained);
-  std::vector<double> white;
   for (std::size_t i = 0; i < looks_.size(); ++i)
     if (tables_.settings[i].second && looks_[i].whiteness >= 0.0 &&
         tables_.settings[i].first <= 1.01 * tables_.bandwidth.highest_hz)
       white.push_back(std::min(1.0, looks_[i].whiteness));
+  result_.explained = median(explained);
   result_.whiteness = median(white);
-  for (auto& named_count : counts) {
-    Count& c = named_count.second;
-    if (c.was == 0.0 || c.could == 0.0) continue;
-    c.f.frequency = c.was / c.could;
-    c.f.first = c.first / c.could;
-    c.f.near = std::min(1.0, (c.was + c.near) / c.could);
-    for (const auto& [other, times] : c.alternatives)
-      if (times >= 0.3 * c.was) c.f.alternatives.emplace_back(other, times / c.was);
-    std::sort(c.shares.begin(), c.shares.end());
-    const auto quantile = [&](double q) {
-      return c.shares[static_cast<std::size_t>(std::lround(q * static_cast<double>(c.shares.size() - 1)))];
-    };
-    c.f.share = quantile(0.5);
-    c.f.share_low = quantile(0.025);
-    c.f.share_high = quantile(0.975);
-    result_.frequencies.push_back(c.f);
-  }
+  for (auto& [name, c] : counts)
+    if (c.was > 0.0 && c.could > 0.0) result_.frequencies.push_back(frequency_of(c));
   std::sort(result_.frequencies.begin(), result_.frequencies.end(),
             [](const Frequency& a, const Frequency& b) { return a.frequency > b.frequency; });
 }

@@ -33,7 +33,7 @@ class StabilitySelection {
  public:
   // Experiments of role fit are chosen with; those of role holdout are kept for held_out_ratios().
   StabilitySelection(const std::vector<const data::Experiment*>& experiments, const model::Drive& drive,
-                     const regression::Terms& terms, Balance balance, const SelectionPolicy& policy);
+                     const estimation::Terms& terms, Balance balance, const SelectionPolicy& policy);
 
   const CandidateTables& tables() const { return tables_; }
   const Stability& result() const { return result_; }

@@ -15,18 +15,18 @@
 #include "host/comparison/compare.hpp"
 #include "host/comparison/free_run.hpp"
 #include "host/comparison/score.hpp"
-#include "host/diagnosis/add.hpp"
-#include "host/regression/identify.hpp"
+#include "host/estimation/identify.hpp"
+#include "host/selection/add.hpp"
 #include "host/sensitivity/lines.hpp"
 
 namespace flexspline::sensitivity {
 namespace {
 
 using data::Experiment;
-using regression::Balance;
-using regression::BalanceData;
-using regression::Prepared;
-using regression::Record;
+using estimation::Balance;
+using estimation::BalanceData;
+using estimation::Prepared;
+using estimation::Record;
 
 // Less of a signal's variance in a line says nothing of the model there.
 constexpr double kLeastShareOfLine = 0.01;
@@ -63,10 +63,10 @@ class Analysis {
   Analysis(const data::Dataset& dataset, const model::Model& model, const Options& options)
       : dataset_(dataset), options_(options), model_(model) {
     for (const Change& change : options.more) require_known(model, change);
-    model_.drive = regression::reconcile(model.drive, dataset, result_.warnings);
+    model_.drive = estimation::reconcile(model.drive, dataset, result_.warnings);
     result_.refit = options.refit;
     if (options.refit) {
-      const auto fitted = regression::identify(dataset, model_, options.pipeline);
+      const auto fitted = estimation::identify(dataset, model_, options.pipeline);
       model_ = fitted->model;
       result_.warnings.insert(result_.warnings.end(), fitted->warnings.begin(), fitted->warnings.end());
     }
@@ -76,9 +76,9 @@ class Analysis {
       all.push_back(&e);
       if (e.role == data::Role::fit) fit.push_back(&e);
     }
-    prepared_ = regression::prepare(fit.empty() ? all : fit, model_.drive, options.pipeline);
+    prepared_ = estimation::prepare(fit.empty() ? all : fit, model_.drive, options.pipeline);
     if (!fit.empty() && fit.size() < all.size())
-      prepared_ = regression::prepare_with(all, model_.drive, prepared_.pipeline);
+      prepared_ = estimation::prepare_with(all, model_.drive, prepared_.pipeline);
     result_.pipeline = prepared_.pipeline;
     find_balances();
     find_lines();
@@ -115,7 +115,7 @@ class Analysis {
       try {
         Changed changed = apply(analysis_.model_, change);
         if (analysis_.options_.refit)
-          changed.model = regression::identify(analysis_.dataset_, changed.model, analysis_.options_.pipeline)->model;
+          changed.model = estimation::identify(analysis_.dataset_, changed.model, analysis_.options_.pipeline)->model;
         Variant variant = judge(changed.model, change);
         variant.also_left_out = std::move(changed.also_left_out);
         return variant;
@@ -132,7 +132,7 @@ class Analysis {
       for (const Experiment& e : analysis_.dataset_.experiments)
         variant.experiments.push_back({e.name, e.role, e.load == data::Load::locked ? "locked" : "free", {}});
       std::vector<Together> together;
-      const regression::Terms terms = regression::terms_of(model);
+      const estimation::Terms terms = estimation::terms_of(model);
       for (BalanceData& data : data_) inverse(data, terms, variant, together);
       for (std::size_t i = 0; i < analysis_.prepared_.records.size(); ++i) free_run(i, model, variant, together);
       for (Together& t : together) {
@@ -161,13 +161,13 @@ class Analysis {
       return variant;
     }
 
-    void inverse(BalanceData& data, const regression::Terms& terms, Variant& variant, std::vector<Together>& together) {
-      const Eigen::VectorXd residual = regression::residual_of(data, terms);
-      for (const regression::RowRange& range : data.records()) {
+    void inverse(BalanceData& data, const estimation::Terms& terms, Variant& variant, std::vector<Together>& together) {
+      const Eigen::VectorXd residual = estimation::residual_of(data, terms);
+      for (const estimation::RowRange& range : data.records()) {
         comparison::Score score;
         for (Eigen::Index k = range.first; k < range.last; ++k) score.add(data.target()[k], residual[k]);
         SignalError s;
-        s.signal = diagnosis::balance_signal(data.balance());
+        s.signal = selection::balance_signal(data.balance());
         s.unit = data::unit_of(data::Column::torque, analysis_.model_.drive.axis);
         keep(std::move(s), score, false, range.record, variant, together);
       }
@@ -269,10 +269,10 @@ class Analysis {
   };
 
   void find_balances() {
-    const regression::Terms terms = regression::terms_of(model_);
+    const estimation::Terms terms = estimation::terms_of(model_);
     for (const Balance balance : {Balance::motor, Balance::transmission, Balance::load}) {
       if (balance != Balance::motor && !prepared_.torque_measured) continue;
-      if (regression::terms_on(terms, balance, prepared_.torque_measured).empty()) continue;
+      if (estimation::terms_on(terms, balance, prepared_.torque_measured).empty()) continue;
       if (!BalanceData(prepared_, balance).empty()) balances_.push_back(balance);
     }
     if (balances_.empty())

@@ -11,8 +11,8 @@
 #include <vector>
 
 #include "host/data/dataset.hpp"
+#include "host/estimation/record.hpp"
 #include "host/model/model.hpp"
-#include "host/regression/record.hpp"
 #include "host/sensitivity/changes.hpp"
 
 namespace flexspline::sensitivity {
@@ -65,7 +65,7 @@ struct Variant {
 };
 
 struct Options {
-  regression::PipelineOptions pipeline{};
+  estimation::PipelineOptions pipeline{};
   bool refit = false;             // estimate what is left anew, of the full model too
   std::vector<Change> more = {};  // after the usual changes
   unsigned threads = 0;           // 0: as many as the machine has; the answer does not depend on it
@@ -76,7 +76,7 @@ struct Sensitivity {
   bool refit = false;
   Variant full;
   std::vector<Variant> variants;  // worst first
-  regression::Pipeline pipeline;
+  estimation::Pipeline pipeline;
   std::vector<std::string> warnings;
 };
 

@@ -10,7 +10,7 @@
 #include <set>
 #include <utility>
 
-#include "host/regression/giving_up.hpp"
+#include "host/estimation/cancellation.hpp"
 #include "host/workbench/gate.hpp"
 #include "host/workbench/kept_tabs.hpp"
 #include "host/workbench/work.hpp"
@@ -138,8 +138,8 @@ void Api::refuse_again(const std::string& key) const {
 
 Answer Api::answer(const Request& request) {
   Answer answer;
-  const regression::Asking nobody;
-  const regression::MayGiveUp known_by(&nobody);
+  const estimation::CancellationCheck nobody;
+  const estimation::CancellationScope known_by(&nobody);
   std::string key = request.path;
   for (const auto& [name, value] : request.query)
     if (name != "tab") key += fmt::format(" {}={}", name, value);
@@ -340,13 +340,13 @@ void Api::start_diagnosis(const std::shared_ptr<Session>& session) {
         const std::shared_ptr<Step> step = session->history().current();
         step->diagnose(
             [&] {
-              diagnosis::Options how;
+              selection::Options how;
               how.pipeline = step->pipeline;
               how.progress = say;
-              return diagnosis::diagnose(*step->dataset, step->model, how);
+              return selection::diagnose(*step->dataset, step->model, how);
             },
             [&, is_told = false]() mutable {
-              regression::ask_whether_to_give_up();
+              estimation::throw_if_cancelled();
               if (!std::exchange(is_told, true)) say("another tab is at it");
             });
       },

@@ -44,7 +44,7 @@ struct Setup {
   std::string data_name;         // as the user named the data
   std::string model_name;        // likewise
   std::filesystem::path folder;  // where models, reports and blocks are saved
-  regression::PipelineOptions pipeline;
+  estimation::PipelineOptions pipeline;
   std::string drive;        // --drive; empty: none
   Rig rig;                  // for closed loops; none known: the present model
   closed_loop::Runner run;  // of closed loops; empty: there are none

@@ -19,7 +19,7 @@ struct JobSlot {
   std::atomic<SlotState> state{SlotState::free};
   std::atomic<std::int64_t> deadline_ms{0};
   std::int64_t began_ms = 0;
-  const regression::Asking* asking = nullptr;
+  const estimation::CancellationCheck* asking = nullptr;
   bool is_work = false;
   std::array<char, 64> tab{};
   std::array<char, 160> what{};
@@ -44,7 +44,8 @@ void put(std::array<char, N>& to, std::string_view text) {
 
 // Runs on the thread that crashed. Nothing but stores to memory that is there: it may have crashed anywhere.
 void note_crash(int signal) {
-  if (const regression::Asking* asking = regression::asked_here(); asking != nullptr && watched != nullptr)
+  if (const estimation::CancellationCheck* asking = estimation::current_cancellation();
+      asking != nullptr && watched != nullptr)
     for (std::size_t k = 0; k < kSlots; ++k)
       if (watched[k].state.load() == SlotState::running && watched[k].asking == asking)
         watched[k].state.store(SlotState::crashed);
@@ -66,7 +67,7 @@ JobBoard::~JobBoard() {
 }
 
 JobBoard::Entry::Entry(JobBoard* board, const Job& job, std::chrono::milliseconds limit,
-                       const regression::Asking* asking) {
+                       const estimation::CancellationCheck* asking) {
   if (board == nullptr) return;
   for (std::size_t k = 0; k < kSlots && slot_ == nullptr; ++k) {
     SlotState expected = SlotState::free;

@@ -10,7 +10,7 @@
 #include <string_view>
 #include <vector>
 
-#include "host/regression/giving_up.hpp"
+#include "host/estimation/cancellation.hpp"
 
 namespace flexspline::workbench {
 
@@ -40,7 +40,8 @@ class JobBoard {
   // by it a thread is known to work for this job. A board that is full leaves the job out.
   class Entry {
    public:
-    Entry(JobBoard* board, const Job& job, std::chrono::milliseconds limit, const regression::Asking* asking);
+    Entry(JobBoard* board, const Job& job, std::chrono::milliseconds limit,
+          const estimation::CancellationCheck* asking);
     ~Entry();
     Entry(const Entry&) = delete;
     Entry& operator=(const Entry&) = delete;

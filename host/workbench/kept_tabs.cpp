@@ -23,7 +23,7 @@ std::optional<double> optional_number(const json& value) {
   return value.is_number() ? std::optional(value.get<double>()) : std::nullopt;
 }
 
-json kept_estimate_json(const regression::Estimate& e) {
+json kept_estimate_json(const estimation::Estimate& e) {
   json per_experiment = json::array();
   for (const auto& [name, value] : e.per_experiment) per_experiment.push_back({name, json_number(value)});
   return {{"slot", {e.slot.term, e.slot.parameter}},
@@ -44,8 +44,8 @@ json kept_estimate_json(const regression::Estimate& e) {
           {"per_experiment", std::move(per_experiment)}};
 }
 
-regression::Estimate estimate_of(const json& kept) {
-  regression::Estimate e;
+estimation::Estimate estimate_of(const json& kept) {
+  estimation::Estimate e;
   e.slot = {kept.at("slot").at(0), kept.at("slot").at(1)};
   e.id = kept.at("id");
   e.effect = kept.at("effect");
@@ -68,7 +68,7 @@ regression::Estimate estimate_of(const json& kept) {
 
 json kept_step_json(const Step& step) {
   json estimates = json::array();
-  for (const regression::Estimate& e : step.estimates) estimates.push_back(kept_estimate_json(e));
+  for (const estimation::Estimate& e : step.estimates) estimates.push_back(kept_estimate_json(e));
   return {{"action", step.action},        {"what", step.what},         {"model_text", step.model_text},
           {"files", step.files.string()}, {"warnings", step.warnings}, {"estimates", std::move(estimates)}};
 }
@@ -112,7 +112,7 @@ void keep_tabs(const std::filesystem::path& file, const std::list<std::shared_pt
 }
 
 std::list<std::shared_ptr<Session>> tabs_again(const std::filesystem::path& file, const std::shared_ptr<Step>& first,
-                                               const regression::PipelineOptions& pipeline, JobBoard* board,
+                                               const estimation::PipelineOptions& pipeline, JobBoard* board,
                                                const JobLimits& limits) {
   std::list<std::shared_ptr<Session>> tabs;
   std::ifstream in(file, std::ios::binary);

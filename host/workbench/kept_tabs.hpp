@@ -15,7 +15,7 @@ void keep_tabs(const std::filesystem::path& file, const std::list<std::shared_pt
 // As they were kept, with their steps but without what was found missing; none where there is no such file. `first` is
 // the first step of all. A tab with steps that cannot be made again begins anew and says so.
 std::list<std::shared_ptr<Session>> tabs_again(const std::filesystem::path& file, const std::shared_ptr<Step>& first,
-                                               const regression::PipelineOptions& pipeline, JobBoard* board,
+                                               const estimation::PipelineOptions& pipeline, JobBoard* board,
                                                const JobLimits& limits);
 
 }  // namespace flexspline::workbench

@@ -28,7 +28,7 @@ const char* role_name(data::Role role) {
 }
 
 report::Subject subject_of(const data::Dataset& dataset, const model::Model& model,
-                           const regression::PipelineOptions& pipeline, std::vector<regression::Estimate> estimates) {
+                           const estimation::PipelineOptions& pipeline, std::vector<estimation::Estimate> estimates) {
   report::Subject subject;
   subject.dataset = &dataset;
   subject.model = model;
@@ -64,7 +64,7 @@ json signal_json(const std::string& signal, const std::string& unit) {
 }  // namespace
 
 Look::Look(std::shared_ptr<const data::Dataset> dataset, const model::Model& model,
-           const regression::PipelineOptions& pipeline, std::vector<regression::Estimate> estimates)
+           const estimation::PipelineOptions& pipeline, std::vector<estimation::Estimate> estimates)
     : dataset_(std::move(dataset)),
       subject_(subject_of(*dataset_, model, pipeline, std::move(estimates))),
       view_(subject_) {}
@@ -221,8 +221,8 @@ json Look::stretches_of(const std::string& signal, const std::string& variable, 
   const auto found =
       std::find_if(variables.begin(), variables.end(), [&](const auto& v) { return v.name == variable; });
   if (found == variables.end()) throw AskedError(fmt::format("there is no map over \"{}\"", variable));
-  for (const regression::RowRange& range : balance->data->records()) {
-    const regression::Record& record = view_.prepared.records[range.record];
+  for (const estimation::RowRange& range : balance->data->records()) {
+    const estimation::Record& record = view_.prepared.records[range.record];
     const std::vector<double>& time = dataset_->experiments[range.record].time_s;
     std::vector<double> times;
     for (Eigen::Index k = range.first; k < range.last; ++k)

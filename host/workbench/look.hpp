@@ -34,7 +34,7 @@ class Look {
  public:
   // The model needs values. Throws what comparison::compare throws.
   Look(std::shared_ptr<const data::Dataset> dataset, const model::Model& model,
-       const regression::PipelineOptions& pipeline, std::vector<regression::Estimate> estimates);
+       const estimation::PipelineOptions& pipeline, std::vector<estimation::Estimate> estimates);
 
   // {"experiments": [{"name", "role", "load", "duration_s", "samples", "begin_s", "signals": [{"signal", "unit",
   // "rmse", "nrmse", "noise_floor", "excess", "free_run"}]}], "balances": [{"signal", "unit", "fit", "holdout",

@@ -6,9 +6,9 @@
 #include <new>
 #include <nlohmann/json.hpp>
 
+#include "host/estimation/cancellation.hpp"
 #include "host/output/diagnosis.hpp"
 #include "host/output/json.hpp"
-#include "host/regression/giving_up.hpp"
 
 namespace flexspline::workbench {
 namespace {
@@ -16,7 +16,7 @@ namespace {
 using nlohmann::json;
 using output::json_number;
 
-json diagnosis_json(const diagnosis::Diagnosis& found) {
+json diagnosis_json(const selection::Diagnosis& found) {
   json answer = output::diagnosis_json(found);
   answer["verdict_in_words"] = output::verdict_in_words(found);
   for (json& candidate : answer["candidates"]) {
@@ -76,11 +76,11 @@ void Step::forget_look() const {
   look_.reset();
 }
 
-std::shared_ptr<const diagnosis::Diagnosis> Step::diagnosed() const {
+std::shared_ptr<const selection::Diagnosis> Step::diagnosed() const {
   const std::lock_guard lock(mutex_);
   return diagnosis_;
 }
-void Step::diagnose(const std::function<diagnosis::Diagnosis()>& search, const std::function<void()>& wait) {
+void Step::diagnose(const std::function<selection::Diagnosis()>& search, const std::function<void()>& wait) {
   std::unique_lock lock(mutex_);
   while (searching_ && !diagnosis_) {
     searched_.wait_for(lock, std::chrono::milliseconds(50));
@@ -91,10 +91,10 @@ void Step::diagnose(const std::function<diagnosis::Diagnosis()>& search, const s
   if (diagnosis_) return;
   searching_ = true;
   lock.unlock();
-  std::shared_ptr<const diagnosis::Diagnosis> found;
+  std::shared_ptr<const selection::Diagnosis> found;
   std::exception_ptr failure;
   try {
-    found = std::make_shared<const diagnosis::Diagnosis>(search());
+    found = std::make_shared<const selection::Diagnosis>(search());
   } catch (...) {
     failure = std::current_exception();
   }
@@ -216,10 +216,10 @@ void Session::start(const std::string& what, std::function<void(const Progress&)
       changed();
     };
     std::exception_ptr error;
-    const regression::Asking ask = [&work = *work] {
+    const estimation::CancellationCheck ask = [&work = *work] {
       if (work.cancelled) throw Cancelled{};
     };
-    const regression::MayGiveUp may_give_up(&ask);
+    const estimation::CancellationScope may_give_up(&ask);
     JobBoard::Entry entry(board_, {id_, work->what, key, true}, limits_.work, &ask);
     {
       const std::lock_guard inner(mutex_);

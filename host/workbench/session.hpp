@@ -14,7 +14,7 @@
 #include <thread>
 #include <vector>
 
-#include "host/diagnosis/diagnosis.hpp"
+#include "host/selection/diagnosis.hpp"
 #include "host/workbench/history.hpp"
 #include "host/workbench/jobs.hpp"
 #include "host/workbench/look.hpp"
@@ -30,9 +30,9 @@ struct Step {
   std::shared_ptr<const data::Dataset> dataset;
   model::Model model;      // with values
   std::string model_text;  // of its file, comments of the user's file in it
-  std::vector<regression::Estimate> estimates;
+  std::vector<estimation::Estimate> estimates;
   std::vector<std::string> warnings;
-  regression::PipelineOptions pipeline;          // with the records of `dataset`
+  estimation::PipelineOptions pipeline;          // with the records of `dataset`
   std::unique_ptr<const nlohmann::json> errors;  // Look::errors()
 
   Step();
@@ -41,18 +41,18 @@ struct Step {
   std::shared_ptr<Look> look() const;
   void forget_look() const;
   // Null while it is not known.
-  std::shared_ptr<const diagnosis::Diagnosis> diagnosed() const;
+  std::shared_ptr<const selection::Diagnosis> diagnosed() const;
   // Found once for all tabs that have this step: who comes while another one searches waits for what that finds, and
   // searches itself where that one gave up. `wait` is called again and again meanwhile; what it throws ends the
   // waiting.
-  void diagnose(const std::function<diagnosis::Diagnosis()>& search, const std::function<void()>& wait);
+  void diagnose(const std::function<selection::Diagnosis()>& search, const std::function<void()>& wait);
 
  private:
   mutable std::mutex mutex_;
   std::condition_variable searched_;
   bool searching_ = false;
   mutable std::shared_ptr<Look> look_;
-  std::shared_ptr<const diagnosis::Diagnosis> diagnosis_;
+  std::shared_ptr<const selection::Diagnosis> diagnosis_;
 };
 
 // Thrown out of work that was cancelled; nobody is told.

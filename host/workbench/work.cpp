@@ -8,9 +8,9 @@
 
 #include "host/catalogue/defined.hpp"
 #include "host/comparison/compare.hpp"
-#include "host/diagnosis/add.hpp"
 #include "host/output/json.hpp"
 #include "host/report/page.hpp"
+#include "host/selection/add.hpp"
 #include "host/workbench/gate.hpp"
 
 namespace flexspline::workbench {
@@ -28,8 +28,8 @@ std::string rewritten(const std::string& text, const model::Model& changed) {
 
 std::shared_ptr<Step> made(std::string action, std::string what, std::shared_ptr<const data::Dataset> dataset,
                            const model::Model& model, const std::string& text_before,
-                           std::vector<regression::Estimate> estimates, std::vector<std::string> warnings,
-                           const regression::PipelineOptions& pipeline, const Progress& say) {
+                           std::vector<estimation::Estimate> estimates, std::vector<std::string> warnings,
+                           const estimation::PipelineOptions& pipeline, const Progress& say) {
   say("comparing with the measurement");
   auto step = std::make_shared<Step>();
   step->id = new_token();
@@ -52,38 +52,38 @@ bool has_values(const model::Model& model) {
 }
 
 // The records of a data set, made once for all its steps: a fit, a comparison and a search begin with them.
-regression::PipelineOptions with_records(const std::shared_ptr<const data::Dataset>& dataset, const model::Model& model,
-                                         regression::PipelineOptions pipeline, const Progress& say) {
+estimation::PipelineOptions with_records(const std::shared_ptr<const data::Dataset>& dataset, const model::Model& model,
+                                         estimation::PipelineOptions pipeline, const Progress& say) {
   struct Kept {
     std::shared_ptr<const data::Dataset> dataset;  // records point into it
-    regression::Prepared records;
+    estimation::Prepared records;
   };
   say("filtering the measurements");
   std::vector<std::string> said_by_the_fit;
   pipeline.ready = nullptr;
-  const model::Drive drive = regression::reconcile(model.drive, *dataset, said_by_the_fit);
-  const auto kept = std::make_shared<const Kept>(Kept{dataset, regression::prepare_all(*dataset, drive, pipeline)});
+  const model::Drive drive = estimation::reconcile(model.drive, *dataset, said_by_the_fit);
+  const auto kept = std::make_shared<const Kept>(Kept{dataset, estimation::prepare_all(*dataset, drive, pipeline)});
   pipeline.ready = {kept, &kept->records};
   return pipeline;
 }
 
 // Those of the step before, whose data are the same.
-regression::PipelineOptions as_before(const Step& before, regression::PipelineOptions pipeline) {
+estimation::PipelineOptions as_before(const Step& before, estimation::PipelineOptions pipeline) {
   pipeline.ready = before.pipeline.ready;
   return pipeline;
 }
 
 std::shared_ptr<Step> identified(std::string action, std::string what, std::shared_ptr<const data::Dataset> dataset,
                                  const model::Model& model, const std::string& text,
-                                 const regression::PipelineOptions& pipeline, const Progress& say) {
+                                 const estimation::PipelineOptions& pipeline, const Progress& say) {
   say("identifying the model");
-  const auto found = regression::identify(*dataset, model, pipeline);
+  const auto found = estimation::identify(*dataset, model, pipeline);
   return made(std::move(action), std::move(what), std::move(dataset), found->model, text, found->estimates,
               found->warnings, pipeline, say);
 }
 
 std::shared_ptr<Step> of_change(std::string action, const std::string& what, const Step& before,
-                                const diagnosis::Addition& change, const regression::PipelineOptions& pipeline,
+                                const selection::Addition& change, const estimation::PipelineOptions& pipeline,
                                 const Progress& say) {
   return made(std::move(action), what, before.dataset, change.model, before.model_text, change.estimates,
               change.warnings, pipeline, say);
@@ -125,32 +125,32 @@ std::pair<std::shared_ptr<const data::Dataset>, std::string> joined(const data::
 }  // namespace
 
 std::shared_ptr<Step> open(std::shared_ptr<const data::Dataset> dataset, const model::ModelFile& file,
-                           const regression::PipelineOptions& pipeline, const Progress& say) {
-  const regression::PipelineOptions own = with_records(dataset, file.model, pipeline, say);
+                           const estimation::PipelineOptions& pipeline, const Progress& say) {
+  const estimation::PipelineOptions own = with_records(dataset, file.model, pipeline, say);
   if (!has_values(file.model)) return identified("open", "", dataset, file.model, file.text, own, say);
   return made("open", "", std::move(dataset), file.model, file.text, {}, {}, own, say);
 }
 
 std::shared_ptr<Step> with_effect(const Step& before, const std::string& effect,
-                                  const regression::PipelineOptions& pipeline, const Progress& say) {
+                                  const estimation::PipelineOptions& pipeline, const Progress& say) {
   say(fmt::format("adding {} and refitting", effect));
-  const regression::PipelineOptions own = as_before(before, pipeline);
-  return of_change("add", effect, before, diagnosis::add(*before.dataset, before.model, effect, own), own, say);
+  const estimation::PipelineOptions own = as_before(before, pipeline);
+  return of_change("add", effect, before, selection::add(*before.dataset, before.model, effect, own), own, say);
 }
 
 std::shared_ptr<Step> without_effect(const Step& before, const std::string& id,
-                                     const regression::PipelineOptions& pipeline, const Progress& say) {
+                                     const estimation::PipelineOptions& pipeline, const Progress& say) {
   say(fmt::format("taking {} out and refitting", id));
-  const regression::PipelineOptions own = as_before(before, pipeline);
-  return of_change("remove", id, before, diagnosis::remove(*before.dataset, before.model, id, own), own, say);
+  const estimation::PipelineOptions own = as_before(before, pipeline);
+  return of_change("remove", id, before, selection::remove(*before.dataset, before.model, id, own), own, say);
 }
 
-std::shared_ptr<Step> refitted(const Step& before, const regression::PipelineOptions& pipeline, const Progress& say) {
+std::shared_ptr<Step> refitted(const Step& before, const estimation::PipelineOptions& pipeline, const Progress& say) {
   return identified("identify", "", before.dataset, before.model, before.model_text, as_before(before, pipeline), say);
 }
 
 std::shared_ptr<Step> with_files(const Step& before, const std::filesystem::path& folder,
-                                 const regression::PipelineOptions& pipeline, const Progress& say) {
+                                 const estimation::PipelineOptions& pipeline, const Progress& say) {
   say("reading the files");
   const auto [all, names] = joined(*before.dataset, folder);
   auto step = identified("data", names, all, before.model, before.model_text,
@@ -160,11 +160,11 @@ std::shared_ptr<Step> with_files(const Step& before, const std::filesystem::path
 }
 
 std::shared_ptr<Step> made_again(const KeptStep& kept, const Step& before,
-                                 const regression::PipelineOptions& pipeline) {
+                                 const estimation::PipelineOptions& pipeline) {
   const Progress say = [](std::string_view) {};
   const model::Model model = model::parse(kept.model_text, "the model", catalogue::known_effects()).model;
   auto dataset = before.dataset;
-  regression::PipelineOptions own = as_before(before, pipeline);
+  estimation::PipelineOptions own = as_before(before, pipeline);
   if (!kept.files.empty()) {
     dataset = joined(*before.dataset, kept.files).first;
     own = with_records(dataset, model, pipeline, say);
@@ -180,7 +180,7 @@ std::string model_file(const Step& step) {
 }
 
 std::string report_page(const Step& step, const Step* before, const std::string& data_name,
-                        const regression::PipelineOptions& pipeline) {
+                        const estimation::PipelineOptions& pipeline) {
   report::Subject subject;
   subject.command = "workbench";
   subject.data_name = data_name;

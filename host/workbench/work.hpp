@@ -13,32 +13,32 @@ namespace flexspline::workbench {
 
 // The first step: the model as its file has it where it has all values, else identified. `text` is the file's.
 std::shared_ptr<Step> open(std::shared_ptr<const data::Dataset> dataset, const model::ModelFile& file,
-                           const regression::PipelineOptions& pipeline, const Progress& say);
+                           const estimation::PipelineOptions& pipeline, const Progress& say);
 
 // Steps from `before`; each throws what the function of the command throws.
 std::shared_ptr<Step> with_effect(const Step& before, const std::string& effect,
-                                  const regression::PipelineOptions& pipeline, const Progress& say);
+                                  const estimation::PipelineOptions& pipeline, const Progress& say);
 std::shared_ptr<Step> without_effect(const Step& before, const std::string& id,
-                                     const regression::PipelineOptions& pipeline, const Progress& say);
-std::shared_ptr<Step> refitted(const Step& before, const regression::PipelineOptions& pipeline, const Progress& say);
+                                     const estimation::PipelineOptions& pipeline, const Progress& say);
+std::shared_ptr<Step> refitted(const Step& before, const estimation::PipelineOptions& pipeline, const Progress& say);
 // `folder` holds nothing but the new files. They join the data; the model is identified anew.
 std::shared_ptr<Step> with_files(const Step& before, const std::filesystem::path& folder,
-                                 const regression::PipelineOptions& pipeline, const Progress& say);
+                                 const estimation::PipelineOptions& pipeline, const Progress& say);
 
 // A step that was there before, from what was kept of it; `before` is the one before it.
 struct KeptStep {
   std::string id, action, what, model_text;
   std::filesystem::path files;
-  std::vector<regression::Estimate> estimates;
+  std::vector<estimation::Estimate> estimates;
   std::vector<std::string> warnings;
 };
-std::shared_ptr<Step> made_again(const KeptStep& kept, const Step& before, const regression::PipelineOptions& pipeline);
+std::shared_ptr<Step> made_again(const KeptStep& kept, const Step& before, const estimation::PipelineOptions& pipeline);
 
 // A model as it is written into files.
 std::string model_file(const Step& step);
 // The report page of a step, with what it was before where there is a step before.
 std::string report_page(const Step& step, const Step* before, const std::string& data_name,
-                        const regression::PipelineOptions& pipeline);
+                        const estimation::PipelineOptions& pipeline);
 
 // "flexspline-pack/1" without the parts of the proof, and how many these are.
 nlohmann::json pack_json(const deployment::Packed& packed);

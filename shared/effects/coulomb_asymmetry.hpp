@@ -22,6 +22,8 @@ struct CoulombAsymmetry : Stateless {
           "at seals, brushes and an axial load on one side.",
       .rivals = "current_offset,torque_bias",
       .separated_by = "a record with the drive off, which shows an offset of the sensor alone",
+      .asymmetry_of = "coulomb_friction",
+      .direction_symbols = "Tsp,Tsn",
   };
   static constexpr ParameterInfo kParameters[] = {
       {.name = "torque", .unit = units::kTorque, .usual = 1e-3},

@@ -112,13 +112,21 @@ struct Description {
   // Laws of one curve that differ in its formula alone carry the same name here: most data cannot distinguish them.
   std::string_view family{};
   std::string_view contains{};  // effects whose torque it can draw as a part of its own
+  // Where all of its amplitudes come out negative: what that means, and what it means if that reaches over a wide range
+  // of velocity, as it is another law then.
+  std::string_view negative_means{};
+  std::string_view wide_negative_means{};
+  std::string_view wide_negative_is{};
+  // The friction of which it is half the difference between the directions, and the symbols of both: "Tvp,Tvn".
+  std::string_view asymmetry_of{};
+  std::string_view direction_symbols{};
   // A surface whose friction differs from run to run, as grease warms or settles: what carries the same name scales
   // together.
   std::string_view surface{};
-  // Other balances that it adds to (bits of `on`); its parameters are estimated on its own balance, or, where that
-  // tells nothing of them, on the motor balance.
+  // Other balances that it adds to (bits of `on`); its parameters are estimated on its own balance, or, where they are
+  // not identifiable on that, on the motor balance.
   unsigned adds_to = 0;
-  bool told_by_motor = false;
+  bool identified_on_motor = false;
   bool acts_last = false;  // a shift that acts on the signal as all others have left it
   bool host_only = false;  // too large for a drive
   // What it computes is stated in the model file beside its parameters, so that each one there is an effect of its own.

@@ -24,6 +24,11 @@ struct StribeckGaussian : Stateless {
       .rivals = "load_dependent_friction,power_law_friction",
       .separated_by = "a slow free triangle of velocity",
       .family = "stribeck",
+      .negative_means = "friction rises out of standstill, so that slow motion starts smoothly",
+      .wide_negative_means =
+          "this is sublinear friction, which grows ever more slowly with speed (see power_law_friction), and no "
+          "Stribeck friction",
+      .wide_negative_is = "power_law_friction",
   };
   static constexpr ParameterInfo kParameters[] = {
       {.name = "amplitude_positive", .unit = units::kTorque, .usual = 0.012},

@@ -21,6 +21,7 @@ struct StribeckHessSoom : Stateless {
       .rivals = "stribeck_gaussian,load_dependent_friction,power_law_friction",
       .separated_by = "a slow free triangle of velocity that reaches five times the Stribeck velocity",
       .family = "stribeck",
+      .negative_means = "friction rises out of standstill, so that slow motion starts smoothly",
   };
   static constexpr ParameterInfo kParameters[] = {
       {.name = "amplitude_positive", .unit = units::kTorque, .usual = 0.012},

@@ -21,7 +21,7 @@ struct TorqueSensorGain : Stateless {
       .rivals = "torque_constant_error,linear_stiffness",
       .separated_by = "a known weight on a known lever",
       .adds_to = on(Balance::motor) | on(Balance::load),
-      .told_by_motor = true,
+      .identified_on_motor = true,
   };
   static constexpr ParameterInfo kParameters[] = {
       {.name = "ratio", .unit = units::kNone, .kind = Kind::shape, .usual = 0.03, .low = -0.3, .high = 0.3},

@@ -20,6 +20,8 @@ struct ViscousAsymmetry : Stateless {
           "where the grease went.",
       .rivals = "coulomb_asymmetry",
       .separated_by = "both directions at two speeds that differ by a factor of five",
+      .asymmetry_of = "viscous_friction",
+      .direction_symbols = "Tvp,Tvn",
   };
   static constexpr ParameterInfo kParameters[] = {
       {.name = "coefficient", .unit = units::kViscous, .usual = 1e-5},

@@ -15,19 +15,19 @@
 #include <string>
 #include <vector>
 
-#include "host/diagnosis/candidates.hpp"
-#include "host/diagnosis/score.hpp"
-#include "host/regression/identify.hpp"
-#include "host/regression/shapes.hpp"
+#include "host/estimation/identify.hpp"
+#include "host/estimation/variable_projection.hpp"
+#include "host/selection/candidate_models.hpp"
+#include "host/selection/cross_validation.hpp"
 #include "tests/bench/rows.hpp"
 #include "tests/support/twin_data.hpp"
 
 namespace flexspline {
 namespace {
 
-using regression::Balance;
-using regression::BalanceData;
-using regression::Terms;
+using estimation::Balance;
+using estimation::BalanceData;
+using estimation::Terms;
 
 constexpr int kRuns = 7;
 constexpr std::size_t kGridPoints = 6;
@@ -66,7 +66,7 @@ data::Dataset measured(model::Model& model) {
 
 // What the script needs of the measurement; both sides begin here.
 void write(const std::filesystem::path& folder, const BalanceData& data, const std::vector<double>& grid) {
-  const regression::Prepared& p = data.prepared();
+  const estimation::Prepared& p = data.prepared();
   std::ofstream about(folder / "about.txt");
   about << fmt::format("{:.17g} {:.17g} {:.17g}\n", 1.0 / p.records[0].sample_s, p.pipeline.row_cutoff_hz,
                        p.constants.torque_constant);
@@ -74,7 +74,7 @@ void write(const std::filesystem::path& folder, const BalanceData& data, const s
   about << "\n";
   for (const Question& q : questions()) about << q.effect << " " << q.order.value_or(0.0) << "\n";
   for (std::size_t i = 0; i < data.records().size(); ++i) {
-    const regression::Record& r = p.records[data.records()[i].record];
+    const estimation::Record& r = p.records[data.records()[i].record];
     std::ofstream signals(folder / fmt::format("signals{}.bin", i), std::ios::binary);
     const auto put = [&](auto value) {
       for (std::size_t k = 0; k < r.inputs.size(); ++k) {
@@ -90,7 +90,7 @@ void write(const std::filesystem::path& folder, const BalanceData& data, const s
     put([&](std::size_t k) { return r.inputs[k].current; });
     put([&](std::size_t k) { return r.effort[k] - r.torque[k] / p.constants.gear_ratio; });
     std::ofstream rows(folder / fmt::format("rows{}.bin", i), std::ios::binary);
-    for (const std::size_t k : r.rows[regression::index(Balance::motor)].samples) {
+    for (const std::size_t k : r.rows[estimation::index(Balance::motor)].samples) {
       const auto at = static_cast<std::int64_t>(k);
       rows.write(reinterpret_cast<const char*>(&at), sizeof at);
     }
@@ -102,21 +102,21 @@ struct Answer {
   double shape = 0.0;                // chosen on the grid
 };
 
-Answer search(const regression::Prepared& prepared, const Terms& terms, const std::vector<double>& grid,
+Answer search(const estimation::Prepared& prepared, const Terms& terms, const std::vector<double>& grid,
               const std::vector<Question>& asked) {
   BalanceData data(prepared, Balance::motor);
   const Eigen::VectorXd keep = Eigen::VectorXd::Ones(data.rows());
-  const diagnosis::Judged base = diagnosis::judge(data, terms, keep);
+  const selection::CrossValidatedFit base = selection::cross_validate(data, terms, keep);
   Answer answer;
   for (const Question& q : asked) {
     const catalogue::Entry& entry = catalogue::get(q.effect);
-    Terms extended = diagnosis::extend(terms, entry, q.order);
+    Terms extended = selection::extend(terms, entry, q.order);
     if (entry.count(effects::Kind::shape) > 0) {
       double& shape = extended.back().values[entry.index_of("velocity")];
       double least = std::numeric_limits<double>::infinity();
       for (const double value : grid) {
         shape = value;
-        const double squares = diagnosis::squares_left(data, extended, base);
+        const double squares = selection::whitened_squares(data, extended, base);
         if (squares < least) {
           least = squares;
           answer.shape = value;
@@ -124,8 +124,8 @@ Answer search(const regression::Prepared& prepared, const Terms& terms, const st
       }
       shape = answer.shape;
     }
-    const diagnosis::Judged judged = diagnosis::judge(data, std::move(extended), keep);
-    answer.fall_percent.push_back(diagnosis::fall_of(base, judged, 1.0).chi2_percent);
+    const selection::CrossValidatedFit judged = selection::cross_validate(data, std::move(extended), keep);
+    answer.fall_percent.push_back(selection::likelihood_gain(base, judged, 1.0).chi2_percent);
   }
   return answer;
 }
@@ -133,12 +133,12 @@ Answer search(const regression::Prepared& prepared, const Terms& terms, const st
 int compare(const std::string& python, const std::string& script) {
   model::Model model;
   const data::Dataset dataset = measured(model);
-  const auto found = regression::identify(dataset, model, {});
+  const auto found = estimation::identify(dataset, model, {});
   const BalanceData& motor = found->data.front();
-  Terms candidate{regression::candidate_term(catalogue::get("stribeck_gaussian"))};
+  Terms candidate{estimation::candidate_term(catalogue::get("stribeck_gaussian"))};
   const std::size_t velocity = candidate[0].entry->index_of("velocity");
   const std::vector<double> grid =
-      regression::shape_grid(regression::shape_range(motor, candidate[0], velocity), kGridPoints);
+      estimation::shape_grid(estimation::shape_range(motor, candidate[0], velocity), kGridPoints);
 
   Answer ours;
   // Processor time: other work on the machine does not count.

@@ -21,13 +21,13 @@
 #include <vector>
 
 #include "host/catalogue/constants.hpp"
-#include "host/regression/identify.hpp"
+#include "host/estimation/identify.hpp"
 #include "tests/bench/rows.hpp"
 
 namespace flexspline {
 namespace {
 
-using regression::Balance;
+using estimation::Balance;
 
 constexpr double kSampleHz = 1000.0;
 constexpr double kCutoffHz = 30.0;
@@ -73,8 +73,8 @@ model::Model open_model() {
   return model;
 }
 
-regression::PipelineOptions options() {
-  regression::PipelineOptions options;
+estimation::PipelineOptions options() {
+  estimation::PipelineOptions options;
   options.cutoff_hz = kCutoffHz;
   options.mask = false;
   return options;
@@ -153,24 +153,24 @@ Figures library(const std::string& self, const std::filesystem::path& folder, in
   data::Dataset dataset;
   f.read_ms = median_ms(runs, [&] { dataset = data::load({file}); });
   const model::Model model = open_model();
-  std::unique_ptr<regression::Identification> found;
+  std::unique_ptr<estimation::Identification> found;
   f.identify_ms = median_ms(runs, [&] {
     found.reset();
-    found = regression::identify(dataset, model, options());
+    found = estimation::identify(dataset, model, options());
   });
   for (const double q : dataset.experiments[0][data::Column::motor_position]) {
     if (std::isnan(f.position_sum)) f.position_sum = 0.0;
     f.position_sum += std::abs(q);
   }
   for (const std::string& name : kEffects)
-    for (const regression::Estimate& e : found->estimates)
+    for (const estimation::Estimate& e : found->estimates)
       if (e.effect == name) f.values.push_back(e.value);
   // What a peer has to know of the recipe: its filter, the width of the sign, and which samples are rows.
-  const regression::Prepared& p = found->prepared;
-  const auto& rows = p.records[0].rows[regression::index(Balance::motor)].samples;
+  const estimation::Prepared& p = found->prepared;
+  const auto& rows = p.records[0].rows[estimation::index(Balance::motor)].samples;
   std::ofstream(folder / "about.txt") << fmt::format("{:.17g} {:.17g} {:.17g} {:.17g} {} {} {} {}\n", kSampleHz,
                                                      kCutoffHz, kTorqueConstant,
-                                                     p.records[0].velocity_noise[regression::index(Balance::motor)],
+                                                     p.records[0].velocity_noise[estimation::index(Balance::motor)],
                                                      rows.front(), p.records[0].decimation, rows.size(), runs);
   found.reset();
   dataset = {};
@@ -239,7 +239,7 @@ void growth_with_experiments() {
     }
     const data::Dataset dataset = data::load(files);
     const model::Model model = open_model();
-    ms[count] = median_ms(5, [&] { regression::identify(dataset, model, options()); });
+    ms[count] = median_ms(5, [&] { estimation::identify(dataset, model, options()); });
     fmt::print("{} experiments of 2e4 samples: identify {:.1f} ms\n", count, ms[count]);
   }
   std::filesystem::remove_all(folder);
@@ -254,7 +254,7 @@ int main(int argc, char** argv) {
   const std::string first = argc > 1 ? argv[1] : "";
   if (argc == 3 && (first == "read" || first == "identify")) {
     const data::Dataset dataset = data::load({argv[2]});
-    if (first == "identify") regression::identify(dataset, open_model(), options());
+    if (first == "identify") estimation::identify(dataset, open_model(), options());
     fmt::print("{:.0f}\n", peak_bytes());
     return 0;
   }

@@ -13,7 +13,7 @@
 #include <thread>
 
 #include "host/comparison/residual_map.hpp"
-#include "host/diagnosis/add.hpp"
+#include "host/selection/add.hpp"
 #include "tests/support/twin_data.hpp"
 
 namespace flexspline {
@@ -62,25 +62,25 @@ Outcome recover(const std::string& label, std::uint64_t seed) {
   const data::Dataset dataset = testing::dataset_of(demo.drive, records);
   const model::Model base = testing::model_of(demo.drive, false, false);
   const model::Model truth = testing::model_of(demo.drive, true, true);
-  const auto balance = catalogue::get(type).told_by();
+  const auto balance = catalogue::get(type).identified_on();
 
   std::vector<const data::Experiment*> fit, holdout;
   for (const auto& e : dataset.experiments) (e.role == data::Role::holdout ? holdout : fit).push_back(&e);
-  const regression::Prepared prepared = regression::prepare(fit, truth.drive, {});
-  const regression::Prepared judged = regression::prepare_with(holdout, truth.drive, prepared.pipeline);
-  regression::BalanceData on_holdout(judged, balance);
-  const double floor = root_mean_square(regression::residual_of(on_holdout, regression::terms_of(truth)));
+  const estimation::Prepared prepared = estimation::prepare(fit, truth.drive, {});
+  const estimation::Prepared judged = estimation::prepare_with(holdout, truth.drive, prepared.pipeline);
+  estimation::BalanceData on_holdout(judged, balance);
+  const double floor = root_mean_square(estimation::residual_of(on_holdout, estimation::terms_of(truth)));
 
-  const diagnosis::Addition added = diagnosis::add(dataset, base, label, {});
+  const selection::Addition added = selection::add(dataset, base, label, {});
   outcome.without_over_floor = *added.before.rmse_holdout / floor;
   outcome.with_over_floor = *added.after.rmse_holdout / floor;
   outcome.fit_share = added.after.rmse_fit / added.before.rmse_fit;
   const model::Effect* hidden = nullptr;
   for (const model::Effect& e : truth.effects)
-    if (regression::term_of(e).label() == label) hidden = &e;
+    if (estimation::term_of(e).label() == label) hidden = &e;
   if (!hidden) throw std::runtime_error("the truth lacks " + label);
   for (const auto& e : added.estimates) {
-    if (e.effect != type || regression::term_of(*added.model.find(e.id)).label() != label) continue;
+    if (e.effect != type || estimation::term_of(*added.model.find(e.id)).label() != label) continue;
     const model::Parameter* p = hidden->find(e.parameter);
     if (!p || !p->value) continue;
     const auto& infos = catalogue::get(type).parameters;
@@ -89,15 +89,15 @@ Outcome recover(const std::string& label, std::uint64_t seed) {
   }
   // An effect that took the place of another leaves a gap; the base model is then what comes back.
   if (catalogue::get(type).info->replaces.empty() && catalogue::get(type).info->contains.empty())
-    outcome.removed_over_floor = *diagnosis::remove(dataset, added.model, label, {}).after.rmse_holdout / floor;
+    outcome.removed_over_floor = *selection::remove(dataset, added.model, label, {}).after.rmse_holdout / floor;
   else
     outcome.removed_over_floor = outcome.without_over_floor;
 
-  const auto without = regression::identify(dataset, base, {});
+  const auto without = estimation::identify(dataset, base, {});
   for (std::size_t b = 0; b < without->data.size(); ++b)
     if (without->data[b].balance() == balance)
       for (const auto& share :
-           comparison::localise(without->data[b], regression::residual_of(without->data[b], without->terms),
+           comparison::localise(without->data[b], estimation::residual_of(without->data[b], without->terms),
                                 without->fits[b].autocorrelation_time))
         if (share.share_percent > 1.0) outcome.maps.push_back(share.variable);
   return outcome;

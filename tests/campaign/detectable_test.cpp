@@ -9,7 +9,7 @@
 #include <cstdlib>
 #include <thread>
 
-#include "host/diagnosis/diagnosis.hpp"
+#include "host/selection/diagnosis.hpp"
 #include "tests/support/campaign_size.hpp"
 #include "tests/support/twin_data.hpp"
 
@@ -22,19 +22,19 @@ std::uint64_t first_seed() {
   return tuning ? std::strtoull(tuning, nullptr, 10) : 7001;
 }
 
-diagnosis::Diagnosis diagnosed(const plant::PlantFile& demo, std::uint64_t seed) {
+selection::Diagnosis diagnosed(const plant::PlantFile& demo, std::uint64_t seed) {
   const data::Dataset dataset = testing::dataset_of(demo.drive, plant::record_all(demo.drive, demo.experiments, seed));
-  return diagnosis::diagnose(dataset, testing::model_of(demo.drive, false, false), {});
+  return selection::diagnose(dataset, testing::model_of(demo.drive, false, false), {});
 }
 
-const diagnosis::Candidate* candidate(const diagnosis::Diagnosis& d, const std::string& effect) {
-  for (const diagnosis::Candidate& c : d.candidates)
+const selection::Candidate* candidate(const selection::Diagnosis& d, const std::string& effect) {
+  for (const selection::Candidate& c : d.candidates)
     if (c.effect == effect && c.minimum_detectable) return &c;
   return nullptr;
 }
 
 // What the plant's parameters are to be multiplied by so that the effect has this size.
-double scale_to(const plant::Drive& drive, const std::string& label, const diagnosis::Detectable& wanted,
+double scale_to(const plant::Drive& drive, const std::string& label, const selection::Detectable& wanted,
                 double times) {
   for (const plant::Effect& e : drive.effects)
     if (e.label() == label) {
@@ -54,23 +54,23 @@ Shown shown(const std::string& label, std::uint64_t seed, int seeds) {
   const std::string type = label.substr(0, label.find(':'));
   plant::PlantFile without = plant::demo_plant();
   plant::without(without.drive, label);
-  const diagnosis::Diagnosis clean = diagnosed(without, seed);
-  const diagnosis::Candidate* c = candidate(clean, type);
+  const selection::Diagnosis clean = diagnosed(without, seed);
+  const selection::Candidate* c = candidate(clean, type);
   Shown result;
   if (!c) return result;
-  const diagnosis::Detectable& least = *c->minimum_detectable;
+  const selection::Detectable& least = *c->minimum_detectable;
   result.text = fmt::format("{} {:.4g} {}", least.size.parameter, least.size.value, least.size.unit);
   for (int s = 0; s < seeds; ++s)
     for (const double times : {1.5, 1.0 / 3.0}) {
       plant::PlantFile hidden = plant::demo_plant();
       for (plant::Effect& e : hidden.drive.effects)
         if (e.label() == label)
-          for (const regression::Estimate& shape : least.at) e.parameter(shape.parameter).value = shape.value;
+          for (const estimation::Estimate& shape : least.at) e.parameter(shape.parameter).value = shape.value;
       plant::hide(hidden.drive, label, scale_to(hidden.drive, label, least, times));
-      const diagnosis::Diagnosis d = diagnosed(hidden, seed + 1 + static_cast<std::uint64_t>(s));
+      const selection::Diagnosis d = diagnosed(hidden, seed + 1 + static_cast<std::uint64_t>(s));
       bool named = false;
       // Near the limit the data may not tell it from what it is known to be confused with.
-      for (const diagnosis::Named& n : d.named)
+      for (const selection::Named& n : d.named)
         named = named || n.effect == type || catalogue::names_contain(catalogue::get(type).info->rivals, n.effect);
       (times > 1.0 ? result.large : result.small) += named;
       result.text += fmt::format(" | {:.2f}: {}", times, d.named.empty() ? "-" : d.named.front().effect);
@@ -80,7 +80,7 @@ Shown shown(const std::string& label, std::uint64_t seed, int seeds) {
 }
 
 // Effects of temperature are not judged: between records they look like friction that differs from run to run, which
-// takes them up, and the size that is said for them does not count with that (host/diagnosis/README.md).
+// takes them up, and the size that is said for them does not count with that (host/selection/METHOD.md).
 TEST(Detectable, EffectsHalfAsLargeAgainAreNamedAndAThirdOfThemAreNot) {
   const std::vector<std::string> labels =
       testing::part_of({"viscous_asymmetry", "coulomb_asymmetry", "stribeck_gaussian", "load_dependent_friction",

@@ -6,10 +6,10 @@
 #include <functional>
 #include <random>
 
-#include "host/diagnosis/add.hpp"
-#include "host/diagnosis/complete.hpp"
+#include "host/selection/add.hpp"
+#include "host/selection/add_until_complete.hpp"
 
-namespace flexspline::diagnosis {
+namespace flexspline::selection {
 namespace {
 
 using data::Column;
@@ -126,4 +126,4 @@ TEST(Needless, IsTheEffectThatTheDataDoNotShow) {
 }
 
 }  // namespace
-}  // namespace flexspline::diagnosis
+}  // namespace flexspline::selection

@@ -7,23 +7,23 @@
 #include <functional>
 #include <random>
 
-#include "host/diagnosis/candidates.hpp"
-#include "host/diagnosis/diagnosis.hpp"
-#include "host/diagnosis/disturbances.hpp"
-#include "host/diagnosis/score.hpp"
-#include "host/regression/shapes.hpp"
+#include "host/estimation/variable_projection.hpp"
+#include "host/selection/candidate_models.hpp"
+#include "host/selection/cross_validation.hpp"
+#include "host/selection/diagnosis.hpp"
+#include "host/selection/disturbances.hpp"
 #include "tests/support/plain_model.hpp"
 
-namespace flexspline::diagnosis {
+namespace flexspline::selection {
 namespace {
 
 using data::Column;
-using regression::Balance;
+using estimation::Balance;
 using testing::plain_model;
 
 constexpr double kPi = 3.14159265358979323846;
 constexpr double kInertia = 1e-3, kViscous = 4e-3, kCoulomb = 0.05;
-const regression::PipelineOptions kOptions{40.0, true};
+const estimation::PipelineOptions kOptions{40.0, true};
 
 struct Recipe {
   double phase = 0.0;
@@ -68,82 +68,87 @@ data::Experiment experiment(const Recipe& recipe) {
 // One record with what a search keeps of it.
 struct Bench {
   data::Experiment record;
-  regression::Prepared prepared;
+  estimation::Prepared prepared;
   BalanceData data;
   Eigen::VectorXd keep;
-  Terms terms = regression::terms_of(plain_model());
-  Judged base;
+  Terms terms = estimation::terms_of(plain_model());
+  CrossValidatedFit base;
 
   explicit Bench(const Recipe& recipe)
       : record(experiment(recipe)),
-        prepared(regression::prepare({&record}, {}, kOptions)),
+        prepared(estimation::prepare({&record}, {}, kOptions)),
         data(prepared, Balance::motor),
         keep(Eigen::VectorXd::Ones(data.rows())),
-        base(judge(data, terms, keep)) {}
+        base(cross_validate(data, terms, keep)) {}
 
-  Fall with(std::string_view effect, std::optional<double> order, double added) {
-    return fall_of(base, judge(data, extend(terms, catalogue::get(effect), order), keep), added);
+  LikelihoodGain with(std::string_view effect, std::optional<double> order, double added) {
+    return likelihood_gain(base, cross_validate(data, extend(terms, catalogue::get(effect), order), keep), added);
   }
   double effective_rows() const { return static_cast<double>(data.rows()) / base.autocorrelation_time; }
 };
 
-// A judgement of records with these squares of left-out rows.
-Judged judged(std::vector<double> squares, std::vector<double> rows, double tau) {
-  Judged j;
+// A cross-validated fit of records with these squares of left-out rows.
+CrossValidatedFit cross_validated(std::vector<double> squares, std::vector<double> rows, double tau) {
+  CrossValidatedFit j;
   for (std::size_t i = 0; i < rows.size(); ++i) j.left_out.push_back({rows[i], squares[i]});
   j.autocorrelation_time = tau;
   return j;
 }
 
-TEST(FallOf, IsTheLogLikelihoodOverTheAutocorrelationTimeLessThePenalty) {
-  const Fall fall = fall_of(judged({200.0}, {100.0}, 4.0), judged({100.0}, {100.0}, 2.0), 2.0);
+TEST(LikelihoodGainOf, IsTheLogLikelihoodOverTheAutocorrelationTimeLessThePenalty) {
+  const LikelihoodGain gain =
+      likelihood_gain(cross_validated({200.0}, {100.0}, 4.0), cross_validated({100.0}, {100.0}, 2.0), 2.0);
   // The extended model's autocorrelation time; the base's would count what is missing as colour.
   const double ratio = 100.0 * std::log(2.0) / 2.0;
-  EXPECT_NEAR(fall.score, ratio - 2.0 * std::log(50.0), 1e-9);
-  EXPECT_NEAR(fall.chi2_percent, 50.0, 1e-9);
-  EXPECT_NEAR(fall.p_value, std::exp(-0.5 * ratio), 1e-20) << "chi-square of two degrees of freedom";
-  EXPECT_NEAR(fall_of(judged({200.0}, {100.0}, 2.0), judged({100.0}, {100.0}, 9.0), 2.0).score, fall.score, 1e-9)
+  EXPECT_NEAR(gain.score, ratio - 2.0 * std::log(50.0), 1e-9);
+  EXPECT_NEAR(gain.chi2_percent, 50.0, 1e-9);
+  EXPECT_NEAR(gain.p_value, std::exp(-0.5 * ratio), 1e-20) << "chi-square of two degrees of freedom";
+  EXPECT_NEAR(
+      likelihood_gain(cross_validated({200.0}, {100.0}, 2.0), cross_validated({100.0}, {100.0}, 9.0), 2.0).score,
+      gain.score, 1e-9)
       << "capped by the base's";
 }
 
-TEST(FallOf, OneParameterHasTheTailOfOneDegreeOfFreedom) {
-  const Fall fall = fall_of(judged({110.0}, {100.0}, 1.0), judged({100.0}, {100.0}, 1.0), 1.0);
-  EXPECT_NEAR(fall.p_value, std::erfc(std::sqrt(0.5 * 100.0 * std::log(1.1))), 1e-12);
+TEST(LikelihoodGainOf, OneParameterHasTheTailOfOneDegreeOfFreedom) {
+  const LikelihoodGain gain =
+      likelihood_gain(cross_validated({110.0}, {100.0}, 1.0), cross_validated({100.0}, {100.0}, 1.0), 1.0);
+  EXPECT_NEAR(gain.p_value, std::erfc(std::sqrt(0.5 * 100.0 * std::log(1.1))), 1e-12);
 }
 
-TEST(FallOf, ARecordThatGotWorseCountsAgainst) {
-  const Judged base = judged({100.0, 100.0}, {100.0, 100.0}, 1.0);
-  const Fall mixed = fall_of(base, judged({50.0, 200.0}, {100.0, 100.0}, 1.0), 0.0);
+TEST(LikelihoodGainOf, ARecordThatGotWorseCountsAgainst) {
+  const CrossValidatedFit base = cross_validated({100.0, 100.0}, {100.0, 100.0}, 1.0);
+  const LikelihoodGain mixed = likelihood_gain(base, cross_validated({50.0, 200.0}, {100.0, 100.0}, 1.0), 0.0);
   EXPECT_NEAR(mixed.score, 0.0, 1e-9) << "half the noise here, twice the noise there";
-  const Fall worse = fall_of(base, judged({100.0, 120.0}, {100.0, 100.0}, 1.0), 0.0);
+  const LikelihoodGain worse = likelihood_gain(base, cross_validated({100.0, 120.0}, {100.0, 100.0}, 1.0), 0.0);
   EXPECT_NEAR(worse.score, -100.0 * std::log(1.2), 1e-9);
   EXPECT_LT(worse.chi2_percent, 0.0);
   EXPECT_EQ(worse.p_value, 1.0);
 }
 
-TEST(FallOf, ANearlySilentRecordDoesNotRule) {
+TEST(LikelihoodGainOf, ANearlySilentRecordDoesNotRule) {
   // Its noise falls by a factor 1e6, from a hundredth of the median's variance at most.
-  const Judged base = judged({100.0, 100.0, 1e-3}, {100.0, 100.0, 100.0}, 1.0);
-  EXPECT_NEAR(fall_of(base, judged({100.0, 100.0, 1e-9}, {100.0, 100.0, 100.0}, 1.0), 0.0).score, 0.0, 1e-9);
+  const CrossValidatedFit base = cross_validated({100.0, 100.0, 1e-3}, {100.0, 100.0, 100.0}, 1.0);
+  EXPECT_NEAR(likelihood_gain(base, cross_validated({100.0, 100.0, 1e-9}, {100.0, 100.0, 100.0}, 1.0), 0.0).score, 0.0,
+              1e-9);
 }
 
-TEST(FallOf, AUselessColumnGainsNothingOnAverage) {
+TEST(LikelihoodGainOf, AUselessColumnGainsNothingOnAverage) {
   double percent = 0.0, ratio = 0.0, highest = -1e9;
   constexpr int kSeeds = 30;
   for (unsigned seed = 1; seed <= kSeeds; ++seed) {
     Bench bench({.seed = seed});
-    const Fall fall = bench.with("torque_ripple", 7.0, 2.0);
-    percent += fall.chi2_percent / kSeeds;
+    const LikelihoodGain gain = bench.with("torque_ripple", 7.0, 2.0);
+    percent += gain.chi2_percent / kSeeds;
     // Without the penalty: each needless parameter costs left-out rows somewhat more than one.
-    ratio += (fall.score + 2.0 * std::log(bench.effective_rows())) / kSeeds;
-    highest = std::max(highest, fall.score);
+    ratio += (gain.score + 2.0 * std::log(bench.effective_rows())) / kSeeds;
+    highest = std::max(highest, gain.score);
   }
   EXPECT_NEAR(ratio, -2.5, 2.5);
   EXPECT_NEAR(percent, -1.0, 1.0);
   EXPECT_LT(highest, 0.0);
 }
 
-TEST(FallOf, ATrueColumnGainsInProportionToTheLengthOfTheRecord) {
+TEST(LikelihoodGainOf, ATrueColumnGainsInProportionToTheLengthOfTheRecord) {
   const auto gain = [](double seconds) {
     double sum = 0.0;
     for (unsigned seed = 1; seed <= 8; ++seed) {
@@ -159,11 +164,11 @@ TEST(FallOf, ATrueColumnGainsInProportionToTheLengthOfTheRecord) {
   EXPECT_NEAR(twice / once, 2.0, 0.4);
 }
 
-TEST(Judge, PredictsEachFifthAsAFitOfTheOthersDoes) {
+TEST(CrossValidate, PredictsEachFifthAsAFitOfTheOthersDoes) {
   const Bench bench({.extra = [](double, double q, double) { return 1e-3 * std::cos(3.0 * q); }});
   BalanceData data = bench.data;
   Eigen::MatrixXd X(data.rows(), 4);
-  X << regression::columns_of(data, bench.terms, bench.base.linear), data.delay_column();
+  X << estimation::columns_of(data, bench.terms, bench.base.linear), data.delay_column();
   using Exact = Eigen::Matrix<long double, Eigen::Dynamic, Eigen::Dynamic>;
   double squares = 0.0;
   for (const auto& fold : data.folds(5)) {
@@ -182,7 +187,7 @@ TEST(Judge, PredictsEachFifthAsAFitOfTheOthersDoes) {
   EXPECT_GT(bench.base.rmse_cv(), bench.base.rmse());
 }
 
-TEST(Judge, ADelayOfTheEffortIsANuisanceThatBiasesNothing) {
+TEST(CrossValidate, ADelayOfTheEffortIsANuisanceThatBiasesNothing) {
   for (const double late_s : {0.4e-3, -0.4e-3}) {
     const Bench bench({.noise = 1e-4, .late_s = late_s});
     EXPECT_NEAR(bench.base.theta[3], late_s, 0.2e-4);
@@ -192,7 +197,7 @@ TEST(Judge, ADelayOfTheEffortIsANuisanceThatBiasesNothing) {
   }
 }
 
-TEST(Judge, RowsThatDoNotCountMoveNothing) {
+TEST(CrossValidate, RowsThatDoNotCountMoveNothing) {
   Bench bench({});
   const Bench pushed({.extra = [](double t, double, double) { return t > 2.0 && t < 2.5 ? 1.0 : 0.0; }});
   BalanceData data = pushed.data;
@@ -201,7 +206,8 @@ TEST(Judge, RowsThatDoNotCountMoveNothing) {
     const double t = 1e-3 * static_cast<double>(data.sample_of(data.records()[0], row));
     if (t > 1.8 && t < 2.7) keep[row] = 0.0;
   }
-  const Judged with = judge(data, bench.terms, keep), without = judge(bench.data, bench.terms, keep);
+  const CrossValidatedFit with = cross_validate(data, bench.terms, keep),
+                          without = cross_validate(bench.data, bench.terms, keep);
   for (Eigen::Index j = 0; j < 3; ++j) EXPECT_NEAR(with.theta[j] / without.theta[j], 1.0, 1e-3) << j;
   EXPECT_NEAR(with.rmse_cv() / without.rmse_cv(), 1.0, 1e-2);
   EXPECT_EQ(with.left_out[0].rows, (keep.array() > 0.0).count());
@@ -315,4 +321,4 @@ TEST(Diagnose, APushIsListedWithItsUnitAndNamesNothing) {
 }
 
 }  // namespace
-}  // namespace flexspline::diagnosis
+}  // namespace flexspline::selection

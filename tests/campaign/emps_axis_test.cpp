@@ -8,8 +8,8 @@
 #include <filesystem>
 #include <fstream>
 
-#include "host/diagnosis/add.hpp"
-#include "host/diagnosis/diagnosis.hpp"
+#include "host/selection/add.hpp"
+#include "host/selection/diagnosis.hpp"
 
 namespace flexspline {
 namespace {
@@ -68,7 +68,7 @@ role = "holdout"
   model::Model model_;
 };
 
-const regression::Estimate& estimate(const regression::Identification& found, std::string_view effect) {
+const estimation::Estimate& estimate(const estimation::Identification& found, std::string_view effect) {
   return *std::find_if(found.estimates.begin(), found.estimates.end(),
                        [&](const auto& e) { return e.effect == effect; });
 }
@@ -80,7 +80,7 @@ double value(const model::Model& model, std::string_view effect, std::string_vie
 TEST_F(EmpsAxis, PublishedParametersComeOutWithThePublishedPipeline) {
   const data::Dataset data = dataset(
       "emps_train.csv", "[[experiment]]\nfile = \"emps_train.csv\"\nname = \"train\"\ncurrent_hold = \"none\"\n");
-  const auto found = regression::identify(data, model_, {.cutoff_hz = 100.0, .mask = false});
+  const auto found = estimation::identify(data, model_, {.cutoff_hz = 100.0, .mask = false});
   EXPECT_NEAR(estimate(*found, "inertia").value, 95.1089, 0.006 * 95.1089);
   EXPECT_NEAR(estimate(*found, "viscous_friction").value, 203.5034, 0.006 * 203.5034);
   EXPECT_NEAR(estimate(*found, "coulomb_friction").value, 20.3935, 0.006 * 20.3935);
@@ -93,7 +93,7 @@ TEST_F(EmpsAxis, PublishedParametersComeOutWithThePublishedPipeline) {
 }
 
 TEST_F(EmpsAxis, DirectionDependenceIsNamedFirstAndStribeckIsNot) {
-  const diagnosis::Diagnosis d = diagnosis::diagnose(halves(), model_, {});
+  const selection::Diagnosis d = selection::diagnose(halves(), model_, {});
   ASSERT_EQ(d.named.size(), 1u);
   EXPECT_EQ(d.named.front().effect, "viscous_asymmetry");
   EXPECT_EQ(d.noise_floor_from, "periods");
@@ -109,7 +109,7 @@ TEST_F(EmpsAxis, DirectionDependenceIsNamedFirstAndStribeckIsNot) {
 
 TEST_F(EmpsAxis, AddingItTakesTheHeldOutErrorDownByAFifthAndKeepsTheModelSensible) {
   const data::Dataset data = halves();
-  const diagnosis::Addition added = diagnosis::add(data, model_, "viscous_asymmetry", {});
+  const selection::Addition added = selection::add(data, model_, "viscous_asymmetry", {});
   fmt::print("held-out error {:.3f} N to {:.3f} N, noise {:.3f} N ({})\n", *added.before.rmse_holdout,
              *added.after.rmse_holdout, added.noise_floor.value_or(0.0), added.noise_floor_from);
   EXPECT_LT(*added.after.rmse_holdout, 0.8 * *added.before.rmse_holdout);
@@ -119,16 +119,16 @@ TEST_F(EmpsAxis, AddingItTakesTheHeldOutErrorDownByAFifthAndKeepsTheModelSensibl
   EXPECT_NEAR(value(added.model, "coulomb_friction", "torque"), 20.4, 1.5);
   EXPECT_LT(std::abs(value(added.model, "torque_bias", "torque")), 5.0);
 
-  const diagnosis::Diagnosis second = diagnosis::diagnose(data, added.model, {});
+  const selection::Diagnosis second = selection::diagnose(data, added.model, {});
   const bool sublinear = std::any_of(second.named.begin(), second.named.end(),
                                      [](const auto& n) { return n.effect == "power_law_friction"; });
-  EXPECT_TRUE(sublinear || !second.remaining_structure.empty()) << diagnosis::verdict_name(second.verdict);
+  EXPECT_TRUE(sublinear || !second.remaining_structure.empty()) << selection::verdict_name(second.verdict);
 }
 
 TEST_F(EmpsAxis, ForcePulsesAreDisturbancesAndNoFriction) {
   const data::Dataset data =
       dataset("emps_test_pulses.csv", "[[experiment]]\nfile = \"emps_test_pulses.csv\"\nname = \"pulses\"\n");
-  const diagnosis::Diagnosis d = diagnosis::diagnose(data, model_, {});
+  const selection::Diagnosis d = selection::diagnose(data, model_, {});
   // Sublinear friction is the other structure of this axis (tests/real_joints/expected.json).
   ASSERT_FALSE(d.named.empty());
   EXPECT_EQ(d.named.front().effect, "viscous_asymmetry");
@@ -136,7 +136,7 @@ TEST_F(EmpsAxis, ForcePulsesAreDisturbancesAndNoFriction) {
     EXPECT_TRUE(n.effect == "viscous_asymmetry" || n.effect == "power_law_friction") << n.effect;
   ASSERT_GE(d.disturbances.size(), 5u);
   // The force steps every half second, first at 0.344 s; the tool does not know that.
-  for (const diagnosis::Disturbance& x : d.disturbances) {
+  for (const selection::Disturbance& x : d.disturbances) {
     const double middle = 0.5 * (x.from_s + x.to_s);
     const double from_edge = std::abs(std::remainder(middle - 0.344, 0.5));
     EXPECT_LT(from_edge, 0.04) << "at " << middle << " s";

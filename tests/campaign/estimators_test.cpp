@@ -6,7 +6,7 @@
 #include <map>
 
 #include "host/estimation/estimate.hpp"
-#include "host/regression/in_parallel.hpp"
+#include "host/estimation/in_parallel.hpp"
 #include "tests/support/noisy_motor.hpp"
 
 namespace flexspline::testing {
@@ -21,7 +21,7 @@ struct Found {
 };
 
 std::map<std::string, Found> fit(const NoisyMotor& motor, Method method, std::uint64_t seed,
-                                 const regression::PipelineOptions& pipeline) {
+                                 const estimation::PipelineOptions& pipeline) {
   data::Dataset dataset;
   dataset.experiments.push_back(noisy_motion(motor, 1.6, 0.7, seed));
   dataset.experiments.push_back(noisy_motion(motor, 2.4, 1.9, seed + 100'000));
@@ -29,7 +29,7 @@ std::map<std::string, Found> fit(const NoisyMotor& motor, Method method, std::ui
   how.method = method;
   const auto found = estimation::estimate(dataset, motor_model(motor), pipeline, how);
   std::map<std::string, Found> result;
-  for (const regression::Estimate& e : found->estimates)
+  for (const estimation::Estimate& e : found->estimates)
     result[e.effect] = {e.value, e.std.value_or(NAN), e.low.value_or(NAN), e.high.value_or(NAN)};
   return result;
 }
@@ -41,9 +41,9 @@ struct Summary {
 };
 
 std::map<std::string, Summary> over_seeds(const NoisyMotor& motor, Method method, int seeds,
-                                          const regression::PipelineOptions& pipeline) {
+                                          const estimation::PipelineOptions& pipeline) {
   std::vector<std::map<std::string, Found>> all(static_cast<std::size_t>(seeds));
-  regression::in_parallel(all.size(), [&](std::size_t s) { all[s] = fit(motor, method, 7001 + s, pipeline); });
+  estimation::in_parallel(all.size(), [&](std::size_t s) { all[s] = fit(motor, method, 7001 + s, pipeline); });
   const std::map<std::string, double> truth = {
       {"inertia", motor.inertia}, {"viscous_friction", motor.viscous}, {"coulomb_friction", motor.coulomb}};
   std::map<std::string, Summary> result;
@@ -71,7 +71,7 @@ std::map<std::string, Summary> over_seeds(const NoisyMotor& motor, Method method
 TEST(Estimators, InstrumentsAndOutputErrorHaveLessThanAThirdOfTheBiasOfLeastSquares) {
   NoisyMotor motor;
   for (const double cutoff_hz : {50.0, 100.0}) {
-    regression::PipelineOptions wide;
+    estimation::PipelineOptions wide;
     wide.cutoff_hz = cutoff_hz;
     std::printf("2 %% noise on the velocity, filters at %g Hz\n", cutoff_hz);
     const auto ls = over_seeds(motor, Method::ls, 30, wide);

@@ -9,7 +9,7 @@
 #include <cstdio>
 #include <string>
 
-#include "host/diagnosis/add.hpp"
+#include "host/selection/add.hpp"
 #include "tests/support/hidden_twin.hpp"
 
 namespace flexspline {
@@ -24,13 +24,13 @@ constexpr double kVariation = 0.03;
 // height.
 double worst_error(const std::string& hidden, double scale, std::uint64_t seed) {
   const HiddenTwin drive(hidden, scale, seed, kVariation);
-  const diagnosis::Addition added = diagnosis::add(drive.dataset, drive.base, hidden, {});
+  const selection::Addition added = selection::add(drive.dataset, drive.base, hidden, {});
   const plant::Effect* truth = &drive.truth();
   double height = 0.0;
   for (const plant::Parameter& p : truth->parameters)
     if (p.key == "cosine" || p.key == "sine") height = std::hypot(height, p.value);
   double worst = 0.0;
-  for (const regression::Estimate& e : added.estimates) {
+  for (const estimation::Estimate& e : added.estimates) {
     if (e.id != added.model.effects.back().id || e.fixed || !truth->has(e.parameter)) continue;
     const double is = truth->value(e.parameter), error = (e.value - is) / (height > 0.0 ? height : std::abs(is));
     std::printf("%s x %g seed %llu: %s off by %.2f %%\n", hidden.c_str(), scale, static_cast<unsigned long long>(seed),
@@ -56,11 +56,11 @@ INSTANTIATE_TEST_SUITE_P(Effects, FrictionDiffers,
 
 TEST(FrictionThatDiffers, DoesNotHideWhatIsMissingFromTheErrorAndItsMap) {
   // With friction of each run its own the error would be a fifth.
-  const diagnosis::Diagnosis found = HiddenTwin("stribeck_gaussian", 1.0, 8202, 0.0).diagnose();
+  const selection::Diagnosis found = HiddenTwin("stribeck_gaussian", 1.0, 8202, 0.0).diagnose();
   ASSERT_EQ(names(found), "stribeck_gaussian");
   EXPECT_GT(found.base_rmse, 15.0 * *found.noise_floor);
   EXPECT_LT(found.base_rmse_own_friction, 0.5 * found.base_rmse);
-  const diagnosis::Candidate& first = found.candidates.front();
+  const selection::Candidate& first = found.candidates.front();
   EXPECT_GT(first.rmse_cv_before, 15.0 * first.rmse_cv_after);
   ASSERT_TRUE(first.evidence.has_value());
   EXPECT_EQ(first.evidence->variable, "speed");
@@ -74,9 +74,9 @@ TEST(FrictionThatDiffers, DoesNotHideWhatIsMissingFromTheErrorAndItsMap) {
 
 TEST(FrictionThatDiffers, IsNoWorseBesideAnEffectThatIsNotThere) {
   // An effect that the model does not have leaves at least as good a fit; its one or two numbers cost some.
-  const diagnosis::Diagnosis found = HiddenTwin("stribeck_gaussian", 1.0, 8203, 0.0).diagnose();
+  const selection::Diagnosis found = HiddenTwin("stribeck_gaussian", 1.0, 8203, 0.0).diagnose();
   for (const char* name : {"load_dependent_friction", "quadratic_drag", "torque_constant_saturation"})
-    for (const diagnosis::Candidate& c : found.candidates)
+    for (const selection::Candidate& c : found.candidates)
       if (c.effect == name) {
         EXPECT_GT(c.score, -30.0) << name;
       }
@@ -92,8 +92,8 @@ TEST(FrictionThatDiffers, LeavesAKinematicErrorOnBothBalances) {
     const HiddenTwin drive("kinematic_error", 0.1, seed, kVariation);
     // The locked flexspline sees a constant; what the motor feels is a few parts in ten of its noise.
     EXPECT_NE(names(drive.diagnose()).find("kinematic_error"), std::string::npos) << seed;
-    const diagnosis::Addition added = diagnosis::add(drive.dataset, drive.base, "kinematic_error:2", {});
-    for (const regression::Estimate& e : added.estimates) {
+    const selection::Addition added = selection::add(drive.dataset, drive.base, "kinematic_error:2", {});
+    for (const estimation::Estimate& e : added.estimates) {
       if (e.effect != "kinematic_error" || e.fixed) continue;
       std::printf("%s %.3g, standard error %.2g rad\n", e.parameter.c_str(), e.value, e.std.value_or(-1.0));
       ASSERT_TRUE(e.std.has_value());

@@ -10,8 +10,8 @@
 #include <mutex>
 #include <thread>
 
-#include "host/diagnosis/add.hpp"
-#include "host/diagnosis/diagnosis.hpp"
+#include "host/selection/add.hpp"
+#include "host/selection/diagnosis.hpp"
 #include "tests/support/campaign_size.hpp"
 #include "tests/support/campaign_statistics.hpp"
 #include "tests/support/twin_data.hpp"
@@ -57,8 +57,8 @@ Outcome run(const Case& c) {
   const auto records = plant::record_all(demo.drive, demo.experiments, c.seed);
   const data::Dataset dataset = testing::dataset_of(demo.drive, records);
   const model::Model base = testing::model_of(demo.drive, false, false);
-  const diagnosis::Diagnosis d = diagnosis::diagnose(dataset, base, {});
-  outcome.verdict = diagnosis::verdict_name(d.verdict);
+  const selection::Diagnosis d = selection::diagnose(dataset, base, {});
+  outcome.verdict = selection::verdict_name(d.verdict);
   for (const auto& n : d.named) outcome.named += (outcome.named.empty() ? "" : "+") + label(n.effect, n.order);
   if (d.named.empty()) outcome.named = "-";
   for (std::size_t i = 0; i < std::min<std::size_t>(4, d.candidates.size()); ++i)
@@ -72,14 +72,14 @@ Outcome run(const Case& c) {
   const std::string truth = c.hidden == "torque_ripple" ? "torque_ripple:2" : c.hidden;
   outcome.right = outcome.named == truth;
   // The floor: the residual of the true model with its true parameters, through the same pipeline.
-  const diagnosis::Addition added = diagnosis::add(dataset, base, truth, {});
+  const selection::Addition added = selection::add(dataset, base, truth, {});
   const model::Model true_model = testing::model_of(demo.drive, true, true);
   std::vector<const data::Experiment*> fit, holdout;
   for (const auto& e : dataset.experiments) (e.role == data::Role::holdout ? holdout : fit).push_back(&e);
-  const regression::Prepared prepared = regression::prepare(fit, true_model.drive, {});
-  const regression::Prepared judged = regression::prepare_with(holdout, true_model.drive, prepared.pipeline);
-  regression::BalanceData data(judged, catalogue::get(truth.substr(0, truth.find(':'))).info->balance);
-  const Eigen::VectorXd r = regression::residual_of(data, regression::terms_of(true_model));
+  const estimation::Prepared prepared = estimation::prepare(fit, true_model.drive, {});
+  const estimation::Prepared judged = estimation::prepare_with(holdout, true_model.drive, prepared.pipeline);
+  estimation::BalanceData data(judged, catalogue::get(truth.substr(0, truth.find(':'))).info->balance);
+  const Eigen::VectorXd r = estimation::residual_of(data, estimation::terms_of(true_model));
   const double floor = std::sqrt(r.squaredNorm() / static_cast<double>(r.size()));
   outcome.holdout_over_floor = *added.after.rmse_holdout / floor;
   outcome.before_over_floor = *added.before.rmse_holdout / floor;

@@ -14,7 +14,7 @@
 
 #include "host/catalogue/constants.hpp"
 #include "host/data/findings.hpp"
-#include "host/diagnosis/diagnosis.hpp"
+#include "host/selection/diagnosis.hpp"
 
 namespace flexspline {
 namespace {
@@ -125,8 +125,8 @@ TEST_F(HonestData, TimeStampsThatJitterAreSaidAndResampled) {
   // The same as from a logger with an even clock of that rate.
   std::vector<Row> even;
   for (double time = rows_.front().time; time < rows_.back().time - 0.02; time += 0.011) even.push_back(at(time));
-  const auto from_jittered = regression::identify(loaded, base(true), {});
-  const auto from_even = regression::identify(load(even), base(true), {});
+  const auto from_jittered = estimation::identify(loaded, base(true), {});
+  const auto from_even = estimation::identify(load(even), base(true), {});
   for (std::size_t i = 0; i < from_even->estimates.size(); ++i) {
     const double expected = from_even->estimates[i].value;
     EXPECT_NEAR(from_jittered->estimates[i].value, expected, 0.05 * std::abs(expected)) << from_even->estimates[i].id;
@@ -164,11 +164,11 @@ TEST_F(HonestData, MotionInOneDirectionShowsNoAsymmetryAndSaysSo) {
   }
   ASSERT_GT(forward.size(), 3000u);
   const data::Dataset loaded = load(forward);
-  const diagnosis::Diagnosis d = diagnosis::diagnose(loaded, base(false), {});
+  const selection::Diagnosis d = selection::diagnose(loaded, base(false), {});
   bool said = false;
   for (const std::string& warning : d.warnings) said = said || warning.find("moves forward in") != std::string::npos;
   EXPECT_TRUE(said);
-  for (const diagnosis::Named& n : d.named) {
+  for (const selection::Named& n : d.named) {
     EXPECT_NE(n.effect, "coulomb_asymmetry");
     EXPECT_NE(n.effect, "viscous_asymmetry");
     EXPECT_NE(n.effect, "torque_bias");
@@ -179,8 +179,8 @@ TEST_F(HonestData, CoarsePositionsLeaveTheParametersAndNameNothingElse) {
   // A linear scale of 10 micrometres. Its steps hide slow motion, and the friction of the axis is curved.
   std::vector<Row> coarse = rows_;
   for (Row& r : coarse) r.position = std::floor(r.position / 10e-6 + 0.5) * 10e-6;
-  const auto fine_fit = regression::identify(load(rows_), base(true), {});
-  const auto coarse_fit = regression::identify(load(coarse), base(true), {});
+  const auto fine_fit = estimation::identify(load(rows_), base(true), {});
+  const auto coarse_fit = estimation::identify(load(coarse), base(true), {});
   for (std::size_t i = 0; i < fine_fit->estimates.size(); ++i) {
     const double fine = fine_fit->estimates[i].value;
     EXPECT_NEAR(coarse_fit->estimates[i].value, fine, 0.08 * std::abs(fine)) << fine_fit->estimates[i].id;
@@ -193,8 +193,8 @@ TEST_F(HonestData, AnOrderIsNamedFromAFewTurnsOnlyWhereTheWholeMeasurementHasThe
   model::Model m = base(true);
   m.drive.pitch_m.value = 0.04;
   const std::vector<Row> part(rows_.begin() + 1000, rows_.begin() + 2500);
-  const diagnosis::Diagnosis d = diagnosis::diagnose(load(part), m, {});
-  for (const diagnosis::Named& n : d.named)
+  const selection::Diagnosis d = selection::diagnose(load(part), m, {});
+  for (const selection::Named& n : d.named)
     if (n.order) {
       EXPECT_NEAR(*m.drive.pitch_m.value / *n.order, 2.5e-3, 0.05e-3) << n.effect << ":" << *n.order;
     }

@@ -12,8 +12,8 @@
 #include <random>
 
 #include "hil/plant/physics.hpp"
-#include "host/diagnosis/diagnosis.hpp"
-#include "host/regression/identify.hpp"
+#include "host/estimation/identify.hpp"
+#include "host/selection/diagnosis.hpp"
 #include "tests/support/twin_data.hpp"
 
 namespace flexspline {
@@ -177,11 +177,11 @@ model::Model model_with(const std::vector<std::string>& effects) {
 }
 
 // Torque of an identified model along the true path.
-std::vector<double> torque_of(const regression::Terms& terms, const Loop& loop) {
+std::vector<double> torque_of(const estimation::Terms& terms, const Loop& loop) {
   std::vector<effects::Inputs<numbers::Real>> inputs(loop.torsion.size());
   for (std::size_t k = 0; k < inputs.size(); ++k) inputs[k].torsion = loop.torsion[k];
   std::vector<double> torque(inputs.size(), 0.0);
-  for (const regression::Term& t : terms)
+  for (const estimation::Term& t : terms)
     t.entry->real.torque(catalogue::natural(*t.entry, t.values).data(), {}, catalogue::Balance::transmission, inputs,
                          torque.data());
   return torque;
@@ -240,7 +240,7 @@ INSTANTIATE_TEST_SUITE_P(Hysteresis, Law,
 TEST_P(Law, IsRecoveredFromNoisyLoopsToFivePercentOfAreaAndThreeOfTheirSize) {
   const std::vector<Loop> loops = loops_of(GetParam(), 7001);
   const bool whole = GetParam() == "duhem_hysteresis";
-  const auto found = regression::identify(
+  const auto found = estimation::identify(
       dataset_of(loops), whole ? model_with({GetParam()}) : model_with({"linear_stiffness", GetParam()}), {});
   for (std::size_t i = 0; i < loops.size(); ++i) {
     const std::vector<double> torque = torque_of(found->terms, loops[i]);
@@ -262,7 +262,7 @@ TEST_P(Law, IsToldFromTheOthersUpToThoseThatContainIt) {
       {"prandtl_ishlinskii_hysteresis", "prandtl_ishlinskii_hysteresis,preisach_hysteresis"},
       {"preisach_hysteresis", "preisach_hysteresis,prandtl_ishlinskii_hysteresis"},
   };
-  const auto found = diagnosis::diagnose(dataset_of(loops_of(GetParam(), 7001)), model_with({"linear_stiffness"}), {});
+  const auto found = selection::diagnose(dataset_of(loops_of(GetParam(), 7001)), model_with({"linear_stiffness"}), {});
   std::string named;
   for (const auto& n : found.named) named += n.effect + " ";
   fmt::print("{}: named {}|", GetParam(), named);

@@ -7,9 +7,9 @@
 #include <map>
 #include <string>
 
-#include "host/diagnosis/add.hpp"
-#include "host/regression/identify.hpp"
-#include "host/regression/in_parallel.hpp"
+#include "host/estimation/identify.hpp"
+#include "host/estimation/in_parallel.hpp"
+#include "host/selection/add.hpp"
 #include "tests/support/twin_data.hpp"
 
 namespace flexspline {
@@ -31,7 +31,7 @@ std::map<std::string, double> truth_of(const model::Model& model) {
 
 // By parameter, of drives whose model is complete. `added`: an effect that is not in the model and comes by `add`.
 std::map<std::string, Coverage> over_seeds(double friction_variation, const std::string& added, std::size_t seeds) {
-  std::vector<std::vector<regression::Estimate>> found(seeds);
+  std::vector<std::vector<estimation::Estimate>> found(seeds);
   std::map<std::string, double> truth;
   plant::PlantFile demo = plant::demo_plant();
   demo.drive.friction_variation = friction_variation;
@@ -39,16 +39,16 @@ std::map<std::string, Coverage> over_seeds(double friction_variation, const std:
   std::erase_if(demo.experiments, [](const plant::ExperimentPlan& e) { return e.holdout; });
   for (plant::ExperimentPlan& e : demo.experiments) e.duration_s = 6.0;
   truth = truth_of(testing::model_of(demo.drive, true, true));
-  regression::in_parallel(seeds, [&](std::size_t s) {
+  estimation::in_parallel(seeds, [&](std::size_t s) {
     const auto records = plant::record_all(demo.drive, demo.experiments, 7001 + s);
     const data::Dataset dataset = testing::dataset_of(demo.drive, records);
     const model::Model model = testing::model_of(demo.drive, false, false);
-    found[s] = added.empty() ? regression::identify(dataset, model, {})->estimates
-                             : diagnosis::add(dataset, model, added, {}).estimates;
+    found[s] = added.empty() ? estimation::identify(dataset, model, {})->estimates
+                             : selection::add(dataset, model, added, {}).estimates;
   });
   std::map<std::string, Coverage> coverage;
   for (const auto& estimates : found)
-    for (const regression::Estimate& e : estimates) {
+    for (const estimation::Estimate& e : estimates) {
       const std::string name = e.effect + "." + e.parameter;
       if (!e.low || !e.high || !truth.contains(name)) continue;
       Coverage& c = coverage[name];
@@ -85,7 +85,7 @@ const std::vector<std::string> kLoad = {"output_inertia.inertia", "output_viscou
 
 // Twenty short sets tell a coverage to 7 % only; what matters is the width: that of noise beside what identify adds to
 // each estimate for what filters leave (0.05 % of it). The load's come from a torque sensor that is read just before
-// the held current steps (host/regression/held_torque).
+// the held current steps (host/estimation/held_torque).
 TEST(Intervals, AreHardlyWiderWhereFrictionIsTheSameInAllRecords) {
   constexpr double kBeyondNoise = 2.0 * 1.96 * 5e-4, kOfNoise = 0.0015;
   const auto coverage = over_seeds(0.0, "", 20);

@@ -1,5 +1,5 @@
 // Tables and formulas as `add`, `identify` and `diagnose` take them, on motions that are written down.
-#include "host/diagnosis/made.hpp"
+#include "host/selection/user_defined_effects.hpp"
 
 #include <gtest/gtest.h>
 
@@ -9,11 +9,11 @@
 
 #include "host/catalogue/constants.hpp"
 #include "host/catalogue/defined.hpp"
-#include "host/diagnosis/add.hpp"
-#include "host/diagnosis/diagnosis.hpp"
+#include "host/selection/add.hpp"
+#include "host/selection/diagnosis.hpp"
 #include "tests/support/plain_model.hpp"
 
-namespace flexspline::diagnosis {
+namespace flexspline::selection {
 namespace {
 
 using data::Column;
@@ -63,7 +63,7 @@ data::Dataset motions(const std::function<double(double q, double w)>& hidden, u
   return dataset;
 }
 
-const regression::PipelineOptions kOptions{30.0, true};
+const estimation::PipelineOptions kOptions{30.0, true};
 
 std::string error_of(const std::function<void()>& act) {
   try {
@@ -75,16 +75,16 @@ std::string error_of(const std::function<void()>& act) {
 }
 
 TEST(MadeEffects, NamesAndParametersAreReadAsTheyAreWritten) {
-  EXPECT_TRUE(names_made_effect("table_effect:velocity"));
-  EXPECT_TRUE(names_made_effect("expression_effect"));
-  EXPECT_FALSE(names_made_effect("torque_ripple:2"));
-  const model::Effect table = made_effect("table_effect:torque*direction", {}, plain_model());
+  EXPECT_TRUE(names_user_defined_effect("table_effect:velocity"));
+  EXPECT_TRUE(names_user_defined_effect("expression_effect"));
+  EXPECT_FALSE(names_user_defined_effect("torque_ripple:2"));
+  const model::Effect table = user_defined_effect("table_effect:torque*direction", {}, plain_model());
   EXPECT_EQ(table.definition->variable, "torque");
   EXPECT_TRUE(table.definition->times_direction);
   EXPECT_EQ(table.definition->balance, "motor");
   EXPECT_EQ(table.id, "table_torque_direction");
-  EXPECT_EQ(made_effect("table_effect:torsion", {}, plain_model()).definition->balance, "transmission");
-  EXPECT_EQ(made_effect("table_effect:output_velocity", {}, plain_model()).definition->balance, "load");
+  EXPECT_EQ(user_defined_effect("table_effect:torsion", {}, plain_model()).definition->balance, "transmission");
+  EXPECT_EQ(user_defined_effect("table_effect:output_velocity", {}, plain_model()).definition->balance, "load");
   const model::Parameter b = parse_parameter("b=0.1..50:rad/s");
   EXPECT_EQ(b.name, "b");
   EXPECT_EQ(b.unit, "rad/s");
@@ -98,7 +98,7 @@ TEST(MadeEffects, NamesAndParametersAreReadAsTheyAreWritten) {
 
 TEST(MadeEffects, MistakesAreSaidWithWhatIsKnown) {
   const auto made = [](const char* text, const Made& m = {}) {
-    return error_of([&] { made_effect(text, m, plain_model()); });
+    return error_of([&] { user_defined_effect(text, m, plain_model()); });
   };
   EXPECT_NE(made("table_effect").find("write table_effect:velocity, for example; signals are velocity, speed"),
             std::string::npos);
@@ -163,12 +163,12 @@ TEST(IdentifyTable, LearnsItsValuesAnewUnlessTheyAreFixed) {
   model::Table& table = moved.find("table_motor_angle_direction")->definition->table;
   const std::vector<double> before = table.value;
   for (double& v : table.value) v *= 0.5;
-  const auto again = regression::identify(motions(tooth), moved, kOptions);
+  const auto again = estimation::identify(motions(tooth), moved, kOptions);
   const model::Table& learned = again->model.find("table_motor_angle_direction")->definition->table;
   EXPECT_EQ(learned.at, table.at) << "the points stay";
   for (std::size_t k = 0; k < before.size(); ++k) EXPECT_NEAR(learned.value[k], before[k], 1e-4);
   table.fixed = true;
-  const auto held = regression::identify(motions(tooth), moved, kOptions);
+  const auto held = estimation::identify(motions(tooth), moved, kOptions);
   EXPECT_EQ(held->model.find("table_motor_angle_direction")->definition->table.value, table.value);
   EXPECT_GT(held->fits[0].rmse(), 3.0 * again->fits[0].rmse());
 }
@@ -179,7 +179,7 @@ TEST(AddExpression, EstimatesTheParametersOfAFormula) {
   made.parameters = {"height:N*m", "width=0.05..3:rad"};
   const Addition added = add(motions(tooth), plain_model(), "expression_effect", kOptions, made);
   EXPECT_GT(*added.before.rmse_holdout, 10.0 * *added.after.rmse_holdout);
-  const auto value = [&](const char* parameter) -> const regression::Estimate& {
+  const auto value = [&](const char* parameter) -> const estimation::Estimate& {
     for (const auto& e : added.estimates)
       if (e.id == "expression_effect" && e.parameter == parameter) return e;
     throw std::out_of_range(parameter);
@@ -218,4 +218,4 @@ TEST(DiagnoseUnknown, LeavesAnEffectOfTheCatalogueItsName) {
 }
 
 }  // namespace
-}  // namespace flexspline::diagnosis
+}  // namespace flexspline::selection

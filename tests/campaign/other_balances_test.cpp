@@ -6,8 +6,8 @@
 
 #include <cmath>
 
-#include "host/diagnosis/add.hpp"
-#include "host/diagnosis/diagnosis.hpp"
+#include "host/selection/add.hpp"
+#include "host/selection/diagnosis.hpp"
 #include "tests/support/campaign_size.hpp"
 #include "tests/support/hidden_twin.hpp"
 
@@ -25,7 +25,7 @@ constexpr std::uint64_t kFirstSeed = 9100;
 void expect_named(const std::string& hidden, double scale, double friction_variation) {
   for (std::uint64_t seed = kFirstSeed; seed < kFirstSeed + in_campaign(2, 12); ++seed) {
     const HiddenTwin twin(hidden, scale, seed, friction_variation);
-    const diagnosis::Diagnosis d = twin.diagnose();
+    const selection::Diagnosis d = twin.diagnose();
     fmt::print("{} x {:g}, friction {:g}, seed {}: {}\n", hidden, scale, friction_variation, seed, names(d));
     EXPECT_EQ(names(d), hidden + ":2");
   }
@@ -46,14 +46,14 @@ TEST(OtherBalances, TellARippleOfTheTorqueSensorFromOneOfTheMotor) {
 
 TEST(OtherBalances, GiveTheWaveOfTheGearItsPhase) {
   const HiddenTwin twin("kinematic_error", 1.0, kFirstSeed + 50, 0.0);
-  const diagnosis::Addition added = diagnosis::add(twin.dataset, twin.base, "kinematic_error:2", {});
+  const selection::Addition added = selection::add(twin.dataset, twin.base, "kinematic_error:2", {});
   const plant::Effect* truth = nullptr;
   for (const plant::Effect& e : twin.file.drive.effects)
     if (e.hidden) truth = &e;
   ASSERT_TRUE(truth);
   const double height = std::hypot(truth->value("cosine"), truth->value("sine"));
   int judged = 0;
-  for (const regression::Estimate& e : added.estimates) {
+  for (const estimation::Estimate& e : added.estimates) {
     if (e.effect != "kinematic_error" || e.fixed) continue;
     ++judged;
     ASSERT_TRUE(e.std);

@@ -12,8 +12,8 @@
 #include <fstream>
 #include <thread>
 
-#include "host/diagnosis/diagnosis.hpp"
 #include "host/planning/design.hpp"
+#include "host/selection/diagnosis.hpp"
 #include "tests/support/twin_data.hpp"
 
 namespace flexspline {
@@ -41,15 +41,15 @@ struct Told {
   double plan_s = 0.0;
 };
 
-std::string named(const diagnosis::Diagnosis& d) {
+std::string named(const selection::Diagnosis& d) {
   std::string text;
-  for (const diagnosis::Named& n : d.named) text += (text.empty() ? "" : "+") + n.effect;
+  for (const selection::Named& n : d.named) text += (text.empty() ? "" : "+") + n.effect;
   return text.empty() ? "-" : text;
 }
 
-double won(const diagnosis::Diagnosis& d, const std::string& truth, const std::string& other) {
+double won(const selection::Diagnosis& d, const std::string& truth, const std::string& other) {
   double score_of_truth = 0.0, score_of_other = 0.0;
-  for (const diagnosis::Candidate& c : d.candidates) {
+  for (const selection::Candidate& c : d.candidates) {
     if (c.effect == truth) score_of_truth = std::max(score_of_truth, c.score);
     if (c.effect == other && c.admissible) score_of_other = std::max(score_of_other, c.score);
   }
@@ -75,7 +75,7 @@ Told tell(const Pair& pair, bool first_is_true, std::uint64_t seed) {
   data::Dataset dataset = testing::dataset_of(demo.drive, plant::record_all(demo.drive, pair.recorded, seed));
   const model::Model base = testing::model_of(demo.drive, false, false);
   const std::string& rival = first_is_true ? pair.second : pair.first;
-  const diagnosis::Diagnosis before = diagnosis::diagnose(dataset, base, {});
+  const selection::Diagnosis before = selection::diagnose(dataset, base, {});
   told.before = named(before);
   told.won_before = won(before, told.truth, rival);
 
@@ -103,7 +103,7 @@ Told tell(const Pair& pair, bool first_is_true, std::uint64_t seed) {
   for (const data::Experiment& e :
        testing::dataset_of(demo.drive, plant::record_all(demo.drive, runs, seed + 50)).experiments)
     dataset.experiments.push_back(e);
-  const diagnosis::Diagnosis after = diagnosis::diagnose(dataset, base, {});
+  const selection::Diagnosis after = selection::diagnose(dataset, base, {});
   told.after = named(after);
   told.won_after = won(after, told.truth, rival);
   return told;

@@ -11,7 +11,7 @@
 #include <string>
 #include <vector>
 
-#include "host/diagnosis/add.hpp"
+#include "host/selection/add.hpp"
 #include "tests/support/campaign_size.hpp"
 #include "tests/support/closed_loop_runs.hpp"
 
@@ -36,8 +36,8 @@ std::vector<Compared> one_drive(std::size_t i) {
   if (!hidden.empty()) plant::hide(demo.drive, hidden);
   const data::Dataset dataset =
       dataset_of(demo.drive, plant::record_all(demo.drive, demo.experiments, kFirstSeed + 500 + i));
-  const model::Model base = regression::identify(dataset, model_of(demo.drive, false, false), {})->model;
-  const model::Model best = hidden.empty() ? base : diagnosis::add(dataset, base, hidden, {}).model;
+  const model::Model base = estimation::identify(dataset, model_of(demo.drive, false, false), {})->model;
+  const model::Model best = hidden.empty() ? base : selection::add(dataset, base, hidden, {}).model;
 
   closed_loop::Question question;
   question.believed = best;

@@ -1,5 +1,5 @@
 // A penalised curve against its closed form with dense matrices.
-#include "host/regression/smooth_curve.hpp"
+#include "host/estimation/smooth_curve.hpp"
 
 #include <gtest/gtest.h>
 
@@ -8,7 +8,7 @@
 #include <cmath>
 #include <random>
 
-namespace flexspline::regression {
+namespace flexspline::estimation {
 namespace {
 
 using Matrix = Eigen::MatrixXd;
@@ -175,4 +175,4 @@ TEST(SmoothCurve, DrawsOnFromNeighboursWhereNoRowLies) {
 }
 
 }  // namespace
-}  // namespace flexspline::regression
+}  // namespace flexspline::estimation

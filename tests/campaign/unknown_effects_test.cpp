@@ -13,8 +13,8 @@
 #include <thread>
 
 #include "host/catalogue/defined.hpp"
-#include "host/diagnosis/add.hpp"
-#include "host/diagnosis/diagnosis.hpp"
+#include "host/selection/add.hpp"
+#include "host/selection/diagnosis.hpp"
 #include "tests/support/twin_data.hpp"
 
 namespace flexspline {
@@ -50,10 +50,10 @@ double floor_of(const plant::PlantFile& demo, std::uint64_t seed) {
   const model::Model truth = testing::model_of(plain.drive, true, true);
   std::vector<const data::Experiment*> fit, holdout;
   for (const auto& e : dataset.experiments) (e.role == data::Role::holdout ? holdout : fit).push_back(&e);
-  const regression::Prepared prepared = regression::prepare(fit, truth.drive, {});
-  const regression::Prepared judged = regression::prepare_with(holdout, truth.drive, prepared.pipeline);
-  regression::BalanceData data(judged, regression::Balance::motor);
-  const Eigen::VectorXd r = regression::residual_of(data, regression::terms_of(truth));
+  const estimation::Prepared prepared = estimation::prepare(fit, truth.drive, {});
+  const estimation::Prepared judged = estimation::prepare_with(holdout, truth.drive, prepared.pipeline);
+  estimation::BalanceData data(judged, estimation::Balance::motor);
+  const Eigen::VectorXd r = estimation::residual_of(data, estimation::terms_of(truth));
   return std::sqrt(r.squaredNorm() / static_cast<double>(r.size()));
 }
 
@@ -66,21 +66,21 @@ Outcome run(const Case& c) {
   const data::Dataset dataset =
       testing::dataset_of(demo.drive, plant::record_all(demo.drive, demo.experiments, c.seed));
   const model::Model base = testing::model_of(demo.drive, false, false);
-  const diagnosis::Diagnosis d = diagnosis::diagnose(dataset, base, {});
-  outcome.verdict = diagnosis::verdict_name(d.verdict);
+  const selection::Diagnosis d = selection::diagnose(dataset, base, {});
+  outcome.verdict = selection::verdict_name(d.verdict);
   bool of_class = !d.named.empty();
   for (const auto& n : d.named) {
     outcome.named += (outcome.named.empty() ? "" : "+") + n.effect;
     of_class = of_class && c.truth.nearest.contains(n.effect);
   }
-  outcome.flagged = d.verdict == diagnosis::Verdict::unknown_structure;
+  outcome.flagged = d.verdict == selection::Verdict::unknown_structure;
   outcome.of_its_class = of_class;
   if (d.unknown) {
     outcome.curve = d.unknown->effect;
     outcome.right_signal = c.truth.curves.contains(d.unknown->effect.substr(d.unknown->effect.find(':') + 1));
-    diagnosis::Made made;
+    selection::UserDefinition made;
     made.balance = d.unknown->definition.balance;
-    const diagnosis::Addition added = diagnosis::add(dataset, base, d.unknown->effect, {}, made);
+    const selection::Addition added = selection::add(dataset, base, d.unknown->effect, {}, made);
     outcome.before = *added.before.rmse_holdout / floor;
     outcome.after = *added.after.rmse_holdout / floor;
   }

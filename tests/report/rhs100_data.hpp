@@ -15,8 +15,8 @@
 
 #include "hil/rhs100/experiments.hpp"
 #include "host/catalogue/catalogue.hpp"
+#include "host/estimation/identify.hpp"
 #include "host/model/model.hpp"
-#include "host/regression/identify.hpp"
 
 namespace flexspline::testing {
 
@@ -89,15 +89,15 @@ inline void fix(model::Model& model, std::string_view effect, std::string_view p
   p->fixed = true;
 }
 
-inline const regression::Estimate& estimate(const regression::Identification& found, std::string_view effect,
+inline const estimation::Estimate& estimate(const estimation::Identification& found, std::string_view effect,
                                             std::string_view parameter) {
-  for (const regression::Estimate& e : found.estimates)
+  for (const estimation::Estimate& e : found.estimates)
     if (e.effect == effect && e.parameter == parameter) return e;
   throw std::invalid_argument("nothing was estimated for " + std::string(effect) + "." + std::string(parameter));
 }
 
-inline double derived(const regression::Identification& found, std::string_view name) {
-  for (const regression::Derived& d : found.derived)
+inline double derived(const estimation::Identification& found, std::string_view name) {
+  for (const estimation::Derived& d : found.derived)
     if (d.name == name) return d.value;
   throw std::invalid_argument("nothing was derived for " + std::string(name));
 }

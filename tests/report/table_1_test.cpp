@@ -18,16 +18,16 @@ namespace published = report::published;
 constexpr double kGuessedConstant = 0.08;  // of the base model
 const report::DcMotor kTruth = published::simulated_motor();
 
-regression::PipelineOptions cutoff(double hz) {
-  regression::PipelineOptions options;
+estimation::PipelineOptions cutoff(double hz) {
+  estimation::PipelineOptions options;
   options.cutoff_hz = hz;
   return options;
 }
 
 // What the composite tells, put into a model that has a Stribeck term and fixed there: the report's partition.
-model::Model partitioned(const regression::Identification& linear) {
+model::Model partitioned(const estimation::Identification& linear) {
   model::Model model = model_of(rhs100::simulated_stribeck_model());
-  for (const regression::Estimate& e : linear.estimates) fix(model, e.effect, e.parameter, e.value);
+  for (const estimation::Estimate& e : linear.estimates) fix(model, e.effect, e.parameter, e.value);
   return model;
 }
 
@@ -35,12 +35,12 @@ class Table1 : public ::testing::Test {
  protected:
   const rhs100::Set composite = rhs100::table_1_composite(), saw_tooth = rhs100::table_1_saw_tooth();
 
-  std::unique_ptr<regression::Identification> linear(std::uint64_t seed, const regression::PipelineOptions& options) {
-    return regression::identify(dataset_of(composite, seed), base_model(composite), options);
+  std::unique_ptr<estimation::Identification> linear(std::uint64_t seed, const estimation::PipelineOptions& options) {
+    return estimation::identify(dataset_of(composite, seed), base_model(composite), options);
   }
 };
 
-void expect_within_three_percent(const regression::Identification& found) {
+void expect_within_three_percent(const estimation::Identification& found) {
   const auto off_percent = [&](double value, double truth) { return 100.0 * std::abs(value / truth - 1.0); };
   const report::DirectionalFriction& friction = kTruth.friction.positive;
   // The report's were off by 9.7, 7.0, 5.9 and 18 %.
@@ -61,9 +61,9 @@ TEST_F(Table1, LinearEstimatesAreWithinThreePercent) {
 }
 
 TEST_F(Table1, FromItsSinusoidsAloneTheToolSaysThatStribeckCannotBeTold) {
-  for (const auto& options : {regression::PipelineOptions{}, cutoff(10.0), cutoff(20.0)}) {
+  for (const auto& options : {estimation::PipelineOptions{}, cutoff(10.0), cutoff(20.0)}) {
     const auto found =
-        regression::identify(dataset_of(composite), model_of(rhs100::simulated_stribeck_model()), options);
+        estimation::identify(dataset_of(composite), model_of(rhs100::simulated_stribeck_model()), options);
     bool said = false;
     for (const std::string& w : found->warnings)
       said = said || (w.find("stribeck_hess_soom.velocity stopped at the end of what these data can show") == 0 &&
@@ -76,14 +76,14 @@ TEST_F(Table1, FromItsSinusoidsAloneTheToolSaysThatStribeckCannotBeTold) {
 // regression has to mask that, and what is left holds the amplitude times the square of the speed alone.
 TEST_F(Table1, RegressionOnTheSlowSawToothDoesNotClaimTheSpeed) {
   const auto found =
-      regression::identify(dataset_of(saw_tooth), partitioned(*linear(kJudgingSeed, cutoff(10.0))), cutoff(200.0));
-  const regression::Estimate& speed = estimate(*found, "stribeck_hess_soom", "velocity");
+      estimation::identify(dataset_of(saw_tooth), partitioned(*linear(kJudgingSeed, cutoff(10.0))), cutoff(200.0));
+  const estimation::Estimate& speed = estimate(*found, "stribeck_hess_soom", "velocity");
   EXPECT_LT(*speed.low, kTruth.friction.positive.stribeck_velocity);
   EXPECT_GT(*speed.high, kTruth.friction.positive.stribeck_velocity);
 }
 
 // Amplitude and speed of the Stribeck term by the free run of one saw-tooth.
-FreeRunFit stribeck_of(const rhs100::Set& saw_tooth, const regression::Identification& linear, std::uint64_t seed) {
+FreeRunFit stribeck_of(const rhs100::Set& saw_tooth, const estimation::Identification& linear, std::uint64_t seed) {
   const std::vector<FreeParameter> parameters{
       {{{"stribeck_hess_soom", "amplitude_positive"}, {"stribeck_hess_soom", "amplitude_negative"}},
        {0.002, 0.004, 0.006, 0.008, 0.01, 0.012, 0.016, 0.024}},

@@ -16,8 +16,8 @@ namespace published = report::published;
 // lies below 2 Hz and would suggest a filter of 5 Hz.
 constexpr double kCutoffHz = 20.0;
 
-regression::PipelineOptions pipeline() {
-  regression::PipelineOptions options;
+estimation::PipelineOptions pipeline() {
+  estimation::PipelineOptions options;
   options.cutoff_hz = kCutoffHz;
   return options;
 }
@@ -30,7 +30,7 @@ Rows one_by_one(const data::Dataset& dataset, const model::Model& model) {
   Rows rows;
   for (const data::Experiment& e : dataset.experiments) {
     if (e.role != data::Role::fit) continue;
-    const auto found = regression::identify(only(dataset, e.name), model, pipeline());
+    const auto found = estimation::identify(only(dataset, e.name), model, pipeline());
     rows.stiffness.push_back(estimate(*found, "linear_stiffness", "stiffness").value);
     rows.damping.push_back(estimate(*found, "structural_damping", "torque").value);
     rows.rmse.push_back(found->fits.front().rmse());
@@ -152,7 +152,7 @@ TEST_F(Table6, TheCubicTermIsUnreliableWithASpreadAboveAHundredPercent) {
   EXPECT_GT(spread_percent(ours.cubic), 100.0);
   EXPECT_LT(spread_percent(ours.stiffness), 30.0);
   // And all four experiments together do not even agree on its sign.
-  const auto together = regression::identify(dataset, base_model(set), pipeline());
+  const auto together = estimation::identify(dataset, base_model(set), pipeline());
   EXPECT_LT(estimate(*together, "cubic_stiffness", "stiffness").value, 0.2 * mean(ours.cubic));
 }
 
@@ -164,9 +164,9 @@ TEST_F(Table6, TheCubicModelOverpredictsAtLargeTorsionAndTheLinearOneDoesNot) {
     fix(model, "structural_damping", "torque", mean(rows.damping));
     if (!rows.cubic.empty()) fix(model, "cubic_stiffness", "stiffness", mean(rows.cubic));
     const data::Dataset largest = only(dataset, "100-8");
-    const regression::Prepared prepared = regression::prepare({&largest.experiments.front()}, model.drive, pipeline());
-    regression::BalanceData balance(prepared, regression::Balance::transmission);
-    const Eigen::VectorXd rest = regression::residual_of(balance, regression::terms_of(model));
+    const estimation::Prepared prepared = estimation::prepare({&largest.experiments.front()}, model.drive, pipeline());
+    estimation::BalanceData balance(prepared, estimation::Balance::transmission);
+    const Eigen::VectorXd rest = estimation::residual_of(balance, estimation::terms_of(model));
     Eigen::Index at = 0;
     const double measured = balance.target().cwiseAbs().maxCoeff(&at);
     return (balance.target()[at] - rest[at]) / std::copysign(measured, balance.target()[at]);

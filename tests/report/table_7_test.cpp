@@ -2,7 +2,7 @@
 #include <gtest/gtest.h>
 
 #include "hil/report/published_tables.hpp"
-#include "host/diagnosis/trends.hpp"
+#include "host/selection/trends.hpp"
 #include "tests/report/rhs100_data.hpp"
 
 namespace flexspline::testing {
@@ -30,7 +30,7 @@ Rows as_published() {
 Rows one_by_one(const data::Dataset& dataset, const model::Model& model) {
   Rows rows;
   for (const data::Experiment& e : dataset.experiments) {
-    const auto found = regression::identify(only(dataset, e.name), model, {});
+    const auto found = estimation::identify(only(dataset, e.name), model, {});
     rows.inertia.push_back(estimate(*found, "inertia", "inertia").value);
     rows.viscous_positive.push_back(derived(*found, "Tvp"));
     rows.viscous_negative.push_back(derived(*found, "Tvn"));
@@ -48,8 +48,8 @@ class Table7 : public ::testing::Test {
   const data::Dataset sines = only(dataset, "-1-");
 };
 
-const diagnosis::Trend* find(const std::vector<diagnosis::Trend>& trends, std::string_view id, std::string_view over) {
-  for (const diagnosis::Trend& t : trends)
+const selection::Trend* find(const std::vector<selection::Trend>& trends, std::string_view id, std::string_view over) {
+  for (const selection::Trend& t : trends)
     if (t.id == id && t.over == over) return &t;
   return nullptr;
 }
@@ -80,7 +80,7 @@ TEST_F(Table7, SpreadsComeOutAsTheReportsRowsGive) {
 }
 
 TEST_F(Table7, AllTogetherTheSpreadsStayBelowTheReportsThirtyPercent) {
-  const auto found = regression::identify(dataset, base, {});
+  const auto found = estimation::identify(dataset, base, {});
   EXPECT_NEAR(*estimate(*found, "inertia", "inertia").spread_percent, 6.4, 1.0);
   EXPECT_NEAR(*estimate(*found, "viscous_friction", "coefficient").spread_percent, 17.7, 1.0);
   EXPECT_TRUE(estimate(*found, "viscous_friction", "coefficient").reliable);
@@ -94,9 +94,9 @@ TEST_F(Table7, AllTogetherTheSpreadsStayBelowTheReportsThirtyPercent) {
 
 // What the report passed over as acceptable deviation.
 TEST_F(Table7, ViscousFrictionFallsWithAmplitude) {
-  const auto found = regression::identify(sines, base, {});
-  const std::vector<diagnosis::Trend> trends = diagnosis::parameter_trends(*found);
-  const diagnosis::Trend* trend = find(trends, "viscous_friction", "speed");
+  const auto found = estimation::identify(sines, base, {});
+  const std::vector<selection::Trend> trends = selection::parameter_trends(*found);
+  const selection::Trend* trend = find(trends, "viscous_friction", "speed");
   ASSERT_NE(trend, nullptr);
   EXPECT_NEAR(trend->slope, -0.65, 0.05);
   EXPECT_LT(trend->p_value, 1e-6);
@@ -104,10 +104,10 @@ TEST_F(Table7, ViscousFrictionFallsWithAmplitude) {
 
 // Printed as a fall with frequency, it is one with acceleration, amplitude times frequency: t = -10 instead of -5.
 TEST_F(Table7, InertiaFallsWithFrequencyAndMoreSurelyWithAcceleration) {
-  const auto found = regression::identify(sines, base, {});
-  const std::vector<diagnosis::Trend> trends = diagnosis::parameter_trends(*found);
-  const diagnosis::Trend* frequency = find(trends, "inertia", "frequency");
-  const diagnosis::Trend* acceleration = find(trends, "inertia", "acceleration");
+  const auto found = estimation::identify(sines, base, {});
+  const std::vector<selection::Trend> trends = selection::parameter_trends(*found);
+  const selection::Trend* frequency = find(trends, "inertia", "frequency");
+  const selection::Trend* acceleration = find(trends, "inertia", "acceleration");
   ASSERT_NE(frequency, nullptr);
   ASSERT_NE(acceleration, nullptr);
   EXPECT_NEAR(frequency->slope, -0.08, 0.02);
@@ -133,17 +133,17 @@ TEST_F(Table7, SublinearFrictionTakesTheViscousSpreadFromNineteenPercentToSeven)
 
   // By the tool: friction that goes as speed to the power of 0.35 in place of viscous friction, with one Coulomb torque
   // for all runs. Each run is linear here, as its row says, so only the spread can show it, not the error.
-  const auto linear = regression::identify(sines, base, {});
+  const auto linear = estimation::identify(sines, base, {});
   EXPECT_NEAR(*estimate(*linear, "viscous_friction", "coefficient").spread_percent, 19.9, 0.7);
   model::Model sublinear = base;
   std::erase_if(sublinear.effects, [](const model::Effect& e) { return e.type.starts_with("viscous"); });
   add(sublinear, "power_law_friction");
   fix(sublinear, "power_law_friction", "exponent", 0.35);
-  const auto together = regression::identify(sines, sublinear, {});
+  const auto together = estimation::identify(sines, sublinear, {});
   fix(sublinear, "coulomb_friction", "torque", estimate(*together, "coulomb_friction", "torque").value);
-  const auto found = regression::identify(sines, sublinear, {});
+  const auto found = estimation::identify(sines, sublinear, {});
   EXPECT_NEAR(*estimate(*found, "power_law_friction", "torque").spread_percent, 7.0, 0.7);
-  for (const diagnosis::Trend& t : diagnosis::parameter_trends(*found)) EXPECT_NE(t.id, "power_law_friction") << t.over;
+  for (const selection::Trend& t : selection::parameter_trends(*found)) EXPECT_NE(t.id, "power_law_friction") << t.over;
 }
 
 // The other way round: a drive whose friction is sublinear, driven by the motions of table 7. (The exponent is the
@@ -161,9 +161,9 @@ TEST_F(Table7, ADriveWithSublinearFrictionShowsTheTrendOfTheReportsRows) {
     e.drive.effects.push_back(power);
   }
   const data::Dataset runs = only(dataset_of(sublinear), "-1-");
-  const auto linear = regression::identify(runs, base, {});
-  const std::vector<diagnosis::Trend> trends = diagnosis::parameter_trends(*linear);
-  const diagnosis::Trend* trend = find(trends, "viscous_friction", "speed");
+  const auto linear = estimation::identify(runs, base, {});
+  const std::vector<selection::Trend> trends = selection::parameter_trends(*linear);
+  const selection::Trend* trend = find(trends, "viscous_friction", "speed");
   ASSERT_NE(trend, nullptr);
   EXPECT_NEAR(trend->slope, -0.41, 0.05);
   EXPECT_NEAR(*estimate(*linear, "viscous_friction", "coefficient").spread_percent, 12.9, 1.5);
@@ -171,7 +171,7 @@ TEST_F(Table7, ADriveWithSublinearFrictionShowsTheTrendOfTheReportsRows) {
   model::Model better = base;
   std::erase_if(better.effects, [](const model::Effect& e) { return e.type.starts_with("viscous"); });
   add(better, "power_law_friction");
-  const auto found = regression::identify(runs, better, {});
+  const auto found = estimation::identify(runs, better, {});
   EXPECT_NEAR(estimate(*found, "power_law_friction", "exponent").value, 0.5, 0.02);
   EXPECT_LT(*estimate(*found, "power_law_friction", "torque").spread_percent, 2.0);
   EXPECT_LT(found->fits.front().rmse(), 0.5 * linear->fits.front().rmse());

@@ -3,7 +3,7 @@
 
 #include "hil/report/published.hpp"
 #include "hil/report/published_tables.hpp"
-#include "host/diagnosis/diagnosis.hpp"
+#include "host/selection/diagnosis.hpp"
 #include "tests/report/rhs100_data.hpp"
 
 namespace flexspline::testing {
@@ -32,12 +32,12 @@ Rows as_published() {
 Rows one_by_one(const data::Dataset& dataset, const model::Model& model) {
   const Rows truth = as_published();
   Rows rows;
-  regression::PipelineOptions options;
+  estimation::PipelineOptions options;
   options.cutoff_hz = kCutoffHz;
   for (std::size_t k = 0; k < dataset.experiments.size(); ++k) {
-    const auto found = regression::identify(only(dataset, dataset.experiments[k].name), model, options);
+    const auto found = estimation::identify(only(dataset, dataset.experiments[k].name), model, options);
     const auto take = [&](const char* name, double true_value) {
-      const regression::Estimate& e = estimate(*found, "stribeck_gaussian", name);
+      const estimation::Estimate& e = estimate(*found, "stribeck_gaussian", name);
       rows.within += e.low && *e.low <= true_value && true_value <= *e.high;
       return e.value;
     };
@@ -88,16 +88,16 @@ TEST_F(Table8, FrictionThatRisesAtLowSpeedIsAcceptedAndNamedSo) {
   // Not known beforehand, it is what the tool names.
   model::Model without = base;
   std::erase_if(without.effects, [](const model::Effect& e) { return e.type == "stribeck_gaussian"; });
-  diagnosis::Options options;
+  selection::Options options;
   options.pipeline.cutoff_hz = kCutoffHz;
-  const diagnosis::Diagnosis found = diagnosis::diagnose(dataset, without, options);
-  ASSERT_EQ(found.verdict, diagnosis::Verdict::missing_effect);
+  const selection::Diagnosis found = selection::diagnose(dataset, without, options);
+  ASSERT_EQ(found.verdict, selection::Verdict::missing_effect);
   ASSERT_EQ(found.named.size(), 1u);
   EXPECT_EQ(found.named.front().effect, "stribeck_gaussian");
-  const diagnosis::Candidate& named = found.candidates.front();
+  const selection::Candidate& named = found.candidates.front();
   EXPECT_EQ(named.effect, "stribeck_gaussian");
   EXPECT_NE(named.note.find("rises out of standstill"), std::string::npos) << named.note;
-  for (const regression::Estimate& e : named.parameters) {
+  for (const estimation::Estimate& e : named.parameters) {
     if (e.parameter == "velocity")
       EXPECT_NEAR(e.value, published::kTable8Velocity, 0.02);
     else

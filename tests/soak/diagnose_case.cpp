@@ -8,17 +8,17 @@
 #include <cmath>
 #include <set>
 
-#include "host/diagnosis/add.hpp"
-#include "host/diagnosis/complete.hpp"
-#include "host/diagnosis/diagnosis.hpp"
-#include "host/regression/shapes.hpp"
+#include "host/estimation/variable_projection.hpp"
+#include "host/selection/add.hpp"
+#include "host/selection/add_until_complete.hpp"
+#include "host/selection/diagnosis.hpp"
 #include "tests/support/twin_data.hpp"
 
 namespace flexspline::soak {
 namespace {
 
-using regression::Balance;
-using regression::BalanceData;
+using estimation::Balance;
+using estimation::BalanceData;
 
 // Of a set in which no candidate is admissible.
 constexpr double kNoScore = -20.0;
@@ -86,21 +86,21 @@ struct Bench {
 
   // RMS of the true model's residual on the hold-out records.
   double holdout_floor(Balance balance) const {
-    const regression::Prepared prepared = regression::prepare(of(data::Role::fit), truth.drive, {});
-    const regression::Prepared judged =
-        regression::prepare_with(of(data::Role::holdout), truth.drive, prepared.pipeline);
+    const estimation::Prepared prepared = estimation::prepare(of(data::Role::fit), truth.drive, {});
+    const estimation::Prepared judged =
+        estimation::prepare_with(of(data::Role::holdout), truth.drive, prepared.pipeline);
     BalanceData data(judged, balance);
-    return root_mean_square(regression::residual_of(data, regression::terms_of(truth)));
+    return root_mean_square(estimation::residual_of(data, estimation::terms_of(truth)));
   }
 
   // What the hidden effects add and the base model cannot imitate, over the noise alone, on the fitted records.
   double missing_over_noise(Balance balance) const {
-    const regression::Prepared prepared = regression::prepare(of(data::Role::fit), truth.drive, {});
+    const estimation::Prepared prepared = estimation::prepare(of(data::Role::fit), truth.drive, {});
     BalanceData data(prepared, balance);
-    const regression::Terms full = regression::terms_of(truth),
-                            without = regression::terms_of(testing::model_of(file.drive, false, true));
-    Eigen::VectorXd noise = regression::residual_of(data, full);
-    Eigen::VectorXd missing = regression::residual_of(data, without) - noise;
+    const estimation::Terms full = estimation::terms_of(truth),
+                            without = estimation::terms_of(testing::model_of(file.drive, false, true));
+    Eigen::VectorXd noise = estimation::residual_of(data, full);
+    Eigen::VectorXd missing = estimation::residual_of(data, without) - noise;
     for (std::size_t t = 0; t < full.size(); ++t) {
       const std::string_view name = full[t].entry->name();
       const bool viscous = name == "viscous_friction", dry = name == "coulomb_friction" || name == "dahl_friction";
@@ -114,11 +114,11 @@ struct Bench {
             ((viscous ? at->viscous_factor : at->coulomb_factor) - 1.0) * torque.segment(range.first, range.size());
       }
     }
-    const auto on_balance = regression::terms_on(without, balance, true);
-    Eigen::MatrixXd X = regression::columns_of(data, without, regression::free_linear_slots(without, on_balance));
+    const auto on_balance = estimation::terms_on(without, balance, true);
+    Eigen::MatrixXd X = estimation::columns_of(data, without, estimation::free_linear_slots(without, on_balance));
     if (X.cols() == 0) {
-      regression::Terms open = regression::terms_of(base);
-      X = regression::columns_of(data, open, regression::free_linear_slots(open, on_balance));
+      estimation::Terms open = estimation::terms_of(base);
+      X = estimation::columns_of(data, open, estimation::free_linear_slots(open, on_balance));
     }
     const Eigen::VectorXd size = X.colwise().norm().transpose().array().max(1e-300);
     X *= size.cwiseInverse().asDiagonal();
@@ -127,7 +127,7 @@ struct Bench {
   }
 };
 
-void compare_parameters(const Bench& bench, const std::string& hidden, const diagnosis::Addition& added,
+void compare_parameters(const Bench& bench, const std::string& hidden, const selection::Addition& added,
                         Outcome& outcome) {
   const catalogue::Entry& entry = catalogue::get(hidden.substr(0, hidden.find(':')));
   const plant::Effect* truth = nullptr;
@@ -139,7 +139,7 @@ void compare_parameters(const Bench& bench, const std::string& hidden, const dia
     if (p.key == "cosine" || p.key == "sine") height = std::hypot(height, p.value);
   // Weights of points that were laid where the data reach mean another thing at the plant's own points.
   const bool laid_by_data = entry.count(effects::Kind::grid) > 0;
-  for (const regression::Estimate& e : added.estimates) {
+  for (const estimation::Estimate& e : added.estimates) {
     if (laid_by_data) break;
     if (e.effect != entry.name() || !truth->has(e.parameter) || !e.std || e.fixed) continue;
     if (e.id != added.model.effects.back().id) continue;
@@ -156,7 +156,7 @@ void compare_parameters(const Bench& bench, const std::string& hidden, const dia
 bool finds_all(const Bench& bench, const std::vector<std::string>& hidden) {
   std::multiset<std::string> found, wanted;
   for (const std::string& h : hidden) wanted.insert(as_named(h));
-  const diagnosis::Completion done = diagnosis::complete(bench.dataset, bench.base, {}, kMostRounds);
+  const selection::Completion done = selection::add_until_complete(bench.dataset, bench.base, {}, kMostRounds);
   for (std::size_t round = 0; round + 1 < done.rounds.size(); ++round)
     found.insert(label(done.rounds[round].named.front().effect, done.rounds[round].named.front().order));
   for (const std::string& out : done.removed) found.erase(out);
@@ -175,18 +175,18 @@ Outcome run(const Case& what) {
   outcome.what = what;
   const Bench bench(what);
   const auto start = std::chrono::steady_clock::now();
-  const diagnosis::Diagnosis d = diagnosis::diagnose(bench.dataset, bench.base, {});
+  const selection::Diagnosis d = selection::diagnose(bench.dataset, bench.base, {});
   outcome.seconds = std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
   outcome.best_score = kNoScore;
-  outcome.verdict = diagnosis::verdict_name(d.verdict);
+  outcome.verdict = selection::verdict_name(d.verdict);
   for (const auto& n : d.named) outcome.named += (outcome.named.empty() ? "" : "+") + label(n.effect, n.order);
   if (d.named.empty()) outcome.named = "-";
   for (std::size_t i = 0; i < d.candidates.size(); ++i) {
-    const diagnosis::Candidate& c = d.candidates[i];
+    const selection::Candidate& c = d.candidates[i];
     if (i < 4)
       outcome.detail += fmt::format(" {}({:.1f},{:.2f}%{})", label(c.effect, c.order), c.score, c.chi2_fall_percent,
                                     c.admissible ? "" : ",x");
-    if (c.admissible) outcome.best_score = std::max(outcome.best_score, c.score + c.score_elsewhere);
+    if (c.admissible) outcome.best_score = std::max(outcome.best_score, c.score + c.other_balance_score);
   }
   const std::vector<std::string> hidden = split(what.hidden, '+');
   if (hidden.empty()) {
@@ -196,8 +196,8 @@ Outcome run(const Case& what) {
   const bool known = std::all_of(hidden.begin(), hidden.end(),
                                  [](const auto& h) { return catalogue::find(h.substr(0, h.find(':'))); });
   if (!known) {
-    outcome.right = d.verdict == diagnosis::Verdict::unknown_structure ||
-                    (d.verdict == diagnosis::Verdict::missing_effect && !d.remaining_structure.empty());
+    outcome.right = d.verdict == selection::Verdict::unknown_structure ||
+                    (d.verdict == selection::Verdict::missing_effect && !d.remaining_structure.empty());
     return outcome;
   }
   if (hidden.size() > 1) {
@@ -209,9 +209,9 @@ Outcome run(const Case& what) {
   outcome.right = outcome.named == truth;
   const std::vector<std::string> group = split(outcome.named, '+');
   outcome.found_all = std::find(group.begin(), group.end(), truth) != group.end();
-  const Balance balance = catalogue::get(truth.substr(0, truth.find(':'))).told_by();
+  const Balance balance = catalogue::get(truth.substr(0, truth.find(':'))).identified_on();
   outcome.missing_over_noise = bench.missing_over_noise(balance);
-  const diagnosis::Addition added = diagnosis::add(bench.dataset, bench.base, truth, {});
+  const selection::Addition added = selection::add(bench.dataset, bench.base, truth, {});
   outcome.holdout_over_floor = *added.after.rmse_holdout / bench.holdout_floor(balance);
   compare_parameters(bench, truth, added, outcome);
   return outcome;

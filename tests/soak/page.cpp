@@ -242,7 +242,7 @@ std::string threshold_header(const std::vector<Outcome>& all, const std::string&
       "// Quantiles of the score: 50 % {:.1f}, 90 % {:.1f}, 99 % {:.1f}. One set in {:.0f} passes the limit, by an "
       "exponential\n// tail above the 90 % quantile whose scale is taken at its upper 95 % bound.\ninline constexpr "
       "double "
-      "kNamedScore = {:.1f};\n\n}}  // namespace flexspline::diagnosis\n",
+      "kNamedScore = {:.1f};\n\n}}  // namespace flexspline::selection\n",
       scores.size(), low, high, version, kinds, quantile(scores, 0.5), quantile(scores, 0.9), quantile(scores, 0.99),
       1.0 / kCalibratedFor, threshold_from(scores, kCalibratedFor));
 }

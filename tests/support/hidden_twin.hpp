@@ -7,7 +7,7 @@
 #include <cstdint>
 #include <string>
 
-#include "host/diagnosis/diagnosis.hpp"
+#include "host/selection/diagnosis.hpp"
 #include "tests/support/twin_data.hpp"
 
 namespace flexspline::testing {
@@ -27,13 +27,13 @@ struct HiddenTwin {
     return *std::find_if(file.drive.effects.begin(), file.drive.effects.end(),
                          [](const plant::Effect& e) { return e.hidden; });
   }
-  diagnosis::Diagnosis diagnose() const { return diagnosis::diagnose(dataset, base, {}); }
+  selection::Diagnosis diagnose() const { return selection::diagnose(dataset, base, {}); }
 };
 
 // "kinematic_error:2+torsion_zero"; empty where nothing is named.
-inline std::string names(const diagnosis::Diagnosis& found) {
+inline std::string names(const selection::Diagnosis& found) {
   std::string list;
-  for (const diagnosis::Named& n : found.named)
+  for (const selection::Named& n : found.named)
     list += (list.empty() ? "" : "+") + n.effect + (n.order ? fmt::format(":{:g}", *n.order) : "");
   return list;
 }

@@ -172,8 +172,8 @@ TEST(ReducedParameters, APivotOfNoughtStaysFinite) {
       std::vector<double> torque(inputs.size(), 0.0);
       std::vector<numbers::Jet> dual(inputs.size(), numbers::Jet(0.0));
       const std::vector<numbers::Jet> lifted_parameters(parameters.begin(), parameters.end());
-      entry.real.torque(parameters.data(), {}, entry.told_by(), inputs, torque.data());
-      entry.dual.torque_of_plain(lifted_parameters.data(), {}, entry.told_by(), inputs, dual.data());
+      entry.real.torque(parameters.data(), {}, entry.identified_on(), inputs, torque.data());
+      entry.dual.torque_of_plain(lifted_parameters.data(), {}, entry.identified_on(), inputs, dual.data());
       for (std::size_t k = 0; k < inputs.size(); ++k) {
         EXPECT_TRUE(std::isfinite(torque[k]) && std::isfinite(dual[k].a) && std::isfinite(dual[k].v[0])) << k;
         // With all linear parameters at nought nothing is left of what has some, to far below any rounding.

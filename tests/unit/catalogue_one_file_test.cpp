@@ -113,12 +113,8 @@ const Reasons& reasons() {
        "what the demo may hide is chosen, so that a newcomer sees something that he knows"},
       {"host/deployment/drive_settings.cpp",
        "loops are laid out for an inertia, and the lead of a feedforward is as slow as the damping lets it"},
-      {"host/diagnosis/diagnose.cpp",
-       "sublinear friction has two formulas, of which one is named as the other's rival"},
-      {"host/diagnosis/trials.cpp", "likewise"},
       {"host/sensitivity/changes.cpp", "the report scales the stiffness, and no other parameter"},
-      {"host/output/effect_curve.cpp", "a shift is drawn on a spring"},
-      {"host/regression/estimates.cpp", "coefficients by direction are made of an even and an odd effect"}};
+      {"host/output/effect_curve.cpp", "a shift is drawn on a spring"}};
   return kReasons;
 }
 
@@ -158,6 +154,12 @@ TEST(AddingAnEffect, IsOneFileAndOneLine) {
   for (const Entry& entry : catalogue::all())
     EXPECT_TRUE(types.contains("shared/effects/" + std::string(entry.name()) + ".hpp")) << entry.name();
   for (const std::string& broken : broken_rules(sources, reasons())) ADD_FAILURE() << broken;
+}
+
+TEST(AddingAnEffect, TheStatisticalEngineHasNoReasonToNameOne) {
+  for (const auto& [path, reason] : reasons())
+    EXPECT_FALSE(path.starts_with("host/estimation/") || path.starts_with("host/selection/"))
+        << path << ": " << reason << "; state it in the effect's header (effects::Description)";
 }
 
 TEST(AddingAnEffect, CheckerSeesWhatBreaksTheRule) {

@@ -169,12 +169,12 @@ TEST(Catalogue, StatesRatiosPerAParameterThatIsThereAndSizesOfAGridAsGrowingShar
 // Where an effect reaches balances beside its own, where its size shows, and which stay on the host.
 TEST(Catalogue, SaysWhatReachesOtherBalancesAndWhatADriveCannotHold) {
   std::map<std::string_view, unsigned> reach;
-  std::set<std::string_view> told_by_motor, host_only;
+  std::set<std::string_view> identified_on_motor, host_only;
   for (const Entry& entry : catalogue::all()) {
     if (entry.info->adds_to != 0) reach[entry.name()] = entry.info->adds_to;
     EXPECT_EQ(entry.info->adds_to & effects::on(entry.info->balance), 0U) << "its own balance needs no mention";
     EXPECT_TRUE(entry.adds_to(entry.info->balance));
-    if (entry.told_by() != entry.info->balance) told_by_motor.insert(entry.name());
+    if (entry.identified_on() != entry.info->balance) identified_on_motor.insert(entry.name());
     if (entry.info->host_only) host_only.insert(entry.name());
   }
   const unsigned motor = effects::on(Balance::motor), load = effects::on(Balance::load);
@@ -183,8 +183,8 @@ TEST(Catalogue, SaysWhatReachesOtherBalancesAndWhatADriveCannotHold) {
                                                          {"torque_sensor_gain", motor | load},
                                                          {"torque_sensor_ripple", motor | load}}));
   // The gain of a sensor and the stiffness behind it are one on the transmission balance.
-  EXPECT_EQ(told_by_motor, (std::set<std::string_view>{"torque_sensor_gain"}));
-  EXPECT_EQ(catalogue::get("torque_sensor_gain").told_by(), Balance::motor);
+  EXPECT_EQ(identified_on_motor, (std::set<std::string_view>{"torque_sensor_gain"}));
+  EXPECT_EQ(catalogue::get("torque_sensor_gain").identified_on(), Balance::motor);
   EXPECT_EQ(host_only, (std::set<std::string_view>{"preisach_hysteresis"}));
 }
 

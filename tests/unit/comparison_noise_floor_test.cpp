@@ -7,17 +7,17 @@
 #include <cstdlib>
 #include <memory>
 
-#include "host/regression/balance_fit.hpp"
+#include "host/estimation/balance_fit.hpp"
 #include "tests/unit/comparison_test_drive.hpp"
 #include "tests/unit/data_test_files.hpp"
 
 namespace flexspline::comparison {
 namespace {
 
+using estimation::Balance;
+using estimation::BalanceData;
 using plant::Mode;
 using plant::Waveform;
-using regression::Balance;
-using regression::BalanceData;
 
 constexpr double kCutoffHz = 30.0;
 
@@ -46,29 +46,29 @@ const Recorded& recorded() {
   return r;
 }
 
-regression::Prepared prepared(const data::Dataset& dataset, const model::Model& m) {
-  regression::PipelineOptions options;
+estimation::Prepared prepared(const data::Dataset& dataset, const model::Model& m) {
+  estimation::PipelineOptions options;
   options.cutoff_hz = kCutoffHz;
-  return regression::prepare(pointers(dataset), m.drive, options);
+  return estimation::prepare(pointers(dataset), m.drive, options);
 }
 
 std::vector<NoiseFloor> floors_of(const data::Dataset& dataset, const model::Model& m, Balance balance) {
-  const regression::Prepared p = prepared(dataset, m);
+  const estimation::Prepared p = prepared(dataset, m);
   BalanceData data(p, balance);
-  return noise_floors(data, regression::terms_of(m), pointers(dataset), m.drive);
+  return noise_floors(data, estimation::terms_of(m), pointers(dataset), m.drive);
 }
 
 // What sensor noise and resolution do to the residual: RMS of its difference from that of noiseless records.
 std::vector<double> true_floors(const Recorded& r, const model::Model& m, Balance balance) {
-  const regression::Prepared p = prepared(r.measured, m);
-  regression::Prepared q = prepared(r.noiseless, m);
+  const estimation::Prepared p = prepared(r.measured, m);
+  estimation::Prepared q = prepared(r.noiseless, m);
   for (std::size_t k = 0; k < p.records.size(); ++k) {
     q.records[k].rows = p.records[k].rows;
     q.records[k].at_rest = p.records[k].at_rest;
   }
   BalanceData a(p, balance), b(q, balance);
-  const auto terms = regression::terms_of(m);
-  const Eigen::VectorXd d = regression::residual_of(a, terms) - regression::residual_of(b, terms);
+  const auto terms = estimation::terms_of(m);
+  const Eigen::VectorXd d = estimation::residual_of(a, terms) - estimation::residual_of(b, terms);
   std::vector<double> floors;
   for (const auto& range : a.records())
     floors.push_back(std::sqrt(d.segment(range.first, range.size()).squaredNorm() / static_cast<double>(range.size())));
@@ -141,12 +141,12 @@ TEST(NoiseFloor, DoesNotCountAnEffectThatTheModelLacks) {
   const Recorded rippled(drive, {plans()[0], plans()[1]});
   const data::Dataset& dataset = rippled.measured;
   const model::Model m = known_model(drive);
-  const regression::Prepared p = prepared(dataset, m);
+  const estimation::Prepared p = prepared(dataset, m);
   BalanceData data(p, Balance::motor);
-  const auto terms = regression::terms_of(m);
+  const auto terms = estimation::terms_of(m);
   const auto floors = noise_floors(data, terms, pointers(dataset), m.drive);
   const auto truth = true_floors(rippled, m, Balance::motor);
-  const Eigen::VectorXd r = regression::residual_of(data, terms);
+  const Eigen::VectorXd r = estimation::residual_of(data, terms);
   for (std::size_t k = 0; k < 2; ++k) {
     const auto& range = data.records()[k];
     const double rmse =
@@ -164,14 +164,14 @@ TEST(NoiseFloor, GivesTheSameAnswerTwice) {
 }
 
 TEST(NoiseFloor, OfAllRecordsWeighsThemByTheirRowsAndIsNamedAfterTheWorstSource) {
-  const std::vector<regression::RowRange> ranges{{0, 0, 30}, {1, 30, 40}};
+  const std::vector<estimation::RowRange> ranges{{0, 0, 30}, {1, 30, 40}};
   const NoiseFloor both = pooled({{1.0, "periods"}, {3.0, "propagated"}}, ranges);
   EXPECT_DOUBLE_EQ(*both.rmse, std::sqrt((30.0 * 1.0 + 10.0 * 9.0) / 40.0));
   EXPECT_EQ(both.from, "propagated");
 }
 
 TEST(NoiseFloor, OfAllRecordsIsNotKnownWhereOneIsNot) {
-  const std::vector<regression::RowRange> ranges{{0, 0, 30}, {1, 30, 40}};
+  const std::vector<estimation::RowRange> ranges{{0, 0, 30}, {1, 30, 40}};
   const NoiseFloor both = pooled({{1.0, "periods"}, {}}, ranges);
   EXPECT_FALSE(both.rmse.has_value());
   EXPECT_EQ(both.from, "none");
@@ -204,12 +204,12 @@ name = "train"
   m.drive.axis = data::Axis::linear;
   for (const char* name : {"inertia", "viscous_friction", "coulomb_friction", "torque_bias"})
     m.effects.push_back(catalogue::blank_effect(catalogue::get(name), data::Axis::linear));
-  regression::PipelineOptions options;
+  estimation::PipelineOptions options;
   options.cutoff_hz = 100.0;
-  const regression::Prepared p = regression::prepare(pointers(dataset), m.drive, options);
+  const estimation::Prepared p = estimation::prepare(pointers(dataset), m.drive, options);
   BalanceData data(p, Balance::motor);
-  regression::Terms terms = regression::terms_of(m);
-  regression::fit_balance(data, terms);
+  estimation::Terms terms = estimation::terms_of(m);
+  estimation::fit_balance(data, terms);
   const auto floors = noise_floors(data, terms, pointers(dataset), m.drive);
   ASSERT_EQ(floors.size(), 1u);
   EXPECT_EQ(floors[0].from, "periods");

@@ -9,20 +9,20 @@
 #include <random>
 
 #include "host/comparison/row_variables.hpp"
-#include "host/regression/least_squares.hpp"
+#include "host/estimation/least_squares.hpp"
 #include "tests/unit/comparison_test_drive.hpp"
 
 namespace flexspline::comparison {
 namespace {
 
+using estimation::Balance;
+using estimation::BalanceData;
 using plant::Mode;
 using plant::Waveform;
-using regression::Balance;
-using regression::BalanceData;
 
 struct Rows {
   data::Dataset dataset;
-  regression::Prepared prepared;
+  estimation::Prepared prepared;
   std::unique_ptr<BalanceData> motor;
   Rows() {
     const plant::Drive drive = plant::demo_plant().drive;
@@ -31,9 +31,9 @@ struct Rows {
                       plan("slow", Mode::velocity, Waveform::triangle, 12.0, 0.4, 5.0),
                       plan("locked", Mode::current, Waveform::sine, 2.0, 0.5, 4.0, true)},
                      1);
-    regression::PipelineOptions options;
+    estimation::PipelineOptions options;
     options.cutoff_hz = 30.0;
-    prepared = regression::prepare(pointers(dataset), known_model(drive).drive, options);
+    prepared = estimation::prepare(pointers(dataset), known_model(drive).drive, options);
     motor = std::make_unique<BalanceData>(prepared, Balance::motor);
   }
   template <class F>
@@ -60,7 +60,7 @@ Eigen::VectorXd noise(Eigen::Index n, std::uint64_t seed) {
 }
 
 std::vector<Share> shares_of(const Eigen::VectorXd& residual) {
-  return localise(*rows().motor, residual, regression::autocorrelation_time(rows().motor->records(), residual));
+  return localise(*rows().motor, residual, estimation::autocorrelation_time(rows().motor->records(), residual));
 }
 
 double share_of(const std::vector<Share>& shares, const std::string& variable) {

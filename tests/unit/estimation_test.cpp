@@ -10,7 +10,7 @@
 namespace flexspline::estimation {
 namespace {
 
-using regression::Estimate;
+using estimation::Estimate;
 using testing::noisy_motion;
 using testing::NoisyMotor;
 
@@ -28,7 +28,7 @@ NoisyMotor quiet() {
   return motor;
 }
 
-const regression::PipelineOptions kFilters{40.0, true};
+const estimation::PipelineOptions kFilters{40.0, true};
 
 const Estimate& of(const Identification& found, std::string_view effect) {
   for (const Estimate& e : found.estimates)

@@ -9,7 +9,7 @@
 #include "host/catalogue/constants.hpp"
 #include "host/catalogue/defined.hpp"
 #include "host/catalogue/formula.hpp"
-#include "host/regression/identify.hpp"
+#include "host/estimation/identify.hpp"
 #include "host/simulation/balances.hpp"
 
 namespace flexspline::catalogue {
@@ -198,9 +198,9 @@ data::Dataset motion(double noise) {
   return dataset;
 }
 
-const regression::Estimate& estimate(const regression::Identification& found, std::string_view id,
+const estimation::Estimate& estimate(const estimation::Identification& found, std::string_view id,
                                      std::string_view parameter) {
-  for (const regression::Estimate& e : found.estimates)
+  for (const estimation::Estimate& e : found.estimates)
     if (e.id == id && e.parameter == parameter) return e;
   throw std::out_of_range(std::string(id));
 }
@@ -213,8 +213,8 @@ TEST(Expression, LinearFormulaGivesTheEstimatesOfTheEffectThatItWrites) {
     if (std::string_view(type) != "inertia") written.effects.push_back(published.effects.back());
   }
   written.effects.push_back(formula_of("c*acceleration", {parameter("c", "kg*m^2", 0.0)}));
-  const auto theirs = regression::identify(dataset, published, {40.0, true});
-  const auto ours = regression::identify(dataset, written, {40.0, true});
+  const auto theirs = estimation::identify(dataset, published, {40.0, true});
+  const auto ours = estimation::identify(dataset, written, {40.0, true});
   const auto& a = estimate(*theirs, "inertia", "inertia");
   const auto& b = estimate(*ours, "mine", "c");
   EXPECT_NEAR(b.value / a.value, 1.0, 1e-12);
@@ -236,8 +236,8 @@ TEST(Expression, ShapesOfAFormulaAreFoundAsThoseOfTheEffectThatItWrites) {
   written.effects.push_back(
       formula_of("direction*exp(-(velocity/vs)^2)*(direction > 0 ? fp : fn)",
                  {parameter("fp", "N*m"), parameter("fn", "N*m"), parameter("vs", "rad/s", 1.0, 20.0)}));
-  const auto theirs = regression::identify(dataset, published, {40.0, true});
-  const auto ours = regression::identify(dataset, written, {40.0, true});
+  const auto theirs = estimation::identify(dataset, published, {40.0, true});
+  const auto ours = estimation::identify(dataset, written, {40.0, true});
   const auto& a = estimate(*theirs, "stribeck_gaussian", "velocity");
   const auto& b = estimate(*ours, "mine", "vs");
   EXPECT_NEAR(b.value / a.value, 1.0, 0.01);

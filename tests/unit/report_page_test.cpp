@@ -7,7 +7,7 @@
 #include <nlohmann/json.hpp>
 
 #include "host/comparison/compare.hpp"
-#include "host/regression/identify.hpp"
+#include "host/estimation/identify.hpp"
 #include "host/report/document.hpp"
 #include "host/report/page.hpp"
 #include "host/report/trace.hpp"
@@ -267,7 +267,7 @@ TEST(ReportDocument, LoadedRecordsDrawALoop) {
 TEST(ReportDocument, AnAdditionIsToldByExperiment) {
   const Case& c = the_case();
   Subject subject = subject_of(c);
-  diagnosis::Addition addition;
+  selection::Addition addition;
   addition.effect = "stribeck_gaussian";
   addition.signal = "motor_balance";
   addition.unit = "N*m";

@@ -123,7 +123,7 @@ Random random_table(Eigen::Index count, Eigen::Index terms, unsigned seed) {
   r.table.model_columns = 2;
   r.table.model_low = {-effects::kUnbounded, -effects::kUnbounded};
   for (Eigen::Index t = 0; t < terms; ++t) {
-    Term term;
+    CandidateTerm term;
     term.name = "term " + std::to_string(t);
     term.entry = &catalogue::all().front();
     term.columns = {2 + t};

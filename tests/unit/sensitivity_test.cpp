@@ -86,7 +86,7 @@ data::Dataset motor_data(std::initializer_list<double> frequencies_hz) {
 }
 
 // Noiseless sines: any filter above them will do, and every sample counts.
-const regression::PipelineOptions kPipeline{.cutoff_hz = 40.0, .mask = false};
+const estimation::PipelineOptions kPipeline{.cutoff_hz = 40.0, .mask = false};
 
 const Variant& variant(const Sensitivity& answer, std::string_view label) {
   for (const Variant& v : answer.variants)

@@ -11,7 +11,7 @@
 #include <nlohmann/json.hpp>
 #include <thread>
 
-#include "host/diagnosis/add.hpp"
+#include "host/selection/add.hpp"
 #include "host/workbench/work.hpp"
 #include "tests/unit/comparison_test_drive.hpp"
 
@@ -350,7 +350,7 @@ TEST_F(WorkbenchApi, StepsOfOneDataSetShareItsRecordsAndFitAsWithoutThem) {
   EXPECT_EQ(opened.pipeline.ready->records.size(), 2u);
   const std::shared_ptr<Step> shared = without_effect(opened, "viscous_friction", {}, say);
   EXPECT_EQ(shared->pipeline.ready, opened.pipeline.ready);
-  const diagnosis::Addition alone = diagnosis::remove(*opened.dataset, opened.model, "viscous_friction", {});
+  const selection::Addition alone = selection::remove(*opened.dataset, opened.model, "viscous_friction", {});
   ASSERT_EQ(shared->model.effects.size(), alone.model.effects.size());
   for (std::size_t e = 0; e < alone.model.effects.size(); ++e)
     for (std::size_t p = 0; p < alone.model.effects[e].parameters.size(); ++p)
@@ -365,7 +365,7 @@ TEST(WorkbenchStep, WhatIsMissingIsSearchedOnceForAllTabsAndAgainWhereASearchGav
   std::atomic<int> searches{0}, waited{0};
   std::thread first([&] {
     EXPECT_THROW(step.diagnose(
-                     [&]() -> diagnosis::Diagnosis {
+                     [&]() -> selection::Diagnosis {
                        ++searches;
                        began.set_value();
                        go.get_future().wait();
@@ -376,11 +376,11 @@ TEST(WorkbenchStep, WhatIsMissingIsSearchedOnceForAllTabsAndAgainWhereASearchGav
   });
   began.get_future().wait();
   // Who waits may go away.
-  EXPECT_THROW(step.diagnose([] { return diagnosis::Diagnosis{}; }, [] { throw GaveUp{}; }), GaveUp);
+  EXPECT_THROW(step.diagnose([] { return selection::Diagnosis{}; }, [] { throw GaveUp{}; }), GaveUp);
   EXPECT_EQ(step.diagnosed(), nullptr);
   const auto search = [&] {
     ++searches;
-    return diagnosis::Diagnosis{};
+    return selection::Diagnosis{};
   };
   std::thread second([&] { step.diagnose(search, [&] { ++waited; }); });
   while (waited == 0) std::this_thread::yield();

@@ -12,7 +12,7 @@
 #include <sstream>
 #include <thread>
 
-#include "host/regression/giving_up.hpp"
+#include "host/estimation/cancellation.hpp"
 
 namespace flexspline::workbench {
 namespace {
@@ -74,10 +74,10 @@ class Supervisor : public ::testing::Test {
 
 TEST_F(Supervisor, AnotherWorkerTakesThePlaceOfOneThatCrashesAndIsToldWhichJobCrashed) {
   const auto failures = failures_after([](JobBoard& board) {
-    const regression::Asking idle, mine;
+    const estimation::CancellationCheck idle, mine;
     const JobBoard::Entry other(&board, {"tab 1", "Showing curves", "a", false}, 1h, &idle);
     std::thread([&] {
-      const regression::MayGiveUp known_by(&mine);
+      const estimation::CancellationScope known_by(&mine);
       const JobBoard::Entry entry(&board, {"tab 2", "Adding coulomb_friction", "b", true}, 1h, &mine);
       raise(SIGSEGV);
     }).join();
@@ -99,7 +99,7 @@ TEST_F(Supervisor, AWorkerThatIsKilledFromOutsideIsReplaced) {
 TEST_F(Supervisor, AJobThatDoesNotEndIsEndedAtItsLimit) {
   const auto begin = std::chrono::steady_clock::now();
   const auto failures = failures_after([](JobBoard& board) {
-    const regression::Asking mine;
+    const estimation::CancellationCheck mine;
     const JobBoard::Entry entry(&board, {"tab", "Identifying", "c", true}, 200ms, &mine);
     for (;;) std::this_thread::sleep_for(1s);
   });
@@ -111,7 +111,7 @@ TEST_F(Supervisor, AJobThatDoesNotEndIsEndedAtItsLimit) {
 
 TEST_F(Supervisor, AJobThatIsCancelledHasLessTimeThanOneThatIsNot) {
   const auto failures = failures_after([](JobBoard& board) {
-    const regression::Asking mine;
+    const estimation::CancellationCheck mine;
     JobBoard::Entry entry(&board, {"tab", "Identifying", "c", true}, 1h, &mine);
     entry.hurry(100ms);
     for (;;) std::this_thread::sleep_for(1s);

@@ -1,0 +1,40 @@
+// Cancellation of long work: a fit asks at each record and each set of columns whether to go on.
+#pragma once
+
+#include <functional>
+#include <utility>
+
+namespace flexspline::estimation {
+
+using CancellationCheck = std::function<void()>;
+
+namespace detail {
+inline thread_local const CancellationCheck* check_of_thread = nullptr;
+}
+
+// For as long as it lives, work of this thread (and what it does in_parallel) asks `ask` again and again; what that
+// throws ends the work. `ask` is called from several threads. Null changes nothing.
+class CancellationScope {
+ public:
+  explicit CancellationScope(const CancellationCheck* ask) : before_(detail::check_of_thread) {
+    if (ask != nullptr) detail::check_of_thread = ask;
+  }
+  ~CancellationScope() { detail::check_of_thread = before_; }
+  CancellationScope(const CancellationScope&) = delete;
+  CancellationScope& operator=(const CancellationScope&) = delete;
+
+ private:
+  const CancellationCheck* before_;
+};
+
+// What threads that are made for this work have to ask; null: nobody.
+inline const CancellationCheck* current_cancellation() {
+  return detail::check_of_thread;
+}
+
+// Throws what the one who is asked throws; costs nothing where nobody is.
+inline void throw_if_cancelled() {
+  if (detail::check_of_thread != nullptr && *detail::check_of_thread) (*detail::check_of_thread)();
+}
+
+}  // namespace flexspline::estimation

@@ -1,0 +1,291 @@
+#include "host/estimation/identify.hpp"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cmath>
+
+#include "host/estimation/least_squares.hpp"
+#include "host/estimation/variable_projection.hpp"
+
+namespace flexspline::estimation {
+namespace {
+
+// Share that a record must add of a parameter's own before its value counts in the table by experiment.
+constexpr double kTellsAlone = 0.03;
+constexpr double kErrorAlone = 0.2;        // and its error must be less than this share of the pooled value
+constexpr double kReliablePercent = 30.0;  // the report's threshold for std/avg
+
+struct Spread {
+  std::optional<double> average, percent;
+};
+
+Spread spread_of(const std::vector<double>& values) {
+  Spread spread;
+  const auto n = static_cast<double>(values.size());
+  if (values.size() < 2) return spread;
+  double mean = 0.0, square = 0.0;
+  for (const double v : values) mean += v / n;
+  for (const double v : values) square += (v - mean) * (v - mean);
+  const double deviation = std::sqrt(square / (n - 1.0));
+  spread.average = mean;
+  // An average that is zero within its error has no meaningful relative spread.
+  if (std::abs(mean) > 2.0 * deviation / std::sqrt(n)) spread.percent = 100.0 * deviation / std::abs(mean);
+  return spread;
+}
+
+// Each record fitted alone, with shapes as pooled.
+void fit_by_experiment(BalanceData& data, const BalanceFit& fit, const Terms& terms, std::vector<Estimate>& estimates,
+                       std::size_t first_estimate) {
+  const Eigen::MatrixXd X = columns_of(data, terms, fit.linear);
+  const Eigen::VectorXd target = data.target() - data.known_torque(terms, fit.on_balance);
+  for (const RowRange& range : data.records()) {
+    if (range.size() < 4 * X.cols()) continue;
+    const LinearFit alone =
+        least_squares(X.middleRows(range.first, range.size()), target.segment(range.first, range.size()),
+                      Eigen::VectorXd::Ones(range.size()));
+    const double noise = alone.residual.squaredNorm() / static_cast<double>(range.size() - X.cols());
+    for (std::size_t j = 0; j < fit.linear.size(); ++j) {
+      const auto c = static_cast<Eigen::Index>(j);
+      const double error = std::sqrt(noise * alone.unit_covariance(c, c) * fit.autocorrelation_time);
+      const bool tells =
+          alone.root_tolerance[c] > kTellsAlone && error < kErrorAlone * std::abs(estimates[first_estimate + j].value);
+      estimates[first_estimate + j].per_experiment.emplace_back(data.prepared().records[range.record].name,
+                                                                tells ? std::optional(alone.theta[c]) : std::nullopt);
+    }
+  }
+}
+
+Estimate estimate_of(const Terms& terms, Slot slot, data::Axis axis) {
+  const Term& term = terms[slot.term];
+  const auto& info = term.entry->parameters[slot.parameter];
+  Estimate e;
+  e.slot = slot;
+  e.id = term.id;
+  e.effect = std::string(term.entry->name());
+  e.parameter = std::string(info.name);
+  e.unit = std::string(catalogue::unit_on(info.unit, axis));
+  e.value = catalogue::natural(*term.entry, term.values)[slot.parameter];
+  e.fixed = term.known[slot.parameter] != 0;
+  return e;
+}
+
+void summarise(Estimate& e) {
+  std::vector<double> values;
+  for (const auto& [name, value] : e.per_experiment)
+    if (value) values.push_back(*value);
+  const Spread spread = spread_of(values);
+  e.average = spread.average;
+  e.spread_percent = spread.percent;
+  e.reliable = !spread.percent || *spread.percent <= kReliablePercent;
+}
+
+Estimate* find_estimate(std::vector<Estimate>& estimates, std::string_view effect, std::string_view parameter) {
+  for (Estimate& e : estimates)
+    if (e.effect == effect && e.parameter == parameter) return &e;
+  return nullptr;
+}
+
+// Tvp = Tv + dTv, Tvn = Tv - dTv and likewise for Coulomb friction (EFFECTS: derived values), where `odd` is half the
+// difference between the directions of `even`. The spread of a difference of directions says little; that of the two
+// directions themselves is what the report compares.
+void derive_directions(const Estimate& even, Estimate& odd, std::string_view symbols, std::vector<Derived>& derived) {
+  const std::vector<std::string_view> names = catalogue::split_names(symbols);
+  derived.push_back({std::string(names[0]), even.value + odd.value, even.unit});
+  derived.push_back({std::string(names[1]), even.value - odd.value, even.unit});
+  std::vector<double> positive, negative;
+  for (std::size_t k = 0; k < std::min(even.per_experiment.size(), odd.per_experiment.size()); ++k)
+    if (even.per_experiment[k].second && odd.per_experiment[k].second) {
+      positive.push_back(*even.per_experiment[k].second + *odd.per_experiment[k].second);
+      negative.push_back(*even.per_experiment[k].second - *odd.per_experiment[k].second);
+    }
+  const Spread p = spread_of(positive), n = spread_of(negative);
+  odd.spread_percent = p.percent && n.percent ? std::optional(std::max(*p.percent, *n.percent)) : std::nullopt;
+  odd.reliable = !odd.spread_percent || *odd.spread_percent <= kReliablePercent;
+}
+
+void derive_directions(std::vector<Estimate>& estimates, std::vector<Derived>& derived) {
+  for (const catalogue::Entry& entry : catalogue::all()) {
+    const effects::Description& info = *entry.info;
+    if (info.asymmetry_of.empty()) continue;
+    const Estimate* even =
+        find_estimate(estimates, info.asymmetry_of, catalogue::get(info.asymmetry_of).parameters.front().name);
+    Estimate* odd = find_estimate(estimates, entry.name(), entry.parameters.front().name);
+    if (even && odd) derive_directions(*even, *odd, info.direction_symbols, derived);
+  }
+}
+
+// The free parameter whose column looks most like that of `j`.
+std::size_t likest(const Eigen::MatrixXd& X, std::size_t j) {
+  std::size_t best = j;
+  double most = 0.0;
+  const auto column = X.col(static_cast<Eigen::Index>(j));
+  for (Eigen::Index k = 0; k < X.cols(); ++k) {
+    if (k == static_cast<Eigen::Index>(j)) continue;
+    const double norm = column.norm() * X.col(k).norm();
+    const double alike = norm > 0.0 ? std::abs(column.dot(X.col(k))) / norm : 0.0;
+    if (alike > most) {
+      most = alike;
+      best = static_cast<std::size_t>(k);
+    }
+  }
+  return best;
+}
+
+constexpr double kAtTheEnd = 0.005;  // of the range
+double share_of_range(const BalanceData& data, const Terms& terms, Slot shape) {
+  const Term& term = terms[shape.term];
+  return shape_range(data, term, shape.parameter).share(term.values[shape.parameter]);
+}
+
+// Standard error that more data do not take away: of filters and differentiation, measured on simulated drives whose
+// noise leaves less (0.02 to 0.07 % of inertia and friction), and of a travel, which no encoder tells within its step.
+double beyond_noise(const BalanceData& data, const effects::ParameterInfo& info, double value) {
+  constexpr double kPipeline = 5e-4;  // of the value
+  constexpr double kOfAStep = 0.5;
+  double step = 0.0;
+  if (info.limit == effects::Limit::travel)
+    for (const RowRange& range : data.records())
+      step = std::max(step, data.prepared().records[range.record].motor_quantum.value_or(0.0));
+  return std::hypot(kPipeline * value, kOfAStep * step);
+}
+
+void warn_of_excitation(BalanceData& data, const BalanceFit& fit, const Terms& terms, Identification& result) {
+  const Eigen::MatrixXd X = columns_of(data, terms, fit.linear);
+  for (std::size_t j = 0; j < fit.linear.size(); ++j) {
+    const Term& term = terms[fit.linear[j].term];
+    const auto c = static_cast<Eigen::Index>(j);
+    const std::string name = fmt::format("{}.{}", term.id, term.entry->parameters[fit.linear[j].parameter].name);
+    if (X.col(c).norm() == 0.0) {
+      result.warnings.push_back(
+          fmt::format("{}: nothing in these data depends on it; record {}", name, term.entry->info->separated_by));
+    } else if (fit.root_tolerance[c] < kUndetermined) {
+      const Slot other = fit.linear[likest(X, j)];
+      result.warnings.push_back(
+          fmt::format("{} cannot be distinguished from {} in these data and is left at zero; record {}", name,
+                      terms[other.term].id, term.entry->info->separated_by));
+    } else if (fit.root_tolerance[c] < 0.03) {
+      const Slot other = fit.linear[likest(X, j)];
+      result.warnings.push_back(fmt::format(
+          "{} is weakly excited: {:.1f} % of its effect is its own, the rest looks like {}; {} would show it", name,
+          100.0 * fit.root_tolerance[c], terms[other.term].id, term.entry->info->separated_by));
+    }
+  }
+  for (std::size_t j = 0; j < fit.shapes.size(); ++j) {
+    const Term& term = terms[fit.shapes[j].term];
+    const double share = share_of_range(data, terms, fit.shapes[j]);
+    if (share < kAtTheEnd || share > 1.0 - kAtTheEnd)
+      result.warnings.push_back(fmt::format("{}.{} stopped at the end of what these data can show ({:.4g}); record {}",
+                                            term.id, term.entry->parameters[fit.shapes[j].parameter].name,
+                                            term.values[fit.shapes[j].parameter], term.entry->info->separated_by));
+  }
+}
+
+// Values of kind grid were set from the data and belong to the model from now on.
+void store_grids(model::Model& model, const Term& term, data::Axis axis) {
+  model::Effect* effect = model.find(term.id);
+  for (std::size_t p = 0; effect && p < term.values.size(); ++p) {
+    const auto& info = term.entry->parameters[p];
+    model::Parameter* parameter = effect->find(info.name);
+    if (info.kind != effects::Kind::grid || !parameter || parameter->value) continue;
+    parameter->value = term.values[p];
+    parameter->unit = std::string(catalogue::unit_on(info.unit, axis));
+    parameter->fixed = true;
+  }
+}
+
+}  // namespace
+
+void store(model::Model& model, const std::vector<Estimate>& estimates) {
+  for (const Estimate& e : estimates) {
+    model::Effect* effect = model.find(e.id);
+    model::Parameter* p = effect ? effect->find(e.parameter) : nullptr;
+    if (!p || e.fixed) continue;
+    p->value = e.value;
+    p->unit = e.unit;
+    p->std = e.std;
+    p->spread_percent = e.spread_percent;
+  }
+}
+
+namespace {
+
+// Estimates of what a fit found, with standard errors and intervals.
+void add_estimates(const BalanceData& data, const BalanceFit& fit, Identification& result) {
+  std::vector<Slot> all = fit.linear;
+  all.insert(all.end(), fit.shapes.begin(), fit.shapes.end());
+  for (std::size_t j = 0; j < all.size(); ++j) {
+    const Slot& slot = all[j];
+    const auto at = static_cast<Eigen::Index>(j);
+    Estimate e = estimate_of(result.terms, slot, result.model.drive.axis);
+    const effects::ParameterInfo& info = result.terms[slot.term].entry->parameters[slot.parameter];
+    e.identifiable = fit.root_tolerance[at] >= kUndetermined;
+    e.excitation = fit.excitation[at];
+    const double variance = natural_value(result.terms[slot.term], slot, all, fit.covariance).variance;
+    if (e.identifiable && std::isfinite(variance)) {
+      e.std = std::hypot(std::sqrt(variance), beyond_noise(data, info, e.value));
+      e.low = e.value - 1.96 * *e.std;
+      e.high = e.value + 1.96 * *e.std;
+      // A length that is shorter than these data can show stops at their end, and may as well be nothing.
+      const bool length = info.limit == effects::Limit::torsion || info.limit == effects::Limit::travel;
+      if (j >= fit.linear.size() && length && info.low >= 0.0 && share_of_range(data, result.terms, slot) < kAtTheEnd)
+        e.low = std::min(*e.low, info.low);
+    }
+    result.estimates.push_back(std::move(e));
+  }
+}
+
+// Average and spread over the experiments.
+void add_spread(const BalanceData& data, const Identification& result, Estimate& e) {
+  const bool per_record = result.terms[e.slot.term].entry->parameters[e.slot.parameter].per_record;
+  if (per_record)
+    for (const RowRange& range : data.records()) {
+      const Record& record = result.prepared.records[range.record];
+      e.per_experiment.emplace_back(record.name, e.value + record.torsion_zero_rad);
+    }
+  summarise(e);
+  if (!per_record) return;
+  // It is meant to differ.
+  e.spread_percent.reset();
+  e.reliable = true;
+}
+
+void store_tables(Identification& result) {
+  for (const auto& [id, learned] : result.tables) {
+    result.model.find(id)->definition->table = learned.table;
+    const auto unseen = std::count(learned.visited.begin(), learned.visited.end(), std::uint8_t{0});
+    if (unseen > 0)
+      result.warnings.push_back(fmt::format(
+          "{}: {} of its {} points lie where these data have no rows; they are drawn on from their neighbours", id,
+          unseen, learned.visited.size()));
+  }
+}
+
+}  // namespace
+
+void assemble(Identification& result) {
+  const data::Axis axis = result.model.drive.axis;
+  std::vector<std::uint8_t> touched(result.terms.size(), 0);
+  for (std::size_t b = 0; b < result.data.size(); ++b) {
+    BalanceData& data = result.data[b];
+    const BalanceFit& fit = result.fits[b];
+    const std::size_t first = result.estimates.size();
+    add_estimates(data, fit, result);
+    fit_by_experiment(data, fit, result.terms, result.estimates, first);
+    for (std::size_t j = first; j < result.estimates.size(); ++j) add_spread(data, result, result.estimates[j]);
+    for (const Slot& slot : result.held[b]) result.estimates.push_back(estimate_of(result.terms, slot, axis));
+    for (const std::size_t t : fit.on_balance) touched[t] = 1;
+    result.condition_number = std::max(result.condition_number, fit.condition_number);
+    warn_of_excitation(data, fit, result.terms, result);
+  }
+  for (std::size_t t = 0; t < result.terms.size(); ++t)
+    if (!touched[t])
+      result.warnings.push_back(fmt::format(
+          "{}: its balance cannot be formed from these data; its parameters are left as they are", result.terms[t].id));
+  for (const Term& term : result.terms) store_grids(result.model, term, axis);
+  store_tables(result);
+  derive_directions(result.estimates, result.derived);
+  store(result.model, result.estimates);
+}
+
+}  // namespace flexspline::estimation

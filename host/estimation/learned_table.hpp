@@ -1,0 +1,61 @@
+// Learns the points of a table effect from the rows of a balance.
+#pragma once
+
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "host/estimation/balance_data.hpp"
+#include "host/estimation/smooth_curve.hpp"
+#include "host/model/model.hpp"
+
+namespace flexspline::estimation {
+
+struct LearnedTable {
+  model::Table table;  // with values and their standard deviations, corrected for autocorrelation
+  // Of rows that were left out of the fit, in fifths of each record: errors without the table and with it, the fall of
+  // their weighted squares, and twice the log likelihood ratio over the autocorrelation time.
+  double rmse_cv_before = 0.0;
+  double rmse_cv_after = 0.0;
+  double fall_percent = 0.0;
+  double score = 0.0;
+  double effective = 0.0;             // numbers that the curve uses
+  std::vector<std::string> left_to;   // effects of the model that hold what the curve and they could both draw
+  std::vector<std::uint8_t> visited;  // one a point: whether rows lie there; else it is drawn from its neighbours
+  Eigen::VectorXd residual;
+  double autocorrelation_time = 1.0;
+};
+
+// What a table is to be learnt over.
+struct TableQuestion {
+  effects::Variable variable{};
+  bool times_direction = false;
+  Balance balance = Balance::motor;
+  std::vector<double> at;         // points to keep; empty: their number and range follow from the data
+  std::size_t most_points = 256;  // where they do
+  bool exactly = false;           // as many as that
+  bool filtered = true;           // else columns as they are at the rows, which cost little
+  bool delay_too = false;         // a delay of the effort stands beside the others
+};
+
+// Fits all free linear parameters of `terms` on this balance and the table together (shapes move to first order), as
+// smooth as left-out rows ask for. A table of `terms` with the id `but` is left out: it is the one to learn. The number
+// of points is the least that predicts left-out rows as well as more would, within a fiftieth of their squares. Nothing
+// where the signal does not vary.
+std::optional<LearnedTable> learn_table(BalanceData& data, const Terms& terms, const TableQuestion& question,
+                                        const Eigen::VectorXd& root_weights, std::string_view but = {});
+
+// The signal at the rows covers this range, but for one row in a thousand at each end.
+struct Covered {
+  double low = 0.0;
+  double high = 0.0;
+};
+Covered covered_range(const Eigen::VectorXd& signal);
+
+// The question that a table of a model asks: its own points where it has some.
+TableQuestion question_of(const model::Definition& definition);
+
+// A table effect with what was learnt; `id` names it.
+model::Effect effect_of(const TableQuestion& question, const model::Table& table, std::string id);
+
+}  // namespace flexspline::estimation

@@ -1,0 +1,475 @@
+#include "host/estimation/record.hpp"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cmath>
+#include <numeric>
+#include <utility>
+
+#include "host/estimation/cancellation.hpp"
+#include "host/estimation/in_parallel.hpp"
+#include "host/estimation/zero_order_hold.hpp"
+#include "host/signals/butterworth.hpp"
+#include "host/signals/cutoff.hpp"
+#include "host/signals/differentiate.hpp"
+
+namespace flexspline::estimation {
+namespace {
+
+using data::Column;
+using data::Experiment;
+using data::Segment;
+using signals::ZeroPhaseFilter;
+
+// Positions are differentiated with a wider filter than rows, so that functions of velocity such as its sign are
+// evaluated on sharp signals and filtered afterwards like the target.
+constexpr double kMotionOverRow = 2.5;
+// Rows per second over the row cut-off: twice the Nyquist rate of what the filter lets through.
+constexpr double kRowsOverCutoff = 4.0;
+
+// How far, in periods of the row cut-off, the step of friction at a reversal rings through the row filter.
+constexpr double kMaskReach = 1.5;
+// Records of less coherent power than this share of the strongest one's do not shape the pipeline.
+constexpr double kCountingPowerShare = 0.01;
+constexpr double kMostMaskedShare = 0.75;
+constexpr double kMaskedShareThen = 0.5;  // where it was more than that
+
+std::vector<double> filtered(const std::vector<double>& signal, const std::vector<Segment>& segments,
+                             const ZeroPhaseFilter& filter) {
+  std::vector<double> result = signal;
+  for (const Segment& s : segments) filter.apply_in_place(std::span<double>(result.data() + s.first, s.last - s.first));
+  return result;
+}
+
+std::vector<double> slope_of(const std::vector<double>& signal, const std::vector<Segment>& segments, double sample_s) {
+  std::vector<double> result(signal.size(), 0.0);
+  for (const Segment& s : segments)
+    signals::central_derivative(std::span<const double>(signal.data() + s.first, s.last - s.first), sample_s,
+                                std::span<double>(result.data() + s.first, s.last - s.first));
+  return result;
+}
+
+struct Motion {
+  std::vector<double> position, velocity;
+  double position_noise = 0.0;  // white, before the filter
+};
+
+// Size of the smallest step of a quantised signal; nothing if it is not quantised.
+std::optional<double> quantum_of(const std::vector<double>& position) {
+  std::vector<double> steps;
+  for (std::size_t k = 1; k < position.size(); ++k) {
+    const double step = std::abs(position[k] - position[k - 1]);
+    if (step > 0.0) steps.push_back(step);
+  }
+  if (steps.size() < 16) return std::nullopt;
+  std::sort(steps.begin(), steps.end());
+  const double smallest = steps[steps.size() / 100];
+  std::size_t whole = 0;
+  for (const double step : steps) {
+    const double multiple = step / smallest;
+    if (std::abs(multiple - std::round(multiple)) < 0.02 * std::max(1.0, multiple * 0.05)) ++whole;
+  }
+  if (10 * whole < 9 * steps.size()) return std::nullopt;
+  return smallest;
+}
+
+// Noise of the derivative over the white noise of the signal, after the filter.
+double derivative_noise_gain(const ZeroPhaseFilter& filter, double sample_s) {
+  const std::size_t half = 4 * filter.settling_samples() + 8;
+  std::vector<double> impulse(2 * half + 1, 0.0);
+  impulse[half] = 1.0;
+  filter.apply_in_place(impulse);
+  const std::vector<double> slope = signals::central_derivative(impulse, sample_s);
+  return std::sqrt(std::inner_product(slope.begin(), slope.end(), slope.begin(), 0.0));
+}
+
+// Root mean square of what a filter has taken away.
+double root_mean_square_of_rest(const std::vector<double>& raw, const std::vector<double>& kept) {
+  if (raw.empty()) return 0.0;
+  double sum = 0.0;
+  for (std::size_t k = 0; k < raw.size(); ++k) sum += (raw[k] - kept[k]) * (raw[k] - kept[k]);
+  return std::sqrt(sum / static_cast<double>(raw.size()));
+}
+
+Motion motion_from_position(const std::vector<double>& raw, const std::vector<Segment>& segments,
+                            const ZeroPhaseFilter& filter, double sample_s) {
+  Motion m;
+  m.position = filtered(raw, segments, filter);
+  m.velocity = slope_of(m.position, segments, sample_s);
+  // The filter keeps a share of the noise; what it takes away stands for the rest.
+  const double kept = std::min(0.8, 2.0 * filter.cutoff_hz() * sample_s);
+  m.position_noise = root_mean_square_of_rest(raw, m.position) / std::sqrt(1.0 - kept);
+  return m;
+}
+
+Motion motion_from_velocity(const std::vector<double>& raw, const std::vector<Segment>& segments,
+                            const ZeroPhaseFilter& filter, double sample_s) {
+  Motion m;
+  m.velocity = filtered(raw, segments, filter);
+  m.position.resize(raw.size(), 0.0);
+  for (const Segment& s : segments)
+    for (std::size_t k = s.first + 1; k < s.last; ++k)
+      m.position[k] = m.position[k - 1] + 0.5 * sample_s * (m.velocity[k] + m.velocity[k - 1]);
+  return m;
+}
+
+// A current that is held for a sample acts, on average, half a sample after its time stamp; the mean with the sample
+// before puts it at the instant at which positions are read.
+std::vector<double> align_held(const std::vector<double>& held, const std::vector<Segment>& segments) {
+  std::vector<double> aligned = held;
+  for (const Segment& s : segments)
+    for (std::size_t k = s.last; k-- > s.first + 1;) aligned[k] = 0.5 * (held[k] + held[k - 1]);
+  return aligned;
+}
+
+// Marks what lies within `reach` samples of a sample for which `bad` holds.
+std::vector<std::uint8_t> spread(const std::vector<std::uint8_t>& bad, std::size_t reach) {
+  std::vector<std::uint8_t> marked(bad.size(), 0);
+  std::ptrdiff_t last = -1;
+  const auto n = static_cast<std::ptrdiff_t>(bad.size());
+  const auto r = static_cast<std::ptrdiff_t>(reach);
+  for (std::ptrdiff_t k = 0; k < n; ++k) {
+    if (!bad[static_cast<std::size_t>(k)]) continue;
+    for (std::ptrdiff_t j = std::max(last + 1, k - r); j <= std::min(n - 1, k + r); ++j) {
+      marked[static_cast<std::size_t>(j)] = 1;
+      last = j;
+    }
+  }
+  return marked;
+}
+
+// Drive off: nothing moves, and the effort changes no more than white noise does. A stuck axis under a changing effort
+// is none: its friction is unknown.
+bool is_at_rest(const Record& record, double motion_span, double resolution) {
+  if (record.locked || record.effort.size() < 16 || motion_span > 2.0 * resolution) return false;
+  double mean = 0.0, steps = 0.0, spread_squared = 0.0;
+  for (std::size_t k = 0; k < record.effort.size(); ++k)
+    mean += record.effort[k] / static_cast<double>(record.effort.size());
+  for (std::size_t k = 1; k < record.effort.size(); ++k) {
+    steps += (record.effort[k] - record.effort[k - 1]) * (record.effort[k] - record.effort[k - 1]);
+    spread_squared += (record.effort[k] - mean) * (record.effort[k] - mean);
+  }
+  // Neighbours of white noise differ by sqrt(2) times its deviation; of noise averaged over two samples by once.
+  return spread_squared <= 2.0 * steps + 1e-12 * mean * mean * static_cast<double>(record.effort.size());
+}
+
+void choose_rows(Record& record, const Pipeline& pipeline, std::size_t settling) {
+  const std::size_t n = record.inputs.size();
+  const auto reach = static_cast<std::size_t>(std::lround(kMaskReach / (pipeline.row_cutoff_hz * record.sample_s)));
+  std::vector<std::uint8_t> unusable(n, 1);
+  for (const Segment& s : record.segments) {
+    // The ends of a segment carry the filters' guess of what lies beyond; short segments keep at least their middle.
+    const std::size_t edge = std::min(settling, (s.last - s.first) / 10);
+    for (std::size_t k = s.first + edge; k + edge < s.last; ++k) unusable[k] = 0;
+  }
+  const std::vector<std::uint8_t> clipped = spread(record.experiment->masked, reach);
+  for (const Balance balance : {Balance::motor, Balance::transmission, Balance::load}) {
+    Rows& rows = record.rows[index(balance)];
+    std::vector<std::uint8_t> unsure(n, 0);
+    if (pipeline.mask && !record.at_rest) {
+      const double visible = 3.0 * record.velocity_noise[index(balance)];
+      for (std::size_t k = 0; k < n; ++k) {
+        const double v = record.direction_variable(balance, k);
+        const double before = k > 0 ? record.direction_variable(balance, k - 1) : v;
+        unsure[k] = std::abs(v) <= visible || v * before < 0.0;  // a position that stays is without noise, too
+      }
+      unsure = spread(unsure, reach);
+    }
+    for (std::size_t k = 0; k < n; k += record.decimation) {
+      if (unusable[k]) continue;
+      if (unsure[k] || (!clipped.empty() && clipped[k]))
+        ++rows.masked;
+      else
+        rows.samples.push_back(k);
+    }
+  }
+}
+
+// The motion of one side, and the noise of its velocity.
+struct Side {
+  Motion motion;
+  double velocity_noise = 0.0;
+  std::optional<double> quantum;
+  bool measured = false;
+};
+
+Side side_from_position(const std::vector<double>& position, std::optional<double> quantum, const Experiment& e,
+                        const ZeroPhaseFilter& filter, double slope_noise) {
+  Side side;
+  side.motion = motion_from_position(position, e.segments, filter, e.sample_s);
+  side.quantum = quantum;
+  side.motion.position_noise = std::max(side.motion.position_noise, quantum.value_or(0.0) / std::sqrt(12.0));
+  side.velocity_noise = side.motion.position_noise * slope_noise;
+  side.measured = true;
+  return side;
+}
+
+Side motor_side(const Experiment& e, const catalogue::DriveConstants<double>& drive, const ZeroPhaseFilter& filter,
+                double slope_noise) {
+  if (e.has(Column::motor_position)) {
+    const std::vector<double>& position = e[Column::motor_position];
+    const std::optional<double> quantum = e.encoder_counts && drive.turn_angle_scale == 1.0
+                                              ? std::optional(2.0 * M_PI / *e.encoder_counts)
+                                              : quantum_of(position);
+    return side_from_position(position, quantum, e, filter, slope_noise);
+  }
+  Side side;
+  if (!e.has(Column::motor_velocity)) return side;
+  side.motion = motion_from_velocity(e[Column::motor_velocity], e.segments, filter, e.sample_s);
+  const double kept = std::min(0.8, 2.0 * filter.cutoff_hz() * e.sample_s);
+  side.velocity_noise =
+      root_mean_square_of_rest(e[Column::motor_velocity], side.motion.velocity) * std::sqrt(kept / (1.0 - kept));
+  side.measured = true;
+  return side;
+}
+
+// Of a load that is free.
+Side output_side(const Experiment& e, const ZeroPhaseFilter& filter, double slope_noise) {
+  if (e.has(Column::output_position)) {
+    const std::vector<double>& position = e[Column::output_position];
+    const std::optional<double> quantum =
+        e.output_encoder_counts ? std::optional(2.0 * M_PI / *e.output_encoder_counts) : quantum_of(position);
+    return side_from_position(position, quantum, e, filter, slope_noise);
+  }
+  Side side;
+  if (!e.has(Column::output_velocity)) return side;
+  side.motion = motion_from_velocity(e[Column::output_velocity], e.segments, filter, e.sample_s);
+  side.measured = true;
+  return side;
+}
+
+// Torques, temperature and effort.
+void take_torques(Record& r, const Experiment& e, const catalogue::DriveConstants<double>& drive,
+                  const ZeroPhaseFilter& filter) {
+  if (e.has(Column::torque)) {
+    r.torque = e[Column::torque];
+    r.inputs.torque = filtered(r.torque, r.segments, filter);
+  }
+  if (e.has(Column::load_torque)) r.load_torque = e[Column::load_torque];
+  if (e.has(Column::temperature)) {
+    // Housings warm up over minutes: all that is faster is noise.
+    const double sample_hz = 1.0 / e.sample_s;
+    const ZeroPhaseFilter slow(2, std::min(0.5, 0.4 * sample_hz), sample_hz);
+    r.inputs.temperature = filtered(e[Column::temperature], r.segments, slow);
+    r.has_temperature = true;
+  }
+  const auto aligned = [&](const std::vector<double>& measured) {
+    return e.current_hold == data::CurrentHold::zoh ? ScaledSignal(align_held(measured, r.segments))
+                                                    : ScaledSignal(measured);
+  };
+  if (e.has(Column::current)) {
+    r.inputs.current = aligned(e[Column::current]);
+    r.effort = r.inputs.current.times(drive.torque_constant);
+  } else if (e.has(Column::motor_torque)) {
+    r.effort = aligned(e[Column::motor_torque]);
+  }
+}
+
+// Motion of both sides, the noise of their directions, and whether the drive is off.
+void take_motion(Record& r, const Experiment& e, Side motor, Side output, double gear_ratio) {
+  r.has_motor_motion = motor.measured;
+  r.has_output_motion = output.measured || r.locked;
+  r.motor_quantum = motor.quantum;
+  r.output_quantum = output.quantum;
+  r.velocity_noise[index(Balance::motor)] = motor.velocity_noise;
+  r.velocity_noise[index(Balance::load)] =
+      r.has_output_motion && output.velocity_noise > 0.0 ? output.velocity_noise : motor.velocity_noise / gear_ratio;
+  r.velocity_noise[index(Balance::transmission)] =
+      std::hypot(motor.velocity_noise / gear_ratio, r.locked ? 0.0 : output.velocity_noise);
+  if (r.has_motor_motion) {
+    const std::vector<double>& p = e.has(Column::motor_position) ? e[Column::motor_position] : motor.motion.position;
+    const auto [low, high] = std::minmax_element(p.begin(), p.end());
+    r.at_rest = is_at_rest(r, *high - *low, std::max(r.motor_quantum.value_or(0.0), motor.motion.position_noise));
+  }
+  r.inputs.angle = std::move(motor.motion.position);
+  r.inputs.velocity = std::move(motor.motion.velocity);
+  r.inputs.output_angle = std::move(output.motion.position);
+  r.inputs.output_velocity = std::move(output.motion.velocity);
+  r.inputs.at_rest = r.at_rest;
+  r.inputs.velocity_noise = r.velocity_noise;
+}
+
+Record prepare_one(const Experiment& e, const catalogue::DriveConstants<double>& drive, const Pipeline& pipeline) {
+  Record r;
+  r.experiment = &e;
+  r.name = e.name;
+  r.locked = e.load == data::Load::locked;
+  r.sample_s = e.sample_s;
+  r.segments = e.segments;
+  const double sample_hz = 1.0 / e.sample_s;
+  r.decimation = std::max<std::size_t>(
+      1, static_cast<std::size_t>(std::floor(sample_hz / (kRowsOverCutoff * pipeline.row_cutoff_hz) + 1e-9)));
+  const ZeroPhaseFilter filter(ZeroPhaseFilter::kDefaultOrder, std::min(pipeline.motion_cutoff_hz, 0.45 * sample_hz),
+                               sample_hz);
+  const double slope_noise = derivative_noise_gain(filter, e.sample_s);
+  r.inputs.resize(e.size());
+  r.inputs.segments = e.segments;
+  r.inputs.sample_s = e.sample_s;
+  r.inputs.gear_ratio = drive.gear_ratio;
+  r.inputs.reference_temperature = drive.reference_temperature;
+  r.inputs.locked = r.locked;
+  take_torques(r, e, drive, filter);
+  take_motion(r, e, motor_side(e, drive, filter, slope_noise), r.locked ? Side{} : output_side(e, filter, slope_noise),
+              drive.gear_ratio);
+  r.inputs.keep_directions();
+  choose_rows(r, pipeline, filter.settling_samples());
+  return r;
+}
+
+// Each reversal masks a stretch that is as long as the rows' filter rings: a cut-off that serves the slow records may
+// leave a fast one nothing at all. Where less than a quarter of a record that counts would be left, raises it until
+// half is.
+void leave_rows_between_reversals(Pipeline& pipeline, const std::vector<const Experiment*>& experiments,
+                                  const std::vector<signals::CutoffChoice>& choices, double highest_hz) {
+  double strongest = 0.0;
+  for (const signals::CutoffChoice& c : choices) strongest = std::max(strongest, c.coherent_power);
+  double wanted = 0.0;
+  const Experiment* fastest = nullptr;
+  for (std::size_t i = 0; i < choices.size(); ++i) {
+    const Experiment& e = *experiments[i];
+    if (!e.has(Column::motor_position) || !(choices[i].coherent_power > kCountingPowerShare * strongest)) continue;
+    const double own_hz = kMotionOverRow * std::max(pipeline.row_cutoff_hz, choices[i].cutoff_hz);
+    const double window_s = std::max(e.sample_s, 1.0 / own_hz);
+    double reversals = 0.0, length_s = 0.0;
+    for (const Segment& s : e.segments) {
+      const double part_s = static_cast<double>(s.last - s.first) * e.sample_s;
+      const std::span<const double> position(e[Column::motor_position].data() + s.first, s.last - s.first);
+      reversals += part_s * signals::reversals_hz(position, e.sample_s, window_s);
+      length_s += part_s;
+    }
+    const double needs = length_s > 0.0 ? 2.0 * kMaskReach / kMostMaskedShare * reversals / length_s : 0.0;
+    if (needs > wanted) {
+      wanted = needs;
+      fastest = &e;
+    }
+  }
+  if (wanted <= pipeline.row_cutoff_hz || pipeline.row_cutoff_hz >= highest_hz) return;
+  pipeline.row_cutoff_hz = std::min(std::ceil(wanted * kMostMaskedShare / kMaskedShareThen), highest_hz);
+  pipeline.reason += fmt::format("; raised to {:.4g} Hz, so that rows are left between the reversals of {}",
+                                 pipeline.row_cutoff_hz, fastest->name);
+}
+
+Pipeline choose_pipeline(const std::vector<const Experiment*>& experiments, const PipelineOptions& options) {
+  Pipeline pipeline;
+  pipeline.mask = options.mask;
+  double slowest_hz = 1e300;
+  for (const Experiment* e : experiments) slowest_hz = std::min(slowest_hz, 1.0 / e->sample_s);
+  if (options.cutoff_hz) {
+    pipeline.row_cutoff_hz = pipeline.motion_cutoff_hz = *options.cutoff_hz;
+    pipeline.reason = "given by --cutoff-hz";
+    if (!(*options.cutoff_hz > 0.0) || *options.cutoff_hz >= 0.45 * slowest_hz)
+      throw data::DataError(
+          {{data::Severity::error, "cutoff", "", 0, "",
+            fmt::format("a cut-off of {} Hz does not fit data sampled at {:.6g} Hz", *options.cutoff_hz, slowest_hz),
+            fmt::format("give --cutoff-hz between 0.1 and {:.4g}", 0.45 * slowest_hz)}});
+    return pipeline;
+  }
+  std::vector<const Experiment*> of_choice;
+  for (const Experiment* e : experiments)
+    if ((e->has(Column::current) || e->has(Column::motor_torque)) &&
+        (e->has(Column::motor_position) || e->has(Column::motor_velocity)))
+      of_choice.push_back(e);
+  std::vector<signals::CutoffChoice> choices(of_choice.size());
+  in_parallel(of_choice.size(), [&](std::size_t i) {
+    const Experiment& e = *of_choice[i];
+    const std::vector<double>& effort = e[e.has(Column::current) ? Column::current : Column::motor_torque];
+    const std::vector<double> velocity = e.has(Column::motor_position)
+                                             ? slope_of(e[Column::motor_position], e.segments, e.sample_s)
+                                             : e[Column::motor_velocity];
+    choices[i] = signals::choose_cutoff(effort, velocity, 1.0 / e.sample_s);
+  });
+  if (choices.empty())
+    throw data::DataError({{data::Severity::error, "missing_column", "", 0, "current_a",
+                            "no experiment has both an effort (current_a or motor_torque_nm) and a motion of the motor",
+                            "record both, or map their columns in dataset.toml"}});
+  const signals::CutoffChoice choice = signals::combine_cutoffs(choices);
+  pipeline.row_cutoff_hz = std::min(choice.cutoff_hz, slowest_hz / 10.0);
+  pipeline.reason = choice.reason;
+  if (pipeline.mask) leave_rows_between_reversals(pipeline, of_choice, choices, slowest_hz / 10.0);
+  pipeline.motion_cutoff_hz = std::min(kMotionOverRow * pipeline.row_cutoff_hz, 0.45 * slowest_hz);
+  return pipeline;
+}
+
+// Facts of the drive that a record is made with.
+bool are_alike(const catalogue::DriveConstants<double>& a, const catalogue::DriveConstants<double>& b) {
+  return a.gear_ratio == b.gear_ratio && a.torque_constant == b.torque_constant &&
+         a.reference_temperature == b.reference_temperature && a.turn_angle_scale == b.turn_angle_scale;
+}
+
+// All but the records.
+Prepared without_records(const std::vector<const Experiment*>& experiments, const model::Drive& drive,
+                         const Pipeline& pipeline) {
+  Prepared prepared;
+  prepared.pipeline = pipeline;
+  prepared.constants = catalogue::constants_of(drive);
+  prepared.rotary = drive.axis == data::Axis::rotary;
+  for (const Experiment* e : experiments) {
+    prepared.torque_measured = prepared.torque_measured || e->has(Column::torque);
+    prepared.effort_is_current = prepared.effort_is_current || e->has(Column::current);
+  }
+  return prepared;
+}
+
+}  // namespace
+
+Prepared prepare_with(const std::vector<const Experiment*>& experiments, const model::Drive& drive,
+                      const Pipeline& pipeline, const Prepared* ready) {
+  Prepared prepared = without_records(experiments, drive, pipeline);
+  prepared.records.resize(experiments.size());
+  const bool is_ready =
+      ready != nullptr && ready->pipeline == pipeline && are_alike(ready->constants, prepared.constants);
+  std::vector<std::size_t> missing;
+  for (std::size_t i = 0; i < experiments.size(); ++i) {
+    if (is_ready) {
+      const auto found = std::ranges::find(ready->records, experiments[i], &Record::experiment);
+      if (found != ready->records.end()) {
+        prepared.records[i] = *found;
+        continue;
+      }
+    }
+    missing.push_back(i);
+  }
+  std::vector<Record> made(missing.size());
+  in_parallel(missing.size(), [&](std::size_t m) {
+    throw_if_cancelled();
+    made[m] = prepare_one(*experiments[missing[m]], prepared.constants, pipeline);
+    correct_zero_order_hold(made[m], prepared.constants, pipeline.torque_per_step);
+  });
+  for (std::size_t m = 0; m < made.size(); ++m) prepared.records[missing[m]] = std::move(made[m]);
+  return prepared;
+}
+
+Prepared prepare(const std::vector<const Experiment*>& experiments, const model::Drive& drive,
+                 const PipelineOptions& options) {
+  if (options.ready && options.ready->chosen_on == experiments &&
+      are_alike(options.ready->constants, without_records(experiments, drive, {}).constants)) {
+    Prepared prepared = prepare_with(experiments, drive, options.ready->pipeline, options.ready.get());
+    prepared.chosen_on = experiments;
+    return prepared;
+  }
+  Prepared prepared = prepare_with(experiments, drive, choose_pipeline(experiments, options));
+  prepared.pipeline.torque_per_step = torque_per_held_step(prepared);
+  for (Record& record : prepared.records)
+    correct_zero_order_hold(record, prepared.constants, prepared.pipeline.torque_per_step);
+  prepared.chosen_on = experiments;
+  return prepared;
+}
+
+Prepared prepare_all(const data::Dataset& dataset, const model::Drive& drive, const PipelineOptions& options) {
+  std::vector<const Experiment*> all, fit;
+  for (const Experiment& e : dataset.experiments) {
+    all.push_back(&e);
+    if (e.role == data::Role::fit) fit.push_back(&e);
+  }
+  if (fit.empty()) fit = all;
+  Prepared prepared = prepare(fit, drive, options);
+  if (fit.size() == all.size()) return prepared;
+  const Prepared* ready =
+      options.ready && options.ready->records.size() == all.size() ? options.ready.get() : &prepared;
+  prepared = prepare_with(all, drive, prepared.pipeline, ready);
+  prepared.chosen_on = std::move(fit);
+  return prepared;
+}
+
+}  // namespace flexspline::estimation

@@ -1,0 +1,60 @@
+// A model as regression sees it: effects with unknown and known parameters.
+#pragma once
+
+#include <string>
+#include <vector>
+
+#include "host/catalogue/constants.hpp"
+#include "host/model/model.hpp"
+
+namespace flexspline::estimation {
+
+using catalogue::Balance;
+
+// One effect of the model.
+struct Term {
+  const catalogue::Entry* entry = nullptr;
+  std::string id;
+  std::vector<double> values;        // in the order of the catalogue, reduced (see effects::ParameterInfo)
+  std::vector<std::uint8_t> known;   // fixed by the user, or given; else estimated
+  std::vector<std::uint8_t> stated;  // has a value in the model, which is where a search starts
+
+  bool adds_torque() const { return entry->adds_torque(); }
+  // Adds a torque that no linear parameter scales.
+  bool scaled_by_none() const { return adds_torque() && entry->count(effects::Kind::linear) == 0; }
+  bool free_linear(std::size_t p) const { return !known[p] && entry->parameters[p].kind == effects::Kind::linear; }
+  bool free_shape(std::size_t p) const { return !known[p] && entry->parameters[p].kind == effects::Kind::shape; }
+  // What it was given beside its name: "torque_ripple:7".
+  std::string label() const;
+};
+
+// A parameter of a term.
+struct Slot {
+  std::size_t term = 0;
+  std::size_t parameter = 0;
+  bool operator==(const Slot&) const = default;
+};
+
+using Terms = std::vector<Term>;
+
+inline std::vector<std::vector<double>> values_of_all(const Terms& terms) {
+  std::vector<std::vector<double>> values;
+  for (const Term& term : terms) values.push_back(term.values);
+  return values;
+}
+
+Term term_of(const model::Effect& effect);
+// A candidate: an effect of the catalogue with nothing known but the order, where it has one.
+Term candidate_term(const catalogue::Entry& entry, std::optional<double> order = std::nullopt);
+Terms terms_of(const model::Model& model);
+
+std::vector<Slot> free_linear_slots(const Terms& terms, const std::vector<std::size_t>& which);
+std::vector<Slot> free_shape_slots(const Terms& terms, const std::vector<std::size_t>& which);
+
+// Terms of a model whose parameters a balance tells. In a drive without a torque sensor the motor balance holds the
+// load's (and, in locked load, the transmission's) terms too.
+std::vector<std::size_t> terms_on(const Terms& terms, Balance balance, bool torque_measured);
+// Terms that add to a balance although another one tells their parameters.
+std::vector<std::size_t> terms_reaching(const Terms& terms, Balance balance, bool torque_measured);
+
+}  // namespace flexspline::estimation

@@ -1,0 +1,55 @@
+// What adding each effect of the catalogue would do on one torque balance.
+#pragma once
+
+#include <optional>
+#include <string>
+#include <string_view>
+#include <vector>
+
+#include "host/selection/balance_search.hpp"
+#include "host/selection/candidate_models.hpp"
+#include "host/selection/cross_validation.hpp"
+#include "host/selection/policy.hpp"
+
+namespace flexspline::selection {
+
+struct CandidateFit {
+  CandidateModel model;
+  CrossValidatedFit fit;
+  LikelihoodGain gain;
+  double other_balance_score = 0.0;    // on the other balances that the effect acts on, with the same parameters
+  double other_balance_percent = 0.0;  // largest fall of left-out chi-square on those
+  bool at_floor_on_others = true;      // likewise
+  bool admissible = true;
+  std::string why_not;
+  std::string confounded_with;  // the effect of the model that the data cannot distinguish it from
+  std::string note;             // what is to be known of it if it is named
+  bool leads = false;  // scores more than a simpler rival that comes first, by too little to tell the two apart
+  bool order_is_not_identifiable =
+      false;  // not admissible for that alone: the usual order, and the best of those that were tried
+
+  double score() const { return gain.score + other_balance_score; }
+};
+
+// Whether an effect may be named: admissible, certain, and large enough to matter.
+bool passes(const CandidateFit& candidate);
+
+// All effects that could be added, best first; the best ones with their shapes searched continuously.
+std::vector<CandidateFit> rank_candidates(BalanceSearch& search);
+// Best first: admissible ones before others, by score; of rivals that leave all but the same error, the simplest.
+void sort_candidates(const BalanceSearch& search, std::vector<CandidateFit>& candidates);
+
+// Forward once more and back: an effect that was named because it resembles the true one is dropped when the true one
+// is in. Returns the candidate to name in the place of `first`, or nothing.
+std::optional<CandidateFit> backward_elimination(BalanceSearch& search, const CandidateFit& first);
+
+// Whether all amplitudes of a law that says what that means came out negative.
+bool is_negative(const CandidateFit& candidate);
+// Whether that holds over so wide a range of speed that it is another law, whatever its formula
+// (effects::Description::wide_negative_is).
+bool is_another_law(const CandidateFit& candidate, const BalanceData& data);
+
+// Where a parameter stands among the linear ones of a cross-validated model, or nothing if it is not estimated there.
+std::optional<std::size_t> position(const CrossValidatedFit& fit, std::string_view id, std::string_view parameter);
+
+}  // namespace flexspline::selection

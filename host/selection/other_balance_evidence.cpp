@@ -1,0 +1,115 @@
+#include "host/selection/other_balance_evidence.hpp"
+#include "host/selection/policy.hpp"
+
+#include <algorithm>
+#include <cmath>
+
+#include "host/estimation/evidence.hpp"
+#include "host/estimation/in_parallel.hpp"
+#include "host/estimation/model_projection.hpp"
+
+namespace flexspline::selection {
+namespace {
+
+// The other balance's own terms as they stand there; all others as the candidate found them.
+Terms as_seen_by(const BalanceSearch& other, const CandidateFit& candidate) {
+  Terms terms = candidate.fit.terms;
+  for (estimation::Term& term : terms) {
+    if (term.entry->identified_on() != other.data->balance()) continue;
+    const auto there = std::find_if(other.base.terms.begin(), other.base.terms.end(),
+                                    [&](const estimation::Term& t) { return t.id == term.id; });
+    if (there != other.base.terms.end()) term = *there;
+  }
+  return terms;
+}
+
+// Free parameters of the added effect that its balance determines, with their values and their places in the
+// covariance.
+struct Identified {
+  std::vector<std::size_t> parameters;
+  std::vector<Eigen::Index> at;
+};
+Identified identified_of(const BalanceSearch& own, CandidateFit& candidate) {
+  Identified identified;
+  CrossValidatedFit& fit = candidate.fit;
+  const std::size_t added = fit.terms.size() - 1;
+  const auto on_balance = estimation::terms_on(fit.terms, own.data->balance(), own.data->prepared().torque_measured);
+  std::vector<Slot> slots = fit.linear;
+  const std::vector<Slot> shapes = estimation::free_shape_slots(fit.terms, on_balance);
+  slots.insert(slots.end(), shapes.begin(), shapes.end());
+  for (std::size_t j = 0; j < slots.size(); ++j) {
+    const auto at = static_cast<Eigen::Index>(j);
+    if (slots[j].term != added || !std::isfinite(fit.covariance(at, at))) continue;
+    identified.parameters.push_back(slots[j].parameter);
+    identified.at.push_back(at);
+    // Shapes stand where they were searched; the fit moved them from there.
+    if (j >= fit.linear.size()) {
+      fit.terms[added].values[slots[j].parameter] += fit.theta[at];
+      fit.theta[at] = 0.0;
+    }
+  }
+  return identified;
+}
+
+// Moves the added effect's parameters to where both balances have them, and returns the score there less what the move
+// costs on the own one.
+double score_on(BalanceSearch& other, CandidateFit& candidate, const Identified& identified) {
+  BalanceData data = *other.data;
+  Terms terms = as_seen_by(other, candidate);
+  const std::size_t added = terms.size() - 1;
+  const double tau = std::max(1.0, other.base.autocorrelation_time);
+  const Eigen::VectorXd residual = other.base.residual - data.term_torque(terms, added);
+  const estimation::Evidence evidence = estimation::evidence_of(
+      estimation::cross_balance_columns(data, terms, added, identified.parameters),
+      estimation::model_columns(data, other.base.terms), residual, other.base.root_weights, tau);
+  const estimation::CombinedEstimate both =
+      estimation::combine(estimation::scaled_inverse(candidate.fit.covariance(identified.at, identified.at)), evidence);
+  if (!both.change.allFinite()) return 0.0;
+  for (std::size_t k = 0; k < identified.parameters.size(); ++k)
+    terms[added].values[identified.parameters[k]] += both.change[static_cast<Eigen::Index>(k)];
+  candidate.fit.terms.back().values = terms[added].values;
+  // No parameter is free there, so none is paid for.
+  const CrossValidatedFit fit = cross_validate(data, terms, other.keep);
+  candidate.at_floor_on_others = candidate.at_floor_on_others && other.at_floor(fit);
+  const LikelihoodGain gain = likelihood_gain(other.base, fit, 0.0);
+  candidate.other_balance_percent = std::max(candidate.other_balance_percent, gain.chi2_percent);
+  return gain.score - both.cost;
+}
+
+bool acts_on(const catalogue::Entry& entry, const BalanceSearch& own, const BalanceSearch& other) {
+  return &other != &own && entry.adds_to(other.data->balance());
+}
+
+}  // namespace
+
+std::vector<BalanceSearch*> other_balances_of(const std::vector<BalanceSearch*>& all, const BalanceSearch& own,
+                                              const CandidateFit& candidate) {
+  std::vector<BalanceSearch*> others;
+  if (!own.data->prepared().torque_measured) return others;  // the motor's balance is the only one
+  for (BalanceSearch* other : all)
+    if (acts_on(*candidate.model.entry, own, *other)) others.push_back(other);
+  return others;
+}
+
+void add_other_balance_evidence(const std::vector<BalanceSearch*>& all, BalanceSearch& own,
+                                std::vector<CandidateFit>& candidates) {
+  // Those as well that the own balance hardly shows: a sensor's offset is a small one to the spring, and all to a
+  // load that moves freely.
+  std::vector<CandidateFit*> acting;
+  for (CandidateFit& candidate : candidates)
+    if (candidate.admissible && !other_balances_of(all, own, candidate).empty()) acting.push_back(&candidate);
+  if (acting.empty()) return;
+  estimation::in_parallel(acting.size(), [&](std::size_t i) {
+    CandidateFit& candidate = *acting[i];
+    const Identified identified = identified_of(own, candidate);
+    if (identified.parameters.empty()) return;
+    for (BalanceSearch* other : other_balances_of(all, own, candidate))
+      candidate.other_balance_score += score_on(*other, candidate, identified);
+    if (candidate.gain.score <= kPolicy.named_score || candidate.score() > kPolicy.named_score) return;
+    candidate.admissible = false;
+    candidate.why_not = "it acts on another torque balance as well, and that one fits worse with it";
+  });
+  sort_candidates(own, candidates);
+}
+
+}  // namespace flexspline::selection

@@ -1,0 +1,204 @@
+#include "host/selection/resampling.hpp"
+
+#include <algorithm>
+#include <cmath>
+
+#include "host/selection/decision.hpp"
+#include "host/selection/policy.hpp"
+#include "host/selection/stability_selection.hpp"
+
+namespace flexspline::selection {
+namespace {
+
+std::vector<Resampling::Support> support_of(const StabilitySelection& selection, const estimation::Terms& terms) {
+  std::vector<Resampling::Support> all;
+  const auto near = [&](const std::string& name) {
+    for (const Frequency& f : selection.result().frequencies)
+      if (f.name == name) return f.near;
+    return 0.0;
+  };
+  for (const CandidateTerm& term : selection.tables().sign.terms) {
+    if (!term.entry) continue;
+    const bool is_there = std::any_of(all.begin(), all.end(), [&](const Resampling::Support& s) {
+      return s.effect == term.entry->name() && s.order == term.order;
+    });
+    if (!is_there) all.push_back({std::string(term.entry->name()), term.order, near(term.name)});
+  }
+  for (const catalogue::Entry* entry : selection.tables().sign.not_visible)
+    all.push_back({std::string(entry->name()), std::nullopt, 0.0});
+  if (const catalogue::Entry* law = presliding_law(terms); law && selection.tables().presliding)
+    all.push_back({std::string(law->name()), std::nullopt, near(kPresliding)});
+  return all;
+}
+
+// Whether a name that resampling chose is that of a candidate, or of another law of its family: resampling has the
+// nonlinear parameters at fixed values only, so which law of the family it is likelihood says.
+bool is_of_family(const std::string& effect, std::optional<double> order, const CandidateFit& candidate) {
+  if (order != candidate.model.order) return false;
+  const std::string_view family = candidate.model.entry->info->family;
+  return effect == candidate.model.entry->name() || (!family.empty() && catalogue::get(effect).info->family == family);
+}
+
+// Of a candidate; nothing where resampling cannot choose it: it has no linear parameter, or more nonlinear ones than
+// one.
+std::optional<double> support_of(const Resampling& resampling, const CandidateFit& candidate) {
+  std::optional<double> support;
+  for (const Resampling::Support& s : resampling.support)
+    if (is_of_family(s.effect, s.order, candidate)) support = std::max(support.value_or(0.0), s.frequency);
+  return support;
+}
+
+bool is_of_effort(const CandidateFit& candidate) {
+  return candidate.model.entry->info->reads == effects::kCurrent;
+}
+
+// Whether the model with the best effect leaves what is known to be noise: as large as a noise floor that no fit made,
+// and no more correlated than the filter makes noise. What is built from the measured effort might explain its own
+// noise there, unless it takes off nearly all.
+bool reaches_floor(const SearchedBalance& e) {
+  if (!e.floor.rmse || !e.names_one()) return false;
+  const CandidateFit& first = e.candidates.front();
+  return std::abs(first.fit.rmse() / *e.floor.rmse - 1.0) < kPolicy.floor_uncertainty &&
+         first.fit.autocorrelation_time <
+             (1.0 + kPolicy.filter_uncertainty) * e.search.data->filter_autocorrelation_time() &&
+         (!is_of_effort(first) || first.gain.chi2_percent > kPolicy.nearly_all_percent);
+}
+
+// Whether the model with the best effect leaves noise: then likelihood is all that decides. A drive whose model lacks
+// more than one effect leaves structure whatever is added, and what takes off a little of it has proved nothing. Where
+// no noise is known, what is left has to be white, and an effect of the effort alone, which might explain its own
+// noise, is not taken.
+bool leaves_noise(const SearchedBalance& e, double whiteness) {
+  const CrossValidatedFit& fit = e.names_one() ? e.candidates.front().fit : e.search.base;
+  if (e.floor.rmse) return fit.rmse() < kPolicy.at_floor * *e.floor.rmse;
+  return whiteness >= kPolicy.white && !(e.names_one() && is_of_effort(e.candidates.front()));
+}
+
+// The effects to name: of what was found in the catalogue, and does not make the held-out error worse, the group with
+// the largest share where it is one that these data cannot distinguish; else all that stand alone. Behind the first,
+// what takes off less than a linear term has to is a remainder of the first one's law, or not worth a parameter.
+std::vector<Named> names_of(const Resampling& resampling) {
+  const double least_percent = 100.0 * kPolicy.line_share;
+  std::vector<Named> names;
+  for (const Resampling::Found& found : resampling.found) {
+    if (found.group.empty() || found.refused_by_holdout) continue;
+    if (names.empty() && found.group.size() > 1) return found.group;
+    if (found.group.size() > 1 || (!names.empty() && found.share_percent < least_percent)) continue;
+    names.push_back(found.group.front());
+  }
+  return names;
+}
+
+}  // namespace
+
+Resampling resample(const std::vector<const data::Experiment*>& experiments, const model::Drive& drive,
+                    const estimation::Terms& terms) {
+  const SelectionPolicy policy;
+  const StabilitySelection selection(experiments, drive, terms, estimation::Balance::motor, policy);
+  const Stability& stability = selection.result();
+  Resampling result;
+  result.subsamples = stability.subsamples;
+  result.too_little = stability.subsamples == 0.0 && selection.tables().sign.model_columns > 0;
+  result.abstained = stability.abstained;
+  result.whiteness = stability.whiteness;
+  result.highest_hz = selection.tables().bandwidth.highest_hz;
+  result.lowest_hz = result.highest_hz * std::pow(policy.bandwidth_factor, static_cast<double>(policy.bandwidths - 1));
+  const std::vector<Found> decided = decide(stability, policy);
+  std::vector<std::string> names;
+  for (const Found& found : decided) names.push_back(found.group.front().name);
+  const std::vector<double> held_out = selection.held_out_ratios(names);
+  for (std::size_t i = 0; i < decided.size(); ++i) {
+    const Found& found = decided[i];
+    Resampling::Found one;
+    for (const Frequency& f : found.group) one.name += (one.name.empty() ? "" : " or ") + f.name;
+    one.frequency = found.frequency;
+    one.share_percent = 100.0 * found.share;
+    one.share_low_percent = 100.0 * found.group.front().share_low;
+    one.share_high_percent = 100.0 * found.group.front().share_high;
+    if (!held_out.empty()) one.held_out_ratio = held_out[i];
+    if (found.in_catalogue)
+      for (const Frequency& f : found.group) {
+        const catalogue::Entry* entry = f.name == kPresliding ? presliding_law(terms) : f.entry;
+        if (entry) one.group.push_back({std::string(entry->name()), f.order});
+      }
+    one.refused_by_holdout =
+        !one.group.empty() && one.held_out_ratio && *one.held_out_ratio > policy.most_held_out_ratio;
+    result.found.push_back(std::move(one));
+  }
+  result.support = support_of(selection, terms);
+  return result;
+}
+
+bool resampling_decides(const Resampling& resampling, const SearchedBalance& motor) {
+  const SelectionPolicy policy;
+  if (resampling.subsamples == 0.0) return resampling.too_little;
+  if (!motor.names_one()) return true;
+  if (reaches_floor(motor)) return false;
+  const CandidateFit& first = motor.candidates.front();
+  const std::optional<double> support = support_of(resampling, first);
+  const bool found_something = std::any_of(resampling.found.begin(), resampling.found.end(),
+                                           [](const auto& f) { return !f.refused_by_holdout; });
+  if (!support && first.gain.chi2_percent > kPolicy.nearly_all_percent && !found_something) return false;
+  const auto is_first = [&](const Named& n) { return is_of_family(n.effect, n.order, first); };
+  const bool found_first = std::any_of(resampling.found.begin(), resampling.found.end(), [&](const auto& f) {
+    return std::any_of(f.group.begin(), f.group.end(), is_first);
+  });
+  if (!resampling.found.empty() && !found_first) return true;
+  const bool silent = resampling.abstained > policy.most_abstaining * resampling.subsamples;
+  if (!silent && support && *support < policy.named_frequency) return true;
+  // What is built from the measured effort explains its noise too.
+  if (!support && is_of_effort(first)) return true;
+  return !leaves_noise(motor, resampling.whiteness);
+}
+
+void name_stable(SearchedBalance& chosen, Diagnosis& result) {
+  result.named = names_of(*result.resampling);
+  const bool is_group = !result.named.empty() && result.resampling->found_group(result.named.front()).size() > 1;
+  result.partial =
+      static_cast<std::ptrdiff_t>(result.resampling->found.size()) > (is_group ? 1 : std::ssize(result.named));
+  if (result.named.empty()) return;
+  // Laws of one family: the one that fits best with its nonlinear parameters searched continuously.
+  for (Named& n : result.named) {
+    const std::string_view family = catalogue::get(n.effect).info->family;
+    if (family.empty()) continue;
+    const CandidateFit* best = nullptr;
+    for (const CandidateFit& t : chosen.candidates)
+      if (t.model.entry->info->family == family && t.admissible && (!best || t.gain.score > best->gain.score))
+        best = &t;
+    if (best) n.effect = std::string(best->model.entry->name());
+  }
+  result.verdict = is_group ? Verdict::confusable_effects : Verdict::missing_effect;
+  const auto is = [](const Candidate& c, const Named& n) { return c.effect == n.effect && c.order == n.order; };
+  auto begin = result.candidates.begin() - result.candidates.begin();
+  for (const Named& n : result.named) {
+    auto at = std::find_if(result.candidates.begin() + begin, result.candidates.end(),
+                           [&](const Candidate& c) { return is(c, n); });
+    if (at == result.candidates.end()) {
+      Candidate c;
+      c.effect = n.effect;
+      c.order = n.order;
+      c.rmse_cv_before = result.base_rmse_cv;
+      c.rmse_cv_after = result.base_rmse_cv;
+      at = result.candidates.insert(result.candidates.end(), std::move(c));
+    }
+    at->admissible = true;
+    at->why_not.clear();
+    for (const Named& other : result.named)
+      if (is_group && !is(*at, other)) at->rivals.push_back(other.effect);
+    std::rotate(result.candidates.begin() + begin, at, at + 1);
+    ++begin;
+  }
+  const auto candidate = std::find_if(chosen.candidates.begin(), chosen.candidates.end(), [&](const CandidateFit& t) {
+    return t.model.entry->name() == result.named.front().effect && t.model.order == result.named.front().order;
+  });
+  if (candidate != chosen.candidates.end()) std::rotate(chosen.candidates.begin(), candidate, candidate + 1);
+}
+
+std::vector<Named> Resampling::found_group(const Named& name) const {
+  for (const Found& one : found)
+    for (const Named& n : one.group)
+      if (n.effect == name.effect && n.order == name.order) return one.group;
+  return {};
+}
+
+}  // namespace flexspline::selection

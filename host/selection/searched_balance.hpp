@@ -1,0 +1,20 @@
+// A balance and all that likelihood found on it.
+#pragma once
+
+#include <vector>
+
+#include "host/comparison/noise_floor.hpp"
+#include "host/selection/candidate_fits.hpp"
+#include "host/selection/confounding.hpp"
+
+namespace flexspline::selection {
+
+struct SearchedBalance {
+  BalanceSearch search;
+  std::vector<CandidateFit> candidates;  // best first
+  comparison::NoiseFloor floor;
+
+  bool names_one() const { return !candidates.empty() && passes(candidates.front()); }
+};
+
+}  // namespace flexspline::selection

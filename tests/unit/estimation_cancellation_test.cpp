@@ -1,0 +1,98 @@
+// A fit that nobody wants any more: whoever asked for it is asked back, and what that throws ends it.
+#include "host/estimation/cancellation.hpp"
+
+#include <gtest/gtest.h>
+
+#include <atomic>
+#include <cmath>
+
+#include "host/catalogue/constants.hpp"
+#include "host/estimation/identify.hpp"
+#include "host/estimation/minimise.hpp"
+#include "host/selection/add.hpp"
+#include "tests/unit/comparison_test_drive.hpp"
+
+namespace flexspline::estimation {
+namespace {
+
+using plant::Mode;
+using plant::Waveform;
+
+struct Enough {};
+
+struct Case {
+  data::Dataset dataset;
+  model::Model model;
+};
+const Case& a_case() {
+  static const Case made = [] {
+    const plant::Drive drive = plant::demo_plant().drive;
+    return Case{comparison::record(drive,
+                                   {comparison::plan("free", Mode::velocity, Waveform::sine, 60.0, 1.0, 3.0),
+                                    comparison::plan("slow", Mode::velocity, Waveform::sine, 5.0, 0.5, 4.0)},
+                                   1),
+                comparison::known_model(drive)};
+  }();
+  return made;
+}
+
+// How often is asked when an effect with shapes is added; the ask of this number throws (zero: none does).
+int asked_until(int last) {
+  std::atomic<int> count{0};
+  const CancellationCheck ask = [&] {
+    if (++count == last) throw Enough{};
+  };
+  const CancellationScope may_give_up(&ask);
+  const auto add = [] { selection::add(a_case().dataset, a_case().model, "stribeck_gaussian", {}); };
+  if (last == 0) {
+    add();
+  } else {
+    EXPECT_THROW(add(), Enough) << "at ask " << last;
+  }
+  return count;
+}
+
+TEST(Cancellation, AFitEndsWhereItIsNoLongerWantedWhetherEarlyOrLate) {
+  const int whole = asked_until(0);
+  // Each record and each set of columns, of the fit before and of the one after.
+  ASSERT_GT(whole, 40);
+  for (const int last : {1, whole / 4, whole / 2, 3 * whole / 4}) {
+    const int asked = asked_until(last);
+    EXPECT_GE(asked, last);
+    EXPECT_LT(asked, whole) << "the rest was done all the same";
+  }
+}
+
+TEST(Cancellation, NobodyIsAskedOnceTheOneWhoAskedIsGone) {
+  int count = 0;
+  const CancellationCheck ask = [&] { ++count; };
+  {
+    const CancellationScope outer(&ask);
+    const CancellationCheck other = [] {};
+    {
+      const CancellationScope inner(&other);
+      throw_if_cancelled();
+    }
+    EXPECT_EQ(count, 0);
+    throw_if_cancelled();
+    EXPECT_EQ(count, 1);
+  }
+  throw_if_cancelled();
+  EXPECT_EQ(count, 1);
+}
+
+TEST(Cancellation, WhatResidualsThrowComesOutOfTheSearchAsItIs) {
+  std::vector<double> x{5.0};
+  int calls = 0;
+  const Residuals residuals = [&](const std::vector<double>& at, Eigen::VectorXd& r, Eigen::MatrixXd* slopes) {
+    if (++calls == 3) throw Enough{};
+    r = Eigen::VectorXd::Constant(1, std::exp(at[0]) - 1.0);
+    if (slopes != nullptr) *slopes = Eigen::MatrixXd::Constant(1, 1, std::exp(at[0]));
+    return true;
+  };
+  EXPECT_THROW(minimise(x, 1, residuals, {}), Enough);
+  EXPECT_EQ(calls, 3) << "the search went on";
+}
+
+}  // namespace
+}  // namespace flexspline::estimation
