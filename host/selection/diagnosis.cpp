@@ -13,6 +13,7 @@
 #include "host/selection/diagnosis.hpp"
 #include "host/selection/disturbances.hpp"
 #include "host/selection/other_balance_evidence.hpp"
+#include "host/selection/record_cross_validation.hpp"
 #include "host/selection/policy.hpp"
 #include "host/selection/resampling.hpp"
 #include "host/selection/searched_balance.hpp"
@@ -121,6 +122,7 @@ std::vector<SearchedBalance> search_balances(estimation::Identification& base,
   for (SearchedBalance& one : all) {
     add_other_balance_evidence(searches, one.search, one.candidates);
     check_orders(searches, one.search, one.candidates);
+    check_carry_over(one.search, one.candidates);
   }
   return all;
 }

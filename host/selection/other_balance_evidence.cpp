@@ -1,6 +1,8 @@
 #include "host/selection/other_balance_evidence.hpp"
 #include "host/selection/policy.hpp"
 
+#include <fmt/format.h>
+
 #include <algorithm>
 #include <cmath>
 
@@ -51,9 +53,43 @@ Identified identified_of(const BalanceSearch& own, CandidateFit& candidate) {
   return identified;
 }
 
+// A parameter beyond its bounds, in words; empty where all lie within them.
+std::string impossible_value(const estimation::Term& term) {
+  for (std::size_t p = 0; p < term.values.size(); ++p) {
+    const effects::ParameterInfo& info = term.entry->parameters[p];
+    if (info.limit != effects::Limit::stated || !info.per.empty() || !info.root_of.empty()) continue;
+    if (term.values[p] < info.low || term.values[p] > info.high)
+      return fmt::format("its {} would be {:.3g} where both balances agree, which is not possible", info.name,
+                         term.values[p]);
+  }
+  return {};
+}
+
+// Whether the effect scales the measured torque, which is the left side of this balance: it changes all parameters of
+// the balance by one factor, and no evidence is in that unless one of them is known.
+bool only_scales(const BalanceSearch& other, const catalogue::Entry& entry) {
+  constexpr unsigned kScale = effects::kTorqueScale | effects::kTorque;
+  if ((entry.info->reads & kScale) != kScale) return false;
+  Terms own;
+  for (const estimation::Term& t : other.base.terms)
+    if (t.entry->identified_on() == other.data->balance()) own.push_back(t);
+  return !states_a_torque(own);
+}
+
+// Twice the log of the Jacobian of a left side from which the added effect takes a share of itself: else a smaller left
+// side would count as a smaller error.
+double jacobian_of(BalanceData& data, const Terms& terms, std::size_t added, double rows, double tau) {
+  constexpr unsigned kScale = effects::kTorqueScale | effects::kTorque;
+  if ((terms[added].entry->info->reads & kScale) != kScale) return 0.0;
+  const Eigen::VectorXd& target = data.target();
+  const double share = data.term_torque(terms, added).dot(target) / std::max(target.squaredNorm(), 1e-300);
+  return 2.0 * rows / tau * std::log(std::max(std::abs(1.0 - share), 1e-300));
+}
+
 // Moves the added effect's parameters to where both balances have them, and returns the score there less what the move
 // costs on the own one.
 double score_on(BalanceSearch& other, CandidateFit& candidate, const Identified& identified) {
+  if (only_scales(other, *candidate.model.entry)) return 0.0;
   BalanceData data = *other.data;
   Terms terms = as_seen_by(other, candidate);
   const std::size_t added = terms.size() - 1;
@@ -68,12 +104,16 @@ double score_on(BalanceSearch& other, CandidateFit& candidate, const Identified&
   for (std::size_t k = 0; k < identified.parameters.size(); ++k)
     terms[added].values[identified.parameters[k]] += both.change[static_cast<Eigen::Index>(k)];
   candidate.fit.terms.back().values = terms[added].values;
+  if (std::string why = impossible_value(terms[added]); !why.empty()) {
+    candidate.admissible = false;
+    candidate.why_not = std::move(why);
+  }
   // No parameter is free there, so none is paid for.
   const CrossValidatedFit fit = cross_validate(data, terms, other.keep);
   candidate.at_floor_on_others = candidate.at_floor_on_others && other.at_floor(fit);
   const LikelihoodGain gain = likelihood_gain(other.base, fit, 0.0);
   candidate.other_balance_percent = std::max(candidate.other_balance_percent, gain.chi2_percent);
-  return gain.score - both.cost;
+  return gain.score + jacobian_of(data, terms, added, other.keep.sum(), tau) - both.cost;
 }
 
 bool acts_on(const catalogue::Entry& entry, const BalanceSearch& own, const BalanceSearch& other) {

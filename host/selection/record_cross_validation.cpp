@@ -1,0 +1,110 @@
+#include "host/selection/record_cross_validation.hpp"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cmath>
+
+#include "host/estimation/in_parallel.hpp"
+#include "host/estimation/model_projection.hpp"
+#include "host/estimation/variable_projection.hpp"
+
+namespace flexspline::selection {
+namespace {
+
+constexpr std::size_t kMostFolds = 6;
+// Relative change of the squares that ends the search for nonlinear parameters: far below what decides.
+constexpr double kSameSquares = 1e-4;
+
+// A model fitted on what `keep` leaves, nonlinear parameters from the values that all records gave.
+CrossValidatedFit fit_without(BalanceData& data, const Terms& terms, const Eigen::VectorXd& keep) {
+  CrossValidatedFit fit = cross_validate(data, terms, keep);
+  const auto on_balance = estimation::terms_on(fit.terms, data.balance(), data.prepared().torque_measured);
+  if (estimation::free_shape_slots(fit.terms, on_balance).empty()) return fit;
+  Terms refined = fit.terms;
+  estimation::refine_shapes(data, refined, on_balance, noise_covariance(data, fit), kSameSquares);
+  return cross_validate(data, std::move(refined), keep);
+}
+
+// Squares that a fit leaves in a record that it has not seen, the record's own random effects predicted from its rows.
+double squares_of(BalanceData& data, const CrossValidatedFit& fit, const RowRange& range, double noise_variance) {
+  const Eigen::VectorXd e = fit.residual.segment(range.first, range.size());
+  if (fit.groups.empty() || fit.random_effects.std.maxCoeff() <= 0.0) return e.squaredNorm();
+  const Eigen::MatrixXd X = estimation::model_columns(data, fit.terms).middleRows(range.first, range.size());
+  const Eigen::MatrixXd Z =
+      X * estimation::random_effect_directions(fit.groups, fit.theta.head(X.cols()), Eigen::VectorXd::Ones(X.cols()),
+                                               static_cast<Eigen::Index>(fit.linear.size()));
+  const RecordErrors errors{static_cast<double>(range.size()), e.squaredNorm(), Z.transpose() * e, Z.transpose() * Z};
+  return (e - Z * estimation::best_linear_predictions(errors, fit.random_effects.std, noise_variance)).squaredNorm();
+}
+
+// Whether a fit identifies at least one parameter of its last term.
+bool identifies_last(const BalanceData& data, const CrossValidatedFit& fit) {
+  const auto on_balance = estimation::terms_on(fit.terms, data.balance(), data.prepared().torque_measured);
+  std::vector<Slot> slots = fit.linear;
+  for (const Slot& shape : estimation::free_shape_slots(fit.terms, on_balance)) slots.push_back(shape);
+  for (std::size_t j = 0; j < slots.size(); ++j)
+    if (slots[j].term + 1 == fit.terms.size() &&
+        fit.root_tolerance[static_cast<Eigen::Index>(j)] > kPolicy.least_orthogonal_share)
+      return true;
+  return false;
+}
+
+bool is_each_records_own(const CandidateFit& candidate) {
+  const auto& parameters = candidate.model.entry->parameters;
+  return std::any_of(parameters.begin(), parameters.end(), [](const auto& p) { return p.per_record; });
+}
+
+}  // namespace
+
+bool CarriedOver::is_refuted() const {
+  return better < kPolicy.named_frequency * (better + worse);
+}
+
+CarriedOver carry_over(const BalanceSearch& search, const CandidateFit& candidate) {
+  const std::vector<RowRange>& ranges = search.data->records();
+  CarriedOver result;
+  if (ranges.size() < estimation::kFewestRecords || is_each_records_own(candidate)) return result;
+  const std::size_t folds = std::min(kMostFolds, ranges.size());
+  // Twice the log-likelihood ratio of each record; zero where it does not count.
+  std::vector<double> gains(ranges.size(), 0.0);
+  estimation::Prepared few;
+  const BalanceData decimated = search.data->decimated(few);
+  estimation::in_parallel(folds, [&](std::size_t fold) {
+    BalanceData data = decimated;
+    Eigen::VectorXd keep = search.keep;
+    for (std::size_t i = fold; i < ranges.size(); i += folds) keep.segment(ranges[i].first, ranges[i].size()).setZero();
+    if (keep.maxCoeff() <= 0.0) return;
+    const CrossValidatedFit with = fit_without(data, candidate.fit.terms, keep);
+    if (!identifies_last(data, with)) return;
+    const CrossValidatedFit without = fit_without(data, search.base.terms, keep);
+    for (std::size_t i = fold; i < ranges.size(); i += folds) {
+      const double tau = std::max(1.0, search.base.autocorrelation_time);
+      const double noise = candidate.fit.random_effects.variance[i] * tau;
+      const double before = squares_of(data, without, ranges[i], noise),
+                   after = squares_of(data, with, ranges[i], noise);
+      gains[i] =
+          static_cast<double>(ranges[i].size()) / tau * std::log(std::max(before, 1e-300) / std::max(after, 1e-300));
+    }
+  });
+  for (const double gain : gains) {
+    result.better += gain > kPolicy.least_gain ? 1 : 0;
+    result.worse += gain < -kPolicy.least_gain ? 1 : 0;
+  }
+  return result;
+}
+
+void check_carry_over(const BalanceSearch& search, std::vector<CandidateFit>& candidates) {
+  constexpr std::size_t kMostRefused = 8;
+  for (std::size_t k = 0; k < kMostRefused && !candidates.empty() && passes(candidates.front()); ++k) {
+    CandidateFit& first = candidates.front();
+    const CarriedOver carried = carry_over(search, first);
+    if (!carried.is_refuted()) return;
+    first.admissible = false;
+    first.why_not = fmt::format("fitted without them, it predicts {} records worse than the model alone, and {} better",
+                                carried.worse, carried.better);
+    sort_candidates(search, candidates);
+  }
+}
+
+}  // namespace flexspline::selection

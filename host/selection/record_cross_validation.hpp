@@ -1,0 +1,24 @@
+// Whether what a candidate explains carries over to records that it was not fitted on: leave-group-out
+// cross-validation by record, nonlinear parameters fitted anew.
+#pragma once
+
+#include "host/selection/candidate_fits.hpp"
+
+namespace flexspline::selection {
+
+// Records that were predicted from the others, by the model alone and with the candidate.
+struct CarriedOver {
+  int better = 0, worse = 0;  // by more than chance (SelectionPolicy::least_gain); others do not decide
+
+  // Fewer than SelectionPolicy::named_frequency of the records that decide are predicted better.
+  bool is_refuted() const;
+};
+
+// A record counts if the others identify the candidate without it. Its own random effects are predicted from its own
+// rows, for both models alike. Nothing counts with fewer than three records, or where a parameter is each record's own.
+CarriedOver carry_over(const BalanceSearch& search, const CandidateFit& candidate);
+
+// Refuses candidates that would be named and do not carry over, best first, until one does. The list stays best first.
+void check_carry_over(const BalanceSearch& search, std::vector<CandidateFit>& candidates);
+
+}  // namespace flexspline::selection
