@@ -128,6 +128,7 @@ void add_source(TableBuilder& builder, const Extension& e, std::size_t nonlinear
     }
     term.columns.push_back(builder.add(std::move(column)));
     term.low.push_back(e.entry.parameters[slots[j].parameter].low);
+    term.high.push_back(e.entry.parameters[slots[j].parameter].high);
   }
   if (term.columns.empty()) return;
   if (corrects_effort && !bound_at_peaks(builder, term)) {

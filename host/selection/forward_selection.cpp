@@ -75,7 +75,11 @@ bool is_possible(const RegressorTable& table, const std::vector<int>& terms, con
     if (t < 0) continue;
     const CandidateTerm& term = table.terms[static_cast<std::size_t>(t)];
     double sum = 0.0;
-    for (const double low : term.low) {
+    for (std::size_t k = 0; k < term.low.size(); ++k) {
+      const double low = term.low[k];
+      // Bounds other than zero are those of what is possible, in the parameter's own unit.
+      const double value = fitted.theta[static_cast<Eigen::Index>(at)] / table.scale[fitted.columns[at]];
+      if ((low < 0.0 && value < low) || (k < term.high.size() && value > term.high[k])) return false;
       sum += fitted.theta[static_cast<Eigen::Index>(at)];
       if (!check(at++, low)) return false;
     }

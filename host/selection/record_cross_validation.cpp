@@ -3,6 +3,7 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <boost/math/distributions/binomial.hpp>
 #include <cmath>
 
 #include "host/estimation/in_parallel.hpp"
@@ -55,10 +56,32 @@ bool is_each_records_own(const CandidateFit& candidate) {
   return std::any_of(parameters.begin(), parameters.end(), [](const auto& p) { return p.per_record; });
 }
 
+// Empty where a candidate carries over.
+std::string why_not(const BalanceSearch& search, const CandidateFit& candidate) {
+  if (is_within_floor_of_few_records(search))
+    return "the error is within 30 % of the noise, and fewer than three records do not show that it carries over";
+  const CarriedOver carried = carry_over(search, candidate);
+  const bool has_resampling = search.data->balance() == estimation::Balance::motor;
+  if (!carried.is_refuted() &&
+      (has_resampling || !search.floor || search.at_floor(candidate.fit) || carried.is_certain()))
+    return {};
+  return fmt::format("fitted without them, it predicts {} records worse than the model alone, and {} better{}",
+                     carried.worse, carried.better,
+                     carried.is_refuted() ? "" : ", too few to be sure with an error that stays above the noise");
+}
+
 }  // namespace
 
 bool CarriedOver::is_refuted() const {
   return better < kPolicy.named_frequency * (better + worse);
+}
+
+bool CarriedOver::is_certain() const {
+  const int all = better + worse;
+  if (all == 0) return false;
+  // Better by chance in so many of all records or more.
+  const boost::math::binomial_distribution<double> chance(all, 0.5);
+  return boost::math::cdf(boost::math::complement(chance, better - 1)) < kPolicy.sign_test_p_value;
 }
 
 CarriedOver carry_over(const BalanceSearch& search, const CandidateFit& candidate) {
@@ -94,15 +117,17 @@ CarriedOver carry_over(const BalanceSearch& search, const CandidateFit& candidat
   return result;
 }
 
+bool is_within_floor_of_few_records(const BalanceSearch& search) {
+  return search.data->records().size() < estimation::kFewestRecords && search.at_floor(search.base);
+}
+
 void check_carry_over(const BalanceSearch& search, std::vector<CandidateFit>& candidates) {
   constexpr std::size_t kMostRefused = 8;
   for (std::size_t k = 0; k < kMostRefused && !candidates.empty() && passes(candidates.front()); ++k) {
     CandidateFit& first = candidates.front();
-    const CarriedOver carried = carry_over(search, first);
-    if (!carried.is_refuted()) return;
+    first.why_not = why_not(search, first);
+    if (first.why_not.empty()) return;
     first.admissible = false;
-    first.why_not = fmt::format("fitted without them, it predicts {} records worse than the model alone, and {} better",
-                                carried.worse, carried.better);
     sort_candidates(search, candidates);
   }
 }

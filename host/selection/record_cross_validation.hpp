@@ -12,13 +12,21 @@ struct CarriedOver {
 
   // Fewer than SelectionPolicy::named_frequency of the records that decide are predicted better.
   bool is_refuted() const;
+  // By the sign test, at SelectionPolicy::sign_test_p_value.
+  bool is_certain() const;
 };
 
 // A record counts if the others identify the candidate without it. Its own random effects are predicted from its own
 // rows, for both models alike. Nothing counts with fewer than three records, or where a parameter is each record's own.
 CarriedOver carry_over(const BalanceSearch& search, const CandidateFit& candidate);
 
-// Refuses candidates that would be named and do not carry over, best first, until one does. The list stays best first.
+// Fewer than three records cannot show that anything carries over, and what filters leave around reversals repeats with
+// the motion: within SelectionPolicy::at_floor of the noise nothing is named from them.
+bool is_within_floor_of_few_records(const BalanceSearch& search);
+
+// Refuses candidates that would be named and do not carry over, best first, until one does. What leaves more than noise
+// has to carry over with certainty where resampling does not decide: parameters that differ from record to record for
+// another reason are followed by any law with enough of them. The list stays best first.
 void check_carry_over(const BalanceSearch& search, std::vector<CandidateFit>& candidates);
 
 }  // namespace flexspline::selection

@@ -26,6 +26,7 @@ struct CandidateTerm {
   std::vector<double> values;  // as estimation::Term has them, where there is an entry
   std::vector<Eigen::Index> columns;
   std::vector<double> low;       // of each column's coefficient
+  std::vector<double> high;      // likewise, where it has one
   bool sum_is_positive = false;  // of the coefficients: amplitudes of a law that may differ by direction
   double most_at_peak = 0.0;     // largest coefficient that is plausible; 0: any
   bool is_placebo = false;

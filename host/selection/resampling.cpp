@@ -5,6 +5,7 @@
 
 #include "host/selection/decision.hpp"
 #include "host/selection/policy.hpp"
+#include "host/selection/record_cross_validation.hpp"
 #include "host/selection/stability_selection.hpp"
 
 namespace flexspline::selection {
@@ -74,14 +75,32 @@ bool leaves_noise(const SearchedBalance& e, double whiteness) {
   return whiteness >= kPolicy.white && !(e.names_one() && is_of_effort(e.candidates.front()));
 }
 
+// Whether the likelihood of all data agrees with a name that resampling chose: half the subsamples may hold nothing
+// above the noise, and what the others chose is then chosen from noise. Where the model alone leaves what is known to
+// be noise, likelihood has to be certain.
+bool likelihood_agrees(const SearchedBalance& motor, const Named& name) {
+  const bool at_floor =
+      motor.floor.rmse && motor.search.base.rmse() < (1.0 + kPolicy.floor_uncertainty) * *motor.floor.rmse;
+  std::optional<double> score;
+  for (const CandidateFit& candidate : motor.candidates)
+    if (is_of_family(name.effect, name.order, candidate))
+      score = std::max(score.value_or(candidate.gain.score), candidate.gain.score);
+  return score ? *score > (at_floor ? kPolicy.named_score : 0.0) : !at_floor;
+}
+
 // The effects to name: of what was found in the catalogue, and does not make the held-out error worse, the group with
 // the largest share where it is one that these data cannot distinguish; else all that stand alone. Behind the first,
 // what takes off less than a linear term has to is a remainder of the first one's law, or not worth a parameter.
-std::vector<Named> names_of(const Resampling& resampling) {
+std::vector<Named> names_of(const Resampling& resampling, const SearchedBalance& motor) {
   const double least_percent = 100.0 * kPolicy.line_share;
   std::vector<Named> names;
+  if (is_within_floor_of_few_records(motor.search)) return names;
   for (const Resampling::Found& found : resampling.found) {
     if (found.group.empty() || found.refused_by_holdout) continue;
+    // Behind the first, likelihood would have to know of that.
+    if (names.empty() && std::none_of(found.group.begin(), found.group.end(),
+                                      [&](const Named& n) { return likelihood_agrees(motor, n); }))
+      continue;
     if (names.empty() && found.group.size() > 1) return found.group;
     if (found.group.size() > 1 || (!names.empty() && found.share_percent < least_percent)) continue;
     names.push_back(found.group.front());
@@ -152,7 +171,7 @@ bool resampling_decides(const Resampling& resampling, const SearchedBalance& mot
 }
 
 void name_stable(SearchedBalance& chosen, Diagnosis& result) {
-  result.named = names_of(*result.resampling);
+  result.named = names_of(*result.resampling, chosen);
   const bool is_group = !result.named.empty() && result.resampling->found_group(result.named.front()).size() > 1;
   result.partial =
       static_cast<std::ptrdiff_t>(result.resampling->found.size()) > (is_group ? 1 : std::ssize(result.named));
