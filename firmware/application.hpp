@@ -19,6 +19,7 @@
 #include "firmware/messages.hpp"
 #include "firmware/parameter_block.hpp"
 #include "firmware/safety.hpp"
+#include "firmware/sequence_lock.hpp"
 #include "firmware/signals.hpp"
 #include "firmware/telemetry.hpp"
 #include "firmware/watchdog.hpp"
@@ -36,12 +37,20 @@ class Application {
   constexpr Application() = default;
   explicit Application(B& board) { begin(board); }
   Application(const Application&) = delete;
-  void begin(B& board) { board_ = &board; }
+  void begin(B& board) {
+    board_ = &board;
+    const control::Hardware hardware = hardware_of(board);
+    most_command_ = control::most_command(hardware);
+    most_reading_ = control::most_reading(hardware);
+    motor_encoder_ = hardware.motor_encoder;
+    output_encoder_ = hardware.output_encoder;
+  }
 
   // The control tick: called by the board's timer, kTickHz times a second. One body, as calls between its parts would
   // take a sixth of it.
   [[gnu::flatten]] void tick() {
     const Readings& readings = board_->read();
+    status_lock_.begin_write();
     ++status_.tick;
     watch_rest(readings.motor_counter);
     watchdog_.report(Part::sensors);
@@ -56,6 +65,7 @@ class Application {
     } else {
       estimate = {};
     }
+    if (has_parameters() && !is_armed(status_.mode)) keep_reference(readings, estimate);
     if (turn == Turn::residual_map && status_.maps_residual && control_.has_residual())
       residual_map_.add(parameters().residual_map, estimate.velocity, estimate.angle, control_.residual());
     take_command(estimate);
@@ -74,6 +84,7 @@ class Application {
     // In a fault already, or on the way to it: what came first is what counts.
     if (board_->tick_overrun() && status_.mode != Mode::fault)
       enter_fault(status_.mode == Mode::stop ? status_.fault : FaultRecord{Fault::tick_overrun, status_.tick, 0, 0});
+    status_lock_.end_write();
   }
 
   // What has time: called again and again from main(), and interrupted by the tick at any point.
@@ -98,10 +109,15 @@ class Application {
     answer_waits_.store(false, std::memory_order_release);
     return answer;
   }
+  // Whether this drive can take a block, where it lies.
+  BlockFinding check(std::span<const std::byte> block) const {
+    return check_block(block, tick_hz_of(*board_), hardware());
+  }
+  control::Hardware hardware() const { return hardware_of(*board_); }
   // Before the first tick: takes the block that lies in flash, at once. Where it is not good the drive has no
   // parameters.
   void boot_with(std::span<const std::byte> block) {
-    const BlockFinding finding = check_block(block, tick_hz_of(*board_));
+    const BlockFinding finding = check(block);
     if (finding == BlockFinding::none) {
       load_block(block, parameters());
       new_parameters_ = true;
@@ -147,7 +163,10 @@ class Application {
   bool at_rest() const { return rest_ticks_ >= kRestTicks; }
 
   Ring& telemetry() { return telemetry_; }
+  // For who calls the tick; or a field of it alone.
   const Status& status() const { return status_; }
+  // The same for background work, which the tick interrupts: all of one tick.
+  Status snapshot() const { return status_lock_.read(status_); }
 
  private:
   enum class BlockStep : std::uint8_t { none, check, wait };
@@ -178,14 +197,14 @@ class Application {
     } else if (owner == Owner::tick && new_parameters_) {
       new_parameters_ = false;
       status_.has_parameters = true;
-      control_.restart();
+      if (control_.restart()) forget_reference();
       safety_ = {};
     }
   }
   // Background work's half: nothing reaches the parameters before the whole block was looked at.
   void take_block() {
     if (block_step_ == BlockStep::check) {
-      const BlockFinding finding = check_block(block_, tick_hz_of(*board_));
+      const BlockFinding finding = check(block_);
       if (finding != BlockFinding::none) return block_done(finding);
       owner_.store(Owner::wanted, std::memory_order_release);
       asked_at_ = status_.tick;
@@ -205,6 +224,64 @@ class Application {
   void block_done(BlockFinding finding) {
     block_step_ = BlockStep::none;
     block_finding_ = finding;
+  }
+
+  // Where the shafts are.
+
+  void forget_reference() {
+    finds_reference_ = true;
+    set_reference(false, false);
+  }
+  void set_reference(bool turn, bool output) {
+    status_.knows_turn = turn;
+    status_.knows_output = output;
+    unknown_ = (turn ? 0U : 1U << 17) | (output ? 0U : 1U << 18);
+    control_.know(turn, output);
+  }
+  // While the drive is not armed: no set point is then at another place.
+  [[gnu::noinline]] void keep_reference(const Readings& readings, Estimate& estimate) {
+    const auto counts = static_cast<std::int32_t>(parameters().motor_encoder.counts);
+    // Counting was interrupted.
+    if (estimate.moved > counts || estimate.moved < -counts) lose_reference();
+    if (status_.mode != Mode::idle) return;
+    using control::SensorKind;
+    if (finds_reference_) {
+      finds_reference_ = false;
+      index_passes_ = readings.index_passes;
+      // A board that does not state its encoders is a simulated one, which wakes at its zero.
+      const bool all = motor_encoder_ == SensorKind::not_stated;
+      const bool turn = all || motor_encoder_ == SensorKind::absolute;
+      const bool output = parameters().has_output_encoder && output_encoder_ == SensorKind::absolute;
+      if (output) control_.take_output(turn);
+      set_reference(turn, all || output);
+      control_.show_angles(estimate);
+    } else if (motor_encoder_ == SensorKind::indexed && !status_.knows_turn && readings.index_passes != index_passes_) {
+      control_.take_index(readings.index_counter);
+      set_reference(true, status_.knows_output);
+      control_.show_angles(estimate);
+    }
+  }
+  // A shaft may have turned unseen. Absolute encoders say where they are once they are good again.
+  void lose_reference() {
+    if (motor_encoder_ == control::SensorKind::not_stated || !has_parameters()) return;
+    if (motor_encoder_ == control::SensorKind::absolute) control_.begin_encoders();
+    forget_reference();
+  }
+  static constexpr bool loses_count(Fault fault) {
+    return fault == Fault::motor_encoder_stale || fault == Fault::motor_encoder_jump ||
+           fault == Fault::motor_encoder_stuck || fault == Fault::implausible_motion ||
+           fault == Fault::encoders_disagree;
+  }
+  Refusal home(const Command& command, const Estimate& estimate) {
+    if (status_.mode == Mode::boot) return Refusal::booting;
+    if (status_.mode == Mode::fault) return Refusal::fault;
+    if (is_armed(status_.mode)) return Refusal::armed;
+    if (!has_parameters()) return Refusal::no_parameters;
+    if (!at_rest() || N::magnitude(estimate.velocity) > parameters().safety.standstill) return Refusal::moving;
+    control_.stand_at(command.position);
+    finds_reference_ = false;
+    set_reference(true, true);
+    return Refusal::none;
   }
 
   // Commands.
@@ -250,6 +327,8 @@ class Application {
         if (!has_parameters()) return Refusal::no_parameters;
         status_.maps_residual = command.kind == Command::Kind::start_map;
         return Refusal::none;
+      case Command::Kind::home:
+        return home(command, estimate);
       case Command::Kind::clear_map:
         if (is_armed(status_.mode)) return Refusal::armed;
         residual_map_.reset();
@@ -286,7 +365,7 @@ class Application {
 
   void judge(const Readings& readings, const Estimate& estimate) {
     const bool needs_output = has_parameters() && parameters().has_output_encoder;
-    FaultRecord found = safety_.check_samples(status_.tick, readings, needs_output);
+    FaultRecord found = safety_.check_samples(status_.tick, readings, needs_output, most_reading_);
     if (found.fault == Fault::none && has_parameters())
       found = safety_.check(status_.tick, readings, estimate, signals_.output, parameters(), status_.mode,
                             control_.streams_in_motion());
@@ -323,6 +402,7 @@ class Application {
     status_.fault = found;
     status_.mode = Mode::fault;
     amplifier_off();
+    if (loses_count(found.fault)) lose_reference();
   }
   void enter_idle() {
     status_.mode = Mode::idle;
@@ -345,7 +425,7 @@ class Application {
   Actuation actuation(const Output& output) const {
     if (!is_armed(status_.mode)) return {};
     const N::Value share = N::scaled(parameters().amplifier, output.current);
-    const std::int64_t most = 32767;
+    const std::int64_t most = most_command_;
     return {
         static_cast<std::int16_t>(fixed::limited(fixed::shift_right(share.raw, fixed::kValueBits - 15), -most, most)),
         true};
@@ -353,12 +433,20 @@ class Application {
 
   void record(const Readings& readings) {
     signals_.state = static_cast<std::uint32_t>(status_.mode) | (static_cast<std::uint32_t>(status_.fault.fault) << 8) |
-                     (signals_.output.limited ? 1U << 16 : 0U);
+                     (signals_.output.limited ? 1U << 16 : 0U) | unknown_;
     signals_.motor_counter = readings.motor_counter;
     telemetry_.record(status_.tick, signals_);
   }
 
   B* board_ = nullptr;
+  std::int32_t most_command_ = 0;  // what the board states, as shares of full scale; from begin() on
+  std::int32_t most_reading_ = 0;
+  control::SensorKind motor_encoder_ = control::SensorKind::not_stated;
+  control::SensorKind output_encoder_ = control::SensorKind::not_stated;
+  bool finds_reference_ = false;
+  std::uint16_t index_passes_ = 0;  // when the drive looked for where it is
+  SequenceLock status_lock_;
+  std::uint32_t unknown_ = 0;  // of the state's word: bit 17 the motor's turn, 18 the output
   Status status_{};
   Demand demand_{};
   Signals signals_{};

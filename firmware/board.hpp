@@ -5,6 +5,8 @@
 #include <concepts>
 #include <cstdint>
 
+#include "shared/control/hardware.hpp"
+
 namespace flexspline::firmware {
 
 // One set of samples, taken together at the start of a tick. Each `..._samples` counts the samples of its source: a
@@ -19,6 +21,9 @@ struct Readings {
   std::int16_t current = 0;
   std::int16_t torque = 0;
   std::int16_t temperature = 0;
+  // Of a motor's encoder with an index pulse: how often it came, and the counter at the last one.
+  std::uint16_t index_passes = 0;
+  std::uint32_t index_counter = 0;
 };
 
 // For the current controller, until the next tick. Not enabled: both switches of every leg open.
@@ -56,6 +61,16 @@ bool amplifier_tripped_of(B& board) {
     return board.amplifier_tripped();
   } else {
     return false;
+  }
+}
+
+// What a board states of itself (shared/control/hardware.hpp); one that states nothing has no such function.
+template <Board B>
+constexpr control::Hardware hardware_of(const B& board) {
+  if constexpr (requires { board.hardware(); }) {
+    return board.hardware();
+  } else {
+    return {};
   }
 }
 

@@ -69,18 +69,20 @@ class Control {
   const Parameters& parameters() const { return p_; }
 
   // At rest and knowing nothing but where the shafts are: after the parameters changed. With another number of counts a
-  // turn an encoder begins anew.
-  [[gnu::noinline]] void restart() {
+  // turn an encoder begins anew. True where one did.
+  [[gnu::noinline]] bool restart() {
+    const bool anew = motor_counts_ != p_.motor_encoder.counts || output_counts_ != p_.output_encoder.counts;
     if (motor_counts_ != p_.motor_encoder.counts) motor_encoder_ = {};
     if (output_counts_ != p_.output_encoder.counts) output_encoder_ = {};
     motor_counts_ = p_.motor_encoder.counts;
     output_counts_ = p_.output_encoder.counts;
-    motor_motion_ = output_motion_ = {};
+    lowest_ = p_.trajectory.lowest;
+    highest_ = p_.trajectory.highest;
     disturbance_ = {};
-    torsion_ = {};
-    ripple_ = {};
-    torque_ripple_ = {};
+    forget_motion();
     off();
+    know(knows_turn_, knows_output_);
+    return anew;
   }
   // The amplifier is off: what the loops remember is void.
   void off() {
@@ -88,6 +90,61 @@ class Control {
     excitation_ = {};
     nominal_ = {};
     compensates_ = false;
+  }
+
+  // Where shafts are. Not of an armed tick.
+
+  // What is known: where a turn of the motor stands, and where the output. What needs it is left out without, effects
+  // of the model as well as limits of position.
+  [[gnu::noinline]] void know(bool turn, bool output) {
+    constexpr std::int64_t kNoLimit = std::int64_t{1} << 62;
+    knows_turn_ = turn;
+    knows_output_ = output;
+    p_.model.note_effects(turn, output);
+    p_.trajectory.lowest = output ? lowest_ : -kNoLimit;
+    p_.trajectory.highest = output ? highest_ : kNoLimit;
+  }
+  // The motor stands at this angle, and the output where it belongs to it.
+  [[gnu::noinline]] void stand_at(N::Angle motor) {
+    observers::EncoderAngle::set(motor_encoder_, p_.motor_encoder, motor);
+    if (p_.has_output_encoder) observers::EncoderAngle::set(output_encoder_, p_.output_encoder, output_of(motor));
+    forget_motion();
+    off();
+  }
+  // The output's angle is true within a turn, which is taken as the one around its zero: how many turns the motor is
+  // from its zero follows, and the rest of a turn as well where that is not true itself. Torsion is far less than half
+  // a turn of the motor.
+  [[gnu::noinline]] void take_output(bool keeps_rest) {
+    const auto shown =
+        static_cast<std::uint64_t>(observers::EncoderAngle::angle(output_encoder_, p_.output_encoder).raw);
+    const N::Angle output{static_cast<std::int32_t>(static_cast<std::uint32_t>(shown))};
+    observers::EncoderAngle::set(output_encoder_, p_.output_encoder, output);
+    std::int64_t low = -(std::int64_t{1} << 56), high = std::int64_t{1} << 56;
+    while (high - low > 1) {
+      const std::int64_t middle = low + (high - low) / 2;
+      (output_of(N::Angle{middle}).raw <= output.raw ? low : high) = middle;
+    }
+    if (keeps_rest) {
+      const std::int64_t now = observers::EncoderAngle::angle(motor_encoder_, p_.motor_encoder).raw;
+      constexpr std::int64_t kHalf = std::int64_t{1} << (fixed::kAngleBits - 1);
+      low = now + ((low - now + kHalf) >> fixed::kAngleBits << fixed::kAngleBits);
+    }
+    observers::EncoderAngle::set(motor_encoder_, p_.motor_encoder, N::Angle{low});
+    forget_motion();
+    off();
+  }
+  // The motor stood at a whole number of turns at that count.
+  [[gnu::noinline]] void take_index(std::uint32_t counter) {
+    observers::EncoderAngle::set_whole_at(motor_encoder_, p_.motor_encoder, counter);
+    forget_motion();
+    off();
+  }
+  // Counts from the counters as they are, as at the start.
+  void begin_encoders() { motor_encoder_ = output_encoder_ = {}; }
+  // After one of these, for the same tick.
+  void show_angles(Estimate& e) const {
+    e.angle = observers::EncoderAngle::angle(motor_encoder_, p_.motor_encoder);
+    if (p_.has_output_encoder) e.output_angle = observers::EncoderAngle::angle(output_encoder_, p_.output_encoder);
   }
 
   // What the sensors say, into `e`: fields of sensors that the drive does not have stay as they are, and those of slow
@@ -193,6 +250,15 @@ class Control {
   }
 
  private:
+  N::Angle output_of(N::Angle motor) const {
+    return N::times_order(motor + p_.feedforward.to_output_zero, p_.feedforward.output_angle);
+  }
+  void forget_motion() {
+    motor_motion_ = output_motion_ = {};
+    torsion_ = {};
+    ripple_ = {};
+    torque_ripple_ = {};
+  }
   static constexpr bool uses_trajectory(Mode mode) {
     return mode == Mode::velocity || mode == Mode::position || mode == Mode::stop;
   }
@@ -288,6 +354,11 @@ class Control {
   // Of the parameters that both encoders' angles were counted with.
   std::uint32_t motor_counts_ = 0;
   std::uint32_t output_counts_ = 0;
+  // Limits of position, as the parameters have them.
+  std::int64_t lowest_ = 0;
+  std::int64_t highest_ = 0;
+  bool knows_turn_ = false;
+  bool knows_output_ = false;
   Mode last_mode_ = Mode::boot;
   bool streams_ = false;
   bool compensates_ = false;

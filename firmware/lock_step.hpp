@@ -43,7 +43,7 @@ struct LockStepUp {
   std::array<std::uint32_t, TelemetrySetup::kMost + 2> frame{};
 };
 
-static_assert(sizeof(LockStepStart) == 20 && sizeof(LockStepDown) == 64 && sizeof(LockStepUp) == 104);
+static_assert(sizeof(LockStepStart) == 20 && sizeof(LockStepDown) == 72 && sizeof(LockStepUp) == 108);
 static_assert(std::is_trivially_copyable_v<LockStepStart> && std::is_trivially_copyable_v<LockStepDown> &&
               std::is_trivially_copyable_v<LockStepUp>);
 

@@ -38,6 +38,7 @@ struct Command {
     start_map,    // residuals count from here on, in any mode in which the model's torque is fed forward
     stop_map,
     clear_map,  // while the drive is not armed, as it takes as long as a tick
+    home,       // the shaft, at rest and not armed, stands at `position`
   };
   Kind kind = Kind::heartbeat;
   Mode mode = Mode::boot;
@@ -74,6 +75,9 @@ struct Status {
   Mode mode = Mode::boot;
   bool has_parameters = false;
   bool maps_residual = false;
+  // Where a turn of the motor stands, and where the output (and so how many turns the motor is from its zero).
+  bool knows_turn = false;
+  bool knows_output = false;
   FaultRecord fault{};  // the one that the drive stands in, or the last one
 };
 

@@ -20,10 +20,11 @@ inline std::span<const std::uint8_t> octets(std::span<const std::byte> bytes) {
 }
 }  // namespace detail
 
-// Whether a drive of this tick rate can take these bytes: BlockFinding::none, or the first reason why not. The span is
-// the block to its last byte; block_bytes() finds that out where it lies in a larger page.
-inline BlockFinding check_block(std::span<const std::byte> block, std::uint32_t tick_hz) {
-  return control::check_for_drive(detail::octets(block), tick_hz).fault;
+// Whether a drive of this tick rate and board can take these bytes: BlockFinding::none, or the first reason why not.
+// The span is the block to its last byte; block_bytes() finds that out where it lies in a larger page.
+inline BlockFinding check_block(std::span<const std::byte> block, std::uint32_t tick_hz,
+                                const control::Hardware& hardware = {}) {
+  return control::check_for_drive(detail::octets(block), tick_hz, hardware).fault;
 }
 // Bytes of the block at the start of a page, as it states them; nought where none begins there or it goes beyond.
 inline std::size_t block_bytes(std::span<const std::byte> page) {

@@ -12,7 +12,8 @@ namespace flexspline::firmware {
 class Safety {
  public:
   // Without parameters there are no scales and no limits: only whether samples come. Returns the first fault found.
-  FaultRecord check_samples(std::uint32_t tick, const Readings& r, bool needs_output) {
+  // `most_reading`: of the current, which no block can raise.
+  FaultRecord check_samples(std::uint32_t tick, const Readings& r, bool needs_output, std::int32_t most_reading) {
     motor_age_ = r.motor_samples == before_.motor_samples ? motor_age_ + 1 : 0;
     output_age_ = r.output_samples == before_.output_samples ? output_age_ + 1 : 0;
     analog_age_ = r.analog_samples == before_.analog_samples ? analog_age_ + 1 : 0;
@@ -23,6 +24,9 @@ class Safety {
     stale(Fault::motor_encoder_stale, motor_age_);
     if (needs_output) stale(Fault::output_encoder_stale, output_age_);
     stale(Fault::analog_stale, analog_age_);
+    const std::int32_t reading = r.current < 0 ? -std::int32_t{r.current} : r.current;
+    above_board_ = reading > most_reading && reading < kRail ? above_board_ + 1 : 0;
+    expect(found, Fault::overcurrent, above_board_ < kOvercurrentTicks, r.current, most_reading);
     before_.motor_samples = r.motor_samples;
     before_.output_samples = r.output_samples;
     before_.analog_samples = r.analog_samples;
@@ -62,6 +66,7 @@ class Safety {
   void begin_mode() { mode_ = Mode::boot; }
 
  private:
+  static constexpr std::int32_t kRail = 32767;  // a reading here is none
   template <class Seen, class Limit>
   static void expect(FaultRecord& found, Fault fault, bool holds, Seen seen, Limit limit) {
     if (holds || found.fault != Fault::none) return;
@@ -235,6 +240,7 @@ class Safety {
   std::uint32_t set_point_age_ = 0;
   std::uint32_t torque_same_ = 0;
   std::uint32_t over_current_ = 0;
+  std::uint32_t above_board_ = 0;
   std::uint32_t hot_ = 0;
   std::uint32_t mismatch_ = 0;
   std::uint32_t unmoved_ = 0;

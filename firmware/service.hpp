@@ -35,7 +35,7 @@ class ApplicationBlocks {
  public:
   explicit ApplicationBlocks(Application& application) : application_(application) {}
   std::uint32_t validate(std::span<const std::uint8_t> block) const {
-    return static_cast<std::uint32_t>(check_block(std::as_bytes(block), kTickHz));
+    return static_cast<std::uint32_t>(application_.check(std::as_bytes(block)));
   }
   void adopt(std::span<const std::uint8_t> block) { application_.offer(std::as_bytes(block)); }
   std::optional<std::uint32_t> adopted() const {
@@ -174,13 +174,19 @@ class Service {
         return identify(m);
       case Kind::status:
       case Kind::effects:
+      case Kind::hardware:
+      case Kind::reference:
       case Kind::block_commit:
+      case Kind::block_erase_all:
       case Kind::map_info: {
         protocol::Empty empty;
         if (!taken(m, empty)) return;
         if (m.request() == Kind::status) return status();
         if (m.request() == Kind::effects) return effects();
+        if (m.request() == Kind::reference) return reference();
+        if (m.request() == Kind::hardware) return finish(Code::done, protocol::Hardware{application_.hardware()});
         if (m.request() == Kind::map_info) return map_info();
+        if (m.request() == Kind::block_erase_all) return erase_all_blocks();
         return commit();
       }
       case Kind::block_begin:
@@ -193,6 +199,8 @@ class Service {
         return read_block(m);
       case Kind::command:
         return command(m);
+      case Kind::home:
+        return home(m);
       case Kind::excitation:
       case Kind::excitation_guard:
       case Kind::excitation_lines:
@@ -229,7 +237,7 @@ class Service {
   }
   void effects() { finish(Code::done, kEffects); }
   void status() {
-    const Status& s = application_.status();
+    const Status s = application_.snapshot();
     protocol::Status out;
     out.tick = s.tick;
     out.mode = static_cast<protocol::Mode>(s.mode);
@@ -247,6 +255,11 @@ class Service {
     finish(Code::done, out);
   }
 
+  void reference() {
+    const Status s = application_.snapshot();
+    finish(Code::done, protocol::Reference{s.knows_turn, s.knows_output});
+  }
+
   // Blocks.
 
   void begin_block(const protocol::Message& m) {
@@ -255,6 +268,12 @@ class Service {
     if (armed()) return finish(Code::armed);
     if (!application_.at_rest()) return finish(Code::moving);
     finish(code_of(store_.begin(begin.bytes, begin.crc)));
+  }
+  // Factory reset: the parameters in use stay until the next start.
+  void erase_all_blocks() {
+    if (armed()) return finish(Code::armed);
+    if (!application_.at_rest()) return finish(Code::moving);
+    finish(code_of(store_.erase_all()));
   }
   void take_chunk(const protocol::Message& m) {
     protocol::Chunk chunk;
@@ -299,10 +318,22 @@ class Service {
 
   // Commands.
 
+  static constexpr std::int64_t kFarthest = std::int64_t{1} << 62;
+  void home(const protocol::Message& m) {
+    protocol::Home wanted;
+    if (!taken(m, wanted)) return;
+    // As far as an encoder's turns are counted.
+    constexpr std::int64_t kMost = std::int64_t{1} << 56;
+    if (wanted.position <= -kMost || wanted.position >= kMost) return finish(Code::wrong_value);
+    command_ = {};
+    command_.kind = Command::Kind::home;
+    command_.position = {wanted.position};
+    command_.number = ++command_number_;
+    submit();
+  }
   void command(const protocol::Message& m) {
     protocol::Command c;
     if (!taken(m, c)) return;
-    constexpr std::int64_t kFarthest = std::int64_t{1} << 62;
     for (const std::int32_t word : {c.velocity, c.acceleration, c.current})
       if (word == INT32_MIN) return finish(Code::wrong_value);
     if (c.position <= -kFarthest || c.position >= kFarthest) return finish(Code::wrong_value);

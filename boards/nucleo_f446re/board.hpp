@@ -15,6 +15,10 @@ inline constexpr Pin kEnable{'C', 8, PinMode::output, 0, Pull::down};
 
 struct Description {
   static constexpr std::string_view kName = "nucleo_f446re";
+  // Current sensor and amplifier are those of the servo amplifier that is connected: set its full scales and its largest
+  // current here, and no block can say otherwise.
+  static constexpr control::Hardware kHardware{.motor_encoder = control::SensorKind::incremental,
+                                               .output_encoder = control::SensorKind::incremental};
   // 8 MHz come from the programmer on the board, not from a crystal.
   static constexpr stm32f4::ClockSetup kClock{.crystal_hz = 8'000'000, .bypass = true, .core_hz = 160'000'000};
   static constexpr std::array kPins{

@@ -1,5 +1,5 @@
 // The board that the application is a template over (firmware/board.hpp), from what a description of a board says. A
-// description has: kClock, kPins, kAnalog, kParameterSector, kMotorReversed, kOutputReversed, kName, and types
+// description has: kClock, kPins, kAnalog, kHardware, kParameterSector, kMotorReversed, kOutputReversed, kName, and types
 // MotorEncoder, OutputEncoder, Amplifier, Serial and Usb (NoUsb where there is none).
 #pragma once
 
@@ -66,6 +66,7 @@ class DriveBoard {
     amplifier_.actuate(wanted, readings_.current);
     enabled_ = wanted.enabled;
   }
+  static constexpr control::Hardware hardware() { return Description::kHardware; }
   bool amplifier_tripped() const { return amplifier_.tripped(); }
   // The next set of samples is there already.
   bool tick_overrun() {

@@ -68,7 +68,7 @@ class Drive {
           device.poll();
         }
         if (!device.configured()) serial_link.turn();
-        if (update.turn(application_.status(), device.configured(), device.template get<usb::DfuRuntime>())) {
+        if (update.turn(application_.snapshot(), device.configured(), device.template get<usb::DfuRuntime>())) {
           port.stop();
           ask_for_loader();
           cortex_m4::reset_processor();

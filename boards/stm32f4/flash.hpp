@@ -31,25 +31,33 @@ class Flash {
   // False: the memory reported an error, or did not end in time.
   bool erase(std::uint32_t sector) {
     const bool good = run(kErase | (sector << 3), 0, 0, true);
-    // What the data cache holds of the sector is old (RM0090, 3.5.2).
-    clear_bits(kFlash, kDataCache);
-    set_bits(kFlash, kDataCacheReset);
-    clear_bits(kFlash, kDataCacheReset);
-    set_bits(kFlash, kDataCache);
+    reset_caches();
     return good;
   }
   // A word at an address that four divides.
-  bool program(std::uint32_t address, std::uint32_t value) { return run(kProgram, address, value, false); }
+  bool program(std::uint32_t address, std::uint32_t value) {
+    const bool good = run(kProgram, address, value, false);
+    reset_caches();
+    return good;
+  }
 
  private:
   static constexpr std::uint32_t kKey = kFlash + 0x04, kStatus = kFlash + 0x0C, kControl = kFlash + 0x10;
   static constexpr std::uint32_t kBusy = 1U << 16, kErrors = 0xF2, kEnd = 1U << 0;
   static constexpr std::uint32_t kProgram = 1U << 0, kErase = 1U << 1, kWords = 2U << 8, kStart = 1U << 16,
                                  kLock = 1U << 31;
-  static constexpr std::uint32_t kDataCache = 1U << 10, kDataCacheReset = 1U << 12;
+  static constexpr std::uint32_t kCaches = 3U << 9, kCacheResets = 3U << 11;  // of instructions and of data
   // An erase takes 2 s at most (128 KB); reading the register from a memory that is busy takes as long as that anyway.
   static constexpr std::uint32_t kTries = 50'000'000;
 
+  // What both caches hold of the memory is old, instructions as well where an image was written (RM0090, 3.5.2). A
+  // cache is reset while it is off.
+  static void reset_caches() {
+    clear_bits(kFlash, kCaches);
+    set_bits(kFlash, kCacheResets);
+    clear_bits(kFlash, kCacheResets);
+    set_bits(kFlash, kCaches);
+  }
   bool run(std::uint32_t what, std::uint32_t address, std::uint32_t value, bool starts) {
     busy_.flash_works();
     if (!wait_for(kStatus, kBusy, 0, kTries)) return false;

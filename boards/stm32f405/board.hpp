@@ -15,12 +15,26 @@ using stm32f4::Pin, stm32f4::PinMode, stm32f4::Pull;
 inline constexpr Pin kEnable{'C', 6, PinMode::output, 0, Pull::down};
 
 #ifdef FLEXSPLINE_PWM
+// What the board's current sensor and bridge are, and the most that it gives. The torque sensor and the thermometer are
+// whatever is connected, so a block alone states their scales.
+inline constexpr control::Hardware kStated{.current_full_scale_ma = 8'000,
+                                           .amplifier_full_scale_ma = 5'000,
+                                           .most_current_ma = 5'000,
+                                           .motor_encoder = control::SensorKind::incremental,
+                                           .output_encoder = control::SensorKind::incremental};
 // To be set for the motor and the supply, README.md says how. These are for 0.25 mH and 0.5 ohm, 5 A, 24 V, corner 6280
 // rad/s.
-inline constexpr stm32f4::BridgeSetup kBridge{.dead_time_cycles = 84,  // 500 ns
-                                              .most_duty_percent = 94,
-                                              .loop = {.proportional = 84, .integral = 2143, .limit = 30'800},
-                                              .sensor_over_amplifier_q12 = 6554};  // 8 A over 5 A
+inline constexpr stm32f4::BridgeSetup kBridge{
+    .dead_time_cycles = 84,  // 500 ns
+    .most_duty_percent = 94,
+    .loop = {.proportional = 84, .integral = 2143, .limit = 30'800},
+    .sensor_over_amplifier_q12 =
+        static_cast<std::int32_t>(kStated.current_full_scale_ma * 4096 / kStated.amplifier_full_scale_ma)};
+#else
+// Current sensor and amplifier are those of the servo amplifier that is connected: set its full scales and its largest
+// current here, and no block can say otherwise.
+inline constexpr control::Hardware kStated{.motor_encoder = control::SensorKind::incremental,
+                                           .output_encoder = control::SensorKind::incremental};
 #endif
 
 struct Description {
@@ -30,6 +44,7 @@ struct Description {
 #else
   static constexpr std::string_view kName = "stm32f405-dac";
 #endif
+  static constexpr control::Hardware kHardware = kStated;
   static constexpr stm32f4::ClockSetup kClock{.crystal_hz = 8'000'000, .core_hz = 168'000'000};
   static constexpr std::array kPins{
       kEnable,
@@ -68,10 +83,10 @@ struct Description {
   static constexpr std::uint32_t kBaud = 115'200;
   static constexpr bool kHasUsb = true;
   static constexpr std::uint32_t kParameterSector = 1;  // and the next
-  static constexpr std::uint32_t kApplicationSector = 4;
-  // Application, download and the application before, 64 KB each (application.ld).
+  static constexpr std::uint32_t kApplicationSector = 5;
+  // Application, download and the application before, 96 KB each (application.ld).
   template <class Busy>
-  using Images = stm32f4::ImageFlash<Busy, 0x10000, 4, 5, 6>;
+  using Images = stm32f4::ImageFlash<Busy, 0x18000, 5, 6, 7>;
 };
 
 }  // namespace flexspline::stm32f405

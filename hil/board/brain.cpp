@@ -70,6 +70,7 @@ void SoftwareBrain::start(const Block& block, const firmware::TelemetrySetup& te
   board_ = {};
   board_.tick_hz = tick_hz;
   board_.cause = cause;
+  board_.hardware_stated = hardware_;
   application_ = std::make_unique<firmware::Application<SoftwareBoard>>(board_);
   application_->telemetry().configure(telemetry_);
   if (!flash_.empty()) application_->boot_with(flash_.bytes());

@@ -54,7 +54,10 @@ class SoftwareBoard {
   void feed_watchdog() { ticks_since_fed = 0; }
   firmware::ResetCause reset_cause() const { return cause; }
 
+  control::Hardware hardware() const { return hardware_stated; }
+
   std::uint32_t tick_hz = kTickHz;
+  control::Hardware hardware_stated{};
   static constexpr firmware::Readings kNone{};
   const firmware::Readings* readings = &kNone;  ///< not a copy: what was just written in parts is slow to copy at once
   firmware::Actuation actuation{};
@@ -73,6 +76,8 @@ class SoftwareBrain : public Brain {
   void start(const Block& block, const firmware::TelemetrySetup& telemetry, firmware::ResetCause cause) override;
   firmware::LockStepUp tick(const firmware::LockStepDown& down) override;
   void offer(std::span<const std::byte> block) override { application_->offer(block); }
+  /// What its board states from the next start on; nothing before.
+  void state(const control::Hardware& hardware) { hardware_ = hardware; }
   /// A bin of the residual map, as a message asks for it.
   bool map_bin(std::uint16_t number, firmware::MapBin& bin) const { return application_->map_bin(number, bin); }
 
@@ -86,6 +91,7 @@ class SoftwareBrain : public Brain {
 
  private:
   Block flash_;
+  control::Hardware hardware_{};
   firmware::TelemetrySetup telemetry_;
   SoftwareBoard board_;
   std::unique_ptr<firmware::Application<SoftwareBoard>> application_;

@@ -30,6 +30,14 @@ std::uint32_t on_one_line(std::uint32_t before, std::uint32_t count) {
   return (before & ~1U) | (count >> 1U & 1U);
 }
 
+plant::State woken(const RigSetup& setup) {
+  plant::State state;
+  if (setup.wake_turns == 0.0) return state;
+  state.motor_angle = kTurn * setup.wake_turns;
+  state.output_angle = state.motor_angle / setup.drive.gear_ratio;
+  return state;
+}
+
 }  // namespace
 
 AnalogScales scales_of(const plant::Drive& drive) {
@@ -40,13 +48,28 @@ AnalogScales scales_of(const plant::Drive& drive) {
           .amplifier_a = 1.25 * limit};
 }
 
+control::Hardware hardware_of(const plant::Drive& drive, control::SensorKind encoders) {
+  using control::SensorKind;
+  const SensorKind output = encoders == SensorKind::indexed ? SensorKind::incremental : encoders;
+  const auto thousandths = [](double x) { return static_cast<std::uint32_t>(std::lround(1000.0 * x)); };
+  const AnalogScales scales = scales_of(drive);
+  return {.current_full_scale_ma = thousandths(scales.current_a),
+          .amplifier_full_scale_ma = thousandths(scales.amplifier_a),
+          .most_current_ma = thousandths(drive.current_limit_a),
+          .torque_full_scale_mnm = thousandths(scales.torque_nm),
+          .temperature_full_scale_mc = thousandths(scales.temperature_c),
+          .motor_encoder = encoders,
+          .output_encoder = drive.sensors.output_counts > 0 ? output : SensorKind::none,
+          .torque_sensor = SensorKind::analog};
+}
+
 DriveRig::DriveRig(const RigSetup& setup)
     : setup_(setup),
       scales_(scales_of(setup.drive)),
       errors_(plant::sensor_errors_of(setup.drive)),
       tick_s_(1.0 / setup.tick_hz),
       plant_steps_(static_cast<int>(std::ceil(tick_s_ / kLongestStepS))),
-      plant_(plant::physics_of(setup.drive), setup.locked),
+      plant_(plant::physics_of(setup.drive), setup.locked, woken(setup)),
       normal_(plant::stream_seed(setup.seed, 0, kSensorNoise)),
       current_noise_a_(noise_of(setup.drive.sensors.current, setup.drive.rated_current_a)),
       torque_noise_nm_(noise_of(setup.drive.sensors.torque, setup.drive.rated_torque_nm)),
@@ -55,6 +78,28 @@ DriveRig::DriveRig(const RigSetup& setup)
           setup.drive.thermal.ambient_c.value_or(setup.drive.temperature_reference_c))) {
   const double corner_hz = setup.drive.amplifier.bandwidth_hz;
   if (corner_hz > 0.0) lag_ = 1.0 - std::exp(-kTurn * corner_hz * tick_s_);
+  if (setup.encoders != control::SensorKind::not_stated) begin_counters();
+}
+
+// An absolute encoder shows where within a turn it stands, another one begins at zero.
+void DriveRig::begin_counters() {
+  const bool absolute = setup_.encoders == control::SensorKind::absolute;
+  const auto origin = [absolute](double angle_rad, int counts) {
+    const std::int64_t now = nearest(angle_rad / kTurn * counts);
+    const std::int64_t rest = ((now % counts) + counts) % counts;
+    return static_cast<std::uint32_t>(absolute ? now - rest : now);
+  };
+  const plant::Sensors& sensors = setup_.drive.sensors;
+  const double motor = plant_.state().motor_angle - motor_zero(), output = plant_.state().output_angle;
+  motor_origin_ = origin(motor, sensors.motor_counts);
+  output_origin_ = sensors.output_counts > 0 ? origin(output, sensors.output_counts) : 0;
+  motor_before_ = counter(motor, sensors.motor_counts) - motor_origin_;
+  output_before_ = counter(output, sensors.output_counts) - output_origin_;
+  turn_before_ = static_cast<std::int64_t>(std::floor(motor / kTurn));
+}
+
+double DriveRig::motor_zero() const {
+  return errors_.torsion_zero_rad * setup_.drive.gear_ratio;
 }
 
 // Drawn even where it is not used: a fault that is injected does not change the noise of what follows.
@@ -76,6 +121,16 @@ std::uint32_t DriveRig::motor_count(std::uint32_t true_count) {
   return true_count - 2U * swapped_ - static_cast<std::uint32_t>(motor_slipped_ / 2);
 }
 
+// A pulse where the motor passes a whole turn, either way.
+void DriveRig::pass_index(double shown_rad, firmware::Readings& r) {
+  const auto turn = static_cast<std::int64_t>(std::floor(shown_rad / kTurn));
+  if (turn == turn_before_) return;
+  const std::int64_t passed = turn > turn_before_ ? turn : turn_before_;
+  turn_before_ = turn;
+  ++r.index_passes;
+  r.index_counter = static_cast<std::uint32_t>(passed * setup_.drive.sensors.motor_counts) - motor_origin_;
+}
+
 void DriveRig::sense(firmware::Readings& r) {
   const plant::State& state = plant_.state();
   const plant::Sensors& sensors = setup_.drive.sensors;
@@ -88,8 +143,8 @@ void DriveRig::sense(firmware::Readings& r) {
   torque += noise(torque_noise_nm_);
   const double temperature = temperature_c_ + noise(temperature_noise_c_);
 
-  const double zero = errors_.torsion_zero_rad * setup_.drive.gear_ratio;
-  const std::uint32_t motor = motor_count(counter(state.motor_angle - zero, sensors.motor_counts));
+  const double shown = state.motor_angle - motor_zero();
+  const std::uint32_t motor = motor_count(counter(shown, sensors.motor_counts) - motor_origin_);
   if (!has(Injection::motor_encoder_stale)) {
     ++r.motor_samples;
     if (has(Injection::encoder_line_lost)) {
@@ -97,9 +152,11 @@ void DriveRig::sense(firmware::Readings& r) {
     } else if (!has(Injection::motor_encoder_stuck)) {
       r.motor_counter = motor;
     }
+    if (setup_.encoders == control::SensorKind::indexed) pass_index(shown, r);
     if (has(Injection::motor_encoder_jump)) r.motor_counter += static_cast<std::uint32_t>(sensors.motor_counts / 4);
   }
-  const std::uint32_t on_shaft = counter(state.output_angle + disturbances_.output_offset_rad, sensors.output_counts);
+  const std::uint32_t on_shaft =
+      counter(state.output_angle + disturbances_.output_offset_rad, sensors.output_counts) - output_origin_;
   if (has(Injection::output_encoder_slips)) output_slipped_ += static_cast<std::int32_t>(on_shaft - output_before_);
   output_before_ = on_shaft;
   const std::uint32_t output = on_shaft - static_cast<std::uint32_t>(output_slipped_ / 2);

@@ -55,8 +55,14 @@ struct RigSetup {
   std::uint32_t tick_hz = 20'000;
   bool noise = true;
   bool locked = false;
+  double wake_turns = 0.0;  ///< where the motor stands when the drive is switched on; the output at rest with it
+  /// What its encoders show of that. Not stated: the angle as it is, as if they had counted from its zero.
+  control::SensorKind encoders = control::SensorKind::not_stated;
 };
 AnalogScales scales_of(const plant::Drive& drive);
+/// What the board of such a drive states of itself.
+control::Hardware hardware_of(const plant::Drive& drive,
+                              control::SensorKind encoders = control::SensorKind::incremental);
 
 /// A drive on a table without its processor: the plant, its amplifier, its sensors with their noise and rounding. One
 /// tick is sense(), then act(). The same setup gives the same bits.
@@ -95,6 +101,9 @@ class DriveRig {
   static constexpr std::uint64_t bit(Injection what) { return std::uint64_t{1} << static_cast<int>(what); }
   double noise(double standard_deviation);
   std::uint32_t motor_count(std::uint32_t true_count);
+  void begin_counters();
+  double motor_zero() const;  // rad
+  void pass_index(double shown_rad, firmware::Readings& r);
   double flowing(bool enabled);
   void warm(double current_a);
   std::int16_t share(double value, double full_scale) const;
@@ -117,7 +126,11 @@ class DriveRig {
   // True counts of both encoders at the tick before.
   std::uint32_t motor_before_ = 0;
   std::uint32_t output_before_ = 0;
-  std::uint32_t swapped_ = 0;  // counts that a swapped encoder of the motor took the other way
+  // Counts from the shaft's zero to that of the counter.
+  std::uint32_t motor_origin_ = 0;
+  std::uint32_t output_origin_ = 0;
+  std::int64_t turn_before_ = 0;  // whole turns of the motor at the tick before
+  std::uint32_t swapped_ = 0;     // counts that a swapped encoder of the motor took the other way
   // Counts during which a coupling slipped.
   std::int32_t motor_slipped_ = 0;
   std::int32_t output_slipped_ = 0;

@@ -21,8 +21,11 @@ void set_name(std::span<std::uint8_t> block, std::size_t at, const std::string& 
 }  // namespace
 
 std::vector<std::uint8_t> factory_block(const plant::Drive& drive) {
-  const effects::DriveConstants<double> d = board::constants_of(drive);
-  const board::Block made(board::parameters_of(drive, board::setup_of(drive, d)), d);
+  return factory_block(drive, board::setup_of(drive));
+}
+
+std::vector<std::uint8_t> factory_block(const plant::Drive& drive, const control::DriveSetup<double>& setup) {
+  const board::Block made(board::parameters_of(drive, setup), board::constants_of(drive));
   const auto* const bytes = reinterpret_cast<const std::uint8_t*>(made.bytes().data());
   std::vector<std::uint8_t> block(bytes, bytes + made.bytes().size());
   set_name(block, model::detail::kBlockStart, drive.name);

@@ -6,6 +6,7 @@
 #include <netinet/tcp.h>
 #include <poll.h>
 #include <stdlib.h>
+#include <sys/random.h>
 #include <sys/socket.h>
 #include <termios.h>
 #include <unistd.h>
@@ -21,6 +22,14 @@ namespace {
 
 [[noreturn]] void fail(const std::string& what) {
   throw std::runtime_error(what + ": " + std::strerror(errno));
+}
+std::string drawn_token() {
+  std::uint8_t bytes[16];
+  if (getrandom(bytes, sizeof(bytes), 0) != static_cast<ssize_t>(sizeof(bytes))) fail("no random bytes for a token");
+  std::string token;
+  for (const std::uint8_t byte : bytes)
+    for (const int digit : {byte >> 4, byte & 15}) token += "0123456789abcdef"[digit];
+  return token;
 }
 void make_nonblocking(int fd) {
   fcntl(fd, F_SETFL, fcntl(fd, F_GETFL) | O_NONBLOCK);
@@ -44,7 +53,9 @@ Line Line::listening(int port) {
     fail("cannot listen at 127.0.0.1:" + std::to_string(port) + "; take another port, or 0 for any");
   socklen_t size = sizeof(address);
   getsockname(line.listener_, reinterpret_cast<sockaddr*>(&address), &size);
-  line.name_ = "tcp:127.0.0.1:" + std::to_string(ntohs(address.sin_port));
+  const std::string token = drawn_token();
+  line.name_ = "tcp:127.0.0.1:" + std::to_string(ntohs(address.sin_port)) + "/" + token;
+  line.hello_ = "flexspline " + token + "\n";
   make_nonblocking(line.listener_);
   return line;
 }
@@ -78,17 +89,22 @@ Line::Line(Line&& other) noexcept
     : name_(std::move(other.name_)),
       listener_(std::exchange(other.listener_, -1)),
       host_(std::exchange(other.host_, -1)),
+      newcomer_(std::exchange(other.newcomer_, -1)),
+      hello_(std::move(other.hello_)),
       keeps_open_(std::exchange(other.keeps_open_, -1)),
       is_terminal_(other.is_terminal_) {}
 
 Line::~Line() {
-  for (const int fd : {listener_, host_, keeps_open_})
+  for (const int fd : {listener_, host_, newcomer_, keeps_open_})
     if (fd >= 0) close(fd);
 }
 
 bool Line::turn(int wait_ms) {
-  pollfd all[2] = {{listener_, POLLIN, 0}, {host_, static_cast<short>(out_.empty() ? POLLIN : POLLIN | POLLOUT), 0}};
-  poll(all, 2, wait_ms);
+  pollfd all[3] = {{listener_, POLLIN, 0},
+                   {host_, static_cast<short>(out_.empty() ? POLLIN : POLLIN | POLLOUT), 0},
+                   {newcomer_, POLLIN, 0}};
+  poll(all, 3, wait_ms);
+  if (newcomer_ >= 0 && all[2].revents != 0) hear_newcomer();
   if (listener_ >= 0 && (all[0].revents & POLLIN) != 0) accept_host();
   if (!plugged_ && is_terminal_) tcflush(keeps_open_, TCIOFLUSH);
   if (host_ >= 0) read_bytes();
@@ -96,20 +112,43 @@ bool Line::turn(int wait_ms) {
   return std::exchange(changed_, false);
 }
 
-// A host that connects while another is there takes its place: the one before may be dead without having said so.
 void Line::accept_host() {
   const int host = accept(listener_, nullptr, nullptr);
   if (host < 0) return;
-  lose_host();
+  lose_newcomer();
   if (!plugged_) {
     close(host);
     return;
   }
-  host_ = host;
-  make_nonblocking(host_);
+  newcomer_ = host;
+  make_nonblocking(newcomer_);
   const int on = 1, bytes = 4096;
-  setsockopt(host_, IPPROTO_TCP, TCP_NODELAY, &on, sizeof(on));
-  setsockopt(host_, SOL_SOCKET, SO_SNDBUF, &bytes, sizeof(bytes));
+  setsockopt(newcomer_, IPPROTO_TCP, TCP_NODELAY, &on, sizeof(on));
+  setsockopt(newcomer_, SOL_SOCKET, SO_SNDBUF, &bytes, sizeof(bytes));
+  hear_newcomer();
+}
+
+// Byte by byte: what comes behind the token is the host's. Who has said it while another host is there takes its place:
+// the one before may be dead without having said so.
+void Line::hear_newcomer() {
+  char byte = 0;
+  for (;;) {
+    const ssize_t got = read(newcomer_, &byte, 1);
+    if (got < 0 && (errno == EAGAIN || errno == EWOULDBLOCK || errno == EINTR)) return;
+    if (got <= 0 || byte != hello_[said_.size()]) return lose_newcomer();
+    said_ += byte;
+    if (said_.size() < hello_.size()) continue;
+    lose_host();
+    host_ = std::exchange(newcomer_, -1);
+    said_.clear();
+    return;
+  }
+}
+
+void Line::lose_newcomer() {
+  if (newcomer_ >= 0) close(newcomer_);
+  newcomer_ = -1;
+  said_.clear();
 }
 
 void Line::read_bytes() {
@@ -144,6 +183,7 @@ void Line::write_bytes() {
 // Of a terminal both ends stay: bytes are lost on the way, as they are where a serial line is pulled.
 void Line::plug(bool in) {
   if (in == std::exchange(plugged_, in)) return;
+  lose_newcomer();
   if (!is_terminal_) return lose_host();
   changed_ = true;
   reader_.restart();

@@ -14,6 +14,8 @@ namespace flexspline::twin {
 class Line final : public HostLine {
  public:
   /// Throw std::runtime_error with the reason.
+  /// A socket of this machine. Its name ends with a token, drawn anew each time, which a host has to say first: a web
+  /// page can reach the port, and would else arm the drive with a POST.
   static Line listening(int port);
   static Line terminal();
   static Line inherited(int fd);
@@ -39,6 +41,8 @@ class Line final : public HostLine {
   static constexpr std::size_t kMostWaiting = 4096;
   Line() = default;
   void accept_host();
+  void hear_newcomer();
+  void lose_newcomer();
   void read_bytes();
   void write_bytes();
   void lose_host();
@@ -46,6 +50,9 @@ class Line final : public HostLine {
   std::string name_;
   int listener_ = -1;
   int host_ = -1;
+  int newcomer_ = -1;    ///< has connected and not said the token yet
+  std::string hello_;    ///< what it has to say
+  std::string said_;     ///< what it has said
   int keeps_open_ = -1;  ///< a terminal's other end, so that it stays when a host closes it
   bool changed_ = false;
   bool ended_ = false;

@@ -1,6 +1,7 @@
 #include "hil/twin/twin_drive.hpp"
 
 #include <algorithm>
+#include <random>
 #include <span>
 #include <stdexcept>
 
@@ -16,13 +17,28 @@ std::array<std::uint8_t, Size> text_in(const std::string& text) {
   return bytes;
 }
 
+// A locked output stands at its zero.
+double wake_of(const TwinSetup& setup) {
+  if (setup.locked) return 0.0;
+  if (setup.wake_turns) return *setup.wake_turns;
+  constexpr double kMostTurns = 2.0;
+  std::mt19937_64 random(setup.seed);
+  return std::uniform_real_distribution<double>(-kMostTurns, kMostTurns)(random);
+}
+
 }  // namespace
 
 TwinDrive::TwinDrive(const TwinSetup& setup)
     : setup_(setup),
-      rig_({.drive = setup.drive, .seed = setup.seed, .locked = setup.locked}),
+      rig_({.drive = setup.drive,
+            .seed = setup.seed,
+            .locked = setup.locked,
+            .wake_turns = wake_of(setup),
+            .encoders = setup.encoders}),
       own_flash_(setup.flash == nullptr ? std::make_unique<FlashFile>(setup.flash_file) : nullptr),
       store_(setup.flash == nullptr ? *own_flash_ : *setup.flash) {
+  board_.hardware_stated = board::hardware_of(setup.drive, setup.encoders);
+  application_.begin(board_);
   const auto validate = [this](std::span<const std::uint8_t> block) { return blocks_.validate(block); };
   if (setup_.as_made && store_.boot(validate) == storage::StoreState::empty) {
     const std::vector<std::uint8_t> block = factory_block(setup_.drive);

@@ -3,6 +3,7 @@
 #include <cstdint>
 #include <filesystem>
 #include <memory>
+#include <optional>
 #include <string>
 
 #include "firmware/service.hpp"
@@ -20,7 +21,10 @@ struct TwinSetup {
   std::filesystem::path flash_file{};  ///< empty: what is flashed ends with the twin
   bool as_made = true;                 ///< an empty flash memory gets the block of the drive's maker
   bool locked = false;                 ///< the output
-  FlashFile* flash = nullptr;          ///< memory that outlives the drive, in the place of the file
+  /// Where the motor stands when the drive is switched on, turns; none: somewhere within two turns, drawn by the seed.
+  std::optional<double> wake_turns{};
+  control::SensorKind encoders = control::SensorKind::absolute;
+  FlashFile* flash = nullptr;  ///< memory that outlives the drive, in the place of the file
   boot::Version version = kFactoryVersion;
 };
 
@@ -51,7 +55,7 @@ class TwinDrive {
   TwinSetup setup_;
   board::DriveRig rig_;
   board::SoftwareBoard board_;
-  TwinApplication application_{board_};
+  TwinApplication application_;
   std::unique_ptr<FlashFile> own_flash_;
   Store store_;
   TwinBlocks blocks_{application_};

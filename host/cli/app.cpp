@@ -369,6 +369,10 @@ class App {
                    "where the error cannot be proven, take the largest one along samples of the envelope");
     pack->add_option("--drive", options->drive, "settings of the drive: its loops, limits and sensors")
         ->type_name("FILE.toml");
+    pack->add_option("--for-drive", options->for_drive,
+                     "a drive in reach: its tick rate, the effects of its image, and full scales, largest current and "
+                     "sensors of its board, which the settings then need not state")
+        ->type_name("DRIVE");
     pack->add_option("--drive-name", options->pack.drive, "name of the drive that the block is for (default: any)")
         ->type_name("NAME");
     pack->add_option("--encoder-counts", options->pack.encoder_counts,
@@ -427,7 +431,9 @@ class App {
 
   void add_drive_commands() {
     const auto [drives, drives_options] = command<DrivesOptions>("drives");
-    drives->add_option("--also", drives_options->also, "look here, too: serial:PORT, tcp:HOST:PORT; may be repeated")
+    drives
+        ->add_option("--also", drives_options->also,
+                     "look here, too: serial:PORT, tcp:HOST:PORT/TOKEN; may be repeated")
         ->type_name("DRIVE")
         ->allow_extra_args(false);
     const auto [flash, flash_options] = command<FlashOptions>("flash");
@@ -452,7 +458,14 @@ class App {
     backup->add_flag("--previous", backup_options->previous, "the block before the active one");
     const auto [restore, restore_options] = command<RestoreOptions>("restore");
     take_drive(restore, restore_options->drive);
+    restore->add_flag("--factory-reset", restore_options->factory_reset,
+                      "erase both blocks, for good: the drive is as it left its maker when it starts anew");
     take_yes(restore, restore_options->yes);
+    const auto [home, home_options] = command<HomeOptions>("home");
+    take_drive(home, home_options->drive);
+    home->add_option("--position-rad", home_options->position,
+                     "where the motor stands now, m on a linear axis (default: only says what the drive knows)")
+        ->type_name("RAD");
     const auto [monitor, monitor_options] = command<MonitorOptions>("monitor");
     take_monitor(monitor, *monitor_options);
     const auto [record, record_options] = command<RecordOptions>("record");

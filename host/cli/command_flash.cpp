@@ -137,8 +137,31 @@ int run(const BackupOptions& options, Console& console) {
   return kDone;
 }
 
+namespace {
+
+int factory_reset(const RestoreOptions& options, drive::Session& session, Console& console) {
+  const BlockView before = drive::view_of(session.read_block(protocol::Which::active));
+  console.line(named(session));
+  console.line(fmt::format("  active    {}", described(before)));
+  const bool erases = confirmed("Erase it and the one before? A backup is all that is left then.", options.yes);
+  if (erases) session.erase_all_blocks();
+  console.line(erases ? "Both blocks are erased; what is in use stays until the drive starts anew."
+                      : "Nothing was changed.");
+  output::save_json(options.json, {{"format", "flexspline-restore/1"},
+                                   {"drive", json_of(session)},
+                                   {"before", json_of(before)},
+                                   {"after", nullptr},
+                                   {"changes", json::array()},
+                                   {"restored", false},
+                                   {"erased", erases}});
+  return kDone;
+}
+
+}  // namespace
+
 int run(const RestoreOptions& options, Console& console) {
   drive::Session session = open_drive(options.drive);
+  if (options.factory_reset) return factory_reset(options, session, console);
   const Bytes active = session.read_block(protocol::Which::active);
   const Bytes previous = session.read_block(protocol::Which::previous);
   if (previous.empty()) session.fail(std::string(protocol::text_of(protocol::Code::no_previous)));

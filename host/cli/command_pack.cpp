@@ -10,6 +10,7 @@
 #include "host/cli/drive_commands.hpp"
 #include "host/deployment/bases.hpp"
 #include "host/deployment/maker.hpp"
+#include "host/drive/model_block.hpp"
 #include "host/model/signature.hpp"
 #include "host/output/json.hpp"
 #include "host/output/text.hpp"
@@ -158,6 +159,13 @@ int run(const PackCommandOptions& options, Console& console) {
   console.progress("proving the block and comparing it with double");
   deployment::Packed packed;
   deployment::PackOptions pack = options.pack;
+  if (!options.for_drive.empty()) {
+    drive::Session session = open_drive(options.for_drive);
+    const deployment::PackOptions asked = drive::pack_options_for(session);
+    pack.tick_hz = asked.tick_hz;
+    pack.image = asked.image;
+    pack.hardware = asked.hardware;
+  }
   if (!options.drive.empty()) {
     std::ifstream in(options.drive, std::ios::binary);
     if (!in) throw deployment::PackError(fmt::format("{} cannot be read; is the path right?", options.drive.string()));

@@ -145,6 +145,7 @@ struct PackCommandOptions {
   std::filesystem::path model;
   std::filesystem::path out;
   std::filesystem::path drive;  // settings of the drive; empty: none in the block
+  std::string for_drive;        // empty: none is asked
   deployment::PackOptions pack;
   std::string json;
 };

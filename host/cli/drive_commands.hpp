@@ -41,10 +41,18 @@ int run(const BackupOptions& options, Console& console);
 
 struct RestoreOptions {
   std::string drive;
+  bool factory_reset = false;
   bool yes = false;
   std::string json;
 };
 int run(const RestoreOptions& options, Console& console);
+
+struct HomeOptions {
+  std::string drive;
+  std::optional<double> position;  // of the motor; none: only asked
+  std::string json;
+};
+int run(const HomeOptions& options, Console& console);
 
 struct MonitorOptions {
   std::string drive;

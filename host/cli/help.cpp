@@ -220,9 +220,21 @@ const std::array kHelp = {
         "restore",
         "goes back to the parameter block before",
         "Makes the block before the active one active, and says first what that changes. A second restore goes forth "
-        "again. Nothing is erased; a power cut leaves one or the other.",
+        "again. Nothing is erased; a power cut leaves one or the other. With --factory-reset both blocks are erased: "
+        "the "
+        "drive has no parameters from its next start on, until another block is flashed.",
         {kMakeData, kIdentify, "flexspline flash --drive twin --model fitted.toml --yes",
          "flexspline restore --drive twin --yes"}},
+    CommandHelp{
+        "home",
+        "tells a drive where its motor stands",
+        "Encoders that count from where they wake do not know where they are: until it is told, or an index pulse "
+        "came, "
+        "a drive leaves out of its compensation what depends on the angle, and limits of position do not hold. Bring "
+        "the shaft to a mark, at rest and not armed, and give the motor's angle there, as the model's data count it. "
+        "Absolute encoders at motor and output need none of this. The reference is lost when the power goes, or when a "
+        "fault says that counts were lost. Without --position-rad it says what the drive knows.",
+        {"flexspline home --drive twin", "flexspline home --drive twin --position-rad 0"}},
     CommandHelp{
         "monitor",
         "live signals of a drive",
@@ -251,7 +263,8 @@ const std::array kHelp = {
     CommandHelp{
         "twin",
         "a virtual drive: a plant, its sensors and the firmware",
-        "Runs until Ctrl-C and says as what --drive finds it: a socket (tcp:127.0.0.1:PORT), or with --usbip a USB "
+        "Runs until Ctrl-C and says as what --drive finds it: a socket (tcp:127.0.0.1:PORT/TOKEN), or with --usbip a "
+        "USB "
         "device, which Linux takes for a real one once it is attached: sudo modprobe vhci-hcd; sudo usbip --tcp-port "
         "PORT attach -r 127.0.0.1 -b 1-1. --drive twin starts one of its own and needs none of this. "
         "flexspline-hil twin, which this starts, has more options: hidden effects, faults, a serial line. --json "

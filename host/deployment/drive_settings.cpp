@@ -101,6 +101,20 @@ class Settings {
     }
     fail(found->line, fmt::format("[{}] {} is \"{}\"; there are {}", table, key, found->text, all));
   }
+  // What a setting says is not what the board states.
+  [[noreturn]] void disagrees(const std::string& table, const std::string& key, double is, const char* unit,
+                              const std::string& why) const {
+    const Node* of = root_.find(table);
+    const Node* found = of == nullptr ? nullptr : of->find(key);
+    fail(found == nullptr ? 1 : found->line,
+         fmt::format("[{}] {} is {:g} {}, but {}; leave it out, and what the board states is taken", table, key, is,
+                     unit, why));
+  }
+  void require_no(const std::string& table, bool board_has_none) const {
+    const Node* of = root_.find(table);
+    if (of != nullptr && board_has_none)
+      fail(of->line, fmt::format("[{}] is there, but the drive's board states that it has none; take it out", table));
+  }
   // After all settings were taken.
   void done() const {
     for (const text::Entry& table : root_.entries) {
@@ -147,10 +161,24 @@ double largest_stiffness(const model::Model& model, double torsion) {
   return steepest;
 }
 
-control::AnalogSetup<double> analog(Settings& s, const std::string& table, const std::string& unit, double full_scale) {
+// Of the board, where it states it: what the settings say has to be that.
+double of_board(Settings& s, const std::string& table, const std::string& key, const char* unit, double stated,
+                double otherwise) {
+  constexpr double kSame = 1.0 / 300.0;
+  const double is = s.positive(table, key, stated > 0.0 ? stated : otherwise);
+  if (stated > 0.0 && std::abs(is - stated) > kSame * stated)
+    s.disagrees(table, key, is, unit, fmt::format("the drive's board states {:g} {}", stated, unit));
+  return is;
+}
+
+control::AnalogSetup<double> analog(Settings& s, const std::string& table, const std::string& unit, double full_scale,
+                                    double stated, double stated_at_zero = 0.0) {
   control::AnalogSetup<double> a;
-  a.full_scale = s.positive(table, "full_scale_" + unit, full_scale);
-  a.at_nought = s.number(table, "at_nought_" + unit).value_or(0.0);
+  a.full_scale = of_board(s, table, "full_scale_" + unit, unit.c_str(), stated, full_scale);
+  const std::string zero = "at_nought_" + unit;
+  a.at_nought = s.number(table, zero).value_or(stated_at_zero);
+  if (stated > 0.0 && std::abs(a.at_nought - stated_at_zero) > 1e-3 * stated)
+    s.disagrees(table, zero, a.at_nought, unit.c_str(), fmt::format("the drive's board states {:g}", stated_at_zero));
   a.lowest_share = s.number(table, "lowest_share", -1.0, 1.0).value_or(a.lowest_share);
   a.highest_share = s.number(table, "highest_share", -1.0, 1.0).value_or(a.highest_share);
   return a;
@@ -201,12 +229,19 @@ control::ExcitationSetup<double> excitation(Settings& s, const DriveConstants<do
 
 control::DriveSetup<double> parse_drive_setup(const std::string& toml, const std::string& origin,
                                               const model::Model& model, const DriveConstants<double>& d,
-                                              std::optional<double> encoder_counts) {
+                                              std::optional<double> encoder_counts, const control::Hardware& hardware) {
   Settings s(toml, origin);
+  const auto stated = [](double thousandths) { return 1e-3 * thousandths; };
+  s.require_no("output_encoder", hardware.output_encoder == control::SensorKind::none);
+  s.require_no("torque_sensor", hardware.torque_sensor == control::SensorKind::none);
   control::DriveSetup<double> setup;
   setup.tick_hz = static_cast<std::uint32_t>(std::lround(1.0 / d.time_base));
 
-  const double current = s.positive("limits", "current_a", d.current_base, 2.0 * d.current_base);
+  const double most_a = stated(hardware.most_current_ma);
+  const double current = s.positive(
+      "limits", "current_a", most_a > 0.0 ? std::min(d.current_base, most_a) : d.current_base, 2.0 * d.current_base);
+  if (most_a > 0.0 && current > 1.003 * most_a)
+    s.disagrees("limits", "current_a", current, "A", fmt::format("the drive's board gives at most {:g} A", most_a));
   const double torque = s.positive("limits", "torque_nm", current * d.torque_constant, 2.0 * d.torque_base);
   const double velocity = s.positive("limits", "velocity_rad_s", d.velocity_base, 2.0 * d.velocity_base);
   const double overspeed = s.positive("limits", "overspeed_rad_s", 1.15 * velocity, 2.0 * d.velocity_base);
@@ -281,16 +316,18 @@ control::DriveSetup<double> parse_drive_setup(const std::string& toml, const std
                        .time_constant_s = s.positive("disturbance", "time_constant_s", 0.01),
                        .limit = 1.9 * d.torque_base};
 
-  setup.current = analog(s, "current_sensor", "a", 2.0 * current);
-  setup.temperature = analog(s, "temperature_sensor", "c", 200.0);
+  setup.current = analog(s, "current_sensor", "a", 2.0 * current, stated(hardware.current_full_scale_ma));
+  setup.temperature = analog(s, "temperature_sensor", "c", 200.0, stated(hardware.temperature_full_scale_mc),
+                             stated(hardware.temperature_at_zero_mc));
   setup.has_torque_sensor = s.has("torque_sensor");
   if (setup.has_torque_sensor) {
-    setup.torque = analog(s, "torque_sensor", "nm", 3.0 * d.output_torque_base);
+    setup.torque = analog(s, "torque_sensor", "nm", 3.0 * d.output_torque_base, stated(hardware.torque_full_scale_mnm));
     setup.ripple = {.order = s.positive("torque_sensor", "ripple_order", 2.0),
                     .memory = s.positive("torque_sensor", "ripple_memory_rad", kTurn * 20.0),
                     .largest_ripple = s.positive("torque_sensor", "largest_ripple_nm", 0.05 * d.output_torque_base)};
   }
-  setup.amplifier_full_scale = s.positive("amplifier", "full_scale_a", 1.25 * current);
+  setup.amplifier_full_scale =
+      of_board(s, "amplifier", "full_scale_a", "A", stated(hardware.amplifier_full_scale_ma), 1.25 * current);
 
   setup.residual_map = {.standstill_velocity = s.positive("residual_map", "standstill_rad_s", 2.5e-3 * d.velocity_base),
                         .largest_velocity = s.positive("residual_map", "largest_rad_s", velocity),

@@ -10,6 +10,7 @@
 
 #include "host/model/model.hpp"
 #include "shared/control/drive_parameters_setup.hpp"
+#include "shared/control/hardware.hpp"
 #include "shared/fixed/system.hpp"
 
 namespace flexspline::deployment {
@@ -17,12 +18,13 @@ namespace flexspline::deployment {
 inline constexpr std::string_view kDriveFormat = "flexspline-drive/1";
 
 // Reads the settings of a drive with this model, in bases of `d`, whose time base is the tick. `origin` names the text
-// in errors. `encoder_counts` of the motor, where they are known from elsewhere. Throws PackError with file, line,
-// table and key: what is no setting, is of another type or outside its bounds, is missing and follows from nothing, or
-// contradicts another.
+// in errors. `encoder_counts` of the motor, where they are known from elsewhere. What the board states (`hardware`) is
+// the default. Throws PackError with file, line, table and key: what is no setting, is of another type or outside its
+// bounds, is missing and follows from nothing, or contradicts another or the board.
 control::DriveSetup<double> parse_drive_setup(const std::string& toml, const std::string& origin,
                                               const model::Model& model, const effects::DriveConstants<double>& d,
-                                              std::optional<double> encoder_counts = {});
+                                              std::optional<double> encoder_counts = {},
+                                              const control::Hardware& hardware = {});
 
 // The settings as a drive computes with them. Throws PackError where numbers do not fit.
 control::DriveSettings<fixed::Fixed> settings_of(const control::DriveSetup<double>& setup,

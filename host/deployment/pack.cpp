@@ -293,7 +293,8 @@ Packed pack(const model::Model& model, const PackOptions& options) {
   model::BlockHeader header = header_of(model, tried.drive, options);
   std::optional<control::DriveSetup<double>> setup;
   if (options.settings) {
-    setup = parse_drive_setup(*options.settings, options.settings_origin, model, tried.drive, options.encoder_counts);
+    setup = parse_drive_setup(*options.settings, options.settings_origin, model, tried.drive, options.encoder_counts,
+                              options.hardware);
     header.encoder_counts = setup->motor_counts;
   }
   model::BlockWriter writer(packed.bytes);

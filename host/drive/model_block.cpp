@@ -38,12 +38,18 @@ void require_same_gear(const Bytes& active, const Bytes& block) {
 
 }  // namespace
 
-ModelBlock model_block(Session& session, const Bytes& active, const model::Model& model,
-                       const std::optional<SettingsFile>& settings, bool measured) {
-  ModelBlock made;
+deployment::PackOptions pack_options_for(Session& session) {
   deployment::PackOptions pack;
   pack.tick_hz = session.identity().tick_hz;
   pack.image = effects_of(session.effects());
+  pack.hardware = session.hardware();
+  return pack;
+}
+
+ModelBlock model_block(Session& session, const Bytes& active, const model::Model& model,
+                       const std::optional<SettingsFile>& settings, bool measured) {
+  ModelBlock made;
+  deployment::PackOptions pack = pack_options_for(session);
   pack.measured = measured;
   if (settings) {
     pack.settings = settings->text;

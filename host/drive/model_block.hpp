@@ -5,6 +5,7 @@
 #include <string>
 #include <vector>
 
+#include "host/deployment/pack.hpp"
 #include "host/drive/session.hpp"
 #include "host/model/model.hpp"
 
@@ -20,6 +21,9 @@ struct ModelBlock {
   Bytes bytes;
   std::vector<std::string> warnings;
 };
+
+// What the drive says of itself, for the packer: tick rate, effects of its image, its board.
+deployment::PackOptions pack_options_for(Session& session);
 
 // `active`: the drive's active block, empty where it has none; its settings are taken where `settings` are none.
 // `measured`: also where the block's error has no bound that can be proven. Throws deployment::PackError where the

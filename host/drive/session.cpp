@@ -47,6 +47,29 @@ Session::Session(std::unique_ptr<transport::Link> link, Milliseconds answer) : l
                      identity_.major < protocol::kMajor ? "the firmware" : "this tool"));
 }
 
+control::Hardware Session::hardware() {
+  if (identity_.minor < protocol::kMinorOfHardware) return {};
+  return ask<protocol::Hardware>(Kind::hardware).board;
+}
+
+protocol::Reference Session::reference() {
+  if (identity_.minor < protocol::kMinorOfHardware)
+    fail("its firmware is older than position references; bring the firmware up to date");
+  return ask<protocol::Reference>(Kind::reference);
+}
+
+void Session::home(std::int64_t position) {
+  if (identity_.minor < protocol::kMinorOfHardware)
+    fail("its firmware is older than position references; bring the firmware up to date");
+  take_refusal(exchange(protocol::request(Kind::home, 0, protocol::Home{position})));
+}
+
+void Session::erase_all_blocks() {
+  if (identity_.minor < protocol::kMinorOfHardware)
+    fail("its firmware is older than the factory reset; bring the firmware up to date");
+  done(exchange(protocol::request(Kind::block_erase_all, 0, protocol::Empty{})));
+}
+
 std::string Session::board() const {
   return text_in(identity_.board);
 }
@@ -71,7 +94,7 @@ std::uint8_t Session::post(protocol::Message request) {
 }
 
 protocol::Message Session::exchange(protocol::Message request) {
-  const bool erases = request.request() == Kind::block_begin;
+  const bool erases = request.request() == Kind::block_begin || request.request() == Kind::block_erase_all;
   const auto busy_until = Clock::now() + kBusy;
   for (int tries = 0; tries < (erases ? 1 : kTries); ++tries) {
     const std::uint8_t number = post(request);
@@ -104,7 +127,10 @@ std::optional<protocol::Message> Session::next(Milliseconds limit) {
 }
 
 protocol::CommandAnswer Session::command(const protocol::Command& command) {
-  const protocol::Message m = exchange(protocol::request(Kind::command, 0, command));
+  return take_refusal(exchange(protocol::request(Kind::command, 0, command)));
+}
+
+protocol::CommandAnswer Session::take_refusal(const protocol::Message& m) const {
   protocol::CommandAnswer answer;
   const bool told = protocol::take_payload(m.content(), answer) == Code::done;
   if (static_cast<Code>(m.code) == Code::refused && told) fail(std::string(protocol::text_of(answer.refusal)));

@@ -47,6 +47,12 @@ class Session {
   // The same, whatever its code.
   protocol::Message exchange(protocol::Message request);
 
+  // What the board states of itself: nothing where the firmware is older than that.
+  control::Hardware hardware();
+  // What it knows of where its shafts are.
+  protocol::Reference reference();
+  // Tells it where its motor stands, 2^-32 turns. Throws DriveError with the reason of a refusal.
+  void home(std::int64_t position);
   protocol::Status status() { return ask<protocol::Status>(protocol::Kind::status); }
   protocol::Effects effects() { return ask<protocol::Effects>(protocol::Kind::effects); }
   // Throws DriveError with the reason of a refusal.
@@ -60,6 +66,8 @@ class Session {
   void write_block(const Bytes& block, const std::function<void(std::size_t)>& progress = {});
   // Returns the status after it.
   protocol::Status restore();
+  // Both blocks, for good. What is in use stays until the drive starts anew.
+  void erase_all_blocks();
 
   // From now on frames come, until an empty subscription.
   void subscribe(const std::vector<protocol::Channel>& channels, std::uint16_t every);
@@ -72,6 +80,7 @@ class Session {
 
  private:
   void wait_for_rest();
+  protocol::CommandAnswer take_refusal(const protocol::Message& answer) const;
   protocol::Message done(const protocol::Message& answer) const;
 
   std::unique_ptr<transport::Link> link_;

@@ -195,6 +195,13 @@ void write_payloads(Writer& w) {
                       {"major", "minor", "firmware", "board", "serial", "tick_hz", "block_bytes", "effects", "channels",
                        "most_channels", "most_lines", "has_output_encoder"});
   w.payload<Effects>("effects", "effects, from the drive: bit n % 8 of byte n / 8", {"bits"});
+  w.payload<Hardware>(
+      "hardware", "hardware, from the drive: what its board states; zero where it does not",
+      {"current_full_scale_ma", "amplifier_full_scale_ma", "most_current_ma", "torque_full_scale_mnm",
+       "temperature_full_scale_mc", "temperature_at_zero_mc", "motor_encoder", "output_encoder", "torque_sensor"});
+  w.payload<Reference>("reference", "reference, from the drive: what it knows of where its shafts are",
+                       {"knows_turn", "knows_output"});
+  w.payload<Home>("home", "home, to the drive: where the motor stands now, 2^-32 turns", {"position"});
   w.payload<Status>("status", "status, from the drive",
                     {"tick", "mode", "has_parameters", "store", "fault", "fault_tick", "fault_seen", "fault_limit",
                      "dropped", "sequence", "staged", "active_bytes", "active_crc", "previous_bytes", "previous_crc"});

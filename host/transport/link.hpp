@@ -33,7 +33,7 @@ class Link {
 
 // What --drive may be, for help and errors.
 inline constexpr const char* kDriveHelp =
-    "serial number of a drive on USB, hid:SERIAL, serial:PORT, tcp:HOST:PORT of a twin, or twin (one of its own)";
+    "serial number of a drive on USB, hid:SERIAL, serial:PORT, tcp:HOST:PORT/TOKEN of a twin, or twin (one of its own)";
 
 // Opens what --drive names; empty: the only drive on USB. Throws LinkError.
 std::unique_ptr<Link> open_link(const std::string& drive);

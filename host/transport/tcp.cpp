@@ -12,10 +12,13 @@
 
 namespace flexspline::transport {
 
-std::unique_ptr<Link> open_tcp(const std::string& address) {
+std::unique_ptr<Link> open_tcp(const std::string& whole) {
+  const std::size_t slash = whole.find('/');
+  const std::string address = whole.substr(0, slash);
+  const std::string token = slash == std::string::npos ? "" : whole.substr(slash + 1);
   const std::size_t colon = address.rfind(':');
   if (colon == std::string::npos || colon == 0 || colon + 1 == address.size())
-    throw LinkError(fmt::format("tcp:{}: an address is HOST:PORT, as tcp:127.0.0.1:4711", address));
+    throw LinkError(fmt::format("tcp:{}: an address is HOST:PORT/TOKEN, as the twin says it when it starts", address));
   addrinfo hints{};
   hints.ai_socktype = SOCK_STREAM;
   addrinfo* found = nullptr;
@@ -36,6 +39,14 @@ std::unique_ptr<Link> open_tcp(const std::string& address) {
                                 std::strerror(error)));
   const int on = 1;
   setsockopt(fd, IPPROTO_TCP, TCP_NODELAY, &on, sizeof(on));
+  const std::string hello = "flexspline " + token + "\n";
+  if (token.empty() || ::send(fd, hello.data(), hello.size(), MSG_NOSIGNAL) != static_cast<ssize_t>(hello.size())) {
+    close(fd);
+    throw LinkError(fmt::format(
+        "tcp:{}: a twin takes only a host that knows its token; take the address as the twin says it when it "
+        "starts, tcp:HOST:PORT/TOKEN",
+        address));
+  }
   return stream_link(fd, "tcp:" + address);
 }
 

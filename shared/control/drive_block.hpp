@@ -11,6 +11,7 @@
 #include <type_traits>
 
 #include "shared/control/drive_parameters.hpp"
+#include "shared/control/hardware.hpp"
 #include "shared/control/reachable.hpp"
 #include "shared/fixed/system.hpp"
 #include "shared/model/block_places.hpp"
@@ -97,6 +98,7 @@ inline constexpr Row kExcitation = Row{}
 static_assert(model::size_in_memory(kExcitation) ==
               model::detail::aligned(offsetof(Excitation::Coefficients<Numbers>, lines), 8));
 // So far from one member to the next as rows say that go over several.
+inline constexpr std::size_t kAmplifierAt = offsetof(Settings, amplifier) - offsetof(Settings, current);
 static_assert(offsetof(Settings, amplifier) - offsetof(Settings, current) + sizeof(Numbers::Gain) ==
               model::size_in_memory(kSensors));
 static_assert(offsetof(Settings, output_of_velocity) - offsetof(Settings, torsion) + sizeof(Numbers::Gain) ==
@@ -120,6 +122,7 @@ inline constexpr Row kResidualMap =
 struct Noted {
   General general{};
   Limited limited{};
+  Stated stated{};
 };
 inline bool note_general(const void* section, void* context) {
   if (context != nullptr) static_cast<Noted*>(context)->general = *static_cast<const General*>(section);
@@ -150,8 +153,12 @@ inline bool encoder_agrees(const void* section, void*) {
 inline bool sensors_agree(const void* section, void* context) {
   const auto* const scales = static_cast<const AnalogScale<Numbers>*>(section);
   if (context != nullptr) {
-    static_cast<Noted*>(context)->limited.current = scales[0];
-    static_cast<Noted*>(context)->limited.temperature = scales[2];
+    auto& noted = *static_cast<Noted*>(context);
+    noted.limited.current = noted.stated.current = scales[0];
+    noted.stated.torque = scales[1];
+    noted.limited.temperature = noted.stated.temperature = scales[2];
+    noted.stated.amplifier =
+        *reinterpret_cast<const Numbers::Gain*>(static_cast<const std::byte*>(section) + kAmplifierAt);
   }
   for (std::size_t i = 0; i < 3; ++i) {
     const auto& scale = scales[i];
@@ -280,10 +287,12 @@ model::BlockVerdict load(std::span<const std::uint8_t> block, Model& model) {
   return verdict;
 }
 
-// Checks all of a block for a drive of this tick rate, where it lies, in flash or in memory; nothing is written.
+// Checks all of a block for a drive of this tick rate and board, where it lies, in flash or in memory; nothing is
+// written. A board that states nothing agrees with any block.
 // The first fault found.
 template <class Model = decltype(DriveParameters<fixed::Fixed>::model)>
-model::BlockVerdict check_for_drive(std::span<const std::uint8_t> block, std::uint32_t tick_hz) {
+model::BlockVerdict check_for_drive(std::span<const std::uint8_t> block, std::uint32_t tick_hz,
+                                    const Hardware& hardware = {}) {
   std::uint32_t seen = 0;
   detail::Noted noted;
   const model::BlockVerdict v =
@@ -296,6 +305,14 @@ model::BlockVerdict check_for_drive(std::span<const std::uint8_t> block, std::ui
   if ((needed & ~seen) != 0) return {model::BlockFault::missing_section};
   if (general.tick_hz != tick_hz) return {model::BlockFault::other_tick_rate};
   if (unreachable(noted.limited) != Limit::none) return {model::BlockFault::unreachable_limit};
+  Stated& stated = noted.stated;
+  stated.current_limit = noted.limited.current_limit;
+  stated.has_output_encoder = general.has_output_encoder;
+  stated.has_torque_sensor = general.has_torque_sensor;
+  stated.current_base = model::base_at(block, model::kCurrentBase);
+  stated.torque_base = model::base_at(block, model::kOutputTorqueBase);
+  stated.temperature_base = model::base_at(block, model::kTemperatureBase);
+  if (disagreement(stated, hardware) != Disagreement::none) return {model::BlockFault::other_hardware};
   return {};
 }
 // Fills parameters from a block that was found good; the model stands at rest then.

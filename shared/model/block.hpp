@@ -100,8 +100,9 @@ enum class BlockFault : std::uint8_t {
   unlike_coefficients,
   missing_section,
   other_tick_rate,
-  armed,  // good, but the drive is armed
+  armed,              // good, but the drive is armed
   unreachable_limit,  // of a protection: its signal cannot show that it was passed
+  other_hardware,     // full scales, currents or sensors are not those of this board
 };
 // Where a block is wrong: which entry (from nought; of the header: -1), and which field in it where one is to blame.
 struct BlockVerdict {
@@ -210,6 +211,13 @@ inline BlockVerdict check_start(std::span<const std::uint8_t> block) {
   if ((version_and_entries >> 16) > kMostEntries) return {BlockFault::too_many_entries};
   return {};
 }
+
+// A base of a block that was found good, by its place in Bases.
+inline Number base_at(std::span<const std::uint8_t> block, std::size_t place) {
+  const std::uint8_t* const at = block.data() + detail::kBlockStart + 2 * sizeof(Name) + 8 + 8 * place;
+  return {static_cast<std::int32_t>(detail::word_at(at)), static_cast<std::int32_t>(detail::word_at(at + 4))};
+}
+inline constexpr std::size_t kOutputTorqueBase = 6, kTemperatureBase = 14, kCurrentBase = 15;
 
 // The header of a block that was found good.
 inline BlockHeader header_of(std::span<const std::uint8_t> block) {

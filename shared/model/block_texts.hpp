@@ -53,6 +53,9 @@ constexpr const char* text_of(BlockFault fault) {
       return "parameters cannot change while the drive is armed; disarm it first";
     case BlockFault::unreachable_limit:
       return "a limit of [faults] lies beyond what its signal can show; pack the block anew, which says which one";
+    case BlockFault::other_hardware:
+      return "full scales, largest current or sensors in it are not those of this board; pack it anew with "
+             "--for-drive, which takes them from the drive";
   }
   return "unknown fault";
 }

@@ -215,6 +215,17 @@ class DriveModel {
       reads_ |= Effect::kInfo.made_by_user ? ~0U : Effect::kInfo.reads;
     });
   }
+  // Takes part in what is where: effects that repeat with the motor's turn, or that depend on the output's angle, are
+  // left out where that is not known. What a user's table reads is not asked: it is left out as well.
+  constexpr void note_effects(bool knows_turn, bool knows_output) {
+    note_effects();
+    places_.for_each([&]<class Effect>(auto&) {
+      const bool needs_turn = Effect::kInfo.made_by_user || is_periodic<Effect>();
+      const bool needs_output = Effect::kInfo.made_by_user || (Effect::kInfo.reads & effects::kOutputAngle) != 0;
+      if ((needs_turn && !knows_turn) || (needs_output && !knows_output))
+        present_ &= ~(std::uint64_t{1} << id_of<Effect>());
+    });
+  }
   // Whether an effect of the model reads one of these signals (effects::Signals).
   constexpr bool reads(unsigned signals) const { return Image::kFilled || (reads_ & signals) != 0; }
   // Calls visit.operator()<Effect>(places) for each effect that the image can run, by rising number.

@@ -49,20 +49,43 @@ struct EncoderAngle {
     s.turns = static_cast<std::int32_t>(static_cast<std::uint32_t>(s.turns) + static_cast<std::uint32_t>(carry));
     return angle(s, c);
   }
+  // From now on the shaft stands at this angle, to the nearest count, whatever was counted before.
+  static constexpr void set(State& s, const Coefficients& c, fixed::Angle angle) {
+    const auto bits = static_cast<std::uint64_t>(angle.raw);
+    const std::uint64_t rest = (std::uint64_t{static_cast<std::uint32_t>(bits)} * c.counts + (1U << 31)) >> 32;
+    const std::uint32_t carry = rest >= c.counts ? 1 : 0;
+    s.rest = carry != 0 ? 0 : static_cast<std::uint32_t>(rest);
+    s.turns = static_cast<std::int32_t>(static_cast<std::uint32_t>(bits >> 32) + carry);
+  }
+  // The angle at which the counter stood at `counter`, less than a turn ago, is a whole number of turns from now on:
+  // the nearest.
+  static constexpr void set_whole_at(State& s, const Coefficients& c, std::uint32_t counter) {
+    const auto counts = static_cast<std::int32_t>(c.counts);
+    std::int32_t there = (static_cast<std::int32_t>(s.rest) - static_cast<std::int32_t>(s.before - counter)) % counts;
+    if (there > counts / 2) there -= counts;
+    if (there <= -counts / 2) there += counts;
+    std::int32_t rest = static_cast<std::int32_t>(s.rest) - there, turns = 0;
+    if (rest < 0) rest += counts, turns = -1;
+    if (rest >= counts) rest -= counts, turns = 1;
+    s.rest = static_cast<std::uint32_t>(rest);
+    s.turns = static_cast<std::int32_t>(static_cast<std::uint32_t>(s.turns) + static_cast<std::uint32_t>(turns));
+  }
   // By how much the counter moved since the last update, in counts.
   static constexpr std::int32_t moved(const State& s, std::uint32_t counter) {
     return s.started ? static_cast<std::int32_t>(counter - s.before) : 0;
+  }
+
+  // Where the shaft stands.
+  static constexpr fixed::Angle angle(const State& s, const Coefficients& c) {
+    const std::uint64_t part = (s.rest * c.per_count + (std::uint64_t{1} << 23)) >> 24;
+    const auto whole = static_cast<std::uint64_t>(static_cast<std::uint32_t>(s.turns)) << 32;
+    return {static_cast<std::int64_t>(whole + part)};
   }
 
  private:
   static constexpr std::int64_t limited_to_a_turn(const Coefficients& c, std::int32_t moved) {
     const auto counts = static_cast<std::int32_t>(c.counts);
     return moved > counts ? counts : moved < -counts ? -counts : moved;
-  }
-  static constexpr fixed::Angle angle(const State& s, const Coefficients& c) {
-    const std::uint64_t part = (s.rest * c.per_count + (std::uint64_t{1} << 23)) >> 24;
-    const auto whole = static_cast<std::uint64_t>(static_cast<std::uint32_t>(s.turns)) << 32;
-    return {static_cast<std::int64_t>(whole + part)};
   }
 };
 

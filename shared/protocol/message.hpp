@@ -18,7 +18,10 @@
 namespace flexspline::protocol {
 
 inline constexpr std::uint8_t kMajor = 1;  // another one: nothing but `identify` is understood
-inline constexpr std::uint8_t kMinor = 1;  // grows with what is added: 1 the residual map
+inline constexpr std::uint8_t kMinor =
+    2;  // grows with what is added: 1 the residual map, 2 the board's hardware and where shafts are
+
+inline constexpr std::uint8_t kMinorOfHardware = 2;
 
 inline constexpr std::size_t kReportBytes = 64;
 inline constexpr std::size_t kHeadBytes = 4;
@@ -34,11 +37,15 @@ enum class Kind : std::uint8_t {
   identify = 0x01,
   status = 0x02,
   effects = 0x03,
+  hardware = 0x04,
+  reference = 0x05,
+  home = 0x06,
   block_begin = 0x10,
   block_chunk = 0x11,
   block_commit = 0x12,
   block_restore = 0x13,
   block_read = 0x14,
+  block_erase_all = 0x15,
   command = 0x20,
   excitation = 0x21,
   excitation_guard = 0x22,

@@ -6,6 +6,7 @@
 #include <cstdint>
 
 #include "shared/control/excitation_setup.hpp"
+#include "shared/control/hardware.hpp"
 #include "shared/protocol/message.hpp"
 
 namespace flexspline::protocol {
@@ -109,6 +110,39 @@ struct Effects {
   bool operator==(const Effects&) const = default;
 };
 
+// What the board states of itself.
+struct Hardware {
+  control::Hardware board{};
+  template <class Codec>
+  constexpr void fields(Codec& c) {
+    c(board.current_full_scale_ma), c(board.amplifier_full_scale_ma), c(board.most_current_ma);
+    c(board.torque_full_scale_mnm), c(board.temperature_full_scale_mc), c(board.temperature_at_zero_mc);
+    c.within(board.motor_encoder, control::kSensorKinds), c.within(board.output_encoder, control::kSensorKinds);
+    c.within(board.torque_sensor, control::kSensorKinds);
+  }
+  bool operator==(const Hardware&) const = default;
+};
+
+// What a drive knows of where its shafts are.
+struct Reference {
+  bool knows_turn = false;    // of the motor: effects that repeat with it act
+  bool knows_output = false;  // effects of the output's angle act, and limits of position
+  template <class Codec>
+  constexpr void fields(Codec& c) {
+    c(knows_turn), c(knows_output);
+  }
+  bool operator==(const Reference&) const = default;
+};
+// `home`: where the motor stands now, 2^-32 turns; answered as a command is.
+struct Home {
+  std::int64_t position = 0;
+  template <class Codec>
+  constexpr void fields(Codec& c) {
+    c(position);
+  }
+  bool operator==(const Home&) const = default;
+};
+
 struct StoredBlock {
   std::uint32_t bytes = 0;  // nought: there is none
   std::uint32_t crc = 0;    // of these bytes, CRC-32
@@ -128,7 +162,7 @@ struct Status {
   std::int32_t fault_seen = 0;
   std::int32_t fault_limit = 0;
   std::uint32_t dropped = 0;   // frames of telemetry that found no room on the drive
-  std::uint16_t sequence = 0;  // of the active block: one more with each commit and restore
+  std::uint16_t sequence = 0;  // of the active block: another one with each commit and restore
   std::uint32_t staged = 0;    // bytes
   StoredBlock active{};
   StoredBlock previous{};

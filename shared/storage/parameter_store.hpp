@@ -49,7 +49,7 @@ class ParameterStore {
   template <class Validate>
   constexpr StoreState boot(Validate&& validate) {
     staged_ = announced_ = 0;
-    staging_ = false;
+    staging_ = confirmed_ = false;
     bool committed[kSectors]{};
     for (std::size_t s = 0; s < kSectors; ++s) {
       rank_[s] = rank_of(s);
@@ -59,6 +59,8 @@ class ParameterStore {
     active_ = is_newer(rank_[1], rank_[0]) ? 1 : 0;
     if (rank_[active_] == 0) return state_ = committed[0] || committed[1] ? StoreState::damaged : StoreState::empty;
     const std::size_t other = 1 - active_;
+    const bool was_given_up = rank_[other] != 0 && older_by(rank_[active_], rank_[other]) > kActivates;
+    if (was_given_up) rank_[other] = 0;
     const bool lost_newer = committed[other] && rank_[other] == 0 && is_newer(rank_of(other), rank_[active_]);
     return state_ = lost_newer ? StoreState::fell_back : StoreState::good;
   }
@@ -70,12 +72,10 @@ class ParameterStore {
   // CRC-32 of these, nought where there is none.
   constexpr std::uint32_t active_crc() const { return rank_[active_] == 0 ? 0 : word(active_, 2); }
   constexpr std::uint32_t previous_crc() const { return rank_[1 - active_] == 0 ? 0 : word(1 - active_, 2); }
-  // One more with each commit and each restore; nought: there is no active block.
+  // Another one with each commit and each restore; nought: there is no active block.
   constexpr std::uint16_t sequence() const { return rank_[active_]; }
-  // Of the next one: after the largest comes one again. All numbers of a store lie within a few hundred.
-  static constexpr std::uint16_t sequence_after(std::uint16_t rank) {
-    return rank >= kMostRank ? 1 : static_cast<std::uint16_t>(rank + 1);
-  }
+  // Of a restore. After the largest comes one again; all numbers of a store lie within a few hundred.
+  static constexpr std::uint16_t sequence_after(std::uint16_t rank) { return later(rank, kActivates); }
   constexpr std::size_t staged() const { return staged_; }
 
   // Begins to stage a block of so many bytes with this CRC-32: erases the sector that is not active, which gives up the
@@ -85,10 +85,8 @@ class ParameterStore {
     staged_ = 0;
     if (bytes == 0 || bytes > kCapacity) return StoreError::too_long;
     const std::size_t s = target();
-    rank_[s] = 0;
-    if (!flash_.erase(s)) return StoreError::flash;
-    for (const std::uint8_t byte : flash_.bytes(s))
-      if (byte != 0xFF) return StoreError::flash;
+    if (rank_[active_] != 0 && !give_up_other()) return StoreError::flash;
+    if (!erase(s)) return StoreError::flash;
     announced_ = bytes;
     crc_ = crc;
     staging_ = true;
@@ -127,7 +125,7 @@ class ParameterStore {
     if (reason != 0) return StoreError::invalid;
     if (!put(s, 0, kMagic) || !put(s, 1, static_cast<std::uint32_t>(announced_)) || !put(s, 2, crc_)) return give_up();
     staging_ = false;
-    return put_slot(s, kFirstSlot);
+    return put_slot(s, kFirstSlot, kActivates);
   }
   // Makes the block before the active one active, and that one the one before: a second restore goes back again.
   // Validated first: an image may have changed since.
@@ -138,9 +136,20 @@ class ParameterStore {
     if (rank_[active_] == 0 || rank_[s] == 0 || !is_whole(s)) return StoreError::no_previous;
     reason = validate(block(s));
     if (reason != 0) return StoreError::invalid;
-    std::size_t slot = kFirstSlot;
-    while (slot < kSlotsEnd && (word(s, slot) != kErasedWord || word(s, slot + 1) != kErasedWord)) slot += 2;
-    return slot == kSlotsEnd ? StoreError::worn : put_slot(s, slot);
+    const std::size_t slot = free_slot(s);
+    // begin() needs as many again.
+    return slot + 2 * kTwice > kSlotsEnd ? StoreError::worn : put_twice(s, slot, kActivates);
+  }
+
+  // As it left its maker: no blocks. The active one goes last.
+  constexpr StoreError erase_all() {
+    staging_ = false;
+    staged_ = 0;
+    for (const std::size_t s : {1 - active_, active_})
+      if (!erase(s)) return StoreError::flash;
+    active_ = 0;
+    state_ = StoreState::empty;
+    return StoreError::none;
   }
 
  private:
@@ -148,7 +157,18 @@ class ParameterStore {
   // active: a check, and last of all the number and its complement.
   static constexpr std::size_t kFirstSlot = 4;
   static constexpr std::size_t kSlotsEnd = kHeaderBytes / 4;
+  static constexpr std::size_t kTwice = 4;  // words
   static constexpr std::uint16_t kMostRank = 0xFFFE;
+  // How many numbers later: a block that becomes active, and an active one that gives up the other. A block that is
+  // older than the active one by more than the first was given up.
+  static constexpr unsigned kActivates = 2, kGivesUp = 1;
+  static constexpr std::uint16_t later(std::uint16_t rank, unsigned steps) {
+    const unsigned next = rank + steps;
+    return static_cast<std::uint16_t>(next > kMostRank ? next - kMostRank : next);
+  }
+  static constexpr unsigned older_by(std::uint16_t newer, std::uint16_t older) {
+    return newer >= older ? newer - older : newer + kMostRank - older;
+  }
 
   // Of two numbers that wrap, of which zero is older than any.
   static constexpr bool is_newer(std::uint16_t a, std::uint16_t b) {
@@ -199,16 +219,56 @@ class ParameterStore {
       if (there[i] != chunk[i]) return false;
     return offset + chunk.size() <= staged_;
   }
+  constexpr bool erase(std::size_t sector) {
+    rank_[sector] = 0;
+    if (!flash_.erase(sector)) return false;
+    for (const std::uint8_t byte : flash_.bytes(sector))
+      if (byte != 0xFF) return false;
+    return true;
+  }
+  // Before the other block is given up: writes the active block's number again, whole, as the next one in a new slot.
+  // A power cut leaves bits that read one way now and another way tomorrow. If the active block's number is such a
+  // one, it could vanish once the other block is gone; and the other, half erased, may read as whole at one start and
+  // not at the next. With the new number the active block is known for good, and the other is too old to count.
+  // Where all slots are used up there is no block before it any more (restore() leaves room): the old number is made
+  // whole.
+  constexpr bool give_up_other() {
+    if (confirmed_ && rank_[1 - active_] == 0) return true;
+    const std::size_t slot = free_slot(active_);
+    if (slot + kTwice <= kSlotsEnd) return put_twice(active_, slot, kGivesUp) == StoreError::none;
+    for (std::size_t at = kFirstSlot; at < kSlotsEnd; at += 2)
+      if (word(active_, at + 1) == code_of(rank_[active_])) {
+        confirmed_ = put(active_, at, word(active_, at)) && put(active_, at + 1, code_of(rank_[active_]));
+        return confirmed_;
+      }
+    return false;
+  }
+  constexpr std::size_t free_slot(std::size_t sector) const {
+    std::size_t slot = kFirstSlot;
+    while (slot < kSlotsEnd && (word(sector, slot) != kErasedWord || word(sector, slot + 1) != kErasedWord)) slot += 2;
+    return slot;
+  }
   constexpr StoreError give_up() {
     staging_ = false;
     return StoreError::flash;
   }
-  constexpr StoreError put_slot(std::size_t sector, std::size_t slot) {
-    const std::uint16_t rank = sequence_after(rank_[active_]);
+  // In a sector that was not erased since the start, the first slot that looks free may have been begun before a power
+  // cut, and have bits that read as zeros another day. The one behind it is free: nothing is written into a slot before
+  // the one in front of it is whole.
+  constexpr StoreError put_twice(std::size_t sector, std::size_t slot, unsigned steps) {
+    const std::uint32_t crc = word(sector, 2);
+    if (const StoreError error = put_slot(sector, slot, steps); error != StoreError::none) return error;
+    const std::uint16_t rank = rank_[sector];
+    const bool good = put(sector, slot + 2, check_of(rank, crc)) && put(sector, slot + 3, code_of(rank));
+    return good ? StoreError::none : StoreError::flash;
+  }
+  constexpr StoreError put_slot(std::size_t sector, std::size_t slot, unsigned steps) {
+    const std::uint16_t rank = later(rank_[active_], steps);
     if (!put(sector, slot, check_of(rank, word(sector, 2))) || !put(sector, slot + 1, code_of(rank)))
       return StoreError::flash;
     rank_[sector] = rank;
     active_ = sector;
+    confirmed_ = true;
     state_ = StoreState::good;
     return StoreError::none;
   }
@@ -220,6 +280,7 @@ class ParameterStore {
   std::size_t announced_ = 0;
   std::uint32_t crc_ = 0;
   bool staging_ = false;
+  bool confirmed_ = false;  // the active block's number was written since the start
   StoreState state_ = StoreState::empty;
 };
 

@@ -10,7 +10,7 @@ Chip::Chip(const std::filesystem::path& image, const WrittenFlash& written)
   const auto bytes = static_cast<std::uint32_t>(flash.bytes.size());
   machine.attach_memory(written.address, bytes, flash.cells);
   // The slot of a download, which the application looks at.
-  if (written.address + bytes <= 0x08020000) machine.map_erased(0x08020000, 0x20000);
+  if (written.address + bytes <= 0x08020000) machine.map_erased(0x08040000, 0x20000);
   machine.attach(0x40012000, converter);
   machine.attach(0x40010000, tim1);
   machine.attach(0x40000000, tim2);

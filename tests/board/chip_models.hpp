@@ -117,7 +117,9 @@ class FlashModel : public Peripheral {
         clock_.wait_states = value & 7;
         if ((value & (1U << 12)) != 0 && (value & (1U << 10)) != 0)
           machine_.violation("the data cache is reset while it is on");
-        if ((value & (1U << 12)) != 0) stale_ = false;
+        if ((value & (1U << 11)) != 0 && (value & (1U << 9)) != 0)
+          machine_.violation("the instruction cache is reset while it is on");
+        stale_ &= ~(value >> 11 & 3U);
         return;
       case 0x04:
         if (value == (keys_ == 0 ? 0x45670123U : 0xCDEF89ABU) && keys_ < 2) {
@@ -148,7 +150,7 @@ class FlashModel : public Peripheral {
    public:
     explicit Cells(FlashModel& flash) : flash_(flash) {}
     std::uint32_t read(std::uint32_t offset) override {
-      if (flash_.stale_) flash_.machine_.violation("reads behind a stale data cache");
+      if (flash_.stale_ != 0) flash_.machine_.violation("reads what a stale cache of instructions or data may hold");
       return flash_.word(offset);
     }
     void write(std::uint32_t offset, std::uint32_t value) override { flash_.program(offset, value); }
@@ -186,6 +188,7 @@ class FlashModel : public Peripheral {
     busy_ = 20;
   }
   void end() {
+    stale_ = access_ >> 9 & 3U;
     status_ |= error != 0 ? error : 1;
     if (error != 0) {
       error = 0;
@@ -194,7 +197,6 @@ class FlashModel : public Peripheral {
     if (erasing_) {
       ++erases;
       std::fill_n(bytes.begin() + sector_.offset, sector_.bytes, std::uint8_t{0xFF});
-      stale_ = (access_ & (1U << 10)) != 0;
     } else {
       ++programs;
       for (std::uint32_t i = 0; i < 4; ++i) bytes[at_ + i] &= static_cast<std::uint8_t>(value_ >> (8 * i));
@@ -207,7 +209,8 @@ class FlashModel : public Peripheral {
   FlashSector sector_{};
   std::uint32_t access_ = 0, status_ = 0, control_ = 1U << 31, at_ = 0, value_ = 0;
   int keys_ = 0, busy_ = 0;
-  bool erasing_ = false, stale_ = false;
+  std::uint32_t stale_ = 0;  // bit 0 the cache of instructions, bit 1 that of data
+  bool erasing_ = false;
 
  public:
   Cells cells;

@@ -46,9 +46,16 @@ class DriveBench {
   // `image`: dac or pwm. An empty flash memory without `parameters`.
   explicit DriveBench(const std::string& variant, bool parameters = true)
       : chip(std::string(FLEXSPLINE_BOARDS) + "/stm32f405/f405-" + variant + ".elf"), is_bridge_(variant == "pwm") {
-    if (parameters) store(twin::factory_block(demo()));
+    if (parameters) store(twin::factory_block(demo(), setup()));
     chip.senses = [this] { sense(); };
     chip.acts = [this] { act(); };
+  }
+  // The demo's, with the full scales of the board where it states them.
+  control::DriveSetup<double> setup() const {
+    auto s = board::setup_of(demo());
+    s.current.full_scale = sensor_a();
+    if (is_bridge_) s.amplifier_full_scale = kBridgeA;
+    return s;
   }
   void store(const std::vector<std::uint8_t>& block) {
     CellsPort port(chip.flash);
@@ -92,6 +99,8 @@ class DriveBench {
   double bridge_a = 0.0;  // what flows out of the bridge
 
  private:
+  static constexpr double kBridgeA = 5.0, kBridgeSensorA = 8.0;
+  double sensor_a() const { return is_bridge_ ? kBridgeSensorA : board::scales_of(demo()).current_a; }
   // A converter of 12 bits with noise of its own, as real ones have.
   std::uint32_t converted(double share) {
     const double raw = (share + 1.0) * 2047.5 + noise_(random_);
@@ -100,7 +109,7 @@ class DriveBench {
   void sense() {
     if (!wired) return;
     const firmware::Readings r = rig.sense();
-    chip.converter.inputs[10] = converted(r.current / 32768.0);
+    chip.converter.inputs[10] = converted(r.current / 32768.0 * board::scales_of(demo()).current_a / sensor_a());
     chip.converter.inputs[11] = converted(r.torque / 32768.0);
     chip.converter.inputs[12] = static_cast<std::uint32_t>(std::clamp(r.temperature / 8, 0, 4095));
     chip.tim2.move_to(r.motor_counter);

@@ -149,6 +149,15 @@ TEST(BoardBridge, ItsCurrentLoopMakesTheCurrentThatIsWanted) {
   expect_no_violation(bench.chip);
 }
 
+// Of the sensor and the amplifier of another board: the drive would regulate another current than it shows.
+TEST(BoardBridge, ABlockOfOtherFullScalesThanTheBridgesIsNotUsed) {
+  DriveBench bench("pwm", false);
+  bench.store(twin::factory_block(demo()));
+  bench.come_up();
+  EXPECT_FALSE(bench.bus.status().has_parameters);
+  EXPECT_EQ(bench.command({.kind = CommandKind::arm, .mode = Mode::current}).refusal, protocol::Refusal::no_parameters);
+}
+
 TEST(BoardBridge, AFaultOpensAllSwitchesWithinTicks) {
   DriveBench bench("pwm");
   bench.come_up();

@@ -11,10 +11,10 @@ namespace flexspline::tests {
 namespace {
 
 const std::string kLoader = std::string(FLEXSPLINE_BOARDS) + "/stm32f405/f405-dac-boot.elf";
-// Sectors 4, 5 and 6: application, download, the one before.
-const WrittenFlash kSlots{.address = 0x08010000,
-                          .sectors = {{4, 0, 0x10000}, {5, 0x10000, 0x20000}, {6, 0x30000, 0x20000}}};
-constexpr std::uint32_t kStack = 0x20001000, kEntry = 0x08010301;
+// Sectors 5, 6 and 7: application, download, the one before.
+const WrittenFlash kSlots{.address = 0x08020000,
+                          .sectors = {{5, 0, 0x20000}, {6, 0x20000, 0x20000}, {7, 0x40000, 0x20000}}};
+constexpr std::uint32_t kStack = 0x20001000, kEntry = 0x08020301;
 
 // Something with vectors, as long as an application.
 std::vector<std::uint8_t> image(const std::string& board, std::size_t bytes = 9000) {
@@ -96,7 +96,7 @@ TEST(BoardLoader, TakesAnImageInstallsItAtTheNextStartAndStartsItUnderTheWatchdo
     DfuHost host(chip);
     ASSERT_TRUE(host.enumerate());
     ASSERT_EQ(host.download(sent), 0);
-    EXPECT_TRUE(std::equal(sent.begin(), sent.end(), chip.flash.bytes.begin() + 0x10000));
+    EXPECT_TRUE(std::equal(sent.begin(), sent.end(), chip.flash.bytes.begin() + 0x20000));
     EXPECT_EQ(chip.ticks(100'000), Stop::reset) << "it restarts by itself";
     EXPECT_TRUE(chip.flash.locked());
     expect_no_violation(chip);
@@ -106,7 +106,7 @@ TEST(BoardLoader, TakesAnImageInstallsItAtTheNextStartAndStartsItUnderTheWatchdo
   chip.flash.bytes = cells;
   // The model's memory holds data, not code: the first instruction of the application ends the run.
   EXPECT_EQ(chip.start(), Stop::fault);
-  EXPECT_EQ(chip.machine.vectors(), 0x08010200U);
+  EXPECT_EQ(chip.machine.vectors(), 0x08020200U);
   EXPECT_EQ(chip.machine.reg(UC_ARM_REG_SP), kStack);
   EXPECT_EQ(chip.machine.reg(UC_ARM_REG_PC) & ~1U, kEntry & ~1U);
   EXPECT_TRUE(std::equal(sent.begin(), sent.end(), chip.flash.bytes.begin()));

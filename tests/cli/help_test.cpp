@@ -12,7 +12,7 @@ constexpr const char* kBuilt[] = {"demo",     "new",       "check",      "effect
                                   "simulate", "compare",   "diagnose",   "add",     "remove",  "sensitivity",
                                   "plan",     "pack",      "unpack",     "export",  "drives",  "flash",
                                   "image",    "backup",    "restore",    "monitor", "record",  "twin",
-                                  "hil",      "workbench", "completion", "man",     "fleet"};
+                                  "hil",      "workbench", "completion", "man",     "fleet",   "home"};
 
 std::vector<std::string> example_lines(const std::string& help) {
   std::vector<std::string> lines;

@@ -21,6 +21,10 @@ enum class CutAt { before, inside, after };
 template <std::size_t kBytes, std::size_t kCount = storage::kSectors>
 struct FlashCells {
   alignas(8) std::array<std::array<std::uint8_t, kBytes>, kCount> sectors;
+  // Where it is wanted: bits that an operation was cut in are weak, and read one way or the other at each start until
+  // they are erased or programmed whole.
+  bool weakens = false;
+  std::array<std::array<std::uint8_t, kBytes>, kCount> weak{};
   FlashCells() {
     for (auto& sector : sectors) sector.fill(0xFF);
   }
@@ -32,7 +36,13 @@ class FlashModel {
  public:
   static constexpr std::size_t kSectorBytes = kBytes;
 
-  explicit FlashModel(FlashCells<kBytes, kCount>& cells, std::uint64_t seed = 1) : cells_(cells), random_(seed) {}
+  explicit FlashModel(FlashCells<kBytes, kCount>& cells, std::uint64_t seed = 1) : cells_(cells), random_(seed) {
+    if (!cells.weakens) return;
+    for (std::size_t s = 0; s < kCount; ++s)
+      for (std::size_t i = 0; i < kBytes; ++i)
+        if (const std::uint8_t mask = cells.weak[s][i]; mask != 0)
+          cells.sectors[s][i] = static_cast<std::uint8_t>((cells.sectors[s][i] & ~mask) | (random_() & mask));
+  }
   // The power goes at the operation of this number, from nought.
   void cut(std::size_t operation, CutAt where) {
     cut_ = static_cast<long>(operation);
@@ -49,14 +59,18 @@ class FlashModel {
       const auto how = random_() % 4;
       for (std::size_t i = 0; i < bytes.size(); ++i) {
         const auto noise = static_cast<std::uint8_t>(random_());
+        const std::uint8_t whole = bytes[i];
         if (how == 0 && random_() % 64 == 0) bytes[i] |= noise;
         if (how == 1) bytes[i] = noise;
         if (how == 2 && (i / 4) % 3 != 0) bytes[i] = noise;
         if (how == 3) bytes[i] = random_() % 256 == 0 ? noise : 0xFF;
+        // Not the bits that were erased before.
+        if (cells_.weakens) cells_.weak[sector][i] = static_cast<std::uint8_t>(~whole | cells_.weak[sector][i]);
       }
       throw PowerCut{};
     }
     bytes.fill(0xFF);
+    cells_.weak[sector].fill(0);
     return end_operation();
   }
   bool program(std::size_t sector, std::size_t word, std::uint32_t value) {
@@ -68,14 +82,24 @@ class FlashModel {
     if (cut_here(CutAt::inside)) {
       then |= now & static_cast<std::uint32_t>(random_());  // some of the bits, perhaps none or all
       std::memcpy(at, &then, 4);
+      if (cells_.weakens) weaken(sector, word, now & ~value);
       throw PowerCut{};
     }
     std::memcpy(at, &then, 4);
+    if (cells_.weakens) strengthen(sector, word, ~value);
     return end_operation();
   }
   std::span<const std::uint8_t> bytes(std::size_t sector) const { return cells_.sectors[sector]; }
 
  private:
+  void weaken(std::size_t sector, std::size_t word, std::uint32_t bits) {
+    for (std::size_t i = 0; i < 4; ++i) cells_.weak[sector][4 * word + i] |= static_cast<std::uint8_t>(bits >> (8 * i));
+  }
+  // What is programmed whole is a zero for good.
+  void strengthen(std::size_t sector, std::size_t word, std::uint32_t bits) {
+    for (std::size_t i = 0; i < 4; ++i)
+      cells_.weak[sector][4 * word + i] &= static_cast<std::uint8_t>(~(bits >> (8 * i)));
+  }
   bool cut_here(CutAt where) const { return cut_ == static_cast<long>(operations_) && where_ == where; }
   bool begin_operation() {
     if (cut_here(CutAt::before)) throw PowerCut{};

@@ -84,7 +84,7 @@ TEST(Service, NamesTheEffectsOfItsImage) {
 
 TEST(Service, RefusesByCodeWhatItDoesNotKnow) {
   Bench b;
-  for (const int kind : {0x00, 0x04, 0x43, 0x6F})
+  for (const int kind : {0x00, 0x0F, 0x43, 0x6F})
     EXPECT_EQ(b.host.code(static_cast<Kind>(kind)), Code::unknown_request) << kind;
   EXPECT_EQ(b.host.code(Kind::status, protocol::Reason{}), Code::wrong_length);
   EXPECT_EQ(b.host.code(Kind::command), Code::wrong_length);
@@ -108,11 +108,11 @@ TEST(Service, FlashesABlockReadsItBackAndRestoresTheOneBefore) {
   EXPECT_EQ(b.host.read(protocol::Which::previous), made);
   const protocol::Status s = b.host.status();
   EXPECT_TRUE(s.has_parameters);
-  EXPECT_EQ(s.sequence, 2U);
+  EXPECT_EQ(s.sequence, 5U);
   EXPECT_EQ(s.active, (protocol::StoredBlock{static_cast<std::uint32_t>(other.size()), model::crc32(other)}));
-  EXPECT_EQ(b.host.code(Kind::block_restore, protocol::BlockRestore{2}), Code::done);
+  EXPECT_EQ(b.host.code(Kind::block_restore, protocol::BlockRestore{5}), Code::done);
   EXPECT_EQ(b.host.read(protocol::Which::active), made);
-  EXPECT_EQ(b.host.code(Kind::block_restore, protocol::BlockRestore{2}), Code::done) << "asked again";
+  EXPECT_EQ(b.host.code(Kind::block_restore, protocol::BlockRestore{5}), Code::done) << "asked again";
   EXPECT_EQ(b.host.read(protocol::Which::active), made) << "and done once";
   EXPECT_EQ(b.host.code(Kind::block_restore, protocol::BlockRestore{1}), Code::wrong_value);
 }
@@ -139,6 +139,21 @@ TEST(Service, WhatWasFlashedIsThereAtTheNextStart) {
   EXPECT_EQ(host.status().store, protocol::StoreState::good);
   EXPECT_TRUE(host.status().has_parameters);
   std::filesystem::remove(file);
+}
+
+TEST(Service, AFactoryResetErasesBothBlocksOfADriveThatStandsAndIsNotArmed) {
+  Bench b;
+  ASSERT_EQ(b.host.flash(twin::factory_block(demo())), Code::done);
+  ASSERT_EQ(b.host.arm(protocol::Mode::velocity).refusal, protocol::Refusal::none);
+  EXPECT_EQ(b.host.code(Kind::block_erase_all), Code::armed);
+  b.host.command({.kind = protocol::CommandKind::disarm});
+  b.drive.run(200);
+  EXPECT_EQ(b.host.code(Kind::block_erase_all), Code::done);
+  const protocol::Status s = b.host.status();
+  EXPECT_EQ(s.active.bytes, 0U);
+  EXPECT_EQ(s.previous.bytes, 0U);
+  EXPECT_TRUE(s.has_parameters) << "until the next start";
+  EXPECT_EQ(b.host.flash(twin::factory_block(demo())), Code::done);
 }
 
 TEST(Service, ABlockThatIsDamagedOrForAnotherTickRateIsRefusedAndTheOldOneStaysInUse) {

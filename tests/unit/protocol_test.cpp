@@ -39,6 +39,17 @@ void randomise(std::mt19937& r, Identity& x) {
 void randomise(std::mt19937& r, Effects& x) {
   fill(r, x.bits);
 }
+void randomise(std::mt19937& r, Hardware& x) {
+  const auto kind = [&] { return below<control::SensorKind>(r, control::kSensorKinds); };
+  const auto number = [&] { return static_cast<std::uint32_t>(r()); };
+  x.board = {number(), number(), number(), number(), number(), static_cast<std::int32_t>(r()), kind(), kind(), kind()};
+}
+void randomise(std::mt19937& r, Reference& x) {
+  x = {(r() & 1) != 0, (r() & 1) != 0};
+}
+void randomise(std::mt19937& r, Home& x) {
+  x.position = static_cast<std::int64_t>(std::uint64_t{r()} << 32 | r());
+}
 void randomise(std::mt19937& r, Status& x) {
   x = {static_cast<std::uint32_t>(r()),
        below<Mode>(r, kModes),
@@ -136,9 +147,10 @@ void randomise(std::mt19937& r, MapCommand& x) {
 
 template <class T>
 class Payload : public ::testing::Test {};
-using AllPayloads = ::testing::Types<Empty, Hello, Identity, Effects, Status, BlockBegin, Chunk, BlockRead,
-                                     BlockRestore, Reason, Command, CommandAnswer, Excitation, ExcitationGuard,
-                                     ExcitationLines, Subscription, FrameHead, MapInfo, MapFirst, MapBins, MapCommand>;
+using AllPayloads =
+    ::testing::Types<Empty, Hello, Identity, Effects, Hardware, Reference, Home, Status, BlockBegin, Chunk, BlockRead,
+                     BlockRestore, Reason, Command, CommandAnswer, Excitation, ExcitationGuard, ExcitationLines,
+                     Subscription, FrameHead, MapInfo, MapFirst, MapBins, MapCommand>;
 TYPED_TEST_SUITE(Payload, AllPayloads);
 
 TYPED_TEST(Payload, ComesBackAsItWasSentAndEveryOtherLengthIsRefused) {
@@ -212,13 +224,18 @@ TEST(Protocol, BytesOnTheWireAreTheRecordedOnes) {
   id.tick_hz = 20'000, id.block_bytes = 16'128, id.effects = 43, id.channels = 21, id.most_channels = 12;
   id.most_lines = 32, id.has_output_encoder = 1;
   EXPECT_EQ(wire(answer_to(request(Kind::identify, 7, Hello{}), Code::done, id)),
-            "810732000101030462000000000000000000000000000000"
+            "810732000102030462000000000000000000000000000000"
             "41310000000000000000000000000000204e0000003f00002b00150c2001");
   Status s{0x01020304, Mode::fault, true, StoreState::fell_back, 13, 5, -2, 3, 4, 6, 8, {0x100, 0xA1B2C3D4}, {9, 10}};
   EXPECT_EQ(wire(answer_to(request(Kind::status, 1, Empty{}), Code::done, s)),
             "82012e0004030201070102"
             "0d05000000feffffff0300000004000000060008000000"
             "00010000d4c3b2a1090000000a000000");
+  using control::SensorKind;
+  EXPECT_EQ(wire(answer_to(request(Kind::hardware, 1, Empty{}), Code::done,
+                           Hardware{{8000, 5000, 4000, 120'000, 200'000, -50'000, SensorKind::absolute,
+                                     SensorKind::none, SensorKind::analog}})),
+            "84011b00401f000088130000a00f0000c0d40100400d0300b03cffff040105");
   EXPECT_EQ(wire(request(Kind::block_begin, 2, BlockBegin{0x1234, 0xDEADBEEF})), "1002080034120000efbeadde");
   EXPECT_EQ(wire(request(Kind::block_chunk, 3, Chunk{56, {1, 2, 3}, 3})), "1103070038000000010203");
   EXPECT_EQ(wire(request(Kind::block_commit, 4, Empty{})), "12040000");

@@ -83,8 +83,10 @@ class Line:
 
 
 def tcp_line(where):
+    where, _, token = where.partition("/")
     host, port = where.rsplit(":", 1)
     connection = socket.create_connection((host, int(port)), timeout=10)
+    connection.sendall(f"flexspline {token}\n".encode())
     connection.settimeout(0.05)
 
     def read():
@@ -174,7 +176,7 @@ def main():
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("--header", required=True, help="of flexspline export --protocol-header")
     parser.add_argument("--serial-number", help="of the drive on USB (default: the first)")
-    parser.add_argument("--tcp", metavar="HOST:PORT", help="a twin: flexspline twin --serve PORT")
+    parser.add_argument("--tcp", metavar="HOST:PORT/TOKEN", help="a twin, as flexspline twin says it")
     parser.add_argument("--serial", metavar="PORT", help="a serial port")
     parser.add_argument("--channels", default="velocity,current,torque")
     parser.add_argument("--every", type=int, default=100, help="ticks from frame to frame")

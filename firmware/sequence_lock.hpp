@@ -1,0 +1,38 @@
+// A number that is odd while an interrupt writes what background work copies: who finds another number behind the copy
+// than before it copies again. The writer interrupts the reader and never the reverse, so a copy is whole as soon as no
+// write came between.
+#pragma once
+
+#include <atomic>
+#include <cstdint>
+
+namespace flexspline::firmware {
+
+class SequenceLock {
+ public:
+  void begin_write() {
+    number_.store(number_.load(std::memory_order_relaxed) + 1, std::memory_order_relaxed);
+    std::atomic_signal_fence(std::memory_order_seq_cst);
+  }
+  void end_write() {
+    std::atomic_signal_fence(std::memory_order_seq_cst);
+    number_.store(number_.load(std::memory_order_relaxed) + 1, std::memory_order_relaxed);
+  }
+  // A copy takes a small part of the time from one write to the next, so a second one is whole.
+  template <class T>
+  T read(const T& shared) const {
+    for (int tries = 0;; ++tries) {
+      const std::uint32_t before = number_.load(std::memory_order_relaxed);
+      std::atomic_signal_fence(std::memory_order_seq_cst);
+      T copy = shared;
+      std::atomic_signal_fence(std::memory_order_seq_cst);
+      if (tries == kTries || (number_.load(std::memory_order_relaxed) == before && (before & 1) == 0)) return copy;
+    }
+  }
+
+ private:
+  static constexpr int kTries = 8;
+  std::atomic<std::uint32_t> number_{0};
+};
+
+}  // namespace flexspline::firmware

@@ -1,0 +1,52 @@
+// Where a drive's shafts are: what it knows, and telling it.
+#include <fmt/format.h>
+
+#include <cmath>
+#include <nlohmann/json.hpp>
+
+#include "host/cli/drive_commands.hpp"
+#include "host/drive/scales.hpp"
+#include "host/output/json.hpp"
+
+namespace flexspline::cli {
+namespace {
+
+using nlohmann::json;
+
+constexpr double kFarthestTurns = 0x1p23;
+
+std::string described(const protocol::Reference& known) {
+  return fmt::format("the turn of the motor is {}, the angle of the output is {}",
+                     known.knows_turn ? "known" : "not known", known.knows_output ? "known" : "not known");
+}
+
+}  // namespace
+
+int run(const HomeOptions& options, Console& console) {
+  drive::Session session = open_drive(options.drive);
+  console.line(named(session));
+  if (options.position) {
+    const drive::Scales scales = drive::scales_of(session);
+    const double turns = *options.position / scales.constants.angle_base;
+    if (!(std::abs(turns) < kFarthestTurns))
+      throw UsageError(
+          fmt::format("--position {:g} is further than the {:g} turns that a drive counts to; give the "
+                      "angle of the motor",
+                      *options.position, kFarthestTurns));
+    session.home(std::llround(std::ldexp(turns, 32)));
+  }
+  const protocol::Reference known = session.reference();
+  console.line(fmt::format("  {}", described(known)));
+  if (!known.knows_turn)
+    console.line("  Effects that repeat with the motor's turn are left out of the compensation until it is known.");
+  if (!known.knows_output)
+    console.line("  Gravity is left out of the compensation, and limits of position do not hold, until it is known.");
+  output::save_json(options.json, {{"format", "flexspline-home/1"},
+                                   {"drive", {{"serial", session.serial()}, {"drive", session.name()}}},
+                                   {"knows_turn", known.knows_turn},
+                                   {"knows_output", known.knows_output},
+                                   {"position_rad", options.position ? json(*options.position) : json()}});
+  return kDone;
+}
+
+}  // namespace flexspline::cli

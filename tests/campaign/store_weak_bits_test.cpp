@@ -1,0 +1,107 @@
+// A power cut can leave bits that read one way at one start and another way at the next. Long histories of the
+// parameter store with cuts anywhere, and such bits: nothing is lost but the operation that was cut.
+#include <gtest/gtest.h>
+
+#include <cstdint>
+#include <cstdio>
+#include <random>
+#include <set>
+#include <vector>
+
+#include "shared/storage/parameter_store.hpp"
+#include "tests/support/campaign_size.hpp"
+#include "tests/support/flash_model.hpp"
+
+namespace flexspline {
+namespace {
+
+using storage::StoreError;
+using testing::CutAt;
+using testing::PowerCut;
+using Bytes = std::vector<std::uint8_t>;
+constexpr std::size_t kSector = 320;
+using Cells = testing::FlashCells<kSector>;
+using Flash = testing::FlashModel<kSector>;
+using Store = storage::ParameterStore<Flash>;
+
+Bytes block_named(std::uint8_t name) {
+  Bytes bytes(12);
+  for (std::size_t i = 0; i < bytes.size(); ++i) bytes[i] = static_cast<std::uint8_t>(name + i * i);
+  return bytes;
+}
+std::uint32_t validate(std::span<const std::uint8_t> bytes) {
+  if (bytes.size() != 12) return 1;
+  const Bytes wanted = block_named(bytes[0]);
+  return std::equal(wanted.begin(), wanted.end(), bytes.begin()) ? 0 : 2;
+}
+
+// One drive: which blocks its store may start with, as far as is known from what was done.
+class History {
+ public:
+  explicit History(std::uint64_t seed) : random_(seed) { cells_.weakens = true; }
+
+  // A start, an action, and most often a cut somewhere in it. False where something else is active than may be.
+  bool step() {
+    Flash flash(cells_, random_());
+    Store store(flash);
+    store.boot(validate);
+    const int active = name_of(store.active());
+    if (!may_be_.contains(active)) return false;
+    if (random_() % 8 == 0) return true;  // another start
+    const bool cut = random_() % 16 != 0;
+    if (cut) flash.cut(random_() % 10, static_cast<CutAt>(random_() % 3));
+    try {
+      if (random_() % 3 != 0) {
+        commit(store, active);
+      } else {
+        restore(store);
+      }
+    } catch (const PowerCut&) {
+      ++cuts_;
+    }
+    return true;
+  }
+  std::size_t cuts() const { return cuts_; }
+
+ private:
+  static int name_of(std::span<const std::uint8_t> bytes) {
+    return bytes.empty() ? kNone : validate(bytes) == 0 ? bytes[0] : kDamaged;
+  }
+  void commit(Store& store, int active) {
+    const auto name = static_cast<std::uint8_t>(++last_);
+    const Bytes block = block_named(name);
+    if (store.begin(block.size(), model::crc32(block)) != StoreError::none) return;
+    may_be_ = {active};  // the other is erased
+    if (store.write(0, block) != StoreError::none) return;
+    may_be_.insert(name);
+    std::uint32_t reason = 0;
+    if (store.commit(validate, reason) == StoreError::none) may_be_ = {name};
+  }
+  void restore(Store& store) {
+    const int before = name_of(store.previous());
+    std::uint32_t reason = 0;
+    if (before != kNone) may_be_.insert(before);
+    if (store.restore(validate, reason) == StoreError::none) may_be_ = {before};
+  }
+
+  static constexpr int kNone = -1, kDamaged = -2;
+  std::mt19937_64 random_;
+  Cells cells_;
+  std::set<int> may_be_{kNone};
+  std::uint8_t last_ = 0;
+  std::size_t cuts_ = 0;
+};
+
+TEST(StoreWithWeakBits, LosesNothingButTheOperationThatWasCut) {
+  const std::size_t wanted = testing::in_campaign<std::size_t>(200'000, 1'000'000);
+  std::size_t cuts = 0;
+  for (std::uint64_t seed = 1; cuts < wanted; ++seed) {
+    History history(seed);
+    for (int k = 0; k < 400; ++k) ASSERT_TRUE(history.step()) << "seed " << seed << ", step " << k;
+    cuts += history.cuts();
+  }
+  std::printf("power cuts with weak bits: %zu\n", cuts);
+}
+
+}  // namespace
+}  // namespace flexspline
