@@ -483,8 +483,10 @@ class App {
 
   void add_workbench() {
     const auto [sub, options] = command<WorkbenchOptions>("workbench");
-    take_data(sub, options->data);
-    take_model(sub, options->model);
+    sub->add_option("DATA", options->data.data, kDataHelp)->type_name("");
+    take_tolerate(sub, options->data);
+    sub->add_option("--model", options->model, "model file (default: a first one, from what is chosen on the page)")
+        ->type_name("MODEL");
     take_workbench(*sub, *options);
     take_holdout(sub, options->data);
     take_pipeline(sub, options->pipeline);

@@ -85,7 +85,7 @@ class Guesser {
       for (const std::string& name : by_preference)
         if (is_free(name)) take(name, by_unit_only, current);
     for (const std::string& name : names_)
-      if (is_free(name) && !name.empty()) result_.unused.push_back(name);
+      if ((is_free(name) || (is_left_out(name) && !is_source(name))) && !name.empty()) result_.unused.push_back(name);
     find_axis();
     find_side();
     return std::move(result_);
@@ -105,7 +105,10 @@ class Guesser {
     return std::any_of(result_.columns.begin(), result_.columns.end(),
                        [&](const ColumnGuess& c) { return c.theirs == name; });
   }
-  bool is_free(const std::string& name) const { return !is_ours(name) && !is_source(name); }
+  bool is_free(const std::string& name) const { return !is_ours(name) && !is_source(name) && !is_left_out(name); }
+  bool is_left_out(const std::string& name) const {
+    return std::find(options_.without.begin(), options_.without.end(), name) != options_.without.end();
+  }
 
   // Positions or velocities with numbers are those of several joints; one of them is looked at.
   void choose_joint() {
@@ -172,13 +175,16 @@ class Guesser {
 
   bool is_mapped_motion() const {
     return std::any_of(result_.columns.begin(), result_.columns.end(),
-                       [](const ColumnGuess& c) { return is_motion(c) && !c.why.empty(); });
+                       [&](const ColumnGuess& c) { return is_motion(c) && may_be_moved(c); });
   }
+
+  // What the user mapped stays where it was put, unless the user says too that it is measured at the link.
+  bool may_be_moved(const ColumnGuess& c) const { return !c.why.empty() || options_.position_side == Side::link; }
 
   // The motor's columns from those of the link, times the gear ratio: between them there is only the gear.
   void set_motor_columns(double scale) {
     for (ColumnGuess& c : result_.columns) {
-      if (c.why.empty()) continue;
+      if (!may_be_moved(c)) continue;
       const bool position = c.ours == "output_position_rad" || c.ours == "motor_position_rad";
       const bool velocity = c.ours == "output_velocity_rad_s" || c.ours == "motor_velocity_rad_s";
       if (position) c.ours = "motor_position_rad";
@@ -186,7 +192,7 @@ class Guesser {
       if (position || velocity || c.ours == "position_command_rad" || c.ours == "velocity_command_rad_s")
         c.scale *= scale;
       // A torque of the joint, where there is no other effort.
-      if (c.ours == "torque_nm" && !is_there("motor_torque_nm") && !is_there("current_a")) {
+      if (c.ours == "torque_nm" && !c.why.empty() && !is_there("motor_torque_nm") && !is_there("current_a")) {
         c.ours = "motor_torque_nm";
         c.scale = 1.0 / scale;
       }

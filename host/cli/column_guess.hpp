@@ -29,8 +29,9 @@ struct GuessOptions {
   std::optional<data::Axis> axis;
   Side position_side = Side::open;  // of the only position or velocity
   std::optional<double> gear_ratio;
-  std::optional<int> joint;       // of a file with several, by the number in the names
-  std::optional<int> pole_pairs;  // of the motor, for speeds in electrical turns
+  std::optional<int> joint;          // of a file with several, by the number in the names
+  std::optional<int> pole_pairs;     // of the motor, for speeds in electrical turns
+  std::vector<std::string> without;  // names that are not used
 };
 
 struct HeaderGuess {

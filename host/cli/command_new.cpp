@@ -1,12 +1,11 @@
 #include <fmt/format.h>
 
 #include <nlohmann/json.hpp>
+#include <utility>
 
-#include "host/cli/base_model.hpp"
 #include "host/cli/commands.hpp"
-#include "host/cli/project_draft.hpp"
+#include "host/cli/first_project.hpp"
 #include "host/cli/unfinished_project.hpp"
-#include "host/model/signature.hpp"
 #include "host/output/json.hpp"
 #include "host/output/text.hpp"
 
@@ -15,11 +14,6 @@ namespace {
 
 namespace fs = std::filesystem;
 using nlohmann::json;
-
-std::string name_of(const fs::path& folder) {
-  const fs::path path = fs::absolute(folder).lexically_normal();
-  return (path.has_filename() ? path : path.parent_path()).filename().string();
-}
 
 json json_of(const NewOptions& options, const Draft& draft, const BaseModel& base) {
   json columns = json::array();
@@ -40,21 +34,6 @@ json json_of(const NewOptions& options, const Draft& draft, const BaseModel& bas
           {"notes", draft.notes}};
 }
 
-// The base model, and in the draft what only the values show.
-BaseModel finish(Draft& draft, const NewOptions& options, Console& console) {
-  if (!draft.open_question.empty()) throw UsageError(draft.open_question);
-  data::Dataset dataset = load_draft(draft, options);
-  for (const data::Finding& finding : dataset.findings)
-    if (finding.severity == data::Severity::warning) console.warn(finding.text());
-  complete(draft, dataset);
-  for (const std::string& doubt : implausible_sides(draft, dataset)) console.warn(doubt);
-  BaseModel base = base_model(dataset, name_of(options.out));
-  if (base.model.effects.empty())
-    throw UsageError(fmt::format("no torque balance can be formed from these columns: {}; name the columns with --map",
-                                 output::listed(base.reasons, "and")));
-  return base;
-}
-
 }  // namespace
 
 int run(const NewOptions& options, Console& console) {
@@ -69,7 +48,9 @@ int run(const NewOptions& options, Console& console) {
   Draft draft = draft_of(options);
   BaseModel base;
   try {
-    base = finish(draft, options, console);
+    FirstProject project = first_project(draft, options);
+    for (const std::string& warning : project.warnings) console.warn(warning);
+    base = std::move(project.base);
   } catch (const data::DataError& unusable) {
     leave_unfinished(draft, options, unusable, console);
     return kUnusable;
@@ -80,11 +61,8 @@ int run(const NewOptions& options, Console& console) {
 
   make_folder(options.out);
   const std::string toml = text_of(draft, options.out);
-  std::string model = "# A first model: the effects that these signals can show, to be identified.\n";
-  for (const std::string& reason : base.reasons) model += fmt::format("# {}\n", reason);
-  model += "\n" + model::write(base.model);
   model::save(dataset_file, toml);
-  model::save(model_file, model::signed_by_tool(model));
+  model::save(model_file, text_of(base));
 
   console.line(console.bold("Guessed or decided; mend it in the files where it is wrong:"));
   for (const std::string& note : draft.notes) console.line(output::wrapped("- " + note, 2, 2));

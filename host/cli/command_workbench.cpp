@@ -12,6 +12,7 @@
 #include "host/cli/drive_commands.hpp"
 #include "host/cli/twin_runs.hpp"
 #include "host/cli/workbench_command.hpp"
+#include "host/cli/workbench_project.hpp"
 #include "host/output/json.hpp"
 #include "host/workbench/server.hpp"
 #include "host/workbench/work.hpp"
@@ -52,22 +53,46 @@ workbench::Rig rig_of(const WorkbenchOptions& options, const data::Dataset& data
   return rig;
 }
 
-}  // namespace
-
-int run(const WorkbenchOptions& options, Console& console) {
+void open_model(const WorkbenchOptions& options, workbench::Setup& setup, Console& console) {
   const model::ModelFile file = load_model(options.model);
+  if (options.data.data.empty())
+    throw UsageError("--model needs measurements to compare it with: flexspline workbench DATA --model MODEL");
   const auto dataset = std::make_shared<const data::Dataset>(load(options.data, console));
-  workbench::Setup setup;
-  setup.pipeline = options.pipeline.options();
   setup.first = workbench::open(dataset, file, setup.pipeline, [&](std::string_view stage) {
     if (!stage.empty()) console.progress(stage);
   });
-  setup.data_name = as_arguments(options.data.data);
   setup.model_name = options.model.string();
-  setup.folder = std::filesystem::absolute(options.model).parent_path();
-  setup.drive = options.drive;
   setup.rig = rig_of(options, *dataset);
+}
+
+// What there is to begin with is chosen on the page.
+void begin_without_model(const WorkbenchOptions& options, workbench::Setup& setup) {
+  if (!options.data.holdout.empty())
+    throw UsageError("--holdout needs --model; without one, give all measurements as DATA");
+  for (const std::filesystem::path& path : options.data.data) {
+    if (!std::filesystem::exists(path))
+      throw UsageError(fmt::format("{}: there is no such file or folder; check the path", path.string()));
+    setup.data.push_back(std::filesystem::absolute(path));
+  }
+  setup.model_name = "model.toml";
+  if (!options.plant.empty()) setup.rig = rig_of(options, {});
+}
+
+}  // namespace
+
+int run(const WorkbenchOptions& options, Console& console) {
+  workbench::Setup setup;
+  setup.pipeline = options.pipeline.options();
+  setup.data_name = as_arguments(options.data.data);
+  setup.drive = options.drive;
   setup.run = twin_runner();
+  setup.folder =
+      options.model.empty() ? std::filesystem::current_path() : std::filesystem::absolute(options.model).parent_path();
+  setup.projects = projects(std::filesystem::current_path());
+  if (options.model.empty())
+    begin_without_model(options, setup);
+  else
+    open_model(options, setup, console);
   const Interruptible interruptible;
   const auto begin = std::chrono::steady_clock::now();
   const auto is_over = [&] {

@@ -44,9 +44,10 @@ int run(const MeasureOptions& options, Console& console);
 struct NewOptions {
   DataInputs data;
   std::filesystem::path out;
-  std::vector<std::string> map;  // OURS=THEIRS[:UNIT]
-  std::string axis;              // empty: guessed
-  std::string position_side;     // "link", "motor"; empty: guessed
+  std::vector<std::string> map;      // OURS=THEIRS[:UNIT]
+  std::vector<std::string> without;  // columns of theirs that are not used, whatever their names say
+  std::string axis;                  // empty: guessed
+  std::string position_side;         // "link", "motor"; empty: guessed
   std::optional<int> pole_pairs;
   std::optional<int> joint;  // of a file with several
   std::optional<double> gear_ratio;

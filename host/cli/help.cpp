@@ -285,11 +285,16 @@ const std::array kHelp = {
         "workbench",
         "all of it with the mouse: a page in the browser of this machine",
         "Serves a page on 127.0.0.1 and opens it: how good the model is, where it fails, what is missing, and what "
-        "becomes of the error with that added; steps can be taken back and compared. Models, reports and blocks are "
-        "saved into the model's folder, run in closed loop on a simulated drive (--plant), and flashed to a drive or "
+        "becomes of the error with that added; steps can be taken back and compared. Without --model it begins as "
+        "flexspline new does: drop recordings on the page (or give them as DATA), look at the signals, choose which "
+        "column is which, type gear ratio and torque constant, and a first model is identified. Models, reports and "
+        "blocks are "
+        "saved into the model's folder (without --model into this one), run in closed loop on a simulated drive "
+        "(--plant), and flashed to a drive or "
         "the twin, whose signals and residual map are shown. The address has a token in it: who does "
         "not know it is refused. Runs until Ctrl-C; --json writes the address once it listens.",
-        {kMakeData, "flexspline workbench demo-out --model demo-out/base-model.toml --no-open --seconds 0.5"}},
+        {"flexspline workbench --no-open --seconds 0.5", kMakeData,
+         "flexspline workbench demo-out --model demo-out/base-model.toml --no-open --seconds 0.5"}},
     CommandHelp{
         "fleet",
         "many drives: one command a drive, then which of them differs from its siblings",

@@ -13,6 +13,11 @@ void take_new(Parser& command, NewOptions& options) {
   command.add_option("--map", options.map, "a column of ours is theirs, in this unit; may be repeated")
       ->type_name("OURS=THEIRS[:UNIT]")
       ->allow_extra_args(false);
+  command
+      .add_option("--without", options.without,
+                  "a column of theirs that is not to be used, whatever its name says; may be repeated")
+      ->type_name("THEIRS")
+      ->allow_extra_args(false);
   command.add_option("--axis", options.axis, "rotary, or linear (m, m/s, N)")
       ->check(CLI::IsMember({"rotary", "linear"}))
       ->type_name("");

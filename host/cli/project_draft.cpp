@@ -254,6 +254,12 @@ Draft draft_of_files(const std::vector<fs::path>& files, const NewOptions& optio
                                                          : Side::open;
   how.gear_ratio = options.gear_ratio;
   how.joint = options.joint;
+  for (const std::string& name : options.without) {
+    if (std::find(names.begin(), names.end(), name) == names.end())
+      throw UsageError(fmt::format("--without {}: no file has such a column; the columns are {}", name,
+                                   output::listed(text::nearest_first(name, names))));
+    how.without.push_back(name);
+  }
   how.pole_pairs = options.pole_pairs;
   const ColumnGuess* time = find(stated, "time_s");
   std::vector<std::string> of_one_table;
@@ -287,6 +293,9 @@ Draft draft_of_files(const std::vector<fs::path>& files, const NewOptions& optio
   }
   take_side(draft, guess);
   draft.side = guess.side;
+  draft.joints = guess.joints;
+  draft.joint = guess.joint;
+  draft.needs_pole_pairs = guess.needs_pole_pairs;
   draft.there = guess.native;
   for (const ColumnGuess& c : guess.columns) draft.there.push_back(c.ours);
   draft.columns = guess.columns;
@@ -309,6 +318,7 @@ Draft draft_of_toml(const fs::path& path, const NewOptions& options) {
       draft.toml.experiments.push_back(std::move(entry));
     }
   for (data::ExperimentEntry& entry : draft.toml.experiments) entry.file = fs::absolute(entry.file);
+  draft.from_toml = true;
   draft.notes.push_back(fmt::format("what {} says is kept", path.string()));
   add_options(draft, options);
   return draft;

@@ -22,8 +22,12 @@ struct Draft {
   std::vector<ColumnGuess> columns;  // guessed or mapped
   std::vector<std::string> there;    // columns of ours that are there, by their name or mapped
   std::vector<std::string> unused;
-  std::optional<Side> side;   // of the only position, where there is one
-  std::string open_question;  // "what; what to do": without an answer there is nothing to go on with
+  std::vector<int> joints;       // numbers of those in the file; empty: one
+  std::optional<int> joint;      // that was taken
+  std::string needs_pole_pairs;  // a speed in electrical turns
+  bool from_toml = false;        // all of it stands in a dataset.toml
+  std::optional<Side> side;      // of the only position, where there is one
+  std::string open_question;     // "what; what to do": without an answer there is nothing to go on with
 };
 
 // From CSV and MAT files and folders of them, or from one dataset.toml, whose facts are kept.

@@ -41,6 +41,7 @@ std::string as_given(const NewOptions& options) {
   std::string line =
       fmt::format("flexspline new --from {} --out {}", as_arguments(options.data.data), quoted(options.out.string()));
   for (const std::string& map : options.map) line += as_argument("--map", map);
+  for (const std::string& name : options.without) line += as_argument("--without", name);
   line += as_argument("--axis", options.axis) + as_argument("--position-side", options.position_side);
   if (options.joint) line += fmt::format(" --joint {}", *options.joint);
   if (options.pole_pairs) line += fmt::format(" --pole-pairs {}", *options.pole_pairs);

@@ -13,6 +13,7 @@
 #include "host/signals/butterworth.hpp"
 #include "host/signals/cutoff.hpp"
 #include "host/signals/differentiate.hpp"
+#include "host/signals/fused_velocity.hpp"
 
 namespace flexspline::estimation {
 namespace {
@@ -114,6 +115,35 @@ Motion motion_from_velocity(const std::vector<double>& raw, const std::vector<Se
   return m;
 }
 
+// White noise of a measured signal, by what the filter takes away of it: the filter keeps a share.
+double noise_of(const std::vector<double>& raw, const std::vector<double>& kept, const ZeroPhaseFilter& filter,
+                double sample_s) {
+  return root_mean_square_of_rest(raw, kept) / std::sqrt(1.0 - std::min(0.8, 2.0 * filter.cutoff_hz() * sample_s));
+}
+
+// Takes a velocity that was measured beside the position into the derivative where it has less noise than that; returns
+// from which frequency on, and in `noise` what is left of both. Zero: it does not help.
+double take_measured_velocity(Motion& motion, const std::vector<double>& measured, const std::vector<Segment>& segments,
+                              const ZeroPhaseFilter& filter, double sample_s, double& noise) {
+  const std::vector<double> kept = filtered(measured, segments, filter);
+  const double measured_noise = noise_of(measured, kept, filter, sample_s);
+  double crossover_hz = 0.0, least = noise;
+  for (const Segment& s : segments) {
+    const auto part = [&](const std::vector<double>& signal) {
+      return std::span<const double>(signal.data() + s.first, s.last - s.first);
+    };
+    const auto fused = signals::fused_velocity(part(motion.velocity), part(kept), motion.position_noise, measured_noise,
+                                               filter.cutoff_hz(), sample_s);
+    if (!fused || !(fused->std < noise)) continue;
+    std::copy(fused->velocity.begin(), fused->velocity.end(),
+              motion.velocity.begin() + static_cast<std::ptrdiff_t>(s.first));
+    crossover_hz = std::max(crossover_hz, fused->crossover_hz);
+    least = std::min(least, fused->std);
+  }
+  noise = least;
+  return crossover_hz;
+}
+
 // A current that is held for a sample acts, on average, half a sample after its time stamp; the mean with the sample
 // before puts it at the instant at which positions are read.
 std::vector<double> align_held(const std::vector<double>& held, const std::vector<Segment>& segments) {
@@ -192,16 +222,21 @@ struct Side {
   double velocity_noise = 0.0;
   std::optional<double> quantum;
   bool measured = false;
+  double velocity_crossover_hz = 0.0;
 };
 
-Side side_from_position(const std::vector<double>& position, std::optional<double> quantum, const Experiment& e,
-                        const ZeroPhaseFilter& filter, double slope_noise) {
+// `velocity` is the column that may have been measured as well.
+Side side_from_position(const std::vector<double>& position, Column velocity, std::optional<double> quantum,
+                        const Experiment& e, const ZeroPhaseFilter& filter, double slope_noise) {
   Side side;
   side.motion = motion_from_position(position, e.segments, filter, e.sample_s);
   side.quantum = quantum;
   side.motion.position_noise = std::max(side.motion.position_noise, quantum.value_or(0.0) / std::sqrt(12.0));
   side.velocity_noise = side.motion.position_noise * slope_noise;
   side.measured = true;
+  if (e.has(velocity))
+    side.velocity_crossover_hz =
+        take_measured_velocity(side.motion, e[velocity], e.segments, filter, e.sample_s, side.velocity_noise);
   return side;
 }
 
@@ -212,7 +247,7 @@ Side motor_side(const Experiment& e, const catalogue::DriveConstants<double>& dr
     const std::optional<double> quantum = e.encoder_counts && drive.turn_angle_scale == 1.0
                                               ? std::optional(2.0 * M_PI / *e.encoder_counts)
                                               : quantum_of(position);
-    return side_from_position(position, quantum, e, filter, slope_noise);
+    return side_from_position(position, Column::motor_velocity, quantum, e, filter, slope_noise);
   }
   Side side;
   if (!e.has(Column::motor_velocity)) return side;
@@ -230,7 +265,7 @@ Side output_side(const Experiment& e, const ZeroPhaseFilter& filter, double slop
     const std::vector<double>& position = e[Column::output_position];
     const std::optional<double> quantum =
         e.output_encoder_counts ? std::optional(2.0 * M_PI / *e.output_encoder_counts) : quantum_of(position);
-    return side_from_position(position, quantum, e, filter, slope_noise);
+    return side_from_position(position, Column::output_velocity, quantum, e, filter, slope_noise);
   }
   Side side;
   if (!e.has(Column::output_velocity)) return side;
@@ -271,6 +306,7 @@ void take_motion(Record& r, const Experiment& e, Side motor, Side output, double
   r.has_motor_motion = motor.measured;
   r.has_output_motion = output.measured || r.locked;
   r.motor_quantum = motor.quantum;
+  r.velocity_crossover_hz = motor.velocity_crossover_hz;
   r.output_quantum = output.quantum;
   r.velocity_noise[index(Balance::motor)] = motor.velocity_noise;
   r.velocity_noise[index(Balance::load)] =

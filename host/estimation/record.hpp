@@ -84,6 +84,9 @@ struct Record {
   bool has_temperature = false;
   std::optional<double> motor_quantum;  // resolution of the motor position
   std::optional<double> output_quantum;
+  // From here on the motor's velocity is the measured one, which has less noise than the derivative of the position;
+  // zero: all of it is the derivative.
+  double velocity_crossover_hz = 0.0;
   // Standard deviation of what the resolution and noise of the positions leave in the direction variable of each
   // balance: motor velocity, torsion rate, output velocity.
   std::array<double, kBalances> velocity_noise{};

@@ -109,6 +109,30 @@ std::string balance_name(estimation::Balance balance) {
   return "";
 }
 
+namespace {
+
+// Which velocity was taken where a record has both a position and a velocity.
+std::string velocity_text(const estimation::Prepared& prepared) {
+  std::size_t both = 0, fused = 0;
+  double highest_hz = 0.0;
+  for (const estimation::Record& record : prepared.records) {
+    if (!record.experiment->has(data::Column::motor_position) || !record.experiment->has(data::Column::motor_velocity))
+      continue;
+    ++both;
+    if (record.velocity_crossover_hz > 0.0) ++fused;
+    highest_hz = std::max(highest_hz, record.velocity_crossover_hz);
+  }
+  if (both == 0) return {};
+  if (fused == 0)
+    return "; the motor's velocity is the derivative of its position, as the measured one is not better or differs";
+  return fmt::format(
+      "; the motor's velocity is the measured one above {:.3g} Hz, where it has less noise than the "
+      "derivative of the position{}",
+      highest_hz, fused < both ? fmt::format(" (in {} of {} records)", fused, both) : "");
+}
+
+}  // namespace
+
 std::string pipeline_text(const estimation::Prepared& prepared) {
   const estimation::Pipeline& p = prepared.pipeline;
   std::size_t used = 0, masked = 0, held = 0, held_by_assumption = 0;
@@ -132,6 +156,7 @@ std::string pipeline_text(const estimation::Prepared& prepared) {
   text += decimations == std::vector<std::string>{"1"}
               ? "; every sample is a row"
               : fmt::format("; one sample in {} is a row", listed(decimations, "or"));
+  text += velocity_text(prepared);
   const double share =
       used + masked > 0 ? 100.0 * static_cast<double>(masked) / static_cast<double>(used + masked) : 0.0;
   text += p.mask ? fmt::format("; {:.1f} % of the motor balance's rows masked (reversals, sticking, clipping)", share)

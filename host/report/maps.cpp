@@ -24,6 +24,7 @@ using output::json_numbers;
 // As residual maps are judged (comparison/residual_map.cpp).
 constexpr std::size_t kMostBins = 24;
 constexpr std::size_t kRowsPerBin = 16;
+constexpr std::size_t kBinsPerWave = 6;
 constexpr std::size_t kFewestInMapBin = 8;
 constexpr int kOrders = 24;
 constexpr double kWholeWaves = 2.0;
@@ -132,11 +133,23 @@ double share_of(const std::vector<comparison::Share>& shares, const std::string&
   return 0.0;
 }
 
+// Bins of a map, enough to draw each wave of the order that is largest in the residual: fewer would draw it as a wave
+// of another order.
+std::size_t bins_for(Eigen::Index rows, const std::vector<double>& amplitudes) {
+  const auto most = static_cast<std::size_t>(rows) / kRowsPerBin;
+  std::size_t wanted = std::clamp<std::size_t>(most, 4, kMostBins);
+  const auto largest = std::max_element(amplitudes.begin(), amplitudes.end(),
+                                        [](double a, double b) { return !(a >= b) && std::isfinite(b); });
+  if (largest == amplitudes.end() || !std::isfinite(*largest)) return wanted;
+  const std::size_t order = static_cast<std::size_t>(largest - amplitudes.begin()) + 1;
+  return std::max(wanted, std::min(kBinsPerWave * order, most));
+}
+
 json map_of(const View& view, const BalanceView& balance, const comparison::RowVariable& variable,
             const std::vector<comparison::Share>& shares, const Eigen::VectorXd& directions) {
-  const auto wanted =
-      std::clamp<std::size_t>(static_cast<std::size_t>(balance.residual.size()) / kRowsPerBin, 4, kMostBins);
-  const Bins bins = comparison::equal_count_bins(variable.values, wanted);
+  const std::vector<double> amplitudes =
+      variable.name == "motor_angle" ? order_amplitudes(view, balance, balance.residual) : std::vector<double>{};
+  const Bins bins = comparison::equal_count_bins(variable.values, bins_for(balance.residual.size(), amplitudes));
   if (bins.count() < 2) return nullptr;
   json map{{"variable", variable.name},
            {"unit", variable.unit},
@@ -155,8 +168,7 @@ json map_of(const View& view, const BalanceView& balance, const comparison::RowV
     map["with_direction_before"] = mean_json(binned(balance, *balance.before, bins, &directions));
   }
   if (variable.name == "motor_angle") {
-    map["orders"] = {{"amplitude", json_numbers(order_amplitudes(view, balance, balance.residual))},
-                     {"before", nullptr}};
+    map["orders"] = {{"amplitude", json_numbers(amplitudes)}, {"before", nullptr}};
     if (balance.before) map["orders"]["before"] = json_numbers(order_amplitudes(view, balance, *balance.before));
     for (int order = 1; order <= kOrders; ++order)
       map["share_percent"] =

@@ -11,6 +11,9 @@ namespace flexspline::selection {
 namespace {
 
 constexpr std::size_t kBins = 10;
+// Fewer would draw a ripple as another one, of a lower order.
+constexpr double kBinsPerWave = 6.0;
+constexpr double kRowsPerBin = 8.0;
 
 std::string label_of(const CandidateFit& candidate) {
   return candidate.fit.terms.back().label();
@@ -27,6 +30,12 @@ Eigen::VectorXd own_torque(BalanceSearch& search, const CandidateFit& candidate,
       .orthogonal_part(estimation::model_torque(*search.data, candidate.fit.terms) -
                        estimation::model_torque(*search.data, search.base.terms))
       .col(0);
+}
+
+std::size_t bins_for(const Trial& trial, const std::string& variable, Eigen::Index rows) {
+  if (!trial.proposal.order || !variable.ends_with("angle")) return kBins;
+  const double most = static_cast<double>(rows) / kRowsPerBin;
+  return std::max(kBins, static_cast<std::size_t>(std::min(kBinsPerWave * std::abs(*trial.proposal.order), most)));
 }
 
 // The plain variable that a torque depends on most: "speed" of "speed x direction".
@@ -73,7 +82,8 @@ std::optional<Evidence> evidence(BalanceSearch& search, const CandidateFit& cand
         std::find_if(variables.begin(), variables.end(), [&](const auto& v) { return v.name == name; });
     if (variable == variables.end()) continue;
     const bool resisting = name != share.variable;
-    const comparison::Bins bins = comparison::equal_count_bins(variable->values, kBins);
+    const comparison::Bins bins =
+        comparison::equal_count_bins(variable->values, bins_for(trial, name, variable->values.size()));
     if (bins.count() < 3) continue;
     Evidence map{name, variable->unit, resisting, share.share_percent, {}};
     for (std::size_t b = 0; b < bins.count(); ++b) {

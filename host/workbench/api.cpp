@@ -21,7 +21,6 @@ namespace {
 using nlohmann::json;
 
 constexpr std::size_t kMostTabs = 24;
-constexpr std::size_t kMostFiles = 200;
 constexpr const char* kTabsFile = "tabs.json";
 // Ends with the server, so it is short.
 constexpr auto kLongestWait = std::chrono::milliseconds(1500);
@@ -74,7 +73,7 @@ std::string field(const json& asked, const char* key) {
 }
 
 std::string ending_of(const std::string& what) {
-  if (what == "model") return ".toml";
+  if (what == "model" || what == "dataset") return ".toml";
   if (what == "report") return ".html";
   if (what == "block") return ".block";
   throw AskedError(fmt::format("there is no \"{}\" to save; model, report and block are", what));
@@ -187,6 +186,7 @@ std::shared_ptr<Session> Api::open_tab(const std::string& like) {
     }
   tabs_.push_front(made);
   if (tabs_.size() > kMostTabs) tabs_.pop_back();
+  if (!made->has_model() && !setup_.data.empty()) start_proposal(made, {});
   return made;
 }
 
@@ -210,7 +210,8 @@ json Api::get(const Request& request) {
     const std::uint64_t seen = whole(request, "seen", 1e15);
     if (session->wait(seen, kLongestWait) <= seen) return {{"changes", seen}};
     json state = session->state();
-    state["data_name"] = setup_.data_name;
+    const std::shared_ptr<Step> opened = session->history()[0];
+    state["data_name"] = opened && !opened->data_name.empty() ? opened->data_name : setup_.data_name;
     state["model_file"] = setup_.model_name;
     state["folder"] = setup_.folder.string();
     state["scenarios"] = setup_.run ? trial_scenarios() : std::vector<std::string>();
@@ -223,6 +224,7 @@ json Api::get(const Request& request) {
     return *traces;
   }
   const History<std::shared_ptr<Step>> history = session->history();
+  if (!session->has_model()) throw NotFound("there is no model yet");
   const std::size_t at = request.query.contains("step") ? whole(request, "step") : history.at();
   if (at >= history.size()) throw AskedError("there is no such step");
   const std::shared_ptr<Look> look = history[at]->look();
@@ -258,7 +260,17 @@ json Api::post(const Request& request) {
 json Api::act(const std::shared_ptr<Session>& session, const json& asked) {
   const std::string what = field(asked, "do");
   const auto pipeline = setup_.pipeline;
-  if (what == "cancel") {
+  constexpr std::string_view kWithoutModel[] = {"cancel", "dismiss", "propose", "begin", "forget"};
+  if (!session->has_model() && std::ranges::find(kWithoutModel, what) == std::end(kWithoutModel))
+    throw AskedError("there is no model yet; drop recordings on the page and begin with them");
+  if (what == "propose") {
+    start_proposal(session, choices_of(asked));
+  } else if (what == "begin") {
+    start_project(session, choices_of(asked));
+  } else if (what == "forget") {
+    session->keep("recordings", nullptr);
+    session->set("proposal", nullptr);
+  } else if (what == "cancel") {
     session->cancel();
   } else if (what == "dismiss") {
     session->set("problem", nullptr);
@@ -300,16 +312,25 @@ json Api::act(const std::shared_ptr<Session>& session, const json& asked) {
   } else if (what == "disconnect") {
     drive_.disconnect();
     session->set("flash", nullptr);
-  } else if (what == "flash") {
-    session->start("Flashing", [this, session = session.get()](const Progress& say) {
+    session->set("flash_preview", nullptr);
+  } else if (what == "preview-flash" || what == "preview-restore") {
+    session->start("Comparing with the drive", [this, what, session = session.get()](const Progress& say) {
       const std::shared_ptr<Step> step = session->history().current();
-      session->set("flash", drive_.flash(step->model, say));
+      session->set("flash_preview",
+                   what == "preview-flash" ? drive_.preview_flash(step->model, say) : drive_.preview_restore());
     });
-  } else if (what == "restore") {
-    session->start("Restoring", [this, session = session.get()](const Progress&) {
-      drive_.restore();
-      session->set("flash", nullptr);
-    });
+  } else if (what == "dismiss-preview") {
+    session->set("flash_preview", nullptr);
+  } else if (what == "flash" || what == "restore") {
+    // Nothing is done to a drive but what was shown.
+    const Shown shown{field(asked, "before"), field(asked, "after")};
+    session->set("flash_preview", nullptr);
+    session->start(what == "flash" ? "Flashing" : "Restoring",
+                   [this, what, shown, session = session.get()](const Progress& say) {
+                     const std::shared_ptr<Step> step = session->history().current();
+                     if (what == "restore") drive_.restore(shown);
+                     session->set("flash", what == "flash" ? drive_.flash(step->model, say, shown) : json(nullptr));
+                   });
   } else if (what == "move") {
     session->start("Moving the twin", [this](const Progress& say) { drive_.move(say); });
   } else if (what == "empty-map") {
@@ -366,9 +387,10 @@ std::string Api::content(const Session& session, const std::string& what) const 
   const auto history = session.history();
   const Step& step = *history.current();
   if (what == "model") return model_file(step);
+  if (what == "dataset") return history[0]->dataset_text;
   if (what == "report")
-    return report_page(step, history.at() > 0 ? history[history.at() - 1].get() : nullptr, setup_.data_name,
-                       setup_.pipeline);
+    return report_page(step, history.at() > 0 ? history[history.at() - 1].get() : nullptr,
+                       history[0]->data_name.empty() ? setup_.data_name : history[0]->data_name, setup_.pipeline);
   const auto bytes = deployment::pack(step.model).bytes;
   return {bytes.begin(), bytes.end()};
 }
@@ -411,38 +433,13 @@ Answer Api::file(const Request& request) {
   const std::shared_ptr<Session> session = session_of(request);
   const std::string what = text(request, "what");
   Answer answer;
-  answer.download = "flexspline-" + what + ending_of(what);
+  if (!session->has_model()) throw AskedError("there is no model yet");
+  answer.download = what == "dataset" ? "dataset.toml" : "flexspline-" + what + ending_of(what);
   answer.body = content(*session, what);
-  answer.type = what == "model"    ? "application/toml"
-                : what == "report" ? "text/html; charset=utf-8"
-                                   : "application/octet-stream";
+  answer.type = ending_of(what) == ".toml" ? "application/toml"
+                : what == "report"         ? "text/html; charset=utf-8"
+                                           : "application/octet-stream";
   return answer;
-}
-
-void Api::start_drop(const std::shared_ptr<Session>& session, const std::vector<Upload>& files) {
-  if (files.empty()) throw AskedError("no file came");
-  if (files.size() > kMostFiles) throw AskedError(fmt::format("at most {} files at a time", kMostFiles));
-  const std::filesystem::path folder = dropped_ / std::to_string([&] {
-                                         const std::lock_guard lock(mutex_);
-                                         return drops_++;
-                                       }());
-  std::filesystem::create_directory(folder);
-  for (const Upload& file : files) {
-    require_text(file.name, "the name of a file");
-    const std::string ending = std::filesystem::path(file.name).extension().string();
-    if (ending != ".csv" && ending != ".mat" && ending != ".CSV" && ending != ".MAT")
-      throw AskedError(
-          fmt::format("{} is no measurement; drop CSV or MAT files. A dataset.toml names files by their "
-                      "place: start the workbench with it",
-                      file.name));
-    std::ofstream out(inside(folder, file.name, ending), std::ios::binary);
-    out.write(file.content.data(), static_cast<std::streamsize>(file.content.size()));
-    if (!out.flush()) throw std::runtime_error("the files cannot be kept: is the disk full?");
-  }
-  start_step(session, fmt::format("Reading {} file{}", files.size(), files.size() == 1 ? "" : "s"),
-             [folder, pipeline = setup_.pipeline](const Step& now, const Progress& say) {
-               return with_files(now, folder, pipeline, say);
-             });
 }
 
 }  // namespace flexspline::workbench

@@ -11,6 +11,7 @@
 #include <vector>
 
 #include "host/workbench/live_drive.hpp"
+#include "host/workbench/project.hpp"
 #include "host/workbench/session.hpp"
 #include "host/workbench/supervisor.hpp"
 #include "host/workbench/trial.hpp"
@@ -40,10 +41,12 @@ struct Answer {
 
 // What the workbench was started with.
 struct Setup {
-  std::shared_ptr<Step> first;
-  std::string data_name;         // as the user named the data
-  std::string model_name;        // likewise
-  std::filesystem::path folder;  // where models, reports and blocks are saved
+  std::shared_ptr<Step> first;              // null: there is no model yet
+  std::vector<std::filesystem::path> data;  // recordings to begin with where there is no model
+  Projects projects;                        // empty functions: without a model there is nothing to do
+  std::string data_name;                    // as the user named the data
+  std::string model_name;                   // likewise
+  std::filesystem::path folder;             // where models, reports and blocks are saved
   estimation::PipelineOptions pipeline;
   std::string drive;        // --drive; empty: none
   Rig rig;                  // for closed loops; none known: the present model
@@ -76,6 +79,11 @@ class Api {
   void start_trial(const std::shared_ptr<Session>& session, const std::string& scenario);
   void start_save(const std::shared_ptr<Session>& session, const nlohmann::json& asked);
   void start_drop(const std::shared_ptr<Session>& session, const std::vector<Upload>& files);
+  // Of the recordings that were dropped last, or that the workbench was started with.
+  void start_proposal(const std::shared_ptr<Session>& session, const Choices& choices);
+  void start_project(const std::shared_ptr<Session>& session, const Choices& choices);
+  std::vector<std::filesystem::path> recordings_for(const std::filesystem::path& folder) const;
+  std::filesystem::path new_folder();
   std::string content(const Session& session, const std::string& what) const;
   std::shared_ptr<Session> session_of(const Request& request);
   std::shared_ptr<Session> open_tab(const std::string& like);

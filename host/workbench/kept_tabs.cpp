@@ -69,8 +69,16 @@ estimation::Estimate estimate_of(const json& kept) {
 json kept_step_json(const Step& step) {
   json estimates = json::array();
   for (const estimation::Estimate& e : step.estimates) estimates.push_back(kept_estimate_json(e));
-  return {{"action", step.action},        {"what", step.what},         {"model_text", step.model_text},
-          {"files", step.files.string()}, {"warnings", step.warnings}, {"estimates", std::move(estimates)}};
+  return {{"action", step.action},
+          {"what", step.what},
+          {"model_text", step.model_text},
+          {"files", step.files.string()},
+          {"warnings", step.warnings},
+          {"estimates", std::move(estimates)},
+          {"project", step.project.string()},
+          {"data_name", step.data_name},
+          {"dataset_text", step.dataset_text},
+          {"tolerated", step.tolerated}};
 }
 
 KeptStep step_of(const std::string& id, const json& kept) {
@@ -81,6 +89,10 @@ KeptStep step_of(const std::string& id, const json& kept) {
   step.model_text = kept.at("model_text");
   step.files = kept.at("files").get<std::string>();
   step.warnings = kept.at("warnings").get<std::vector<std::string>>();
+  step.project = kept.at("project").get<std::string>();
+  step.data_name = kept.at("data_name");
+  step.dataset_text = kept.at("dataset_text");
+  step.tolerated = kept.at("tolerated").get<std::vector<std::string>>();
   for (const json& e : kept.at("estimates")) step.estimates.push_back(estimate_of(e));
   return step;
 }
@@ -93,8 +105,10 @@ void keep_tabs(const std::filesystem::path& file, const std::list<std::shared_pt
     const History<std::shared_ptr<Step>> history = tab->history();
     json ids = json::array();
     for (std::size_t k = 0; k < history.size(); ++k) {
+      if (!history[k]) continue;  // there is no model yet
       ids.push_back(history[k]->id);
-      if (k > 0 && !steps.contains(history[k]->id)) steps[history[k]->id] = kept_step_json(*history[k]);
+      if ((k > 0 || !history[k]->project.empty()) && !steps.contains(history[k]->id))
+        steps[history[k]->id] = kept_step_json(*history[k]);
     }
     listed.push_back({{"id", tab->id()},
                       {"changes", tab->wait(0, std::chrono::milliseconds(0))},
@@ -126,10 +140,13 @@ std::list<std::shared_ptr<Session>> tabs_again(const std::filesystem::path& file
     History<std::shared_ptr<Step>> history(first);
     try {
       const auto ids = one.at("steps").get<std::vector<std::string>>();
-      for (std::size_t k = 1; k < ids.size(); ++k) {
+      for (std::size_t k = first ? 1 : 0; k < ids.size(); ++k) {
         std::shared_ptr<Step>& step = known[ids[k]];
-        if (!step) step = made_again(step_of(ids[k], kept.at("steps").at(ids[k])), *history.current(), pipeline);
-        history.take(step);
+        if (!step) step = made_again(step_of(ids[k], kept.at("steps").at(ids[k])), history.current().get(), pipeline);
+        if (k == 0)
+          history = History<std::shared_ptr<Step>>(step);
+        else
+          history.take(step);
       }
       history.go(one.at("at").get<std::size_t>());
       tab->restore(std::move(history), changes);

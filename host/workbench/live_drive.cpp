@@ -48,6 +48,18 @@ json changes_json(const std::vector<drive::BlockChange>& changes) {
   return list;
 }
 
+json comparison_json(const drive::Bytes& before, const drive::Bytes& after) {
+  return {{"before", view_json(drive::view_of(before))},
+          {"after", view_json(drive::view_of(after))},
+          {"changes", changes_json(drive::changes(before, after))}};
+}
+
+// A drive or a model may have changed while its user looked at the preview.
+void require_shown(const std::optional<Shown>& shown, const drive::Bytes& before, const drive::Bytes& after) {
+  if (shown && (drive::view_of(before).sha256 != shown->before || drive::view_of(after).sha256 != shown->after))
+    throw drive::DriveError("the block on the drive or the model is another than in the preview; look at it again");
+}
+
 // Fast and slower sines, and a shaft that creeps to and fro, so that the map has all velocities in it for long enough.
 planning::Plan motion_of(const drive::Scales& scales) {
   const double limit =
@@ -236,31 +248,64 @@ json LiveDrive::told() const {
   return answer;
 }
 
-json LiveDrive::flash(const model::Model& model, const std::function<void(std::string_view)>& say) {
+json LiveDrive::preview_flash(const model::Model& model, const std::function<void(std::string_view)>& say) {
   const Turn turn(mutex_, waiting_);
   require();
   return seeing_losses([&]() -> json {
     say("proving the block and comparing it with double");
     read_block();
     const drive::ModelBlock made = drive::model_block(*session_, active_, model);
-    const auto changes = drive::changes(active_, made.bytes);
-    const drive::BlockView before = drive::view_of(active_), after = drive::view_of(made.bytes);
+    json preview = comparison_json(active_, made.bytes);
+    preview["warnings"] = made.warnings;
+    preview["restores"] = false;
+    return preview;
+  });
+}
+
+json LiveDrive::preview_restore() {
+  const Turn turn(mutex_, waiting_);
+  require();
+  return seeing_losses([&]() -> json {
+    read_block();
+    const drive::Bytes previous = session_->read_block(protocol::Which::previous);
+    if (previous.empty()) session_->fail("it has no block before the active one");
+    json preview = comparison_json(active_, previous);
+    preview["warnings"] = json::array();
+    preview["restores"] = true;
+    return preview;
+  });
+}
+
+json LiveDrive::flash(const model::Model& model, const std::function<void(std::string_view)>& say,
+                      const std::optional<Shown>& shown) {
+  const Turn turn(mutex_, waiting_);
+  require();
+  return seeing_losses([&]() -> json {
+    say("proving the block and comparing it with double");
+    read_block();
+    const drive::ModelBlock made = drive::model_block(*session_, active_, model);
+    require_shown(shown, active_, made.bytes);
+    json answer = comparison_json(active_, made.bytes);
     const bool is_new = made.bytes != active_;
     if (is_new)
       session_->write_block(
           made.bytes, [&](std::size_t sent) { say(fmt::format("flashing: {} of {} bytes", sent, made.bytes.size())); });
     read_block();
     subscribed_ = came_back_ = false;
-    return {{"before", view_json(before)}, {"after", view_json(after)}, {"changes", changes_json(changes)},
-            {"warnings", made.warnings},   {"flashed", is_new},         {"drive", session_->serial()}};
+    answer.update({{"warnings", made.warnings}, {"flashed", is_new}, {"drive", session_->serial()}});
+    return answer;
   });
 }
 
-json LiveDrive::restore() {
+json LiveDrive::restore(const std::optional<Shown>& shown) {
   const Turn turn(mutex_, waiting_);
   require();
   return seeing_losses([&]() -> json {
     const drive::BlockView before = drive::view_of(active_);
+    if (shown) {
+      read_block();
+      require_shown(shown, active_, session_->read_block(protocol::Which::previous));
+    }
     session_->restore();
     read_block();
     subscribed_ = came_back_ = false;

@@ -26,6 +26,11 @@ struct Reaching {
   std::chrono::milliseconds first{1000}, most{10000};
 };
 
+// The blocks of a preview, by their SHA-256; empty: none.
+struct Shown {
+  std::string before, after;
+};
+
 // A drive that is lost (cable, power, a twin that ended) is connected again when it comes back, if it is the same one.
 // That alone: nothing that changes a drive is ever done a second time.
 class LiveDrive {
@@ -47,9 +52,14 @@ class LiveDrive {
   // Drives in reach: [{"drive", "what", "usable", "problem"}]; a twin always.
   nlohmann::json in_reach() const;
 
-  // {"before", "after", "changes", "warnings", "flashed"} as `flexspline flash` says it. Throws as it does.
-  nlohmann::json flash(const model::Model& model, const std::function<void(std::string_view)>& say);
-  nlohmann::json restore();
+  // {"before", "after", "changes", "warnings", "restores"}: what the next two would do. Changes nothing.
+  nlohmann::json preview_flash(const model::Model& model, const std::function<void(std::string_view)>& say);
+  nlohmann::json preview_restore();
+  // {"before", "after", "changes", "warnings", "flashed"} as `flexspline flash` says it. Throws as it does, and
+  // DriveError where the blocks are not those that were shown.
+  nlohmann::json flash(const model::Model& model, const std::function<void(std::string_view)>& say,
+                       const std::optional<Shown>& shown = std::nullopt);
+  nlohmann::json restore(const std::optional<Shown>& shown = std::nullopt);
 
   // What `monitor --residual-map` says, and "started": it counts only from now; {"problem"} where there is none.
   nlohmann::json residual_map();

@@ -37,6 +37,33 @@ json step_json(const Step& step) {
            }()}};
 }
 
+json state_of(const History<std::shared_ptr<Step>>& history) {
+  const Step& now = *history.current();
+  json steps = json::array();
+  for (std::size_t k = 0; k < history.size(); ++k) steps.push_back(step_json(*history[k]));
+  const auto found = now.diagnosed();
+  json answer = *now.errors;
+  json warnings = answer["warnings"];
+  for (const data::Finding& f : now.dataset->findings)
+    if (f.severity == data::Severity::warning) warnings.push_back(f.text());
+  for (const std::string& w : now.warnings) warnings.push_back(w);
+  answer["warnings"] = std::move(warnings);
+  answer["model_name"] = now.model.name;
+  answer["steps"] = std::move(steps);
+  answer["at"] = history.at();
+  answer["parameters"] = now.look()->parameters();
+  answer["diagnosis"] = found ? diagnosis_json(*found) : json(nullptr);
+  json before = json::array();
+  if (history.at() > 0)
+    for (const model::Effect& e : history[history.at() - 1]->model.effects)
+      for (const model::Parameter& p : e.parameters)
+        before.push_back(
+            {{"id", e.id}, {"parameter", p.name}, {"value", p.value ? json_number(*p.value) : json(nullptr)}});
+  answer["parameters_before"] = std::move(before);
+  answer["has_dataset_text"] = !history[0]->dataset_text.empty();
+  return answer;
+}
+
 }  // namespace
 
 json problem_json(const std::string& during, const std::exception_ptr& error) {
@@ -147,13 +174,20 @@ History<std::shared_ptr<Step>> Session::history() const {
   return history_;
 }
 
+bool Session::has_model() const {
+  const std::lock_guard lock(mutex_);
+  return history_.current() != nullptr;
+}
+
 void Session::change(const std::function<void(History<std::shared_ptr<Step>>&)>& change) {
   const std::lock_guard lock(mutex_);
   change(history_);
   // The one before stands beside the present one; others are seldom looked at.
   for (std::size_t k = 0; k < history_.size(); ++k)
-    if (k > history_.at() || k + 1 < history_.at()) history_[k]->forget_look();
+    if (history_[k] && (k > history_.at() || k + 1 < history_.at())) history_[k]->forget_look();
   parts_->erase("pack");
+  parts_->erase("proposal");
+  parts_->erase("flash_preview");
   parts_->erase("problem");
   changed();
 }
@@ -267,22 +301,8 @@ std::uint64_t Session::wait(std::uint64_t seen, std::chrono::milliseconds limit)
 
 json Session::state() const {
   const std::lock_guard lock(mutex_);
-  const Step& now = *history_.current();
-  json steps = json::array();
-  for (std::size_t k = 0; k < history_.size(); ++k) steps.push_back(step_json(*history_[k]));
-  const auto found = now.diagnosed();
-  json answer = *now.errors;
-  json warnings = answer["warnings"];
-  for (const data::Finding& f : now.dataset->findings)
-    if (f.severity == data::Severity::warning) warnings.push_back(f.text());
-  for (const std::string& w : now.warnings) warnings.push_back(w);
-  answer["warnings"] = std::move(warnings);
+  json answer = history_.current() ? state_of(history_) : json{{"steps", json::array()}, {"at", 0}};
   answer["changes"] = changes_;
-  answer["model_name"] = now.model.name;
-  answer["steps"] = std::move(steps);
-  answer["at"] = history_.at();
-  answer["parameters"] = now.look()->parameters();
-  answer["diagnosis"] = found ? diagnosis_json(*found) : json(nullptr);
   answer["work"] = nullptr;
   if (work_)
     answer["work"] = {

@@ -25,8 +25,12 @@ namespace flexspline::workbench {
 struct Step {
   std::string id;               // of its own
   std::filesystem::path files;  // folder of the files that came with it; empty: none
-  std::string action;           // "open", "identify", "add", "remove", "data"
-  std::string what;             // "stribeck_gaussian", "two more files"
+  // What a first step was made of where the workbench began without a model: a folder with a dataset.toml.
+  std::filesystem::path project;
+  std::string data_name, dataset_text;
+  std::vector<std::string> tolerated;  // findings in `files` or `project` that the user accepts
+  std::string action;                  // "open", "identify", "add", "remove", "data"
+  std::string what;                    // "stribeck_gaussian", "two more files"
   std::shared_ptr<const data::Dataset> dataset;
   model::Model model;      // with values
   std::string model_text;  // of its file, comments of the user's file in it
@@ -70,6 +74,7 @@ class BusyError : public std::runtime_error {
 class Session {
  public:
   // `board`: where its work is written down; null: nowhere.
+  // `first` is null while there is no model yet.
   Session(std::string id, std::shared_ptr<Step> first, JobBoard* board = nullptr, JobLimits limits = {});
   ~Session();
   Session(const Session&) = delete;
@@ -80,6 +85,8 @@ class Session {
   // As it was in a worker process that ended, with all its changes and more.
   void restore(History<std::shared_ptr<Step>> history, std::uint64_t changes);
 
+  // Whether there is a model with data; without one its history holds a null alone.
+  bool has_model() const;
   // Of the history; `change` is told to those who wait.
   History<std::shared_ptr<Step>> history() const;
   void change(const std::function<void(History<std::shared_ptr<Step>>&)>& change);

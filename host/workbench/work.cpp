@@ -97,10 +97,20 @@ void require_same(const std::optional<double>& ours, const std::optional<double>
           "drop measurements of the same drive"}});
 }
 
+// What dropped files are read by: a dataset.toml that was made for them, else each as it is, whatever its ending.
+std::vector<std::filesystem::path> recordings_of(const std::filesystem::path& folder) {
+  if (std::filesystem::exists(folder / "dataset.toml")) return {folder / "dataset.toml"};
+  std::vector<std::filesystem::path> files;
+  for (const auto& entry : std::filesystem::directory_iterator(folder)) files.push_back(entry.path());
+  std::sort(files.begin(), files.end());
+  return files;
+}
+
 // The data of a step and those of the files in `folder`, and the names of these.
 std::pair<std::shared_ptr<const data::Dataset>, std::string> joined(const data::Dataset& before,
-                                                                    const std::filesystem::path& folder) {
-  data::Dataset more = data::load({folder});
+                                                                    const std::filesystem::path& folder,
+                                                                    const std::vector<std::string>& tolerated) {
+  data::Dataset more = data::load(recordings_of(folder), {tolerated, false});
   require_same(before.drive.gear_ratio, more.drive.gear_ratio, "gear_ratio");
   require_same(before.drive.torque_constant_nm_a, more.drive.torque_constant_nm_a, "torque_constant_nm_a");
   auto all = std::make_shared<data::Dataset>(before);
@@ -150,28 +160,48 @@ std::shared_ptr<Step> refitted(const Step& before, const estimation::PipelineOpt
 }
 
 std::shared_ptr<Step> with_files(const Step& before, const std::filesystem::path& folder,
-                                 const estimation::PipelineOptions& pipeline, const Progress& say) {
+                                 const std::vector<std::string>& tolerated, const estimation::PipelineOptions& pipeline,
+                                 const Progress& say) {
   say("reading the files");
-  const auto [all, names] = joined(*before.dataset, folder);
+  const auto [all, names] = joined(*before.dataset, folder, tolerated);
   auto step = identified("data", names, all, before.model, before.model_text,
                          with_records(all, before.model, pipeline, say), say);
   step->files = folder;
+  step->tolerated = tolerated;
   return step;
 }
 
-std::shared_ptr<Step> made_again(const KeptStep& kept, const Step& before,
+std::shared_ptr<Step> first_of(const Project& project, const std::filesystem::path& folder,
+                               const estimation::PipelineOptions& pipeline, const Progress& say) {
+  const model::ModelFile file = model::parse(project.model_text, "the first model", catalogue::known_effects());
+  auto step = open(project.dataset, file, pipeline, say);
+  step->project = folder;
+  step->dataset_text = project.dataset_text;
+  return step;
+}
+
+std::shared_ptr<Step> made_again(const KeptStep& kept, const Step* before,
                                  const estimation::PipelineOptions& pipeline) {
   const Progress say = [](std::string_view) {};
   const model::Model model = model::parse(kept.model_text, "the model", catalogue::known_effects()).model;
-  auto dataset = before.dataset;
-  estimation::PipelineOptions own = as_before(before, pipeline);
-  if (!kept.files.empty()) {
-    dataset = joined(*before.dataset, kept.files).first;
+  std::shared_ptr<const data::Dataset> dataset;
+  estimation::PipelineOptions own = pipeline;
+  if (before == nullptr || !kept.files.empty()) {
+    dataset = before == nullptr ? std::make_shared<const data::Dataset>(
+                                      data::load({kept.project / "dataset.toml"}, {kept.tolerated, false}))
+                                : joined(*before->dataset, kept.files, kept.tolerated).first;
     own = with_records(dataset, model, pipeline, say);
+  } else {
+    dataset = before->dataset;
+    own = as_before(*before, pipeline);
   }
   auto step = made(kept.action, kept.what, dataset, model, kept.model_text, kept.estimates, kept.warnings, own, say);
   step->id = kept.id;
   step->files = kept.files;
+  step->project = kept.project;
+  step->data_name = kept.data_name;
+  step->dataset_text = kept.dataset_text;
+  step->tolerated = kept.tolerated;
   return step;
 }
 

@@ -7,6 +7,7 @@
 #include <vector>
 
 #include "host/deployment/pack.hpp"
+#include "host/workbench/project.hpp"
 #include "host/workbench/session.hpp"
 
 namespace flexspline::workbench {
@@ -21,18 +22,26 @@ std::shared_ptr<Step> with_effect(const Step& before, const std::string& effect,
 std::shared_ptr<Step> without_effect(const Step& before, const std::string& id,
                                      const estimation::PipelineOptions& pipeline, const Progress& say);
 std::shared_ptr<Step> refitted(const Step& before, const estimation::PipelineOptions& pipeline, const Progress& say);
-// `folder` holds nothing but the new files. They join the data; the model is identified anew.
+// `folder` holds nothing but the new files, maybe with a dataset.toml. They join the data; the model is identified
+// anew.
 std::shared_ptr<Step> with_files(const Step& before, const std::filesystem::path& folder,
-                                 const estimation::PipelineOptions& pipeline, const Progress& say);
+                                 const std::vector<std::string>& tolerated, const estimation::PipelineOptions& pipeline,
+                                 const Progress& say);
+// The first step of a project whose dataset.toml is in `folder`.
+std::shared_ptr<Step> first_of(const Project& project, const std::filesystem::path& folder,
+                               const estimation::PipelineOptions& pipeline, const Progress& say);
 
 // A step that was there before, from what was kept of it; `before` is the one before it.
 struct KeptStep {
   std::string id, action, what, model_text;
-  std::filesystem::path files;
+  std::filesystem::path files, project;
+  std::string data_name, dataset_text;
+  std::vector<std::string> tolerated;
   std::vector<estimation::Estimate> estimates;
   std::vector<std::string> warnings;
 };
-std::shared_ptr<Step> made_again(const KeptStep& kept, const Step& before, const estimation::PipelineOptions& pipeline);
+// `before` is null for the first step of a project.
+std::shared_ptr<Step> made_again(const KeptStep& kept, const Step* before, const estimation::PipelineOptions& pipeline);
 
 // A model as it is written into files.
 std::string model_file(const Step& step);

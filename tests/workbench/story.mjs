@@ -96,6 +96,18 @@ async function place(locator) {
   }
 }
 
+// Shows first what it changes; the drive has its old block until that is confirmed.
+async function flash(page) {
+  await page.locator("[data-flash]").click();
+  await page.waitForSelector("[data-preview=flash]");
+  assert.match(await page.locator("[data-preview]").innerText(), /→.*\([+−×±].*\)|added/s);
+  assert.equal(await page.locator("[data-flashed]").count(), 0);
+  await idle(page);
+  await shot(page, "9-preview");
+  await page.locator("[data-confirm]").click();
+  await page.waitForSelector("[data-flashed=yes]");
+}
+
 async function accessible(page, where) {
   // The page's policy forbids inline scripts, so axe comes in by the debugger's door.
   await page.evaluate(axe);
@@ -126,6 +138,13 @@ try {
   figures.before = await excess(page);
   assert.ok(figures.before > 10, `error before: ${figures.before}`);
   await shot(page, "1-how-good");
+
+  say("another record is overlaid");
+  await page.getByLabel("Overlay another experiment").selectOption({ index: 1 });
+  await until(page, () => (document.querySelector(".time").dataset.overlay ?? "") !== "");
+  await shot(page, "1-overlay");
+  await page.getByLabel("Overlay another experiment").selectOption("");
+  await until(page, () => document.querySelector(".time").dataset.overlay === "");
 
   say("zoom and pan");
   await page.locator(".time").focus();
@@ -203,6 +222,7 @@ try {
   say("parameters, save, pack");
   await page.getByRole("tab", { name: "Parameters" }).click();
   await page.waitForSelector("tbody tr");
+  assert.match(await page.locator("tbody").innerText(), /[+−]\S+ %/, "changes against the step before");
   await shot(page, "6-parameters");
   await page.getByRole("tab", { name: "Save" }).click();
   await page.getByLabel("Name of the file").fill("better");
@@ -267,8 +287,7 @@ try {
   await page.waitForSelector("[data-map=model_fails]");
   await idle(page);
   await shot(page, "9-map-before");
-  await page.locator("[data-flash]").click();
-  await page.waitForSelector("[data-flashed=yes]");
+  await flash(page);
   await page.waitForSelector("[data-map=too_little_data]");
   await idle(page);
   await page.locator("[data-move]").click();
@@ -294,8 +313,7 @@ try {
   await page.waitForSelector("[data-back]");
   await until(page, () => Number(document.querySelector(".live")?.dataset.samples) > 20);
   // A twin without a file for its flash memory begins with the block of its maker.
-  await page.locator("[data-flash]").click();
-  await page.waitForSelector("[data-flashed=yes]");
+  await flash(page);
   assert.equal(await page.locator("[data-back]").count(), 0);
   await idle(page);
 

@@ -32,10 +32,12 @@ export interface Diagnosis {
 export interface Unknown { [key: string]: unknown }
 export interface Problem { during: string; what: string; findings: { file: string; line: number; column: string; what: string; remedy: string }[] }
 export interface BlockView { model: string; bytes: number; sha256: string }
+export interface BlockChange { effect: string; change: string; parameter: string; before: number | null; after: number | null; unit: string }
 export interface Flash {
-  before: BlockView | null; after: BlockView | null; warnings: string[]; flashed: boolean; drive: string;
-  changes: { effect: string; change: string; parameter: string; before: number | null; after: number | null; unit: string }[];
+  before: BlockView | null; after: BlockView | null; warnings: string[]; flashed: boolean; drive: string; changes: BlockChange[];
 }
+// What a flash, or going back, would change; nothing is done before it is confirmed.
+export interface FlashPreview extends Flash { restores: boolean }
 export interface State {
   changes: number; data_name: string; model_name: string; model_file: string; folder: string; experiments: Experiment[]; balances: Balance[];
   warnings: string[]; steps: Step[]; at: number; parameters: Parameter[]; diagnosis: Diagnosis | null;
@@ -43,6 +45,19 @@ export interface State {
   pack?: { bytes: number; sha256: string; max_error_nm: number; max_error_share_of_rated: number; worst_balance: string; bounds: number };
   saved?: { what: string; file: string }; flash?: Flash;
   scenarios: string[]; rig: string; closed_loop?: ClosedLoop;
+  parameters_before: { id: string; parameter: string; value: number | null }[]; has_dataset_text?: boolean; proposal?: Proposal; flash_preview?: FlashPreview;
+}
+
+// Recordings, and which of their columns is taken for which signal; see host/workbench/README.md.
+export interface ProposedColumn {
+  column: string; units: { unit: string; factor: number | null; offset: number }[]; source: string | null; unit?: string; scale?: number; why?: string; stated?: boolean;
+}
+export interface Proposal {
+  files: string[]; columns: ProposedColumn[]; adds: boolean;
+  signals: { name: string; unit: string; low?: (number | null)[]; high?: (number | null)[]; least?: number | null; largest?: number | null }[];
+  axis: string; position_side: string; question: string; joints: number[]; joint: number | null; needs_pole_pairs: string; gear_ratio: number | null; torque_constant_nm_a: number | null;
+  encoder_counts: number | null; notes: string[]; warnings: string[]; effects: string[]; reasons: string[]; can_begin: boolean; why_not: string; has_dataset_toml: boolean;
+  findings: { file: string; line: number; column: string; what: string; remedy: string; tolerate: string | null }[];
 }
 
 // Errors in rad, currents in A; see host/output/JSON.md.

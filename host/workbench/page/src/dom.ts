@@ -91,6 +91,16 @@ export function times(excess: number | null | undefined): string {
   return excess === null || excess === undefined ? "–" : `${excess >= 100 ? excess.toFixed(0) : excess >= 10 ? excess.toFixed(1) : excess.toFixed(2)}×`;
 }
 
+// By how much a value has changed, of what it was before.
+export function relative(before: number | null | undefined, after: number | null | undefined): string {
+  if (before === null || before === undefined || after === null || after === undefined) return "new";
+  if (before === after) return "±0 %";
+  if (before === 0) return "was 0";
+  const percent = 100 * (after / before - 1);
+  const size = Math.abs(percent);
+  return size >= 1000 ? `×${num(after / before, 3)}` : `${percent < 0 ? "−" : "+"}${size < 0.01 ? "<0.01" : num(size, 2)} %`;
+}
+
 // A bar of a length between nought and one.
 export function bar(share: number, kind: string): HTMLElement {
   return el("span", { class: `bar ${kind}`, "--share": Math.max(0, Math.min(1, share)).toFixed(4), "aria-hidden": "true" });

@@ -1,12 +1,20 @@
 // The drive: connect, flash, go back, and its signals live.
 import type uPlot from "uplot";
-import { get, type BlockView, type State } from "./api";
-import { announce, button, el, fill, num, unit, words } from "./dom";
+import { get, type BlockChange, type BlockView, type State } from "./api";
+import { announce, button, el, fill, num, relative, unit, words } from "./dom";
 import { MapPart } from "./map";
 import { axes, Figure, line } from "./plots";
 
 interface Status { status: { given: string; connected: boolean; name?: string; serial?: string; board?: string; block: BlockView | null; problem: string; moving: boolean; simulated: boolean; came_back: boolean; again: { drive: string; attempts: number; why: string } | null }; in_reach: { drive: string; what: string; usable: boolean; problem: string }[] }
 interface Live { connected: boolean; problem: string; attempts: number; channels: { name: string; unit: string }[]; next: number; mode: string; samples: number[][] }
+
+// What another block changes, with how much of the value before that is.
+function changes(all: BlockChange[]): HTMLElement {
+  const changed = all.filter((c) => c.change !== "same");
+  const value = (c: BlockChange) => `${num(c.before, 5)} → ${num(c.after, 5)} ${unit(c.unit)}`;
+  return el("ul", { class: "changes" }, changed.slice(0, 12).map((c) => el("li", {}, `${c.change} ${words(c.effect)}${c.parameter ? ` ${words(c.parameter)}: ${value(c)}` : ""}`, c.parameter ? el("span", { class: "soft" }, ` (${relative(c.before, c.after)})`) : null)),
+    changed.length > 12 ? el("li", {}, `and ${changed.length - 12} more`) : null, changed.length ? null : el("li", {}, "nothing: the drive has these values already"));
+}
 
 export class DrivePart {
   private readonly head = el("div", { class: "column" });
@@ -89,12 +97,15 @@ export class DrivePart {
       return;
     }
     const f = s.came_back ? undefined : state.flash;  // what it has in it now may be something else
-    const changed = f?.changes.filter((c) => c.change !== "same") ?? [];
+    const p = s.came_back ? undefined : state.flash_preview;
     fill(this.head, el("p", {}, el("strong", {}, `${s.serial} `), el("span", { class: "soft" }, `${s.board}; ${s.block ? `block “${s.block.model}”, ${s.block.bytes} bytes` : "no block"}`)),
-      el("div", { class: "row actions" }, button("Flash this model", () => this.run("flash"), { class: "main", disabled: off, "data-flash": "" }), button("Go back to the block before", () => this.run("restore"), { disabled: off }), button("Disconnect", () => { this.status = null; this.run("disconnect"); }, { class: "quiet", disabled: off })),
+      el("div", { class: "row actions" }, button("Flash this model", () => this.run("preview-flash"), { class: p ? "" : "main", disabled: off, "data-flash": "" }), button("Go back to the block before", () => this.run("preview-restore"), { disabled: off, "data-restore": "" }), button("Disconnect", () => { this.status = null; this.run("disconnect"); }, { class: "quiet", disabled: off })),
       s.came_back ? el("p", { class: "soft", "data-back": "" }, "It was lost and is connected again. Nothing was done to it meanwhile: look whether its block is the one that you want.") : null,
-      f ? el("div", { class: "done", "data-flashed": f.flashed ? "yes" : "no" }, el("p", {}, f.flashed ? "✓ flashed, read back and in use" : "The drive has this block already."), f.warnings.map((w) => el("p", { class: "high" }, w)),
-        el("ul", { class: "changes" }, changed.slice(0, 8).map((c) => el("li", {}, `${c.change} ${words(c.effect)}${c.parameter ? ` ${words(c.parameter)}: ${num(c.before, 5)} → ${num(c.after, 5)} ${unit(c.unit)}` : ""}`)), changed.length > 8 ? el("li", {}, `and ${changed.length - 8} more`) : null)) : null);
+      p ? el("div", { class: "preview", "data-preview": p.restores ? "restore" : "flash" }, el("p", {}, el("strong", {}, p.restores ? "Going back would change:" : "Flashing would change:"), el("span", { class: "soft" }, ` ${p.before ? `“${p.before.model}”` : "no block"} → ${p.after ? `“${p.after.model}”` : "no block"}`)),
+        p.warnings.map((w) => el("p", { class: "high" }, w)), changes(p.changes),
+        el("div", { class: "row actions" }, button(p.restores ? "Go back" : "Flash it", () => this.run(p.restores ? "restore" : "flash", { before: p.before?.sha256 ?? "", after: p.after?.sha256 ?? "" }), { class: "main", disabled: off, "data-confirm": "" }), button("Leave it as it is", () => this.run("dismiss-preview"), { class: "quiet", disabled: off }))) : null,
+      f && !p ? el("div", { class: "done", "data-flashed": f.flashed ? "yes" : "no" }, el("p", {}, f.flashed ? "✓ flashed, read back and in use" : "The drive has this block already."), f.warnings.map((w) => el("p", { class: "high" }, w)),
+        changes(f.changes)) : null);
   }
 
   private listen(): void {

@@ -1,6 +1,7 @@
 // The page: what the server says is drawn by four panels; what the user does goes to the server.
 import { act, get, openTab, Refusal, sendFiles, type Problem, type State } from "./api";
 import { Add } from "./add";
+import { Begin } from "./begin";
 import { announce, button, el, fill, fillOnce, words } from "./dom";
 import { Good } from "./good";
 import { Missing } from "./missing";
@@ -30,7 +31,7 @@ function run(what: string, more: Record<string, unknown> = {}): void {
   local = null;
   if (what === "complain") return complain(new Error(String(more["what"])));
   // A search for what is missing gives way to what the user wants, and begins again where the model is the same then.
-  const searching = state?.work?.what.startsWith("Looking") && !["cancel", "diagnose", "dismiss", "disconnect", "empty-map"].includes(what);
+  const searching = (state?.work?.what.startsWith("Looking") && !["cancel", "diagnose", "dismiss", "disconnect", "empty-map"].includes(what)) || (state?.work?.what.startsWith("Reading") && what === "propose");
   (searching ? act("cancel").then(() => act(what, more)).finally(again) : act(what, more)).catch(complain);
 }
 
@@ -38,6 +39,7 @@ function run(what: string, more: Record<string, unknown> = {}): void {
 const good = new Good(), where = new Where(() => setTimeout(() => { if (state) lookByItself(state); }, 50));
 const missing = new Missing((effect) => run("add", { effect }), () => run("diagnose"));
 const add = new Add(run);
+const beginning = new Begin(run, () => picker.click());
 
 // Parts that stay: what work says changes many times a second, and its button shall be there to be pressed.
 const title = el("p", { class: "about clip" }), warned = el("span"), stage = el("span", { class: "clip" });
@@ -46,16 +48,18 @@ const working = el("div", { class: "work", role: "status" }, el("span", { class:
 function header(s: State): void {
   if (!title.isConnected)
     fill(top_, el("h1", {}, "Flexspline"), title, warned, el("label", { class: "file" }, "Add files", filePicker()), button("Save plots", offerPlots, { class: "quiet" }), button("Light or dark", toggleTheme, { class: "quiet", title: "Light or dark" }), button("Keys", () => help.showModal(), { class: "quiet", title: "?" }));
-  fill(title, el("strong", {}, s.model_name || s.model_file), el("span", { class: "soft" }, ` on ${s.data_name}: ${s.experiments.length} experiments, ${s.experiments.filter((e) => e.role === "holdout").length} held out`));
+  if (s.steps.length) fill(title, el("strong", {}, s.model_name || s.model_file), el("span", { class: "soft" }, ` on ${s.data_name}: ${s.experiments.length} experiments, ${s.experiments.filter((e) => e.role === "holdout").length} held out`));
+  else fill(title, el("span", { class: "soft" }, "no model yet"));
   if (s.work) {
     stage.textContent = `${words(s.work.what)}${s.work.stage ? `: ${words(s.work.stage)}` : ""}`;
     working.dataset.work = s.work.what;
     if (!working.isConnected) title.after(working);
   } else working.remove();
-  fillOnce(warned, String(s.warnings.length), s.warnings.length ? button(`${s.warnings.length} warning${s.warnings.length > 1 ? "s" : ""}`, () => tell("Warnings", state?.warnings ?? []), { class: "quiet" }) : null);
+  const count = s.warnings?.length ?? 0;
+  fillOnce(warned, String(count), count ? button(`${count} warning${count > 1 ? "s" : ""}`, () => tell("Warnings", state?.warnings ?? []), { class: "quiet" }) : null);
 }
 
-const picker = el("input", { type: "file", multiple: true, accept: ".csv,.tsv,.gz,.mat,.h5,.hdf5,.npz,.npy,.bag,.db3,.mcap,.log", class: "unseen", "aria-label": "Add files", "data-key": "files" });
+const picker = el("input", { type: "file", multiple: true, accept: ".csv,.tsv,.txt,.dat,.asc,.log,.gz,.mat,.h5,.hdf5,.npz,.npy,.bag,.db3,.mcap", class: "unseen", "aria-label": "Add files", "data-key": "files" });
 picker.addEventListener("change", () => { void send(Array.from(picker.files ?? [])); picker.value = ""; });
 function filePicker(): HTMLElement { return picker; }
 
@@ -80,20 +84,23 @@ function render(): void {
   if (!s) return;
   header(s);
   problem(local ?? s.problem ?? null);
+  const begins = beginning.render(s);
+  panels.hidden = begins;
+  document.body.dataset.ready = "yes";
+  document.body.dataset.step = s.steps.length ? String(s.at) : "";
+  if (begins) return;
   if (shownAt !== s.at) announce(`step ${s.at + 1} of ${s.steps.length}`);
   shownAt = s.at;
   good.render(s);
   where.render(s);
   missing.render(s);
   add.render(s);
-  document.body.dataset.ready = "yes";
-  document.body.dataset.step = String(s.at);
 }
 
 // What is missing is looked for by itself, once for each step.
 function lookByItself(s: State): void {
   const key = `${s.at} ${s.steps.length} ${s.steps[s.at]?.what ?? ""}`;
-  if (s.diagnosis || s.work || !where.isShown || wasDiagnosing === key) return;
+  if (!s.steps.length || s.proposal || s.diagnosis || s.work || !where.isShown || wasDiagnosing === key) return;
   wasDiagnosing = key;
   // Something else may have begun meanwhile: then it is looked for after that.
   act("diagnose").catch((error: Error) => { if (error instanceof Refusal && error.status === 409) wasDiagnosing = ""; else complain(error); });
@@ -182,9 +189,10 @@ async function begin(): Promise<void> {
   panels.append(good.element, where.element, missing.element, add.element);
   document.body.append(help);
   top_.after(note);
+  panels.after(beginning.element);
   keys();
   dropping();
-  onLook(() => { if (state) { good.render(state); where.render(state); add.render(state); } });
+  onLook(() => { if (state?.steps.length) { good.render(state); where.render(state); add.render(state); } });
   try {
     await openTab();
   } catch (error) {

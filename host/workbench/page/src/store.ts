@@ -6,6 +6,7 @@ export interface Brush { variable: string; low: number; high: number; unit: stri
 export const view = {
   signal: "",       // a balance or a free run
   experiment: "",
+  overlay: "",      // another experiment, drawn into the same plots
   brush: null as Brush | null,
 };
 
@@ -29,7 +30,12 @@ export function worstBalance(balances: Balance[]): Balance | undefined {
 export function balanceInView(state: State): Balance | undefined {
   return state.balances.find((b) => b.signal === view.signal) ?? worstBalance(state.balances);
 }
-export function badness(e: Experiment, signal: string): number {
+// A list has one unit: multiples of the noise where all of it has a noise, else the error itself.
+export function inNoise(experiments: Experiment[], signal: string): boolean {
+  const all = experiments.flatMap((e) => e.signals.filter((x) => x.signal === signal));
+  return all.length > 0 && all.every((s) => s.excess !== null);
+}
+export function badness(e: Experiment, signal: string, byNoise: boolean): number {
   const s = e.signals.find((x) => x.signal === signal);
-  return s ? s.excess ?? s.nrmse ?? -1 : -2;
+  return s ? (byNoise ? s.excess : s.rmse ?? s.nrmse) ?? -1 : -2;
 }

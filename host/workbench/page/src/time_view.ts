@@ -5,8 +5,10 @@ import { el, unit, withUnit, words } from "./dom";
 import { axes, colour, Figure, line, shade } from "./plots";
 
 interface Answer { from_s: number; to_s: number; whole: boolean; time: Packed; measured: Packed; model: Packed; residual: Packed; unit: string; noise_floor: number | null }
-interface Chunk { from: number; to: number; whole: boolean; data: (number | null)[][]; unit: string; floor: number | null; before: (number | null)[] | null }
-export interface Shown { experiment: string; signal: string; begin: number; end: number; stretches: [number, number][]; before: number | null }
+interface Curve { time: (number | null)[]; measured: (number | null)[]; residual: (number | null)[] }
+interface Chunk { from: number; to: number; whole: boolean; data: (number | null)[][]; unit: string; floor: number | null; before: (number | null)[] | null; overlay: Curve | null }
+// `overlay`: another experiment, drawn from its own beginning on.
+export interface Shown { experiment: string; signal: string; begin: number; end: number; stretches: [number, number][]; before: number | null; overlay: { experiment: string; begin: number; end: number } | null }
 
 export class TimeView {
   private readonly head = el("div", { class: "readout" });
@@ -58,12 +60,15 @@ export class TimeView {
     try {
       const now = get<Answer>("trace", query, abort.signal);
       const before = shown.before === null ? null : get<Answer>("trace", { ...query, step: shown.before }, abort.signal).catch(() => null);
-      const answer = await now, old = await before;
+      const o = shown.overlay, shift = o ? o.begin - shown.begin : 0;
+      const over = o && from + shift < o.end ? get<Answer>("trace", { ...query, experiment: o.experiment, from: from + shift, to: Math.min(o.end, to + shift) }, abort.signal).catch(() => null) : null;
+      const answer = await now, old = await before, other = await over;
       if (key !== this.key) return;
       const time = unpack(answer.time);
       const residual = old ? unpack(old.residual) : null;
       const chunk: Chunk = { from, to, whole: answer.whole, unit: answer.unit, floor: answer.noise_floor, data: [time, unpack(answer.measured), unpack(answer.model), unpack(answer.residual)],
-        before: residual && residual.length === time.length ? residual : null };
+        before: residual && residual.length === time.length ? residual : null,
+        overlay: other ? { time: unpack(other.time).map((t) => (t === null ? null : t - shift)), measured: unpack(other.measured), residual: unpack(other.residual) } : null };
       if (overview) this.overview = chunk;
       this.chunk = chunk;
       this.problem.hidden = true;
@@ -133,18 +138,25 @@ export class TimeView {
     const [time, measured, model, residual] = c.data as [number[], number[], number[], number[]];
     this.upper.holder.setAttribute("aria-label", `${words(shown.signal)} of ${shown.experiment}: measured and model over time`);
     this.lower.holder.setAttribute("aria-label", `Error of ${words(shown.signal)} of ${shown.experiment} over time${c.floor ? `, noise ${withUnit(c.floor, c.unit)}` : ""}`);
-    this.upper.show(() => ({ data: [time, measured, model], options: options("", unit(c.unit), [line("measured"), line("model", { dash: [7, 4] })], () => undefined) }));
+    // Two experiments have times of their own: what one of them lacks there is no gap.
+    const with_ = (own: (number | null)[][], other: (number | null)[] | undefined) =>
+      c.overlay && other ? uPlot.join([own as uPlot.AlignedData, [c.overlay.time, other] as uPlot.AlignedData]) : (own as uPlot.AlignedData);
+    const name = shown.overlay?.experiment ?? "";
+    const overlaid = c.overlay ? [line("overlay", { label: name, dash: [10, 3, 2, 3] })] : [];
+    this.upper.show(() => ({ data: with_([time, measured, model], c.overlay?.measured), options: options("", unit(c.unit), [line("measured"), line("model", { dash: [7, 4] }), ...overlaid], () => undefined) }));
     this.lower.show(() => ({
-      data: c.before ? [time, residual, c.before] : [time, residual],
-      options: options("time (s)", `error (${unit(c.unit)})`, [line("residual"), ...(c.before ? [line("before", { dash: [2, 3], alpha: 0.8 })] : [])],
+      data: with_(c.before ? [time, residual, c.before] : [time, residual], c.overlay?.residual),
+      options: options("time (s)", `error (${unit(c.unit)})`, [line("residual"), ...(c.before ? [line("before", { dash: [2, 3], alpha: 0.8 })] : []), ...overlaid],
         (u) => { if (c.floor) shade(u, colour("noise"), -2 * c.floor, 2 * c.floor, "y"); }),
     }));
     this.element.dataset.drawn = `${shown.experiment} ${shown.signal}`;
+    this.element.dataset.overlay = c.overlay ? name : "";
   }
 
   private read(u: uPlot): void {
-    const c = this.chunk, k = u.cursor.idx;
-    if (!c || k === null || k === undefined || (u.cursor.left ?? -1) < 0) { this.head.textContent = ""; return; }
+    const c = this.chunk, at_ = u.cursor.idx;
+    if (!c || at_ === null || at_ === undefined || (u.cursor.left ?? -1) < 0) { this.head.textContent = ""; return; }
+    const k = c.overlay ? nearest(c.data[0] as number[], Number(u.data[0][at_])) : at_;
     const at = (i: number) => withUnit(c.data[i]?.[k], c.unit, 3);
     this.head.textContent = `${withUnit(c.data[0]?.[k], "s")} · measured ${at(1)} · model ${at(2)} · error ${at(3)}`;
   }
@@ -188,4 +200,14 @@ export class TimeView {
     e.preventDefault();
     act();
   }
+}
+
+// Index of the time that is nearest, of times in order.
+function nearest(times: number[], t: number): number {
+  let low = 0, high = times.length - 1;
+  while (low < high) {
+    const middle = (low + high) >> 1;
+    if ((times[middle] ?? 0) < t) low = middle + 1; else high = middle;
+  }
+  return low > 0 && Math.abs((times[low - 1] ?? 0) - t) < Math.abs((times[low] ?? 0) - t) ? low - 1 : low;
 }

@@ -1,9 +1,9 @@
 // 2. Where does it fail? The error over what it may depend on; a brushed region is shown in time.
 import uPlot from "uplot";
-import { get, unpack, type Packed, type State } from "./api";
-import { announce, bar, button, el, fill, num, times, unit, words } from "./dom";
+import { get, unpack, type Experiment, type Packed, type State } from "./api";
+import { announce, bar, button, el, fill, num, times, unit, withUnit, words } from "./dom";
 import { axes, colour, Figure, kHidden, line, shade, stretchedScale, stretchedSplits } from "./plots";
-import { badness, balanceInView, looked, view } from "./store";
+import { badness, balanceInView, inNoise, looked, view } from "./store";
 
 interface Means { mean: (number | null)[]; standard_error: (number | null)[] }
 interface Map1 {
@@ -209,10 +209,12 @@ export class Where {
   }
 
   private drawRecords(state: State, signal: string): void {
-    fill(this.head, el("strong", {}, "By record"), el("span", { class: "soft clip" }, "error over the noise"));
-    const sorted = state.experiments.filter((e) => badness(e, signal) > -2).sort((a, b) => badness(b, signal) - badness(a, signal));
-    const worst = Math.max(1, ...sorted.map((e) => badness(e, signal)));
-    fill(this.records, sorted.map((e) => el("div", { class: "record" }, el("span", { class: "name" }, e.name), bar(badness(e, signal) / worst, badness(e, signal) <= 1.3 ? "fine" : "bad"), el("span", { class: "figure" }, times(e.signals.find((s) => s.signal === signal)?.excess)))));
+    const those = state.experiments.filter((e) => e.signals.some((s) => s.signal === signal)), byNoise = inNoise(those, signal);
+    const of = (e: Experiment) => badness(e, signal, byNoise), unitOf = (e: Experiment) => e.signals.find((s) => s.signal === signal)?.unit ?? "";
+    fill(this.head, el("strong", {}, "By record"), el("span", { class: "soft clip" }, byNoise ? "error over the noise" : "error"));
+    const sorted = [...those].sort((a, b) => of(b) - of(a));
+    const worst = Math.max(byNoise ? 1 : 0, ...sorted.map(of));
+    fill(this.records, sorted.map((e) => el("div", { class: "record" }, el("span", { class: "name" }, e.name), bar(worst > 0 ? of(e) / worst : 0, byNoise && of(e) <= 1.3 ? "fine" : "bad"), el("span", { class: "figure" }, byNoise ? times(of(e)) : withUnit(of(e), unitOf(e), 3)))));
   }
 }
 

@@ -1,0 +1,71 @@
+#include "host/workbench/project.hpp"
+
+#include <fmt/format.h>
+
+#include <cmath>
+#include <nlohmann/json.hpp>
+
+#include "host/workbench/look.hpp"
+
+namespace flexspline::workbench {
+namespace {
+
+using nlohmann::json;
+
+std::string text(const json& asked, const char* key) {
+  if (!asked.contains(key) || asked[key].is_null()) return {};
+  if (!asked[key].is_string()) throw AskedError(fmt::format("{} is no text", key));
+  return asked[key].get<std::string>();
+}
+
+std::vector<std::string> texts(const json& asked, const char* key) {
+  std::vector<std::string> all;
+  if (!asked.contains(key) || asked[key].is_null()) return all;
+  if (!asked[key].is_array()) throw AskedError(fmt::format("{} is no list", key));
+  for (const json& one : asked[key]) {
+    if (!one.is_string()) throw AskedError(fmt::format("{} holds something that is no text", key));
+    all.push_back(one.get<std::string>());
+  }
+  return all;
+}
+
+std::optional<double> positive(const json& asked, const char* key) {
+  if (!asked.contains(key) || asked[key].is_null()) return std::nullopt;
+  if (!asked[key].is_number() || !(asked[key].get<double>() > 0.0))
+    throw AskedError(fmt::format("{} has to be a number above zero", key));
+  return asked[key].get<double>();
+}
+
+std::optional<int> whole(const json& asked, const char* key, int least) {
+  if (!asked.contains(key) || asked[key].is_null()) return std::nullopt;
+  const double value = asked[key].is_number() ? asked[key].get<double>() : -1.0;
+  if (value != std::floor(value) || value < least || value > 1e4)
+    throw AskedError(fmt::format("{} has to be a whole number from {} on", key, least));
+  return static_cast<int>(value);
+}
+
+}  // namespace
+
+Choices choices_of(const json& asked) {
+  Choices choices;
+  if (!asked.contains("choices")) return choices;
+  const json& given = asked["choices"];
+  if (!given.is_object()) throw AskedError("choices are no object");
+  choices.map = texts(given, "map");
+  choices.without = texts(given, "without");
+  choices.tolerate = texts(given, "tolerate");
+  choices.axis = text(given, "axis");
+  choices.position_side = text(given, "position_side");
+  if (!choices.axis.empty() && choices.axis != "rotary" && choices.axis != "linear")
+    throw AskedError("axis is rotary or linear");
+  if (!choices.position_side.empty() && choices.position_side != "link" && choices.position_side != "motor")
+    throw AskedError("position_side is link or motor");
+  choices.joint = whole(given, "joint", 0);
+  choices.pole_pairs = whole(given, "pole_pairs", 1);
+  choices.gear_ratio = positive(given, "gear_ratio");
+  choices.torque_constant_nm_a = positive(given, "torque_constant_nm_a");
+  choices.encoder_counts = positive(given, "encoder_counts");
+  return choices;
+}
+
+}  // namespace flexspline::workbench
