@@ -46,6 +46,7 @@ struct NewOptions {
   std::filesystem::path out;
   std::vector<std::string> map;      // OURS=THEIRS[:UNIT]
   std::vector<std::string> without;  // columns of theirs that are not used, whatever their names say
+  std::vector<std::string> turned;   // columns of ours whose sign is the other one
   std::string axis;                  // empty: guessed
   std::string position_side;         // "link", "motor"; empty: guessed
   std::optional<int> pole_pairs;

@@ -18,6 +18,13 @@ void take_new(Parser& command, NewOptions& options) {
                   "a column of theirs that is not to be used, whatever its name says; may be repeated")
       ->type_name("THEIRS")
       ->allow_extra_args(false);
+  command
+      .add_option(
+          "--turn", options.turned,
+          "a column of ours whose sign is the other one, as current_a where a positive current decelerates; may "
+          "be repeated")
+      ->type_name("OURS")
+      ->allow_extra_args(false);
   command.add_option("--axis", options.axis, "rotary, or linear (m, m/s, N)")
       ->check(CLI::IsMember({"rotary", "linear"}))
       ->type_name("");

@@ -168,7 +168,7 @@ void complete(Draft& draft, data::Dataset& dataset) {
     } else if (ratio) {
       draft.notes.push_back(
           "the output turns against the motor: a positive motor motion must turn it positively; write scale = -1 under "
-          "[columns.output_position_rad]");
+          "[columns.output_position_rad], or give --turn output_position_rad");
     }
   }
   if (dataset.has(Column::current) && !dataset.drive.torque_constant_nm_a)

@@ -178,6 +178,18 @@ void guess_units(std::vector<ColumnGuess>& columns, const data::Recording& recor
   }
 }
 
+void turn(HeaderGuess& guess, const std::vector<std::string>& turned) {
+  for (const std::string& ours : turned) {
+    if (ColumnGuess* column = find(guess.columns, ours)) {
+      column->scale *= -1.0;
+      continue;
+    }
+    if (std::find(guess.native.begin(), guess.native.end(), ours) == guess.native.end())
+      throw UsageError(fmt::format("--turn {}: there is no such column; map one with --map {}=THEIRS", ours, ours));
+    guess.columns.push_back({ours, ours, "", "", -1.0});
+  }
+}
+
 void add_options(Draft& draft, const NewOptions& options) {
   if (!options.axis.empty()) draft.toml.drive["axis"] = text_value(options.axis);
   if (options.gear_ratio) draft.toml.drive["gear_ratio"] = number_value(*options.gear_ratio);
@@ -272,6 +284,7 @@ Draft draft_of_files(const std::vector<fs::path>& files, const NewOptions& optio
                                      ? std::string("no position or velocity has the number of a joint")
                                      : fmt::format("the joints are {}", fmt::join(guess.joints, ", "))));
   guess_units(guess.columns, *first);
+  turn(guess, options.turned);
 
   for (const ColumnGuess& c : guess.columns) {
     data::ColumnMapping mapping;

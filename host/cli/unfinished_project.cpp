@@ -42,6 +42,7 @@ std::string as_given(const NewOptions& options) {
       fmt::format("flexspline new --from {} --out {}", as_arguments(options.data.data), quoted(options.out.string()));
   for (const std::string& map : options.map) line += as_argument("--map", map);
   for (const std::string& name : options.without) line += as_argument("--without", name);
+  for (const std::string& name : options.turned) line += as_argument("--turn", name);
   line += as_argument("--axis", options.axis) + as_argument("--position-side", options.position_side);
   if (options.joint) line += fmt::format(" --joint {}", *options.joint);
   if (options.pole_pairs) line += fmt::format(" --pole-pairs {}", *options.pole_pairs);

@@ -33,6 +33,7 @@ NewOptions options_of(const std::vector<fs::path>& files, const workbench::Choic
   options.out = out;
   options.map = choices.map;
   options.without = choices.without;
+  options.turned = choices.turned;
   options.axis = choices.axis;
   options.position_side = choices.position_side;
   options.joint = choices.joint;
@@ -213,7 +214,8 @@ workbench::Project make(const std::vector<fs::path>& files, const workbench::Cho
                         const fs::path& home) {
   const NewOptions options = options_of(files, choices, folder);
   Draft draft = draft_of(options);
-  const FirstProject first = first_project(draft, options);
+  FirstProject first = first_project(draft, options);
+  first.base.model.name = files.front().stem().string();
   make_folder(folder);
   model::save(folder / "dataset.toml", text_of(draft, folder));
   const bool is_inside = std::all_of(files.begin(), files.end(),

@@ -98,7 +98,8 @@ void check_effort_sign(const Experiment& experiment, Findings& findings) {
       fmt::format("in \"{}\" the motor would take energy out of the drive wherever it moves ({:.0f} % of the power is "
                   "negative): the sign of {} or of the motor's motion is likely turned round",
                   experiment.name, 50.0 * (1.0 - sum / sizes), column_name(effort)),
-      fmt::format("if so, write scale = -1 under [columns.{}] in dataset.toml", column_name(effort)));
+      fmt::format("if so, write scale = -1 under [columns.{0}] in dataset.toml, or give flexspline new --turn {0}",
+                  column_name(effort)));
 }
 
 void check_velocity_lag(const Experiment& experiment, Findings& findings) {

@@ -53,6 +53,7 @@ Choices choices_of(const json& asked) {
   if (!given.is_object()) throw AskedError("choices are no object");
   choices.map = texts(given, "map");
   choices.without = texts(given, "without");
+  choices.turned = texts(given, "turned");
   choices.tolerate = texts(given, "tolerate");
   choices.axis = text(given, "axis");
   choices.position_side = text(given, "position_side");

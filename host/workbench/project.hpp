@@ -18,6 +18,7 @@ namespace flexspline::workbench {
 struct Choices {
   std::vector<std::string> map;      // OURS=THEIRS[:UNIT]
   std::vector<std::string> without;  // columns of theirs that are not used
+  std::vector<std::string> turned;   // columns of ours whose sign is the other one
   std::string axis, position_side;
   std::optional<int> joint, pole_pairs;
   std::optional<double> gear_ratio, torque_constant_nm_a, encoder_counts;

@@ -19,6 +19,7 @@ export class Begin {
   private readonly chosen = new Map<string, Chosen>();
   private readonly facts: Record<string, string> = {};  // as they are typed or chosen
   private readonly tolerated = new Set<string>();
+  private readonly turned = new Set<string>();
   private showsAll = false;
   private state: State | null = null;
   private timer = 0;
@@ -46,6 +47,8 @@ export class Begin {
   private forget(): void {
     this.chosen.clear();
     this.tolerated.clear();
+    this.turned.clear();
+    this.left = [];
     for (const key of Object.keys(this.facts)) delete this.facts[key];
     this.showsAll = false;
   }
@@ -67,11 +70,11 @@ export class Begin {
       this.drive(p),
       p.has_dataset_toml ? el("p", { class: "soft" }, "Columns are as the dataset.toml of these recordings says.") : null,
       el("div", { class: "scroll", "data-scroll": "columns" }, el("table", { class: "columns" },
-        el("thead", {}, el("tr", {}, ["signal", "column of the file", "unit", "as recorded", "from … to"].map((t) => el("th", { scope: "col" }, t)))),
+        el("thead", {}, el("tr", {}, ["signal", "column of the file", "unit", "sign", "as recorded", "from … to"].map((t) => el("th", { scope: "col" }, t)))),
         el("tbody", {}, rows.map((c) => this.row(p, c))))),
       el("div", { class: "row actions" }, this.showsAll ? null : button("Show all signals", () => { this.showsAll = true; if (this.state) this.render(this.state); }, { class: "quiet" })),
       p.notes.length ? el("details", {}, el("summary", {}, `What was guessed or decided (${p.notes.length})`), el("ul", {}, p.notes.map((n) => el("li", {}, n)))) : null,
-      p.warnings.length ? el("details", { open: true }, el("summary", {}, `Look at this (${p.warnings.length})`), el("ul", {}, p.warnings.map((n) => el("li", {}, n)))) : null,
+      p.warnings.length ? el("details", { open: true }, el("summary", {}, `Look at this (${p.warnings.length})`), el("ul", {}, p.warnings.map((n) => el("li", {}, this.inPageWords(n))))) : null,
     ];
   }
 
@@ -90,7 +93,8 @@ export class Begin {
 
   // Options of the command line are fields here.
   private inPageWords(text: string): string {
-    return text.replace(/; give --position-side motor or --position-side link/, ": choose below on which side they are measured").replace(/; name the columns with --map/, "; choose the columns below");
+    return (text.charAt(0).toUpperCase() + text.slice(1)).replace(/; give --position-side motor or --position-side link/, ": choose below on which side they are measured").replace(/; name the columns with --map/, "; choose the columns below")
+      .replace(/write scale = -1 under \[columns\.(\w+)\] in dataset\.toml, or give flexspline new --turn \w+/, (_, column: string) => `turn the sign of the ${kLabels[column] ?? words(column)} below`);
   }
 
   private drive(p: Proposal): HTMLElement {
@@ -132,8 +136,10 @@ export class Begin {
         el("option", { value: "", selected: source === null }, "– not recorded –"), p.signals.map((s) => el("option", { value: s.name, selected: s.name === source }, s.unit ? `${s.name} [${s.unit}]` : s.name)))),
       el("td", {}, source === null ? "" : fixed ? unit(si) : el("select", { "aria-label": `Unit of ${label}`, "data-key": `unit ${c.column}`, change: ((e: Event) => this.choose(c, source, (e.target as HTMLSelectElement).value)) as (event: never) => void },
         c.units.map((u, k) => el("option", { value: u.unit, selected: u.unit === ofUnit || (k === 0 && ofUnit === "") }, unit(u.unit))))),
+      el("td", {}, source === null || c.column === "time_s" || p.has_dataset_toml ? "" : el("button", { type: "button", class: "sign", "data-key": `turn ${c.column}`, "aria-pressed": this.turned.has(c.column) ? "true" : "false", "aria-label": `Turn the sign of ${label}`, title: "turns the sign; a positive current accelerates positively",
+        click: () => { if (!this.turned.delete(c.column)) this.turned.add(c.column); this.ask(); } }, this.turned.has(c.column) ? "−" : "+")),
       el("td", {}, signal?.low ? sparkline(signal.low, signal.high ?? [], `${label} as recorded`) : ""),
-      el("td", { class: "n" }, range, scale !== 1 ? el("span", { class: "soft" }, ` (×${num(scale, 4)})`) : null, c.why && !own ? el("span", { class: "mark", title: c.why }, "guess") : null));
+      el("td", { class: "n" }, range, Math.abs(scale) !== 1 ? el("span", { class: "soft" }, ` (×${num(scale, 4)})`) : null, c.why && !own ? el("span", { class: "mark", title: c.why }, "guess") : null));
   }
 
   private choose(c: ProposedColumn, source: string | null, ofUnit: string): void {
@@ -162,7 +168,7 @@ export class Begin {
     const number = (key: string) => { const v = Number((this.facts[key] ?? "").trim().replace(",", ".") || NaN); return Number.isFinite(v) ? v : undefined; };
     // What was mapped by hand is of the same side as what was guessed.
     const side = this.facts["position_side"] ?? (map.length && p?.position_side === "link" ? "link" : undefined);
-    return { map, without, gear_ratio: number("gear_ratio"), torque_constant_nm_a: number("torque_constant_nm_a"), encoder_counts: number("encoder_counts"), joint: number("joint"), pole_pairs: number("pole_pairs"),
+    return { map, without, turned: [...this.turned].filter((column) => p?.columns.some((c) => c.column === column && c.source !== null)), gear_ratio: number("gear_ratio"), torque_constant_nm_a: number("torque_constant_nm_a"), encoder_counts: number("encoder_counts"), joint: number("joint"), pole_pairs: number("pole_pairs"),
       position_side: side && side !== "open" ? side : undefined, tolerate: [...this.tolerated] };
   }
   private left: string[] = [];
