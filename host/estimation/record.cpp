@@ -121,10 +121,24 @@ double noise_of(const std::vector<double>& raw, const std::vector<double>& kept,
   return root_mean_square_of_rest(raw, kept) / std::sqrt(1.0 - std::min(0.8, 2.0 * filter.cutoff_hz() * sample_s));
 }
 
+// Whether the noise of the position makes so much of the accelerations that it matters: regressors with noise attenuate
+// what is fitted on them, an inertia by that share.
+bool blurs_accelerations(const Motion& motion, const std::vector<Segment>& segments, double cutoff_hz,
+                         double sample_s) {
+  constexpr double kShare = 0.005;
+  const std::vector<double> acceleration = slope_of(motion.velocity, segments, sample_s);
+  const double square = std::inner_product(acceleration.begin(), acceleration.end(), acceleration.begin(), 0.0);
+  // White noise, differentiated twice below the cut-off.
+  const double noise = std::pow(2.0 * M_PI, 4) * 2.0 * sample_s * motion.position_noise * motion.position_noise *
+                       std::pow(cutoff_hz, 5) / 5.0;
+  return noise * static_cast<double>(acceleration.size()) > kShare * square;
+}
+
 // Takes a velocity that was measured beside the position into the derivative where it has less noise than that; returns
 // from which frequency on, and in `noise` what is left of both. Zero: it does not help.
 double take_measured_velocity(Motion& motion, const std::vector<double>& measured, const std::vector<Segment>& segments,
                               const ZeroPhaseFilter& filter, double sample_s, double& noise) {
+  if (!blurs_accelerations(motion, segments, filter.cutoff_hz(), sample_s)) return 0.0;
   const std::vector<double> kept = filtered(measured, segments, filter);
   const double measured_noise = noise_of(measured, kept, filter, sample_s);
   double crossover_hz = 0.0, least = noise;
@@ -132,7 +146,7 @@ double take_measured_velocity(Motion& motion, const std::vector<double>& measure
     const auto part = [&](const std::vector<double>& signal) {
       return std::span<const double>(signal.data() + s.first, s.last - s.first);
     };
-    const auto fused = signals::fused_velocity(part(motion.velocity), part(kept), motion.position_noise, measured_noise,
+    const auto fused = signals::fused_velocity(part(motion.position), part(kept), motion.position_noise, measured_noise,
                                                filter.cutoff_hz(), sample_s);
     if (!fused || !(fused->std < noise)) continue;
     std::copy(fused->velocity.begin(), fused->velocity.end(),

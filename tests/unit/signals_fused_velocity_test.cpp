@@ -19,7 +19,7 @@ constexpr std::size_t kSamples = 6000;
 constexpr double kPositionStd = 3e-3, kVelocityStd = 0.2;
 
 struct Measured {
-  std::vector<double> truth, derivative, velocity;  // filtered
+  std::vector<double> truth, position, derivative, velocity;  // filtered
 };
 
 // A motion with parts up to 40 Hz; `delay_s` and `gain` of the measured velocity.
@@ -44,7 +44,8 @@ Measured measured(double delay_s = 0.0, double gain = 1.0, double smoothed_hz = 
   if (smoothed_hz > 0.0) velocity = ZeroPhaseFilter(2, smoothed_hz, 1.0 / kSample_s).apply(velocity);
   for (double& v : velocity) v += kVelocityStd * normal(chance);
   m.truth = filter.apply(m.truth);
-  m.derivative = central_derivative(filter.apply(position), kSample_s);
+  m.position = filter.apply(position);
+  m.derivative = central_derivative(m.position, kSample_s);
   m.velocity = filter.apply(velocity);
   return m;
 }
@@ -56,7 +57,7 @@ double error(const std::vector<double>& a, const std::vector<double>& b) {
 }
 
 std::optional<FusedVelocity> fused(const Measured& m) {
-  return fused_velocity(m.derivative, m.velocity, kPositionStd, kVelocityStd, kCutoff_hz, kSample_s);
+  return fused_velocity(m.position, m.velocity, kPositionStd, kVelocityStd, kCutoff_hz, kSample_s);
 }
 
 TEST(FusedVelocity, IsBetterThanEitherAndSaysHowGoodItIs) {
@@ -85,13 +86,13 @@ TEST(FusedVelocity, TakesNoneThatIsLateOrOfAnotherSizeOrSmoothed) {
   EXPECT_FALSE(fused(measured(0.0, -1.0)));
   // The position shows what its drive has smoothed away.
   Measured smoothed = measured(0.0, 1.0, 5.0);
-  EXPECT_FALSE(fused_velocity(smoothed.derivative, smoothed.velocity, 1e-4, 0.01, kCutoff_hz, kSample_s));
+  EXPECT_FALSE(fused_velocity(smoothed.position, smoothed.velocity, 1e-4, 0.01, kCutoff_hz, kSample_s));
 }
 
 TEST(FusedVelocity, TakesNoneThatHasMoreNoiseThanTheDerivative) {
   const Measured m = measured();
-  EXPECT_FALSE(fused_velocity(m.derivative, m.velocity, 1e-5, kVelocityStd, kCutoff_hz, kSample_s));
-  EXPECT_FALSE(fused_velocity(m.derivative, m.velocity, 0.0, kVelocityStd, kCutoff_hz, kSample_s));
+  EXPECT_FALSE(fused_velocity(m.position, m.velocity, 1e-5, kVelocityStd, kCutoff_hz, kSample_s));
+  EXPECT_FALSE(fused_velocity(m.position, m.velocity, 0.0, kVelocityStd, kCutoff_hz, kSample_s));
   const std::vector<double> few(20, 1.0), still(1000, 0.0);
   EXPECT_FALSE(fused_velocity(few, few, kPositionStd, kVelocityStd, kCutoff_hz, kSample_s));
   EXPECT_FALSE(fused_velocity(still, still, kPositionStd, kVelocityStd, kCutoff_hz, kSample_s));

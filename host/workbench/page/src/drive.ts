@@ -80,6 +80,7 @@ export class DrivePart {
     this.live.hidden = this.showsMap;
     this.map.element.hidden = !this.showsMap;
     this.map.visible = this.visible && this.showsMap && s.connected;
+    this.element.classList.toggle("asks", s.connected && !s.again && !!state.flash_preview);
     const part = (text: string, map: boolean) => button(text, () => { this.showsMap = map; this.draw(state); }, { "aria-pressed": this.showsMap === map ? "true" : "false", "data-part": text });
     fill(this.choice, part("Live signals", false), part("Residual map", true), this.showsMap && s.connected ? this.map.actions : null);
     if (!s.connected) this.map.forget(); else if (this.showsMap) this.map.render(state, s.simulated, s.given || s.serial || "");
@@ -97,13 +98,13 @@ export class DrivePart {
       return;
     }
     const f = s.came_back ? undefined : state.flash;  // what it has in it now may be something else
-    const p = s.came_back ? undefined : state.flash_preview;
+    const p = state.flash_preview;  // the server flashes nothing but what it shows
     fill(this.head, el("p", {}, el("strong", {}, `${s.serial} `), el("span", { class: "soft" }, `${s.board}; ${s.block ? `block “${s.block.model}”, ${s.block.bytes} bytes` : "no block"}`)),
       el("div", { class: "row actions" }, button("Flash this model", () => this.run("preview-flash"), { class: p ? "" : "main", disabled: off, "data-flash": "" }), button("Go back to the block before", () => this.run("preview-restore"), { disabled: off, "data-restore": "" }), button("Disconnect", () => { this.status = null; this.run("disconnect"); }, { class: "quiet", disabled: off })),
       s.came_back ? el("p", { class: "soft", "data-back": "" }, "It was lost and is connected again. Nothing was done to it meanwhile: look whether its block is the one that you want.") : null,
       p ? el("div", { class: "preview", "data-preview": p.restores ? "restore" : "flash" }, el("p", {}, el("strong", {}, p.restores ? "Going back would change:" : "Flashing would change:"), el("span", { class: "soft" }, ` ${p.before ? `“${p.before.model}”` : "no block"} → ${p.after ? `“${p.after.model}”` : "no block"}`)),
-        p.warnings.map((w) => el("p", { class: "high" }, w)), changes(p.changes),
-        el("div", { class: "row actions" }, button(p.restores ? "Go back" : "Flash it", () => this.run(p.restores ? "restore" : "flash", { before: p.before?.sha256 ?? "", after: p.after?.sha256 ?? "" }), { class: "main", disabled: off, "data-confirm": "" }), button("Leave it as it is", () => this.run("dismiss-preview"), { class: "quiet", disabled: off }))) : null,
+        el("div", { class: "row actions" }, button(p.restores ? "Go back" : "Flash it", () => this.run(p.restores ? "restore" : "flash", { before: p.before?.sha256 ?? "", after: p.after?.sha256 ?? "" }), { class: "main", disabled: off, "data-confirm": "" }), button("Leave it as it is", () => this.run("dismiss-preview"), { class: "quiet", disabled: off })),
+        changes(p.changes), p.warnings.map((w) => el("p", { class: "high" }, w))) : null,
       f && !p ? el("div", { class: "done", "data-flashed": f.flashed ? "yes" : "no" }, el("p", {}, f.flashed ? "✓ flashed, read back and in use" : "The drive has this block already."), f.warnings.map((w) => el("p", { class: "high" }, w)),
         changes(f.changes)) : null);
   }
