@@ -15,8 +15,8 @@ inline constexpr Pin kEnable{'C', 8, PinMode::output, 0, Pull::down};
 
 struct Description {
   static constexpr std::string_view kName = "nucleo_f446re";
-  // Current sensor and amplifier are those of the servo amplifier that is connected: set its full scales and its largest
-  // current here, and no block can say otherwise.
+  // Current sensor and amplifier are those of the servo amplifier that is connected: set its full scales and its
+  // largest current here, and no block can say otherwise.
   static constexpr control::Hardware kHardware{.motor_encoder = control::SensorKind::incremental,
                                                .output_encoder = control::SensorKind::incremental};
   // 8 MHz come from the programmer on the board, not from a crystal.

@@ -1,6 +1,6 @@
 // The board that the application is a template over (firmware/board.hpp), from what a description of a board says. A
-// description has: kClock, kPins, kAnalog, kHardware, kParameterSector, kMotorReversed, kOutputReversed, kName, and types
-// MotorEncoder, OutputEncoder, Amplifier, Serial and Usb (NoUsb where there is none).
+// description has: kClock, kPins, kAnalog, kHardware, kParameterSector, kMotorReversed, kOutputReversed, kName, and
+// types MotorEncoder, OutputEncoder, Amplifier, Serial and Usb (NoUsb where there is none).
 #pragma once
 
 #include <cstdint>

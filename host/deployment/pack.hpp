@@ -39,7 +39,7 @@ struct PackOptions {
   // Settings of the drive (drive_settings.hpp): then the block has all that a drive needs. Text and where it is from.
   std::optional<std::string> settings;
   std::string settings_origin = "settings";
-  control::Hardware hardware;  // what the drive's board states: taken for what the settings leave out
+  control::Hardware hardware;            // what the drive's board states: taken for what the settings leave out
   std::optional<double> encoder_counts;  // per motor turn: then the block has an encoder filter
   double filter_corner_hz = 50.0;
   std::vector<std::string> image;  // effects that the firmware has; empty: all that a drive can run

@@ -40,8 +40,8 @@ struct EffectName {
 EffectName parse_effect(std::string_view text);
 
 // Adds an effect and refits everything, shapes continuously. Experiments of role fit are fitted, those of role holdout
-// compared. Throws model::ModelError where the effect cannot be added and data::DataError where the data cannot show it.
-// An effect that users make (see user_defined_effects.hpp) is described by `given`.
+// compared. Throws model::ModelError where the effect cannot be added and data::DataError where the data cannot show
+// it. An effect that users make (see user_defined_effects.hpp) is described by `given`.
 Addition add(const data::Dataset& dataset, const model::Model& model, std::string_view effect,
              const estimation::PipelineOptions& options, const UserDefinition& given = {});
 

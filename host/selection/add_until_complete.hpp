@@ -16,10 +16,10 @@ struct Completion {
   model::Model model;                // with what was added, refitted
 };
 
-// Adds what diagnose() names until it names nothing or a group that cannot be distinguished, the next fall of chi-square
-// is under 0.3 % of the first one with the error at the noise floor, or `most_rounds` are over. After each addition
-// those made before are tried without: what is needless then is removed. Throws what diagnose() and add() throw.
-// `said`, where it is not empty, is called with each round as it ends.
+// Adds what diagnose() names until it names nothing or a group that cannot be distinguished, the next fall of
+// chi-square is under 0.3 % of the first one with the error at the noise floor, or `most_rounds` are over. After each
+// addition those made before are tried without: what is needless then is removed. Throws what diagnose() and add()
+// throw. `said`, where it is not empty, is called with each round as it ends.
 Completion add_until_complete(const data::Dataset& dataset, const model::Model& model, const Options& options,
                               std::size_t most_rounds, const std::function<void(const Diagnosis&)>& said = {});
 

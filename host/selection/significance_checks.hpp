@@ -14,7 +14,8 @@ namespace flexspline::selection {
 // list stays best first. `all`: the searches of every balance; `own`: the one whose candidates these are.
 void check_orders(const std::vector<BalanceSearch*>& all, BalanceSearch& own, std::vector<CandidateFit>& candidates);
 
-// "The axis moves one way only ...": what differs by direction is not identifiable then. Empty where it moves both ways.
+// "The axis moves one way only ...": what differs by direction is not identifiable then. Empty where it moves both
+// ways.
 std::string one_direction_warning(const BalanceData& data);
 
 }  // namespace flexspline::selection

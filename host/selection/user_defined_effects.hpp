@@ -22,8 +22,8 @@ struct UserDefinition {
 // Whether the text names an effect that users make: "table_effect:velocity", "expression_effect".
 bool names_user_defined_effect(std::string_view text);
 
-// "table_effect:velocity" or "table_effect:torque*direction" without points; "expression_effect" with what `given` says.
-// The id is free in `model`. Throws model::ModelError with what is wrong and what is known instead.
+// "table_effect:velocity" or "table_effect:torque*direction" without points; "expression_effect" with what `given`
+// says. The id is free in `model`. Throws model::ModelError with what is wrong and what is known instead.
 model::Effect user_defined_effect(std::string_view text, const UserDefinition& given, const model::Model& model);
 
 // "b=0.1..50:rad/s": name, bounds and unit; bounds (either end) and unit may be missing. Throws model::ModelError.

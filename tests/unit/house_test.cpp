@@ -43,15 +43,9 @@ const std::set<std::string, std::less<>> kFreestandingHeaders = {
 
 // Each costs many seconds a file under sanitizers, so each stands in one file of the folders that need it.
 const std::map<std::string, std::set<std::string>, std::less<>> kHeavyHeaders = {
-    {"toml++/toml.hpp", {"host", "hil"}},
-    {"toml++/toml.h", {"host", "hil"}},
-    {"CLI/CLI.hpp", {"host", "hil"}},
-    {"ceres/ceres.h", {"host"}},
-    {"matio.h", {"host", "tests"}},
-    {"hdf5.h", {"host", "tests"}},
-    {"sqlite3.h", {"host", "tests"}},
-    {"hidapi/hidapi.h", {"host", "tests"}},
-    {"httplib.h", {"host"}},
+    {"toml++/toml.hpp", {"host", "hil"}}, {"toml++/toml.h", {"host", "hil"}},     {"CLI/CLI.hpp", {"host", "hil"}},
+    {"ceres/ceres.h", {"host"}},          {"matio.h", {"host", "tests"}},         {"hdf5.h", {"host", "tests"}},
+    {"sqlite3.h", {"host", "tests"}},     {"hidapi/hidapi.h", {"host", "tests"}}, {"httplib.h", {"host"}},
     {"libusb-1.0/libusb.h", {"host"}},
 };
 
