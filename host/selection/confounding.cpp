@@ -32,10 +32,10 @@ Eigen::VectorXd own_torque(BalanceSearch& search, const CandidateFit& candidate,
       .col(0);
 }
 
-std::size_t bins_for(const Trial& trial, const std::string& variable, Eigen::Index rows) {
-  if (!trial.proposal.order || !variable.ends_with("angle")) return kBins;
+std::size_t bins_for(const CandidateFit& candidate, const std::string& variable, Eigen::Index rows) {
+  if (!candidate.model.order || !variable.ends_with("angle")) return kBins;
   const double most = static_cast<double>(rows) / kRowsPerBin;
-  return std::max(kBins, static_cast<std::size_t>(std::min(kBinsPerWave * std::abs(*trial.proposal.order), most)));
+  return std::max(kBins, static_cast<std::size_t>(std::min(kBinsPerWave * std::abs(*candidate.model.order), most)));
 }
 
 // The plain variable that a torque depends on most: "speed" of "speed x direction".
@@ -83,7 +83,7 @@ std::optional<Evidence> evidence(BalanceSearch& search, const CandidateFit& cand
     if (variable == variables.end()) continue;
     const bool resisting = name != share.variable;
     const comparison::Bins bins =
-        comparison::equal_count_bins(variable->values, bins_for(trial, name, variable->values.size()));
+        comparison::equal_count_bins(variable->values, bins_for(candidate, name, variable->values.size()));
     if (bins.count() < 3) continue;
     Evidence map{name, variable->unit, resisting, share.share_percent, {}};
     for (std::size_t b = 0; b < bins.count(); ++b) {

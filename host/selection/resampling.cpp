@@ -75,17 +75,15 @@ bool leaves_noise(const SearchedBalance& e, double whiteness) {
   return whiteness >= kPolicy.white && !(e.names_one() && is_of_effort(e.candidates.front()));
 }
 
-// Whether the likelihood of all data agrees with a name that resampling chose: half the subsamples may hold nothing
-// above the noise, and what the others chose is then chosen from noise. Where the model alone leaves what is known to
-// be noise, likelihood has to be certain.
+// Whether the likelihood of all data agrees with a name that resampling chose. Where the model alone leaves what is
+// known to be noise, most subsamples hold nothing above it, and what the others chose may be chosen from noise:
+// likelihood has to be certain then. Elsewhere it has no say, as it looks at one bandwidth, without reversals.
 bool likelihood_agrees(const SearchedBalance& motor, const Named& name) {
-  const bool at_floor =
-      motor.floor.rmse && motor.search.base.rmse() < (1.0 + kPolicy.floor_uncertainty) * *motor.floor.rmse;
-  std::optional<double> score;
-  for (const CandidateFit& candidate : motor.candidates)
-    if (is_of_family(name.effect, name.order, candidate))
-      score = std::max(score.value_or(candidate.gain.score), candidate.gain.score);
-  return score ? *score > (at_floor ? kPolicy.named_score : 0.0) : !at_floor;
+  if (!motor.floor.rmse || motor.search.base.rmse() > (1.0 + kPolicy.floor_uncertainty) * *motor.floor.rmse)
+    return true;
+  return std::any_of(motor.candidates.begin(), motor.candidates.end(), [&](const CandidateFit& candidate) {
+    return is_of_family(name.effect, name.order, candidate) && candidate.gain.score > kPolicy.named_score;
+  });
 }
 
 // The effects to name: of what was found in the catalogue, and does not make the held-out error worse, the group with
@@ -97,9 +95,8 @@ std::vector<Named> names_of(const Resampling& resampling, const SearchedBalance&
   if (is_within_floor_of_few_records(motor.search)) return names;
   for (const Resampling::Found& found : resampling.found) {
     if (found.group.empty() || found.refused_by_holdout) continue;
-    // Behind the first, likelihood would have to know of that.
-    if (names.empty() && std::none_of(found.group.begin(), found.group.end(),
-                                      [&](const Named& n) { return likelihood_agrees(motor, n); }))
+    if (std::none_of(found.group.begin(), found.group.end(),
+                     [&](const Named& n) { return likelihood_agrees(motor, n); }))
       continue;
     if (names.empty() && found.group.size() > 1) return found.group;
     if (found.group.size() > 1 || (!names.empty() && found.share_percent < least_percent)) continue;
