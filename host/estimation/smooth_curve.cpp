@@ -42,6 +42,10 @@ Products products_of(const CurveProblem& p) {
     if (p.root_weights[k] > 0.0) rows[static_cast<std::size_t>(p.fold[static_cast<std::size_t>(k)])].push_back(k);
   result.all = Matrix::Zero(columns, columns);
   for (const auto& own : rows) {
+    if (own.empty()) {  // a product over no rows divides by their number
+      result.fold.emplace_back(Matrix::Zero(columns, columns));
+      continue;
+    }
     Matrix block(static_cast<Eigen::Index>(own.size()), columns);
     block << p.others(own, Eigen::all) * result.size.cwiseInverse().asDiagonal(), p.points(own, Eigen::all),
         p.target(own);

@@ -316,7 +316,10 @@ TEST_F(WorkbenchApi, ADriveThatIsNotInReachIsNotOpened) {
   const json state = settled(tab);
   ASSERT_TRUE(state.contains("problem"));
   EXPECT_EQ(ask("GET", "/api/drive")["status"]["connected"], false);
-  act(tab, {{"do", "flash"}});
+  act(tab, {{"do", "preview-flash"}});
+  EXPECT_TRUE(settled(tab).contains("problem"));
+  act(tab, {{"do", "flash"}}, 400);  // nothing was shown
+  act(tab, {{"do", "flash"}, {"before", "a"}, {"after", "b"}});
   EXPECT_TRUE(settled(tab).contains("problem"));
 }
 

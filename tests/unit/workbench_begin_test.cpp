@@ -166,6 +166,7 @@ TEST_F(WorkbenchBegin, AFileThatCannotBeReadIsNotInTheWayOfTheNext) {
   ASSERT_EQ(drop(tab, "broken.csv", "?"), 200);
   EXPECT_EQ(settled(tab)["problem"]["what"], "it is broken");
   act(tab, {{"do", "propose"}});
+  settled(tab);
   EXPECT_EQ(files_.size(), 1u);
   EXPECT_EQ(drop(tab, "run.sh", "#!"), 400);
   EXPECT_EQ(drop(tab, "dataset.toml", ""), 400);

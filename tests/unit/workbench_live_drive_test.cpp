@@ -153,6 +153,29 @@ TEST_F(WorkbenchLiveDrive, AFlashThatLostItsDriveIsAnErrorAndIsNotDoneAgain) {
   EXPECT_EQ(bench_.drive.store().sequence(), 2U);
 }
 
+TEST_F(WorkbenchLiveDrive, APreviewChangesNothingAndNothingElseThanItShowsIsFlashed) {
+  const auto say = [](std::string_view) {};
+  const json preview = live_.preview_flash(other_model(), say);
+  EXPECT_EQ(bench_.drive.store().sequence(), 1U);
+  const auto changed = std::ranges::find_if(preview["changes"], [](const json& c) { return c["change"] != "same"; });
+  ASSERT_NE(changed, preview["changes"].end());
+  const Shown shown{preview["before"]["sha256"], preview["after"]["sha256"]};
+  // The model is another one by now.
+  const model::Model known = comparison::known_model(plant::demo_plant().drive);
+  EXPECT_THROW(live_.flash(known, say, shown), drive::DriveError);
+  EXPECT_EQ(bench_.drive.store().sequence(), 1U);
+  EXPECT_EQ(live_.flash(other_model(), say, shown)["flashed"], true);
+  EXPECT_EQ(bench_.drive.store().sequence(), 2U);
+  // The drive has another block by now.
+  EXPECT_THROW(live_.flash(known, say, shown), drive::DriveError);
+  const json back = live_.preview_restore();
+  EXPECT_EQ(back["after"]["sha256"], shown.before);
+  EXPECT_EQ(bench_.drive.store().sequence(), 2U);
+  EXPECT_THROW(live_.restore(shown), drive::DriveError);
+  live_.restore(Shown{shown.after, shown.before});
+  EXPECT_EQ(live_.status()["block"]["sha256"], shown.before);
+}
+
 TEST_F(WorkbenchLiveDrive, AnotherDriveInItsPlaceIsNotConnected) {
   Bench other("SN-2");
   bench_.plugged = false;
