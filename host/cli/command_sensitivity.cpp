@@ -143,7 +143,7 @@ int run(const SensitivityOptions& options, Console& console) {
   } catch (const std::invalid_argument& wrong) {
     throw UsageError(fmt::format("--scale {}", wrong.what()));
   }
-  const model::ModelFile file = load_model(options.model);
+  const model::ModelFile file = load_searched_model(options.model);
   const data::Dataset dataset = load(options.data, console);
   console.progress("judging the full model");
   wanted.progress = [&console](std::size_t done, std::size_t all) {

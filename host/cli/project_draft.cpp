@@ -270,6 +270,11 @@ Draft draft_of_files(const std::vector<fs::path>& files, const NewOptions& optio
     if (std::find(names.begin(), names.end(), name) == names.end())
       throw UsageError(fmt::format("--without {}: no file has such a column; the columns are {}", name,
                                    output::listed(text::nearest_first(name, names))));
+    if (name == "time_s" || data::column_from_name(name))
+      throw UsageError(
+          fmt::format("--without {0}: a column that has a name of ours is always read; give it another name "
+                      "in the file, or --map {0}=THEIRS to take another one for it",
+                      name));
     how.without.push_back(name);
   }
   how.pole_pairs = options.pole_pairs;

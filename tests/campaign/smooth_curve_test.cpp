@@ -132,6 +132,21 @@ TEST(SmoothCurve, IntervalsCoverTheTruth) {
   EXPECT_LT(share, 0.99);
 }
 
+TEST(SmoothCurve, AFoldWithoutAnyWeightChangesNothing) {
+  Made m = made(400, 24, 0.1, bump, 3);
+  Made without = m;
+  for (Eigen::Index k = 0; k < 400; ++k) {
+    const bool last = k % 5 == 4;
+    m.problem.root_weights[k] = without.problem.root_weights[k] = last ? 0.0 : 1.0;
+    if (last) without.problem.fold[static_cast<std::size_t>(k)] = 0;  // no fold is empty of weight then
+  }
+  without.problem.folds = 4;
+  const Curve curve = fit_curve(m.problem);
+  const Curve expected = fit_curve(without.problem);
+  EXPECT_TRUE(curve.value.isApprox(expected.value, 1e-9));
+  EXPECT_NEAR(curve.squares_with, expected.squares_with, 1e-9 * expected.squares_with);
+}
+
 TEST(SmoothCurve, LeavesToTheOthersWhatTheyDrawThemselves) {
   Made m = made(
       2000, 32, 0.05, [](double x) { return 3.0 + 2.0 * x + bump(x); }, 6);

@@ -74,8 +74,8 @@ TEST(LargeModels, CommandsThatSearchRefuseAModelOf300Ripples) {
             " }\ncosine = { value = 1e-5 }\nsine = { value = 0.0 }\n";
   shell.write("model.toml", text);
   shell.write("data.csv", log_of(2000, 1e-3));
-  for (const std::string command :
-       {"diagnose", "add stribeck_gaussian --out added.toml", "remove r7 --out less.toml", "plan --out plan.toml"}) {
+  for (const std::string command : {"diagnose", "add stribeck_gaussian --out added.toml", "remove r7 --out less.toml",
+                                    "plan --out plan.toml", "sensitivity", "sensitivity --refit"}) {
     const Answer answer = shell.run(kBounds + ("flexspline " + command) + " --model model.toml data.csv");
     EXPECT_EQ(answer.code, 2) << command << "\n" << answer.err;
     EXPECT_TRUE(contains(answer.err, "602 parameters")) << answer.err;
