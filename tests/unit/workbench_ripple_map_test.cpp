@@ -23,7 +23,7 @@ json angle_map(int order) {
     e[data::Column::current][k] += 0.3 * std::sin(order * e[data::Column::motor_position][k]);
   model::ModelFile file{comparison::known_model(drive), ""};
   file.text = model::write(file.model);
-  regression::PipelineOptions pipeline;
+  estimation::PipelineOptions pipeline;
   pipeline.cutoff_hz = 120.0;
   const auto step = open(dataset, file, pipeline, [](std::string_view) {});
   for (const json& of_signal : step->look()->maps())
