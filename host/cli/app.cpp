@@ -458,14 +458,10 @@ class App {
     backup->add_flag("--previous", backup_options->previous, "the block before the active one");
     const auto [restore, restore_options] = command<RestoreOptions>("restore");
     take_drive(restore, restore_options->drive);
-    restore->add_flag("--factory-reset", restore_options->factory_reset,
-                      "erase both blocks, for good: the drive is as it left its maker when it starts anew");
-    take_yes(restore, restore_options->yes);
+    take_restore(restore, *restore_options);
     const auto [home, home_options] = command<HomeOptions>("home");
     take_drive(home, home_options->drive);
-    home->add_option("--position-rad", home_options->position,
-                     "where the motor stands now, m on a linear axis (default: only says what the drive knows)")
-        ->type_name("RAD");
+    take_home(home, *home_options);
     const auto [monitor, monitor_options] = command<MonitorOptions>("monitor");
     take_monitor(monitor, *monitor_options);
     const auto [record, record_options] = command<RecordOptions>("record");

@@ -23,6 +23,19 @@ void take_yes(Parser* sub, bool& yes) {
 }
 
 template <class Parser>
+void take_restore(Parser* sub, RestoreOptions& options) {
+  sub->add_flag("--factory-reset", options.factory_reset,
+                "erase both blocks, for good: the drive is as it left its maker when it starts anew");
+  take_yes(sub, options.yes);
+}
+template <class Parser>
+void take_home(Parser* sub, HomeOptions& options) {
+  sub->add_option("--position-rad", options.position,
+                  "where the motor stands now, m on a linear axis (default: only says what the drive knows)")
+      ->type_name("RAD");
+}
+
+template <class Parser>
 void take_monitor(Parser* sub, MonitorOptions& options) {
   take_drive(sub, options.drive);
   sub->add_option("--seconds", options.seconds, "how long (default: until Ctrl-C; of --residual-map: not at all)")
