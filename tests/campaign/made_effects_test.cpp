@@ -97,27 +97,27 @@ TEST(MadeEffects, NamesAndParametersAreReadAsTheyAreWritten) {
 }
 
 TEST(MadeEffects, MistakesAreSaidWithWhatIsKnown) {
-  const auto made = [](const char* text, const Made& m = {}) {
+  const auto mistake_in = [](const char* text, const UserDefinition& m = {}) {
     return error_of([&] { user_defined_effect(text, m, plain_model()); });
   };
-  EXPECT_NE(made("table_effect").find("write table_effect:velocity, for example; signals are velocity, speed"),
+  EXPECT_NE(mistake_in("table_effect").find("write table_effect:velocity, for example; signals are velocity, speed"),
             std::string::npos);
-  EXPECT_EQ(made("table_effect:velocty"), "there is no signal \"velocty\"; did you mean velocity?");
-  EXPECT_NE(made("expression_effect").find("needs --formula"), std::string::npos);
-  Made m;
+  EXPECT_EQ(mistake_in("table_effect:velocty"), "there is no signal \"velocty\"; did you mean velocity?");
+  EXPECT_NE(mistake_in("expression_effect").find("needs --formula"), std::string::npos);
+  UserDefinition m;
   m.formula = "a*velocty";
   m.parameters = {"a:N*m"};
-  EXPECT_NE(made("expression_effect", m).find("did you mean velocity?"), std::string::npos);
+  EXPECT_NE(mistake_in("expression_effect", m).find("did you mean velocity?"), std::string::npos);
   m.formula = "a*velocity";
   m.parameters = {"a:N*m", "a:N"};
-  EXPECT_EQ(made("expression_effect", m), "the parameter a is given twice");
+  EXPECT_EQ(mistake_in("expression_effect", m), "the parameter a is given twice");
   m.parameters = {"a=1:N*m"};
-  EXPECT_NE(made("expression_effect", m).find("two dots"), std::string::npos);
+  EXPECT_NE(mistake_in("expression_effect", m).find("two dots"), std::string::npos);
   m.balance = "engine";
-  EXPECT_EQ(made("expression_effect", m), "there is no balance \"engine\"; it is motor, transmission or load");
-  Made points;
+  EXPECT_EQ(mistake_in("expression_effect", m), "there is no balance \"engine\"; it is motor, transmission or load");
+  UserDefinition points;
   points.points = 300;
-  EXPECT_EQ(made("table_effect:velocity", points), "300 points are too many; a table has 4 to 256");
+  EXPECT_EQ(mistake_in("table_effect:velocity", points), "300 points are too many; a table has 4 to 256");
 }
 
 TEST(AddTable, LearnsACurveThatHoldsOnDataThatTheFitNeverSaw) {
@@ -174,10 +174,10 @@ TEST(IdentifyTable, LearnsItsValuesAnewUnlessTheyAreFixed) {
 }
 
 TEST(AddExpression, EstimatesTheParametersOfAFormula) {
-  Made made;
-  made.formula = "height*exp(-(min(abs(motor_angle - 2), 2*pi - abs(motor_angle - 2))/width)^2)*direction";
-  made.parameters = {"height:N*m", "width=0.05..3:rad"};
-  const Addition added = add(motions(tooth), plain_model(), "expression_effect", kOptions, made);
+  UserDefinition given;
+  given.formula = "height*exp(-(min(abs(motor_angle - 2), 2*pi - abs(motor_angle - 2))/width)^2)*direction";
+  given.parameters = {"height:N*m", "width=0.05..3:rad"};
+  const Addition added = add(motions(tooth), plain_model(), "expression_effect", kOptions, given);
   EXPECT_GT(*added.before.rmse_holdout, 10.0 * *added.after.rmse_holdout);
   const auto value = [&](const char* parameter) -> const estimation::Estimate& {
     for (const auto& e : added.estimates)
