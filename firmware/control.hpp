@@ -119,8 +119,9 @@ class Control {
         static_cast<std::uint64_t>(observers::EncoderAngle::angle(output_encoder_, p_.output_encoder).raw);
     const N::Angle output{static_cast<std::int32_t>(static_cast<std::uint32_t>(shown))};
     observers::EncoderAngle::set(output_encoder_, p_.output_encoder, output);
-    std::int64_t low = -(std::int64_t{1} << 56), high = std::int64_t{1} << 56;
-    while (high - low > 1) {
+    constexpr int kBits = 56;
+    std::int64_t low = -(std::int64_t{1} << kBits), high = std::int64_t{1} << kBits;
+    for (int halving = 0; halving <= kBits; ++halving) {
       const std::int64_t middle = low + (high - low) / 2;
       (output_of(N::Angle{middle}).raw <= output.raw ? low : high) = middle;
     }
