@@ -78,7 +78,7 @@ bool CarriedOver::is_refuted() const {
 
 bool CarriedOver::is_certain() const {
   const int all = better + worse;
-  if (all == 0) return false;
+  if (better == 0) return false;
   // Better by chance in so many of all records or more.
   const boost::math::binomial_distribution<double> chance(all, 0.5);
   return boost::math::cdf(boost::math::complement(chance, better - 1)) < kPolicy.sign_test_p_value;
