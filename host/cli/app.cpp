@@ -445,10 +445,7 @@ class App {
                      "of the drive, as pack --drive takes them (default: those of its active block)")
         ->type_name("FILE.toml");
     take_firmware(*flash, *flash_options);
-    flash->add_option("--draws", flash_options->draws, "simulated drives of the prediction; 0: none")
-        ->check(CLI::IsMember({0, 3, 4, 5, 6, 8, 12, 20}))
-        ->capture_default_str();
-    flash->add_flag("--measured", flash_options->measured, "as pack --measured takes it");
+    take_prediction(flash, *flash_options);
     take_yes(flash, flash_options->yes);
     const auto [image, image_options] = command<ImageOptions>("image");
     take_image(*image, *image_options);

@@ -29,6 +29,13 @@ void take_restore(Parser* sub, RestoreOptions& options) {
   take_yes(sub, options.yes);
 }
 template <class Parser>
+void take_prediction(Parser* sub, FlashOptions& options) {
+  sub->add_option("--draws", options.draws, "simulated drives of the prediction; 0: none")
+      ->check(CLI::IsMember({0, 3, 4, 5, 6, 8, 12, 20}))
+      ->capture_default_str();
+  sub->add_flag("--measured", options.measured, "as pack --measured takes it");
+}
+template <class Parser>
 void take_home(Parser* sub, HomeOptions& options) {
   sub->add_option("--position-rad", options.position,
                   "where the motor stands now, m on a linear axis (default: only says what the drive knows)")
