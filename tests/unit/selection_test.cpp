@@ -121,6 +121,7 @@ Random random_table(Eigen::Index count, Eigen::Index terms, unsigned seed) {
   Random r;
   r.rows = Eigen::MatrixXd::NullaryExpr(count, terms + 3, [&] { return normal(chance); });
   r.table.model_columns = 2;
+  r.table.scale = Eigen::VectorXd::Ones(terms + 3);
   r.table.model_low = {-effects::kUnbounded, -effects::kUnbounded};
   for (Eigen::Index t = 0; t < terms; ++t) {
     CandidateTerm term;
