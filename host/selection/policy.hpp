@@ -81,8 +81,9 @@ struct SelectionPolicy {
   double named_chi2_percent = 0.5;
   // Score within which two effects are not distinguished (METHOD, step 6).
   double confounded_margin = 10.0;
-  // Of the sign test over records that were predicted without them: five of five are certain.
-  double sign_test_p_value = 0.05;
+  // Of the one-sided sign test over records that were predicted without them: four of four are enough, three of three
+  // are not.
+  double sign_test_p_value = 0.1;
   // Share of a candidate's torque that is orthogonal to the model: below, both are one in the data (by hand, on drives
   // with an effect that the model has in another form).
   double least_orthogonal_share = 0.003;

@@ -39,18 +39,6 @@ double squares_of(BalanceData& data, const CrossValidatedFit& fit, const RowRang
   return (e - Z * estimation::best_linear_predictions(errors, fit.random_effects.std, noise_variance)).squaredNorm();
 }
 
-// Whether a fit identifies at least one parameter of its last term.
-bool identifies_last(const BalanceData& data, const CrossValidatedFit& fit) {
-  const auto on_balance = estimation::terms_on(fit.terms, data.balance(), data.prepared().torque_measured);
-  std::vector<Slot> slots = fit.linear;
-  for (const Slot& shape : estimation::free_shape_slots(fit.terms, on_balance)) slots.push_back(shape);
-  for (std::size_t j = 0; j < slots.size(); ++j)
-    if (slots[j].term + 1 == fit.terms.size() &&
-        fit.root_tolerance[static_cast<Eigen::Index>(j)] > kPolicy.least_orthogonal_share)
-      return true;
-  return false;
-}
-
 bool is_each_records_own(const CandidateFit& candidate) {
   const auto& parameters = candidate.model.entry->parameters;
   return std::any_of(parameters.begin(), parameters.end(), [](const auto& p) { return p.per_record; });
@@ -60,11 +48,10 @@ bool is_each_records_own(const CandidateFit& candidate) {
 std::string why_not(const BalanceSearch& search, const CandidateFit& candidate) {
   if (is_within_floor_of_few_records(search))
     return "the error is within 30 % of the noise, and fewer than three records do not show that it carries over";
+  // On the motor's balance stability selection looks at halves of the records.
+  if (search.data->balance() == estimation::Balance::motor) return {};
   const CarriedOver carried = carry_over(search, candidate);
-  const bool has_resampling = search.data->balance() == estimation::Balance::motor;
-  if (!carried.is_refuted() &&
-      (has_resampling || !search.floor || search.at_floor(candidate.fit) || carried.is_certain()))
-    return {};
+  if (!carried.is_refuted() && (!search.floor || search.at_floor(candidate.fit) || carried.is_certain())) return {};
   return fmt::format("fitted without them, it predicts {} records worse than the model alone, and {} better{}",
                      carried.worse, carried.better,
                      carried.is_refuted() ? "" : ", too few to be sure with an error that stays above the noise");
@@ -99,8 +86,9 @@ CarriedOver carry_over(const BalanceSearch& search, const CandidateFit& candidat
     for (std::size_t i = fold; i < ranges.size(); i += folds) keep.segment(ranges[i].first, ranges[i].size()).setZero();
     if (keep.maxCoeff() <= 0.0) return;
     const CrossValidatedFit with = fit_without(data, candidate.fit.terms, keep);
-    if (!identifies_last(data, with)) return;
     const CrossValidatedFit without = fit_without(data, search.base.terms, keep);
+    // An effect that a few records alone show is not identified by the others.
+    if (likelihood_gain(without, with, candidate.model.added).score < kPolicy.named_score) return;
     for (std::size_t i = fold; i < ranges.size(); i += folds) {
       const double tau = std::max(1.0, search.base.autocorrelation_time);
       const double noise = candidate.fit.random_effects.variance[i] * tau;

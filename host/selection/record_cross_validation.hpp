@@ -16,7 +16,7 @@ struct CarriedOver {
   bool is_certain() const;
 };
 
-// A record counts if the others identify the candidate without it. Its own random effects are predicted from its own
+// A record counts if the others alone would name the candidate. Its own random effects are predicted from its own
 // rows, for both models alike. Nothing counts with fewer than three records, or where a parameter is each record's own.
 CarriedOver carry_over(const BalanceSearch& search, const CandidateFit& candidate);
 
@@ -25,8 +25,8 @@ CarriedOver carry_over(const BalanceSearch& search, const CandidateFit& candidat
 bool is_within_floor_of_few_records(const BalanceSearch& search);
 
 // Refuses candidates that would be named and do not carry over, best first, until one does. What leaves more than noise
-// has to carry over with certainty where resampling does not decide: parameters that differ from record to record for
-// another reason are followed by any law with enough of them. The list stays best first.
+// has to carry over with certainty on the balances at which stability selection does not look: parameters that differ
+// from record to record for another reason are followed by any law with enough of them. The list stays best first.
 void check_carry_over(const BalanceSearch& search, std::vector<CandidateFit>& candidates);
 
 }  // namespace flexspline::selection

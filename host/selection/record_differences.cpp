@@ -37,8 +37,9 @@ void eliminate_differences(Eigen::MatrixXd& products, const Differences& differe
 Eigen::VectorXd differences_of(const RegressorTable& table, const Setting& setting, const std::vector<double>& weights,
                                double noise, const SelectionPolicy& policy) {
   constexpr double kLeast = 0.005, kMost = 0.5;  // of the friction
-  std::vector<Eigen::Index> model(static_cast<std::size_t>(table.model_columns));
-  std::iota(model.begin(), model.end(), Eigen::Index{0});
+  std::vector<Eigen::Index> fixed(static_cast<std::size_t>(table.model_columns));
+  std::iota(fixed.begin(), fixed.end(), Eigen::Index{0});
+  fixed.insert(fixed.end(), table.differences.begin(), table.differences.end());
   std::vector<estimation::RecordProducts> records;
   const auto k = static_cast<Eigen::Index>(table.differences.size());
   Eigen::VectorXd size(k);
@@ -52,10 +53,10 @@ Eigen::VectorXd differences_of(const RegressorTable& table, const Setting& setti
     own *= weights[record];
     const Eigen::Index y = own.cols() - 1;
     estimation::RecordProducts r;
-    r.xx = own(model, model);
-    r.xz = own(model, table.differences) * size.asDiagonal();
+    r.xx = own(fixed, fixed);
+    r.xz = own(fixed, table.differences) * size.asDiagonal();
     r.zz = size.asDiagonal() * own(table.differences, table.differences) * size.asDiagonal();
-    r.xy = own(model, y);
+    r.xy = own(fixed, y);
     r.zy = size.asDiagonal() * own(table.differences, y);
     records.push_back(std::move(r));
     first = last;

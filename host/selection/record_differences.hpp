@@ -20,7 +20,9 @@ struct Differences {
 // squares with the differences' covariance.
 void eliminate_differences(Eigen::MatrixXd& products, const Differences& differences);
 
-// Variance components by record of the model's friction; columns scaled as the table has them.
+// Variance components by record of the model's friction; columns scaled as the table has them. What all records have in
+// common is no difference: the columns of the differences are fixed effects as well as random ones, so that an
+// asymmetry that the model lacks does not pass for friction that differs.
 Eigen::VectorXd differences_of(const RegressorTable& table, const Setting& setting, const std::vector<double>& weights,
                                double noise, const SelectionPolicy& policy);
 

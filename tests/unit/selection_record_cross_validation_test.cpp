@@ -6,12 +6,12 @@
 namespace flexspline::selection {
 namespace {
 
-TEST(CarriedOver, IsCertainFromFiveRecordsOfFiveOn) {
-  // By the binomial distribution with one half: 1/32 is below 0.05, 1/16 is not; 8 of 9 are 10/512, 7 of 9 are 46/512.
-  EXPECT_TRUE((CarriedOver{5, 0}.is_certain()));
-  EXPECT_FALSE((CarriedOver{4, 0}.is_certain()));
-  EXPECT_TRUE((CarriedOver{8, 1}.is_certain()));
-  EXPECT_FALSE((CarriedOver{7, 2}.is_certain()));
+TEST(CarriedOver, IsCertainFromFourRecordsOfFourOn) {
+  // By the binomial distribution with one half: 1/16 is below 0.1, 1/8 is not; 7 of 9 are 46/512, 6 of 9 are 130/512.
+  EXPECT_TRUE((CarriedOver{4, 0}.is_certain()));
+  EXPECT_FALSE((CarriedOver{3, 0}.is_certain()));
+  EXPECT_TRUE((CarriedOver{7, 2}.is_certain()));
+  EXPECT_FALSE((CarriedOver{6, 3}.is_certain()));
 }
 
 TEST(CarriedOver, WithoutARecordThatDecidesNothingIsCertainAndNothingRefuted) {
