@@ -61,7 +61,21 @@ protocol::Reference Session::reference() {
 void Session::home(std::int64_t position) {
   if (identity_.minor < protocol::kMinorOfHardware)
     fail("its firmware is older than position references; bring the firmware up to date");
-  take_refusal(exchange(protocol::request(Kind::home, 0, protocol::Home{position})));
+  const auto request = protocol::request(Kind::home, 0, protocol::Home{position});
+  // A drive that was just switched on looks at its sensors first.
+  constexpr int kMostAttempts = 100;
+  for (int attempt = 1;; ++attempt) {
+    const protocol::Message answer = exchange(request);
+    protocol::CommandAnswer refused;
+    const bool starts = static_cast<Code>(answer.code) == Code::refused &&
+                        protocol::take_payload(answer.content(), refused) == Code::done &&
+                        refused.refusal == protocol::Refusal::booting;
+    if (!starts || attempt == kMostAttempts) {
+      take_refusal(answer);
+      return;
+    }
+    std::this_thread::sleep_for(Milliseconds(10));
+  }
 }
 
 void Session::erase_all_blocks() {

@@ -234,7 +234,7 @@ class ParameterStore {
   // whole.
   constexpr bool give_up_other() {
     if (confirmed_ && rank_[1 - active_] == 0) return true;
-    const std::size_t slot = free_slot(active_);
+    const std::size_t slot = free_slot(active_, kTwice);
     if (slot + kTwice <= kSlotsEnd) return put_twice(active_, slot, kGivesUp) == StoreError::none;
     for (std::size_t at = kFirstSlot; at < kSlotsEnd; at += 2)
       if (word(active_, at + 1) == code_of(rank_[active_])) {
@@ -243,9 +243,14 @@ class ParameterStore {
       }
     return false;
   }
-  constexpr std::size_t free_slot(std::size_t sector) const {
-    std::size_t slot = kFirstSlot;
-    while (slot < kSlotsEnd && (word(sector, slot) != kErasedWord || word(sector, slot + 1) != kErasedWord)) slot += 2;
+  // The first slot from which on so many words are free: damage may lie behind one that is.
+  constexpr std::size_t free_slot(std::size_t sector, std::size_t words = 2) const {
+    std::size_t slot = kSlotsEnd;
+    std::size_t free = 0;
+    for (std::size_t at = kSlotsEnd; at-- > kFirstSlot;) {
+      free = word(sector, at) == kErasedWord ? free + 1 : 0;
+      if (at % 2 == 0 && free >= words) slot = at;
+    }
     return slot;
   }
   constexpr StoreError give_up() {
