@@ -191,6 +191,13 @@ int main(int argc, char** argv) {
   twin_command->add_option("--serve", twin_options.port, "port on 127.0.0.1 (default and 0: any that is free)")
       ->check(CLI::Range(0, 65535));
   twin_command
+      ->add_option("--token", twin_options.token,
+                   "32 hexadecimal digits, the end of its address: with those of the one before, hosts find it again")
+      ->check([](const std::string& text) {
+        const bool good = text.size() == 32 && text.find_first_not_of("0123456789abcdef") == std::string::npos;
+        return good ? std::string() : "not 32 digits of 0 to 9 and a to f";
+      });
+  twin_command
       ->add_option("--usbip", twin_options.usbip,
                    "a USB device in its place: port of its USB/IP server, 0 any (3240 is usual)")
       ->check(CLI::Range(0, 65535));

@@ -38,7 +38,7 @@ void make_nonblocking(int fd) {
 
 }  // namespace
 
-Line Line::listening(int port) {
+Line Line::listening(int port, const std::string& given) {
   Line line;
   line.listener_ = socket(AF_INET, SOCK_STREAM | SOCK_CLOEXEC, 0);
   if (line.listener_ < 0) fail("no socket");
@@ -53,7 +53,7 @@ Line Line::listening(int port) {
     fail("cannot listen at 127.0.0.1:" + std::to_string(port) + "; take another port, or 0 for any");
   socklen_t size = sizeof(address);
   getsockname(line.listener_, reinterpret_cast<sockaddr*>(&address), &size);
-  const std::string token = drawn_token();
+  const std::string token = given.empty() ? drawn_token() : given;
   line.name_ = "tcp:127.0.0.1:" + std::to_string(ntohs(address.sin_port)) + "/" + token;
   line.hello_ = "flexspline " + token + "\n";
   make_nonblocking(line.listener_);

@@ -14,9 +14,9 @@ namespace flexspline::twin {
 class Line final : public HostLine {
  public:
   /// Throw std::runtime_error with the reason.
-  /// A socket of this machine. Its name ends with a token, drawn anew each time, which a host has to say first: a web
-  /// page can reach the port, and would else arm the drive with a POST.
-  static Line listening(int port);
+  /// A socket of this machine. Its name ends with a token, drawn anew each time where none is given, which a host has
+  /// to say first: a web page can reach the port, and would else arm the drive with a POST.
+  static Line listening(int port, const std::string& token = {});
   static Line terminal();
   static Line inherited(int fd);
   ~Line() override;

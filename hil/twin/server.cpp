@@ -48,7 +48,7 @@ std::unique_ptr<HostLine> line_of(const TwinOptions& options) {
   if (options.inherits) return std::make_unique<Line>(Line::inherited(STDIN_FILENO));
   if (options.pty) return std::make_unique<Line>(Line::terminal());
   if (options.usbip >= 0) return std::make_unique<UsbLine>(options.usbip, options.serial);
-  return std::make_unique<Line>(Line::listening(std::max(options.port, 0)));
+  return std::make_unique<Line>(Line::listening(std::max(options.port, 0), options.token));
 }
 
 // Where it is, for a person or for a program.

@@ -18,6 +18,7 @@ struct TwinOptions {
   double inject_at_s = 1.0;  ///< after the drive was armed first
   std::uint64_t seed = 1;
   int port = -1;          ///< on 127.0.0.1; nought: any that is free
+  std::string token;      ///< that a host has to say; empty: drawn anew
   int usbip = -1;         ///< on 127.0.0.1, a USB device there; nought: any port that is free
   double seconds = 0.0;   ///< nought: until it is stopped
   bool pty = false;       ///< a serial line

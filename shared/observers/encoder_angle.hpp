@@ -52,7 +52,8 @@ struct EncoderAngle {
   // From now on the shaft stands at this angle, to the nearest count, whatever was counted before.
   static constexpr void set(State& s, const Coefficients& c, fixed::Angle angle) {
     const auto bits = static_cast<std::uint64_t>(angle.raw);
-    const std::uint64_t rest = (std::uint64_t{static_cast<std::uint32_t>(bits)} * c.counts + (1U << 31)) >> 32;
+    const std::uint64_t of_a_turn = bits & 0xFFFFFFFFU;
+    const std::uint64_t rest = (of_a_turn * c.counts + 0x80000000U) >> 32;
     const std::uint32_t carry = rest >= c.counts ? 1 : 0;
     s.rest = carry != 0 ? 0 : static_cast<std::uint32_t>(rest);
     s.turns = static_cast<std::int32_t>(static_cast<std::uint32_t>(bits >> 32) + carry);

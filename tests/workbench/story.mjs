@@ -50,7 +50,7 @@ function status(url, headers = {}) {
 const hil = join(tool, "..", "flexspline-hil");
 await run(hil, ["record", "--out", "rec", "--seed", "7", "--hide", "stribeck_gaussian", "--force"]);
 // A drive with the same hidden effect, which is asked over a socket; it goes faster than real time.
-const serve = (port) => spawn(hil, ["twin", "--serve", port, "--fast", "--hide", "stribeck_gaussian", "--json", "twin.json"], { cwd: work, stdio: ["ignore", "ignore", "inherit"] });
+const serve = (port, more = []) => spawn(hil, ["twin", "--serve", port, ...more, "--fast", "--hide", "stribeck_gaussian", "--json", "twin.json"], { cwd: work, stdio: ["ignore", "ignore", "inherit"] });
 let twin = serve("0");
 let drive = "";
 while (!drive) {
@@ -309,7 +309,8 @@ try {
   await until(page, () => Number(document.querySelector("[data-again]")?.dataset.again) > 0);
   await shot(page, "12-lost");
   await accessible(page, "with a lost drive");
-  twin = serve(drive.split(":").pop());
+  const [port, token] = drive.split(":").pop().split("/");
+  twin = serve(port, ["--token", token]);
   await page.waitForSelector("[data-back]");
   await until(page, () => Number(document.querySelector(".live")?.dataset.samples) > 20);
   // A twin without a file for its flash memory begins with the block of its maker.
