@@ -87,8 +87,8 @@ export class Begin {
       p.findings.length ? el("ul", { class: "findings" }, p.findings.slice(0, 6).map((f) => el("li", {}, `${f.column && f.column !== "time_s" ? `${f.column}: ` : ""}${f.what}${f.line ? ` (${f.file}, line ${f.line})` : ""}`))) : null,
       [...tolerable, ...others].length ? el("p", { class: "row actions" }, [...tolerable, ...others].map((kind) => el("label", {},
         el("input", { type: "checkbox", checked: this.tolerated.has(kind), "data-key": `tolerate ${kind}`, change: ((e: Event) => { if ((e.target as HTMLInputElement).checked) this.tolerated.add(kind); else this.tolerated.delete(kind); this.ask(); }) as (event: never) => void }), ` use them all the same: ${words(kind)}`))) : null,
-      el("div", { class: "row actions" }, button(p.adds ? "Add these recordings" : "Identify a first model", () => this.run("begin", { choices: this.choices() }), { class: "main", "data-begin": "", disabled: off || !p.can_begin }),
-        button(p.adds ? "Leave them out" : "Other recordings", () => { this.forget(); this.run("forget"); }, { class: "quiet", disabled: off, "data-forget": "" })));
+      el("div", { class: "row actions" }, button(p.adds ? "Add these recordings" : "Identify a first model", () => { this.dropTimer(); this.run("begin", { choices: this.choices() }); }, { class: "main", "data-begin": "", disabled: off || !p.can_begin }),
+        button(p.adds ? "Leave them out" : "Other recordings", () => { this.dropTimer(); this.forget(); this.run("forget"); }, { class: "quiet", disabled: off, "data-forget": "" })));
   }
 
   // Options of the command line are fields here.
@@ -151,8 +151,8 @@ export class Begin {
 
   private typed(key: string, value: string): void {
     this.facts[key] = value;
-    clearTimeout(this.timer);
-    this.timer = window.setTimeout(() => { this.timer = 0; this.ask(); }, 400);
+    this.dropTimer();
+    this.timer = window.setTimeout(() => this.ask(), 400);
   }
 
   private choices(): Record<string, unknown> {
@@ -173,7 +173,14 @@ export class Begin {
   }
   private left: string[] = [];
 
+  // Whatever is asked for next takes all choices along; a question that came after it would find no recordings any more.
+  private dropTimer(): void {
+    clearTimeout(this.timer);
+    this.timer = 0;
+  }
+
   private ask(): void {
+    this.dropTimer();
     this.run("propose", { choices: this.choices() });
   }
 }
