@@ -240,6 +240,7 @@ void Session::start(const std::string& what, std::function<void(const Progress&)
   work->what = what;
   work->began = std::chrono::steady_clock::now();
   work_ = work;
+  ++works_started_;
   if (!by_itself) parts_->erase("problem");
   changed();
   work->thread = std::thread([this, work, run = std::move(run), key] {
@@ -303,6 +304,7 @@ json Session::state() const {
   const std::lock_guard lock(mutex_);
   json answer = history_.current() ? state_of(history_) : json{{"steps", json::array()}, {"at", 0}};
   answer["changes"] = changes_;
+  answer["works_started"] = works_started_;
   answer["work"] = nullptr;
   if (work_)
     answer["work"] = {

@@ -132,6 +132,7 @@ class Session {
   mutable std::mutex mutex_;
   mutable std::condition_variable told_;
   std::uint64_t changes_ = 1;
+  std::uint64_t works_started_ = 0;
   History<std::shared_ptr<Step>> history_;
   std::shared_ptr<Work> work_;                // running; else null
   std::vector<std::shared_ptr<Work>> ended_;  // with threads still to be joined

@@ -94,6 +94,14 @@ TEST_F(WorkbenchApi, SaysHowGoodTheModelIsByExperiment) {
   EXPECT_EQ(state["experiments"][0]["signals"][0]["free_run"], false);
 }
 
+// A page that hears of a work only when it is over still learns that there was one.
+TEST_F(WorkbenchApi, CountsTheWorksThatWereStarted) {
+  const std::string tab = new_tab();
+  const auto before = settled(tab)["works_started"].get<int>();
+  act(tab, {{"do", "refit"}});
+  EXPECT_EQ(settled(tab)["works_started"].get<int>(), before + 1);
+}
+
 TEST_F(WorkbenchApi, GivesCurvesAndWhereTheRowsOfARegionLieInTime) {
   const std::string tab = new_tab();
   const json trace = ask("GET", "/api/trace",

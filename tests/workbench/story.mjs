@@ -266,13 +266,12 @@ try {
   say("flash to the twin, its signals, and where its model fails before and after");
   await page.getByRole("tab", { name: "Drive" }).click();
   // What was asked before it was connected is answered last: the page must not believe it.
-  let early = true, late = () => undefined;
+  // Where the page first asks when the drive is connected already, there is no such answer to hold back.
+  let late = () => undefined;
   const connected = new Promise((done) => { late = done; });
   await page.route("**/api/drive*", async (route) => {
-    const isFirst = early;
-    early = false;
     const answer = await route.fetch();
-    if (isFirst) await connected;
+    if (!(await answer.json()).status.connected) await connected;
     await route.fulfill({ response: answer });
   });
   await page.locator(`[data-connect="${drive}"]`).click();
@@ -313,8 +312,14 @@ try {
   twin = serve(port, ["--token", token]);
   await page.waitForSelector("[data-back]");
   await until(page, () => Number(document.querySelector(".live")?.dataset.samples) > 20);
-  // A twin without a file for its flash memory begins with the block of its maker.
+  // A twin without a file for its flash memory begins with the block of its maker. The page hears of the work only when
+  // it is over.
+  await page.route("**/api/state*", async (route) => {
+    await new Promise((slow) => setTimeout(slow, 1500));
+    await route.continue();
+  });
   await flash(page);
+  await page.unroute("**/api/state*");
   assert.equal(await page.locator("[data-back]").count(), 0);
   await idle(page);
 

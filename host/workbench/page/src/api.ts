@@ -41,6 +41,7 @@ export interface FlashPreview extends Flash { restores: boolean }
 export interface State {
   changes: number; data_name: string; model_name: string; model_file: string; folder: string; experiments: Experiment[]; balances: Balance[];
   warnings: string[]; steps: Step[]; at: number; parameters: Parameter[]; diagnosis: Diagnosis | null;
+  works_started: number;
   work: { what: string; stage: string; seconds: number } | null; problem?: Problem;
   pack?: { bytes: number; sha256: string; max_error_nm: number; max_error_share_of_rated: number; worst_balance: string; bounds: number };
   saved?: { what: string; file: string }; flash?: Flash;

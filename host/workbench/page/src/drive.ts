@@ -33,7 +33,7 @@ export class DrivePart {
   private channel = 0;
   private next = 0;
   private timer = 0;
-  private working = false;
+  private works = "";  // how many were started, and whether the last one is over
   private asked = 0;
   private lost = false;
   private state: State | null = null;
@@ -46,9 +46,10 @@ export class DrivePart {
 
   render(state: State): void {
     this.state = state;
-    const working = state.work !== null;
-    if (!this.status || this.working !== working) void this.refresh(state);
-    this.working = working;
+    // A work that is over before the page hears of it changes the drive as well.
+    const works = `${state.works_started} ${state.work === null}`;
+    if (!this.status || this.works !== works) void this.refresh(state);
+    this.works = works;
     this.draw(state);
     if (this.visible && !this.timer) this.listen();
   }
