@@ -1,10 +1,10 @@
-// The application on a drive, over any board: modes, the control tick, and the work behind it.
+// The application of a drive, for any board: modes, the control tick, and background work.
 //
 //   main() -> Application::tick(), from the board's timer -> Control::observe() and Control::update()
 //
 // The tick interrupts background work, never the other way round. The state of the drive belongs to the tick; a command
-// waits in a mailbox for the next tick. Parameters are the one thing that background work writes: it asks for them, and
-// the tick lends them only while the amplifier is off.
+// waits in a mailbox for the next tick. Only the parameters are written by background work: it requests them, and the
+// tick releases them only while the amplifier is off.
 #pragma once
 
 #include <atomic>
@@ -33,7 +33,7 @@ class Application {
   static constexpr std::uint32_t kBootTicks = 50;
   static constexpr std::uint32_t kRestTicks = 100;  // within two counts
 
-  // An image's application is constinit and begins when main() says so.
+  // In an image the application is constinit; begin() starts it from main().
   constexpr Application() = default;
   explicit Application(B& board) { begin(board); }
   Application(const Application&) = delete;
@@ -46,30 +46,30 @@ class Application {
     output_encoder_ = hardware.output_encoder;
   }
 
-  // The control tick: called by the board's timer, kTickHz times a second. One body, as calls between its parts would
-  // take a sixth of it.
+  // The control tick: called by the board's timer, kTickHz times a second. All in one function: calls between its parts
+  // would take a sixth of its time.
   [[gnu::flatten]] void tick() {
     const Readings& readings = board_->read();
     status_lock_.begin_write();
     ++status_.tick;
     watch_rest(readings.motor_counter);
     watchdog_.report(Part::sensors);
-    lend_or_take_back();
-    const Turn turn = turn_of(status_.tick);
+    release_or_take_parameters();
+    const SlowTask task = slow_task_of(status_.tick);
     Estimate& estimate = signals_.estimate;
-    // Of the tick before, until this one has its own.
+    // Still of the previous tick.
     Output& output = signals_.output;
     if (!is_armed(status_.mode)) output = {};
     if (has_parameters()) {
-      control_.observe(readings, turn, estimate);
+      control_.observe(readings, task, estimate);
     } else {
       estimate = {};
     }
     if (has_parameters() && !is_armed(status_.mode)) keep_reference(readings, estimate);
-    if (turn == Turn::residual_map && status_.maps_residual && control_.has_residual())
+    if (task == SlowTask::residual_map && status_.maps_residual && control_.has_residual())
       residual_map_.add(parameters().residual_map, estimate.velocity, estimate.angle, control_.residual());
     take_command(estimate);
-    judge(readings, estimate);
+    check_safety(readings, estimate);
     watchdog_.report(Part::safety);
     if (is_armed(status_.mode)) {
       control_.update(demand_, estimate, output);
@@ -79,23 +79,23 @@ class Application {
     watchdog_.report(Part::control);
     board_->actuate(actuation(output));
     watchdog_.report(Part::output);
-    follow_up(output);
+    update_mode(output);
     record(readings);
-    // In a fault already, or on the way to it: what came first is what counts.
+    // In a fault already, or stopping because of one: the first cause is kept.
     if (board_->tick_overrun() && status_.mode != Mode::fault)
       enter_fault(status_.mode == Mode::stop ? status_.fault : FaultRecord{Fault::tick_overrun, status_.tick, 0, 0});
     status_lock_.end_write();
   }
 
-  // What has time: called again and again from main(), and interrupted by the tick at any point.
+  // Background work: called repeatedly from main(), and interrupted by the tick at any point.
   void background() {
     watchdog_.report(Part::background);
     take_block();
     if (watchdog_.all_reported()) board_->feed_watchdog();
   }
 
-  // The command interface, for background work (a protocol) or for whoever calls the tick, but not for both at once.
-  // False: the command before has not been taken yet; a tick later it has.
+  // The command interface, for background work (a protocol) or for the caller of the tick, but not for both at once.
+  // False: the previous command has not been taken yet; the next tick takes it.
   bool submit(const Command& command) {
     if (command_waits_.load(std::memory_order_acquire)) return false;
     command_ = command;
@@ -109,13 +109,12 @@ class Application {
     answer_waits_.store(false, std::memory_order_release);
     return answer;
   }
-  // Whether this drive can take a block, where it lies.
+  // Whether this drive can take a block. It is checked in place.
   BlockFinding check(std::span<const std::byte> block) const {
     return check_block(block, tick_hz_of(*board_), hardware());
   }
   control::Hardware hardware() const { return hardware_of(*board_); }
-  // Before the first tick: takes the block that lies in flash, at once. Where it is not good the drive has no
-  // parameters.
+  // Before the first tick: takes the block in flash at once. If it is not valid the drive has no parameters.
   void boot_with(std::span<const std::byte> block) {
     const BlockFinding finding = check(block);
     if (finding == BlockFinding::none) {
@@ -124,8 +123,8 @@ class Application {
     }
     block_done(finding);
   }
-  // A packed parameter block, in flash or in memory. It has to stay where it is until block_finding() has the answer,
-  // which background work finds.
+  // A packed parameter block, in flash or in memory. It has to stay in place until block_finding() has the answer,
+  // which background work determines.
   void offer(std::span<const std::byte> block) {
     block_ = block;
     block_finding_.reset();
@@ -133,9 +132,9 @@ class Application {
   }
   std::optional<BlockFinding> block_finding() const { return block_finding_; }
 
-  // Changes the excitation: edit(coefficients, is torque). The tick reads it in mode `excitation` alone, and gets there
-  // by a command alone, which background work gives as well; so nothing has to be lent. False, and nothing done, while
-  // the drive is armed, a command waits, or there are no parameters.
+  // Changes the excitation: edit(coefficients, is torque). The tick reads it in mode `excitation` only, which it enters
+  // only by a command from background work; so the tick need not release the parameters. Returns false and does nothing
+  // while the drive is armed, a command waits, or there are no parameters.
   template <class Edit>
   bool edit_excitation(Edit&& edit) {
     if (is_armed(status_.mode) || command_waits_.load(std::memory_order_acquire) || !has_parameters()) return false;
@@ -152,25 +151,25 @@ class Application {
     return true;
   }
 
-  // What the bins mean: of the parameters, which background work alone changes. None where there are none.
+  // The meaning of the bins, from the parameters, which only background work changes. nullptr without parameters.
   const control::ResidualMap::Coefficients* map_coefficients() const {
     return has_parameters() ? &parameters().residual_map : nullptr;
   }
   std::uint32_t map_version() const { return residual_map_.version(); }
 
-  // The motor's count has stood still for a while: flash memory may be written, which may stop the processor, without a
-  // turn being lost.
+  // The motor's count has not changed for a while: flash memory may be written, which may stop the processor, without
+  // losing count of turns.
   bool at_rest() const { return rest_ticks_ >= kRestTicks; }
 
   Ring& telemetry() { return telemetry_; }
-  // For who calls the tick; or a field of it alone.
+  // For the caller of the tick; other contexts may read single fields only.
   const Status& status() const { return status_; }
-  // The same for background work, which the tick interrupts: all of one tick.
+  // The same for background work, which the tick interrupts: a consistent copy.
   Status snapshot() const { return status_lock_.read(status_); }
 
  private:
   enum class BlockStep : std::uint8_t { none, check, wait };
-  enum class Owner : std::uint8_t { tick, wanted, background };
+  enum class Owner : std::uint8_t { tick, requested, background };
 
   bool has_parameters() const { return status_.has_parameters; }
   Parameters& parameters() { return control_.parameters(); }
@@ -187,12 +186,12 @@ class Application {
 
   // Parameters.
 
-  // The tick's half: lends the parameters while nothing is driven by them, and starts anew with what comes back.
-  void lend_or_take_back() {
+  // The tick's part: releases the parameters while no mode uses them, and restarts with the new ones.
+  void release_or_take_parameters() {
     const Owner owner = owner_.load(std::memory_order_acquire);
-    if (owner == Owner::wanted && !is_armed(status_.mode)) {
+    if (owner == Owner::requested && !is_armed(status_.mode)) {
       status_.has_parameters = false;
-      status_.maps_residual = false;  // in other bases the bins would mean something else
+      status_.maps_residual = false;  // in other bases the bins have another meaning
       owner_.store(Owner::background, std::memory_order_release);
     } else if (owner == Owner::tick && new_parameters_) {
       new_parameters_ = false;
@@ -201,13 +200,13 @@ class Application {
       safety_ = {};
     }
   }
-  // Background work's half: nothing reaches the parameters before the whole block was looked at.
+  // Background work's part: the parameters are written only after the whole block was checked.
   void take_block() {
     if (block_step_ == BlockStep::check) {
       const BlockFinding finding = check(block_);
       if (finding != BlockFinding::none) return block_done(finding);
-      owner_.store(Owner::wanted, std::memory_order_release);
-      asked_at_ = status_.tick;
+      owner_.store(Owner::requested, std::memory_order_release);
+      requested_at_ = status_.tick;
       block_step_ = BlockStep::wait;
     } else if (block_step_ == BlockStep::wait) {
       if (owner_.load(std::memory_order_acquire) == Owner::background) {
@@ -215,9 +214,9 @@ class Application {
         new_parameters_ = true;
         owner_.store(Owner::tick, std::memory_order_release);
         block_done(BlockFinding::none);
-      } else if (status_.tick - asked_at_ > 1) {
-        Owner wanted = Owner::wanted;
-        if (owner_.compare_exchange_strong(wanted, Owner::tick)) block_done(BlockFinding::armed);
+      } else if (status_.tick - requested_at_ > 1) {
+        Owner expected = Owner::requested;
+        if (owner_.compare_exchange_strong(expected, Owner::tick)) block_done(BlockFinding::armed);
       }
     }
   }
@@ -238,7 +237,7 @@ class Application {
     unknown_ = (turn ? 0U : 1U << 17) | (output ? 0U : 1U << 18);
     control_.know(turn, output);
   }
-  // While the drive is not armed: no set point is then at another place.
+  // While the drive is not armed, as a set point would refer to the old angle.
   [[gnu::noinline]] void keep_reference(const Readings& readings, Estimate& estimate) {
     const auto counts = static_cast<std::int32_t>(parameters().motor_encoder.counts);
     // Counting was interrupted.
@@ -248,7 +247,7 @@ class Application {
     if (finds_reference_) {
       finds_reference_ = false;
       index_passes_ = readings.index_passes;
-      // A board that does not state its encoders is a simulated one, which wakes at its zero.
+      // A board that does not state its encoders is a simulated one, which starts at its zero.
       const bool all = motor_encoder_ == SensorKind::not_stated;
       const bool turn = all || motor_encoder_ == SensorKind::absolute;
       const bool output = parameters().has_output_encoder && output_encoder_ == SensorKind::absolute;
@@ -261,7 +260,7 @@ class Application {
       control_.show_angles(estimate);
     }
   }
-  // A shaft may have turned unseen. Absolute encoders say where they are once they are good again.
+  // A shaft may have turned without being counted. Absolute encoders give the angle once they are valid again.
   void lose_reference() {
     if (motor_encoder_ == control::SensorKind::not_stated || !has_parameters()) return;
     if (motor_encoder_ == control::SensorKind::absolute) control_.begin_encoders();
@@ -278,7 +277,7 @@ class Application {
     if (is_armed(status_.mode)) return Refusal::armed;
     if (!has_parameters()) return Refusal::no_parameters;
     if (!at_rest() || N::magnitude(estimate.velocity) > parameters().safety.standstill) return Refusal::moving;
-    control_.stand_at(command.position);
+    control_.set_angle(command.position);
     finds_reference_ = false;
     set_reference(true, true);
     return Refusal::none;
@@ -288,13 +287,13 @@ class Application {
 
   void take_command(const Estimate& estimate) {
     if (!command_waits_.load(std::memory_order_acquire)) return;
-    safety_.host_is_there();
+    safety_.note_host();
     const Refusal refusal = obey(command_, estimate);
     answer_ = {command_.number, refusal, status_.mode};
     answer_waits_.store(true, std::memory_order_release);
     command_waits_.store(false, std::memory_order_release);
   }
-  // What is rare is no part of the tick's one body.
+  // Rare commands are not inlined into the tick.
   [[gnu::noinline]] Refusal obey(const Command& command, const Estimate& estimate) {
     switch (command.kind) {
       case Command::Kind::heartbeat:
@@ -309,7 +308,7 @@ class Application {
         return Refusal::none;
       case Command::Kind::disarm:
         if (!is_armed(status_.mode)) return Refusal::not_armed;
-        // A drive that comes to rest because of a fault stays in it.
+        // A drive that is stopping because of a fault stays in that fault.
         if (status_.mode == Mode::stop) {
           enter_fault(status_.fault);
         } else {
@@ -317,7 +316,7 @@ class Application {
         }
         return Refusal::none;
       case Command::Kind::clear_fault:
-        // Back to boot: idle again once the sensors were found good for as long as after a reset.
+        // Back to boot: idle again once the sensors were valid for as long as after a reset.
         if (status_.mode != Mode::fault) return Refusal::none;
         status_.mode = Mode::boot;
         boot_ticks_ = 0;
@@ -352,7 +351,7 @@ class Application {
     return Refusal::none;
   }
   void take_set_point(const Command& command) {
-    safety_.set_point_is_there();
+    safety_.note_set_point();
     demand_.mode = command.mode;
     demand_.stream = command.stream;
     demand_.position = command.position;
@@ -363,7 +362,7 @@ class Application {
 
   // Modes.
 
-  void judge(const Readings& readings, const Estimate& estimate) {
+  void check_safety(const Readings& readings, const Estimate& estimate) {
     const bool needs_output = has_parameters() && parameters().has_output_encoder;
     FaultRecord found = safety_.check_samples(status_.tick, readings, needs_output, most_reading_);
     if (found.fault == Fault::none && has_parameters())
@@ -383,11 +382,11 @@ class Application {
     if (++boot_ticks_ < kBootTicks) return;
     status_.mode = Mode::idle;
     const ResetCause cause = board_->reset_cause();
-    if (cause != ResetCause::power && !told_reset_)
+    if (cause != ResetCause::power && !reported_reset_)
       enter_fault({cause == ResetCause::watchdog ? Fault::watchdog : Fault::crashed, status_.tick, 0, 0});
-    told_reset_ = true;
+    reported_reset_ = true;
   }
-  // A drive that is off stays off; one that comes to rest already is not told to do so again.
+  // A drive that is off stays off; one that is stopping already is not stopped again.
   [[gnu::noinline]] void respond(const FaultRecord& found, const Estimate& estimate) {
     if (status_.mode == Mode::fault) return;
     if (!is_armed(status_.mode) || ends_in(found.fault) == SafeState::off) return enter_fault(found);
@@ -413,8 +412,8 @@ class Application {
     control_.off();
     board_->actuate({});
   }
-  // What this tick's output means for the mode of the next.
-  void follow_up(const Output& output) {
+  // The mode of the next tick, from this tick's output.
+  void update_mode(const Output& output) {
     if (status_.mode == Mode::excitation && output.finished) enter_idle();
     if (status_.mode != Mode::stop) return;
     if (output.at_rest) return enter_fault(status_.fault);
@@ -439,12 +438,12 @@ class Application {
   }
 
   B* board_ = nullptr;
-  std::int32_t most_command_ = 0;  // what the board states, as shares of full scale; from begin() on
+  std::int32_t most_command_ = 0;  // as the board states it, a share of full scale; set by begin()
   std::int32_t most_reading_ = 0;
   control::SensorKind motor_encoder_ = control::SensorKind::not_stated;
   control::SensorKind output_encoder_ = control::SensorKind::not_stated;
   bool finds_reference_ = false;
-  std::uint16_t index_passes_ = 0;  // when the drive looked for where it is
+  std::uint16_t index_passes_ = 0;  // at the last search for the angle
   SequenceLock status_lock_;
   std::uint32_t unknown_ = 0;  // of the state's word: bit 17 the motor's turn, 18 the output
   Status status_{};
@@ -457,7 +456,7 @@ class Application {
   std::uint32_t rest_ticks_ = 0;
   std::uint32_t boot_ticks_ = 0;
   std::uint32_t stop_ticks_ = 0;
-  bool told_reset_ = false;
+  bool reported_reset_ = false;
 
   Command command_{};
   Answer answer_{};
@@ -467,11 +466,11 @@ class Application {
   std::span<const std::byte> block_{};
   std::optional<BlockFinding> block_finding_{};
   BlockStep block_step_ = BlockStep::none;
-  std::uint32_t asked_at_ = 0;
+  std::uint32_t requested_at_ = 0;
   std::atomic<Owner> owner_{Owner::tick};
   bool new_parameters_ = false;
 
-  // Last, as a tick reaches what lies near the beginning in fewer instructions.
+  // Last, as a tick reaches the first members in fewer instructions.
   Ring telemetry_{};
   control::ResidualMap residual_map_{};
 };

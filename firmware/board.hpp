@@ -1,4 +1,4 @@
-// What the application asks of a board. The application is a template over it: a real board, QEMU's and the software
+// What the application needs from a board. The application is a template over it: a real board, QEMU's and the software
 // board of the desktop run the same sources, and no call is virtual.
 #pragma once
 
@@ -10,7 +10,7 @@
 namespace flexspline::firmware {
 
 // One set of samples, taken together at the start of a tick. Each `..._samples` counts the samples of its source: a
-// number that stands still says that the values beside it are old.
+// number that does not change says that the values with it are old.
 struct Readings {
   std::uint32_t motor_counter = 0;   // of the encoder, wraps; positive with positive current
   std::uint32_t output_counter = 0;  // the same at the output, where there is an encoder
@@ -21,7 +21,7 @@ struct Readings {
   std::int16_t current = 0;
   std::int16_t torque = 0;
   std::int16_t temperature = 0;
-  // Of a motor's encoder with an index pulse: how often it came, and the counter at the last one.
+  // For a motor encoder with an index pulse: the number of pulses, and the counter at the last one.
   std::uint16_t index_passes = 0;
   std::uint32_t index_counter = 0;
 };
@@ -35,7 +35,7 @@ struct Actuation {
 enum class ResetCause : std::uint8_t {
   power,
   watchdog,
-  crash,  // the firmware gave up by itself
+  crash,  // the firmware reset itself after an error
 };
 
 template <class B>
@@ -43,18 +43,18 @@ concept Board = requires(B board, const Actuation& actuation) {
   { B::kTickHz } -> std::convertible_to<std::uint32_t>;
   { B::kTelemetryWords } -> std::convertible_to<std::uint32_t>;  // a power of two
   // Called at each tick, in this order: samples at the start of the tick, current, and whether the tick took longer
-  // than there was time.
+  // than its period.
   { board.read() } -> std::same_as<Readings>;
   board.actuate(actuation);
   { board.tick_overrun() } -> std::same_as<bool>;
-  // Called from background work. The watchdog resets the drive when it was not fed for kWatchdogTicks (faults.hpp), and
-  // a reset switches the amplifier off.
+  // Called from background work. The watchdog resets the drive when it is not fed for kWatchdogTicks (faults.hpp). A
+  // reset switches the amplifier off.
   board.feed_watchdog();
   { board.reset_cause() } -> std::same_as<ResetCause>;
 };
 
-// Whether the amplifier switched itself off while it was told to be on. A board whose amplifier does not tell has no
-// such function.
+// Whether the amplifier switched itself off while it was commanded on. A board whose amplifier does not report this has
+// no such function.
 template <Board B>
 bool amplifier_tripped_of(B& board) {
   if constexpr (requires { board.amplifier_tripped(); }) {
@@ -64,7 +64,8 @@ bool amplifier_tripped_of(B& board) {
   }
 }
 
-// What a board states of itself (shared/control/hardware.hpp); one that states nothing has no such function.
+// What a board states about its hardware (shared/control/hardware.hpp). A board that states nothing has no such
+// function.
 template <Board B>
 constexpr control::Hardware hardware_of(const B& board) {
   if constexpr (requires { board.hardware(); }) {
@@ -74,7 +75,7 @@ constexpr control::Hardware hardware_of(const B& board) {
   }
 }
 
-// How often a board ticks: kTickHz, but for one that is told when it starts.
+// A board's tick rate: kTickHz, except for a board whose rate is set when it starts.
 template <Board B>
 constexpr std::uint32_t tick_hz_of(const B& board) {
   if constexpr (requires { board.tick_hz; }) {

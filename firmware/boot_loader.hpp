@@ -1,5 +1,5 @@
-// The boot loader over a board: starts the application, or takes a new one over USB. README.md says how a board makes
-// one of it.
+// The boot loader for any board: starts the application, or receives a new one over USB. README.md says how a board
+// uses it.
 #pragma once
 
 #include <concepts>
@@ -13,19 +13,19 @@
 
 namespace flexspline::firmware {
 
-// What the boot loader asks of a board.
+// What the boot loader needs from a board.
 template <class B>
 concept LoaderBoard = requires(B board) {
-  { B::kName } -> std::convertible_to<std::string_view>;  // that images are made for; at most fifteen letters
-  // A storage::FlashPort of boot::kSlots sectors; a sector may be several of the memory's. It feeds a watchdog that
-  // runs.
+  { B::kName } -> std::convertible_to<std::string_view>;  // which images are made for; at most fifteen letters
+  // A storage::FlashPort of boot::kSlots sectors; each may consist of several sectors of the memory. It feeds a running
+  // watchdog.
   typename B::Slots;
   { board.slots() } -> std::same_as<typename B::Slots&>;
-  // How long the memory may take: to erase a slot, to write a block of DFU, to check an image.
+  // Longest times: to erase a slot, to write a block of DFU, to check an image.
   { B::kEraseMs } -> std::convertible_to<std::uint32_t>;
   { B::kBlockMs } -> std::convertible_to<std::uint32_t>;
   { B::kCheckMs } -> std::convertible_to<std::uint32_t>;
-  // The application asked for the boot loader before it made the reset, or somebody holds a button. Asking forgets it.
+  // The application requested the boot loader before the reset, or somebody holds a button. Reading clears the request.
   { board.takes_loader_request() } -> std::same_as<bool>;
 };
 
@@ -40,7 +40,7 @@ class UpdateMemory {
 
   usb::DfuStatus write(std::size_t at, std::span<const std::uint8_t> block) {
     if (at == 0) {
-      // What is no image for this board does not cost the one that was downloaded before.
+      // Data that are not an image for this board do not overwrite the image that was downloaded before.
       boot::ImageHeader header;
       if (block.size() >= boot::kHeaderBytes) {
         const auto finding = boot::check_header(block, B::kName, Slots::kImageBytes, header);
@@ -103,14 +103,15 @@ class BootLoader {
   explicit BootLoader(B& board) : slots_(board.slots(), B::kName), memory_(slots_), board_(board) {}
   BootLoader(const BootLoader&) = delete;
 
-  // Once, after reset: finishes an update that was begun and says what to start; `none`: open the bus and call turn().
+  // Once, after reset: finishes an update that was begun and returns what to start; `none`: open the bus and call
+  // poll().
   boot::Start start() { return board_.takes_loader_request() ? boot::Start::none : slots_.resume(); }
 
   // The device's class, before the bus is opened.
   void serve(Dfu& dfu) { dfu.use(memory_); }
-  // Again and again beside the device's poll(); `was_reset`: the bus was reset since the last turn. True: let go of the
-  // bus and reset the processor. A time passes in between, so that the host's program can end as it likes to.
-  bool turn(const Dfu& dfu, bool was_reset, std::uint32_t now_ms) {
+  // Call repeatedly, after the device's poll(). `was_reset`: the bus was reset since the last call. True: disconnect
+  // from the bus and reset the processor. It waits a while first, so that the host's program can finish.
+  bool poll(const Dfu& dfu, bool was_reset, std::uint32_t now_ms) {
     if (was_reset && dfu.was_used() && can_start()) return true;
     if (!dfu.installed()) {
       waits_ = false;
@@ -118,12 +119,12 @@ class BootLoader {
     }
     if (!waits_) since_ms_ = now_ms;
     waits_ = true;
-    return now_ms - since_ms_ >= (dfu.told() ? kLeaveMs : kLeaveUntoldMs);
+    return now_ms - since_ms_ >= (dfu.install_reported() ? kLeaveMs : kLeaveUnreportedMs);
   }
   const Slots& slots() const { return slots_; }
 
  private:
-  static constexpr std::uint32_t kLeaveMs = 500, kLeaveUntoldMs = 10'000;
+  static constexpr std::uint32_t kLeaveMs = 500, kLeaveUnreportedMs = 10'000;
   bool can_start() const {
     return !slots_.image(boot::Slot::application).empty() || !slots_.image(boot::Slot::old).empty() ||
            !slots_.image(boot::Slot::download).empty();

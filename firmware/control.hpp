@@ -1,4 +1,4 @@
-// The control tick: what the sensors say (observe), and what current answers the demand (update).
+// The control tick: estimates from the sensors (observe), and the current for the demand (update).
 #pragma once
 
 #include <cstdint>
@@ -12,7 +12,7 @@ namespace flexspline::firmware {
 
 using Parameters = control::DriveParameters<N>;
 
-// What is wanted, as the host said it.
+// The demand, as the host sent it.
 struct Demand {
   Mode mode = Mode::boot;
   bool compensate = false;
@@ -23,13 +23,13 @@ struct Demand {
   N::Value current{};
 };
 
-// What is slow, or feeds no loop, is done at every fourth tick, each at another one, so that no tick is much longer
-// than another.
-enum class Turn : std::uint8_t { ripple_taken, residual_map, ripple_learnt, temperature_and_gear };
-inline constexpr std::uint32_t kTurns = 4;
-static_assert(control::ResidualMap::kEveryTicks == kTurns);
-constexpr Turn turn_of(std::uint32_t tick) {
-  return static_cast<Turn>(tick % kTurns);
+// Slow tasks, and those that feed no loop, run at every fourth tick, each at a different one, so that all ticks take
+// about the same time.
+enum class SlowTask : std::uint8_t { ripple_taken, residual_map, ripple_learnt, temperature_and_gear };
+inline constexpr std::uint32_t kSlowTasks = 4;
+static_assert(control::ResidualMap::kEveryTicks == kSlowTasks);
+constexpr SlowTask slow_task_of(std::uint32_t tick) {
+  return static_cast<SlowTask>(tick % kSlowTasks);
 }
 
 struct Estimate {
@@ -38,11 +38,11 @@ struct Estimate {
   N::Value acceleration{};
   N::Angle output_angle{};  // of the output: measured, or estimated without an encoder there
   N::Value output_velocity{};
-  N::Value torsion{};  // estimated without an encoder at the output, else nought
+  N::Value torsion{};  // estimated without an encoder at the output, otherwise zero
   N::Value torque{};   // through the flexspline, without the sensor's ripple
   N::Value current{};
   N::Value temperature{};
-  N::Value shown_current{};  // as far as the sensor shows it, for limits; what a model reads ends at two bases
+  N::Value shown_current{};  // the full range of the sensor, for limits; a model's input ends at two bases
   N::Value shown_temperature{};
   N::Value disturbance{};
   std::int32_t moved = 0;  // counts of the motor's encoder since the tick before
@@ -58,20 +58,20 @@ struct Output {
   N::Step lag{};     // mode position: the set point of the loop, less where the shaft is
   N::Value error{};  // of the velocity loop, where it is closed
   bool limited = false;
-  bool at_rest = false;   // modes velocity and stop: the set point is nought and so is the shaft's velocity
+  bool at_rest = false;   // modes velocity and stop: the set point is zero and so is the shaft's velocity
   bool finished = false;  // the excitation is over
 };
 
 class Control {
  public:
-  // Who writes them has to see to it that no tick reads them meanwhile, and has to call restart() then.
+  // A writer has to make sure that no tick reads them meanwhile, and has to call restart() afterwards.
   Parameters& parameters() { return p_; }
   const Parameters& parameters() const { return p_; }
 
-  // At rest and knowing nothing but where the shafts are: after the parameters changed. With another number of counts a
-  // turn an encoder begins anew. True where one did.
+  // After the parameters changed: all states at rest, only the angles of the shafts are kept. An encoder with another
+  // number of counts per turn restarts. True where one did.
   [[gnu::noinline]] bool restart() {
-    const bool anew = motor_counts_ != p_.motor_encoder.counts || output_counts_ != p_.output_encoder.counts;
+    const bool restarted = motor_counts_ != p_.motor_encoder.counts || output_counts_ != p_.output_encoder.counts;
     if (motor_counts_ != p_.motor_encoder.counts) motor_encoder_ = {};
     if (output_counts_ != p_.output_encoder.counts) output_encoder_ = {};
     motor_counts_ = p_.motor_encoder.counts;
@@ -82,9 +82,9 @@ class Control {
     forget_motion();
     off();
     know(knows_turn_, knows_output_);
-    return anew;
+    return restarted;
   }
-  // The amplifier is off: what the loops remember is void.
+  // The amplifier is off: the states of the loops are reset.
   void off() {
     loops_ = {};
     excitation_ = {};
@@ -92,10 +92,10 @@ class Control {
     compensates_ = false;
   }
 
-  // Where shafts are. Not of an armed tick.
+  // Angles of the shafts. Not for an armed tick.
 
-  // What is known: where a turn of the motor stands, and where the output. What needs it is left out without, effects
-  // of the model as well as limits of position.
+  // Which angles are known: that of the motor within its turn, and that of the output. Effects and limits of position
+  // that need an unknown angle are left out.
   [[gnu::noinline]] void know(bool turn, bool output) {
     constexpr std::int64_t kNoLimit = std::int64_t{1} << 62;
     knows_turn_ = turn;
@@ -104,16 +104,16 @@ class Control {
     p_.trajectory.lowest = output ? lowest_ : -kNoLimit;
     p_.trajectory.highest = output ? highest_ : kNoLimit;
   }
-  // The motor stands at this angle, and the output where it belongs to it.
-  [[gnu::noinline]] void stand_at(N::Angle motor) {
+  // The motor is at this angle, and the output at the corresponding one.
+  [[gnu::noinline]] void set_angle(N::Angle motor) {
     observers::EncoderAngle::set(motor_encoder_, p_.motor_encoder, motor);
     if (p_.has_output_encoder) observers::EncoderAngle::set(output_encoder_, p_.output_encoder, output_of(motor));
     forget_motion();
     off();
   }
-  // The output's angle is true within a turn, which is taken as the one around its zero: how many turns the motor is
-  // from its zero follows, and the rest of a turn as well where that is not true itself. Torsion is far less than half
-  // a turn of the motor.
+  // The output's angle is known within a turn, which is taken as the one around its zero. From it follows how many
+  // turns the motor is from its zero, and also its angle within a turn where that is not known. Torsion is far less
+  // than half a turn of the motor.
   [[gnu::noinline]] void take_output(bool keeps_rest) {
     const auto shown =
         static_cast<std::uint64_t>(observers::EncoderAngle::angle(output_encoder_, p_.output_encoder).raw);
@@ -134,7 +134,7 @@ class Control {
     forget_motion();
     off();
   }
-  // The motor stood at a whole number of turns at that count.
+  // The motor was at a whole number of turns at that count.
   [[gnu::noinline]] void take_index(std::uint32_t counter) {
     observers::EncoderAngle::set_whole_at(motor_encoder_, p_.motor_encoder, counter);
     forget_motion();
@@ -142,15 +142,15 @@ class Control {
   }
   // Counts from the counters as they are, as at the start.
   void begin_encoders() { motor_encoder_ = output_encoder_ = {}; }
-  // After one of these, for the same tick.
+  // Called after one of these, for the same tick.
   void show_angles(Estimate& e) const {
     e.angle = observers::EncoderAngle::angle(motor_encoder_, p_.motor_encoder);
     if (p_.has_output_encoder) e.output_angle = observers::EncoderAngle::angle(output_encoder_, p_.output_encoder);
   }
 
-  // What the sensors say, into `e`: fields of sensors that the drive does not have stay as they are, and those of slow
-  // signals but in their turn.
-  void observe(const Readings& readings, Turn turn, Estimate& e) {
+  // Writes the estimates from the sensors into `e`. Fields of sensors that the drive does not have stay as they are;
+  // those of slow signals change every fourth tick.
+  void observe(const Readings& readings, SlowTask task, Estimate& e) {
     e.moved = observers::EncoderAngle::moved(motor_encoder_, readings.motor_counter);
     e.angle = observers::EncoderAngle::update(motor_encoder_, p_.motor_encoder, readings.motor_counter);
     const auto motor = observers::EncoderKalman::update<N>(motor_motion_, p_.motor_motion, e.angle);
@@ -165,18 +165,18 @@ class Control {
     e.current = N::clamp(e.shown_current, two_bases());
     const N::Value applied = N::scaled(p_.torque_of_current, e.current);
     if (!p_.has_output_encoder) estimate_output(applied, e);
-    if (turn == Turn::temperature_and_gear) {
+    if (task == SlowTask::temperature_and_gear) {
       e.shown_temperature = control::shown(p_.temperature, readings.temperature);
       e.temperature = N::clamp(e.shown_temperature, two_bases());
     }
     if (p_.has_torque_sensor)
-      observe_torque(N::clamp(control::shown(p_.torque, readings.torque), two_bases()), turn, e);
+      observe_torque(N::clamp(control::shown(p_.torque, readings.torque), two_bases()), task, e);
     e.disturbance =
         observers::DisturbanceObserver::update<N>(disturbance_, p_.disturbance, applied, nominal_.torque,
                                                   N::clamp(e.acceleration - nominal_.acceleration, two_bases()));
   }
 
-  // Enters an armed mode where the shaft is, at the velocity that it has. The torque goes on from what it is.
+  // Enters an armed mode at the shaft's present angle and velocity. The torque continues without a jump.
   [[gnu::noinline]] void start(const Demand& demand, const Estimate& e) {
     const bool goes_on =
         uses_trajectory(last_mode_) && uses_trajectory(demand.mode) && loops_.mode != control::Mode::off;
@@ -205,10 +205,10 @@ class Control {
     streams_ = demand.stream;
   }
 
-  // A stream of set points moves on by itself, until the next one comes.
+  // Between two set points of a stream the drive extrapolates.
   bool streams_in_motion() const { return streams_ && (stream_.velocity != 0 || stream_.change != 0); }
 
-  // What the model of the tick before leaves over of the motor's torque, where there was one: off() and other modes
+  // The residual of the motor's torque with the model of the previous tick, where there was one: off() and other modes
   // have none.
   bool has_residual() const { return compensates_; }
   N::Value residual() const { return disturbance_.residual; }
@@ -264,15 +264,15 @@ class Control {
     return mode == Mode::velocity || mode == Mode::position || mode == Mode::stop;
   }
   static constexpr N::Value two_bases() { return N::one() + N::one(); }
-  // The ripple is that of at most five ticks ago.
-  void observe_torque(N::Value torque, Turn turn, Estimate& e) {
-    if (turn == Turn::ripple_taken) observers::RippleFilter::take<N>(ripple_, p_.ripple, e.angle, torque);
-    if (turn == Turn::ripple_learnt && ripple_.started)
+  // The ripple's estimate is at most five ticks old.
+  void observe_torque(N::Value torque, SlowTask task, Estimate& e) {
+    if (task == SlowTask::ripple_taken) observers::RippleFilter::take<N>(ripple_, p_.ripple, e.angle, torque);
+    if (task == SlowTask::ripple_learnt && ripple_.started)
       torque_ripple_ = observers::RippleFilter::learn<N>(ripple_, p_.ripple);
     e.torque = torque - torque_ripple_;
   }
-  // The observer tells how the drive differs from its nominal motion. Without a model friction would count as torsion,
-  // and around a reversal it does: a stiff gear is the better guess then.
+  // The observer estimates how the drive differs from its nominal motion. Without a model friction would count as
+  // torsion, and around a reversal it does: a stiff gear is the better estimate then.
   void estimate_output(N::Value applied, Estimate& e) {
     const N::Value rest = p_.safety.standstill;
     const bool forward = nominal_.velocity > rest && e.velocity > rest;
@@ -308,14 +308,14 @@ class Control {
     out.acceleration = point.acceleration;
   }
   [[gnu::noinline]] void excite(const Estimate& e, Output& out, control::Loops::Command<N>& command) {
-    const auto wanted = control::Excitation::update<N>(excitation_, p_.excitation, e.velocity);
+    const auto set_point = control::Excitation::update<N>(excitation_, p_.excitation, e.velocity);
     out.finished = control::Excitation::finished<N>(excitation_);
     if (p_.excites_torque) {
       command.mode = control::Mode::torque;
-      command.torque = wanted;
+      command.torque = set_point;
     } else {
-      out.velocity = wanted;
-      command = {control::Mode::velocity, {}, wanted, {}};
+      out.velocity = set_point;
+      command = {control::Mode::velocity, {}, set_point, {}};
     }
   }
   void compensate(const Estimate& e, Output& out, control::Loops::Command<N>& command) {
@@ -329,7 +329,7 @@ class Control {
     command.velocity = command.velocity + forward.velocity;
   }
 
-  // Here, and not behind a pointer: where a tick finds them is known when it is compiled.
+  // A member, not a pointer: their address is known at compile time.
   Parameters p_{};
   observers::EncoderAngle::State motor_encoder_{};
   observers::EncoderAngle::State output_encoder_{};
@@ -344,7 +344,7 @@ class Control {
   control::Excitation::State<N> excitation_{};
   control::Feedforward::State<N> feedforward_{};
   control::Loops::State<N> loops_{};
-  // What the model says of the tick before, with compensation; else standstill without a torque.
+  // The model's output of the previous tick, with compensation; otherwise rest without torque.
   struct Nominal {
     N::Value torque{};
     N::Value velocity{};
@@ -352,7 +352,7 @@ class Control {
     N::Value torsion{};
   };
   Nominal nominal_{};
-  // Of the parameters that both encoders' angles were counted with.
+  // The parameters with which both encoders' angles were counted.
   std::uint32_t motor_counts_ = 0;
   std::uint32_t output_counts_ = 0;
   // Limits of position, as the parameters have them.

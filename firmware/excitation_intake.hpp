@@ -1,5 +1,5 @@
-// An excitation that a host sends, number by number checked, into the application's parameters. It is written where it
-// is used, with no ticks until it is complete.
+// Receives an excitation from a host, checks each number and writes it into the application's parameters in place. Its
+// number of ticks stays zero until it is complete.
 #pragma once
 
 #include <array>
@@ -7,7 +7,7 @@
 
 #include "firmware/messages.hpp"
 #include "shared/control/excitation.hpp"
-#include "shared/fixed/complete.hpp"
+#include "shared/fixed/derived_fields.hpp"
 #include "shared/protocol/payloads.hpp"
 
 namespace flexspline::firmware {
@@ -41,7 +41,7 @@ class ExcitationIntake {
   }
   static bool is_limit(std::int32_t raw) { return raw > 0 && raw <= (std::int32_t{2} << fixed::kValueBits); }
   static bool is_signal(std::int32_t raw) { return raw > INT32_MIN && (raw == 0 || is_limit(raw) || is_limit(-raw)); }
-  // Only the normal form is a gain, so that one number has one form.
+  // Only the normalised form is accepted, so that each number has one representation.
   static bool make_gain(std::int32_t mantissa, std::int32_t exponent, N::Gain& gain) {
     const std::uint64_t size = fixed::size_of(mantissa);
     const bool normal = mantissa == 0 ? exponent == 0
@@ -52,7 +52,7 @@ class ExcitationIntake {
     gain = {};
     gain.mantissa = mantissa;
     gain.exponent = static_cast<std::int8_t>(exponent);
-    return fixed::complete(gain);
+    return fixed::derive_fields(gain);
   }
 
   template <class Application>
@@ -124,7 +124,7 @@ class ExcitationIntake {
     return edit(application, [&](auto& c, bool&) { c.ticks = ticks_; });
   }
 
-  std::uint32_t ticks_ = 0;  // nought: nothing was begun
+  std::uint32_t ticks_ = 0;  // zero: no excitation is being received
 };
 
 }  // namespace flexspline::firmware

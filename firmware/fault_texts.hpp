@@ -1,5 +1,5 @@
-// What faults are called, why they happen (in the words that a host knows as well, shared/protocol/texts.hpp), and
-// within how many ticks they are found. No image holds them.
+// Names of the faults, their reasons (the words of shared/protocol/texts.hpp, which the host uses as well), and within
+// how many ticks they are detected. Not part of any image.
 #pragma once
 
 #include <array>
@@ -14,12 +14,11 @@ namespace flexspline::firmware {
 
 struct FaultInfo {
   Fault fault = Fault::none;
-  std::uint32_t ticks = 0;  // from the first tick that shows the cause; nought: a parameter, named in the reason
+  std::uint32_t ticks = 0;  // from the first tick with the cause; zero: a parameter, named in the reason
   std::string_view name{};
   std::string_view reason{};
 };
 
-static_assert(protocol::kFaults == kFaults);
 namespace detail {
 constexpr FaultInfo fault_info(Fault fault) {
   const protocol::FaultText text = protocol::fault_text(static_cast<std::uint8_t>(fault));

@@ -1,4 +1,4 @@
-// The residual map for a host: what its bins mean, and the bins, some a message.
+// The residual map for a host: the meaning of its bins, and the bins, several per message.
 #pragma once
 
 #include <cstdint>
@@ -9,7 +9,7 @@
 namespace flexspline::firmware {
 
 struct MapMessages {
-  // `first` is beyond the map: wrong_value. `busy` where the tick hit a bin at each try to read it.
+  // `wrong_value`: `first` is beyond the map. `busy`: the tick wrote the bin at each attempt to read it.
   template <class Application>
   static protocol::Code bins(const Application& application, std::uint16_t first, protocol::MapBins& out) {
     constexpr std::size_t kBins = control::ResidualMap::kVelocityBins * control::ResidualMap::kAngleBins;
@@ -23,7 +23,7 @@ struct MapMessages {
     }
     return protocol::Code::done;
   }
-  // `no_parameters` where none give the bins a meaning.
+  // `no_parameters`: the bins have no meaning without them.
   template <class Application>
   static protocol::Code info(const Application& application, protocol::MapInfo& out) {
     const control::ResidualMap::Coefficients* c = application.map_coefficients();

@@ -1,4 +1,4 @@
-// Between the service and reports of 64 bytes (USB HID): whole messages both ways, nothing lost on the drive's side.
+// Connects the service with reports of 64 bytes (USB HID): whole messages both ways, none lost on the drive's side.
 #pragma once
 
 #include <span>
@@ -7,20 +7,20 @@
 
 namespace flexspline::firmware {
 
-// `Reports` has receive(report), which is false where none came, send(report), and room() for reports to the host
-// (shared/usb/hid.hpp). What is no message is passed over.
+// `Reports` has receive(report), which is false where none is available, send(report), and room() for reports to the
+// host (shared/usb/hid.hpp). Reports that are not a message are ignored.
 template <class Service, class Reports>
 class ReportLink {
  public:
   ReportLink(Service& service, Reports& reports) : service_(service), reports_(reports) {}
 
-  // From background work, again and again; `connected`: a host has configured the device.
-  void turn(bool connected) {
+  // Called repeatedly from background work; `connected`: a host has configured the device.
+  void poll(bool connected) {
     if (connected != connected_) service_.disconnected();
     if (connected != connected_) waits_ = false;
     connected_ = connected;
     if (!connected) return;
-    // A request that the service has no room for waits here, and those behind it with their endpoint.
+    // A request for which the service has no room waits here, later ones in their endpoint.
     protocol::Report report;
     if (!waits_) waits_ = reports_.receive(report) && protocol::decode(report, request_);
     if (waits_) waits_ = !service_.take(request_);

@@ -1,5 +1,5 @@
-// Looks at each tick for what must stop the drive. The limits of torque, current and velocity that hold for every
-// command are not here: they are part of the loops. Here is what remains when those do not help.
+// Checks at each tick whether the drive has to stop. The limits of torque, current and velocity of every command are
+// part of the loops; the checks here are for the cases in which those are not enough.
 #pragma once
 
 #include <cstdint>
@@ -11,8 +11,8 @@ namespace flexspline::firmware {
 
 class Safety {
  public:
-  // Without parameters there are no scales and no limits: only whether samples come. Returns the first fault found.
-  // `most_reading`: of the current, which no block can raise.
+  // Without parameters there are no scales and no limits: it only checks that samples arrive. Returns the first fault
+  // found. `most_reading`: the largest reading of the current, which no block can raise.
   FaultRecord check_samples(std::uint32_t tick, const Readings& r, bool needs_output, std::int32_t most_reading) {
     motor_age_ = r.motor_samples == before_.motor_samples ? motor_age_ + 1 : 0;
     output_age_ = r.output_samples == before_.output_samples ? output_age_ + 1 : 0;
@@ -33,8 +33,8 @@ class Safety {
     return found;
   }
 
-  // `last` is what the tick before commanded.
-  // `streams`: set points have to come one after the other.
+  // `last`: the command of the previous tick.
+  // `streams`: set points have to arrive in time.
   FaultRecord check(std::uint32_t tick, const Readings& r, const Estimate& e, const Output& last, const Parameters& p,
                     Mode mode, bool streams) {
     FaultRecord found{Fault::none, tick, 0, 0};
@@ -58,15 +58,15 @@ class Safety {
     if (set_point_age_ < UINT32_MAX) ++set_point_age_;
     return found;
   }
-  // A command came.
-  void host_is_there() { host_age_ = 0; }
-  // A set point came.
-  void set_point_is_there() { set_point_age_ = 0; }
-  // The host armed a mode, be it from another one or the same.
+  // A command arrived.
+  void note_host() { host_age_ = 0; }
+  // A set point arrived.
+  void note_set_point() { set_point_age_ = 0; }
+  // The host armed a mode, from another one or from the same.
   void begin_mode() { mode_ = Mode::boot; }
 
  private:
-  static constexpr std::int32_t kRail = 32767;  // a reading here is none
+  static constexpr std::int32_t kRail = 32767;  // a reading at this value is not valid
   template <class Seen, class Limit>
   static void expect(FaultRecord& found, Fault fault, bool holds, Seen seen, Limit limit) {
     if (holds || found.fault != Fault::none) return;
@@ -93,13 +93,13 @@ class Safety {
     expect(found, Fault::torque_stuck, most == 0 || torque_same_ < most, torque_same_, most);
   }
   void check_always(FaultRecord& found, const Estimate& e, const control::SafetyLimits<N>& limits) {
-    // A reading at the rail is no current.
+    // A reading at the rail is not a measurement.
     const bool over = N::magnitude(e.shown_current) > limits.overcurrent && current_outside_ == 0;
     over_current_ = over ? over_current_ + 1 : 0;
     expect(found, Fault::overcurrent, over_current_ < kOvercurrentTicks, e.shown_current.raw, limits.overcurrent.raw);
-    if (turn_of(found.tick) == Turn::temperature_and_gear)
+    if (slow_task_of(found.tick) == SlowTask::temperature_and_gear)
       hot_ = e.shown_temperature > limits.overtemperature ? hot_ + 1 : 0;
-    expect(found, Fault::overtemperature, hot_ < kHotTicks / kTurns, e.shown_temperature.raw,
+    expect(found, Fault::overtemperature, hot_ < kHotTicks / kSlowTasks, e.shown_temperature.raw,
            limits.overtemperature.raw);
   }
   void check_motion(FaultRecord& found, const Estimate& e, const Output& last, const Parameters& p) {
@@ -114,59 +114,65 @@ class Safety {
     expect(found, Fault::current_mismatch, mismatch_ < limits.mismatch_ticks, missing.raw, limits.current_mismatch.raw);
     check_stuck(found, e, last, p);
   }
-  // Nothing moves: the count stays within kRestCounts. Then a torque that must move the shaft shows that the encoder
-  // does not tell, or that the shaft is blocked:
+  // The count stays within kRestCounts although a torque must move the shaft: the encoder fails, or the shaft is
+  // blocked. Such a torque is one of three:
   // - it changed by more than friction can hold, which is twice the breakaway torque; a blocked shaft still twists the
-  //   gear. Torque that goes to and fro faster than the shaft follows is none that it feels, and what braked it may
-  //   last until it has come to rest within its last count: so the torque is smoothed, and counts from a little after
+  //   gear. Torque that alternates faster than the shaft follows does not move it, and the torque that braked it may
+  //   last until it is at rest within its last count: so the torque is smoothed, and is compared from a little after
   //   the last motion, or from when the drive was armed;
-  // - or it is at its limit, and the velocity loop still wants motion. A load that does not let go looks the same;
-  // - or it drives on as before a shaft that turned, and that nothing had slowed down when its count stopped.
+  // - or it is at its limit, and the velocity loop still demands motion. A load that holds the shaft looks the same;
+  // - or it goes on driving a shaft that turned, and that was not slowing down when its count stopped.
   void check_stuck(FaultRecord& found, const Estimate& e, const Output& last, const Parameters& p) {
     const control::SafetyLimits<N>& limits = p.safety;
     const std::uint32_t settling_ticks = limits.stuck_ticks / kSettlingShare + 1U;
     const bool begins = !watches_;
     watches_ = true;
-    felt_.raw = begins ? last.torque.raw : felt_.raw + ((last.torque.raw - felt_.raw) >> kFeltTicksLog2);
-    moved_by_.raw = begins ? last.torque.raw : moved_by_.raw + ((felt_.raw - moved_by_.raw) >> kFeltTicksLog2);
-    strayed_ += static_cast<std::uint32_t>(e.moved);
-    const auto strayed = static_cast<std::int32_t>(strayed_);
-    if (begins || strayed > kRestCounts || strayed < -kRestCounts) {
-      way_ = strayed < 0 ? -1 : 1;
-      stopped_from_ = begins ? 0 : driven_direction(e, limits);
-      strayed_ = 0;
+    smoothed_torque_.raw =
+        begins ? last.torque.raw
+               : smoothed_torque_.raw + ((last.torque.raw - smoothed_torque_.raw) >> kTorqueSmoothingLog2);
+    twice_smoothed_torque_.raw =
+        begins ? last.torque.raw
+               : twice_smoothed_torque_.raw +
+                     ((smoothed_torque_.raw - twice_smoothed_torque_.raw) >> kTorqueSmoothingLog2);
+    displacement_ += static_cast<std::uint32_t>(e.moved);
+    const auto displacement = static_cast<std::int32_t>(displacement_);
+    if (begins || displacement > kRestCounts || displacement < -kRestCounts) {
+      last_direction_ = displacement < 0 ? -1 : 1;
+      driven_direction_ = begins ? 0 : driven_direction(e, limits);
+      displacement_ = 0;
       unmoved_ = begins ? settling_ticks : 0;
       stalled_ = 0;
-      lowest_ = highest_ = moved_by_;
+      lowest_ = highest_ = twice_smoothed_torque_;
     }
-    // While the shaft comes to rest, torque against the motion brakes it and does not count; torque that rises in the
-    // direction of the motion does.
+    // While the shaft comes to rest, torque against the motion brakes it and is not counted; torque that rises in the
+    // direction of the motion is.
     if (unmoved_ < settling_ticks &&
-        (way_ < 0 ? felt_ > lowest_ || felt_ > N::Value{} : felt_ < highest_ || felt_ < N::Value{}))
-      lowest_ = highest_ = felt_;
-    if (felt_ < lowest_) lowest_ = felt_;
-    if (felt_ > highest_) highest_ = felt_;
+        (last_direction_ < 0 ? smoothed_torque_ > lowest_ || smoothed_torque_ > N::Value{}
+                             : smoothed_torque_ < highest_ || smoothed_torque_ < N::Value{}))
+      lowest_ = highest_ = smoothed_torque_;
+    if (smoothed_torque_ < lowest_) lowest_ = smoothed_torque_;
+    if (smoothed_torque_ > highest_) highest_ = smoothed_torque_;
     const N::Value span = highest_ - lowest_;
-    const std::int32_t onward = stopped_from_ < 0 ? -felt_.raw : felt_.raw;
-    const bool drives_on = stopped_from_ != 0 && onward > limits.stuck_torque.raw / 2;
+    const std::int32_t onward = driven_direction_ < 0 ? -smoothed_torque_.raw : smoothed_torque_.raw;
+    const bool drives_on = driven_direction_ != 0 && onward > limits.stuck_torque.raw / 2;
     if (unmoved_ < settling_ticks || span > limits.stuck_torque || drives_on) ++unmoved_;
     const std::int32_t most = p.loops.torque_limit.raw;
-    const bool at_limit = N::magnitude(felt_).raw > most - most / 8;
-    const bool wants_motion = N::magnitude(last.error).raw > limits.standstill.raw / 8;
-    stalled_ = at_limit && wants_motion ? stalled_ + 1 : 0;
+    const bool at_limit = N::magnitude(smoothed_torque_).raw > most - most / 8;
+    const bool demands_motion = N::magnitude(last.error).raw > limits.standstill.raw / 8;
+    stalled_ = at_limit && demands_motion ? stalled_ + 1 : 0;
     expect(found, Fault::motor_encoder_stuck,
-           unmoved_ < settling_ticks + limits.stuck_ticks && stalled_ < settling_ticks + limits.stuck_ticks, felt_.raw,
-           limits.stuck_torque.raw);
+           unmoved_ < settling_ticks + limits.stuck_ticks && stalled_ < settling_ticks + limits.stuck_ticks,
+           smoothed_torque_.raw, limits.stuck_torque.raw);
   }
-  // Which way the shaft turns, where nothing slows it down; else zero.
+  // The direction in which the shaft turns if nothing slows it down, otherwise zero.
   static int driven_direction(const Estimate& e, const control::SafetyLimits<N>& limits) {
     const std::int32_t rest = limits.standstill.raw;
     if (e.velocity.raw > rest && e.acceleration.raw >= 0) return 1;
     if (e.velocity.raw < -rest && e.acceleration.raw <= 0) return -1;
     return 0;
   }
-  // The output moves with the motor, but for torsion and backlash. A line that is lost leaves a count that goes to and
-  // fro, so a few counts are no motion. Without limits any count is enough, and nothing is watched.
+  // The output moves with the motor, except for torsion and backlash. With one line lost the count alternates, so a few
+  // counts are not motion. Without limits any count is enough, and nothing is checked.
   void check_output(FaultRecord& found, const Readings& r, const Estimate& e, const Parameters& p) {
     const control::FollowingLimits<N>& limits = p.following;
     turned_ += static_cast<std::uint32_t>(e.moved);
@@ -178,51 +184,52 @@ class Safety {
     const auto turned = static_cast<std::int32_t>(turned_);
     const std::int32_t most = limits.motor_counts;
     expect(found, Fault::output_encoder_stuck, turned <= most && turned >= -most, turned, most);
-    const bool in_turn = !watches_ || turn_of(found.tick) == Turn::temperature_and_gear;
-    if (p.has_output_encoder && most > 0 && in_turn) check_gear(found, e, p);
+    const bool is_due = !watches_ || slow_task_of(found.tick) == SlowTask::temperature_and_gear;
+    if (p.has_output_encoder && most > 0 && is_due) check_gear(found, e, p);
   }
-  // Both encoders show the same motion, but for torsion and backlash, since the drive was armed. The reference follows
-  // slowly: a ratio is rounded in the parameters. What stands still at the output is found before.
+  // Since the drive was armed both encoders show the same motion, except for torsion and backlash. The reference
+  // follows slowly, as the ratio is rounded in the parameters. An output that does not move is detected earlier.
   void check_gear(FaultRecord& found, const Estimate& e, const Parameters& p) {
-    if (most_apart_ == 0) {
+    if (largest_difference_ == 0) {
       const auto turns = static_cast<std::int64_t>(
           (std::uint64_t{static_cast<std::uint32_t>(p.following.motor_counts)} << 32) / p.motor_encoder.counts);
-      const std::int64_t apart = N::times_order(N::Angle{turns}, p.feedforward.output_angle).raw;
-      most_apart_ = apart + (apart >> 3);
+      const std::int64_t difference = N::times_order(N::Angle{turns}, p.feedforward.output_angle).raw;
+      largest_difference_ = difference + (difference >> 3);
     }
-    const std::int64_t apart = (e.output_angle - N::times_order(e.angle, p.feedforward.output_angle)).raw;
-    if (!watches_) apart_from_ = apart;
+    const std::int64_t difference = (e.output_angle - N::times_order(e.angle, p.feedforward.output_angle)).raw;
+    if (!watches_) reference_difference_ = difference;
     // Angles wrap.
-    const auto off =
-        static_cast<std::int64_t>(static_cast<std::uint64_t>(apart) - static_cast<std::uint64_t>(apart_from_));
-    apart_from_ += off >> kDriftTurnsLog2;
-    expect(found, Fault::encoders_disagree, off <= most_apart_ && off >= -most_apart_, off >> 8, most_apart_ >> 8);
+    const auto off = static_cast<std::int64_t>(static_cast<std::uint64_t>(difference) -
+                                               static_cast<std::uint64_t>(reference_difference_));
+    reference_difference_ += off >> kDriftStepsLog2;
+    expect(found, Fault::encoders_disagree, off <= largest_difference_ && off >= -largest_difference_, off >> 8,
+           largest_difference_ >> 8);
   }
-  // A host may begin a stream far from where the shaft is; the shaft is watched from when it has got there. In mode
-  // velocity there is no position to follow, and in mode position another velocity than that of the set point is how
-  // the loop works: as far behind as the position loop needs for a velocity, it asks for this velocity. So the window
-  // is as wide as the speed of set point or shaft asks for, the latter where the shaft catches up.
+  // A host may begin a stream far from the shaft; the error is checked once the shaft has reached it. In mode velocity
+  // there is no position to follow. In mode position the velocity may differ from that of the set point: the position
+  // loop turns a position error into a velocity. So the allowed error grows with the speed of the set point or of the
+  // shaft, the latter while the shaft catches up.
   void check_following(FaultRecord& found, const Estimate& e, const Output& last, const Parameters& p, Mode mode) {
     const control::FollowingLimits<N>& limits = p.following;
     const N::Value closing = last.lag.raw < 0 ? -e.velocity : e.velocity;
-    const N::Value wanted = N::magnitude(last.velocity);
+    const N::Value set_speed = N::magnitude(last.velocity);
     const std::int32_t full = p.loops.velocity_limit.raw;
-    const std::int32_t speed = wanted > closing ? wanted.raw : closing.raw;
+    const std::int32_t speed = set_speed > closing ? set_speed.raw : closing.raw;
     const std::int32_t open =
         fixed::limited<std::int32_t>((speed < full ? speed : full) + (full >> kFollowingFloorLog2), 1, full);
-    const std::uint32_t lag = in_a_word(last.lag.raw), window = in_a_word(limits.position);
+    const std::uint32_t lag = magnitude_word(last.lag.raw), window = magnitude_word(limits.position);
     bool behind = fixed::long_product(lag, static_cast<std::uint32_t>(full)) >
                   fixed::long_product(window, static_cast<std::uint32_t>(open));
     if (mode == Mode::velocity) behind = N::magnitude(last.velocity - e.velocity) > limits.velocity;
-    // When a mode begins, what was wanted last was wanted before.
+    // When a mode begins, the last demand belongs to the previous mode.
     follows_ = mode == mode_ && (follows_ || !behind);
     mode_ = mode;
     lagging_ = behind && follows_ ? lagging_ + 1 : 0;
     if (limits.ticks == 0 || lagging_ < limits.ticks) return;
     expect(found, Fault::following_error, false, lag, std::int64_t{window} * open / full);
   }
-  // The size of an angle in 2^-16 turns, of which 65536 are as good as more.
-  static std::uint32_t in_a_word(std::int64_t angle) {
+  // The magnitude of an angle in 2^-16 turns, limited to 65536.
+  static std::uint32_t magnitude_word(std::int64_t angle) {
     const std::uint64_t size = fixed::size_of(angle);
     return (size >> 48) != 0 ? 0xFFFFFFFF : static_cast<std::uint32_t>(size >> 16);
   }
@@ -245,21 +252,21 @@ class Safety {
   std::uint32_t mismatch_ = 0;
   std::uint32_t unmoved_ = 0;
   std::uint32_t stalled_ = 0;
-  std::uint32_t strayed_ = 0;  // of the motor from where it rests, counts; wraps
+  std::uint32_t displacement_ = 0;  // of the motor from its position of rest, counts; wraps
   std::uint32_t lagging_ = 0;
   std::uint32_t output_from_ = 0;
-  std::uint32_t turned_ = 0;  // of the motor since then, counts; wraps
-  N::Value felt_{};           // torque, smoothed
-  N::Value moved_by_{};       // smoothed again: a motion comes later than the torque that makes it
+  std::uint32_t turned_ = 0;          // of the motor since then, counts; wraps
+  N::Value smoothed_torque_{};        // torque, smoothed
+  N::Value twice_smoothed_torque_{};  // smoothed again: a motion is later than the torque that causes it
   N::Value lowest_{};
   N::Value highest_{};
   std::uint8_t current_outside_ = 0;
   std::uint8_t torque_outside_ = 0;
   std::uint8_t temperature_outside_ = 0;
-  int way_ = 0;                  // of the last motion
-  int stopped_from_ = 0;         // direction in which the shaft was driven when its count stopped
-  std::int64_t apart_from_ = 0;  // between both encoders when the drive was armed, 2^-32 turns of the output
-  std::int64_t most_apart_ = 0;  // zero: not known yet
+  int last_direction_ = 0;                 // of the last motion
+  int driven_direction_ = 0;               // direction in which the shaft was driven when its count stopped
+  std::int64_t reference_difference_ = 0;  // between both encoders when the drive was armed, 2^-32 turns of the output
+  std::int64_t largest_difference_ = 0;    // zero: not known yet
   bool watches_ = false;
   bool follows_ = false;
   Mode mode_{};

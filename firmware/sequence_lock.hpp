@@ -1,6 +1,6 @@
-// A number that is odd while an interrupt writes what background work copies: who finds another number behind the copy
-// than before it copies again. The writer interrupts the reader and never the reverse, so a copy is whole as soon as no
-// write came between.
+// Sequence lock: the number is odd while an interrupt writes the data that background work copies. If it changed during
+// a copy, the reader copies again. The writer interrupts the reader and never the reverse, so a copy is consistent as
+// soon as no write interrupted it.
 #pragma once
 
 #include <atomic>
@@ -18,7 +18,7 @@ class SequenceLock {
     std::atomic_signal_fence(std::memory_order_seq_cst);
     number_.store(number_.load(std::memory_order_relaxed) + 1, std::memory_order_relaxed);
   }
-  // A copy takes a small part of the time from one write to the next, so a second one is whole.
+  // A copy takes a small part of the time between two writes, so the second one is consistent.
   template <class T>
   T read(const T& shared) const {
     for (int tries = 0;; ++tries) {

@@ -1,4 +1,4 @@
-// Between the service and a line of bytes (shared/protocol/serial_frame.hpp): whole messages both ways.
+// Connects the service with a serial line (shared/protocol/serial_frame.hpp): whole messages both ways.
 #pragma once
 
 #include <cstddef>
@@ -8,15 +8,16 @@
 
 namespace flexspline::firmware {
 
-// `Line` has receive(byte), which is false where none came, send(byte), and room() for bytes to the host.
+// `Line` has receive(byte), which is false where none is available, send(byte), and room() for bytes to the host.
 template <class Service, class Line>
 class SerialLink {
  public:
   SerialLink(Service& service, Line& line) : service_(service), line_(line) {}
 
-  // From background work, again and again. Nobody tells when the host of a line goes: a telemetry subscription stays
-  // until the next one. Bytes come for one message at a time; what a full line would not hold waits with the service.
-  void turn() {
+  // Called repeatedly from background work. A serial line does not show that its host has gone: a telemetry
+  // subscription stays until the next one, and other links are never kept out. Bytes of one message are taken at a
+  // time; what does not fit into a full line waits in the service.
+  bool poll() {
     std::uint8_t byte = 0;
     while (!waits_ && line_.receive(byte)) waits_ = reader_.take(byte, request_);
     if (waits_) waits_ = !service_.take(request_);
@@ -25,6 +26,7 @@ class SerialLink {
       const protocol::SerialFrame frame = protocol::serial_frame(m);
       for (const std::uint8_t b : frame.content()) line_.send(b);
     }
+    return false;
   }
 
  private:

@@ -1,8 +1,8 @@
-// What a host asks of the drive: takes messages, answers them, sends telemetry. Runs in background work; the tick knows
-// nothing of it. Whatever the link, USB or serial, it hands over whole messages and fetches whole messages.
+// Serves a host: takes messages, answers them, sends telemetry. Runs in background work; the tick does not depend on
+// it. Every link, USB or serial, hands over whole messages and fetches whole messages.
 //
-// What a host may do is decided here and in Application: parameters and excitation change only while the drive is not
-// armed; commands go through the application's mailbox, which arms from `idle` alone.
+// The rights of a host are checked here and in Application: parameters and excitation change only while the drive is
+// not armed; commands go through the application's mailbox, which arms from `idle` alone.
 #pragma once
 
 #include <array>
@@ -11,6 +11,7 @@
 #include <cstdint>
 #include <optional>
 #include <span>
+#include <string_view>
 
 #include "firmware/application.hpp"
 #include "firmware/excitation_intake.hpp"
@@ -21,15 +22,15 @@
 
 namespace flexspline::firmware {
 
-// Who judges blocks, and who puts the active one to use. Numbers are reasons, nought is good.
+// Validates blocks and applies the active one. validate() returns a reason, zero for a valid block.
 template <class B>
 concept BlockUser = requires(B blocks, std::span<const std::uint8_t> block) {
-  { blocks.validate(block) } -> std::convertible_to<std::uint32_t>;  // where it lies, without a copy
-  blocks.adopt(block);                                               // begins; the block stays where it is
+  { blocks.validate(block) } -> std::convertible_to<std::uint32_t>;  // in place, without a copy
+  blocks.adopt(block);                                               // begins; the block has to stay in place
   { blocks.adopted() } -> std::same_as<std::optional<std::uint32_t>>;
 };
 
-// The application's own.
+// With the functions of the application.
 template <class Application, std::uint32_t kTickHz>
 class ApplicationBlocks {
  public:
@@ -51,20 +52,19 @@ class ApplicationBlocks {
 // What does not change while the drive runs.
 struct DriveInfo {
   std::array<std::uint8_t, 2> firmware{};  // version
-  std::array<std::uint8_t, 16> board{};
+  std::array<std::uint8_t, 16> board{};    // ASCII, zeros to the end; at most 15 characters
   std::array<std::uint8_t, 16> serial{};
+  static constexpr DriveInfo of(std::array<std::uint8_t, 2> version, std::string_view board, std::string_view serial) {
+    DriveInfo info{version, {}, {}};
+    for (std::size_t i = 0; i < board.size() && i + 1 < info.board.size(); ++i)
+      info.board[i] = static_cast<std::uint8_t>(board[i]);
+    for (std::size_t i = 0; i < serial.size() && i + 1 < info.serial.size(); ++i)
+      info.serial[i] = static_cast<std::uint8_t>(serial[i]);
+    return info;
+  }
 };
 
-// The numbers on the wire are the application's own.
-static_assert(protocol::kChannels == kChannels && protocol::kMostChannels == TelemetrySetup::kMost);
-static_assert(protocol::kFaults == kFaults);
-static_assert(static_cast<int>(protocol::Channel::command_current) == static_cast<int>(Channel::command_current) &&
-              static_cast<int>(protocol::Channel::torsion) == static_cast<int>(Channel::torsion));
-static_assert(static_cast<int>(protocol::Mode::fault) == static_cast<int>(Mode::fault) &&
-              static_cast<int>(protocol::Mode::current) == static_cast<int>(Mode::current));
-static_assert(static_cast<int>(protocol::CommandKind::clear_fault) == static_cast<int>(Command::Kind::clear_fault));
-static_assert(static_cast<int>(protocol::Refusal::booting) == static_cast<int>(Refusal::booting));
-static_assert(static_cast<int>(protocol::StoreState::damaged) == static_cast<int>(storage::StoreState::damaged));
+static_assert(protocol::kMostChannels == TelemetrySetup::kMost);
 static_assert(static_cast<int>(protocol::Code::worn) - static_cast<int>(protocol::Code::too_long) + 1 ==
               static_cast<int>(storage::StoreError::worn));
 
@@ -74,12 +74,13 @@ class Service {
   Service(Application& application, Store& store, Blocks& blocks, std::uint32_t tick_hz, const DriveInfo& info)
       : application_(application), store_(store), blocks_(blocks), tick_hz_(tick_hz), info_(info) {}
 
-  // Before the first tick: the newest good block of the store is the drive's.
+  // Before the first tick: applies the newest valid block of the store.
   void start() {
     store_.boot(validator());
     if (!store_.active().empty()) blocks_.adopt(store_.active());
   }
-  // The link is gone or new: the next host has to identify itself, and gets no one else's telemetry.
+  // The link was lost or is new: the next host has to identify itself, and does not get the telemetry of the previous
+  // one.
   void disconnected() {
     agreed_ = false;
     has_answer_ = false;
@@ -87,7 +88,7 @@ class Service {
     application_.telemetry().configure({});
   }
 
-  // A message that came. False: there is no room for its answer yet, offer it again later.
+  // A received message. False: there is no room for its answer yet, offer it again later.
   bool take(const protocol::Message& m) {
     if (has_answer_) return false;
     if (!m.is_request()) return true;
@@ -112,21 +113,20 @@ class Service {
     }
     return frames_.next(application_, m);
   }
-  // Call again and again, beside Application::background().
+  // Call repeatedly, after Application::background().
   void background() {
-    if (has_answer_) return;  // to a request that was refused meanwhile: it goes first
+    if (has_answer_) return;  // to a request that was refused meanwhile: it is sent first
     if (waits_for_ == Wait::room) {
       if (application_.submit(command_)) waits_for_ = Wait::command;
     } else if (waits_for_ == Wait::command) {
       const auto got = application_.answer();
       if (!got || got->number != command_.number) return;
       waits_for_ = Wait::none;
-      const protocol::CommandAnswer payload{static_cast<protocol::Refusal>(got->refusal),
-                                            static_cast<protocol::Mode>(got->mode)};
+      const protocol::CommandAnswer payload{got->refusal, got->mode};
       finish(got->refusal == Refusal::none ? protocol::Code::done : protocol::Code::refused, payload);
     } else if (waits_for_ == Wait::adoption) {
       const auto reason = blocks_.adopted();
-      // Decided on, and with the tick again.
+      // The block was taken or refused, and the tick has the parameters again.
       if (!reason || (*reason == 0 && !application_.status().has_parameters)) return;
       waits_for_ = Wait::none;
       finish(*reason == 0 ? protocol::Code::done : protocol::Code::invalid, protocol::Reason{*reason});
@@ -156,7 +156,7 @@ class Service {
     protocol::put_payload(request_, payload);
     finish(code);
   }
-  // Takes the payload; where it is none, answers so and returns false.
+  // Decodes the payload; if it is not valid, answers so and returns false.
   template <class Payload>
   bool taken(const protocol::Message& m, Payload& payload) {
     const Code code = protocol::take_payload(m.content(), payload);
@@ -240,9 +240,9 @@ class Service {
     const Status s = application_.snapshot();
     protocol::Status out;
     out.tick = s.tick;
-    out.mode = static_cast<protocol::Mode>(s.mode);
+    out.mode = s.mode;
     out.has_parameters = s.has_parameters;
-    out.store = static_cast<protocol::StoreState>(store_.state());
+    out.store = store_.state();
     out.fault = static_cast<std::uint8_t>(s.fault.fault);
     out.fault_tick = s.fault.tick;
     out.fault_seen = s.fault.seen;
@@ -288,11 +288,11 @@ class Service {
     use_block(error, reason);
   }
   void restore(const protocol::Message& m) {
-    protocol::BlockRestore wanted;
-    if (!taken(m, wanted)) return;
+    protocol::BlockRestore request;
+    if (!taken(m, request)) return;
     if (armed()) return finish(Code::armed);
-    if (store_.sequence() == Store::sequence_after(wanted.sequence)) return finish(Code::done, protocol::Reason{});
-    if (store_.sequence() != wanted.sequence) return finish(Code::wrong_value);
+    if (store_.sequence() == Store::sequence_after(request.sequence)) return finish(Code::done, protocol::Reason{});
+    if (store_.sequence() != request.sequence) return finish(Code::wrong_value);
     std::uint32_t reason = 0;
     const storage::StoreError error = store_.restore(validator(), reason);
     use_block(error, reason);
@@ -303,16 +303,16 @@ class Service {
     waits_for_ = Wait::adoption;
   }
   void read_block(const protocol::Message& m) {
-    protocol::BlockRead wanted;
-    if (!taken(m, wanted)) return;
-    const auto block = wanted.which == protocol::Which::active ? store_.active() : store_.previous();
+    protocol::BlockRead request;
+    if (!taken(m, request)) return;
+    const auto block = request.which == protocol::Which::active ? store_.active() : store_.previous();
     if (block.empty()) return finish(Code::no_block);
-    if (wanted.offset > block.size()) return finish(Code::wrong_value);
+    if (request.offset > block.size()) return finish(Code::wrong_value);
     protocol::Chunk chunk;
-    chunk.offset = wanted.offset;
-    const std::size_t left = block.size() - wanted.offset;
+    chunk.offset = request.offset;
+    const std::size_t left = block.size() - request.offset;
     chunk.count = static_cast<std::uint8_t>(left < protocol::kMostChunk ? left : protocol::kMostChunk);
-    for (std::size_t i = 0; i < chunk.count; ++i) chunk.bytes[i] = block[wanted.offset + i];
+    for (std::size_t i = 0; i < chunk.count; ++i) chunk.bytes[i] = block[request.offset + i];
     finish(Code::done, chunk);
   }
 
@@ -320,14 +320,14 @@ class Service {
 
   static constexpr std::int64_t kFarthest = std::int64_t{1} << 62;
   void home(const protocol::Message& m) {
-    protocol::Home wanted;
-    if (!taken(m, wanted)) return;
-    // As far as an encoder's turns are counted.
+    protocol::Home request;
+    if (!taken(m, request)) return;
+    // The range in which an encoder's turns are counted.
     constexpr std::int64_t kMost = std::int64_t{1} << 56;
-    if (wanted.position <= -kMost || wanted.position >= kMost) return finish(Code::wrong_value);
+    if (request.position <= -kMost || request.position >= kMost) return finish(Code::wrong_value);
     command_ = {};
     command_.kind = Command::Kind::home;
-    command_.position = {wanted.position};
+    command_.position = {request.position};
     command_.number = ++command_number_;
     submit();
   }
@@ -337,8 +337,8 @@ class Service {
     for (const std::int32_t word : {c.velocity, c.acceleration, c.current})
       if (word == INT32_MIN) return finish(Code::wrong_value);
     if (c.position <= -kFarthest || c.position >= kFarthest) return finish(Code::wrong_value);
-    command_ = {static_cast<Command::Kind>(c.kind),
-                static_cast<Mode>(c.mode),
+    command_ = {c.kind,
+                c.mode,
                 c.compensate,
                 c.stream,
                 ++command_number_,
@@ -349,7 +349,7 @@ class Service {
     submit();
   }
   void submit() {
-    application_.answer();  // to a command that nobody asks about any more
+    application_.answer();  // to a command whose host is gone
     waits_for_ = application_.submit(command_) ? Wait::command : Wait::room;
   }
 
@@ -361,17 +361,17 @@ class Service {
     return code == Code::done ? finish(code, info) : finish(code);
   }
   void map_bins(const protocol::Message& m) {
-    protocol::MapFirst wanted;
-    if (!taken(m, wanted)) return;
+    protocol::MapFirst request;
+    if (!taken(m, request)) return;
     protocol::MapBins bins;
-    const Code code = MapMessages::bins(application_, wanted.first, bins);
+    const Code code = MapMessages::bins(application_, request.first, bins);
     return code == Code::done ? finish(code, bins) : finish(code);
   }
   void map_command(const protocol::Message& m) {
-    protocol::MapCommand wanted;
-    if (!taken(m, wanted)) return;
+    protocol::MapCommand request;
+    if (!taken(m, request)) return;
     command_ = {};
-    command_.kind = MapMessages::command_of(wanted.action);
+    command_.kind = MapMessages::command_of(request.action);
     command_.number = ++command_number_;
     submit();
   }
@@ -379,12 +379,12 @@ class Service {
   // Telemetry.
 
   void telemetry(const protocol::Message& m) {
-    protocol::Subscription wanted;
-    if (!taken(m, wanted)) return;
+    protocol::Subscription request;
+    if (!taken(m, request)) return;
     TelemetrySetup setup;
-    setup.every = wanted.every;
-    setup.count = wanted.count;
-    for (std::size_t i = 0; i < wanted.count; ++i) setup.channels[i] = static_cast<Channel>(wanted.channels[i]);
+    setup.every = request.every;
+    setup.count = request.count;
+    for (std::size_t i = 0; i < request.count; ++i) setup.channels[i] = request.channels[i];
     frames_.restart();
     finish(application_.telemetry().configure(setup) ? Code::done : Code::wrong_value);
   }
@@ -407,7 +407,7 @@ class Service {
   std::uint32_t tick_hz_;
   DriveInfo info_;
   protocol::Message answer_{};
-  protocol::Message request_{};  // its answer in the making
+  protocol::Message request_{};  // the request being answered
   TelemetryMessages frames_{};
   ExcitationIntake excitation_{};
   Command command_{};

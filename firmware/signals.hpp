@@ -1,4 +1,4 @@
-// All signals of a tick in one place, so that telemetry takes those that a host asked for where they lie.
+// All signals of a tick in one struct, from which telemetry copies the channels that a host subscribed to.
 #pragma once
 
 #include <array>
@@ -17,7 +17,7 @@ struct Signals {
   Estimate estimate{};
   Output output{};
 
-  // Where a channel's word lies in the signals, in bytes.
+  // The offset of a channel's word in the signals, in bytes.
   struct Places {
     static constexpr std::uint8_t of(Channel channel) { return kOf[static_cast<std::size_t>(channel)]; }
 
@@ -26,7 +26,7 @@ struct Signals {
   };
 };
 
-// The upper word of an angle, its whole turns, lies behind the lower one.
+// The upper word of an angle, its whole turns, follows the lower one.
 static_assert(std::endian::native == std::endian::little);
 inline constexpr std::array<std::uint8_t, kChannels> Signals::Places::kOf = {
     offsetof(Signals, state),

@@ -1,10 +1,10 @@
-// Telemetry: what the host asked for, tick by tick, in a ring between the control tick (writes) and background work
+// Telemetry: the channels that the host subscribed to, in a ring between the control tick (writes) and background work
 // (reads). A frame is
 //   word 0  sequence number of the frame: one more for each that was due, written or not
 //   word 1  tick
 //   then    one word for each channel, in the order asked for
-// A ring that is full drops the new frame and counts it: the tick never waits, and a gap in the sequence says what is
-// missing.
+// A ring that is full drops the new frame and counts it: the tick never waits, and a gap in the sequence shows how many
+// are missing.
 #pragma once
 
 #include <array>
@@ -14,48 +14,27 @@
 #include <cstring>
 #include <span>
 
+#include "shared/protocol/states.hpp"
+
 namespace flexspline::firmware {
 
-// Values are of 2^-27 bases unless said otherwise.
-enum class Channel : std::uint8_t {
-  state,           // mode, fault << 8, loops limited << 16
-  readings,        // motor encoder's counter
-  motor_turns,     // whole turns of the motor's position
-  motor_fraction,  // and the rest, 2^-32 turns
-  output_turns,
-  output_fraction,
-  velocity,
-  acceleration,
-  output_velocity,
-  torque,   // measured, without ripple
-  current,  // measured
-  temperature,
-  disturbance,
-  torsion,  // estimated where the output has no encoder
-  set_turns,
-  set_fraction,
-  set_velocity,
-  set_acceleration,
-  feedforward_torque,
-  command_torque,
-  command_current,
-};
-inline constexpr std::size_t kChannels = 21;
+using protocol::Channel;
+using protocol::kChannels;
 using ChannelValues = std::array<std::uint32_t, kChannels>;
 
 struct TelemetrySetup {
   static constexpr std::size_t kMost = 12;
   std::uint16_t every = 1;  // ticks
-  std::uint8_t count = 0;   // nought: no telemetry
+  std::uint8_t count = 0;   // zero: no telemetry
   std::array<Channel, kMost> channels{};
 };
 
-// Where a channel's word lies, in bytes: here one behind the other.
+// The offset of a channel's word, in bytes: here one after the other.
 struct ByNumber {
   static constexpr std::uint8_t of(Channel channel) { return static_cast<std::uint8_t>(channel) * 4U; }
 };
 
-// `kWords` a power of two. The signals of a tick lie in a struct of the caller's; Places says where.
+// `kWords` a power of two. The signals of a tick are in a struct of the caller; Places has their offsets.
 template <std::size_t kWords, class Places = ByNumber>
 class Telemetry {
   static_assert(kWords >= 32 && (kWords & (kWords - 1)) == 0);
@@ -63,13 +42,13 @@ class Telemetry {
  public:
   static constexpr std::size_t kHeaderWords = 2;
 
-  // Background: starts anew with other channels; what is in the ring is lost, sequence and drops begin at nought.
+  // Background: restarts with other channels; the ring is cleared, sequence and drops begin at zero.
   // Returns false, and changes nothing, for what cannot be recorded.
   bool configure(const TelemetrySetup& setup) {
     if (setup.count > TelemetrySetup::kMost || setup.every == 0) return false;
     for (std::size_t i = 0; i < setup.count; ++i)
       if (static_cast<std::size_t>(setup.channels[i]) >= kChannels) return false;
-    // The tick interrupts background work, never the other way round: from here on it leaves the ring alone.
+    // The tick interrupts background work, never the other way round: from here on it does not use the ring.
     running_.store(false);
     setup_ = setup;
     for (std::size_t i = 0; i < setup.count; ++i) places_[i] = Places::of(setup.channels[i]);
@@ -86,7 +65,7 @@ class Telemetry {
 
   // Whether a frame is recorded at all.
   bool is_running() const { return running_.load(std::memory_order_relaxed); }
-  // Tick: `signals` is the struct of the caller's, whose words are copied where a frame is due.
+  // Tick: `signals` is the struct of the caller; its words are copied when a frame is due.
   template <class Signals>
   void record(std::uint32_t tick, const Signals& signals) {
     if (!is_running()) return;
@@ -102,7 +81,7 @@ class Telemetry {
       dropped_ = dropped_ + 1;
       return;
     }
-    // A frame that does not reach the end of the ring, as nearly all, needs no look at each word.
+    // Nearly all frames do not reach the end of the ring and need no check of each word.
     const std::uint32_t from = at & (kWords - 1);
     if (from + words <= kWords) {
       copy(&ring_[from], tick, sequence, signals, [](std::uint32_t*& to, std::uint32_t word) { *to++ = word; });

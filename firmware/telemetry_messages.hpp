@@ -1,4 +1,4 @@
-// Frames of telemetry into messages: as many as follow each other without a gap and have room.
+// Packs frames of telemetry into messages: as many as follow each other without a gap and fit.
 #pragma once
 
 #include <array>
@@ -13,11 +13,11 @@ namespace flexspline::firmware {
 
 class TelemetryMessages {
  public:
-  // A message waits to fill up no longer than this.
+  // The longest time that a message waits to be filled.
   static constexpr std::uint32_t kMostWaitTicks = 200;
 
-  // From background work. True: `m` is the next message to send. What is not fetched stays in the application's ring,
-  // which drops and counts what finds no room.
+  // From background work. True: `m` is the next message to send. Frames that are not fetched stay in the application's
+  // ring; a full ring drops and counts further ones.
   template <class Application>
   bool next(Application& application, protocol::Message& m) {
     constexpr std::size_t kHead = Application::Ring::kHeaderWords;

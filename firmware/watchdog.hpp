@@ -1,5 +1,5 @@
-// The watchdog is fed when every part of the application has reported since it was fed last: one part that hangs is
-// enough to reset the drive.
+// The watchdog is fed when every part of the application has reported since the last feed: if one part hangs, the drive
+// is reset.
 #pragma once
 
 #include <atomic>
@@ -11,10 +11,10 @@ enum class Part : std::uint8_t { sensors, safety, control, output, background };
 
 class Watchdog {
  public:
-  // From the tick (all but the last part) or from background work. A report is one byte each, as a tick may interrupt
-  // background work in the middle of its own.
+  // From the tick (all but the last part) or from background work. Each report is a byte of its own, as the tick may
+  // interrupt background work while it writes its own.
   void report(Part part) { reports_[static_cast<std::uint8_t>(part)].store(1, std::memory_order_relaxed); }
-  // From background work: true when all have reported, and then all have to report again.
+  // From background work: true when all have reported. Then all have to report again.
   bool all_reported() {
     for (const auto& report : reports_)
       if (report.load(std::memory_order_relaxed) == 0) return false;

@@ -1,4 +1,4 @@
-// g++ 12 sees a null pointer in CLI11's inlined std::vector growth, where there is none.
+// g++ 12 reports a null pointer in CLI11's inlined std::vector growth, wrongly.
 #pragma GCC diagnostic ignored "-Wnull-dereference"
 
 #include <fmt/format.h>
@@ -119,30 +119,30 @@ int main(int argc, char** argv) {
       app.add_subcommand("record", "simulates the experiments of a plant file and writes a data set");
   record_command->add_option("--out", options.out, "folder to write into")->required();
   record_command->add_option("--plant", options.plant_file, "plant file (default: the demo's drive, built in)");
-  record_command->add_option(
-      "--plan", options.plan,
-      "runs of a plan that `flexspline plan` wrote, in the place of the plant file's experiments");
-  record_command->add_option("--hide", options.hide, "effect that the base model does not name, as torque_ripple:2");
+  record_command->add_option("--plan", options.plan,
+                             "runs of a plan that `flexspline plan` wrote, instead of the plant file's experiments");
+  record_command->add_option("--hide", options.hide,
+                             "effect that the base model does not have, such as torque_ripple:2");
   record_command->add_option("--scale", options.scale, "size of the hidden effect, 1 = usual")->needs("--hide");
-  record_command->add_option("--with", options.with, "effects that the drive has and the base model names, A,B")
+  record_command->add_option("--with", options.with, "effects that the drive and the base model have, A,B")
       ->delimiter(',');
   record_command
       ->add_option("--friction-variation", options.friction_variation, "relative std of friction from record to record")
       ->check(CLI::Range(0.0, 0.3));
   record_command->add_option("--noise-correlation", options.noise_correlation, "AR(1) coefficient of the noise")
       ->check(CLI::Range(0.0, 0.999));
-  record_command->add_flag("--tachometer", options.tachometer, "record a tachometer, too");
-  record_command->add_option("--seed", options.seed, "of all chance (default 1)");
+  record_command->add_flag("--tachometer", options.tachometer, "record a tachometer as well");
+  record_command->add_option("--seed", options.seed, "of all random numbers (default 1)");
   record_command->add_flag("--force", options.force, "write into a folder that is not empty");
   record_command->footer("Example: flexspline-hil record --out data --hide stribeck_gaussian --seed 7");
   record_command->callback([&] { record(options); });
   CLI::App* rhs_command = app.add_subcommand(
-      "rhs-100", "makes the experiments of Taghirad and Belanger's report, each with its own row's parameters");
+      "rhs-100", "makes the experiments of Taghirad and Belanger's report, each with the parameters of its own row");
   rhs_command->add_option("--out", options.out, "folder to write into")->required();
   rhs_command
       ->add_option("--part", options.parts, "only these, A,B: table-1, table-3, table-4, table-6, table-7, table-8")
       ->delimiter(',');
-  rhs_command->add_option("--seed", options.seed, "of all chance (default 1)");
+  rhs_command->add_option("--seed", options.seed, "of all random numbers (default 1)");
   rhs_command->add_flag("--force", options.force, "write into a folder that is not empty");
   rhs_command->footer("Example: flexspline-hil rhs-100 --out rhs-100");
   rhs_command->callback([&] { make_rhs_100(options); });
@@ -154,13 +154,13 @@ int main(int argc, char** argv) {
   drive_command->add_option("--seconds", drive_options.seconds, "simulated time (default: the scenario's)")
       ->check(CLI::Range(0.01, 36000.0));
   drive_command->add_option("--plant", drive_options.plant_file, "plant file (default: the demo's drive, built in)");
-  drive_command->add_option("--with", drive_options.with, "effects that the drive has and its model knows, A,B")
+  drive_command->add_option("--with", drive_options.with, "effects that the drive and its model have, A,B")
       ->delimiter(',');
-  drive_command->add_option("--hide", drive_options.hide, "effect that the drive has and its model does not know");
+  drive_command->add_option("--hide", drive_options.hide, "effect that the drive has and its model does not have");
   drive_command->add_option("--compensation", drive_options.compensation, "on, off, both (default)")
       ->check(CLI::IsMember({"on", "off", "both"}));
-  drive_command->add_option("--inject", drive_options.inject, "what goes wrong, as motor-encoder-stuck");
-  drive_command->add_option("--inject-at", drive_options.inject_at_s, "when, in seconds (default: half the time)");
+  drive_command->add_option("--inject", drive_options.inject, "failure to inject, such as motor-encoder-stuck");
+  drive_command->add_option("--inject-at", drive_options.inject_at_s, "its time in seconds (default: half the run)");
   drive_command->add_option(
       "--block", drive_options.block_file,
       "parameter block of `flexspline pack` for this --tick-hz: the drive's model (default: the plant's)");
@@ -174,13 +174,13 @@ int main(int argc, char** argv) {
   drive_command->footer("Example: flexspline-hil drive --scenario slow-reversals --seconds 4");
   drive_command->callback([&] { flexspline::scenario::run_drive(drive_options); });
   flexspline::scenario::DataSheetOptions sheet;
-  CLI::App* sheet_command = app.add_subcommand(
-      "data-sheet", "writes what the maker says of a drive: settings, and models with its true values");
+  CLI::App* sheet_command =
+      app.add_subcommand("data-sheet", "writes the data sheet of a drive: settings, and models with its true values");
   sheet_command->add_option("--scenario", sheet.scenario, "whose drive it is (default: none)");
   sheet_command->add_option("--plant", sheet.plant_file, "plant file (default: the demo's drive, built in)");
-  sheet_command->add_option("--with", sheet.with, "effects that the drive has and its maker knows, A,B")
+  sheet_command->add_option("--with", sheet.with, "effects that the drive has and its data sheet has, A,B")
       ->delimiter(',');
-  sheet_command->add_option("--hide", sheet.hide, "effect that its maker does not know");
+  sheet_command->add_option("--hide", sheet.hide, "effect that is not in the data sheet");
   sheet_command->add_option("--out", sheet.out, "folder to write into")->required();
   sheet_command->footer("Example: flexspline-hil data-sheet --hide gravity --out sheet");
   sheet_command->callback([&] { flexspline::scenario::write_data_sheet(sheet); });
@@ -191,25 +191,26 @@ int main(int argc, char** argv) {
   twin_command->add_option("--serve", twin_options.port, "port on 127.0.0.1 (default and 0: any that is free)")
       ->check(CLI::Range(0, 65535));
   twin_command
-      ->add_option("--token", twin_options.token,
-                   "32 hexadecimal digits, the end of its address: with those of the one before, hosts find it again")
+      ->add_option(
+          "--token", twin_options.token,
+          "32 hexadecimal digits, the end of its address: with the token of an earlier twin, hosts find it again")
       ->check([](const std::string& text) {
         const bool good = text.size() == 32 && text.find_first_not_of("0123456789abcdef") == std::string::npos;
         return good ? std::string() : "not 32 digits of 0 to 9 and a to f";
       });
   twin_command
       ->add_option("--usbip", twin_options.usbip,
-                   "a USB device in its place: port of its USB/IP server, 0 any (3240 is usual)")
+                   "a USB device instead: port of its USB/IP server, 0 any (3240 is usual)")
       ->check(CLI::Range(0, 65535));
-  twin_command->add_option("--seconds", twin_options.seconds, "ends after so long (default: never)")
+  twin_command->add_option("--seconds", twin_options.seconds, "ends after this time (default: never)")
       ->check(CLI::PositiveNumber);
-  twin_command->add_option("--json", twin_options.json_file, "writes where it is into this file; - is standard output");
-  twin_command->add_flag("--pty", twin_options.pty, "a serial line (pseudo terminal) in the place of a port");
-  twin_command->add_flag("--inherit", twin_options.inherits, "a socket that stands as standard input");
+  twin_command->add_option("--json", twin_options.json_file, "writes its address into this file; - is standard output");
+  twin_command->add_flag("--pty", twin_options.pty, "a serial line (pseudo terminal) instead of a port");
+  twin_command->add_flag("--inherit", twin_options.inherits, "uses standard input, which has to be a socket");
   twin_command->add_option("--plant", twin_options.plant_file, "plant file (default: the demo's drive, built in)");
-  twin_command->add_option("--with", twin_options.with, "effects that the drive has and its maker knows, A,B")
+  twin_command->add_option("--with", twin_options.with, "effects that the drive has and its data sheet has, A,B")
       ->delimiter(',');
-  twin_command->add_option("--hide", twin_options.hide, "effect that the drive has and its maker does not know");
+  twin_command->add_option("--hide", twin_options.hide, "effect that the drive has and its data sheet does not have");
   twin_command->add_option("--flash", twin_options.flash_file, "file that holds its flash memory (default: none)");
   twin_command->add_option("--serial", twin_options.serial, "serial number (default TWIN)")
       ->check([](const std::string& text) -> std::string {
@@ -218,27 +219,27 @@ int main(int argc, char** argv) {
         return good ? "" : "a serial number has 1 to 16 letters, digits, - _ .";
       });
   twin_command->add_option("--cable", twin_options.cable_file,
-                           "file that pulls its plug: holds in, out, or out N (after N more messages of the host)");
-  twin_command->add_option("--inject", twin_options.inject, "what goes wrong once it is armed, as motor-encoder-stuck");
-  twin_command->add_option("--inject-at", twin_options.inject_at_s, "how long it was armed then, s (default 1)");
+                           "file that unplugs it: contains in, out, or out N (after N more messages of the host)");
+  twin_command->add_option("--inject", twin_options.inject, "failure after it was armed, such as motor-encoder-stuck");
+  twin_command->add_option("--inject-at", twin_options.inject_at_s, "time after it was armed, s (default 1)");
   twin_command->add_option("--seed", twin_options.seed, "of the sensors' noise (default 1)");
   twin_command->add_flag("--empty", twin_options.empty, "an empty flash memory stays without parameters");
   twin_command->add_flag("--locked", twin_options.locked, "the output is locked");
-  twin_command->add_flag("--fast", twin_options.fast, "while armed faster than real time, as far as its host keeps up");
+  twin_command->add_flag("--fast", twin_options.fast, "while armed faster than real time, as far as its host follows");
   twin_command->add_flag("--lossy", twin_options.lossy, "with --fast: does not wait for a host that reads slowly");
   twin_command->footer("Example: flexspline-hil twin --serve 4711 --flash twin.flash");
   twin_command->callback([&] { flexspline::twin::run_twin(twin_options); });
   ImageOptions image_options;
   CLI::App* image_command =
-      app.add_subcommand("image", "makes a firmware image for the twin, to be sent by `flexspline flash --firmware`");
+      app.add_subcommand("image", "makes a firmware image for the twin, for `flexspline flash --firmware`");
   image_command->add_option("--out", image_options.out, "file to write")->required();
   image_command->add_option("--major", image_options.major, "version, before the point (default 0)")
       ->check(CLI::Range(0, 255));
-  image_command->add_option("--minor", image_options.minor, "version, behind the point (default 1)")
+  image_command->add_option("--minor", image_options.minor, "version, after the point (default 1)")
       ->check(CLI::Range(0, 255));
-  image_command->add_option("--bytes", image_options.bytes, "behind its header (default 24000)")
+  image_command->add_option("--bytes", image_options.bytes, "after its header (default 24000)")
       ->check(CLI::Range(64, 64'000));
-  image_command->add_flag("--hangs", image_options.hangs, "it never confirms itself, and is taken back");
+  image_command->add_flag("--hangs", image_options.hangs, "it never confirms itself, and is rolled back");
   image_command->footer("Example: flexspline-hil image --minor 2 --out twin-0.2.image");
   image_command->callback([&] { make_image(image_options); });
   CLI::App* effects_command = app.add_subcommand("effects", "lists what can be hidden");

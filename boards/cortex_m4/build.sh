@@ -1,6 +1,6 @@
 #!/bin/sh
 # build.sh OUT_DIR NAME SCRIPT.ld SOURCE...: builds OUT_DIR/NAME.elf, .bin and .map for a Cortex-M4; flags in FLAGS.
-# FOR=speed for an application, whose tick counts; else what is built is small, as a boot loader has to be. Exit 3 where there is no ARM compiler.
+# FOR=speed for an application, whose tick has to be fast; otherwise it optimises for size, as for a boot loader. Exit 3 where there is no ARM compiler.
 set -eu
 here=$(cd -- "$(dirname -- "$0")" && pwd)
 root=$(cd -- "$here/../.." && pwd)
@@ -13,14 +13,14 @@ command -v "$compiler" >/dev/null || {
 }
 mkdir -p "$out"
 new=$out/$name.elf.new
-# As a whole; without scheduling, from which these processors gain little and which takes registers. Without copies of
-# functions for constant arguments where flash counts, and without values kept for another branch where time does.
+# Link-time optimisation; without scheduling, which needs registers and gains little on these processors. Without copies of
+# functions for constant arguments for size, and without partial redundancy elimination for speed.
 if [ "${FOR:-size}" = speed ]; then
   optimise="-O2 -fno-tree-pre"
 else
   optimise="-Os -fno-schedule-insns2 -fno-ipa-cp -fno-reorder-blocks -fno-tree-ch"
 fi
-# Debugging information is no part of what is programmed; it says which part of a tick an instruction belongs to.
+# Debugging information is not programmed into flash; it shows to which part of a tick an instruction belongs.
 # shellcheck disable=SC2086
 "$compiler" -std=c++20 -g -ffile-prefix-map="$root"=. $optimise -flto=1 -fno-schedule-insns -mcpu=cortex-m4 -mthumb -mfloat-abi=soft \
   -ffunction-sections -fdata-sections -fno-exceptions -fno-rtti -fno-threadsafe-statics -fno-unwind-tables \

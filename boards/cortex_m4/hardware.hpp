@@ -19,7 +19,8 @@ inline void clear_bits(std::uint32_t address, std::uint32_t bits) {
 inline void change_bits(std::uint32_t address, std::uint32_t field, std::uint32_t value) {
   hardware(address) = (hardware(address) & ~field) | value;
 }
-// Waits until these bits of a register are as wanted, but only so often: hardware that is dead must not hang a drive.
+// Waits until these bits of a register have the given value. The number of tries is limited: dead hardware must not
+// hang a drive.
 inline bool wait_for(std::uint32_t address, std::uint32_t field, std::uint32_t value, std::uint32_t tries) {
   for (; tries > 0; --tries)
     if ((hardware(address) & field) == value) return true;

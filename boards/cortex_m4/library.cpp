@@ -7,7 +7,8 @@ using Word [[gnu::may_alias, gnu::aligned(1)]] = std::uint32_t;
 }  // namespace
 
 extern "C" {
-// By words where both ends allow it. The library's take five hundred bytes of flash, for copies longer than any here.
+// Copies words where both ends allow it. The library's functions take 500 bytes of flash, for copies longer than any
+// here.
 [[gnu::used, gnu::optimize("no-tree-loop-distribute-patterns")]] void* memcpy(void* to, const void* from,
                                                                               std::size_t count) {
   auto* t = static_cast<unsigned char*>(to);

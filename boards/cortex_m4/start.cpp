@@ -2,7 +2,7 @@
 // of vectors and Unexpected_Handler().
 #include <cstdint>
 
-// A start-up calls main(), which no other code may.
+// Start-up code calls main(), which ISO C++ forbids elsewhere.
 #pragma GCC diagnostic ignored "-Wpedantic"
 
 namespace {
@@ -17,7 +17,7 @@ extern const Constructor constructors_start[], constructors_end[];
 int main();
 [[noreturn]] void Unexpected_Handler();
 
-// No loop of it may become a call of memset(), whose frame it would paint over.
+// None of its loops may become a call of memset(): it would paint over the frame of that call.
 [[noreturn, gnu::optimize("no-tree-loop-distribute-patterns")]] void Reset_Handler() {
   const std::uint32_t* from = data_load;
   for (std::uint32_t* to = data_start; to < data_end; ++to) *to = *from++;

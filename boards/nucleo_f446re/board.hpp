@@ -1,4 +1,4 @@
-// What this board is: clock, pins, timers, amplifier. README.md has the pins as a table.
+// Description of this board: clock, pins, timers, amplifier. README.md has the pins as a table.
 #pragma once
 
 #include <array>
@@ -16,7 +16,7 @@ inline constexpr Pin kEnable{'C', 8, PinMode::output, 0, Pull::down};
 struct Description {
   static constexpr std::string_view kName = "nucleo_f446re";
   // Current sensor and amplifier are those of the servo amplifier that is connected: set its full scales and its
-  // largest current here, and no block can say otherwise.
+  // largest current here. No block can override them.
   static constexpr control::Hardware kHardware{.motor_encoder = control::SensorKind::incremental,
                                                .output_encoder = control::SensorKind::incremental};
   // 8 MHz come from the programmer on the board, not from a crystal.
@@ -42,7 +42,7 @@ struct Description {
   using Serial = stm32f4::Usart<stm32f4::kUsart2>;
   static constexpr std::uint32_t kBaud = 115'200;
   static constexpr bool kHasUsb = false;
-  static constexpr std::uint32_t kParameterSector = 5;  // and the next, 128 KB each
+  static constexpr std::uint32_t kParameterSector = 5;  // and the one after it, 128 KB each
 };
 
 }  // namespace flexspline::nucleo_f446re

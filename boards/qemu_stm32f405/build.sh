@@ -9,4 +9,4 @@ compiler=${ARM_GXX:-arm-none-eabi-g++}
 "${compiler%g++}size" -A "$out/image.elf" | awk '
   $1 == ".text" || $1 == ".data" { flash += $2 }
   $1 == ".data" || $1 == ".bss" || $1 == ".stack" { ram += $2 }
-  END { printf "flash %d of 98304 bytes, RAM %d of 8192 bytes beside the telemetry ring and the residual map\n", flash, ram - 8192 - 3848 }'
+  END { printf "flash %d of 98304 bytes, RAM %d of 8192 bytes without the telemetry ring and the residual map\n", flash, ram - 8192 - 3848 }'

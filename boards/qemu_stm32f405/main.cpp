@@ -1,20 +1,21 @@
-// The application on QEMU's model of an STM32F405 (machine netduinoplus2), in lock step with a drive that the desktop
-// simulates: each tick of the timer takes the drive's samples from one pipe and hands back the current in another.
+// The application on QEMU's model of an STM32F405 (machine netduinoplus2), in co-simulation with a drive that the
+// desktop simulates: each tick of the timer takes the drive's samples from one pipe and hands back the current in
+// another.
 #include <cstddef>
 #include <cstdint>
 #include <span>
 
 #include "boards/qemu_stm32f405/semihosting.hpp"
 #include "firmware/application.hpp"
-#include "firmware/lock_step.hpp"
+#include "firmware/co_simulation.hpp"
 
 namespace {
 
 using flexspline::firmware::Actuation;
 using flexspline::firmware::Application;
-using flexspline::firmware::LockStepDown;
-using flexspline::firmware::LockStepStart;
-using flexspline::firmware::LockStepUp;
+using flexspline::firmware::CoSimulationInput;
+using flexspline::firmware::CoSimulationOutput;
+using flexspline::firmware::CoSimulationStart;
 using flexspline::firmware::Readings;
 using flexspline::firmware::ResetCause;
 using flexspline::qemu::HostFile;
@@ -33,10 +34,10 @@ class QemuBoard {
   static constexpr std::uint32_t kTickHz = 20'000;
   static constexpr std::uint32_t kTelemetryWords = 2048;
 
-  Readings read() const { return down.readings; }
-  void actuate(const Actuation& wanted) { actuation = wanted; }
+  Readings read() const { return input.readings; }
+  void actuate(const Actuation& command) { actuation = command; }
   // The next tick is due already.
-  bool tick_overrun() const { return down.overrun || (hardware(kInterruptState) & kSysTickPending) != 0; }
+  bool tick_overrun() const { return input.overrun || (hardware(kInterruptState) & kSysTickPending) != 0; }
   void feed_watchdog() {}  // the model has none
   ResetCause reset_cause() const { return ResetCause::power; }
 
@@ -52,46 +53,46 @@ class QemuBoard {
   }
   static std::uint32_t instructions() { return hardware(kTimer2Count); }
 
-  LockStepDown down{.reads_frame = false};
+  CoSimulationInput input{.reads_frame = false};
   Actuation actuation{};
 };
 
-constexpr char kDown[] = "to_drive", kUp[] = "from_drive";
+constexpr char kInputPipe[] = "to_drive", kOutputPipe[] = "from_drive";
 constexpr std::uint32_t kExitDone = 0, kExitNoDesktop = 2;
 constexpr std::size_t kPageBytes = 16 * 1024;
 [[gnu::section(".parameters")]] alignas(8) std::byte parameter_page[kPageBytes];
 
 QemuBoard board;
 constinit Application<QemuBoard> application;
-const HostFile* down_pipe = nullptr;
-const HostFile* up_pipe = nullptr;
+const HostFile* input_pipe = nullptr;
+const HostFile* output_pipe = nullptr;
 
 }  // namespace
 
 extern "C" std::uint32_t used_stack_bytes();
 
 extern "C" void SysTick_Handler() {
-  if (!down_pipe->read(&board.down, sizeof(board.down))) flexspline::qemu::leave(kExitNoDesktop);
-  if (board.down.ends) {
-    LockStepUp last;
+  if (!input_pipe->read(&board.input, sizeof(board.input))) flexspline::qemu::leave(kExitNoDesktop);
+  if (board.input.ends) {
+    CoSimulationOutput last;
     last.stack_bytes = used_stack_bytes();
-    up_pipe->write(&last, sizeof(last));
+    output_pipe->write(&last, sizeof(last));
     flexspline::qemu::leave(kExitDone);
   }
-  LockStepUp up = flexspline::firmware::lock_step(application, board.down, QemuBoard::instructions);
-  up.actuation = board.actuation;
-  if (!up_pipe->write(&up, sizeof(up))) flexspline::qemu::leave(kExitNoDesktop);
+  CoSimulationOutput output = flexspline::firmware::co_simulate(application, board.input, QemuBoard::instructions);
+  output.actuation = board.actuation;
+  if (!output_pipe->write(&output, sizeof(output))) flexspline::qemu::leave(kExitNoDesktop);
 }
 
 [[gnu::cold]] int main() {
-  const HostFile down(kDown, sizeof(kDown) - 1, HostFile::For::reading);
-  const HostFile up(kUp, sizeof(kUp) - 1, HostFile::For::writing);
-  LockStepStart start;
-  if (!down.is_open() || !up.is_open() || !down.read(&start, sizeof(start)) || start.block_bytes > kPageBytes ||
-      !down.read(parameter_page, start.block_bytes))
+  const HostFile input(kInputPipe, sizeof(kInputPipe) - 1, HostFile::For::reading);
+  const HostFile output(kOutputPipe, sizeof(kOutputPipe) - 1, HostFile::For::writing);
+  CoSimulationStart start;
+  if (!input.is_open() || !output.is_open() || !input.read(&start, sizeof(start)) || start.block_bytes > kPageBytes ||
+      !input.read(parameter_page, start.block_bytes))
     flexspline::qemu::leave(kExitNoDesktop);
-  down_pipe = &down;
-  up_pipe = &up;
+  input_pipe = &input;
+  output_pipe = &output;
   application.begin(board);
   application.telemetry().configure(start.telemetry);
   if (start.block_bytes > 0) application.boot_with({parameter_page, start.block_bytes});

@@ -15,7 +15,7 @@ std::uint32_t word(const void* p) {
   return static_cast<std::uint32_t>(reinterpret_cast<std::uintptr_t>(p));
 }
 
-// Both operations return how many bytes they left over.
+// Both operations return the number of bytes that they did not transfer.
 template <class Byte>
 bool transfer(Operation operation, std::int32_t handle, Byte* bytes, std::size_t count) {
   while (count > 0) {
@@ -45,7 +45,7 @@ void print(const char* text) {
   call(kPrint, text);
 }
 void leave(std::uint32_t exit_code) {
-  const std::uint32_t arguments[] = {0x20026, exit_code};  // the application came to its end
+  const std::uint32_t arguments[] = {0x20026, exit_code};  // ADP_Stopped_ApplicationExit
   for (;;) call(kExit, arguments);
 }
 

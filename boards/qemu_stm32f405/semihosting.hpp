@@ -1,4 +1,4 @@
-// Files, the way out and text through a debugger or an emulator (Arm's semihosting).
+// Files, exit and text output through a debugger or an emulator (Arm's semihosting).
 #pragma once
 
 #include <cstddef>
@@ -12,7 +12,7 @@ class HostFile {
 
   HostFile(const char* name, std::size_t length, For what);
   bool is_open() const { return handle_ >= 0; }
-  // All of it or false, whatever pieces a pipe hands out.
+  // Reads everything or returns false. A pipe may deliver the data in pieces.
   bool read(void* to, std::size_t bytes) const;
   bool write(const void* from, std::size_t bytes) const;
 
@@ -20,7 +20,7 @@ class HostFile {
   std::int32_t handle_;
 };
 
-void print(const char* text);  // ends with a nought
+void print(const char* text);  // ends with a zero
 [[noreturn]] void leave(std::uint32_t exit_code);
 
 }  // namespace flexspline::qemu

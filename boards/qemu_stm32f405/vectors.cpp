@@ -1,4 +1,4 @@
-// The vector table, and what happens at an exception that has no business here. Start-up is boards/cortex_m4/start.cpp.
+// The vector table, and the handler of unexpected exceptions. Start-up is boards/cortex_m4/start.cpp.
 #include <cstdint>
 
 #include "boards/qemu_stm32f405/semihosting.hpp"

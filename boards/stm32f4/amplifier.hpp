@@ -1,5 +1,5 @@
-// Where the current comes from. Both run TIM1, which times the control tick: its trigger starts the converter at the
-// start of each period. Not enabled is the state after reset, and what a reset, a break and a fault lead to.
+// The two amplifiers. Both run TIM1, which times the control tick: its trigger starts the converter at the start of
+// each period. After a reset, a break or a fault the amplifier is not enabled.
 //
 //   ServoAmplifier  a current controller outside; gets a voltage from the DAC and an enable (RM0090, 14)
 //   HBridge         two legs on TIM1's channels 1 and 3, with dead time and a break input (RM0090, 17)
@@ -36,12 +36,12 @@ inline void run() {
 template <const Pin& enable>
 class ServoAmplifier {
  public:
-  static constexpr bool kClosesLoop = true;  // itself
+  static constexpr bool kClosesLoop = true;  // the current loop is in the amplifier
 
   void start(std::uint32_t half_period) {
     switch_clock_on(kDac);
     hardware(kDac + kRight1) = kMiddle;
-    hardware(kDac) = 1;  // channel 1, buffered: the middle is no current
+    hardware(kDac) = 1;  // channel 1, buffered: half scale is zero current
     tim1::set_up(half_period);
     tim1::run();
   }
@@ -56,9 +56,9 @@ class ServoAmplifier {
     hardware(kDac + kRight1) = kMiddle;
     on_ = false;
   }
-  // With nothing but registers, from wherever a fault was found.
+  // Writes registers only, as any fault handler may call it.
   static void cut() { write(enable, false); }
-  static constexpr bool tripped() { return false; }  // it does not tell
+  static constexpr bool tripped() { return false; }  // it does not report that
 
  private:
   static constexpr std::uint32_t kRight1 = 0x08, kMiddle = 2048;
@@ -111,7 +111,7 @@ class HBridge {
     clear_bits(tim1::kBreak, kOutputsOn);
     write(enable, false);
   }
-  // The break input opened the switches (RM0090, 17.3.12): the outputs' bit is off, though nobody here switched it off.
+  // The break input opened the switches (RM0090, 17.3.12): the outputs' bit is off although this code did not clear it.
   bool tripped() const { return on_ && (hardware(tim1::kBreak) & kOutputsOn) == 0; }
 
  private:

@@ -10,7 +10,7 @@ namespace flexspline::stm32f4 {
 
 inline constexpr std::uint32_t kAdcInterrupt = 18;
 
-// Converter inputs. Current and torque swing about half the supply, temperature begins at nought.
+// Converter inputs. Current and torque swing about half the supply, temperature begins at zero.
 struct AnalogInputs {
   std::uint8_t current;
   std::uint8_t torque;
@@ -19,7 +19,7 @@ struct AnalogInputs {
   bool torque_falls = false;
 };
 
-// 12 bits to shares of full scale, 2^-15; rails become rails, so that a broken wire shows.
+// 12 bits to shares of full scale, 2^-15. The ends of the range stay the ends, so that a broken wire is detected.
 constexpr std::int16_t bipolar_share(std::uint32_t raw, bool falls) {
   const auto all = static_cast<std::int32_t>((raw << 4) | (raw >> 8)) - 32768;
   return static_cast<std::int16_t>(falls ? -1 - all : all);
@@ -49,7 +49,7 @@ class Analog {
     hardware(kAdc1 + kControl2) = kOn | (1U << 16) | (1U << 20);
     cortex_m4::enable_interrupt(kAdcInterrupt);
   }
-  // A set of three is there. Taking it forgets that.
+  // A set of three samples is available. Taking it clears the flag.
   static bool ended() { return (hardware(kAdc1 + kStatus) & kInjectedEnd) != 0; }
   static void take() { hardware(kAdc1 + kStatus) = ~kInjectedEnd; }
   static std::uint32_t result(std::uint32_t number) { return hardware(kAdc1 + 0x3C + 4 * number) & 0xFFF; }
@@ -59,7 +59,7 @@ class Analog {
                                  kSequence = 0x38;
   static constexpr std::uint32_t kInjectedEnd = 1U << 2, kInterruptAtEnd = 1U << 7, kScan = 1U << 8, kOn = 1U << 0;
 
-  // 28 cycles and 12 to convert: three inputs in 5.7 us. For a source of up to 10 kOhm.
+  // 28 cycles to sample and 12 to convert: three inputs in 5.7 us, for a source of up to 10 kOhm.
   static void set_sample_time(std::uint32_t input) {
     const std::uint32_t at = kAdc1 + kSampleTime + (input < 10 ? 4U : 0U);
     const std::uint32_t shift = 3 * (input % 10);

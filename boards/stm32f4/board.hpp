@@ -1,4 +1,4 @@
-// The board that the application is a template over (firmware/board.hpp), from what a description of a board says. A
+// The board type for the application's template (firmware/board.hpp), made from the description of a board. A
 // description has: kClock, kPins, kAnalog, kHardware, kParameterSector, kMotorReversed, kOutputReversed, kName, and
 // types MotorEncoder, OutputEncoder, Amplifier, Serial and Usb (NoUsb where there is none).
 #pragma once
@@ -25,7 +25,7 @@ class DriveBoard {
   static constexpr std::uint32_t kTickHz = 20'000;
   static constexpr std::uint32_t kTelemetryWords = 4096;
 
-  // Pins and clock first: the amplifier is off from the first instructions on. False: there is no clock for a drive.
+  // Pins and clock first: the amplifier is off from the first instructions on. False: no clock that a drive can run on.
   bool start_clock() {
     const bool crashed = crash_was_noted();
     cause_ = watchdog_was_the_reset() ? firmware::ResetCause::watchdog
@@ -33,11 +33,11 @@ class DriveBoard {
                                       : firmware::ResetCause::power;
     set_up(Description::kPins);
     source_ = Clock::start(Description::kClock);
-    // With its longest limit, from before there is a tick: what hangs until then is reset as well.
+    // With its longest limit, before the first tick: a hang in start-up leads to a reset as well.
     if (source_ != ClockSource::bare) watchdog_.start();
     return source_ != ClockSource::bare;
   }
-  // The control tick runs from here on.
+  // The control tick starts here.
   void start_tick() {
     motor_.start(Description::kMotorReversed);
     output_.start(Description::kOutputReversed);
@@ -46,7 +46,7 @@ class DriveBoard {
   }
   bool clock_is_exact() const { return source_ == ClockSource::crystal; }
 
-  // Of the tick.
+  // Called from the tick.
 
   firmware::Readings read() {
     if (Analog::ended()) {
@@ -62,13 +62,13 @@ class DriveBoard {
     ++readings_.output_samples;
     return readings_;
   }
-  void actuate(const firmware::Actuation& wanted) {
-    amplifier_.actuate(wanted, readings_.current);
-    enabled_ = wanted.enabled;
+  void actuate(const firmware::Actuation& command) {
+    amplifier_.actuate(command, readings_.current);
+    enabled_ = command.enabled;
   }
   static constexpr control::Hardware hardware() { return Description::kHardware; }
   bool amplifier_tripped() const { return amplifier_.tripped(); }
-  // The next set of samples is there already.
+  // The next set of samples is available already.
   bool tick_overrun() {
     if (late_ticks_ > 0) {
       late_ticks_ = static_cast<std::uint8_t>(late_ticks_ - 1);
@@ -77,12 +77,12 @@ class DriveBoard {
     return Analog::ended();
   }
 
-  // Of background work.
+  // Called from background work.
 
   void feed_watchdog() { watchdog_.feed(enabled_); }
   firmware::ResetCause reset_cause() const { return cause_; }
-  // The flash memory stops the processor: the ticks after that begin late, which is no fault of theirs. The service
-  // writes only while the amplifier is off.
+  // The flash memory stops the processor: the ticks after that begin late, which is not counted as an overrun. The
+  // service writes only while the amplifier is off.
   void flash_works() { late_ticks_ = 2; }
 
  private:
@@ -97,7 +97,7 @@ class DriveBoard {
   volatile std::uint8_t late_ticks_ = 0;
 };
 
-// Twelve hexadecimal digits of the chip's number, those that the ROM's boot loader shows as well.
+// Twelve hexadecimal digits of the chip's serial number, as the ROM's boot loader shows it.
 inline void serial_number(char (&text)[13]) {
   const std::uint32_t words[] = {hardware(kUniqueId) + hardware(kUniqueId + 8), hardware(kUniqueId + 4) >> 16};
   for (std::uint32_t i = 0; i < 12; ++i) {

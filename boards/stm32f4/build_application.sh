@@ -1,6 +1,6 @@
 #!/bin/sh
 # build_application.sh BOARD OUT_DIR NAME: the application of boards/BOARD as OUT_DIR/NAME.elf, .bin and .map; flags of a
-# variant in FLAGS. Says what it takes. Exit 3 where there is no ARM compiler.
+# variant in FLAGS. Prints flash and RAM. Exit 3 where there is no ARM compiler.
 set -eu
 boards=$(cd -- "$(dirname -- "$0")/.." && pwd)
 board=$boards/$1 out=$2 name=$3

@@ -1,6 +1,6 @@
-// The core's clock from a crystal (or the clock of another chip) over the PLL, or, where that is dead, from the
-// internal oscillator over the same PLL: slower to trust, one percent off, too far for USB, but the drive's loops run
-// as they do. Nothing here waits for ever (RM0090, 7.2 and 3.5.1).
+// The core's clock from a crystal (or the clock of another chip) over the PLL. Where the crystal is dead the internal
+// oscillator drives the same PLL: its error of one percent is too large for USB, but the drive's loops run at the same
+// rate. No wait here is unlimited (RM0090, 7.2 and 3.5.1).
 #pragma once
 
 #include <cstdint>
@@ -33,7 +33,7 @@ constexpr std::uint32_t pll_setup(const ClockSetup& c, std::uint32_t input_hz, b
 
 class Clock {
  public:
-  // From reset, or after a boot loader did the same.
+  // After reset, or after a boot loader that set the same clock.
   static ClockSource start(const ClockSetup& c) {
     switch_clock_on(kPower);
     set_bits(kControl, kInternalOn);
@@ -57,7 +57,7 @@ class Clock {
   static constexpr std::uint32_t kInternalOn = 1U << 0, kCrystalOn = 1U << 16, kCrystalReady = 1U << 17,
                                  kCrystalBypass = 1U << 18, kSecurityOn = 1U << 19, kPllOn = 1U << 24,
                                  kPllReady = 1U << 25;
-  // A crystal starts within some milliseconds, the PLL locks within 0.3 ms; a turn of the loop takes at least 0.3 us.
+  // A crystal starts within some milliseconds, the PLL locks within 0.3 ms; an iteration takes at least 0.3 us.
   static constexpr std::uint32_t kCrystalTries = 100'000, kPllTries = 10'000, kSwitchTries = 1'000;
   // AHB undivided; APB1 a quarter, APB2 a half: 42 and 84 MHz at most.
   static constexpr std::uint32_t kDividers = (5U << 10) | (4U << 13), kDividerFields = 0xFCF0;
@@ -79,7 +79,7 @@ class Clock {
   }
 };
 
-// What reset the processor (RM0090, 7.3.21); asking forgets it.
+// What reset the processor (RM0090, 7.3.21). Reading clears it.
 inline bool watchdog_was_the_reset() {
   constexpr std::uint32_t kStatus = kRcc + 0x74, kWatchdogReset = 1U << 29, kForget = 1U << 24;
   const bool watchdog = (hardware(kStatus) & kWatchdogReset) != 0;

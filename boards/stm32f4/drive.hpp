@@ -8,14 +8,14 @@
 
 #include "boards/stm32f4/board.hpp"
 #include "boards/stm32f4/handover.hpp"
+#include "boards/stm32f4/usb_link.hpp"
 #include "firmware/application.hpp"
-#include "firmware/report_link.hpp"
+#include "firmware/drive.hpp"
 #include "firmware/serial_link.hpp"
 #include "firmware/service.hpp"
 #include "firmware/update_watch.hpp"
 #include "shared/boot/slots.hpp"
 #include "shared/usb/device.hpp"
-#include "shared/usb/hid.hpp"
 #include "shared/usb/identity.hpp"
 
 extern "C" const std::uint32_t vectors[];  // of the linker script
@@ -32,12 +32,14 @@ class Drive {
   using Blocks = firmware::ApplicationBlocks<Application, Board::kTickHz>;
   using Service = firmware::Service<Application, Store, Blocks>;
   using Serial = typename Description::Serial;
+  using UsbReports = flexspline::usb::Hid<8, 4>;
+  using UsbDevice = usb::Device<usb::FlexsplineIdentity, OtgFs, UsbReports, usb::DfuRuntime>;
 
   constexpr Drive() = default;
 
   [[gnu::cold, noreturn]] void run() {
     hardware(cortex_m4::kVectorTable) = static_cast<std::uint32_t>(reinterpret_cast<std::uintptr_t>(vectors));
-    // Without a clock for the loops the drive stays as reset left it, with its amplifier off.
+    // Without a clock for the loops the drive stays in its reset state, with its amplifier off.
     if (!board_.start_clock()) stay_off();
     application_.begin(board_);
     static char serial[13];
@@ -45,65 +47,54 @@ class Drive {
     static Flash flash(board_);
     static Store store(flash);
     static Blocks blocks(application_);
-    static Service service(application_, store, blocks, Board::kTickHz, info(serial));
+    static Service service(application_, store, blocks, Board::kTickHz,
+                           firmware::DriveInfo::of({0, 1}, Description::kName, {serial, 12}));
     service.start();
     line_.start(Description::kClock.core_hz / 4, Description::kBaud);
-    static firmware::SerialLink<Service, Serial> serial_link(service, line_);
+    using SerialLink = firmware::SerialLink<Service, Serial>;
+    static SerialLink serial_link(service, line_);
     if constexpr (Description::kHasUsb) {
       static OtgFs port;
-      // An internal oscillator is too far off for USB: the host would give up on the device. The serial line does.
+      // The internal oscillator is not accurate enough for USB: the host would reject the device. The serial line
+      // works.
       const bool usb = board_.clock_is_exact() && port.start(Description::kClock.core_hz);
-      using Reports = flexspline::usb::Hid<8, 4>;
-      static usb::Device<usb::FlexsplineIdentity, OtgFs, Reports, usb::DfuRuntime> device(port, serial);
+      static UsbDevice device(port, serial);
       using ImageMemory = typename Description::template Images<Board>;
       static ImageMemory images(board_);
       static boot::Slots<ImageMemory> slots(images, Description::kName);
       static firmware::UpdateWatch<boot::Slots<ImageMemory>> update(slots, Board::kTickHz);
-      static firmware::ReportLink<Service, Reports> report_link(service, device.template get<Reports>());
+      using Usb = UsbLink<Service, OtgFs, UsbDevice, UsbReports>;
+      static Usb usb_link(service, port, device, usb);
+      firmware::Drive<Application, Service, Usb, SerialLink> drive(application_, service, usb_link, serial_link);
       board_.start_tick();
       for (;;) {
-        if (usb) {
-          port.poll(device);
-          report_link.turn(device.configured());
-          device.poll();
-        }
-        if (!device.configured()) serial_link.turn();
-        if (update.turn(application_.snapshot(), device.configured(), device.template get<usb::DfuRuntime>())) {
+        drive.poll();
+        if (update.poll(application_.snapshot(), device.configured(), device.template get<usb::DfuRuntime>())) {
           port.stop();
-          ask_for_loader();
+          request_loader();
           cortex_m4::reset_processor();
         }
-        turn(service);
+        wait_for_interrupt();
       }
     } else {
+      firmware::Drive<Application, Service, SerialLink> drive(application_, service, serial_link);
       board_.start_tick();
       for (;;) {
-        serial_link.turn();
-        turn(service);
+        drive.poll();
+        wait_for_interrupt();
       }
     }
   }
-  // The interrupt.
+  // The interrupt handler.
   void tick() {
     application_.tick();
     line_.move();
   }
 
  private:
-  void turn(Service& service) {
-    application_.background();
-    service.background();
-    asm volatile("wfi");
-  }
+  static void wait_for_interrupt() { asm volatile("wfi"); }
   [[noreturn]] static void stay_off() {
-    for (;;) asm volatile("wfi");
-  }
-  static firmware::DriveInfo info(const char (&serial)[13]) {
-    firmware::DriveInfo out{.firmware = {0, 1}};
-    for (std::size_t i = 0; i < Description::kName.size() && i + 1 < out.board.size(); ++i)
-      out.board[i] = static_cast<std::uint8_t>(Description::kName[i]);
-    for (std::size_t i = 0; i < 12; ++i) out.serial[i] = static_cast<std::uint8_t>(serial[i]);
-    return out;
+    for (;;) wait_for_interrupt();
   }
 
   Board board_{};

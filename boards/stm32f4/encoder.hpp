@@ -9,7 +9,8 @@ namespace flexspline::stm32f4 {
 
 enum class CounterBits : std::uint8_t { sixteen, thirty_two };
 
-// Of a timer of 16 bits the count is carried on: read it before the shaft went half way round those, each tick.
+// The count of a 16-bit timer is extended to 32 bits: it must be read before it has moved by half its range, so each
+// tick.
 template <std::uint32_t timer, CounterBits bits>
 class Encoder {
  public:
@@ -17,7 +18,7 @@ class Encoder {
     switch_clock_on(timer);
     // Both inputs, an edge counts after eight equal samples of the timer's clock.
     hardware(timer + kCapture) = (1U << 0) | (3U << 4) | (1U << 8) | (3U << 12);
-    hardware(timer + kPolarity) = reversed ? 1U << 1 : 0U;  // the first input turned round: it counts the other way
+    hardware(timer + kPolarity) = reversed ? 1U << 1 : 0U;  // the first input inverted: it counts the other way
     hardware(timer + kSlave) = 3;                           // encoder mode 3
     hardware(timer + kReload) = bits == CounterBits::sixteen ? 0xFFFF : 0xFFFFFFFF;
     hardware(timer + kCount) = 0;

@@ -1,5 +1,5 @@
 // Erases sectors and programs words of the chip's flash memory (RM0090, 3.6). The processor runs from the same memory:
-// it stands still until an operation ends, with all its interrupts.
+// it is stalled until an operation ends, with all its interrupts.
 #pragma once
 
 #include <cstddef>
@@ -28,13 +28,13 @@ class Flash {
  public:
   explicit constexpr Flash(Busy& busy) : busy_(busy) {}
 
-  // False: the memory reported an error, or did not end in time.
+  // False: the memory reported an error, or was not ready in time.
   bool erase(std::uint32_t sector) {
     const bool good = run(kErase | (sector << 3), 0, 0, true);
     reset_caches();
     return good;
   }
-  // A word at an address that four divides.
+  // A word at an address that is a multiple of four.
   bool program(std::uint32_t address, std::uint32_t value) {
     const bool good = run(kProgram, address, value, false);
     reset_caches();
@@ -50,8 +50,8 @@ class Flash {
   // An erase takes 2 s at most (128 KB); reading the register from a memory that is busy takes as long as that anyway.
   static constexpr std::uint32_t kTries = 50'000'000;
 
-  // What both caches hold of the memory is old, instructions as well where an image was written (RM0090, 3.5.2). A
-  // cache is reset while it is off.
+  // Both caches hold old contents of the memory, the instruction cache as well where an image was written
+  // (RM0090, 3.5.2). A cache can only be reset while it is off.
   static void reset_caches() {
     clear_bits(kFlash, kCaches);
     set_bits(kFlash, kCacheResets);
@@ -61,7 +61,7 @@ class Flash {
   bool run(std::uint32_t what, std::uint32_t address, std::uint32_t value, bool starts) {
     busy_.flash_works();
     if (!wait_for(kStatus, kBusy, 0, kTries)) return false;
-    hardware(kStatus) = kErrors | kEnd;  // of before
+    hardware(kStatus) = kErrors | kEnd;  // of earlier operations
     if ((hardware(kControl) & kLock) != 0) {
       hardware(kKey) = 0x45670123;
       hardware(kKey) = 0xCDEF89AB;
@@ -83,7 +83,7 @@ class Flash {
   Busy& busy_;
 };
 
-// Two sectors of one size as the parameter store wants them (shared/storage/flash_port.hpp).
+// Two sectors of one size, as the parameter store needs them (shared/storage/flash_port.hpp).
 template <class Busy, std::uint32_t first_sector>
 class ParameterFlash {
  public:
@@ -106,8 +106,8 @@ class ParameterFlash {
   Flash<Busy> flash_;
 };
 
-// Three sectors of one size for images (shared/boot/slots.hpp), each at the start of a sector of the memory that may be
-// longer: the application's, the download's and the one before.
+// Three sectors of one size for images (shared/boot/slots.hpp), each at the start of a sector of the memory, which may
+// be longer: the application, the download and the previous application.
 template <class Busy, std::size_t size, std::uint32_t application, std::uint32_t download, std::uint32_t old>
 class ImageFlash {
  public:

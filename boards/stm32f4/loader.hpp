@@ -1,5 +1,5 @@
-// The boot loader on one of these processors (firmware/boot_loader.hpp): main() of its image is run(), SysTick its
-// clock.
+// The boot loader on one of these processors (firmware/boot_loader.hpp). main() of its image is run(); its clock is
+// SysTick.
 #pragma once
 
 #include <cstdint>
@@ -23,7 +23,8 @@ class Loader {
     static firmware::BootLoader<Board> loader(board);
     const boot::Start start = loader.start();
     if (start != boot::Start::none) {
-      // An image on trial that hangs before it starts its own watchdog: it runs already, with its longest limit.
+      // An image on trial may hang before it starts its own watchdog, so the watchdog is started here with its longest
+      // limit.
       if (start == boot::Start::trial) board.watchdog.start();
       jump_to(sector_address(Description::kApplicationSector) + boot::kHeaderBytes);
     }
@@ -33,14 +34,14 @@ class Loader {
     using Dfu = typename firmware::BootLoader<Board>::Dfu;
     static usb::Device<usb::LoaderIdentity, OtgFs, Dfu> device(port, serial);
     loader.serve(device.template get<Dfu>());
-    // Without a crystal there is no USB: a debugger has to help.
+    // Without a crystal there is no USB: a debugger is needed.
     const bool usb = source == ClockSource::crystal && port.start(Description::kClock.core_hz);
-    hardware(kSysTickReload) = Description::kClock.core_hz / kTurnsHz - 1;
+    hardware(kSysTickReload) = Description::kClock.core_hz / kTickHz - 1;
     hardware(kSysTick) = 7;
     for (;;) {
       if (usb) port.poll(device);
       device.poll();
-      if (loader.turn(device.template get<Dfu>(), port.was_reset(), turns_ / (kTurnsHz / 1000))) {
+      if (loader.poll(device.template get<Dfu>(), port.was_reset(), ticks_ / (kTickHz / 1000))) {
         port.stop();
         cortex_m4::reset_processor();
       }
@@ -48,11 +49,11 @@ class Loader {
       asm volatile("wfi");
     }
   }
-  // The interrupt.
-  void tick() { turns_ = turns_ + 1; }
+  // The interrupt handler.
+  void tick() { ticks_ = ticks_ + 1; }
 
  private:
-  static constexpr std::uint32_t kSysTick = 0xE000E010, kSysTickReload = 0xE000E014, kTurnsHz = 8'000;
+  static constexpr std::uint32_t kSysTick = 0xE000E010, kSysTickReload = 0xE000E014, kTickHz = 8'000;
 
   struct Board {
     static constexpr std::string_view kName = Description::kName;
@@ -60,8 +61,8 @@ class Loader {
     // RM0090 and the data sheet: 2 s for 128 KB, 100 us a word.
     static constexpr std::uint32_t kEraseMs = 2'200, kBlockMs = 30, kCheckMs = 100;
     Slots& slots() { return images; }
-    bool takes_loader_request() { return loader_is_wanted(); }
-    // Before and after each operation: feeds a watchdog that runs.
+    bool takes_loader_request() { return loader_is_requested(); }
+    // Called before and after each operation: feeds the watchdog if it runs.
     void flash_works() { watchdog.feed(false); }
 
     IndependentWatchdog<20'000> watchdog{};
@@ -74,7 +75,7 @@ class Loader {
     __builtin_unreachable();
   }
 
-  volatile std::uint32_t turns_ = 0;
+  volatile std::uint32_t ticks_ = 0;
 };
 
 }  // namespace flexspline::stm32f4

@@ -1,7 +1,7 @@
 // The USB controller OTG_FS as a full-speed device, for the device core (shared/usb/port.hpp). Without DMA and without
-// interrupts: poll() in background work looks at what came, the controller answers NAK meanwhile (RM0090, 34).
+// interrupts: poll() in background work takes received packets; until then the controller answers NAK (RM0090, 34).
 //
-// One packet at a time on each endpoint, as the core wants it. The FIFO's 320 words: 96 for what comes, 32 to 64 for
+// One packet at a time on each endpoint, as the device core needs it. The FIFO's 320 words: 96 to receive, 32 to 64 for
 // each endpoint to the host.
 #pragma once
 
@@ -19,7 +19,7 @@ class OtgFs {
   static constexpr bool kAddressBeforeStatus = true;
   static constexpr std::uint8_t kEndpoints = 4;  // of each direction, with endpoint 0
 
-  // The device shows itself to the host (pulls D+ up) while the bus is powered. False: the controller does not answer.
+  // Connects to the bus (pulls D+ up) while it is powered. False: the controller does not answer.
   bool start(std::uint32_t core_hz) {
     switch_clock_on(kOtgFs);
     hardware(kUsbSetup) = kInternalPhy;
@@ -27,7 +27,7 @@ class OtgFs {
     set_bits(kReset, 1);  // the core itself
     if (!wait_for(kReset, 1, 0, kTries)) return false;
     hardware(kPhy) = (1U << 16) | (1U << 19);  // power; sensing of the bus's power for a device
-    // Turn-round time for a bus clock above 32 MHz; a device whatever the ID pin says, 25 ms later.
+    // Turnaround time for a bus clock above 32 MHz; forced device mode, which takes 25 ms.
     hardware(kUsbSetup) = kInternalPhy | (6U << 10) | (1U << 30);
     cortex_m4::spend_cycles(core_hz / 1000 * 25);
     hardware(kPowerGating) = 0;
@@ -47,10 +47,10 @@ class OtgFs {
     return true;
   }
 
-  // Lets go of the bus: to the host it is unplugged.
+  // Disconnects from the bus: the host sees an unplugged device.
   void stop() { set_bits(kDeviceControl, kDisconnect); }
 
-  // Background work: tells the core what came. The core calls back in here.
+  // Background work: passes events and packets to the device core, which calls back into this class.
   template <class Core>
   void poll(Core& core) {
     const std::uint32_t events = hardware(kEvents);
@@ -97,7 +97,7 @@ class OtgFs {
     }
   }
 
-  // Whether the bus was reset since the last question.
+  // Whether the bus was reset since the last call.
   bool was_reset() {
     const bool was = was_reset_;
     was_reset_ = false;
@@ -154,7 +154,7 @@ class OtgFs {
       disable_in(number);
       set_bits(in(number), kStall);
     } else if (number == 0) {
-      set_bits(out(0), kStall);  // ends with the next SETUP, which is taken all the same
+      set_bits(out(0), kStall);  // ends with the next SETUP, which is accepted nevertheless
     } else {
       disable_out(number, kStall);
       set_bits(out(number), kStall);
@@ -196,7 +196,7 @@ class OtgFs {
   static constexpr std::uint32_t kReceiveWords = 96, kAllFifos = 0x10;
   static constexpr std::uint32_t kTries = 10'000;
   // GRXSTSP, packet status.
-  enum class Came : std::uint8_t { global_nak = 1, data = 2, data_done = 3, setup_done = 4, setup = 6 };
+  enum class PacketStatus : std::uint8_t { global_nak = 1, data = 2, data_done = 3, setup_done = 4, setup = 6 };
 
   struct Packet {
     std::array<std::uint8_t, usb::kPacketBytes> bytes{};
@@ -204,7 +204,8 @@ class OtgFs {
     bool whole = false;
   };
 
-  // 34.17.5, at the end of a bus reset: all packets are refused until the core asks for some, and SETUP may come.
+  // 34.17.5, at the end of a bus reset: all packets are refused until the device core asks for some, only SETUP is
+  // accepted.
   void bus_reset() {
     forget_all();
     change_bits(kDevice, 0x7FU << 4, 0);
@@ -229,27 +230,27 @@ class OtgFs {
   void take_entry() {
     const std::uint32_t entry = hardware(kPop);
     const std::uint32_t number = entry & 15, bytes = (entry >> 4) & 0x7FF;
-    switch (static_cast<Came>((entry >> 17) & 15)) {
-      case Came::setup:
+    switch (static_cast<PacketStatus>((entry >> 17) & 15)) {
+      case PacketStatus::setup:
         read_fifo(setup_, bytes);
         break;
-      case Came::setup_done:
+      case PacketStatus::setup_done:
         setup_came_ = true;
         break;
-      case Came::data: {
+      case PacketStatus::data: {
         Packet& p = packets_[number % kEndpoints];
         read_fifo(p.bytes, bytes);
         p.size = static_cast<std::uint8_t>(bytes < p.bytes.size() ? bytes : p.bytes.size());
         break;
       }
-      case Came::data_done:
+      case PacketStatus::data_done:
         packets_[number % kEndpoints].whole = true;
         break;
       default:
         break;
     }
   }
-  // Takes all words of the packet, whatever of them has room.
+  // Takes all words of the packet out of the FIFO and keeps those that have room.
   static void read_fifo(std::span<std::uint8_t> to, std::uint32_t bytes) {
     for (std::uint32_t i = 0; i < bytes; i += 4) {
       const std::uint32_t word = hardware(fifo(0));
@@ -266,7 +267,7 @@ class OtgFs {
     hardware(kReset) = 1U << 4;
     wait_for(kReset, 1U << 4, 0, kTries);
   }
-  // 34.17.6, disabling: a packet that waits is taken back.
+  // 34.17.6, disabling: a waiting packet is removed.
   void disable_in(std::uint8_t number) {
     sending_[number] = false;
     if ((hardware(in(number)) & kEnable) != 0) {
@@ -278,12 +279,12 @@ class OtgFs {
     }
     hardware(in(number) + kFlags) = kTransferred;
   }
-  // The same for what the host sends: under a global NAK, which takes effect when its entry is out of the FIFO.
+  // The same for packets from the host: under a global NAK, which takes effect when its entry is out of the FIFO.
   void disable_out(std::uint8_t number, std::uint32_t with) {
     if ((hardware(out(number)) & kEnable) != 0) {
       set_bits(kDeviceControl, kSetGlobalNak);
       for (std::uint32_t i = 0; i < kTries && (hardware(kEvents) & kGlobalNakHolds) == 0; ++i) drain();
-      // Unless the packet came just now.
+      // Unless the packet has just arrived.
       if ((hardware(out(number)) & kEnable) != 0) {
         set_bits(out(number), kDisable | kNak | with);
         wait_for(out(number) + kFlags, kDisabled, kDisabled, kTries);

@@ -29,7 +29,7 @@ inline void set_up(const Pin& p) {
   // Fast edges where a timer or USB drives the pin.
   if (p.mode == PinMode::alternate) change_bits(p.base() + kSpeed, 3U << two, 2U << two);
   change_bits(p.base() + kFunction + 4U * (p.number / 8), 15U << four, std::uint32_t{p.function} << four);
-  // The mode last: a pin that a peripheral takes over has its function by then, an output its level.
+  // The mode last: by then a pin of a peripheral has its function, an output its level.
   change_bits(p.base(), 3U << two, static_cast<std::uint32_t>(p.mode) << two);
 }
 inline void set_up(std::span<const Pin> pins) {

@@ -1,5 +1,5 @@
-// Where the peripherals of an STM32F405 and F446 lie (RM0090 and RM0390, memory map), and what switches each one's
-// clock on. Only those that are used; the registers of each are with its driver.
+// Addresses of the peripherals of an STM32F405 and F446 (RM0090 and RM0390, memory map), and how each one's clock is
+// switched on. Only those that are used; the registers of each are in its driver.
 #pragma once
 
 #include <cstdint>
@@ -20,7 +20,7 @@ inline constexpr std::uint32_t kTim1 = 0x40010000, kTim2 = 0x40000000, kTim3 = 0
                                kGpioA = 0x40020000, kGpioBytes = 0x400, kRcc = 0x40023800, kFlash = 0x40023C00,
                                kOtgFs = 0x50000000;
 
-// 96 bits of the chip's own (RM0090, 39.1).
+// The chip's unique number of 96 bits (RM0090, 39.1).
 inline constexpr std::uint32_t kUniqueId = 0x1FFF7A10;
 
 // RCC_AHB1ENR and so on: the register that holds a clock's bit, and the bit.

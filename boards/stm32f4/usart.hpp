@@ -1,4 +1,4 @@
-// A line of bytes, 8N1. Moved by the control tick, a byte each way a tick: up to 115200 baud nothing is lost while
+// A serial line, 8N1. The control tick moves one byte each way: up to 115200 baud nothing is lost while
 // background work is busy, and no second interrupt is needed (RM0090, 30).
 #pragma once
 
@@ -11,7 +11,7 @@
 
 namespace flexspline::stm32f4 {
 
-// One context puts, another takes.
+// A ring with one writing and one reading context.
 template <std::size_t size>
 class ByteRing {
   static_assert(size <= 256 && (size & (size - 1)) == 0);
@@ -53,7 +53,7 @@ class Usart {
   // The tick.
   void move() {
     const std::uint32_t status = hardware(usart);
-    // Reading the data ends an overrun as well; what was garbled, the frame's CRC finds. A full ring drops.
+    // Reading the data ends an overrun as well. The frame's CRC finds corrupted bytes. A full ring drops.
     if ((status & (kCame | kOverrun)) != 0) came_.put(static_cast<std::uint8_t>(hardware(usart + kData)));
     std::uint8_t byte = 0;
     if ((status & kCanSend) != 0 && to_send_.take(byte)) hardware(usart + kData) = byte;

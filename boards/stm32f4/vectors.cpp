@@ -1,5 +1,5 @@
-// The vector table up to the one interrupt that is ever enabled, and what happens at an exception that has no business
-// here: the amplifier off, then a reset. A stack that overflowed leaves the RAM at its lower end and ends here as well.
+// The vector table up to the one interrupt that is ever enabled, and the handler of unexpected exceptions: the
+// amplifier off, then a reset. A stack overflow leaves the RAM at its lower end and ends here as well.
 #include <cstdint>
 
 #include "boards/cortex_m4/hardware.hpp"
@@ -10,21 +10,21 @@ extern std::uint32_t stack_top[];
 [[noreturn]] void Reset_Handler();
 [[noreturn]] void Unexpected_Handler();
 void ADC_IRQHandler();
-// Of the boot loader alone.
+// The boot loader only.
 [[gnu::weak]] void SysTick_Handler() {
   Unexpected_Handler();
 }
-// Of the board: opens all switches with nothing but registers.
+// Provided by the board: opens all switches by writing registers only.
 void cut_amplifier();
 
-[[noreturn, gnu::used, gnu::noinline]] void give_up() {
+[[noreturn, gnu::used, gnu::noinline]] void switch_off_and_reset() {
   cut_amplifier();
   flexspline::stm32f4::note_crash();
   flexspline::cortex_m4::reset_processor();
 }
-// The stack may be what went wrong: a new one first.
+// The stack may be the cause: set a new one first.
 [[noreturn, gnu::naked, gnu::used]] void Unexpected_Handler() {
-  asm volatile("ldr r0, =stack_top \n mov sp, r0 \n b give_up");
+  asm volatile("ldr r0, =stack_top \n mov sp, r0 \n b switch_off_and_reset");
 }
 }
 
@@ -37,7 +37,7 @@ constexpr Vector kGiveUp{.handler = Unexpected_Handler};
 constexpr Vector kNone{.handler = nullptr};
 constexpr Vector kSysTick{.handler = SysTick_Handler};
 constexpr Vector kTick{.handler = ADC_IRQHandler};
-// NMI is the crystal's death (RM0090, 7.2.7): the start after the reset takes the internal oscillator.
+// NMI: the crystal failed (RM0090, 7.2.7). The start after the reset takes the internal oscillator.
 [[gnu::section(".vectors"), gnu::used]] const Vector kVectors[16 + 19] = {
     {.stack = stack_top},
     {.handler = Reset_Handler},

@@ -31,12 +31,12 @@ class IndependentWatchdog {
   static constexpr std::uint32_t kSlowestHz = 17'000;
   static constexpr std::uint32_t kShort = kSlowestHz / 4 * firmware::kWatchdogTicks / tick_hz - 1;
   static_assert(kShort > 10 && kShort < 4096);
-  // An update takes five cycles of the oscillator; a turn of the loop at least 0.1 us.
+  // An update takes five cycles of the oscillator; an iteration at least 0.1 us.
   static constexpr std::uint32_t kTries = 20'000;
 
-  // Divided by 4; or by 32, where 4096 counts are 2.8 s for the fastest.
+  // Divided by 4, or by 32, where 4096 counts are 2.8 s at the fastest.
   void set_limit(bool is_short) {
-    if (!wait_for(kStatus, 3, 0, kTries)) return;  // the change before is not through: the next feed tries again
+    if (!wait_for(kStatus, 3, 0, kTries)) return;  // the previous change is not finished: the next feed tries again
     hardware(kIwdg) = kUnlock;
     hardware(kPrescaler) = is_short ? 0 : 3;
     hardware(kReload) = is_short ? kShort : 0xFFF;

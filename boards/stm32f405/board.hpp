@@ -1,4 +1,4 @@
-// What this board is: clock, pins, timers, amplifier. README.md has the pins as a table.
+// Description of this board: clock, pins, timers, amplifier. README.md has the pins as a table.
 #pragma once
 
 #include <array>
@@ -11,12 +11,12 @@ namespace flexspline::stm32f405 {
 
 using stm32f4::Pin, stm32f4::PinMode, stm32f4::Pull;
 
-// Low: the amplifier is off. A resistor on the board pulls it down as well, for the time before the first instruction.
+// Low: the amplifier is off. A resistor on the board pulls it down as well until the first instruction runs.
 inline constexpr Pin kEnable{'C', 6, PinMode::output, 0, Pull::down};
 
 #ifdef FLEXSPLINE_PWM
-// What the board's current sensor and bridge are, and the most that it gives. The torque sensor and the thermometer are
-// whatever is connected, so a block alone states their scales.
+// The board's current sensor, bridge and largest current. Torque sensor and thermometer are not part of the board, so
+// the block states their scales.
 inline constexpr control::Hardware kStated{.current_full_scale_ma = 8'000,
                                            .amplifier_full_scale_ma = 5'000,
                                            .most_current_ma = 5'000,
@@ -32,7 +32,7 @@ inline constexpr stm32f4::BridgeSetup kBridge{
         static_cast<std::int32_t>(kStated.current_full_scale_ma * 4096 / kStated.amplifier_full_scale_ma)};
 #else
 // Current sensor and amplifier are those of the servo amplifier that is connected: set its full scales and its largest
-// current here, and no block can say otherwise.
+// current here. No block can override them.
 inline constexpr control::Hardware kStated{.motor_encoder = control::SensorKind::incremental,
                                            .output_encoder = control::SensorKind::incremental};
 #endif
@@ -65,7 +65,7 @@ struct Description {
       Pin{'B', 13, PinMode::alternate, 1, Pull::down},  // TIM1_CH1N, leg A low
       Pin{'A', 10, PinMode::alternate, 1, Pull::down},  // TIM1_CH3, leg B high
       Pin{'B', 15, PinMode::alternate, 1, Pull::down},  // TIM1_CH3N, leg B low
-      Pin{'B', 12, PinMode::alternate, 1, Pull::up},    // TIM1_BKIN, low: the bridge is in trouble
+      Pin{'B', 12, PinMode::alternate, 1, Pull::up},    // TIM1_BKIN, low: the bridge reports a fault
 #else
       Pin{'A', 4, PinMode::analog},  // DAC_OUT1, current command
 #endif
@@ -82,9 +82,9 @@ struct Description {
   using Serial = stm32f4::Usart<stm32f4::kUsart3>;
   static constexpr std::uint32_t kBaud = 115'200;
   static constexpr bool kHasUsb = true;
-  static constexpr std::uint32_t kParameterSector = 1;  // and the next
+  static constexpr std::uint32_t kParameterSector = 1;  // and the one after it
   static constexpr std::uint32_t kApplicationSector = 5;
-  // Application, download and the application before, 96 KB each (application.ld).
+  // Application, download and previous application, 96 KB each (application.ld).
   template <class Busy>
   using Images = stm32f4::ImageFlash<Busy, 0x18000, 5, 6, 7>;
 };

@@ -8,9 +8,9 @@
 #include <type_traits>
 #include <vector>
 
-#include "hil/board/brain.hpp"
-#include "hil/board/drive_rig.hpp"
-#include "shared/fixed/findings.hpp"
+#include "hil/board/controller.hpp"
+#include "hil/board/plant_rig.hpp"
+#include "shared/fixed/overflow_log.hpp"
 #include "shared/fixed/turn.hpp"
 
 namespace flexspline::board {
@@ -22,7 +22,7 @@ double stiffness_of(const plant::Drive& drive) {
   const plant::Effect* spring = drive.find("linear_stiffness");
   return spring == nullptr ? 0.0 : spring->value("stiffness");
 }
-// As far as the maker knows it.
+// Without the hidden effects.
 double breakaway_torque_of(const plant::Drive& drive) {
   const auto known = [&](const char* effect, const char* parameter) {
     const plant::Effect* found = drive.find(effect);
@@ -44,7 +44,7 @@ double output_inertia_of(const plant::Drive& drive) {
 template <class Effect>
 void add_all(const plant::Drive& drive, const effects::DriveConstants<double>& d,
              model::DriveModel<N, model::EveryFormula>& model) {
-  // What a sensor gets wrong turns no shaft.
+  // Errors of sensors do not act on a shaft.
   for (const std::string_view of_sensor :
        {"torsion_zero", "torque_offset", "torque_sensor_gain", "torque_sensor_ripple"})
     if (Effect::kInfo.name == of_sensor) return;
@@ -121,7 +121,7 @@ control::DriveSetup<double> setup_of(const plant::Drive& drive, const effects::D
                    .stiffness = stiffness,
                    .torsion_limit = 1.9 * d.torsion_base,
                    .torsion_rate_limit = 0.5 * d.velocity_base / d.gear_ratio};
-  // Of what is hidden the drive is not told.
+  // The drive does not know hidden effects.
   if (const plant::Effect* damping = drive.find("structural_damping"); damping != nullptr && !damping->hidden) {
     s.feedforward.damping_torque = damping->value("torque");
     s.feedforward.damping_exponent = damping->value("exponent");
@@ -145,14 +145,15 @@ control::DriveSetup<double> setup_of(const plant::Drive& drive, const effects::D
 
 namespace {
 void require_no_findings() {
-  if (fixed::Findings::count() != 0)
-    throw std::runtime_error("the drive's parameters do not fit its numbers: " + std::string(fixed::Findings::first()));
+  if (fixed::OverflowLog::count() != 0)
+    throw std::runtime_error("the drive's parameters do not fit its numbers: " +
+                             std::string(fixed::OverflowLog::first()));
 }
 }  // namespace
 
 firmware::Parameters parameters_of(const plant::Drive& drive, const control::DriveSetup<double>& setup) {
   const effects::DriveConstants<double> d = constants_of(drive, setup.tick_hz);
-  fixed::Findings::clear();
+  fixed::OverflowLog::clear();
   firmware::Parameters parameters = control::derive<N>(setup, d);
   parameters.model.for_each(
       [&]<class Effect>(model::Places<Effect, N>&) { add_all<Effect>(drive, d, parameters.model); });

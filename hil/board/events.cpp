@@ -72,7 +72,7 @@ bool EventScript::acts(Event::Kind kind, double time_s) const {
   return std::any_of(events_.begin(), events_.end(), [&](const Event& e) { return e.kind == kind && e.acts(time_s); });
 }
 
-void EventScript::apply(double time_s, double load_torque_nm, DriveRig& rig) {
+void EventScript::apply(double time_s, double load_torque_nm, PlantRig& rig) {
   Disturbances now;
   double load = load_torque_nm;
   for (const Event& e : events_) {

@@ -5,20 +5,20 @@
 
 namespace flexspline::board {
 
-/// Where the output shall be: rad, rad/s, rad/s^2.
+/// Set point of the output: rad, rad/s, rad/s^2.
 struct Reference {
   double position = 0.0;
   double velocity = 0.0;
   double acceleration = 0.0;
 };
 
-/// A motion of the output from rest at nought. Which of the members count, `kind` says.
+/// A motion of the output from rest at zero. `kind` determines which members are used.
 struct Motion {
   enum class Kind {
     sines,      ///< their sum, faded in during the first second by 3 x^2 - 2 x^3
     constant,   ///< `velocity_rad_s`, reached within half a second
-    trapezoid,  ///< to and fro with `acceleration_rad_s2`: an eighth of the period each faster and slower, between them
-                ///< a quarter at speed
+    trapezoid,  ///< back and forth with `acceleration_rad_s2`: an eighth of the period each faster and slower, between
+                ///< them a quarter at speed
     waypoints,  ///< from point to point, at rest in each, with the least jerk: a polynomial of degree five between them
   };
   struct Sine {
@@ -35,7 +35,7 @@ struct Motion {
   double velocity_rad_s = 0.0;
   double acceleration_rad_s2 = 0.0;
   double period_s = 0.0;
-  std::vector<Waypoint> waypoints{};  ///< times rise, the first above nought
+  std::vector<Waypoint> waypoints{};  ///< times rise, the first above zero
 
   Reference at(double time_s) const;
 };

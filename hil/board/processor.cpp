@@ -65,10 +65,10 @@ bool Processor::is_installed() {
 Processor::Processor(std::filesystem::path image) : image_(std::filesystem::absolute(std::move(image))) {
   if (!std::filesystem::is_regular_file(image_))
     throw std::runtime_error(image_.string() + ": no such firmware image; " + kMakes);
-  if (!is_arm_program(image_)) throw std::runtime_error(image_.string() + ": is no ARM program (ELF); " + kMakes);
+  if (!is_arm_program(image_)) throw std::runtime_error(image_.string() + ": is not an ARM program (ELF); " + kMakes);
   if (!is_installed())
     throw std::runtime_error(std::string(kEmulator) + " is not installed; it is in the Debian package of that name");
-  // A pipe whose reader went away is an error of write(), not the end of this program.
+  // Writing to a pipe without a reader is an error of write(), not the end of this program.
   signal(SIGPIPE, SIG_IGN);
 }
 
@@ -81,26 +81,27 @@ void Processor::end() {
     kill(child_, SIGKILL);
     waitpid(child_, nullptr, 0);
   }
-  if (down_ >= 0) close(down_);
-  if (up_ >= 0) close(up_);
-  child_ = down_ = up_ = -1;
+  if (to_image_ >= 0) close(to_image_);
+  if (from_image_ >= 0) close(from_image_);
+  child_ = to_image_ = from_image_ = -1;
   std::error_code ignored;
   if (!folder_.empty()) std::filesystem::remove_all(folder_, ignored);
   folder_.clear();
 }
 
 void Processor::start(const Block& block, const firmware::TelemetrySetup& telemetry, firmware::ResetCause) {
-  end();  // a supply that came back
+  end();  // after a power cut
   std::string folder = (std::filesystem::temp_directory_path() / "flexspline-processor-XXXXXX").string();
   if (mkdtemp(folder.data()) == nullptr) throw std::runtime_error(folder + ": cannot be made: " + std::strerror(errno));
   folder_ = folder;
-  const std::string down = folder + "/to_drive", up = folder + "/from_drive", log = folder + "/log";
-  if (mkfifo(down.c_str(), 0600) != 0 || mkfifo(up.c_str(), 0600) != 0)
-    throw std::runtime_error(folder + ": no pipes can be made there: " + std::strerror(errno));
+  const std::string to_image = folder + "/to_drive", from_image = folder + "/from_drive", log = folder + "/log";
+  if (mkfifo(to_image.c_str(), 0600) != 0 || mkfifo(from_image.c_str(), 0600) != 0)
+    throw std::runtime_error(folder + ": pipes cannot be made there: " + std::strerror(errno));
   // Open for both directions, so that neither end waits for the other to open.
-  down_ = open(down.c_str(), O_RDWR | O_CLOEXEC);
-  up_ = open(up.c_str(), O_RDWR | O_CLOEXEC);
-  if (down_ < 0 || up_ < 0) throw std::runtime_error(folder + ": the pipes cannot be opened: " + std::strerror(errno));
+  to_image_ = open(to_image.c_str(), O_RDWR | O_CLOEXEC);
+  from_image_ = open(from_image.c_str(), O_RDWR | O_CLOEXEC);
+  if (to_image_ < 0 || from_image_ < 0)
+    throw std::runtime_error(folder + ": the pipes cannot be opened: " + std::strerror(errno));
 
   const std::string emulator = found_on_path(kEmulator), image = image_.string();
   const std::array<const char*, 16> arguments{kEmulator,
@@ -132,19 +133,19 @@ void Processor::start(const Block& block, const firmware::TelemetrySetup& teleme
     throw std::runtime_error(emulator + " cannot be started: " + std::strerror(error));
   }
   const auto bytes = block.bytes();
-  const firmware::LockStepStart start{static_cast<std::uint32_t>(bytes.size()), telemetry};
+  const firmware::CoSimulationStart start{static_cast<std::uint32_t>(bytes.size()), telemetry};
   send(&start, sizeof(start));
   send(bytes.data(), bytes.size());
 }
 
-firmware::LockStepUp Processor::tick(const firmware::LockStepDown& down) {
-  send(&down, sizeof(down));
-  firmware::LockStepUp up;
-  receive(&up, sizeof(up));
-  most_instructions_ = std::max(most_instructions_, up.instructions);
-  instructions_ += up.instructions;
+firmware::CoSimulationOutput Processor::tick(const firmware::CoSimulationInput& input) {
+  send(&input, sizeof(input));
+  firmware::CoSimulationOutput output;
+  receive(&output, sizeof(output));
+  most_instructions_ = std::max(most_instructions_, output.instructions);
+  instructions_ += output.instructions;
   ++ticks_;
-  return up;
+  return output;
 }
 
 void Processor::offer(std::span<const std::byte>) {
@@ -153,12 +154,12 @@ void Processor::offer(std::span<const std::byte>) {
 
 int Processor::stop() {
   if (child_ <= 0) return 0;
-  firmware::LockStepDown last;
+  firmware::CoSimulationInput last;
   last.ends = true;
   send(&last, sizeof(last));
-  firmware::LockStepUp up;
-  receive(&up, sizeof(up));
-  stack_bytes_ = up.stack_bytes;
+  firmware::CoSimulationOutput output;
+  receive(&output, sizeof(output));
+  stack_bytes_ = output.stack_bytes;
   int status = 0;
   waitpid(child_, &status, 0);
   child_ = -1;
@@ -168,9 +169,9 @@ int Processor::stop() {
 void Processor::send(const void* bytes, std::size_t count) {
   const char* from = static_cast<const char*>(bytes);
   while (count > 0) {
-    pollfd ready{down_, POLLOUT, 0};
-    if (poll(&ready, 1, kPatienceMs) != 1) fail("takes nothing any more");
-    const ssize_t written = write(down_, from, std::min<std::size_t>(count, PIPE_BUF));
+    pollfd ready{to_image_, POLLOUT, 0};
+    if (poll(&ready, 1, kPatienceMs) != 1) fail("does not accept data any more");
+    const ssize_t written = write(to_image_, from, std::min<std::size_t>(count, PIPE_BUF));
     if (written <= 0) fail("cannot be written to");
     from += written;
     count -= static_cast<std::size_t>(written);
@@ -180,8 +181,8 @@ void Processor::send(const void* bytes, std::size_t count) {
 void Processor::receive(void* bytes, std::size_t count) {
   char* to = static_cast<char*>(bytes);
   while (count > 0) {
-    pollfd ready{up_, POLLIN, 0};
-    // In short turns, so that an emulator that ended is found out.
+    pollfd ready{from_image_, POLLIN, 0};
+    // In short intervals, so that the end of the emulator is detected.
     int waited = 0;
     while (poll(&ready, 1, 100) != 1) {
       int status = 0;
@@ -192,7 +193,7 @@ void Processor::receive(void* bytes, std::size_t count) {
       waited += 100;
       if (waited >= kPatienceMs) fail("does not answer");
     }
-    const ssize_t got = read(up_, to, count);
+    const ssize_t got = read(from_image_, to, count);
     if (got <= 0) fail("cannot be read from");
     to += got;
     count -= static_cast<std::size_t>(got);
@@ -201,7 +202,7 @@ void Processor::receive(void* bytes, std::size_t count) {
 
 void Processor::fail(const char* what) {
   const std::string said = text_of(folder_ / "log");
-  // Of a processor that stops at a fault the emulator lists all registers.
+  // When a processor stops at a fault the emulator prints all registers.
   throw std::runtime_error("the emulated processor " + std::string(what) +
                            (said.empty() ? "" : ": " + said.substr(0, said.find('\n'))) + "; is " + image_.string() +
                            " the image of boards/qemu_stm32f405?");

@@ -40,7 +40,7 @@ class Host {
     c.acceleration = N::value(r.acceleration * d_.gear_ratio / d_.acceleration_base);
     return c;
   }
-  // What a host does in a millisecond that it has heard this status in: it takes up a drive that was away.
+  // The host's work in a millisecond in which it received this status: it arms a drive again that was away.
   firmware::Command next(const firmware::Status& status, const Reference& r) const {
     using Kind = firmware::Command::Kind;
     if (status.mode == firmware::Mode::idle) return command(Kind::arm, r);
@@ -55,9 +55,9 @@ class Host {
 };
 
 // The motion, and after it the hold: from the velocity at its end to rest within a quarter of a second.
-class Course {
+class MotionAndHold {
  public:
-  Course(const Scenario& motion, double duration_s) : motion_(motion), duration_s_(duration_s) {}
+  MotionAndHold(const Scenario& motion, double duration_s) : motion_(motion), duration_s_(duration_s) {}
   Reference at(double time_s) const {
     if (time_s <= duration_s_) return motion_.at(time_s);
     constexpr double kStopS = 0.25;
@@ -72,12 +72,12 @@ class Course {
   double duration_s_;
 };
 
-// What becomes of the measurements of a run, one a millisecond.
-class Judge {
+// Accumulates the measurements of a run, one a millisecond.
+class RunMeasures {
  public:
-  Judge(const ScenarioPlan& plan, ScenarioResult& result) : plan_(plan), result_(result) {}
+  RunMeasures(const ScenarioPlan& plan, ScenarioResult& result) : plan_(plan), result_(result) {}
 
-  void see(double time_s, const Reference& set, const DriveRig& rig) {
+  void add(double time_s, const Reference& set, const PlantRig& rig) {
     const plant::State& state = rig.truth();
     const double error = state.output_angle - set.position, current = rig.current_a();
     result_.peak_current_a = std::max(result_.peak_current_a, std::abs(current));
@@ -87,7 +87,7 @@ class Judge {
       error_squares_ += error * error;
       result_.peak_error_rad = std::max(result_.peak_error_rad, std::abs(error));
       current_squares_ += current * current;
-      ++judged_;
+      ++samples_;
       const bool rests = state.motor_velocity == 0.0;
       if (rests && !rested_ && std::abs(set.velocity) > 0.1 * fastest_) ++result_.stops;
       rested_ = rests;
@@ -95,7 +95,7 @@ class Judge {
       low_ = std::min(low_, state.output_angle);
       high_ = std::max(high_, state.output_angle);
       error_sum_ += error;
-      ++held_;
+      ++hold_samples_;
       if (state.motor_direction != 0) {
         if (direction_ != 0 && state.motor_direction != direction_) ++result_.hold_reversals;
         direction_ = state.motor_direction;
@@ -103,12 +103,12 @@ class Judge {
     }
   }
   void finish() {
-    const double count = judged_ > 0 ? static_cast<double>(judged_) : 1.0;
+    const double count = samples_ > 0 ? static_cast<double>(samples_) : 1.0;
     result_.rms_error_rad = std::sqrt(error_squares_ / count);
     result_.rms_current_a = std::sqrt(current_squares_ / count);
-    if (held_ == 0) return;
+    if (hold_samples_ == 0) return;
     result_.hold_swing_rad = 0.5 * (high_ - low_);
-    result_.hold_error_rad = error_sum_ / static_cast<double>(held_);
+    result_.hold_error_rad = error_sum_ / static_cast<double>(hold_samples_);
   }
 
  private:
@@ -117,7 +117,7 @@ class Judge {
   ScenarioResult& result_;
   double error_squares_ = 0.0, current_squares_ = 0.0, error_sum_ = 0.0, fastest_ = 0.0;
   double low_ = 1e300, high_ = -1e300;
-  std::uint64_t judged_ = 0, held_ = 0;
+  std::uint64_t samples_ = 0, hold_samples_ = 0;
   int direction_ = 0;
   bool rested_ = false;
 };
@@ -142,7 +142,7 @@ Motion trapezoid() {
 }
 
 TracePoint traced(double time_s, const Reference& set, const VirtualDrive& drive, double load_torque_nm) {
-  const DriveRig& rig = drive.rig();
+  const PlantRig& rig = drive.rig();
   return {time_s,
           set,
           rig.truth().output_angle,
@@ -158,9 +158,9 @@ TracePoint traced(double time_s, const Reference& set, const VirtualDrive& drive
 
 const std::vector<Scenario>& scenarios() {
   static const std::vector<Scenario> all = {
-      {"slow-reversals", "sine of 0.02 rad and 0.25 Hz: friction changes its side", of_sines({{0.02, 0.25, 0.0}})},
+      {"slow-reversals", "sine of 0.02 rad and 0.25 Hz: friction changes its sign", of_sines({{0.02, 0.25, 0.0}})},
       {"sine", "sine of 0.2 rad and 0.5 Hz", of_sines({{0.2, 0.5, 0.0}})},
-      {"trapezoid", "to and fro by 1.5 rad, with accelerations of 4 rad/s^2", trapezoid()},
+      {"trapezoid", "back and forth by 1.5 rad, with accelerations of 4 rad/s^2", trapezoid()},
       {"joint-trajectory", "three sines at once, as a robot's joint moves",
        of_sines({{0.25, 0.2, 0.0}, {0.08, 0.55, 0.3}, {0.02, 1.3, 0.1}})},
       {"constant-slow", "0.005 rad/s one way: ripple and stick-slip", constant_slow()},
@@ -177,14 +177,14 @@ const Scenario& scenario(std::string_view name) {
   throw std::invalid_argument("no scenario '" + std::string(name) + "'; there are " + known);
 }
 
-ScenarioResult run_scenario(const ScenarioPlan& plan, std::unique_ptr<Brain> brain) {
+ScenarioResult run_scenario(const ScenarioPlan& plan, std::unique_ptr<Controller> controller) {
   constexpr std::uint32_t kBootTicks = 100;
   if (plan.tick_hz < 4'000 || plan.tick_hz > 40'000 || plan.tick_hz % 1000 != 0)
     throw std::invalid_argument("a drive of " + std::to_string(plan.tick_hz) +
                                 " ticks a second cannot be simulated; take a multiple of 1000 from 4000 to 40000");
   const std::uint32_t host_ticks = plan.tick_hz / 1000;
   const Scenario motion = plan.motion ? *plan.motion : scenario(plan.scenario);
-  const Course course(motion, plan.duration_s);
+  const MotionAndHold motion_and_hold(motion, plan.duration_s);
   const effects::DriveConstants<double> constants =
       plan.packed ? plan.packed->constants : constants_of(plan.drive, plan.tick_hz);
   if (std::abs(constants.gear_ratio - plan.drive.gear_ratio) > 1e-6 * plan.drive.gear_ratio)
@@ -195,10 +195,10 @@ ScenarioResult run_scenario(const ScenarioPlan& plan, std::unique_ptr<Brain> bra
   const Block block = plan.packed ? Block(plan.packed->bytes)
                                   : Block(parameters_of(plan.drive, setup_of(plan.drive, constants)), constants);
   VirtualDrive drive({.drive = plan.drive, .seed = plan.seed, .tick_hz = plan.tick_hz, .noise = plan.noise}, block,
-                     telemetry(), std::move(brain));
+                     telemetry(), std::move(controller));
   drive.rig().set_load_torque(plan.load_torque_nm);
   drive.run(kBootTicks);
-  const firmware::Answer armed = drive.command(host.command(firmware::Command::Kind::arm, course.at(0.0)));
+  const firmware::Answer armed = drive.command(host.command(firmware::Command::Kind::arm, motion_and_hold.at(0.0)));
   if (armed.refusal != firmware::Refusal::none)
     throw std::runtime_error("the drive cannot be armed: fault " +
                              std::string(firmware::info_of(drive.status().fault.fault).name));
@@ -206,27 +206,27 @@ ScenarioResult run_scenario(const ScenarioPlan& plan, std::unique_ptr<Brain> bra
   ScenarioResult result;
   result.compensation = plan.compensation;
   EventScript script(plan.events);
-  Judge judge(plan, result);
+  RunMeasures measures(plan, result);
   const auto ticks = static_cast<std::uint64_t>(std::llround((plan.duration_s + plan.hold_s) * plan.tick_hz));
   const auto inject_at = static_cast<std::uint64_t>(std::llround(plan.injection_s * plan.tick_hz));
   for (std::uint64_t k = 1; k <= ticks; ++k) {
     const double time_s = static_cast<double>(k) / plan.tick_hz;
     if (plan.injection && k == inject_at) drive.rig().inject(*plan.injection);
     if (k % host_ticks == 0) {
-      const Reference set = course.at(time_s);
+      const Reference set = motion_and_hold.at(time_s);
       if (!script.empty()) {
         script.apply(time_s, plan.load_torque_nm, drive.rig());
         drive.power(!script.acts(Event::Kind::power_cut, time_s));
       }
       if (!script.acts(Event::Kind::usb_unplugged, time_s))
         drive.post(script.empty() ? host.command(firmware::Command::Kind::set, set) : host.next(drive.status(), set));
-      judge.see(time_s, set, drive.rig());
+      measures.add(time_s, set, drive.rig());
       if (plan.keeps_trace) result.trace.push_back(traced(time_s, set, drive, drive.rig().load_torque_nm()));
       if (result.first_fault.fault == firmware::Fault::none) result.first_fault = drive.status().fault;
     }
     drive.run(1);
   }
-  judge.finish();
+  measures.finish();
   result.ticks = kBootTicks + 1 + ticks;
   result.frames = drive.frame_count();
   result.telemetry_hash = drive.telemetry_hash();

@@ -22,15 +22,15 @@ struct Scenario {
   Reference at(double time_s) const { return motion.at(time_s); }
 };
 const std::vector<Scenario>& scenarios();
-/// Throws std::invalid_argument naming all there are.
+/// Throws std::invalid_argument with all names.
 const Scenario& scenario(std::string_view name);
 
 struct ScenarioPlan {
-  plant::Drive drive{};  ///< what the plant has, and what the drive is told of
+  plant::Drive drive{};  ///< the plant; the drive knows its effects that are not hidden
   std::string scenario = "sine";
-  std::optional<Scenario> motion{};  ///< in the place of the one that is named
+  std::optional<Scenario> motion{};  ///< replaces the one that is named
   double duration_s = 10.0;
-  /// After the motion the output is held where it shall be; the second half shows whether the loops come to rest.
+  /// After the motion the output is held at its set point; the second half shows whether the loops come to rest.
   double hold_s = 0.0;
   std::uint32_t tick_hz = SoftwareBoard::kTickHz;  ///< of the drive; whole ticks in a millisecond
   std::uint64_t seed = 1;
@@ -39,12 +39,12 @@ struct ScenarioPlan {
   double injection_s = 0.0;
   std::vector<Event> events{};
   double load_torque_nm = 0.0;          ///< on the output all the time, positive resists
-  std::optional<PackedModel> packed{};  ///< what the drive is given; else the plant's own values
+  std::optional<PackedModel> packed{};  ///< the drive's parameters; without it the plant's own values
   bool keeps_trace = false;
   bool noise = true;  ///< of the sensors
 };
 
-/// What a run looked like, every millisecond.
+/// Trace of a run, every millisecond.
 struct TracePoint {
   double time_s = 0.0;
   Reference reference{};
@@ -57,7 +57,7 @@ struct TracePoint {
   firmware::Mode mode{};
 };
 
-/// What happened. Errors are those of the true output position against the reference, after the first second.
+/// The result. Errors are those of the true output position against the reference, after the first second.
 struct ScenarioResult {
   bool compensation = false;
   double rms_error_rad = 0.0;
@@ -66,7 +66,7 @@ struct ScenarioResult {
   double peak_current_a = 0.0;
   /// While the set point moves at a tenth of its top speed or more: how often the shaft came to rest (stick and slip).
   int stops = 0;
-  /// Half of the output's way to and fro in the second half of the hold, and how often the motor turned round there.
+  /// Amplitude of the output in the second half of the hold, and the number of the motor's reversals there.
   double hold_swing_rad = 0.0;
   int hold_reversals = 0;
   double hold_error_rad = 0.0;  ///< mean over that half
@@ -76,17 +76,17 @@ struct ScenarioResult {
   std::uint64_t telemetry_hash = 0;
   double wall_s = 0.0;
   firmware::Status end{};
-  firmware::FaultRecord first_fault{};  ///< that the drive had, even where it went on
+  firmware::FaultRecord first_fault{};  ///< of the drive, even where it continued
   std::vector<TracePoint> trace{};
 
-  /// The loops hunt at rest: the shaft keeps turning round, by more than the encoder's counts.
+  /// The loops hunt at rest: the shaft keeps reversing, by more than the encoder's counts.
   bool limit_cycle(double count_rad) const { return hold_reversals >= 2 && hold_swing_rad > 2.0 * count_rad; }
 };
-/// Runs it on the software board, or on `brain`. Throws std::runtime_error where the drive cannot be armed,
-/// std::invalid_argument for a rate of ticks that is none for it.
-ScenarioResult run_scenario(const ScenarioPlan& plan, std::unique_ptr<Brain> brain = nullptr);
+/// Runs it on the software board, or on `controller`. Throws std::runtime_error where the drive cannot be armed,
+/// std::invalid_argument for a tick rate that cannot be simulated.
+ScenarioResult run_scenario(const ScenarioPlan& plan, std::unique_ptr<Controller> controller = nullptr);
 
-/// The names that `--inject` knows.
+/// The names for `--inject`.
 std::optional<Injection> injection_named(std::string_view name);
 std::vector<std::string_view> injection_names();
 

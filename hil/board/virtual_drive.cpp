@@ -9,25 +9,25 @@ namespace flexspline::board {
 void FrameHash::add(std::uint64_t words) {
   hash_ ^= words;
   hash_ *= 0x100000001b3U;
-  // Of a whole word at a time the upper bits would reach the lower ones never.
+  // Without the shift the upper bits of a word would never reach the lower ones.
   hash_ ^= hash_ >> 29U;
 }
 
 VirtualDrive::VirtualDrive(const RigSetup& setup, const Block& block, const firmware::TelemetrySetup& telemetry,
-                           std::unique_ptr<Brain> brain)
+                           std::unique_ptr<Controller> controller)
     : rig_(setup),
-      brain_(brain ? std::move(brain) : std::make_unique<SoftwareBrain>(setup.tick_hz)),
+      controller_(controller ? std::move(controller) : std::make_unique<SoftwareController>(setup.tick_hz)),
       flash_(block),
       telemetry_(telemetry) {
-  brain_->start(flash_, telemetry_, firmware::ResetCause::power);
+  controller_->start(flash_, telemetry_, firmware::ResetCause::power);
 }
 
 void VirtualDrive::power(bool on) {
   if (on == powered_) return;
   powered_ = on;
   posted_.reset();
-  up_ = {};
-  if (on) brain_->start(flash_, telemetry_, firmware::ResetCause::power);
+  output_ = {};
+  if (on) controller_->start(flash_, telemetry_, firmware::ResetCause::power);
 }
 
 void VirtualDrive::run(std::uint32_t ticks) {
@@ -37,16 +37,16 @@ void VirtualDrive::run(std::uint32_t ticks) {
       rig_.act({});
       continue;
     }
-    rig_.sense(down_.readings);
-    down_.overrun = rig_.has(Injection::tick_overrun);
-    down_.reads_frame = reads_;
-    down_.has_command = posted_.has_value();
+    rig_.sense(input_.readings);
+    input_.overrun = rig_.has(Injection::tick_overrun);
+    input_.reads_frame = reads_;
+    input_.has_command = posted_.has_value();
     if (posted_) {
-      down_.command = *posted_;
+      input_.command = *posted_;
       posted_.reset();
     }
-    up_ = brain_->tick(down_);
-    rig_.act(up_.actuation);
+    output_ = controller_->tick(input_);
+    rig_.act(output_.actuation);
     take_frame();
   }
 }
@@ -58,29 +58,30 @@ void VirtualDrive::run_seconds(double seconds) {
 firmware::Answer VirtualDrive::command(const firmware::Command& command) {
   post(command);
   run(1);
-  if (!up_.has_answer) throw std::runtime_error("the drive gave no answer within a tick; does its tick run?");
-  return up_.answer;
+  if (!output_.has_answer) throw std::runtime_error("the drive gave no answer within a tick; does its tick run?");
+  return output_.answer;
 }
 
 firmware::BlockFinding VirtualDrive::commit(const Block& block) {
   constexpr int kMostTicks = 10;
   offered_ = block;
-  brain_->offer(offered_.bytes());
+  controller_->offer(offered_.bytes());
   for (int k = 0; k < kMostTicks; ++k) {
     run(1);
-    if (up_.has_finding) return up_.finding;
+    if (output_.has_finding) return output_.finding;
   }
-  throw std::runtime_error("the drive did not decide on a block; does its background work run?");
+  throw std::runtime_error("the drive did not accept or refuse a block; does its background work run?");
 }
 
 void VirtualDrive::take_frame() {
-  if (up_.frame_words == 0) return;
+  if (output_.frame_words == 0) return;
   std::size_t i = 0;
-  for (; i + 1 < up_.frame_words; i += 2) hash_.add(up_.frame[i] | std::uint64_t{up_.frame[i + 1]} << 32U);
-  if (i < up_.frame_words) hash_.add(up_.frame[i]);
+  for (; i + 1 < output_.frame_words; i += 2) hash_.add(output_.frame[i] | std::uint64_t{output_.frame[i + 1]} << 32U);
+  if (i < output_.frame_words) hash_.add(output_.frame[i]);
   ++frame_count_;
   if (keep_)
-    frames_.push_back({up_.frame[0], up_.frame[1], {up_.frame.begin() + 2, up_.frame.begin() + up_.frame_words}});
+    frames_.push_back(
+        {output_.frame[0], output_.frame[1], {output_.frame.begin() + 2, output_.frame.begin() + output_.frame_words}});
 }
 
 }  // namespace flexspline::board

@@ -5,8 +5,8 @@
 #include <optional>
 #include <vector>
 
-#include "hil/board/brain.hpp"
-#include "hil/board/drive_rig.hpp"
+#include "hil/board/controller.hpp"
+#include "hil/board/plant_rig.hpp"
 
 namespace flexspline::board {
 
@@ -27,36 +27,37 @@ class FrameHash {
   std::uint64_t hash_ = 0xcbf29ce484222325U;
 };
 
-/// A rig with the application: the whole of a drive on the desktop. Each tick runs sense, control tick, act, in this
-/// order; nothing depends on the machine's clock.
+/// A rig with the application: a whole drive on the desktop. Each tick runs sense, control tick, act, in this order,
+/// independent of the machine's clock.
 class VirtualDrive {
  public:
-  /// `block` is what the drive finds in its flash at each reset; empty: none. Without a brain it gets a SoftwareBrain.
+  /// `block` is what the drive finds in its flash at each reset; empty: none. Without a controller it gets a
+  /// SoftwareController.
   VirtualDrive(const RigSetup& setup, const Block& block, const firmware::TelemetrySetup& telemetry = {},
-               std::unique_ptr<Brain> brain = nullptr);
+               std::unique_ptr<Controller> controller = nullptr);
 
   void run(std::uint32_t ticks);
   void run_seconds(double seconds);
-  /// A command that goes with the next tick and nobody waits for.
+  /// Sends a command with the next tick, without waiting for the answer.
   void post(const firmware::Command& command) { posted_ = command; }
   /// Sends a command, runs the tick that takes it and returns its answer.
   firmware::Answer command(const firmware::Command& command);
   /// Offers a block and runs until the drive has decided on it.
   firmware::BlockFinding commit(const Block& block);
 
-  /// Without power amplifier and processor do nothing; with it again the drive starts from its flash memory.
+  /// Without power neither amplifier nor processor works; when it returns the drive starts from its flash memory.
   void power(bool on);
 
-  /// Frames are hashed as they come; kept ones are in frames() as well.
+  /// All frames are hashed; with `keep_frames` they are in frames() as well.
   void keep_frames(bool keep) { keep_ = keep; }
-  /// When nobody reads the telemetry, the drive's ring fills up.
+  /// Without reading, the drive's ring of telemetry fills up.
   void read_frames(bool read) { reads_ = read; }
 
-  DriveRig& rig() { return rig_; }
-  const DriveRig& rig() const { return rig_; }
-  Brain& brain() { return *brain_; }
-  const firmware::Status& status() const { return up_.status; }
-  const firmware::LockStepUp& last() const { return up_; }
+  PlantRig& rig() { return rig_; }
+  const PlantRig& rig() const { return rig_; }
+  Controller& controller() { return *controller_; }
+  const firmware::Status& status() const { return output_.status; }
+  const firmware::CoSimulationOutput& last() const { return output_; }
   const std::vector<Frame>& frames() const { return frames_; }
   std::uint64_t telemetry_hash() const { return hash_.value(); }
   std::uint64_t frame_count() const { return frame_count_; }
@@ -64,13 +65,13 @@ class VirtualDrive {
  private:
   void take_frame();
 
-  DriveRig rig_;
-  std::unique_ptr<Brain> brain_;
+  PlantRig rig_;
+  std::unique_ptr<Controller> controller_;
   Block flash_;
   firmware::TelemetrySetup telemetry_;
   Block offered_;
-  firmware::LockStepDown down_{};
-  firmware::LockStepUp up_{};
+  firmware::CoSimulationInput input_{};
+  firmware::CoSimulationOutput output_{};
   std::optional<firmware::Command> posted_;
   std::vector<Frame> frames_;
   FrameHash hash_;

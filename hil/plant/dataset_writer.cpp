@@ -102,7 +102,7 @@ Text base_model(const Drive& drive) {
   return text;
 }
 
-// A bristle stands in for Coulomb friction.
+// A bristle replaces Coulomb friction.
 void write_effects(Text& text, const Drive& drive, bool with_hidden) {
   const Effect* dahl = drive.find("dahl_friction");
   const bool bristle = dahl != nullptr && (with_hidden || !dahl->hidden);
@@ -124,7 +124,7 @@ void write_effects(Text& text, const Drive& drive, bool with_hidden) {
 
 Text truth(const std::vector<Record>& records, const Drive& drive) {
   Text text;
-  line(text, "# What the plant really is. Not for the eyes of an identification.");
+  line(text, "# The plant's true parameters. Not for use in an identification.");
   line(text, "format = \"flexspline-model/1\"\nname = \"{}-truth\"", drive.name);
   line(text, "hidden = \"{}\"\nseed = {}\nscale = {}", drive.hidden(), records.empty() ? 0 : records.front().seed,
        real(drive.hidden_scale));

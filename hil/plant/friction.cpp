@@ -80,7 +80,7 @@ double MotorFriction::bristle(const FrictionPoint& at) const {
 
 FrictionTorque MotorFriction::evaluate(const FrictionPoint& at, double viscous_now) const {
   const double s = at.direction;
-  const double along = s * at.velocity;  // negative where a solver looks beyond an event
+  const double along = s * at.velocity;  // negative where a solver evaluates beyond an event
   const double speed = std::abs(at.velocity);
   FrictionTorque sum;
   sum.torque = viscous_now * at.velocity + viscous_asymmetry * along + coulomb_asymmetry;

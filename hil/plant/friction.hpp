@@ -67,13 +67,13 @@ struct LuGre {
   double limit(double velocity_rad_s) const;
 };
 
-/// What the friction on the motor shaft is evaluated at.
+/// The state at which the friction on the motor shaft is evaluated.
 struct FrictionPoint {
   double direction = 0.0;        ///< +1 or -1: the branch of the set-valued sign
   double velocity = 0.0;         ///< motor rad/s
   double torque = 0.0;           ///< through the flexspline, output side, N m
   double angle = 0.0;            ///< motor rad
-  double anchor = 0.0;           ///< motor angle at which the bristle stood at `bristle`
+  double anchor = 0.0;           ///< motor angle at which the deflection was `bristle`
   double bristle = 0.0;          ///< bristle deflection at the anchor, rad
   double anchor_velocity = 0.0;  ///< motor rad/s there
 };
@@ -86,7 +86,7 @@ struct FrictionTorque {
   double by_angle = 0.0;
 };
 
-/// Everything that stands between Km i and J a + T/N on the motor shaft, apart from inertia.
+/// All torques between Km i and J a + T/N on the motor shaft, except inertia.
 struct MotorFriction {
   double gear_ratio = 100.0;
   double viscous = 0.0;
@@ -115,15 +115,14 @@ struct MotorFriction {
 
   /// Factor on the viscous coefficient at a temperature, exp(-b (temp - temp0)).
   double viscous_factor(double temperature_c) const;
-  /// The same on Coulomb friction and on what takes its place.
+  /// The same for Coulomb friction and the effects that replace it.
   double coulomb_factor(double temperature_c) const;
   bool has_bristle() const { return dahl_torque > 0.0 || lugre.stiffness > 0.0; }
-  /// Nothing but viscous, quadratic and Coulomb friction.
+  /// Only viscous, quadratic and Coulomb friction.
   bool is_plain() const;
-  /// What is left of evaluate() where the friction is plain.
+  /// evaluate() for plain friction.
   FrictionTorque evaluate_plain(double direction, double velocity, double viscous_now) const {
-    // On its branch the law goes on smoothly past w = 0, so that a solver can look beyond an event before it locates
-    // it.
+    // On its branch the law is smooth past w = 0, so that a solver can evaluate beyond an event before it locates it.
     const double along = direction * velocity;
     FrictionTorque sum;
     sum.torque = viscous_now * velocity + viscous_asymmetry * along + coulomb_asymmetry;
@@ -135,7 +134,7 @@ struct MotorFriction {
   }
   /// `viscous_now` is the viscous coefficient at the present temperature.
   FrictionTorque evaluate(const FrictionPoint& at, double viscous_now) const;
-  /// Bristle deflection after the shaft went, in one direction, from the anchor to `angle`: the rate-independent law
+  /// Bristle deflection after the shaft moved, in one direction, from the anchor to `angle`: the rate-independent law
   /// dz/dq = 1 - s z/presliding, solved exactly.
   double bristle(const FrictionPoint& at) const;
 };

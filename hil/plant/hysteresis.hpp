@@ -48,7 +48,7 @@ struct Relay {
   double weight = 0.0;
 };
 
-/// What the loops remember, and the torsion at which they do.
+/// The states of the loops, and the torsion to which they belong.
 struct LoopState {
   static constexpr int kLoops = 6;
   static constexpr int kPlays = 16;
@@ -60,8 +60,8 @@ struct LoopState {
   std::array<std::int8_t, kRelays> relay{};
 };
 
-/// All hysteresis laws of a drive; each adds to the torque of the flexspline and follows the torsion alone, however
-/// fast.
+/// All hysteresis laws of a drive; each adds to the torque of the flexspline and depends on the torsion only, not on
+/// its rate.
 struct Loops {
   std::vector<DahlLoop> dahl;
   std::vector<DuhemLoop> duhem;
@@ -70,18 +70,18 @@ struct Loops {
   std::vector<Relay> relays;
 
   bool empty() const { return dahl.empty() && duhem.empty() && bouc_wen.empty() && plays.empty() && relays.empty(); }
-  /// The state after the torsion went, in one direction, to `torsion`. Dahl's laws in closed form, the others by Runge
-  /// and Kutta with at least 50 steps for each characteristic length.
-  /// Relays go over only where the state is `kept`: a solver that looks ahead must not meet their jumps.
+  /// The state after the torsion changed, in one direction, to `torsion`. Dahl's laws in closed form, the others by
+  /// Runge and Kutta with at least 50 steps for each characteristic length. Relays switch only where the state is
+  /// `kept`: a solver that evaluates ahead must not see their jumps.
   LoopState ahead(const LoopState& from, double torsion, bool kept) const;
   /// Torque of a state, with its slope in the direction of `sign`.
   TorqueSlope torque(const LoopState& state, double sign) const;
-  /// A gear that was worked until nothing of its past is left.
+  /// A gear that was cycled until its history has no influence.
   LoopState at_rest() const;
 };
 
-/// Torque along a prescribed path of the torsion (rad), N m: `loops` beside a spring of this stiffness and cubic
-/// stiffness.
+/// Torque along a prescribed path of the torsion (rad), N m: `loops` in parallel with a spring of this stiffness and
+/// cubic stiffness.
 std::vector<double> torque_along(const Loops& loops, double stiffness, double cubic_stiffness,
                                  const std::vector<double>& torsion);
 

@@ -14,9 +14,10 @@
 #include <utility>
 #include <vector>
 
-// The reader asserts what it then checks itself: a header such as "[.x]" would end the program where asserts are on,
-// and let the optimiser leave out the check where they are off. Without either it is an error with a line. Every source
-// that includes the reader has these lines: of functions that several compile, the linker takes one.
+// The reader asserts conditions that it then checks itself: a header such as "[.x]" would end the program where asserts
+// are on, and the optimiser could remove the check where they are off. Without either it is an error with a line
+// number. Every source that includes the reader needs these lines, as the linker takes one of several compiled copies
+// of a function.
 #pragma push_macro("NDEBUG")
 #undef NDEBUG
 #define TOML_ASSERT(expression) static_assert(true)
@@ -29,7 +30,7 @@
 namespace flexspline::plant {
 namespace {
 
-/// Reads the keys of one table, and refuses those it was not asked for: a misspelt key must not pass as a default.
+/// Reads the keys of one table and refuses unknown ones: a misspelt key must not be replaced by a default.
 class Section {
  public:
   Section(const toml::table& table, std::string_view origin, std::string where)
@@ -57,7 +58,7 @@ class Section {
     if (value < least) fail(table_.get(key), fmt::format("{} must be at least {}", key, least));
   }
   void text(std::string_view key, std::string& value, bool required = false) { read(key, value, required, "text"); }
-  /// What stands under a key, whatever it is; nullptr where there is nothing.
+  /// The node of a key, of any type; nullptr where there is none.
   const toml::node* node(std::string_view key) {
     known_.emplace_back(key);
     return table_.get(key);
@@ -68,7 +69,7 @@ class Section {
     if (node != nullptr && !node->is_table()) fail(node, fmt::format("{} must be a table", key));
     return node == nullptr ? nullptr : node->as_table();
   }
-  /// The name that the text under `key` stands for.
+  /// The value that the text under `key` names.
   template <class T>
   void choice(std::string_view key, T& value, std::initializer_list<std::pair<std::string_view, T>> names) {
     std::string name;
@@ -139,8 +140,8 @@ std::string text_of(const std::filesystem::path& file, std::string_view kind) {
 }
 
 toml::table parse_ascii(std::string_view text, std::string_view origin) {
-  // Outside quotes and comments the reader's behaviour is undefined for some letters beyond ASCII. These files need
-  // none.
+  // Outside quotes and comments the reader's behaviour is undefined for some characters beyond ASCII. These files do
+  // not need them.
   const auto foreign =
       std::find_if(text.begin(), text.end(), [](char c) { return static_cast<unsigned char>(c) > 127; });
   if (foreign != text.end()) {
@@ -216,7 +217,7 @@ Effect read_effect(const toml::table& table, std::string_view origin) {
   return effect;
 }
 
-// Half a day at a thousand samples a second: what is longer was meant in another unit.
+// Half a day at a thousand samples a second: a longer time is probably in another unit.
 constexpr double kMostSamples = 5e7;
 
 void read_duration(Section& section, const toml::table& table, const Drive& drive, ExperimentPlan& plan) {

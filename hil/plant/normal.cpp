@@ -6,8 +6,8 @@
 namespace flexspline::plant {
 namespace {
 
-// As a conversion rounds it, which for words without a sign is a branch and no vector: both halves as the lower bits of
-// a number of their size, of which no sum but the last rounds. From 0 to just below 1.
+// Rounds as a conversion does. A conversion of unsigned words has a branch and is not vectorised, so both halves become
+// the lower bits of a double, and only the last sum rounds. From 0 to just below 1.
 double share(std::uint64_t drawn) {
   constexpr double kUpper = 0x1p84, kLower = 0x1p52, kJustBelow = 1.0 - 0x1p-53;
   const auto upper = std::bit_cast<double>(std::bit_cast<std::uint64_t>(kUpper) | drawn >> 32U);
@@ -25,8 +25,8 @@ Normal::Normal(std::uint64_t seed) {
   }
 }
 
-// The whole state is new.
-void Normal::turn() {
+// Computes the next state of the generator (twist).
+void Normal::twist() {
   constexpr std::uint64_t kLower = (std::uint64_t{1} << Engine::mask_bits) - 1;
   constexpr std::size_t kShift = Engine::shift_size;
   const auto twisted = [this](std::size_t k, std::size_t after, std::size_t shifted) {
@@ -40,7 +40,7 @@ void Normal::turn() {
 }
 
 void Normal::make() {
-  turn();
+  twist();
   std::array<double, kWords> drawn;
   for (std::size_t i = 0; i < kWords; ++i) {
     std::uint64_t word = state_[i];
@@ -50,7 +50,7 @@ void Normal::make() {
     word ^= word >> Engine::tempering_l;
     drawn[i] = 2.0 * share(word) - 1.0;
   }
-  // What lies within the circle moves up.
+  // Compacts the pairs within the circle.
   std::array<double, kWords / 2> squares;
   std::size_t pairs = 0;
   for (std::size_t i = 0; i < kWords; i += 2) {

@@ -8,9 +8,9 @@
 namespace flexspline::plant {
 
 /// Numbers of a standard normal distribution by Marsaglia's polar method from the words of std::mt19937_64. Unlike
-/// std::normal_distribution, whose method each library chooses, the same seed gives the same numbers everywhere. They
-/// are made some hundred at a time: one by one, each second word and each pair that is thrown away is a branch that no
-/// processor foresees.
+/// std::normal_distribution, whose method depends on the library, the same seed gives the same numbers everywhere. They
+/// are made some hundred at a time: one at a time, each second word and each rejected pair is a branch that a processor
+/// cannot predict.
 class Normal {
  public:
   explicit Normal(std::uint64_t seed);
@@ -20,11 +20,11 @@ class Normal {
   }
 
  private:
-  using Engine = std::mt19937_64;  // of which only the numbers are taken that define it
+  using Engine = std::mt19937_64;  // only its constants are used
   static constexpr std::size_t kWords = Engine::state_size;
-  static_assert(kWords % 2 == 0, "a pair of words is of one round");
+  static_assert(kWords % 2 == 0, "both words of a pair are of one round");
 
-  void turn();
+  void twist();
   void make();
 
   std::array<std::uint64_t, kWords> state_{};

@@ -22,7 +22,7 @@ Effect& select(Drive& drive, std::string_view label) {
   }
   const auto colon = label.find(':');
   if (colon != std::string_view::npos) {
-    // A ripple of another order: the same size as the one that the file has.
+    // A ripple of another order has the size of the one in the file.
     const std::string_view type = label.substr(0, colon);
     const std::string digits(label.substr(colon + 1));
     const bool numeric =
@@ -100,7 +100,7 @@ void with(Drive& drive, std::string_view effect) {
   Effect& found = select(drive, effect);
   if (!found.catalogue) {
     throw std::invalid_argument(
-        fmt::format("no model can hold \"{}\": it can be hidden, but not be a known effect", effect));
+        fmt::format("a model cannot have \"{}\": it can be hidden, but not be a known effect", effect));
   }
   found.present = true;
 }

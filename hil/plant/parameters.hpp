@@ -9,7 +9,8 @@
 
 namespace flexspline::plant {
 
-/// One number of an effect. `scaled` marks what an effect size multiplies: the torque, or what stands for it.
+/// One number of an effect. `scaled` marks the numbers that an effect size multiplies: the torque, or a corresponding
+/// one.
 struct Parameter {
   std::string key;
   std::string unit;
@@ -18,7 +19,7 @@ struct Parameter {
 };
 
 /// One physical effect of the drive, by its name in the catalogue of effects. Effects with `catalogue == false` are
-/// truths that no library effect describes exactly; they can be hidden, but cannot stand in a model.
+/// truths that no library effect describes exactly; they can be hidden, but cannot be in a model.
 struct Effect {
   std::string type;
   bool present = false;
@@ -30,7 +31,7 @@ struct Effect {
   double value(std::string_view key) const;
   Parameter& parameter(std::string_view key);
   bool has(std::string_view key) const;
-  /// "torque_ripple:2" where the effect has an order, else the type.
+  /// "torque_ripple:2" where the effect has an order, otherwise the type.
   std::string label() const;
 };
 
@@ -61,20 +62,20 @@ struct VelocityLoop {
   double integral = 0.0;
 };
 
-/// Makes the current that a drive commands. Nought: without that limit.
+/// The amplifier of a drive. Zero: without that limit.
 struct Amplifier {
-  double saturation_a = 0.0;  ///< of a supply that is too low; what it saturates at is measured as such
+  double saturation_a = 0.0;  ///< of a low supply; the measured current saturates as well
   double bandwidth_hz = 0.0;
-  double offset_a = 0.0;  ///< flows beside what is measured
+  double offset_a = 0.0;  ///< flows in addition to the measured current
 };
 
-/// Lumped: one temperature of housing, gear and motor. Without a capacity it is what the experiment says.
+/// Lumped: one temperature of housing, gear and motor. Without a capacity the experiment states it.
 struct Thermal {
   double capacity_j_c = 0.0;
   double resistance_c_w = 1.0;  ///< to the air
   double winding_ohm = 0.0;
   std::optional<double> ambient_c{};  ///< else the reference
-  std::optional<double> start_c{};    ///< of the drive, else that of the air
+  std::optional<double> start_c{};    ///< of the drive, otherwise that of the air
 };
 
 struct Drive {
@@ -159,8 +160,8 @@ PlantFile parse_plant(std::string_view text, std::string_view origin);
 PlantFile demo_plant();
 
 /// The runs of a plan that `flexspline plan` wrote ("flexspline-plan/1"), for `drive`, at the plan's sample time, which
-/// is put into the drive, as is a current limit that is lower than the drive's. Throws std::runtime_error with file,
-/// line and cause, also for what the plant cannot do: position control.
+/// is set in the drive, as is a current limit that is lower than the drive's. Throws std::runtime_error with file, line
+/// and cause, also for what the plant cannot do: position control.
 std::vector<ExperimentPlan> load_plan(const std::filesystem::path& file, Drive& drive);
 
 /// Makes `effect` (a type, or "torque_ripple:7" for an order) present at `scale` times its size and hides it: the base

@@ -11,7 +11,8 @@ namespace {
 
 using Apply = std::function<void(const Effect&, const Drive&, Physics&)>;
 
-// The catalogue's relays go over along an edge as wide as the distance of two levels. Here each is several sharp ones.
+// The catalogue's relays switch along an edge as wide as the distance of two levels. Here each consists of several
+// ideal relays.
 void add_relays(const Effect& e, const Drive&, Physics& p) {
   const double edge = e.value("span") / 9.0;
   for (int j = 1; j <= 9; ++j)
@@ -90,7 +91,7 @@ const std::map<std::string, Apply, std::less<>>& appliers() {
        [](const Effect& e, const Drive&, Physics& p) {
          p.friction.onsets.push_back({e.value("height"), e.value("velocity"), e.value("width")});
        }},
-      // The sensor's error is no torque: the recorder adds it to the reading.
+      // The sensor's error is not a torque: the recorder adds it to the reading.
       {"current_offset", [](const Effect&, const Drive&, Physics&) {}},
       {"linear_stiffness",
        [](const Effect& e, const Drive&, Physics& p) { p.transmission.stiffness = e.value("stiffness"); }},
@@ -181,7 +182,7 @@ const std::map<std::string, Apply, std::less<>>& appliers() {
        [](const Effect& e, const Drive&, Physics& p) {
          p.transmission.kinematic_error.push_back({e.value("order"), e.value("cosine"), e.value("sine")});
        }},
-      // Errors of sensors are no torques: the recorder adds them to the readings, and makes current act late.
+      // Errors of sensors are not torques: the recorder adds them to the readings, and delays the current.
       {"current_delay", [](const Effect&, const Drive&, Physics&) {}},
       {"torque_offset", [](const Effect&, const Drive&, Physics&) {}},
       {"torque_sensor_gain", [](const Effect&, const Drive&, Physics&) {}},
@@ -213,14 +214,14 @@ Physics physics_of(const Drive& drive) {
     found->second(effect, drive, physics);
   }
   if (physics.transmission.slopes.stiffness_1 > 0.0 || !physics.transmission.loops.duhem.empty())
-    physics.transmission.stiffness = 0.0;  // these stand in for it
+    physics.transmission.stiffness = 0.0;  // these replace it
   if (!physics.transmission.loops.duhem.empty()) physics.damping_torque = 0.0;
   if (physics.friction.lugre.stiffness > 0.0) physics.friction.coulomb = 0.0;
   if (physics.friction.dahl_torque > 0.0) {
     if (!(physics.friction.dahl_presliding > 0.0)) {
       throw std::invalid_argument("dahl_friction: presliding must be positive");
     }
-    physics.friction.coulomb = 0.0;  // the bristle stands in for it
+    physics.friction.coulomb = 0.0;  // the bristle replaces it
   }
   return physics;
 }

@@ -24,10 +24,10 @@ class VelocityController {
   double update(double command_rad_s, double velocity_rad_s) {
     const double error = command_rad_s - velocity_rad_s;
     const double integral = integral_a_ + gains_.integral * error * sample_s_;
-    const double wanted = gains_.proportional * error + integral;
-    const double given = std::clamp(wanted, -limit_a_, limit_a_);
-    if (given == wanted || (wanted > given) != (error > 0.0)) integral_a_ = integral;
-    return given;
+    const double command = gains_.proportional * error + integral;
+    const double limited = std::clamp(command, -limit_a_, limit_a_);
+    if (limited == command || (command > limited) != (error > 0.0)) integral_a_ = integral;
+    return limited;
   }
 
  private:
@@ -72,7 +72,7 @@ std::vector<double> torque_reading(const SensorErrors& errors, const Record::Tru
   return reading;
 }
 
-// Currents that act from one sample to the next where the motor feels them late: that of an earlier sample first.
+// With a delayed current two values act from one sample to the next: first that of an earlier sample.
 struct LateCurrent {
   double first_a = 0.0;
   double first_s = 0.0;
@@ -165,7 +165,7 @@ Record record_one(const Drive& drive, const ExperimentPlan& plan, std::uint64_t 
     if (plan.mode == Mode::current) held = std::clamp(set_point, -drive.current_limit_a, drive.current_limit_a);
     if (plan.mode == Mode::velocity) held = controller.update(set_point, state.motor_velocity);
     Inputs inputs;
-    // A drive that is on makes its (biased) reading follow the command.
+    // With the drive on, its (biased) reading follows the command.
     inputs.current_a = plan.mode == Mode::off ? 0.0 : held - offset;
     inputs.load_torque_nm = plan.load_torque_nm;
     inputs.temperature_c = plan.temperature_c + plan.temperature_rise_c * time / plan.duration_s;

@@ -14,7 +14,7 @@ struct Entries {
   std::size_t line = 0;
   std::vector<Entry> entries;
 };
-/// What stands under a key of a TOML file. Only what it is is filled: a number or a text one of them.
+/// The value of a key of a TOML file. Only the member of its type is filled; a single number or text is a list of one.
 struct Entry {
   std::string name;
   std::size_t line = 0;
@@ -25,9 +25,9 @@ struct Entry {
   std::vector<Entries> tables;            ///< one, or those of a list of tables
 };
 
-/// A TOML text as tables, for readers that know what may stand there. Throws std::runtime_error with `origin` and line.
+/// A TOML text as tables, for readers that know its keys. Throws std::runtime_error with `origin` and line.
 Entries read_entries(std::string_view text, std::string_view origin);
-/// The whole of a file; `kind` says in the error what it was to be.
+/// The content of a file; `kind` is its role in error messages.
 std::string read_text(const std::filesystem::path& file, std::string_view kind);
 
 }  // namespace flexspline::plant

@@ -34,15 +34,15 @@ double Transmission::error_slope(double q) const {
 
 TorqueSlope Transmission::spring(double torsion) const {
   const double gap = backlash_half_width;
-  double stretch = torsion;
+  double deflection = torsion;
   double open = 1.0;
   if (gap > 0.0) {
-    stretch = torsion > gap ? torsion - gap : (torsion < -gap ? torsion + gap : 0.0);
-    if (stretch == 0.0) open = 0.0;
+    deflection = torsion > gap ? torsion - gap : (torsion < -gap ? torsion + gap : 0.0);
+    if (deflection == 0.0) open = 0.0;
   }
-  TorqueSlope sum = polynomial(stretch);
+  TorqueSlope sum = polynomial(deflection);
   if (slopes.stiffness_1 > 0.0) {
-    const TorqueSlope more = three_slopes(slopes, stretch);
+    const TorqueSlope more = three_slopes(slopes, deflection);
     sum.torque += more.torque;
     sum.slope += more.slope;
   }

@@ -29,17 +29,17 @@ struct Transmission {
 
   bool has_spring() const { return stiffness > 0.0 || slopes.stiffness_1 > 0.0 || !loops.duhem.empty(); }
   double error(double motor_angle) const;
-  /// de/dq: what the error adds to one over the gear ratio, for velocities and, by virtual work, for torques.
+  /// de/dq: the error's addition to one over the gear ratio, for velocities and, by virtual work, for torques.
   double error_slope(double motor_angle) const;
-  /// Of the spring alone, without loops.
+  /// Of the spring only, without loops.
   TorqueSlope spring(double torsion) const;
-  /// Neither backlash nor corners nor an error of the gear: spring() is polynomial().
+  /// Without backlash, corners and gear error: spring() is polynomial().
   bool is_polynomial() const {
     return !(backlash_half_width > 0.0) && !(slopes.stiffness_1 > 0.0) && kinematic_error.empty();
   }
-  TorqueSlope polynomial(double stretch) const {
-    return {stretch * (stiffness + stretch * (quadratic_stiffness + cubic_stiffness * stretch)),
-            stiffness + stretch * (2.0 * quadratic_stiffness + 3.0 * cubic_stiffness * stretch)};
+  TorqueSlope polynomial(double deflection) const {
+    return {deflection * (stiffness + deflection * (quadratic_stiffness + cubic_stiffness * deflection)),
+            stiffness + deflection * (2.0 * quadratic_stiffness + 3.0 * cubic_stiffness * deflection)};
   }
   /// Energy of the spring, J; backlash and three slopes included.
   double energy(double torsion) const;

@@ -34,7 +34,7 @@ TwoMass::TwoMass(Physics physics, bool locked, State initial)
                  physics_.transmission.cubic_stiffness == 0.0 && has_plain_friction_ &&
                  physics_.friction.quadratic == 0.0 && !has_gravity_ &&
                  (physics_.damping_torque == 0.0 || has_root_damping_ || physics_.damping_exponent == 1.0)),
-      is_straight_(is_linear_ && has_root_damping_ && physics_.damping_torque > 0.0 && !locked_),
+      has_fast_path_(is_linear_ && has_root_damping_ && physics_.damping_torque > 0.0 && !locked_),
       per_gear_(1.0 / physics_.gear_ratio),
       state_(initial) {
   const bool usable = physics_.motor_inertia > 0.0 && physics_.transmission.has_spring() && physics_.gear_ratio > 0.0 &&
@@ -91,7 +91,7 @@ FrictionPoint TwoMass::friction_point(const State& s, double direction) const {
 
 // Newton's method on motor velocity, output velocity and signed damping power. Using the power as the unknown keeps the
 // equations smooth where |v|^alpha has an infinite slope, and well scaled where the torsion rate is next to nothing. A
-// square root is solved for exactly in each step: where nothing else bends, the first one is the solution.
+// square root is solved exactly in each step: without other nonlinearities the first step is the solution.
 bool TwoMass::solve_stage(const Stage& stage, const State& start, State& s) const {
   const double g = stage.weight;
   const bool motor_moves = s.motor_direction != 0;
@@ -183,8 +183,8 @@ bool TwoMass::solve_stage(const Stage& stage, const State& start, State& s) cons
   return false;
 }
 
-const TwoMass::Straight& TwoMass::straight(double weight) {
-  Straight& k = straight_;
+const TwoMass::FastPath& TwoMass::fast_path(double weight) {
+  FastPath& k = fast_path_;
   if (k.weight == weight && k.viscous == viscous_ && k.motor_direction == state_.motor_direction) return k;
   const MotorFriction& friction = physics_.friction;
   k.weight = weight;
@@ -205,10 +205,10 @@ const TwoMass::Straight& TwoMass::straight(double weight) {
   return k;
 }
 
-// What solve_stage() does of a drive that is straight while both of its shafts turn, to the bit: its first step of
-// Newton's method, without what is nought in it. The known numbers of both stages are not divided for again.
-[[gnu::always_inline]] inline Shafts TwoMass::solve_straight(const Straight& k, const Stage& stage,
-                                                             const Shafts& start) const {
+// solve_stage() for a linear drive while both of its shafts turn, to the bit: its first step of Newton's method,
+// without the terms that are zero. Quotients that both stages share are not computed again.
+[[gnu::always_inline]] inline Shafts TwoMass::solve_fast_path(const FastPath& k, const Stage& stage,
+                                                              const Shafts& start) const {
   Shafts s = start;
   const double g = k.weight, c = physics_.damping_torque;
   const auto direction = static_cast<double>(k.motor_direction);
@@ -238,24 +238,24 @@ const TwoMass::Straight& TwoMass::straight(double weight) {
   return s;
 }
 
-// A step in which both shafts go on turning their way. False, and nothing done, where that is not so.
-bool TwoMass::take_straight_step(double h) {
+// A step in which both shafts keep their direction. Returns false, and does nothing, otherwise.
+bool TwoMass::take_fast_step(double h) {
   if (state_.motor_velocity == 0.0 || state_.output_velocity == 0.0 || state_.motor_direction == 0 ||
       state_.output_direction == 0)
     return false;
   const Shafts from = state_;
-  const Straight& known = straight(kGamma * h);
+  const FastPath& known = fast_path(kGamma * h);
   if (!known.has_closed_form) return false;
-  const Shafts middle = solve_straight(
+  const Shafts middle = solve_fast_path(
       known, {from.motor_angle, from.motor_velocity, from.output_angle, from.output_velocity, known.weight}, from);
-  const Shafts to = solve_straight(known, carried(from, middle, known.weight), middle);
+  const Shafts to = solve_fast_path(known, second_stage(from, middle, known.weight), middle);
   const bool goes_on = to.motor_direction * to.motor_velocity >= 0.0 && to.output_direction * to.output_velocity >= 0.0;
   if (!goes_on || !std::isfinite(to.motor_velocity + to.output_velocity + to.damping)) return false;
   static_cast<Shafts&>(state_) = to;
   return true;
 }
 
-TwoMass::Stage TwoMass::carried(const Shafts& before, const Shafts& after, double weight) {
+TwoMass::Stage TwoMass::second_stage(const Shafts& before, const Shafts& after, double weight) {
   const auto carry = [](double from, double to) { return from + kCarry * (to - from); };
   return {carry(before.motor_angle, after.motor_angle), carry(before.motor_velocity, after.motor_velocity),
           carry(before.output_angle, after.output_angle), carry(before.output_velocity, after.output_velocity), weight};
@@ -266,7 +266,7 @@ bool TwoMass::try_step(const State& from, double h, State& to) const {
   copy(from, to);
   const Stage first{from.motor_angle, from.motor_velocity, from.output_angle, from.output_velocity, g};
   if (!solve_stage(first, from, to)) return false;
-  if (!solve_stage(carried(from, to, g), from, to)) return false;
+  if (!solve_stage(second_stage(from, to, g), from, to)) return false;
   if (to.motor_direction != 0 && !has_plain_friction_) {
     FrictionPoint at = friction_point(to, to.motor_direction);
     at.anchor = from.motor_angle;
@@ -281,7 +281,7 @@ bool TwoMass::try_step(const State& from, double h, State& to) const {
   return true;
 }
 
-// How far a state is from the event: negative means that it has happened.
+// The margin of a state to the event: negative after it.
 double TwoMass::margin(Event event, const State& s) const {
   switch (event) {
     case Event::motor_stop:
@@ -309,7 +309,7 @@ int TwoMass::choose_motor_direction(const State& s) const {
   const double forward = physics_.friction.evaluate(friction_point(s, 1.0), viscous_).torque;
   const double backward = physics_.friction.evaluate(friction_point(s, -1.0), viscous_).torque;
   if (forward > backward) return need > forward ? 1 : (need < backward ? -1 : 0);
-  // No static friction (a bristle carries it): the shaft never sticks, it only turns round.
+  // No static friction (the bristle models it): the shaft never sticks, it only reverses.
   return need >= 0.5 * (forward + backward) ? 1 : -1;
 }
 
@@ -321,14 +321,14 @@ int TwoMass::choose_output_direction(const State& s) const {
   return need >= 0.0 ? 1 : -1;
 }
 
-// A shaft at rest takes the branch that its torques ask for.
-void TwoMass::settle(State& s) const {
+// A shaft at rest takes the branch of its torques.
+void TwoMass::choose_resting_branches(State& s) const {
   if (s.motor_velocity == 0.0) s.motor_direction = choose_motor_direction(s);
   if (s.output_velocity == 0.0) s.output_direction = choose_output_direction(s);
 }
 
-// A shaft released at the start of a step may come out moving against its branch, where a stiff torque decays within
-// the step. Then it sticks for this step if friction can hold it at the end, else it leaves the other way.
+// A shaft released at the start of a step may end up moving against its branch, where a stiff torque decays within the
+// step. Then it sticks for this step if friction can hold it at the end, otherwise it moves in the other direction.
 void TwoMass::resolve_resting(State& s, double h) const {
   if (s.motor_velocity != 0.0 && s.output_velocity != 0.0) return;
   State end;
@@ -369,7 +369,7 @@ double TwoMass::locate(Event event, const State& from, double h, const State& at
       low_margin = value;
       if (side == 1) high_margin *= 0.5;
       side = 1;
-      // A shaft that has almost stopped may be stopped here; sticking that ends must be past its limit.
+      // A shaft that has almost stopped may be stopped here; to end sticking, the torque must be past its limit.
       if (stop && value <= tolerance) return low;
     }
   }
@@ -379,7 +379,7 @@ double TwoMass::locate(Event event, const State& from, double h, const State& at
 TwoMass::Event TwoMass::first_event(const State& from, double h, State& to, double& taken) const {
   constexpr Event kEvents[] = {Event::motor_stop, Event::output_stop, Event::motor_break, Event::output_break};
   taken = h;
-  // Most steps: what turns goes on turning its way.
+  // Most steps: both shafts keep their direction.
   if (to.motor_direction != 0 && to.motor_direction * to.motor_velocity >= 0.0 &&
       (locked_ || (to.output_direction != 0 && to.output_direction * to.output_velocity >= 0.0)))
     return Event::none;
@@ -395,11 +395,11 @@ TwoMass::Event TwoMass::first_event(const State& from, double h, State& to, doub
 }
 
 void TwoMass::take_step(double h) {
-  if (is_straight_ && take_straight_step(h)) return;
+  if (has_fast_path_ && take_fast_step(h)) return;
   double remaining = h;
   double piece = h;
   for (int events = 0; remaining > 1e-13; ++events) {
-    settle(state_);
+    choose_resting_branches(state_);
     piece = std::min(piece, remaining);
     resolve_resting(state_, piece);
     State& to = next_;
@@ -411,7 +411,7 @@ void TwoMass::take_step(double h) {
       continue;
     }
     if (events > kEventLimit) {
-      // Events accumulate: stop whatever turned round and go on with the end of the piece.
+      // Events accumulate: stop the shafts that reversed and continue at the end of the segment.
       if (margin(Event::motor_stop, to) < 0.0) to.motor_velocity = 0.0;
       if (margin(Event::output_stop, to) < 0.0) to.output_velocity = 0.0;
       copy(to, state_);
@@ -426,7 +426,7 @@ void TwoMass::take_step(double h) {
       (event == Event::motor_stop ? state_.motor_velocity : state_.output_velocity) = 0.0;
       state_.damping = damping_of(state_.motor_velocity * ratio(state_.motor_angle) - state_.output_velocity);
     } else if (event == Event::motor_break || event == Event::output_break) {
-      settle(state_);
+      choose_resting_branches(state_);
     }
     remaining -= taken;
     piece = remaining;

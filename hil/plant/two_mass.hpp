@@ -23,8 +23,8 @@ struct Physics {
   double gravity_sine = 0.0;
 };
 
-/// Positions and velocities of both shafts. `damping` is the signed power |v|^alpha s(v) of the torsion rate; it is
-/// carried along because it keeps its precision where v itself is too small to.
+/// Positions and velocities of both shafts. `damping` is the signed power |v|^alpha s(v) of the torsion rate; it is a
+/// state because it keeps its precision where v itself is too small.
 struct Shafts {
   double motor_angle = 0.0;
   double motor_velocity = 0.0;
@@ -53,7 +53,7 @@ class TwoMass {
   /// for inertias, stiffness, gear ratio or damping exponent that are not positive.
   TwoMass(Physics physics, bool locked, State initial = {});
 
-  /// Moves on by `duration_s` in `steps` equal steps.
+  /// Advances by `duration_s` in `steps` equal steps.
   void advance(const Inputs& inputs, double duration_s, int steps);
 
   const State& state() const { return state_; }
@@ -70,9 +70,9 @@ class TwoMass {
   struct Stage {
     double motor_angle, motor_velocity, output_angle, output_velocity, weight;
   };
-  /// What both stages of a step of a straight drive, both shafts turning, have in common.
-  struct Straight {
-    double weight = 0.0;  ///< nought: not made yet
+  /// Values common to both stages of a step of a linear drive with both shafts turning.
+  struct FastPath {
+    double weight = 0.0;  ///< zero: not made yet
     double viscous = 0.0;
     int motor_direction = 0;
     double motor_slope = 0.0, output_slope = 0.0;  ///< of the residuals over the velocities
@@ -88,13 +88,13 @@ class TwoMass {
     const double twist = s.motor_angle / physics_.gear_ratio - s.output_angle;
     return has_plain_spring_ ? twist : twist + physics_.transmission.error(s.motor_angle);
   }
-  /// Spring and loops where the torsion of `s` is, from the loops' state as it stands.
+  /// Spring and loops at the torsion of `s`, from the loops' present state.
   TorqueSlope elastic(const State& s) const {
     return has_plain_spring_ ? physics_.transmission.polynomial(torsion(s)) : elastic_with_loops(s);
   }
   TorqueSlope elastic_with_loops(const State& s) const;
   double torque(const State& s) const { return elastic(s).torque + physics_.damping_torque * s.damping; }
-  /// The state of a drive without loops is its shafts: the rest, large, is not copied at each step.
+  /// The state of a drive without loops is that of its shafts: the rest, which is large, is not copied at each step.
   void copy(const State& from, State& to) const {
     if (has_loops_) {
       to = from;
@@ -112,16 +112,16 @@ class TwoMass {
   FrictionPoint friction_point(const State& s, double direction) const;
   double gravity(double angle) const;
   bool solve_stage(const Stage& stage, const State& start, State& s) const;
-  const Straight& straight(double weight);
-  Shafts solve_straight(const Straight& known, const Stage& stage, const Shafts& start) const;
-  bool take_straight_step(double h);
-  static Stage carried(const Shafts& before, const Shafts& after, double weight);  ///< the second of a step
+  const FastPath& fast_path(double weight);
+  Shafts solve_fast_path(const FastPath& known, const Stage& stage, const Shafts& start) const;
+  bool take_fast_step(double h);
+  static Stage second_stage(const Shafts& before, const Shafts& after, double weight);  ///< the second of a step
   bool try_step(const State& from, double h, State& to) const;
   void take_step(double h);
   double margin(Event event, const State& s) const;
   Event first_event(const State& from, double h, State& to, double& taken) const;
   double locate(Event event, const State& from, double h, const State& at_h) const;
-  void settle(State& s) const;
+  void choose_resting_branches(State& s) const;
   int choose_motor_direction(const State& s) const;
   int choose_output_direction(const State& s) const;
   void resolve_resting(State& s, double h) const;
@@ -129,21 +129,21 @@ class TwoMass {
 
   Physics physics_;
   bool locked_;
-  // What the drive has none of costs a step nothing.
+  // Effects that the drive does not have take no time in a step.
   bool has_loops_;
   bool has_plain_spring_;  ///< a polynomial of the torsion, and no error of the gear
   bool has_plain_friction_;
   bool has_gravity_;
   bool has_root_damping_;  ///< of exponent 0.5
-  bool is_linear_;         ///< but for that and the signs
-  bool is_straight_;       ///< is linear, with that damping, and free
+  bool is_linear_;         ///< except for that and the signs
+  bool has_fast_path_;     ///< is linear, with that damping, and free
   double per_gear_;        ///< of the gear's ratio
   State state_;
   State next_;  ///< at the end of the step that is being taken
   Inputs inputs_;
   double motor_drive_ = 0.0;  // Km i
   double viscous_ = 0.0;
-  Straight straight_;
+  FastPath fast_path_;
 };
 
 }  // namespace flexspline::plant

@@ -35,7 +35,7 @@ void make_folder(const std::filesystem::path& folder) {
   std::error_code failed;
   std::filesystem::create_directories(folder, failed);
   if (failed) {
-    throw std::runtime_error(fmt::format("{}: the folder cannot be made: {}", folder.string(), failed.message()));
+    throw std::runtime_error(fmt::format("{}: the folder could not be created: {}", folder.string(), failed.message()));
   }
 }
 

@@ -5,7 +5,7 @@
 
 namespace flexspline::plant {
 
-/// Writes a file that, under its final name, is always complete: it is written beside it and renamed. Throws
+/// Writes a file that, under its final name, is always complete: it is written to another name and renamed. Throws
 /// std::runtime_error where it cannot be written.
 void write_whole(const std::filesystem::path& file, std::string_view text);
 

@@ -10,9 +10,9 @@
 #include <thread>
 
 #include "hil/plant/whole_file.hpp"
-#include "hil/report/published.hpp"
 #include "hil/rhs100/models.hpp"
 #include "hil/rhs100/readme.hpp"
+#include "hil/thesis_models/published.hpp"
 
 namespace flexspline::rhs100 {
 namespace {
@@ -88,7 +88,7 @@ Text dataset_head(double gear_ratio) {
 
 Text truth(const Set& set, std::uint64_t seed) {
   Text text;
-  line(text, "# What each experiment was simulated with, SI units. Not for the eyes of an identification.");
+  line(text, "# The true parameters of each experiment, SI units. Not for use in an identification.");
   line(text, "seed = {}", seed);
   for (const Experiment& e : set.experiments) {
     line(text, "\n[[experiment]]\nname = \"{}\"", e.plan.name);
@@ -148,7 +148,7 @@ std::size_t write_data_set(const std::filesystem::path& folder, const std::vecto
     if (!asked_for(set, parts)) continue;
     write_set(set, folder / set.name, seed);
     written += set.experiments.size();
-    // Table 6 has the experiments of table 4 once more, with another spring.
+    // Table 6 has the experiments of table 4 again, with another spring.
     if (set.sensors == Sensors::drive && set.name != "table-6") list_experiments(all, set, set.name + "/");
   }
   plant::write_whole(folder / "README.md", readme(sets, seed));

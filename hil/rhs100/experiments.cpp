@@ -5,9 +5,9 @@
 #include <algorithm>
 #include <stdexcept>
 
-#include "hil/report/published.hpp"
-#include "hil/report/published_tables.hpp"
 #include "hil/rhs100/models.hpp"
+#include "hil/thesis_models/published.hpp"
+#include "hil/thesis_models/published_tables.hpp"
 
 namespace flexspline::rhs100 {
 namespace {
@@ -101,7 +101,7 @@ plant::Waveform waveform_of(int code) {
 plant::ExperimentPlan plan_of(const std::string& name, plant::Mode mode, double full, double shortest_s) {
   int percent = 0, code = 0, tenths = 5;
   if (std::sscanf(name.c_str(), "%d-%d-%d", &percent, &code, &tenths) < 2)
-    throw std::logic_error("rhs-100: " + name + " is no name of an experiment");
+    throw std::logic_error("rhs-100: " + name + " is not a name of an experiment");
   plant::ExperimentPlan plan;
   plan.name = name;
   plan.mode = mode;
@@ -122,8 +122,8 @@ Experiment locked_experiment(const published::ComplianceRow& row, bool holdout) 
   return e;
 }
 
-// A motor without gear: behind a gear of an enormous ratio, with a locked output and next to no stiffness, its shaft
-// feels 1e-11 N m/rad. A constant load is what the plant calls asymmetry: it acts at rest, too.
+// A motor without gear: with a gear of a very large ratio, a locked output and a very small stiffness, the stiffness at
+// its shaft is 1e-11 N m/rad. A constant load is modelled by the plant's asymmetry, which acts at rest as well.
 plant::Drive bare_motor(double torque_constant, double inertia, double load_nm) {
   plant::Drive drive;
   drive.name = "dc-motor";
@@ -236,8 +236,8 @@ Set table_8() {
 
 Set table_3_fast() {
   Set set = motor_set("table-3-fast", "the bare motor: saw-tooth, square, sine and composite", motor_model());
-  // Of the rows the scan has the last column alone. The others are spread by what the table prints as std over final
-  // decision, each up in two rows and down in two.
+  // Of these rows the scan has the last column only. The others are varied by the table's ratio of std to final
+  // decision, up in two rows and down in two.
   constexpr double kSpread[] = {0.0082, 0.115, 0.233, 0.09};
   constexpr int kPattern[4][4] = {{1, 1, 1, 1}, {-1, 1, -1, -1}, {-1, -1, 1, -1}, {1, -1, -1, 1}};
   constexpr plant::Waveform kWaveforms[] = {plant::Waveform::triangle, plant::Waveform::square, plant::Waveform::sine,

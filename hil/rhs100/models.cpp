@@ -5,9 +5,9 @@
 #include <initializer_list>
 #include <string_view>
 
-#include "hil/report/published.hpp"
-#include "hil/report/published_tables.hpp"
 #include "hil/rhs100/experiments.hpp"
+#include "hil/thesis_models/published.hpp"
+#include "hil/thesis_models/published_tables.hpp"
 
 namespace flexspline::rhs100 {
 namespace {

@@ -1,4 +1,4 @@
-// Texts of the models that the sets are identified with: known values are fixed, what is sought has none.
+// Texts of the models that the sets are identified with: known values are fixed, values to estimate are missing.
 #pragma once
 
 #include <string>
@@ -10,13 +10,13 @@ std::string cubic_compliance_model();
 std::string fast_friction_model();
 /// Averages of table 7 fixed, and the Stribeck velocity of table 8.
 std::string slow_friction_model();
-/// Inertia supplied, as in tables 2 and 3; the data sheet's torque constant with an error to be found.
+/// Inertia supplied, as in tables 2 and 3; the data sheet's torque constant with an error to estimate.
 std::string motor_model();
 /// Table 1 without its Stribeck term.
 std::string simulated_motor_model();
-/// With it; what the composite tells is to be put in and fixed first, as section 3.4 says.
+/// With it; the parameters identified on the composite have to be fixed first, as in section 3.4.
 std::string simulated_stribeck_model();
-/// All of the drive, for all of its experiments at once.
+/// The whole drive, for all of its experiments at once.
 std::string drive_model();
 
 }  // namespace flexspline::rhs100

@@ -8,7 +8,7 @@
 
 namespace flexspline::rhs100 {
 
-/// The README.md that is written beside the data: what is the report's, and what is chosen.
+/// The README.md of the data set: which values are from the report, and which are chosen.
 std::string readme(const std::vector<Set>& sets, std::uint64_t seed);
 
 }  // namespace flexspline::rhs100

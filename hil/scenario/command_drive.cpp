@@ -38,7 +38,7 @@ ScenarioPlan plan_of(const DriveOptions& options) {
   plan.seed = options.seed;
   plan.tick_hz = options.tick_hz;
   if (!options.processor_image.empty() && options.tick_hz != board::SoftwareBoard::kTickHz)
-    throw std::invalid_argument(fmt::format("the image of a processor ticks {} times a second; leave --tick-hz out",
+    throw std::invalid_argument(fmt::format("the image of a processor ticks {} times a second; remove --tick-hz",
                                             board::SoftwareBoard::kTickHz));
   plan.keeps_trace = !options.trace_file.empty();
   if (!options.inject.empty()) {
@@ -57,7 +57,7 @@ std::string fault_json(const firmware::FaultRecord& fault) {
   return fmt::format("\"{}\"", firmware::info_of(fault.fault).name);
 }
 
-// Letters of JSON that are written otherwise; other texts here have none.
+// Characters that JSON escapes; other texts here have none.
 std::string in_json(const std::string& text) {
   std::string out;
   for (const char c : text) {
@@ -100,7 +100,7 @@ void print(const DriveOptions& options, const ScenarioPlan& plan, const std::vec
   }
   for (const ScenarioResult& r : runs) {
     if (r.limit_cycle(count_of(plan)))
-      fmt::print("compensation {}: at rest the output goes to and fro by {:.2e} rad\n", r.compensation ? "on" : "off",
+      fmt::print("compensation {}: at rest the output oscillates by {:.2e} rad\n", r.compensation ? "on" : "off",
                  r.hold_swing_rad);
     if (r.first_fault.fault == Fault::none) continue;
     const firmware::FaultInfo& info = firmware::info_of(r.first_fault.fault);
@@ -130,14 +130,14 @@ std::string csv_of(const std::vector<board::TracePoint>& trace) {
 void run_drive(const DriveOptions& options) {
   ScenarioPlan plan = plan_of(options);
   if (plan.keeps_trace && options.compensation == "both")
-    throw std::invalid_argument("--trace is of one run: say --compensation on, or off");
+    throw std::invalid_argument("--trace is for one run: add --compensation on, or off");
   std::vector<ScenarioResult> runs;
   for (const bool compensation : {false, true}) {
     if (options.compensation == (compensation ? "off" : "on")) continue;
     plan.compensation = compensation;
-    std::unique_ptr<board::Brain> brain;
-    if (!options.processor_image.empty()) brain = std::make_unique<board::Processor>(options.processor_image);
-    runs.push_back(board::run_scenario(plan, std::move(brain)));
+    std::unique_ptr<board::Controller> controller;
+    if (!options.processor_image.empty()) controller = std::make_unique<board::Processor>(options.processor_image);
+    runs.push_back(board::run_scenario(plan, std::move(controller)));
   }
   if (plan.keeps_trace) plant::write_whole(options.trace_file, csv_of(runs.front().trace));
   if (options.json == "-") {

@@ -9,7 +9,7 @@ namespace flexspline::scenario {
 /// The arguments of `flexspline-hil drive`.
 struct DriveOptions {
   std::string scenario = "sine";  ///< a name or a file
-  double seconds = 0.0;           ///< nought: what the scenario says
+  double seconds = 0.0;           ///< zero: that of the scenario
   std::string plant_file;
   std::vector<std::string> with;
   std::string hide;
@@ -24,7 +24,7 @@ struct DriveOptions {
   std::uint64_t seed = 1;
 };
 
-/// Runs the scenario and prints what happened. Throws std::exception with the reason where it cannot.
+/// Runs the scenario and prints the result. Throws std::exception with the reason where it cannot.
 void run_drive(const DriveOptions& options);
 
 /// The arguments of `flexspline-hil data-sheet`.
@@ -36,12 +36,12 @@ struct DataSheetOptions {
   std::string out;
 };
 
-/// Writes what the maker of a scenario's drive says of it into a folder: settings.toml for `flexspline pack --drive`,
-/// known-model.toml with its effects and their true values but for the hidden one, and whole-model.toml with that, too,
-/// where a model can hold it. Throws std::exception with the reason where it cannot.
+/// Writes the data sheet of a scenario's drive into a folder: settings.toml for `flexspline pack --drive`,
+/// known-model.toml with its effects and their true values except the hidden one, and whole-model.toml with the hidden
+/// one as well, if a model can have it. Throws std::exception with the reason where it cannot.
 void write_data_sheet(const DataSheetOptions& options);
 
-/// Prints the scenarios that come with the tool.
+/// Prints the built-in scenarios.
 void list_scenarios();
 
 }  // namespace flexspline::scenario

@@ -20,7 +20,7 @@ using plant::Entry;
 
 constexpr double kMostS = 36000.0;
 
-// The keys of one table; what nobody asked for is an error.
+// The keys of one table; unknown ones are an error.
 class Table {
  public:
   Table(const Entries& entries, std::string origin, std::string where)
@@ -58,7 +58,7 @@ class Table {
     if (find(key) == nullptr) fail(entries_.line, fmt::format("the key \"{}\" is missing", key));
     return number(key, 0.0, least, most);
   }
-  // A number that need not be there.
+  // An optional number.
   std::vector<double> maybe(const std::string& key, double least, double most) {
     if (find(key) == nullptr) return {};
     return {number(key, 0.0, least, most)};
@@ -122,7 +122,7 @@ Motion motion_of(Table& table) {
     double before = 0.0;
     for (const auto& row : table.rows("waypoints", 2, "[time in s, position in rad]")) {
       if (row[0] < before + 1e-2)
-        table.fail(table.line_of("waypoints"), "times of waypoints rise by at least 0.01 s, from nought on");
+        table.fail(table.line_of("waypoints"), "times of waypoints rise by at least 0.01 s, from zero on");
       m.waypoints.push_back({before = row[0], row[1]});
     }
   } else {
@@ -149,7 +149,7 @@ Event event_of(Table& table) {
       table.fail(table.line_of("unit"),
                  fmt::format("the unit of {} is {}, not {}", name, board::event_unit(event.kind), unit));
     if (event.kind == Event::Kind::amplifier_saturation && event.value <= 0.0)
-      table.fail(table.line_of("value"), "an amplifier saturates above nought");
+      table.fail(table.line_of("value"), "an amplifier saturates above zero");
   }
   table.done();
   return event;
@@ -233,7 +233,8 @@ ScenarioFile find_scenario(const std::string& name) {
   }
   std::string all;
   for (const Known& one : known_scenarios()) all += (all.empty() ? "" : ", ") + one.name;
-  throw std::runtime_error(fmt::format("no scenario \"{}\": there is no such file, and the tool has {}", name, all));
+  throw std::runtime_error(
+      fmt::format("no scenario \"{}\": there is no such file, and the built-in ones are {}", name, all));
 }
 
 std::vector<Known> known_scenarios() {

@@ -10,14 +10,14 @@
 
 namespace flexspline::scenario {
 
-/// A case for a drive in closed loop: the drive, its motion, its surroundings and what happens to it. README.md has the
+/// A scenario for a drive in closed loop: the drive, its motion, its environment and the events. README.md has the
 /// format of the files.
 struct ScenarioFile {
   std::string name;
   board::Scenario motion;
   double duration_s = 10.0;
   double hold_s = 2.0;
-  std::string plant_file;  ///< beside the scenario's file; empty: the demo's drive
+  std::string plant_file;  ///< relative to the scenario's file; empty: the demo's drive
   std::vector<std::string> with{};
   std::string hide;
   double hidden_scale = 1.0;
@@ -29,23 +29,22 @@ struct ScenarioFile {
   std::vector<board::Event> events{};
 };
 
-/// Throws std::runtime_error with origin, line and what is wrong.
+/// Throws std::runtime_error with origin, line and reason.
 ScenarioFile parse_scenario(std::string_view text, std::string_view origin);
-/// A file, one of those that come with the tool, or a motion of `board::scenarios()`. Throws std::runtime_error naming
-/// all there are.
+/// A file, a built-in one, or a motion of `board::scenarios()`. Throws std::runtime_error with all names.
 ScenarioFile find_scenario(const std::string& name_or_file);
 
 struct Known {
   std::string name;
   std::string what;
 };
-/// All that `find_scenario` knows by name.
+/// All names for `find_scenario`.
 std::vector<Known> known_scenarios();
 
 /// The drive of a scenario: its plant file or another one, with the effects that both name.
 plant::Drive drive_of(const ScenarioFile& file, const std::string& plant_file,
                       const std::vector<std::string>& more = {}, const std::string& hide = {});
-/// All of a run but what the drive is given.
+/// The plan of a run except the drive's parameters.
 board::ScenarioPlan plan_of(const ScenarioFile& file, const plant::Drive& drive);
 
 }  // namespace flexspline::scenario

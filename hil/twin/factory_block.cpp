@@ -4,7 +4,7 @@
 #include <span>
 #include <string>
 
-#include "hil/board/brain.hpp"
+#include "hil/board/controller.hpp"
 #include "hil/board/drive_setup.hpp"
 #include "shared/model/block.hpp"
 
@@ -12,7 +12,7 @@ namespace flexspline::twin {
 
 namespace {
 
-// The block of the drive's parameters knows no names.
+// The block of the drive's parameters has no names.
 void set_name(std::span<std::uint8_t> block, std::size_t at, const std::string& name) {
   constexpr std::size_t kMost = sizeof(model::Name) - 1;
   std::copy_n(name.begin(), std::min(name.size(), kMost), block.begin() + static_cast<std::ptrdiff_t>(at));

@@ -8,8 +8,8 @@
 
 namespace flexspline::twin {
 
-/// The parameter block that a drive leaves its maker with: its sensors, loops and limits, and the effects that are no
-/// secret of the plant, with the plant's own values, in the bases of its ratings.
+/// The factory parameter block of a drive: its sensors, loops and limits, and the plant's effects that are not hidden,
+/// with the plant's own values, in the bases of its ratings.
 std::vector<std::uint8_t> factory_block(const plant::Drive& drive);
 /// The same with other settings.
 std::vector<std::uint8_t> factory_block(const plant::Drive& drive, const control::DriveSetup<double>& setup);

@@ -24,7 +24,7 @@ FlashMemory::FlashMemory(std::size_t sector_bytes, std::size_t sectors, const st
                                       : info.st_size == whole && pread(file_, cells_.data(), cells_.size(), 0) == whole;
   if (!good) {
     close(file_);
-    throw std::runtime_error(file.string() + ": is no flash memory of a twin; name a file that is not there yet");
+    throw std::runtime_error(file.string() + ": is not a flash memory of a twin; name a file that does not exist yet");
   }
 }
 

@@ -12,10 +12,10 @@
 namespace flexspline::twin {
 
 /// Flash memory in this process, and, where a file is named, in that file as well, word by word as it is written. So a
-/// twin that was killed finds at its next start what a drive would find after a power cut.
+/// killed twin starts again with the memory that a drive has after a power cut.
 class FlashMemory {
  public:
-  /// An empty path: no file. Throws std::runtime_error where the file cannot be opened or is no such memory.
+  /// An empty path: no file. Throws std::runtime_error where the file cannot be opened or is not such a memory.
   FlashMemory(std::size_t sector_bytes, std::size_t sectors, const std::filesystem::path& file);
   ~FlashMemory();
   FlashMemory(const FlashMemory&) = delete;

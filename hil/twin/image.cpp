@@ -13,7 +13,7 @@ constexpr std::string_view kHangs = "twin application that hangs\n";
 std::vector<std::uint8_t> twin_image(boot::Version version, std::size_t payload_bytes, bool hangs) {
   std::vector<std::uint8_t> image(boot::kHeaderBytes + std::max<std::size_t>(payload_bytes, 64));
   const std::span payload = std::span(image).subspan(boot::kHeaderBytes);
-  // Something that another order of blocks would not leave the same.
+  // Data that differ for another order of blocks.
   std::uint32_t noise = 1 + version.major * 256U + version.minor;
   for (std::uint8_t& byte : payload) {
     noise = noise * 1'664'525U + 1'013'904'223U;

@@ -89,22 +89,22 @@ Line::Line(Line&& other) noexcept
     : name_(std::move(other.name_)),
       listener_(std::exchange(other.listener_, -1)),
       host_(std::exchange(other.host_, -1)),
-      newcomer_(std::exchange(other.newcomer_, -1)),
+      unidentified_(std::exchange(other.unidentified_, -1)),
       hello_(std::move(other.hello_)),
       keeps_open_(std::exchange(other.keeps_open_, -1)),
       is_terminal_(other.is_terminal_) {}
 
 Line::~Line() {
-  for (const int fd : {listener_, host_, newcomer_, keeps_open_})
+  for (const int fd : {listener_, host_, unidentified_, keeps_open_})
     if (fd >= 0) close(fd);
 }
 
-bool Line::turn(int wait_ms) {
+bool Line::transfer(int wait_ms) {
   pollfd all[3] = {{listener_, POLLIN, 0},
                    {host_, static_cast<short>(out_.empty() ? POLLIN : POLLIN | POLLOUT), 0},
-                   {newcomer_, POLLIN, 0}};
+                   {unidentified_, POLLIN, 0}};
   poll(all, 3, wait_ms);
-  if (newcomer_ >= 0 && all[2].revents != 0) hear_newcomer();
+  if (unidentified_ >= 0 && all[2].revents != 0) read_token();
   if (listener_ >= 0 && (all[0].revents & POLLIN) != 0) accept_host();
   if (!plugged_ && is_terminal_) tcflush(keeps_open_, TCIOFLUSH);
   if (host_ >= 0) read_bytes();
@@ -115,40 +115,40 @@ bool Line::turn(int wait_ms) {
 void Line::accept_host() {
   const int host = accept(listener_, nullptr, nullptr);
   if (host < 0) return;
-  lose_newcomer();
+  close_unidentified();
   if (!plugged_) {
     close(host);
     return;
   }
-  newcomer_ = host;
-  make_nonblocking(newcomer_);
+  unidentified_ = host;
+  make_nonblocking(unidentified_);
   const int on = 1, bytes = 4096;
-  setsockopt(newcomer_, IPPROTO_TCP, TCP_NODELAY, &on, sizeof(on));
-  setsockopt(newcomer_, SOL_SOCKET, SO_SNDBUF, &bytes, sizeof(bytes));
-  hear_newcomer();
+  setsockopt(unidentified_, IPPROTO_TCP, TCP_NODELAY, &on, sizeof(on));
+  setsockopt(unidentified_, SOL_SOCKET, SO_SNDBUF, &bytes, sizeof(bytes));
+  read_token();
 }
 
-// Byte by byte: what comes behind the token is the host's. Who has said it while another host is there takes its place:
-// the one before may be dead without having said so.
-void Line::hear_newcomer() {
+// Byte by byte: the bytes after the token belong to the host. A host with the right token replaces a connected one,
+// which may have died without closing its connection.
+void Line::read_token() {
   char byte = 0;
   for (;;) {
-    const ssize_t got = read(newcomer_, &byte, 1);
+    const ssize_t got = read(unidentified_, &byte, 1);
     if (got < 0 && (errno == EAGAIN || errno == EWOULDBLOCK || errno == EINTR)) return;
-    if (got <= 0 || byte != hello_[said_.size()]) return lose_newcomer();
-    said_ += byte;
-    if (said_.size() < hello_.size()) continue;
+    if (got <= 0 || byte != hello_[received_.size()]) return close_unidentified();
+    received_ += byte;
+    if (received_.size() < hello_.size()) continue;
     lose_host();
-    host_ = std::exchange(newcomer_, -1);
-    said_.clear();
+    host_ = std::exchange(unidentified_, -1);
+    received_.clear();
     return;
   }
 }
 
-void Line::lose_newcomer() {
-  if (newcomer_ >= 0) close(newcomer_);
-  newcomer_ = -1;
-  said_.clear();
+void Line::close_unidentified() {
+  if (unidentified_ >= 0) close(unidentified_);
+  unidentified_ = -1;
+  received_.clear();
 }
 
 void Line::read_bytes() {
@@ -180,10 +180,10 @@ void Line::write_bytes() {
   }
 }
 
-// Of a terminal both ends stay: bytes are lost on the way, as they are where a serial line is pulled.
+// Both ends of a terminal stay open: bytes are lost in between, as on an unplugged serial line.
 void Line::plug(bool in) {
   if (in == std::exchange(plugged_, in)) return;
-  lose_newcomer();
+  close_unidentified();
   if (!is_terminal_) return lose_host();
   changed_ = true;
   reader_.restart();

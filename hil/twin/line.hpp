@@ -10,12 +10,12 @@
 
 namespace flexspline::twin {
 
-/// The drive's end of a line of bytes: a socket that hosts connect to, a pseudo terminal, or one that is open already.
+/// The drive's end of a serial line: a socket that hosts connect to, a pseudo terminal, or one that is open already.
 class Line final : public HostLine {
  public:
   /// Throw std::runtime_error with the reason.
-  /// A socket of this machine. Its name ends with a token, drawn anew each time where none is given, which a host has
-  /// to say first: a web page can reach the port, and would else arm the drive with a POST.
+  /// A socket of this machine. Its name ends with a token, random unless one is given, which a host has to send first:
+  /// a web page can reach the port, and could otherwise arm the drive with a POST.
   static Line listening(int port, const std::string& token = {});
   static Line terminal();
   static Line inherited(int fd);
@@ -26,14 +26,14 @@ class Line final : public HostLine {
   Line& operator=(Line&&) = delete;
 
   std::string name() const override { return name_; }
-  bool turn(int wait_ms) override;
+  bool transfer(int wait_ms) override;
   void plug(bool in) override;
   bool has_host() const override { return host_ >= 0 && plugged_; }
-  /// An inherited line whose other end is gone.
+  /// An inherited line whose other end is closed.
   bool ended() const override { return ended_; }
   const protocol::Message* front() override { return arrived_.empty() ? nullptr : &arrived_.front(); }
   void drop() override { arrived_.pop_front(); }
-  /// What is sent without room waits in this process.
+  /// Data without room in the socket wait in this process.
   bool has_room() const override { return out_.size() < kMostWaiting; }
   void send(const protocol::Message& m) override;
 
@@ -41,8 +41,8 @@ class Line final : public HostLine {
   static constexpr std::size_t kMostWaiting = 4096;
   Line() = default;
   void accept_host();
-  void hear_newcomer();
-  void lose_newcomer();
+  void read_token();
+  void close_unidentified();
   void read_bytes();
   void write_bytes();
   void lose_host();
@@ -50,10 +50,10 @@ class Line final : public HostLine {
   std::string name_;
   int listener_ = -1;
   int host_ = -1;
-  int newcomer_ = -1;    ///< has connected and not said the token yet
-  std::string hello_;    ///< what it has to say
-  std::string said_;     ///< what it has said
-  int keeps_open_ = -1;  ///< a terminal's other end, so that it stays when a host closes it
+  int unidentified_ = -1;  ///< has connected and not sent the token yet
+  std::string hello_;      ///< what it has to send
+  std::string received_;   ///< what it has sent
+  int keeps_open_ = -1;    ///< a terminal's other end, so that it stays when a host closes it
   bool changed_ = false;
   bool ended_ = false;
   bool is_terminal_ = false;

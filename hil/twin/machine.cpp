@@ -13,7 +13,7 @@ namespace {
 
 using Dfu = Machine::Loader::Dfu;
 
-// The boot loader's device as the bus sees it; its memory is written between two packets.
+// The boot loader's device on the bus; its memory is written between two packets.
 struct Connector final : usbip::BusDevice {
   explicit Connector(const std::string& serial) : device(serial) {}
   void reset() override {
@@ -79,7 +79,7 @@ void Machine::serve_loader(usbip::Server& bus, std::string_view bus_id, const st
     return static_cast<std::uint32_t>(
         std::chrono::duration_cast<std::chrono::milliseconds>(Clock::now() - since).count());
   };
-  while (!over() && !loader_->turn(dfu, std::exchange(connector.was_reset, false), now_ms())) bus.serve(5);
+  while (!over() && !loader_->poll(dfu, std::exchange(connector.was_reset, false), now_ms())) bus.serve(5);
   bus.unplug(bus_id);
 }
 

@@ -15,7 +15,7 @@
 
 namespace flexspline::twin {
 
-/// What the boot loader sees of the twin's board.
+/// The twin's board for the boot loader.
 struct LoaderBoard {
   using Slots = ImageFlash;
   static constexpr std::string_view kName = kBoardName;
@@ -28,15 +28,15 @@ struct LoaderBoard {
   bool request = false;
 };
 
-/// What the twin has beside its application: memory for firmware images, and the drive's own boot loader. Each start
-/// begins with nothing but what is in that memory.
+/// The twin's parts other than its application: memory for firmware images, and the drive's own boot loader. Each start
+/// depends on that memory only.
 class Machine {
  public:
   using Loader = firmware::BootLoader<LoaderBoard>;
   using Slots = Loader::Slots;
 
-  /// `file` holds the images (empty: they end with the twin). Where nothing was ever installed, `as_made` puts in what
-  /// the twin leaves its maker with. Throws std::runtime_error where the file is no such memory.
+  /// `file` holds the images (empty: they end with the twin). Where nothing was ever installed, `as_made` installs the
+  /// factory image. Throws std::runtime_error where the file is not such a memory.
   Machine(const std::filesystem::path& file, bool as_made);
 
   /// A reset. True: an application was started, which may hang; false: the boot loader waits for a host.
@@ -46,10 +46,10 @@ class Machine {
   bool hangs() const { return hangs_; }
   /// The same memory, for the application.
   Slots& slots() { return slots_; }
-  /// The application's note for the next start.
-  void ask_for_loader() { board_.request = true; }
+  /// The application's request for the next start.
+  void request_loader() { board_.request = true; }
 
-  /// The boot loader on the bus, until it resets the machine or `over` says that the twin ends.
+  /// Runs the boot loader on the bus, until it resets the machine or `over` returns that the twin ends.
   void serve_loader(usbip::Server& bus, std::string_view bus_id, const std::string& serial,
                     const std::function<bool()>& over);
 

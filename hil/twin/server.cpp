@@ -17,8 +17,8 @@
 #include "firmware/update_watch.hpp"
 #include "hil/board/scenario.hpp"
 #include "hil/plant/parameters.hpp"
-#include "hil/twin/cable.hpp"
 #include "hil/twin/line.hpp"
+#include "hil/twin/link_fault.hpp"
 #include "hil/twin/machine.hpp"
 #include "hil/twin/twin_drive.hpp"
 #include "hil/twin/usb_line.hpp"
@@ -29,7 +29,7 @@ namespace {
 using Clock = std::chrono::steady_clock;
 constexpr std::uint32_t kTickHz = board::SoftwareBoard::kTickHz;
 
-constexpr auto kAfterDetach = std::chrono::milliseconds(100);  // so that the host has its answer
+constexpr auto kAfterDetach = std::chrono::milliseconds(100);  // so that the host receives its answer
 constexpr auto kWatchdog = std::chrono::milliseconds(200);
 
 TwinSetup setup_of(const TwinOptions& options) {
@@ -51,8 +51,8 @@ std::unique_ptr<HostLine> line_of(const TwinOptions& options) {
   return std::make_unique<Line>(Line::listening(std::max(options.port, 0), options.token));
 }
 
-// Where it is, for a person or for a program.
-void say_where(const TwinOptions& options, const HostLine& line) {
+// Its address, for a person or for a program.
+void write_address(const TwinOptions& options, const HostLine& line) {
   const auto* usb = dynamic_cast<const UsbLine*>(&line);
   if (options.json_file != "-") {
     if (usb != nullptr)
@@ -60,7 +60,7 @@ void say_where(const TwinOptions& options, const HostLine& line) {
                  UsbLine::kBusId);
     fmt::print("drive {} at {}\n", options.serial, line.name());
   }
-  // Neither a serial number nor a name has letters that JSON writes otherwise.
+  // Neither a serial number nor a name has characters that JSON escapes.
   const std::string json =
       fmt::format("{{\"format\": \"flexspline-twin/1\", \"serial\": \"{}\", \"drive\": \"{}\", \"usbip_port\": {}}}\n",
                   options.serial, line.name(), usb != nullptr ? std::to_string(usb->port()) : "null");
@@ -85,7 +85,7 @@ class Server {
         flash_(options.flash_file),
         setup_(setup_of(options)),
         line_(line_of(options)),
-        cable_(options.cable_file) {
+        link_fault_(options.cable_file) {
     setup_.flash = &flash_;
     usb_ = dynamic_cast<UsbLine*>(line_.get());
     if (usb_ != nullptr)
@@ -99,19 +99,19 @@ class Server {
   }
 
   void run() {
-    if (!options_.inherits) say_where(options_, *line_);
+    if (!options_.inherits) write_address(options_, *line_);
     end_ = Clock::now() +
            std::chrono::duration_cast<Clock::duration>(std::chrono::duration<double>(std::max(options_.seconds, 0.0)));
     std::signal(SIGINT, note_signal);
     std::signal(SIGTERM, note_signal);
     if (machine_ == nullptr) return run_application(nullptr);
-    // One turn from each reset to the next.
+    // One iteration from each reset to the next.
     while (!over()) {
       if (!machine_->start()) {
-        usb_->pull_out();
+        usb_->reconnect();
         machine_->serve_loader(usb_->bus(), UsbLine::kBusId, options_.serial, [this] { return over(); });
       } else if (machine_->hangs()) {
-        usb_->pull_out();
+        usb_->reconnect();
         wait_for_watchdog();
       } else {
         setup_.version = machine_->version();
@@ -120,38 +120,39 @@ class Server {
         usb_->plug_in();
         Watch watch(machine_->slots(), kTickHz);
         run_application(&watch);
-        machine_->ask_for_loader();
-        usb_->pull_out();
+        machine_->request_loader();
+        usb_->reconnect();
       }
     }
   }
 
  private:
   static constexpr std::uint32_t kBurst = 100;
-  // An armed drive without its host for 0.1 s stops: an armed twin that runs fast waits for its host well before.
+  // An armed drive stops after 0.1 s without its host: an armed twin that runs fast waits for its host long before
+  // that.
   static constexpr std::uint32_t kMostAhead = 1'000;
-  // Set points are streamed by what the host has heard of the drive's time: two messages of a host in time, or each is
-  // late by as much as the machine is busy, and the shaft goes on where it should have turned.
+  // A host times its set points by the drive's time that it has received: the twin waits so that they arrive in time.
+  // Otherwise each is late by the machine's delay, and the shaft overshoots its turning points.
   static constexpr std::uint32_t kMostAheadOfSetPoints = 200;
 
   using Watch = firmware::UpdateWatch<Machine::Slots>;
 
   bool over() const { return line_->ended() || asked_to_end != 0 || (options_.seconds > 0.0 && Clock::now() >= end_); }
-  // Until the twin ends, or a host asked for the boot loader.
+  // Until the twin ends, or a host requests the boot loader.
   void run_application(Watch* watch) {
     due_ = Clock::now();
     std::optional<Clock::time_point> leaves_at;
     int wait_ms = 0;
     while (!over() && (!leaves_at || Clock::now() < *leaves_at)) {
-      cable_.look();
+      link_fault_.read_file();
       follow_cable();
-      if (line_->turn(wait_ms)) drive_->service().disconnected();
-      // What waits in the drive takes its place on the line before that counts as room for more time.
+      if (line_->transfer(wait_ms)) drive_->service().disconnected();
+      // Waiting data of the drive are sent first, before room on the line counts as time to run.
       exchange();
       const std::uint32_t ticks = ticks_now();
       for (std::uint32_t i = 0; i < ticks; ++i) tick();
       exchange();
-      if (watch != nullptr && watch->turn(drive_->status(), line_->has_host(), usb_->dfu()) && !leaves_at)
+      if (watch != nullptr && watch->poll(drive_->status(), line_->has_host(), usb_->dfu()) && !leaves_at)
         leaves_at = Clock::now() + kAfterDetach;
       wait_ms = ticks > 0 && runs_fast() ? 0 : 1;
     }
@@ -167,8 +168,8 @@ class Server {
     return streams ? kMostAheadOfSetPoints : kMostAhead;
   }
   void follow_cable() {
-    if (cable_.plugged() == std::exchange(was_plugged_, cable_.plugged())) return;
-    line_->plug(cable_.plugged());
+    if (link_fault_.plugged() == std::exchange(was_plugged_, link_fault_.plugged())) return;
+    line_->plug(link_fault_.plugged());
     drive_->service().disconnected();
   }
   std::uint32_t ticks_now() {
@@ -179,7 +180,7 @@ class Server {
       return kBurst;
     }
     const auto late = std::chrono::duration<double>(now - due_).count();
-    // A machine that was busy: time that cannot be made good is dropped.
+    // The machine was busy: lost time that cannot be recovered is dropped.
     if (late > 0.05) due_ = now - std::chrono::milliseconds(50);
     const auto ticks = static_cast<std::uint32_t>(std::max(0.0, std::floor(std::min(late, 0.05) * kTickHz)));
     due_ += std::chrono::nanoseconds(std::int64_t{1'000'000'000} / kTickHz * ticks);
@@ -190,15 +191,15 @@ class Server {
     ++since_message_;
     if (injection_ && is_armed(drive_->status().mode) && ++armed_ticks_ == std::llround(options_.inject_at_s * kTickHz))
       drive_->rig().inject(*injection_);
-    // Answers and frames leave as they come, so that the drive's ring holds what a real one would.
+    // Answers and frames are sent at once, so that the drive's ring fills as in a real drive.
     if (drive_->status().tick % 20 == 0) exchange();
   }
   void exchange() {
     for (const protocol::Message* m = line_->front(); m != nullptr && drive_->service().take(*m); m = line_->front()) {
       line_->drop();
       since_message_ = 0;
-      cable_.count();
-      if (!cable_.plugged()) break;
+      link_fault_.count();
+      if (!link_fault_.plugged()) break;
     }
     follow_cable();
     protocol::Message m;
@@ -217,7 +218,7 @@ class Server {
   std::optional<board::Injection> injection_;
   std::uint32_t since_message_ = 0;
   std::int64_t armed_ticks_ = 0;
-  Cable cable_;
+  LinkFault link_fault_;
   bool was_plugged_ = true;
 };
 

@@ -12,15 +12,15 @@ struct TwinOptions {
   std::string hide;
   std::string flash_file;
   std::string serial = "TWIN";
-  std::string json_file;   ///< takes where it is, once it listens; - is standard output
-  std::string cable_file;  ///< pulls its plug (cable.hpp); empty: none
+  std::string json_file;   ///< receives its address, once it listens; - is standard output
+  std::string cable_file;  ///< unplugs its link (link_fault.hpp); empty: none
   std::string inject;
-  double inject_at_s = 1.0;  ///< after the drive was armed first
+  double inject_at_s = 1.0;  ///< after the drive was first armed
   std::uint64_t seed = 1;
-  int port = -1;          ///< on 127.0.0.1; nought: any that is free
-  std::string token;      ///< that a host has to say; empty: drawn anew
-  int usbip = -1;         ///< on 127.0.0.1, a USB device there; nought: any port that is free
-  double seconds = 0.0;   ///< nought: until it is stopped
+  int port = -1;          ///< on 127.0.0.1; zero: any that is free
+  std::string token;      ///< that a host has to send; empty: random
+  int usbip = -1;         ///< on 127.0.0.1, a USB device there; zero: any port that is free
+  double seconds = 0.0;   ///< zero: until it is stopped
   bool pty = false;       ///< a serial line
   bool inherits = false;  ///< a line that the caller left as standard input
   bool empty = false;
@@ -29,10 +29,9 @@ struct TwinOptions {
   bool lossy = false;
 };
 
-/// Runs a drive for hosts that come by, one at a time, over a line of bytes with the serial framing or over USB. In
-/// real time; with `fast` an armed drive runs as fast as it can, but no further ahead than its host keeps up with.
-/// Returns where the line that it inherited ends, at SIGINT and SIGTERM, and after `seconds`. Throws std::runtime_error
-/// with what cannot be opened.
+/// Runs a drive for hosts, one at a time, over a serial line or over USB. In real time; with `fast` an armed drive runs
+/// as fast as it can, but not further ahead than its host follows. Returns where the line that it inherited ends, at
+/// SIGINT and SIGTERM, and after `seconds`. Throws std::runtime_error with what cannot be opened.
 void run_twin(const TwinOptions& options);
 
 }  // namespace flexspline::twin

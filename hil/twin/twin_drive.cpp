@@ -17,10 +17,10 @@ std::array<std::uint8_t, Size> text_in(const std::string& text) {
   return bytes;
 }
 
-// A locked output stands at its zero.
-double wake_of(const TwinSetup& setup) {
+// A locked output is at its zero.
+double start_turns_of(const TwinSetup& setup) {
   if (setup.locked) return 0.0;
-  if (setup.wake_turns) return *setup.wake_turns;
+  if (setup.start_turns) return *setup.start_turns;
   constexpr double kMostTurns = 2.0;
   std::mt19937_64 random(setup.seed);
   return std::uniform_real_distribution<double>(-kMostTurns, kMostTurns)(random);
@@ -33,7 +33,7 @@ TwinDrive::TwinDrive(const TwinSetup& setup)
       rig_({.drive = setup.drive,
             .seed = setup.seed,
             .locked = setup.locked,
-            .wake_turns = wake_of(setup),
+            .start_turns = start_turns_of(setup),
             .encoders = setup.encoders}),
       own_flash_(setup.flash == nullptr ? std::make_unique<FlashFile>(setup.flash_file) : nullptr),
       store_(setup.flash == nullptr ? *own_flash_ : *setup.flash) {
@@ -46,10 +46,9 @@ TwinDrive::TwinDrive(const TwinSetup& setup)
     if (store_.begin(block.size(), model::crc32(block)) != storage::StoreError::none ||
         store_.write(0, block) != storage::StoreError::none ||
         store_.commit(validate, reason) != storage::StoreError::none)
-      throw std::runtime_error("the block of the drive's maker cannot be stored; is the flash file writable?");
+      throw std::runtime_error("the factory block cannot be stored; is the flash file writable?");
   }
-  const firmware::DriveInfo info{
-      {setup_.version.major, setup_.version.minor}, text_in<16>(std::string(kBoardName)), text_in<16>(setup_.serial)};
+  const auto info = firmware::DriveInfo::of({setup_.version.major, setup_.version.minor}, kBoardName, setup_.serial);
   service_ = std::make_unique<Service>(application_, store_, blocks_, board::SoftwareBoard::kTickHz, info);
   service_->start();
   application_.background();

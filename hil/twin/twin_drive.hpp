@@ -7,8 +7,8 @@
 #include <string>
 
 #include "firmware/service.hpp"
-#include "hil/board/brain.hpp"
-#include "hil/board/drive_rig.hpp"
+#include "hil/board/controller.hpp"
+#include "hil/board/plant_rig.hpp"
 #include "hil/twin/flash_file.hpp"
 #include "hil/twin/image.hpp"
 
@@ -18,13 +18,13 @@ struct TwinSetup {
   plant::Drive drive{};
   std::uint64_t seed = 1;
   std::string serial = "TWIN";
-  std::filesystem::path flash_file{};  ///< empty: what is flashed ends with the twin
-  bool as_made = true;                 ///< an empty flash memory gets the block of the drive's maker
+  std::filesystem::path flash_file{};  ///< empty: the memory ends with the twin
+  bool as_made = true;                 ///< an empty flash memory gets the factory block
   bool locked = false;                 ///< the output
-  /// Where the motor stands when the drive is switched on, turns; none: somewhere within two turns, drawn by the seed.
-  std::optional<double> wake_turns{};
+  /// The motor's angle when the drive is switched on, turns; none: random within two turns, by the seed.
+  std::optional<double> start_turns{};
   control::SensorKind encoders = control::SensorKind::absolute;
-  FlashFile* flash = nullptr;  ///< memory that outlives the drive, in the place of the file
+  FlashFile* flash = nullptr;  ///< memory that outlives the drive, instead of the file
   boot::Version version = kFactoryVersion;
 };
 
@@ -33,7 +33,7 @@ using TwinApplication = firmware::Application<board::SoftwareBoard>;
 using TwinBlocks = firmware::ApplicationBlocks<TwinApplication, board::SoftwareBoard::kTickHz>;
 
 /// A whole drive: plant, sensors, the firmware's application and its service for a host, and flash memory. Time passes
-/// in run(), and nowhere else.
+/// only in run().
 class TwinDrive {
  public:
   using Store = storage::ParameterStore<FlashFile>;
@@ -49,11 +49,11 @@ class TwinDrive {
   Service& service() { return *service_; }
   const firmware::Status& status() const { return application_.status(); }
   const Store& store() const { return store_; }
-  board::DriveRig& rig() { return rig_; }
+  board::PlantRig& rig() { return rig_; }
 
  private:
   TwinSetup setup_;
-  board::DriveRig rig_;
+  board::PlantRig rig_;
   board::SoftwareBoard board_;
   TwinApplication application_;
   std::unique_ptr<FlashFile> own_flash_;

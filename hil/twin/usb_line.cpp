@@ -10,7 +10,7 @@ UsbLine::UsbLine(int port, const std::string& serial)
   server_.plug(kBusId, *connector_);
 }
 
-void UsbLine::pull_out() {
+void UsbLine::reconnect() {
   server_.unplug(kBusId);
 }
 
@@ -21,7 +21,7 @@ void UsbLine::plug_in() {
   if (plugged_) server_.plug(kBusId, *connector_);
 }
 
-bool UsbLine::turn(int wait_ms) {
+bool UsbLine::transfer(int wait_ms) {
   server_.serve(wait_ms);
   const bool had_host = std::exchange(had_host_, has_host());
   const bool changed = std::exchange(connector_->was_reset, false) || had_host != had_host_;
@@ -39,7 +39,7 @@ void UsbLine::plug(bool in) {
 }
 
 const protocol::Message* UsbLine::front() {
-  // A report that holds no message is passed over, as the drive does.
+  // A report without a message is ignored, as in the drive.
   usb::Report report;
   while (!is_waiting_ && reports().receive(report)) is_waiting_ = protocol::decode(report, waiting_);
   return is_waiting_ ? &waiting_ : nullptr;

@@ -14,8 +14,8 @@
 
 namespace flexspline::twin {
 
-/// A drive's USB connector, which hosts reach by USB/IP: the drive's own device core, a message in each report. Whoever
-/// detaches, configures the device away or resets it is a lost host.
+/// A drive's USB connector, which hosts reach by USB/IP: the drive's own device core, a message in each report. A host
+/// that detaches, deconfigures or resets the device counts as lost.
 class UsbLine final : public HostLine {
  public:
   static constexpr const char* kBusId = "1-1";
@@ -24,14 +24,14 @@ class UsbLine final : public HostLine {
   UsbLine(int port, const std::string& serial);
 
   std::uint16_t port() const { return server_.port(); }
-  /// The drive leaves the bus and comes back as one that was just switched on.
-  void pull_out();
+  /// The drive leaves the bus and returns as after power-on.
+  void reconnect();
   void plug_in();
   usbip::Server& bus() { return server_; }
   /// Its run-time interface for firmware updates.
   usb::DfuRuntime& dfu() { return connector_->device.get<usb::DfuRuntime>(); }
   std::string name() const override { return "hid:" + serial_; }
-  bool turn(int wait_ms) override;
+  bool transfer(int wait_ms) override;
   void plug(bool in) override;
   bool has_host() const override { return connector_->device.configured(); }
   const protocol::Message* front() override;
@@ -40,11 +40,10 @@ class UsbLine final : public HostLine {
   void send(const protocol::Message& m) override;
 
  private:
-  // As many reports as telemetry makes between two frames of the bus, and more requests than a host has open.
+  // Room for the telemetry between two frames of the bus, and for more requests than a host has open.
   using Reports = usb::Hid<16, 4>;
 
-  // The device as the bus sees it. A host that leaves and another that comes between two turns are seen by their
-  // resets.
+  // The device on the bus. If one host leaves and another one connects between two calls, their resets show it.
   struct Connector final : usbip::BusDevice {
     explicit Connector(const std::string& serial) : device(serial) {}
     void reset() override {

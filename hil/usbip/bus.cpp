@@ -21,12 +21,12 @@ void Bus::plug(std::string_view bus_id, BusDevice& device) {
   const std::uint16_t port = dash < bus_id.size() ? number(bus_id.substr(dash + 1)) : std::uint16_t{0};
   const std::string id(bus_id);
   if (bus == 0 || port == 0 || port > 127)
-    throw std::invalid_argument("'" + id + "' is no bus id; write bus and port, as 1-1");
-  if (find(id)) throw std::invalid_argument("bus id " + id + " is in use; pull that device out first");
+    throw std::invalid_argument("'" + id + "' is not a bus id; write bus and port, such as 1-1");
+  if (find(id)) throw std::invalid_argument("bus id " + id + " is in use; unplug that device first");
   auto slot = std::make_shared<Slot>(id, bus, port, device);
   if (!slot->host.enumerate())
     throw std::invalid_argument("the device for bus id " + id + " does not answer a host's first requests");
-  slot->host.let_go();
+  slot->host.release();
   slots_.push_back(std::move(slot));
 }
 
@@ -34,7 +34,7 @@ bool Bus::unplug(std::string_view bus_id) {
   const auto found = std::find_if(slots_.begin(), slots_.end(), [&](const auto& s) { return s->bus_id == bus_id; });
   if (found == slots_.end()) return false;
   (*found)->plugged = false;
-  (*found)->host.let_go();
+  (*found)->host.release();
   slots_.erase(found);
   return true;
 }

@@ -11,7 +11,7 @@
 
 namespace flexspline::usbip {
 
-/// A place on the bus with a device in it. Connections share it, so that they notice when the device is pulled out.
+/// A port of the bus with its device. Connections share it, so that they notice when the device is unplugged.
 struct Slot {
   Slot(std::string id, std::uint16_t bus_number, std::uint16_t device_number, BusDevice& device)
       : bus_id(std::move(id)), bus(bus_number), number(device_number), host(device) {}
@@ -28,10 +28,10 @@ struct Slot {
 /// The devices that a server offers, by their bus ids (1-1, 1-2, ...).
 class Bus {
  public:
-  /// `device` has to live until it is pulled out. Throws std::invalid_argument for a bus id that is none or in use, and
-  /// for a device that does not answer as USB demands.
+  /// `device` has to live until it is unplugged. Throws std::invalid_argument for a bus id that is invalid or in use,
+  /// and for a device that does not answer as USB requires.
   void plug(std::string_view bus_id, BusDevice& device);
-  /// Whoever uses the device loses it at once. False where there is none.
+  /// A client of the device loses it at once. False where there is none.
   bool unplug(std::string_view bus_id);
   std::shared_ptr<Slot> find(std::string_view bus_id) const;
   const std::vector<std::shared_ptr<Slot>>& slots() const { return slots_; }

@@ -6,10 +6,10 @@
 
 namespace flexspline::usbip {
 
-/// What a device answers to a packet. Silence: there is no such endpoint.
+/// A device's answer to a packet. Silence: there is no such endpoint.
 enum class Handshake : std::uint8_t { ack, nak, stall, silence };
 
-/// A full-speed USB device, packet by packet, as its bus sees it. `endpoint` is a number without direction.
+/// A full-speed USB device on its bus, packet by packet. `endpoint` is a number without direction.
 class BusDevice {
  public:
   virtual ~BusDevice() = default;

@@ -32,7 +32,7 @@ void put_device(Buffer& to, const Slot& slot) {
 Connection::~Connection() {
   if (!slot_) return;
   slot_->imported = false;
-  if (slot_->plugged) slot_->host.let_go();
+  if (slot_->plugged) slot_->host.release();
 }
 
 void Connection::fail(std::string why) {
@@ -41,7 +41,7 @@ void Connection::fail(std::string why) {
 }
 
 void Connection::input_ended() {
-  // Who has a device and says no more has let it go; who asked for the list still wants to read it.
+  // A client with a device that ends its stream has released it; one that requested the list still reads it.
   if (!input_.empty()) fail("the stream ended within a message");
   finished_ = true;
 }
@@ -58,7 +58,7 @@ void Connection::take(std::span<const std::uint8_t> bytes) {
   input_.erase(input_.begin(), input_.begin() + static_cast<std::ptrdiff_t>(at));
 }
 
-// Both return the bytes that they used, nought where more have to come first.
+// Both return the number of bytes that they used, zero where more are needed first.
 std::size_t Connection::take_operation(std::span<const std::uint8_t> bytes) {
   if (bytes.size() < kOperationBytes) return 0;
   const OperationHead head = read_operation(bytes.first<kOperationBytes>());
@@ -179,7 +179,7 @@ void Connection::end_transfer(std::uint32_t sequence, Status status, std::size_t
 void Connection::unlink(const CommandHead& head) {
   const auto found = std::find_if(pending_.begin(), pending_.end(),
                                   [&](const Transfer& t) { return t.sequence == head.unlink_sequence; });
-  // Nought says that it had ended before: its result is on its way.
+  // Zero: it had ended before, and its result is being sent.
   const Status status = found == pending_.end() ? Status::ok : Status::unlinked;
   if (found != pending_.end()) pending_.erase(found);
   put_unlinked(output_, head.sequence, static_cast<std::int32_t>(status));

@@ -12,8 +12,8 @@
 
 namespace flexspline::usbip {
 
-/// One client's conversation, bytes in, bytes out; it knows of no socket. Whatever a client sends, memory is bounded
-/// and what makes no sense ends the conversation.
+/// The protocol with one client, bytes in, bytes out, without a socket. For any input of a client, memory is bounded
+/// and invalid messages end the connection.
 class Connection {
  public:
   static constexpr std::int32_t kLongestTransfer = 65'536;
@@ -27,18 +27,18 @@ class Connection {
 
   /// Bytes from the client, in pieces of any length.
   void take(std::span<const std::uint8_t> bytes);
-  /// Transfers that had to wait for the device. Returns whether one of them ended.
+  /// Continues transfers that had to wait for the device. Returns whether one of them ended.
   bool advance();
-  /// What is to be sent; the sender removes what it has sent.
+  /// Bytes to send; the sender removes those that it has sent.
   Buffer& output() { return output_; }
-  /// Whether it may be fed: not while the client does not read.
+  /// Whether it accepts input: not while the client does not read.
   bool wants_input() const { return !finished() && output_.size() < kMostOutput; }
-  /// Nothing more is read; to be closed once the output is sent.
+  /// No more input is read; close it once the output is sent.
   bool finished() const { return finished_ || (slot_ && !slot_->plugged); }
   /// The client's sending side ended.
   void input_ended();
   bool attached() const { return slot_ != nullptr; }
-  /// Why it was ended, empty where the client did nothing wrong.
+  /// Why it was ended, empty without an error of the client.
   const std::string& fault() const { return fault_; }
 
  private:

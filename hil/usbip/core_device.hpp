@@ -13,7 +13,7 @@
 namespace flexspline::usbip {
 
 /// The drive's own device core (shared/usb) on a software port: `CoreDevice<usb::FlexsplineIdentity, usb::Hid<16, 4>>`.
-/// The application reaches its classes by get(), and calls poll() after it has given them something to send.
+/// The application reaches its classes by get(), and calls poll() after it has given them data to send.
 template <class Identity, class... Classes>
 class CoreDevice final : public BusDevice {
  public:

@@ -116,7 +116,7 @@ std::size_t HostController::packet_bytes(std::uint8_t address) const {
   return found == info_.packet_bytes.end() ? 0 : found->second;
 }
 
-HostController::Step HostController::in(std::uint8_t endpoint, std::size_t wanted, std::vector<std::uint8_t>& data,
+HostController::Step HostController::in(std::uint8_t endpoint, std::size_t bytes, std::vector<std::uint8_t>& data,
                                         Status& status) {
   const std::size_t full = packet_bytes(static_cast<std::uint8_t>(endpoint | kToHost));
   status = Status::no_endpoint;
@@ -128,12 +128,12 @@ HostController::Step HostController::in(std::uint8_t endpoint, std::size_t wante
     status = status_of(hand);
     if (status != Status::ok) return Step::failed;
     data.insert(data.end(), packet.begin(), packet.end());
-    if (data.size() > wanted) {
-      data.resize(wanted);
+    if (data.size() > bytes) {
+      data.resize(bytes);
       status = Status::overflow;
       return Step::failed;
     }
-  } while (packet.size() == full && data.size() < wanted);
+  } while (packet.size() == full && data.size() < bytes);
   return Step::done;
 }
 
@@ -142,7 +142,7 @@ HostController::Step HostController::out(std::uint8_t endpoint, std::span<const 
   const std::size_t full = packet_bytes(endpoint);
   status = Status::no_endpoint;
   if (full == 0) return Step::failed;
-  // Nothing to send is one empty packet, too.
+  // Without data one empty packet is sent.
   const bool extra = data.empty() || (end_empty && data.size() % full == 0);
   const std::size_t all = (data.size() + full - 1) / full + (extra ? 1 : 0);
   for (; packets < all; ++packets) {

@@ -11,20 +11,20 @@
 
 namespace flexspline::usbip {
 
-/// What a transfer ends with: Linux's error numbers, negative, as USB/IP carries them.
+/// The status of a transfer: Linux's error numbers, negative, as in USB/IP.
 enum class Status : std::int32_t {
   ok = 0,
   no_endpoint = -2,   // ENOENT
   bad_request = -22,  // EINVAL
   stall = -32,        // EPIPE
   protocol = -71,     // EPROTO
-  overflow = -75,     // EOVERFLOW: more data than asked for
+  overflow = -75,     // EOVERFLOW: more data than requested
   unlinked = -104,    // ECONNRESET
   timed_out = -110,   // ETIMEDOUT
   too_short = -121,   // EREMOTEIO: less data, where that was not allowed
 };
 
-/// What a host learns of a device before it is used, from its descriptors.
+/// A device's descriptors, which a host reads before it uses the device.
 struct DeviceInfo {
   std::uint16_t vendor = 0;
   std::uint16_t product = 0;
@@ -36,25 +36,25 @@ struct DeviceInfo {
   std::map<std::uint8_t, std::uint16_t> packet_bytes;   // of each endpoint's address
 };
 
-/// The host's end of the wire: makes packets of transfers, and transfers of packets.
+/// The host's side of the bus: splits transfers into packets, and joins packets to transfers.
 class HostController {
  public:
   explicit HostController(BusDevice& device) : device_(device) {}
 
   /// Resets the bus, gives the device an address and reads its descriptors. False where it does not answer as chapter 9
-  /// of USB 2.0 demands.
+  /// of USB 2.0 requires.
   bool enumerate();
-  /// The host is gone: the device is on the bus, without address.
-  void let_go() { device_.reset(); }
+  /// Without a host: the device is on the bus, without address.
+  void release() { device_.reset(); }
   const DeviceInfo& info() const { return info_; }
 
   /// A whole control transfer. `data` is sent, or received, by the direction of `setup`.
   Status control(std::span<const std::uint8_t, 8> setup, std::vector<std::uint8_t>& data);
 
   enum class Step : std::uint8_t { done, later, failed };
-  /// Goes on with a transfer from `endpoint` until it has `wanted` bytes or a short packet came.
-  Step in(std::uint8_t endpoint, std::size_t wanted, std::vector<std::uint8_t>& data, Status& status);
-  /// Goes on with a transfer to `endpoint`; `packets` is how far it is. `end_empty` adds an empty packet after full
+  /// Continues a transfer from `endpoint` until it has `bytes` or a short packet was received.
+  Step in(std::uint8_t endpoint, std::size_t bytes, std::vector<std::uint8_t>& data, Status& status);
+  /// Continues a transfer to `endpoint`; `packets` have been sent. `end_empty` adds an empty packet after full
   /// ones.
   Step out(std::uint8_t endpoint, std::span<const std::uint8_t> data, bool end_empty, std::size_t& packets,
            Status& status);

@@ -54,7 +54,7 @@ bool Server::imported(std::string_view bus_id) const {
 
 bool Server::serve(int timeout_ms) {
   bool any = false;
-  // What the application has ready goes first.
+  // Data that the application has ready are sent first.
   for (const auto& client : clients_) {
     if (client->talk.advance()) any = true;
     if (write(*client)) any = true;
@@ -130,7 +130,7 @@ void Server::drop_finished() {
   const auto now = std::chrono::steady_clock::now();
   std::erase_if(clients_, [&](const std::unique_ptr<Client>& client) {
     const bool said_all = client->talk.finished() && (client->talk.output().empty() || client->talk.attached());
-    const bool idle = !client->talk.attached() && now - client->since > patience_;
+    const bool idle = !client->talk.attached() && now - client->since > idle_limit_;
     if (!client->broken && !said_all && !idle) return false;
     if (!client->talk.fault().empty() || idle) ++faults_;
     close(client->socket);

@@ -14,8 +14,8 @@ namespace flexspline::usbip {
 inline constexpr std::uint16_t kUsualPort = 3240;
 
 /// Offers devices to USB/IP clients of this machine: `usbip attach -r 127.0.0.1 -b 1-1`. It listens on loopback only,
-/// as the protocol knows neither passwords nor encryption. One thread: nothing happens but in serve(), so the
-/// application behind a device runs between two calls:
+/// as the protocol has neither passwords nor encryption. One thread: all work is done in serve(), so the application of
+/// a device runs between two calls:
 ///   while (...) { if (!server.serve(1)) drive.run_some_ticks(); drive.background(); device.poll(); }
 class Server {
  public:
@@ -29,18 +29,18 @@ class Server {
 
   std::uint16_t port() const { return port_; }
 
-  /// See Bus: `device` has to live until it is pulled out or the server ends.
+  /// See Bus: `device` has to live until it is unplugged or the server ends.
   void plug(std::string_view bus_id, BusDevice& device) { bus_.plug(bus_id, device); }
-  /// Its client loses the connection, as a host notices that a plug was pulled.
+  /// Its client loses the connection, as a host notices an unplugged device.
   bool unplug(std::string_view bus_id);
   bool imported(std::string_view bus_id) const;
   std::size_t connections() const { return clients_.size(); }
-  /// Clients that were sent away because of what they sent.
+  /// Clients that were disconnected because of invalid messages.
   std::uint64_t faults() const { return faults_; }
-  /// How long a client may do nothing before it has a device.
-  void set_patience(std::chrono::milliseconds patience) { patience_ = patience; }
+  /// How long a client may be idle before it has a device.
+  void set_idle_limit(std::chrono::milliseconds limit) { idle_limit_ = limit; }
 
-  /// Waits at most so long for something to do, and does it. Returns whether there was anything.
+  /// Waits at most this time for work, and does it. Returns whether there was any.
   bool serve(int timeout_ms);
 
  private:
@@ -61,7 +61,7 @@ class Server {
   int listener_ = -1;
   std::uint16_t port_ = 0;
   std::uint64_t faults_ = 0;
-  std::chrono::milliseconds patience_{5000};
+  std::chrono::milliseconds idle_limit_{5000};
 };
 
 }  // namespace flexspline::usbip

@@ -10,7 +10,7 @@
 
 namespace flexspline::usbip {
 
-/// The port of shared/usb where there is no wire: it keeps what waits on each endpoint until the bus asks.
+/// The port of shared/usb without hardware: it stores the packet of each endpoint until the bus asks for it.
 class SoftwarePort {
  public:
   static constexpr bool kAddressBeforeStatus = false;
@@ -27,7 +27,7 @@ class SoftwarePort {
   void stall(std::uint8_t address) { at(address) = {.open = at(address).open, .stalled = true}; }
   void unstall(std::uint8_t address) { at(address) = {.open = at(address).open}; }
 
-  // The bus's side.
+  // For the bus.
 
   void bus_reset() {
     pipes_ = {};
@@ -35,7 +35,7 @@ class SoftwarePort {
     setup_came();
   }
   void setup_came() { at(0) = at(usb::kToHost) = {.open = true}; }
-  /// Takes the packet that waits for the host.
+  /// Takes the packet that is ready for the host.
   Handshake take(std::uint8_t number, std::vector<std::uint8_t>& packet) {
     Pipe& pipe = at(number | usb::kToHost);
     const Handshake hand = answer(pipe);
@@ -45,7 +45,7 @@ class SoftwarePort {
     }
     return hand;
   }
-  /// Whether a packet from the host is taken; it then belongs to the device.
+  /// Whether a packet from the host is accepted; it then belongs to the device.
   Handshake offer(std::uint8_t number) {
     Pipe& pipe = at(number);
     const Handshake hand = answer(pipe);
@@ -58,7 +58,7 @@ class SoftwarePort {
   struct Pipe {
     bool open = false;
     bool stalled = false;
-    bool ready = false;  // a packet waits, or one may come
+    bool ready = false;  // a packet is ready, or one may be received
     std::vector<std::uint8_t> packet{};
   };
   static Handshake answer(const Pipe& pipe) {

@@ -11,7 +11,7 @@ std::uint32_t word32(std::span<const std::uint8_t> b, std::size_t at) {
 void put_reply_head(Buffer& to, Command command, std::uint32_t sequence) {
   put32(to, static_cast<std::uint32_t>(command));
   put32(to, sequence);
-  // Device, direction and endpoint are nought in replies.
+  // Device, direction and endpoint are zero in replies.
   for (int i = 0; i < 3; ++i) put32(to, 0);
 }
 

@@ -55,14 +55,14 @@ struct OperationHead {
 };
 
 OperationHead read_operation(std::span<const std::uint8_t, kOperationBytes> bytes);
-/// The text of a field up to its first nought; empty where it has none.
+/// The text of a field up to its first zero; empty where it has none.
 std::string read_bus_id(std::span<const std::uint8_t, kBusIdBytes> bytes);
 CommandHead read_command(std::span<const std::uint8_t, kCommandBytes> bytes);
 
 void put8(Buffer& to, std::uint8_t value);
 void put16(Buffer& to, std::uint16_t value);
 void put32(Buffer& to, std::uint32_t value);
-/// A field of `bytes`, filled with noughts; the last is one.
+/// A field of `bytes`, filled with zeros; the last is one.
 void put_text(Buffer& to, std::string_view text, std::size_t bytes);
 
 void put_operation(Buffer& to, Operation code, std::uint32_t status);

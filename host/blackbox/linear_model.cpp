@@ -15,13 +15,14 @@ namespace {
 using Eigen::Index;
 
 constexpr double kUnknown = std::numeric_limits<double>::quiet_NaN();
-// Columns that differ by less than this from what the others can say are taken for the same; the data have six digits.
+// Columns that differ by less than this from a combination of the others are taken as collinear; the data have six
+// digits.
 constexpr double kRank = 1e-10;
 
 void require_same_shape(const std::vector<Record>& records, const Orders& orders) {
   if (orders.na < 0 || orders.nb < 0 || orders.nk < 0 || orders.parameters(1) == 0)
     throw std::invalid_argument(
-        fmt::format("black box: orders na = {}, nb = {}, nk = {} must not be negative, nor all nought", orders.na,
+        fmt::format("black box: orders na = {}, nb = {}, nk = {} must not be negative, nor all zero", orders.na,
                     orders.nb, orders.nk));
   if (records.empty()) throw std::invalid_argument("black box: there is no record to fit");
   for (const Record& r : records) {
@@ -32,9 +33,9 @@ void require_same_shape(const std::vector<Record>& records, const Orders& orders
       if (u.size() != r.output.size())
         throw std::invalid_argument(
             fmt::format("black box: an input has {} samples, its output {}", u.size(), r.output.size()));
-    if (!r.judged.empty() && r.judged.size() != r.output.size())
+    if (!r.scored.empty() && r.scored.size() != r.output.size())
       throw std::invalid_argument(
-          fmt::format("black box: {} samples are marked, the output has {}", r.judged.size(), r.output.size()));
+          fmt::format("black box: {} samples are marked, the output has {}", r.scored.size(), r.output.size()));
   }
 }
 
@@ -74,7 +75,7 @@ LinearModel fit(const std::vector<Record>& records, const Orders& orders) {
   const std::size_t columns = orders.parameters(inputs);
   std::size_t rows = 0;
   for (const Record& r : records)
-    for (std::size_t k = orders.memory(); k < r.output.size(); ++k) rows += r.is_judged(k) ? 1 : 0;
+    for (std::size_t k = orders.memory(); k < r.output.size(); ++k) rows += r.is_scored(k) ? 1 : 0;
   if (rows < columns)
     throw std::invalid_argument(fmt::format("{} parameters cannot be fitted on {} samples", columns, rows));
 
@@ -83,7 +84,7 @@ LinearModel fit(const std::vector<Record>& records, const Orders& orders) {
   Index row = 0;
   for (const Record& r : records)
     for (std::size_t k = orders.memory(); k < r.output.size(); ++k) {
-      if (!r.is_judged(k)) continue;
+      if (!r.is_scored(k)) continue;
       fill(A.row(row), orders, r, r.output, k);
       y[row++] = r.output[k];
     }
@@ -113,7 +114,7 @@ LinearModel fit(const std::vector<Record>& records, const Orders& orders) {
 }
 
 double LinearModel::largest_pole() const {
-  // Trailing noughts are poles at nought.
+  // Trailing zeros are poles at zero.
   Index n = a.size();
   while (n > 0 && a[n - 1] == 0.0) --n;
   if (n == 0) return 0.0;
@@ -167,7 +168,7 @@ Errors errors_of(const LinearModel& model, const Record& record) {
   const std::vector<double> free_run = model.simulate(record), one_step = model.one_step(record);
   Errors errors;
   for (std::size_t k = model.orders.memory(); k < record.output.size(); ++k) {
-    if (!record.is_judged(k)) continue;
+    if (!record.is_scored(k)) continue;
     const double y = record.output[k];
     Errors one;
     one.samples = 1;

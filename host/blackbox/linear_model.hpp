@@ -29,14 +29,14 @@ struct Orders {
   bool operator==(const Orders&) const = default;
 };
 
-/// One uninterrupted stretch of samples at the sample time of the model.
+/// One uninterrupted segment of samples at the sample time of the model.
 struct Record {
   std::vector<double> output;
   std::vector<std::vector<double>> inputs;  // each as long as the output
-  std::vector<std::uint8_t> judged;  // empty: all. Others are neither fitted nor scored, but are the past of those
-  std::size_t experiment = 0;        // stretches of one experiment are left out together
+  std::vector<std::uint8_t> scored;  // empty: all. Others are neither fitted nor scored, but are the past of those
+  std::size_t experiment = 0;        // segments of one experiment are left out together
 
-  bool is_judged(std::size_t k) const { return judged.empty() || judged[k]; }
+  bool is_scored(std::size_t k) const { return scored.empty() || scored[k]; }
 };
 
 struct LinearModel {
@@ -45,12 +45,13 @@ struct LinearModel {
   std::vector<Eigen::VectorXd> b;  // one an input, nb each
   double constant = 0.0;
   std::size_t parameters = 0;
-  std::size_t rows = 0;           // that it was fitted on
-  double condition_number = 0.0;  // of the columns scaled to unit length; infinite where inputs do not tell all
+  std::size_t rows = 0;  // that it was fitted on
+  double condition_number =
+      0.0;  // of the columns scaled to unit length; infinite where the inputs do not determine all
 
-  /// Largest modulus of the roots of z^na + a_1 z^(na-1) + ...; nought for FIR.
+  /// Largest modulus of the roots of z^na + a_1 z^(na-1) + ...; zero for FIR.
   double largest_pole() const;
-  /// Every input that is bounded gives an output that is.
+  /// Bounded inputs give bounded outputs.
   bool stable() const { return largest_pole() < 1.0; }
   /// Static gain from an input to the output: sum(b) / (1 + sum(a)).
   double static_gain(std::size_t input) const;
@@ -62,13 +63,13 @@ struct LinearModel {
   std::vector<double> simulate(const Record& record) const;
 };
 
-/// Least squares of the equation error (eq. 15 to 19) over all judged samples of all records, by a rank-revealing
-/// orthogonal factorisation; parameters that the inputs do not tell share the effect with the least squares of their
-/// own (minimum norm of the scaled columns). Throws std::invalid_argument where orders are out of range, records differ
-/// in their inputs or lengths, or there are fewer samples than parameters.
+/// Least squares of the equation error (eq. 15 to 19) over all scored samples of all records, by a rank-revealing
+/// orthogonal factorisation; parameters that the inputs do not determine share the effect with the least squares of
+/// their own (minimum norm of the scaled columns). Throws std::invalid_argument where orders are out of range, records
+/// differ in their inputs or lengths, or there are fewer samples than parameters.
 LinearModel fit(const std::vector<Record>& records, const Orders& orders);
 
-/// Sums of the errors of a model on records, over judged samples after the first `orders.memory()` of each record.
+/// Sums of the errors of a model on records, over scored samples after the first `orders.memory()` of each record.
 struct Errors {
   std::size_t samples = 0;
   double squared = 0.0;  // free run
@@ -78,7 +79,7 @@ struct Errors {
   void add(const Errors& other);
   double rms() const;  // NaN without samples or where the free run diverged
   double rms_one_step() const;
-  double fit_percent() const;  // of the free run: 100 (1 - |y - yhat| / |y - mean(y)|), NaN for an output that stays
+  double fit_percent() const;  // of the free run: 100 (1 - |y - yhat| / |y - mean(y)|), NaN for a constant output
   double nrms() const;         // rms / std(y)
 };
 Errors errors_of(const LinearModel& model, const Record& record);

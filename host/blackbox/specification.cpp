@@ -20,7 +20,8 @@ constexpr std::size_t kParts = 3;  // of a single record
 
 [[noreturn]] void refuse(std::string_view text, std::string_view why) {
   throw std::invalid_argument(fmt::format(
-      "{} is no black box: {}; write fir:N, arx:NA,NB,NK, fir:auto or arx:auto, as in fir:20 or arx:4,4,1", text, why));
+      "{} is not a black box: {}; write fir:N, arx:NA,NB,NK, fir:auto or arx:auto, as in fir:20 or arx:4,4,1", text,
+      why));
 }
 
 std::vector<int> numbers_of(std::string_view text, std::string_view list) {
@@ -31,7 +32,7 @@ std::vector<int> numbers_of(std::string_view text, std::string_view list) {
     int number = 0;
     const auto [stop, error] = std::from_chars(word.data(), word.data() + word.size(), number);
     if (word.empty() || error != std::errc{} || stop != word.data() + word.size())
-      refuse(text, word.empty() ? "an order is missing" : fmt::format("\"{}\" is no whole number", word));
+      refuse(text, word.empty() ? "an order is missing" : fmt::format("\"{}\" is not a whole number", word));
     numbers.push_back(number);
     if (comma == std::string_view::npos) return numbers;
     list.remove_prefix(comma + 1);
@@ -49,7 +50,7 @@ std::vector<Orders> candidates(Family family) {
   return all;
 }
 
-// Folds of what is left out: experiments dealt in turn, or thirds of the only one.
+// Folds of the cross-validation: experiments in turn, or thirds of a single one.
 std::vector<std::vector<Record>> folds_of(const std::vector<Record>& records) {
   std::set<std::size_t> experiments;
   for (const Record& r : records) experiments.insert(r.experiment);
@@ -71,7 +72,7 @@ std::vector<std::vector<Record>> folds_of(const std::vector<Record>& records) {
       cut.experiment = r.experiment;
       cut.output.assign(r.output.begin() + from, r.output.begin() + to);
       for (const std::vector<double>& u : r.inputs) cut.inputs.emplace_back(u.begin() + from, u.begin() + to);
-      if (!r.judged.empty()) cut.judged.assign(r.judged.begin() + from, r.judged.begin() + to);
+      if (!r.scored.empty()) cut.scored.assign(r.scored.begin() + from, r.scored.begin() + to);
       folds[part].push_back(std::move(cut));
     }
   return folds;

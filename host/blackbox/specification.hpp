@@ -1,4 +1,4 @@
-// Which black box: as a user writes it, and the choice of its orders where he leaves that open.
+// The specification of a black box by the user, and the choice of its orders where they are left open.
 #pragma once
 
 #include <cstdint>
@@ -20,7 +20,7 @@ struct Specification {
 };
 
 /// "fir:N", "fir:N,NK", "arx:NA,NB", "arx:NA,NB,NK" (NK is 1 where it is left out), "fir:auto", "arx:auto". Orders are
-/// up to 200, NK from 1 to 100. Throws std::invalid_argument that quotes the text and says what is expected.
+/// up to 200, NK from 1 to 100. Throws std::invalid_argument that quotes the text and states what is expected.
 Specification parse_specification(std::string_view text);
 /// The text that gives this back: "arx:4,4,1", "fir:20".
 std::string text_of(const Orders& orders);

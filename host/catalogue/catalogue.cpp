@@ -53,9 +53,9 @@ void torque_along_plain(const typename N::Parameter* parameters, const DriveCons
   const auto coefficients = coefficients_of<E, N>(parameters, drive);
   typename E::template State<N> state{};
   Inputs<N> before;
-  inputs.each_stretch([&](std::size_t first, std::span<const Inputs<Real>> stretch) {
-    for (std::size_t k = 0; k < stretch.size(); ++k) {
-      const Inputs<N> now = lifted<N>(stretch[k]);
+  inputs.each_block([&](std::size_t first, std::span<const Inputs<Real>> block) {
+    for (std::size_t k = 0; k < block.size(); ++k) {
+      const Inputs<N> now = lifted<N>(block[k]);
       if constexpr (!std::is_empty_v<typename E::template State<N>>) {
         if (first + k > 0) E::advance(state, coefficients, now, before);
         before = now;
@@ -111,8 +111,8 @@ class InstanceOf final : public Instance {
 };
 
 template <class E, class N>
-Along<N> along() {
-  Along<N> functions;
+BlockFunctions<N> along() {
+  BlockFunctions<N> functions;
   if constexpr (kAddsTorque<E>) {
     functions.torque = &torque_along<E, N>;
     functions.torque_of_plain = &torque_along_plain<E, N>;
@@ -121,10 +121,10 @@ Along<N> along() {
   return functions;
 }
 
-std::vector<Entry> make_entries(bool made_by_user) {
+std::vector<Entry> make_entries(bool is_user_defined) {
   std::vector<Entry> entries;
   effects::for_each_effect([&]<class E>(std::size_t id) {
-    if (E::kInfo.made_by_user != made_by_user) return;
+    if (E::kInfo.made_by_user != is_user_defined) return;
     Entry entry;
     entry.id = id;
     entry.info = &E::kInfo;
@@ -196,7 +196,7 @@ const Entry* find(std::string_view name) {
   return nullptr;
 }
 
-const Entry* find_made_by_user(std::string_view name) {
+const Entry* find_user_defined(std::string_view name) {
   static const std::vector<Entry> table = make_entries(true);
   for (const Entry& entry : table)
     if (entry.name() == name) return &entry;

@@ -32,7 +32,7 @@ class Instance {
   virtual ~Instance() = default;
   virtual void shift(effects::Inputs<Real>&) const {}
   virtual void modulate(effects::Inputs<Real>&) const {}
-  // Adds the effect's torques for these inputs, with its state as it stands.
+  // Adds the effect's torques for these inputs, with its present state.
   virtual void evaluate(const effects::Inputs<Real>&, effects::Torques<Real>&) const {}
   // The same with the state moved on from `before` to `now`, and left as it was.
   virtual void evaluate_ahead(const effects::Inputs<Real>& now, const effects::Inputs<Real>& before,
@@ -40,11 +40,11 @@ class Instance {
   virtual void advance(const effects::Inputs<Real>& now, const effects::Inputs<Real>& before) = 0;
 };
 
-// Plain inputs of a record, given a stretch at a time: a record keeps its signals in a form of its own.
+// Plain inputs of a record, given a block at a time: a record keeps its signals in a form of its own.
 class PlainInputs {
  public:
   using Inputs = effects::Inputs<Real>;
-  static constexpr std::size_t kStretch = 256;  // what stays in the processor's cache
+  static constexpr std::size_t kBlock = 256;  // what stays in the processor's cache
   // Writes the inputs from `first` on, at least the signals that `reads` (bits of effects::Signals) names.
   using Copy = void (*)(const void* record, std::size_t first, std::span<Inputs> to, unsigned reads);
 
@@ -55,16 +55,16 @@ class PlainInputs {
       : record_(record), size_(size), reads_(reads), copy_(copy) {}
 
   std::size_t size() const { return size_; }
-  // Calls work(first, inputs) for one stretch after the other.
+  // Calls work(first, inputs) for one block after the other.
   template <class Work>
-  void each_stretch(Work work) const {
+  void each_block(Work work) const {
     if (!copy_) {
       work(std::size_t{0}, std::span<const Inputs>(inputs_, size_));
       return;
     }
-    std::vector<Inputs> stretch(std::min(kStretch, size_));
-    for (std::size_t first = 0; first < size_; first += kStretch) {
-      const std::span<Inputs> part = std::span(stretch).first(std::min(kStretch, size_ - first));
+    std::vector<Inputs> block(std::min(kBlock, size_));
+    for (std::size_t first = 0; first < size_; first += kBlock) {
+      const std::span<Inputs> part = std::span(block).first(std::min(kBlock, size_ - first));
       copy_(record_, first, part, reads_);
       work(first, std::span<const Inputs>(part));
     }
@@ -81,7 +81,7 @@ class PlainInputs {
 // What can be done with an effect along a whole record in number system N. `parameters` are in the order of the
 // catalogue; inner states start from rest at each call.
 template <class N>
-struct Along {
+struct BlockFunctions {
   using Parameter = typename N::Parameter;
   // Adds the effect's torque on `balance` at each sample of `inputs` to `torque` (N m), same length. Null where it adds
   // to none, as most shifts and all modulations.
@@ -103,10 +103,10 @@ struct Entry {
   const effects::Description* info = nullptr;
   std::span<const effects::ParameterInfo> parameters;
   bool has_state = false;
-  Along<Real> real;
-  Along<Dual> dual;
+  BlockFunctions<Real> real;
+  BlockFunctions<Dual> dual;
   std::function<std::unique_ptr<Instance>(const double* parameters, const DriveConstants<double>& drive)> make;
-  // Of an effect that a user made: what its model file states; else null, and no label.
+  // The definition of a user-defined effect in its model file; else null.
   const model::Definition* definition = nullptr;
   std::string label{};  // "table_effect:velocity"
 
@@ -121,7 +121,7 @@ struct Entry {
 };
 
 // Parameters as they are searched for (see effects::ParameterInfo), and back. Where a parameter that another is stated
-// per is nought, so is the reduced one.
+// per is zero, so is the reduced one.
 template <class P>
 std::vector<P> natural(const Entry& entry, const std::vector<P>& reduced);
 std::vector<double> reduced(const Entry& entry, const std::vector<double>& natural);
@@ -143,10 +143,10 @@ effects::Inputs<N> lifted(const effects::Inputs<Real>& in) {
   }
 }
 
-// All effects, by rising number, but those that users make: see defined.hpp.
+// All effects, by rising number, except user-defined ones: see user_defined_effect.hpp.
 std::span<const Entry> all();
 // What users make effects of: an entry that takes all that is stated as parameters. Null if there is none of that name.
-const Entry* find_made_by_user(std::string_view name);
+const Entry* find_user_defined(std::string_view name);
 // Null if there is none of that name.
 const Entry* find(std::string_view name);
 // As `find`, for names that are known to exist; throws std::out_of_range.

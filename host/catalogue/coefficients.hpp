@@ -17,7 +17,7 @@ inline constexpr std::size_t position_of(std::span<const effects::ParameterInfo>
   return at;
 }
 
-// Coefficients divide by lengths and by what others are stated per. A parameter of nought that has none of these (an
+// Coefficients divide by lengths and by what others are stated per. A parameter of zero that has none of these (an
 // effect that is switched off, a search that has not begun) gets the smallest value that leaves the others finite.
 template <class E, class N>
 typename E::template Coefficients<N> coefficients_of(const typename N::Parameter* parameters,

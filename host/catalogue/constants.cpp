@@ -2,7 +2,7 @@
 
 #include <numbers>
 
-#include "host/catalogue/defined.hpp"
+#include "host/catalogue/user_defined_effect.hpp"
 
 namespace flexspline::catalogue {
 namespace {

@@ -17,7 +17,7 @@ std::string_view unit_on(const effects::Unit& unit, data::Axis axis);
 // The catalogue as the reader of model files asks for it.
 const model::KnownEffects& known_effects();
 
-// A parameter vector in the order of the catalogue; nought where the model has no value.
+// A parameter vector in the order of the catalogue; zero where the model has no value.
 std::vector<double> values_of(const model::Effect& effect, const Entry& entry);
 
 // A new effect for a model: all parameters of the catalogue with their units and no values.

@@ -73,7 +73,7 @@ class Formula::Parser {
         throw FormulaError(fmt::format("the parameter {} has the name of a signal", parameter), "give it another name");
     if (text.find_first_not_of(" \t\n") == std::string::npos)
       throw FormulaError("the formula is empty", "write one such as a*tanh(velocity/b)");
-    if (assigns(text)) throw FormulaError("a formula assigns nothing", "leave out what stands left of the =");
+    if (assigns(text)) throw FormulaError("a formula assigns nothing", "leave out what is left of the =");
     try {
       parser_.DefineConst("pi", std::numbers::pi);
       parser_.SetExpr(text);

@@ -34,9 +34,9 @@ effects::Inputs<Real> moved(const effects::Inputs<Dual>& in, double step) {
 // digits.
 constexpr double kShareOfStep = 1e-5;
 
-class FormulaAlong {
+class FormulaFunctions {
  public:
-  FormulaAlong(std::string text, std::vector<std::string> parameters, Balance balance)
+  FormulaFunctions(std::string text, std::vector<std::string> parameters, Balance balance)
       : text_(std::move(text)), parameters_(std::move(parameters)), balance_(balance) {}
 
   // A parser of its own for each call, so that threads need not share one.
@@ -68,7 +68,7 @@ class FormulaAlong {
   void add(const numbers::Jet* parameters, const DriveConstants<numbers::Jet>& drive, Balance balance,
            std::span<const effects::Inputs<Dual>> inputs, numbers::Jet* sum) const {
     if (balance != balance_) return;
-    // A shift moves each sample's signals by as much as they change per unit of a shape of its own.
+    // A shift moves each sample's signals by as much as they change per unit of a nonlinear parameter of its own.
     double step = step_of(parameters);
     double largest = 0.0, slopes = 0.0;
     for (const auto& in : inputs) {
@@ -94,8 +94,8 @@ class FormulaAlong {
   static void add(Formula& f, std::span<const double> parameters, double turn_angle_scale, const PlainInputs& inputs,
                   double* sum) {
     try {
-      inputs.each_stretch([&](std::size_t first, std::span<const effects::Inputs<Real>> stretch) {
-        f.add(parameters, turn_angle_scale, stretch, sum + first);
+      inputs.each_block([&](std::size_t first, std::span<const effects::Inputs<Real>> block) {
+        f.add(parameters, turn_angle_scale, block, sum + first);
       });
     } catch (const FormulaError& error) {
       throw model::ModelError(fmt::format("{}; {}", error.what(), error.remedy()));
@@ -185,7 +185,7 @@ const effects::Description kExpression{
         "A torque that you write as a formula over the signals, with parameters of your own; they are fitted as those "
         "of any other effect.",
     .causes = "What you know of the machine and the catalogue does not: a seal's law, a spring, a brake.",
-    .rivals = kTableEffect,
+    .confused_with = kTableEffect,
     .separated_by = "motion over the whole range of the signals that the formula reads",
     .host_only = true,
     .made_by_user = true,
@@ -218,10 +218,10 @@ std::vector<std::uint8_t> linear_in(const model::Effect& effect) {
     }
     return sum;
   };
-  // f(x + u + v) - f(x + u) - f(x + v) + f(x) vanishes where f is straight in the set.
-  const auto straight = [&](const std::vector<std::uint8_t>& set, bool vanishes) {
-    int told = 0;
-    for (int trial = 0; trial < 4 * kTrials && told < kTrials; ++trial) {
+  // f(x + u + v) - f(x + u) - f(x + v) + f(x) is zero where f is linear in the set.
+  const auto linear_in_set = [&](const std::vector<std::uint8_t>& set, bool vanishes) {
+    int decided = 0;
+    for (int trial = 0; trial < 4 * kTrials && decided < kTrials; ++trial) {
       const effects::Inputs<Real> in = drawn_inputs(random);
       std::vector<double> x(count), u(count, 0.0), v(count, 0.0), both(count), one(count), other(count);
       for (std::size_t p = 0; p < count; ++p) {
@@ -239,38 +239,38 @@ std::vector<std::uint8_t> linear_in(const model::Effect& effect) {
         const auto none = value(x, in);
         const auto some = value(one, in);
         if (!none || !some) continue;
-        ++told;
+        ++decided;
         if (std::abs(*none) > kRounding * std::max(std::abs(*some), 1e-30)) return false;
         continue;
       }
       const auto f = value(x, in), fu = value(one, in), fv = value(other, in), fuv = value(both, in);
       if (!f || !fu || !fv || !fuv) continue;
-      ++told;
+      ++decided;
       const double size = std::abs(*f) + std::abs(*fu) + std::abs(*fv) + std::abs(*fuv);
       if (std::abs(*fuv - *fu - *fv + *f) > kRounding * size) return false;
     }
-    return told > 0;
+    return decided > 0;
   };
   std::vector<std::uint8_t> set(count, 0);
   for (std::size_t p = 0; p < count; ++p) {
     set[p] = 1;
-    if (!straight(set, false)) set[p] = 0;
+    if (!linear_in_set(set, false)) set[p] = 0;
   }
-  if (!straight(set, true)) std::fill(set.begin(), set.end(), std::uint8_t{0});
+  if (!linear_in_set(set, true)) std::fill(set.begin(), set.end(), std::uint8_t{0});
   return set;
 }
 
-void make_formula(Made& made, const model::Effect& effect) {
-  const model::Definition& d = made.definition;
+void make_formula(UserDefinedEntry& defined, const model::Effect& effect) {
+  const model::Definition& d = defined.definition;
   const std::vector<std::uint8_t> linear = linear_in(effect);
   for (const model::Parameter& p : effect.parameters) {
-    made.names.push_back(p.name);
-    made.units.push_back(p.unit.empty() ? "1" : p.unit);
+    defined.names.push_back(p.name);
+    defined.units.push_back(p.unit.empty() ? "1" : p.unit);
   }
   for (std::size_t p = 0; p < effect.parameters.size(); ++p) {
     effects::ParameterInfo info;
-    info.name = made.names[p];
-    info.unit = {made.units[p], made.units[p]};
+    info.name = defined.names[p];
+    info.unit = {defined.units[p], defined.units[p]};
     info.kind = linear[p] ? Kind::linear : Kind::shape;
     info.low = effect.parameters[p].low.value_or(-effects::kUnbounded);
     info.high = effect.parameters[p].high.value_or(effects::kUnbounded);
@@ -281,28 +281,29 @@ void make_formula(Made& made, const model::Effect& effect) {
     } else {
       info.usual = 1.0;
     }
-    made.parameters.push_back(info);
+    defined.parameters.push_back(info);
   }
   const Balance balance = balance_named(d.balance);
-  const FormulaAlong along(d.formula, made.names, balance);
-  made.info = kExpression;
-  made.info.reads = along.formula().reads();
-  made.equation = d.formula;
-  made.entry.label = fmt::format("{}:{}", kExpression.name, d.formula);
-  made.entry.parameters = made.parameters;
-  made.entry.real.torque = [along](const double* p, const DriveConstants<double>& drive, Balance to,
-                                   std::span<const effects::Inputs<Real>> in,
-                                   double* sum) { along.add(p, drive, to, in, sum); };
-  made.entry.real.torque_of_plain = [along](const double* p, const DriveConstants<double>& drive, Balance to,
-                                            const PlainInputs& in, double* sum) { along.add(p, drive, to, in, sum); };
-  made.entry.dual.torque_of_plain = [along](const numbers::Jet* p, const DriveConstants<numbers::Jet>& drive,
-                                            Balance to, const PlainInputs& in,
-                                            numbers::Jet* sum) { along.add(p, drive, to, in, sum); };
-  made.entry.dual.torque = [along](const numbers::Jet* p, const DriveConstants<numbers::Jet>& drive, Balance to,
-                                   std::span<const effects::Inputs<Dual>> in,
-                                   numbers::Jet* sum) { along.add(p, drive, to, in, sum); };
-  made.entry.make = [along, balance, count = made.names.size()](
-                        const double* p, const DriveConstants<double>& drive) -> std::unique_ptr<Instance> {
+  const FormulaFunctions along(d.formula, defined.names, balance);
+  defined.info = kExpression;
+  defined.info.reads = along.formula().reads();
+  defined.equation = d.formula;
+  defined.entry.label = fmt::format("{}:{}", kExpression.name, d.formula);
+  defined.entry.parameters = defined.parameters;
+  defined.entry.real.torque = [along](const double* p, const DriveConstants<double>& drive, Balance to,
+                                      std::span<const effects::Inputs<Real>> in,
+                                      double* sum) { along.add(p, drive, to, in, sum); };
+  defined.entry.real.torque_of_plain = [along](const double* p, const DriveConstants<double>& drive, Balance to,
+                                               const PlainInputs& in,
+                                               double* sum) { along.add(p, drive, to, in, sum); };
+  defined.entry.dual.torque_of_plain = [along](const numbers::Jet* p, const DriveConstants<numbers::Jet>& drive,
+                                               Balance to, const PlainInputs& in,
+                                               numbers::Jet* sum) { along.add(p, drive, to, in, sum); };
+  defined.entry.dual.torque = [along](const numbers::Jet* p, const DriveConstants<numbers::Jet>& drive, Balance to,
+                                      std::span<const effects::Inputs<Dual>> in,
+                                      numbers::Jet* sum) { along.add(p, drive, to, in, sum); };
+  defined.entry.make = [along, balance, count = defined.names.size()](
+                           const double* p, const DriveConstants<double>& drive) -> std::unique_ptr<Instance> {
     return std::make_unique<FormulaInstance>(along.formula(), std::vector<double>(p, p + count), drive.turn_angle_scale,
                                              balance);
   };

@@ -6,7 +6,7 @@
 namespace flexspline::catalogue {
 
 effects::Torques<Real> settled_torques(Instance& effect, bool has_state, effects::Inputs<Real> in) {
-  constexpr int kStepsATurn = 4096;  // short beside presliding
+  constexpr int kStepsATurn = 4096;  // short compared with presliding
   if (has_state) {
     const double turn = std::copysign(2.0 * std::numbers::pi, in.velocity);
     in.elapsed = turn / kStepsATurn / in.velocity;

@@ -36,7 +36,7 @@ constexpr const char* kDataHelp =
     "measurements: any number of recordings (CSV, MAT, HDF5, NumPy, ROS, MCAP), folders, dataset.tomls";
 
 // A command as it was parsed, ready to run.
-struct Chosen {
+struct ChosenCommand {
   std::function<int(Console&)> run;
   std::string json;
 };
@@ -83,7 +83,7 @@ class App {
     const std::string reason = output::unwritten();
     if (reason.empty() || code == kUnusable) return code;
     fmt::print(stderr,
-               "flexspline: the answer could not be written to standard output: {}; make room, or send it elsewhere\n",
+               "flexspline: the answer could not be written to standard output: {}; make room, or redirect it\n",
                reason);
     return code == kDone ? kUnusable : code;
   }
@@ -172,7 +172,7 @@ class App {
   }
 
   static void take_holdout(CLI::App* sub, DataInputs& inputs) {
-    sub->add_option("--holdout", inputs.holdout, "measurements to judge on and never to fit, whatever role they state")
+    sub->add_option("--holdout", inputs.holdout, "measurements for validation, never fitted, whatever role they state")
         ->type_name("DATA");
   }
 
@@ -197,7 +197,7 @@ class App {
     const auto [sub, options] = command<DemoOptions>("demo");
     sub->add_option("--hidden", options->hidden, "effect that the twin hides, or none (default: by chance)")
         ->type_name("EFFECT");
-    sub->add_option("--seed", options->seed, "of all chance (default: another one each time)")->type_name("N");
+    sub->add_option("--seed", options->seed, "of the random numbers (default: another one each time)")->type_name("N");
     sub->add_option("--out", options->out, "folder for recording and models (default: demo-out)")->type_name("DIR");
   }
 
@@ -234,24 +234,24 @@ class App {
     sub->add_option("--out", options->out, "the model with the values in it (default: print only)")->type_name("MODEL");
     sub->add_option(
            "--method", options->method,
-           "ls: least squares; nls: with a search for shape parameters; partitioned: linear parameters first, then the "
-           "others; iv: instrumental variables, for noisy velocities; oe: least error of the free run (default: ls or "
-           "nls, as the model needs)")
+           "ls: least squares; nls: with a search for nonlinear parameters; partitioned: linear parameters first, then "
+           "the others; iv: instrumental variables, for noisy velocities; oe: least error of the free run (default: "
+           "ls or nls, as the model needs)")
         ->check(CLI::IsMember({"ls", "nls", "partitioned", "iv", "oe"}))
         ->type_name("");
     sub->add_option(
            "--intervals", options->intervals,
-           "standard; profile: where the best fit of all others gets significantly worse; bootstrap: from rows "
+           "standard; profile: where the best fit of all others gets significantly worse; bootstrap: from samples "
            "drawn again (ls and nls)")
         ->check(CLI::IsMember({"standard", "profile", "bootstrap"}))
         ->capture_default_str()
         ->type_name("");
     sub->add_option(
            "--supply", options->supply,
-           "a parameter that you know another way, in its SI unit, as inertia.inertia=1.07e-4; may be repeated")
+           "a parameter that is known from another source, in its SI unit, as inertia.inertia=1.07e-4; may be repeated")
         ->type_name("EFFECT.PARAMETER=VALUE")
         ->allow_extra_args(false);
-    sub->add_option("--starts", options->starts, "starts of the search for shape parameters")
+    sub->add_option("--starts", options->starts, "starts of the search for nonlinear parameters")
         ->check(CLI::Range(1, 100))
         ->capture_default_str()
         ->type_name("N");
@@ -279,7 +279,7 @@ class App {
         ->type_name("SIGNAL=RMSE")
         ->allow_extra_args(false);
     sub->add_option(
-           "--beside", options->beside,
+           "--beside", options->baselines,
            "a black box to compare the model with: fir:N, arx:NA,NB,NK, or fir:auto, arx:auto; may be repeated")
         ->type_name("BOX")
         ->allow_extra_args(false);
@@ -303,16 +303,17 @@ class App {
                 "effect of the catalogue; torque_ripple:2 gives an order; table_effect:velocity learns a curve over a "
                 "signal, table_effect:torque*direction one times the direction; expression_effect takes --formula");
     const auto [sub, options] = added;
-    sub->add_option("--formula", options->made.formula, "torque of an expression_effect, over signals and parameters")
+    sub->add_option("--formula", options->user_defined.formula,
+                    "torque of an expression_effect, over signals and parameters")
         ->type_name("TEXT");
-    sub->add_option("--parameter", options->made.parameters,
+    sub->add_option("--parameter", options->user_defined.parameters,
                     "of the formula, with bounds where it does not only scale the torque; may be repeated")
         ->type_name("NAME=LOW..HIGH:UNIT")
         ->allow_extra_args(false);
-    sub->add_option("--points", options->made.points, "of a table_effect; else as many as the data ask for")
+    sub->add_option("--points", options->user_defined.points, "of a table_effect (default: chosen from the data)")
         ->type_name("N");
     sub->add_option(
-           "--balance", options->made.balance,
+           "--balance", options->user_defined.balance,
            "of a table_effect or expression_effect: motor, transmission or load; else where its signals belong")
         ->type_name("NAME");
   }
@@ -334,7 +335,7 @@ class App {
     take_data(sub, options->data);
     take_model(sub, options->model);
     sub->add_flag("--refit", options->refit,
-                  "estimate what is left anew each time: what the other effects cannot make good");
+                  "re-estimate the remaining parameters each time: the error that the other effects cannot compensate");
     sub->add_option("--scale", options->scale, "scale a parameter, too; may be repeated")
         ->type_name("EFFECT.PARAMETER=FACTOR")
         ->allow_extra_args(false);
@@ -398,7 +399,7 @@ class App {
     take_tolerate(sub, options->data);
     take_model(sub, options->model);
     sub->add_option("--out", options->out, "the plan")->required()->type_name("PLAN");
-    sub->add_option("--separate", options->separate, "two effects to tell apart (default: what is not well known)")
+    sub->add_option("--separate", options->separate, "two effects to distinguish (default: what is not well known)")
         ->delimiter(',')
         ->expected(2)
         ->type_name("A,B");
@@ -433,7 +434,7 @@ class App {
     const auto [drives, drives_options] = command<DrivesOptions>("drives");
     drives
         ->add_option("--also", drives_options->also,
-                     "look here, too: serial:PORT, tcp:HOST:PORT/TOKEN; may be repeated")
+                     "search here, too: serial:PORT, tcp:HOST:PORT/TOKEN; may be repeated")
         ->type_name("DRIVE")
         ->allow_extra_args(false);
     const auto [flash, flash_options] = command<FlashOptions>("flash");
@@ -486,7 +487,7 @@ class App {
   }
 
   CLI::App app_;
-  Chosen chosen_;
+  ChosenCommand chosen_;
 };
 
 }  // namespace

@@ -100,7 +100,7 @@ class Builder {
         result_.model.effects.push_back(catalogue::blank_effect(*entry, result_.model.drive.axis));
   }
 
-  void say(const char* balance, bool possible, const std::string& text) {
+  void print(const char* balance, bool possible, const std::string& text) {
     result_.reasons.push_back(fmt::format("{} balance: {}{}", balance, possible ? "" : "not possible, ", text));
   }
 
@@ -145,29 +145,29 @@ class Builder {
     const bool torque =
         has_together(dataset_, {{Column::motor_torque}, {Column::motor_position, Column::motor_velocity}});
     if (!current && !torque) {
-      say("motor", false, "needs current_a or motor_torque_nm together with motor_position_rad");
+      print("motor", false, "needs current_a or motor_torque_nm together with motor_position_rad");
       return;
     }
     add({"inertia", "viscous_friction", "coulomb_friction", current ? "current_offset" : "torque_bias"});
-    say("motor", true,
-        fmt::format("inertia, viscous_friction, coulomb_friction, {}", current ? "current_offset" : "torque_bias"));
+    print("motor", true,
+          fmt::format("inertia, viscous_friction, coulomb_friction, {}", current ? "current_offset" : "torque_bias"));
   }
 
   void transmission() {
     const bool there =
         has_together(dataset_, {{Column::torque}, {Column::motor_position}, {Column::output_position}}, true);
     if (there) add({"linear_stiffness", "structural_damping"});
-    say("transmission", there,
-        there ? "linear_stiffness, structural_damping"
-              : "needs torque_nm with motor_position_rad, and output_position_rad or a locked load");
+    print("transmission", there,
+          there ? "linear_stiffness, structural_damping"
+                : "needs torque_nm with motor_position_rad, and output_position_rad or a locked load");
   }
 
   void load() {
     const bool there = output_moves(dataset_);
     if (there) add({"output_inertia", "output_viscous_friction", "output_coulomb_friction"});
-    say("load", there,
-        there ? "output_inertia, output_viscous_friction, output_coulomb_friction"
-              : "needs torque_nm and output_position_rad with a free load");
+    print("load", there,
+          there ? "output_inertia, output_viscous_friction, output_coulomb_friction"
+                : "needs torque_nm and output_position_rad with a free load");
   }
 
   const Dataset& dataset_;

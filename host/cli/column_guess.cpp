@@ -110,7 +110,7 @@ class Guesser {
     return std::find(options_.without.begin(), options_.without.end(), name) != options_.without.end();
   }
 
-  // Positions or velocities with numbers are those of several joints; one of them is looked at.
+  // Positions or velocities with numbers are those of several joints; one of them is used.
   void choose_joint() {
     std::set<int> joints;
     for (const auto& [name, r] : readings_)

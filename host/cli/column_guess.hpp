@@ -14,7 +14,7 @@ namespace flexspline::cli {
 
 struct LoggedColumn {
   std::string name;
-  std::string unit;  // that the file states beside the name; empty where it does not
+  std::string unit;  // that the file states next to the name; empty where it does not
 };
 
 struct ColumnGuess {
@@ -42,8 +42,8 @@ struct HeaderGuess {
   std::string axis_why;
   std::optional<Side> side;        // of the only position or velocity, where it is not stated by its name as ours
   bool side_is_asked_for = false;  // it is open, and the gear ratio makes a difference of it
-  double scaled_by = 1.0;          // the link's position stands for the motor's, times this
-  bool joint_side = false;  // no motor sensors: the output's columns stand for the motor's, with a gear ratio of one
+  double scaled_by = 1.0;          // the link's position is used as the motor's, times this
+  bool joint_side = false;  // no motor sensors: the output's columns are used as the motor's, with a gear ratio of one
   std::string needs_pole_pairs;  // a speed that is taken for mechanical, though its name says electrical
   std::vector<int> joints;       // numbers of the joints in the file; empty: one
   std::optional<int> joint;      // that was taken

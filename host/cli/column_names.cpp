@@ -137,7 +137,7 @@ Kind kind_of_words(const std::vector<std::string>& words) {
 
 // Names of well-known loggers that are always in one unit.
 std::string usual_unit(const std::string& name, const std::vector<std::string>& words) {
-  // ODrive counts in turns, as moteus does; both say so in their documentation alone.
+  // ODrive counts in turns, as moteus does; both document it outside of their files only.
   if (name.ends_with("pos_estimate") || name.ends_with("pos_rel") || name.ends_with("pos_abs")) return "rev";
   if (name.ends_with("vel_estimate")) return "rev/s";
   if (name.find("servo_stats/") != std::string::npos && name.ends_with("/position")) return "rev";
@@ -178,7 +178,8 @@ ColumnReading read_name(const std::string& name, const std::string& stated_unit,
     r.kind = kind_of_quantity(unit->quantity);
     r.by_unit_only = true;
   }
-  // moteus computes it from the current; VESC's encoder begins anew at each turn, too seldom logged to be unwrapped.
+  // moteus computes it from the current; VESC's encoder starts again from zero at each turn, too seldom logged to be
+  // unwrapped.
   if ((r.kind == Kind::torque && name.find("servo_stats/") != std::string::npos) || name == "encoder_position")
     r.kind = Kind::none;
   // Of the current that makes no torque.
@@ -191,7 +192,7 @@ ColumnReading read_name(const std::string& name, const std::string& stated_unit,
   const bool motor = has_any(words, {"motor", "mot", "rotor", "wg", "qm", "thetam", "phim", "wm", "dqm", "taum", "im"});
   r.side = motor ? Side::motor : link ? Side::link : side_by_letter(name, r.kind, names);
   if (unit && kind_of_quantity(unit->quantity) != r.kind) r.unit.clear();
-  // The last letter said the side, so it is no unit.
+  // The last letter gave the side, so it is not a unit.
   if (r.side == Side::motor && r.unit == "m" && stated_unit.empty() && before_brackets(name).size() == name.size())
     r.unit.clear();
   r.external = has_any(words, {"external", "ext", "disturbance"});

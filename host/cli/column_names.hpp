@@ -27,7 +27,7 @@ struct ColumnReading {
 };
 
 // `names`: all of the file; what ends with "_m" is the motor's where one with "_l" is there, too, or where metres would
-// make no sense. `stated_unit`: in the file beside the name.
+// make no sense. `stated_unit`: in the file next to the name.
 ColumnReading read_name(const std::string& name, const std::string& stated_unit, const std::vector<std::string>& names);
 
 // The unit that a name ends with, in brackets or after an underscore: "speed [rpm]", "position_mm", "i_ma".

@@ -101,7 +101,7 @@ int change_model(const ChangeOptions& options, const std::string& command, const
   console.progress("refitting the model");
   const Addition changed = change(dataset, file.model);
   for (const std::string& warning : changed.warnings) console.warn(warning);
-  // What only the data set knows of the drive stays there: the file keeps what its author wrote.
+  // Facts of the drive that only the data set has are not written into the model file.
   model::Model stored = changed.model;
   stored.drive = file.model.drive;
   model::save(options.out, model::signed_by_tool(model::rewrite(file, stored)));
@@ -121,15 +121,15 @@ int change_model(const ChangeOptions& options, const std::string& command, const
 
 int run(const AddOptions& options, Console& console) {
   require_effect(options.effect.substr(0, options.effect.find(':')));
-  // A wrong name is said before files are read.
+  // A wrong name is reported before files are read.
   if (selection::names_user_defined_effect(options.effect))
-    selection::user_defined_effect(options.effect, options.made, {});
+    selection::user_defined_effect(options.effect, options.user_defined, {});
   else
     selection::parse_effect(options.effect);
   return change_model(
       options, "add", fmt::format("{} added", options.effect),
       [&](const data::Dataset& dataset, const model::Model& model) {
-        return selection::add(dataset, model, options.effect, options.pipeline.options(), options.made);
+        return selection::add(dataset, model, options.effect, options.pipeline.options(), options.user_defined);
       },
       console);
 }

@@ -42,7 +42,7 @@ void print(const data::Experiment& e, const RecordSummary& r, Console& console) 
                            r.masked_percent > 0.0 ? fmt::format(", {:.2g} % masked", r.masked_percent) : "",
                            load_name(e), role_name(e)));
   if (r.highest_speed && !(*r.highest_speed > 0.0))
-    console.line("  stands still");
+    console.line("  is at rest");
   else if (r.moving_percent)
     console.line(fmt::format("  moves {:.0f} % of the time, {} to {} {}, {} reversals{}", *r.moving_percent,
                              number(r.lowest_speed), number(r.highest_speed), r.speed_unit, *r.reversals,
@@ -105,14 +105,14 @@ void print(const std::vector<data::Finding>& findings, Console& console) {
   console.line();
 }
 
-// Says which filters an identification would use; null where these data allow none.
+// Prints which filters an identification would use; null where these data allow none.
 json print_pipeline(const data::Dataset& dataset, const BaseModel& base, const estimation::PipelineOptions& options,
                     Console& console) {
   std::vector<const data::Experiment*> experiments;
   for (const data::Experiment& e : dataset.experiments) experiments.push_back(&e);
   try {
     console.progress("choosing the filters");
-    const estimation::Prepared prepared = estimation::prepare(experiments, base.model.drive, options);
+    const estimation::PreparedData prepared = estimation::prepare(experiments, base.model.drive, options);
     console.line(output::wrapped(output::pipeline_text(prepared)));
     return {{"cutoff_hz", json_number(prepared.pipeline.row_cutoff_hz)},
             {"motion_cutoff_hz", json_number(prepared.pipeline.motion_cutoff_hz)},

@@ -47,7 +47,7 @@ bool is_kept(const Limit& limit, const comparison::Comparison& comparison, Conso
     return kept;
   }
   throw UsageError(
-      fmt::format("--limit {}: these data and this model do not give that signal; flexspline check says "
+      fmt::format("--limit {}: these data and this model do not give that signal; flexspline check reports "
                   "which columns are missing",
                   limit.signal));
 }
@@ -57,9 +57,9 @@ bool is_kept(const Limit& limit, const comparison::Comparison& comparison, Conso
 int run(const CompareOptions& options, Console& console) {
   std::vector<Limit> limits;
   for (const std::string& text : options.limits) limits.push_back(parse_limit(text));
-  std::vector<blackbox::Specification> beside;
+  std::vector<blackbox::Specification> baselines;
   try {
-    for (const std::string& text : options.beside) beside.push_back(blackbox::parse_specification(text));
+    for (const std::string& text : options.baselines) baselines.push_back(blackbox::parse_specification(text));
   } catch (const std::invalid_argument& wrong) {
     throw UsageError(fmt::format("--beside {}", wrong.what()));
   }
@@ -68,7 +68,7 @@ int run(const CompareOptions& options, Console& console) {
   const data::Dataset dataset = load(options.data, console);
   console.progress("comparing model and measurement");
   const comparison::Comparison comparison =
-      comparison::compare(dataset, file.model, options.pipeline.options(), beside);
+      comparison::compare(dataset, file.model, options.pipeline.options(), baselines);
   for (const std::string& warning : comparison.warnings) console.warn(warning);
   console.line(comparison::table(comparison));
   if (!options.report.empty())
@@ -79,7 +79,7 @@ int run(const CompareOptions& options, Console& console) {
                   .dataset = &dataset,
                   .model = file.model,
                   .pipeline = options.pipeline.options(),
-                  .beside = beside},
+                  .baselines = baselines},
                  console);
   output::save_json(options.json, comparison::to_json(comparison));
   bool all_kept = true;

@@ -30,12 +30,12 @@ constexpr std::string_view kMayHide[] = {
     "gravity",           "current_offset",    "torque_ripple:2",   "torque_ripple:7",         "temperature_viscous",
     "dahl_friction",     "backlash",          "structural_damping"};
 
-std::string label(const selection::Named& named) {
+std::string label(const selection::NamedEffect& named) {
   return named.order ? fmt::format("{}:{:g}", named.effect, *named.order) : named.effect;
 }
 
 // The same effect, whether or not an order was given with it.
-bool is_the_hidden_one(const selection::Named& named, const std::string& hidden) {
+bool is_the_hidden_one(const selection::NamedEffect& named, const std::string& hidden) {
   return label(named) == hidden || (named.effect == "torque_ripple" && hidden == "torque_ripple" && named.order == 2.0);
 }
 
@@ -70,8 +70,7 @@ void print_free_runs(const comparison::Comparison& before, const comparison::Com
   if (worse)
     console.line(
         output::wrapped("A free run has no feedback. Where friction falls with speed, slow motion under a given "
-                        "current is unstable: the "
-                        "smallest difference grows, and no model follows it for long."));
+                        "current is unstable: the smallest difference grows, and no model follows it for long."));
 }
 
 // On the drive, and a motion that was never recorded: without compensation, with the base model, with the added effect.
@@ -131,8 +130,7 @@ int run(const DemoOptions& options, Console& console) {
                                     [](const auto& e) { return e.role == data::Role::holdout; });
   console.line(output::wrapped(fmt::format(
       "A twin of a strain-wave drive (100:1, 40 N m) was moved through {} experiments, free and with its output "
-      "locked; {} of "
-      "them are kept aside to judge on. It has an effect that the model does not know{}. Recording: {}",
+      "locked; {} of them are held out for validation. It has an effect that the model does not know{}. Recording: {}",
       dataset.experiments.size(), unseen, options.hidden.empty() ? ", chosen by chance" : "", recording.string())));
   console.line();
 
@@ -164,7 +162,7 @@ int run(const DemoOptions& options, Console& console) {
   for (std::size_t i = 0; i < std::min<std::size_t>(2, found.localised.size()); ++i)
     console.line(output::wrapped(fmt::format("{:.0f} % of the error depends on {}.", found.localised[i].share_percent,
                                              found.localised[i].variable)));
-  output::Table ranked({"candidate", "score", "error falls by", "on"}, "lrrl");
+  output::Table ranked({"candidate", "score", "error decreases by", "on"}, "lrrl");
   for (std::size_t i = 0; i < std::min<std::size_t>(4, found.candidates.size()); ++i) {
     const auto& c = found.candidates[i];
     ranked.row({label({c.effect, c.order}), fmt::format("{:.0f}", c.score),
@@ -211,7 +209,7 @@ int run(const DemoOptions& options, Console& console) {
     console.line(output::wrapped(fmt::format("Check on the machine: {}", info.check)));
     console.line();
 
-    console.line(console.bold("4. Add it, and judge on motions that the fit never saw"));
+    console.line(console.bold("4. Add it, and compare on motions that the fit never saw"));
     console.progress("adding the effect and refitting");
     const selection::Addition added = selection::add(dataset, base->model, names.front(), {});
     const std::filesystem::path path = folder / "model-with-effect.toml";

@@ -23,7 +23,7 @@ std::string add_command(const DiagnoseOptions& options) {
   return text + fmt::format(" --out {}", quoted(out.string()));
 }
 
-// The model of the last round with values, beside the one that was asked about where effects were added.
+// The model of the last round with values; and the user's own model where effects were added.
 void write_page(const DiagnoseOptions& options, const data::Dataset& dataset, const model::Model& asked,
                 const model::Model& last, const std::vector<selection::Diagnosis>& rounds, Console& console) {
   if (options.report.empty()) return;
@@ -52,7 +52,7 @@ int run(const DiagnoseOptions& options, Console& console) {
   how.pipeline = options.pipeline.options();
   how.progress = [&](std::string_view stage) { console.progress(stage); };
   std::size_t round = 0;
-  const auto say = [&](const selection::Diagnosis& found) {
+  const auto print = [&](const selection::Diagnosis& found) {
     for (const std::string& warning : found.warnings) console.warn(warning);
     if (options.all) {
       console.line();
@@ -61,7 +61,7 @@ int run(const DiagnoseOptions& options, Console& console) {
     output::print_diagnosis(console, found, add_command(options));
   };
   const selection::Completion done =
-      selection::add_until_complete(dataset, file.model, how, options.all ? kMostRounds : 1, say);
+      selection::add_until_complete(dataset, file.model, how, options.all ? kMostRounds : 1, print);
   for (const std::string& effect : done.removed)
     console.line(fmt::format("{} was needless once the others were in the model, and was removed.", effect));
   write_page(options, dataset, file.model, done.model, done.rounds, console);

@@ -11,14 +11,14 @@ namespace {
 
 using nlohmann::json;
 
-struct Seen {
+struct FoundDrive {
   transport::Found found;
   json answer;  // null where it was not asked
 };
 
 // Asks a drive who it is. What is wrong with one drive does not hide the others.
-Seen asked(transport::Found found) {
-  Seen seen{std::move(found), nullptr};
+FoundDrive asked(transport::Found found) {
+  FoundDrive seen{std::move(found), nullptr};
   if (!seen.found.usable) return seen;
   try {
     drive::Session session = open_drive(seen.found.drive);
@@ -44,11 +44,11 @@ Seen asked(transport::Found found) {
 }  // namespace
 
 int run(const DrivesOptions& options, Console& console) {
-  std::vector<Seen> all;
+  std::vector<FoundDrive> all;
   for (transport::Found& found : transport::find_drives()) all.push_back(asked(std::move(found)));
   for (const std::string& name : options.also) all.push_back(asked({name, name, true, {}}));
   json list = json::array();
-  for (const Seen& one : all) {
+  for (const FoundDrive& one : all) {
     json entry = one.answer.is_null() ? json::object() : one.answer;
     entry["drive"] = one.found.drive;
     entry["usable"] = one.found.usable;

@@ -2,7 +2,7 @@
 
 #include <nlohmann/json.hpp>
 
-#include "host/catalogue/defined.hpp"
+#include "host/catalogue/user_defined_effect.hpp"
 #include "host/cli/commands.hpp"
 #include "host/output/effect_curve.hpp"
 #include "host/output/identification.hpp"
@@ -58,8 +58,8 @@ json entry_json(const Entry& entry) {
                           {"usual", output::json_number(p.usual)},
                           {"low", output::json_number(p.low)},
                           {"high", output::json_number(p.high)}});
-  json rivals = json::array();
-  for (const std::string_view rival : catalogue::split_names(entry.info->rivals)) rivals.push_back(rival);
+  json confused = json::array();
+  for (const std::string_view name : catalogue::split_names(entry.info->confused_with)) confused.push_back(name);
   return {{"name", entry.name()},
           {"balance", output::balance_name(entry.info->balance)},
           {"phase", phase_name(entry.info->phase)},
@@ -72,7 +72,7 @@ json entry_json(const Entry& entry) {
           {"causes", entry.info->causes},
           {"check", entry.info->check},
           {"separated_by", entry.info->separated_by},
-          {"rivals", std::move(rivals)},
+          {"rivals", std::move(confused)},
           {"curve", output::curve_json(output::effect_curve(entry))}};
 }
 
@@ -92,7 +92,7 @@ void describe(const Entry& entry, Console& console) {
   output::Table table({"parameter", "unit", "(linear axis)", "", "usual"}, "llllr");
   for (const effects::ParameterInfo& p : entry.parameters) {
     const char* how = p.kind == effects::Kind::linear  ? "estimated"
-                      : p.kind == effects::Kind::shape ? "estimated, a shape: searched for"
+                      : p.kind == effects::Kind::shape ? "estimated, a nonlinear parameter: searched for"
                       : p.kind == effects::Kind::grid
                           ? "set from the range of the data where the model does not state it"
                           : "stated by you";
@@ -104,21 +104,21 @@ void describe(const Entry& entry, Console& console) {
   console.line("At these values:");
   console.line(output::curve_text(output::effect_curve(entry), output::takes_braille()));
   console.line();
-  const auto say = [&](std::string_view what, std::string_view text) {
+  const auto print = [&](std::string_view what, std::string_view text) {
     if (!text.empty()) console.line(output::wrapped(fmt::format("{}: {}", what, text)));
   };
-  say("Shows over", info.shows_over);
-  say("What it does", info.consequence);
-  say("Usual causes", info.causes);
-  say("Check on the machine", info.check);
-  say("Confused with", comma_separated(info.rivals));
-  say("Told apart by", info.separated_by);
-  say("Stands in for", comma_separated(info.replaces));
-  say("Scales", info.modulates);
-  say("Source", info.source);
+  print("Shows over", info.shows_over);
+  print("What it does", info.consequence);
+  print("Usual causes", info.causes);
+  print("Check on the machine", info.check);
+  print("Confused with", comma_separated(info.confused_with));
+  print("Distinguished by", info.separated_by);
+  print("Used instead of", comma_separated(info.replaces));
+  print("Scales", info.modulates);
+  print("Source", info.source);
 }
 
-// What users make has no parameters of its own and no curve: how one is made stands in their place.
+// A user-defined effect has no parameters of its own and no curve: the text explains how to define one instead.
 constexpr std::string_view kMadeByUsers[] = {catalogue::kTableEffect, catalogue::kExpressionEffect};
 
 std::string how_to_add(std::string_view name) {
@@ -128,9 +128,9 @@ std::string how_to_add(std::string_view name) {
                "b=0.1..50:rad/s --model base-model.toml DATA --out better.toml";
 }
 
-json made_json(const effects::Description& info) {
-  json rivals = json::array();
-  for (const std::string_view rival : catalogue::split_names(info.rivals)) rivals.push_back(rival);
+json user_defined_json(const effects::Description& info) {
+  json confused = json::array();
+  for (const std::string_view name : catalogue::split_names(info.confused_with)) confused.push_back(name);
   json signals = json::array();
   for (const effects::VariableInfo& v : effects::kVariables)
     signals.push_back({{"signal", v.name}, {"unit", v.unit.rotary}, {"unit_linear", v.unit.linear}});
@@ -144,12 +144,12 @@ json made_json(const effects::Description& info) {
           {"explanation", info.explanation},
           {"causes", info.causes},
           {"separated_by", info.separated_by},
-          {"rivals", std::move(rivals)},
+          {"rivals", std::move(confused)},
           {"signals", std::move(signals)},
           {"curve", nullptr}};
 }
 
-void describe_made(const effects::Description& info, Console& console) {
+void describe_user_defined(const effects::Description& info, Console& console) {
   console.line(console.bold(info.name));
   console.line(output::wrapped(info.explanation));
   console.line();
@@ -161,12 +161,11 @@ void describe_made(const effects::Description& info, Console& console) {
   if (info.name == catalogue::kExpressionEffect)
     console.line(output::wrapped(
         "direction, output_direction and torsion_direction are 1, -1, or 0 at rest. Functions: sin, cos, tan, tanh, "
-        "exp, "
-        "ln, sqrt, abs, sign, min, max; powers are written ^, conditions a > b ? c : d. Parameters that only scale the "
-        "torque are estimated; others are searched for and need bounds."));
+        "exp, ln, sqrt, abs, sign, min, max; powers are written ^, conditions a > b ? c : d. Parameters that only "
+        "scale the torque are estimated; others are searched for and need bounds."));
   console.line();
   console.line(output::wrapped(fmt::format("Usual causes, and what to check: {}", info.causes)));
-  console.line(output::wrapped(fmt::format("Told apart by: {}", info.separated_by)));
+  console.line(output::wrapped(fmt::format("Distinguished by: {}", info.separated_by)));
   console.line();
   console.line("  " + how_to_add(info.name));
 }
@@ -179,9 +178,9 @@ int run(const EffectsOptions& options, Console& console) {
     require_effect(options.name);
     const Entry* entry = catalogue::find(options.name);
     if (const effects::Description* made = catalogue::description_of(options.name)) {
-      describe_made(*made, console);
+      describe_user_defined(*made, console);
       output::save_json(options.json,
-                        {{"format", "flexspline-effects/1"}, {"effects", json::array({made_json(*made)})}});
+                        {{"format", "flexspline-effects/1"}, {"effects", json::array({user_defined_json(*made)})}});
       return kDone;
     }
     describe(*entry, console);
@@ -196,7 +195,7 @@ int run(const EffectsOptions& options, Console& console) {
     for (const std::string_view name : kMadeByUsers) {
       const effects::Description& info = *catalogue::description_of(name);
       table.row({std::string(name), "yours", std::string(info.equation), "", std::string(info.shows_over)});
-      list.push_back(made_json(info));
+      list.push_back(user_defined_json(info));
     }
     console.line(table.text_within(output::line_width(), 0));
     console.line();

@@ -2,7 +2,7 @@
 
 #include <nlohmann/json.hpp>
 
-#include "host/catalogue/defined.hpp"
+#include "host/catalogue/user_defined_effect.hpp"
 #include "host/cli/export_options.hpp"
 #include "host/interchange/export.hpp"
 #include "host/interchange/protocol_header.hpp"
@@ -78,8 +78,8 @@ int run(const ExportCommandOptions& options, Console& console) {
   if (options.as == "mujoco" || options.as == "urdf") {
     const interchange::Joint joint = interchange::joint_of(model);
     const bool linear = model.drive.axis == data::Axis::linear;
-    const auto quantity = [&](const char* name, double value, const char* rotary, const char* straight) {
-      return json{{"name", name}, {"value", output::json_number(value)}, {"unit", linear ? straight : rotary}};
+    const auto quantity = [&](const char* name, double value, const char* rotary, const char* linear_law) {
+      return json{{"name", name}, {"value", output::json_number(value)}, {"unit", linear ? linear_law : rotary}};
     };
     answer["joint"] = {quantity("armature", joint.armature, "kg*m^2", "kg"),
                        quantity("damping", joint.damping, "N*m*s/rad", "N*s/m"),

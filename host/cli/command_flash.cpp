@@ -89,7 +89,7 @@ int run(const FlashOptions& options, Console& console) {
   if (options.older) throw UsageError("--older is for --firmware; backup and restore go back to an older block");
   if (options.model.empty() == options.block.empty())
     throw UsageError(
-        "say what to flash: --model MODEL, --block BLOCK of flexspline pack or backup, or --firmware IMAGE");
+        "choose what to flash: --model MODEL, --block BLOCK of flexspline pack or backup, or --firmware IMAGE");
   drive::Session session = open_drive(options.drive);
   const Bytes active = session.read_block(protocol::Which::active);
   const Bytes block = block_of(options, session, active, console);
@@ -145,7 +145,7 @@ int factory_reset(const RestoreOptions& options, drive::Session& session, Consol
   console.line(fmt::format("  active    {}", described(before)));
   const bool erases = confirmed("Erase it and the one before? A backup is all that is left then.", options.yes);
   if (erases) session.erase_all_blocks();
-  console.line(erases ? "Both blocks are erased; what is in use stays until the drive starts anew."
+  console.line(erases ? "Both blocks are erased; the block in use stays active until the drive restarts."
                       : "Nothing was changed.");
   output::save_json(options.json, {{"format", "flexspline-restore/1"},
                                    {"drive", json_of(session)},

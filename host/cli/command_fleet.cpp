@@ -47,7 +47,7 @@ Task task_of(const FleetOptions& options, const fs::path& folder) {
   std::error_code error;
   if (!fs::is_directory(folder, error))
     throw UsageError(
-        fmt::format("{} is no folder; fleet run takes the folder of one drive's measurements", folder.string()));
+        fmt::format("{} is not a folder; fleet run takes the folder of one drive's measurements", folder.string()));
   Task task{folder,
             options.model.empty() ? folder / "base-model.toml" : options.model,
             options.out.empty() ? folder / fleet::kResultName : options.out,
@@ -97,7 +97,7 @@ json result_of(const FleetOptions& options, const Task& task, Console& console) 
   try {
     errors = comparison::to_json(comparison::compare(dataset, found->model, pipeline))["overall"];
   } catch (const model::ModelError& error) {
-    // Measurements that do not show every effect of the model still tell the other parameters.
+    // Measurements that do not show every effect of the model still identify the other parameters.
     console.warn(fmt::format("{}: {}", task.name, error.what()));
   }
   json answer = {{"parameters", identified["parameters"]},
@@ -130,7 +130,7 @@ bool run_one(const FleetOptions& options, const fs::path& folder, Console& conso
     result["failed"] = failed;
     output::save_json(task.out.string(), result);
   };
-  // What a job that is killed leaves behind; without it the drive would be missing and nobody told.
+  // What a job that is killed leaves behind; without it the drive would be missing without a message.
   save(json::object(), "its run has not finished: it was stopped, or goes on still");
   json result;
   std::string failed;
@@ -213,9 +213,10 @@ int merge_results(const FleetOptions& options, Console& console) {
   console.line();
   const std::size_t good = results.size() - merged.failed.size();
   if (good < fleet::kFewestDrives) {
-    console.line(output::wrapped(
-        fmt::format("With {} drives none can be told from its siblings: {} are needed.", good, fleet::kFewestDrives),
-        0));
+    console.line(
+        output::wrapped(fmt::format("With {} drives none can be distinguished from its siblings: {} are needed.", good,
+                                    fleet::kFewestDrives),
+                        0));
   } else if (merged.differences.empty() && merged.verdicts.empty()) {
     console.line(
         fmt::format("No drive differs from its siblings (limit: {} deviations).", output::number(merged.limit, 3)));

@@ -17,9 +17,9 @@
 namespace flexspline::cli {
 namespace {
 
+using closed_loop::ComparedModel;
 using closed_loop::ComparedRun;
 using closed_loop::Comparison;
-using closed_loop::Contender;
 using nlohmann::json;
 using output::number;
 
@@ -29,8 +29,8 @@ std::string text_of(const std::filesystem::path& path) {
   return {std::istreambuf_iterator<char>(in), std::istreambuf_iterator<char>()};
 }
 
-std::vector<Contender> models_of(const HilOptions& options, const std::filesystem::path& sheet) {
-  std::vector<Contender> all;
+std::vector<ComparedModel> models_of(const HilOptions& options, const std::filesystem::path& sheet) {
+  std::vector<ComparedModel> all;
   const auto take = [&](std::string label, const std::filesystem::path& path, std::string name) {
     all.push_back({std::move(label), std::move(name), load_model(path).model});
   };
@@ -84,12 +84,12 @@ void print(const Comparison& c, Console& console) {
 
 closed_loop::Comparison run_closed_loop(const HilOptions& options, Console& console) {
   if (options.seconds != 0.0 && options.seconds < 1.1)
-    throw UsageError("--seconds has to be above 1.1: the first second fades the motion in and is not judged");
+    throw UsageError("--seconds has to be above 1.1: the first second fades the motion in and is not scored");
   if (options.draws != 0 && (options.draws < 3 || options.draws > 200))
     throw UsageError("--draws has to be 0, or 3 to 200");
   require_report_place(options.report);
-  closed_loop::Contest contest;
-  closed_loop::Job& job = contest.job;
+  closed_loop::ComparisonSetup setup;
+  closed_loop::Job& job = setup.job;
   job.scenario = options.scenario;
   job.plant_file = options.plant.string();
   job.with = options.with;
@@ -101,13 +101,13 @@ closed_loop::Comparison run_closed_loop(const HilOptions& options, Console& cons
   job.keeps_trace = !options.report.empty() || !options.picture.empty();
   const ScratchFolder sheet;
   fetch_data_sheet(job, sheet.path());
-  contest.contenders = models_of(options, sheet.path());
+  setup.models = models_of(options, sheet.path());
   const std::filesystem::path settings = options.settings.empty() ? sheet.path() / "settings.toml" : options.settings;
-  contest.settings = text_of(settings);
-  contest.settings_origin = settings.string();
-  contest.draws = options.draws;
+  setup.settings = text_of(settings);
+  setup.settings_origin = settings.string();
+  setup.draws = options.draws;
   const Comparison c =
-      closed_loop::compare(std::move(contest), twin_runner(), [&](std::string_view stage) { console.progress(stage); });
+      closed_loop::compare(std::move(setup), twin_runner(), [&](std::string_view stage) { console.progress(stage); });
   print(c, console);
   if (!options.report.empty()) {
     closed_loop::write_page(options.report, c);

@@ -17,7 +17,7 @@ namespace flexspline::cli {
 namespace {
 
 // "inertia.inertia=1.07e-4"
-estimation::Supplied supplied_from(const std::string& text) {
+estimation::SuppliedValue supplied_from(const std::string& text) {
   const std::size_t equals = text.find('=');
   const std::size_t dot = text.rfind('.', equals);
   std::size_t used = 0;
@@ -55,7 +55,7 @@ int run(const IdentifyOptions& options, Console& console) {
   const data::Dataset dataset = load(options.data, console);
   console.progress("estimating the parameters");
   try {
-    for (const estimation::Supplied& supplied : how.supplied) estimation::supply(known, supplied);
+    for (const estimation::SuppliedValue& supplied : how.supplied) estimation::supply(known, supplied);
     found = estimation::estimate(dataset, known, options.pipeline.options(), how);
   } catch (const std::invalid_argument& unsuitable) {
     throw UsageError(unsuitable.what());
@@ -67,7 +67,7 @@ int run(const IdentifyOptions& options, Console& console) {
     console.line();
     console.line("No file was written: --out MODEL writes the model with these values.");
   } else {
-    // What only the data set knows of the drive stays there: the file keeps what its author wrote.
+    // Facts of the drive that only the data set has are not written into the model file.
     model::Model changed = known;
     estimation::store(changed, found->estimates);
     model::save(options.out, model::signed_by_tool(model::rewrite(file, changed)));

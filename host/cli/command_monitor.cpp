@@ -47,8 +47,8 @@ std::vector<Channel> channels_of(const std::vector<std::string>& names) {
     channels.push_back(static_cast<Channel>(found));
   }
   if (channels.size() >= protocol::kMostChannels)
-    throw UsageError(
-        fmt::format("at most {} channels beside the state, not {}", protocol::kMostChannels - 1, channels.size()));
+    throw UsageError(fmt::format("at most {} channels in addition to the state, not {}", protocol::kMostChannels - 1,
+                                 channels.size()));
   return channels;
 }
 

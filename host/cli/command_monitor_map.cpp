@@ -25,7 +25,7 @@ std::string text_of(const ResidualMap::Range& v) {
   if (std::isinf(v.high)) return fmt::format("above {}", output::number(v.low, 3));
   return fmt::format("{} to {}", output::number(v.low, 3), output::number(v.high, 3));
 }
-// A glyph for a mean: the middle one is nought, a full bar the largest of the map.
+// A glyph for a mean: the middle one is zero, a full bar the largest of the map.
 std::string glyph_of(const drive::ResidualBin& bin, double largest) {
   constexpr std::string_view kBars[] = {"▁", "▂", "▃", "▄", "▅", "▆", "▇"};
   if (bin.ticks == 0) return "·";
@@ -38,7 +38,7 @@ void show(const ResidualMap& map, Console& console) {
   for (const drive::ResidualBin& bin : map.bins) largest = std::max(largest, std::abs(bin.mean_nm));
   console.line(
       fmt::format("Measured less modelled torque over motor angle (0 to 1 turn, left to right), {:.3g} s in "
-                  "all;\na full bar is {} N*m, half of one nought, a dot nothing yet:",
+                  "all;\na full bar is {} N*m, half of one zero, a dot nothing yet:",
                   map.seconds(), output::number(largest, 3)));
   console.line(fmt::format("{:>20}", "velocity, rad/s"));
   for (std::size_t v = map.velocity_bins(); v-- > 0;) {
@@ -63,16 +63,16 @@ std::string text_of(const MapFinding& f) {
                                  output::number(f.size_nm, 3));
   return fmt::format("{} +- {}; chance that it is noise: {}", what, output::number(f.std_nm, 2), certainty);
 }
-void say(const drive::MapJudgement& j, double limit_nm, Console& console) {
+void print(const drive::MapTest& j, double limit_nm, Console& console) {
   switch (j.verdict) {
     case MapVerdict::too_little_data:
       return console.line(
-          "Too little to judge by: 0.4 s at a velocity are needed. Move the drive with its model fed forward (record "
-          "--compensate), then look again.");
+          "Too little data: 0.4 s at a velocity are needed. Move the drive with feedforward of its model (record "
+          "--compensate), then read it again.");
     case MapVerdict::model_fits:
       return console.line(console.good("The model fits") +
                           fmt::format(": nothing certain above {} N*m at the {} velocities that were seen.",
-                                      output::number(limit_nm, 3), j.judged_bins));
+                                      output::number(limit_nm, 3), j.tested_bins));
     case MapVerdict::model_fails:
       console.line(console.bad("The model fails") + " here:");
       for (const MapFinding& f : j.findings) console.line("  " + text_of(f));
@@ -92,16 +92,16 @@ int run_residual_map(const MonitorOptions& options, Console& console) {
     std::this_thread::sleep_for(transport::Milliseconds(20));
   const ResidualMap map = drive::read_residual_map(session, scales);
   const double limit_nm = options.limit_nm.value_or(drive::usual_map_limit_nm(scales));
-  const drive::MapJudgement judgement = drive::judge(map, limit_nm);
+  const drive::MapTest test = drive::judge(map, limit_nm);
   if (started)
     console.line("The residual map did not count (it was never asked, or the block is new): it does from now.");
   show(map, console);
-  say(judgement, limit_nm, console);
+  print(test, limit_nm, console);
   if (options.reset) {
     drive::reset_residual_map(session);
     console.line("The residual map is empty again.");
   }
-  json answer = drive::map_json(map, judgement, limit_nm);
+  json answer = drive::map_json(map, test, limit_nm);
   answer["format"] = "flexspline-residual-map/1";
   answer["drive"] = {{"serial", session.serial()}, {"board", session.board()}};
   answer["started"] = started;

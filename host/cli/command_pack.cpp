@@ -51,7 +51,7 @@ json json_of(const deployment::Packed& packed) {
           {"proof", proof}};
 }
 
-// Of each effect and of the sum: what is proven beside what was seen.
+// The proven bound and the largest measured error, for each effect and for the sum.
 void print_errors(const deployment::Packed& packed, Console& console) {
   console.line();
   console.line(

@@ -11,8 +11,9 @@
 namespace flexspline::cli {
 namespace {
 
-planning::Setting setting_of(const PlanOptions& options, const model::Model& model, const data::Dataset* dataset) {
-  planning::Setting setting = planning::setting_of(model, dataset);
+planning::MotionSettings setting_of(const PlanOptions& options, const model::Model& model,
+                                    const data::Dataset* dataset) {
+  planning::MotionSettings setting = planning::setting_of(model, dataset);
   planning::Limits& limits = setting.limits;
   const double known_current = limits.current_a;
   limits.current_a = options.current_a.value_or(limits.current_a);
@@ -69,7 +70,7 @@ int run(const PlanOptions& options, Console& console) {
   const model::ModelFile file = load_searched_model(options.model);
   std::optional<data::Dataset> dataset;
   if (!options.data.data.empty()) dataset = load(options.data, console);
-  planning::Question question;
+  planning::PlanRequest question;
   question.model = &file.model;
   question.dataset = dataset ? &*dataset : nullptr;
   question.pipeline = options.pipeline.options();

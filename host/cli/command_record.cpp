@@ -33,15 +33,16 @@ std::string task_of(const planning::Run& run) {
   return text;
 }
 
-// Whether somebody is there to do what runs need, before the first of them moves.
+// Whether a person is there to do what runs need, before the first of them moves.
 void require_person(const planning::Plan& plan, bool yes) {
   if (yes || isatty(STDIN_FILENO) != 0) return;
   for (const planning::Run& run : plan.runs)
     if (needs_a_person(run))
-      throw UsageError(fmt::format("run \"{}\" needs a person ({}); record on a terminal, or say --yes when all is so",
-                                   run.name, task_of(run)));
+      throw UsageError(
+          fmt::format("run \"{}\" needs a person ({}); record on a terminal, or give --yes when all of this is done",
+                      run.name, task_of(run)));
 }
-// False: the person wants to stop.
+// False: the user asked to stop.
 bool prepared(const planning::Run& run, bool yes) {
   if (yes || !needs_a_person(run)) return true;
   fmt::print(stderr, "{}: {}. Enter when done, q to stop: ", run.name, task_of(run));
@@ -63,7 +64,7 @@ json json_of(const drive::Recording& r) {
           {"ended", r.ended.empty() ? json() : json(r.ended)}};
 }
 
-void say(const drive::Recording& r, Console& console) {
+void print(const drive::Recording& r, Console& console) {
   console.line(fmt::format("  {:<28} {:>8} samples, {:.3g} s{}", r.run.name, r.time_s.size(),
                            r.time_s.empty() ? 0.0 : r.time_s.back(),
                            r.complete ? std::string() : ", not complete: " + r.ended));
@@ -151,7 +152,7 @@ int run(const RecordOptions& options, Console& console) {
                                   console.progress(fmt::format("run {} of {}, {}: {:.1f} of {:g} s", i + 1,
                                                                plan.runs.size(), run.name, time_s, run.duration_s));
                                 }});
-      say(r, console);
+      print(r, console);
       ended = r.ended;
       if (r.complete) model::save(options.out / (run.name + ".csv"), drive::csv_of(r, scales, origin));
       all.push_back(std::move(r));

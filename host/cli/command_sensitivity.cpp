@@ -50,7 +50,7 @@ std::string phase_text(const SignalError& s) {
   return change_text(s.response.phase_deg, "deg");
 }
 
-// Those that tell most, free positions aside: they are velocities once more, with their drift.
+// Those that show most, except free positions: they are velocities once more, with their drift.
 std::vector<const SignalError*> telling(const Variant& variant) {
   std::vector<const SignalError*> signals;
   for (const SignalError& s : variant.overall)
@@ -106,16 +106,16 @@ std::string sentence(const Sensitivity& answer, const Variant& variant) {
 }
 
 void print(const Sensitivity& answer, Console& console) {
-  console.line(console.bold(answer.refit ? "What the model depends on, the other parameters estimated anew each time"
+  console.line(console.bold(answer.refit ? "What the model depends on, the other parameters re-estimated each time"
                                          : "What the model depends on, the other parameters as they are"));
-  std::vector<std::string> said;
+  std::vector<std::string> printed;
   for (const Variant& variant : answer.variants) {
-    if (said.size() == kSentences) break;
-    if (std::find(said.begin(), said.end(), variant.change->effect) != said.end()) continue;
+    if (printed.size() == kSentences) break;
+    if (std::find(printed.begin(), printed.end(), variant.change->effect) != printed.end()) continue;
     const std::string text = sentence(answer, variant);
     if (text.empty()) continue;
     console.line("  " + text);
-    said.push_back(variant.change->effect);
+    printed.push_back(variant.change->effect);
   }
   console.line();
   std::vector<std::string> nothing, notes;
@@ -147,7 +147,7 @@ int run(const SensitivityOptions& options, Console& console) {
   const data::Dataset dataset = load(options.data, console);
   console.progress("judging the full model");
   wanted.progress = [&console](std::size_t done, std::size_t all) {
-    console.progress(fmt::format("{} of {} changed models judged", done, all));
+    console.progress(fmt::format("{} of {} changed models evaluated", done, all));
   };
   const Sensitivity answer = sensitivity::analyse(dataset, file.model, wanted);
   for (const std::string& warning : answer.warnings) console.warn(warning);

@@ -49,13 +49,13 @@ std::string file_name(const Experiment& e) {
   return (name.empty() || name.front() == '.' ? "run" + name : name) + ".csv";
 }
 
-struct Written {
+struct WrittenCsv {
   std::string text;
   std::size_t samples = 0;  // those that the model reached
 };
 
-Written csv_of(const Experiment& e, const simulation::FreeRun& run) {
-  Written written;
+WrittenCsv csv_of(const Experiment& e, const simulation::FreeRun& run) {
+  WrittenCsv written;
   fmt::memory_buffer text;
   const auto out = std::back_inserter(text);
   // A bar within a line would end it.
@@ -92,12 +92,12 @@ std::string dataset_head(const model::Drive& drive, const std::filesystem::path&
   std::string text =
       fmt::format("# Simulated by flexspline from {}.\nformat = \"flexspline-dataset/1\"\n\n[drive]\naxis = \"{}\"\n",
                   model.filename().string(), drive.axis == data::Axis::rotary ? "rotary" : "linear");
-  const auto say = [&](const char* key, const model::Quantity& quantity) {
+  const auto print = [&](const char* key, const model::Quantity& quantity) {
     if (quantity.value) text += fmt::format("{} = {}\n", key, model::exact_text(*quantity.value));
   };
-  say("gear_ratio", drive.gear_ratio);
-  say("torque_constant_nm_a", drive.torque_constant_nm_a);
-  say("pitch_m", drive.pitch_m);
+  print("gear_ratio", drive.gear_ratio);
+  print("torque_constant_nm_a", drive.torque_constant_nm_a);
+  print("pitch_m", drive.pitch_m);
   return text;
 }
 
@@ -124,7 +124,7 @@ int run(const SimulateOptions& options, Console& console) {
                       e.name));
       continue;
     }
-    const Written written = csv_of(e, run);
+    const WrittenCsv written = csv_of(e, run);
     const bool diverged = written.samples < samples_in_segments(e);
     if (diverged)
       console.warn(

@@ -20,13 +20,13 @@
 namespace flexspline::cli {
 namespace {
 
-// The desktop's own way to open an address; without a desktop nobody is bothered.
+// The desktop's own program to open an address; nothing happens without a desktop.
 bool open_browser(const std::string& address) {
   if (!std::getenv("DISPLAY") && !std::getenv("WAYLAND_DISPLAY")) return false;
   const pid_t child = fork();
   if (child < 0) return false;
   if (child == 0) {
-    // Twice, so that nobody has to wait for the browser.
+    // In two places, so that the command need not wait for the browser.
     if (fork() == 0) {
       execlp("xdg-open", "xdg-open", address.c_str(), nullptr);
       _exit(1);
@@ -38,19 +38,19 @@ bool open_browser(const std::string& address) {
 }
 
 // The drive that closed loops are run on.
-workbench::Rig rig_of(const WorkbenchOptions& options, const data::Dataset& dataset) {
-  if (options.plant.empty()) return workbench::rig_beside(options.data.data, dataset);
+workbench::SimulatedPlant plant_setup_of(const WorkbenchOptions& options, const data::Dataset& dataset) {
+  if (options.plant.empty()) return workbench::plant_of_recordings(options.data.data, dataset);
   closed_loop::Job job;
   job.plant_file = options.plant.string();
   const ScratchFolder sheet;
   fetch_data_sheet(job, sheet.path());
   std::ifstream in(sheet.path() / "settings.toml", std::ios::binary);
-  workbench::Rig rig;
-  rig.plant_file = std::filesystem::absolute(options.plant).string();
-  rig.settings = {std::istreambuf_iterator<char>(in), std::istreambuf_iterator<char>()};
-  rig.settings_origin = options.plant.string();
-  rig.what = fmt::format("the simulated drive of {}", options.plant.filename().string());
-  return rig;
+  workbench::SimulatedPlant plant_setup;
+  plant_setup.plant_file = std::filesystem::absolute(options.plant).string();
+  plant_setup.settings = {std::istreambuf_iterator<char>(in), std::istreambuf_iterator<char>()};
+  plant_setup.settings_origin = options.plant.string();
+  plant_setup.what = fmt::format("the simulated drive of {}", options.plant.filename().string());
+  return plant_setup;
 }
 
 void open_model(const WorkbenchOptions& options, workbench::Setup& setup, Console& console) {
@@ -62,7 +62,7 @@ void open_model(const WorkbenchOptions& options, workbench::Setup& setup, Consol
     if (!stage.empty()) console.progress(stage);
   });
   setup.model_name = options.model.string();
-  setup.rig = rig_of(options, *dataset);
+  setup.plant_setup = plant_setup_of(options, *dataset);
 }
 
 // What there is to begin with is chosen on the page.
@@ -75,7 +75,7 @@ void begin_without_model(const WorkbenchOptions& options, workbench::Setup& setu
     setup.data.push_back(std::filesystem::absolute(path));
   }
   setup.model_name = "model.toml";
-  if (!options.plant.empty()) setup.rig = rig_of(options, {});
+  if (!options.plant.empty()) setup.plant_setup = plant_setup_of(options, {});
 }
 
 }  // namespace

@@ -86,9 +86,9 @@ struct CompareOptions {
   DataInputs data;
   PipelineInputs pipeline;
   std::filesystem::path model;
-  std::vector<std::string> limits;  // SIGNAL=RMSE
-  std::vector<std::string> beside;  // fir:20, arx:4,4,1
-  std::filesystem::path report;     // empty: none
+  std::vector<std::string> limits;     // SIGNAL=RMSE
+  std::vector<std::string> baselines;  // fir:20, arx:4,4,1
+  std::filesystem::path report;        // empty: none
   std::string json;
 };
 int run(const CompareOptions& options, Console& console);
@@ -137,7 +137,7 @@ struct ChangeOptions {
   std::string json;
 };
 struct AddOptions : ChangeOptions {
-  selection::UserDefinition made;
+  selection::UserDefinition user_defined;
 };
 struct RemoveOptions : ChangeOptions {};
 int run(const AddOptions& options, Console& console);

@@ -31,7 +31,7 @@ std::string brief(const std::string& help) {
   return help.substr(0, help.find_first_of(";("));
 }
 
-// What stands behind `option` on the line, as words of bash's `compgen`.
+// What follows `option` on the line, as words of bash's `compgen`.
 std::string bash_reply(const OptionText& option) {
   switch (option.takes) {
     case Takes::files:
@@ -135,7 +135,7 @@ std::string zsh(const std::vector<CommandText>& commands, const std::vector<std:
       if (option.is_positional()) {
         ++place;
         const std::string where = place == places && option.takes == Takes::files ? "*" : std::to_string(place);
-        // An effect's list is in a variable, so these stand in double quotes.
+        // An effect's list is in a variable, so these are in double quotes.
         cases += option.takes == Takes::effect ? fmt::format(" \\\n        \"{}{}\"", where, zsh_value(option))
                                                : fmt::format(" \\\n        '{}{}'", where, zsh_value(option));
       } else if (option.takes == Takes::effect) {

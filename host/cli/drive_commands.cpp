@@ -41,7 +41,7 @@ bool confirmed(const std::string& question, bool yes) {
 drive::Bytes read_block_file(const std::filesystem::path& path) {
   std::ifstream in(path, std::ios::binary);
   if (!in) throw UsageError(fmt::format("{} cannot be read; is the path right?", path.string()));
-  // One more than the largest block tells that a file is larger.
+  // One byte more than the largest block shows that a file is too large.
   drive::Bytes bytes(model::kLargestBlock + 1);
   in.read(reinterpret_cast<char*>(bytes.data()), static_cast<std::streamsize>(bytes.size()));
   bytes.resize(static_cast<std::size_t>(in.gcount()));

@@ -12,7 +12,7 @@
 namespace flexspline::cli {
 
 struct DrivesOptions {
-  std::vector<std::string> also;  // ports and sockets to look behind
+  std::vector<std::string> also;  // ports and sockets to search
   std::string json;
 };
 int run(const DrivesOptions& options, Console& console);
@@ -24,7 +24,7 @@ struct FlashOptions {
   std::filesystem::path settings;  // empty: those of the active block
   std::filesystem::path firmware;
   bool older = false;     // firmware
-  int draws = 4;          // of the prediction; nought: none
+  int draws = 4;          // of the prediction; zero: none
   bool measured = false;  // as pack --measured
   bool yes = false;
   std::string json;
@@ -56,7 +56,7 @@ int run(const HomeOptions& options, Console& console);
 
 struct MonitorOptions {
   std::string drive;
-  double seconds = 0.0;  // nought: until Ctrl-C
+  double seconds = 0.0;  // zero: until Ctrl-C
   double rate_hz = 10.0;
   std::vector<std::string> channels;
   bool residual_map = false;  // that, and not the signals
@@ -85,10 +85,10 @@ int run(const RecordOptions& options, Console& console);
 struct TwinOptions {
   std::filesystem::path plant;  // empty: the demo's drive
   std::filesystem::path flash;  // empty: what is flashed ends with the twin
-  std::filesystem::path cable;  // pulls its plug while it says so; empty: none
+  std::filesystem::path cable;  // unplugs it while this text is shown; empty: none
   std::string serial = "TWIN";
-  int serve = 0;   // port; nought: any that is free
-  int usbip = -1;  // port of a USB device; below nought: none
+  int serve = 0;   // port; zero: any that is free
+  int usbip = -1;  // port of a USB device; below zero: none
   double seconds = 0.0;
   bool fast = false;
   std::string json;
@@ -100,13 +100,13 @@ int run(const TwinOptions& options, Console& console);
 drive::Session open_drive(const std::string& drive);
 // "drive SERIAL (BOARD) at NAME".
 std::string named(const drive::Session& session);
-// Asks on a terminal, unless `yes`; without a terminal nobody is asked and it is true.
+// Asks on a terminal, unless `yes`; without a terminal nothing is asked and the result is true.
 bool confirmed(const std::string& question, bool yes);
 // A good parameter block from a file. Throws UsageError where it cannot be read, deployment::PackError with the file
 // and the place where the block is bad.
 drive::Bytes read_block_file(const std::filesystem::path& path);
 
-// True once Ctrl-C was pressed (or the process was told to end) while one of these lives.
+// True once Ctrl-C was pressed (or the process received SIGTERM) while one of these exists.
 class Interruptible {
  public:
   Interruptible();

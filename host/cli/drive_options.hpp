@@ -25,7 +25,7 @@ void take_yes(Parser* sub, bool& yes) {
 template <class Parser>
 void take_restore(Parser* sub, RestoreOptions& options) {
   sub->add_flag("--factory-reset", options.factory_reset,
-                "erase both blocks, for good: the drive is as it left its maker when it starts anew");
+                "erase both blocks, for good: after a restart the drive is as delivered by its manufacturer");
   take_yes(sub, options.yes);
 }
 template <class Parser>
@@ -38,7 +38,7 @@ void take_prediction(Parser* sub, FlashOptions& options) {
 template <class Parser>
 void take_home(Parser* sub, HomeOptions& options) {
   sub->add_option("--position-rad", options.position,
-                  "where the motor stands now, m on a linear axis (default: only says what the drive knows)")
+                  "the present position of the motor, m on a linear axis (default: only prints what the drive knows)")
       ->type_name("RAD");
 }
 
@@ -83,7 +83,7 @@ void take_record(Parser* sub, RecordOptions& options) {
       ->delimiter(',')
       ->type_name("NAME")
       ->allow_extra_args(false);
-  sub->add_flag("--compensate", options.compensate, "runs of mode position with the model on the drive fed forward");
+  sub->add_flag("--compensate", options.compensate, "runs of mode position with feedforward of the model on the drive");
   sub->add_option("--full-velocity-rad-s", options.full_velocity_rad_s,
                   "motor velocity that is 100 % in the report's plans (default: nine tenths of the drive's limit)")
       ->check(CLI::PositiveNumber)
@@ -92,7 +92,7 @@ void take_record(Parser* sub, RecordOptions& options) {
                   "current that is 100 % in them (default: nine tenths of the drive's limit)")
       ->check(CLI::PositiveNumber)
       ->type_name("A");
-  sub->add_flag("--clear-fault", options.clear_fault, "the cause of the fault it stands in is gone");
+  sub->add_flag("--clear-fault", options.clear_fault, "the cause of its present fault is gone");
   take_yes(sub, options.yes);
 }
 

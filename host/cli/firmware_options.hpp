@@ -14,7 +14,7 @@ void take_firmware(Command& flash, FlashOptions& options) {
 
 template <class Command>
 void take_image(Command& image, ImageOptions& options) {
-  image.add_option("--program", options.program, "BIN file of a linker, made to stand behind a header of 512 bytes")
+  image.add_option("--program", options.program, "BIN file of a linker, linked to start behind a header of 512 bytes")
       ->required()
       ->type_name("BIN");
   image.add_option("--board", options.board, "the board that it is for, as flexspline drives calls it")

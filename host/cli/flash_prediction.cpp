@@ -20,7 +20,7 @@ std::vector<std::uint8_t> packed(const model::Model& model, const std::string& s
   deployment::PackOptions pack;
   pack.tick_hz = kTwinTickHz;
   pack.samples = 2'000;
-  pack.bound = 1e-3;  // it is judged where it is packed for the drive
+  pack.bound = 1e-3;  // it is checked when it is packed for the drive
   pack.settings = settings;
   pack.settings_origin = "the block's gains";
   return deployment::pack(model, pack).bytes;
@@ -45,9 +45,9 @@ nlohmann::json predict_flash(const model::Model& model, const std::vector<std::u
   try {
     const deployment::Unpacked now = deployment::unpack(block);
     closed_loop::Question question;
-    question.believed = model;
-    question.bench = closed_loop::bench_of(now);
-    const std::string settings = closed_loop::settings_like(now, question.bench);
+    question.identified = model;
+    question.hardware = closed_loop::twin_hardware_of(now);
+    const std::string settings = closed_loop::settings_like(now, question.hardware);
     question.candidates.push_back({"new", packed(model, settings)});
     if (!active.empty())
       if (const auto before = deployment::unpack(active).model)

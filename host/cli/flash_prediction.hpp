@@ -1,4 +1,4 @@
-// What a model will be worth on a drive, said before it is flashed.
+// The gain that a model will have on a drive, predicted before it is flashed.
 #pragma once
 
 #include <cstdint>
@@ -11,9 +11,9 @@
 namespace flexspline::cli {
 
 // Runs slow reversals on twins of which `model` is true, within its uncertainty, with the gains of `block`: without
-// compensation, with the active block's model (where the block holds it) and with `model`. Says it, and returns it as
+// compensation, with the active block's model (where the block holds it) and with `model`. Prints it, and returns it as
 // {"scenario","ratio","interval","draws","active":{"ratio","interval"} or null}, or null where a twin cannot be what
-// the model says; the reason is said then.
+// the model says; the reason is printed then.
 nlohmann::json predict_flash(const model::Model& model, const std::vector<std::uint8_t>& block,
                              const std::vector<std::uint8_t>& active, int draws, Console& console);
 

@@ -19,31 +19,25 @@ const std::array kHelp = {
     CommandHelp{"demo",
                 "the whole story on the embedded twin, with a hidden effect",
                 "A simulated drive with one effect that the model does not know is recorded, identified and compared; "
-                "the missing "
-                "effect is diagnosed and added, and both models are judged on motions that the fit never saw. At the "
-                "end the twin "
-                "tells what it had hidden. All of it stands with plots in report.html.",
+                "the missing effect is diagnosed and added, and both models are compared on motions that the fit "
+                "never saw. At the end the twin reveals what was hidden. All of it is shown with plots in report.html.",
                 {"flexspline demo --hidden stribeck_gaussian --seed 7 --out demo-out"}},
     CommandHelp{
         "new",
         "first dataset.toml and base model from the measurements that there are",
         "Reads recordings as a logger left them (CSV, also of scopes and compressed by gzip; MAT; HDF5; NumPy; bags of "
-        "ROS "
-        "1 and 2 and MCAP, by topic and field; logs of moteus), finds out which column is what from names, units and "
-        "motion, and writes "
-        "two files into a new folder: dataset.toml, which maps the columns to ours, and base-model.toml, with the "
-        "effects that these signals can show. The measurements stay where they are and as they are. What is guessed is "
-        "said, and stands as a comment in the files; --map and the other options overrule it. A robot's log, with the "
-        "position of the link beside the current of the motor, takes --position-side link --gear-ratio N. A single "
-        "record "
-        "is split into a part to fit and a part to verify. What cannot be finished is left as a draft, with the line "
-        "to go "
-        "on with.",
+        "ROS 1 and 2 and MCAP, by topic and field; logs of moteus), finds out which column is what from names, units "
+        "and motion, and writes two files into a new folder: dataset.toml, which maps the columns to the names of the "
+        "tool, and base-model.toml, with the effects that these signals can show. The measurements are not changed. "
+        "What is guessed is printed, and written as a comment into the files; --map and the other options overrule "
+        "it. A robot's log, with the position of the link together with the current of the motor, takes "
+        "--position-side link --gear-ratio N. A single record is split into a part to fit and a part to verify. What "
+        "cannot be finished is left as a draft, with the command to continue.",
         {kMakeData, "flexspline new --from demo-out --out project"}},
     CommandHelp{
         "check",
         "what is in the data: signals, rates, noise, excitation, findings",
-        "Reads measurements and says of each experiment what it holds: signals with their range, noise and smallest "
+        "Reads measurements and lists what each experiment holds: signals with their range, noise and smallest "
         "step, motion, reversals, a period if it repeats itself; then everything that was found wrong and what to do "
         "about it, what can be identified from these signals, and which filters would be used.",
         {kMakeData, "flexspline check demo-out"}},
@@ -52,30 +46,29 @@ const std::array kHelp = {
         "the catalogue of physical effects, or one of them explained",
         "Without a name: all effects with the torque balance they act on, their equation, usual size and where they "
         "show. With a name: what the effect is, where it comes from on a machine, what it is confused with and which "
-        "experiment tells them apart; and a drawn curve.",
+        "experiment distinguishes them; and a drawn curve.",
         {"flexspline effects stribeck_gaussian"}},
     CommandHelp{
         "measure",
         "before any model: frequency response, noise floor, distortion, resonance",
-        "Says what measurements tell of a drive without any model: the frequency response from the current to "
-        "velocity, "
-        "torque and torsion with its coherence and confidence band; resonances and anti-resonances with damping; the "
-        "noise of each signal, from what differs between the periods of an excitation; odd and even nonlinear "
-        "distortion, from the lines that a linear drive would leave empty. What the motions at hand cannot tell is "
-        "said, and which motion would. Best is an odd random-phase multisine with some odd lines left out, repeated "
-        "six times.",
+        "Reports what measurements show of a drive without any model: the frequency response from the current to "
+        "velocity, torque and torsion with its coherence and confidence band; resonances and anti-resonances with "
+        "damping; the noise of each signal, from what differs between the periods of an excitation; odd and even "
+        "nonlinear distortion, from the lines that a linear drive would leave empty. What the given motions cannot "
+        "show is printed, with the motion that would show it. Best is an odd random-phase multisine with some odd "
+        "lines left out, repeated six times.",
         {kMakeData, "flexspline measure demo-out"}},
     CommandHelp{
         "identify",
         "estimates the parameters of a model",
         "Estimates every parameter that the model does not fix, from the experiments of role fit: for each experiment "
-        "alone, with average and spread, and for all together with 95 % intervals. A spread above 30 % is flagged: the "
-        "parameter is not reliable, or an effect is missing. \"excited\" is the share of a parameter's effect on the "
-        "data that no other parameter can stand in for. With --out the model is written with the values; its comments "
+        "alone, with average and spread, and for all together with 95 % intervals. A spread above 30 % is flagged: "
+        "the parameter is not reliable, or an effect is missing. \"excited\" is the share of a parameter's effect on "
+        "the data that no other parameter can explain. With --out the model is written with the values; its comments "
         "and layout stay. --method iv or oe is for velocities so noisy that least squares finds too little of "
         "everything; --intervals profile or bootstrap for parameters whose uncertainty is not symmetric; --supply for "
-        "what you know another way, as an inertia where the torque constant is open too. --report writes a page with "
-        "plots for a browser or a printer.",
+        "a parameter that is known from another source, such as an inertia where the torque constant is not known "
+        "either. --report writes a page with plots for a browser or a printer.",
         {kMakeData, kIdentify,
          "flexspline identify demo-out --model demo-out/base-model.toml --method oe --supply inertia.inertia=1.04e-4"}},
     CommandHelp{
@@ -87,48 +80,47 @@ const std::array kHelp = {
     CommandHelp{
         "compare",
         "model against measurement, by experiment, signal and region",
-        "Compares in both directions: the torque that the model asks for the measured motion (the balances), and the "
-        "motion that it makes of the measured torque (free run). Errors stand beside the noise of the measurement "
-        "where that is known; the regions with the largest excess over it are named. --limit makes a test of it: exit "
-        "code 1 where a signal's error is above. --beside fits a linear black box (FIR or ARX) to the same signals, on "
-        "the experiments that are not held out, and shows what error its many parameters reach. --report writes a page "
-        "with plots of all of it.",
+        "Compares in both directions: the torque that the model needs for the measured motion (the balances), and the "
+        "motion that it predicts from the measured torque (free run). Errors are shown with the noise of the "
+        "measurement where that is known; the regions with the largest excess over it are named. --limit sets a "
+        "limit: exit code 1 where a signal's error is above it. --beside fits a linear black box (FIR or ARX) to the "
+        "same signals, on the experiments that are not held out, and shows what error its many parameters reach. "
+        "--report writes a page with plots of all of it.",
         {kMakeData, kIdentify, "flexspline compare --model fitted.toml demo-out --beside arx:4,4,1"}},
     CommandHelp{
         "diagnose",
         "which physical effect is missing from a model, or that none is",
-        "Fits the model, looks at where its error stands, tries every effect of the catalogue against data left out of "
-        "the fit, and names the one that is missing; or says that none is, or that these data cannot tell, and which "
-        "experiment would. The model needs no values. With --auto it goes on with the effect added until nothing more "
-        "is found. --report writes a page with plots: where the model fails, and what is missing.",
+        "Fits the model, finds where its error is large, tries every effect of the catalogue against data left out of "
+        "the fit, and names the one that is missing; or reports that none is, or that these data cannot show it, and "
+        "which experiment would. The model needs no values. With --auto it goes on with the effect added until "
+        "nothing more is found. --report writes a page with plots: where the model fails, and what is missing.",
         {kMakeData, "flexspline diagnose --model demo-out/base-model.toml demo-out"}},
     CommandHelp{
         "add",
         "adds an effect to a model and refits it, with the error before and after",
-        "Adds an effect of the catalogue, estimates all parameters anew and says what that does to the error, on the "
-        "data that were fitted and on those held out. table_effect:SIGNAL learns a curve over a signal of your choice, "
-        "as "
-        "smooth as the data ask for, where no effect of the catalogue fits; expression_effect fits a formula of yours. "
-        "Comments and layout of the model file stay; its history gets a "
-        "line. --report writes a page with plots, with the error before and after.",
+        "Adds an effect of the catalogue, re-estimates all parameters and reports what that does to the error, on the "
+        "data that were fitted and on those held out. table_effect:SIGNAL learns a curve over a signal of your "
+        "choice, as smooth as cross-validation chooses, where no effect of the catalogue fits; expression_effect fits "
+        "a formula of your own. Comments and layout of the model file stay; its history gets a line. --report writes "
+        "a page with plots, with the error before and after.",
         {kMakeData, kAdd,
          "flexspline add expression_effect --formula 'a*abs(velocity)' --parameter a:N*m*s/rad --model "
          "demo-out/base-model.toml demo-out --out better.toml"}},
     CommandHelp{
         "remove",
         "takes an effect out of a model and refits it, and shows what that costs",
-        "Takes an effect out, by its id or its type, estimates the rest anew and says what that does to the error, on "
+        "Takes an effect out, by its id or its type, re-estimates the rest and reports what that does to the error, on "
         "the data that were fitted and on those held out.",
         {kMakeData, kAdd, "flexspline remove coulomb_asymmetry --model better.toml demo-out --out smaller.toml"}},
     CommandHelp{
         "sensitivity",
         "what the model depends on: each effect left out or scaled in turn",
         "Leaves each effect of the model out in turn, and scales the stiffness to a tenth and to ten times (and with "
-        "--scale any parameter), everything else as it is. Each of these models is judged as compare does: the torque "
-        "balances, and the free run with its amplitude and phase at the frequency of the motion. The largest growth of "
-        "an error comes first. What hardly changes anything need not be modelled, or these motions do not show it. "
-        "With "
-        "--refit the other parameters are estimated anew first: what they cannot make good is what the effect is for.",
+        "--scale any parameter), everything else as it is. Each of these models is evaluated as compare does: the "
+        "torque balances, and the free run with its amplitude and phase at the frequency of the motion. The largest "
+        "growth of an error comes first. An effect that hardly changes any error need not be modelled, or these "
+        "motions do not show it. With --refit the other parameters are re-estimated first: the error that they cannot "
+        "compensate is what the effect is needed for.",
         {kMakeData, kIdentify,
          "flexspline sensitivity --model fitted.toml demo-out --scale viscous_friction.coefficient=1.5"}},
     CommandHelp{
@@ -148,21 +140,19 @@ const std::array kHelp = {
          "printf 'format = \"flexspline-drive/1\"\\n[output_encoder]\\ncounts = 65536\\n' | tee drive.toml",
          "flexspline pack --model fitted.toml --drive drive.toml --tick-hz 20000 --encoder-counts 4096 --out "
          "full.block"}},
-    CommandHelp{
-        "unpack",
-        "checks a parameter block and says what is in it",
-        "Checks a block with the code that a drive checks it with, says what it holds in SI, and with --out writes the "
-        "model that it was made from. A damaged block is refused: which entry and field, and why.",
-        {kMakeData, kIdentify, "flexspline pack --model fitted.toml --out drive.block",
-         "flexspline unpack drive.block --out again.toml"}},
+    CommandHelp{"unpack",
+                "checks a parameter block and prints its contents",
+                "Checks a block with the drive's own code, prints its contents in SI, and with --out writes the "
+                "model that it was made from. A damaged block is refused: which entry and field, and why.",
+                {kMakeData, kIdentify, "flexspline pack --model fitted.toml --out drive.block",
+                 "flexspline unpack drive.block --out again.toml"}},
     CommandHelp{
         "export",
         "the model for other tools: C header, tables, MuJoCo, URDF",
         "c: one C99 header with all the model's effects, those with memory too, to be called once a sample; its "
-        "numbers "
-        "are those of simulate, to rounding. csv: a folder with the parameters, the friction over speed, the "
+        "numbers are those of simulate, to rounding. csv: a folder with the parameters, the friction over speed, the "
         "transmission's loop, and the curve of each effect that depends on one signal. mujoco, urdf: a joint with "
-        "armature, the straight line nearest to the friction, and stiffness; what a joint cannot hold is said in a "
+        "armature, the linear law nearest to the friction, and stiffness; what a joint cannot hold is written in a "
         "comment. --protocol-header writes what travels between host and drive, for programs of your own: message "
         "kinds, codes, channels, layouts, and the parameter block with the places of its fields.",
         {kMakeData, kIdentify, "flexspline export --protocol-header --out flexspline_protocol.h",
@@ -171,16 +161,13 @@ const std::array kHelp = {
     CommandHelp{
         "plan",
         "designs the motion that separates two effects, or that shows what is not well known",
-        "Rehearses some thirty motions with the model, within the limits of the drive: triangles slow and fast, "
-        "sines, "
-        "saw-teeth, multi-sines, chirps, ladders of speeds, a locked output, a constant load, two temperatures, "
-        "the drive off. With --separate, those are taken in which the true one of two effects beats the other "
-        "by most: its torque that the model with the other cannot imitate, over the noise. Without, those that "
-        "make all parameters known best. Measurements, where given, tell the noise, the sizes of the effects "
-        "and what need not be "
-        "recorded again. Where no motion separates two effects, the answer says so. The plan is a TOML file "
-        "that "
-        "flexspline-hil record --plan runs on the twin.",
+        "Rehearses some thirty motions with the model, within the limits of the drive: triangles slow and fast, sines, "
+        "saw-teeth, multi-sines, chirps, ladders of speeds, a locked output, a constant load, two temperatures, the "
+        "drive off. With --separate, motions are chosen that distinguish two effects best: by the part of one "
+        "effect's torque that the model with the other cannot reproduce, over the noise. Without it, motions that "
+        "determine all parameters best. Measurements, where given, give the noise, the sizes of the effects and what "
+        "need not be recorded again. Where no motion separates two effects, the answer says so. The plan is a TOML "
+        "file that flexspline-hil record --plan runs on the twin.",
         {kMakeData, kIdentify,
          "flexspline plan --separate stribeck_gaussian,load_dependent_friction --model fitted.toml --out "
          "plan.toml"}},
@@ -188,24 +175,24 @@ const std::array kHelp = {
         "drives",
         "the drives in reach, and what each is",
         "Lists the drives on USB with serial number, firmware, effects of the image and state; one that cannot be "
-        "opened with the reason and what to do. What is behind a serial port or a socket is asked with --also.",
+        "opened with the reason and what to do. What is behind a serial port or a socket is found with --also.",
         {"flexspline drives --also twin"}},
     CommandHelp{
         "flash",
         "puts a model, a parameter block or new firmware on a drive",
-        "Packs the model for this drive (its tick rate, its effects), or takes a block as it is, and says what that "
-        "changes against the block in use, parameter by parameter. The drive keeps the old block until the new one has "
-        "arrived whole and was found good, and has it for restore afterwards; it refuses while it is armed. What the "
-        "model will be worth at slow reversals is predicted from its values and their uncertainty and said before. On "
-        "a terminal it asks first; without one, or with --yes, it does not. --firmware takes an image of flexspline "
-        "image to a drive on USB: it goes to its boot loader, gets the image and tries it; one that does not do well "
-        "is taken back (exit code 1). Images for other boards, damaged ones and, without --older, older ones are "
-        "refused before anything is sent.",
+        "Packs the model for this drive (its tick rate, its effects), or takes a block as it is, and prints what that "
+        "changes against the block in use, parameter by parameter. The drive keeps the old block until the new one "
+        "has arrived completely and has passed its checks, and keeps it for restore; it refuses while it is armed. "
+        "The gain of the model at slow reversals is predicted from its values and their uncertainty and printed "
+        "first. On a terminal it asks first; without one, or with --yes, it does not. --firmware takes an image of "
+        "flexspline image to a drive on USB: it goes to its boot loader, gets the image and tries it; an image that "
+        "fails is rolled back (exit code 1). Images for other boards, damaged ones and, without --older, older ones "
+        "are refused before anything is sent.",
         {kMakeData, kIdentify, "flexspline flash --drive twin --model fitted.toml --yes"}},
     CommandHelp{
         "image",
         "makes a firmware image of a program",
-        "Puts before a program (BIN file) the header that boot loader and flash --firmware look at: length, checksum, "
+        "Puts before a program (BIN file) the header that boot loader and flash --firmware check: length, checksum, "
         "board and version. The program has to be linked to begin 512 bytes behind its slot. --dfu adds the suffix "
         "that dfu-util looks for. flexspline-hil image makes images for the twin.",
         {"echo a program | tee program.bin",
@@ -219,42 +206,38 @@ const std::array kHelp = {
     CommandHelp{
         "restore",
         "goes back to the parameter block before",
-        "Makes the block before the active one active, and says first what that changes. A second restore goes forth "
-        "again. Nothing is erased; a power cut leaves one or the other. With --factory-reset both blocks are erased: "
-        "the "
-        "drive has no parameters from its next start on, until another block is flashed.",
+        "Makes the block before the active one active, and prints first what that changes. A second restore goes "
+        "forward again. Nothing is erased; a power cut leaves one or the other. With --factory-reset both blocks are "
+        "erased: the drive has no parameters from its next start on, until another block is flashed.",
         {kMakeData, kIdentify, "flexspline flash --drive twin --model fitted.toml --yes",
          "flexspline restore --drive twin --yes"}},
     CommandHelp{
         "home",
-        "tells a drive where its motor stands",
-        "Encoders that count from where they wake do not know where they are: until it is told, or an index pulse "
-        "came, "
-        "a drive leaves out of its compensation what depends on the angle, and limits of position do not hold. Bring "
-        "the shaft to a mark, at rest and not armed, and give the motor's angle there, as the model's data count it. "
-        "Absolute encoders at motor and output need none of this. The reference is lost when the power goes, or when a "
-        "fault says that counts were lost. Without --position-rad it says what the drive knows.",
+        "sets the motor position of a drive",
+        "Incremental encoders do not know their absolute position: until it is set, or an index pulse came, a drive "
+        "leaves out of its compensation what depends on the angle, and limits of position do not hold. Bring the "
+        "shaft to a mark, at rest and not armed, and give the motor's angle there, as the model's data count it. "
+        "Absolute encoders at motor and output need none of this. The reference is lost when the power goes, or when "
+        "a fault reports that counts were lost. Without --position-rad it prints what the drive knows.",
         {"flexspline home --drive twin", "flexspline home --drive twin --position-rad 0"}},
     CommandHelp{
         "monitor",
         "live signals of a drive",
-        "Shows mode, faults and signals as they are; on a terminal with a curve of the last seconds behind each, "
-        "else a line at a time. --json writes the samples at the end. It only looks: nothing is armed. --residual-map "
-        "shows where over velocity "
-        "and motor angle the model on the drive fails, and how certain that is: the drive counts it by itself while "
-        "its "
-        "model is fed forward (record --compensate); the first call starts the count.",
+        "Shows mode, faults and signals as they are; on a terminal with a curve of the last seconds behind each, else "
+        "a line at a time. --json writes the samples at the end. It only reads: nothing is armed. --residual-map "
+        "shows where over velocity and motor angle the model on the drive fails, and how significant that is: the "
+        "drive fills the map while feedforward of its model is on (record --compensate); the first call starts the "
+        "count.",
         {"flexspline monitor --drive twin --seconds 0.5", "flexspline monitor --drive twin --residual-map"}},
     CommandHelp{
         "record",
         "runs the motions of a plan on a drive and saves the measurements",
         "Runs each motion of a plan on the drive itself (currents and velocities as its excitation, positions by its "
-        "trajectory, from where the shaft stands), at most at the plan's limits and the "
-        "drive's, "
-        "and writes a data set: a CSV file for each run with the drive's identity and its block's hash, and "
-        "dataset.toml. Frames that got lost are counted and named in the file. Ctrl-C, a limit or a fault brings the "
-        "drive to rest; what was finished before is kept (exit code 1). Runs that need a person (a locked output, a "
-        "load) ask on a terminal, and without one need --yes.",
+        "trajectory, from the present position of the shaft), at most at the plan's limits and the drive's, and "
+        "writes a data set: a CSV file for each run with the drive's identity and its block's hash, and dataset.toml. "
+        "Frames that got lost are counted and named in the file. Ctrl-C, a limit or a fault brings the drive to rest; "
+        "what was finished before is kept (exit code 1). Runs that need a person (a locked output, a load) ask on a "
+        "terminal, and without one need --yes.",
         {kMakeData, kIdentify,
          "flexspline plan --model fitted.toml --run-s 2 --motions 1 --without off,locked,load,temperature --out "
          "plan.toml",
@@ -263,10 +246,9 @@ const std::array kHelp = {
     CommandHelp{
         "twin",
         "a virtual drive: a plant, its sensors and the firmware",
-        "Runs until Ctrl-C and says as what --drive finds it: a socket (tcp:127.0.0.1:PORT/TOKEN), or with --usbip a "
-        "USB "
-        "device, which Linux takes for a real one once it is attached: sudo modprobe vhci-hcd; sudo usbip --tcp-port "
-        "PORT attach -r 127.0.0.1 -b 1-1. --drive twin starts one of its own and needs none of this. "
+        "Runs until Ctrl-C and prints the address for --drive: a socket (tcp:127.0.0.1:PORT/TOKEN), or with --usbip a "
+        "USB device, which Linux takes for a real one once it is attached: sudo modprobe vhci-hcd; sudo usbip "
+        "--tcp-port PORT attach -r 127.0.0.1 -b 1-1. --drive twin starts one of its own and needs none of this. "
         "flexspline-hil twin, which this starts, has more options: hidden effects, faults, a serial line. --json "
         "writes where it is once it listens.",
         {"flexspline twin --seconds 0.5"}},
@@ -274,12 +256,11 @@ const std::array kHelp = {
         "hil",
         "a drive in closed loop, with and without compensation",
         "Runs the drive's own firmware on a simulated drive along a motion, with the same loops each time: without "
-        "compensation, with a model, and with the model that an effect was added to (--base and --model). Says how far "
-        "the output is from where it shall be, what current that takes, and whether the loops hunt; and beside it what "
-        "was predicted from the model and the uncertainty of its parameters alone. A scenario is a name "
-        "(flexspline-hil scenarios lists them) or a file that says motion, drive, surroundings and what goes wrong. "
-        "Without --model the maker's values of the drive are taken. --processor runs the controller as the image of "
-        "an ARM processor.",
+        "compensation, with a model, and with the model that an effect was added to (--base and --model). Reports the "
+        "tracking error of the output, the current, and whether the loops hunt; and also what was predicted from the "
+        "model and the uncertainty of its parameters alone. A scenario is a name (flexspline-hil scenarios lists "
+        "them) or a file with motion, drive, surroundings and faults. Without --model the manufacturer's values are "
+        "used. --processor runs the controller as the image of an ARM processor.",
         {"flexspline hil --scenario slow-reversals --hide stribeck_gaussian --seconds 4"}},
     CommandHelp{
         "workbench",
@@ -288,24 +269,21 @@ const std::array kHelp = {
         "becomes of the error with that added; steps can be taken back and compared. Without --model it begins as "
         "flexspline new does: drop recordings on the page (or give them as DATA), look at the signals, choose which "
         "column is which, type gear ratio and torque constant, and a first model is identified. Models, reports and "
-        "blocks are "
-        "saved into the model's folder (without --model into this one), run in closed loop on a simulated drive "
-        "(--plant), and flashed to a drive or "
-        "the twin, whose signals and residual map are shown. The address has a token in it: who does "
-        "not know it is refused. Runs until Ctrl-C; --json writes the address once it listens.",
+        "blocks are saved into the model's folder (without --model into this one), run in closed loop on a simulated "
+        "drive (--plant), and flashed to a drive or the twin, whose signals and residual map are shown. The address "
+        "has a token in it: requests without it are refused. Runs until Ctrl-C; --json writes the address once it "
+        "listens.",
         {"flexspline workbench --no-open --seconds 0.5", kMakeData,
          "flexspline workbench demo-out --model demo-out/base-model.toml --no-open --seconds 0.5"}},
     CommandHelp{
         "fleet",
         "many drives: one command a drive, then which of them differs from its siblings",
-        "run identifies a drive (with --diagnose diagnoses it, too) and puts the answer as fleet-result.json beside "
-        "its "
-        "measurements; where that is there already, of the same files and the same build, nothing is done, so the "
+        "run identifies a drive (with --diagnose diagnoses it, too) and puts the answer as fleet-result.json next to "
+        "its measurements; where that is there already, of the same files and the same build, nothing is done, so the "
         "command can be given again after a stop. It is for a scheduler: parallel flexspline fleet run {} ::: "
-        "drives/*, "
-        "or in a Slurm array job: all=(drives/*); flexspline fleet run \"${all[$SLURM_ARRAY_TASK_ID]}\". merge reads "
-        "the results, says how each parameter and each error lies over the drives, and names drives that lie further "
-        "off than their siblings' scatter explains; at least five drives are needed.",
+        "drives/*, or in a Slurm array job: all=(drives/*); flexspline fleet run \"${all[$SLURM_ARRAY_TASK_ID]}\". "
+        "merge reads the results, reports how each parameter and each error is distributed over the drives, and names "
+        "drives that are further off than their siblings' scatter explains; at least five drives are needed.",
         {"flexspline-hil record --out drives/one --seed 1", "flexspline fleet run drives/one",
          "flexspline fleet merge drives"}},
     CommandHelp{"completion",

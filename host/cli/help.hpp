@@ -1,4 +1,4 @@
-// What --help says of each command, and the examples in it, which a test runs.
+// The text of --help for each command, and its examples, which a test runs.
 #pragma once
 
 #include <string>

@@ -23,7 +23,7 @@ class HelpFormat : public CLI::Formatter {
     const std::size_t width = output::line_width();
     const std::size_t column = width < 70 ? 6 : 30;
     std::string out = name;
-    // What is too long for its column stands alone on its line.
+    // A text that is too long for its column gets a line of its own.
     if (name.size() + 1 > column)
       out += "\n" + std::string(column, ' ');
     else

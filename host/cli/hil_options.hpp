@@ -13,7 +13,7 @@ namespace flexspline::cli {
 
 struct HilOptions {
   std::string scenario;
-  std::filesystem::path model;  // empty: what the drive's maker says of it
+  std::filesystem::path model;  // empty: the data of the drive's manufacturer
   std::filesystem::path base;   // model without the effect that was added; empty: no such run
   std::filesystem::path plant;
   std::filesystem::path settings;
@@ -25,11 +25,11 @@ struct HilOptions {
   double seconds = 0.0;
   std::uint64_t seed = 1;
   std::uint32_t tick_hz = closed_loop::kTwinTickHz;
-  int draws = 8;  // of the prediction; nought: none
+  int draws = 8;  // of the prediction; zero: none
   std::string json;
 };
 int run(const HilOptions& options, Console& console);
-// All runs, said on the console and written where the options want them.
+// All runs, printed on the console and written to the files that the options name.
 closed_loop::Comparison run_closed_loop(const HilOptions& options, Console& console);
 
 template <class Parser>
@@ -37,7 +37,8 @@ void take_hil(Parser* sub, HilOptions& options) {
   sub->add_option("--scenario", options.scenario, "name or file; flexspline-hil scenarios lists names")
       ->required()
       ->type_name("S");
-  sub->add_option("--model", options.model, "what is fed forward (default: the maker's values, hidden effect unknown)")
+  sub->add_option("--model", options.model,
+                  "model for the feedforward (default: the manufacturer's values, hidden effect unknown)")
       ->type_name("MODEL");
   sub->add_option("--base", options.base, "a run with this model, too: the one before an effect was added")
       ->type_name("MODEL");

@@ -6,7 +6,7 @@
 #include <cmath>
 
 #include "host/catalogue/constants.hpp"
-#include "host/catalogue/defined.hpp"
+#include "host/catalogue/user_defined_effect.hpp"
 #include "host/estimation/terms.hpp"
 #include "host/text/nearest.hpp"
 
@@ -111,7 +111,7 @@ void make_folder(const fs::path& folder) {
     throw UsageError(fmt::format("{} is there and no folder; give another --out", folder.string()));
   fs::create_directories(folder, error);
   if (error)
-    throw UsageError(fmt::format("{}: the folder cannot be made: {}; check the path and its permissions",
+    throw UsageError(fmt::format("{}: the folder could not be created: {}; check the path and its permissions",
                                  folder.string(), error.message()));
 }
 

@@ -40,7 +40,7 @@ struct PipelineInputs {
 };
 
 // Reads all measurements; those of `holdout` are never fitted, whatever role they state, and an experiment that both
-// name is held out. Warnings are said, notes are not. Throws data::DataError.
+// name is held out. Warnings are printed, notes are not. Throws data::DataError.
 data::Dataset load(const DataInputs& inputs, Console& console);
 
 // Throws model::ModelError.

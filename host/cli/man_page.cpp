@@ -61,7 +61,7 @@ std::string man_page(const std::vector<CommandText>& commands) {
   std::string page = fmt::format(
       ".\\\" Made by {0}.\n.TH FLEXSPLINE 1 \"\" \"flexspline {1}\" \"User Commands\"\n.nh\n.ad l\n.SH "
       "NAME\nflexspline "
-      "\\- identifies drives with strain\\-wave gears and says what a model of one lacks\n.SH SYNOPSIS\n"
+      "\\- identifies drives with strain\\-wave gears and finds what a model of one lacks\n.SH SYNOPSIS\n"
       ".B flexspline\n.I COMMAND\n.RI [ OPTIONS ]\n.br\n.B flexspline\n.I COMMAND\n.B \\-\\-help\n.br\n.B flexspline "
       "\\-\\-version\n.SH DESCRIPTION\n"
       "Reads recorded motion of a drive, estimates the parameters of a model, compares the model with the measurement, "
@@ -71,7 +71,7 @@ std::string man_page(const std::vector<CommandText>& commands) {
   for (const CommandText& command : commands) page += command_part(command);
   page +=
       ".SH EXIT STATUS\n.TP\n.B 0\nThe command did its work, whatever the verdict.\n.TP\n.B 1\nA limit that was given "
-      "is not met, or a verification failed.\n.TP\n.B 2\nUnusable input or arguments, said on standard error.\n"
+      "is not met, or a verification failed.\n.TP\n.B 2\nUnusable input or arguments, reported on standard error.\n"
       ".SH ENVIRONMENT\n.TP\n.B NO_COLOR\nNo colours on a terminal.\n.TP\n.B XDG_STATE_HOME\nWhere \\fB\\-\\-drive "
       "twin\\fR keeps its flash memory.\n.SH FILES\nFormats are described in the documents that come with the program "
       "(share/doc/flexspline).\n";

@@ -29,7 +29,7 @@ std::string completion_script(std::string_view shell, const std::vector<CommandT
 // A page of section 1 in the macros of man(7).
 std::string man_page(const std::vector<CommandText>& commands);
 
-// What both commands take beside --json.
+// The options that both commands have in addition to --json.
 template <class Parser>
 void take_manual(Parser* completion, CompletionOptions& options) {
   completion->add_option("SHELL", options.shell, "bash, zsh or fish")->required()->type_name("{bash,zsh,fish}");

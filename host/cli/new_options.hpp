@@ -6,7 +6,7 @@
 
 namespace flexspline::cli {
 
-// Its options beside DATA and --tolerate.
+// Its options other than DATA and --tolerate.
 template <class Parser>
 void take_new(Parser& command, NewOptions& options) {
   command.add_option("--out", options.out, "folder for dataset.toml and base-model.toml")->required()->type_name("DIR");
@@ -34,7 +34,7 @@ void take_new(Parser& command, NewOptions& options) {
   command
       .add_option("--position-side", options.position_side,
                   "where the only position and velocity are measured: link or motor. Of the link, with --gear-ratio N, "
-                  "the motor's are N times those, as most robots log them beside the motor's current")
+                  "the motor's are N times those, as most robots log them together with the motor's current")
       ->check(CLI::IsMember({"link", "motor"}))
       ->type_name("");
   command.add_option("--joint", options.joint, "of a file with several joints, by the number in the names")

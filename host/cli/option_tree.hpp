@@ -1,5 +1,5 @@
 // The commands with their options as plain data, taken from the parser that reads them: --help, completion and the man
-// page cannot say different things.
+// page cannot differ.
 #pragma once
 
 #include <algorithm>
@@ -12,8 +12,8 @@ namespace flexspline::cli {
 
 struct OptionText {
   enum class Takes { nothing, words, files, choice, effect };
-  std::string name;   // "--out"; without dashes it is told by its place
-  std::string value;  // what stands for the value: "FILE"; empty where the choices say it
+  std::string name;   // "--out"; without dashes its place identifies it
+  std::string value;  // the placeholder of the value: "FILE"; empty where the choices are listed
   std::vector<std::string> choices;
   std::string help;
   std::string usual;  // default; empty: none, or said in `help`

@@ -16,7 +16,7 @@ namespace {
 namespace fs = std::filesystem;
 using data::Column;
 
-// Each part of a split record must hold enough to be judged.
+// Each part of a split record must be long enough to be evaluated.
 constexpr std::size_t kFewestSamplesOfAPart = 500;
 
 class TemporaryFolder {
@@ -24,7 +24,7 @@ class TemporaryFolder {
   TemporaryFolder() {
     std::string path = (fs::temp_directory_path() / "flexspline-XXXXXX").string();
     if (::mkdtemp(path.data()) == nullptr)
-      throw UsageError(fmt::format("{}: no temporary folder can be made; check TMPDIR", path));
+      throw UsageError(fmt::format("{}: no temporary folder could be created; check TMPDIR", path));
     path_ = path;
   }
   TemporaryFolder(const TemporaryFolder&) = delete;
@@ -67,12 +67,12 @@ std::optional<double> gear_ratio_of(const data::Dataset& dataset) {
   return std::abs(slope - whole) < 0.005 * std::abs(slope) ? whole : slope;
 }
 
-struct Cut {
+struct Split {
   double at_s = 0.0;
   std::string why;
 };
 
-std::optional<Cut> cut_of(const data::Experiment& e) {
+std::optional<Split> split_of(const data::Experiment& e) {
   const std::size_t n = e.size();
   if (n < 2 * kFewestSamplesOfAPart) return std::nullopt;
   if (const auto period = period_samples(e)) {
@@ -80,10 +80,11 @@ std::optional<Cut> cut_of(const data::Experiment& e) {
     const double sample = std::round(std::round(periods) / 2.0) * *period;
     if (sample >= static_cast<double>(kFewestSamplesOfAPart) &&
         sample + static_cast<double>(kFewestSamplesOfAPart) <= static_cast<double>(n))
-      return Cut{e.time_s.front() + sample * e.sample_s,
-                 fmt::format("the motion repeats itself every {:.6g} s: the cut is on a whole period. The second part "
-                             "repeats the first, so it shows repeatability more than generality",
-                             *period * e.sample_s)};
+      return Split{
+          e.time_s.front() + sample * e.sample_s,
+          fmt::format("the motion repeats itself every {:.6g} s: the cut is on a whole period. The second part "
+                      "repeats the first, so it shows repeatability more than generality",
+                      *period * e.sample_s)};
   }
   // The standstill next to the middle; a cut there leaves both filters quiet.
   const std::vector<double> velocity = velocity_of(e);
@@ -97,14 +98,14 @@ std::optional<Cut> cut_of(const data::Experiment& e) {
         best = k;
         at_rest = true;
       }
-  return Cut{e.time_s[best], at_rest
-                                 ? "the motion does not repeat itself: the cut is at the standstill next to the middle"
-                                 : "the motion does not repeat itself: the cut is in the middle"};
+  return Split{e.time_s[best],
+               at_rest ? "the motion does not repeat itself: the cut is at the standstill next to the middle"
+                       : "the motion does not repeat itself: the cut is in the middle"};
 }
 
 void split(Draft& draft, const data::Dataset& dataset) {
   const data::Experiment& e = dataset.experiments.front();
-  const auto cut = cut_of(e);
+  const auto cut = split_of(e);
   if (!cut) {
     draft.notes.push_back(
         fmt::format("\"{}\" is too short to be split; record a second experiment to verify on", e.name));

@@ -24,7 +24,7 @@ using data::Column;
   throw data::DataError({{data::Severity::error, "file", file.string(), 0, "", what, remedy}});
 }
 
-// The dataset.toml that a path stands for, if it does.
+// The dataset.toml that a path refers to, if any.
 std::optional<fs::path> toml_of(const fs::path& path) {
   if (fs::is_directory(path) && fs::exists(path / "dataset.toml")) return path / "dataset.toml";
   if (path.extension() == ".toml") return path;
@@ -76,15 +76,15 @@ std::vector<std::vector<double>> values_of(const data::Recording& recording, con
     return std::find(there.begin(), there.end(), data::name_of_element(there, name, 1));
   };
   std::vector<std::size_t> wanted;
-  std::vector<std::optional<std::size_t>> slots;
+  std::vector<std::optional<std::size_t>> refs;
   for (const std::string& name : names) {
     const auto at = find_name(name);
-    slots.push_back(at == there.end() ? std::nullopt : std::optional(wanted.size()));
+    refs.push_back(at == there.end() ? std::nullopt : std::optional(wanted.size()));
     if (at != there.end()) wanted.push_back(static_cast<std::size_t>(at - there.begin()));
   }
   const data::Table table = recording.read(wanted);
   std::vector<std::vector<double>> values;
-  for (const auto& slot : slots) values.push_back(slot ? table.columns[*slot] : std::vector<double>{});
+  for (const auto& ref : refs) values.push_back(ref ? table.columns[*ref] : std::vector<double>{});
   return values;
 }
 
@@ -217,11 +217,10 @@ void take_side(Draft& draft, const HeaderGuess& guess) {
                                       fmt::join(guess.joints, ", "), *guess.joint));
   if (guess.joint_side) {
     draft.toml.drive["gear_ratio"] = number_value(1.0);
-    draft.gear_comment = "no motor sensors: the joint's columns stand for the motor's";
+    draft.gear_comment = "no motor sensors: the joint's columns are used as the motor's";
     draft.notes.push_back(
-        "there are no motor sensors: the joint's own columns stand for the motor's, with gear ratio 1; give "
-        "--gear-ratio "
-        "N to have the motor's side of the gear");
+        "there are no motor sensors: the joint's own columns are used as the motor's, with gear ratio 1; give "
+        "--gear-ratio N to have the motor's side of the gear");
   } else if (guess.scaled_by != 1.0) {
     draft.notes.push_back(fmt::format(
         "the position is of the link, current or torque of the motor: the motor's position and velocity are "
@@ -232,9 +231,8 @@ void take_side(Draft& draft, const HeaderGuess& guess) {
   }
   if (guess.side_is_asked_for)
     draft.open_question =
-        "the names do not say whether position and velocity are of the motor or of the link, and with this gear ratio "
-        "that "
-        "makes a difference; give --position-side motor or --position-side link";
+        "the names do not show whether position and velocity are of the motor or of the link, and with this gear ratio "
+        "that makes a difference; give --position-side motor or --position-side link";
 }
 
 Draft draft_of_files(const std::vector<fs::path>& files, const NewOptions& options) {
@@ -337,7 +335,7 @@ Draft draft_of_toml(const fs::path& path, const NewOptions& options) {
     }
   for (data::ExperimentEntry& entry : draft.toml.experiments) entry.file = fs::absolute(entry.file);
   draft.from_toml = true;
-  draft.notes.push_back(fmt::format("what {} says is kept", path.string()));
+  draft.notes.push_back(fmt::format("the facts in {} are kept", path.string()));
   add_options(draft, options);
   return draft;
 }
@@ -352,7 +350,7 @@ Draft draft_of(const NewOptions& options) {
       fail(path, "there is no such file or folder", "give CSV or MAT files, folders of them, or a dataset.toml");
     if (const auto toml = toml_of(path)) {
       if (options.data.data.size() > 1)
-        throw UsageError(fmt::format("{} says already what belongs together; give it alone, or give recordings only",
+        throw UsageError(fmt::format("{} already lists what belongs together; give it alone, or give recordings only",
                                      toml->string()));
       return draft_of_toml(*toml, options);
     }

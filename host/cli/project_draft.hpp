@@ -25,7 +25,7 @@ struct Draft {
   std::vector<int> joints;       // numbers of those in the file; empty: one
   std::optional<int> joint;      // that was taken
   std::string needs_pole_pairs;  // a speed in electrical turns
-  bool from_toml = false;        // all of it stands in a dataset.toml
+  bool from_toml = false;        // all of it is in a dataset.toml
   std::optional<Side> side;      // of the only position, where there is one
   std::string open_question;     // "what; what to do": without an answer there is nothing to go on with
 };

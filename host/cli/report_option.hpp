@@ -8,10 +8,10 @@
 
 namespace flexspline::cli {
 
-// Said before the work and not after it. Throws UsageError; nothing is asked where no report is.
+// Checked before the work and not after it. Throws UsageError; nothing is checked where no report is requested.
 void require_report_place(const std::filesystem::path& file);
 
-// Writes the page and says where it is; nothing where no report is asked.
+// Writes the page and prints its path; nothing where no report is requested.
 void write_report(const std::filesystem::path& file, const report::Subject& subject, Console& console);
 
 }  // namespace flexspline::cli

@@ -18,15 +18,15 @@ extern char** environ;
 namespace flexspline::cli {
 namespace {
 
-std::filesystem::path beside_this_program() {
+std::filesystem::path in_folder_of_this_program() {
   std::error_code error;
   const std::filesystem::path self = std::filesystem::read_symlink("/proc/self/exe", error);
-  if (error) throw std::runtime_error("cannot tell where this program stands: " + error.message());
+  if (error) throw std::runtime_error("could not find the folder of this program: " + error.message());
   return self.parent_path() / "flexspline-hil";
 }
 
 std::string program_there() {
-  const std::string program = beside_this_program().string();
+  const std::string program = in_folder_of_this_program().string();
   if (access(program.c_str(), X_OK) != 0)
     throw std::runtime_error(
         fmt::format("{} is not there; build it with ./dev build, and keep both programs in one folder", program));
@@ -53,12 +53,12 @@ std::string read_to_end(int file) {
 }
 
 // Its own message is the reason, wherever this one is shown: on a terminal, or on a page that has none.
-std::string why_it_failed(const std::vector<std::string>& arguments, std::string said, int status) {
-  while (!said.empty() && (said.back() == '\n' || said.back() == ' ')) said.pop_back();
-  if (!said.empty()) return text::shortened(said, 2000);
+std::string why_it_failed(const std::vector<std::string>& arguments, std::string printed, int status) {
+  while (!printed.empty() && (printed.back() == '\n' || printed.back() == ' ')) printed.pop_back();
+  if (!printed.empty()) return text::shortened(printed, 2000);
   const std::string how = WIFSIGNALED(status) ? fmt::format("was ended by signal {}", WTERMSIG(status))
                                               : fmt::format("ended with exit code {}", WEXITSTATUS(status));
-  return fmt::format("flexspline-hil {} {} and said nothing", arguments.empty() ? "" : arguments.front(), how);
+  return fmt::format("flexspline-hil {} {} and printed nothing", arguments.empty() ? "" : arguments.front(), how);
 }
 
 }  // namespace
@@ -80,15 +80,16 @@ void run_twin(const std::vector<std::string>& arguments) {
   const int failed = posix_spawn(&child, program.c_str(), &actions, nullptr, argv.data(), environ);
   posix_spawn_file_actions_destroy(&actions);
   close(ends[1]);
-  const std::string said = failed == 0 ? read_to_end(ends[0]) : std::string();
+  const std::string printed = failed == 0 ? read_to_end(ends[0]) : std::string();
   close(ends[0]);
   if (failed != 0) throw std::runtime_error(fmt::format("cannot start {}: {}", program, std::strerror(failed)));
   int status = 0;
   while (waitpid(child, &status, 0) < 0)
     if (errno != EINTR) throw std::runtime_error(fmt::format("lost {}: {}", program, std::strerror(errno)));
-  if (!WIFEXITED(status) || WEXITSTATUS(status) != 0) throw std::runtime_error(why_it_failed(arguments, said, status));
+  if (!WIFEXITED(status) || WEXITSTATUS(status) != 0)
+    throw std::runtime_error(why_it_failed(arguments, printed, status));
   // What it warned of.
-  fmt::print(stderr, "{}", said);
+  fmt::print(stderr, "{}", printed);
 }
 
 void become_twin(const std::vector<std::string>& arguments) {

@@ -7,8 +7,8 @@
 
 namespace flexspline::cli {
 
-// Runs `flexspline-hil ARGUMENTS`, which stands beside this program, and waits for it. Its output goes to standard
-// error. Throws std::runtime_error with path and reason where it cannot be started or does not succeed.
+// Runs `flexspline-hil ARGUMENTS`, which is in the same folder as this program, and waits for it. Its output goes to
+// standard error. Throws std::runtime_error with path and reason where it cannot be started or does not succeed.
 void run_twin(const std::vector<std::string>& arguments);
 // Becomes `flexspline-hil ARGUMENTS`: terminal, signals and exit code are the twin's from here on. Throws
 // std::runtime_error with path and reason where it cannot be started.

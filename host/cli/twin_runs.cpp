@@ -64,7 +64,7 @@ Outcome run_one(const Job& job, const fs::path& stem) {
 ScratchFolder::ScratchFolder() {
   std::string name = (fs::temp_directory_path() / "flexspline-hil-XXXXXX").string();
   if (mkdtemp(name.data()) == nullptr)
-    throw std::runtime_error(fmt::format("{}: cannot be made: {}", name, std::strerror(errno)));
+    throw std::runtime_error(fmt::format("{}could not be created: {}", name, std::strerror(errno)));
   path_ = name;
 }
 ScratchFolder::~ScratchFolder() {

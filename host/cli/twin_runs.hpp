@@ -22,7 +22,7 @@ class ScratchFolder {
 };
 
 closed_loop::Runner twin_runner();
-// What the maker of the drive of a job says of it, written into `folder` by the twin (settings.toml, known-model.toml
+// The manufacturer's data of the drive of a job, written into `folder` by the twin (settings.toml, known-model.toml
 // and, with a hidden effect, whole-model.toml).
 void fetch_data_sheet(const closed_loop::Job& job, const std::filesystem::path& folder);
 

@@ -111,7 +111,7 @@ void leave_unfinished(const Draft& draft, const NewOptions& options, const std::
   std::string line = as_given(options) + missing_maps(draft) + tolerations(errors);
   if (!draft.open_question.empty()) line += " --position-side link";
   console.error(
-      fmt::format("{} holds what could be found; where NAME stands or the wrong name, write the right one "
+      fmt::format("{} holds what could be found; replace NAME, or a wrong name, by the right one "
                   "(NAME:UNIT states its unit), and go on with\n  {}",
                   file.string(), line));
 }

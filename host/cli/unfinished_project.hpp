@@ -12,7 +12,7 @@ namespace flexspline::cli {
 // Whether a dataset.toml is such a draft, which may be written over.
 bool is_unfinished(const std::filesystem::path& dataset_toml);
 
-// Writes the draft as OUT/dataset.toml, in which the lines of `why`'s findings are right, and says what is missing.
+// Writes the draft as OUT/dataset.toml, in which the lines of `why`'s findings are right, and reports what is missing.
 void leave_unfinished(const Draft& draft, const NewOptions& options, const std::exception& why, Console& console);
 
 }  // namespace flexspline::cli

@@ -13,9 +13,9 @@ struct WorkbenchOptions {
   PipelineInputs pipeline;
   std::filesystem::path model;
   std::string drive;            // empty: none yet
-  std::filesystem::path plant;  // for closed loops; empty: what made the data, or the model
-  int port = 0;                 // nought: any that is free
-  double seconds = 0.0;         // nought: until Ctrl-C
+  std::filesystem::path plant;  // for closed loops; empty: the twin that recorded the data, or the model
+  int port = 0;                 // zero: any that is free
+  double seconds = 0.0;         // zero: until Ctrl-C
   bool no_open = false;
   std::string json;
 };

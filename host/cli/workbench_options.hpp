@@ -9,7 +9,7 @@
 
 namespace flexspline::cli {
 
-// Its options beside DATA, the model and those of the filters.
+// Its options other than DATA, the model and those of the filters.
 template <class Parser>
 void take_workbench(Parser& command, WorkbenchOptions& options) {
   command.add_option("--drive", options.drive, fmt::format("{} (default: choose on the page)", transport::kDriveHelp))
@@ -17,7 +17,7 @@ void take_workbench(Parser& command, WorkbenchOptions& options) {
   command
       .add_option(
           "--plant", options.plant,
-          "plant file of the drive that closed loops are run on (default: the twin that made the data, else one "
+          "plant file of the drive that closed loops are run on (default: the twin that recorded the data, else one "
           "of which the model is true)")
       ->check(CLI::ExistingFile)
       ->type_name("FILE");

@@ -169,7 +169,7 @@ json outlook(Draft& draft, const NewOptions& options) {
     answer["warnings"] = project.warnings;
     answer["reasons"] = project.base.reasons;
     for (const model::Effect& effect : project.base.model.effects) answer["effects"].push_back(effect.type);
-    // What the files say themselves, too.
+    // The facts in the files themselves, too.
     answer["gear_ratio"] = output::json_number(project.dataset.drive.gear_ratio);
     answer["torque_constant_nm_a"] = output::json_number(project.dataset.drive.torque_constant_nm_a);
   } catch (const data::DataError& unusable) {

@@ -7,8 +7,8 @@
 
 namespace flexspline::cli {
 
-// `home`: where the user stands; a dataset.toml for files that are not in the workbench's own folder names them from
-// there.
+// `home`: the user's current folder; a dataset.toml for files that are not in the workbench's own folder names them
+// from there.
 workbench::Projects projects(const std::filesystem::path& home);
 
 }  // namespace flexspline::cli

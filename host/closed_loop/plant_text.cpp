@@ -13,7 +13,7 @@ namespace {
 double quantity(const deployment::Unpacked& block, std::string_view name) {
   for (const deployment::NamedQuantity& q : block.settings)
     if (q.name == name) return q.value;
-  throw deployment::PackError(fmt::format("the block says nothing of {}; pack it with --drive", name));
+  throw deployment::PackError(fmt::format("the block does not state {}; pack it with --drive", name));
 }
 
 double known(const model::Quantity& q, const char* name) {
@@ -23,16 +23,16 @@ double known(const model::Quantity& q, const char* name) {
 
 }  // namespace
 
-Bench bench_of(const deployment::Unpacked& block) {
-  Bench bench;
-  bench.motor_counts = static_cast<int>(quantity(block, "motor_encoder_counts"));
+TwinHardware twin_hardware_of(const deployment::Unpacked& block) {
+  TwinHardware hardware;
+  hardware.motor_counts = static_cast<int>(quantity(block, "motor_encoder_counts"));
   if (const double counts = quantity(block, "output_encoder_counts"); counts > 0.0)
-    bench.output_counts = static_cast<int>(counts);
-  bench.current_limit_a = quantity(block, "current_limit");
-  return bench;
+    hardware.output_counts = static_cast<int>(counts);
+  hardware.current_limit_a = quantity(block, "current_limit");
+  return hardware;
 }
 
-std::string plant_text(const model::Model& model, const Bench& bench) {
+std::string plant_text(const model::Model& model, const TwinHardware& hardware) {
   if (model.drive.axis != data::Axis::rotary) throw std::runtime_error("the twin has no linear axis");
   const double reference_c = model.drive.temperature_reference_c.value.value_or(30.0);
   std::string text = fmt::format(
@@ -43,13 +43,13 @@ std::string plant_text(const model::Model& model, const Bench& bench) {
       known(model.drive.gear_ratio, "gear_ratio"), known(model.drive.torque_constant_nm_a, "torque_constant_nm_a"),
       known(model.drive.rated_current_a, "rated_current_a"),
       known(model.drive.rated_velocity_rad_s, "rated_velocity_rad_s"),
-      known(model.drive.rated_torque_nm, "rated_torque_nm"), reference_c, bench.current_limit_a);
+      known(model.drive.rated_torque_nm, "rated_torque_nm"), reference_c, hardware.current_limit_a);
   // Usual sensors: a model does not say how noisy a drive's are.
   text +=
       "[sensors.current]\nnoise_share = 0.005\nnoise_floor = 1e-3\n[sensors.torque]\nnoise_share = 0.01\n"
       "noise_floor = 5e-3\n[sensors.temperature]\nnoise_floor = 0.05\n";
   text += fmt::format("[sensors.motor_encoder]\ncounts = {}\n[sensors.output_encoder]\ncounts = {}\n",
-                      bench.motor_counts, bench.output_counts);
+                      hardware.motor_counts, hardware.output_counts);
   for (const model::Effect& effect : model.effects) {
     if (effect.definition) throw std::runtime_error(fmt::format("the twin cannot simulate {}", effect.id));
     text += fmt::format("[[effect]]\ntype = \"{}\"\npresent = true\n[effect.parameters]\n", effect.type);
@@ -61,12 +61,12 @@ std::string plant_text(const model::Model& model, const Bench& bench) {
   return text;
 }
 
-std::string settings_like(const deployment::Unpacked& block, const Bench& bench) {
+std::string settings_like(const deployment::Unpacked& block, const TwinHardware& hardware) {
   return fmt::format(
       "format = \"flexspline-drive/1\"\n[motor_encoder]\ncounts = {}\n[output_encoder]\ncounts = {}\n[torque_sensor]\n"
       "[limits]\ncurrent_a = {:.9e}\n[velocity_loop]\ngain_nm_s_rad = {:.9e}\nintegral_nm_rad = {:.9e}\n"
       "[position_loop]\nbandwidth_hz = {:.9e}\n[feedforward]\ndirection_band_rad_s = {:.9e}\n",
-      bench.motor_counts, bench.output_counts, bench.current_limit_a, quantity(block, "velocity_gain"),
+      hardware.motor_counts, hardware.output_counts, hardware.current_limit_a, quantity(block, "velocity_gain"),
       quantity(block, "integral_gain"), quantity(block, "position_gain") * 0.5 / std::numbers::pi,
       quantity(block, "direction_band"));
 }

@@ -12,11 +12,11 @@ namespace flexspline::closed_loop {
 namespace {
 
 constexpr double kMostDeviations = 3.0;
-// What draws do not show: that a fit's own parameters are not the drive's where two effects stand in for each other.
+// What draws do not show: that a fit's own parameters are not the drive's where two effects are confounded.
 constexpr double kLeastSpread = 0.05;
 
-// What cannot be, a fit would not have found either: an exponent near nought, say, makes a plant that no step is short
-// enough for. Bounds of shapes that are searched as ratios are not those of their values.
+// What cannot be, a fit would not have found either: for example an exponent near zero makes a plant that no step is
+// short enough for. Bounds of nonlinear parameters that are searched as ratios are not those of their values.
 double within_bounds(const model::Effect& effect, const model::Parameter& p, double value) {
   const catalogue::Entry* entry = catalogue::find(effect.type);
   if (entry == nullptr) return value;
@@ -50,7 +50,7 @@ std::vector<Prediction> predict(const Question& question, const Runner& run) {
   for (int k = 0; k < question.draws; ++k) {
     Job job;
     job.scenario = question.scenario;
-    job.plant = plant_text(drawn(question.believed, question.seed, static_cast<std::uint64_t>(k)), question.bench);
+    job.plant = plant_text(drawn(question.identified, question.seed, static_cast<std::uint64_t>(k)), question.hardware);
     job.seconds = question.seconds;
     job.tick_hz = question.tick_hz;
     job.seed = question.seed + 1000 + static_cast<std::uint64_t>(k);

@@ -19,18 +19,18 @@ struct Candidate {
 };
 
 struct Question {
-  model::Model believed;  // the best that is known of the drive
-  Bench bench;
+  model::Model identified;  // the best that is known of the drive
+  TwinHardware hardware;
   std::vector<Candidate> candidates;
   std::string scenario;
-  double seconds = 0.0;  // nought: what the scenario says
+  double seconds = 0.0;  // zero: what the scenario says
   int draws = 8;
   std::uint64_t seed = 1;
   std::uint32_t tick_hz = kTwinTickHz;  // of the candidates' blocks
 };
 
 // RMS error with this candidate's compensation over that without any, same loops: its expectation and the interval in
-// which a measured one will lie with 95 %.
+// which a measured one will be with 95 %.
 struct Prediction {
   std::string label;
   double rms_none_rad = 0.0;

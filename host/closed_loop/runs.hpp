@@ -1,4 +1,4 @@
-// A drive in closed loop, run elsewhere: on a twin in a process of its own, or in a test. What goes in, what comes out.
+// A drive in closed loop that runs outside of this process (a twin) or in a test: its inputs and its results.
 #pragma once
 
 #include <cstdint>
@@ -9,7 +9,7 @@
 
 namespace flexspline::closed_loop {
 
-// The twin's, unless it is told otherwise.
+// The twin's, unless another one is given.
 inline constexpr std::uint32_t kTwinTickHz = 20'000;
 
 // One run of one drive.
@@ -21,7 +21,7 @@ struct Job {
   std::string hide;
   std::vector<std::uint8_t> block;  // that the drive has in its flash memory
   bool compensation = false;
-  double seconds = 0.0;  // nought: what the scenario says
+  double seconds = 0.0;  // zero: what the scenario says
   std::uint64_t seed = 1;
   std::uint32_t tick_hz = kTwinTickHz;
   std::string processor;  // firmware image; empty: the software board
@@ -43,7 +43,7 @@ struct Outcome {
   double rms_current_a = 0.0;
   double peak_current_a = 0.0;
   int stops = 0;             // comes to rest while it shall move
-  bool limit_cycle = false;  // goes to and fro where it shall rest
+  bool limit_cycle = false;  // oscillates where it should be at rest
   double hold_swing_rad = 0.0;
   std::string fault;  // the first one; empty: none
   bool ends_in_fault = false;

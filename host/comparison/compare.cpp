@@ -8,11 +8,11 @@
 #include <stdexcept>
 #include <utility>
 
-#include "host/catalogue/defined.hpp"
+#include "host/catalogue/user_defined_effect.hpp"
 #include "host/comparison/free_run.hpp"
 #include "host/comparison/full_rate.hpp"
 #include "host/comparison/noise_floor.hpp"
-#include "host/comparison/row_variables.hpp"
+#include "host/comparison/sample_variables.hpp"
 #include "host/comparison/score.hpp"
 #include "host/estimation/balance_fit.hpp"
 #include "host/estimation/identify.hpp"
@@ -27,7 +27,7 @@ using data::Column;
 using data::Experiment;
 using estimation::Balance;
 using estimation::BalanceData;
-using estimation::Prepared;
+using estimation::PreparedData;
 using estimation::Record;
 
 constexpr std::size_t kFewestBins = 12;
@@ -42,19 +42,19 @@ const char* signal_name(Balance balance) {
 }
 
 // All samples of one signal, over experiments.
-struct Together {
+struct PooledScores {
   std::string signal;
   Score score;
   double worst_case_gain = kUnknown;
   std::size_t masked = 0;
-  bool spoilt = false;  // a free run among them diverged
+  bool diverged_or_empty = false;  // a free run among them diverged
 };
 
 class Comparer {
  public:
   Comparer(const data::Dataset& dataset, const model::Model& model, const estimation::PipelineOptions& options,
-           const std::vector<blackbox::Specification>& beside)
-      : model_(model), beside_(beside) {
+           const std::vector<blackbox::Specification>& baselines)
+      : model_(model), baseline_specifications_(baselines) {
     require_values(model);
     model_.drive = estimation::reconcile(model.drive, dataset, result_.warnings);
     terms_ = estimation::terms_of(model_);
@@ -81,14 +81,14 @@ class Comparer {
                               "no torque balance of the model can be formed from these columns",
                               "record current (or torque) and motor position together"}});
     for (std::size_t i = 0; extent.free_runs && i < all_.size(); ++i) free_run(i);
-    for (const Together& t : together_) {
+    for (const PooledScores& t : together_) {
       if (std::any_of(result_.overall.begin(), result_.overall.end(), [&](auto& s) { return s.signal == t.signal; }))
         continue;
-      SignalResult s = result_of(t.signal, t.score, t.masked, t.spoilt);
+      SignalResult s = result_of(t.signal, t.score, t.masked, t.diverged_or_empty);
       s.worst_case_gain = t.worst_case_gain;
       result_.overall.push_back(std::move(s));
     }
-    result_.beside = judge_beside(beside_signals_, beside_, result_.warnings);
+    result_.baselines = fit_baselines(baseline_signals_, baseline_specifications_, result_.warnings);
     return std::move(result_);
   }
 
@@ -101,33 +101,34 @@ class Comparer {
     return data::unit_of(Column::torque, axis);
   }
 
-  SignalResult result_of(const std::string& signal, const Score& score, std::size_t masked, bool spoilt) const {
+  SignalResult result_of(const std::string& signal, const Score& score, std::size_t masked,
+                         bool diverged_or_empty) const {
     SignalResult s;
     s.signal = signal;
     s.unit = unit_of(signal);
     s.samples = score.samples();
     s.masked = masked;
-    s.rmse = spoilt ? kUnknown : score.rmse();
-    s.nrmse = spoilt ? kUnknown : score.nrmse();
-    s.fit_percent = spoilt ? kUnknown : score.fit_percent();
-    s.vaf_percent = spoilt ? kUnknown : score.vaf_percent();
-    s.max_abs = spoilt ? kUnknown : score.max_abs();
+    s.rmse = diverged_or_empty ? kUnknown : score.rmse();
+    s.nrmse = diverged_or_empty ? kUnknown : score.nrmse();
+    s.fit_percent = diverged_or_empty ? kUnknown : score.fit_percent();
+    s.vaf_percent = diverged_or_empty ? kUnknown : score.vaf_percent();
+    s.max_abs = diverged_or_empty ? kUnknown : score.max_abs();
     s.worst_case_gain = kUnknown;
     return s;
   }
 
-  Together& together(const std::string& signal) {
-    for (Together& t : together_)
+  PooledScores& together(const std::string& signal) {
+    for (PooledScores& t : together_)
       if (t.signal == signal) return t;
     together_.push_back({signal, {}, kUnknown, 0, false});
     return together_.back();
   }
 
   void keep(std::size_t experiment, SignalResult s, const Score& score) {
-    Together& t = together(s.signal);
+    PooledScores& t = together(s.signal);
     t.score.add(score);
     t.masked += s.masked;
-    t.spoilt = t.spoilt || std::isnan(s.rmse);
+    t.diverged_or_empty = t.diverged_or_empty || std::isnan(s.rmse);
     t.worst_case_gain = std::fmax(t.worst_case_gain, s.worst_case_gain);
     result_.experiments[experiment].signals.push_back(std::move(s));
   }
@@ -171,8 +172,9 @@ class Comparer {
         floor_squared.segment(range.first, range.size()).setConstant(*floors[i].rmse * *floors[i].rmse);
       keep(range.record, std::move(s), score);
     }
-    if (!beside_.empty()) beside_signals_.push_back(balance_signal(prepared_, data, terms_, signal, unit_of(signal)));
-    const Together& t = together(signal);
+    if (!baseline_specifications_.empty())
+      baseline_signals_.push_back(balance_signal(prepared_, data, terms_, signal, unit_of(signal)));
+    const PooledScores& t = together(signal);
     SignalResult overall = result_of(signal, t.score, t.masked, false);
     overall.worst_case_gain = t.worst_case_gain;
     const NoiseFloor floor = pooled(floors, data.records());
@@ -185,11 +187,11 @@ class Comparer {
 
   void add_regions(const BalanceData& data, const std::string& signal, const Eigen::VectorXd& residual,
                    const Eigen::VectorXd& floor_squared) {
-    // A short record has few rows; its regions are wider then, never too thin to be judged.
+    // A short record has few rows; its regions are wider then, never too small for a test.
     const auto rows = static_cast<std::size_t>(data.rows());
     const std::size_t wanted = std::min(std::clamp(rows / kRowsPerBin, kFewestBins, kMostBins),
                                         std::max<std::size_t>(1, rows / kFewestInRegion));
-    for (const RowVariable& variable : row_variables(data, model_.drive.axis)) {
+    for (const SampleVariable& variable : sample_variables(data, model_.drive.axis)) {
       const Bins bins = equal_count_bins(variable.values, wanted);
       struct Sums {
         double error = 0.0, squared = 0.0, floor = 0.0;
@@ -255,7 +257,8 @@ class Comparer {
         score.add(measured[k], error[k]);
       }
     if (score.samples() == 0) return;
-    if (!beside_.empty()) add_free_run_signal(prepared_, i, signal, unit_of(signal), measured, error, beside_signals_);
+    if (!baseline_specifications_.empty())
+      add_free_run_signal(prepared_, i, signal, unit_of(signal), measured, error, baseline_signals_);
     SignalResult result = result_of(signal, score, masked, diverged);
     if (diverged)
       result_.warnings.push_back(fmt::format("{}: the free run diverges ({})", e.name, signal));
@@ -268,10 +271,10 @@ class Comparer {
   model::Model model_;
   estimation::Terms terms_;
   std::vector<const Experiment*> all_;
-  Prepared prepared_;
-  std::vector<Together> together_;
-  std::vector<blackbox::Specification> beside_;
-  std::vector<BesideSignal> beside_signals_;
+  PreparedData prepared_;
+  std::vector<PooledScores> together_;
+  std::vector<blackbox::Specification> baseline_specifications_;
+  std::vector<BaselineSignal> baseline_signals_;
   Comparison result_;
 };
 
@@ -295,8 +298,8 @@ const SignalResult* Comparison::find_overall(std::string_view signal) const {
 }
 
 Comparison compare(const data::Dataset& dataset, const model::Model& model, const estimation::PipelineOptions& options,
-                   const std::vector<blackbox::Specification>& beside, Extent extent) {
-  return Comparer(dataset, model, options, beside).all(extent);
+                   const std::vector<blackbox::Specification>& baselines, Extent extent) {
+  return Comparer(dataset, model, options, baselines).all(extent);
 }
 
 }  // namespace flexspline::comparison

@@ -6,7 +6,7 @@
 #include <string>
 #include <vector>
 
-#include "host/comparison/beside.hpp"
+#include "host/comparison/black_box_baseline.hpp"
 #include "host/data/dataset.hpp"
 #include "host/estimation/record.hpp"
 #include "host/model/model.hpp"
@@ -29,7 +29,7 @@ struct SignalResult {
   double worst_case_gain = 0.0;  // largest ratio of error to signal spectrum over the excited lines
   std::optional<double> noise_floor;
   std::string noise_floor_from = "none";
-  bool collapsed = false;  // motor and load are one balance, for want of a torque sensor
+  bool collapsed = false;  // motor and load are one balance, as there is no torque sensor
 
   std::optional<double> excess() const {
     return noise_floor && *noise_floor > 0.0 ? std::optional(rmse / *noise_floor) : std::nullopt;
@@ -42,7 +42,7 @@ struct ExperimentResult {
   std::vector<SignalResult> signals;
 };
 
-// Rows of all experiments in which a variable lies between two values.
+// Rows of all experiments in which a variable is between two values.
 struct Region {
   std::string signal;
   std::string unit;
@@ -60,26 +60,26 @@ struct Comparison {
   std::vector<ExperimentResult> experiments;  // in the order of the data set
   std::vector<SignalResult> overall;          // all samples of all experiments together
   std::vector<Region> regions;
-  std::vector<BesideResult> beside;  // black boxes, in the order asked for, each with its signals
+  std::vector<BaselineResult> baselines;  // black boxes, in the order of the command, each with its signals
   estimation::Pipeline pipeline;
   std::vector<std::string> warnings;
 
   const SignalResult* find_overall(std::string_view signal) const;
 };
 
-// What is compared: what takes longer than errors by experiment, and is not always asked for.
+// Options of a comparison: parts that take longer than errors by experiment, and are not always needed.
 struct Extent {
   bool free_runs = true;          // else the balances alone
   bool regions_and_gains = true;  // else neither `regions` nor worst_case_gain of balances
 };
 
 // Inverse model: each torque balance on the rows of the regression, with the motion as measured. Free run: what the
-// model does with the measured effort alone, from the measured state at the start of each segment; nothing is taken out
-// of the positions, as drift is an error. The cut-off is chosen from the experiments of role fit, where there are any.
-// `beside`: black boxes that are fitted to the same signals, see beside.hpp.
-// Throws model::ModelError naming parameters without a value, data::DataError where no balance can be formed.
+// model does with the measured effort alone, from the measured state at the start of each segment; positions are not
+// detrended, as drift is an error. The cut-off is chosen from the experiments of role fit, where there are any.
+// `baselines`: black boxes that are fitted to the same signals, see black_box_baseline.hpp. Throws model::ModelError
+// naming parameters without a value, data::DataError where no balance can be formed.
 Comparison compare(const data::Dataset& dataset, const model::Model& model, const estimation::PipelineOptions& options,
-                   const std::vector<blackbox::Specification>& beside = {}, Extent extent = {});
+                   const std::vector<blackbox::Specification>& baselines = {}, Extent extent = {});
 
 // Throws model::ModelError naming the parameters without a value, if there are any.
 void require_values(const model::Model& model);

@@ -34,14 +34,14 @@ json to_json(const std::vector<SignalResult>& signals) {
   return list;
 }
 
-json to_json(const BesideResult& b) {
+json to_json(const BaselineResult& b) {
   json experiments = json::array();
-  for (const BesideExperiment& e : b.experiments)
+  for (const BaselineExperiment& e : b.experiments)
     experiments.push_back({{"name", e.name},
                            {"role", e.role == data::Role::fit ? "fit" : "holdout"},
                            {"rmse", number(e.rmse)},
                            {"model_rmse", number(e.model_rmse)}});
-  return {{"asked", b.asked},
+  return {{"asked", b.requested},
           {"black_box", b.black_box},
           {"signal", b.signal},
           {"unit", b.unit},
@@ -66,7 +66,7 @@ json to_json(const BesideResult& b) {
 }  // namespace
 
 json to_json(const Comparison& comparison) {
-  json experiments = json::array(), regions = json::array(), beside = json::array();
+  json experiments = json::array(), regions = json::array(), baselines = json::array();
   for (const ExperimentResult& e : comparison.experiments)
     experiments.push_back(
         {{"name", e.name}, {"role", e.role == data::Role::fit ? "fit" : "holdout"}, {"signals", to_json(e.signals)}});
@@ -81,12 +81,12 @@ json to_json(const Comparison& comparison) {
                        {"bias", number(r.bias)},
                        {"rmse", number(r.rmse)},
                        {"excess", number(r.excess)}});
-  for (const BesideResult& b : comparison.beside) beside.push_back(to_json(b));
+  for (const BaselineResult& b : comparison.baselines) baselines.push_back(to_json(b));
   return {{"format", "flexspline-compare/1"},
           {"experiments", std::move(experiments)},
           {"overall", to_json(comparison.overall)},
           {"regions", std::move(regions)},
-          {"beside", std::move(beside)},
+          {"beside", std::move(baselines)},
           {"parameter_trends", json::array()},
           {"cutoff_hz", number(comparison.pipeline.row_cutoff_hz)},
           {"warnings", comparison.warnings}};

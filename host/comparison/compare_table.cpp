@@ -48,7 +48,7 @@ std::string words(const Region& r, const SignalResult& overall) {
   std::replace(variable.begin(), variable.end(), '_', ' ');
   const std::string unit = r.variable_unit.empty() ? "" : " " + r.variable_unit;
   const std::string size = std::isfinite(r.excess) ? fmt::format("{:.1f} times the noise", r.excess)
-                                                   : fmt::format("{:.1f} times the error of all rows",
+                                                   : fmt::format("{:.1f} times the error of all samples",
                                                                  overall.rmse > 0.0 ? r.rmse / overall.rmse : 0.0);
   const char* side = r.bias > 0.0 ? "too little" : "too much";
   return fmt::format(
@@ -56,8 +56,8 @@ std::string words(const Region& r, const SignalResult& overall) {
       variable, r.low, r.high, unit, r.rmse, r.unit, size, std::abs(r.bias), r.unit, side);
 }
 
-// A black box a line, with the model on the same samples beside it.
-std::string beside_table(const std::vector<BesideResult>& results) {
+// One line for each black box, with the physical model's error on the same samples.
+std::string baseline_table(const std::vector<BaselineResult>& results) {
   std::string text =
       "\nBeside the model, black boxes fitted to the same signals (free run; the model on the same samples):\n";
   const auto line = [&text](std::string_view box, std::string_view signal, std::string_view unit,
@@ -68,7 +68,7 @@ std::string beside_table(const std::vector<BesideResult>& results) {
   };
   line("black box", "signal", "unit", "parameters", "rmse", "model", "held out", "model", "one step", "of std");
   bool unstable = false;
-  for (const BesideResult& b : results) {
+  for (const BaselineResult& b : results) {
     line(b.black_box + (b.stable ? "" : "!"), b.load.empty() ? b.signal : fmt::format("{} {}", b.signal, b.load),
          b.unit, b.parameters, cell(b.rmse), cell(b.model_rmse), cell(b.rmse_holdout), cell(b.model_rmse_holdout),
          cell(b.rmse_one_step), cell(100.0 * b.nrmse, " %"));
@@ -112,19 +112,19 @@ std::string table(const Comparison& comparison) {
   std::vector<const Region*> regions;
   for (const Region& r : comparison.regions) regions.push_back(&r);
   std::stable_sort(regions.begin(), regions.end(), [&](auto* a, auto* b) { return size(*a) > size(*b); });
-  // One sentence a variable; its neighbouring bins would say the same.
-  std::vector<const Region*> said;
+  // One sentence for each variable; its neighbouring bins would repeat it.
+  std::vector<const Region*> printed;
   for (const Region* r : regions) {
-    if (said.size() == kRegionsInWords) break;
-    if (std::any_of(said.begin(), said.end(),
+    if (printed.size() == kRegionsInWords) break;
+    if (std::any_of(printed.begin(), printed.end(),
                     [&](const Region* s) { return s->signal == r->signal && s->variable == r->variable; }))
       continue;
-    said.push_back(r);
+    printed.push_back(r);
   }
-  if (!said.empty()) text += "\nWhere the error is largest:\n";
-  for (const Region* r : said)
+  if (!printed.empty()) text += "\nWhere the error is largest:\n";
+  for (const Region* r : printed)
     if (const SignalResult* overall = comparison.find_overall(r->signal)) text += "  " + words(*r, *overall);
-  if (!comparison.beside.empty()) text += beside_table(comparison.beside);
+  if (!comparison.baselines.empty()) text += baseline_table(comparison.baselines);
   for (const std::string& warning : comparison.warnings) text += fmt::format("warning: {}\n", warning);
   return text;
 }

@@ -8,7 +8,7 @@
 
 namespace flexspline::comparison {
 
-std::vector<FreeRunSignal> free_run_signals(const estimation::Prepared& prepared, std::size_t record_at,
+std::vector<FreeRunSignal> free_run_signals(const estimation::PreparedData& prepared, std::size_t record_at,
                                             simulation::FreeRun run) {
   using data::Column;
   const estimation::Record& record = prepared.records[record_at];

@@ -1,4 +1,4 @@
-// A free run beside the measurement, signal by signal.
+// A free run and the measurement, signal by signal.
 #pragma once
 
 #include <string>
@@ -18,7 +18,7 @@ struct FreeRunSignal {
 // The signals that both the record and `run` have, in the order above. The measured velocity is filtered; the model's
 // likewise, or reversals would differ for that alone. A locked output has no position to compare. Empty where nothing
 // was simulated.
-std::vector<FreeRunSignal> free_run_signals(const estimation::Prepared& prepared, std::size_t record,
+std::vector<FreeRunSignal> free_run_signals(const estimation::PreparedData& prepared, std::size_t record,
                                             simulation::FreeRun run);
 
 }  // namespace flexspline::comparison

@@ -6,9 +6,9 @@
 
 namespace flexspline::comparison {
 
-std::optional<FullRate> full_rate(const estimation::Prepared& prepared, const estimation::Record& record,
+std::optional<FullRate> full_rate(const estimation::PreparedData& prepared, const estimation::Record& record,
                                   estimation::Balance balance, const estimation::Terms& terms) {
-  estimation::Prepared all;
+  estimation::PreparedData all;
   all.pipeline = prepared.pipeline;
   all.records = {record};
   all.constants = prepared.constants;

@@ -10,13 +10,13 @@
 namespace flexspline::comparison {
 
 struct FullRate {
-  std::vector<double> target;       // N m, filtered; nought outside the segments
+  std::vector<double> target;       // N m, filtered; zero outside the segments
   std::vector<double> residual;     // target minus model
-  std::vector<std::uint8_t> valid;  // within the stretches that the record's rows are taken from
+  std::vector<std::uint8_t> valid;  // within the segments that the record's rows are taken from
 };
 
 // Nothing where the record lacks what the balance needs. `record` need not be one of `prepared`, which gives the rest.
-std::optional<FullRate> full_rate(const estimation::Prepared& prepared, const estimation::Record& record,
+std::optional<FullRate> full_rate(const estimation::PreparedData& prepared, const estimation::Record& record,
                                   estimation::Balance balance, const estimation::Terms& terms);
 
 }  // namespace flexspline::comparison

@@ -17,17 +17,17 @@ namespace {
 using data::Column;
 using data::Experiment;
 using estimation::BalanceData;
-using estimation::Prepared;
+using estimation::PreparedData;
 using estimation::Record;
 using estimation::Terms;
 
-// A motion counts as repeated, sample by sample, where the motor is back within this angle (a ripple of order ten then
+// A motion counts as repeated at a sample where the motor returns to within this angle (a ripple of order ten then
 // cancels to a half) and within this share of the motion's RMS in position and in velocity.
 constexpr double kSameAngleRad = 0.05;
 constexpr double kSamePosition = 0.01;
 constexpr double kSamePositionUnknownPitch = 0.005;
 constexpr double kSameVelocity = 0.02;
-// The search for the period may end up generous: what did not repeat is left out afterwards.
+// The limits of the search for the period are wide: samples that did not repeat are left out afterwards.
 constexpr double kRepetition = 0.02;
 constexpr double kLooseRepetition = 0.25;
 // Pairs wanted, as a share of the record's usable samples and as a number of rows.
@@ -35,13 +35,13 @@ constexpr double kWantedShare = 0.3;
 constexpr std::size_t kWantedRows = 50;
 constexpr int kRealisations = 2;
 
-// How far two instants may differ and still be the same point of the same motion.
+// Largest difference of two instants that count as the same point of the same motion.
 struct SameMotion {
   double position = 0.0;
   double velocity = 0.0;
 };
 
-SameMotion same_motion(const Record& record, const Prepared& prepared, bool turns_known) {
+SameMotion same_motion(const Record& record, const PreparedData& prepared, bool turns_known) {
   double mean = 0.0, position = 0.0, velocity = 0.0;
   const auto n = static_cast<double>(record.inputs.size());
   const estimation::RecordSignals& in = record.inputs;
@@ -53,7 +53,7 @@ SameMotion same_motion(const Record& record, const Prepared& prepared, bool turn
   SameMotion same;
   same.position = (turns_known ? kSamePosition : kSamePositionUnknownPitch) * std::sqrt(position);
   if (turns_known) same.position = std::min(same.position, kSameAngleRad / prepared.constants.turn_angle_scale);
-  // Resolution and noise of the encoder do not make a motion another one.
+  // Differences within the resolution and noise of the encoder do not count.
   same.position += 2.0 * record.motor_quantum.value_or(0.0);
   same.velocity =
       kSameVelocity * std::sqrt(velocity) + 4.0 * record.velocity_noise[estimation::index(estimation::Balance::motor)];
@@ -68,7 +68,7 @@ double at(const std::vector<double>& x, std::size_t k, double fraction) {
          x[k + 1] * (-(f + 1.0) * f * (f - 2.0) / 2.0) + x[k + 2] * ((f + 1.0) * f * (f - 1.0) / 6.0);
 }
 
-// Half the mean square of differences between instants of equal phase: of independent noise, its variance. Successive
+// Half the mean square of differences between instants of equal phase: the variance of independent noise. Successive
 // periods are compared, not each with the mean of all, so that a slow drift (warming up) does not count as noise.
 struct Pairs {
   double sum = 0.0;
@@ -103,7 +103,7 @@ struct Pairs {
   }
 };
 
-// Period of the motion in samples. Set points repeat exactly, so they are asked first; the start of a record is left
+// Period of the motion in samples. Set points repeat exactly, so they are used first; the start of a record is left
 // out where it takes that, as motions are faded in.
 std::optional<double> period_of(const Experiment& e) {
   const auto& longest = *std::max_element(e.segments.begin(), e.segments.end(), [](const auto& a, const auto& b) {
@@ -139,8 +139,8 @@ bool are_replicates(const Experiment& a, const Experiment& b) {
   return power > 0.0 && difference < 1e-6 * power;
 }
 
-// What the resolution of an encoder adds to a smooth motion: rounding with the steps at a random place. In slow motion
-// that is not white, and most of it passes the filters.
+// Quantisation noise of an encoder on a smooth motion, with the steps at a random place. In slow motion it is not
+// white, and most of it passes the filters.
 void add_quantisation(std::vector<double>& position, const std::vector<double>& smooth, double quantum, double offset) {
   for (std::size_t k = 0; k < position.size(); ++k) {
     const double x = smooth[k] + offset;
@@ -163,14 +163,14 @@ Experiment with_noise(const Record& record, std::uint64_t seed) {
     const std::optional<double> quantum = motor ? record.motor_quantum : output ? record.output_quantum : std::nullopt;
     double std = e.noise_std[c].value_or(0.0);
     if (quantum) {
-      // What is stated holds the rounding already.
+      // The stated noise includes the rounding already.
       std = std::sqrt(std::max(0.0, std * std - *quantum * *quantum / 12.0));
       std::vector<double> smooth(e.size());
       for (std::size_t k = 0; k < smooth.size(); ++k)
         smooth[k] = motor ? record.inputs.angle_at(k) : record.inputs.output_angle_at(k);
       const double share = std::uniform_real_distribution<double>(0.0, 1.0)(generator);
       if (motor || !record.locked) add_quantisation(e[column], smooth, *quantum, share * *quantum);
-      // A share of the stated figure that rounding leaves over by rounding of its digits is no noise.
+      // A remainder within the rounding of the stated digits is not noise.
       if (std < 0.1 * *quantum) std = 0.0;
     }
     gaussian(e[column], std);
@@ -237,7 +237,7 @@ class Floors {
     for (const Experiment* other : experiments_) {
       if (other == record.experiment || other->name == record.name || !are_replicates(*record.experiment, *other))
         continue;
-      Prepared theirs = estimation::prepare_with({other}, drive_, prepared_.pipeline);
+      PreparedData theirs = estimation::prepare_with({other}, drive_, prepared_.pipeline);
       theirs.torque_measured = prepared_.torque_measured;
       theirs.constants = prepared_.constants;
       const auto a = full_rate(prepared_, record, data_.balance(), terms_);
@@ -247,12 +247,13 @@ class Floors {
     return pairs.rmse(record.decimation);
   }
 
-  // The record carries its noise already; as much again shows, as the difference, what it does to the residual.
+  // The record contains its noise already. Adding the same amount again and taking the difference shows its effect on
+  // the residual.
   std::optional<double> by_propagation(const Record& record, const Eigen::VectorXd& residual) const {
     double sum = 0.0;
     for (int realisation = 0; realisation < kRealisations; ++realisation) {
       const Experiment noisy = with_noise(record, static_cast<std::uint64_t>(realisation) + 1);
-      Prepared again = estimation::prepare_with({&noisy}, drive_, prepared_.pipeline);
+      PreparedData again = estimation::prepare_with({&noisy}, drive_, prepared_.pipeline);
       again.torque_measured = prepared_.torque_measured;
       again.constants = prepared_.constants;
       again.records[0].at_rest = record.at_rest;
@@ -268,7 +269,7 @@ class Floors {
   const Terms& terms_;
   const std::vector<const Experiment*>& experiments_;
   const model::Drive& drive_;
-  const Prepared& prepared_;
+  const PreparedData& prepared_;
   bool turns_known_ = false;
 };
 
@@ -281,7 +282,7 @@ std::vector<NoiseFloor> noise_floors(BalanceData& data, const Terms& terms,
 
 NoiseFloor pooled(const std::vector<NoiseFloor>& floors, const std::vector<estimation::RowRange>& records) {
   if (floors.size() != records.size()) throw std::invalid_argument("one noise floor a record is needed");
-  // Worst source first; the pooled floor is as good as its worst part.
+  // Worst source first: the pooled floor is named after its worst part.
   constexpr std::array<const char*, 4> kSources{"stated", "propagated", "replicates", "periods"};
   double sum = 0.0, rows = 0.0;
   std::size_t worst = kSources.size();

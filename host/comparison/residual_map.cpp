@@ -11,7 +11,7 @@
 #include <limits>
 #include <optional>
 
-#include "host/comparison/row_variables.hpp"
+#include "host/comparison/sample_variables.hpp"
 #include "host/estimation/in_parallel.hpp"
 #include "host/estimation/least_squares.hpp"
 
@@ -27,24 +27,26 @@ constexpr double kWholeWaves = 2.0;
 constexpr std::size_t kMostMapBins = 24;
 constexpr std::size_t kRowsPerMapBin = 16;
 
-// A map or wave: what it predicts in each row (nought where it has no say), with so many free numbers beside the mean.
+// A map or wave: what it predicts in each row (zero where it predicts nothing), and its number of parameters in
+// addition to the mean.
 struct Explained {
   Eigen::VectorXd prediction;
-  std::vector<RowRange> records;  // in which it has a say
+  std::vector<RowRange> records;  // in which it predicts something
   double parameters = 0.0;
-  double rows = 0.0;       // in which it has a say
-  double explained = 0.0;  // sum of squares, of the rows in which it has a say
+  double rows = 0.0;       // in which it predicts something
+  double explained = 0.0;  // sum of squares, of the rows in which it predicts something
   double total = 0.0;      // likewise, about the mean
   double all = 0.0;        // of all rows, about the mean
 };
 
-// Adjusted share of the whole residual's variance, where it is significant. Neighbouring rows count as independent as
-// what is left is, not as the residual itself is, which holds the structure that is looked for.
+// Adjusted share of the whole residual's variance, where it is significant. The number of independent rows follows from
+// the autocorrelation of what the map leaves, not of the residual itself, which contains the structure.
 std::optional<double> significant_share(const Eigen::VectorXd& residual, const Explained& e, double longest_tau,
                                         double level) {
   if (!(e.total > 0.0) || e.parameters < 1.0) return std::nullopt;
   const double r2 = std::clamp(e.explained / e.total, 0.0, 1.0 - 1e-12);
-  // What explains less than this at one degree of freedom a number is nothing under any autocorrelation.
+  // A map that explains less than this with one degree of freedom for each number is not significant under any
+  // autocorrelation.
   if (r2 * e.rows < e.parameters) return std::nullopt;
   const double tau = std::clamp(estimation::autocorrelation_time(e.records, residual - e.prediction), 1.0, longest_tau);
   const double independent = e.rows / tau, freedom = independent - 1.0 - e.parameters;
@@ -113,9 +115,9 @@ Bins direction_bins(const Eigen::VectorXd& directions) {
   return bins;
 }
 
-// A wave of the motor's turn, as it comes through the filter of the rows: at speed, high orders do not. The zero of an
-// angle that is not absolute differs from record to record, so each record has a phase of its own then. Records that do
-// not see some whole waves stand aside: a part of one looks like anything that is smooth.
+// A wave of the motor's turn after the filter of the rows, which removes high orders at speed. The zero of an angle
+// that is not absolute differs from record to record, so each record has a phase of its own then. Records with less
+// than a few whole waves are left out: a part of a wave resembles any smooth curve.
 Explained wave_of(const BalanceData& data, const Eigen::VectorXd& residual, int order) {
   const auto& prepared = data.prepared();
   const auto balance = estimation::index(data.balance());
@@ -181,8 +183,8 @@ std::vector<Share> localise(const BalanceData& data, const Eigen::VectorXd& resi
   const double tau = std::max(1.0, autocorrelation_time);
   const auto wanted =
       std::clamp<std::size_t>(static_cast<std::size_t>(residual.size()) / kRowsPerMapBin, 4, kMostMapBins);
-  const Eigen::VectorXd directions = row_directions(data);
-  // One question each; asked on all cores, answered in this order.
+  const Eigen::VectorXd directions = sample_directions(data);
+  // One test each; on all cores, with results in this order.
   std::vector<std::function<std::vector<Share>()>> questions;
   const auto share_of = [&](std::vector<Share>& shares, std::string name, const Explained& explained, double level) {
     if (const auto share = significant_share(residual, explained, tau, level))
@@ -194,8 +196,8 @@ std::vector<Share> localise(const BalanceData& data, const Eigen::VectorXd& resi
     share_of(shares, name + " x direction", map_of(data, bins, residual, &directions), kSignificant);
     return shares;
   };
-  const std::vector<RowVariable> variables = row_variables(data, axis);
-  for (const RowVariable& variable : variables)
+  const std::vector<SampleVariable> variables = sample_variables(data, axis);
+  for (const SampleVariable& variable : variables)
     questions.emplace_back([&] { return maps_of(variable.name, equal_count_bins(variable.values, wanted)); });
   questions.emplace_back([&] {
     std::vector<Share> shares;
@@ -203,7 +205,7 @@ std::vector<Share> localise(const BalanceData& data, const Eigen::VectorXd& resi
     return shares;
   });
   if (data.records().size() > 1) questions.emplace_back([&] { return maps_of("record", record_bins(data)); });
-  // The turn of a linear axis is known by its pitch alone.
+  // A linear axis has a turn only where its pitch is known.
   const bool turns = axis == data::Axis::rotary || data.prepared().constants.turn_angle_scale != 1.0;
   for (int order = 1; turns && order <= kOrders; ++order)
     questions.emplace_back([&, order] {

@@ -10,14 +10,14 @@
 namespace flexspline::comparison {
 
 struct Share {
-  // A variable of row_variables, "direction", or "record", for maps of the residual; with " x direction" behind it for
-  // maps of the residual times the direction of motion (what resists motion shows there); "motor_angle order 7" for one
-  // order of the motor's turn.
+  // A variable of sample_variables, "direction", or "record", for maps of the residual; with " x direction" behind it
+  // for maps of the residual times the direction of motion (what resists motion shows there); "motor_angle order 7" for
+  // one order of the motor's turn.
   std::string variable;
   double share_percent = 0.0;  // of the residual's variance, less what bins or waves explain of pure noise
 };
 
-// Largest share first; only those that an F test at 1e-3 (of each kind of map) tells from noise, where rows are
+// Largest share first; only those that an F test at 1e-3 (of each kind of map) separates from noise, where rows are
 // counted as independent after the autocorrelation time of what the map leaves, at most `autocorrelation_time`. Shares
 // overlap, so they need not add up to less than 100 %.
 std::vector<Share> localise(const estimation::BalanceData& data, const Eigen::VectorXd& residual,

@@ -73,7 +73,7 @@ double worst_case_gain(const std::vector<double>& measured, const std::vector<do
   const std::vector<double> signal = signals::power_density(part(measured), sample_hz, window);
   const std::vector<double> wrong = signals::power_density(part(error), sample_hz, window);
   const double line_hz = sample_hz / static_cast<double>(window);
-  // The first line holds what is left of the mean.
+  // The first line contains the rest of the mean.
   const auto last = std::min(signal.size(), static_cast<std::size_t>(std::max(0.0, up_to_hz / line_hz)) + 1);
   double strongest = 0.0, largest = 0.0;
   for (std::size_t k = 1; k < last; ++k) strongest = std::max(strongest, signal[k]);

@@ -9,7 +9,7 @@
 
 namespace flexspline::comparison {
 
-// What a figure is that has no meaning, or that nobody has worked out.
+// Value of a figure that is undefined or not computed.
 inline constexpr double kUnknown = std::numeric_limits<double>::quiet_NaN();
 
 // Sums over samples of a measured signal y and its error e = y - yhat. Figures are NaN where they have no meaning: no
@@ -29,7 +29,7 @@ class Score {
  private:
   double variance() const;
 
-  // Means and sums of squares about them, updated as samples come (Chan, Golub, LeVeque 1979): positions may stand far
+  // Means and sums of squares about them, updated as samples come (Chan, Golub, LeVeque 1979): positions may be far
   // from zero.
   std::size_t samples_ = 0;
   double mean_ = 0.0, spread_ = 0.0;

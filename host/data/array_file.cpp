@@ -13,7 +13,7 @@
 namespace flexspline::data {
 namespace {
 
-// A matrix with more signals than this is no record of a drive; its names would bury all others.
+// A matrix with more signals than this is not a record of a drive; its names would hide all others.
 constexpr std::size_t kMostSignals = 256;
 
 void refuse_what_holds_no_arrays(const std::filesystem::path& path, FileFormat format, Findings& findings) {
@@ -57,7 +57,7 @@ ArrayFile::ArrayFile(const std::filesystem::path& path, FileFormat format, Findi
 }
 
 // Recorders such as ControlDesk's put each signal into an element of a struct array, "run.Y(3)", with its values in
-// Data and its name and unit as texts beside them, and the time into "run.X".
+// Data, with name and unit as separate texts, and the time into "run.X".
 void ArrayFile::name_by_labels() {
   std::map<std::string, std::string> texts;
   for (const NamedText& text : contents_.texts) texts.emplace(text.name, text.text);
@@ -134,8 +134,8 @@ std::string ArrayFile::why_not(std::string_view name) const {
 
 Table ArrayFile::read(std::span<const std::size_t> wanted) const {
   Table table;
-  for (std::size_t slot = 0; slot < wanted.size(); ++slot) {
-    const View& view = views_[wanted[slot]];
+  for (std::size_t column_index = 0; column_index < wanted.size(); ++column_index) {
+    const View& view = views_[wanted[column_index]];
     const std::vector<double>& values = contents_.arrays[view.array].values;
     std::vector<double>& column = table.columns.emplace_back(view.count);
     for (std::size_t row = 0; row < view.count; ++row) {
@@ -144,7 +144,7 @@ Table ArrayFile::read(std::span<const std::size_t> wanted) const {
       if (std::isfinite(value)) continue;
       column[row] = std::numeric_limits<double>::quiet_NaN();
       const char* text = std::isnan(value) ? "NaN" : value > 0.0 ? "Inf" : "-Inf";
-      table.bad_cells.push_back({row, slot, BadCell::Kind::not_finite, text});
+      table.bad_cells.push_back({row, column_index, BadCell::Kind::not_finite, text});
     }
   }
   std::stable_sort(table.bad_cells.begin(), table.bad_cells.end(),

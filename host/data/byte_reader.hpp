@@ -8,7 +8,7 @@
 
 namespace flexspline::data {
 
-// The file says something that its bytes do not hold.
+// The file states something that its bytes do not contain.
 class DamagedFile : public std::runtime_error {
  public:
   DamagedFile() : std::runtime_error("is damaged or cut short") {}

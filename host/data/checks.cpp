@@ -16,7 +16,7 @@ constexpr std::size_t kClippedRun = 10;  // samples in a row
 struct Runs {
   std::vector<Segment> at_extremes;
   std::size_t extreme_samples = 0;
-  std::size_t inner_samples = 0;  // in equally long runs elsewhere
+  std::size_t inner_samples = 0;  // in equally long runs outside of the limits
 };
 
 Runs runs_of(const std::vector<double>& signal, const Experiment& experiment) {
@@ -100,7 +100,7 @@ void warn_of_unit(const Experiment& experiment, std::string_view column, const s
 void check_clipping(Experiment& experiment, Findings& findings) {
   for (const Column column : {Column::current, Column::motor_torque, Column::torque}) {
     if (!experiment.has(column)) continue;
-    // A command that the drive holds stands at a level because it was told to.
+    // A command is held at a level on purpose.
     if (column != Column::torque && experiment.is_held_command()) continue;
     const std::vector<double>& signal = experiment[column];
     const Runs runs = runs_of(signal, experiment);
@@ -113,7 +113,7 @@ void check_clipping(Experiment& experiment, Findings& findings) {
     const Segment& first = runs.at_extremes.front();
     findings.add(
         Severity::warning, "clipping", experiment.file.string(), 0, std::string(column_name(column)),
-        fmt::format("in \"{}\" it stands at exactly {:.6g} for {} samples from {:.6g} s on, {} samples ({:.2g} %) in "
+        fmt::format("in \"{}\" it is at exactly {:.6g} for {} samples from {:.6g} s on, {} samples ({:.2g} %) in "
                     "{} such places; those samples are masked",
                     experiment.name, signal[first.first], first.last - first.first, experiment.time_s[first.first],
                     runs.extreme_samples,

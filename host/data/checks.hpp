@@ -1,4 +1,4 @@
-// What can be wrong with measurements that were read well. Each check adds findings and masks; none changes a value.
+// Checks of measurements that were read without errors. Each check adds findings and masks; none changes a value.
 #pragma once
 
 #include <span>
@@ -28,7 +28,7 @@ void check_velocity_lag(const Experiment& experiment, Findings& findings);
 void check_effort_sign(const Experiment& experiment, Findings& findings);
 // Output against motor position and gear ratio: "gear_ratio".
 void check_gear_ratio(const Experiment& experiment, const DriveFacts& drive, Findings& findings);
-// Long stretches without motion: "standstill", and masked unless the load is locked or all of it is at rest.
+// Long intervals without motion: "standstill", and masked unless the load is locked or all of it is at rest.
 void check_standstill(Experiment& experiment, Findings& findings);
 // "constant_column".
 void check_constant_columns(const Experiment& experiment, Findings& findings);

@@ -39,7 +39,7 @@ class Planner {
     list_unused();
     if (has_time_ && plan_.columns.empty())
       findings_.add(Severity::error, "missing_column", file_, recording_.header_line(), "",
-                    fmt::format("beside time, none of the columns is known; not used: {}", quoted_list(plan_.unused)),
+                    fmt::format("no column other than time is known; not used: {}", quoted_list(plan_.unused)),
                     "map them in dataset.toml: [columns.current_a] with source = \"NAME IN THE FILE\" and unit");
     if (!has_time_ || plan_.columns.empty()) return std::nullopt;
     return std::move(plan_);
@@ -52,15 +52,15 @@ class Planner {
     return at == toml_->columns.end() ? nullptr : &at->second;
   }
 
-  // Slot of the column of theirs with this name.
-  std::optional<std::size_t> slot(std::string_view wanted) {
+  // Index of the file's column with this name.
+  std::optional<std::size_t> column_index(std::string_view wanted) {
     const std::vector<std::string>& names = recording_.names();
     const std::string theirs = element_ ? name_of_element(names, wanted, *element_) : std::string(wanted);
     const auto at = std::find(names.begin(), names.end(), theirs);
     if (at == names.end()) return std::nullopt;
     if (std::find(at + 1, names.end(), theirs) != names.end())
       findings_.add(Severity::error, "header", file_, recording_.header_line(), theirs,
-                    "this name stands twice in the header", "rename one of the two");
+                    "this name is in the header twice", "rename one of the two");
     const std::size_t index = static_cast<std::size_t>(at - names.begin());
     const auto known = std::find(plan_.wanted.begin(), plan_.wanted.end(), index);
     if (known != plan_.wanted.end()) return static_cast<std::size_t>(known - plan_.wanted.begin());
@@ -73,13 +73,13 @@ class Planner {
     return quoted_list(text::nearest_first(name, recording_.names()));
   }
 
-  // A unit that stands in the file holds where nobody says otherwise.
-  void take_unit_of_file(std::size_t slot, ColumnMapping& mapping) const {
+  // A unit in the file is used unless the user gives another one.
+  void take_unit_of_file(std::size_t column_index, ColumnMapping& mapping) const {
     if (mapping.unit.empty() && mapping.scale == 1.0 && mapping.offset == 0.0)
-      mapping.unit = recording_.unit(plan_.wanted[slot]);
+      mapping.unit = recording_.unit(plan_.wanted[column_index]);
   }
 
-  // Something of this name is there, but no column can be made of it.
+  // There is an entry of this name, but it cannot be a column.
   bool is_no_column(const std::string& theirs, const std::string& ours) {
     const std::string why = recording_.why_not(theirs);
     if (why.empty()) return false;
@@ -89,14 +89,14 @@ class Planner {
     return true;
   }
 
-  bool has_length_of_time(std::size_t slot, const std::string& ours) {
+  bool has_length_of_time(std::size_t column_index, const std::string& ours) {
     if (!has_time_) return true;
-    const std::size_t length = recording_.length(plan_.wanted[slot]);
-    const std::size_t time = recording_.length(plan_.wanted[plan_.time_slot]);
+    const std::size_t length = recording_.length(plan_.wanted[column_index]);
+    const std::size_t time = recording_.length(plan_.wanted[plan_.time_column]);
     if (length == time) return true;
     findings_.add(Severity::error, "mapping", file_, 0, ours,
-                  fmt::format("\"{}\" has {} values, but the time \"{}\" has {}", plan_.wanted_names[slot], length,
-                              plan_.time.source, time),
+                  fmt::format("\"{}\" has {} values, but the time \"{}\" has {}", plan_.wanted_names[column_index],
+                              length, plan_.time.source, time),
                   "map the time that belongs to it, or bring all to one time in MATLAB: interp1(t, x, time_s)");
     plan_.wanted.pop_back();  // it is new there: what was wanted before has the length of time
     plan_.wanted_names.pop_back();
@@ -106,7 +106,7 @@ class Planner {
   bool find_time() {
     plan_.time.source = "time_s";
     if (const ColumnMapping* mapping = mapping_of("time_s")) plan_.time = *mapping;
-    const std::optional<std::size_t> found = slot(plan_.time.source);
+    const std::optional<std::size_t> found = column_index(plan_.time.source);
     if (!found) {
       if (is_no_column(plan_.time.source, "time_s")) return false;
       findings_.add(Severity::error, "missing_column", file_, recording_.header_line(), "time_s",
@@ -114,7 +114,7 @@ class Planner {
                     "name the column of time time_s, or map it in dataset.toml: [columns.time_s] with source and unit");
       return false;
     }
-    plan_.time_slot = *found;
+    plan_.time_column = *found;
     take_unit_of_file(*found, plan_.time);
     return true;
   }
@@ -127,7 +127,7 @@ class Planner {
     planned.mapped = mapping != nullptr;
     planned.mapping.source = name;
     if (mapping != nullptr) planned.mapping = *mapping;
-    const std::optional<std::size_t> found = slot(planned.mapping.source);
+    const std::optional<std::size_t> found = column_index(planned.mapping.source);
     if (!found) {
       if (is_no_column(planned.mapping.source, name)) return;
       if (mapping != nullptr)
@@ -138,7 +138,7 @@ class Planner {
       return;
     }
     if (!has_length_of_time(*found, name)) return;
-    planned.slot = *found;
+    planned.column_index = *found;
     take_unit_of_file(*found, planned.mapping);
     plan_.columns.push_back(planned);
   }

@@ -15,7 +15,7 @@ namespace flexspline::data {
 
 struct PlannedColumn {
   Column column = Column::current;
-  std::size_t slot = 0;  // into ColumnPlan::wanted
+  std::size_t column_index = 0;  // into ColumnPlan::wanted
   ColumnMapping mapping;
   bool mapped = false;  // by dataset.toml, not by its name
 };
@@ -23,7 +23,7 @@ struct PlannedColumn {
 struct ColumnPlan {
   std::vector<std::size_t> wanted;  // indices into Recording::names()
   std::vector<std::string> wanted_names;
-  std::size_t time_slot = 0;
+  std::size_t time_column = 0;
   ColumnMapping time;
   std::string mapping_file;  // dataset.toml, if one maps
   std::vector<PlannedColumn> columns;
@@ -31,7 +31,7 @@ struct ColumnPlan {
 };
 
 // Empty if the file has no time or no column of ours; the findings say what to map. `element`: of struct arrays, where
-// "log.iq" stands for "log(2).iq" then.
+// "log.iq" means "log(2).iq" then.
 std::optional<ColumnPlan> plan_columns(const Recording& recording, const std::filesystem::path& path,
                                        const DatasetToml* toml, std::optional<std::size_t> element, Findings& findings);
 

@@ -1,4 +1,4 @@
-// Checks of effort and velocity against the motion: what physics would not let them be.
+// Checks of effort and velocity against the motion by physical laws.
 #include <fmt/format.h>
 
 #include <algorithm>
@@ -24,7 +24,7 @@ std::vector<double> motor_velocity_of(const Experiment& e) {
 }
 
 // From the first sample to the last at which the motor is back where it was then: between these the potential energy of
-// the load, the springs' and, all but, the kinetic one are what they were.
+// load and springs is the same, and the kinetic energy almost.
 Segment round_trip(const std::vector<double>& velocity, const Segment& s) {
   double at = 0.0, low = 0.0, high = 0.0;
   std::vector<double> travelled{0.0};
@@ -34,7 +34,7 @@ Segment round_trip(const std::vector<double>& velocity, const Segment& s) {
     low = std::min(low, at);
     high = std::max(high, at);
   }
-  // It must have been away; a shaft that only goes one way never is back.
+  // It must have moved away; a shaft that moves in one direction only never returns.
   std::size_t last = 0;
   bool was_away = false;
   for (std::size_t k = 1; k < travelled.size(); ++k) {
@@ -49,8 +49,8 @@ struct Fit {
   double explained = 0.0;  // share of the variance
 };
 
-// Of `y` over `x` beside a constant and a drift; all of one length.
-std::optional<Fit> slope_beside_drift(std::vector<double> y, std::vector<double> x) {
+// Slope of `y` over `x`, with a constant and a drift in the fit; all of one length.
+std::optional<Fit> slope_without_drift(std::vector<double> y, std::vector<double> x) {
   const std::size_t n = y.size();
   const auto without_drift = [&](std::vector<double>& values) {
     double mean = 0.0, cross = 0.0, square = 0.0;
@@ -121,7 +121,7 @@ void check_velocity_lag(const Experiment& experiment, Findings& findings) {
       behind.push_back(experiment[position][k] - sum);
       v.push_back(experiment[velocity][k]);
     }
-    const std::optional<Fit> fit = slope_beside_drift(std::move(behind), std::move(v));
+    const std::optional<Fit> fit = slope_without_drift(std::move(behind), std::move(v));
     if (!fit || fit->explained < kExplained ||
         std::abs(fit->slope) < std::max(kLeast_s, kLeastSamples * experiment.sample_s))
       continue;

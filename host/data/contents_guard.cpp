@@ -20,7 +20,7 @@
 #include "host/data/message_logs.hpp"
 #include "host/data/numpy_contents.hpp"
 
-// GCC and Clang say it in different ways.
+// GCC and Clang have different macros for it.
 #if defined(__SANITIZE_ADDRESS__)
 #define FLEXSPLINE_ADDRESS_SANITIZER 1
 #elif defined(__has_feature)
@@ -35,7 +35,7 @@
 namespace flexspline::data {
 namespace {
 
-constexpr char kEndMark = 'E';  // what ends without it was cut short
+constexpr char kEndMark = 'E';  // without it the answer was cut short
 
 class Pipe {
  public:
@@ -86,7 +86,7 @@ class Packer {
   bool good_ = true;
 };
 
-// Reads what a process wrote that may have run wild: every size is checked against what is there.
+// Reads the output of a process that may have failed: every size is checked against the bytes that are there.
 class Unpacker {
  public:
   explicit Unpacker(std::string_view bytes) : bytes_(bytes) {}
@@ -147,7 +147,7 @@ bool pack(const FileContents& contents, int file) {
   return packer.good();
 }
 
-// Whoever takes columns out of an array goes by its dimensions.
+// Columns are taken from an array by its dimensions.
 bool fits(const NamedArray& array) {
   std::size_t left = array.values.size();
   for (const std::size_t d : array.dims) {
@@ -188,7 +188,7 @@ void limit_resources(std::uintmax_t file_bytes) {
   ::setrlimit(RLIMIT_CPU, &time);
   rlimit no_core{0, 0};
   ::setrlimit(RLIMIT_CORE, &no_core);
-#if !FLEXSPLINE_ADDRESS_SANITIZER  // which takes terabytes of addresses for itself
+#if !FLEXSPLINE_ADDRESS_SANITIZER  // which reserves terabytes of addresses
   // deflate makes at most 1032 bytes of one, but signals with any noise are not packed 20 to 1; and as double each byte
   // becomes eight.
   const rlim_t bytes = (rlim_t{4} << 30) + 160 * static_cast<rlim_t>(file_bytes);
@@ -242,7 +242,7 @@ FileContents read_unguarded(const std::filesystem::path& path, FileFormat format
 }
 
 [[noreturn]] void be_the_child(const std::filesystem::path& path, FileFormat format, int file) {
-  // Libraries that stumble over damage say so; the parent says it better.
+  // Libraries print messages about damage; the parent's message is better.
   const int nowhere = ::open("/dev/null", O_WRONLY | O_CLOEXEC);
   if (nowhere >= 0) ::dup2(nowhere, STDERR_FILENO);
   int code = 1;
@@ -252,7 +252,7 @@ FileContents read_unguarded(const std::filesystem::path& path, FileFormat format
     if (error) size = 0;
     limit_resources(size);
     code = pack(read_unguarded(path, format, size), file) ? 0 : 1;
-  } catch (...) {  // out of memory: the code says enough
+  } catch (...) {  // out of memory: the exit code is enough
   }
   ::_exit(code);
 }

@@ -25,7 +25,7 @@ class Stamps {
  public:
   double seconds(std::int64_t stamp_ns) {
     if (!first_ns_) first_ns_ = stamp_ns;
-    // A time of day begins anew at midnight.
+    // A time of day starts again from zero at midnight.
     if (stamp_ns < kDay_ns && before_ns_ - stamp_ns > kDay_ns / 2) ++days_;
     before_ns_ = stamp_ns;
     return 1e-9 * static_cast<double>(stamp_ns - *first_ns_ + days_ * kDay_ns);
@@ -51,7 +51,7 @@ CsvFile::CsvFile(const std::filesystem::path& path, Findings& findings) : text_(
   };
   if (header_.skipped > 0)
     note("header", header_.line,
-         fmt::format("the names of the columns stand here; {} lines before are not read", header_.skipped));
+         fmt::format("the names of the columns are in this line; {} lines before are not read", header_.skipped));
   if (header_.units_line > 0)
     note("unit", header_.units_line, "this line holds the units of the columns; they are used");
   if (header_.latin1) note("header", header_.line, "the names are not UTF-8; they were read as Latin-1");
@@ -63,8 +63,8 @@ std::string CsvFile::unit(std::size_t name) const {
 
 Table CsvFile::read(std::span<const std::size_t> wanted) const {
   constexpr std::size_t kUnwanted = std::numeric_limits<std::size_t>::max();
-  std::vector<std::size_t> slots(header_.names.size(), kUnwanted);
-  for (std::size_t i = 0; i < wanted.size(); ++i) slots[wanted[i]] = i;
+  std::vector<std::size_t> column_indices(header_.names.size(), kUnwanted);
+  for (std::size_t i = 0; i < wanted.size(); ++i) column_indices[wanted[i]] = i;
 
   const char separator = header_.separator;
   Stamps stamps;
@@ -91,7 +91,7 @@ Table CsvFile::read(std::span<const std::size_t> wanted) const {
       while (line_stop > at && is_blank(line_stop[-1])) --line_stop;
     const char* first = at;
     while (first < line_stop && is_blank(*first)) ++first;
-    // A line of nothing but semicolons or commas is what spreadsheets append.
+    // Spreadsheets append lines of semicolons or commas only.
     if (first == line_stop || *first == '#' ||
         std::all_of(first, line_stop, [&](char c) { return c == separator || is_blank(c); })) {
       at = next;
@@ -109,11 +109,11 @@ Table CsvFile::read(std::span<const std::size_t> wanted) const {
     bool more = true;
     bool surplus = false;
     while (more) {
-      const std::size_t slot = fields < slots.size() ? slots[fields] : kUnwanted;
+      const std::size_t column_index = fields < column_indices.size() ? column_indices[fields] : kUnwanted;
       if (separator == ' ')
         while (at < line_stop && is_blank(*at)) ++at;
       const char* stop = nullptr;
-      if (slot != kUnwanted) {
+      if (column_index != kUnwanted) {
         double value = 0.0;
         const char* begin = at;
         while (begin < line_stop && *begin == ' ') ++begin;
@@ -124,24 +124,25 @@ Table CsvFile::read(std::span<const std::size_t> wanted) const {
           parsed = error == std::errc{} && ends_field(general) && std::isfinite(value) ? general : nullptr;
         }
         if (parsed != nullptr) {
-          table.columns[slot][row] = value;
+          table.columns[column_index][row] = value;
           stop = parsed;
         }
       }
       if (stop == nullptr) {
         stop = field_end(at, line_stop, separator);
         const std::string_view field(at, static_cast<std::size_t>(stop - at));
-        if (slot != kUnwanted) {
+        if (column_index != kUnwanted) {
           const Number number = number_from_field(field, separator);
-          table.columns[slot][row] = number.value;
-          if (number.stamp_ns) table.columns[slot][row] = stamps.seconds(*number.stamp_ns);
+          table.columns[column_index][row] = number.value;
+          if (number.stamp_ns) table.columns[column_index][row] = stamps.seconds(*number.stamp_ns);
           if (number.bad)
-            table.bad_cells.push_back({row, slot, *number.bad, text::shortened(unquoted(field), kLongestField)});
+            table.bad_cells.push_back(
+                {row, column_index, *number.bad, text::shortened(unquoted(field), kLongestField)});
           if (number.decimal_comma && decimal_comma_line == 0) decimal_comma_line = line_number;
         }
-        if (fields >= slots.size() && !trimmed(field).empty()) surplus = true;
+        if (fields >= column_indices.size() && !trimmed(field).empty()) surplus = true;
       }
-      if (separator != ',' && slot != kUnwanted && !decimal_points)
+      if (separator != ',' && column_index != kUnwanted && !decimal_points)
         decimal_points = std::memchr(at, '.', static_cast<std::size_t>(stop - at)) != nullptr;
       ++fields;
       more = stop != line_stop;

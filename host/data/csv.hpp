@@ -16,7 +16,7 @@ namespace flexspline::data {
 // A file in memory with its header understood. Separator: comma, semicolon or tab, whichever the header has most of, or
 // blanks. Decimal point, or decimal comma where the separator is not one. CRLF, LF and CR, a UTF-8 byte order mark,
 // gzip, quoted fields, a line of units and blank lines are understood; a header behind `#`, as NumPy writes it, is
-// taken where no other stands.
+// used where no other is given.
 class CsvFile final : public Recording {
  public:
   // Throws DataError (with what `findings` holds) of kind "file", "format" or "header".

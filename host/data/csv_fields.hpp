@@ -19,7 +19,7 @@ std::string_view trimmed(std::string_view text);
 // Without the quotes around it.
 std::string_view unquoted(std::string_view field);
 
-// Tab, semicolon or comma, whichever stands most often outside quotes; else a blank where blanks part words.
+// Tab, semicolon or comma, whichever occurs most often outside quotes; else a blank where blanks part words.
 char separator_of(std::string_view line);
 // First separator outside quotes at or after `at`, or the end of the line.
 const char* field_end(const char* at, const char* end, char separator);

@@ -67,7 +67,7 @@ class HeaderReader {
   }
 
  private:
-  // Lines that are neither blank nor comments; as many as may stand before the numbers.
+  // Lines that are neither blank nor comments; as many as may come before the numbers.
   std::vector<Row> first_rows() {
     std::vector<Row> rows;
     for (std::size_t number = 1; at_ < text_.size() && rows.size() < kMostLinesBefore; ++number) {
@@ -108,7 +108,8 @@ class HeaderReader {
     return std::nullopt;
   }
 
-  // Names of ours are names, whatever stands under them; others are where numbers or units do.
+  // Column names of the contract are names, whatever is under them; others are names where numbers or units are under
+  // them.
   static bool fits(const Row& names, const Row& under) {
     const bool ours = std::any_of(names.fields.begin(), names.fields.end(), [](std::string_view field) {
       return field == "time_s" || column_from_name(field).has_value();
@@ -120,7 +121,8 @@ class HeaderReader {
            (under.numbers() > 0 || is_units(under, names.fields.size()));
   }
 
-  // The first line, unless lines of a logger's own stand there: then the last line of names before the numbers begin.
+  // The first line, unless the logger wrote lines of its own there: then the last line of names before the numbers
+  // begin.
   static std::size_t row_of_names(const std::vector<Row>& rows) {
     if (rows.size() < 2 || fits(rows[0], rows[1])) return 0;
     for (std::size_t k = 1; k < rows.size(); ++k) {

@@ -1,4 +1,4 @@
-// What stands above the numbers of a CSV file: keys, names, units, and lines of a logger's own.
+// What is above the numbers of a CSV file: keys, names, units, and lines of a logger's own.
 #pragma once
 
 #include <cstddef>
@@ -15,7 +15,7 @@ struct CsvHeader {
   char line_end = '\n';
   char separator = ',';
   std::vector<std::string> names;
-  std::vector<std::string> units;  // as names; empty where no line of units stands under them
+  std::vector<std::string> units;  // as names; empty where no line of units is under them
   std::vector<HeaderKey> keys;
   std::size_t line = 0;        // of the names
   std::size_t units_line = 0;  // 0: none

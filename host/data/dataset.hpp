@@ -59,20 +59,20 @@ struct Experiment {
   Load load = Load::free;
   // Where nothing is stated the effort is taken as a command that is held, which is what most drives log.
   CurrentHold current_hold = CurrentHold::zoh;
-  bool current_hold_stated = false;  // by a key; what is only assumed excuses no clipping
+  bool current_hold_stated = false;  // by a key; an assumed effort is not an excuse for clipping
   std::string replicate_of;          // empty: of none
   double sample_s = 0.0;
   std::vector<double> time_s;
   std::array<std::vector<double>, kColumns> columns;      // empty: not measured
   std::array<std::optional<double>, kColumns> noise_std;  // stated by the user, in the column's unit
   std::vector<Segment> segments;
-  // Samples that must not be judged (clipped, for one), as found by `load`; same length as time_s.
+  // Samples that must not be used (clipped, for one), as found by `load`; same length as time_s.
   std::vector<std::uint8_t> masked;
   std::optional<double> encoder_counts;         // per motor turn (or per metre on a linear axis)
   std::optional<double> output_encoder_counts;  // per output turn
   PositionZero motor_position_zero = PositionZero::none;
   PositionZero output_position_zero = PositionZero::none;
-  std::vector<std::string> unused_columns;  // names in the file that map to none of ours
+  std::vector<std::string> unused_columns;  // names in the file that are not mapped
 
   std::size_t size() const { return time_s.size(); }
   // The effort column is known to be a held command, not only taken for one.
@@ -82,7 +82,7 @@ struct Experiment {
   std::vector<double>& operator[](Column column) { return columns[static_cast<std::size_t>(column)]; }
 };
 
-// What the data set says of the drive; absent where it does not.
+// The drive's facts in the data set; absent where not given.
 struct DriveFacts {
   std::optional<Axis> axis;
   std::optional<double> gear_ratio;
@@ -104,7 +104,7 @@ struct Dataset {
 
 struct LoadOptions {
   std::vector<std::string> tolerate;  // kinds of findings that are warnings then, not errors
-  bool holdout = false;               // every experiment is judged on, none fitted (`--holdout`)
+  bool holdout = false;               // every experiment is used for scoring, none for fitting (`--holdout`)
 };
 
 // Reads any number of files, folders and dataset.tomls. A folder with a dataset.toml is read by that file, one

@@ -61,7 +61,7 @@ class Reader {
   void check_format(const Node& root) {
     const Node* node = root.find("format");
     if (node == nullptr) {
-      findings_.add(Severity::warning, "unknown_key", file(), 1, "", "the file does not say its format",
+      findings_.add(Severity::warning, "unknown_key", file(), 1, "", "the file does not state its format",
                     fmt::format("write format = \"{}\" as its first line", kFormat));
       return;
     }
@@ -71,7 +71,7 @@ class Reader {
                    fmt::format("the format is \"{}\", this tool reads \"{}\"", format, kFormat),
                    format.starts_with("flexspline-model/") ? "this is a model: give it as --model"
                    : format.starts_with("flexspline-dataset/")
-                       ? "use a tool that knows this format, or write it anew with `flexspline new`"
+                       ? "use a tool that knows this format, or write it again with `flexspline new`"
                        : "give a data set");
   }
 

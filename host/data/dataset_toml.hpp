@@ -35,7 +35,7 @@ struct DatasetToml {
   KeyMap drive;                                  // [drive]: keys of the drive
   KeyMap defaults;                               // [drive]: keys of experiments that hold for all of them
   std::map<std::string, ColumnMapping> columns;  // by our name, "time_s" included
-  std::vector<ExperimentEntry> experiments;      // empty: all recordings beside it
+  std::vector<ExperimentEntry> experiments;      // empty: all recordings in its folder
 };
 
 // Throws DataError (with what `findings` holds) if it cannot be read or parsed or is of another format. Unknown keys

@@ -19,7 +19,7 @@ struct NamedText {
   std::string text;
 };
 
-struct NotAColumn {  // no column can be made of it
+struct NotAColumn {  // it cannot be a column
   std::string name;
   std::string why;  // "is complex": continues a sentence that begins with the name
 };

@@ -83,7 +83,7 @@ FileFormat format_of(const std::filesystem::path& path) {
   return mat == MatVersion::v4 && lower_extension(path) == ".mat" ? FileFormat::mat4 : FileFormat::text;
 }
 
-WayOut way_out(const std::filesystem::path& path) {
+FormatAdvice way_out(const std::filesystem::path& path) {
   const std::string head = first_bytes(path, 128);
   if (is_office(head)) return {"this is a workbook of an office program, which is not read", "save its sheet as CSV"};
   const Foreign* foreign = foreign_of(head);

@@ -24,11 +24,11 @@ enum class FileFormat : std::uint8_t {
 
 FileFormat format_of(const std::filesystem::path& path);
 
-// Of a file of a format that is known but not read: what it is, and the line to run that makes one of it that is.
-struct WayOut {
+// For a file of a format that is known but not read: its format, and the command that converts it.
+struct FormatAdvice {
   std::string what;
   std::string remedy;
 };
-WayOut way_out(const std::filesystem::path& path);
+FormatAdvice way_out(const std::filesystem::path& path);
 
 }  // namespace flexspline::data

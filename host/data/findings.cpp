@@ -98,7 +98,7 @@ Severity Findings::add(Finding finding) {
         std::find_if(kKinds.begin(), kKinds.end(), [&](const KindInfo& k) { return k.name == finding.kind; });
     if (kind != kKinds.end() && kind->tolerable) finding.severity = Severity::warning;
   }
-  // Parts of one file share its header and mapping: what is wrong there is said once.
+  // Parts of one file share its header and mapping: what is wrong there is reported once.
   const bool known = std::any_of(list_.begin(), list_.end(), [&](const Finding& f) {
     return f.kind == finding.kind && f.line == finding.line && f.file == finding.file && f.column == finding.column &&
            f.what == finding.what;

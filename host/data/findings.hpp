@@ -10,7 +10,7 @@
 
 namespace flexspline::data {
 
-// A kind of finding, as documented in README.md beside this file.
+// A kind of finding, as documented in README.md in this folder.
 struct KindInfo {
   std::string_view name;
   Severity severity = Severity::warning;  // without `--tolerate`
@@ -33,7 +33,7 @@ class Findings {
   Severity add(Finding finding);
   Severity add(Severity severity, std::string kind, std::string file, std::size_t line, std::string column,
                std::string what, std::string remedy);
-  // An error that stays one though its kind may be tolerated: here there is nothing to go on with.
+  // Adds an error that cannot be tolerated here although its kind may be, as there is no way to continue.
   void fail_later(std::string kind, std::string file, std::size_t line, std::string column, std::string what,
                   std::string remedy);
   // Adds an error and throws it with all that was found so far.

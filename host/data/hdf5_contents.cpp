@@ -7,7 +7,7 @@
 #include <algorithm>
 #include <cstdint>
 
-#include "host/data/columns_of_rows.hpp"
+#include "host/data/row_major_columns.hpp"
 
 namespace flexspline::data {
 namespace {
@@ -98,7 +98,7 @@ class Hdf5Walk {
     std::vector<double> values(count);
     if (H5Dread(dataset, H5T_NATIVE_DOUBLE, H5S_ALL, H5S_ALL, H5P_DEFAULT, values.data()) < 0)
       return refuse(name, "cannot be read: it is damaged, or compressed by a filter that is not here");
-    if (!matlab_) return add_columns_of_rows(contents_, name, dims, values);
+    if (!matlab_) return add_row_major_columns(contents_, name, dims, values);
     if (text_attribute(dataset, "MATLAB_class") == "char") {
       std::string text;
       for (const double unit : values) text += unit > 0.0 && unit < 128.0 ? static_cast<char>(unit) : '?';
@@ -140,7 +140,7 @@ class Hdf5Walk {
 
 FileContents read_hdf5_unguarded(const std::filesystem::path& path, bool matlab) {
   FileContents contents;
-  H5Eset_auto2(H5E_DEFAULT, nullptr, nullptr);  // what is wrong is said here
+  H5Eset_auto2(H5E_DEFAULT, nullptr, nullptr);  // what is wrong is reported here
   const Id file(H5Fopen(path.c_str(), H5F_ACC_RDONLY, H5P_DEFAULT), H5Fclose);
   if (!file.is_open()) {
     contents.failure = "is damaged or cut short: it cannot be opened";

@@ -91,12 +91,12 @@ KeyMap keys_of_header(const std::vector<HeaderKey>& lines, const std::string& fi
       const auto [at, inserted] = keys.emplace(line.key, value);
       if (!inserted && !same(at->second, value))
         findings.add(Severity::warning, "key_differs", file, line.line, "",
-                     fmt::format("{} stands twice in the header: \"{}\" in line {} is used, \"{}\" is not", line.key,
+                     fmt::format("{} is in the header twice: \"{}\" in line {} is used, \"{}\" is not", line.key,
                                  at->second.text, at->second.line, line.value),
                      "take one of them out");
       continue;
     }
-    // "# date: ..." is a comment; only what is nearly a key deserves a word.
+    // "# date: ..." is a comment; only a text that is nearly a key gets a warning.
     const std::string near = nearest_key(line.key);
     if (!near.empty() && (line.key.find('_') != std::string::npos || line.key.size() + 1 >= near.size()) &&
         line.key.find(' ') == std::string::npos)
@@ -123,7 +123,7 @@ KeyMap merged(const KeyMap& winner, const KeyMap& loser, Findings& findings) {
 void apply_drive_keys(const KeyMap& keys, DriveFacts& drive, Findings& findings) {
   const auto conflict = [&](const std::string& key, const KeyValue& value, const std::string& before) {
     findings.add(Severity::error, "conflict", value.file, value.line, "",
-                 fmt::format("{} is {} here, but {} elsewhere in the same data set", key, value.text, before),
+                 fmt::format("{} is {} here, but {} in another place of the same data set", key, value.text, before),
                  "measurements of different drives do not go together: load them one by one");
   };
   for (const auto& [key, value] : keys) {

@@ -10,9 +10,9 @@
 #include "host/data/columns.hpp"
 #include "host/data/dataset.hpp"
 #include "host/data/dataset_toml.hpp"
+#include "host/data/experiment_reader.hpp"
 #include "host/data/findings.hpp"
 #include "host/data/keys.hpp"
-#include "host/data/part.hpp"
 #include "host/data/recording.hpp"
 
 namespace flexspline::data {
@@ -37,10 +37,10 @@ class Loader {
       findings_.fail("file", "", 0, "no measurements were given", "give files, folders or a dataset.toml");
     for (const fs::path& path : paths) read_path(path);
     findings_.throw_if_errors();
-    cached_.reset();  // a file's numbers are as large as all that was made of them
+    cached_.reset();  // a file's numbers take as much memory as the experiments
     for (Experiment& experiment : data_.experiments) {
       if (options_.holdout) experiment.role = Role::holdout;
-      check_part(experiment, data_.drive, findings_);
+      check_experiment(experiment, data_.drive, findings_);
     }
     check_replicates();
     findings_.throw_if_errors();
@@ -77,12 +77,12 @@ class Loader {
         read_file(file, &toml, nullptr);
     for (const ExperimentEntry& entry : toml.experiments) read_file(entry.file, &toml, &entry);
     for (const auto& [name, mapping] : toml.columns)
-      // A file without its time was not looked at any further.
+      // A file without its time was not checked any further.
       if (name != "time_s" && !has_error_of("time_s") && found_mappings_.count({path.string(), name}) == 0 &&
           !has_error_of(name))
         findings_.add(Severity::error, "missing_column", path.string(), mapping.line, name,
                       fmt::format("no file has the column \"{}\" that this is mapped from", mapping.source),
-                      "write source as it stands in the header of the files, or take the mapping out");
+                      "write source as it is written in the header of the files, or take the mapping out");
   }
 
   bool has_error_of(const std::string& column) const {
@@ -90,7 +90,7 @@ class Loader {
                        [&](const Finding& f) { return f.severity == Severity::error && f.column == column; });
   }
 
-  // A file by itself is read by the dataset.toml beside it, if there is one.
+  // A file by itself is read by the dataset.toml in the same folder, if there is one.
   void read_single_file(const fs::path& path) {
     const fs::path beside = path.parent_path() / "dataset.toml";
     if (!fs::exists(beside)) {
@@ -98,7 +98,7 @@ class Loader {
       return;
     }
     const DatasetToml toml = read_dataset_toml(beside, findings_);
-    findings_.add(Severity::note, "mapping", path.string(), 0, "", "read by the dataset.toml beside it", "");
+    findings_.add(Severity::note, "mapping", path.string(), 0, "", "read by the dataset.toml in the same folder", "");
     bool named = false;
     for (const ExperimentEntry& entry : toml.experiments)
       if (real_path(entry.file) == real_path(path)) {
@@ -138,7 +138,7 @@ class Loader {
   }
 
   void read_file(const fs::path& path, const DatasetToml* toml, const ExperimentEntry* entry) {
-    PartBounds bounds;
+    TimeBounds bounds;
     if (entry != nullptr) bounds = {entry->from_s, entry->to_s};
     const std::optional<std::size_t> element = entry != nullptr ? entry->element : std::nullopt;
     const std::string identity = fmt::format("{} {} {} {}", real_path(path).string(), bounds.from_s.value_or(-1e300),
@@ -159,7 +159,7 @@ class Loader {
       KeyMap stated = entry == nullptr ? KeyMap{} : entry->keys;
       stated.insert(toml->defaults.begin(), toml->defaults.end());
       stated.insert(toml->drive.begin(), toml->drive.end());
-      // One name in a header cannot fit several parts of the file, so a name given to a part is no contradiction.
+      // One name in a header cannot fit several parts of the file, so a part with another name is not a contradiction.
       if (stated.count("experiment") != 0) keys.erase("experiment");
       keys = merged(stated, keys, findings_);
     }
@@ -171,7 +171,8 @@ class Loader {
     apply_experiment_keys(keys, experiment, findings_);
     make_unique(experiment);
 
-    if (read_part(file->table, file->plan, bounds, data_.drive.axis.value_or(Axis::rotary), experiment, findings_))
+    if (read_experiment(file->table, file->plan, bounds, data_.drive.axis.value_or(Axis::rotary), experiment,
+                        findings_))
       data_.experiments.push_back(std::move(experiment));
   }
 

@@ -39,7 +39,7 @@ struct Element {
   std::string_view data;
 };
 
-// Elements one after another; each is checked to lie within what holds it.
+// Elements one after another; each is checked to be within its container.
 class Elements {
  public:
   Elements(std::string_view bytes, bool swapped) : bytes_(bytes), swapped_(swapped) {}
@@ -54,7 +54,7 @@ class Elements {
   std::optional<Element> next() {
     if (bytes_.size() < 8) return std::nullopt;
     const std::uint32_t first = number(bytes_, 0);
-    if (const std::uint32_t small = first >> 16; small != 0) {  // up to four bytes beside the tag
+    if (const std::uint32_t small = first >> 16; small != 0) {  // up to four bytes next to the tag
       if (small > 4) return std::nullopt;
       return taken({first & 0xFFFF, bytes_.substr(4, small)}, 8);
     }
@@ -86,7 +86,7 @@ class Checker {
     Elements parts(bytes, swapped_);
     const auto flags = parts.next();
     if (!flags || (flags->type != kUint32 && flags->type != kInt32) || flags->data.size() != 8)
-      return "does not say its class";
+      return "does not state its class";
     const std::uint32_t flag = parts.number(flags->data, 0);
     const std::uint32_t kind = flag & 0xFF;
     if (kind == 0 || kind > 17) return "is of a class that does not exist";
@@ -122,7 +122,7 @@ class Checker {
       if (!values) return "is cut short";
       const std::size_t size = value_size(values->type);
       if (size == 0 || values->data.size() % size != 0 || values->data.size() / size != count)
-        return fmt::format("holds another number of values than its dimensions say ({})", count);
+        return fmt::format("holds another number of values than its dimensions state ({})", count);
     }
     return {};
   }
@@ -146,7 +146,7 @@ class Checker {
     for (std::size_t i = 0; i < count; ++i) {
       const auto child = parts.next();
       if (!child) return "is cut short";
-      if (child->type != kMatrix) return "has a part that is no array";
+      if (child->type != kMatrix) return "has a part that is not an array";
       if (std::string wrong = array(child->data, depth + 1); !wrong.empty()) return wrong;
     }
     return {};
@@ -232,10 +232,10 @@ std::string damage_of_mat5(std::string_view file) {
       if (!whole) return fmt::format("is damaged: the compressed data of {} are not whole", called(number, ""));
       inflated = std::move(*whole);
       const auto inner = Elements(inflated, swapped).next();
-      if (!inner || inner->type != kMatrix) return fmt::format("is damaged: {} is no array", called(number, ""));
+      if (!inner || inner->type != kMatrix) return fmt::format("is damaged: {} is not an array", called(number, ""));
       array = inner->data;
     } else if (element->type != kMatrix) {
-      return fmt::format("is damaged: {} is no array", called(number, ""));
+      return fmt::format("is damaged: {} is not an array", called(number, ""));
     }
     std::string name;
     const std::string wrong = Checker(swapped).array(array, 0, &name);

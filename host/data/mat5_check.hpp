@@ -10,7 +10,7 @@ namespace flexspline::data {
 
 enum class MatVersion : std::uint8_t { none, v4, v5, v7_3 };
 
-// By the first bytes. `v4` has no mark of its own and is only told from files that end in .mat.
+// By the first bytes. `v4` has no mark of its own and is only recognised in files that end in .mat.
 MatVersion mat_version(const std::filesystem::path& path);
 
 // Walks all elements of a version 5 file in memory, inflates those that are compressed and compares their checksums:

@@ -192,7 +192,7 @@ FileContents read_mat_unguarded(const std::filesystem::path& path) {
   char* const* const directory = Mat_GetDir(file.get(), &count);
   for (std::size_t i = 0; directory != nullptr && i < count; ++i)
     if (is_name(directory[i]) && read.count(directory[i]) == 0) contents.refused.push_back({directory[i], kDamaged});
-  // Nor does it say that HDF5 could not open one.
+  // Nor does it report that HDF5 could not open one.
   if (read.empty() && contents.refused.empty())
     contents.failure = "holds no variable that can be read: it is empty, damaged or cut short";
   return contents;

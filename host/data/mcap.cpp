@@ -9,9 +9,9 @@
 #include <nlohmann/json.hpp>
 
 #include "host/data/byte_reader.hpp"
+#include "host/data/decompress.hpp"
 #include "host/data/message_logs.hpp"
 #include "host/data/ros_message.hpp"
-#include "host/data/unpacked.hpp"
 
 namespace flexspline::data {
 namespace {
@@ -126,8 +126,8 @@ class Mcap {
     const std::string compression = text(reader);
     const std::string_view data = reader.take(reader.u64());
     if (compression.empty()) return records(data, 1);
-    if (compression == "zstd") return records(unpacked_zstd(data, size), 1);
-    if (compression == "lz4") return records(unpacked_lz4(data, size), 1);
+    if (compression == "zstd") return records(decompress_zstd(data, size), 1);
+    if (compression == "lz4") return records(decompress_lz4(data, size), 1);
     throw std::runtime_error(
         fmt::format("is compressed by {}, which is not read; run mcap compress on it", compression));
   }

@@ -10,7 +10,7 @@ void MessageColumns::add(const std::string& topic, std::int64_t logged_ns, const
   if (is_new) order_.push_back(topic);
   Topic& t = at->second;
   t.logged_ns.push_back(logged_ns);
-  // Zero is what a header has whose author did not fill it.
+  // A header that its author did not fill has a time of zero.
   if (fields.stamp_ns && *fields.stamp_ns != 0) t.stamp_ns.push_back(*fields.stamp_ns);
   for (const auto& [name, value] : fields.numbers) {
     std::vector<double>& values = t.values[name];

@@ -21,8 +21,8 @@ class MessageColumns {
  public:
   void add(const std::string& topic, std::int64_t logged_ns, const MessageFields& fields);
   void refuse(const std::string& topic, std::string why);
-  // "/joint_states/time" in seconds since the first message of all, "/joint_states/effort[2]" ... What not every
-  // message of its topic has is refused.
+  // "/joint_states/time" in seconds since the first message of all, "/joint_states/effort[2]" ... A field that some
+  // messages of its topic lack is refused.
   FileContents contents() const;
 
  private:

@@ -16,7 +16,7 @@ bool near(double factor, double known) {
   return std::abs(factor / known - 1.0) < 0.02;
 }
 
-// What a factor between velocity and the derivative of position is known for; empty: nothing.
+// The usual cause of a factor between velocity and the derivative of position; empty: unknown.
 std::string cause_of(double factor, const DriveFacts& drive) {
   const double size = std::abs(factor);
   std::string sign = factor < 0.0 ? ", and its sign is turned round" : "";
@@ -90,7 +90,7 @@ Extent extent_of(std::span<const double> signal, std::size_t first, std::size_t 
   return {*low, *high};
 }
 
-// Excursion within a stretch: the range of a position, the size of a velocity.
+// Excursion within an interval: the range of a position, the size of a velocity.
 double excursion(std::span<const double> signal, bool is_position, std::size_t first, std::size_t last) {
   const Extent e = extent_of(signal, first, last);
   return is_position ? e.high - e.low : std::max(std::abs(e.low), std::abs(e.high));
@@ -151,7 +151,7 @@ void check_gear_ratio(const Experiment& experiment, const DriveFacts& drive, Fin
   const IncrementRatio ratio =
       increment_ratio(experiment[Column::output_position], experiment[Column::motor_position], experiment.segments);
   const double factor = ratio.factor * *drive.gear_ratio;
-  // Torsion and backlash take a share of small motions; only what a unit, a sign or another ratio explains is told.
+  // Torsion and backlash take a share of small motions; only what a unit, a sign or another ratio explains is reported.
   if (!ratio.meaningful || (factor > 0.8 && factor < 1.25)) return;
   std::string cause;
   if (near(factor, -1.0)) cause = ": the sign of one of them is turned round";
@@ -228,7 +228,7 @@ void check_standstill(Experiment& experiment, Findings& findings) {
     findings.add(Severity::note, "standstill", experiment.file.string(), 0, std::string(column_name(*column)),
                  fmt::format("\"{}\" is at rest for {:.0f} % of its samples; none is masked for that", experiment.name,
                              100.0 * share),
-                 "it can tell offsets; record motion as well");
+                 "it identifies offsets alone; record motion as well");
   };
   if (whole <= 2.0 * floor) {
     note_rest(1.0);
@@ -236,8 +236,8 @@ void check_standstill(Experiment& experiment, Findings& findings) {
   }
 
   const double still = std::max(floor, 0.005 * largest);
-  const std::size_t long_stretch = std::max<std::size_t>(5 * block, samples_in(1.0, experiment));
-  std::vector<Segment> stretches;
+  const std::size_t long_interval = std::max<std::size_t>(5 * block, samples_in(1.0, experiment));
+  std::vector<Segment> intervals;
   std::size_t total = 0;
   std::size_t samples = 0;
   for (const Segment& s : experiment.segments) {
@@ -246,7 +246,7 @@ void check_standstill(Experiment& experiment, Findings& findings) {
       std::size_t end = k;
       while (end < s.last && excursion(x, is_position, end, std::min(end + block, s.last)) <= still)
         end = std::min(end + block, s.last);
-      // A creeping motion is small in each block but not over the stretch.
+      // A creeping motion is small in each block but not over the interval.
       bool creeps = false;
       if (end > k && is_position) creeps = excursion(x, true, k, end) > 1.5 * still;
       if (end > k && !is_position) {
@@ -254,14 +254,14 @@ void check_standstill(Experiment& experiment, Findings& findings) {
         for (std::size_t i = k; i < end; ++i) mean += x[i] / static_cast<double>(end - k);
         creeps = std::abs(mean) > std::max(4.0 * noise / std::sqrt(static_cast<double>(end - k)), 1e-3 * largest);
       }
-      if (end - k >= long_stretch && !creeps) {
-        stretches.push_back({k, end});
+      if (end - k >= long_interval && !creeps) {
+        intervals.push_back({k, end});
         total += end - k;
       }
       k = end > k ? end : std::min(k + block, s.last);
     }
   }
-  if (stretches.empty()) return;
+  if (intervals.empty()) return;
   const double share = static_cast<double>(total) / static_cast<double>(samples);
   if (share > 0.95) {
     note_rest(share);
@@ -269,14 +269,14 @@ void check_standstill(Experiment& experiment, Findings& findings) {
   }
   const bool mask = experiment.load == Load::free;
   if (mask)
-    for (const Segment& s : stretches)
+    for (const Segment& s : intervals)
       std::fill(experiment.masked.begin() + static_cast<std::ptrdiff_t>(s.first),
                 experiment.masked.begin() + static_cast<std::ptrdiff_t>(s.last), std::uint8_t{1});
   findings.add(mask ? Severity::warning : Severity::note, "standstill", experiment.file.string(), 0,
                std::string(column_name(*column)),
-               fmt::format("\"{}\" stands still for {:.0f} % of its samples, first from {:.6g} s to {:.6g} s{}",
-                           experiment.name, 100.0 * share, experiment.time_s[stretches.front().first],
-                           experiment.time_s[stretches.front().last - 1], mask ? "; those samples are masked" : ""),
+               fmt::format("\"{}\" is at rest for {:.0f} % of its samples, first from {:.6g} s to {:.6g} s{}",
+                           experiment.name, 100.0 * share, experiment.time_s[intervals.front().first],
+                           experiment.time_s[intervals.front().last - 1], mask ? "; those samples are masked" : ""),
                "nothing needs doing if the rest moves enough");
 }
 

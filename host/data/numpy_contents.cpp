@@ -14,7 +14,7 @@
 #include <optional>
 #include <string_view>
 
-#include "host/data/columns_of_rows.hpp"
+#include "host/data/row_major_columns.hpp"
 
 namespace flexspline::data {
 namespace {
@@ -86,7 +86,7 @@ std::vector<double> numpy_values(std::string_view bytes, std::size_t at, std::si
   return values;
 }
 
-// What stands after 'key': in the header, a dictionary as Python prints it, up to `end`.
+// What follows 'key': in the header, a dictionary as Python prints it, up to `end`.
 std::string_view header_entry(std::string_view header, std::string_view key) {
   const std::size_t at = header.find(fmt::format("'{}':", key));
   if (at == std::string_view::npos) return {};
@@ -178,9 +178,9 @@ void take_array(std::string_view bytes, const std::string& name, FileContents& c
     std::vector<double> rows(values.size());
     for (std::size_t r = 0; r < dims[0]; ++r)
       for (std::size_t c = 0; c < dims[1]; ++c) rows[r * dims[1] + c] = values[c * dims[0] + r];
-    return add_columns_of_rows(contents, name, dims, rows);
+    return add_row_major_columns(contents, name, dims, rows);
   }
-  add_columns_of_rows(contents, name, dims, values);
+  add_row_major_columns(contents, name, dims, values);
 }
 
 std::optional<std::string> inflated(std::string_view packed, std::size_t size) {
@@ -205,7 +205,7 @@ bool take_zip_entry(std::string_view file, std::size_t entry, FileContents& cont
                 at = little(file, entry + 42, 4);
   const std::size_t name_size = little(file, entry + 28, 2), extra_size = little(file, entry + 30, 2);
   if (entry + 46 + name_size + extra_size > file.size()) return false;
-  // Sizes of 4 GB and more stand in an extra field.
+  // Sizes of 4 GB and more are in an extra field.
   for (std::size_t extra = entry + 46 + name_size, end = extra + extra_size; extra + 4 <= end;) {
     std::size_t value = extra + 4;
     if (little(file, extra, 2) == 1)
@@ -245,7 +245,7 @@ FileContents read_npz(const std::filesystem::path& path) {
   const std::string bytes = whole_file(path);
   const std::string_view file = bytes;
   FileContents contents;
-  // The directory's end stands at the end, before a comment of at most 65535 bytes.
+  // The directory's end record is at the end, before a comment of at most 65535 bytes.
   const std::size_t end = file.rfind(std::string_view("PK\x05\x06", 4));
   std::size_t entry = end == std::string_view::npos ? file.size() : little(file, end + 16, 4);
   const std::size_t count = end == std::string_view::npos ? 0 : little(file, end + 10, 2);

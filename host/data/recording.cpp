@@ -58,7 +58,7 @@ ElementName without_element(std::string_view name) {
 std::unique_ptr<Recording> open_recording(const fs::path& path, Findings& findings) {
   const FileFormat format = format_of(path);
   if (format == FileFormat::foreign) {
-    const WayOut way = way_out(path);
+    const FormatAdvice way = way_out(path);
     findings.fail("format", path.string(), 0, way.what, way.remedy);
   }
   if (format == FileFormat::text && lower_extension(path) != ".mat") return std::make_unique<CsvFile>(path, findings);

@@ -64,7 +64,7 @@ class Recording {
   virtual const std::vector<HeaderKey>& keys() const = 0;
   virtual std::size_t header_line() const { return 0; }
 
-  // The unit that the file states for a name beside it; empty where it does not.
+  // The unit that the file states next to a name; empty where it does not.
   virtual std::string unit(std::size_t) const { return {}; }
 
   // Number of values under a name; columns of one length make one table. A CSV file is one table throughout, and says

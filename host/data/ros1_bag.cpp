@@ -7,9 +7,9 @@
 #include <memory>
 
 #include "host/data/byte_reader.hpp"
+#include "host/data/decompress.hpp"
 #include "host/data/message_logs.hpp"
 #include "host/data/ros_message.hpp"
-#include "host/data/unpacked.hpp"
 
 namespace flexspline::data {
 namespace {
@@ -64,7 +64,7 @@ class Ros1Bag {
     const auto at = header.find("compression");
     const std::string_view compression = at == header.end() ? "none" : at->second;
     if (compression == "none") return records(data, 1);
-    if (compression == "lz4") return records(unpacked_lz4(data, field_of(header, "size").u32()), 1);
+    if (compression == "lz4") return records(decompress_lz4(data, field_of(header, "size").u32()), 1);
     throw std::runtime_error(fmt::format(
         "is compressed by {}, which is not read; run rosbag decompress on it, or rosbag compress --lz4", compression));
   }

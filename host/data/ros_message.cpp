@@ -202,7 +202,7 @@ const RosMessageType::Struct* RosMessageType::find(const std::string& type) cons
 
 MessageFields RosMessageType::read(std::string_view message) const {
   if (wire_ == RosWire::cdr) {
-    // Four bytes say how it is written; a one in the second, the least significant byte first, as all do.
+    // Four bytes give the encoding; a one in the second, the least significant byte first, as all do.
     if (message.size() < 4 || message[1] != 1) throw DamagedFile();
     message.remove_prefix(4);
   }

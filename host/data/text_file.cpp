@@ -14,7 +14,7 @@ namespace {
 
 constexpr std::size_t kHead = 65536;  // by which a binary file is known
 constexpr std::size_t kChunk = std::size_t{1} << 20;
-// gzip packs text 3 to 20 to 1; beyond this a file is made to fill the memory.
+// gzip packs text 3 to 20 to 1; beyond this a file is an attack on the memory.
 constexpr std::size_t kMostInflation = 200;
 
 // gzread reads files that are not compressed as they are.

@@ -48,7 +48,7 @@ TimeBase time_base(std::span<const double> time_s) {
   TimeBase base;
   const std::size_t steps = time_s.size() - 1;
   const auto step = [&](std::size_t i) { return time_s[i + 1] - time_s[i]; };
-  // Long recordings are what fills memory: one array, used twice.
+  // Long recordings need much memory, so one array is used twice.
   std::vector<double> sorted(steps);
   for (std::size_t i = 0; i < steps; ++i) sorted[i] = step(i);
   const auto middle = sorted.begin() + static_cast<std::ptrdiff_t>(steps / 2);

@@ -11,7 +11,7 @@ namespace flexspline::data {
 
 // Steps within this share of a sample are rounding of the time stamps.
 inline constexpr double kUniformShare = 0.02;
-// Above this share (of the 99th percentile) the samples are no longer where a filter may take them to be.
+// Above this share (of the 99th percentile) a filter cannot treat the samples as uniform.
 inline constexpr double kJitterShare = 0.20;
 // A step of more samples than this is a gap; shorter ones are samples lost, which interpolation bridges.
 inline constexpr double kGapSamples = 3.5;

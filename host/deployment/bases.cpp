@@ -5,7 +5,7 @@
 #include <cmath>
 
 #include "host/catalogue/constants.hpp"
-#include "host/catalogue/defined.hpp"
+#include "host/catalogue/user_defined_effect.hpp"
 #include "host/deployment/pack.hpp"
 #include "host/deployment/statics.hpp"
 #include "shared/fixed/coefficients.hpp"

@@ -9,7 +9,7 @@
 #include <set>
 
 #include "host/catalogue/constants.hpp"
-#include "host/catalogue/defined.hpp"
+#include "host/catalogue/user_defined_effect.hpp"
 #include "host/deployment/pack.hpp"
 #include "host/deployment/reachable_limits.hpp"
 #include "host/deployment/statics.hpp"
@@ -24,18 +24,18 @@ using text::Node;
 using text::NodeKind;
 
 constexpr double kMost = 1e12;
-constexpr double kLeast = 1e-12;  // of what has to be above nought
+constexpr double kLeast = 1e-12;  // of what has to be above zero
 // The motor may turn before the output's encoder has to show it: torsion swings by less than four of its bases, and a
 // quarter of this has to be seen (shared/control/drive_parameters_setup.hpp).
 constexpr double kTorsionsBeforeStuck = 8.0;
 constexpr double kCountsBeforeStuck = 32.0;
-// The motor's encoder: friction may hold half more than the model says, and a half of what the drive has may come
+// The motor's encoder: friction may hold half more than the model predicts, and a half of what the drive has may come
 // of what is no friction. The time in which full torque turns a free shaft by a count passes so often first.
 constexpr double kHeldBeforeStuck = 1.5, kTorqueBeforeStuck = 0.5, kMostTorqueChange = 1.85;
 constexpr double kCountsTimesBeforeStuck = 16.0;
 constexpr double kShownOfStop = 0.25;  // less than the rule of reachable limits allows
 
-// The file's tables, whose keys are taken one after another; what nobody took is no setting.
+// The file's tables, whose keys are read one after another; an unread key is not a setting.
 class Settings {
  public:
   Settings(const std::string& toml, std::string origin) : origin_(std::move(origin)) {
@@ -70,8 +70,8 @@ class Settings {
     if (found == nullptr) return {};
     if (!(found->number >= least && found->number <= most))
       fail(found->line, fmt::format("[{}] {} is {:g}; it has to be {}", table, key, found->number,
-                                    least == kLeast && most == kMost ? "above nought"
-                                    : least == kLeast ? fmt::format("above nought and at most {:g}", most)
+                                    least == kLeast && most == kMost ? "above zero"
+                                    : least == kLeast                ? fmt::format("above zero and at most {:g}", most)
                                                       : fmt::format("between {:g} and {:g}", least, most)));
     return found->number;
   }
@@ -101,7 +101,7 @@ class Settings {
     }
     fail(found->line, fmt::format("[{}] {} is \"{}\"; there are {}", table, key, found->text, all));
   }
-  // What a setting says is not what the board states.
+  // A setting differs from what the board states.
   [[noreturn]] void disagrees(const std::string& table, const std::string& key, double is, const char* unit,
                               const std::string& why) const {
     const Node* of = root_.find(table);
@@ -124,13 +124,13 @@ class Settings {
         std::string all;
         for (const auto& [name, keys] : taken_)
           if (!name.empty()) all += (all.empty() ? "" : ", ") + name;
-        fail(table.line, fmt::format("[{}] is no table of settings; there are {}", table.key, all));
+        fail(table.line, fmt::format("[{}] is not a table of settings; there are {}", table.key, all));
       }
       for (const text::Entry& entry : table.value.entries) {
         if (known->second.contains(entry.key)) continue;
         std::string all;
         for (const std::string& key : known->second) all += (all.empty() ? "" : ", ") + key;
-        fail(entry.line, fmt::format("[{}] {} is no setting; there are {}", table.key, entry.key, all));
+        fail(entry.line, fmt::format("[{}] {} is not a setting; there are {}", table.key, entry.key, all));
       }
     }
   }
@@ -149,7 +149,7 @@ std::optional<double> parameter(const model::Model& model, const char* effect, c
   return {};
 }
 
-// The largest slope of what the transmission carries without memory, within a torsion; nought without such effects.
+// The largest slope of what the transmission carries without memory, within a torsion; zero without such effects.
 double largest_stiffness(const model::Model& model, double torsion) {
   constexpr int kSteps = 400;
   const Springs springs(model);
@@ -161,7 +161,7 @@ double largest_stiffness(const model::Model& model, double torsion) {
   return steepest;
 }
 
-// Of the board, where it states it: what the settings say has to be that.
+// Of the board, where it states it: the settings have to agree with it.
 double of_board(Settings& s, const std::string& table, const std::string& key, const char* unit, double stated,
                 double otherwise) {
   constexpr double kSame = 1.0 / 300.0;
@@ -175,10 +175,10 @@ control::AnalogSetup<double> analog(Settings& s, const std::string& table, const
                                     double stated, double stated_at_zero = 0.0) {
   control::AnalogSetup<double> a;
   a.full_scale = of_board(s, table, "full_scale_" + unit, unit.c_str(), stated, full_scale);
-  const std::string zero = "at_nought_" + unit;
-  a.at_nought = s.number(table, zero).value_or(stated_at_zero);
-  if (stated > 0.0 && std::abs(a.at_nought - stated_at_zero) > 1e-3 * stated)
-    s.disagrees(table, zero, a.at_nought, unit.c_str(), fmt::format("the drive's board states {:g}", stated_at_zero));
+  const std::string zero = "at_zero_" + unit;
+  a.at_zero = s.number(table, zero).value_or(stated_at_zero);
+  if (stated > 0.0 && std::abs(a.at_zero - stated_at_zero) > 1e-3 * stated)
+    s.disagrees(table, zero, a.at_zero, unit.c_str(), fmt::format("the drive's board states {:g}", stated_at_zero));
   a.lowest_share = s.number(table, "lowest_share", -1.0, 1.0).value_or(a.lowest_share);
   a.highest_share = s.number(table, "highest_share", -1.0, 1.0).value_or(a.highest_share);
   return a;
@@ -373,11 +373,11 @@ control::DriveSetup<double> parse_drive_setup(const std::string& toml, const std
 
 control::DriveSettings<fixed::Fixed> settings_of(const control::DriveSetup<double>& setup,
                                                  const DriveConstants<double>& d, const std::string& origin) {
-  fixed::Findings::clear();
+  fixed::OverflowLog::clear();
   const control::DriveSettings<fixed::Fixed> settings = control::derive<fixed::Fixed>(setup, d);
-  if (fixed::Findings::count() != 0)
+  if (fixed::OverflowLog::count() != 0)
     throw PackError(
-        fmt::format("{}: the settings do not fit a drive with these ratings: {}", origin, fixed::Findings::first()));
+        fmt::format("{}: the settings do not fit a drive with these ratings: {}", origin, fixed::OverflowLog::first()));
   for (const auto& [counts, corner] :
        {std::pair{setup.motor_counts, setup.motor_corner}, std::pair{setup.output_counts, setup.output_corner}})
     if (counts != 0 && !observers::kalman_bounds(observers::kalman_gains(corner * d.time_base)).fit)

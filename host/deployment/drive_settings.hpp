@@ -18,9 +18,9 @@ namespace flexspline::deployment {
 inline constexpr std::string_view kDriveFormat = "flexspline-drive/1";
 
 // Reads the settings of a drive with this model, in bases of `d`, whose time base is the tick. `origin` names the text
-// in errors. `encoder_counts` of the motor, where they are known from elsewhere. What the board states (`hardware`) is
-// the default. Throws PackError with file, line, table and key: what is no setting, is of another type or outside its
-// bounds, is missing and follows from nothing, or contradicts another or the board.
+// in errors. `encoder_counts` of the motor, where they are known from another source. What the board states
+// (`hardware`) is the default. Throws PackError with file, line, table and key: what is no setting, is of another type
+// or outside its bounds, is missing and follows from nothing, or contradicts another or the board.
 control::DriveSetup<double> parse_drive_setup(const std::string& toml, const std::string& origin,
                                               const model::Model& model, const effects::DriveConstants<double>& d,
                                               std::optional<double> encoder_counts = {},
@@ -30,7 +30,7 @@ control::DriveSetup<double> parse_drive_setup(const std::string& toml, const std
 control::DriveSettings<fixed::Fixed> settings_of(const control::DriveSetup<double>& setup,
                                                  const effects::DriveConstants<double>& d, const std::string& origin);
 
-// What settings in a block say, in SI.
+// The settings of a block, in SI.
 struct NamedQuantity {
   std::string name;
   double value = 0.0;

@@ -16,7 +16,7 @@
 namespace flexspline::deployment {
 
 // Why an error has no bound, first reason first.
-class Unproven {
+class ProofFailure {
  public:
   static void clear() { reason_.clear(); }
   static void note(const char* reason) {
@@ -41,7 +41,7 @@ struct ErrorNumbers {
   struct Bounded {
     double low = 0.0, high = 0.0;  // of the equation
     double error = 0.0;            // the drive's number is at most this far from it, at the same instant
-    int signal = 0;                // the input that it is, but for constants: from tick to tick both move alike
+    int signal = 0;  // the input that it is, but for constants: from tick to tick both change by the same amount
     bool constant = false;
 
     double most() const { return std::max(high, -low); }
@@ -68,7 +68,7 @@ struct ErrorNumbers {
   using State = Bounded<OfState>;
   using Sum = Bounded<OfSum>;
 
-  // A position: how many turns from nought, how far a tick can move it, and of a phase what it is off by, in turns.
+  // A position: how many turns from zero, how far a tick can move it, and of a phase what it is off by, in turns.
   struct Step {
     double most_turns = 0.0;
   };
@@ -128,7 +128,7 @@ struct ErrorNumbers {
     Value sine;
   };
   // A distance over a length. `relative` bounds what it is off by as a share of itself, however small it is; `least` is
-  // the shortest one that is not nought.
+  // the shortest one that is not zero.
   struct Travel {
     double low = 0.0, high = 0.0;
     double relative = 0.0;
@@ -139,7 +139,7 @@ struct ErrorNumbers {
     double rounding = 0.0;  // and what rounding it adds, of the state itself
   };
   // What a relaxation keeps, by what it loses, with the same meanings.
-  struct Kept {
+  struct DecayFactor {
     double least_lost = 0.0, most_lost = 1.0;
     Travel travel;
     double exponent = 1.0;
@@ -149,7 +149,7 @@ struct ErrorNumbers {
   static Gain gain(double x) { return {x, relative(fixed::make_gain(x).factor, x)}; }
   static StepGain step_gain(double x) {
     const fixed::StepGain g = fixed::make_step_gain(x);
-    return {x, std::max(relative(g.factor, x), relative(g.halvings, x * 1.4426950408889634)),
+    return {x, std::max(relative(g.factor, x), relative(g.exponent_of_two, x * 1.4426950408889634)),
             real(g.limit, fixed::kAngleBits)};
   }
   static RatioGain ratio_gain(double x) {
@@ -208,7 +208,7 @@ struct ErrorNumbers {
   static State bounded(const State& x) { return within(x, 4.0); }
   static Value by_sign(const Value& x, const Value& a, const Value& b) {
     if (x.error > 0.0 && x.low < 0.0 && x.high >= 0.0)
-      Unproven::note("what it does hangs on the sign of a number that is rounded");
+      ProofFailure::note("what it does hangs on the sign of a number that is rounded");
     return {std::min(a.low, b.low), std::max(a.high, b.high), std::max(a.error, b.error)};
   }
   static State sign(const Step&) { return {-1.0, 1.0, 0.0}; }
@@ -244,7 +244,7 @@ struct ErrorNumbers {
   }
   static Travel times_power(Travel t, const State& left, const Exponent& e) {
     if (e.exact < 0.0)
-      Unproven::note("where its limit is near it moves ever faster, which spreads what is rounded without a bound");
+      ProofFailure::note("where its limit is near it moves ever faster, which spreads what is rounded without a bound");
     of_state(t, left.high, e.exact);
     t.relative += 5e-9 + e.error * (2.0 + std::log(2.0));
     t.extra += 1.4 * e.error;
@@ -253,7 +253,7 @@ struct ErrorNumbers {
   static Travel over(Travel t, const Value& x) {
     const double least = x.low - x.error;
     if (!(least > 0.0)) {
-      Unproven::note("it divides by a torque that may be nought");
+      ProofFailure::note("it divides by a torque that may be zero");
       return t;
     }
     t.high /= x.low;
@@ -264,30 +264,30 @@ struct ErrorNumbers {
     return t;
   }
   static State step(const Travel&, const Value& x) {
-    Unproven::note("its state is moved by a rate of its own");
+    ProofFailure::note("its state is moved by a rate of its own");
     return {-4.0, 4.0, x.error};
   }
 
-  static Kept exp_negative(const Travel& t) {
-    Kept k;
+  static DecayFactor exp_negative(const Travel& t) {
+    DecayFactor k;
     k.least_lost = -std::expm1(-t.low);
     k.most_lost = -std::expm1(-t.high);
     k.travel = t;
     k.travel.relative += 2.1e-8;
     return k;
   }
-  static Kept q_exp_negative(const Travel& t, const Exponent& q) {
+  static DecayFactor q_exp_negative(const Travel& t, const Exponent& q) {
     if (q.exact < 1.0)
-      Unproven::note(
+      ProofFailure::note(
           "its exponent is below one: near its limit it moves ever faster, which spreads what is rounded without a "
           "bound");
-    Kept k = exp_negative(t);
+    DecayFactor k = exp_negative(t);
     k.travel.relative += q.error;
     k.exponent = q.exact;
     k.least_lost = 0.0;
     return k;
   }
-  static State relax(const State& from, const State& target, const Kept& kept) {
+  static State relax(const State& from, const State& target, const DecayFactor& kept) {
     const Travel& t = kept.travel;
     const double away = std::max(from.high - target.low, target.high - from.low) + from.error + target.error;
     State to{std::min(from.low, target.low), std::max(from.high, target.high)};
@@ -312,7 +312,7 @@ struct ErrorNumbers {
   static Value reciprocal(const Value& x) {
     const double least = x.low - x.error;
     if (!(least > 1.0 / 15.0)) {
-      Unproven::note("it divides by a number that may be nought");
+      ProofFailure::note("it divides by a number that may be zero");
       return {0.0, 15.0, 15.0};
     }
     return {1.0 / x.high, 1.0 / x.low, 0.5 * kUnit + 4.5e-9 / least + x.error / (least * least)};
@@ -332,7 +332,7 @@ struct ErrorNumbers {
     const double size = std::abs(x.gain.exact);
     const double most = size * x.signal.most() + size * x.signal.error;
     const double power = std::pow(most, e.exact);
-    // y^e ln y is -1/(e exp(1)) at its least, between nought and one.
+    // y^e ln y is -1/(e exp(1)) at its least, between zero and one.
     const double by_exponent = std::max(power * std::abs(std::log(std::max(most, 1e-300))), 0.37 / e.exact);
     const double by_input = x.signal.error == 0.0 ? 0.0
                             : e.exact >= 1.0      ? e.exact * std::pow(most, e.exact - 1.0) * size * x.signal.error
@@ -342,7 +342,7 @@ struct ErrorNumbers {
         1.2 * kUnit + power * (5e-9 + e.exact * (7.5e-8 + 0.7 * x.gain.logarithm)) + by_exponent * e.error + by_input};
   }
   static Value pow_abs(const State& x, const Exponent&) {
-    Unproven::note("a power of its own state moves it");
+    ProofFailure::note("a power of its own state moves it");
     return {0.0, std::max(1.0, x.most()), 1.0};
   }
 
@@ -376,7 +376,7 @@ struct ErrorNumbers {
 
   // What the above is made of.
   static double real(std::int64_t raw, int bits) { return std::ldexp(static_cast<double>(raw), -bits); }
-  // How far a number in an integer of any power of two is from what it stands for, as a share of it.
+  // How far a number in an integer of any power of two is from the exact value, as a share of it.
   static double relative(std::int64_t held, double exact) {
     if (exact == 0.0) return held == 0 ? 0.0 : std::numeric_limits<double>::infinity();
     if (held == 0) return 1.0;
@@ -400,7 +400,7 @@ struct ErrorNumbers {
   }
   static void exact_motion(const Value& x) {
     if (x.error > 0.0)
-      Unproven::note(
+      ProofFailure::note(
           "it moves by a torsion that another effect has changed and rounded, however little that moves in a tick");
   }
   static void of_state(Travel& t, double most_left, double exponent) {
@@ -409,7 +409,7 @@ struct ErrorNumbers {
     t.rounding += 2.0 * 0x1p-58;
   }
   // What the roundings of a state add up to until motion has forgotten them.
-  static double roundings_of(const Kept& kept) {
+  static double roundings_of(const DecayFactor& kept) {
     const Travel& t = kept.travel;
     if (t.least <= 0.0) return 0.0;
     const double rounding = kStateUnit + t.rounding;

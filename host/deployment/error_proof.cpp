@@ -9,7 +9,7 @@
 
 namespace flexspline::deployment {
 
-thread_local std::string Unproven::reason_;
+thread_local std::string ProofFailure::reason_;
 
 namespace {
 
@@ -21,7 +21,7 @@ constexpr int kTorsionSignal = 1;
 // What double itself rounds, of each torque and of a base.
 constexpr double kOfDouble = 0x1p-36;
 // Errors that still grow by less than this share in a tick are a twentieth below what they come to at most, where a
-// state forgets a 50,000th of itself in a tick or more; that they then grow no more is looked at.
+// state forgets a 50,000th of itself in a tick or more; that they then grow no more is checked.
 constexpr double kSettled = 1e-6;
 constexpr double kMargin = 1.05;
 constexpr int kMostTicks = 300'000;
@@ -86,7 +86,7 @@ ErrorProof prove_error(const std::vector<EffectValues>& effects, const effects::
   const effects::Inputs<Numbers> inputs = envelope(drive);
   ErrorProof proof;
   for (const EffectValues& e : effects) proof.parts.push_back({e.id, {}, {}});
-  Visited visited(effects);
+  VisitedEffects visited(effects);
   // One tick from all states so far; what they grew by.
   const auto tick = [&] {
     Growth growth;
@@ -95,7 +95,7 @@ ErrorProof prove_error(const std::vector<EffectValues>& effects, const effects::
         inputs, [&]<class Effect>(auto& state, const auto& coefficients, const effects::Inputs<Numbers>& in,
                                   const effects::Inputs<Numbers>& before, effects::Torques<Numbers>&) {
           ErrorPart& part = proof.parts[visited.next(Model::template number_of<Effect>())];
-          Unproven::clear();
+          ProofFailure::clear();
           effects::Torques<Numbers> out{};
           const auto old = state;
           Effect::advance(state, coefficients, in, before);
@@ -107,7 +107,7 @@ ErrorProof prove_error(const std::vector<EffectValues>& effects, const effects::
             return sum.most() == 0.0 && sum.error == 0.0 ? 0.0 : sum.error + kOfDouble * (1.0 + sum.most());
           };
           part.bound = {bound(out.motor), bound(out.transmission), bound(out.load)};
-          part.unproven = Unproven::reason();
+          part.unproven = ProofFailure::reason();
           if (!part.unproven.empty()) return;
           growth.grown = growth.grown || of_part.grown;
           growth.changed = growth.changed || of_part.changed;

@@ -6,14 +6,14 @@
 #include <stdexcept>
 
 #include "host/catalogue/constants.hpp"
-#include "host/catalogue/defined.hpp"
+#include "host/catalogue/user_defined_effect.hpp"
 #include "shared/effects/variables.hpp"
 
 namespace flexspline::deployment {
 namespace {
 
 constexpr std::array<const char*, 3> kBalanceNames = {"motor", "transmission", "load"};
-// An odd number of points has one at nought, where most laws bend.
+// An odd number of points has one at zero, where most laws bend.
 constexpr std::size_t kPoints = 255, kPointsOfTurn = 256;
 constexpr std::size_t kChecked = 16;  // places between two points at which the error is measured
 constexpr double kFoldedRange = 2.0;  // bases
@@ -24,7 +24,7 @@ const effects::VariableInfo& info_of(effects::Variable variable) {
 }
 
 const catalogue::Entry& table_entry() {
-  return *catalogue::find_made_by_user(catalogue::kTableEffect);
+  return *catalogue::find_user_defined(catalogue::kTableEffect);
 }
 
 }  // namespace
@@ -33,8 +33,8 @@ std::size_t table_number() {
   return table_entry().id;
 }
 
-std::optional<Folded> folded(const model::Effect& effect, const model::Drive& drive,
-                             const effects::DriveConstants<double>& bases) {
+std::optional<FoldedTable> folded(const model::Effect& effect, const model::Drive& drive,
+                                  const effects::DriveConstants<double>& bases) {
   const catalogue::Entry& entry = catalogue::entry_of(effect);
   const auto constants = catalogue::constants_of(drive);
   const std::vector<double> parameters = catalogue::values_of(effect, entry);
@@ -49,7 +49,7 @@ std::optional<Folded> folded(const model::Effect& effect, const model::Drive& dr
   const auto torque = [&](std::span<const double> x) {
     return catalogue::torque_over(entry, parameters, constants, single->variable, x);
   };
-  Folded result;
+  FoldedTable result;
   model::Definition d;
   d.balance = kBalanceNames[static_cast<std::size_t>(entry.info->balance)];
   if (effect.definition) d.balance = effect.definition->balance;
@@ -58,7 +58,7 @@ std::optional<Folded> folded(const model::Effect& effect, const model::Drive& dr
   d.table.at = at;
   d.table.value = torque(at);
   d.table.fixed = true;
-  // Beside the points: what straight lines are off.
+  // The error of linear interpolation, in addition to that of the points.
   const std::size_t steps = variable.periodic ? at.size() : at.size() - 1;
   for (std::size_t k = 0; k < steps; ++k) {
     const double step = at[1] - at[0];

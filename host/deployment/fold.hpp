@@ -11,13 +11,13 @@
 
 namespace flexspline::deployment {
 
-struct Folded {
+struct FoldedTable {
   model::Effect table;  // on the balance of the effect, over the whole envelope of a drive with these bases
   double error = 0.0;   // largest difference to the effect within the envelope, N m on its balance
 };
 // Nothing where the effect depends on more than one signal, on none, or on what was before.
-std::optional<Folded> folded(const model::Effect& effect, const model::Drive& drive,
-                             const effects::DriveConstants<double>& bases);
+std::optional<FoldedTable> folded(const model::Effect& effect, const model::Drive& drive,
+                                  const effects::DriveConstants<double>& bases);
 
 // The number of table effects in a block.
 std::size_t table_number();

@@ -1,4 +1,4 @@
-// The note in a block that says which build of the tool made it. A drive passes it over.
+// The note in a block with the build of the tool that wrote it. A drive ignores it.
 #pragma once
 
 #include <cstdint>
@@ -12,7 +12,7 @@ inline constexpr std::uint16_t kMakerNote = 0xF001;
 
 // What this build writes: text::tool_name().
 std::vector<std::uint8_t> maker_note();
-// What stands in a good block; empty where it does not say.
+// The contents of a valid block; empty where it does not state them.
 std::string maker_of(std::span<const std::uint8_t> block);
 
 }  // namespace flexspline::deployment

@@ -5,7 +5,7 @@
 #include <span>
 #include <vector>
 
-#include "host/deployment/trial.hpp"
+#include "host/deployment/fixed_point_check.hpp"
 #include "host/model/model.hpp"
 
 namespace flexspline::deployment {

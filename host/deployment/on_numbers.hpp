@@ -6,10 +6,10 @@
 #include <memory>
 #include <vector>
 
+#include "host/deployment/fixed_point_check.hpp"
 #include "host/deployment/pack.hpp"
-#include "host/deployment/trial.hpp"
 #include "shared/effects/walk.hpp"
-#include "shared/fixed/findings.hpp"
+#include "shared/fixed/overflow_log.hpp"
 #include "shared/model/drive_model.hpp"
 
 namespace flexspline::deployment {
@@ -20,10 +20,10 @@ void add(model::DriveModel<N>& model, const EffectValues& e, const effects::Driv
   effects::for_each_effect([&]<class Effect>(std::size_t number) {
     if constexpr (!Effect::kInfo.host_only) {
       if (number != e.number) return;
-      fixed::Findings::clear();
+      fixed::OverflowLog::clear();
       const bool placed = model.template add<Effect>(Effect::template derive<N>(e.parameters.data(), drive));
-      if (fixed::Findings::count() != 0)
-        throw PackError(fmt::format("{} does not fit: {}", e.id, fixed::Findings::first()));
+      if (fixed::OverflowLog::count() != 0)
+        throw PackError(fmt::format("{} does not fit: {}", e.id, fixed::OverflowLog::first()));
       if (!placed)
         throw PackError(
             fmt::format("{} does not fit: a drive has no place for more of its kind; take some out of "
@@ -41,9 +41,9 @@ std::unique_ptr<model::DriveModel<N>> model_of(const std::vector<EffectValues>& 
 }
 
 // Which of the effects a tick is at, as it visits them by rising number, those of one number in their order.
-class Visited {
+class VisitedEffects {
  public:
-  explicit Visited(const std::vector<EffectValues>& effects) : effects_(effects) {}
+  explicit VisitedEffects(const std::vector<EffectValues>& effects) : effects_(effects) {}
   void start() { before_.assign(effects::kLastId + 1, 0); }
   std::size_t next(std::size_t number) {
     std::size_t skip = before_[number]++;

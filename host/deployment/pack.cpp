@@ -8,14 +8,14 @@
 #include <limits>
 
 #include "host/catalogue/constants.hpp"
-#include "host/catalogue/defined.hpp"
+#include "host/catalogue/user_defined_effect.hpp"
 #include "host/deployment/bases.hpp"
 #include "host/deployment/error_proof.hpp"
+#include "host/deployment/fixed_point_check.hpp"
 #include "host/deployment/fold.hpp"
 #include "host/deployment/maker.hpp"
 #include "host/deployment/note.hpp"
 #include "host/deployment/sha256.hpp"
-#include "host/deployment/trial.hpp"
 #include "host/output/text.hpp"
 #include "shared/control/drive_block.hpp"
 #include "shared/fixed/system.hpp"
@@ -26,8 +26,8 @@ namespace flexspline::deployment {
 namespace {
 
 using effects::DriveConstants;
-using fixed::Findings;
 using fixed::Fixed;
+using fixed::OverflowLog;
 
 constexpr std::array<double, 4> kTorqueScales = {1.0, 2.0, 4.0, 8.0};
 // Limits in bases: those of torque and current are the ratings, so that they hold where nothing else is known.
@@ -57,7 +57,7 @@ OnDrive on_drive(const model::Model& model, const PackOptions& options) {
       throw PackError(
           fmt::format("{} does not fit: it is too large for a drive, and has a memory that no table holds; "
                       "replace it by one of {}",
-                      effect.id, entry.info->rivals));
+                      effect.id, entry.info->confused_with));
     if (effect.type == catalogue::kTableEffect && has(effect.type)) {
       all.effects.push_back({table_number(), effect.id, catalogue::table_parameters(*effect.definition)});
     } else if (effect.type != catalogue::kExpressionEffect && effect.type != catalogue::kTableEffect &&
@@ -123,12 +123,12 @@ model::BlockHeader header_of(const model::Model& model, const DriveConstants<dou
 ProofPart add_encoder_filter(model::BlockWriter& writer, const DriveConstants<double>& d, const PackOptions& options) {
   using observers::EncoderKalman;
   const double corner = kTurn * options.filter_corner_hz;
-  Findings::clear();
+  OverflowLog::clear();
   const auto c = EncoderKalman::derive<Fixed>(observers::setup_for_corner(*options.encoder_counts, corner, d), d);
   const auto bounds = observers::kalman_bounds(observers::kalman_gains(corner * d.time_base));
-  if (Findings::count() != 0 || !bounds.fit)
+  if (OverflowLog::count() != 0 || !bounds.fit)
     throw PackError(fmt::format("the encoder filter does not fit: {}; choose another corner than {:g} Hz",
-                                Findings::count() != 0 ? Findings::first() : "its states leave their range",
+                                OverflowLog::count() != 0 ? OverflowLog::first() : "its states leave their range",
                                 options.filter_corner_hz));
   writer.add(static_cast<std::uint16_t>(model::Section::encoder_filter), c);
   return {"encoder_filter", "impulse_response", bounds.velocity * d.velocity_base,
@@ -146,16 +146,16 @@ void prove_filters(const control::DriveSetup<double>& setup, const DriveConstant
   if (setup.output_counts != 0) filter("output_filter", setup.output_corner, d.output_velocity_base);
 }
 
-struct Tried {
+struct ScaledModel {
   DriveConstants<double> drive;
   Bounds bounds;
 };
 // Widens the bases of torque until the proof holds.
-Tried proven(const model::Model& model, const std::vector<EffectValues>& effects, const PackOptions& options,
-             Packed& packed) {
+ScaledModel proven(const model::Model& model, const std::vector<EffectValues>& effects, const PackOptions& options,
+                   Packed& packed) {
   std::string reason;
   for (const double scale : kTorqueScales) {
-    Tried tried{bases_of(model, 1.0 / options.tick_hz, scale), {}};
+    ScaledModel tried{bases_of(model, 1.0 / options.tick_hz, scale), {}};
     try {
       tried.bounds = prove(effects, tried.drive);
     } catch (const PackError& error) {
@@ -181,7 +181,7 @@ std::array<double, 3> torque_bases(const DriveConstants<double>& d) {
   return {d.torque_base, d.output_torque_base, d.output_torque_base};
 }
 
-void prove_parts(const std::vector<EffectValues>& effects, const Tried& tried, const std::string& unit,
+void prove_parts(const std::vector<EffectValues>& effects, const ScaledModel& tried, const std::string& unit,
                  Packed& packed) {
   const auto bases = torque_bases(tried.drive);
   const auto entries = catalogue::all();
@@ -237,8 +237,8 @@ void measure_error(const Difference& d, const PackOptions& options, const Scale&
         packed.max_error_share_of_rated, packed.worst_balance, options.bound));
 }
 
-// The proof of the error, by parts, beside what was measured of each.
-void prove_errors(const OnDrive& run, const Tried& tried, const Difference& measured, const PackOptions& options,
+// The proof of the error, by parts, with the measured error of each.
+void prove_errors(const OnDrive& run, const ScaledModel& tried, const Difference& measured, const PackOptions& options,
                   const Scale& scale, Packed& packed) {
   constexpr double kNone = std::numeric_limits<double>::infinity();
   ErrorProof proof = prove_error(run.effects, tried.drive);
@@ -280,7 +280,7 @@ Packed pack(const model::Model& model, const PackOptions& options) {
   const std::vector<EffectValues>& effects = run.effects;
   const std::string unit = model.drive.axis == data::Axis::linear ? "N" : "N*m";
   Packed packed;
-  const Tried tried = proven(model, effects, options, packed);
+  const ScaledModel tried = proven(model, effects, options, packed);
   prove_parts(effects, tried, unit, packed);
   packed.proof.insert(packed.proof.end(), run.folds.begin(), run.folds.end());
   const double rated = rated_output_torque(model.drive);

@@ -81,7 +81,7 @@ struct Packed {
 // error exceeds the bound.
 Packed pack(const model::Model& model, const PackOptions& options = {});
 
-// A coefficient as it stands in a block.
+// A coefficient as it is stored in a block.
 struct Coefficient {
   std::string kind;  // "gain", "value", ...
   double value = 0.0;
@@ -94,7 +94,7 @@ struct Unpacked {
   model::BlockHeader header;
   std::vector<UnpackedEffect> effects;
   std::vector<std::uint16_t> sections;
-  // Of the drive's settings, in SI; empty where the block has none, and then `refusal` says what a drive makes of it.
+  // Of the drive's settings, in SI; empty where the block has none, and then `refusal` gives the drive's reason.
   std::vector<NamedQuantity> settings;
   std::string refusal;
   std::optional<model::Model> model;  // from the note that the host leaves in a block

@@ -20,7 +20,7 @@ void require_reachable(const control::DriveSettings<fixed::Fixed>& s, const Driv
   const auto tell = [&](const char* key, control::Shown is, double base, const char* unit, const char* remedy) {
     const double factor = std::ldexp(base, -fixed::kValueBits);
     throw PackError(
-        fmt::format("{}: [faults] {} is {:.4g} {}, but no more than {:.4g} {} can be told from the drive's "
+        fmt::format("{}: [faults] {} is {:.4g} {}, but no more than {:.4g} {} can be distinguished from the drive's "
                     "signals, so it would never act; {}",
                     origin, key, is.raw * factor, unit, largest(limit, limited).raw * factor, unit, remedy));
   };

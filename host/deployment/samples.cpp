@@ -36,7 +36,7 @@ void Samples::start() {
   left_ = static_cast<int>(random_() % 200) + 20;
   for (Swing& s : swings_) {
     s.rate = std::exp(between(std::log(1e-7), std::log(0.02)));
-    s.stands = random_() % 5 == 0;
+    s.at_corner = random_() % 5 == 0;
     s.corner = kCorners[random_() % kCorners.size()];
   }
 }
@@ -44,8 +44,8 @@ void Samples::start() {
 std::int32_t Samples::step(int channel) {
   Swing& s = swings_[static_cast<std::size_t>(channel)];
   // A torsion does not jump: laws with memory take the way that it went.
-  if (s.stands && channel == torsion) return torsion_;
-  if (s.stands) return s.corner;
+  if (s.at_corner && channel == torsion) return torsion_;
+  if (s.at_corner) return s.corner;
   s.phase += s.rate;
   return static_cast<std::int32_t>(std::lround(kFarthest * std::sin(s.phase)));
 }

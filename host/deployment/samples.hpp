@@ -11,8 +11,8 @@
 
 namespace flexspline::deployment {
 
-// Signals as a drive has them after its inputs were limited. Stretches of some hundred ticks in which each signal
-// swings through its range, slowly or fast, or stands at a corner: at an end, at nought, or a unit beside it.
+// Signals as a drive has them after its inputs were limited. Segments of some hundred ticks in which each signal
+// swings through its range, slowly or fast, or is at a corner: at an end, at zero, or one unit away from it.
 class Samples {
  public:
   Samples(const effects::DriveConstants<double>& drive, std::uint64_t seed);
@@ -25,7 +25,7 @@ class Samples {
     double phase = 0.0;
     double rate = 0.0;
     std::int32_t corner = 0;
-    bool stands = false;
+    bool at_corner = false;
   };
   double between(double low, double high);
   void start();

@@ -11,7 +11,7 @@ namespace flexspline::deployment {
 std::string sha256(std::span<const std::uint8_t> bytes) {
   std::array<unsigned char, 32> digest{};
   if (EVP_Digest(bytes.data(), bytes.size(), digest.data(), nullptr, EVP_sha256(), nullptr) != 1)
-    throw std::runtime_error("SHA-256 is not to be had from OpenSSL");
+    throw std::runtime_error("OpenSSL has no SHA-256");
   std::string text;
   for (const unsigned char byte : digest) text += fmt::format("{:02x}", byte);
   return text;

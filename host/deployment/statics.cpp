@@ -4,8 +4,8 @@
 #include <cmath>
 
 #include "host/catalogue/constants.hpp"
-#include "host/catalogue/defined.hpp"
 #include "host/catalogue/settled.hpp"
+#include "host/catalogue/user_defined_effect.hpp"
 
 namespace flexspline::deployment {
 namespace {

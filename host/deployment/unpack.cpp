@@ -6,7 +6,7 @@
 #include <stdexcept>
 
 #include "host/catalogue/constants.hpp"
-#include "host/catalogue/defined.hpp"
+#include "host/catalogue/user_defined_effect.hpp"
 #include "host/deployment/bases.hpp"
 #include "host/deployment/fold.hpp"
 #include "host/deployment/note.hpp"
@@ -74,12 +74,24 @@ void describe(std::int16_t x, std::vector<Coefficient>& out) {
   out.push_back({"number", static_cast<double>(x)});
 }
 
+// Lists the fields of coefficients in the order of the block; of a table only the points that it has.
+struct Describer {
+  std::vector<Coefficient>& out;
+  template <class T>
+  void operator()(T& x) {
+    describe(x, out);
+  }
+  template <class Words>
+  void points(std::int16_t& count, Words& words) {
+    describe(count, out);
+    for (std::size_t i = 0; i < static_cast<std::size_t>(count); ++i) describe(words[i], out);
+  }
+};
+
 template <class T>
-void describe_all(const T& coefficients, std::vector<Coefficient>& out) {
-  model::for_each_member(coefficients, [&](const auto& c) { describe(c, out); });
-  // Of a table only the points that it has.
-  if constexpr (requires { coefficients.points; })
-    out.resize(out.size() - coefficients.value.size() + static_cast<std::size_t>(coefficients.points));
+void describe_all(T coefficients, std::vector<Coefficient>& out) {
+  Describer describer{out};
+  coefficients.fields(describer);
 }
 
 std::string text_of(const model::Name& name) {
@@ -97,7 +109,7 @@ std::string text_of(const model::Name& name) {
   if (v.field >= 0) where += fmt::format("{}field {}", where.empty() ? " (" : ", ", v.field);
   if (!where.empty()) where += ")";
   throw PackError(
-      fmt::format("this is no good parameter block: {}{}; pack the model again", model::text_of(v.fault), where));
+      fmt::format("this is not a good parameter block: {}{}; pack the model again", model::text_of(v.fault), where));
 }
 
 // Whether the effects' coefficients are, to the bit, what the note's parameters give.

@@ -19,7 +19,7 @@ struct Origin {
 
 // One CSV file of a run.
 std::string csv_of(const Recording& recording, const Scales& scales, const Origin& origin);
-// Of those that are complete, dataset.toml beside them.
+// Writes the recordings that are complete, and a dataset.toml in the same folder.
 std::string dataset_toml_of(const std::vector<Recording>& recordings, const Scales& scales, const Origin& origin);
 
 }  // namespace flexspline::drive

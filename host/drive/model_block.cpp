@@ -59,7 +59,7 @@ ModelBlock model_block(Session& session, const Bytes& active, const model::Model
     const double most_a = 1.99 * deployment::bases_of(model, 1.0 / pack.tick_hz, 1.0).current_base;
     std::optional<double> lowered_from_a;
     pack.settings = settings_text(deployment::unpack(active), most_a, lowered_from_a);
-    // Rounding of the block's integers is nothing to tell.
+    // Rounding of the block's integers is not reported.
     if (lowered_from_a && *lowered_from_a > 1.001 * most_a)
       made.warnings.push_back(
           fmt::format("overcurrent is lowered from {:.4g} A to {:.4g} A: with this model's rated current the "

@@ -22,7 +22,7 @@ struct ModelBlock {
   std::vector<std::string> warnings;
 };
 
-// What the drive says of itself, for the packer: tick rate, effects of its image, its board.
+// The drive's own data, for the packer: tick rate, effects of its image, its board.
 deployment::PackOptions pack_options_for(Session& session);
 
 // `active`: the drive's active block, empty where it has none; its settings are taken where `settings` are none.

@@ -54,7 +54,7 @@ protocol::Command PositionMotion::at(double time_s, double set_point_rad) const 
   c.kind = protocol::CommandKind::set;
   c.mode = protocol::Mode::position;
   c.position = start_ + static_cast<std::int64_t>(std::llround(target / kTurn * 0x1p32));
-  // Nought would mean as fast as the drive may.
+  // Zero would mean as fast as the drive may.
   c.velocity = std::max(scales_.per_unit(std::abs(velocity), scales_.constants.velocity_base), 1);
   return c;
 }

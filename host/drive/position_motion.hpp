@@ -12,7 +12,7 @@
 
 namespace flexspline::drive {
 
-// Set points of a run are radians of the motor from where the shaft stands when it begins. A host's messages are not
+// Set points of a run are radians of the motor from the shaft's position when it begins. A host's messages are not
 // punctual and a trajectory comes to rest where nothing follows, so each message asks for a place further on than the
 // next one will come late, at the run's velocity, corrected by how far the drive's set point is from the run's.
 class PositionMotion {
@@ -23,7 +23,7 @@ class PositionMotion {
   // Throws PlanError where the run does not keep to the plan's limits of velocity (a square has none) and travel.
   PositionMotion(const planning::Run& run, const planning::Limits& limits, const Scales& scales);
 
-  // Where the shaft stands, 2^-32 turns.
+  // Position of the shaft, 2^-32 turns.
   void start_at(std::int64_t angle) { start_ = angle; }
   protocol::Command arm(bool compensate) const;
   // `time_s` since the run began, `set_point_rad` the drive's own at that time, from the start.
@@ -33,7 +33,7 @@ class PositionMotion {
  private:
   const Scales& scales_;
   std::vector<double> points_;
-  double velocity_limit_ = 0.0;  // rad/s; nought: the drive's
+  double velocity_limit_ = 0.0;  // rad/s; zero: the drive's
   std::int64_t start_ = 0;
 };
 

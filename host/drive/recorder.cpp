@@ -10,7 +10,7 @@
 
 #include "host/planning/excitation.hpp"
 #include "shared/control/excitation.hpp"
-#include "shared/fixed/findings.hpp"
+#include "shared/fixed/overflow_log.hpp"
 #include "shared/fixed/turn.hpp"
 #include "shared/protocol/excitation_requests.hpp"
 #include "shared/protocol/texts.hpp"
@@ -73,7 +73,7 @@ class Unwrapped {
 
 }  // namespace
 
-// Frames into columns, and what the plan's limits say of them.
+// Frames into columns, and the check against the plan's limits.
 class Recorder::Columns {
  public:
   Columns(const Scales& scales, const planning::Plan& plan, double tick_s, std::uint16_t every, Recording& out)
@@ -106,7 +106,7 @@ class Recorder::Columns {
     watch();
   }
   // Of mode position, from where it began.
-  // Where motor and output stand when the run begins, turns.
+  // Positions of motor and output when the run begins, turns.
   void start_at(double motor, double output) {
     start_turns_ = motor;
     motor_.begin(motor);
@@ -118,7 +118,7 @@ class Recorder::Columns {
   const std::string& exceeded() const { return exceeded_; }
 
  private:
-  // A drive that is not armed has no set point and says nought; the first one is where the shaft stood.
+  // A drive that is not armed has no set point and sends zero; the first one is the shaft's position.
   double set_point(std::uint32_t word, double samples) {
     if (!set_.known()) {
       constexpr double kSame = 0.02;  // turns
@@ -214,10 +214,10 @@ void Recorder::send_excitation(const planning::Run& run) {
   const double base = is_torque ? d.torque_base : d.velocity_base;
   setup.limit = std::max(setup.limit, 1e-6 * base);
   setup.slope_limit = std::max(setup.slope_limit, setup.limit);
-  fixed::Findings::clear();
+  fixed::OverflowLog::clear();
   const auto c = control::Excitation::derive<fixed::Fixed>(setup, base, d);
-  if (fixed::Findings::count() != 0)
-    session_.fail(fmt::format("run \"{}\" does not fit the drive: {}", run.name, fixed::Findings::first()));
+  if (fixed::OverflowLog::count() != 0)
+    session_.fail(fmt::format("run \"{}\" does not fit the drive: {}", run.name, fixed::OverflowLog::first()));
   protocol::send_excitation(c, is_torque, [this](Kind kind, const auto& payload) {
     session_.ask(kind, payload);
     return true;
@@ -228,24 +228,24 @@ void Recorder::clear_fault() {
   if (session_.status().mode == protocol::Mode::fault) session_.command({.kind = protocol::CommandKind::clear_fault});
 }
 
-// Where motor and output stand, whole turns and all; the drive says it in telemetry alone.
-Recorder::Standing Recorder::standing_now() {
+// Positions of motor and output, whole turns included; the drive sends them in telemetry alone.
+Recorder::ShaftPositions Recorder::read_shaft_positions() {
   session_.subscribe({Channel::motor_turns, Channel::motor_fraction, Channel::output_turns, Channel::output_fraction},
                      20);
-  std::optional<Standing> standing;
+  std::optional<ShaftPositions> shaft;
   const auto end = Clock::now() + kSilence;
-  while (!standing && Clock::now() < end) {
+  while (!shaft && Clock::now() < end) {
     const auto m = session_.next(Milliseconds(20));
     if (!m || !m->is_unasked()) continue;
     protocol::for_each_frame(*m, [&](const auto&, auto, std::span<const std::uint32_t> words) {
       const auto angle = [&](std::size_t i) {
         return std::int64_t{static_cast<std::int32_t>(words[i])} * (std::int64_t{1} << 32) + std::int64_t{words[i + 1]};
       };
-      if (words.size() == 4) standing = {angle(0), angle(2)};
+      if (words.size() == 4) shaft = {angle(0), angle(2)};
     });
   }
-  if (!standing) session_.fail("it does not say where its shaft is; check cable and power, then try again");
-  return *standing;
+  if (!shaft) session_.fail("it does not report the position of its shaft; check cable and power, then try again");
+  return *shaft;
 }
 
 protocol::Mode Recorder::start(const planning::Run& run, std::optional<PositionMotion>& position) {
@@ -269,35 +269,35 @@ Recording Recorder::record(const planning::Run& run, const Watch& watch) {
     before = session_.status();
   }
   if (before.mode == protocol::Mode::fault)
-    session_.fail(fmt::format("it stands in a fault: {}; find its cause, then record with --clear-fault",
+    session_.fail(fmt::format("it is in the fault state: {}; find its cause, then record with --clear-fault",
                               protocol::fault_text(before.fault).reason));
   if (before.mode != protocol::Mode::idle)
     session_.fail(fmt::format("it is in mode {}, not idle; another program may have it", name_of(before.mode)));
   std::optional<PositionMotion> position;
   // Fractions of turns alone would put each run somewhere else, and the torsion between motor and output with it.
-  const Standing standing = standing_now();
+  const ShaftPositions shaft = read_shaft_positions();
   if (run.mode == planning::Mode::position) {
     position.emplace(run, plan_.limits, scales_);
-    position->start_at(standing.motor);
+    position->start_at(shaft.motor);
   } else if (moves) {
     send_excitation(run);
   }
-  const Milliseconds say_every = position ? kSetPoint : kHeartbeat;
-  const auto say_ticks = static_cast<std::uint32_t>((position ? kSetPoint_s : kHeartbeatTick_s) / tick_s);
+  const Milliseconds report_every = position ? kSetPoint : kHeartbeat;
+  const auto report_ticks = static_cast<std::uint32_t>((position ? kSetPoint_s : kHeartbeatTick_s) / tick_s);
   Columns columns(scales_, plan_, tick_s, every_, out);
-  columns.start_at(turns_of(standing.motor), turns_of(standing.output));
+  columns.start_at(turns_of(shaft.motor), turns_of(shaft.output));
   try {
     session_.subscribe(channels_of(run), every_);
     const protocol::Mode mode = moves ? start(run, position) : protocol::Mode::idle;
-    auto said_at = Clock::now(), heard_at = said_at;
-    std::uint32_t said_tick = 0;
+    auto reported_at = Clock::now(), received_at = reported_at;
+    std::uint32_t reported_tick = 0;
     std::optional<double> began_s;  // of position
     bool waits = false;
     std::uint8_t asked = 0;
     while (true) {
       const auto m = session_.next(Milliseconds(5));
       const auto now = Clock::now();
-      if (m) heard_at = now;
+      if (m) received_at = now;
       if (m && m->is_unasked()) {
         protocol::for_each_frame(*m,
                                  [&](const auto& head, std::uint32_t i, auto words) { columns.take(head, i, words); });
@@ -323,15 +323,16 @@ Recording Recorder::record(const planning::Run& run, const Watch& watch) {
       if (!columns.exceeded().empty()) out.ended = columns.exceeded();
       if (watch.stops && watch.stops()) out.ended = "interrupted";
       if (!out.ended.empty()) break;
-      if (now - heard_at > kSilence) session_.fail("the drive went silent; check cable and power");
-      const bool is_late = now - said_at > Milliseconds(500);
-      if ((!waits || is_late) && (now - said_at >= say_every || columns.last_tick() - said_tick >= say_ticks)) {
+      if (now - received_at > kSilence) session_.fail("the drive went silent; check cable and power");
+      const bool is_late = now - reported_at > Milliseconds(500);
+      if ((!waits || is_late) &&
+          (now - reported_at >= report_every || columns.last_tick() - reported_tick >= report_ticks)) {
         waits = true;
-        const protocol::Command said =
+        const protocol::Command command =
             began_s ? position->at(time_s - *began_s, columns.set_point_rad()) : protocol::Command{};
-        asked = session_.post(protocol::request(Kind::command, 0, said));
-        said_at = now;
-        said_tick = columns.last_tick();
+        asked = session_.post(protocol::request(Kind::command, 0, command));
+        reported_at = now;
+        reported_tick = columns.last_tick();
         if (watch.progress) watch.progress(time_s);
         if (watch.seen) watch.seen(out);
       }

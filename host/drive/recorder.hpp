@@ -1,4 +1,4 @@
-// Runs the motions of a plan on a drive, one at a time, and gathers what its sensors say.
+// Runs the motions of a plan on a drive, one at a time, and collects its sensors' signals.
 #pragma once
 
 #include <cstdint>
@@ -36,11 +36,11 @@ class Recorder {
   Recorder(Session& session, const Scales& scales, const planning::Plan& plan, bool compensates = false);
 
   struct Watch {
-    std::function<bool()> stops;  // asked again and again: the user wants an end
+    std::function<bool()> stops;  // asked again and again: the user asked to stop
     std::function<void(double time_s)> progress{};
     std::function<void(const Recording& so_far)> seen{};
   };
-  // A fault that the drive stands in, as the user says that its cause is gone.
+  // Clears a fault of the drive whose cause, as the user states, is gone.
   void clear_fault();
   // The drive is at rest and not armed when it returns, and where the link still works also when it throws.
   Recording record(const planning::Run& run, const Watch& watch);
@@ -49,10 +49,10 @@ class Recorder {
   class Columns;
   void send_excitation(const planning::Run& run);
   // 2^-32 turns.
-  struct Standing {
+  struct ShaftPositions {
     std::int64_t motor = 0, output = 0;
   };
-  Standing standing_now();
+  ShaftPositions read_shaft_positions();
   protocol::Mode start(const planning::Run& run, std::optional<PositionMotion>& position);
 
   Session& session_;

@@ -19,7 +19,7 @@ namespace {
 using protocol::Kind;
 using protocol::MapAction;
 
-constexpr double kLeastIndependent = 20.0;  // samples of a velocity bin that is judged
+constexpr double kLeastIndependent = 20.0;  // samples of a velocity bin that is tested
 
 protocol::MapInfo info_of(Session& session) {
   const protocol::Identity& id = session.identity();
@@ -30,15 +30,15 @@ protocol::MapInfo info_of(Session& session) {
                     id.major, id.minor, protocol::kMajor, protocol::kMinorOfMap));
   const auto info = session.ask<protocol::MapInfo>(Kind::map_info);
   if (info.angle_bins == 0 || info.edge_count == 0 || info.scale <= 0)
-    session.fail("what it says of its residual map cannot be understood; bring the tool up to date");
+    session.fail("its residual map could not be read; update the tool");
   return info;
 }
 void command(Session& session, MapAction action) {
   const protocol::Message m = session.exchange(protocol::request(Kind::map_command, 0, protocol::MapCommand{action}));
   const auto code = static_cast<protocol::Code>(m.code);
   protocol::CommandAnswer answer;
-  const bool told = protocol::take_payload(m.content(), answer) == protocol::Code::done;
-  if (code == protocol::Code::refused && told) session.fail(std::string(protocol::text_of(answer.refusal)));
+  const bool has_reason = protocol::take_payload(m.content(), answer) == protocol::Code::done;
+  if (code == protocol::Code::refused && has_reason) session.fail(std::string(protocol::text_of(answer.refusal)));
   if (code != protocol::Code::done) session.fail(std::string(protocol::text_of(code)));
 }
 
@@ -138,7 +138,7 @@ ResidualMap read_residual_map(Session& session, const Scales& scales) {
     const protocol::MapFirst wanted{static_cast<std::uint16_t>(map.bins.size())};
     const auto part = session.ask<protocol::MapBins>(Kind::map_bins, wanted);
     if (part.first != wanted.first || part.count == 0)
-      session.fail("what it sends is no part of its residual map; try again");
+      session.fail("what it sends is not a part of its residual map; try again");
     for (std::size_t i = 0; i < part.count && map.bins.size() < all; ++i) {
       const protocol::MapBin& bin = part.bins[i];
       ResidualBin out{bin.count, 0.0, 0.0};
@@ -178,8 +178,8 @@ std::string_view name_of(MapVerdict verdict) {
   return "";
 }
 
-MapJudgement judge(const ResidualMap& map, double limit_nm) {
-  MapJudgement out;
+MapTest judge(const ResidualMap& map, double limit_nm) {
+  MapTest out;
   const auto row_of = [&](std::size_t v) { return std::span(map.bins).subspan(v * map.angle_bins, map.angle_bins); };
   std::vector<std::size_t> judged, whole;
   for (std::size_t v = 0; v < map.velocity_bins(); ++v) {
@@ -191,7 +191,7 @@ MapJudgement judge(const ResidualMap& map, double limit_nm) {
     if (std::ranges::all_of(row, [&](const ResidualBin& b) { return independent_of(map, b.ticks) >= 0.25; }))
       whole.push_back(v);
   }
-  out.judged_bins = judged.size();
+  out.tested_bins = judged.size();
   if (judged.empty()) return out;
   const double tests = static_cast<double>(judged.size()) + (whole.empty() ? 0.0 : kMostMapOrder);
   ResidualMap::Range range{map.velocity(judged.front()).low, map.velocity(judged.back()).high};

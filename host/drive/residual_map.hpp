@@ -12,15 +12,15 @@ namespace flexspline::drive {
 
 struct ResidualBin {
   std::uint32_t ticks = 0;
-  double mean_nm = 0.0;  // measured less modelled torque of the motor; nought where ticks are
+  double mean_nm = 0.0;  // measured less modelled torque of the motor; zero where ticks are
   double std_nm = 0.0;   // of single ticks
 };
 struct ResidualMap {
   bool counts = false;              // it grows while it is read
   bool of_one_moment = false;       // nothing was counted between its first and its last bin
   double tick_s = 0.0;              // from one residual that is counted to the next
-  std::size_t angle_bins = 0;       // of a turn, from nought
-  std::vector<double> edges_rad_s;  // of a direction, rising; the bin in the middle lies below the first
+  std::size_t angle_bins = 0;       // of a turn, from zero
+  std::vector<double> edges_rad_s;  // of a direction, rising; the bin in the middle is below the first
   double unit_nm = 0.0;             // steps in which the drive counts
   std::vector<ResidualBin> bins;    // velocity bin times angle_bins + angle bin; first the fastest backwards
 
@@ -42,29 +42,29 @@ bool start_residual_map(Session& session);
 // Empties it; it counts on as before. The drive refuses that while it is armed.
 void reset_residual_map(Session& session);
 
-// What a map says that a model lacks.
+// An error of the model that a map shows.
 struct MapFinding {
-  int order = 0;                  // of the motor's turn; nought: a torque over velocity
-  ResidualMap::Range velocity{};  // of an order: the whole of what was judged
+  int order = 0;                  // of the motor's turn; zero: a torque over velocity
+  ResidualMap::Range velocity{};  // of an order: the whole range that was tested
   double size_nm = 0.0;           // mean of the residual (signed), or amplitude of the order
   double std_nm = 0.0;            // of the size
   double p_value = 1.0;           // that noise alone makes this anywhere in the map: times the tests made
 };
 enum class MapVerdict : std::uint8_t { too_little_data, model_fits, model_fails };
 std::string_view name_of(MapVerdict verdict);
-struct MapJudgement {
+struct MapTest {
   MapVerdict verdict = MapVerdict::too_little_data;
-  std::size_t judged_bins = 0;       // of velocity
-  std::vector<MapFinding> findings;  // certain and above the limit; the surest first
+  std::size_t tested_bins = 0;       // of velocity
+  std::vector<MapFinding> findings;  // significant and above the limit; the most significant first
 };
 inline constexpr double kMapCertainty = 1e-3;  // largest p_value of a finding
 inline constexpr int kMostMapOrder = 8;
 // Residuals closer in time than this count as one: they went through the same filters.
 inline constexpr double kIndependent_s = 0.02;
 
-// The mean of each velocity bin is tested against nought (normal), and each order up to kMostMapOrder over all velocity
+// The mean of each velocity bin is tested against zero (normal), and each order up to kMostMapOrder over all velocity
 // bins together (chi squared of twice as many degrees of freedom), with the scatter inside of the bins as noise and by
-// Bonferroni for the number of tests. What is smaller than `limit_nm` is no finding. Standstill is not judged.
-MapJudgement judge(const ResidualMap& map, double limit_nm);
+// Bonferroni for the number of tests. What is smaller than `limit_nm` is no finding. Standstill is not tested.
+MapTest judge(const ResidualMap& map, double limit_nm);
 
 }  // namespace flexspline::drive

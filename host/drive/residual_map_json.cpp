@@ -20,7 +20,7 @@ double usual_map_limit_nm(const Scales& scales) {
   return kLimitShare * std::ldexp(scales.header.limits.torque.raw, -fixed::kValueBits) * scales.constants.torque_base;
 }
 
-json map_json(const ResidualMap& map, const MapJudgement& judgement, double limit_nm) {
+json map_json(const ResidualMap& map, const MapTest& test, double limit_nm) {
   json rows = json::array(), findings = json::array();
   for (std::size_t v = 0; v < map.velocity_bins(); ++v) {
     json ticks = json::array(), mean = json::array(), std = json::array();
@@ -36,7 +36,7 @@ json map_json(const ResidualMap& map, const MapJudgement& judgement, double limi
                     {"mean_nm", mean},
                     {"std_nm", std}});
   }
-  for (const MapFinding& f : judgement.findings)
+  for (const MapFinding& f : test.findings)
     findings.push_back({{"order", f.order == 0 ? json() : json(f.order)},
                         {"velocity_rad_s", {finite(f.velocity.low), finite(f.velocity.high)}},
                         {"size_nm", f.size_nm},
@@ -47,9 +47,9 @@ json map_json(const ResidualMap& map, const MapJudgement& judgement, double limi
           {"seconds", map.seconds()},
           {"angle_bins", map.angle_bins},
           {"rows", std::move(rows)},
-          {"verdict", name_of(judgement.verdict)},
+          {"verdict", name_of(test.verdict)},
           {"limit_nm", limit_nm},
-          {"judged_velocities", judgement.judged_bins},
+          {"judged_velocities", test.tested_bins},
           {"findings", std::move(findings)}};
 }
 

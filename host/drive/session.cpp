@@ -40,7 +40,7 @@ Session::Session(std::unique_ptr<transport::Link> link, Milliseconds answer) : l
   } catch (const DriveError&) {
     fail("nothing there answers as a drive does; is it a Flexspline drive, and does its firmware run?");
   }
-  if (protocol::take_front(m.content(), identity_) != Code::done) fail("what answers there is no drive");
+  if (protocol::take_front(m.content(), identity_) != Code::done) fail("what answers there is not a drive");
   if (identity_.major != protocol::kMajor)
     fail(fmt::format("its firmware speaks version {} of the protocol, this tool version {}; bring {} up to date",
                      identity_.major, protocol::kMajor,
@@ -62,7 +62,7 @@ void Session::home(std::int64_t position) {
   if (identity_.minor < protocol::kMinorOfHardware)
     fail("its firmware is older than position references; bring the firmware up to date");
   const auto request = protocol::request(Kind::home, 0, protocol::Home{position});
-  // A drive that was just switched on looks at its sensors first.
+  // A drive that was just switched on checks its sensors first.
   constexpr int kMostAttempts = 100;
   for (int attempt = 1;; ++attempt) {
     const protocol::Message answer = exchange(request);
@@ -146,8 +146,8 @@ protocol::CommandAnswer Session::command(const protocol::Command& command) {
 
 protocol::CommandAnswer Session::take_refusal(const protocol::Message& m) const {
   protocol::CommandAnswer answer;
-  const bool told = protocol::take_payload(m.content(), answer) == Code::done;
-  if (static_cast<Code>(m.code) == Code::refused && told) fail(std::string(protocol::text_of(answer.refusal)));
+  const bool has_reason = protocol::take_payload(m.content(), answer) == Code::done;
+  if (static_cast<Code>(m.code) == Code::refused && has_reason) fail(std::string(protocol::text_of(answer.refusal)));
   done(m);
   return answer;
 }
@@ -171,7 +171,7 @@ void Session::wait_for_rest() {
   subscribe({protocol::Channel::velocity, protocol::Channel::state},
             static_cast<std::uint16_t>(std::clamp<std::uint32_t>(identity_.tick_hz / 1000 * kEveryMs, 1, 65535)));
   const auto end = Clock::now() + std::chrono::seconds(1);
-  auto said_at = Clock::now();
+  auto reported_at = Clock::now();
   int slow = 0;
   while (slow < 3 && Clock::now() < end) {
     const auto m = next(Milliseconds(kEveryMs));
@@ -182,9 +182,9 @@ void Session::wait_for_rest() {
         slow = !armed ? 3 : velocity > -kSlow && velocity < kSlow ? slow + 1 : 0;
       });
     // A sign of the host, by its clock or by the drive's.
-    if (!m && Clock::now() - said_at < Milliseconds(20)) continue;
+    if (!m && Clock::now() - reported_at < Milliseconds(20)) continue;
     command({});
-    said_at = Clock::now();
+    reported_at = Clock::now();
   }
 }
 
@@ -196,10 +196,10 @@ Bytes Session::read_block(protocol::Which which) {
     if (static_cast<Code>(m.code) == Code::no_block) return {};
     protocol::Chunk chunk;
     if (protocol::take_payload(done(m).content(), chunk) != Code::done || chunk.offset != block.size())
-      fail("what it sends is no part of its block; try again");
+      fail("what it sends is not a part of its block; try again");
     if (chunk.count == 0) return block;
     block.insert(block.end(), chunk.bytes.begin(), chunk.bytes.begin() + chunk.count);
-    if (block.size() > identity_.block_bytes) fail("its block is longer than it says that one can be");
+    if (block.size() > identity_.block_bytes) fail("its block is longer than the limit that it states");
   }
 }
 

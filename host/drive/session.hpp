@@ -51,7 +51,7 @@ class Session {
   control::Hardware hardware();
   // What it knows of where its shafts are.
   protocol::Reference reference();
-  // Tells it where its motor stands, 2^-32 turns. Throws DriveError with the reason of a refusal.
+  // Sets the position of its motor, 2^-32 turns. Throws DriveError with the reason of a refusal.
   void home(std::int64_t position);
   protocol::Status status() { return ask<protocol::Status>(protocol::Kind::status); }
   protocol::Effects effects() { return ask<protocol::Effects>(protocol::Kind::effects); }
@@ -62,11 +62,11 @@ class Session {
 
   // Empty where there is none.
   Bytes read_block(protocol::Which which);
-  // Stages, commits and reads back. progress(bytes sent) may throw to give up.
+  // Stages, commits and reads back. progress(bytes sent) may throw to cancel.
   void write_block(const Bytes& block, const std::function<void(std::size_t)>& progress = {});
   // Returns the status after it.
   protocol::Status restore();
-  // Both blocks, for good. What is in use stays until the drive starts anew.
+  // Both blocks, for good. The block in use stays active until the drive restarts.
   void erase_all_blocks();
 
   // From now on frames come, until an empty subscription.

@@ -20,13 +20,13 @@ using numbers::Jet;
 
 constexpr std::size_t kCachedNumbers = 40'000'000;
 
-// Whether a shift or modulation reaches what a term computes.
+// Whether a shift or modulation changes the torque of a term.
 bool changes(const Term& changer, const Term& term) {
   const effects::Description& what = *changer.entry->info;
-  // A kinematic error's own torque follows the measured torque.
+  // The torque of a kinematic error follows from the measured torque.
   if (what.phase == Phase::shift)
     return (term.entry->info->reads & effects::kTorsion) != 0 && term.entry->info->phase == Phase::source;
-  // What takes the place of an effect is scaled as that would be.
+  // An effect that replaces another one is scaled like it.
   if (what.phase == Phase::modulate)
     return catalogue::names_contain(what.modulates, term.entry->name()) ||
            catalogue::names_contain(term.entry->info->replaces, what.modulates);
@@ -34,19 +34,19 @@ bool changes(const Term& changer, const Term& term) {
 }
 
 // Parameters that a column depends on, written exactly.
-void append_shapes(std::string& key, const Term& term) {
+void append_nonlinear(std::string& key, const Term& term) {
   key += fmt::format("{}", term.entry->id);
   for (std::size_t p = 0; p < term.values.size(); ++p)
     if (term.entry->parameters[p].kind != Kind::linear) key += fmt::format(",{:a}", term.values[p]);
   key += ';';
 }
 
-std::string key_of(const Terms& terms, Slot slot) {
-  const Term& term = terms[slot.term];
-  std::string key = fmt::format("{}:", slot.parameter);
-  append_shapes(key, term);
+std::string key_of(const Terms& terms, ParameterRef ref) {
+  const Term& term = terms[ref.term];
+  std::string key = fmt::format("{}:", ref.parameter);
+  append_nonlinear(key, term);
   for (const Term& other : terms)
-    if (changes(other, term)) append_shapes(key, other);
+    if (changes(other, term)) append_nonlinear(key, other);
   return key;
 }
 
@@ -61,7 +61,7 @@ DriveConstants<P> lifted(const DriveConstants<double>& d) {
   return c;
 }
 
-// The direction of a torsion rate that a shift has changed, smooth over the noise of the rate as it was measured.
+// The direction of a torsion rate that a shift has changed, smoothed over the noise of the measured rate.
 template <class S>
 S direction_of(const S& rate, double width) {
   using std::tanh;
@@ -69,23 +69,23 @@ S direction_of(const S& rate, double width) {
 }
 
 template <class N>
-const catalogue::Along<N>& along(const catalogue::Entry& entry) {
+const catalogue::BlockFunctions<N>& functions_of(const catalogue::Entry& entry) {
   if constexpr (std::is_same_v<N, Real>)
     return entry.real;
   else
     return entry.dual;
 }
 
-// Signals that a term's torque reads; kWhole where it remembers, or its inputs are changed by others, or a user made it
-// (whose formula would be read anew for each stretch).
+// Signals that a term's torque reads. kWholeRecord for effects with memory, with inputs that others change, or with a
+// formula (which would be parsed again for each block).
 unsigned reads_of(const Terms& terms, const Term& term) {
-  if (term.entry->has_state || term.entry->definition) return kWhole;
+  if (term.entry->has_state || term.entry->definition) return kWholeRecord;
   for (const Term& other : terms)
-    if (changes(other, term)) return kWhole;
+    if (changes(other, term)) return kWholeRecord;
   return term.entry->info->reads;
 }
 
-// Calls add(balance, sum) for each balance that the term acts on, and weighs what comes of it by share(balance).
+// Calls add(balance, sum) for each balance that the term acts on, and weighs the sum by share(balance).
 template <class V, class Share, class Add>
 void add_by_shares(const Term& term, Share share, std::span<V> torque, Add add) {
   for (const Balance to : {Balance::motor, Balance::transmission, Balance::load}) {
@@ -112,15 +112,16 @@ bool BalanceData::change_inputs(const Terms& terms, const Term& term, const Reco
   if (!any) return false;
   const auto constants = lifted<typename N::Parameter>(prepared_->constants);
   changed.reserve(r.inputs.size());
-  r.inputs.all().each_stretch([&](std::size_t, std::span<const effects::Inputs<Real>> stretch) {
-    for (const auto& in : stretch) changed.push_back(catalogue::lifted<N>(in));
+  r.inputs.all().each_block([&](std::size_t, std::span<const effects::Inputs<Real>> block) {
+    for (const auto& in : block) changed.push_back(catalogue::lifted<N>(in));
   });
   bool turned = false;
   constexpr std::pair<Phase, bool> kSteps[] = {{Phase::shift, false}, {Phase::shift, true}, {Phase::modulate, false}};
   for (const auto& [phase, last] : kSteps)
     for (std::size_t t = 0; t < terms.size(); ++t)
       if (terms[t].entry->info->phase == phase && terms[t].entry->info->acts_last == last && changes(terms[t], term)) {
-        along<N>(*terms[t].entry).change(catalogue::natural(*terms[t].entry, all_values[t]).data(), constants, changed);
+        functions_of<N>(*terms[t].entry)
+            .change(catalogue::natural(*terms[t].entry, all_values[t]).data(), constants, changed);
         turned = turned || (phase == Phase::shift && (terms[t].entry->info->reads & effects::kMotorAngle) != 0);
       }
   if (turned && !r.at_rest)
@@ -145,7 +146,7 @@ void BalanceData::add_torque(const Terms& terms, const Term& term, const std::ve
   const std::vector<P> natural = catalogue::natural(*term.entry, values);
   const auto share_of = [&](Balance to) { return share(r, to); };
   add_by_shares(term, share_of, torque, [&](Balance to, typename N::Value* sum) {
-    const catalogue::Along<N>& functions = along<N>(*term.entry);
+    const catalogue::BlockFunctions<N>& functions = functions_of<N>(*term.entry);
     if (any)
       functions.torque(natural.data(), constants, to, changed, sum);
     else
@@ -155,7 +156,7 @@ void BalanceData::add_torque(const Terms& terms, const Term& term, const std::ve
 
 namespace {
 
-// Linear parameters: all zero but one, which is one. Others as they stand.
+// Linear parameters: all zero but one, which is one. Others keep their values.
 std::vector<double> unit_values(const Term& term, std::size_t parameter) {
   std::vector<double> values = term.values;
   for (std::size_t p = 0; p < values.size(); ++p)
@@ -163,7 +164,7 @@ std::vector<double> unit_values(const Term& term, std::size_t parameter) {
   return values;
 }
 
-// Whether the torque is straight in all linear parameters together, so that a slope by one of them is its column.
+// Whether the torque is linear in all linear parameters together, so that a slope by one of them is its column.
 bool is_linear_in_all(const catalogue::Entry& entry) {
   return std::all_of(entry.parameters.begin(), entry.parameters.end(), [](const effects::ParameterInfo& p) {
     return p.per.empty() && p.root_of.empty() && (p.kind != Kind::linear || !(p.low > 0.0));
@@ -172,22 +173,22 @@ bool is_linear_in_all(const catalogue::Entry& entry) {
 
 // Columns of two linear parameters of a term by one evaluation, which finds the wave or bell that both multiply once:
 // the first parameter is one, the second zero with a slope of one.
-struct TwoAtOnce {
+struct ColumnPair {
   std::vector<Jet> parameters;
   std::vector<Jet> torque;
   const RowRange* of = nullptr;
   std::size_t first = 0;
 
-  TwoAtOnce(const std::vector<double>& values_of_first, std::size_t second)
+  ColumnPair(const std::vector<double>& values_of_first, std::size_t second)
       : parameters(values_of_first.begin(), values_of_first.end()) {
     parameters[second].v[0] = 1.0;
   }
-  // Whether this is a stretch that the other parameter's column has not made yet; its torque is zero then.
-  bool begins(const RowRange& range, const ColumnStretch& stretch) {
-    if (of == &range && first == stretch.first && torque.size() == stretch.signal.size()) return false;
+  // Whether this is a block that the other parameter's column has not computed yet; its torque is zero then.
+  bool begins(const RowRange& range, const ColumnBlock& block) {
+    if (of == &range && first == block.first && torque.size() == block.signal.size()) return false;
     of = &range;
-    first = stretch.first;
-    torque.assign(stretch.signal.size(), Jet(0.0));
+    first = block.first;
+    torque.assign(block.signal.size(), Jet(0.0));
     return true;
   }
 };
@@ -195,108 +196,109 @@ struct TwoAtOnce {
 // The column of one linear parameter.
 struct UnitColumn {
   const Term* term;
-  std::vector<double> values;                      // as unit_values
-  unsigned reads;                                  // as reads_of
-  std::shared_ptr<TwoAtOnce> first_of, second_of;  // with the column after it, before it
+  std::vector<double> values;                       // as unit_values
+  unsigned reads;                                   // as reads_of
+  std::shared_ptr<ColumnPair> first_of, second_of;  // with the column after it, before it
 };
 
-UnitColumn unit_column(const Terms& terms, Slot slot) {
-  const Term& term = terms[slot.term];
-  return {&term, unit_values(term, slot.parameter), term.adds_torque() ? reads_of(terms, term) : 0, nullptr, nullptr};
+UnitColumn unit_column(const Terms& terms, ParameterRef ref) {
+  const Term& term = terms[ref.term];
+  return {&term, unit_values(term, ref.parameter), term.adds_torque() ? reads_of(terms, term) : 0, nullptr, nullptr};
 }
 
 bool together(const UnitColumn& first, const UnitColumn& second) {
-  return first.term == second.term && !first.second_of && first.term->adds_torque() && first.reads != kWhole &&
+  return first.term == second.term && !first.second_of && first.term->adds_torque() && first.reads != kWholeRecord &&
          is_linear_in_all(*first.term->entry);
 }
 
 }  // namespace
 
-const Eigen::VectorXd& BalanceData::column(const Terms& terms, Slot slot) {
-  make_columns(terms, {slot});
-  return cache_.at(key_of(terms, slot));
+const Eigen::VectorXd& BalanceData::column(const Terms& terms, ParameterRef ref) {
+  make_columns(terms, {ref});
+  return cache_.at(key_of(terms, ref));
 }
 
-Eigen::MatrixXd BalanceData::columns(const Terms& terms, const std::vector<Slot>& slots) {
+Eigen::MatrixXd BalanceData::columns(const Terms& terms, const std::vector<ParameterRef>& refs) {
   throw_if_cancelled();
-  make_columns(terms, slots);
-  Eigen::MatrixXd X(rows(), static_cast<Eigen::Index>(slots.size()));
-  for (std::size_t j = 0; j < slots.size(); ++j)
-    X.col(static_cast<Eigen::Index>(j)) = cache_.at(key_of(terms, slots[j]));
+  make_columns(terms, refs);
+  Eigen::MatrixXd X(rows(), static_cast<Eigen::Index>(refs.size()));
+  for (std::size_t j = 0; j < refs.size(); ++j) X.col(static_cast<Eigen::Index>(j)) = cache_.at(key_of(terms, refs[j]));
   return X;
 }
 
-void BalanceData::make_columns(const Terms& terms, const std::vector<Slot>& slots) {
+void BalanceData::make_columns(const Terms& terms, const std::vector<ParameterRef>& refs) {
   const auto missing = [&] {
-    std::vector<Slot> list;
-    for (const Slot& slot : slots)
-      if (!cache_.contains(key_of(terms, slot))) list.push_back(slot);
+    std::vector<ParameterRef> list;
+    for (const ParameterRef& ref : refs)
+      if (!cache_.contains(key_of(terms, ref))) list.push_back(ref);
     return list;
   };
-  std::vector<Slot> wanted = missing();
+  std::vector<ParameterRef> wanted = missing();
   if (wanted.empty()) return;
-  // A search over shapes makes many columns that nobody asks for again.
+  // A search over nonlinear parameters computes many columns that are not used again.
   if (cache_.size() * static_cast<std::size_t>(rows()) > kCachedNumbers) {
     cache_.clear();
     wanted = missing();
   }
   const auto all = values_of_all(terms);
   const DriveConstants<Jet> lifted_constants = lifted<Jet>(prepared_->constants);
-  std::vector<UnitColumn> made_of;
-  for (const Slot& slot : wanted) {
-    UnitColumn column = unit_column(terms, slot);
-    if (!made_of.empty() && together(made_of.back(), column))
-      column.second_of = made_of.back().first_of = std::make_shared<TwoAtOnce>(made_of.back().values, slot.parameter);
-    made_of.push_back(std::move(column));
+  std::vector<UnitColumn> unit_columns;
+  for (const ParameterRef& ref : wanted) {
+    UnitColumn column = unit_column(terms, ref);
+    if (!unit_columns.empty() && together(unit_columns.back(), column))
+      column.second_of = unit_columns.back().first_of =
+          std::make_shared<ColumnPair>(unit_columns.back().values, ref.parameter);
+    unit_columns.push_back(std::move(column));
   }
   struct Fill {
     const std::vector<UnitColumn>* of;
-    std::function<void(const RowRange&, const UnitColumn&, const ColumnStretch&)> work;
+    std::function<void(const RowRange&, const UnitColumn&, const ColumnBlock&)> work;
     unsigned reads(std::size_t column) const { return (*of)[column].reads; }
-    void operator()(const RowRange& range, std::size_t column, const ColumnStretch& stretch) const {
-      work(range, (*of)[column], stretch);
+    void operator()(const RowRange& range, std::size_t column, const ColumnBlock& block) const {
+      work(range, (*of)[column], block);
     }
   };
-  const auto fill = [&](const RowRange& range, const UnitColumn& column, const ColumnStretch& stretch) {
+  const auto fill = [&](const RowRange& range, const UnitColumn& column, const ColumnBlock& block) {
     const Term& term = *column.term;
     const Record& r = prepared_->records[range.record];
     const auto share_of = [&](Balance to) { return share(r, to); };
-    if (column.reads == kWhole) return add_torque<Real>(terms, term, column.values, r, all, stretch.signal);
+    if (column.reads == kWholeRecord) return add_torque<Real>(terms, term, column.values, r, all, block.signal);
     if (!term.adds_torque()) return;
-    if (TwoAtOnce* const both = column.second_of ? column.second_of.get() : column.first_of.get()) {
-      if (both->begins(range, stretch))
+    if (ColumnPair* const both = column.second_of ? column.second_of.get() : column.first_of.get()) {
+      if (both->begins(range, block))
         add_by_shares(term, share_of, std::span(both->torque), [&](Balance to, Jet* sum) {
-          term.entry->dual.torque_of_plain(both->parameters.data(), lifted_constants, to, stretch.inputs, sum);
+          term.entry->dual.torque_of_plain(both->parameters.data(), lifted_constants, to, block.inputs, sum);
         });
-      for (std::size_t k = 0; k < stretch.signal.size(); ++k)
-        stretch.signal[k] = column.second_of ? both->torque[k].v[0] : both->torque[k].a;
+      for (std::size_t k = 0; k < block.signal.size(); ++k)
+        block.signal[k] = column.second_of ? both->torque[k].v[0] : both->torque[k].a;
       return;
     }
     const std::vector<double> natural = catalogue::natural(*term.entry, column.values);
-    add_by_shares(term, share_of, stretch.signal, [&](Balance to, double* sum) {
-      term.entry->real.torque_of_plain(natural.data(), prepared_->constants, to, stretch.inputs, sum);
+    add_by_shares(term, share_of, block.signal, [&](Balance to, double* sum) {
+      term.entry->real.torque_of_plain(natural.data(), prepared_->constants, to, block.inputs, sum);
     });
   };
-  const Eigen::MatrixXd made = filtered_columns(wanted.size(), Fill{&made_of, fill});
+  const Eigen::MatrixXd made = filtered_columns(wanted.size(), Fill{&unit_columns, fill});
   for (std::size_t j = 0; j < wanted.size(); ++j)
     cache_.insert_or_assign(key_of(terms, wanted[j]), made.col(static_cast<Eigen::Index>(j)));
 }
 
-Eigen::VectorXd BalanceData::shape_column(const Terms& terms, const std::vector<std::size_t>& on_balance, Slot shape) {
-  return shape_columns(terms, on_balance, {shape});
+Eigen::VectorXd BalanceData::nonlinear_column(const Terms& terms, const std::vector<std::size_t>& on_balance,
+                                              ParameterRef nonlinear_ref) {
+  return nonlinear_columns(terms, on_balance, {nonlinear_ref});
 }
 
-Eigen::MatrixXd BalanceData::shape_columns(const Terms& terms, const std::vector<std::size_t>& on_balance,
-                                           const std::vector<Slot>& shapes) {
-  Eigen::MatrixXd columns = Eigen::MatrixXd::Zero(rows(), static_cast<Eigen::Index>(shapes.size()));
-  std::vector<Slot> together;
+Eigen::MatrixXd BalanceData::nonlinear_columns(const Terms& terms, const std::vector<std::size_t>& on_balance,
+                                               const std::vector<ParameterRef>& nonlinear) {
+  Eigen::MatrixXd columns = Eigen::MatrixXd::Zero(rows(), static_cast<Eigen::Index>(nonlinear.size()));
+  std::vector<ParameterRef> together;
   std::vector<Eigen::Index> at;
-  for (std::size_t j = 0; j < shapes.size(); ++j) {
+  for (std::size_t j = 0; j < nonlinear.size(); ++j) {
     const auto column = static_cast<Eigen::Index>(j);
-    if (is_slope_cached(terms, shapes[j])) {
-      columns.col(column) = cached_slope(terms, shapes[j]);
+    if (is_slope_cached(terms, nonlinear[j])) {
+      columns.col(column) = cached_slope(terms, nonlinear[j]);
     } else {
-      together.push_back(shapes[j]);
+      together.push_back(nonlinear[j]);
       at.push_back(column);
     }
   }
@@ -304,44 +306,45 @@ Eigen::MatrixXd BalanceData::shape_columns(const Terms& terms, const std::vector
   std::vector<std::vector<Jet>> all;
   for (const Term& term : terms) all.emplace_back(term.values.begin(), term.values.end());
   std::vector<Jet> torque;
-  columns(Eigen::all, at) =
-      filtered_columns(together.size(), AtOnce{[&](const RowRange& range, std::size_t j, std::span<double> signal) {
-                         const Slot shape = together[j];
-                         all[shape.term][shape.parameter].v[0] = 1.0;
-                         torque.assign(signal.size(), Jet(0.0));
-                         for (const std::size_t t : on_balance)
-                           if (terms[t].adds_torque() && (t == shape.term || changes(terms[shape.term], terms[t])))
-                             add_torque<Dual>(terms, terms[t], all[t], prepared_->records[range.record], all, torque);
-                         for (std::size_t k = 0; k < signal.size(); ++k) signal[k] = torque[k].v[0];
-                         all[shape.term][shape.parameter].v[0] = 0.0;
-                       }});
+  columns(Eigen::all, at) = filtered_columns(
+      together.size(), WholeRecord{[&](const RowRange& range, std::size_t j, std::span<double> signal) {
+        const ParameterRef nonlinear_ref = together[j];
+        all[nonlinear_ref.term][nonlinear_ref.parameter].v[0] = 1.0;
+        torque.assign(signal.size(), Jet(0.0));
+        for (const std::size_t t : on_balance)
+          if (terms[t].adds_torque() && (t == nonlinear_ref.term || changes(terms[nonlinear_ref.term], terms[t])))
+            add_torque<Dual>(terms, terms[t], all[t], prepared_->records[range.record], all, torque);
+        for (std::size_t k = 0; k < signal.size(); ++k) signal[k] = torque[k].v[0];
+        all[nonlinear_ref.term][nonlinear_ref.parameter].v[0] = 0.0;
+      }});
   return columns;
 }
 
-bool BalanceData::is_slope_cached(const Terms& terms, Slot shape) const {
-  const Term& term = terms[shape.term];
+bool BalanceData::is_slope_cached(const Terms& terms, ParameterRef nonlinear_ref) const {
+  const Term& term = terms[nonlinear_ref.term];
   return term.entry->info->phase == Phase::source && term.adds_torque() && term.entry->count(Kind::linear) == 1;
 }
 
-Eigen::VectorXd BalanceData::cached_slope(const Terms& terms, Slot shape) {
-  const Term& term = terms[shape.term];
+Eigen::VectorXd BalanceData::cached_slope(const Terms& terms, ParameterRef nonlinear_ref) {
+  const Term& term = terms[nonlinear_ref.term];
   std::size_t scale = 0;
   while (term.entry->parameters[scale].kind != Kind::linear) ++scale;
-  const std::string key = fmt::format("slope {}:{}", shape.parameter, key_of(terms, {shape.term, scale}));
+  const std::string key =
+      fmt::format("slope {}:{}", nonlinear_ref.parameter, key_of(terms, {nonlinear_ref.term, scale}));
   auto found = cache_.find(key);
   if (found == cache_.end()) {
     if (cache_.size() * static_cast<std::size_t>(rows()) > kCachedNumbers) cache_.clear();
     std::vector<std::vector<Jet>> all;
     for (const Term& other : terms) all.emplace_back(other.values.begin(), other.values.end());
-    all[shape.term][scale] = Jet(1.0);
-    all[shape.term][shape.parameter].v[0] = 1.0;
+    all[nonlinear_ref.term][scale] = Jet(1.0);
+    all[nonlinear_ref.term][nonlinear_ref.parameter].v[0] = 1.0;
     std::vector<Jet> torque;
     const auto fill = [&](const RowRange& range, std::size_t, std::span<double> signal) {
       torque.assign(signal.size(), Jet(0.0));
-      add_torque<Dual>(terms, term, all[shape.term], prepared_->records[range.record], all, torque);
+      add_torque<Dual>(terms, term, all[nonlinear_ref.term], prepared_->records[range.record], all, torque);
       for (std::size_t k = 0; k < signal.size(); ++k) signal[k] = torque[k].v[0];
     };
-    found = cache_.emplace(key, filtered_columns(1, AtOnce{fill})).first;
+    found = cache_.emplace(key, filtered_columns(1, WholeRecord{fill})).first;
   }
   return term.values[scale] * found->second;
 }
@@ -355,7 +358,8 @@ Eigen::VectorXd BalanceData::known_torque(const Terms& terms, const std::vector<
         sum += terms[t].values[p] * column(terms, {t, p});
   for (const std::size_t t : on_balance)
     if (terms[t].scaled_by_none()) sum += term_torque(terms, t);
-  for (const std::size_t t : terms_reaching(terms, balance_, prepared_->torque_measured)) sum += term_torque(terms, t);
+  for (const std::size_t t : terms_acting_on_other_balance(terms, balance_, prepared_->torque_measured))
+    sum += term_torque(terms, t);
   return sum;
 }
 
@@ -364,17 +368,18 @@ Eigen::VectorXd BalanceData::term_torque(const Terms& terms, std::size_t t) {
   if (!terms[t].adds_torque()) return sum;
   if (terms[t].scaled_by_none()) {
     std::string key = "whole:";
-    append_shapes(key, terms[t]);
+    append_nonlinear(key, terms[t]);
     for (const Term& other : terms)
-      if (changes(other, terms[t])) append_shapes(key, other);
+      if (changes(other, terms[t])) append_nonlinear(key, other);
     if (const auto found = cache_.find(key); found != cache_.end()) return found->second;
     if (cache_.size() * static_cast<std::size_t>(rows()) > kCachedNumbers) cache_.clear();
     const auto all = values_of_all(terms);
     return cache_
-        .emplace(key, filtered_columns(1, AtOnce{[&](const RowRange& range, std::size_t, std::span<double> signal) {
-                                         add_torque<Real>(terms, terms[t], terms[t].values,
-                                                          prepared_->records[range.record], all, signal);
-                                       }}))
+        .emplace(key,
+                 filtered_columns(1, WholeRecord{[&](const RowRange& range, std::size_t, std::span<double> signal) {
+                                    add_torque<Real>(terms, terms[t], terms[t].values, prepared_->records[range.record],
+                                                     all, signal);
+                                  }}))
         .first->second;
   }
   for (std::size_t p = 0; p < terms[t].values.size(); ++p)

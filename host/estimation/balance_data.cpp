@@ -38,7 +38,7 @@ void BalanceData::filter(const RowRange& range, Eigen::Ref<Eigen::MatrixXd> sign
         signals.middleRows(static_cast<Eigen::Index>(s.first), static_cast<Eigen::Index>(s.last - s.first)));
 }
 
-bool BalanceData::filtered_alike(const RowRange& a, const RowRange& b) const {
+bool BalanceData::have_equal_filters(const RowRange& a, const RowRange& b) const {
   const Record &first = prepared_->records[a.record], &second = prepared_->records[b.record];
   return first.sample_s == second.sample_s && first.segments.size() == 1 && second.segments.size() == 1 &&
          first.inputs.size() == second.inputs.size() && first.segments[0].first == second.segments[0].first &&
@@ -61,17 +61,17 @@ void BalanceData::take_rows(const RowRange& range, const double* signal, Eigen::
 namespace {
 
 // Left sides of a balance and their negative slopes along a record, for BalanceData::filtered_columns.
-class LeftSides {
+class LeftHandSides {
  public:
-  LeftSides(const Prepared& prepared, Balance balance) : prepared_(prepared), balance_(balance) {}
+  LeftHandSides(const PreparedData& prepared, Balance balance) : prepared_(prepared), balance_(balance) {}
 
   unsigned reads(std::size_t) const { return 0; }
-  void operator()(const RowRange& range, std::size_t column, const ColumnStretch& stretch) {
+  void operator()(const RowRange& range, std::size_t column, const ColumnBlock& block) {
     const Record& r = prepared_.records[range.record];
     if (column == 0)
-      fill_target(r, stretch.first, stretch.signal);
+      fill_target(r, block.first, block.signal);
     else
-      fill_delay(r, stretch.first, stretch.signal);
+      fill_delay(r, block.first, block.signal);
   }
 
  private:
@@ -108,21 +108,21 @@ class LeftSides {
     }
   }
 
-  const Prepared& prepared_;
+  const PreparedData& prepared_;
   Balance balance_;
   std::vector<double> left_, slope_;
 };
 
 }  // namespace
 
-BalanceData::BalanceData(const Prepared& prepared, Balance balance) : prepared_(&prepared), balance_(balance) {
+BalanceData::BalanceData(const PreparedData& prepared, Balance balance) : prepared_(&prepared), balance_(balance) {
   Eigen::Index first = 0;
   for (std::size_t i = 0; i < prepared.records.size(); ++i) {
     const Record& r = prepared.records[i];
     const auto count = static_cast<Eigen::Index>(r.rows[index(balance)].samples.size());
     if (!usable(r)) continue;
     if (count < kFewestRows) {
-      left_out_.emplace(i, fmt::format("{} (of its {} rows {} are masked)", r.name,
+      left_out_.emplace(i, fmt::format("{} (of its {} samples {} are masked)", r.name,
                                        r.rows[index(balance)].masked + static_cast<std::size_t>(count),
                                        r.rows[index(balance)].masked));
       continue;
@@ -132,7 +132,7 @@ BalanceData::BalanceData(const Prepared& prepared, Balance balance) : prepared_(
                           std::min(prepared.pipeline.row_cutoff_hz, 0.45 / r.sample_s), 1.0 / r.sample_s);
     first += count;
   }
-  const Eigen::MatrixXd both = filtered_columns(2, LeftSides(prepared, balance));
+  const Eigen::MatrixXd both = filtered_columns(2, LeftHandSides(prepared, balance));
   target_ = both.col(0);
   delay_ = both.col(1);
 }

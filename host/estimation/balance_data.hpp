@@ -1,5 +1,5 @@
 // Rows of one torque balance over all records: the target, and a column for any parameter of any effect. Columns are
-// made when asked for and kept, so that a search over models pays for each column once.
+// computed at their first use and cached, so that a search over models computes each column once.
 #pragma once
 
 #include <Eigen/Core>
@@ -26,16 +26,16 @@ struct RowRange {
 class BalanceData {
  public:
   // Keeps a reference to `prepared`. Records that lack what the balance needs have no rows.
-  BalanceData(const Prepared& prepared, Balance balance);
+  BalanceData(const PreparedData& prepared, Balance balance);
 
   Balance balance() const { return balance_; }
   bool empty() const { return target_.size() == 0; }
   Eigen::Index rows() const { return target_.size(); }
-  const Prepared& prepared() const { return *prepared_; }
+  const PreparedData& prepared() const { return *prepared_; }
   const std::vector<RowRange>& records() const { return ranges_; }
   // Each record's rows cut into `parts` pieces of equal length: part k of all records is fold k of a cross-validation.
   std::vector<std::vector<RowRange>> folds(std::size_t parts) const;
-  // Index of the sample that a row stands for, within its record.
+  // Index of a row's sample within its record.
   std::size_t sample_of(const RowRange& range, Eigen::Index row) const;
 
   // Measured left side, filtered, N m: Km i - T/N (motor; Km i without a torque sensor), T, T - load torque.
@@ -43,24 +43,27 @@ class BalanceData {
   // Negative slope of the target: what a delay of one second adds to it, to first order.
   const Eigen::VectorXd& delay_column() const { return delay_; }
 
-  // Torque per unit of a linear parameter, with shapes, shifts and modulations as `terms` say, filtered. N m per unit.
-  // The reference holds until the next call.
-  const Eigen::VectorXd& column(const Terms& terms, Slot slot);
+  // Torque per unit of a linear parameter, with nonlinear parameters, shifts and modulations as in `terms`, filtered. N
+  // m per unit. The reference holds until the next call.
+  const Eigen::VectorXd& column(const Terms& terms, ParameterRef ref);
   // Those of many parameters side by side: what is not there yet is filtered together, which costs less than half.
-  Eigen::MatrixXd columns(const Terms& terms, const std::vector<Slot>& slots);
-  // Slope of the model's torque by a shape parameter, at the linear parameters of `terms`, filtered.
-  Eigen::VectorXd shape_column(const Terms& terms, const std::vector<std::size_t>& on_balance, Slot shape);
-  Eigen::MatrixXd shape_columns(const Terms& terms, const std::vector<std::size_t>& on_balance,
-                                const std::vector<Slot>& shapes);
-  // Torque of terms with known linear parameters, of those that no linear parameter scales at their shapes as they
-  // stand, and of those that only reach this balance, filtered: belongs on the left side. It moves with the shapes.
+  Eigen::MatrixXd columns(const Terms& terms, const std::vector<ParameterRef>& refs);
+  // Slope of the model's torque by a nonlinear parameter, at the linear parameters of `terms`, filtered.
+  Eigen::VectorXd nonlinear_column(const Terms& terms, const std::vector<std::size_t>& on_balance,
+                                   ParameterRef nonlinear_ref);
+  Eigen::MatrixXd nonlinear_columns(const Terms& terms, const std::vector<std::size_t>& on_balance,
+                                    const std::vector<ParameterRef>& nonlinear);
+  // Torque of terms with known linear parameters, of those that no linear parameter scales at their nonlinear
+  // parameters as they stand, and of those that only reach this balance, filtered: belongs on the left side. It moves
+  // with the nonlinear parameters.
   Eigen::VectorXd known_torque(const Terms& terms, const std::vector<std::size_t>& on_balance);
   // Torque of one term at its values, all parameters in, filtered.
   Eigen::VectorXd term_torque(const Terms& terms, std::size_t term);
 
-  // What one unit at each point of a table adds, one column a point: straight lines between even points of a signal
+  // What one unit at each point of a table adds, one column a point: linear interpolation between even points of a
+  // signal
   // (`low` to `high`, or over a turn for an angle), times the direction where `times_direction`. The signal is as the
-  // shifts of `terms` leave it. Unfiltered columns cost a small part and serve to tell signals apart.
+  // shifts of `terms` leave it. Unfiltered columns cost a small part and serve to distinguish signals.
   struct Points {
     effects::Variable variable{};
     bool times_direction = false;
@@ -76,7 +79,7 @@ class BalanceData {
   // The same rows and target, with columns from fewer samples (eight a period of the row cut-off): they cost a part,
   // and are near enough to choose a point on a grid and to begin a search, not to report. `few` takes the samples and
   // must live as long as the result.
-  BalanceData decimated(Prepared& few) const;
+  BalanceData decimated(PreparedData& few) const;
 
   // Rows that count as one for white noise, because the row filter correlates neighbours: row rate over twice the
   // filter's noise bandwidth. A short residual underestimates this.
@@ -87,8 +90,8 @@ class BalanceData {
  private:
   // Filters signals that are given along the samples of a range's record, in place.
   void filter(const RowRange& range, Eigen::Ref<Eigen::MatrixXd> signals) const;
-  // Whether signals of both may stand side by side in one filter.
-  bool filtered_alike(const RowRange& a, const RowRange& b) const;
+  // Whether signals of both may be filtered side by side.
+  bool have_equal_filters(const RowRange& a, const RowRange& b) const;
   bool usable(const Record& record) const;
   // How much of what adds to a balance reaches this one: its own, and by way of the gear without a torque sensor.
   double share(const Record& record, Balance of_effect) const;
@@ -106,21 +109,21 @@ class BalanceData {
   void add_torque(const Terms& terms, const Term& term, const std::vector<typename N::Parameter>& values,
                   const Record& record, const std::vector<std::vector<typename N::Parameter>>& all_values,
                   std::span<typename N::Value> torque) const;
-  // Slopes by a shape of what one parameter alone scales: kept per unit of that, as a search asks for those of the
-  // model with each candidate again.
-  bool is_slope_cached(const Terms& terms, Slot shape) const;
-  Eigen::VectorXd cached_slope(const Terms& terms, Slot shape);
+  // Slopes by a nonlinear parameter of what one parameter alone scales: kept per unit of that, as a search asks for
+  // those of the model with each candidate again.
+  bool is_slope_cached(const Terms& terms, ParameterRef nonlinear_ref) const;
+  Eigen::VectorXd cached_slope(const Terms& terms, ParameterRef nonlinear_ref);
   // Puts columns that are not there yet among those that are.
-  void make_columns(const Terms& terms, const std::vector<Slot>& slots);
+  void make_columns(const Terms& terms, const std::vector<ParameterRef>& refs);
 
-  const Prepared* prepared_;
+  const PreparedData* prepared_;
   Balance balance_;
   std::vector<RowRange> ranges_;
   std::map<std::size_t, std::string> left_out_;
   Eigen::VectorXd target_;
   Eigen::VectorXd delay_;
   std::vector<signals::ZeroPhaseFilter> filters_;  // one a range
-  // Where rows stand between the samples of decimated data: how far beyond the sample of the record's rows, in samples.
+  // Where rows are between the samples of decimated data: how far beyond the sample of the record's rows, in samples.
   std::vector<double> beyond_;
   std::unordered_map<std::string, Eigen::VectorXd> cache_;
 };

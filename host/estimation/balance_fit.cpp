@@ -8,23 +8,23 @@
 
 namespace flexspline::estimation {
 
-Eigen::MatrixXd shape_columns(BalanceData& data, const Terms& terms, const std::vector<std::size_t>& on_balance,
-                              const std::vector<Slot>& shapes) {
-  return data.shape_columns(terms, on_balance, shapes);
+Eigen::MatrixXd nonlinear_columns(BalanceData& data, const Terms& terms, const std::vector<std::size_t>& on_balance,
+                                  const std::vector<ParameterRef>& nonlinear) {
+  return data.nonlinear_columns(terms, on_balance, nonlinear);
 }
 
-NaturalValue natural_value(const Term& term, Slot asked, const std::vector<Slot>& slots,
+NaturalValue natural_value(const Term& term, ParameterRef asked, const std::vector<ParameterRef>& refs,
                            const Eigen::MatrixXd& covariance) {
   NaturalValue result;
   result.value = catalogue::natural(*term.entry, term.values)[asked.parameter];
   Eigen::VectorXd slopes = Eigen::VectorXd::Zero(covariance.rows());
-  for (std::size_t j = 0; j < slots.size(); ++j) {
-    if (slots[j].term != asked.term) continue;
+  for (std::size_t j = 0; j < refs.size(); ++j) {
+    if (refs[j].term != asked.term) continue;
     std::vector<numbers::Jet> values(term.values.begin(), term.values.end());
-    values[slots[j].parameter].v[0] = 1.0;
+    values[refs[j].parameter].v[0] = 1.0;
     slopes[static_cast<Eigen::Index>(j)] = catalogue::natural(*term.entry, values)[asked.parameter].v[0];
   }
-  // What is not determined has an infinite variance, which must not meet a slope of zero.
+  // An undetermined parameter has an infinite variance, which must not be multiplied by a slope of zero.
   for (Eigen::Index i = 0; i < slopes.size(); ++i)
     for (Eigen::Index j = 0; j < slopes.size(); ++j)
       if (slopes[i] != 0.0 && slopes[j] != 0.0) result.variance += slopes[i] * covariance(i, j) * slopes[j];
@@ -35,15 +35,15 @@ Eigen::VectorXd residual_of(BalanceData& data, const Terms& terms) {
   Eigen::VectorXd residual = data.target();
   for (const std::size_t t : terms_on(terms, data.balance(), data.prepared().torque_measured))
     residual -= data.term_torque(terms, t);
-  for (const std::size_t t : terms_reaching(terms, data.balance(), data.prepared().torque_measured))
+  for (const std::size_t t : terms_acting_on_other_balance(terms, data.balance(), data.prepared().torque_measured))
     residual -= data.term_torque(terms, t);
   return residual;
 }
 
-// Columns of the linear parameters. A column that is the target itself (the effort, where nothing but the effort fixes
-// the scale of the torques, report 3.6) would explain everything by nothing: it is zero, so not determined.
-static Eigen::MatrixXd columns_beside(BalanceData& data, const Terms& terms, const std::vector<Slot>& linear,
-                                      const Eigen::VectorXd& target) {
+// Columns of the linear parameters, and the target. A column that equals the target (the effort, where only the effort
+// fixes the scale of the torques, report 3.6) would be a trivial solution: it is set to zero, so it is not determined.
+static Eigen::MatrixXd columns_and_target(BalanceData& data, const Terms& terms,
+                                          const std::vector<ParameterRef>& linear, const Eigen::VectorXd& target) {
   constexpr double kSame = 1e-3;
   Eigen::MatrixXd X = columns_of(data, terms, linear);
   for (std::size_t j = 0; j < linear.size(); ++j) {
@@ -67,34 +67,34 @@ class Fitting {
   void fit_weighted();
   // With friction that differs between records, if that leaves nothing but noise: generalised least squares.
   void fit_generalised();
-  // Of linear parameters and shapes together, to first order.
+  // Of linear parameters and nonlinear parameters together, to first order.
   void take_uncertainty();
 
  private:
-  // Linear parameters at given shapes; `whitening` says what each row's error counts.
+  // Linear parameters at given nonlinear parameters; `whitening` is the noise covariance.
   void solve(const NoiseCovariance& whitening) {
     const Eigen::VectorXd target = data_.target() - data_.known_torque(terms_, fit_.on_balance);
-    const Eigen::MatrixXd X = columns_beside(data_, terms_, fit_.linear, target);
+    const Eigen::MatrixXd X = columns_and_target(data_, terms_, fit_.linear, target);
     const LinearFit linear = least_squares(X, target, whitening);
     for (std::size_t j = 0; j < fit_.linear.size(); ++j)
       terms_[fit_.linear[j].term].values[fit_.linear[j].parameter] = linear.theta[static_cast<Eigen::Index>(j)];
     fit_.residual = linear.residual;
   }
 
-  // Columns of linear parameters and shapes.
+  // Columns of linear parameters and nonlinear parameters.
   Eigen::MatrixXd columns() {
-    Eigen::MatrixXd J(data_.rows(), static_cast<Eigen::Index>(fit_.linear.size() + fit_.shapes.size()));
-    J << columns_beside(data_, terms_, fit_.linear, data_.target() - data_.known_torque(terms_, fit_.on_balance)),
-        shape_columns(data_, terms_, fit_.on_balance, fit_.shapes);
+    Eigen::MatrixXd J(data_.rows(), static_cast<Eigen::Index>(fit_.linear.size() + fit_.nonlinear.size()));
+    J << columns_and_target(data_, terms_, fit_.linear, data_.target() - data_.known_torque(terms_, fit_.on_balance)),
+        nonlinear_columns(data_, terms_, fit_.on_balance, fit_.nonlinear);
     return J;
   }
 
-  // What a factor of each group of friction does to the torque, of `columns`.
+  // The torque of each friction group, from `columns`.
   Eigen::MatrixXd friction(const Eigen::MatrixXd& columns) const {
     Eigen::VectorXd theta = Eigen::VectorXd::Zero(columns.cols());
     for (std::size_t j = 0; j < fit_.linear.size(); ++j)
       theta[static_cast<Eigen::Index>(j)] = terms_[fit_.linear[j].term].values[fit_.linear[j].parameter];
-    return columns * random_effect_directions(friction_groups(terms_, fit_.linear, fit_.shapes), theta,
+    return columns * random_effect_directions(friction_groups(terms_, fit_.linear, fit_.nonlinear), theta,
                                               Eigen::VectorXd::Ones(columns.cols()),
                                               static_cast<Eigen::Index>(fit_.linear.size()));
   }
@@ -110,18 +110,18 @@ class Fitting {
   BalanceData& data_;
   Terms& terms_;
   BalanceFit& fit_;
-  Eigen::VectorXd noise_weights_;  // of the rows without what the records' own friction does to them
+  Eigen::VectorXd noise_weights_;  // of the residual without the records' random effects
   Eigen::MatrixXd J_, friction_, torques_;
   RecordVariance between_;
 };
 
 void Fitting::fit_weighted() {
   // Weights and parameters depend on each other; two rounds are enough.
-  sweep_shapes(data_, terms_, fit_.on_balance, fit_.root_weights);
+  sweep_nonlinear(data_, terms_, fit_.on_balance, fit_.root_weights);
   for (int round = 0; round < 2; ++round) {
     solve(fit_.root_weights);
     fit_.root_weights = record_weights(data_.records(), fit_.residual);
-    if (!fit_.shapes.empty()) refine_shapes(data_, terms_, fit_.on_balance, fit_.root_weights);
+    if (!fit_.nonlinear.empty()) refine_nonlinear(data_, terms_, fit_.on_balance, fit_.root_weights);
   }
   solve(fit_.root_weights);
   fit_.whitening = noise_weights_ = fit_.root_weights;
@@ -136,9 +136,9 @@ void Fitting::fit_generalised() {
     noise_weights_ = record_weights(data_.records(), between_.left.cwiseQuotient(noise_weights_));
     fit_.whitening = noise_covariance(data_, noise_weights_, noise_weights_.asDiagonal() * friction_, between_.std,
                                       between_.autocorrelation_time);
-    // With friction that differs a small effect has another best shape than without, and far away.
-    if (round == 0) sweep_shapes(data_, terms_, fit_.on_balance, fit_.whitening, SweepFrom::values);
-    if (!fit_.shapes.empty()) refine_shapes(data_, terms_, fit_.on_balance, fit_.whitening);
+    // With random effects the best nonlinear parameter of a small effect may be far from that without.
+    if (round == 0) sweep_nonlinear(data_, terms_, fit_.on_balance, fit_.whitening, SweepFrom::values);
+    if (!fit_.nonlinear.empty()) refine_nonlinear(data_, terms_, fit_.on_balance, fit_.whitening);
     solve(fit_.whitening);
     estimate_differences();
   }
@@ -164,7 +164,7 @@ void Fitting::take_uncertainty() {
   std::vector<Eigen::Index> identified;
   for (Eigen::Index j = 0; j < J_.cols(); ++j)
     if (std::isfinite(generalised.unit_covariance(j, j))) identified.push_back(j);
-  // Of the rows without what friction that differs from record to record does to them; that is added after.
+  // Covariance without the records' random effects, which are added below.
   const Eigen::MatrixXd columns = fit_.whitening.score_columns(J_(Eigen::all, identified));
   const Eigen::MatrixXd middle = newey_west(data_.records(), columns, between_.left,
                                             newey_west_lags(between_.autocorrelation_time, data_.rows())) *
@@ -185,8 +185,8 @@ BalanceFit fit_balance(BalanceData& data, Terms& terms) {
   BalanceFit fit;
   fit.balance = data.balance();
   fit.on_balance = terms_on(terms, data.balance(), data.prepared().torque_measured);
-  fit.linear = free_linear_slots(terms, fit.on_balance);
-  fit.shapes = free_shape_slots(terms, fit.on_balance);
+  fit.linear = free_linear_parameters(terms, fit.on_balance);
+  fit.nonlinear = free_nonlinear_parameters(terms, fit.on_balance);
   fit.root_weights = Eigen::VectorXd::Ones(data.rows());
   fit.whitening = fit.root_weights;
   if (data.empty()) return fit;

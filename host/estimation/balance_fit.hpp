@@ -1,5 +1,6 @@
-// One balance fitted: shapes and linear parameters together, with weights by record and their uncertainty. Where
-// friction differs from record to record and nothing but noise is left beside that, by generalised least squares.
+// One balance fitted: nonlinear parameters and linear parameters together, with weights by record and their
+// uncertainty. Where friction differs from record to record and nothing else but noise is left, by generalised least
+// squares.
 #pragma once
 
 #include <Eigen/Core>
@@ -14,13 +15,13 @@ namespace flexspline::estimation {
 struct BalanceFit {
   Balance balance = Balance::motor;
   std::vector<std::size_t> on_balance;  // terms
-  std::vector<Slot> linear;             // free parameters that the torque is proportional to
-  std::vector<Slot> shapes;
+  std::vector<ParameterRef> linear;     // free parameters that the torque is proportional to
+  std::vector<ParameterRef> nonlinear;
   Eigen::VectorXd residual;      // target minus model, N m
   Eigen::VectorXd root_weights;  // one over the residual's RMS of each record
   // What the parameters were found with: weights, and friction that differs from record to record taken down.
   NoiseCovariance whitening = Eigen::VectorXd();
-  Eigen::MatrixXd covariance;      // of linear, then shapes; corrected for autocorrelation
+  Eigen::MatrixXd covariance;      // of linear, then nonlinear parameters; corrected for autocorrelation
   Eigen::VectorXd root_tolerance;  // likewise; see LinearFit
   Eigen::VectorXd excitation;      // likewise: LinearFit::share_beside_all
   Eigen::VectorXd white_variance;  // likewise: what the variances would be without autocorrelation
@@ -31,8 +32,8 @@ struct BalanceFit {
   }
 };
 
-// Estimates all free parameters on the balance and writes them into `terms`. Shapes that the model states are where the
-// search starts; others are swept first. Parameters that the data do not determine are set to zero (see
+// Estimates all free parameters on the balance and writes them into `terms`. Nonlinear parameters that the model states
+// are where the search starts; others are swept first. Parameters that the data do not determine are set to zero (see
 // root_tolerance).
 BalanceFit fit_balance(BalanceData& data, Terms& terms);
 
@@ -42,15 +43,16 @@ struct NaturalValue {
   double value = 0.0;
   double variance = 0.0;
 };
-// `slots` are those of `covariance`, in its order; the parameter asked for need not be among them.
-NaturalValue natural_value(const Term& term, Slot asked, const std::vector<Slot>& slots,
+// `refs` are the parameters of `covariance`, in its order; the requested one need not be among them.
+NaturalValue natural_value(const Term& term, ParameterRef asked, const std::vector<ParameterRef>& refs,
                            const Eigen::MatrixXd& covariance);
 
-// Residual of terms as they stand on (other) data, N m.
+// Residual of terms at their present values on (other) data, N m.
 Eigen::VectorXd residual_of(BalanceData& data, const Terms& terms);
 
-// Slopes of the model by its free shapes: columns that let a linear fit move shapes to first order.
-Eigen::MatrixXd shape_columns(BalanceData& data, const Terms& terms, const std::vector<std::size_t>& on_balance,
-                              const std::vector<Slot>& shapes);
+// Slopes of the model by its free nonlinear parameters: columns that let a linear fit move nonlinear parameters to
+// first order.
+Eigen::MatrixXd nonlinear_columns(BalanceData& data, const Terms& terms, const std::vector<std::size_t>& on_balance,
+                                  const std::vector<ParameterRef>& nonlinear);
 
 }  // namespace flexspline::estimation

@@ -12,12 +12,12 @@ namespace detail {
 inline thread_local const CancellationCheck* check_of_thread = nullptr;
 }
 
-// For as long as it lives, work of this thread (and what it does in_parallel) asks `ask` again and again; what that
-// throws ends the work. `ask` is called from several threads. Null changes nothing.
+// For as long as it lives, work of this thread (and what it does in_parallel) calls `check` again and again; what that
+// throws ends the work. `check` is called from several threads. Null changes nothing.
 class CancellationScope {
  public:
-  explicit CancellationScope(const CancellationCheck* ask) : before_(detail::check_of_thread) {
-    if (ask != nullptr) detail::check_of_thread = ask;
+  explicit CancellationScope(const CancellationCheck* check) : before_(detail::check_of_thread) {
+    if (check != nullptr) detail::check_of_thread = check;
   }
   ~CancellationScope() { detail::check_of_thread = before_; }
   CancellationScope(const CancellationScope&) = delete;
@@ -27,12 +27,12 @@ class CancellationScope {
   const CancellationCheck* before_;
 };
 
-// What threads that are made for this work have to ask; null: nobody.
+// The check for threads that are started for this work; null: none.
 inline const CancellationCheck* current_cancellation() {
   return detail::check_of_thread;
 }
 
-// Throws what the one who is asked throws; costs nothing where nobody is.
+// Throws what the check throws; costs nothing where there is none.
 inline void throw_if_cancelled() {
   if (detail::check_of_thread != nullptr && *detail::check_of_thread) (*detail::check_of_thread)();
 }

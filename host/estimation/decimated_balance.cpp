@@ -1,4 +1,4 @@
-// A balance on fewer samples, for searches that look at many shapes.
+// A balance on fewer samples, for searches over many nonlinear parameters.
 #include <algorithm>
 #include <cmath>
 
@@ -7,14 +7,14 @@
 namespace flexspline::estimation {
 namespace {
 
-// Samples per row that are kept. Four rows are taken for a period of the row cut-off, so that what moves the columns
-// (positions are filtered at 2.5 times it) stays below the Nyquist frequency of two samples a row.
+// Samples for each row. Four rows are taken for a period of the row cut-off, so that what moves the columns (positions
+// are filtered at 2.5 times it) stays below the Nyquist frequency of two samples a row.
 constexpr std::size_t kSamplesPerRow = 2;
 
 }  // namespace
 
-BalanceData BalanceData::decimated(Prepared& few) const {
-  few = Prepared{};
+BalanceData BalanceData::decimated(PreparedData& few) const {
+  few = PreparedData{};
   few.pipeline = prepared_->pipeline;
   few.constants = prepared_->constants;
   few.torque_measured = prepared_->torque_measured;

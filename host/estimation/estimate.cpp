@@ -7,7 +7,7 @@
 #include <stdexcept>
 #include <utility>
 
-#include "host/catalogue/defined.hpp"
+#include "host/catalogue/user_defined_effect.hpp"
 #include "host/estimation/instruments.hpp"
 #include "host/estimation/intervals.hpp"
 #include "host/estimation/output_error.hpp"
@@ -30,10 +30,10 @@ constexpr std::array<std::pair<std::string_view, Intervals>, 3> kIntervals = {{
     {"bootstrap", Intervals::bootstrap},
 }};
 
-// A homogeneous balance (report 3.6): where the torque constant is open too, any multiple of a solution is one.
+// A homogeneous balance (report 3.6): where the torque constant is free too, any multiple of a solution is a solution.
 void warn_of_scale(Identification& identification) {
   for (const Estimate& e : identification.estimates) {
-    const auto& info = *identification.terms[e.slot.term].entry->info;
+    const auto& info = *identification.terms[e.ref.term].entry->info;
     if (e.identifiable || e.fixed || (info.reads & effects::kTorqueScale) == 0) continue;
     identification.warnings.push_back(fmt::format(
         "nothing fixes the scale of the torques, so {}.{} is not identifiable: supply one parameter that you know "
@@ -44,7 +44,7 @@ void warn_of_scale(Identification& identification) {
 
 }  // namespace
 
-void supply(model::Model& model, const Supplied& supplied) {
+void supply(model::Model& model, const SuppliedValue& supplied) {
   model::Effect* effect = model.find(supplied.id);
   if (!effect)
     throw std::invalid_argument(fmt::format("{}.{} is supplied, but the model has no effect {}: it has {}", supplied.id,
@@ -87,19 +87,19 @@ Intervals intervals_from_name(std::string_view name) {
 Method method_for(const model::Model& model) {
   for (const Term& term : terms_of(model))
     for (std::size_t p = 0; p < term.values.size(); ++p)
-      if (term.free_shape(p)) return Method::nls;
+      if (term.free_nonlinear(p)) return Method::nls;
   return Method::ls;
 }
 
 std::unique_ptr<Identification> estimate(const data::Dataset& dataset, const model::Model& model,
                                          const PipelineOptions& pipeline, const Options& options) {
   model::Model known = model;
-  for (const Supplied& supplied : options.supplied) supply(known, supplied);
+  for (const SuppliedValue& supplied : options.supplied) supply(known, supplied);
   const Method method = options.method == Method::automatic ? method_for(known) : options.method;
   if (method == Method::ls && method_for(known) == Method::nls)
     throw std::invalid_argument(
-        "the model has shape parameters, which least squares alone does not find; give --method nls, or state them "
-        "with fixed = true");
+        "the model has nonlinear parameters, which linear least squares cannot estimate; give --method nls, or state "
+        "them with fixed = true");
   std::unique_ptr<Identification> result;
   if (method == Method::partitioned) {
     result = partitioned(dataset, known, pipeline);

@@ -11,7 +11,7 @@
 namespace flexspline::estimation {
 namespace {
 
-// Share that a record must add of a parameter's own before its value counts in the table by experiment.
+// Least tolerance of a parameter in a record for its value to count in the table by experiment.
 constexpr double kTellsAlone = 0.03;
 constexpr double kErrorAlone = 0.2;        // and its error must be less than this share of the pooled value
 constexpr double kReliablePercent = 30.0;  // the report's threshold for std/avg
@@ -34,7 +34,7 @@ Spread spread_of(const std::vector<double>& values) {
   return spread;
 }
 
-// Each record fitted alone, with shapes as pooled.
+// Each record fitted alone, with nonlinear parameters as pooled.
 void fit_by_experiment(BalanceData& data, const BalanceFit& fit, const Terms& terms, std::vector<Estimate>& estimates,
                        std::size_t first_estimate) {
   const Eigen::MatrixXd X = columns_of(data, terms, fit.linear);
@@ -56,17 +56,17 @@ void fit_by_experiment(BalanceData& data, const BalanceFit& fit, const Terms& te
   }
 }
 
-Estimate estimate_of(const Terms& terms, Slot slot, data::Axis axis) {
-  const Term& term = terms[slot.term];
-  const auto& info = term.entry->parameters[slot.parameter];
+Estimate estimate_of(const Terms& terms, ParameterRef ref, data::Axis axis) {
+  const Term& term = terms[ref.term];
+  const auto& info = term.entry->parameters[ref.parameter];
   Estimate e;
-  e.slot = slot;
+  e.ref = ref;
   e.id = term.id;
   e.effect = std::string(term.entry->name());
   e.parameter = std::string(info.name);
   e.unit = std::string(catalogue::unit_on(info.unit, axis));
-  e.value = catalogue::natural(*term.entry, term.values)[slot.parameter];
-  e.fixed = term.known[slot.parameter] != 0;
+  e.value = catalogue::natural(*term.entry, term.values)[ref.parameter];
+  e.fixed = term.known[ref.parameter] != 0;
   return e;
 }
 
@@ -87,8 +87,8 @@ Estimate* find_estimate(std::vector<Estimate>& estimates, std::string_view effec
 }
 
 // Tvp = Tv + dTv, Tvn = Tv - dTv and likewise for Coulomb friction (EFFECTS: derived values), where `odd` is half the
-// difference between the directions of `even`. The spread of a difference of directions says little; that of the two
-// directions themselves is what the report compares.
+// difference between the directions of `even`. The spread of a difference of directions has little information; that of
+// the two directions themselves is what the report compares.
 void derive_directions(const Estimate& even, Estimate& odd, std::string_view symbols, std::vector<Derived>& derived) {
   const std::vector<std::string_view> names = catalogue::split_names(symbols);
   derived.push_back({std::string(names[0]), even.value + odd.value, even.unit});
@@ -115,7 +115,7 @@ void derive_directions(std::vector<Estimate>& estimates, std::vector<Derived>& d
   }
 }
 
-// The free parameter whose column looks most like that of `j`.
+// The free parameter whose column is most similar to that of `j`.
 std::size_t likest(const Eigen::MatrixXd& X, std::size_t j) {
   std::size_t best = j;
   double most = 0.0;
@@ -133,13 +133,14 @@ std::size_t likest(const Eigen::MatrixXd& X, std::size_t j) {
 }
 
 constexpr double kAtTheEnd = 0.005;  // of the range
-double share_of_range(const BalanceData& data, const Terms& terms, Slot shape) {
-  const Term& term = terms[shape.term];
-  return shape_range(data, term, shape.parameter).share(term.values[shape.parameter]);
+double share_of_range(const BalanceData& data, const Terms& terms, ParameterRef nonlinear_ref) {
+  const Term& term = terms[nonlinear_ref.term];
+  return parameter_range(data, term, nonlinear_ref.parameter).share(term.values[nonlinear_ref.parameter]);
 }
 
 // Standard error that more data do not take away: of filters and differentiation, measured on simulated drives whose
-// noise leaves less (0.02 to 0.07 % of inertia and friction), and of a travel, which no encoder tells within its step.
+// noise leaves less (0.02 to 0.07 % of inertia and friction), and of a travel, which no encoder resolves within its
+// step.
 double beyond_noise(const BalanceData& data, const effects::ParameterInfo& info, double value) {
   constexpr double kPipeline = 5e-4;  // of the value
   constexpr double kOfAStep = 0.5;
@@ -160,24 +161,25 @@ void warn_of_excitation(BalanceData& data, const BalanceFit& fit, const Terms& t
       result.warnings.push_back(
           fmt::format("{}: nothing in these data depends on it; record {}", name, term.entry->info->separated_by));
     } else if (fit.root_tolerance[c] < kUndetermined) {
-      const Slot other = fit.linear[likest(X, j)];
+      const ParameterRef other = fit.linear[likest(X, j)];
       result.warnings.push_back(
           fmt::format("{} cannot be distinguished from {} in these data and is left at zero; record {}", name,
                       terms[other.term].id, term.entry->info->separated_by));
     } else if (fit.root_tolerance[c] < 0.03) {
-      const Slot other = fit.linear[likest(X, j)];
-      result.warnings.push_back(fmt::format(
-          "{} is weakly excited: {:.1f} % of its effect is its own, the rest looks like {}; {} would show it", name,
-          100.0 * fit.root_tolerance[c], terms[other.term].id, term.entry->info->separated_by));
+      const ParameterRef other = fit.linear[likest(X, j)];
+      result.warnings.push_back(
+          fmt::format("{} is weakly excited: {:.1f} % of its effect is orthogonal to the others, the rest cannot be "
+                      "distinguished from {}; {} would show it",
+                      name, 100.0 * fit.root_tolerance[c], terms[other.term].id, term.entry->info->separated_by));
     }
   }
-  for (std::size_t j = 0; j < fit.shapes.size(); ++j) {
-    const Term& term = terms[fit.shapes[j].term];
-    const double share = share_of_range(data, terms, fit.shapes[j]);
+  for (std::size_t j = 0; j < fit.nonlinear.size(); ++j) {
+    const Term& term = terms[fit.nonlinear[j].term];
+    const double share = share_of_range(data, terms, fit.nonlinear[j]);
     if (share < kAtTheEnd || share > 1.0 - kAtTheEnd)
       result.warnings.push_back(fmt::format("{}.{} stopped at the end of what these data can show ({:.4g}); record {}",
-                                            term.id, term.entry->parameters[fit.shapes[j].parameter].name,
-                                            term.values[fit.shapes[j].parameter], term.entry->info->separated_by));
+                                            term.id, term.entry->parameters[fit.nonlinear[j].parameter].name,
+                                            term.values[fit.nonlinear[j].parameter], term.entry->info->separated_by));
   }
 }
 
@@ -212,23 +214,23 @@ namespace {
 
 // Estimates of what a fit found, with standard errors and intervals.
 void add_estimates(const BalanceData& data, const BalanceFit& fit, Identification& result) {
-  std::vector<Slot> all = fit.linear;
-  all.insert(all.end(), fit.shapes.begin(), fit.shapes.end());
+  std::vector<ParameterRef> all = fit.linear;
+  all.insert(all.end(), fit.nonlinear.begin(), fit.nonlinear.end());
   for (std::size_t j = 0; j < all.size(); ++j) {
-    const Slot& slot = all[j];
+    const ParameterRef& ref = all[j];
     const auto at = static_cast<Eigen::Index>(j);
-    Estimate e = estimate_of(result.terms, slot, result.model.drive.axis);
-    const effects::ParameterInfo& info = result.terms[slot.term].entry->parameters[slot.parameter];
+    Estimate e = estimate_of(result.terms, ref, result.model.drive.axis);
+    const effects::ParameterInfo& info = result.terms[ref.term].entry->parameters[ref.parameter];
     e.identifiable = fit.root_tolerance[at] >= kUndetermined;
     e.excitation = fit.excitation[at];
-    const double variance = natural_value(result.terms[slot.term], slot, all, fit.covariance).variance;
+    const double variance = natural_value(result.terms[ref.term], ref, all, fit.covariance).variance;
     if (e.identifiable && std::isfinite(variance)) {
       e.std = std::hypot(std::sqrt(variance), beyond_noise(data, info, e.value));
       e.low = e.value - 1.96 * *e.std;
       e.high = e.value + 1.96 * *e.std;
-      // A length that is shorter than these data can show stops at their end, and may as well be nothing.
+      // A length below the resolution of these data stops at its bound and may be zero.
       const bool length = info.limit == effects::Limit::torsion || info.limit == effects::Limit::travel;
-      if (j >= fit.linear.size() && length && info.low >= 0.0 && share_of_range(data, result.terms, slot) < kAtTheEnd)
+      if (j >= fit.linear.size() && length && info.low >= 0.0 && share_of_range(data, result.terms, ref) < kAtTheEnd)
         e.low = std::min(*e.low, info.low);
     }
     result.estimates.push_back(std::move(e));
@@ -237,7 +239,7 @@ void add_estimates(const BalanceData& data, const BalanceFit& fit, Identificatio
 
 // Average and spread over the experiments.
 void add_spread(const BalanceData& data, const Identification& result, Estimate& e) {
-  const bool per_record = result.terms[e.slot.term].entry->parameters[e.slot.parameter].per_record;
+  const bool per_record = result.terms[e.ref.term].entry->parameters[e.ref.parameter].per_record;
   if (per_record)
     for (const RowRange& range : data.records()) {
       const Record& record = result.prepared.records[range.record];
@@ -245,7 +247,7 @@ void add_spread(const BalanceData& data, const Identification& result, Estimate&
     }
   summarise(e);
   if (!per_record) return;
-  // It is meant to differ.
+  // It differs by definition.
   e.spread_percent.reset();
   e.reliable = true;
 }
@@ -256,8 +258,8 @@ void store_tables(Identification& result) {
     const auto unseen = std::count(learned.visited.begin(), learned.visited.end(), std::uint8_t{0});
     if (unseen > 0)
       result.warnings.push_back(fmt::format(
-          "{}: {} of its {} points lie where these data have no rows; they are drawn on from their neighbours", id,
-          unseen, learned.visited.size()));
+          "{}: {} of its {} points are where these data have no samples; they are extrapolated from their neighbours",
+          id, unseen, learned.visited.size()));
   }
 }
 
@@ -273,7 +275,7 @@ void assemble(Identification& result) {
     add_estimates(data, fit, result);
     fit_by_experiment(data, fit, result.terms, result.estimates, first);
     for (std::size_t j = first; j < result.estimates.size(); ++j) add_spread(data, result, result.estimates[j]);
-    for (const Slot& slot : result.held[b]) result.estimates.push_back(estimate_of(result.terms, slot, axis));
+    for (const ParameterRef& ref : result.held[b]) result.estimates.push_back(estimate_of(result.terms, ref, axis));
     for (const std::size_t t : fit.on_balance) touched[t] = 1;
     result.condition_number = std::max(result.condition_number, fit.condition_number);
     warn_of_excitation(data, fit, result.terms, result);

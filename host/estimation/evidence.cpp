@@ -20,7 +20,7 @@ Eigen::MatrixXd cross_balance_columns(BalanceData& data, const Terms& terms, std
     Terms moved = terms;
     const double usual = std::abs(terms[t].entry->parameters[parameters[k]].usual);
     double step = kStep * std::max(usual, std::abs(terms[t].values[parameters[k]]));
-    // Parts of a wave of which one is usually zero: as large as the other.
+    // The cosine or sine part of a wave that is usually zero has the scale of the other.
     for (const auto& info : terms[t].entry->parameters)
       if (info.kind == terms[t].entry->parameters[parameters[k]].kind)
         step = std::max(step, kStep * std::abs(info.usual));
@@ -30,9 +30,9 @@ Eigen::MatrixXd cross_balance_columns(BalanceData& data, const Terms& terms, std
   return columns;
 }
 
-Evidence evidence_of(const Eigen::MatrixXd& reaching, const Eigen::MatrixXd& own, const Eigen::VectorXd& residual,
+Evidence evidence_of(const Eigen::MatrixXd& cross_columns, const Eigen::MatrixXd& own, const Eigen::VectorXd& residual,
                      const NoiseCovariance& whitening, double autocorrelation_time) {
-  Eigen::MatrixXd left = whitening * reaching;
+  Eigen::MatrixXd left = whitening * cross_columns;
   Eigen::MatrixXd scaled = whitening * own;
   for (auto column : scaled.colwise()) column /= std::max(column.norm(), 1e-300);
   if (scaled.cols() > 0) {
@@ -45,17 +45,17 @@ Evidence evidence_of(const Eigen::MatrixXd& reaching, const Eigen::MatrixXd& own
           left.transpose() * left / autocorrelation_time};
 }
 
-NoiseModel noise_model(const Eigen::MatrixXd& reaching, const Eigen::MatrixXd& own, const BalanceData& data,
+NoiseModel noise_model(const Eigen::MatrixXd& cross_columns, const Eigen::MatrixXd& own, const BalanceData& data,
                        const Terms& terms, const BalanceFit& fit, const Eigen::VectorXd& residual) {
-  Eigen::MatrixXd all(own.rows(), own.cols() + reaching.cols());
-  all << own, reaching;
+  Eigen::MatrixXd all(own.rows(), own.cols() + cross_columns.cols());
+  all << own, cross_columns;
   Eigen::VectorXd weights = fit.root_weights;
   LinearFit moved = least_squares(all, residual, weights);
   weights = record_weights(data.records(), moved.residual);
   moved = least_squares(all, residual, weights);
   const NoiseModel alike{weights, std::max(autocorrelation_time(data.records(), weights.cwiseProduct(moved.residual)),
                                            data.filter_autocorrelation_time())};
-  const std::vector<FrictionGroup> groups = friction_groups(terms, fit.linear, fit.shapes);
+  const std::vector<FrictionGroup> groups = friction_groups(terms, fit.linear, fit.nonlinear);
   const auto friction = [&] {
     Eigen::VectorXd theta = moved.theta.head(own.cols());
     for (std::size_t j = 0; j < fit.linear.size(); ++j)

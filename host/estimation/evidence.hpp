@@ -10,8 +10,8 @@
 
 namespace flexspline::estimation {
 
-// Evidence of a balance for parameters that are identified on another one, about where they stand: slope and (minus)
-// curvature of its log likelihood, the balance's own parameters free.
+// Evidence of a balance for parameters that are identified on another one, about their present values: slope and
+// (minus) curvature of its log likelihood, the balance's own parameters free.
 struct Evidence {
   Eigen::VectorXd slope;
   Eigen::MatrixXd information;
@@ -22,18 +22,18 @@ struct Evidence {
 Eigen::MatrixXd cross_balance_columns(BalanceData& data, const Terms& terms, std::size_t t,
                                       const std::vector<std::size_t>& parameters);
 
-// `reaching`: slopes of the parameters asked for; `own`: of the balance's own parameters; `residual` at the present
-// values. `whitening` makes the rows' errors noise of one, of which `autocorrelation_time` rows count as one.
-Evidence evidence_of(const Eigen::MatrixXd& reaching, const Eigen::MatrixXd& own, const Eigen::VectorXd& residual,
+// `cross_columns`: slopes of the requested parameters; `own`: of the balance's own parameters; `residual` at the
+// present values. `whitening` makes the rows' errors noise of one, of which `autocorrelation_time` rows count as one.
+Evidence evidence_of(const Eigen::MatrixXd& cross_columns, const Eigen::MatrixXd& own, const Eigen::VectorXd& residual,
                      const NoiseCovariance& whitening, double autocorrelation_time);
 
-// The noise of a balance where `reaching` are not where they will be: those and the balance's own are
+// The noise of a balance where those of `cross_columns` are not at their final values: those and the balance's own are
 // fitted to first order for the moment, so that what is amiss with them is not taken for friction that differs.
 struct NoiseModel {
   NoiseCovariance whitening;
   double autocorrelation_time;
 };
-NoiseModel noise_model(const Eigen::MatrixXd& reaching, const Eigen::MatrixXd& own, const BalanceData& data,
+NoiseModel noise_model(const Eigen::MatrixXd& cross_columns, const Eigen::MatrixXd& own, const BalanceData& data,
                        const Terms& terms, const BalanceFit& fit, const Eigen::VectorXd& residual);
 
 // Inverse of a covariance or a precision whose parameters differ much in size by their units.

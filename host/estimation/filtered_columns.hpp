@@ -1,4 +1,4 @@
-// How the columns of a balance are made along its records and filtered, for the sources of BalanceData.
+// How the columns of a balance are computed along its records and filtered, for the sources of BalanceData.
 #pragma once
 
 #include <algorithm>
@@ -6,7 +6,7 @@
 #include <vector>
 
 #include "host/estimation/balance_data.hpp"
-#include "host/signals/by_stretches.hpp"
+#include "host/signals/blockwise_filter.hpp"
 
 namespace flexspline::estimation {
 
@@ -15,28 +15,28 @@ struct ColumnLane {
   const Record* record;
   const RowRange* range;
   std::size_t column;
-  std::vector<double> whole;  // of what cannot be made stretch by stretch
+  std::vector<double> whole;  // of what cannot be computed block by block
   std::size_t next = 0;       // row that is taken next
 };
 
-// Where a column is to be written: samples from `first` on, whose signals are `inputs` where it asked for any.
-struct ColumnStretch {
+// Where a column is to be written: samples from `first` on, whose signals are `inputs` where it reads any.
+struct ColumnBlock {
   std::size_t first;
   std::span<const effects::Inputs<Real>> inputs;
   std::span<double> signal;
 };
 
 // Makes columns and takes their rows, some samples at a time. `Fill` has
-//   unsigned reads(column): signals that it needs, of effects::Signals; kWhole: it writes the whole record at once;
-//   void operator()(range, column, stretch).
-constexpr unsigned kWhole = ~0U;
+//   unsigned reads(column): signals that it needs, of effects::Signals; kWholeRecord: it writes the whole record at
+//   once; void operator()(range, column, block).
+constexpr unsigned kWholeRecord = ~0U;
 template <class Fill>
-struct ColumnsByStretches final : signals::Stretches {
-  ColumnsByStretches(Fill& how, std::vector<ColumnLane> of) : fill_column(how), lanes(std::move(of)) {
+struct BlockwiseColumns final : signals::BlockProcessor {
+  BlockwiseColumns(Fill& how, std::vector<ColumnLane> of) : fill_column(how), lanes(std::move(of)) {
     for (ColumnLane& lane : lanes)
-      if (fill_column.reads(lane.column) == kWhole) {
+      if (fill_column.reads(lane.column) == kWholeRecord) {
         lane.whole.assign(lane.record->inputs.size(), 0.0);
-        fill_column(*lane.range, lane.column, ColumnStretch{0, {}, lane.whole});
+        fill_column(*lane.range, lane.column, ColumnBlock{0, {}, lane.whole});
       }
   }
 
@@ -59,7 +59,7 @@ struct ColumnsByStretches final : signals::Stretches {
             continue;
           }
           std::fill(to.begin(), to.end(), 0.0);
-          fill_column(*lanes[j].range, lanes[j].column, ColumnStretch{at, part, to});
+          fill_column(*lanes[j].range, lanes[j].column, ColumnBlock{at, part, to});
         }
       }
       l = end;
@@ -80,7 +80,7 @@ struct ColumnsByStretches final : signals::Stretches {
 
   Fill& fill_column;
   std::vector<ColumnLane> lanes;
-  std::vector<effects::Inputs<Real>> inputs = std::vector<effects::Inputs<Real>>(catalogue::PlainInputs::kStretch);
+  std::vector<effects::Inputs<Real>> inputs = std::vector<effects::Inputs<Real>>(catalogue::PlainInputs::kBlock);
   std::size_t offset = 0;  // of the segment
   Eigen::MatrixXd* rows = nullptr;
   Balance balance{};
@@ -88,36 +88,36 @@ struct ColumnsByStretches final : signals::Stretches {
 
 // What writes a column at once, from the record alone.
 template <class Work>
-struct AtOnce {
+struct WholeRecord {
   Work work;
-  unsigned reads(std::size_t) const { return kWhole; }
-  void operator()(const RowRange& range, std::size_t column, const ColumnStretch& stretch) {
-    work(range, column, stretch.signal);
+  unsigned reads(std::size_t) const { return kWholeRecord; }
+  void operator()(const RowRange& range, std::size_t column, const ColumnBlock& block) {
+    work(range, column, block.signal);
   }
 };
 template <class Work>
-AtOnce(Work) -> AtOnce<Work>;
+WholeRecord(Work) -> WholeRecord<Work>;
 
 template <class Fill>
 Eigen::MatrixXd BalanceData::filtered_columns(std::size_t columns, Fill fill) const {
-  // Some at a time: more would not stay in the processor's cache. Of records that are alike some are taken together.
+  // Some at a time: more would not stay in the processor's cache. Records with equal filters are filtered together.
   constexpr std::size_t kTogether = 8;
-  constexpr std::size_t kStretchesAtOnce = 8;  // a cache further out still holds these
+  constexpr std::size_t kBlocksAtOnce = 8;  // a cache further out still holds these
   Eigen::MatrixXd rows(ranges_.empty() ? 0 : ranges_.back().last, static_cast<Eigen::Index>(columns));
   for (std::size_t first = 0; first < columns; first += kTogether) {
     const std::size_t many = std::min(kTogether, columns - first);
     for (std::size_t i = 0; i < ranges_.size();) {
       const std::size_t samples = prepared_->records[ranges_[i].record].inputs.size();
       // Points between samples need samples on both sides of them.
-      const bool at_once = !beyond_.empty() || samples <= kStretchesAtOnce * signals::stretch_of(filters_[i]);
+      const bool at_once = !beyond_.empty() || samples <= kBlocksAtOnce * signals::block_size_of(filters_[i]);
       std::size_t end = i + 1;
-      while (end < ranges_.size() && (end - i + 1) * many <= kTogether && filtered_alike(ranges_[i], ranges_[end]))
+      while (end < ranges_.size() && (end - i + 1) * many <= kTogether && have_equal_filters(ranges_[i], ranges_[end]))
         ++end;
       std::vector<ColumnLane> lanes;
       for (std::size_t range = i; range < end; ++range)
         for (std::size_t j = 0; j < many; ++j)
           lanes.push_back({&prepared_->records[ranges_[range].record], &ranges_[range], first + j, {}, 0});
-      ColumnsByStretches<Fill> work(fill, std::move(lanes));
+      BlockwiseColumns<Fill> work(fill, std::move(lanes));
       if (at_once) {
         Eigen::MatrixXd all =
             Eigen::MatrixXd::Zero(static_cast<Eigen::Index>(samples), static_cast<Eigen::Index>(work.lanes.size()));
@@ -132,8 +132,7 @@ Eigen::MatrixXd BalanceData::filtered_columns(std::size_t columns, Fill fill) co
         work.balance = balance_;
         for (const data::Segment& s : prepared_->records[ranges_[i].record].segments) {
           work.offset = s.first;
-          signals::filter_by_stretches(filters_[i], s.last - s.first, static_cast<Eigen::Index>(work.lanes.size()),
-                                       work);
+          signals::filter_blockwise(filters_[i], s.last - s.first, static_cast<Eigen::Index>(work.lanes.size()), work);
         }
       }
       i = end;

@@ -64,7 +64,7 @@ model::Model model_with_values(const Identification& identification) {
 
 FreeMotion free_motion(const Identification& identification, const FreeMotionOptions& options) {
   const model::Model model = model_with_values(identification);
-  const Prepared& measured = identification.prepared;
+  const PreparedData& measured = identification.prepared;
   const std::size_t records = measured.records.size();
   FreeMotion result;
   result.experiments.resize(records);

@@ -13,18 +13,18 @@ namespace flexspline::estimation {
 // The model of an identification with the values of its terms.
 model::Model model_with_values(const Identification& identification);
 
-// Every record again, with motion and torque of the free run, made ready by the same pipeline with the same rows. A
+// Every record again, with motion and torque of the free run, prepared by the same pipeline with the same rows. A
 // record that cannot be simulated or diverges keeps what was measured and is not marked. Records run on all cores; the
 // result does not depend on their number.
 struct FreeMotion {
   std::vector<data::Experiment> experiments;
-  Prepared prepared;
+  PreparedData prepared;
   std::vector<std::uint8_t> simulated;  // by record
 };
 struct FreeMotionOptions {
   // Initial motor velocities by record, where the caller knows better than the first sample does; else empty.
   std::span<const std::optional<double>> initial_velocity{};
-  // Records that are asked for, by record; the others stay empty. All where this is empty.
+  // Requested records, by record; the others stay empty. All where this is empty.
   std::span<const std::uint8_t> only{};
   double step_s = simulation::Options{}.step_s;  // longest integration step
 };

@@ -5,8 +5,8 @@
 
 namespace flexspline::estimation {
 
-std::vector<FrictionGroup> friction_groups(const Terms& terms, const std::vector<Slot>& linear,
-                                           const std::vector<Slot>& shapes) {
+std::vector<FrictionGroup> friction_groups(const Terms& terms, const std::vector<ParameterRef>& linear,
+                                           const std::vector<ParameterRef>& nonlinear) {
   std::vector<FrictionGroup> groups;
   for (std::size_t j = 0; j < linear.size(); ++j) {
     const std::string_view surface = terms[linear[j].term].entry->info->surface;
@@ -16,24 +16,25 @@ std::vector<FrictionGroup> friction_groups(const Terms& terms, const std::vector
     group->columns.push_back(static_cast<Eigen::Index>(j));
     const Term& term = terms[linear[j].term];
     const auto& varies = term.entry->parameters[linear[j].parameter];
-    for (std::size_t k = 0; k < shapes.size(); ++k) {
-      const auto& shape = term.entry->parameters[shapes[k].parameter];
-      // One in the same unit is a share of the friction, and varies with it.
-      if (shapes[k].term == linear[j].term && shape.per == varies.name && shape.unit.rotary != varies.unit.rotary)
-        group->stays.push_back({static_cast<Eigen::Index>(k), term.values[shapes[k].parameter]});
+    for (std::size_t k = 0; k < nonlinear.size(); ++k) {
+      const auto& nonlinear_ref = term.entry->parameters[nonlinear[k].parameter];
+      // A parameter in the same unit is a part of the friction, and varies with it.
+      if (nonlinear[k].term == linear[j].term && nonlinear_ref.per == varies.name &&
+          nonlinear_ref.unit.rotary != varies.unit.rotary)
+        group->ratio_parameters.push_back({static_cast<Eigen::Index>(k), term.values[nonlinear[k].parameter]});
     }
   }
   return groups;
 }
 
 Eigen::MatrixXd random_effect_directions(const std::vector<FrictionGroup>& groups, const Eigen::VectorXd& theta,
-                                         const Eigen::VectorXd& size, Eigen::Index first_shape) {
+                                         const Eigen::VectorXd& size, Eigen::Index first_nonlinear) {
   Eigen::MatrixXd u = Eigen::MatrixXd::Zero(theta.size(), static_cast<Eigen::Index>(groups.size()));
   for (std::size_t g = 0; g < groups.size(); ++g) {
     const auto column = static_cast<Eigen::Index>(g);
     for (const Eigen::Index j : groups[g].columns) u(j, column) = theta[j];
-    for (const FrictionGroup::Stays& s : groups[g].stays)
-      if (const Eigen::Index j = first_shape + s.shape; j < theta.size()) u(j, column) = -s.ratio * size[j];
+    for (const FrictionGroup::RatioParameter& s : groups[g].ratio_parameters)
+      if (const Eigen::Index j = first_nonlinear + s.nonlinear_ref; j < theta.size()) u(j, column) = -s.ratio * size[j];
   }
   return u;
 }

@@ -13,25 +13,27 @@ namespace flexspline::estimation {
 struct FrictionGroup {
   std::string name;  // "viscous friction"
   std::vector<Eigen::Index> columns;
-  // Shapes that are searched for by unit of a friction that varies, and do not vary with it: the stiffness of the
-  // contacts remains what it is where they slide harder, so that its ratio to the friction falls.
-  struct Stays {
-    Eigen::Index shape;  // its place among the free shapes
-    double ratio;        // its value
+  // Nonlinear parameters that are searched for by unit of a friction that varies, and do not vary with it: the
+  // stiffness of the contacts remains what it is where they slide harder, so that its ratio to the friction falls.
+  struct RatioParameter {
+    Eigen::Index nonlinear_ref;  // its place among the free nonlinear parameters
+    double ratio;                // its value
   };
-  std::vector<Stays> stays;
+  std::vector<RatioParameter> ratio_parameters;
 };
 inline constexpr Eigen::Index kMostGroups = 4;
 // Fewer records than that do not identify a variance between them.
 inline constexpr std::size_t kFewestRecords = 3;
 
-// Groups among the linear parameters that a regression estimates; `shapes` are those that it estimates besides.
-std::vector<FrictionGroup> friction_groups(const Terms& terms, const std::vector<Slot>& linear,
-                                           const std::vector<Slot>& shapes = {});
+// Groups among the linear parameters that a regression estimates; `nonlinear parameters` are those that it estimates
+// besides.
+std::vector<FrictionGroup> friction_groups(const Terms& terms, const std::vector<ParameterRef>& linear,
+                                           const std::vector<ParameterRef>& nonlinear = {});
 
 // What a factor of each group does to the torque is X times these, `theta` being the values of the columns of X times
-// `size`, which X was divided by. Columns of free shapes, where there are any, begin at `first_shape`.
+// `size`, which X was divided by. Columns of free nonlinear parameters, where there are any, begin at
+// `first_nonlinear`.
 Eigen::MatrixXd random_effect_directions(const std::vector<FrictionGroup>& groups, const Eigen::VectorXd& theta,
-                                         const Eigen::VectorXd& size, Eigen::Index first_shape);
+                                         const Eigen::VectorXd& size, Eigen::Index first_nonlinear);
 
 }  // namespace flexspline::estimation

@@ -8,7 +8,7 @@
 #include <map>
 #include <tuple>
 
-#include "host/catalogue/defined.hpp"
+#include "host/catalogue/user_defined_effect.hpp"
 #include "host/estimation/evidence.hpp"
 #include "host/estimation/record_constants.hpp"
 #include "host/estimation/variable_projection.hpp"
@@ -17,19 +17,19 @@ namespace flexspline::estimation {
 namespace {
 
 // Fits a balance; a parameter whose best value is not possible (negative friction) is held at its bound and the others
-// are fitted again. Returns the fit and what was held, which is said in the warnings.
-std::pair<BalanceFit, std::vector<Slot>> fit_within_bounds(BalanceData& data, Terms& terms, data::Axis axis,
-                                                           std::vector<std::string>& warnings) {
-  std::vector<Slot> held;
+// are fitted again. Returns the fit and what was held at a bound, which is among the warnings.
+std::pair<BalanceFit, std::vector<ParameterRef>> fit_within_bounds(BalanceData& data, Terms& terms, data::Axis axis,
+                                                                   std::vector<std::string>& warnings) {
+  std::vector<ParameterRef> held;
   for (;;) {
     BalanceFit fit = fit_balance(data, terms);
-    const auto outside = std::find_if(fit.linear.begin(), fit.linear.end(), [&](const Slot& slot) {
-      const auto& info = terms[slot.term].entry->parameters[slot.parameter];
-      const double value = terms[slot.term].values[slot.parameter];
+    const auto outside = std::find_if(fit.linear.begin(), fit.linear.end(), [&](const ParameterRef& ref) {
+      const auto& info = terms[ref.term].entry->parameters[ref.parameter];
+      const double value = terms[ref.term].values[ref.parameter];
       return value < info.low || value > info.high;
     });
     if (outside == fit.linear.end()) {
-      for (const Slot& slot : held) terms[slot.term].known[slot.parameter] = 0;
+      for (const ParameterRef& ref : held) terms[ref.term].known[ref.parameter] = 0;
       return {std::move(fit), std::move(held)};
     }
     Term& term = terms[outside->term];
@@ -47,66 +47,68 @@ std::pair<BalanceFit, std::vector<Slot>> fit_within_bounds(BalanceData& data, Te
   }
 }
 
-// Slots of a fit that show on the balance of other data as well, with their places in the fit's covariance. Of what the
-// fit does not identify, nothing is asked of others either.
+// Parameters of a fit that act on the balance of other data as well, with their places in the fit's covariance. Of what
+// the fit does not identify, other balances are not used either.
 struct Shared {
-  std::vector<Slot> slots;
+  std::vector<ParameterRef> refs;
   std::vector<Eigen::Index> at;
 };
 Shared shared_with(const BalanceFit& fit, const Terms& terms, Balance other) {
   Shared shared;
-  std::vector<Slot> all = fit.linear;
-  all.insert(all.end(), fit.shapes.begin(), fit.shapes.end());
+  std::vector<ParameterRef> all = fit.linear;
+  all.insert(all.end(), fit.nonlinear.begin(), fit.nonlinear.end());
   for (std::size_t j = 0; j < all.size(); ++j) {
     const auto at = static_cast<Eigen::Index>(j);
     if (!terms[all[j].term].entry->adds_to(other) || !std::isfinite(fit.covariance(at, at))) continue;
-    shared.slots.push_back(all[j]);
+    shared.refs.push_back(all[j]);
     shared.at.push_back(at);
   }
   return shared;
 }
 
-// Estimates parameters that two balances show on both: what their own balance found, with its covariance, and the
-// evidence of the other one. Where they contradict each other, one of them lacks something, and the own one counts.
+// Combines the evidence of two balances for parameters that act on both: the estimate of their own balance with its
+// covariance, and the evidence of the other one. Where they contradict each other, one model is incomplete, and the own
+// balance counts.
 bool combine_balances(Identification& result, std::size_t identified, std::size_t other) {
   constexpr double kContradiction = 16.0;  // squared standard errors a parameter
   BalanceFit& fit = result.fits[identified];
   const Shared shared = shared_with(fit, result.terms, result.data[other].balance());
-  if (shared.slots.empty()) return false;
+  if (shared.refs.empty()) return false;
   BalanceData& data = result.data[other];
   const BalanceFit& its = result.fits[other];
-  Eigen::MatrixXd reaching(data.rows(), 0),
-      own(data.rows(), static_cast<Eigen::Index>(its.linear.size() + its.shapes.size()));
-  for (const Slot& slot : shared.slots) {
-    reaching.conservativeResize(Eigen::NoChange, reaching.cols() + 1);
-    reaching.rightCols(1) = cross_balance_columns(data, result.terms, slot.term, {slot.parameter});
+  Eigen::MatrixXd cross_columns(data.rows(), 0),
+      own(data.rows(), static_cast<Eigen::Index>(its.linear.size() + its.nonlinear.size()));
+  for (const ParameterRef& ref : shared.refs) {
+    cross_columns.conservativeResize(Eigen::NoChange, cross_columns.cols() + 1);
+    cross_columns.rightCols(1) = cross_balance_columns(data, result.terms, ref.term, {ref.parameter});
   }
-  own << columns_of(data, result.terms, its.linear), shape_columns(data, result.terms, its.on_balance, its.shapes);
+  own << columns_of(data, result.terms, its.linear),
+      nonlinear_columns(data, result.terms, its.on_balance, its.nonlinear);
   const Eigen::VectorXd residual = residual_of(data, result.terms);
-  const NoiseModel noise = noise_model(reaching, own, data, result.terms, its, residual);
+  const NoiseModel noise = noise_model(cross_columns, own, data, result.terms, its, residual);
   const Evidence evidence =
-      evidence_of(reaching, own, residual, noise.whitening, std::max(1.0, noise.autocorrelation_time));
+      evidence_of(cross_columns, own, residual, noise.whitening, std::max(1.0, noise.autocorrelation_time));
   const Eigen::MatrixXd before = fit.covariance(shared.at, shared.at);
   const Eigen::MatrixXd precision = scaled_inverse(before);
   const CombinedEstimate both = combine(precision, evidence);
-  if (!both.change.allFinite() || both.cost > kContradiction * static_cast<double>(shared.slots.size())) {
-    result.warnings.push_back(
-        fmt::format("{}: the torque balance that tells its values and the motor's contradict each other; one of them "
-                    "lacks an effect (see `flexspline diagnose`)",
-                    result.terms[shared.slots.front().term].id));
+  if (!both.change.allFinite() || both.cost > kContradiction * static_cast<double>(shared.refs.size())) {
+    result.warnings.push_back(fmt::format(
+        "{}: the torque balance that its values are identified on and the motor's contradict each other; one of them "
+        "lacks an effect (see `flexspline diagnose`)",
+        result.terms[shared.refs.front().term].id));
     return false;
   }
-  // The own balance's other parameters move along.
-  std::vector<Slot> all = fit.linear;
-  all.insert(all.end(), fit.shapes.begin(), fit.shapes.end());
+  // The other parameters of the own balance change with them.
+  std::vector<ParameterRef> all = fit.linear;
+  all.insert(all.end(), fit.nonlinear.begin(), fit.nonlinear.end());
   std::vector<Eigen::Index> known;
   for (Eigen::Index j = 0; j < fit.covariance.rows(); ++j)
     if (std::isfinite(fit.covariance(j, j))) known.push_back(j);
   const Eigen::MatrixXd gain = fit.covariance(known, shared.at) * precision;
   const Eigen::VectorXd change = gain * both.change;
   for (std::size_t k = 0; k < known.size(); ++k) {
-    const Slot& slot = all[static_cast<std::size_t>(known[k])];
-    result.terms[slot.term].values[slot.parameter] += change[static_cast<Eigen::Index>(k)];
+    const ParameterRef& ref = all[static_cast<std::size_t>(known[k])];
+    result.terms[ref.term].values[ref.parameter] += change[static_cast<Eigen::Index>(k)];
   }
   const Eigen::MatrixXd less = gain * (before - both.covariance) * gain.transpose();
   for (std::size_t i = 0; i < known.size(); ++i)
@@ -120,31 +122,31 @@ bool combine_balances(Identification& result, std::size_t identified, std::size_
 // there, so that one comes first: the transmission's before the motor's, and, where the motor's identifies others, both
 // again.
 // Returns what was held at a bound on each.
-std::vector<std::vector<Slot>> fit_all(Identification& result, data::Axis axis) {
-  std::vector<std::vector<Slot>> held(result.data.size());
+std::vector<std::vector<ParameterRef>> fit_all(Identification& result, data::Axis axis) {
+  std::vector<std::vector<ParameterRef>> held(result.data.size());
   result.fits.resize(result.data.size());
-  bool reach = false, identified_elsewhere = false;
+  bool reach = false, identified_on_other_balance = false;
   for (const Term& term : result.terms) {
     reach = reach || term.entry->info->adds_to != 0;
-    identified_elsewhere = identified_elsewhere || term.entry->info->identified_on_motor;
+    identified_on_other_balance = identified_on_other_balance || term.entry->info->identified_on_motor;
   }
   std::vector<std::size_t> order;
   for (std::size_t b = 0; b < result.data.size(); ++b)
     if (!reach || result.data[b].balance() != Balance::motor) order.push_back(b);
   for (std::size_t b = 0; b < result.data.size() && reach; ++b)
     if (result.data[b].balance() == Balance::motor) order.push_back(b);
-  for (int pass = 0; pass < (identified_elsewhere ? 2 : 1); ++pass)
+  for (int pass = 0; pass < (identified_on_other_balance ? 2 : 1); ++pass)
     for (const std::size_t b : order) {
       std::vector<std::string> warnings;
       std::tie(result.fits[b], held[b]) = fit_within_bounds(result.data[b], result.terms, axis, warnings);
-      if (pass > 0 || !identified_elsewhere) std::ranges::move(warnings, std::back_inserter(result.warnings));
+      if (pass > 0 || !identified_on_other_balance) std::ranges::move(warnings, std::back_inserter(result.warnings));
     }
   for (std::size_t b = 0; b < result.data.size() && reach && result.prepared.torque_measured; ++b)
     for (std::size_t other = 0; other < result.data.size(); ++other)
       if (other != b && result.data[other].balance() == Balance::motor && combine_balances(result, b, other)) {
-        std::vector<std::string> said_before;
+        std::vector<std::string> warned_before;
         std::tie(result.fits[other], held[other]) =
-            fit_within_bounds(result.data[other], result.terms, axis, said_before);
+            fit_within_bounds(result.data[other], result.terms, axis, warned_before);
       }
   return held;
 }
@@ -195,7 +197,7 @@ std::unique_ptr<Identification> form(const data::Dataset& dataset, const model::
     for (const RowRange& range : data.records()) used[range.record] = 1;
     result->data.push_back(std::move(data));
   }
-  // A record may show one balance and not another: free motion twists too little for the transmission's.
+  // A record may identify one balance only: free motion twists the transmission too little.
   std::erase_if(too_short, [&](const auto& record) { return used[record.first] != 0; });
   std::string list;
   for (const auto& [record, what] : too_short) list += (list.empty() ? "" : ", ") + what;
@@ -204,42 +206,42 @@ std::unique_ptr<Identification> form(const data::Dataset& dataset, const model::
     unmasked.mask = false;
     unmasked.ready = nullptr;
     auto kept = form(dataset, model, unmasked);
-    kept->warnings.push_back(
-        fmt::format("reversals are not left out, as too few rows would remain in {}: static friction laws do not hold "
-                    "there; record longer strokes",
-                    list));
+    kept->warnings.push_back(fmt::format(
+        "reversals are not left out, as too few samples would remain in {}: static friction laws do not hold "
+        "there; record longer strokes",
+        list));
     return kept;
   }
   if (result->data.empty() && !too_short.empty())
     throw data::DataError({{data::Severity::error, "too_few_samples", "", 0, "",
-                            fmt::format("too few rows are left to fit on in {}", list),
+                            fmt::format("too few samples are left to fit on in {}", list),
                             "record longer or faster motion, or raise --cutoff-hz, or give --mask none"}});
   if (result->data.empty())
     throw data::DataError({{data::Severity::error, "missing_column", "", 0, "",
                             "no torque balance of the model can be formed from these columns",
                             "record current (or torque) and motor position together"}});
-  if (!too_short.empty()) result->warnings.push_back(fmt::format("too few rows are left in {}; not used", list));
+  if (!too_short.empty()) result->warnings.push_back(fmt::format("too few samples are left in {}; not used", list));
   return result;
 }
 
 namespace {
 
-// Moves the constants of each record to where they fit best, and forms the balances anew. Returns whether any moved.
+// Moves the constants of each record to where they fit best, and forms the balances again. Returns whether any moved.
 bool refine_record_constants(Identification& result) {
   if (record_constants(result.terms).empty()) return false;
   bool moved = false;
   for (std::size_t b = 0; b < result.data.size(); ++b) {
     const BalanceFit& found = result.fits[b];
-    std::vector<Slot> beside = found.linear;
-    beside.insert(beside.end(), found.shapes.begin(), found.shapes.end());
-    moved = refine_record_constants(result.prepared, result.data[b], result.terms, beside, found.root_weights) || moved;
+    std::vector<ParameterRef> others = found.linear;
+    others.insert(others.end(), found.nonlinear.begin(), found.nonlinear.end());
+    moved = refine_record_constants(result.prepared, result.data[b], result.terms, others, found.root_weights) || moved;
   }
   if (!moved) return false;
   for (BalanceData& data : result.data) data = BalanceData(result.prepared, data.balance());
   return true;
 }
 
-// Learns the tables of a balance beside its other effects, one after the other. Returns whether there were any.
+// Learns the tables of a balance together with its other effects, one after the other. Returns whether there were any.
 bool learn_tables(Identification& result) {
   bool any = false;
   for (std::size_t t = 0; t < result.terms.size(); ++t) {
@@ -249,7 +251,7 @@ bool learn_tables(Identification& result) {
     for (std::size_t b = 0; b < result.data.size(); ++b) {
       const std::vector<std::size_t>& on_balance = result.fits[b].on_balance;
       if (std::find(on_balance.begin(), on_balance.end(), t) == on_balance.end()) continue;
-      const TableQuestion question = question_of(*definition);
+      const TableSpecification question = table_specification(*definition);
       auto learned = learn_table(result.data[b], result.terms, question, result.fits[b].root_weights, term.id);
       if (!learned) {
         result.warnings.push_back(fmt::format("{}: {} does not vary in these data; the table is left as it is", term.id,
@@ -269,7 +271,7 @@ bool learn_tables(Identification& result) {
 void fit(Identification& result) {
   const std::vector<std::string> before = result.warnings;
   const auto again = [&] {
-    // What the fit before warned of may have gone.
+    // Warnings of the previous fit may no longer hold.
     result.warnings = before;
     result.held = fit_all(result, result.model.drive.axis);
   };

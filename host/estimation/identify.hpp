@@ -16,18 +16,18 @@
 namespace flexspline::estimation {
 
 struct Estimate {
-  Slot slot;
+  ParameterRef ref;
   std::string id, effect, parameter, unit;
   double value = 0.0;
   std::optional<double> std;
   std::optional<double> low, high;       // 95 % interval
-  std::optional<double> average;         // of the experiments that can tell it
+  std::optional<double> average;         // of the experiments that identify it
   std::optional<double> spread_percent;  // standard deviation (n-1) over average
   bool reliable = true;                  // spread not above the report's 30 %
   bool identifiable = true;
   bool fixed = false;
   // Persistent excitation, by parameter (report 3.1): the share of its effect on the data, 0 to 1, that no other
-  // parameter can stand in for.
+  // parameter can explain.
   std::optional<double> excitation;
   std::vector<std::pair<std::string, std::optional<double>>> per_experiment;
 };
@@ -40,11 +40,11 @@ struct Derived {
 };
 
 struct Identification {
-  Prepared prepared;
-  Terms terms;                          // with values
-  std::vector<BalanceData> data;        // the balances that could be formed
-  std::vector<BalanceFit> fits;         // one each
-  std::vector<std::vector<Slot>> held;  // on each, parameters that are held at a bound
+  PreparedData prepared;
+  Terms terms;                                  // with values
+  std::vector<BalanceData> data;                // the balances that could be formed
+  std::vector<BalanceFit> fits;                 // one each
+  std::vector<std::vector<ParameterRef>> held;  // on each, parameters that are held at a bound
   std::vector<Estimate> estimates;
   std::vector<std::pair<std::string, LearnedTable>> tables;  // by id: those of the model that are not fixed
   std::vector<Derived> derived;

@@ -14,7 +14,7 @@
 namespace flexspline::estimation {
 
 // Calls work(i) for each i below count, on as many threads as there are cores. After all have ended the exception of
-// the lowest i is thrown again: the one that a loop would have met. Once giving up was asked for, none goes on or
+// the lowest i is thrown again: the one that a loop would have met. After cancellation none continues or
 // begins.
 template <class Work>
 void in_parallel(std::size_t count, const Work& work) {
@@ -22,23 +22,23 @@ void in_parallel(std::size_t count, const Work& work) {
   std::exception_ptr failure;
   std::size_t failed = count;
   std::mutex guard;
-  const CancellationCheck* const asked = current_cancellation();
-  std::atomic<bool> given_up{false};
+  const CancellationCheck* const outer = current_cancellation();
+  std::atomic<bool> cancelled{false};
   std::exception_ptr why;
-  const CancellationCheck ask = [&] {
-    if (given_up) std::rethrow_exception(why);
+  const CancellationCheck check = [&] {
+    if (cancelled) std::rethrow_exception(why);
     try {
-      if (*asked) (*asked)();
+      if (*outer) (*outer)();
     } catch (...) {
       const std::lock_guard lock(guard);
       if (!why) why = std::current_exception();
-      given_up = true;
+      cancelled = true;
       throw;
     }
   };
   const auto run = [&] {
-    const CancellationScope as_the_caller(asked != nullptr ? &ask : nullptr);
-    for (std::size_t i = next++; i < count && !given_up; i = next++) {
+    const CancellationScope as_the_caller(outer != nullptr ? &check : nullptr);
+    for (std::size_t i = next++; i < count && !cancelled; i = next++) {
       try {
         work(i);
       } catch (...) {

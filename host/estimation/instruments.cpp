@@ -18,20 +18,20 @@ constexpr int kSteps = 4;
 
 // Slopes of the model by all free parameters, linear ones first.
 Eigen::MatrixXd slopes(BalanceData& data, const Terms& terms, const BalanceFit& fit) {
-  Eigen::MatrixXd J(data.rows(), static_cast<Eigen::Index>(fit.linear.size() + fit.shapes.size()));
-  J << columns_of(data, terms, fit.linear), shape_columns(data, terms, fit.on_balance, fit.shapes);
+  Eigen::MatrixXd J(data.rows(), static_cast<Eigen::Index>(fit.linear.size() + fit.nonlinear.size()));
+  J << columns_of(data, terms, fit.linear), nonlinear_columns(data, terms, fit.on_balance, fit.nonlinear);
   return J;
 }
 
 // Adds to a parameter, within its bounds.
-void move(BalanceData& data, Terms& terms, const Slot& slot, double by, bool shape) {
-  Term& term = terms[slot.term];
-  double& value = term.values[slot.parameter];
-  if (shape) {
-    const ShapeRange range = shape_range(data, term, slot.parameter);
+void move(BalanceData& data, Terms& terms, const ParameterRef& ref, double by, bool nonlinear_ref) {
+  Term& term = terms[ref.term];
+  double& value = term.values[ref.parameter];
+  if (nonlinear_ref) {
+    const ParameterRange range = parameter_range(data, term, ref.parameter);
     value = std::clamp(value + by, range.low, range.high);
   } else {
-    const auto& info = term.entry->parameters[slot.parameter];
+    const auto& info = term.entry->parameters[ref.parameter];
     value = std::clamp(value + by, info.low, info.high);
   }
 }
@@ -61,13 +61,14 @@ void refit(BalanceData& data, const FreeMotion& motion, Terms& terms, BalanceFit
     const Eigen::VectorXd instrument_size = Z.colwise().norm().transpose().array().max(1e-300);
     const Eigen::MatrixXd zs = Z * instrument_size.cwiseInverse().asDiagonal();
     const Eigen::FullPivLU<Eigen::MatrixXd> normal(zs.transpose() * A * size.cwiseInverse().asDiagonal());
-    if (normal.rcond() < 1e-9) return;  // the free run does not excite what the data do
+    if (normal.rcond() < 1e-9) return;  // the free run does not excite this parameter
     const Eigen::VectorXd by = normal.solve(zs.transpose() * fit.root_weights.cwiseProduct(fit.residual));
     for (Eigen::Index j = 0; j < count; ++j) {
       const Eigen::Index at = kept[static_cast<std::size_t>(j)];
-      const bool shape = at >= linear;
-      const auto& slots = shape ? fit.shapes : fit.linear;
-      move(data, terms, slots[static_cast<std::size_t>(shape ? at - linear : at)], by[j] / size[j], shape);
+      const bool nonlinear_ref = at >= linear;
+      const auto& refs = nonlinear_ref ? fit.nonlinear : fit.linear;
+      move(data, terms, refs[static_cast<std::size_t>(nonlinear_ref ? at - linear : at)], by[j] / size[j],
+           nonlinear_ref);
     }
     if (step + 1 < kSteps) continue;
     fit.residual = residual_of(data, terms);

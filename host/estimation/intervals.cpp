@@ -14,22 +14,23 @@ namespace {
 
 constexpr double kLikelihoodRatio = 3.84;  // 95 % point of chi-square with one degree of freedom
 
-Estimate* estimate_of(Identification& identification, const Slot& slot) {
+Estimate* estimate_of(Identification& identification, const ParameterRef& ref) {
   for (Estimate& e : identification.estimates)
-    if (e.slot == slot && !e.fixed) return &e;
+    if (e.ref == ref && !e.fixed) return &e;
   return nullptr;
 }
 
-double natural(const Terms& terms, const Slot& slot) {
-  const Term& term = terms[slot.term];
-  return catalogue::natural(*term.entry, term.values)[slot.parameter];
+double natural(const Terms& terms, const ParameterRef& ref) {
+  const Term& term = terms[ref.term];
+  return catalogue::natural(*term.entry, term.values)[ref.parameter];
 }
 
-// Fits all that is free on the balance from where the terms stand, and returns the sum of squares of white errors.
+// Fits all that is free on the balance from the present values of the terms, and returns the sum of squares of white
+// errors.
 double fit_rest(BalanceData& data, Terms& terms, const std::vector<std::size_t>& on_balance,
                 const NoiseCovariance& whitening) {
-  refine_shapes(data, terms, on_balance, whitening);
-  const std::vector<Slot> linear = free_linear_slots(terms, on_balance);
+  refine_nonlinear(data, terms, on_balance, whitening);
+  const std::vector<ParameterRef> linear = free_linear_parameters(terms, on_balance);
   const LinearFit fit =
       least_squares(columns_of(data, terms, linear), data.target() - data.known_torque(terms, on_balance), whitening);
   for (std::size_t j = 0; j < linear.size(); ++j)
@@ -39,13 +40,14 @@ double fit_rest(BalanceData& data, Terms& terms, const std::vector<std::size_t>&
 
 // The value of one parameter at which the sum of squares, with all others fitted, has grown by `allowed`; `side` -1
 // or 1.
-std::optional<double> end_of_profile(BalanceData& data, const Terms& best, const BalanceFit& fit, const Slot& slot,
-                                     double step, double low, double high, double least, double allowed, int side) {
-  const double start = best[slot.term].values[slot.parameter];
+std::optional<double> end_of_profile(BalanceData& data, const Terms& best, const BalanceFit& fit,
+                                     const ParameterRef& ref, double step, double low, double high, double least,
+                                     double allowed, int side) {
+  const double start = best[ref.term].values[ref.parameter];
   Terms terms = best;
-  terms[slot.term].known[slot.parameter] = 1;
+  terms[ref.term].known[ref.parameter] = 1;
   const auto excess_at = [&](double value) {
-    terms[slot.term].values[slot.parameter] = value;
+    terms[ref.term].values[ref.parameter] = value;
     return fit_rest(data, terms, fit.on_balance, fit.whitening) - least - allowed;
   };
   // Outward in growing steps, then by halving.
@@ -62,15 +64,15 @@ std::optional<double> end_of_profile(BalanceData& data, const Terms& best, const
     const double middle = 0.5 * (inside + outside);
     (excess_at(middle) > 0.0 ? outside : inside) = middle;
   }
-  terms[slot.term].values[slot.parameter] = 0.5 * (inside + outside);
+  terms[ref.term].values[ref.parameter] = 0.5 * (inside + outside);
   fit_rest(data, terms, fit.on_balance, fit.whitening);
-  return natural(terms, slot);
+  return natural(terms, ref);
 }
 
-std::vector<Slot> slots_of(const BalanceFit& fit) {
-  std::vector<Slot> slots = fit.linear;
-  slots.insert(slots.end(), fit.shapes.begin(), fit.shapes.end());
-  return slots;
+std::vector<ParameterRef> slots_of(const BalanceFit& fit) {
+  std::vector<ParameterRef> refs = fit.linear;
+  refs.insert(refs.end(), fit.nonlinear.begin(), fit.nonlinear.end());
+  return refs;
 }
 
 }  // namespace
@@ -81,33 +83,33 @@ void profile(Identification& identification, const Progress& progress) {
     BalanceData& data = identification.data[b];
     Terms best = identification.terms;
     const double least = fit_rest(data, best, fit.on_balance, fit.whitening);
-    const auto slots = slots_of(fit);
-    const double freedom = std::max(1.0, static_cast<double>(data.rows()) - static_cast<double>(slots.size()));
-    for (std::size_t j = 0; j < slots.size(); ++j) {
-      Estimate* estimate = estimate_of(identification, slots[j]);
+    const auto refs = slots_of(fit);
+    const double freedom = std::max(1.0, static_cast<double>(data.rows()) - static_cast<double>(refs.size()));
+    for (std::size_t j = 0; j < refs.size(); ++j) {
+      Estimate* estimate = estimate_of(identification, refs[j]);
       const double variance = fit.covariance(static_cast<Eigen::Index>(j), static_cast<Eigen::Index>(j));
       if (!estimate || !estimate->identifiable || !std::isfinite(variance)) continue;
       // Autocorrelation widens a profile as it widens the standard error.
       const double allowed =
           kLikelihoodRatio * least / freedom * variance / fit.white_variance[static_cast<Eigen::Index>(j)];
-      const Term& term = best[slots[j].term];
-      progress(fmt::format("profile of {}.{}", term.id, term.entry->parameters[slots[j].parameter].name));
-      double low = term.entry->parameters[slots[j].parameter].low;
-      double high = term.entry->parameters[slots[j].parameter].high;
+      const Term& term = best[refs[j].term];
+      progress(fmt::format("profile of {}.{}", term.id, term.entry->parameters[refs[j].parameter].name));
+      double low = term.entry->parameters[refs[j].parameter].low;
+      double high = term.entry->parameters[refs[j].parameter].high;
       if (j >= fit.linear.size()) {
-        const ShapeRange range = shape_range(data, term, slots[j].parameter);
+        const ParameterRange range = parameter_range(data, term, refs[j].parameter);
         low = range.low;
         high = range.high;
       }
       const double step = std::max(std::sqrt(variance), 1e-9 * std::abs(estimate->value));
-      const auto a = end_of_profile(data, best, fit, slots[j], step, low, high, least, allowed, -1);
-      const auto b_end = end_of_profile(data, best, fit, slots[j], step, low, high, least, allowed, 1);
+      const auto a = end_of_profile(data, best, fit, refs[j], step, low, high, least, allowed, -1);
+      const auto b_end = end_of_profile(data, best, fit, refs[j], step, low, high, least, allowed, 1);
       estimate->low = a;
       estimate->high = b_end;
       if (a && b_end && *a > *b_end) std::swap(estimate->low, estimate->high);
       if (!a || !b_end)
         identification.warnings.push_back(fmt::format("{}.{}: the data give no {} bound within its range; record {}",
-                                                      term.id, term.entry->parameters[slots[j].parameter].name,
+                                                      term.id, term.entry->parameters[refs[j].parameter].name,
                                                       !a && !b_end ? ""
                                                       : !a         ? "lower"
                                                                    : "upper",
@@ -121,8 +123,8 @@ void bootstrap(Identification& identification, int replicates, std::uint64_t see
   for (std::size_t b = 0; b < identification.fits.size(); ++b) {
     const BalanceFit& fit = identification.fits[b];
     BalanceData& data = identification.data[b];
-    const auto slots = slots_of(fit);
-    if (slots.empty()) continue;
+    const auto refs = slots_of(fit);
+    if (refs.empty()) continue;
     // Blocks are long against what neighbours have in common, and there are at least twenty where there are so many
     // rows.
     const auto rows = static_cast<double>(data.rows());
@@ -132,7 +134,7 @@ void bootstrap(Identification& identification, int replicates, std::uint64_t see
     for (const RowRange& range : data.records())
       for (Eigen::Index first = range.first; first < range.last; first += length)
         blocks.push_back({range.record, first, std::min(first + length, range.last)});
-    std::vector<std::vector<double>> drawn(slots.size());
+    std::vector<std::vector<double>> drawn(refs.size());
     for (int r = 0; r < replicates; ++r) {
       if (r % 20 == 0) progress(fmt::format("bootstrap: {} of {}", r, replicates));
       std::vector<int> times(blocks.size(), 0);
@@ -142,10 +144,10 @@ void bootstrap(Identification& identification, int replicates, std::uint64_t see
         counts.segment(blocks[k].first, blocks[k].size()).setConstant(std::sqrt(static_cast<double>(times[k])));
       Terms terms = identification.terms;
       fit_rest(data, terms, fit.on_balance, fit.whitening.with_counts(counts));
-      for (std::size_t j = 0; j < slots.size(); ++j) drawn[j].push_back(natural(terms, slots[j]));
+      for (std::size_t j = 0; j < refs.size(); ++j) drawn[j].push_back(natural(terms, refs[j]));
     }
-    for (std::size_t j = 0; j < slots.size(); ++j) {
-      Estimate* estimate = estimate_of(identification, slots[j]);
+    for (std::size_t j = 0; j < refs.size(); ++j) {
+      Estimate* estimate = estimate_of(identification, refs[j]);
       if (!estimate || !estimate->identifiable || drawn[j].empty()) continue;
       std::sort(drawn[j].begin(), drawn[j].end());
       const auto at = [&](double share) {

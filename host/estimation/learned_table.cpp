@@ -5,7 +5,7 @@
 #include <limits>
 #include <map>
 
-#include "host/catalogue/defined.hpp"
+#include "host/catalogue/user_defined_effect.hpp"
 #include "host/estimation/balance_fit.hpp"
 #include "host/estimation/least_squares.hpp"
 #include "host/estimation/variable_projection.hpp"
@@ -26,31 +26,32 @@ bool is_closed(effects::Variable variable) {
   return variable == effects::Variable::motor_angle || variable == effects::Variable::output_angle;
 }
 
-// Columns of what stands beside the table, and the target without what is known.
-struct Beside {
+// Columns of the other effects, and the target less the torque of known parameters.
+struct OtherColumns {
   CurveProblem problem;
   std::vector<std::string> ids;                    // of each column
   std::map<std::size_t, Eigen::MatrixXd> columns;  // of tables, by their points
 };
 
-Beside beside(BalanceData& data, const Terms& all, const TableQuestion& question, const Eigen::VectorXd& root_weights,
-              std::string_view but) {
+OtherColumns others(BalanceData& data, const Terms& all, const TableSpecification& question,
+                    const Eigen::VectorXd& root_weights, std::string_view but) {
   Terms terms;
   for (const Term& t : all)
     if (but.empty() || t.id != but) terms.push_back(t);
   const auto on_balance = terms_on(terms, data.balance(), data.prepared().torque_measured);
-  const std::vector<Slot> linear = free_linear_slots(terms, on_balance), shapes = free_shape_slots(terms, on_balance);
-  Beside b;
+  const std::vector<ParameterRef> linear = free_linear_parameters(terms, on_balance),
+                                  nonlinear = free_nonlinear_parameters(terms, on_balance);
+  OtherColumns b;
   const Eigen::VectorXd y = data.target() - data.known_torque(terms, on_balance);
   const Eigen::MatrixXd X = columns_of(data, terms, linear);
-  const auto count = static_cast<Eigen::Index>(linear.size() + shapes.size()) + (question.delay_too ? 1 : 0);
+  const auto count = static_cast<Eigen::Index>(linear.size() + nonlinear.size()) + (question.delay_too ? 1 : 0);
   b.problem.others.resize(data.rows(), count);
   b.problem.others.leftCols(X.cols()) = X;
-  b.problem.others.middleCols(X.cols(), static_cast<Eigen::Index>(shapes.size())) =
-      shape_columns(data, terms, on_balance, shapes);
+  b.problem.others.middleCols(X.cols(), static_cast<Eigen::Index>(nonlinear.size())) =
+      nonlinear_columns(data, terms, on_balance, nonlinear);
   if (question.delay_too) b.problem.others.rightCols(1) = data.delay_column();
-  for (const auto* slots : {&linear, &shapes})
-    for (const Slot& slot : *slots) b.ids.push_back(terms[slot.term].id);
+  for (const auto* refs : {&linear, &nonlinear})
+    for (const ParameterRef& ref : *refs) b.ids.push_back(terms[ref.term].id);
   if (question.delay_too) b.ids.emplace_back("a delay of the effort");
   // From what the others leave, so that squares keep their digits.
   b.problem.target = least_squares(X, y, root_weights).residual;
@@ -70,11 +71,11 @@ struct Fitted {
   std::vector<double> at;
   std::vector<std::uint8_t> visited;
   double left() const { return curve.squares_with; }
-  double fall() const { return curve.squares_without - curve.squares_with; }
+  double decrease() const { return curve.squares_without - curve.squares_with; }
 };
 
-Fitted fit_points(BalanceData& data, const Terms& terms, const TableQuestion& question, std::vector<double> at,
-                  Beside& b, int smoothings = kSmoothings) {
+Fitted fit_points(BalanceData& data, const Terms& terms, const TableSpecification& question, std::vector<double> at,
+                  OtherColumns& b, int smoothings = kSmoothings) {
   const BalanceData::Points points{question.variable, question.times_direction, question.balance, at.front(), at.back(),
                                    at.size()};
   Eigen::MatrixXd& columns = b.columns[at.size()];
@@ -88,7 +89,7 @@ Fitted fit_points(BalanceData& data, const Terms& terms, const TableQuestion& qu
   return fitted;
 }
 
-LearnedTable learned(BalanceData& data, const Beside& b, Fitted fitted) {
+LearnedTable learned(BalanceData& data, const OtherColumns& b, Fitted fitted) {
   LearnedTable result;
   const Curve& curve = fitted.curve;
   const Eigen::VectorXd weighted = b.problem.root_weights.cwiseProduct(curve.residual);
@@ -100,7 +101,7 @@ LearnedTable learned(BalanceData& data, const Beside& b, Fitted fitted) {
   const double weight = b.problem.root_weights.squaredNorm() / std::max(1.0, curve.rows);
   result.rmse_cv_before = std::sqrt(curve.squares_without / std::max(1.0, curve.rows) / weight);
   result.rmse_cv_after = std::sqrt(curve.squares_with / std::max(1.0, curve.rows) / weight);
-  result.fall_percent = curve.squares_without > 0.0 ? 100.0 * fitted.fall() / curve.squares_without : 0.0;
+  result.decrease_percent = curve.squares_without > 0.0 ? 100.0 * fitted.decrease() / curve.squares_without : 0.0;
   result.score =
       curve.squares_with > 0.0 ? curve.rows / tau * std::log(curve.squares_without / curve.squares_with) : 0.0;
   result.effective = curve.effective;
@@ -117,7 +118,7 @@ LearnedTable learned(BalanceData& data, const Beside& b, Fitted fitted) {
 
 }  // namespace
 
-Covered covered_range(const Eigen::VectorXd& signal) {
+SignalRange central_range(const Eigen::VectorXd& signal) {
   if (signal.size() == 0) return {};
   std::vector<double> sorted(signal.begin(), signal.end());
   const auto at = [&](double share) {
@@ -128,13 +129,13 @@ Covered covered_range(const Eigen::VectorXd& signal) {
   return {at(0.001), at(0.999)};
 }
 
-std::optional<LearnedTable> learn_table(BalanceData& data, const Terms& terms, const TableQuestion& question,
+std::optional<LearnedTable> learn_table(BalanceData& data, const Terms& terms, const TableSpecification& question,
                                         const Eigen::VectorXd& root_weights, std::string_view but) {
   if (data.empty()) return std::nullopt;
   const bool closed = is_closed(question.variable);
-  const Covered range = covered_range(data.signal_at_rows(terms, question.variable));
+  const SignalRange range = central_range(data.signal_at_rows(terms, question.variable));
   if (!(range.high > range.low)) return std::nullopt;
-  Beside b = beside(data, terms, question, root_weights, but);
+  OtherColumns b = others(data, terms, question, root_weights, but);
   const auto points = [&](std::size_t count) {
     return closed ? catalogue::points_of_turn(count) : catalogue::even_points(range.low, range.high, count);
   };
@@ -168,8 +169,8 @@ std::optional<LearnedTable> learn_table(BalanceData& data, const Terms& terms, c
   return std::nullopt;
 }
 
-TableQuestion question_of(const model::Definition& definition) {
-  TableQuestion question;
+TableSpecification table_specification(const model::Definition& definition) {
+  TableSpecification question;
   question.variable = catalogue::find_variable(definition.variable)->variable;
   question.times_direction = definition.times_direction;
   question.balance = definition.balance == "transmission" ? Balance::transmission
@@ -179,7 +180,7 @@ TableQuestion question_of(const model::Definition& definition) {
   return question;
 }
 
-model::Effect effect_of(const TableQuestion& question, const model::Table& table, std::string id) {
+model::Effect effect_of(const TableSpecification& question, const model::Table& table, std::string id) {
   model::Effect effect;
   effect.type = std::string(catalogue::kTableEffect);
   effect.id = std::move(id);

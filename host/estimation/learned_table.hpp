@@ -13,21 +13,22 @@ namespace flexspline::estimation {
 
 struct LearnedTable {
   model::Table table;  // with values and their standard deviations, corrected for autocorrelation
-  // Of rows that were left out of the fit, in fifths of each record: errors without the table and with it, the fall of
-  // their weighted squares, and twice the log likelihood ratio over the autocorrelation time.
+  // Of rows that were left out of the fit, in fifths of each record: errors without the table and with it, the decrease
+  // of their weighted squares, and twice the log likelihood ratio over the autocorrelation time.
   double rmse_cv_before = 0.0;
   double rmse_cv_after = 0.0;
-  double fall_percent = 0.0;
+  double decrease_percent = 0.0;
   double score = 0.0;
-  double effective = 0.0;             // numbers that the curve uses
-  std::vector<std::string> left_to;   // effects of the model that hold what the curve and they could both draw
-  std::vector<std::uint8_t> visited;  // one a point: whether rows lie there; else it is drawn from its neighbours
+  double effective = 0.0;            // numbers that the curve uses
+  std::vector<std::string> left_to;  // effects of the model that hold what the curve and they could both draw
+  std::vector<std::uint8_t>
+      visited;  // one a point: whether rows are there; else it is extrapolated from its neighbours
   Eigen::VectorXd residual;
   double autocorrelation_time = 1.0;
 };
 
-// What a table is to be learnt over.
-struct TableQuestion {
+// The signal and the points of a table that is to be learnt.
+struct TableSpecification {
   effects::Variable variable{};
   bool times_direction = false;
   Balance balance = Balance::motor;
@@ -35,27 +36,27 @@ struct TableQuestion {
   std::size_t most_points = 256;  // where they do
   bool exactly = false;           // as many as that
   bool filtered = true;           // else columns as they are at the rows, which cost little
-  bool delay_too = false;         // a delay of the effort stands beside the others
+  bool delay_too = false;         // a delay of the effort is estimated as well
 };
 
-// Fits all free linear parameters of `terms` on this balance and the table together (shapes move to first order), as
-// smooth as left-out rows ask for. A table of `terms` with the id `but` is left out: it is the one to learn. The number
-// of points is the least that predicts left-out rows as well as more would, within a fiftieth of their squares. Nothing
-// where the signal does not vary.
-std::optional<LearnedTable> learn_table(BalanceData& data, const Terms& terms, const TableQuestion& question,
+// Fits all free linear parameters of `terms` on this balance and the table together (nonlinear parameters move to first
+// order), as smooth as cross-validation chooses. A table of `terms` with the id `but` is left out: it is the one to
+// learn. The number of points is the least that predicts left-out rows as well as more would, within a fiftieth of
+// their squares. Nothing where the signal does not vary.
+std::optional<LearnedTable> learn_table(BalanceData& data, const Terms& terms, const TableSpecification& question,
                                         const Eigen::VectorXd& root_weights, std::string_view but = {});
 
 // The signal at the rows covers this range, but for one row in a thousand at each end.
-struct Covered {
+struct SignalRange {
   double low = 0.0;
   double high = 0.0;
 };
-Covered covered_range(const Eigen::VectorXd& signal);
+SignalRange central_range(const Eigen::VectorXd& signal);
 
-// The question that a table of a model asks: its own points where it has some.
-TableQuestion question_of(const model::Definition& definition);
+// The specification of a table of a model: its own points where it has some.
+TableSpecification table_specification(const model::Definition& definition);
 
 // A table effect with what was learnt; `id` names it.
-model::Effect effect_of(const TableQuestion& question, const model::Table& table, std::string id);
+model::Effect effect_of(const TableSpecification& question, const model::Table& table, std::string id);
 
 }  // namespace flexspline::estimation

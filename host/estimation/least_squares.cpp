@@ -26,7 +26,7 @@ LinearFit least_squares(const Eigen::MatrixXd& X, const Eigen::VectorXd& y, cons
   std::vector<Eigen::Index> kept;
   for (Eigen::Index j = 0; j < columns; ++j)
     if (length[j] > 0.0 && std::isfinite(length[j])) kept.push_back(j);
-  // Take out, one at a time, the column that the others explain best, until all that is left is determined.
+  // Removes one column at a time, the one with the smallest tolerance, until all others are determined.
   for (;;) {
     const auto count = static_cast<Eigen::Index>(kept.size());
     if (count == 0 || X.rows() < count) return fit;
@@ -38,7 +38,7 @@ LinearFit least_squares(const Eigen::MatrixXd& X, const Eigen::VectorXd& y, cons
     const Eigen::JacobiSVD<Eigen::MatrixXd> svd(R, Eigen::ComputeThinU | Eigen::ComputeThinV);
     const Eigen::VectorXd s = svd.singularValues();
     const double smallest = std::max(s[count - 1], 1e-14 * s[0]);
-    // Rows of R^-1 have length one over the own share of their column.
+    // Rows of R^-1 have length one over the tolerance of their column.
     Eigen::MatrixXd inverse_rows = svd.matrixV();
     for (Eigen::Index j = 0; j < count; ++j) inverse_rows.col(j) /= std::max(s[j], 1e-14 * s[0]);
     const Eigen::VectorXd own = inverse_rows.rowwise().norm().cwiseInverse();
@@ -47,7 +47,7 @@ LinearFit least_squares(const Eigen::MatrixXd& X, const Eigen::VectorXd& y, cons
     for (Eigen::Index j = 0; j < count; ++j) fit.root_tolerance[kept[static_cast<std::size_t>(j)]] = own[j];
     if (fit.root_tolerance_of_all.isZero(0.0)) fit.root_tolerance_of_all = fit.root_tolerance;
     if (own[worst] < kUndetermined) {
-      // Of columns that explain each other, the last one goes: models list the basic effects first.
+      // Of collinear columns the last one is dropped: models list the basic effects first.
       Eigen::Index out = worst;
       for (Eigen::Index j = 0; j < count; ++j)
         if (own[j] < 3.0 * own[worst]) out = j;

@@ -13,8 +13,8 @@ struct LinearFit {
   Eigen::VectorXd theta;            // one a column of X
   Eigen::VectorXd residual;         // y - X theta, unweighted
   Eigen::MatrixXd unit_covariance;  // (X' W X)^-1; infinite on what is not determined
-  // Of each column, the share that no other column can stand in for (sine of its angle to their span), 0 to 1. Below
-  // kUndetermined the parameter is left at zero and the data cannot tell it.
+  // Of each column, the share that is orthogonal to all other columns (sine of its angle to their span), 0 to 1. Below
+  // kUndetermined the parameter is left at zero and the data do not identify it.
   Eigen::VectorXd root_tolerance;
   Eigen::VectorXd root_tolerance_of_all;  // the same, counting also the columns that were taken out as not determined
   double condition_number = 0.0;          // of the columns scaled to unit length
@@ -39,7 +39,7 @@ Eigen::VectorXd record_weights(const std::vector<RowRange>& records, const Eigen
 Eigen::MatrixXd newey_west(const std::vector<RowRange>& records, const Eigen::MatrixXd& columns,
                            const Eigen::VectorXd& residual, Eigen::Index lags);
 
-// How far neighbours are looked at for a residual of this autocorrelation time.
+// The lags that are used for a residual of this autocorrelation time.
 Eigen::Index newey_west_lags(double autocorrelation_time, Eigen::Index rows);
 
 // Rows that count as one: integrated autocorrelation time of the weighted residual over all records, at least one.

@@ -22,7 +22,7 @@ class Cost final : public ceres::CostFunction {
     } catch (...) {  // not through the solver, which expects none
       failure_ = std::current_exception();
     }
-    // Nothing is left to do: it ends at once, and has nothing to say about it on the terminal.
+    // Nothing is left to do: it ends at once, without a message on the terminal.
     std::fill_n(residuals, count_, 0.0);
     if (jacobians && jacobians[0]) std::fill_n(jacobians[0], count_ * static_cast<Eigen::Index>(unknowns_), 0.0);
     return true;
@@ -33,7 +33,7 @@ class Cost final : public ceres::CostFunction {
   bool evaluate(const double* parameters, double* residuals, double** jacobians) const {
     const std::vector<double> x(parameters, parameters + unknowns_);
     const bool wants_slopes = jacobians && jacobians[0];
-    // The solver asks again where its line search has been: for the values, then for the slopes.
+    // The solver evaluates the points of its line search again: for the values, then for the slopes.
     if (x != at_ || (wants_slopes && slopes_.size() == 0)) {
       at_.clear();
       slopes_.resize(0, 0);
@@ -46,8 +46,8 @@ class Cost final : public ceres::CostFunction {
     if (wants_slopes) Eigen::Map<RowMajor>(jacobians[0], count_, static_cast<Eigen::Index>(unknowns_)) = slopes_;
     return true;
   }
-  // What stands at a bound and would go beyond stays there, and the step of the others is made without it: a step that
-  // counted on it and was cut back after would be a poor one for them, too.
+  // A parameter at a bound that would move beyond it stays there, and the step of the others is made without it: a step
+  // that counted on it and was cut back after would be a poor one for them, too.
   void hold_at_bounds(const std::vector<double>& x) const {
     for (std::size_t j = 0; j < unknowns_; ++j) {
       const auto column = slopes_.col(static_cast<Eigen::Index>(j));
@@ -83,7 +83,7 @@ double minimise(std::vector<double>& x, Eigen::Index count, const Residuals& res
   options.max_num_iterations = how.iterations;
   options.function_tolerance = how.function_tolerance;
   options.parameter_tolerance = how.parameter_tolerance;
-  // By values alone: a line search that asked for slopes would pay for those of each point that it leaves.
+  // By values alone: a line search with slopes would compute them at each point that it leaves.
   options.line_search_interpolation_type = ceres::QUADRATIC;
   options.logging_type = ceres::SILENT;
   ceres::Solver::Summary summary;

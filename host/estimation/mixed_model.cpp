@@ -11,11 +11,11 @@ std::vector<double> raw_variances(const std::vector<RecordErrors>& records) {
   return variances;
 }
 
-// From noise that holds all differences between records, or from random effects that are as large as they may be.
+// Two starts: all differences between records as noise, or the largest random effects that are allowed.
 enum class Start { all_noise, largest_effects };
 
 MixedFit fit_from(Start start, const RecordFactors& factors, const std::vector<FrictionGroup>& groups,
-                  Eigen::Index first_shape, double tau) {
+                  Eigen::Index first_nonlinear, double tau) {
   MixedFit fit;
   const Eigen::Index columns = factors.columns();
   const auto solve = [&] {
@@ -27,7 +27,7 @@ MixedFit fit_from(Start start, const RecordFactors& factors, const std::vector<F
               : eliminate_random_effects(factors.whole[i], fit.u, fit.effects.std, fit.effects.variance[i] * tau));
     const Eigen::MatrixXd all = combined_factor(reduced);
     fit.linear = least_squares(all.leftCols(columns), all.col(columns), Eigen::VectorXd::Ones(all.rows()));
-    fit.u = random_effect_directions(groups, fit.linear.theta, factors.size, first_shape);
+    fit.u = random_effect_directions(groups, fit.linear.theta, factors.size, first_nonlinear);
   };
   solve();
   if (start == Start::largest_effects) {
@@ -40,7 +40,7 @@ MixedFit fit_from(Start start, const RecordFactors& factors, const std::vector<F
   constexpr double kSame = 0.02;
   for (int round = 0; round < kMostRounds; ++round) {
     const std::vector<RecordErrors> errors = record_errors(factors, fit.linear.theta, fit.u);
-    // Random effects are no noise: the limit follows what is left without them.
+    // The limit of the noise follows the residual without random effects.
     const double least = least_variance_of(fit.effects.variance.empty() ? raw_variances(errors) : fit.effects.variance);
     const SmallVector before = fit.effects.std;
     fit.effects = fit_random_effects(errors, tau, least, fit.effects.variance);
@@ -55,10 +55,10 @@ MixedFit fit_from(Start start, const RecordFactors& factors, const std::vector<F
 }  // namespace
 
 MixedFit fit_mixed_model(const RecordFactors& factors, const std::vector<FrictionGroup>& groups,
-                         Eigen::Index first_shape, double tau) {
-  MixedFit fit = fit_from(Start::all_noise, factors, groups, first_shape, tau);
+                         Eigen::Index first_nonlinear, double tau) {
+  MixedFit fit = fit_from(Start::all_noise, factors, groups, first_nonlinear, tau);
   if (groups.empty()) return fit;
-  MixedFit other = fit_from(Start::largest_effects, factors, groups, first_shape, tau);
+  MixedFit other = fit_from(Start::largest_effects, factors, groups, first_nonlinear, tau);
   return other.deviance() < fit.deviance() ? other : fit;
 }
 

@@ -19,10 +19,10 @@ struct MixedFit {
   double deviance() const { return std::accumulate(effects.deviance.begin(), effects.deviance.end(), 0.0); }
 };
 
-// `tau` rows count as one. Columns of free shapes begin at `first_shape`. Two searches begin with all that is left as
-// noise and with all of it as random effects; the likelier end counts.
+// `tau` rows count as one. Columns of free nonlinear parameters begin at `first_nonlinear`. Two searches begin with all
+// that is left as noise and with all of it as random effects; the likelier end counts.
 MixedFit fit_mixed_model(const RecordFactors& factors, const std::vector<FrictionGroup>& groups,
-                         Eigen::Index first_shape, double tau);
+                         Eigen::Index first_nonlinear, double tau);
 
 // Of each record, the cross products of the error that `theta` leaves.
 std::vector<RecordErrors> record_errors(const RecordFactors& factors, const Eigen::VectorXd& theta,

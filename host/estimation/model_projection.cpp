@@ -22,10 +22,10 @@ Eigen::VectorXd model_torque(BalanceData& data, const Terms& terms) {
 
 Eigen::MatrixXd model_columns(BalanceData& data, const Terms& terms) {
   const auto on_balance = terms_on(terms, data.balance(), data.prepared().torque_measured);
-  const std::vector<Slot> linear = free_linear_slots(terms, on_balance);
-  const std::vector<Slot> shapes = free_shape_slots(terms, on_balance);
-  Eigen::MatrixXd X(data.rows(), static_cast<Eigen::Index>(linear.size() + shapes.size() + 1));
-  X << columns_of(data, terms, linear), shape_columns(data, terms, on_balance, shapes), data.delay_column();
+  const std::vector<ParameterRef> linear = free_linear_parameters(terms, on_balance);
+  const std::vector<ParameterRef> nonlinear = free_nonlinear_parameters(terms, on_balance);
+  Eigen::MatrixXd X(data.rows(), static_cast<Eigen::Index>(linear.size() + nonlinear.size() + 1));
+  X << columns_of(data, terms, linear), nonlinear_columns(data, terms, on_balance, nonlinear), data.delay_column();
   return X;
 }
 
@@ -39,7 +39,7 @@ ModelProjection::ModelProjection(const Eigen::MatrixXd& columns, const Eigen::Ve
 Eigen::MatrixXd ModelProjection::orthogonal_part(const Eigen::MatrixXd& torques) const {
   Eigen::MatrixXd left = root_weights_.asDiagonal() * torques;
   left -= span_ * (span_.transpose() * left);
-  // Rows without weight count for nothing.
+  // Rows without weight are not used.
   return (root_weights_.array() > 0.0).select(root_weights_.array(), 1.0).inverse().matrix().asDiagonal() * left;
 }
 

@@ -10,8 +10,8 @@ namespace flexspline::estimation {
 // Torque of all effects on the balance at their values, filtered as the rows are, N m.
 Eigen::VectorXd model_torque(BalanceData& data, const Terms& terms);
 
-// The columns that a fit of the model has on a balance: its free linear parameters, the slopes by its free shapes, and
-// a delay of the effort.
+// The columns that a fit of the model has on a balance: its free linear parameters, the slopes by its free nonlinear
+// parameters, and a delay of the effort.
 Eigen::MatrixXd model_columns(BalanceData& data, const Terms& terms);
 
 class ModelProjection {

@@ -18,17 +18,17 @@ namespace {
 
 constexpr double kFar = 100.0;          // standard errors of least squares
 constexpr double kShownAtLeast = 1e-6;  // of the error's size, by a step of one standard error
-// Steps with one computation of the slopes, and how often these are computed.
+// Steps with one Jacobian, and the number of Jacobians.
 constexpr int kIterations = 12;
 constexpr int kRounds = 3;
 constexpr double kConverged = 0.1;  // in standard errors: slopes found before such a move serve after it
-// A move too short to tell slopes by: what is left of the search is rounding and standstills that come and go.
+// A step too short for slopes by differences: what is left of the search is rounding and standstills that come and go.
 constexpr double kLeastMove = 0.01;
 constexpr double kStep_s = 1.0 / 4000.0;  // of the integration
 
 // A free parameter, moved in units of its standard error from least squares.
 struct Free {
-  Slot slot;
+  ParameterRef ref;
   std::size_t fit = 0;
   Eigen::Index at = 0;  // in the covariance of the fit
   double start = 0.0;
@@ -36,7 +36,7 @@ struct Free {
   double low = 0.0, high = 0.0;
 };
 
-// The velocity at the first sample of a record, which noise would put wrong: estimated along with the parameters.
+// The initial velocity of a record. The first sample is noisy, so it is estimated with the parameters.
 struct Start {
   std::size_t record = 0;
   double velocity = 0.0;  // as measured
@@ -64,9 +64,9 @@ class OutputError {
   explicit OutputError(Identification& identification) : all_(identification) {
     for (std::size_t b = 0; b < all_.fits.size(); ++b) {
       const BalanceFit& fit = all_.fits[b];
-      for (std::size_t j = 0; j < fit.linear.size() + fit.shapes.size(); ++j)
-        add(b, j < fit.linear.size() ? fit.linear[j] : fit.shapes[j - fit.linear.size()], static_cast<Eigen::Index>(j),
-            j >= fit.linear.size());
+      for (std::size_t j = 0; j < fit.linear.size() + fit.nonlinear.size(); ++j)
+        add(b, j < fit.linear.size() ? fit.linear[j] : fit.nonlinear[j - fit.linear.size()],
+            static_cast<Eigen::Index>(j), j >= fit.linear.size());
     }
     const FreeMotion motion = run_free({});
     usable_ = motion.simulated;
@@ -99,10 +99,10 @@ class OutputError {
     for (std::size_t i = 0; i < starts_.size(); ++i)
       initial_[starts_[i].record] = starts_[i].velocity + x[free_.size() + i] * starts_[i].unit;
     for (std::size_t j = 0; j < free_.size(); ++j)
-      all_.terms[free_[j].slot.term].values[free_[j].slot.parameter] = free_[j].start + x[j] * free_[j].unit;
+      all_.terms[free_[j].ref.term].values[free_[j].ref.parameter] = free_[j].start + x[j] * free_[j].unit;
   }
-  // Weighted errors of the terms as they stand, zero in records other than those of `only` (empty: all). Empty where
-  // a record that could be simulated no longer can.
+  // Weighted errors of the terms at their present values, zero in records other than those of `only` (empty: all).
+  // Empty where a record that could be simulated no longer can.
   Eigen::VectorXd weighted(const std::vector<std::uint8_t>& only = {}) {
     const std::vector<std::uint8_t>& run = only.empty() ? usable_ : only;
     const FreeMotion motion = run_free(run);
@@ -111,9 +111,9 @@ class OutputError {
     for (const Part& part : parts_) e.segment(part.range.first, part.range.size()) *= part.weight;
     return e;
   }
-  // Records whose free run a parameter moves: what only the load feels does nothing where the load is locked.
+  // Records whose free run depends on a parameter: the load's parameters do not act where the load is locked.
   std::vector<std::uint8_t> moved_by(const Free& free) const {
-    const catalogue::Entry& entry = *all_.terms[free.slot.term].entry;
+    const catalogue::Entry& entry = *all_.terms[free.ref.term].entry;
     const bool load_alone = entry.info->phase == effects::Phase::source && !entry.adds_to(Balance::motor) &&
                             !entry.adds_to(Balance::transmission);
     std::vector<std::uint8_t> records = usable_;
@@ -130,17 +130,17 @@ class OutputError {
     how.step_s = kStep_s;
     return free_motion(all_, how);
   }
-  void add(std::size_t b, Slot slot, Eigen::Index at, bool shape) {
+  void add(std::size_t b, ParameterRef ref, Eigen::Index at, bool nonlinear_ref) {
     const BalanceFit& fit = all_.fits[b];
     if (fit.root_tolerance[at] < kUndetermined) return;
-    const Term& term = all_.terms[slot.term];
-    const auto& info = term.entry->parameters[slot.parameter];
-    Free f{slot, b, at, term.values[slot.parameter], 0.0, info.low, info.high};
+    const Term& term = all_.terms[ref.term];
+    const auto& info = term.entry->parameters[ref.parameter];
+    Free f{ref, b, at, term.values[ref.parameter], 0.0, info.low, info.high};
     const double variance = fit.covariance(at, at);
     f.unit = std::isfinite(variance) && variance > 0.0 ? std::sqrt(variance) : 0.01 * std::abs(f.start);
     f.unit = std::max(f.unit, 1e-4 * std::abs(f.start));
-    if (shape) {
-      const ShapeRange range = shape_range(all_.data[b], term, slot.parameter);
+    if (nonlinear_ref) {
+      const ParameterRange range = parameter_range(all_.data[b], term, ref.parameter);
       f.low = range.low;
       f.high = range.high;
       f.unit = std::min(f.unit, 0.1 * (range.high - range.low));
@@ -210,8 +210,8 @@ class OutputError {
   Eigen::Index rows_ = 0;
 };
 
-// Slopes of the weighted errors by a step of `step` units each, from both sides. A first velocity matters to its own
-// record alone, so all of them are moved at once.
+// Slopes of the weighted errors by a step of `step` units each, from both sides. An initial velocity acts on its own
+// record alone, so all of them are changed in one run.
 Eigen::MatrixXd slopes(OutputError& problem, const std::vector<double>& x,
                        const std::function<void(std::string_view)>& progress) {
   constexpr double kStep = 0.05;
@@ -267,9 +267,9 @@ void take_covariance(Identification& identification, OutputError& problem, const
     BalanceFit& fit = identification.fits[free[i].fit];
     const auto a = static_cast<Eigen::Index>(i);
     if (J.col(a).norm() < kShownAtLeast * e.norm()) {
-      const Term& term = identification.terms[free[i].slot.term];
+      const Term& term = identification.terms[free[i].ref.term];
       unseen += (unseen.empty() ? "" : ", ") +
-                fmt::format("{}.{}", term.id, term.entry->parameters[free[i].slot.parameter].name);
+                fmt::format("{}.{}", term.id, term.entry->parameters[free[i].ref.parameter].name);
       continue;
     }
     for (std::size_t j = 0; j < free.size(); ++j) {

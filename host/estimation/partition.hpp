@@ -8,13 +8,15 @@
 
 namespace flexspline::estimation {
 
-// First the linear parameters of all effects without a free shape, alone; then, with those known, the others. As the
-// report does it: simple and steady, but what the first part lacks goes into its parameters (compare with nls).
+// First the linear parameters of all effects without a free nonlinear parameter, alone; then, with those known, the
+// others. As the report does it: simple and steady, but what the first part lacks goes into its parameters (compare
+// with nls).
 std::unique_ptr<Identification> partitioned(const data::Dataset& dataset, const model::Model& model,
                                             const PipelineOptions& pipeline);
 
-// Searches for the shapes that the model does not state again from random places of their ranges, and keeps the best.
-// Replaces the fits where one is better. Adds a warning where starts end at different places with like errors.
+// Searches for the nonlinear parameters that the model does not state again from random places of their ranges, and
+// keeps the best. Replaces the fits where one is better. Adds a warning where starts end at different places with like
+// errors.
 void search_from_several_starts(Identification& identification, int starts, std::uint64_t seed);
 
 }  // namespace flexspline::estimation

@@ -9,7 +9,7 @@
 namespace flexspline::estimation {
 namespace {
 
-// A stand-in that reads what a table over the variable reads, so that it sees what shifts leave of it.
+// A placeholder effect that reads what a table over the variable reads, so that it sees what shifts leave of it.
 struct Reader {
   effects::Description info;
   catalogue::Entry entry;
@@ -29,7 +29,7 @@ double signal_of(const effects::Inputs<Real>& in, effects::Variable variable, do
   return effects::signal_of<Real>(variable, in);
 }
 
-// Between which points of the table a sample lies, and how much it adds there.
+// Between which points of the table a sample is, and how much it adds there.
 struct Place {
   Eigen::Index point = 0;
   double share = 0.0, size = 0.0;
@@ -46,9 +46,9 @@ std::vector<Place> places_of(const catalogue::PlainInputs& inputs, const Balance
   const double per_signal = closed ? static_cast<double>(count) / (2.0 * std::numbers::pi)
                                    : static_cast<double>(count - 1) / (points.high - points.low);
   std::vector<Place> places(inputs.size());
-  inputs.each_stretch([&](std::size_t first, std::span<const effects::Inputs<Real>> stretch) {
-    for (std::size_t k = 0; k < stretch.size(); ++k) {
-      const effects::Inputs<Real>& in = stretch[k];
+  inputs.each_block([&](std::size_t first, std::span<const effects::Inputs<Real>> block) {
+    for (std::size_t k = 0; k < block.size(); ++k) {
+      const effects::Inputs<Real>& in = block[k];
       const double x = signal_of(in, points.variable, turn_angle_scale);
       const double most = static_cast<double>(closed ? count : count - 1);
       const double at = std::clamp(closed ? x * per_signal : (x - points.low) * per_signal, 0.0, most);
@@ -62,12 +62,12 @@ std::vector<Place> places_of(const catalogue::PlainInputs& inputs, const Balance
 
 // By point, the samples that add to it.
 std::vector<std::vector<std::size_t>> samples_by_point(const std::vector<Place>& places, std::size_t count) {
-  std::vector<std::vector<std::size_t>> reaching(count);
+  std::vector<std::vector<std::size_t>> cross_columns(count);
   for (std::size_t k = 0; k < places.size(); ++k) {
-    reaching[static_cast<std::size_t>(places[k].point)].push_back(k);
-    reaching[static_cast<std::size_t>(places[k].point + 1) % count].push_back(k);
+    cross_columns[static_cast<std::size_t>(places[k].point)].push_back(k);
+    cross_columns[static_cast<std::size_t>(places[k].point + 1) % count].push_back(k);
   }
-  return reaching;
+  return cross_columns;
 }
 
 }  // namespace
@@ -95,10 +95,10 @@ Eigen::MatrixXd BalanceData::point_columns(const Terms& terms, const Points& poi
       }
       continue;
     }
-    const std::vector<std::vector<std::size_t>> reaching = samples_by_point(places, points.count);
+    const std::vector<std::vector<std::size_t>> cross_columns = samples_by_point(places, points.count);
     std::vector<Eigen::Index> visited;
     for (Eigen::Index j = 0; j < count; ++j)
-      if (!reaching[static_cast<std::size_t>(j)].empty()) visited.push_back(j);
+      if (!cross_columns[static_cast<std::size_t>(j)].empty()) visited.push_back(j);
     // Some at a time: together they would not stay in the cache.
     constexpr std::size_t kTogether = 8;
     for (std::size_t first = 0; first < visited.size(); first += kTogether) {
@@ -107,7 +107,7 @@ Eigen::MatrixXd BalanceData::point_columns(const Terms& terms, const Points& poi
           Eigen::MatrixXd::Zero(static_cast<Eigen::Index>(places.size()), static_cast<Eigen::Index>(many));
       for (std::size_t i = 0; i < many; ++i) {
         const Eigen::Index j = visited[first + i];
-        for (const std::size_t k : reaching[static_cast<std::size_t>(j)]) {
+        for (const std::size_t k : cross_columns[static_cast<std::size_t>(j)]) {
           const Place& p = places[k];
           signals(static_cast<Eigen::Index>(k), static_cast<Eigen::Index>(i)) +=
               p.size * (p.point == j ? 1.0 - p.share : p.share);

@@ -30,7 +30,7 @@ constexpr double kRowsOverCutoff = 4.0;
 
 // How far, in periods of the row cut-off, the step of friction at a reversal rings through the row filter.
 constexpr double kMaskReach = 1.5;
-// Records of less coherent power than this share of the strongest one's do not shape the pipeline.
+// Records of less coherent power than this share of the strongest one's do not determine the pipeline.
 constexpr double kCountingPowerShare = 0.01;
 constexpr double kMostMaskedShare = 0.75;
 constexpr double kMaskedShareThen = 0.5;  // where it was more than that
@@ -44,7 +44,7 @@ std::vector<double> align_held(const std::vector<double>& held, const std::vecto
   return aligned;
 }
 
-// Marks what lies within `reach` samples of a sample for which `bad` holds.
+// Marks what is within `reach` samples of a sample for which `bad` holds.
 std::vector<std::uint8_t> spread(const std::vector<std::uint8_t>& bad, std::size_t reach) {
   std::vector<std::uint8_t> marked(bad.size(), 0);
   std::ptrdiff_t last = -1;
@@ -80,7 +80,7 @@ void choose_rows(Record& record, const Pipeline& pipeline, std::size_t settling)
   const auto reach = static_cast<std::size_t>(std::lround(kMaskReach / (pipeline.row_cutoff_hz * record.sample_s)));
   std::vector<std::uint8_t> unusable(n, 1);
   for (const Segment& s : record.segments) {
-    // The ends of a segment carry the filters' guess of what lies beyond; short segments keep at least their middle.
+    // The ends of a segment carry the filters' guess of what is beyond; short segments keep at least their middle.
     const std::size_t edge = std::min(settling, (s.last - s.first) / 10);
     for (std::size_t k = s.first + edge; k + edge < s.last; ++k) unusable[k] = 0;
   }
@@ -184,7 +184,7 @@ Record prepare_one(const Experiment& e, const catalogue::DriveConstants<double>&
   return r;
 }
 
-// Each reversal masks a stretch that is as long as the rows' filter rings: a cut-off that serves the slow records may
+// Each reversal masks an interval that is as long as the rows' filter rings: a cut-off that serves the slow records may
 // leave a fast one nothing at all. Where less than a quarter of a record that counts would be left, raises it until
 // half is.
 void leave_rows_between_reversals(Pipeline& pipeline, const std::vector<const Experiment*>& experiments,
@@ -213,7 +213,7 @@ void leave_rows_between_reversals(Pipeline& pipeline, const std::vector<const Ex
   }
   if (wanted <= pipeline.row_cutoff_hz || pipeline.row_cutoff_hz >= highest_hz) return;
   pipeline.row_cutoff_hz = std::min(std::ceil(wanted * kMostMaskedShare / kMaskedShareThen), highest_hz);
-  pipeline.reason += fmt::format("; raised to {:.4g} Hz, so that rows are left between the reversals of {}",
+  pipeline.reason += fmt::format("; raised to {:.4g} Hz, so that samples are left between the reversals of {}",
                                  pipeline.row_cutoff_hz, fastest->name);
 }
 
@@ -259,15 +259,15 @@ Pipeline choose_pipeline(const std::vector<const Experiment*>& experiments, cons
 }
 
 // Facts of the drive that a record is made with.
-bool are_alike(const catalogue::DriveConstants<double>& a, const catalogue::DriveConstants<double>& b) {
+bool are_similar(const catalogue::DriveConstants<double>& a, const catalogue::DriveConstants<double>& b) {
   return a.gear_ratio == b.gear_ratio && a.torque_constant == b.torque_constant &&
          a.reference_temperature == b.reference_temperature && a.turn_angle_scale == b.turn_angle_scale;
 }
 
 // All but the records.
-Prepared without_records(const std::vector<const Experiment*>& experiments, const model::Drive& drive,
-                         const Pipeline& pipeline) {
-  Prepared prepared;
+PreparedData without_records(const std::vector<const Experiment*>& experiments, const model::Drive& drive,
+                             const Pipeline& pipeline) {
+  PreparedData prepared;
   prepared.pipeline = pipeline;
   prepared.constants = catalogue::constants_of(drive);
   prepared.rotary = drive.axis == data::Axis::rotary;
@@ -280,12 +280,12 @@ Prepared without_records(const std::vector<const Experiment*>& experiments, cons
 
 }  // namespace
 
-Prepared prepare_with(const std::vector<const Experiment*>& experiments, const model::Drive& drive,
-                      const Pipeline& pipeline, const Prepared* ready) {
-  Prepared prepared = without_records(experiments, drive, pipeline);
+PreparedData prepare_with(const std::vector<const Experiment*>& experiments, const model::Drive& drive,
+                          const Pipeline& pipeline, const PreparedData* ready) {
+  PreparedData prepared = without_records(experiments, drive, pipeline);
   prepared.records.resize(experiments.size());
   const bool is_ready =
-      ready != nullptr && ready->pipeline == pipeline && are_alike(ready->constants, prepared.constants);
+      ready != nullptr && ready->pipeline == pipeline && are_similar(ready->constants, prepared.constants);
   std::vector<std::size_t> missing;
   for (std::size_t i = 0; i < experiments.size(); ++i) {
     if (is_ready) {
@@ -307,15 +307,15 @@ Prepared prepare_with(const std::vector<const Experiment*>& experiments, const m
   return prepared;
 }
 
-Prepared prepare(const std::vector<const Experiment*>& experiments, const model::Drive& drive,
-                 const PipelineOptions& options) {
+PreparedData prepare(const std::vector<const Experiment*>& experiments, const model::Drive& drive,
+                     const PipelineOptions& options) {
   if (options.ready && options.ready->chosen_on == experiments &&
-      are_alike(options.ready->constants, without_records(experiments, drive, {}).constants)) {
-    Prepared prepared = prepare_with(experiments, drive, options.ready->pipeline, options.ready.get());
+      are_similar(options.ready->constants, without_records(experiments, drive, {}).constants)) {
+    PreparedData prepared = prepare_with(experiments, drive, options.ready->pipeline, options.ready.get());
     prepared.chosen_on = experiments;
     return prepared;
   }
-  Prepared prepared = prepare_with(experiments, drive, choose_pipeline(experiments, options));
+  PreparedData prepared = prepare_with(experiments, drive, choose_pipeline(experiments, options));
   prepared.pipeline.torque_per_step = torque_per_held_step(prepared);
   for (Record& record : prepared.records)
     correct_zero_order_hold(record, prepared.constants, prepared.pipeline.torque_per_step);
@@ -323,16 +323,16 @@ Prepared prepare(const std::vector<const Experiment*>& experiments, const model:
   return prepared;
 }
 
-Prepared prepare_all(const data::Dataset& dataset, const model::Drive& drive, const PipelineOptions& options) {
+PreparedData prepare_all(const data::Dataset& dataset, const model::Drive& drive, const PipelineOptions& options) {
   std::vector<const Experiment*> all, fit;
   for (const Experiment& e : dataset.experiments) {
     all.push_back(&e);
     if (e.role == data::Role::fit) fit.push_back(&e);
   }
   if (fit.empty()) fit = all;
-  Prepared prepared = prepare(fit, drive, options);
+  PreparedData prepared = prepare(fit, drive, options);
   if (fit.size() == all.size()) return prepared;
-  const Prepared* ready =
+  const PreparedData* ready =
       options.ready && options.ready->records.size() == all.size() ? options.ready.get() : &prepared;
   prepared = prepare_with(all, drive, prepared.pipeline, ready);
   prepared.chosen_on = std::move(fit);

@@ -1,4 +1,4 @@
-// A measurement made ready for regression: every signal that effects read, aligned, differentiated and with directions,
+// A measurement prepared for regression: every signal that effects read, aligned, differentiated and with directions,
 // and the left sides of the torque balances.
 #pragma once
 
@@ -23,14 +23,14 @@ constexpr std::size_t index(Balance balance) {
   return static_cast<std::size_t>(balance);
 }
 
-struct Prepared;
+struct PreparedData;
 
 struct PipelineOptions {
   std::optional<double> cutoff_hz;  // sets both filters
   bool mask = true;                 // leave out reversals and sticking
-  // Records that were made before with these options, by prepare_all: who asks for them again takes a copy, which costs
+  // Records that were made before with these options, by prepare_all: a later request copies them, which costs
   // a tenth. Whoever keeps this keeps the data set, too. Null: nothing was.
-  std::shared_ptr<const Prepared> ready = nullptr;
+  std::shared_ptr<const PreparedData> ready = nullptr;
 };
 
 // What was chosen for the data at hand; the same for all records, so that their rows can be compared.
@@ -38,7 +38,7 @@ struct Pipeline {
   double row_cutoff_hz = 0.0;     // filter of the target and of every column, Butterworth of order five, zero phase
   double motion_cutoff_hz = 0.0;  // filter of positions before they are differentiated
   bool mask = true;
-  double torque_per_step = 0.0;  // of a held effort, that readings of the torque lack half of; see held_torque.hpp
+  double torque_per_step = 0.0;  // of a held effort, that readings of the torque lack half of; see zero_order_hold.hpp
   std::string reason;            // where the cut-off comes from
 
   bool operator==(const Pipeline&) const = default;
@@ -50,10 +50,10 @@ struct Rows {
   std::size_t masked = 0;            // left out by the mask, counted after decimation
 };
 
-// What follows from the measurement alone and takes long: found when it is first asked for, once for all copies of a
+// What follows from the measurement alone and takes long: computed at its first use, once for all copies of a
 // record.
 template <class Value>
-class FoundOnce {
+class LazyValue {
  public:
   template <class Find>
   const Value& get(const Find& find) {
@@ -92,7 +92,7 @@ struct Record {
   std::array<double, kBalances> velocity_noise{};
   std::array<Rows, kBalances> rows;
   // Of the motion, in samples; nothing where it does not repeat itself. See comparison/noise_floor.cpp.
-  std::shared_ptr<FoundOnce<std::optional<double>>> period = std::make_shared<FoundOnce<std::optional<double>>>();
+  std::shared_ptr<LazyValue<std::optional<double>>> period = std::make_shared<LazyValue<std::optional<double>>>();
 
   // The variable whose sign is the direction of a balance's friction.
   double direction_variable(Balance balance, std::size_t sample) const {
@@ -102,7 +102,7 @@ struct Record {
   }
 };
 
-struct Prepared {
+struct PreparedData {
   Pipeline pipeline;
   std::vector<Record> records;
   catalogue::DriveConstants<double> constants;
@@ -115,14 +115,14 @@ struct Prepared {
 // Makes all experiments ready. Equations: report 82 (motor), 78 (transmission), 45 (load). Positions, where there are
 // any, give velocity and acceleration; a tachometer is used only without them.
 // Throws data::DataError where no balance can be formed or a record is too short for the filters.
-Prepared prepare(const std::vector<const data::Experiment*>& experiments, const model::Drive& drive,
-                 const PipelineOptions& options);
+PreparedData prepare(const std::vector<const data::Experiment*>& experiments, const model::Drive& drive,
+                     const PipelineOptions& options);
 // The same with a pipeline that was chosen before, as for hold-out records. Records that are among the ready ones by
 // that pipeline are taken from there.
-Prepared prepare_with(const std::vector<const data::Experiment*>& experiments, const model::Drive& drive,
-                      const Pipeline& pipeline, const Prepared* ready = nullptr);
+PreparedData prepare_with(const std::vector<const data::Experiment*>& experiments, const model::Drive& drive,
+                          const Pipeline& pipeline, const PreparedData* ready = nullptr);
 // All experiments of a data set, by the pipeline that suits those to be fitted, or all where none is: errors on them
 // can be compared with those of an identification. `drive` as reconcile() leaves it (identify.hpp).
-Prepared prepare_all(const data::Dataset& dataset, const model::Drive& drive, const PipelineOptions& options);
+PreparedData prepare_all(const data::Dataset& dataset, const model::Drive& drive, const PipelineOptions& options);
 
 }  // namespace flexspline::estimation

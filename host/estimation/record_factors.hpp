@@ -25,7 +25,7 @@ struct RecordFactors {
 RecordFactors record_factors(const BalanceData& data, const Eigen::MatrixXd& X, const Eigen::VectorXd& y,
                              const Eigen::VectorXd& keep, std::size_t parts);
 
-// The R factor of matrices that stand one on the other. All have the same number of columns.
+// The R factor of matrices that are stacked. All have the same number of columns.
 Eigen::MatrixXd combined_factor(const std::vector<const Eigen::MatrixXd*>& blocks);
 
 }  // namespace flexspline::estimation

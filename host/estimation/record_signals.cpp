@@ -51,12 +51,12 @@ void RecordSignals::slopes(const std::vector<double>& signal, std::size_t first,
 
 void RecordSignals::copy(std::size_t first, std::span<Inputs> to, unsigned reads) const {
   using namespace effects;
-  while (to.size() > PlainInputs::kStretch) {
-    copy(first, to.first(PlainInputs::kStretch), reads);
-    first += PlainInputs::kStretch;
-    to = to.subspan(PlainInputs::kStretch);
+  while (to.size() > PlainInputs::kBlock) {
+    copy(first, to.first(PlainInputs::kBlock), reads);
+    first += PlainInputs::kBlock;
+    to = to.subspan(PlainInputs::kBlock);
   }
-  std::array<double, PlainInputs::kStretch> slope;
+  std::array<double, PlainInputs::kBlock> slope;
   const auto along = [&](auto set) {
     for (std::size_t i = 0; i < to.size(); ++i) set(to[i], first + i);
   };

@@ -1,4 +1,4 @@
-// The signals of a record that effects read: one array each, and only those that no other one tells.
+// The signals of a record that effects read: one array each, and only those that do not follow from another one.
 #pragma once
 
 #include <array>
@@ -39,8 +39,8 @@ class RecordSignals {
  public:
   using Inputs = effects::Inputs<catalogue::Real>;
 
-  // Empty: not measured, and zero, unless others tell it. Accelerations that are empty are slopes of the velocities,
-  // directions that are empty are made of velocities and their noise.
+  // Empty: not measured, and zero, unless it follows from others. Accelerations that are empty are slopes of the
+  // velocities, directions that are empty are made of velocities and their noise.
   std::vector<double> angle, velocity, acceleration;
   std::vector<double> output_angle, output_velocity, output_acceleration;
   std::vector<double> torque;  // filtered as positions are
@@ -65,7 +65,7 @@ class RecordSignals {
   Inputs at(std::size_t sample, unsigned reads) const;
   // Signals of the samples from `first` on; at least those that `reads` (bits of effects::Signals) names.
   void copy(std::size_t first, std::span<Inputs> to, unsigned reads = ~0U) const;
-  // The same for what takes inputs a stretch at a time. Not to be used any longer than this.
+  // The same for what takes inputs a block at a time. It must not outlive this.
   catalogue::PlainInputs all(unsigned reads = ~0U) const;
 
   double angle_at(std::size_t k) const { return angle.empty() ? 0.0 : angle[k]; }

@@ -11,8 +11,7 @@
 namespace flexspline::estimation {
 namespace {
 
-// Friction does not differ by more than that from run to run; records that know their factor no better than to a tenth
-// do not count.
+// Largest difference of friction between runs; records whose factor is known to no better than a tenth do not count.
 constexpr double kLargestDifference = 0.5;
 constexpr double kKnownTo = 0.1;
 constexpr double kCertain = 0.95;
@@ -83,7 +82,7 @@ RecordVariance paule_mandel(const BalanceData& data, const Eigen::MatrixXd& torq
         residual.segment(range.first, range.size()) - torques.middleRows(range.first, range.size()) * factors;
   };
   // Differences of friction are slow: taken for noise, they would make noise look so slow that no difference is
-  // certain. So the first look at the noise is at what each record leaves beside factors of its own.
+  // certain. So the noise is first estimated from the residual after each record has its own factors.
   if (torques.cols() > 0) {
     const std::vector<OwnFactors> records = own_factors(data, torques, residual, residual, 1.0);
     for (std::size_t i = 0; i < records.size(); ++i) take_off(data.records()[i], records[i].value);

@@ -74,7 +74,7 @@ SideMotion motion_from_position(const std::vector<double>& raw, const std::vecto
   SideMotion m;
   m.position = filtered(raw, segments, filter);
   m.velocity = slope_of(m.position, segments, sample_s);
-  // The filter keeps a share of the noise; what it takes away stands for the rest.
+  // The filter keeps a share of the noise; what it removes is an estimate of the rest.
   const double kept = std::min(0.8, 2.0 * filter.cutoff_hz() * sample_s);
   m.position_noise = root_mean_square_of_rest(raw, m.position) / std::sqrt(1.0 - kept);
   return m;
@@ -91,14 +91,14 @@ SideMotion motion_from_velocity(const std::vector<double>& raw, const std::vecto
   return m;
 }
 
-// White noise of a measured signal, by what the filter takes away of it: the filter keeps a share.
+// White noise of a measured signal, by what the filter removes: the filter keeps a share.
 double noise_of(const std::vector<double>& raw, const std::vector<double>& kept, const ZeroPhaseFilter& filter,
                 double sample_s) {
   return root_mean_square_of_rest(raw, kept) / std::sqrt(1.0 - std::min(0.8, 2.0 * filter.cutoff_hz() * sample_s));
 }
 
-// Whether the noise of the position makes so much of the accelerations that it matters: regressors with noise attenuate
-// what is fitted on them, an inertia by that share.
+// Whether the noise of the position is a relevant share of the acceleration: noise of a regressor attenuates its
+// coefficient (the inertia) by that share.
 bool blurs_accelerations(const SideMotion& motion, const std::vector<Segment>& segments, double cutoff_hz,
                          double sample_s) {
   constexpr double kShare = 0.005;
@@ -110,8 +110,8 @@ bool blurs_accelerations(const SideMotion& motion, const std::vector<Segment>& s
   return noise * static_cast<double>(acceleration.size()) > kShare * square;
 }
 
-// Takes a velocity that was measured beside the position into the derivative where it has less noise than that; returns
-// from which frequency on, and in `noise` what is left of both. Zero: it does not help.
+// Combines a velocity that was measured in addition to the position with the derivative where it has less noise than
+// that; returns from which frequency on, and in `noise` what is left of both. Zero: it does not help.
 double take_measured_velocity(SideMotion& motion, const std::vector<double>& measured,
                               const std::vector<Segment>& segments, const ZeroPhaseFilter& filter, double sample_s,
                               double& noise) {

@@ -11,12 +11,12 @@
 namespace flexspline::estimation {
 namespace {
 
-// Smoothings tried lie between these, over the size of the data's part of the normal equations.
+// Smoothings that are tried are between these, over the size of the data's part of the normal equations.
 constexpr double kLeast = 1e-7;
 constexpr double kMost = 1e7;
 // Directions of no length: points that no row reaches.
 constexpr double kNoLength = 1e-9;
-// Holds what neither data nor smoothing determine, far below either.
+// Ridge for directions that neither data nor smoothing determine, far below both.
 constexpr double kRidge = 1e-10;
 
 using Matrix = Eigen::MatrixXd;
@@ -70,14 +70,14 @@ Matrix inverse_root(const Matrix& products) {
   return eigen.eigenvectors()(Eigen::all, kept) * values(kept).cwiseSqrt().cwiseInverse().asDiagonal();
 }
 
-struct Freedom {
+struct EffectiveParameters {
   Matrix basis;                       // the curve is basis * z
   std::vector<Eigen::Index> left_to;  // see Curve
 };
 
-// The curves that are orthogonal, in the data, to those that the others draw themselves.
-Freedom freedom_of(const Products& g) {
-  Freedom freedom;
+// The curves that are orthogonal, in the data, to those that the other columns can represent.
+EffectiveParameters freedom_of(const Products& g) {
+  EffectiveParameters freedom;
   freedom.basis = Matrix::Identity(g.points, g.points);
   if (g.others == 0) return freedom;
   const Matrix others = g.all.topLeftCorner(g.others, g.others);
@@ -88,7 +88,7 @@ Freedom freedom_of(const Products& g) {
   const Eigen::JacobiSVD<Matrix> svd(root_others.transpose() * cross * root_points,
                                      Eigen::ComputeThinU | Eigen::ComputeThinV);
   Eigen::Index count = 0;
-  while (count < svd.singularValues().size() && svd.singularValues()[count] > kImitated) ++count;
+  while (count < svd.singularValues().size() && svd.singularValues()[count] > kCollinear) ++count;
   if (count == 0) return freedom;
   const Matrix theirs = root_others * svd.matrixU().leftCols(count);
   for (Eigen::Index k = 0; k < count; ++k) {
@@ -112,7 +112,7 @@ struct Solution {
 // From the products of the rows that the fit sees.
 class Solver {
  public:
-  Solver(const Products& g, const Freedom& freedom, bool closed) : g_(g), freedom_(freedom) {
+  Solver(const Products& g, const EffectiveParameters& freedom, bool closed) : g_(g), freedom_(freedom) {
     const Matrix d = second_differences(g.points, closed);
     penalty_ = freedom.basis.transpose() * (d.transpose() * d) * freedom.basis;
     size_ = std::max(g.all.block(g.others, g.others, g.points, g.points).trace(), 1e-300) /
@@ -149,7 +149,7 @@ class Solver {
 
  private:
   const Products& g_;
-  const Freedom& freedom_;
+  const EffectiveParameters& freedom_;
   Matrix penalty_;
   double size_ = 1.0;
 };
@@ -182,7 +182,8 @@ double left_out_without(const Products& g) {
   return sum;
 }
 
-Curve finish(const CurveProblem& p, const Products& g, const Freedom& freedom, const Solver& solver, double smoothing) {
+Curve finish(const CurveProblem& p, const Products& g, const EffectiveParameters& freedom, const Solver& solver,
+             double smoothing) {
   Curve curve;
   curve.smoothing = smoothing;
   curve.left_to = freedom.left_to;
@@ -218,20 +219,20 @@ Matrix second_differences(Eigen::Index points, bool closed) {
 
 Curve fit_curve_smoothed(const CurveProblem& problem, double smoothing) {
   const Products g = products_of(problem);
-  const Freedom freedom = freedom_of(g);
+  const EffectiveParameters freedom = freedom_of(g);
   return finish(problem, g, freedom, Solver(g, freedom, problem.closed), smoothing);
 }
 
 Curve fit_curve(const CurveProblem& problem, int smoothings) {
   const Products g = products_of(problem);
-  const Freedom freedom = freedom_of(g);
+  const EffectiveParameters freedom = freedom_of(g);
   const Solver solver(g, freedom, problem.closed);
   double best = solver.size(), least = std::numeric_limits<double>::infinity();
   for (int k = 0; k < smoothings; ++k) {
     const double smoothing =
         solver.size() * kMost * std::pow(kLeast / kMost, static_cast<double>(k) / (smoothings - 1));
     const double now = left_out(g, solver, smoothing);
-    // From smooth to rough: a rougher curve must predict better, not as well.
+    // From smooth to rough: a rougher curve must predict strictly better.
     if (now < least * (1.0 - 1e-9)) {
       least = now;
       best = smoothing;

@@ -1,4 +1,5 @@
-// A smooth curve by points beside other columns: penalised least squares, as smooth as left-out rows ask for.
+// A smooth curve, given by points, and other columns in one regression: penalised least squares. Cross-validation
+// chooses the smoothness.
 #pragma once
 
 #include <Eigen/Core>
@@ -7,7 +8,7 @@
 namespace flexspline::estimation {
 
 // Rows of a regression, weighted: target = others * beta + points * t + noise, where t are the values of a curve at
-// even points. `fold` says which part each row belongs to; a row of weight zero counts nowhere.
+// even points. `fold` says which part each row belongs to; a row of weight zero is not used.
 struct CurveProblem {
   Eigen::MatrixXd others;
   Eigen::MatrixXd points;  // one column a point: what one unit there adds
@@ -35,7 +36,7 @@ struct Curve {
 
 // Minimises |W^(1/2) (target - others beta - points t)|^2 + smoothing |D t|^2 with D the second differences (Whittaker
 // 1923; Eilers and Marx 1996 for the view as P-splines of degree one), where t's torque is held orthogonal, in the
-// data, to what `others` imitate to more than `kImitated` of its length. The smoothing is the one whose fits predict
+// data, to what `others` represent to more than `kCollinear` of its length. The smoothing is the one whose fits predict
 // left-out folds best.
 // That one is searched for on so many values over fourteen decades.
 inline constexpr int kSmoothings = 29;
@@ -44,7 +45,7 @@ Curve fit_curve(const CurveProblem& problem, int smoothings = kSmoothings);
 Curve fit_curve_smoothed(const CurveProblem& problem, double smoothing);
 
 // Cosine between a direction of the curve and the span of the others from which on it is theirs.
-inline constexpr double kImitated = 0.995;
+inline constexpr double kCollinear = 0.995;
 
 // D: for an open curve one row less than two for the points, for a closed one as many as points.
 Eigen::MatrixXd second_differences(Eigen::Index points, bool closed);

@@ -2,7 +2,7 @@
 
 #include <fmt/format.h>
 
-#include "host/catalogue/defined.hpp"
+#include "host/catalogue/user_defined_effect.hpp"
 
 namespace flexspline::estimation {
 
@@ -22,7 +22,7 @@ Term term_of(const model::Effect& effect) {
   term.values = catalogue::reduced(*term.entry, catalogue::values_of(effect, *term.entry));
   for (const auto& info : term.entry->parameters) {
     const model::Parameter* p = effect.find(info.name);
-    // A ratio to a parameter without a value says nothing.
+    // A ratio to a parameter without a value is undefined.
     const model::Parameter* per = info.per.empty() ? p : effect.find(info.per);
     const bool stated = p && p->value.has_value() && (info.per.empty() || (per && per->value.value_or(0.0) != 0.0));
     term.stated.push_back(stated);
@@ -50,20 +50,20 @@ Terms terms_of(const model::Model& model) {
   return terms;
 }
 
-std::vector<Slot> free_linear_slots(const Terms& terms, const std::vector<std::size_t>& which) {
-  std::vector<Slot> slots;
+std::vector<ParameterRef> free_linear_parameters(const Terms& terms, const std::vector<std::size_t>& which) {
+  std::vector<ParameterRef> refs;
   for (const std::size_t t : which)
     for (std::size_t p = 0; p < terms[t].values.size(); ++p)
-      if (terms[t].free_linear(p)) slots.push_back({t, p});
-  return slots;
+      if (terms[t].free_linear(p)) refs.push_back({t, p});
+  return refs;
 }
 
-std::vector<Slot> free_shape_slots(const Terms& terms, const std::vector<std::size_t>& which) {
-  std::vector<Slot> slots;
+std::vector<ParameterRef> free_nonlinear_parameters(const Terms& terms, const std::vector<std::size_t>& which) {
+  std::vector<ParameterRef> refs;
   for (const std::size_t t : which)
     for (std::size_t p = 0; p < terms[t].values.size(); ++p)
-      if (terms[t].free_shape(p)) slots.push_back({t, p});
-  return slots;
+      if (terms[t].free_nonlinear(p)) refs.push_back({t, p});
+  return refs;
 }
 
 std::vector<std::size_t> terms_on(const Terms& terms, Balance balance, bool torque_measured) {
@@ -75,7 +75,7 @@ std::vector<std::size_t> terms_on(const Terms& terms, Balance balance, bool torq
   return which;
 }
 
-std::vector<std::size_t> terms_reaching(const Terms& terms, Balance balance, bool torque_measured) {
+std::vector<std::size_t> terms_acting_on_other_balance(const Terms& terms, Balance balance, bool torque_measured) {
   std::vector<std::size_t> which;
   if (!torque_measured) return which;
   for (std::size_t t = 0; t < terms.size(); ++t)

@@ -23,16 +23,16 @@ struct Term {
   // Adds a torque that no linear parameter scales.
   bool scaled_by_none() const { return adds_torque() && entry->count(effects::Kind::linear) == 0; }
   bool free_linear(std::size_t p) const { return !known[p] && entry->parameters[p].kind == effects::Kind::linear; }
-  bool free_shape(std::size_t p) const { return !known[p] && entry->parameters[p].kind == effects::Kind::shape; }
-  // What it was given beside its name: "torque_ripple:7".
+  bool free_nonlinear(std::size_t p) const { return !known[p] && entry->parameters[p].kind == effects::Kind::shape; }
+  // Its name with the order, where it has one: "torque_ripple:7".
   std::string label() const;
 };
 
 // A parameter of a term.
-struct Slot {
+struct ParameterRef {
   std::size_t term = 0;
   std::size_t parameter = 0;
-  bool operator==(const Slot&) const = default;
+  bool operator==(const ParameterRef&) const = default;
 };
 
 using Terms = std::vector<Term>;
@@ -48,13 +48,13 @@ Term term_of(const model::Effect& effect);
 Term candidate_term(const catalogue::Entry& entry, std::optional<double> order = std::nullopt);
 Terms terms_of(const model::Model& model);
 
-std::vector<Slot> free_linear_slots(const Terms& terms, const std::vector<std::size_t>& which);
-std::vector<Slot> free_shape_slots(const Terms& terms, const std::vector<std::size_t>& which);
+std::vector<ParameterRef> free_linear_parameters(const Terms& terms, const std::vector<std::size_t>& which);
+std::vector<ParameterRef> free_nonlinear_parameters(const Terms& terms, const std::vector<std::size_t>& which);
 
-// Terms of a model whose parameters a balance tells. In a drive without a torque sensor the motor balance holds the
-// load's (and, in locked load, the transmission's) terms too.
+// Terms of a model whose parameters are identified on a balance. In a drive without a torque sensor the motor balance
+// holds the load's (and, in locked load, the transmission's) terms too.
 std::vector<std::size_t> terms_on(const Terms& terms, Balance balance, bool torque_measured);
-// Terms that add to a balance although another one tells their parameters.
-std::vector<std::size_t> terms_reaching(const Terms& terms, Balance balance, bool torque_measured);
+// Terms that add to a balance although their parameters are identified on another one.
+std::vector<std::size_t> terms_acting_on_other_balance(const Terms& terms, Balance balance, bool torque_measured);
 
 }  // namespace flexspline::estimation

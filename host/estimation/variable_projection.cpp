@@ -33,7 +33,7 @@ std::vector<double> magnitudes(const BalanceData& data, Signal signal) {
   return values;
 }
 
-// Shortest stroke between reversals that is no jitter, over all records.
+// Shortest stroke between reversals over all records, jitter excluded.
 double shortest_stroke(const BalanceData& data) {
   std::vector<double> strokes;
   for (const RowRange& range : data.records()) {
@@ -80,7 +80,7 @@ std::vector<double> usual_reduced(const catalogue::Entry& entry) {
   return catalogue::reduced(entry, usual);
 }
 
-// Weighted columns of like size, so that the factorisation can tell a small one (a cubed torsion) from a needless one.
+// Weighted columns of like size, so that the factorisation does not drop a small one (a cubed torsion).
 struct ScaledColumns {
   Eigen::MatrixXd A;
   Eigen::VectorXd size;
@@ -101,11 +101,11 @@ double projected_cost(const Eigen::MatrixXd& X, const Eigen::VectorXd& y, const 
 
 }  // namespace
 
-double ShapeRange::at(double share_of_range) const {
+double ParameterRange::at(double share_of_range) const {
   return logarithmic ? low * std::pow(high / low, share_of_range) : low + (high - low) * share_of_range;
 }
 
-double ShapeRange::share(double value) const {
+double ParameterRange::share(double value) const {
   const double s =
       logarithmic ? std::log(std::max(value, 1e-300) / low) / std::log(high / low) : (value - low) / (high - low);
   return std::clamp(s, 0.0, 1.0);
@@ -114,8 +114,8 @@ double ShapeRange::share(double value) const {
 namespace {
 
 // Quantities with a scale, between two values of the data and within what is possible.
-ShapeRange scale_between(const effects::ParameterInfo& info, double low, double high) {
-  ShapeRange range;
+ParameterRange scale_between(const effects::ParameterInfo& info, double low, double high) {
+  ParameterRange range;
   range.low = std::max(low, info.low);
   range.high = std::min(std::max(high, 2.0 * range.low), info.high);
   range.logarithmic = true;
@@ -124,7 +124,7 @@ ShapeRange scale_between(const effects::ParameterInfo& info, double low, double 
 
 constexpr double kNegligible = 1e-9;
 
-ShapeRange torsion_range(const BalanceData& data, const effects::ParameterInfo& info) {
+ParameterRange torsion_range(const BalanceData& data, const effects::ParameterInfo& info) {
   const double largest = largest_torsion(data);
   switch (info.limit) {
     case Limit::torsion:
@@ -139,25 +139,25 @@ ShapeRange torsion_range(const BalanceData& data, const effects::ParameterInfo& 
   }
 }
 
-ShapeRange velocity_range(const BalanceData& data, const effects::ParameterInfo& info) {
+ParameterRange velocity_range(const BalanceData& data, const effects::ParameterInfo& info) {
   const std::vector<double> all = magnitudes(data, [](const auto& in) { return in.velocity; });
-  // What the mask leaves must hold enough of the term to see: its width at the slowest hundredth of the rows.
+  // The unmasked rows must cover the term: its width is at least the slowest hundredth of the rows.
   if (info.limit == Limit::velocity)
     return scale_between(info, std::max(quantile(all, 0.01), kNegligible), 0.25 * quantile(all, 0.95));
   return scale_between(info, 1e-3 / std::max(quantile(all, 0.95), kNegligible),
                        1.0 / std::max(quantile(all, 0.01), kNegligible));
 }
 
-ShapeRange current_range(const BalanceData& data, const effects::ParameterInfo& info) {
+ParameterRange current_range(const BalanceData& data, const effects::ParameterInfo& info) {
   const std::vector<double> all = magnitudes(data, [](const auto& in) { return in.current; });
   const double largest = quantile(all, 1.0);
-  // A limit shows as a plateau at the peaks. One below half of the log would make of the model whatever was measured.
+  // A limit shows as a plateau at the peaks. A limit below half of the log could reproduce any measured signal.
   return {std::max({0.25 * largest, quantile(all, 0.5), info.low}), largest, false};
 }
 
 }  // namespace
 
-ShapeRange shape_range(const BalanceData& data, const Term& term, std::size_t parameter) {
+ParameterRange parameter_range(const BalanceData& data, const Term& term, std::size_t parameter) {
   const auto& info = term.entry->parameters[parameter];
   switch (info.limit) {
     case Limit::stated:
@@ -199,31 +199,31 @@ void set_grid_values(const BalanceData& data, Terms& terms, const std::vector<st
     }
 }
 
-std::vector<double> shape_grid(const ShapeRange& range, std::size_t count) {
+std::vector<double> parameter_grid(const ParameterRange& range, std::size_t count) {
   std::vector<double> values;
   for (std::size_t k = 0; k < count; ++k)
     values.push_back(range.at((static_cast<double>(k) + 0.5) / static_cast<double>(count)));
   return values;
 }
 
-Eigen::MatrixXd columns_of(BalanceData& data, const Terms& terms, const std::vector<Slot>& linear) {
+Eigen::MatrixXd columns_of(BalanceData& data, const Terms& terms, const std::vector<ParameterRef>& linear) {
   return data.columns(terms, linear);
 }
 
-void sweep_shapes(BalanceData& data, Terms& terms, const std::vector<std::size_t>& on_balance,
-                  const NoiseCovariance& whitening, SweepFrom from) {
-  const std::vector<Slot> shapes = free_shape_slots(terms, on_balance);
-  const std::vector<Slot> linear = free_linear_slots(terms, on_balance);
-  std::vector<Slot> open;
-  for (const Slot& s : shapes) {
+void sweep_nonlinear(BalanceData& data, Terms& terms, const std::vector<std::size_t>& on_balance,
+                     const NoiseCovariance& whitening, SweepFrom from) {
+  const std::vector<ParameterRef> nonlinear = free_nonlinear_parameters(terms, on_balance);
+  const std::vector<ParameterRef> linear = free_linear_parameters(terms, on_balance);
+  std::vector<ParameterRef> open;
+  for (const ParameterRef& s : nonlinear) {
     if (terms[s.term].stated[s.parameter]) continue;
     open.push_back(s);
     if (from == SweepFrom::values) continue;
     const auto& info = terms[s.term].entry->parameters[s.parameter];
-    // A ratio or an exponent begins at its usual value, what has a size at the middle of its range.
+    // A ratio or an exponent begins at its usual value, other parameters in the middle of their range.
     terms[s.term].values[s.parameter] = info.limit == Limit::stated || info.limit == Limit::scale
                                             ? usual_reduced(*terms[s.term].entry)[s.parameter]
-                                            : shape_range(data, terms[s.term], s.parameter).at(0.5);
+                                            : parameter_range(data, terms[s.term], s.parameter).at(0.5);
   }
   constexpr std::size_t kGrid = 6;
   const auto cost_now = [&] {
@@ -231,10 +231,10 @@ void sweep_shapes(BalanceData& data, Terms& terms, const std::vector<std::size_t
                           whitening);
   };
   for (int around = 0; around < (open.size() > 1 ? 2 : 1); ++around)
-    for (const Slot& s : open) {
+    for (const ParameterRef& s : open) {
       double& value = terms[s.term].values[s.parameter];
       double best = value, least = cost_now();
-      for (const double tried : shape_grid(shape_range(data, terms[s.term], s.parameter), kGrid)) {
+      for (const double tried : parameter_grid(parameter_range(data, terms[s.term], s.parameter), kGrid)) {
         value = tried;
         const double cost = cost_now();
         if (cost < least) {
@@ -246,15 +246,15 @@ void sweep_shapes(BalanceData& data, Terms& terms, const std::vector<std::size_t
     }
 }
 
-double refine_shapes(BalanceData& data, Terms& terms, const std::vector<std::size_t>& on_balance,
-                     const NoiseCovariance& whitening) {
+double refine_nonlinear(BalanceData& data, Terms& terms, const std::vector<std::size_t>& on_balance,
+                        const NoiseCovariance& whitening) {
   constexpr double kTolerance = 1e-9;
-  return refine_shapes(data, terms, on_balance, whitening, kTolerance);
+  return refine_nonlinear(data, terms, on_balance, whitening, kTolerance);
 }
 
 namespace {
 
-// Residual of the best linear fit as a function of the shapes alone, each as a share of its range.
+// Residual of the best linear fit as a function of the nonlinear parameters alone, each as a share of its range.
 class ProjectedResidual {
  public:
   ProjectedResidual(const BalanceData& data, Terms& terms, const std::vector<std::size_t>& on_balance,
@@ -262,22 +262,23 @@ class ProjectedResidual {
       : terms_(terms),
         on_balance_(on_balance),
         whitening_(whitening),
-        shapes_(free_shape_slots(terms, on_balance)),
-        linear_(free_linear_slots(terms, on_balance)) {
-    for (const Slot& s : shapes_) ranges_.push_back(shape_range(data, terms[s.term], s.parameter));
+        nonlinear_(free_nonlinear_parameters(terms, on_balance)),
+        linear_(free_linear_parameters(terms, on_balance)) {
+    for (const ParameterRef& s : nonlinear_) ranges_.push_back(parameter_range(data, terms[s.term], s.parameter));
   }
 
-  std::size_t shapes() const { return shapes_.size(); }
-  // Where the terms stand, not at the very ends.
+  std::size_t nonlinear() const { return nonlinear_.size(); }
+  // The present values of the terms, not at the very ends.
   std::vector<double> start() const {
     std::vector<double> shares;
-    for (std::size_t j = 0; j < shapes_.size(); ++j)
-      shares.push_back(std::clamp(ranges_[j].share(terms_[shapes_[j].term].values[shapes_[j].parameter]), 0.01, 0.99));
+    for (std::size_t j = 0; j < nonlinear_.size(); ++j)
+      shares.push_back(
+          std::clamp(ranges_[j].share(terms_[nonlinear_[j].term].values[nonlinear_[j].parameter]), 0.01, 0.99));
     return shares;
   }
   void set(const std::vector<double>& shares) {
-    for (std::size_t j = 0; j < shapes_.size(); ++j)
-      terms_[shapes_[j].term].values[shapes_[j].parameter] = ranges_[j].at(shares[j]);
+    for (std::size_t j = 0; j < nonlinear_.size(); ++j)
+      terms_[nonlinear_[j].term].values[nonlinear_[j].parameter] = ranges_[j].at(shares[j]);
   }
   // Columns come from this from now on.
   void use(BalanceData& data) {
@@ -285,7 +286,7 @@ class ProjectedResidual {
     factored_at_.clear();
   }
 
-  // Slopes are asked for where values were: the factors are kept until then.
+  // The solver needs slopes where it had values: the factors are stored until then.
   bool operator()(const std::vector<double>& shares, Eigen::VectorXd& residual, Eigen::MatrixXd* slopes) {
     set(shares);
     if (shares != factored_at_) factor(shares);
@@ -310,10 +311,10 @@ class ProjectedResidual {
     for (std::size_t j = 0; j < linear_.size(); ++j)
       terms_[linear_[j].term].values[linear_[j].parameter] =
           theta_[static_cast<Eigen::Index>(j)] / size_[static_cast<Eigen::Index>(j)];
-    slopes.resize(left_.size(), static_cast<Eigen::Index>(shapes_.size()));
+    slopes.resize(left_.size(), static_cast<Eigen::Index>(nonlinear_.size()));
     constexpr double kDifference = 1e-6;
-    const Eigen::MatrixXd columns = whitening_ * on_->shape_columns(terms_, on_balance_, shapes_);
-    for (std::size_t j = 0; j < shapes_.size(); ++j) {
+    const Eigen::MatrixXd columns = whitening_ * on_->nonlinear_columns(terms_, on_balance_, nonlinear_);
+    for (std::size_t j = 0; j < nonlinear_.size(); ++j) {
       const double per_share =
           (ranges_[j].at(shares[j] + kDifference) - ranges_[j].at(shares[j] - kDifference)) / (2.0 * kDifference);
       const Eigen::VectorXd slope = columns.col(static_cast<Eigen::Index>(j)) * per_share;
@@ -324,8 +325,8 @@ class ProjectedResidual {
   Terms& terms_;
   const std::vector<std::size_t>& on_balance_;
   const NoiseCovariance& whitening_;
-  std::vector<Slot> shapes_, linear_;
-  std::vector<ShapeRange> ranges_;
+  std::vector<ParameterRef> nonlinear_, linear_;
+  std::vector<ParameterRange> ranges_;
   BalanceData* on_ = nullptr;
   std::vector<double> factored_at_;
   Eigen::MatrixXd A_;
@@ -335,18 +336,18 @@ class ProjectedResidual {
 
 }  // namespace
 
-double refine_shapes(BalanceData& data, Terms& terms, const std::vector<std::size_t>& on_balance,
-                     const NoiseCovariance& whitening, double tolerance, BalanceData* coarse) {
+double refine_nonlinear(BalanceData& data, Terms& terms, const std::vector<std::size_t>& on_balance,
+                        const NoiseCovariance& whitening, double tolerance, BalanceData* coarse) {
   ProjectedResidual projected(data, terms, on_balance, whitening);
-  if (projected.shapes() == 0 || data.empty())
-    return projected_cost(columns_of(data, terms, free_linear_slots(terms, on_balance)),
+  if (projected.nonlinear() == 0 || data.empty())
+    return projected_cost(columns_of(data, terms, free_linear_parameters(terms, on_balance)),
                           data.target() - data.known_torque(terms, on_balance), whitening);
   Minimisation how;
-  how.low.assign(projected.shapes(), 0.0);
-  how.high.assign(projected.shapes(), 1.0);
+  how.low.assign(projected.nonlinear(), 0.0);
+  how.high.assign(projected.nonlinear(), 1.0);
   how.function_tolerance = tolerance;
   std::vector<double> shares = projected.start();
-  // The few samples lead to where the others need a step or two.
+  // The decimated samples give a start from which all samples need one or two steps.
   double cost = 0.0;
   for (BalanceData* const stage : {coarse, &data}) {
     if (!stage) continue;

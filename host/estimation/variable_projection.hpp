@@ -1,4 +1,4 @@
-// Shape parameters: the range in which data can show them, and the search within it.
+// Nonlinear parameters: the range in which data can show them, and the search within it.
 #pragma once
 
 #include "host/estimation/balance_data.hpp"
@@ -6,8 +6,8 @@
 
 namespace flexspline::estimation {
 
-// Bounds of a shape parameter for the data at hand (see effects::Limit). `logarithmic` where it scales.
-struct ShapeRange {
+// Bounds of a nonlinear parameter for the data at hand (see effects::Limit). `logarithmic` where it scales.
+struct ParameterRange {
   double low = 0.0;
   double high = 1.0;
   bool logarithmic = false;
@@ -15,31 +15,32 @@ struct ShapeRange {
   double at(double share) const;
   double share(double value) const;
 };
-ShapeRange shape_range(const BalanceData& data, const Term& term, std::size_t parameter);
+ParameterRange parameter_range(const BalanceData& data, const Term& term, std::size_t parameter);
 
 // Gives parameters of kind grid that the model does not state their values, from the largest torsion of the data.
 void set_grid_values(const BalanceData& data, Terms& terms, const std::vector<std::size_t>& which);
 
 // Values to start from or to rank candidates on, spread over the range.
-std::vector<double> shape_grid(const ShapeRange& range, std::size_t count);
+std::vector<double> parameter_grid(const ParameterRange& range, std::size_t count);
 
 // Columns of all linear parameters that are free, in the order of `linear`.
-Eigen::MatrixXd columns_of(BalanceData& data, const Terms& terms, const std::vector<Slot>& linear);
+Eigen::MatrixXd columns_of(BalanceData& data, const Terms& terms, const std::vector<ParameterRef>& linear);
 
-// Minimises the weighted residual over the free shapes on this balance by variable projection (linear parameters are
-// eliminated at each step; Jacobian after Kaufman), from the values in `terms`, within their ranges. Writes the result
-// into `terms`. Returns the weighted sum of squares.
-double refine_shapes(BalanceData& data, Terms& terms, const std::vector<std::size_t>& on_balance,
-                     const NoiseCovariance& whitening);
+// Minimises the weighted residual over the free nonlinear parameters on this balance by variable projection (linear
+// parameters are eliminated at each step; Jacobian after Kaufman), from the values in `terms`, within their ranges.
+// Writes the result into `terms`. Returns the weighted sum of squares.
+double refine_nonlinear(BalanceData& data, Terms& terms, const std::vector<std::size_t>& on_balance,
+                        const NoiseCovariance& whitening);
 // The same to a relative change of the sum below `tolerance`. Where `coarse`
 // (BalanceData::decimated) is given, the search begins on that.
-double refine_shapes(BalanceData& data, Terms& terms, const std::vector<std::size_t>& on_balance,
-                     const NoiseCovariance& whitening, double tolerance, BalanceData* coarse = nullptr);
+double refine_nonlinear(BalanceData& data, Terms& terms, const std::vector<std::size_t>& on_balance,
+                        const NoiseCovariance& whitening, double tolerance, BalanceData* coarse = nullptr);
 
-// Chooses starting values for shapes that the model does not state: sweeps each over its grid, twice around; from the
-// usual ones or the middle of their ranges, or from those that `terms` has, which stay where none is better.
+// Chooses starting values for nonlinear parameters that the model does not state: sweeps each over its grid, twice
+// around; from the usual ones or the middle of their ranges, or from those that `terms` has, which stay where none is
+// better.
 enum class SweepFrom { usual, values };
-void sweep_shapes(BalanceData& data, Terms& terms, const std::vector<std::size_t>& on_balance,
-                  const NoiseCovariance& whitening, SweepFrom from = SweepFrom::usual);
+void sweep_nonlinear(BalanceData& data, Terms& terms, const std::vector<std::size_t>& on_balance,
+                     const NoiseCovariance& whitening, SweepFrom from = SweepFrom::usual);
 
 }  // namespace flexspline::estimation

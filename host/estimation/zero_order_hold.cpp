@@ -17,8 +17,8 @@ using data::Column;
 using Signals = std::vector<std::vector<double>>;
 
 constexpr double kCertainErrors = 3.0;  // standard errors
-// Rows that count as one: the filter keeps half of their band (record.cpp), and errors have a colour beside.
-constexpr double kRowsAlike = 4.0;
+// Rows that count as one: the filter keeps half of their band (record.cpp), and the errors are coloured noise as well.
+constexpr double kRowsPerSample = 4.0;
 constexpr double kFewestHeldRows = 100.0;
 
 bool steps_with_effort(const Record& r) {
@@ -27,7 +27,7 @@ bool steps_with_effort(const Record& r) {
          e.current_hold == data::CurrentHold::zoh && (e.has(Column::output_position) || e.has(Column::output_velocity));
 }
 
-// Half of what the effort changes by at each sample, N m (N).
+// Half of the change of the effort at each sample, N m (N).
 std::vector<double> half_steps(const Record& r, double torque_constant) {
   const data::Experiment& e = *r.experiment;
   const bool current = e.has(Column::current);
@@ -42,13 +42,13 @@ std::vector<double> half_steps(const Record& r, double torque_constant) {
 template <class Value>
 std::vector<double> along(const Record& r, Value value) {
   std::vector<double> signal(r.inputs.size());
-  r.inputs.all().each_stretch([&](std::size_t first, auto stretch) {
-    std::transform(stretch.begin(), stretch.end(), signal.begin() + static_cast<std::ptrdiff_t>(first), value);
+  r.inputs.all().each_block([&](std::size_t first, auto block) {
+    std::transform(block.begin(), block.end(), signal.begin() + static_cast<std::ptrdiff_t>(first), value);
   });
   return signal;
 }
 
-// Least squares over the rows of many records, by normal equations: few columns, none like another.
+// Least squares over the rows of many records, by normal equations: few columns, none collinear.
 class Fit {
  public:
   explicit Fit(Eigen::Index columns)
@@ -80,7 +80,7 @@ class Fit {
   struct Result {
     Eigen::VectorXd value, std;
   };
-  // Nothing where the rows do not tell all of them.
+  // Nothing where the rows do not identify all of them.
   std::optional<Result> solve() const {
     const Eigen::VectorXd size = products_.diagonal().cwiseSqrt();
     if (rows_ < kFewestHeldRows || !(size.minCoeff() > 0.0)) return std::nullopt;
@@ -93,7 +93,7 @@ class Fit {
     Result result;
     result.value = inverse * along_;
     const double left = std::max(squares_ - along_.dot(result.value), 0.0);
-    result.std = (inverse.diagonal() * (kRowsAlike * left / rows_)).cwiseSqrt();
+    result.std = (inverse.diagonal() * (kRowsPerSample * left / rows_)).cwiseSqrt();
     return result;
   }
 
@@ -105,9 +105,9 @@ class Fit {
 
 }  // namespace
 
-double torque_per_held_step(const Prepared& prepared) {
-  // Beside what moves: friction, an offset, and what a weight on the output would do, which looks like an inertia where
-  // the motion is a sine.
+double torque_per_held_step(const PreparedData& prepared) {
+  // In addition to the inertias: friction, an offset, and what a weight on the output would do, which looks like an
+  // inertia where the motion is a sine.
   struct Fits {
     Fit all{6}, output{7};
   };
@@ -119,7 +119,7 @@ double torque_per_held_step(const Prepared& prepared) {
     const double sample_hz = 1.0 / r.sample_s;
     const signals::ZeroPhaseFilter filter(signals::ZeroPhaseFilter::kDefaultOrder,
                                           std::min(prepared.pipeline.row_cutoff_hz, 0.45 * sample_hz), sample_hz);
-    const Signals beside = {std::vector<double>(r.inputs.size(), 1.0),
+    const Signals others = {std::vector<double>(r.inputs.size(), 1.0),
                             along(r, [](const auto& in) { return std::sin(in.output_angle); }),
                             along(r, [](const auto& in) { return std::cos(in.output_angle); })};
     Signals motor = {along(r, [](const auto& in) { return in.acceleration; }),
@@ -128,7 +128,7 @@ double torque_per_held_step(const Prepared& prepared) {
     Signals load = {along(r, [](const auto& in) { return in.output_acceleration; }),
                     along(r, [](const auto& in) { return in.output_velocity; }),
                     along(r, [](const auto& in) { return in.output_direction; })};
-    for (const std::vector<double>& signal : beside) {
+    for (const std::vector<double>& signal : others) {
       motor.push_back(signal);
       load.push_back(signal);
     }
@@ -150,7 +150,7 @@ double torque_per_held_step(const Prepared& prepared) {
   const bool known = inertia_of_all > kCertainErrors * motor->std[0] && output_inertia > kCertainErrors * load->std[0];
   if (!known) return 0.0;
   const double per_step = output_inertia / (prepared.constants.gear_ratio * inertia_of_all);
-  // Of the half step, the share that readings lack.
+  // The share of the half step that readings lack.
   const double lacking = -load->value[6] / per_step, doubt = load->std[6] / per_step;
   return lacking - kCertainErrors * doubt > 0.5 ? per_step : 0.0;
 }

@@ -1,4 +1,4 @@
-// Torque readings beside an effort that the drive holds for a sample.
+// Correction of torque readings for an effort with zero-order hold.
 #pragma once
 
 #include "host/estimation/record.hpp"
@@ -13,7 +13,7 @@ namespace flexspline::estimation {
 // Both inertias are estimated from all free records together, and so is how much of the half step the readings lack.
 // Where that is more than half of it for certain, returns the step of the torque per step of the effort; else, as
 // behind a soft gear, zero. `prepared.pipeline.torque_per_step` must be zero still.
-double torque_per_held_step(const Prepared& prepared);
+double torque_per_held_step(const PreparedData& prepared);
 // Adds the other half of the steps to `torque` of a record (not to the inputs of effects), where it is free.
 void correct_zero_order_hold(Record& record, const catalogue::DriveConstants<double>& constants,
                              double torque_per_step);

@@ -18,25 +18,25 @@ constexpr std::uint32_t kMostMs = 60'000;
   throw DfuError(pipe.name() + ": " + what);
 }
 
-// Brings the device to dfuIDLE, from whatever somebody left it in.
+// Brings the device to dfuIDLE, from any other state.
 void make_idle(Pipe& pipe) {
   for (int i = 0; i < 4; ++i) {
-    const Told told = get_status(pipe);
-    if (told.state == DfuState::idle) return;
-    pipe.out(told.state == DfuState::error ? DfuRequest::clear_status : DfuRequest::abort, 0, {});
+    const DeviceStatus device = get_status(pipe);
+    if (device.state == DfuState::idle) return;
+    pipe.out(device.state == DfuState::error ? DfuRequest::clear_status : DfuRequest::abort, 0, {});
   }
   fail(pipe, "the boot loader does not become idle; switch the drive off and on");
 }
 
-// Asks until the device is done with what it does, and says in what state it is then.
+// Polls until the device has finished, and returns its state.
 DfuState wait_for_work(Pipe& pipe) {
   for (std::uint32_t waited = 0; waited <= kMostMs;) {
-    const Told told = get_status(pipe);
-    if (told.status != DfuStatus::ok) fail(pipe, text_of(told.status));
-    const bool works = told.state == DfuState::download_busy || told.state == DfuState::download_sync ||
-                       told.state == DfuState::manifest || told.state == DfuState::manifest_sync;
-    if (!works) return told.state;
-    const std::uint32_t time = std::max<std::uint32_t>(told.poll_ms, 1);
+    const DeviceStatus device = get_status(pipe);
+    if (device.status != DfuStatus::ok) fail(pipe, text_of(device.status));
+    const bool works = device.state == DfuState::download_busy || device.state == DfuState::download_sync ||
+                       device.state == DfuState::manifest || device.state == DfuState::manifest_sync;
+    if (!works) return device.state;
+    const std::uint32_t time = std::max<std::uint32_t>(device.poll_ms, 1);
     pipe.wait_ms(time);
     waited += time;
   }
@@ -45,17 +45,17 @@ DfuState wait_for_work(Pipe& pipe) {
 
 void send(Pipe& pipe, std::uint16_t number, std::span<const std::uint8_t> block) {
   if (pipe.out(DfuRequest::download, number, block)) return;
-  const Told told = get_status(pipe);
-  fail(pipe, told.status == DfuStatus::ok ? "the boot loader refused a block" : text_of(told.status));
+  const DeviceStatus device = get_status(pipe);
+  fail(pipe, device.status == DfuStatus::ok ? "the boot loader refused a block" : text_of(device.status));
 }
 
 }  // namespace
 
-Told get_status(Pipe& pipe) {
+DeviceStatus get_status(Pipe& pipe) {
   Bytes data;
   if (!pipe.in(DfuRequest::get_status, 0, usb::kDfuStatusBytes, data) || data.size() != usb::kDfuStatusBytes ||
       data[0] > static_cast<std::uint8_t>(DfuStatus::stalled) || data[4] > static_cast<std::uint8_t>(DfuState::error))
-    fail(pipe, "it does not tell its state; switch the drive off and on and try again");
+    fail(pipe, "it does not report its state; switch the drive off and on and try again");
   return {static_cast<DfuStatus>(data[0]), static_cast<DfuState>(data[4]),
           static_cast<std::uint32_t>(data[1] | data[2] << 8 | data[3] << 16)};
 }
@@ -67,7 +67,7 @@ std::string text_of(usb::DfuStatus status) {
     case DfuStatus::target:
       return "the image is for another board (errTARGET); take the one for this board";
     case DfuStatus::file:
-      return "what was sent is no image that fits (errFILE); take one of flexspline image for this board";
+      return "what was sent is not an image that fits (errFILE); take one of flexspline image for this board";
     case DfuStatus::erase:
     case DfuStatus::check_erased:
     case DfuStatus::write:
@@ -76,7 +76,7 @@ std::string text_of(usb::DfuStatus status) {
     case DfuStatus::verify:
       return "what arrived is not what was sent (errVERIFY); try again";
     case DfuStatus::not_done:
-      return "the image ends before its header says so (errNOTDONE); fetch or make it again";
+      return "the image ends before the length in its header (errNOTDONE); fetch or make it again";
     case DfuStatus::address:
       return "a block came out of its order (errADDRESS); try again";
     case DfuStatus::firmware:

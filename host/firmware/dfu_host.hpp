@@ -33,18 +33,18 @@ class Pipe {
   virtual std::string name() const = 0;
 };
 
-struct Told {
+struct DeviceStatus {
   usb::DfuStatus status{};
   usb::DfuState state{};
   std::uint32_t poll_ms = 0;
 };
 // Throws DfuError where the device does not answer as it has to.
-Told get_status(Pipe& pipe);
+DeviceStatus get_status(Pipe& pipe);
 
 // What a status means, and what to do.
 std::string text_of(usb::DfuStatus status);
 
-// Sends an image in blocks of `block_bytes` and has it installed. progress(bytes taken) may throw to give up. Throws
+// Sends an image in blocks of `block_bytes` and has it installed. progress(bytes taken) may throw to cancel. Throws
 // DfuError with the device's reason.
 void download(Pipe& pipe, std::span<const std::uint8_t> image, std::size_t block_bytes,
               const std::function<void(std::size_t)>& progress);

@@ -30,7 +30,7 @@ void take_suffix(Bytes& bytes, const std::string& origin) {
   if (suffix[8] != 'U' || suffix[9] != 'F' || suffix[10] != 'D' || suffix[11] != kSuffixBytes) return;
   model::Reader r(suffix.last(4));
   if (r.take<std::uint32_t>() != suffix_crc(std::span(bytes).first(bytes.size() - 4)))
-    throw ImageError(fmt::format("{}: its DFU suffix says that it is damaged (CRC); fetch or make it again", origin));
+    throw ImageError(fmt::format("{}: its DFU suffix has a wrong checksum (CRC); fetch or make it again", origin));
   bytes.resize(bytes.size() - kSuffixBytes);
 }
 
@@ -45,7 +45,7 @@ Image parse_image(Bytes bytes, const std::string& origin) {
     case boot::ImageFinding::none:
       break;
     case boot::ImageFinding::no_image:
-      refuse("is no firmware image; flexspline image makes one of a program (BIN file)");
+      refuse("is not a firmware image; flexspline image makes one of a program (BIN file)");
       break;
     case boot::ImageFinding::unknown_format:
       refuse("is an image of a newer format; take a newer flexspline");
@@ -54,7 +54,7 @@ Image parse_image(Bytes bytes, const std::string& origin) {
       if (image.bytes.size() < boot::kHeaderBytes)
         refuse(fmt::format("is truncated: it has {} bytes, its header alone {}; fetch or make it again",
                            image.bytes.size(), boot::kHeaderBytes));
-      refuse(fmt::format("is truncated: it has {} bytes, and its header says {}; fetch or make it again",
+      refuse(fmt::format("is truncated: it has {} bytes, and its header states {}; fetch or make it again",
                          image.bytes.size(), image.header.whole_bytes()));
       break;
     case boot::ImageFinding::damaged_header:
@@ -64,7 +64,7 @@ Image parse_image(Bytes bytes, const std::string& origin) {
       refuse("is damaged: the checksum (CRC-32) of its program is wrong; fetch or make it again");
   }
   if (image.bytes.size() != image.header.whole_bytes())
-    refuse(fmt::format("has {} bytes behind the {} that its header says; is it two files in one?",
+    refuse(fmt::format("has {} bytes behind the {} that its header states; is it two files in one?",
                        image.bytes.size() - image.header.whole_bytes(), image.header.whole_bytes()));
   return image;
 }

@@ -30,7 +30,7 @@ Image load_image(const std::filesystem::path& path);
 // The same of bytes; `origin` names them in messages.
 Image parse_image(Bytes bytes, const std::string& origin);
 
-// Puts the header before a program that was linked to stand behind one. Throws ImageError for an empty program and a
+// Puts the header before a program that was linked to start behind one. Throws ImageError for an empty program and a
 // name of no or more than fifteen letters.
 Bytes make_image(const Bytes& program, const std::string& board, boot::Version version);
 // DFU 1.1, appendix B: sixteen bytes behind a file that say which devices it is for.

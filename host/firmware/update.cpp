@@ -26,11 +26,11 @@ boot::Version version_of(const drive::Session& session) {
   return {session.identity().firmware[0], session.identity().firmware[1]};
 }
 
-// Calls `look` until it returns true. False where time ran out.
-template <class Look>
-bool wait_until(Look look) {
+// Calls `check` until it returns true. False where time ran out.
+template <class Check>
+bool wait_until(Check check) {
   const auto end = Clock::now() + kPatience;
-  while (!look()) {
+  while (!check()) {
     if (Clock::now() > end) return false;
     std::this_thread::sleep_for(kBetweenLooks);
   }
@@ -45,7 +45,7 @@ bool is_there(const std::string& serial, bool is_loader) {
 }
 
 std::optional<boot::Version> installed_version(const std::string& serial) {
-  const dfu::Opened loader = dfu::open_device(serial, true);
+  const dfu::OpenDevice loader = dfu::open_device(serial, true);
   const Bytes start = dfu::upload(*loader.pipe, boot::kHeaderBytes, loader.block_bytes);
   boot::ImageHeader header;
   if (boot::read_header(start, header) != boot::ImageFinding::none) return {};
@@ -89,7 +89,7 @@ Target find_target(const std::string& drive) {
         "{}: {}; check cable and power", wanted,
         others.empty() ? "neither a drive nor a boot loader is there" : "is not on USB; those that are: " + others));
   if (matching.size() > 1)
-    throw DfuError(fmt::format("USB: there is more than one drive ({}); say which: --drive SERIAL", others));
+    throw DfuError(fmt::format("USB: there is more than one drive ({}); choose one: --drive SERIAL", others));
   const dfu::Device& device = matching.front();
   if (!device.problem.empty())
     throw DfuError(fmt::format("{}: {}", device.serial.empty() ? wanted : device.serial, device.problem));
@@ -131,7 +131,7 @@ boot::Version update(const Image& image, const Target& target,
                       target.serial, kPatience.count()));
   }
   {
-    const dfu::Opened loader = dfu::open_device(target.serial, true);
+    const dfu::OpenDevice loader = dfu::open_device(target.serial, true);
     dfu::download(*loader.pipe, image.bytes, loader.block_bytes, [&](std::size_t sent) {
       progress(
           fmt::format("sending: {} of {} bytes ({} %)", sent, image.bytes.size(), 100 * sent / image.bytes.size()));
@@ -142,7 +142,7 @@ boot::Version update(const Image& image, const Target& target,
   if (!version)
     throw DfuError(
         fmt::format("drive {}: the image arrived whole, but the drive did not come back within {} s; switch "
-                    "it off and on (over USB/IP, attach it again) and look with flexspline drives",
+                    "it off and on (over USB/IP, attach it again) and check with flexspline drives",
                     target.serial, kPatience.count()));
   return *version;
 }

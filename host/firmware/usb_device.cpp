@@ -17,7 +17,7 @@ namespace {
 constexpr unsigned kTimeoutMs = 10'000;  // of one transfer: an erase may keep the processor from answering
 constexpr const char* kRemedy =
     "your user may not open it: sudo cp 70-flexspline.rules /etc/udev/rules.d/ && sudo udevadm control --reload, then "
-    "plug the drive in again (the file stands in host/drive)";
+    "plug the drive in again (the file is in host/drive)";
 
 struct Exit {
   void operator()(libusb_context* context) const { libusb_exit(context); }
@@ -28,7 +28,7 @@ struct Close {
 using Context = std::unique_ptr<libusb_context, Exit>;
 using Handle = std::unique_ptr<libusb_device_handle, Close>;
 
-// Each look at the bus has its own: a context learns of devices that come later from the udev daemon alone, which need
+// Each query of the bus has its own: a context learns of devices that come later from the udev daemon alone, which need
 // not run.
 Context new_context() {
   libusb_context* context = nullptr;
@@ -113,7 +113,7 @@ class UsbPipe : public Pipe {
   std::string name() const override { return name_; }
 
  private:
-  // Bytes that went, or below nought where the device answered STALL.
+  // Bytes that went, or below zero where the device answered STALL.
   int transfer(libusb_endpoint_direction direction, usb::DfuRequest request, std::uint16_t value, Bytes& data) {
     const auto type = static_cast<std::uint8_t>(static_cast<unsigned>(direction) | LIBUSB_REQUEST_TYPE_CLASS |
                                                 LIBUSB_RECIPIENT_INTERFACE);
@@ -150,14 +150,16 @@ std::vector<Device> find_devices() {
       device.serial = text_at(opened, descriptor.iSerialNumber);
       if (is_loader) device.board = text_at(opened, place.string);
       if (!place.found)
-        device.problem = "its firmware is too old to be updated over USB; flash it once over SWD, as its board says";
+        device.problem =
+            "its firmware is too old to be updated over USB; flash it once over SWD, as the page of its board "
+            "describes";
     }
     found.push_back(std::move(device));
   });
   return found;
 }
 
-Opened open_device(const std::string& serial, bool is_loader) {
+OpenDevice open_device(const std::string& serial, bool is_loader) {
   Context context = new_context();
   const std::string name = (is_loader ? "boot loader of " : "drive ") + serial;
   Handle handle;
@@ -177,7 +179,7 @@ Opened open_device(const std::string& serial, bool is_loader) {
   if (const int error = libusb_claim_interface(handle.get(), place.interface); error != 0)
     throw DfuError(fmt::format("{}: is in use ({}); end the program that updates it, dfu-util perhaps", name,
                                libusb_error_name(error)));
-  Opened opened;
+  OpenDevice opened;
   opened.block_bytes = place.block_bytes;
   opened.pipe = std::make_unique<UsbPipe>(std::move(context), std::move(handle), place.interface, name);
   return opened;

@@ -14,17 +14,17 @@ namespace flexspline::dfu {
 struct Device {
   std::string serial;  // empty: it may not be opened
   bool is_loader = false;
-  std::string board;    // of a boot loader; an application tells it by its own protocol
+  std::string board;    // of a boot loader; an application sends it by its own protocol
   std::string problem;  // why it cannot be used, and what to do
 };
 // Those on the bus now.
 std::vector<Device> find_devices();
 
-struct Opened {
+struct OpenDevice {
   std::unique_ptr<Pipe> pipe;
   std::size_t block_bytes = 0;  // that it takes at once
 };
 // The one of that serial number and kind. Throws DfuError where it is not there or cannot be opened.
-Opened open_device(const std::string& serial, bool is_loader);
+OpenDevice open_device(const std::string& serial, bool is_loader);
 
 }  // namespace flexspline::dfu

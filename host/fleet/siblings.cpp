@@ -61,7 +61,7 @@ bool is_of_a_drive(const fs::path& folder) {
                                [](const fs::directory_entry& entry) { return data::is_recording(entry.path()); });
 }
 
-// A drive whose job never wrote anything: it counts, or nobody notices that it is missing.
+// A drive whose job never wrote anything: it counts, or the missing drive would go unnoticed.
 DriveResult without_result(const fs::path& folder) {
   const fs::path whole = fs::absolute(folder).lexically_normal();
   DriveResult result;
@@ -91,7 +91,7 @@ void gather(const fs::path& place, std::vector<DriveResult>& results) {
     if (fs::exists(entry / kResultName, error)) {
       results.push_back(result_from(read_json(entry / kResultName), entry / kResultName));
     } else if (entry.extension() == ".json") {
-      // Others may lie here, too.
+      // Others may be here, too.
       const json content = read_json(entry);
       if (is_result(content)) results.push_back(result_from(content, entry));
     } else if (is_of_a_drive(entry)) {
@@ -176,7 +176,7 @@ Merged merge(const std::vector<DriveResult>& results, std::optional<double> limi
   Merged merged;
   std::vector<const DriveResult*> good;
   for (const DriveResult& result : results) (result.failed.empty() ? good : merged.failed).push_back(&result);
-  std::vector<std::string> names;  // in the order in which they first stand
+  std::vector<std::string> names;  // in the order of their first use
   for (const DriveResult* result : good)
     for (const Quantity& q : result->quantities)
       if (std::find(names.begin(), names.end(), q.name) == names.end()) names.push_back(q.name);
@@ -196,7 +196,7 @@ Merged merge(const std::vector<DriveResult>& results, std::optional<double> limi
     merged.spreads.push_back({name, all.front().second->unit, all.size(), centre.median, centre.deviation});
     if (all.size() < kFewestDrives) continue;
     for (const auto& [result, q] : all) {
-      // A value that is itself uncertain is no news, and where most are alike to the last digit, rounding is none.
+      // A value that is itself uncertain is not reported, and where most are equal to the last digit, rounding is none.
       const double deviation =
           std::max({centre.deviation, q->std.value_or(0.0), 1e-9 * std::abs(centre.median), 1e-300});
       const double z = (q->value - centre.median) / deviation;
@@ -207,7 +207,7 @@ Merged merge(const std::vector<DriveResult>& results, std::optional<double> limi
   std::stable_sort(merged.differences.begin(), merged.differences.end(),
                    [](const Difference& a, const Difference& b) { return std::abs(a.z) > std::abs(b.z); });
 
-  // What the diagnosis says of most.
+  // The most frequent verdict of the diagnosis.
   const auto said = [](const DriveResult& result) {
     std::string text = result.verdict;
     for (const std::string& effect : result.named) text += " " + effect;

@@ -19,7 +19,7 @@ class FleetError : public std::runtime_error {
 
 inline constexpr const char* kResultName = "fleet-result.json";
 inline constexpr const char* kResultFormat = "flexspline-fleet-drive/1";
-// With fewer siblings nobody can be told from them.
+// Fewer siblings do not show which one differs.
 inline constexpr std::size_t kFewestDrives = 5;
 
 // A parameter, or the error of a fitted balance ("error of motor_balance").
@@ -46,7 +46,7 @@ DriveResult result_from(const nlohmann::json& json, const std::filesystem::path&
 // where there is no result at all or one cannot be read.
 std::vector<DriveResult> read_results(const std::vector<std::filesystem::path>& places);
 
-// How a quantity lies over the drives that have it.
+// How a quantity is distributed over the drives that have it.
 struct Spread {
   std::string name;
   std::string unit;
@@ -62,7 +62,7 @@ struct Difference {
   std::string unit;
   double value = 0.0;
   double median = 0.0;
-  double deviation = 0.0;  // that it was judged by: the siblings', or the value's own where that is larger
+  double deviation = 0.0;  // that it was compared with: the siblings', or the value's own where that is larger
   double z = 0.0;          // (value - median) / deviation
 };
 struct Merged {

@@ -7,17 +7,17 @@
 
 #include "host/catalogue/coefficients.hpp"
 #include "host/catalogue/constants.hpp"
-#include "host/catalogue/defined.hpp"
+#include "host/catalogue/user_defined_effect.hpp"
+#include "host/interchange/c_statements.hpp"
 #include "host/interchange/export.hpp"
-#include "host/interchange/written.hpp"
 #include "shared/effects/list.hpp"
 
 namespace flexspline::interchange {
 namespace {
 
 using effects::Phase;
-using Inputs = effects::Inputs<Written>;
-using Torques = effects::Torques<Written>;
+using Inputs = effects::Inputs<CNumbers>;
+using Torques = effects::Torques<CNumbers>;
 using Constants = effects::DriveConstants<double>;
 
 // What remembers the tick before, and is kept by the caller's struct.
@@ -65,9 +65,9 @@ constexpr Field kFields[] = {
     {"elapsed", "s", "s", "since the step before"}};
 
 // An effect of the model as it writes itself.
-class Author {
+class CodeGenerator {
  public:
-  virtual ~Author() = default;
+  virtual ~CodeGenerator() = default;
   virtual void change(Inputs&) const {}
   virtual void state(std::vector<Term*>&) {}
   virtual void advance(const Inputs&, const Inputs&) {}
@@ -75,16 +75,16 @@ class Author {
 };
 
 template <class E>
-class AuthorOf final : public Author {
+class EffectGenerator final : public CodeGenerator {
  public:
-  AuthorOf(const double* parameters, const Constants& constants)
-      : coefficients_(catalogue::coefficients_of<E, Written>(parameters, constants)) {}
+  EffectGenerator(const double* parameters, const Constants& constants)
+      : coefficients_(catalogue::coefficients_of<E, CNumbers>(parameters, constants)) {}
   void change(Inputs& in) const override {
     if constexpr (E::kInfo.phase == Phase::shift) E::shift(coefficients_, in);
     if constexpr (E::kInfo.phase == Phase::modulate) E::modulate(coefficients_, in);
   }
   void state(std::vector<Term*>& terms) override {
-    using State = typename E::template State<Written>;
+    using State = typename E::template State<CNumbers>;
     if constexpr (!std::is_empty_v<State>) {
       // States are made of numbers and of nothing else: a rule of shared/effects, which the size shows.
       static_assert(std::is_standard_layout_v<State> && sizeof(State) % sizeof(Term) == 0 &&
@@ -94,7 +94,8 @@ class AuthorOf final : public Author {
     }
   }
   void advance(const Inputs& now, const Inputs& before) override {
-    if constexpr (!std::is_empty_v<typename E::template State<Written>>) E::advance(state_, coefficients_, now, before);
+    if constexpr (!std::is_empty_v<typename E::template State<CNumbers>>)
+      E::advance(state_, coefficients_, now, before);
   }
   void evaluate(const Inputs& in, Torques& out) const override {
     if constexpr (requires { E::evaluate(state_, coefficients_, in, out); })
@@ -102,15 +103,15 @@ class AuthorOf final : public Author {
   }
 
  private:
-  typename E::template Coefficients<Written> coefficients_;
-  typename E::template State<Written> state_{};
+  typename E::template Coefficients<CNumbers> coefficients_;
+  typename E::template State<CNumbers> state_{};
 };
 
-std::unique_ptr<Author> author_of(std::string_view name, const std::vector<double>& parameters,
-                                  const Constants& constants) {
-  std::unique_ptr<Author> author;
+std::unique_ptr<CodeGenerator> author_of(std::string_view name, const std::vector<double>& parameters,
+                                         const Constants& constants) {
+  std::unique_ptr<CodeGenerator> author;
   effects::for_each_effect([&]<class E>(std::size_t) {
-    if (E::kInfo.name == name) author = std::make_unique<AuthorOf<E>>(parameters.data(), constants);
+    if (E::kInfo.name == name) author = std::make_unique<EffectGenerator<E>>(parameters.data(), constants);
   });
   return author;
 }
@@ -118,7 +119,7 @@ std::unique_ptr<Author> author_of(std::string_view name, const std::vector<doubl
 struct Placed {
   std::string id;
   const effects::Description* info;
-  std::unique_ptr<Author> author;
+  std::unique_ptr<CodeGenerator> author;
 };
 
 std::vector<Placed> authors_of(const model::Model& model, const Constants& constants) {
@@ -128,7 +129,7 @@ std::vector<Placed> authors_of(const model::Model& model, const Constants& const
     if (effect.type == catalogue::kExpressionEffect)
       throw ExportError(
           fmt::format("\"{}\" is a formula of yours, which has no C form yet; learn a table of it (add "
-                      "table_effect:VARIABLE) or write it beside the header",
+                      "table_effect:VARIABLE) or write it next to the header",
                       effect.id));
     all.push_back({effect.id, entry.info,
                    author_of(effect.type,
@@ -149,12 +150,12 @@ void change(const std::vector<Placed>& effects, Inputs& in) {
   pass(Phase::shift, false);
   pass(Phase::shift, true);
   // A shift that turns with the motor changes the torsion's rate, and with it its direction.
-  if (in.torsion_rate.line() != rate.line()) in.torsion_direction = Written::sign(in.torsion_rate);
+  if (in.torsion_rate.line() != rate.line()) in.torsion_direction = CNumbers::sign(in.torsion_rate);
   pass(Phase::modulate, false);
   pass(Phase::modulate, true);
 }
 
-Inputs inputs_of(Sheet& page, const Constants& constants) {
+Inputs inputs_of(CStatements& page, const Constants& constants) {
   const auto given = [&](const char* name) { return page.input(std::string("in->") + name); };
   Inputs in;
   in.angle = given("motor_position");
@@ -169,11 +170,11 @@ Inputs inputs_of(Sheet& page, const Constants& constants) {
   in.current = given("current");
   in.temperature = given("temperature");
   in.elapsed = given("elapsed");
-  in.speed = Written::magnitude(in.velocity);
-  in.torque_magnitude = Written::magnitude(in.torque);
+  in.speed = CNumbers::magnitude(in.velocity);
+  in.torque_magnitude = CNumbers::magnitude(in.torque);
   in.torsion = in.angle / Term(constants.gear_ratio) - in.output_angle;
   in.torsion_rate = in.velocity / Term(constants.gear_ratio) - in.output_velocity;
-  in.torsion_direction = Written::sign(in.torsion_rate);
+  in.torsion_direction = CNumbers::sign(in.torsion_rate);
   in.viscous_scale = in.coulomb_scale = 1.0;
   return in;
 }
@@ -197,7 +198,7 @@ static inline double @q_exp_negative(double x, double q) {
   return exp(-x * (log(1.0 + z) / z));
 }
 )"},
-    {"table", R"(/* Straight lines between the values, at a position counted in points; held beyond both ends. */
+    {"table", R"(/* Linear interpolation between the values, at a position counted in points; held beyond both ends. */
 static inline double @table(const double* values, int points, double at) {
   int k;
   if (!(at > 0.0)) return values[0];
@@ -239,8 +240,8 @@ std::string c_name(std::string_view name) {
 std::string c_header(const model::Model& model, const std::string& source) {
   const Constants constants = catalogue::constants_of(model.drive);
   const bool linear = model.drive.axis == data::Axis::linear;
-  Sheet page;
-  sheet() = &page;
+  CStatements page;
+  c_statements() = &page;
   const std::vector<Placed> effects = authors_of(model, constants);
 
   Inputs now = inputs_of(page, constants);
@@ -272,14 +273,14 @@ std::string c_header(const model::Model& model, const std::string& source) {
       rest.push_back(*terms[k]);
     }
     effect.author->advance(now, before);
-    // The first step only takes note of where the drive stands.
+    // The first step only stores the position of the drive.
     for (std::size_t k = 0; k < terms.size(); ++k) {
       *terms[k] = at_first(*terms[k], rest[k]);
       states[states.size() - terms.size() + k].value = *terms[k];
     }
     effect.author->evaluate(now, torques);
   }
-  sheet() = nullptr;
+  c_statements() = nullptr;
 
   std::vector<Term> results{torques.motor, torques.transmission, torques.load};
   for (const Variable& s : states) results.push_back(s.value);

@@ -11,7 +11,7 @@
 
 namespace flexspline::interchange {
 
-// The model cannot be written so; the message says why and what to do.
+// The model cannot be written in this format; the message states why and what to do.
 class ExportError : public std::runtime_error {
  public:
   using std::runtime_error::runtime_error;
@@ -26,19 +26,19 @@ std::string c_header(const model::Model& model, const std::string& source);
 // alone its curve. Files that a model has nothing for are left out.
 std::vector<std::pair<std::string, std::string>> csv_tables(const model::Model& model);
 
-// What a physics engine knows of a joint, at the output side: the straight line (Coulomb and viscous) that is nearest
+// What a physics engine knows of a joint, at the output side: the linear law (Coulomb and viscous) that is nearest
 // to the model's friction between a hundredth of the rated velocity and all of it.
 struct Joint {
   double armature = 0.0;         // inertia of the motor seen from the output, kg m^2
   double damping = 0.0;          // N m s/rad
   double friction = 0.0;         // N m
   double friction_error = 0.0;   // RMS of what the line leaves of the model's friction, N m
-  double stiffness = 0.0;        // N m/rad of the transmission, by the secant at half the rated torque; nought: rigid
+  double stiffness = 0.0;        // N m/rad of the transmission, by the secant at half the rated torque; zero: rigid
   double stiffness_error = 0.0;  // largest difference of the secant at the rated torque, as a share of it
   double link_damping = 0.0;     // of the transmission, N m s/rad
   double output_inertia = 0.0;   // that the model has on the load balance, kg m^2
   double gear_ratio = 1.0;
-  double torque_limit = 0.0;          // rated, at the output; nought: not known
+  double torque_limit = 0.0;          // rated, at the output; zero: not known
   double velocity_limit = 0.0;        // rated, at the output
   std::vector<std::string> left_out;  // effects of which a joint knows nothing
 };

@@ -3,7 +3,7 @@
 #include <functional>
 
 #include "host/catalogue/constants.hpp"
-#include "host/catalogue/defined.hpp"
+#include "host/catalogue/user_defined_effect.hpp"
 #include "host/interchange/export.hpp"
 #include "host/interchange/sweeps.hpp"
 
@@ -12,7 +12,7 @@ namespace {
 
 constexpr int kSpeeds = 60;
 
-// Straight line friction + damping w through points, by least squares; neither below nought.
+// Linear law friction + damping w through points, by least squares; neither below zero.
 void fit_line(const std::vector<double>& speed, const std::vector<double>& torque, Joint& joint) {
   const double n = static_cast<double>(speed.size());
   double w = 0.0, t = 0.0, ww = 0.0, wt = 0.0;

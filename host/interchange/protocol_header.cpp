@@ -80,6 +80,38 @@ class Layout {
   std::size_t size_ = 0;
 };
 
+// The kinds of an entry's fields, as a validator's verdict counts them, and where each is in the entry.
+class EntryLayout : public model::FieldNames<EntryLayout> {
+ public:
+  struct EntryField {
+    std::size_t at = 0;
+    model::Field kind{};
+  };
+  template <class Member>
+  void integer(model::Field kind, Member&) {
+    add(kind, model::kIntegers[static_cast<std::size_t>(kind)].bytes);
+  }
+  template <class Gain>
+  void floating(model::Field kind, Gain&) {
+    add(kind, 8);
+  }
+  void harmonic(fixed::Harmonic&) { add(model::Field::harmonic, 16); }
+  template <class Words>
+  void points(std::int16_t&, Words&) {
+    add(model::Field::points, 4);
+  }
+  std::size_t bytes() const { return bytes_; }
+  const std::vector<EntryField>& fields() const { return fields_; }
+
+ private:
+  void add(model::Field kind, std::size_t bytes) {
+    fields_.push_back({bytes_, kind});
+    bytes_ += bytes;
+  }
+  std::vector<EntryField> fields_;
+  std::size_t bytes_ = 0;
+};
+
 class Writer {
  public:
   void line(std::string_view text = {}) { text_ += std::string(text) + "\n"; }
@@ -120,16 +152,15 @@ class Writer {
                     members, name));
   }
 
-  // Where the fields of an entry's row stand, counted as a validator's verdict counts them.
-  void row(std::string_view name, const std::uint8_t* parts) {
-    std::size_t at = 0, field = 0;
-    for (; *parts != 0; ++parts)
-      for (int k = 0; k < model::often(*parts); ++k, ++field) {
-        const model::Field kind = model::field_of(*parts);
-        number(fmt::format("{}_FIELD_{}_AT", name, field), at, kind_name(kind));
-        at += model::detail::size_of(kind).in_block;
-      }
-    number(fmt::format("{}_BYTES", name), at);
+  // Where the fields of an entry are.
+  template <class T>
+  void entry(std::string_view name) {
+    EntryLayout layout;
+    T object{};
+    object.fields(layout);
+    for (std::size_t i = 0; i < layout.fields().size(); ++i)
+      number(fmt::format("{}_FIELD_{}_AT", name, i), layout.fields()[i].at, kind_name(layout.fields()[i].kind));
+    number(fmt::format("{}_BYTES", name), layout.bytes());
   }
   const std::string& text() const { return text_; }
 
@@ -153,7 +184,7 @@ void write_numbers(Writer& w) {
   w.number("PROTOCOL_MINOR", kMinor);
   w.number("USB_VENDOR", usb::FlexsplineIdentity::kVendorId);
   w.number("USB_PRODUCT", usb::FlexsplineIdentity::kProductId);
-  w.number("REPORT_BYTES", kReportBytes, "a message over HID, filled up with noughts");
+  w.number("REPORT_BYTES", kReportBytes, "a message over HID, filled up with zeros");
   w.number("HEAD_BYTES", kHeadBytes);
   w.number("MOST_PAYLOAD", kMostPayload);
   w.number("HEAD_KIND_AT", 0);
@@ -163,7 +194,7 @@ void write_numbers(Writer& w) {
   w.number("ANSWER_BIT", kAnswerBit, "an answer has the request's kind with this");
   w.number("FIRST_UNASKED", kFirstUnasked);
   w.number("MOST_CHANNELS", kMostChannels);
-  w.number("MOST_SERIAL", kMostSerial, "bytes of a frame on a serial line: COBS of message and CRC-32, then a nought");
+  w.number("MOST_SERIAL", kMostSerial, "bytes of a frame on a serial line: COBS of message and CRC-32, then a zero");
   w.title("Kinds of messages");
   w.numbers<Kind>("KIND", kNoComment);
   w.title("Codes of answers");
@@ -171,12 +202,12 @@ void write_numbers(Writer& w) {
   w.title("Modes of a drive");
   w.numbers<Mode>("MODE", kNoComment);
   w.title("Commands, and why one is refused");
-  w.numbers<CommandKind>("COMMAND", kNoComment);
+  w.numbers<CommandKind, 0, kCommandKinds>("COMMAND", kNoComment);
   w.numbers<Refusal>("REFUSAL", [](Refusal refusal) { return text_of(refusal); });
   w.title("What a drive found of its stored blocks when it started");
   w.numbers<StoreState>("STORE", kNoComment);
   w.numbers<Which>("BLOCK", kNoComment);
-  w.title("Channels of telemetry: 32-bit words, shares of a base (2^-27) where a unit stands");
+  w.title("Channels of telemetry: 32-bit words, shares of a base (2^-27) where a unit is given");
   w.numbers<Channel>("CHANNEL", [](Channel channel) { return text_of(channel).unit; });
   w.title("Faults");
   for (std::uint8_t fault = 0; fault < kFaults; ++fault)
@@ -201,12 +232,12 @@ void write_payloads(Writer& w) {
        "temperature_full_scale_mc", "temperature_at_zero_mc", "motor_encoder", "output_encoder", "torque_sensor"});
   w.payload<Reference>("reference", "reference, from the drive: what it knows of where its shafts are",
                        {"knows_turn", "knows_output"});
-  w.payload<Home>("home", "home, to the drive: where the motor stands now, 2^-32 turns", {"position"});
+  w.payload<Home>("home", "home, to the drive: the motor's present position, 2^-32 turns", {"position"});
   w.payload<Status>("status", "status, from the drive",
                     {"tick", "mode", "has_parameters", "store", "fault", "fault_tick", "fault_seen", "fault_limit",
                      "dropped", "sequence", "staged", "active_bytes", "active_crc", "previous_bytes", "previous_crc"});
   w.payload<BlockBegin>("block_begin", "block_begin, to the drive", {"bytes", "crc"});
-  w.payload<Chunk>("chunk", "block_chunk to the drive, block_read from it; as many bytes as the length says",
+  w.payload<Chunk>("chunk", "block_chunk to the drive, block_read from it; as many bytes as the length states",
                    {"offset", "bytes"});
   w.payload<BlockRead>("block_read", "block_read, to the drive", {"which", "offset"});
   w.payload<BlockRestore>("block_restore", "block_restore, to the drive", {"sequence"});
@@ -261,31 +292,33 @@ void write_block(Writer& w) {
     w.number(fmt::format("LIMIT_{}_AT", limit), at, "value");
     at += 4;
   }
-  w.number("BLOCK_ENTRIES_AT", d::kBlockStart + d::kHeaderBytes, "uint16 kind, uint16 nought, uint32 bytes, bytes");
+  w.number("BLOCK_ENTRIES_AT", d::kBlockStart + d::kHeaderBytes, "uint16 kind, uint16 zero, uint32 bytes, bytes");
   w.number("ENTRY_HEAD_BYTES", d::kEntryHeader);
   w.number("BLOCK_CHECKSUM_BYTES", d::kChecksum, "CRC-32 of all before it, at the end");
   w.number("FIRST_NOTE", model::kFirstNote, "entries from here on are for people and hosts");
-  w.title("What a validator says of a block");
+  w.title("A validator's verdict on a block");
   w.numbers<model::BlockFault>("REASON", [](model::BlockFault fault) { return model::text_of(fault); });
   w.title(
-      "Entries of effects: their number, and where their coefficients stand; behind the last a table has its points, 4 "
+      "Entries of effects: their number, and where their coefficients are; behind the last a table has its points, 4 "
       "bytes each");
-  static constexpr model::BlockPlaces kPlaces =
-      control::block_places<decltype(control::DriveParameters<fixed::Fixed>::model)>();
+  using Image = decltype(control::DriveParameters<fixed::Fixed>::model);
+  const auto image = std::make_unique<const Image>();
   std::map<std::size_t, std::string_view> names;
   effects::for_each_effect([&]<class Effect>(std::size_t id) { names.emplace(id, Effect::kInfo.name); });
   for (const auto& [id, effect] : names) {
     const std::string name = fmt::format("EFFECT_{}", effect);
     w.number(name, id);
-    for (const model::EffectPlace& place : kPlaces.effects)
-      if (place.number == id) w.row(name, kPlaces.effect_rows + place.row);
+    image->for_each([&, number = id]<class Effect>(const auto&) {
+      if (Image::number_of<Effect>() == number) w.entry<typename Effect::template Coefficients<fixed::Fixed>>(name);
+    });
   }
   w.title("Entries of sections");
   for_each_enumerator<model::Section, 0x100, 0x40>([&](std::string_view name, std::size_t value) {
     const std::string section = fmt::format("SECTION_{}", name);
     w.number(section, value);
-    for (const auto& plan : control::detail::kSections)
-      if (static_cast<std::size_t>(plan.kind) == value) w.row(section, plan.row.parts.data());
+    control::detail::for_each_section([&]<class S>(S) {
+      if (static_cast<std::size_t>(S::kKind) == value) w.entry<typename S::Data>(section);
+    });
   });
 }
 

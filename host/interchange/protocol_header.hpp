@@ -8,7 +8,7 @@ namespace flexspline::interchange {
 
 // C99, no dependency but <stdint.h>: kinds, codes, channels, faults, limits of the protocol; each payload as a packed
 // struct and as offsets; header, entries and sections of the parameter block with the places of their fields.
-// `made_by` stands in its first comment.
+// `made_by` is in its first comment.
 std::string protocol_header(const std::string& made_by);
 
 }  // namespace flexspline::interchange

@@ -38,7 +38,7 @@ std::string said_of(const model::Model& model, const Joint& joint, const std::st
   const bool linear = model.drive.axis == data::Axis::linear;
   std::string text = fmt::format(
       "Model \"{}\", written by flexspline export from {}. All at the output side, in SI.\n     Friction is "
-      "the straight line nearest to the model's over speed; it leaves {:.3g} {} RMS.",
+      "the linear law nearest to the model's friction over speed; it leaves {:.3g} {} RMS.",
       model.name, source, joint.friction_error, linear ? "N" : "N m");
   if (joint.stiffness > 0.0)
     text +=
@@ -48,7 +48,7 @@ std::string said_of(const model::Model& model, const Joint& joint, const std::st
   return comment_safe(text);
 }
 
-// Links need some mass for an engine to start; it is small beside any arm.
+// Links need some mass for an engine to start; it is small compared with any arm.
 constexpr const char* kSmallMass = "0.001";
 constexpr const char* kSmallInertia = "1e-06";
 

@@ -34,7 +34,7 @@ class Sweeps {
   // The transmission's torque from rest up to `torque`, back to its negative, and up again, in steps of torsion; empty
   // where a torsion of a radian does not reach it.
   std::vector<Twist> loop(double torque) const;
-  // The torsion on the first branch of that; nought where it is not reached.
+  // The torsion on the first branch of that; zero where it is not reached.
   double torsion_at(double torque) const;
   // What the transmission carries at no torsion, twisting at a rate.
   double torque_at_rate(double rate) const;

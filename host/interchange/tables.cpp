@@ -4,7 +4,7 @@
 #include <optional>
 
 #include "host/catalogue/constants.hpp"
-#include "host/catalogue/defined.hpp"
+#include "host/catalogue/user_defined_effect.hpp"
 #include "host/interchange/export.hpp"
 #include "host/interchange/sweeps.hpp"
 
@@ -36,7 +36,7 @@ std::string parameters(const model::Model& model) {
   return text;
 }
 
-// How far a signal goes on this drive; nothing where its ratings do not tell.
+// How far a signal goes on this drive; nothing where its ratings do not state it.
 std::optional<double> range_of(effects::Variable variable, const model::Model& model,
                                const catalogue::DriveConstants<double>& constants, const Sweeps& sweeps) {
   using effects::Variable;
@@ -86,7 +86,7 @@ std::vector<std::pair<std::string, std::string>> csv_tables(const model::Model& 
   if (model.drive.rated_velocity_rad_s.value) {
     const double fastest = *model.drive.rated_velocity_rad_s.value;
     std::string text = "motor_velocity_rad_s,motor_torque_nm,load_torque_nm\n";
-    // The points by a square law: closer where friction bends. None at nought, where direction decides.
+    // The points by a square law: closer where friction bends. None at zero, where direction decides.
     for (int k = -kPoints / 2; k <= kPoints / 2; ++k) {
       if (k == 0) continue;
       const double share = static_cast<double>(k) / (kPoints / 2);

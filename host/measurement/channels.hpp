@@ -30,7 +30,7 @@ struct Channel {
 std::optional<Channel> effort_of(const data::Experiment& experiment, data::Axis axis);
 
 // What answers the effort, as far as it is measured: velocity of the motor (of its position where there is one, else
-// the tachometer's; of the output where the motor has neither), torque, torsion (q / N - qo; qo is nought where a
+// the tachometer's; of the output where the motor has neither), torque, torsion (q / N - qo; qo is zero where a
 // locked load has no sensor).
 std::vector<Channel> responses_of(const data::Experiment& experiment, const data::DriveFacts& drive);
 

@@ -36,7 +36,7 @@ class Lines {
 
   std::size_t count() const { return y_.lines(); }
 
-  // Sums of power where `per_line` is false, which is what harmonics of a sine are told by.
+  // Sums of power where `per_line` is false, by which harmonics of a sine are found.
   DistortionLevel level(const std::vector<std::size_t>& detection, bool corrected, bool per_line) const {
     const auto periods = static_cast<double>(y_.count());
     double power = 0.0, noise = 0.0, squares = 0.0;
@@ -120,7 +120,7 @@ Distortion distortion_of(const Channel& input, const Channel& output, const Peri
     d.odd_why_not = d.even_why_not = std::move(why);
     return d;
   };
-  if (excited.lines.empty()) return neither("no line of the period stands above the noise of the effort");
+  if (excited.lines.empty()) return neither("no line of the period is above the noise of the effort");
   d.low_hz = period.frequency_hz(excited.lines.front(), sample_s);
   d.high_hz = period.frequency_hz(excited.lines.back(), sample_s);
   if (!period.is_whole()) return neither("the period is no whole number of samples, so that its lines smear");

@@ -1,4 +1,4 @@
-// Odd and even nonlinear distortion, told apart by the lines of the spectrum that a linear drive would leave empty.
+// Odd and even nonlinear distortion, distinguished by the lines of the spectrum that a linear drive would leave empty.
 #pragma once
 
 #include <cstddef>
@@ -38,7 +38,7 @@ struct Distortion {
 
 // After R. Pintelon and J. Schoukens, System Identification: A Frequency Domain Approach, 2nd ed., 4.3: with excited
 // odd lines alone, an even nonlinearity answers at even lines, an odd one at odd lines, and both show where nothing was
-// excited. The means over the periods are judged; what the input holds at these lines (a controller answers the
+// excited. The means over the periods are tested; what the input holds at these lines (a controller answers the
 // distortion) is taken off as response times input, the response interpolated between excited lines. Levels are mean
 // powers of a line of each kind within the excited band over those of an excited line.
 // Of a single sine the harmonics up to the 20th are summed up, without such correction.

@@ -30,7 +30,7 @@ double leakage(double d) {
 // Largest power that each line can owe to leakage from others.
 std::vector<double> leaked(const std::vector<double>& power) {
   std::vector<double> leak(power.size(), 0.0);
-  // Only lines that stand above all within reach of theirs can leak more than there is: local maxima suffice.
+  // Only lines that are above all within reach of theirs can leak more than there is: local maxima suffice.
   for (std::size_t j = 0; j < power.size(); ++j) {
     const double left = j > 0 ? power[j - 1] : 0.0, right = j + 1 < power.size() ? power[j + 1] : 0.0;
     if (!(power[j] > 0.0) || power[j] < left || power[j] < right) continue;
@@ -70,7 +70,7 @@ Spectra spectra_by_periods(const Channel& input, const Channel& output, const Pe
   for (std::size_t k = 0; k < lines; ++k) s.frequency_hz[k] = period.frequency_hz(k, sample_s);
   // |c|^2 / 2 is the power of a line; over the resolution it is a density.
   const double scale = 0.5 / s.resolution_hz;
-  // The last line is that at half the sample rate, where a difference and a hold say nothing of the phase.
+  // The last line is that at half the sample rate, where a difference and a hold have no defined phase.
   for (const std::size_t k : excited.lines) {
     if (k == 0 || k + 1 >= lines) continue;
     for (std::size_t p = 0; p < x.count(); ++p) {

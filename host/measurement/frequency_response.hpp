@@ -59,11 +59,12 @@ struct ResponseLine {
   bool trusted = false;  // band below a half, and coherence above: below, feedback may bias it
 };
 
-// Lines with at least two averages. `input` and `output` say what is to be corrected.
+// Lines with at least two averages. `input` and `output` state what is to be corrected.
 std::vector<ResponseLine> response_of(const Spectra& spectra, const Channel& input, const Channel& output,
                                       double sample_s);
 
-// At most so many lines, spread evenly over the logarithm of the frequency; of each part the surest one.
+// At most so many lines, spread evenly over the logarithm of the frequency; of each part the one with the least
+// uncertainty.
 std::vector<ResponseLine> thinned(std::span<const ResponseLine> lines, std::size_t most);
 
 }  // namespace flexspline::measurement

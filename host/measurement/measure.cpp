@@ -16,7 +16,7 @@ namespace {
 
 using data::Experiment;
 
-// Periods with fewer excited lines than this tell nothing between them that Welch's average over all records does not.
+// Periods with fewer excited lines than this show nothing between them that Welch's average over all records does not.
 constexpr std::size_t kMultisineLines = 8;
 // Half-overlapping windows: at least eight averages a record.
 constexpr double kWindowsARecord = 4.5;
@@ -27,9 +27,8 @@ constexpr double kShortShare = 0.25;
 
 constexpr const char* kWhatToRecord =
     "an odd random-phase multisine as set point of the current (or of the velocity): odd lines of its period alone, "
-    "about "
-    "every fourth of them left out at random, a whole number of samples in the period, six periods or more, and a mean "
-    "velocity that keeps the drive from sticking";
+    "about every fourth of them left out at random, a whole number of samples in the period, six periods or more, and "
+    "a mean velocity that keeps the drive from sticking";
 
 std::size_t longest_of(const Experiment& e) {
   std::size_t longest = 0;
@@ -96,7 +95,7 @@ double coherent_to_hz(const Experiment& e, const Channel& input, const Channel& 
   return highest;
 }
 
-// Pools are told apart by load, output, kind of average, lines of the period and sample rate.
+// Pools are distinguished by load, output, kind of average, lines of the period and sample rate.
 using PoolKey = std::tuple<int, std::string, std::string, bool, std::size_t, long>;
 struct Pool {
   Channel input, output;  // without values: units and corrections
@@ -221,7 +220,7 @@ class Measuring {
           find_resonances(pooled.response.lines, pooled.response.resolution_hz, !pooled.response.by_periods);
       answer_.pooled.push_back(std::move(pooled));
     }
-    // Velocity first, then the kind that tells most.
+    // Velocity first, then the kind with most information.
     const auto place = [](const PooledResponse& p) {
       const std::string& name = p.response.output;
       return name.find("velocity") != std::string::npos ? 0 : name == "torque_nm" ? 1 : 2;
@@ -247,21 +246,22 @@ class Measuring {
     if (!response)
       notes.push_back(
           "There is no frequency response without what answers the current: record motor_position_rad or torque_nm.");
-    const bool resonance_told = std::any_of(answer_.pooled.begin(), answer_.pooled.end(),
-                                            [](const PooledResponse& p) { return p.resonances.why_not.empty(); });
-    const auto told = [](const Distortion& d) { return d.odd.has_value() || d.even.has_value(); };
-    const bool distortion_told =
-        any([&](const RecordMeasurement& r) { return std::any_of(r.distortion.begin(), r.distortion.end(), told); });
-    if (effort && response && !(resonance_told && distortion_told))
-      notes.push_back(fmt::format("{} cannot be told from these motions: record {}.",
-                                  resonance_told    ? "Odd and even nonlinear distortion"
-                                  : distortion_told ? "Whether there is a resonance"
-                                                    : "Whether there is a resonance, and nonlinear distortion,",
+    const bool resonance_found = std::any_of(answer_.pooled.begin(), answer_.pooled.end(),
+                                             [](const PooledResponse& p) { return p.resonances.why_not.empty(); });
+    const auto is_determined = [](const Distortion& d) { return d.odd.has_value() || d.even.has_value(); };
+    const bool distortion_found = any([&](const RecordMeasurement& r) {
+      return std::any_of(r.distortion.begin(), r.distortion.end(), is_determined);
+    });
+    if (effort && response && !(resonance_found && distortion_found))
+      notes.push_back(fmt::format("{} cannot be distinguished from these motions: record {}.",
+                                  resonance_found    ? "Odd and even nonlinear distortion"
+                                  : distortion_found ? "Whether there is a resonance"
+                                                     : "Whether there is a resonance, and nonlinear distortion,",
                                   kWhatToRecord));
     if (!any([](const RecordMeasurement& r) { return !r.noise.empty(); }))
       notes.push_back(
-          "The noise floor cannot be told, as no record repeats itself: repeat one period of the excitation six times "
-          "or more, or record a minute at rest for the sensors alone.");
+          "The noise floor could not be found, as no record repeats itself: repeat one period of the excitation six "
+          "times or more, or record a minute at rest for the sensors alone.");
     std::size_t reversing = 0;
     for (std::size_t k = 0; k < experiments_.size(); ++k) {
       const auto& responses = answer_.records[k].responses;
@@ -272,9 +272,8 @@ class Measuring {
     if (reversing > 0)
       notes.push_back(fmt::format(
           "In {} of {} records the free motor reverses: dry friction, where there is any, is part of the response "
-          "then, "
-          "which is not that of inertia and spring alone and changes with the amplitude; add a mean velocity that "
-          "keeps one direction to see those.",
+          "then, which is not that of inertia and spring alone and changes with the amplitude; add a mean velocity "
+          "that keeps one direction to see those.",
           reversing, answer_.records.size()));
     std::vector<std::string> blind;
     for (std::size_t k = 0; k < experiments_.size(); ++k) {
@@ -286,8 +285,8 @@ class Measuring {
     if (!blind.empty())
       notes.push_back(
           fmt::format("{} of {} records ({}{}) neither repeat themselves nor have a set point: if a controller moved "
-                      "the drive, its "
-                      "answer to friction counts there as excitation and spoils the response; record the set point.",
+                      "the drive, its answer to friction counts there as excitation and spoils the response; record "
+                      "the set point.",
                       blind.size(), answer_.records.size(), blind.front(), blind.size() > 1 ? ", ..." : ""));
     for (const RecordMeasurement& r : answer_.records)
       if (r.masked_percent > 5.0)

@@ -1,4 +1,4 @@
-// What the data say of the drive before any model: the answer of the command `measure`.
+// What the data show of the drive without a model: the answer of the command `measure`.
 #pragma once
 
 #include <optional>
@@ -47,10 +47,10 @@ struct PooledResponse {
 struct Measurement {
   std::vector<RecordMeasurement> records;
   std::vector<PooledResponse> pooled;  // of records of one load, sample rate and kind of average; best first
-  std::vector<std::string> notes;      // what could not be told, and what to record; sentences
+  std::vector<std::string> notes;      // what could not be determined, and what to record; sentences
 };
 
-// `period_s` overrides the period that is looked for. Never throws for data that lack something: notes say so.
+// `period_s` overrides the period that is searched for. Never throws for data that lack something: notes report it.
 Measurement measure(const data::Dataset& dataset, std::optional<double> period_s = std::nullopt);
 
 }  // namespace flexspline::measurement

@@ -26,11 +26,11 @@ struct NoiseLevel {
   std::vector<NoiseBand> bands;
 };
 
-// Half the mean square of what differs between neighbouring periods, less a straight line: a drift over periods is no
+// Half the mean square of what differs between neighbouring periods, less a linear trend: a drift over periods is no
 // noise. What repeats, ripple and a missing effect included, cancels.
 NoiseLevel noise_by_periods(const Channel& channel, const Period& period, double sample_s);
 
-// What varies while nothing moves, less a straight line through each segment.
+// What varies while nothing moves, less a linear trend through each segment.
 NoiseLevel noise_at_rest(const Channel& channel, std::span<const data::Segment> segments, double sample_s);
 
 // No motion and no change of effort beyond what sampling noise makes.

@@ -24,7 +24,7 @@ constexpr std::array kMeasured = {Column::current, Column::motor_torque, Column:
 constexpr double kExact = 0.02, kNoisy = 0.15;
 constexpr double kSetPointShare = 1e-3;
 // Dry friction in closed loop puts a third harmonic of up to a third into the effort; lines above that are meant. Only
-// beside many of them weaker ones are taken for meant, too.
+// among many of them weaker ones count as excited, too.
 constexpr double kStrongShare = 0.35;
 constexpr std::size_t kManyLines = 8;
 constexpr double kEffortShare = 0.05;
@@ -66,7 +66,7 @@ std::optional<Found> search(const Experiment& e, const data::Segment& s) {
   };
   for (const Column column : kSetPoints)
     if (auto found = in(column, kExact)) return found;
-  // The signal with the least noise tells the period best.
+  // The signal with the least noise shows the period best.
   std::optional<Found> best;
   for (const Column column : kMeasured)
     if (auto found = in(column, kNoisy); found && (!best || found->mismatch < best->mismatch)) best = found;

@@ -32,13 +32,13 @@ struct PeriodSearch {
   std::string why_not;  // a sentence without a full stop; empty where there is one
 };
 
-// Looks at the longest segment: set points first, as they repeat exactly, then effort and motion, of which the one that
+// Uses the longest segment: set points first, as they repeat exactly, then effort and motion, of which the one that
 // repeats best is taken. The first period is left out
 // where at least three are there, and more while the motion still settles and three remain. With `period_s` nothing is
 // searched for.
 PeriodSearch find_period(const data::Experiment& experiment, std::optional<double> period_s = std::nullopt);
 
-// Takes out the straight line of least squares, and with it two degrees of freedom.
+// Removes the linear trend (least squares), and with it two degrees of freedom.
 void take_out_line(std::vector<double>& signal);
 
 // The periods of a signal, one after the other. A period between samples is cut by cubic interpolation.
@@ -73,7 +73,7 @@ class PeriodSpectra {
 
 // Lines that the excitation holds, ten times above the noise: those of a set point above a thousandth of its largest;
 // without a set point those of the effort above a third of its largest, as weaker ones may be a controller's answer to
-// friction, or above a twentieth where at least eight stand above the third. Sorted, without the mean.
+// friction, or above a twentieth where at least eight are above the third. Sorted, without the mean.
 struct ExcitedLines {
   std::vector<std::size_t> lines;
   std::string from;  // column

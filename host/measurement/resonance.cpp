@@ -184,7 +184,7 @@ std::optional<Root> fitted_root(std::span<const ResponseLine> lines, double cent
   return best == nullptr || best->misfit() > kLargestMisfit ? std::nullopt : best->root(of_zeros);
 }
 
-// By how much a maximum stands above the higher one of the lowest points that lead to higher ground, in dB.
+// By how much a maximum is above the higher one of the lowest points that lead to higher ground, in dB.
 double prominence(const std::vector<double>& x, std::size_t at) {
   double left = x[at], right = x[at];
   for (std::size_t k = at; k-- > 0 && x[k] <= x[at];) left = std::min(left, x[k]);
@@ -192,7 +192,7 @@ double prominence(const std::vector<double>& x, std::size_t at) {
   return x[at] - std::max(left, right);
 }
 
-// Nothing where no pole or zero that is broad enough to be told from a single line explains the extremum.
+// Nothing where no pole or zero that is broad enough to be distinguished from a single line explains the extremum.
 std::optional<Resonance> resonance_at(std::span<const ResponseLine> lines, std::size_t at, bool anti,
                                       double resolution_hz, bool windowed) {
   const double centre = lines[at].frequency_hz;
@@ -210,7 +210,7 @@ std::optional<Resonance> resonance_at(std::span<const ResponseLine> lines, std::
   r.damping_std = q->damping_std;
   const double width_hz = 2.0 * r.damping * r.frequency_hz;
   r.damping_is_upper_limit = windowed && width_hz < 2.0 * resolution_hz;
-  // A drive's poles are damped; its zeros may come to lie beyond the axis by a delay or by noise.
+  // A drive's poles are damped; its zeros may be beyond the axis by a delay or by noise.
   const bool damped = anti ? q->damping > -3.0 * q->damping_std - 0.02 : q->damping > 2.0 * q->damping_std;
   const bool broad = width_hz > (windowed ? 0.5 : anti ? -1.0 : 0.1) * resolution_hz;
   const bool sure = r.frequency_std_hz < kLargestStd * r.frequency_hz;

@@ -23,9 +23,9 @@ struct ResonanceSearch {
   std::vector<Resonance> found;   // by frequency
   std::size_t unexplained = 0;    // extrema that no pole or zero explains: noise, or no linear response
   std::size_t trusted_lines = 0;  // in all
-  double from_hz = 0.0;           // band of the trusted lines, nought where there are none
+  double from_hz = 0.0;           // band of the trusted lines, zero where there are none
   double to_hz = 0.0;
-  std::string why_not;  // a sentence without a full stop where the lines are too few to tell
+  std::string why_not;  // a sentence without a full stop where there are too few lines
 };
 
 // Maxima and minima of the amplitude over the trusted lines that stand out by 3 dB and twice their uncertainty. About

@@ -12,7 +12,7 @@ using text::Node;
 using text::NodeKind;
 using text::Span;
 
-// The root table. Throws ModelError with `file_name`, line and what the TOML reader says.
+// The root table. Throws ModelError with `file_name`, line and the TOML reader's message.
 Node parse_document(std::string_view text, std::string_view file_name);
 
 }  // namespace flexspline::model

@@ -9,7 +9,7 @@ namespace {
 
 constexpr std::string_view kBlank = " \t\r";
 
-// Ends of everything that stands in the text, headers too.
+// Ends of everything in the text, headers too.
 void collect_ends(const Node& node, std::vector<std::size_t>& ends) {
   if (node.kind != NodeKind::table || node.is_inline || node.has_header) ends.push_back(node.span.end);
   for (const Entry& entry : node.entries) collect_ends(entry.value, ends);
@@ -28,7 +28,7 @@ void collect_headers(const Node& node, const Node* effect, bool is_history, std:
   for (const Node& item : node.items) collect_headers(item, effect, is_history, headers);
 }
 
-// The last byte of an entry that stands in its table's own lines; 0 where it has headers of its own.
+// The last byte of an entry that is in its table's own lines; 0 where it has headers of its own.
 std::size_t own_end(const Node& node) {
   if (node.kind == NodeKind::array && !node.items.empty() && node.items.front().has_header) return 0;
   if (node.kind != NodeKind::table || node.is_inline) return node.span.end;
@@ -196,7 +196,7 @@ void Edits::remove_entry(const Node& table, std::string_view key) {
 
 void Edits::insert_entry(const Node& table, std::string_view key, std::string_view text,
                          std::span<const std::string_view> order) {
-  // The last entry that the key is to follow, among those that stand in the table's own lines.
+  // The last entry that the key is to follow, among those in the table's own lines.
   const auto rank = [&](std::string_view name) { return std::ranges::find(order, name) - order.begin(); };
   const Entry* before = nullptr;
   const Entry* first = nullptr;
@@ -218,7 +218,7 @@ void Edits::insert_entry(const Node& table, std::string_view key, std::string_vi
   // Behind the header where it is the first key, so that a comment above the next one stays above that.
   const Entry* neighbour = before || table.has_header ? before : first;
   if (neighbour) {
-    // What stands left of the neighbour's key: indentation, or the first parts of a dotted key.
+    // What is left of the neighbour's key: indentation, or the first parts of a dotted key.
     const std::size_t begin = document_.line_begin(neighbour->key_span.begin);
     const std::string_view prefix = document_.text({begin, neighbour->key_span.begin});
     insert_line(document_.line_end(own_end(neighbour->value)), std::string(prefix) + line);
@@ -256,8 +256,8 @@ void Edits::insert_blocks(std::size_t position, std::string blocks) {
   std::string before;
   if (position > 0 && text[position - 1] != '\n') before = newline;
   const std::size_t last_line = position == 0 ? 0 : document_.line_begin(position - 1);
-  const bool stands_free = position == 0 || text.find_first_not_of(kBlank, last_line) == text.find('\n', last_line);
-  if (!stands_free) before += newline;
+  const bool is_separate = position == 0 || text.find_first_not_of(kBlank, last_line) == text.find('\n', last_line);
+  if (!is_separate) before += newline;
   // An empty line ends the blocks; where one follows anyway, or nothing, it is one too many.
   const std::size_t next = text.find_first_not_of(kBlank, position);
   if (next == std::string::npos || text[next] == '\n') blocks.resize(blocks.size() - newline.size());

@@ -39,7 +39,7 @@ class EditedDocument {
   const Node* effect(std::string_view id) const;  // nullptr: not there
   std::size_t history_count() const;
 
-  // Where a table goes that is to stand behind those of its kind.
+  // Where a table is inserted that is to follow those of its kind.
   std::size_t end_of_root() const;
   std::size_t end_of_effects() const;
   std::size_t end_of_history() const;

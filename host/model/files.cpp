@@ -17,7 +17,7 @@ namespace {
 
 namespace fs = std::filesystem;
 
-// What the system says, and what to do about it.
+// The system's message, and what to do about it.
 std::string reason(int error) {
   const std::string said = std::strerror(error);
   switch (error) {
@@ -37,7 +37,7 @@ std::string reason(int error) {
   }
 }
 
-// The file beside, which is gone again unless it took the place of the real one.
+// A temporary file in the same folder. It is deleted unless it replaced the real one.
 class TemporaryFile {
  public:
   explicit TemporaryFile(const fs::path& target) : target_(target), path_(target.string() + ".XXXXXX") {

@@ -19,7 +19,8 @@ struct KnownParameter {
   bool given;  // order: must be stated by the user, is never estimated
 };
 
-// What a file states of an effect beside its parameters: nothing, a table, or a formula with parameters of its own.
+// What a file states of an effect in addition to its parameters: nothing, a table, or a formula with parameters of its
+// own.
 enum class Form : std::uint8_t { plain, table, formula };
 
 struct KnownEffect {
@@ -30,7 +31,7 @@ struct KnownEffect {
 
 struct Effect;
 
-// What is wrong with an effect that a user made. `key` is where: "variable", "table", "formula", or a parameter's name.
+// What is wrong with a user-defined effect. `key` is where: "variable", "table", "formula", or a parameter's name.
 struct Objection {
   std::string key, what, remedy;
 };
@@ -41,7 +42,7 @@ class KnownEffects {
   // nullptr where there is no effect of that name; else valid as long as this object.
   virtual const KnownEffect* find(std::string_view name) const = 0;
   virtual std::vector<std::string_view> names() const = 0;
-  // Of an effect that a user made; nothing where it can be used.
+  // Of a user-defined effect; nothing where it can be used.
   virtual std::optional<Objection> objection(const Effect&) const { return std::nullopt; }
 };
 

@@ -37,7 +37,7 @@ struct Parameter {
   std::optional<double> std;
   std::optional<double> spread_percent;
   bool fixed = false;
-  // Bounds of a parameter that the user made; those of the catalogue are in the catalogue.
+  // Bounds of a user-defined parameter; those of the catalogue are in the catalogue.
   std::optional<double> low{};
   std::optional<double> high{};
 };
@@ -63,9 +63,9 @@ struct Effect {
   std::string type;  // name in the catalogue
   std::string id;    // unique in the model; the type unless the file says otherwise
   // In the order of the catalogue, all that the catalogue has, with no value where the file has none.
-  // Of one that the user made, those that the file has.
+  // Of a user-defined effect, those of the file.
   std::vector<Parameter> parameters;
-  std::optional<Definition> definition{};  // of one that the user made
+  std::optional<Definition> definition{};  // of a user-defined effect
 
   const Parameter* find(std::string_view name) const;
   Parameter* find(std::string_view name);
@@ -94,7 +94,7 @@ class ModelError : public std::runtime_error {
   using std::runtime_error::runtime_error;
 };
 
-// A model and the text that it came from, so that a rewrite changes values where they stand and keeps all else.
+// A model and the text that it came from, so that a rewrite changes values in place and keeps all else.
 struct ModelFile {
   Model model;
   std::string text;
@@ -107,20 +107,20 @@ ModelFile read(const std::filesystem::path& path, const KnownEffects& known);
 // The same from a text; `file_name` is only for messages.
 ModelFile parse(std::string text, std::string_view file_name, const KnownEffects& known);
 
-// The text of `file` with the values of `changed`: values, std and spread are replaced where they stand, missing ones
+// The text of `file` with the values of `changed`: values, std and spread are replaced in place, missing ones
 // inserted, those that are no longer known taken out, new effects and history appended, removed effects cut out with
 // the comments directly above; comments, key order and the text of unchanged numbers stay. Effects are matched by id;
 // their order in `changed` does not matter. Values are written with 6 significant digits (stated ones, in [drive] or
 // fixed, exactly), std and spread with 3; an std or spread that is not finite counts as not known. A `file` without
-// text is written anew. Throws std::logic_error where the result would not read back as `changed`: a value that is not
+// text is written again. Throws std::logic_error where the result would not read back as `changed`: a value that is not
 // finite, a history that is not a continuation of the file's.
 std::string rewrite(const ModelFile& file, const Model& changed);
 
 // A new file for a model that came from none, with short comments. Throws std::logic_error as `rewrite` does.
 std::string write(const Model& model);
 
-// Whole or not at all: written beside and renamed. Throws ModelError with path and reason; a file that was there before
-// is unchanged then.
+// Atomic: written to a temporary file in the same folder, then renamed. Throws ModelError with path and reason; a file
+// that was there before is unchanged then.
 void save(const std::filesystem::path& path, const std::string& text);
 
 }  // namespace flexspline::model

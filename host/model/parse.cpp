@@ -71,7 +71,7 @@ class Reader {
 
   void format(const Node& root) const {
     const Node* node = root.find("format");
-    const std::string remedy = fmt::format("the file must say format = \"{}\" before its first table", kFormat);
+    const std::string remedy = fmt::format("the file must have format = \"{}\" before its first table", kFormat);
     if (!node) fail(1, "this is not a model file: it has no format", remedy);
     if (node->kind != NodeKind::text || node->text != kFormat)
       fail(node->line,
@@ -103,7 +103,7 @@ class Reader {
       const bool positive = bounds.low == std::numeric_limits<double>::min();
       fail(node.line, fmt::format("{} = {} is outside its bounds", key, exact_text(value)),
            positive ? "it must be greater than 0"
-                    : fmt::format("it must lie between {} and {}", bound_text(bounds.low), bound_text(bounds.high)));
+                    : fmt::format("it must be between {} and {}", bound_text(bounds.low), bound_text(bounds.high)));
     }
     return std::clamp(value, bounds.low, bounds.high);
   }
@@ -169,13 +169,13 @@ class Reader {
     for (const Entry& entry : node.entries) {
       const bool misplaced = std::ranges::any_of(known->parameters, [&](const auto& p) { return p.name == entry.key; });
       if (misplaced)
-        fail(entry.line, fmt::format("the parameter {} stands outside the parameters", entry.key),
+        fail(entry.line, fmt::format("the parameter {} is outside the parameters", entry.key),
              "write it below a line [effect.parameters]");
       require_known(entry, "[[effect]]", keys_of(known->form));
     }
     identify(node, result, type->line);
     if (known->form != Form::plain) {
-      made_by_user(node, *known, result);
+      read_user_definition(node, *known, result);
       return result;
     }
     const Node* parameters = node.find("parameters");
@@ -203,7 +203,7 @@ class Reader {
     return {"type", "id", "parameters"};
   }
 
-  void made_by_user(const Node& node, const KnownEffect& known, Effect& result) const {
+  void read_user_definition(const Node& node, const KnownEffect& known, Effect& result) const {
     Definition definition;
     if (const Node* balance = node.find("balance")) {
       definition.balance = text(*balance, "balance");
@@ -265,7 +265,7 @@ class Reader {
     return result;
   }
 
-  // A parameter of a formula: the user says what the catalogue says of others.
+  // A parameter of a formula: the user gives what the catalogue gives of others.
   Parameter own_parameter(const Entry& entry) const {
     const Node& node = entry.value;
     KnownParameter known{
@@ -327,7 +327,7 @@ class Reader {
     if (value) result.value = number_within(*value, known.name, {known.low, known.high});
     if (result.fixed && !result.value)
       fail(node->line, fmt::format("{} is fixed, but has no value", result.name),
-           "write value = NUMBER beside it, or leave out fixed to have it estimated");
+           "write value = NUMBER next to it, or leave out fixed to have it estimated");
     return result;
   }
 

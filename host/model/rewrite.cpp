@@ -1,4 +1,4 @@
-// Changes a model file where it stands. The text is brought to the wanted model in rounds: each reads the text, makes
+// Changes a model file in place. The text is brought to the wanted model in rounds: each reads the text, makes
 // the edits that do not touch one another, and the last one finds nothing left to do. So no edit must know what another
 // does to positions.
 #include <fmt/format.h>
@@ -16,7 +16,7 @@
 namespace flexspline::model {
 namespace {
 
-// A key that a table is to have: its text, or none where it is not to stand there; and whether what stands there may
+// A key that a table is to have: its text, or none where it is not to be there; and whether what is there may
 // stay.
 struct Field {
   std::string key;
@@ -51,7 +51,7 @@ std::vector<Field> fields_of(const Parameter& parameter) {
   };
   return {number_field("value", parameter.value, parameter.value ? value_text(parameter) : ""),
           deviation_field("std", parameter.std), deviation_field("spread_percent", parameter.spread_percent),
-          // Not fixed is what a file says by saying nothing.
+          // A parameter that is not marked in the file is not fixed.
           Field{"fixed", fixed ? std::optional<std::string>("true") : std::nullopt,
                 [fixed](const Node& node) { return node.boolean == fixed; }},
           bound("low", parameter.low), bound("high", parameter.high)};
@@ -69,7 +69,7 @@ struct List {
   int digits;
 };
 
-// The order in which keys stand in a table that we extend.
+// The order of the keys in a table that we extend.
 constexpr std::string_view kOrder[] = {
     "format",          "name", "type",  "id",   "variable", "formula", "balance",
     "times_direction", "at",   "value", "unit", "std",      "source",  "spread_percent",
@@ -118,7 +118,7 @@ class Round {
     if (!added.empty()) edits_.insert_blocks(document_.end_of_history(), std::move(added));
   }
 
-  // Brings the keys of a table that stands in the text to the fields; at most one insertion or removal a round.
+  // Brings the keys of a table of the text to the fields; at most one insertion or removal a round.
   bool sync(const Node& table, const std::vector<Field>& fields) {
     bool structural = false;
     for (const Field& field : fields) {
@@ -179,15 +179,15 @@ class Round {
     const Node* parameters = node.find("parameters");
     bool structural = effect.definition && definition(node, *effect.definition);
     for (const Parameter& parameter : effect.parameters) {
-      const Node* stands = parameters ? parameters->find(parameter.name) : nullptr;
+      const Node* is_present = parameters ? parameters->find(parameter.name) : nullptr;
       const std::vector<Field> fields = fields_of(parameter);
-      if (stands && stands->kind == NodeKind::table) {
-        sync(*stands, fields);
-      } else if (stands && is_stated(parameter)) {
-        replace_number(*stands, parameter, fields);
-      } else if (!structural && (stands || is_stated(parameter))) {
+      if (is_present && is_present->kind == NodeKind::table) {
+        sync(*is_present, fields);
+      } else if (is_present && is_stated(parameter)) {
+        replace_number(*is_present, parameter, fields);
+      } else if (!structural && (is_present || is_stated(parameter))) {
         structural = true;
-        if (stands)
+        if (is_present)
           edits_.remove_entry(*parameters, parameter.name);
         else
           edits_.insert_parameter(node, parameter.name, parameter_text(parameter), parameter_order(effect));
@@ -198,47 +198,47 @@ class Round {
   bool definition(const Node& node, const Definition& definition) {
     std::vector<Field> fields = {text_field("variable", definition.variable), text_field("formula", definition.formula),
                                  flag_field("times_direction", definition.times_direction)};
-    // The motor balance is what a file says by saying nothing.
+    // An effect without a balance in the file is on the motor balance.
     if (node.find("balance") || definition.balance != "motor")
       fields.push_back(text_field("balance", definition.balance));
     if (sync(node, fields)) return true;
     const Table& table = definition.table;
-    const Node* stands = node.find("table");
-    if (!stands && table.at.empty()) return false;
-    if (!stands) {
+    const Node* is_present = node.find("table");
+    if (!is_present && table.at.empty()) return false;
+    if (!is_present) {
       edits_.insert_blocks(document_.end_of_effect(node), table_block(table, document_.newline()));
       return true;
     }
     for (const List& list : {List{"at", &table.at, kPointDigits}, List{"value", &table.value, kValueDigits},
                              List{"std", &table.std, kDeviationDigits}})
-      if (this->list(*stands, list)) return true;
-    return sync(*stands, {flag_field("fixed", table.fixed)});
+      if (this->list(*is_present, list)) return true;
+    return sync(*is_present, {flag_field("fixed", table.fixed)});
   }
 
   // True where an entry had to be added or taken out.
   bool list(const Node& table, const List& list) {
-    const Node* stands = table.find(list.key);
-    if (!stands && list.values->empty()) return false;
-    if (!stands || list.values->empty()) {
-      if (stands)
+    const Node* is_present = table.find(list.key);
+    if (!is_present && list.values->empty()) return false;
+    if (!is_present || list.values->empty()) {
+      if (is_present)
         edits_.remove_entry(table, list.key);
       else
         edits_.insert_entry(table, list.key, list_text(*list.values, list.digits, document_.newline()), kOrder);
       return true;
     }
-    if (stands->items.size() != list.values->size()) {
-      edits_.replace(stands->span, list_text(*list.values, list.digits, document_.newline()));
+    if (is_present->items.size() != list.values->size()) {
+      edits_.replace(is_present->span, list_text(*list.values, list.digits, document_.newline()));
       return false;
     }
     for (std::size_t k = 0; k < list.values->size(); ++k) {
       const double value = (*list.values)[k];
       const std::string text = number_text(value, list.digits);
-      if (!reads(stands->items[k], value, text)) edits_.replace(stands->items[k].span, text);
+      if (!reads(is_present->items[k], value, text)) edits_.replace(is_present->items[k].span, text);
     }
     return false;
   }
 
-  // A number that is to say more becomes a table in braces, in which a number that does not change keeps its text.
+  // A number that gets more fields becomes a table in braces, in which a number that does not change keeps its text.
   void replace_number(const Node& node, const Parameter& parameter, const std::vector<Field>& fields) {
     const bool stays = parameter.value && fields.front().stays(node);
     const bool more = parameter.std || parameter.spread_percent || parameter.fixed || !parameter.value;

@@ -6,7 +6,7 @@
 
 namespace flexspline::model {
 
-// What a model says of its own effects, without bounds: enough to read back what was written from it.
+// The effects of a model, without bounds: enough to read back what was written from it.
 class EffectsOfModel : public KnownEffects {
  public:
   explicit EffectsOfModel(const Model& model);
@@ -21,7 +21,7 @@ class EffectsOfModel : public KnownEffects {
 
 // Without what cannot be written and need not be: standard deviations, spreads and errors that are not finite are not
 // known. An effect without an id has its type as id. Throws std::logic_error for a value that is not finite, for ids
-// that stand twice, and for an effect or parameter without a name.
+// that are there twice, and for an effect or parameter without a name.
 Model without_unknowns(Model model);
 
 // Throws std::logic_error naming the first difference where `text` does not read as `model`, to the digits that are

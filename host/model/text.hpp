@@ -22,7 +22,7 @@ std::string value_text(const Parameter& parameter);
 // Quoted and escaped.
 std::string toml_string(std::string_view text);
 
-// What stands right of the equals sign: a number, or a table in braces where there is more to say.
+// What is right of the equals sign: a number, or a table in braces where there are more fields.
 std::string parameter_text(const Parameter& parameter);
 std::string quantity_text(const Quantity& quantity);
 

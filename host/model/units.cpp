@@ -16,8 +16,8 @@ using Powers = std::map<std::string, int>;
 
 // What a run of letters is split into; prefixed units only where the whole run is one, so that "Nms" is N*m*s.
 constexpr std::array<std::string_view, 8> kSymbols = {"degC", "rad", "kg", "N", "m", "s", "A", "K"};
-constexpr std::array<std::string_view, 13> kWhole = {"mm", "um", "ms", "us",  "mN",  "kN",  "mA",
-                                                     "g",  "J",  "V",  "deg", "rpm", "degF"};
+constexpr std::array<std::string_view, 13> kWholeRecord = {"mm", "um", "ms", "us",  "mN",  "kN",  "mA",
+                                                           "g",  "J",  "V",  "deg", "rpm", "degF"};
 
 class UnitReader {
  public:
@@ -88,7 +88,7 @@ class UnitReader {
     if (letters.empty()) return false;
     const int power = exponent();
     if (power == 0) return false;
-    for (const std::string_view whole : kWhole)
+    for (const std::string_view whole : kWholeRecord)
       if (letters == whole) return add(whole, sign * power);
     std::string_view rest = letters;
     while (!rest.empty()) {

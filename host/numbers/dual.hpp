@@ -10,7 +10,7 @@ namespace flexspline::numbers {
 using Jet = ceres::Jet<double, 1>;
 
 struct Dual : ScalarSystem<Jet> {
-  // At nought the slope of |x|^d is unbounded for d < 1; a slope of nought there leaves a solver free to move on.
+  // At zero the slope of |x|^d is unbounded for d < 1; a slope of zero there leaves a solver free to move on.
   static Jet pow_abs(const Jet& x, const Jet& exponent) {
     const double size = std::abs(x.a);
     if (size < 1e-12) return Jet(exponent.a > 0.0 ? 0.0 : 1.0);

@@ -70,7 +70,7 @@ struct ScalarSystem {
   static S ratio(const S& gain, const S& x) { return gain * x; }
   static S signal(const S& gain, const S& x) { return gain * x; }
   static S travel(const S& gain, const S& x) { return gain * x; }
-  // Of a bound that nears nought the travel over it grows without end.
+  // Of a bound that nears zero the travel over it grows without end.
   static S over(const S& travel, const S& x) { return travel / (x < S(1e-12) ? S(1e-12) : x); }
   static S times_power(const S& travel, const S& x, const S& exponent) {
     using std::pow;
@@ -86,8 +86,8 @@ struct ScalarSystem {
   static S by_sign(const S& x, const S& a, const S& b) { return x < S(0.0) ? b : a; }
   // Moves to `target` and keeps `share` of the distance; no motion, no change.
   static S relax(const S& from, const S& target, const S& share) { return target + (from - target) * share; }
-  // Straight lines between `points` values: at a position counted in points from the first, held beyond both ends; and
-  // at a phase, a turn being the whole table.
+  // Linear interpolation between `points` values: at a position counted in points from the first, held beyond both
+  // ends; and at a phase, a turn being the whole table.
   template <std::size_t Size>
   static S table(const std::array<S, Size>& values, int points, const S& at) {
     if (!(at > S(0.0)) || points < 2) return values[0];
@@ -132,7 +132,7 @@ struct ScalarSystem {
     if (x < S(1e-4)) return S(1.0) - x * (S(0.5) - x * S(1.0 / 6.0));
     return (S(1.0) - exp(-x)) / x;
   }
-  // The solution at x of u' = -u^q, u(0) = 1. For q < 1 it reaches nought and stays there.
+  // The solution at x of u' = -u^q, u(0) = 1. For q < 1 it reaches zero and stays there.
   static S q_exp_negative(const S& x, const S& q) {
     using std::exp;
     using std::log;

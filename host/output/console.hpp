@@ -1,4 +1,4 @@
-// What a command says to a person: text on standard output, warnings and progress on standard error.
+// The output of a command for a person: text on standard output, warnings and progress on standard error.
 #pragma once
 
 #include <string>
@@ -9,7 +9,7 @@ namespace flexspline::output {
 // Colour and progress appear on a terminal only; NO_COLOR (see no-color.org) and TERM=dumb are respected.
 class Console {
  public:
-  // `quiet`: standard output belongs to a machine (`--json -`), so nothing is said there.
+  // `quiet`: standard output belongs to a machine (`--json -`), so nothing is printed there.
   Console(std::string command, bool quiet);
   Console(const Console&) = delete;
   Console& operator=(const Console&) = delete;
@@ -40,7 +40,7 @@ class Console {
   bool progress_open_ = false;
 };
 
-// Why what was said on standard output did not all arrive there (a full disk, a closed file); empty where it did. To be
+// Why not all output was written to standard output (a full disk, a closed file); empty where it did. To be
 // asked once, at the end: until then part of it is in memory.
 std::string unwritten();
 

@@ -95,7 +95,7 @@ std::string curve_text(const EffectCurve& curve, bool braille, std::size_t width
     y.hold(curve.y[k]);
   }
   if (!(x.high > x.low) || !(y.high >= y.low)) return {};
-  // Nought belongs into the picture of a torque: what is constant would have no size without it.
+  // Zero belongs into the picture of a torque: what is constant would have no size without it.
   y.hold(0.0);
   if (!(y.high > y.low)) y.hold(1.0);
   const std::size_t columns = width * (braille ? 2 : 1), rows = height * (braille ? 4 : 2);
@@ -109,11 +109,11 @@ std::string curve_text(const EffectCurve& curve, bool braille, std::size_t width
     dots.line(column(curve.x[from]), row(curve.y[from]), column(curve.x[k]), row(curve.y[k]));
   }
 
-  const std::size_t nought = static_cast<std::size_t>(std::lround(row(0.0))) / (braille ? 4 : 2);
+  const std::size_t zero = static_cast<std::size_t>(std::lround(row(0.0))) / (braille ? 4 : 2);
   std::vector<std::string> marks(height);
   marks.front() = number(y.high, 3);
   marks.back() = number(y.low, 3);
-  marks[std::min(nought, height - 1)] = "0";
+  marks[std::min(zero, height - 1)] = "0";
   std::size_t margin = 0;
   for (const std::string& mark : marks) margin = std::max(margin, mark.size());
   const char* wall = braille ? "\u2502" : "|";

@@ -23,8 +23,8 @@ using selection::Diagnosis;
 using selection::Verdict;
 
 constexpr std::size_t kRowsShown = 10;
-// Errors that differ by less are told as one.
-constexpr double kAsGoodAsAlike = 0.95;
+// Errors that differ by less are reported as equal.
+constexpr double kRunFrictionMatters = 0.95;
 
 std::string evidence(const Diagnosis& d) {
   std::string text;
@@ -37,16 +37,16 @@ std::string evidence(const Diagnosis& d) {
   else
     text += "; noise not known (state noise_std_COLUMN in dataset.toml, or record a periodic motion)";
   // What is named may pass for friction that differs; only where nothing is, the difference is the runs' own.
-  if (d.named.empty() && d.base_rmse_own_friction < kAsGoodAsAlike * d.base_rmse)
+  if (d.named.empty() && d.base_rmse_own_friction < kRunFrictionMatters * d.base_rmse)
     text += fmt::format("; with friction that is each run's own {}{}", with_unit(d.base_rmse_own_friction, d.unit),
                         d.noise_floor ? fmt::format(", {:.2f} times", d.base_rmse_own_friction / *d.noise_floor) : "");
   return text;
 }
 
-std::string shares(const std::vector<selection::Localised>& parts) {
+std::string shares(const std::vector<selection::LocalisedResidual>& parts) {
   std::vector<std::string> texts;
-  // Signals go together in any motion; the first few say it all.
-  for (const selection::Localised& part : std::span(parts).first(std::min<std::size_t>(3, parts.size())))
+  // Signals go together in any motion; the first few are enough.
+  for (const selection::LocalisedResidual& part : std::span(parts).first(std::min<std::size_t>(3, parts.size())))
     texts.push_back(fmt::format("{} {:.1f} %", part.variable, part.share_percent));
   return listed(texts);
 }
@@ -58,13 +58,13 @@ std::string candidate_table(const Diagnosis& d) {
   for (const Candidate& c : d.candidates) {
     if (++rank > kRowsShown) break;
     table.row({fmt::format("{}", rank), effect_label(c.effect, c.order), balance_name(c.balance), number(c.score),
-               fmt::format("{:.1f} %", c.chi2_fall_percent), number(c.rmse_cv_before), number(c.rmse_cv_after), d.unit,
-               detectable_in_words(c), c.admissible ? "" : "refused: " + c.why_not});
+               fmt::format("{:.1f} %", c.chi2_decrease_percent), number(c.rmse_cv_before), number(c.rmse_cv_after),
+               d.unit, detectable_in_words(c), c.admissible ? "" : "refused: " + c.why_not});
   }
   return table.text();
 }
 
-const Candidate* candidate_of(const Diagnosis& d, const selection::Named& named) {
+const Candidate* candidate_of(const Diagnosis& d, const selection::NamedEffect& named) {
   for (const Candidate& c : d.candidates)
     if (c.effect == named.effect && c.order == named.order) return &c;
   return nullptr;
@@ -90,22 +90,23 @@ void print_next(Console& console, const Diagnosis& d, const std::string& add_com
   switch (d.verdict) {
     case Verdict::missing_effect:
     case Verdict::confusable_effects:
-      for (const selection::Named& n : d.named)
+      for (const selection::NamedEffect& n : d.named)
         if (const Candidate* c = candidate_of(d, n); c == nullptr || c->admissible)
           steps.push_back(replaced(add_command, "EFFECT", effect_label(n.effect, n.order)));
       if (d.named.size() > 1)
         steps.push_back(fmt::format(
-            "flexspline plan --separate {},{} --help   shows how to record what tells them apart",
+            "flexspline plan --separate {},{} --help   shows how to record what distinguishes them",
             effect_label(d.named[0].effect, d.named[0].order), effect_label(d.named[1].effect, d.named[1].order)));
       break;
     case Verdict::unknown_structure:
       if (d.unknown)
         steps.push_back(fmt::format("{} --balance {}", replaced(add_command, "EFFECT", d.unknown->effect),
                                     d.unknown->definition.balance));
-      steps.push_back("flexspline compare shows in which region the error stands; look at the drive there");
+      steps.push_back("flexspline compare shows in which region the error is large; examine the drive there");
       break;
     case Verdict::insufficient_excitation:
-      steps.push_back("record slow and fast motion in both directions; flexspline identify names what cannot be told");
+      steps.push_back(
+          "record slow and fast motion in both directions; flexspline identify names what cannot be identified");
       break;
     case Verdict::at_noise_floor:
     case Verdict::nothing_significant:
@@ -122,17 +123,16 @@ void print_unknown(Console& console, const Diagnosis& d) {
   console.line();
   console.line(
       wrapped(fmt::format("It goes with {}{}: a curve over it takes {:.1f} % off the squared error on data left out of "
-                          "the fit (score {:.0f}). "
-                          "At the points that the data reach it is known to {}.",
+                          "the fit (score {:.0f}). At the points that the data reach it is known to {}.",
                           u.definition.variable, u.definition.times_direction ? ", times the direction of motion" : "",
-                          u.curve.fall_percent, u.curve.score, with_unit(typical_error(u.curve), d.unit))));
+                          u.curve.decrease_percent, u.curve.score, with_unit(typical_error(u.curve), d.unit))));
   if (u.named_share_percent && !d.candidates.empty())
     console.line(wrapped(
         fmt::format("The nearest effect of the catalogue, {}, explains {:.0f} % of what the curve does.",
                     effect_label(d.candidates.front().effect, d.candidates.front().order), *u.named_share_percent)));
   std::vector<std::string> others;
   for (std::size_t k = 1; k < std::min<std::size_t>(4, u.depends_on.size()); ++k)
-    others.push_back(fmt::format("{} {:.1f} %", u.depends_on[k].variable, u.depends_on[k].fall_percent));
+    others.push_back(fmt::format("{} {:.1f} %", u.depends_on[k].variable, u.depends_on[k].decrease_percent));
   if (!others.empty())
     console.line(wrapped(fmt::format("Curves over other signals, which may go along with it: {}.", listed(others))));
   console.line(curve_text(curve_of_table(u.definition, u.curve.table, d.unit), takes_braille()));
@@ -146,15 +146,15 @@ json unknown_json(const Diagnosis& d) {
   answer["effect"] = u.effect;
   answer["depends_on"] = json::array();
   for (const auto& over : u.depends_on)
-    answer["depends_on"].push_back({{"variable", over.variable}, {"fall_percent", json_number(over.fall_percent)}});
+    answer["depends_on"].push_back({{"variable", over.variable}, {"fall_percent", json_number(over.decrease_percent)}});
   answer["named_share_percent"] = json_number(u.named_share_percent);
   answer["record_next"] = u.record_next;
   return answer;
 }
 
-json localised_json(const std::vector<selection::Localised>& parts) {
+json localised_json(const std::vector<selection::LocalisedResidual>& parts) {
   json list = json::array();
-  for (const selection::Localised& part : parts)
+  for (const selection::LocalisedResidual& part : parts)
     list.push_back({{"variable", part.variable}, {"share_percent", json_number(part.share_percent)}});
   return list;
 }
@@ -177,9 +177,9 @@ json trends_json(const std::vector<selection::Trend>& trends) {
   return list;
 }
 
-json named_json(const std::vector<selection::Named>& named) {
+json named_json(const std::vector<selection::NamedEffect>& named) {
   json list = json::array();
-  for (const selection::Named& n : named) list.push_back({{"effect", n.effect}, {"order", json_number(n.order)}});
+  for (const selection::NamedEffect& n : named) list.push_back({{"effect", n.effect}, {"order", json_number(n.order)}});
   return list;
 }
 
@@ -196,7 +196,7 @@ json candidate_json(const Candidate& c, std::size_t rank, const std::string& uni
           {"rank", rank},
           {"score", json_number(c.score)},
           {"score_elsewhere", json_number(c.other_balance_score)},
-          {"chi2_fall_percent", json_number(c.chi2_fall_percent)},
+          {"chi2_fall_percent", json_number(c.chi2_decrease_percent)},
           {"rmse_cv_before", json_number(c.rmse_cv_before)},
           {"rmse_cv_after", json_number(c.rmse_cv_after)},
           {"unit", unit},
@@ -206,8 +206,8 @@ json candidate_json(const Candidate& c, std::size_t rank, const std::string& uni
           {"admissible", c.admissible},
           {"why_not", c.admissible ? json(nullptr) : json(c.why_not)},
           {"note", c.note.empty() ? json(nullptr) : json(c.note)},
-          {"rivals", c.rivals},
-          {"rival_reasons", rival_reasons_json(c)},
+          {"rivals", c.cannot_distinguish},
+          {"rival_reasons", confounding_reasons_json(c)},
           {"evidence", evidence_json(c, unit)},
           {"separating_experiment", text(&effects::Description::separated_by)},
           {"explanation", text(&effects::Description::explanation)},
@@ -228,15 +228,15 @@ std::string effect_in_words(const std::string& effect, const std::optional<doubl
 
 std::string verdict_in_words(const Diagnosis& d) {
   std::vector<std::string> names;
-  for (const selection::Named& n : d.named) names.push_back(effect_in_words(n.effect, n.order));
+  for (const selection::NamedEffect& n : d.named) names.push_back(effect_in_words(n.effect, n.order));
   switch (d.verdict) {
     case Verdict::missing_effect:
       return fmt::format("The model lacks {}.", listed(names));
     case Verdict::confusable_effects:
-      return fmt::format("The model lacks one of {}; these data cannot tell which.", listed(names, "or"));
+      return fmt::format("The model lacks one of {}; these data cannot show which.", listed(names, "or"));
     case Verdict::at_noise_floor:
-      if (d.base_rmse_own_friction < kAsGoodAsAlike * d.base_rmse)
-        return "Nothing is missing: friction differs from run to run, and beside that the model's error is the noise "
+      if (d.base_rmse_own_friction < kRunFrictionMatters * d.base_rmse)
+        return "Nothing is missing: friction differs from run to run, and otherwise the model's error is the noise "
                "of the measurement.";
       return "Nothing is missing: the model's error is the noise of the measurement.";
     case Verdict::nothing_significant:
@@ -245,16 +245,16 @@ std::string verdict_in_words(const Diagnosis& d) {
     case Verdict::unknown_structure:
       return "Something is missing that no effect of the catalogue explains.";
     case Verdict::insufficient_excitation:
-      return "These data do not excite the drive enough to tell.";
+      return "These data do not excite the drive enough to show it.";
   }
   return {};
 }
 
-// What the experiments that are held out say. They decide whether an effect is named, so that their error is no proof
-// of the gain.
+// The result on the experiments that are held out. They decide whether an effect is named, so that their error is no
+// proof of the gain.
 void print_held_out(Console& console, const selection::Resampling& r) {
   std::vector<std::string> better, worse;
-  for (const selection::Resampling::Found& f : r.found) {
+  for (const selection::Resampling::FoundTerm& f : r.found) {
     if (!f.held_out_ratio || f.group.empty()) continue;
     const std::string name = effect_in_words(f.group.front().effect, f.group.front().order);
     (f.refused_by_holdout ? worse : better).push_back(fmt::format("{} {:.3f}", name, *f.held_out_ratio));
@@ -267,15 +267,15 @@ void print_held_out(Console& console, const selection::Resampling& r) {
                         : fmt::format(". It rises with {}, so {} not named.", listed(worse),
                                       worse.size() > 1 ? "these are" : "that is");
   console.line(wrapped(text +
-                       " As it was used to decide, it does not prove the gain: judge that with `compare` on data of a "
+                       " As it was used to decide, it does not prove the gain: test that with `compare` on data of a "
                        "later measurement."));
 }
 
 void print_resampling(Console& console, const selection::Resampling& r) {
   std::vector<std::string> found;
-  for (const selection::Resampling::Found& f : r.found) {
+  for (const selection::Resampling::FoundTerm& f : r.found) {
     std::vector<std::string> names;
-    for (const selection::Named& n : f.group) names.push_back(effect_in_words(n.effect, n.order));
+    for (const selection::NamedEffect& n : f.group) names.push_back(effect_in_words(n.effect, n.order));
     found.push_back(
         fmt::format("{} in {:.0f} of 100 ({:.0f} % of the squared error above the noise, {:.0f} to {:.0f} %)",
                     names.empty() ? f.name + ", which is in no catalogue," : listed(names, "or"), 100.0 * f.frequency,
@@ -299,7 +299,7 @@ void print_diagnosis(Console& console, const Diagnosis& d, const std::string& ad
         wrapped(fmt::format("The effort {} the motion by {:.3g} ms beyond the alignment: check the time stamps, or "
                             "current_hold.",
                             *d.delay_s > 0.0 ? "lags" : "leads", 1e3 * std::abs(*d.delay_s))));
-  for (const selection::Named& named : d.named)
+  for (const selection::NamedEffect& named : d.named)
     if (const Candidate* c = candidate_of(d, named)) print_explanation(console, *c, d.unit);
   if (d.unknown) print_unknown(console, d);
   if (!d.candidates.empty()) {
@@ -326,7 +326,7 @@ void print_diagnosis(Console& console, const Diagnosis& d, const std::string& ad
 json resampling_json(const Diagnosis& d) {
   if (!d.resampling) return nullptr;
   json found = json::array();
-  for (const selection::Resampling::Found& f : d.resampling->found)
+  for (const selection::Resampling::FoundTerm& f : d.resampling->found)
     found.push_back({{"effects", named_json(f.group)},
                      {"structure", f.group.empty() ? json(f.name) : json(nullptr)},
                      {"frequency", json_number(f.frequency)},
@@ -383,13 +383,13 @@ json diagnosis_json(const Diagnosis& d) {
 
 json rounds_json(const std::vector<Diagnosis>& rounds, const std::vector<std::string>& removed) {
   json result = diagnosis_json(rounds.front());
-  std::vector<selection::Named> all;
+  std::vector<selection::NamedEffect> all;
   for (const Diagnosis& d : rounds) {
     // The last round ends the search; it names nothing that was added.
     if (&d != &rounds.back() || rounds.size() == 1) all.insert(all.end(), d.named.begin(), d.named.end());
     result["rounds"].push_back(diagnosis_json(d));
   }
-  std::erase_if(all, [&](const selection::Named& n) {
+  std::erase_if(all, [&](const selection::NamedEffect& n) {
     return std::find(removed.begin(), removed.end(), effect_label(n.effect, n.order)) != removed.end();
   });
   if (!all.empty()) result["named"] = named_json(all);

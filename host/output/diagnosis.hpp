@@ -19,8 +19,9 @@ std::string effect_in_words(const std::string& effect, const std::optional<doubl
 // "The model lacks stribeck_gaussian."
 std::string verdict_in_words(const selection::Diagnosis& found);
 
-// Verdict, evidence, candidates, rivals with the experiment that separates them, where the error lies, what to do next.
-// `add_command`: what to type to add the named effect, with EFFECT where its name goes.
+// Verdict, evidence, candidates, effects that cannot be distinguished, with the experiment that separates them, where
+// the error is, what to do next. `add_command`: what to type to add the named effect, with EFFECT where its name
+// goes.
 void print_diagnosis(Console& console, const selection::Diagnosis& found, const std::string& add_command);
 
 // "flexspline-diagnose/1". With more than one round, `named` holds all that were added and not removed again.

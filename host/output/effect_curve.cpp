@@ -58,8 +58,8 @@ struct Sweep {
   std::string x_label;
   std::vector<double> x;
   std::vector<Inputs> inputs;
-  std::size_t drawn_from = 0;  // what lies before is only there to settle memory
-  bool one_way = false;        // points lie in the order of x; a change of direction is a gap
+  std::size_t drawn_from = 0;  // the samples before only bring the memory to its steady cycle
+  bool one_way = false;        // points are in the order of x; a change of direction is a gap
 };
 
 // Motor and output at ease: warm, loaded, turning slowly forward.
@@ -89,7 +89,7 @@ void set_torque(Inputs& in, double torque) {
   in.torque_magnitude = std::abs(torque);
 }
 
-// An even number of values, so that none between -top and top is nought: there a direction would be missing.
+// An even number of values, so that none between -top and top is zero: there a direction would be missing.
 Sweep sweep_of(unsigned reads, std::string x_label, double low, double high,
                const std::function<void(Inputs&, double)>& set) {
   Sweep sweep{reads, std::move(x_label), {}, {}, 0, true};
@@ -103,7 +103,7 @@ Sweep sweep_of(unsigned reads, std::string x_label, double low, double high,
   return sweep;
 }
 
-// A signal that goes to and fro as a sine in one second, a few times.
+// A sine of one second, a few times.
 Sweep loop_of(unsigned reads, std::string x_label, double top,
               const std::function<void(Inputs&, double x, double slope)>& set) {
   Sweep sweep{reads, std::move(x_label), {}, {}, (kCycles - 1) * kPoints, false};
@@ -124,7 +124,7 @@ double range_of(const Entry& entry, std::string_view unit, std::string_view inve
   double range = 0.0;
   for (const auto& p : entry.parameters) {
     if (p.kind == catalogue::Kind::linear || p.usual == 0.0) continue;
-    // A grid ends where its largest value lies.
+    // A grid ends at its largest value.
     const double factor = p.kind == catalogue::Kind::grid ? 1.2 : 5.0;
     if (p.unit.rotary == unit) range = std::max(range, factor * std::abs(p.usual));
     if (!inverse.empty() && p.unit.rotary == inverse) range = std::max(range, factor / std::abs(p.usual));
@@ -174,7 +174,8 @@ std::vector<Sweep> sweeps_for(const Entry& entry) {
         in.angle = angle;
         set_velocity(in, rate);
       }));
-  // Only memory tells to and fro apart; without it a line over the velocity says more than one over the angle.
+  // Only an effect with memory differs between the two directions over the angle; without memory a curve over the
+  // velocity shows more.
   if (!entry.has_state) sweeps.pop_back();
   sweeps.push_back(sweep_of(effects::kMotorMotion, "motor velocity (rad/s)", -velocity, velocity, set_velocity));
   sweeps.push_back(sweep_of(effects::kMotorMotion, "motor acceleration (rad/s^2)", -1000.0, 1000.0,
@@ -199,9 +200,9 @@ double torque_on(const effects::Torques<Real>& torques, Balance balance) {
 }
 
 // The effect, and what it acts on where it adds no torque of its own.
-class Bench {
+class SweepModel {
  public:
-  explicit Bench(const Entry& entry) : entry_(entry), balance_(entry.info->balance) {
+  explicit SweepModel(const Entry& entry) : entry_(entry), balance_(entry.info->balance) {
     const Entry* other = nullptr;
     if (entry.info->phase == Phase::shift) {
       other = catalogue::find("linear_stiffness");
@@ -219,7 +220,7 @@ class Bench {
   }
 
   Balance balance() const { return balance_; }
-  // Over the torsion a shift is drawn with the stiffness behind it; elsewhere that would hide it.
+  // Over the torsion a shift is drawn with the stiffness behind it; over other signals that would hide it.
   bool only_change(const Sweep& sweep) const {
     return entry_.info->phase == Phase::shift && sweep.reads != effects::kTorsion;
   }
@@ -288,22 +289,23 @@ EffectCurve drawn(const Sweep& sweep, const std::vector<double>& y, Balance bala
 }  // namespace
 
 EffectCurve effect_curve(const Entry& entry) {
-  Bench bench(entry);
+  SweepModel sweep_model(entry);
   const std::vector<Sweep> sweeps = sweeps_for(entry);
-  std::vector<Balance> balances{bench.balance()};
+  std::vector<Balance> balances{sweep_model.balance()};
   for (const Balance b : {Balance::motor, Balance::transmission, Balance::load})
-    if (b != bench.balance() && entry.adds_to(b)) balances.push_back(b);
+    if (b != sweep_model.balance() && entry.adds_to(b)) balances.push_back(b);
   for (const Balance balance : balances)
     for (const bool all : {false, true})
       for (const Sweep& sweep : sweeps) {
         if (!all && (entry.info->reads & sweep.reads) == 0) continue;
-        const std::vector<double> y = bench.torques(sweep, balance);
-        if (varies(y)) return drawn(sweep, y, balance, bench.caption(sweep));
+        const std::vector<double> y = sweep_model.torques(sweep, balance);
+        if (varies(y)) return drawn(sweep, y, balance, sweep_model.caption(sweep));
       }
   // The same everywhere.
   const auto over = std::find_if(sweeps.begin(), sweeps.end(),
                                  [](const Sweep& s) { return s.one_way && s.reads == effects::kMotorMotion; });
-  return drawn(*over, bench.torques(*over, bench.balance()), bench.balance(), bench.caption(*over));
+  return drawn(*over, sweep_model.torques(*over, sweep_model.balance()), sweep_model.balance(),
+               sweep_model.caption(*over));
 }
 
 nlohmann::json curve_json(const EffectCurve& curve) {

@@ -1,4 +1,4 @@
-// What an effect looks like: its torque over the variable in which it shows, from the catalogue itself.
+// The curve of an effect: its torque over the variable in which it shows, from the catalogue itself.
 #pragma once
 
 #include <nlohmann/json_fwd.hpp>
@@ -9,7 +9,7 @@
 
 namespace flexspline::output {
 
-// One line through (x[k], y[k]) in the order of the motion; a loop ends where it began. NaN in y is a gap: what lies on
+// One line through (x[k], y[k]) in the order of the motion; a loop ends where it began. NaN in y is a gap: what is on
 // the two sides of it are two directions.
 struct EffectCurve {
   std::vector<double> x, y;
@@ -23,7 +23,7 @@ struct EffectCurve {
 // by what it does to the effect that it modulates.
 EffectCurve effect_curve(const catalogue::Entry& entry);
 
-// The curve in characters, `width` by `height` of them beside the axes: Braille patterns, or ASCII.
+// The curve in characters, `width` by `height` of them without the axes: Braille patterns, or ASCII.
 std::string curve_text(const EffectCurve& curve, bool braille, std::size_t width = 60, std::size_t height = 14);
 
 // Whether the locale is UTF-8 and the terminal not a dumb one.

@@ -50,13 +50,13 @@ void print_map(Console& console, const Evidence& map, const std::string& unit) {
   console.line(table.text(4));
 }
 
-void print_rivals(Console& console, const Candidate& c, std::string_view separated_by) {
-  for (const selection::ConfoundingReason& reason : c.rival_reasons)
+void print_confounding(Console& console, const Candidate& c, std::string_view separated_by) {
+  for (const selection::ConfoundingReason& reason : c.confounding_reasons)
     console.line(wrapped(fmt::format(
-        "Not to be told from {} here: only {:.2g} % of what it does in these data is its own{}.", reason.effect,
-        reason.own_percent,
+        "Not to be distinguished from {} here: only {:.2g} % of what it does in these data is its own{}.",
+        reason.effect, reason.own_percent,
         reason.variable.empty() ? "" : fmt::format("; both go with {}", variable_in_words(reason.variable)))));
-  if (!c.rivals.empty() && !separated_by.empty())
+  if (!c.cannot_distinguish.empty() && !separated_by.empty())
     console.line(
         wrapped(fmt::format("To separate them, record {}; flexspline plan --separate designs it.", separated_by)));
 }
@@ -69,20 +69,20 @@ void print_explanation(Console& console, const Candidate& c, const std::string& 
   const effects::Description& info = *entry->info;
   console.line();
   console.line(console.bold(effect_in_words(c.effect, c.order)));
-  const auto say = [&](std::string_view what, std::string_view text) {
+  const auto print = [&](std::string_view what, std::string_view text) {
     if (!text.empty()) console.line(wrapped(fmt::format("{}{}", what, text)));
   };
-  say("", info.explanation);
+  print("", info.explanation);
   for (const estimation::Estimate& e : c.parameters)
     console.line(
         fmt::format("  {} = {}{}", e.parameter, with_unit(e.value, e.unit),
                     e.low && e.high ? fmt::format("   (95 %: {} to {})", number(*e.low), number(*e.high)) : ""));
-  say("", c.note);
+  print("", c.note);
   if (c.evidence && !c.evidence->bins.empty()) print_map(console, *c.evidence, unit);
-  say("What it does: ", info.consequence);
-  say("Usual causes: ", info.causes);
-  say("Check on the machine: ", info.check);
-  print_rivals(console, c, info.separated_by);
+  print("What it does: ", info.consequence);
+  print("Usual causes: ", info.causes);
+  print("Check on the machine: ", info.check);
+  print_confounding(console, c, info.separated_by);
 }
 
 std::string detectable_in_words(const Candidate& c) {
@@ -101,9 +101,9 @@ json detectable_json(const Candidate& c) {
   return answer;
 }
 
-json rival_reasons_json(const Candidate& c) {
+json confounding_reasons_json(const Candidate& c) {
   json list = json::array();
-  for (const selection::ConfoundingReason& r : c.rival_reasons)
+  for (const selection::ConfoundingReason& r : c.confounding_reasons)
     list.push_back({{"effect", r.effect},
                     {"own_percent", json_number(r.own_percent)},
                     {"variable", r.variable.empty() ? json(nullptr) : json(r.variable)}});

@@ -1,4 +1,4 @@
-// What a named effect is, where it shows, what it does, and what to do about it: for somebody at the machine.
+// What a named effect is, where it shows, what it does, and what to do about it: for a person at the machine.
 #pragma once
 
 #include <nlohmann/json_fwd.hpp>
@@ -17,7 +17,7 @@ std::string detectable_in_words(const selection::Candidate& candidate);
 
 // P with "at_most" and "at", a list of P; null where there is none.
 nlohmann::json detectable_json(const selection::Candidate& candidate);
-nlohmann::json rival_reasons_json(const selection::Candidate& candidate);
+nlohmann::json confounding_reasons_json(const selection::Candidate& candidate);
 nlohmann::json evidence_json(const selection::Candidate& candidate, const std::string& unit);
 
 }  // namespace flexspline::output

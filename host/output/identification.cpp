@@ -44,7 +44,7 @@ std::string by_experiment(const estimation::Identification& found) {
   const std::vector<std::string> names = experiment_names(found);
   if (names.empty()) return {};
   std::string text;
-  // Side by side as far as a terminal is wide; average and spread stand beside the last ones.
+  // Side by side as far as a terminal is wide; average and spread are next to the last ones.
   for (std::size_t first = 0; first < names.size(); first += kExperimentsAbreast) {
     const std::size_t last = std::min(names.size(), first + kExperimentsAbreast);
     const bool ends = last == names.size();
@@ -78,9 +78,9 @@ std::string pooled(const estimation::Identification& found) {
   for (const Estimate& e : found.estimates)
     table.row({label(e), number(e.value, kDigits), number(e.low, kDigits), number(e.high, kDigits), e.unit,
                e.excitation ? fmt::format("{:.3g} %", 100.0 * *e.excitation) : "",
-               e.identifiable ? (e.fixed ? "known" : "") : "these data cannot tell it"});
+               e.identifiable ? (e.fixed ? "known" : "") : "these data do not identify it"});
   return table.text() +
-         "\n  excited: the share of a parameter's effect on these data that no other parameter can stand in for";
+         "\n  excited: the share of a parameter's effect on these data that no other parameter can explain";
 }
 
 std::string errors(const estimation::Identification& found) {
@@ -112,7 +112,7 @@ std::string balance_name(estimation::Balance balance) {
 namespace {
 
 // Which velocity was taken where a record has both a position and a velocity.
-std::string velocity_text(const estimation::Prepared& prepared) {
+std::string velocity_text(const estimation::PreparedData& prepared) {
   std::size_t both = 0, fused = 0;
   double highest_hz = 0.0;
   for (const estimation::Record& record : prepared.records) {
@@ -133,7 +133,7 @@ std::string velocity_text(const estimation::Prepared& prepared) {
 
 }  // namespace
 
-std::string pipeline_text(const estimation::Prepared& prepared) {
+std::string pipeline_text(const estimation::PreparedData& prepared) {
   const estimation::Pipeline& p = prepared.pipeline;
   std::size_t used = 0, masked = 0, held = 0, held_by_assumption = 0;
   std::vector<std::string> decimations;
@@ -151,16 +151,17 @@ std::string pipeline_text(const estimation::Prepared& prepared) {
       if (!record.experiment->current_hold_stated) ++held_by_assumption;
     }
   }
-  std::string text = fmt::format("filters: {:.4g} Hz for all rows, {:.4g} Hz for positions; {}", p.row_cutoff_hz,
+  std::string text = fmt::format("filters: {:.4g} Hz for the regression, {:.4g} Hz for positions; {}", p.row_cutoff_hz,
                                  p.motion_cutoff_hz, p.reason);
   text += decimations == std::vector<std::string>{"1"}
-              ? "; every sample is a row"
-              : fmt::format("; one sample in {} is a row", listed(decimations, "or"));
+              ? "; every sample is used"
+              : fmt::format("; one sample in {} is used", listed(decimations, "or"));
   text += velocity_text(prepared);
   const double share =
       used + masked > 0 ? 100.0 * static_cast<double>(masked) / static_cast<double>(used + masked) : 0.0;
-  text += p.mask ? fmt::format("; {:.1f} % of the motor balance's rows masked (reversals, sticking, clipping)", share)
-                 : std::string("; no mask for reversals and sticking");
+  text += p.mask
+              ? fmt::format("; {:.1f} % of the motor balance's samples masked (reversals, sticking, clipping)", share)
+              : std::string("; no mask for reversals and sticking");
   if (held > 0)
     text += fmt::format(
         "; effort moved by half a sample in {} of {} experiments, as a drive holds it{}", held, prepared.records.size(),

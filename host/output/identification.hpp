@@ -9,7 +9,7 @@
 namespace flexspline::output {
 
 // How the data were prepared: cut-offs and where they come from, decimation, mask, alignment of the effort.
-std::string pipeline_text(const estimation::Prepared& prepared);
+std::string pipeline_text(const estimation::PreparedData& prepared);
 
 // Table by experiment (as the report's tables 3 to 8), pooled values with 95 % intervals, derived values, errors of
 // the balances.

@@ -38,7 +38,7 @@ void save_json(const std::string& where, const json& content) {
   if (where.empty()) return;
   // Names come from the user's files and may be in any encoding.
   json answer = content;
-  // Which build said it; beside what the contract lists.
+  // The build that wrote it; an addition to the contract.
   if (answer.is_object() && !answer.contains("tool")) answer["tool"] = text::tool_name();
   const std::string text = answer.dump(2, ' ', false, nlohmann::json::error_handler_t::replace) + "\n";
   if (where == "-") {

@@ -14,7 +14,7 @@ nlohmann::json json_number(double value);
 nlohmann::json json_number(const std::optional<double>& value);
 nlohmann::json json_numbers(const std::vector<double>& values);
 
-// {"id","effect","parameter","value","unit","std","interval":[lo,hi]}: a parameter wherever one stands.
+// {"id","effect","parameter","value","unit","std","interval":[lo,hi]}: the form of a parameter in all answers.
 nlohmann::json json_parameter(const estimation::Estimate& estimate);
 
 // Whole or not at all; `where` is a file, or "-" for standard output. Nothing is done where it is empty.

@@ -6,7 +6,7 @@
 #include <cmath>
 #include <nlohmann/json.hpp>
 
-#include "host/catalogue/defined.hpp"
+#include "host/catalogue/user_defined_effect.hpp"
 #include "host/output/json.hpp"
 #include "host/output/text.hpp"
 
@@ -48,14 +48,15 @@ std::string learned_table_text(const std::string& id, const std::string& variabl
       "numbers.",
       id, table.at.size(), variable, number(table.at.front()), with_unit(table.at.back(), unit), number(*low),
       with_unit(*high, torque_unit), with_unit(error, torque_unit), learned.effective));
-  text += "\n" + wrapped(fmt::format("On rows left out of its fit the squared error falls by {:.1f} % (score {:.0f}).",
-                                     learned.fall_percent, learned.score));
+  text +=
+      "\n" + wrapped(fmt::format("On rows left out of its fit the squared error decreases by {:.1f} % (score {:.0f}).",
+                                 learned.decrease_percent, learned.score));
   if (!learned.left_to.empty())
     text += "\n" + wrapped(fmt::format("What {} can draw as well was left to {}: the table holds what they cannot.",
                                        listed(learned.left_to), learned.left_to.size() > 1 ? "them" : "it"));
   if (unseen > 0)
-    text += "\n" +
-            wrapped(fmt::format("{} of the points lie where these data have no rows: trust them for nothing.", unseen));
+    text +=
+        "\n" + wrapped(fmt::format("{} of the points are where these data have no samples: do not use them.", unseen));
   model::Definition definition;
   definition.variable = variable;
   EffectCurve curve = curve_of_table(definition, table, torque_unit);
@@ -85,7 +86,7 @@ json learned_table_json(const std::string& id, const model::Definition& definiti
           {"balance", definition.balance},
           {"unit", torque_unit},
           {"points", std::move(points)},
-          {"chi2_fall_percent", json_number(learned.fall_percent)},
+          {"chi2_fall_percent", json_number(learned.decrease_percent)},
           {"rmse_cv_before", json_number(learned.rmse_cv_before)},
           {"rmse_cv_after", json_number(learned.rmse_cv_after)},
           {"score", json_number(learned.score)},

@@ -16,7 +16,7 @@ std::string learned_table_text(const std::string& id, const std::string& variabl
                                const estimation::LearnedTable& learned, const std::string& torque_unit);
 
 // {"id","effect","variable","variable_unit","times_direction","balance","unit","points":[{"at","value","std","interval",
-// "visited"}],"chi2_fall_percent","rmse_cv_before","rmse_cv_after","score","left_to":[]}
+// "visited"}],"chi2_decrease_percent","rmse_cv_before","rmse_cv_after","score","left_to":[]}
 nlohmann::json learned_table_json(const std::string& id, const model::Definition& definition,
                                   const estimation::LearnedTable& learned, const std::string& torque_unit);
 

@@ -171,20 +171,20 @@ void add_distortion(std::string& text, const Measurement& found) {
   if (!judged && reasons.empty()) add_line(text, "  not known: no record repeats itself");
   if (!table.empty()) {
     add_line(text, table.text(4));
-    if (hides) add_line(text, "    Other signals stand in the JSON answer.");
+    if (hides) add_line(text, "    Other signals are in the JSON answer.");
   }
-  const auto say = [&](const Strongest& s, const char* kind, const char* causes) {
+  const auto print = [&](const Strongest& s, const char* kind, const char* causes) {
     if (s.level != nullptr)
       add_line(text, wrapped(fmt::format("{} nonlinear distortion at {:.0f} dB ({}): {}.", kind, s.level->level_db,
                                          s.where, causes)));
   };
-  say(odd, "Odd", "dry friction, backlash, cubic stiffness, saturation, whatever is the same in both directions");
-  say(even, "Even", "asymmetry, such as friction that differs by direction, gravity, or a mean motion beside friction");
+  print(odd, "Odd", "dry friction, backlash, cubic stiffness, saturation, whatever is the same in both directions");
+  print(even, "Even", "asymmetry, such as friction that differs by direction, gravity, or a mean motion with friction");
   if (judged && odd.level == nullptr && even.level == nullptr)
-    add_line(text, "  None stands above the noise: at this amplitude the drive is linear as far as can be seen.");
+    add_line(text, "  None is above the noise: at this amplitude the drive is linear as far as can be seen.");
   for (const auto& [reason, count] : reasons)
-    add_line(text,
-             wrapped(fmt::format("Not told in {} of {} records: {}.", count, found.records.size(), reason), 2, 2));
+    add_line(text, wrapped(fmt::format("Not determined in {} of {} records: {}.", count, found.records.size(), reason),
+                           2, 2));
   text += "\n";
 }
 
@@ -196,7 +196,7 @@ std::string measurement_text(const Measurement& found) {
   add_noise(text, found);
   add_distortion(text, found);
   if (!found.notes.empty()) {
-    add_line(text, "What these data do not tell");
+    add_line(text, "What these data do not show");
     for (const std::string& note : found.notes) add_line(text, wrapped(note, 2, 2));
   }
   while (text.ends_with('\n')) text.pop_back();

@@ -1,4 +1,4 @@
-// What the data say of a drive before any model, as text and as JSON.
+// What the data show of a drive without a model, as text and as JSON.
 #pragma once
 
 #include <nlohmann/json_fwd.hpp>
@@ -8,7 +8,7 @@
 
 namespace flexspline::output {
 
-// Responses with their resonances, noise, distortion, and what could not be told.
+// Responses with their resonances, noise, distortion, and what could not be determined.
 std::string measurement_text(const measurement::Measurement& found);
 
 // "flexspline-measure/1".

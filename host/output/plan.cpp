@@ -56,10 +56,11 @@ void print_runs(Console& console, const Design& design) {
                fmt::format("{} rad", number(peak.travel_rad, 3))});
   }
   console.line(table.text());
-  std::vector<std::string> said;
+  std::vector<std::string> printed;
   for (const Run& run : design.plan.runs) {
-    if (run.instructions.empty() || std::find(said.begin(), said.end(), run.instructions) != said.end()) continue;
-    said.push_back(run.instructions);
+    if (run.instructions.empty() || std::find(printed.begin(), printed.end(), run.instructions) != printed.end())
+      continue;
+    printed.push_back(run.instructions);
     console.line(wrapped(fmt::format("{}: {}", run.name, run.instructions)));
   }
 }
@@ -75,15 +76,16 @@ json separation_json(const std::optional<planning::Separation>& s) {
 
 void print_plan(Console& console, const Design& design, const std::string& file) {
   const bool separating = !design.plan.separate.empty();
-  const bool useless = separating && design.after && design.after->worst() < planning::kTold;
+  const bool useless = separating && design.after && design.after->worst() < planning::kDistinguished;
   if (separating)
-    console.line(console.bold(fmt::format("To tell {} from {}", design.plan.separate[0], design.plan.separate[1])));
+    console.line(
+        console.bold(fmt::format("To distinguish {} from {}", design.plan.separate[0], design.plan.separate[1])));
   else
     console.line(console.bold("To show what is not well known"));
   for (const std::string& note : design.plan.notes) console.line(wrapped(note));
   if (design.plan.runs.empty() && !useless)
     console.line(
-        wrapped(separating ? "What was recorded tells them apart already." : "All parameters are known well."));
+        wrapped(separating ? "What was recorded distinguishes them already." : "All parameters are known well."));
   if (!design.plan.runs.empty()) {
     console.line();
     print_runs(console, design);
@@ -136,8 +138,9 @@ json plan_json(const Design& design) {
   const bool separating = !design.plan.separate.empty();
   return {{"format", "flexspline-plan-answer/1"},
           {"separate", design.plan.separate},
-          {"separable", separating ? json(design.after && design.after->worst() >= planning::kTold) : json(nullptr)},
-          {"margin_needed", json_number(planning::kTold)},
+          {"separable",
+           separating ? json(design.after && design.after->worst() >= planning::kDistinguished) : json(nullptr)},
+          {"margin_needed", json_number(planning::kDistinguished)},
           {"before", separation_json(design.before)},
           {"after", separation_json(design.after)},
           {"parameters", std::move(parameters)},

@@ -9,7 +9,7 @@
 
 namespace flexspline::output {
 
-// What is to be recorded, what the person does, what it tells. `file` is where the plan was written.
+// What is to be recorded, what the person does, what it will show. `file` is where the plan was written.
 void print_plan(Console& console, const planning::Design& design, const std::string& file);
 
 // "flexspline-plan-answer/1".

@@ -9,7 +9,7 @@
 
 namespace flexspline::output {
 
-// Characters in a line: of the terminal, or as COLUMNS has it, but no more than can be read with ease; 110 elsewhere.
+// Characters in a line: of the terminal, or as COLUMNS has it, but no more than is easy to read; 110 for other outputs.
 std::size_t line_width();
 
 // Columns as wide as their widest cell, two blanks apart. Widths are counted in characters of UTF-8.

@@ -17,8 +17,8 @@ using estimation::Term;
 
 constexpr std::size_t kGridPoints = 7;
 
-Bench::Side* side_of(Bench& bench, Balance balance) {
-  for (Bench::Side& side : bench.sides())
+RehearsedMotions::Side* side_of(RehearsedMotions& rehearsed, Balance balance) {
+  for (RehearsedMotions::Side& side : rehearsed.sides())
     if (side.planned->balance() == balance) return &side;
   return nullptr;
 }
@@ -32,22 +32,23 @@ std::vector<double> usual_values(const Term& term) {
   return usual;
 }
 
-// Shapes that are searched on a grid; the others are moved along their slope.
-std::vector<std::size_t> grid_shapes(const Term& term) {
+// Nonlinear parameters that are searched on a grid; the others are moved along their slope.
+std::vector<std::size_t> grid_parameters(const Term& term) {
   std::vector<std::size_t> list;
   for (std::size_t p = 0; p < term.values.size(); ++p)
-    if (term.free_shape(p) && !(term.entry->parameters[p].low < 0.0 && term.entry->parameters[p].per.empty()))
+    if (term.free_nonlinear(p) && !(term.entry->parameters[p].low < 0.0 && term.entry->parameters[p].per.empty()))
       list.push_back(p);
   return list;
 }
 
-// The added term's values over its grid: one shape over its range, the others as usual; then a second likewise.
+// The added term's values over its grid: one nonlinear parameter over its range, the others as usual; then a second
+// likewise.
 std::vector<std::vector<double>> grid_of(const BalanceData& data, const Term& term) {
   const std::vector<double> usual = usual_values(term);
   std::vector<std::vector<double>> grid{usual};
-  for (const std::size_t p : grid_shapes(term)) {
-    const estimation::ShapeRange range = estimation::shape_range(data, term, p);
-    for (const double value : estimation::shape_grid(range, kGridPoints)) {
+  for (const std::size_t p : grid_parameters(term)) {
+    const estimation::ParameterRange range = estimation::parameter_range(data, term, p);
+    for (const double value : estimation::parameter_grid(range, kGridPoints)) {
       grid.push_back(usual);
       grid.back()[p] = value;
     }
@@ -63,19 +64,19 @@ bool possible(const Term& term) {
   return true;
 }
 
-// A model fitted to what was recorded; shapes of either sign follow their slopes.
+// A model fitted to what was recorded; nonlinear parameters of either sign follow their slopes.
 selection::CrossValidatedFit fitted(BalanceData& data, Terms terms) {
   const Eigen::VectorXd all = Eigen::VectorXd::Ones(data.rows());
   selection::CrossValidatedFit fit = selection::cross_validate(data, std::move(terms), all);
   for (int step = 0; step < 2; ++step) {
     Term& added = fit.terms.back();
     const auto on_balance = estimation::terms_on(fit.terms, data.balance(), data.prepared().torque_measured);
-    const auto shapes = estimation::free_shape_slots(fit.terms, on_balance);
+    const auto nonlinear = estimation::free_nonlinear_parameters(fit.terms, on_balance);
     bool moved = false;
-    for (std::size_t i = 0; i < shapes.size(); ++i) {
-      const auto& info = added.entry->parameters[shapes[i].parameter];
-      if (shapes[i].term + 1 != fit.terms.size() || !(info.low < 0.0 && info.per.empty())) continue;
-      double& value = added.values[shapes[i].parameter];
+    for (std::size_t i = 0; i < nonlinear.size(); ++i) {
+      const auto& info = added.entry->parameters[nonlinear[i].parameter];
+      if (nonlinear[i].term + 1 != fit.terms.size() || !(info.low < 0.0 && info.per.empty())) continue;
+      double& value = added.values[nonlinear[i].parameter];
       value = std::clamp(value + fit.theta[static_cast<Eigen::Index>(fit.linear.size() + i)], info.low, info.high);
       moved = true;
     }
@@ -85,10 +86,10 @@ selection::CrossValidatedFit fitted(BalanceData& data, Terms terms) {
   return fit;
 }
 
-// How much of an effect of usual size may be there without these data showing it.
+// Share of an effect's usual size that could be present without a significant effect on these data.
 double unseen_share(BalanceData& data, const Terms& base, const Terms& usual,
                     const estimation::ModelProjection& projection, double noise) {
-  // With its own parameters alone: the others are as the base has them.
+  // Fits its own parameters alone; the others keep the values of the base.
   Terms terms = usual;
   for (Term& t : terms)
     for (const Term& b : base)
@@ -109,18 +110,19 @@ Terms without(const Terms& terms, std::string_view effect) {
   return left;
 }
 
-Contender contender(Bench& bench, Layout& layout, const Terms& model, std::string_view effect) {
+EffectHypothesis effect_hypothesis(RehearsedMotions& rehearsed, ColumnLayout& layout, const Terms& model,
+                                   std::string_view effect) {
   const selection::EffectName name = selection::parse_effect(effect);
-  Contender c;
+  EffectHypothesis c;
   c.label = std::string(effect);
   Terms base = selection::extend(model, *name.entry, name.order);
-  Bench::Side* side = side_of(bench, name.entry->identified_on());
-  if (!side) side = side_of(bench, Balance::motor);
+  RehearsedMotions::Side* side = side_of(rehearsed, name.entry->identified_on());
+  if (!side) side = side_of(rehearsed, Balance::motor);
   if (side) estimation::set_grid_values(*side->planned, base, {base.size() - 1});
 
   Terms truth = base;
   truth.back().values = usual_values(truth.back());
-  for (const Term& t : bench.terms())
+  for (const Term& t : rehearsed.terms())
     if (t.label() == truth.back().label()) truth.back().values = t.values;
   std::vector<Terms> variants;
   const std::vector<std::vector<double>> grid =
@@ -149,7 +151,7 @@ Contender contender(Bench& bench, Layout& layout, const Terms& model, std::strin
     }
     variants.push_back(fit.terms);
   }
-  // An effect that the data do not show is no larger than what they would have shown.
+  // An effect that the data do not show is at most as large as their detection limit.
   if (!c.seen)
     for (std::size_t p = 0; p < truth.back().values.size(); ++p)
       if (truth.back().free_linear(p)) truth.back().values[p] *= unseen;

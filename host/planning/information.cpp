@@ -12,14 +12,15 @@
 namespace flexspline::planning {
 namespace {
 
-using estimation::Slot;
+using estimation::ParameterRef;
 using estimation::Term;
 
-// All that a column depends on besides the data: the term's own shapes, and those of what may change its inputs.
-std::string label_of(const Terms& terms, Slot slot) {
-  std::string label = fmt::format("{} {}", terms[slot.term].entry->name(), slot.parameter);
+// Everything that a column depends on except the data: the term's own nonlinear parameters, and those of what may
+// change its inputs.
+std::string label_of(const Terms& terms, ParameterRef ref) {
+  std::string label = fmt::format("{} {}", terms[ref.term].entry->name(), ref.parameter);
   for (std::size_t t = 0; t < terms.size(); ++t) {
-    if (t != slot.term && terms[t].entry->info->phase == effects::Phase::source) continue;
+    if (t != ref.term && terms[t].entry->info->phase == effects::Phase::source) continue;
     label += fmt::format(" {}", terms[t].entry->name());
     for (std::size_t p = 0; p < terms[t].values.size(); ++p)
       if (terms[t].entry->parameters[p].kind != effects::Kind::linear)
@@ -48,27 +49,27 @@ bool is_on(const Terms& terms, const BalanceData& data, std::size_t term) {
 
 }  // namespace
 
-std::size_t Layout::place(std::string label, std::function<Eigen::VectorXd(BalanceData&)> make) {
+std::size_t ColumnLayout::place(std::string label, std::function<Eigen::VectorXd(BalanceData&)> make) {
   for (std::size_t i = 0; i < columns_.size(); ++i)
     if (columns_[i].label == label) return i;
   columns_.push_back({std::move(label), std::move(make)});
   return columns_.size() - 1;
 }
 
-Hypothesis Layout::add(Terms terms) {
+Hypothesis ColumnLayout::add(Terms terms) {
   Hypothesis h;
   for (std::size_t t = 0; t < terms.size(); ++t)
     for (std::size_t p = 0; p < terms[t].values.size(); ++p) {
-      const Slot slot{t, p};
+      const ParameterRef ref{t, p};
       if (terms[t].free_linear(p))
-        h.columns.push_back(place(label_of(terms, slot), [terms, slot](BalanceData& data) -> Eigen::VectorXd {
-          if (!is_on(terms, data, slot.term)) return Eigen::VectorXd::Zero(data.rows());
-          return data.column(terms, slot);
+        h.columns.push_back(place(label_of(terms, ref), [terms, ref](BalanceData& data) -> Eigen::VectorXd {
+          if (!is_on(terms, data, ref.term)) return Eigen::VectorXd::Zero(data.rows());
+          return data.column(terms, ref);
         }));
-      else if (terms[t].free_shape(p))
-        h.columns.push_back(place(fmt::format("slope {}{}", label_of(terms, slot), label_of(terms)),
-                                  [terms, slot](BalanceData& data) -> Eigen::VectorXd {
-                                    return data.shape_column(terms, on_balance(terms, data), slot);
+      else if (terms[t].free_nonlinear(p))
+        h.columns.push_back(place(fmt::format("slope {}{}", label_of(terms, ref), label_of(terms)),
+                                  [terms, ref](BalanceData& data) -> Eigen::VectorXd {
+                                    return data.nonlinear_column(terms, on_balance(terms, data), ref);
                                   }));
     }
   h.columns.push_back(place("delay", [](BalanceData& data) -> Eigen::VectorXd { return data.delay_column(); }));
@@ -81,7 +82,7 @@ Hypothesis Layout::add(Terms terms) {
   return h;
 }
 
-Eigen::MatrixXd Layout::over(BalanceData& data) const {
+Eigen::MatrixXd ColumnLayout::over(BalanceData& data) const {
   Eigen::MatrixXd all(data.rows(), static_cast<Eigen::Index>(columns_.size()));
   for (std::size_t i = 0; i < columns_.size(); ++i) all.col(static_cast<Eigen::Index>(i)) = columns_[i].make(data);
   return all;
@@ -91,12 +92,12 @@ std::vector<Eigen::MatrixXd> factors(const BalanceData& data, const Eigen::Matri
   std::vector<Eigen::MatrixXd> all(data.prepared().records.size());
   for (const estimation::RowRange& range : data.records()) {
     const Eigen::MatrixXd rows = columns.middleRows(range.first, range.size());
-    all[range.record] = together({&rows});
+    all[range.record] = stacked_factor({&rows});
   }
   return all;
 }
 
-Eigen::MatrixXd together(const std::vector<const Eigen::MatrixXd*>& parts) {
+Eigen::MatrixXd stacked_factor(const std::vector<const Eigen::MatrixXd*>& parts) {
   Eigen::Index rows = 0, columns = 0;
   for (const Eigen::MatrixXd* part : parts) {
     rows += part->rows();

@@ -1,4 +1,4 @@
-// What records tell of models: triangular factors of the models' columns, small enough to add up records by the
+// Information that records hold about models: R factors of the models' columns, small enough to add up records by the
 // thousand.
 #pragma once
 
@@ -24,10 +24,10 @@ struct Hypothesis {
 };
 
 // Columns over any data, in one order, so that factors of different data add up.
-class Layout {
+class ColumnLayout {
  public:
-  // Adds the columns of a model: its free linear parameters, the slopes by its free shapes at their values, and the
-  // delay. Columns that another model has as well are shared.
+  // Adds the columns of a model: its free linear parameters, the slopes by its free nonlinear parameters at their
+  // values, and the delay. Columns that another model has as well are shared.
   Hypothesis add(Terms terms);
   std::size_t size() const { return columns_.size(); }
   // All columns over the rows of a balance, one each.
@@ -42,13 +42,13 @@ class Layout {
   std::vector<Column> columns_;
 };
 
-// Triangular factors of columns over each record of the data, by the index of the record among the prepared ones; an
+// R factors of columns over each record of the data, by the index of the record among the prepared ones; an
 // empty matrix where a record has no rows.
 std::vector<Eigen::MatrixXd> factors(const BalanceData& data, const Eigen::MatrixXd& columns);
-// Of all rows that any of the factors stands for. Empty ones count for nothing.
-Eigen::MatrixXd together(const std::vector<const Eigen::MatrixXd*>& factors);
+// The factor of the rows of all `factors` together. Empty ones are ignored.
+Eigen::MatrixXd stacked_factor(const std::vector<const Eigen::MatrixXd*>& factors);
 
-// Squares of the torque of `truth` that the columns of `other` cannot take up.
+// Squares of the torque of `truth` that is orthogonal to the columns of `other`.
 double unexplained(const Eigen::MatrixXd& factor, const Hypothesis& truth, const Hypothesis& other);
 
 }  // namespace flexspline::planning

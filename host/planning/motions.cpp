@@ -10,7 +10,7 @@
 namespace flexspline::planning {
 namespace {
 
-// Room below the limits for what the model does not know.
+// Margin below the limits for errors of the model.
 constexpr double kMargin = 0.9;
 
 std::vector<Line> lines_of(std::uint64_t seed, std::uint16_t first, std::uint16_t last) {
@@ -25,7 +25,7 @@ std::vector<Line> lines_of(std::uint64_t seed, std::uint16_t first, std::uint16_
 
 class Builder {
  public:
-  explicit Builder(const Setting& setting) : s_(setting) {}
+  explicit Builder(const MotionSettings& setting) : s_(setting) {}
 
   // A velocity of the motor; its amplitude shrinks where the output would travel too far.
   Run velocity(std::string name, Waveform waveform, double share, double frequency_hz) const {
@@ -151,12 +151,12 @@ class Builder {
   }
 
  private:
-  const Setting& s_;
+  const MotionSettings& s_;
 };
 
 }  // namespace
 
-std::vector<Motion> motions(const Setting& setting) {
+std::vector<Motion> motions(const MotionSettings& setting) {
   std::vector<Motion> list;
   const Builder build(setting);
   build.free_motions(list);
@@ -166,7 +166,7 @@ std::vector<Motion> motions(const Setting& setting) {
     run.mode = Mode::off;
     run.waveform = Waveform::zero;
     run.duration_s = 4.0;
-    run.instructions = "Switch the drive's power stage off and let the axis stand still; the sensors go on.";
+    run.instructions = "Switch the drive's power stage off and leave the axis at rest; the sensors go on.";
     list.push_back({"drive-off", {run}, 0.5});
   }
   if (setting.locked && setting.locked_current_a > 0.0) build.locked_motions(list);

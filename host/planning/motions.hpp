@@ -8,8 +8,8 @@
 
 namespace flexspline::planning {
 
-// What the person at the drive is willing to do, and what the drive is.
-struct Setting {
+// The limits of the drive, and what the person at the drive is willing to do.
+struct MotionSettings {
   Limits limits;
   double gear_ratio = 1.0;
   double locked_current_a = 0.0;  // that the gear carries with its output locked
@@ -26,10 +26,10 @@ struct Setting {
 struct Motion {
   std::string name;
   std::vector<Run> runs;
-  double trouble = 0.0;  // what it asks of a person: 0 nothing, 1 a lock or a switch, 2 a weight, 3 waiting for heat
+  double trouble = 0.0;  // the effort for a person: 0 nothing, 1 a lock or a switch, 2 a weight, 3 waiting for heat
 };
 
 // Amplitudes are as large as the limits let them be, or a stated part of that. Deterministic.
-std::vector<Motion> motions(const Setting& setting);
+std::vector<Motion> motions(const MotionSettings& setting);
 
 }  // namespace flexspline::planning

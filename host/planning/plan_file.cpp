@@ -45,10 +45,10 @@ std::string_view unit_of(std::string_view key) {
   if (key == "slope_limit") return "in the unit of the amplitude per second";
   if (key == "amplitude" || key == "offset")
     return "in A (mode current), rad/s (velocity) or rad (position) at the motor";
-  return "as the plan's description says";
+  return "as the plan's description states";
 }
 
-// A table of the file, whose keys are taken one after another; what nobody took is unknown.
+// A table of the file, whose keys are taken one after another; an unread key is unknown.
 class Section {
  public:
   Section(const Node& node, std::string_view origin, std::string where)
@@ -190,7 +190,7 @@ std::string text_of(const Plan& plan) {
     text += "]\n";
   }
   text += fmt::format(
-      "\n[limits]                # not to be exceeded whatever a run says\ncurrent_a = {}\nvelocity_rad_s = {}\n"
+      "\n[limits]                # not to be exceeded whatever a run states\ncurrent_a = {}\nvelocity_rad_s = {}\n"
       "travel_rad = {}\nduration_s = {}\nload_torque_nm = {}\n",
       number(plan.limits.current_a), number(plan.limits.velocity_rad_s), number(plan.limits.travel_rad),
       number(plan.limits.duration_s), number(plan.limits.load_torque_nm));

@@ -24,7 +24,7 @@ double steps_of(double position, double counts) {
   return std::floor(position / step + 0.5) * step;
 }
 
-// What a current sensor reads without current: the effort that stands at rest where nothing moves or pushes.
+// What a current sensor reads without current: the effort that keeps the axis at rest where nothing moves or pushes.
 double reading_at_rest(const simulation::Balances& balances, double temperature, double torque_constant) {
   simulation::Inputs rest{};
   rest.viscous_scale = rest.coulomb_scale = 1.0;

@@ -1,4 +1,4 @@
-// A run as the model makes it: what a recording of it would hold, before anybody moves the drive.
+// Simulates a run with the model: the expected recording, before the drive moves.
 #pragma once
 
 #include "host/data/dataset.hpp"
@@ -13,7 +13,7 @@ struct Sensors {
   bool output_position = true;
   bool torque = true;
   bool temperature = true;
-  double motor_counts = 16384;    // per turn; nought: no resolution to speak of
+  double motor_counts = 16384;    // per turn; zero: no resolution to speak of
   double output_counts = 262144;  // per turn
 };
 
@@ -22,11 +22,11 @@ struct Rehearsal {
   double peak_current_a = 0.0;
   double peak_velocity_rad_s = 0.0;  // motor
   double travel_rad = 0.0;           // output, from end to end
-  double clipped_share = 0.0;        // of the samples, in which the velocity loop asked for more than the limit
+  double clipped_share = 0.0;        // share of the samples in which the velocity loop demanded more than the limit
   bool diverged = false;
 };
 
-// Simulates a run from standstill at nought, without noise but with the encoders' steps. The model must have all
+// Simulates a run from standstill at zero, without noise but with the encoders' steps. The model must have all
 // values: simulation::ModelIncomplete. Velocities are controlled by a PI loop whose bandwidth follows from the sample
 // time and the model's inertia.
 Rehearsal rehearse(const model::Model& model, const Run& run, double sample_s, const Limits& limits,

@@ -15,7 +15,7 @@ struct ReportPlan {
 };
 const std::vector<ReportPlan>& report_plans();
 
-// What 100 % means on a drive; the report does not say it.
+// What 100 % means on a drive; the report does not give it.
 struct FullScale {
   double velocity_rad_s = 0.0;  // of the motor
   double current_a = 0.0;

@@ -10,7 +10,7 @@ const effectName = (c) => (c.order === null || c.order === undefined ? c.effect 
 function candidateCard(c, round) {
   const card = el("div", { class: "card" }, el("h3", {}, effectName(c)));
   if (c.explanation) card.append(el("p", {}, c.explanation));
-  card.append(el("p", {}, el("strong", {}, "Evidence: "), `with it, the error of the ${c.balance} balance on data left out of the fit falls from ` +
+  card.append(el("p", {}, el("strong", {}, "Evidence: "), `with it, the error of the ${c.balance} balance on data left out of the fit decreases from ` +
     `${withUnit(c.rmse_cv_before, c.unit)} to ${withUnit(c.rmse_cv_after, c.unit)}; it explains ${number(c.chi2_fall_percent, 3)} % of what the model leaves. ` +
     `The score is ${number(c.score, 3)} (20 would do): ${scoreInWords(c)}.`));
   if (c.note) card.append(el("p", {}, c.note));
@@ -19,9 +19,9 @@ function candidateCard(c, round) {
   if (c.causes) card.append(el("p", {}, el("strong", {}, "Usual causes: "), c.causes));
   if (c.check) card.append(el("p", {}, el("strong", {}, "Check on the machine: "), c.check));
   if (c.rivals.length) {
-    card.append(el("p", {}, el("strong", {}, "Not to be told from: "), listed(c.rivals, "or"), " in these data. ",
+    card.append(el("p", {}, el("strong", {}, "Not to be distinguished from: "), listed(c.rivals, "or"), " in these data. ",
       c.rival_reasons.map((r) => `Beside ${r.effect}, only ${number(r.own_percent, 2)} % of what it does is its own${r.variable ? `; both go with ${variableName(r.variable)}` : ""}.`).join(" ")));
-    if (c.separating_experiment) card.append(el("p", {}, el("strong", {}, "What would tell them apart: "), c.separating_experiment, "."));
+    if (c.separating_experiment) card.append(el("p", {}, el("strong", {}, "What would distinguish them: "), c.separating_experiment, "."));
   }
   if (c.parameters.length)
     card.append(table("Its parameters", ["parameter", { n: "value" }, { n: "95 % interval" }, "unit"],
@@ -42,7 +42,7 @@ function leastShown(c) {
 }
 function interval(p) { return p.interval[0] === null ? "–" : `${number(p.interval[0])} to ${number(p.interval[1])}`; }
 
-// `named`: those of the verdict; the others are told by how far they are behind.
+// `named`: those of the verdict; of the others it states how far they are behind.
 function candidateTable(list, named, caption) {
   const isNamed = (c) => named.some((n) => n.effect === c.effect && n.order === c.order);
   const verdict = (c) => (!c.admissible ? "refused: " + c.why_not : named.length && !isNamed(c) && c.score >= 20 ? "helps, but explains less than the best" : scoreInWords(c));
@@ -69,7 +69,7 @@ function fillUnknown(s, c) {
         series: [{}, kHidden, kHidden, line("residual", k, { width: 2 })],
         bands: [{ series: [1, 2], fill: faded("residual") }],
         cursor: { drag: { x: false, y: false }, y: false },
-        hooks: { drawClear: [noughtHook(k)], setCursor: [readoutHook(plot, [null, null, "torque"], unit, "at", xUnit)] },
+        hooks: { drawClear: [zeroHook(k)], setCursor: [readoutHook(plot, [null, null, "torque"], unit, "at", xUnit)] },
       },
     }),
   }));
@@ -98,7 +98,7 @@ function fillRound(s, round) {
   if (round.named.length && round.remaining_structure.length)
     s.append(el("p", {}, `With that added, the error still goes with ${listed(round.remaining_structure.slice(0, 3).map((l) => `${variableName(l.variable)} (${number(l.share_percent, 3)} %)`))}.`));
   if (round.disturbances.length)
-    s.append(table("Something from outside acted on the axis in these stretches; they were left out.", ["experiment", { n: "from" }, { n: "to" }, { n: "peak" }],
+    s.append(table("Something from outside acted on the axis in these intervals; they were left out.", ["experiment", { n: "from" }, { n: "to" }, { n: "peak" }],
       round.disturbances.map((d) => [d.experiment, { n: withUnit(d.from_s, "s") }, { n: withUnit(d.to_s, "s") }, { n: withUnit(d.peak, d.unit) }])));
   for (const warning of round.warnings) s.append(el("p", { class: "note" }, warning));
 }

@@ -42,7 +42,7 @@ function part(title, introduction) {
       const lines = report.runs.map((_, i) => line(kRunLines[i % 3][0], k, { dash: kRunLines[i % 3][1] || undefined }));
       const data = traces.map((t) => t[signal].map((v) => (v === null ? null : factor * v)));
       const hooks = linked.hook();
-      hooks.draw = [noughtHook(k)];
+      hooks.draw = [zeroHook(k)];
       hooks.setCursor = [readoutHook(plotted, more ? ["set point", ...names] : names, unit, "time", "s")];
       return {
         data: [traces[0].time, ...(more ? [traces[0].command.map((v) => (v === null ? null : factor * v))] : []), ...data],
@@ -55,4 +55,4 @@ function part(title, introduction) {
     plot("Motor velocity", "rad/s", 1, "velocity", false), plot("Current", "A", 1, "current", false),
     plot("Temperature", "degC", 1, "temperature", false));
 }
-document.getElementById("footer").textContent = "Every value stands in this page as JSON.";
+document.getElementById("footer").textContent = "Every value is in this page as JSON.";

@@ -1,4 +1,4 @@
-// All that a report page tells, gathered into one JSON document.
+// All that a report page shows, gathered into one JSON document.
 #pragma once
 
 #include <filesystem>
@@ -26,15 +26,15 @@ struct Subject {
   model::Model model{};                  // that the page judges
   std::optional<model::Model> before{};  // without what was added
   estimation::PipelineOptions pipeline{};
-  std::vector<blackbox::Specification> beside{};  // black boxes to stand beside `model`
-  comparison::Extent extent{};                    // of what is compared
+  std::vector<blackbox::Specification> baselines{};  // black boxes to compare with `model`
+  comparison::Extent extent{};                       // of what is compared
   // Each only where the command has it.
   std::vector<estimation::Estimate> estimates{};  // of `model`
   std::vector<selection::Diagnosis> rounds{};     // the first of `before` where there is one
   std::optional<selection::Addition> addition{};  // or removal, of the command `remove`
 };
 
-// "flexspline-report/1"; README.md says what stands in it. Compares model and measurement once more, as `compare` does.
+// "flexspline-report/1"; README.md describes its content. Compares model and measurement once more, as `compare` does.
 // Throws what comparison::compare throws.
 nlohmann::json document(const Subject& subject);
 

@@ -45,7 +45,7 @@ std::string in_words(std::string signal) {
   return signal;
 }
 
-// The balance whose error stands highest above its noise; without a noise, above its signal.
+// The balance whose error is highest above its noise; without a noise, above its signal.
 const comparison::SignalResult* worst_balance(const comparison::Comparison& comparison) {
   const comparison::SignalResult* worst = nullptr;
   const auto badness = [](const comparison::SignalResult& s) { return s.excess().value_or(s.nrmse); };
@@ -79,10 +79,11 @@ json of_addition(const selection::Addition& a, bool removed) {
   const double before = held_out ? *a.before.rmse_holdout : a.before.rmse_fit;
   const double after = held_out ? *a.after.rmse_holdout : a.after.rmse_fit;
   const std::string on = held_out ? "on motions that the fit never saw" : "on the fitted data (none were held out)";
-  const std::string verdict = fmt::format(
-      "With {} {}, the error of the {} {} {} from {} to {} ({:+.1f} %); {}.", a.effect, removed ? "taken out" : "added",
-      in_words(a.signal), on, after < before ? "falls" : "goes", with_unit(before, a.unit), with_unit(after, a.unit),
-      before > 0.0 ? 100.0 * (after / before - 1.0) : 0.0, against_noise(after, a.noise_floor));
+  const std::string verdict =
+      fmt::format("With {} {}, the error of the {} {} {} from {} to {} ({:+.1f} %); {}.", a.effect,
+                  removed ? "taken out" : "added", in_words(a.signal), on, after < before ? "decreases" : "goes",
+                  with_unit(before, a.unit), with_unit(after, a.unit),
+                  before > 0.0 ? 100.0 * (after / before - 1.0) : 0.0, against_noise(after, a.noise_floor));
   return {{"verdict", verdict},
           {"good", after < before},
           {"headline", headline(a.signal, a.unit, on, before, after, a.noise_floor, a.noise_floor_from)}};
@@ -104,7 +105,7 @@ json of_diagnosis(const selection::Diagnosis& d) {
       const std::string on = "on data left out of the fit";
       result["headline"] =
           headline(signal, d.unit, on, c.rmse_cv_before, c.rmse_cv_after, d.noise_floor, d.noise_floor_from);
-      sentence += fmt::format(" With {}, the error {} falls from {} to {}.", c.effect, on,
+      sentence += fmt::format(" With {}, the error {} decreases from {} to {}.", c.effect, on,
                               with_unit(c.rmse_cv_before, d.unit), with_unit(c.rmse_cv_after, d.unit));
     }
   result["verdict"] = result["verdict"].get<std::string>() + sentence;
@@ -118,7 +119,7 @@ json of_comparison(const View& view) {
   return {
       {"verdict",
        fmt::format("{} The {} is off by {}{}; {}.",
-                   at_noise          ? "The model is as good as these data can tell."
+                   at_noise          ? "The model is as good as these data can show."
                    : worst->excess() ? "The model does not explain all of these data."
                                      : "How good the model can be is not known.",
                    in_words(worst->signal), with_unit(worst->rmse, worst->unit),

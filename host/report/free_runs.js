@@ -21,7 +21,7 @@ function twoOf(runs) {
 function freeRunGallery(traces) {
   const shown = experiments.filter((e) => traces.get(e.name)?.free_runs.length).sort((a, b) => freeRunBadness(b) - freeRunBadness(a));
   if (!shown.length) return;
-  const s = section("Free run beside the measurement", "What the model does with the measured effort alone, from the measured start, in every experiment; the worst first. " +
+  const s = section("Free run and measurement", "What the model does with the measured effort alone, from the measured start, in every experiment; the worst first. " +
     "A free run adds up what friction and stiffness are wrong by, so that it shows what the torque balances hide.");
   s.append(el("ul", { class: "key" }, [{ name: "measured", colour: "measured" }, { name: "free run of the model", colour: "model", dash: [6, 3] }].map(keyItem)));
   for (const e of shown) {
@@ -39,11 +39,11 @@ function freeRunGallery(traces) {
 }
 
 // Null without black boxes.
-function besideTable() {
+function baselineTable() {
   const boxes = report.comparison.beside;
   if (!boxes.length) return null;
   const error = (value, box) => ({ n: box.stable ? number(value, 3) : "grows without bound" });
-  return table("Black boxes beside the model: linear models without physics, fitted to the same signals and run freely. The model's error is on the same samples.",
+  return table("Black boxes compared with the model: linear models without physics, fitted to the same signals and run freely. The model's error is on the same samples.",
     ["black box", "signal", { n: "parameters" }, { n: "error" }, { n: "of the model" }, { n: "held out" }, { n: "of the model" }, "unit"],
     boxes.map((b) => [b.black_box, signalName(b.signal) + (b.load ? ", " + b.load : ""), { n: number(b.parameters) }, error(b.rmse, b), { n: number(b.model_rmse, 3) },
       b.stable ? error(b.rmse_holdout, b) : { n: "–" }, { n: number(b.model_rmse_holdout, 3) }, unitText(b.unit)]));

@@ -3,7 +3,7 @@
 #include <nlohmann/json.hpp>
 
 #include "host/catalogue/settled.hpp"
-#include "host/comparison/row_variables.hpp"
+#include "host/comparison/sample_variables.hpp"
 #include "host/estimation/least_squares.hpp"
 #include "host/output/json.hpp"
 #include "host/report/parts.hpp"
@@ -94,11 +94,12 @@ json friction_curve(View& view) {
   if (balance == view.balances.end()) return nullptr;
   estimation::BalanceData& data = *balance->data;
   Eigen::VectorXd velocity;
-  for (const comparison::RowVariable& v : comparison::row_variables(data, view.axis()))
+  for (const comparison::SampleVariable& v : comparison::sample_variables(data, view.axis()))
     if (v.name == "velocity") velocity = v.values;
   std::vector<std::size_t> friction;
   std::vector<std::size_t> all = estimation::terms_on(view.terms, Balance::motor, view.prepared.torque_measured);
-  for (const std::size_t t : estimation::terms_reaching(view.terms, Balance::motor, view.prepared.torque_measured))
+  for (const std::size_t t :
+       estimation::terms_acting_on_other_balance(view.terms, Balance::motor, view.prepared.torque_measured))
     all.push_back(t);
   for (const std::size_t t : all)
     if (is_friction(view.terms[t], view)) friction.push_back(t);

@@ -49,7 +49,7 @@ json hysteresis_loops(const View& view) {
     std::size_t samples = 0;
     for (const data::Segment& s : record.segments) samples += s.last - s.first;
     const std::size_t step = std::max<std::size_t>(1, samples / kPoints);
-    // A point without a number parts two stretches.
+    // A point without a number separates two segments.
     std::vector<double> torsion, measured, modelled;
     for (const data::Segment& s : record.segments) {
       for (std::size_t k = s.first; k < s.last; k += step) {

@@ -7,7 +7,7 @@
 #include <nlohmann/json.hpp>
 
 #include "host/comparison/residual_map.hpp"
-#include "host/comparison/row_variables.hpp"
+#include "host/comparison/sample_variables.hpp"
 #include "host/estimation/in_parallel.hpp"
 #include "host/estimation/least_squares.hpp"
 #include "host/output/json.hpp"
@@ -21,7 +21,7 @@ using nlohmann::json;
 using output::json_number;
 using output::json_numbers;
 
-// As residual maps are judged (comparison/residual_map.cpp).
+// As residual maps are tested (comparison/residual_map.cpp).
 constexpr std::size_t kMostBins = 24;
 constexpr std::size_t kRowsPerBin = 16;
 constexpr std::size_t kBinsPerWave = 6;
@@ -96,7 +96,7 @@ std::vector<double> centres(const Bins& bins, const Eigen::VectorXd& values) {
 
 // Amplitude of each order of the motor's turn in the residual: root mean square of the fitted waves times root two.
 // Each record has a phase of its own, so that no common zero of the angle is needed; one that sees less than some whole
-// waves stands aside.
+// waves is left out.
 std::vector<double> order_amplitudes(const View& view, const BalanceView& balance, const Eigen::VectorXd& residual) {
   std::vector<double> amplitudes(kOrders);
   const auto at = estimation::index(balance.data->balance());
@@ -145,7 +145,7 @@ std::size_t bins_for(Eigen::Index rows, const std::vector<double>& amplitudes) {
   return std::max(wanted, std::min(kBinsPerWave * order, most));
 }
 
-json map_of(const View& view, const BalanceView& balance, const comparison::RowVariable& variable,
+json map_of(const View& view, const BalanceView& balance, const comparison::SampleVariable& variable,
             const std::vector<comparison::Share>& shares, const Eigen::VectorXd& directions) {
   const std::vector<double> amplitudes =
       variable.name == "motor_angle" ? order_amplitudes(view, balance, balance.residual) : std::vector<double>{};
@@ -182,10 +182,10 @@ json map_of(const View& view, const BalanceView& balance, const comparison::RowV
 json residual_maps(const View& view) {
   json list = json::array();
   for (const BalanceView& balance : view.balances) {
-    const Eigen::VectorXd directions = comparison::row_directions(*balance.data);
+    const Eigen::VectorXd directions = comparison::sample_directions(*balance.data);
     const std::vector<comparison::Share> shares =
         comparison::localise(*balance.data, View::shown(balance), balance.autocorrelation_time, view.axis());
-    const std::vector<comparison::RowVariable> variables = comparison::row_variables(*balance.data, view.axis());
+    const std::vector<comparison::SampleVariable> variables = comparison::sample_variables(*balance.data, view.axis());
     std::vector<json> maps(variables.size());
     estimation::in_parallel(maps.size(),
                             [&](std::size_t v) { maps[v] = map_of(view, balance, variables[v], shares, directions); });

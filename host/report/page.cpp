@@ -66,7 +66,7 @@ std::string embedded(const nlohmann::json& document) {
   const std::string text = document.dump(-1, ' ', false, nlohmann::json::error_handler_t::replace);
   std::string result;
   result.reserve(text.size());
-  // These stand in strings of JSON alone, where an escape means the same.
+  // These occur in strings of JSON alone, where an escape means the same.
   for (const char c : text) {
     if (c == '<')
       result += "\\u003c";

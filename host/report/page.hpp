@@ -10,13 +10,13 @@ namespace flexspline::report {
 // Which sections a page has.
 enum class Script { report, closed_loop };
 
-// The page of a document (see document.hpp; of `closed_loop`, host/closed_loop/page.hpp). Whatever stands in its texts,
+// The page of a document (see document.hpp; of `closed_loop`, host/closed_loop/page.hpp). Whatever is in its texts,
 // none of it becomes markup or script.
 std::string page(const nlohmann::json& document, Script script = Script::report);
 
-// Text as it may stand between tags and in attributes of HTML.
+// Text as it may be written between tags and in attributes of HTML.
 std::string escaped(std::string_view text);
-// JSON as it may stand in a script element: no text in it can end the element or open a comment.
+// JSON as it may be written in a script element: no text in it can end the element or open a comment.
 std::string embedded(const nlohmann::json& document);
 
 }  // namespace flexspline::report

@@ -1,5 +1,5 @@
 "use strict";
-// The document that this page shows; host/report/README.md says what stands in it.
+// The document that this page shows; host/report/README.md describes it.
 const report = JSON.parse(document.getElementById("document").textContent);
 
 // An element with text. Texts of the report are never markup: this is the only way in which they get into the page.
@@ -40,7 +40,7 @@ const kVariableNames = {
   torsion_rate: "rate of torsion", temperature: "temperature", time: "time since the record began",
   travel: "travel since the last reversal", direction: "direction of motion", record: "experiment",
 };
-// "velocity x direction" and "motor_angle order 7" as people say it.
+// "velocity x direction" and "motor_angle order 7" in words.
 function variableName(variable) {
   const directed = variable.endsWith(" x direction");
   const plain = directed ? variable.slice(0, -" x direction".length) : variable;

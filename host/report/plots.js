@@ -1,5 +1,5 @@
 
-// Plots are made when they come into view, and again for paper and when the colours change.
+// Plots are drawn when they come into view, and again for paper and when the colours change.
 const plots = [];
 const kFont = 'px system-ui, "Segoe UI", Roboto, Arial, "DejaVu Sans", sans-serif';
 const kPaperWidth = 690;  // of A4 between the margins, in CSS pixels
@@ -25,7 +25,7 @@ function keyItem(item) {
   return el("li", {}, svg, item.name);
 }
 
-// A figure whose plot `make(k)` gives as {data, options}; sizes in it are times k. `half`: two stand side by side on
+// A figure whose plot `make(k)` gives as {data, options}; sizes in it are times k. `half`: two are side by side on
 // paper.
 function figure({ title, label, caption, key, height, half, make }) {
   const readout = el("div", { class: "readout", "aria-hidden": "true" });
@@ -117,8 +117,8 @@ function bandHook(low, high, name) {
     u.ctx.restore();
   };
 }
-// A fine line where y is nought.
-function noughtHook(k) {
+// A fine line where y is zero.
+function zeroHook(k) {
   return (u) => {
     const y = Math.round(u.valToPos(0, "y", true));
     if (y < u.bbox.top || y > u.bbox.top + u.bbox.height) return;

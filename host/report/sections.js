@@ -108,7 +108,7 @@ function freeRunTable() {
 }
 
 const kTimeNames = { x: "time (s)" };
-function timePlot(linked, names, colours, unit, data, { height, noise, nought, label, title, caption, half, bare, dashes = [] }) {
+function timePlot(linked, names, colours, unit, data, { height, noise, zero, label, title, caption, half, bare, dashes = [] }) {
   return figure({
     title, label, caption, height, half,
     key: bare ? null : names.map((name, k) => ({ name, colour: colours[k], dash: dashes[k] })).concat(noise ? [{ name: "noise alone (±2 standard deviations)", colour: "noise", kind: "band" }] : []),
@@ -121,7 +121,7 @@ function timePlot(linked, names, colours, unit, data, { height, noise, nought, l
         cursor: { sync: { key: linked.key, setSeries: false, scales: ["x", null] }, drag: { x: true, y: false }, bind: { mousedown: movable } },
         hooks: {
           ...linked.hook(),
-          drawClear: [...(noise ? [bandHook(-2 * noise, 2 * noise, "noise")] : []), ...(nought ? [noughtHook(k)] : [])],
+          drawClear: [...(noise ? [bandHook(-2 * noise, 2 * noise, "noise")] : []), ...(zero ? [zeroHook(k)] : [])],
           setCursor: [readoutHook(plot, names, unit, "at", "s")],
         },
       },
@@ -142,7 +142,7 @@ function fillExperiment(body, trace) {
       label: `${name} of ${trace.experiment} over time, measured and modelled; root mean square error ${withUnit(s.rmse, unit)}` }));
     const series = b.before ? [unpacked(b.before), unpacked(b.residual)] : [unpacked(b.residual)];
     body.append(timePlot(linked, b.before ? ["error before", "error after"] : ["error (measured less model)"], b.before ? ["before", "residual"] : ["residual"], unit, [time, ...series], {
-      height: 160, noise: b.noise_floor, nought: true,
+      height: 160, noise: b.noise_floor, zero: true,
       label: `Error of the ${name} of ${trace.experiment} over time; noise alone ${withUnit(b.noise_floor, unit)}`,
       caption: "Gaps are reversals and sticking, which are left out of the error." }));
   }
@@ -157,7 +157,7 @@ function fillExperiment(body, trace) {
 {
   const s = section("How good is the model?", "The model is asked for the torque that the measured motion takes, and that is compared with the torque that was measured, " +
     "balance by balance: at the motor, through the gear, at the load. What is left over is the error.");
-  s.append(...[errorTable(), freeRunTable(), besideTable()].filter(Boolean));
+  s.append(...[errorTable(), freeRunTable(), baselineTable()].filter(Boolean));
   for (const warning of report.comparison.warnings) s.append(el("p", { class: "note" }, warning));
   const traces = new Map(report.traces.map((t) => [t.experiment, t]));
   const drawn = experiments.filter((e) => traces.has(e.name) && (traces.get(e.name).balances.length || traces.get(e.name).free_runs.length));
@@ -173,14 +173,14 @@ function fillExperiment(body, trace) {
 
 // ---- where it fails ----
 // What happens near standstill or at a reversal would be a needle on a linear scale.
-const kCrowdedAtNought = ["velocity", "speed", "torsion_rate", "travel"];
+const kCrowdedAtZero = ["velocity", "speed", "torsion_rate", "travel"];
 function mapScale(m) {
   const sizes = m.x.filter((v) => v !== null).map(Math.abs);
   const largest = Math.max(...sizes), least = Math.min(...sizes.filter((v) => v > 0));
-  if (!kCrowdedAtNought.includes(m.variable) || !(least < 0.05 * largest)) return { time: false };
+  if (!kCrowdedAtZero.includes(m.variable) || !(least < 0.05 * largest)) return { time: false };
   return { time: false, distr: 4, asinh: Math.max(least, largest / 300), range: (u, low, high) => [low, high] };
 }
-// Decades of both signs, and nought.
+// Decades of both signs, and zero.
 function mapSplits(scale) {
   if (scale.distr !== 4) return {};
   return { splits: (u, axisAt, low, high) => {
@@ -202,7 +202,7 @@ function mapFigure(signal, unit, m) {
   return figure({
     title, half: true, height: 190,
     label: `Mean error of the ${signalName(signal)} over ${name}; it explains ${number(share, 3)} % of the error's variance`,
-    caption: share > 0 ? el("span", {}, el("strong", {}, `${number(share, 3)} %`), ` of the error's variance goes with it${m.share_with_direction_percent > m.share_percent ? ", by direction of motion" : ""}`) : "no structure that could be told from chance",
+    caption: share > 0 ? el("span", {}, el("strong", {}, `${number(share, 3)} %`), ` of the error's variance goes with it${m.share_with_direction_percent > m.share_percent ? ", by direction of motion" : ""}`) : "no structure that could be distinguished from chance",
     make: (k, plot) => ({
       data: [m.x, noise, noise.map((v) => (v === null ? null : -v)), up(m.plain, 2), up(m.plain, -2), up(m.with_direction, 2), up(m.with_direction, -2),
         m.plain.mean, m.with_direction.mean, ...(m.plain_before ? [m.plain_before.mean, m.with_direction_before.mean] : [])],
@@ -215,7 +215,7 @@ function mapFigure(signal, unit, m) {
         bands: [...(hasNoise ? [{ series: [1, 2], fill: colour("noise") }] : []),
           { series: [3, 4], fill: faded("residual") }, { series: [5, 6], fill: faded("directed") }],
         cursor: { drag: { x: false, y: false }, y: false },
-        hooks: { drawClear: [noughtHook(k)], setCursor: [readoutHook(plot, [null, null, null, null, null, null, "mean", "with direction"], unit, "at", m.unit)] },
+        hooks: { drawClear: [zeroHook(k)], setCursor: [readoutHook(plot, [null, null, null, null, null, null, "mean", "with direction"], unit, "at", m.unit)] },
       },
     }),
   });
@@ -244,7 +244,7 @@ function orderFigure(signal, unit, m) {
 function loopFigure(loop) {
   const x = unpacked(loop.torsion), measured = unpacked(loop.measured), model = unpacked(loop.model);
   const span = (...lists) => { let low = Infinity, high = -Infinity; for (const l of lists) for (const v of l) if (v !== null) { low = Math.min(low, v); high = Math.max(high, v); } const pad = 0.05 * (high - low || 1); return [low - pad, high + pad]; };
-  // uPlot's own lines want x to rise; a loop goes to and fro.
+  // uPlot's own lines want x to rise; the x of a loop goes back and forth.
   const path = (u, seriesIdx) => {
     uPlot.orient(u, seriesIdx, (series, dataX, dataY, scaleX, scaleY, toX, toY, left, top, width, height) => {
       const [xs, ys] = u.data[seriesIdx];
@@ -306,7 +306,7 @@ function frictionFigure(f, title, top) {
           ...f.parts.map((_, p) => line("part-" + (p % 6), k, { width: 1.4, dash: dashes[p % 6] }))],
         bands: [{ series: [1, 2], fill: colour("noise") }],
         cursor: { drag: { x: true, y: false } },
-        hooks: { drawClear: [noughtHook(k)], setCursor: [readoutHook(plot, [null, null, "measured", "model", ...f.parts.map((p) => p.id)], f.unit, "at", f.velocity_unit)] },
+        hooks: { drawClear: [zeroHook(k)], setCursor: [readoutHook(plot, [null, null, "measured", "model", ...f.parts.map((p) => p.id)], f.unit, "at", f.velocity_unit)] },
       },
     }),
   });
@@ -316,7 +316,7 @@ function frictionFigure(f, title, top) {
   const hasMaps = report.maps.some((b) => b.maps.length);
   if (hasMaps || report.loops.length || report.friction) {
     const s = section(before ? "Where did it fail, and what is left?" : "Where does it fail?",
-      hasMaps ? "The error is averaged over all samples in which a quantity has about the same value. If it stands off zero somewhere by more than its bands, the model lacks " +
+      hasMaps ? "The error is averaged over all samples in which a quantity has about the same value. If it differs from zero somewhere by more than its bands, the model lacks " +
         "something that goes with that quantity. What resists motion changes its sign with the direction: it shows in the error times the direction." : null);
     if (hasMaps)
       s.append(el("ul", { class: "key", "aria-label": "Lines of the plots below" }, [
@@ -373,7 +373,7 @@ if (report.rounds.length) {
 if (report.parameters.length) {
   const s = section("Parameters of the model");
   const spreads = report.parameters.some((p) => p.spread_percent !== null);
-  const remark = (p) => (!p.identifiable ? "these data cannot tell it" : !p.reliable ? "unreliable: differs from experiment to experiment by more than 30 %" : "");
+  const remark = (p) => (!p.identifiable ? "these data do not identify it" : !p.reliable ? "unreliable: differs from experiment to experiment by more than 30 %" : "");
   s.append(table("Values with 95 % intervals" + (spreads ? ", and how much they differ from experiment to experiment (standard deviation over average)" : "") +
     ". An interval holds for this model; while an effect is missing, the true value may lie outside.",
     ["parameter", { n: "value" }, { n: "95 % interval" }, "unit", { n: "spread" }, ""],

@@ -1,4 +1,4 @@
-// Signals over time, made small enough for a page.
+// Signals over time, thinned for a page.
 #pragma once
 
 #include <cstdint>
@@ -19,7 +19,7 @@ class Thinning {
 
   // Time of each point; a gap in time is one point without a number.
   std::vector<double> times(std::span<const double> time_s) const;
-  // Values of one signal at these points; NaN where `valid` (may be empty) says that there is none.
+  // Values of one signal at these points; NaN where `valid` (may be empty) marks that there is none.
   std::vector<double> values(std::span<const double> signal, std::span<const std::uint8_t> valid = {}) const;
 
  private:

@@ -14,15 +14,15 @@ using estimation::Balance;
 
 model::Model reconciled(const model::Model& model, const data::Dataset& dataset) {
   comparison::require_values(model);
-  std::vector<std::string> said_already;
+  std::vector<std::string> warned_already;
   model::Model result = model;
-  result.drive = estimation::reconcile(model.drive, dataset, said_already);
+  result.drive = estimation::reconcile(model.drive, dataset, warned_already);
   return result;
 }
 
-std::shared_ptr<const estimation::Prepared> records_for(const Subject& subject, const model::Drive& drive) {
+std::shared_ptr<const estimation::PreparedData> records_for(const Subject& subject, const model::Drive& drive) {
   if (subject.pipeline.ready) return subject.pipeline.ready;
-  return std::make_shared<const estimation::Prepared>(
+  return std::make_shared<const estimation::PreparedData>(
       estimation::prepare_all(*subject.dataset, drive, subject.pipeline));
 }
 
@@ -36,7 +36,7 @@ View::View(const Subject& subject)
       prepared(*ready) {
   estimation::PipelineOptions pipeline = subject.pipeline;
   pipeline.ready = ready;
-  comparison = comparison::compare(dataset, model, pipeline, subject.beside, subject.extent);
+  comparison = comparison::compare(dataset, model, pipeline, subject.baselines, subject.extent);
   terms = estimation::terms_of(model);
   if (model_before) {
     model_before->drive = model.drive;

@@ -1,4 +1,4 @@
-// Model and measurement side by side on the rows of each balance: what all parts of a page are made from.
+// Model and measurement on the rows of each balance: the source of all parts of a page.
 #pragma once
 
 #include <memory>
@@ -32,7 +32,7 @@ struct View {
 
   data::Axis axis() const { return model.drive.axis; }
   std::string unit_of(data::Column column) const { return data::unit_of(column, axis()); }
-  // Residual that the page is about: before, where there is one; what shows there is what was looked for.
+  // Residual that the page is about: before, where there is one; the missing effect shows there.
   static const Eigen::VectorXd& shown(const BalanceView& balance) {
     return balance.before ? *balance.before : balance.residual;
   }
@@ -41,9 +41,9 @@ struct View {
   const data::Dataset& dataset;
   model::Model model;
   std::optional<model::Model> model_before;
-  // What is compared, too: made once, and not at all where the subject's pipeline brings it along.
-  std::shared_ptr<const estimation::Prepared> ready;
-  const estimation::Prepared& prepared;
+  // What is compared, too: computed once, and not at all where the subject's pipeline brings it along.
+  std::shared_ptr<const estimation::PreparedData> ready;
+  const estimation::PreparedData& prepared;
   comparison::Comparison comparison;
   std::optional<comparison::Comparison> comparison_before;
   estimation::Terms terms;

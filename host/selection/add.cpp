@@ -6,7 +6,7 @@
 #include <charconv>
 #include <cmath>
 
-#include "host/catalogue/defined.hpp"
+#include "host/catalogue/user_defined_effect.hpp"
 #include "host/comparison/noise_floor.hpp"
 #include "host/estimation/in_parallel.hpp"
 #include "host/selection/candidate_models.hpp"
@@ -25,11 +25,11 @@ double root_mean_square(const Eigen::VectorXd& r) {
 // Hold-out records on the pipeline of the fit.
 struct Holdout {
   std::vector<const data::Experiment*> experiments;
-  estimation::Prepared prepared;
+  estimation::PreparedData prepared;
   std::unique_ptr<BalanceData> data;
 
   Holdout(const data::Dataset& dataset, const Identification& fitted, Balance balance,
-          const estimation::Prepared* ready) {
+          const estimation::PreparedData* ready) {
     for (const data::Experiment& e : dataset.experiments)
       if (e.role == data::Role::holdout) experiments.push_back(&e);
     if (experiments.empty()) return;
@@ -100,9 +100,9 @@ Addition compare_models(const data::Dataset& dataset, const model::Model& before
   result.tables = extended->tables;
   result.warnings = extended->warnings;
   if (action == "add" && result.before.rmse_holdout && *result.after.rmse_holdout >= *result.before.rmse_holdout)
-    result.warnings.push_back(
-        fmt::format("the error on held-out data did not fall: {} does not hold beyond the data that it was fitted on",
-                    result.effect));
+    result.warnings.push_back(fmt::format(
+        "the error on held-out data did not decrease: {} does not hold beyond the data that it was fitted on",
+        result.effect));
   return result;
 }
 

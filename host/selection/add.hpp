@@ -1,5 +1,5 @@
-// An effect more or less in a model: refitted, with the error before and after on data that the fit saw and that it
-// never saw.
+// Adds an effect to a model, or removes one, and refits. Reports the error before and after, on fitted and on held-out
+// data.
 #pragma once
 
 #include <optional>
@@ -39,9 +39,9 @@ struct EffectName {
 };
 EffectName parse_effect(std::string_view text);
 
-// Adds an effect and refits everything, shapes continuously. Experiments of role fit are fitted, those of role holdout
-// compared. Throws model::ModelError where the effect cannot be added and data::DataError where the data cannot show
-// it. An effect that users make (see user_defined_effects.hpp) is described by `given`.
+// Adds an effect and refits everything, nonlinear parameters continuously. Experiments of role fit are fitted, those of
+// role holdout compared. Throws model::ModelError where the effect cannot be added and data::DataError where the data
+// cannot show it. A user-defined effect (see user_defined_effects.hpp) is described by `given`.
 Addition add(const data::Dataset& dataset, const model::Model& model, std::string_view effect,
              const estimation::PipelineOptions& options, const UserDefinition& given = {});
 

@@ -12,7 +12,7 @@
 namespace flexspline::selection {
 namespace {
 
-// Fall of chi-square over rows, in units of the noise where that is known: comparable between balances.
+// Decrease of chi-square over rows, in units of the noise where that is known: comparable between balances.
 double chi2_drop(const Diagnosis& d) {
   if (d.candidates.empty()) return 0.0;
   const Candidate& c = d.candidates.front();
@@ -20,7 +20,7 @@ double chi2_drop(const Diagnosis& d) {
   return d.noise_floor && *d.noise_floor > 0.0 ? drop / (*d.noise_floor * *d.noise_floor) : drop;
 }
 
-std::string label(const Named& named) {
+std::string label(const NamedEffect& named) {
   return named.order ? fmt::format("{}:{:g}", named.effect, *named.order) : named.effect;
 }
 
@@ -58,7 +58,7 @@ std::string needless(const data::Dataset& dataset, const model::Model& model, co
 }
 
 Completion add_until_complete(const data::Dataset& dataset, const model::Model& model, const Options& options,
-                              std::size_t most_rounds, const std::function<void(const Diagnosis&)>& said) {
+                              std::size_t most_rounds, const std::function<void(const Diagnosis&)>& progress) {
   Completion result;
   result.model = model;
   std::vector<std::string> added;               // ids
@@ -75,20 +75,20 @@ Completion add_until_complete(const data::Dataset& dataset, const model::Model& 
       more = false;
     }
     result.rounds.push_back(std::move(found));
-    if (said) said(result.rounds.back());
+    if (progress) progress(result.rounds.back());
     if (!more) return result;
     if (options.progress) options.progress("adding it");
     result.model = add(dataset, result.model, label(result.rounds.back().named.front()), options.pipeline).model;
     added.push_back(result.model.effects.back().id);
     label_of[added.back()] = label(result.rounds.back().named.front());
     if (added.size() < 2) continue;
-    // The newest was just named beside the others; those are tried.
+    // The newest was just named with the others in the model; only those are tried.
     const std::vector<std::string> before(added.begin(), added.end() - 1);
     const std::string out = needless(dataset, result.model, before, options);
     if (out.empty()) continue;
     result.model = remove(dataset, result.model, out, options.pipeline).model;
     std::erase(added, out);
-    // Named once and needless since: naming it again would go round in circles.
+    // It was named before and removed as needless. Naming it again would be an endless loop.
     const bool again = std::find(result.removed.begin(), result.removed.end(), label_of[out]) != result.removed.end();
     if (again) return result;
     result.removed.push_back(label_of[out]);

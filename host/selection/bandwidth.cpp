@@ -112,7 +112,7 @@ Bandwidth highest_bandwidth(const std::vector<const Experiment*>& experiments, c
     if (!(e->has(Column::current) || e->has(Column::motor_torque)) || !(position || e->has(Column::motor_velocity)))
       continue;
     moving.push_back(e);
-    // Of a velocity column the filters are not known: it limits nothing here.
+    // The filters of a measured velocity are not known, so it sets no limit here.
     noise.push_back(position ? noise_by_fourth_differences((*e)[Column::motor_position], e->segments) : 0.0);
   }
   Bandwidth result;

@@ -1,5 +1,5 @@
-// The highest bandwidth at which a regression on differentiated positions holds: where the noise of the regressors is
-// still small against what they are to explain.
+// The highest bandwidth for a regression on differentiated positions: the noise of the regressors is still small
+// compared with the torque that they explain.
 #pragma once
 
 #include <string>

@@ -21,17 +21,17 @@ using estimation::Term;
 // Relative change of the squares that ends the search: well below one by score.
 constexpr double kSameSquares = 1e-5;
 constexpr std::size_t kFineGridPoints = 24;
-constexpr std::size_t kRefined = 4;  // candidates whose shapes are searched continuously
+constexpr std::size_t kRefined = 4;  // candidates whose nonlinear parameters are searched continuously
 
-// On `coarse`, the same rows from fewer samples.
-void choose_shapes(BalanceSearch& search, BalanceData& coarse, CandidateModel& model) {
+// Chooses the nonlinear parameters of the added effect on a grid. `coarse` has the same rows from fewer samples.
+void choose_nonlinear(BalanceSearch& search, BalanceData& coarse, CandidateModel& model) {
   Term& added = model.terms.back();
   for (std::size_t p = 0; p < added.values.size(); ++p) {
-    if (!added.free_shape(p) || begins_at_zero(added, p)) continue;
+    if (!added.free_nonlinear(p) || begins_at_zero(added, p)) continue;
     double best = added.values[p], least = std::numeric_limits<double>::infinity();
-    // What no linear parameter scales fits at its place only.
-    const std::size_t points = added.entry->count(effects::Kind::linear) == 0 ? kFineGridPoints : kShapeGridPoints;
-    for (const double value : estimation::shape_grid(estimation::shape_range(*search.data, added, p), points)) {
+    // An effect without a linear parameter fits in a narrow range only, so its grid is finer.
+    const std::size_t points = added.entry->count(effects::Kind::linear) == 0 ? kFineGridPoints : kGridPoints;
+    for (const double value : estimation::parameter_grid(estimation::parameter_range(*search.data, added, p), points)) {
       added.values[p] = value;
       const double squares = whitened_squares(coarse, model.terms, search.base);
       if (squares < least) {
@@ -43,20 +43,20 @@ void choose_shapes(BalanceSearch& search, BalanceData& coarse, CandidateModel& m
   }
 }
 
-// The effect of the model whose column looks most like that of the added one.
+// The effect of the model whose column is most similar to that of the added one.
 std::string most_collinear_effect(BalanceData& data, const CrossValidatedFit& fit, std::size_t added) {
   std::string best = "the model";
   double most = 0.0;
-  for (const Slot& own : fit.linear) {
+  for (const ParameterRef& own : fit.linear) {
     if (own.term != added) continue;
     const Eigen::VectorXd column = data.column(fit.terms, own);
-    for (const Slot& other : fit.linear) {
+    for (const ParameterRef& other : fit.linear) {
       if (other.term == added) continue;
       const Eigen::VectorXd& theirs = data.column(fit.terms, other);
       const double norm = column.norm() * theirs.norm();
-      const double alike = norm > 0.0 ? std::abs(column.dot(theirs)) / norm : 0.0;
-      if (alike > most) {
-        most = alike;
+      const double similar = norm > 0.0 ? std::abs(column.dot(theirs)) / norm : 0.0;
+      if (similar > most) {
+        most = similar;
         best = fit.terms[other.term].id;
       }
     }
@@ -69,7 +69,7 @@ bool scales_torques(const Terms& terms) {
                      [](const Term& t) { return (t.entry->info->reads & effects::kTorqueScale) != 0; });
 }
 
-// A candidate that needs an impossible value, or that makes the base model impossible, is a fit and no explanation.
+// A candidate that needs an impossible value, or that makes the base model impossible, is a fit, not an explanation.
 void check_admissible(BalanceData& data, const CrossValidatedFit& base, CandidateFit& candidate) {
   const auto& fit = candidate.fit;
   const auto refuse = [&](std::string why) {
@@ -90,22 +90,22 @@ void check_admissible(BalanceData& data, const CrossValidatedFit& base, Candidat
             catalogue::unit_on(info.unit, data.prepared().rotary ? data::Axis::rotary : data::Axis::linear)));
       continue;
     }
-    // Friction, inertia and stiffness have a sign; offsets and asymmetries may have any. What the candidate can draw
-    // itself may go over to it.
+    // Friction, inertia and stiffness have a sign; offsets and asymmetries may have any. What the candidate can explain
+    // itself may move to it.
     if (info.low != 0.0) continue;
     if (catalogue::names_contain(fit.terms[added].entry->info->contains, t.entry->name())) continue;
     const auto before = position(base, t.id, info.name);
     if (!before) continue;
     const double was = base.theta[static_cast<Eigen::Index>(*before)];
     if (was <= kPolicy.known_base_errors * base.std[static_cast<Eigen::Index>(*before)]) continue;
-    // A coefficient moves with its exponent, so torques are compared, not numbers.
+    // The coefficient depends on the exponent, so torques are compared, not coefficients.
     const std::size_t old = base.linear[*before].term;
     const Eigen::VectorXd torque = data.term_torque(base.terms, old);
-    // An effect that is hardly larger than what is missing is not known well enough to rule anything out.
+    // An effect that is hardly larger than the missing torque is not known well enough to refuse a candidate.
     if (torque.norm() < kPolicy.known_base_over_missing * base.residual.norm()) continue;
-    // Where all but nothing is left the base model was worth nothing; unless all torques shrank together.
+    // Where almost nothing is left the base model was useless, unless all torques decreased together.
     if (candidate.gain.chi2_percent > kPolicy.all_explained_percent && !scales_torques(fit.terms)) continue;
-    // Of the larger one: without what is missing an effect may be found half as large as it is, or twice.
+    // Relative to the larger one: without the missing effect an estimate may be half or twice the true value.
     const Eigen::VectorXd now = data.term_torque(fit.terms, fit.linear[j].term);
     const double change = (now - torque).norm() / std::max(torque.norm(), now.norm());
     if (change > kPolicy.most_base_change)
@@ -118,15 +118,15 @@ void check_admissible(BalanceData& data, const CrossValidatedFit& base, Candidat
   }
 }
 
-// Shapes that begin at zero, where the fit moved them: the model is all but linear in them there.
+// Moves nonlinear parameters that begin at zero to their fitted values; the model is almost linear in them there.
 void take_first_step(const BalanceData& data, CrossValidatedFit& fit) {
   const auto on_balance = estimation::terms_on(fit.terms, data.balance(), data.prepared().torque_measured);
-  const std::vector<Slot> shapes = estimation::free_shape_slots(fit.terms, on_balance);
-  for (std::size_t k = 0; k < shapes.size(); ++k) {
+  const std::vector<ParameterRef> nonlinear = estimation::free_nonlinear_parameters(fit.terms, on_balance);
+  for (std::size_t k = 0; k < nonlinear.size(); ++k) {
     Term& added = fit.terms.back();
     double& step = fit.theta[static_cast<Eigen::Index>(fit.linear.size() + k)];
-    if (&fit.terms[shapes[k].term] != &added || !begins_at_zero(added, shapes[k].parameter)) continue;
-    added.values[shapes[k].parameter] += step;
+    if (&fit.terms[nonlinear[k].term] != &added || !begins_at_zero(added, nonlinear[k].parameter)) continue;
+    added.values[nonlinear[k].parameter] += step;
     step = 0.0;
   }
 }
@@ -143,16 +143,16 @@ CandidateFit evaluate(BalanceSearch& search, CandidateModel model) {
 
 bool better(const CandidateFit& a, const CandidateFit& b);
 
-// Where the best shape makes the model impossible, the best of those that do not: a bound that the model's own meaning
-// sets. Returns `refused` where there is none.
+// Where the best value of a nonlinear parameter makes the model impossible, returns the best admissible value of the
+// grid; `refused` where there is none.
 CandidateFit best_admissible(BalanceSearch& search, CandidateModel model, CandidateFit refused) {
   Term& added = model.terms.back();
   if (refused.gain.score < kPolicy.named_score) return refused;
   for (std::size_t p = 0; p < added.values.size(); ++p) {
-    if (!added.free_shape(p) || begins_at_zero(added, p)) continue;
+    if (!added.free_nonlinear(p) || begins_at_zero(added, p)) continue;
     const double chosen = added.values[p];
     for (const double value :
-         estimation::shape_grid(estimation::shape_range(*search.data, added, p), kShapeGridPoints)) {
+         estimation::parameter_grid(estimation::parameter_range(*search.data, added, p), kGridPoints)) {
       if (value == chosen) continue;
       added.values[p] = value;
       CandidateFit candidate = evaluate(search, model);
@@ -163,7 +163,7 @@ CandidateFit best_admissible(BalanceSearch& search, CandidateModel model, Candid
   return refused;
 }
 
-// Of the base model, for the choice of orders.
+// Residual and span of the base model, for the choice of orders.
 Unexplained left_by(BalanceData& data, const CrossValidatedFit& base) {
   Unexplained left;
   left.root_weights = base.root_weights;
@@ -190,18 +190,18 @@ std::optional<std::size_t> position(const CrossValidatedFit& fit, std::string_vi
 }
 
 bool passes(const CandidateFit& t) {
-  // What differs from record to record only, as temperature does, takes from the random effects and hardly from the
-  // rest.
+  // An effect that differs between records only (temperature) reduces the random effects and hardly the residual.
   return t.admissible && t.score() > kPolicy.named_score &&
          std::max({t.gain.chi2_percent, t.gain.fixed_effects_percent, t.other_balance_percent}) >
              kPolicy.named_chi2_percent;
 }
 
-// Whether the law bends over a travel that the encoder resolves in few steps: what it leaves there is the encoder's.
+// Whether the law is nonlinear over a travel that the encoder resolves in few steps: the residual there is the
+// encoder's.
 bool is_smeared(const BalanceData& data, const CandidateFit& candidate) {
   const Term& added = candidate.fit.terms.back();
   for (std::size_t p = 0; p < added.values.size(); ++p) {
-    if (!added.free_shape(p) || added.entry->parameters[p].limit != effects::Limit::travel) continue;
+    if (!added.free_nonlinear(p) || added.entry->parameters[p].limit != effects::Limit::travel) continue;
     for (const RowRange& range : data.records()) {
       const std::optional<double>& quantum = data.prepared().records[range.record].motor_quantum;
       if (quantum && added.values[p] < kPolicy.smeared_quanta * *quantum) return true;
@@ -210,14 +210,15 @@ bool is_smeared(const BalanceData& data, const CandidateFit& candidate) {
   return false;
 }
 
-// A law that contains another fits at least as well. Of the best one and its rivals in the catalogue that leave all but
-// the same error the one with the fewest parameters comes first.
+// A law that contains another one fits at least as well. So among the best law and those confused with it that leave
+// almost the same error, the one with the fewest parameters comes first.
 void prefer_simple(const BalanceSearch& search, std::vector<CandidateFit>& candidates) {
   const CrossValidatedFit& base = search.base;
   for (CandidateFit& candidate : candidates) candidate.leads = false;
   if (candidates.empty() || !passes(candidates.front())) return;
   const CandidateFit& best = candidates.front();
-  // Left-out squares over the noise of each record as the best one has it: a loud record must not decide alone.
+  // Left-out squares over each record's noise variance, as the best candidate leaves it: a noisy record must not decide
+  // alone.
   const std::vector<LeftOut> noise = best.fit.left_out;
   const auto chi2 = [&](const CrossValidatedFit& fit) {
     double sum = 0.0;
@@ -225,19 +226,20 @@ void prefer_simple(const BalanceSearch& search, std::vector<CandidateFit>& candi
       sum += fit.left_out[i].squares * noise[i].rows / std::max(noise[i].squares, 1e-300);
     return sum;
   };
-  const double least = chi2(best.fit), fall = chi2(base) - least;
+  const double least = chi2(best.fit), decrease = chi2(base) - least;
   std::size_t simplest = 0;
   bool distinguished = true;
   for (std::size_t i = 1; i < candidates.size(); ++i) {
     const CandidateFit& other = candidates[i];
-    // A law of dozens of parameters is everyone's rival.
+    // A law with dozens of parameters counts as confused with every other.
     const bool dozens = best.model.added >= other.model.added + kPolicy.many_parameters;
-    const bool rivals = dozens || catalogue::names_contain(best.model.entry->info->rivals, other.model.entry->name()) ||
-                        catalogue::names_contain(other.model.entry->info->rivals, best.model.entry->name());
-    if (!rivals || !passes(other) || other.model.added >= candidates[simplest].model.added) continue;
+    const bool is_confused =
+        dozens || catalogue::names_contain(best.model.entry->info->confused_with, other.model.entry->name()) ||
+        catalogue::names_contain(other.model.entry->info->confused_with, best.model.entry->name());
+    if (!is_confused || !passes(other) || other.model.added >= candidates[simplest].model.added) continue;
     const double left = chi2(other.fit);
     const auto within = [&](const SelectionPolicy::Same& same) {
-      return left <= same.left * least && left - least <= same.share_of_missing * fall;
+      return left <= same.left * least && left - least <= same.share_of_missing * decrease;
     };
     const bool same = within(is_smeared(*search.data, other) ? kPolicy.same_smeared : kPolicy.same) ||
                       (dozens && within(kPolicy.hardly_more));
@@ -254,27 +256,28 @@ std::vector<CandidateFit> rank_candidates(BalanceSearch& search) {
   std::vector<CandidateModel> tried =
       candidate_models(*search.data, search.base.terms, left_by(*search.data, search.base));
   std::vector<CandidateFit> candidates(tried.size());
-  estimation::Prepared few;
+  estimation::PreparedData few;
   BalanceData decimated = search.data->decimated(few);
   decimated.columns(search.base.terms, search.base.linear);
-  // Each on its own copy of the data, with the columns that are there: the result is that of one thread.
+  // Each candidate has its own copy of the data and its cached columns, so the result does not depend on the number of
+  // threads.
   estimation::in_parallel(tried.size(), [&](std::size_t i) {
     BalanceData data = *search.data, coarse = decimated;
     BalanceSearch own{&data, search.keep, search.base};
     CandidateModel& model = tried[i];
-    choose_shapes(own, coarse, model);
+    choose_nonlinear(own, coarse, model);
     candidates[i] = evaluate(own, model);
     if (!candidates[i].admissible) candidates[i] = best_admissible(own, std::move(model), std::move(candidates[i]));
   });
-  // By score alone: a shape that is only near may make the model impossible where the best one does not.
+  // By score alone: a grid value near the best one may make the model impossible although the best one does not.
   std::stable_sort(candidates.begin(), candidates.end(),
                    [](const CandidateFit& a, const CandidateFit& b) { return a.gain.score > b.gain.score; });
   std::vector<CandidateFit*> to_refine;
   for (CandidateFit& candidate : candidates) {
     const Term& added = candidate.model.terms.back();
-    bool has_shape = false;
-    for (std::size_t p = 0; p < added.values.size(); ++p) has_shape = has_shape || added.free_shape(p);
-    if (has_shape && candidate.gain.score >= kPolicy.named_score && to_refine.size() < kRefined)
+    bool has_nonlinear = false;
+    for (std::size_t p = 0; p < added.values.size(); ++p) has_nonlinear = has_nonlinear || added.free_nonlinear(p);
+    if (has_nonlinear && candidate.gain.score >= kPolicy.named_score && to_refine.size() < kRefined)
       to_refine.push_back(&candidate);
   }
   estimation::in_parallel(to_refine.size(), [&](std::size_t i) {
@@ -284,8 +287,8 @@ std::vector<CandidateFit> rank_candidates(BalanceSearch& search) {
     CandidateModel refined = candidate.model;
     refined.terms = candidate.fit.terms;
     const auto on_balance = estimation::terms_on(refined.terms, data.balance(), data.prepared().torque_measured);
-    estimation::refine_shapes(data, refined.terms, on_balance, noise_covariance(data, candidate.fit), kSameSquares,
-                              &coarse);
+    estimation::refine_nonlinear(data, refined.terms, on_balance, noise_covariance(data, candidate.fit), kSameSquares,
+                                 &coarse);
     CandidateFit again = evaluate(own, std::move(refined));
     if (better(again, candidate) || !candidate.admissible) candidate = std::move(again);
   });
@@ -311,8 +314,8 @@ bool is_another_law(const CandidateFit& candidate, const BalanceData& data) {
   const Term& term = candidate.fit.terms.back();
   for (std::size_t p = 0; p < term.values.size(); ++p) {
     if (term.entry->parameters[p].limit != effects::Limit::velocity) continue;
-    // The range ends at a quarter of the fast motion; wide is from a tenth of it.
-    return term.values[p] > kPolicy.wide_share_of_range * estimation::shape_range(data, term, p).high;
+    // The range ends at a quarter of the fast motion; a law is wide from a tenth of it on.
+    return term.values[p] > kPolicy.wide_share_of_range * estimation::parameter_range(data, term, p).high;
   }
   return false;
 }
@@ -322,7 +325,7 @@ std::optional<CandidateFit> backward_elimination(BalanceSearch& search, const Ca
   std::vector<CandidateFit> more = rank_candidates(next);
   if (more.empty() || !passes(more.front())) return std::nullopt;
   const CandidateFit& second = more.front();
-  // Only what may be added to the base model alone can take the place of the first.
+  // Only an effect that may be added to the base model alone can replace the first one.
   CandidateModel alone;
   try {
     alone.terms = extend(search.base.terms, *second.model.entry, second.model.order);

@@ -30,14 +30,14 @@ bool replaced_in(const Terms& terms, const catalogue::Entry& entry) {
 }
 
 // The model has the effect, or one that takes its place.
-bool stands_in(const Terms& terms, std::string_view name) {
+bool replaces_it(const Terms& terms, std::string_view name) {
   return has(terms, name) || std::any_of(terms.begin(), terms.end(), [&](const Term& t) {
            return catalogue::names_contain(t.entry->info->replaces, name);
          });
 }
 
-// All torques of the motor balance could be scaled alike, unless one of them is known: a parameter that the user gave,
-// or the torque of a loaded sensor.
+// All torques of the motor balance could be scaled by one factor, unless one of them is known: a parameter that the
+// user gave, or the torque of a loaded sensor.
 bool knows_torque_scale(const BalanceData& data, const Terms& terms) {
   if (states_a_torque(terms)) return true;
   if (!data.prepared().torque_measured) return false;
@@ -52,14 +52,14 @@ bool knows_torque_scale(const BalanceData& data, const Terms& terms) {
   return std::sqrt(sensor) > kPolicy.least_loaded_share * data.prepared().constants.gear_ratio * std::sqrt(effort);
 }
 
-// Something in the model already stands in for this effect.
+// Something in the model already has this effect's place.
 bool covered(const Terms& terms, const catalogue::Entry& entry) {
   return std::any_of(terms.begin(), terms.end(),
                      [&](const Term& t) { return catalogue::names_contain(t.entry->info->replaces, entry.name()); });
 }
 
-// Some record moves in both directions (each a tenth of its rows), or stands still, or there are several for each: else
-// what differs between directions is what differs between records.
+// Some record moves in both directions (each a tenth of its rows), or is at rest, or there are several records of each
+// direction. Else differences between directions are confounded with differences between records.
 bool moves_both_ways(const BalanceData& data) {
   int forward_only = 0, backward_only = 0;
   for (const auto& range : data.records()) {
@@ -79,7 +79,7 @@ bool moves_both_ways(const BalanceData& data) {
 
 bool visible(const BalanceData& data, const Terms& terms, const catalogue::Entry& entry) {
   const unsigned reads = entry.info->reads;
-  const estimation::Prepared& p = data.prepared();
+  const estimation::PreparedData& p = data.prepared();
   const bool has_torque =
       p.torque_measured || std::any_of(p.records.begin(), p.records.end(),
                                        [](const estimation::Record& r) { return !r.inputs.torque.empty(); });
@@ -92,7 +92,8 @@ bool visible(const BalanceData& data, const Terms& terms, const catalogue::Entry
     return std::any_of(data.records().begin(), data.records().end(),
                        [&](const estimation::RowRange& range) { return what(p.records[range.record]); });
   };
-  // Behind a rigid gear the output's motion is the motor's, and so are its effects.
+  // Behind a rigid gear the output's motion is proportional to the motor's, so its effects are confounded with the
+  // motor's.
   if ((reads & effects::kOutputMotion) && !(reads & effects::kOutputAngle) &&
       !any([](const estimation::Record& r) { return r.has_output_motion; }))
     return false;
@@ -112,11 +113,11 @@ bool visible(const BalanceData& data, const Terms& terms, const catalogue::Entry
   return true;
 }
 
-// Orders of an effect that the residual holds most of, by its waves at the rows alone: without the filter, which costs
-// far more than it could change in the ranking of neighbours. Where the motor hardly turns, the waves of all orders
-// look like the offset that the model may have, so that only what it has not counts.
+// The orders with the largest waves in the residual. Waves are not filtered: the filter costs much and hardly changes
+// the ranking. Where the motor hardly turns, waves of all orders resemble the model's offset, so only their orthogonal
+// part counts.
 std::vector<double> likely_orders(const BalanceData& data, const catalogue::Entry& entry, const Unexplained& left) {
-  std::vector<std::pair<double, double>> found;  // minus the fall, order
+  std::vector<std::pair<double, double>> found;  // minus the decrease, order
   std::vector<effects::Inputs<catalogue::Real>> rows;
   for (const auto& range : data.records()) {
     const estimation::Record& r = data.prepared().records[range.record];
@@ -133,7 +134,7 @@ std::vector<double> likely_orders(const BalanceData& data, const catalogue::Entr
       values[given] = order;
       values[p] = 1.0;
       if (entry.info->phase == Phase::shift) {
-        // What it does to the torsion, a stiffness makes a torque of.
+        // It changes the torsion; a stiffness turns that into a torque.
         auto shifted = rows;
         entry.real.change(values.data(), data.prepared().constants, shifted);
         for (std::size_t k = 0; k < rows.size(); ++k) wave[k] = shifted[k].torsion - rows[k].torsion;
@@ -151,7 +152,8 @@ std::vector<double> likely_orders(const BalanceData& data, const catalogue::Entr
   std::sort(found.begin(), found.end());
   std::vector<double> orders;
   for (std::size_t i = 0; i < kPolicy.orders_tried; ++i) orders.push_back(found[i].second);
-  // Where these data hardly tell orders, the one that such effects mostly have is tried, too; another balance may tell.
+  // Where these data hardly distinguish orders, the usual one of such effects is tried, too; another balance may
+  // decide.
   for (std::size_t i = kPolicy.orders_tried; i < found.size(); ++i)
     if (found[i].second == entry.parameters[given].usual &&
         found[i].first <= kPolicy.usual_order_share * found[0].first)
@@ -172,7 +174,7 @@ std::size_t free_count(const Terms& terms) {
 bool may_be_seen(const BalanceData& data, const Terms& terms, const catalogue::Entry& entry) {
   if (!visible(data, terms, entry) || covered(terms, entry)) return false;
   if (!entry.info->replaces.empty() && !replaced_in(terms, entry)) return false;
-  if (!entry.info->modulates.empty() && !stands_in(terms, entry.info->modulates)) return false;
+  if (!entry.info->modulates.empty() && !replaces_it(terms, entry.info->modulates)) return false;
   return entry.count(Kind::given) > 0 || !has(terms, entry.name());
 }
 
@@ -188,7 +190,7 @@ Terms extend(const Terms& terms, const catalogue::Entry& entry, std::optional<do
   for (const Term& t : terms)
     if (t.entry->name() == entry.name() && (!ordered || t.label() == estimation::candidate_term(entry, order).label()))
       throw model::ModelError(fmt::format("the model has {} already; remove it first, or identify again", t.label()));
-  if (!entry.info->modulates.empty() && !stands_in(terms, entry.info->modulates))
+  if (!entry.info->modulates.empty() && !replaces_it(terms, entry.info->modulates))
     throw model::ModelError(fmt::format("{} scales {}, which the model does not have; add that first", entry.name(),
                                         entry.info->modulates));
   Terms extended;
@@ -213,10 +215,10 @@ std::vector<CandidateModel> candidate_models(const BalanceData& data, const Term
     if (entry.identified_on() != data.balance() && !collapsed) continue;
     if (!visible(data, terms, entry) || covered(terms, entry)) continue;
     if (!entry.info->replaces.empty() && !replaced_in(terms, entry)) continue;
-    if (!entry.info->modulates.empty() && !stands_in(terms, entry.info->modulates)) continue;
+    if (!entry.info->modulates.empty() && !replaces_it(terms, entry.info->modulates)) continue;
     const bool ordered = entry.count(Kind::given) > 0;
     if (!ordered && has(terms, entry.name())) continue;
-    // Orders are counted by turn: a linear axis has turns where its pitch is known.
+    // Orders are per turn: a linear axis has turns where its pitch is known.
     const bool turns = data.prepared().rotary || data.prepared().constants.turn_angle_scale != 1.0;
     if (ordered && !turns) continue;
     const std::vector<double> orders = ordered ? likely_orders(data, entry, left) : std::vector<double>{0.0};
@@ -231,8 +233,8 @@ std::vector<CandidateModel> candidate_models(const BalanceData& data, const Term
       model.terms = extend(terms, entry, model.order);
       Term& added = model.terms.back();
       for (std::size_t p = 0; p < added.values.size(); ++p)
-        if (added.free_shape(p))
-          added.values[p] = begins_at_zero(added, p) ? 0.0 : estimation::shape_range(data, added, p).at(0.5);
+        if (added.free_nonlinear(p))
+          added.values[p] = begins_at_zero(added, p) ? 0.0 : estimation::parameter_range(data, added, p).at(0.5);
       estimation::set_grid_values(data, model.terms, {model.terms.size() - 1});
       model.added = static_cast<double>(free_count(model.terms)) - static_cast<double>(free_count(terms));
       list.push_back(std::move(model));

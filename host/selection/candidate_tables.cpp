@@ -9,19 +9,19 @@
 namespace flexspline::selection {
 namespace {
 
-// Motion is filtered that much wider than the rows, which are filtered once more.
+// The motion's filter is wider than the rows' by this factor, as the rows are filtered once more.
 constexpr double kMotionOverRow = 2.5;
 
-// At the highest bandwidth; wider where waves over the motor's angle lie above the motion.
-estimation::Prepared prepare(const std::vector<const data::Experiment*>& experiments, const model::Drive& drive,
-                             double highest_hz, const SelectionPolicy& policy) {
+// At the highest bandwidth; wider where waves over the motor's angle are above the bandwidth of the motion.
+estimation::PreparedData prepare(const std::vector<const data::Experiment*>& experiments, const model::Drive& drive,
+                                 double highest_hz, const SelectionPolicy& policy) {
   double slowest_hz = 1e300;
   for (const data::Experiment* e : experiments) slowest_hz = std::min(slowest_hz, 1.0 / e->sample_s);
   estimation::Pipeline pipeline;
   pipeline.motion_cutoff_hz = std::min(kMotionOverRow * highest_hz, 0.45 * slowest_hz);
   pipeline.mask = false;
   pipeline.row_cutoff_hz = highest_hz;
-  estimation::Prepared prepared = estimation::prepare_with(experiments, drive, pipeline);
+  estimation::PreparedData prepared = estimation::prepare_with(experiments, drive, pipeline);
   double widest_hz = highest_hz;
   const double wanted_hz =
       std::min({1.5 * highest_order_hz(prepared), policy.widest_over_sampling * slowest_hz, policy.widest_hz});
@@ -31,7 +31,7 @@ estimation::Prepared prepare(const std::vector<const data::Experiment*>& experim
   return estimation::prepare_with(experiments, drive, pipeline);
 }
 
-estimation::Prepared without_held_out(estimation::Prepared prepared) {
+estimation::PreparedData without_held_out(estimation::PreparedData prepared) {
   std::erase_if(prepared.records,
                 [](const estimation::Record& r) { return r.experiment->role == data::Role::holdout; });
   return prepared;
@@ -64,13 +64,13 @@ CandidateTables make_tables(const std::vector<const data::Experiment*>& experime
   CandidateTables tables;
   tables.bandwidth = highest_bandwidth(experiments, policy);
   const double highest_hz = tables.bandwidth.highest_hz;
-  estimation::Prepared prepared = prepare(experiments, drive, highest_hz, policy);
+  estimation::PreparedData prepared = prepare(experiments, drive, highest_hz, policy);
   take_noise_off_torque(prepared);
   if (!prepared.torque_measured) take_torque_from_load(prepared, terms);
   tables.sign = make_regressor_table(prepared, balance, terms, std::nullopt, highest_hz, policy);
   if (tables.sign.model_columns == 0) return tables;
   if (balance == Balance::motor && presliding_law(terms) != nullptr) {
-    const estimation::Prepared fitted = without_held_out(prepared);
+    const estimation::PreparedData fitted = without_held_out(prepared);
     const std::vector<double> travels = presliding_travels(fitted, policy);
     const std::vector<double> squares = squares_by_travel(fitted, terms, travels);
     if (!squares.empty()) {

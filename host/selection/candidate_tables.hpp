@@ -1,4 +1,4 @@
-// Regressor tables of one data set, and the settings that it is looked at with.
+// Regressor tables of one data set, and the settings at which it is searched.
 #pragma once
 
 #include <optional>

@@ -13,7 +13,7 @@ namespace {
 
 using effects::Kind;
 using effects::Phase;
-using estimation::Slot;
+using estimation::ParameterRef;
 using estimation::Terms;
 
 // Placebo orders: none is within a fifth of a whole number or of a half.
@@ -71,14 +71,14 @@ Eigen::VectorXd from_model_current(const TableBuilder& builder, const catalogue:
   return column;
 }
 
-// What scales another effect: slopes by its shapes.
+// What scales another effect: slopes by its nonlinear parameters.
 void add_modulation(TableBuilder& builder, const Extension& e) {
   CandidateTerm term = term_of(e.entry, e.order);
   const estimation::Term& added = e.terms.back();
   const auto on = estimation::terms_on(e.terms, builder.data.balance(), builder.prepared().torque_measured);
   for (std::size_t p = 0; p < added.values.size(); ++p)
-    if (added.free_shape(p)) {
-      term.columns.push_back(builder.add(builder.data.shape_column(e.terms, on, {e.added(), p})));
+    if (added.free_nonlinear(p)) {
+      term.columns.push_back(builder.add(builder.data.nonlinear_column(e.terms, on, {e.added(), p})));
       term.low.push_back(e.entry.parameters[p].low);
     }
   term.values = added.values;
@@ -108,27 +108,27 @@ void add_source(TableBuilder& builder, const Extension& e, std::size_t nonlinear
   term.nonlinear = nonlinear;
   term.values = added.values;
   term.highest_hz = e.highest_hz;
-  // No drive has such an order: it competes, and is never named.
+  // No drive has such an order. It competes with the others and is never named.
   term.is_placebo = e.order && *e.order != std::round(*e.order);
   if (term.is_placebo) {
     term.entry = nullptr;
     term.name = "placebo " + term.name;
   }
   term.sum_is_positive = info.replaces.empty() && nonlinear > 0 && e.entry.count(Kind::linear) == 2;
-  std::vector<Slot> slots;
+  std::vector<ParameterRef> refs;
   for (std::size_t p = 0; p < added.values.size(); ++p)
-    if (added.free_linear(p)) slots.push_back({e.added(), p});
+    if (added.free_linear(p)) refs.push_back({e.added(), p});
   bool corrects_effort = false;
-  const Eigen::MatrixXd own = builder.data.columns(e.terms, slots);
-  for (std::size_t j = 0; j < slots.size(); ++j) {
+  const Eigen::MatrixXd own = builder.data.columns(e.terms, refs);
+  for (std::size_t j = 0; j < refs.size(); ++j) {
     Eigen::VectorXd column = own.col(static_cast<Eigen::Index>(j));
     if ((info.reads & effects::kCurrent) != 0 && !e.entry.has_state) {
-      column = from_model_current(builder, e.entry, slots[j].parameter);
+      column = from_model_current(builder, e.entry, refs[j].parameter);
       corrects_effort = info.reads == effects::kCurrent && is_curved(column, builder.effort);
     }
     term.columns.push_back(builder.add(std::move(column)));
-    term.low.push_back(e.entry.parameters[slots[j].parameter].low);
-    term.high.push_back(e.entry.parameters[slots[j].parameter].high);
+    term.low.push_back(e.entry.parameters[refs[j].parameter].low);
+    term.high.push_back(e.entry.parameters[refs[j].parameter].high);
   }
   if (term.columns.empty()) return;
   if (corrects_effort && !bound_at_peaks(builder, term)) {
@@ -142,14 +142,14 @@ void add_effect(TableBuilder& builder, Extension e) {
   if (e.entry.info->phase == Phase::modulate) return add_modulation(builder, e);
   if (e.entry.info->reads & effects::kCurrent && e.entry.count(Kind::linear) == 0) return;  // delay, saturation
   estimation::Term& added = e.terms.back();
-  std::vector<std::size_t> free_shapes;
+  std::vector<std::size_t> free_nonlinear;
   for (std::size_t p = 0; p < added.values.size(); ++p)
-    if (added.free_shape(p)) free_shapes.push_back(p);
-  if (free_shapes.size() > 1) return;
-  if (free_shapes.empty()) return add_source(builder, e, 0);
-  const estimation::ShapeRange range = estimation::shape_range(builder.data, added, free_shapes[0]);
-  for (const double value : estimation::shape_grid(range, kShapeGridPoints)) {
-    added.values[free_shapes[0]] = value;
+    if (added.free_nonlinear(p)) free_nonlinear.push_back(p);
+  if (free_nonlinear.size() > 1) return;
+  if (free_nonlinear.empty()) return add_source(builder, e, 0);
+  const estimation::ParameterRange range = estimation::parameter_range(builder.data, added, free_nonlinear[0]);
+  for (const double value : estimation::parameter_grid(range, kGridPoints)) {
+    added.values[free_nonlinear[0]] = value;
     add_source(builder, e, 1);
   }
 }

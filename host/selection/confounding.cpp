@@ -4,14 +4,14 @@
 #include <cmath>
 
 #include "host/comparison/residual_map.hpp"
-#include "host/comparison/row_variables.hpp"
+#include "host/comparison/sample_variables.hpp"
 #include "host/estimation/model_projection.hpp"
 
 namespace flexspline::selection {
 namespace {
 
 constexpr std::size_t kBins = 10;
-// Fewer would draw a ripple as another one, of a lower order.
+// Fewer bins would alias a ripple to a lower order.
 constexpr double kBinsPerWave = 6.0;
 constexpr double kRowsPerBin = 8.0;
 
@@ -23,7 +23,7 @@ data::Axis axis_of(const BalanceData& data) {
   return data.prepared().rotary ? data::Axis::rotary : data::Axis::linear;
 }
 
-// What an effect adds to the model's torque that the model cannot make itself.
+// The part of an effect's torque that is orthogonal to the model.
 Eigen::VectorXd own_torque(BalanceSearch& search, const CandidateFit& candidate,
                            const estimation::ModelProjection& projection) {
   return projection
@@ -54,10 +54,10 @@ ConfoundingReason compare(BalanceSearch& search, const CandidateFit& first, cons
   const estimation::ModelProjection by_model(estimation::model_columns(data, search.base.terms),
                                              search.base.root_weights);
   const Eigen::VectorXd own = own_torque(search, first, by_model);
-  const estimation::ModelProjection by_rival(estimation::model_columns(data, second.fit.terms),
-                                             search.base.root_weights);
-  // The second may lack what it replaces of the model; that is the same torque for both.
-  const Eigen::VectorXd left = by_rival.orthogonal_part(own).col(0);
+  const estimation::ModelProjection by_confounded(estimation::model_columns(data, second.fit.terms),
+                                                  search.base.root_weights);
+  // The second may lack an effect that it replaces; that torque is the same for both.
+  const Eigen::VectorXd left = by_confounded.orthogonal_part(own).col(0);
   const double whole = search.base.root_weights.cwiseProduct(own).norm();
   reason.own_percent = whole > 0.0 ? 100.0 * search.base.root_weights.cwiseProduct(left).norm() / whole : 0.0;
   reason.variable = variable_of(data, own - left);
@@ -65,7 +65,7 @@ ConfoundingReason compare(BalanceSearch& search, const CandidateFit& first, cons
 }
 
 // Mean of what the model lacks over bins of a variable in which the effect shows most (what resists motion, where that
-// shows more), beside what the effect makes of it.
+// shows more), and the torque of the effect in the same bins.
 std::optional<Evidence> evidence(BalanceSearch& search, const CandidateFit& candidate, data::Axis axis) {
   BalanceData& data = *search.data;
   // With one friction for all runs: what is missing may pass for friction that differs.
@@ -74,8 +74,8 @@ std::optional<Evidence> evidence(BalanceSearch& search, const CandidateFit& cand
   const estimation::ModelProjection by_model(estimation::model_columns(data, search.base.terms), weights);
   const Eigen::VectorXd own = own_torque(search, candidate, by_model);
   const auto shares = comparison::localise(data, own, 1.0, axis);
-  const std::vector<comparison::RowVariable> variables = comparison::row_variables(data, axis);
-  const Eigen::VectorXd directions = comparison::row_directions(data);
+  const std::vector<comparison::SampleVariable> variables = comparison::sample_variables(data, axis);
+  const Eigen::VectorXd directions = comparison::sample_directions(data);
   for (const comparison::Share& share : shares) {
     const std::string name = share.variable.substr(0, share.variable.find(" x "));
     const auto variable =
@@ -132,18 +132,18 @@ bool is_scale_confounded(const BalanceSearch& search, const CandidateFit& first,
 
 void explain_named(BalanceSearch& search, const std::vector<CandidateFit>& candidates, data::Axis axis,
                    Diagnosis& result) {
-  const auto trial_of = [&](const Named& n) {
+  const auto trial_of = [&](const NamedEffect& n) {
     return std::find_if(candidates.begin(), candidates.end(), [&](const CandidateFit& t) {
       return t.model.entry->name() == n.effect && t.model.order == n.order;
     });
   };
   for (Candidate& c : result.candidates)
-    for (const Named& n : result.named) {
+    for (const NamedEffect& n : result.named) {
       if (c.effect != n.effect || c.order != n.order || trial_of(n) == candidates.end()) continue;
       c.evidence = evidence(search, *trial_of(n), axis);
-      for (const Named& other : result.named)
+      for (const NamedEffect& other : result.named)
         if (&other != &n && trial_of(other) != candidates.end())
-          c.rival_reasons.push_back(compare(search, *trial_of(n), *trial_of(other)));
+          c.confounding_reasons.push_back(compare(search, *trial_of(n), *trial_of(other)));
     }
 }
 

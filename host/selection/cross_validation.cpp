@@ -36,8 +36,7 @@ std::vector<Eigen::MatrixXd> factors_without(const RecordFactors& factors, std::
   return others;
 }
 
-// Predicts each part of all records from the others. What the whole data do not determine, a part of them does still
-// less: determined columns alone are fitted.
+// Predicts each part of all records from the others. Only columns that the whole data determine are fitted.
 std::vector<LeftOut> predict_left_out(const RecordFactors& factors, const MixedFit& whole, double tau) {
   const Eigen::Index columns = factors.columns();
   std::vector<Eigen::Index> used;
@@ -82,20 +81,20 @@ double rows_of(const std::vector<LeftOut>& records) {
                          [](double sum, const LeftOut& r) { return sum + r.rows; });
 }
 
-void set_linear(Terms& terms, const std::vector<Slot>& linear, const Eigen::VectorXd& theta) {
+void set_linear(Terms& terms, const std::vector<ParameterRef>& linear, const Eigen::VectorXd& theta) {
   for (std::size_t j = 0; j < linear.size(); ++j)
     terms[linear[j].term].values[linear[j].parameter] = theta[static_cast<Eigen::Index>(j)];
 }
 
-// What a fit with one R factor a record needs.
+// The data of a fit with one R factor for each record.
 struct Regression {
   Eigen::MatrixXd X;
   Eigen::VectorXd y;
   RecordFactors factors;
-  Eigen::Index first_shape = 0;
+  Eigen::Index first_nonlinear = 0;
 };
 
-// What `theta` leaves, each record's random effects as predicted.
+// The residual of `theta`, with each record's predicted random effects.
 Eigen::VectorXd residual_of(const BalanceData& data, const Regression& regression, const Eigen::VectorXd& theta,
                             const MixedFit& mixed) {
   Eigen::VectorXd residual = regression.y - regression.X * theta;
@@ -109,14 +108,16 @@ Eigen::VectorXd residual_of(const BalanceData& data, const Regression& regressio
   return residual;
 }
 
-// Fits the mixed model with as many rows counted as one as what it leaves asks for. Returns the fit and that number.
+// Fits the mixed model with the number of rows that count as one by its residual's autocorrelation. Returns the fit and
+// that number.
 std::pair<MixedFit, double> fit_with_autocorrelation(const BalanceData& data, const Regression& regression,
                                                      const Eigen::VectorXd& keep, CrossValidatedFit& fit) {
   double tau = data.filter_autocorrelation_time();
   MixedFit mixed;
-  // What random effects explain depends on how many rows count, which depends on what they leave.
+  // The random effects depend on the autocorrelation time of the residual, which depends on the random effects:
+  // iterate.
   for (int round = 0; round < 2; ++round) {
-    mixed = estimation::fit_mixed_model(regression.factors, fit.groups, regression.first_shape, tau);
+    mixed = estimation::fit_mixed_model(regression.factors, fit.groups, regression.first_nonlinear, tau);
     fit.theta = mixed.linear.theta.cwiseQuotient(regression.factors.size);
     fit.residual = residual_of(data, regression, fit.theta, mixed);
     fit.root_weights = root_weights_of(data, keep, mixed.effects.variance);
@@ -129,7 +130,7 @@ std::pair<MixedFit, double> fit_with_autocorrelation(const BalanceData& data, co
   return {std::move(mixed), tau};
 }
 
-// Of a fit in which `tau` rows count as one already, in the weights of the R factors.
+// For a fit whose R factors are weighted with `tau` rows counting as one.
 void take_covariance(const Regression& regression, const MixedFit& mixed, double tau, const Eigen::VectorXd& keep,
                      CrossValidatedFit& fit) {
   const double counted = (keep.array() > 0.0).count();
@@ -158,18 +159,18 @@ double rmse_of(const std::vector<LeftOut>& records) {
 CrossValidatedFit cross_validate(BalanceData& data, Terms terms, const Eigen::VectorXd& keep) {
   CrossValidatedFit fit;
   const auto on_balance = estimation::terms_on(terms, data.balance(), data.prepared().torque_measured);
-  fit.linear = estimation::free_linear_slots(terms, on_balance);
-  const std::vector<Slot> shapes = estimation::free_shape_slots(terms, on_balance);
-  fit.groups = estimation::friction_groups(terms, fit.linear, shapes);
+  fit.linear = estimation::free_linear_parameters(terms, on_balance);
+  const std::vector<ParameterRef> nonlinear = estimation::free_nonlinear_parameters(terms, on_balance);
+  fit.groups = estimation::friction_groups(terms, fit.linear, nonlinear);
   Regression regression;
-  regression.first_shape = static_cast<Eigen::Index>(fit.linear.size());
+  regression.first_nonlinear = static_cast<Eigen::Index>(fit.linear.size());
   regression.y = data.target() - data.known_torque(terms, on_balance);
-  if (!shapes.empty()) {
-    // Slopes by shapes need the linear parameters.
+  if (!nonlinear.empty()) {
+    // Slopes by nonlinear parameters need the linear parameters.
     const RecordFactors linear =
         estimation::record_factors(data, estimation::columns_of(data, terms, fit.linear), regression.y, keep, 1);
     const MixedFit first =
-        estimation::fit_mixed_model(linear, fit.groups, regression.first_shape, data.filter_autocorrelation_time());
+        estimation::fit_mixed_model(linear, fit.groups, regression.first_nonlinear, data.filter_autocorrelation_time());
     set_linear(terms, fit.linear, first.linear.theta.cwiseQuotient(linear.size));
   }
   regression.X = estimation::model_columns(data, terms);
@@ -182,7 +183,7 @@ CrossValidatedFit cross_validate(BalanceData& data, Terms terms, const Eigen::Ve
   take_covariance(regression, mixed, tau, keep, fit);
   fit.left_out = predict_left_out(regression.factors, mixed, tau);
   if (!fit.groups.empty() && fit.random_effects.std.maxCoeff() > 0.0) {
-    const MixedFit fixed = estimation::fit_mixed_model(regression.factors, {}, regression.first_shape, tau);
+    const MixedFit fixed = estimation::fit_mixed_model(regression.factors, {}, regression.first_nonlinear, tau);
     fit.fixed_effects.residual =
         regression.y - regression.X * fixed.linear.theta.cwiseQuotient(regression.factors.size);
     fit.fixed_effects.root_weights = root_weights_of(data, keep, fixed.effects.variance);
@@ -208,20 +209,20 @@ SmallVector std_for(const std::vector<FrictionGroup>& groups, const CrossValidat
 
 NoiseCovariance noise_covariance(BalanceData& data, const CrossValidatedFit& fit) {
   if (fit.groups.empty()) return fit.root_weights;
-  const auto first_shape = static_cast<Eigen::Index>(fit.linear.size());
-  const bool stays =
-      std::any_of(fit.groups.begin(), fit.groups.end(), [](const FrictionGroup& g) { return !g.stays.empty(); });
-  const Eigen::MatrixXd X =
-      stays ? estimation::model_columns(data, fit.terms) : estimation::columns_of(data, fit.terms, fit.linear);
+  const auto first_nonlinear = static_cast<Eigen::Index>(fit.linear.size());
+  const bool ratio_parameters = std::any_of(fit.groups.begin(), fit.groups.end(),
+                                            [](const FrictionGroup& g) { return !g.ratio_parameters.empty(); });
+  const Eigen::MatrixXd X = ratio_parameters ? estimation::model_columns(data, fit.terms)
+                                             : estimation::columns_of(data, fit.terms, fit.linear);
   const Eigen::MatrixXd u = estimation::random_effect_directions(fit.groups, fit.theta.head(X.cols()),
-                                                                 Eigen::VectorXd::Ones(X.cols()), first_shape);
+                                                                 Eigen::VectorXd::Ones(X.cols()), first_nonlinear);
   return estimation::noise_covariance(data, fit.root_weights, fit.root_weights.asDiagonal() * (X * u),
                                       fit.random_effects.std, fit.autocorrelation_time);
 }
 
 double whitened_squares(BalanceData& data, const Terms& terms, const CrossValidatedFit& fit) {
   const auto on_balance = estimation::terms_on(terms, data.balance(), data.prepared().torque_measured);
-  const auto linear = estimation::free_linear_slots(terms, on_balance);
+  const auto linear = estimation::free_linear_parameters(terms, on_balance);
   const Eigen::VectorXd keep = (fit.root_weights.array() > 0.0).cast<double>();
   const RecordFactors factors = estimation::record_factors(
       data, estimation::columns_of(data, terms, linear), data.target() - data.known_torque(terms, on_balance), keep, 1);

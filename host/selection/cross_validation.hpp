@@ -13,10 +13,10 @@ namespace flexspline::selection {
 using estimation::BalanceData;
 using estimation::FrictionGroup;
 using estimation::NoiseCovariance;
+using estimation::ParameterRef;
 using estimation::RandomEffects;
 using estimation::RecordErrors;
 using estimation::RowRange;
-using estimation::Slot;
 using estimation::SmallVector;
 using estimation::Terms;
 
@@ -27,24 +27,24 @@ struct LeftOut {
   double squares = 0.0;
 };
 
-// What is left of rows that count, as a root mean square.
+// Root mean square of the residual over rows with weight.
 double rmse_of(const Eigen::VectorXd& residual, const Eigen::VectorXd& root_weights);
 double rmse_of(const std::vector<LeftOut>& records);
 
-// The same model with one friction for all records: what a drive that runs it would see. A missing effect that differs
-// from record to record may pass for random effects; this shows it then.
+// The same model without random effects, as a drive would run it. Random effects may hide a missing effect that differs
+// between records; this fit shows it.
 struct FixedEffectsFit {
   Eigen::VectorXd residual;
   Eigen::VectorXd root_weights;
   std::vector<LeftOut> left_out;
 };
 
-// A model on one balance, fitted with weights by record and cross-validated. Its shapes are free to first order, and so
-// is a delay of the effort.
+// A model on one balance, fitted with weights by record and cross-validated. Its nonlinear parameters are free to first
+// order, and so is a delay of the effort.
 struct CrossValidatedFit {
   Terms terms;  // with fitted values
-  std::vector<Slot> linear;
-  Eigen::VectorXd theta;           // linear parameters, then shifts of shapes, then the delay in s
+  std::vector<ParameterRef> linear;
+  Eigen::VectorXd theta;           // linear parameters, then shifts of nonlinear parameters, then the delay in s
   Eigen::VectorXd std;             // likewise; corrected for autocorrelation
   Eigen::MatrixXd covariance;      // likewise; infinite on what is not determined
   Eigen::VectorXd root_tolerance;  // likewise
@@ -79,7 +79,7 @@ CrossValidatedFit cross_validate(BalanceData& data, Terms terms, const Eigen::Ve
 // Covariance of the errors of a fit, random effects among them.
 NoiseCovariance noise_covariance(BalanceData& data, const CrossValidatedFit& fit);
 // Whitened squares that `terms` leave after their best linear fit, with noise and random effects as `fit` has them:
-// enough to choose a shape on a grid.
+// enough to choose a nonlinear parameter on a grid.
 double whitened_squares(BalanceData& data, const Terms& terms, const CrossValidatedFit& fit);
 
 struct LikelihoodGain {

@@ -14,10 +14,10 @@ bool is_placebo(const Frequency& f) {
 
 }  // namespace
 
-std::vector<Found> decide(const Stability& stability, const SelectionPolicy& policy) {
-  std::vector<Found> all;
+std::vector<FoundTerm> decide(const Stability& stability, const SelectionPolicy& policy) {
+  std::vector<FoundTerm> all;
   std::set<std::string> taken;
-  // Mostly abstaining: nothing stands above the noise.
+  // Most subsamples abstain: nothing is above the noise.
   if (stability.abstained > policy.most_abstaining * stability.subsamples) return all;
   const auto find = [&](const std::string& name) {
     return std::find_if(stability.frequencies.begin(), stability.frequencies.end(),
@@ -27,7 +27,7 @@ std::vector<Found> decide(const Stability& stability, const SelectionPolicy& pol
     if (taken.count(lead.name) != 0 || lead.near < policy.named_frequency ||
         lead.frequency < policy.least_own_frequency)
       continue;
-    Found found;
+    FoundTerm found;
     found.group.push_back(lead);
     found.frequency = lead.frequency;
     found.share = lead.share;
@@ -38,8 +38,8 @@ std::vector<Found> decide(const Stability& stability, const SelectionPolicy& pol
       found.group.push_back(*other);
       found.frequency += other->frequency;
     }
-    // A placebo wave that does as well says that no order is identifiable here. Where what leads is no wave, that is no
-    // reason against it, only against the waves.
+    // A placebo wave that does as well shows that no order is identifiable here. Where the leading term is not a wave,
+    // this refutes the waves only.
     if (lead.entry && !lead.order && lead.frequency >= policy.named_frequency &&
         std::any_of(found.group.begin(), found.group.end(), is_placebo)) {
       std::erase_if(found.group, [](const Frequency& f) { return f.order.has_value(); });
@@ -54,22 +54,23 @@ std::vector<Found> decide(const Stability& stability, const SelectionPolicy& pol
     }
     all.push_back(std::move(found));
   }
-  // Beside a structure that is in no catalogue, and for what takes off little, chance has to be ruled out better.
-  const bool unknown = std::any_of(all.begin(), all.end(), [](const Found& f) { return !f.in_catalogue; });
-  std::erase_if(all, [&](const Found& f) {
+  // Where there is also a structure that is not in the catalogue, and for terms with a small share, the limit is
+  // stricter.
+  const bool unknown = std::any_of(all.begin(), all.end(), [](const FoundTerm& f) { return !f.in_catalogue; });
+  std::erase_if(all, [&](const FoundTerm& f) {
     const bool presliding = f.group.front().name == kPresliding;
     const double least =
         !presliding && (unknown || f.share < policy.line_share) ? policy.certain_frequency : policy.named_frequency;
     return f.in_catalogue && f.frequency < least;
   });
-  // Waves that take off no more than a placebo wave found beside them are as real as that.
+  // Waves that take off no more than a placebo wave found with them are not more significant than that.
   double placebo_share = 0.0;
-  for (const Found& f : all)
+  for (const FoundTerm& f : all)
     if (is_placebo(f.group.front())) placebo_share = std::max(placebo_share, f.share);
-  std::erase_if(all, [&](const Found& f) {
-    return f.in_catalogue && f.group.front().order && f.share < policy.alike_left * placebo_share;
+  std::erase_if(all, [&](const FoundTerm& f) {
+    return f.in_catalogue && f.group.front().order && f.share < policy.similar_left * placebo_share;
   });
-  std::stable_sort(all.begin(), all.end(), [](const Found& a, const Found& b) { return a.share > b.share; });
+  std::stable_sort(all.begin(), all.end(), [](const FoundTerm& a, const FoundTerm& b) { return a.share > b.share; });
   return all;
 }
 

@@ -1,4 +1,5 @@
-// What stability selection found often enough to be said: single terms, or groups that these data cannot distinguish.
+// What stability selection found often enough to be reported: single terms, or groups that these data cannot
+// distinguish.
 #pragma once
 
 #include <vector>
@@ -7,7 +8,7 @@
 
 namespace flexspline::selection {
 
-struct Found {
+struct FoundTerm {
   std::vector<Frequency> group;  // the most frequent first; more than one: not distinguished
   double frequency = 0.0;        // of the subsamples that chose one of the group
   double share = 0.0;            // of the squares above the noise
@@ -15,6 +16,6 @@ struct Found {
 };
 
 // Largest share first.
-std::vector<Found> decide(const Stability& stability, const SelectionPolicy& policy);
+std::vector<FoundTerm> decide(const Stability& stability, const SelectionPolicy& policy);
 
 }  // namespace flexspline::selection

@@ -14,9 +14,9 @@ namespace {
 using effects::Kind;
 using estimation::Term;
 
-// Nobody would call it an effect beyond that many times the usual size.
+// Beyond that many times the usual size it is not a plausible effect.
 constexpr double kLargestScale = 1e6;
-// Of the least shape that the search looks at: an effect that is that small is not identifiable.
+// Of the least nonlinear parameter that the search tries: an effect that is that small is not identifiable.
 constexpr double kUnseen = 1e-3;
 
 std::vector<double> usual_values(const catalogue::Entry& entry) {
@@ -25,15 +25,16 @@ std::vector<double> usual_values(const catalogue::Entry& entry) {
   return catalogue::reduced(entry, usual);
 }
 
-// Shapes as usual, on the nearest point of the search's grid; a candidate that is named keeps those it was found with.
-void set_usual_shapes(const BalanceData& data, const CandidateFit& candidate, Term& term) {
+// Nonlinear parameters as usual, on the nearest point of the search's grid; a candidate that is named keeps those it
+// was found with.
+void set_usual_nonlinear(const BalanceData& data, const CandidateFit& candidate, Term& term) {
   if (passes(candidate)) return;
   const std::vector<double> usual = usual_values(*term.entry);
   for (std::size_t p = 0; p < term.values.size(); ++p) {
-    if (!term.free_shape(p) || begins_at_zero(term, p)) continue;
+    if (!term.free_nonlinear(p) || begins_at_zero(term, p)) continue;
     double nearest = term.values[p], least = 1e300;
-    const estimation::ShapeRange range = estimation::shape_range(data, term, p);
-    for (const double value : estimation::shape_grid(range, kShapeGridPoints))
+    const estimation::ParameterRange range = estimation::parameter_range(data, term, p);
+    for (const double value : estimation::parameter_grid(range, kGridPoints))
       if (const double away = std::abs(range.share(value) - range.share(usual[p])); away < least) {
         least = away;
         nearest = value;
@@ -53,12 +54,12 @@ estimation::Estimate estimate(const BalanceSearch& search, const Term& term, std
   return e;
 }
 
-// Free shapes at which a size was found, in their own units; without `size` itself.
-std::vector<estimation::Estimate> shapes_of(const BalanceSearch& search, const Term& term, std::size_t size) {
+// Free nonlinear parameters at which a size was found, in their own units; without `size` itself.
+std::vector<estimation::Estimate> nonlinear_values_of(const BalanceSearch& search, const Term& term, std::size_t size) {
   std::vector<estimation::Estimate> list;
   const std::vector<double> natural = catalogue::natural(*term.entry, term.values);
   for (std::size_t p = 0; p < term.values.size(); ++p)
-    if (p != size && term.free_shape(p)) list.push_back(estimate(search, term, p, natural[p]));
+    if (p != size && term.free_nonlinear(p)) list.push_back(estimate(search, term, p, natural[p]));
   return list;
 }
 
@@ -73,8 +74,7 @@ DetectionLimit::DetectionLimit(BalanceSearch& search)
       projection_(estimation::model_columns(*search.data, search.base.terms), search.base.root_weights),
       base_torque_(estimation::model_torque(*search.data, search.base.terms)) {}
 
-// What the search would find: its own score, with the squares of what the effect adds in the place of those of a base
-// model that lacks it.
+// The expected score of the search: noise plus the squares of the effect's orthogonal part, against noise alone.
 bool DetectionLimit::named(const CandidateFit& candidate, const Eigen::VectorXd& own, double scale) const {
   CrossValidatedFit with, without;
   with.left_out = without.left_out = candidate.fit.left_out;
@@ -124,7 +124,8 @@ std::optional<Detectable> DetectionLimit::of_linear(const CandidateFit& candidat
   for (std::size_t p = 0; p < term.values.size(); ++p)
     if (term.free_linear(p)) term.values[p] = *scale * usual[p];
   const double value = catalogue::natural(*term.entry, term.values)[first];
-  return Detectable{estimate(*search_, term, first, std::abs(value)), false, shapes_of(*search_, term, first)};
+  return Detectable{estimate(*search_, term, first, std::abs(value)), false,
+                    nonlinear_values_of(*search_, term, first)};
 }
 
 std::optional<Detectable> DetectionLimit::of_wave(const CandidateFit& candidate, estimation::Terms terms,
@@ -134,7 +135,7 @@ std::optional<Detectable> DetectionLimit::of_wave(const CandidateFit& candidate,
   const double usual = std::hypot(usual_values(*term.entry)[cosine], usual_values(*term.entry)[sine]);
   constexpr int kPhases = 4;
   std::optional<double> largest;
-  // Torques are all but linear in the size, so two of them make all phases.
+  // Torques are almost linear in the size, so the waves of two phases give those of all phases.
   Eigen::VectorXd parts[2];
   for (int i = 0; i < 2; ++i) {
     term.values[cosine] = i == 0 ? usual : 0.0;
@@ -153,11 +154,11 @@ std::optional<Detectable> DetectionLimit::of_wave(const CandidateFit& candidate,
 }
 
 // A size that the torque is not proportional to: the first value, from where the effect vanishes, that would be named.
-std::optional<Detectable> DetectionLimit::of_shape(const CandidateFit& candidate, estimation::Terms terms,
-                                                   BalanceData& data) const {
+std::optional<Detectable> DetectionLimit::of_nonlinear(const CandidateFit& candidate, estimation::Terms terms,
+                                                       BalanceData& data) const {
   Term& term = terms.back();
   std::size_t size = 0;
-  while (size < term.values.size() && !term.free_shape(size)) ++size;
+  while (size < term.values.size() && !term.free_nonlinear(size)) ++size;
   if (size == term.values.size()) return std::nullopt;
   const auto torque_at = [&](double value) -> Eigen::VectorXd {
     term.values[size] = value;
@@ -169,20 +170,20 @@ std::optional<Detectable> DetectionLimit::of_shape(const CandidateFit& candidate
     const double step = 0.01 * usual_values(*term.entry)[size];
     const auto scale = scale_to_name(candidate, torque_at(step));
     if (!scale) return std::nullopt;
-    return Detectable{estimate(*search_, term, size, *scale * step), false, shapes_of(*search_, term, size)};
+    return Detectable{estimate(*search_, term, size, *scale * step), false, nonlinear_values_of(*search_, term, size)};
   }
   const auto would_name = [&](const Eigen::VectorXd& torque) {
     return projection_.orthogonal_share(torque) > kPolicy.least_orthogonal_share &&
            named(candidate, projection_.orthogonal_part(torque), 1.0);
   };
-  const estimation::ShapeRange range = estimation::shape_range(*search_->data, term, size);
+  const estimation::ParameterRange range = estimation::parameter_range(*search_->data, term, size);
   const Eigen::VectorXd at_low = torque_at(range.low), at_high = torque_at(range.high);
-  // The end at which it does less is the one where it vanishes.
-  const bool falls = at_low.norm() > at_high.norm();
-  if (!would_name(falls ? at_low : at_high)) return std::nullopt;
-  double with = range.at(falls ? 0.0 : 1.0), without = range.at(falls ? 1.0 : 0.0);
-  // A size below what the search looks at passes for the least that it does.
-  if (would_name(falls ? at_high : at_low)) without = falls || !range.logarithmic ? with : kUnseen * range.low;
+  // The effect vanishes at the end of the range with the smaller torque.
+  const bool decreases = at_low.norm() > at_high.norm();
+  if (!would_name(decreases ? at_low : at_high)) return std::nullopt;
+  double with = range.at(decreases ? 0.0 : 1.0), without = range.at(decreases ? 1.0 : 0.0);
+  // A size below the range of the search is reported as the least of that range.
+  if (would_name(decreases ? at_high : at_low)) without = decreases || !range.logarithmic ? with : kUnseen * range.low;
   if (without == with) return std::nullopt;
   for (int i = 0; i < 10; ++i) {
     const double middle = range.logarithmic ? std::sqrt(with * without) : 0.5 * (with + without);
@@ -190,18 +191,18 @@ std::optional<Detectable> DetectionLimit::of_shape(const CandidateFit& candidate
   }
   term.values[size] = with;
   const double value = catalogue::natural(*term.entry, term.values)[size];
-  return Detectable{estimate(*search_, term, size, value), falls, shapes_of(*search_, term, size)};
+  return Detectable{estimate(*search_, term, size, value), decreases, nonlinear_values_of(*search_, term, size)};
 }
 
 std::optional<Detectable> DetectionLimit::smallest(const CandidateFit& candidate, BalanceData& data) const {
   estimation::Terms terms = candidate.fit.terms;
   Term& term = terms.back();
-  set_usual_shapes(*search_->data, candidate, term);
+  set_usual_nonlinear(*search_->data, candidate, term);
   if (is_wave(*term.entry)) return of_wave(candidate, std::move(terms), data);
-  // What takes the place of another effect has the size of that one.
+  // An effect that replaces another one has the size of that one.
   if (term.entry->count(Kind::linear) > 0 && term.entry->info->replaces.empty())
     return of_linear(candidate, std::move(terms), data);
-  return of_shape(candidate, std::move(terms), data);
+  return of_nonlinear(candidate, std::move(terms), data);
 }
 
 }  // namespace flexspline::selection

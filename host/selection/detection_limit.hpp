@@ -9,8 +9,8 @@
 
 namespace flexspline::selection {
 
-// What the search is expected to find if an effect is there: its own score (`fall_of`), where the model that lacks the
-// effect leaves, besides the noise, the orthogonal part of the effect's torque.
+// What the search is expected to find if an effect is there: its own score (`likelihood_gain`), where the model that
+// lacks the effect leaves, besides the noise, the orthogonal part of the effect's torque.
 class DetectionLimit {
  public:
   explicit DetectionLimit(BalanceSearch& search);
@@ -24,7 +24,8 @@ class DetectionLimit {
   std::optional<double> scale_to_name(const CandidateFit& candidate, const Eigen::VectorXd& torque) const;
   std::optional<Detectable> of_linear(const CandidateFit& candidate, estimation::Terms terms, BalanceData& data) const;
   std::optional<Detectable> of_wave(const CandidateFit& candidate, estimation::Terms terms, BalanceData& data) const;
-  std::optional<Detectable> of_shape(const CandidateFit& candidate, estimation::Terms terms, BalanceData& data) const;
+  std::optional<Detectable> of_nonlinear(const CandidateFit& candidate, estimation::Terms terms,
+                                         BalanceData& data) const;
 
   BalanceSearch* search_;
   estimation::ModelProjection projection_;

@@ -31,13 +31,13 @@ Candidate candidate_of(const CandidateFit& candidate, const BalanceSearch& searc
   c.balance = search.data->balance();
   c.score = candidate.gain.score;
   c.other_balance_score = candidate.other_balance_score;
-  c.chi2_fall_percent = candidate.gain.chi2_percent;
+  c.chi2_decrease_percent = candidate.gain.chi2_percent;
   c.rmse_cv_before = search.base.rmse_cv_fixed_effects();
   c.rmse_cv_after = candidate.fit.rmse_cv_fixed_effects();
   c.p_value = candidate.gain.p_value;
   c.admissible = candidate.admissible;
   c.why_not = candidate.why_not;
-  if (!candidate.confounded_with.empty()) c.rivals.push_back(candidate.confounded_with);
+  if (!candidate.confounded_with.empty()) c.cannot_distinguish.push_back(candidate.confounded_with);
   const effects::Description& info = *candidate.model.entry->info;
   if (is_another_law(candidate, *search.data))
     c.note = fmt::format("Both amplitudes are negative over a wide range of speed: {}.", info.wide_negative_means);
@@ -49,7 +49,7 @@ Candidate candidate_of(const CandidateFit& candidate, const BalanceSearch& searc
   const std::vector<double> natural = catalogue::natural(*term.entry, term.values);
   for (std::size_t p = 0; p < term.values.size(); ++p) {
     estimation::Estimate e;
-    e.slot = {added, p};
+    e.ref = {added, p};
     e.id = term.id;
     e.effect = std::string(term.entry->name());
     e.parameter = std::string(term.entry->parameters[p].name);
@@ -66,26 +66,26 @@ Candidate candidate_of(const CandidateFit& candidate, const BalanceSearch& searc
   return c;
 }
 
-std::vector<Localised> shares(const BalanceData& data, const CrossValidatedFit& fit, const Eigen::VectorXd& residual,
-                              double least = kPolicy.shown_share_percent) {
-  std::vector<Localised> list;
+std::vector<LocalisedResidual> shares(const BalanceData& data, const CrossValidatedFit& fit,
+                                      const Eigen::VectorXd& residual, double least = kPolicy.shown_share_percent) {
+  std::vector<LocalisedResidual> list;
   const data::Axis axis = data.prepared().rotary ? data::Axis::rotary : data::Axis::linear;
   for (const auto& share : comparison::localise(data, residual, fit.autocorrelation_time, axis))
     if (share.share_percent >= least) list.push_back({share.variable, share.share_percent});
   return list;
 }
 
-// Shapes were fitted as if friction were the same in all records. Where it is not, they are searched again with that
-// known, or candidates would be named for no more than a better search.
-void refine_base_shapes(BalanceSearch& search) {
+// The nonlinear parameters were fitted with the same friction in all records. Where friction differs, they are searched
+// again with random effects; else a candidate could be named only because its search was better.
+void refine_base_nonlinear(BalanceSearch& search) {
   BalanceData& data = *search.data;
   if (search.base.groups.empty() || search.base.random_effects.std.maxCoeff() <= 0.0) return;
   estimation::Terms terms = search.base.terms;
   const auto on_balance = estimation::terms_on(terms, data.balance(), data.prepared().torque_measured);
-  if (estimation::free_shape_slots(terms, on_balance).empty()) return;
+  if (estimation::free_nonlinear_parameters(terms, on_balance).empty()) return;
   constexpr double kTolerance = 1e-7;
   for (int round = 0; round < 2; ++round) {
-    estimation::refine_shapes(data, terms, on_balance, noise_covariance(data, search.base), kTolerance);
+    estimation::refine_nonlinear(data, terms, on_balance, noise_covariance(data, search.base), kTolerance);
     search.base = cross_validate(data, terms, search.keep);
     terms = search.base.terms;
   }
@@ -107,7 +107,7 @@ std::vector<SearchedBalance> search_balances(estimation::Identification& base,
     }
     one.search.base =
         one.search.keep.minCoeff() < 1.0 ? cross_validate(data, base.terms, one.search.keep) : std::move(whole);
-    refine_base_shapes(one.search);
+    refine_base_nonlinear(one.search);
     one.candidates = rank_candidates(one.search);
     if (std::string warning = one_direction_warning(data);
         data.balance() == estimation::Balance::motor && !warning.empty())
@@ -122,12 +122,12 @@ std::vector<SearchedBalance> search_balances(estimation::Identification& base,
   for (SearchedBalance& one : all) {
     add_other_balance_evidence(searches, one.search, one.candidates);
     check_orders(searches, one.search, one.candidates);
-    check_carry_over(one.search, one.candidates);
+    check_by_record(one.search, one.candidates);
   }
   return all;
 }
 
-// The balance whose named effect scores best; where none is named, the one that stands highest above its floor.
+// The balance whose named effect scores best; where none is named, the one that is highest above its floor.
 SearchedBalance& most_significant(std::vector<SearchedBalance>& all) {
   const auto importance = [](const SearchedBalance& e) {
     if (e.names_one()) return 1e9 + e.candidates.front().score();
@@ -138,7 +138,7 @@ SearchedBalance& most_significant(std::vector<SearchedBalance>& all) {
   });
 }
 
-// Puts the effect to name first. Returns the name of an effect that it stands for as well, if there is one.
+// Puts the effect to name first. Returns the name of an effect that it is named for as well, if there is one.
 std::string choose_named(SearchedBalance& chosen) {
   auto& list = chosen.candidates;
   if (auto instead = backward_elimination(chosen.search, list.front())) {
@@ -153,7 +153,7 @@ std::string choose_named(SearchedBalance& chosen) {
   const auto law =
       std::find_if(list.begin(), list.end(), [&](const CandidateFit& t) { return t.model.entry->name() == other; });
   if (law == list.end() || law->gain.score <= kPolicy.named_score) return {};
-  // Which formula stands first is a matter of which one leaves the rest of the model its meaning.
+  // The formula that leaves the other effects of the model their physical meaning comes first.
   if (!law->admissible) return std::string(other);
   std::string alias(first.model.entry->name());
   std::rotate(list.begin(), law, law + 1);
@@ -162,16 +162,16 @@ std::string choose_named(SearchedBalance& chosen) {
 
 void name_effects(const SearchedBalance& chosen, const std::string& alias, Diagnosis& result) {
   const auto& list = chosen.candidates;
-  const auto is = [](const Candidate& c, const Named& n) { return c.effect == n.effect && c.order == n.order; };
+  const auto is = [](const Candidate& c, const NamedEffect& n) { return c.effect == n.effect && c.order == n.order; };
   for (const CandidateFit& t : list) {
-    const Named name{std::string(t.model.entry->name()), t.model.order};
+    const NamedEffect name{std::string(t.model.entry->name()), t.model.order};
     const bool near = t.score() >= list.front().score() - kPolicy.confounded_margin;
-    // A law with more parameters that leaves the same error is no rival of the simpler one: it can do no worse. One
-    // that earns them, if by little, is.
+    // A law with more parameters and the same error is not confounded with the simpler one, as it contains it. One with
+    // a slightly smaller error is.
     const bool wider = t.model.added > list.front().model.added && !t.leads;
     if ((passes(t) && !wider && (near || is_scale_confounded(chosen.search, list.front(), t))) || name.effect == alias)
       result.named.push_back(name);
-    // Its order is not identifiable, but neither is whether it is the other effect.
+    // Its order is not identifiable, and it may also be the other effect.
     if (!t.order_is_not_identifiable || !near || t.model.entry == list.front().model.entry) continue;
     result.named.push_back(name);
     for (Candidate& c : result.candidates)
@@ -182,13 +182,14 @@ void name_effects(const SearchedBalance& chosen, const std::string& alias, Diagn
   }
   result.verdict = result.named.size() > 1 ? Verdict::confusable_effects : Verdict::missing_effect;
   for (Candidate& c : result.candidates) {
-    if (std::none_of(result.named.begin(), result.named.end(), [&](const Named& n) { return is(c, n); })) continue;
-    for (const Named& other : result.named)
-      if (!is(c, other)) c.rivals.push_back(other.effect);
+    if (std::none_of(result.named.begin(), result.named.end(), [&](const NamedEffect& n) { return is(c, n); }))
+      continue;
+    for (const NamedEffect& other : result.named)
+      if (!is(c, other)) c.cannot_distinguish.push_back(other.effect);
   }
-  // The named effect leads the list, whatever a refused candidate scores.
+  // The named effect is first in the list, even where a refused candidate has a higher score.
   auto begin = result.candidates.begin();
-  for (const Named& n : result.named) {
+  for (const NamedEffect& n : result.named) {
     const auto at = std::find_if(begin, result.candidates.end(), [&](const Candidate& c) { return is(c, n); });
     if (at != result.candidates.end()) std::rotate(begin++, at, at + 1);
   }
@@ -207,10 +208,11 @@ void list_candidates(std::vector<SearchedBalance>& all, data::Axis axis, Diagnos
       result.candidates.push_back(candidate_of(t, e.search, axis));
       result.candidates.back().minimum_detectable = std::move(smallest[i]);
       if (t.confounded_with.empty()) continue;
-      result.candidates.back().rival_reasons.push_back(compare_with_model(e.search, t));
-      result.warnings.push_back(fmt::format(
-          "{0} cannot be distinguished from {1} in these data: {1} stands for what both share; {2} would separate them",
-          t.model.entry->name(), t.confounded_with, t.model.entry->info->separated_by));
+      result.candidates.back().confounding_reasons.push_back(compare_with_model(e.search, t));
+      result.warnings.push_back(
+          fmt::format("{0} cannot be distinguished from {1} in these data: {1} is named for what both share; {2} would "
+                      "separate them",
+                      t.model.entry->name(), t.confounded_with, t.model.entry->info->separated_by));
     }
   }
   std::stable_sort(result.candidates.begin(), result.candidates.end(), [](const Candidate& a, const Candidate& b) {
@@ -222,7 +224,7 @@ void list_candidates(std::vector<SearchedBalance>& all, data::Axis axis, Diagnos
 // What is left, with the named effect in the model if there is one.
 void assess_remainder(const SearchedBalance& chosen, Diagnosis& result) {
   const CrossValidatedFit& after = result.named.empty() ? chosen.search.base : chosen.candidates.front().fit;
-  // What is missing may pass for a delay, so it is read off the better model.
+  // A missing effect may look like a delay, so the delay is taken from the better model.
   const Eigen::Index delay = after.theta.size() - 1;
   if (chosen.search.data->balance() == estimation::Balance::motor &&
       std::abs(after.theta[delay]) > kPolicy.delay_errors * after.std[delay])
@@ -230,8 +232,7 @@ void assess_remainder(const SearchedBalance& chosen, Diagnosis& result) {
   result.friction_drift = drifts(after);
   for (const Drift& d : result.friction_drift)
     result.warnings.push_back(fmt::format(
-        "{} differs between runs by {:.1f} %, and nothing that was recorded says why: temperature? An effect that "
-        "shows "
+        "{} differs between runs by {:.1f} %, and no recorded signal explains it: temperature? An effect that shows "
         "only from run to run counts for less then; log the temperature, and repeat one motion from time to time",
         d.group, d.percent));
   const bool at_floor = result.noise_floor && after.rmse() < kPolicy.at_floor * *result.noise_floor;
@@ -244,7 +245,7 @@ void assess_remainder(const SearchedBalance& chosen, Diagnosis& result) {
       result.recovered_percent = std::clamp(100.0 * (1.0 - above(after) / above(chosen.search.base)), 0.0, 100.0);
     enough = at_floor || result.recovered_percent.value_or(100.0) >= kPolicy.recovered_percent;
   }
-  const std::vector<Localised> remaining =
+  const std::vector<LocalisedResidual> remaining =
       shares(*chosen.search.data, after, after.residual,
              enough ? kPolicy.shown_share_percent : kPolicy.least_shown_share_percent);
   if (!at_floor) result.remaining_structure = remaining;
@@ -315,7 +316,7 @@ Diagnosis diagnose(const data::Dataset& dataset, const model::Model& model, cons
   result.base_rmse_own_friction = fit.rmse();
   result.noise_floor = chosen.floor.rmse;
   result.noise_floor_from = chosen.floor.from;
-  // Where nothing is missing, friction that differs between runs is no structure to look for.
+  // Where nothing is missing, friction that differs between runs is not a structure to search for.
   const bool names_one = chosen.names_one() && !by_resampling;
   result.localised =
       shares(*chosen.search.data, fit, names_one || by_resampling ? fit.residual_fixed_effects() : fit.residual);
@@ -330,7 +331,7 @@ Diagnosis diagnose(const data::Dataset& dataset, const model::Model& model, cons
   }
   if (result.resampling && result.resampling->too_little)
     result.warnings.push_back(
-        "these data have too few rows to choose effects on halves of them; record longer, with several strokes");
+        "these data have too few samples to choose effects on halves of them; record longer, with several strokes");
   if (!moves || (result.resampling && result.resampling->too_little)) result.verdict = Verdict::insufficient_excitation;
   return result;
 }

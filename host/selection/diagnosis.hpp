@@ -14,7 +14,7 @@
 
 namespace flexspline::selection {
 
-struct Named {
+struct NamedEffect {
   std::string effect;
   std::optional<double> order;
 };
@@ -25,7 +25,7 @@ struct Detectable {
   // or, as "amplitude", of a wave at the phase that is seen worst. Without std and interval.
   estimation::Estimate size;
   bool at_most = false;                  // an effect that grows as this falls: a limit that it stays below
-  std::vector<estimation::Estimate> at;  // shapes at which that holds
+  std::vector<estimation::Estimate> at;  // nonlinear parameters at which that holds
 };
 
 // Why an effect is confounded with another one in these data.
@@ -52,28 +52,28 @@ struct Candidate {
   std::string effect;
   std::optional<double> order;
   estimation::Balance balance = estimation::Balance::motor;
-  double score = 0.0;  // fall of cross-validated chi-square over the autocorrelation time, less k ln(n_eff)
-  double other_balance_score = 0.0;  // on the other balances that the effect acts on, with the same parameters
-  double chi2_fall_percent = 0.0;    // cross-validated
+  double score = 0.0;  // decrease of cross-validated chi-square over the autocorrelation time, less k ln(n_eff)
+  double other_balance_score = 0.0;    // on the other balances that the effect acts on, with the same parameters
+  double chi2_decrease_percent = 0.0;  // cross-validated
   double rmse_cv_before = 0.0;
   double rmse_cv_after = 0.0;
   std::optional<double> p_value;
   std::vector<estimation::Estimate> parameters;
   bool admissible = true;
   std::string why_not;  // where it is not admissible
-  std::vector<std::string> rivals;
-  std::vector<ConfoundingReason> rival_reasons;
+  std::vector<std::string> cannot_distinguish;
+  std::vector<ConfoundingReason> confounding_reasons;
   std::optional<Evidence> evidence;  // of named effects
   std::optional<Detectable> minimum_detectable;
-  std::string note;  // what its values mean, where that is not what the effect's name says
+  std::string note;  // what its values mean, where that differs from the effect's name
 };
 
-struct Localised {
+struct LocalisedResidual {
   std::string variable;
   double share_percent = 0.0;
 };
 
-// A stretch in which something acted on the axis that no model of the drive explains.
+// An interval in which something acted on the axis that no model of the drive explains.
 struct Disturbance {
   std::string experiment;
   double from_s = 0.0;
@@ -82,14 +82,14 @@ struct Disturbance {
   std::string unit;
 };
 
-// What resampling says: how often a term is chosen on halves of the data, over bandwidths and with and without
+// The result of resampling: how often a term is chosen on halves of the data, over bandwidths and with and without
 // reversals.
 struct Resampling {
-  struct Found {
-    std::vector<Named> group;    // more than one: these data cannot distinguish them; empty: in no catalogue
-    std::string name;            // of what is in no catalogue
-    double frequency = 0.0;      // of the subsamples
-    double share_percent = 0.0;  // of the squared error above the noise, median of the subsamples
+  struct FoundTerm {
+    std::vector<NamedEffect> group;  // more than one: these data cannot distinguish them; empty: in no catalogue
+    std::string name;                // of what is in no catalogue
+    double frequency = 0.0;          // of the subsamples
+    double share_percent = 0.0;      // of the squared error above the noise, median of the subsamples
     double share_low_percent = 0.0, share_high_percent = 0.0;  // of 95 % of the subsamples
     // Error on the experiments that are held out, with it over without it; nothing where none are.
     std::optional<double> held_out_ratio;
@@ -106,10 +106,10 @@ struct Resampling {
   double abstained = 0.0;   // saw nothing above the noise
   double whiteness = 0.0;   // of what the best terms leave, reversals masked: 1 for noise, 0 for structure
   double lowest_hz = 0.0, highest_hz = 0.0;
-  std::vector<Found> found;      // largest share first
+  std::vector<FoundTerm> found;  // largest share first
   std::vector<Support> support;  // of all terms that could be chosen
   // The group that a name was found in.
-  std::vector<Named> found_group(const Named& name) const;
+  std::vector<NamedEffect> found_group(const NamedEffect& name) const;
   bool decides =
       false;  // the model's error is no noise even with the likeliest effect, so that likelihood alone does not count
 };
@@ -126,7 +126,7 @@ std::string verdict_name(Verdict verdict);
 
 struct Diagnosis {
   Verdict verdict = Verdict::nothing_significant;
-  std::vector<Named> named;
+  std::vector<NamedEffect> named;
   std::optional<estimation::Balance> balance;  // of the named effect, else of the largest excess
   std::string unit;                            // of the balances' errors
   double base_rmse = 0.0;                      // with one friction for all runs, as all errors of candidates are
@@ -134,11 +134,11 @@ struct Diagnosis {
   double base_rmse_own_friction = 0.0;  // with each run's own friction where it differs from run to run
   std::optional<double> noise_floor;
   std::string noise_floor_from = "none";
-  std::vector<Localised> localised;
+  std::vector<LocalisedResidual> localised;
   std::vector<Candidate> candidates;    // best first
   std::vector<Trend> parameter_trends;  // of the model as it is
   std::vector<Drift> friction_drift;    // with the named effect in the model
-  std::vector<Localised> remaining_structure;
+  std::vector<LocalisedResidual> remaining_structure;
   // Of the chi-square above the noise floor, the share in percent that the named effect takes off.
   std::optional<double> recovered_percent;
   std::vector<Disturbance> disturbances;
@@ -151,7 +151,7 @@ struct Diagnosis {
 
 struct Options {
   estimation::PipelineOptions pipeline;
-  std::function<void(std::string_view)> progress;  // said at each stage; may be empty
+  std::function<void(std::string_view)> progress;  // called at each stage; may be empty
 };
 
 // METHOD of the project: see host/selection/METHOD.md. Uses experiments of role fit. The model need not have values:

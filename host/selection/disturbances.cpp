@@ -23,7 +23,7 @@ double median(std::vector<double> x) {
   return *middle;
 }
 
-// What is left of a residual when its slow part is taken away: a running median, which a burst does not move.
+// The residual less a running median, which a burst does not change.
 std::vector<double> without_slow_part(const Eigen::VectorXd& residual, const RowRange& range, std::size_t half_window) {
   const auto n = static_cast<std::size_t>(range.size());
   std::vector<double> fast(n), window;
@@ -55,8 +55,8 @@ std::vector<double> share_among_like(const std::vector<double>& signal, const st
   return share;
 }
 
-// Rows at which a residual above the limit comes again a period of the motion later or earlier: what repeats with the
-// motion belongs to the drive.
+// Rows whose residual is above the limit one period of the motion earlier or later as well: a residual that repeats
+// with the motion belongs to the drive.
 std::vector<std::uint8_t> recurs(const Record& r, const std::vector<std::size_t>& samples,
                                  const std::vector<double>& size, double limit, std::size_t reach) {
   std::vector<std::uint8_t> again(size.size(), 0);
@@ -79,8 +79,8 @@ std::vector<std::uint8_t> recurs(const Record& r, const std::vector<std::size_t>
   return again;
 }
 
-// For each row, the largest share of marked ones among those that are like it in a signal that an effect of the drive
-// might depend on: velocity, time since a reversal, angle, torsion.
+// For each row, the largest share of marked rows among its neighbours in a signal that an effect may depend on:
+// velocity, time since a reversal, angle, torsion.
 std::vector<double> share_among_like(const BalanceData& data, const Record& r, const std::vector<std::size_t>& samples,
                                      const std::vector<std::uint8_t>& marked) {
   const std::size_t n = samples.size();
@@ -108,20 +108,20 @@ std::vector<double> share_among_like(const BalanceData& data, const Record& r, c
 }
 
 // Rows of a record that stand out, and what speaks against a disturbance at each.
-struct StandingOut {
+struct Outliers {
   std::vector<double> size;  // without the slow part
   std::vector<std::uint8_t> marked, recurring;
-  std::vector<double> alike;  // share of marked rows among those like this one
-  std::size_t reach = 0;      // of the filter, in rows
+  std::vector<double> similar;  // share of marked rows among those like this one
+  std::size_t reach = 0;        // of the filter, in rows
 };
 
 // Nothing where no row stands out, or too many do.
-std::optional<StandingOut> standing_out(const BalanceData& data, const Eigen::VectorXd& residual, const RowRange& range,
-                                        const std::vector<std::size_t>& samples) {
+std::optional<Outliers> outliers(const BalanceData& data, const Eigen::VectorXd& residual, const RowRange& range,
+                                 const std::vector<std::size_t>& samples) {
   const Record& r = data.prepared().records[range.record];
   const std::size_t n = samples.size();
   const double row_s = r.sample_s * static_cast<double>(r.decimation);
-  StandingOut found;
+  Outliers found;
   found.size = without_slow_part(residual, range, static_cast<std::size_t>(std::ceil(kPolicy.longest_burst_s / row_s)));
   for (double& size : found.size) size = std::abs(size);
   const double far = kPolicy.far_out * 1.4826 * median(found.size);
@@ -130,14 +130,14 @@ std::optional<StandingOut> standing_out(const BalanceData& data, const Eigen::Ve
   const double share =
       static_cast<double>(std::accumulate(found.marked.begin(), found.marked.end(), 0)) / static_cast<double>(n);
   if (share == 0.0 || share > kPolicy.most_disturbed) return std::nullopt;
-  found.alike = share_among_like(data, r, samples, found.marked);
+  found.similar = share_among_like(data, r, samples, found.marked);
   found.reach = static_cast<std::size_t>(std::ceil(1.0 / data.prepared().pipeline.row_cutoff_hz / row_s));
   found.recurring = recurs(r, samples, found.size, 0.6 * far, found.reach);
   return found;
 }
 
 // Lists the bursts of a record that are disturbances, and leaves out their rows.
-void list_bursts(const Record& r, const StandingOut& rows, const std::vector<std::size_t>& samples,
+void list_bursts(const Record& r, const Outliers& rows, const std::vector<std::size_t>& samples,
                  Eigen::Ref<Eigen::VectorXd> keep, std::vector<Disturbance>& found) {
   const std::size_t n = samples.size(), reach = rows.reach;
   for (std::size_t k = 0; k < n;) {
@@ -152,14 +152,15 @@ void list_bursts(const Record& r, const StandingOut& rows, const std::vector<std
       if (rows.marked[end]) {
         last = end;
         peak = std::max(peak, rows.size[end]);
-        explained += rows.recurring[end] ? 1.0 : rows.alike[end];
+        explained += rows.recurring[end] ? 1.0 : rows.similar[end];
         count += 1.0;
       }
       ++end;
     }
     const double from = r.experiment->time_s[samples[k]], to = r.experiment->time_s[samples[last]];
     const std::size_t low = k > reach ? k - reach : 0, high = std::min(n - 1, last + reach);
-    // Next to rows that the mask left out, at a reversal or a start, friction that the model lacks looks the same.
+    // Next to rows that the mask left out, at a reversal or a start, friction that the model lacks has the same
+    // residual.
     const std::size_t before = low > reach ? low - reach : 0, after = std::min(n - 1, high + reach);
     const bool next_to_mask =
         samples[after] - samples[before] != (after - before) * r.decimation || before == 0 || after == n - 1;
@@ -181,7 +182,7 @@ std::vector<Disturbance> find_disturbances(const BalanceData& data, const Eigen:
     const Record& r = data.prepared().records[range.record];
     const auto& samples = r.rows[estimation::index(data.balance())].samples;
     if (r.at_rest || samples.size() < kFewestRows) continue;
-    if (const auto rows = standing_out(data, residual, range, samples))
+    if (const auto rows = outliers(data, residual, range, samples))
       list_bursts(r, *rows, samples, keep.segment(range.first, range.size()), found);
   }
   return found;

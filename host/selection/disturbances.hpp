@@ -1,4 +1,4 @@
-// Short stretches in which something acted on the axis that is no property of the drive: a push, a force step, a cable
+// Short intervals in which something acted on the axis that is no property of the drive: a push, a force step, a cable
 // that caught. They are found in the residual alone.
 #pragma once
 
@@ -11,9 +11,9 @@
 namespace flexspline::selection {
 
 // A burst: rows whose residual stands far above the rest, though the axis passes through the same velocity and the same
-// time after a reversal elsewhere without one. An effect of the drive shows wherever its signals come back; a
-// disturbance does not. Returns the stretches in time; `keep` gets zeros at their rows and at their filter's reach
-// around them.
+// time after a reversal at other places without such a residual. An effect of the drive shows wherever its signals come
+// back; a disturbance does not. Returns the intervals in time; `keep` gets zeros at their rows and at their filter's
+// reach around them.
 std::vector<Disturbance> find_disturbances(const estimation::BalanceData& data, const Eigen::VectorXd& residual,
                                            Eigen::VectorXd& keep);
 

@@ -30,11 +30,12 @@ bool has_presliding(const std::vector<int>& terms) {
 
 }  // namespace
 
-Fitted fit_terms(const RegressorTable& table, const std::vector<int>& terms, const Half& fit, const Half& judge) {
+TermFit fit_terms(const RegressorTable& table, const std::vector<int>& terms, const HalfData& fit,
+                  const HalfData& judge) {
   const bool presliding = has_presliding(terms);
   const Eigen::MatrixXd& on = presliding ? fit.presliding : fit.sign;
   const Eigen::MatrixXd& other = presliding ? judge.presliding : judge.sign;
-  Fitted result;
+  TermFit result;
   for (Eigen::Index j = 0; j < table.model_columns; ++j) result.columns.push_back(j);
   for (const int t : terms)
     if (t >= 0)
@@ -48,18 +49,19 @@ Fitted fit_terms(const RegressorTable& table, const std::vector<int>& terms, con
     for (Eigen::Index j = 0; j < n; ++j) inner(i, j) = on(result.columns[i], result.columns[j]) / (size[i] * size[j]);
     along[i] = on(result.columns[i], y) / size[i];
   }
-  // Columns that stand for each other share their coefficient.
+  // Columns that are collinear share their coefficient.
   inner.diagonal().array() += 1e-8;
   result.theta = inner.ldlt().solve(along).cwiseQuotient(size);
-  result.on_fit = squares(on, result.columns, result.theta);
-  result.on_judge = squares(other, result.columns, result.theta);
+  result.training_squares = squares(on, result.columns, result.theta);
+  result.validation_squares = squares(other, result.columns, result.theta);
   return result;
 }
 
 namespace {
 
 // Whether all coefficients keep their signs, but for those that are about zero.
-bool is_possible(const RegressorTable& table, const std::vector<int>& terms, const Fitted& fitted, const Half& half) {
+bool is_possible(const RegressorTable& table, const std::vector<int>& terms, const TermFit& fitted,
+                 const HalfData& half) {
   const Eigen::MatrixXd& on = has_presliding(terms) ? half.presliding : half.sign;
   const Eigen::Index y = on.cols() - 1;
   const double small = kSmall * std::sqrt(on(y, y));
@@ -84,7 +86,7 @@ bool is_possible(const RegressorTable& table, const std::vector<int>& terms, con
       if (!check(at++, low)) return false;
     }
     if (term.most_at_peak > 0.0 && sum > term.most_at_peak) return false;
-    // Friction that rises out of standstill is another law's.
+    // Friction that rises from standstill belongs to another law.
     if (term.sum_is_positive && sum < 0.0) return false;
   }
   return true;
@@ -92,19 +94,20 @@ bool is_possible(const RegressorTable& table, const std::vector<int>& terms, con
 
 }  // namespace
 
-Selected select_forward(const RegressorTable& table, const Half& fit, const Half& judge, const Noise& noise,
-                        const std::vector<std::uint8_t>& may_enter, const SelectionPolicy& policy) {
-  Selected result;
+SelectionPath select_forward(const RegressorTable& table, const HalfData& fit, const HalfData& judge,
+                             const Noise& noise, const std::vector<std::uint8_t>& may_enter,
+                             const SelectionPolicy& policy) {
+  SelectionPath result;
   std::vector<int> terms;
-  Fitted now = fit_terms(table, terms, fit, judge);
-  result.before = result.after = now.on_judge;
-  if (now.on_judge / judge.rows > policy.most_leverage * now.on_fit / fit.rows) {
+  TermFit now = fit_terms(table, terms, fit, judge);
+  result.before = result.after = now.validation_squares;
+  if (now.validation_squares / judge.rows > policy.most_leverage * now.training_squares / fit.rows) {
     result.abstains = result.extrapolates = true;
     return result;
   }
-  const double floor = std::min(noise.variance * judge.rows, 0.999 * now.on_judge);
-  const double excess = now.on_judge - floor;
-  if (excess < policy.least_excess * now.on_judge) {
+  const double floor = std::min(noise.variance * judge.rows, 0.999 * now.validation_squares);
+  const double excess = now.validation_squares - floor;
+  if (excess < policy.least_excess * now.validation_squares) {
     result.abstains = true;
     return result;
   }
@@ -112,20 +115,20 @@ Selected select_forward(const RegressorTable& table, const Half& fit, const Half
   for (std::size_t step = 0; step < policy.most_steps; ++step) {
     struct Best {
       int term = 0;
-      Fitted fitted;
+      TermFit fitted;
       double gain = -1e300;
     };
-    // Of each name the values of its nonlinear parameters that fit best where they are fitted.
+    // For each name the values of its nonlinear parameters that fit best on the training half.
     std::map<std::string, Best> by_name;
     const auto try_term = [&](int t, const std::string& name, double parameters) {
       std::vector<int> with = terms;
       with.push_back(t);
-      Fitted fitted = fit_terms(table, with, fit, judge);
+      TermFit fitted = fit_terms(table, with, fit, judge);
       const auto found = by_name.find(name);
-      if (found != by_name.end() && found->second.fitted.on_fit <= fitted.on_fit) return;
+      if (found != by_name.end() && found->second.fitted.training_squares <= fitted.training_squares) return;
       if (!is_possible(table, with, fitted, fit) && was_possible) return;
-      const double per_one = now.on_judge / judge.rows * noise.tau;
-      double gain = now.on_judge - fitted.on_judge - parameters * per_one;
+      const double per_one = now.validation_squares / judge.rows * noise.tau;
+      double gain = now.validation_squares - fitted.validation_squares - parameters * per_one;
       // A curve that is in no catalogue can follow most laws: it has to do better.
       const bool curve = t >= 0 && !table.terms[static_cast<std::size_t>(t)].entry &&
                          !table.terms[static_cast<std::size_t>(t)].is_placebo;
@@ -141,28 +144,28 @@ Selected select_forward(const RegressorTable& table, const Half& fit, const Half
     const auto best = std::max_element(by_name.begin(), by_name.end(),
                                        [](const auto& a, const auto& b) { return a.second.gain < b.second.gain; });
     const Best& chosen = best->second;
-    const double drop = now.on_judge - chosen.fitted.on_judge;
-    const double above = std::max(now.on_judge - floor, 1e-300);
+    const double drop = now.validation_squares - chosen.fitted.validation_squares;
+    const double above = std::max(now.validation_squares - floor, 1e-300);
     const bool law = chosen.term == kPreslidingTerm || table.terms[static_cast<std::size_t>(chosen.term)].nonlinear > 0;
-    const double per_one = chosen.fitted.on_judge / judge.rows * noise.tau;
+    const double per_one = chosen.fitted.validation_squares / judge.rows * noise.tau;
     if (drop < (law ? policy.law_share : policy.line_share) * above || drop < policy.least_gain * per_one) break;
     terms.push_back(chosen.term);
-    Step taken{chosen.term, drop / above, drop / excess, {}};
-    const auto left = [&](const Fitted& f) { return std::max(f.on_judge - floor, 0.0); };
+    SelectionStep taken{chosen.term, drop / above, drop / excess, {}};
+    const auto left = [&](const TermFit& f) { return std::max(f.validation_squares - floor, 0.0); };
     for (const auto& [name, other] : by_name) {
-      // A curve of no catalogue that does no better than a law that has to be beaten says nothing against the law.
+      // A generic curve that fits no better than a law does not refute that law.
       const bool curve = other.term >= 0 && !table.terms[static_cast<std::size_t>(other.term)].entry &&
                          !table.terms[static_cast<std::size_t>(other.term)].is_placebo;
-      if (curve || other.term == chosen.term || other.gain < policy.alike * chosen.gain) continue;
+      if (curve || other.term == chosen.term || other.gain < policy.similar * chosen.gain) continue;
       // Where the chosen one leaves noise and the other one does not, they are distinguished.
-      if (left(other.fitted) > policy.alike_left * left(chosen.fitted) + policy.least_gain * per_one) continue;
+      if (left(other.fitted) > policy.similar_left * left(chosen.fitted) + policy.least_gain * per_one) continue;
       taken.alternatives.push_back(name);
     }
     result.steps.push_back(std::move(taken));
     now = chosen.fitted;
     was_possible = is_possible(table, terms, now, fit);
-    result.after = now.on_judge;
-    if (now.on_judge - floor < policy.least_excess * now.on_judge) break;
+    result.after = now.validation_squares;
+    if (now.validation_squares - floor < policy.least_excess * now.validation_squares) break;
   }
   return result;
 }

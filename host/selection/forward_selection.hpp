@@ -10,14 +10,14 @@ namespace flexspline::selection {
 
 // Products of a half of the data, weighted by record, for the sign of the velocity and for the presliding state (empty
 // where that does not compete).
-struct Half {
+struct HalfData {
   Eigen::MatrixXd sign, presliding;
   double rows = 0.0;
 };
 
 inline constexpr int kPreslidingTerm = -1;
 
-struct Step {
+struct SelectionStep {
   int term = 0;                           // index of RegressorTable::terms, or kPreslidingTerm
   double share = 0.0;                     // of the squares above the noise that were left before it
   double of_all = 0.0;                    // of the squares above the noise of the model alone
@@ -29,22 +29,24 @@ struct Noise {
   double tau = 1.0;       // rows that count as one
 };
 
-struct Selected {
+struct SelectionPath {
   bool abstains = false;
   bool extrapolates = false;         // the model alone does not carry over from one half to the other
-  double before = 0.0, after = 0.0;  // squares of the half that judges, model alone and with all steps
-  std::vector<Step> steps;
+  double before = 0.0, after = 0.0;  // squares of the validation half, model alone and with all steps
+  std::vector<SelectionStep> steps;
 };
 
-// The model with some terms added, fitted on `fit`. Squares on `judge`.
-struct Fitted {
+// The model with some terms added, fitted on the training half `fit`. Squares on both halves.
+struct TermFit {
   Eigen::VectorXd theta;
   std::vector<Eigen::Index> columns;
-  double on_fit = 0.0, on_judge = 0.0;
+  double training_squares = 0.0, validation_squares = 0.0;
 };
-Fitted fit_terms(const RegressorTable& table, const std::vector<int>& terms, const Half& fit, const Half& judge);
+TermFit fit_terms(const RegressorTable& table, const std::vector<int>& terms, const HalfData& fit,
+                  const HalfData& judge);
 
-Selected select_forward(const RegressorTable& table, const Half& fit, const Half& judge, const Noise& noise,
-                        const std::vector<std::uint8_t>& may_enter, const SelectionPolicy& policy);
+SelectionPath select_forward(const RegressorTable& table, const HalfData& fit, const HalfData& judge,
+                             const Noise& noise, const std::vector<std::uint8_t>& may_enter,
+                             const SelectionPolicy& policy);
 
 }  // namespace flexspline::selection

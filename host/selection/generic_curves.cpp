@@ -22,14 +22,14 @@ void add_generic(TableBuilder& builder, std::string name, std::vector<Eigen::Vec
   builder.table.terms.push_back(std::move(term));
 }
 
-// Friction that bends at two speeds.
+// Friction with kinks at two speeds.
 void add_friction_curve(TableBuilder& builder, double top_speed) {
-  const auto bent_at = [&](double knot) {
+  const auto kinked_at = [&](double knot) {
     return builder.at_rows([knot](const estimation::Record& r, std::size_t k) {
       return TableBuilder::direction(r, k) * std::min(std::abs(r.inputs.velocity_at(k)), knot);
     });
   };
-  add_generic(builder, "friction curve over speed", {bent_at(0.1 * top_speed), bent_at(0.3 * top_speed)});
+  add_generic(builder, "friction curve over speed", {kinked_at(0.1 * top_speed), kinked_at(0.3 * top_speed)});
 }
 
 // Torque and friction over the output angle: Chebyshev polynomials, which are well conditioned.
@@ -55,7 +55,7 @@ void add_angle_curves(TableBuilder& builder) {
   }
 }
 
-// What a first-order lag lacks of a column, along each run.
+// A column less its first-order lag, along each run.
 Eigen::VectorXd lag_of(const Eigen::VectorXd& column, const std::vector<Run>& runs, double time_constant_s) {
   Eigen::VectorXd lag = column;
   for (const Run& run : runs) {

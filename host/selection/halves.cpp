@@ -16,17 +16,17 @@ std::vector<double> record_weights(const RegressorTable& table, const Setting& s
   }
   for (std::size_t r = 0; r < table.records; ++r) weights[r] = rows[r] > 0.0 ? 1.0 : 0.0;
   for (int round = 0; round < 3; ++round) {
-    Half all;
+    HalfData all;
     for (std::size_t r = 0; r < table.records; ++r) {
       if (rows[r] == 0.0) continue;
       if (all.sign.size() == 0) all.sign = Eigen::MatrixXd::Zero(products[r].rows(), products[r].cols());
       all.sign += weights[r] * products[r];
     }
-    const Fitted fitted = fit_terms(table, {}, all, all);
+    const TermFit fitted = fit_terms(table, {}, all, all);
     std::vector<double> found;
     for (std::size_t r = 0; r < table.records; ++r) {
       if (rows[r] == 0.0) continue;
-      Half one{products[r], {}, rows[r]};
+      HalfData one{products[r], {}, rows[r]};
       double sum = products[r](products[r].rows() - 1, products[r].cols() - 1);
       const Eigen::Index y = products[r].cols() - 1;
       for (std::size_t i = 0; i < fitted.columns.size(); ++i) {
@@ -45,9 +45,9 @@ std::vector<double> record_weights(const RegressorTable& table, const Setting& s
   return weights;
 }
 
-Half sum_of(const Setting& sign, const Setting* presliding, const std::vector<double>& weights,
-            std::span<const std::uint8_t> in, std::uint8_t which, const Differences& differences) {
-  Half half;
+HalfData sum_of(const Setting& sign, const Setting* presliding, const std::vector<double>& weights,
+                std::span<const std::uint8_t> in, std::uint8_t which, const FrictionRandomEffects& differences) {
+  HalfData half;
   const Eigen::Index p = sign.rows.cols();
   half.sign = Eigen::MatrixXd::Zero(p, p);
   if (presliding) half.presliding = Eigen::MatrixXd::Zero(p, p);
@@ -70,7 +70,7 @@ Half sum_of(const Setting& sign, const Setting* presliding, const std::vector<do
       }
       if (own.size() > 0) {
         own *= weights[record];
-        eliminate_differences(own, differences);
+        eliminate_friction_effects(own, differences);
         to += own;
       }
       first = last;

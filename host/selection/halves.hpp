@@ -6,7 +6,7 @@
 #include <span>
 #include <vector>
 
-#include "host/selection/record_differences.hpp"
+#include "host/selection/friction_random_effects.hpp"
 
 namespace flexspline::selection {
 
@@ -16,8 +16,8 @@ std::vector<double> record_weights(const RegressorTable& table, const Setting& s
 
 // Products of the blocks k with in[k] == which, or of all where `in` is empty; each record's differences eliminated.
 // `presliding` is null where that state does not compete; else its blocks are those of `sign`.
-Half sum_of(const Setting& sign, const Setting* presliding, const std::vector<double>& weights,
-            std::span<const std::uint8_t> in, std::uint8_t which, const Differences& differences);
+HalfData sum_of(const Setting& sign, const Setting* presliding, const std::vector<double>& weights,
+                std::span<const std::uint8_t> in, std::uint8_t which, const FrictionRandomEffects& differences);
 
 // Which blocks are in the first of two complementary halves: half of each record's blocks, so that no half lacks a
 // record.

@@ -14,8 +14,8 @@ bool add_model_columns(TableBuilder& builder) {
   RegressorTable& table = builder.table;
   const estimation::Terms& terms = builder.terms;
   const auto on_balance = builder.on_balance();
-  const std::vector<estimation::Slot> linear = estimation::free_linear_slots(terms, on_balance);
-  const std::vector<estimation::Slot> shapes = estimation::free_shape_slots(terms, on_balance);
+  const std::vector<estimation::ParameterRef> linear = estimation::free_linear_parameters(terms, on_balance);
+  const std::vector<estimation::ParameterRef> nonlinear = estimation::free_nonlinear_parameters(terms, on_balance);
   table.target = data.target() - data.known_torque(terms, on_balance);
   if (linear.empty() || data.rows() == 0) return false;
   const Eigen::MatrixXd base = data.columns(terms, linear);
@@ -29,21 +29,21 @@ bool add_model_columns(TableBuilder& builder) {
     const auto& info = t.entry->parameters[linear[j].parameter];
     add(base.col(static_cast<Eigen::Index>(j)), fmt::format("{}.{}", t.id, info.name), info.low);
   }
-  if (!shapes.empty()) {
-    const Eigen::MatrixXd slopes = data.shape_columns(terms, on_balance, shapes);
-    for (std::size_t j = 0; j < shapes.size(); ++j)
-      add(slopes.col(static_cast<Eigen::Index>(j)), fmt::format("slope by {}", terms[shapes[j].term].id),
+  if (!nonlinear.empty()) {
+    const Eigen::MatrixXd slopes = data.nonlinear_columns(terms, on_balance, nonlinear);
+    for (std::size_t j = 0; j < nonlinear.size(); ++j)
+      add(slopes.col(static_cast<Eigen::Index>(j)), fmt::format("slope by {}", terms[nonlinear[j].term].id),
           -effects::kUnbounded);
   }
   const Eigen::VectorXd fitted = base * estimation::PivotedQr(base).solve(table.target);
-  const estimation::Prepared& prepared = builder.prepared();
+  const estimation::PreparedData& prepared = builder.prepared();
   const Eigen::VectorXd through_gear = prepared.torque_measured
                                            ? builder.at_rows([&](const estimation::Record& r, std::size_t k) {
                                                return r.inputs.torque_at(k) / prepared.constants.gear_ratio;
                                              })
                                            : Eigen::VectorXd::Zero(data.rows());
   builder.effort = fitted + through_gear;
-  // A lag between the columns is a nuisance of every model.
+  // A lag between the columns is a nuisance parameter of every model.
   add(slope_of(builder.effort, table.runs), "time lag", -effects::kUnbounded);
   table.model_columns = static_cast<Eigen::Index>(builder.columns.size());
   return true;

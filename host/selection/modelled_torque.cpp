@@ -9,11 +9,11 @@ namespace flexspline::selection {
 
 using effects::Phase;
 using estimation::Balance;
-using estimation::Prepared;
+using estimation::PreparedData;
 using estimation::Record;
 using estimation::Terms;
 
-void take_noise_off_torque(Prepared& prepared) {
+void take_noise_off_torque(PreparedData& prepared) {
   constexpr double kWhite =
       0.5;  // semivariance of neighbours over the variance: 1 for white noise, 0 for a slow signal
   constexpr Eigen::Index kRowsPerColumn = 20;
@@ -43,8 +43,8 @@ void take_noise_off_torque(Prepared& prepared) {
   }
 }
 
-void take_torque_from_load(Prepared& prepared, const Terms& terms) {
-  // A weight on the output, and what takes a torque to be accelerated: most of that is behind the gear.
+void take_torque_from_load(PreparedData& prepared, const Terms& terms) {
+  // Weight on the output and inertia: most of both is behind the gear.
   const auto torque_of = [&](const estimation::Term& t, const std::vector<double>& values, double acceleration) {
     effects::Inputs<catalogue::Real> in;
     in.acceleration = acceleration;

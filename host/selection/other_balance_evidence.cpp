@@ -13,7 +13,7 @@
 namespace flexspline::selection {
 namespace {
 
-// The other balance's own terms as they stand there; all others as the candidate found them.
+// The other balance's own terms with the values fitted there; all others with the candidate's values.
 Terms as_seen_by(const BalanceSearch& other, const CandidateFit& candidate) {
   Terms terms = candidate.fit.terms;
   for (estimation::Term& term : terms) {
@@ -36,24 +36,24 @@ Identified identified_of(const BalanceSearch& own, CandidateFit& candidate) {
   CrossValidatedFit& fit = candidate.fit;
   const std::size_t added = fit.terms.size() - 1;
   const auto on_balance = estimation::terms_on(fit.terms, own.data->balance(), own.data->prepared().torque_measured);
-  std::vector<Slot> slots = fit.linear;
-  const std::vector<Slot> shapes = estimation::free_shape_slots(fit.terms, on_balance);
-  slots.insert(slots.end(), shapes.begin(), shapes.end());
-  for (std::size_t j = 0; j < slots.size(); ++j) {
+  std::vector<ParameterRef> refs = fit.linear;
+  const std::vector<ParameterRef> nonlinear = estimation::free_nonlinear_parameters(fit.terms, on_balance);
+  refs.insert(refs.end(), nonlinear.begin(), nonlinear.end());
+  for (std::size_t j = 0; j < refs.size(); ++j) {
     const auto at = static_cast<Eigen::Index>(j);
-    if (slots[j].term != added || !std::isfinite(fit.covariance(at, at))) continue;
-    identified.parameters.push_back(slots[j].parameter);
+    if (refs[j].term != added || !std::isfinite(fit.covariance(at, at))) continue;
+    identified.parameters.push_back(refs[j].parameter);
     identified.at.push_back(at);
-    // Shapes stand where they were searched; the fit moved them from there.
+    // Nonlinear parameters have the values at which they were searched; the fit moved them from there.
     if (j >= fit.linear.size()) {
-      fit.terms[added].values[slots[j].parameter] += fit.theta[at];
+      fit.terms[added].values[refs[j].parameter] += fit.theta[at];
       fit.theta[at] = 0.0;
     }
   }
   return identified;
 }
 
-// A parameter beyond its bounds, in words; empty where all lie within them.
+// A parameter beyond its bounds, in words; empty where all are within them.
 std::string impossible_value(const estimation::Term& term) {
   for (std::size_t p = 0; p < term.values.size(); ++p) {
     const effects::ParameterInfo& info = term.entry->parameters[p];
@@ -65,8 +65,8 @@ std::string impossible_value(const estimation::Term& term) {
   return {};
 }
 
-// Whether the effect scales the measured torque, which is the left side of this balance: it changes all parameters of
-// the balance by one factor, and no evidence is in that unless one of them is known.
+// Whether the effect scales the measured torque, the left side of this balance. It then changes all parameters by one
+// factor, which is no evidence unless one of them is known.
 bool only_scales(const BalanceSearch& other, const catalogue::Entry& entry) {
   constexpr unsigned kScale = effects::kTorqueScale | effects::kTorque;
   if ((entry.info->reads & kScale) != kScale) return false;
@@ -86,8 +86,8 @@ double jacobian_of(BalanceData& data, const Terms& terms, std::size_t added, dou
   return 2.0 * rows / tau * std::log(std::max(std::abs(1.0 - share), 1e-300));
 }
 
-// Moves the added effect's parameters to where both balances have them, and returns the score there less what the move
-// costs on the own one.
+// Combines both balances' estimates of the added effect's parameters. Returns the score there, less the cost of the
+// change on its own balance.
 double score_on(BalanceSearch& other, CandidateFit& candidate, const Identified& identified) {
   if (only_scales(other, *candidate.model.entry)) return 0.0;
   BalanceData data = *other.data;
@@ -108,7 +108,7 @@ double score_on(BalanceSearch& other, CandidateFit& candidate, const Identified&
     candidate.admissible = false;
     candidate.why_not = std::move(why);
   }
-  // No parameter is free there, so none is paid for.
+  // No parameter is free there, so there is no penalty.
   const CrossValidatedFit fit = cross_validate(data, terms, other.keep);
   candidate.at_floor_on_others = candidate.at_floor_on_others && other.at_floor(fit);
   const LikelihoodGain gain = likelihood_gain(other.base, fit, 0.0);
@@ -133,8 +133,8 @@ std::vector<BalanceSearch*> other_balances_of(const std::vector<BalanceSearch*>&
 
 void add_other_balance_evidence(const std::vector<BalanceSearch*>& all, BalanceSearch& own,
                                 std::vector<CandidateFit>& candidates) {
-  // Those as well that the own balance hardly shows: a sensor's offset is a small one to the spring, and all to a
-  // load that moves freely.
+  // Also parameters that their own balance hardly shows: an offset of the sensor is small for the spring, and large for
+  // a free load.
   std::vector<CandidateFit*> acting;
   for (CandidateFit& candidate : candidates)
     if (candidate.admissible && !other_balances_of(all, own, candidate).empty()) acting.push_back(&candidate);

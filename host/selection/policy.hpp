@@ -39,8 +39,8 @@ struct SelectionPolicy {
   double least_excess = 0.03;
 
   double curve_discount = 0.8;  // METHOD: a law takes at least 80 % of what any curve does
-  double alike = 0.9;           // terms that take off that share of the best one's are not distinguished,
-  double alike_left = 2.0;      // unless they leave that many times the squares above the noise
+  double similar = 0.9;         // terms that take off that share of the best one's are not distinguished,
+  double similar_left = 2.0;    // unless they leave that many times the squares above the noise
 
   double group_frequency = 0.5;      // of the subsamples that chose the first of a group
   double least_own_frequency = 0.3;  // of the first of a group
@@ -67,8 +67,8 @@ struct SelectionPolicy {
   double fewest_reversals = 3.0;
 
   // Resampling against likelihood on the motor's balance.
-  // Percent of the left-out chi-square from which on what resampling cannot choose counts by itself: what stood for
-  // another effect took off at most 96 % in robot-like twins, a limit of the current that is there 99 %.
+  // Percent of the left-out chi-square from which on what resampling cannot choose counts by itself: what was named
+  // instead of another effect took off at most 96 % in robot-like twins, a limit of the current that is there 99 %.
   double nearly_all_percent = 98.0;
   double floor_uncertainty = 0.1;   // relative, of a floor of some ten periods
   double filter_uncertainty = 0.2;  // relative, of an autocorrelation time
@@ -87,7 +87,7 @@ struct SelectionPolicy {
   // Share of a candidate's torque that is orthogonal to the model: below, both are one in the data (by hand, on drives
   // with an effect that the model has in another form).
   double least_orthogonal_share = 0.003;
-  // Residual over noise floor: what the filters leave around reversals repeats with the motion, so a true model stands
+  // Residual over noise floor: what the filters leave around reversals repeats with the motion, so a true model is
   // some 15 % above its floor on simulated drives.
   double at_floor = 1.3;
   // A candidate that takes as much off the left-out chi-square, in percent, may change the base model as it likes (by
@@ -144,10 +144,10 @@ struct SelectionPolicy {
   std::size_t like_rows = 120;    // that count as like ones
   double most_disturbed = 0.3;    // of a record: more is no exception
 
-  // What is said beside the name.
+  // What is reported in addition to the name.
   double shown_share_percent = 5.0;        // maps of a complete model show significant shares of a few percent
   double least_shown_share_percent = 1.0;  // where much is left
-  double delay_errors = 5.0;               // standard errors from which on a delay is said
+  double delay_errors = 5.0;               // standard errors from which on a delay is reported
   // Of the chi-square above the noise: the best substitute for an effect that is not in the catalogue takes off 60 %
   // and less (METHOD).
   double recovered_percent = 80.0;
@@ -159,10 +159,10 @@ struct SelectionPolicy {
   double curve_chi2_percent = 3.0;
   // What is named must recover this share of what a curve does: substitutes for unknown laws stay below, effects of the
   // catalogue that are the nearest to one above.
-  double shape_recovered = 0.9;
+  double curve_recovered = 0.9;
   double recovered_by_two = 0.98;  // two that are right leave nothing to a curve
   double simpler_curve = 0.02;     // of the left-out squares: a simpler curve is taken where it predicts as well
-  // A table that a user asks for: below that score it is noise that was fitted, and it must lower the left-out squares
+  // A table that a user adds: below that score it is noise that was fitted, and it must lower the left-out squares
   // by that many percent.
   double table_score = 20.0;
   double least_table_percent = 0.1;
@@ -171,7 +171,7 @@ struct SelectionPolicy {
   std::size_t fewest_of_trend = 6;  // experiments
   double trend_p_value = 1e-3;      // after the correction for what was tried
   double trend_size = 0.03;         // of the parameter, over the records
-  double least_drift = 0.01;        // relative standard deviation of friction between records that is said
+  double least_drift = 0.01;        // relative standard deviation of friction between records that is reported
   double drift_deviance = 12.0;     // twice the log-likelihood ratio of random effects against none
 };
 

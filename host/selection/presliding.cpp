@@ -13,7 +13,7 @@ namespace flexspline::selection {
 
 using estimation::Balance;
 using estimation::BalanceData;
-using estimation::Prepared;
+using estimation::PreparedData;
 using estimation::Record;
 using estimation::Terms;
 
@@ -21,7 +21,7 @@ std::vector<double> presliding_state(const Record& record, double travel) {
   const std::size_t n = record.inputs.size();
   std::vector<double> state(n, 0.0);
   for (const data::Segment& s : record.segments) {
-    // Before the record the axis may have come from anywhere: it begins as it will move.
+    // The motion before the record is unknown: the state starts in the direction of the first motion.
     double z = 0.0;
     for (std::size_t k = s.first; k < s.last; ++k)
       if (std::abs(record.inputs.velocity_at(k)) > 3.0 * record.velocity_noise[0]) {
@@ -49,7 +49,7 @@ double lower_median(std::vector<double> x) {
 
 }  // namespace
 
-std::vector<double> presliding_travels(const Prepared& prepared, const SelectionPolicy& policy) {
+std::vector<double> presliding_travels(const PreparedData& prepared, const SelectionPolicy& policy) {
   std::vector<double> strokes;
   double noise = 0.0;
   for (const Record& r : prepared.records) {
@@ -76,15 +76,15 @@ std::vector<double> presliding_travels(const Prepared& prepared, const Selection
   return travels;
 }
 
-std::vector<double> squares_by_travel(const Prepared& original, const Terms& terms,
+std::vector<double> squares_by_travel(const PreparedData& original, const Terms& terms,
                                       const std::vector<double>& travels) {
   std::vector<double> squares(travels.size());
   estimation::in_parallel(travels.size(), [&](std::size_t i) {
-    Prepared prepared = original;
+    PreparedData prepared = original;
     for (Record& r : prepared.records) r.inputs.directions[0] = presliding_state(r, travels[i]);
     BalanceData data(prepared, Balance::motor);
     const auto on_balance = estimation::terms_on(terms, Balance::motor, prepared.torque_measured);
-    const Eigen::MatrixXd X = data.columns(terms, estimation::free_linear_slots(terms, on_balance));
+    const Eigen::MatrixXd X = data.columns(terms, estimation::free_linear_parameters(terms, on_balance));
     const Eigen::VectorXd y = data.target() - data.known_torque(terms, on_balance);
     squares[i] = (y - X * estimation::PivotedQr(X).solve(y)).squaredNorm();
   });

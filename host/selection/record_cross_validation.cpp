@@ -17,13 +17,13 @@ constexpr std::size_t kMostFolds = 6;
 // Relative change of the squares that ends the search for nonlinear parameters: far below what decides.
 constexpr double kSameSquares = 1e-4;
 
-// A model fitted on what `keep` leaves, nonlinear parameters from the values that all records gave.
+// A model fitted on the rows in `keep`; nonlinear parameters start at the values from all records.
 CrossValidatedFit fit_without(BalanceData& data, const Terms& terms, const Eigen::VectorXd& keep) {
   CrossValidatedFit fit = cross_validate(data, terms, keep);
   const auto on_balance = estimation::terms_on(fit.terms, data.balance(), data.prepared().torque_measured);
-  if (estimation::free_shape_slots(fit.terms, on_balance).empty()) return fit;
+  if (estimation::free_nonlinear_parameters(fit.terms, on_balance).empty()) return fit;
   Terms refined = fit.terms;
-  estimation::refine_shapes(data, refined, on_balance, noise_covariance(data, fit), kSameSquares);
+  estimation::refine_nonlinear(data, refined, on_balance, noise_covariance(data, fit), kSameSquares);
   return cross_validate(data, std::move(refined), keep);
 }
 
@@ -48,9 +48,9 @@ bool is_each_records_own(const CandidateFit& candidate) {
 std::string why_not(const BalanceSearch& search, const CandidateFit& candidate) {
   if (is_within_floor_of_few_records(search))
     return "the error is within 30 % of the noise, and fewer than three records do not show that it carries over";
-  // On the motor's balance stability selection looks at halves of the records.
+  // On the motor's balance stability selection splits the records into halves.
   if (search.data->balance() == estimation::Balance::motor) return {};
-  const CarriedOver carried = carry_over(search, candidate);
+  const RecordCrossValidation carried = cross_validate_by_record(search, candidate);
   if (!carried.is_refuted() && (!search.floor || search.at_floor(candidate.fit) || carried.is_certain())) return {};
   return fmt::format("fitted without them, it predicts {} records worse than the model alone, and {} better{}",
                      carried.worse, carried.better,
@@ -59,11 +59,11 @@ std::string why_not(const BalanceSearch& search, const CandidateFit& candidate) 
 
 }  // namespace
 
-bool CarriedOver::is_refuted() const {
+bool RecordCrossValidation::is_refuted() const {
   return better < kPolicy.named_frequency * (better + worse);
 }
 
-bool CarriedOver::is_certain() const {
+bool RecordCrossValidation::is_certain() const {
   const int all = better + worse;
   if (better == 0) return false;
   // Better by chance in so many of all records or more.
@@ -71,14 +71,14 @@ bool CarriedOver::is_certain() const {
   return boost::math::cdf(boost::math::complement(chance, better - 1)) < kPolicy.sign_test_p_value;
 }
 
-CarriedOver carry_over(const BalanceSearch& search, const CandidateFit& candidate) {
+RecordCrossValidation cross_validate_by_record(const BalanceSearch& search, const CandidateFit& candidate) {
   const std::vector<RowRange>& ranges = search.data->records();
-  CarriedOver result;
+  RecordCrossValidation result;
   if (ranges.size() < estimation::kFewestRecords || is_each_records_own(candidate)) return result;
   const std::size_t folds = std::min(kMostFolds, ranges.size());
   // Twice the log-likelihood ratio of each record; zero where it does not count.
   std::vector<double> gains(ranges.size(), 0.0);
-  estimation::Prepared few;
+  estimation::PreparedData few;
   const BalanceData decimated = search.data->decimated(few);
   estimation::in_parallel(folds, [&](std::size_t fold) {
     BalanceData data = decimated;
@@ -87,7 +87,7 @@ CarriedOver carry_over(const BalanceSearch& search, const CandidateFit& candidat
     if (keep.maxCoeff() <= 0.0) return;
     const CrossValidatedFit with = fit_without(data, candidate.fit.terms, keep);
     const CrossValidatedFit without = fit_without(data, search.base.terms, keep);
-    // An effect that a few records alone show is not identified by the others.
+    // An effect that only a few records show is not identified by the others.
     if (likelihood_gain(without, with, candidate.model.added).score < kPolicy.named_score) return;
     for (std::size_t i = fold; i < ranges.size(); i += folds) {
       const double tau = std::max(1.0, search.base.autocorrelation_time);
@@ -109,7 +109,7 @@ bool is_within_floor_of_few_records(const BalanceSearch& search) {
   return search.data->records().size() < estimation::kFewestRecords && search.at_floor(search.base);
 }
 
-void check_carry_over(const BalanceSearch& search, std::vector<CandidateFit>& candidates) {
+void check_by_record(const BalanceSearch& search, std::vector<CandidateFit>& candidates) {
   constexpr std::size_t kMostRefused = 8;
   for (std::size_t k = 0; k < kMostRefused && !candidates.empty() && passes(candidates.front()); ++k) {
     CandidateFit& first = candidates.front();

@@ -1,5 +1,5 @@
 // Whether what a candidate explains carries over to records that it was not fitted on: leave-group-out
-// cross-validation by record, nonlinear parameters fitted anew.
+// cross-validation by record, nonlinear parameters fitted again.
 #pragma once
 
 #include "host/selection/candidate_fits.hpp"
@@ -7,7 +7,7 @@
 namespace flexspline::selection {
 
 // Records that were predicted from the others, by the model alone and with the candidate.
-struct CarriedOver {
+struct RecordCrossValidation {
   int better = 0, worse = 0;  // by more than chance (SelectionPolicy::least_gain); others do not decide
 
   // Fewer than SelectionPolicy::named_frequency of the records that decide are predicted better.
@@ -17,16 +17,17 @@ struct CarriedOver {
 };
 
 // A record counts if the others alone would name the candidate. Its own random effects are predicted from its own
-// rows, for both models alike. Nothing counts with fewer than three records, or where a parameter is each record's own.
-CarriedOver carry_over(const BalanceSearch& search, const CandidateFit& candidate);
+// rows, for both models in the same way. Nothing counts with fewer than three records, or where a parameter is each
+// record's own.
+RecordCrossValidation cross_validate_by_record(const BalanceSearch& search, const CandidateFit& candidate);
 
 // Fewer than three records cannot show that anything carries over, and what filters leave around reversals repeats with
 // the motion: within SelectionPolicy::at_floor of the noise nothing is named from them.
 bool is_within_floor_of_few_records(const BalanceSearch& search);
 
-// Refuses candidates that would be named and do not carry over, best first, until one does. What leaves more than noise
-// has to carry over with certainty on the balances at which stability selection does not look: parameters that differ
-// from record to record for another reason are followed by any law with enough of them. The list stays best first.
-void check_carry_over(const BalanceSearch& search, std::vector<CandidateFit>& candidates);
+// Refuses candidates that would be named and do not carry over, best first, until one does. On balances that stability
+// selection does not cover, a candidate that leaves more than noise must pass the sign test: a law with many parameters
+// follows any difference between records. The list stays best first.
+void check_by_record(const BalanceSearch& search, std::vector<CandidateFit>& candidates);
 
 }  // namespace flexspline::selection

@@ -11,7 +11,7 @@ namespace flexspline::selection {
 namespace {
 
 using estimation::BalanceData;
-using estimation::Prepared;
+using estimation::PreparedData;
 using estimation::Record;
 using estimation::Terms;
 
@@ -74,7 +74,7 @@ void scale_columns(const TableBuilder& builder) {
 
 }  // namespace
 
-double highest_order_hz(const Prepared& prepared) {
+double highest_order_hz(const PreparedData& prepared) {
   std::vector<double> speeds;
   for (const Record& r : prepared.records)
     for (std::size_t k = 0; k < r.inputs.size() && !r.inputs.velocity.empty(); k += r.decimation)
@@ -85,9 +85,9 @@ double highest_order_hz(const Prepared& prepared) {
                : 0.0;
 }
 
-RegressorTable make_regressor_table(const Prepared& original, Balance balance, const Terms& terms,
+RegressorTable make_regressor_table(const PreparedData& original, Balance balance, const Terms& terms,
                                     Presliding presliding, double highest_law_hz, const SelectionPolicy& policy) {
-  Prepared prepared = original;
+  PreparedData prepared = original;
   for (Record& r : prepared.records)
     r.inputs.directions[0] = presliding ? presliding_state(r, *presliding) : expected_sign(r);
   BalanceData data(prepared, balance);

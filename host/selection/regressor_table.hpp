@@ -1,5 +1,5 @@
 // The regression that a diagnosis searches: target, columns of the model, and columns of all terms that may be added,
-// at the highest bandwidth and without a mask. Immutable once made; lower bandwidths and masks are made from its rows.
+// at the highest bandwidth and without a mask. Immutable; lower bandwidths and masks are made from its rows.
 #pragma once
 
 #include <Eigen/Core>
@@ -64,11 +64,11 @@ struct RegressorTable {
 };
 
 // `prepared` is at the highest bandwidth and not masked; `terms` have the values of a first fit.
-RegressorTable make_regressor_table(const estimation::Prepared& prepared, Balance balance,
+RegressorTable make_regressor_table(const estimation::PreparedData& prepared, Balance balance,
                                     const estimation::Terms& terms, Presliding presliding, double highest_law_hz,
                                     const SelectionPolicy& policy);
 
 // Highest frequency of an order of the motor's turn that counts, Hz, at the typical speed.
-double highest_order_hz(const estimation::Prepared& prepared);
+double highest_order_hz(const estimation::PreparedData& prepared);
 
 }  // namespace flexspline::selection

@@ -33,7 +33,7 @@ std::vector<Resampling::Support> support_of(const StabilitySelection& selection,
 }
 
 // Whether a name that resampling chose is that of a candidate, or of another law of its family: resampling has the
-// nonlinear parameters at fixed values only, so which law of the family it is likelihood says.
+// nonlinear parameters at fixed values only, so likelihood decides which law of the family it is.
 bool is_of_family(const std::string& effect, std::optional<double> order, const CandidateFit& candidate) {
   if (order != candidate.model.order) return false;
   const std::string_view family = candidate.model.entry->info->family;
@@ -53,9 +53,9 @@ bool is_of_effort(const CandidateFit& candidate) {
   return candidate.model.entry->info->reads == effects::kCurrent;
 }
 
-// Whether the model with the best effect leaves what is known to be noise: as large as a noise floor that no fit made,
-// and no more correlated than the filter makes noise. What is built from the measured effort might explain its own
-// noise there, unless it takes off nearly all.
+// Whether the model with the best effect leaves known noise: as large as a noise floor that is not from a fit, with no
+// more correlation than the filter causes. An effect built from the measured effort may explain its own noise, so it
+// must take off nearly all.
 bool reaches_floor(const SearchedBalance& e) {
   if (!e.floor.rmse || !e.names_one()) return false;
   const CandidateFit& first = e.candidates.front();
@@ -65,20 +65,19 @@ bool reaches_floor(const SearchedBalance& e) {
          (!is_of_effort(first) || first.gain.chi2_percent > kPolicy.nearly_all_percent);
 }
 
-// Whether the model with the best effect leaves noise: then likelihood is all that decides. A drive whose model lacks
-// more than one effect leaves structure whatever is added, and what takes off a little of it has proved nothing. Where
-// no noise is known, what is left has to be white, and an effect of the effort alone, which might explain its own
-// noise, is not taken.
+// Whether the model with the best effect leaves noise: then likelihood alone decides. Where more than one effect is
+// missing, structure remains whatever is added, and a small decrease proves nothing. Where the noise floor is unknown,
+// the residual must be white, and an effect of the effort alone is not taken, as it may explain its own noise.
 bool leaves_noise(const SearchedBalance& e, double whiteness) {
   const CrossValidatedFit& fit = e.names_one() ? e.candidates.front().fit : e.search.base;
   if (e.floor.rmse) return fit.rmse() < kPolicy.at_floor * *e.floor.rmse;
   return whiteness >= kPolicy.white && !(e.names_one() && is_of_effort(e.candidates.front()));
 }
 
-// Whether the likelihood of all data agrees with a name that resampling chose. Where the model alone leaves what is
-// known to be noise, most subsamples hold nothing above it, and what the others chose may be chosen from noise:
-// likelihood has to be certain then. Elsewhere it has no say, as it looks at one bandwidth, without reversals.
-bool likelihood_agrees(const SearchedBalance& motor, const Named& name) {
+// Whether the likelihood of all data agrees with a name that resampling chose. Where the model alone leaves known
+// noise, most subsamples abstain and the others may have selected noise: likelihood must be significant then. Otherwise
+// it is not used, as it sees one bandwidth, without reversals.
+bool likelihood_agrees(const SearchedBalance& motor, const NamedEffect& name) {
   if (!motor.floor.rmse || motor.search.base.rmse() > (1.0 + kPolicy.floor_uncertainty) * *motor.floor.rmse)
     return true;
   return std::any_of(motor.candidates.begin(), motor.candidates.end(), [&](const CandidateFit& candidate) {
@@ -86,17 +85,17 @@ bool likelihood_agrees(const SearchedBalance& motor, const Named& name) {
   });
 }
 
-// The effects to name: of what was found in the catalogue, and does not make the held-out error worse, the group with
-// the largest share where it is one that these data cannot distinguish; else all that stand alone. Behind the first,
-// what takes off less than a linear term has to is a remainder of the first one's law, or not worth a parameter.
-std::vector<Named> names_of(const Resampling& resampling, const SearchedBalance& motor) {
+// The effects to name, among those in the catalogue that do not increase the held-out error: the group with the largest
+// share where these data cannot distinguish its members, else all single ones. After the first, a term below the share
+// of a linear term is a remainder of the first law, or not worth a parameter.
+std::vector<NamedEffect> names_of(const Resampling& resampling, const SearchedBalance& motor) {
   const double least_percent = 100.0 * kPolicy.line_share;
-  std::vector<Named> names;
+  std::vector<NamedEffect> names;
   if (is_within_floor_of_few_records(motor.search)) return names;
-  for (const Resampling::Found& found : resampling.found) {
+  for (const Resampling::FoundTerm& found : resampling.found) {
     if (found.group.empty() || found.refused_by_holdout) continue;
     if (std::none_of(found.group.begin(), found.group.end(),
-                     [&](const Named& n) { return likelihood_agrees(motor, n); }))
+                     [&](const NamedEffect& n) { return likelihood_agrees(motor, n); }))
       continue;
     if (names.empty() && found.group.size() > 1) return found.group;
     if (found.group.size() > 1 || (!names.empty() && found.share_percent < least_percent)) continue;
@@ -119,13 +118,13 @@ Resampling resample(const std::vector<const data::Experiment*>& experiments, con
   result.whiteness = stability.whiteness;
   result.highest_hz = selection.tables().bandwidth.highest_hz;
   result.lowest_hz = result.highest_hz * std::pow(policy.bandwidth_factor, static_cast<double>(policy.bandwidths - 1));
-  const std::vector<Found> decided = decide(stability, policy);
+  const std::vector<FoundTerm> decided = decide(stability, policy);
   std::vector<std::string> names;
-  for (const Found& found : decided) names.push_back(found.group.front().name);
+  for (const FoundTerm& found : decided) names.push_back(found.group.front().name);
   const std::vector<double> held_out = selection.held_out_ratios(names);
   for (std::size_t i = 0; i < decided.size(); ++i) {
-    const Found& found = decided[i];
-    Resampling::Found one;
+    const FoundTerm& found = decided[i];
+    Resampling::FoundTerm one;
     for (const Frequency& f : found.group) one.name += (one.name.empty() ? "" : " or ") + f.name;
     one.frequency = found.frequency;
     one.share_percent = 100.0 * found.share;
@@ -155,14 +154,14 @@ bool resampling_decides(const Resampling& resampling, const SearchedBalance& mot
   const bool found_something = std::any_of(resampling.found.begin(), resampling.found.end(),
                                            [](const auto& f) { return !f.refused_by_holdout; });
   if (!support && first.gain.chi2_percent > kPolicy.nearly_all_percent && !found_something) return false;
-  const auto is_first = [&](const Named& n) { return is_of_family(n.effect, n.order, first); };
+  const auto is_first = [&](const NamedEffect& n) { return is_of_family(n.effect, n.order, first); };
   const bool found_first = std::any_of(resampling.found.begin(), resampling.found.end(), [&](const auto& f) {
     return std::any_of(f.group.begin(), f.group.end(), is_first);
   });
   if (!resampling.found.empty() && !found_first) return true;
   const bool silent = resampling.abstained > policy.most_abstaining * resampling.subsamples;
   if (!silent && support && *support < policy.named_frequency) return true;
-  // What is built from the measured effort explains its noise too.
+  // An effect built from the measured effort also explains its noise.
   if (!support && is_of_effort(first)) return true;
   return !leaves_noise(motor, resampling.whiteness);
 }
@@ -174,7 +173,7 @@ void name_stable(SearchedBalance& chosen, Diagnosis& result) {
       static_cast<std::ptrdiff_t>(result.resampling->found.size()) > (is_group ? 1 : std::ssize(result.named));
   if (result.named.empty()) return;
   // Laws of one family: the one that fits best with its nonlinear parameters searched continuously.
-  for (Named& n : result.named) {
+  for (NamedEffect& n : result.named) {
     const std::string_view family = catalogue::get(n.effect).info->family;
     if (family.empty()) continue;
     const CandidateFit* best = nullptr;
@@ -184,9 +183,9 @@ void name_stable(SearchedBalance& chosen, Diagnosis& result) {
     if (best) n.effect = std::string(best->model.entry->name());
   }
   result.verdict = is_group ? Verdict::confusable_effects : Verdict::missing_effect;
-  const auto is = [](const Candidate& c, const Named& n) { return c.effect == n.effect && c.order == n.order; };
+  const auto is = [](const Candidate& c, const NamedEffect& n) { return c.effect == n.effect && c.order == n.order; };
   auto begin = result.candidates.begin() - result.candidates.begin();
-  for (const Named& n : result.named) {
+  for (const NamedEffect& n : result.named) {
     auto at = std::find_if(result.candidates.begin() + begin, result.candidates.end(),
                            [&](const Candidate& c) { return is(c, n); });
     if (at == result.candidates.end()) {
@@ -199,8 +198,8 @@ void name_stable(SearchedBalance& chosen, Diagnosis& result) {
     }
     at->admissible = true;
     at->why_not.clear();
-    for (const Named& other : result.named)
-      if (is_group && !is(*at, other)) at->rivals.push_back(other.effect);
+    for (const NamedEffect& other : result.named)
+      if (is_group && !is(*at, other)) at->cannot_distinguish.push_back(other.effect);
     std::rotate(result.candidates.begin() + begin, at, at + 1);
     ++begin;
   }
@@ -210,9 +209,9 @@ void name_stable(SearchedBalance& chosen, Diagnosis& result) {
   if (candidate != chosen.candidates.end()) std::rotate(chosen.candidates.begin(), candidate, candidate + 1);
 }
 
-std::vector<Named> Resampling::found_group(const Named& name) const {
-  for (const Found& one : found)
-    for (const Named& n : one.group)
+std::vector<NamedEffect> Resampling::found_group(const NamedEffect& name) const {
+  for (const FoundTerm& one : found)
+    for (const NamedEffect& n : one.group)
       if (n.effect == name.effect && n.order == name.order) return one.group;
   return {};
 }

@@ -1,4 +1,4 @@
-// What resampling (host/selection) makes of the motor's balance, and how the verdict follows it.
+// Resampling (host/selection) on the motor's balance, and the verdict from it.
 #pragma once
 
 #include <vector>
@@ -8,17 +8,16 @@
 
 namespace flexspline::selection {
 
-// Experiments of role fit choose, those of role holdout judge.
+// Experiments of role fit select the terms, those of role holdout validate them.
 Resampling resample(const std::vector<const data::Experiment*>& experiments, const model::Drive& drive,
                     const estimation::Terms& terms);
 
-// Whether the verdict on the motor's balance follows resampling. Likelihood is sharper where all that the model lacks
-// is the one effect, and nothing else than that can be meant by what is left: it decides where the halves of the data
-// hold nothing above the noise, and where resampling does not speak against its name.
+// Whether resampling decides the verdict on the motor's balance. Likelihood has more power where exactly one effect is
+// missing: it decides where the halves of the data show nothing above the noise, and where resampling does not
+// contradict it.
 bool resampling_decides(const Resampling& resampling, const SearchedBalance& motor);
 
-// Names what resampling found; nothing where it found nothing that is in the catalogue. The
-// candidates that it names come first.
+// Names the effects that resampling found in the catalogue, if any. Their candidates come first.
 void name_stable(SearchedBalance& chosen, Diagnosis& result);
 
 }  // namespace flexspline::selection

@@ -1,4 +1,4 @@
-// A balance and all that likelihood found on it.
+// A balance with its candidates by likelihood.
 #pragma once
 
 #include <vector>

@@ -9,10 +9,10 @@ namespace flexspline::selection {
 namespace {
 
 constexpr double kRowsPerPeriod = 4.0;
-constexpr double kStanding = 0.5;  // periods of the cut-off
-constexpr double kVisible = 3.0;   // velocities in units of their noise
+constexpr double kAtRest = 0.5;   // periods of the cut-off
+constexpr double kVisible = 3.0;  // velocities in units of their noise
 
-// Rows of a run that are left out: around reversals and sticking where `mask` asks for it, and where the axis stands.
+// Rows of a run that are left out: around reversals and sticking where `mask` is set, and where the axis is at rest.
 std::vector<std::uint8_t> unsure_rows(const RegressorTable& table, const Run& run, double cutoff_hz, bool mask,
                                       Eigen::Index reach) {
   const Eigen::Index n = run.last - run.first;
@@ -25,12 +25,12 @@ std::vector<std::uint8_t> unsure_rows(const RegressorTable& table, const Run& ru
         for (Eigen::Index j = std::max<Eigen::Index>(0, k - reach); j <= std::min(n - 1, k + reach); ++j)
           unsure[static_cast<std::size_t>(j)] = 1;
     }
-  // Where the axis stands, friction takes any value up to its limit, whatever law holds in motion.
-  const auto standing = std::max<Eigen::Index>(2, std::lround(kStanding / (cutoff_hz * run.row_s)));
+  // Where the axis is at rest, friction takes any value up to its limit, whatever law holds in motion.
+  const auto rest_rows = std::max<Eigen::Index>(2, std::lround(kAtRest / (cutoff_hz * run.row_s)));
   for (Eigen::Index k = 0; k < n;) {
     Eigen::Index end = k;
     while (end < n && std::abs(table.velocity_over_noise[run.first + end]) <= kVisible) ++end;
-    if (end - k >= standing)
+    if (end - k >= rest_rows)
       for (Eigen::Index j = std::max<Eigen::Index>(0, k - reach / 2); j < std::min(n, end + reach / 2); ++j)
         unsure[static_cast<std::size_t>(j)] = 1;
     k = std::max(end, k + 1);
@@ -38,15 +38,15 @@ std::vector<std::uint8_t> unsure_rows(const RegressorTable& table, const Run& ru
   return unsure;
 }
 
-// Rows of the setting in the making, stretch by stretch.
-struct KeptRows {
+// Rows of the setting, run by run.
+struct SelectedRows {
   std::vector<Eigen::MatrixXd> rows;  // by run
   std::vector<Run> runs;
   Eigen::Index total = 0;
 };
 
-// Takes the rows of a run, filtered and fewer, without those that are left out.
-void take_rows(const RegressorTable& table, const Run& run, double cutoff_hz, bool mask, KeptRows& kept) {
+// Adds the rows of a run, filtered and decimated, without those that are left out.
+void take_rows(const RegressorTable& table, const Run& run, double cutoff_hz, bool mask, SelectedRows& kept) {
   const Eigen::Index n = run.last - run.first;
   Eigen::MatrixXd rows(n, table.columns.cols() + 1);
   rows << table.columns.middleRows(run.first, n), table.target.segment(run.first, n);
@@ -79,7 +79,7 @@ void take_rows(const RegressorTable& table, const Run& run, double cutoff_hz, bo
   close();
 }
 
-// Blocks of one record: a share of all that follows its rows, and at least two, so that each half can have one.
+// Number of blocks of one record: in proportion to its rows, at least two, so that each half can have one.
 void add_blocks(Setting& setting, std::size_t record, Eigen::Index rows_of_record, std::size_t blocks) {
   const Eigen::Index columns = setting.rows.cols();
   const auto parts =
@@ -111,7 +111,7 @@ Setting make_setting(const RegressorTable& table, double cutoff_hz, bool mask, b
   Setting setting;
   setting.cutoff_hz = cutoff_hz;
   setting.mask = mask;
-  KeptRows kept;
+  SelectedRows kept;
   for (const Run& run : table.runs)
     if ((table.held_out[run.record] != 0) == held_out) take_rows(table, run, cutoff_hz, mask, kept);
   setting.rows.resize(kept.total, table.columns.cols() + 1);

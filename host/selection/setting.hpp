@@ -1,5 +1,5 @@
-// One way to look at the data: a bandwidth, and reversals kept or left out. Blocks of consecutive rows with their cross
-// products, so that fits on any choice of blocks are algebra on small matrices.
+// One setting of the regression: a bandwidth, and reversals kept or left out. Blocks of consecutive rows with their
+// cross products, so that fits on any choice of blocks are algebra on small matrices.
 #pragma once
 
 #include <Eigen/Core>
@@ -20,7 +20,7 @@ struct Setting {
   double cutoff_hz = 0.0;
   bool mask = false;
   std::vector<Block> blocks;
-  // What rows are, for residuals: filtered and masked.
+  // The rows, filtered and masked, for residuals.
   Eigen::MatrixXd rows;  // [columns, target]
   std::vector<Run> runs;
 };

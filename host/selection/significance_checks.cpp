@@ -7,7 +7,7 @@
 #include <cmath>
 #include <map>
 
-#include "host/comparison/row_variables.hpp"
+#include "host/comparison/sample_variables.hpp"
 #include "host/estimation/evidence.hpp"
 #include "host/estimation/model_projection.hpp"
 #include "host/estimation/pivoted_qr.hpp"
@@ -25,7 +25,7 @@ std::size_t order_place(const catalogue::Entry& entry) {
   return entry.parameters.size();
 }
 
-// Columns of the added effect at an order: of its linear parameters, or slopes by its shapes about zero.
+// Columns of the added effect at an order: of its linear parameters, or slopes by its nonlinear parameters about zero.
 Eigen::MatrixXd order_columns(BalanceData& data, Terms terms, double order) {
   estimation::Term& added = terms.back();
   added.values[order_place(*added.entry)] = order;
@@ -36,22 +36,23 @@ Eigen::MatrixXd order_columns(BalanceData& data, Terms terms, double order) {
     columns.rightCols(1) = column;
   };
   for (std::size_t p = 0; p < added.values.size(); ++p)
-    if (added.free_shape(p)) added.values[p] = 0.0;
+    if (added.free_nonlinear(p)) added.values[p] = 0.0;
   for (std::size_t p = 0; p < added.values.size(); ++p) {
     if (added.free_linear(p)) take(data.column(terms, {terms.size() - 1, p}));
-    if (added.free_shape(p)) take(data.shape_column(terms, on_balance, {terms.size() - 1, p}));
+    if (added.free_nonlinear(p)) take(data.nonlinear_column(terms, on_balance, {terms.size() - 1, p}));
   }
   return columns;
 }
 
-// A balance on which the effect of a candidate acts, and what its model could draw there.
+// A balance on which the effect of a candidate acts, and the span of its model there.
 struct ActingBalance {
   BalanceSearch* search = nullptr;
   const estimation::ModelProjection* projection = nullptr;
   const CrossValidatedFit* noise = nullptr;  // whose weights count
 };
 
-// Squares in units of the noise that an order takes off the residuals of all balances on which it acts, its own first.
+// Squares that an order takes off the residuals of all balances on which it acts, in units of the noise; its own
+// balance first.
 double explained(const std::vector<ActingBalance>& acting, const Terms& terms, double order) {
   std::vector<Eigen::MatrixXd> parts;
   std::vector<Eigen::VectorXd> residuals;
@@ -66,7 +67,7 @@ double explained(const std::vector<ActingBalance>& acting, const Terms& terms, d
     } else {
       std::vector<std::size_t> parameters;
       for (std::size_t p = 0; p < added.values.size(); ++p)
-        if (added.free_linear(p) || added.free_shape(p)) {
+        if (added.free_linear(p) || added.free_nonlinear(p)) {
           parameters.push_back(p);
           added.values[p] = 0.0;
         }
@@ -104,7 +105,7 @@ bool is_likelier_than_placebos(std::vector<ActingBalance> acting, const Candidat
   return true;
 }
 
-// The order that such effects mostly have, if none of the others that were tried fits better by more than that.
+// The usual order of such effects, unless another order fits better by more than this.
 bool usual_and_best(const std::vector<CandidateFit>& candidates, const CandidateFit& candidate, double better_by) {
   const catalogue::Entry& entry = *candidate.model.entry;
   return *candidate.model.order == entry.parameters[order_place(entry)].usual &&
@@ -148,7 +149,7 @@ std::string objection_to_order(const std::vector<ActingBalance>& acting, const C
   if (seen < kPolicy.order_parts_with_gain)
     return fmt::format("it shows in {} of {} parts of the data only", seen, parts);
   if (largest > kPolicy.most_in_one_part * whole)
-    return fmt::format("{:.0f} % of what it explains lies in one part of the data", 100.0 * largest / whole);
+    return fmt::format("{:.0f} % of what it explains is in one part of the data", 100.0 * largest / whole);
   return {};
 }
 
@@ -174,11 +175,10 @@ void check_orders(const std::vector<BalanceSearch*>& all, BalanceSearch& own_sea
     t.admissible = t.why_not.empty();
     if (t.admissible || !usual_and_best(candidates, t, kPolicy.confounded_margin)) continue;
     t.note = fmt::format(
-        "These data are too short to tell its order: {:g} a turn is what such effects mostly have, and fits best of "
-        "the "
-        "whole orders; {} would show it.",
+        "These data are too short to identify its order: {:g} per turn is the usual order of such effects, and fits "
+        "best of the whole orders; {} would show it.",
         *t.model.order, t.model.entry->info->separated_by);
-    // Its own balance says that the effect is there; where another says so, too, its order is taken for the usual one.
+    // Its own balance shows that the effect is there. Where another balance shows it, too, the usual order is taken.
     t.order_is_not_identifiable =
         t.other_balance_score <= kPolicy.confounded_margin || !usual_and_best(candidates, t, 0.0);
     if (t.order_is_not_identifiable) continue;
@@ -189,7 +189,7 @@ void check_orders(const std::vector<BalanceSearch*>& all, BalanceSearch& own_sea
 }
 
 std::string one_direction_warning(const BalanceData& data) {
-  const Eigen::VectorXd directions = comparison::row_directions(data);
+  const Eigen::VectorXd directions = comparison::sample_directions(data);
   double forward = 0.0, backward = 0.0;
   for (const double d : directions) (d > 0.0 ? forward : backward) += std::isfinite(d) && d != 0.0 ? 1.0 : 0.0;
   const double rarer = std::min(forward, backward), all = forward + backward;

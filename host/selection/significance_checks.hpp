@@ -1,5 +1,5 @@
-// Checks of what a fit would name although the data are too short or too one-sided to show it: placebo orders, parts of
-// the data, both directions.
+// Significance checks of candidates where data are short or one-sided: placebo orders, parts of the data, both
+// directions.
 #pragma once
 
 #include <string>
@@ -9,9 +9,9 @@
 
 namespace flexspline::selection {
 
-// Refuses effects that come in orders per turn (and would be named) where the order explains no more than orders that
-// no drive has, on all balances on which the effect acts together, or where it shows in a part of the data only. The
-// list stays best first. `all`: the searches of every balance; `own`: the one whose candidates these are.
+// Refuses effects with orders per turn that would be named, where their order explains no more than placebo orders
+// (over all balances on which the effect acts), or where it shows in one part of the data only. The list stays best
+// first. `all`: the searches of every balance; `own`: the one whose candidates these are.
 void check_orders(const std::vector<BalanceSearch*>& all, BalanceSearch& own, std::vector<CandidateFit>& candidates);
 
 // "The axis moves one way only ...": what differs by direction is not identifiable then. Empty where it moves both

@@ -33,15 +33,16 @@ StabilitySelection::StabilitySelection(const std::vector<const data::Experiment*
                                        const SelectionPolicy& policy)
     : policy_(policy), tables_(make_tables(experiments, drive, terms, balance, policy)) {
   if (tables_.sign.model_columns == 0) return;
-  looks_.resize(tables_.settings.size());
-  estimation::in_parallel(looks_.size(), [&](std::size_t i) {
-    looks_[i] = look(tables_.settings[i].first, tables_.settings[i].second, kSeed + i);
+  per_setting_.resize(tables_.settings.size());
+  estimation::in_parallel(per_setting_.size(), [&](std::size_t i) {
+    per_setting_[i] = evaluate_setting(tables_.settings[i].first, tables_.settings[i].second, kSeed + i);
   });
   count();
 }
 
-StabilitySelection::Look StabilitySelection::look(double cutoff_hz, bool mask, std::uint64_t seed) const {
-  Look result;
+StabilitySelection::SettingResult StabilitySelection::evaluate_setting(double cutoff_hz, bool mask,
+                                                                       std::uint64_t seed) const {
+  SettingResult result;
   const RegressorTable& sign = tables_.sign;
   const Setting one = make_setting(sign, cutoff_hz, mask, false, policy_);
   std::optional<Setting> two;
@@ -54,16 +55,16 @@ StabilitySelection::Look StabilitySelection::look(double cutoff_hz, bool mask, s
   std::vector<double> weights = record_weights(sign, one);
   for (const CandidateTerm& term : sign.terms) result.may_enter.push_back(tables_.may_enter(term, cutoff_hz) ? 1 : 0);
 
-  // Noise as the best model of all data leaves it: first with one friction for all records, then with each record's
-  // own, which otherwise passes for slow noise.
-  Differences differences{sign.differences, {}, 0.0};
+  // Noise of the best model of all data: first with the same friction in all records, then with random effects, which
+  // would otherwise count as slow noise.
+  FrictionRandomEffects differences{sign.differences, {}, 0.0};
   Noise noise;
   for (int round = 0; round < 2; ++round) {
     result.all = sum_of(one, second, weights, {}, 0, differences);
-    const Selected rough = select_forward(sign, result.all, result.all, noise, result.may_enter, policy_);
+    const SelectionPath rough = select_forward(sign, result.all, result.all, noise, result.may_enter, policy_);
     std::vector<int> chosen;
-    for (const Step& s : rough.steps) chosen.push_back(s.term);
-    const Fitted fitted = fit_terms(sign, chosen, result.all, result.all);
+    for (const SelectionStep& s : rough.steps) chosen.push_back(s.term);
+    const TermFit fitted = fit_terms(sign, chosen, result.all, result.all);
     const bool z = std::find(chosen.begin(), chosen.end(), kPreslidingTerm) != chosen.end();
     const Setting& seen = z ? *second : one;
     const Eigen::VectorXd residual = weighted_residual(seen, fitted, weights, differences);
@@ -75,7 +76,8 @@ StabilitySelection::Look StabilitySelection::look(double cutoff_hz, bool mask, s
     result.whiteness = residual.size() > 0 ? noise.variance / std::max(left, 1e-300) : -1.0;
     if (sign.differences.empty() || round == 1) break;
     differences.noise = noise.tau * std::max(left, 1e-12);
-    differences.variance = differences_of(z ? *tables_.presliding : sign, seen, weights, differences.noise, policy_);
+    differences.variance =
+        friction_effects_of(z ? *tables_.presliding : sign, seen, weights, differences.noise, policy_);
   }
 
   std::mt19937_64 chance(seed);
@@ -84,8 +86,8 @@ StabilitySelection::Look StabilitySelection::look(double cutoff_hz, bool mask, s
   for (std::size_t pair = 0; pair < policy_.pairs; ++pair) {
     const bool by_record = records >= policy_.fewest_records_to_split && pair % 2 == 1;
     const std::vector<std::uint8_t> in = by_record ? half_of_records(one, chance) : half_of_blocks(one, chance);
-    const Half a = sum_of(one, second, weights, in, 0, differences),
-               b = sum_of(one, second, weights, in, 1, differences);
+    const HalfData a = sum_of(one, second, weights, in, 0, differences),
+                   b = sum_of(one, second, weights, in, 1, differences);
     result.votes.push_back(select_forward(sign, a, b, noise, result.may_enter, policy_));
     result.votes.push_back(select_forward(sign, b, a, noise, result.may_enter, policy_));
   }
@@ -117,11 +119,11 @@ const std::string& name_of(const RegressorTable& table, int term) {
   return term == kPreslidingTerm ? presliding : table.terms[static_cast<std::size_t>(term)].name;
 }
 
-// Of a subsample that does not abstain. Returns the share of the excess that its steps take off.
-double count_steps(const RegressorTable& table, const Selected& vote, Counts& counts) {
+// Counts a subsample that does not abstain. Returns the share of the excess that its steps explain.
+double count_steps(const RegressorTable& table, const SelectionPath& vote, Counts& counts) {
   double sum = 0.0;
   for (std::size_t k = 0; k < vote.steps.size(); ++k) {
-    const Step& s = vote.steps[k];
+    const SelectionStep& s = vote.steps[k];
     Count& c = counts[name_of(table, s.term)];
     c.was += 1.0;
     for (const std::string& other : s.alternatives) {
@@ -159,13 +161,13 @@ void StabilitySelection::count() {
   const RegressorTable& sign = tables_.sign;
   Counts counts;
   std::vector<double> explained, white;
-  for (std::size_t i = 0; i < looks_.size(); ++i) {
-    if (looks_[i].votes.empty()) continue;
+  for (std::size_t i = 0; i < per_setting_.size(); ++i) {
+    if (per_setting_[i].votes.empty()) continue;
     std::map<std::string, const CandidateTerm*> open;
     for (std::size_t t = 0; t < sign.terms.size(); ++t)
-      if (looks_[i].may_enter[t]) open[sign.terms[t].name] = &sign.terms[t];
+      if (per_setting_[i].may_enter[t]) open[sign.terms[t].name] = &sign.terms[t];
     if (tables_.presliding && !tables_.settings[i].second) open[kPresliding] = nullptr;
-    for (const Selected& vote : looks_[i].votes) {
+    for (const SelectionPath& vote : per_setting_[i].votes) {
       result_.subsamples += 1.0;
       if (vote.extrapolates) result_.extrapolated += 1.0;
       if (vote.abstains) {
@@ -184,10 +186,10 @@ void StabilitySelection::count() {
       explained.push_back(count_steps(sign, vote, counts));
     }
   }
-  for (std::size_t i = 0; i < looks_.size(); ++i)
-    if (tables_.settings[i].second && looks_[i].whiteness >= 0.0 &&
+  for (std::size_t i = 0; i < per_setting_.size(); ++i)
+    if (tables_.settings[i].second && per_setting_[i].whiteness >= 0.0 &&
         tables_.settings[i].first <= 1.01 * tables_.bandwidth.highest_hz)
-      white.push_back(std::min(1.0, looks_[i].whiteness));
+      white.push_back(std::min(1.0, per_setting_[i].whiteness));
   result_.explained = median(explained);
   result_.whiteness = median(white);
   for (auto& [name, c] : counts)
@@ -196,20 +198,21 @@ void StabilitySelection::count() {
             [](const Frequency& a, const Frequency& b) { return a.frequency > b.frequency; });
 }
 
-std::vector<int> StabilitySelection::terms_of(const Look& look, const std::vector<std::string>& names) const {
+std::vector<int> StabilitySelection::terms_of(const SettingResult& setting,
+                                              const std::vector<std::string>& names) const {
   std::vector<int> chosen;
   for (const std::string& name : names) {
     if (name == kPresliding) {
-      if (look.all.presliding.size() == 0) return {};
+      if (setting.all.presliding.size() == 0) return {};
       chosen.push_back(kPreslidingTerm);
       continue;
     }
     int best = -1;
     double least = 0.0;
     for (std::size_t t = 0; t < tables_.sign.terms.size(); ++t) {
-      if (tables_.sign.terms[t].name != name || !look.may_enter[t]) continue;
+      if (tables_.sign.terms[t].name != name || !setting.may_enter[t]) continue;
       chosen.push_back(static_cast<int>(t));
-      const double squares = fit_terms(tables_.sign, chosen, look.all, look.all).on_fit;
+      const double squares = fit_terms(tables_.sign, chosen, setting.all, setting.all).training_squares;
       chosen.pop_back();
       if (best >= 0 && squares >= least) continue;
       best = static_cast<int>(t);
@@ -223,17 +226,19 @@ std::vector<int> StabilitySelection::terms_of(const Look& look, const std::vecto
 
 std::vector<double> StabilitySelection::held_out_ratios(const std::vector<std::string>& names) const {
   std::vector<std::vector<double>> ratios(names.size());
-  for (const Look& look : looks_) {
-    if (look.held_out.rows == 0.0) continue;
-    // What cannot be seen at this bandwidth, or with reversals left out, is left out of all fits.
+  for (const SettingResult& setting : per_setting_) {
+    if (setting.held_out.rows == 0.0) continue;
+    // Terms that are not visible at this bandwidth, or without reversals, are left out of all fits.
     std::vector<std::string> seen;
     for (const std::string& name : names)
-      if (!terms_of(look, {name}).empty()) seen.push_back(name);
-    const double with_all = fit_terms(tables_.sign, terms_of(look, seen), look.all, look.held_out).on_judge;
+      if (!terms_of(setting, {name}).empty()) seen.push_back(name);
+    const double with_all =
+        fit_terms(tables_.sign, terms_of(setting, seen), setting.all, setting.held_out).validation_squares;
     for (std::size_t i = 0; i < names.size(); ++i) {
       std::vector<std::string> others = seen;
       if (std::erase(others, names[i]) == 0) continue;
-      const double without = fit_terms(tables_.sign, terms_of(look, others), look.all, look.held_out).on_judge;
+      const double without =
+          fit_terms(tables_.sign, terms_of(setting, others), setting.all, setting.held_out).validation_squares;
       if (without > 0.0) ratios[i].push_back(std::sqrt(with_all / without));
     }
   }

@@ -44,21 +44,21 @@ class StabilitySelection {
 
  private:
   // One bandwidth, with or without reversals.
-  struct Look {
-    std::vector<Selected> votes;
+  struct SettingResult {
+    std::vector<SelectionPath> votes;
     std::vector<std::uint8_t> may_enter;  // by term
     double whiteness = -1.0;
-    Half all, held_out;
+    HalfData all, held_out;
   };
 
-  Look look(double cutoff_hz, bool mask, std::uint64_t seed) const;
+  SettingResult evaluate_setting(double cutoff_hz, bool mask, std::uint64_t seed) const;
   void count();
   // The terms of these names that fit best together; none where one cannot be seen there.
-  std::vector<int> terms_of(const Look& look, const std::vector<std::string>& names) const;
+  std::vector<int> terms_of(const SettingResult& setting, const std::vector<std::string>& names) const;
 
   SelectionPolicy policy_;
   CandidateTables tables_;
-  std::vector<Look> looks_;  // one each setting
+  std::vector<SettingResult> per_setting_;  // one each setting
   Stability result_;
 };
 

@@ -26,7 +26,7 @@ void TableBuilder::filter(Eigen::VectorXd& column) const {
   }
 }
 
-Motion motion_of(const estimation::Prepared& prepared) {
+Motion motion_of(const estimation::PreparedData& prepared) {
   Motion motion;
   std::vector<double> speeds;
   for (const estimation::Record& r : prepared.records)

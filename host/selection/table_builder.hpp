@@ -1,5 +1,4 @@
-// What the parts of a regressor table are made with, one after the other. For the sources of make_regressor_table
-// alone.
+// Builds the parts of a regressor table, one after the other. For the sources of make_regressor_table alone.
 #pragma once
 
 #include <Eigen/Core>
@@ -16,11 +15,11 @@ struct TableBuilder {
   const SelectionPolicy& policy;
   RegressorTable& table;
   std::vector<Eigen::VectorXd> columns;
-  // What the model makes of the effort, N m: terms that read the current are built from that, never from the measured
-  // one, whose noise stands in the target.
+  // The model's prediction of the effort, N m. Terms that read the current are built from it, not from the measured
+  // current, whose noise is in the target.
   Eigen::VectorXd effort;
 
-  const estimation::Prepared& prepared() const { return data.prepared(); }
+  const estimation::PreparedData& prepared() const { return data.prepared(); }
   std::vector<std::size_t> on_balance() const;
   // Direction of the motor's friction: the expected sign of its velocity, or a presliding state.
   static double direction(const estimation::Record& r, std::size_t k) { return r.inputs.directions[0][k]; }
@@ -48,9 +47,9 @@ struct Motion {
   double travel = 0.0;
   double typical_speed = 0.0, top_speed = 0.0;
 };
-Motion motion_of(const estimation::Prepared& prepared);
+Motion motion_of(const estimation::PreparedData& prepared);
 
-// Value below which that share of the numbers lies; zero of none.
+// Value below which that share of the numbers is; zero of none.
 double quantile(std::vector<double> x, double share);
 // Slope in time of a column, along each run.
 Eigen::VectorXd slope_of(const Eigen::VectorXd& column, const std::vector<Run>& runs);
@@ -59,7 +58,7 @@ Eigen::VectorXd slope_of(const Eigen::VectorXd& column, const std::vector<Run>& 
 bool add_model_columns(TableBuilder& builder);
 // Effects of the catalogue, and placebo orders of those that come in orders.
 void add_catalogue_terms(TableBuilder& builder, const Motion& motion);
-// Curves that are in no catalogue: they compete, and are never named.
+// Generic curves: they compete with the effects, and are never named.
 void add_generic_curves(TableBuilder& builder, const Motion& motion);
 // Relative changes of viscous and of dry friction, in common and by direction.
 void add_differences(TableBuilder& builder);

@@ -18,14 +18,14 @@ struct Covariate {
   std::vector<std::optional<double>> by_record;
 };
 
-std::vector<Covariate> covariates_of(const estimation::Prepared& prepared) {
+std::vector<Covariate> covariates_of(const estimation::PreparedData& prepared) {
   std::vector<Covariate> covariates{{"speed", true, {}},          {"frequency", true, {}},
                                     {"acceleration", true, {}},   {"temperature", false, {}},
                                     {"order in time", false, {}}, {"torque", true, {}}};
   double order = 0.0;
   for (const estimation::Record& r : prepared.records) {
     double speed = 0.0, acceleration = 0.0, temperature = 0.0, torque = 0.0;
-    r.inputs.all().each_stretch([&](std::size_t, auto stretch) {
+    r.inputs.all().each_block([&](std::size_t, auto stretch) {
       for (const auto& in : stretch) {
         speed += in.velocity * in.velocity;
         acceleration += in.acceleration * in.acceleration;
@@ -75,10 +75,10 @@ std::vector<Trend> parameter_trends(const estimation::Identification& identified
   const std::vector<Covariate> covariates = covariates_of(identified.prepared);
   std::vector<Trend> trends;
   for (const estimation::Estimate& e : identified.estimates) {
-    // Counted by parameter: a model with more of them must not hide what one of them shows.
+    // Corrected for the tests of this parameter alone: more parameters in the model must not hide a trend.
     double tried = 0.0;
     const auto first = static_cast<std::ptrdiff_t>(trends.size());
-    if (identified.terms[e.slot.term].entry->parameters[e.slot.parameter].low != 0.0)
+    if (identified.terms[e.ref.term].entry->parameters[e.ref.parameter].low != 0.0)
       continue;  // offsets have no relative change
     for (const Covariate& covariate : covariates) {
       std::vector<double> x, y;

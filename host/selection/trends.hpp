@@ -1,4 +1,4 @@
-// Parameters that differ between experiments along something: evidence of an effect that the model lacks.
+// Trends of parameters over the experiments: evidence of an effect that the model lacks.
 #pragma once
 
 #include <string>
@@ -20,16 +20,16 @@ struct Trend {
 
 // Regresses the value of each parameter of physical sign by experiment on what its experiments differ in. Only trends
 // with a corrected p-value below 0.001 that move the parameter by more than 3 % over the records are returned, surest
-// first. Needs six experiments that tell the parameter; standing still counts as none.
+// first. Needs six experiments that identify the parameter; standing still counts as none.
 std::vector<Trend> parameter_trends(const estimation::Identification& identified);
 
-// Friction that differs between runs although nothing that the model or the data know of does.
+// Friction that differs between runs without a known cause.
 struct Drift {
   std::string group;  // "viscous friction"
   double percent = 0.0;
 };
 
-// Spreads that the errors of a cross-validated model bear witness to, from 1 % on.
+// Standard deviations of the random effects of a cross-validated model, from 1 % on.
 std::vector<Drift> drifts(const CrossValidatedFit& fit);
 
 }  // namespace flexspline::selection

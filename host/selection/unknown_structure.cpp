@@ -5,7 +5,7 @@
 #include <algorithm>
 #include <cmath>
 
-#include "host/catalogue/defined.hpp"
+#include "host/catalogue/user_defined_effect.hpp"
 #include "host/estimation/in_parallel.hpp"
 #include "host/selection/candidate_fits.hpp"
 #include "host/selection/diagnosis.hpp"
@@ -17,25 +17,25 @@ namespace {
 using effects::Variable;
 using estimation::Balance;
 using estimation::LearnedTable;
-using estimation::TableQuestion;
+using estimation::TableSpecification;
 
 constexpr std::size_t kScreenedPoints = 24;
 constexpr std::size_t kLearned = 3;  // signals whose curves are learnt in full
 
-struct Screened {
-  TableQuestion question;
+struct ScreenedCurve {
+  TableSpecification question;
   std::string label;
   LearnedTable curve;
 };
 
-std::string label_of(const TableQuestion& q) {
+std::string label_of(const TableSpecification& q) {
   for (const effects::VariableInfo& v : effects::kVariables)
     if (v.variable == q.variable) return fmt::format("{}{}", v.name, q.times_direction ? "*direction" : "");
   return {};
 }
 
 bool measured(const BalanceData& data, const effects::VariableInfo& v) {
-  const estimation::Prepared& p = data.prepared();
+  const estimation::PreparedData& p = data.prepared();
   const auto all = [&](auto has) {
     return std::all_of(data.records().begin(), data.records().end(),
                        [&](const RowRange& range) { return has(p.records[range.record]); });
@@ -51,8 +51,8 @@ bool measured(const BalanceData& data, const effects::VariableInfo& v) {
   return v.variable != Variable::output_angle || p.rotary;
 }
 
-// The current is what the motor balance measures, the torque what the others do: a curve over them explains itself. The
-// motion of one side goes along with that of the other, so that each balance has its own.
+// The current is the left side of the motor balance, the torque that of the others: a curve over it would explain
+// itself. The motions of both sides are collinear, so each balance uses its own.
 bool belongs(Balance balance, const effects::VariableInfo& v) {
   if (v.variable == Variable::temperature || v.variable == Variable::motor_angle ||
       v.variable == Variable::output_angle)
@@ -69,18 +69,18 @@ bool belongs(Balance balance, const effects::VariableInfo& v) {
 }
 
 // Signals that a curve may run over on this balance: measured, varying, and not the left side itself.
-std::vector<TableQuestion> questions(BalanceData& data, const Terms& model) {
-  std::vector<TableQuestion> list;
+std::vector<TableSpecification> questions(BalanceData& data, const Terms& model) {
+  std::vector<TableSpecification> list;
   for (const effects::VariableInfo& v : effects::kVariables) {
     if (!measured(data, v)) continue;
     if (!belongs(data.balance(), v)) continue;
     const Eigen::VectorXd signal = data.signal_at_rows(model, v.variable);
-    const estimation::Covered range = estimation::covered_range(signal);
+    const estimation::SignalRange range = estimation::central_range(signal);
     const double span = range.high - range.low;
     if (!(span > 0.0) || (v.variable == Variable::temperature && span < kPolicy.least_temperature_span)) continue;
-    // Part of a turn only is a curve over an angle, too, but one that its ends do not close.
+    // Over a part of a turn the curve over an angle is not periodic.
     for (const bool times_direction : {false, true}) {
-      TableQuestion q;
+      TableSpecification q;
       q.variable = v.variable;
       q.times_direction = times_direction;
       q.balance = data.balance();
@@ -91,25 +91,25 @@ std::vector<TableQuestion> questions(BalanceData& data, const Terms& model) {
   return list;
 }
 
-// Those that the data tell, in the order of the questions; learnt on all cores.
-std::vector<Screened> curves(BalanceData& data, const Terms& model, const std::vector<TableQuestion>& asked,
-                             const Eigen::VectorXd& weights) {
+// Those that the data identify, in the order of the specifications; learnt on all cores.
+std::vector<ScreenedCurve> curves(BalanceData& data, const Terms& model, const std::vector<TableSpecification>& asked,
+                                  const Eigen::VectorXd& weights) {
   std::vector<std::optional<LearnedTable>> learned(asked.size());
   estimation::in_parallel(asked.size(), [&](std::size_t i) {
     BalanceData own = data;
     learned[i] = estimation::learn_table(own, model, asked[i], weights);
   });
-  std::vector<Screened> list;
+  std::vector<ScreenedCurve> list;
   for (std::size_t i = 0; i < asked.size(); ++i)
     if (learned[i]) list.push_back({asked[i], label_of(asked[i]), std::move(*learned[i])});
   return list;
 }
 
 bool is_significant(const LearnedTable& curve) {
-  return curve.score > kPolicy.curve_score && curve.fall_percent > kPolicy.curve_chi2_percent;
+  return curve.score > kPolicy.curve_score && curve.decrease_percent > kPolicy.curve_chi2_percent;
 }
 
-// Where the curve is least certain among the points that were visited, and what else goes along with it.
+// The visited point at which the curve is least certain, and the signals that are collinear with it.
 std::string next_record(const UnknownStructure& unknown, const data::Axis axis) {
   const model::Table& table = unknown.curve.table;
   const effects::VariableInfo& v = *catalogue::find_variable(unknown.definition.variable);
@@ -118,12 +118,12 @@ std::string next_record(const UnknownStructure& unknown, const data::Axis axis) 
     if (table.std[k] > table.std[widest]) widest = k;
   const auto unit = catalogue::unit_on(v.unit, axis);
   std::string text = fmt::format(
-      "slow motion to and fro over {} from {:.3g} to {:.3g} {}, most of all around {:.3g} {}, where the curve is least "
-      "certain",
+      "slow motion back and forth over {} from {:.3g} to {:.3g} {}, most of all around {:.3g} {}, where the curve is "
+      "least certain",
       v.name, table.at.front(), table.at.back(), unit, table.at[widest], unit);
   std::string others;
   for (std::size_t k = 1; k < unknown.depends_on.size() && k < 3; ++k)
-    if (unknown.depends_on[k].fall_percent > 0.5 * unknown.depends_on.front().fall_percent &&
+    if (unknown.depends_on[k].decrease_percent > 0.5 * unknown.depends_on.front().decrease_percent &&
         unknown.depends_on[k].variable.substr(0, unknown.depends_on[k].variable.find('*')) != v.name)
       others += fmt::format("{}{}", others.empty() ? "" : " and ", unknown.depends_on[k].variable);
   if (!others.empty()) text += fmt::format("; and a motion in which {} does not go along with {}", v.name, others);
@@ -135,15 +135,17 @@ std::string next_record(const UnknownStructure& unknown, const data::Axis axis) 
 std::optional<UnknownStructure> find_unknown_structure(BalanceSearch& search, const Terms& model) {
   BalanceData& data = *search.data;
   const Eigen::VectorXd weights = search.base.root_weights.cwiseProduct(search.keep);
-  std::vector<TableQuestion> asked = questions(data, model);
-  for (TableQuestion& q : asked) {
-    // Without the filter a curve costs little, and serves to tell signals apart.
+  std::vector<TableSpecification> asked = questions(data, model);
+  for (TableSpecification& q : asked) {
+    // Without the filter a curve costs little, and serves to distinguish signals.
     q.filtered = false;
     q.most_points = kScreenedPoints;
     q.exactly = true;
   }
-  std::vector<Screened> list = curves(data, model, asked, weights);
-  const auto more = [](const Screened& a, const Screened& b) { return a.curve.fall_percent > b.curve.fall_percent; };
+  std::vector<ScreenedCurve> list = curves(data, model, asked, weights);
+  const auto more = [](const ScreenedCurve& a, const ScreenedCurve& b) {
+    return a.curve.decrease_percent > b.curve.decrease_percent;
+  };
   std::sort(list.begin(), list.end(), more);
   if (list.empty() || !(list.front().curve.score > 0.0)) return std::nullopt;
   asked.clear();
@@ -153,12 +155,13 @@ std::optional<UnknownStructure> find_unknown_structure(BalanceSearch& search, co
     asked.back().exactly = false;
     asked.back().most_points = 128;
   }
-  std::vector<Screened> learned = curves(data, model, asked, weights);
+  std::vector<ScreenedCurve> learned = curves(data, model, asked, weights);
   if (learned.empty()) return std::nullopt;
   std::sort(learned.begin(), learned.end(), more);
-  const Screened* best = &learned.front();
-  for (const Screened& s : learned)
-    if (100.0 - s.curve.fall_percent < (1.0 + kPolicy.simpler_curve) * (100.0 - learned.front().curve.fall_percent) &&
+  const ScreenedCurve* best = &learned.front();
+  for (const ScreenedCurve& s : learned)
+    if (100.0 - s.curve.decrease_percent <
+            (1.0 + kPolicy.simpler_curve) * (100.0 - learned.front().curve.decrease_percent) &&
         s.curve.effective < best->curve.effective)
       best = &s;
   if (!is_significant(best->curve)) return std::nullopt;
@@ -166,10 +169,10 @@ std::optional<UnknownStructure> find_unknown_structure(BalanceSearch& search, co
   unknown.effect = fmt::format("{}:{}", catalogue::kTableEffect, best->label);
   unknown.definition = *estimation::effect_of(best->question, best->curve.table, "unknown").definition;
   unknown.curve = best->curve;
-  unknown.depends_on.push_back({best->label, best->curve.fall_percent});
-  for (const Screened& s : list)
+  unknown.depends_on.push_back({best->label, best->curve.decrease_percent});
+  for (const ScreenedCurve& s : list)
     if (s.label != best->label && s.curve.score > kPolicy.curve_score)
-      unknown.depends_on.push_back({s.label, s.curve.fall_percent});
+      unknown.depends_on.push_back({s.label, s.curve.decrease_percent});
   unknown.record_next = next_record(unknown, data.prepared().rotary ? data::Axis::rotary : data::Axis::linear);
   return unknown;
 }
@@ -210,8 +213,8 @@ void check_unknown_structure(BalanceSearch& search, const CandidateFit* named, D
       return share_of(search.base, candidate.fit, curve, unknown->curve.effective - numbers);
     };
     unknown->named_share_percent = 100.0 * share(*named, named->model.added);
-    if (*unknown->named_share_percent >= 100.0 * kPolicy.shape_recovered) return;
-    // Two effects of the catalogue may explain what one does not.
+    if (*unknown->named_share_percent >= 100.0 * kPolicy.curve_recovered) return;
+    // Two effects of the catalogue may explain it together.
     BalanceSearch next{search.data, search.keep, named->fit};
     const std::vector<CandidateFit> more = rank_candidates(next);
     if (!more.empty() && passes(more.front()) &&
@@ -221,7 +224,7 @@ void check_unknown_structure(BalanceSearch& search, const CandidateFit* named, D
     result.remaining_structure = result.localised;
   } else if (likelihood_gain(search.base, with_curve(search, *unknown), unknown->curve.effective).score <
              kPolicy.curve_score) {
-    // What one or two records have alone is their own friction.
+    // A curve that only one or two records show is their own friction.
     return;
   }
   result.verdict = Verdict::unknown_structure;

@@ -5,7 +5,7 @@
 #include <algorithm>
 #include <charconv>
 
-#include "host/catalogue/defined.hpp"
+#include "host/catalogue/user_defined_effect.hpp"
 #include "host/selection/policy.hpp"
 #include "host/text/nearest.hpp"
 
@@ -113,7 +113,8 @@ bool names_user_defined_effect(std::string_view text) {
 model::Parameter parse_parameter(std::string_view text) {
   const auto refuse = [&](std::string_view what) {
     throw model::ModelError(fmt::format(
-        "\"{}\" is no parameter: {}; write NAME, NAME:UNIT or NAME=LOW..HIGH:UNIT, as in b=0.1..50:rad/s", text, what));
+        "\"{}\" is not a parameter: {}; write NAME, NAME:UNIT or NAME=LOW..HIGH:UNIT, as in b=0.1..50:rad/s", text,
+        what));
   };
   model::Parameter parameter;
   const std::size_t equals = text.find('='), colon = text.find(':');
@@ -132,7 +133,7 @@ model::Parameter parse_parameter(std::string_view text) {
   const auto bound = [&](std::string_view part) -> std::optional<double> {
     if (part.empty()) return std::nullopt;
     const auto value = number(part);
-    if (!value) refuse("a bound is no number");
+    if (!value) refuse("a bound is not a number");
     return value;
   };
   parameter.low = bound(range.substr(0, dots));
@@ -151,7 +152,7 @@ model::Effect user_defined_effect(std::string_view text, const UserDefinition& g
 
 estimation::LearnedTable learn(estimation::Identification& base, const model::Effect& table,
                                const UserDefinition& given) {
-  estimation::TableQuestion question = estimation::question_of(*table.definition);
+  estimation::TableSpecification question = estimation::table_specification(*table.definition);
   if (given.points) {
     question.most_points = *given.points;
     question.exactly = true;
@@ -168,13 +169,13 @@ estimation::LearnedTable learn(estimation::Identification& base, const model::Ef
       fail("missing_column",
            fmt::format("{} does not vary in these data, so that nothing can be learnt over it", variable),
            "record motion over the range that the table is to have, with the sensors that show it");
-    if (learned->score < kPolicy.table_score || learned->fall_percent < kPolicy.least_table_percent)
+    if (learned->score < kPolicy.table_score || learned->decrease_percent < kPolicy.least_table_percent)
       fail("no_gain",
            fmt::format(
-               "a table over {} does not lower the error on rows that its fit did not see: they fall by {:.2f} % "
+               "a table over {} does not lower the error on samples that its fit did not see: it decreases by {:.2f} % "
                "(score {:.0f}, {:.0f} is needed)",
-               variable, learned->fall_percent, learned->score, kPolicy.table_score),
-           "`flexspline diagnose` says what the rest depends on; the model is left as it is");
+               variable, learned->decrease_percent, learned->score, kPolicy.table_score),
+           "`flexspline diagnose` shows what the rest depends on; the model is left as it is");
     return std::move(*learned);
   }
   fail("missing_column", fmt::format("the {} balance cannot be formed from these data", table.definition->balance),

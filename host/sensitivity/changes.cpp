@@ -8,13 +8,13 @@
 #include <stdexcept>
 
 #include "host/catalogue/constants.hpp"
-#include "host/catalogue/defined.hpp"
+#include "host/catalogue/user_defined_effect.hpp"
 
 namespace flexspline::sensitivity {
 namespace {
 
 // True while the model has the effect, or one that takes its place.
-bool stands_in(const model::Model& model, std::string_view type) {
+bool is_placeholder(const model::Model& model, std::string_view type) {
   return std::any_of(model.effects.begin(), model.effects.end(), [&](const model::Effect& e) {
     return e.type == type || catalogue::names_contain(catalogue::entry_of(e).info->replaces, type);
   });
@@ -34,7 +34,7 @@ void require_within_bounds(const model::Effect& effect, std::size_t p, const Cha
   const double value = catalogue::reduced(entry, catalogue::values_of(effect, entry))[p];
   if (value >= info.low && value <= info.high) return;
   throw model::ModelError(
-      fmt::format("{}: the value would be {:g}, and {} must lie from {:g} to {:g}; choose another factor",
+      fmt::format("{}: the value would be {:g}, and {} must be from {:g} to {:g}; choose another factor",
                   change.label(), *effect.parameters[p].value, info.name, info.low, info.high));
 }
 
@@ -78,9 +78,9 @@ void require_known(const model::Model& model, const Change& change) {
                     names_of(effect->parameters, [](const model::Parameter& p) { return p.name; })));
 }
 
-Changed apply(const model::Model& model, const Change& change) {
+ChangedModel apply(const model::Model& model, const Change& change) {
   require_known(model, change);
-  Changed changed{model, {}};
+  ChangedModel changed{model, {}};
   if (!change.leaves_out()) {
     model::Effect& effect = *changed.model.find(change.effect);
     model::Parameter& parameter = *effect.find(change.parameter);
@@ -96,7 +96,7 @@ Changed apply(const model::Model& model, const Change& change) {
   std::erase_if(effects, [&](const model::Effect& e) { return e.id == change.effect; });
   const auto scales_nothing = [&](const model::Effect& e) {
     const std::string_view scaled = catalogue::entry_of(e).info->modulates;
-    return !scaled.empty() && !stands_in(changed.model, scaled);
+    return !scaled.empty() && !is_placeholder(changed.model, scaled);
   };
   for (const model::Effect& e : effects)
     if (scales_nothing(e)) changed.also_left_out.push_back(e.id);

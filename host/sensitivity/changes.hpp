@@ -29,13 +29,13 @@ std::vector<Change> usual_changes(const model::Model& model);
 // Throws model::ModelError unless the model has what is to be changed; it names what the model has instead.
 void require_known(const model::Model& model, const Change& change);
 
-struct Changed {
+struct ChangedModel {
   model::Model model;
   std::vector<std::string> also_left_out;  // effects that scaled what was left out, and nothing else
 };
 
 // The changed model; the other parameters stay. A scaled parameter is fixed at its new value. Throws model::ModelError
 // as `require_known` does, and where the new value is outside the bounds of the catalogue, or there is none to scale.
-Changed apply(const model::Model& model, const Change& change);
+ChangedModel apply(const model::Model& model, const Change& change);
 
 }  // namespace flexspline::sensitivity

@@ -25,17 +25,17 @@ namespace {
 using data::Experiment;
 using estimation::Balance;
 using estimation::BalanceData;
-using estimation::Prepared;
+using estimation::PreparedData;
 using estimation::Record;
 
-// Less of a signal's variance in a line says nothing of the model there.
+// Less of a signal's variance in a line does not test the model there.
 constexpr double kLeastShareOfLine = 0.01;
 
 // All samples of one signal of a model over experiments, and its sines.
-struct Together {
+struct PooledErrors {
   SignalError error;
   comparison::Score score;
-  bool spoilt = false;              // a free run among them diverged
+  bool diverged = false;            // a free run among them diverged
   std::complex<double> across = 0;  // sum of conj(measured) simulated
   double measured_squared = 0.0;
   double largest_growth = 0.0;
@@ -87,7 +87,8 @@ class Analysis {
   Sensitivity all() {
     std::vector<Change> changes = usual_changes(model_);
     changes.insert(changes.end(), options_.more.begin(), options_.more.end());
-    for (const Change& change : options_.more) apply(model_, change);  // what is out of bounds is said before the work
+    for (const Change& change : options_.more)
+      apply(model_, change);  // what is out of bounds is reported before the work
     {
       Worker worker(*this);
       result_.full = worker.judge(model_, std::nullopt);
@@ -113,7 +114,7 @@ class Analysis {
 
     Variant changed(const Change& change) {
       try {
-        Changed changed = apply(analysis_.model_, change);
+        ChangedModel changed = apply(analysis_.model_, change);
         if (analysis_.options_.refit)
           changed.model = estimation::identify(analysis_.dataset_, changed.model, analysis_.options_.pipeline)->model;
         Variant variant = judge(changed.model, change);
@@ -131,14 +132,14 @@ class Analysis {
       variant.change = change;
       for (const Experiment& e : analysis_.dataset_.experiments)
         variant.experiments.push_back({e.name, e.role, e.load == data::Load::locked ? "locked" : "free", {}});
-      std::vector<Together> together;
+      std::vector<PooledErrors> together;
       const estimation::Terms terms = estimation::terms_of(model);
       for (BalanceData& data : data_) inverse(data, terms, variant, together);
       for (std::size_t i = 0; i < analysis_.prepared_.records.size(); ++i) free_run(i, model, variant, together);
-      for (Together& t : together) {
+      for (PooledErrors& t : together) {
         SignalError& s = t.error;
         s.samples = t.score.samples();
-        if (!t.spoilt) {
+        if (!t.diverged) {
           s.rmse = t.score.rmse();
           s.nrmse = t.score.nrmse();
           if (t.measured_squared > 0.0) s.response = response_of(kUnknown, t.across / t.measured_squared);
@@ -148,7 +149,7 @@ class Analysis {
           variant.growth = std::isnan(variant.growth) ? s.growth : std::max(variant.growth, s.growth);
         variant.overall.push_back(std::move(s));
       }
-      // What the full model has said already.
+      // Warnings that the full model has given already.
       if (change && variant.note == analysis_.result_.full.note) variant.note.clear();
       return variant;
     }
@@ -161,7 +162,8 @@ class Analysis {
       return variant;
     }
 
-    void inverse(BalanceData& data, const estimation::Terms& terms, Variant& variant, std::vector<Together>& together) {
+    void inverse(BalanceData& data, const estimation::Terms& terms, Variant& variant,
+                 std::vector<PooledErrors>& together) {
       const Eigen::VectorXd residual = estimation::residual_of(data, terms);
       for (const estimation::RowRange& range : data.records()) {
         comparison::Score score;
@@ -173,7 +175,7 @@ class Analysis {
       }
     }
 
-    void free_run(std::size_t i, const model::Model& model, Variant& variant, std::vector<Together>& together) {
+    void free_run(std::size_t i, const model::Model& model, Variant& variant, std::vector<PooledErrors>& together) {
       const Record& record = analysis_.prepared_.records[i];
       std::vector<comparison::FreeRunSignal> signals;
       try {
@@ -183,11 +185,11 @@ class Analysis {
         variant.note = fmt::format("no free run: {}", impossible.what());
         return;
       }
-      for (const comparison::FreeRunSignal& signal : signals) judge_free_run(i, signal, variant, together);
+      for (const comparison::FreeRunSignal& signal : signals) score_free_run(i, signal, variant, together);
     }
 
-    void judge_free_run(std::size_t i, const comparison::FreeRunSignal& signal, Variant& variant,
-                        std::vector<Together>& together) {
+    void score_free_run(std::size_t i, const comparison::FreeRunSignal& signal, Variant& variant,
+                        std::vector<PooledErrors>& together) {
       const Record& record = analysis_.prepared_.records[i];
       const Experiment& e = *record.experiment;
       comparison::Score score;
@@ -222,15 +224,15 @@ class Analysis {
           measured_squared = std::norm(measured.amplitude);
         }
       }
-      Together& t = keep(std::move(s), score, diverged, i, variant, together);
+      PooledErrors& t = keep(std::move(s), score, diverged, i, variant, together);
       t.across += across;
       t.measured_squared += measured_squared;
     }
 
     // Adds one signal of one experiment.
-    Together& keep(SignalError s, const comparison::Score& score, bool diverged, std::size_t experiment,
-                   Variant& variant, std::vector<Together>& together) const {
-      auto t = std::find_if(together.begin(), together.end(), [&](const Together& other) {
+    PooledErrors& keep(SignalError s, const comparison::Score& score, bool diverged, std::size_t experiment,
+                       Variant& variant, std::vector<PooledErrors>& together) const {
+      auto t = std::find_if(together.begin(), together.end(), [&](const PooledErrors& other) {
         return other.error.signal == s.signal && other.error.load == s.load;
       });
       if (t == together.end()) {
@@ -241,7 +243,7 @@ class Analysis {
         t->error.unit = s.unit;
       }
       t->score.add(score);
-      t->spoilt = t->spoilt || diverged;
+      t->diverged = t->diverged || diverged;
       s.samples = score.samples();
       if (!diverged) {
         s.rmse = score.rmse();
@@ -249,7 +251,7 @@ class Analysis {
       }
       if (variant.change) {
         s.growth = growth_of(s, find_in(analysis_.result_.full.experiments[experiment].signals, s.signal, s.load));
-        // A drive that is off stands still: any motion is many times its own.
+        // A drive that is off is at rest: any motion is many times its own.
         if (!analysis_.prepared_.records[experiment].at_rest && s.growth > t->largest_growth) {
           t->largest_growth = s.growth;
           t->error.most_in = variant.experiments[experiment].name;
@@ -301,7 +303,8 @@ class Analysis {
     }
   }
 
-  // Each change is judged by itself and has its own place, so that the answer is the same with any number of threads.
+  // Each change is evaluated by itself and has its own place, so that the answer is the same with any number of
+  // threads.
   void run_all(const std::vector<Change>& changes) {
     std::atomic<std::size_t> next = 0;
     std::size_t done = 0;
@@ -333,7 +336,7 @@ class Analysis {
   const data::Dataset& dataset_;
   const Options& options_;
   model::Model model_;
-  Prepared prepared_;
+  PreparedData prepared_;
   std::vector<Balance> balances_;
   std::vector<Lines> lines_;  // one a record
   Sensitivity result_;

@@ -1,5 +1,5 @@
 // What a model depends on: its errors, and its amplitude and phase, with each effect left out in turn or a parameter
-// scaled, beside those of the full model (report, section 5.4).
+// scaled, compared with those of the full model (report, section 5.4).
 #pragma once
 
 #include <functional>
@@ -66,7 +66,7 @@ struct Variant {
 
 struct Options {
   estimation::PipelineOptions pipeline{};
-  bool refit = false;             // estimate what is left anew, of the full model too
+  bool refit = false;             // re-estimate what is left, for the full model too
   std::vector<Change> more = {};  // after the usual changes
   unsigned threads = 0;           // 0: as many as the machine has; the answer does not depend on it
   std::function<void(std::size_t done, std::size_t all)> progress = {};  // one call at a time, from any thread

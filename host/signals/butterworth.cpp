@@ -76,12 +76,12 @@ ZeroPhaseFilter::ZeroPhaseFilter(int order, double cutoff_hz, double sample_hz)
   const double decay = slowest > 0.0 ? std::log(kDecay) / std::log(slowest) : 1.0;
   pad_length_ = static_cast<std::size_t>(std::clamp(std::ceil(decay), 1.0, kLongest));
 
-  // For slow filters the response only stretches with the period of the cut-off; a faster one tells its length.
+  // For slow filters the response only scales with the period of the cut-off; a faster one shows its length.
   constexpr std::size_t kEnough = 20000;
   if (pad_length_ > kEnough) {
-    const double stretch = decay / (0.5 * kEnough);
-    const ZeroPhaseFilter faster(order, cutoff_hz * stretch, sample_hz);
-    settling_samples_ = static_cast<std::size_t>(std::ceil(stretch * static_cast<double>(faster.settling_samples_)));
+    const double scale = decay / (0.5 * kEnough);
+    const ZeroPhaseFilter faster(order, cutoff_hz * scale, sample_hz);
+    settling_samples_ = static_cast<std::size_t>(std::ceil(scale * static_cast<double>(faster.settling_samples_)));
     return;
   }
   std::vector<double> response(2 * pad_length_ + 1, 0.0);

@@ -63,7 +63,7 @@ struct Cascade {
   }
 
   // The state after an endless constant input.
-  void settle(const V& input) {
+  void set_steady_state(const V& input) {
     V x = input * gain;
     for (int k = 0; k < kSections; ++k) {
       const bool single = kOdd && k == kPairs;
@@ -122,7 +122,7 @@ inline void in_blocks(C& cascade, std::size_t count, Body&& body) {
 }
 
 // What both passes of a zero-phase filter consist of; all of it relative to the first sample, `origin`, so that a
-// constant is exactly nought inside.
+// constant is exactly zero inside.
 
 // The state that `pad` samples before the signal leave behind: those after its first one, turned about it.
 template <typename C, typename V>
@@ -130,7 +130,7 @@ void begin_forward(C& cascade, const Columns<V>& x, std::size_t pad, const V& or
   V value;
   x.load(pad, value);
   value = origin - value;
-  cascade.settle(value);
+  cascade.set_steady_state(value);
   in_blocks(cascade, pad, [&](auto& c, std::size_t i) {
     V v;
     x.load(pad - i, v);
@@ -153,7 +153,7 @@ template <typename C, typename V>
 void begin_backward(C& cascade, const Columns<V>& after, std::size_t begin, std::size_t end) {
   V value;
   after.load(end - 1, value);
-  cascade.settle(value);
+  cascade.set_steady_state(value);
   in_blocks(cascade, end - begin, [&](auto& c, std::size_t i) {
     V v;
     after.load(end - 1 - i, v);

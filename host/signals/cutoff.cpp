@@ -99,9 +99,10 @@ CutoffChoice choose_cutoff(std::span<const double> effort, std::span<const doubl
   }
   if (!(total > 0.0)) {
     choice.cutoff_hz = lowest;
-    choice.reason =
-        fmt::format("{:.3g} Hz, the lowest allowed: effort and motion are nowhere coherent ({} segments of {} samples)",
-                    lowest, spectrum.averages, segment);
+    choice.reason = fmt::format(
+        "{:.3g} Hz, the lowest allowed: effort and motion are not coherent at any frequency ({} segments of {} "
+        "samples)",
+        lowest, spectrum.averages, segment);
     return choice;
   }
   double below = 0.0;
@@ -121,7 +122,7 @@ CutoffChoice choose_cutoff(std::span<const double> effort, std::span<const doubl
     bound = ", raised to the lowest allowed";
   }
   choice.reason = fmt::format(
-      "{:.3g} Hz: {:.2f} % of the effort that is coherent with the motion lies below {:.3g} Hz, a quarter was added{} "
+      "{:.3g} Hz: {:.2f} % of the effort that is coherent with the motion is below {:.3g} Hz, a quarter was added{} "
       "({} segments of {} samples)",
       choice.cutoff_hz, 100.0 * below / total, choice.coherent_to_hz, bound, spectrum.averages, segment);
   return choice;

@@ -25,7 +25,7 @@ inline constexpr double kLowestCutoffHz = 5.0;
 /// power, or where none counts for a factor 3.2 in frequency (the harmonics of one sine are a factor 3 apart),
 /// whichever is lower. The cut-off is 1.25 times that, so that the filter takes at most 10 % there, within 5 Hz ..
 /// sample_hz / 10 (the upper bound wins), rounded to two digits. Without enough data, or without coherence, it is the
-/// upper bound or 5 Hz, and the reason says so.
+/// upper bound or 5 Hz, and the reason states it.
 ///
 /// In closed loop the controller returns encoder noise as effort: coherent, too. The power keeps it out unless it is
 /// large. Throws std::invalid_argument if the lengths differ or the sample rate is not positive.
@@ -33,12 +33,12 @@ CutoffChoice choose_cutoff(std::span<const double> effort, std::span<const doubl
                            double sample_hz);
 
 /// How often a motion turns back, Hz: its velocity over `window_s`, beyond a fifth of its root mean square on either
-/// side. Positions of one uninterrupted stretch, in any unit. 0 where it is shorter than eight windows or nothing
+/// side. Positions of one uninterrupted segment, in any unit. 0 where it is shorter than eight windows or nothing
 /// moves. Throws std::invalid_argument unless 0 < sample_s <= window_s.
 double reversals_hz(std::span<const double> position, double sample_s, double window_s);
 
 enum class CutoffCombination {
-  kWeightedMedian,  ///< half of the coherent power lies in records with this cut-off or a lower one
+  kWeightedMedian,  ///< half of the coherent power is in records with this cut-off or a lower one
   kLargest,         ///< enough for each record that holds at least 1 % of the strongest one's coherent power
 };
 

@@ -194,7 +194,7 @@ std::vector<double> DifferentiatingFilter::applied(const Rational& g, std::span<
   const std::size_t n = signal.size();
   std::vector<double> result(n);
   if (n == 0) return result;
-  // The line through the first two samples has a response in closed form; what is left starts from nought.
+  // The line through the first two samples has a response in closed form; what is left starts from zero.
   const double step = n > 1 ? signal[1] - signal[0] : 0.0;
   const double gain = sum_of(g.b) / sum_of(g.a);
   const double lag = (slope_of(g.b) - gain * slope_of(g.a)) / sum_of(g.a);
@@ -269,7 +269,7 @@ double DifferentiatingFilter::noise_gain(int order) const {
       info_->filter == AnalogFilter::none && (info_->discretisation == Discretisation::bilinear ||
                                               info_->discretisation == Discretisation::bilinear_prewarped);
   if (order > 0 && rings) return std::numeric_limits<double>::infinity();
-  // Energy of the impulse response: autocovariance of a second-order recursion at lag nought, from its three equations.
+  // Energy of the impulse response: autocovariance of a second-order recursion at lag zero, from its three equations.
   const Rational& g = rational(order);
   const double a1 = g.a[1], a2 = g.a[2];
   const double g0 = g.b[0], g1 = g.b[1] - a1 * g0, g2 = g.b[2] - a1 * g1 - a2 * g0;

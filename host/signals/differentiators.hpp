@@ -73,7 +73,7 @@ struct Derivatives {
 
 /// One method at one sample time and cut-off.
 ///
-/// Delay of the velocity at low frequency, in samples (group_delay_samples says it at any): backward 1/2, bilinear 0,
+/// Delay of the velocity at low frequency, in samples (group_delay_samples gives it at any): backward 1/2, bilinear 0,
 /// with H1 sqrt(2) / (w0 T) more, with H2 2 / (w0 T), with matched poles likewise within (w0 T)^2; Butterworth forward
 /// and backward 0 everywhere. Gain error at low frequency: none, but pre-warping takes (w0 T)^2 / 12 off (per order)
 /// and the impulse-invariant velocity of a filter has no zero at standstill (see gain_at_standstill).
@@ -84,7 +84,7 @@ class DifferentiatingFilter {
   /// Throws std::invalid_argument unless sample_s > 0 and, where the method uses it, 0 < cutoff_hz < 1 / (2 sample_s).
   DifferentiatingFilter(Differentiator which, double cutoff_hz, double sample_s);
 
-  /// Before its first sample the signal is taken to have gone on as the straight line through the first two, so that a
+  /// Before its first sample the signal is extrapolated linearly from the first two samples, so that a
   /// constant velocity has no transient. Data with a gap must be given piece by piece.
   Derivatives apply(std::span<const double> position) const;
 
@@ -98,7 +98,7 @@ class DifferentiatingFilter {
   /// Standard deviation of the result over that of white noise on the position, 1/s^order. Infinite for the bilinear
   /// derivatives without a filter: their pole at z = -1 keeps all noise for ever.
   double noise_gain(int order) const;
-  /// Derivative that a constant position of one shows, 1/s^order (order 1 or 2): nought but for impulse invariance with
+  /// Derivative that a constant position of one shows, 1/s^order (order 1 or 2): zero but for impulse invariance with
   /// a filter, where aliasing leaves w0 (w0 T)^2 / 6 (H2) or sqrt(2) / 12 times w0 (w0 T)^2 (H1), to that order.
   double gain_at_standstill(int order) const { return response(order, 0.0).real(); }
 

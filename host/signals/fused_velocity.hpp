@@ -6,7 +6,7 @@
 
 namespace flexspline::signals {
 
-/// A velocity made of two measurements of it.
+/// A velocity from two measurements of it.
 struct FusedVelocity {
   std::vector<double> velocity;
   double crossover_hz = 0.0;  // the position's derivative counts below it, the measured velocity above it
@@ -22,7 +22,7 @@ struct FusedVelocity {
 /// Both signals must have passed the same zero-phase filter, of `cutoff_hz`. The measured velocity is put on the
 /// position's time and scale by the lag and gain that it has below the crossover. Nothing where it cannot help: the
 /// crossover is near the filter's cut-off, its gain is off by more than 5 %, it lags by more than two samples, it lacks
-/// more of the fast motion than the derivative has noise there, or the signals are too short to tell.
+/// more of the fast motion than the derivative has noise there, or the signals are too short.
 std::optional<FusedVelocity> fused_velocity(std::span<const double> position, std::span<const double> measured,
                                             double position_std, double velocity_std, double cutoff_hz,
                                             double sample_s);

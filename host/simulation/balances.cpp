@@ -3,14 +3,14 @@
 #include <algorithm>
 
 #include "host/catalogue/constants.hpp"
-#include "host/catalogue/defined.hpp"
+#include "host/catalogue/user_defined_effect.hpp"
 
 namespace flexspline::simulation {
 
 Balances::Balances(const model::Model& model, const catalogue::DriveConstants<double>& constants) {
   std::vector<catalogue::Instance*> last_shifts;
   std::vector<catalogue::Instance*> modulations;
-  // What a modulation scales is not straight.
+  // A modulated effect is not linear.
   const bool fold = std::none_of(model.effects.begin(), model.effects.end(), [](const model::Effect& e) {
     return catalogue::entry_of(e).info->phase != catalogue::Phase::source;
   });
@@ -23,8 +23,9 @@ Balances::Balances(const model::Model& model, const catalogue::DriveConstants<do
       (entry.info->acts_last ? last_shifts : changing_).push_back(instance);
     if (entry.info->phase == catalogue::Phase::modulate) modulations.push_back(instance);
     if (!entry.adds_torque()) continue;
-    // What a user made may be straight where it is tried and bend elsewhere.
-    if (fold && !entry.has_state && !entry.definition && take_straight(*instance, entry.info->balance)) continue;
+    // A user-defined effect may be linear where it is tried and nonlinear outside of that range.
+    if (fold && !entry.has_state && !entry.definition && take_piecewise_linear(*instance, entry.info->balance))
+      continue;
     switch (entry.info->balance) {
       case catalogue::Balance::motor:
         motor_.push_back({instance, entry.has_state});
@@ -50,15 +51,15 @@ Balances::Balances(const model::Model& model, const catalogue::DriveConstants<do
   changing_.insert(changing_.end(), modulations.begin(), modulations.end());
 }
 
-bool Balances::take_straight(const catalogue::Instance& instance, Balance balance) {
+bool Balances::take_piecewise_linear(const catalogue::Instance& instance, Balance balance) {
   if (balance == Balance::transmission) {
     const auto stiffness = spring_of(instance);
     stiffness_ += stiffness.value_or(0.0);
     return stiffness.has_value();
   }
-  const auto straight = straight_of(instance, balance);
-  if (straight) (balance == Balance::motor ? straight_motor_ : straight_load_) += *straight;
-  return straight.has_value();
+  const auto linear = piecewise_linear_of(instance, balance);
+  if (linear) (balance == Balance::motor ? linear_motor_ : linear_load_) += *linear;
+  return linear.has_value();
 }
 
 void Balances::change(Inputs& inputs) const {

@@ -6,7 +6,7 @@
 
 #include "host/catalogue/catalogue.hpp"
 #include "host/model/model.hpp"
-#include "host/simulation/straight.hpp"
+#include "host/simulation/piecewise_linear.hpp"
 
 namespace flexspline::simulation {
 
@@ -22,7 +22,7 @@ class Balances {
   // Each adds the torques of the effects that belong to a balance; one effect may add to the others too. Inner states
   // are moved on from `before` to `now` and left as they were.
   void add_motor(const Inputs& now, const Inputs& before, Torques& sums) const {
-    sums.motor += straight_motor_.torque(now.acceleration, now.velocity, now.direction);
+    sums.motor += linear_motor_.torque(now.acceleration, now.velocity, now.direction);
     add(motor_, now, before, sums);
   }
   void add_transmission(const Inputs& now, const Inputs& before, Torques& sums) const {
@@ -30,13 +30,13 @@ class Balances {
     add(transmission_, now, before, sums);
   }
   void add_load(const Inputs& now, const Inputs& before, Torques& sums) const {
-    sums.load += straight_load_.torque(now.output_acceleration, now.output_velocity, now.output_direction);
+    sums.load += linear_load_.torque(now.output_acceleration, now.output_velocity, now.output_direction);
     add(load_, now, before, sums);
   }
 
-  // All of a shaft's torques where they are straight in its motion, which then has a closed form; else null.
-  const Straight* all_of_motor() const { return motor_.empty() ? &straight_motor_ : nullptr; }
-  const Straight* all_of_load() const { return load_.empty() ? &straight_load_ : nullptr; }
+  // All of a shaft's torques where they are linear in its motion, which then has a closed form; else null.
+  const PiecewiseLinear* all_of_motor() const { return motor_.empty() ? &linear_motor_ : nullptr; }
+  const PiecewiseLinear* all_of_load() const { return load_.empty() ? &linear_load_ : nullptr; }
 
   // True where shifts or modulations change what effects see.
   bool changes_inputs() const { return !changing_.empty(); }
@@ -56,8 +56,8 @@ class Balances {
     catalogue::Instance* instance;
     bool has_state;
   };
-  // Adds a straight effect to the sums; false where it is none.
-  bool take_straight(const catalogue::Instance& instance, Balance balance);
+  // Adds a linear effect to the sums; false where it is not linear.
+  bool take_piecewise_linear(const catalogue::Instance& instance, Balance balance);
   static void add(const std::vector<Source>& sources, const Inputs& now, const Inputs& before, Torques& sums) {
     for (const Source& source : sources) {
       if (source.has_state)
@@ -68,9 +68,9 @@ class Balances {
   }
 
   std::vector<std::unique_ptr<catalogue::Instance>> instances_;
-  // Straight effects are summed once; the others are asked each time.
-  Straight straight_motor_;
-  Straight straight_load_;
+  // Linear effects are summed once; the others are evaluated each time.
+  PiecewiseLinear linear_motor_;
+  PiecewiseLinear linear_load_;
   double stiffness_ = 0.0;
   std::vector<Source> motor_;
   std::vector<Source> transmission_;

@@ -129,8 +129,8 @@ double Dynamics::steepness_at_rest() {
 }
 
 template <class Residual>
-Dynamics::Moving Dynamics::solve_set_valued(Residual&& residual, double guess, double slope, double tolerance, int held,
-                                            int last) const {
+Dynamics::SolvedVelocity Dynamics::solve_set_valued(Residual&& residual, double guess, double slope, double tolerance,
+                                                    int held, int last) const {
   const double limit = tolerance * slope;
   const auto moving = [&](int direction, double from, double low, double high) {
     return find_root([&](double velocity) { return residual(velocity, direction); }, from, slope, limit, low, high).x;
@@ -153,15 +153,15 @@ Dynamics::Moving Dynamics::solve_set_valued(Residual&& residual, double guess, d
 }
 
 // As solve_set_valued, in closed form.
-Dynamics::Moving Dynamics::solve_straight(const Straight& c, double base, double driving, double guess, double limit,
-                                          int held, int last) const {
+Dynamics::SolvedVelocity Dynamics::solve_piecewise_linear(const PiecewiseLinear& c, double base, double driving,
+                                                          double guess, double limit, int held, int last) const {
   const auto in = [&](int direction) {
-    return Moving{c.velocity_in(direction, base, stage_.theta, driving), direction};
+    return SolvedVelocity{c.velocity_in(direction, base, stage_.theta, driving), direction};
   };
   if (held != 0) return in(held);
   const int expected = sign_of(guess);
   if (expected != 0) {
-    const Moving moving = in(expected);
+    const SolvedVelocity moving = in(expected);
     if (sign_of(moving.velocity) == expected) return moving;
   }
   const bool starts_forward = c.left_at_rest(1.0, base, stage_.theta, driving) < -limit;
@@ -171,15 +171,15 @@ Dynamics::Moving Dynamics::solve_straight(const Straight& c, double base, double
   return {0.0, 0};
 }
 
-Dynamics::Moving Dynamics::solve_motor(double torque) {
+Dynamics::SolvedVelocity Dynamics::solve_motor(double torque) {
   const double slope = motor_inertia_ / stage_.theta;
   const double guess = guess_motor_ - (torque - guess_torque_) / (gear_ratio_ * slope);
   set_torque(torque);
   const double driving = stage_.forcing.effort - torque / gear_ratio_ - motor_share_;
   const double tolerance = 0.1 * gear_ratio_ * tolerance_;
-  if (const Straight* all = balances_.all_of_motor())
-    return solve_straight(*all, stage_.base.motor_velocity, driving, guess, tolerance * slope, stage_.held.motor,
-                          last_.motor_direction);
+  if (const PiecewiseLinear* all = balances_.all_of_motor())
+    return solve_piecewise_linear(*all, stage_.base.motor_velocity, driving, guess, tolerance * slope,
+                                  stage_.held.motor, last_.motor_direction);
   return solve_set_valued(
       [&](double velocity, int direction) {
         set_motor(velocity, direction);
@@ -189,16 +189,16 @@ Dynamics::Moving Dynamics::solve_motor(double torque) {
       guess, slope, tolerance, stage_.held.motor, last_.motor_direction);
 }
 
-Dynamics::Moving Dynamics::solve_load(double torque) {
+Dynamics::SolvedVelocity Dynamics::solve_load(double torque) {
   if (coupling_ == Coupling::locked_output) return {};
   const double slope = output_inertia_ / stage_.theta;
   const double guess = guess_output_ + (torque - guess_torque_) / slope;
   set_torque(torque);
   const double driving = torque - stage_.forcing.load_torque - load_share_;
   const double tolerance = 0.1 * tolerance_;
-  if (const Straight* all = balances_.all_of_load())
-    return solve_straight(*all, stage_.base.output_velocity, driving, guess, tolerance * slope, stage_.held.output,
-                          last_.output_direction);
+  if (const PiecewiseLinear* all = balances_.all_of_load())
+    return solve_piecewise_linear(*all, stage_.base.output_velocity, driving, guess, tolerance * slope,
+                                  stage_.held.output, last_.output_direction);
   return solve_set_valued(
       [&](double velocity, int direction) {
         set_output(velocity, direction);
@@ -211,8 +211,8 @@ Dynamics::Moving Dynamics::solve_load(double torque) {
 // The torsion rate v decides all: the transmission's torque grows with it, so the motor is slower and the output
 // faster, and v - (w/N - wo) grows with a slope of one or more.
 void Dynamics::solve_coupled(Solution& solution) {
-  Moving motor;
-  Moving output;
+  SolvedVelocity motor;
+  SolvedVelocity output;
   double torque = 0.0;
   const auto solve_shafts = [&](double at) {
     torque = at;
@@ -261,8 +261,8 @@ void Dynamics::solve_rigid(Solution& solution) {
     const Torques motor = sum(Balance::motor);
     return motor.motor + now_.torque / gear_ratio_ - stage_.forcing.effort;
   };
-  const Moving motor = solve_set_valued(residual, guess_motor_, slope, 0.1 * gear_ratio_ * tolerance_,
-                                        stage_.held.motor, last_.motor_direction);
+  const SolvedVelocity motor = solve_set_valued(residual, guess_motor_, slope, 0.1 * gear_ratio_ * tolerance_,
+                                                stage_.held.motor, last_.motor_direction);
   // The last evaluation was within the tolerance of the solution, unless it was that of another direction.
   if (now_.direction != motor.direction) residual(motor.velocity, motor.direction);
   solution.torque = now_.torque;
@@ -296,22 +296,23 @@ Dynamics::Solution Dynamics::solve(const Stage& stage) {
   return solution;
 }
 
-Dynamics::Trial Dynamics::attempt(const Forcing& begin, const Forcing& end, double duration, Held held) {
+Dynamics::StepAttempt Dynamics::attempt(const Forcing& begin, const Forcing& end, double duration,
+                                        HeldDirections held) {
   const double theta = kGamma * duration;
   const double rest = duration - theta;
-  Trial trial;
-  trial.middle = solve({theta, theta, state_, between(begin, end, kGamma), held});
-  trial.duration = duration;
-  const Solution& m = trial.middle;
+  StepAttempt attempted;
+  attempted.middle = solve({theta, theta, state_, between(begin, end, kGamma), held});
+  attempted.duration = duration;
+  const Solution& m = attempted.middle;
   const State base{
       state_.motor_position + rest * m.state.motor_velocity, state_.motor_velocity + rest * m.motor_acceleration,
       state_.output_position + rest * m.state.output_velocity, state_.output_velocity + rest * m.output_acceleration};
-  trial.end = solve({theta, duration, base, end, held});
-  return trial;
+  attempted.end = solve({theta, duration, base, end, held});
+  return attempted;
 }
 
-double Dynamics::advance_to_standstill(const Forcing& begin, const Forcing& end, double duration, Held held,
-                                       Trial trial) {
+double Dynamics::advance_to_standstill(const Forcing& begin, const Forcing& end, double duration, HeldDirections held,
+                                       StepAttempt attempted) {
   constexpr double kNegligible = 1e-6;  // of the step
   double time = duration;
   Forcing until = end;
@@ -321,17 +322,17 @@ double Dynamics::advance_to_standstill(const Forcing& begin, const Forcing& end,
     const auto consider = [&](int direction, double from, double to) {
       if (direction != 0 && to * direction < 0.0) share = std::min(share, from / (from - to));
     };
-    consider(held.motor, state_.motor_velocity, trial.end.state.motor_velocity);
-    consider(held.output, state_.output_velocity, trial.end.state.output_velocity);
+    consider(held.motor, state_.motor_velocity, attempted.end.state.motor_velocity);
+    consider(held.output, state_.output_velocity, attempted.end.state.output_velocity);
     if (share > 1.0 - 1e-4) break;
     time *= share;
     if (time < kNegligible * duration) break;
     until = between(begin, end, time / duration);
-    trial = attempt(begin, until, time, held);
+    attempted = attempt(begin, until, time, held);
   }
   const State from = state_;
   if (time >= kNegligible * duration)
-    accept(trial, until);
+    accept(attempted, until);
   else
     time = 0.0;
   // What has all but stopped has stopped.
@@ -371,13 +372,13 @@ void Dynamics::fill(const Solution& solution) {
   set_torque(solution.torque);
 }
 
-void Dynamics::accept(const Trial& trial, const Forcing& forcing) {
-  state_ = trial.end.state;
-  torque_ = trial.end.torque;
+void Dynamics::accept(const StepAttempt& attempted, const Forcing& forcing) {
+  state_ = attempted.end.state;
+  torque_ = attempted.end.torque;
   if (!balances_.has_state()) return;
   set_forcing(forcing);
-  fill(trial.end);
-  now_.elapsed = trial.duration;
+  fill(attempted.end);
+  now_.elapsed = attempted.duration;
   const Inputs seen = seen_by_effects();
   balances_.advance(seen, before_);
   before_ = seen;
@@ -390,22 +391,23 @@ Dynamics::Accelerations Dynamics::step(const Forcing& begin, const Forcing& end,
   // Each shaft can come to rest once; what starts from rest within a step is not divided again.
   constexpr int kMostEvents = 4;
   for (int piece = 0;; ++piece) {
-    Trial trial = attempt(from, end, left, {});
-    if (piece == 0) accelerations.first = trial.middle.motor_acceleration;
+    StepAttempt attempted = attempt(from, end, left, {});
+    if (piece == 0) accelerations.first = attempted.middle.motor_acceleration;
     const auto turned = [](double velocity, int middle, int last) {
       const int direction = sign_of(velocity);
       return middle == direction && last == direction ? 0 : direction;
     };
-    Held held{turned(state_.motor_velocity, trial.middle.motor_direction, trial.end.motor_direction), 0};
+    HeldDirections held{turned(state_.motor_velocity, attempted.middle.motor_direction, attempted.end.motor_direction),
+                        0};
     if (coupling_ == Coupling::two_masses)
-      held.output = turned(state_.output_velocity, trial.middle.output_direction, trial.end.output_direction);
+      held.output = turned(state_.output_velocity, attempted.middle.output_direction, attempted.end.output_direction);
     if (piece == kMostEvents || (held.motor == 0 && held.output == 0)) {
-      accept(trial, end);
-      accelerations.last = trial.end.motor_acceleration;
+      accept(attempted, end);
+      accelerations.last = attempted.end.motor_acceleration;
       return accelerations;
     }
-    trial = attempt(from, end, left, held);
-    const double time = advance_to_standstill(from, end, left, held, trial);
+    attempted = attempt(from, end, left, held);
+    const double time = advance_to_standstill(from, end, left, held, attempted);
     accelerations.last = last_.motor_acceleration;
     if (time > left * (1.0 - 1e-6)) return accelerations;
     from = between(from, end, time / left);

@@ -53,8 +53,8 @@ class Dynamics {
   double torque() const { return torque_; }
 
  private:
-  // +1 or -1 holds a shaft's friction to that direction through nought; 0 leaves it free.
-  struct Held {
+  // +1 or -1 holds a shaft's friction to that direction through zero; 0 leaves it free.
+  struct HeldDirections {
     int motor = 0;
     int output = 0;
   };
@@ -64,7 +64,7 @@ class Dynamics {
     double elapsed = 0.0;  // since the step began
     State base;
     Forcing forcing;
-    Held held;
+    HeldDirections held;
   };
   struct Solution {
     State state;
@@ -75,31 +75,33 @@ class Dynamics {
     int motor_direction = 0;
     int output_direction = 0;
   };
-  struct Trial {
+  struct StepAttempt {
     Solution middle;
     Solution end;
     double duration = 0.0;
   };
-  struct Moving {
+  struct SolvedVelocity {
     double velocity = 0.0;
     int direction = 0;
   };
 
-  Trial attempt(const Forcing& begin, const Forcing& end, double duration, Held held);
+  StepAttempt attempt(const Forcing& begin, const Forcing& end, double duration, HeldDirections held);
   // Moves on to the first standstill of a held shaft, at most `duration`. Returns the time that took.
-  double advance_to_standstill(const Forcing& begin, const Forcing& end, double duration, Held held, Trial trial);
-  void accept(const Trial& trial, const Forcing& forcing);
+  double advance_to_standstill(const Forcing& begin, const Forcing& end, double duration, HeldDirections held,
+                               StepAttempt attempted);
+  void accept(const StepAttempt& attempted, const Forcing& forcing);
 
   Solution solve(const Stage& stage);
   void solve_coupled(Solution& solution);
   void solve_rigid(Solution& solution);
-  Moving solve_motor(double torque);
-  Moving solve_load(double torque);
+  SolvedVelocity solve_motor(double torque);
+  SolvedVelocity solve_load(double torque);
   template <class Residual>
-  Moving solve_set_valued(Residual&& residual, double guess, double slope, double tolerance, int held, int last) const;
+  SolvedVelocity solve_set_valued(Residual&& residual, double guess, double slope, double tolerance, int held,
+                                  int last) const;
 
-  Moving solve_straight(const Straight& c, double base, double driving, double guess, double limit, int held,
-                        int last) const;
+  SolvedVelocity solve_piecewise_linear(const PiecewiseLinear& c, double base, double driving, double guess,
+                                        double limit, int held, int last) const;
 
   void set_motor(double velocity, int direction);
   void set_output(double velocity, int direction);
@@ -118,7 +120,7 @@ class Dynamics {
   double gear_ratio_;
   double motor_inertia_;
   double output_inertia_;
-  // The torsion rate is searched for as sign(x) abs(x)^power, which makes damping that is steep at rest straight.
+  // The torsion rate is searched for as sign(x) abs(x)^power, which makes a damping that is steep at rest linear.
   double power_ = 1.0;
   double torsion_zero_ = 0.0;
 

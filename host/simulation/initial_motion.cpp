@@ -31,8 +31,8 @@ Slope slope_at_start(const double* position, std::size_t count, double sample_s)
   const Eigen::Vector3d fit = powers.householderQr().solve(values);
   const double variance = (values - powers * fit).squaredNorm() / static_cast<double>(rows - 3);
   const Eigen::Matrix3d normal = powers.transpose() * powers;
-  // What a parabola does not follow (a change of acceleration) is as likely to bend the slope as noise is; it is alike
-  // from sample to sample, so it does not average out.
+  // What a parabola does not follow (a change of acceleration) is as likely to change the slope as noise is; it is the
+  // same from sample to sample, so it does not average out.
   return {fit(1) / unit, std::sqrt(variance * normal.inverse()(1, 1) * static_cast<double>(window) / 8.0) / unit};
 }
 

@@ -13,8 +13,8 @@ struct InitialMotion {
 };
 
 // From a position and a velocity column, either of which may be missing; nothing where both are. With both, the
-// velocity is the surer one of the measured sample and the slope of a parabola through the first 20 ms (at least 8
-// samples) of the position, judged by the stated noise, else by the scatter of the data.
+// velocity is the more certain one of the measured sample and the slope of a parabola through the first 20 ms (at least
+// 8 samples) of the position, compared with the stated noise, else by the scatter of the data.
 std::optional<InitialMotion> initial_motion(const data::Experiment& experiment, const data::Segment& segment,
                                             data::Column position, data::Column velocity);
 

@@ -13,7 +13,7 @@ struct Root {
   // Slope of the last secant, or the one given: a good guess for the next root of a similar function.
   double slope = 1.0;
   bool converged = false;
-  // Not converged, but the function jumps through nought between `low` and `high`, which are next to each other.
+  // Not converged, but the function jumps through zero between `low` and `high`, which are next to each other.
   bool jump = false;
   double low = 0.0;
   double high = 0.0;

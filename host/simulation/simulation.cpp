@@ -8,7 +8,7 @@
 #include <string>
 
 #include "host/catalogue/constants.hpp"
-#include "host/catalogue/defined.hpp"
+#include "host/catalogue/user_defined_effect.hpp"
 #include "host/simulation/dynamics.hpp"
 #include "host/simulation/initial_motion.hpp"
 
@@ -118,7 +118,7 @@ Column effort_column(const model::Model& model, const data::Experiment& experime
   return current && (model.drive.torque_constant_nm_a.value || !torque) ? Column::current : Column::motor_torque;
 }
 
-// The largest torque that positions may stand for: a gear carries no more than a few times its rating.
+// The largest torque that positions may imply: a gear carries no more than a few times its rating.
 double plausible_torque(const model::Model& model, const data::Experiment& experiment) {
   constexpr double kMargin = 4.0;
   double largest = model.drive.rated_torque_nm.value.value_or(0.0);
@@ -168,7 +168,7 @@ FreeRun run(const model::Model& model, const data::Experiment& experiment, const
     throw std::invalid_argument("experiment \"" + experiment.name +
                                 "\" cannot be simulated: it has no time between samples (sample_s)");
 
-  // At its own step the simulation would run for hours, and nobody controls a drive at this rate.
+  // At its own step the simulation would run for hours, and no drive is controlled at this rate.
   if (experiment.sample_s >= kLongestSample_s)
     throw std::invalid_argument(fmt::format(
         "experiment \"{}\" cannot be simulated: a sample lasts {:.4g} s, the longest is {:g} s. Is time_s in another "

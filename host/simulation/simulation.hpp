@@ -44,7 +44,7 @@ class ModelIncomplete : public std::runtime_error {
 // balance and, with a free load, output inertia; else one rigid mass with qo = q/N, and `torque` comes from the load
 // balance. Where motor and output positions have no common zero (they differ by more than the gear can twist), the
 // torsion starts in equilibrium instead. A missing temperature is the reference temperature, a missing load torque
-// nought. Throws ModelIncomplete, and std::invalid_argument where the experiment has no effort, no time base, or a step
+// zero. Throws ModelIncomplete, and std::invalid_argument where the experiment has no effort, no time base, or a step
 // of Options is not positive.
 FreeRun run(const model::Model& model, const data::Experiment& experiment, const Options& options = {});
 

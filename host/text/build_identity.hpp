@@ -1,4 +1,4 @@
-// Which build of the tool this is: said by --version and written into what it makes.
+// Which build of the tool this is: printed by --version and written into its files.
 #pragma once
 
 #include <string>
@@ -9,8 +9,8 @@ namespace flexspline::text {
 // Of the project: "0.1.0".
 std::string_view version();
 
-// What `git describe` said of the source when it was built, with "+changes" where files differed from that; "unknown"
-// where the source came without git.
+// The output of `git describe` for the source when it was built, with "+changes" where files differed from that;
+// "unknown" where the source came without git.
 std::string_view revision();
 
 // Name and version of the compiler: "g++ 12.2.0".

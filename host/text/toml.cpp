@@ -133,7 +133,7 @@ class Guard {
   void skip(char c) {
     if (static_cast<unsigned char>(c) >= 0x80U) fail_not_ascii();
     if (static_cast<unsigned char>(c) < 0x20U && c != '\n' && c != '\r' && c != '\t')
-      throw TomlError(line(), 0, "a control character stands outside quotes", "remove it");
+      throw TomlError(line(), 0, "a control character is outside quotes", "remove it");
     if (c == '[' || c == '{') open_ += c;
     if (c == (in('[') ? ']' : '}') && !open_.empty()) open_.pop_back();
     if (c == '\n' || c == ',' || c == '[' || c == '{') key_done_ = in('[');
@@ -144,19 +144,19 @@ class Guard {
   }
   bool in(char bracket) const { return !open_.empty() && open_.back() == bracket; }
 
-  // TOML knows letters beyond ASCII only in quotes and comments. The reader would say so, but not for all of them: for
+  // TOML knows letters beyond ASCII only in quotes and comments. The reader reports it, but not for all of them: for
   // those from U+00A1 up to some hundred its behaviour is undefined, also where it looks ahead from a number into
   // quotes that follow without a space, or with no more than a name and an equals sign between them.
   void skip_quotes() {
     const std::size_t end = end_of_quotes(text_, at_);
-    const bool stands_free =
+    const bool is_separate =
         at_ == 0 || at_ == value_at_ || std::string_view(" \t\n,[{").find(text_[at_ - 1]) != std::string_view::npos;
-    if (!stands_free && !is_ascii(text_.substr(at_, end - at_))) fail_not_ascii();
+    if (!is_separate && !is_ascii(text_.substr(at_, end - at_))) fail_not_ascii();
     at_ = end;
   }
 
   [[noreturn]] void fail_not_ascii() const {
-    throw TomlError(line(), 0, "a letter or sign that is not ASCII stands outside quotes",
+    throw TomlError(line(), 0, "a letter or sign that is not ASCII is outside quotes",
                     "correct it, or put the whole text in quotes");
   }
 
@@ -171,7 +171,7 @@ class Guard {
     };
     if (key == std::string_view::npos || !begins_key(header[key]))
       throw TomlError(line(), 0, fmt::format("no name follows the bracket in {}", header),
-                      "correct the line: the name of the table stands between the brackets");
+                      "correct the line: the name of the table is between the brackets");
   }
 
   std::string_view text_;
@@ -222,7 +222,7 @@ Node parse_toml(std::string_view text) {
   } catch (const toml::parse_error& error) {
     const toml::source_position at = error.source().begin;
     throw TomlError(std::max<std::size_t>(at.line, 1), at.column, std::string(error.description()),
-                    "correct the line (numbers have a decimal point, text stands in quotes, a key stands once in its "
+                    "correct the line (numbers have a decimal point, text is in quotes, a key is used once in its "
                     "table, the file is UTF-8)");
   }
 }

@@ -1,4 +1,4 @@
-// A TOML text as a tree that knows where in the text each key and value stands, so that values can be replaced there.
+// A TOML text as a tree that knows where in the text each key and value is, so that values can be replaced there.
 #pragma once
 
 #include <cstddef>
@@ -28,7 +28,7 @@ struct Node {
   bool is_inline = false;      // table in braces
   bool has_header = false;     // table with a [header] or [[header]] of its own
   std::string text;            // kind text
-  double number = 0.0;         // kind number: integers and floats alike, infinity and NaN included
+  double number = 0.0;         // kind number: integers and floats, infinity and NaN included
   bool boolean = false;        // kind boolean
   std::vector<Entry> entries;  // kind table, in the order of the text
   std::vector<Node> items;     // kind array

@@ -6,7 +6,7 @@
 
 namespace flexspline::text {
 
-// The text with what stands in units beyond ASCII in ASCII: degree sign as "deg", micro sign and Greek mu as "u", dots
+// The text with the non-ASCII characters of units in ASCII: degree sign as "deg", micro sign and Greek mu as "u", dots
 // and cross between factors as "*", raised digits and minus as "^2", "^3", "1" and "-". All else stays.
 std::string unit_in_ascii(std::string_view unit);
 

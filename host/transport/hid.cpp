@@ -1,5 +1,5 @@
 // Drives on USB, by hidapi. The program is linked to one of its back ends, hidraw (Debian's default here) or libusb;
-// both behave alike but for what a device without permission looks like.
+// both behave the same, except for a device without permission.
 #include <fmt/format.h>
 #include <hidapi/hidapi.h>
 #include <unistd.h>
@@ -20,9 +20,9 @@ namespace {
 using Identity = usb::FlexsplineIdentity;
 constexpr const char* kNotAllowed =
     "your user may not open it: sudo cp 70-flexspline.rules /etc/udev/rules.d/ && sudo udevadm control --reload, then "
-    "plug the drive in again (the file stands in host/drive)";
+    "plug the drive in again (the file is in host/drive)";
 
-// What may help where a drive that is there cannot be opened. hidapi does not say why; root is allowed everything.
+// What may help where a drive that is there cannot be opened. hidapi does not report why; root is allowed everything.
 const char* remedy() {
   return geteuid() == 0 ? "plug it in again, and end other programs that use it" : kNotAllowed;
 }
@@ -78,7 +78,7 @@ class Hid : public Link {
   std::string serial_;
 };
 
-// A plug that is pulled while somebody looks leaves a device that hides its serial number and cannot be opened; for a
+// A plug that is pulled during the search leaves a device that hides its serial number and cannot be opened; for a
 // moment it is listed still. A machine that has much to do takes its time.
 bool is_there(const std::string& path) {
   constexpr std::chrono::milliseconds kStep{100};
@@ -134,14 +134,14 @@ std::unique_ptr<Link> open_hid(const std::string& serial) {
   if (count == 0 && !hidden.empty() && !is_there(hidden))
     throw LinkError(fmt::format("{}: the drive is gone; plug it in again and try again", drive_named(serial)));
   if (count == 0 && !hidden.empty())
-    throw LinkError(fmt::format("hid:{}: a drive on USB does not tell its serial number; {}", serial, remedy()));
+    throw LinkError(fmt::format("hid:{}: a drive on USB does not send its serial number; {}", serial, remedy()));
   if (count == 0) {
     const std::string there = others.empty() ? "no drive is on USB" : "those on USB are " + others;
     throw LinkError(
         fmt::format("{}: {}; check cable and power, or use --drive twin without hardware", drive_named(serial), there));
   }
   if (count > 1)
-    throw LinkError(fmt::format("USB: there is more than one drive ({}); say which: --drive SERIAL", others));
+    throw LinkError(fmt::format("USB: there is more than one drive ({}); choose one: --drive SERIAL", others));
   hid_device* device = hid_open_path(path.c_str());
   if (device == nullptr && !is_there(path))
     throw LinkError(fmt::format("{}: the drive is gone; plug it in again and try again", drive_named(its_serial)));

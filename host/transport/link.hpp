@@ -45,7 +45,7 @@ struct Found {
   bool usable = true;
   std::string problem;  // why not, and what to do
 };
-// Drives on USB. Serial ports and sockets do not say what is behind them.
+// Drives on USB. Serial ports and sockets do not show which device is behind them.
 std::vector<Found> find_drives();
 
 // The parts of open_link(), one file each.

@@ -28,7 +28,7 @@ class Stream : public Link {
     fcntl(fd_, F_SETFL, fcntl(fd_, F_GETFL) | O_NONBLOCK);
     // A line whose other end is gone is an error of write(), not a reason to end.
     std::signal(SIGPIPE, SIG_IGN);
-    // Whatever stood half sent on the line ends here.
+    // A message that was sent in part ends here.
     constexpr std::uint8_t kNothing = 0;
     write_all(&kNothing, 1);
   }

@@ -18,7 +18,8 @@ std::unique_ptr<Link> open_tcp(const std::string& whole) {
   const std::string token = slash == std::string::npos ? "" : whole.substr(slash + 1);
   const std::size_t colon = address.rfind(':');
   if (colon == std::string::npos || colon == 0 || colon + 1 == address.size())
-    throw LinkError(fmt::format("tcp:{}: an address is HOST:PORT/TOKEN, as the twin says it when it starts", address));
+    throw LinkError(
+        fmt::format("tcp:{}: an address is HOST:PORT/TOKEN, as the twin prints it when it starts", address));
   addrinfo hints{};
   hints.ai_socktype = SOCK_STREAM;
   addrinfo* found = nullptr;
@@ -43,7 +44,7 @@ std::unique_ptr<Link> open_tcp(const std::string& whole) {
   if (token.empty() || ::send(fd, hello.data(), hello.size(), MSG_NOSIGNAL) != static_cast<ssize_t>(hello.size())) {
     close(fd);
     throw LinkError(fmt::format(
-        "tcp:{}: a twin takes only a host that knows its token; take the address as the twin says it when it "
+        "tcp:{}: a twin takes only a host that knows its token; take the address as the twin prints it when it "
         "starts, tcp:HOST:PORT/TOKEN",
         address));
   }

@@ -30,7 +30,7 @@ fs::path flash_file() {
   folder /= "flexspline";
   std::error_code error;
   fs::create_directories(folder, error);
-  if (error) throw LinkError(fmt::format("twin: {} cannot be made: {}", folder.string(), error.message()));
+  if (error) throw LinkError(fmt::format("twin: {} could not be created: {}", folder.string(), error.message()));
   return folder / "twin.flash";
 }
 

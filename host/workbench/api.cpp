@@ -11,8 +11,8 @@
 #include <utility>
 
 #include "host/estimation/cancellation.hpp"
-#include "host/workbench/gate.hpp"
-#include "host/workbench/kept_tabs.hpp"
+#include "host/workbench/access_control.hpp"
+#include "host/workbench/stored_tabs.hpp"
 #include "host/workbench/work.hpp"
 
 namespace flexspline::workbench {
@@ -22,10 +22,10 @@ using nlohmann::json;
 
 constexpr std::size_t kMostTabs = 24;
 constexpr const char* kTabsFile = "tabs.json";
-// Ends with the server, so it is short.
+// Wait at the end of the server, so it is short.
 constexpr auto kLongestWait = std::chrono::milliseconds(1500);
 
-// What is not there: 404.
+// An unknown path: 404.
 class NotFound : public std::runtime_error {
  public:
   using std::runtime_error::runtime_error;
@@ -37,14 +37,14 @@ class DeadlyError : public std::runtime_error {
   using std::runtime_error::runtime_error;
 };
 
-// What a message quotes would end there, and with it the message.
+// An invalid character would end the message there.
 void require_text(std::string_view value, std::string_view what) {
-  if (value.find('\0') != value.npos) throw AskedError(fmt::format("{} holds a byte that is no text", what));
+  if (value.find('\0') != value.npos) throw UnknownNameError(fmt::format("{} holds a byte that is not text", what));
 }
 
 const std::string& text(const Request& request, const std::string& key) {
   const auto found = request.query.find(key);
-  if (found == request.query.end()) throw AskedError(fmt::format("\"{}\" is missing in the request", key));
+  if (found == request.query.end()) throw UnknownNameError(fmt::format("\"{}\" is missing in the request", key));
   require_text(found->second, key);
   return found->second;
 }
@@ -54,19 +54,19 @@ double number(const Request& request, const std::string& key) {
   double parsed = 0.0;
   const auto [end, error] = std::from_chars(value.data(), value.data() + value.size(), parsed);
   if (error != std::errc() || end != value.data() + value.size() || parsed != parsed)
-    throw AskedError(fmt::format("\"{}\" is no number, in {}", value, key));
+    throw UnknownNameError(fmt::format("\"{}\" is not a number, in {}", value, key));
   return parsed;
 }
 
 std::size_t whole(const Request& request, const std::string& key, double most = 1e9) {
   const double value = number(request, key);
-  if (!(value >= 0.0 && value <= most)) throw AskedError(fmt::format("{} is out of range", key));
+  if (!(value >= 0.0 && value <= most)) throw UnknownNameError(fmt::format("{} is out of range", key));
   return static_cast<std::size_t>(value);
 }
 
 std::string field(const json& asked, const char* key) {
   if (!asked.contains(key) || !asked[key].is_string())
-    throw AskedError(fmt::format("\"{}\" is missing in the request", key));
+    throw UnknownNameError(fmt::format("\"{}\" is missing in the request", key));
   const auto value = asked[key].get<std::string>();
   require_text(value, key);
   return value;
@@ -76,12 +76,12 @@ std::string ending_of(const std::string& what) {
   if (what == "model" || what == "dataset") return ".toml";
   if (what == "report") return ".html";
   if (what == "block") return ".block";
-  throw AskedError(fmt::format("there is no \"{}\" to save; model, report and block are", what));
+  throw UnknownNameError(fmt::format("there is no \"{}\" to save; model, report and block are", what));
 }
 
 std::filesystem::path own_folder() {
   std::string name = (std::filesystem::temp_directory_path() / "flexspline-workbench-XXXXXX").string();
-  if (!mkdtemp(name.data())) throw std::runtime_error(fmt::format("no folder can be made at {}", name));
+  if (!mkdtemp(name.data())) throw std::runtime_error(fmt::format("no folder could be created at {}", name));
   return name;
 }
 
@@ -93,24 +93,24 @@ json reply_of(const std::string& what) {
 
 Api::Api(Setup setup)
     : setup_(std::move(setup)), dropped_(setup_.scratch.empty() ? own_folder() : setup_.scratch), drive_(setup_.drive) {
-  go_on();
+  restore_tabs();
 }
 
 Api::~Api() {
-  tabs_.clear();  // work ends before what it works with
+  tabs_.clear();  // work ends before the objects that it uses
   std::error_code error;
   if (setup_.scratch.empty()) std::filesystem::remove_all(dropped_, error);
 }
 
-void Api::keep() {
+void Api::store_all_tabs() {
   const std::lock_guard lock(mutex_);
-  if (!setup_.scratch.empty()) keep_tabs(setup_.scratch / kTabsFile, tabs_);
+  if (!setup_.scratch.empty()) store_tabs(setup_.scratch / kTabsFile, tabs_);
 }
 
-// With the tabs of the worker before; those whose work ended it, or ended with it, are told.
-void Api::go_on() {
+// With the tabs of the worker before; those whose work ended it, or ended with it, get a message.
+void Api::restore_tabs() {
   if (setup_.failures.empty()) return;
-  tabs_ = tabs_again(setup_.scratch / kTabsFile, setup_.first, setup_.pipeline, setup_.board, setup_.limits);
+  tabs_ = load_tabs(setup_.scratch / kTabsFile, setup_.first, setup_.pipeline, setup_.jobs, setup_.limits);
   for (std::error_code error; std::filesystem::exists(dropped_ / std::to_string(drops_), error);) ++drops_;
   for (const Failure& failure : setup_.failures)
     if (failure.is_known && !failure.jobs.front().key.empty()) deadly_[failure.jobs.front().key] = failure.why;
@@ -130,7 +130,7 @@ void Api::go_on() {
   }
 }
 
-void Api::refuse_again(const std::string& key) const {
+void Api::refuse_deadly_job(const std::string& key) const {
   if (const auto found = deadly_.find(key); found != deadly_.end())
     throw DeadlyError(fmt::format("this was tried before, and {}; it is not tried again", found->second));
 }
@@ -144,12 +144,12 @@ Answer Api::answer(const Request& request) {
     if (name != "tab") key += fmt::format(" {}={}", name, value);
   const auto tab = request.query.find("tab");
   const bool computes = request.path != "/api/state" && request.method == "GET";
-  const JobBoard::Entry entry(
-      setup_.board,
+  const JobTable::Entry entry(
+      setup_.jobs,
       {tab == request.query.end() ? "" : tab->second, "Showing " + request.path, computes ? key : "", false},
       setup_.limits.request, &nobody);
   try {
-    if (computes) refuse_again(key);
+    if (computes) refuse_deadly_job(key);
     if (request.method == "GET" && request.path == "/api/file") return file(request);
     if (request.method == "GET")
       answer.body = get(request).dump();
@@ -178,7 +178,7 @@ Answer Api::answer(const Request& request) {
 
 std::shared_ptr<Session> Api::open_tab(const std::string& like) {
   const std::lock_guard lock(mutex_);
-  std::shared_ptr<Session> made = std::make_shared<Session>(new_token(), setup_.first, setup_.board, setup_.limits);
+  std::shared_ptr<Session> made = std::make_shared<Session>(new_token(), setup_.first, setup_.jobs, setup_.limits);
   for (const auto& s : tabs_)
     if (s->id() == like) {
       const History<std::shared_ptr<Step>> history = s->history();
@@ -214,29 +214,29 @@ json Api::get(const Request& request) {
     state["data_name"] = opened && !opened->data_name.empty() ? opened->data_name : setup_.data_name;
     state["model_file"] = setup_.model_name;
     state["folder"] = setup_.folder.string();
-    state["scenarios"] = setup_.run ? trial_scenarios() : std::vector<std::string>();
-    state["rig"] = setup_.rig.what;
+    state["scenarios"] = setup_.run ? closed_loop_scenarios() : std::vector<std::string>();
+    state["rig"] = setup_.plant_setup.what;
     return state;
   }
   if (request.path == "/api/closed_loop") {
-    const auto traces = session->kept("closed_loop");
+    const auto traces = session->stored("closed_loop");
     if (!traces) throw NotFound("no closed loop was run in this tab");
     return *traces;
   }
   const History<std::shared_ptr<Step>> history = session->history();
   if (!session->has_model()) throw NotFound("there is no model yet");
   const std::size_t at = request.query.contains("step") ? whole(request, "step") : history.at();
-  if (at >= history.size()) throw AskedError("there is no such step");
-  const std::shared_ptr<Look> look = history[at]->look();
+  if (at >= history.size()) throw UnknownNameError("there is no such step");
+  const std::shared_ptr<ResultView> view = history[at]->view();
   if (request.path == "/api/trace")
-    return look->trace({.experiment = text(request, "experiment"),
+    return view->trace({.experiment = text(request, "experiment"),
                         .signal = text(request, "signal"),
                         .from_s = number(request, "from"),
                         .to_s = number(request, "to"),
                         .points = whole(request, "points")});
-  if (request.path == "/api/maps") return {{"maps", look->maps()}, {"loops", look->loops()}};
+  if (request.path == "/api/maps") return {{"maps", view->maps()}, {"loops", view->loops()}};
   if (request.path == "/api/stretches")
-    return look->stretches_of(text(request, "signal"), text(request, "variable"), number(request, "low"),
+    return view->intervals_of(text(request, "signal"), text(request, "variable"), number(request, "low"),
                               number(request, "high"));
   throw NotFound("there is nothing under this address");
 }
@@ -245,7 +245,7 @@ json Api::post(const Request& request) {
   if (request.path == "/api/tab") {
     const auto like = request.query.find("like");
     const std::string id = open_tab(like == request.query.end() ? "" : like->second)->id();
-    keep();
+    store_all_tabs();
     return {{"tab", id}};
   }
   const std::shared_ptr<Session> session = session_of(request);
@@ -262,13 +262,13 @@ json Api::act(const std::shared_ptr<Session>& session, const json& asked) {
   const auto pipeline = setup_.pipeline;
   constexpr std::string_view kWithoutModel[] = {"cancel", "dismiss", "propose", "begin", "forget"};
   if (!session->has_model() && std::ranges::find(kWithoutModel, what) == std::end(kWithoutModel))
-    throw AskedError("there is no model yet; drop recordings on the page and begin with them");
+    throw UnknownNameError("there is no model yet; drop recordings on the page and begin with them");
   if (what == "propose") {
     start_proposal(session, choices_of(asked));
   } else if (what == "begin") {
     start_project(session, choices_of(asked));
   } else if (what == "forget") {
-    session->keep("recordings", nullptr);
+    session->store("recordings", nullptr);
     session->set("proposal", nullptr);
   } else if (what == "cancel") {
     session->cancel();
@@ -281,22 +281,22 @@ json Api::act(const std::shared_ptr<Session>& session, const json& asked) {
       if (what == "redo") history.redo();
       if (what == "go") history.go(asked.at("step").get<std::size_t>());
     });
-    keep();
+    store_all_tabs();
   } else if (what == "diagnose") {
     start_diagnosis(session);
   } else if (what == "add") {
     start_step(session, fmt::format("Adding {}", field(asked, "effect")),
-               [pipeline, effect = field(asked, "effect")](const Step& now, const Progress& say) {
-                 return with_effect(now, effect, pipeline, say);
+               [pipeline, effect = field(asked, "effect")](const Step& now, const Progress& progress) {
+                 return with_effect(now, effect, pipeline, progress);
                });
   } else if (what == "remove") {
     start_step(session, fmt::format("Removing {}", field(asked, "effect")),
-               [pipeline, id = field(asked, "effect")](const Step& now, const Progress& say) {
-                 return without_effect(now, id, pipeline, say);
+               [pipeline, id = field(asked, "effect")](const Step& now, const Progress& progress) {
+                 return without_effect(now, id, pipeline, progress);
                });
   } else if (what == "refit") {
     start_step(session, "Identifying",
-               [pipeline](const Step& now, const Progress& say) { return refitted(now, pipeline, say); });
+               [pipeline](const Step& now, const Progress& progress) { return refitted(now, pipeline, progress); });
   } else if (what == "pack") {
     start_pack(session);
   } else if (what == "try") {
@@ -305,8 +305,8 @@ json Api::act(const std::shared_ptr<Session>& session, const json& asked) {
     start_save(session, asked);
   } else if (what == "connect") {
     const std::string drive = field(asked, "drive");
-    session->start("Connecting", [this, drive](const Progress& say) {
-      say(drive);
+    session->start("Connecting", [this, drive](const Progress& progress) {
+      progress(drive);
       drive_.connect(drive);
     });
   } else if (what == "disconnect") {
@@ -314,29 +314,29 @@ json Api::act(const std::shared_ptr<Session>& session, const json& asked) {
     session->set("flash", nullptr);
     session->set("flash_preview", nullptr);
   } else if (what == "preview-flash" || what == "preview-restore") {
-    session->start("Comparing with the drive", [this, what, session = session.get()](const Progress& say) {
+    session->start("Comparing with the drive", [this, what, session = session.get()](const Progress& progress) {
       const std::shared_ptr<Step> step = session->history().current();
       session->set("flash_preview",
-                   what == "preview-flash" ? drive_.preview_flash(step->model, say) : drive_.preview_restore());
+                   what == "preview-flash" ? drive_.preview_flash(step->model, progress) : drive_.preview_restore());
     });
   } else if (what == "dismiss-preview") {
     session->set("flash_preview", nullptr);
   } else if (what == "flash" || what == "restore") {
-    // Nothing is done to a drive but what was shown.
-    const Shown shown{field(asked, "before"), field(asked, "after")};
+    // A drive is changed only as shown in the preview.
+    const PreviewedBlocks shown{field(asked, "before"), field(asked, "after")};
     session->set("flash_preview", nullptr);
-    session->start(what == "flash" ? "Flashing" : "Restoring",
-                   [this, what, shown, session = session.get()](const Progress& say) {
-                     const std::shared_ptr<Step> step = session->history().current();
-                     if (what == "restore") drive_.restore(shown);
-                     session->set("flash", what == "flash" ? drive_.flash(step->model, say, shown) : json(nullptr));
-                   });
+    session->start(what == "flash" ? "Flashing" : "Restoring", [this, what, shown,
+                                                                session = session.get()](const Progress& progress) {
+      const std::shared_ptr<Step> step = session->history().current();
+      if (what == "restore") drive_.restore(shown);
+      session->set("flash", what == "flash" ? drive_.flash(step->model, progress, shown) : json(nullptr));
+    });
   } else if (what == "move") {
-    session->start("Moving the twin", [this](const Progress& say) { drive_.move(say); });
+    session->start("Moving the twin", [this](const Progress& progress) { drive_.move(progress); });
   } else if (what == "empty-map") {
     drive_.reset_residual_map();
   } else {
-    throw AskedError(fmt::format("\"{}\" cannot be done", what));
+    throw UnknownNameError(fmt::format("\"{}\" cannot be done", what));
   }
   return json::object();
 }
@@ -344,41 +344,41 @@ json Api::act(const std::shared_ptr<Session>& session, const json& asked) {
 void Api::start_step(const std::shared_ptr<Session>& session, const std::string& what,
                      std::function<std::shared_ptr<Step>(const Step&, const Progress&)> make) {
   // The thread is joined before its session ends.
-  session->start(what, [this, session = session.get(), make = std::move(make)](const Progress& say) {
+  session->start(what, [this, session = session.get(), make = std::move(make)](const Progress& progress) {
     const std::shared_ptr<Step> now = session->history().current();
-    const std::shared_ptr<Step> next = make(*now, say);
+    const std::shared_ptr<Step> next = make(*now, progress);
     session->change([&](auto& history) { history.take(next); });
-    keep();
+    store_all_tabs();
   });
 }
 
 void Api::start_diagnosis(const std::shared_ptr<Session>& session) {
   const std::string key = "diagnose " + session->history().current()->id;
-  refuse_again(key);  // it begins by itself
+  refuse_deadly_job(key);  // it begins by itself
   session->start(
-      "Looking for what is missing",
-      [session = session.get()](const Progress& say) {
+      "Searching for what is missing",
+      [session = session.get()](const Progress& progress) {
         const std::shared_ptr<Step> step = session->history().current();
         step->diagnose(
             [&] {
               selection::Options how;
               how.pipeline = step->pipeline;
-              how.progress = say;
+              how.progress = progress;
               return selection::diagnose(*step->dataset, step->model, how);
             },
-            [&, is_told = false]() mutable {
+            [&, is_reported = false]() mutable {
               estimation::throw_if_cancelled();
-              if (!std::exchange(is_told, true)) say("another tab is at it");
+              if (!std::exchange(is_reported, true)) progress("another tab is at it");
             });
       },
       true, key);
 }
 
 void Api::start_pack(const std::shared_ptr<Session>& session) {
-  session->start("Packing", [session = session.get()](const Progress& say) {
-    say("proving the block and comparing it with double");
+  session->start("Packing", [session = session.get()](const Progress& progress) {
+    progress("proving the block and comparing it with double");
     const deployment::Packed packed = deployment::pack(session->history().current()->model);
-    say("");
+    progress("");
     session->set("pack", pack_json(packed));
   });
 }
@@ -396,21 +396,22 @@ std::string Api::content(const Session& session, const std::string& what) const 
 }
 
 void Api::start_trial(const std::shared_ptr<Session>& session, const std::string& scenario) {
-  if (!setup_.run) throw AskedError("there is nothing here to run a closed loop on");
+  if (!setup_.run) throw UnknownNameError("there is nothing here to run a closed loop on");
   // Names alone: a scenario may be a file, and requests name no paths.
-  if (std::ranges::find(trial_scenarios(), scenario) == trial_scenarios().end())
-    throw AskedError(
-        fmt::format("there is no scenario \"{}\"; there are {}", scenario, fmt::join(trial_scenarios(), ", ")));
-  session->start("Running the closed loop", [this, scenario, session = session.get()](const Progress& say) {
+  if (std::ranges::find(closed_loop_scenarios(), scenario) == closed_loop_scenarios().end())
+    throw UnknownNameError(
+        fmt::format("there is no scenario \"{}\"; there are {}", scenario, fmt::join(closed_loop_scenarios(), ", ")));
+  session->start("Running the closed loop", [this, scenario, session = session.get()](const Progress& progress) {
     const auto history = session->history();
-    Rig rig = setup_.rig;
-    const bool is_model = !rig.is_known();
-    const auto made = try_out(*history[0], *history.current(), rig, scenario, setup_.run, say);
-    say("");
-    session->keep("closed_loop", closed_loop::traces_json(made));
-    json told = trial_json(made, rig, is_model);
-    told["step"] = {{"at", history.at()}, {"action", history.current()->action}, {"what", history.current()->what}};
-    session->set("closed_loop", std::move(told));
+    SimulatedPlant plant_setup = setup_.plant_setup;
+    const bool is_model = !plant_setup.is_known();
+    const auto made = run_closed_loop(*history[0], *history.current(), plant_setup, scenario, setup_.run, progress);
+    progress("");
+    session->store("closed_loop", closed_loop::traces_json(made));
+    json drive_status = closed_loop_json(made, plant_setup, is_model);
+    drive_status["step"] = {
+        {"at", history.at()}, {"action", history.current()->action}, {"what", history.current()->what}};
+    session->set("closed_loop", std::move(drive_status));
   });
 }
 
@@ -420,10 +421,10 @@ void Api::start_save(const std::shared_ptr<Session>& session, const json& asked)
   std::error_code error;
   if (std::filesystem::exists(path, error) && !asked.value("replace", false))
     throw NameError(fmt::format("{} is there already; take another name, or replace it", path.filename().string()));
-  session->start("Saving", [this, what, path, session = session.get()](const Progress& say) {
-    say(path.filename().string());
+  session->start("Saving", [this, what, path, session = session.get()](const Progress& progress) {
+    progress(path.filename().string());
     const std::string text = content(*session, what);
-    say("");
+    progress("");
     model::save(path, text);
     session->set("saved", {{"what", what}, {"file", path.string()}});
   });
@@ -433,7 +434,7 @@ Answer Api::file(const Request& request) {
   const std::shared_ptr<Session> session = session_of(request);
   const std::string what = text(request, "what");
   Answer answer;
-  if (!session->has_model()) throw AskedError("there is no model yet");
+  if (!session->has_model()) throw UnknownNameError("there is no model yet");
   answer.download = what == "dataset" ? "dataset.toml" : "flexspline-" + what + ending_of(what);
   answer.body = content(*session, what);
   answer.type = ending_of(what) == ".toml" ? "application/toml"

@@ -10,11 +10,11 @@
 #include <string>
 #include <vector>
 
+#include "host/workbench/closed_loop_run.hpp"
 #include "host/workbench/live_drive.hpp"
 #include "host/workbench/project.hpp"
 #include "host/workbench/session.hpp"
 #include "host/workbench/supervisor.hpp"
-#include "host/workbench/trial.hpp"
 
 namespace flexspline::workbench {
 
@@ -23,7 +23,7 @@ struct Upload {
   std::string content;
 };
 
-// A request that passed the gate.
+// A request that passed access control.
 struct Request {
   std::string method;  // "GET", "POST"
   std::string path;    // behind the token: "/api/state"
@@ -48,12 +48,12 @@ struct Setup {
   std::string model_name;                   // likewise
   std::filesystem::path folder;             // where models, reports and blocks are saved
   estimation::PipelineOptions pipeline;
-  std::string drive;        // --drive; empty: none
-  Rig rig;                  // for closed loops; none known: the present model
-  closed_loop::Runner run;  // of closed loops; empty: there are none
-  // What outlives a worker process: its jobs, a folder for dropped files and tabs, how those before it ended. Without
-  // these all of it ends with the Api.
-  JobBoard* board = nullptr;
+  std::string drive;           // --drive; empty: none
+  SimulatedPlant plant_setup;  // for closed loops; none known: the present model
+  closed_loop::Runner run;     // of closed loops; empty: there are none
+  // Data that outlive a worker process: its jobs, a folder for dropped files and tabs, the failures of earlier workers.
+  // Without these all of it ends with the Api.
+  JobTable* jobs = nullptr;
   JobLimits limits;
   std::filesystem::path scratch;
   std::vector<Failure> failures;
@@ -87,9 +87,9 @@ class Api {
   std::string content(const Session& session, const std::string& what) const;
   std::shared_ptr<Session> session_of(const Request& request);
   std::shared_ptr<Session> open_tab(const std::string& like);
-  void keep();
-  void go_on();
-  void refuse_again(const std::string& key) const;
+  void store_all_tabs();
+  void restore_tabs();
+  void refuse_deadly_job(const std::string& key) const;
 
   Setup setup_;
   std::filesystem::path dropped_;  // folder of dropped files; ends with the workbench

@@ -1,4 +1,4 @@
-// Recordings that come to the page: those of the data that are open, and those to begin with.
+// Recordings that are dropped on the page: additions to the open data, and those of a new project.
 #include <fmt/format.h>
 
 #include <algorithm>
@@ -8,8 +8,8 @@
 #include <nlohmann/json.hpp>
 #include <utility>
 
+#include "host/workbench/access_control.hpp"
 #include "host/workbench/api.hpp"
-#include "host/workbench/gate.hpp"
 #include "host/workbench/work.hpp"
 
 namespace flexspline::workbench {
@@ -19,7 +19,7 @@ using nlohmann::json;
 namespace fs = std::filesystem;
 
 constexpr std::size_t kMostFiles = 200;
-// What is read, and what is refused with the line that converts it.
+// Accepts files that can be read; refuses others with the command that converts them.
 constexpr std::string_view kEndings[] = {".csv",  ".tsv",     ".txt",  ".dat",  ".asc", ".log", ".gz",
                                          ".mat",  ".h5",      ".hdf5", ".npz",  ".npy", ".bag", ".db3",
                                          ".mcap", ".parquet", ".mf4",  ".tdms", ".xlsx"};
@@ -29,10 +29,10 @@ std::string ending_of_recording(const std::string& name) {
   std::string lower = ending;
   for (char& c : lower) c = static_cast<char>(std::tolower(static_cast<unsigned char>(c)));
   if (std::ranges::find(kEndings, lower) == std::end(kEndings))
-    throw AskedError(
-        fmt::format("{} is no recording; drop CSV, MAT, HDF5, NumPy, bag or MCAP files. A dataset.toml names files by "
-                    "their place: start the workbench with it",
-                    name));
+    throw UnknownNameError(fmt::format(
+        "{} is not a recording; drop CSV, MAT, HDF5, NumPy, bag or MCAP files. A dataset.toml names files by "
+        "their place: start the workbench with it",
+        name));
   return ending;
 }
 
@@ -42,7 +42,7 @@ std::vector<fs::path> write(const fs::path& folder, const std::vector<Upload>& f
     const fs::path path = inside(folder, file.name, ending_of_recording(file.name));
     std::ofstream out(path, std::ios::binary);
     out.write(file.content.data(), static_cast<std::streamsize>(file.content.size()));
-    if (!out.flush()) throw std::runtime_error("the files cannot be kept: is the disk full?");
+    if (!out.flush()) throw std::runtime_error("the files could not be stored: is the disk full?");
     written.push_back(path);
   }
   return written;
@@ -50,11 +50,11 @@ std::vector<fs::path> write(const fs::path& folder, const std::vector<Upload>& f
 
 // The folder of the recordings that a tab's proposal is about; nothing where there are none.
 std::optional<fs::path> proposed(const Session& session) {
-  const auto kept = session.kept("recordings");
-  return kept && kept->is_string() ? std::optional(fs::path(kept->get<std::string>())) : std::nullopt;
+  const auto stored = session.stored("recordings");
+  return stored && stored->is_string() ? std::optional(fs::path(stored->get<std::string>())) : std::nullopt;
 }
 
-// Columns have names that are not ours, or there are none that we know: there is something to choose.
+// The user has to choose columns where names are unknown.
 bool is_foreign(const json& proposal) {
   bool has_time = false, is_ours = true;
   for (const json& column : proposal.at("columns")) {
@@ -101,13 +101,13 @@ std::vector<fs::path> Api::recordings_for(const fs::path& folder) const {
 void Api::start_proposal(const std::shared_ptr<Session>& session, const Choices& choices) {
   const std::optional<fs::path> folder = proposed(*session);
   if (!setup_.projects.propose || (!folder && setup_.data.empty()))
-    throw AskedError("there are no recordings to begin with; drop some");
+    throw UnknownNameError("there are no recordings to begin with; drop some");
   session->start("Reading the recordings",
-                 [this, choices, folder = folder.value_or(""), session = session.get()](const Progress& say) {
-                   say("");
+                 [this, choices, folder = folder.value_or(""), session = session.get()](const Progress& progress) {
+                   progress("");
                    json proposal = setup_.projects.propose(recordings_for(folder), choices);
                    proposal["adds"] = session->has_model();
-                   say("");
+                   progress("");
                    session->set("proposal", std::move(proposal));
                  });
 }
@@ -115,34 +115,36 @@ void Api::start_proposal(const std::shared_ptr<Session>& session, const Choices&
 void Api::start_project(const std::shared_ptr<Session>& session, const Choices& choices) {
   const std::optional<fs::path> folder = proposed(*session);
   if (!setup_.projects.make || (!folder && setup_.data.empty()))
-    throw AskedError("there are no recordings to begin with; drop some");
+    throw UnknownNameError("there are no recordings to begin with; drop some");
   const bool adds = session->has_model();
   session->start(adds ? "Adding the recordings" : "Identifying a first model",
-                 [this, choices, adds, folder, session = session.get()](const Progress& say) {
-                   say("reading the recordings");
+                 [this, choices, adds, folder, session = session.get()](const Progress& progress) {
+                   progress("reading the recordings");
                    const std::vector<fs::path> files = recordings_for(folder.value_or(""));
                    const fs::path place = folder ? *folder : new_folder();
                    const Project project = setup_.projects.make(files, choices, place);
                    std::shared_ptr<Step> step;
                    if (adds) {
-                     step = with_files(*session->history().current(), place, choices.tolerate, setup_.pipeline, say);
+                     step =
+                         with_files(*session->history().current(), place, choices.tolerate, setup_.pipeline, progress);
                      session->change([&](auto& history) { history.take(step); });
                    } else {
-                     step = first_of(project, place, setup_.pipeline, say);
+                     step = first_of(project, place, setup_.pipeline, progress);
                      step->tolerated = choices.tolerate;
                      step->data_name = names_of(files);
                      session->change([&](auto& history) { history = History<std::shared_ptr<Step>>(step); });
                    }
-                   session->keep("recordings", nullptr);
-                   keep();
+                   session->store("recordings", nullptr);
+                   store_all_tabs();
                  });
 }
 
 void Api::start_drop(const std::shared_ptr<Session>& session, const std::vector<Upload>& files) {
-  if (files.empty()) throw AskedError("no file came");
-  if (files.size() > kMostFiles) throw AskedError(fmt::format("at most {} files at a time", kMostFiles));
+  if (files.empty()) throw UnknownNameError("no file came");
+  if (files.size() > kMostFiles) throw UnknownNameError(fmt::format("at most {} files at a time", kMostFiles));
   for (const Upload& file : files) {
-    if (file.name.find('\0') != std::string::npos) throw AskedError("the name of a file holds a byte that is no text");
+    if (file.name.find('\0') != std::string::npos)
+      throw UnknownNameError("the name of a file holds a byte that is not text");
     ending_of_recording(file.name);
   }
   if (session->works()) throw BusyError("something is still running; wait, or cancel it");
@@ -154,26 +156,26 @@ void Api::start_drop(const std::shared_ptr<Session>& session, const std::vector<
   const std::string what = fmt::format("Reading {} file{}", files.size(), files.size() == 1 ? "" : "s");
   const auto propose = [this, folder, session = session.get()](const Choices& choices) {
     return setup_.projects.propose ? setup_.projects.propose(recordings_for(folder), choices)
-                                   : throw AskedError("there is no model yet");
+                                   : throw UnknownNameError("there is no model yet");
   };
-  session->start(what, [this, adds, folder, written, propose, session = session.get()](const Progress& say) {
+  session->start(what, [this, adds, folder, written, propose, session = session.get()](const Progress& progress) {
     json proposal;
     if (adds) {
       const std::shared_ptr<Step> now = session->history().current();
       try {
-        const std::shared_ptr<Step> next = with_files(*now, folder, {}, setup_.pipeline, say);
+        const std::shared_ptr<Step> next = with_files(*now, folder, {}, setup_.pipeline, progress);
         session->change([&](auto& history) { history.take(next); });
-        return keep();
+        return store_all_tabs();
       } catch (const data::DataError&) {
         try {
           if (setup_.projects.propose) proposal = propose(like(now->model.drive));
         } catch (const std::runtime_error&) {
-          // What was wrong at first says more.
+          // The first error is more useful.
         }
         if (proposal.is_null() || !is_foreign(proposal)) throw;
       }
     } else {
-      say("");
+      progress("");
       try {
         proposal = propose({});
       } catch (...) {
@@ -182,8 +184,8 @@ void Api::start_drop(const std::shared_ptr<Session>& session, const std::vector<
       }
     }
     proposal["adds"] = adds;
-    say("");
-    session->keep("recordings", folder.string());
+    progress("");
+    session->store("recordings", folder.string());
     session->set("proposal", std::move(proposal));
   });
 }

@@ -1,4 +1,4 @@
-// Steps that can be taken back and taken again.
+// Steps with undo and redo.
 #pragma once
 
 #include <cstddef>
@@ -7,8 +7,7 @@
 
 namespace flexspline::workbench {
 
-// A list of steps with a place in it; never empty. What stands behind the place can be taken again until a new step
-// takes another way from there.
+// A list of steps with a present one; never empty. Later steps can be redone until a new step replaces them.
 template <class Step>
 class History {
  public:
@@ -24,7 +23,7 @@ class History {
     steps_.push_back(std::move(step));
     ++at_;
   }
-  // Whether there was a step to take back, or to take again.
+  // False where there is no step to undo, or to redo.
   bool undo() {
     if (at_ == 0) return false;
     --at_;

@@ -23,8 +23,8 @@ using protocol::Channel;
 using Clock = std::chrono::steady_clock;
 
 constexpr double kRateHz = 25.0;
-constexpr std::size_t kKept = 1500;  // a minute
-// Nobody looks any more.
+constexpr std::size_t kStoredSamples = 1500;  // a minute
+// No page reads it any more.
 constexpr auto kIdle = std::chrono::seconds(10);
 constexpr auto kSilence = std::chrono::seconds(5);
 
@@ -54,13 +54,13 @@ json comparison_json(const drive::Bytes& before, const drive::Bytes& after) {
           {"changes", changes_json(drive::changes(before, after))}};
 }
 
-// A drive or a model may have changed while its user looked at the preview.
-void require_shown(const std::optional<Shown>& shown, const drive::Bytes& before, const drive::Bytes& after) {
+// A drive or a model may have changed while its user read the preview.
+void require_shown(const std::optional<PreviewedBlocks>& shown, const drive::Bytes& before, const drive::Bytes& after) {
   if (shown && (drive::view_of(before).sha256 != shown->before || drive::view_of(after).sha256 != shown->after))
-    throw drive::DriveError("the block on the drive or the model is another than in the preview; look at it again");
+    throw drive::DriveError("the block on the drive or the model is not the one of the preview; preview it again");
 }
 
-// Fast and slower sines, and a shaft that creeps to and fro, so that the map has all velocities in it for long enough.
+// Fast and slower sines and a slow triangle, so that all velocity bins of the map are filled for long enough.
 planning::Plan motion_of(const drive::Scales& scales) {
   const double limit =
       std::ldexp(scales.header.limits.velocity.raw, -fixed::kValueBits) * scales.constants.velocity_base;
@@ -81,10 +81,10 @@ planning::Plan motion_of(const drive::Scales& scales) {
   return plan;
 }
 
-// Lets requests pass before the listener, which takes the lock again and again.
-class Turn {
+// Gives requests priority over the listener, which takes the lock repeatedly.
+class PriorityLock {
  public:
-  Turn(std::mutex& mutex, std::atomic<int>& waiting) : waiting_(waiting) {
+  PriorityLock(std::mutex& mutex, std::atomic<int>& waiting) : waiting_(waiting) {
     ++waiting_;
     lock_ = std::unique_lock(mutex);
     --waiting_;
@@ -97,7 +97,8 @@ class Turn {
 
 }  // namespace
 
-LiveDrive::LiveDrive(std::string drive, Reaching reaching) : given_(std::move(drive)), reaching_(std::move(reaching)) {
+LiveDrive::LiveDrive(std::string drive, ConnectionOptions reaching)
+    : given_(std::move(drive)), connection_(std::move(reaching)) {
   listener_ = std::thread([this] { listen(); });
 }
 
@@ -120,24 +121,24 @@ void LiveDrive::forget(const std::string& why) {
   session_.reset();
   scales_.reset();
   active_.clear();
-  again_.reset();
+  reconnection_.reset();
   subscribed_ = came_back_ = false;
   problem_ = why;
 }
 
-// The drive is gone and nobody wanted that.
+// The drive is gone without a request of the user.
 void LiveDrive::lose(const std::string& why) {
   if (!session_) return;
-  // One that does not stay is not tried as often.
-  pause_ = Clock::now() - back_ < reaching_.most ? std::min(2 * pause_, reaching_.most) : reaching_.first;
-  Again again{drive_, session_->serial(), 0, "", Clock::now() + pause_};
+  // A link that is lost again soon is tried less often.
+  pause_ = Clock::now() - back_ < connection_.most ? std::min(2 * pause_, connection_.most) : connection_.first;
+  Reconnection reconnection{drive_, session_->serial(), 0, "", Clock::now() + pause_};
   forget(why);
-  again_ = std::move(again);
+  reconnection_ = std::move(reconnection);
 }
 
-// What a drive is asked for; that it is gone is seen here, also while nobody looks at its signals.
+// Runs a request to the drive; a lost link is noticed here, also while no page reads its signals.
 template <class Act>
-auto LiveDrive::seeing_losses(const Act& act) {
+auto LiveDrive::noticing_losses(const Act& act) {
   try {
     return act();
   } catch (const transport::LinkError& gone) {
@@ -151,51 +152,51 @@ void LiveDrive::try_again() {
   std::uint64_t wish = 0;
   {
     const std::lock_guard lock(mutex_);
-    if (!again_ || Clock::now() < again_->next) return;
-    drive = again_->drive;
+    if (!reconnection_ || Clock::now() < reconnection_->next) return;
+    drive = reconnection_->drive;
     wish = wishes_;
   }
-  // Others go on while it is opened: that may take seconds.
+  // The lock is free while it is opened, which may take seconds.
   std::unique_ptr<drive::Session> session;
   std::string why;
   try {
-    session = std::make_unique<drive::Session>(reaching_.open(drive));
+    session = std::make_unique<drive::Session>(connection_.open(drive));
   } catch (const std::exception& error) {
     why = error.what();
   }
-  const Turn turn(mutex_, waiting_);
-  if (!again_ || wish != wishes_) return;
-  if (session && session->serial() != again_->serial)
-    return forget(fmt::format("{} was lost; at {} there is another drive now, {}: connect it if you want that one",
-                              again_->serial, drive, session->serial()));
+  const PriorityLock turn(mutex_, waiting_);
+  if (!reconnection_ || wish != wishes_) return;
+  if (session && session->serial() != reconnection_->serial)
+    return forget(fmt::format("{} was lost; at {} there is another drive now, {}: connect it if it is the right one",
+                              reconnection_->serial, drive, session->serial()));
   if (session) {
-    const Again before = *again_;
+    const Reconnection before = *reconnection_;
     const std::string lost = problem_;
     try {
       session_ = std::move(session);
       read_block();
-      again_.reset();
+      reconnection_.reset();
       problem_.clear();
       came_back_ = true;
       back_ = Clock::now();
       return;
     } catch (const std::exception& error) {
       forget(lost);
-      again_ = before;
+      reconnection_ = before;
       why = error.what();
     }
   }
-  ++again_->attempts;
-  again_->why = why;
-  pause_ = std::min(2 * pause_, reaching_.most);
-  again_->next = Clock::now() + pause_;
+  ++reconnection_->attempts;
+  reconnection_->why = why;
+  pause_ = std::min(2 * pause_, connection_.most);
+  reconnection_->next = Clock::now() + pause_;
 }
 
 void LiveDrive::connect(const std::string& drive) {
   const auto reach = in_reach();
   if (std::none_of(reach.begin(), reach.end(), [&](const json& d) { return d["drive"] == drive; }))
     throw drive::DriveError(fmt::format("\"{}\" is not in reach; start the workbench with --drive {}", drive, drive));
-  const Turn turn(mutex_, waiting_);
+  const PriorityLock turn(mutex_, waiting_);
   if (away_) require();
   ++wishes_;
   forget("");
@@ -203,7 +204,7 @@ void LiveDrive::connect(const std::string& drive) {
   // A socket is a twin's (host/transport/link.hpp).
   simulated_ = drive == "twin" || drive.starts_with("tcp:");
   try {
-    session_ = std::make_unique<drive::Session>(reaching_.open(drive));
+    session_ = std::make_unique<drive::Session>(connection_.open(drive));
     read_block();
   } catch (const std::exception& error) {
     forget(error.what());
@@ -212,7 +213,7 @@ void LiveDrive::connect(const std::string& drive) {
 }
 
 void LiveDrive::disconnect() {
-  const Turn turn(mutex_, waiting_);
+  const PriorityLock turn(mutex_, waiting_);
   if (away_) require();
   ++wishes_;
   forget("");
@@ -231,14 +232,16 @@ json LiveDrive::in_reach() const {
 }
 
 json LiveDrive::status() const {
-  const Turn turn(mutex_, waiting_);
-  return away_ ? *away_ : told();
+  const PriorityLock turn(mutex_, waiting_);
+  return away_ ? *away_ : drive_status();
 }
 
-json LiveDrive::told() const {
+json LiveDrive::drive_status() const {
   json answer{{"given", given_}, {"connected", session_ != nullptr}, {"problem", problem_},     {"block", nullptr},
               {"moving", false}, {"simulated", simulated_},          {"came_back", came_back_}, {"again", nullptr}};
-  if (again_) answer["again"] = {{"drive", again_->drive}, {"attempts", again_->attempts}, {"why", again_->why}};
+  if (reconnection_)
+    answer["again"] = {
+        {"drive", reconnection_->drive}, {"attempts", reconnection_->attempts}, {"why", reconnection_->why}};
   if (session_) {
     answer["name"] = session_->name();
     answer["serial"] = session_->serial();
@@ -248,11 +251,11 @@ json LiveDrive::told() const {
   return answer;
 }
 
-json LiveDrive::preview_flash(const model::Model& model, const std::function<void(std::string_view)>& say) {
-  const Turn turn(mutex_, waiting_);
+json LiveDrive::preview_flash(const model::Model& model, const std::function<void(std::string_view)>& progress) {
+  const PriorityLock turn(mutex_, waiting_);
   require();
-  return seeing_losses([&]() -> json {
-    say("proving the block and comparing it with double");
+  return noticing_losses([&]() -> json {
+    progress("proving the block and comparing it with double");
     read_block();
     const drive::ModelBlock made = drive::model_block(*session_, active_, model);
     json preview = comparison_json(active_, made.bytes);
@@ -263,9 +266,9 @@ json LiveDrive::preview_flash(const model::Model& model, const std::function<voi
 }
 
 json LiveDrive::preview_restore() {
-  const Turn turn(mutex_, waiting_);
+  const PriorityLock turn(mutex_, waiting_);
   require();
-  return seeing_losses([&]() -> json {
+  return noticing_losses([&]() -> json {
     read_block();
     const drive::Bytes previous = session_->read_block(protocol::Which::previous);
     if (previous.empty()) session_->fail("it has no block before the active one");
@@ -276,20 +279,21 @@ json LiveDrive::preview_restore() {
   });
 }
 
-json LiveDrive::flash(const model::Model& model, const std::function<void(std::string_view)>& say,
-                      const std::optional<Shown>& shown) {
-  const Turn turn(mutex_, waiting_);
+json LiveDrive::flash(const model::Model& model, const std::function<void(std::string_view)>& progress,
+                      const std::optional<PreviewedBlocks>& shown) {
+  const PriorityLock turn(mutex_, waiting_);
   require();
-  return seeing_losses([&]() -> json {
-    say("proving the block and comparing it with double");
+  return noticing_losses([&]() -> json {
+    progress("proving the block and comparing it with double");
     read_block();
     const drive::ModelBlock made = drive::model_block(*session_, active_, model);
     require_shown(shown, active_, made.bytes);
     json answer = comparison_json(active_, made.bytes);
     const bool is_new = made.bytes != active_;
     if (is_new)
-      session_->write_block(
-          made.bytes, [&](std::size_t sent) { say(fmt::format("flashing: {} of {} bytes", sent, made.bytes.size())); });
+      session_->write_block(made.bytes, [&](std::size_t sent) {
+        progress(fmt::format("flashing: {} of {} bytes", sent, made.bytes.size()));
+      });
     read_block();
     subscribed_ = came_back_ = false;
     answer.update({{"warnings", made.warnings}, {"flashed", is_new}, {"drive", session_->serial()}});
@@ -297,10 +301,10 @@ json LiveDrive::flash(const model::Model& model, const std::function<void(std::s
   });
 }
 
-json LiveDrive::restore(const std::optional<Shown>& shown) {
-  const Turn turn(mutex_, waiting_);
+json LiveDrive::restore(const std::optional<PreviewedBlocks>& shown) {
+  const PriorityLock turn(mutex_, waiting_);
   require();
-  return seeing_losses([&]() -> json {
+  return noticing_losses([&]() -> json {
     const drive::BlockView before = drive::view_of(active_);
     if (shown) {
       read_block();
@@ -314,11 +318,11 @@ json LiveDrive::restore(const std::optional<Shown>& shown) {
 }
 
 json LiveDrive::residual_map() {
-  const Turn turn(mutex_, waiting_);
+  const PriorityLock turn(mutex_, waiting_);
   try {
     require();
     if (!scales_) throw drive::DriveError("the drive has no block, so nothing to compare its torque with; flash one");
-    return seeing_losses([&]() -> json {
+    return noticing_losses([&]() -> json {
       const bool started = drive::start_residual_map(*session_);
       const drive::ResidualMap map = drive::read_residual_map(*session_, *scales_);
       const double limit_nm = drive::usual_map_limit_nm(*scales_);
@@ -333,9 +337,9 @@ json LiveDrive::residual_map() {
 }
 
 void LiveDrive::reset_residual_map() {
-  const Turn turn(mutex_, waiting_);
+  const PriorityLock turn(mutex_, waiting_);
   require();
-  seeing_losses([&] { drive::reset_residual_map(*session_); });
+  noticing_losses([&] { drive::reset_residual_map(*session_); });
 }
 
 // A recording has fewer signals than the page shows; the others stay empty while it moves.
@@ -346,7 +350,7 @@ void LiveDrive::show(const drive::Recording& so_far, double after_s) {
   const double now_s = so_far.time_s.back();
   const double velocity = (so_far.motor_position_rad[n - 1] - so_far.motor_position_rad[n - 1 - kSpan]) /
                           (now_s - so_far.time_s[n - 1 - kSpan]);
-  const Turn turn(mutex_, waiting_);
+  const PriorityLock turn(mutex_, waiting_);
   if (!samples_.empty() && after_s + now_s < samples_.back().time_s + 1.0 / kRateHz) return;
   Sample s{after_s + now_s, {}};
   for (const Channel c : kChannels)
@@ -356,14 +360,14 @@ void LiveDrive::show(const drive::Recording& so_far, double after_s) {
                                                : std::numeric_limits<double>::quiet_NaN());
   samples_.push_back(std::move(s));
   ++count_;
-  if (samples_.size() > kKept) samples_.pop_front();
+  if (samples_.size() > kStoredSamples) samples_.pop_front();
 }
 
-void LiveDrive::move(const std::function<void(std::string_view)>& say) {
+void LiveDrive::move(const std::function<void(std::string_view)>& progress) {
   std::unique_ptr<drive::Session> session;
   drive::Scales scales;
   {
-    const Turn turn(mutex_, waiting_);
+    const PriorityLock turn(mutex_, waiting_);
     require();
     if (!simulated_)
       throw drive::DriveError(
@@ -372,7 +376,7 @@ void LiveDrive::move(const std::function<void(std::string_view)>& say) {
     if (!scales_) throw drive::DriveError("the drive has no block, so it cannot move; flash one");
     drive::start_residual_map(*session_);
     scales = *scales_;
-    away_ = std::make_unique<json>(told());
+    away_ = std::make_unique<json>(drive_status());
     (*away_)["moving"] = true;
     session = std::move(session_);
     subscribed_ = false;
@@ -383,15 +387,16 @@ void LiveDrive::move(const std::function<void(std::string_view)>& say) {
   try {
     const planning::Plan plan = motion_of(scales);
     drive::Recorder recorder(*session, scales, plan, true);
-    recorder.clear_fault();  // nothing is in a simulated drive's way
+    recorder.clear_fault();  // a simulated drive has no obstacles
     double after_s = 0.0;
     for (const planning::Run& run : plan.runs) {
-      // The link's own errors aside, it is at rest when it comes back.
+      // It is at rest when this returns, except for errors of the link.
       const drive::Recording made = recorder.record(
-          run, {.stops = [] { return false; },
-                .progress =
-                    [&](double time_s) { say(fmt::format("{}: {:.1f} of {:g} s", run.name, time_s, run.duration_s)); },
-                .seen = [&](const drive::Recording& so_far) { show(so_far, after_s); }});
+          run,
+          {.stops = [] { return false; },
+           .progress =
+               [&](double time_s) { progress(fmt::format("{}: {:.1f} of {:g} s", run.name, time_s, run.duration_s)); },
+           .seen = [&](const drive::Recording& so_far) { show(so_far, after_s); }});
       after_s += made.time_s.empty() ? 0.0 : made.time_s.back();
       if (!made.complete) throw drive::DriveError(fmt::format("the motion ended early: {}", made.ended));
     }
@@ -400,7 +405,7 @@ void LiveDrive::move(const std::function<void(std::string_view)>& say) {
     session->stop();
   }
   {
-    const Turn turn(mutex_, waiting_);
+    const PriorityLock turn(mutex_, waiting_);
     session_ = std::move(session);
     away_.reset();
     try {
@@ -413,7 +418,7 @@ void LiveDrive::move(const std::function<void(std::string_view)>& say) {
 }
 
 json LiveDrive::live(std::uint64_t since) {
-  const Turn turn(mutex_, waiting_);
+  const PriorityLock turn(mutex_, waiting_);
   asked_ = Clock::now();
   json channels = json::array(), samples = json::array();
   for (const Channel c : kChannels)
@@ -428,7 +433,7 @@ json LiveDrive::live(std::uint64_t since) {
   return {{"connected", session_ != nullptr || away_ != nullptr},
           {"has_block", scales_.has_value()},
           {"problem", problem_},
-          {"attempts", again_ ? again_->attempts : 0},
+          {"attempts", reconnection_ ? reconnection_->attempts : 0},
           {"channels", std::move(channels)},
           {"rate_hz", kRateHz},
           {"next", count_},
@@ -451,14 +456,14 @@ void LiveDrive::listen() {
         subscribed_ = true;
         samples_.clear();
         first_tick_ = 0;
-        heard_ = Clock::now();
+        last_read_ = Clock::now();
       } else if (lock.owns_lock() && session_ && subscribed_ && !wanted) {
         session_->subscribe({}, 1);
         subscribed_ = false;
       }
       if (wanted) {
         const auto message = session_->next(drive::Milliseconds(20));
-        if (message) heard_ = Clock::now();
+        if (message) last_read_ = Clock::now();
         const double every = std::clamp(std::round(session_->identity().tick_hz / kRateHz), 1.0, 65535.0);
         if (message && message->is_unasked())
           protocol::for_each_frame(
@@ -472,9 +477,9 @@ void LiveDrive::listen() {
                   s.values.push_back(scales_->value(kChannels[k], words[k + 1]));
                 samples_.push_back(std::move(s));
                 ++count_;
-                if (samples_.size() > kKept) samples_.pop_front();
+                if (samples_.size() > kStoredSamples) samples_.pop_front();
               });
-        if (Clock::now() - heard_ > kSilence)
+        if (Clock::now() - last_read_ > kSilence)
           session_->fail("the drive went silent; check cable and power, then connect it again");
       }
     } catch (const std::exception& error) {

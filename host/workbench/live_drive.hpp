@@ -20,23 +20,23 @@
 
 namespace flexspline::workbench {
 
-// How a way to a drive is opened, and how often one that was lost is tried again: the pause doubles each time.
-struct Reaching {
+// How a link to a drive is opened, and how often a lost one is tried again: the pause doubles each time.
+struct ConnectionOptions {
   std::function<std::unique_ptr<transport::Link>(const std::string&)> open = transport::open_link;
   std::chrono::milliseconds first{1000}, most{10000};
 };
 
 // The blocks of a preview, by their SHA-256; empty: none.
-struct Shown {
+struct PreviewedBlocks {
   std::string before, after;
 };
 
 // A drive that is lost (cable, power, a twin that ended) is connected again when it comes back, if it is the same one.
-// That alone: nothing that changes a drive is ever done a second time.
+// Nothing that changes a drive is repeated.
 class LiveDrive {
  public:
   // `drive` as --drive names it; empty: none was given.
-  explicit LiveDrive(std::string drive, Reaching reaching = {});
+  explicit LiveDrive(std::string drive, ConnectionOptions reaching = {});
   ~LiveDrive();
   LiveDrive(const LiveDrive&) = delete;
   LiveDrive& operator=(const LiveDrive&) = delete;
@@ -52,21 +52,22 @@ class LiveDrive {
   // Drives in reach: [{"drive", "what", "usable", "problem"}]; a twin always.
   nlohmann::json in_reach() const;
 
-  // {"before", "after", "changes", "warnings", "restores"}: what the next two would do. Changes nothing.
-  nlohmann::json preview_flash(const model::Model& model, const std::function<void(std::string_view)>& say);
+  // {"before", "after", "changes", "warnings", "restores"}: the effect of the next two functions. Changes nothing.
+  nlohmann::json preview_flash(const model::Model& model, const std::function<void(std::string_view)>& progress);
   nlohmann::json preview_restore();
-  // {"before", "after", "changes", "warnings", "flashed"} as `flexspline flash` says it. Throws as it does, and
+  // {"before", "after", "changes", "warnings", "flashed"} as `flexspline flash` reports it. Throws as it does, and
   // DriveError where the blocks are not those that were shown.
-  nlohmann::json flash(const model::Model& model, const std::function<void(std::string_view)>& say,
-                       const std::optional<Shown>& shown = std::nullopt);
-  nlohmann::json restore(const std::optional<Shown>& shown = std::nullopt);
+  nlohmann::json flash(const model::Model& model, const std::function<void(std::string_view)>& progress,
+                       const std::optional<PreviewedBlocks>& shown = std::nullopt);
+  nlohmann::json restore(const std::optional<PreviewedBlocks>& shown = std::nullopt);
 
-  // What `monitor --residual-map` says, and "started": it counts only from now; {"problem"} where there is none.
+  // The answer of `monitor --residual-map`, and "started": it counts only from now; {"problem"} where there is none.
   nlohmann::json residual_map();
   void reset_residual_map();
-  // Moves a simulated drive to and fro with its model fed forward, so that its map fills and its signals are seen.
-  // Others are moved by a person, with `flexspline record`. Throws DriveError, and what `say` throws, at rest.
-  void move(const std::function<void(std::string_view)>& say);
+  // Moves a simulated drive back and forth with feedforward of its model, so that its map fills and its signals are
+  // visible. Others are moved by a person, with `flexspline record`. Throws DriveError, and what `progress` throws, at
+  // rest.
+  void move(const std::function<void(std::string_view)>& progress);
 
   // {"channels": [{"name", "unit"}], "attempts": of a drive that was lost, "rate_hz", "next", "mode", "samples":
   // [[time_s, value, ...]]} from number `since` on; the first call begins to listen. Nothing is armed.
@@ -80,32 +81,33 @@ class LiveDrive {
   void lose(const std::string& why);
   void try_again();
   template <class Act>
-  auto seeing_losses(const Act& act);
+  auto noticing_losses(const Act& act);
   void show(const drive::Recording& so_far, double after_s);
-  nlohmann::json told() const;
+  nlohmann::json drive_status() const;
 
-  struct Again {
+  struct Reconnection {
     std::string drive, serial;
     int attempts = 0;
-    std::string why;  // it did not work the last time
+    std::string why;  // reason of the last failure
     std::chrono::steady_clock::time_point next;
   };
 
   const std::string given_;
-  const Reaching reaching_;
+  const ConnectionOptions connection_;
   mutable std::mutex mutex_;             // of all below
-  mutable std::atomic<int> waiting_{0};  // requests that the listener lets pass first
+  mutable std::atomic<int> waiting_{0};  // waiting requests, which have priority over the listener
   std::unique_ptr<drive::Session> session_;
   std::optional<drive::Scales> scales_;
   drive::Bytes active_;
   std::string problem_;
-  std::string drive_;           // as it was named when it was connected
-  std::optional<Again> again_;  // while a drive that was lost is tried
-  std::uint64_t wishes_ = 0;    // how often a person connected or disconnected: an attempt that is on its way gives way
+  std::string drive_;                         // as it was named when it was connected
+  std::optional<Reconnection> reconnection_;  // while a drive that was lost is tried
+  std::uint64_t wishes_ =
+      0;  // number of connections and disconnections by the user: a pending attempt is dropped where it changed
   bool came_back_ = false;
-  std::chrono::steady_clock::time_point back_;  // when it did
+  std::chrono::steady_clock::time_point back_;  // when it was connected again
   std::chrono::milliseconds pause_{0};          // before the next attempt
-  std::unique_ptr<nlohmann::json> away_;        // what status() says while a motion has the session; else null
+  std::unique_ptr<nlohmann::json> away_;        // the answer of status() while a motion has the session; else null
   bool simulated_ = false;
   struct Sample {
     double time_s = 0.0;
@@ -116,7 +118,7 @@ class LiveDrive {
   std::uint32_t first_tick_ = 0;
   bool subscribed_ = false;
   std::string mode_;
-  std::chrono::steady_clock::time_point heard_, asked_;
+  std::chrono::steady_clock::time_point last_read_, asked_;
   std::atomic<bool> ends_{false};
   std::thread listener_;
 };

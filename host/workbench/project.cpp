@@ -5,7 +5,7 @@
 #include <cmath>
 #include <nlohmann/json.hpp>
 
-#include "host/workbench/look.hpp"
+#include "host/workbench/result_view.hpp"
 
 namespace flexspline::workbench {
 namespace {
@@ -14,16 +14,16 @@ using nlohmann::json;
 
 std::string text(const json& asked, const char* key) {
   if (!asked.contains(key) || asked[key].is_null()) return {};
-  if (!asked[key].is_string()) throw AskedError(fmt::format("{} is no text", key));
+  if (!asked[key].is_string()) throw UnknownNameError(fmt::format("{} is not a text", key));
   return asked[key].get<std::string>();
 }
 
 std::vector<std::string> texts(const json& asked, const char* key) {
   std::vector<std::string> all;
   if (!asked.contains(key) || asked[key].is_null()) return all;
-  if (!asked[key].is_array()) throw AskedError(fmt::format("{} is no list", key));
+  if (!asked[key].is_array()) throw UnknownNameError(fmt::format("{} is not a list", key));
   for (const json& one : asked[key]) {
-    if (!one.is_string()) throw AskedError(fmt::format("{} holds something that is no text", key));
+    if (!one.is_string()) throw UnknownNameError(fmt::format("{} holds something that is not a text", key));
     all.push_back(one.get<std::string>());
   }
   return all;
@@ -32,7 +32,7 @@ std::vector<std::string> texts(const json& asked, const char* key) {
 std::optional<double> positive(const json& asked, const char* key) {
   if (!asked.contains(key) || asked[key].is_null()) return std::nullopt;
   if (!asked[key].is_number() || !(asked[key].get<double>() > 0.0))
-    throw AskedError(fmt::format("{} has to be a number above zero", key));
+    throw UnknownNameError(fmt::format("{} has to be a number above zero", key));
   return asked[key].get<double>();
 }
 
@@ -40,7 +40,7 @@ std::optional<int> whole(const json& asked, const char* key, int least) {
   if (!asked.contains(key) || asked[key].is_null()) return std::nullopt;
   const double value = asked[key].is_number() ? asked[key].get<double>() : -1.0;
   if (value != std::floor(value) || value < least || value > 1e4)
-    throw AskedError(fmt::format("{} has to be a whole number from {} on", key, least));
+    throw UnknownNameError(fmt::format("{} has to be a whole number from {} on", key, least));
   return static_cast<int>(value);
 }
 
@@ -50,7 +50,7 @@ Choices choices_of(const json& asked) {
   Choices choices;
   if (!asked.contains("choices")) return choices;
   const json& given = asked["choices"];
-  if (!given.is_object()) throw AskedError("choices are no object");
+  if (!given.is_object()) throw UnknownNameError("choices are no object");
   choices.map = texts(given, "map");
   choices.without = texts(given, "without");
   choices.turned = texts(given, "turned");
@@ -58,9 +58,9 @@ Choices choices_of(const json& asked) {
   choices.axis = text(given, "axis");
   choices.position_side = text(given, "position_side");
   if (!choices.axis.empty() && choices.axis != "rotary" && choices.axis != "linear")
-    throw AskedError("axis is rotary or linear");
+    throw UnknownNameError("axis is rotary or linear");
   if (!choices.position_side.empty() && choices.position_side != "link" && choices.position_side != "motor")
-    throw AskedError("position_side is link or motor");
+    throw UnknownNameError("position_side is link or motor");
   choices.joint = whole(given, "joint", 0);
   choices.pole_pairs = whole(given, "pole_pairs", 1);
   choices.gear_ratio = positive(given, "gear_ratio");

@@ -1,5 +1,4 @@
-// From recordings to a first step: what `flexspline new` does, with pictures. The functions are those of the command,
-// and are given by it.
+// From recordings to a first step, as `flexspline new`. The command passes its functions.
 #pragma once
 
 #include <filesystem>
@@ -14,7 +13,7 @@
 
 namespace flexspline::workbench {
 
-// What the user decided; all else is guessed.
+// Choices of the user; everything else is guessed.
 struct Choices {
   std::vector<std::string> map;      // OURS=THEIRS[:UNIT]
   std::vector<std::string> without;  // columns of theirs that are not used
@@ -25,20 +24,20 @@ struct Choices {
   std::vector<std::string> tolerate;
 };
 
-// From "choices" of a request. Throws AskedError where a value is none of its kind.
+// From "choices" of a request. Throws UnknownNameError where a value has the wrong type.
 Choices choices_of(const nlohmann::json& asked);
 
 struct Project {
   std::shared_ptr<const data::Dataset> dataset;
   std::string model_text;    // of a first model, without values
-  std::string dataset_text;  // of a dataset.toml to be kept beside the recordings
+  std::string dataset_text;  // of a dataset.toml to be kept in the folder of the recordings
 };
 
 struct Projects {
   // "flexspline-proposal/1": which column is taken for which, with a preview of the signals, and what is open
-  // (README.md). Throws what reading throws where the files are no recordings.
+  // (README.md). Throws the errors of reading where the files are not recordings.
   std::function<nlohmann::json(const std::vector<std::filesystem::path>& files, const Choices& choices)> propose;
-  // Writes dataset.toml into `folder`. Throws what `flexspline new` says where it cannot finish.
+  // Writes dataset.toml into `folder`. Throws the message of `flexspline new` where it cannot finish.
   std::function<Project(const std::vector<std::filesystem::path>& files, const Choices& choices,
                         const std::filesystem::path& folder)>
       make;

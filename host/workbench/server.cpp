@@ -9,8 +9,8 @@
 #include <nlohmann/json.hpp>
 #include <thread>
 
+#include "host/workbench/access_control.hpp"
 #include "host/workbench/assets.hpp"
-#include "host/workbench/gate.hpp"
 #include "host/workbench/supervisor.hpp"
 
 namespace flexspline::workbench {
@@ -21,7 +21,7 @@ constexpr const char* kAddress = "127.0.0.1";
 constexpr std::size_t kThreads = 32;
 constexpr std::size_t kLargestBody = 1'000'000'000;
 
-// Nothing from elsewhere, nothing inline, in no frame; plots set their sizes by style attributes of their own.
+// Nothing from other hosts, nothing inline, in no frame; plots set their sizes by style attributes of their own.
 constexpr const char* kPolicy =
     "default-src 'none'; script-src 'self'; style-src 'self'; img-src 'self' data:; connect-src 'self'; "
     "base-uri 'none'; form-action 'none'; frame-ancestors 'none'";
@@ -41,8 +41,8 @@ Request request_of(const httplib::Request& http) {
   return request;
 }
 
-// As it is: what httplib has whole it compresses as small as can be, which takes longer than all else that an answer
-// does, and nothing of it has to go through a network. `owner` keeps the content.
+// Unchanged: httplib compresses complete bodies at its highest level, which takes longer than all other work for an
+// answer does, and nothing of it has to go through a network. `owner` keeps the content.
 void put(httplib::Response& response, std::string_view content, const std::string& type,
          std::shared_ptr<const void> owner = nullptr) {
   if (content.empty()) return response.set_content("", type);
@@ -68,7 +68,7 @@ bool send_asset(const std::string& path, httplib::Response& response) {
 struct Scratch {
   Scratch() {
     std::string name = (std::filesystem::temp_directory_path() / "flexspline-workbench-XXXXXX").string();
-    if (!mkdtemp(name.data())) throw std::runtime_error(fmt::format("no folder can be made at {}", name));
+    if (!mkdtemp(name.data())) throw std::runtime_error(fmt::format("no folder could be created at {}", name));
     path = name;
   }
   ~Scratch() {
@@ -113,14 +113,14 @@ void answer_until(httplib::Server& server, const Setup& setup, const std::functi
 
 }  // namespace
 
-void serve(Setup setup, const Serving& serving) {
+void serve(Setup setup, const ServerOptions& serving) {
   httplib::Server server;
   server.new_task_queue = [] { return new httplib::ThreadPool(kThreads); };
   server.set_payload_max_length(kLargestBody);
   server.set_default_headers(kHeaders);
   server.set_tcp_nodelay(true);
   server.set_keep_alive_max_count(1000);
-  server.set_keep_alive_timeout(2);  // a connection that is kept holds up the end
+  server.set_keep_alive_timeout(2);  // an open connection delays the end
   const std::string token = new_token();
   const int port = serving.port > 0 ? (server.bind_to_port(kAddress, serving.port) ? serving.port : -1)
                                     : server.bind_to_any_port(kAddress);
@@ -128,15 +128,15 @@ void serve(Setup setup, const Serving& serving) {
     throw std::runtime_error(
         fmt::format("port {} of this machine is taken; give another --port, or none", serving.port));
   const Scratch scratch;
-  JobBoard board;
+  JobTable jobs;
   setup.scratch = scratch.path;
-  setup.board = &board;
+  setup.jobs = &jobs;
   serving.listening(fmt::format("http://{}:{}/{}/", kAddress, port, token));
   const auto work = [&](const std::vector<Failure>& failures) {
     setup.failures = failures;
     answer_until(server, setup, serving.ends, token, port);
   };
-  supervise(board, {.work = work, .ends = serving.ends});
+  supervise(jobs, {.work = work, .ends = serving.ends});
 }
 
 }  // namespace flexspline::workbench

@@ -8,15 +8,15 @@
 
 namespace flexspline::workbench {
 
-struct Serving {
-  int port = 0;  // nought: any that is free
+struct ServerOptions {
+  int port = 0;  // zero: any that is free
   // Called once it listens, with the address to open; the token is in it.
   std::function<void(const std::string& address)> listening;
-  // Asked a few times a second; serving ends where it is true.
+  // Called a few times a second; the server ends where it is true.
   std::function<bool()> ends;
 };
 
-// Serves on 127.0.0.1 until told to end. Throws std::runtime_error where the port cannot be had.
-void serve(Setup setup, const Serving& serving);
+// Serves on 127.0.0.1 until `ends` is true. Throws std::runtime_error where the port is not free.
+void serve(Setup setup, const ServerOptions& serving);
 
 }  // namespace flexspline::workbench

@@ -51,7 +51,7 @@ json state_of(const History<std::shared_ptr<Step>>& history) {
   answer["model_name"] = now.model.name;
   answer["steps"] = std::move(steps);
   answer["at"] = history.at();
-  answer["parameters"] = now.look()->parameters();
+  answer["parameters"] = now.view()->parameters();
   answer["diagnosis"] = found ? diagnosis_json(*found) : json(nullptr);
   json before = json::array();
   if (history.at() > 0)
@@ -93,14 +93,14 @@ json problem_json(const std::string& during, const std::exception_ptr& error) {
 Step::Step() = default;
 Step::~Step() = default;
 
-std::shared_ptr<Look> Step::look() const {
+std::shared_ptr<ResultView> Step::view() const {
   const std::lock_guard lock(mutex_);
-  if (!look_) look_ = std::make_shared<Look>(dataset, model, pipeline, estimates);
-  return look_;
+  if (!view_) view_ = std::make_shared<ResultView>(dataset, model, pipeline, estimates);
+  return view_;
 }
-void Step::forget_look() const {
+void Step::discard_view() const {
   const std::lock_guard lock(mutex_);
-  look_.reset();
+  view_.reset();
 }
 
 std::shared_ptr<const selection::Diagnosis> Step::diagnosed() const {
@@ -133,9 +133,9 @@ void Step::diagnose(const std::function<selection::Diagnosis()>& search, const s
   if (failure) std::rethrow_exception(failure);
 }
 
-Session::Session(std::string id, std::shared_ptr<Step> first, JobBoard* board, JobLimits limits)
+Session::Session(std::string id, std::shared_ptr<Step> first, JobTable* jobs, JobLimits limits)
     : id_(std::move(id)),
-      board_(board),
+      jobs_(jobs),
       limits_(limits),
       history_(std::move(first)),
       parts_(std::make_unique<json>(json::object())) {}
@@ -166,7 +166,7 @@ void Session::join() {
 
 void Session::changed() {
   ++changes_;
-  told_.notify_all();
+  changed_.notify_all();
 }
 
 History<std::shared_ptr<Step>> Session::history() const {
@@ -182,9 +182,9 @@ bool Session::has_model() const {
 void Session::change(const std::function<void(History<std::shared_ptr<Step>>&)>& change) {
   const std::lock_guard lock(mutex_);
   change(history_);
-  // The one before stands beside the present one; others are seldom looked at.
+  // The previous step is shown for comparison with the present one; others are rarely shown.
   for (std::size_t k = 0; k < history_.size(); ++k)
-    if (history_[k] && (k > history_.at() || k + 1 < history_.at())) history_[k]->forget_look();
+    if (history_[k] && (k > history_.at() || k + 1 < history_.at())) history_[k]->discard_view();
   parts_->erase("pack");
   parts_->erase("proposal");
   parts_->erase("flash_preview");
@@ -208,15 +208,15 @@ void Session::set(const std::string& part, json value) {
   changed();
 }
 
-void Session::keep(const std::string& part, json value) {
-  auto kept = std::make_shared<const json>(std::move(value));
+void Session::store(const std::string& part, json value) {
+  auto stored = std::make_shared<const json>(std::move(value));
   const std::lock_guard lock(mutex_);
-  kept_[part] = std::move(kept);
+  stored_[part] = std::move(stored);
 }
-std::shared_ptr<const json> Session::kept(const std::string& part) const {
+std::shared_ptr<const json> Session::stored(const std::string& part) const {
   const std::lock_guard lock(mutex_);
-  const auto found = kept_.find(part);
-  return found == kept_.end() ? nullptr : found->second;
+  const auto found = stored_.find(part);
+  return found == stored_.end() ? nullptr : found->second;
 }
 
 void Session::set_problem(const std::string& during, const std::exception_ptr& error) {
@@ -244,7 +244,7 @@ void Session::start(const std::string& what, std::function<void(const Progress&)
   if (!by_itself) parts_->erase("problem");
   changed();
   work->thread = std::thread([this, work, run = std::move(run), key] {
-    const Progress say = [&](std::string_view stage) {
+    const Progress progress = [&](std::string_view stage) {
       const std::lock_guard inner(mutex_);
       if (work->cancelled) throw Cancelled{};
       work->stage = stage;
@@ -254,15 +254,15 @@ void Session::start(const std::string& what, std::function<void(const Progress&)
     const estimation::CancellationCheck ask = [&work = *work] {
       if (work.cancelled) throw Cancelled{};
     };
-    const estimation::CancellationScope may_give_up(&ask);
-    JobBoard::Entry entry(board_, {id_, work->what, key, true}, limits_.work, &ask);
+    const estimation::CancellationScope scope(&ask);
+    JobTable::Entry entry(jobs_, {id_, work->what, key, true}, limits_.work, &ask);
     {
       const std::lock_guard inner(mutex_);
       work->entry = &entry;
       if (work->cancelled) entry.hurry(limits_.cancelled);
     }
     try {
-      run(say);
+      run(progress);
     } catch (const Cancelled&) {
     } catch (...) {
       error = std::current_exception();
@@ -296,7 +296,7 @@ bool Session::works() const {
 
 std::uint64_t Session::wait(std::uint64_t seen, std::chrono::milliseconds limit) const {
   std::unique_lock lock(mutex_);
-  told_.wait_for(lock, limit, [&] { return changes_ > seen; });
+  changed_.wait_for(lock, limit, [&] { return changes_ > seen; });
   return changes_;
 }
 

@@ -16,16 +16,16 @@
 
 #include "host/selection/diagnosis.hpp"
 #include "host/workbench/history.hpp"
-#include "host/workbench/jobs.hpp"
-#include "host/workbench/look.hpp"
+#include "host/workbench/job_table.hpp"
+#include "host/workbench/result_view.hpp"
 
 namespace flexspline::workbench {
 
-// A model with its data. All but what is found later is fixed once it is made.
+// A model with its data. Constant, except for results that are found later.
 struct Step {
   std::string id;               // of its own
   std::filesystem::path files;  // folder of the files that came with it; empty: none
-  // What a first step was made of where the workbench began without a model: a folder with a dataset.toml.
+  // The folder with a dataset.toml of a first step, where the workbench started without a model.
   std::filesystem::path project;
   std::string data_name, dataset_text;
   std::vector<std::string> tolerated;  // findings in `files` or `project` that the user accepts
@@ -37,35 +37,34 @@ struct Step {
   std::vector<estimation::Estimate> estimates;
   std::vector<std::string> warnings;
   estimation::PipelineOptions pipeline;          // with the records of `dataset`
-  std::unique_ptr<const nlohmann::json> errors;  // Look::errors()
+  std::unique_ptr<const nlohmann::json> errors;  // ResultView::errors()
 
   Step();
   ~Step();
-  // A look takes much memory: it is made again where it was forgotten.
-  std::shared_ptr<Look> look() const;
-  void forget_look() const;
+  // A result view takes much memory: it is computed again where it was discarded.
+  std::shared_ptr<ResultView> view() const;
+  void discard_view() const;
   // Null while it is not known.
   std::shared_ptr<const selection::Diagnosis> diagnosed() const;
-  // Found once for all tabs that have this step: who comes while another one searches waits for what that finds, and
-  // searches itself where that one gave up. `wait` is called again and again meanwhile; what it throws ends the
-  // waiting.
+  // Found once for all tabs that have this step: a second caller waits for the result of the first, and searches itself
+  // where the first was cancelled. `wait` is called repeatedly meanwhile; an exception from it ends the waiting.
   void diagnose(const std::function<selection::Diagnosis()>& search, const std::function<void()>& wait);
 
  private:
   mutable std::mutex mutex_;
   std::condition_variable searched_;
   bool searching_ = false;
-  mutable std::shared_ptr<Look> look_;
+  mutable std::shared_ptr<ResultView> view_;
   std::shared_ptr<const selection::Diagnosis> diagnosis_;
 };
 
-// Thrown out of work that was cancelled; nobody is told.
+// Thrown out of work that was cancelled; it is not reported.
 struct Cancelled {};
 
-// What work says of itself; every call may throw Cancelled.
+// Progress of work; every call may throw Cancelled.
 using Progress = std::function<void(std::string_view)>;
 
-// Asked for while something else runs.
+// A request while other work runs.
 class BusyError : public std::runtime_error {
  public:
   using std::runtime_error::runtime_error;
@@ -73,9 +72,9 @@ class BusyError : public std::runtime_error {
 
 class Session {
  public:
-  // `board`: where its work is written down; null: nowhere.
+  // `jobs`: where its work is registered; null: it is not registered.
   // `first` is null while there is no model yet.
-  Session(std::string id, std::shared_ptr<Step> first, JobBoard* board = nullptr, JobLimits limits = {});
+  Session(std::string id, std::shared_ptr<Step> first, JobTable* jobs = nullptr, JobLimits limits = {});
   ~Session();
   Session(const Session&) = delete;
   Session& operator=(const Session&) = delete;
@@ -87,16 +86,16 @@ class Session {
 
   // Whether there is a model with data; without one its history holds a null alone.
   bool has_model() const;
-  // Of the history; `change` is told to those who wait.
+  // Of the history; those who wait are notified of `change`.
   History<std::shared_ptr<Step>> history() const;
   void change(const std::function<void(History<std::shared_ptr<Step>>&)>& change);
 
-  // Runs `work` beside the server. What it throws becomes the session's problem. Throws BusyError while other work
-  // runs. The problem before is forgotten, unless the work begins by itself: then nobody may have read it yet. `key`
-  // is equal for two pieces of work that compute the same.
+  // Runs `work` in a thread of its own. An exception from it becomes the session's problem. Throws BusyError while
+  // other work runs. The problem before is forgotten, unless the work begins by itself: then nobody may have read it
+  // yet. `key` is equal for two pieces of work that compute the same.
   void start(const std::string& what, std::function<void(const Progress&)> work, bool by_itself = false,
              const std::string& key = {});
-  // Work ends at its next word to Progress, fits at their next set of columns; what it makes is thrown away.
+  // Work ends at its next call of Progress, fits at their next set of columns; the result is discarded.
   void cancel();
   bool works() const;
   // Waits until all work that was started has ended, also what was cancelled.
@@ -104,15 +103,15 @@ class Session {
 
   // A part of the answer that changes with work: "pack", "flash", "saved", "closed_loop". Null takes it away.
   void set(const std::string& part, nlohmann::json value);
-  // What is too large to be told with each change: the page asks for it. Null where there is none.
-  void keep(const std::string& part, nlohmann::json value);
-  std::shared_ptr<const nlohmann::json> kept(const std::string& part) const;
+  // A part that is too large to be sent with each change: the page requests it. Null where there is none.
+  void store(const std::string& part, nlohmann::json value);
+  std::shared_ptr<const nlohmann::json> stored(const std::string& part) const;
   void set_problem(const std::string& during, const std::exception_ptr& error);
   void set_problem(const std::string& during, const std::string& what);
 
   // Number of changes so far. Waits until there are more than `seen`, at most so long.
   std::uint64_t wait(std::uint64_t seen, std::chrono::milliseconds limit) const;
-  // All that the page shows beside curves and maps; README.md says what is in it.
+  // All that the page shows except curves and maps; README.md says what is in it.
   nlohmann::json state() const;
 
  private:
@@ -122,22 +121,22 @@ class Session {
     std::chrono::steady_clock::time_point began;
     std::thread thread;
     std::atomic<bool> done{false};
-    JobBoard::Entry* entry = nullptr;  // while it runs
+    JobTable::Entry* entry = nullptr;  // while it runs
   };
   void changed();
 
   const std::string id_;
-  JobBoard* const board_;
+  JobTable* const jobs_;
   const JobLimits limits_;
   mutable std::mutex mutex_;
-  mutable std::condition_variable told_;
+  mutable std::condition_variable changed_;
   std::uint64_t changes_ = 1;
   std::uint64_t works_started_ = 0;
   History<std::shared_ptr<Step>> history_;
   std::shared_ptr<Work> work_;                // running; else null
   std::vector<std::shared_ptr<Work>> ended_;  // with threads still to be joined
   std::unique_ptr<nlohmann::json> parts_;
-  std::map<std::string, std::shared_ptr<const nlohmann::json>> kept_;
+  std::map<std::string, std::shared_ptr<const nlohmann::json>> stored_;
 };
 
 // {"what", "findings": [{"file", "line", "column", "what", "remedy"}]} of an error.

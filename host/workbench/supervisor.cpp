@@ -21,7 +21,7 @@ using Clock = std::chrono::steady_clock;
 constexpr auto kPause = std::chrono::milliseconds(50);
 // To end drives, twins and files in order.
 constexpr auto kTimeToEnd = std::chrono::seconds(10);
-// A worker that ends sooner has not come to work.
+// A worker that ends sooner counts as failed at its start.
 constexpr auto kBeginning = std::chrono::seconds(2);
 constexpr int kMostAtBeginning = 5;
 
@@ -32,7 +32,7 @@ std::uint64_t data_bytes() {
   return 0;
 }
 
-// Of what the process writes to, not of addresses: threads reserve many addresses that they never use.
+// The limit is on written memory, not on addresses: threads reserve many addresses that they never use.
 void limit_memory(std::uint64_t bytes) {
   const auto machine =
       static_cast<std::uint64_t>(sysconf(_SC_PHYS_PAGES)) * static_cast<std::uint64_t>(sysconf(_SC_PAGESIZE));
@@ -43,14 +43,14 @@ void limit_memory(std::uint64_t bytes) {
   setrlimit(RLIMIT_DATA, &limit);
 }
 
-[[noreturn]] void be_worker(JobBoard& board, const Supervised& supervised, const std::vector<Failure>& failures,
+[[noreturn]] void be_worker(JobTable& jobs, const SupervisorOptions& supervised, const std::vector<Failure>& failures,
                             pid_t parent) {
   prctl(PR_SET_PDEATHSIG, SIGTERM);
   if (getppid() != parent) _exit(0);  // it ended before
   limit_memory(supervised.memory_bytes);
   int code = 0;
   try {
-    board.watch();
+    jobs.watch();
     supervised.work(failures);
   } catch (const std::exception& error) {
     fmt::print(stderr, "flexspline: {}\n", error.what());
@@ -60,7 +60,7 @@ void limit_memory(std::uint64_t bytes) {
   _exit(code);
 }
 
-std::string why_of(int status, const JobBoard::Left& left) {
+std::string why_of(int status, const JobTable::UnfinishedJobs& left) {
   if (left.is_overtime) return fmt::format("it did not end within {} s", left.seconds);
   if (WIFSIGNALED(status) && WTERMSIG(status) == SIGKILL)
     return "it was ended from outside (signal 9), as systems do where memory runs out";
@@ -79,21 +79,21 @@ void end(pid_t worker) {
 
 }  // namespace
 
-void supervise(JobBoard& board, const Supervised& supervised) {
+void supervise(JobTable& jobs, const SupervisorOptions& supervised) {
   std::vector<Failure> failures;
   for (int at_beginning = 0;;) {
     const auto began = Clock::now();
-    std::fflush(nullptr);  // else both write what is still to be written
+    std::fflush(nullptr);  // else both processes write the buffered output
     const pid_t parent = getpid();
     const pid_t worker = fork();
-    if (worker < 0) throw std::runtime_error("no process can be made for the workbench's work");
-    if (worker == 0) be_worker(board, supervised, failures, parent);
+    if (worker < 0) throw std::runtime_error("no process could be started for the workbench's work");
+    if (worker == 0) be_worker(jobs, supervised, failures, parent);
     int status = 0;
     for (; waitpid(worker, &status, WNOHANG) != worker; std::this_thread::sleep_for(kPause))
       if (supervised.ends()) return end(worker);
     if (supervised.ends()) return;
-    JobBoard::Left left = board.take();
-    failures.push_back({why_of(status, left), std::move(left.jobs), left.culprit_is_known});
+    JobTable::UnfinishedJobs left = jobs.take();
+    failures.push_back({why_of(status, left), std::move(left.jobs), left.cause_is_known});
     at_beginning = Clock::now() - began < kBeginning && failures.back().jobs.empty() ? at_beginning + 1 : 0;
     if (at_beginning == kMostAtBeginning)
       throw std::runtime_error(

@@ -17,7 +17,7 @@ std::vector<data::Segment> clipped(const std::vector<data::Segment>& segments, s
     auto last = std::upper_bound(begin, end, to_s);
     if (first != begin) --first;
     if (last != end) ++last;
-    // A window beside the segment finds one neighbour of it, which is outside.
+    // A window outside of the segment finds one neighbour of it, which is outside.
     if (last - first < 2 && (first == end || *first < from_s || *first > to_s)) continue;
     parts.push_back(
         {static_cast<std::size_t>(first - time_s.begin()), static_cast<std::size_t>(last - time_s.begin())});
@@ -39,7 +39,7 @@ nlohmann::json window(const std::vector<data::Segment>& segments, std::span<cons
   return answer;
 }
 
-std::vector<std::pair<double, double>> stretches(std::span<const double> times, double join_s) {
+std::vector<std::pair<double, double>> intervals(std::span<const double> times, double join_s) {
   std::vector<std::pair<double, double>> list;
   for (const double t : times) {
     if (!list.empty() && t - list.back().second <= join_s)

@@ -6,19 +6,19 @@
 #include <cmath>
 #include <nlohmann/json.hpp>
 
-#include "host/catalogue/defined.hpp"
+#include "host/catalogue/user_defined_effect.hpp"
 #include "host/comparison/compare.hpp"
 #include "host/output/json.hpp"
 #include "host/report/page.hpp"
 #include "host/selection/add.hpp"
-#include "host/workbench/gate.hpp"
+#include "host/workbench/access_control.hpp"
 
 namespace flexspline::workbench {
 namespace {
 
 using nlohmann::json;
 
-// What only the data set knows of the drive stays there: the file keeps what its author wrote.
+// Facts of the drive that only the data set has are not written into the model file.
 std::string rewritten(const std::string& text, const model::Model& changed) {
   const model::ModelFile file = model::parse(text, "the model", catalogue::known_effects());
   model::Model stored = changed;
@@ -29,8 +29,8 @@ std::string rewritten(const std::string& text, const model::Model& changed) {
 std::shared_ptr<Step> made(std::string action, std::string what, std::shared_ptr<const data::Dataset> dataset,
                            const model::Model& model, const std::string& text_before,
                            std::vector<estimation::Estimate> estimates, std::vector<std::string> warnings,
-                           const estimation::PipelineOptions& pipeline, const Progress& say) {
-  say("comparing with the measurement");
+                           const estimation::PipelineOptions& pipeline, const Progress& progress) {
+  progress("comparing with the measurement");
   auto step = std::make_shared<Step>();
   step->id = new_token();
   step->action = std::move(action);
@@ -41,8 +41,8 @@ std::shared_ptr<Step> made(std::string action, std::string what, std::shared_ptr
   step->estimates = std::move(estimates);
   step->warnings = std::move(warnings);
   step->pipeline = pipeline;
-  step->errors = std::make_unique<const json>(step->look()->errors());
-  say("");  // a last chance to cancel
+  step->errors = std::make_unique<const json>(step->view()->errors());
+  progress("");  // a last chance to cancel
   return step;
 }
 
@@ -53,17 +53,18 @@ bool has_values(const model::Model& model) {
 
 // The records of a data set, made once for all its steps: a fit, a comparison and a search begin with them.
 estimation::PipelineOptions with_records(const std::shared_ptr<const data::Dataset>& dataset, const model::Model& model,
-                                         estimation::PipelineOptions pipeline, const Progress& say) {
-  struct Kept {
+                                         estimation::PipelineOptions pipeline, const Progress& progress) {
+  struct StoredCurves {
     std::shared_ptr<const data::Dataset> dataset;  // records point into it
-    estimation::Prepared records;
+    estimation::PreparedData records;
   };
-  say("filtering the measurements");
-  std::vector<std::string> said_by_the_fit;
+  progress("filtering the measurements");
+  std::vector<std::string> warned_by_fit;
   pipeline.ready = nullptr;
-  const model::Drive drive = estimation::reconcile(model.drive, *dataset, said_by_the_fit);
-  const auto kept = std::make_shared<const Kept>(Kept{dataset, estimation::prepare_all(*dataset, drive, pipeline)});
-  pipeline.ready = {kept, &kept->records};
+  const model::Drive drive = estimation::reconcile(model.drive, *dataset, warned_by_fit);
+  const auto stored =
+      std::make_shared<const StoredCurves>(StoredCurves{dataset, estimation::prepare_all(*dataset, drive, pipeline)});
+  pipeline.ready = {stored, &stored->records};
   return pipeline;
 }
 
@@ -75,18 +76,18 @@ estimation::PipelineOptions as_before(const Step& before, estimation::PipelineOp
 
 std::shared_ptr<Step> identified(std::string action, std::string what, std::shared_ptr<const data::Dataset> dataset,
                                  const model::Model& model, const std::string& text,
-                                 const estimation::PipelineOptions& pipeline, const Progress& say) {
-  say("identifying the model");
+                                 const estimation::PipelineOptions& pipeline, const Progress& progress) {
+  progress("identifying the model");
   const auto found = estimation::identify(*dataset, model, pipeline);
   return made(std::move(action), std::move(what), std::move(dataset), found->model, text, found->estimates,
-              found->warnings, pipeline, say);
+              found->warnings, pipeline, progress);
 }
 
 std::shared_ptr<Step> of_change(std::string action, const std::string& what, const Step& before,
                                 const selection::Addition& change, const estimation::PipelineOptions& pipeline,
-                                const Progress& say) {
+                                const Progress& progress) {
   return made(std::move(action), what, before.dataset, change.model, before.model_text, change.estimates,
-              change.warnings, pipeline, say);
+              change.warnings, pipeline, progress);
 }
 
 void require_same(const std::optional<double>& ours, const std::optional<double>& theirs, const char* name) {
@@ -97,7 +98,7 @@ void require_same(const std::optional<double>& ours, const std::optional<double>
           "drop measurements of the same drive"}});
 }
 
-// What dropped files are read by: a dataset.toml that was made for them, else each as it is, whatever its ending.
+// How dropped files are read: by a dataset.toml for them, else each by its own format.
 std::vector<std::filesystem::path> recordings_of(const std::filesystem::path& folder) {
   if (std::filesystem::exists(folder / "dataset.toml")) return {folder / "dataset.toml"};
   std::vector<std::filesystem::path> files;
@@ -135,73 +136,76 @@ std::pair<std::shared_ptr<const data::Dataset>, std::string> joined(const data::
 }  // namespace
 
 std::shared_ptr<Step> open(std::shared_ptr<const data::Dataset> dataset, const model::ModelFile& file,
-                           const estimation::PipelineOptions& pipeline, const Progress& say) {
-  const estimation::PipelineOptions own = with_records(dataset, file.model, pipeline, say);
-  if (!has_values(file.model)) return identified("open", "", dataset, file.model, file.text, own, say);
-  return made("open", "", std::move(dataset), file.model, file.text, {}, {}, own, say);
+                           const estimation::PipelineOptions& pipeline, const Progress& progress) {
+  const estimation::PipelineOptions own = with_records(dataset, file.model, pipeline, progress);
+  if (!has_values(file.model)) return identified("open", "", dataset, file.model, file.text, own, progress);
+  return made("open", "", std::move(dataset), file.model, file.text, {}, {}, own, progress);
 }
 
 std::shared_ptr<Step> with_effect(const Step& before, const std::string& effect,
-                                  const estimation::PipelineOptions& pipeline, const Progress& say) {
-  say(fmt::format("adding {} and refitting", effect));
+                                  const estimation::PipelineOptions& pipeline, const Progress& progress) {
+  progress(fmt::format("adding {} and refitting", effect));
   const estimation::PipelineOptions own = as_before(before, pipeline);
-  return of_change("add", effect, before, selection::add(*before.dataset, before.model, effect, own), own, say);
+  return of_change("add", effect, before, selection::add(*before.dataset, before.model, effect, own), own, progress);
 }
 
 std::shared_ptr<Step> without_effect(const Step& before, const std::string& id,
-                                     const estimation::PipelineOptions& pipeline, const Progress& say) {
-  say(fmt::format("taking {} out and refitting", id));
+                                     const estimation::PipelineOptions& pipeline, const Progress& progress) {
+  progress(fmt::format("taking {} out and refitting", id));
   const estimation::PipelineOptions own = as_before(before, pipeline);
-  return of_change("remove", id, before, selection::remove(*before.dataset, before.model, id, own), own, say);
+  return of_change("remove", id, before, selection::remove(*before.dataset, before.model, id, own), own, progress);
 }
 
-std::shared_ptr<Step> refitted(const Step& before, const estimation::PipelineOptions& pipeline, const Progress& say) {
-  return identified("identify", "", before.dataset, before.model, before.model_text, as_before(before, pipeline), say);
+std::shared_ptr<Step> refitted(const Step& before, const estimation::PipelineOptions& pipeline,
+                               const Progress& progress) {
+  return identified("identify", "", before.dataset, before.model, before.model_text, as_before(before, pipeline),
+                    progress);
 }
 
 std::shared_ptr<Step> with_files(const Step& before, const std::filesystem::path& folder,
                                  const std::vector<std::string>& tolerated, const estimation::PipelineOptions& pipeline,
-                                 const Progress& say) {
-  say("reading the files");
+                                 const Progress& progress) {
+  progress("reading the files");
   const auto [all, names] = joined(*before.dataset, folder, tolerated);
   auto step = identified("data", names, all, before.model, before.model_text,
-                         with_records(all, before.model, pipeline, say), say);
+                         with_records(all, before.model, pipeline, progress), progress);
   step->files = folder;
   step->tolerated = tolerated;
   return step;
 }
 
 std::shared_ptr<Step> first_of(const Project& project, const std::filesystem::path& folder,
-                               const estimation::PipelineOptions& pipeline, const Progress& say) {
+                               const estimation::PipelineOptions& pipeline, const Progress& progress) {
   const model::ModelFile file = model::parse(project.model_text, "the first model", catalogue::known_effects());
-  auto step = open(project.dataset, file, pipeline, say);
+  auto step = open(project.dataset, file, pipeline, progress);
   step->project = folder;
   step->dataset_text = project.dataset_text;
   return step;
 }
 
-std::shared_ptr<Step> made_again(const KeptStep& kept, const Step* before,
-                                 const estimation::PipelineOptions& pipeline) {
-  const Progress say = [](std::string_view) {};
-  const model::Model model = model::parse(kept.model_text, "the model", catalogue::known_effects()).model;
+std::shared_ptr<Step> restored_step(const StoredStep& stored, const Step* before,
+                                    const estimation::PipelineOptions& pipeline) {
+  const Progress progress = [](std::string_view) {};
+  const model::Model model = model::parse(stored.model_text, "the model", catalogue::known_effects()).model;
   std::shared_ptr<const data::Dataset> dataset;
   estimation::PipelineOptions own = pipeline;
-  if (before == nullptr || !kept.files.empty()) {
+  if (before == nullptr || !stored.files.empty()) {
     dataset = before == nullptr ? std::make_shared<const data::Dataset>(
-                                      data::load({kept.project / "dataset.toml"}, {kept.tolerated, false}))
-                                : joined(*before->dataset, kept.files, kept.tolerated).first;
-    own = with_records(dataset, model, pipeline, say);
+                                      data::load({stored.project / "dataset.toml"}, {stored.tolerated, false}))
+                                : joined(*before->dataset, stored.files, stored.tolerated).first;
+    own = with_records(dataset, model, pipeline, progress);
   } else {
     dataset = before->dataset;
     own = as_before(*before, pipeline);
   }
-  auto step = made(kept.action, kept.what, dataset, model, kept.model_text, kept.estimates, kept.warnings, own, say);
-  step->id = kept.id;
-  step->files = kept.files;
-  step->project = kept.project;
-  step->data_name = kept.data_name;
-  step->dataset_text = kept.dataset_text;
-  step->tolerated = kept.tolerated;
+  auto step = made(stored.action, stored.what, dataset, model, stored.model_text, stored.estimates, stored.warnings,
+                   own, progress);
+  step->id = stored.id;
+  step->files = stored.files;
+  step->project = stored.project;
+  step->data_name = stored.data_name;
+  step->dataset_text = stored.dataset_text;
+  step->tolerated = stored.tolerated;
   return step;
 }
 

@@ -1,4 +1,4 @@
-// What the page can have done: steps of a model, files of it, blocks for a drive. The same functions as the commands.
+// The work of the page: steps of a model, its files, blocks for a drive. The same functions as the commands.
 #pragma once
 
 #include <filesystem>
@@ -12,27 +12,28 @@
 
 namespace flexspline::workbench {
 
-// The first step: the model as its file has it where it has all values, else identified. `text` is the file's.
+// The first step: the model of the file where it has all values, else identified. `text` is the file's.
 std::shared_ptr<Step> open(std::shared_ptr<const data::Dataset> dataset, const model::ModelFile& file,
-                           const estimation::PipelineOptions& pipeline, const Progress& say);
+                           const estimation::PipelineOptions& pipeline, const Progress& progress);
 
 // Steps from `before`; each throws what the function of the command throws.
 std::shared_ptr<Step> with_effect(const Step& before, const std::string& effect,
-                                  const estimation::PipelineOptions& pipeline, const Progress& say);
+                                  const estimation::PipelineOptions& pipeline, const Progress& progress);
 std::shared_ptr<Step> without_effect(const Step& before, const std::string& id,
-                                     const estimation::PipelineOptions& pipeline, const Progress& say);
-std::shared_ptr<Step> refitted(const Step& before, const estimation::PipelineOptions& pipeline, const Progress& say);
+                                     const estimation::PipelineOptions& pipeline, const Progress& progress);
+std::shared_ptr<Step> refitted(const Step& before, const estimation::PipelineOptions& pipeline,
+                               const Progress& progress);
 // `folder` holds nothing but the new files, maybe with a dataset.toml. They join the data; the model is identified
-// anew.
+// again.
 std::shared_ptr<Step> with_files(const Step& before, const std::filesystem::path& folder,
                                  const std::vector<std::string>& tolerated, const estimation::PipelineOptions& pipeline,
-                                 const Progress& say);
+                                 const Progress& progress);
 // The first step of a project whose dataset.toml is in `folder`.
 std::shared_ptr<Step> first_of(const Project& project, const std::filesystem::path& folder,
-                               const estimation::PipelineOptions& pipeline, const Progress& say);
+                               const estimation::PipelineOptions& pipeline, const Progress& progress);
 
-// A step that was there before, from what was kept of it; `before` is the one before it.
-struct KeptStep {
+// A step of an earlier worker process, from its stored form; `before` is the one before it.
+struct StoredStep {
   std::string id, action, what, model_text;
   std::filesystem::path files, project;
   std::string data_name, dataset_text;
@@ -41,7 +42,8 @@ struct KeptStep {
   std::vector<std::string> warnings;
 };
 // `before` is null for the first step of a project.
-std::shared_ptr<Step> made_again(const KeptStep& kept, const Step* before, const estimation::PipelineOptions& pipeline);
+std::shared_ptr<Step> restored_step(const StoredStep& stored, const Step* before,
+                                    const estimation::PipelineOptions& pipeline);
 
 // A model as it is written into files.
 std::string model_file(const Step& step);

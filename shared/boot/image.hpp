@@ -1,5 +1,5 @@
-// A firmware image: a header of 512 bytes, then what the processor runs. README.md has the layout. Whoever makes an
-// image, sends it, stores it or starts it reads it by these functions.
+// A firmware image: a header of 512 bytes, then the program. README.md has the layout. All code that makes, sends,
+// stores or starts an image uses these functions.
 #pragma once
 
 #include <array>
@@ -13,14 +13,14 @@
 
 namespace flexspline::boot {
 
-// As long as a Cortex-M wants its vectors aligned: they begin right behind it.
+// The alignment that a Cortex-M needs for its vectors, which begin directly after it.
 inline constexpr std::size_t kHeaderBytes = 512;
 inline constexpr std::uint32_t kImageMagic = 0x4D495846;  // "FXIM"
 inline constexpr std::uint16_t kImageFormat = 1;
-inline constexpr std::size_t kBoardBytes = 16;  // its name, with at least one nought behind it
+inline constexpr std::size_t kBoardBytes = 16;  // its name, followed by at least one zero
 inline constexpr std::size_t kSignatureBytes = 64;
 
-// As a drive tells its hosts.
+// As a drive reports it to hosts.
 struct Version {
   std::uint8_t major = 0;
   std::uint8_t minor = 0;
@@ -28,11 +28,11 @@ struct Version {
 };
 
 struct ImageHeader {
-  std::uint32_t bytes = 0;  // behind the header
+  std::uint32_t bytes = 0;  // after the header
   std::uint32_t crc = 0;    // CRC-32 of these
   std::array<std::uint8_t, kBoardBytes> board{};
   Version version{};
-  // Room: nothing signs or checks yet. Kind nought: none.
+  // Reserved: signatures are not implemented. Kind zero: none.
   std::uint32_t signature_kind = 0;
   std::array<std::uint8_t, kSignatureBytes> signature{};
 
@@ -46,16 +46,16 @@ struct ImageHeader {
 
 enum class ImageFinding : std::uint8_t {
   none,
-  no_image,        // it does not begin as one
-  unknown_format,  // of a newer tool
+  no_image,        // it does not begin with the magic number
+  unknown_format,  // made by a newer tool
   damaged_header,
   incomplete,  // shorter than its header says
   too_long,    // longer than that, or than the slot
-  damaged,     // the checksum is another one
+  damaged,     // the checksum differs
   wrong_board,
 };
 
-// What is cut off counts as none: a name is at most fifteen letters.
+// A longer name is not accepted: it has at most fifteen letters.
 constexpr std::array<std::uint8_t, kBoardBytes> board_bytes(std::string_view name) {
   std::array<std::uint8_t, kBoardBytes> bytes{};
   for (std::size_t i = 0; i + 1 < kBoardBytes && i < name.size(); ++i) bytes[i] = static_cast<std::uint8_t>(name[i]);
@@ -81,7 +81,7 @@ constexpr void write_header(std::span<std::uint8_t, kHeaderBytes> room, const Im
   end.put(crc);
 }
 
-// Reads the header alone: what stands behind it may be missing. `header` is that of an image where the finding is none.
+// Reads the header only: the data after it may be missing. `header` is valid where the finding is none.
 constexpr ImageFinding read_header(std::span<const std::uint8_t> bytes, ImageHeader& header) {
   model::Reader r(bytes);
   if (bytes.size() < 4 || r.take<std::uint32_t>() != kImageMagic) return ImageFinding::no_image;
@@ -98,12 +98,12 @@ constexpr ImageFinding read_header(std::span<const std::uint8_t> bytes, ImageHea
   r.skip(2);
   header.signature_kind = r.take<std::uint32_t>();
   for (std::uint8_t& byte : header.signature) byte = r.take<std::uint8_t>();
-  // So that no sum of lengths runs over.
+  // So that no sum of lengths overflows.
   return header.bytes == 0 || header.bytes > 0x7FFFFFFF - kHeaderBytes ? ImageFinding::damaged_header
                                                                        : ImageFinding::none;
 }
 
-// The same, and whether it is for this board and no longer than there is room.
+// The same, and whether it is for this board and fits the slot.
 constexpr ImageFinding check_header(std::span<const std::uint8_t> bytes, std::string_view board, std::size_t room,
                                     ImageHeader& header) {
   const ImageFinding finding = read_header(bytes, header);
@@ -112,7 +112,7 @@ constexpr ImageFinding check_header(std::span<const std::uint8_t> bytes, std::st
   return header.whole_bytes() > room ? ImageFinding::too_long : ImageFinding::none;
 }
 
-// A whole image, whatever its board, at the start of `bytes`; what follows it is not looked at.
+// A whole image for any board at the start of `bytes`; the bytes after it are ignored.
 constexpr ImageFinding read_image(std::span<const std::uint8_t> bytes, ImageHeader& header) {
   const ImageFinding finding = read_header(bytes, header);
   if (finding != ImageFinding::none) return finding;

@@ -1,8 +1,8 @@
-// Three slots for images in flash and the journal of an update: what is downloaded, installed, tried and confirmed, or
-// taken back. README.md tells the whole story and why a power cut at any point leaves an image that is whole.
+// Three slots for images in flash and the journal of an update: an image is downloaded, installed, tried and confirmed,
+// or rolled back. README.md describes the process and why a power cut at any point leaves a complete image.
 //
-// The boot loader, the application (which confirms itself) and the twin use it. Nothing is remembered from one start to
-// the next but what is in flash.
+// The boot loader, the application (which confirms itself) and the twin use it. Only the contents of the flash are kept
+// from one start to the next.
 #pragma once
 
 #include <cstddef>
@@ -17,9 +17,9 @@ namespace flexspline::boot {
 
 // The sectors of the port, by number.
 enum class Slot : std::uint8_t {
-  application,  // runs where it lies
+  application,  // runs in place
   download,     // the new image; the journal is at its end
-  old,          // the application before
+  old,          // the previous application
 };
 inline constexpr std::size_t kSlots = 3;
 inline constexpr std::size_t kJournalBytes = 64;
@@ -27,38 +27,38 @@ inline constexpr std::size_t kJournalBytes = 64;
 enum class SlotError : std::uint8_t {
   none,
   erase,         // the memory reported an error
-  not_blank,     // it is not empty after it was erased
-  program,       // a word did not become what was written
+  not_blank,     // it is not blank after it was erased
+  program,       // a word does not read back as written
   out_of_order,  // nothing was begun, or a chunk does not follow the one before it
-  too_long,      // there is no room for it
-  image,         // finding() says what is wrong with it
+  too_long,      // it does not fit
+  image,         // finding() has the reason
 };
 
-// What is to be started.
+// What the boot loader has to start.
 enum class Start : std::uint8_t {
-  application,  // as ever
+  application,  // the confirmed one
   trial,        // a new one that has not been confirmed yet
-  none,         // there is none that is whole, or the only one failed all its trials: wait for a download
+  none,         // there is no complete image, or the only one failed all its trials: wait for a download
 };
 
 template <storage::FlashPort Flash>
 class Slots {
  public:
   static constexpr std::size_t kImageBytes = Flash::kSectorBytes - kJournalBytes;
-  // A power cut in a trial is no fault of the image: so often it is started before it is taken back.
+  // A power cut during a trial is not the image's fault, so it is started this many times before it is rolled back.
   static constexpr std::size_t kTrials = 3;
 
   // `board`: images for others are refused. It has to outlive this.
   constexpr Slots(Flash& flash, std::string_view board) : flash_(flash), board_(board) {}
 
-  // At each start of the boot loader: finishes what was begun.
+  // At each start of the boot loader: finishes an update that was begun.
   constexpr Start resume() {
     if (is_pending()) {
       if ((is_set(Mark::installed) && is_whole(Slot::application)) || install()) {
         for (std::size_t i = 0; i < kTrials && !is_set(Mark::fell_back); ++i) {
           const Mark trial = trial_of(i);
           if (is_set(trial)) continue;
-          // A trial that is not noted down is not begun: it could go on for ever.
+          // A trial that cannot be recorded is not started: it could repeat without end.
           if (set(trial)) return Start::trial;
           break;
         }
@@ -66,35 +66,34 @@ class Slots {
       if (!fall_back()) return Start::none;
     }
     if (is_whole(Slot::application)) return Start::application;
-    // It is damaged, or a first installation broke off: whatever there is takes its place, the newest first.
+    // It is damaged, or a first installation was interrupted: another image replaces it, the newest first.
     const bool again = is_set(Mark::confirmed) && copy(Slot::download, Slot::application);
     return again || copy(Slot::old, Slot::application) ? Start::application : Start::none;
   }
 
-  // Whether the running application is on trial. It reads the whole image: to be asked once, before there are
-  // deadlines.
+  // Whether the running application is on trial. It reads the whole image: call it once, before there are deadlines.
   constexpr bool on_trial() const { return is_pending() && is_set(Mark::installed) && !is_set(Mark::fell_back); }
-  // The running application, which is on trial, does well: one word is written.
+  // Confirms the running application, which is on trial: one word is written.
   constexpr bool confirm() { return set(Mark::confirmed); }
 
   // Download.
 
-  // Erases the download slot. An application that was never confirmed is taken back first, so that the image before it
+  // Erases the download slot. An application that was never confirmed is rolled back first, so that the previous image
   // is not lost.
   constexpr SlotError begin() {
     staging_ = false;
     staged_ = 0;
     finding_ = ImageFinding::none;
     if (is_pending() && is_set(Mark::saved)) fall_back();
-    // A new image's first word is taken away before the rest, so that an erase that is cut short leaves no image with
+    // The first word of an image is cleared before the rest, so that an interrupted erase does not leave an image with
     // half a journal.
     if (word(Slot::download, 0) != storage::kErasedWord) flash_.program(number(Slot::download), 0, 0);
     if (const SlotError error = erase(Slot::download); error != SlotError::none) return error;
     staging_ = true;
     return SlotError::none;
   }
-  // A chunk behind the one before; all but the last are of a multiple of four bytes. The header is looked at as soon as
-  // it is whole.
+  // The next chunk; all but the last are a multiple of four bytes long. The header is checked as soon as it is
+  // complete.
   constexpr SlotError write(std::span<const std::uint8_t> chunk) {
     if (!staging_ || staged_ % 4 != 0) return SlotError::out_of_order;
     if (chunk.size() > kImageBytes - staged_) return SlotError::too_long;
@@ -104,22 +103,22 @@ class Slots {
         value &= ~(std::uint32_t{0xFF} << (8 * b));
         value |= std::uint32_t{chunk[i + b]} << (8 * b);
       }
-      if (!put(Slot::download, (staged_ + i) / 4, value)) return give_up(SlotError::program);
+      if (!put(Slot::download, (staged_ + i) / 4, value)) return fail(SlotError::program);
     }
     const bool had_header = staged_ >= kHeaderBytes;
     staged_ += chunk.size();
     if (had_header || staged_ < kHeaderBytes) return SlotError::none;
     ImageHeader header;
     finding_ = check_header(bytes(Slot::download), board_, kImageBytes, header);
-    return finding_ == ImageFinding::none ? SlotError::none : give_up(SlotError::image);
+    return finding_ == ImageFinding::none ? SlotError::none : fail(SlotError::image);
   }
-  // Whether everything came that the header promises.
+  // Whether all bytes that the header announces were received.
   constexpr bool has_all() const {
     ImageHeader header;
     return staging_ && read_header(bytes(Slot::download), header) == ImageFinding::none &&
            staged_ == header.whole_bytes();
   }
-  // Checks the image as a whole where it lies, and asks the boot loader to install it at its next start.
+  // Checks the whole image in place, and requests its installation at the next start of the boot loader.
   constexpr SlotError finish() {
     if (!staging_) return SlotError::out_of_order;
     staging_ = false;
@@ -134,7 +133,7 @@ class Slots {
   constexpr std::size_t staged() const { return staged_; }
   constexpr ImageFinding finding() const { return finding_; }
 
-  // The image in a slot, header and all; empty where there is none that is whole and for this board.
+  // The image in a slot with its header; empty where it is not complete or not for this board.
   constexpr std::span<const std::uint8_t> image(Slot slot) const {
     ImageHeader header;
     const bool good = read_image(bytes(slot), header) == ImageFinding::none && header.board == board_bytes(board_);
@@ -143,13 +142,13 @@ class Slots {
   constexpr std::string_view board() const { return board_; }
 
  private:
-  // Words of the journal, each set once. What was asked for and how far it came; they are void without a whole image
+  // Words of the journal, each set once: the request and its progress. They are not valid without a complete image
   // before them.
   enum class Mark : std::uint8_t { requested, saved, installed, trial, confirmed = 3 + kTrials, fell_back, taken_back };
   static constexpr std::size_t kMarks = 3 + kTrials + 3;
   static_assert(4 * kMarks <= kJournalBytes);
   static_assert(Flash::kSectorBytes > kHeaderBytes + kJournalBytes && Flash::kSectorBytes % 8 == 0);
-  // Sixteen of its bits are nought: a write that was cut short has fewer, and is completed by writing it again.
+  // Sixteen of its bits are zero: an interrupted write has fewer, and is completed by writing it again.
   static constexpr std::uint32_t kSet = 0x5AA53CC3;
 
   static constexpr Mark trial_of(std::size_t i) { return static_cast<Mark>(static_cast<std::size_t>(Mark::trial) + i); }
@@ -165,7 +164,7 @@ class Slots {
   constexpr bool is_whole(Slot slot) const { return !image(slot).empty(); }
   constexpr bool is_set(Mark mark) const { return word(Slot::download, place_of(mark)) == kSet; }
   constexpr bool set(Mark mark) { return put(Slot::download, place_of(mark), kSet); }
-  // An update that was asked for and has come to no end.
+  // An update that was requested and is not finished.
   constexpr bool is_pending() const {
     return is_set(Mark::requested) && !is_set(Mark::confirmed) && !is_set(Mark::taken_back) && is_whole(Slot::download);
   }
@@ -180,7 +179,7 @@ class Slots {
       if (byte != 0xFF) return SlotError::not_blank;
     return SlotError::none;
   }
-  constexpr SlotError give_up(SlotError error) {
+  constexpr SlotError fail(SlotError error) {
     staging_ = false;
     return error;
   }
@@ -190,7 +189,7 @@ class Slots {
       if (bytes(slot)[i] != there[i]) return false;
     return !there.empty();
   }
-  // A copy that was cut short begins anew; one that is done is not made again.
+  // An interrupted copy starts again; a finished one is not repeated.
   constexpr bool copy(Slot from, Slot to) {
     const std::size_t words = (image(from).size() + 3) / 4;
     if (words == 0) return false;
@@ -200,7 +199,7 @@ class Slots {
       if (!put(to, i, word(from, i))) return false;
     return is_whole(to);
   }
-  // The application is saved before a word of it is touched; one that is not whole is not worth it.
+  // The application is saved before a word of it is changed, unless it is not complete.
   constexpr bool install() {
     if (is_set(Mark::fell_back)) return false;
     if (!is_set(Mark::saved)) {
@@ -209,7 +208,7 @@ class Slots {
     }
     return copy(Slot::download, Slot::application) && set(Mark::installed);
   }
-  // False: there is nothing to go back to. Where the application was not touched yet, it stays.
+  // False: there is no image to go back to. An application that was not changed yet stays.
   constexpr bool fall_back() {
     if (!set(Mark::fell_back)) return false;
     const bool untouched = !is_set(Mark::saved) && is_whole(Slot::application);

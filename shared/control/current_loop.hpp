@@ -1,5 +1,5 @@
-// The innermost loop, for a board whose amplifier is a bridge: proportional and integral, from the difference of wanted
-// and measured current to a share of the supply voltage. Integers, no state but the integral.
+// The innermost loop, for a board whose amplifier is a bridge: proportional and integral, from the difference of
+// commanded and measured current to a share of the supply voltage. Integers; the integral is its only state.
 #pragma once
 
 #include <cstdint>
@@ -18,9 +18,9 @@ struct CurrentLoopSetup {
 class CurrentLoop {
  public:
   void reset() { sum_ = 0; }
-  // All are shares in 2^-15. What the limit cuts off is not summed up.
-  std::int32_t update(const CurrentLoopSetup& setup, std::int32_t wanted, std::int32_t measured) {
-    const std::int64_t error = wanted - measured, before = sum_;
+  // All are shares in 2^-15. The integral stops at the limit (anti-windup).
+  std::int32_t update(const CurrentLoopSetup& setup, std::int32_t reference, std::int32_t measured) {
+    const std::int64_t error = reference - measured, before = sum_;
     const std::int64_t most = std::int64_t{setup.limit} << 16;
     sum_ += setup.integral * error;
     const std::int64_t all = ((setup.proportional * error) << 8) + sum_;

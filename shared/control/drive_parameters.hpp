@@ -1,5 +1,5 @@
-// All numbers that a drive's tick computes with, apart from what it remembers from tick to tick. Made on the host from
-// SI units (drive_parameters_setup.hpp), changed as a whole or not at all.
+// All parameters of a drive's tick. The host makes them from SI units (drive_parameters_setup.hpp); they are changed as
+// a whole or not at all.
 #pragma once
 
 #include <cstdint>
@@ -20,16 +20,20 @@
 namespace flexspline::control {
 
 // An analogue sensor gives a share of its full scale, 2^-15; value = gain share - offset, in the base of the signal.
-// Readings at `lowest` or below and `highest` or above are those of a broken wire or an amplifier at its rail.
+// Readings at `lowest` or below and at `highest` or above mean a broken wire or an amplifier at its rail.
 template <class N>
 struct AnalogScale {
   typename N::Gain gain{};
   typename N::Value offset{};
   std::int16_t lowest = 0;
   std::int16_t highest = 0;
+  template <class Codec>
+  constexpr void fields(Codec& c) {
+    c(gain), c(offset), c.share_of_converter(lowest), c.share_of_converter(highest);
+  }
 };
 
-// Above (or, for times, beyond) which the drive stops by itself; firmware/faults.hpp says what happens then.
+// Limits above (or times after) which the drive stops by itself; firmware/faults.hpp says how.
 template <class N>
 struct SafetyLimits {
   typename N::Value overspeed{};         // measured velocity
@@ -44,11 +48,18 @@ struct SafetyLimits {
   std::uint32_t stop_ticks = 0;          // that a controlled stop may take
   std::uint16_t stuck_ticks = 0;         // over which the torque may change as said above
   std::uint16_t mismatch_ticks = 0;
-  std::uint16_t torque_same_ticks = 0;  // the torque sensor's noise changes its reading within these; nought: no sensor
+  std::uint16_t torque_same_ticks = 0;  // the torque sensor's noise changes its reading within these; zero: no sensor
+  template <class Codec>
+  constexpr void fields(Codec& c) {
+    c.positive(overspeed), c.positive(overcurrent), c.positive(overtemperature), c.positive(acceleration);
+    c.positive(stuck_torque), c.positive(current_mismatch), c.positive(standstill);
+    c.ticks(counts_a_tick), c.ticks(host_ticks), c.ticks(stop_ticks);
+    c.short_ticks(stuck_ticks), c.short_ticks(mismatch_ticks), c.short_ticks_or_none(torque_same_ticks);
+  }
 };
 
-// How far motor and output may be from where they have to be. All nought in a block that does not state them: then it
-// is not watched.
+// Limits of the following errors of motor and output. All zero in a block that does not state them: they are not
+// checked then.
 template <class N>
 struct FollowingLimits {
   std::int64_t position = 0;       // mode position: of the motor behind its set point, 2^-32 turns
@@ -56,33 +67,67 @@ struct FollowingLimits {
   std::int32_t motor_counts = 0;   // that the motor may turn ...
   std::int32_t output_counts = 0;  // ... while the output's encoder moves by less than this
   std::uint16_t ticks = 0;         // that the motor may be behind for
+  template <class Codec>
+  constexpr void fields(Codec& c) {
+    c.speed(position), c.positive(velocity), c.ticks_or_none(motor_counts), c.ticks_or_none(output_counts);
+    c.short_ticks(ticks);
+  }
 };
 
-template <class N>
-struct DriveSettings {
+// Settings that are one section of a parameter block.
+struct GeneralSettings {
   std::uint32_t tick_hz = 0;
   bool has_output_encoder = false;
   bool has_torque_sensor = false;
   bool excites_torque = false;  // else the excitation is a velocity
-  observers::EncoderAngle::Coefficients motor_encoder{};
-  observers::EncoderAngle::Coefficients output_encoder{};
-  observers::EncoderKalman::Coefficients<N> motor_motion{};
-  observers::EncoderKalman::Coefficients<N> output_motion{};
-  observers::DisturbanceObserver::Coefficients<N> disturbance{};
-  // Without an encoder at the output.
+  template <class Codec>
+  constexpr void fields(Codec& c) {
+    c.tick_rate(tick_hz), c(has_output_encoder), c(has_torque_sensor), c(excites_torque);
+  }
+};
+// Without an encoder at the output.
+template <class N>
+struct TorsionSettings {
   observers::TorsionObserver::Coefficients<N> torsion{};
   typename N::Order output_angle{};       // of the motor's
   typename N::Gain torsion_turns{};       // turns of the output per base of torsion
   typename N::Gain output_of_velocity{};  // base of the output's velocity per base of the motor's
-  observers::RippleFilter::Coefficients<N> ripple{};
+  template <class Codec>
+  constexpr void fields(Codec& c) {
+    c(torsion), c(output_angle), c(torsion_turns), c(output_of_velocity);
+  }
+};
+template <class N>
+struct SensorSettings {
   AnalogScale<N> current{};
   AnalogScale<N> torque{};
   AnalogScale<N> temperature{};
   typename N::Gain torque_of_current{};
   typename N::Gain amplifier{};  // from a current in bases to a share of the amplifier's full scale
-  Loops::Coefficients<N> loops{};
+  template <class Codec>
+  constexpr void fields(Codec& c) {
+    c(current), c(torque), c(temperature), c(torque_of_current), c(amplifier);
+  }
+};
+template <class N>
+struct SetPointSettings {
   Trajectory::Coefficients<N> trajectory{};
   Stream::Coefficients stream{};
+  template <class Codec>
+  constexpr void fields(Codec& c) {
+    c(trajectory), c(stream);
+  }
+};
+
+template <class N>
+struct DriveSettings : GeneralSettings, TorsionSettings<N>, SensorSettings<N>, SetPointSettings<N> {
+  observers::EncoderAngle::Coefficients motor_encoder{};
+  observers::EncoderAngle::Coefficients output_encoder{};
+  observers::EncoderKalman::Coefficients<N> motor_motion{};
+  observers::EncoderKalman::Coefficients<N> output_motion{};
+  observers::DisturbanceObserver::Coefficients<N> disturbance{};
+  observers::RippleFilter::Coefficients<N> ripple{};
+  Loops::Coefficients<N> loops{};
   Feedforward::Coefficients<N> feedforward{};
   Excitation::Coefficients<N> excitation{};
   SafetyLimits<N> safety{};

@@ -5,11 +5,11 @@
 
 namespace flexspline::control {
 
-// What a reading of one at an analogue input stands for, and what it reads at nought.
+// The signal at a full-scale reading of an analogue input, and its offset.
 template <class P>
 struct AnalogSetup {
   P full_scale{};
-  P at_nought{};              // in the unit of the signal: value = full_scale share - at_nought
+  P at_zero{};                // in the unit of the signal: value = full_scale share - at_zero
   P lowest_share{P(-0.999)};  // beyond: a broken wire
   P highest_share{P(0.999)};
 };
@@ -28,7 +28,7 @@ struct SafetySetup {
   P standstill{P(1.0)};      // rad/s
   P host_s{P(0.1)};          // s
   P stop_s{P(1.0)};          // s
-  P following_error{};       // rad of the motor, mode position; nought: none of these is watched
+  P following_error{};       // rad of the motor, mode position; zero: none of these is watched
   P following_velocity{};    // rad/s, mode velocity
   P following_s{P(0.02)};    // s
   P output_stuck{};          // rad of the output, more than torsion and backlash
@@ -38,7 +38,7 @@ template <class P>
 struct DriveSetup {
   std::uint32_t tick_hz = 20'000;
   std::uint32_t motor_counts = 0;
-  std::uint32_t output_counts = 0;  // nought: no encoder at the output
+  std::uint32_t output_counts = 0;  // zero: no encoder at the output
   P motor_corner{};                 // rad/s, of the motor's Kalman filter
   P output_corner{};
   observers::TorsionSetup<P> torsion{};  // used without an encoder at the output
@@ -62,7 +62,7 @@ namespace detail {
 template <class N, class P>
 AnalogScale<N> analog_scale(const AnalogSetup<P>& s, const P& base) {
   const auto share = [](const P& x) { return static_cast<std::int16_t>(static_cast<double>(x) * 32767.0); };
-  return {N::gain(s.full_scale / base), N::value(s.at_nought / base), share(s.lowest_share), share(s.highest_share)};
+  return {N::gain(s.full_scale / base), N::value(s.at_zero / base), share(s.lowest_share), share(s.highest_share)};
 }
 template <class P>
 std::uint32_t ticks_of(const P& seconds, const P& tick_s) {
@@ -78,7 +78,7 @@ SafetyLimits<N> safety_limits(const SafetySetup<P>& s, std::uint32_t counts, con
   limits.stuck_torque = N::value(s.stuck_torque / d.torque_base);
   limits.current_mismatch = N::value(s.current_mismatch / d.current_base);
   limits.standstill = N::value(s.standstill / d.velocity_base);
-  // Twice the overspeed: what moves faster than this did not move.
+  // Twice the overspeed: a faster motion is not real.
   const P most = P(2.0) * s.overspeed * d.time_base / d.angle_base * P(static_cast<double>(counts));
   limits.counts_a_tick = static_cast<std::int32_t>(static_cast<double>(most)) + 2;
   limits.host_ticks = ticks_of(s.host_s, d.time_base);
@@ -109,7 +109,7 @@ FollowingLimits<N> following_limits(const SafetySetup<P>& s, std::uint32_t motor
   if (output_counts != 0 && s.output_stuck > P(0.0)) {
     const P turns = s.output_stuck / d.angle_base;
     const P motor = turns * d.gear_ratio * P(static_cast<double>(motor_counts));
-    // What the motor turns goes into torsion first: of the rest a part has to be seen.
+    // Part of the motor's motion becomes torsion; a part of the rest has to be measurable.
     const P output = turns * P(0.25) * P(static_cast<double>(output_counts));
     const bool in_counts = motor >= P(2.0) && motor < P(0x1p30) && output >= P(2.0) && output < P(0x1p30);
     require(in_counts, "a stuck output's angle is at least 8 counts of the output's encoder and 2 of the motor's");
@@ -121,8 +121,8 @@ FollowingLimits<N> following_limits(const SafetySetup<P>& s, std::uint32_t motor
 }
 }  // namespace detail
 
-// Notes what does not fit. The model is the caller's to fill: `parameters.model.add<Effect>(...)` with the same `d`.
-// The bases of `d` hold for all of it; its time base is the tick.
+// Records values that do not fit in OverflowLog. The caller fills the model: `parameters.model.add<Effect>(...)` with
+// the same `d`. The bases of `d` hold for all of it; its time base is the tick.
 template <class N, class P>
 DriveParameters<N> derive(const DriveSetup<P>& s, const effects::DriveConstants<P>& d) {
   DriveParameters<N> p;

@@ -1,6 +1,6 @@
 // Excitations for identification (report sections 3.5 and 4.2.2): a set point of torque or velocity that moves a drive
-// so that its parameters show. Phases are integers of 2^-64 turns on the host and on the drive, so that a frequency is
-// as exact as its number and both run through the same phases, tick for tick.
+// so that its parameters can be identified. Phases are integers of 2^-64 turns on the host and on the drive, so that
+// both have exactly the same phases at every tick.
 #pragma once
 
 #include <array>
@@ -30,9 +30,14 @@ struct Excitation {
     std::uint16_t harmonic = 0;
     std::uint32_t phase = 0;
     typename N::Gain amplitude{};
+    template <class Codec>
+    constexpr void fields(Codec& c) {
+      c.harmonics(harmonic), c.number(phase), c(amplitude);
+    }
   };
+  // All of an excitation but its lines.
   template <class N>
-  struct Coefficients {
+  struct Waveform {
     Shape shape = Shape::lines;
     bool guarded = false;
     std::uint8_t line_count = 0;
@@ -45,7 +50,17 @@ struct Excitation {
     typename N::Value positive{};
     typename N::Value negative{};
     typename N::Value offset{};
-    SpeedGuard::Coefficients<N> guard{};
+    SpeedGuard::Coefficients<N> guard{};  // zero where it is not guarded
+    template <class Codec>
+    constexpr void fields(Codec& c) {
+      c.shape(shape), c(guarded), c.lines(line_count), c.wide(step), c.wide(step_change);
+      c.ticks_or_none(ticks), c.ticks_or_none(fade_ticks), c.share(fade_step), c.limit(limiter.limit), c(limiter.rate);
+      c(positive), c(negative), c(offset);
+      c(guard.torque_limit), c(guard.overspeed), c(guard.largest_velocity), c(guard.slope);
+    }
+  };
+  template <class N>
+  struct Coefficients : Waveform<N> {
     std::array<DriveLine<N>, kMostLines> lines{};
   };
   template <class N>
@@ -90,7 +105,7 @@ struct Excitation {
   static constexpr void start(State<N>& s, const Coefficients<N>& c) {
     s = {0, 0, c.step, s.limiter, true};
   }
-  // Ends it before its time; the set point goes to nought as fast as its slope may.
+  // Ends it early; the set point goes to zero with the largest slope.
   template <class N>
   static constexpr void stop(State<N>& s) {
     s.running = false;
@@ -99,20 +114,20 @@ struct Excitation {
   template <class N>
   static constexpr typename N::Value update(State<N>& s, const Coefficients<N>& c, typename N::Value velocity) {
     if (s.running && s.tick >= c.ticks) s.running = false;
-    typename N::Value wanted{};
+    typename N::Value set_point{};
     if (s.running) {
-      wanted = faded<N>(s, c, c.offset + shape<N>(s, c));
+      set_point = faded<N>(s, c, c.offset + shape<N>(s, c));
       if (c.guarded) {
         const auto bounds = SpeedGuard::bounds<N>(c.guard, velocity);
-        wanted = N::between(wanted, bounds.low, bounds.high);
+        set_point = N::between(set_point, bounds.low, bounds.high);
       }
       s.phase += s.step;
       s.step += c.step_change;
       ++s.tick;
     }
-    return RateLimiter::update<N>(s.limiter, c.limiter, wanted);
+    return RateLimiter::update<N>(s.limiter, c.limiter, set_point);
   }
-  // True once it has ended and the set point is back at nought.
+  // True once it has ended and the set point is back at zero.
   template <class N>
   static constexpr bool finished(const State<N>& s) {
     return !s.running && N::narrow(s.limiter.output) == typename N::Value{};

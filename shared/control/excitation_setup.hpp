@@ -1,4 +1,4 @@
-// What excitations are made of, on the host: shapes, the signals of the report, multi-sines.
+// Setups of excitations on the host: shapes, the signals of the report, multi-sines.
 #pragma once
 
 #include <array>
@@ -11,7 +11,7 @@
 
 namespace flexspline::control {
 
-// What is repeated over a cycle. All start at nought, rising, but for lines with phases of their own.
+// The shape of a cycle. All start at zero, rising, except lines with phases of their own.
 enum class Shape : std::uint8_t { lines, asymmetric_sine, square, saw_tooth, triangle };
 
 inline constexpr std::size_t kMostLines = 32;
@@ -25,8 +25,8 @@ struct Line {
   P weight{1.0};
 };
 
-// In the unit of the set point (N m or rad/s at the motor), seconds and hertz. The first block says what is wanted, the
-// second what may not be exceeded whatever is wanted.
+// In the unit of the set point (N m or rad/s at the motor), seconds and hertz. The first block is the demand, the
+// second has limits that are never exceeded.
 template <class P>
 struct ExcitationSetup {
   Shape shape = Shape::lines;
@@ -34,7 +34,7 @@ struct ExcitationSetup {
   P negative_per_positive{1.2};  // amplitude of the negative half of an asymmetric sine over the positive one's
   P offset{};
   P frequency_hz{};          // of the cycle
-  P end_frequency_hz{-1.0};  // of a linear chirp; below nought: the frequency stays
+  P end_frequency_hz{-1.0};  // of a linear chirp; below zero: the frequency stays
   std::uint32_t ticks = 0;
   std::uint32_t fade_ticks = 0;  // at either end: 3 x^2 - 2 x^3
   std::size_t line_count = 0;
@@ -42,11 +42,11 @@ struct ExcitationSetup {
 
   P limit{};           // of the set point
   P slope_limit{};     // per second: acceleration where the set point is a velocity
-  P velocity_limit{};  // rad/s measured, where the set point is a torque: see SpeedGuard; nought: not guarded
+  P velocity_limit{};  // rad/s measured, where the set point is a torque: see SpeedGuard; zero: not guarded
   P overspeed{};       // rad/s
 };
 
-// The signals of the report. Where it gives no amplitudes they are the caller's.
+// The signals of the report. Where it gives no amplitudes the caller sets them.
 template <class P>
 ExcitationSetup<P> with_lines(ExcitationSetup<P> setup, std::initializer_list<Line<P>> lines) {
   setup.shape = Shape::lines;
@@ -71,8 +71,8 @@ ExcitationSetup<P> composite(const ExcitationSetup<P>& setup) {
 }
 
 // Lines of equal weight with phases drawn from a seed: `count` of them from `first` on. With `odd` only odd harmonics
-// are taken, and of every `omit_one_of` (nought: none) of them one, drawn as well, is left out: what answers at an
-// omitted or an even line is distortion.
+// are taken, and of every `omit_one_of` (zero: none) one, drawn as well, is left out: a response at an omitted or an
+// even line is distortion.
 struct MultiSine {
   std::uint64_t seed = 1;
   std::uint16_t first = 1;
@@ -96,17 +96,17 @@ class SplitMix {
 };
 // Host only.
 template <class P>
-ExcitationSetup<P> multi_sine(ExcitationSetup<P> setup, const MultiSine& wanted) {
+ExcitationSetup<P> multi_sine(ExcitationSetup<P> setup, const MultiSine& signal) {
   setup.shape = Shape::lines;
   setup.line_count = 0;
-  SplitMix random(wanted.seed);
+  SplitMix random(signal.seed);
   std::uint32_t in_group = 0, omitted = 0;
-  for (std::uint32_t harmonic = wanted.first; harmonic <= wanted.last; ++harmonic) {
-    if (wanted.odd && harmonic % 2 == 0) continue;
-    if (wanted.omit_one_of != 0) {
-      if (in_group == 0) omitted = static_cast<std::uint32_t>((random.next() >> 32) % wanted.omit_one_of);
+  for (std::uint32_t harmonic = signal.first; harmonic <= signal.last; ++harmonic) {
+    if (signal.odd && harmonic % 2 == 0) continue;
+    if (signal.omit_one_of != 0) {
+      if (in_group == 0) omitted = static_cast<std::uint32_t>((random.next() >> 32) % signal.omit_one_of);
       const bool leave_out = in_group == omitted;
-      in_group = (in_group + 1) % wanted.omit_one_of;
+      in_group = (in_group + 1) % signal.omit_one_of;
       if (leave_out) continue;
     }
     const auto phase = static_cast<std::uint32_t>(random.next() >> 32);
@@ -140,8 +140,8 @@ inline std::uint32_t highest_harmonic(const auto& setup) {
   return highest;
 }
 // Largest magnitude of the sum. Between 64 samples to a cycle of the highest line a sum of sines exceeds the largest
-// sample by no more than one over cos(pi/64) (Ehlich and Zeller, 1964), so the true peak lies beside one of those that
-// come as near as that.
+// sample by no more than one over cos(pi/64) (Ehlich and Zeller, 1964), so the true peak is next to one of the samples
+// that are this close to the largest.
 template <class P>
 P peak_of_lines(const ExcitationSetup<P>& setup) {
   constexpr double kNear = 0.9987;  // below cos(pi/64)

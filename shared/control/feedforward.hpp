@@ -1,15 +1,16 @@
-// Feedforward: the torque that a set point takes by the drive's model, and how far the motor has to lead the output.
+// Feedforward: the torque for a set point by the drive's model, and the angle by which the motor has to lead the
+// output.
 //
-// From the set point come position, velocity and acceleration, and with them inertia, friction (its memory as well),
-// the load and the torsion: they are free of noise, known without delay, and close no loop. Measured are
-// - the motor's angle, for what repeats with it (ripples, kinematic errors): a set point is off by the following error,
-//   and k times that is lost of a ripple's phase. It does close a loop, but one of known gain: a ripple of amplitude a
+// Position, velocity and acceleration of the set point determine inertia, friction (with its memory), the load and the
+// torsion: they are free of noise, known without delay, and close no loop. Measured are
+// - the motor's angle, for periodic effects (ripples, kinematic errors): a set point differs by the following error,
+//   k times which is the error of a ripple's phase. This closes a loop, but one of known gain: a ripple of amplitude a
 //   acts as a stiffness of at most k a, which has to stay far below that of the position loop.
 // - temperature and a load that the model does not know: both change slowly. Neither angle nor velocity measured enters
 //   friction: friction compensated by its own sign is a negative damping, and hunts.
 //
 // Direction is clamp(w_set / band, 1): continuous, so that a set point with noise below the band cannot make friction
-// chatter, and nought at standstill, where friction takes whatever side it must.
+// chatter, and zero at standstill, where the direction of friction depends on the load.
 #pragma once
 
 #include <cstdint>
@@ -26,12 +27,12 @@ struct FeedforwardSetup {
   P direction_band{};      // rad/s of the motor: above it friction acts in full
   P torque_limit{};        // N m at the motor
   P load_limit{};          // N m at the output
-  P stiffness{};           // N m/rad at the output, the largest of the transmission; nought: no lead
+  P stiffness{};           // N m/rad at the output, the largest of the transmission; zero: no lead
   P torsion_limit{};       // rad at the output
   P torsion_rate_limit{};  // rad/s, of how fast the lead may change: jumps of the acceleration would make it jump
-  P output_zero_turns{};   // of the motor where the output's angle is nought, for gravity
+  P output_zero_turns{};   // of the motor where the output's angle is zero, for gravity
   // Structural damping of the transmission, `damping_torque` abs(rate)^damping_exponent (report eq. 78), N m at 1
-  // rad/s: it lets the spring settle slowly, and the lead has to be as slow. Nought: none.
+  // rad/s: it lets the spring settle slowly, and the lead has to be as slow. Zero: none.
   P damping_torque{};
   P damping_exponent{P(0.5)};
 };
@@ -58,12 +59,18 @@ struct Feedforward {
     typename N::Value creep{};  // bases of torsion in a tick at 1 rad/s
     typename N::Gain lead{};    // turns of the motor per torsion
     typename N::StepGain lead_velocity{};
+    template <class Codec>
+    constexpr void fields(Codec& c) {
+      c(per_band), c(output_velocity), c(output_acceleration), c(output_angle), c(to_output_zero), c(share_of_load);
+      c.limit(torque_limit), c.limit(load_limit), c(leads), c(compliance), c(torsion_limit), c(torsion_change);
+      c(damped), c(per_damping), c(rate_exponent), c(most_damping), c(creep), c(lead), c(lead_velocity);
+    }
   };
   template <class N>
   struct State {
     typename N::Value load{};  // torque through the flexspline, at the tick before
     typename N::Value torsion{};
-    typename N::State settled{};  // the torsion, of which a tick changes less than a value can show
+    typename N::State torsion_state{};  // the torsion; its change in a tick may be below the resolution of a value
   };
   template <class N>
   struct SetPoint {
@@ -84,8 +91,8 @@ struct Feedforward {
     typename N::Value velocity{};  // of the lead, to be added to that of velocity
   };
 
-  // Host only. The model's effects are derived with the same `d`; which of them it holds says what is fed forward.
-  // Errors of sensors do not belong into it: they turn no shaft.
+  // Host only. The model's effects are derived with the same `d`; they determine the feedforward. Errors of sensors
+  // must not be in it, as they do not act on a shaft.
   template <class N, class P>
   static Coefficients<N> derive(const FeedforwardSetup<P>& s, const effects::DriveConstants<P>& d) {
     constexpr double kTurn = 6.283185307179586;
@@ -113,7 +120,7 @@ struct Feedforward {
     if (c.damped) {
       require(s.damping_exponent >= P(0.1) && s.damping_exponent <= P(1.0),
               "the exponent of a feedforward's damping is not between 0.1 and 1");
-      // Faster than eight radians a second nothing creeps, and powers stay in their range.
+      // Limited to eight radians a second, above which creep does not matter, so that powers stay in their range.
       const P most = s.damping_torque * N::power(P(8.0), s.damping_exponent) / d.output_torque_base;
       c.per_damping = N::ratio_gain(d.output_torque_base / s.damping_torque);
       c.rate_exponent = N::exponent(P(1.0) / s.damping_exponent);
@@ -127,10 +134,10 @@ struct Feedforward {
 
   // One tick. The set point within two bases.
   //   T = load(set point) + measured load;  torque = motor(set point, measured angle) + T/N
-  //   dq += (T - transmission(dq))/K_largest, a chord step a tick: it settles where the transmission carries T, however
-  //   it bends, as long as it is nowhere stiffer; lead = N dq. With damping a step is no longer than
-  //   T_tick (abs(T - transmission(dq))/damping_torque)^(1/damping_exponent), as the rate of the transmission is.
-  // Friction that depends on the load takes the load of the tick before.
+  //   dq += (T - transmission(dq))/K_largest, a chord step a tick: it converges to the torsion at which the
+  //   transmission carries T, for any curve that is not stiffer than K_largest; lead = N dq. With damping a step
+  //   is at most T_tick (abs(T - transmission(dq))/damping_torque)^(1/damping_exponent), the transmission's rate.
+  // Friction that depends on the load takes the load of the previous tick.
   template <class N, class Image>
   static constexpr Output<N> update(State<N>& s, const Coefficients<N>& c, model::DriveModel<N, Image>& model,
                                     const SetPoint<N>& set, const Measured<N>& measured) {
@@ -164,8 +171,8 @@ struct Feedforward {
       change = N::clamp(change, N::times(N::widen(N::clamp(rate, four)), c.creep));
     }
     const auto before = s.torsion;
-    s.settled = N::clamp(s.settled + change, c.torsion_limit);
-    s.torsion = N::narrow(s.settled);
+    s.torsion_state = N::clamp(s.torsion_state + change, c.torsion_limit);
+    s.torsion = N::narrow(s.torsion_state);
     out.lead = N::distance(c.lead, s.torsion);
     out.velocity = N::narrow(N::signal(c.lead_velocity, N::distance(c.lead, s.torsion - before)));
     return out;

@@ -1,5 +1,5 @@
-// What a board is, whatever a parameter block says: full scales, the most current that it may command, its sensors. A
-// drive says it to a host, which packs for it; the drive's validator refuses a block that states something else.
+// The hardware of a board, independent of the parameter block: full scales, its largest current, its sensors. A drive
+// reports it to a host, which packs a block for it; the drive's validator refuses a block that states something else.
 #pragma once
 
 #include <cstdint>
@@ -12,16 +12,16 @@
 namespace flexspline::control {
 
 enum class SensorKind : std::uint8_t {
-  not_stated,  // what is connected is not the board's: the block alone says
+  not_stated,  // the sensor is not part of the board: the block states it
   none,
-  incremental,  // quadrature: counts from where it wakes
+  incremental,  // quadrature: counts from its angle at power-on
   indexed,      // the same, with an index pulse
   absolute,     // its angle within a turn, from the start
   analog,
 };
 inline constexpr std::uint32_t kSensorKinds = 6;
 
-// Zero: the board does not state it, as of a sensor or amplifier outside of it. Full scale is a reading (or a command)
+// Zero: the board does not state it, as for an external sensor or amplifier. Full scale is a reading (or a command)
 // of one, 2^15; a temperature is linear in its reading: full scale times the share, less what it is at zero.
 struct Hardware {
   std::uint32_t current_full_scale_ma = 0;
@@ -36,15 +36,15 @@ struct Hardware {
   bool operator==(const Hardware&) const = default;
 };
 
-// The most that the amplifier is commanded, whatever a block says: a share of its full scale, 2^-15.
+// The largest command to the amplifier with any block: a share of its full scale, 2^-15.
 constexpr std::int32_t most_command(const Hardware& h) {
   constexpr std::int32_t kAll = 32767;
   if (h.most_current_ma == 0 || h.amplifier_full_scale_ma == 0 || h.most_current_ma >= h.amplifier_full_scale_ma)
     return kAll;
   return static_cast<std::int32_t>(std::uint64_t{h.most_current_ma} * 32768 / h.amplifier_full_scale_ma);
 }
-// The current's reading from which on the drive is off, whatever a block says: a quarter above the most that it
-// commands. 32768, which no reading is, where the sensor shows no more.
+// The current's reading at which the drive switches off with any block: a quarter above the largest command. 32768,
+// which no reading reaches, where the sensor's range is smaller.
 constexpr std::int32_t most_reading(const Hardware& h) {
   constexpr std::uint64_t kNever = 32768;
   if (h.most_current_ma == 0 || h.current_full_scale_ma == 0) return static_cast<std::int32_t>(kNever);
@@ -52,7 +52,7 @@ constexpr std::int32_t most_reading(const Hardware& h) {
   return static_cast<std::int32_t>(share < kNever ? share : kNever);
 }
 
-// What of a block has to agree with the board.
+// The values of a block that have to agree with the board.
 enum class Disagreement : std::uint8_t {
   none,
   current_full_scale,
@@ -123,7 +123,7 @@ constexpr Size thousandths(std::int32_t raw, const model::Number& base) {
 }
 }  // namespace detail
 
-// The first thing in which a block and its board do not agree.
+// The first disagreement between a block and its board.
 constexpr Disagreement disagreement(const Stated& s, const Hardware& h) {
   using detail::Size, detail::thousandths, detail::is_near;
   const auto whole = [](std::uint32_t x) { return Size::of(x, 0); };
@@ -145,7 +145,7 @@ constexpr Disagreement disagreement(const Stated& s, const Hardware& h) {
     return Disagreement::torque_full_scale;
   if (!agrees(h.temperature_full_scale_mc, thousandths(s.temperature.gain, s.temperature_base)))
     return Disagreement::temperature_law;
-  // A block that states none reads zero at zero.
+  // A block without an offset reads zero at zero.
   const std::int32_t offset = s.temperature.offset.raw, zero = h.temperature_at_zero_mc;
   const auto size = static_cast<std::uint32_t>(zero < 0 ? -std::int64_t{zero} : zero);
   const bool same_zero =

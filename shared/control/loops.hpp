@@ -1,13 +1,13 @@
 // Cascaded loops of a drive: position (P), velocity (PI) and the command to the current controller, with limits of
-// velocity, torque and current that hold whatever comes in. Per unit; k counts ticks of T seconds, clamp(x, a) limits x
-// to -a..a:
+// velocity, torque and current that hold for any input. Per unit; k counts ticks of T seconds, clamp(x, a) limits x to
+// -a..a:
 //   w_ref = clamp(Kp (q_ref - q) + w_ff, w_limit)                           mode position
 //   w_ref = clamp(w_ff, w_limit)                                            mode velocity
 //   e[k]  = w_ref - w
 //   u[k]  = Kv e[k] + x[k] + t_ff                                           mode torque: u[k] = t_ff
-//   t[k]  = u[k] limited to low..high                                       of SpeedGuard at w, within
-//   -t_limit..t_limit x[k+1] = clamp(x[k] + Ki T e[k], t_limit), but x[k] where t[k] is limited and e[k] would push it
-//   further i[k]  = clamp(t[k]/Km, i_limit)
+//   t[k]  = u[k] limited to low..high of SpeedGuard at w, within -t_limit..t_limit
+//   x[k+1] = clamp(x[k] + Ki T e[k], t_limit), but x[k] where t[k] is limited and e[k] would push it further
+//   i[k]  = clamp(t[k]/Km, i_limit)
 // When a loop closes, or the mode changes, x is set so that t[k] is what t[k-1] was: x = t[k-1] - Kv e[k] - t_ff.
 #pragma once
 
@@ -39,12 +39,17 @@ struct Loops {
     typename N::Gain velocity{};
     typename N::Share integral{};  // Ki T
     typename N::Value velocity_limit{};
-    typename N::Value largest_velocity{};  // what a measured velocity is limited to
+    typename N::Value largest_velocity{};  // limit of the measured velocity
     typename N::Value torque_limit{};
-    typename N::Value largest_torque{};  // what a torque that comes in is limited to
+    typename N::Value largest_torque{};  // limit of the input torque
     SpeedGuard::Coefficients<N> guard{};
     typename N::Gain current{};
     typename N::Value current_limit{};
+    template <class Codec>
+    constexpr void fields(Codec& c) {
+      c(position), c(velocity), c(integral), c.limit(velocity_limit), c.positive(largest_velocity);
+      c.limit(torque_limit), c.positive(largest_torque), c(guard), c(current), c.limit(current_limit);
+    }
   };
   template <class N>
   struct State {
@@ -52,8 +57,8 @@ struct Loops {
     typename N::Value torque{};  // of the tick before
     Mode mode = Mode::off;
   };
-  // What is wanted. In mode velocity `velocity` is the set point; in mode position `velocity` is the feedforward of it;
-  // `torque` is the set point in mode torque, else the feedforward.
+  // The demand. In mode velocity `velocity` is the set point; in mode position `velocity` is the feedforward of it;
+  // `torque` is the set point in mode torque, otherwise the feedforward.
   template <class N>
   struct Command {
     Mode mode = Mode::off;
@@ -66,10 +71,10 @@ struct Loops {
     typename N::Value torque{};   // of torque_base
     typename N::Value current{};  // of current_base, for the current controller
     typename N::Value error{};    // of the velocity; zero in mode torque
-    bool limited = false;         // the loops wanted more than they may
+    bool limited = false;         // the loops reached a limit
   };
 
-  // Host only. Notes gains and limits that do not fit.
+  // Host only. Records gains and limits that do not fit in OverflowLog.
   template <class N, class P>
   static Coefficients<N> derive(const LoopSetup<P>& s, const effects::DriveConstants<P>& d) {
     const P by_current = s.current_limit * d.torque_constant;
@@ -79,7 +84,7 @@ struct Loops {
     Coefficients<N> c;
     c.position = N::distance_gain(s.position_gain * d.angle_base / d.velocity_base);
     c.velocity = N::gain(s.velocity_gain * d.velocity_base / d.torque_base);
-    // Above one the integral would pass the base of the torque within a tick: no loop can be meant.
+    // Above one the integral would exceed the base of the torque within a tick, which is not a useful loop.
     c.integral = N::share(s.integral_gain * d.time_base * d.velocity_base / d.torque_base);
     c.velocity_limit = N::value(velocity_limit);
     c.largest_velocity = N::value(overspeed + overspeed);
@@ -92,8 +97,7 @@ struct Loops {
   }
 
   // One tick: returns the torque and the current to command. `angle` and `velocity` are measured. Bumpless in every
-  // change of mode as long as the integral may be as large as that takes, which is the torque limit; mode off gives
-  // nought at once.
+  // change of mode as far as the integral, which is within the torque limit, allows; mode off gives zero at once.
   template <class N>
   static constexpr Output<N> update(State<N>& s, const Coefficients<N>& c, const Command<N>& command,
                                     typename N::Angle angle, typename N::Value velocity) {
@@ -107,10 +111,10 @@ struct Loops {
     auto torque = feedforward;
     if (command.mode != Mode::torque) {
       error = velocity_set_point<N>(c, command, angle) - w;
-      // Within eight, beside four of the feedforward and two of the integral: the sum fits a value, and where it was
-      // held there it is beyond every limit.
+      // Within eight, in addition to four of the feedforward and two of the integral: the sum fits a value, and where
+      // it was clamped it is beyond every limit.
       const auto proportional = N::clamp(N::scaled(c.velocity, error), most_proportional<N>());
-      if (command.mode != s.mode) s.integral = taken_over<N>(c, s.torque, proportional, feedforward);
+      if (command.mode != s.mode) s.integral = bumpless_integral<N>(c, s.torque, proportional, feedforward);
       torque = torque + N::narrow(s.integral) + proportional;
     }
     s.mode = command.mode;
@@ -138,10 +142,10 @@ struct Loops {
     const auto two = N::one() + N::one();
     return two + two + two + two;
   }
-  // Limited where it becomes a state; before it is within two, eight and four.
+  // Limited where it becomes a state; before that it is within two, eight and four.
   template <class N>
-  static constexpr typename N::State taken_over(const Coefficients<N>& c, typename N::Value torque,
-                                                typename N::Value proportional, typename N::Value feedforward) {
+  static constexpr typename N::State bumpless_integral(const Coefficients<N>& c, typename N::Value torque,
+                                                       typename N::Value proportional, typename N::Value feedforward) {
     return N::widen(N::clamp(torque - proportional - feedforward, c.torque_limit));
   }
 };

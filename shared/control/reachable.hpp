@@ -1,5 +1,5 @@
-// One rule for all limits that stop a drive: each lies where its signal can show that it was passed, with a margin. A
-// limit beyond what a signal shows is no protection. Asked by the host when it packs and by the drive's validator.
+// One rule for all limits that stop a drive: each has to be within the range of its signal, with a margin. A limit
+// beyond that range does not protect. The host checks this when it packs, and the drive's validator as well.
 #pragma once
 
 #include <cstdint>
@@ -11,7 +11,8 @@ namespace flexspline::control {
 
 using Shown = fixed::Fixed::Value;
 
-// An analogue reading in bases of its signal. Signals that a model reads are held to two bases; limits see all of it.
+// An analogue reading in bases of its signal. Signals that a model reads are limited to two bases; limits use the whole
+// range.
 inline Shown shown(const AnalogScale<fixed::Fixed>& scale, std::int16_t share) {
   constexpr std::int32_t kMost = std::int32_t{15} << fixed::kValueBits;
   const Shown part{{std::int32_t{share} * (1 << (fixed::kValueBits - 15))}};
@@ -31,7 +32,7 @@ enum class Limit : std::uint8_t {
   following_velocity,
 };
 
-// What the rule is about.
+// The signals and limits of the rule.
 struct Limited {
   using N = fixed::Fixed;
   AnalogScale<N> current{};
@@ -60,7 +61,7 @@ inline Shown largest(Limit limit, const Limited& d) {
   const auto share = [](std::int64_t raw, int percent) {
     return Shown{{static_cast<std::int32_t>(fixed::limited<std::int64_t>(raw * percent / 100, 0, INT32_MAX))}};
   };
-  constexpr std::int64_t kTwoBases = std::int64_t{2} << fixed::kValueBits;  // where an encoder's velocity ends
+  constexpr std::int64_t kTwoBases = std::int64_t{2} << fixed::kValueBits;  // range of an encoder's velocity
   switch (limit) {
     case Limit::overspeed:
       return share(kTwoBases, 95);
@@ -75,7 +76,7 @@ inline Shown largest(Limit limit, const Limited& d) {
       return share(a > b ? a : b, 95);
     }
     case Limit::acceleration: {
-      // A count that stops at the overspeed; the filter shows the less of it, the slower it is.
+      // A count that stops at the overspeed: the slower the filter, the smaller its acceleration.
       const Shown stop = share(d.safety.overspeed.raw, 30);
       return fixed::Fixed::scaled(d.acceleration_scale, stop);
     }

@@ -1,9 +1,9 @@
-// Where a model is wrong, kept on the drive: the residual (measured motor torque less the model's) over velocity and
-// motor angle. Integers on the host and on the drive alike. 3848 bytes.
+// The errors of a model, recorded on the drive: the residual (measured motor torque less the model's) over velocity and
+// motor angle. Integers, both on the host and on the drive. 3848 bytes.
 //
 // A bin is one word: count (12 bits), sum (22) and sum of squares (30) of residuals of 10 bits. These cannot overflow
-// before the count is full, 4094; then all three are halved, so that a bin forgets what is older than some thousand
-// samples, and mean and variance stay.
+// before the count is full, 4094; then all three are halved, so that older samples lose weight after some thousand new
+// ones, and mean and variance stay.
 #pragma once
 
 #include <array>
@@ -21,24 +21,29 @@ namespace flexspline::control {
 // In the units of the motor.
 template <class P>
 struct ResidualMapSetup {
-  P standstill_velocity{};  // rad/s: below it friction takes whatever side it must, and has a bin of its own
+  P standstill_velocity{};  // rad/s: below it the direction of friction is undefined; it has a bin of its own
   P largest_velocity{};     // rad/s: from here on all is one bin
   P largest_residual{};     // N m, limited to it; a unit of the map is a part in 511
 };
 
 class ResidualMap {
  public:
-  static constexpr std::size_t kEdges = 7;  // of a direction, geometric from standstill to the largest velocity
+  static constexpr std::size_t kEdges = 7;  // per direction, geometric from standstill to the largest velocity
   static constexpr std::size_t kVelocityBins = 2 * kEdges + 1;
   static constexpr int kAngleBits = 5;
   static constexpr std::size_t kAngleBins = std::size_t{1} << kAngleBits;
   static constexpr std::int64_t kLargest = 511;
   static constexpr std::uint32_t kMostCount = 4094;
-  static constexpr std::uint32_t kEveryTicks = 4;  // a drive adds a residual as often
+  static constexpr std::uint32_t kEveryTicks = 4;  // interval at which a drive adds a residual
 
   struct Coefficients {
     std::array<std::int32_t, kEdges> edges{};  // raw values of velocity, rising
     std::int64_t scale = 0;                    // units per base, 2^-27
+    template <class Codec>
+    constexpr void fields(Codec& c) {
+      for (std::int32_t& edge : edges) c.positive(edge);
+      c.factor(scale);
+    }
   };
   struct Bin {
     std::uint32_t count = 0;
@@ -50,7 +55,7 @@ class ResidualMap {
   template <class N, class P>
   static Coefficients derive(const ResidualMapSetup<P>& s, const effects::DriveConstants<P>& d) {
     require(s.standstill_velocity > P(0.0) && s.standstill_velocity < s.largest_velocity,
-            "velocities of a residual map have to rise from above nought");
+            "velocities of a residual map have to rise from above zero");
     require(s.largest_residual > P(0.0), "the largest residual of a map has to be positive");
     Coefficients c;
     const P ratio = s.largest_velocity / s.standstill_velocity;
@@ -78,8 +83,8 @@ class ResidualMap {
     ++version_;
   }
 
-  // Reads a bin while the tick may interrupt: twice, until both agree, as a word of 64 bits takes a processor of 32 two
-  // steps. False after `kTries`, and then `bin` is not set: the tick would have to have hit the same bin each time.
+  // Reads a bin while the tick may interrupt: twice, until both agree, as a processor of 32 bits reads a word of 64
+  // bits in two steps. False after `kTries`, and then `bin` is not set: the tick wrote the same bin each time.
   bool read(std::size_t velocity_bin, std::size_t angle_bin, Bin& bin) const {
     constexpr int kTries = 8;
     const volatile std::uint64_t& word = words_[index(velocity_bin, angle_bin)];
@@ -91,7 +96,8 @@ class ResidualMap {
     }
     return false;
   }
-  // Changes with every tick and reset: the same before and after a copy of the whole map says that it is of one moment.
+  // Changes with every tick and reset: if it is the same before and after a copy of the whole map, the copy is
+  // consistent.
   std::uint32_t version() const {
     const volatile std::uint32_t& now = version_;
     return now;
@@ -132,7 +138,7 @@ class ResidualMap {
     return (std::uint64_t{bin.count} << (kSquareBits + kSumBits)) | (std::uint64_t{sum} << kSquareBits) | bin.squares;
   }
   static constexpr Bin halved(const Bin& bin) {
-    // Halves of a unit to the even side: many halvings have no bias.
+    // Rounds half to even, so that repeated halving has no bias.
     const std::int32_t half = (bin.sum + ((bin.sum >> 1) & 1)) >> 1;
     return {bin.count / 2, half, bin.squares / 2};
   }

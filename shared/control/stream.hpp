@@ -1,9 +1,9 @@
-// Set points of position that come one after the other from a host, each with its velocity and acceleration: between
-// two of them the drive goes on as the last one says,
+// A stream of set points of position from a host, each with its velocity and acceleration. Between two of them the
+// drive extrapolates the last one:
 //   v[k] = clamp(v[k-1] + a, v_limit),  p[k] = p[k-1] + (v[k-1] + v[k])/2,
-// so that a host at a thousandth of a second gives a set point without steps at every tick. Limits of position,
-// velocity and acceleration are those of the trajectory. A jump from one set point to the next is the host's; the loops
-// limit what comes of it. Integers on the host and on the drive, as in trajectory.hpp.
+// so that a host with a period of 1 ms gives a smooth set point at every tick. Limits of position, velocity and
+// acceleration are those of the trajectory. Jumps between set points are not smoothed; the loops limit their effect.
+// Integers on the host and on the drive, as in trajectory.hpp.
 #pragma once
 
 #include "shared/control/trajectory.hpp"
@@ -14,6 +14,10 @@ namespace flexspline::control {
 struct Stream {
   struct Coefficients {
     std::int64_t acceleration_base = 0;  // 2^-48 turns a tick, a tick
+    template <class Codec>
+    constexpr void fields(Codec& c) {
+      c.factor(acceleration_base);
+    }
   };
   struct State {
     std::int64_t position = 0;  // 2^-32 turns
@@ -29,7 +33,7 @@ struct Stream {
     const double base = static_cast<double>(d.acceleration_base * d.time_base * d.time_base) * units;
     return {fixed::nearest(base, 0x1p46, "the base of acceleration is above a quarter of a turn a tick, a tick")};
   }
-  // What the host says of this tick. Values in bases, of which each is held to its limit.
+  // The host's set point for this tick. Values in bases, each is clamped to its limit.
   template <class N>
   static constexpr State at(const Coefficients& c, const Trajectory::Coefficients<N>& limits, fixed::Angle position,
                             fixed::Value velocity, fixed::Value acceleration) {
@@ -38,7 +42,7 @@ struct Stream {
     return {fixed::limited(position.raw, limits.lowest, limits.highest), 0,
             fixed::limited(v, -limits.velocity, limits.velocity), fixed::limited(a, -limits.change, limits.change)};
   }
-  // One tick: the set point of this tick; the state then is that of the next.
+  // One tick: the set point of this tick; afterwards the state is that of the next tick.
   template <class N>
   static constexpr Trajectory::SetPoint<N> update(State& s, const Trajectory::Coefficients<N>& limits) {
     const Trajectory::SetPoint<N> point{N::angle(s.position),

@@ -5,8 +5,8 @@
 // in 2^-48 turns a tick, and A the largest change of it a tick. p[k] = p[k-1] + v[k]. From v the drive can stop, losing
 // A a tick, within
 //   D(v) = (v - A) + (v - 2 A) + ... = n v - A n (n + 1)/2,   v = n A + r,  0 <= r < A.
-// Of all v[k] that differ from v[k-1] by at most A, that one is taken which is largest towards the target and leaves
-// room to stop: v + D(v) <= distance. Then v - A will do so in the next tick, so that there always is one.
+// Of all v[k] that differ from v[k-1] by at most A, the largest one towards the target is taken that leaves room to
+// stop: v + D(v) <= distance. Then v - A does so in the next tick, so a solution always exists.
 #pragma once
 
 #include <bit>
@@ -15,7 +15,7 @@
 #include "shared/effects/effect.hpp"
 #include "shared/fixed/bits.hpp"
 #include "shared/fixed/elementary.hpp"
-#include "shared/fixed/findings.hpp"
+#include "shared/fixed/overflow_log.hpp"
 #include "shared/fixed/types.hpp"
 
 namespace flexspline::control {
@@ -31,7 +31,7 @@ struct TrajectorySetup {
 
 struct Trajectory {
   static constexpr int kFractionBits = 16;
-  static constexpr int kMostDistanceBits = 61;  // 8192 turns: what lies beyond is as good as this far
+  static constexpr int kMostDistanceBits = 61;  // 8192 turns: larger distances are limited to this
 
   template <class N>
   struct Coefficients {
@@ -42,6 +42,11 @@ struct Trajectory {
     typename N::DistanceGain to_velocity{};
     typename N::DistanceGain to_acceleration{};
     std::int64_t velocity_base = 0;  // 2^-48 turns a tick
+    template <class Codec>
+    constexpr void fields(Codec& c) {
+      c.position(lowest), c.position(highest), c.speed(velocity), c.speed(change);
+      c(to_velocity), c(to_acceleration), c.factor(velocity_base);
+    }
   };
   struct State {
     std::int64_t position = 0;  // 2^-32 turns
@@ -57,7 +62,8 @@ struct Trajectory {
     typename N::Value acceleration{};
   };
 
-  // Host only. Notes limits that cannot be kept to: less than a unit a tick, or more than 8192 turns to stop in.
+  // Host only. Records limits that are not representable in OverflowLog: less than a unit a tick, or more than 8192
+  // turns to stop in.
   template <class N, class P>
   static Coefficients<N> derive(const TrajectorySetup<P>& setup, const effects::DriveConstants<P>& d) {
     const double units = 0x1p48 / static_cast<double>(d.angle_base);  // a position base is a turn
@@ -67,7 +73,7 @@ struct Trajectory {
                       velocity * (velocity / change + 4.0) + 4.0 * change < 0x1p61;
     Coefficients<N> c;
     if (!fits || setup.lowest > setup.highest) {
-      fixed::Findings::note(
+      fixed::OverflowLog::note(
           "limits of a trajectory: above a unit a tick, below half a turn a tick, 8192 turns to stop");
       c.change = 1;
       return c;
@@ -83,9 +89,9 @@ struct Trajectory {
     return c;
   }
 
-  // Stands still at a position (2^-32 turns).
+  // At rest at a position (2^-32 turns).
   static constexpr State at(std::int64_t position) { return {position, 0, 0, 0}; }
-  // At a position and moving, as when control is handed over; limits count from here on. One division, by bits, as a
+  // At a position with a velocity, as at a change of mode; limits apply from here on. One division, by bits, as a
   // library's of 64 bits is larger than all this file; so not for every tick. `velocity` in 2^-48 turns a tick.
   template <class N>
   static constexpr State moving(const Coefficients<N>& c, std::int64_t position, std::int64_t velocity) {
@@ -108,11 +114,11 @@ struct Trajectory {
                                       std::int64_t speed = std::int64_t{1} << 62) {
     const std::int64_t before = s.velocity;
     const std::int64_t left = distance(s, fixed::limited(target, c.lowest, c.highest));
-    // Seen towards the target.
+    // In the direction of the target.
     const bool backwards = left < 0;
     const std::int64_t v = backwards ? -before : before;
-    const std::int64_t next =
-        towards(v, s.steps, backwards ? -left : left, c.change, fixed::limited<std::int64_t>(speed, 0, c.velocity));
+    const std::int64_t next = next_velocity(v, s.steps, backwards ? -left : left, c.change,
+                                            fixed::limited<std::int64_t>(speed, 0, c.velocity));
     move(s, backwards ? -next : next, c.change);
     return {N::angle(s.position), N::narrow(N::signal(c.to_velocity, N::steps(s.velocity))),
             N::narrow(N::signal(c.to_acceleration, N::steps(s.velocity - before)))};
@@ -127,7 +133,7 @@ struct Trajectory {
   }
 
  private:
-  // What is left to go, in 2^-48 turns.
+  // The remaining distance, in 2^-48 turns.
   static constexpr std::int64_t distance(const State& s, std::int64_t target) {
     constexpr std::int64_t kMost = std::int64_t{1} << (kMostDistanceBits - kFractionBits);
     const auto whole =
@@ -135,11 +141,13 @@ struct Trajectory {
     return fixed::limited(whole, -kMost, kMost) * (std::int64_t{1} << kFractionBits) - s.fraction;
   }
   // v + D(v) of v = n A: A n (n + 1)/2.
-  static constexpr std::int64_t room(std::int64_t n, std::int64_t change) { return n * (n + 1) / 2 * change; }
+  static constexpr std::int64_t stopping_distance(std::int64_t n, std::int64_t change) {
+    return n * (n + 1) / 2 * change;
+  }
 
   // The next velocity towards a target `left` >= 0 away; n is the number of whole A in the magnitude of v.
-  static constexpr std::int64_t towards(std::int64_t v, std::int64_t n, std::int64_t left, std::int64_t change,
-                                        std::int64_t limit) {
+  static constexpr std::int64_t next_velocity(std::int64_t v, std::int64_t n, std::int64_t left, std::int64_t change,
+                                              std::int64_t limit) {
     const std::int64_t slowest = v - change;
     std::int64_t fastest = v + change;
     if (fastest > limit) fastest = slowest > limit ? slowest : limit;
@@ -149,16 +157,17 @@ struct Trajectory {
     if (fastest - m * change < 0) --m;
     if (fastest - m * change >= change) ++m;
     const std::int64_t above = fastest - m * change;
-    if (room(m, change) + (m + 1) * above <= left) return fastest;
-    // Too fast: the largest velocity that can still stop has at most as many A; what cannot stop slows down by A.
-    for (int i = 0; i < 3 && m > 0 && room(m, change) > left; ++i) --m;
-    const std::int64_t over = left - room(m, change);
+    if (stopping_distance(m, change) + (m + 1) * above <= left) return fastest;
+    // Too fast: the largest velocity that can still stop has at most as many A; if none can stop, slow down by A.
+    for (int i = 0; i < 3 && m > 0 && stopping_distance(m, change) > left; ++i) --m;
+    const std::int64_t over = left - stopping_distance(m, change);
     if (over < 0) return slowest;
-    const std::int64_t best = m * change + shared_out(over, m + 1);
+    const std::int64_t best = m * change + divided(over, m + 1);
     return best < slowest ? slowest : best > fastest ? fastest : best;
   }
-  // over/parts, rounded down, or less by a part in 2^27: never more, as that could not stop. No division.
-  static constexpr std::int64_t shared_out(std::int64_t over, std::int64_t parts) {
+  // over/parts without a division: rounded down, or smaller by 2^-27 of it, but never larger, as then it could not
+  // stop.
+  static constexpr std::int64_t divided(std::int64_t over, std::int64_t parts) {
     if (parts == 1) return over;
     constexpr std::uint32_t kError = 4;
     const fixed::Reciprocal r = fixed::reciprocal_of(static_cast<std::uint64_t>(parts));
@@ -167,7 +176,7 @@ struct Trajectory {
   }
   static constexpr void move(State& s, std::int64_t velocity, std::int64_t change) {
     const auto size = static_cast<std::int64_t>(fixed::size_of(velocity));
-    // Through nought the magnitude begins anew, below A.
+    // After zero the magnitude starts again below A.
     if ((velocity < 0) != (s.velocity < 0)) s.steps = 0;
     if (size - s.steps * change < 0) --s.steps;
     if (size - s.steps * change >= change) ++s.steps;

@@ -22,7 +22,7 @@ struct Backlash : Stateless {
       .check =
           "Hold the motor and move the output by hand at both ends of the gap with a dial gauge; look for a loose key, "
           "bolt or coupling; count hours on the teeth.",
-      .rivals = "cubic_stiffness",
+      .confused_with = "cubic_stiffness",
       .separated_by = "small multi-sine about zero torque in locked load",
       .acts_last = true,
   };
@@ -37,6 +37,10 @@ struct Backlash : Stateless {
   template <class N>
   struct Coefficients {
     typename N::Value half_width;
+    template <class Codec>
+    constexpr void fields(Codec& c) {
+      c(half_width);
+    }
   };
   template <class N, class P>
   static Coefficients<N> derive(const P* p, const DriveConstants<P>& d) {

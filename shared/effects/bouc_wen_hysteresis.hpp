@@ -21,7 +21,7 @@ struct BoucWenHysteresis {
       .check =
           "Load and unload the locked output slowly by hand: the angle that stays at zero torque is the loop's width. "
           "Check the flexspline's bolts first.",
-      .rivals =
+      .confused_with =
           "dahl_hysteresis,modified_dahl_hysteresis,duhem_hysteresis,structural_damping,prandtl_ishlinskii_hysteresis",
       .separated_by =
           "the same torsion amplitude at a second frequency, which leaves this loop as it is; loops of several "
@@ -53,8 +53,12 @@ struct BoucWenHysteresis {
     typename N::Gain stiffening;  // n
     typename N::Exponent exponent;
     typename N::Exponent less_one;
+    template <class Codec>
+    constexpr void fields(Codec& c) {
+      c(torque), c(per_torsion), c(unloading), c(stiffening), c(exponent), c(less_one);
+    }
   };
-  // z over the most that it can reach, (beta + gamma)^(-1/n).
+  // z over its largest value, (beta + gamma)^(-1/n).
   template <class N>
   struct State {
     typename N::State share{};

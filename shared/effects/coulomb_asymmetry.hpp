@@ -18,9 +18,9 @@ struct CoulombAsymmetry : Stateless {
           "direction.",
       .causes = "Tooth flanks or seals that differ by direction, one-sided wear.",
       .check =
-          "Compare the current at the same slow speed both ways, with the drive off the sensor must read nought. Look "
+          "Compare the current at the same slow speed both ways, with the drive off the sensor must read zero. Look "
           "at seals, brushes and an axial load on one side.",
-      .rivals = "current_offset,torque_bias",
+      .confused_with = "current_offset,torque_bias",
       .separated_by = "a record with the drive off, which shows an offset of the sensor alone",
       .asymmetry_of = "coulomb_friction",
       .direction_symbols = "Tsp,Tsn",
@@ -31,12 +31,16 @@ struct CoulombAsymmetry : Stateless {
   template <class N>
   struct Coefficients {
     typename N::Weight torque;
+    template <class Codec>
+    constexpr void fields(Codec& c) {
+      c(torque);
+    }
   };
   template <class N, class P>
   static Coefficients<N> derive(const P* p, const DriveConstants<P>& d) {
     return {N::weight(p[0] / d.torque_base)};
   }
-  // The square of the direction is one while moving, nought at rest, and smooth between where the direction is.
+  // The square of the direction is one while moving, zero at rest, and smooth between where the direction is.
   template <class N>
   static void evaluate(const State<N>&, const Coefficients<N>& c, const Inputs<N>& in, Torques<N>& out) {
     out.motor += c.torque * N::times(in.direction, in.direction);

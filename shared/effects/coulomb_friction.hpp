@@ -18,7 +18,7 @@ struct CoulombFriction : Stateless {
       .check =
           "Raise the current slowly until the motor turns, in both directions and at several angles; a value that grew "
           "since assembly means preload, a seal or a dry bearing.",
-      .rivals = "dahl_friction",
+      .confused_with = "dahl_friction",
       .separated_by = "small slow motion that reverses often",
       .surface = "dry friction",
   };
@@ -28,6 +28,10 @@ struct CoulombFriction : Stateless {
   template <class N>
   struct Coefficients {
     typename N::Weight torque;
+    template <class Codec>
+    constexpr void fields(Codec& c) {
+      c(torque);
+    }
   };
   template <class N, class P>
   static Coefficients<N> derive(const P* p, const DriveConstants<P>& d) {

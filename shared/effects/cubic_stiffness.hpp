@@ -15,14 +15,12 @@ struct CubicStiffness : Stateless {
       .consequence =
           "The resonance rises with the load, so a controller that is damped at rest may ring under load, or the other "
           "way round.",
-      .causes =
-          "Usual in strain-wave gears: more teeth share the load as it grows. A soft start is also what wear "
-          "looks like.",
+      .causes = "Usual in strain-wave gears: more teeth share the load as it grows. Wear also looks like a soft start.",
       .check =
           "Measure the angle of the locked output at a tenth, half and all of the rated torque and compare with the "
           "maker's stiffness steps.",
-      .rivals = "backlash,piecewise_stiffness",
-      .separated_by = "multi-sine, small amplitude about zero, beside one up to the peak torque",
+      .confused_with = "backlash,piecewise_stiffness",
+      .separated_by = "two multi-sines: a small amplitude about zero, and one up to the peak torque",
   };
   static constexpr ParameterInfo kParameters[] = {
       {.name = "stiffness", .unit = {"N*m/rad^3", "N/m^3"}, .usual = 3e8},
@@ -30,6 +28,10 @@ struct CubicStiffness : Stateless {
   template <class N>
   struct Coefficients {
     typename N::Weight stiffness;
+    template <class Codec>
+    constexpr void fields(Codec& c) {
+      c(stiffness);
+    }
   };
   template <class N, class P>
   static Coefficients<N> derive(const P* p, const DriveConstants<P>& d) {

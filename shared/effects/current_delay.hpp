@@ -10,7 +10,7 @@ struct CurrentDelay {
       .equation = "Km (i(t) - i(t-d))",
       .shows_over = "current slope",
       .source = "sampling, filters",
-      .explanation = "The motor feels the current later than the log says.",
+      .explanation = "The current acts on the motor later than the log says.",
       .consequence =
           "Phase is lost at high frequency: the current loop and everything around it has less margin than the log "
           "suggests.",
@@ -20,7 +20,7 @@ struct CurrentDelay {
       .check =
           "Compare the time stamps of current and position, look for a filter in the amplifier's monitor output, log "
           "the measured current and not the command.",
-      .rivals = "inertia",
+      .confused_with = "inertia",
       .separated_by = "motion at several frequencies up to the current loop's bandwidth",
   };
   static constexpr ParameterInfo kParameters[] = {
@@ -30,9 +30,13 @@ struct CurrentDelay {
   struct Coefficients {
     typename N::Weight torque;
     typename N::Gain per_time;
+    template <class Codec>
+    constexpr void fields(Codec& c) {
+      c(torque), c(per_time);
+    }
   };
   // The delay's first-order all-pass, 2/(1 + s d/2) - 1, whose phase errs by (2 pi f d)^3/12. The state is how far the
-  // low-pass in it lags behind the current: nought at rest, so that a record may begin at any current.
+  // low-pass in it lags behind the current: zero at rest, so that a record may begin at any current.
   template <class N>
   struct State {
     typename N::State lag{};
@@ -42,7 +46,7 @@ struct CurrentDelay {
     const P two(2.0);
     return {N::weight(two * d.torque_constant * d.current_base / d.torque_base), N::gain(two * d.time_base / p[0])};
   }
-  // Exact for a current that is a straight line between two inputs.
+  // Exact for a current that is linear between two inputs.
   template <class N>
   static void advance(State<N>& state, const Coefficients<N>& c, const Inputs<N>& now, const Inputs<N>& before) {
     const typename N::Travel share = N::travel(c.per_time, now.elapsed);

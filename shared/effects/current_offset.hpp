@@ -10,14 +10,13 @@ struct CurrentOffset : Stateless {
       .equation = "Km i0, i0 = what the sensor reads at zero current",
       .shows_over = "bias, also at rest",
       .source = "amplifier",
-      .explanation =
-          "The current sensor reads something although no current flows, so every torque is off by a constant.",
+      .explanation = "The current sensor does not read zero at zero current, so every torque is off by a constant.",
       .consequence =
           "The axis creeps when zero current is commanded, and seems to have more friction one way than the other.",
       .causes = "Offset of the current sensor or of the amplifier's monitor output; drifts with temperature.",
       .check =
           "Read the current sensor with the power stage off; redo the amplifier's offset calibration, warm and cold.",
-      .rivals = "coulomb_asymmetry",
+      .confused_with = "coulomb_asymmetry",
       .separated_by = "a record with the drive off",
   };
   static constexpr ParameterInfo kParameters[] = {
@@ -26,6 +25,10 @@ struct CurrentOffset : Stateless {
   template <class N>
   struct Coefficients {
     typename N::Value torque;
+    template <class Codec>
+    constexpr void fields(Codec& c) {
+      c(torque);
+    }
   };
   template <class N, class P>
   static Coefficients<N> derive(const P* p, const DriveConstants<P>& d) {

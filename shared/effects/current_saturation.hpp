@@ -18,7 +18,7 @@ struct CurrentSaturation : Stateless {
       .check =
           "Look for a current or power limit in the amplifier's settings and at the supply voltage under load; log the "
           "measured current.",
-      .rivals = "torque_constant_saturation",
+      .confused_with = "torque_constant_saturation",
       .separated_by = "slow sine of current with a rising amplitude in locked load",
   };
   static constexpr ParameterInfo kParameters[] = {
@@ -33,6 +33,10 @@ struct CurrentSaturation : Stateless {
   struct Coefficients {
     typename N::Weight torque;
     typename N::Value limit;
+    template <class Codec>
+    constexpr void fields(Codec& c) {
+      c(torque), c(limit);
+    }
   };
   template <class N, class P>
   static Coefficients<N> derive(const P* p, const DriveConstants<P>& d) {

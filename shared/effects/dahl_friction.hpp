@@ -19,7 +19,7 @@ struct DahlFriction {
       .check =
           "Make a very small slow triangle of torque and look whether the angle follows as a spring does; check "
           "preload and seals.",
-      .rivals = "lugre_friction,coulomb_friction",
+      .confused_with = "lugre_friction,coulomb_friction",
       .separated_by = "small slow motion that reverses often",
       .replaces = "coulomb_friction",
       .surface = "dry friction",
@@ -37,6 +37,10 @@ struct DahlFriction {
   struct Coefficients {
     typename N::Weight torque;
     typename N::StepGain per_travel;
+    template <class Codec>
+    constexpr void fields(Codec& c) {
+      c(torque), c(per_travel);
+    }
   };
   // Share of the full friction that the bristles carry, -1 to 1.
   template <class N>

@@ -21,7 +21,7 @@ struct DahlHysteresis {
       .check =
           "Lock the output, raise and lower the current slowly: torque against angle draws the loop. Check the "
           "flexspline's bolts and clamping first.",
-      .rivals =
+      .confused_with =
           "structural_damping,modified_dahl_hysteresis,bouc_wen_hysteresis,duhem_hysteresis,prandtl_ishlinskii_"
           "hysteresis",
       .separated_by =
@@ -45,6 +45,10 @@ struct DahlHysteresis {
     typename N::Gain per_torsion;
     typename N::Exponent exponent;
     typename N::Exponent less_one;
+    template <class Codec>
+    constexpr void fields(Codec& c) {
+      c(torque), c(per_torsion), c(exponent), c(less_one);
+    }
   };
   // Share of the full torque, -1 to 1.
   template <class N>
@@ -56,7 +60,7 @@ struct DahlHysteresis {
     return {N::weight(p[0] / d.output_torque_base), N::gain(p[1] * d.torsion_base / p[0]), N::exponent(p[2]),
             N::exponent(p[2] - P(1.0))};
   }
-  // What is left to the limit, u = abs(s - T/Tc), obeys u' = -u^i over travel x = sigma abs(dq)/Tc, whose solution is
+  // The distance to the limit, u = abs(s - T/Tc), obeys u' = -u^i over travel x = sigma abs(dq)/Tc, whose solution is
   // u0 times the q-exponential of x u0^(i-1). Where i < 1 that power grows without bound as the limit comes near, which
   // is then reached after a finite travel.
   template <class N>

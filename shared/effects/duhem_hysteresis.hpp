@@ -21,7 +21,7 @@ struct DuhemHysteresis {
           "came before.",
       .causes = "Friction inside the flexspline and the mesh, described together with the stiffness.",
       .check = "Lock the output and make slow loops of several sizes; check the flexspline's bolts and clamping first.",
-      .rivals = "dahl_hysteresis,bouc_wen_hysteresis,structural_damping,prandtl_ishlinskii_hysteresis",
+      .confused_with = "dahl_hysteresis,bouc_wen_hysteresis,structural_damping,prandtl_ishlinskii_hysteresis",
       .separated_by =
           "the same torsion amplitude at a second frequency, which leaves this loop as it is; loops of several "
           "amplitudes against other laws of hysteresis",
@@ -43,12 +43,16 @@ struct DuhemHysteresis {
   template <class N>
   struct Coefficients {
     typename N::Gain rate;
-    typename N::Value lead;  // quarter of b/a, what the torque leads phi by in long motion
+    typename N::Value lead;  // quarter of b/a, by which the torque leads phi in long motion
     typename N::Value eighth_phi_0;
     typename N::Gain eighth_phi_1;
     typename N::Gain eighth_phi_2;
     typename N::Gain eighth_phi_3;
     typename N::Weight torque;
+    template <class Codec>
+    constexpr void fields(Codec& c) {
+      c(rate), c(lead), c(eighth_phi_0), c(eighth_phi_1), c(eighth_phi_2), c(eighth_phi_3), c(torque);
+    }
   };
   // A quarter of the torque, in output torque bases: a drive relaxes over distances below eight.
   template <class N>

@@ -1,7 +1,7 @@
-// What every physical effect is made of. An effect is written once, as templates over a number system N, and from its
-// header it appears in every command, in the simulation, in the diagnosis and in the firmware.
+// The interface of a physical effect. An effect is written once, as templates over a number system N; its header makes
+// it available in every command, in the simulation, in the diagnosis and in the firmware.
 //
-// A number system is a set of types and functions, not one scalar; README.md has the table of what it must offer. On
+// A number system is a set of types and functions, not one scalar; README.md says what it has to offer. On
 // the host all types are one plain scalar. Effects use operators between coefficients and signals and take every other
 // function from N; they never branch on a value.
 #pragma once
@@ -19,19 +19,20 @@ enum class Balance : std::uint8_t { motor, transmission, load };
 // shift: changes a signal before any other effect sees it; modulate: scales another effect; source: adds a torque.
 enum class Phase : std::uint8_t { shift, modulate, source };
 
-// linear: the torque is proportional to it (and to all that are stated per it); shape: searched for within bounds;
-// given: stated by the user; grid: set from the range of the data where the model does not state it, and then known.
+// linear: the torque is proportional to it (and to all parameters that are stated relative to it); shape: a nonlinear
+// parameter, searched for within bounds; given: stated by the user; grid: set from the range of the data where the
+// model does not state it, and then known.
 enum class Kind : std::uint8_t { linear, shape, given, grid };
 
-// Where the bounds of a shape parameter come from when data are at hand.
+// From what the bounds of a nonlinear parameter are derived when data are available.
 enum class Limit : std::uint8_t {
   stated,            // low and high below hold for any data
-  scale,             // the same, of something with a size: searched for by its ratio to them
-  velocity,          // a motor velocity: above what the mask leaves visible, below a quarter of the fast motion
-  travel,            // a motor angle: above what the filter resolves, below the shortest stroke between reversals
+  scale,             // the same, for a positive scale: searched for by its ratio to them
+  velocity,          // a motor velocity: above the mask's limit, below a quarter of the fast motion
+  travel,            // a motor angle: above the filter's resolution, below the shortest stroke between reversals
   torsion,           // a torsion: above the resolution of the positions, below a third of the largest torsion
-  corner,            // a torsion at which something changes: above the resolution, up to half more than the largest
-  span,              // the whole range of a torsion: from half the largest to a third more
+  corner,            // a torsion at a corner: above the resolution, up to 1.5 times the largest
+  span,              // the whole range of a torsion: from half the largest to 4/3 of it
   current,           // a current: between a tenth of the largest and the largest
   inverse_velocity,  // one over a motor velocity, from a thousandth of the fast motion's to that of the slowest visible
   inverse_travel,    // one over a motor angle: the inverse of travel
@@ -39,7 +40,7 @@ enum class Limit : std::uint8_t {
   inverse_torque,    // one over a torque: from a hundredth of the largest torque's to thirty times it
 };
 
-// What an effect reads, so that it is offered only where it can be seen.
+// The signals that an effect reads, so that it is offered only where the data have them.
 enum Signals : std::uint16_t {
   kMotorMotion = 1,
   kMotorAngle = 2,
@@ -50,7 +51,7 @@ enum Signals : std::uint16_t {
   kCurrent = 64,
   kTemperature = 128,
   kTorqueInput = 256,      // where effort is given as torque or force, not as current
-  kBothDirections = 1024,  // motion both ways: else it is no more than a part of the friction of one
+  kBothDirections = 1024,  // motion both ways: with one direction it is only a part of that direction's friction
   kTorqueScale = 512,      // needs something that fixes the torque scale: a known parameter, or a loaded torque sensor
 };
 
@@ -84,13 +85,14 @@ struct ParameterInfo {
   double low = -kUnbounded;
   double high = kUnbounded;
   Limit limit = Limit::stated;
-  // How a shape is searched for, where its own number is a poor measure: as a ratio to another parameter (so that the
-  // torque is proportional to that one), or as the root of a power. Limits and the bounds above then hold for
+  // How a nonlinear parameter is searched for where its own value is a poor measure: as a ratio to another parameter
+  // (so that the torque is proportional to that one), or as the root of a power. Limits and the bounds above then hold
+  // for
   //   reduced = (value / value(per))^(1 / value(root_of)).
   std::string_view per{};
   std::string_view root_of{};
   double share_of_range = 1.0;  // of the largest torsion, for kind grid
-  bool per_record = false;      // a constant of each recording; the model holds what they have in common
+  bool per_record = false;      // a constant of each recording; the model has their mean
 };
 
 struct Description {
@@ -101,42 +103,40 @@ struct Description {
   std::string_view equation{};
   std::string_view shows_over{};
   std::string_view source{};
-  std::string_view explanation{};   // what it is, for somebody who never heard of it
-  std::string_view consequence{};   // what it does to the motion
-  std::string_view causes{};        // usual causes
-  std::string_view check{};         // what to look at on the machine
-  std::string_view rivals{};        // names, separated by commas: what it is confused with
-  std::string_view separated_by{};  // the experiment that tells them apart
-  std::string_view replaces{};      // effects that it stands in for, separated by commas
-  std::string_view modulates{};     // the effect that it scales and needs in the model
-  // Laws of one curve that differ in its formula alone carry the same name here: most data cannot distinguish them.
+  std::string_view explanation{};    // what it is, for a reader who does not know it
+  std::string_view consequence{};    // its influence on the motion
+  std::string_view causes{};         // usual causes
+  std::string_view check{};          // what to check on the machine
+  std::string_view confused_with{};  // effects that it is confused with, separated by commas
+  std::string_view separated_by{};   // the experiment that distinguishes them
+  std::string_view replaces{};       // effects that it replaces, separated by commas
+  std::string_view modulates{};      // the effect that it scales and needs in the model
+  // Laws that are different formulas for the same curve have the same name here: most data cannot distinguish them.
   std::string_view family{};
-  std::string_view contains{};  // effects whose torque it can draw as a part of its own
-  // Where all of its amplitudes come out negative: what that means, and what it means if that reaches over a wide range
-  // of velocity, as it is another law then.
+  std::string_view contains{};  // effects whose torque it can represent as a part of its own
+  // The meaning of negative amplitudes, and their meaning over a wide range of velocity, as it is another law then.
   std::string_view negative_means{};
   std::string_view wide_negative_means{};
   std::string_view wide_negative_is{};
   // The friction of which it is half the difference between the directions, and the symbols of both: "Tvp,Tvn".
   std::string_view asymmetry_of{};
   std::string_view direction_symbols{};
-  // A surface whose friction differs from run to run, as grease warms or settles: what carries the same name scales
-  // together.
+  // A surface whose friction differs from run to run, as the grease changes: effects with the same name scale together.
   std::string_view surface{};
   // Other balances that it adds to (bits of `on`); its parameters are estimated on its own balance, or, where they are
   // not identifiable on that, on the motor balance.
   unsigned adds_to = 0;
   bool identified_on_motor = false;
-  bool acts_last = false;  // a shift that acts on the signal as all others have left it
+  bool acts_last = false;  // a shift that acts after all others
   bool host_only = false;  // too large for a drive
-  // What it computes is stated in the model file beside its parameters, so that each one there is an effect of its own.
+  // Its law is stated in the model file with its parameters, so that each one there is an effect of its own.
   bool made_by_user = false;
 };
 constexpr unsigned on(Balance balance) {
   return 1U << static_cast<unsigned>(balance);
 }
 
-// Known facts of the drive that derivations use, and the bases of per-unit numbers (all one where numbers are SI).
+// Constants of the drive for derivations, and the bases of per-unit numbers (all one where numbers are SI).
 template <class P>
 struct DriveConstants {
   P gear_ratio{1.0};
@@ -180,7 +180,7 @@ struct Inputs {
   typename N::Value temperature{};
   typename N::Value viscous_scale{};  // one unless an effect modulates
   typename N::Value coulomb_scale{};
-  typename N::Value elapsed{};  // since the inputs before; one on a drive, whose time base is its tick
+  typename N::Value elapsed{};  // since the previous inputs; one on a drive, whose time base is its tick
 };
 
 template <class N>
@@ -190,7 +190,7 @@ struct Torques {
   typename N::Sum load{};
 };
 
-// An effect without memory: what it does depends on this tick alone.
+// An effect without memory: it depends on the present tick only.
 struct Stateless {
   template <class N>
   struct State {};
@@ -199,7 +199,7 @@ struct Stateless {
 };
 
 // The effect with a number in the parameter block; each effect's header defines its own. A number used twice does not
-// compile, and numbers are never given again.
+// compile, and numbers are not reused.
 template <std::size_t Id>
 struct AtId {
   using Effect = void;

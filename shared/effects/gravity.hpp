@@ -13,14 +13,12 @@ struct Gravity : Stateless {
       .source = "unbalanced link",
       .explanation =
           "The link's centre of mass is off the axis, so its weight turns the output, depending on the angle.",
-      .consequence =
-          "The axis needs torque to stand still, differing with the angle, and runs away downwards when the drive is "
-          "off.",
+      .consequence = "The axis needs a holding torque that depends on the angle, and falls when the drive is off.",
       .causes = "An arm, tool or cable that is not balanced; a base that is not level.",
       .check =
           "Turn the output slowly through a turn and note the holding current; check balance weights, cables and the "
           "level of the base.",
-      .rivals = "linear_stiffness",
+      .confused_with = "linear_stiffness",
       .separated_by = "slow motion over a large part of an output turn",
   };
   static constexpr ParameterInfo kParameters[] = {
@@ -31,6 +29,10 @@ struct Gravity : Stateless {
   struct Coefficients {
     typename N::Weight cosine;
     typename N::Weight sine;
+    template <class Codec>
+    constexpr void fields(Codec& c) {
+      c(cosine), c(sine);
+    }
   };
   template <class N, class P>
   static Coefficients<N> derive(const P* p, const DriveConstants<P>& d) {

@@ -16,7 +16,7 @@ struct Inertia : Stateless {
       .check =
           "Compare with the data sheets of rotor, coupling and wave generator; check the set screw or clamp between "
           "them.",
-      .rivals = "current_delay",
+      .confused_with = "current_delay",
       .separated_by = "the same amplitude at a second frequency",
   };
   static constexpr ParameterInfo kParameters[] = {
@@ -25,6 +25,10 @@ struct Inertia : Stateless {
   template <class N>
   struct Coefficients {
     typename N::Weight inertia;
+    template <class Codec>
+    constexpr void fields(Codec& c) {
+      c(inertia);
+    }
   };
   template <class N, class P>
   static Coefficients<N> derive(const P* p, const DriveConstants<P>& d) {

@@ -13,8 +13,8 @@ struct KinematicError : Stateless {
       .shows_over = "motor angle",
       .source = "Tuttle",
       .explanation =
-          "The gear does not turn the output quite evenly: over a turn of the motor the output leads and lags "
-          "by some arc seconds. The motor feels it as a ripple that grows with the load.",
+          "The gear does not turn the output evenly: over a turn of the motor the output leads and lags "
+          "by some arc seconds. At the motor it is a ripple that grows with the load.",
       .consequence =
           "The output leads and lags twice a turn of the motor; at a certain speed this meets the resonance and the "
           "axis shakes.",
@@ -24,7 +24,7 @@ struct KinematicError : Stateless {
       .check =
           "Turn slowly with an encoder on the output and compare with the motor's; check the alignment of circular "
           "spline and wave generator.",
-      .rivals = "load_scaled_ripple,torque_ripple,dahl_hysteresis",
+      .confused_with = "load_scaled_ripple,torque_ripple,dahl_hysteresis",
       .separated_by = "slow constant speed over many turns with an output encoder",
       .adds_to = on(Balance::motor),
   };
@@ -42,6 +42,10 @@ struct KinematicError : Stateless {
     typename N::Gain rate_sine;
     typename N::Weight torque_cosine;  // of its slope, times torque
     typename N::Weight torque_sine;
+    template <class Codec>
+    constexpr void fields(Codec& c) {
+      c(order), c(cosine), c(sine), c(rate_cosine), c(rate_sine), c(torque_cosine), c(torque_sine);
+    }
   };
   template <class N, class P>
   static Coefficients<N> derive(const P* p, const DriveConstants<P>& d) {

@@ -18,7 +18,7 @@ struct LinearStiffness : Stateless {
       .check =
           "Apply a known torque to the output with the motor held and read the angle; look for loose bolts when it is "
           "soft.",
-      .rivals = "cubic_stiffness",
+      .confused_with = "cubic_stiffness",
       .separated_by = "locked load at full torque and at a tenth of it",
   };
   static constexpr ParameterInfo kParameters[] = {
@@ -27,6 +27,10 @@ struct LinearStiffness : Stateless {
   template <class N>
   struct Coefficients {
     typename N::Weight stiffness;
+    template <class Codec>
+    constexpr void fields(Codec& c) {
+      c(stiffness);
+    }
   };
   template <class N, class P>
   static Coefficients<N> derive(const P* p, const DriveConstants<P>& d) {

@@ -1,4 +1,4 @@
-// The list of effects: one line each. The order is that of the numbers which the effects give themselves.
+// The list of effects: one line each, in the order of their numbers.
 #pragma once
 
 #include "shared/effects/backlash.hpp"

@@ -20,7 +20,7 @@ struct LoadDependentFriction : Stateless {
       .check =
           "Lift and lower the same weight at the same speed and compare the currents; check the lubricant of the tooth "
           "mesh and the wear of the teeth.",
-      .rivals = "stribeck_gaussian,torque_constant_saturation",
+      .confused_with = "stribeck_gaussian,torque_constant_saturation",
       .separated_by =
           "a constant external load in both directions at low current; a slow free triangle against Stribeck",
   };
@@ -30,6 +30,10 @@ struct LoadDependentFriction : Stateless {
   template <class N>
   struct Coefficients {
     typename N::Weight coefficient;
+    template <class Codec>
+    constexpr void fields(Codec& c) {
+      c(coefficient);
+    }
   };
   template <class N, class P>
   static Coefficients<N> derive(const P* p, const DriveConstants<P>& d) {

@@ -11,13 +11,13 @@ struct LoadScaledRipple : Stateless {
       .shows_over = "motor angle times torque",
       .source = "mesh",
       .explanation =
-          "A torque on the motor that repeats with its angle and grows with the load: what a kinematic error of "
-          "the gear looks like from the motor.",
+          "A torque on the motor that repeats with its angle and grows with the load: the effect of a kinematic error "
+          "of the gear on the motor.",
       .consequence = "The speed ripples under load and is smooth without.",
       .causes = "Kinematic error of the mesh; misalignment of the wave generator that shows under load.",
       .check =
           "Turn slowly at two loads and compare the ripple of the current; check the alignment of the wave generator.",
-      .rivals = "kinematic_error,torque_ripple",
+      .confused_with = "kinematic_error,torque_ripple",
       .separated_by = "slow constant speed over many turns at two loads, with an output encoder",
   };
   static constexpr ParameterInfo kParameters[] = {
@@ -28,6 +28,10 @@ struct LoadScaledRipple : Stateless {
   template <class N>
   struct Coefficients {
     typename N::Harmonic ripple;
+    template <class Codec>
+    constexpr void fields(Codec& c) {
+      c(ripple);
+    }
   };
   template <class N, class P>
   static Coefficients<N> derive(const P* p, const DriveConstants<P>& d) {

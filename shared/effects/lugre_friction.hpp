@@ -19,7 +19,7 @@ struct LugreFriction {
           "The axis springs within its stiction, breaks loose and jerks at slow speed; it hunts about a position.",
       .causes = "Elastic contacts in mesh, bearings and seals together with boundary lubrication.",
       .check = "Creep at the slowest speed that is used and look for stick-slip; check grease and preload.",
-      .rivals = "dahl_friction,stribeck_gaussian,stribeck_hess_soom,coulomb_friction",
+      .confused_with = "dahl_friction,stribeck_gaussian,stribeck_hess_soom,coulomb_friction",
       .separated_by = "small slow motion that reverses often, and a slow free triangle of velocity",
       .replaces = "coulomb_friction,stribeck_gaussian,stribeck_hess_soom",
       .surface = "dry friction",
@@ -56,12 +56,16 @@ struct LugreFriction {
   };
   template <class N>
   struct Coefficients {
-    typename N::Weight full;  // static friction, the most that the bristles carry
+    typename N::Weight full;  // static friction, the largest load of the bristles
     typename N::Weight damping;
     typename N::Value sliding;  // Fc/Fs
     typename N::Gain rise;      // 1 - Fc/Fs
     typename N::RatioGain per_velocity;
     typename N::StepGain per_travel;
+    template <class Codec>
+    constexpr void fields(Codec& c) {
+      c(full), c(damping), c(sliding), c(rise), c(per_velocity), c(per_travel);
+    }
   };
   // Share of the static friction that the bristles carry.
   template <class N>
@@ -83,8 +87,8 @@ struct LugreFriction {
   static typename N::Value limit(const Coefficients<N>& c, const Inputs<N>& in) {
     return c.sliding + N::scaled(c.rise, N::gauss(N::ratio(c.per_velocity, in.velocity)));
   }
-  // Over a step the speed hardly changes, so that its g is a constant and the law is linear in z: solved exactly by
-  // travel, as s0 is far too stiff for an explicit step.
+  // Over a step the speed hardly changes, so g is taken as constant and the law is linear in z: it is solved exactly
+  // over travel, as s0 is far too stiff for an explicit step.
   template <class N>
   static void advance(State<N>& state, const Coefficients<N>& c, const Inputs<N>& now, const Inputs<N>& before) {
     const typename N::Step travel = now.angle - before.angle;
@@ -92,7 +96,7 @@ struct LugreFriction {
     const auto share = N::exp_negative(N::over(N::travel(c.per_travel, N::magnitude(travel)), most));
     state.deflection = N::relax(state.deflection, N::times(N::sign(travel), most), share);
   }
-  // s1 z' = s1 w (1 - s(w) s0 z/g): nought in steady sliding.
+  // s1 z' = s1 w (1 - s(w) s0 z/g): zero in steady sliding.
   template <class N>
   static void evaluate(const State<N>& state, const Coefficients<N>& c, const Inputs<N>& in, Torques<N>& out) {
     const typename N::Value carried = N::narrow(state.deflection);

@@ -19,7 +19,8 @@ struct ModifiedDahlHysteresis {
       .check =
           "Lock the output, raise and lower the current slowly: torque against angle draws the loop. Check the "
           "flexspline's bolts and clamping first.",
-      .rivals = "dahl_hysteresis,structural_damping,bouc_wen_hysteresis,duhem_hysteresis,prandtl_ishlinskii_hysteresis",
+      .confused_with =
+          "dahl_hysteresis,structural_damping,bouc_wen_hysteresis,duhem_hysteresis,prandtl_ishlinskii_hysteresis",
       .separated_by =
           "the same torsion amplitude at a second frequency, which leaves this loop as it is; loops of several "
           "amplitudes against other laws of hysteresis",
@@ -39,6 +40,10 @@ struct ModifiedDahlHysteresis {
     typename N::Weight torque;
     typename N::Gain per_torsion;
     typename N::Exponent exponent;
+    template <class Codec>
+    constexpr void fields(Codec& c) {
+      c(torque), c(per_torsion), c(exponent);
+    }
   };
   // Share of the full torque, -1 to 1.
   template <class N>

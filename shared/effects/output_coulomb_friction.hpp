@@ -13,13 +13,13 @@ struct OutputCoulombFriction : Stateless {
       .source = "report eq. 43",
       .explanation = "Dry friction of the output bearing: the same torque against every motion of the link.",
       .consequence =
-          "The link stays where it stopped although the gear is still twisted: the torque at rest is not known to "
-          "better than this.",
+          "The link stays where it stopped although the gear is still twisted: the torque at rest is uncertain by this "
+          "amount.",
       .causes = "Preload and seal of the output bearing, cables that drag.",
       .check =
           "Uncouple the motor and turn the link by hand or with a spring balance; look for dragging cables and a tight "
           "seal.",
-      .rivals = "coulomb_friction",
+      .confused_with = "coulomb_friction",
       .separated_by = "a torque sensor",
       .surface = "the output's dry friction",
   };
@@ -29,6 +29,10 @@ struct OutputCoulombFriction : Stateless {
   template <class N>
   struct Coefficients {
     typename N::Weight torque;
+    template <class Codec>
+    constexpr void fields(Codec& c) {
+      c(torque);
+    }
   };
   template <class N, class P>
   static Coefficients<N> derive(const P* p, const DriveConstants<P>& d) {

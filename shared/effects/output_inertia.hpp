@@ -11,11 +11,11 @@ struct OutputInertia : Stateless {
       .equation = "Jo ao",
       .shows_over = "acceleration",
       .source = "report eq. 45",
-      .explanation = "The link and all that it carries resist every change of speed.",
+      .explanation = "The link and its payload resist every change of speed.",
       .consequence = "Sets the resonance with the gear's stiffness: a heavier link swings slower and longer.",
       .causes = "Always there. A change means another payload.",
       .check = "Weigh the payload, or compute it from the drawings; ask what was mounted since the last recording.",
-      .rivals = "inertia",
+      .confused_with = "inertia",
       .separated_by = "a torque sensor, or a second known payload",
   };
   static constexpr ParameterInfo kParameters[] = {
@@ -24,6 +24,10 @@ struct OutputInertia : Stateless {
   template <class N>
   struct Coefficients {
     typename N::Weight inertia;
+    template <class Codec>
+    constexpr void fields(Codec& c) {
+      c(inertia);
+    }
   };
   template <class N, class P>
   static Coefficients<N> derive(const P* p, const DriveConstants<P>& d) {

@@ -15,7 +15,7 @@ struct OutputViscousFriction : Stateless {
       .consequence = "The link is damped; fast motion takes more torque through the gear.",
       .causes = "Output bearing and its seal; grease when cold.",
       .check = "Uncouple the motor, let the link swing and see how soon it stops, cold and warm.",
-      .rivals = "viscous_friction",
+      .confused_with = "viscous_friction",
       .separated_by = "a torque sensor",
       .surface = "the output's viscous friction",
   };
@@ -25,6 +25,10 @@ struct OutputViscousFriction : Stateless {
   template <class N>
   struct Coefficients {
     typename N::Weight coefficient;
+    template <class Codec>
+    constexpr void fields(Codec& c) {
+      c(coefficient);
+    }
   };
   template <class N, class P>
   static Coefficients<N> derive(const P* p, const DriveConstants<P>& d) {

@@ -12,13 +12,13 @@ struct PiecewiseStiffness : Stateless {
       .shows_over = "torsion, corners",
       .source = "makers' catalogues",
       .explanation =
-          "The spring has three slopes, as makers of gears state it: soft up to a torque T1, harder up to T2, "
+          "The spring has three slopes, as catalogues of gears state them: soft up to a torque T1, harder up to T2, "
           "hardest beyond.",
       .consequence = "The resonance jumps with the load's range; a model with one stiffness is too soft or too stiff.",
       .causes = "Teeth that come into mesh one after the other as the load grows.",
       .check =
           "Compare the corners and slopes with the three that the maker's catalogue states for this size and ratio.",
-      .rivals = "cubic_stiffness,backlash",
+      .confused_with = "cubic_stiffness,backlash",
       .separated_by = "slow sine of torque up to twice T2 in locked load",
       .replaces = "linear_stiffness",
   };
@@ -60,6 +60,10 @@ struct PiecewiseStiffness : Stateless {
     typename N::Weight outer;
     typename N::Value first;  // torsion at the corners
     typename N::Value second;
+    template <class Codec>
+    constexpr void fields(Codec& c) {
+      c(inner), c(middle), c(outer), c(first), c(second);
+    }
   };
   // T1/K1, and from there (T2 - T1)/K2 on.
   template <class N, class P>

@@ -14,11 +14,11 @@ struct PowerLawFriction : Stateless {
           "Friction grows with speed, but ever more slowly: the lubricant thins as it is sheared (sublinear "
           "friction).",
       .consequence =
-          "The torque rises steeply at slow speed and little at high speed: a straight viscous line is wrong at both "
+          "The torque rises steeply at slow speed and little at high speed: a linear viscous law is wrong at both "
           "ends.",
       .causes = "Grease; its kind and temperature set the exponent. Usual in strain-wave gears.",
       .check = "Hold five or more speeds from slow to rated and plot the current; note grease and temperature.",
-      .rivals = "viscous_friction,stribeck_gaussian",
+      .confused_with = "viscous_friction,stribeck_gaussian",
       .separated_by = "steady motion at five or more speeds from slow to rated",
       .surface = "viscous friction",
   };
@@ -31,6 +31,10 @@ struct PowerLawFriction : Stateless {
     typename N::Weight torque;
     typename N::RatioGain per_velocity;
     typename N::Exponent exponent;
+    template <class Codec>
+    constexpr void fields(Codec& c) {
+      c(torque), c(per_velocity), c(exponent);
+    }
   };
   template <class N, class P>
   static Coefficients<N> derive(const P* p, const DriveConstants<P>& d) {

@@ -14,14 +14,15 @@ struct PrandtlIshlinskiiHysteresis {
       .shows_over = "loops within loops",
       .source = "Ishlinskii",
       .explanation =
-          "The loop as a sum of plays of different widths: any loop whose shape does not depend on where along the "
-          "torsion it lies, with loops within loops. Beside a stiffness its weights are negative.",
+          "The loop as a sum of plays of different widths: any loop whose shape does not depend on its place along the "
+          "torsion, with loops within loops. Together with a stiffness its weights are negative.",
       .consequence = "The output stops at angles that depend on all reversals before; small motions have small loops.",
       .causes = "Friction inside the flexspline and the mesh, of many contacts that slip one after the other.",
       .check =
-          "Lock the output and ride small sines on a slow large one; check the flexspline's bolts and clamping first.",
-      .rivals = "dahl_hysteresis,bouc_wen_hysteresis,duhem_hysteresis,preisach_hysteresis",
-      .separated_by = "sines of several amplitudes that ride on a slower one",
+          "Lock the output and superpose small sines on a slow large one; check the flexspline's bolts and clamping "
+          "first.",
+      .confused_with = "dahl_hysteresis,bouc_wen_hysteresis,duhem_hysteresis,preisach_hysteresis",
+      .separated_by = "sines of several amplitudes superposed on a slower one",
       .contains = "linear_stiffness",
   };
   static constexpr ParameterInfo kParameters[] = {
@@ -87,6 +88,10 @@ struct PrandtlIshlinskiiHysteresis {
   struct Coefficients {
     std::array<typename N::Value, kPlays> threshold;
     std::array<typename N::Weight, kPlays> weight;
+    template <class Codec>
+    constexpr void fields(Codec& c) {
+      c(threshold), c(weight);
+    }
   };
   template <class N>
   struct State {
@@ -101,7 +106,7 @@ struct PrandtlIshlinskiiHysteresis {
     }
     return c;
   }
-  // A play follows the torsion itself, so that nothing can add up to a drift.
+  // A play follows the torsion itself, so that errors cannot accumulate to a drift.
   template <class N>
   static void advance(State<N>& state, const Coefficients<N>& c, const Inputs<N>& now, const Inputs<N>&) {
     for (int j = 0; j < kPlays; ++j)

@@ -14,14 +14,15 @@ struct PreisachHysteresis {
       .shows_over = "loops within loops",
       .source = "Preisach",
       .explanation =
-          "The loop as a sum of relays with two thresholds each: the most general of the rate-independent laws "
-          "here, with the most parameters. Beside a stiffness its weights are negative. For analysis on the host.",
+          "The loop as a sum of relays with two thresholds each: the most general of the rate-independent laws here, "
+          "with the most parameters. Together with a stiffness its weights are negative. For analysis on the host.",
       .consequence = "The output stops at angles that depend on all reversals before, in loops within loops.",
       .causes = "Friction inside the flexspline and the mesh, of many contacts that slip one after the other.",
       .check =
-          "Lock the output and ride small sines on a slow large one; check the flexspline's bolts and clamping first.",
-      .rivals = "prandtl_ishlinskii_hysteresis,dahl_hysteresis,bouc_wen_hysteresis,duhem_hysteresis",
-      .separated_by = "sines of several amplitudes that ride on a slower one, away from zero",
+          "Lock the output and superpose small sines on a slow large one; check the flexspline's bolts and clamping "
+          "first.",
+      .confused_with = "prandtl_ishlinskii_hysteresis,dahl_hysteresis,bouc_wen_hysteresis,duhem_hysteresis",
+      .separated_by = "sines of several amplitudes superposed on a slower one, away from zero",
       .contains = "linear_stiffness",
       .host_only = true,
   };
@@ -80,15 +81,15 @@ struct PreisachHysteresis {
     typename N::Value up[kLevels];  // centres of the edges
     typename N::Value down[kLevels];
     typename N::Gain per_edge;
-    typename N::Value initial[kRelays];  // of a gear that was worked until nothing of its past is left
+    typename N::Value initial[kRelays];  // of a gear that was cycled until its history has no influence
     typename N::Weight weight[kRelays];
-    // Relays that add something, in order: a regression asks for one at a time, which is a small part of the work.
+    // Relays with a weight, in order: a regression evaluates one at a time, which is a small part of the work.
     unsigned char level_up[kRelays];
     unsigned char level_down[kRelays];
     unsigned char relay[kRelays];
     int used = 0;
   };
-  // How far each relay is from where it began.
+  // The difference of each relay from its initial state.
   template <class N>
   struct State {
     typename N::Value moved[kRelays]{};
@@ -117,8 +118,8 @@ struct PreisachHysteresis {
       }
     return c;
   }
-  // A relay goes over along an edge that is as wide as the distance of two levels: what a finer grid of relays does
-  // between them. So the sum has no steps where the gear has none.
+  // A relay switches along an edge that is as wide as the distance of two levels, as a finer grid of relays would. So
+  // the sum has no steps where the gear has none.
   template <class N>
   static void advance(State<N>& state, const Coefficients<N>& c, const Inputs<N>& now, const Inputs<N>&) {
     typename N::Value up[kLevels];

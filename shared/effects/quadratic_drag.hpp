@@ -10,12 +10,12 @@ struct QuadraticDrag : Stateless {
       .equation = "c w abs(w)",
       .shows_over = "velocity, convex",
       .source = "churning",
-      .explanation = "The lubricant is flung about: friction grows with the square of speed.",
-      .consequence = "The top speed is lower and the gear warmer than expected; slow motion shows nothing.",
+      .explanation = "The lubricant is churned: friction grows with the square of speed.",
+      .consequence = "The top speed is lower and the gear warmer than expected; slow motion does not show it.",
       .causes = "Too much oil or grease, or one that is too thick for the speed; a fan on the shaft.",
       .check =
           "Check the amount and kind of lubricant against the maker's table; look for a fan or a brush on the shaft.",
-      .rivals = "viscous_friction,power_law_friction",
+      .confused_with = "viscous_friction,power_law_friction",
       .separated_by = "steady motion at five or more speeds from slow to rated",
   };
   static constexpr ParameterInfo kParameters[] = {
@@ -24,6 +24,10 @@ struct QuadraticDrag : Stateless {
   template <class N>
   struct Coefficients {
     typename N::Weight coefficient;
+    template <class Codec>
+    constexpr void fields(Codec& c) {
+      c(coefficient);
+    }
   };
   template <class N, class P>
   static Coefficients<N> derive(const P* p, const DriveConstants<P>& d) {

@@ -14,12 +14,12 @@ struct QuadraticStiffness : Stateless {
       .explanation = "The spring is stiffer in one direction than in the other.",
       .consequence = "The output bends further one way than the other under the same load.",
       .causes =
-          "A flexspline that sits off centre, a bolted joint that opens to one side; often the shadow of an "
+          "A flexspline that sits off centre, a bolted joint that opens to one side; often only the result of an "
           "offset of torque or torsion.",
       .check =
           "Load the locked output by the same torque in both directions; zero the torque sensor and the positions "
           "first, then look at bolts that open to one side.",
-      .rivals = "torque_offset,torsion_zero",
+      .confused_with = "torque_offset,torsion_zero",
       .separated_by = "large and small sines of torque about zero in locked load",
   };
   static constexpr ParameterInfo kParameters[] = {
@@ -28,6 +28,10 @@ struct QuadraticStiffness : Stateless {
   template <class N>
   struct Coefficients {
     typename N::Weight stiffness;
+    template <class Codec>
+    constexpr void fields(Codec& c) {
+      c(stiffness);
+    }
   };
   template <class N, class P>
   static Coefficients<N> derive(const P* p, const DriveConstants<P>& d) {

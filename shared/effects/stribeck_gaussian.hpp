@@ -14,20 +14,20 @@ struct StribeckGaussian : Stateless {
           "Near standstill the surfaces touch instead of floating on lubricant: friction is higher there and "
           "falls as motion gets faster. It makes slow motion jerk.",
       .consequence =
-          "Slow motion jerks (stick-slip), and the axis overshoots as it breaks loose; fast motion shows nothing.",
+          "Slow motion jerks (stick-slip), and the axis overshoots as it breaks loose; fast motion does not show it.",
       .causes =
           "Boundary lubrication, thick or old grease, long standstill. A negative amplitude means friction that "
           "rises out of standstill.",
       .check =
           "Creep at the slowest speed that is used and listen; run the axis warm and repeat; look at the age and the "
           "amount of grease.",
-      .rivals = "load_dependent_friction,power_law_friction",
+      .confused_with = "load_dependent_friction,power_law_friction",
       .separated_by = "a slow free triangle of velocity",
       .family = "stribeck",
       .negative_means = "friction rises out of standstill, so that slow motion starts smoothly",
       .wide_negative_means =
-          "this is sublinear friction, which grows ever more slowly with speed (see power_law_friction), and no "
-          "Stribeck friction",
+          "this is sublinear friction, which grows ever more slowly with speed (see power_law_friction), not Stribeck "
+          "friction",
       .wide_negative_is = "power_law_friction",
   };
   static constexpr ParameterInfo kParameters[] = {
@@ -45,6 +45,10 @@ struct StribeckGaussian : Stateless {
     typename N::Weight odd;  // half the sum of both amplitudes, and half their difference
     typename N::Weight even;
     typename N::RatioGain per_velocity;
+    template <class Codec>
+    constexpr void fields(Codec& c) {
+      c(odd), c(even), c(per_velocity);
+    }
   };
   template <class N, class P>
   static Coefficients<N> derive(const P* p, const DriveConstants<P>& d) {

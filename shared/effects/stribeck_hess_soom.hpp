@@ -18,7 +18,7 @@ struct StribeckHessSoom : Stateless {
       .causes = "Boundary lubrication, thick or old grease, long standstill.",
       .check =
           "Creep at slow speeds and listen; run the axis warm and repeat; look at the age and the amount of grease.",
-      .rivals = "stribeck_gaussian,load_dependent_friction,power_law_friction",
+      .confused_with = "stribeck_gaussian,load_dependent_friction,power_law_friction",
       .separated_by = "a slow free triangle of velocity that reaches five times the Stribeck velocity",
       .family = "stribeck",
       .negative_means = "friction rises out of standstill, so that slow motion starts smoothly",
@@ -38,6 +38,10 @@ struct StribeckHessSoom : Stateless {
     typename N::Weight positive;
     typename N::Weight negative;
     typename N::RatioGain per_velocity;
+    template <class Codec>
+    constexpr void fields(Codec& c) {
+      c(positive), c(negative), c(per_velocity);
+    }
   };
   template <class N, class P>
   static Coefficients<N> derive(const P* p, const DriveConstants<P>& d) {

@@ -18,7 +18,7 @@ struct StructuralDamping : Stateless {
       .check =
           "Strike the link with the motor held and count the swings; compare with the value after assembly, growth "
           "means preload or wear.",
-      .rivals = "dahl_hysteresis",
+      .confused_with = "dahl_hysteresis",
       .separated_by = "the same torsion amplitude at a second frequency",
   };
   static constexpr ParameterInfo kParameters[] = {
@@ -30,6 +30,10 @@ struct StructuralDamping : Stateless {
     typename N::Weight torque;
     typename N::RatioGain per_rate;
     typename N::Exponent exponent;
+    template <class Codec>
+    constexpr void fields(Codec& c) {
+      c(torque), c(per_rate), c(exponent);
+    }
   };
   template <class N, class P>
   static Coefficients<N> derive(const P* p, const DriveConstants<P>& d) {

@@ -6,8 +6,8 @@
 
 namespace flexspline::effects {
 
-// A torque by points: straight lines between values at even steps of one signal, held beyond both ends. What it runs
-// over, on which balance and with which values is stated in the model file; there is one entry of it for each.
+// A piecewise linear torque: values at even steps of one signal, constant beyond both ends. The model file states its
+// signal, balance and values; it has one entry for each table.
 struct TableEffect : Stateless {
   static constexpr int kMostPoints = 256;
   static constexpr int kStated = 6;  // parameters before the values
@@ -15,22 +15,22 @@ struct TableEffect : Stateless {
   static constexpr Description kInfo{
       .name = "table_effect",
       .reads = kMotorMotion | kMotorAngle | kOutputMotion | kOutputAngle | kTorsion | kTorque | kCurrent | kTemperature,
-      .equation = "f(x), f by points with straight lines between, x one signal; optionally f(x) s(w)",
+      .equation = "f(x), f piecewise linear between points, x one signal; optionally f(x) s(w)",
       .shows_over = "the signal that it runs over",
       .source = "the data themselves",
       .explanation =
-          "What no formula of the catalogue describes, as a curve over one signal: up to 256 points, learnt from the "
-          "residual as smooth as the data ask for, with a standard error at each point.",
+          "An effect that no formula of the catalogue describes, as a curve over one signal: up to 256 points, "
+          "estimated from the residual with the smoothness that the data support, with a standard error at each point.",
       .causes =
           "A worn or damaged tooth, an uneven bearing, a brake or seal that rubs, cogging, a calibration that was made "
-          "by points. The curve says where to look; it does not say why.",
-      .rivals = "expression_effect",
+          "by points. The curve shows where the effect is, not its cause.",
+      .confused_with = "expression_effect",
       .separated_by =
           "slow motion over the whole range of the signal, in both directions, and once more at another load",
       .adds_to = on(Balance::transmission) | on(Balance::load),
       .made_by_user = true,
   };
-  // Numbers of the variable and the balance; the direction nought or one; the signal at the first and at the last
+  // Numbers of the variable and the balance; the direction zero or one; the signal at the first and at the last
   // point (not used for angles, whose points divide a turn); then the values, on the balance's own side.
   static constexpr auto kParameters = [] {
     std::array<ParameterInfo, kStated + kMostPoints> infos{};
@@ -55,6 +55,10 @@ struct TableEffect : Stateless {
     typename N::Order turn{};
     std::int16_t points = 0;
     std::array<typename N::Value, kMostPoints> value{};  // the first `points` of them
+    template <class Codec>
+    constexpr void fields(Codec& c) {
+      c(variable), c(balance), c(times_direction), c(periodic), c(from), c(per_step), c(turn), c.points(points, value);
+    }
   };
   template <class N, class P>
   static Coefficients<N> derive(const P* p, const DriveConstants<P>& d) {

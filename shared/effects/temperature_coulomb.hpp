@@ -17,7 +17,7 @@ struct TemperatureCoulomb : Stateless {
       .check =
           "Repeat a slow motion every few minutes from a cold start and plot the current over the housing's "
           "temperature.",
-      .rivals = "temperature_viscous",
+      .confused_with = "temperature_viscous",
       .separated_by = "slow and fast motion at two temperatures",
       .modulates = "coulomb_friction",
   };
@@ -33,6 +33,10 @@ struct TemperatureCoulomb : Stateless {
   struct Coefficients {
     typename N::Gain coefficient;
     typename N::Value reference;
+    template <class Codec>
+    constexpr void fields(Codec& c) {
+      c(coefficient), c(reference);
+    }
   };
   template <class N, class P>
   static Coefficients<N> derive(const P* p, const DriveConstants<P>& d) {

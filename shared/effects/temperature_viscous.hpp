@@ -17,7 +17,7 @@ struct TemperatureViscous : Stateless {
       .check =
           "Repeat a fast motion every few minutes from a cold start and plot the current over the housing's "
           "temperature; check the grease's range.",
-      .rivals = "temperature_coulomb",
+      .confused_with = "temperature_coulomb",
       .separated_by = "slow and fast motion at two temperatures",
       .modulates = "viscous_friction",
   };
@@ -33,6 +33,10 @@ struct TemperatureViscous : Stateless {
   struct Coefficients {
     typename N::Gain coefficient;
     typename N::Value reference;
+    template <class Codec>
+    constexpr void fields(Codec& c) {
+      c(coefficient), c(reference);
+    }
   };
   template <class N, class P>
   static Coefficients<N> derive(const P* p, const DriveConstants<P>& d) {

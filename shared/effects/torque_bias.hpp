@@ -15,7 +15,7 @@ struct TorqueBias : Stateless {
       .causes = "Offset of the drive's torque signal, or a constant load such as weight on a vertical axis.",
       .check =
           "Read the torque signal with the drive off; look for a weight, a spring or a counterbalance on the axis.",
-      .rivals = "coulomb_asymmetry",
+      .confused_with = "coulomb_asymmetry",
       .separated_by = "a record with the drive off",
   };
   static constexpr ParameterInfo kParameters[] = {
@@ -24,6 +24,10 @@ struct TorqueBias : Stateless {
   template <class N>
   struct Coefficients {
     typename N::Value torque;
+    template <class Codec>
+    constexpr void fields(Codec& c) {
+      c(torque);
+    }
   };
   template <class N, class P>
   static Coefficients<N> derive(const P* p, const DriveConstants<P>& d) {

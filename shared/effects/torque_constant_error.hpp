@@ -19,7 +19,7 @@ struct TorqueConstantError : Stateless {
       .check =
           "Hold a known weight on the output and compare the current with the data sheet's; check peak against RMS "
           "amperes and the commutation angle.",
-      .rivals = "torque_sensor_gain,torque_constant_saturation",
+      .confused_with = "torque_sensor_gain,torque_constant_saturation",
       .separated_by = "a known inertia or weight at the output, or the back EMF at a known speed",
   };
   static constexpr ParameterInfo kParameters[] = {
@@ -28,6 +28,10 @@ struct TorqueConstantError : Stateless {
   template <class N>
   struct Coefficients {
     typename N::Weight ratio;
+    template <class Codec>
+    constexpr void fields(Codec& c) {
+      c(ratio);
+    }
   };
   template <class N, class P>
   static Coefficients<N> derive(const P* p, const DriveConstants<P>& d) {

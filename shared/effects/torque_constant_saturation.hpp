@@ -17,7 +17,7 @@ struct TorqueConstantSaturation : Stateless {
       .check =
           "Hold rising known weights and plot them over the current; a line that bends is the iron. Check the motor's "
           "peak current.",
-      .rivals = "load_dependent_friction,torque_constant_error,cubic_stiffness",
+      .confused_with = "load_dependent_friction,torque_constant_error,cubic_stiffness",
       .separated_by = "a constant external load in both directions at low current",
   };
   static constexpr ParameterInfo kParameters[] = {
@@ -26,6 +26,10 @@ struct TorqueConstantSaturation : Stateless {
   template <class N>
   struct Coefficients {
     typename N::Weight coefficient;
+    template <class Codec>
+    constexpr void fields(Codec& c) {
+      c(coefficient);
+    }
   };
   template <class N, class P>
   static Coefficients<N> derive(const P* p, const DriveConstants<P>& d) {

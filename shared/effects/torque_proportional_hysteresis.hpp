@@ -19,7 +19,7 @@ struct TorqueProportionalHysteresis {
       .check =
           "Load and unload the locked output to half and to all of the torque and compare the width of the two loops; "
           "check lubricant and wear of the teeth.",
-      .rivals = "dahl_hysteresis,load_dependent_friction",
+      .confused_with = "dahl_hysteresis,load_dependent_friction",
       .separated_by = "loops of small amplitude at no load and at half the rated torque",
   };
   static constexpr ParameterInfo kParameters[] = {
@@ -45,6 +45,10 @@ struct TorqueProportionalHysteresis {
     typename N::Value rest;
     typename N::Gain per_torque;
     typename N::Gain per_torsion;
+    template <class Codec>
+    constexpr void fields(Codec& c) {
+      c(most), c(rest), c(per_torque), c(per_torsion);
+    }
   };
   // Share of that bound.
   template <class N>

@@ -18,8 +18,8 @@ struct TorqueRipple : Stateless {
           "Higher orders: cogging (slots and poles), bearing balls; on a screw, its pitch.",
       .check =
           "Turn slowly at constant speed and look at the current over the angle; release the coupling and repeat to "
-          "tell motor from gear; check concentricity.",
-      .rivals = "kinematic_error,load_scaled_ripple",
+          "distinguish motor and gear; check concentricity.",
+      .confused_with = "kinematic_error,load_scaled_ripple",
       .separated_by = "slow constant speed over many turns, then the same at a second load",
   };
   static constexpr ParameterInfo kParameters[] = {
@@ -30,6 +30,10 @@ struct TorqueRipple : Stateless {
   template <class N>
   struct Coefficients {
     typename N::Harmonic ripple;
+    template <class Codec>
+    constexpr void fields(Codec& c) {
+      c(ripple);
+    }
   };
   template <class N, class P>
   static Coefficients<N> derive(const P* p, const DriveConstants<P>& d) {

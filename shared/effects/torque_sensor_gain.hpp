@@ -17,8 +17,9 @@ struct TorqueSensorGain : Stateless {
           "too little.",
       .causes = "Calibration of the bridge, a part of the load that bypasses it.",
       .check =
-          "Hang a known weight on a known lever and compare; look for a load path around the sensor, as a stiff cable.",
-      .rivals = "torque_constant_error,linear_stiffness",
+          "Hang a known weight on a known lever and compare; look for a load path around the sensor, such as a stiff "
+          "cable.",
+      .confused_with = "torque_constant_error,linear_stiffness",
       .separated_by = "a known weight on a known lever",
       .adds_to = on(Balance::motor) | on(Balance::load),
       .identified_on_motor = true,
@@ -30,14 +31,18 @@ struct TorqueSensorGain : Stateless {
   struct Coefficients {
     typename N::Weight torque;
     typename N::Weight motor;
+    template <class Codec>
+    constexpr void fields(Codec& c) {
+      c(torque), c(motor);
+    }
   };
-  // Of the measured torque, the share ratio/(1 + ratio) is not there.
+  // The share ratio/(1 + ratio) of the measured torque does not exist.
   template <class N, class P>
   static Coefficients<N> derive(const P* p, const DriveConstants<P>& d) {
     const P share = p[0] / (P(1.0) + p[0]);
     return {N::weight(share), N::weight(-share * d.output_torque_base / (d.gear_ratio * d.torque_base))};
   }
-  // A sensor is no spring: what it adds to the reading is taken back where the reading stands for the torque.
+  // A sensor error is not a torque: it is subtracted where the reading is used as the torque.
   template <class N>
   static void evaluate(const State<N>&, const Coefficients<N>& c, const Inputs<N>& in, Torques<N>& out) {
     out.transmission += c.torque * in.torque;

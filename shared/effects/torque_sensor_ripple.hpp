@@ -12,16 +12,16 @@ struct TorqueSensorRipple : Stateless {
       .shows_over = "motor angle, not in motion",
       .source = "report 5.3",
       .explanation =
-          "The torque sensor reads a ripple that repeats with the motor angle and that the drive does not feel: "
+          "The torque sensor reads a ripple that repeats with the motor angle and does not act on the drive: "
           "strain gauges on the flexspline are bent by each lobe of the wave generator that passes.",
       .consequence =
-          "The torque signal ripples twice a turn of the motor although the axis runs evenly; torque control then "
-          "makes it real.",
+          "The torque signal ripples twice a turn of the motor although the axis runs evenly; torque control turns it "
+          "into a real ripple.",
       .causes = "Gauges on the flexspline itself; misalignment of the gauges.",
       .check =
           "Turn slowly without load: the reading must be flat. Check the gauges' pattern (opposed pairs cancel the "
           "ripple) and filter or map it.",
-      .rivals = "torque_ripple,kinematic_error",
+      .confused_with = "torque_ripple,kinematic_error",
       .separated_by = "slow constant speed over many turns without load",
       .adds_to = on(Balance::motor) | on(Balance::load),
   };
@@ -34,6 +34,10 @@ struct TorqueSensorRipple : Stateless {
   struct Coefficients {
     typename N::Harmonic output;
     typename N::Harmonic motor;
+    template <class Codec>
+    constexpr void fields(Codec& c) {
+      c(output), c(motor);
+    }
   };
   template <class N, class P>
   static Coefficients<N> derive(const P* p, const DriveConstants<P>& d) {
@@ -42,7 +46,7 @@ struct TorqueSensorRipple : Stateless {
     return {N::harmonic(order, p[1] / d.output_torque_base, p[2] / d.output_torque_base),
             N::harmonic(order, p[1] * motor, p[2] * motor)};
   }
-  // A sensor is no spring: what it adds to the reading is taken back where the reading stands for the torque.
+  // A sensor error is not a torque: it is subtracted where the reading is used as the torque.
   template <class N>
   static void evaluate(const State<N>&, const Coefficients<N>& c, const Inputs<N>& in, Torques<N>& out) {
     const typename N::Sum ripple = N::wave(c.output, in.angle);

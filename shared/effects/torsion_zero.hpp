@@ -13,12 +13,11 @@ struct TorsionZero : Stateless {
       .shows_over = "per record",
       .source = "integrated tachometer",
       .explanation = "The torsion is counted from a wrong zero: motor and output position have no common one.",
-      .consequence = "The spring seems bent at rest; stiffness differs by direction where it does not.",
+      .consequence = "The spring seems loaded at rest; stiffness seems to differ by direction.",
       .causes =
-          "Incremental encoders that start at nought wherever the axis stands, positions integrated from a "
-          "tachometer.",
+          "Incremental encoders that start at zero at any angle of the axis, positions integrated from a tachometer.",
       .check = "Let the axis rest without load and zero both positions there, or use absolute encoders or an index.",
-      .rivals = "torque_offset,quadratic_stiffness",
+      .confused_with = "torque_offset,quadratic_stiffness",
       .separated_by = "locked load with a torque far from zero, or positions that are referenced",
   };
   static constexpr ParameterInfo kParameters[] = {
@@ -32,6 +31,10 @@ struct TorsionZero : Stateless {
   template <class N>
   struct Coefficients {
     typename N::Value angle;
+    template <class Codec>
+    constexpr void fields(Codec& c) {
+      c(angle);
+    }
   };
   template <class N, class P>
   static Coefficients<N> derive(const P* p, const DriveConstants<P>& d) {

@@ -1,4 +1,4 @@
-// The signals by the names that users give them: what a table may run over and a formula may read.
+// The names of the signals that a table may depend on and a formula may read.
 #pragma once
 
 #include <cstdint>
@@ -7,7 +7,7 @@
 
 namespace flexspline::effects {
 
-// Written into model files by name and into parameter blocks by number; numbers are never given again.
+// Written into model files by name and into parameter blocks by number; numbers are not reused.
 enum class Variable : std::uint8_t {
   velocity,
   speed,
@@ -30,7 +30,7 @@ struct VariableInfo {
   Unit unit{};
   unsigned reads = 0;  // Signals
   std::string_view meaning{};
-  bool periodic = false;  // comes back after a turn
+  bool periodic = false;  // repeats after a turn
 };
 
 inline constexpr VariableInfo kVariables[] = {
@@ -54,7 +54,7 @@ inline constexpr VariableInfo kVariables[] = {
     {Variable::temperature, "temperature", {"degC", "degC"}, kTemperature, "of housing or lubricant"},
 };
 
-// A signal that is no angle; nought for angles. The variable is a coefficient, so that this is no branch on a value.
+// A signal that is not an angle; zero for angles. The variable is a coefficient, so this does not branch on a value.
 template <class N>
 constexpr typename N::Value signal_of(Variable variable, const Inputs<N>& in) {
   switch (variable) {
@@ -87,7 +87,7 @@ constexpr typename N::Value signal_of(Variable variable, const Inputs<N>& in) {
   return {};
 }
 
-// What a signal is divided by on a drive.
+// The base of a signal on a drive.
 template <class P>
 constexpr P base_of(Variable variable, const DriveConstants<P>& d) {
   switch (variable) {
@@ -118,7 +118,7 @@ constexpr P base_of(Variable variable, const DriveConstants<P>& d) {
   return P(1.0);
 }
 
-// The direction that friction on a balance has.
+// The direction of friction on a balance.
 template <class N>
 constexpr typename N::Value direction_on(Balance balance, const Inputs<N>& in) {
   return balance == Balance::motor          ? in.direction

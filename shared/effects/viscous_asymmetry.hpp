@@ -18,7 +18,7 @@ struct ViscousAsymmetry : Stateless {
       .check =
           "Hold the same speed both ways at several speeds and compare the currents; look at brushes, axial load and "
           "where the grease went.",
-      .rivals = "coulomb_asymmetry",
+      .confused_with = "coulomb_asymmetry",
       .separated_by = "both directions at two speeds that differ by a factor of five",
       .asymmetry_of = "viscous_friction",
       .direction_symbols = "Tvp,Tvn",
@@ -29,6 +29,10 @@ struct ViscousAsymmetry : Stateless {
   template <class N>
   struct Coefficients {
     typename N::Weight coefficient;
+    template <class Codec>
+    constexpr void fields(Codec& c) {
+      c(coefficient);
+    }
   };
   template <class N, class P>
   static Coefficients<N> derive(const P* p, const DriveConstants<P>& d) {

@@ -15,7 +15,7 @@ struct ViscousFriction : Stateless {
           "Fast motion takes torque and warms the gear; it also damps, so too much in the model makes control weak.",
       .causes = "Grease in the wave-generator bearing and the tooth mesh; more when cold or over-filled.",
       .check = "Hold several speeds and plot the current, cold and warm; check the kind and amount of grease.",
-      .rivals = "power_law_friction",
+      .confused_with = "power_law_friction",
       .separated_by = "steady motion at several speeds",
       .surface = "viscous friction",
   };
@@ -25,6 +25,10 @@ struct ViscousFriction : Stateless {
   template <class N>
   struct Coefficients {
     typename N::Weight coefficient;
+    template <class Codec>
+    constexpr void fields(Codec& c) {
+      c(coefficient);
+    }
   };
   template <class N, class P>
   static Coefficients<N> derive(const P* p, const DriveConstants<P>& d) {

@@ -1,4 +1,4 @@
-// Walks the effects that have a number, without knowing which there are. Include after all effects: see list.hpp.
+// Visits all effects that have a number, without a list of them. Include it after all effects: see list.hpp.
 #pragma once
 
 #include <type_traits>

@@ -1,5 +1,5 @@
-// Integer arithmetic that the number types stand on: products of 64 bits and shifts that round. All of it is defined
-// for every input, so that the same inputs give the same bits on every processor and at every level of optimisation.
+// Integer arithmetic for the number types: products of 64 bits and shifts that round. All functions are defined for
+// every input, so that the same inputs give the same bits on every processor and at every level of optimisation.
 #pragma once
 
 #include <bit>
@@ -31,7 +31,7 @@ constexpr Product multiply(std::uint64_t a, std::uint64_t b) {
   return {static_cast<std::uint64_t>(product >> 64), static_cast<std::uint64_t>(product)};
 #elif defined(__ARM_FEATURE_DSP) && __ARM_FEATURE_DSP
   if (std::is_constant_evaluated()) return multiply_by_words(a, b);
-  // UMAAL adds two words to a product, which no compiler finds by itself: four of them are all of it.
+  // UMAAL adds two words to a product. Compilers do not generate it; four of them make the whole product.
   const auto a0 = static_cast<std::uint32_t>(a), a1 = static_cast<std::uint32_t>(a >> 32);
   const auto b0 = static_cast<std::uint32_t>(b), b1 = static_cast<std::uint32_t>(b >> 32);
   std::uint32_t word0 = 0, word1 = 0, word2 = 0, word3 = 0;
@@ -52,7 +52,7 @@ constexpr Product multiply(std::uint64_t a, std::uint32_t b) {
   return {high >> 32, (high << 32) | (low & 0xFFFFFFFF)};
 }
 
-// a b 2^-bits rounded down, for 0 < bits < 64; the caller knows that it fits.
+// a b 2^-bits rounded down, for 0 < bits < 64; the caller guarantees that it fits.
 constexpr std::uint64_t multiply_down(std::uint64_t a, std::uint64_t b, int bits) {
   const Product p = multiply(a, b);
   return (p.high << (64 - bits)) | (p.low >> bits);
@@ -69,7 +69,7 @@ constexpr std::int64_t negated(std::int64_t x) {
   return with_sign(size_of(x), x > 0);
 }
 
-// a b 2^-bits rounded to the nearest (halves away from nought), for 0 < bits < 64; the caller knows that it fits.
+// a b 2^-bits rounded to the nearest (halves away from zero), for 0 < bits < 64; the caller guarantees that it fits.
 constexpr std::int64_t multiply_round(std::int64_t a, std::int64_t b, int bits) {
   const Product p = multiply(size_of(a), size_of(b));
   const std::uint64_t half = std::uint64_t{1} << (bits - 1);
@@ -78,7 +78,7 @@ constexpr std::int64_t multiply_round(std::int64_t a, std::int64_t b, int bits) 
   return with_sign((high << (64 - bits)) | (low >> bits), (a < 0) != (b < 0));
 }
 
-// x 2^-bits rounded to the nearest; bits may be negative, and then the caller knows that it fits.
+// x 2^-bits rounded to the nearest; bits may be negative, and then the caller guarantees that it fits.
 constexpr std::int64_t shift_right(std::int64_t x, int bits) {
   if (bits <= 0) return bits <= -64 ? 0 : static_cast<std::int64_t>(static_cast<std::uint64_t>(x) << -bits);
   if (bits >= 64) return 0;
@@ -90,8 +90,9 @@ constexpr std::int32_t multiply31(std::int32_t a, std::int32_t b) {
   return static_cast<std::int32_t>((std::int64_t{a} * b + (std::int64_t{1} << 30)) >> 31);
 }
 
-// A polynomial in x of 31 fractional bits, by Horner's rule; the result has the format of the coefficients. What is
-// multiplied on the way has to stay within 2^30, so that its double is a word and the rounded product one instruction.
+// A polynomial in x of 31 fractional bits, by Horner's rule; the result has the format of the coefficients.
+// Intermediate factors have to stay within 2^30, so that twice a factor is a word and the rounded product one
+// instruction.
 template <std::size_t Size>
 constexpr std::int32_t polynomial(const std::int32_t (&coefficients)[Size], std::int32_t x) {
   std::int32_t sum = coefficients[Size - 1];

@@ -1,16 +1,16 @@
-// Coefficients from floating point. For the host: nothing here is instantiated on a drive.
+// Coefficients from floating point. For the host only.
 #pragma once
 
 #include <cstdint>
 
 #include "shared/fixed/bits.hpp"
-#include "shared/fixed/complete.hpp"
-#include "shared/fixed/findings.hpp"
+#include "shared/fixed/derived_fields.hpp"
+#include "shared/fixed/overflow_log.hpp"
 #include "shared/fixed/types.hpp"
 
 namespace flexspline::fixed {
 
-// x 2^power, exact as long as nothing falls below the smallest double.
+// x 2^power, exact unless it underflows.
 constexpr double scaled_by_power(double x, int power) {
   for (; power > 0; --power) x *= 2.0;
   for (; power < 0; ++power) x *= 0.5;
@@ -19,10 +19,10 @@ constexpr double scaled_by_power(double x, int power) {
 constexpr bool is_finite(double x) {
   return x - x == 0.0;
 }
-// The nearest integer; nought and a note where x is not below 2^bits.
+// The nearest integer; zero and an entry in the log where x is not below 2^bits.
 inline std::int64_t nearest(double x, double below, std::string_view what) {
   if (!is_finite(x) || x >= below || x <= -below) {
-    Findings::note(what);
+    OverflowLog::note(what);
     return 0;
   }
   return static_cast<std::int64_t>(x < 0.0 ? x - 0.5 : x + 0.5);
@@ -38,7 +38,7 @@ inline Weight make_weight(double x) {
 }
 inline Share make_share(double x) {
   if (!(x >= 0.0 && x <= 1.0)) {
-    Findings::note("a share is not between nought and one");
+    OverflowLog::note("a share is not between zero and one");
     return {};
   }
   constexpr std::uint64_t kOne = std::uint64_t{1} << kShareBits;
@@ -64,17 +64,17 @@ inline Harmonic make_harmonic(double radians_per_turn, double cosine, double sin
   h.amplitude = make_weight(__builtin_sqrt(cosine * cosine + sine * sine)).raw;
   h.phase = static_cast<std::uint32_t>(
       static_cast<std::uint64_t>(nearest(__builtin_atan2(cosine, sine) / kTurn * 0x1p32, 0x1p33, "")));
-  complete(h);
+  derive_fields(h);
   return h;
 }
 
 // Mantissa and exponent of a number, rounded; a mantissa of one is written as a half of the next power. Below `least`
-// it is nought.
+// it is zero.
 template <class G>
 G make_floating(double x, double least) {
   G g;
   if (!is_finite(x)) {
-    Findings::note("a coefficient is not finite");
+    OverflowLog::note("a coefficient is not finite");
     return g;
   }
   double size = x < 0.0 ? -x : x;
@@ -83,24 +83,24 @@ G make_floating(double x, double least) {
   for (; size >= 1.0; size *= 0.5) ++exponent;
   for (; size < 0.5; size *= 2.0) --exponent;
   if (exponent > G::kMostExponent || exponent < G::kLeastExponent) {
-    Findings::note("a coefficient is too large or too small for its format: another base is needed");
+    OverflowLog::note("a coefficient is too large or too small for its format: another base is needed");
     return g;
   }
   g.mantissa = static_cast<std::int32_t>(nearest(scaled_by_power(x < 0.0 ? -size : size, kMantissaBits), 1.1e9, ""));
   g.exponent = static_cast<std::int8_t>(exponent);
   return g;
 }
-// Complete, or of a limit of nought and a note.
+// With its derived fields, or with a limit of zero and an entry in the log.
 template <class G>
 G make_coefficient(double x, double least) {
   G g = make_floating<G>(x, least);
-  if (!complete(g)) {
-    Findings::note("a coefficient leaves no input that it could be applied to: another base is needed");
+  if (!derive_fields(g)) {
+    OverflowLog::note("a coefficient leaves no input that it could be applied to: another base is needed");
     return {};
   }
   return g;
 }
-inline constexpr double kLargestValue = kLargestValueQ20 * 0x1p-20;  // of what a gain may give, in bases
+inline constexpr double kLargestValue = kLargestValueQ20 * 0x1p-20;  // result of a gain, in bases
 inline constexpr double kLeastCoefficient = 1e-12;                   // less than a unit of any result
 inline Gain make_gain(double x) {
   return make_coefficient<Gain>(x, kLeastCoefficient);
@@ -111,7 +111,7 @@ inline StepGain make_step_gain(double x) {
 inline RatioGain make_ratio_gain(double x) {
   return make_coefficient<RatioGain>(x, kLeastCoefficient);
 }
-// Per unit of angle (a turn), from distances of up to 2^31 turns to a state that stops at four; nought, or from 1e-18
+// Per unit of angle (a turn), from distances of up to 2^31 turns to a state that stops at four; zero, or from 1e-18
 // to 1e9.
 inline DistanceGain make_distance_gain(double x) {
   return make_coefficient<DistanceGain>(x, 1e-300);

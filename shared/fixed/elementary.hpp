@@ -1,4 +1,4 @@
-// Elementary functions on integers. Each states its format and its largest error, which a test holds against long
+// Elementary functions on integers. Each states its format and its largest error, which a test checks against long
 // double over the whole domain. Polynomials are Chebyshev interpolations of the named function, rounded to their
 // format.
 //
@@ -23,22 +23,22 @@ constexpr std::int32_t decay_mean(std::int32_t x) {
   return polynomial(kCoefficients, x);
 }
 
-// A travel in Q58, up to kLargestTravel, as a number of halvings and what is left over, below ln 2.
-struct Halvings {
+// A travel in Q58, up to kLargestTravel, as a multiple of ln 2 and a remainder below ln 2.
+struct SplitTravel {
   int count = 0;
   std::uint64_t rest = 0;
 };
-constexpr Halvings halvings_of(std::uint64_t travel) {
+constexpr SplitTravel split_travel(std::uint64_t travel) {
   // 1/ln 2 rounded down, so that the first count is at most one too few.
   constexpr std::uint64_t kPerLn2 = 0xB8AA3B29;  // Q31
-  Halvings h;
-  h.count = static_cast<int>(((travel >> 32) * kPerLn2) >> (31 + kTravelBits - 32));
-  h.rest = travel - static_cast<std::uint64_t>(h.count) * kLn2;
-  if (h.rest >= kLn2) {
-    h.rest -= kLn2;
-    ++h.count;
+  SplitTravel split;
+  split.count = static_cast<int>(((travel >> 32) * kPerLn2) >> (31 + kTravelBits - 32));
+  split.rest = travel - static_cast<std::uint64_t>(split.count) * kLn2;
+  if (split.rest >= kLn2) {
+    split.rest -= kLn2;
+    ++split.count;
   }
-  return h;
+  return split;
 }
 
 // 1 - exp(-x) for x in Q58 below ln 2, in Q60, within 2e-9 of itself: exact for the smallest travel too.
@@ -49,8 +49,8 @@ constexpr std::uint64_t decay_lost(std::uint64_t rest) {
 
 // exp(-x) for x in Q58, in Q60, within 1e-9; 1 - exp(-x) within 2e-9 of itself.
 constexpr std::uint64_t decay(std::uint64_t travel) {
-  const Halvings h = halvings_of(travel);
-  return ((std::uint64_t{1} << 60) - decay_lost(h.rest)) >> h.count;
+  const SplitTravel split = split_travel(travel);
+  return ((std::uint64_t{1} << 60) - decay_lost(split.rest)) >> split.count;
 }
 
 // 2^x for x in Q31 from 0 to 1, in Q30; within 3.2 units of Q30.
@@ -60,8 +60,8 @@ constexpr std::uint32_t power_of_two(std::int32_t x) {
   return (std::uint32_t{1} << 30) + static_cast<std::uint32_t>(multiply31(polynomial(kCoefficients, x), x));
 }
 
-// One over m for m in Q31 from 1/2 to 1, in Q30, within 3 units of Q30: a straight line within 1/17 of it, and three
-// steps of Newton's rule, each of which squares the relative error.
+// One over m for m in Q31 from 1/2 to 1, in Q30, within 3 units of Q30: a linear approximation within 1/17 of it, and
+// three steps of Newton's method, each of which squares the relative error.
 constexpr std::uint32_t reciprocal_of_mantissa(std::uint32_t m) {
   constexpr std::uint64_t kTwo = std::uint64_t{1} << 32;  // Q31
   // (48 - 32 m)/17, rounded down: in two divisions of 32 bits, as one of 64 is a call to a library where words have 32.
@@ -81,7 +81,7 @@ constexpr Reciprocal reciprocal_of(std::uint64_t x) {
   return {reciprocal_of_mantissa(static_cast<std::uint32_t>((x << zeros) >> 33)), zeros - 64};
 }
 
-// log2(x) of an integer x from 1 on, in Q40, within 8e-11: a table finds a factor that brings the mantissa next to one.
+// log2(x) of an integer x from 1 on, in Q40, within 8e-11: a table has a factor that brings the mantissa close to one.
 namespace detail {
 struct LogTable {
   std::uint32_t factor[32]{};  // 1/(1 + (i + 1/2)/32), Q31
@@ -115,7 +115,7 @@ constexpr std::int64_t log2_of(std::uint64_t x) {
   const int zeros = std::countl_zero(x);
   const std::uint64_t mantissa = x << zeros;  // Q63
   const auto i = static_cast<std::size_t>((mantissa >> 58) & 31);
-  // mantissa times factor, less one; as the product is next to one, what is left fits Q36.
+  // mantissa times factor, less one; as the product is close to one, the difference fits Q36.
   const std::uint64_t near_one = multiply_down(mantissa, detail::kLogTable.factor[i], 31);  // Q63
   const auto r = static_cast<std::int64_t>(near_one - (std::uint64_t{1} << 63));
   const auto r31 = static_cast<std::int32_t>(shift_right(r, 32));
@@ -133,7 +133,7 @@ constexpr Power power_of_two_of(std::int64_t y) {
   return {power_of_two(static_cast<std::int32_t>(fraction >> (kLogBits - 31))), static_cast<int>(y >> kLogBits)};
 }
 
-// Sine and cosine of a phase in 2^-32 turns, in Q30, within 4 units of Q30. The nearest quarter turn is taken off.
+// Sine and cosine of a phase in 2^-32 turns, in Q30, within 4 units of Q30. The nearest quarter turn is subtracted.
 struct SineCosine {
   std::int32_t sine = 0;
   std::int32_t cosine = 0;

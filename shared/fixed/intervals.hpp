@@ -1,18 +1,18 @@
-// Intervals over the number system of the drive: all that an effect can give for inputs between two bounds, so that one
-// run of it proves that nothing leaves its range. Ends are computed with the arithmetic of the drive itself; functions
-// that need not be monotone to the last unit get a margin. For the host.
+// Interval arithmetic over the drive's number system: all results of an effect for inputs between two bounds, so that
+// one run proves that no value leaves its range. Ends are computed with the drive's own arithmetic; functions that need
+// not be monotone to the last unit get a margin. For the host.
 #pragma once
 
 #include <array>
 #include <cstdint>
 
 #include "shared/fixed/checked.hpp"
-#include "shared/fixed/findings.hpp"
+#include "shared/fixed/overflow_log.hpp"
 #include "shared/fixed/system.hpp"
 
 namespace flexspline::fixed {
 
-// Raw numbers of the format of a `Value`, `State` or `Sum`; both ends belong to it.
+// Raw numbers in the format of a `Value`, `State` or `Sum`; both ends are included.
 template <class Format>
 struct Range {
   std::int64_t low = 0;
@@ -42,14 +42,14 @@ inline Fixed::State state_of(std::int64_t raw) {
 inline constexpr std::int64_t kValueMost = 0x7FFFFFFF;
 inline constexpr std::int64_t kStateMost = 0x7FFFFFFFFFFFFFFF;
 inline Range<Value> value_range(std::int64_t low, std::int64_t high) {
-  if (low < -kValueMost || high > kValueMost) Findings::note("a value may leave its range");
+  if (low < -kValueMost || high > kValueMost) OverflowLog::note("a value may leave its range");
   return {limited(low, -kValueMost, kValueMost), limited(high, -kValueMost, kValueMost)};
 }
-// Sums of states saturate here, so that they can be told from those that fit.
+// Sums of states saturate here, so that they can be distinguished from those that fit.
 inline std::int64_t state_sum(std::int64_t a, std::int64_t b) {
-  const std::int64_t sum = Trusting::state_sum(a, b);
+  const std::int64_t sum = UncheckedArithmetic::state_sum(a, b);
   if ((a < 0) != (b < 0) || (sum < 0) == (a < 0)) return sum;
-  Findings::note("a sum of states may leave its range");
+  OverflowLog::note("a sum of states may leave its range");
   return a < 0 ? -kStateMost : kStateMost;
 }
 }  // namespace detail
@@ -76,7 +76,7 @@ inline Range<State> operator-(Range<State> a, Range<State> b) {
 inline constexpr std::int64_t kSumMost = std::int64_t{1} << 61;
 inline Range<Sum> operator+(Range<Sum> a, Range<Sum> b) {
   const Range<Sum> sum{a.low + b.low, a.high + b.high};
-  if (sum.low < -kSumMost || sum.high > kSumMost) Findings::note("a sum of torques is not below 128 bases");
+  if (sum.low < -kSumMost || sum.high > kSumMost) OverflowLog::note("a sum of torques is not below 128 bases");
   return {limited(sum.low, -kSumMost, kSumMost), limited(sum.high, -kSumMost, kSumMost)};
 }
 inline Range<Sum>& operator+=(Range<Sum>& a, Range<Sum> b) {
@@ -93,7 +93,7 @@ struct Intervals {
     Value signal;
   };
   using Ratio = Scaled;
-  using Kept = State;
+  using DecayFactor = State;
   struct Travel {
     std::uint64_t low = 0;
     std::uint64_t high = 0;
@@ -108,7 +108,7 @@ struct Intervals {
       constexpr std::int64_t kSixteen = std::int64_t{16} << kSumBits;
       const std::int64_t a = w.raw * x.low, b = w.raw * x.high;
       if (limited(a, 1 - kSixteen, kSixteen - 1) != a || limited(b, 1 - kSixteen, kSixteen - 1) != b)
-        Findings::note("a torque may not be below 16 bases");
+        OverflowLog::note("a torque may not be below 16 bases");
       return a < b ? Sum{a, b} : Sum{b, a};
     }
   };
@@ -118,11 +118,11 @@ struct Intervals {
       const auto end = [&](std::int64_t raw) { return (Fixed::Gain{g} * detail::value_of(raw)).raw; };
       return g.ordered<Sum>(x, end);
     }
-    // A result between its values at both ends. An input beyond the limit would be clamped, so that the drive would not
-    // compute what the model says.
+    // The result is between its values at both ends. An input beyond the limit would be clamped, so that the drive
+    // would not compute the model.
     template <class Result, class End>
     Result ordered(Value x, End&& end) const {
-      if (most(x) > limit) Findings::note("a gain may reach its limit: its result is not below 16 bases");
+      if (most(x) > limit) OverflowLog::note("a gain may reach its limit: its result is not below 16 bases");
       const std::int64_t a = end(x.low);
       const std::int64_t b = end(x.high);
       return a < b ? Result{a, b} : Result{b, a};
@@ -229,14 +229,14 @@ struct Intervals {
   static State times(State a, Share b) {
     return {Fixed::times(detail::state_of(a.low), b).raw, Fixed::times(detail::state_of(a.high), b).raw};
   }
-  // For a share between nought and one. The drive may pass the target by a unit, and not by more however long it runs.
+  // For a share between zero and one. The drive may pass the target by a unit, but not by more in any number of ticks.
   static State relax(State from, State target, State) {
     constexpr std::int64_t kUnit = std::int64_t{1} << (kStateBits - 27);
     constexpr std::int64_t kMost = 8 * kOne;
     const auto apart = [](std::int64_t high, std::int64_t low) { return high - low >= kMost; };
     if (target.low <= -kMost || target.high >= kMost || from.low <= -kMost || from.high >= kMost ||
         apart(from.high, target.low) || apart(target.high, from.low)) {
-      Findings::note("a distance to relax over may leave its range");
+      OverflowLog::note("a distance to relax over may leave its range");
       return {-kMost, kMost};
     }
     return hull(from, State{target.low - kUnit, target.high + kUnit});
@@ -249,7 +249,7 @@ struct Intervals {
     return share(Fixed::q_exp_negative({x.high}, q), Fixed::q_exp_negative({x.low}, q));
   }
   static Value exp_negative(Value x) {
-    if (x.low < Fixed::kLeastExponential) Findings::note("an exponential may reach its limit");
+    if (x.low < Fixed::kLeastExponential) OverflowLog::note("an exponential may reach its limit");
     return padded(Fixed::exp_negative(detail::value_of(x.high)).raw, Fixed::exp_negative(detail::value_of(x.low)).raw);
   }
   static Value exp_mean(Travel x) { return padded(Fixed::exp_mean({x.high}).raw, Fixed::exp_mean({x.low}).raw); }
@@ -260,7 +260,7 @@ struct Intervals {
     return padded(at(Fixed::lorentzian, x, most(x.signal)).raw, at(Fixed::lorentzian, x, least(x.signal)).raw);
   }
   static Value reciprocal(Value x) {
-    if (x.low < Fixed::kLeastDivisor) Findings::note("a divisor may come too near to nought");
+    if (x.low < Fixed::kLeastDivisor) OverflowLog::note("a divisor may come too near to zero");
     return padded(Fixed::reciprocal(detail::value_of(x.high)).raw, Fixed::reciprocal(detail::value_of(x.low)).raw);
   }
   static Value pow_abs(const Scaled& x, Exponent e) {

@@ -1,5 +1,6 @@
-// The number system of the drive, as shared/effects/README.md asks for it: integers only. Its policy says what happens
-// where a result is safe by proof: `Trusting` takes it as it is, `Verifying` (checked.hpp) looks.
+// The number system of the drive, as shared/effects/README.md defines it: integers only. The policy says what happens
+// where a result is safe by proof: `UncheckedArithmetic` takes it as it is, `CheckedArithmetic` (checked.hpp) checks
+// it.
 #pragma once
 
 #include <array>
@@ -12,7 +13,7 @@
 
 namespace flexspline::fixed {
 
-struct Trusting {
+struct UncheckedArithmetic {
   static constexpr std::int32_t value(std::int64_t x) { return static_cast<std::int32_t>(x); }
   static constexpr std::int64_t state_sum(std::int64_t a, std::int64_t b) {
     return static_cast<std::int64_t>(static_cast<std::uint64_t>(a) + static_cast<std::uint64_t>(b));
@@ -35,7 +36,7 @@ inline constexpr int kProductBits = 57;
 template <class Policy>
 struct FixedSystem {
   using Parameter = double;
-  // Values and states take the policy along, as sums of them are what may leave the range.
+  // Values and states depend on the policy, as their sums may leave the range.
   struct Value : fixed::Value {
     friend constexpr auto operator<=>(Value, Value) = default;
     friend constexpr Value operator+(Value a, Value b) { return {{Policy::value(std::int64_t{a.raw} + b.raw)}}; }
@@ -47,7 +48,7 @@ struct FixedSystem {
     friend constexpr State operator-(State a, State b) { return {{Policy::state_difference(a.raw, b.raw)}}; }
     friend constexpr State operator-(State a) { return {{negated(a.raw)}}; }
   };
-  // A term of a sum keeps its factors apart, so that a processor multiplies and adds at once.
+  // A term of a sum keeps its factors separate, so that a processor can multiply and add in one instruction.
   struct Weight : fixed::Weight {
     friend constexpr fixed::Sum operator*(Weight w, Value x) { return {long_product(w.raw, x.raw)}; }
   };
@@ -60,7 +61,7 @@ struct FixedSystem {
     Value cosine;
     Value sine;
   };
-  // A signal over a characteristic size, not multiplied yet: each function needs it in its own way.
+  // A signal over a characteristic size, not multiplied yet: each function needs another form of it.
   struct Scaled {
     fixed::RatioGain gain;
     Value signal;
@@ -69,20 +70,20 @@ struct FixedSystem {
       return {shift_right(long_product(x, gain.mantissa), kMantissaBits + kValueBits - kRatioBits - gain.exponent)};
     }
   };
-  // What a relaxation loses of its distance, 1 - exp(-x), Q63: exact however small x is.
-  struct Kept {
+  // A decay factor exp(-x), stored as 1 - exp(-x) in Q63, so that it is exact for small x as well.
+  struct DecayFactor {
     std::uint64_t lost = 0;
     constexpr operator State() const { return {{kOneState - static_cast<std::int64_t>(lost >> (63 - kStateBits))}}; }
   };
   // Magnitude of a step, 2^-32 turns.
-  struct Length {
+  struct StepMagnitude {
     std::uint32_t raw;
   };
-  // A travel of steps, not multiplied yet.
-  struct Way {
+  // The travel of a step, not multiplied yet.
+  struct StepTravel {
     std::uint32_t steps;
     std::uint32_t factor;
-    std::uint32_t halvings;
+    std::uint32_t exponent_of_two;
     constexpr operator fixed::Travel() const { return {long_product(steps, factor)}; }
   };
   using Harmonic = fixed::Harmonic;
@@ -102,7 +103,7 @@ struct FixedSystem {
   static constexpr std::int32_t kLeastExponential = -0x16000000;
   static constexpr std::int32_t kLeastDivisor = (std::int32_t{1} << kValueBits) / 15;
 
-  // Coefficients, on the host; Findings has what does not fit.
+  // Coefficients, on the host; OverflowLog has what does not fit.
   static Weight weight(double x) { return {make_weight(x)}; }
   static Harmonic harmonic(double radians_per_turn, double cosine, double sine) {
     return make_harmonic(radians_per_turn, cosine, sine);
@@ -136,7 +137,7 @@ struct FixedSystem {
   static constexpr Sum sum(Value x) {
     return {std::int64_t{x.raw} * (std::int64_t{1} << (kSumBits - kValueBits))};
   }
-  // The whole of the balance: what does not fit a signal is clamped, as the last step.
+  // The sum of a balance: clamped to the range of a signal as the last step.
   static constexpr Value narrow(Sum x) {
     constexpr int kUp = kValueBits + 32 - kSumBits;
     const auto high = static_cast<std::int32_t>(x.raw >> 32);
@@ -144,7 +145,7 @@ struct FixedSystem {
     const auto word = static_cast<std::int32_t>(static_cast<std::uint64_t>(x.raw) >> (32 - kUp));
     return {{high >= -kMost + 1 && high < kMost ? word : high < 0 ? -0x7FFFFFFF : 0x7FFFFFFF}};
   }
-  // Both have the same place of their point in a word.
+  // Both have the same binary point.
   static constexpr Value narrow(State x) {
     static_assert(kStateBits - kValueBits == 32);
     const auto high = static_cast<std::uint32_t>(x.raw >> 32);
@@ -154,8 +155,8 @@ struct FixedSystem {
     return {{std::int64_t{x.raw} * (std::int64_t{1} << 32)}};
   }
 
-  // Longer than half a turn is as good as a turn.
-  static constexpr Length magnitude(Step x) {
+  // More than half a turn counts as a turn.
+  static constexpr StepMagnitude magnitude(Step x) {
     const auto low = static_cast<std::int32_t>(x.raw), high = static_cast<std::int32_t>(x.raw >> 32);
     return {high == low >> 31 ? magnitude_of(low) : 0xFFFFFFFF};
   }
@@ -200,7 +201,7 @@ struct FixedSystem {
     return {{x.raw > 0 ? kOneState : x.raw < 0 ? -kOneState : 0}};
   }
 
-  // Two, as every signal is limited to at entry: so the bound of a linear observer needs no trust in its input.
+  // Limited to two, like every signal at entry: so the bound of a linear observer holds for any input.
   static constexpr State signal(const StepGain& g, Step x) {
     const std::uint32_t size = magnitude(x).raw;
     const std::uint64_t travelled = long_product((size < g.near ? size : g.near) << g.up, g.factor);
@@ -219,9 +220,9 @@ struct FixedSystem {
   static constexpr Step distance(const Gain& g, Value x) {
     return {product(g, x.raw) >> (kProductBits - kAngleBits)};
   }
-  static constexpr Way travel(const StepGain& g, Length x) {
+  static constexpr StepTravel travel(const StepGain& g, StepMagnitude x) {
     const auto most = static_cast<std::uint32_t>(g.limit);
-    return {(x.raw < most ? x.raw : most) << g.up, g.factor, g.halvings};
+    return {(x.raw < most ? x.raw : most) << g.up, g.factor, g.exponent_of_two};
   }
   static constexpr Travel travel(const Gain& g, Value x) {
     const std::int64_t travelled = product(g, x.raw);
@@ -242,7 +243,7 @@ struct FixedSystem {
     const Power p = power_of_two_of(log_times(size_of(x.raw), kStateBits, e));
     return by_mantissa(t, p.mantissa, kMantissaBits - p.exponent);
   }
-  // What a step moves a state by: never more than four, as the state is clamped to one next.
+  // By how much a step moves a state: at most four, as the state is clamped to one next.
   static constexpr State step(Travel t, Value x) {
     constexpr std::uint64_t kFour = std::uint64_t{4} << kStateBits;
     const auto factor = static_cast<std::uint64_t>(size_of(x.raw));
@@ -259,18 +260,17 @@ struct FixedSystem {
     const std::uint64_t size = (p.high << (64 - kValueBits)) | (p.low >> kValueBits);
     return {{with_sign(fits ? size : kMost - 1, (a.raw < 0) != (b.raw < 0))}};
   }
-  // Rounded down, to two units; by words, of which the product of both lower ones does not show.
+  // Rounded down, to two units. The product of both lower words is below that and left out.
   static constexpr State times(State a, const Share& b) {
     const std::int32_t high = as_word(static_cast<std::int32_t>(a.raw >> 32));
-    // A share of one has no word with a sign: it is as near to it as that shows.
+    // A share of one does not fit a signed word and is the nearest number below.
     const auto whole = static_cast<std::int32_t>(b.raw >> 32);
     const std::int32_t rest = as_word(static_cast<std::int32_t>(static_cast<std::uint32_t>(b.raw) >> 1));
     const std::int64_t lower = (long_product(high, rest) >> 31) +
                                multiply_high(static_cast<std::uint32_t>(a.raw), static_cast<std::uint32_t>(whole));
     return {{(long_product(high, whole) + lower) * 2}};
   }
-  // With the upper word of the share alone: the share of an observer's gain, which need not be known to more than
-  // 2^-31.
+  // With the upper word of the share only: for an observer's gain, for which a resolution of 2^-31 is enough.
   static constexpr State times_gain(State a, const Share& b) {
     const std::int32_t high = as_word(static_cast<std::int32_t>(a.raw >> 32));
     const auto whole = static_cast<std::int32_t>(b.raw >> 32);
@@ -278,28 +278,28 @@ struct FixedSystem {
               multiply_high(static_cast<std::uint32_t>(a.raw), static_cast<std::uint32_t>(whole))) *
              2}};
   }
-  // Takes what it loses off the distance, of which 28 fractional bits count: so it may pass the target by a unit.
-  static constexpr State relax(State from, State target, Kept kept) {
+  // Reduces the distance, of which 28 fractional bits are used: so it may pass the target by a unit.
+  static constexpr State relax(State from, State target, DecayFactor factor) {
     const std::int64_t away = Policy::state_difference(from.raw, target.raw);
     Policy::expect(away < 8 * kOneState && away >= -8 * kOneState, "a distance to relax over leaves its range");
     const std::int32_t distance = as_word(static_cast<std::int32_t>(away >> 31));
-    const auto low = static_cast<std::int32_t>(kept.lost);
-    // The lower word is taken with a sign, as the distance has one.
-    const std::int32_t high = as_word(static_cast<std::int32_t>((kept.lost >> 32) + (low < 0 ? 1 : 0)));
+    const auto low = static_cast<std::int32_t>(factor.lost);
+    // The lower word is signed, as the distance is.
+    const std::int32_t high = as_word(static_cast<std::int32_t>((factor.lost >> 32) + (low < 0 ? 1 : 0)));
     const std::int64_t change = long_product(distance, high) + (long_product(distance, low) >> 32);
     return {{static_cast<std::int64_t>(static_cast<std::uint64_t>(from.raw) - static_cast<std::uint64_t>(change))}};
   }
-  // What is kept as a share, as other functions than exponentials give it.
+  // With a decay factor from another function than an exponential.
   static constexpr State relax(State from, State target, State share) {
     const std::uint64_t lost = static_cast<std::uint64_t>(kOneState - share.raw) << (63 - kStateBits);
-    return relax(from, target, Kept{lost < kAllLost ? lost : kAllLost});
+    return relax(from, target, DecayFactor{lost < kAllLost ? lost : kAllLost});
   }
 
-  static constexpr Kept exp_negative(const Way& x) {
-    return {lost_of_halvings(long_product(x.steps, x.halvings))};
+  static constexpr DecayFactor exp_negative(const StepTravel& x) {
+    return {one_minus_power_of_two(long_product(x.steps, x.exponent_of_two))};
   }
-  static constexpr Kept exp_negative(Travel x) {
-    return {lost_of(x.raw)};
+  static constexpr DecayFactor exp_negative(Travel x) {
+    return {one_minus_exp(x.raw)};
   }
   static constexpr Value exp_negative(Value x) {
     constexpr std::int64_t kPerLn2 = 0x5C551D94AE0BF85E;  // Q62
@@ -308,9 +308,9 @@ struct FixedSystem {
     return from_power(power_of_two_of(y));
   }
   static constexpr Value exp_mean(Travel x) {
-    const Halvings h = halvings_of(x.raw);
-    if (h.count == 0) {
-      const auto mean = decay_mean(static_cast<std::int32_t>(h.rest >> (kTravelBits - 31)));
+    const SplitTravel split = split_travel(x.raw);
+    if (split.count == 0) {
+      const auto mean = decay_mean(static_cast<std::int32_t>(split.rest >> (kTravelBits - 31)));
       return {{static_cast<std::int32_t>(shift_right(mean, kMantissaBits - kValueBits))}};
     }
     constexpr int kLostBits = 52;  // so that the shift below is less than a word
@@ -320,14 +320,14 @@ struct FixedSystem {
         multiply_down(lost, r.mantissa, kLostBits + kMantissaBits - kValueBits - kTravelBits - r.exponent))}};
   }
   // exp(-y), y = log(1 + z)/(q - 1), z = (q - 1) x.
-  static constexpr Kept q_exp_negative(Travel x, Exponent q) {
+  static constexpr DecayFactor q_exp_negative(Travel x, Exponent q) {
     constexpr int kZBits = 52;
     const std::int64_t less_one = std::int64_t{q.raw} - (std::int64_t{1} << kExponentBits);
     const std::int64_t z =
         multiply_round(static_cast<std::int64_t>(x.raw), less_one, kTravelBits + kExponentBits - kZBits);
     constexpr std::int64_t kSmall = std::int64_t{1} << (kZBits - 4);
     if (z < kSmall && z > -kSmall) {
-      // The square of a small z is far below a unit, but z itself is rounded: from x, not from z, comes what counts.
+      // The square of a small z is far below a unit, but z itself is rounded, so x is used instead of z.
       const auto mean = static_cast<std::uint32_t>(log_mean(static_cast<std::int32_t>(shift_right(z, kZBits - 31))));
       return exp_negative(by_mantissa(x, mean, kMantissaBits));
     }
@@ -361,7 +361,7 @@ struct FixedSystem {
     const Reciprocal r = reciprocal_of(static_cast<std::uint64_t>(x.raw < kLeastDivisor ? kLeastDivisor : x.raw));
     return {{static_cast<std::int32_t>(shift_right(r.mantissa, kMantissaBits - 2 * kValueBits - r.exponent))}};
   }
-  // For exponents above nought; results below 11.
+  // For exponents above zero; results below 11.
   static constexpr Value pow_abs(const Scaled& x, Exponent e) {
     const std::uint32_t size = magnitude_of(x.signal.raw);
     const auto zeros = static_cast<std::uint32_t>(std::countl_zero(size));
@@ -375,7 +375,7 @@ struct FixedSystem {
     const auto mantissa = static_cast<std::uint32_t>((size << zeros) >> 32);
     return power_of(log_sum((63 - kStateBits - zeros) << 25, mantissa), e, size == 0);
   }
-  // Of an amplitude and a phase: one sine. The whole turns count as well, where the order is not whole.
+  // From amplitude and phase: one sine. Whole turns count as well where the order is not an integer.
   static constexpr Value wave_of(const Harmonic& h, Angle angle) {
     const auto turns = static_cast<std::int32_t>(angle.raw >> 32);
     const auto part = static_cast<std::uint32_t>(angle.raw);
@@ -404,8 +404,9 @@ struct FixedSystem {
     return {{{static_cast<std::int32_t>(shift_right(w.cosine, kBits))}},
             {{static_cast<std::int32_t>(shift_right(w.sine, kBits))}}};
   }
-  // Straight lines between `points` values: at a position counted in points from the first, held beyond both ends; and
-  // at a phase, a turn being the whole table. A line is exact to half a unit, and to 2^-30 of its own rise.
+  // Linear interpolation between `points` values: at a position counted in points from the first, constant beyond both
+  // ends; and at a phase, where the whole table is a turn. Exact to half a unit, and to 2^-30 of the difference between
+  // two points.
   template <std::size_t Size>
   static constexpr Value table(const std::array<Value, Size>& values, std::int32_t points, Ratio at) {
     if (at.raw <= 0 || points < 2) return values[0];
@@ -422,7 +423,7 @@ struct FixedSystem {
     return on_line(values[index], values[index + 1 < points ? index + 1 : 0], rest);
   }
 
-  // Integers of 2^-32: a position and a distance in turns, a value below 15, the wave at a phase in turns.
+  // From integers in 2^-32: a position and a distance in turns, a value below 15, the wave at a phase in turns.
   static constexpr Angle angle(std::int64_t q32) {
     return {q32};
   }
@@ -460,26 +461,26 @@ struct FixedSystem {
     const std::uint64_t size = (p.high << (64 - bits)) | (p.low >> bits);
     return {size > kLargestTravel ? kLargestTravel : size};
   }
-  // e log2(x 2^-bits), Q40, limited to what a power of two can take.
+  // e log2(x 2^-bits), Q40, limited to the input range of a power of two.
   static constexpr std::int64_t log_times(std::uint64_t x, int bits, Exponent e) {
     const std::int64_t log = log2_of(x) - (std::int64_t{bits} << kLogBits);
     return multiply_round(log, e.raw, kExponentBits);
   }
-  // Wraps for gains that no signal could use.
+  // Wraps for gains that are not valid for any signal.
   static constexpr std::int32_t log_sum(std::uint32_t whole, std::uint32_t mantissa) {
     return static_cast<std::int32_t>(whole + static_cast<std::uint32_t>(log2_of_mantissa(mantissa)));
   }
-  // 2^(e log), log in Q25; the power is counted from 28 halvings on, below which nothing is left of a value.
-  static constexpr Value power_of(std::int32_t log, Exponent e, bool of_nought) {
+  // 2^(e log), log in Q25; the power is counted from 2^-28, below which a value is zero.
+  static constexpr Value power_of(std::int32_t log, Exponent e, bool of_zero) {
     constexpr int kBits = 25 + kExponentBits - 32;
     constexpr std::int32_t kLow = std::int32_t{28} << kBits;
     const std::int64_t product = long_product(log, e.raw);
     const auto high = static_cast<std::int32_t>(product >> 32) + kLow;
-    const std::uint32_t counted = saturated<kBits + 5>(of_nought ? 0 : high);
+    const std::uint32_t counted = saturated<kBits + 5>(of_zero ? 0 : high);
     const std::uint32_t y = (counted << (26 - kBits)) | (static_cast<std::uint32_t>(product) >> (32 - (26 - kBits)));
-    const std::uint32_t halvings = 31 - ((y + (std::uint32_t{1} << 25)) >> 26);
-    Policy::expect(halvings < 32, "a power leaves the range of a value");
-    return {{power_of_two_word(static_cast<std::int32_t>(y << 6)) >> (halvings & 31)}};
+    const std::uint32_t shift = 31 - ((y + (std::uint32_t{1} << 25)) >> 26);
+    Policy::expect(shift < 32, "a power leaves the range of a value");
+    return {{power_of_two_word(static_cast<std::int32_t>(y << 6)) >> (shift & 31)}};
   }
   static constexpr Value from_power(Power p) {
     Policy::expect(p.exponent < 4, "a power leaves the range of a value");
@@ -488,6 +489,6 @@ struct FixedSystem {
   }
 };
 
-using Fixed = FixedSystem<Trusting>;
+using Fixed = FixedSystem<UncheckedArithmetic>;
 
 }  // namespace flexspline::fixed

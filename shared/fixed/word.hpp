@@ -1,6 +1,6 @@
-// Functions on one word of 32 bits, for what every tick computes: a dozen or two instructions each, the same in each
-// run. Each states its formats and its largest error, which a test holds against long double over the whole domain.
-// Polynomials are Chebyshev interpolations of the named function, rounded to their format.
+// Functions on one word of 32 bits, for the tick: 12 to 24 instructions each, the same number in each run. Each states
+// its formats and its largest error, which a test checks against long double over the whole domain. Polynomials are
+// Chebyshev interpolations of the named function, rounded to their format.
 //
 // Qn: an integer of n fractional bits.
 #pragma once
@@ -13,10 +13,10 @@
 
 namespace flexspline::fixed {
 
-// Products of two words. Cortex-M0 has no long multiplication: its parts are put together from 16 bits.
+// Products of two words. Cortex-M0 has no long multiplication: the product is made from halves of 16 bits.
 #if defined(__ARM_ARCH_6M__)
 namespace detail {
-// From halves, the upper ones with a sign where the numbers have one. No step leaves 32 bits.
+// From halves, the upper ones signed where the numbers are. No step exceeds 32 bits.
 [[gnu::noinline]] inline std::int64_t signed_product(std::int32_t a, std::int32_t b) {
   const auto a0 = static_cast<std::int32_t>(a & 0xFFFF), b0 = static_cast<std::int32_t>(b & 0xFFFF);
   const std::int32_t a1 = a >> 16, b1 = b >> 16;
@@ -57,7 +57,7 @@ constexpr std::int64_t long_product(std::int32_t a, std::int32_t b) {
 }
 #endif
 
-// c + a b 2^-32, rounded to the nearest (halves up): SMMLAR, which no compiler finds by itself, where the processor has
+// c + a b 2^-32, rounded to the nearest (halves up): SMMLAR where the processor has it, as compilers do not generate
 // it. Sums wrap.
 constexpr std::int32_t add_high(std::int32_t c, std::int32_t a, std::int32_t b) {
 #if defined(__ARM_FEATURE_DSP) && __ARM_FEATURE_DSP
@@ -87,18 +87,18 @@ constexpr std::int32_t multiply_high(std::int32_t a, std::int32_t b) {
 constexpr std::uint32_t multiply_high(std::uint32_t a, std::uint32_t b) {
   return static_cast<std::uint32_t>(long_product(a, b) >> 32);
 }
-// a b 2^-bits, rounded down; the caller knows that it fits.
+// a b 2^-bits, rounded down; the caller guarantees that it fits.
 constexpr std::int32_t multiply_shift(std::int32_t a, std::int32_t b, int bits) {
   return static_cast<std::int32_t>(long_product(a, b) >> bits);
 }
-// Keeps a word a word: compilers that have seen it widened multiply all 64 bits of it.
+// Prevents the compiler from widening the word and multiplying all 64 bits.
 constexpr std::int32_t as_word(std::int32_t x) {
 #if defined(__arm__)
   if (!std::is_constant_evaluated()) asm("" : "+r"(x));
 #endif
   return x;
 }
-// x 2^-bits for bits from 0 to 63, rounded down: beyond 31 nothing is left.
+// x 2^-bits for bits from 0 to 63, rounded down: zero beyond 31.
 constexpr std::uint32_t shift_down(std::uint32_t x, std::uint32_t bits) {
 #if defined(__arm__) && defined(__thumb2__)
   if (!std::is_constant_evaluated()) {
@@ -109,7 +109,7 @@ constexpr std::uint32_t shift_down(std::uint32_t x, std::uint32_t bits) {
 #endif
   return bits > 31 ? 0 : x >> bits;
 }
-// x 2^bits for bits from 0 to 63, of which the lowest word is left.
+// The lowest word of x 2^bits for bits from 0 to 63.
 constexpr std::uint32_t shift_up(std::uint32_t x, std::uint32_t bits) {
 #if defined(__arm__) && defined(__thumb2__)
   if (!std::is_constant_evaluated()) {
@@ -120,7 +120,7 @@ constexpr std::uint32_t shift_up(std::uint32_t x, std::uint32_t bits) {
 #endif
   return bits > 31 ? 0 : x << bits;
 }
-// a - b, held to what a word shows.
+// a - b, saturated to a word.
 constexpr std::int32_t saturated_difference(std::int32_t a, std::int32_t b) {
 #if defined(__ARM_FEATURE_DSP) && __ARM_FEATURE_DSP
   if (!std::is_constant_evaluated()) {
@@ -134,7 +134,7 @@ constexpr std::int32_t saturated_difference(std::int32_t a, std::int32_t b) {
                                    : difference < INT32_MIN ? INT32_MIN
                                                             : difference);
 }
-// x within 0 and 2^Bits - 1.
+// x, saturated to 0 to 2^Bits - 1.
 template <int Bits>
 constexpr std::uint32_t saturated(std::int32_t x) {
 #if defined(__arm__) && defined(__thumb2__)
@@ -153,12 +153,12 @@ constexpr std::uint32_t magnitude_of(std::int32_t x) {
 }
 
 namespace detail {
-// Not within the functions, where compilers copy them to the stack first.
+// Not inside the functions, where compilers copy them to the stack first.
 inline constexpr std::int32_t kPowerOfTwo[] = {1073741824, 744261146, 257941250, 59596185, 10327310, 1438860, 166016};
 inline constexpr std::int32_t kSine[] = {843314853, -1387196611, 684531186, -160602359, 20845600};
 inline constexpr std::int32_t kLogMean[] = {3025551, -94558, 3940};
 inline constexpr std::int32_t kHalvingMean[] = {1488522224, -1031763206, 476734752, -164875809, 44380305, -7897239};
-// Where a table lies. Compilers would build its numbers from immediates, at two instructions each.
+// The address of a table. Without it compilers build its numbers from immediates, at two instructions each.
 template <class T, std::size_t Size>
 constexpr const T* in_memory(const T (&table)[Size]) {
   const T* at = table;
@@ -167,7 +167,7 @@ constexpr const T* in_memory(const T (&table)[Size]) {
 #endif
   return at;
 }
-// Two neighbours at once, where the processor can.
+// Two neighbouring numbers at once, where the processor can.
 struct Pair {
   std::int32_t first = 0;
   std::int32_t second = 0;
@@ -175,7 +175,7 @@ struct Pair {
 template <std::size_t Index>
 constexpr Pair load_pair(const std::int32_t* table) {
 #if defined(__arm__) && defined(__thumb2__)
-  // No memory operand: what lies in a table never changes.
+  // No memory operand: the contents of a table never change.
   if (!std::is_constant_evaluated()) {
     Pair p;
     asm("ldrd %0, %1, [%2, %3]" : "=r"(p.first), "=r"(p.second) : "r"(table), "n"(Index * sizeof(std::int32_t)));
@@ -215,15 +215,15 @@ constexpr std::int32_t power_of_two_word(std::int32_t x) {
 
 // sin(2 pi x) for x in turns, Q32, in Q27; within 2 units.
 constexpr std::int32_t sine_word(std::uint32_t phase) {
-  // sin(2 pi t)/t over 16 t^2 in Q30, each four times as large as the one before stands for.
-  // Beyond a quarter turn to either side: half a turn less it.
+  // sin(2 pi t)/t over 16 t^2 in Q30; each coefficient is scaled by four more than the one before.
+  // Beyond a quarter turn to either side: half a turn less the phase.
   const bool beyond = static_cast<std::int32_t>(phase ^ (phase << 1)) < 0;
   const auto t = static_cast<std::int32_t>(beyond ? 0x80000000U - phase : phase);
   const std::int32_t square = multiply_high(t, t);
   return multiply_high(t, detail::horner(detail::kSine, square * 4));
 }
 
-// log2(x) of an integer x from 1 on, in Q25, within 1.2 units: a table finds a factor that brings the mantissa next to
+// log2(x) of an integer x from 1 on, in Q25, within 1.2 units: a table has a factor that brings the mantissa close to
 // one.
 namespace detail {
 struct LogEntry {
@@ -258,11 +258,11 @@ constexpr WordLogTable make_word_log_table() {
 inline constexpr WordLogTable kWordLogTable = make_word_log_table();
 }  // namespace detail
 
-// Of the mantissa alone: x as an integer that was shifted up until its highest bit stood; from 0 to 1.
+// Of the mantissa only: x is an integer that was shifted up until its highest bit is set; the result is from 0 to 1.
 constexpr std::int32_t log2_of_mantissa(std::uint32_t mantissa) {
   // log2(1 + r)/r over r up to 1/62 to each side, in Q21 and sixteenths of it.
   const detail::LogEntry& entry = detail::in_memory(detail::kWordLogTable.entries)[(mantissa >> 26) & 31];
-  // Next to one, so that Q36 holds what it differs by: the one itself is shifted out.
+  // Close to one, so that its difference from one fits Q36: the one itself is shifted out.
   const auto r = static_cast<std::int32_t>(multiply_high(mantissa, entry.factor) << 5);
   return entry.log + multiply_high(r, detail::horner(detail::kLogMean, r));
 }
@@ -272,26 +272,26 @@ constexpr std::uint32_t halving_mean(std::int32_t x) {
   return static_cast<std::uint32_t>(detail::horner(detail::kHalvingMean, x));
 }
 
-inline constexpr std::uint64_t kAllLost = 0x7FFFFFFE00000000;  // one, as far as it shows
+inline constexpr std::uint64_t kAllLost = 0x7FFFFFFE00000000;  // the largest number below one
 
 // 1 - 2^-x for x in Q57, in Q63, within 1e-8; of a small x within 2e-8 of itself.
-constexpr std::uint64_t lost_of_halvings(std::uint64_t halvings) {
-  const auto count = static_cast<std::uint32_t>(halvings >> 57) & 63;
-  const std::uint64_t fraction = halvings << 7;  // Q64
+constexpr std::uint64_t one_minus_power_of_two(std::uint64_t exponent_of_two) {
+  const auto count = static_cast<std::uint32_t>(exponent_of_two >> 57) & 63;
+  const std::uint64_t fraction = exponent_of_two << 7;  // Q64
   const auto upper = static_cast<std::uint32_t>(fraction >> 32);
   const std::uint32_t mean = halving_mean(static_cast<std::int32_t>(upper >> 1));
   const std::uint64_t lost = long_product(upper, mean) + multiply_high(static_cast<std::uint32_t>(fraction), mean);
-  // What is left is halved as often as the whole part says; of what that loses below a word nothing shows. Never quite
-  // all, so that a word with a sign holds it.
+  // The power of the fraction is halved as often as the integer part says; bits below a word are lost. The result stays
+  // below one, so that it fits a signed word.
   constexpr std::uint32_t kAll = kAllLost >> 32;
   const std::uint32_t left = shift_down(kAll - static_cast<std::uint32_t>(lost >> 32), count);
   return (std::uint64_t{kAll - left} << 32) | static_cast<std::uint32_t>(lost);
 }
 // 1 - exp(-x) for x in Q58, likewise.
-constexpr std::uint64_t lost_of(std::uint64_t travel) {
+constexpr std::uint64_t one_minus_exp(std::uint64_t travel) {
   constexpr std::uint32_t kPerLn2 = 0xB8AA3B29;  // Q31
   const auto high = static_cast<std::uint32_t>(travel >> 32), low = static_cast<std::uint32_t>(travel);
-  return lost_of_halvings(long_product(high, kPerLn2) + multiply_high(low, kPerLn2));
+  return one_minus_power_of_two(long_product(high, kPerLn2) + multiply_high(low, kPerLn2));
 }
 
 }  // namespace flexspline::fixed

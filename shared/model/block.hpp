@@ -1,4 +1,4 @@
-// The parameter block: all that a drive knows of its model, as bytes. README.md has the format. One validator serves
+// The parameter block: the drive's model and settings as bytes. README.md has the format. One validator serves
 // the host, the drive when a block arrives, and the drive when it starts: integers only, no heap, no recursion.
 #pragma once
 
@@ -6,12 +6,12 @@
 #include <cstddef>
 #include <cstdint>
 #include <span>
-#include <type_traits>
+#include <tuple>
 #include <utility>
 
 #include "shared/model/drive_model.hpp"
 #include "shared/model/encoding.hpp"
-#include "shared/model/rows.hpp"
+#include "shared/model/fields.hpp"
 
 namespace flexspline::model {
 
@@ -20,10 +20,9 @@ inline constexpr std::uint16_t kBlockVersion = 1;
 inline constexpr std::size_t kLargestBlock = 16384;
 inline constexpr std::size_t kMostEntries = 64;
 
-// What an entry holds. Below 256: coefficients of the effect of that number. From kFirstNote on: notes that the drive
-// keeps and does not read.
-// Sections: what the drive's tick needs beside the model (shared/control/drive_block.hpp). A section that changes gets
-// another number; numbers are never given again.
+// The kinds of entries. Below 256: coefficients of the effect of that number. From kFirstNote on: notes, which the
+// drive stores and does not read. Sections: what the drive's tick needs in addition to the model
+// (shared/control/drive_block.hpp). A section that changes gets another number; numbers are not reused.
 enum class Section : std::uint16_t {
   encoder_filter = 0x100,  // of the motor
   feedforward = 0x101,
@@ -44,12 +43,12 @@ enum class Section : std::uint16_t {
   following = 0x11B,
 };
 inline constexpr std::uint16_t kFirstNote = 0xF000;
-inline constexpr std::uint16_t kParametersNote = 0xF000;  // what the effects were derived from, for `unpack`
+inline constexpr std::uint16_t kParametersNote = 0xF000;  // the SI parameters of the effects, for `unpack`
 
-using Name = std::array<char, 32>;  // UTF-8, the rest noughts
+using Name = std::array<char, 32>;  // UTF-8, the rest zeros
 
-// The bases of per-unit numbers and known facts, in the order of effects::DriveConstants; SI. The drive does not
-// compute with them, but says them to who reads its signals.
+// The bases of per-unit numbers and drive constants, in the order of effects::DriveConstants; SI. The drive does not
+// compute with them, but reports them to readers of its signals.
 struct Bases {
   Number gear_ratio, torque_constant, rated_velocity, reference_temperature, turn_angle_scale;
   Number torque, output_torque, velocity, output_velocity, acceleration, output_acceleration;
@@ -58,22 +57,32 @@ struct Bases {
   Number temperature() const { return others[0]; }
   Number current() const { return others[1]; }
   Number tick() const { return others[2]; }
+  template <class Codec>
+  constexpr void fields(Codec& c) {
+    c(gear_ratio), c(torque_constant), c(rated_velocity), c(reference_temperature), c(turn_angle_scale);
+    c(torque), c(output_torque), c(velocity), c(output_velocity), c(acceleration), c(output_acceleration);
+    c(angle), c(torsion), c(torsion_rate), c(others[0]), c(others[1]), c(others[2]);
+  }
 };
-// Per unit of their bases; each above nought and within two.
+// Per unit of their bases; each above zero and within two.
 struct Limits {
   fixed::Value torque;     // of the motor
   fixed::Value load;       // of the output
   fixed::Value velocity;   // of the motor: full torque up to here
-  fixed::Value overspeed;  // no torque that drives from here on
+  fixed::Value overspeed;  // no driving torque from here on
   fixed::Value current;
   fixed::Value torsion;
   fixed::Value direction_band;  // velocity above which friction acts in full
+  template <class Codec>
+  constexpr void fields(Codec& c) {
+    c(torque), c(load), c(velocity), c(overspeed), c(current), c(torsion), c(direction_band);
+  }
 };
 struct BlockHeader {
   Name drive{};  // which drive it is meant for
   Name model{};
   std::uint32_t axis = 0;            // 0 rotary, 1 linear
-  std::uint32_t encoder_counts = 0;  // per motor turn; nought: not known
+  std::uint32_t encoder_counts = 0;  // per motor turn; zero: not known
   Bases bases{};
   Limits limits{};
 };
@@ -100,11 +109,11 @@ enum class BlockFault : std::uint8_t {
   unlike_coefficients,
   missing_section,
   other_tick_rate,
-  armed,              // good, but the drive is armed
-  unreachable_limit,  // of a protection: its signal cannot show that it was passed
+  armed,              // valid, but the drive is armed
+  unreachable_limit,  // of a protection: its signal cannot show that it is exceeded
   other_hardware,     // full scales, currents or sensors are not those of this board
 };
-// Where a block is wrong: which entry (from nought; of the header: -1), and which field in it where one is to blame.
+// Where a block is invalid: the entry (from zero; the header is -1), and the field in it if one is the cause.
 struct BlockVerdict {
   BlockFault fault = BlockFault::none;
   std::int16_t entry = -1;
@@ -114,13 +123,13 @@ struct BlockVerdict {
 };
 
 namespace detail {
-inline constexpr std::size_t kEntryHeader = 8;  // u16 kind, u16 nought, u32 bytes that follow
+inline constexpr std::size_t kEntryHeader = 8;  // u16 kind, u16 zero, u32 bytes that follow
 inline constexpr std::size_t kBlockStart = 12;  // u32 magic, u16 version, u16 entries, u32 bytes in all
 inline constexpr std::size_t kHeaderBytes = 2 * 32 + 2 * 4 + 17 * 8 + 7 * 4;
 inline constexpr std::size_t kChecksum = 4;
 inline constexpr std::size_t kLeastBlock = kBlockStart + kHeaderBytes + kChecksum;
 
-// Printable from the first to the last character, noughts behind, the last of all a nought.
+// Printable from the first to the last character, then zeros, at least one.
 inline bool is_name(const std::uint8_t* name) {
   bool ended = false;
   for (std::size_t i = 0; i < sizeof(Name); ++i) {
@@ -133,8 +142,8 @@ inline bool is_name(const std::uint8_t* name) {
 inline constexpr int kBases = 17;
 inline constexpr int kReferenceTemperature = 3;
 inline constexpr int kLimits = 7;
-inline constexpr int kVelocityLimit = 2;  // and behind it the overspeed
-// Fields count from the drive's name on. All bytes of the header are there.
+inline constexpr int kVelocityLimit = 2;  // and after it the overspeed
+// Fields count from the drive's name on. The header is complete.
 inline BlockVerdict check_header(const std::uint8_t* at) {
   std::int16_t field = 0;
   const auto wrong = [&](BlockFault fault) { return BlockVerdict{fault, -1, field, 0}; };
@@ -176,7 +185,7 @@ constexpr void put_entry(Writer& w, std::uint16_t kind, Fill&& fill) {
 }
 }  // namespace detail
 
-// What the block at the start of these bytes states as its length; nought where none begins there.
+// The length that the block at the start of these bytes states; zero where none begins there.
 constexpr std::size_t stated_bytes(std::span<const std::uint8_t> bytes) {
   if (bytes.size() < detail::kLeastBlock) return 0;
   Reader r(bytes);
@@ -185,7 +194,7 @@ constexpr std::size_t stated_bytes(std::span<const std::uint8_t> bytes) {
   return r.take<std::uint32_t>();
 }
 
-// Walks the entries of a block that was found good. visit(kind, bytes of it).
+// Calls visit(kind, bytes) for each entry of a block that was found valid.
 template <class Visit>
 void for_each_entry(std::span<const std::uint8_t> block, Visit&& visit) {
   std::size_t at = detail::kBlockStart + detail::kHeaderBytes;
@@ -212,14 +221,14 @@ inline BlockVerdict check_start(std::span<const std::uint8_t> block) {
   return {};
 }
 
-// A base of a block that was found good, by its place in Bases.
+// A base of a block that was found valid, by its place in Bases.
 inline Number base_at(std::span<const std::uint8_t> block, std::size_t place) {
   const std::uint8_t* const at = block.data() + detail::kBlockStart + 2 * sizeof(Name) + 8 + 8 * place;
   return {static_cast<std::int32_t>(detail::word_at(at)), static_cast<std::int32_t>(detail::word_at(at + 4))};
 }
 inline constexpr std::size_t kOutputTorqueBase = 6, kTemperatureBase = 14, kCurrentBase = 15;
 
-// The header of a block that was found good.
+// The header of a block that was found valid.
 inline BlockHeader header_of(std::span<const std::uint8_t> block) {
   BlockHeader h;
   Reader r(block.subspan(detail::kBlockStart));
@@ -231,113 +240,86 @@ inline BlockHeader header_of(std::span<const std::uint8_t> block) {
     n.mantissa = r.take<std::int32_t>();
     n.exponent = r.take<std::int32_t>();
   };
-  for_each_member(h.bases, [&]<class M>(M& member) {
-    if constexpr (std::is_same_v<M, Number>) {
-      take(member);
-    } else {
-      for (Number& one : member) take(one);
-    }
-  });
-  for_each_member(h.limits, [&](fixed::Value& limit) { limit.raw = r.take<std::int32_t>(); });
+  const auto limit = [&](fixed::Value& x) { x.raw = r.take<std::int32_t>(); };
+  h.bases.fields(take);
+  h.limits.fields(limit);
   return h;
 }
 
-// What an image can take of a block: effects into a model, sections into settings.
-struct EffectPlace {
-  std::uint16_t at;  // of Places<Effect, N, Count> in all places: a count and then the coefficients, from `start` on
-  std::uint16_t stride;
-  std::uint8_t number;
-  std::uint8_t count;
-  std::uint8_t start;
-  std::uint8_t row;  // where it begins among all rows
-};
-struct SectionPlace {
-  bool (*agrees)(const void* section, void* context);  // what its fields cannot say each by itself; null: nothing
-  std::uint16_t kind;
-  std::uint16_t at;  // in the settings
-  std::uint8_t row;
-  std::uint8_t times;  // an array of so many
-};
-struct BlockPlaces {
-  std::span<const EffectPlace> effects;
-  const std::uint8_t* effect_rows;
-  std::span<const SectionPlace> sections;
-  const std::uint8_t* section_rows;
-};
-// Sections whose fields have to agree are no larger than this.
-inline constexpr std::size_t kLargestChecked = 160;
-
 namespace detail {
-constexpr BlockVerdict verdict_of(const RowVerdict& v) {
+constexpr BlockVerdict verdict_of(const FieldVerdict& v) {
   switch (v.fault) {
-    case RowFault::none:
+    case FieldFault::none:
       return {};
-    case RowFault::length:
+    case FieldFault::length:
       return {BlockFault::entry_of_wrong_length};
-    case RowFault::field:
+    case FieldFault::field:
       break;
   }
   return {BlockFault::wrong_coefficient, -1, v.field, 0};
 }
-// What an entry is read into and what is kept while a block is read.
-struct Reading {
-  const BlockPlaces& places;
-  void* model;
-  void* settings;
-  void* context;
-  std::uint32_t seen = 0;
-  std::uint8_t often[effects::kLastId + 1]{};
+
+// Reads entries of effects into the model of an image, or checks them alone where there is no model.
+template <class Model>
+class EffectReader {
+ public:
+  explicit EffectReader(Model* model) : model_(model) {}
+  BlockVerdict take(std::uint32_t id, std::span<const std::uint8_t> bytes) {
+    const Image& image = kImage[id];
+    if (image.most == 0) return {BlockFault::missing_effect};
+    if (count_[id] == image.most) return {BlockFault::too_often};
+    FieldReader reader(bytes);
+    image.take(reader, model_, count_[id]++);
+    return verdict_of(reader.verdict());
+  }
+
+ private:
+  using Take = void (*)(FieldReader&, Model*, std::uint8_t index);
+  struct Image {
+    Take take;
+    std::uint8_t most;  // of this effect in a model
+  };
+  template <std::size_t Id>
+  static void take_one(FieldReader& reader, Model* model, std::uint8_t index) {
+    if (model == nullptr) {
+      typename Model::template PlaceOf<Id>::Effect::template Coefficients<typename Model::Numbers> checked{};
+      take_fields(reader, checked);
+    } else {
+      auto& places = model->template place<Id>();
+      places.count = static_cast<std::uint8_t>(index + 1);
+      take_fields(reader, places.coefficients[index]);
+    }
+  }
+  template <class Coefficients>
+  [[gnu::noinline]] static void take_fields(FieldReader& reader, Coefficients& coefficients) {
+    coefficients.fields(reader);
+  }
+  template <std::size_t Id>
+  static constexpr Image image_of() {
+    using Place = typename Model::template PlaceOf<Id>;
+    if constexpr (Place::kExists) {
+      return {&take_one<Id>, static_cast<std::uint8_t>(std::tuple_size_v<decltype(Place::places.coefficients)>)};
+    } else {
+      return {nullptr, 0};
+    }
+  }
+  static constexpr auto kImage = []<std::size_t... Ids>(std::index_sequence<Ids...>) {
+    return std::array<Image, effects::kLastId + 1>{image_of<Ids>()...};
+  }
+  (std::make_index_sequence<effects::kLastId + 1>{});
+
+  Model* model_;
+  std::uint8_t count_[effects::kLastId + 1]{};
 };
-template <bool kTables>
-BlockVerdict take_effect(Reading& r, std::uint32_t kind, std::span<const std::uint8_t> bytes) {
-  for (const EffectPlace& place : r.places.effects) {
-    if (place.number != kind) continue;
-    const std::size_t before = r.often[kind]++;
-    if (before == place.count) return {BlockFault::too_often};
-    std::byte* memory = nullptr;
-    if (r.model != nullptr) {
-      std::byte* const all = static_cast<std::byte*>(r.model) + place.at;
-      *all = static_cast<std::byte>(before + 1);
-      memory = all + place.start + place.stride * before;
-    }
-    return verdict_of(take_row<kTables>(r.places.effect_rows + place.row, bytes, memory));
-  }
-  return {BlockFault::missing_effect};
-}
-template <bool kTables>
-BlockVerdict take_section(Reading& r, std::uint32_t kind, std::span<const std::uint8_t> bytes) {
-  std::uint32_t bit = 1;
-  for (const SectionPlace& place : r.places.sections) {
-    if (place.kind != kind) {
-      bit <<= 1;
-      continue;
-    }
-    if ((r.seen & bit) != 0) return {BlockFault::too_often};
-    r.seen |= bit;
-    alignas(8) std::byte checked[kLargestChecked];
-    std::byte* memory = r.settings != nullptr     ? static_cast<std::byte*>(r.settings) + place.at
-                        : place.agrees != nullptr ? checked
-                                                  : nullptr;
-    const RowVerdict v = take_row<kTables>(r.places.section_rows + place.row, bytes, memory, place.times);
-    if (v.fault == RowFault::none && place.agrees != nullptr && !place.agrees(memory, r.context))
-      return {BlockFault::unlike_coefficients};
-    return verdict_of(v);
-  }
-  return {BlockFault::unknown_entry};
-}
 }  // namespace detail
 
-// The one validator. Looks at all of a block: start, checksum, header, each entry, each field. Notes are passed over.
-// With a model (DriveModel of the image that `places` is of, at rest) and settings, either may be null, it fills them
-// as well; where the verdict is not good, what was read is not to be used. `seen` says which sections there were, by
-// their place; `context` is handed to those that agree with something.
-template <bool kTables>
-BlockVerdict read_block(std::span<const std::uint8_t> block, const BlockPlaces& places, void* model, void* settings,
-                        std::uint32_t& seen, void* context) {
+// The only validator. Checks the whole block: start, checksum, header, each entry, each field. Notes are ignored. With
+// a model (of the image that is to run it, without effects) it fills that as well; `sections.take(kind, bytes)` returns
+// the verdict of a section. If the block is not valid, what was read must not be used.
+template <class Model, class Sections>
+BlockVerdict read_block(std::span<const std::uint8_t> block, Model* model, Sections& sections) {
   if (const BlockVerdict v = check_start(block); !v.good()) return v;
-  detail::Reading reading{places, model, settings, context};
-  if (model != nullptr)
-    for (const EffectPlace& place : places.effects) static_cast<std::byte*>(model)[place.at] = std::byte{0};
+  detail::EffectReader<Model> effects(model);
   const std::uint8_t* at = block.data() + detail::kBlockStart + detail::kHeaderBytes;
   const std::uint8_t* const end = block.data() + block.size() - detail::kChecksum;
   const auto entries = static_cast<std::int16_t>(detail::word_at(block.data() + 4) >> 16);
@@ -346,16 +328,16 @@ BlockVerdict read_block(std::span<const std::uint8_t> block, const BlockPlaces& 
     const std::uint32_t kind = detail::word_at(at), length = detail::word_at(at + 4);
     at += detail::kEntryHeader;
     BlockVerdict v;
-    if (kind > 0xFFFF) {  // what has to be nought
+    if (kind > 0xFFFF) {  // what has to be zero
       v = {BlockFault::unknown_entry};
     } else if (length > static_cast<std::size_t>(end - at)) {
       v = {BlockFault::entry_cut_off};
     } else if (kind <= effects::kLastId) {
-      v = detail::take_effect<kTables>(reading, kind, {at, length});
+      v = effects.take(kind, {at, length});
     } else if (kind < 0x100) {
       v = {BlockFault::missing_effect};
     } else if (kind < kFirstNote) {
-      v = detail::take_section<kTables>(reading, kind, {at, length});
+      v = sections.take(kind, {at, length});
     }
     if (!v.good()) {
       v.entry = entry;
@@ -365,19 +347,10 @@ BlockVerdict read_block(std::span<const std::uint8_t> block, const BlockPlaces& 
     at += length;
   }
   if (at != end) return {BlockFault::wrong_length};
-  seen = reading.seen;
   return {};
 }
 
-// Reads coefficients of a struct alone, as it stands in an entry.
-template <class T>
-RowVerdict read_row(std::span<const std::uint8_t> bytes, T& coefficients) {
-  static constexpr Row kRow = row_of<T>();
-  static_assert(size_in_memory(kRow) == sizeof(T));
-  return take_row(kRow.parts.data(), bytes, reinterpret_cast<std::byte*>(&coefficients));
-}
-
-// Writes a block; host only in use, but of integers all the same. Entries are added between begin() and end().
+// Writes a block, with integers only although only the host uses it. Entries are added between begin() and end().
 class BlockWriter {
  public:
   explicit constexpr BlockWriter(std::span<std::uint8_t> room) : room_(room), writer_(room) {}
@@ -390,24 +363,24 @@ class BlockWriter {
       for (const char c : *name) writer_.put(static_cast<std::uint8_t>(c));
     writer_.put(h.axis);
     writer_.put(h.encoder_counts);
-    for_each_member(h.bases, [&]<class M>(const M& member) {
-      if constexpr (std::is_same_v<M, Number>) {
-        put(writer_, member);
-      } else {
-        for (const Number& one : member) put(writer_, one);
-      }
-    });
-    for_each_member(h.limits, [&](const fixed::Value& limit) { writer_.put(limit.raw); });
+    const auto number = [&](const Number& x) { put(writer_, x); };
+    const auto limit = [&](const fixed::Value& x) { writer_.put(x.raw); };
+    Bases bases = h.bases;
+    Limits limits = h.limits;
+    bases.fields(number);
+    limits.fields(limit);
   }
-  // Coefficients of an effect, or another struct of numbers.
+  // An entry with the fields of a struct: coefficients of an effect, or a section.
   template <class T>
-  void add(std::uint16_t kind, const T& coefficients) {
-    static constexpr Row kRow = row_of<T>();
-    static_assert(size_in_memory(kRow) == sizeof(T));
-    add_row(kind, kRow.parts.data(), &coefficients);
+  constexpr void add(std::uint16_t kind, const T& object) {
+    add(kind, std::span(&object, 1));
   }
-  void add_row(std::uint16_t kind, const std::uint8_t* row, const void* memory, int times = 1) {
-    detail::put_entry(writer_, kind, [&](Writer& w) { put_row(w, row, static_cast<const std::byte*>(memory), times); });
+  // The same, of each struct one after the other.
+  template <class T>
+  constexpr void add(std::uint16_t kind, std::span<const T> objects) {
+    detail::put_entry(writer_, kind, [&](Writer& w) {
+      for (const T& object : objects) write_fields(w, object);
+    });
     ++entries_;
   }
   constexpr void add_bytes(std::uint16_t kind, std::span<const std::uint8_t> bytes) {
@@ -416,7 +389,7 @@ class BlockWriter {
     });
     ++entries_;
   }
-  // The length in all, or nought where there was not enough room.
+  // The total length, or zero where there was not enough room.
   constexpr std::size_t end() {
     const std::size_t size = writer_.size() + detail::kChecksum;
     if (size > room_.size()) return 0;

@@ -1,4 +1,4 @@
-// What is wrong with a block, for people. No image of a drive holds these.
+// Messages for invalid blocks. They are in no image of a drive.
 #pragma once
 
 #include "shared/model/block.hpp"
@@ -20,15 +20,15 @@ constexpr const char* text_of(BlockFault fault) {
     case BlockFault::wrong_length:
       return "its length is not the one that it states";
     case BlockFault::wrong_checksum:
-      return "its checksum does not fit its bytes";
+      return "its checksum does not match its bytes";
     case BlockFault::wrong_name:
-      return "a name holds what is no text";
+      return "a name contains invalid characters";
     case BlockFault::wrong_base:
       return "a base is not a positive number";
     case BlockFault::wrong_limit:
-      return "a limit is not between nought and two bases";
+      return "a limit is not between zero and two bases";
     case BlockFault::wrong_header:
-      return "a field of the header holds what it may not";
+      return "a field of the header has an invalid value";
     case BlockFault::too_many_entries:
       return "it has more entries than a drive takes";
     case BlockFault::entry_cut_off:
@@ -36,11 +36,11 @@ constexpr const char* text_of(BlockFault fault) {
     case BlockFault::entry_of_wrong_length:
       return "an entry is longer or shorter than its coefficients";
     case BlockFault::unknown_entry:
-      return "an entry is of no known kind";
+      return "an entry has an unknown kind";
     case BlockFault::missing_effect:
       return "an effect is not in this firmware";
     case BlockFault::too_often:
-      return "an effect or a section stands more often than the drive has places";
+      return "an effect or a section occurs more often than the drive has places";
     case BlockFault::wrong_coefficient:
       return "a coefficient is outside the bounds of its format";
     case BlockFault::unlike_coefficients:
@@ -52,9 +52,9 @@ constexpr const char* text_of(BlockFault fault) {
     case BlockFault::armed:
       return "parameters cannot change while the drive is armed; disarm it first";
     case BlockFault::unreachable_limit:
-      return "a limit of [faults] lies beyond what its signal can show; pack the block anew, which says which one";
+      return "a limit of [faults] is beyond what its signal can show; pack the block again, which says which one";
     case BlockFault::other_hardware:
-      return "full scales, largest current or sensors in it are not those of this board; pack it anew with "
+      return "full scales, largest current or sensors in it are not those of this board; pack it again with "
              "--for-drive, which takes them from the drive";
   }
   return "unknown fault";

@@ -1,5 +1,5 @@
-// A drive model as the drive runs it: a fixed place for each effect of the image, no heap, every tick the same work.
-// Which effects an image has is known when it is compiled: what it lacks costs nothing.
+// A drive model as the drive runs it: a fixed place for each effect of the image, no heap, the same work in every tick.
+// The effects of an image are known at compile time: effects that it does not have cost nothing.
 #pragma once
 
 #include <array>
@@ -15,7 +15,8 @@
 
 namespace flexspline::model {
 
-// How often an effect can stand in one model: those told apart by a given parameter (orders of a ripple) four times.
+// How often an effect can occur in one model: four times where a given parameter distinguishes them (the order of a
+// ripple).
 template <class Effect>
 constexpr std::size_t places_of() {
   for (const effects::ParameterInfo& p : Effect::kParameters)
@@ -23,18 +24,19 @@ constexpr std::size_t places_of() {
   return 1;
 }
 
-// What a firmware image can run. All effects, as often as they are in a model; a tick asks each whether it is there.
+// The effects that a firmware image can run. All of them, as often as a model may have them; a tick checks for each
+// whether it is present.
 struct EveryEffect {
   static constexpr bool kFilled = false;
   static constexpr bool kTables = true;
   static constexpr std::size_t places(std::size_t, std::size_t most) { return most; }
 };
-// All but those that a user makes: the points of a table take a kilobyte a place, which small processors do not have.
+// All except the user-defined ones: the points of a table take a kilobyte a place, which small processors do not have.
 struct EveryFormula : EveryEffect {
   static constexpr bool kTables = false;
 };
-// The effects of these numbers, as often as each stands here. A tick runs all of them, without asking: an effect that a
-// block leaves out has coefficients of nought, and does nothing.
+// The effects of these numbers, as often as each is listed. A tick runs all of them without a check: an effect that is
+// not in the block has coefficients of zero and no influence.
 template <std::size_t... Numbers>
 struct TheseEffects {
   static constexpr bool kFilled = true;
@@ -86,7 +88,7 @@ struct AllPlaces<N, Image, std::index_sequence<Ids...>> : PlaceAt<Ids, N, Image>
   constexpr void for_each(Visit&& visit) const {
     (visit_one<Ids>(*this, visit), ...);
   }
-  // The same for those whose bit is set in `present`, by groups: a tick does not ask each effect whether it is there.
+  // The same for those whose bit is set in `present`, by groups: a tick does not check each effect.
   template <class Visit>
   constexpr void for_each_present(std::uint64_t present, Visit&& visit) {
     const auto low = static_cast<std::uint32_t>(present), high = static_cast<std::uint32_t>(present >> 32);
@@ -95,7 +97,7 @@ struct AllPlaces<N, Image, std::index_sequence<Ids...>> : PlaceAt<Ids, N, Image>
     }
     (std::make_index_sequence<(sizeof...(Ids) + kGroup - 1) / kGroup>{});
   }
-  // Signals that effects with memory read: those of the tick before are kept.
+  // Signals that effects with memory read: their values at the previous tick are stored.
   static constexpr unsigned remembered() { return (0U | ... | remembered_by<Ids>()); }
 
  private:
@@ -146,7 +148,7 @@ struct AllPlaces<N, Image, std::index_sequence<Ids...>> : PlaceAt<Ids, N, Image>
     return 0U;
   }
 };
-// Rest is nought in every state of every effect. Said so, it takes a processor a call and not a page of stores.
+// At rest every state of every effect is zero. Written this way it is one call instead of many stores.
 template <class States>
 constexpr void set_to_rest(States& states) {
   if (std::is_constant_evaluated() || !std::is_trivially_copyable_v<States>) {
@@ -156,7 +158,7 @@ constexpr void set_to_rest(States& states) {
   }
 }
 struct Nothing {};
-// T where `kKept`, else nothing.
+// T where `kKept`, otherwise nothing.
 template <bool kKept, class T>
 struct Slot {
   using Type = T;
@@ -178,11 +180,13 @@ class DriveModel {
   static constexpr std::size_t number_of() {
     return id_of<Effect>();
   }
-  // For who fills places from bytes (block_places.hpp): the memory of all places, and that of an effect in it.
-  using Memory = detail::AllPlaces<N, Image, std::make_index_sequence<effects::kLastId + 1>>;
+  // For reading effects from a parameter block (block.hpp): the places of the effect of this number.
   template <std::size_t Id>
   using PlaceOf = detail::PlaceAt<Id, N, Image>;
-  void* memory() { return &places_; }
+  template <std::size_t Id>
+  constexpr auto& place() {
+    return static_cast<PlaceOf<Id>&>(places_).places;
+  }
   // Adds an effect at rest. Returns false where the model already has it as often as it can.
   template <class Effect>
   constexpr bool add(const typename Effect::template Coefficients<N>& coefficients) {
@@ -198,12 +202,12 @@ class DriveModel {
   constexpr void clear() {
     places_.for_each([]<class Effect>(auto& places) {
       places.count = 0;
-      places.coefficients = {};
+      if constexpr (Image::kFilled) places.coefficients = {};
     });
     note_effects();
     reset();
   }
-  // Takes note of which effects there are; after the memory of the places was filled.
+  // Updates the set of present effects; call it after the memory of the places was filled.
   constexpr void note_effects() {
     has_scales_ = false;
     present_ = 0;
@@ -211,12 +215,12 @@ class DriveModel {
     places_.for_each([&]<class Effect>(auto& places) {
       if (places.count == 0 && !Image::kFilled) return;
       present_ |= std::uint64_t{1} << id_of<Effect>();
-      // What a table reads is one of its coefficients.
+      // The signal that a table reads is one of its coefficients.
       reads_ |= Effect::kInfo.made_by_user ? ~0U : Effect::kInfo.reads;
     });
   }
-  // Takes part in what is where: effects that repeat with the motor's turn, or that depend on the output's angle, are
-  // left out where that is not known. What a user's table reads is not asked: it is left out as well.
+  // Sets which angles are known: effects that repeat with the motor's turn, or that depend on the output's angle, are
+  // left out where that angle is not known. User-defined tables are left out as well, whichever signal they read.
   constexpr void note_effects(bool knows_turn, bool knows_output) {
     note_effects();
     places_.for_each([&]<class Effect>(auto&) {
@@ -246,17 +250,17 @@ class DriveModel {
     has_scales_ = false;
   }
 
-  // One tick. `in` has what is measured or set: positions, velocities, accelerations, directions, torque, current,
-  // temperature, all within two bases, which the caller limits once, at entry. Returns the torques of the three
-  // balances. The first tick only takes note of where the drive stands.
+  // One tick. `in` has measured values or set points: positions, velocities, accelerations, directions, torque,
+  // current, temperature, all within two bases, to which the caller limits them once, at entry. Returns the torques of
+  // the three balances. The first tick only stores the drive's position.
   constexpr effects::Torques<N> tick(const effects::Inputs<N>& in) { return tick(in, in.angle); }
   // The same with another angle for effects that repeat with it and have no memory (ripples): a model along a set point
-  // may take what is periodic from where the motor stands.
+  // may take periodic effects at the motor's measured angle.
   constexpr effects::Torques<N> tick(const effects::Inputs<N>& measured, typename N::Angle periodic_angle) {
     effects::Inputs<N> in;
     take(in, measured);
     const auto angle = in.angle;
-    complete(in);
+    derive_inputs(in);
     shift(in, periodic_angle);
     modulate(in);
     // Not const: compilers keep constants in memory.
@@ -276,14 +280,14 @@ class DriveModel {
     remember(in);
     return out;
   }
-  // The same, effect by effect, for a host that looks at each: `visit` is called for every effect in its turn, with
-  // operator()<Effect>(state, coefficients, in, before, out), and has to do what run<Effect>() does with these. Not
-  // what tick() is made of: compilers would take twice the stack for it.
+  // The same, effect by effect, for a host that evaluates each: `visit` is called for every effect in order, with
+  // operator()<Effect>(state, coefficients, in, before, out), and has to do what run<Effect>() does with these. tick()
+  // does not use it: compilers would take twice the stack.
   template <class Visit>
   effects::Torques<N> tick_by_effect(const effects::Inputs<N>& measured, Visit&& visit) {
     effects::Inputs<N> in;
     take(in, measured);
-    complete(in);
+    derive_inputs(in);
     shift(in, measured.angle);
     modulate(in);
     const effects::Inputs<N> before = remembered(in);
@@ -347,7 +351,7 @@ class DriveModel {
       for (std::size_t i = 0; i < places.count; ++i) visit(i);
     }
   }
-  // One by one, so that what the image does not read is not copied; a copy of the whole stays one.
+  // One by one, so that signals that the image does not read are not copied.
   static constexpr void take(effects::Inputs<N>& in, const effects::Inputs<N>& from) {
     in.angle = from.angle;
     in.velocity = from.velocity;
@@ -364,14 +368,14 @@ class DriveModel {
     in.current = from.current;
     in.temperature = from.temperature;
   }
-  static constexpr void complete(effects::Inputs<N>& in) {
+  static constexpr void derive_inputs(effects::Inputs<N>& in) {
     in.speed = N::magnitude(in.velocity);
     in.torque_magnitude = N::magnitude(in.torque);
     in.viscous_scale = N::one();
     in.coulomb_scale = N::one();
     in.elapsed = N::one();
   }
-  // The dead zone of a backlash lies behind everything else that changes the torsion.
+  // The dead zone of a backlash comes after everything else that changes the torsion.
   constexpr void shift(effects::Inputs<N>& in, typename N::Angle periodic_angle) {
     constexpr std::uint64_t kShifts = of_phase<effects::Phase::shift>();
     if (!Image::kFilled && (present_ & kShifts) == 0) return;
@@ -390,8 +394,8 @@ class DriveModel {
     });
     in.angle = angle;
   }
-  // What modulates follows from the temperature alone, which changes slowly: a tick that has the temperature of the one
-  // before takes its scales. There the effects see nothing but it, so that this holds for each.
+  // The modulating scales depend on the temperature only, which changes slowly: a tick with the temperature of the
+  // previous one reuses its scales. The effects get no other signal here, so that this holds for each.
   constexpr void modulate(effects::Inputs<N>& in) {
     constexpr std::uint64_t kModulates = of_phase<effects::Phase::modulate>();
     const auto modulate_all = [&](effects::Inputs<N>& seen) {
@@ -417,8 +421,8 @@ class DriveModel {
     }
   }
 
-  using All = Memory;
-  // Of the tick before, what effects with memory may ask for: angle, torsion, magnitude of the torque, current.
+  using All = detail::AllPlaces<N, Image, std::make_index_sequence<effects::kLastId + 1>>;
+  // Signals of the previous tick that effects with memory may read: angle, torsion, magnitude of the torque, current.
   static constexpr unsigned kRemembered = All::remembered();
   template <unsigned kSignal, class T>
   using Kept = typename detail::Slot<(kRemembered & kSignal) != 0, T>::Type;
@@ -452,8 +456,8 @@ class DriveModel {
   All places_;
   std::uint64_t present_ = 0;  // bits of the effects' numbers
   unsigned reads_ = 0;
-  // Of the last temperature, on a drive. Other number systems have no temperature that is the same as another, and an
-  // image that runs all its effects at every tick asks nothing.
+  // For the last temperature, on a drive. Other number systems cannot compare temperatures, and an image that runs all
+  // its effects at every tick makes no check.
   static constexpr bool kKeepsScales = !Image::kFilled && std::is_base_of_v<fixed::Value, typename N::Value>;
   struct Scales {
     typename N::Value temperature{};

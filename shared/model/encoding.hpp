@@ -1,4 +1,4 @@
-// Bytes of a parameter block: little-endian, fixed width. What stands in a row of them: rows.hpp.
+// Bytes of a parameter block: little-endian, fixed width. The fields of a row: rows.hpp.
 #pragma once
 
 #include <cstddef>
@@ -20,7 +20,7 @@ constexpr std::uint32_t crc32(std::span<const std::uint8_t> bytes) {
   return ~crc;
 }
 
-// Writes as far as there is room and counts what there is to write.
+// Writes as far as there is room and counts all bytes.
 class Writer {
  public:
   explicit constexpr Writer(std::span<std::uint8_t> room) : room_(room) {}
@@ -40,7 +40,7 @@ class Writer {
   std::size_t at_ = 0;
 };
 
-// Reads noughts beyond the end, and then is no longer whole.
+// Reads zeros beyond the end; whole() is false from then on.
 class Reader {
  public:
   explicit constexpr Reader(std::span<const std::uint8_t> bytes) : bytes_(bytes) {}
@@ -60,7 +60,7 @@ class Reader {
   std::size_t at_ = 0;
 };
 
-// A number of any size, for what the drive does not compute with: mantissa 2^(exponent - 30).
+// A number of any size, which the drive does not compute with: mantissa 2^(exponent - 30).
 struct Number {
   std::int32_t mantissa = 0;
   std::int32_t exponent = 0;

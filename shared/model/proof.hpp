@@ -1,4 +1,4 @@
-// The proof that a drive model cannot leave the range of its numbers: one run over intervals instead of all runs over
+// The proof that a drive model cannot leave the range of its numbers: one run with intervals covers all runs with
 // numbers. For the host.
 #pragma once
 
@@ -18,13 +18,13 @@ inline constexpr std::int32_t kEnvelopeBases = 2;
 
 struct Proof {
   bool holds = false;
-  std::string_view reason{};                     // what was found first, where it does not hold
-  effects::Torques<fixed::Intervals> torques{};  // bounds of what the model can give
+  std::string_view reason{};                     // the first violation, where it does not hold
+  effects::Torques<fixed::Intervals> torques{};  // bounds of the model's torques
 };
 
 namespace detail {
-// Widens the states of an effect to what they were before; true where that changed them. A state is made of ranges and
-// of nothing else.
+// Widens the states of an effect by their previous ranges; true where that changed them. A state consists of ranges
+// only.
 template <class State>
 bool keep_hull(const State& before, State& after) {
   if constexpr (std::is_empty_v<State>) {
@@ -63,10 +63,10 @@ inline effects::Inputs<fixed::Intervals> envelope() {
 
 // Proves that no value, state or torque leaves its range for any inputs within the envelope, however long the model
 // runs: its states are widened tick by tick until a tick no longer widens them, which is then an invariant. `model`
-// must be at rest; its coefficients made without a finding.
+// must be at rest, and its coefficients made without an entry in OverflowLog.
 inline Proof prove(DriveModel<fixed::Intervals> model) {
   constexpr int kMostTicks = 100;
-  fixed::Findings::clear();
+  fixed::OverflowLog::clear();
   const effects::Inputs<fixed::Intervals> inputs = detail::envelope();
   Proof proof;
   for (int tick = 0; tick < kMostTicks; ++tick) {
@@ -84,8 +84,8 @@ inline Proof prove(DriveModel<fixed::Intervals> model) {
       for (std::size_t i = 0; i < places.count; ++i)
         changed = detail::keep_hull(states[i], places.states[i]) || changed;
     });
-    if (fixed::Findings::count() != 0) {
-      proof.reason = fixed::Findings::first();
+    if (fixed::OverflowLog::count() != 0) {
+      proof.reason = fixed::OverflowLog::first();
       return proof;
     }
     if (!changed) {

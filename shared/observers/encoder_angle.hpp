@@ -1,10 +1,10 @@
 // The position of a shaft from the counter of its encoder: the counter wraps, and its counts need not divide 2^32, so
-// turns and the rest of a turn are kept as integers, and no count is ever lost. Integers on the host and on the drive.
+// turns and the counts within a turn are integers, and no count is lost. Integers on the host and on the drive.
 #pragma once
 
 #include <cstdint>
 
-#include "shared/fixed/findings.hpp"
+#include "shared/fixed/overflow_log.hpp"
 #include "shared/fixed/types.hpp"
 
 namespace flexspline::observers {
@@ -14,6 +14,10 @@ struct EncoderAngle {
   struct Coefficients {
     std::uint32_t counts = 0;     // per turn
     std::uint64_t per_count = 0;  // 2^-56 turns: as 2^-32 it would drift within a turn
+    template <class Codec>
+    constexpr void fields(Codec& c) {
+      c.counts(counts), c.share(per_count);
+    }
   };
   struct State {
     std::uint32_t before = 0;  // the counter's last reading
@@ -25,13 +29,13 @@ struct EncoderAngle {
   // Host only.
   static Coefficients derive(std::uint32_t counts_per_turn) {
     if (counts_per_turn < 4 || counts_per_turn > kMostCounts) {
-      fixed::Findings::note("an encoder has between 4 and 2^24 counts a turn");
+      fixed::OverflowLog::note("an encoder has between 4 and 2^24 counts a turn");
       return {};
     }
     return {counts_per_turn, ((std::uint64_t{1} << 56) + counts_per_turn / 2) / counts_per_turn};
   }
-  // One tick: takes the counter and returns where the shaft stands, in 2^-32 turns, right to a unit. The first call
-  // takes the counter as it is, so that an absolute encoder stays one. A tick of more than a turn is another angle.
+  // One tick: takes the counter and returns the shaft's angle in 2^-32 turns, exact to a unit. The first call takes the
+  // counter as it is, so that an absolute encoder stays absolute. More than a turn in one tick gives a wrong angle.
   static constexpr fixed::Angle update(State& s, const Coefficients& c, std::uint32_t counter) {
     const auto moved = static_cast<std::int32_t>(s.started ? counter - s.before : counter);
     s.before = counter;
@@ -49,7 +53,7 @@ struct EncoderAngle {
     s.turns = static_cast<std::int32_t>(static_cast<std::uint32_t>(s.turns) + static_cast<std::uint32_t>(carry));
     return angle(s, c);
   }
-  // From now on the shaft stands at this angle, to the nearest count, whatever was counted before.
+  // Sets the present angle, to the nearest count, independent of what was counted before.
   static constexpr void set(State& s, const Coefficients& c, fixed::Angle angle) {
     const auto bits = static_cast<std::uint64_t>(angle.raw);
     const std::uint64_t of_a_turn = bits & 0xFFFFFFFFU;
@@ -58,8 +62,7 @@ struct EncoderAngle {
     s.rest = carry != 0 ? 0 : static_cast<std::uint32_t>(rest);
     s.turns = static_cast<std::int32_t>(static_cast<std::uint32_t>(bits >> 32) + carry);
   }
-  // The angle at which the counter stood at `counter`, less than a turn ago, is a whole number of turns from now on:
-  // the nearest.
+  // The angle at the counter value `counter`, less than a turn ago, becomes the nearest whole number of turns.
   static constexpr void set_whole_at(State& s, const Coefficients& c, std::uint32_t counter) {
     const auto counts = static_cast<std::int32_t>(c.counts);
     std::int32_t there = (static_cast<std::int32_t>(s.rest) - static_cast<std::int32_t>(s.before - counter)) % counts;
@@ -76,7 +79,7 @@ struct EncoderAngle {
     return s.started ? static_cast<std::int32_t>(counter - s.before) : 0;
   }
 
-  // Where the shaft stands.
+  // The shaft's angle.
   static constexpr fixed::Angle angle(const State& s, const Coefficients& c) {
     const std::uint64_t part = (s.rest * c.per_count + (std::uint64_t{1} << 23)) >> 24;
     const auto whole = static_cast<std::uint64_t>(static_cast<std::uint32_t>(s.turns)) << 32;

@@ -1,12 +1,12 @@
 // Velocity and acceleration from the counts of an encoder, by a Kalman filter in its steady state (report sections 4.1
-// and 4.3, after Belanger): the shaft's acceleration wanders, driven by a jerk that is white noise, and rounding to
-// counts is a measurement noise of a twelfth of a count squared.
+// and 4.3, after Belanger): the shaft's acceleration is a random walk, driven by white jerk, and rounding to counts is
+// a measurement noise of a twelfth of a count squared.
 //
 // All three states count in velocity bases: the position error times the corner frequency w, the velocity, and the
-// acceleration over w. So one format holds them whatever the corner is, and every coefficient is a share (a corner
-// above one radian a tick makes none, which derive() finds). The position itself is not a state: only the difference of
-// two readings enters, which wraps, and the position error carries over what was not used yet, so that no count is lost
-// however slow the motion.
+// acceleration over w. So one format holds them for any corner, and every coefficient is a share (a corner above one
+// radian a tick does not give one, which derive() detects). The position itself is not a state: only the difference of
+// two readings enters, which wraps, and the position error keeps the part that was not used yet, so that no count is
+// lost in slow motion.
 #pragma once
 
 #include <cstdint>
@@ -16,8 +16,7 @@
 
 namespace flexspline::observers {
 
-// What the filter assumes of the motion and of the encoder; in the units of position of the motor (rad on a rotary
-// axis).
+// The assumptions about motion and encoder, in the units of the motor's position (rad on a rotary axis).
 template <class P>
 struct KalmanSetup {
   P encoder_counts{};  // per motor turn, after quadrature
@@ -30,15 +29,15 @@ P count_variance(const P& encoder_counts, const effects::DriveConstants<P>& d) {
   const P count = P(6.283185307179586) / (encoder_counts * d.turn_angle_scale);
   return count * count / P(12.0);
 }
-// Host only: the setup whose filter has the corner frequency (where its three poles lie, at 60 degrees from one
-// another) `corner_rad_s`: S = T r w^6.
+// Host only: the setup whose filter has the corner frequency (the magnitude of its three poles, 60 degrees apart)
+// `corner_rad_s`: S = T r w^6.
 template <class P>
 KalmanSetup<P> setup_for_corner(const P& encoder_counts, const P& corner_rad_s, const effects::DriveConstants<P>& d) {
   const P cube = corner_rad_s * corner_rad_s * corner_rad_s;
   return {encoder_counts, d.time_base * count_variance(encoder_counts, d) * cube * cube};
 }
 
-// The gains of the filter for states scaled as above; they depend on the corner frequency times the tick alone.
+// The gains of the filter for states scaled as above; they depend on the corner frequency times the tick only.
 template <class P>
 struct KalmanGains {
   P corner{};  // w T
@@ -68,6 +67,10 @@ struct EncoderKalman {
     typename N::Share velocity;
     typename N::Share acceleration;
     typename N::Gain acceleration_scale;  // from velocity bases times w to acceleration bases
+    template <class Codec>
+    constexpr void fields(Codec& c) {
+      c(per_step), c(tick), c(half_tick), c(kept), c(velocity), c(acceleration), c(acceleration_scale);
+    }
   };
   template <class N>
   struct State {
@@ -93,8 +96,8 @@ struct EncoderKalman {
   // Host only: from gains that are known already.
   template <class N, class P>
   static Coefficients<N> coefficients(const KalmanGains<P>& g, const effects::DriveConstants<P>& d) {
-    // In whole 2^-31, of which a tick multiplies with one word: a part in a million off the best filter at 5 Hz, and
-    // the same filter on the host.
+    // Rounded to 2^-31, as a tick multiplies with one word: the gains differ from the optimum by 1e-6 at 5 Hz, and the
+    // host uses the same filter.
     const auto in_a_word = [](const P& x) {
       return P(static_cast<double>(static_cast<std::int64_t>(static_cast<double>(x) * 0x1p31 + 0.5)) * 0x1p-31);
     };
@@ -109,7 +112,7 @@ struct EncoderKalman {
   }
 
   // One tick: takes a reading and returns the estimates at the time of that reading, in bases. The first call only
-  // takes note of where the shaft stands.
+  // stores the shaft's angle.
   template <class N>
   static constexpr Estimate<N> update(State<N>& s, const Coefficients<N>& c, typename N::Angle reading) {
     if (!s.started) s.before = reading;
@@ -118,26 +121,26 @@ struct EncoderKalman {
     s.before = reading;
     const auto half_rise = N::times_gain(s.acceleration, c.half_tick);
     const auto expected = s.velocity + half_rise;
-    // What the reading surprises by is `surprise`; what is left of it once the position took up its part is the error.
-    const auto surprise = s.position_error + N::times_gain(travelled - expected, c.tick);
-    s.position_error = N::times_gain(surprise, c.kept);
-    s.velocity = expected + half_rise + N::times_gain(surprise, c.velocity);
-    s.acceleration = s.acceleration + N::times_gain(surprise, c.acceleration);
+    // The new position error is the innovation less the correction of the position.
+    const auto innovation = s.position_error + N::times_gain(travelled - expected, c.tick);
+    s.position_error = N::times_gain(innovation, c.kept);
+    s.velocity = expected + half_rise + N::times_gain(innovation, c.velocity);
+    s.acceleration = s.acceleration + N::times_gain(innovation, c.acceleration);
     return {N::narrow(s.velocity), N::scaled(c.acceleration_scale, N::narrow(s.acceleration))};
   }
 };
 
-// The largest magnitudes that the states and the sums on the way to them can reach, in velocity bases, for readings
-// that move by at most two bases a tick, which N::signal sees to; and whether all fit a state, which ends at eight.
+// The largest magnitudes of the states and intermediate sums, in velocity bases, for readings that move by at most two
+// bases a tick, to which N::signal limits them; and whether all fit a state, which ends at eight.
 struct KalmanBounds {
-  double surprise = 0.0;
+  double innovation = 0.0;
   double velocity = 0.0;
   double acceleration = 0.0;
   double sums = 0.0;
   bool fit = false;
 };
-// Host only. The filter is linear, so the bound is twice the sum of the magnitudes of its answer to one reading;
-// round-off (five roundings a tick of a few units of 2^-59) is such an input too, and far below the margin.
+// Host only. The filter is linear, so the bound is twice the sum of the magnitudes of its impulse response; round-off
+// (five roundings a tick of a few units of 2^-59) is an input as well, and far below the margin.
 inline KalmanBounds kalman_bounds(const KalmanGains<double>& g) {
   constexpr double kEnvelope = 2.0, kMargin = 1e-6, kRange = 8.0;
   constexpr double kTimeConstants = 100.0;  // the slowest poles decay with half the corner frequency
@@ -147,15 +150,15 @@ inline KalmanBounds kalman_bounds(const KalmanGains<double>& g) {
   const long ticks = static_cast<long>(kTimeConstants / g.corner) + 100;
   for (long k = 0; k < ticks; ++k) {
     const double expected = velocity + acceleration * g.corner / 2.0;
-    const double surprise = error + (travelled - expected) * g.corner;
+    const double innovation = error + (travelled - expected) * g.corner;
     const double predicted = velocity + acceleration * g.corner;
-    error = surprise * (1.0 - g.position);
-    velocity = predicted + surprise * g.velocity;
-    acceleration += surprise * g.acceleration;
+    error = innovation * (1.0 - g.position);
+    velocity = predicted + innovation * g.velocity;
+    acceleration += innovation * g.acceleration;
     expected_sum += detail::size_of(expected);
     difference_sum += detail::size_of(travelled - expected);
     predicted_sum += detail::size_of(predicted);
-    sum.surprise += detail::size_of(surprise);
+    sum.innovation += detail::size_of(innovation);
     sum.velocity += detail::size_of(velocity);
     sum.acceleration += detail::size_of(acceleration);
     travelled = 0.0;
@@ -164,10 +167,10 @@ inline KalmanBounds kalman_bounds(const KalmanGains<double>& g) {
   sum.sums = 0.0;
   for (const double x : {expected_sum, difference_sum, predicted_sum})
     if (bound(x) > sum.sums) sum.sums = bound(x);
-  sum.surprise = bound(sum.surprise);
+  sum.innovation = bound(sum.innovation);
   sum.velocity = bound(sum.velocity);
   sum.acceleration = bound(sum.acceleration);
-  sum.fit = sum.surprise < kRange && sum.velocity < kRange && sum.acceleration < kRange && sum.sums < kRange;
+  sum.fit = sum.innovation < kRange && sum.velocity < kRange && sum.acceleration < kRange && sum.sums < kRange;
   return sum;
 }
 

@@ -65,11 +65,11 @@ Matrix<P, n> solved(Matrix<P, n> a, Matrix<P, n> b) {
 }
 }  // namespace detail
 
-// The covariance before a measurement, P, that x' = A x + w, y = x_0 + v settles at, with the covariance Q of w and the
+// The steady-state covariance before a measurement, P, of x' = A x + w, y = x_0 + v, with the covariance Q of w and the
 // variance R of v:
 //   P = A (P - P c' (c P c' + R)^-1 c P) A' + Q,  c = (1 0 ...).
-// Each step of the structure-preserving doubling algorithm (Chu, Fan, Lin and Wang, 2004) does the work of all steps
-// before it once more, so that filters a million ticks slow are solved as well.
+// Each step of the structure-preserving doubling algorithm (Chu, Fan, Lin and Wang, 2004) doubles the number of ticks,
+// so that filters with time constants of a million ticks are solved as well.
 template <class P, std::size_t n>
 Matrix<P, n> steady_covariance(const Matrix<P, n>& a, const Matrix<P, n>& q, const P& r) {
   constexpr int kMostDoublings = 64;
@@ -86,7 +86,7 @@ Matrix<P, n> steady_covariance(const Matrix<P, n>& a, const Matrix<P, n>& q, con
     g = detail::sum(g, detail::product(f, detail::product(w_g, detail::transposed(f))));
     f = detail::product(f, w_f);
     h = detail::sum(h, more);
-    // Round-off must not make the sides of a symmetric matrix drift apart.
+    // Keeps the matrix symmetric in spite of round-off.
     const Matrix<P, n> turned = detail::transposed(h);
     h = detail::filled<P, n>([&](std::size_t i, std::size_t j) { return P(0.5) * (h[i][j] + turned[i][j]); });
     if (!(detail::size_of(more[0][0]) > P(1e-17) * h[0][0] ||
@@ -96,7 +96,7 @@ Matrix<P, n> steady_covariance(const Matrix<P, n>& a, const Matrix<P, n>& q, con
   return h;
 }
 
-// What part of the measurement's surprise each state takes up: P c' / (c P c' + R).
+// The filter's gain for each state: P c' / (c P c' + R).
 template <class P, std::size_t n>
 std::array<P, n> steady_gain(const Matrix<P, n>& covariance, const P& r) {
   std::array<P, n> gain{};

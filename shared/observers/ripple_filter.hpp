@@ -1,9 +1,9 @@
-// Takes torque ripple of a known order out of a torque signal (report section 5.3: a Kalman filter on a harmonic
-// oscillator). The oscillator's phase is the order times the motor's angle, so what is estimated is the mean of the
+// Removes torque ripple of a known order from a torque signal (report section 5.3: a Kalman filter on a harmonic
+// oscillator). The oscillator's phase is the order times the motor's angle, so the filter estimates the mean of the
 // torque and the amplitudes of cosine and sine,
 //   torque = mean + a cos(phase) + b sin(phase),
-// all three as random walks per unit of travel: the filter is as narrow in orders at every speed, and stands still with
-// the shaft.
+// all three as random walks per unit of travel: its bandwidth in orders is the same at every speed, and it does not
+// change while the shaft is at rest.
 #pragma once
 
 #include "shared/effects/effect.hpp"
@@ -14,7 +14,7 @@ template <class P>
 struct RippleSetup {
   P order{};           // cycles per motor turn
   P memory{};          // motor angle (rad on a rotary axis) after which 1/e of an old amplitude is left
-  P largest_ripple{};  // amplitude that cosine and sine are held to, N m at the output
+  P largest_ripple{};  // limit of the amplitudes of cosine and sine, N m at the output
 };
 
 struct RippleFilter {
@@ -23,8 +23,12 @@ struct RippleFilter {
     typename N::StepGain per_travel;
     typename N::Order order;
     typename N::Value largest;
-    typename N::Value mean_part;  // of what surprises, when all of it is taken up
+    typename N::Value mean_part;  // of the innovation, at full gain
     typename N::Value wave_part;
+    template <class Codec>
+    constexpr void fields(Codec& c) {
+      c(per_travel), c(order), c.limit(largest), c.unsigned_one(mean_part), c.unsigned_one(wave_part);
+    }
   };
   template <class N>
   struct State {
@@ -32,7 +36,7 @@ struct RippleFilter {
     typename N::State mean{};
     typename N::State cosine{};
     typename N::State sine{};
-    // What take() found, for learn().
+    // The results of take(), for learn().
     typename N::State step{};
     typename N::Wave wave{};
     typename N::Value torque{};
@@ -42,25 +46,25 @@ struct RippleFilter {
   // Host only. Torques are of the output side, as a torque sensor measures them.
   template <class N, class P>
   static Coefficients<N> derive(const RippleSetup<P>& setup, const effects::DriveConstants<P>& d) {
-    // Parts of 1/3, 2/3 and 2/3 make the whole step a projection, so that no surprise is ever taken up more than once:
-    // the estimates cannot swing up, whatever the order of the phases. On average over a turn an amplitude, and the
-    // mean, then follow with a third of the step.
+    // Gains of 1/3, 2/3 and 2/3 make the full step a projection, so that no innovation is used more than once: the
+    // estimates cannot become unstable for any order of the phases. On average over a turn an amplitude, and the mean,
+    // then follow with a third of the step.
     const P part = P(1.0) / P(3.0);
     return {N::step_gain(d.angle_base / (part * setup.memory)),
             N::order(setup.order * d.turn_angle_scale * d.angle_base),
             N::value(setup.largest_ripple / d.output_torque_base), N::value(part), N::value(part + part)};
   }
 
-  // One tick: takes where the shaft stands and the torque there, within two bases, and returns the torque without the
-  // ripple. The first call only takes note of the angle and of the torque.
+  // One tick: takes the shaft's angle and the torque, within two bases, and returns the torque without the ripple. The
+  // first call only stores both.
   template <class N>
   static constexpr typename N::Value update(State<N>& s, const Coefficients<N>& c, typename N::Angle angle,
                                             typename N::Value torque) {
     take<N>(s, c, angle, torque);
     return torque - learn<N>(s, c);
   }
-  // The same in two halves, for two ticks: what there is to learn from, and learning from it, which returns the ripple
-  // of the torque that was taken. As all counts by travel, it need not be done at every tick.
+  // The same in two parts, for two ticks: take() stores the inputs, and learn() updates the estimates and returns the
+  // ripple of the stored torque. As everything depends on travel, it need not run at every tick.
   template <class N>
   static constexpr void take(State<N>& s, const Coefficients<N>& c, typename N::Angle angle, typename N::Value torque) {
     if (!s.started) {
@@ -76,11 +80,10 @@ struct RippleFilter {
   }
   template <class N>
   static constexpr typename N::Value learn(State<N>& s, const Coefficients<N>& c) {
-    const auto surprise = s.torque - N::narrow(s.mean) - ripple<N>(s, s.wave);
-    // Random walks hold what they know without end, and would drift where the phase does not tell them apart: so each
-    // is held to its bound.
-    s.mean = N::bounded(s.mean + N::times(s.step, N::times(c.mean_part, surprise)));
-    const auto part = N::times(c.wave_part, surprise);
+    const auto innovation = s.torque - N::narrow(s.mean) - ripple<N>(s, s.wave);
+    // Random walks do not forget, and drift where the phase does not distinguish them, so each is limited.
+    s.mean = N::bounded(s.mean + N::times(s.step, N::times(c.mean_part, innovation)));
+    const auto part = N::times(c.wave_part, innovation);
     s.cosine = N::clamp(s.cosine + N::times(s.step, N::times(part, s.wave.cosine)), c.largest);
     s.sine = N::clamp(s.sine + N::times(s.step, N::times(part, s.wave.sine)), c.largest);
     return ripple<N>(s, s.wave);

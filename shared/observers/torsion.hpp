@@ -1,13 +1,13 @@
 // Torsion and output of a gear whose output has no encoder: a Kalman filter in its steady state on two masses and a
 // spring, of which only the motor's velocity is measured,
-//   J w' = t - K dq/N,   dq' = w/N - wo,   Jo wo' = K dq - l,   l a load that nobody knows, as a random walk.
-// All of it are differences from a nominal motion: t is the applied less the modelled torque, w the measured velocity
-// less the set point's, and so the estimates are to be added to the model's torsion and to the set point over N. Then
-// friction, gravity and a spring that bends are the model's business, and what is left is linear; without a model the
+//   J w' = t - K dq/N,   dq' = w/N - wo,   Jo wo' = K dq - l,   l an unknown load, as a random walk.
+// All variables are differences from a nominal motion: t is the applied less the modelled torque, w the measured
+// velocity less the set point's, and so the estimates are to be added to the model's torsion and to the set point over
+// N. So friction, gravity and a nonlinear spring are in the model, and the remainder is linear. Without a model the
 // nominal motion is standstill, and friction counts as torsion.
 //
-// What it cannot know: a constant error of friction looks like a torque through the gear, b at the motor as N b/K of
-// torsion. No observer tells them apart from the motor's side alone.
+// A limit of this method: a constant error of friction looks like a torque through the gear, b at the motor as N b/K of
+// torsion. No observer distinguishes them from the motor's side alone.
 //
 // Each tick takes the velocities first and the torsion with the new ones (symplectic Euler), which neither damps nor
 // excites the resonance; the gains are those of the Riccati equation for exactly this step.
@@ -25,7 +25,7 @@ struct TorsionSetup {
   P inertia{};         // kg m^2, motor
   P output_inertia{};  // kg m^2
   P stiffness{};       // N m/rad at the output, where the gear usually works
-  P torque_noise{};    // N m at the motor, std of what no model says, from tick to tick
+  P torque_noise{};    // N m at the motor, std of the unmodelled torque, from tick to tick
   P load_walk{};       // N m per root second at the output: how fast an unknown load changes
   P velocity_noise{};  // rad/s, std of the measured velocity
 };
@@ -39,10 +39,15 @@ struct TorsionObserver {
     typename N::Share by_load{};      // the same, by the load
     typename N::Share from_motor{};   // of the torsion, by the motor's velocity
     typename N::Share from_output{};  // and by the output's
-    typename N::Gain velocity{};      // of each state, by what the measurement surprises
+    typename N::Gain velocity{};      // of each state, by the innovation
     typename N::Gain torsion{};
     typename N::Gain output_velocity{};
     typename N::Gain load{};
+    template <class Codec>
+    constexpr void fields(Codec& c) {
+      c(by_torque), c(by_torsion), c(output), c(by_load), c(from_motor), c(from_output);
+      c(velocity), c(torsion), c(output_velocity), c(load);
+    }
   };
   template <class N>
   struct State {
@@ -68,7 +73,7 @@ struct TorsionObserver {
     const P by_load = tick * d.output_torque_base / (s.output_inertia * d.output_velocity_base);
     const P from_motor = tick * d.velocity_base / (d.gear_ratio * d.torsion_base);
     const P from_output = tick * d.output_velocity_base / d.torsion_base;
-    // A state within four bases, corrected by one, then stays within eight on the way.
+    // A state within four bases, corrected by one, then stays within eight in all intermediate results.
     constexpr double kMost = 0.3;
     for (const P& x : {by_torque, by_torsion, output, by_load, from_motor, from_output})
       control::require(x > P(0.0) && x < P(kMost), "a tick of the torsion observer is too long for the resonance");
@@ -90,9 +95,9 @@ struct TorsionObserver {
     return {N::share(by_torque),   N::share(by_torsion), N::share(output), N::share(by_load), N::share(from_motor),
             N::share(from_output), N::gain(gain[0]),     N::gain(gain[1]), N::gain(gain[2]),  N::gain(gain[3])};
   }
-  // One tick: the torque that acted since the tick before, and the motor's velocity now; differences, as said above, in
-  // bases and within two. Where they are not to be trusted, as where friction changes its side and no model says when
-  // to a tick, the masses go on without them.
+  // One tick: the torque that acted since the previous tick, and the motor's velocity now; both are differences from
+  // the nominal motion, in bases and within two. Where they are not reliable, as where friction changes its sign at an
+  // unknown tick, the model runs without a correction.
   template <class N>
   static constexpr Estimate<N> update(State<N>& s, const Coefficients<N>& c, typename N::Value torque,
                                       typename N::Value velocity, bool trusted = true) {
@@ -100,19 +105,19 @@ struct TorsionObserver {
                        N::times(s.torsion, c.by_torsion);
     const auto output = s.output_velocity + N::times(s.torsion, c.output) - N::times(s.load, c.by_load);
     const auto torsion = s.torsion + N::times(motor, c.from_motor) - N::times(output, c.from_output);
-    const auto surprise = trusted ? velocity - N::narrow(motor) : typename N::Value{};
-    // Bounded, so that wrong inputs for ever cannot run the sums out of their range.
-    s.velocity = N::bounded(motor + corrected<N>(surprise, c.velocity));
-    s.torsion = N::bounded(torsion + corrected<N>(surprise, c.torsion));
-    s.output_velocity = N::bounded(output + corrected<N>(surprise, c.output_velocity));
-    s.load = N::bounded(s.load + corrected<N>(surprise, c.load));
+    const auto innovation = trusted ? velocity - N::narrow(motor) : typename N::Value{};
+    // Bounded, so that permanently wrong inputs cannot make the sums leave their range.
+    s.velocity = N::bounded(motor + corrected<N>(innovation, c.velocity));
+    s.torsion = N::bounded(torsion + corrected<N>(innovation, c.torsion));
+    s.output_velocity = N::bounded(output + corrected<N>(innovation, c.output_velocity));
+    s.load = N::bounded(s.load + corrected<N>(innovation, c.load));
     return {N::narrow(s.torsion), N::narrow(s.output_velocity), N::narrow(s.load)};
   }
 
  private:
   template <class N>
-  static constexpr typename N::State corrected(typename N::Value surprise, typename N::Gain gain) {
-    return N::widen(N::clamp(N::scaled(gain, surprise), N::one()));
+  static constexpr typename N::State corrected(typename N::Value innovation, typename N::Gain gain) {
+    return N::widen(N::clamp(N::scaled(gain, innovation), N::one()));
   }
 };
 

@@ -1,4 +1,4 @@
-// The requests that bring an excitation to a drive, from the coefficients that control::Excitation::derive made on the
+// The requests that send an excitation to a drive, from the coefficients that control::Excitation::derive made on the
 // host for the bases of the drive's active block.
 #pragma once
 

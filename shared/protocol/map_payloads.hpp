@@ -1,4 +1,4 @@
-// What the messages of the residual map carry (shared/control/residual_map.hpp). Since minor version 1.
+// Payloads of the messages of the residual map (shared/control/residual_map.hpp). Since minor version 1.
 #pragma once
 
 #include <array>
@@ -11,9 +11,9 @@ namespace flexspline::protocol {
 
 inline constexpr std::uint8_t kMinorOfMap = 1;
 
-// Answer to `map_info`: what the bins mean. A velocity bin below the middle one turns backwards.
+// Answer to `map_info`: the meaning of the bins. Velocity bins below the middle one are negative velocities.
 struct MapInfo {
-  bool counts = false;          // ticks are counted now, where a model's torque is fed forward
+  bool counts = false;          // the map is running: it counts ticks in which a model's torque is fed forward
   std::uint8_t angle_bins = 0;  // of a turn of the motor
   std::uint32_t version = 0;    // changes with every tick that is counted, and every reset
   std::int64_t scale = 0;       // units of a sum per base of torque, 2^-27
@@ -35,7 +35,7 @@ struct MapFirst {
   bool operator==(const MapFirst&) const = default;
 };
 struct MapBin {
-  std::uint16_t count = 0;  // of ticks; halved with both sums where it is full
+  std::uint16_t count = 0;  // of ticks; halved together with both sums when it is full
   std::int32_t sum = 0;
   std::uint32_t squares = 0;
   template <class Codec>

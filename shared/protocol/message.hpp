@@ -1,10 +1,13 @@
-// The message that goes between a host and a drive, over whatever link: at most 64 bytes, little-endian.
+// A message between a host and a drive, over any link: at most 64 bytes, little-endian.
 //
-//   0  kind     of a request, below 0x70; an answer has the same with kAnswerBit; from kFirstUnasked on what a drive
-//   sends by itself 1  number   of the request, any; comes back with the answer 2  length   of the payload, 0 to 60 3
-//   code of an answer; else nought (of telemetry: the number of frames) 4  payload
+//   0  kind     of a request, below 0x70; an answer has the same with kAnswerBit;
+//               from kFirstUnasked on messages that a drive sends by itself
+//   1  number   of the request, any; the answer repeats it
+//   2  length   of the payload, 0 to 60
+//   3  code     of an answer; otherwise zero (of telemetry: the number of frames)
+//   4  payload
 //
-// README.md has the table of kinds. A report of 64 bytes is filled up with noughts.
+// A report of 64 bytes is filled up with zeros.
 #pragma once
 
 #include <array>
@@ -17,9 +20,9 @@
 
 namespace flexspline::protocol {
 
-inline constexpr std::uint8_t kMajor = 1;  // another one: nothing but `identify` is understood
+inline constexpr std::uint8_t kMajor = 1;  // with another one only `identify` is understood
 inline constexpr std::uint8_t kMinor =
-    2;  // grows with what is added: 1 the residual map, 2 the board's hardware and where shafts are
+    2;  // increases with each addition: 1 the residual map, 2 the board's hardware and the angles of the shafts
 
 inline constexpr std::uint8_t kMinorOfHardware = 2;
 
@@ -32,7 +35,7 @@ inline constexpr std::uint8_t kAnswerBit = 0x80;
 inline constexpr std::uint8_t kEndOfRequests = 0x70;
 inline constexpr std::uint8_t kFirstUnasked = kAnswerBit + kEndOfRequests;
 
-// Numbers stay as they are for good; a kind that is no longer served is not used again.
+// Numbers never change; that of a removed kind is not reused.
 enum class Kind : std::uint8_t {
   identify = 0x01,
   status = 0x02,
@@ -64,7 +67,7 @@ enum class Code : std::uint8_t {
   wrong_length,
   wrong_value,    // a number is outside what its field may hold
   wrong_version,  // `identify` with an agreeing major has to come first
-  busy,           // the request before has not been answered
+  busy,           // the previous request has not been answered
   armed,          // not while the drive is armed
   refused,        // a command; the payload says why
   no_parameters,
@@ -98,7 +101,7 @@ struct Message {
   constexpr std::span<const std::uint8_t> content() const { return std::span(payload).first(length); }
 };
 
-// The first size() bytes count; the rest are noughts.
+// The first size() bytes count; the rest are zeros.
 constexpr Report encode(const Message& m) {
   Report report{};
   report[0] = m.kind;
@@ -108,7 +111,7 @@ constexpr Report encode(const Message& m) {
   for (std::size_t i = 0; i < m.length && i < kMostPayload; ++i) report[kHeadBytes + i] = m.payload[i];
   return report;
 }
-// False for what is cut off or states a length that does not fit. Bytes behind the message are passed over.
+// False for a message that is cut off or states a length that does not fit. Bytes after the message are ignored.
 constexpr bool decode(std::span<const std::uint8_t> bytes, Message& m) {
   if (bytes.size() < kHeadBytes) return false;
   const std::uint8_t length = bytes[2];
@@ -140,7 +143,7 @@ class PutFields {
   constexpr void within(T& x, std::uint32_t) {
     (*this)(x);
   }
-  // The first `count` of `all`, whose number travels before them in a byte.
+  // The first `count` of `all`; a byte before them has their number.
   template <class T, std::size_t Size>
   constexpr void some(std::array<T, Size>& all, std::uint8_t& count) {
     writer_.put(count);
@@ -231,7 +234,7 @@ constexpr Code take_payload(std::span<const std::uint8_t> bytes, Payload& payloa
   if (!take.whole()) return Code::wrong_length;
   return take.in_range() ? Code::done : Code::wrong_value;
 }
-// The same for `identify`, where a later version may have put more behind what is known here.
+// The same for `identify`, to which a later version may have appended more.
 template <class Payload>
 constexpr Code take_front(std::span<const std::uint8_t> bytes, Payload& payload) {
   TakeFields take(bytes);

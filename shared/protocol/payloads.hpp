@@ -1,4 +1,4 @@
-// What the messages carry. Fields travel in the order of fields(), little-endian, each as wide as its type.
+// Payloads of the messages. Fields are sent in the order of fields(), little-endian, each as wide as its type.
 #pragma once
 
 #include <array>
@@ -8,59 +8,11 @@
 #include "shared/control/excitation_setup.hpp"
 #include "shared/control/hardware.hpp"
 #include "shared/protocol/message.hpp"
+#include "shared/protocol/states.hpp"
 
 namespace flexspline::protocol {
 
-// As firmware has them, by the same numbers (firmware/service.hpp holds both together).
-enum class Mode : std::uint8_t { boot, idle, current, velocity, position, excitation, stop, fault };
-inline constexpr std::uint32_t kModes = 8;
-constexpr bool is_armed(Mode mode) {
-  return mode >= Mode::current && mode <= Mode::stop;
-}
-enum class CommandKind : std::uint8_t { heartbeat, arm, set, disarm, clear_fault };
-inline constexpr std::uint32_t kCommandKinds = 5;
-enum class Refusal : std::uint8_t {
-  none,
-  armed,
-  not_armed,
-  other_mode,
-  no_mode,
-  moving,
-  no_parameters,
-  no_excitation,
-  fault,
-  booting,
-};
-inline constexpr std::uint32_t kRefusals = 10;
-// What a drive found of its stored blocks when it started.
-enum class StoreState : std::uint8_t { empty, good, fell_back, damaged };
-inline constexpr std::uint32_t kStoreStates = 4;
-enum class Channel : std::uint8_t {
-  state,
-  readings,
-  motor_turns,
-  motor_fraction,
-  output_turns,
-  output_fraction,
-  velocity,
-  acceleration,
-  output_velocity,
-  torque,
-  current,
-  temperature,
-  disturbance,
-  torsion,
-  set_turns,
-  set_fraction,
-  set_velocity,
-  set_acceleration,
-  feedforward_torque,
-  command_torque,
-  command_current,
-};
-inline constexpr std::size_t kChannels = 21;
 inline constexpr std::size_t kMostChannels = 12;
-inline constexpr std::uint32_t kFaults = 25;
 
 struct Empty {
   template <class Codec>
@@ -68,7 +20,7 @@ struct Empty {
   bool operator==(const Empty&) const = default;
 };
 
-// `identify`, both ways. These two layouts never change, whatever the version; what comes behind them is passed over.
+// `identify`, both ways. These two layouts never change in any version; further bytes are ignored.
 struct Hello {
   std::uint8_t major = kMajor;
   std::uint8_t minor = kMinor;
@@ -82,11 +34,11 @@ struct Identity {
   std::uint8_t major = kMajor;
   std::uint8_t minor = kMinor;
   std::array<std::uint8_t, 2> firmware{};  // version
-  std::array<std::uint8_t, 16> board{};    // names: ASCII, noughts behind
+  std::array<std::uint8_t, 16> board{};    // names: ASCII, zeros behind
   std::array<std::uint8_t, 16> serial{};
   std::uint32_t tick_hz = 0;
   std::uint32_t block_bytes = 0;   // the longest parameter block
-  std::uint16_t effects = 0;       // that the image has; `effects` tells which
+  std::uint16_t effects = 0;       // that the image has; `effects` lists them
   std::uint8_t channels = 0;       // of telemetry that it knows
   std::uint8_t most_channels = 0;  // in one subscription
   std::uint8_t most_lines = 0;     // of an excitation
@@ -110,7 +62,7 @@ struct Effects {
   bool operator==(const Effects&) const = default;
 };
 
-// What the board states of itself.
+// What the board states about its hardware.
 struct Hardware {
   control::Hardware board{};
   template <class Codec>
@@ -123,7 +75,7 @@ struct Hardware {
   bool operator==(const Hardware&) const = default;
 };
 
-// What a drive knows of where its shafts are.
+// Which angles of its shafts a drive knows.
 struct Reference {
   bool knows_turn = false;    // of the motor: effects that repeat with it act
   bool knows_output = false;  // effects of the output's angle act, and limits of position
@@ -133,7 +85,7 @@ struct Reference {
   }
   bool operator==(const Reference&) const = default;
 };
-// `home`: where the motor stands now, 2^-32 turns; answered as a command is.
+// `home`: the motor's present angle, 2^-32 turns; answered as a command is.
 struct Home {
   std::int64_t position = 0;
   template <class Codec>
@@ -144,7 +96,7 @@ struct Home {
 };
 
 struct StoredBlock {
-  std::uint32_t bytes = 0;  // nought: there is none
+  std::uint32_t bytes = 0;  // zero: there is none
   std::uint32_t crc = 0;    // of these bytes, CRC-32
   template <class Codec>
   constexpr void fields(Codec& c) {
@@ -157,11 +109,11 @@ struct Status {
   Mode mode = Mode::boot;
   bool has_parameters = false;
   StoreState store = StoreState::empty;
-  std::uint8_t fault = 0;  // the one that the drive stands in, or the last one
+  std::uint8_t fault = 0;  // the present fault, or the last one
   std::uint32_t fault_tick = 0;
   std::int32_t fault_seen = 0;
   std::int32_t fault_limit = 0;
-  std::uint32_t dropped = 0;   // frames of telemetry that found no room on the drive
+  std::uint32_t dropped = 0;   // frames of telemetry that the drive dropped because its ring was full
   std::uint16_t sequence = 0;  // of the active block: another one with each commit and restore
   std::uint32_t staged = 0;    // bytes
   StoredBlock active{};
@@ -184,7 +136,7 @@ struct BlockBegin {
   }
   bool operator==(const BlockBegin&) const = default;
 };
-// A piece of a block, either way. The longest is of a multiple of four bytes, as flash is written in words.
+// A chunk of a block, both ways. The longest is a multiple of four bytes, as flash is written in words.
 inline constexpr std::size_t kMostChunk = kMostPayload - 4;
 static_assert(kMostChunk % 4 == 0);
 struct Chunk {
@@ -207,7 +159,7 @@ struct BlockRead {
   }
   bool operator==(const BlockRead&) const = default;
 };
-// `sequence` as the status had it: a restore that is asked for twice, because an answer got lost, is done once.
+// `sequence` as in the status: a restore that is requested twice, because an answer was lost, is done once.
 struct BlockRestore {
   std::uint16_t sequence = 0;
   template <class Codec>
@@ -216,7 +168,7 @@ struct BlockRestore {
   }
   bool operator==(const BlockRestore&) const = default;
 };
-// Answer to commit and restore: of the validator, nought for a good block.
+// Answer to commit and restore: the validator's reason, zero for a valid block.
 struct Reason {
   std::uint32_t reason = 0;
   template <class Codec>
@@ -311,7 +263,7 @@ struct ExcitationLines {
   bool operator==(const ExcitationLines&) const = default;
 };
 
-// Begins, changes or (with no channels) ends the telemetry; sequence and drops start from nought.
+// Begins, changes or (with no channels) ends the telemetry; sequence and drops start from zero.
 struct Subscription {
   std::uint16_t every = 1;  // ticks
   std::array<Channel, kMostChannels> channels{};
@@ -338,7 +290,8 @@ constexpr std::size_t frames_a_message(std::size_t channels) {
   return channels == 0 ? 0 : (kMostPayload - kFrameHeadBytes) / (4 * channels);
 }
 static_assert(frames_a_message(kMostChannels) >= 1);
-// Calls visit(sequence, index of the frame, words) for each frame. False for what is no whole message of frames.
+// Calls visit(sequence, index of the frame, words) for each frame. False for a message that does not contain whole
+// frames.
 template <class Visit>
 constexpr bool for_each_frame(const Message& m, Visit&& visit) {
   const std::size_t channels = m.number, frames = m.code;

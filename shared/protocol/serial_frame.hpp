@@ -1,5 +1,5 @@
-// Messages over a line of bytes: the message's used bytes and their CRC-32, stuffed by COBS (Cheshire and Baker, 1999)
-// so that no nought is among them, then a nought. Whatever was lost or garbled, the next nought is a new beginning.
+// Messages over a serial line: the message's used bytes and their CRC-32, stuffed by COBS (Cheshire and Baker, 1999) so
+// that none of them is zero, then a zero. After lost or corrupted bytes the next zero starts a new frame.
 #pragma once
 
 #include <array>
@@ -12,7 +12,7 @@
 namespace flexspline::protocol {
 
 inline constexpr std::size_t kSerialCrc = 4;
-inline constexpr std::size_t kMostSerial = kReportBytes + kSerialCrc + 2;  // a code byte before, the nought behind
+inline constexpr std::size_t kMostSerial = kReportBytes + kSerialCrc + 2;  // a code byte before, the zero after
 
 struct SerialFrame {
   std::array<std::uint8_t, kMostSerial> bytes{};
@@ -43,10 +43,10 @@ constexpr SerialFrame serial_frame(const Message& m) {
   return frame;
 }
 
-// Takes bytes as they come.
+// Takes bytes as they arrive.
 class SerialReader {
  public:
-  // True: `m` is a message that came whole.
+  // True: `m` is a complete message.
   constexpr bool take(std::uint8_t byte, Message& m) {
     if (byte != 0) {
       if (size_ < frame_.size()) frame_[size_] = byte;
@@ -55,12 +55,12 @@ class SerialReader {
     }
     const std::size_t size = size_;
     size_ = 0;
-    if (size == 0) return false;  // noughts between frames are no fault
+    if (size == 0) return false;  // zeros between frames are no fault
     const bool good = size <= frame_.size() && unstuff(std::span(frame_).first(size), m);
     if (!good) ++damaged_;
     return good;
   }
-  // Frames that were no message, so far.
+  // The number of invalid frames so far.
   constexpr std::uint32_t damaged() const { return damaged_; }
   constexpr void restart() { size_ = 0; }
 

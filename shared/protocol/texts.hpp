@@ -1,4 +1,4 @@
-// What codes, refusals, faults and channels are called for people. For the host's side; no image holds them.
+// Texts for codes, refusals, faults and channels. For the host; they are in no image.
 #pragma once
 
 #include <array>
@@ -39,11 +39,11 @@ constexpr std::string_view text_of(Code code) {
     case Code::too_long:
       return "the block is empty or longer than the drive's flash has room for";
     case Code::not_begun:
-      return "no block is being sent; begin anew";
+      return "no block is being sent; start again";
     case Code::out_of_order:
-      return "a piece of the block is missing; begin anew";
+      return "a piece of the block is missing; start again";
     case Code::incomplete:
-      return "the block is not complete; begin anew";
+      return "the block is not complete; start again";
     case Code::wrong_checksum:
       return "what arrived is not what was sent; try again over a better line";
     case Code::invalid:
@@ -70,7 +70,7 @@ constexpr std::string_view text_of(Refusal refusal) {
     case Refusal::other_mode:
       return "the set point is for another mode than the drive is in";
     case Refusal::no_mode:
-      return "that is no mode that a drive can be commanded into";
+      return "this is not a mode that a drive can be commanded into";
     case Refusal::moving:
       return "the shaft moves; bring it to rest first";
     case Refusal::no_parameters:
@@ -78,7 +78,7 @@ constexpr std::string_view text_of(Refusal refusal) {
     case Refusal::no_excitation:
       return "the drive has no excitation";
     case Refusal::fault:
-      return "the drive stands in a fault; find its cause and clear it first";
+      return "the drive is in a fault; find its cause and clear it first";
     case Refusal::booting:
       return "the drive is starting";
   }
@@ -91,7 +91,7 @@ constexpr std::string_view name_of(Mode mode) {
   return static_cast<std::size_t>(mode) < kNames.size() ? kNames[static_cast<std::size_t>(mode)] : "unknown";
 }
 
-// A fault's name, and why it happens. By their numbers (firmware/faults.hpp).
+// A fault's name and its cause, by the numbers of firmware/faults.hpp.
 struct FaultText {
   std::string_view name{};
   std::string_view reason{};
@@ -138,7 +138,7 @@ constexpr FaultText fault_text(std::uint8_t number) {
   return number < kFaults ? kFaultTexts[number] : FaultText{"unknown", "a fault that this tool does not know"};
 }
 
-// The base that a channel's numbers are shares of, 2^-27; or what else its word is.
+// The base of a channel's numbers, in 2^-27; or another meaning of its word.
 enum class Base : std::uint8_t {
   word,
   turns,     // signed, of the motor or output

@@ -1,8 +1,8 @@
-// Two parameter blocks in flash: the active one and the one before. README.md has the layout and why a power cut at any
-// point leaves a complete old or a complete new block.
+// Two parameter blocks in flash: the active one and the previous one. README.md has the layout and why a power cut at
+// any point leaves a complete old or a complete new block.
 //
-// The block itself is none of the store's business: `validate(bytes)` is asked, which returns nought for a good block
-// and any other number as the reason.
+// The store does not interpret the block: `validate(bytes)` returns zero for a valid block and any other number as the
+// reason.
 #pragma once
 
 #include <cstddef>
@@ -10,6 +10,7 @@
 #include <span>
 
 #include "shared/model/encoding.hpp"
+#include "shared/protocol/states.hpp"
 #include "shared/storage/flash_port.hpp"
 
 namespace flexspline::storage {
@@ -20,20 +21,14 @@ enum class StoreError : std::uint8_t {
   not_begun,       // nothing is being staged
   out_of_order,    // a chunk has to follow the one before it, or repeat what is staged
   incomplete,      // fewer bytes were staged than announced
-  wrong_checksum,  // what was staged is not what was announced
+  wrong_checksum,  // the staged bytes are not those that were announced
   invalid,         // the validator refused it; nothing was changed
-  flash,           // the memory did not take what was written
-  no_previous,     // there is no valid block before the active one
-  worn,            // no room to note another restore; staging a block anew makes room
+  flash,           // the memory does not read back as written
+  no_previous,     // there is no valid previous block
+  worn,            // no room to record another restore; staging a block again makes room
 };
 
-// What boot() found.
-enum class StoreState : std::uint8_t {
-  empty,      // no block was ever committed
-  good,       // the newest block that was committed is active
-  fell_back,  // the newest one is damaged; the one before is active
-  damaged,    // blocks were committed and none of them is good: there is no active one
-};
+using protocol::StoreState;  // what boot() found
 
 template <FlashPort Flash>
 class ParameterStore {
@@ -45,7 +40,7 @@ class ParameterStore {
 
   explicit constexpr ParameterStore(Flash& flash) : flash_(flash) {}
 
-  // Looks at both sectors; nothing is remembered from before and nothing is written.
+  // Reads both sectors; keeps nothing from before and writes nothing.
   template <class Validate>
   constexpr StoreState boot(Validate&& validate) {
     staged_ = announced_ = 0;
@@ -66,34 +61,34 @@ class ParameterStore {
   }
   constexpr StoreState state() const { return state_; }
 
-  // Empty where there is none. The bytes lie in flash, from a multiple of eight on, until the next begin().
+  // Empty where there is none. The bytes are in flash, aligned to eight bytes, until the next begin().
   constexpr std::span<const std::uint8_t> active() const { return good_block(active_); }
   constexpr std::span<const std::uint8_t> previous() const { return good_block(1 - active_); }
-  // CRC-32 of these, nought where there is none.
+  // CRC-32 of these bytes, zero without a block.
   constexpr std::uint32_t active_crc() const { return rank_[active_] == 0 ? 0 : word(active_, 2); }
   constexpr std::uint32_t previous_crc() const { return rank_[1 - active_] == 0 ? 0 : word(1 - active_, 2); }
-  // Another one with each commit and each restore; nought: there is no active block.
+  // Changes with each commit and each restore; zero: there is no active block.
   constexpr std::uint16_t sequence() const { return rank_[active_]; }
-  // Of a restore. After the largest comes one again; all numbers of a store lie within a few hundred.
+  // The number after a restore. The largest is followed by one; all numbers of a store are within a few hundred.
   static constexpr std::uint16_t sequence_after(std::uint16_t rank) { return later(rank, kActivates); }
   constexpr std::size_t staged() const { return staged_; }
 
-  // Begins to stage a block of so many bytes with this CRC-32: erases the sector that is not active, which gives up the
-  // block before the active one.
+  // Begins to stage a block of this length and CRC-32: erases the sector that is not active, and with it the previous
+  // block.
   constexpr StoreError begin(std::size_t bytes, std::uint32_t crc) {
     staging_ = false;
     staged_ = 0;
     if (bytes == 0 || bytes > kCapacity) return StoreError::too_long;
     const std::size_t s = target();
-    if (rank_[active_] != 0 && !give_up_other()) return StoreError::flash;
+    if (rank_[active_] != 0 && !invalidate_other()) return StoreError::flash;
     if (!erase(s)) return StoreError::flash;
     announced_ = bytes;
     crc_ = crc;
     staging_ = true;
     return StoreError::none;
   }
-  // A chunk: `offset` is where the chunk before ended. All but the last are of a multiple of four bytes. A chunk that
-  // is staged already, byte for byte, is taken again: a host whose answer got lost repeats itself.
+  // A chunk: `offset` is the end of the previous chunk. All but the last are a multiple of four bytes long. A chunk
+  // that is staged already with the same bytes is accepted again: a host whose answer was lost repeats it.
   constexpr StoreError write(std::size_t offset, std::span<const std::uint8_t> chunk) {
     if (!staging_) return StoreError::not_begun;
     if (offset % 4 != 0 || chunk.empty() || offset > staged_ || chunk.size() > announced_ - offset)
@@ -107,12 +102,12 @@ class ParameterStore {
         value &= ~(std::uint32_t{0xFF} << (8 * b));
         value |= std::uint32_t{chunk[i + b]} << (8 * b);
       }
-      if (!put(s, (kHeaderBytes + offset + i) / 4, value)) return give_up();
+      if (!put(s, (kHeaderBytes + offset + i) / 4, value)) return flash_failed();
     }
     staged_ = offset + chunk.size();
     return StoreError::none;
   }
-  // Validates what was staged as a whole, then makes it the active block. `reason` gets the validator's.
+  // Validates the whole staged block, then makes it active. `reason` gets the validator's reason.
   template <class Validate>
   constexpr StoreError commit(Validate&& validate, std::uint32_t& reason) {
     reason = 0;
@@ -123,12 +118,13 @@ class ParameterStore {
     if (model::crc32(bytes) != crc_) return StoreError::wrong_checksum;
     reason = validate(bytes);
     if (reason != 0) return StoreError::invalid;
-    if (!put(s, 0, kMagic) || !put(s, 1, static_cast<std::uint32_t>(announced_)) || !put(s, 2, crc_)) return give_up();
+    if (!put(s, 0, kMagic) || !put(s, 1, static_cast<std::uint32_t>(announced_)) || !put(s, 2, crc_))
+      return flash_failed();
     staging_ = false;
     return put_slot(s, kFirstSlot, kActivates);
   }
-  // Makes the block before the active one active, and that one the one before: a second restore goes back again.
-  // Validated first: an image may have changed since.
+  // Exchanges the active and the previous block: a second restore goes back again. The block is validated first, as the
+  // image may have changed since.
   template <class Validate>
   constexpr StoreError restore(Validate&& validate, std::uint32_t& reason) {
     reason = 0;
@@ -137,11 +133,11 @@ class ParameterStore {
     reason = validate(block(s));
     if (reason != 0) return StoreError::invalid;
     const std::size_t slot = free_slot(s);
-    // begin() needs as many again.
+    // begin() needs the same number.
     return slot + 2 * kTwice > kSlotsEnd ? StoreError::worn : put_twice(s, slot, kActivates);
   }
 
-  // As it left its maker: no blocks. The active one goes last.
+  // Factory state: no blocks. The active one is erased last.
   constexpr StoreError erase_all() {
     staging_ = false;
     staged_ = 0;
@@ -153,14 +149,14 @@ class ParameterStore {
   }
 
  private:
-  // Words of the header: magic, bytes, CRC, one left free; then a slot of two words for each time that the block became
-  // active: a check, and last of all the number and its complement.
+  // Words of the header: magic, bytes, CRC, one unused; then a slot of two words for each time that the block became
+  // active: a check, and finally the number and its complement.
   static constexpr std::size_t kFirstSlot = 4;
   static constexpr std::size_t kSlotsEnd = kHeaderBytes / 4;
   static constexpr std::size_t kTwice = 4;  // words
   static constexpr std::uint16_t kMostRank = 0xFFFE;
-  // How many numbers later: a block that becomes active, and an active one that gives up the other. A block that is
-  // older than the active one by more than the first was given up.
+  // Increments of the number: for a block that becomes active, and for an active one that invalidates the other. A
+  // block that is older than the active one by more than the first increment is invalid.
   static constexpr unsigned kActivates = 2, kGivesUp = 1;
   static constexpr std::uint16_t later(std::uint16_t rank, unsigned steps) {
     const unsigned next = rank + steps;
@@ -170,16 +166,16 @@ class ParameterStore {
     return newer >= older ? newer - older : newer + kMostRank - older;
   }
 
-  // Of two numbers that wrap, of which zero is older than any.
+  // Compares two wrapping numbers; zero is older than any.
   static constexpr bool is_newer(std::uint16_t a, std::uint16_t b) {
     if (a == 0 || b == 0) return a != 0;
     return static_cast<std::int16_t>(static_cast<std::uint16_t>(a - b)) > 0;
   }
-  // Sixteen of its bits are nought. A write that was cut short leaves fewer, so it can never be another valid number.
+  // Sixteen of its bits are zero. An interrupted write leaves fewer, so it cannot be another valid number.
   static constexpr std::uint32_t code_of(std::uint16_t rank) {
     return std::uint32_t{rank} | (std::uint32_t{static_cast<std::uint16_t>(~rank)} << 16);
   }
-  // Binds the number to the block: what an erase that was cut short leaves is no number by chance.
+  // Binds the number to the block: the bits that an interrupted erase leaves cannot be a valid number by chance.
   static constexpr std::uint32_t check_of(std::uint16_t rank, std::uint32_t crc) { return (crc ^ rank) * 0x9E3779B1U; }
   constexpr std::uint32_t word(std::size_t sector, std::size_t at) const {
     model::Reader r(flash_.bytes(sector).subspan(4 * at, 4));
@@ -208,7 +204,7 @@ class ParameterStore {
   constexpr std::span<const std::uint8_t> good_block(std::size_t sector) const {
     return rank_[sector] == 0 ? std::span<const std::uint8_t>{} : block(sector);
   }
-  // Where a new block goes: never over the active one.
+  // The sector for a new block: never the active one.
   constexpr std::size_t target() const { return rank_[active_] == 0 ? active_ : 1 - active_; }
   constexpr bool put(std::size_t sector, std::size_t at, std::uint32_t value) {
     return flash_.program(sector, at, value) && word(sector, at) == value;
@@ -226,13 +222,12 @@ class ParameterStore {
       if (byte != 0xFF) return false;
     return true;
   }
-  // Before the other block is given up: writes the active block's number again, whole, as the next one in a new slot.
-  // A power cut leaves bits that read one way now and another way tomorrow. If the active block's number is such a
-  // one, it could vanish once the other block is gone; and the other, half erased, may read as whole at one start and
-  // not at the next. With the new number the active block is known for good, and the other is too old to count.
-  // Where all slots are used up there is no block before it any more (restore() leaves room): the old number is made
-  // whole.
-  constexpr bool give_up_other() {
+  // Before the other block is invalidated: writes the active block's number again, completely, as the next one in a new
+  // slot. A power cut leaves bits that do not always read the same. If the active block's number has such bits, it
+  // could become invalid after the other block is erased; and the other, half erased, may be valid at one start and not
+  // at the next. With the new number the active block is certain, and the other is too old to count. Where all slots
+  // are used there is no previous block any more (restore() leaves room): the old number is completed.
+  constexpr bool invalidate_other() {
     if (confirmed_ && rank_[1 - active_] == 0) return true;
     const std::size_t slot = free_slot(active_, kTwice);
     if (slot + kTwice <= kSlotsEnd) return put_twice(active_, slot, kGivesUp) == StoreError::none;
@@ -243,7 +238,7 @@ class ParameterStore {
       }
     return false;
   }
-  // The first slot from which on so many words are free: damage may lie behind one that is.
+  // The first slot with this many free words from its start: a free slot may be followed by damaged words.
   constexpr std::size_t free_slot(std::size_t sector, std::size_t words = 2) const {
     std::size_t slot = kSlotsEnd;
     std::size_t free = 0;
@@ -253,13 +248,13 @@ class ParameterStore {
     }
     return slot;
   }
-  constexpr StoreError give_up() {
+  constexpr StoreError flash_failed() {
     staging_ = false;
     return StoreError::flash;
   }
-  // In a sector that was not erased since the start, the first slot that looks free may have been begun before a power
-  // cut, and have bits that read as zeros another day. The one behind it is free: nothing is written into a slot before
-  // the one in front of it is whole.
+  // In a sector that was not erased since the start, the first slot that reads as free may have been begun before a
+  // power cut, and its bits may read as zeros later. The next one is free: a slot is written only after the one before
+  // it is complete.
   constexpr StoreError put_twice(std::size_t sector, std::size_t slot, unsigned steps) {
     const std::uint32_t crc = word(sector, 2);
     if (const StoreError error = put_slot(sector, slot, steps); error != StoreError::none) return error;
@@ -280,7 +275,7 @@ class ParameterStore {
 
   Flash& flash_;
   std::size_t active_ = 0;
-  std::uint16_t rank_[kSectors]{};  // nought: no good block there
+  std::uint16_t rank_[kSectors]{};  // zero: no valid block there
   std::size_t staged_ = 0;
   std::size_t announced_ = 0;
   std::uint32_t crc_ = 0;

@@ -43,12 +43,12 @@ enum class TransferType : std::uint8_t { control, isochronous, bulk, interrupt }
 
 // Of SET_FEATURE and CLEAR_FEATURE, to an endpoint.
 inline constexpr std::uint16_t kEndpointHalt = 0;
-// To the device (table 9-6), and where it is said (figures 9-4, table 9-10).
+// To the device (table 9-6), and where its state is reported (figure 9-4, table 9-10).
 inline constexpr std::uint16_t kDeviceRemoteWakeup = 1;
 inline constexpr std::uint8_t kStatusRemoteWakeup = 0x02;
 inline constexpr std::uint8_t kAttributeRemoteWakeup = 0x20;
 
-// The eight bytes that begin every control transfer.
+// The eight bytes at the start of every control transfer.
 struct Setup {
   std::uint8_t type = 0;
   std::uint8_t request = 0;
@@ -72,7 +72,7 @@ struct Setup {
   constexpr std::uint8_t value_low() const { return static_cast<std::uint8_t>(value & 0xff); }
 };
 
-// What comes of a request. Refused: the host gets STALL, which ends with its next request.
+// The result of a request. Refused: the host gets STALL, which ends with its next request.
 struct Reply {
   bool accepted = false;
   std::span<const std::uint8_t> data{};  // of a request to the host; has to live until the transfer ends

@@ -1,6 +1,5 @@
-// Descriptors, made while compiling from a list of classes: one configuration, with the interfaces and endpoints of
-// each class one after the other. What the specification demands of them is checked by static_assert where a device is
-// made.
+// Descriptors, made at compile time from a list of classes: one configuration, with the interfaces and endpoints of
+// each class one after the other. A static_assert where a device is made checks them against the specification.
 #pragma once
 
 #include <array>
@@ -44,7 +43,7 @@ inline constexpr std::uint8_t kSerialString = 3;
 inline constexpr std::uint8_t kFirstClassString = 4;
 inline constexpr std::uint16_t kEnglish = 0x0409;
 
-// Where a class stands in the configuration: its first interface, endpoint numbers and string.
+// The place of a class in the configuration: its first interface, endpoint numbers and string.
 struct Place {
   std::uint8_t interface = 0;
   std::uint8_t in = 1;
@@ -52,7 +51,7 @@ struct Place {
   std::uint8_t string = kFirstClassString;
 };
 
-// A class of interfaces. What is optional is in device.hpp, at ClassHooks.
+// A class of interfaces. The optional parts are in device.hpp, at ClassHooks.
 template <class C>
 concept InterfaceClass = requires(Place place) {
   { C::kInterfaces } -> std::convertible_to<std::size_t>;
@@ -63,7 +62,7 @@ concept InterfaceClass = requires(Place place) {
   C::descriptors(place);  // interface, class and endpoint descriptors, as std::array
 };
 
-// USB 2.0, table 9-12. Strings by index, nought for none.
+// USB 2.0, table 9-12. Strings by index, zero for none.
 struct InterfaceDescription {
   std::uint8_t number = 0;
   std::uint8_t alternate = 0;
@@ -91,7 +90,7 @@ constexpr Bytes<7> endpoint_descriptor(const EndpointSetup& e, std::uint8_t inte
           interval_ms};
 }
 
-// Table 9-8. `I` as FlexsplineIdentity (identity.hpp). Classes are told per interface.
+// Table 9-8. `I` as FlexsplineIdentity (identity.hpp). Classes are stated per interface.
 template <class I>
 constexpr Bytes<18> device_descriptor() {
   return {18,
@@ -157,18 +156,18 @@ struct Composition {
   }
 };
 
-// What is wrong with a configuration, for static_assert; nought when nothing is.
+// The error in a configuration, for static_assert; zero for none.
 enum class DescriptorFinding : std::uint8_t {
   none,
   header,           // not a configuration descriptor of nine bytes
   total_length,     // wTotalLength is not the length
-  runs_over,        // a descriptor is longer than what is left, or shorter than two bytes
-  wrong_length,     // an interface or endpoint descriptor is not of its length
+  runs_over,        // a descriptor is longer than the remaining bytes, or shorter than two
+  wrong_length,     // an interface or endpoint descriptor has a wrong length
   interface_order,  // numbers are not 0, 1, 2, ... with alternates 0, 1, 2, ...
   interface_count,
-  endpoint_count,  // an interface promised another number of endpoints
+  endpoint_count,  // an interface states another number of endpoints
   endpoint_twice,  // by two interfaces, or twice in an alternate setting
-  endpoint_bad,    // number nought, no interface before it, or a packet too long for full speed
+  endpoint_bad,    // number zero, no interface before it, or a packet too long for full speed
 };
 
 constexpr DescriptorFinding check_configuration(std::span<const std::uint8_t> d) {

@@ -1,5 +1,5 @@
 // The device core: control transfers of endpoint 0 and the requests of USB 2.0, chapter 9, for one configuration made
-// of any number of classes. `Device<FlexsplineIdentity, Port, Hid>`, and beside Hid whatever else a board has.
+// of any number of classes: `Device<FlexsplineIdentity, Port, Hid, ...>`, with the other classes of a board after Hid.
 //
 // Not thread safe: the port's calls, poll() and the application's use of a class come from one context.
 #pragma once
@@ -17,7 +17,7 @@
 
 namespace flexspline::usb {
 
-// A class's way to its endpoints, numbered from nought within the class. False: the endpoint is halted.
+// The access of a class to its endpoints, numbered from zero within the class. False: the endpoint is halted.
 template <Port P>
 class Link {
  public:
@@ -41,24 +41,24 @@ class Link {
   const std::uint32_t& halted_;
 };
 
-// What the core calls of a class beyond InterfaceClass (descriptors.hpp).
+// The functions of a class that the core calls in addition to InterfaceClass (descriptors.hpp).
 template <class C, class P>
 concept ClassHooks = requires(C c, Link<P> link, const Setup& setup, std::span<std::uint8_t> room,
                               std::span<const std::uint8_t> data, std::size_t i, bool to_host) {
-  c.start(link);    // configured: endpoints are open, nothing waits on them
-  c.stop();         // no longer
-  c.poll(link);     // sends and receives what it can
+  c.start(link);    // configured: endpoints are open and have no transfer
+  c.stop();         // no longer configured
+  c.poll(link);     // sends and receives as far as possible
   c.sent(link, i);  // the host took the packet of endpoint i
   c.received(link, i, data);
-  c.resume(link, to_host, i);  // what waited on an endpoint is forgotten: begin again
-  // Requests to its interfaces, GET_DESCRIPTOR among them. `room` holds kControlBytes, for data that is made up.
+  c.resume(link, to_host, i);  // transfers of an endpoint are cancelled: start again
+  // Requests to its interfaces, GET_DESCRIPTOR among them. `room` holds kControlBytes, for generated data.
   { c.control_in(setup, room) } -> std::same_as<Reply>;
   { c.control_out(setup, data) } -> std::same_as<bool>;
   // Optional: kAlternates with set_alternate(number) and alternate(), of a class without endpoints; and
   // control_done(setup), when the host has seen the end of a request.
 };
 
-// Alternate settings that bring endpoints of their own are not built.
+// Alternate settings with endpoints of their own are not supported.
 template <class C>
 constexpr bool alternates_have_no_endpoints() {
   if constexpr (requires { C::kAlternates; }) return C::kInEndpoints + C::kOutEndpoints == 0;
@@ -84,7 +84,7 @@ class Device {
   static constexpr std::size_t kLongestString = 31;
   static_assert(I::kManufacturer.size() <= kLongestString && I::kProduct.size() <= kLongestString);
 
-  // `serial` has to outlive the device; what is beyond 31 characters is not shown.
+  // `serial` has to outlive the device; only its first 31 characters are shown.
   Device(P& port, std::string_view serial) : port_(port), serial_(shown(serial)) {}
 
   template <class Class>
@@ -94,9 +94,9 @@ class Device {
   bool configured() const { return configured_; }
   std::uint8_t address() const { return address_; }
 
-  // The bus sleeps: nothing goes, and what waits goes on afterwards. Address and configuration stay.
+  // The bus is suspended: nothing is sent, and waiting transfers continue afterwards. Address and configuration stay.
   bool is_suspended() const { return suspended_; }
-  // Wakes a host that sleeps and has allowed it; false where it does not sleep or has not.
+  // Wakes a sleeping host that has allowed it; false otherwise.
   bool wake_host() {
     if constexpr (kCanWake<P>) {
       if (suspended_ && may_wake_) {
@@ -107,7 +107,7 @@ class Device {
     return false;
   }
 
-  // Background: whatever the application gave its classes goes on its way.
+  // Background: sends the data that the application gave its classes.
   void poll() {
     if (!configured_ || suspended_) return;
     for_each_class([&](auto& c, std::size_t i) {
@@ -250,7 +250,7 @@ class Device {
 
   // Requests.
 
-  // Not substr(), which drags the library's exceptions into an image.
+  // Not substr(), which brings the library's exceptions into an image.
   static constexpr std::string_view shown(std::string_view text) {
     return {text.data(), text.size() < kLongestString ? text.size() : kLongestString};
   }
@@ -258,7 +258,7 @@ class Device {
     return setup_.kind() == RequestKind::standard && setup_.recipient() == Recipient::device && !setup_.to_host() &&
            setup_.request == static_cast<std::uint8_t>(StandardRequest::set_address);
   }
-  // Calls `use` for the class that has the interface of wIndex; false where none has.
+  // Calls `use` for the class that has the interface of wIndex; false where there is none.
   template <class Use>
   bool for_class_of_interface(Use use) {
     bool found = false;
@@ -270,7 +270,7 @@ class Device {
     });
     return found;
   }
-  // The bit of an endpoint in halted_, nought where wIndex names none.
+  // The bit of an endpoint in halted_, zero where wIndex names none.
   std::uint32_t endpoint_bit() const {
     std::uint32_t bit = 0;
     for_each_endpoint(kConfiguration, [&](const EndpointSetup& e, std::uint8_t, std::uint8_t) {
@@ -334,7 +334,7 @@ class Device {
         return index == 0 && setup_.index == 0 ? reply_with(kConfiguration) : kRefused;
       case DescriptorType::string:
         return answer_string(index);
-      default:  // a device qualifier is for those that know high speed
+      default:  // a device qualifier is for devices with high speed
         return kRefused;
     }
   }
@@ -361,7 +361,7 @@ class Device {
     return Parts::class_string(index);
   }
 
-  // A request without data, or the data of one that is not to the host.
+  // A request without data, or data from the host.
   bool accept(std::span<const std::uint8_t> data) {
     const auto request = static_cast<StandardRequest>(setup_.request);
     if (setup_.kind() != RequestKind::standard) return accept_of_class(data);

@@ -1,6 +1,6 @@
-// Device firmware update, DFU 1.1 (USB-IF, 5 August 2004): the run-time interface that an application carries along
-// (DfuRuntime), and the mode in which a boot loader takes and gives an image (DfuMode). States and what leads from one
-// to the other are those of its appendix A; numbers in comments are its sections.
+// Device firmware update, DFU 1.1 (USB-IF, 5 August 2004): the run-time interface of an application (DfuRuntime), and
+// the mode in which a boot loader receives and sends an image (DfuMode). States and transitions are those of its
+// appendix A; numbers in comments are its sections.
 #pragma once
 
 #include <array>
@@ -33,20 +33,20 @@ enum class DfuState : std::uint8_t {
 enum class DfuStatus : std::uint8_t {
   ok,
   target,        // not for this device
-  file,          // no image, or one that fails a check of its maker
+  file,          // no image, or one that fails a check of its vendor
   write,         // memory cannot be written
   erase,         // erasing failed
-  check_erased,  // not empty after it
+  check_erased,  // not blank after it
   program,       // programming failed
-  verify,        // what was written is not what was sent
-  address,       // beyond the end, or not where the block before ended
-  not_done,      // the host says that this was all, and it was not
-  firmware,      // there is no image that is whole
+  verify,        // memory does not read back as sent
+  address,       // beyond the end, or not at the end of the previous block
+  not_done,      // the host ends the download before the image is complete
+  firmware,      // there is no complete image
   vendor,
-  reset,  // a reset came when none was expected
+  reset,  // an unexpected reset
   power_on,
   unknown,
-  stalled,  // a request that the device does not know, or not now
+  stalled,  // a request that the device does not support in this state
 };
 
 inline constexpr std::uint8_t kDfuDescriptorType = 0x21;
@@ -59,7 +59,7 @@ inline constexpr std::size_t kDfuBlockBytes = 1024;
 // How long a device has to be gone after DETACH.
 inline constexpr std::uint16_t kDfuDetachMs = 1000;
 
-// 4.1.3. The device comes back by itself, and can be asked for its state after an image was installed.
+// 4.1.3. The device detaches by itself, and answers requests for its state after an image was installed.
 constexpr Bytes<kDfuDescriptorBytes> dfu_descriptor() {
   constexpr std::uint16_t kVersion = 0x0110;
   return {
@@ -67,7 +67,7 @@ constexpr Bytes<kDfuDescriptorBytes> dfu_descriptor() {
       low(kDfuDetachMs),    high(kDfuDetachMs), low(kDfuBlockBytes),
       high(kDfuBlockBytes), low(kVersion),      high(kVersion)};
 }
-// 6.1.2: status, time to wait before the next question, state, a string.
+// 6.1.2: status, time to wait before the next request, state, a string.
 constexpr Bytes<kDfuStatusBytes> dfu_status(DfuStatus status, std::uint32_t poll_ms, DfuState state) {
   return {static_cast<std::uint8_t>(status),
           low(poll_ms),
@@ -79,7 +79,7 @@ constexpr Bytes<kDfuStatusBytes> dfu_status(DfuStatus status, std::uint32_t poll
 
 namespace detail {
 
-// What both have in common: an interface without endpoints.
+// Common to both: an interface without endpoints.
 template <std::uint8_t kProtocol>
 struct DfuInterface {
   static constexpr std::size_t kInterfaces = 1, kInEndpoints = 0, kOutEndpoints = 0;
@@ -108,15 +108,16 @@ struct DfuInterface {
 
 }  // namespace detail
 
-// In the application: says that there is a boot loader, and asks for it. The application decides whether it may, and
-// goes there by itself (bitWillDetach): wants_loader() is true once the host has seen that its DETACH was accepted.
+// In the application: announces the boot loader and passes on requests for it. The application decides whether to
+// accept, and starts the boot loader by itself (bitWillDetach): wants_loader() is true once the host has seen that its
+// DETACH was accepted.
 class DfuRuntime : public detail::DfuInterface<kDfuRuntimeProtocol> {
  public:
   // Not while the drive is armed.
   void allow(bool allowed) { allowed_ = allowed; }
   bool wants_loader() const { return leaves_; }
 
-  // The core's side.
+  // For the device core.
 
   static constexpr std::size_t kControlBytes = kDfuStatusBytes;
   static constexpr std::array<std::string_view, 1> kStrings{"firmware update"};
@@ -158,39 +159,39 @@ class DfuRuntime : public detail::DfuInterface<kDfuRuntimeProtocol> {
   bool leaves_ = false;
 };
 
-// Where images go to and come from.
+// The memory of images.
 template <class M>
 concept DfuMemory = requires(M memory, std::span<const std::uint8_t> block, std::size_t at) {
-  { M::kName } -> std::convertible_to<std::string_view>;             // of what is written, for a person
-  { memory.write(at, block) } -> std::same_as<DfuStatus>;            // from the start on, one block behind the other
-  { memory.write_ms(at) } -> std::same_as<std::uint32_t>;            // how long that may take
-  { memory.has_all() } -> std::same_as<bool>;                        // whether the image is at its end
-  { memory.install() } -> std::same_as<DfuStatus>;                   // checks it as a whole, and arranges for its start
-  { memory.install_ms() } -> std::same_as<std::uint32_t>;            // how long that may take
-  memory.abort();                                                    // nothing comes any more
-  { memory.read() } -> std::same_as<std::span<const std::uint8_t>>;  // the image that runs; empty: there is none
+  { M::kName } -> std::convertible_to<std::string_view>;   // name of the memory, for the user
+  { memory.write(at, block) } -> std::same_as<DfuStatus>;  // from the start on, one block after the other
+  { memory.write_ms(at) } -> std::same_as<std::uint32_t>;  // its longest time
+  { memory.has_all() } -> std::same_as<bool>;              // whether the image is complete
+  { memory.install() } -> std::same_as<DfuStatus>;         // checks the whole image and requests its installation
+  { memory.install_ms() } -> std::same_as<std::uint32_t>;  // its longest time
+  memory.abort();                                          // the download is cancelled
+  { memory.read() } -> std::same_as<std::span<const std::uint8_t>>;  // the installed image; empty: there is none
 };
 
-// In the boot loader. The memory's work is done by poll(), between two requests.
+// In the boot loader. poll() works on the memory, between two requests.
 template <DfuMemory Memory>
 class DfuMode : public detail::DfuInterface<kDfuModeProtocol> {
  public:
   // Before the first request; it has to outlive this.
   void use(Memory& memory) { memory_ = &memory; }
-  // An image was installed; the host has been told so.
+  // An image was installed; the host has been informed.
   bool installed() const { return installed_; }
-  bool told() const { return told_; }
-  // A host has asked for something since the device came up: a bus reset after that ends DFU mode (A.2.3 on).
+  bool install_reported() const { return install_reported_; }
+  // A host has sent a request since the device started: a bus reset after that ends DFU mode (A.2.3 on).
   bool was_used() const { return was_used_; }
   DfuState state() const { return state_; }
   DfuStatus status() const { return status_; }
 
-  // The core's side.
+  // For the device core.
 
   static constexpr std::size_t kControlBytes = kDfuBlockBytes;
   static constexpr std::array<std::string_view, 1> kStrings{Memory::kName};
   static constexpr auto descriptors(Place place) { return dfu_descriptors(place); }
-  // The bus was reset or the device configured anew: what was under way is void.
+  // The bus was reset or the device configured again: a running transfer is cancelled.
   void stop() {
     if (state_ == DfuState::idle || state_ == DfuState::error) return;
     memory_->abort();
@@ -249,13 +250,13 @@ class DfuMode : public detail::DfuInterface<kDfuModeProtocol> {
         return refuse(DfuStatus::stalled);
     }
   }
-  // What a status has announced begins once the host has it.
+  // The work that a status announced begins once the host has received it.
   void control_done(const Setup& setup) {
     if (setup.kind() != RequestKind::of_class || setup.request != static_cast<std::uint8_t>(DfuRequest::get_status))
       return;
     if (state_ == DfuState::download_sync && work_ == Work::announced) state_ = DfuState::download_busy;
     if (state_ == DfuState::manifest_sync && work_ == Work::announced) state_ = DfuState::manifest;
-    if (state_ == DfuState::idle && installed_) told_ = true;
+    if (state_ == DfuState::idle && installed_) install_reported_ = true;
   }
 
  private:
@@ -265,7 +266,7 @@ class DfuMode : public detail::DfuInterface<kDfuModeProtocol> {
     return state_ == DfuState::idle || state_ == DfuState::download_sync || state_ == DfuState::download_idle ||
            state_ == DfuState::manifest_sync || state_ == DfuState::upload_idle;
   }
-  // Always false. In the state of an error the first one stays.
+  // Always false. In the error state the first error is kept.
   bool refuse(DfuStatus why) {
     if (state_ != DfuState::error) {
       if (state_ != DfuState::idle) memory_->abort();
@@ -323,7 +324,7 @@ class DfuMode : public detail::DfuInterface<kDfuModeProtocol> {
     if (begins) {
       at_ = 0;
       number_ = setup.value;
-      installed_ = told_ = false;
+      installed_ = install_reported_ = false;
     }
     if (setup.value != number_) return refuse(DfuStatus::address);
     ++number_;
@@ -333,7 +334,7 @@ class DfuMode : public detail::DfuInterface<kDfuModeProtocol> {
     work_ = Work::waiting;
     return true;
   }
-  // A block shorter than was asked for is the last one.
+  // A block shorter than requested is the last one.
   Reply upload(const Setup& setup) {
     if (state_ != DfuState::idle && state_ != DfuState::upload_idle) return refused();
     if (setup.length > kDfuBlockBytes) return refused();
@@ -357,9 +358,9 @@ class DfuMode : public detail::DfuInterface<kDfuModeProtocol> {
   DfuStatus status_ = DfuStatus::ok;
   Work work_ = Work::none;
   bool installed_ = false;
-  bool told_ = false;
+  bool install_reported_ = false;
   bool was_used_ = false;
-  std::uint16_t number_ = 0;  // of the block to come
+  std::uint16_t number_ = 0;  // of the next block
   std::size_t at_ = 0;
   std::size_t count_ = 0;
   std::array<std::uint8_t, kDfuBlockBytes> block_{};

@@ -1,6 +1,6 @@
-// HID with vendor-defined reports of 64 bytes, one kind each way, on interrupt endpoints (HID 1.11). What the bytes
-// mean is the business of a protocol. Reports wait in queues: one to the host that finds its queue full is dropped and
-// counted; from the host nothing is lost, the endpoint answers NAK until there is room.
+// HID with vendor-defined reports of 64 bytes, one kind each way, on interrupt endpoints (HID 1.11). The protocol
+// defines the meaning of the bytes. Reports wait in queues. One to the host whose queue is full is dropped and counted;
+// from the host nothing is lost, as the endpoint answers NAK until there is room.
 #pragma once
 
 #include <array>
@@ -38,15 +38,15 @@ inline constexpr Bytes<25> kReportDescriptor = {
     0x09,
     0x02,  //   usage
     0x81,
-    0x02,  //   input: data, variable, absolute
+    0x02,  // input: data, variable, absolute
     0x09,
     0x03,  //   usage
     0x91,
-    0x02,  //   output: the same; size and count hold on
+    0x02,  // output: the same; size and count stay in force
     0xc0,  // end
 };
 
-// Reports in the order they came. Not for two contexts at once.
+// Reports in the order of arrival. Not for two contexts at once.
 template <std::size_t kReports>
 class ReportQueue {
  public:
@@ -54,7 +54,7 @@ class ReportQueue {
   bool empty() const { return count_ == 0; }
   std::size_t room() const { return kReports - count_; }
   void clear() { count_ = 0; }
-  // What is short is filled with noughts. Only where there is room.
+  // Fills a short report with zeros. Call it only if there is room.
   void push(std::span<const std::uint8_t> bytes) {
     Report& report = reports_[(first_ + count_++) % kReports];
     for (std::size_t i = 0; i < report.size(); ++i) report[i] = i < bytes.size() ? bytes[i] : std::uint8_t{0};
@@ -71,17 +71,17 @@ class ReportQueue {
   std::size_t count_ = 0;
 };
 
-// Queues of so many reports to the host and from it.
+// With queues of this many reports to the host and from it.
 template <std::size_t kToHostReports, std::size_t kFromHostReports>
 class Hid {
-  // One place is kept for the packet that the endpoint may be receiving while another comes by SET_REPORT.
+  // One place is reserved for the packet that the endpoint may be receiving while another arrives by SET_REPORT.
   static_assert(kToHostReports >= 1 && kFromHostReports >= 2);
 
  public:
-  // The application's side.
+  // For the application.
 
   // False where the queue is full, which counts as dropped, or no host has configured the device, which does not. The
-  // report goes with the next Device::poll().
+  // report is sent by the next Device::poll().
   bool send(const Report& report) {
     if (!running_) return false;
     if (to_host_.room() == 0) {
@@ -91,7 +91,7 @@ class Hid {
     to_host_.push(report);
     return true;
   }
-  // Places left: who sends much leaves some to who has to answer.
+  // Places left: a frequent sender leaves some for answers.
   std::size_t room() const { return running_ ? to_host_.room() : 0; }
   // The oldest report from the host; false where there is none.
   bool receive(Report& report) {
@@ -102,9 +102,11 @@ class Hid {
   }
   // Since power on.
   std::uint32_t dropped_to_host() const { return dropped_to_host_; }
-  std::uint32_t dropped_from_host() const { return dropped_from_host_; }  // SET_REPORT that found no room: refused
+  std::uint32_t dropped_from_host() const {
+    return dropped_from_host_;
+  }  // SET_REPORT refused because the queue was full
 
-  // The core's side (descriptors.hpp, device.hpp).
+  // For the device core (descriptors.hpp, device.hpp).
 
   static constexpr std::size_t kInterfaces = 1, kInEndpoints = 1, kOutEndpoints = 1;
   static constexpr std::size_t kControlBytes = kPacketBytes;
@@ -134,7 +136,7 @@ class Hid {
     running_ = true;
     poll(link);
   }
-  // A host that comes later is not to get the answers of another.
+  // A later host must not get the answers to another one.
   void stop() {
     running_ = sending_ = receiving_ = false;
     to_host_.clear();
@@ -147,7 +149,7 @@ class Hid {
   }
   template <class Link>
   void sent(Link& link, std::size_t) {
-    // It stays in its queue until the host has it: a halt in between loses nothing.
+    // It stays in its queue until the host has received it, so that a halt loses nothing.
     if (!sending_) return;
     sending_ = false;
     to_host_.pop();
@@ -176,7 +178,7 @@ class Hid {
     if (setup.kind() != RequestKind::of_class) return kRefused;
     switch (static_cast<Request>(setup.request)) {
       case Request::get_report: {
-        // The one that goes next, which stays; noughts where none waits.
+        // The next report, which stays in its queue; zeros where none waits.
         if (setup.value != kInputReport) return kRefused;
         const std::span<std::uint8_t> bytes = room.first(kPacketBytes);
         for (std::size_t i = 0; i < bytes.size(); ++i)
@@ -203,10 +205,10 @@ class Hid {
         from_host_.push(data);
         return true;
       case Request::set_idle:
-        // Reports go when there is something to say; a rate of repetition is refused.
+        // Reports are sent when there is data; an idle rate is refused.
         return setup.value == 0 && data.empty();
       case Request::set_protocol:
-        return setup.value == 1 && data.empty();  // the report protocol, which it speaks anyway
+        return setup.value == 1 && data.empty();  // the report protocol, which is the only one
       default:
         return false;
     }

@@ -30,9 +30,9 @@ const std::vector<int>& gone() {
   return local;  // finds: returnReference
 }
 
-int by_nought(int x) {
-  const int nought = 0;
-  return x / nought;  // finds: zerodiv
+int by_zero(int x) {
+  const int zero = 0;
+  return x / zero;  // finds: zerodiv
 }
 
 bool twice_the_same(int x) {

@@ -66,7 +66,7 @@ data::Dataset measured(model::Model& model) {
 
 // What the script needs of the measurement; both sides begin here.
 void write(const std::filesystem::path& folder, const BalanceData& data, const std::vector<double>& grid) {
-  const estimation::Prepared& p = data.prepared();
+  const estimation::PreparedData& p = data.prepared();
   std::ofstream about(folder / "about.txt");
   about << fmt::format("{:.17g} {:.17g} {:.17g}\n", 1.0 / p.records[0].sample_s, p.pipeline.row_cutoff_hz,
                        p.constants.torque_constant);
@@ -98,11 +98,11 @@ void write(const std::filesystem::path& folder, const BalanceData& data, const s
 }
 
 struct Answer {
-  std::vector<double> fall_percent;  // of the left-out chi-square, of each question
-  double shape = 0.0;                // chosen on the grid
+  std::vector<double> decrease_percent;  // of the left-out chi-square, of each question
+  double shape = 0.0;                    // chosen on the grid
 };
 
-Answer search(const estimation::Prepared& prepared, const Terms& terms, const std::vector<double>& grid,
+Answer search(const estimation::PreparedData& prepared, const Terms& terms, const std::vector<double>& grid,
               const std::vector<Question>& asked) {
   BalanceData data(prepared, Balance::motor);
   const Eigen::VectorXd keep = Eigen::VectorXd::Ones(data.rows());
@@ -125,7 +125,7 @@ Answer search(const estimation::Prepared& prepared, const Terms& terms, const st
       shape = answer.shape;
     }
     const selection::CrossValidatedFit judged = selection::cross_validate(data, std::move(extended), keep);
-    answer.fall_percent.push_back(selection::likelihood_gain(base, judged, 1.0).chi2_percent);
+    answer.decrease_percent.push_back(selection::likelihood_gain(base, judged, 1.0).chi2_percent);
   }
   return answer;
 }
@@ -138,7 +138,7 @@ int compare(const std::string& python, const std::string& script) {
   Terms candidate{estimation::candidate_term(catalogue::get("stribeck_gaussian"))};
   const std::size_t velocity = candidate[0].entry->index_of("velocity");
   const std::vector<double> grid =
-      estimation::shape_grid(estimation::shape_range(motor, candidate[0], velocity), kGridPoints);
+      estimation::parameter_grid(estimation::parameter_range(motor, candidate[0], velocity), kGridPoints);
 
   Answer ours;
   // Processor time: other work on the machine does not count.
@@ -168,7 +168,7 @@ int compare(const std::string& python, const std::string& script) {
   {
     std::ofstream answer(folder / "answer.txt");
     answer << fmt::format("{:.6f} {:.17g}\n", ours_ms, ours.shape);
-    for (const double fall : ours.fall_percent) answer << fmt::format("{:.17g}\n", fall);
+    for (const double fall : ours.decrease_percent) answer << fmt::format("{:.17g}\n", fall);
   }
   std::fflush(stdout);
   const int code = std::system(

@@ -166,7 +166,7 @@ Figures library(const std::string& self, const std::filesystem::path& folder, in
     for (const estimation::Estimate& e : found->estimates)
       if (e.effect == name) f.values.push_back(e.value);
   // What a peer has to know of the recipe: its filter, the width of the sign, and which samples are rows.
-  const estimation::Prepared& p = found->prepared;
+  const estimation::PreparedData& p = found->prepared;
   const auto& rows = p.records[0].rows[estimation::index(Balance::motor)].samples;
   std::ofstream(folder / "about.txt") << fmt::format("{:.17g} {:.17g} {:.17g} {:.17g} {} {} {} {}\n", kSampleHz,
                                                      kCutoffHz, kTorqueConstant,

@@ -9,8 +9,8 @@
 #include <random>
 #include <string>
 
-#include "hil/board/drive_rig.hpp"
 #include "hil/board/drive_setup.hpp"
+#include "hil/board/plant_rig.hpp"
 #include "hil/twin/factory_block.hpp"
 #include "shared/storage/parameter_store.hpp"
 #include "tests/board/usb_bus.hpp"
@@ -94,7 +94,7 @@ class DriveBench {
 
   Chip chip;
   UsbBus bus{chip};
-  board::DriveRig rig{{.drive = demo(), .seed = 3}};
+  board::PlantRig rig{{.drive = demo(), .seed = 3}};
   bool wired = true;      // to the simulated drive; else the test sets the inputs
   double bridge_a = 0.0;  // what flows out of the bridge
 

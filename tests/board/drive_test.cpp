@@ -22,7 +22,7 @@ double base_velocity() {
 TEST(BoardDrive, ReadsConverterAndEncodersWithTheRightSignAndScale) {
   DriveBench bench("dac");
   bench.wired = false;
-  // Shares of full scale: current 0.25, torque -0.5; temperature a quarter of its range above nought.
+  // Shares of full scale: current 0.25, torque -0.5; temperature a quarter of its range above zero.
   bench.chip.converter.inputs[10] = 2559;
   bench.chip.converter.inputs[11] = 1024;
   bench.chip.converter.inputs[12] = 1024;

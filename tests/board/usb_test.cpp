@@ -27,7 +27,7 @@ TEST_F(BoardUsb, ShowsItselfOnlyWhileTheBusIsPowered) {
   EXPECT_FALSE(chip.otg.attached());
 }
 
-TEST_F(BoardUsb, AnswersAtAddressNoughtAfterABusResetAndThenAtItsOwn) {
+TEST_F(BoardUsb, AnswersAtAddressZeroAfterABusResetAndThenAtItsOwn) {
   chip.otg.plug(true);
   bus.reset();
   const auto head = bus.descriptor(1, 0, 64);
@@ -35,11 +35,11 @@ TEST_F(BoardUsb, AnswersAtAddressNoughtAfterABusResetAndThenAtItsOwn) {
   EXPECT_EQ(head[7], 64);  // packets of endpoint 0
   ASSERT_TRUE(bus.control_out({0x00, 5, 17, 0, 0, 0, 0, 0}));
   EXPECT_EQ(chip.otg.address(), 17);
-  EXPECT_TRUE(bus.descriptor(1, 0, 18).empty()) << "address nought is nobody's any more";
+  EXPECT_TRUE(bus.descriptor(1, 0, 18).empty()) << "address zero is nobody's any more";
   bus.move_to(17);
   EXPECT_EQ(bus.descriptor(1, 0, 18), head);
   bus.reset();
-  EXPECT_EQ(bus.descriptor(1, 0, 18), head) << "a reset brings it back to nought";
+  EXPECT_EQ(bus.descriptor(1, 0, 18), head) << "a reset brings it back to zero";
 }
 
 TEST_F(BoardUsb, SendsDescriptorsInWholePacketsAndItsChipsNumberAsText) {
@@ -64,7 +64,7 @@ TEST_F(BoardUsb, StallsWhatItDoesNotKnowAndServesTheNextRequest) {
   EXPECT_EQ(bus.descriptor(1, 0, 18).size(), 18U);
 }
 
-TEST_F(BoardUsb, ANewSetupVoidsWhatWaitedOnEndpointNought) {
+TEST_F(BoardUsb, ANewSetupVoidsWhatWaitedOnEndpointZero) {
   ASSERT_TRUE(bus.enumerate());
   // The host asks for a descriptor and never fetches it.
   const std::vector<std::uint8_t> setup{0x80, 6, 0, 2, 0, 0, 255, 0};

@@ -27,7 +27,7 @@ using testing::TestSlots;
 enum class Behaviour { does_well, hangs };
 constexpr std::uint8_t kOld = 'a', kNew = 'b', kNext = 'c';
 
-// The version of the image that is started, checked byte for byte; nought where there is none.
+// The version of the image that is started, checked byte for byte; zero where there is none.
 std::uint8_t name_of(const TestSlots& slots) {
   const auto image = slots.image(Slot::application);
   if (image.empty()) return 0;

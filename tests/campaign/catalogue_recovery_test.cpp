@@ -66,8 +66,8 @@ Outcome recover(const std::string& label, std::uint64_t seed) {
 
   std::vector<const data::Experiment*> fit, holdout;
   for (const auto& e : dataset.experiments) (e.role == data::Role::holdout ? holdout : fit).push_back(&e);
-  const estimation::Prepared prepared = estimation::prepare(fit, truth.drive, {});
-  const estimation::Prepared judged = estimation::prepare_with(holdout, truth.drive, prepared.pipeline);
+  const estimation::PreparedData prepared = estimation::prepare(fit, truth.drive, {});
+  const estimation::PreparedData judged = estimation::prepare_with(holdout, truth.drive, prepared.pipeline);
   estimation::BalanceData on_holdout(judged, balance);
   const double floor = root_mean_square(estimation::residual_of(on_holdout, estimation::terms_of(truth)));
 
@@ -143,7 +143,7 @@ const std::map<std::string, double> kHardToSee = {
 // Laws whose weights stand on another grid of thresholds than the plant's.
 const std::set<std::string> kJudgedByTheirLoops = {"prandtl_ishlinskii_hysteresis", "preisach_hysteresis"};
 
-// What a single bias of these records cannot be told from but by the record at rest, which is not held out.
+// What a single bias of these records cannot be distinguished from but by the record at rest, which is not held out.
 const std::set<std::string> kHiddenByOffsets = {"coulomb_asymmetry", "current_offset"};
 
 // Maps of which one must be among the first four of the residual without the effect.

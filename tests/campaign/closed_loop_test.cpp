@@ -33,9 +33,10 @@ ScenarioPlan plan_of(std::string_view scenario, double duration_s, std::uint64_t
   plan.seed = seed;
   return plan;
 }
-ScenarioResult run(ScenarioPlan plan, bool compensation = true, std::unique_ptr<board::Brain> brain = nullptr) {
+ScenarioResult run(ScenarioPlan plan, bool compensation = true,
+                   std::unique_ptr<board::Controller> controller = nullptr) {
   plan.compensation = compensation;
-  const ScenarioResult result = board::run_scenario(plan, std::move(brain));
+  const ScenarioResult result = board::run_scenario(plan, std::move(controller));
   EXPECT_EQ(result.end.mode, firmware::Mode::position) << firmware::info_of(result.end.fault.fault).reason;
   return result;
 }
@@ -184,20 +185,20 @@ TEST_F(ProcessorInTheLoop, AFaultEndsInTheSameTickAsOnTheSoftwareBoard) {
 TEST_F(ProcessorInTheLoop, TheImageEndsWhenItIsSwitchedOff) {
   Processor processor(FLEXSPLINE_IMAGE);
   processor.start(board::Block(), {}, firmware::ResetCause::power);
-  firmware::LockStepDown down;
+  firmware::CoSimulationInput down;
   for (int k = 0; k < 100; ++k) processor.tick(down);
   EXPECT_EQ(processor.stop(), 0);
   EXPECT_GT(processor.most_instructions(), 100u);
 }
 
 // A processor that is still there when its drive is gone.
-class Borrowed : public board::Brain {
+class Borrowed : public board::Controller {
  public:
   explicit Borrowed(Processor& processor) : processor_(processor) {}
   void start(const board::Block& block, const firmware::TelemetrySetup& setup, firmware::ResetCause cause) override {
     processor_.start(block, setup, cause);
   }
-  firmware::LockStepUp tick(const firmware::LockStepDown& down) override { return processor_.tick(down); }
+  firmware::CoSimulationOutput tick(const firmware::CoSimulationInput& down) override { return processor_.tick(down); }
   void offer(std::span<const std::byte> block) override { processor_.offer(block); }
 
  private:

@@ -77,12 +77,12 @@ board::Block block() {
 
 // Rows of a drive in closed loop: where inputs come from.
 std::vector<Row> recorded_inputs(const Case& c) {
-  board::DriveRig rig({.drive = drive(), .seed = 11});
-  board::SoftwareBrain brain;
-  brain.start(block(), telemetry(), firmware::ResetCause::power);
+  board::PlantRig rig({.drive = drive(), .seed = 11});
+  board::SoftwareController controller;
+  controller.start(block(), telemetry(), firmware::ResetCause::power);
   std::vector<Row> rows;
   for (std::uint32_t k = 0; rows.size() < kRows; ++k) {
-    firmware::LockStepDown down;
+    firmware::CoSimulationInput down;
     down.readings = rig.sense();
     if (k % kTicksPerRow == 0) {
       const firmware::Readings& r = down.readings;
@@ -96,15 +96,15 @@ std::vector<Row> recorded_inputs(const Case& c) {
       down.command =
           command_at(c, k == kBootTicks ? firmware::Command::Kind::arm : firmware::Command::Kind::set, time_s);
     }
-    rig.act(brain.tick(down).actuation);
+    rig.act(controller.tick(down).actuation);
   }
   return rows;
 }
 
 // The controller alone, on straight lines between the inputs of the rows: fills in its outputs.
 void replay(const Case& c, std::vector<Row>& rows) {
-  board::SoftwareBrain brain;
-  brain.start(block(), telemetry(), firmware::ResetCause::power);
+  board::SoftwareController controller;
+  controller.start(block(), telemetry(), firmware::ResetCause::power);
   firmware::Readings readings;
   for (std::uint32_t k = 0; k < (kRows - 1) * kTicksPerRow; ++k) {
     const Row &from = rows[k / kTicksPerRow], &to = rows[k / kTicksPerRow + 1];
@@ -121,14 +121,14 @@ void replay(const Case& c, std::vector<Row>& rows) {
     ++readings.motor_samples;
     ++readings.output_samples;
     ++readings.analog_samples;
-    firmware::LockStepDown down;
+    firmware::CoSimulationInput down;
     down.readings = readings;
     if (k >= kBootTicks && (k - kBootTicks) % kHostTicks == 0) {
       down.has_command = true;
       down.command = command_at(c, k == kBootTicks ? firmware::Command::Kind::arm : firmware::Command::Kind::set,
                                 (static_cast<double>(k) - kBootTicks) / kTickHz);
     }
-    const firmware::LockStepUp up = brain.tick(down);
+    const firmware::CoSimulationOutput up = controller.tick(down);
     ASSERT_TRUE(k <= kBootTicks || up.status.mode == firmware::Mode::position)
         << c.scenario << ": not armed any more at tick " << k << ", fault " << static_cast<int>(up.status.fault.fault);
     if (k % kTicksPerRow == 0 && up.frame_words > 5)

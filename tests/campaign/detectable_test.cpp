@@ -70,8 +70,9 @@ Shown shown(const std::string& label, std::uint64_t seed, int seeds) {
       const selection::Diagnosis d = diagnosed(hidden, seed + 1 + static_cast<std::uint64_t>(s));
       bool named = false;
       // Near the limit the data may not tell it from what it is known to be confused with.
-      for (const selection::Named& n : d.named)
-        named = named || n.effect == type || catalogue::names_contain(catalogue::get(type).info->rivals, n.effect);
+      for (const selection::NamedEffect& n : d.named)
+        named =
+            named || n.effect == type || catalogue::names_contain(catalogue::get(type).info->confused_with, n.effect);
       (times > 1.0 ? result.large : result.small) += named;
       result.text += fmt::format(" | {:.2f}: {}", times, d.named.empty() ? "-" : d.named.front().effect);
     }

@@ -68,7 +68,7 @@ data::Experiment experiment(const Recipe& recipe) {
 // One record with what a search keeps of it.
 struct Bench {
   data::Experiment record;
-  estimation::Prepared prepared;
+  estimation::PreparedData prepared;
   BalanceData data;
   Eigen::VectorXd keep;
   Terms terms = estimation::terms_of(plain_model());

@@ -103,8 +103,8 @@ TEST_F(EmpsAxis, DirectionDependenceIsNamedFirstAndStribeckIsNot) {
                                    [](const auto& c) { return c.effect == "coulomb_asymmetry"; });
   ASSERT_NE(shared, d.candidates.end());
   EXPECT_FALSE(shared->admissible);
-  ASSERT_EQ(shared->rivals.size(), 1u);
-  EXPECT_EQ(shared->rivals.front(), "torque_bias");
+  ASSERT_EQ(shared->cannot_distinguish.size(), 1u);
+  EXPECT_EQ(shared->cannot_distinguish.front(), "torque_bias");
 }
 
 TEST_F(EmpsAxis, AddingItTakesTheHeldOutErrorDownByAFifthAndKeepsTheModelSensible) {

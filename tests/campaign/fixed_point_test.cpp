@@ -29,7 +29,7 @@ TEST(FixedPoint, EachEffectIsWithinAMillionthOfRatedTorqueOver300Blocks) {
       largest = std::max(largest, trial.largest);
       ASSERT_TRUE(trial.same_bits) << name;
       ASSERT_TRUE(trial.within_proof) << name;
-      ASSERT_EQ(trial.findings, 0) << name << ": " << Findings::first();
+      ASSERT_EQ(trial.findings, 0) << name << ": " << OverflowLog::first();
     }
     std::printf("%-32s worst error %.1e of rated torque, largest torque %5.2f, %d blocks of %d drawn\n", name.c_str(),
                 worst, largest, blocks, draws);
@@ -65,7 +65,7 @@ TEST(FixedPoint, TheirSumIsWithinTwoMillionthsOver300Blocks) {
     worst = std::max(worst, trial.worst);
     ASSERT_TRUE(trial.same_bits);
     ASSERT_TRUE(trial.within_proof);
-    ASSERT_EQ(trial.findings, 0) << Findings::first();
+    ASSERT_EQ(trial.findings, 0) << OverflowLog::first();
   }
   std::printf("%d blocks of %d drawn, %.1f effects each: worst error %.1e of rated torque\n", blocks, draws,
               static_cast<double>(effects_in_all) / blocks, worst);

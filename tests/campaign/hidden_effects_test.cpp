@@ -33,7 +33,7 @@ struct Case {
 
 struct Outcome {
   Case what;
-  std::string named;  // "+" between effects that could not be told apart, "-" for none
+  std::string named;  // "+" between effects that could not be distinguished, "-" for none
   bool right = false;
   double holdout_over_floor = 0.0;
   double before_over_floor = 0.0;
@@ -62,9 +62,9 @@ Outcome run(const Case& c) {
   for (const auto& n : d.named) outcome.named += (outcome.named.empty() ? "" : "+") + label(n.effect, n.order);
   if (d.named.empty()) outcome.named = "-";
   for (std::size_t i = 0; i < std::min<std::size_t>(4, d.candidates.size()); ++i)
-    outcome.detail +=
-        fmt::format(" {}({:.0f},{:.2f}%{})", label(d.candidates[i].effect, d.candidates[i].order),
-                    d.candidates[i].score, d.candidates[i].chi2_fall_percent, d.candidates[i].admissible ? "" : ",x");
+    outcome.detail += fmt::format(" {}({:.0f},{:.2f}%{})", label(d.candidates[i].effect, d.candidates[i].order),
+                                  d.candidates[i].score, d.candidates[i].chi2_decrease_percent,
+                                  d.candidates[i].admissible ? "" : ",x");
   if (c.hidden.empty()) {
     outcome.right = d.named.empty();
     return outcome;
@@ -76,8 +76,8 @@ Outcome run(const Case& c) {
   const model::Model true_model = testing::model_of(demo.drive, true, true);
   std::vector<const data::Experiment*> fit, holdout;
   for (const auto& e : dataset.experiments) (e.role == data::Role::holdout ? holdout : fit).push_back(&e);
-  const estimation::Prepared prepared = estimation::prepare(fit, true_model.drive, {});
-  const estimation::Prepared judged = estimation::prepare_with(holdout, true_model.drive, prepared.pipeline);
+  const estimation::PreparedData prepared = estimation::prepare(fit, true_model.drive, {});
+  const estimation::PreparedData judged = estimation::prepare_with(holdout, true_model.drive, prepared.pipeline);
   estimation::BalanceData data(judged, catalogue::get(truth.substr(0, truth.find(':'))).info->balance);
   const Eigen::VectorXd r = estimation::residual_of(data, estimation::terms_of(true_model));
   const double floor = std::sqrt(r.squaredNorm() / static_cast<double>(r.size()));

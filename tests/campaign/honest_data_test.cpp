@@ -168,7 +168,7 @@ TEST_F(HonestData, MotionInOneDirectionShowsNoAsymmetryAndSaysSo) {
   bool said = false;
   for (const std::string& warning : d.warnings) said = said || warning.find("moves forward in") != std::string::npos;
   EXPECT_TRUE(said);
-  for (const selection::Named& n : d.named) {
+  for (const selection::NamedEffect& n : d.named) {
     EXPECT_NE(n.effect, "coulomb_asymmetry");
     EXPECT_NE(n.effect, "viscous_asymmetry");
     EXPECT_NE(n.effect, "torque_bias");
@@ -194,7 +194,7 @@ TEST_F(HonestData, AnOrderIsNamedFromAFewTurnsOnlyWhereTheWholeMeasurementHasThe
   m.drive.pitch_m.value = 0.04;
   const std::vector<Row> part(rows_.begin() + 1000, rows_.begin() + 2500);
   const selection::Diagnosis d = selection::diagnose(load(part), m, {});
-  for (const selection::Named& n : d.named)
+  for (const selection::NamedEffect& n : d.named)
     if (n.order) {
       EXPECT_NEAR(*m.drive.pitch_m.value / *n.order, 2.5e-3, 0.05e-3) << n.effect << ":" << *n.order;
     }

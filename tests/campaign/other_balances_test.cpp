@@ -1,5 +1,5 @@
-// Effects that act on two torque balances: rivals that one balance cannot tell apart are told by the other, and their
-// parameters are estimated on both.
+// Effects that act on two torque balances: effects that are confounded on one balance are identifiable from the other,
+// and their parameters are estimated on both.
 #include <gtest/gtest.h>
 
 #include <fmt/format.h>

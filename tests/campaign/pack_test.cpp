@@ -5,8 +5,8 @@
 #include <random>
 
 #include "host/deployment/bases.hpp"
+#include "host/deployment/fixed_point_check.hpp"
 #include "host/deployment/pack.hpp"
-#include "host/deployment/trial.hpp"
 #include "tests/support/random_model.hpp"
 
 namespace flexspline::tests {

@@ -43,7 +43,7 @@ struct Told {
 
 std::string named(const selection::Diagnosis& d) {
   std::string text;
-  for (const selection::Named& n : d.named) text += (text.empty() ? "" : "+") + n.effect;
+  for (const selection::NamedEffect& n : d.named) text += (text.empty() ? "" : "+") + n.effect;
   return text.empty() ? "-" : text;
 }
 
@@ -74,12 +74,12 @@ Told tell(const Pair& pair, bool first_is_true, std::uint64_t seed) {
   plant::hide(demo.drive, told.truth, first_is_true ? pair.size_of_first : pair.size_of_second);
   data::Dataset dataset = testing::dataset_of(demo.drive, plant::record_all(demo.drive, pair.recorded, seed));
   const model::Model base = testing::model_of(demo.drive, false, false);
-  const std::string& rival = first_is_true ? pair.second : pair.first;
+  const std::string& other = first_is_true ? pair.second : pair.first;
   const selection::Diagnosis before = selection::diagnose(dataset, base, {});
   told.before = named(before);
-  told.won_before = won(before, told.truth, rival);
+  told.won_before = won(before, told.truth, other);
 
-  planning::Question question;
+  planning::PlanRequest question;
   question.model = &base;
   question.dataset = &dataset;
   question.setting = planning::setting_of(base, &dataset);
@@ -105,7 +105,7 @@ Told tell(const Pair& pair, bool first_is_true, std::uint64_t seed) {
     dataset.experiments.push_back(e);
   const selection::Diagnosis after = selection::diagnose(dataset, base, {});
   told.after = named(after);
-  told.won_after = won(after, told.truth, rival);
+  told.won_after = won(after, told.truth, other);
   return told;
 }
 
@@ -203,7 +203,7 @@ TEST(Planning, TheMotionPlannedForTwoEffectsTellsThemApart) {
         cases[i].pair->first, cases[i].pair->second, t.truth, t.before, t.won_before, t.margin_before, t.after,
         t.won_after, t.margin_after, t.plan_s, t.motions);
     // Where nothing separates two effects the plan is empty and says so; it never promises what does not come.
-    EXPECT_EQ(t.motions.empty(), t.margin_after < planning::kTold || t.margin_after == t.margin_before);
+    EXPECT_EQ(t.motions.empty(), t.margin_after < planning::kDistinguished || t.margin_after == t.margin_before);
     if (!cases[i].pair->separable) continue;
     ++possible;
     right += t.won_after > 10.0;

@@ -112,7 +112,7 @@ TEST_P(PlantConvergence, HalvingTheStepChangesLessThanSensorsCanTell) {
   EXPECT_LT(worst.output, kShareOfCount);
 }
 
-// A drive in closed loop whose tick is an eighth of a millisecond takes one step for each (hil/board/drive_rig.cpp).
+// A drive in closed loop whose tick is an eighth of a millisecond takes one step for each (hil/board/plant_rig.cpp).
 TEST_P(PlantConvergence, AStepOfAnEighthOfAMillisecondDiffersByLessThanSensorsCanTell) {
   const PlantFile file = demo_plant();
   Drive coarse = drive_of(file, GetParam());

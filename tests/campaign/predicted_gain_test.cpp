@@ -40,10 +40,10 @@ std::vector<Compared> one_drive(std::size_t i) {
   const model::Model best = hidden.empty() ? base : selection::add(dataset, base, hidden, {}).model;
 
   closed_loop::Question question;
-  question.believed = best;
+  question.identified = best;
   question.candidates.push_back({"base", loop_block(base, loop_settings(demo.drive))});
   if (!hidden.empty()) question.candidates.push_back({"added", same_loops(best, question.candidates[0].block)});
-  question.bench = closed_loop::bench_of(deployment::unpack(question.candidates[0].block));
+  question.hardware = closed_loop::twin_hardware_of(deployment::unpack(question.candidates[0].block));
   question.scenario = kMotions[i % std::size(kMotions)];
   question.seconds = kSeconds;
   question.seed = kFirstSeed + i;

@@ -12,7 +12,7 @@
 #include <set>
 #include <thread>
 
-#include "host/catalogue/defined.hpp"
+#include "host/catalogue/user_defined_effect.hpp"
 #include "host/selection/add.hpp"
 #include "host/selection/diagnosis.hpp"
 #include "tests/support/twin_data.hpp"
@@ -50,8 +50,8 @@ double floor_of(const plant::PlantFile& demo, std::uint64_t seed) {
   const model::Model truth = testing::model_of(plain.drive, true, true);
   std::vector<const data::Experiment*> fit, holdout;
   for (const auto& e : dataset.experiments) (e.role == data::Role::holdout ? holdout : fit).push_back(&e);
-  const estimation::Prepared prepared = estimation::prepare(fit, truth.drive, {});
-  const estimation::Prepared judged = estimation::prepare_with(holdout, truth.drive, prepared.pipeline);
+  const estimation::PreparedData prepared = estimation::prepare(fit, truth.drive, {});
+  const estimation::PreparedData judged = estimation::prepare_with(holdout, truth.drive, prepared.pipeline);
   estimation::BalanceData data(judged, estimation::Balance::motor);
   const Eigen::VectorXd r = estimation::residual_of(data, estimation::terms_of(truth));
   return std::sqrt(r.squaredNorm() / static_cast<double>(r.size()));

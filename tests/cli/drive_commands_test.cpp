@@ -131,7 +131,7 @@ TEST(Flash, RefusesWhatDoesNotFitAndTheDriveKeepsItsBlock) {
   for (const auto& [line, expected] : std::vector<std::pair<std::string, std::string>>{
            {"flash --model gear.toml", "a gear of 50"},
            {"flash --block model.block", "settings of the drive"},
-           {"flash --block no.block", "no.block: this is no good parameter block"},
+           {"flash --block no.block", "no.block: this is not a good parameter block"},
            {"flash --block missing.block", "cannot be read"},
            {"flash", "--model MODEL"},
            {"restore", "no valid block before"},
@@ -264,7 +264,7 @@ TEST(Record, StopsAtALimitOfThePlanAndAtAFaultAndSaysSo) {
   EXPECT_TRUE(shell.file("two/sine.csv").empty());
   const Answer again = shell.run("flexspline record --plan plan.toml --out three --drive " + twin.name());
   EXPECT_EQ(again.code, 2);
-  EXPECT_TRUE(contains(again.err, "stands in a fault")) << again.err;
+  EXPECT_TRUE(contains(again.err, "is in the fault state")) << again.err;
 }
 
 TEST(Record, RefusesAPlanThatTheDriveCannotRunBeforeAnythingMoves) {

@@ -58,7 +58,7 @@ int main(void) {
   return 0;
 }
 )");
-  // 1e-4 * 50 + 4e-4 * 10 + 0.05 + 0.01 at angle nought; 8000 * 1e-3; 0.5 * 0.1.
+  // 1e-4 * 50 + 4e-4 * 10 + 0.05 + 0.01 at angle zero; 8000 * 1e-3; 0.5 * 0.1.
   EXPECT_EQ(shell.must("cc -std=c99 -Wall -Wextra -Werror -pedantic main.c -o main -lm && ./main"),
             "0.069 8 0.05 100 0.05\n");
 }

@@ -121,7 +121,7 @@ TEST(Measure, OfUnsuitableDataSaysWhatToRecord) {
   }
   shell.write("ramp.csv", ramp);
   const std::string text = shell.must("flexspline measure ramp.csv");
-  EXPECT_TRUE(contains(text, "What these data do not tell")) << text;
+  EXPECT_TRUE(contains(text, "What these data do not show")) << text;
   EXPECT_TRUE(contains(text, "multisine")) << text;
   EXPECT_TRUE(contains(text, "repeat one period")) << text;
   EXPECT_EQ(shell.json("flexspline measure ramp.csv")["notes"].size(), 2u);

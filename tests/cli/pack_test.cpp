@@ -100,7 +100,7 @@ TEST(UnpackCommand, SaysWhatIsWrongWithABlock) {
   shell.must("printf 'x' | dd of=drive.block bs=1 seek=300 conv=notrunc status=none");
   const Answer damaged = shell.run("flexspline unpack drive.block");
   EXPECT_EQ(damaged.code, 2);
-  EXPECT_TRUE(contains(damaged.err, "its checksum does not fit its bytes")) << damaged.err;
+  EXPECT_TRUE(contains(damaged.err, "its checksum does not match its bytes")) << damaged.err;
   EXPECT_EQ(shell.run("flexspline unpack m.toml").code, 2);
   EXPECT_EQ(shell.run("flexspline unpack not-there").code, 2);
 }

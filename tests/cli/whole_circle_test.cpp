@@ -68,8 +68,8 @@ TEST(WholeCircle, FromRecordingsOfADriveWithAHiddenEffectToACloserMotion) {
   // Runs begin where the shaft stands, whole turns and all: else there would be a turn of torsion in one of them.
   EXPECT_NEAR(value_of(base, "linear_stiffness", "stiffness"), 6300.0, 0.05 * 6300.0);
   EXPECT_NEAR(value_of(base, "inertia", "inertia"), 1.04e-4, 0.02e-4);
-  // What the gear's damping makes of speed is told by the locked runs' two frequencies; else it would be in both
-  // models.
+  // What the gear's damping makes of speed is identifiable from the locked runs' two frequencies; else it would be in
+  // both models.
   EXPECT_NEAR(value_of(base, "structural_damping", "torque"), 57.0, 0.05 * 57.0);
   EXPECT_NEAR(value_of(base, "structural_damping", "exponent"), 0.5, 0.01);
   shell.must("flexspline compare --model base.toml project");

@@ -32,7 +32,7 @@ constexpr std::int32_t kOne = std::int32_t{1} << fixed::kValueBits;
 template <class T>
 void read(std::uint16_t kind, T& coefficients) {
   model::for_each_entry(kBlock, [&](std::uint16_t found, std::span<const std::uint8_t> bytes) {
-    if (found == kind && model::read_row(bytes, coefficients).fault != model::RowFault::none) bare::stop(4);
+    if (found == kind && model::read_fields(bytes, coefficients).fault != model::FieldFault::none) bare::stop(4);
   });
 }
 
@@ -43,7 +43,7 @@ std::int32_t random_signal() {
   random_state ^= random_state >> 7;
   random_state ^= random_state << 17;
   const auto bits = static_cast<std::int32_t>(random_state >> 20);
-  // Within two bases; now and then nought, an end, or hardly anything.
+  // Within two bases; now and then zero, an end, or hardly anything.
   switch (random_state & 31) {
     case 0:
       return 0;
@@ -189,7 +189,7 @@ G gain(std::int32_t mantissa, int exponent) {
   G g;
   g.mantissa = mantissa;
   g.exponent = static_cast<std::int8_t>(exponent);
-  if (!fixed::complete(g)) bare::stop(5);
+  if (!fixed::derive_fields(g)) bare::stop(5);
   return g;
 }
 void set_loops(Loops::Coefficients<Fixed>& c) {

@@ -16,7 +16,7 @@ template <class T>
 T read(std::uint16_t kind) {
   T coefficients{};
   model::for_each_entry(kBlock, [&](std::uint16_t found, std::span<const std::uint8_t> bytes) {
-    if (found == kind && model::read_row(bytes, coefficients).fault != model::RowFault::none) bare::stop(4);
+    if (found == kind && model::read_fields(bytes, coefficients).fault != model::FieldFault::none) bare::stop(4);
   });
   return coefficients;
 }
@@ -43,14 +43,13 @@ int main() {
   using namespace flexspline;
   using Model = model::DriveModel<fixed::Fixed>;
   static same_bits::Settings settings;
-  std::uint32_t seen = 0;
-  if (!model::read_block<Model::kTables>(kBlock, control::block_places<Model>(), nullptr, &settings, seen, nullptr)
-           .good()) {
+  control::detail::SectionReader sections(&settings);
+  if (!model::read_block<Model>(kBlock, nullptr, sections).good()) {
     bare::print("no good block");
     return 4;
   }
   const auto print = [](std::string_view name, std::uint64_t hash) {
-    // A catalogue's names end with a nought.
+    // A catalogue's names end with a zero.
     bare::print(name.data());
     bare::print(" ");
     bare::print_hex(hash);

@@ -1,5 +1,6 @@
 // What a control tick of the application gets to do, recorded on the software board and read back from the image:
-//   tick_inputs record FOLDER    writes FOLDER/demo/to_drive and FOLDER/demo_and_seven/to_drive: the lock step's pipe
+//   tick_inputs record FOLDER    writes FOLDER/demo/to_drive and FOLDER/demo_and_seven/to_drive: the co-simulation's
+//   pipe
 //                                of a drive in closed loop as a file, which an image reads as it would read the pipe
 //   tick_inputs counts FILE      least, most and mean instructions of the armed ticks, from an image's answers
 // As the image computes the same bits, its loop is closed although its inputs are a file.
@@ -27,13 +28,13 @@ constexpr std::uint64_t kMapFrom = 110;
 constexpr std::uint64_t kFirstCounted = 150;
 constexpr double kSeconds = 0.25;
 
-class Recorder : public board::Brain {
+class Recorder : public board::Controller {
  public:
   explicit Recorder(const std::filesystem::path& file) : out_(file, std::ios::binary) {
     if (!out_) throw std::runtime_error(file.string() + " cannot be written");
   }
   ~Recorder() override {
-    firmware::LockStepDown last;
+    firmware::CoSimulationInput last;
     last.ends = true;
     write(last);
   }
@@ -42,12 +43,12 @@ class Recorder : public board::Brain {
   void start(const board::Block& block, const firmware::TelemetrySetup& telemetry,
              firmware::ResetCause cause) override {
     const auto bytes = block.bytes();
-    write(firmware::LockStepStart{static_cast<std::uint32_t>(bytes.size()), telemetry});
+    write(firmware::CoSimulationStart{static_cast<std::uint32_t>(bytes.size()), telemetry});
     out_.write(reinterpret_cast<const char*>(bytes.data()), static_cast<std::streamsize>(bytes.size()));
-    brain_.start(block, telemetry, cause);
+    controller_.start(block, telemetry, cause);
   }
-  firmware::LockStepUp tick(const firmware::LockStepDown& down) override {
-    firmware::LockStepDown said = down;
+  firmware::CoSimulationOutput tick(const firmware::CoSimulationInput& down) override {
+    firmware::CoSimulationInput said = down;
     const bool starts_map = ++ticks_ >= kMapFrom && !maps_ && !down.has_command;
     if (starts_map) {
       said.command = {};
@@ -55,7 +56,7 @@ class Recorder : public board::Brain {
       said.has_command = maps_ = true;
     }
     write(said);
-    firmware::LockStepUp up = brain_.tick(said);
+    firmware::CoSimulationOutput up = controller_.tick(said);
     if (starts_map) up.has_answer = false;  // to who did not ask
     return up;
   }
@@ -67,7 +68,7 @@ class Recorder : public board::Brain {
     out_.write(reinterpret_cast<const char*>(&item), sizeof(item));
   }
 
-  board::SoftwareBrain brain_;
+  board::SoftwareController controller_;
   std::ofstream out_;
   std::uint64_t ticks_ = 0;
   bool maps_ = false;
@@ -96,7 +97,7 @@ int record(const std::filesystem::path& folder) {
 
 int count(const std::filesystem::path& file) {
   std::ifstream in(file, std::ios::binary);
-  firmware::LockStepUp up;
+  firmware::CoSimulationOutput up;
   std::vector<std::uint32_t> counts;
   for (std::uint64_t tick = 0; in.read(reinterpret_cast<char*>(&up), sizeof(up)); ++tick)
     if (tick >= kFirstCounted && up.status.mode == firmware::Mode::position) counts.push_back(up.instructions);

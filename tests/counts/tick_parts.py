@@ -14,15 +14,15 @@ PARTS = [  # innermost function first: the first pattern that fits its name; mem
     ("effects", r"model::(detail::AllPlaces|DriveModel)::|flexspline::effects::\w+::"),
     ("residual_map", r"ResidualMap::"),
     ("telemetry", r"firmware::Telemetry::|(^|::)(channels|record)$"),
-    ("safety", r"firmware::(Safety|Watchdog)::|(^|::)judge$"),
+    ("safety", r"firmware::(Safety|Watchdog)::|(^|::)check_safety$"),
     ("sensors", r"EncoderAngle::|control::shown|(^|::)(watch_rest|read)$"),
     ("observers", r"(EncoderKalman|RippleFilter|DisturbanceObserver|TorsionObserver)::|Control::(observe|estimate)"),
     ("set_point", r"control::(Trajectory|Stream)::|Control::(follow|set$)"),
     ("feedforward", r"control::Feedforward::|Control::compensate"),
     ("loops", r"control::(Loops|SpeedGuard)::|(^|::)actuation$|Control::update"),
-    ("modes", r"firmware::(Application|Control)::|(^|::)(tick|lend_or_take_back|take_command|obey|follow_up|tick_overrun)$"),
+    ("modes", r"firmware::(Application|Control)::|(^|::)(tick|release_or_take_parameters|take_command|obey|update_mode|tick_overrun)$"),
 ]
-OUTSIDE = r"(^|::)(SysTick_Handler|lock_step|main|background)$|qemu::HostFile"
+OUTSIDE = r"(^|::)(SysTick_Handler|co_simulate|main|background)$|qemu::HostFile"
 
 
 def bare(name):

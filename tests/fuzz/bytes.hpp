@@ -1,4 +1,4 @@
-// A fuzzer's input, taken from the front; noughts where it has ended.
+// A fuzzer's input, taken from the front; zeros where it has ended.
 #pragma once
 
 #include <algorithm>

@@ -14,8 +14,8 @@
 
 #include "host/catalogue/constants.hpp"
 #include "host/data/dataset.hpp"
+#include "host/workbench/access_control.hpp"
 #include "host/workbench/api.hpp"
-#include "host/workbench/gate.hpp"
 #include "host/workbench/work.hpp"
 #include "tests/fuzz/readers.hpp"
 
@@ -84,7 +84,7 @@ std::string_view cut(std::string_view& rest, char at) {
 }
 
 // "HOST\tORIGIN\tPATH"
-void knock(std::string_view line) {
+void request(std::string_view line) {
   const std::string_view host = cut(line, '\t'), origin = cut(line, '\t');
   if (!workbench::refusal({host, origin, line}, kToken, kPort).empty()) return;
   std::string lower(host);
@@ -165,7 +165,7 @@ extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* bytes, std::size_t siz
     std::string_view line = cut(text, '\n');
     if (line.empty()) continue;
     if (line[0] == 'K')
-      knock(line.substr(std::min<std::size_t>(2, line.size())));
+      request(line.substr(std::min<std::size_t>(2, line.size())));
     else if (line[0] == 'N')
       name_of_a_file(bench.folder, line.substr(std::min<std::size_t>(2, line.size())));
     else

@@ -67,7 +67,7 @@ TEST_F(Rhs100DataSet, AllPartsHaveTheReportsExperimentsAndSayWhatIsChosen) {
   }
   const std::string readme = text_of(folder / "README.md");
   for (const char* chosen :
-       {"Chosen, because the report does not say", "output inertia", "wave-form codes", "encoders"})
+       {"Chosen, because the report does not state it", "output inertia", "wave-form codes", "encoders"})
     EXPECT_NE(readme.find(chosen), std::string::npos) << chosen;
 }
 

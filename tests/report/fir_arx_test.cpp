@@ -9,9 +9,9 @@
 #include <numbers>
 #include <random>
 
-#include "hil/report/friction_block.hpp"
-#include "hil/report/published.hpp"
-#include "hil/report/runge_kutta.hpp"
+#include "hil/thesis_models/friction_block.hpp"
+#include "hil/thesis_models/published.hpp"
+#include "hil/thesis_models/runge_kutta.hpp"
 #include "host/blackbox/specification.hpp"
 
 namespace flexspline {

@@ -13,7 +13,7 @@
 #include "hil/plant/parameters.hpp"
 #include "hil/plant/recorder.hpp"
 #include "shared/fixed/checked.hpp"
-#include "shared/fixed/findings.hpp"
+#include "shared/fixed/overflow_log.hpp"
 #include "shared/observers/ripple_filter.hpp"
 
 namespace flexspline::tests {
@@ -60,7 +60,7 @@ double left_of_the_ripple(plant::Waveform waveform, double amplitude, double fre
   const auto c = RippleFilter::derive<Checked>(
       observers::RippleSetup<double>{.order = 2.0, .memory = kMemoryTurns * kTurn, .largest_ripple = 1.0}, d);
   RippleFilter::State<Checked> state;
-  fixed::Findings::clear();
+  fixed::OverflowLog::clear();
   std::vector<double> filtered;
   for (std::size_t k = 0; k < r.record.torque_nm.size(); ++k) {
     const double turns = r.record.motor_position_rad[k] / kTurn;
@@ -68,7 +68,7 @@ double left_of_the_ripple(plant::Waveform waveform, double amplitude, double fre
                                                    Checked::value(r.record.torque_nm[k] / d.output_torque_base));
     filtered.push_back(std::ldexp(out.raw, -fixed::kValueBits) * d.output_torque_base);
   }
-  EXPECT_EQ(fixed::Findings::count(), 0) << fixed::Findings::first();
+  EXPECT_EQ(fixed::OverflowLog::count(), 0) << fixed::OverflowLog::first();
   const double before = rms(r.record.torque_nm, r.record.truth.torque_nm);
   const double after = rms(filtered, r.record.truth.torque_nm);
   const double noise = r.record.torque_noise_std;

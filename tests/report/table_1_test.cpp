@@ -4,9 +4,9 @@
 
 #include <future>
 
-#include "hil/report/friction_block.hpp"
-#include "hil/report/published.hpp"
 #include "hil/rhs100/models.hpp"
+#include "hil/thesis_models/friction_block.hpp"
+#include "hil/thesis_models/published.hpp"
 #include "tests/report/free_run_fit.hpp"
 #include "tests/report/rhs100_data.hpp"
 

@@ -2,8 +2,8 @@
 // direction, and what figures 24 to 27 show of it.
 #include <gtest/gtest.h>
 
-#include "hil/report/published.hpp"
-#include "hil/report/published_tables.hpp"
+#include "hil/thesis_models/published.hpp"
+#include "hil/thesis_models/published_tables.hpp"
 #include "host/comparison/compare.hpp"
 #include "host/signals/butterworth.hpp"
 #include "host/simulation/simulation.hpp"
@@ -83,7 +83,7 @@ TEST_F(Table2, WithoutItNothingSetsTheScaleAndTheTorqueConstantIsNotClaimed) {
   inertia->fixed = false;
   inertia->value.reset();
   const auto found = estimation::identify(slow, open, pipeline());
-  // All parameters at nought, with a motor that makes no torque, would leave no error at all.
+  // All parameters at zero, with a motor that makes no torque, would leave no error at all.
   EXPECT_FALSE(estimate(*found, "torque_constant_error", "ratio").identifiable);
   bool said = false;
   for (const std::string& w : found->warnings) said = said || w.find("torque_constant_error.ratio") == 0;
@@ -114,7 +114,7 @@ TEST_F(Table3, HarmonicDriveFrictionIsTheTotalLessTheMotors) {
   const auto motor = estimation::identify(slow, by_direction, pipeline());
   const rhs100::Set drive_set = rhs100::table_7();
   const auto drive = estimation::identify(dataset_of(drive_set), base_model(drive_set), {});
-  // Section 4.3: T_f = T_fm + T_f1 + T_f2, of which the parts of the drive cannot be told apart.
+  // Section 4.3: T_f = T_fm + T_f1 + T_f2, of which the parts of the drive cannot be distinguished.
   const report::DcMotor known = published::identified_motor();
   const auto rest = [&](const char* name) { return derived(*drive, name) - derived(*motor, name); };
   EXPECT_NEAR(rest("Tsp") / (published::kTable7Average.coulomb_positive - known.friction.positive.coulomb), 1.0, 0.1);

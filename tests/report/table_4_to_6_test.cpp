@@ -2,8 +2,8 @@
 // torsion's rate, and with a cubic spring.
 #include <gtest/gtest.h>
 
-#include "hil/report/published.hpp"
-#include "hil/report/published_tables.hpp"
+#include "hil/thesis_models/published.hpp"
+#include "hil/thesis_models/published_tables.hpp"
 #include "host/comparison/compare.hpp"
 #include "tests/report/rhs100_data.hpp"
 
@@ -164,7 +164,8 @@ TEST_F(Table6, TheCubicModelOverpredictsAtLargeTorsionAndTheLinearOneDoesNot) {
     fix(model, "structural_damping", "torque", mean(rows.damping));
     if (!rows.cubic.empty()) fix(model, "cubic_stiffness", "stiffness", mean(rows.cubic));
     const data::Dataset largest = only(dataset, "100-8");
-    const estimation::Prepared prepared = estimation::prepare({&largest.experiments.front()}, model.drive, pipeline());
+    const estimation::PreparedData prepared =
+        estimation::prepare({&largest.experiments.front()}, model.drive, pipeline());
     estimation::BalanceData balance(prepared, estimation::Balance::transmission);
     const Eigen::VectorXd rest = estimation::residual_of(balance, estimation::terms_of(model));
     Eigen::Index at = 0;

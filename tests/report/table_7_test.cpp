@@ -1,7 +1,7 @@
 // Table 7: friction at speed, each experiment fitted alone as the report did, and what its deviations hide.
 #include <gtest/gtest.h>
 
-#include "hil/report/published_tables.hpp"
+#include "hil/thesis_models/published_tables.hpp"
 #include "host/selection/trends.hpp"
 #include "tests/report/rhs100_data.hpp"
 

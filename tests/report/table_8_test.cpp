@@ -1,8 +1,8 @@
 // Table 8: the amplitudes of the Stribeck term at low speed, each experiment fitted alone with the averages of table 7.
 #include <gtest/gtest.h>
 
-#include "hil/report/published.hpp"
-#include "hil/report/published_tables.hpp"
+#include "hil/thesis_models/published.hpp"
+#include "hil/thesis_models/published_tables.hpp"
 #include "host/selection/diagnosis.hpp"
 #include "tests/report/rhs100_data.hpp"
 
@@ -79,7 +79,7 @@ TEST_F(Table8, EveryRowComesBack) {
 }
 
 TEST_F(Table8, FrictionThatRisesAtLowSpeedIsAcceptedAndNamedSo) {
-  // Both amplitudes are negative in every row, and none is held at nought.
+  // Both amplitudes are negative in every row, and none is held at zero.
   const Rows ours = one_by_one(dataset, base);
   for (const double amplitude : ours.positive) EXPECT_LT(amplitude, 0.0);
   for (const double amplitude : ours.negative) EXPECT_LT(amplitude, 0.0);

@@ -20,14 +20,9 @@ void print_block() {
   model::BlockWriter writer(bytes);
   model::BlockHeader header;
   const auto one = [](model::Number& n) { n = {std::int32_t{1} << fixed::kMantissaBits, 0}; };
-  model::for_each_member(header.bases, [&]<class M>(M& member) {
-    if constexpr (std::is_same_v<M, model::Number>) {
-      one(member);
-    } else {
-      for (model::Number& n : member) one(n);
-    }
-  });
-  model::for_each_member(header.limits, [](fixed::Value& x) { x.raw = std::int32_t{1} << fixed::kValueBits; });
+  const auto one_base = [](fixed::Value& x) { x.raw = std::int32_t{1} << fixed::kValueBits; };
+  header.bases.fields(one);
+  header.limits.fields(one_base);
   header.limits.overspeed.raw = std::int32_t{3} << (fixed::kValueBits - 1);
   writer.begin(header);
   effects::for_each_effect([&]<class Effect>(std::size_t number) {
@@ -61,8 +56,8 @@ int main(int argc, char** argv) {
   same_bits::run<same_bits::Derived>(few ? 200 : 20'000, many, print);
   same_bits::run_parts<same_bits::Derived>(same_bits::settings(), many / 10, print);
   if (!few) print("drawn_blocks", same_bits::hash_of_drawn_blocks(100, many / 1'000));
-  if (fixed::Findings::count() != 0) {
-    std::fprintf(stderr, "%s\n", std::string(fixed::Findings::first()).c_str());
+  if (fixed::OverflowLog::count() != 0) {
+    std::fprintf(stderr, "%s\n", std::string(fixed::OverflowLog::first()).c_str());
     return 1;
   }
 }

@@ -23,7 +23,7 @@ class Random {
     state_ ^= state_ << 17;
     return state_;
   }
-  // Often at the ends of the range, at nought or next to it.
+  // Often at the ends of the range, at zero or next to it.
   std::int32_t signal() {
     const std::uint64_t bits = next();
     switch (bits & 15) {
@@ -180,8 +180,8 @@ struct Drawn {
       *next++ = drawn < p.low || drawn > p.high ? usual : drawn;
     }
     const auto coefficients = Effect::template derive<Fixed>(parameters, drive());
-    if (fixed::Findings::count() == 0) return coefficients;
-    fixed::Findings::clear();  // these do not fit a drive
+    if (fixed::OverflowLog::count() == 0) return coefficients;
+    fixed::OverflowLog::clear();  // these do not fit a drive
     return Derived::effect<Effect>();
   }
 };

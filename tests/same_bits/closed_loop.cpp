@@ -9,12 +9,12 @@
 #include <string>
 #include <vector>
 
-#include "hil/board/brain.cpp"
-#include "hil/board/drive_rig.cpp"
+#include "hil/board/controller.cpp"
 #include "hil/board/drive_setup.cpp"
 #include "hil/board/events.cpp"
 #include "hil/board/motion.cpp"
 #include "hil/board/packed_model.cpp"
+#include "hil/board/plant_rig.cpp"
 #include "hil/board/scenario.cpp"
 #include "hil/board/virtual_drive.cpp"
 #include "hil/plant/friction.cpp"

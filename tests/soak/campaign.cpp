@@ -47,7 +47,7 @@ const std::vector<std::string> kHidden = {
     "torsion_zero",
 };
 // Those that are there or not: laws whose size is one with their shape, and what every drive has.
-const std::vector<std::string> kWhole = {
+const std::vector<std::string> kWholeRecord = {
     "lugre_friction",
     "current_saturation",
     "piecewise_stiffness",
@@ -129,7 +129,7 @@ std::vector<Case> judging_round(std::uint64_t round) {
     cases.push_back(
         {list[n % list.size()], 1.0, own, kVariations[(n + n / list.size()) % std::size(kVariations)], 0.0, ""});
   };
-  for (std::size_t k = 0; k < kWholeInARound; ++k) nth(kWhole, kWholeInARound * round + k, seed + 55 + k);
+  for (std::size_t k = 0; k < kWholeInARound; ++k) nth(kWholeRecord, kWholeInARound * round + k, seed + 55 + k);
   for (std::size_t k = 0; k < kPairsInARound; ++k) nth(kPairs, kPairsInARound * round + k, seed + 60 + k);
   for (std::size_t k = 0; k < kUnknownInARound; ++k) nth(kUnknown, kUnknownInARound * round + k, seed + 70 + k);
   return cases;

@@ -86,8 +86,8 @@ struct Bench {
 
   // RMS of the true model's residual on the hold-out records.
   double holdout_floor(Balance balance) const {
-    const estimation::Prepared prepared = estimation::prepare(of(data::Role::fit), truth.drive, {});
-    const estimation::Prepared judged =
+    const estimation::PreparedData prepared = estimation::prepare(of(data::Role::fit), truth.drive, {});
+    const estimation::PreparedData judged =
         estimation::prepare_with(of(data::Role::holdout), truth.drive, prepared.pipeline);
     BalanceData data(judged, balance);
     return root_mean_square(estimation::residual_of(data, estimation::terms_of(truth)));
@@ -95,7 +95,7 @@ struct Bench {
 
   // What the hidden effects add and the base model cannot imitate, over the noise alone, on the fitted records.
   double missing_over_noise(Balance balance) const {
-    const estimation::Prepared prepared = estimation::prepare(of(data::Role::fit), truth.drive, {});
+    const estimation::PreparedData prepared = estimation::prepare(of(data::Role::fit), truth.drive, {});
     BalanceData data(prepared, balance);
     const estimation::Terms full = estimation::terms_of(truth),
                             without = estimation::terms_of(testing::model_of(file.drive, false, true));
@@ -115,10 +115,10 @@ struct Bench {
       }
     }
     const auto on_balance = estimation::terms_on(without, balance, true);
-    Eigen::MatrixXd X = estimation::columns_of(data, without, estimation::free_linear_slots(without, on_balance));
+    Eigen::MatrixXd X = estimation::columns_of(data, without, estimation::free_linear_parameters(without, on_balance));
     if (X.cols() == 0) {
       estimation::Terms open = estimation::terms_of(base);
-      X = estimation::columns_of(data, open, estimation::free_linear_slots(open, on_balance));
+      X = estimation::columns_of(data, open, estimation::free_linear_parameters(open, on_balance));
     }
     const Eigen::VectorXd size = X.colwise().norm().transpose().array().max(1e-300);
     X *= size.cwiseInverse().asDiagonal();
@@ -133,7 +133,7 @@ void compare_parameters(const Bench& bench, const std::string& hidden, const sel
   const plant::Effect* truth = nullptr;
   for (const plant::Effect& e : bench.file.drive.effects)
     if (e.hidden) truth = &e;
-  // The two parts of a wave are judged by its height: either may be near nought.
+  // The two parts of a wave are judged by its height: either may be near zero.
   double height = 0.0;
   for (const plant::Parameter& p : truth->parameters)
     if (p.key == "cosine" || p.key == "sine") height = std::hypot(height, p.value);
@@ -184,7 +184,7 @@ Outcome run(const Case& what) {
   for (std::size_t i = 0; i < d.candidates.size(); ++i) {
     const selection::Candidate& c = d.candidates[i];
     if (i < 4)
-      outcome.detail += fmt::format(" {}({:.1f},{:.2f}%{})", label(c.effect, c.order), c.score, c.chi2_fall_percent,
+      outcome.detail += fmt::format(" {}({:.1f},{:.2f}%{})", label(c.effect, c.order), c.score, c.chi2_decrease_percent,
                                     c.admissible ? "" : ",x");
     if (c.admissible) outcome.best_score = std::max(outcome.best_score, c.score + c.other_balance_score);
   }

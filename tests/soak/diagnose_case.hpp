@@ -30,7 +30,7 @@ struct Recovered {
 
 struct Outcome {
   Case what;
-  std::string named;    // "+" between effects that could not be told apart, "-" for none
+  std::string named;    // "+" between effects that could not be distinguished, "-" for none
   std::string verdict;  // as the diagnosis says it
   bool right = false;
   bool found_all = false;           // of several, by adding what is named until nothing is; of one, among those named

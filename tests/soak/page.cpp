@@ -84,7 +84,7 @@ std::string power(const std::vector<Outcome>& all) {
       "## One effect hidden\n\nBy the RMS of what the effect adds and the rest of the model cannot imitate, over the "
       "RMS of "
       "the noise.\n\n| missing over noise | named right, friction constant | named right, friction 3 % from run to run "
-      "| in a group that cannot be told apart | a wrong name |\n| --- | --- | --- | --- | --- |\n";
+      "| in a group that cannot be distinguished | a wrong name |\n| --- | --- | --- | --- | --- |\n";
   constexpr double kEdges[] = {0.0, 0.025, 0.05, 0.1, 0.25, 1.0, 1e9};
   for (std::size_t k = std::size(kEdges) - 1; k-- > 0;) {
     const auto in = [&](const Outcome& o) {

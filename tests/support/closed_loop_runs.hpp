@@ -51,7 +51,7 @@ inline std::vector<std::uint8_t> loop_block(const model::Model& model, const std
 // With the loops of `first`, whatever inertia the model holds.
 inline std::vector<std::uint8_t> same_loops(const model::Model& model, const std::vector<std::uint8_t>& first) {
   const deployment::Unpacked block = deployment::unpack(first);
-  return loop_block(model, closed_loop::settings_like(block, closed_loop::bench_of(block)));
+  return loop_block(model, closed_loop::settings_like(block, closed_loop::twin_hardware_of(block)));
 }
 
 struct LoopRun {
@@ -59,7 +59,7 @@ struct LoopRun {
   plant::Drive drive{};
   std::vector<std::uint8_t> block{};
   bool compensation = false;
-  double seconds = 0.0;  // nought: what the scenario says
+  double seconds = 0.0;  // zero: what the scenario says
   double hold_s = 0.0;
   std::uint64_t seed = 1;
 };

@@ -13,7 +13,7 @@
 
 #include "host/catalogue/catalogue.hpp"
 #include "shared/fixed/checked.hpp"
-#include "shared/fixed/findings.hpp"
+#include "shared/fixed/overflow_log.hpp"
 #include "shared/model/drive_model.hpp"
 #include "shared/model/proof.hpp"
 
@@ -22,9 +22,9 @@ namespace flexspline::tests {
 using effects::DriveConstants;
 using effects::Inputs;
 using fixed::Checked;
-using fixed::Findings;
 using fixed::Fixed;
 using fixed::Intervals;
+using fixed::OverflowLog;
 using numbers::Real;
 
 inline constexpr double kTickS = 1.0 / 16000.0;
@@ -201,17 +201,18 @@ struct Models {
   model::DriveModel<Real> real;
   model::DriveModel<Intervals> intervals;
 
-  // Adds an effect; false where a coefficient does not fit its format (Findings says which) or there is no place left.
+  // Adds an effect; false where a coefficient does not fit its format (OverflowLog says which) or there is no place
+  // left.
   template <class Effect>
   bool add(const double* parameters, const DriveConstants<double>& drive) {
-    Findings::clear();
+    OverflowLog::clear();
     DriveConstants<double> radians = drive;
     radians.angle_base = 1.0;
     const bool placed = fixed.add<Effect>(Effect::template derive<Fixed>(parameters, drive)) &&
                         checked.add<Effect>(Effect::template derive<Checked>(parameters, drive)) &&
                         intervals.add<Effect>(Effect::template derive<Intervals>(parameters, drive)) &&
                         real.add<Effect>(Effect::template derive<Real>(parameters, radians));
-    return placed && Findings::count() == 0;
+    return placed && OverflowLog::count() == 0;
   }
   bool add_named(std::string_view name, const std::vector<double>& parameters, const DriveConstants<double>& drive) {
     bool added = false;
@@ -282,7 +283,7 @@ inline Trial run(Models& models, const DriveConstants<double>& drive, Random& ra
   Trial trial;
   Motion motion(drive, random);
   const model::Proof proof = model::prove(models.intervals);
-  Findings::clear();
+  OverflowLog::clear();
   // No law with memory reads the rate, so that models at the ends of its resolution stay beside the others.
   model::DriveModel<Real> slower = models.real, faster = models.real;
   for (int k = 0; k < ticks; ++k) {
@@ -312,7 +313,7 @@ inline Trial run(Models& models, const DriveConstants<double>& drive, Random& ra
     compare(BalanceOf{&effects::Torques<Fixed>::load, &effects::Torques<Checked>::load, &effects::Torques<Real>::load,
                       &effects::Torques<Intervals>::load});
   }
-  trial.findings = Findings::count();
+  trial.findings = OverflowLog::count();
   return trial;
 }
 

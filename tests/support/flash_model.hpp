@@ -43,7 +43,7 @@ class FlashModel {
         if (const std::uint8_t mask = cells.weak[s][i]; mask != 0)
           cells.sectors[s][i] = static_cast<std::uint8_t>((cells.sectors[s][i] & ~mask) | (random_() & mask));
   }
-  // The power goes at the operation of this number, from nought.
+  // The power goes at the operation of this number, from zero.
   void cut(std::size_t operation, CutAt where) {
     cut_ = static_cast<long>(operation);
     where_ = where;

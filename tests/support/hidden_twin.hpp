@@ -33,7 +33,7 @@ struct HiddenTwin {
 // "kinematic_error:2+torsion_zero"; empty where nothing is named.
 inline std::string names(const selection::Diagnosis& found) {
   std::string list;
-  for (const selection::Named& n : found.named)
+  for (const selection::NamedEffect& n : found.named)
     list += (list.empty() ? "" : "+") + n.effect + (n.order ? fmt::format(":{:g}", *n.order) : "");
   return list;
 }

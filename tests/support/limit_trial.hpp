@@ -31,7 +31,7 @@ inline control::DriveSetup<double> drawn_limits(std::mt19937_64& random) {
   s.loops.torque_limit = s.loops.current_limit * d.torque_constant;
   s.current.full_scale = between(0.5, 4.0) * d.current_base;
   s.temperature.full_scale = between(80.0, 400.0);
-  s.temperature.at_nought = between(-20.0, 60.0);
+  s.temperature.at_zero = between(-20.0, 60.0);
   s.amplifier_full_scale = 1.25 * s.loops.current_limit;
   s.safety.overspeed = between(1.0, 1.4) * s.loops.overspeed;
   s.safety.overcurrent = between(1.05, 2.0) * s.loops.current_limit;
@@ -57,7 +57,7 @@ inline std::optional<Block> accepted_block(const control::DriveSetup<double>& se
 class Readout {
  public:
   Readout(const Block& block, const control::DriveSetup<double>& setup) : setup_(setup) {
-    brain_.start(block, {}, firmware::ResetCause::power);
+    controller_.start(block, {}, firmware::ResetCause::power);
     temperature(25.0);
     for (int k = 0; k < 100; ++k) tick();
   }
@@ -67,7 +67,7 @@ class Readout {
     follows_ = false;
   }
   void temperature(double celsius) {
-    down_.readings.temperature = share((celsius + setup_.temperature.at_nought) / setup_.temperature.full_scale);
+    down_.readings.temperature = share((celsius + setup_.temperature.at_zero) / setup_.temperature.full_scale);
   }
   void turn(double rad_s) { velocity_ = rad_s; }
   bool arm(Command command) {
@@ -75,7 +75,7 @@ class Readout {
     tick();
     return up_.status.mode == command.mode;
   }
-  const firmware::LockStepUp& tick() {
+  const firmware::CoSimulationOutput& tick() {
     firmware::Readings& r = down_.readings;
     angle_ += velocity_ / kTickHz;
     r.motor_counter = counts(angle_, setup_.motor_counts);
@@ -87,7 +87,7 @@ class Readout {
     command_.kind = is_armed(up_.status.mode) ? Command::Kind::heartbeat : command_.kind;
     down_.has_command = command_.kind != Command::Kind::clear_fault;
     down_.command = command_;
-    return up_ = brain_.tick(down_);
+    return up_ = controller_.tick(down_);
   }
   // Runs until there is a fault, at most so long; its name.
   std::string fault_within(double seconds) {
@@ -106,9 +106,9 @@ class Readout {
     return static_cast<std::int16_t>(std::lround(std::clamp(x, -1.0, 0.99997) * 32768.0));
   }
   control::DriveSetup<double> setup_;
-  board::SoftwareBrain brain_;
-  firmware::LockStepDown down_;
-  firmware::LockStepUp up_;
+  board::SoftwareController controller_;
+  firmware::CoSimulationInput down_;
+  firmware::CoSimulationOutput up_;
   Command command_ = of_kind(Command::Kind::heartbeat);
   double velocity_ = 0.0, angle_ = 0.0;
   bool follows_ = true;

@@ -7,7 +7,7 @@
 #include <vector>
 
 #include "host/catalogue/constants.hpp"
-#include "host/deployment/trial.hpp"
+#include "host/deployment/fixed_point_check.hpp"
 #include "host/model/model.hpp"
 
 namespace flexspline::tests {

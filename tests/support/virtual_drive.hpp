@@ -16,7 +16,7 @@ namespace flexspline::tests {
 using board::Block;
 using board::Injection;
 using board::RigSetup;
-using board::SoftwareBrain;
+using board::SoftwareController;
 using board::VirtualDrive;
 using firmware::Channel;
 using firmware::Command;
@@ -96,8 +96,8 @@ inline std::unique_ptr<VirtualDrive> idle_drive(const control::DriveSetup<double
   EXPECT_TRUE(drive->status().has_parameters);
   return drive;
 }
-inline SoftwareBrain& software(VirtualDrive& drive) {
-  return dynamic_cast<SoftwareBrain&>(drive.brain());
+inline SoftwareController& software(VirtualDrive& drive) {
+  return dynamic_cast<SoftwareController&>(drive.controller());
 }
 
 }  // namespace flexspline::tests

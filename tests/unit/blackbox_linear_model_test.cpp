@@ -70,11 +70,11 @@ TEST(LinearModel, AFirWithSeveralInputsAndADelayIsFound) {
 
 TEST(LinearModel, SamplesThatAreNotJudgedAreNeitherFittedNorScored) {
   Record r = record_of(kA, kB, 1, 0.0, 300, 4);
-  r.judged.assign(300, 1);
+  r.scored.assign(300, 1);
   // A disturbed output spoils the equations that hold it: its own and the two after.
   r.output[100] += 50.0;
   EXPECT_GT(std::abs(fit({r}, {2, 2, 1, false}).a[0] + 1.5), 1e-3);
-  for (std::size_t k = 100; k < 103; ++k) r.judged[k] = 0;
+  for (std::size_t k = 100; k < 103; ++k) r.scored[k] = 0;
   const LinearModel m = fit({r}, {2, 2, 1, false});
   EXPECT_NEAR(m.a[0], -1.5, 1e-12);
   EXPECT_EQ(m.rows, 298u - 3u);
@@ -98,7 +98,7 @@ TEST(LinearModel, OneStepUsesMeasuredOutputsAndTheFreeRunItsOwn) {
   EXPECT_NEAR(e.rms(), 0.5, 0.01);
 }
 
-TEST(LinearModel, FitInPercentIsNoughtForTheMeanAndAHundredForAPerfectModel) {
+TEST(LinearModel, FitInPercentIsZeroForTheMeanAndAHundredForAPerfectModel) {
   const Record r = record_of(kA, kB, 1, 0.7, 4000, 6);
   EXPECT_NEAR(errors_of(fit({r}, {2, 2, 1, true}), r).fit_percent(), 100.0, 1e-6);
   EXPECT_NEAR(errors_of(fit({r}, {0, 0, 1, true}), r).fit_percent(), 0.0, 1e-6);

@@ -54,11 +54,11 @@ TEST(BlackBoxSpecification, WhatIsWrongIsQuotedWithWhatIsExpected) {
   for (const char* text : {"", "fir", "fir:", "fir:0", "fir:x", "fir:2.5", "fir:1,2,3", "fir:201", "fir:5,0", "arx:4",
                            "arx:0,4,1", "arx:4,0,1", "arx:4,4,1,1", "arx:4,,1", "arma:2,2", "arx:4,4,-1", "fir:20 "}) {
     const std::string why = refusal_of(text);
-    EXPECT_TRUE(why.starts_with(std::string(text) + " is no black box: ")) << text << ": " << why;
+    EXPECT_TRUE(why.starts_with(std::string(text) + " is not a black box: ")) << text << ": " << why;
     EXPECT_NE(why.find("arx:4,4,1"), std::string::npos) << why;
   }
   EXPECT_NE(refusal_of("arma:2,2").find("\"arma\" is neither fir nor arx"), std::string::npos);
-  EXPECT_NE(refusal_of("fir:2.5").find("\"2.5\" is no whole number"), std::string::npos);
+  EXPECT_NE(refusal_of("fir:2.5").find("\"2.5\" is not a whole number"), std::string::npos);
   EXPECT_NE(refusal_of("arx:4,0,1").find("NB is 0, not within 1..200"), std::string::npos);
 }
 

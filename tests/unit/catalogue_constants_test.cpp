@@ -145,9 +145,9 @@ TEST(ReducedParameters, OfDualNumbersHaveTheDerivativesOfTheNaturalOnes) {
   }
 }
 
-// A model may switch an effect off, and a search begins with nought: what others are stated per, and what coefficients
-// divide by, may be nought then.
-TEST(ReducedParameters, APivotOfNoughtStaysFinite) {
+// A model may switch an effect off, and a search begins with zero: what others are stated per, and what coefficients
+// divide by, may be zero then.
+TEST(ReducedParameters, APivotOfZeroStaysFinite) {
   for (const Entry& entry : all()) {
     SCOPED_TRACE(entry.name());
     for (const double value : reduced(entry, std::vector<double>(entry.parameters.size(), 0.0)))
@@ -167,8 +167,8 @@ TEST(ReducedParameters, APivotOfNoughtStaysFinite) {
     std::vector<double> off = usual_values(entry);
     for (std::size_t p = 0; p < off.size(); ++p)
       if (entry.parameters[p].kind == Kind::linear) off[p] = 0.0;
-    const std::vector<double> nought(off.size(), 0.0);
-    for (const std::vector<double>& parameters : {natural(entry, reduced(entry, off)), nought}) {
+    const std::vector<double> zero(off.size(), 0.0);
+    for (const std::vector<double>& parameters : {natural(entry, reduced(entry, off)), zero}) {
       std::vector<double> torque(inputs.size(), 0.0);
       std::vector<numbers::Jet> dual(inputs.size(), numbers::Jet(0.0));
       const std::vector<numbers::Jet> lifted_parameters(parameters.begin(), parameters.end());
@@ -176,7 +176,7 @@ TEST(ReducedParameters, APivotOfNoughtStaysFinite) {
       entry.dual.torque_of_plain(lifted_parameters.data(), {}, entry.identified_on(), inputs, dual.data());
       for (std::size_t k = 0; k < inputs.size(); ++k) {
         EXPECT_TRUE(std::isfinite(torque[k]) && std::isfinite(dual[k].a) && std::isfinite(dual[k].v[0])) << k;
-        // With all linear parameters at nought nothing is left of what has some, to far below any rounding.
+        // With all linear parameters at zero nothing is left of what has some, to far below any rounding.
         EXPECT_NEAR(torque[k], 0.0, entry.count(Kind::linear) > 0 ? 1e-25 : effects::kUnbounded);
       }
     }
@@ -211,7 +211,7 @@ TEST(ValuesOf, AreInTheOrderOfTheCatalogueWhateverThatOfTheModel) {
   effect.find("velocity")->value = 3.0;
   effect.find("amplitude_positive")->value = 0.012;
   std::swap(effect.parameters[0], effect.parameters[2]);
-  EXPECT_EQ(values_of(effect, entry), (std::vector<double>{0.012, 0.0, 3.0})) << "nought where there is no value";
+  EXPECT_EQ(values_of(effect, entry), (std::vector<double>{0.012, 0.0, 3.0})) << "zero where there is no value";
   effect.parameters.clear();
   EXPECT_EQ(values_of(effect, entry), (std::vector<double>{0.0, 0.0, 0.0}));
 }

@@ -107,7 +107,8 @@ std::string effect_of(const std::string& path) {
 using Reasons = std::map<std::string, std::string>;
 const Reasons& reasons() {
   static const Reasons kReasons = {
-      {"host/catalogue/defined.hpp", "what a user made is named in model files and made apart from the others"},
+      {"host/catalogue/user_defined_effect.hpp",
+       "what a user made is named in model files and made apart from the others"},
       {"host/cli/base_model.cpp", "a first model has the effects that every drive has"},
       {"host/cli/command_demo.cpp",
        "what the demo may hide is chosen, so that a newcomer sees something that he knows"},
@@ -134,7 +135,7 @@ std::vector<std::string> broken_rules(const std::vector<Source>& sources, const 
     for (const auto& [path, type] : types) {
       if (path != source.path && code.words.contains(type))
         broken.push_back(source.path + " names " + type + "; go through the catalogue instead");
-      // Effects name one another as rivals; "inertia" is a parameter too.
+      // Effects name those that they are confused with; "inertia" is a parameter too.
       if (source.path.starts_with("shared/effects/") || !code.literals.contains(effect_of(path))) continue;
       names_one = true;
       if (!allowed.contains(source.path))
@@ -150,7 +151,7 @@ TEST(AddingAnEffect, IsOneFileAndOneLine) {
   const std::vector<Source> sources = sources_below({"shared", "host", "firmware"});
   const auto types = effect_types(sources);
   EXPECT_EQ(types.size(), catalogue::all().size() + 1) << "and the one that users make of a header";
-  EXPECT_NE(catalogue::find_made_by_user("table_effect"), nullptr);
+  EXPECT_NE(catalogue::find_user_defined("table_effect"), nullptr);
   for (const Entry& entry : catalogue::all())
     EXPECT_TRUE(types.contains("shared/effects/" + std::string(entry.name()) + ".hpp")) << entry.name();
   for (const std::string& broken : broken_rules(sources, reasons())) ADD_FAILURE() << broken;
@@ -231,9 +232,9 @@ TEST(EffectDocuments, CatalogueHasEachEffectWithItsParametersAndRivals) {
         while (!key.empty() && std::isdigit(static_cast<unsigned char>(key.back())) != 0) key.pop_back();
       EXPECT_TRUE(any_row_has(rows, entry.name(), "`" + key)) << entry.name() << "." << key << " is not described";
     }
-    for (const std::string_view rival : catalogue::split_names(entry.info->rivals))
-      EXPECT_TRUE(any_row_has(rows, entry.name(), "`" + std::string(rival) + "`"))
-          << "CATALOGUE.md does not say that " << entry.name() << " is confused with " << rival;
+    for (const std::string_view name : catalogue::split_names(entry.info->confused_with))
+      EXPECT_TRUE(any_row_has(rows, entry.name(), "`" + std::string(name) + "`"))
+          << "CATALOGUE.md does not say that " << entry.name() << " is confused with " << name;
   }
 }
 

@@ -80,12 +80,12 @@ TEST(Catalogue, DescribesEachEffectToSomebodyWhoNeverHeardOfIt) {
       EXPECT_TRUE(sentence.ends_with('.'));
     }
     EXPECT_NE(info.reads, 0U);
-    for (const std::string_view list : {info.rivals, info.replaces, info.modulates, info.contains})
+    for (const std::string_view list : {info.confused_with, info.replaces, info.modulates, info.contains})
       for (const std::string_view name : catalogue::split_names(list)) {
         EXPECT_TRUE(is_published(name)) << '"' << name << '"';
         EXPECT_NE(name, entry.name());
       }
-    EXPECT_FALSE(info.rivals.empty());
+    EXPECT_FALSE(info.confused_with.empty());
     if (info.phase == Phase::modulate)
       EXPECT_NE(catalogue::find(info.modulates), nullptr) << "what it scales must be there to be scaled";
     else

@@ -46,22 +46,22 @@ const Recorded& recorded() {
   return r;
 }
 
-estimation::Prepared prepared(const data::Dataset& dataset, const model::Model& m) {
+estimation::PreparedData prepared(const data::Dataset& dataset, const model::Model& m) {
   estimation::PipelineOptions options;
   options.cutoff_hz = kCutoffHz;
   return estimation::prepare(pointers(dataset), m.drive, options);
 }
 
 std::vector<NoiseFloor> floors_of(const data::Dataset& dataset, const model::Model& m, Balance balance) {
-  const estimation::Prepared p = prepared(dataset, m);
+  const estimation::PreparedData p = prepared(dataset, m);
   BalanceData data(p, balance);
   return noise_floors(data, estimation::terms_of(m), pointers(dataset), m.drive);
 }
 
 // What sensor noise and resolution do to the residual: RMS of its difference from that of noiseless records.
 std::vector<double> true_floors(const Recorded& r, const model::Model& m, Balance balance) {
-  const estimation::Prepared p = prepared(r.measured, m);
-  estimation::Prepared q = prepared(r.noiseless, m);
+  const estimation::PreparedData p = prepared(r.measured, m);
+  estimation::PreparedData q = prepared(r.noiseless, m);
   for (std::size_t k = 0; k < p.records.size(); ++k) {
     q.records[k].rows = p.records[k].rows;
     q.records[k].at_rest = p.records[k].at_rest;
@@ -141,7 +141,7 @@ TEST(NoiseFloor, DoesNotCountAnEffectThatTheModelLacks) {
   const Recorded rippled(drive, {plans()[0], plans()[1]});
   const data::Dataset& dataset = rippled.measured;
   const model::Model m = known_model(drive);
-  const estimation::Prepared p = prepared(dataset, m);
+  const estimation::PreparedData p = prepared(dataset, m);
   BalanceData data(p, Balance::motor);
   const auto terms = estimation::terms_of(m);
   const auto floors = noise_floors(data, terms, pointers(dataset), m.drive);
@@ -206,7 +206,7 @@ name = "train"
     m.effects.push_back(catalogue::blank_effect(catalogue::get(name), data::Axis::linear));
   estimation::PipelineOptions options;
   options.cutoff_hz = 100.0;
-  const estimation::Prepared p = estimation::prepare(pointers(dataset), m.drive, options);
+  const estimation::PreparedData p = estimation::prepare(pointers(dataset), m.drive, options);
   BalanceData data(p, Balance::motor);
   estimation::Terms terms = estimation::terms_of(m);
   estimation::fit_balance(data, terms);

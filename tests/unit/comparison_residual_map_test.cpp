@@ -8,7 +8,7 @@
 #include <memory>
 #include <random>
 
-#include "host/comparison/row_variables.hpp"
+#include "host/comparison/sample_variables.hpp"
 #include "host/estimation/least_squares.hpp"
 #include "tests/unit/comparison_test_drive.hpp"
 
@@ -22,7 +22,7 @@ using plant::Waveform;
 
 struct Rows {
   data::Dataset dataset;
-  estimation::Prepared prepared;
+  estimation::PreparedData prepared;
   std::unique_ptr<BalanceData> motor;
   Rows() {
     const plant::Drive drive = plant::demo_plant().drive;
@@ -134,7 +134,7 @@ TEST(ResidualMap, AConstantHasNoBins) {
 }
 
 TEST(ResidualMap, MotorAngleStaysWithinATurn) {
-  for (const RowVariable& v : row_variables(*rows().motor, data::Axis::rotary)) {
+  for (const SampleVariable& v : sample_variables(*rows().motor, data::Axis::rotary)) {
     if (v.name != "motor_angle") continue;
     EXPECT_GE(v.values.minCoeff(), 0.0);
     EXPECT_LE(v.values.maxCoeff(), 2.0 * M_PI);

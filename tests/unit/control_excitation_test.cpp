@@ -14,7 +14,7 @@
 #include "host/numbers/real.hpp"
 #include "shared/control/excitation.hpp"
 #include "shared/fixed/checked.hpp"
-#include "shared/fixed/findings.hpp"
+#include "shared/fixed/overflow_log.hpp"
 
 namespace flexspline::tests {
 namespace {
@@ -23,8 +23,8 @@ using control::Excitation;
 using control::ExcitationSetup;
 using control::Shape;
 using fixed::Checked;
-using fixed::Findings;
 using fixed::Fixed;
+using fixed::OverflowLog;
 using numbers::Real;
 
 constexpr double kPi = std::numbers::pi;
@@ -70,7 +70,7 @@ std::vector<double> played(const ExcitationSetup<double>& setup) {
   do {
     out.push_back(real(Excitation::update(s, c, {})));
   } while (!Excitation::finished(s) && out.size() < 10'000'000);
-  out.pop_back();  // the first nought after the end
+  out.pop_back();  // the first zero after the end
   return out;
 }
 // Coefficient of exp(i h phase), relative to the amplitude; h cycles of a cycle of the excitation.
@@ -239,11 +239,11 @@ TEST(Excitation, FadesInAndOutAndLastsAsManyTicksAsSaid) {
   }
 }
 
-TEST(Excitation, ASquareBecomesATrapezoidOfTheSlopeAllowedAndEndsAtNought) {
+TEST(Excitation, ASquareBecomesATrapezoidOfTheSlopeAllowedAndEndsAtZero) {
   auto setup = shaped(Shape::square);
   setup.slope_limit = 0.3 * kBase / (100 * kTickS);
   const auto y = played<Fixed>(setup);
-  EXPECT_EQ(y.size(), setup.ticks + 99);  // 100 ticks back to nought, of which the last shows as the end
+  EXPECT_EQ(y.size(), setup.ticks + 99);  // 100 ticks back to zero, of which the last shows as the end
   EXPECT_NEAR(y[49], 0.15, 1e-7);
   EXPECT_NEAR(y[1024 + 99], 0.0, 1e-7);
   double slope = 0.0;
@@ -268,7 +268,7 @@ TEST(Excitation, StopsAtOnceAsFastAsItsSlopeAllows) {
 TEST(Excitation, KeepsToItsLimitsForAHundredThousandAdversarialTicks) {
   std::mt19937_64 random(17);
   std::uniform_real_distribution<double> uniform(0.0, 1.0);
-  Findings::clear();
+  OverflowLog::clear();
   double closest = 0.0;
   int braking = 0;
   for (int run = 0; run < 100; ++run) {
@@ -283,8 +283,8 @@ TEST(Excitation, KeepsToItsLimitsForAHundredThousandAdversarialTicks) {
     setup.ticks = 900;
     const bool clipped = setup.offset + 1.2 * setup.amplitude > setup.limit;
     const auto c = Excitation::derive<Checked>(setup, kBase, drive());
-    EXPECT_TRUE(Findings::count() == 1 || !clipped);  // told, and held all the same
-    Findings::clear();
+    EXPECT_TRUE(OverflowLog::count() == 1 || !clipped);  // told, and held all the same
+    OverflowLog::clear();
     Excitation::State<Checked> s;
     Excitation::start(s, c);
     double before = 0.0;
@@ -297,7 +297,7 @@ TEST(Excitation, KeepsToItsLimitsForAHundredThousandAdversarialTicks) {
       braking += y * velocity < 0.0 ? 1 : 0;
       before = y;
     }
-    EXPECT_EQ(Findings::count(), 0) << Findings::first();
+    EXPECT_EQ(OverflowLog::count(), 0) << OverflowLog::first();
   }
   EXPECT_GT(closest, 0.999);
   EXPECT_GT(braking, 1000);
@@ -327,7 +327,7 @@ TEST(Excitation, OnADriveAgreesWithDouble) {
   auto chirp = sine(plain());
   chirp.end_frequency_hz = 300.0;
   const auto many = multi_sine(plain(), {.seed = 5, .first = 1, .last = 63, .odd = true});
-  Findings::clear();
+  OverflowLog::clear();
   double all = 0.0;
   for (auto setup : {sine(plain()), composite(plain()), chirp, many, shaped(Shape::asymmetric_sine),
                      shaped(Shape::square), shaped(Shape::saw_tooth), shaped(Shape::triangle)}) {
@@ -340,15 +340,15 @@ TEST(Excitation, OnADriveAgreesWithDouble) {
     EXPECT_LT(worst, 3e-8);
     all = std::max(all, worst);
   }
-  EXPECT_EQ(Findings::count(), 0) << Findings::first();
+  EXPECT_EQ(OverflowLog::count(), 0) << OverflowLog::first();
   EXPECT_GT(all, 0.0);
 }
 
 TEST(Excitation, TellsWhatItCannotPlay) {
   const auto found = [](const ExcitationSetup<double>& setup) {
-    Findings::clear();
+    OverflowLog::clear();
     Excitation::derive<Fixed>(setup, kBase, drive());
-    return Findings::count() > 0;
+    return OverflowLog::count() > 0;
   };
   EXPECT_FALSE(found(sine(plain())));
   auto setup = sine(plain());
@@ -363,9 +363,9 @@ TEST(Excitation, TellsWhatItCannotPlay) {
   setup = sine(plain());
   setup.fade_ticks = setup.ticks;
   EXPECT_TRUE(found(setup));
-  Findings::clear();
+  OverflowLog::clear();
   multi_sine(plain(), {.seed = 1, .first = 1, .last = 40});
-  EXPECT_EQ(Findings::count(), 1);
+  EXPECT_EQ(OverflowLog::count(), 1);
 }
 
 }  // namespace

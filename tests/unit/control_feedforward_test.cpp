@@ -13,7 +13,7 @@
 #include "shared/control/loops.hpp"
 #include "shared/control/trajectory.hpp"
 #include "shared/fixed/checked.hpp"
-#include "shared/fixed/findings.hpp"
+#include "shared/fixed/overflow_log.hpp"
 
 namespace flexspline::tests {
 namespace {
@@ -21,8 +21,8 @@ namespace {
 using control::Feedforward;
 using control::FeedforwardSetup;
 using fixed::Checked;
-using fixed::Findings;
 using fixed::Fixed;
+using fixed::OverflowLog;
 using numbers::Real;
 
 constexpr double kTurn = 2.0 * std::numbers::pi;
@@ -142,9 +142,9 @@ TEST(Feedforward, WithStructuralDampingTheLeadCreepsAsTheSpringDoes) {
   Feedforward::State<Fixed> state;
   Feedforward::State<Checked> state_checked;
   Feedforward::State<Real> state_real;
-  Findings::clear();
+  OverflowLog::clear();
   const double load = 1.2;
-  const fixed::Angle level{std::llround(3.25 * 0x1p32)};  // where gravity is nought
+  const fixed::Angle level{std::llround(3.25 * 0x1p32)};  // where gravity is zero
   double lead = 0.0;
   for (int k = 1; k <= 160'000; ++k) {
     const auto out = Feedforward::update<Fixed>(state, c, model, {level, {}, {}}, {{}, {}, Fixed::value(load / 40.0)});
@@ -158,7 +158,7 @@ TEST(Feedforward, WithStructuralDampingTheLeadCreepsAsTheSpringDoes) {
     ASSERT_NEAR(turns(out.lead), out_real.lead, 5e-7) << k;
     ASSERT_EQ(out.lead.raw, out_checked.lead.raw);
   }
-  EXPECT_EQ(Findings::count(), 0) << Findings::first();
+  EXPECT_EQ(OverflowLog::count(), 0) << OverflowLog::first();
   // Ten seconds later some of it is still to come.
   EXPECT_LT(lead, 0.97 * kGear * load / kStiffness / kTurn);
 }
@@ -174,7 +174,7 @@ TEST(Feedforward, OnADriveAgreesWithDouble) {
   Feedforward::State<Checked> s_checked;
   Feedforward::State<Real> s_real;
   std::mt19937_64 random(9);
-  Findings::clear();
+  OverflowLog::clear();
   double worst = 0.0, worst_lead = 0.0, worst_velocity = 0.0;
   Point p{};
   for (int k = 0; k < 100'000; ++k) {
@@ -201,7 +201,7 @@ TEST(Feedforward, OnADriveAgreesWithDouble) {
     worst_lead = std::max(worst_lead, std::abs(turns(out.lead) - expected.lead));
     worst_velocity = std::max(worst_velocity, std::abs(real(out.velocity) - expected.velocity));
   }
-  EXPECT_EQ(Findings::count(), 0) << Findings::first();
+  EXPECT_EQ(OverflowLog::count(), 0) << OverflowLog::first();
   EXPECT_LT(worst, 2e-7);
   EXPECT_LT(worst_lead, 1e-7);
   EXPECT_LT(worst_velocity, 5e-5);

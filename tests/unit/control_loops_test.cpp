@@ -11,7 +11,7 @@
 #include "host/numbers/real.hpp"
 #include "shared/control/loops.hpp"
 #include "shared/fixed/checked.hpp"
-#include "shared/fixed/findings.hpp"
+#include "shared/fixed/overflow_log.hpp"
 
 namespace flexspline::tests {
 namespace {
@@ -20,8 +20,8 @@ using control::Loops;
 using control::LoopSetup;
 using control::Mode;
 using fixed::Checked;
-using fixed::Findings;
 using fixed::Fixed;
+using fixed::OverflowLog;
 using numbers::Real;
 
 constexpr double kTurn = 2.0 * std::numbers::pi;
@@ -208,7 +208,7 @@ TEST(Loops, ClosingALoopAndChangingTheModeMakeNoStepOfTheTorque) {
   Loops::State<Fixed> s;
   const auto velocity = Fixed::value(0.2);
   const fixed::Angle angle{12345};
-  // Closed on a turning shaft: from nought.
+  // Closed on a turning shaft: from zero.
   auto out = Loops::update(s, c, velocity_command(42.0), angle, velocity);
   EXPECT_NEAR(real(out.torque), 0.0, 1e-8);
   // Torque mode gives what it is told; then back.
@@ -221,7 +221,7 @@ TEST(Loops, ClosingALoopAndChangingTheModeMakeNoStepOfTheTorque) {
   out = Loops::update(s, c, {Mode::position, {12345 + 1'000'000}, velocity, {}}, angle, velocity);
   EXPECT_NEAR(real(out.torque), before, 1e-8);
   EXPECT_GT(before, 0.3);
-  // Off is nought at once, and nothing is left over.
+  // Off is zero at once, and nothing is left over.
   out = Loops::update(s, c, {}, angle, velocity);
   EXPECT_EQ(out.torque.raw, 0);
   EXPECT_EQ(out.current.raw, 0);
@@ -284,7 +284,7 @@ TEST(Loops, HoldAllLimitsForAHundredThousandAdversarialTicksAndAgreeWithTheirEqu
   Loops::State<Fixed> s_fixed;
   Loops::State<Real> s_real;
   Equations equations;
-  Findings::clear();
+  OverflowLog::clear();
   double worst = 0.0, worst_real = 0.0, largest = 0.0;
   int inside = 0;
   const auto signal = [&] { return static_cast<std::int32_t>(random()) >> (random() % 32); };
@@ -311,7 +311,7 @@ TEST(Loops, HoldAllLimitsForAHundredThousandAdversarialTicksAndAgreeWithTheirEqu
     largest = std::max(largest, std::abs(real(out.torque)));
     if (mode != Mode::off && !out.limited) ++inside;
   }
-  EXPECT_EQ(Findings::count(), 0) << Findings::first();
+  EXPECT_EQ(OverflowLog::count(), 0) << OverflowLog::first();
   EXPECT_LT(worst, 3e-7);
   EXPECT_LT(worst_real, 1e-12);
   EXPECT_NEAR(largest, kTorqueLimit, 1e-8);
@@ -320,9 +320,9 @@ TEST(Loops, HoldAllLimitsForAHundredThousandAdversarialTicksAndAgreeWithTheirEqu
 
 TEST(Loops, TellGainsAndLimitsThatDoNotFit) {
   const auto found = [](LoopSetup<double> s) {
-    Findings::clear();
+    OverflowLog::clear();
     loops<Fixed>(s);
-    return Findings::count() > 0;
+    return OverflowLog::count() > 0;
   };
   EXPECT_FALSE(found(setup()));
   auto s = setup();

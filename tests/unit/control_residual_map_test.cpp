@@ -11,13 +11,13 @@
 
 #include "host/numbers/real.hpp"
 #include "shared/control/residual_map.hpp"
-#include "shared/fixed/findings.hpp"
+#include "shared/fixed/overflow_log.hpp"
 
 namespace flexspline::tests {
 namespace {
 
 using control::ResidualMap;
-using fixed::Findings;
+using fixed::OverflowLog;
 
 effects::DriveConstants<double> drive() {
   effects::DriveConstants<double> d;
@@ -171,14 +171,14 @@ TEST(ResidualMap, ResetEmptiesItAndEveryChangeShowsInItsVersion) {
 }
 
 TEST(ResidualMap, TellsSetupsThatDoNotFit) {
-  Findings::clear();
+  OverflowLog::clear();
   made();
-  EXPECT_EQ(Findings::count(), 0);
+  EXPECT_EQ(OverflowLog::count(), 0);
   made(0.0);
-  EXPECT_GT(Findings::count(), 0);
-  Findings::clear();
+  EXPECT_GT(OverflowLog::count(), 0);
+  OverflowLog::clear();
   made(1e-6);
-  EXPECT_GT(Findings::count(), 0);
+  EXPECT_GT(OverflowLog::count(), 0);
 }
 
 }  // namespace

@@ -17,8 +17,8 @@ namespace {
 using control::Stream;
 using control::Trajectory;
 using fixed::Checked;
-using fixed::Findings;
 using fixed::Fixed;
+using fixed::OverflowLog;
 using numbers::Real;
 
 constexpr double kTurn = 2.0 * std::numbers::pi;
@@ -84,7 +84,7 @@ TEST(Stream, AHostAtAThousandthOfASecondGivesASineWithoutSteps) {
 TEST(Stream, KeepsToTheLimitsWhateverTheHostSays) {
   const auto c = Stream::derive(drive());
   const auto l = limits<Checked>(5.0);
-  Findings::clear();
+  OverflowLog::clear();
   std::mt19937_64 random(11);
   for (int i = 0; i < 300; ++i) {
     const auto any = [&] { return fixed::Value{static_cast<std::int32_t>(random())}; };
@@ -96,7 +96,7 @@ TEST(Stream, KeepsToTheLimitsWhateverTheHostSays) {
       ASSERT_LE(std::abs(std::ldexp(point.acceleration.raw, -27)), 4000.1 / 5000.0);
     }
   }
-  EXPECT_EQ(Findings::count(), 0) << Findings::first();
+  EXPECT_EQ(OverflowLog::count(), 0) << OverflowLog::first();
 }
 
 TEST(Stream, OnADriveAgreesWithDouble) {

@@ -13,7 +13,7 @@
 #include "shared/control/limits.hpp"
 #include "shared/control/trajectory.hpp"
 #include "shared/fixed/checked.hpp"
-#include "shared/fixed/findings.hpp"
+#include "shared/fixed/overflow_log.hpp"
 
 namespace flexspline::tests {
 namespace {
@@ -22,8 +22,8 @@ using control::RateLimiter;
 using control::Trajectory;
 using control::TrajectorySetup;
 using fixed::Checked;
-using fixed::Findings;
 using fixed::Fixed;
+using fixed::OverflowLog;
 using numbers::Real;
 
 constexpr double kTurn = 2.0 * std::numbers::pi;
@@ -45,7 +45,7 @@ Trajectory::Coefficients<N> limits(double velocity, double acceleration, double 
   setup.lowest = -setup.highest;
   return Trajectory::derive<N>(setup, drive());
 }
-// Position with its fraction, 2^-48 turns from nought; here below 8192 turns.
+// Position with its fraction, 2^-48 turns from zero; here below 8192 turns.
 std::int64_t fine(const Trajectory::State& s) {
   return static_cast<std::int64_t>(s.position) * 65536 + s.fraction;
 }
@@ -193,7 +193,7 @@ TEST(Trajectory, OnADriveAgreesWithDouble) {
   const auto c_real = limits<Real>(150.0, 3500.0);
   const auto c_checked = limits<Checked>(150.0, 3500.0);
   Trajectory::State s = Trajectory::at(0), s_real = s, s_checked = s;
-  Findings::clear();
+  OverflowLog::clear();
   double worst = 0.0, fastest = 0.0;
   for (int k = 0; k < 50'000; ++k) {
     const std::int64_t target = (k / 7000) % 2 == 0 ? 9 * kOneTurn + 5 : -3 * kOneTurn;
@@ -207,20 +207,20 @@ TEST(Trajectory, OnADriveAgreesWithDouble) {
         {worst, std::abs(real(set.velocity) - exact.velocity), std::abs(real(set.acceleration) - exact.acceleration)});
     fastest = std::max(fastest, exact.velocity);
   }
-  EXPECT_EQ(Findings::count(), 0) << Findings::first();
+  EXPECT_EQ(OverflowLog::count(), 0) << OverflowLog::first();
   EXPECT_LT(worst, 1e-8);
   EXPECT_GT(fastest, 0.74);
 }
 
 TEST(Trajectory, TellsLimitsThatItCannotKeepTo) {
   for (const auto& [velocity, acceleration] : {std::pair{100.0, 1e-9}, {0.0, 100.0}, {100.0, 0.1}, {1e6, 1e6}}) {
-    Findings::clear();
+    OverflowLog::clear();
     limits(velocity, acceleration);
-    EXPECT_EQ(Findings::count(), 1) << velocity << " " << acceleration;
+    EXPECT_EQ(OverflowLog::count(), 1) << velocity << " " << acceleration;
   }
-  Findings::clear();
+  OverflowLog::clear();
   limits(100.0, 1.0);
-  EXPECT_EQ(Findings::count(), 0);
+  EXPECT_EQ(OverflowLog::count(), 0);
 }
 
 TEST(RateLimiter, KeepsItsLimitsForAHundredThousandAdversarialInputsAndArrivesExactly) {
@@ -230,7 +230,7 @@ TEST(RateLimiter, KeepsItsLimitsForAHundredThousandAdversarialInputsAndArrivesEx
     const auto c_real = RateLimiter::derive<Real>(1.5, rate / kTickS, 1.0, kTickS);
     RateLimiter::State<Checked> s;
     RateLimiter::State<Real> s_real;
-    Findings::clear();
+    OverflowLog::clear();
     double before = 0.0, worst = 0.0;
     fixed::Value last{};
     for (int k = 0; k < 100'000; ++k) {
@@ -243,7 +243,7 @@ TEST(RateLimiter, KeepsItsLimitsForAHundredThousandAdversarialInputsAndArrivesEx
       worst = std::max(worst, std::abs(now - exact));
       before = now;
     }
-    EXPECT_EQ(Findings::count(), 0) << Findings::first();
+    EXPECT_EQ(OverflowLog::count(), 0) << OverflowLog::first();
     EXPECT_LT(worst, 5e-9) << rate;
   }
   const auto c = RateLimiter::derive<Fixed>(1.5, 0.1 / kTickS, 1.0, kTickS);

@@ -241,7 +241,7 @@ TEST(Csv, NumbersAreReadToTheLastBitHoweverTheyAreWritten) {
   const std::vector<double>& read = data.experiments.at(0)[Column::current];
   ASSERT_EQ(read.size(), written.size());
   for (std::size_t k = 0; k < written.size(); ++k) {
-    const double expected = std::strtod(written[k].c_str(), nullptr) + 0.0;  // a nought has no sign
+    const double expected = std::strtod(written[k].c_str(), nullptr) + 0.0;  // a zero has no sign
     ASSERT_EQ(std::bit_cast<std::uint64_t>(read[k]), std::bit_cast<std::uint64_t>(expected)) << written[k];
   }
 }

@@ -37,7 +37,7 @@ TEST(LineOrder, RepeatedAndSwappedLinesAreErrorsThatNameTheOptionAndToleratedThe
   ASSERT_EQ(warnings.size(), 1u);
   EXPECT_EQ(warnings[0].severity, Severity::warning);
   EXPECT_NE(warnings[0].what.find("1 lines repeat"), std::string::npos) << warnings[0].what;
-  EXPECT_NE(warnings[0].what.find("1 stand out of order"), std::string::npos) << warnings[0].what;
+  EXPECT_NE(warnings[0].what.find("1 are out of order"), std::string::npos) << warnings[0].what;
 }
 
 TEST(LineOrder, LinesOfOneTimeThatDifferCannotBeTolerated) {

@@ -226,7 +226,7 @@ TEST(Mat, FilesThatAreNoMatFileOfTheseVersionsAreRefusedByWhatTheyAre) {
   expect_error(folder.path() / "scalars.mat", "header", {"no vector", "\"gear_ratio\" is a single number", "save("});
 }
 
-TEST(Mat, AMatFileOfAnyNameIsToldByItsFirstBytes) {
+TEST(Mat, AMatFileOfAnyNameIsRecognizedByItsFirstBytes) {
   const TestFolder folder;
   fs::copy_file(kFixtures / "scipy_plain.mat", folder.path() / "recording.dat");
   EXPECT_EQ(load({folder.path() / "recording.dat"}).experiments.at(0).size(), 100u);

@@ -92,7 +92,7 @@ TEST(TextFiles, DatesAndTimesOfDayBecomeSecondsSinceTheFirst) {
   }
   // No year of a recording.
   const TestFolder far;
-  EXPECT_NE(errors_text(far.write("far.csv", "time_s,current_a\n9999-01-01T00:00:00,1\n")).find("is no number"),
+  EXPECT_NE(errors_text(far.write("far.csv", "time_s,current_a\n9999-01-01T00:00:00,1\n")).find("is not a number"),
             std::string::npos);
   // Over midnight.
   const TestFolder folder;

@@ -203,7 +203,7 @@ TEST_F(Block, EachFieldOfTheHeaderIsJudged) {
     refused(with(good(), at + 4, std::int32_t{101}), BlockFault::wrong_base, "exponent");
     refused(with(good(), at + 4, std::int32_t{-101}), BlockFault::wrong_base, "exponent");
     const Read negative = read(with(good(), at, -(std::int32_t{1} << 29)));
-    // A reference temperature alone may be below nought.
+    // A reference temperature alone may be below zero.
     EXPECT_EQ(negative.verdict.fault, base == 3 ? BlockFault::none : BlockFault::wrong_base) << base;
     if (base != 3) {
       EXPECT_EQ(negative.verdict.field, static_cast<int>(4 + base));
@@ -224,7 +224,7 @@ TEST_F(Block, EachEntryAndCoefficientIsJudged) {
   refused(with(good(), at, std::uint16_t{38}), BlockFault::missing_effect, "an effect that no drive can run");
   refused(with(good(), at, std::uint16_t{2}), BlockFault::too_often, "viscous friction twice");
   refused(with(good(), at, std::uint16_t{0x1FE}), BlockFault::unknown_entry, "a section that is none");
-  refused(with(good(), at + 2, std::uint16_t{1}), BlockFault::unknown_entry, "what has to be nought");
+  refused(with(good(), at + 2, std::uint16_t{1}), BlockFault::unknown_entry, "what has to be zero");
   refused(with(good(), at + 4, std::uint32_t{1} << 20), BlockFault::entry_cut_off, "length");
   refused(with(good(), at, std::uint16_t{10}), BlockFault::entry_of_wrong_length, "too short for that effect");
   refused(with(good(), at + 8, INT32_MIN), BlockFault::wrong_coefficient, "a weight without a magnitude");
@@ -236,7 +236,7 @@ TEST_F(Block, EachEntryAndCoefficientIsJudged) {
   refused(with(good(), ratio, (std::int32_t{1} << 30) + 1), BlockFault::wrong_coefficient, "not normal");
   refused(with(good(), ratio + 4, std::int32_t{61}), BlockFault::wrong_coefficient, "exponent");
   refused(with(good(), ratio + 4, std::int32_t{-41}), BlockFault::wrong_coefficient, "exponent");
-  refused(with(good(), ratio, std::int32_t{0}), BlockFault::wrong_coefficient, "nought has no exponent");
+  refused(with(good(), ratio, std::int32_t{0}), BlockFault::wrong_coefficient, "zero has no exponent");
   const BlockVerdict v = read(with(good(), ratio, std::int32_t{1})).verdict;
   EXPECT_EQ(v.entry, 3);
   EXPECT_EQ(v.field, 2);

@@ -144,7 +144,7 @@ TEST(ErrorProof, SaysWhyThereIsNone) {
   m = drive_with({"torque_proportional_hysteresis"});
   EXPECT_EQ(unproven(proof_of(m), "torque_proportional_hysteresis"), "");
   m.effects[0].parameters[0].value = 0.0;
-  EXPECT_NE(unproven(proof_of(m), "torque_proportional_hysteresis").find("nought"), std::string::npos);
+  EXPECT_NE(unproven(proof_of(m), "torque_proportional_hysteresis").find("zero"), std::string::npos);
 }
 
 // What a constant adds to a torsion is the same in each tick; what a wave or a dead zone adds is not.

@@ -5,7 +5,7 @@
 #include <string>
 
 #include "host/catalogue/constants.hpp"
-#include "host/catalogue/defined.hpp"
+#include "host/catalogue/user_defined_effect.hpp"
 #include "host/deployment/bases.hpp"
 #include "host/deployment/fold.hpp"
 #include "host/deployment/pack.hpp"

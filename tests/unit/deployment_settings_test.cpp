@@ -132,18 +132,18 @@ TEST(DriveSettings, ThatAreWrongAreRefusedWithTheirPlace) {
   EXPECT_EQ(error_of(kCounts), "none");
   expect(error_of(""), {"d.toml", "counts", "[motor_encoder]"});
   expect(error_of(kCounts + "[limits]\ncurrent_a = 4.5\n"), {"d.toml:5:", "[limits] current_a is 4.5", "at most 4"});
-  expect(error_of(kCounts + "[limits]\ncurrent_a = 0\n"), {"d.toml:5:", "above nought"});
+  expect(error_of(kCounts + "[limits]\ncurrent_a = 0\n"), {"d.toml:5:", "above zero"});
   expect(error_of(kCounts + "[limits]\ncurrent_a = nan\n"), {"d.toml:5:"});
   expect(error_of(kCounts + "[limits]\ncurrent_a = \"1\"\n"), {"d.toml:5:", "has to be a number", "text"});
-  expect(error_of(kCounts + "[limits]\ncurrent = 1\n"), {"d.toml:5:", "[limits] current is no setting", "current_a"});
-  expect(error_of(kCounts + "[limit]\ncurrent_a = 1\n"), {"d.toml:4:", "[limit] is no table", "limits"});
+  expect(error_of(kCounts + "[limits]\ncurrent = 1\n"),
+         {"d.toml:5:", "[limits] current is not a setting", "current_a"});
+  expect(error_of(kCounts + "[limit]\ncurrent_a = 1\n"), {"d.toml:4:", "[limit] is not a table", "limits"});
   expect(error_of("limits = 3\n" + kCounts), {"d.toml:2:", "limits has to be a table"});
   expect(error_of("[motor_encoder]\ncounts = 4096.5\n"), {"d.toml:3:", "no whole number"});
   expect(error_of("[motor_encoder]\ncounts = 3\n"), {"d.toml:3:", "between 4 and"});
   expect(error_of(kCounts + "[output_encoder]\n"), {"[output_encoder] needs counts"});
   expect(error_of(kCounts + "[excitation]\nshape = \"round\"\n"), {"d.toml:5:", "round", "multi_sine"});
-  expect(error_of(kCounts + "[faults]\nfollowing_error_rad = 0\n"),
-         {"d.toml:5:", "following_error_rad", "above nought"});
+  expect(error_of(kCounts + "[faults]\nfollowing_error_rad = 0\n"), {"d.toml:5:", "following_error_rad", "above zero"});
   expect(error_of(kCounts + "[faults]\nfollowing_s = 4\n"), {"d.toml:5:", "following_s is 4", "at most 3"});
   expect(error_of(kCounts + "[faults]\noutput_stuck_rad = -1\n"), {"d.toml:5:", "output_stuck_rad"});
   expect(error_of("[motor_encoder\n"), {"d.toml:2:"});

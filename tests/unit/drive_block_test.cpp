@@ -198,7 +198,7 @@ TEST_F(DriveBlock, EachFieldIsRefusedBeyondEachOfItsBounds) {
           refused(with(bytes, at, (std::int64_t{1} << 30) + 1, 4), kind, field, what + ": not normal");
           refused(with(with(bytes, at, std::int64_t{1} << 30, 4), at + 4, e.low - 1, 4), kind, field, what);
           refused(with(with(bytes, at, std::int64_t{1} << 30, 4), at + 4, e.high + 1, 4), kind, field, what);
-          refused(with(with(bytes, at, 0, 4), at + 4, 1, 4), kind, field, what + ": nought with an exponent");
+          refused(with(with(bytes, at, 0, 4), at + 4, 1, 4), kind, field, what + ": zero with an exponent");
           at += 8;
           continue;
         }

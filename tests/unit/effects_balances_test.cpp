@@ -203,7 +203,7 @@ TEST(TemperatureCoulomb, ScalesCoulombFrictionAndTheBristlesThatStandForIt) {
     Inputs<Real> before, now;
     before.viscous_scale = before.coulomb_scale = now.viscous_scale = now.coulomb_scale = 1.0;
     now.angle = 0.03;
-    now.velocity = now.speed = 1e-9;  // so slow that damping and viscous friction are nought
+    now.velocity = now.speed = 1e-9;  // so slow that damping and viscous friction are zero
     now.direction = 1.0;
     now.temperature = temperature;
     make("temperature_coulomb", {b})->modulate(now);

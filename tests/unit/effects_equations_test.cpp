@@ -226,7 +226,7 @@ TEST_P(EveryEffect, IsProportionalToItsLinearParameters) {
 }
 
 // At rest static friction is the simulator's to solve: no effect may push by a sign that is not there.
-TEST(FrictionEffects, ResistMotionAndAreNoughtAtRest) {
+TEST(FrictionEffects, ResistMotionAndAreZeroAtRest) {
   std::mt19937 random(9);
   const Record record = random_record(random);
   for (const char* name : {"viscous_friction", "coulomb_friction", "stribeck_gaussian", "stribeck_hess_soom",

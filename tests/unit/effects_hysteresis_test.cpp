@@ -117,7 +117,7 @@ TEST(DahlHysteresis, OfExponentTwoIsTheModifiedOne) {
                torque_of("modified_dahl_hysteresis", {2.0, 5000.0}, inputs), 1e-12);
 }
 
-TEST(DahlHysteresis, OfExponentOneIsDuhemThatIsDrawnToNought) {
+TEST(DahlHysteresis, OfExponentOneIsDuhemThatIsDrawnToZero) {
   const auto inputs = along_path(wild_path());
   // T' = b v - a abs(v) T: sigma = b, Tc = b/a.
   expect_equal(torque_of("dahl_hysteresis", {2.0, 5000.0, 1.0}, inputs),
@@ -140,7 +140,7 @@ TEST(LugreFriction, WithoutStribeckAndDampingIsDahlFriction) {
                torque_of("lugre_friction", {0.045, 0.045, 3.0, 0.045 / 0.05, 0.0}, inputs), 1e-12);
 }
 
-// In steady sliding z' is nought: what is left is g(w), whatever the damping.
+// In steady sliding z' is zero: what is left is g(w), whatever the damping.
 TEST(LugreFriction, SlidesWithCoulombAndStribeckFriction) {
   for (const double velocity : {-40.0, -2.0, 0.5, 3.0}) {
     std::vector<Inputs<Real>> inputs(400);
@@ -187,7 +187,7 @@ TEST(GearHysteresis, PreisachAndPrandtlIshlinskiiForgetASmallLoopThatIsClosed) {
       ASSERT_NEAR(a[a.size() - 1 - k], b[b.size() - 1 - k], 1e-12 * largest(a))
           << law << ", " << k << " before the end";
   }
-  // Of Dahl's law the small loop is not forgotten: it is how one tells them apart.
+  // Of Dahl's law the small loop is not forgotten: it is how one distinguishes them.
   const Values a = torque_of("dahl_hysteresis", {2.0, 5000.0, 1.0}, along_path(direct));
   const Values b = torque_of("dahl_hysteresis", {2.0, 5000.0, 1.0}, along_path(detour));
   EXPECT_GT(std::abs(a.back() - b.back()), 1e-3);

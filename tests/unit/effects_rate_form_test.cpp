@@ -26,7 +26,7 @@ double s(double x) {
   return x > 0.0 ? 1.0 : x < 0.0 ? -1.0 : 0.0;
 }
 
-// A motion of which every derivative is known: the sum of two sines, at nought at the beginning.
+// A motion of which every derivative is known: the sum of two sines, at zero at the beginning.
 struct TwoSines {
   double size, slow, fast;
   double at(double t) const { return size * (std::sin(slow * t) + 0.6 * std::sin(fast * t)); }
@@ -219,7 +219,7 @@ TEST(CurrentDelay, DelaysASmoothCurrentWithinItsStatedPhaseError) {
   }
 }
 
-TEST(CurrentDelay, OfASteadyCurrentIsNoughtWhateverTheRecordBeginsWith) {
+TEST(CurrentDelay, OfASteadyCurrentIsZeroWhateverTheRecordBeginsWith) {
   const Entry& entry = catalogue::get("current_delay");
   const double delay = 1e-3;
   std::vector<Inputs<Real>> inputs(100);

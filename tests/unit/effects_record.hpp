@@ -45,7 +45,7 @@ inline Record random_record(std::mt19937& random) {
   Record record;
   double angle = 40.0 * unit(random);
   // Laws with memory follow the torsion and the current from sample to sample, so these are smooth; they reverse often,
-  // stop now and then, and begin at nought.
+  // stop now and then, and begin at zero.
   const double cycles = 0.8 + 0.2 * unit(random);
   std::size_t moved = 0;
   for (std::size_t k = 0; k < kSamples; ++k) {
@@ -126,7 +126,7 @@ std::vector<Inputs<N>> inputs_of(const Record& record, const DriveConstants<doub
 }
 
 template <class N>
-const catalogue::Along<N>& along(const Entry& entry) {
+const catalogue::BlockFunctions<N>& along(const Entry& entry) {
   if constexpr (std::is_same_v<N, Dual>)
     return entry.dual;
   else

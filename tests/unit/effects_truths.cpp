@@ -122,7 +122,7 @@ Values masing(const Record& record, const std::function<double(double)>& virgin)
       const double before = (n == 3 ? 2.0 : 1.0) * std::abs(points[n - 2] - points[n - 3]);
       forgets = branch >= before;
       if (!forgets) break;
-      // The virgin curve begins at nought, which is no turning point.
+      // The virgin curve begins at zero, which is no turning point.
       points.erase(points.end() - (n == 3 ? 2 : 3), points.end() - 1);
     }
     double torque = 0.0;

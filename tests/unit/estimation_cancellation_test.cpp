@@ -42,7 +42,7 @@ int asked_until(int last) {
   const CancellationCheck ask = [&] {
     if (++count == last) throw Enough{};
   };
-  const CancellationScope may_give_up(&ask);
+  const CancellationScope scope(&ask);
   const auto add = [] { selection::add(a_case().dataset, a_case().model, "stribeck_gaussian", {}); };
   if (last == 0) {
     add();

@@ -355,7 +355,7 @@ TEST(Identify, IntervalsOfExactDataAreAsWideAsWhatFiltersLeave) {
   }
 }
 
-// Friction that jumps at the reversal has no presliding that could be told from zero.
+// Friction that jumps at the reversal has no presliding that could be distinguished from zero.
 TEST(Identify, AnIntervalOfALengthThatStoppedAtTheShortEndBeginsAtZero) {
   const auto found = identify(dataset_of({experiment("a", {{3.0, 1.0, 0.3}, {0.3, 3.1, 1.0}}, plain)}),
                               model_of({"inertia", "viscous_friction", "dahl_friction"}), kOptions);

@@ -88,14 +88,14 @@ TEST(FrictionGroups, KnowWhatDoesNotVaryWithTheFriction) {
   const auto place = [&](std::string_view name) { return lugre.entry->index_of(name); };
   lugre.values[place("stiffness")] = 9.0;
   const Terms terms = {lugre};
-  const std::vector<Slot> shapes = {{0, place("static")}, {0, place("velocity")}, {0, place("stiffness")}};
-  const std::vector<FrictionGroup> groups = friction_groups(terms, {{0, place("coulomb")}}, shapes);
+  const std::vector<ParameterRef> nonlinear = {{0, place("static")}, {0, place("velocity")}, {0, place("stiffness")}};
+  const std::vector<FrictionGroup> groups = friction_groups(terms, {{0, place("coulomb")}}, nonlinear);
   ASSERT_EQ(groups.size(), 1u);
   // Static friction is a share of the Coulomb friction, the velocity no torque; the contacts' stiffness stays.
-  ASSERT_EQ(groups[0].stays.size(), 1u);
-  EXPECT_EQ(groups[0].stays[0].shape, 2);
-  EXPECT_EQ(groups[0].stays[0].ratio, 9.0);
-  EXPECT_TRUE(friction_groups(terms, {{0, place("coulomb")}})[0].stays.empty());
+  ASSERT_EQ(groups[0].ratio_parameters.size(), 1u);
+  EXPECT_EQ(groups[0].ratio_parameters[0].nonlinear_ref, 2);
+  EXPECT_EQ(groups[0].ratio_parameters[0].ratio, 9.0);
+  EXPECT_TRUE(friction_groups(terms, {{0, place("coulomb")}})[0].ratio_parameters.empty());
 }
 
 }  // namespace

@@ -137,7 +137,7 @@ TEST(FitRandomEffects, RowsThatAreAlikeCountForLess) {
 TEST(FrictionGroups, LawsOfTheSameSurfaceAreOne) {
   const auto term = [](const char* name) { return candidate_term(catalogue::get(name)); };
   const Terms terms{term("inertia"), term("viscous_friction"), term("coulomb_friction"), term("gravity")};
-  const std::vector<FrictionGroup> groups = friction_groups(terms, free_linear_slots(terms, {0, 1, 2, 3}));
+  const std::vector<FrictionGroup> groups = friction_groups(terms, free_linear_parameters(terms, {0, 1, 2, 3}));
   ASSERT_EQ(groups.size(), 2u);
   EXPECT_EQ(groups[0].name, "viscous friction");
   EXPECT_EQ(groups[0].columns, std::vector<Eigen::Index>{1});

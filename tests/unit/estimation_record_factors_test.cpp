@@ -21,7 +21,7 @@ constexpr std::size_t kParts = 5;
 // Two records whose rows are taken for a regression with columns that are drawn, and a few rows that do not count.
 struct Bench {
   std::vector<data::Experiment> experiments{record(0.7, 3000), record(1.3, 2000)};
-  Prepared prepared = prepare({&experiments[0], &experiments[1]}, {}, {40.0, false});
+  PreparedData prepared = prepare({&experiments[0], &experiments[1]}, {}, {40.0, false});
   BalanceData data{prepared, Balance::motor};
   MatrixXd X = MatrixXd(data.rows(), 3);
   VectorXd y = VectorXd(data.rows()), keep = VectorXd::Ones(data.rows());

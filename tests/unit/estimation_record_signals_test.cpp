@@ -8,7 +8,7 @@
 #include <limits>
 #include <numbers>
 
-#include "host/catalogue/defined.hpp"
+#include "host/catalogue/user_defined_effect.hpp"
 #include "host/signals/differentiate.hpp"
 
 namespace flexspline::estimation {
@@ -53,10 +53,10 @@ TEST(RecordSignals, AreTheSameAloneInStretchesAndWithDirectionsThatAreKept) {
   RecordSignals s = two_segments(1500);
   const RecordSignals made = s;
   s.keep_directions();
-  s.all().each_stretch([&](std::size_t first, std::span<const Inputs> stretch) {
-    for (std::size_t k = 0; k < stretch.size(); ++k) {
+  s.all().each_block([&](std::size_t first, std::span<const Inputs> block) {
+    for (std::size_t k = 0; k < block.size(); ++k) {
       const Inputs alone = made[first + k];
-      ASSERT_EQ(std::memcmp(&alone, &stretch[k], sizeof alone), 0) << first + k;
+      ASSERT_EQ(std::memcmp(&alone, &block[k], sizeof alone), 0) << first + k;
       ASSERT_EQ(alone.direction, std::tanh(s.velocity[first + k] / 0.3));
       ASSERT_EQ(alone.torsion, s.angle[first + k] / 100.0 - s.output_angle[first + k]);
     }

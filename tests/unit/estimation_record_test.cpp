@@ -208,7 +208,7 @@ TEST(Prepare, SaysWhichColumnsAreMissing) {
 TEST(Prepare, ASlowRecordLeavesAFastOneHalfOfItsRows) {
   const data::Experiment slow = sine(400.0, 0.5, 8.0), fast = sine(2.0, 8.0, 8.0);
   EXPECT_LT(prepare({&slow}, {}, {}).pipeline.row_cutoff_hz, 10.0);
-  const Prepared both = prepare({&slow, &fast}, {}, {});
+  const PreparedData both = prepare({&slow, &fast}, {}, {});
   EXPECT_NEAR(both.pipeline.row_cutoff_hz, 96.0, 2.0) << both.pipeline.reason;
   const Rows& rows = both.records[1].rows[index(Balance::motor)];
   EXPECT_NEAR(static_cast<double>(rows.masked), static_cast<double>(rows.samples.size()),

@@ -71,15 +71,15 @@ TEST(Columns, OfTwoParametersByOneEvaluationAreThoseOfEachAlone) {
   int told = 0;
   for (const catalogue::Entry& entry : catalogue::all()) {
     const Terms terms{candidate_term(entry)};
-    std::vector<Slot> slots;
+    std::vector<ParameterRef> refs;
     for (std::size_t p = 0; p < entry.parameters.size(); ++p)
-      if (entry.parameters[p].kind == effects::Kind::linear) slots.push_back({0, p});
-    if (slots.size() < 2 || !terms[0].adds_torque()) continue;
+      if (entry.parameters[p].kind == effects::Kind::linear) refs.push_back({0, p});
+    if (refs.size() < 2 || !terms[0].adds_torque()) continue;
     BalanceData together(found->prepared, Balance::motor);
-    const Eigen::MatrixXd all = together.columns(terms, slots);
-    for (std::size_t j = 0; j < slots.size(); ++j) {
+    const Eigen::MatrixXd all = together.columns(terms, refs);
+    for (std::size_t j = 0; j < refs.size(); ++j) {
       BalanceData alone(found->prepared, Balance::motor);
-      const Eigen::VectorXd& column = alone.column(terms, slots[j]);
+      const Eigen::VectorXd& column = alone.column(terms, refs[j]);
       EXPECT_LE((all.col(static_cast<Eigen::Index>(j)) - column).norm(), 1e-13 * column.norm()) << entry.name() << j;
       told += column.norm() > 0.0 ? 1 : 0;
     }
@@ -121,23 +121,23 @@ TEST(ShapeSearch, RecoversTheExponentOfSublinearFrictionFromExactData) {
 }
 
 TEST(ShapeSearch, RangesMapToSharesAndBack) {
-  const ShapeRange linear{2.0, 10.0, false}, logarithmic{0.1, 10.0, true};
+  const ParameterRange linear{2.0, 10.0, false}, logarithmic{0.1, 10.0, true};
   EXPECT_DOUBLE_EQ(linear.at(0.25), 4.0);
   EXPECT_DOUBLE_EQ(linear.share(4.0), 0.25);
   EXPECT_NEAR(logarithmic.at(0.5), 1.0, 1e-12);
   EXPECT_NEAR(logarithmic.share(1.0), 0.5, 1e-12);
   EXPECT_EQ(linear.share(50.0), 1.0);
   EXPECT_EQ(logarithmic.share(0.0), 0.0);
-  const std::vector<double> grid = shape_grid(linear, 4);
+  const std::vector<double> grid = parameter_grid(linear, 4);
   EXPECT_EQ(grid, (std::vector<double>{3.0, 5.0, 7.0, 9.0}));
 }
 
 TEST(ShapeSearch, AStribeckVelocityEndsAtAQuarterOfTheFastMotion) {
   const data::Experiment e = experiment("fast", kFast, plain);
-  const Prepared prepared = prepare({&e}, {}, kOptions);
+  const PreparedData prepared = prepare({&e}, {}, kOptions);
   const BalanceData data(prepared, Balance::motor);
   const Term term = candidate_term(catalogue::get("stribeck_gaussian"));
-  const ShapeRange range = shape_range(data, term, 2);
+  const ParameterRange range = parameter_range(data, term, 2);
   std::vector<double> speeds;
   for (const std::size_t k : prepared.records[0].rows[0].samples) speeds.push_back(prepared.records[0].inputs[k].speed);
   std::sort(speeds.begin(), speeds.end());
@@ -149,11 +149,11 @@ TEST(ShapeSearch, AStribeckVelocityEndsAtAQuarterOfTheFastMotion) {
 
 TEST(BalanceRows, SlopeByAShapeIsTheDifferenceOfTorques) {
   const data::Experiment e = experiment("fast", kFast, plain);
-  const Prepared prepared = prepare({&e}, {}, kOptions);
+  const PreparedData prepared = prepare({&e}, {}, kOptions);
   BalanceData data(prepared, Balance::motor);
   Terms terms{candidate_term(catalogue::get("stribeck_gaussian"))};
   terms[0].values = {0.03, 0.02, 2.0};
-  const Eigen::VectorXd slope = data.shape_column(terms, {0}, {0, 2});
+  const Eigen::VectorXd slope = data.nonlinear_column(terms, {0}, {0, 2});
   constexpr double kStep = 1e-4;
   terms[0].values[2] = 2.0 + kStep;
   const Eigen::VectorXd above = data.term_torque(terms, 0);
@@ -165,7 +165,7 @@ TEST(BalanceRows, SlopeByAShapeIsTheDifferenceOfTorques) {
 
 TEST(BalanceRows, FoldsCutEachRecordIntoEqualPartsWithoutGapOrOverlap) {
   const data::Experiment a = experiment("a", kSlow, plain), b = experiment("b", kFast, plain, 3.0);
-  const Prepared prepared = prepare({&a, &b}, {}, kOptions);
+  const PreparedData prepared = prepare({&a, &b}, {}, kOptions);
   const BalanceData data(prepared, Balance::motor);
   const auto folds = data.folds(5);
   ASSERT_EQ(folds.size(), 5u);
@@ -191,11 +191,11 @@ TEST(BalanceRows, ColumnsMadeTogetherAreThoseMadeOneByOne) {
   const auto found = identify(d, m, kOptions);
   BalanceData together(found->prepared, Balance::motor), single(found->prepared, Balance::motor);
   const auto on_balance = terms_on(found->terms, Balance::motor, false);
-  const std::vector<Slot> slots = free_linear_slots(found->terms, on_balance);
-  ASSERT_EQ(slots.size(), 5U);
-  const Eigen::MatrixXd columns = together.columns(found->terms, slots);
-  for (std::size_t j = 0; j < slots.size(); ++j) {
-    const Eigen::VectorXd alone = single.column(found->terms, slots[j]);
+  const std::vector<ParameterRef> refs = free_linear_parameters(found->terms, on_balance);
+  ASSERT_EQ(refs.size(), 5U);
+  const Eigen::MatrixXd columns = together.columns(found->terms, refs);
+  for (std::size_t j = 0; j < refs.size(); ++j) {
+    const Eigen::VectorXd alone = single.column(found->terms, refs[j]);
     EXPECT_GT(alone.norm(), 0.0);
     EXPECT_LT((columns.col(static_cast<Eigen::Index>(j)) - alone).norm(), 1e-12 * alone.norm()) << j;
   }
@@ -209,13 +209,14 @@ TEST(BalanceRows, ColumnsFromFewerSamplesFollowThoseOfAll) {
   for (const double cutoff_hz : {40.0, 19.0}) {
     const auto found = identify(d, m, {cutoff_hz, true});
     BalanceData all(found->prepared, Balance::motor);
-    Prepared few;
+    PreparedData few;
     BalanceData decimated = all.decimated(few);
     EXPECT_LT(3 * few.records[0].inputs.size(), found->prepared.records[0].inputs.size() + 3);
     ASSERT_EQ(decimated.rows(), all.rows());
     EXPECT_EQ((decimated.target() - all.target()).norm(), 0.0);
-    const std::vector<Slot> slots = free_linear_slots(found->terms, terms_on(found->terms, Balance::motor, false));
-    const Eigen::MatrixXd a = all.columns(found->terms, slots), b = decimated.columns(found->terms, slots);
+    const std::vector<ParameterRef> refs =
+        free_linear_parameters(found->terms, terms_on(found->terms, Balance::motor, false));
+    const Eigen::MatrixXd a = all.columns(found->terms, refs), b = decimated.columns(found->terms, refs);
     for (Eigen::Index j = 0; j < a.cols(); ++j)
       EXPECT_LT((a.col(j) - b.col(j)).norm(), 0.02 * a.col(j).norm()) << cutoff_hz << " Hz, column " << j;
   }

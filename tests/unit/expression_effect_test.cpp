@@ -7,8 +7,8 @@
 #include <random>
 
 #include "host/catalogue/constants.hpp"
-#include "host/catalogue/defined.hpp"
 #include "host/catalogue/formula.hpp"
+#include "host/catalogue/user_defined_effect.hpp"
 #include "host/estimation/identify.hpp"
 #include "host/simulation/balances.hpp"
 

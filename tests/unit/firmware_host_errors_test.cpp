@@ -116,22 +116,22 @@ TEST(HostErrors, FlashMemoryIsNotErasedWhileTheShaftCoasts) {
 // A motor of 16384 counts passes 2^31 of them after 131,072 turns.
 TEST(HostErrors, NewParametersLeaveTheAngleWhereItIsHoweverOftenTheCounterWrapped) {
   Block block = demo_block();
-  board::SoftwareBrain brain;
-  brain.start(block, {.every = 1, .count = 1, .channels = {Channel::motor_turns}}, firmware::ResetCause::power);
-  firmware::LockStepDown down;
+  board::SoftwareController controller;
+  controller.start(block, {.every = 1, .count = 1, .channels = {Channel::motor_turns}}, firmware::ResetCause::power);
+  firmware::CoSimulationInput down;
   std::uint32_t turns = 0;
   const auto tick = [&](std::uint32_t counts) {
     down.readings.motor_counter += counts;
     ++down.readings.motor_samples, ++down.readings.output_samples, ++down.readings.analog_samples;
     down.readings.torque = static_cast<std::int16_t>(1 + down.readings.motor_samples % 2);
-    const firmware::LockStepUp up = brain.tick(down);
+    const firmware::CoSimulationOutput up = controller.tick(down);
     if (up.frame_words > 2) turns = up.frame[2];
     return up;
   };
   for (int k = 0; k < 100; ++k) tick(0);
   for (int k = 0; k < 150'000; ++k) tick(16384);
   ASSERT_EQ(turns, 150'000U);
-  brain.offer(block.bytes());
+  controller.offer(block.bytes());
   bool taken = false;
   for (int k = 0; k < 20; ++k) taken = tick(0).has_finding || taken;
   EXPECT_TRUE(taken);

@@ -40,10 +40,10 @@ TEST(FirmwareImage, WhatIsMadeIsRead) {
 TEST(FirmwareImage, EveryKindOfDamageIsNamed) {
   const Bytes good = make_image(program(), "board", {1, 0});
   EXPECT_TRUE(says(refusal({}), "empty"));
-  EXPECT_TRUE(says(refusal(program()), "no firmware image"));
+  EXPECT_TRUE(says(refusal(program()), "not a firmware image"));
   EXPECT_TRUE(says(refusal(Bytes(good.begin(), good.begin() + 100)), "truncated"));
   EXPECT_TRUE(
-      says(refusal(Bytes(good.begin(), good.end() - 1)), "truncated: it has 1511 bytes, and its header says 1512"));
+      says(refusal(Bytes(good.begin(), good.end() - 1)), "truncated: it has 1511 bytes, and its header states 1512"));
   Bytes longer = good;
   longer.push_back(0);
   EXPECT_TRUE(says(refusal(longer), "1 bytes behind the 1512"));

@@ -162,7 +162,7 @@ TEST(Modes, LimitsOfTorqueAndVelocityHoldWhateverTheHostSays) {
   const auto drive = idle_drive();
   const double most_current = demo_drive().current_limit_a;
   double current = 0.0, velocity = 0.0;
-  const auto try_out = [&](Command command) {
+  const auto run_closed_loop = [&](Command command) {
     ASSERT_EQ(drive->command(command).refusal, Refusal::none);
     for (int k = 0; k < 1000; ++k) {
       drive->post(as_set_point(command));
@@ -174,19 +174,19 @@ TEST(Modes, LimitsOfTorqueAndVelocityHoldWhateverTheHostSays) {
   for (const std::int32_t raw : {INT32_MAX, INT32_MIN, INT32_MIN + 1}) {
     Command c = arm_current(0.0);
     c.current.raw = raw;
-    try_out(c);
+    run_closed_loop(c);
     c = arm_velocity(0.0);
     c.velocity.raw = raw;
-    try_out(c);
+    run_closed_loop(c);
   }
   for (const std::int64_t raw : {INT64_MAX, INT64_MIN}) {
     Command c = arm_position(0.0);
     c.position.raw = raw;
-    try_out(c);
+    run_closed_loop(c);
     c.stream = true;
     c.velocity.raw = raw > 0 ? INT32_MAX : INT32_MIN;
     c.acceleration = c.velocity;
-    try_out(c);
+    run_closed_loop(c);
   }
   EXPECT_TRUE(is_armed(drive->status().mode));
   EXPECT_LE(current, most_current * 1.0001);

@@ -36,7 +36,7 @@ struct Bench {
   void run(int ticks) {
     for (int i = 0; i < ticks; ++i) {
       drive.tick();
-      link.turn(connected);
+      link.poll(connected);
     }
   }
   template <class Payload>

@@ -170,14 +170,14 @@ TEST(Watchdog, ResetsADriveWhoseTickOrBackgroundWorkHangsWhichThenSaysSo) {
 }
 
 TEST(Watchdog, ADriveThatWasResetByItsOwnCrashSaysSo) {
-  board::SoftwareBrain brain;
-  brain.start(demo_block(), {}, firmware::ResetCause::crash);
-  firmware::LockStepDown down;
-  firmware::LockStepUp up;
+  board::SoftwareController controller;
+  controller.start(demo_block(), {}, firmware::ResetCause::crash);
+  firmware::CoSimulationInput down;
+  firmware::CoSimulationOutput up;
   for (int k = 0; k < 100; ++k) {
     ++down.readings.motor_samples, ++down.readings.output_samples, ++down.readings.analog_samples;
     down.readings.torque = static_cast<std::int16_t>(1 + k % 2);
-    up = brain.tick(down);
+    up = controller.tick(down);
   }
   EXPECT_EQ(up.status.mode, Mode::fault);
   EXPECT_EQ(up.status.fault.fault, Fault::crashed);

@@ -24,7 +24,7 @@ TEST_P(EveryEffectOnADrive, AgreesWithDoubleAndCannotLeaveItsRange) {
     worst = std::max(worst, trial.worst);
     largest = std::max(largest, trial.largest);
     EXPECT_TRUE(trial.same_bits);
-    EXPECT_EQ(trial.findings, 0) << Findings::first();
+    EXPECT_EQ(trial.findings, 0) << OverflowLog::first();
     EXPECT_TRUE(trial.within_proof);
   }
   EXPECT_EQ(admissible, 4);
@@ -41,7 +41,7 @@ TEST(ProofOfABlock, RefusesWhatCouldLeaveItsRangeAndSaysWhy) {
   const DriveConstants<double> drive = random_drive(random);
   const auto reason_of = [&](std::string_view name, std::vector<double> parameters) {
     Models models;
-    EXPECT_TRUE(models.add_named(name, parameters, drive)) << Findings::first();
+    EXPECT_TRUE(models.add_named(name, parameters, drive)) << OverflowLog::first();
     const model::Proof proof = model::prove(models.intervals);
     EXPECT_FALSE(proof.holds);
     return std::string(proof.reason);
@@ -52,7 +52,7 @@ TEST(ProofOfABlock, RefusesWhatCouldLeaveItsRangeAndSaysWhy) {
   EXPECT_EQ(reason_of("torsion_zero", {14.5 * drive.torsion_base}), "a value may leave its range");
   Models models;
   EXPECT_FALSE(models.add_named("torque_bias", {20.0 * drive.torque_base}, drive));
-  EXPECT_EQ(Findings::first(), "a value is not below 16 bases");
+  EXPECT_EQ(OverflowLog::first(), "a value is not below 16 bases");
 }
 
 TEST(DriveModel, TakesAnEffectOnceAndARippleFourTimes) {

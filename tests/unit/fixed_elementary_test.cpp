@@ -69,7 +69,7 @@ TEST(FixedBits, ShiftsRoundToTheNearest) {
   EXPECT_EQ(fixed::shift_right(5, -3), 40);
   EXPECT_EQ(fixed::shift_right(-5, -3), -40);
   EXPECT_EQ(fixed::shift_right(INT64_MIN, 64), 0);
-  EXPECT_EQ(fixed::multiply_round(-3, std::int64_t{1} << 40, 41), -2);  // halves away from nought
+  EXPECT_EQ(fixed::multiply_round(-3, std::int64_t{1} << 40, 41), -2);  // halves away from zero
 }
 
 TEST(FixedElementary, DecayIsWithinItsErrorAndKeepsWhatTheSmallestTravelLoses) {
@@ -222,15 +222,15 @@ TEST(FixedElementary, SinesOfAWordAreWithinTheirError) {
 TEST(FixedElementary, WhatARelaxationLosesIsWithinItsErrorHoweverLittle) {
   long double worst = 0.0L, worst_of_itself = 0.0L;
   over(0, fixed::kLargestTravel, [&](std::uint64_t x) {
-    worst = std::max(worst, fabsl(real(fixed::lost_of(x), 63) + expm1l(-real(x, fixed::kTravelBits))));
+    worst = std::max(worst, fabsl(real(fixed::one_minus_exp(x), 63) + expm1l(-real(x, fixed::kTravelBits))));
   });
   over(std::uint64_t{1} << 27, fixed::kLn2 / 2, [&](std::uint64_t x) {
     const long double lost = -expm1l(-real(x, fixed::kTravelBits));
-    worst_of_itself = std::max(worst_of_itself, fabsl(real(fixed::lost_of(x), 63) - lost) / lost);
+    worst_of_itself = std::max(worst_of_itself, fabsl(real(fixed::one_minus_exp(x), 63) - lost) / lost);
   });
   EXPECT_LT(worst, 8e-9L);
   EXPECT_LT(worst_of_itself, 2e-8L);
-  EXPECT_EQ(fixed::lost_of(0), 0U);
+  EXPECT_EQ(fixed::one_minus_exp(0), 0U);
 }
 
 TEST(FixedSystem, AHarmonicIsItsTwoAmplitudesOverAMillionTurns) {

@@ -15,9 +15,9 @@ namespace flexspline::tests {
 namespace {
 
 using fixed::Checked;
-using fixed::Findings;
 using fixed::Fixed;
 using fixed::Intervals;
+using fixed::OverflowLog;
 
 const double kUnit = std::ldexp(1.0, -fixed::kValueBits);
 
@@ -59,16 +59,16 @@ TEST(FixedSystem, GainClampsItsInputSoThatNoSizeOfGainOverflows) {
 }
 
 TEST(FixedSystem, WhatDoesNotFitAFormatIsFoundWhenItIsMade) {
-  Findings::clear();
+  OverflowLog::clear();
   Fixed::value(15.9);
   Fixed::gain(1e6);
   Fixed::exponent(-7.9);
   Fixed::order(1000.0);
-  EXPECT_EQ(Findings::count(), 0);
+  EXPECT_EQ(OverflowLog::count(), 0);
   const auto is_found = [](auto&& make) {
-    Findings::clear();
+    OverflowLog::clear();
     make();
-    return Findings::count() == 1;
+    return OverflowLog::count() == 1;
   };
   EXPECT_TRUE(is_found([] { Fixed::value(16.0); }));
   EXPECT_TRUE(is_found([] { Fixed::value(std::nan("")); }));
@@ -190,9 +190,9 @@ TEST(CheckedSystem, FindsWhatLeavesItsRangeAndGivesTheSameBits) {
   const auto large = Checked::value(10.0);
   const Checked::State nine{{std::int64_t{9} << fixed::kStateBits}};
   const auto finds = [](auto&& compute) {
-    Findings::clear();
+    OverflowLog::clear();
     compute();
-    return Findings::count();
+    return OverflowLog::count();
   };
   EXPECT_EQ(finds([&] { static_cast<void>(Checked::value(5.0) + large); }), 0);
   EXPECT_EQ(finds([&] { static_cast<void>(large + large); }), 1);

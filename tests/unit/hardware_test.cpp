@@ -43,7 +43,7 @@ TEST(BoardHardware, ABlockOfOtherFullScalesOrSensorsIsRefused) {
   EXPECT_EQ(with([](Hardware& h) { h.output_encoder = control::SensorKind::none; }), kOther);
   EXPECT_EQ(with([](Hardware& h) { h.torque_sensor = control::SensorKind::none; }), kOther);
   auto cold = demo_setup();
-  cold.temperature.at_nought = 40.0;
+  cold.temperature.at_zero = 40.0;
   Hardware shifted = demo_hardware();
   EXPECT_EQ(finding(shifted, cold), kOther);
   shifted.temperature_at_zero_mc = 40'000;

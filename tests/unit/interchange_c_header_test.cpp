@@ -10,7 +10,7 @@
 #include <sstream>
 
 #include "host/catalogue/constants.hpp"
-#include "host/catalogue/defined.hpp"
+#include "host/catalogue/user_defined_effect.hpp"
 #include "host/interchange/export.hpp"
 #include "host/simulation/balances.hpp"
 

@@ -101,7 +101,7 @@ TEST(Distortion, OfASquareIsEvenAtThePredictedLevel) {
   EXPECT_LT(d.odd->level_db, d.even->level_db - 20.0);
 }
 
-TEST(Distortion, OfBothIsToldApart) {
+TEST(Distortion, OfBothIsDistinguished) {
   const auto lines = testing::multisine(kHighest, 0.1, 7);
   const Truth truth = truth_of(lines, 0.02, 0.3);
   const Distortion d = distortion_in(lines, 0.02, 0.3, 1e-4);
@@ -153,7 +153,7 @@ TEST(Distortion, OfASineIsThatOfItsHarmonics) {
   EXPECT_NEAR(d.odd->rms, 0.025 / std::sqrt(2.0), 1e-6);
 }
 
-TEST(Distortion, CannotBeToldApartWhereEvenLinesAreExcited) {
+TEST(Distortion, CannotBeDistinguishedWhereEvenLinesAreExcited) {
   const Distortion d = distortion_in(testing::multisine(kHighest, 0.1, 5, false), 0.1, 0.1, 1e-4);
   EXPECT_EQ(d.excitation, Excitation::kOther);
   EXPECT_FALSE(d.odd || d.even);

@@ -15,8 +15,8 @@ namespace flexspline::tests {
 namespace {
 
 using fixed::Checked;
-using fixed::Findings;
 using fixed::Fixed;
+using fixed::OverflowLog;
 using numbers::Real;
 using observers::DisturbanceObserver;
 using observers::EncoderAngle;
@@ -58,11 +58,11 @@ TEST(EncoderAngle, StartsWhereAnAbsoluteEncoderStands) {
 
 TEST(EncoderAngle, RefusesCountsThatNoEncoderHas) {
   for (const std::uint32_t counts : {0U, 3U, (1U << 24) + 1}) {
-    Findings::clear();
+    OverflowLog::clear();
     EncoderAngle::derive(counts);
-    EXPECT_EQ(Findings::count(), 1) << counts;
+    EXPECT_EQ(OverflowLog::count(), 1) << counts;
   }
-  Findings::clear();
+  OverflowLog::clear();
 }
 
 effects::DriveConstants<double> drive() {
@@ -112,7 +112,7 @@ TEST(DisturbanceObserver, OnADriveAgreesWithDoubleOverItsEnvelopeAndStaysWithinI
   DisturbanceObserver::State<Fixed> s;
   DisturbanceObserver::State<Checked> s_checked;
   DisturbanceObserver::State<Real> s_real;
-  Findings::clear();
+  OverflowLog::clear();
   std::mt19937_64 random(3);
   double worst = 0.0, largest = 0.0;
   double in[3] = {};
@@ -128,7 +128,7 @@ TEST(DisturbanceObserver, OnADriveAgreesWithDoubleOverItsEnvelopeAndStaysWithinI
     worst = std::max(worst, std::abs(real(d) - exact));
     largest = std::max(largest, std::abs(real(d)));
   }
-  EXPECT_EQ(Findings::count(), 0) << Findings::first();
+  EXPECT_EQ(OverflowLog::count(), 0) << OverflowLog::first();
   EXPECT_LT(worst, 3e-8);
   EXPECT_GT(largest, 1.0);
   EXPECT_LE(largest, 1.9 + 1e-8);

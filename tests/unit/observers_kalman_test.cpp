@@ -14,15 +14,15 @@
 
 #include "host/numbers/real.hpp"
 #include "shared/fixed/checked.hpp"
-#include "shared/fixed/findings.hpp"
+#include "shared/fixed/overflow_log.hpp"
 #include "shared/observers/encoder_kalman.hpp"
 
 namespace flexspline::tests {
 namespace {
 
 using fixed::Checked;
-using fixed::Findings;
 using fixed::Fixed;
+using fixed::OverflowLog;
 using numbers::Real;
 using observers::EncoderKalman;
 using observers::KalmanGains;
@@ -152,11 +152,11 @@ TEST(EncoderKalman, CornerAndJerkDensityAreTwoNamesOfOneSetup) {
 }
 
 TEST(EncoderKalman, ACornerAboveOneRadianATickIsFound) {
-  Findings::clear();
+  OverflowLog::clear();
   filter<Fixed>(0.99 / kTickS / kTurn);
-  EXPECT_EQ(Findings::count(), 0);
+  EXPECT_EQ(OverflowLog::count(), 0);
   filter<Fixed>(1.01 / kTickS / kTurn);
-  EXPECT_GT(Findings::count(), 0);
+  EXPECT_GT(OverflowLog::count(), 0);
 }
 
 // Turns at time t of a motion that has everything: fast, slow, at rest, reversals.
@@ -172,7 +172,7 @@ TEST(EncoderKalman, OnADriveAgreesWithDoubleForAHundredThousandTicks) {
     EncoderKalman::State<Fixed> s;
     EncoderKalman::State<Checked> s_checked;
     EncoderKalman::State<Real> s_real;
-    Findings::clear();
+    OverflowLog::clear();
     double worst_velocity = 0.0, worst_acceleration = 0.0, largest = 0.0;
     for (int k = 0; k < 100'000; ++k) {
       const fixed::Angle reading = counted(motion(k * kTickS));
@@ -186,7 +186,7 @@ TEST(EncoderKalman, OnADriveAgreesWithDoubleForAHundredThousandTicks) {
         worst_acceleration = std::max(worst_acceleration, std::abs(real(now.acceleration) - exact.acceleration));
       largest = std::max(largest, std::abs(exact.velocity));
     }
-    EXPECT_EQ(Findings::count(), 0) << Findings::first();
+    EXPECT_EQ(OverflowLog::count(), 0) << OverflowLog::first();
     EXPECT_GT(largest, 0.5);
     EXPECT_LT(worst_velocity, 1e-8) << corner_hz;
     // Half a unit of the state's signal, scaled by w v_base/a_base, and half a unit of the result.
@@ -215,7 +215,7 @@ TEST(EncoderKalman, ReachesTheBoundOfItsVelocityAndNeverPassesIt) {
     EncoderKalman::State<Checked> s;
     fixed::Angle reading{};
     EncoderKalman::update<Checked>(s, c, reading);
-    Findings::clear();
+    OverflowLog::clear();
     double largest = 0.0;
     for (int k = ticks; k-- > 0;) {
       // Ten times the envelope: it is limited at entry.
@@ -224,10 +224,10 @@ TEST(EncoderKalman, ReachesTheBoundOfItsVelocityAndNeverPassesIt) {
       largest = std::max(largest, std::abs(real(s.velocity)));
       ASSERT_LE(std::abs(real(s.velocity)), bounds.velocity);
       ASSERT_LE(std::abs(real(s.acceleration)), bounds.acceleration);
-      ASSERT_LE(std::abs(real(s.position_error)), bounds.surprise);
+      ASSERT_LE(std::abs(real(s.position_error)), bounds.innovation);
     }
     EXPECT_GT(largest, 0.9999 * bounds.velocity) << corner_tick;
-    EXPECT_EQ(Findings::count(), 0) << Findings::first();
+    EXPECT_EQ(OverflowLog::count(), 0) << OverflowLog::first();
   }
 }
 

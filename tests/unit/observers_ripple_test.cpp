@@ -9,17 +9,17 @@
 
 #include "host/numbers/real.hpp"
 #include "shared/fixed/checked.hpp"
-#include "shared/fixed/findings.hpp"
 #include "shared/fixed/intervals.hpp"
+#include "shared/fixed/overflow_log.hpp"
 #include "shared/observers/ripple_filter.hpp"
 
 namespace flexspline::tests {
 namespace {
 
 using fixed::Checked;
-using fixed::Findings;
 using fixed::Fixed;
 using fixed::Intervals;
+using fixed::OverflowLog;
 using numbers::Real;
 using observers::RippleFilter;
 
@@ -154,7 +154,7 @@ TEST(RippleFilter, OnADriveAgreesWithDoubleForAHundredThousandTicks) {
     RippleFilter::State<Fixed> s;
     RippleFilter::State<Checked> s_checked;
     RippleFilter::State<Real> s_exact;
-    Findings::clear();
+    OverflowLog::clear();
     double worst = 0.0, largest = 0.0;
     for (int k = 0; k < 100'000; ++k) {
       const double t = k * kTickS;
@@ -168,7 +168,7 @@ TEST(RippleFilter, OnADriveAgreesWithDoubleForAHundredThousandTicks) {
       worst = std::max(worst, std::abs(real(now) - exact));
       largest = std::max(largest, std::abs(exact));
     }
-    EXPECT_EQ(Findings::count(), 0) << Findings::first();
+    EXPECT_EQ(OverflowLog::count(), 0) << OverflowLog::first();
     EXPECT_LT(worst, 1e-7) << order;
     EXPECT_GT(worst, 0.0);
     EXPECT_GT(largest, 0.5);
@@ -179,7 +179,7 @@ TEST(RippleFilter, CannotGrowWhateverItIsGiven) {
   std::mt19937_64 random(5);
   const auto c = filter<Checked>(2.0, 0.25);
   RippleFilter::State<Checked> s;
-  Findings::clear();
+  OverflowLog::clear();
   double largest = 0.0;
   std::int64_t at = 0;
   for (int k = 0; k < 200'000; ++k) {
@@ -193,7 +193,7 @@ TEST(RippleFilter, CannotGrowWhateverItIsGiven) {
     ASSERT_LE(largest, 0.25);
   }
   EXPECT_EQ(largest, 0.25);  // it did push against the bound
-  EXPECT_EQ(Findings::count(), 0) << Findings::first();
+  EXPECT_EQ(OverflowLog::count(), 0) << OverflowLog::first();
 }
 
 // States are widened tick by tick until a tick no longer widens them.
@@ -201,7 +201,7 @@ bool proven(double largest) {
   const auto c = filter<Intervals>(2.0, largest);
   constexpr std::int64_t kTwo = std::int64_t{2} << fixed::kValueBits;
   RippleFilter::State<Intervals> s;
-  Findings::clear();
+  OverflowLog::clear();
   for (int k = 0; k < 100; ++k) {
     const RippleFilter::State<Intervals> before = s;
     RippleFilter::update<Intervals>(s, c, {}, {-kTwo, kTwo});
@@ -212,7 +212,7 @@ bool proven(double largest) {
       wider = wider || both.low != (before.*member).low || both.high != (before.*member).high;
       s.*member = both;
     }
-    if (Findings::count() != 0) return false;
+    if (OverflowLog::count() != 0) return false;
     if (!wider) return true;
   }
   return false;

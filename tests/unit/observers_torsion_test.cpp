@@ -17,8 +17,8 @@ namespace flexspline::tests {
 namespace {
 
 using fixed::Checked;
-using fixed::Findings;
 using fixed::Fixed;
+using fixed::OverflowLog;
 using numbers::Real;
 using observers::TorsionObserver;
 using observers::TorsionSetup;
@@ -157,7 +157,7 @@ TEST(TorsionObserver, OnADriveAgreesWithDoubleAndKeepsItsRangeForWrongInputsToo)
   TorsionObserver::State<Fixed> s;
   TorsionObserver::State<Checked> s_checked;
   TorsionObserver::State<Real> s_real;
-  Findings::clear();
+  OverflowLog::clear();
   std::mt19937_64 random(4);
   double worst = 0.0, largest = 0.0, torque = 0.0, velocity = 0.0;
   for (int k = 0; k < 300'000; ++k) {
@@ -178,7 +178,7 @@ TEST(TorsionObserver, OnADriveAgreesWithDoubleAndKeepsItsRangeForWrongInputsToo)
         {worst, std::abs(real(e.torsion) - exact.torsion), std::abs(real(e.output_velocity) - exact.output_velocity)});
     largest = std::max(largest, std::abs(exact.torsion));
   }
-  EXPECT_EQ(Findings::count(), 0) << Findings::first();
+  EXPECT_EQ(OverflowLog::count(), 0) << OverflowLog::first();
   EXPECT_LT(worst, 1e-5);
   EXPECT_GT(largest, 0.05);
 }
@@ -186,10 +186,10 @@ TEST(TorsionObserver, OnADriveAgreesWithDoubleAndKeepsItsRangeForWrongInputsToo)
 TEST(TorsionObserver, RefusesATickThatIsTooLongForTheResonance) {
   auto d = drive();
   d.time_base = 1e-3;
-  Findings::clear();
+  OverflowLog::clear();
   TorsionObserver::derive<Fixed>(setup(), d);
-  EXPECT_GT(Findings::count(), 0);
-  Findings::clear();
+  EXPECT_GT(OverflowLog::count(), 0);
+  OverflowLog::clear();
 }
 
 }  // namespace

@@ -130,8 +130,8 @@ model::Model a_drive() {
   return m;
 }
 
-Question question_of(const model::Model& model) {
-  Question q;
+PlanRequest request_for(const model::Model& model) {
+  PlanRequest q;
   q.model = &model;
   q.setting = setting_of(model, nullptr);
   q.setting.run_s = 4.0;
@@ -141,11 +141,11 @@ Question question_of(const model::Model& model) {
 
 TEST(Planning, AnOffsetOfTheSensorIsToldFromAsymmetryWithTheDriveOff) {
   const model::Model m = a_drive();
-  const Question q = question_of(m);
+  const PlanRequest q = request_for(m);
   const Design d = separate(q, "current_offset", "coulomb_asymmetry");
   EXPECT_TRUE(
       std::any_of(d.plan.runs.begin(), d.plan.runs.end(), [](const planning::Run& r) { return r.mode == Mode::off; }));
-  EXPECT_GT(d.after->worst(), kTold);
+  EXPECT_GT(d.after->worst(), kDistinguished);
   ASSERT_EQ(d.peaks.size(), d.plan.runs.size());
   for (const Design::Peak& peak : d.peaks) {
     EXPECT_LE(peak.current_a, q.setting.limits.current_a);
@@ -156,10 +156,10 @@ TEST(Planning, AnOffsetOfTheSensorIsToldFromAsymmetryWithTheDriveOff) {
 
 TEST(Planning, WithoutTheDriveOffTheSameTwoAreOneClass) {
   const model::Model m = a_drive();
-  Question q = question_of(m);
+  PlanRequest q = request_for(m);
   q.setting.off = q.setting.locked = q.setting.external_load = false;
   const Design d = separate(q, "current_offset", "coulomb_asymmetry");
-  EXPECT_LT(d.after->worst(), kTold);
+  EXPECT_LT(d.after->worst(), kDistinguished);
   EXPECT_TRUE(d.plan.runs.empty());
   ASSERT_FALSE(d.plan.notes.empty());
   EXPECT_NE(d.plan.notes.front().find("No motion within these limits"), std::string::npos);
@@ -167,7 +167,7 @@ TEST(Planning, WithoutTheDriveOffTheSameTwoAreOneClass) {
 
 TEST(Planning, StiffnessIsUnknownUntilTheOutputIsLocked) {
   const model::Model m = a_drive();
-  const Design d = excite(question_of(m));
+  const Design d = excite(request_for(m));
   EXPECT_TRUE(std::any_of(d.plan.runs.begin(), d.plan.runs.end(), [](const planning::Run& r) { return r.locked; }));
   for (const Precision& p : d.parameters) {
     ASSERT_TRUE(p.percent_after.has_value()) << p.id;
@@ -177,11 +177,11 @@ TEST(Planning, StiffnessIsUnknownUntilTheOutputIsLocked) {
 
 TEST(Planning, ACurrentThatMovesNothingTellsNothing) {
   const model::Model m = a_drive();
-  Question q = question_of(m);
+  PlanRequest q = request_for(m);
   q.setting.limits.current_a = 0.01;
   q.setting.off = q.setting.locked = q.setting.external_load = false;
   const Design d = separate(q, "viscous_asymmetry", "coulomb_asymmetry");
-  EXPECT_LT(d.after->worst(), kTold);
+  EXPECT_LT(d.after->worst(), kDistinguished);
   EXPECT_TRUE(d.plan.runs.empty());
 }
 

@@ -21,14 +21,14 @@ plant::Drive drive_with(std::initializer_list<const char*> effects) {
 // A drive that woke somewhere, with these encoders.
 std::unique_ptr<VirtualDrive> woken(const plant::Drive& drive, double turns, SensorKind encoders,
                                     const control::DriveSetup<double>* setup = nullptr) {
-  auto brain = std::make_unique<SoftwareBrain>();
-  brain->state(board::hardware_of(drive, encoders));
+  auto controller = std::make_unique<SoftwareController>();
+  controller->state(board::hardware_of(drive, encoders));
   const Block block(board::parameters_of(drive, setup != nullptr ? *setup : board::setup_of(drive)),
                     board::constants_of(drive));
   auto all = std::make_unique<VirtualDrive>(
-      RigSetup{.drive = drive, .seed = 3, .wake_turns = turns, .encoders = encoders}, block,
+      RigSetup{.drive = drive, .seed = 3, .start_turns = turns, .encoders = encoders}, block,
       firmware::TelemetrySetup{.every = 1, .count = 2, .channels = {Channel::motor_turns, Channel::motor_fraction}},
-      std::move(brain));
+      std::move(controller));
   all->run(120);
   EXPECT_EQ(all->status().mode, Mode::idle);
   return all;
@@ -171,11 +171,11 @@ TEST(PositionReference, IsLostWhereTheCounterWasNotReadForMoreThanATurn) {
     return drive;
   };
   const auto skip = [](VirtualDrive& drive, int counts) {
-    firmware::LockStepDown down;
+    firmware::CoSimulationInput down;
     drive.rig().sense(down.readings);
     down.readings.motor_samples = down.readings.output_samples = down.readings.analog_samples = 1000;
     down.readings.motor_counter += static_cast<std::uint32_t>(counts);
-    return drive.brain().tick(down).status;
+    return drive.controller().tick(down).status;
   };
   auto little = at_home();
   EXPECT_TRUE(skip(*little, demo_drive().sensors.motor_counts / 2).knows_turn);

@@ -329,7 +329,7 @@ TEST(SerialFrame, BytesOnTheLineAreTheRecordedOnes) {
                                                                                               "00"));
 }
 
-TEST(SerialFrame, HoldsNoNoughtButTheLastAndComesBack) {
+TEST(SerialFrame, HoldsNoZeroButTheLastAndComesBack) {
   std::mt19937 random(3);
   SerialReader reader;
   for (int i = 0; i < 5'000; ++i) {

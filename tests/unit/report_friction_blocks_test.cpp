@@ -8,9 +8,9 @@
 #include <random>
 #include <stdexcept>
 
-#include "hil/report/friction_block.hpp"
-#include "hil/report/published.hpp"
-#include "hil/report/runge_kutta.hpp"
+#include "hil/thesis_models/friction_block.hpp"
+#include "hil/thesis_models/published.hpp"
+#include "hil/thesis_models/runge_kutta.hpp"
 
 namespace {
 
@@ -155,7 +155,7 @@ TEST(ReportFriction, EulerStepsOfOneMillisecondTurnThresholdFrictionRoundAThousa
 }
 
 TEST(ReportFriction, RungeKuttaHidesTheChatterWithinTheStepAndNeverComesToRest) {
-  // The weights 1, 2, 2, 1 of friction that turns round at each evaluation add up to nought.
+  // The weights 1, 2, 2, 1 of friction that turns round at each evaluation add up to zero.
   for (const FrictionMethod method : {threshold_1e_8, threshold_1e_4}) {
     const Standstill rest = drive_at_rest(method, false);
     EXPECT_EQ(rest.evaluated, 3999);

@@ -8,8 +8,8 @@
 #include <numbers>
 #include <stdexcept>
 
-#include "hil/report/harmonic_drive.hpp"
-#include "hil/report/published.hpp"
+#include "hil/thesis_models/harmonic_drive.hpp"
+#include "hil/thesis_models/published.hpp"
 
 namespace {
 

@@ -5,10 +5,10 @@
 #include <cmath>
 #include <memory>
 
-#include "hil/report/dc_motor.hpp"
-#include "hil/report/friction_block.hpp"
-#include "hil/report/published.hpp"
-#include "hil/report/runge_kutta.hpp"
+#include "hil/thesis_models/dc_motor.hpp"
+#include "hil/thesis_models/friction_block.hpp"
+#include "hil/thesis_models/published.hpp"
+#include "hil/thesis_models/runge_kutta.hpp"
 
 namespace {
 

@@ -67,7 +67,7 @@ Subject subject_of(const Case& c) {
           .model_name = "model.toml",
           .dataset = &c.dataset,
           .model = c.model,
-          .beside = {blackbox::parse_specification("arx:2,2,1")}};
+          .baselines = {blackbox::parse_specification("arx:2,2,1")}};
 }
 
 // Made once: it takes some seconds under sanitizers.
@@ -128,7 +128,7 @@ TEST(ReportPage, StaysSmall) {
 
 TEST(ReportDocument, NumbersAreThoseOfTheComparison) {
   const comparison::Comparison truth =
-      comparison::compare(the_case().dataset, the_case().model, {}, subject_of(the_case()).beside);
+      comparison::compare(the_case().dataset, the_case().model, {}, subject_of(the_case()).baselines);
   json expected = comparison::to_json(truth);
   expected.erase("regions");
   EXPECT_EQ(the_document()["comparison"], expected);
@@ -239,7 +239,7 @@ TEST(ReportDocument, BlackBoxesStandBesideTheModel) {
   EXPECT_EQ(beside[0]["black_box"], "arx:2,2,1");
   EXPECT_EQ(beside[0]["signal"], "motor_balance");
   Subject without = subject_of(the_case());
-  without.beside.clear();
+  without.baselines.clear();
   EXPECT_TRUE(document(without)["comparison"]["beside"].empty());
 }
 
@@ -247,9 +247,9 @@ TEST(ReportPage, DrawsFreeRunsAndBlackBoxesBeforeWhatExplainsThem) {
   // Functions of the page, and where they are called.
   const std::string html = page(the_document());
   EXPECT_EQ(count(html, "function freeRunGallery("), 1u);
-  EXPECT_EQ(count(html, "function besideTable("), 1u);
+  EXPECT_EQ(count(html, "function baselineTable("), 1u);
   const std::size_t good = html.find("section(\"How good is the model?\"");
-  const std::size_t beside = html.find("besideTable()", good), runs = html.find("freeRunGallery(traces)", good);
+  const std::size_t beside = html.find("baselineTable()", good), runs = html.find("freeRunGallery(traces)", good);
   const std::size_t fails = html.find("\"Where does it fail?\"", good);
   EXPECT_LT(good, beside);
   EXPECT_LT(beside, runs);
@@ -264,7 +264,7 @@ TEST(ReportDocument, LoadedRecordsDrawALoop) {
   EXPECT_EQ(loops[0]["torsion"]["count"], loops[0]["measured"]["count"]);
 }
 
-TEST(ReportDocument, AnAdditionIsToldByExperiment) {
+TEST(ReportDocument, ShowsTheChangeOfEachExperimentAfterAnAddition) {
   const Case& c = the_case();
   Subject subject = subject_of(c);
   selection::Addition addition;
@@ -285,7 +285,7 @@ TEST(ReportDocument, AnAdditionIsToldByExperiment) {
     if (effect.type == "coulomb_friction") *effect.find("torque")->value *= 2.0;
   const json made = document(subject);
   EXPECT_TRUE(contains(made["verdict"].get<std::string>(),
-                       "on motions that the fit never saw falls from 4 N\u00b7m to 1 N\u00b7m (-75.0 %)"))
+                       "on motions that the fit never saw decreases from 4 N\u00b7m to 1 N\u00b7m (-75.0 %)"))
       << made["verdict"];
   EXPECT_EQ(made["headline"]["error_before"], 4.0);
   ASSERT_EQ(made["addition"]["experiments"].size(), 1u);

@@ -6,9 +6,9 @@
 #include <cmath>
 
 #include "hil/plant/two_mass.hpp"
-#include "hil/report/drive_system.hpp"
-#include "hil/report/published.hpp"
-#include "hil/report/runge_kutta.hpp"
+#include "hil/thesis_models/drive_system.hpp"
+#include "hil/thesis_models/published.hpp"
+#include "hil/thesis_models/runge_kutta.hpp"
 
 namespace {
 

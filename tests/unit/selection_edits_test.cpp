@@ -128,7 +128,7 @@ TEST(CandidateModels, HoldWhatTheSignalsCanShowAndTheModelLacks) {
   data::Experiment e = experiment(
       "a", 0.0, [](double, double) { return 0.0; }, 1);
   const auto names_for = [&](const Terms& terms) {
-    const estimation::Prepared prepared = estimation::prepare({&e}, {}, kOptions);
+    const estimation::PreparedData prepared = estimation::prepare({&e}, {}, kOptions);
     const estimation::BalanceData data(prepared, estimation::Balance::motor);
     std::vector<std::string> names;
     for (const CandidateModel& p : candidate_models(data, terms, whole(data))) names.push_back(p.terms.back().label());
@@ -160,7 +160,7 @@ TEST(CandidateModels, HoldWhatTheSignalsCanShowAndTheModelLacks) {
 TEST(CandidateModels, CountTheParametersThatTheyAdd) {
   const data::Experiment e = experiment(
       "a", 0.0, [](double, double) { return 0.0; }, 1);
-  const estimation::Prepared prepared = estimation::prepare({&e}, {}, kOptions);
+  const estimation::PreparedData prepared = estimation::prepare({&e}, {}, kOptions);
   const estimation::BalanceData data(prepared, estimation::Balance::motor);
   std::map<std::string_view, double> added;
   for (const CandidateModel& p : candidate_models(data, estimation::terms_of(model_of(kPlain)), whole(data)))

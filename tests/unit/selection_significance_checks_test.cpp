@@ -52,7 +52,7 @@ double ripple(double, double q) {
 // The ripple of three a turn as a candidate on such a record, checked. Its gain is kept in the rows from `first` to
 // `last`, shares of all, alone.
 CandidateFit checked(const data::Experiment& e, double first = 0.0, double last = 1.0) {
-  const estimation::Prepared prepared = estimation::prepare({&e}, {}, kOptions);
+  const estimation::PreparedData prepared = estimation::prepare({&e}, {}, kOptions);
   BalanceData data(prepared, Balance::motor);
   const Terms terms = estimation::terms_of(testing::plain_model());
   const Eigen::VectorXd keep = Eigen::VectorXd::Ones(data.rows());
@@ -95,7 +95,7 @@ TEST(CheckOrders, WhatShowsInAFewPartsOfTheDataIsNoPropertyOfTheDrive) {
 TEST(OneDirectionWarning, IsGivenWhereTheAxisHardlyComesBack) {
   const auto warning = [](double amplitude_rad, double drift_rad_s) {
     const data::Experiment e = experiment(amplitude_rad, drift_rad_s, ripple);
-    const estimation::Prepared prepared = estimation::prepare({&e}, {}, kOptions);
+    const estimation::PreparedData prepared = estimation::prepare({&e}, {}, kOptions);
     return one_direction_warning(BalanceData(prepared, Balance::motor));
   };
   EXPECT_EQ(warning(20.0, 0.0), "");

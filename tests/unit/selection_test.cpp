@@ -15,7 +15,7 @@
 #include "host/selection/bandwidth.hpp"
 #include "host/selection/decision.hpp"
 #include "host/selection/forward_selection.hpp"
-#include "host/selection/record_differences.hpp"
+#include "host/selection/friction_random_effects.hpp"
 
 namespace flexspline::selection {
 namespace {
@@ -133,7 +133,7 @@ Random random_table(Eigen::Index count, Eigen::Index terms, unsigned seed) {
   }
   return r;
 }
-Half half_of(const Eigen::MatrixXd& rows) {
+HalfData half_of(const Eigen::MatrixXd& rows) {
   return {rows.transpose() * rows, {}, static_cast<double>(rows.rows())};
 }
 
@@ -141,9 +141,9 @@ Half half_of(const Eigen::MatrixXd& rows) {
 TEST(RecordDifferences, EliminationIsGeneralisedLeastSquares) {
   Random r = random_table(60, 1, 11);
   const double noise = 0.5, variance = 0.3;
-  const Differences differences{{1}, Eigen::VectorXd::Constant(1, variance), noise};
+  const FrictionRandomEffects differences{{1}, Eigen::VectorXd::Constant(1, variance), noise};
   Eigen::MatrixXd products = r.rows.transpose() * r.rows;
-  eliminate_differences(products, differences);
+  eliminate_friction_effects(products, differences);
   const Eigen::MatrixXd V =
       noise * Eigen::MatrixXd::Identity(60, 60) + variance * r.rows.col(1) * r.rows.col(1).transpose();
   const Eigen::MatrixXd truth = noise * (r.rows.transpose() * V.inverse() * r.rows);
@@ -154,11 +154,11 @@ TEST(RecordDifferences, EliminationIsGeneralisedLeastSquares) {
 TEST(RecordDifferences, ResidualIsWhatTheBestLinearUnbiasedPredictionLeaves) {
   Random r = random_table(60, 1, 12);
   const double noise = 0.5, variance = 0.3, weight = 4.0;
-  const Differences differences{{1}, Eigen::VectorXd::Constant(1, variance), noise};
+  const FrictionRandomEffects differences{{1}, Eigen::VectorXd::Constant(1, variance), noise};
   Setting setting;
   setting.rows = r.rows;
   setting.runs = {{0, 0, 30, 0.01}, {0, 30, 60, 0.01}};
-  Fitted fitted;
+  TermFit fitted;
   fitted.columns = {0};
   fitted.theta = Eigen::VectorXd::Constant(1, 2.0);
   const Eigen::VectorXd raw = r.rows.col(3) - 2.0 * r.rows.col(0);
@@ -170,19 +170,19 @@ TEST(RecordDifferences, ResidualIsWhatTheBestLinearUnbiasedPredictionLeaves) {
 
 TEST(ForwardSelection, FitsAreThoseOfLeastSquares) {
   Random r = random_table(200, 3, 1);
-  const Half all = half_of(r.rows);
-  const Fitted fitted = fit_terms(r.table, {1}, all, all);
+  const HalfData all = half_of(r.rows);
+  const TermFit fitted = fit_terms(r.table, {1}, all, all);
   const Eigen::MatrixXd X = r.rows(Eigen::all, std::vector<Eigen::Index>{0, 1, 3});
   const Eigen::VectorXd y = r.rows.col(5), theta = X.colPivHouseholderQr().solve(y);
   EXPECT_LT((fitted.theta - theta).norm(), 1e-6);
-  EXPECT_NEAR(fitted.on_fit, (y - X * theta).squaredNorm(), 1e-6);
+  EXPECT_NEAR(fitted.training_squares, (y - X * theta).squaredNorm(), 1e-6);
 }
 
 TEST(ForwardSelection, ChoosesWhatIsThereAndNothingElse) {
   Random r = random_table(400, 20, 2);
   r.rows.col(22) = 0.1 * r.rows.col(22) + r.rows.col(0) - 0.4 * r.rows.col(9);
-  const Half a = half_of(r.rows.topRows(200)), b = half_of(r.rows.bottomRows(200));
-  const Selected selected = select_forward(r.table, a, b, {0.01, 1.0}, std::vector<std::uint8_t>(20, 1), {});
+  const HalfData a = half_of(r.rows.topRows(200)), b = half_of(r.rows.bottomRows(200));
+  const SelectionPath selected = select_forward(r.table, a, b, {0.01, 1.0}, std::vector<std::uint8_t>(20, 1), {});
   ASSERT_EQ(selected.steps.size(), 1U);
   EXPECT_EQ(selected.steps[0].term, 7);
   EXPECT_NEAR(selected.steps[0].of_all, 1.0, 0.05);
@@ -191,7 +191,7 @@ TEST(ForwardSelection, ChoosesWhatIsThereAndNothingElse) {
 TEST(ForwardSelection, AbstainsWhereNothingStandsAboveTheNoise) {
   Random r = random_table(400, 20, 3);
   r.rows.col(22) = r.rows.col(22) + r.rows.col(0);
-  const Half a = half_of(r.rows.topRows(200)), b = half_of(r.rows.bottomRows(200));
+  const HalfData a = half_of(r.rows.topRows(200)), b = half_of(r.rows.bottomRows(200));
   EXPECT_TRUE(select_forward(r.table, a, b, {1.1, 1.0}, std::vector<std::uint8_t>(20, 1), {}).abstains);
 }
 
@@ -200,7 +200,7 @@ TEST(ForwardSelection, AbstainsWhereTheModelAloneDoesNotCarryOver) {
   r.rows.col(4) = 0.01 * r.rows.col(4) + r.rows.col(0);
   r.rows.topRows(200).col(1).setZero();
   r.rows.bottomRows(200).col(4) += 3.0 * r.rows.bottomRows(200).col(1);
-  const Half a = half_of(r.rows.topRows(200)), b = half_of(r.rows.bottomRows(200));
+  const HalfData a = half_of(r.rows.topRows(200)), b = half_of(r.rows.bottomRows(200));
   EXPECT_TRUE(select_forward(r.table, a, b, {1e-4, 1.0}, {1, 1}, {}).extrapolates);
 }
 
@@ -208,7 +208,7 @@ TEST(ForwardSelection, ATermOfImpossibleSignIsNotChosen) {
   Random r = random_table(400, 20, 5);
   r.table.terms[7].low = {0.0};
   r.rows.col(22) = 0.1 * r.rows.col(22) - 0.4 * r.rows.col(9);
-  const Half a = half_of(r.rows.topRows(200)), b = half_of(r.rows.bottomRows(200));
+  const HalfData a = half_of(r.rows.topRows(200)), b = half_of(r.rows.bottomRows(200));
   EXPECT_TRUE(select_forward(r.table, a, b, {0.01, 1.0}, std::vector<std::uint8_t>(20, 1), {}).steps.empty());
 }
 

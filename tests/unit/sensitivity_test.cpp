@@ -279,11 +279,11 @@ TEST(SensitivityChange, AnEffectThatScaledWhatIsLeftOutGoesWithIt) {
                                        {"viscous_friction", {kViscous}},
                                        {"coulomb_friction", {0.05}},
                                        {"temperature_viscous", {0.01}}});
-  const Changed changed = apply(model, {"viscous_friction", "", 0.0});
+  const ChangedModel changed = apply(model, {"viscous_friction", "", 0.0});
   EXPECT_EQ(changed.also_left_out, std::vector<std::string>{"temperature_viscous"});
   ASSERT_EQ(changed.model.effects.size(), 2u);
   EXPECT_TRUE(apply(model, {"coulomb_friction", "", 0.0}).also_left_out.empty());
-  const Changed scaled = apply(model, {"viscous_friction", "coefficient", 3.0});
+  const ChangedModel scaled = apply(model, {"viscous_friction", "coefficient", 3.0});
   EXPECT_DOUBLE_EQ(*scaled.model.find("viscous_friction")->find("coefficient")->value, 3.0 * kViscous);
   EXPECT_TRUE(scaled.model.find("viscous_friction")->find("coefficient")->fixed);
   EXPECT_EQ(*scaled.model.find("inertia")->find("inertia")->value, kInertia);

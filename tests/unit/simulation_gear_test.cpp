@@ -96,7 +96,7 @@ TEST(SimulationOfTwoMasses, SwingsAtTheResonanceOfBothAgainstTheSpring) {
   }
 }
 
-// The same equations written out, by the classic Runge-Kutta scheme with a step so short that its error is nought.
+// The same equations written out, by the classic Runge-Kutta scheme with a step so short that its error is zero.
 struct Reference {
   using Vector = std::array<double, 4>;  // q, w, qo, wo
   static double torque(const Vector& x) { return kStiffness * (x[0] / kRatio - x[2]); }

@@ -7,7 +7,7 @@
 #include <random>
 
 #include "host/catalogue/constants.hpp"
-#include "host/catalogue/defined.hpp"
+#include "host/catalogue/user_defined_effect.hpp"
 #include "tests/support/drive_trial.hpp"
 
 namespace flexspline::tests {
@@ -217,11 +217,11 @@ TEST(TableEffect, OnADriveStaysWithinItsBoundOfDoubleOverRandomTables) {
     }
     if (v.periodic) steepest = std::max(steepest, 3.0);
     Models models;
-    ASSERT_TRUE(models.add<TableEffect>(p.data(), drive)) << Findings::first();
+    ASSERT_TRUE(models.add<TableEffect>(p.data(), drive)) << fixed::OverflowLog::first();
     ASSERT_TRUE(model::prove(models.intervals).holds);
     const Trial trial = run(models, drive, random, 300);
     EXPECT_TRUE(trial.same_bits);
-    EXPECT_EQ(trial.findings, 0) << Findings::first();
+    EXPECT_EQ(trial.findings, 0) << fixed::OverflowLog::first();
     EXPECT_TRUE(trial.within_proof);
     constexpr double kUnit = 0x1p-27;
     const double steps_per_base = v.periodic ? 0.0 : (points - 1) / range;

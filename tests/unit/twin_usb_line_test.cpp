@@ -16,7 +16,7 @@ class UsbLine : public ::testing::Test {
  protected:
   // What flexspline-hil twin does, with a tick in the place of the time.
   void turn() {
-    if (line.turn(0)) {
+    if (line.transfer(0)) {
       ++changes;
       drive.service().disconnected();
     }

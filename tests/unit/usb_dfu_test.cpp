@@ -238,9 +238,9 @@ TEST(UsbDfu, WorkIsAnnouncedWithItsTimeAndDoneOnceTheHostKnows) {
   EXPECT_EQ(b.status(), (std::vector<int>{0, 7, 70'000}));
   b.device.poll();
   EXPECT_TRUE(b.dfu().installed());
-  EXPECT_FALSE(b.dfu().told());
+  EXPECT_FALSE(b.dfu().install_reported());
   EXPECT_EQ(b.status(), (std::vector<int>{0, 2, 0})) << "manifestation tolerant: dfuIDLE";
-  EXPECT_TRUE(b.dfu().told());
+  EXPECT_TRUE(b.dfu().install_reported());
 }
 
 TEST(UsbDfu, WhatTheMemoryRefusesIsTheStatusUntilItIsCleared) {
@@ -356,10 +356,10 @@ TEST(UsbDfu, AnImageGoesFromTheHostToTheFirstStartWhateverTheSizeOfItsBlocks) {
     LoaderBench b(cells);
     EXPECT_EQ(b.found, boot::Start::none);
     EXPECT_EQ(b.download(testing::image_named('a', 101), block), "");
-    EXPECT_GE(b.pipe.waited, 3U + 1U) << "it waits as long as it is told to";
+    EXPECT_GE(b.pipe.waited, 3U + 1U) << "it waits as long as it is install_reported to";
     auto& dfu = b.bus.device.get<LoaderBench::Loader::Dfu>();
-    EXPECT_FALSE(b.loader.turn(dfu, false, 10));
-    EXPECT_TRUE(b.loader.turn(dfu, false, 1010)) << "it leaves by itself";
+    EXPECT_FALSE(b.loader.poll(dfu, false, 10));
+    EXPECT_TRUE(b.loader.poll(dfu, false, 1010)) << "it leaves by itself";
     LoaderBench next(cells);
     EXPECT_EQ(next.found, boot::Start::trial);
     EXPECT_EQ(dfu::upload(next.pipe, 10'000, block), testing::image_named('a', 101));
@@ -405,11 +405,11 @@ TEST(UsbDfu, ABusResetAfterItWasUsedEndsDfuModeWhereThereIsSomethingToStart) {
   testing::SlotCells cells;
   LoaderBench empty(cells);
   auto& dfu = empty.bus.device.get<LoaderBench::Loader::Dfu>();
-  EXPECT_FALSE(empty.loader.turn(dfu, true, 0)) << "enumeration";
+  EXPECT_FALSE(empty.loader.poll(dfu, true, 0)) << "enumeration";
   dfu::get_status(empty.pipe);
-  EXPECT_FALSE(empty.loader.turn(dfu, true, 0)) << "nothing to start";
+  EXPECT_FALSE(empty.loader.poll(dfu, true, 0)) << "nothing to start";
   ASSERT_EQ(empty.download(testing::image_named('a')), "");
-  EXPECT_TRUE(empty.loader.turn(dfu, true, 0));
+  EXPECT_TRUE(empty.loader.poll(dfu, true, 0));
 }
 
 }  // namespace

@@ -86,7 +86,7 @@ TEST_F(UsbHid, ReportsFromTheHostWaitInsteadOfBeingLost) {
   EXPECT_EQ(taken(), -1);
 }
 
-TEST_F(UsbHid, AShortReportIsFilledWithNoughtsAndAnEmptyOneIsNone) {
+TEST_F(UsbHid, AShortReportIsFilledWithZerosAndAnEmptyOneIsNone) {
   EXPECT_EQ(b.host.out(1, Octets(64, 0xff)), Hand::ack);
   EXPECT_EQ(taken(), 0xff);
   b.device.poll();
@@ -141,7 +141,7 @@ TEST_F(UsbHid, KnowsTheIdleRateAndTheProtocolThatItHas) {
   EXPECT_TRUE(b.host.get({0xa1, 3, 0, 0, 1}).stalled);
 }
 
-TEST_F(UsbHid, AHaltLosesNoReportAndBeginsAtDataNought) {
+TEST_F(UsbHid, AHaltLosesNoReportAndBeginsAtDataZero) {
   send(1);
   send(2);
   const int began = b.wire.pipes[0x81].began;

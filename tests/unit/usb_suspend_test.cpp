@@ -87,7 +87,7 @@ TEST(UsbSuspend, TheFeatureBelongsToADeviceWithAnAddress) {
   b.host.bus_reset();
   EXPECT_TRUE(b.host.put(kAllow, {}).stalled);
   ASSERT_TRUE(b.host.enumerate());
-  EXPECT_TRUE(b.host.put({0x00, 3, 1, 1, 0}, {}).stalled) << "wIndex has to be nought";
+  EXPECT_TRUE(b.host.put({0x00, 3, 1, 1, 0}, {}).stalled) << "wIndex has to be zero";
   EXPECT_TRUE(b.host.put({0x00, 3, 2, 0, 0}, {}).stalled) << "no such feature";
 }
 

@@ -178,7 +178,7 @@ TEST_F(UsbIpMalformed, WhoSaysNothingIsSentAwayButNotWhoHasADevice) {
   auto silent = client();
   auto user = client();
   ASSERT_EQ(user->import("1-1"), 0);
-  server.set_patience(std::chrono::milliseconds(20));
+  server.set_idle_limit(std::chrono::milliseconds(20));
   std::this_thread::sleep_for(std::chrono::milliseconds(40));
   EXPECT_TRUE(silent->is_closed());
   EXPECT_EQ(server.faults(), 1u);

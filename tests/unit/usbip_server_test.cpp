@@ -222,7 +222,7 @@ class Crooked : public usbip::BusDevice {
     return device.out(endpoint, packet);
   }
   HidDevice device{"CROOKED"};
-  std::size_t control_bytes = 0, report_bytes = 0;  // nought: as they are
+  std::size_t control_bytes = 0, report_bytes = 0;  // zero: as they are
 };
 
 TEST_F(UsbIpServer, AShortPacketEndsATransferAndALongOneIsAnOverflow) {

@@ -234,11 +234,11 @@ TEST_F(WorkbenchApi, ARefusalHasAReasonWhateverTheNamesInTheRequest) {
     EXPECT_EQ(answer.status, 400) << answer.body;
     return json::parse(answer.body)["what"].get<std::string>();
   };
-  // A text in C ends at its first nought, and a message that begins with such a name is empty.
+  // A text in C ends at its first zero, and a message that begins with such a name is empty.
   EXPECT_EQ(reason({"POST", "/api/drop", {}, "", {{"\0\0../a.csv(x"s, "time_s\n"}}}),
-            "the name of a file holds a byte that is no text");
-  EXPECT_EQ(reason({"GET", "/api/live", {{"since", "\0"s}}, "", {}}), "since holds a byte that is no text");
-  EXPECT_EQ(reason({"POST", "/api/do", {}, R"({"do": "\u0000"})", {}}), "do holds a byte that is no text");
+            "the name of a file holds a byte that is not text");
+  EXPECT_EQ(reason({"GET", "/api/live", {{"since", "\0"s}}, "", {}}), "since holds a byte that is not text");
+  EXPECT_EQ(reason({"POST", "/api/do", {}, R"({"do": "\u0000"})", {}}), "do holds a byte that is not text");
   EXPECT_FALSE(reason({"POST", "/api/do", {}, "{\"do\": \"\xE7\xE7", {}}).empty());
 }
 
@@ -425,7 +425,7 @@ TEST_F(WorkbenchApi, TheNextProcessHasTheTabsOfTheOneThatEndedAndSaysWhatEndedIt
     return std::string();
   }();
   setup.failures.push_back({"it crashed",
-                            {{tab, "Looking for what is missing", diagnosis, true},
+                            {{tab, "Searching for what is missing", diagnosis, true},
                              {other, "Identifying", "", true},
                              {other, "Showing /api/maps", "", false}},
                             true});
@@ -439,9 +439,9 @@ TEST_F(WorkbenchApi, TheNextProcessHasTheTabsOfTheOneThatEndedAndSaysWhatEndedIt
   const double error = before["steps"][1]["balances"][0]["fit"].get<double>();
   EXPECT_NEAR(after["steps"][1]["balances"][0]["fit"].get<double>(), error, 1e-6 * error);
   EXPECT_GT(after["changes"].get<std::uint64_t>(), before["changes"].get<std::uint64_t>());
-  EXPECT_EQ(after["problem"]["during"], "Looking for what is missing");
+  EXPECT_EQ(after["problem"]["during"], "Searching for what is missing");
   EXPECT_EQ(after["problem"]["what"].get<std::string>().find("it crashed"), 0U);
-  EXPECT_NE(settled(other)["problem"]["what"].get<std::string>().find("Looking for what is missing, which failed"),
+  EXPECT_NE(settled(other)["problem"]["what"].get<std::string>().find("Searching for what is missing, which failed"),
             std::string::npos);
   // What the page begins by itself is not begun again; all else may be tried.
   act(tab, {{"do", "diagnose"}}, 500);

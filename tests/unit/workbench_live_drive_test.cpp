@@ -34,9 +34,9 @@ struct Bench {
   std::atomic<int> pulled_at_chunk{-1};  // of a block on its way to the drive
 };
 
-class Cable final : public transport::Link {
+class LinkFault final : public transport::Link {
  public:
-  explicit Cable(Bench& bench) : bench_(bench), line_(bench.drive, {}) {}
+  explicit LinkFault(Bench& bench) : bench_(bench), line_(bench.drive, {}) {}
   void send(const protocol::Message& m) override {
     if (m.request() == Kind::block_chunk && bench_.pulled_at_chunk-- == 0) bench_.plugged = false;
     require();
@@ -58,13 +58,13 @@ class Cable final : public transport::Link {
   tests::Loopback line_;
 };
 
-Reaching reaching(const std::shared_ptr<std::atomic<Bench*>>& there) {
+ConnectionOptions reaching(const std::shared_ptr<std::atomic<Bench*>>& there) {
   return {.open = [there](const std::string&) -> std::unique_ptr<transport::Link> {
             Bench& bench = **there;
             ++bench.asked_to_open;
             if (!bench.plugged) throw transport::LinkError("nothing is plugged in");
             ++bench.opened;
-            return std::make_unique<Cable>(bench);
+            return std::make_unique<LinkFault>(bench);
           },
           .first = 1ms,
           .most = 4ms};
@@ -162,7 +162,7 @@ TEST_F(WorkbenchLiveDrive, APreviewChangesNothingAndNothingElseThanItShowsIsFlas
   EXPECT_EQ(bench_.drive.store().sequence(), first);
   const auto changed = std::ranges::find_if(preview["changes"], [](const json& c) { return c["change"] != "same"; });
   ASSERT_NE(changed, preview["changes"].end());
-  const Shown shown{preview["before"]["sha256"], preview["after"]["sha256"]};
+  const PreviewedBlocks shown{preview["before"]["sha256"], preview["after"]["sha256"]};
   // The model is another one by now.
   const model::Model known = comparison::known_model(plant::demo_plant().drive);
   EXPECT_THROW(live_.flash(known, say, shown), drive::DriveError);
@@ -176,7 +176,7 @@ TEST_F(WorkbenchLiveDrive, APreviewChangesNothingAndNothingElseThanItShowsIsFlas
   EXPECT_EQ(back["after"]["sha256"], shown.before);
   EXPECT_EQ(bench_.drive.store().sequence(), second);
   EXPECT_THROW(live_.restore(shown), drive::DriveError);
-  live_.restore(Shown{shown.after, shown.before});
+  live_.restore(PreviewedBlocks{shown.after, shown.before});
   EXPECT_EQ(live_.status()["block"]["sha256"], shown.before);
 }
 

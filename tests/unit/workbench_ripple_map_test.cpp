@@ -4,7 +4,7 @@
 #include <cmath>
 #include <nlohmann/json.hpp>
 
-#include "host/workbench/look.hpp"
+#include "host/workbench/result_view.hpp"
 #include "host/workbench/work.hpp"
 #include "tests/unit/comparison_test_drive.hpp"
 
@@ -26,7 +26,7 @@ json angle_map(int order) {
   estimation::PipelineOptions pipeline;
   pipeline.cutoff_hz = 120.0;
   const auto step = open(dataset, file, pipeline, [](std::string_view) {});
-  for (const json& of_signal : step->look()->maps())
+  for (const json& of_signal : step->view()->maps())
     if (of_signal["signal"] == "motor_balance")
       for (const json& map : of_signal["maps"])
         if (map["variable"] == "motor_angle") return map;

@@ -20,41 +20,41 @@ namespace {
 using namespace std::chrono_literals;
 
 // What the workers of a test tell the test, in memory that all of them see.
-struct Told {
+struct SharedCounts {
   std::atomic<int> workers{0};
   std::atomic<int> done{0};
 };
 class Supervisor : public ::testing::Test {
  protected:
   Supervisor() {
-    void* memory = mmap(nullptr, sizeof(Told), PROT_READ | PROT_WRITE, MAP_SHARED | MAP_ANONYMOUS, -1, 0);
-    told = new (memory) Told;
+    void* memory = mmap(nullptr, sizeof(SharedCounts), PROT_READ | PROT_WRITE, MAP_SHARED | MAP_ANONYMOUS, -1, 0);
+    told = new (memory) SharedCounts;
   }
-  ~Supervisor() override { munmap(told, sizeof(Told)); }
+  ~Supervisor() override { munmap(told, sizeof(SharedCounts)); }
 
   // The first worker does `first`; the second one is asked what it was told of the first, and all ends.
-  std::vector<Failure> failures_after(const std::function<void(JobBoard&)>& first, std::uint64_t memory_bytes = 0) {
+  std::vector<Failure> failures_after(const std::function<void(JobTable&)>& first, std::uint64_t memory_bytes = 0) {
     int pipe_ends[2];
     EXPECT_EQ(pipe(pipe_ends), 0);
-    JobBoard board;
-    supervise(board, {.work =
-                          [&](const std::vector<Failure>& failures) {
-                            ++told->workers;
-                            if (failures.empty()) {
-                              first(board);
-                              return;
-                            }
-                            std::string text;
-                            for (const Failure& f : failures) {
-                              text += f.why + '\n' + (f.is_known ? "known" : "unknown") + '\n';
-                              for (const Job& j : f.jobs) text += j.tab + '|' + j.what + '|' + j.key + '\n';
-                            }
-                            EXPECT_EQ(write(pipe_ends[1], text.data(), text.size()), static_cast<ssize_t>(text.size()));
-                            ++told->done;
-                            std::this_thread::sleep_for(60s);  // SIGTERM ends it
-                          },
-                      .ends = [&] { return told->done > 0; },
-                      .memory_bytes = memory_bytes});
+    JobTable jobs;
+    supervise(jobs, {.work =
+                         [&](const std::vector<Failure>& failures) {
+                           ++told->workers;
+                           if (failures.empty()) {
+                             first(jobs);
+                             return;
+                           }
+                           std::string text;
+                           for (const Failure& f : failures) {
+                             text += f.why + '\n' + (f.is_known ? "known" : "unknown") + '\n';
+                             for (const Job& j : f.jobs) text += j.tab + '|' + j.what + '|' + j.key + '\n';
+                           }
+                           EXPECT_EQ(write(pipe_ends[1], text.data(), text.size()), static_cast<ssize_t>(text.size()));
+                           ++told->done;
+                           std::this_thread::sleep_for(60s);  // SIGTERM ends it
+                         },
+                     .ends = [&] { return told->done > 0; },
+                     .memory_bytes = memory_bytes});
     close(pipe_ends[1]);
     std::string text(4096, '\0');
     text.resize(static_cast<std::size_t>(std::max<ssize_t>(0, read(pipe_ends[0], text.data(), text.size()))));
@@ -69,16 +69,16 @@ class Supervisor : public ::testing::Test {
     return failures;
   }
 
-  Told* told = nullptr;
+  SharedCounts* told = nullptr;
 };
 
 TEST_F(Supervisor, AnotherWorkerTakesThePlaceOfOneThatCrashesAndIsToldWhichJobCrashed) {
-  const auto failures = failures_after([](JobBoard& board) {
+  const auto failures = failures_after([](JobTable& jobs) {
     const estimation::CancellationCheck idle, mine;
-    const JobBoard::Entry other(&board, {"tab 1", "Showing curves", "a", false}, 1h, &idle);
+    const JobTable::Entry other(&jobs, {"tab 1", "Showing curves", "a", false}, 1h, &idle);
     std::thread([&] {
       const estimation::CancellationScope known_by(&mine);
-      const JobBoard::Entry entry(&board, {"tab 2", "Adding coulomb_friction", "b", true}, 1h, &mine);
+      const JobTable::Entry entry(&jobs, {"tab 2", "Adding coulomb_friction", "b", true}, 1h, &mine);
       raise(SIGSEGV);
     }).join();
   });
@@ -90,7 +90,7 @@ TEST_F(Supervisor, AnotherWorkerTakesThePlaceOfOneThatCrashesAndIsToldWhichJobCr
 }
 
 TEST_F(Supervisor, AWorkerThatIsKilledFromOutsideIsReplaced) {
-  const auto failures = failures_after([](JobBoard&) { kill(getpid(), SIGKILL); });
+  const auto failures = failures_after([](JobTable&) { kill(getpid(), SIGKILL); });
   EXPECT_EQ(told->workers, 2);
   EXPECT_NE(failures[0].why.find("signal 9"), std::string::npos) << failures[0].why;
   EXPECT_FALSE(failures[0].is_known);
@@ -98,9 +98,9 @@ TEST_F(Supervisor, AWorkerThatIsKilledFromOutsideIsReplaced) {
 
 TEST_F(Supervisor, AJobThatDoesNotEndIsEndedAtItsLimit) {
   const auto begin = std::chrono::steady_clock::now();
-  const auto failures = failures_after([](JobBoard& board) {
+  const auto failures = failures_after([](JobTable& jobs) {
     const estimation::CancellationCheck mine;
-    const JobBoard::Entry entry(&board, {"tab", "Identifying", "c", true}, 200ms, &mine);
+    const JobTable::Entry entry(&jobs, {"tab", "Identifying", "c", true}, 200ms, &mine);
     for (;;) std::this_thread::sleep_for(1s);
   });
   EXPECT_LT(std::chrono::steady_clock::now() - begin, 60s);
@@ -110,9 +110,9 @@ TEST_F(Supervisor, AJobThatDoesNotEndIsEndedAtItsLimit) {
 }
 
 TEST_F(Supervisor, AJobThatIsCancelledHasLessTimeThanOneThatIsNot) {
-  const auto failures = failures_after([](JobBoard& board) {
+  const auto failures = failures_after([](JobTable& jobs) {
     const estimation::CancellationCheck mine;
-    JobBoard::Entry entry(&board, {"tab", "Identifying", "c", true}, 1h, &mine);
+    JobTable::Entry entry(&jobs, {"tab", "Identifying", "c", true}, 1h, &mine);
     entry.hurry(100ms);
     for (;;) std::this_thread::sleep_for(1s);
   });
@@ -121,7 +121,7 @@ TEST_F(Supervisor, AJobThatIsCancelledHasLessTimeThanOneThatIsNot) {
 
 TEST_F(Supervisor, AWorkerGetsNoMoreMemoryThanItsLimit) {
   const auto failures = failures_after(
-      [](JobBoard&) {
+      [](JobTable&) {
         constexpr std::size_t kSmall = 8U << 20, kLarge = 1U << 30;
         const auto take = [](std::size_t bytes) {
           return mmap(nullptr, bytes, PROT_READ | PROT_WRITE, MAP_PRIVATE | MAP_ANONYMOUS, -1, 0) != MAP_FAILED;
@@ -133,9 +133,9 @@ TEST_F(Supervisor, AWorkerGetsNoMoreMemoryThanItsLimit) {
 }
 
 TEST_F(Supervisor, WorkersThatAllEndAtTheirBeginningAreGivenUp) {
-  JobBoard board;
+  JobTable jobs;
   EXPECT_THROW(
-      supervise(board, {.work = [&](const std::vector<Failure>&) { ++told->workers; }, .ends = [] { return false; }}),
+      supervise(jobs, {.work = [&](const std::vector<Failure>&) { ++told->workers; }, .ends = [] { return false; }}),
       std::runtime_error);
   EXPECT_EQ(told->workers, 5);
 }

@@ -107,11 +107,11 @@ TEST(WorkbenchWindow, PartsSegmentsAndLeavesOutWhatIsNotValid) {
   EXPECT_EQ(clipped(s.segments, s.time, 5.0, 6.0).size(), 0u);
 }
 
-TEST(WorkbenchWindow, JoinsNeighbouringRowsToStretches) {
+TEST(WorkbenchWindow, JoinsNeighbouringRowsToIntervals) {
   const std::vector<double> times{0.0, 0.1, 0.2, 1.0, 1.1, 5.0};
   const std::vector<std::pair<double, double>> expected{{0.0, 0.2}, {1.0, 1.1}, {5.0, 5.0}};
-  EXPECT_EQ(stretches(times, 0.15), expected);
-  EXPECT_TRUE(stretches({}, 0.1).empty());
+  EXPECT_EQ(intervals(times, 0.15), expected);
+  EXPECT_TRUE(intervals({}, 0.1).empty());
 }
 
 TEST(WorkbenchHistory, TakesStepsBackAndForth) {

@@ -14,7 +14,7 @@
 #                   it may be built with sanitizers
 #   --seconds N     time limit of the guest (60)
 #
-# Exit code: the script's; 77 where there is no kernel to be had (and why is printed); 124 when time ran out;
+# Exit code: the script's; 77 where no kernel can be installed (and why is printed); 124 when time ran out;
 # 3 when the twin went wrong.
 set -euo pipefail
 here=$(cd -- "$(dirname -- "${BASH_SOURCE[0]}")" && pwd)

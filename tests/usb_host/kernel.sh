@@ -4,7 +4,7 @@
 #
 #   kernel.sh FOLDER
 #
-# Exit code: 77 where there is no kernel to be had; why is printed.
+# Exit code: 77 where no kernel can be installed; why is printed.
 set -euo pipefail
 kernel=${1:?kernel.sh: a folder is needed}
 

@@ -74,7 +74,7 @@ echo "by flexspline flash --firmware:"
 refused "is for board other" flexspline flash --firmware /images/other.image
 refused "is truncated" flexspline flash --firmware /images/short.image
 refused "is damaged" flexspline flash --firmware /images/bad.image
-refused "is no firmware image" flexspline flash --firmware /images/noise.image
+refused "is not a firmware image" flexspline flash --firmware /images/noise.image
 refused "--older" flexspline flash --firmware /images/0.1.image
 device_is 0001 || fail "a refusal sent the drive to its boot loader"
 # On a terminal it shows how far it is.

@@ -55,7 +55,7 @@ class Usb:
 
 
 class Line:
-    """The same messages on a line of bytes: message and CRC-32, stuffed by COBS, then a nought."""
+    """The same messages on a line of bytes: message and CRC-32, stuffed by COBS, then a zero."""
 
     def __init__(self, read, write):
         self.read, self.write, self.buffer = read, write, b""

@@ -2,8 +2,8 @@
 import { act, download, type Balance, type Parameter, type State, type Step } from "./api";
 import { bar, button, el, fill, num, relative, times, unit, withUnit, words } from "./dom";
 import { errorOf, excessOf, floorOf, view, worstBalance } from "./store";
-import { ClosedPart } from "./closed";
-import { DrivePart } from "./drive";
+import { ClosedLoopPanel } from "./closed_loop";
+import { DrivePanel } from "./drive";
 
 type Do = (what: string, more?: Record<string, unknown>) => void;
 
@@ -13,18 +13,18 @@ function change(state: State, p: Parameter): string {
 }
 
 export class Add {
-  private readonly tabs = el("div", { class: "tabs", role: "tablist", "aria-label": "Parts of the fourth question" });
+  private readonly tabs = el("div", { class: "tabs", role: "tablist", "aria-label": "Parts of panel 4" });
   private readonly body = el("div", { class: "tabbody", role: "tabpanel", "aria-label": "Steps, parameters, files, closed loop or drive" });
   private readonly element_ = el("section", { class: "panel add", "aria-labelledby": "q4" }, el("div", { class: "row" }, el("h2", { id: "q4" }, el("b", {}, "4"), " Add it"), this.tabs), this.body);
   private part = "Steps";
   private state: State | null = null;
-  private readonly drive: DrivePart;
-  private readonly closed: ClosedPart;
+  private readonly drive: DrivePanel;
+  private readonly closed: ClosedLoopPanel;
   private readonly name = el("input", { type: "text", "data-key": "name", "aria-label": "Name of the file without its ending" });
 
   constructor(private readonly run: Do) {
-    this.drive = new DrivePart(run);
-    this.closed = new ClosedPart(run);
+    this.drive = new DrivePanel(run);
+    this.closed = new ClosedLoopPanel(run);
     this.tabs.addEventListener("keydown", (e) => {
       const all = Array.from(this.tabs.querySelectorAll<HTMLElement>("[role=tab]"));
       const next = all[all.indexOf(document.activeElement as HTMLElement) + (e.key === "ArrowRight" ? 1 : e.key === "ArrowLeft" ? -1 : NaN)];
@@ -96,14 +96,14 @@ export class Add {
     const p = state.pack;
     return el("div", { class: "save" },
       el("label", { class: "row" }, "Name ", input),
-      el("div", { class: "row actions" }, kinds.map(([what, ending, text]) => button(text, () => void this.keep(what, `${input.value}${ending}`), { "data-save": what, disabled: state.work !== null }))),
+      el("div", { class: "row actions" }, kinds.map(([what, ending, text]) => button(text, () => void this.save_(what, `${input.value}${ending}`), { "data-save": what, disabled: state.work !== null }))),
       el("p", { class: "soft" }, `Into ${state.folder}`), state.saved ? el("p", { class: "done", "data-saved": state.saved.what }, `✓ ${state.saved.file}`) : null,
-      el("div", { class: "row actions" }, "Download: ", [...kinds.map(([what]) => what), ...(state.has_dataset_text ? ["dataset"] : [])].map((what) => button(what, () => download(what), { class: "quiet", "aria-label": `Download ${what}`, "data-key": `download ${what}`, title: what === "dataset" ? "dataset.toml: which column is which, to be kept beside the recordings" : "" }))),
+      el("div", { class: "row actions" }, "Download: ", [...kinds.map(([what]) => what), ...(state.has_dataset_text ? ["dataset"] : [])].map((what) => button(what, () => download(what), { class: "quiet", "aria-label": `Download ${what}`, "data-key": `download ${what}`, title: what === "dataset" ? "dataset.toml: which column is which, to be kept in the folder of the recordings" : "" }))),
       el("div", { class: "row actions" }, button("Pack for a drive", () => this.run("pack"), { "data-pack": "", disabled: state.work !== null }),
         p ? el("span", { class: "done", "data-packed": "" }, `${p.bytes} bytes; fixed point is off by at most ${num(p.max_error_nm, 3)} N·m, ${num(100 * p.max_error_share_of_rated, 2)} % of rated torque (${words(p.worst_balance)} balance); ${p.bounds} bounds proven`) : null));
   }
 
-  private async keep(what: string, name: string): Promise<void> {
+  private async save_(what: string, name: string): Promise<void> {
     const exists = await act("save", { what, name }).then(() => null, (error: Error) => error);
     if (!exists) return;
     if (exists.message.includes("is there already")) {

@@ -113,7 +113,7 @@ export function download(what: string): void {
   link.click();
 }
 
-// A reload finds its tab again; a tab that was duplicated gets one of its own, which begins where the other stands.
+// A reload finds its tab again; a tab that was duplicated gets one of its own, which begins with the other's step.
 export async function openTab(): Promise<void> {
   const kept = sessionStorage.getItem("tab") ?? "";
   if (kept && (await isMine(kept))) {

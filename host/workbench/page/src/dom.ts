@@ -82,7 +82,7 @@ export function withUnit(value: number | null | undefined, of: string, digits = 
   return `${num(value, digits)} ${unit(of)}`.trim();
 }
 
-// "motor_balance" as people say it.
+// "motor_balance" in words.
 export function words(name: string): string {
   return name.replace(/_/g, " ");
 }
@@ -101,7 +101,7 @@ export function relative(before: number | null | undefined, after: number | null
   return size >= 1000 ? `×${num(after / before, 3)}` : `${percent < 0 ? "−" : "+"}${size < 0.01 ? "<0.01" : num(size, 2)} %`;
 }
 
-// A bar of a length between nought and one.
+// A bar of a length between zero and one.
 export function bar(share: number, kind: string): HTMLElement {
   return el("span", { class: `bar ${kind}`, "--share": Math.max(0, Math.min(1, share)).toFixed(4), "aria-hidden": "true" });
 }
@@ -110,7 +110,7 @@ export function button(text: string, press: () => void, attributes: Attributes =
   return el("button", { type: "button", click: press, "data-key": text, ...attributes }, text);
 }
 
-// Tells a screen reader.
+// For screen readers.
 export function announce(text: string): void {
   const said = document.getElementById("said");
   if (said) said.textContent = text;

@@ -2,13 +2,13 @@
 import type uPlot from "uplot";
 import { get, type BlockChange, type BlockView, type State } from "./api";
 import { announce, button, el, fill, num, relative, unit, words } from "./dom";
-import { MapPart } from "./map";
+import { MapPanel } from "./map";
 import { axes, Figure, line } from "./plots";
 
 interface Status { status: { given: string; connected: boolean; name?: string; serial?: string; board?: string; block: BlockView | null; problem: string; moving: boolean; simulated: boolean; came_back: boolean; again: { drive: string; attempts: number; why: string } | null }; in_reach: { drive: string; what: string; usable: boolean; problem: string }[] }
 interface Live { connected: boolean; problem: string; attempts: number; channels: { name: string; unit: string }[]; next: number; mode: string; samples: number[][] }
 
-// What another block changes, with how much of the value before that is.
+// What another block changes, with the relative change of each value.
 function changes(all: BlockChange[]): HTMLElement {
   const changed = all.filter((c) => c.change !== "same");
   const value = (c: BlockChange) => `${num(c.before, 5)} → ${num(c.after, 5)} ${unit(c.unit)}`;
@@ -16,13 +16,13 @@ function changes(all: BlockChange[]): HTMLElement {
     changed.length > 12 ? el("li", {}, `and ${changed.length - 12} more`) : null, changed.length ? null : el("li", {}, "nothing: the drive has these values already"));
 }
 
-export class DrivePart {
+export class DrivePanel {
   private readonly head = el("div", { class: "column" });
   private readonly readout = el("dl", { class: "live" });
   private readonly figure = new Figure(el("div", { class: "plot", role: "img", "aria-label": "Live signal of the drive" }));
   private readonly live = el("div", { class: "column grow" }, this.readout, this.figure.holder);
   private readonly choice = el("div", { class: "choice" });
-  private readonly map: MapPart;
+  private readonly map: MapPanel;
   private readonly right: HTMLElement;
   readonly element: HTMLElement;
   visible = false;
@@ -39,14 +39,14 @@ export class DrivePart {
   private state: State | null = null;
 
   constructor(private readonly run: (what: string, more?: Record<string, unknown>) => void) {
-    this.map = new MapPart(run);
+    this.map = new MapPanel(run);
     this.right = el("div", { class: "column grow" }, this.choice, this.live, this.map.element);
     this.element = el("div", { class: "drive" }, this.head, this.right);
   }
 
   render(state: State): void {
     this.state = state;
-    // A work that is over before the page hears of it changes the drive as well.
+    // A work that is over before the page has polled it changes the drive as well.
     const works = `${state.works_started} ${state.work === null}`;
     if (!this.status || this.works !== works) void this.refresh(state);
     this.works = works;
@@ -54,7 +54,7 @@ export class DrivePart {
     if (this.visible && !this.timer) this.listen();
   }
 
-  // Of two answers that are on their way the one that was asked for last holds, whichever comes first.
+  // Of two pending answers the one to the last request counts, whichever comes first.
   private async refresh(state: State): Promise<void> {
     const asked = ++this.asked;
     try {
@@ -76,7 +76,7 @@ export class DrivePart {
 
   private draw(state: State): void {
     const s = this.status?.status;
-    if (!this.status || !s) return fill(this.head, el("p", { class: "empty" }, "Looking for drives …"));
+    if (!this.status || !s) return fill(this.head, el("p", { class: "empty" }, "Searching for drives …"));
     this.right.hidden = !s.connected;
     this.live.hidden = this.showsMap;
     this.map.element.hidden = !this.showsMap;
@@ -102,7 +102,7 @@ export class DrivePart {
     const p = state.flash_preview;  // the server flashes nothing but what it shows
     fill(this.head, el("p", {}, el("strong", {}, `${s.serial} `), el("span", { class: "soft" }, `${s.board}; ${s.block ? `block “${s.block.model}”, ${s.block.bytes} bytes` : "no block"}`)),
       el("div", { class: "row actions" }, button("Flash this model", () => this.run("preview-flash"), { class: p ? "" : "main", disabled: off, "data-flash": "" }), button("Go back to the block before", () => this.run("preview-restore"), { disabled: off, "data-restore": "" }), button("Disconnect", () => { this.status = null; this.run("disconnect"); }, { class: "quiet", disabled: off })),
-      s.came_back ? el("p", { class: "soft", "data-back": "" }, "It was lost and is connected again. Nothing was done to it meanwhile: look whether its block is the one that you want.") : null,
+      s.came_back ? el("p", { class: "soft", "data-back": "" }, "It was lost and is connected again. Nothing was done to it meanwhile: check whether its block is the right one.") : null,
       p ? el("div", { class: "preview", "data-preview": p.restores ? "restore" : "flash" }, el("p", {}, el("strong", {}, p.restores ? "Going back would change:" : "Flashing would change:"), el("span", { class: "soft" }, ` ${p.before ? `“${p.before.model}”` : "no block"} → ${p.after ? `“${p.after.model}”` : "no block"}`)),
         el("div", { class: "row actions" }, button(p.restores ? "Go back" : "Flash it", () => this.run(p.restores ? "restore" : "flash", { before: p.before?.sha256 ?? "", after: p.after?.sha256 ?? "" }), { class: "main", disabled: off, "data-confirm": "" }), button("Leave it as it is", () => this.run("dismiss-preview"), { class: "quiet", disabled: off })),
         changes(p.changes), p.warnings.map((w) => el("p", { class: "high" }, w))) : null,
@@ -117,10 +117,10 @@ export class DrivePart {
       try {
         const answer = await get<Live>("live", { since: this.next });
         if (answer.connected) this.take(answer);
-        // A drive that went away while nobody did anything.
+        // A drive that was lost without an action of the user.
         const known = this.status?.status;
         if (this.state && known && (answer.connected !== known.connected || answer.attempts !== (known.again?.attempts ?? 0))) await this.refresh(this.state);
-      } catch { /* said elsewhere */ }
+      } catch { /* reported by the caller */ }
       this.timer = window.setTimeout(() => void round(), 200);
     };
     this.timer = window.setTimeout(() => void round(), 0);

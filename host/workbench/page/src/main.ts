@@ -1,15 +1,15 @@
-// The page: what the server says is drawn by four panels; what the user does goes to the server.
+// The page: four panels draw the server's state; the user's actions are sent to the server.
 import { act, get, openTab, Refusal, sendFiles, type Problem, type State } from "./api";
 import { Add } from "./add";
-import { Begin } from "./begin";
+import { NewProject } from "./new_project";
 import { announce, button, el, fill, fillOnce, words } from "./dom";
-import { Good } from "./good";
+import { FitQuality } from "./fit_quality";
 import { Missing } from "./missing";
 import { redrawAll } from "./plots";
 import { offerPlots } from "./plot_files";
-import { onLook, view } from "./store";
+import { onViewChange, view } from "./store";
 import "./style.css";
-import { Where } from "./where";
+import { ErrorLocation } from "./error_location";
 
 const top_ = document.getElementById("top") as HTMLElement;
 const panels = document.getElementById("panels") as HTMLElement;
@@ -18,7 +18,7 @@ const note = el("div", { class: "note", role: "alert", hidden: true });
 const help = el("dialog", { "aria-label": "Keys" });
 
 let state: State | null = null;
-let local: Problem | null = null;  // said by a request, not by work
+let local: Problem | null = null;  // reported by a request, not by work
 let wasDiagnosing = "";
 let shownAt = -1;
 
@@ -30,18 +30,18 @@ function complain(error: Error): void {
 function run(what: string, more: Record<string, unknown> = {}): void {
   local = null;
   if (what === "complain") return complain(new Error(String(more["what"])));
-  // A search for what is missing gives way to what the user wants, and begins again where the model is the same then.
-  const searching = (state?.work?.what.startsWith("Looking") && !["cancel", "diagnose", "dismiss", "disconnect", "empty-map"].includes(what)) || (state?.work?.what.startsWith("Reading") && what === "propose");
+  // A search for what is missing is cancelled by what the user starts, and begins again where the model is the same then.
+  const searching = (state?.work?.what.startsWith("Searching") && !["cancel", "diagnose", "dismiss", "disconnect", "empty-map"].includes(what)) || (state?.work?.what.startsWith("Reading") && what === "propose");
   (searching ? act("cancel").then(() => act(what, more)).finally(again) : act(what, more)).catch(complain);
 }
 
-// The search takes all cores, so what is to be seen first is drawn before it begins.
-const good = new Good(), where = new Where(() => setTimeout(() => { if (state) lookByItself(state); }, 50));
+// The search uses all cores, so the first panels are drawn before it begins.
+const good = new FitQuality(), where = new ErrorLocation(() => setTimeout(() => { if (state) searchAutomatically(state); }, 50));
 const missing = new Missing((effect) => run("add", { effect }), () => run("diagnose"));
 const add = new Add(run);
-const beginning = new Begin(run, () => picker.click());
+const beginning = new NewProject(run, () => picker.click());
 
-// Parts that stay: what work says changes many times a second, and its button shall be there to be pressed.
+// Parts that stay: the progress of work changes many times a second, and its button must stay in place.
 const title = el("p", { class: "about clip" }), warned = el("span"), stage = el("span", { class: "clip" });
 const working = el("div", { class: "work", role: "status" }, el("span", { class: "busy" }), stage, button("Cancel", () => run("cancel")));
 
@@ -56,14 +56,14 @@ function header(s: State): void {
     if (!working.isConnected) title.after(working);
   } else working.remove();
   const count = s.warnings?.length ?? 0;
-  fillOnce(warned, String(count), count ? button(`${count} warning${count > 1 ? "s" : ""}`, () => tell("Warnings", state?.warnings ?? []), { class: "quiet" }) : null);
+  fillOnce(warned, String(count), count ? button(`${count} warning${count > 1 ? "s" : ""}`, () => showMessages("Warnings", state?.warnings ?? []), { class: "quiet" }) : null);
 }
 
 const picker = el("input", { type: "file", multiple: true, accept: ".csv,.tsv,.txt,.dat,.asc,.log,.gz,.mat,.h5,.hdf5,.npz,.npy,.bag,.db3,.mcap", class: "unseen", "aria-label": "Add files", "data-key": "files" });
 picker.addEventListener("change", () => { void send(Array.from(picker.files ?? [])); picker.value = ""; });
 function filePicker(): HTMLElement { return picker; }
 
-function tell(title: string, lines: string[]): void {
+function showMessages(title: string, lines: string[]): void {
   const dialog = el("dialog", { "aria-label": title });
   dialog.append(el("h2", {}, title), el("ul", {}, lines.map((l) => el("li", {}, l))), button("Close", () => dialog.close()));
   dialog.addEventListener("close", () => dialog.remove());
@@ -97,18 +97,18 @@ function render(): void {
   add.render(s);
 }
 
-// What is missing is looked for by itself, once for each step.
-function lookByItself(s: State): void {
+// The search for what is missing starts by itself, once for each step.
+function searchAutomatically(s: State): void {
   const key = `${s.at} ${s.steps.length} ${s.steps[s.at]?.what ?? ""}`;
   if (!s.steps.length || s.proposal || s.diagnosis || s.work || !where.isShown || wasDiagnosing === key) return;
   wasDiagnosing = key;
-  // Something else may have begun meanwhile: then it is looked for after that.
+  // Something else may have begun meanwhile: then it starts after that.
   act("diagnose").catch((error: Error) => { if (error instanceof Refusal && error.status === 409) wasDiagnosing = ""; else complain(error); });
 }
-// A search that gave way begins again.
+// A search that was cancelled for another action begins again.
 function again(): void {
   wasDiagnosing = "";
-  if (state) lookByItself(state);
+  if (state) searchAutomatically(state);
 }
 
 async function follow(): Promise<void> {
@@ -120,13 +120,13 @@ async function follow(): Promise<void> {
       state = next;
       seen = next.changes;
       render();
-      lookByItself(state);
+      searchAutomatically(state);
     } catch (error) {
       if (error instanceof Refusal && error.status === 404) return location.reload();
       document.body.classList.add("lost");
       const isOther = error instanceof Refusal && error.status === 403;
       local = { during: "", what: isOther ? "Another workbench answers here: the one of this page has ended. Open the address that the new one printed."
-        : "The workbench does not answer. If it was ended, start it again and open the address that it prints; else this page goes on where it was when it answers.", findings: [] };
+        : "The workbench does not answer. If it was ended, start it again and open the address that it prints; else this page continues as soon as it answers.", findings: [] };
       problem(local);
       await new Promise((later) => setTimeout(later, 1500));
       local = null;
@@ -138,7 +138,7 @@ async function send(files: File[]): Promise<void> {
   local = null;
   if (!files.length) return;
   try {
-    const searching = state?.work?.what.startsWith("Looking");
+    const searching = state?.work?.what.startsWith("Searching");
     if (searching) await act("cancel");
     await sendFiles(files).finally(() => { if (searching) again(); });
   } catch (error) {
@@ -157,7 +157,7 @@ function toggleTheme(): void {
 }
 
 function keys(): void {
-  fill(help, el("h2", {}, "Keys"), el("dl", {}, [["1 2 3 4", "to the four questions"], ["Tab, arrows", "through experiments, maps, candidates"], ["in curves: ← →  + −  0", "pan, zoom, show all; wheel and drag zoom, Shift and drag pans"],
+  fill(help, el("h2", {}, "Keys"), el("dl", {}, [["1 2 3 4", "to the four panels"], ["Tab, arrows", "through experiments, maps, candidates"], ["in curves: ← →  + −  0", "pan, zoom, show all; wheel and drag zoom, Shift and drag pans"],
     ["in a map: ← →", "mark a region; it shows in the curves; Esc clears it"], ["Ctrl+Z, Ctrl+Y", "undo, redo"], ["?", "this"]].map(([k, t]) => el("div", {}, el("dt", {}, k), el("dd", {}, t)))), button("Close", () => help.close()));
   addEventListener("keydown", (e) => {
     const typing = e.target instanceof HTMLInputElement || e.target instanceof HTMLSelectElement;
@@ -182,8 +182,8 @@ function dropping(): void {
 
 async function begin(): Promise<void> {
   const dark = matchMedia("(prefers-color-scheme: dark)");
-  const kept = localStorage.getItem("theme");
-  theme(kept ? kept === "dark" : dark.matches);
+  const stored = localStorage.getItem("theme");
+  theme(stored ? stored === "dark" : dark.matches);
   dark.addEventListener("change", () => { if (!localStorage.getItem("theme")) theme(dark.matches); });
   top_.append(el("h1", {}, "Flexspline"), el("p", { class: "about" }, "Loading …"));
   panels.append(good.element, where.element, missing.element, add.element);
@@ -192,7 +192,7 @@ async function begin(): Promise<void> {
   panels.after(beginning.element);
   keys();
   dropping();
-  onLook(() => { if (state?.steps.length) { good.render(state); where.render(state); add.render(state); } });
+  onViewChange(() => { if (state?.steps.length) { good.render(state); where.render(state); add.render(state); } });
   try {
     await openTab();
   } catch (error) {

@@ -1,4 +1,4 @@
-// The residual map that the drive keeps: measured less modelled torque of the motor over velocity and motor angle.
+// The residual map of the drive: measured less modelled torque of the motor over velocity and motor angle.
 import { get, type State } from "./api";
 import { button, el, fill, num, unit } from "./dom";
 
@@ -15,8 +15,8 @@ function inWords(f: Finding): string {
   return `${what} (± ${num(f.std_nm, 2)}; by chance ${f.p_value < 1e-12 ? "below 10⁻¹²" : num(f.p_value, 1)})`;
 }
 
-export class MapPart {
-  private readonly head = el("div", { class: "maphead", "data-scroll": "map", tabindex: 0, role: "region", "aria-label": "What the drive's residual map says" });
+export class MapPanel {
+  private readonly head = el("div", { class: "maphead", "data-scroll": "map", tabindex: 0, role: "region", "aria-label": "The drive's residual map" });
   private readonly grid = el("div", { class: "map", role: "img" });
   readonly actions = el("span", { class: "choice" });
   readonly element = el("div", { class: "column grow mappart" }, this.head, this.grid);
@@ -24,23 +24,23 @@ export class MapPart {
   private map: DriveMap | null = null;
   private timer = 0;
   private asking = false;
-  private tell = () => undefined as void;
+  private update = () => undefined as void;
 
   constructor(private readonly run: (what: string, more?: Record<string, unknown>) => void) {}
 
   // `simulated`: the workbench moves no other drive.
   render(state: State, simulated: boolean, drive: string): void {
-    this.tell = () => this.say(state, simulated, drive);
-    this.tell();
+    this.update = () => this.renderHead(state, simulated, drive);
+    this.update();
     if (this.visible && !this.timer) void this.follow();
   }
 
-  private say(state: State, simulated: boolean, drive: string): void {
+  private renderHead(state: State, simulated: boolean, drive: string): void {
     const off = state.work !== null, m = this.map;
-    fill(this.actions, simulated ? [button("Move the twin", () => this.run("move"), { "data-move": "", disabled: off, title: "to and fro, fast to creeping, with its model fed forward" }), button("Empty it", () => this.run("empty-map"), { class: "quiet", disabled: off })] : null);
+    fill(this.actions, simulated ? [button("Move the twin", () => this.run("move"), { "data-move": "", disabled: off, title: "back and forth, fast to creeping, with feedforward of its model" }), button("Empty it", () => this.run("empty-map"), { class: "quiet", disabled: off })] : null);
     fill(this.head, this.verdict(m),
       m && !m.problem ? el("p", { class: "soft clip" }, `${num(m.seconds, 3)} s in it, of the block “${m.model}”; nothing below ${num(m.limit_nm, 2)} N·m counts.`) : null,
-      simulated ? null : el("p", { class: "soft" }, "It fills while the drive moves with its model fed forward. Disconnect, then: ", el("code", {}, `flexspline record --compensate --drive ${drive} --plan PLAN.toml --out DIR`)));
+      simulated ? null : el("p", { class: "soft" }, "It fills while the drive moves with feedforward of its model. Disconnect, then: ", el("code", {}, `flexspline record --compensate --drive ${drive} --plan PLAN.toml --out DIR`)));
   }
 
   private verdict(m: DriveMap | null): HTMLElement {
@@ -49,11 +49,11 @@ export class MapPart {
     const fits = m.verdict === "model_fits", little = m.verdict === "too_little_data";
     return el("div", { "data-map": m.verdict },
       el("p", { class: `verdict ${fits ? "fine" : little ? "open" : "bad"}` }, el("span", { class: "sign", "aria-hidden": "true" }, fits ? "✓" : little ? "?" : "!"),
-        fits ? `The model on the drive fits at the ${m.judged_velocities} velocities that were seen.` : little ? "Too little to judge by: the drive has to move." : "The model on the drive fails here:"),
+        fits ? `The model on the drive fits at the ${m.judged_velocities} velocities that were seen.` : little ? "Too little data: the drive has to move." : "The model on the drive fails here:"),
       m.findings.length ? el("ul", {}, m.findings.slice(0, 2).map((f) => el("li", {}, inWords(f))), m.findings.length > 2 ? el("li", {}, `and ${m.findings.length - 2} more`) : null) : null);
   }
 
-  // Again and again while it is looked at.
+  // Repeatedly while it is shown.
   private async follow(): Promise<void> {
     this.timer = window.setTimeout(() => { this.timer = 0; if (this.visible) void this.follow(); }, 3000);
     if (this.asking) return;
@@ -62,9 +62,9 @@ export class MapPart {
       const next = await get<DriveMap>("map");
       // While it moves the map of before stays.
       if (!next.problem || !this.map) this.map = next;
-      this.tell();
+      this.update();
       this.draw();
-    } catch { /* said elsewhere */ }
+    } catch { /* reported by the caller */ }
     this.asking = false;
   }
 
@@ -73,9 +73,9 @@ export class MapPart {
   private draw(): void {
     const m = this.map;
     if (!m || m.problem) return fill(this.grid);
-    // What is of no account stays pale.
+    // Values that do not matter stay pale.
     const largest = Math.max(5 * m.limit_nm, ...m.rows.map((r) => Math.max(...r.mean_nm.map((v) => Math.abs(v ?? 0)))));
-    this.grid.setAttribute("aria-label", `Residual map: velocity bins by motor angle, up to ${num(largest, 3)} N·m. The findings are said above.`);
+    this.grid.setAttribute("aria-label", `Residual map: velocity bins by motor angle, up to ${num(largest, 3)} N·m. The findings are listed above.`);
     this.grid.dataset.seconds = m.seconds.toFixed(2);
     const cell = (v: number | null | undefined, ticks: number) => el("i", ticks && largest > 0 ? { class: (v ?? 0) >= 0 ? "up" : "down", "--share": (Math.abs(v ?? 0) / largest).toFixed(3) } : { class: "nothing" });
     const rows = [...m.rows].reverse().filter((r) => r.ticks.some((t) => t > 0));

@@ -13,7 +13,7 @@ function certainty(c: Candidate, found: Diagnosis): string {
   const named = found.named.some((n) => label(n) === label(c));
   const score = c.score ?? 0, falls = c.chi2_fall_percent ?? 0;
   if (falls < 0 || score < 0) return "makes left-out data worse";
-  if (named) return found.named.length > 1 ? "likely; cannot be told from its rivals" : score >= 200 ? "beyond doubt" : score >= 20 ? "sure" : "weak";
+  if (named) return found.named.length > 1 ? "likely; cannot be distinguished from other effects" : score >= 200 ? "certain" : score >= 20 ? "sure" : "weak";
   if (score < 10) return "could be chance";
   if (falls < 0.5) return "real, but explains next to nothing";
   return found.named.length ? "helps, but explains less than the best" : score >= 20 ? "real, but not all of it" : "weak";
@@ -29,16 +29,16 @@ export class Missing {
   private chosen = "";
   private key = "";
 
-  constructor(private readonly add: (effect: string) => void, private readonly look: () => void) {}
+  constructor(private readonly add: (effect: string) => void, private readonly search: () => void) {}
 
   render(state: State): void {
     const key = [state.at, state.steps.length, state.steps[state.at]?.what].join("|");
     if (key !== this.key) { this.key = key; this.chosen = ""; }
     const found = state.diagnosis;
     if (!found) {
-      fill(this.body, state.work?.what.startsWith("Looking")
+      fill(this.body, state.work?.what.startsWith("Searching")
         ? el("div", { class: "waiting" }, el("p", {}, "Trying every effect of the catalogue on data that the fit did not see."), el("p", { class: "soft" }, state.work.stage || "…"), el("div", { class: "busy" }))
-        : el("div", { class: "waiting" }, el("p", {}, state.work ? "Waiting for the model." : "Not looked for yet."), button("Look for what is missing", this.look, { class: "main", disabled: state.work !== null })));
+        : el("div", { class: "waiting" }, el("p", {}, state.work ? "Waiting for the model." : "Not searched for yet."), button("Search for what is missing", this.search, { class: "main", disabled: state.work !== null })));
       return;
     }
     const good = found.verdict === "at_noise_floor", none = found.named.length === 0;
@@ -50,7 +50,7 @@ export class Missing {
     const list = el("div", { class: "column candidates" },
       el("p", { class: `verdict ${good ? "fine" : none ? "open" : "bad"}`, "data-verdict": found.verdict }, el("span", { class: "sign", "aria-hidden": "true" }, good ? "✓" : none ? "?" : "!"), sentence(found)),
       unknown ? el("div", { class: "choice" }, button("Its shape", () => { this.chosen = ""; this.render(state); }, { "aria-pressed": chosen ? "false" : "true" })) : null,
-      found.named.length > 1 ? el("p", { class: "rivals" }, el("strong", {}, "To tell them apart: "), found.candidates.find((c) => label(c) === first)?.separating_experiment ?? "flexspline plan --separate designs a motion", ".") : null,
+      found.named.length > 1 ? el("p", { class: "rivals" }, el("strong", {}, "To distinguish them: "), found.candidates.find((c) => label(c) === first)?.separating_experiment ?? "flexspline plan --separate designs a motion", ".") : null,
       shown.length ? el("div", { class: "side", role: "listbox", "aria-label": "Candidates, best first", "data-scroll": "candidates",
         keydown: ((e: KeyboardEvent) => this.arrows(e)) as (event: never) => void }, shown.map((c) => this.row(c, found, state))) : null);
     fill(this.body, list, el("div", { class: "column grow details", "data-scroll": "details", tabindex: 0, role: "region", "aria-label": "What it means" },
@@ -72,19 +72,19 @@ export class Missing {
     const falls = c.rmse_cv_before && c.rmse_cv_after !== null ? 1 - c.rmse_cv_after / c.rmse_cv_before : 0;
     return el("div", { role: "option", tabindex: chosen || (!this.chosen && c.rank === 1) ? 0 : -1, "aria-selected": chosen ? "true" : "false", "data-key": `candidate ${name}`, "data-effect": name, class: named ? "named" : "",
         click: () => { this.chosen = name; this.render(state); } },
-      el("span", { class: "name" }, inWords(c)), el("span", { class: "figure", title: "fall of the error on left-out data" }, falls > 0 ? `−${num(100 * falls, 3)} %` : "0 %"), bar(falls, named ? "named" : "bad"),
+      el("span", { class: "name" }, inWords(c)), el("span", { class: "figure", title: "decrease of the error on left-out data" }, falls > 0 ? `−${num(100 * falls, 3)} %` : "0 %"), bar(falls, named ? "named" : "bad"),
       el("span", { class: "marks soft" }, certainty(c, found)));
   }
 
   private details(c: Candidate, found: Diagnosis, state: State): HTMLElement[] {
     const part = (title: string, text: string | null) => (text ? el("p", {}, el("strong", {}, `${title} `), text) : el("span"));
     return [
-      el("div", { class: "row" }, el("strong", { class: "clip" }, inWords(c)), button(`Add ${inWords(c)}`, () => this.add(label(c)), { class: "main", "data-add": label(c), disabled: !c.admissible || (state.work !== null && !state.work.what.startsWith("Looking")) })),
+      el("div", { class: "row" }, el("strong", { class: "clip" }, inWords(c)), button(`Add ${inWords(c)}`, () => this.add(label(c)), { class: "main", "data-add": label(c), disabled: !c.admissible || (state.work !== null && !state.work.what.startsWith("Searching")) })),
       part("", c.explanation), c.equation ? el("p", { class: "equation" }, c.equation) : el("span"),
       c.evidence?.bins.length ? this.figure.holder : el("span"),
-      el("p", {}, el("strong", {}, "Evidence: "), `on left-out data the error of the ${c.balance} balance goes from ${withUnit(c.rmse_cv_before, c.unit)} to ${withUnit(c.rmse_cv_after, c.unit)}` +
+      el("p", {}, el("strong", {}, "Evidence: "), `on left-out data the error of the ${c.balance} balance decreases from ${withUnit(c.rmse_cv_before, c.unit)} to ${withUnit(c.rmse_cv_after, c.unit)}` +
         (found.base.noise_floor ? `; noise is ${withUnit(found.base.noise_floor, c.unit)}` : "") + `. ${certainty(c, found)}.`),
-      part("", c.note), c.rivals.length ? part("Rivals:", `${c.rivals.map(words).join(", ")}. What tells them apart: ${c.separating_experiment ?? "unknown"}.`) : el("span"),
+      part("", c.note), c.rivals.length ? part("Cannot be distinguished from:", `${c.rivals.map(words).join(", ")}. What distinguishes them: ${c.separating_experiment ?? "unknown"}.`) : el("span"),
       part("What it does:", c.consequence), part("Usual causes:", c.causes), part("Check on the machine:", c.check),
     ];
   }
@@ -101,7 +101,7 @@ export class Missing {
     return [
       el("div", { class: "row" }, el("strong", {}, `Its shape over ${words(u.variable)}${u.times_direction ? ", times the direction of motion" : ""}`),
         button("Add this curve", () => this.add(u.effect), { class: "main", "data-add": u.effect, disabled: state.work !== null })),
-      el("p", {}, `${num(u.chi2_fall_percent, 3)} % of the squared error on left-out data goes with this curve. No effect of the catalogue has its shape.`),
+      el("p", {}, `${num(u.chi2_fall_percent, 3)} % of the squared error on left-out data is explained by this curve. No effect of the catalogue has its shape.`),
       this.figure.holder, el("p", {}, el("strong", {}, "Record next: "), u.record_next, "."),
     ];
   }

@@ -48,7 +48,7 @@ export function svgOf(u: uPlot): string {
   const text = (s: string) => s.replace(/[&<>"]/g, (c) => ({ "&": "&amp;", "<": "&lt;", ">": "&gt;", '"': "&quot;" })[c] ?? c);
   const at = (v: number, scale: string) => (u.valToPos(v, scale, true) / ratio).toFixed(2);
   const parts: string[] = [];
-  // What uPlot drew beside the ticks is kept by it under names that its types do not have.
+  // uPlot stores its axis labels in fields that its type definitions do not have.
   const ticks = (axis: number) => u.axes[axis] as unknown as { _splits?: number[]; _values?: (string | null)[]; scale?: string };
   for (const axis of [0, 1]) {
     const { _splits = [], _values = [] } = ticks(axis), scale = u.axes[axis]?.scale ?? (axis === 0 ? "x" : "y");

@@ -101,7 +101,7 @@ export function line(name: string, more: Partial<uPlot.Series> = {}): uPlot.Seri
 }
 export const kHidden: uPlot.Series = { width: 0, points: { show: false }, stroke: "transparent" };
 
-// Fills [low, high] at all x, or stretches of x at all y, under the curves.
+// Fills [low, high] at all x, or intervals of x at all y, under the curves.
 export function shade(u: uPlot, fill: string, from: number, to: number, along: "x" | "y"): void {
   const { left, top, width, height } = u.bbox;
   const a = u.valToPos(from, along, true), b = u.valToPos(to, along, true);
@@ -117,7 +117,7 @@ export function shade(u: uPlot, fill: string, from: number, to: number, along: "
   u.ctx.restore();
 }
 
-// Velocities and travels are told apart near nought: the axis is stretched there.
+// Velocities and travels are distinguished near zero: the axis is stretched there.
 export function stretchedScale(x: number[]): Partial<uPlot.Scale> {
   const sizes = x.map(Math.abs).filter((v) => v > 0);
   const largest = Math.max(...sizes), least = Math.min(...sizes);

@@ -1,4 +1,4 @@
-// What the page is looking at, shared by its panels.
+// What the page shows at present, shared by its panels.
 import type { Balance, Experiment, State } from "./api";
 
 export interface Brush { variable: string; low: number; high: number; unit: string; list: { experiment: string; rows: number; stretches: [number, number][] }[] }
@@ -12,8 +12,8 @@ export const view = {
 
 type Listener = () => void;
 const listeners = new Set<Listener>();
-export function onLook(listener: Listener): void { listeners.add(listener); }
-export function looked(): void { for (const listener of listeners) listener(); }
+export function onViewChange(listener: Listener): void { listeners.add(listener); }
+export function viewChanged(): void { for (const listener of listeners) listener(); }
 
 // On motions that the fit never saw, where there are any.
 export function errorOf(b: Balance): number | null { return b.holdout ?? b.fit; }
@@ -26,7 +26,7 @@ export function excessOf(b: Balance | undefined): number | null {
 export function worstBalance(balances: Balance[]): Balance | undefined {
   return [...balances].sort((a, b) => (excessOf(b) ?? 0) - (excessOf(a) ?? 0))[0];
 }
-// The balance that the present look is about; free runs have none of their own.
+// The balance that is shown at present; free runs have none of their own.
 export function balanceInView(state: State): Balance | undefined {
   return state.balances.find((b) => b.signal === view.signal) ?? worstBalance(state.balances);
 }

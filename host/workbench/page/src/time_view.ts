@@ -31,11 +31,11 @@ export class TimeView {
     for (const holder of [this.upper.holder, this.lower.holder]) {
       holder.addEventListener("wheel", (e) => this.wheeled(e), { passive: false });
       holder.addEventListener("pointerdown", (e) => this.dragged(e));
-      holder.addEventListener("dblclick", () => this.look(this.shown?.begin ?? 0, this.shown?.end ?? 1));
+      holder.addEventListener("dblclick", () => this.showRange(this.shown?.begin ?? 0, this.shown?.end ?? 1));
     }
   }
 
-  // `key` tells whether curves must be fetched anew.
+  // `key` tells whether curves must be fetched again.
   show(shown: Shown, key: string): void {
     const same = this.shown?.experiment === shown.experiment && this.shown.begin === shown.begin && this.shown.end === shown.end;
     this.shown = shown;
@@ -96,7 +96,7 @@ export class TimeView {
     if (!covers || !fine) void this.fetch(false);
   }
 
-  look(from: number, to: number): void {
+  showRange(from: number, to: number): void {
     const shown = this.shown;
     if (!shown) return;
     const whole = shown.end - shown.begin;
@@ -130,7 +130,7 @@ export class TimeView {
           if (u.select.width < 4) return;
           const from = u.posToVal(u.select.left, "x"), to = u.posToVal(u.select.left + u.select.width, "x");
           u.setSelect({ left: 0, top: 0, width: 0, height: 0 }, false);
-          this.look(from, to);
+          this.showRange(from, to);
         }],
         setCursor: [(u) => this.read(u)],
       },
@@ -168,12 +168,12 @@ export class TimeView {
     const span = this.to - this.from;
     if (e.shiftKey || Math.abs(e.deltaX) > Math.abs(e.deltaY)) {
       const by = ((e.deltaX || e.deltaY) / 600) * span;
-      return this.look(this.from + by, this.to + by);
+      return this.showRange(this.from + by, this.to + by);
     }
     const box = plot.over.getBoundingClientRect();
     const share = Math.min(1, Math.max(0, (e.clientX - box.left) / box.width)), factor = Math.exp(e.deltaY / 400);
     const centre = this.from + share * span;
-    this.look(centre - share * span * factor, centre + (1 - share) * span * factor);
+    this.showRange(centre - share * span * factor, centre + (1 - share) * span * factor);
   }
 
   // With shift, or the middle button: pan. Else uPlot selects what to zoom into.
@@ -182,7 +182,7 @@ export class TimeView {
     e.preventDefault();
     e.stopPropagation();
     const from = this.from, span = this.to - this.from, width = this.upper.plot.over.clientWidth, start = e.clientX;
-    const move = (m: PointerEvent) => { const by = ((start - m.clientX) / width) * span; this.look(from + by, from + by + span); };
+    const move = (m: PointerEvent) => { const by = ((start - m.clientX) / width) * span; this.showRange(from + by, from + by + span); };
     const end = () => { removeEventListener("pointermove", move); removeEventListener("pointerup", end); };
     addEventListener("pointermove", move);
     addEventListener("pointerup", end);
@@ -191,9 +191,9 @@ export class TimeView {
   private pressed(e: KeyboardEvent): void {
     const span = this.to - this.from, step = 0.15 * span;
     const keys: Record<string, () => void> = {
-      ArrowLeft: () => this.look(this.from - step, this.to - step), ArrowRight: () => this.look(this.from + step, this.to + step),
-      "+": () => this.look(this.from + 0.2 * span, this.to - 0.2 * span), "-": () => this.look(this.from - 0.35 * span, this.to + 0.35 * span),
-      "0": () => this.look(this.shown?.begin ?? 0, this.shown?.end ?? 1),
+      ArrowLeft: () => this.showRange(this.from - step, this.to - step), ArrowRight: () => this.showRange(this.from + step, this.to + step),
+      "+": () => this.showRange(this.from + 0.2 * span, this.to - 0.2 * span), "-": () => this.showRange(this.from - 0.35 * span, this.to + 0.35 * span),
+      "0": () => this.showRange(this.shown?.begin ?? 0, this.shown?.end ?? 1),
     };
     const act = keys[e.key === "=" ? "+" : e.key];
     if (!act || e.ctrlKey || e.metaKey || e.altKey) return;

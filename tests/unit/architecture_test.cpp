@@ -1,0 +1,443 @@
+// Keeps the rules of the architecture: who may include whom, what shared/ may use, where heavy headers stand.
+// Each rule is a function over source texts, so that it is also tried on made-up texts that break it.
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <array>
+#include <cctype>
+#include <filesystem>
+#include <fstream>
+#include <iterator>
+#include <map>
+#include <set>
+#include <string>
+#include <string_view>
+#include <vector>
+
+namespace {
+
+namespace fs = std::filesystem;
+
+struct SourceFile {
+  std::string path;  // from the project's root, with forward slashes
+  std::string text;
+};
+using Violations = std::vector<std::string>;
+
+constexpr std::array<std::string_view, 6> kTopFolders = {"shared", "firmware", "boards", "hil", "host", "tests"};
+constexpr long kMaxLines = 500;
+
+const std::map<std::string, std::set<std::string>, std::less<>> kMayInclude = {
+    {"shared", {"shared"}},
+    {"firmware", {"firmware", "shared"}},
+    {"boards", {"boards", "firmware", "shared"}},
+    {"hil", {"hil", "firmware", "shared"}},
+    {"host", {"host", "shared"}},
+    {"tests", {"shared", "firmware", "boards", "hil", "host", "tests"}},
+};
+
+// Headers that need neither heap nor floating point nor an operating system.
+const std::set<std::string, std::less<>> kFreestandingHeaders = {
+    "array",  "bit",  "climits",     "compare", "concepts",    "cstddef", "cstdint", "cstring", "initializer_list",
+    "limits", "span", "string_view", "tuple",   "type_traits", "utility", "version"};
+
+// Each costs many seconds a file under sanitizers, so each stands in one file of the folders that need it.
+const std::map<std::string, std::set<std::string>, std::less<>> kHeavyHeaders = {
+    {"toml++/toml.hpp", {"host", "hil"}}, {"toml++/toml.h", {"host", "hil"}},     {"CLI/CLI.hpp", {"host", "hil"}},
+    {"ceres/ceres.h", {"host"}},          {"matio.h", {"host", "tests"}},         {"hdf5.h", {"host", "tests"}},
+    {"sqlite3.h", {"host", "tests"}},     {"hidapi/hidapi.h", {"host", "tests"}}, {"httplib.h", {"host"}},
+    {"libusb-1.0/libusb.h", {"host"}},
+};
+
+std::string top_folder(std::string_view path) {
+  return std::string(path.substr(0, path.find('/')));
+}
+
+bool ends_with_any(std::string_view path, std::initializer_list<std::string_view> endings) {
+  return std::any_of(endings.begin(), endings.end(), [&](std::string_view end) { return path.ends_with(end); });
+}
+
+bool is_cpp(std::string_view path) {
+  return ends_with_any(path, {".hpp", ".cpp", ".h", ".c"});
+}
+bool is_header(std::string_view path) {
+  return ends_with_any(path, {".hpp", ".h"});
+}
+
+bool is_word(char c) {
+  return std::isalnum(static_cast<unsigned char>(c)) != 0 || c == '_';
+}
+
+// The text with comments and the contents of string and character literals blanked; lines stay where they are.
+// Texts between quotes are kept on #include lines, where they are the name of a header.
+std::string code_only(std::string_view text) {
+  std::string out;
+  out.reserve(text.size());
+  std::size_t i = 0;
+  const auto at = [&](std::size_t k) { return k < text.size() ? text[k] : '\0'; };
+  const auto blank_to = [&](std::size_t end) {
+    for (end = std::min(end, text.size()); i < end; ++i) out += text[i] == '\n' ? '\n' : ' ';
+  };
+  const auto on_include_line = [&] {
+    const std::size_t start = out.rfind('\n') == std::string::npos ? 0 : out.rfind('\n') + 1;
+    const std::size_t hash = out.find_first_not_of(" \t", start);
+    return hash != std::string::npos && out[hash] == '#' && out.find("include", hash) != std::string::npos;
+  };
+  while (i < text.size()) {
+    if (at(i) == '/' && at(i + 1) == '/') {
+      blank_to(text.find('\n', i));
+    } else if (at(i) == '/' && at(i + 1) == '*') {
+      const std::size_t end = text.find("*/", i + 2);
+      blank_to(end == std::string_view::npos ? end : end + 2);
+    } else if (is_word(at(i))) {
+      // A whole word or number at once, so that the quote in 1'000 opens no literal.
+      const bool number = std::isdigit(static_cast<unsigned char>(at(i))) != 0;
+      const std::size_t start = i;
+      while (is_word(at(i)) || (number && at(i) == '\'' && is_word(at(i + 1)))) out += text[i++];
+      const std::string_view word = text.substr(start, i - start);
+      if (at(i) == '"' && (word == "R" || word == "u8R" || word == "uR" || word == "UR" || word == "LR")) {
+        const std::size_t open = text.find('(', i);
+        if (open == std::string_view::npos) continue;
+        const std::string close = ")" + std::string(text.substr(i + 1, open - i - 1)) + "\"";
+        const std::size_t end = text.find(close, open);
+        blank_to(end == std::string_view::npos ? end : end + close.size());
+      }
+    } else if ((at(i) == '"' || at(i) == '\'') && !on_include_line()) {
+      std::size_t end = i + 1;
+      while (end < text.size() && text[end] != text[i] && text[end] != '\n') end += text[end] == '\\' ? 2 : 1;
+      blank_to(end + 1);
+    } else {
+      out += text[i++];
+    }
+  }
+  return out;
+}
+
+struct Line {
+  long number;
+  std::string_view text;
+};
+
+std::vector<Line> lines_of(std::string_view text) {
+  std::vector<Line> lines;
+  for (std::size_t start = 0; start < text.size();) {
+    const std::size_t end = std::min(text.find('\n', start), text.size());
+    lines.push_back({static_cast<long>(lines.size()) + 1, text.substr(start, end - start)});
+    start = end + 1;
+  }
+  return lines;
+}
+
+std::string place(const SourceFile& file, long line) {
+  return file.path + ":" + std::to_string(line) + ": ";
+}
+
+struct Include {
+  long line;
+  char kind;  // '"' or '<'; '?' for a name that is computed by a macro
+  std::string name;
+};
+
+std::vector<Include> includes_of(const SourceFile& file) {
+  std::vector<Include> includes;
+  const std::string code = code_only(file.text);
+  for (const Line& line : lines_of(code)) {
+    const std::size_t hash = line.text.find_first_not_of(" \t");
+    if (hash == std::string_view::npos || line.text[hash] != '#') continue;
+    const std::size_t word = line.text.find_first_not_of(" \t", hash + 1);
+    if (word == std::string_view::npos || !line.text.substr(word).starts_with("include")) continue;
+    const std::size_t open = line.text.find_first_of("\"<", word);
+    const std::size_t close = open == std::string_view::npos ? open : line.text.find_first_of("\">", open + 1);
+    if (close == std::string_view::npos) {
+      includes.push_back({line.number, '?', std::string(line.text)});
+    } else {
+      includes.push_back({line.number, line.text[open], std::string(line.text.substr(open + 1, close - open - 1))});
+    }
+  }
+  return includes;
+}
+
+Violations broken_arrows(const std::vector<SourceFile>& files) {
+  Violations found;
+  for (const SourceFile& file : files) {
+    const std::string folder = top_folder(file.path);
+    const auto rule = kMayInclude.find(folder);
+    if (!is_cpp(file.path) || rule == kMayInclude.end()) continue;
+    for (const Include& include : includes_of(file)) {
+      const std::string target = top_folder(include.name);
+      const bool ours = include.name.find('/') != std::string::npos && kMayInclude.contains(target);
+      const bool climbs = include.name.find("..") != std::string::npos;
+      if (include.kind == '?' || climbs || (include.kind == '"' && !ours)) {
+        found.push_back(place(file, include.line) + "includes " + include.name +
+                        "; write our own headers as \"folder/...\" from the project's root, others as <...>");
+      } else if (ours && !rule->second.contains(target)) {
+        found.push_back(place(file, include.line) + folder + " may not include " + target + " (" + include.name + ")");
+      } else if (!ours && folder == "shared" && !kFreestandingHeaders.contains(include.name)) {
+        found.push_back(place(file, include.line) + "shared may not include <" + include.name + ">");
+      }
+    }
+  }
+  return found;
+}
+
+// What shared/ may not use: heap, exceptions, and functions that its number systems have to supply.
+Violations forbidden_in_shared(const std::vector<SourceFile>& files) {
+  static const std::set<std::string, std::less<>> kWords = {"new", "malloc", "calloc",       "realloc", "throw",
+                                                            "try", "catch",  "dynamic_cast", "typeid"};
+  static const std::set<std::string, std::less<>> kStd = {
+      "vector", "string", "map",  "unordered_map", "set",    "deque", "list",  "function", "unique_ptr", "shared_ptr",
+      "abs",    "fabs",   "sin",  "cos",           "tan",    "asin",  "acos",  "atan",     "atan2",      "sinh",
+      "cosh",   "tanh",   "exp",  "exp2",          "log",    "log2",  "log10", "pow",      "sqrt",       "cbrt",
+      "hypot",  "floor",  "ceil", "round",         "lround", "trunc", "fmod",  "copysign", "isnan",      "isfinite"};
+  Violations found;
+  for (const SourceFile& file : files) {
+    if (!is_cpp(file.path) || top_folder(file.path) != "shared") continue;
+    const std::string code = code_only(file.text);
+    for (const Line& line : lines_of(code)) {
+      const std::size_t first = std::min(line.text.find_first_not_of(" \t"), line.text.size());
+      if (line.text.substr(first).starts_with("#include")) continue;  // broken_arrows() judges these
+      for (std::size_t i = 0; i < line.text.size();) {
+        if (!is_word(line.text[i])) {
+          ++i;
+          continue;
+        }
+        const std::size_t start = i;
+        while (i < line.text.size() && is_word(line.text[i])) ++i;
+        const std::string_view word = line.text.substr(start, i - start);
+        const bool in_std = line.text.substr(0, start).ends_with("std::");
+        if (in_std ? kStd.contains(word) : kWords.contains(word)) {
+          found.push_back(place(file, line.number) + "shared may not use " + (in_std ? "std::" : "") +
+                          std::string(word));
+        }
+      }
+    }
+  }
+  return found;
+}
+
+Violations misplaced_heavy_headers(const std::vector<SourceFile>& files) {
+  Violations found;
+  std::map<std::string, std::string> first_user;  // by top folder and header
+  for (const SourceFile& file : files) {
+    const std::string folder = top_folder(file.path);
+    if (!is_cpp(file.path)) continue;
+    for (const Include& include : includes_of(file)) {
+      const auto heavy = kHeavyHeaders.find(include.name);
+      if (heavy == kHeavyHeaders.end()) continue;
+      const std::string what = place(file, include.line) + "heavy header " + include.name;
+      if (is_header(file.path)) {
+        found.push_back(what + " in a header reaches every file that includes it; include it in a .cpp");
+      } else if (!heavy->second.contains(folder)) {
+        found.push_back(what + " does not belong in " + folder);
+      } else if (const auto [user, is_new] =
+                     first_user.try_emplace(folder + " " + include.name.substr(0, include.name.find('/')), file.path);
+                 !is_new && user->second != file.path) {
+        found.push_back(what + " is already included by " + user->second);
+      }
+    }
+  }
+  return found;
+}
+
+Violations too_long(const std::vector<SourceFile>& files) {
+  Violations found;
+  for (const SourceFile& file : files) {
+    if (!is_cpp(file.path) && file.path != "dev" && !ends_with_any(file.path, {".js", ".mjs", ".ts", ".css", ".S"}))
+      continue;
+    const long lines = std::count(file.text.begin(), file.text.end(), '\n');
+    if (lines > kMaxLines) {
+      found.push_back(file.path + " has " + std::to_string(lines) + " lines, more than " + std::to_string(kMaxLines));
+    }
+  }
+  return found;
+}
+
+Violations developer_paths(const std::vector<SourceFile>& files) {
+  // Put together here, so that this file does not break its own rule.
+  static const std::array<std::string, 2> kPlaces = {std::string("/") + "work/", std::string("/") + "home/"};
+  Violations found;
+  for (const SourceFile& file : files) {
+    for (const Line& line : lines_of(file.text)) {
+      for (const std::string& path : kPlaces) {
+        const std::size_t at = line.text.find(path);
+        if (at == std::string_view::npos) continue;
+        // "tests/work/x" and "./work/x" are relative.
+        const char before = at == 0 ? ' ' : line.text[at - 1];
+        if (!is_word(before) && before != '.' && before != '-' && before != '}') {
+          found.push_back(place(file, line.number) + "names " + path + ", a place on one developer's machine");
+        }
+      }
+    }
+  }
+  return found;
+}
+
+Violations folders_without_readme(const fs::path& root) {
+  Violations found;
+  for (const std::string_view folder : kTopFolders) {
+    if (!fs::is_regular_file(root / folder / "README.md"))
+      found.push_back(std::string(folder) + "/README.md is missing");
+  }
+  return found;
+}
+
+std::string read(const fs::path& path) {
+  std::ifstream in(path, std::ios::binary);
+  return {std::istreambuf_iterator<char>(in), std::istreambuf_iterator<char>()};
+}
+
+// The project's own files: the top folders and what stands in the root. Not by git, which a source archive lacks.
+const std::vector<SourceFile>& project_files() {
+  static const std::vector<SourceFile> files = [] {
+    const fs::path root = FLEXSPLINE_SOURCE_DIR;
+    std::vector<SourceFile> all;
+    const auto add = [&](const fs::path& path) {
+      all.push_back({path.lexically_relative(root).generic_string(), read(path)});
+    };
+    for (const char* name : {"dev", "README.md", "CMakeLists.txt", "CMakePresets.json", ".clang-tidy", ".ci/run"}) {
+      if (fs::is_regular_file(root / name)) add(root / name);
+    }
+    for (const std::string_view folder : kTopFolders) {
+      if (!fs::is_directory(root / folder)) continue;
+      for (auto entry = fs::recursive_directory_iterator(root / folder); entry != fs::recursive_directory_iterator();
+           ++entry) {
+        if (entry->path().filename() == "node_modules") entry.disable_recursion_pending();
+        if (entry->is_regular_file()) add(entry->path());
+      }
+    }
+    return all;
+  }();
+  return files;
+}
+
+std::string listed(const Violations& violations) {
+  std::string text;
+  for (const std::string& violation : violations) text += "\n  " + violation;
+  return text;
+}
+
+#define EXPECT_NO_VIOLATION(expression)                    \
+  do {                                                     \
+    const Violations violations = (expression);            \
+    EXPECT_TRUE(violations.empty()) << listed(violations); \
+  } while (false)
+
+Violations arrows_of(const std::string& path, const std::string& text) {
+  return broken_arrows({{path, text}});
+}
+Violations shared_rules_of(const std::string& text) {
+  return forbidden_in_shared({{"shared/a.hpp", text}});
+}
+
+// The rules on the project itself.
+
+TEST(Architecture, IsReadFromTheSourceTree) {
+  for (const std::string_view folder : {"shared", "host", "hil", "tests"}) {
+    EXPECT_TRUE(std::any_of(project_files().begin(), project_files().end(),
+                            [&](const SourceFile& f) { return top_folder(f.path) == folder && is_cpp(f.path); }))
+        << folder << " holds no source file";
+  }
+}
+
+TEST(Architecture, FoldersIncludeOnlyWhatTheyMay) {
+  EXPECT_NO_VIOLATION(broken_arrows(project_files()));
+}
+TEST(Architecture, SharedUsesNoHeapNoExceptionsAndNoMathLibrary) {
+  EXPECT_NO_VIOLATION(forbidden_in_shared(project_files()));
+}
+TEST(Architecture, HeavyHeadersStandInOneFileOfAFolder) {
+  EXPECT_NO_VIOLATION(misplaced_heavy_headers(project_files()));
+}
+TEST(Architecture, NoSourceFileOutgrowsAHead) {
+  EXPECT_NO_VIOLATION(too_long(project_files()));
+}
+TEST(Architecture, NoFileNamesADeveloperMachine) {
+  EXPECT_NO_VIOLATION(developer_paths(project_files()));
+}
+TEST(Architecture, EveryTopFolderHasAReadme) {
+  EXPECT_NO_VIOLATION(folders_without_readme(FLEXSPLINE_SOURCE_DIR));
+}
+
+// The rules on texts that break them.
+
+TEST(ArchitectureRules, ArrowsAgainstTheDesignAreFound) {
+  EXPECT_EQ(arrows_of("shared/a.hpp", "#include \"host/x.hpp\"\n").size(), 1u);
+  EXPECT_EQ(arrows_of("shared/a.hpp", "#include \"firmware/x.hpp\"\n").size(), 1u);
+  EXPECT_EQ(arrows_of("firmware/a.hpp", "#include \"boards/x.hpp\"\n").size(), 1u);
+  EXPECT_EQ(arrows_of("boards/a.cpp", "#include \"hil/x.hpp\"\n").size(), 1u);
+  EXPECT_EQ(arrows_of("hil/plant/a.cpp", "  #  include <host/x.hpp>\n").size(), 1u);
+  EXPECT_EQ(arrows_of("host/a.cpp", "#include \"hil/x.hpp\"\n#include \"tests/x.hpp\"\n").size(), 2u);
+}
+
+TEST(ArchitectureRules, ArrowsOfTheDesignAreAllowed) {
+  EXPECT_NO_VIOLATION(arrows_of("shared/a.hpp", "#include <cstdint>\n#include \"shared/fixed/x.hpp\"\n"));
+  EXPECT_NO_VIOLATION(arrows_of("firmware/a.hpp", "#include \"shared/x.hpp\"\n"));
+  EXPECT_NO_VIOLATION(arrows_of("boards/a.cpp", "#include \"firmware/x.hpp\"\n#include \"shared/x.hpp\"\n"));
+  EXPECT_NO_VIOLATION(arrows_of("hil/a.cpp", "#include <cmath>\n#include \"firmware/x.hpp\"\n"));
+  EXPECT_NO_VIOLATION(arrows_of("host/a.cpp", "#include <Eigen/Dense>\n#include \"shared/x.hpp\"\n"));
+  EXPECT_NO_VIOLATION(arrows_of("tests/unit/a.cpp", "#include \"host/x.hpp\"\n#include \"hil/x.hpp\"\n"));
+  EXPECT_NO_VIOLATION(arrows_of("shared/a.hpp", "// #include <cmath>\n/*\n#include \"host/x.hpp\"\n*/\n"));
+}
+
+TEST(ArchitectureRules, HeadersOutsideTheAllowListAreFoundInShared) {
+  for (const char* header : {"cmath", "math.h", "vector", "string", "new", "Eigen/Dense"}) {
+    EXPECT_EQ(arrows_of("shared/a.hpp", std::string("#include <") + header + ">\n").size(), 1u) << header;
+  }
+}
+
+TEST(ArchitectureRules, DetoursAroundTheRootAreFound) {
+  EXPECT_EQ(arrows_of("shared/effects/a.hpp", "#include \"../../host/x.hpp\"\n").size(), 1u);
+  EXPECT_EQ(arrows_of("host/a.cpp", "#include \"neighbour.hpp\"\n").size(), 1u);
+  EXPECT_EQ(arrows_of("host/a.cpp", "#include CHOSEN_HEADER\n").size(), 1u);
+}
+
+TEST(ArchitectureRules, AViolationNamesFileLineAndWhatIsWrong) {
+  const Violations found = arrows_of("host/a.cpp", "#include <vector>\n/* two\nlines */ #include \"hil/x.hpp\"\n");
+  ASSERT_EQ(found.size(), 1u);
+  EXPECT_EQ(found[0], "host/a.cpp:3: host may not include hil (hil/x.hpp)");
+}
+
+TEST(ArchitectureRules, HeapExceptionsAndMathAreFoundInShared) {
+  EXPECT_EQ(shared_rules_of("int* p = new int;\n").size(), 1u);
+  EXPECT_EQ(shared_rules_of("void* p = malloc(4);\n").size(), 1u);
+  EXPECT_EQ(shared_rules_of("std::vector<int> a; std::string b;\n").size(), 2u);
+  EXPECT_EQ(shared_rules_of("try { throw 1; } catch (...) {}\n").size(), 3u);
+  EXPECT_EQ(shared_rules_of("auto x = std::sqrt(y) + std::abs(z);\n").size(), 2u);
+  EXPECT_EQ(shared_rules_of("#define MAKE new int\n").size(), 1u);
+  EXPECT_EQ(shared_rules_of("auto x = 1'000; auto c = 'a'; throw c;\n").size(), 1u);
+}
+
+TEST(ArchitectureRules, WordsInCommentsLiteralsAndLongerNamesAreNoViolation) {
+  EXPECT_NO_VIOLATION(shared_rules_of("// try a new one, std::sqrt\n/* throw\n new */ int news = 1'000'000;\n"));
+  EXPECT_NO_VIOLATION(shared_rules_of("constexpr std::string_view s = \"a new \\\" throw\";\n"));
+  EXPECT_NO_VIOLATION(shared_rules_of("auto s = R\"x(try \" new)x\"; char c = '\"'; auto t = N::sqrt(v);\n"));
+  EXPECT_NO_VIOLATION(forbidden_in_shared({{"host/a.cpp", "auto x = std::sqrt(2.0);\n"}}));
+}
+
+TEST(ArchitectureRules, ASecondUserOfAHeavyHeaderIsFound) {
+  const std::string toml = "#include <toml++/toml.hpp>\n";
+  EXPECT_NO_VIOLATION(misplaced_heavy_headers({{"host/a.cpp", toml}, {"hil/b.cpp", toml}}));
+  EXPECT_EQ(misplaced_heavy_headers({{"host/a.cpp", toml}, {"host/b.cpp", toml}}).size(), 1u);
+  EXPECT_EQ(misplaced_heavy_headers({{"host/a.cpp", toml}, {"host/b.cpp", "#include <toml++/toml.h>\n"}}).size(), 1u);
+  EXPECT_EQ(misplaced_heavy_headers({{"host/a.hpp", "#include <CLI/CLI.hpp>\n"}}).size(), 1u);
+  EXPECT_EQ(misplaced_heavy_headers({{"hil/a.cpp", "#include <ceres/ceres.h>\n"}}).size(), 1u);
+}
+
+TEST(ArchitectureRules, LongFilesAreFound) {
+  const auto with_lines = [](long n) { return std::string(static_cast<std::size_t>(n), '\n'); };
+  EXPECT_NO_VIOLATION(too_long({{"host/a.cpp", with_lines(kMaxLines)}, {"tests/data.csv", with_lines(kMaxLines + 1)}}));
+  EXPECT_EQ(too_long({{"host/a.cpp", with_lines(kMaxLines + 1)}, {"dev", with_lines(kMaxLines + 1)}}).size(), 2u);
+}
+
+TEST(ArchitectureRules, PathsOfADeveloperMachineAreFound) {
+  const std::string root = "/";
+  EXPECT_EQ(developer_paths({{"dev", "cd " + root + "work/main\n"}}).size(), 1u);
+  EXPECT_EQ(developer_paths({{"host/a.cpp", "open(\"" + root + "home/me/x.csv\");\n"}}).size(), 1u);
+  EXPECT_NO_VIOLATION(developer_paths({{"host/a.cpp", "tests" + root + "home/x and ." + root + "work/x\n"}}));
+}
+
+TEST(ArchitectureRules, AFolderWithoutReadmeIsFound) {
+  EXPECT_EQ(folders_without_readme(fs::path(FLEXSPLINE_SOURCE_DIR) / "no-such-folder").size(), kTopFolders.size());
+}
+
+}  // namespace
