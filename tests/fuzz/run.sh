@@ -1,14 +1,15 @@
 #!/usr/bin/env bash
-# run.sh PROGRAM SEEDS FOLDER SECONDS: fuzzes for so long. New inputs go to FOLDER, so that the next run goes on from there;
-# one that fails is left beside them, and its path is printed. Fails also where so few ran that it says nothing.
+# run.sh PROGRAM SEEDS FOLDER SECONDS [RANDOM_SEED]: fuzzes for so long; without RANDOM_SEED with other inputs each time.
+# New inputs go to FOLDER, so that the next run goes on from there; one that fails is left beside them, and its path is
+# printed. Fails also where so few ran that it says nothing.
 set -euo pipefail
-program=$1 seeds=$2 folder=$3 seconds=$4
+program=$1 seeds=$2 folder=$3 seconds=$4 random_seed=${5:-0}
 mkdir -p "$folder/corpus"
 # As long as the longest seed, so that none is cut.
 longest=$(find "$seeds" -type f -printf '%s\n' | sort -n | tail -n 1)
 status=0
 "$program" "$folder/corpus" "$seeds" -max_total_time="$seconds" -max_len="$((longest > 1024 ? longest : 1024))" -timeout=10 -rss_limit_mb=1500 \
-  -artifact_prefix="$folder/" -print_final_stats=1 >"$folder/log.txt" 2>&1 || status=$?
+  -seed="$random_seed" -artifact_prefix="$folder/" -print_final_stats=1 >"$folder/log.txt" 2>&1 || status=$?
 if ((status != 0)); then
   tail -n 60 "$folder/log.txt" >&2
   exit 1

@@ -109,7 +109,8 @@ TEST(UnitSigns, BecomeAsciiAndAllElseStays) {
 TEST(DatasetToml, BrokenOrUnreadableFilesAreErrorsWithTheirLine) {
   const data::TestFolder folder;
   folder.write("run.csv", data::good_csv(100));
-  for (const std::string text : {"a = 1\n\u00E4 = 2\n", "a = 1\nb = \n", "a = 1\nb = 1\"\u00E4\"\n", "a = 1\n[.x]\n"}) {
+  for (const std::string text : {"a = 1\n\u00E4 = 2\n", "a = 1\nb = \n", "a = 1\nb = 1\"\u00E4\"\n",
+                                 "a = 1\nb = 2e{c=\"\uFDFF\"\n", "a = 1\n[.x]\n"}) {
     folder.write("dataset.toml", text);
     const auto errors = data::errors_of({folder.path()});
     ASSERT_EQ(errors.size(), 1u) << text;
