@@ -17,9 +17,12 @@ namespace flexspline::firmware {
 template <class B>
 concept LoaderBoard = requires(B board) {
   { B::kName } -> std::convertible_to<std::string_view>;  // which images are made for; at most fifteen letters
-  // A storage::FlashPort of boot::kSlots sectors; each may consist of several sectors of the memory. It feeds a running
-  // watchdog.
+  // A storage::FlashPort of boot::kImageSectors sectors, the last of which may be as short as boot::kCounterBytes; each
+  // may consist of several sectors of the memory. It feeds a running watchdog.
   typename B::Slots;
+  // Which images may run (shared/boot/image.hpp), and whether a host may read the one that does.
+  typename B::Trust;
+  { B::kCanUpload } -> std::convertible_to<bool>;
   { board.slots() } -> std::same_as<typename B::Slots&>;
   // Longest times: to erase a slot, to write a block of DFU, to check an image.
   { B::kEraseMs } -> std::convertible_to<std::uint32_t>;
@@ -33,17 +36,17 @@ concept LoaderBoard = requires(B board) {
 template <LoaderBoard B>
 class UpdateMemory {
  public:
-  using Slots = boot::Slots<typename B::Slots>;
+  using Slots = boot::Slots<typename B::Slots, typename B::Trust>;
   static constexpr std::string_view kName = B::kName;
+  static constexpr bool kCanUpload = B::kCanUpload;
 
   explicit UpdateMemory(Slots& slots) : slots_(slots) {}
 
   usb::DfuStatus write(std::size_t at, std::span<const std::uint8_t> block) {
     if (at == 0) {
       // Data that are not an image for this board do not overwrite the image that was downloaded before.
-      boot::ImageHeader header;
       if (block.size() >= boot::kHeaderBytes) {
-        const auto finding = boot::check_header(block, B::kName, Slots::kImageBytes, header);
+        const auto finding = slots_.check_start(block);
         if (finding != boot::ImageFinding::none) return status_of(finding);
       }
       if (const auto error = slots_.begin(); error != boot::SlotError::none) return status_of(error);
@@ -105,7 +108,11 @@ class BootLoader {
 
   // Once, after reset: finishes an update that was begun and returns what to start; `none`: open the bus and call
   // poll().
-  boot::Start start() { return board_.takes_loader_request() ? boot::Start::none : slots_.resume(); }
+  boot::Start start() {
+    if (!board_.takes_loader_request()) return slots_.resume();
+    slots_.keep_counter();
+    return boot::Start::none;
+  }
 
   // The device's class, before the bus is opened.
   void serve(Dfu& dfu) { dfu.use(memory_); }
@@ -126,8 +133,8 @@ class BootLoader {
  private:
   static constexpr std::uint32_t kLeaveMs = 500, kLeaveUnreportedMs = 10'000;
   bool can_start() const {
-    return !slots_.image(boot::Slot::application).empty() || !slots_.image(boot::Slot::old).empty() ||
-           !slots_.image(boot::Slot::download).empty();
+    return !slots_.image_to_run(boot::Slot::application).empty() || !slots_.image_to_run(boot::Slot::old).empty() ||
+           !slots_.image_to_run(boot::Slot::download).empty();
   }
 
   Slots slots_;

@@ -54,8 +54,10 @@ struct DriveInfo {
   std::array<std::uint8_t, 2> firmware{};  // version
   std::array<std::uint8_t, 16> board{};    // ASCII, zeros to the end; at most 15 characters
   std::array<std::uint8_t, 16> serial{};
-  static constexpr DriveInfo of(std::array<std::uint8_t, 2> version, std::string_view board, std::string_view serial) {
-    DriveInfo info{version, {}, {}};
+  protocol::FirmwareKey key = protocol::FirmwareKey::none;
+  static constexpr DriveInfo of(std::array<std::uint8_t, 2> version, std::string_view board, std::string_view serial,
+                                protocol::FirmwareKey key = protocol::FirmwareKey::none) {
+    DriveInfo info{version, {}, {}, key};
     for (std::size_t i = 0; i < board.size() && i + 1 < info.board.size(); ++i)
       info.board[i] = static_cast<std::uint8_t>(board[i]);
     for (std::size_t i = 0; i < serial.size() && i + 1 < info.serial.size(); ++i)
@@ -226,6 +228,7 @@ class Service {
     id.firmware = info_.firmware;
     id.board = info_.board;
     id.serial = info_.serial;
+    id.firmware_key = info_.key;
     id.tick_hz = tick_hz_;
     id.block_bytes = Store::kCapacity;
     for (const std::uint8_t byte : kEffects.bits)

@@ -17,6 +17,7 @@
 #include "hil/plant/recorder.hpp"
 #include "hil/rhs100/data_set.hpp"
 #include "hil/scenario/command_drive.hpp"
+#include "hil/thesis_figures/command.hpp"
 #include "hil/twin/image.hpp"
 #include "hil/twin/server.hpp"
 
@@ -83,12 +84,18 @@ struct ImageOptions {
   int minor = 1;
   std::size_t bytes = 24'000;
   bool hangs = false;
+  bool is_unsigned = false;
+  std::uint16_t counter = 0;
 };
 
 void make_image(const ImageOptions& options) {
   const flexspline::boot::Version version{static_cast<std::uint8_t>(options.major),
                                           static_cast<std::uint8_t>(options.minor)};
-  const auto image = flexspline::twin::twin_image(version, options.bytes, options.hangs);
+  const auto image = flexspline::twin::twin_image({.version = version,
+                                                   .bytes = options.bytes,
+                                                   .hangs = options.hangs,
+                                                   .is_signed = !options.is_unsigned,
+                                                   .security_counter = options.counter});
   std::ofstream out(options.out, std::ios::binary);
   out.write(reinterpret_cast<const char*>(image.data()), static_cast<std::streamsize>(image.size()));
   if (!out.flush()) throw std::runtime_error(options.out + ": cannot be written");
@@ -146,6 +153,20 @@ int main(int argc, char** argv) {
   rhs_command->add_flag("--force", options.force, "write into a folder that is not empty");
   rhs_command->footer("Example: flexspline-hil rhs-100 --out rhs-100");
   rhs_command->callback([&] { make_rhs_100(options); });
+  flexspline::thesis_figures::ReportOptions report_options, model_options;
+  CLI::App* report_command =
+      app.add_subcommand("report", "draws the figures of Taghirad and Belanger's report again, as SVG and CSV");
+  report_command->add_option("what", report_options.what, "number of a figure, all, or list")->required();
+  report_command->add_option("--out", report_options.out, "folder to write into");
+  report_command->add_option("--seed", report_options.seed, "of all chance")->capture_default_str();
+  report_command->footer("Example: flexspline-hil report 45 --out figures");
+  report_command->callback([&] { flexspline::thesis_figures::write_report(report_options); });
+  CLI::App* model_command = app.add_subcommand(
+      "model", "runs the report's own blocks: DC motor, saturation, friction block, models 1 to 3; SVG and CSV");
+  model_command->add_option("block", model_options.what, "motor, saturation, friction, models or all")->required();
+  model_command->add_option("--out", model_options.out, "folder to write into")->required();
+  model_command->footer("Example: flexspline-hil model friction --out blocks");
+  model_command->callback([&] { flexspline::thesis_figures::write_models(model_options); });
   flexspline::scenario::DriveOptions drive_options;
   CLI::App* drive_command = app.add_subcommand(
       "drive", "runs the firmware's application on a simulated drive, with and without compensation");
@@ -168,7 +189,7 @@ int main(int argc, char** argv) {
                             "firmware image to run it on, in QEMU (boards/qemu_stm32f405)");
   drive_command->add_option("--trace", drive_options.trace_file, "CSV of one run, a line a millisecond");
   drive_command->add_option("--json", drive_options.json, "file for the result; - is standard output");
-  drive_command->add_option("--tick-hz", drive_options.tick_hz, "ticks of the drive a second, whole in a millisecond")
+  drive_command->add_option("--tick-hz", drive_options.tick_hz, "ticks of the drive per second, a multiple of 1000")
       ->capture_default_str();
   drive_command->add_option("--seed", drive_options.seed, "of the sensors' noise (default 1)");
   drive_command->footer("Example: flexspline-hil drive --scenario slow-reversals --seconds 4");
@@ -240,6 +261,8 @@ int main(int argc, char** argv) {
   image_command->add_option("--bytes", image_options.bytes, "after its header (default 24000)")
       ->check(CLI::Range(64, 64'000));
   image_command->add_flag("--hangs", image_options.hangs, "it never confirms itself, and is rolled back");
+  image_command->add_option("--counter", image_options.counter, "security counter (default 0)");
+  image_command->add_flag("--unsigned", image_options.is_unsigned, "without a signature: the twin does not take it");
   image_command->footer("Example: flexspline-hil image --minor 2 --out twin-0.2.image");
   image_command->callback([&] { make_image(image_options); });
   CLI::App* effects_command = app.add_subcommand("effects", "lists what can be hidden");

@@ -8,6 +8,7 @@
 
 #include "boards/stm32f4/board.hpp"
 #include "boards/stm32f4/handover.hpp"
+#include "boards/stm32f4/signing_key.hpp"
 #include "boards/stm32f4/usb_link.hpp"
 #include "firmware/application.hpp"
 #include "firmware/drive.hpp"
@@ -48,7 +49,8 @@ class Drive {
     static Store store(flash);
     static Blocks blocks(application_);
     static Service service(application_, store, blocks, Board::kTickHz,
-                           firmware::DriveInfo::of({0, 1}, Description::kName, {serial, 12}));
+                           firmware::DriveInfo::of({0, 1}, Description::kName, {serial, 12},
+                                                   Description::kHasUsb ? kFirmwareKey : protocol::FirmwareKey::none));
     service.start();
     line_.start(Description::kClock.core_hz / 4, Description::kBaud);
     using SerialLink = firmware::SerialLink<Service, Serial>;

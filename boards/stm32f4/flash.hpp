@@ -107,8 +107,9 @@ class ParameterFlash {
 };
 
 // Three sectors of one size for images (shared/boot/slots.hpp), each at the start of a sector of the memory, which may
-// be longer: the application, the download and the previous application.
-template <class Busy, std::size_t size, std::uint32_t application, std::uint32_t download, std::uint32_t old>
+// be longer: the application, the download and the previous application. Then one for the security counter.
+template <class Busy, std::size_t size, std::uint32_t application, std::uint32_t download, std::uint32_t old,
+          std::uint32_t counter>
 class ImageFlash {
  public:
   static constexpr std::size_t kSectorBytes = size;
@@ -121,11 +122,11 @@ class ImageFlash {
   }
   std::span<const std::uint8_t> bytes(std::size_t slot) const {
     return {reinterpret_cast<const std::uint8_t*>(static_cast<std::uintptr_t>(sector_address(kNumbers[slot]))),
-            kSectorBytes};
+            slot == 3 ? sector_bytes(counter) : kSectorBytes};
   }
 
  private:
-  static constexpr std::uint32_t kNumbers[3] = {application, download, old};
+  static constexpr std::uint32_t kNumbers[4] = {application, download, old, counter};
   Flash<Busy> flash_;
 };
 

@@ -7,6 +7,7 @@
 
 #include "boards/stm32f4/board.hpp"
 #include "boards/stm32f4/handover.hpp"
+#include "boards/stm32f4/signing_key.hpp"
 #include "firmware/boot_loader.hpp"
 #include "shared/usb/device.hpp"
 #include "shared/usb/identity.hpp"
@@ -58,8 +59,10 @@ class Loader {
   struct Board {
     static constexpr std::string_view kName = Description::kName;
     using Slots = typename Description::template Images<Board>;
-    // RM0090 and the data sheet: 2 s for 128 KB, 100 us a word.
-    static constexpr std::uint32_t kEraseMs = 2'200, kBlockMs = 30, kCheckMs = 100;
+    using Trust = boot::SignedBy<kSigningKey>;
+    static constexpr bool kCanUpload = stm32f4::kCanUpload;
+    // RM0090 and the data sheet: 2 s for 128 KB, 100 us a word. A check of 96 KB takes 20 million instructions.
+    static constexpr std::uint32_t kEraseMs = 2'200, kBlockMs = 30, kCheckMs = 400;
     Slots& slots() { return images; }
     bool takes_loader_request() { return loader_is_requested(); }
     // Called before and after each operation: feeds the watchdog if it runs.

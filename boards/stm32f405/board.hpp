@@ -84,9 +84,9 @@ struct Description {
   static constexpr bool kHasUsb = true;
   static constexpr std::uint32_t kParameterSector = 1;  // and the one after it
   static constexpr std::uint32_t kApplicationSector = 5;
-  // Application, download and previous application, 96 KB each (application.ld).
+  // Application, download and previous application, 96 KB each, and the security counter (application.ld).
   template <class Busy>
-  using Images = stm32f4::ImageFlash<Busy, 0x18000, 5, 6, 7>;
+  using Images = stm32f4::ImageFlash<Busy, 0x18000, 5, 6, 7, 3>;
 };
 
 }  // namespace flexspline::stm32f405

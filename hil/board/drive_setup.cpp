@@ -32,7 +32,7 @@ double breakaway_torque_of(const plant::Drive& drive) {
 }
 double inertia_of(const plant::Drive& drive) {
   const plant::Effect* inertia = drive.find("inertia");
-  if (inertia == nullptr) throw std::runtime_error("the drive has no effect 'inertia'; its loops cannot be laid out");
+  if (inertia == nullptr) throw std::runtime_error("the drive has no effect 'inertia'; its loops cannot be designed");
   return inertia->value("inertia");
 }
 

@@ -79,7 +79,7 @@ struct ScenarioResult {
   firmware::FaultRecord first_fault{};  ///< of the drive, even where it continued
   std::vector<TracePoint> trace{};
 
-  /// The loops hunt at rest: the shaft keeps reversing, by more than the encoder's counts.
+  /// A limit cycle at rest: the shaft keeps reversing, by more than the encoder's counts.
   bool limit_cycle(double count_rad) const { return hold_reversals >= 2 && hold_swing_rad > 2.0 * count_rad; }
 };
 /// Runs it on the software board, or on `controller`. Throws std::runtime_error where the drive cannot be armed,

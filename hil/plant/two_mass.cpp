@@ -335,9 +335,9 @@ void TwoMass::resolve_resting(State& s, double h) const {
   const auto retry = [&](int State::*direction, double State::*velocity, Event stop, Event breaks) {
     if (s.*velocity != 0.0 || s.*direction == 0) return;
     if (!try_step(s, h, end) || margin(stop, end) >= 0.0) return;
-    const int asked = s.*direction;
+    const int before = s.*direction;
     s.*direction = 0;
-    if (try_step(s, h, end) && margin(breaks, end) < 0.0) s.*direction = -asked;
+    if (try_step(s, h, end) && margin(breaks, end) < 0.0) s.*direction = -before;
   };
   retry(&State::motor_direction, &State::motor_velocity, Event::motor_stop, Event::motor_break);
   retry(&State::output_direction, &State::output_velocity, Event::output_stop, Event::output_break);

@@ -11,7 +11,8 @@
 
 namespace flexspline::twin {
 
-FlashMemory::FlashMemory(std::size_t sector_bytes, std::size_t sectors, const std::filesystem::path& file)
+FlashMemory::FlashMemory(std::size_t sector_bytes, std::size_t sectors, const std::filesystem::path& file,
+                         std::size_t older_sectors)
     : sector_bytes_(sector_bytes), cells_(sector_bytes * sectors, 0xFF) {
   if (file.empty()) return;
   file_ = open(file.c_str(), O_RDWR | O_CREAT | O_CLOEXEC, 0644);
@@ -20,8 +21,10 @@ FlashMemory::FlashMemory(std::size_t sector_bytes, std::size_t sectors, const st
   struct stat info {};
   fstat(file_, &info);
   const auto whole = static_cast<ssize_t>(cells_.size());
-  const bool good = info.st_size == 0 ? save(0, cells_.size())
-                                      : info.st_size == whole && pread(file_, cells_.data(), cells_.size(), 0) == whole;
+  const bool is_older = info.st_size == static_cast<off_t>(sector_bytes * older_sectors);
+  const bool good = info.st_size == 0 || is_older
+                        ? save(0, cells_.size())
+                        : info.st_size == whole && pread(file_, cells_.data(), cells_.size(), 0) == whole;
   if (!good) {
     close(file_);
     throw std::runtime_error(file.string() + ": is not a flash memory of a twin; name a file that does not exist yet");

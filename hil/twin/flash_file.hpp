@@ -15,8 +15,10 @@ namespace flexspline::twin {
 /// killed twin starts again with the memory that a drive has after a power cut.
 class FlashMemory {
  public:
-  /// An empty path: no file. Throws std::runtime_error where the file cannot be opened or is not such a memory.
-  FlashMemory(std::size_t sector_bytes, std::size_t sectors, const std::filesystem::path& file);
+  /// An empty path: no file. A file of `older_sectors` is the memory of an older twin and starts anew. Throws
+  /// std::runtime_error where the file cannot be opened or is not such a memory.
+  FlashMemory(std::size_t sector_bytes, std::size_t sectors, const std::filesystem::path& file,
+              std::size_t older_sectors = 0);
   ~FlashMemory();
   FlashMemory(const FlashMemory&) = delete;
   FlashMemory& operator=(const FlashMemory&) = delete;
@@ -42,11 +44,12 @@ class FlashFile : public FlashMemory {
   explicit FlashFile(const std::filesystem::path& file = {}) : FlashMemory(kSectorBytes, storage::kSectors, file) {}
 };
 
-/// Its firmware images.
+/// Its firmware images, and the security counter, without which older twins had images that were not signed.
 class ImageFlash : public FlashMemory {
  public:
   static constexpr std::size_t kSectorBytes = 65'536;
-  explicit ImageFlash(const std::filesystem::path& file = {}) : FlashMemory(kSectorBytes, boot::kSlots, file) {}
+  explicit ImageFlash(const std::filesystem::path& file = {})
+      : FlashMemory(kSectorBytes, boot::kImageSectors, file, boot::kSlots) {}
 };
 
 }  // namespace flexspline::twin

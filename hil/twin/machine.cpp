@@ -36,7 +36,7 @@ struct Connector final : usbip::BusDevice {
 };
 
 bool is_blank(const ImageFlash& flash) {
-  for (std::size_t s = 0; s < boot::kSlots; ++s)
+  for (std::size_t s = 0; s < boot::kImageSectors; ++s)
     if (!std::ranges::all_of(flash.bytes(s), [](std::uint8_t byte) { return byte == 0xFF; })) return false;
   return true;
 }
@@ -46,8 +46,7 @@ bool is_blank(const ImageFlash& flash) {
 Machine::Machine(const std::filesystem::path& file, bool as_made)
     : board_{.flash = ImageFlash(file)}, slots_(board_.flash, LoaderBoard::kName) {
   if (!as_made || !is_blank(board_.flash)) return;
-  constexpr std::size_t kFactoryBytes = 24'000;
-  const std::vector<std::uint8_t> image = twin_image(kFactoryVersion, kFactoryBytes, false);
+  const std::vector<std::uint8_t> image = twin_image({});
   const std::span<const std::uint8_t> bytes(image);
   for (std::size_t at = 0; at < bytes.size(); at += 4) {
     model::Reader word(bytes.subspan(at, 4));

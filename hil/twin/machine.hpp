@@ -12,12 +12,15 @@
 #include "hil/twin/flash_file.hpp"
 #include "hil/twin/image.hpp"
 #include "hil/usbip/server.hpp"
+#include "shared/boot/development_key.hpp"
 
 namespace flexspline::twin {
 
 /// The twin's board for the boot loader.
 struct LoaderBoard {
   using Slots = ImageFlash;
+  using Trust = boot::SignedBy<boot::kDevelopmentKey>;
+  static constexpr bool kCanUpload = true;
   static constexpr std::string_view kName = kBoardName;
   static constexpr std::uint32_t kEraseMs = 50, kBlockMs = 2, kCheckMs = 20;
 

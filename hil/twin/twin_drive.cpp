@@ -48,7 +48,8 @@ TwinDrive::TwinDrive(const TwinSetup& setup)
         store_.commit(validate, reason) != storage::StoreError::none)
       throw std::runtime_error("the factory block cannot be stored; is the flash file writable?");
   }
-  const auto info = firmware::DriveInfo::of({setup_.version.major, setup_.version.minor}, kBoardName, setup_.serial);
+  const auto info = firmware::DriveInfo::of({setup_.version.major, setup_.version.minor}, kBoardName, setup_.serial,
+                                            protocol::FirmwareKey::development);
   service_ = std::make_unique<Service>(application_, store_, blocks_, board::SoftwareBoard::kTickHz, info);
   service_->start();
   application_.background();

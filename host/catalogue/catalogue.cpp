@@ -124,7 +124,7 @@ BlockFunctions<N> along() {
 std::vector<Entry> make_entries(bool is_user_defined) {
   std::vector<Entry> entries;
   effects::for_each_effect([&]<class E>(std::size_t id) {
-    if (E::kInfo.made_by_user != is_user_defined) return;
+    if (E::kInfo.user_defined != is_user_defined) return;
     Entry entry;
     entry.id = id;
     entry.info = &E::kInfo;

@@ -188,7 +188,7 @@ const effects::Description kExpression{
     .confused_with = kTableEffect,
     .separated_by = "motion over the whole range of the signals that the formula reads",
     .host_only = true,
-    .made_by_user = true,
+    .user_defined = true,
 };
 
 Balance balance_named(std::string_view name) {
@@ -271,7 +271,7 @@ void make_formula(UserDefinedEntry& defined, const model::Effect& effect) {
     effects::ParameterInfo info;
     info.name = defined.names[p];
     info.unit = {defined.units[p], defined.units[p]};
-    info.kind = linear[p] ? Kind::linear : Kind::shape;
+    info.kind = linear[p] ? Kind::linear : Kind::nonlinear;
     info.low = effect.parameters[p].low.value_or(-effects::kUnbounded);
     info.high = effect.parameters[p].high.value_or(effects::kUnbounded);
     if (!linear[p]) {

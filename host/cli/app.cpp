@@ -292,7 +292,7 @@ class App {
     take_data(sub, options->data);
     take_model(sub, options->model);
     take_holdout(sub, options->data);
-    sub->add_flag("--auto", options->all, "go on with the named effect added, until nothing more is found");
+    sub->add_flag("--auto", options->all, "continue with the named effect added, until no more is found");
     take_report(sub, options->report);
     take_pipeline(sub, options->pipeline);
   }
@@ -448,8 +448,9 @@ class App {
     take_firmware(*flash, *flash_options);
     take_prediction(flash, *flash_options);
     take_yes(flash, flash_options->yes);
-    const auto [image, image_options] = command<ImageOptions>("image");
-    take_image(*image, *image_options);
+    take_image(command<ImageOptions>("image"));
+    take_sign(command<SignOptions>("sign"));
+    take_key(command<KeyOptions>("key"));
     const auto [backup, backup_options] = command<BackupOptions>("backup");
     take_drive(backup, backup_options->drive);
     backup->add_option("--out", backup_options->out, "file for the block")->required()->type_name("BLOCK");

@@ -15,8 +15,8 @@ struct BaseModel {
   std::vector<std::string> reasons;
 };
 
-// The effects that every drive has, on each torque balance whose signals are there (METHOD of the project: a base that
-// is plain, so that what is missing shows). Known facts come from the data set; ratings are guessed from the largest
+// The effects that every drive has, on each torque balance whose signals are there: a
+// simple base, so that what is missing shows. Known facts come from the data set; ratings are guessed from the largest
 // values and their source says so.
 BaseModel base_model(const data::Dataset& dataset, const std::string& name);
 

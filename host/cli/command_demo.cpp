@@ -241,7 +241,7 @@ int run(const DemoOptions& options, Console& console) {
     try {
       answer["closed_loop"] = close_the_loop(folder, base_path, path, hidden, seed, console);
     } catch (const std::runtime_error& error) {
-      console.warn(fmt::format("the model does not go on the drive: {}", error.what()));
+      console.warn(fmt::format("the model cannot be put on the drive: {}", error.what()));
     }
   }
   const std::filesystem::path report = folder / "report.html";

@@ -24,7 +24,7 @@ std::string add_command(const DiagnoseOptions& options) {
 }
 
 // The model of the last round with values; and the user's own model where effects were added.
-void write_page(const DiagnoseOptions& options, const data::Dataset& dataset, const model::Model& asked,
+void write_page(const DiagnoseOptions& options, const data::Dataset& dataset, const model::Model& given,
                 const model::Model& last, const std::vector<selection::Diagnosis>& rounds, Console& console) {
   if (options.report.empty()) return;
   console.progress("fitting the model for the report");
@@ -38,7 +38,7 @@ void write_page(const DiagnoseOptions& options, const data::Dataset& dataset, co
                           .pipeline = pipeline,
                           .estimates = fitted->estimates,
                           .rounds = rounds};
-  if (rounds.size() > 1) subject.before = estimation::identify(dataset, asked, pipeline)->model;
+  if (rounds.size() > 1) subject.before = estimation::identify(dataset, given, pipeline)->model;
   write_report(options.report, subject, console);
 }
 

@@ -13,11 +13,24 @@ using nlohmann::json;
 
 struct FoundDrive {
   transport::Found found;
-  json answer;  // null where it was not asked
+  json answer;  // null if it was not queried
 };
 
-// Asks a drive who it is. What is wrong with one drive does not hide the others.
-FoundDrive asked(transport::Found found) {
+json key_text(protocol::FirmwareKey key) {
+  switch (key) {
+    case protocol::FirmwareKey::none:
+      return "none";
+    case protocol::FirmwareKey::development:
+      return "development";
+    case protocol::FirmwareKey::own:
+      return "own";
+    default:
+      return nullptr;
+  }
+}
+
+// Queries the identity of a drive. A problem of one drive does not hide the others.
+FoundDrive queried(transport::Found found) {
   FoundDrive seen{std::move(found), nullptr};
   if (!seen.found.usable) return seen;
   try {
@@ -29,6 +42,7 @@ FoundDrive asked(transport::Found found) {
                    {"firmware", fmt::format("{}.{}", id.firmware[0], id.firmware[1])},
                    {"protocol", fmt::format("{}.{}", id.major, id.minor)},
                    {"tick_hz", id.tick_hz},
+                   {"firmware_key", key_text(id.firmware_key)},
                    {"effects", id.effects},
                    {"block_bytes", id.block_bytes},
                    {"mode", protocol::name_of(status.mode)},
@@ -45,8 +59,8 @@ FoundDrive asked(transport::Found found) {
 
 int run(const DrivesOptions& options, Console& console) {
   std::vector<FoundDrive> all;
-  for (transport::Found& found : transport::find_drives()) all.push_back(asked(std::move(found)));
-  for (const std::string& name : options.also) all.push_back(asked({name, name, true, {}}));
+  for (transport::Found& found : transport::find_drives()) all.push_back(queried(std::move(found)));
+  for (const std::string& name : options.also) all.push_back(queried({name, name, true, {}}));
   json list = json::array();
   for (const FoundDrive& one : all) {
     json entry = one.answer.is_null() ? json::object() : one.answer;
@@ -56,11 +70,12 @@ int run(const DrivesOptions& options, Console& console) {
     if (one.answer.is_null()) {
       console.line(fmt::format("{:<28} {}", one.found.drive, console.bad(one.found.problem)));
     } else {
-      console.line(fmt::format("{:<28} {} (board {}, firmware {}), {} effects, {}{}", one.found.drive,
-                               one.answer["serial"].get<std::string>(), one.answer["board"].get<std::string>(),
-                               one.answer["firmware"].get<std::string>(), one.answer["effects"].get<int>(),
-                               one.answer["mode"].get<std::string>(),
-                               one.answer["has_parameters"].get<bool>() ? "" : ", without parameters"));
+      console.line(fmt::format(
+          "{:<28} {} (board {}, firmware {}), {} effects, {}{}{}", one.found.drive,
+          one.answer["serial"].get<std::string>(), one.answer["board"].get<std::string>(),
+          one.answer["firmware"].get<std::string>(), one.answer["effects"].get<int>(),
+          one.answer["mode"].get<std::string>(), one.answer["has_parameters"].get<bool>() ? "" : ", without parameters",
+          one.answer["firmware_key"] == "development" ? ", takes the public development key" : ""));
     }
     list.push_back(std::move(entry));
   }

@@ -19,8 +19,8 @@ std::string kind_name(effects::Kind kind) {
   switch (kind) {
     case effects::Kind::linear:
       return "linear";
-    case effects::Kind::shape:
-      return "shape";
+    case effects::Kind::nonlinear:
+      return "shape";  // the word of flexspline-effects/1
     case effects::Kind::grid:
       return "grid";
     case effects::Kind::given:
@@ -91,8 +91,8 @@ void describe(const Entry& entry, Console& console) {
       output::wrapped(fmt::format("On the {} balance: {}", output::balance_name(info.balance), info.equation)));
   output::Table table({"parameter", "unit", "(linear axis)", "", "usual"}, "llllr");
   for (const effects::ParameterInfo& p : entry.parameters) {
-    const char* how = p.kind == effects::Kind::linear  ? "estimated"
-                      : p.kind == effects::Kind::shape ? "estimated, a nonlinear parameter: searched for"
+    const char* how = p.kind == effects::Kind::linear      ? "estimated"
+                      : p.kind == effects::Kind::nonlinear ? "estimated, a nonlinear parameter: searched for"
                       : p.kind == effects::Kind::grid
                           ? "set from the range of the data where the model does not state it"
                           : "stated by you";

@@ -131,7 +131,7 @@ bool run_one(const FleetOptions& options, const fs::path& folder, Console& conso
     output::save_json(task.out.string(), result);
   };
   // What a job that is killed leaves behind; without it the drive would be missing without a message.
-  save(json::object(), "its run has not finished: it was stopped, or goes on still");
+  save(json::object(), "its run has not finished: it was stopped, or is still running");
   json result;
   std::string failed;
   try {

@@ -41,7 +41,7 @@ std::vector<ComparedModel> models_of(const HilOptions& options, const std::files
     take(options.base.empty() ? "model" : "added", options.model, options.model.string());
     return all;
   }
-  take("base", sheet / "known-model.toml", "the maker's values");
+  take("base", sheet / "known-model.toml", "the manufacturer's values");
   if (std::filesystem::exists(sheet / "whole-model.toml"))
     take("added", sheet / "whole-model.toml", "the true values, with the hidden effect");
   return all;

@@ -1,4 +1,4 @@
-// Where a drive's shafts are: what it knows, and telling it.
+// Shows the positions that a drive knows, and sets the motor position.
 #include <fmt/format.h>
 
 #include <cmath>

@@ -127,8 +127,8 @@ int run(const MonitorOptions& options, Console& console) {
   const drive::Scales scales = drive::scales_of(session);
   const double tick_hz = session.identity().tick_hz;
   const auto every = static_cast<std::uint16_t>(std::clamp(std::round(tick_hz / options.rate_hz), 1.0, 65535.0));
-  std::vector<Channel> asked{Channel::state};
-  for (const Channel c : channels) asked.push_back(c);
+  std::vector<Channel> subscribed{Channel::state};
+  for (const Channel c : channels) subscribed.push_back(c);
   const bool is_terminal = isatty(STDOUT_FILENO) != 0 && options.json != "-";
   console.line(named(session));
   if (!is_terminal) {
@@ -139,14 +139,14 @@ int run(const MonitorOptions& options, Console& console) {
     console.line(head);
   }
   const Interruptible interruptible;
-  session.subscribe(asked, every);
+  session.subscribe(subscribed, every);
   Screen screen(channels, console);
   json samples = json::array();
   std::uint32_t first_tick = 0, next = 0, lost = 0;
   bool any = false;
   auto heard_at = Clock::now();
   const auto take = [&](const protocol::FrameHead& head, std::uint32_t i, std::span<const std::uint32_t> words) {
-    if (words.size() != asked.size()) return;
+    if (words.size() != subscribed.size()) return;
     const std::uint32_t tick = head.tick + i * every;
     if (!any) first_tick = tick;
     any = true;

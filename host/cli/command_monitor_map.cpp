@@ -92,9 +92,9 @@ int run_residual_map(const MonitorOptions& options, Console& console) {
     std::this_thread::sleep_for(transport::Milliseconds(20));
   const ResidualMap map = drive::read_residual_map(session, scales);
   const double limit_nm = options.limit_nm.value_or(drive::usual_map_limit_nm(scales));
-  const drive::MapTest test = drive::judge(map, limit_nm);
+  const drive::MapTest test = drive::test_map(map, limit_nm);
   if (started)
-    console.line("The residual map did not count (it was never asked, or the block is new): it does from now.");
+    console.line("The residual map did not count (it was never read, or the block is new): it does from now.");
   show(map, console);
   print(test, limit_nm, console);
   if (options.reset) {

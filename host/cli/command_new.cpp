@@ -64,7 +64,7 @@ int run(const NewOptions& options, Console& console) {
   model::save(dataset_file, toml);
   model::save(model_file, text_of(base));
 
-  console.line(console.bold("Guessed or decided; mend it in the files where it is wrong:"));
+  console.line(console.bold("Guessed or decided; correct it in the files if it is wrong:"));
   for (const std::string& note : draft.notes) console.line(output::wrapped("- " + note, 2, 2));
   if (!draft.unused.empty())
     console.line(output::wrapped(fmt::format("- not used: {}", output::listed(draft.unused)), 2, 2));

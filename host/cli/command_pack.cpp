@@ -161,10 +161,10 @@ int run(const PackCommandOptions& options, Console& console) {
   deployment::PackOptions pack = options.pack;
   if (!options.for_drive.empty()) {
     drive::Session session = open_drive(options.for_drive);
-    const deployment::PackOptions asked = drive::pack_options_for(session);
-    pack.tick_hz = asked.tick_hz;
-    pack.image = asked.image;
-    pack.hardware = asked.hardware;
+    const deployment::PackOptions of_drive = drive::pack_options_for(session);
+    pack.tick_hz = of_drive.tick_hz;
+    pack.image = of_drive.image;
+    pack.hardware = of_drive.hardware;
   }
   if (!options.drive.empty()) {
     std::ifstream in(options.drive, std::ios::binary);

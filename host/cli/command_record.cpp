@@ -42,7 +42,7 @@ void require_person(const planning::Plan& plan, bool yes) {
           fmt::format("run \"{}\" needs a person ({}); record on a terminal, or give --yes when all of this is done",
                       run.name, task_of(run)));
 }
-// False: the user asked to stop.
+// False: the user requested a stop.
 bool prepared(const planning::Run& run, bool yes) {
   if (yes || !needs_a_person(run)) return true;
   fmt::print(stderr, "{}: {}. Enter when done, q to stop: ", run.name, task_of(run));

@@ -22,7 +22,7 @@ constexpr int kShareDigits = 3;
 constexpr std::size_t kSignalsOfOne = 3;
 constexpr std::size_t kSentences = 3;
 // Less growth, in shares of the signal, is not worth a line.
-constexpr double kTelling = 0.005;
+constexpr double kLeastShownGrowth = 0.005;
 
 std::string name_of(const SignalError& s) {
   std::string name = s.signal;
@@ -51,10 +51,10 @@ std::string phase_text(const SignalError& s) {
 }
 
 // Those that show most, except free positions: they are velocities once more, with their drift.
-std::vector<const SignalError*> telling(const Variant& variant) {
+std::vector<const SignalError*> most_changed(const Variant& variant) {
   std::vector<const SignalError*> signals;
   for (const SignalError& s : variant.overall)
-    if (!s.drifts() && std::abs(s.growth) >= kTelling) signals.push_back(&s);
+    if (!s.drifts() && std::abs(s.growth) >= kLeastShownGrowth) signals.push_back(&s);
   std::stable_sort(signals.begin(), signals.end(), [](auto* a, auto* b) { return a->growth > b->growth; });
   if (signals.size() > kSignalsOfOne) signals.resize(kSignalsOfOne);
   return signals;
@@ -77,7 +77,7 @@ std::string table_of(const Sensitivity& answer, std::vector<std::string>& nothin
   }
   for (const Variant& variant : answer.variants) {
     if (!variant.note.empty()) notes.push_back(fmt::format("{}: {}", label_of(variant), variant.note));
-    const std::vector<const SignalError*> signals = telling(variant);
+    const std::vector<const SignalError*> signals = most_changed(variant);
     if (signals.empty() && variant.note.empty()) nothing.push_back(label_of(variant));
     for (const SignalError* s : signals) {
       const SignalError* full = answer.full.find(s->signal, s->load);
@@ -92,7 +92,7 @@ std::string table_of(const Sensitivity& answer, std::vector<std::string>& nothin
 // "leaving out coulomb_friction: free motor velocity error 3.1 -> 14.2 rad/s, amplitude +12 %, phase -4.0 deg".
 // What moves otherwise is easier to see than what a balance lacks.
 std::string sentence(const Sensitivity& answer, const Variant& variant) {
-  const std::vector<const SignalError*> signals = telling(variant);
+  const std::vector<const SignalError*> signals = most_changed(variant);
   if (signals.empty()) return {};
   const auto moving = std::find_if(signals.begin(), signals.end(), [](auto* s) { return !s->is_balance(); });
   const SignalError& s = moving == signals.end() ? *signals.front() : **moving;
@@ -125,7 +125,7 @@ void print(const Sensitivity& answer, Console& console) {
     console.line(output::wrapped(
         fmt::format("No error grows by {:g} % of its signal: {}. They need not be modelled, or these motions do not "
                     "show them.",
-                    100.0 * kTelling, output::listed(nothing)),
+                    100.0 * kLeastShownGrowth, output::listed(nothing)),
         0));
   for (const std::string& note : notes) console.line(output::wrapped(note, 0));
   console.line(
@@ -145,7 +145,7 @@ int run(const SensitivityOptions& options, Console& console) {
   }
   const model::ModelFile file = load_searched_model(options.model);
   const data::Dataset dataset = load(options.data, console);
-  console.progress("judging the full model");
+  console.progress("evaluating the full model");
   wanted.progress = [&console](std::size_t done, std::size_t all) {
     console.progress(fmt::format("{} of {} changed models evaluated", done, all));
   };

@@ -147,7 +147,7 @@ struct PackCommandOptions {
   std::filesystem::path model;
   std::filesystem::path out;
   std::filesystem::path drive;  // settings of the drive; empty: none in the block
-  std::string for_drive;        // empty: none is asked
+  std::string for_drive;        // empty: no drive is read
   deployment::PackOptions pack;
   std::string json;
 };

@@ -49,7 +49,7 @@ int run(const RestoreOptions& options, Console& console);
 
 struct HomeOptions {
   std::string drive;
-  std::optional<double> position;  // of the motor; none: only asked
+  std::optional<double> position;  // of the motor; none: only queried
   std::string json;
 };
 int run(const HomeOptions& options, Console& console);
@@ -100,7 +100,7 @@ int run(const TwinOptions& options, Console& console);
 drive::Session open_drive(const std::string& drive);
 // "drive SERIAL (BOARD) at NAME".
 std::string named(const drive::Session& session);
-// Asks on a terminal, unless `yes`; without a terminal nothing is asked and the result is true.
+// Asks on a terminal, unless `yes`; without a terminal there is no question and the result is true.
 bool confirmed(const std::string& question, bool yes);
 // A good parameter block from a file. Throws UsageError where it cannot be read, deployment::PackError with the file
 // and the place where the block is bad.

@@ -19,13 +19,13 @@ void take_drive(Parser* sub, std::string& drive) {
 }
 template <class Parser>
 void take_yes(Parser* sub, bool& yes) {
-  sub->add_flag("--yes", yes, "ask nothing");
+  sub->add_flag("--yes", yes, "do not ask for confirmation");
 }
 
 template <class Parser>
 void take_restore(Parser* sub, RestoreOptions& options) {
   sub->add_flag("--factory-reset", options.factory_reset,
-                "erase both blocks, for good: after a restart the drive is as delivered by its manufacturer");
+                "erase both blocks permanently: after a restart the drive is as delivered by its manufacturer");
   take_yes(sub, options.yes);
 }
 template <class Parser>
@@ -33,7 +33,7 @@ void take_prediction(Parser* sub, FlashOptions& options) {
   sub->add_option("--draws", options.draws, "simulated drives of the prediction; 0: none")
       ->check(CLI::IsMember({0, 3, 4, 5, 6, 8, 12, 20}))
       ->capture_default_str();
-  sub->add_flag("--measured", options.measured, "as pack --measured takes it");
+  sub->add_flag("--measured", options.measured, "as in pack --measured");
 }
 template <class Parser>
 void take_home(Parser* sub, HomeOptions& options) {
@@ -45,10 +45,10 @@ void take_home(Parser* sub, HomeOptions& options) {
 template <class Parser>
 void take_monitor(Parser* sub, MonitorOptions& options) {
   take_drive(sub, options.drive);
-  sub->add_option("--seconds", options.seconds, "how long (default: until Ctrl-C; of --residual-map: not at all)")
+  sub->add_option("--seconds", options.seconds, "duration (default: until Ctrl-C; with --residual-map: 0)")
       ->check(CLI::PositiveNumber)
       ->type_name("S");
-  auto* rate = sub->add_option("--rate-hz", options.rate_hz, "lines a second")
+  auto* rate = sub->add_option("--rate-hz", options.rate_hz, "lines per second")
                    ->check(CLI::Range(0.5, 100.0))
                    ->capture_default_str()
                    ->type_name("HZ");
@@ -57,12 +57,12 @@ void take_monitor(Parser* sub, MonitorOptions& options) {
                        ->type_name("NAME")
                        ->allow_extra_args(false);
   auto* map = sub->add_flag("--residual-map", options.residual_map,
-                            "where the model fails: the drive's own map over velocity and motor angle")
+                            "where the model fails: the map of the drive over velocity and motor angle")
                   ->excludes(rate)
                   ->excludes(channels);
-  sub->add_flag("--reset", options.reset, "empties the residual map once it was shown")->needs(map);
+  sub->add_flag("--reset", options.reset, "clears the residual map after showing it")->needs(map);
   sub->add_option("--limit-nm", options.limit_nm,
-                  "residuals below are no failure (default: a hundredth of the motor's torque limit)")
+                  "smaller residuals are ignored (default: a hundredth of the motor's torque limit)")
       ->check(CLI::PositiveNumber)
       ->type_name("NM")
       ->needs(map);
@@ -89,25 +89,25 @@ void take_record(Parser* sub, RecordOptions& options) {
       ->check(CLI::PositiveNumber)
       ->type_name("RAD/S");
   sub->add_option("--full-current-a", options.full_current_a,
-                  "current that is 100 % in them (default: nine tenths of the drive's limit)")
+                  "motor current that is 100 % in the report's plans (default: nine tenths of the drive's limit)")
       ->check(CLI::PositiveNumber)
       ->type_name("A");
-  sub->add_flag("--clear-fault", options.clear_fault, "the cause of its present fault is gone");
+  sub->add_flag("--clear-fault", options.clear_fault, "clear the present fault first; its cause must be gone");
   take_yes(sub, options.yes);
 }
 
 template <class Parser>
 void take_twin(Parser* sub, TwinOptions& options) {
   sub->add_option("--plant", options.plant, "plant file (default: the demo's drive)")->type_name("FILE");
-  sub->add_option("--flash", options.flash, "holds its flash memory (default: none)")->type_name("FILE");
+  sub->add_option("--flash", options.flash, "file with its flash memory (default: none)")->type_name("FILE");
   sub->add_option("--cable", options.cable,
-                  "pulls its plug: a file that holds in, out, or out N (after N more messages)")
+                  "file that connects or disconnects it: in, out, or out N (after N more messages)")
       ->type_name("FILE");
   sub->add_option("--serial", options.serial, "serial number")->capture_default_str()->type_name("TEXT");
   sub->add_option("--serve", options.serve, "port on 127.0.0.1 (default: any that is free)")->type_name("PORT");
-  sub->add_option("--usbip", options.usbip, "a USB device behind this port of USB/IP")->type_name("PORT");
-  sub->add_option("--seconds", options.seconds, "ends after so long (default: at Ctrl-C)")->type_name("S");
-  sub->add_flag("--fast", options.fast, "while armed faster than real time, as its host keeps up");
+  sub->add_option("--usbip", options.usbip, "a USB device at this port of USB/IP")->type_name("PORT");
+  sub->add_option("--seconds", options.seconds, "duration (default: until Ctrl-C)")->type_name("S");
+  sub->add_flag("--fast", options.fast, "while armed faster than real time, as fast as the host answers");
 }
 
 }  // namespace flexspline::cli

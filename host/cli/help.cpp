@@ -17,14 +17,14 @@ constexpr std::string_view kAdd =
 
 const std::array kHelp = {
     CommandHelp{"demo",
-                "the whole story on the embedded twin, with a hidden effect",
+                "all steps on the embedded twin, with a hidden effect",
                 "A simulated drive with one effect that the model does not know is recorded, identified and compared; "
                 "the missing effect is diagnosed and added, and both models are compared on motions that the fit "
-                "never saw. At the end the twin reveals what was hidden. All of it is shown with plots in report.html.",
+                "never saw. At the end the twin states what was hidden. report.html shows all of it with plots.",
                 {"flexspline demo --hidden stribeck_gaussian --seed 7 --out demo-out"}},
     CommandHelp{
         "new",
-        "first dataset.toml and base model from the measurements that there are",
+        "first dataset.toml and base model from measurements",
         "Reads recordings as a logger left them (CSV, also of scopes and compressed by gzip; MAT; HDF5; NumPy; bags of "
         "ROS 1 and 2 and MCAP, by topic and field; logs of moteus), finds out which column is what from names, units "
         "and motion, and writes two files into a new folder: dataset.toml, which maps the columns to the names of the "
@@ -34,13 +34,12 @@ const std::array kHelp = {
         "--position-side link --gear-ratio N. A single record is split into a part to fit and a part to verify. What "
         "cannot be finished is left as a draft, with the command to continue.",
         {kMakeData, "flexspline new --from demo-out --out project"}},
-    CommandHelp{
-        "check",
-        "what is in the data: signals, rates, noise, excitation, findings",
-        "Reads measurements and lists what each experiment holds: signals with their range, noise and smallest "
-        "step, motion, reversals, a period if it repeats itself; then everything that was found wrong and what to do "
-        "about it, what can be identified from these signals, and which filters would be used.",
-        {kMakeData, "flexspline check demo-out"}},
+    CommandHelp{"check",
+                "what is in the data: signals, rates, noise, excitation, findings",
+                "Reads measurements and lists what each experiment holds: signals with their range, noise and smallest "
+                "step, motion, reversals, a period if it repeats itself; then each problem and its remedy, "
+                " what can be identified from these signals, and which filters would be used.",
+                {kMakeData, "flexspline check demo-out"}},
     CommandHelp{
         "effects",
         "the catalogue of physical effects, or one of them explained",
@@ -65,8 +64,8 @@ const std::array kHelp = {
         "alone, with average and spread, and for all together with 95 % intervals. A spread above 30 % is flagged: "
         "the parameter is not reliable, or an effect is missing. \"excited\" is the share of a parameter's effect on "
         "the data that no other parameter can explain. With --out the model is written with the values; its comments "
-        "and layout stay. --method iv or oe is for velocities so noisy that least squares finds too little of "
-        "everything; --intervals profile or bootstrap for parameters whose uncertainty is not symmetric; --supply for "
+        "and layout stay. --method iv or oe is for velocities so noisy that least squares is biased towards "
+        "zero; --intervals profile or bootstrap for parameters whose uncertainty is not symmetric; --supply for "
         "a parameter that is known from another source, such as an inertia where the torque constant is not known "
         "either. --report writes a page with plots for a browser or a printer.",
         {kMakeData, kIdentify,
@@ -92,7 +91,7 @@ const std::array kHelp = {
         "which physical effect is missing from a model, or that none is",
         "Fits the model, finds where its error is large, tries every effect of the catalogue against data left out of "
         "the fit, and names the one that is missing; or reports that none is, or that these data cannot show it, and "
-        "which experiment would. The model needs no values. With --auto it goes on with the effect added until "
+        "which experiment would. The model needs no values. With --auto it continues with the effect added until "
         "nothing more is found. --report writes a page with plots: where the model fails, and what is missing.",
         {kMakeData, "flexspline diagnose --model demo-out/base-model.toml demo-out"}},
     CommandHelp{
@@ -160,20 +159,20 @@ const std::array kHelp = {
          "flexspline export --model fitted.toml --as csv --out tables"}},
     CommandHelp{
         "plan",
-        "designs the motion that separates two effects, or that shows what is not well known",
+        "designs the motion that distinguishes two effects, or that determines the parameters",
         "Rehearses some thirty motions with the model, within the limits of the drive: triangles slow and fast, sines, "
-        "saw-teeth, multi-sines, chirps, ladders of speeds, a locked output, a constant load, two temperatures, the "
+        "saw-teeth, multisines, chirps, steps of speed, a locked output, a constant load, two temperatures, the "
         "drive off. With --separate, motions are chosen that distinguish two effects best: by the part of one "
         "effect's torque that the model with the other cannot reproduce, over the noise. Without it, motions that "
         "determine all parameters best. Measurements, where given, give the noise, the sizes of the effects and what "
-        "need not be recorded again. Where no motion separates two effects, the answer says so. The plan is a TOML "
+        "need not be recorded again. If no motion distinguishes two effects, the answer says so. The plan is a TOML "
         "file that flexspline-hil record --plan runs on the twin.",
         {kMakeData, kIdentify,
          "flexspline plan --separate stribeck_gaussian,load_dependent_friction --model fitted.toml --out "
          "plan.toml"}},
     CommandHelp{
         "drives",
-        "the drives in reach, and what each is",
+        "the drives that can be reached, and what each is",
         "Lists the drives on USB with serial number, firmware, effects of the image and state; one that cannot be "
         "opened with the reason and what to do. What is behind a serial port or a socket is found with --also.",
         {"flexspline drives --also twin"}},
@@ -193,10 +192,30 @@ const std::array kHelp = {
         "image",
         "makes a firmware image of a program",
         "Puts before a program (BIN file) the header that boot loader and flash --firmware check: length, checksum, "
-        "board and version. The program has to be linked to begin 512 bytes behind its slot. --dfu adds the suffix "
-        "that dfu-util looks for. flexspline-hil image makes images for the twin.",
+        "board, version, security counter and signature. The program has to be linked to begin 512 bytes behind its "
+        "slot. Without --key the image is signed with the development key, which is public: boot loaders that were "
+        "built without a key of their own take it. --dfu adds the suffix that dfu-util looks for. flexspline-hil "
+        "image makes images for the twin.",
         {"echo a program | tee program.bin",
          "flexspline image --program program.bin --board stm32f405-dac --version 1.2 --out firmware.image"}},
+    CommandHelp{
+        "sign",
+        "signs a firmware image",
+        "Signs an image (Ed25519) with the secret key of a file of flexspline key --new, for boot loaders that were "
+        "built with its public key; a signature that the image has is replaced. --counter raises the security "
+        "counter: once such an image was confirmed by a drive, the drive refuses all with a smaller one.",
+        {"echo a program | tee program.bin",
+         "flexspline image --program program.bin --board stm32f405-dac --version 1.2 --unsigned --out plain.image",
+         "flexspline key --new product.key",
+         "flexspline sign --image plain.image --key product.key --counter 1 --out firmware.image"}},
+    CommandHelp{
+        "key",
+        "makes and shows keys that firmware is signed with",
+        "--new makes a pair of Ed25519 keys and writes both into a file that its owner alone may read (mode 0600); "
+        "an existing file is never overwritten. Keep a copy: a drive whose boot loader has this public key takes "
+        "images signed by it and no others. --show prints the public key of a file, for the build of the boot "
+        "loader; it prints nothing secret.",
+        {"flexspline key --new product.key", "flexspline key --show product.key"}},
     CommandHelp{
         "backup",
         "saves the parameter block of a drive",
@@ -257,16 +276,16 @@ const std::array kHelp = {
         "a drive in closed loop, with and without compensation",
         "Runs the drive's own firmware on a simulated drive along a motion, with the same loops each time: without "
         "compensation, with a model, and with the model that an effect was added to (--base and --model). Reports the "
-        "tracking error of the output, the current, and whether the loops hunt; and also what was predicted from the "
+        "tracking error of the output, the current, and limit cycles at rest; and what was predicted from the "
         "model and the uncertainty of its parameters alone. A scenario is a name (flexspline-hil scenarios lists "
         "them) or a file with motion, drive, surroundings and faults. Without --model the manufacturer's values are "
         "used. --processor runs the controller as the image of an ARM processor.",
         {"flexspline hil --scenario slow-reversals --hide stribeck_gaussian --seconds 4"}},
     CommandHelp{
         "workbench",
-        "all of it with the mouse: a page in the browser of this machine",
-        "Serves a page on 127.0.0.1 and opens it: how good the model is, where it fails, what is missing, and what "
-        "becomes of the error with that added; steps can be taken back and compared. Without --model it begins as "
+        "all steps with the mouse: a page in the browser of this machine",
+        "Serves a page on 127.0.0.1 and opens it: how good the model is, where it fails, what is missing, and the "
+        "error with that added; steps can be undone and compared. Without --model it begins as "
         "flexspline new does: drop recordings on the page (or give them as DATA), look at the signals, choose which "
         "column is which, type gear ratio and torque constant, and a first model is identified. Models, reports and "
         "blocks are saved into the model's folder (without --model into this one), run in closed loop on a simulated "
@@ -278,9 +297,9 @@ const std::array kHelp = {
     CommandHelp{
         "fleet",
         "many drives: one command a drive, then which of them differs from its siblings",
-        "run identifies a drive (with --diagnose diagnoses it, too) and puts the answer as fleet-result.json next to "
-        "its measurements; where that is there already, of the same files and the same build, nothing is done, so the "
-        "command can be given again after a stop. It is for a scheduler: parallel flexspline fleet run {} ::: "
+        "run identifies a drive (with --diagnose diagnoses it, too) and writes fleet-result.json next to its "
+        "measurements; if that exists already, of the same files and the same build, nothing is done, so the "
+        "command can be repeated after a stop. It is for a scheduler: parallel flexspline fleet run {} ::: "
         "drives/*, or in a Slurm array job: all=(drives/*); flexspline fleet run \"${all[$SLURM_ARRAY_TASK_ID]}\". "
         "merge reads the results, reports how each parameter and each error is distributed over the drives, and names "
         "drives that are further off than their siblings' scatter explains; at least five drives are needed.",

@@ -1,4 +1,4 @@
-// What `flexspline hil` is given. The options are taken by a template, so that no second file needs the parser.
+// The options of `flexspline hil`. A template adds them, so that no second file needs the parser.
 #pragma once
 
 #include <cstdint>
@@ -40,23 +40,24 @@ void take_hil(Parser* sub, HilOptions& options) {
   sub->add_option("--model", options.model,
                   "model for the feedforward (default: the manufacturer's values, hidden effect unknown)")
       ->type_name("MODEL");
-  sub->add_option("--base", options.base, "a run with this model, too: the one before an effect was added")
-      ->type_name("MODEL");
+  sub->add_option("--base", options.base, "model before an effect was added, for one more run")->type_name("MODEL");
   sub->add_option("--plant", options.plant, "plant file of the drive (default: the scenario's)")->type_name("FILE");
-  sub->add_option("--with", options.with, "effects that the drive has and its maker knows, A,B")
+  sub->add_option("--with", options.with, "effects that the drive has and the manufacturer's values include, A,B")
       ->delimiter(',')
       ->type_name("EFFECT");
-  sub->add_option("--hide", options.hide, "effect that the drive has and its maker does not know")->type_name("EFFECT");
-  sub->add_option("--settings", options.settings, "of the drive, as pack --drive takes them (default: the maker's)")
+  sub->add_option("--hide", options.hide, "effect that the drive has and the manufacturer's values do not include")
+      ->type_name("EFFECT");
+  sub->add_option("--settings", options.settings,
+                  "settings of the drive, as for pack --drive (default: the manufacturer's)")
       ->type_name("FILE.toml");
-  sub->add_option("--seconds", options.seconds, "of motion (default: the scenario's)")->type_name("S");
+  sub->add_option("--seconds", options.seconds, "duration of the motion (default: the scenario's)")->type_name("S");
   sub->add_option("--processor", options.processor, "firmware image that runs the controller, in QEMU")
       ->type_name("ELF");
   sub->add_option("--draws", options.draws, "simulated drives of the prediction; 0: none")
       ->capture_default_str()
       ->type_name("N");
-  sub->add_option("--seed", options.seed, "of the sensors' noise")->capture_default_str()->type_name("N");
-  sub->add_option("--tick-hz", options.tick_hz, "ticks of the drive a second, whole in a millisecond")
+  sub->add_option("--seed", options.seed, "seed of the sensors' noise")->capture_default_str()->type_name("N");
+  sub->add_option("--tick-hz", options.tick_hz, "ticks of the drive per second, a multiple of 1000")
       ->capture_default_str()
       ->type_name("HZ");
   sub->add_option("--picture", options.picture, "write the tracking errors as a picture into this file")

@@ -27,7 +27,7 @@ struct Draft {
   std::string needs_pole_pairs;  // a speed in electrical turns
   bool from_toml = false;        // all of it is in a dataset.toml
   std::optional<Side> side;      // of the only position, where there is one
-  std::string open_question;     // "what; what to do": without an answer there is nothing to go on with
+  std::string open_question;     // "what; what to do": without an answer the work cannot continue
 };
 
 // From CSV and MAT files and folders of them, or from one dataset.toml, whose facts are kept.

@@ -112,7 +112,7 @@ void leave_unfinished(const Draft& draft, const NewOptions& options, const std::
   if (!draft.open_question.empty()) line += " --position-side link";
   console.error(
       fmt::format("{} holds what could be found; replace NAME, or a wrong name, by the right one "
-                  "(NAME:UNIT states its unit), and go on with\n  {}",
+                  "(NAME:UNIT states its unit), and continue with\n  {}",
                   file.string(), line));
 }
 

@@ -1,4 +1,4 @@
-// What `new` leaves where it cannot finish: the draft with what could be found, and the command to go on with.
+// What `new` writes if it cannot finish: the draft with what could be found, and the command to continue with.
 #pragma once
 
 #include <exception>

@@ -136,8 +136,8 @@ std::string picture(const Comparison& c) {
   std::string svg = fmt::format(
       "<svg xmlns=\"http://www.w3.org/2000/svg\" viewBox=\"0 0 860 {:.0f}\" font-family=\"sans-serif\" "
       "font-size=\"13\">\n<rect width=\"100%\" height=\"100%\" fill=\"#ffffff\"/>\n"
-      "<text x=\"{}\" y=\"22\" font-size=\"15\" font-weight=\"bold\" fill=\"#222\">How far the output is from where it "
-      "shall be: {}</text>\n<text x=\"{}\" y=\"41\" fill=\"#444\">error in millirad over {:g} s; the same loops in all "
+      "<text x=\"{}\" y=\"22\" font-size=\"15\" font-weight=\"bold\" fill=\"#222\">Tracking error of the output: "
+      "{}</text>\n<text x=\"{}\" y=\"41\" fill=\"#444\">error in millirad over {:g} s; the same loops in all "
       "runs (velocity {:.3g} Hz with integrator, position {:.3g} Hz)</text>\n",
       bottom + 20.0, kLeft, report::escaped(c.runs.front().outcome.what), kLeft, c.seconds, c.velocity_loop_hz,
       c.position_loop_hz);

@@ -45,7 +45,7 @@ const char* signal_name(Balance balance) {
 struct PooledScores {
   std::string signal;
   Score score;
-  double worst_case_gain = kUnknown;
+  HInfinityNorm h_infinity;  // the largest
   std::size_t masked = 0;
   bool diverged_or_empty = false;  // a free run among them diverged
 };
@@ -85,7 +85,7 @@ class Comparer {
       if (std::any_of(result_.overall.begin(), result_.overall.end(), [&](auto& s) { return s.signal == t.signal; }))
         continue;
       SignalResult s = result_of(t.signal, t.score, t.masked, t.diverged_or_empty);
-      s.worst_case_gain = t.worst_case_gain;
+      s.h_infinity = t.h_infinity;
       result_.overall.push_back(std::move(s));
     }
     result_.baselines = fit_baselines(baseline_signals_, baseline_specifications_, result_.warnings);
@@ -113,14 +113,13 @@ class Comparer {
     s.fit_percent = diverged_or_empty ? kUnknown : score.fit_percent();
     s.vaf_percent = diverged_or_empty ? kUnknown : score.vaf_percent();
     s.max_abs = diverged_or_empty ? kUnknown : score.max_abs();
-    s.worst_case_gain = kUnknown;
     return s;
   }
 
   PooledScores& together(const std::string& signal) {
     for (PooledScores& t : together_)
       if (t.signal == signal) return t;
-    together_.push_back({signal, {}, kUnknown, 0, false});
+    together_.push_back({signal, {}, {}, 0, false});
     return together_.back();
   }
 
@@ -129,25 +128,22 @@ class Comparer {
     t.score.add(score);
     t.masked += s.masked;
     t.diverged_or_empty = t.diverged_or_empty || std::isnan(s.rmse);
-    t.worst_case_gain = std::fmax(t.worst_case_gain, s.worst_case_gain);
+    if (!(t.h_infinity.value >= s.h_infinity.value) && std::isfinite(s.h_infinity.value)) t.h_infinity = s.h_infinity;
     result_.experiments[experiment].signals.push_back(std::move(s));
   }
 
-  // Of the balance at full rate, by range of its rows.
-  std::vector<double> worst_case_gains(const BalanceData& data) const {
-    std::vector<double> gains(data.records().size(), kUnknown);
-    estimation::in_parallel(gains.size(), [&](std::size_t i) {
+  // Of the balance at full rate, by range of its samples.
+  std::vector<HInfinityNorm> h_infinity_norms(const BalanceData& data) const {
+    std::vector<HInfinityNorm> norms(data.records().size());
+    estimation::in_parallel(norms.size(), [&](std::size_t i) {
       const Record& record = prepared_.records[data.records()[i].record];
       // A drive that is off excites no lines.
       const auto full = record.at_rest ? std::nullopt : full_rate(prepared_, record, data.balance(), terms_);
       if (!full) return;
-      std::vector<double> error = full->residual;
-      for (std::size_t k = 0; k < error.size(); ++k)
-        if (!full->valid[k]) error[k] = 0.0;
-      gains[i] = worst_case_gain(full->target, error, record.segments, 1.0 / record.sample_s,
+      norms[i] = h_infinity_norm(full->target, full->residual, record.segments, 1.0 / record.sample_s,
                                  prepared_.pipeline.row_cutoff_hz);
     });
-    return gains;
+    return norms;
   }
 
   void inverse(BalanceData& data, bool regions_and_gains) {
@@ -156,8 +152,8 @@ class Comparer {
     const std::string signal = signal_name(data.balance());
     const bool collapsed = data.balance() == Balance::motor && !prepared_.torque_measured;
     Eigen::VectorXd floor_squared = Eigen::VectorXd::Constant(data.rows(), kUnknown);
-    const std::vector<double> gains =
-        regions_and_gains ? worst_case_gains(data) : std::vector<double>(data.records().size(), kUnknown);
+    const std::vector<HInfinityNorm> norms =
+        regions_and_gains ? h_infinity_norms(data) : std::vector<HInfinityNorm>(data.records().size());
     for (std::size_t i = 0; i < data.records().size(); ++i) {
       const estimation::RowRange& range = data.records()[i];
       const Record& record = prepared_.records[range.record];
@@ -167,7 +163,7 @@ class Comparer {
       s.noise_floor = floors[i].rmse;
       s.noise_floor_from = floors[i].from;
       s.collapsed = collapsed;
-      s.worst_case_gain = gains[i];
+      s.h_infinity = norms[i];
       if (floors[i].rmse)
         floor_squared.segment(range.first, range.size()).setConstant(*floors[i].rmse * *floors[i].rmse);
       keep(range.record, std::move(s), score);
@@ -176,7 +172,7 @@ class Comparer {
       baseline_signals_.push_back(balance_signal(prepared_, data, terms_, signal, unit_of(signal)));
     const PooledScores& t = together(signal);
     SignalResult overall = result_of(signal, t.score, t.masked, false);
-    overall.worst_case_gain = t.worst_case_gain;
+    overall.h_infinity = t.h_infinity;
     const NoiseFloor floor = pooled(floors, data.records());
     overall.noise_floor = floor.rmse;
     overall.noise_floor_from = floor.from;
@@ -187,7 +183,7 @@ class Comparer {
 
   void add_regions(const BalanceData& data, const std::string& signal, const Eigen::VectorXd& residual,
                    const Eigen::VectorXd& floor_squared) {
-    // A short record has few rows; its regions are wider then, never too small for a test.
+    // A short record has few samples; its regions are wider then, never too small for a test.
     const auto rows = static_cast<std::size_t>(data.rows());
     const std::size_t wanted = std::min(std::clamp(rows / kRowsPerBin, kFewestBins, kMostBins),
                                         std::max<std::size_t>(1, rows / kFewestInRegion));
@@ -248,11 +244,11 @@ class Comparer {
     bool diverged = false;
     for (const data::Segment& s : record.segments)
       for (std::size_t k = s.first; k < s.last; ++k) {
+        error[k] = measured[k] - simulated[k];
         if (!e.masked.empty() && e.masked[k]) {
           ++masked;
           continue;
         }
-        error[k] = measured[k] - simulated[k];
         diverged = diverged || !std::isfinite(error[k]);
         score.add(measured[k], error[k]);
       }
@@ -263,8 +259,8 @@ class Comparer {
     if (diverged)
       result_.warnings.push_back(fmt::format("{}: the free run diverges ({})", e.name, signal));
     else if (!record.at_rest)
-      result.worst_case_gain =
-          worst_case_gain(measured, error, record.segments, 1.0 / e.sample_s, prepared_.pipeline.row_cutoff_hz);
+      result.h_infinity =
+          h_infinity_norm(measured, error, record.segments, 1.0 / e.sample_s, prepared_.pipeline.row_cutoff_hz);
     keep(i, std::move(result), score);
   }
 

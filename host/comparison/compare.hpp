@@ -7,6 +7,7 @@
 #include <vector>
 
 #include "host/comparison/black_box_baseline.hpp"
+#include "host/comparison/h_infinity.hpp"
 #include "host/data/dataset.hpp"
 #include "host/estimation/record.hpp"
 #include "host/model/model.hpp"
@@ -26,7 +27,7 @@ struct SignalResult {
   double fit_percent = 0.0;  // 100 (1 - |y - yhat| / |y - mean(y)|)
   double vaf_percent = 0.0;  // 100 (1 - var(y - yhat) / var(y))
   double max_abs = 0.0;
-  double worst_case_gain = 0.0;  // largest ratio of error to signal spectrum over the excited lines
+  HInfinityNorm h_infinity;  // of the error against the signal, without a mask
   std::optional<double> noise_floor;
   std::string noise_floor_from = "none";
   bool collapsed = false;  // motor and load are one balance, as there is no torque sensor
@@ -42,7 +43,7 @@ struct ExperimentResult {
   std::vector<SignalResult> signals;
 };
 
-// Rows of all experiments in which a variable is between two values.
+// Samples of all experiments in which a variable is between two values.
 struct Region {
   std::string signal;
   std::string unit;
@@ -53,7 +54,7 @@ struct Region {
   std::size_t samples = 0;
   double bias = 0.0;
   double rmse = 0.0;
-  double excess = 0.0;  // rmse over the noise floor of these rows; NaN where there is none
+  double excess = 0.0;  // rmse over the noise floor of these samples; NaN where there is none
 };
 
 struct Comparison {
@@ -70,10 +71,10 @@ struct Comparison {
 // Options of a comparison: parts that take longer than errors by experiment, and are not always needed.
 struct Extent {
   bool free_runs = true;          // else the balances alone
-  bool regions_and_gains = true;  // else neither `regions` nor worst_case_gain of balances
+  bool regions_and_gains = true;  // else neither `regions` nor H-infinity norms of balances
 };
 
-// Inverse model: each torque balance on the rows of the regression, with the motion as measured. Free run: what the
+// Inverse model: each torque balance on the samples of the regression, with the motion as measured. Free run: what the
 // model does with the measured effort alone, from the measured state at the start of each segment; positions are not
 // detrended, as drift is an error. The cut-off is chosen from the experiments of role fit, where there are any.
 // `baselines`: black boxes that are fitted to the same signals, see black_box_baseline.hpp. Throws model::ModelError

@@ -22,7 +22,12 @@ json to_json(const SignalResult& s) {
           {"fit_percent", number(s.fit_percent)},
           {"vaf_percent", number(s.vaf_percent)},
           {"max_abs", number(s.max_abs)},
-          {"worst_case_gain", number(s.worst_case_gain)},
+          {"worst_case_gain", number(s.h_infinity.value)},
+          {"h_infinity",
+           {{"norm", number(s.h_infinity.value)},
+            {"interval", {number(s.h_infinity.low), number(s.h_infinity.high)}},
+            {"frequency_hz", number(s.h_infinity.frequency_hz)},
+            {"windows", number(s.h_infinity.windows)}}},
           {"noise_floor", s.noise_floor ? number(*s.noise_floor) : json(nullptr)},
           {"noise_floor_from", s.noise_floor_from},
           {"collapsed", s.collapsed}};

@@ -39,7 +39,7 @@ void add_line(std::string& text, std::size_t width, std::string_view first, cons
   fmt::format_to(std::back_inserter(text), "{:<{}} {:<20} {:>10} {:<6} {:>8} {:>10} {:>8} {:>10} {:>8}\n", first, width,
                  s.signal + (s.collapsed ? "*" : ""), cell(s.rmse), s.unit, cell(100.0 * s.nrmse, " %"),
                  s.noise_floor ? cell(*s.noise_floor) : "-", excess ? cell(*excess) : "-", cell(s.max_abs),
-                 cell(s.worst_case_gain));
+                 cell(s.h_infinity.value));
 }
 
 std::string words(const Region& r, const SignalResult& overall) {

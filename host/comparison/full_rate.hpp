@@ -1,4 +1,4 @@
-// Residual and target of one record at every sample, where rows are too few or not evenly spaced.
+// Residual and target of one record at every sample, where samples are too few or not evenly spaced.
 #pragma once
 
 #include <cstdint>
@@ -12,7 +12,7 @@ namespace flexspline::comparison {
 struct FullRate {
   std::vector<double> target;       // N m, filtered; zero outside the segments
   std::vector<double> residual;     // target minus model
-  std::vector<std::uint8_t> valid;  // within the segments that the record's rows are taken from
+  std::vector<std::uint8_t> valid;  // within the segments that the record's samples are taken from
 };
 
 // Nothing where the record lacks what the balance needs. `record` need not be one of `prepared`, which gives the rest.

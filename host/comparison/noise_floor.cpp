@@ -30,7 +30,7 @@ constexpr double kSameVelocity = 0.02;
 // The limits of the search for the period are wide: samples that did not repeat are left out afterwards.
 constexpr double kRepetition = 0.02;
 constexpr double kLooseRepetition = 0.25;
-// Pairs wanted, as a share of the record's usable samples and as a number of rows.
+// Pairs wanted, as a share of the record's usable samples and as a number of samples.
 constexpr double kWantedShare = 0.3;
 constexpr std::size_t kWantedRows = 50;
 constexpr int kRealisations = 2;

@@ -10,7 +10,7 @@
 namespace flexspline::comparison {
 
 struct NoiseFloor {
-  std::optional<double> rmse;  // N m (N on a linear axis), over the rows of the record
+  std::optional<double> rmse;  // N m (N on a linear axis), over the samples of the record
   std::string from = "none";   // periods, replicates, propagated, stated, none
 };
 
@@ -22,7 +22,7 @@ std::vector<NoiseFloor> noise_floors(estimation::BalanceData& data, const estima
                                      const std::vector<const data::Experiment*>& experiments,
                                      const model::Drive& drive);
 
-// Of all records together, weighted by their rows; none where any record has none.
+// Of all records together, weighted by their samples; none where any record has none.
 NoiseFloor pooled(const std::vector<NoiseFloor>& floors, const std::vector<estimation::RowRange>& records);
 
 }  // namespace flexspline::comparison

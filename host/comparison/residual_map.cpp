@@ -27,20 +27,20 @@ constexpr double kWholeWaves = 2.0;
 constexpr std::size_t kMostMapBins = 24;
 constexpr std::size_t kRowsPerMapBin = 16;
 
-// A map or wave: what it predicts in each row (zero where it predicts nothing), and its number of parameters in
+// A map or wave: what it predicts in each sample (zero where it predicts nothing), and its number of parameters in
 // addition to the mean.
 struct Explained {
   Eigen::VectorXd prediction;
   std::vector<RowRange> records;  // in which it predicts something
   double parameters = 0.0;
   double rows = 0.0;       // in which it predicts something
-  double explained = 0.0;  // sum of squares, of the rows in which it predicts something
+  double explained = 0.0;  // sum of squares, of the samples in which it predicts something
   double total = 0.0;      // likewise, about the mean
-  double all = 0.0;        // of all rows, about the mean
+  double all = 0.0;        // of all samples, about the mean
 };
 
-// Adjusted share of the whole residual's variance, where it is significant. The number of independent rows follows from
-// the autocorrelation of what the map leaves, not of the residual itself, which contains the structure.
+// Adjusted share of the whole residual's variance, where it is significant. The number of independent samples follows
+// from the autocorrelation of what the map leaves, not of the residual itself, which contains the structure.
 std::optional<double> significant_share(const Eigen::VectorXd& residual, const Explained& e, double longest_tau,
                                         double level) {
   if (!(e.total > 0.0) || e.parameters < 1.0) return std::nullopt;
@@ -115,7 +115,7 @@ Bins direction_bins(const Eigen::VectorXd& directions) {
   return bins;
 }
 
-// A wave of the motor's turn after the filter of the rows, which removes high orders at speed. The zero of an angle
+// A wave of the motor's turn after the filter, which removes high orders at speed. The zero of an angle
 // that is not absolute differs from record to record, so each record has a phase of its own then. Records with less
 // than a few whole waves are left out: a part of a wave resembles any smooth curve.
 Explained wave_of(const BalanceData& data, const Eigen::VectorXd& residual, int order) {

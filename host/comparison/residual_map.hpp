@@ -17,7 +17,7 @@ struct Share {
   double share_percent = 0.0;  // of the residual's variance, less what bins or waves explain of pure noise
 };
 
-// Largest share first; only those that an F test at 1e-3 (of each kind of map) separates from noise, where rows are
+// Largest share first; only those that an F test at 1e-3 (of each kind of map) separates from noise, where samples are
 // counted as independent after the autocorrelation time of what the map leaves, at most `autocorrelation_time`. Shares
 // overlap, so they need not add up to less than 100 %.
 std::vector<Share> localise(const estimation::BalanceData& data, const Eigen::VectorXd& residual,

@@ -38,10 +38,4 @@ class Score {
   double largest_ = 0.0;
 };
 
-// Largest ratio of error to signal amplitude over the lines of an averaged spectrum (Hann windows) that are excited:
-// below `up_to_hz`, with at least a thousandth of the power of the strongest. The longest segment counts. NaN where it
-// is shorter than 64 samples or nothing is excited.
-double worst_case_gain(const std::vector<double>& measured, const std::vector<double>& error,
-                       const std::vector<data::Segment>& segments, double sample_hz, double up_to_hz);
-
 }  // namespace flexspline::comparison

@@ -54,7 +54,7 @@ class Reader {
     } catch (const text::TomlError& error) {
       const std::string where = error.column() > 0 ? fmt::format(" at column {}", error.column()) : std::string();
       findings_.fail("format", file(), error.line(), fmt::format("no valid TOML{}: {}", where, error.what()),
-                     "mend this line");
+                     "correct this line");
     }
   }
 

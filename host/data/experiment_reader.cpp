@@ -60,7 +60,7 @@ class ExperimentReader {
     return fail("too_few_samples", 0, "",
                 fmt::format("\"{}\" has {} samples{}; {} are needed at least", experiment_.name, rows_.size(), range,
                             kMinimumSamples),
-                "record longer, or mend from_s and to_s");
+                "record longer, or correct from_s and to_s");
   }
 
   // Rows whose time is in the part; a row without a time belongs where the row before it does.

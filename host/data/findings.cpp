@@ -78,8 +78,8 @@ Findings::Findings(std::vector<std::string> tolerate) : tolerate_(std::move(tole
           fmt::format("kinds that can be tolerated are {}", tolerable_kinds()));
     } else if (!kind->tolerable && kind->severity == Severity::error) {
       add(Severity::error, "tolerate", "", 0, "",
-          fmt::format("\"{}\" cannot be tolerated: there is nothing to go on with", name),
-          fmt::format("mend the data; kinds that can be tolerated are {}", tolerable_kinds()));
+          fmt::format("\"{}\" cannot be tolerated: the data cannot be used", name),
+          fmt::format("correct the data; kinds that can be tolerated are {}", tolerable_kinds()));
     } else if (!kind->tolerable) {
       add(Severity::note, "tolerate", "", 0, "", fmt::format("\"{}\" is never an error", name),
           fmt::format("kinds that can be tolerated are {}", tolerable_kinds()));

@@ -14,7 +14,7 @@ namespace flexspline::data {
 struct KindInfo {
   std::string_view name;
   Severity severity = Severity::warning;  // without `--tolerate`
-  bool tolerable = false;                 // `--tolerate` makes it a warning, and work goes on
+  bool tolerable = false;                 // `--tolerate` makes it a warning, and work continues
 };
 
 // All kinds that reading and checking may give.

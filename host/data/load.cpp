@@ -92,12 +92,12 @@ class Loader {
 
   // A file by itself is read by the dataset.toml in the same folder, if there is one.
   void read_single_file(const fs::path& path) {
-    const fs::path beside = path.parent_path() / "dataset.toml";
-    if (!fs::exists(beside)) {
+    const fs::path toml_path = path.parent_path() / "dataset.toml";
+    if (!fs::exists(toml_path)) {
       read_file(path, nullptr, nullptr);
       return;
     }
-    const DatasetToml toml = read_dataset_toml(beside, findings_);
+    const DatasetToml toml = read_dataset_toml(toml_path, findings_);
     findings_.add(Severity::note, "mapping", path.string(), 0, "", "read by the dataset.toml in the same folder", "");
     bool named = false;
     for (const ExperimentEntry& entry : toml.experiments)
@@ -125,7 +125,7 @@ class Loader {
     if (!fs::is_regular_file(path, error)) {
       findings_.add(Severity::error, "file", path.string(), 0, "",
                     fs::exists(path, error) ? "this is not a file" : "there is no such file",
-                    toml == nullptr ? "check the path" : fmt::format("mend its name in {}", toml->file.string()));
+                    toml == nullptr ? "check the path" : fmt::format("correct its name in {}", toml->file.string()));
       return nullptr;
     }
     const std::unique_ptr<Recording> recording = open_recording(path, findings_);

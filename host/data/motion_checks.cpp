@@ -62,7 +62,7 @@ void check_velocity(const Experiment& experiment, Column position, Column veloci
                fmt::format("in \"{}\" it is {:.4g} times the derivative of {}{}{}", experiment.name, ratio.factor,
                            column_name(position), cause.empty() ? "" : ": ", cause),
                fmt::format("give unit or scale of the wrong one under [columns.{}] or [columns.{}] in dataset.toml, or "
-                           "leave one out; --tolerate velocity_position_mismatch goes on with it",
+                           "leave one out; --tolerate velocity_position_mismatch uses it",
                            column_name(velocity), column_name(position)));
 }
 

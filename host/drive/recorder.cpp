@@ -293,7 +293,7 @@ Recording Recorder::record(const planning::Run& run, const Watch& watch) {
     std::uint32_t reported_tick = 0;
     std::optional<double> began_s;  // of position
     bool waits = false;
-    std::uint8_t asked = 0;
+    std::uint8_t command_number = 0;
     while (true) {
       const auto m = session_.next(Milliseconds(5));
       const auto now = Clock::now();
@@ -301,7 +301,7 @@ Recording Recorder::record(const planning::Run& run, const Watch& watch) {
       if (m && m->is_unasked()) {
         protocol::for_each_frame(*m,
                                  [&](const auto& head, std::uint32_t i, auto words) { columns.take(head, i, words); });
-      } else if (m && waits && m->number == asked) {
+      } else if (m && waits && m->number == command_number) {
         waits = false;
         protocol::CommandAnswer answer;
         if (moves && protocol::take_payload(m->content(), answer) == protocol::Code::done && answer.mode != mode) {
@@ -330,7 +330,7 @@ Recording Recorder::record(const planning::Run& run, const Watch& watch) {
         waits = true;
         const protocol::Command command =
             began_s ? position->at(time_s - *began_s, columns.set_point_rad()) : protocol::Command{};
-        asked = session_.post(protocol::request(Kind::command, 0, command));
+        command_number = session_.post(protocol::request(Kind::command, 0, command));
         reported_at = now;
         reported_tick = columns.last_tick();
         if (watch.progress) watch.progress(time_s);

@@ -36,7 +36,7 @@ class Recorder {
   Recorder(Session& session, const Scales& scales, const planning::Plan& plan, bool compensates = false);
 
   struct Watch {
-    std::function<bool()> stops;  // asked again and again: the user asked to stop
+    std::function<bool()> stops;  // called repeatedly: the user requested a stop
     std::function<void(double time_s)> progress{};
     std::function<void(const Recording& so_far)> seen{};
   };

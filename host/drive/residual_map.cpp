@@ -178,26 +178,26 @@ std::string_view name_of(MapVerdict verdict) {
   return "";
 }
 
-MapTest judge(const ResidualMap& map, double limit_nm) {
+MapTest test_map(const ResidualMap& map, double limit_nm) {
   MapTest out;
   const auto row_of = [&](std::size_t v) { return std::span(map.bins).subspan(v * map.angle_bins, map.angle_bins); };
-  std::vector<std::size_t> judged, whole;
+  std::vector<std::size_t> tested, whole;
   for (std::size_t v = 0; v < map.velocity_bins(); ++v) {
     if (v == map.edges_rad_s.size()) continue;
     const auto row = row_of(v);
     if (independent_of(map, mean_of(row, map).ticks) < kLeastIndependent) continue;
-    judged.push_back(v);
+    tested.push_back(v);
     // An order needs the whole turn, and an independent sample or so of each part of it.
     if (std::ranges::all_of(row, [&](const ResidualBin& b) { return independent_of(map, b.ticks) >= 0.25; }))
       whole.push_back(v);
   }
-  out.tested_bins = judged.size();
-  if (judged.empty()) return out;
-  const double tests = static_cast<double>(judged.size()) + (whole.empty() ? 0.0 : kMostMapOrder);
-  ResidualMap::Range range{map.velocity(judged.front()).low, map.velocity(judged.back()).high};
+  out.tested_bins = tested.size();
+  if (tested.empty()) return out;
+  const double tests = static_cast<double>(tested.size()) + (whole.empty() ? 0.0 : kMostMapOrder);
+  ResidualMap::Range range{map.velocity(tested.front()).low, map.velocity(tested.back()).high};
 
   std::size_t last = 0;
-  for (const std::size_t v : judged) {
+  for (const std::size_t v : tested) {
     const Mean mean = mean_of(row_of(v), map);
     const double p = std::min(1.0, tests * std::erfc(std::abs(mean.value) / mean.std / std::numbers::sqrt2));
     if (p > kMapCertainty || std::abs(mean.value) < limit_nm) continue;

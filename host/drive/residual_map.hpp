@@ -65,6 +65,6 @@ inline constexpr double kIndependent_s = 0.02;
 // The mean of each velocity bin is tested against zero (normal), and each order up to kMostMapOrder over all velocity
 // bins together (chi squared of twice as many degrees of freedom), with the scatter inside of the bins as noise and by
 // Bonferroni for the number of tests. What is smaller than `limit_nm` is no finding. Standstill is not tested.
-MapTest judge(const ResidualMap& map, double limit_nm);
+MapTest test_map(const ResidualMap& map, double limit_nm);
 
 }  // namespace flexspline::drive

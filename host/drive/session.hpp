@@ -28,7 +28,7 @@ using Bytes = std::vector<std::uint8_t>;
 class Session {
  public:
   // Identifies the drive. Throws DriveError where nothing answers or versions do not agree, LinkError as the link does.
-  // `answer`: how long a drive may take to answer before it is asked again.
+  // `answer`: how long a drive may take to answer before the request is repeated.
   explicit Session(std::unique_ptr<transport::Link> link, Milliseconds answer = Milliseconds(500));
 
   const protocol::Identity& identity() const { return identity_; }

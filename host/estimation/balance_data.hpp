@@ -1,4 +1,4 @@
-// Rows of one torque balance over all records: the target, and a column for any parameter of any effect. Columns are
+// Samples of one torque balance over all records: the target, and a column for any parameter of any effect. Columns are
 // computed at their first use and cached, so that a search over models computes each column once.
 #pragma once
 
@@ -15,7 +15,7 @@
 
 namespace flexspline::estimation {
 
-// Rows [first, last) that belong to one record, or to one part of one.
+// Samples [first, last) that belong to one record, or to one part of one.
 struct RowRange {
   std::size_t record = 0;
   Eigen::Index first = 0;
@@ -25,7 +25,7 @@ struct RowRange {
 
 class BalanceData {
  public:
-  // Keeps a reference to `prepared`. Records that lack what the balance needs have no rows.
+  // Keeps a reference to `prepared`. Records that lack what the balance needs have no samples.
   BalanceData(const PreparedData& prepared, Balance balance);
 
   Balance balance() const { return balance_; }
@@ -33,9 +33,10 @@ class BalanceData {
   Eigen::Index rows() const { return target_.size(); }
   const PreparedData& prepared() const { return *prepared_; }
   const std::vector<RowRange>& records() const { return ranges_; }
-  // Each record's rows cut into `parts` pieces of equal length: part k of all records is fold k of a cross-validation.
+  // Each record's samples cut into `parts` pieces of equal length: part k of all records is fold k of a
+  // cross-validation.
   std::vector<std::vector<RowRange>> folds(std::size_t parts) const;
-  // Index of a row's sample within its record.
+  // Index within its record, at full rate, of the sample in this row.
   std::size_t sample_of(const RowRange& range, Eigen::Index row) const;
 
   // Measured left side, filtered, N m: Km i - T/N (motor; Km i without a torque sensor), T, T - load torque.
@@ -73,18 +74,18 @@ class BalanceData {
     std::size_t count = 2;
   };
   Eigen::MatrixXd point_columns(const Terms& terms, const Points& points, bool filtered = true);
-  // Values of a signal at the rows, as the shifts of `terms` leave it; angles within a turn.
+  // Values of a signal at the samples, as the shifts of `terms` leave it; angles within a turn.
   Eigen::VectorXd signal_at_rows(const Terms& terms, effects::Variable variable);
 
-  // The same rows and target, with columns from fewer samples (eight a period of the row cut-off): they cost a part,
-  // and are near enough to choose a point on a grid and to begin a search, not to report. `few` takes the samples and
-  // must live as long as the result.
+  // The same samples and target, with columns from decimated signals (eight samples a period of the cut-off): they cost
+  // a part, and are near enough to choose a point on a grid and to begin a search, not to report. `few` takes the
+  // samples and must live as long as the result.
   BalanceData decimated(PreparedData& few) const;
 
-  // Rows that count as one for white noise, because the row filter correlates neighbours: row rate over twice the
+  // Samples that count as one for white noise, because the filter correlates neighbours: their rate over twice the
   // filter's noise bandwidth. A short residual underestimates this.
   double filter_autocorrelation_time() const;
-  // Records with too few rows to be used, by their index, with name and reason.
+  // Records with too few samples to be used, by their index, with name and reason.
   const std::map<std::size_t, std::string>& left_out() const { return left_out_; }
 
  private:
@@ -95,10 +96,10 @@ class BalanceData {
   bool usable(const Record& record) const;
   // How much of what adds to a balance reaches this one: its own, and by way of the gear without a torque sensor.
   double share(const Record& record, Balance of_effect) const;
-  // Rows from what `fill(range, column, signal)` writes along each record, filtered.
+  // Samples from what `fill(range, column, signal)` writes along each record, filtered.
   template <class Fill>
   Eigen::MatrixXd filtered_columns(std::size_t columns, Fill fill) const;
-  // Values of a filtered signal at the rows of a range.
+  // Values of a filtered signal at the samples of a range.
   void take_rows(const RowRange& range, const double* signal, Eigen::Ref<Eigen::VectorXd> rows) const;
   // Inputs as shifts and modulations of `terms` leave them for a term; false where they change nothing of it.
   template <class N>
@@ -123,7 +124,7 @@ class BalanceData {
   Eigen::VectorXd target_;
   Eigen::VectorXd delay_;
   std::vector<signals::ZeroPhaseFilter> filters_;  // one a range
-  // Where rows are between the samples of decimated data: how far beyond the sample of the record's rows, in samples.
+  // How far each sample of the target is beyond the sample of the decimated signals before it, in their samples.
   std::vector<double> beyond_;
   std::unordered_map<std::string, Eigen::VectorXd> cache_;
 };

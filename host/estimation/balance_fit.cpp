@@ -13,16 +13,16 @@ Eigen::MatrixXd nonlinear_columns(BalanceData& data, const Terms& terms, const s
   return data.nonlinear_columns(terms, on_balance, nonlinear);
 }
 
-NaturalValue natural_value(const Term& term, ParameterRef asked, const std::vector<ParameterRef>& refs,
+NaturalValue natural_value(const Term& term, ParameterRef requested, const std::vector<ParameterRef>& refs,
                            const Eigen::MatrixXd& covariance) {
   NaturalValue result;
-  result.value = catalogue::natural(*term.entry, term.values)[asked.parameter];
+  result.value = catalogue::natural(*term.entry, term.values)[requested.parameter];
   Eigen::VectorXd slopes = Eigen::VectorXd::Zero(covariance.rows());
   for (std::size_t j = 0; j < refs.size(); ++j) {
-    if (refs[j].term != asked.term) continue;
+    if (refs[j].term != requested.term) continue;
     std::vector<numbers::Jet> values(term.values.begin(), term.values.end());
     values[refs[j].parameter].v[0] = 1.0;
-    slopes[static_cast<Eigen::Index>(j)] = catalogue::natural(*term.entry, values)[asked.parameter].v[0];
+    slopes[static_cast<Eigen::Index>(j)] = catalogue::natural(*term.entry, values)[requested.parameter].v[0];
   }
   // An undetermined parameter has an infinite variance, which must not be multiplied by a slope of zero.
   for (Eigen::Index i = 0; i < slopes.size(); ++i)

@@ -23,7 +23,7 @@ struct BalanceFit {
   NoiseCovariance whitening = Eigen::VectorXd();
   Eigen::MatrixXd covariance;      // of linear, then nonlinear parameters; corrected for autocorrelation
   Eigen::VectorXd root_tolerance;  // likewise; see LinearFit
-  Eigen::VectorXd excitation;      // likewise: LinearFit::share_beside_all
+  Eigen::VectorXd excitation;      // likewise: LinearFit::root_tolerance_of_all
   Eigen::VectorXd white_variance;  // likewise: what the variances would be without autocorrelation
   double autocorrelation_time = 1.0;
   double condition_number = 0.0;
@@ -44,7 +44,7 @@ struct NaturalValue {
   double variance = 0.0;
 };
 // `refs` are the parameters of `covariance`, in its order; the requested one need not be among them.
-NaturalValue natural_value(const Term& term, ParameterRef asked, const std::vector<ParameterRef>& refs,
+NaturalValue natural_value(const Term& term, ParameterRef requested, const std::vector<ParameterRef>& refs,
                            const Eigen::MatrixXd& covariance);
 
 // Residual of terms at their present values on (other) data, N m.

@@ -7,8 +7,8 @@
 namespace flexspline::estimation {
 namespace {
 
-// Samples for each row. Four rows are taken for a period of the row cut-off, so that what moves the columns (positions
-// are filtered at 2.5 times it) stays below the Nyquist frequency of two samples a row.
+// Samples of the decimated signals for each sample of the target. The target has four for a period of the cut-off, so
+// what moves the columns (positions are filtered at 2.5 times it) stays below the Nyquist frequency of twice that rate.
 constexpr std::size_t kSamplesPerRow = 2;
 
 }  // namespace

@@ -23,7 +23,7 @@ enum class Method : std::uint8_t {
 enum class Intervals : std::uint8_t {
   standard,   // from the covariance, corrected for the residual's autocorrelation
   profile,    // where the best fit of all others gets significantly worse
-  bootstrap,  // from fits to blocks of the rows drawn at random
+  bootstrap,  // from fits to blocks of the samples drawn at random
 };
 
 // A parameter that the user supplies for this run: known, as where the data leave the scale open (report 3.6).

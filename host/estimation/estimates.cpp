@@ -11,49 +11,37 @@
 namespace flexspline::estimation {
 namespace {
 
-// Least tolerance of a parameter in a record for its value to count in the table by experiment.
-constexpr double kTellsAlone = 0.03;
-constexpr double kErrorAlone = 0.2;        // and its error must be less than this share of the pooled value
-constexpr double kReliablePercent = 30.0;  // the report's threshold for std/avg
-
-struct Spread {
-  std::optional<double> average, percent;
-};
-
-Spread spread_of(const std::vector<double>& values) {
-  Spread spread;
-  const auto n = static_cast<double>(values.size());
-  if (values.size() < 2) return spread;
-  double mean = 0.0, square = 0.0;
-  for (const double v : values) mean += v / n;
-  for (const double v : values) square += (v - mean) * (v - mean);
-  const double deviation = std::sqrt(square / (n - 1.0));
-  spread.average = mean;
-  // An average that is zero within its error has no meaningful relative spread.
-  if (std::abs(mean) > 2.0 * deviation / std::sqrt(n)) spread.percent = 100.0 * deviation / std::abs(mean);
-  return spread;
+// Each record fitted alone, with nonlinear parameters as pooled. Its error is its own: from its residual and that
+// residual's autocorrelation, not from those of all records, which contain the differences between the records.
+std::vector<AloneFit> fit_alone(const BalanceData& data, const Eigen::MatrixXd& X, const Eigen::VectorXd& target) {
+  std::vector<AloneFit> all;
+  for (const RowRange& range : data.records()) {
+    AloneFit& fit = all.emplace_back();
+    fit.name = data.prepared().records[range.record].name;
+    if (range.size() < 4 * X.cols()) {
+      fit.too_short = fmt::format("{} rows for {} parameters", range.size(), X.cols());
+      continue;
+    }
+    LinearFit alone = least_squares(X.middleRows(range.first, range.size()), target.segment(range.first, range.size()),
+                                    Eigen::VectorXd::Ones(range.size()));
+    const double noise = alone.residual.squaredNorm() / static_cast<double>(range.size() - X.cols());
+    const double rows_as_one = std::max(autocorrelation_time({{range.record, 0, range.size()}}, alone.residual),
+                                        data.filter_autocorrelation_time());
+    fit.theta = std::move(alone.theta);
+    fit.root_tolerance = std::move(alone.root_tolerance);
+    fit.covariance = alone.unit_covariance * (noise * rows_as_one);
+  }
+  for (const auto& [record, reason] : data.left_out()) {
+    AloneFit& fit = all.emplace_back();
+    fit.name = data.prepared().records[record].name;
+    fit.too_short = "too few rows are left of it";
+  }
+  return all;
 }
 
-// Each record fitted alone, with nonlinear parameters as pooled.
-void fit_by_experiment(BalanceData& data, const BalanceFit& fit, const Terms& terms, std::vector<Estimate>& estimates,
-                       std::size_t first_estimate) {
+std::vector<AloneFit> fit_alone(BalanceData& data, const BalanceFit& fit, const Terms& terms) {
   const Eigen::MatrixXd X = columns_of(data, terms, fit.linear);
-  const Eigen::VectorXd target = data.target() - data.known_torque(terms, fit.on_balance);
-  for (const RowRange& range : data.records()) {
-    if (range.size() < 4 * X.cols()) continue;
-    const LinearFit alone =
-        least_squares(X.middleRows(range.first, range.size()), target.segment(range.first, range.size()),
-                      Eigen::VectorXd::Ones(range.size()));
-    const double noise = alone.residual.squaredNorm() / static_cast<double>(range.size() - X.cols());
-    for (std::size_t j = 0; j < fit.linear.size(); ++j) {
-      const auto c = static_cast<Eigen::Index>(j);
-      const double error = std::sqrt(noise * alone.unit_covariance(c, c) * fit.autocorrelation_time);
-      const bool tells =
-          alone.root_tolerance[c] > kTellsAlone && error < kErrorAlone * std::abs(estimates[first_estimate + j].value);
-      estimates[first_estimate + j].per_experiment.emplace_back(data.prepared().records[range.record].name,
-                                                                tells ? std::optional(alone.theta[c]) : std::nullopt);
-    }
-  }
+  return fit_alone(data, X, data.target() - data.known_torque(terms, fit.on_balance));
 }
 
 Estimate estimate_of(const Terms& terms, ParameterRef ref, data::Axis axis) {
@@ -70,48 +58,66 @@ Estimate estimate_of(const Terms& terms, ParameterRef ref, data::Axis axis) {
   return e;
 }
 
-void summarise(Estimate& e) {
-  std::vector<double> values;
-  for (const auto& [name, value] : e.per_experiment)
-    if (value) values.push_back(*value);
-  const Spread spread = spread_of(values);
-  e.average = spread.average;
-  e.spread_percent = spread.percent;
-  e.reliable = !spread.percent || *spread.percent <= kReliablePercent;
-}
-
 Estimate* find_estimate(std::vector<Estimate>& estimates, std::string_view effect, std::string_view parameter) {
   for (Estimate& e : estimates)
     if (e.effect == effect && e.parameter == parameter) return &e;
   return nullptr;
 }
 
+void take(ByExperiment from, ByExperiment& to) {
+  to = std::move(from);
+}
+
+// The experiments' own fits of a balance.
+struct AloneFits {
+  std::vector<AloneFit> fits;
+  std::vector<ParameterRef> linear;
+
+  std::optional<Eigen::Index> column_of(ParameterRef ref) const {
+    for (std::size_t j = 0; j < linear.size(); ++j)
+      if (linear[j].term == ref.term && linear[j].parameter == ref.parameter) return static_cast<Eigen::Index>(j);
+    return std::nullopt;
+  }
+};
+
 // Tvp = Tv + dTv, Tvn = Tv - dTv and likewise for Coulomb friction (EFFECTS: derived values), where `odd` is half the
 // difference between the directions of `even`. The spread of a difference of directions has little information; that of
 // the two directions themselves is what the report compares.
-void derive_directions(const Estimate& even, Estimate& odd, std::string_view symbols, std::vector<Derived>& derived) {
+void derive_directions(const std::vector<AloneFits>& balances, const Estimate& even, Estimate& odd,
+                       std::string_view symbols, std::vector<Derived>& derived) {
   const std::vector<std::string_view> names = catalogue::split_names(symbols);
-  derived.push_back({std::string(names[0]), even.value + odd.value, even.unit});
-  derived.push_back({std::string(names[1]), even.value - odd.value, even.unit});
-  std::vector<double> positive, negative;
-  for (std::size_t k = 0; k < std::min(even.per_experiment.size(), odd.per_experiment.size()); ++k)
-    if (even.per_experiment[k].second && odd.per_experiment[k].second) {
-      positive.push_back(*even.per_experiment[k].second + *odd.per_experiment[k].second);
-      negative.push_back(*even.per_experiment[k].second - *odd.per_experiment[k].second);
+  std::size_t with_spread = 0, with_verdict = 0;
+  double larger = 0.0;
+  for (std::size_t k = 0; k < 2; ++k) {
+    const double sign = k == 0 ? 1.0 : -1.0;
+    Derived d;
+    d.name = std::string(names[k]);
+    d.value = even.value + sign * odd.value;
+    d.unit = even.unit;
+    for (const AloneFits& alone : balances) {
+      const auto first = alone.column_of(even.ref), second = alone.column_of(odd.ref);
+      if (first && second) take(by_experiment(alone.fits, {*first, second, sign}), d);
     }
-  const Spread p = spread_of(positive), n = spread_of(negative);
-  odd.spread_percent = p.percent && n.percent ? std::optional(std::max(*p.percent, *n.percent)) : std::nullopt;
-  odd.reliable = !odd.spread_percent || *odd.spread_percent <= kReliablePercent;
+    with_spread += d.spread_percent.has_value();
+    with_verdict += d.reliable.has_value();
+    larger = std::max(larger, d.spread_percent.value_or(0.0));
+    derived.push_back(std::move(d));
+  }
+  odd.spread_percent.reset();
+  odd.reliable.reset();
+  if (with_spread == 2) odd.spread_percent = larger;
+  if (with_verdict == 2) odd.reliable = larger <= kReliableSpreadPercent;
 }
 
-void derive_directions(std::vector<Estimate>& estimates, std::vector<Derived>& derived) {
+void derive_directions(const std::vector<AloneFits>& balances, std::vector<Estimate>& estimates,
+                       std::vector<Derived>& derived) {
   for (const catalogue::Entry& entry : catalogue::all()) {
     const effects::Description& info = *entry.info;
     if (info.asymmetry_of.empty()) continue;
     const Estimate* even =
         find_estimate(estimates, info.asymmetry_of, catalogue::get(info.asymmetry_of).parameters.front().name);
     Estimate* odd = find_estimate(estimates, entry.name(), entry.parameters.front().name);
-    if (even && odd) derive_directions(*even, *odd, info.direction_symbols, derived);
+    if (even && odd) derive_directions(balances, *even, *odd, info.direction_symbols, derived);
   }
 }
 
@@ -176,6 +182,9 @@ void warn_of_excitation(BalanceData& data, const BalanceFit& fit, const Terms& t
   for (std::size_t j = 0; j < fit.nonlinear.size(); ++j) {
     const Term& term = terms[fit.nonlinear[j].term];
     const double share = share_of_range(data, terms, fit.nonlinear[j]);
+    // A free run shows values below the range of the regression.
+    const ParameterRange range = parameter_range(data, term, fit.nonlinear[j].parameter);
+    if (term.values[fit.nonlinear[j].parameter] < range.low * (1.0 - 1e-9)) continue;
     if (share < kAtTheEnd || share > 1.0 - kAtTheEnd)
       result.warnings.push_back(fmt::format("{}.{} stopped at the end of what these data can show ({:.4g}); record {}",
                                             term.id, term.entry->parameters[fit.nonlinear[j].parameter].name,
@@ -237,19 +246,19 @@ void add_estimates(const BalanceData& data, const BalanceFit& fit, Identificatio
   }
 }
 
-// Average and spread over the experiments.
-void add_spread(const BalanceData& data, const Identification& result, Estimate& e) {
-  const bool per_record = result.terms[e.ref.term].entry->parameters[e.ref.parameter].per_record;
-  if (per_record)
-    for (const RowRange& range : data.records()) {
-      const Record& record = result.prepared.records[range.record];
-      e.per_experiment.emplace_back(record.name, e.value + record.torsion_zero_rad);
-    }
+// The values by experiment, with average and spread.
+void add_by_experiment(const BalanceData& data, const AloneFits& alone, const Identification& result, Estimate& e) {
+  if (const auto column = alone.column_of(e.ref)) take(by_experiment(alone.fits, {*column, std::nullopt}), e);
+  if (!result.terms[e.ref.term].entry->parameters[e.ref.parameter].per_record) return;
+  e.per_experiment.clear();
+  for (const RowRange& range : data.records()) {
+    const Record& record = result.prepared.records[range.record];
+    e.per_experiment.push_back({record.name, e.value + record.torsion_zero_rad, std::nullopt, ""});
+  }
   summarise(e);
-  if (!per_record) return;
   // It differs by definition.
   e.spread_percent.reset();
-  e.reliable = true;
+  e.reliable.reset();
 }
 
 void store_tables(Identification& result) {
@@ -268,13 +277,15 @@ void store_tables(Identification& result) {
 void assemble(Identification& result) {
   const data::Axis axis = result.model.drive.axis;
   std::vector<std::uint8_t> touched(result.terms.size(), 0);
+  std::vector<AloneFits> alone;
   for (std::size_t b = 0; b < result.data.size(); ++b) {
     BalanceData& data = result.data[b];
     const BalanceFit& fit = result.fits[b];
     const std::size_t first = result.estimates.size();
     add_estimates(data, fit, result);
-    fit_by_experiment(data, fit, result.terms, result.estimates, first);
-    for (std::size_t j = first; j < result.estimates.size(); ++j) add_spread(data, result, result.estimates[j]);
+    alone.push_back({fit_alone(data, fit, result.terms), fit.linear});
+    for (std::size_t j = first; j < result.estimates.size(); ++j)
+      add_by_experiment(data, alone.back(), result, result.estimates[j]);
     for (const ParameterRef& ref : result.held[b]) result.estimates.push_back(estimate_of(result.terms, ref, axis));
     for (const std::size_t t : fit.on_balance) touched[t] = 1;
     result.condition_number = std::max(result.condition_number, fit.condition_number);
@@ -286,7 +297,7 @@ void assemble(Identification& result) {
           "{}: its balance cannot be formed from these data; its parameters are left as they are", result.terms[t].id));
   for (const Term& term : result.terms) store_grids(result.model, term, axis);
   store_tables(result);
-  derive_directions(result.estimates, result.derived);
+  derive_directions(alone, result.estimates, result.derived);
   store(result.model, result.estimates);
 }
 

@@ -23,12 +23,13 @@ Eigen::MatrixXd cross_balance_columns(BalanceData& data, const Terms& terms, std
                                       const std::vector<std::size_t>& parameters);
 
 // `cross_columns`: slopes of the requested parameters; `own`: of the balance's own parameters; `residual` at the
-// present values. `whitening` makes the rows' errors noise of one, of which `autocorrelation_time` rows count as one.
+// present values. `whitening` makes the samples' errors noise of one, of which `autocorrelation_time` samples count as
+// one.
 Evidence evidence_of(const Eigen::MatrixXd& cross_columns, const Eigen::MatrixXd& own, const Eigen::VectorXd& residual,
                      const NoiseCovariance& whitening, double autocorrelation_time);
 
 // The noise of a balance where those of `cross_columns` are not at their final values: those and the balance's own are
-// fitted to first order for the moment, so that what is amiss with them is not taken for friction that differs.
+// fitted to first order for the moment, so that their errors are not taken for friction that differs.
 struct NoiseModel {
   NoiseCovariance whitening;
   double autocorrelation_time;

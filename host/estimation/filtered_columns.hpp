@@ -16,7 +16,7 @@ struct ColumnLane {
   const RowRange* range;
   std::size_t column;
   std::vector<double> whole;  // of what cannot be computed block by block
-  std::size_t next = 0;       // row that is taken next
+  std::size_t next = 0;       // sample that is taken next
 };
 
 // Where a column is to be written: samples from `first` on, whose signals are `inputs` where it reads any.
@@ -26,7 +26,7 @@ struct ColumnBlock {
   std::span<double> signal;
 };
 
-// Makes columns and takes their rows, some samples at a time. `Fill` has
+// Makes columns and takes them filtered, some samples at a time. `Fill` has
 //   unsigned reads(column): signals that it needs, of effects::Signals; kWholeRecord: it writes the whole record at
 //   once; void operator()(range, column, block).
 constexpr unsigned kWholeRecord = ~0U;

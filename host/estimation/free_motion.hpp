@@ -13,7 +13,7 @@ namespace flexspline::estimation {
 // The model of an identification with the values of its terms.
 model::Model model_with_values(const Identification& identification);
 
-// Every record again, with motion and torque of the free run, prepared by the same pipeline with the same rows. A
+// Every record again, with motion and torque of the free run, prepared by the same pipeline with the same samples. A
 // record that cannot be simulated or diverges keeps what was measured and is not marked. Records run on all cores; the
 // result does not depend on their number.
 struct FreeMotion {

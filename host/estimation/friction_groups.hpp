@@ -25,8 +25,7 @@ inline constexpr Eigen::Index kMostGroups = 4;
 // Fewer records than that do not identify a variance between them.
 inline constexpr std::size_t kFewestRecords = 3;
 
-// Groups among the linear parameters that a regression estimates; `nonlinear parameters` are those that it estimates
-// besides.
+// Groups among the linear parameters that a regression estimates; `nonlinear` are its nonlinear ones.
 std::vector<FrictionGroup> friction_groups(const Terms& terms, const std::vector<ParameterRef>& linear,
                                            const std::vector<ParameterRef>& nonlinear = {});
 

@@ -251,14 +251,14 @@ bool learn_tables(Identification& result) {
     for (std::size_t b = 0; b < result.data.size(); ++b) {
       const std::vector<std::size_t>& on_balance = result.fits[b].on_balance;
       if (std::find(on_balance.begin(), on_balance.end(), t) == on_balance.end()) continue;
-      const TableSpecification question = table_specification(*definition);
-      auto learned = learn_table(result.data[b], result.terms, question, result.fits[b].root_weights, term.id);
+      const TableSpecification specification = table_specification(*definition);
+      auto learned = learn_table(result.data[b], result.terms, specification, result.fits[b].root_weights, term.id);
       if (!learned) {
         result.warnings.push_back(fmt::format("{}: {} does not vary in these data; the table is left as it is", term.id,
                                               definition->variable));
         continue;
       }
-      term.entry = &catalogue::entry_of(effect_of(question, learned->table, term.id));
+      term.entry = &catalogue::entry_of(effect_of(specification, learned->table, term.id));
       result.tables.emplace_back(term.id, std::move(*learned));
       any = true;
     }

@@ -10,30 +10,27 @@
 
 #include "host/data/dataset.hpp"
 #include "host/estimation/balance_fit.hpp"
+#include "host/estimation/by_experiment.hpp"
 #include "host/estimation/learned_table.hpp"
 #include "host/model/model.hpp"
 
 namespace flexspline::estimation {
 
-struct Estimate {
+struct Estimate : ByExperiment {
   ParameterRef ref;
   std::string id, effect, parameter, unit;
   double value = 0.0;
   std::optional<double> std;
-  std::optional<double> low, high;       // 95 % interval
-  std::optional<double> average;         // of the experiments that identify it
-  std::optional<double> spread_percent;  // standard deviation (n-1) over average
-  bool reliable = true;                  // spread not above the report's 30 %
+  std::optional<double> low, high;  // 95 % interval
   bool identifiable = true;
   bool fixed = false;
   // Persistent excitation, by parameter (report 3.1): the share of its effect on the data, 0 to 1, that no other
   // parameter can explain.
   std::optional<double> excitation;
-  std::vector<std::pair<std::string, std::optional<double>>> per_experiment;
 };
 
 // A value that follows from several parameters, as the report gives them: Tvp = Tv + dTv.
-struct Derived {
+struct Derived : ByExperiment {
   std::string name;
   double value = 0.0;
   std::string unit;

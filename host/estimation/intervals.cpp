@@ -69,7 +69,7 @@ std::optional<double> end_of_profile(BalanceData& data, const Terms& best, const
   return natural(terms, ref);
 }
 
-std::vector<ParameterRef> slots_of(const BalanceFit& fit) {
+std::vector<ParameterRef> parameter_refs(const BalanceFit& fit) {
   std::vector<ParameterRef> refs = fit.linear;
   refs.insert(refs.end(), fit.nonlinear.begin(), fit.nonlinear.end());
   return refs;
@@ -83,7 +83,7 @@ void profile(Identification& identification, const Progress& progress) {
     BalanceData& data = identification.data[b];
     Terms best = identification.terms;
     const double least = fit_rest(data, best, fit.on_balance, fit.whitening);
-    const auto refs = slots_of(fit);
+    const auto refs = parameter_refs(fit);
     const double freedom = std::max(1.0, static_cast<double>(data.rows()) - static_cast<double>(refs.size()));
     for (std::size_t j = 0; j < refs.size(); ++j) {
       Estimate* estimate = estimate_of(identification, refs[j]);
@@ -123,10 +123,10 @@ void bootstrap(Identification& identification, int replicates, std::uint64_t see
   for (std::size_t b = 0; b < identification.fits.size(); ++b) {
     const BalanceFit& fit = identification.fits[b];
     BalanceData& data = identification.data[b];
-    const auto refs = slots_of(fit);
+    const auto refs = parameter_refs(fit);
     if (refs.empty()) continue;
     // Blocks are long against what neighbours have in common, and there are at least twenty where there are so many
-    // rows.
+    // samples.
     const auto rows = static_cast<double>(data.rows());
     const auto length =
         static_cast<Eigen::Index>(std::clamp(10.0 * fit.autocorrelation_time, 1.0, std::max(1.0, rows / 20.0)));

@@ -33,7 +33,7 @@ struct OtherColumns {
   std::map<std::size_t, Eigen::MatrixXd> columns;  // of tables, by their points
 };
 
-OtherColumns others(BalanceData& data, const Terms& all, const TableSpecification& question,
+OtherColumns others(BalanceData& data, const Terms& all, const TableSpecification& specification,
                     const Eigen::VectorXd& root_weights, std::string_view but) {
   Terms terms;
   for (const Term& t : all)
@@ -44,15 +44,15 @@ OtherColumns others(BalanceData& data, const Terms& all, const TableSpecificatio
   OtherColumns b;
   const Eigen::VectorXd y = data.target() - data.known_torque(terms, on_balance);
   const Eigen::MatrixXd X = columns_of(data, terms, linear);
-  const auto count = static_cast<Eigen::Index>(linear.size() + nonlinear.size()) + (question.delay_too ? 1 : 0);
+  const auto count = static_cast<Eigen::Index>(linear.size() + nonlinear.size()) + (specification.delay_too ? 1 : 0);
   b.problem.others.resize(data.rows(), count);
   b.problem.others.leftCols(X.cols()) = X;
   b.problem.others.middleCols(X.cols(), static_cast<Eigen::Index>(nonlinear.size())) =
       nonlinear_columns(data, terms, on_balance, nonlinear);
-  if (question.delay_too) b.problem.others.rightCols(1) = data.delay_column();
+  if (specification.delay_too) b.problem.others.rightCols(1) = data.delay_column();
   for (const auto* refs : {&linear, &nonlinear})
     for (const ParameterRef& ref : *refs) b.ids.push_back(terms[ref.term].id);
-  if (question.delay_too) b.ids.emplace_back("a delay of the effort");
+  if (specification.delay_too) b.ids.emplace_back("a delay of the effort");
   // From what the others leave, so that squares keep their digits.
   b.problem.target = least_squares(X, y, root_weights).residual;
   b.problem.root_weights = root_weights;
@@ -62,7 +62,7 @@ OtherColumns others(BalanceData& data, const Terms& all, const TableSpecificatio
   for (std::size_t f = 0; f < folds.size(); ++f)
     for (const RowRange& range : folds[f])
       std::fill(b.problem.fold.begin() + range.first, b.problem.fold.begin() + range.last, static_cast<int>(f));
-  b.problem.closed = is_closed(question.variable);
+  b.problem.closed = is_closed(specification.variable);
   return b;
 }
 
@@ -74,12 +74,12 @@ struct Fitted {
   double decrease() const { return curve.squares_without - curve.squares_with; }
 };
 
-Fitted fit_points(BalanceData& data, const Terms& terms, const TableSpecification& question, std::vector<double> at,
-                  OtherColumns& b, int smoothings = kSmoothings) {
-  const BalanceData::Points points{question.variable, question.times_direction, question.balance, at.front(), at.back(),
-                                   at.size()};
+Fitted fit_points(BalanceData& data, const Terms& terms, const TableSpecification& specification,
+                  std::vector<double> at, OtherColumns& b, int smoothings = kSmoothings) {
+  const BalanceData::Points points{
+      specification.variable, specification.times_direction, specification.balance, at.front(), at.back(), at.size()};
   Eigen::MatrixXd& columns = b.columns[at.size()];
-  if (columns.size() == 0) columns = data.point_columns(terms, points, question.filtered);
+  if (columns.size() == 0) columns = data.point_columns(terms, points, specification.filtered);
   b.problem.points = columns;
   Fitted fitted;
   fitted.curve = fit_curve(b.problem, smoothings);
@@ -129,39 +129,40 @@ SignalRange central_range(const Eigen::VectorXd& signal) {
   return {at(0.001), at(0.999)};
 }
 
-std::optional<LearnedTable> learn_table(BalanceData& data, const Terms& terms, const TableSpecification& question,
+std::optional<LearnedTable> learn_table(BalanceData& data, const Terms& terms, const TableSpecification& specification,
                                         const Eigen::VectorXd& root_weights, std::string_view but) {
   if (data.empty()) return std::nullopt;
-  const bool closed = is_closed(question.variable);
-  const SignalRange range = central_range(data.signal_at_rows(terms, question.variable));
+  const bool closed = is_closed(specification.variable);
+  const SignalRange range = central_range(data.signal_at_rows(terms, specification.variable));
   if (!(range.high > range.low)) return std::nullopt;
-  OtherColumns b = others(data, terms, question, root_weights, but);
+  OtherColumns b = others(data, terms, specification, root_weights, but);
   const auto points = [&](std::size_t count) {
     return closed ? catalogue::points_of_turn(count) : catalogue::even_points(range.low, range.high, count);
   };
   // Without the curve, records that show it most seem the noisiest and count the least: so they are weighed by what a
   // first curve leaves.
-  const std::vector<double> first = !question.at.empty() ? question.at
-                                    : question.exactly   ? points(question.most_points)
-                                                         : points(std::min<std::size_t>(kFirst, question.most_points));
-  for (int round = question.filtered ? 0 : 1;
+  const std::vector<double> first = !specification.at.empty() ? specification.at
+                                    : specification.exactly
+                                        ? points(specification.most_points)
+                                        : points(std::min<std::size_t>(kFirst, specification.most_points));
+  for (int round = specification.filtered ? 0 : 1;
        round < kWeighings && static_cast<Eigen::Index>(2 * first.size()) < data.rows(); ++round) {
-    const Fitted fitted = fit_points(data, terms, question, first, b, kFewSmoothings);
+    const Fitted fitted = fit_points(data, terms, specification, first, b, kFewSmoothings);
     const Eigen::VectorXd keep = (root_weights.array() > 0.0).cast<double>();
     b.problem.root_weights =
         keep.cwiseProduct(record_weights(data.records(), keep.cwiseProduct(fitted.curve.residual)));
   }
-  if (!question.at.empty()) return learned(data, b, fit_points(data, terms, question, question.at, b));
+  if (!specification.at.empty()) return learned(data, b, fit_points(data, terms, specification, specification.at, b));
   std::vector<Fitted> tried;
   double least = std::numeric_limits<double>::infinity();
   std::vector<std::size_t> counts(std::begin(kCounts), std::end(kCounts));
-  if (question.exactly) counts = {question.most_points};
+  if (specification.exactly) counts = {specification.most_points};
   for (const std::size_t count : counts) {
-    if (count > question.most_points || static_cast<Eigen::Index>(4 * count) > data.rows()) break;
+    if (count > specification.most_points || static_cast<Eigen::Index>(4 * count) > data.rows()) break;
     // A bump that is narrow shows only between points that are close, so that the first counts are tried in any case.
     const std::size_t n = tried.size();
     if (n >= kAlways && tried[n - 1].left() > (1.0 - kWorthMore) * tried[n - 2].left()) break;
-    tried.push_back(fit_points(data, terms, question, points(count), b));
+    tried.push_back(fit_points(data, terms, specification, points(count), b));
     least = std::min(least, tried.back().left());
   }
   for (Fitted& fitted : tried)
@@ -170,27 +171,27 @@ std::optional<LearnedTable> learn_table(BalanceData& data, const Terms& terms, c
 }
 
 TableSpecification table_specification(const model::Definition& definition) {
-  TableSpecification question;
-  question.variable = catalogue::find_variable(definition.variable)->variable;
-  question.times_direction = definition.times_direction;
-  question.balance = definition.balance == "transmission" ? Balance::transmission
-                     : definition.balance == "load"       ? Balance::load
-                                                          : Balance::motor;
-  question.at = definition.table.at;
-  return question;
+  TableSpecification specification;
+  specification.variable = catalogue::find_variable(definition.variable)->variable;
+  specification.times_direction = definition.times_direction;
+  specification.balance = definition.balance == "transmission" ? Balance::transmission
+                          : definition.balance == "load"       ? Balance::load
+                                                               : Balance::motor;
+  specification.at = definition.table.at;
+  return specification;
 }
 
-model::Effect effect_of(const TableSpecification& question, const model::Table& table, std::string id) {
+model::Effect effect_of(const TableSpecification& specification, const model::Table& table, std::string id) {
   model::Effect effect;
   effect.type = std::string(catalogue::kTableEffect);
   effect.id = std::move(id);
   model::Definition definition;
   for (const effects::VariableInfo& v : effects::kVariables)
-    if (v.variable == question.variable) definition.variable = std::string(v.name);
-  definition.balance = question.balance == Balance::motor          ? "motor"
-                       : question.balance == Balance::transmission ? "transmission"
-                                                                   : "load";
-  definition.times_direction = question.times_direction;
+    if (v.variable == specification.variable) definition.variable = std::string(v.name);
+  definition.balance = specification.balance == Balance::motor          ? "motor"
+                       : specification.balance == Balance::transmission ? "transmission"
+                                                                        : "load";
+  definition.times_direction = specification.times_direction;
   definition.table = table;
   effect.definition = std::move(definition);
   return effect;

@@ -1,4 +1,4 @@
-// Learns the points of a table effect from the rows of a balance.
+// Learns the points of a table effect from the samples of a balance.
 #pragma once
 
 #include <optional>
@@ -13,8 +13,8 @@ namespace flexspline::estimation {
 
 struct LearnedTable {
   model::Table table;  // with values and their standard deviations, corrected for autocorrelation
-  // Of rows that were left out of the fit, in fifths of each record: errors without the table and with it, the decrease
-  // of their weighted squares, and twice the log likelihood ratio over the autocorrelation time.
+  // Of samples that were left out of the fit, in fifths of each record: errors without the table and with it, the
+  // decrease of their weighted squares, and twice the log likelihood ratio over the autocorrelation time.
   double rmse_cv_before = 0.0;
   double rmse_cv_after = 0.0;
   double decrease_percent = 0.0;
@@ -22,7 +22,7 @@ struct LearnedTable {
   double effective = 0.0;            // numbers that the curve uses
   std::vector<std::string> left_to;  // effects of the model that hold what the curve and they could both draw
   std::vector<std::uint8_t>
-      visited;  // one a point: whether rows are there; else it is extrapolated from its neighbours
+      visited;  // one a point: whether samples are there; else it is extrapolated from its neighbours
   Eigen::VectorXd residual;
   double autocorrelation_time = 1.0;
 };
@@ -35,18 +35,18 @@ struct TableSpecification {
   std::vector<double> at;         // points to keep; empty: their number and range follow from the data
   std::size_t most_points = 256;  // where they do
   bool exactly = false;           // as many as that
-  bool filtered = true;           // else columns as they are at the rows, which cost little
+  bool filtered = true;           // else columns as they are at the samples, which cost little
   bool delay_too = false;         // a delay of the effort is estimated as well
 };
 
 // Fits all free linear parameters of `terms` on this balance and the table together (nonlinear parameters move to first
 // order), as smooth as cross-validation chooses. A table of `terms` with the id `but` is left out: it is the one to
-// learn. The number of points is the least that predicts left-out rows as well as more would, within a fiftieth of
+// learn. The number of points is the least that predicts left-out samples as well as more would, within a fiftieth of
 // their squares. Nothing where the signal does not vary.
-std::optional<LearnedTable> learn_table(BalanceData& data, const Terms& terms, const TableSpecification& question,
+std::optional<LearnedTable> learn_table(BalanceData& data, const Terms& terms, const TableSpecification& specification,
                                         const Eigen::VectorXd& root_weights, std::string_view but = {});
 
-// The signal at the rows covers this range, but for one row in a thousand at each end.
+// The signal at the samples covers this range, but for one sample in a thousand at each end.
 struct SignalRange {
   double low = 0.0;
   double high = 0.0;
@@ -57,6 +57,6 @@ SignalRange central_range(const Eigen::VectorXd& signal);
 TableSpecification table_specification(const model::Definition& definition);
 
 // A table effect with what was learnt; `id` names it.
-model::Effect effect_of(const TableSpecification& question, const model::Table& table, std::string id);
+model::Effect effect_of(const TableSpecification& specification, const model::Table& table, std::string id);
 
 }  // namespace flexspline::estimation

@@ -22,18 +22,18 @@ struct LinearFit {
 inline constexpr double kUndetermined = 1e-3;
 
 // Minimises |W^(1/2) (y - X theta)| by a Householder factorisation with column pivoting of the scaled columns.
-// `root_weights`: square roots of the weights, one a row. A column of zeros is undetermined.
+// `root_weights`: square roots of the weights, one a sample. A column of zeros is undetermined.
 LinearFit least_squares(const Eigen::MatrixXd& X, const Eigen::VectorXd& y, const Eigen::VectorXd& root_weights);
 
-// The same with errors that rows of a record have in common taken down: generalised least squares.
+// The same with errors that samples of a record have in common taken down: generalised least squares.
 LinearFit least_squares(const Eigen::MatrixXd& X, const Eigen::VectorXd& y, const NoiseCovariance& whitening);
 
-// One over the residual's RMS of each record, repeated along its rows: records with more noise count less. A record is
-// never weighted more than ten times the median one, so that a silent record does not rule the fit.
+// One over the residual's RMS of each record, repeated along its samples: records with more noise count less. A record
+// is never weighted more than ten times the median one, so that a silent record does not rule the fit.
 Eigen::VectorXd record_weights(const std::vector<RowRange>& records, const Eigen::VectorXd& residual);
 
-// What neighbouring rows have in common, in a covariance (Newey and West 1987): the sum over lags of the products of
-// columns and residual, X'rr'X with weights that fall to zero at `lags` rows. The covariance of least squares with
+// What neighbouring samples have in common, in a covariance (Newey and West 1987): the sum over lags of the products of
+// columns and residual, X'rr'X with weights that fall to zero at `lags` samples. The covariance of least squares with
 // unit covariance U is then U times this times U; that of an estimate by instruments has the instruments as columns.
 // Columns and residual are weighted; a lag does not reach from one record into another.
 Eigen::MatrixXd newey_west(const std::vector<RowRange>& records, const Eigen::MatrixXd& columns,
@@ -42,7 +42,7 @@ Eigen::MatrixXd newey_west(const std::vector<RowRange>& records, const Eigen::Ma
 // The lags that are used for a residual of this autocorrelation time.
 Eigen::Index newey_west_lags(double autocorrelation_time, Eigen::Index rows);
 
-// Rows that count as one: integrated autocorrelation time of the weighted residual over all records, at least one.
+// Samples that count as one: integrated autocorrelation time of the weighted residual over all records, at least one.
 double autocorrelation_time(const std::vector<RowRange>& records, const Eigen::VectorXd& weighted_residual);
 
 }  // namespace flexspline::estimation

@@ -7,8 +7,8 @@
 
 namespace flexspline::estimation {
 
-// Fills the residuals at `x` and, where `slopes` is not null, their slopes (one row a residual, one column an unknown).
-// False: `x` is a step too far, and the solver tries a shorter one.
+// Fills the residuals at `x` and, where `slopes` is not null, their slopes (a row for each residual, a column for each
+// unknown). False: `x` is a step too far, and the solver tries a shorter one.
 using Residuals =
     std::function<bool(const std::vector<double>& x, Eigen::VectorXd& residuals, Eigen::MatrixXd* slopes)>;
 

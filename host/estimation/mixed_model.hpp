@@ -19,8 +19,8 @@ struct MixedFit {
   double deviance() const { return std::accumulate(effects.deviance.begin(), effects.deviance.end(), 0.0); }
 };
 
-// `tau` rows count as one. Columns of free nonlinear parameters begin at `first_nonlinear`. Two searches begin with all
-// that is left as noise and with all of it as random effects; the likelier end counts.
+// `tau` samples count as one. Columns of free nonlinear parameters begin at `first_nonlinear`. Two searches begin with
+// all that is left as noise and with all of it as random effects; the likelier end counts.
 MixedFit fit_mixed_model(const RecordFactors& factors, const std::vector<FrictionGroup>& groups,
                          Eigen::Index first_nonlinear, double tau);
 

@@ -39,7 +39,7 @@ ModelProjection::ModelProjection(const Eigen::MatrixXd& columns, const Eigen::Ve
 Eigen::MatrixXd ModelProjection::orthogonal_part(const Eigen::MatrixXd& torques) const {
   Eigen::MatrixXd left = root_weights_.asDiagonal() * torques;
   left -= span_ * (span_.transpose() * left);
-  // Rows without weight are not used.
+  // Samples without weight are not used.
   return (root_weights_.array() > 0.0).select(root_weights_.array(), 1.0).inverse().matrix().asDiagonal() * left;
 }
 

@@ -25,6 +25,11 @@ constexpr double kConverged = 0.1;  // in standard errors: slopes found before s
 // A step too short for slopes by differences: what is left of the search is rounding and standstills that come and go.
 constexpr double kLeastMove = 0.01;
 constexpr double kStep_s = 1.0 / 4000.0;  // of the integration
+// A velocity that shapes friction: least squares cannot find one below the speeds that its mask leaves, but a free run
+// passes through all speeds.
+constexpr double kBelowTheMask = 0.02;  // of the slowest rows' speed
+constexpr double kEndOfRange = 0.005;   // of a range
+constexpr int kStarts = 4;              // over the range, where least squares found no start
 
 // A free parameter, moved in units of its standard error from least squares.
 struct Free {
@@ -34,10 +39,19 @@ struct Free {
   double start = 0.0;
   double unit = 0.0;
   double low = 0.0, high = 0.0;
+  bool nonlinear = false;
+  bool without_start = false;  // least squares stopped at the end of its range
+
+  // Where `value` is at an end of the range.
+  bool at_an_end(double value) const {
+    const double share = std::log(std::max(value, 1e-300) / low) / std::log(high / low);
+    return nonlinear && low > 0.0 && (share < kEndOfRange || share > 1.0 - kEndOfRange);
+  }
+  double in_units(double value) const { return (value - start) / unit; }
 };
 
 // The initial velocity of a record. The first sample is noisy, so it is estimated with the parameters.
-struct Start {
+struct StartVelocity {
   std::size_t record = 0;
   double velocity = 0.0;  // as measured
   double unit = 0.0;
@@ -89,7 +103,7 @@ class OutputError {
   bool empty() const { return rows_ == 0 || free_.empty(); }
   Eigen::Index rows() const { return rows_; }
   std::vector<Free>& free() { return free_; }
-  const std::vector<Start>& starts() const { return starts_; }
+  const std::vector<StartVelocity>& starts() const { return starts_; }
   std::size_t unknowns() const { return free_.size() + starts_.size(); }
   const std::vector<Part>& parts() const { return parts_; }
   const std::vector<std::uint8_t>& usable() const { return usable_; }
@@ -135,7 +149,7 @@ class OutputError {
     if (fit.root_tolerance[at] < kUndetermined) return;
     const Term& term = all_.terms[ref.term];
     const auto& info = term.entry->parameters[ref.parameter];
-    Free f{ref, b, at, term.values[ref.parameter], 0.0, info.low, info.high};
+    Free f{ref, b, at, term.values[ref.parameter], 0.0, info.low, info.high, nonlinear_ref, false};
     const double variance = fit.covariance(at, at);
     f.unit = std::isfinite(variance) && variance > 0.0 ? std::sqrt(variance) : 0.01 * std::abs(f.start);
     f.unit = std::max(f.unit, 1e-4 * std::abs(f.start));
@@ -143,6 +157,8 @@ class OutputError {
       const ParameterRange range = parameter_range(all_.data[b], term, ref.parameter);
       f.low = range.low;
       f.high = range.high;
+      f.without_start = range.logarithmic && f.at_an_end(f.start);
+      if (info.limit == effects::Limit::velocity) f.low = std::max(info.low, kBelowTheMask * range.low);
       f.unit = std::min(f.unit, 0.1 * (range.high - range.low));
     }
     if (f.unit > 0.0) free_.push_back(f);
@@ -203,7 +219,7 @@ class OutputError {
 
   Identification& all_;
   std::vector<Free> free_;
-  std::vector<Start> starts_;
+  std::vector<StartVelocity> starts_;
   std::vector<std::optional<double>> initial_;  // velocities, by record
   std::vector<Part> parts_;
   std::vector<std::uint8_t> usable_;
@@ -342,6 +358,94 @@ Minimisation search_of(OutputError& problem) {
   return how;
 }
 
+// Where a search ended.
+struct End {
+  std::vector<double> x;
+  Eigen::MatrixXd slopes;
+  double cost = INFINITY;
+};
+
+End search_from(OutputError& problem, std::vector<double> x, const std::function<void(std::string_view)>& progress) {
+  End end;
+  problem.set(x.data());
+  if (problem.weighted().size() == 0) return end;  // no free run from there
+  const Minimisation how = search_of(problem);
+  BroydenErrors errors(problem, progress);
+  for (int round = 0; round < kRounds; ++round) {
+    const std::vector<double> before = x;
+    end.cost = minimise(x, problem.rows(), std::ref(errors), how);
+    double moved = 0.0;
+    for (std::size_t j = 0; j < problem.free().size(); ++j) moved = std::max(moved, std::abs(x[j] - before[j]));
+    if (round > 0 && moved < kConverged) break;
+    problem.set(x.data());
+    errors.compute_slopes(x);
+  }
+  end.x = std::move(x);
+  end.slopes = errors.slope();
+  return end;
+}
+
+// From least squares, and over the range of each nonlinear parameter for which that found no start: a free run has
+// local minima. The least error comes first.
+std::vector<End> searches(OutputError& problem, const std::function<void(std::string_view)>& progress) {
+  std::vector<End> ends;
+  const auto search = [&](std::vector<double> x) {
+    End end = search_from(problem, std::move(x), progress);
+    if (std::isfinite(end.cost)) ends.push_back(std::move(end));
+  };
+  search(std::vector<double>(problem.unknowns(), 0.0));
+  for (std::size_t j = 0; j < problem.free().size(); ++j) {
+    const Free& f = problem.free()[j];
+    for (int k = 0; f.without_start && k < kStarts; ++k) {
+      std::vector<double> x(problem.unknowns(), 0.0);
+      x[j] = f.in_units(f.low * std::pow(f.high / f.low, (k + 0.5) / kStarts));
+      search(std::move(x));
+    }
+  }
+  std::ranges::sort(ends, {}, &End::cost);
+  return ends;
+}
+
+// No interval for a nonlinear parameter that the free run does not determine, nor for the others of its effect, whose
+// values depend on it: it ended at an end of its range, another value leaves an error that is not significantly larger,
+// or least squares had no start for it. Then the error has several minima (a shaft that breaks away jumps), and an
+// interval from the slopes at one of them is too short: on the slow saw-tooth of the report's table 1 it held the truth
+// in none of three runs.
+void mark_undetermined(Identification& identification, OutputError& problem, const std::vector<End>& ends) {
+  constexpr double kChi2 = 3.84;  // 95 %, one parameter
+  for (std::size_t j = 0; j < problem.free().size(); ++j) {
+    const Free& f = problem.free()[j];
+    if (!f.nonlinear) continue;
+    BalanceFit& fit = identification.fits[f.fit];
+    const Term& term = identification.terms[f.ref.term];
+    const double value = f.start + ends.front().x[j] * f.unit;
+    const double error = std::sqrt(fit.covariance(f.at, f.at));
+    const double independent = static_cast<double>(problem.rows()) / std::max(1.0, fit.autocorrelation_time);
+    std::string why = f.at_an_end(value) ? "the search ended at an end of its range" : "";
+    for (const End& end : ends) {
+      const double other = f.start + end.x[j] * f.unit;
+      const bool as_good = independent * (end.cost / ends.front().cost - 1.0) < kChi2;
+      if (why.empty() && as_good && std::abs(other - value) > 2.0 * error)
+        why = fmt::format("{:.4g} and {:.4g} leave the same error", value, other);
+    }
+    const bool undetermined = !why.empty();
+    if (!undetermined && f.without_start) {
+      why = "several minima, no interval; searches from several starts ended, by increasing error, at";
+      for (const End& end : ends) why += fmt::format(" {:.4g}", f.start + end.x[j] * f.unit);
+    }
+    if (why.empty()) continue;
+    identification.warnings.push_back(fmt::format("{}.{}: {}{}", term.id, term.entry->parameters[f.ref.parameter].name,
+                                                  undetermined ? "the free run does not determine it: " : "", why));
+    if (undetermined) fit.root_tolerance[f.at] = 0.0;
+    for (const Free& g : problem.free()) {
+      if (g.fit != f.fit || g.ref.term != f.ref.term) continue;
+      fit.covariance.row(g.at).setZero();
+      fit.covariance.col(g.at).setZero();
+      fit.covariance(g.at, g.at) = INFINITY;
+    }
+  }
+}
+
 }  // namespace
 
 void refit_to_output(Identification& identification, const std::function<void(std::string_view)>& progress) {
@@ -352,21 +456,16 @@ void refit_to_output(Identification& identification, const std::function<void(st
         "balances are needed for one");
     return;
   }
-  std::vector<double> x(problem.unknowns(), 0.0);
-  const Minimisation how = search_of(problem);
-  BroydenErrors errors(problem, progress);
-  for (int round = 0; round < kRounds; ++round) {
-    const std::vector<double> before = x;
-    minimise(x, problem.rows(), std::ref(errors), how);
-    double moved = 0.0;
-    for (std::size_t j = 0; j < problem.free().size(); ++j) moved = std::max(moved, std::abs(x[j] - before[j]));
-    if (round > 0 && moved < kConverged) break;
-    problem.set(x.data());
-    errors.compute_slopes(x);
+  const std::vector<End> ends = searches(problem, progress);
+  if (ends.empty()) {
+    identification.warnings.push_back("no free run starts from the values of least squares: they are kept");
+    return;
   }
-  problem.set(x.data());
-  take_covariance(identification, problem, errors.slope());
-  problem.set(x.data());
+  const End& best = ends.front();
+  problem.set(best.x.data());
+  take_covariance(identification, problem, best.slopes);
+  problem.set(best.x.data());
+  mark_undetermined(identification, problem, ends);
   for (std::size_t b = 0; b < identification.fits.size(); ++b)
     identification.fits[b].residual = residual_of(identification.data[b], identification.terms);
   std::string without;

@@ -27,7 +27,7 @@ struct RandomEffects {
   std::vector<double> variance;          // noise of each record, random effects taken off, (N m)^2
   std::vector<SmallVector> predictions;  // by record: best linear unbiased predictions, relative
   std::vector<double> squares;           // e'e with the predictions taken off
-  // Minus twice the log likelihood of each record, with rows over `tau` that count: n/tau ln(variance) and what the
+  // Minus twice the log likelihood of each record, with samples over `tau` that count: n/tau ln(variance) and what the
   // random effects cost.
   std::vector<double> deviance;
 };

@@ -22,13 +22,13 @@ using data::Experiment;
 using data::Segment;
 using signals::ZeroPhaseFilter;
 
-// Positions are differentiated with a wider filter than rows, so that functions of velocity such as its sign are
-// evaluated on sharp signals and filtered afterwards like the target.
+// Positions are differentiated with a wider filter than the target, so that functions of velocity such as its sign are
+// evaluated on sharp signals and filtered afterwards like it.
 constexpr double kMotionOverRow = 2.5;
-// Rows per second over the row cut-off: twice the Nyquist rate of what the filter lets through.
+// Samples per second after decimation, over the cut-off: twice the Nyquist rate of what the filter lets through.
 constexpr double kRowsOverCutoff = 4.0;
 
-// How far, in periods of the row cut-off, the step of friction at a reversal rings through the row filter.
+// How far, in periods of the cut-off, the step of friction at a reversal rings through the filter.
 constexpr double kMaskReach = 1.5;
 // Records of less coherent power than this share of the strongest one's do not determine the pipeline.
 constexpr double kCountingPowerShare = 0.01;
@@ -184,7 +184,7 @@ Record prepare_one(const Experiment& e, const catalogue::DriveConstants<double>&
   return r;
 }
 
-// Each reversal masks an interval that is as long as the rows' filter rings: a cut-off that serves the slow records may
+// Each reversal masks an interval that is as long as the filter rings: a cut-off that serves the slow records may
 // leave a fast one nothing at all. Where less than a quarter of a record that counts would be left, raises it until
 // half is.
 void leave_rows_between_reversals(Pipeline& pipeline, const std::vector<const Experiment*>& experiments,

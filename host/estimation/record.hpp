@@ -33,7 +33,7 @@ struct PipelineOptions {
   std::shared_ptr<const PreparedData> ready = nullptr;
 };
 
-// What was chosen for the data at hand; the same for all records, so that their rows can be compared.
+// What was chosen for the data at hand; the same for all records, so that their samples can be compared.
 struct Pipeline {
   double row_cutoff_hz = 0.0;     // filter of the target and of every column, Butterworth of order five, zero phase
   double motion_cutoff_hz = 0.0;  // filter of positions before they are differentiated

@@ -10,8 +10,8 @@
 namespace flexspline::estimation {
 
 struct RecordFactors {
-  Eigen::VectorXd size;  // length of each column over the rows that count: the factors are of X/size
-  // By record, then by part of it: R of [X/size, y] over the rows that count, upper triangular, columns + 1 wide.
+  Eigen::VectorXd size;  // length of each column over the samples that count: the factors are of X/size
+  // By record, then by part of it: R of [X/size, y] over the samples that count, upper triangular, columns + 1 wide.
   std::vector<std::vector<Eigen::MatrixXd>> parts;
   std::vector<std::vector<double>> rows;
   std::vector<Eigen::MatrixXd> whole;  // by record, of all its parts
@@ -20,7 +20,7 @@ struct RecordFactors {
   double rows_of(std::size_t record) const;
 };
 
-// `keep` is zero for rows that do not count. Records are cut into `parts` pieces of equal length
+// `keep` is zero for samples that do not count. Records are cut into `parts` pieces of equal length
 // (BalanceData::folds).
 RecordFactors record_factors(const BalanceData& data, const Eigen::MatrixXd& X, const Eigen::VectorXd& y,
                              const Eigen::VectorXd& keep, std::size_t parts);

@@ -26,8 +26,8 @@ RecordVariance paule_mandel(const BalanceData& data, const Eigen::MatrixXd& torq
 // take that for friction ruins what the model knows of friction.
 bool leaves_noise(const RecordVariance& between, const BalanceData& data);
 
-// Errors of rows at these weights that records have in common by their own friction: `torques` (weighted, a column a
-// group) vary by `std`, noise of which `autocorrelation_time` rows count as one by one.
+// Errors of samples at these weights that records have in common by their own friction: `torques` (weighted, a column a
+// group) vary by `std`, noise of which `autocorrelation_time` samples count as one by one.
 NoiseCovariance noise_covariance(const BalanceData& data, const Eigen::VectorXd& root_weights,
                                  const Eigen::MatrixXd& torques, const Eigen::VectorXd& std,
                                  double autocorrelation_time);

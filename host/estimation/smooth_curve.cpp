@@ -14,7 +14,7 @@ namespace {
 // Smoothings that are tried are between these, over the size of the data's part of the normal equations.
 constexpr double kLeast = 1e-7;
 constexpr double kMost = 1e7;
-// Directions of no length: points that no row reaches.
+// Directions of no length: points that no sample reaches.
 constexpr double kNoLength = 1e-9;
 // Ridge for directions that neither data nor smoothing determine, far below both.
 constexpr double kRidge = 1e-10;
@@ -22,7 +22,7 @@ constexpr double kRidge = 1e-10;
 using Matrix = Eigen::MatrixXd;
 using Vector = Eigen::VectorXd;
 
-// Products of all columns: others, points, target, over the rows of one fold.
+// Products of all columns: others, points, target, over the samples of one fold.
 struct Products {
   Eigen::Index others = 0, points = 0;
   Vector size;  // of the other columns, which are scaled to one
@@ -42,7 +42,7 @@ Products products_of(const CurveProblem& p) {
     if (p.root_weights[k] > 0.0) rows[static_cast<std::size_t>(p.fold[static_cast<std::size_t>(k)])].push_back(k);
   result.all = Matrix::Zero(columns, columns);
   for (const auto& own : rows) {
-    if (own.empty()) {  // a product over no rows divides by their number
+    if (own.empty()) {  // a product over no samples divides by their number
       result.fold.emplace_back(Matrix::Zero(columns, columns));
       continue;
     }
@@ -109,7 +109,7 @@ struct Solution {
   Vector value;
 };
 
-// From the products of the rows that the fit sees.
+// From the products of the samples that the fit sees.
 class Solver {
  public:
   Solver(const Products& g, const EffectiveParameters& freedom, bool closed) : g_(g), freedom_(freedom) {
@@ -154,7 +154,7 @@ class Solver {
   double size_ = 1.0;
 };
 
-// Squares of a solution over the rows of `products`.
+// Squares of a solution over the samples of `products`.
 double squares(const Products& g, const Matrix& products, const Solution& s) {
   Vector all(g.others + g.points + 1);
   all << s.beta, s.value, -1.0;

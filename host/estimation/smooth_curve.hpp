@@ -7,8 +7,8 @@
 
 namespace flexspline::estimation {
 
-// Rows of a regression, weighted: target = others * beta + points * t + noise, where t are the values of a curve at
-// even points. `fold` says which part each row belongs to; a row of weight zero is not used.
+// Samples of a regression, weighted: target = others * beta + points * t + noise, where t are the values of a curve at
+// even points. `fold` says which part each sample belongs to; a sample of weight zero is not used.
 struct CurveProblem {
   Eigen::MatrixXd others;
   Eigen::MatrixXd points;  // one column a point: what one unit there adds
@@ -26,7 +26,7 @@ struct Curve {
   Eigen::VectorXd residual;      // unweighted
   double smoothing = 0.0;        // factor of the squared second differences
   double effective = 0.0;        // numbers that the curve uses: the trace of its part of the hat matrix
-  double squares_without = 0.0;  // weighted, of rows left out of the fit of the others alone
+  double squares_without = 0.0;  // weighted, of samples left out of the fit of the others alone
   double squares_with = 0.0;     // the same with the curve
   double rows = 0.0;             // that count
   // What the other columns can draw themselves was left to them: the curve's torque has no part in it. How many

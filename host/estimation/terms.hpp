@@ -23,7 +23,9 @@ struct Term {
   // Adds a torque that no linear parameter scales.
   bool scaled_by_none() const { return adds_torque() && entry->count(effects::Kind::linear) == 0; }
   bool free_linear(std::size_t p) const { return !known[p] && entry->parameters[p].kind == effects::Kind::linear; }
-  bool free_nonlinear(std::size_t p) const { return !known[p] && entry->parameters[p].kind == effects::Kind::shape; }
+  bool free_nonlinear(std::size_t p) const {
+    return !known[p] && entry->parameters[p].kind == effects::Kind::nonlinear;
+  }
   // Its name with the order, where it has one: "torque_ripple:7".
   std::string label() const;
 };

@@ -21,7 +21,7 @@ double quantile(std::vector<double> values, double share) {
   return values[static_cast<std::size_t>(at)];
 }
 
-// Magnitudes of a signal over the rows of the balance.
+// Magnitudes of a signal over the samples of the balance.
 template <class Signal>
 std::vector<double> magnitudes(const BalanceData& data, Signal signal) {
   std::vector<double> values;
@@ -92,7 +92,7 @@ ScaledColumns scaled_columns(const Eigen::MatrixXd& X, const NoiseCovariance& wh
   return s;
 }
 
-// The sum over rows of weighted squares after the best linear parameters.
+// The sum over samples of weighted squares after the best linear parameters.
 double projected_cost(const Eigen::MatrixXd& X, const Eigen::VectorXd& y, const NoiseCovariance& whitening) {
   const Eigen::MatrixXd A = scaled_columns(X, whitening).A;
   const Eigen::VectorXd b = whitening * y;
@@ -141,7 +141,7 @@ ParameterRange torsion_range(const BalanceData& data, const effects::ParameterIn
 
 ParameterRange velocity_range(const BalanceData& data, const effects::ParameterInfo& info) {
   const std::vector<double> all = magnitudes(data, [](const auto& in) { return in.velocity; });
-  // The unmasked rows must cover the term: its width is at least the slowest hundredth of the rows.
+  // The unmasked samples must cover the term: its width is at least the slowest hundredth of the samples.
   if (info.limit == Limit::velocity)
     return scale_between(info, std::max(quantile(all, 0.01), kNegligible), 0.25 * quantile(all, 0.95));
   return scale_between(info, 1e-3 / std::max(quantile(all, 0.95), kNegligible),

@@ -6,8 +6,8 @@
 
 namespace flexspline::estimation {
 
-// Cross products of one record in the model y = X beta + Z b + e, with e of variance `noise` for each row that counts
-// as one, b ~ N(0, diag(variance)) of each record its own.
+// Cross products of one record in the model y = X beta + Z b + e, with e of variance `noise` for each sample that
+// counts as one, b ~ N(0, diag(variance)) of each record its own.
 struct RecordProducts {
   Eigen::MatrixXd xx, xz, zz;
   Eigen::VectorXd xy, zy;

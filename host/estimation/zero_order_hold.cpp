@@ -17,7 +17,8 @@ using data::Column;
 using Signals = std::vector<std::vector<double>>;
 
 constexpr double kCertainErrors = 3.0;  // standard errors
-// Rows that count as one: the filter keeps half of their band (record.cpp), and the errors are coloured noise as well.
+// Samples that count as one: the filter keeps half of their band (record.cpp), and the errors are coloured noise as
+// well.
 constexpr double kRowsPerSample = 4.0;
 constexpr double kFewestHeldRows = 100.0;
 
@@ -48,13 +49,13 @@ std::vector<double> along(const Record& r, Value value) {
   return signal;
 }
 
-// Least squares over the rows of many records, by normal equations: few columns, none collinear.
+// Least squares over the samples of many records, by normal equations: few columns, none collinear.
 class Fit {
  public:
   explicit Fit(Eigen::Index columns)
       : products_(Eigen::MatrixXd::Zero(columns, columns)), along_(Eigen::VectorXd::Zero(columns)) {}
 
-  // Adds rows of filtered signals; the last one is what the others are to explain.
+  // Adds samples of filtered signals; the last one is what the others are to explain.
   void add(const Record& r, const signals::ZeroPhaseFilter& filter, Signals signals, Balance balance) {
     for (std::vector<double>& signal : signals)
       for (const data::Segment& s : r.segments)
@@ -80,7 +81,7 @@ class Fit {
   struct Result {
     Eigen::VectorXd value, std;
   };
-  // Nothing where the rows do not identify all of them.
+  // Nothing where the samples do not identify all of them.
   std::optional<Result> solve() const {
     const Eigen::VectorXd size = products_.diagonal().cwiseSqrt();
     if (rows_ < kFewestHeldRows || !(size.minCoeff() > 0.0)) return std::nullopt;

@@ -67,7 +67,8 @@ std::string text_of(usb::DfuStatus status) {
     case DfuStatus::target:
       return "the image is for another board (errTARGET); take the one for this board";
     case DfuStatus::file:
-      return "what was sent is not an image that fits (errFILE); take one of flexspline image for this board";
+      return "it does not take this image (errFILE): it is no image that fits, is not signed with the key of this boot "
+             "loader, or has a smaller security counter than one that ran; sign it with that key (flexspline sign)";
     case DfuStatus::erase:
     case DfuStatus::check_erased:
     case DfuStatus::write:

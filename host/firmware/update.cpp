@@ -110,7 +110,7 @@ void require_fit(const Image& image, const Target& target, bool allow_older) {
                                  target.serial, target.board, target.board));
   if (target.version && image.header.version < *target.version && !allow_older)
     throw ImageError(
-        fmt::format("the image is of version {}, drive {} has the newer {}; --older flashes it all the same",
+        fmt::format("the image is of version {}, drive {} has the newer {}; --older flashes it nevertheless",
                     text_of(image.header.version), target.serial, text_of(*target.version)));
 }
 

@@ -16,7 +16,7 @@ struct Target {
   std::string serial;
   std::string board;
   bool is_loader = false;
-  std::optional<boot::Version> version;  // none: a boot loader without an image that is whole
+  std::optional<boot::Version> version;  // none: a boot loader that has no image to run, or does not upload
 };
 
 // What --drive names, empty: the only one on USB. Throws DfuError, LinkError or DriveError where there is none, more

@@ -224,7 +224,7 @@ void write_payloads(Writer& w) {
   w.payload<Hello>("hello", "identify, to the drive", {"major", "minor"});
   w.payload<Identity>("identity", "identify, from the drive",
                       {"major", "minor", "firmware", "board", "serial", "tick_hz", "block_bytes", "effects", "channels",
-                       "most_channels", "most_lines", "has_output_encoder"});
+                       "most_channels", "most_lines", "has_output_encoder", "firmware_key"});
   w.payload<Effects>("effects", "effects, from the drive: bit n % 8 of byte n / 8", {"bits"});
   w.payload<Hardware>(
       "hardware", "hardware, from the drive: what its board states; zero where it does not",

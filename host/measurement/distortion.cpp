@@ -147,15 +147,15 @@ Distortion distortion_of(const Channel& input, const Channel& output, const Peri
       even.push_back(k);
     else if (!excited.contains(k))
       odd.push_back(k);
-  const auto judge = [&](const std::vector<std::size_t>& detection, const char* why, std::optional<DistortionLevel>& to,
-                         std::string& why_not) {
+  const auto evaluate = [&](const std::vector<std::size_t>& detection, const char* why,
+                            std::optional<DistortionLevel>& to, std::string& why_not) {
     if (detection.size() < kFewestLines)
       why_not = why;
     else
       to = lines.level(detection, true, true);
   };
-  judge(odd, "hardly an odd line within the band is left out", d.odd, d.odd_why_not);
-  judge(even, "the band holds hardly an even line", d.even, d.even_why_not);
+  evaluate(odd, "hardly an odd line within the band is left out", d.odd, d.odd_why_not);
+  evaluate(even, "the band holds hardly an even line", d.even, d.even_why_not);
   return d;
 }
 

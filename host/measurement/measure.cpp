@@ -285,13 +285,13 @@ class Measuring {
     if (!blind.empty())
       notes.push_back(
           fmt::format("{} of {} records ({}{}) neither repeat themselves nor have a set point: if a controller moved "
-                      "the drive, its answer to friction counts there as excitation and spoils the response; record "
+                      "the drive, its answer to friction counts there as excitation and falsifies the response; record "
                       "the set point.",
                       blind.size(), answer_.records.size(), blind.front(), blind.size() > 1 ? ", ..." : ""));
     for (const RecordMeasurement& r : answer_.records)
       if (r.masked_percent > 5.0)
         notes.push_back(fmt::format(
-            "{}: {:.0f} % of the samples are clipped or at standstill, and count here all the same; see flexspline "
+            "{}: {:.0f} % of the samples are clipped or at standstill, and count here nevertheless; see flexspline "
             "check.",
             r.name, r.masked_percent));
   }

@@ -209,6 +209,7 @@ json candidate_json(const Candidate& c, std::size_t rank, const std::string& uni
           {"rivals", c.cannot_distinguish},
           {"rival_reasons", confounding_reasons_json(c)},
           {"evidence", evidence_json(c, unit)},
+          {"size", size_json(c, unit)},
           {"separating_experiment", text(&effects::Description::separated_by)},
           {"explanation", text(&effects::Description::explanation)},
           {"consequence", text(&effects::Description::consequence)},

@@ -77,6 +77,12 @@ void print_explanation(Console& console, const Candidate& c, const std::string& 
     console.line(
         fmt::format("  {} = {}{}", e.parameter, with_unit(e.value, e.unit),
                     e.low && e.high ? fmt::format("   (95 %: {} to {})", number(*e.low), number(*e.high)) : ""));
+  if (c.size)
+    console.line(wrapped(fmt::format(
+        "Its torque that the model cannot replace: {} {} (RMS), {} at most{}.", number(c.size->rms), unit,
+        number(c.size->peak),
+        c.size->percent_of_rated ? fmt::format("; {} % of the rated torque", number(*c.size->percent_of_rated, 2))
+                                 : "")));
   print("", c.note);
   if (c.evidence && !c.evidence->bins.empty()) print_map(console, *c.evidence, unit);
   print("What it does: ", info.consequence);
@@ -108,6 +114,14 @@ json confounding_reasons_json(const Candidate& c) {
                     {"own_percent", json_number(r.own_percent)},
                     {"variable", r.variable.empty() ? json(nullptr) : json(r.variable)}});
   return list;
+}
+
+json size_json(const Candidate& c, const std::string& unit) {
+  if (!c.size) return nullptr;
+  return {{"rms", json_number(c.size->rms)},
+          {"peak", json_number(c.size->peak)},
+          {"unit", unit},
+          {"percent_of_rated", c.size->percent_of_rated ? json_number(*c.size->percent_of_rated) : json(nullptr)}};
 }
 
 json evidence_json(const Candidate& c, const std::string& unit) {

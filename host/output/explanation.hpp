@@ -19,5 +19,7 @@ std::string detectable_in_words(const selection::Candidate& candidate);
 nlohmann::json detectable_json(const selection::Candidate& candidate);
 nlohmann::json confounding_reasons_json(const selection::Candidate& candidate);
 nlohmann::json evidence_json(const selection::Candidate& candidate, const std::string& unit);
+// {"rms", "peak", "unit", "percent_of_rated"}; null where the effect is not named.
+nlohmann::json size_json(const selection::Candidate& candidate, const std::string& unit);
 
 }  // namespace flexspline::output

@@ -3,6 +3,7 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <map>
 #include <nlohmann/json.hpp>
 
 #include "host/output/json.hpp"
@@ -11,7 +12,9 @@
 namespace flexspline::output {
 namespace {
 
+using estimation::ByExperiment;
 using estimation::Estimate;
+using estimation::ExperimentValue;
 using nlohmann::json;
 
 constexpr std::size_t kExperimentsAbreast = 5;
@@ -29,20 +32,84 @@ std::string shortened(const std::string& name) {
 std::vector<std::string> experiment_names(const estimation::Identification& found) {
   std::vector<std::string> names;
   for (const Estimate& e : found.estimates)
-    for (const auto& [name, value] : e.per_experiment)
-      if (std::find(names.begin(), names.end(), name) == names.end()) names.push_back(name);
+    for (const ExperimentValue& v : e.per_experiment)
+      if (std::find(names.begin(), names.end(), v.name) == names.end()) names.push_back(v.name);
   return names;
 }
 
-std::optional<double> value_in(const Estimate& e, const std::string& experiment) {
-  for (const auto& [name, value] : e.per_experiment)
-    if (name == experiment) return value;
+std::optional<double> value_in(const ByExperiment& e, const std::string& experiment) {
+  for (const ExperimentValue& v : e.per_experiment)
+    if (v.name == experiment) return v.value;
   return std::nullopt;
+}
+
+// What stands below each other: the parameters, then what is derived of two of them.
+std::vector<std::pair<std::string, const ByExperiment*>> lines_of(const estimation::Identification& found) {
+  std::vector<std::pair<std::string, const ByExperiment*>> lines;
+  for (const Estimate& e : found.estimates)
+    if (!e.per_experiment.empty()) lines.emplace_back(label(e), &e);
+  for (const estimation::Derived& d : found.derived)
+    if (!d.per_experiment.empty()) lines.emplace_back(d.name, &d);
+  return lines;
+}
+
+std::string spread_cell(const ByExperiment& e) {
+  std::string cell = "-";
+  if (e.spread_percent)
+    cell = fmt::format("{:.1f} %{}", *e.spread_percent,
+                       *e.spread_percent > estimation::kReliableSpreadPercent ? " !" : "");
+  if (e.left_out() > 0) cell += fmt::format(" ({} of {})", e.counted(), e.per_experiment.size());
+  return cell;
+}
+
+// Which experiments a spread leaves out, by reason: "50-7, 50-8: its own standard error is above 20 %".
+std::string left_out_text(const ByExperiment& e) {
+  constexpr std::size_t kNamed = 3;
+  std::map<std::string, std::vector<std::string>> by_reason;
+  for (const ExperimentValue& v : e.per_experiment)
+    if (!v.value) by_reason[v.left_out].push_back(v.name);
+  std::string text;
+  for (const auto& [reason, names] : by_reason) {
+    std::string list;
+    for (std::size_t k = 0; k < std::min(kNamed, names.size()); ++k) list += (k == 0 ? "" : ", ") + names[k];
+    if (names.size() > kNamed) list += fmt::format(" and {} more", names.size() - kNamed);
+    text += fmt::format("{}{}: {}", text.empty() ? "" : "; ", list, reason);
+  }
+  return fmt::format("{} of {} experiments count; left out: {}", e.counted(), e.per_experiment.size(), text);
+}
+
+std::string remarks(const std::vector<std::pair<std::string, const ByExperiment*>>& lines) {
+  std::string text;
+  bool differs = false, few = false;
+  for (const auto& [name, e] : lines) {
+    differs = differs || e->spread_percent.value_or(0.0) > estimation::kReliableSpreadPercent;
+    few = few ||
+          (e->per_experiment.size() >= estimation::kFewestForReliable && e->counted() < estimation::kFewestForReliable);
+  }
+  if (differs)
+    text +=
+        "\n  ! differs by more than 30 % from experiment to experiment: not reliable, or an effect is missing "
+        "(flexspline diagnose)";
+  // Parameters of one balance often leave out the same experiments.
+  std::vector<std::pair<std::string, std::string>> by_text;
+  for (const auto& [name, e] : lines) {
+    if (e->left_out() == 0) continue;
+    const std::string why = left_out_text(*e);
+    const auto same = std::find_if(by_text.begin(), by_text.end(), [&](const auto& one) { return one.first == why; });
+    if (same == by_text.end())
+      by_text.emplace_back(why, name);
+    else
+      same->second += ", " + name;
+  }
+  for (const auto& [why, names] : by_text) text += "\n" + wrapped(fmt::format("  {}: {}", names, why));
+  if (few) text += "\n  Fewer than three experiments do not show whether a value is reliable.";
+  return text;
 }
 
 std::string by_experiment(const estimation::Identification& found) {
   const std::vector<std::string> names = experiment_names(found);
   if (names.empty()) return {};
+  const auto lines = lines_of(found);
   std::string text;
   // Side by side as far as a terminal is wide; average and spread are next to the last ones.
   for (std::size_t first = 0; first < names.size(); first += kExperimentsAbreast) {
@@ -52,24 +119,18 @@ std::string by_experiment(const estimation::Identification& found) {
     for (std::size_t k = first; k < last; ++k) head.push_back(shortened(names[k]));
     if (ends) head.insert(head.end(), {"average", "std/avg"});
     Table table(head, "lr");
-    for (const Estimate& e : found.estimates) {
-      if (e.per_experiment.empty()) continue;
-      std::vector<std::string> cells = {label(e)};
-      for (std::size_t k = first; k < last; ++k) cells.push_back(number(value_in(e, names[k])));
+    for (const auto& [name, e] : lines) {
+      std::vector<std::string> cells = {name};
+      for (std::size_t k = first; k < last; ++k) cells.push_back(number(value_in(*e, names[k])));
       if (ends) {
-        cells.push_back(number(e.average));
-        cells.push_back(e.spread_percent ? fmt::format("{:.1f} %{}", *e.spread_percent, e.reliable ? "" : " !") : "-");
+        cells.push_back(number(e->average));
+        cells.push_back(spread_cell(*e));
       }
       table.row(cells);
     }
     text += (text.empty() ? "" : "\n\n") + table.text();
   }
-  const bool unreliable =
-      std::any_of(found.estimates.begin(), found.estimates.end(), [](const Estimate& e) { return !e.reliable; });
-  if (unreliable)
-    text +=
-        "\n  ! differs by more than 30 % from experiment to experiment: not reliable, or an effect is missing "
-        "(flexspline diagnose)";
+  text += remarks(lines);
   return text;
 }
 
@@ -84,7 +145,7 @@ std::string pooled(const estimation::Identification& found) {
 }
 
 std::string errors(const estimation::Identification& found) {
-  Table table({"balance", "rmse", "of", "rows", "condition"}, "lrlrr");
+  Table table({"balance", "rmse", "unit", "samples", "condition"}, "lrlrr");
   for (const estimation::BalanceFit& fit : found.fits)
     table.row({balance_name(fit.balance), number(fit.rmse()), torque_unit(found.model.drive.axis),
                fmt::format("{}", fit.residual.size()), number(fit.condition_number)});
@@ -185,20 +246,17 @@ json identification_json(const estimation::Identification& found, const std::str
   json parameters = json::array();
   for (const Estimate& e : found.estimates) {
     json parameter = json_parameter(e);
-    parameter["average"] = json_number(e.average);
-    parameter["spread_percent"] = json_number(e.spread_percent);
-    parameter["reliable"] = e.reliable;
+    add_by_experiment(parameter, e);
     parameter["identifiable"] = e.identifiable;
     parameter["excitation"] = json_number(e.excitation);
-    json per_experiment = json::array();
-    for (const auto& [name, value] : e.per_experiment)
-      per_experiment.push_back({{"name", name}, {"value", json_number(value)}});
-    parameter["per_experiment"] = std::move(per_experiment);
     parameters.push_back(std::move(parameter));
   }
   json derived = json::array();
-  for (const estimation::Derived& d : found.derived)
-    derived.push_back({{"name", d.name}, {"value", json_number(d.value)}, {"unit", d.unit}});
+  for (const estimation::Derived& d : found.derived) {
+    json one = {{"name", d.name}, {"value", json_number(d.value)}, {"unit", d.unit}};
+    add_by_experiment(one, d);
+    derived.push_back(std::move(one));
+  }
   json balances = json::array();
   for (const estimation::BalanceFit& fit : found.fits)
     balances.push_back({{"balance", balance_name(fit.balance)},

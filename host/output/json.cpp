@@ -34,6 +34,21 @@ json json_parameter(const estimation::Estimate& e) {
           {"interval", json::array({json_number(e.low), json_number(e.high)})}};
 }
 
+void add_by_experiment(json& to, const estimation::ByExperiment& values) {
+  to["average"] = json_number(values.average);
+  to["spread_percent"] = json_number(values.spread_percent);
+  to["reliable"] = values.reliable ? json(*values.reliable) : json(nullptr);
+  to["counted"] = values.counted();
+  to["left_out"] = values.left_out();
+  json list = json::array();
+  for (const estimation::ExperimentValue& v : values.per_experiment) {
+    json one = {{"name", v.name}, {"value", json_number(v.value)}, {"std", json_number(v.std)}};
+    if (!v.value) one["left_out"] = v.left_out;
+    list.push_back(std::move(one));
+  }
+  to["per_experiment"] = std::move(list);
+}
+
 void save_json(const std::string& where, const json& content) {
   if (where.empty()) return;
   // Names come from the user's files and may be in any encoding.

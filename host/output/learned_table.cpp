@@ -48,9 +48,9 @@ std::string learned_table_text(const std::string& id, const std::string& variabl
       "numbers.",
       id, table.at.size(), variable, number(table.at.front()), with_unit(table.at.back(), unit), number(*low),
       with_unit(*high, torque_unit), with_unit(error, torque_unit), learned.effective));
-  text +=
-      "\n" + wrapped(fmt::format("On rows left out of its fit the squared error decreases by {:.1f} % (score {:.0f}).",
-                                 learned.decrease_percent, learned.score));
+  text += "\n" +
+          wrapped(fmt::format("On samples left out of its fit the squared error decreases by {:.1f} % (score {:.0f}).",
+                              learned.decrease_percent, learned.score));
   if (!learned.left_to.empty())
     text += "\n" + wrapped(fmt::format("What {} can draw as well was left to {}: the table holds what they cannot.",
                                        listed(learned.left_to), learned.left_to.size() > 1 ? "them" : "it"));

@@ -141,7 +141,7 @@ void add_distortion(std::string& text, const Measurement& found) {
   Strongest odd, even;
   std::map<std::string, std::size_t> reasons;
   const bool many = static_cast<double>(found.records.size()) > kManyRecords;
-  bool hides = false, judged = false;
+  bool hides = false, tested = false;
   for (const measurement::RecordMeasurement& r : found.records) {
     bool first = true;
     for (const measurement::Distortion& d : r.distortion) {
@@ -150,7 +150,7 @@ void add_distortion(std::string& text, const Measurement& found) {
         first = false;
         continue;
       }
-      judged = true;
+      tested = true;
       odd.offer(d.odd, r.name, d.output);
       even.offer(d.even, r.name, d.output);
       if (first || !many) {
@@ -168,7 +168,7 @@ void add_distortion(std::string& text, const Measurement& found) {
       first = false;
     }
   }
-  if (!judged && reasons.empty()) add_line(text, "  not known: no record repeats itself");
+  if (!tested && reasons.empty()) add_line(text, "  not known: no record repeats itself");
   if (!table.empty()) {
     add_line(text, table.text(4));
     if (hides) add_line(text, "    Other signals are in the JSON answer.");
@@ -180,7 +180,7 @@ void add_distortion(std::string& text, const Measurement& found) {
   };
   print(odd, "Odd", "dry friction, backlash, cubic stiffness, saturation, whatever is the same in both directions");
   print(even, "Even", "asymmetry, such as friction that differs by direction, gravity, or a mean motion with friction");
-  if (judged && odd.level == nullptr && even.level == nullptr)
+  if (tested && odd.level == nullptr && even.level == nullptr)
     add_line(text, "  None is above the noise: at this amplitude the drive is linear as far as can be seen.");
   for (const auto& [reason, count] : reasons)
     add_line(text, wrapped(fmt::format("Not determined in {} of {} records: {}.", count, found.records.size(), reason),

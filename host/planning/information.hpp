@@ -30,7 +30,7 @@ class ColumnLayout {
   // values, and the delay. Columns that another model has as well are shared.
   Hypothesis add(Terms terms);
   std::size_t size() const { return columns_.size(); }
-  // All columns over the rows of a balance, one each.
+  // All columns over the samples of a balance, one each.
   Eigen::MatrixXd over(BalanceData& data) const;
 
  private:
@@ -43,9 +43,9 @@ class ColumnLayout {
 };
 
 // R factors of columns over each record of the data, by the index of the record among the prepared ones; an
-// empty matrix where a record has no rows.
+// empty matrix where a record has no samples.
 std::vector<Eigen::MatrixXd> factors(const BalanceData& data, const Eigen::MatrixXd& columns);
-// The factor of the rows of all `factors` together. Empty ones are ignored.
+// The factor of the samples of all `factors` together. Empty ones are ignored.
 Eigen::MatrixXd stacked_factor(const std::vector<const Eigen::MatrixXd*>& factors);
 
 // Squares of the torque of `truth` that is orthogonal to the columns of `other`.

@@ -166,7 +166,7 @@ std::vector<Motion> motions(const MotionSettings& setting) {
     run.mode = Mode::off;
     run.waveform = Waveform::zero;
     run.duration_s = 4.0;
-    run.instructions = "Switch the drive's power stage off and leave the axis at rest; the sensors go on.";
+    run.instructions = "Switch the drive's power stage off and leave the axis at rest; the sensors stay on.";
     list.push_back({"drive-off", {run}, 0.5});
   }
   if (setting.locked && setting.locked_current_a > 0.0) build.locked_motions(list);

@@ -76,10 +76,10 @@ Rehearsal rehearse(const model::Model& model, const Run& run, double sample_s, c
     if (run.mode == Mode::velocity) {
       const double error = wanted[k] - s.motor_velocity;
       const double next = integrated + integral * error * sample_s;
-      const double asked = proportional * error + next;
-      current = std::clamp(asked, -limit, limit);
-      if (current == asked || (asked > current) != (error > 0.0)) integrated = next;
-      clipped += current != asked;
+      const double unlimited = proportional * error + next;
+      current = std::clamp(unlimited, -limit, limit);
+      if (current == unlimited || (unlimited > current) != (error > 0.0)) integrated = next;
+      clipped += current != unlimited;
     }
     // A drive that is off reads its offset; one that is on controls its biased reading.
     if (run.mode == Mode::off) current = offset;

@@ -27,7 +27,7 @@ class RehearsedMotions {
     std::unique_ptr<BalanceData> planned;
     BalanceData* recorded = nullptr;  // null where there are no data
     std::vector<double> louder;       // noise of each planned record over that of the recorded data
-    double noise = 1.0;               // squares per row of the residual of a true model, times the autocorrelation time
+    double noise = 1.0;  // squares per sample of the residual of a true model, times the autocorrelation time
   };
   std::vector<Side>& sides() { return sides_; }
   // Prepared record of a motion's first run; the others follow.

@@ -23,7 +23,7 @@ struct Subject {
   std::string data_name{};   // as the user named the data
   std::string model_name{};  // likewise
   const data::Dataset* dataset = nullptr;
-  model::Model model{};                  // that the page judges
+  model::Model model{};                  // of the page
   std::optional<model::Model> before{};  // without what was added
   estimation::PipelineOptions pipeline{};
   std::vector<blackbox::Specification> baselines{};  // black boxes to compare with `model`

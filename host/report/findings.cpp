@@ -18,19 +18,11 @@ using output::json_number;
 // Up to here an error is called that of the noise (see comparison/README.md and the verdict at_noise_floor).
 constexpr double kAtNoise = 1.3;
 constexpr double kTwoSided95 = 1.96;
-// As identify judges it.
-constexpr double kReliableSpreadPercent = 30.0;
 
 json parameter_json(const estimation::Estimate& e) {
   json parameter = output::json_parameter(e);
-  parameter["average"] = json_number(e.average);
-  parameter["spread_percent"] = json_number(e.spread_percent);
-  parameter["reliable"] = e.reliable;
+  output::add_by_experiment(parameter, e);
   parameter["identifiable"] = e.identifiable;
-  json per_experiment = json::array();
-  for (const auto& [name, value] : e.per_experiment)
-    per_experiment.push_back({{"name", name}, {"value", json_number(value)}});
-  parameter["per_experiment"] = std::move(per_experiment);
   return parameter;
 }
 
@@ -171,7 +163,8 @@ json parameters(const Subject& subject, const View& view) {
         e.high = *p.value + kTwoSided95 * *p.std;
       }
       e.spread_percent = p.spread_percent;
-      e.reliable = !p.spread_percent || *p.spread_percent <= kReliableSpreadPercent;
+      // The file does not say of how many experiments the spread is, so a small one is no verdict.
+      if (p.spread_percent && *p.spread_percent > estimation::kReliableSpreadPercent) e.reliable = false;
       list.push_back(parameter_json(e));
     }
   return list;

@@ -33,8 +33,8 @@ struct BinnedMean {
   std::vector<double> mean, standard_error;
 };
 
-// Mean of the residual by bin, times the direction of motion where that is given. Neighbouring rows count as one as far
-// as what the map leaves is correlated.
+// Mean of the residual by bin, times the direction of motion where that is given. Neighbouring samples count as one as
+// far as what the map leaves is correlated.
 BinnedMean binned(const BalanceView& balance, const Eigen::VectorXd& residual, const Bins& bins,
                   const Eigen::VectorXd* directions) {
   constexpr double kNone = std::numeric_limits<double>::quiet_NaN();

@@ -373,12 +373,13 @@ if (report.rounds.length) {
 if (report.parameters.length) {
   const s = section("Parameters of the model");
   const spreads = report.parameters.some((p) => p.spread_percent !== null);
-  const remark = (p) => (!p.identifiable ? "these data do not identify it" : !p.reliable ? "unreliable: differs from experiment to experiment by more than 30 %" : "");
+  const remark = (p) => (!p.identifiable ? "these data do not identify it" : p.reliable === false ? "unreliable: differs from experiment to experiment by more than 30 %" : "") +
+    (p.left_out ? `${!p.identifiable || p.reliable === false ? "; " : ""}${p.counted} of ${p.counted + p.left_out} experiments determine it alone` : "");
   s.append(table("Values with 95 % intervals" + (spreads ? ", and how much they differ from experiment to experiment (standard deviation over average)" : "") +
     ". An interval holds for this model; while an effect is missing, the true value may lie outside.",
     ["parameter", { n: "value" }, { n: "95 % interval" }, "unit", { n: "spread" }, ""],
     report.parameters.map((p) => [`${p.id}.${p.parameter}`, { n: p.identifiable ? number(p.value, 5) : "–" }, { n: interval(p) }, unitText(p.unit),
-      { n: p.spread_percent === null ? "–" : number(p.spread_percent, 3) + " %", class: p.reliable ? "" : "high" }, el("span", { class: remark(p) ? "high" : "" }, remark(p))])));
+      { n: p.spread_percent === null ? "–" : number(p.spread_percent, 3) + " %", class: p.reliable === false ? "high" : "" }, el("span", { class: !p.identifiable || p.reliable === false ? "high" : "" }, remark(p))])));
 }
 
 // ---- after adding ----

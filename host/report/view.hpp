@@ -1,4 +1,4 @@
-// Model and measurement on the rows of each balance: the source of all parts of a page.
+// Model and measurement on the samples of each balance: the source of all parts of a page.
 #pragma once
 
 #include <memory>
@@ -17,10 +17,10 @@ struct BalanceView {
   std::unique_ptr<estimation::BalanceData> data;
   std::string signal;  // "motor_balance"
   std::string unit;
-  Eigen::VectorXd residual;               // measured minus model, one a row
+  Eigen::VectorXd residual;               // measured minus model, one a sample
   std::optional<Eigen::VectorXd> before;  // of the model before
-  Eigen::VectorXd floor_squared;          // of the row's record; NaN where its noise is not known
-  double autocorrelation_time = 1.0;      // rows that count as one, of `residual`
+  Eigen::VectorXd floor_squared;          // of the sample's record; NaN where its noise is not known
+  double autocorrelation_time = 1.0;      // samples that count as one, of `residual`
   double filter_time = 1.0;               // likewise of white noise behind the filter
 };
 

@@ -12,7 +12,7 @@
 namespace flexspline::selection {
 namespace {
 
-// Decrease of chi-square over rows, in units of the noise where that is known: comparable between balances.
+// Decrease of chi-square over samples, in units of the noise where that is known: comparable between balances.
 double chi2_drop(const Diagnosis& d) {
   if (d.candidates.empty()) return 0.0;
   const Candidate& c = d.candidates.front();

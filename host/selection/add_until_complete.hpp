@@ -23,8 +23,8 @@ struct Completion {
 Completion add_until_complete(const data::Dataset& dataset, const model::Model& model, const Options& options,
                               std::size_t most_rounds, const std::function<void(const Diagnosis&)>& progress = {});
 
-// The effect among `ids` whose removal increases the error on left-out rows least, if by too little to be named; empty
-// where all are needed. Effects that replaced others are not tried.
+// The effect among `ids` whose removal increases the error on left-out samples least, if by too little to be named;
+// empty where all are needed. Effects that replaced others are not tried.
 std::string needless(const data::Dataset& dataset, const model::Model& model, const std::vector<std::string>& ids,
                      const Options& options);
 

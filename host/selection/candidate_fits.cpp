@@ -23,7 +23,8 @@ constexpr double kSameSquares = 1e-5;
 constexpr std::size_t kFineGridPoints = 24;
 constexpr std::size_t kRefined = 4;  // candidates whose nonlinear parameters are searched continuously
 
-// Chooses the nonlinear parameters of the added effect on a grid. `coarse` has the same rows from fewer samples.
+// Chooses the nonlinear parameters of the added effect on a grid. `coarse` has the same samples, from decimated
+// signals.
 void choose_nonlinear(BalanceSearch& search, BalanceData& coarse, CandidateModel& model) {
   Term& added = model.terms.back();
   for (std::size_t p = 0; p < added.values.size(); ++p) {

@@ -58,8 +58,8 @@ bool covered(const Terms& terms, const catalogue::Entry& entry) {
                      [&](const Term& t) { return catalogue::names_contain(t.entry->info->replaces, entry.name()); });
 }
 
-// Some record moves in both directions (each a tenth of its rows), or is at rest, or there are several records of each
-// direction. Else differences between directions are confounded with differences between records.
+// Some record moves in both directions (each a tenth of its samples), or is at rest, or there are several records of
+// each direction. Else differences between directions are confounded with differences between records.
 bool moves_both_ways(const BalanceData& data) {
   int forward_only = 0, backward_only = 0;
   for (const auto& range : data.records()) {

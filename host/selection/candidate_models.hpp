@@ -18,10 +18,10 @@ struct CandidateModel {
   double added = 0.0;       // parameters more than before
 };
 
-// The residual of a model, each row over its noise, and the span of the model's own columns.
+// The residual of a model, each sample over its noise, and the span of the model's own columns.
 struct Unexplained {
   Eigen::VectorXd residual;
-  Eigen::VectorXd root_weights;  // one over the noise of each row
+  Eigen::VectorXd root_weights;  // one over the noise of each sample
   Eigen::MatrixXd own;           // orthonormal basis of the model's columns; empty: none
 };
 

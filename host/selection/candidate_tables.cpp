@@ -9,7 +9,7 @@
 namespace flexspline::selection {
 namespace {
 
-// The motion's filter is wider than the rows' by this factor, as the rows are filtered once more.
+// The motion's filter is wider than the target's by this factor, as the columns are filtered once more.
 constexpr double kMotionOverRow = 2.5;
 
 // At the highest bandwidth; wider where waves over the motor's angle are above the bandwidth of the motion.

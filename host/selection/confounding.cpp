@@ -107,6 +107,25 @@ std::optional<Evidence> evidence(BalanceSearch& search, const CandidateFit& cand
   return std::nullopt;
 }
 
+EffectSize size_of(BalanceSearch& search, const CandidateFit& candidate, const model::Drive& drive) {
+  const Eigen::VectorXd& weights = search.base.root_weights;
+  const estimation::ModelProjection by_model(estimation::model_columns(*search.data, search.base.terms), weights);
+  const Eigen::VectorXd own = own_torque(search, candidate, by_model);
+  EffectSize size;
+  double squares = 0.0, rows = 0.0;
+  for (Eigen::Index k = 0; k < own.size(); ++k) {
+    if (!(weights[k] > 0.0)) continue;
+    squares += own[k] * own[k];
+    rows += 1.0;
+    size.peak = std::max(size.peak, std::abs(own[k]));
+  }
+  size.rms = rows > 0.0 ? std::sqrt(squares / rows) : 0.0;
+  const double gear = search.data->balance() == estimation::Balance::motor ? drive.gear_ratio.value.value_or(1.0) : 1.0;
+  if (const auto rated = drive.rated_torque_nm.value; rated && *rated > 0.0)
+    size.percent_of_rated = 100.0 * size.rms * gear / *rated;
+  return size;
+}
+
 }  // namespace
 
 ConfoundingReason compare_with_model(BalanceSearch& search, const CandidateFit& candidate) {
@@ -130,7 +149,7 @@ bool is_scale_confounded(const BalanceSearch& search, const CandidateFit& first,
   return (both & effects::kTorqueScale) != 0 && !states_a_torque(search.base.terms);
 }
 
-void explain_named(BalanceSearch& search, const std::vector<CandidateFit>& candidates, data::Axis axis,
+void explain_named(BalanceSearch& search, const std::vector<CandidateFit>& candidates, const model::Drive& drive,
                    Diagnosis& result) {
   const auto trial_of = [&](const NamedEffect& n) {
     return std::find_if(candidates.begin(), candidates.end(), [&](const CandidateFit& t) {
@@ -140,7 +159,8 @@ void explain_named(BalanceSearch& search, const std::vector<CandidateFit>& candi
   for (Candidate& c : result.candidates)
     for (const NamedEffect& n : result.named) {
       if (c.effect != n.effect || c.order != n.order || trial_of(n) == candidates.end()) continue;
-      c.evidence = evidence(search, *trial_of(n), axis);
+      c.evidence = evidence(search, *trial_of(n), drive.axis);
+      c.size = size_of(search, *trial_of(n), drive);
       for (const NamedEffect& other : result.named)
         if (&other != &n && trial_of(other) != candidates.end())
           c.confounding_reasons.push_back(compare(search, *trial_of(n), *trial_of(other)));

@@ -17,10 +17,10 @@ ConfoundingReason compare_with_model(BalanceSearch& search, const CandidateFit& 
 // the measured torque, whose noise differs.
 bool is_scale_confounded(const BalanceSearch& search, const CandidateFit& first, const CandidateFit& second);
 
-// For each named effect, where it shows; for effects that are named together, how similar they are in these data: what
-// of the torque of each, orthogonal to the model, is orthogonal to the model with the other as well, and over which
-// variable they do the same.
-void explain_named(BalanceSearch& search, const std::vector<CandidateFit>& candidates, data::Axis axis,
+// For each named effect, where it shows and how large its torque is; for effects that are named together, how similar
+// they are in these data: what of the torque of each, orthogonal to the model, is orthogonal to the model with the
+// other as well, and over which variable they do the same.
+void explain_named(BalanceSearch& search, const std::vector<CandidateFit>& candidates, const model::Drive& drive,
                    Diagnosis& result);
 
 }  // namespace flexspline::selection

@@ -108,8 +108,8 @@ Eigen::VectorXd residual_of(const BalanceData& data, const Regression& regressio
   return residual;
 }
 
-// Fits the mixed model with the number of rows that count as one by its residual's autocorrelation. Returns the fit and
-// that number.
+// Fits the mixed model with the number of samples that count as one by its residual's autocorrelation. Returns the fit
+// and that number.
 std::pair<MixedFit, double> fit_with_autocorrelation(const BalanceData& data, const Regression& regression,
                                                      const Eigen::VectorXd& keep, CrossValidatedFit& fit) {
   double tau = data.filter_autocorrelation_time();
@@ -130,7 +130,7 @@ std::pair<MixedFit, double> fit_with_autocorrelation(const BalanceData& data, co
   return {std::move(mixed), tau};
 }
 
-// For a fit whose R factors are weighted with `tau` rows counting as one.
+// For a fit whose R factors are weighted with `tau` samples counting as one.
 void take_covariance(const Regression& regression, const MixedFit& mixed, double tau, const Eigen::VectorXd& keep,
                      CrossValidatedFit& fit) {
   const double counted = (keep.array() > 0.0).count();
@@ -270,7 +270,7 @@ LikelihoodGain likelihood_gain(const CrossValidatedFit& base, const CrossValidat
   const double least = std::max(estimation::least_variance_of(after), 1e-300);
   double ratio = 0.0, chi2_before = 0.0, chi2_after = 0.0;
   const auto noise = [&](const LeftOut& r) { return std::max(r.squares / std::max(1.0, r.rows), least); };
-  // Minus twice the log likelihood: what the rows leave, and what the records' random effects cost.
+  // Minus twice the log likelihood: what the samples leave, and what the records' random effects cost.
   const auto deviance = [&](const CrossValidatedFit& fit, std::size_t i, double& chi2) {
     const LeftOut& r = fit.left_out[i];
     RandomEffectCost cost;

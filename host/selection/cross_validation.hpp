@@ -20,14 +20,14 @@ using estimation::RowRange;
 using estimation::SmallVector;
 using estimation::Terms;
 
-// A record's rows, each predicted from others: parameters from all records without its part, the record's own random
+// A record's samples, each predicted from others: parameters from all records without its part, the record's own random
 // effects from its other parts.
 struct LeftOut {
   double rows = 0.0;
   double squares = 0.0;
 };
 
-// Root mean square of the residual over rows with weight.
+// Root mean square of the residual over samples with weight.
 double rmse_of(const Eigen::VectorXd& residual, const Eigen::VectorXd& root_weights);
 double rmse_of(const std::vector<LeftOut>& records);
 
@@ -72,8 +72,8 @@ struct CrossValidatedFit {
   double rmse_cv_fixed_effects() const { return rmse_of(left_out_fixed_effects()); }
 };
 
-// Fits `terms` on `data` and cross-validates them by fifths of each record. `keep` holds one a row, or zero for rows
-// that must not count.
+// Fits `terms` on `data` and cross-validates them by fifths of each record. `keep` holds one a sample, or zero for
+// samples that must not count.
 CrossValidatedFit cross_validate(BalanceData& data, Terms terms, const Eigen::VectorXd& keep);
 
 // Covariance of the errors of a fit, random effects among them.
@@ -83,7 +83,7 @@ NoiseCovariance noise_covariance(BalanceData& data, const CrossValidatedFit& fit
 double whitened_squares(BalanceData& data, const Terms& terms, const CrossValidatedFit& fit);
 
 struct LikelihoodGain {
-  // Twice the log likelihood ratio of left-out rows over the autocorrelation time, less k ln(n_eff).
+  // Twice the log likelihood ratio of left-out samples over the autocorrelation time, less k ln(n_eff).
   double score = 0.0;
   double chi2_percent = 0.0;           // of the left-out chi-square
   double fixed_effects_percent = 0.0;  // the same with one friction for all records

@@ -10,7 +10,7 @@
 namespace flexspline::selection {
 
 // What the search is expected to find if an effect is there: its own score (`likelihood_gain`), where the model that
-// lacks the effect leaves, besides the noise, the orthogonal part of the effect's torque.
+// lacks the effect leaves, in addition to the noise, the orthogonal part of the effect's torque.
 class DetectionLimit {
  public:
   explicit DetectionLimit(BalanceSearch& search);

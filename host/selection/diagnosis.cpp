@@ -323,7 +323,7 @@ Diagnosis diagnose(const data::Dataset& dataset, const model::Model& model, cons
   list_candidates(all, model.drive.axis, result);
   if (by_resampling) name_stable(chosen, result);
   if (names_one) name_effects(chosen, alias, result);
-  if (!result.named.empty()) explain_named(chosen.search, chosen.candidates, model.drive.axis, result);
+  if (!result.named.empty()) explain_named(chosen.search, chosen.candidates, model.drive, result);
   assess_remainder(chosen, result);
   if (!by_resampling || result.named.empty()) {
     if (options.progress) options.progress("looking for what no effect explains");

@@ -48,6 +48,13 @@ struct Evidence {
   std::vector<Bin> bins;
 };
 
+// The torque of an effect that the model cannot replace (orthogonal to the model's regressors), on the samples of the
+// fit.
+struct EffectSize {
+  double rms = 0.0, peak = 0.0;            // N m, N on a linear axis
+  std::optional<double> percent_of_rated;  // the RMS, of the rated torque on this balance; none: not stated
+};
+
 struct Candidate {
   std::string effect;
   std::optional<double> order;
@@ -64,6 +71,7 @@ struct Candidate {
   std::vector<std::string> cannot_distinguish;
   std::vector<ConfoundingReason> confounding_reasons;
   std::optional<Evidence> evidence;  // of named effects
+  std::optional<EffectSize> size;    // of named effects
   std::optional<Detectable> minimum_detectable;
   std::string note;  // what its values mean, where that differs from the effect's name
 };
@@ -102,7 +110,7 @@ struct Resampling {
     double frequency = 0.0;
   };
   double subsamples = 0.0;
-  bool too_little = false;  // there are not enough rows for halves
+  bool too_little = false;  // there are not enough samples for halves
   double abstained = 0.0;   // saw nothing above the noise
   double whiteness = 0.0;   // of what the best terms leave, reversals masked: 1 for noise, 0 for structure
   double lowest_hz = 0.0, highest_hz = 0.0;
@@ -154,7 +162,7 @@ struct Options {
   std::function<void(std::string_view)> progress;  // called at each stage; may be empty
 };
 
-// METHOD of the project: see host/selection/METHOD.md. Uses experiments of role fit. The model need not have values:
+// The method is in METHOD.md. Uses experiments of role fit. The model need not have values:
 // all free parameters are estimated.
 Diagnosis diagnose(const data::Dataset& dataset, const model::Model& model, const Options& options);
 

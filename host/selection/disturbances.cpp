@@ -38,7 +38,7 @@ std::vector<double> without_slow_part(const Eigen::VectorXd& residual, const Row
   return fast;
 }
 
-// For each row, the share of the rows nearest in `signal` that are marked.
+// For each sample, the share of the samples nearest in `signal` that are marked.
 std::vector<double> share_among_like(const std::vector<double>& signal, const std::vector<std::uint8_t>& marked) {
   const std::size_t n = signal.size();
   std::vector<std::size_t> order(n);
@@ -55,7 +55,7 @@ std::vector<double> share_among_like(const std::vector<double>& signal, const st
   return share;
 }
 
-// Rows whose residual is above the limit one period of the motion earlier or later as well: a residual that repeats
+// Samples whose residual is above the limit one period of the motion earlier or later as well: a residual that repeats
 // with the motion belongs to the drive.
 std::vector<std::uint8_t> recurs(const Record& r, const std::vector<std::size_t>& samples,
                                  const std::vector<double>& size, double limit, std::size_t reach) {
@@ -79,7 +79,7 @@ std::vector<std::uint8_t> recurs(const Record& r, const std::vector<std::size_t>
   return again;
 }
 
-// For each row, the largest share of marked rows among its neighbours in a signal that an effect may depend on:
+// For each sample, the largest share of marked samples among its neighbours in a signal that an effect may depend on:
 // velocity, time since a reversal, angle, torsion.
 std::vector<double> share_among_like(const BalanceData& data, const Record& r, const std::vector<std::size_t>& samples,
                                      const std::vector<std::uint8_t>& marked) {
@@ -107,15 +107,15 @@ std::vector<double> share_among_like(const BalanceData& data, const Record& r, c
   return largest;
 }
 
-// Rows of a record that stand out, and what speaks against a disturbance at each.
+// Samples of a record that stand out, and what speaks against a disturbance at each.
 struct Outliers {
   std::vector<double> size;  // without the slow part
   std::vector<std::uint8_t> marked, recurring;
-  std::vector<double> similar;  // share of marked rows among those like this one
-  std::size_t reach = 0;        // of the filter, in rows
+  std::vector<double> similar;  // share of marked samples among those like this one
+  std::size_t reach = 0;        // of the filter, in samples
 };
 
-// Nothing where no row stands out, or too many do.
+// Nothing where no sample stands out, or too many do.
 std::optional<Outliers> outliers(const BalanceData& data, const Eigen::VectorXd& residual, const RowRange& range,
                                  const std::vector<std::size_t>& samples) {
   const Record& r = data.prepared().records[range.record];
@@ -136,7 +136,7 @@ std::optional<Outliers> outliers(const BalanceData& data, const Eigen::VectorXd&
   return found;
 }
 
-// Lists the bursts of a record that are disturbances, and leaves out their rows.
+// Lists the bursts of a record that are disturbances, and leaves out their samples.
 void list_bursts(const Record& r, const Outliers& rows, const std::vector<std::size_t>& samples,
                  Eigen::Ref<Eigen::VectorXd> keep, std::vector<Disturbance>& found) {
   const std::size_t n = samples.size(), reach = rows.reach;
@@ -159,7 +159,7 @@ void list_bursts(const Record& r, const Outliers& rows, const std::vector<std::s
     }
     const double from = r.experiment->time_s[samples[k]], to = r.experiment->time_s[samples[last]];
     const std::size_t low = k > reach ? k - reach : 0, high = std::min(n - 1, last + reach);
-    // Next to rows that the mask left out, at a reversal or a start, friction that the model lacks has the same
+    // Next to samples that the mask left out, at a reversal or a start, friction that the model lacks has the same
     // residual.
     const std::size_t before = low > reach ? low - reach : 0, after = std::min(n - 1, high + reach);
     const bool next_to_mask =

@@ -10,10 +10,10 @@
 
 namespace flexspline::selection {
 
-// A burst: rows whose residual stands far above the rest, though the axis passes through the same velocity and the same
-// time after a reversal at other places without such a residual. An effect of the drive shows wherever its signals come
-// back; a disturbance does not. Returns the intervals in time; `keep` gets zeros at their rows and at their filter's
-// reach around them.
+// A burst: samples whose residual stands far above the rest, though the axis passes through the same velocity and the
+// same time after a reversal at other places without such a residual. An effect of the drive shows wherever its signals
+// come back; a disturbance does not. Returns the intervals in time; `keep` gets zeros at their samples and at their
+// filter's reach around them.
 std::vector<Disturbance> find_disturbances(const estimation::BalanceData& data, const Eigen::VectorXd& residual,
                                            Eigen::VectorXd& keep);
 

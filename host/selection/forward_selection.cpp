@@ -31,10 +31,10 @@ bool has_presliding(const std::vector<int>& terms) {
 }  // namespace
 
 TermFit fit_terms(const RegressorTable& table, const std::vector<int>& terms, const HalfData& fit,
-                  const HalfData& judge) {
+                  const HalfData& validation) {
   const bool presliding = has_presliding(terms);
   const Eigen::MatrixXd& on = presliding ? fit.presliding : fit.sign;
-  const Eigen::MatrixXd& other = presliding ? judge.presliding : judge.sign;
+  const Eigen::MatrixXd& other = presliding ? validation.presliding : validation.sign;
   TermFit result;
   for (Eigen::Index j = 0; j < table.model_columns; ++j) result.columns.push_back(j);
   for (const int t : terms)
@@ -94,18 +94,18 @@ bool is_possible(const RegressorTable& table, const std::vector<int>& terms, con
 
 }  // namespace
 
-SelectionPath select_forward(const RegressorTable& table, const HalfData& fit, const HalfData& judge,
+SelectionPath select_forward(const RegressorTable& table, const HalfData& fit, const HalfData& validation,
                              const Noise& noise, const std::vector<std::uint8_t>& may_enter,
                              const SelectionPolicy& policy) {
   SelectionPath result;
   std::vector<int> terms;
-  TermFit now = fit_terms(table, terms, fit, judge);
+  TermFit now = fit_terms(table, terms, fit, validation);
   result.before = result.after = now.validation_squares;
-  if (now.validation_squares / judge.rows > policy.most_leverage * now.training_squares / fit.rows) {
+  if (now.validation_squares / validation.rows > policy.most_leverage * now.training_squares / fit.rows) {
     result.abstains = result.extrapolates = true;
     return result;
   }
-  const double floor = std::min(noise.variance * judge.rows, 0.999 * now.validation_squares);
+  const double floor = std::min(noise.variance * validation.rows, 0.999 * now.validation_squares);
   const double excess = now.validation_squares - floor;
   if (excess < policy.least_excess * now.validation_squares) {
     result.abstains = true;
@@ -123,11 +123,11 @@ SelectionPath select_forward(const RegressorTable& table, const HalfData& fit, c
     const auto try_term = [&](int t, const std::string& name, double parameters) {
       std::vector<int> with = terms;
       with.push_back(t);
-      TermFit fitted = fit_terms(table, with, fit, judge);
+      TermFit fitted = fit_terms(table, with, fit, validation);
       const auto found = by_name.find(name);
       if (found != by_name.end() && found->second.fitted.training_squares <= fitted.training_squares) return;
       if (!is_possible(table, with, fitted, fit) && was_possible) return;
-      const double per_one = now.validation_squares / judge.rows * noise.tau;
+      const double per_one = now.validation_squares / validation.rows * noise.tau;
       double gain = now.validation_squares - fitted.validation_squares - parameters * per_one;
       // A curve that is in no catalogue can follow most laws: it has to do better.
       const bool curve = t >= 0 && !table.terms[static_cast<std::size_t>(t)].entry &&
@@ -147,7 +147,7 @@ SelectionPath select_forward(const RegressorTable& table, const HalfData& fit, c
     const double drop = now.validation_squares - chosen.fitted.validation_squares;
     const double above = std::max(now.validation_squares - floor, 1e-300);
     const bool law = chosen.term == kPreslidingTerm || table.terms[static_cast<std::size_t>(chosen.term)].nonlinear > 0;
-    const double per_one = chosen.fitted.validation_squares / judge.rows * noise.tau;
+    const double per_one = chosen.fitted.validation_squares / validation.rows * noise.tau;
     if (drop < (law ? policy.law_share : policy.line_share) * above || drop < policy.least_gain * per_one) break;
     terms.push_back(chosen.term);
     SelectionStep taken{chosen.term, drop / above, drop / excess, {}};

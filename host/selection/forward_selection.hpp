@@ -25,8 +25,8 @@ struct SelectionStep {
 };
 
 struct Noise {
-  double variance = 0.0;  // of a row, weighted: what no model can take off
-  double tau = 1.0;       // rows that count as one
+  double variance = 0.0;  // of a sample, weighted: what no model can take off
+  double tau = 1.0;       // samples that count as one
 };
 
 struct SelectionPath {
@@ -43,9 +43,9 @@ struct TermFit {
   double training_squares = 0.0, validation_squares = 0.0;
 };
 TermFit fit_terms(const RegressorTable& table, const std::vector<int>& terms, const HalfData& fit,
-                  const HalfData& judge);
+                  const HalfData& validation);
 
-SelectionPath select_forward(const RegressorTable& table, const HalfData& fit, const HalfData& judge,
+SelectionPath select_forward(const RegressorTable& table, const HalfData& fit, const HalfData& validation,
                              const Noise& noise, const std::vector<std::uint8_t>& may_enter,
                              const SelectionPolicy& policy);
 

@@ -11,7 +11,7 @@ namespace flexspline::selection {
 struct FrictionRandomEffects {
   std::vector<Eigen::Index> columns;
   Eigen::VectorXd variance;
-  double noise = 0.0;  // variance of a row times the rows that count as one
+  double noise = 0.0;  // variance of a sample times the samples that count as one
 
   bool any() const { return variance.size() > 0 && variance.maxCoeff() > 0.0; }
 };
@@ -26,8 +26,8 @@ void eliminate_friction_effects(Eigen::MatrixXd& products, const FrictionRandomE
 Eigen::VectorXd friction_effects_of(const RegressorTable& table, const Setting& setting,
                                     const std::vector<double>& weights, double noise, const SelectionPolicy& policy);
 
-// What a fit leaves of the rows, times the root of the record's weight. Each record's own friction is taken off as its
-// best linear unbiased prediction.
+// What a fit leaves of the samples, times the root of the record's weight. Each record's own friction is taken off as
+// its best linear unbiased prediction.
 Eigen::VectorXd weighted_residual(const Setting& seen, const TermFit& fitted, const std::vector<double>& weights,
                                   const FrictionRandomEffects& differences);
 

@@ -11,7 +11,7 @@
 namespace flexspline::selection {
 
 // Weights of the records: one over the variance that the model leaves in each, none more than ten times the median.
-// Zero for a record without rows.
+// Zero for a record without samples.
 std::vector<double> record_weights(const RegressorTable& table, const Setting& setting);
 
 // Products of the blocks k with in[k] == which, or of all where `in` is empty; each record's differences eliminated.

@@ -1,4 +1,4 @@
-// Every threshold of the diagnosis in one place, with its unit and its source.
+// Every threshold of the diagnosis in one place, with its unit and its source. Steps are those of METHOD.md.
 #pragma once
 
 #include <cstddef>
@@ -11,10 +11,10 @@ struct SelectionPolicy {
   // Bandwidths: the highest, and four lower ones, each by this factor.
   std::size_t bandwidths = 5;
   double bandwidth_factor = 0.7071;
-  // Highest bandwidth, Hz: above the coherent motion of drives, below the resonances of arms (METHOD: presliding shows
-  // at 20 Hz).
+  // Highest bandwidth, Hz: above the coherent motion of drives, below the resonances of arms. Presliding shows at 20
+  // Hz.
   double highest_hz = 40.0;
-  // Of the rows, for waves over the motor's angle.
+  // The same for waves over the motor's angle.
   double widest_hz = 200.0;
   double widest_over_sampling = 0.4;
   // Share of the variance of an acceleration that may be noise of the position: the attenuation of the inertia.
@@ -38,7 +38,7 @@ struct SelectionPolicy {
   // A subsample without that share of its squares above the noise abstains.
   double least_excess = 0.03;
 
-  double curve_discount = 0.8;  // METHOD: a law takes at least 80 % of what any curve does
+  double curve_discount = 0.8;  // a law has to take off at least this share of what any curve does
   double similar = 0.9;         // terms that take off that share of the best one's are not distinguished,
   double similar_left = 2.0;    // unless they leave that many times the squares above the noise
 
@@ -46,10 +46,10 @@ struct SelectionPolicy {
   double least_own_frequency = 0.3;  // of the first of a group
   double most_abstaining = 0.75;     // of the subsamples
 
-  double most_leverage = 3.0;  // error per row of the half that judges over that of the half that fits: beyond, the
+  double most_leverage = 3.0;  // error per sample of the half that judges over that of the half that fits: beyond, the
                                // model itself does not carry over
 
-  // Friction of one drive differs between runs by 0 to 10 %, by 3 % mostly (METHOD): worth that many records.
+  // Friction of one drive differs between runs by 0 to 10 %, by 3 % mostly: a prior worth that many records.
   double friction_difference = 0.03;
   double friction_difference_records = 2.0;
 
@@ -77,9 +77,9 @@ struct SelectionPolicy {
   // Score (twice the log-likelihood gain less k ln n_eff) from which on an effect may be named: one in 1000 sets with
   // nothing hidden passes it; calibrated by `./dev soak MINUTES calibrate`.
   double named_score = kNamedScore;
-  // Percent of the left-out chi-square: an effect must matter, not only be there (METHOD, step 6).
+  // Percent of the left-out chi-square: an effect must matter, not only be there (step 7).
   double named_chi2_percent = 0.5;
-  // Score within which two effects are not distinguished (METHOD, step 6).
+  // Score within which two effects are not distinguished (step 12).
   double confounded_margin = 10.0;
   // Of the one-sided sign test over records that were predicted without them: four of four are enough, three of three
   // are not.
@@ -133,14 +133,14 @@ struct SelectionPolicy {
   // Visibility.
   double least_temperature_span = 3.0;  // degC: less shows no effect of temperature
   double least_loaded_share = 0.1;      // torque of the sensor over the motor's: above, it fixes the torque scale
-  double least_direction_share = 0.1;   // rows of the rarer direction that make a record one of both directions
+  double least_direction_share = 0.1;   // samples of the rarer direction that make a record one of both directions
   int fewest_one_way_records = 3;       // of each direction, where no record has both
-  double one_way_share = 0.01;          // rows of the rarer direction below which data count as one way
+  double one_way_share = 0.01;          // samples of the rarer direction below which data count as one way
 
   // Disturbances (by hand: pushes on a simulated axis, against bursts that filters make of friction at reversals).
   double far_out = 6.0;           // robust standard deviations
   double longest_burst_s = 0.15;  // what lasts longer is a state of the drive
-  double burst_repeats = 0.35;    // share of like rows that stand out too: above, it depends on that signal
+  double burst_repeats = 0.35;    // share of like samples that stand out too: above, it depends on that signal
   std::size_t like_rows = 120;    // that count as like ones
   double most_disturbed = 0.3;    // of a record: more is no exception
 
@@ -149,9 +149,9 @@ struct SelectionPolicy {
   double least_shown_share_percent = 1.0;  // where much is left
   double delay_errors = 5.0;               // standard errors from which on a delay is reported
   // Of the chi-square above the noise: the best substitute for an effect that is not in the catalogue takes off 60 %
-  // and less (METHOD).
+  // and less (step 14).
   double recovered_percent = 80.0;
-  double worth_adding = 0.003;  // of the first drop of chi-square: METHOD, step 8
+  double worth_adding = 0.003;  // of the first decrease of chi-square (step 15)
 
   // Structure outside the catalogue. A curve has many numbers and the best of some two dozen signals is taken, so it
   // must show more than an effect of the catalogue; both limits were set on drives that lack nothing.
@@ -167,7 +167,7 @@ struct SelectionPolicy {
   double table_score = 20.0;
   double least_table_percent = 0.1;
 
-  // Trends of parameters over experiments (METHOD, step 4).
+  // Trends of parameters over experiments (step 14).
   std::size_t fewest_of_trend = 6;  // experiments
   double trend_p_value = 1e-3;      // after the correction for what was tried
   double trend_size = 0.03;         // of the parameter, over the records

@@ -16,7 +16,7 @@ using Presliding = std::optional<double>;  // rad of the motor
 // The state of Dahl's law along a record, -1 to 1, advanced by travel (exact for one direction).
 std::vector<double> presliding_state(const estimation::Record& record, double travel);
 
-// Squares that the model alone leaves with each travel of presliding, over the rows of the motor balance.
+// Squares that the model alone leaves with each travel of presliding, over the samples of the motor balance.
 std::vector<double> squares_by_travel(const estimation::PreparedData& prepared, const estimation::Terms& terms,
                                       const std::vector<double>& travels);
 

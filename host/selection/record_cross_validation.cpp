@@ -17,7 +17,7 @@ constexpr std::size_t kMostFolds = 6;
 // Relative change of the squares that ends the search for nonlinear parameters: far below what decides.
 constexpr double kSameSquares = 1e-4;
 
-// A model fitted on the rows in `keep`; nonlinear parameters start at the values from all records.
+// A model fitted on the samples in `keep`; nonlinear parameters start at the values from all records.
 CrossValidatedFit fit_without(BalanceData& data, const Terms& terms, const Eigen::VectorXd& keep) {
   CrossValidatedFit fit = cross_validate(data, terms, keep);
   const auto on_balance = estimation::terms_on(fit.terms, data.balance(), data.prepared().torque_measured);
@@ -27,7 +27,8 @@ CrossValidatedFit fit_without(BalanceData& data, const Terms& terms, const Eigen
   return cross_validate(data, std::move(refined), keep);
 }
 
-// Squares that a fit leaves in a record that it has not seen, the record's own random effects predicted from its rows.
+// Squares that a fit leaves in a record that it has not seen, the record's own random effects predicted from its
+// samples.
 double squares_of(BalanceData& data, const CrossValidatedFit& fit, const RowRange& range, double noise_variance) {
   const Eigen::VectorXd e = fit.residual.segment(range.first, range.size());
   if (fit.groups.empty() || fit.random_effects.std.maxCoeff() <= 0.0) return e.squaredNorm();

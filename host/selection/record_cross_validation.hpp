@@ -17,7 +17,7 @@ struct RecordCrossValidation {
 };
 
 // A record counts if the others alone would name the candidate. Its own random effects are predicted from its own
-// rows, for both models in the same way. Nothing counts with fewer than three records, or where a parameter is each
+// samples, for both models in the same way. Nothing counts with fewer than three records, or where a parameter is each
 // record's own.
 RecordCrossValidation cross_validate_by_record(const BalanceSearch& search, const CandidateFit& candidate);
 

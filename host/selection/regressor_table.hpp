@@ -1,5 +1,5 @@
 // The regression that a diagnosis searches: target, columns of the model, and columns of all terms that may be added,
-// at the highest bandwidth and without a mask. Immutable; lower bandwidths and masks are made from its rows.
+// at the highest bandwidth and without a mask. Immutable; lower bandwidths and masks are made from its samples.
 #pragma once
 
 #include <Eigen/Core>
@@ -34,7 +34,7 @@ struct CandidateTerm {
   double highest_hz = 0.0;    // the bandwidth must reach that far for it to be seen
 };
 
-// Consecutive rows of one record, evenly spaced in time.
+// Consecutive samples of one record, evenly spaced in time.
 struct Run {
   std::size_t record = 0;
   Eigen::Index first = 0, last = 0;
@@ -56,9 +56,9 @@ struct RegressorTable {
   std::vector<Run> runs;
   std::size_t records = 0;
   std::vector<std::uint8_t> held_out;  // by record: not fitted on and not chosen with
-  double highest_hz = 0.0;             // of the rows
+  double highest_hz = 0.0;             // of the samples
   double highest_law_hz = 0.0;         // of the motion: wider bandwidths serve waves over the motor's angle alone
-  // For masks: velocity over its noise, by row.
+  // For masks: velocity over its noise, by sample.
   Eigen::VectorXd velocity_over_noise;
   double reversals = 0.0;
 };

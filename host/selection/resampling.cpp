@@ -104,12 +104,16 @@ std::vector<NamedEffect> names_of(const Resampling& resampling, const SearchedBa
   return names;
 }
 
+bool names_several(const Resampling& resampling, const SearchedBalance& motor) {
+  const std::vector<NamedEffect> names = names_of(resampling, motor);
+  return names.size() > 1 && resampling.found_group(names.front()).size() < 2;
+}
+
 }  // namespace
 
 Resampling resample(const std::vector<const data::Experiment*>& experiments, const model::Drive& drive,
                     const estimation::Terms& terms) {
-  const SelectionPolicy policy;
-  const StabilitySelection selection(experiments, drive, terms, estimation::Balance::motor, policy);
+  const StabilitySelection selection(experiments, drive, terms, estimation::Balance::motor, kPolicy);
   const Stability& stability = selection.result();
   Resampling result;
   result.subsamples = stability.subsamples;
@@ -117,8 +121,9 @@ Resampling resample(const std::vector<const data::Experiment*>& experiments, con
   result.abstained = stability.abstained;
   result.whiteness = stability.whiteness;
   result.highest_hz = selection.tables().bandwidth.highest_hz;
-  result.lowest_hz = result.highest_hz * std::pow(policy.bandwidth_factor, static_cast<double>(policy.bandwidths - 1));
-  const std::vector<FoundTerm> decided = decide(stability, policy);
+  result.lowest_hz =
+      result.highest_hz * std::pow(kPolicy.bandwidth_factor, static_cast<double>(kPolicy.bandwidths - 1));
+  const std::vector<FoundTerm> decided = decide(stability, kPolicy);
   std::vector<std::string> names;
   for (const FoundTerm& found : decided) names.push_back(found.group.front().name);
   const std::vector<double> held_out = selection.held_out_ratios(names);
@@ -137,7 +142,7 @@ Resampling resample(const std::vector<const data::Experiment*>& experiments, con
         if (entry) one.group.push_back({std::string(entry->name()), f.order});
       }
     one.refused_by_holdout =
-        !one.group.empty() && one.held_out_ratio && *one.held_out_ratio > policy.most_held_out_ratio;
+        !one.group.empty() && one.held_out_ratio && *one.held_out_ratio > kPolicy.most_held_out_ratio;
     result.found.push_back(std::move(one));
   }
   result.support = support_of(selection, terms);
@@ -145,7 +150,6 @@ Resampling resample(const std::vector<const data::Experiment*>& experiments, con
 }
 
 bool resampling_decides(const Resampling& resampling, const SearchedBalance& motor) {
-  const SelectionPolicy policy;
   if (resampling.subsamples == 0.0) return resampling.too_little;
   if (!motor.names_one()) return true;
   if (reaches_floor(motor)) return false;
@@ -159,8 +163,10 @@ bool resampling_decides(const Resampling& resampling, const SearchedBalance& mot
     return std::any_of(f.group.begin(), f.group.end(), is_first);
   });
   if (!resampling.found.empty() && !found_first) return true;
-  const bool silent = resampling.abstained > policy.most_abstaining * resampling.subsamples;
-  if (!silent && support && *support < policy.named_frequency) return true;
+  // Likelihood is the more sensitive method where exactly one effect is missing.
+  if (names_several(resampling, motor)) return true;
+  const bool silent = resampling.abstained > kPolicy.most_abstaining * resampling.subsamples;
+  if (!silent && support && *support < kPolicy.named_frequency) return true;
   // An effect built from the measured effort also explains its noise.
   if (!support && is_of_effort(first)) return true;
   return !leaves_noise(motor, resampling.whiteness);

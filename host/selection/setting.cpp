@@ -12,7 +12,7 @@ constexpr double kRowsPerPeriod = 4.0;
 constexpr double kAtRest = 0.5;   // periods of the cut-off
 constexpr double kVisible = 3.0;  // velocities in units of their noise
 
-// Rows of a run that are left out: around reversals and sticking where `mask` is set, and where the axis is at rest.
+// Samples of a run that are left out: around reversals and sticking where `mask` is set, and where the axis is at rest.
 std::vector<std::uint8_t> unsure_rows(const RegressorTable& table, const Run& run, double cutoff_hz, bool mask,
                                       Eigen::Index reach) {
   const Eigen::Index n = run.last - run.first;
@@ -38,14 +38,14 @@ std::vector<std::uint8_t> unsure_rows(const RegressorTable& table, const Run& ru
   return unsure;
 }
 
-// Rows of the setting, run by run.
+// Samples of the setting, run by run.
 struct SelectedRows {
   std::vector<Eigen::MatrixXd> rows;  // by run
   std::vector<Run> runs;
   Eigen::Index total = 0;
 };
 
-// Adds the rows of a run, filtered and decimated, without those that are left out.
+// Adds the samples of a run, filtered and decimated, without those that are left out.
 void take_rows(const RegressorTable& table, const Run& run, double cutoff_hz, bool mask, SelectedRows& kept) {
   const Eigen::Index n = run.last - run.first;
   Eigen::MatrixXd rows(n, table.columns.cols() + 1);
@@ -79,7 +79,7 @@ void take_rows(const RegressorTable& table, const Run& run, double cutoff_hz, bo
   close();
 }
 
-// Number of blocks of one record: in proportion to its rows, at least two, so that each half can have one.
+// Number of blocks of one record: in proportion to its samples, at least two, so that each half can have one.
 void add_blocks(Setting& setting, std::size_t record, Eigen::Index rows_of_record, std::size_t blocks) {
   const Eigen::Index columns = setting.rows.cols();
   const auto parts =

@@ -1,4 +1,4 @@
-// One setting of the regression: a bandwidth, and reversals kept or left out. Blocks of consecutive rows with their
+// One setting of the regression: a bandwidth, and reversals kept or left out. Blocks of consecutive samples with their
 // cross products, so that fits on any choice of blocks are algebra on small matrices.
 #pragma once
 
@@ -9,7 +9,7 @@
 
 namespace flexspline::selection {
 
-// Rows of one record that follow each other, with the products of [columns, target].
+// Samples of one record that follow each other, with the products of [columns, target].
 struct Block {
   std::size_t record = 0;
   double rows = 0.0;
@@ -20,13 +20,13 @@ struct Setting {
   double cutoff_hz = 0.0;
   bool mask = false;
   std::vector<Block> blocks;
-  // The rows, filtered and masked, for residuals.
+  // The samples, filtered and masked, for residuals.
   Eigen::MatrixXd rows;  // [columns, target]
   std::vector<Run> runs;
 };
 
-// Rows left out at each end of a run, in periods of the cut-off, where the filter guesses what lies beyond; masked rows
-// reach as far around a reversal.
+// Samples left out at each end of a run, in periods of the cut-off, where the filter guesses what lies beyond; masked
+// samples reach as far around a reversal.
 inline constexpr double kFilterReach = 1.5;
 
 // Of the records that are held out, or of all others.

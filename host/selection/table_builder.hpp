@@ -25,7 +25,7 @@ struct TableBuilder {
   static double direction(const estimation::Record& r, std::size_t k) { return r.inputs.directions[0][k]; }
 
   Eigen::Index add(Eigen::VectorXd column);
-  // A signal of each record at the rows.
+  // A signal of each record at the samples.
   template <class Value>
   Eigen::VectorXd at_rows(Value value) const {
     Eigen::VectorXd column(data.rows());

@@ -82,15 +82,14 @@ std::vector<Trend> parameter_trends(const estimation::Identification& identified
       continue;  // offsets have no relative change
     for (const Covariate& covariate : covariates) {
       std::vector<double> x, y;
-      for (const auto& [name, value] : e.per_experiment) {
-        if (!value || *value <= 0.0) continue;
-        const auto at =
-            std::find_if(records.begin(), records.end(), [&wanted = name](const auto& r) { return r.name == wanted; });
+      for (const estimation::ExperimentValue& v : e.per_experiment) {
+        if (!v.value || *v.value <= 0.0) continue;
+        const auto at = std::find_if(records.begin(), records.end(), [&v](const auto& r) { return r.name == v.name; });
         if (at == records.end()) continue;
         const auto& covariate_value = covariate.by_record[static_cast<std::size_t>(at - records.begin())];
         if (!covariate_value) continue;
         x.push_back(covariate.is_scale ? std::log(*covariate_value) : *covariate_value);
-        y.push_back(std::log(*value));
+        y.push_back(std::log(*v.value));
       }
       if (x.size() < kPolicy.fewest_of_trend) continue;
       const auto line = fit_line(x, y);

@@ -23,7 +23,7 @@ constexpr std::size_t kScreenedPoints = 24;
 constexpr std::size_t kLearned = 3;  // signals whose curves are learnt in full
 
 struct ScreenedCurve {
-  TableSpecification question;
+  TableSpecification specification;
   std::string label;
   LearnedTable curve;
 };
@@ -69,7 +69,7 @@ bool belongs(Balance balance, const effects::VariableInfo& v) {
 }
 
 // Signals that a curve may run over on this balance: measured, varying, and not the left side itself.
-std::vector<TableSpecification> questions(BalanceData& data, const Terms& model) {
+std::vector<TableSpecification> table_specifications(BalanceData& data, const Terms& model) {
   std::vector<TableSpecification> list;
   for (const effects::VariableInfo& v : effects::kVariables) {
     if (!measured(data, v)) continue;
@@ -92,16 +92,17 @@ std::vector<TableSpecification> questions(BalanceData& data, const Terms& model)
 }
 
 // Those that the data identify, in the order of the specifications; learnt on all cores.
-std::vector<ScreenedCurve> curves(BalanceData& data, const Terms& model, const std::vector<TableSpecification>& asked,
+std::vector<ScreenedCurve> curves(BalanceData& data, const Terms& model,
+                                  const std::vector<TableSpecification>& specifications,
                                   const Eigen::VectorXd& weights) {
-  std::vector<std::optional<LearnedTable>> learned(asked.size());
-  estimation::in_parallel(asked.size(), [&](std::size_t i) {
+  std::vector<std::optional<LearnedTable>> learned(specifications.size());
+  estimation::in_parallel(specifications.size(), [&](std::size_t i) {
     BalanceData own = data;
-    learned[i] = estimation::learn_table(own, model, asked[i], weights);
+    learned[i] = estimation::learn_table(own, model, specifications[i], weights);
   });
   std::vector<ScreenedCurve> list;
-  for (std::size_t i = 0; i < asked.size(); ++i)
-    if (learned[i]) list.push_back({asked[i], label_of(asked[i]), std::move(*learned[i])});
+  for (std::size_t i = 0; i < specifications.size(); ++i)
+    if (learned[i]) list.push_back({specifications[i], label_of(specifications[i]), std::move(*learned[i])});
   return list;
 }
 
@@ -135,27 +136,27 @@ std::string next_record(const UnknownStructure& unknown, const data::Axis axis) 
 std::optional<UnknownStructure> find_unknown_structure(BalanceSearch& search, const Terms& model) {
   BalanceData& data = *search.data;
   const Eigen::VectorXd weights = search.base.root_weights.cwiseProduct(search.keep);
-  std::vector<TableSpecification> asked = questions(data, model);
-  for (TableSpecification& q : asked) {
+  std::vector<TableSpecification> specifications = table_specifications(data, model);
+  for (TableSpecification& q : specifications) {
     // Without the filter a curve costs little, and serves to distinguish signals.
     q.filtered = false;
     q.most_points = kScreenedPoints;
     q.exactly = true;
   }
-  std::vector<ScreenedCurve> list = curves(data, model, asked, weights);
+  std::vector<ScreenedCurve> list = curves(data, model, specifications, weights);
   const auto more = [](const ScreenedCurve& a, const ScreenedCurve& b) {
     return a.curve.decrease_percent > b.curve.decrease_percent;
   };
   std::sort(list.begin(), list.end(), more);
   if (list.empty() || !(list.front().curve.score > 0.0)) return std::nullopt;
-  asked.clear();
+  specifications.clear();
   for (std::size_t k = 0; k < std::min(kLearned, list.size()); ++k) {
-    asked.push_back(list[k].question);
-    asked.back().filtered = true;
-    asked.back().exactly = false;
-    asked.back().most_points = 128;
+    specifications.push_back(list[k].specification);
+    specifications.back().filtered = true;
+    specifications.back().exactly = false;
+    specifications.back().most_points = 128;
   }
-  std::vector<ScreenedCurve> learned = curves(data, model, asked, weights);
+  std::vector<ScreenedCurve> learned = curves(data, model, specifications, weights);
   if (learned.empty()) return std::nullopt;
   std::sort(learned.begin(), learned.end(), more);
   const ScreenedCurve* best = &learned.front();
@@ -167,7 +168,7 @@ std::optional<UnknownStructure> find_unknown_structure(BalanceSearch& search, co
   if (!is_significant(best->curve)) return std::nullopt;
   UnknownStructure unknown;
   unknown.effect = fmt::format("{}:{}", catalogue::kTableEffect, best->label);
-  unknown.definition = *estimation::effect_of(best->question, best->curve.table, "unknown").definition;
+  unknown.definition = *estimation::effect_of(best->specification, best->curve.table, "unknown").definition;
   unknown.curve = best->curve;
   unknown.depends_on.push_back({best->label, best->curve.decrease_percent});
   for (const ScreenedCurve& s : list)
@@ -190,8 +191,8 @@ CrossValidatedFit with_curve(BalanceSearch& search, const UnknownStructure& unkn
   return cross_validate(*search.data, std::move(terms), search.keep);
 }
 
-// What the named effects explain of what the curve explains, by the squares of left-out rows; one where the curve does
-// not explain more for certain.
+// What the named effects explain of what the curve explains, by the squares of left-out samples; one where the curve
+// does not explain more for certain.
 double share_of(const CrossValidatedFit& base, const CrossValidatedFit& named, const CrossValidatedFit& curve,
                 double more_numbers) {
   const LikelihoodGain of_named = likelihood_gain(named, curve, std::max(0.0, more_numbers));

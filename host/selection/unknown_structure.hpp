@@ -24,7 +24,7 @@ struct UnknownStructure {
   // these motions.
   struct DependentVariable {
     std::string variable;           // "velocity", "torque*direction"
-    double decrease_percent = 0.0;  // of squares of rows left out of the fit
+    double decrease_percent = 0.0;  // of squares of samples left out of the fit
   };
   std::vector<DependentVariable> depends_on;
   // What the named effect explains of what it and the curve explain together; nothing where no effect was named.
@@ -32,7 +32,7 @@ struct UnknownStructure {
   std::string record_next;
 };
 
-// Learns curves on what `model` leaves. Nothing where none predicts left-out rows better by more than chance would.
+// Learns curves on what `model` leaves. Nothing where none predicts left-out samples better by more than chance would.
 std::optional<UnknownStructure> find_unknown_structure(BalanceSearch& search, const estimation::Terms& model);
 
 // Whether what is missing is outside the catalogue. `named` is the candidate that would be named, or null

@@ -152,19 +152,19 @@ model::Effect user_defined_effect(std::string_view text, const UserDefinition& g
 
 estimation::LearnedTable learn(estimation::Identification& base, const model::Effect& table,
                                const UserDefinition& given) {
-  estimation::TableSpecification question = estimation::table_specification(*table.definition);
+  estimation::TableSpecification specification = estimation::table_specification(*table.definition);
   if (given.points) {
-    question.most_points = *given.points;
-    question.exactly = true;
+    specification.most_points = *given.points;
+    specification.exactly = true;
   }
   const auto fail = [&](const char* kind, std::string what, std::string remedy) {
     throw data::DataError({{data::Severity::error, kind, "", 0, "", std::move(what), std::move(remedy)}});
   };
-  const estimation::Balance on = base.prepared.torque_measured ? question.balance : estimation::Balance::motor;
+  const estimation::Balance on = base.prepared.torque_measured ? specification.balance : estimation::Balance::motor;
   const std::string& variable = table.definition->variable;
   for (std::size_t b = 0; b < base.data.size(); ++b) {
     if (base.data[b].balance() != on) continue;
-    auto learned = estimation::learn_table(base.data[b], base.terms, question, base.fits[b].root_weights);
+    auto learned = estimation::learn_table(base.data[b], base.terms, specification, base.fits[b].root_weights);
     if (!learned)
       fail("missing_column",
            fmt::format("{} does not vary in these data, so that nothing can be learnt over it", variable),

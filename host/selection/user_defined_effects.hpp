@@ -30,7 +30,7 @@ model::Effect user_defined_effect(std::string_view text, const UserDefinition& g
 model::Parameter parse_parameter(std::string_view text);
 
 // Learns the points of a table together with the effects of an identified model. Throws data::DataError where the
-// signal does not vary, or where the table does not lower the error on rows that its fit did not see.
+// signal does not vary, or where the table does not lower the error on samples that its fit did not see.
 estimation::LearnedTable learn(estimation::Identification& base, const model::Effect& table,
                                const UserDefinition& given);
 

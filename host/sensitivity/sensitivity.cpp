@@ -91,7 +91,7 @@ class Analysis {
       apply(model_, change);  // what is out of bounds is reported before the work
     {
       Worker worker(*this);
-      result_.full = worker.judge(model_, std::nullopt);
+      result_.full = worker.evaluate(model_, std::nullopt);
     }
     if (!result_.full.note.empty()) result_.warnings.push_back(result_.full.note);
     result_.variants.resize(changes.size());
@@ -117,7 +117,7 @@ class Analysis {
         ChangedModel changed = apply(analysis_.model_, change);
         if (analysis_.options_.refit)
           changed.model = estimation::identify(analysis_.dataset_, changed.model, analysis_.options_.pipeline)->model;
-        Variant variant = judge(changed.model, change);
+        Variant variant = evaluate(changed.model, change);
         variant.also_left_out = std::move(changed.also_left_out);
         return variant;
       } catch (const model::ModelError& impossible) {
@@ -127,7 +127,7 @@ class Analysis {
       }
     }
 
-    Variant judge(const model::Model& model, const std::optional<Change>& change) {
+    Variant evaluate(const model::Model& model, const std::optional<Change>& change) {
       Variant variant;
       variant.change = change;
       for (const Experiment& e : analysis_.dataset_.experiments)

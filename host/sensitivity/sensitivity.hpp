@@ -80,7 +80,7 @@ struct Sensitivity {
   std::vector<std::string> warnings;
 };
 
-// Judges all experiments, each error as `comparison::compare` has it. With `refit` the experiments of role fit are
+// Evaluates the errors of all experiments as `comparison::compare` does. With `refit` the experiments of role fit are
 // fitted. A change that leaves a model which cannot be run or fitted has a note. Throws model::ModelError where a
 // parameter has no value or `more` names what the model does not have, data::DataError where nothing can be compared.
 Sensitivity analyse(const data::Dataset& dataset, const model::Model& model, const Options& options);

@@ -16,7 +16,7 @@ namespace flexspline::signals {
 /// Ends: the signal is continued by odd reflection, until the slowest pole has decayed or the signal is used up, and
 /// each section starts in its steady state. A constant passes bit for bit, a linear ramp to about 1e-6 of its slope
 /// times the filter's delay where the signal is longer than `pad_length`. Data with a gap must be filtered segment by
-/// segment. A value that is not finite spoils the whole signal.
+/// segment. A value that is not finite makes the whole signal invalid.
 ///
 /// All methods are const and hold no scratch memory: one filter may serve several threads.
 class ZeroPhaseFilter {

@@ -64,10 +64,10 @@ std::size_t whole(const Request& request, const std::string& key, double most = 
   return static_cast<std::size_t>(value);
 }
 
-std::string field(const json& asked, const char* key) {
-  if (!asked.contains(key) || !asked[key].is_string())
+std::string field(const json& body, const char* key) {
+  if (!body.contains(key) || !body[key].is_string())
     throw UnknownNameError(fmt::format("\"{}\" is missing in the request", key));
-  const auto value = asked[key].get<std::string>();
+  const auto value = body[key].get<std::string>();
   require_text(value, key);
   return value;
 }
@@ -257,16 +257,16 @@ json Api::post(const Request& request) {
   throw NotFound("there is nothing under this address");
 }
 
-json Api::act(const std::shared_ptr<Session>& session, const json& asked) {
-  const std::string what = field(asked, "do");
+json Api::act(const std::shared_ptr<Session>& session, const json& body) {
+  const std::string what = field(body, "do");
   const auto pipeline = setup_.pipeline;
   constexpr std::string_view kWithoutModel[] = {"cancel", "dismiss", "propose", "begin", "forget"};
   if (!session->has_model() && std::ranges::find(kWithoutModel, what) == std::end(kWithoutModel))
     throw UnknownNameError("there is no model yet; drop recordings on the page and begin with them");
   if (what == "propose") {
-    start_proposal(session, choices_of(asked));
+    start_proposal(session, choices_of(body));
   } else if (what == "begin") {
-    start_project(session, choices_of(asked));
+    start_project(session, choices_of(body));
   } else if (what == "forget") {
     session->store("recordings", nullptr);
     session->set("proposal", nullptr);
@@ -279,19 +279,19 @@ json Api::act(const std::shared_ptr<Session>& session, const json& asked) {
     session->change([&](auto& history) {
       if (what == "undo") history.undo();
       if (what == "redo") history.redo();
-      if (what == "go") history.go(asked.at("step").get<std::size_t>());
+      if (what == "go") history.go(body.at("step").get<std::size_t>());
     });
     store_all_tabs();
   } else if (what == "diagnose") {
     start_diagnosis(session);
   } else if (what == "add") {
-    start_step(session, fmt::format("Adding {}", field(asked, "effect")),
-               [pipeline, effect = field(asked, "effect")](const Step& now, const Progress& progress) {
+    start_step(session, fmt::format("Adding {}", field(body, "effect")),
+               [pipeline, effect = field(body, "effect")](const Step& now, const Progress& progress) {
                  return with_effect(now, effect, pipeline, progress);
                });
   } else if (what == "remove") {
-    start_step(session, fmt::format("Removing {}", field(asked, "effect")),
-               [pipeline, id = field(asked, "effect")](const Step& now, const Progress& progress) {
+    start_step(session, fmt::format("Removing {}", field(body, "effect")),
+               [pipeline, id = field(body, "effect")](const Step& now, const Progress& progress) {
                  return without_effect(now, id, pipeline, progress);
                });
   } else if (what == "refit") {
@@ -300,11 +300,11 @@ json Api::act(const std::shared_ptr<Session>& session, const json& asked) {
   } else if (what == "pack") {
     start_pack(session);
   } else if (what == "try") {
-    start_trial(session, field(asked, "scenario"));
+    start_trial(session, field(body, "scenario"));
   } else if (what == "save") {
-    start_save(session, asked);
+    start_save(session, body);
   } else if (what == "connect") {
-    const std::string drive = field(asked, "drive");
+    const std::string drive = field(body, "drive");
     session->start("Connecting", [this, drive](const Progress& progress) {
       progress(drive);
       drive_.connect(drive);
@@ -323,7 +323,7 @@ json Api::act(const std::shared_ptr<Session>& session, const json& asked) {
     session->set("flash_preview", nullptr);
   } else if (what == "flash" || what == "restore") {
     // A drive is changed only as shown in the preview.
-    const PreviewedBlocks shown{field(asked, "before"), field(asked, "after")};
+    const PreviewedBlocks shown{field(body, "before"), field(body, "after")};
     session->set("flash_preview", nullptr);
     session->start(what == "flash" ? "Flashing" : "Restoring", [this, what, shown,
                                                                 session = session.get()](const Progress& progress) {
@@ -415,11 +415,11 @@ void Api::start_trial(const std::shared_ptr<Session>& session, const std::string
   });
 }
 
-void Api::start_save(const std::shared_ptr<Session>& session, const json& asked) {
-  const std::string what = field(asked, "what");
-  const std::filesystem::path path = inside(setup_.folder, field(asked, "name"), ending_of(what));
+void Api::start_save(const std::shared_ptr<Session>& session, const json& body) {
+  const std::string what = field(body, "what");
+  const std::filesystem::path path = inside(setup_.folder, field(body, "name"), ending_of(what));
   std::error_code error;
-  if (std::filesystem::exists(path, error) && !asked.value("replace", false))
+  if (std::filesystem::exists(path, error) && !body.value("replace", false))
     throw NameError(fmt::format("{} is there already; take another name, or replace it", path.filename().string()));
   session->start("Saving", [this, what, path, session = session.get()](const Progress& progress) {
     progress(path.filename().string());

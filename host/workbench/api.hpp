@@ -71,13 +71,13 @@ class Api {
   nlohmann::json get(const Request& request);
   nlohmann::json post(const Request& request);
   Answer file(const Request& request);
-  nlohmann::json act(const std::shared_ptr<Session>& session, const nlohmann::json& asked);
+  nlohmann::json act(const std::shared_ptr<Session>& session, const nlohmann::json& body);
   void start_step(const std::shared_ptr<Session>& session, const std::string& what,
                   std::function<std::shared_ptr<Step>(const Step&, const Progress&)> make);
   void start_diagnosis(const std::shared_ptr<Session>& session);
   void start_pack(const std::shared_ptr<Session>& session);
   void start_trial(const std::shared_ptr<Session>& session, const std::string& scenario);
-  void start_save(const std::shared_ptr<Session>& session, const nlohmann::json& asked);
+  void start_save(const std::shared_ptr<Session>& session, const nlohmann::json& body);
   void start_drop(const std::shared_ptr<Session>& session, const std::vector<Upload>& files);
   // Of the recordings that were dropped last, or that the workbench was started with.
   void start_proposal(const std::shared_ptr<Session>& session, const Choices& choices);

@@ -326,7 +326,7 @@ json LiveDrive::residual_map() {
       const bool started = drive::start_residual_map(*session_);
       const drive::ResidualMap map = drive::read_residual_map(*session_, *scales_);
       const double limit_nm = drive::usual_map_limit_nm(*scales_);
-      json answer = drive::map_json(map, drive::judge(map, limit_nm), limit_nm);
+      json answer = drive::map_json(map, drive::test_map(map, limit_nm), limit_nm);
       answer["started"] = started;
       answer["model"] = drive::view_of(active_).model;
       return answer;
@@ -449,10 +449,10 @@ void LiveDrive::listen() {
     const bool wanted = lock.owns_lock() && session_ && scales_ && Clock::now() - asked_ < kIdle;
     try {
       if (wanted && !subscribed_) {
-        std::vector<Channel> asked{Channel::state};
-        for (const Channel c : kChannels) asked.push_back(c);
+        std::vector<Channel> channels{Channel::state};
+        for (const Channel c : kChannels) channels.push_back(c);
         const double every = std::clamp(std::round(session_->identity().tick_hz / kRateHz), 1.0, 65535.0);
-        session_->subscribe(asked, static_cast<std::uint16_t>(every));
+        session_->subscribe(channels, static_cast<std::uint16_t>(every));
         subscribed_ = true;
         samples_.clear();
         first_tick_ = 0;

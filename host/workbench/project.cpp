@@ -12,33 +12,33 @@ namespace {
 
 using nlohmann::json;
 
-std::string text(const json& asked, const char* key) {
-  if (!asked.contains(key) || asked[key].is_null()) return {};
-  if (!asked[key].is_string()) throw UnknownNameError(fmt::format("{} is not a text", key));
-  return asked[key].get<std::string>();
+std::string text(const json& body, const char* key) {
+  if (!body.contains(key) || body[key].is_null()) return {};
+  if (!body[key].is_string()) throw UnknownNameError(fmt::format("{} is not a text", key));
+  return body[key].get<std::string>();
 }
 
-std::vector<std::string> texts(const json& asked, const char* key) {
+std::vector<std::string> texts(const json& body, const char* key) {
   std::vector<std::string> all;
-  if (!asked.contains(key) || asked[key].is_null()) return all;
-  if (!asked[key].is_array()) throw UnknownNameError(fmt::format("{} is not a list", key));
-  for (const json& one : asked[key]) {
+  if (!body.contains(key) || body[key].is_null()) return all;
+  if (!body[key].is_array()) throw UnknownNameError(fmt::format("{} is not a list", key));
+  for (const json& one : body[key]) {
     if (!one.is_string()) throw UnknownNameError(fmt::format("{} holds something that is not a text", key));
     all.push_back(one.get<std::string>());
   }
   return all;
 }
 
-std::optional<double> positive(const json& asked, const char* key) {
-  if (!asked.contains(key) || asked[key].is_null()) return std::nullopt;
-  if (!asked[key].is_number() || !(asked[key].get<double>() > 0.0))
+std::optional<double> positive(const json& body, const char* key) {
+  if (!body.contains(key) || body[key].is_null()) return std::nullopt;
+  if (!body[key].is_number() || !(body[key].get<double>() > 0.0))
     throw UnknownNameError(fmt::format("{} has to be a number above zero", key));
-  return asked[key].get<double>();
+  return body[key].get<double>();
 }
 
-std::optional<int> whole(const json& asked, const char* key, int least) {
-  if (!asked.contains(key) || asked[key].is_null()) return std::nullopt;
-  const double value = asked[key].is_number() ? asked[key].get<double>() : -1.0;
+std::optional<int> whole(const json& body, const char* key, int least) {
+  if (!body.contains(key) || body[key].is_null()) return std::nullopt;
+  const double value = body[key].is_number() ? body[key].get<double>() : -1.0;
   if (value != std::floor(value) || value < least || value > 1e4)
     throw UnknownNameError(fmt::format("{} has to be a whole number from {} on", key, least));
   return static_cast<int>(value);
@@ -46,10 +46,10 @@ std::optional<int> whole(const json& asked, const char* key, int least) {
 
 }  // namespace
 
-Choices choices_of(const json& asked) {
+Choices choices_of(const json& body) {
   Choices choices;
-  if (!asked.contains("choices")) return choices;
-  const json& given = asked["choices"];
+  if (!body.contains("choices")) return choices;
+  const json& given = body["choices"];
   if (!given.is_object()) throw UnknownNameError("choices are no object");
   choices.map = texts(given, "map");
   choices.without = texts(given, "without");

@@ -25,7 +25,7 @@ struct Choices {
 };
 
 // From "choices" of a request. Throws UnknownNameError where a value has the wrong type.
-Choices choices_of(const nlohmann::json& asked);
+Choices choices_of(const nlohmann::json& body);
 
 struct Project {
   std::shared_ptr<const data::Dataset> dataset;

@@ -25,7 +25,8 @@ std::optional<double> optional_number(const json& value) {
 
 json stored_estimate_json(const estimation::Estimate& e) {
   json per_experiment = json::array();
-  for (const auto& [name, value] : e.per_experiment) per_experiment.push_back({name, json_number(value)});
+  for (const estimation::ExperimentValue& v : e.per_experiment)
+    per_experiment.push_back({v.name, json_number(v.value), json_number(v.std), v.left_out});
   return {{"slot", {e.ref.term, e.ref.parameter}},
           {"id", e.id},
           {"effect", e.effect},
@@ -37,7 +38,7 @@ json stored_estimate_json(const estimation::Estimate& e) {
           {"high", json_number(e.high)},
           {"average", json_number(e.average)},
           {"spread_percent", json_number(e.spread_percent)},
-          {"reliable", e.reliable},
+          {"reliable", e.reliable ? json(*e.reliable) : json(nullptr)},
           {"identifiable", e.identifiable},
           {"fixed", e.fixed},
           {"excitation", json_number(e.excitation)},
@@ -57,12 +58,14 @@ estimation::Estimate estimate_of(const json& stored) {
   e.high = optional_number(stored.at("high"));
   e.average = optional_number(stored.at("average"));
   e.spread_percent = optional_number(stored.at("spread_percent"));
-  e.reliable = stored.at("reliable");
+  if (stored.at("reliable").is_boolean()) e.reliable = stored.at("reliable").get<bool>();
   e.identifiable = stored.at("identifiable");
   e.fixed = stored.at("fixed");
   e.excitation = optional_number(stored.at("excitation"));
   for (const json& one : stored.at("per_experiment"))
-    e.per_experiment.emplace_back(one.at(0).get<std::string>(), optional_number(one.at(1)));
+    e.per_experiment.push_back({one.at(0).get<std::string>(), optional_number(one.at(1)),
+                                one.size() > 2 ? optional_number(one.at(2)) : std::nullopt,  // an older tab has two
+                                one.size() > 3 ? one.at(3).get<std::string>() : std::string()});
   return e;
 }
 

@@ -11,7 +11,7 @@
 
 namespace flexspline::workbench {
 
-// How a worker ended that was not asked to.
+// How a worker ended without a request.
 struct Failure {
   std::string why;        // "it crashed (signal 11, Segmentation fault)"
   std::vector<Job> jobs;  // what ran then

@@ -27,7 +27,7 @@ std::vector<data::Segment> clipped(const std::vector<data::Segment>& segments, s
 nlohmann::json window(const std::vector<data::Segment>& segments, std::span<const double> time_s, double from_s,
                       double to_s, std::size_t points, const std::vector<Curve>& curves);
 
-// Samples of rows, as intervals of time: neighbours at most `join_s` apart become one. [[from, to], ...].
+// Samples as intervals of time: neighbours at most `join_s` apart become one. [[from, to], ...].
 // `times` rise.
 std::vector<std::pair<double, double>> intervals(std::span<const double> times, double join_s);
 

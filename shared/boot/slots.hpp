@@ -23,6 +23,9 @@ enum class Slot : std::uint8_t {
 };
 inline constexpr std::size_t kSlots = 3;
 inline constexpr std::size_t kJournalBytes = 64;
+// Another sector, never erased: a word for each time that the security counter was raised.
+inline constexpr std::size_t kCounterSector = kSlots, kImageSectors = kSlots + 1;
+inline constexpr std::size_t kCounterBytes = 512;
 
 enum class SlotError : std::uint8_t {
   none,
@@ -41,7 +44,8 @@ enum class Start : std::uint8_t {
   none,         // there is no complete image, or the only one failed all its trials: wait for a download
 };
 
-template <storage::FlashPort Flash>
+// `Trust`: which images may run (image.hpp). An image that may not is handled as one that is damaged.
+template <storage::FlashPort Flash, class Trust = AnySigner>
 class Slots {
  public:
   static constexpr std::size_t kImageBytes = Flash::kSectorBytes - kJournalBytes;
@@ -54,7 +58,7 @@ class Slots {
   // At each start of the boot loader: finishes an update that was begun.
   constexpr Start resume() {
     if (is_pending()) {
-      if ((is_set(Mark::installed) && is_whole(Slot::application)) || install()) {
+      if ((is_set(Mark::installed) && may_run(Slot::application)) || install()) {
         for (std::size_t i = 0; i < kTrials && !is_set(Mark::fell_back); ++i) {
           const Mark trial = trial_of(i);
           if (is_set(trial)) continue;
@@ -65,10 +69,30 @@ class Slots {
       }
       if (!fall_back()) return Start::none;
     }
-    if (is_whole(Slot::application)) return Start::application;
+    if (may_run(Slot::application)) {
+      raise_counter();
+      return Start::application;
+    }
     // It is damaged, or a first installation was interrupted: another image replaces it, the newest first.
     const bool again = is_set(Mark::confirmed) && copy(Slot::download, Slot::application);
     return again || copy(Slot::old, Slot::application) ? Start::application : Start::none;
+  }
+
+  // The same counter before a download, where the boot loader was started by a request: the application may have
+  // confirmed itself since the last start.
+  constexpr void keep_counter() {
+    if (!is_pending() && may_run(Slot::application)) raise_counter();
+  }
+  // The largest of the images that were confirmed. Words that an interrupted write left have too few zeros, and do not
+  // count.
+  constexpr std::uint16_t security_counter() const {
+    std::uint16_t most = 0;
+    for (std::size_t i = 0; i < kCounterBytes / 4; ++i) {
+      const std::uint32_t code = counter_word(i);
+      const auto counter = static_cast<std::uint16_t>(code);
+      if (code == code_of(counter) && counter > most) most = counter;
+    }
+    return most;
   }
 
   // Whether the running application is on trial. It reads the whole image: call it once, before there are deadlines.
@@ -108,9 +132,16 @@ class Slots {
     const bool had_header = staged_ >= kHeaderBytes;
     staged_ += chunk.size();
     if (had_header || staged_ < kHeaderBytes) return SlotError::none;
-    ImageHeader header;
-    finding_ = check_header(bytes(Slot::download), board_, kImageBytes, header);
+    finding_ = check_start(bytes(Slot::download));
     return finding_ == ImageFinding::none ? SlotError::none : fail(SlotError::image);
+  }
+  // What the first bytes of an image show already.
+  constexpr ImageFinding check_start(std::span<const std::uint8_t> start) const {
+    ImageHeader header;
+    const ImageFinding finding = check_header(start, board_, kImageBytes, header);
+    if (finding != ImageFinding::none) return finding;
+    if (!Trust::may_accept(header)) return ImageFinding::not_signed;
+    return header.security_counter < security_counter() ? ImageFinding::rolled_back : ImageFinding::none;
   }
   // Whether all bytes that the header announces were received.
   constexpr bool has_all() const {
@@ -126,6 +157,10 @@ class Slots {
     finding_ = read_image(bytes(Slot::download).first(staged_), header);
     if (finding_ == ImageFinding::none && header.board != board_bytes(board_)) finding_ = ImageFinding::wrong_board;
     if (finding_ == ImageFinding::none && header.whole_bytes() != staged_) finding_ = ImageFinding::too_long;
+    if (finding_ == ImageFinding::none && !Trust::accepts(bytes(Slot::download).first(staged_), header))
+      finding_ = ImageFinding::not_signed;
+    if (finding_ == ImageFinding::none && header.security_counter < security_counter())
+      finding_ = ImageFinding::rolled_back;
     if (finding_ != ImageFinding::none) return SlotError::image;
     return set(Mark::requested) ? SlotError::none : SlotError::program;
   }
@@ -139,6 +174,15 @@ class Slots {
     const bool good = read_image(bytes(slot), header) == ImageFinding::none && header.board == board_bytes(board_);
     return good ? bytes(slot).first(header.whole_bytes()) : std::span<const std::uint8_t>{};
   }
+  // The same where it may run as well: it is signed, and has no smaller counter than one that was confirmed.
+  constexpr std::span<const std::uint8_t> image_to_run(Slot slot) const {
+    const auto whole = image(slot);
+    ImageHeader header;
+    if (read_header(whole, header) != ImageFinding::none || header.security_counter < security_counter() ||
+        !Trust::accepts(whole, header))
+      return {};
+    return whole;
+  }
   constexpr std::string_view board() const { return board_; }
 
  private:
@@ -148,6 +192,7 @@ class Slots {
   static constexpr std::size_t kMarks = 3 + kTrials + 3;
   static_assert(4 * kMarks <= kJournalBytes);
   static_assert(Flash::kSectorBytes > kHeaderBytes + kJournalBytes && Flash::kSectorBytes % 8 == 0);
+  static_assert(Flash::kSectorBytes >= kCounterBytes);
   // Sixteen of its bits are zero: an interrupted write has fewer, and is completed by writing it again.
   static constexpr std::uint32_t kSet = 0x5AA53CC3;
 
@@ -162,6 +207,7 @@ class Slots {
     return r.take<std::uint32_t>();
   }
   constexpr bool is_whole(Slot slot) const { return !image(slot).empty(); }
+  constexpr bool may_run(Slot slot) const { return !image_to_run(slot).empty(); }
   constexpr bool is_set(Mark mark) const { return word(Slot::download, place_of(mark)) == kSet; }
   constexpr bool set(Mark mark) { return put(Slot::download, place_of(mark), kSet); }
   // An update that was requested and is not finished.
@@ -191,7 +237,7 @@ class Slots {
   }
   // An interrupted copy starts again; a finished one is not repeated.
   constexpr bool copy(Slot from, Slot to) {
-    const std::size_t words = (image(from).size() + 3) / 4;
+    const std::size_t words = (image_to_run(from).size() + 3) / 4;
     if (words == 0) return false;
     if (is_copy(from, to)) return true;
     if (erase(to) != SlotError::none) return false;
@@ -199,11 +245,11 @@ class Slots {
       if (!put(to, i, word(from, i))) return false;
     return is_whole(to);
   }
-  // The application is saved before a word of it is changed, unless it is not complete.
+  // The application is saved before a word of it is changed, unless it may not run.
   constexpr bool install() {
     if (is_set(Mark::fell_back)) return false;
     if (!is_set(Mark::saved)) {
-      if (is_whole(Slot::application) && !copy(Slot::application, Slot::old)) return false;
+      if (may_run(Slot::application) && !copy(Slot::application, Slot::old)) return false;
       if (!set(Mark::saved)) return false;
     }
     return copy(Slot::download, Slot::application) && set(Mark::installed);
@@ -211,8 +257,29 @@ class Slots {
   // False: there is no image to go back to. An application that was not changed yet stays.
   constexpr bool fall_back() {
     if (!set(Mark::fell_back)) return false;
-    const bool untouched = !is_set(Mark::saved) && is_whole(Slot::application);
+    const bool untouched = !is_set(Mark::saved) && may_run(Slot::application);
     return (untouched || copy(Slot::old, Slot::application)) && set(Mark::taken_back);
+  }
+
+  // The counter in both halves, once inverted: each word has sixteen zeros.
+  static constexpr std::uint32_t code_of(std::uint16_t counter) {
+    return std::uint32_t{counter} | (~std::uint32_t{counter} << 16);
+  }
+  constexpr std::uint32_t counter_word(std::size_t i) const {
+    model::Reader r(flash_.bytes(kCounterSector).subspan(4 * i, 4));
+    return r.take<std::uint32_t>();
+  }
+  // To that of the application, which is confirmed. The first word that is blank or that an interrupted write of the
+  // same counter left takes it. Where all are used, the counter stays what it is.
+  constexpr void raise_counter() {
+    ImageHeader header;
+    if (read_header(bytes(Slot::application), header) != ImageFinding::none) return;
+    if (header.security_counter <= security_counter()) return;
+    const std::uint32_t code = code_of(header.security_counter);
+    for (std::size_t i = 0; i < kCounterBytes / 4; ++i) {
+      if ((counter_word(i) & code) != code) continue;
+      if (flash_.program(kCounterSector, i, code) && counter_word(i) == code) return;
+    }
   }
 
   Flash& flash_;

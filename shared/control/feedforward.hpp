@@ -7,7 +7,7 @@
 //   k times which is the error of a ripple's phase. This closes a loop, but one of known gain: a ripple of amplitude a
 //   acts as a stiffness of at most k a, which has to stay far below that of the position loop.
 // - temperature and a load that the model does not know: both change slowly. Neither angle nor velocity measured enters
-//   friction: friction compensated by its own sign is a negative damping, and hunts.
+//   friction: friction compensated by its own sign is a negative damping, with a limit cycle.
 //
 // Direction is clamp(w_set / band, 1): continuous, so that a set point with noise below the band cannot make friction
 // chatter, and zero at standstill, where the direction of friction depends on the load.

@@ -29,7 +29,7 @@ struct Backlash : Stateless {
   static constexpr ParameterInfo kParameters[] = {
       {.name = "half_width",
        .unit = units::kAngle,
-       .kind = Kind::shape,
+       .kind = Kind::nonlinear,
        .usual = 1.5e-4,
        .low = 0.0,
        .limit = Limit::torsion},

@@ -31,19 +31,19 @@ struct BoucWenHysteresis {
       {.name = "stiffness", .unit = units::kStiffness, .usual = 5000.0, .low = 0.0},
       {.name = "beta",
        .unit = units::kNone,
-       .kind = Kind::shape,
+       .kind = Kind::nonlinear,
        .usual = 2500.0,
        .low = 1e-9,
        .limit = Limit::inverse_torsion,
        .root_of = "exponent"},
       {.name = "gamma",
        .unit = units::kNone,
-       .kind = Kind::shape,
+       .kind = Kind::nonlinear,
        .usual = 0.0,
        .low = -0.5,
        .high = 1.0,
        .per = "beta"},
-      {.name = "exponent", .unit = units::kNone, .kind = Kind::shape, .usual = 1.0, .low = 1.0, .high = 3.0},
+      {.name = "exponent", .unit = units::kNone, .kind = Kind::nonlinear, .usual = 1.0, .low = 1.0, .high = 3.0},
   };
   template <class N>
   struct Coefficients {

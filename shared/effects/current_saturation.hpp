@@ -24,7 +24,7 @@ struct CurrentSaturation : Stateless {
   static constexpr ParameterInfo kParameters[] = {
       {.name = "limit",
        .unit = units::kCurrent,
-       .kind = Kind::shape,
+       .kind = Kind::nonlinear,
        .usual = 3.0,
        .low = 1e-6,
        .limit = Limit::current},

@@ -28,7 +28,7 @@ struct DahlFriction {
       {.name = "torque", .unit = units::kTorque, .usual = 0.045, .low = 0.0},
       {.name = "presliding",
        .unit = units::kAngle,
-       .kind = Kind::shape,
+       .kind = Kind::nonlinear,
        .usual = 0.05,
        .low = 1e-12,
        .limit = Limit::travel},

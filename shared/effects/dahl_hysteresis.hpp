@@ -32,12 +32,12 @@ struct DahlHysteresis {
       {.name = "torque", .unit = units::kTorque, .usual = 2.0, .low = 0.0},
       {.name = "stiffness",
        .unit = units::kStiffness,
-       .kind = Kind::shape,
+       .kind = Kind::nonlinear,
        .usual = 5000.0,
        .low = 1e-9,
        .limit = Limit::inverse_torsion,
        .per = "torque"},
-      {.name = "exponent", .unit = units::kNone, .kind = Kind::shape, .usual = 1.0, .low = 0.5, .high = 4.0},
+      {.name = "exponent", .unit = units::kNone, .kind = Kind::nonlinear, .usual = 1.0, .low = 0.5, .high = 4.0},
   };
   template <class N>
   struct Coefficients {

@@ -30,7 +30,7 @@ struct DuhemHysteresis {
   static constexpr ParameterInfo kParameters[] = {
       {.name = "rate",
        .unit = units::kPerAngle,
-       .kind = Kind::shape,
+       .kind = Kind::nonlinear,
        .usual = 2500.0,
        .low = 1e-9,
        .limit = Limit::inverse_torsion},

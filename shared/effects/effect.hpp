@@ -19,10 +19,10 @@ enum class Balance : std::uint8_t { motor, transmission, load };
 // shift: changes a signal before any other effect sees it; modulate: scales another effect; source: adds a torque.
 enum class Phase : std::uint8_t { shift, modulate, source };
 
-// linear: the torque is proportional to it (and to all parameters that are stated relative to it); shape: a nonlinear
-// parameter, searched for within bounds; given: stated by the user; grid: set from the range of the data where the
-// model does not state it, and then known.
-enum class Kind : std::uint8_t { linear, shape, given, grid };
+// linear: the torque is proportional to it (and to all parameters that are stated relative to it); nonlinear: searched
+// for within bounds; given: stated by the user; grid: set from the range of the data where the model does not state it,
+// and then known.
+enum class Kind : std::uint8_t { linear, nonlinear, given, grid };
 
 // From what the bounds of a nonlinear parameter are derived when data are available.
 enum class Limit : std::uint8_t {
@@ -130,7 +130,7 @@ struct Description {
   bool acts_last = false;  // a shift that acts after all others
   bool host_only = false;  // too large for a drive
   // Its law is stated in the model file with its parameters, so that each one there is an effect of its own.
-  bool made_by_user = false;
+  bool user_defined = false;
 };
 constexpr unsigned on(Balance balance) {
   return 1U << static_cast<unsigned>(balance);

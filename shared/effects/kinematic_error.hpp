@@ -30,8 +30,8 @@ struct KinematicError : Stateless {
   };
   static constexpr ParameterInfo kParameters[] = {
       {.name = "order", .unit = units::kNone, .kind = Kind::given, .usual = 2.0, .low = 0.01, .high = 1000.0},
-      {.name = "cosine", .unit = units::kAngle, .kind = Kind::shape, .usual = 4e-5, .limit = Limit::torsion},
-      {.name = "sine", .unit = units::kAngle, .kind = Kind::shape, .usual = 0.0, .limit = Limit::torsion},
+      {.name = "cosine", .unit = units::kAngle, .kind = Kind::nonlinear, .usual = 4e-5, .limit = Limit::torsion},
+      {.name = "sine", .unit = units::kAngle, .kind = Kind::nonlinear, .usual = 0.0, .limit = Limit::torsion},
   };
   template <class N>
   struct Coefficients {

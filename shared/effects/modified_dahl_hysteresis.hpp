@@ -29,7 +29,7 @@ struct ModifiedDahlHysteresis {
       {.name = "torque", .unit = units::kTorque, .usual = 2.0, .low = 0.0},
       {.name = "stiffness",
        .unit = units::kStiffness,
-       .kind = Kind::shape,
+       .kind = Kind::nonlinear,
        .usual = 5000.0,
        .low = 1e-9,
        .limit = Limit::inverse_torsion,

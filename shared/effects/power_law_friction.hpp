@@ -24,7 +24,7 @@ struct PowerLawFriction : Stateless {
   };
   static constexpr ParameterInfo kParameters[] = {
       {.name = "torque", .unit = units::kTorque, .usual = 0.02, .low = 0.0},
-      {.name = "exponent", .unit = units::kNone, .kind = Kind::shape, .usual = 0.4, .low = 0.15, .high = 0.85},
+      {.name = "exponent", .unit = units::kNone, .kind = Kind::nonlinear, .usual = 0.4, .low = 0.15, .high = 0.85},
   };
   template <class N>
   struct Coefficients {

@@ -27,7 +27,12 @@ struct PreisachHysteresis {
       .host_only = true,
   };
   static constexpr ParameterInfo kParameters[] = {
-      {.name = "span", .unit = units::kAngle, .kind = Kind::shape, .usual = 1.6e-3, .low = 1e-12, .limit = Limit::span},
+      {.name = "span",
+       .unit = units::kAngle,
+       .kind = Kind::nonlinear,
+       .usual = 1.6e-3,
+       .low = 1e-12,
+       .limit = Limit::span},
       {.name = "weight_11", .unit = units::kTorque, .usual = -0.06},
       {.name = "weight_21", .unit = units::kTorque, .usual = -0.1},
       {.name = "weight_22", .unit = units::kTorque, .usual = -0.06},

@@ -35,7 +35,7 @@ struct StribeckGaussian : Stateless {
       {.name = "amplitude_negative", .unit = units::kTorque, .usual = 0.012},
       {.name = "velocity",
        .unit = units::kVelocity,
-       .kind = Kind::shape,
+       .kind = Kind::nonlinear,
        .usual = 3.0,
        .low = 1e-6,
        .limit = Limit::velocity},

@@ -28,7 +28,7 @@ struct StribeckHessSoom : Stateless {
       {.name = "amplitude_negative", .unit = units::kTorque, .usual = 0.012},
       {.name = "velocity",
        .unit = units::kVelocity,
-       .kind = Kind::shape,
+       .kind = Kind::nonlinear,
        .usual = 3.0,
        .low = 1e-6,
        .limit = Limit::velocity},

@@ -23,7 +23,7 @@ struct StructuralDamping : Stateless {
   };
   static constexpr ParameterInfo kParameters[] = {
       {.name = "torque", .unit = units::kTorque, .usual = 57.0, .low = 0.0},
-      {.name = "exponent", .unit = units::kNone, .kind = Kind::shape, .usual = 0.5, .low = 0.1, .high = 1.0},
+      {.name = "exponent", .unit = units::kNone, .kind = Kind::nonlinear, .usual = 0.5, .low = 0.1, .high = 1.0},
   };
   template <class N>
   struct Coefficients {

@@ -28,7 +28,7 @@ struct TableEffect : Stateless {
       .separated_by =
           "slow motion over the whole range of the signal, in both directions, and once more at another load",
       .adds_to = on(Balance::transmission) | on(Balance::load),
-      .made_by_user = true,
+      .user_defined = true,
   };
   // Numbers of the variable and the balance; the direction zero or one; the signal at the first and at the last
   // point (not used for angles, whose points divide a turn); then the values, on the balance's own side.

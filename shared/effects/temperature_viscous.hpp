@@ -24,7 +24,7 @@ struct TemperatureViscous : Stateless {
   static constexpr ParameterInfo kParameters[] = {
       {.name = "coefficient",
        .unit = units::kPerKelvin,
-       .kind = Kind::shape,
+       .kind = Kind::nonlinear,
        .usual = 0.012,
        .low = -0.02,
        .high = 0.06},

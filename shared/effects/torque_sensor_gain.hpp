@@ -25,7 +25,7 @@ struct TorqueSensorGain : Stateless {
       .identified_on_motor = true,
   };
   static constexpr ParameterInfo kParameters[] = {
-      {.name = "ratio", .unit = units::kNone, .kind = Kind::shape, .usual = 0.03, .low = -0.3, .high = 0.3},
+      {.name = "ratio", .unit = units::kNone, .kind = Kind::nonlinear, .usual = 0.03, .low = -0.3, .high = 0.3},
   };
   template <class N>
   struct Coefficients {

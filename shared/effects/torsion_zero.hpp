@@ -23,7 +23,7 @@ struct TorsionZero : Stateless {
   static constexpr ParameterInfo kParameters[] = {
       {.name = "angle",
        .unit = units::kAngle,
-       .kind = Kind::shape,
+       .kind = Kind::nonlinear,
        .usual = 1e-4,
        .limit = Limit::torsion,
        .per_record = true},

@@ -59,7 +59,7 @@ template <class Effect, class Image>
 constexpr std::size_t places_in(std::size_t number) {
   if constexpr (std::is_void_v<Effect>) {
     return 0;
-  } else if constexpr (Effect::kInfo.host_only || (Effect::kInfo.made_by_user && !Image::kTables)) {
+  } else if constexpr (Effect::kInfo.host_only || (Effect::kInfo.user_defined && !Image::kTables)) {
     return 0;
   } else {
     return Image::places(number, places_of<Effect>());
@@ -216,7 +216,7 @@ class DriveModel {
       if (places.count == 0 && !Image::kFilled) return;
       present_ |= std::uint64_t{1} << id_of<Effect>();
       // The signal that a table reads is one of its coefficients.
-      reads_ |= Effect::kInfo.made_by_user ? ~0U : Effect::kInfo.reads;
+      reads_ |= Effect::kInfo.user_defined ? ~0U : Effect::kInfo.reads;
     });
   }
   // Sets which angles are known: effects that repeat with the motor's turn, or that depend on the output's angle, are
@@ -224,8 +224,8 @@ class DriveModel {
   constexpr void note_effects(bool knows_turn, bool knows_output) {
     note_effects();
     places_.for_each([&]<class Effect>(auto&) {
-      const bool needs_turn = Effect::kInfo.made_by_user || is_periodic<Effect>();
-      const bool needs_output = Effect::kInfo.made_by_user || (Effect::kInfo.reads & effects::kOutputAngle) != 0;
+      const bool needs_turn = Effect::kInfo.user_defined || is_periodic<Effect>();
+      const bool needs_output = Effect::kInfo.user_defined || (Effect::kInfo.reads & effects::kOutputAngle) != 0;
       if ((needs_turn && !knows_turn) || (needs_output && !knows_output))
         present_ &= ~(std::uint64_t{1} << id_of<Effect>());
     });

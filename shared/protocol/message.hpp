@@ -21,8 +21,9 @@
 namespace flexspline::protocol {
 
 inline constexpr std::uint8_t kMajor = 1;  // with another one only `identify` is understood
-inline constexpr std::uint8_t kMinor =
-    2;  // increases with each addition: 1 the residual map, 2 the board's hardware and the angles of the shafts
+// Increases with each addition: 1 the residual map, 2 the board's hardware and the angles of the shafts, 3 the key of
+// the firmware.
+inline constexpr std::uint8_t kMinor = 3;
 
 inline constexpr std::uint8_t kMinorOfHardware = 2;
 

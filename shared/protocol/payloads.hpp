@@ -30,6 +30,12 @@ struct Hello {
   }
   bool operator==(const Hello&) const = default;
 };
+// Whose images the drive's boot loader takes. Not stated: by firmware before protocol 1.3.
+enum class FirmwareKey : std::uint8_t { not_stated, none, development, own };
+inline constexpr std::size_t kFirmwareKeys = 4;
+// Of an identity without it.
+inline constexpr std::size_t kIdentityBytesBeforeKey = 50;
+
 struct Identity {
   std::uint8_t major = kMajor;
   std::uint8_t minor = kMinor;
@@ -43,10 +49,12 @@ struct Identity {
   std::uint8_t most_channels = 0;  // in one subscription
   std::uint8_t most_lines = 0;     // of an excitation
   std::uint8_t has_output_encoder = 0;
+  FirmwareKey firmware_key = FirmwareKey::not_stated;
   template <class Codec>
   constexpr void fields(Codec& c) {
     c(major), c(minor), c(firmware), c(board), c(serial), c(tick_hz), c(block_bytes), c(effects), c(channels),
         c(most_channels), c(most_lines), c(has_output_encoder);
+    c.within(firmware_key, kFirmwareKeys);
   }
   bool operator==(const Identity&) const = default;
 };

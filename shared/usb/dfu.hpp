@@ -60,12 +60,18 @@ inline constexpr std::size_t kDfuBlockBytes = 1024;
 inline constexpr std::uint16_t kDfuDetachMs = 1000;
 
 // 4.1.3. The device detaches by itself, and answers requests for its state after an image was installed.
-constexpr Bytes<kDfuDescriptorBytes> dfu_descriptor() {
+constexpr Bytes<kDfuDescriptorBytes> dfu_descriptor(bool can_upload) {
   constexpr std::uint16_t kVersion = 0x0110;
-  return {
-      kDfuDescriptorBytes,  kDfuDescriptorType, kDfuCanDownload | kDfuCanUpload | kDfuOutlivesManifest | kDfuWillDetach,
-      low(kDfuDetachMs),    high(kDfuDetachMs), low(kDfuBlockBytes),
-      high(kDfuBlockBytes), low(kVersion),      high(kVersion)};
+  constexpr std::uint8_t kAlways = kDfuCanDownload | kDfuOutlivesManifest | kDfuWillDetach;
+  return {kDfuDescriptorBytes,
+          kDfuDescriptorType,
+          static_cast<std::uint8_t>(can_upload ? kAlways | kDfuCanUpload : kAlways),
+          low(kDfuDetachMs),
+          high(kDfuDetachMs),
+          low(kDfuBlockBytes),
+          high(kDfuBlockBytes),
+          low(kVersion),
+          high(kVersion)};
 }
 // 6.1.2: status, time to wait before the next request, state, a string.
 constexpr Bytes<kDfuStatusBytes> dfu_status(DfuStatus status, std::uint32_t poll_ms, DfuState state) {
@@ -80,7 +86,7 @@ constexpr Bytes<kDfuStatusBytes> dfu_status(DfuStatus status, std::uint32_t poll
 namespace detail {
 
 // Common to both: an interface without endpoints.
-template <std::uint8_t kProtocol>
+template <std::uint8_t kProtocol, bool can_upload>
 struct DfuInterface {
   static constexpr std::size_t kInterfaces = 1, kInEndpoints = 0, kOutEndpoints = 0;
   static constexpr auto dfu_descriptors(const Place& place) {
@@ -89,10 +95,10 @@ struct DfuInterface {
                                         .subclass = kDfuSubclass,
                                         .protocol = kProtocol,
                                         .string = place.string}),
-                  dfu_descriptor());
+                  dfu_descriptor(can_upload));
   }
   static Reply descriptor_reply(const Setup& setup) {
-    static constexpr auto kDescriptor = dfu_descriptor();
+    static constexpr auto kDescriptor = dfu_descriptor(can_upload);
     return setup.value == kDfuDescriptorType << 8 ? reply_with(kDescriptor) : kRefused;
   }
   template <class Link>
@@ -111,7 +117,9 @@ struct DfuInterface {
 // In the application: announces the boot loader and passes on requests for it. The application decides whether to
 // accept, and starts the boot loader by itself (bitWillDetach): wants_loader() is true once the host has seen that its
 // DETACH was accepted.
-class DfuRuntime : public detail::DfuInterface<kDfuRuntimeProtocol> {
+//
+// The boot loader's own descriptor says whether it uploads.
+class DfuRuntime : public detail::DfuInterface<kDfuRuntimeProtocol, false> {
  public:
   // Not while the drive is armed.
   void allow(bool allowed) { allowed_ = allowed; }
@@ -163,6 +171,7 @@ class DfuRuntime : public detail::DfuInterface<kDfuRuntimeProtocol> {
 template <class M>
 concept DfuMemory = requires(M memory, std::span<const std::uint8_t> block, std::size_t at) {
   { M::kName } -> std::convertible_to<std::string_view>;   // name of the memory, for the user
+  { M::kCanUpload } -> std::convertible_to<bool>;          // whether a host may read the installed image
   { memory.write(at, block) } -> std::same_as<DfuStatus>;  // from the start on, one block after the other
   { memory.write_ms(at) } -> std::same_as<std::uint32_t>;  // its longest time
   { memory.has_all() } -> std::same_as<bool>;              // whether the image is complete
@@ -174,7 +183,9 @@ concept DfuMemory = requires(M memory, std::span<const std::uint8_t> block, std:
 
 // In the boot loader. poll() works on the memory, between two requests.
 template <DfuMemory Memory>
-class DfuMode : public detail::DfuInterface<kDfuModeProtocol> {
+class DfuMode : public detail::DfuInterface<kDfuModeProtocol, Memory::kCanUpload> {
+  using Interface = detail::DfuInterface<kDfuModeProtocol, Memory::kCanUpload>;
+
  public:
   // Before the first request; it has to outlive this.
   void use(Memory& memory) { memory_ = &memory; }
@@ -190,7 +201,7 @@ class DfuMode : public detail::DfuInterface<kDfuModeProtocol> {
 
   static constexpr std::size_t kControlBytes = kDfuBlockBytes;
   static constexpr std::array<std::string_view, 1> kStrings{Memory::kName};
-  static constexpr auto descriptors(Place place) { return dfu_descriptors(place); }
+  static constexpr auto descriptors(Place place) { return Interface::dfu_descriptors(place); }
   // The bus was reset or the device configured again: a running transfer is cancelled.
   void stop() {
     if (state_ == DfuState::idle || state_ == DfuState::error) return;
@@ -209,7 +220,7 @@ class DfuMode : public detail::DfuInterface<kDfuModeProtocol> {
     }
   }
   Reply control_in(const Setup& setup, std::span<std::uint8_t> room) {
-    if (setup.kind() == RequestKind::standard) return descriptor_reply(setup);
+    if (setup.kind() == RequestKind::standard) return Interface::descriptor_reply(setup);
     if (setup.kind() != RequestKind::of_class) return kRefused;
     was_used_ = true;
     switch (static_cast<DfuRequest>(setup.request)) {
@@ -224,7 +235,7 @@ class DfuMode : public detail::DfuInterface<kDfuModeProtocol> {
         room[0] = static_cast<std::uint8_t>(state_);
         return reply_with(room.first(1));
       case DfuRequest::upload:
-        return upload(setup);
+        return Memory::kCanUpload ? upload(setup) : refused();
       default:
         return refused();
     }

@@ -56,7 +56,7 @@ cd "$out/source"
 } | sort -u >../findings.txt
 cat ../findings.txt
 [[ ! -s ../findings.txt ]] || {
-  echo "mend what is right; what is wrong goes into tests/analysis/cppcheck-suppressions.txt with its reason"
+  echo "correct the code where a finding is right; a wrong finding goes into tests/analysis/cppcheck-suppressions.txt with its reason"
   exit 1
 }
 echo "$(wc -l <../files.txt) files, nothing found"

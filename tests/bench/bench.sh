@@ -1,5 +1,5 @@
 #!/usr/bin/env bash
-# bench.sh BUILD OUT: every bench of BUILD beside its peers, then one table of ratios with their goals, also in OUT/table.md.
+# bench.sh BUILD OUT: every bench of BUILD and its peers, then one table of ratios with their goals, also in OUT/table.md.
 # What is compared is in README.md. Exit code 1 where a peer gave another answer or could not be run; a goal that is missed
 # is said and is no failure, as times are no law.
 set -euo pipefail
@@ -36,11 +36,11 @@ else
   status=1
 fi
 
-# The twin runs the drive's own code beside its plant.
+# The twin runs the drive's own code with its plant.
 "$python" "$here/twin.py" "$build" >>"$FLEXSPLINE_BENCH_ROWS" || status=1
 
 awk -F ' [|] ' '
-  BEGIN { print "| what | beside | goal | measured | |"; print "| --- | --- | --- | ---: | --- |" }
+  BEGIN { print "| what | compared with | goal | measured | |"; print "| --- | --- | --- | ---: | --- |" }
   {
     verdict = ""
     split($3, goal, " ")

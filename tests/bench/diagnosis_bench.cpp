@@ -1,6 +1,5 @@
-// The search for a missing effect beside the same recipe in NumPy and SciPy, on one core each: times, and that both
-// rank the candidates alike.
-// Usage: flexspline_diagnosis_bench PYTHON SCRIPT; without arguments SciPy is left out.
+// The search for a missing effect, compared with the same recipe in NumPy and SciPy, on one core each: times, and that
+// both rank the candidates alike. Usage: flexspline_diagnosis_bench PYTHON SCRIPT; without arguments SciPy is left out.
 #include <fmt/format.h>
 
 #include <algorithm>
@@ -38,7 +37,7 @@ struct Question {
   std::string label() const { return order ? fmt::format("{}:{:g}", effect, *order) : effect; }
 };
 
-// All that is linear and static, and one with a shape that is chosen on a grid.
+// All that is linear and static, and one with a nonlinear parameter that is chosen on a grid.
 std::vector<Question> questions() {
   std::vector<Question> list;
   for (const char* name : {"quadratic_drag", "load_dependent_friction", "torque_constant_saturation"})
@@ -99,7 +98,7 @@ void write(const std::filesystem::path& folder, const BalanceData& data, const s
 
 struct Answer {
   std::vector<double> decrease_percent;  // of the left-out chi-square, of each question
-  double shape = 0.0;                    // chosen on the grid
+  double nonlinear = 0.0;                // chosen on the grid
 };
 
 Answer search(const estimation::PreparedData& prepared, const Terms& terms, const std::vector<double>& grid,
@@ -111,18 +110,18 @@ Answer search(const estimation::PreparedData& prepared, const Terms& terms, cons
   for (const Question& q : asked) {
     const catalogue::Entry& entry = catalogue::get(q.effect);
     Terms extended = selection::extend(terms, entry, q.order);
-    if (entry.count(effects::Kind::shape) > 0) {
-      double& shape = extended.back().values[entry.index_of("velocity")];
+    if (entry.count(effects::Kind::nonlinear) > 0) {
+      double& nonlinear = extended.back().values[entry.index_of("velocity")];
       double least = std::numeric_limits<double>::infinity();
       for (const double value : grid) {
-        shape = value;
+        nonlinear = value;
         const double squares = selection::whitened_squares(data, extended, base);
         if (squares < least) {
           least = squares;
-          answer.shape = value;
+          answer.nonlinear = value;
         }
       }
-      shape = answer.shape;
+      nonlinear = answer.nonlinear;
     }
     const selection::CrossValidatedFit judged = selection::cross_validate(data, std::move(extended), keep);
     answer.decrease_percent.push_back(selection::likelihood_gain(base, judged, 1.0).chi2_percent);
@@ -167,7 +166,7 @@ int compare(const std::string& python, const std::string& script) {
   write(folder, motor, grid);
   {
     std::ofstream answer(folder / "answer.txt");
-    answer << fmt::format("{:.6f} {:.17g}\n", ours_ms, ours.shape);
+    answer << fmt::format("{:.6f} {:.17g}\n", ours_ms, ours.nonlinear);
     for (const double fall : ours.decrease_percent) answer << fmt::format("{:.17g}\n", fall);
   }
   std::fflush(stdout);

@@ -1,6 +1,6 @@
-// Reading a CSV file and identifying a model from it, beside NumPy with SciPy and GNU Octave: the same file, the same
-// recipe, one core each, and the answers compared. Processor time, not the clock's: other work on the machine does not
-// count. Usage: flexspline_identify_bench PYTHON OCTAVE FOLDER     FOLDER has identify.py and identify.m
+// Reading a CSV file and identifying a model from it, compared with NumPy with SciPy and GNU Octave: the same file, the
+// same recipe, one core each, and the answers compared. Processor time, not the clock's: other work on the machine does
+// not count. Usage: flexspline_identify_bench PYTHON OCTAVE FOLDER     FOLDER has identify.py and identify.m
 //        flexspline_identify_bench read|identify FILE       once; prints its peak of memory in bytes
 #include <sys/resource.h>
 

@@ -1,6 +1,6 @@
-// Round trips over HID: a request to the twin and its answer, beside a device that sends each report back, both behind
-// the same USB/IP server and asked by the same host; and beside 64 bytes there and back over a bare socket, which is
-// what the operating system takes of it. Wall time, as most of it is waiting for the other process. Usage:
+// Round trips over HID: a request to the twin and its answer, compared with a device that sends each report back, both
+// behind the same USB/IP server and asked by the same host; and with 64 bytes there and back over a bare socket, which
+// is what the operating system takes of it. Wall time, as most of it is waiting for the other process. Usage:
 // flexspline_round_trips_bench TWIN ECHO
 #include <arpa/inet.h>
 #include <fmt/format.h>

@@ -1,4 +1,4 @@
-// Models of what an STM32F405 has beside its core, from RM0090: registers, what they do, and what they demand.
+// Models of the peripherals of an STM32F405, from RM0090: registers, what they do, and what they require.
 #pragma once
 
 #include <algorithm>

@@ -1,5 +1,6 @@
 // An image on an emulated Cortex-M4 (Unicorn) whose peripherals are models written from the reference manual, apart
-// from the drivers. A model checks what the manual demands of software; what breaks it is a violation, told in words.
+// from the drivers. A model checks what the manual demands of software; what breaks it is a violation, described in
+// words.
 #pragma once
 
 #include <unicorn/unicorn.h>

@@ -86,7 +86,7 @@ TEST(BoardStart, AnUnexpectedExceptionSwitchesTheAmplifierOffAndResetsEvenWithAB
   chip.machine.set_reg(UC_ARM_REG_SP, 0x1FFFFFF0);
   EXPECT_EQ(chip.machine.interrupt(kHardFault), Stop::reset) << chip.machine.where();
   EXPECT_TRUE(amplifier_is_off(chip));
-  EXPECT_EQ(chip.machine.word(kHandover), 0x43525348U) << "the next start is told";
+  EXPECT_EQ(chip.machine.word(kHandover), 0x43525348U) << "the next start knows it";
 }
 
 TEST(BoardStart, TheWatchdogRunsBeforeStoreLinesAndTick) {
@@ -120,6 +120,7 @@ TEST(BoardStart, AnotherBoardRunsTheSameSourcesWithItsOwnClockTimersAndLine) {
   const protocol::Identity id = identify(chip, chip.usart2);
   EXPECT_STREQ(reinterpret_cast<const char*>(id.board.data()), "nucleo_f446re");
   EXPECT_EQ(id.block_bytes, 0x20000U - 256);
+  EXPECT_EQ(id.firmware_key, protocol::FirmwareKey::none) << "no boot loader";
   expect_no_violation(chip);
 }
 

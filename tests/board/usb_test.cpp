@@ -81,6 +81,7 @@ TEST_F(BoardUsb, IdentifiesItselfOverReports) {
   ASSERT_EQ(protocol::take_payload(m.content(), id), protocol::Code::done);
   EXPECT_STREQ(reinterpret_cast<const char*>(id.board.data()), "stm32f405-dac");
   EXPECT_STREQ(reinterpret_cast<const char*>(id.serial.data()), "14152728ABCD");
+  EXPECT_EQ(id.firmware_key, protocol::FirmwareKey::development);
   EXPECT_EQ(id.tick_hz, 20'000U);
   EXPECT_GT(id.effects, 40);
 }

@@ -206,6 +206,84 @@ TEST(FirmwareUpdate, ADownloadThatIsCutTwiceCostsNothing) {
   EXPECT_GT(pairs, 1000U);
 }
 
+// The counter of the new image is larger. Wherever the power goes, also with weak bits: no image is started with a
+// smaller counter than the drive has shown, the counter is one of an image that was confirmed, and an update that goes
+// on ends with the new one.
+TEST(FirmwareUpdate, EveryPowerCutLeavesASecurityCounterThatNeverFalls) {
+  constexpr std::uint16_t kBefore = 0x0102, kAfter = 0x1234;
+  const auto image = [](std::uint8_t name, std::uint16_t counter) {
+    return testing::image_named(name, 42, testing::kTestBoard, counter);
+  };
+  // Starts until nothing is on trial, and once more, which raises the counter.
+  const auto finish = [](SlotFlash& flash) {
+    for (int i = 0; i < 3; ++i) {
+      TestSlots slots(flash, testing::kTestBoard);
+      const Start start = slots.resume();
+      ASSERT_NE(start, Start::none);
+      if (start == Start::trial) {
+        ASSERT_TRUE(TestSlots(flash, testing::kTestBoard).confirm());
+      }
+    }
+  };
+  const auto run = [&](SlotFlash& flash, std::uint8_t name, std::uint16_t counter) {
+    TestSlots slots(flash, testing::kTestBoard);
+    ASSERT_TRUE(testing::download(slots, image(name, counter)));
+    finish(flash);
+  };
+  SlotCells prepared;
+  {
+    SlotFlash flash(prepared);
+    run(flash, kOld, kBefore);
+  }
+  std::size_t operations = 0;
+  {
+    SlotCells cells = prepared;
+    SlotFlash flash(cells);
+    run(flash, kNew, kAfter);
+    operations = flash.operations();
+    EXPECT_EQ(TestSlots(flash, testing::kTestBoard).security_counter(), kAfter);
+  }
+  std::size_t cuts = 0, raised = 0;
+  for (const bool weakens : {false, true})
+    for (std::size_t at = 0; at < operations; ++at)
+      for (const CutAt where : kWheres)
+        for (std::uint64_t seed = 1; seed <= (where == CutAt::inside ? 8U : 1U); ++seed) {
+          SlotCells cells = prepared;
+          cells.weakens = weakens;
+          try {
+            SlotFlash flash(cells, seed);
+            flash.cut(at, where);
+            run(flash, kNew, kAfter);
+            FAIL() << "not cut at " << at;
+          } catch (const PowerCut&) {
+            ++cuts;
+          }
+          std::uint16_t shown = 0;
+          for (std::uint64_t start = 0; start < 4; ++start) {
+            SlotFlash flash(cells, 100 * seed + start);
+            TestSlots slots(flash, testing::kTestBoard);
+            const Start how = slots.resume();
+            ASSERT_NE(how, Start::none) << at;
+            const std::uint16_t counter = slots.security_counter();
+            ASSERT_TRUE(counter == kBefore || counter == kAfter) << at << ": " << counter;
+            ASSERT_GE(counter, shown) << at;
+            shown = counter;
+            boot::ImageHeader header;
+            ASSERT_EQ(boot::read_image(slots.image(Slot::application), header), boot::ImageFinding::none);
+            ASSERT_GE(header.security_counter, counter) << at;
+          }
+          raised += shown == kAfter ? 1 : 0;
+          SlotFlash flash(cells, seed);
+          ASSERT_NO_FATAL_FAILURE(run(flash, kNext, kAfter)) << at;
+          ASSERT_EQ(TestSlots(flash, testing::kTestBoard).security_counter(), kAfter);
+          TestSlots slots(flash, testing::kTestBoard);
+          ASSERT_FALSE(testing::download(slots, image(kOld, kBefore))) << at;
+        }
+  std::printf("power cuts of an update with a larger counter: %zu, raised before or after %zu\n", cuts, raised);
+  EXPECT_GT(cuts, 5000U);
+  EXPECT_GT(raised, 0U);
+}
+
 // Nothing was ever there: until the new image is whole there is nothing to start, and the boot loader waits.
 TEST(FirmwareUpdate, AFirstInstallationThatIsCutEndsInTheNewImageOrWaitsForIt) {
   std::size_t cuts = 0;

@@ -24,7 +24,7 @@ struct Recovered {
   double truth = 0.0;
   double value = 0.0;
   std::optional<double> std;
-  bool shape = false;
+  bool nonlinear = false;
   double error_percent() const {
     return truth != 0.0 ? 100.0 * std::abs(value / truth - 1.0) : std::numeric_limits<double>::infinity();
   }
@@ -67,8 +67,8 @@ Outcome recover(const std::string& label, std::uint64_t seed) {
   std::vector<const data::Experiment*> fit, holdout;
   for (const auto& e : dataset.experiments) (e.role == data::Role::holdout ? holdout : fit).push_back(&e);
   const estimation::PreparedData prepared = estimation::prepare(fit, truth.drive, {});
-  const estimation::PreparedData judged = estimation::prepare_with(holdout, truth.drive, prepared.pipeline);
-  estimation::BalanceData on_holdout(judged, balance);
+  const estimation::PreparedData held_out = estimation::prepare_with(holdout, truth.drive, prepared.pipeline);
+  estimation::BalanceData on_holdout(held_out, balance);
   const double floor = root_mean_square(estimation::residual_of(on_holdout, estimation::terms_of(truth)));
 
   const selection::Addition added = selection::add(dataset, base, label, {});
@@ -85,7 +85,7 @@ Outcome recover(const std::string& label, std::uint64_t seed) {
     if (!p || !p->value) continue;
     const auto& infos = catalogue::get(type).parameters;
     const auto& info = infos[catalogue::get(type).index_of(e.parameter)];
-    outcome.parameters.push_back({e.parameter, *p->value, e.value, e.std, info.kind == effects::Kind::shape});
+    outcome.parameters.push_back({e.parameter, *p->value, e.value, e.std, info.kind == effects::Kind::nonlinear});
   }
   // An effect that took the place of another leaves a gap; the base model is then what comes back.
   if (catalogue::get(type).info->replaces.empty() && catalogue::get(type).info->contains.empty())
@@ -209,7 +209,7 @@ TEST(Catalogue, IsRecoveredEffectByEffectFromThePlant) {
     for (const Recovered& r : o.parameters) {
       if (any_shape_of_loop) break;
       const auto known = kHardToSee.find(type + "." + r.name);
-      const double most = known != kHardToSee.end() ? known->second : r.shape ? 5.0 : 2.0;
+      const double most = known != kHardToSee.end() ? known->second : r.nonlinear ? 5.0 : 2.0;
       // A parameter that these motions hardly excite is known no better than its interval says.
       EXPECT_TRUE(r.error_percent() <= most || r.inside())
           << r.name << " is " << r.value << " instead of " << r.truth << ", standard error " << r.std.value_or(0.0);

@@ -69,7 +69,7 @@ Shown shown(const std::string& label, std::uint64_t seed, int seeds) {
       plant::hide(hidden.drive, label, scale_to(hidden.drive, label, least, times));
       const selection::Diagnosis d = diagnosed(hidden, seed + 1 + static_cast<std::uint64_t>(s));
       bool named = false;
-      // Near the limit the data may not tell it from what it is known to be confused with.
+      // Near the limit the data may not distinguish it from what it is known to be confused with.
       for (const selection::NamedEffect& n : d.named)
         named =
             named || n.effect == type || catalogue::names_contain(catalogue::get(type).info->confused_with, n.effect);
@@ -80,7 +80,7 @@ Shown shown(const std::string& label, std::uint64_t seed, int seeds) {
   return result;
 }
 
-// Effects of temperature are not judged: between records they look like friction that differs from run to run, which
+// Effects of temperature are not tested: between records they look like friction that differs from run to run, which
 // takes them up, and the size that is said for them does not count with that (host/selection/METHOD.md).
 TEST(Detectable, EffectsHalfAsLargeAgainAreNamedAndAThirdOfThemAreNot) {
   const std::vector<std::string> labels =

@@ -217,7 +217,7 @@ std::vector<Disturbance> disturbances_of(Bench& bench) {
   return find_disturbances(bench.data, bench.base.residual, bench.keep);
 }
 
-// Between reversals (at 2.92 s and 3.47 s): beside one it could be friction.
+// Between reversals (at 2.92 s and 3.47 s): near one it could be friction.
 TEST(Disturbances, APushIsFoundAtItsTimeAndLeftOut) {
   constexpr double kFrom = 3.16, kLength = 0.06, kPeak = 0.05;
   Bench bench({.extra = [&](double t, double, double) {

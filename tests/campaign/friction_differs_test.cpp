@@ -1,7 +1,7 @@
-// Effects beside friction that differs by 3 % from record to record: how well their parameters are told, and what is
-// named where friction that differs could pass for them. By least squares with weights by record alone the same drives
-// had Stribeck friction off by 37 to 51 % (its velocity by up to 186 %), the asymmetry by 6 and 11 %, the ripple by up
-// to 6 %.
+// Effects with friction that differs by 3 % from record to record: how well their parameters are determined, and what
+// is named where friction that differs could pass for them. By least squares with weights by record alone the same
+// drives had Stribeck friction off by 37 to 51 % (its velocity by up to 186 %), the asymmetry by 6 and 11 %, the ripple
+// by up to 6 %.
 #include <gtest/gtest.h>
 
 #include <algorithm>

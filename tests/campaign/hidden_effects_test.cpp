@@ -26,7 +26,7 @@ struct Case {
   std::string hidden;  // empty: nothing is
   double scale = 1.0;
   std::uint64_t seed = 0;
-  std::string with;                 // effects that the drive has besides, and the model knows
+  std::string with;                 // further effects that the drive has and the model knows
   double friction_variation = 0.0;  // relative, from record to record
   double noise_correlation = 0.0;   // AR(1) coefficient
 };
@@ -77,8 +77,8 @@ Outcome run(const Case& c) {
   std::vector<const data::Experiment*> fit, holdout;
   for (const auto& e : dataset.experiments) (e.role == data::Role::holdout ? holdout : fit).push_back(&e);
   const estimation::PreparedData prepared = estimation::prepare(fit, true_model.drive, {});
-  const estimation::PreparedData judged = estimation::prepare_with(holdout, true_model.drive, prepared.pipeline);
-  estimation::BalanceData data(judged, catalogue::get(truth.substr(0, truth.find(':'))).info->balance);
+  const estimation::PreparedData held_out = estimation::prepare_with(holdout, true_model.drive, prepared.pipeline);
+  estimation::BalanceData data(held_out, catalogue::get(truth.substr(0, truth.find(':'))).info->balance);
   const Eigen::VectorXd r = estimation::residual_of(data, estimation::terms_of(true_model));
   const double floor = std::sqrt(r.squaredNorm() / static_cast<double>(r.size()));
   outcome.holdout_over_floor = *added.after.rmse_holdout / floor;
@@ -119,7 +119,7 @@ void print(const std::vector<Outcome>& outcomes) {
   }
 }
 
-// Seeds below 1000 were looked at while the diagnosis was written; these judge it.
+// Seeds below 1000 were used while the diagnosis was written; these test it.
 constexpr std::uint64_t kFirstSeed = 7001;
 
 std::vector<Case> cases_at(const std::vector<std::string>& effects, double scale, std::uint64_t seeds,

@@ -88,7 +88,7 @@ double rms_error(const Loop& loop, const std::vector<double>& torque) {
 }
 
 // The report's equation 72 for the modified Dahl law with a cubic spring, K0 left out: the backward difference of the
-// law, whose state is what the measured torque leaves beside the spring.
+// law, whose state is the measured torque less that of the spring.
 struct Report72 {
   const std::vector<Loop>& loops;
 

@@ -83,9 +83,9 @@ TEST(Intervals, HoldTheMeanFrictionWhereItDiffersFromRecordToRecord) {
 const std::vector<std::string> kLoad = {"output_inertia.inertia", "output_viscous_friction.coefficient",
                                         "output_coulomb_friction.torque"};
 
-// Twenty short sets tell a coverage to 7 % only; what matters is the width: that of noise beside what identify adds to
-// each estimate for what filters leave (0.05 % of it). The load's come from a torque sensor that is read just before
-// the held current steps (host/estimation/zero_order_hold.hpp).
+// Twenty short sets determine a coverage to 7 % only; what matters is the width: that of noise compared with what
+// identify adds to each estimate for what filters leave (0.05 % of it). The load's come from a torque sensor that is
+// read just before the held current steps (host/estimation/zero_order_hold.hpp).
 TEST(Intervals, AreHardlyWiderWhereFrictionIsTheSameInAllRecords) {
   constexpr double kBeyondNoise = 2.0 * 1.96 * 5e-4, kOfNoise = 0.0015;
   const auto coverage = over_seeds(0.0, "", 20);

@@ -1,4 +1,4 @@
-// What the drive makes of its sensors, beside the truth of the plant it moves and beside what one would have without an
+// Estimates of the drive from its sensors, compared with the true state of the plant and with estimates without an
 // observer: in closed loop, with the sensors' noise and counts, in the drive's own numbers.
 #include <gtest/gtest.h>
 
@@ -43,7 +43,7 @@ struct Bench {
   double seconds = 4.0;
   bool output_encoder = true;
   std::vector<std::string> with{};
-  double load_amplitude_nm = 0.0, load_hz = 1.0;  // that nobody told the drive of
+  double load_amplitude_nm = 0.0, load_hz = 1.0;  // unknown to the drive
 };
 
 double value(std::uint32_t word, double base) {
@@ -177,7 +177,7 @@ TEST(ObserversAndTruth, TorqueWithoutTheSensorsRipple) {
       order = effect.value("order");
     }
   ASSERT_GT(std::hypot(cosine, sine), 0.0);
-  // The filter passes the noise of the sensor; what is to be judged is the ripple, so both are taken at its frequency.
+  // The filter passes the noise of the sensor; the ripple alone is tested, so both are taken at its frequency.
   const auto share = [&](const std::function<double(std::size_t)>& error) {
     double c = 0.0, s = 0.0;
     for (std::size_t k = half; k < with.truth.size(); ++k) {

@@ -52,17 +52,17 @@ TEST(OtherBalances, GiveTheWaveOfTheGearItsPhase) {
     if (e.hidden) truth = &e;
   ASSERT_TRUE(truth);
   const double height = std::hypot(truth->value("cosine"), truth->value("sine"));
-  int judged = 0;
+  int tested = 0;
   for (const estimation::Estimate& e : added.estimates) {
     if (e.effect != "kinematic_error" || e.fixed) continue;
-    ++judged;
+    ++tested;
     ASSERT_TRUE(e.std);
     fmt::print("{} {:.4g}, truth {:.4g}, standard error {:.2g}\n", e.parameter, e.value, truth->value(e.parameter),
                *e.std);
     EXPECT_NEAR(e.value, truth->value(e.parameter), 0.05 * height);
     EXPECT_LT(std::abs(e.value - truth->value(e.parameter)), 4.0 * *e.std);
   }
-  EXPECT_EQ(judged, 2);
+  EXPECT_EQ(tested, 2);
 }
 
 }  // namespace

@@ -22,7 +22,7 @@ TEST(PackedModels, ThreeHundredAreWithinAMillionthOfRatedTorqueAndOthersRefusedW
   std::mt19937 random(7101);
   PackOptions options;
   options.samples = 4000;
-  options.measured = true;  // other samples judge here; the proof has a test of its own
+  options.measured = true;  // other samples are used here; the proof has a test of its own
   int admitted = 0, refused = 0, above_bound = 0;
   double worst = 0.0;
   while (admitted < 300 && admitted + refused + above_bound < 3000) {

@@ -1,6 +1,6 @@
-// The pairs of effects that are known to be confused: data in which the diagnosis cannot tell them, the motion that is
-// planned to tell them, and what the diagnosis says with that motion recorded on the plant, which is written apart from
-// the model that planned it.
+// The pairs of effects that are known to be confused: data in which the diagnosis cannot distinguish, the motion that
+// is planned to distinguish them, and what the diagnosis says with that motion recorded on the plant, which is written
+// apart from the model that planned it.
 #include <gtest/gtest.h>
 
 #include <fmt/format.h>
@@ -32,7 +32,7 @@ struct Pair {
   bool separable = true;
 };
 
-struct Told {
+struct PlannedCase {
   std::string truth;
   std::string before, after;                       // what is named, "-" for nothing
   double margin_before = 0.0, margin_after = 0.0;  // expected
@@ -66,18 +66,18 @@ std::vector<plant::ExperimentPlan> as_recorded(const planning::Plan& plan, plant
   return runs;
 }
 
-Told tell(const Pair& pair, bool first_is_true, std::uint64_t seed) {
-  Told told;
-  told.truth = first_is_true ? pair.first : pair.second;
+PlannedCase plan_and_record(const Pair& pair, bool first_is_true, std::uint64_t seed) {
+  PlannedCase result;
+  result.truth = first_is_true ? pair.first : pair.second;
   plant::PlantFile demo = plant::demo_plant();
   for (const std::string& effect : {pair.first, pair.second}) plant::without(demo.drive, effect);
-  plant::hide(demo.drive, told.truth, first_is_true ? pair.size_of_first : pair.size_of_second);
+  plant::hide(demo.drive, result.truth, first_is_true ? pair.size_of_first : pair.size_of_second);
   data::Dataset dataset = testing::dataset_of(demo.drive, plant::record_all(demo.drive, pair.recorded, seed));
   const model::Model base = testing::model_of(demo.drive, false, false);
   const std::string& other = first_is_true ? pair.second : pair.first;
   const selection::Diagnosis before = selection::diagnose(dataset, base, {});
-  told.before = named(before);
-  told.won_before = won(before, told.truth, other);
+  result.before = named(before);
+  result.won_before = won(before, result.truth, other);
 
   planning::PlanRequest question;
   question.model = &base;
@@ -88,25 +88,25 @@ Told tell(const Pair& pair, bool first_is_true, std::uint64_t seed) {
   question.setting.limits.load_torque_nm = 5.0;
   question.sensors = planning::sensors_of(&dataset);
   const planning::Design design = planning::separate(question, pair.first, pair.second);
-  told.margin_before = design.before->worst();
-  told.margin_after = design.after->worst();
+  result.margin_before = design.before->worst();
+  result.margin_after = design.after->worst();
   for (const planning::Run& run : design.plan.runs) {
-    told.motions += (told.motions.empty() ? "" : ", ") + run.name;
-    told.plan_s += run.duration_s;
+    result.motions += (result.motions.empty() ? "" : ", ") + run.name;
+    result.plan_s += run.duration_s;
   }
   const auto runs = as_recorded(design.plan, demo.drive, seed);
   if (runs.empty()) {
-    told.after = told.before;
-    told.won_after = told.won_before;
-    return told;
+    result.after = result.before;
+    result.won_after = result.won_before;
+    return result;
   }
   for (const data::Experiment& e :
        testing::dataset_of(demo.drive, plant::record_all(demo.drive, runs, seed + 50)).experiments)
     dataset.experiments.push_back(e);
   const selection::Diagnosis after = selection::diagnose(dataset, base, {});
-  told.after = named(after);
-  told.won_after = won(after, told.truth, other);
-  return told;
+  result.after = named(after);
+  result.won_after = won(after, result.truth, other);
+  return result;
 }
 
 plant::ExperimentPlan motion(const std::string& name, plant::Mode mode, plant::Waveform waveform, double amplitude,
@@ -185,18 +185,18 @@ TEST(Planning, TheMotionPlannedForTwoEffectsTellsThemApart) {
     for (const bool first : {true, false})
       for (int s = 0; s < seeds; ++s)
         cases.push_back({&pair, first, first_seed() + 100 * static_cast<std::uint64_t>(s)});
-  std::vector<Told> all(cases.size());
+  std::vector<PlannedCase> all(cases.size());
   std::atomic<std::size_t> next{0};
   const auto work = [&] {
     for (std::size_t i = next++; i < cases.size(); i = next++)
-      all[i] = tell(*cases[i].pair, cases[i].first, cases[i].seed);
+      all[i] = plan_and_record(*cases[i].pair, cases[i].first, cases[i].seed);
   };
   std::thread other(work);
   work();
   other.join();
   int right = 0, possible = 0;
   for (std::size_t i = 0; i < cases.size(); ++i) {
-    const Told& t = all[i];
+    const PlannedCase& t = all[i];
     fmt::print(
         "{:26} / {:26} truth {:26} named {} (wins by {:.1f}, expected {:.3g}) -> {} (wins by {:.1f}, expected {:.3g}) "
         "with {:.0f} s: {}\n",

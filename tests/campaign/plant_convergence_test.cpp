@@ -1,5 +1,5 @@
 // The plant is the truth of every campaign, so its own error must not be seen: halving the step may change no signal by
-// more than a tenth of what its sensor can tell.
+// more than a tenth of what its sensor can resolve.
 
 #include <gtest/gtest.h>
 
@@ -64,7 +64,7 @@ std::vector<std::string> hidden_effects() {
 
 class PlantConvergence : public ::testing::TestWithParam<std::string> {};
 
-/// By how much two ways to step through the same experiments differ at the worst, in what sensors can tell.
+/// By how much two ways to step through the same experiments differ at the worst, in what sensors can resolve.
 struct Worst {
   double velocity = 0.0, torque = 0.0;  // of the noise
   double motor = 0.0, output = 0.0;     // counts
@@ -99,7 +99,7 @@ Drive drive_of(const PlantFile& file, const std::string& hidden) {
   return drive;
 }
 
-TEST_P(PlantConvergence, HalvingTheStepChangesLessThanSensorsCanTell) {
+TEST_P(PlantConvergence, HalvingTheStepChangesLessThanSensorsCanResolve) {
   const PlantFile file = demo_plant();
   const Drive drive = drive_of(file, GetParam());
   Drive halved = drive;
@@ -113,7 +113,7 @@ TEST_P(PlantConvergence, HalvingTheStepChangesLessThanSensorsCanTell) {
 }
 
 // A drive in closed loop whose tick is an eighth of a millisecond takes one step for each (hil/board/plant_rig.cpp).
-TEST_P(PlantConvergence, AStepOfAnEighthOfAMillisecondDiffersByLessThanSensorsCanTell) {
+TEST_P(PlantConvergence, AStepOfAnEighthOfAMillisecondDiffersByLessThanSensorsCanResolve) {
   const PlantFile file = demo_plant();
   Drive coarse = drive_of(file, GetParam());
   Drive fine = coarse;

@@ -51,8 +51,8 @@ double floor_of(const plant::PlantFile& demo, std::uint64_t seed) {
   std::vector<const data::Experiment*> fit, holdout;
   for (const auto& e : dataset.experiments) (e.role == data::Role::holdout ? holdout : fit).push_back(&e);
   const estimation::PreparedData prepared = estimation::prepare(fit, truth.drive, {});
-  const estimation::PreparedData judged = estimation::prepare_with(holdout, truth.drive, prepared.pipeline);
-  estimation::BalanceData data(judged, estimation::Balance::motor);
+  const estimation::PreparedData held_out = estimation::prepare_with(holdout, truth.drive, prepared.pipeline);
+  estimation::BalanceData data(held_out, estimation::Balance::motor);
   const Eigen::VectorXd r = estimation::residual_of(data, estimation::terms_of(truth));
   return std::sqrt(r.squaredNorm() / static_cast<double>(r.size()));
 }
@@ -120,16 +120,16 @@ std::vector<Truth> truths(double scale) {
   };
 }
 
-// Seeds from 7001 on are for judging; limits were set on seeds below 1100.
+// Seeds from 7001 on test; limits were set on seeds below 1100.
 TEST(UnknownEffects, AreFlaggedOrGivenTheNameOfTheirClassAndTheirCurveTakesTheErrorToTheFloor) {
   std::vector<Case> cases;
   for (const std::uint64_t seed : {7001, 7002})
     for (const Truth& t : truths(1.0)) cases.push_back({t, seed});
   const std::vector<Outcome> outcomes = run_all(cases);
-  int told = 0, flagged = 0, right_signal = 0;
+  int found = 0, flagged = 0, right_signal = 0;
   std::vector<double> after;
   for (const Outcome& o : outcomes) {
-    told += o.flagged || o.of_its_class ? 1 : 0;
+    found += o.flagged || o.of_its_class ? 1 : 0;
     if (!o.flagged) continue;
     ++flagged;
     right_signal += o.right_signal ? 1 : 0;
@@ -137,8 +137,8 @@ TEST(UnknownEffects, AreFlaggedOrGivenTheNameOfTheirClassAndTheirCurveTakesTheEr
     EXPECT_LT(o.after, 0.2 * o.before) << o.what.truth.hidden;
   }
   const auto all = static_cast<int>(outcomes.size());
-  fmt::print("told {} of {}; flagged {}, with the right signal {}\n", told, all, flagged, right_signal);
-  EXPECT_GE(told, static_cast<int>(std::ceil(0.9 * all)));
+  fmt::print("found {} of {}; flagged {}, with the right signal {}\n", found, all, flagged, right_signal);
+  EXPECT_GE(found, static_cast<int>(std::ceil(0.9 * all)));
   ASSERT_GE(flagged, 6) << "three of the truths have no relative in the catalogue";
   EXPECT_GE(right_signal, static_cast<int>(std::ceil(0.9 * flagged)));
   std::sort(after.begin(), after.end());

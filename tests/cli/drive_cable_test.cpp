@@ -137,7 +137,7 @@ TEST_F(PulledPlug, InDrivesBackupMonitorAndRecordIsAClearErrorAndTheNextTryWorks
   EXPECT_EQ(tool("monitor --seconds 0.2").code, 0);
 
   // It reads the block twice, so that this many messages are beyond the arming; then one comes each 20 ms, and the
-  // motion is long. The drive stands in a fault afterwards: its host went while it was armed.
+  // motion is long. The drive is in a fault afterwards: its host disconnected while it was armed.
   std::string longer = shell_.file("plan.toml");
   longer.replace(longer.find("duration_s = 1"), 14, "duration_s = 60");
   shell_.write("long.toml", longer);

@@ -51,6 +51,7 @@ TEST(Drives, SaysWhatStandsBehindASocketAndWhatCannotBeReached) {
   EXPECT_EQ(first["tick_hz"], 20'000);
   EXPECT_GT(first["effects"].get<int>(), 40);
   EXPECT_TRUE(first["usable"].get<bool>());
+  EXPECT_EQ(first["firmware_key"], "development");
   EXPECT_FALSE(answer["drives"][1]["usable"].get<bool>());
   EXPECT_TRUE(contains(answer["drives"][1]["problem"].get<std::string>(), "is the twin running?"));
 }

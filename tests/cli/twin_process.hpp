@@ -1,4 +1,4 @@
-// A twin that runs beside a test, as a drive on the table would.
+// A twin in its own process, as a drive that a test uses.
 #pragma once
 
 #include <signal.h>

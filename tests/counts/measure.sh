@@ -71,17 +71,21 @@ stack() { # CALL_GRAPH FUNCTION
     END { print start == "" ? "-" : deepest(start) }' "$1"
 }
 
+# No helper of floating point may be in the image.
+integers_only() { # ELF
+  if arm-none-eabi-nm "$1" |
+    grep -E '__aeabi_(f|d|cf|cd)(add|sub|mul|div|cmp|rsub|2)|__aeabi_(i|ui|l|ul)2[fd]|__(add|sub|mul|div)[sd]f3' >&2; then
+    echo "$1 holds floating point" >&2
+    exit 1
+  fi
+}
+
 for machine in m4 m3 m0; do
   elf=$folder/counts-$machine.elf
   build count-$machine "$here/instructions.cpp" "$elf" -I"$folder" -fstack-usage -fcallgraph-info=su,da \
     -Wl,-Map="$folder/counts-$machine.map"
   arm-none-eabi-objcopy -O binary "$elf" "$folder/counts-$machine.bin"
-  # Integers only: no helper of floating point may be in the image.
-  if arm-none-eabi-nm "$elf" |
-    grep -E '__aeabi_(f|d|cf|cd)(add|sub|mul|div|cmp|rsub|2)|__aeabi_(i|ui|l|ul)2[fd]|__(add|sub|mul|div)[sd]f3' >&2; then
-    echo "$elf holds floating point" >&2
-    exit 1
-  fi
+  integers_only "$elf"
   "$here/build.sh" run count-$machine "$elf" | sed "s/^/$machine /" >>"$table"
   graph=$(ls "$folder"/counts-$machine*instructions.ci)
   for part in six_effects whole; do
@@ -91,9 +95,15 @@ for machine in m4 m3 m0; do
     echo "$machine ${part}_stack $bytes $bytes" >>"$table"
   done
 done
-# In the same run, on the same machine, beside what one would write in floating point.
+# In the same run, on the same machine, compared with the same in floating point.
 build count-m4 "$here/instructions.cpp" "$folder/peers.elf" -I"$folder" -DFLEXSPLINE_PEERS -lm
 "$here/build.sh" run count-m4 "$folder/peers.elf" | grep '^six' | sed 's/^/m4-fpu /' >>"$table"
+# The current loop of a three-phase motor, likewise.
+build count-m4 "$here/current_loop.cpp" "$folder/current_loop.elf"
+integers_only "$folder/current_loop.elf"
+"$here/build.sh" run count-m4 "$folder/current_loop.elf" | sed 's/^/m4 /' >>"$table"
+build count-m4 "$here/current_loop.cpp" "$folder/current_loop_peer.elf" -DFLEXSPLINE_PEERS -lm
+"$here/build.sh" run count-m4 "$folder/current_loop_peer.elf" | sed 's/^/m4-fpu /' >>"$table"
 # Cycles, estimated from published timings, of all of these on three processors.
 for machine in m4 m3 m0; do
   elf=$folder/cycles-$machine.elf

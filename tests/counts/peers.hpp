@@ -1,4 +1,4 @@
-// The six effects as one would write them by hand in floating point: what the drive's integers are measured beside.
+// The six effects as one would write them by hand in floating point: the drive's integers are compared with them.
 // `Library` takes functions of the C library in the type at hand; `Careful` is single precision with polynomials, no
 // division and no branch beyond what the equations need.
 #pragma once
@@ -38,8 +38,7 @@ struct Careful {
     const auto bits = __builtin_bit_cast(std::uint32_t, x);
     const std::int32_t up = (bits & 0x7FFFFF) > 0x3504F3 ? 1 : 0;
     const std::int32_t exponent = static_cast<std::int32_t>(bits >> 23) - 127 + up;
-    const float m =
-        __builtin_bit_cast(float, static_cast<std::uint32_t>((bits & 0x7FFFFF) | ((127 - up) << 23))) - 1.0F;
+    const float m = __builtin_bit_cast(float, (bits & 0x7FFFFF) | (static_cast<std::uint32_t>(127 - up) << 23)) - 1.0F;
     const float log =
         m * (1.44269504F +
              m * (-0.72134752F +

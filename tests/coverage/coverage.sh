@@ -1,7 +1,7 @@
 #!/usr/bin/env bash
 # coverage.sh BUILD PAGE VERSION JOBS: runs the unit tests, the command tests and the report's of a build with gcc's counters, and
-# writes PAGE: which lines of which folder ran, which functions never did. Files of counters from before are removed first.
-# Exit code 1 where a test failed; the page is written all the same and says so.
+# writes PAGE, which lines of which folder ran, and BUILD/coverage/files.md, which files and functions did not. Files of counters
+# from before are removed first. Exit code 1 if a test failed; the page is written nevertheless and says so.
 set -euo pipefail
 build=$1 page=$2 version=$3 jobs=$4
 here=$(cd -- "$(dirname -- "${BASH_SOURCE[0]}")" && pwd)
@@ -33,9 +33,9 @@ gcovr --root "$root" --object-directory "$build" --exclude-throw-branches \
   exit 2
 }
 python3 "$here/page.py" "$logs/coverage.json" "$here/reasons.txt" "$version" "$(grep -hE '^\[  PASSED  \]' "$logs"/*_tests-*.txt |
-  awk '{n += $4} END {print n + 0}')" "${#failed[@]}" >"$page"
-sed -n '/^| folder/,/^$/p' "$page"
-echo "the page: $page"
+  awk '{n += $4} END {print n + 0}')" "${#failed[@]}" "$logs/files.md" >"$page"
+grep '^- ' "$page"
+echo "the page: $page; files and functions: $logs/files.md"
 ((${#failed[@]} == 0)) || {
   echo "tests failed: see $logs" >&2
   exit 1

@@ -1,5 +1,5 @@
-"""Writes the page of coverage.sh to standard output. Arguments: gcovr's JSON, file of reasons, version, tests that
-passed, programs in which tests failed."""
+"""Writes the page of coverage.sh, by folder, to standard output. Arguments: gcovr's JSON, file of reasons, version, tests
+that passed, programs in which tests failed, output file for the list of files and functions."""
 import collections
 import json
 import re
@@ -7,7 +7,7 @@ import sys
 
 FEW_LINES = 8  # of a file that is named as little covered
 LITTLE_PERCENT = 80.0
-MOST_FUNCTIONS = 60
+NO_REASON = "no reason: tests are missing"
 
 files = json.load(open(sys.argv[1]))["files"]
 version, passed, failed = sys.argv[3], int(sys.argv[4]), int(sys.argv[5])
@@ -20,7 +20,7 @@ for line in open(sys.argv[2]):
 
 def reason(path):
     fitting = [r for r in reasons if path.startswith(r[0])]
-    return max(fitting, key=lambda r: len(r[0]))[1] if fitting else "no reason: tests are missing"
+    return max(fitting, key=lambda r: len(r[0]))[1] if fitting else NO_REASON
 
 
 def percent(part, whole):
@@ -49,7 +49,7 @@ for f in files:
     lines[folder][1] += run
     if len(code) >= FEW_LINES and percent(run, len(code)) < LITTLE_PERCENT:
         little.append((percent(run, len(code)), len(code) - run, path))
-    # All instances of a template stand at one line: it was called where one of them was.
+    # All instances of a template are at one line: it was called if one of them was.
     called = collections.defaultdict(int)
     names = {}
     for g in f.get("functions", []):
@@ -62,28 +62,26 @@ for f in files:
 print("# What the quick tests run, by folder\n")
 print(f"Written by `./dev coverage` from version {version}: {passed} tests passed"
       + (f", and tests failed in {failed} runs" if failed else "")
-      + ". gcc's counters at -O1, without sanitizers; unit tests, command tests and those of the report. Campaigns, fuzzing, boards,")
-print("guests and the workbench's page run more than this, and are not counted. A line that ran is not a line that was judged.\n")
-print("| folder | lines | of which ran | functions | of which called |\n| --- | ---: | ---: | ---: | ---: |")
+      + ". gcc's counters at -O1 without sanitizers; unit, command and report tests. Campaigns, fuzzing, boards, guests and the")
+print("workbench's page are not counted. That a line ran does not prove that it is right. Files and functions: `build/coverage/coverage/files.md`.\n")
+print("Share of the lines that ran:\n")
 for folder in sorted(lines):
     all_lines, run = lines[folder]
-    all_functions, called = functions[folder]
-    print(f"| `{folder}` | {all_lines} | {percent(run, all_lines):.1f} % | {all_functions} | {percent(called, all_functions):.1f} % |")
+    print(f"- `{folder}`: {percent(run, all_lines):.1f} % of {all_lines}")
 all_lines, run = (sum(x[i] for x in lines.values()) for i in (0, 1))
+print(f"- all: {percent(run, all_lines):.1f} % of {all_lines}\n")
 all_functions, called = (sum(x[i] for x in functions.values()) for i in (0, 1))
-print(f"| all | {all_lines} | {percent(run, all_lines):.1f} % | {all_functions} | {percent(called, all_functions):.1f} % |\n")
+print(f"Of {all_functions} functions {called} were called ({percent(called, all_functions):.1f} %). "
+      f"Of {len(little)} files less than {LITTLE_PERCENT:.0f} % of the lines ran; "
+      f"{sum(reason(path) == NO_REASON for _, _, path in little)} of these have no reason in `tests/coverage/reasons.txt`.")
 
-print(f"## Files of which less than {LITTLE_PERCENT:.0f} % ran\n\n| file | ran | lines that did not | why |\n| --- | ---: | ---: | --- |")
-for share, missing, path in sorted(little):
-    print(f"| `{path}` | {share:.0f} % | {missing} | {reason(path)} |")
-print(f"\n## Functions never called: {len(never)}\n")
-by_file = collections.defaultdict(list)
-for path, at, name in sorted(never):
-    by_file[path].append(f"`{name}` ({at})")
-shown = 0
-for path in sorted(by_file, key=lambda p: -len(by_file[p])):
-    if shown >= MOST_FUNCTIONS:
-        print(f"\nAnd {len(never) - shown} more, a few in each of the other files.")
-        break
-    print(f"- `{path}`: {', '.join(by_file[path])}")
-    shown += len(by_file[path])
+with open(sys.argv[6], "w") as out:
+    print(f"# Files of which less than {LITTLE_PERCENT:.0f} % ran\n\n| file | ran | lines that did not | why |\n| --- | ---: | ---: | --- |", file=out)
+    for share, missing, path in sorted(little):
+        print(f"| `{path}` | {share:.0f} % | {missing} | {reason(path)} |", file=out)
+    print(f"\n# Functions never called: {len(never)}\n", file=out)
+    by_file = collections.defaultdict(list)
+    for path, at, name in sorted(never):
+        by_file[path].append(f"`{name}` ({at})")
+    for path in sorted(by_file, key=lambda p: -len(by_file[p])):
+        print(f"- `{path}`: {', '.join(by_file[path])}", file=out)

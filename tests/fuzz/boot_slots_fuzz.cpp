@@ -1,5 +1,5 @@
-// Slots and journal of any content, image headers among it: a start gives an image that is whole and for this board, or
-// says that there is none; after it an image can be downloaded, and that one is started next.
+// Slots, journal and security counter of any content, image headers among it: a start gives an image that is whole and
+// for this board, or says that there is none; after it an image can be downloaded, and that one is started next.
 #include <algorithm>
 #include <cstddef>
 #include <cstdint>
@@ -46,7 +46,7 @@ extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size
   testing::SlotCells cells;
   while (!bytes.empty()) {
     const std::uint8_t what = bytes.next();
-    auto& sector = cells.sectors[(what >> 2) % boot::kSlots];
+    auto& sector = cells.sectors[(what >> 2) % boot::kImageSectors];
     if ((what & 3) == 0) {
       const std::size_t at = bytes.word() % sector.size();
       const auto piece = bytes.some(std::min<std::size_t>(bytes.next(), sector.size() - at));
@@ -82,12 +82,13 @@ extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size
   }
   testing::SlotFlash flash(cells);
   testing::TestSlots slots(flash, testing::kTestBoard);
-  require(testing::download(slots, testing::image_named('n')), "nothing can be downloaded");
+  // Whatever the counter is, this one is not smaller.
+  const auto newest = testing::image_named('n', 42, testing::kTestBoard, 0xFFFF);
+  require(testing::download(slots, newest), "nothing can be downloaded");
   testing::TestSlots next(flash, testing::kTestBoard);
   require(next.resume() == Start::trial && next.confirm(), "what was downloaded is not started");
   testing::TestSlots last(flash, testing::kTestBoard);
-  require(last.resume() == Start::application &&
-              std::ranges::equal(last.image(Slot::application), testing::image_named('n')),
+  require(last.resume() == Start::application && std::ranges::equal(last.image(Slot::application), newest),
           "what was confirmed is not what is started");
   return 0;
 }

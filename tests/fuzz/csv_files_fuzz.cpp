@@ -1,5 +1,5 @@
-// CSV files of any content, alone or with a dataset.toml beside them: what cannot be used is refused with a reason, and
-// what is used is a data set that holds what host/data promises of one.
+// CSV files of any content, alone or with a dataset.toml next to them: what cannot be used is refused with a reason,
+// and what is used is a data set that holds what host/data promises of one.
 #include <algorithm>
 #include <cmath>
 #include <cstddef>

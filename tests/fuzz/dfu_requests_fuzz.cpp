@@ -26,6 +26,8 @@ void require(bool holds, const char* what) {
 
 struct Board {
   using Slots = testing::SlotFlash;
+  using Trust = boot::AnySigner;
+  static constexpr bool kCanUpload = true;
   static constexpr std::string_view kName = testing::kTestBoard;
   static constexpr std::uint32_t kEraseMs = 1, kBlockMs = 1, kCheckMs = 1;
   Slots& slots() { return flash; }

@@ -1,5 +1,5 @@
 // Bytes on a drive's serial line: messages, garbage, time that passes. Every request gets one answer that can be read,
-// nothing arms a drive that has no parameters or stands in a fault, and identify works at the end.
+// nothing arms a drive that has no parameters or is in a fault, and identify works at the end.
 #include <cstddef>
 #include <cstdint>
 #include <cstdio>
@@ -85,7 +85,7 @@ struct Drive {
 
 }  // namespace
 
-// The first byte says whether the drive stands in a fault. Then bytes of the line; of each byte 0xFE a tick passes as
+// The first byte says whether the drive is in a fault. Then bytes of the line; of each byte 0xFE a tick passes as
 // well, and 0xFD says that the rest of up to 64 bytes is a message without its frame, so that checksums are no wall.
 extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size) {
   static Drive* drive = nullptr;

@@ -1,6 +1,6 @@
 #!/usr/bin/env bash
 # run.sh PROGRAM SEEDS FOLDER SECONDS [RANDOM_SEED]: fuzzes for so long; without RANDOM_SEED with other inputs each time.
-# New inputs go to FOLDER, so that the next run goes on from there; one that fails is left beside them, and its path is
+# New inputs go to FOLDER, so that the next run continues from there; one that fails is left next to them, and its path is
 # printed. Fails also where so few ran that it says nothing.
 set -euo pipefail
 program=$1 seeds=$2 folder=$3 seconds=$4 random_seed=${5:-0}

@@ -1,6 +1,6 @@
 #!/usr/bin/env bash
 # soak.sh PROGRAMS MINUTES FOLDER: every fuzz target in turn, each for its share of the time, going on from the corpora in
-# FOLDER/NAME. Inputs that failed before come first. Exit code 1 where anything was found; all targets run all the same.
+# FOLDER/NAME. Inputs that failed before come first. Exit code 1 if anything was found; all targets run nevertheless.
 set -euo pipefail
 programs=$1 minutes=$2 folder=$3
 here=$(cd -- "$(dirname -- "${BASH_SOURCE[0]}")" && pwd)
@@ -37,5 +37,5 @@ for target in "${targets[@]}"; do
   summary+=("  $target: $said; corpus $before to $(find "$own/corpus" -type f | wc -l)")
 done
 printf '%s\n' "${summary[@]}"
-if ((found)); then echo "something was found; mend it, and put its input into tests/fuzz/corpus"; fi
+if ((found)); then echo "something was found; correct it, and put its input into tests/fuzz/corpus"; fi
 exit "$found"

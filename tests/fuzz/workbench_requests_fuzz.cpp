@@ -1,5 +1,5 @@
 // What anybody may ask of the workbench: who gets in, which files a name may mean, and requests of the page in any
-// order and with any content. Each gets an answer that can be read, and nothing is written beside the folder for
+// order and with any content. Each gets an answer that can be read, and nothing is written outside the folder for
 // models.
 #include <algorithm>
 #include <charconv>
@@ -66,7 +66,7 @@ struct Bench {
   // Nothing but models, reports and blocks under plain names, and nothing else where the folder is.
   void require_tidy() const {
     for (const auto& entry : fs::directory_iterator(place.path()))
-      require(entry.path() == folder || entry.path().filename() == "data.csv", "a file beside the folder");
+      require(entry.path() == folder || entry.path().filename() == "data.csv", "a file outside the folder");
     for (const auto& entry : fs::directory_iterator(folder)) {
       const std::string name = entry.path().filename().string();
       require(entry.is_regular_file() && name[0] != '.', "something else than a plain file: " + name);

@@ -82,7 +82,8 @@ TEST_F(Table1, RegressionOnTheSlowSawToothDoesNotClaimTheSpeed) {
   EXPECT_GT(*speed.high, kTruth.friction.positive.stribeck_velocity);
 }
 
-// Amplitude and speed of the Stribeck term by the free run of one saw-tooth.
+// Amplitude and speed of the Stribeck term by the free run of one saw-tooth: by a search of this test's own, with all
+// other parameters known and a smoothed current. It shows what these data contain, not what the tool gives.
 FreeRunFit stribeck_of(const rhs100::Set& saw_tooth, const estimation::Identification& linear, std::uint64_t seed) {
   const std::vector<FreeParameter> parameters{
       {{{"stribeck_hess_soom", "amplitude_positive"}, {"stribeck_hess_soom", "amplitude_negative"}},

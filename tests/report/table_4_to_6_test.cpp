@@ -15,10 +15,14 @@ namespace published = report::published;
 // The torsion's rate is sharpest where the motor breaks away, tens of milliseconds long; the bulk of these runs' motion
 // lies below 2 Hz and would suggest a filter of 5 Hz.
 constexpr double kCutoffHz = 20.0;
+// A filter rounds the square root of the rate, and the cubic term takes part of that: where the torsion is small
+// (50-7), K_3 is 18 % too large at 20 Hz and 7 % at 120 Hz, averaged over seven seeds; one run has a standard error of
+// 5 to 8 %.
+constexpr double kCubicCutoffHz = 80.0;
 
-estimation::PipelineOptions pipeline() {
+estimation::PipelineOptions pipeline(double cutoff_hz = kCutoffHz) {
   estimation::PipelineOptions options;
-  options.cutoff_hz = kCutoffHz;
+  options.cutoff_hz = cutoff_hz;
   return options;
 }
 
@@ -26,11 +30,11 @@ struct Rows {
   Column stiffness, cubic, damping, exponent, rmse;
 };
 
-Rows one_by_one(const data::Dataset& dataset, const model::Model& model) {
+Rows one_by_one(const data::Dataset& dataset, const model::Model& model, double cutoff_hz = kCutoffHz) {
   Rows rows;
   for (const data::Experiment& e : dataset.experiments) {
     if (e.role != data::Role::fit) continue;
-    const auto found = estimation::identify(only(dataset, e.name), model, pipeline());
+    const auto found = estimation::identify(only(dataset, e.name), model, pipeline(cutoff_hz));
     rows.stiffness.push_back(estimate(*found, "linear_stiffness", "stiffness").value);
     rows.damping.push_back(estimate(*found, "structural_damping", "torque").value);
     rows.rmse.push_back(found->fits.front().rmse());
@@ -117,7 +121,7 @@ TEST_F(Table4, AHalfHasTheSmallerWorstErrorInAlmostAllElevenExperiments) {
     Column gains;
     for (const auto& e : comparison::compare(dataset, nominal, pipeline()).experiments)
       for (const auto& s : e.signals)
-        if (s.signal == "transmission_balance") gains.push_back(s.worst_case_gain);
+        if (s.signal == "transmission_balance") gains.push_back(s.h_infinity.value);
     return gains;
   };
   const Column half = worst(0.5), third = worst(1.0 / 3.0);
@@ -137,10 +141,11 @@ TEST_F(Table5, AFreeExponentComesOutAtAHalf) {
 }
 
 TEST_F(Table6, RowsAndSpreadsComeOutAsTheReports) {
-  const Rows ours = one_by_one(dataset, base_model(set)), theirs = as_published(published::kTable6);
+  const Rows ours = one_by_one(dataset, base_model(set), kCubicCutoffHz), theirs = as_published(published::kTable6);
   EXPECT_LT(worst_percent(ours.stiffness, theirs.stiffness), 0.5);
   EXPECT_LT(worst_percent(ours.damping, theirs.damping), 0.5);
-  for (std::size_t k = 0; k < 3; ++k) EXPECT_NEAR(ours.cubic[k] / theirs.cubic[k], 1.0, 0.05) << k;
+  for (std::size_t k = 0; k < 3; ++k) EXPECT_NEAR(ours.cubic[k] / theirs.cubic[k], 1.0, 0.02) << k;
+  EXPECT_NEAR(ours.cubic[3] / theirs.cubic[3], 1.0, 0.2) << "50-7: see kCubicCutoffHz";
   // Over n, as printed.
   EXPECT_NEAR(spread_percent(ours.stiffness, true), 6.5, 0.3);
   EXPECT_NEAR(spread_percent(ours.cubic, true), 109.0, 8.0);
@@ -148,24 +153,30 @@ TEST_F(Table6, RowsAndSpreadsComeOutAsTheReports) {
 }
 
 TEST_F(Table6, TheCubicTermIsUnreliableWithASpreadAboveAHundredPercent) {
-  const Rows ours = one_by_one(dataset, base_model(set));
+  const Rows ours = one_by_one(dataset, base_model(set), kCubicCutoffHz);
   EXPECT_GT(spread_percent(ours.cubic), 100.0);
   EXPECT_LT(spread_percent(ours.stiffness), 30.0);
   // And all four experiments together do not even agree on its sign.
-  const auto together = estimation::identify(dataset, base_model(set), pipeline());
+  const auto together = estimation::identify(dataset, base_model(set), pipeline(kCubicCutoffHz));
   EXPECT_LT(estimate(*together, "cubic_stiffness", "stiffness").value, 0.2 * mean(ours.cubic));
+  // And the tool's own std/avg says so, with every experiment: over n - 1, where the report's 109 % are over n.
+  const estimation::Estimate& cubic = estimate(*together, "cubic_stiffness", "stiffness");
+  EXPECT_EQ(cubic.counted(), 4u);
+  EXPECT_NEAR(cubic.spread_percent.value(), 109.0 * std::sqrt(4.0 / 3.0), 10.0);
+  EXPECT_EQ(cubic.reliable, std::optional(false));
+  EXPECT_EQ(estimate(*together, "linear_stiffness", "stiffness").reliable, std::optional(true));
 }
 
 // Figure 33: the average of the cubic models on the experiment with the largest torsion.
 TEST_F(Table6, TheCubicModelOverpredictsAtLargeTorsionAndTheLinearOneDoesNot) {
   const auto prediction_over_measurement = [&](model::Model model) {
-    const Rows rows = one_by_one(dataset, model);
+    const Rows rows = one_by_one(dataset, model, kCubicCutoffHz);
     fix(model, "linear_stiffness", "stiffness", mean(rows.stiffness));
     fix(model, "structural_damping", "torque", mean(rows.damping));
     if (!rows.cubic.empty()) fix(model, "cubic_stiffness", "stiffness", mean(rows.cubic));
     const data::Dataset largest = only(dataset, "100-8");
     const estimation::PreparedData prepared =
-        estimation::prepare({&largest.experiments.front()}, model.drive, pipeline());
+        estimation::prepare({&largest.experiments.front()}, model.drive, pipeline(kCubicCutoffHz));
     estimation::BalanceData balance(prepared, estimation::Balance::transmission);
     const Eigen::VectorXd rest = estimation::residual_of(balance, estimation::terms_of(model));
     Eigen::Index at = 0;

@@ -83,8 +83,18 @@ TEST_F(Table7, AllTogetherTheSpreadsStayBelowTheReportsThirtyPercent) {
   const auto found = estimation::identify(dataset, base, {});
   EXPECT_NEAR(*estimate(*found, "inertia", "inertia").spread_percent, 6.4, 1.0);
   EXPECT_NEAR(*estimate(*found, "viscous_friction", "coefficient").spread_percent, 17.7, 1.0);
-  EXPECT_TRUE(estimate(*found, "viscous_friction", "coefficient").reliable);
-  EXPECT_TRUE(estimate(*found, "coulomb_friction", "torque").reliable);
+  EXPECT_TRUE(estimate(*found, "viscous_friction", "coefficient").reliable.value_or(false));
+  EXPECT_TRUE(estimate(*found, "coulomb_friction", "torque").reliable.value_or(false));
+  // By direction, as printed: all runs count.
+  const std::pair<const char*, double> printed[] = {{"Tvp", 16.66}, {"Tvn", 19.26}, {"Tsp", 23.69}, {"Tsn", 24.01}};
+  for (const auto& [name, percent] : printed)
+    for (const estimation::Derived& d : found->derived) {
+      if (d.name != name) continue;
+      EXPECT_EQ(d.counted(), 26u) << name;
+      EXPECT_NEAR(d.spread_percent.value(), percent, 0.7) << name;
+      EXPECT_TRUE(d.reliable.value_or(false)) << name;
+    }
+  ASSERT_EQ(found->derived.size(), 4u);
   // Inertia and friction of the load, which the report does not give: chosen, and the same in all runs.
   EXPECT_NEAR(estimate(*found, "output_inertia", "inertia").value, rhs100::kOutputInertia,
               0.003 * rhs100::kOutputInertia);

@@ -1,7 +1,7 @@
 #!/usr/bin/env bash
-# bits.sh BUILD MINUTES FOLDER: seed after seed drives in closed loop by two compilers, a minute of each case, and a
+# bits.sh BUILD MINUTES FOLDER: for one seed after the other, drives in closed loop by two compilers, a minute of each case, and a
 # million adversarial ticks of all effects over a thousand drawn blocks by each compiler at two levels of optimisation;
-# all bits compared. FOLDER/seeds.txt names the seeds that were the same; a next run goes on behind them.
+# all bits compared. FOLDER/seeds.txt names the seeds that were the same; the next run continues after them.
 set -euo pipefail
 build=$1 minutes=$2 folder=$3
 seconds=60

@@ -46,7 +46,7 @@ const std::vector<std::string> kHidden = {
     "torque_sensor_ripple",
     "torsion_zero",
 };
-// Those that are there or not: laws whose size is one with their shape, and what every drive has.
+// Effects without a choice of size: laws whose size depends on their nonlinear parameters, and what every drive has.
 const std::vector<std::string> kWholeRecord = {
     "lugre_friction",
     "current_saturation",
@@ -89,7 +89,7 @@ nlohmann::json to_json(const Outcome& o) {
                       {"recovered", nlohmann::json::array()}};
   if (o.holdout_over_floor) j["holdout_over_floor"] = *o.holdout_over_floor;
   for (const Recovered& r : o.recovered)
-    j["recovered"].push_back({{"name", r.name}, {"shape", r.shape}, {"error", r.error}, {"covered", r.covered}});
+    j["recovered"].push_back({{"name", r.name}, {"shape", r.nonlinear}, {"error", r.error}, {"covered", r.covered}});
   return j;
 }
 
@@ -113,10 +113,10 @@ Outcome from_json(const nlohmann::json& j) {
 
 }  // namespace
 
-std::vector<Case> judging_round(std::uint64_t round) {
+std::vector<Case> test_round(std::uint64_t round) {
   std::vector<Case> cases;
-  const std::uint64_t seed = kFirstJudgingSeed + 100 * round;
-  // Nothing hidden, in the four ways that have fooled a diagnosis.
+  const std::uint64_t seed = kFirstTestSeed + 100 * round;
+  // Nothing hidden, with the four kinds of data that have led to false names.
   for (std::uint64_t s = 0; s < kNothingOfAKind; ++s)
     for (const double variation : kVariations)
       for (const double correlation : {0.0, kCorrelation})
@@ -124,7 +124,7 @@ std::vector<Case> judging_round(std::uint64_t round) {
   for (std::size_t h = 0; h < kHidden.size(); ++h)
     cases.push_back({kHidden[h], kScales[(round + h) % std::size(kScales)], seed + 20 + h,
                      kVariations[(round / std::size(kScales) + h + 1) % std::size(kVariations)], 0.0, ""});
-  // The n-th of a list that goes on from round to round; what begins anew meets the other friction.
+  // The n-th of a list that continues from round to round; its second pass has the other friction variation.
   const auto nth = [&](const std::vector<std::string>& list, std::size_t n, std::uint64_t own) {
     cases.push_back(
         {list[n % list.size()], 1.0, own, kVariations[(n + n / list.size()) % std::size(kVariations)], 0.0, ""});
@@ -156,7 +156,7 @@ Results::Results(std::filesystem::path file, const std::string& version) : file_
     std::filesystem::rename(file_, file_.string() + ".old");
   } else {
     while (std::getline(in, line)) {
-      // The last line of a campaign that was stopped may be half written.
+      // The last line may be incomplete if the campaign was stopped.
       const auto parsed = nlohmann::json::parse(line, nullptr, false);
       if (!parsed.is_discarded()) outcomes_.push_back(from_json(parsed));
     }

@@ -1,4 +1,4 @@
-// Which drives a campaign looks at, and what is kept of each.
+// Which drives a campaign simulates, and what is stored of each.
 #pragma once
 
 #include <filesystem>
@@ -12,20 +12,19 @@ namespace flexspline::soak {
 // Sizes of hidden effects, over their usual ones.
 inline constexpr double kScales[] = {1.0, 0.5, 0.2, 0.1, 0.05, 0.02, 0.01};
 
-// Seeds below kFirstJudgingSeed were looked at while the diagnosis was written and set its limits; the others judge it.
+// Seeds below kFirstTestSeed were used while the diagnosis was written and set its limits; the others test it.
 inline constexpr std::uint64_t kFirstTuningSeed = 1;
 inline constexpr std::uint64_t kLastTuningSeed = 1099;
-// 7001 to 7999 and 20001 to 21999 judged versions before, and what went wrong there was looked at since.
-inline constexpr std::uint64_t kFirstJudgingSeed = 30001;
+// 7001 to 7999 and 20001 to 21999 tested earlier versions; their failures have been examined since.
+inline constexpr std::uint64_t kFirstTestSeed = 30001;
 
-// Round `round` of the campaign that judges: every effect once, its size and the friction's variation going round from
-// round to round, pairs, truths that no effect of the catalogue describes, and sets with nothing hidden.
-std::vector<Case> judging_round(std::uint64_t round);
+// Round `round` of the test campaign: every effect once, with sizes and variations of friction that change from round
+// to round, pairs, truths that no effect of the catalogue describes, and sets with nothing hidden.
+std::vector<Case> test_round(std::uint64_t round);
 // Sets with nothing hidden on tuning seeds; none once those are used up.
 std::vector<Case> calibration_round(std::uint64_t round);
 
-// Results as they come, one a line, so that a campaign that was stopped goes on where it was. A file of another version
-// of the program is put aside.
+// Results, one per line, so that a stopped campaign can continue. A file of another version of the program is renamed.
 class Results {
  public:
   Results(std::filesystem::path file, const std::string& version);

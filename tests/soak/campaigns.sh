@@ -1,14 +1,14 @@
 #!/usr/bin/env bash
-# The campaigns of the tests at full size, one test after the other until the time is over; a test that has begun is ended.
-# Goes on where the last run of this program stopped.
+# The campaigns of the tests at full size, one test after the other until the time is over; a test that was started is finished.
+# Continues where the last run of this program stopped.
 #
 #   campaigns.sh PROGRAM MINUTES FOLDER      FOLDER: each test's output, and which tests were run
 #
-# Exit code: 1 where one failed.
+# Exit code: 1 if one failed.
 set -euo pipefail
 program=${1:?} minutes=${2:?} folder=${3:?}
 mkdir -p "$folder"
-# Another program, another campaign.
+# Another program starts a new campaign.
 sum=$(sha256sum "$program" | cut -d ' ' -f 1)
 if [[ $(cat "$folder/program" 2>/dev/null) != "$sum" ]]; then
   rm -f "$folder"/*.txt

@@ -38,7 +38,7 @@ std::string label(const std::string& effect, const std::optional<double>& order)
   return order ? fmt::format("{}:{:g}", effect, *order) : effect;
 }
 
-// As the diagnosis names it: orders are said, the plant's own name for the common order is without.
+// As the diagnosis names it: with the order, which the plant's name of the usual order does not have.
 std::string as_named(const std::string& hidden) {
   const catalogue::Entry* entry = catalogue::find(hidden);
   return entry && entry->count(effects::Kind::given) > 0 ? hidden + ":2" : hidden;
@@ -48,7 +48,7 @@ double root_mean_square(const Eigen::VectorXd& r) {
   return r.size() ? std::sqrt(r.squaredNorm() / static_cast<double>(r.size())) : 0.0;
 }
 
-// A drive's recordings with what only the plant knows.
+// A drive's recordings, and the truth that only the plant has.
 struct Bench {
   plant::PlantFile file;
   std::vector<plant::Record> records;
@@ -57,7 +57,7 @@ struct Bench {
 
   explicit Bench(const Case& c) : file(plant::demo_plant()) {
     const std::vector<std::string> hidden = split(c.hidden, '+'), with = split(c.with, ',');
-    // The plant hides one; others are made a part of it and taken out of the model.
+    // The plant hides one effect; further ones are added to the plant and removed from the model.
     for (std::size_t k = 0; k < hidden.size(); ++k) {
       if (k == 0) {
         plant::hide(file.drive, hidden[k], c.scale);
@@ -87,13 +87,13 @@ struct Bench {
   // RMS of the true model's residual on the hold-out records.
   double holdout_floor(Balance balance) const {
     const estimation::PreparedData prepared = estimation::prepare(of(data::Role::fit), truth.drive, {});
-    const estimation::PreparedData judged =
+    const estimation::PreparedData held_out =
         estimation::prepare_with(of(data::Role::holdout), truth.drive, prepared.pipeline);
-    BalanceData data(judged, balance);
+    BalanceData data(held_out, balance);
     return root_mean_square(estimation::residual_of(data, estimation::terms_of(truth)));
   }
 
-  // What the hidden effects add and the base model cannot imitate, over the noise alone, on the fitted records.
+  // The torque of the hidden effects orthogonal to the base model, over the noise, on the fitted records.
   double missing_over_noise(Balance balance) const {
     const estimation::PreparedData prepared = estimation::prepare(of(data::Role::fit), truth.drive, {});
     BalanceData data(prepared, balance);
@@ -133,11 +133,11 @@ void compare_parameters(const Bench& bench, const std::string& hidden, const sel
   const plant::Effect* truth = nullptr;
   for (const plant::Effect& e : bench.file.drive.effects)
     if (e.hidden) truth = &e;
-  // The two parts of a wave are judged by its height: either may be near zero.
+  // Errors of cosine and sine are relative to the amplitude, as either may be near zero.
   double height = 0.0;
   for (const plant::Parameter& p : truth->parameters)
     if (p.key == "cosine" || p.key == "sine") height = std::hypot(height, p.value);
-  // Weights of points that were laid where the data reach mean another thing at the plant's own points.
+  // Weights at points that depend on the data cannot be compared with those at the plant's points.
   const bool laid_by_data = entry.count(effects::Kind::grid) > 0;
   for (const estimation::Estimate& e : added.estimates) {
     if (laid_by_data) break;
@@ -147,12 +147,13 @@ void compare_parameters(const Bench& bench, const std::string& hidden, const sel
     const auto kind = entry.parameters[entry.index_of(e.parameter)].kind;
     if (kind == effects::Kind::given || kind == effects::Kind::grid) continue;
     const double scale = height > 0.0 ? height : std::abs(is);
-    outcome.recovered.push_back({e.parameter, kind == effects::Kind::shape, scale > 0.0 ? (e.value - is) / scale : 0.0,
+    outcome.recovered.push_back({e.parameter, kind == effects::Kind::nonlinear,
+                                 scale > 0.0 ? (e.value - is) / scale : 0.0,
                                  e.low && e.high && *e.low <= is && is <= *e.high});
   }
 }
 
-// Adds what is named until nothing is, and compares with all that was hidden.
+// Adds the named effects until none is named, and compares with all hidden ones.
 bool finds_all(const Bench& bench, const std::vector<std::string>& hidden) {
   std::multiset<std::string> found, wanted;
   for (const std::string& h : hidden) wanted.insert(as_named(h));

@@ -1,4 +1,4 @@
-// One simulated drive with something hidden, or nothing: what the diagnosis says of it, beside the truth.
+// One simulated drive with something hidden, or nothing: the answer of the diagnosis, and the truth.
 #pragma once
 
 #include <cstdint>
@@ -14,16 +14,16 @@ struct Case {
   std::uint64_t seed = 0;
   double friction_variation = 0.0;  // relative, from record to record
   double noise_correlation = 0.0;   // AR(1) coefficient at the sample rate
-  std::string with;                 // effects that the drive has besides, and the model knows; separated by commas
+  std::string with;                 // further effects that the drive has and the model knows; separated by commas
 
-  // One line without tabs that says all of it: what a campaign is resumed by.
+  // One line without tabs that identifies the case: the key by which a campaign continues.
   std::string key() const;
 };
 
 // One estimated parameter of a hidden effect after it was added by its true name.
 struct Recovered {
   std::string name;
-  bool shape = false;
+  bool nonlinear = false;
   double error = 0.0;  // estimate over truth, less one
   bool covered = false;
 };

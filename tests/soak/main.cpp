@@ -1,4 +1,4 @@
-// Runs a campaign for so many minutes and writes what it found: see `./dev soak`.
+// Runs a campaign for a given number of minutes and writes its results: see `./dev soak`.
 #include <fmt/format.h>
 
 #include <atomic>
@@ -21,10 +21,10 @@ namespace {
 using namespace flexspline::soak;
 using Clock = std::chrono::steady_clock;
 
-// Fewer sets than that have no tail to speak of.
+// Fewer sets do not determine the tail of the distribution.
 constexpr std::size_t kFewestNulls = 60;
 
-// Runs rounds until time is up or there are none; a drive that was begun is finished.
+// Runs rounds until the time is over or none is left; a drive that was started is finished.
 void run_until(Clock::time_point end, const std::function<std::vector<Case>(std::uint64_t)>& round_of,
                Results& results) {
   std::mutex guard;
@@ -57,7 +57,7 @@ void run_until(Clock::time_point end, const std::function<std::vector<Case>(std:
 int run_campaign(const std::string& name, double minutes, const std::string& results_file, const std::string& page,
                  const std::string& version) {
   const bool calibrates = name == "calibrate";
-  if (name == "proof") return judge_proof(minutes, page, version);
+  if (name == "proof") return run_proof_campaign(minutes, page, version);
   if (!calibrates && name != "diagnose") {
     fmt::print(stderr, "there is no campaign \"{}\"; known are diagnose, calibrate and proof\n", name);
     return 2;
@@ -65,7 +65,7 @@ int run_campaign(const std::string& name, double minutes, const std::string& res
   Results results(results_file, version);
   const auto end =
       Clock::now() + std::chrono::duration_cast<Clock::duration>(std::chrono::duration<double>(60.0 * minutes));
-  run_until(end, calibrates ? calibration_round : judging_round, results);
+  run_until(end, calibrates ? calibration_round : test_round, results);
   if (results.all().empty() || (calibrates && results.all().size() < kFewestNulls)) {
     fmt::print("{} drives so far, too few to say anything; run it again for more\n", results.all().size());
     return 0;

@@ -81,9 +81,8 @@ std::string false_alarms(const std::vector<Outcome>& all) {
 
 std::string power(const std::vector<Outcome>& all) {
   std::string text =
-      "## One effect hidden\n\nBy the RMS of what the effect adds and the rest of the model cannot imitate, over the "
-      "RMS of "
-      "the noise.\n\n| missing over noise | named right, friction constant | named right, friction 3 % from run to run "
+      "## One effect hidden\n\nBy the RMS of the effect's torque orthogonal to the rest of the model, over that of the "
+      "noise.\n\n| missing over noise | named right, friction constant | named right, friction 3 % from run to run "
       "| in a group that cannot be distinguished | a wrong name |\n| --- | --- | --- | --- | --- |\n";
   constexpr double kEdges[] = {0.0, 0.025, 0.05, 0.1, 0.25, 1.0, 1e9};
   for (std::size_t k = std::size(kEdges) - 1; k-- > 0;) {
@@ -104,48 +103,68 @@ std::string power(const std::vector<Outcome>& all) {
                         share(count_right(constant), constant.size()), share(count_right(varies), varies.size()),
                         share(grouped, both.size()), share(wrong, both.size()));
   }
-  const Selection told = select(all, [](const Outcome& o) {
+  const Selection one_name = select(all, [](const Outcome& o) {
     return single(o) && listed(o) && o.named != "-" && o.named.find('+') == std::string::npos;
   });
-  return text + fmt::format("\nRight when one effect was named: {}.\n\n", share(count_right(told), told.size()));
+  return text +
+         fmt::format("\nRight when one effect was named: {}.\n\n", share(count_right(one_name), one_name.size()));
 }
 
-// What became of drives of one cell: "right", a wrong name or a verdict, with how often.
+// The answers for drives of one effect and size: how many were named right, then wrong names and verdicts, after their
+// number if above one.
 std::string named(const Selection& some) {
   std::map<std::string, std::size_t> names;
   for (const Outcome* o : some)
-    ++names[o->right                            ? "right"
-            : o->named != "-"                   ? o->named
-            : o->verdict == "at_noise_floor"    ? "nothing"
-            : o->verdict == "unknown_structure" ? "unknown"
-                                                : o->verdict];
-  std::string list;
+    if (!o->right)
+      ++names[o->named != "-"                     ? o->named
+              : o->verdict == "at_noise_floor"    ? "nothing"
+              : o->verdict == "unknown_structure" ? "unknown"
+                                                  : o->verdict];
+  const std::size_t right = count_right(some);
+  std::string list = right > 0 ? fmt::format("{} right", right) : "";
   for (const auto& [name, count] : names)
-    list += fmt::format("{}{}{}", list.empty() ? "" : ", ", name, count > 1 ? fmt::format(" x {}", count) : "");
-  return list.empty() ? "-" : list;
+    list += fmt::format("{}{}{}", list.empty() ? "" : ", ", count > 1 ? fmt::format("{} ", count) : "", name);
+  return list;
+}
+
+// Effects that were named right on all drives: by the smallest size tried, their names with the number of drives.
+std::string always_right(const std::map<std::string, Selection>& by_effect) {
+  std::map<double, std::string, std::greater<>> by_smallest;
+  for (const auto& [hidden, some] : by_effect) {
+    if (count_right(some) != some.size()) continue;
+    double smallest = kScales[0];
+    for (const Outcome* o : some) smallest = std::min(smallest, o->what.scale);
+    std::string& list = by_smallest[smallest];
+    list += fmt::format("{}{} {}", list.empty() ? "" : ", ", hidden, some.size());
+  }
+  std::string text;
+  for (const auto& [smallest, list] : by_smallest)
+    text += fmt::format("Right on all drives, {}: {}.\n\n",
+                        smallest < kScales[0] ? fmt::format("from {:g} to {:g}", kScales[0], smallest)
+                                              : fmt::format("tried at {:g} only", smallest),
+                        list);
+  return text;
 }
 
 std::string confusion(const std::vector<Outcome>& all) {
-  std::string text =
-      "## What was named\n\nBy size over the usual one; nothing: the error was taken for noise.\n\n| hidden |";
-  std::string rule = "\n| --- |";
-  for (const double scale : kScales) {
-    text += fmt::format(" {:g} |", scale);
-    rule += " --- |";
-  }
-  text += rule + "\n";
   std::map<std::string, Selection> by_effect;
   for (const Outcome& o : all)
     if (!o.what.hidden.empty()) by_effect[o.what.hidden].push_back(&o);
+  std::string text =
+      "## What was named\n\nBy size over the usual one, with the number of drives; "
+      "*nothing*: the error was taken for noise.\n\n" +
+      always_right(by_effect) + "Others, at the sizes at which not all drives were named right:\n\n";
   for (const auto& [hidden, some] : by_effect) {
-    text += fmt::format("| {} |", hidden);
+    if (count_right(some) == some.size()) continue;
+    std::string sizes;
     for (const double scale : kScales) {
       Selection of_size;
       std::copy_if(some.begin(), some.end(), std::back_inserter(of_size),
                    [&](const Outcome* o) { return o->what.scale == scale; });
-      text += fmt::format(" {} |", named(of_size));
+      if (count_right(of_size) < of_size.size())
+        sizes += fmt::format("{}{:g}: {}", sizes.empty() ? "" : "; ", scale, named(of_size));
     }
-    text += "\n";
+    text += fmt::format("- {}, {}\n", hidden, sizes);
   }
   return text + "\n";
 }
@@ -154,31 +173,31 @@ std::string after_adding(const std::vector<Outcome>& all) {
   std::string text =
       "## After adding the true effect\n\n| friction from run to run | hold-out error over the floor: median, 95 % of "
       "drives | "
-      "error of parameters | of shapes | intervals of 95 % that hold the truth |\n| --- | --- | --- | --- | --- |\n";
+      "error of parameters | of nonlinear parameters | intervals of 95 % that hold the truth |\n| --- | --- | --- | "
+      "--- | --- |\n";
   for (const double variation : {0.0, 0.03}) {
-    std::vector<double> holdout, linear, shape;
+    std::vector<double> holdout, linear, nonlinear;
     std::size_t covered = 0, intervals = 0;
     for (const Outcome* o : select(all, [&](const Outcome& c) {
            return single(c) && listed(c) && c.right && c.what.friction_variation == variation;
          })) {
       if (o->holdout_over_floor) holdout.push_back(*o->holdout_over_floor);
       for (const Recovered& r : o->recovered) {
-        if (o->missing_over_noise >= 0.25) (r.shape ? shape : linear).push_back(std::abs(r.error));
+        if (o->missing_over_noise >= 0.25) (r.nonlinear ? nonlinear : linear).push_back(std::abs(r.error));
         covered += r.covered ? 1 : 0;
         ++intervals;
       }
     }
     text += fmt::format("| {} | {:.3f}, {:.3f} | {:.2f} %, {:.2f} % | {:.2f} %, {:.2f} % | {} |\n",
                         variation > 0.0 ? "3 %" : "none", quantile(holdout, 0.5), quantile(holdout, 0.95),
-                        100.0 * quantile(linear, 0.5), 100.0 * quantile(linear, 0.95), 100.0 * quantile(shape, 0.5),
-                        100.0 * quantile(shape, 0.95), share(covered, intervals));
+                        100.0 * quantile(linear, 0.5), 100.0 * quantile(linear, 0.95), 100.0 * quantile(nonlinear, 0.5),
+                        100.0 * quantile(nonlinear, 0.95), share(covered, intervals));
   }
   return text +
-         "\nOf drives that were named right; errors where the effect is a quarter of the noise or more. Weights of an "
-         "operator whose points are laid by the data (Prandtl and Ishlinskii) are not compared: the plant's stand at "
-         "others. The floor is the residual of the true model with its nominal parameters, so where friction differs "
-         "from run to run it "
-         "holds the hold-out records' own deviations.\n\n";
+         "\nOf drives that were named right; errors where the effect is a quarter of the noise or more. Weights of a "
+         "Prandtl-Ishlinskii operator are not compared, as its points depend on the data. The floor is the residual "
+         "of the true model with nominal parameters: where friction differs between runs it contains those "
+         "deviations.\n\n";
 }
 
 std::string others(const std::vector<Outcome>& all) {
@@ -203,17 +222,16 @@ std::string page_of(const std::vector<Outcome>& all, const std::string& version)
   std::string text = fmt::format(
       "# Campaign: what the diagnosis names\n\nMade by `./dev soak MINUTES diagnose` of version {}: {} simulated "
       "drives, "
-      "seeds {} to {} (judging seeds start at {}; those that set the limits end at {}), {:.1f} s each for the "
-      "diagnosis "
-      "beside others.\n\n",
-      version, all.size(), low, high, kFirstJudgingSeed, kLastTuningSeed,
+      "seeds {} to {} (test seeds start at {}; those that set the limits end at {}), {:.1f} s for each diagnosis.\n\n",
+      version, all.size(), low, high, kFirstTestSeed, kLastTuningSeed,
       all.empty() ? 0.0 : seconds / static_cast<double>(all.size()));
   return text + false_alarms(all) + power(all) + after_adding(all) + others(all) + confusion(all) +
          fmt::format(
              "Targets: false names in at most {:.2f} % of the sets with nothing hidden; named right 100 % from a "
              "quarter "
              "of the noise on and 95 % from a tenth; right when named 99 %; hold-out within 1.05 of the floor; "
-             "parameters within 2 %, shapes within 5 %; intervals that hold the truth in 90 to 98 %; both of two "
+             "parameters within 2 %, nonlinear ones within 5 %; intervals that hold the truth in 90 to 98 %; both of "
+             "two "
              "effects in 97 %; 90 % of unknown ones flagged.\n",
              100.0 * kFalseAlarmTarget);
 }
@@ -235,9 +253,9 @@ std::string threshold_header(const std::vector<Outcome>& all, const std::string&
   for (const auto& [kind, some] : by_kind)
     kinds += fmt::format("//   {}: {} sets, largest score {:.1f}\n", kind, some.size(), quantile(some, 1.0));
   return fmt::format(
-      "// Made by `./dev soak MINUTES calibrate`; not written by hand. What a set with nothing hidden scores: the best "
+      "// Made by `./dev soak MINUTES calibrate`; not written by hand. The score of sets with nothing hidden: the best "
       "of all\n// candidates that are admissible.\n#pragma once\n\nnamespace "
-      "flexspline::diagnosis {{\n\n// From {} sets of the demo's drive and its experiments, seeds {} to {}, version "
+      "flexspline::selection {{\n\n// From {} sets of the demo's drive and its experiments, seeds {} to {}, version "
       "{}:\n{}"
       "// Quantiles of the score: 50 % {:.1f}, 90 % {:.1f}, 99 % {:.1f}. One set in {:.0f} passes the limit, by an "
       "exponential\n// tail above the 90 % quantile whose scale is taken at its upper 95 % bound.\ninline constexpr "

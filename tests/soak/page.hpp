@@ -1,4 +1,4 @@
-// What a campaign found, as a page and as the limit that the diagnosis takes from it.
+// The results of a campaign as a page, and the limit that the diagnosis takes from them.
 #pragma once
 
 #include <string>
@@ -8,7 +8,7 @@
 
 namespace flexspline::soak {
 
-// Markdown: false alarms, named by size, confusion, errors, coverage, and what was missed of the targets.
+// Markdown: false alarms, names by size, errors, coverage, wrong names, targets.
 std::string page_of(const std::vector<Outcome>& outcomes, const std::string& version);
 
 // The header host/selection/named_score.hpp from the scores of calibration sets.

@@ -35,7 +35,7 @@ struct Row {
 
 }  // namespace
 
-int judge_proof(double minutes, const std::string& page, const std::string& version) {
+int run_proof_campaign(double minutes, const std::string& page, const std::string& version) {
   using Clock = std::chrono::steady_clock;
   const auto end =
       Clock::now() + std::chrono::duration_cast<Clock::duration>(std::chrono::duration<double>(60.0 * minutes));
@@ -69,7 +69,7 @@ int judge_proof(double minutes, const std::string& page, const std::string& vers
     }
   }
   std::string text = fmt::format(
-      "# The error of parameter blocks: proven beside seen\n\nVersion {}. {} directed samples of {} random models. "
+      "# The error of parameter blocks: proven and seen\n\nVersion {}. {} directed samples of {} random models. "
       "Errors are "
       "in bases of torque; what the columns mean is in [`PROOF.md`](../../host/deployment/PROOF.md).\n\n| effect | "
       "proven | "

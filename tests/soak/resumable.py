@@ -1,9 +1,9 @@
-"""Results of a campaign as JSON lines, so that it goes on where its last run stopped."""
+"""Results of a campaign as JSON lines, so that it continues where its last run stopped."""
 import json
 
 
 def results_so_far(file, version, key):
-    """By key(result); those of another version are put aside."""
+    """By key(result); a file of another version is renamed."""
     if not file.exists():
         return {}
     lines = file.read_text().splitlines()
@@ -14,7 +14,7 @@ def results_so_far(file, version, key):
     for line in lines[1:]:
         try:
             one = json.loads(line)
-        except json.JSONDecodeError:  # half written, by a run that was stopped
+        except json.JSONDecodeError:  # incomplete, from a run that was stopped
             continue
         known[key(one)] = one
     return known

@@ -2,17 +2,17 @@
 """What is named on robot-like twins: robot_like.py TOOLS MINUTES FOLDER VERSION [options]
 
 Writes twins with flexspline_robot_twins (tests/worlds), runs `flexspline diagnose` on each with its hold-out and compares what is
-named with the truth. Goes on where the last run of this version stopped (FOLDER/robot-like.jsonl) and prints a Markdown table by
+named with the truth. Continues where the last run of this version stopped (FOLDER/robot-like.jsonl) and prints a Markdown table by
 family and by hidden effect. Options:
 
-  --families A,B      which families, in turn (default: robot-like every other time, between them all others)
-  --first N           first seed (default 60001: for the figures alone; calibrate below it)
+  --families A,B      which families, in turn (default: robot-like in alternation with all others)
+  --first N           first seed (default 60001, for figures; calibrate on lower ones)
   --count N           stop after so many seeds even if there is time
   --variants          also with half and twice the cut-off, without the mask and with a tenth of the data left out
   --tool FILE         another program than TOOLS/flexspline
   --twins FILE        another program than TOOLS/tests/flexspline_robot_twins
-  --show              only print the table of what is there
-Exit code 1 where a program could not be run; false names are what the table is for."""
+  --show              only print the table of the present results
+Exit code 1 if a program could not be run; false names are in the table."""
 import argparse
 import collections
 import json
@@ -63,7 +63,11 @@ def is_hidden(name, hidden):
 
 
 def true_name(name, truth):
-    return any(is_hidden(name, h) for h in truth["hidden"]) or any(name[0] == a["effect"] for a in truth["also_true"])
+    def same(also):
+        # Orders are tried as whole numbers: the one next to a wave's is its name.
+        return name[0] == also["effect"] and ("order" not in also or (name[1] is not None and abs(name[1] - also["order"]) <= 0.5))
+
+    return any(is_hidden(name, h) for h in truth["hidden"]) or any(same(a) for a in truth["also_true"])
 
 
 def outcome_of(answer, truth):

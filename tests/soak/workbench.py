@@ -1,11 +1,11 @@
 #!/usr/bin/env python3
 """The workbench under load: workbench.py TOOLS MINUTES FOLDER VERSION
 
-Four clients at once ask a workbench of the embedded twin's recording for what its page asks for, let it work (diagnose, add,
-undo, tabs), and send what no page would: numbers that are none, unknown fields, broken JSON, long texts, wrong tokens. Each
-request gets an answer of its kind: 200 with JSON, or a refusal with its reason; never a 5xx, nothing without a token, and at
-the end the page is still there and has grown by less than 1500 MB (24 tabs, each of which keeps its steps and what it made for them). Rounds of one minute, each with a new workbench and seed;
-goes on where the last run of this version stopped (FOLDER/workbench.jsonl). Exit code 1 where a round went wrong."""
+Four clients at once send a workbench of the embedded twin's recording the requests of its page, start work (diagnose, add, undo,
+tabs), and send what no page would: invalid numbers, unknown fields, broken JSON, long texts, wrong tokens. Each request gets an
+answer of its kind: 200 with JSON, or a refusal with its reason; never a 5xx, nothing without a token. At the end the page still
+answers and has grown by less than 1500 MB (24 tabs, each with its steps and their results). Rounds of one minute, each with a new
+workbench and seed; continues where the last run of this version stopped (FOLDER/workbench.jsonl). Exit code 1 if a round failed."""
 import collections
 import json
 import random
@@ -121,7 +121,7 @@ def one_round(number, seconds):
                 break
             time.sleep(0.1)
         if not listening.exists():
-            result["wrong"] = ["it did not come up: " + (folder / "workbench.txt").read_text()[-300:]]
+            result["wrong"] = ["it did not start: " + (folder / "workbench.txt").read_text()[-300:]]
             return result
         address = next(v for v in json.loads(listening.read_text()).values() if str(v).startswith("http"))
         clients = [Client(address, 1000 * number + i, time.monotonic() + seconds) for i in range(CLIENTS)]
@@ -150,7 +150,7 @@ def one_round(number, seconds):
             server.wait(20)
         except subprocess.TimeoutExpired:
             server.kill()
-            result["wrong"].append("it did not end when told to")
+            result["wrong"].append("it did not end on request")
     return result
 
 
@@ -162,7 +162,7 @@ if results_file.exists():
             try:
                 one = json.loads(line)
                 rounds[one["round"]] = one
-            except json.JSONDecodeError:  # half written, by a run that was stopped
+            except json.JSONDecodeError:  # incomplete, from a run that was stopped
                 pass
     else:
         results_file.rename(str(results_file) + ".old")

@@ -60,8 +60,8 @@ inline DriveConstants<double> random_drive(Random& random) {
   return d;
 }
 
-// Parameters of an effect within their bounds, in the order of the catalogue: shapes up to five times their usual size
-// to each side, torques a tenth of `size` usual ones up to `size` of them.
+// Parameters of an effect within their bounds, in the order of the catalogue: nonlinear ones up to five times their
+// usual size to each side, torques a tenth of `size` usual ones up to `size` of them.
 inline std::vector<double> drawn_parameters(const catalogue::Entry& entry, double size, Random& random) {
   std::vector<double> usual;
   for (const effects::ParameterInfo& p : entry.parameters) usual.push_back(p.usual);

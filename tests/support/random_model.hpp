@@ -13,7 +13,7 @@
 namespace flexspline::tests {
 
 // A drive somewhat like the report's with three to eight effects, none of which stands in for another, torques from a
-// tenth to three times their usual size, shapes from half to twice. With `only` it has that effect alone.
+// tenth to three times their usual size, nonlinear parameters from half to twice. With `only` it has that effect alone.
 inline model::Model random_model(std::mt19937& random, const catalogue::Entry* only = nullptr) {
   const auto between = [&](double low, double high) {
     return std::uniform_real_distribution<double>(low, high)(random);

@@ -1,4 +1,4 @@
-// A host beside a twin, in one process: asks and lets time pass until the answer comes.
+// A host and a twin in one process: sends requests and lets time pass until the answer comes.
 #pragma once
 
 #include <gtest/gtest.h>

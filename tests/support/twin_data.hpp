@@ -68,7 +68,7 @@ inline model::Model model_of(const plant::Drive& drive, bool with_hidden, bool w
         ours.parameters[p].value = effect.value(ours.parameters[p].name);
     model.effects.push_back(std::move(ours));
   }
-  // What an effect stands in for is not in the drive beside it.
+  // The drive lacks the effects that another one replaces.
   std::string replaced;
   for (const model::Effect& e : model.effects) replaced += std::string(catalogue::get(e.type).info->replaces) + ",";
   std::erase_if(model.effects, [&](const model::Effect& e) { return catalogue::names_contain(replaced, e.type); });

@@ -189,20 +189,6 @@ std::string text_of(const char* path) {
   return std::string(std::istreambuf_iterator(in), {});
 }
 
-// What stands between the first line that is `open` and the next that is `close`.
-std::string between(const std::string& text, const std::string& open, const std::string& close) {
-  const std::size_t from = text.find(open + "\n");
-  if (from == std::string::npos) return {};
-  const std::size_t begin = from + open.size() + 1;
-  return text.substr(begin, text.find(close + "\n", begin) - begin);
-}
-
-TEST(EffectDocuments, ShowTheExampleAsItStandsInTheTree) {
-  const std::string example = between(text_of("shared/effects/README.md"), "```cpp", "```");
-  EXPECT_FALSE(example.empty());
-  EXPECT_EQ(example, text_of("shared/effects/quadratic_drag.hpp"));
-}
-
 // Rows of the tables of a document by the name in their first column.
 std::multimap<std::string, std::string> rows_of(const std::string& text) {
   std::multimap<std::string, std::string> rows;

@@ -118,7 +118,7 @@ TEST(Catalogue, BoundsHoldTheUsualValueAndShapesAreBounded) {
       // What is searched for needs a bound of its own from below, and from above one of its own or of the data; an
       // angle of either sign has both from the data.
       const bool signed_angle = std::isinf(parameter.low);
-      EXPECT_EQ(signed_angle, signed_angles().contains(entry.name()) && parameter.kind == Kind::shape);
+      EXPECT_EQ(signed_angle, signed_angles().contains(entry.name()) && parameter.kind == Kind::nonlinear);
       if (signed_angle) {
         EXPECT_EQ(parameter.limit, Limit::torsion);
         EXPECT_TRUE(std::isinf(parameter.high));
@@ -126,8 +126,8 @@ TEST(Catalogue, BoundsHoldTheUsualValueAndShapesAreBounded) {
       EXPECT_TRUE(std::isfinite(parameter.high) || parameter.limit != Limit::stated);
       EXPECT_TRUE(parameter.usual != 0.0 || parameter.low < 0.0);
     }
-    EXPECT_EQ(entry.parameters.size(), entry.count(Kind::linear) + entry.count(Kind::shape) + entry.count(Kind::given) +
-                                           entry.count(Kind::grid));
+    EXPECT_EQ(entry.parameters.size(), entry.count(Kind::linear) + entry.count(Kind::nonlinear) +
+                                           entry.count(Kind::given) + entry.count(Kind::grid));
     EXPECT_GT(entry.parameters.size(), 0U);
   }
 }
@@ -166,7 +166,7 @@ TEST(Catalogue, StatesRatiosPerAParameterThatIsThereAndSizesOfAGridAsGrowingShar
   EXPECT_EQ(roots, (std::map<std::string, std::string>{{"bouc_wen_hysteresis.beta", "exponent"}}));
 }
 
-// Where an effect reaches balances beside its own, where its size shows, and which stay on the host.
+// Where an effect reaches balances other than its own, where its size shows, and which stay on the host.
 TEST(Catalogue, SaysWhatReachesOtherBalancesAndWhatADriveCannotHold) {
   std::map<std::string_view, unsigned> reach;
   std::set<std::string_view> identified_on_motor, host_only;

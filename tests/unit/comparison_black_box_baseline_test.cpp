@@ -1,4 +1,5 @@
-// Black boxes beside a model: on a drive that is linear both are right; on one with dry friction only the model is.
+// Black boxes compared with a model: on a drive that is linear both are right; on one with dry friction only the model
+// is.
 #include "host/comparison/black_box_baseline.hpp"
 
 #include <gtest/gtest.h>

@@ -283,7 +283,7 @@ TEST(Excitation, KeepsToItsLimitsForAHundredThousandAdversarialTicks) {
     setup.ticks = 900;
     const bool clipped = setup.offset + 1.2 * setup.amplitude > setup.limit;
     const auto c = Excitation::derive<Checked>(setup, kBase, drive());
-    EXPECT_TRUE(OverflowLog::count() == 1 || !clipped);  // told, and held all the same
+    EXPECT_TRUE(OverflowLog::count() == 1 || !clipped);  // reported, and clipped nevertheless
     OverflowLog::clear();
     Excitation::State<Checked> s;
     Excitation::start(s, c);

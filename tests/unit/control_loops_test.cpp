@@ -211,7 +211,7 @@ TEST(Loops, ClosingALoopAndChangingTheModeMakeNoStepOfTheTorque) {
   // Closed on a turning shaft: from zero.
   auto out = Loops::update(s, c, velocity_command(42.0), angle, velocity);
   EXPECT_NEAR(real(out.torque), 0.0, 1e-8);
-  // Torque mode gives what it is told; then back.
+  // Torque mode gives the commanded torque; then back.
   out = Loops::update(s, c, {Mode::torque, {}, {}, Fixed::value(0.31)}, angle, velocity);
   EXPECT_NEAR(real(out.torque), 0.31, 1e-8);
   out = Loops::update(s, c, velocity_command(41.0, 0.05), angle, velocity);

@@ -52,32 +52,32 @@ ResidualMap made_map(const Made& made, unsigned seed) {
 
 TEST(ResidualMapVerdict, NoiseAloneFitsInEveryOneOfSixtyMaps) {
   for (unsigned seed = 1; seed <= 60; ++seed)
-    EXPECT_EQ(judge(made_map({}, seed), 1e-9).verdict, MapVerdict::model_fits) << seed;
+    EXPECT_EQ(test_map(made_map({}, seed), 1e-9).verdict, MapVerdict::model_fits) << seed;
 }
 
 TEST(ResidualMapVerdict, FindsAnOffsetWhereItIsAndAnOrderAndTheirSizes) {
   for (unsigned seed = 1; seed <= 20; ++seed) {
-    const MapTest j = judge(made_map({.offset_nm = -0.004}, seed), 1e-4);
+    const MapTest j = test_map(made_map({.offset_nm = -0.004}, seed), 1e-4);
     ASSERT_EQ(j.verdict, MapVerdict::model_fails) << seed;
     ASSERT_EQ(j.findings.size(), 1U) << "neighbours are one finding";
     EXPECT_EQ(j.findings[0].order, 0);
     EXPECT_EQ(j.findings[0].velocity.low, 1.0);
     EXPECT_EQ(j.findings[0].velocity.high, 5.0);
     EXPECT_NEAR(j.findings[0].size_nm, -0.004, 5.0 * j.findings[0].std_nm);
-    const MapTest order = judge(made_map({.ripple_nm = 0.002}, seed), 1e-4);
+    const MapTest order = test_map(made_map({.ripple_nm = 0.002}, seed), 1e-4);
     ASSERT_EQ(order.findings.size(), 1U) << seed;
     EXPECT_EQ(order.findings[0].order, 3);
-    // The middle of a bin stands for all of it here: the judge makes good for a bin's width, 1.4 % at this order.
+    // The middle of a bin stands for all of it here: the test corrects for a bin's width, 1.4 % at this order.
     EXPECT_NEAR(order.findings[0].size_nm, 0.002 * 1.0146, 5.0 * order.findings[0].std_nm);
     EXPECT_LT(order.findings[0].p_value, kMapCertainty);
   }
 }
 
 TEST(ResidualMapVerdict, SaysSoWhereThereIsTooLittleAndPassesOverWhatIsSmallerThanTheLimit) {
-  EXPECT_EQ(judge(made_map({.seconds = 0.0}, 1), 1e-4).verdict, MapVerdict::too_little_data);
-  const MapTest j = judge(made_map({.ripple_nm = 0.002}, 1), 0.003);
+  EXPECT_EQ(test_map(made_map({.seconds = 0.0}, 1), 1e-4).verdict, MapVerdict::too_little_data);
+  const MapTest j = test_map(made_map({.ripple_nm = 0.002}, 1), 0.003);
   EXPECT_EQ(j.verdict, MapVerdict::model_fits);
-  EXPECT_EQ(j.tested_bins, 14U) << "standstill is not judged";
+  EXPECT_EQ(j.tested_bins, 14U) << "standstill is not tested";
 }
 
 TEST(ResidualMapVerdict, VelocitiesOfBinsAreThoseBetweenTheEdges) {
@@ -133,7 +133,7 @@ TEST(ResidualMapOverTheProtocol, NamesARippleThatTheBlockLacksAndFindsNothingWhe
     EXPECT_TRUE(map.counts);
     EXPECT_TRUE(map.of_one_moment) << "nothing is fed forward any more";
     EXPECT_GT(map.seconds(), 4.0);
-    const MapTest j = judge(map, 1e-3);
+    const MapTest j = test_map(map, 1e-3);
     for (const MapFinding& f : j.findings)
       std::printf("known %d: order %d, %.2f to %.2f rad/s, %.5f +- %.5f N m, p %.2g\n", known, f.order, f.velocity.low,
                   f.velocity.high, f.size_nm, f.std_nm, f.p_value);

@@ -1,4 +1,4 @@
-// A fit that nobody wants any more: whoever asked for it is asked back, and what that throws ends it.
+// A fit that is cancelled: it checks the cancellation token again and again, and what that throws ends it.
 #include "host/estimation/cancellation.hpp"
 
 #include <gtest/gtest.h>
@@ -36,38 +36,39 @@ const Case& a_case() {
   return made;
 }
 
-// How often is asked when an effect with shapes is added; the ask of this number throws (zero: none does).
-int asked_until(int last) {
+// How often the cancellation token is checked while an effect with nonlinear parameters is added; the check of this
+// number throws (zero: none does).
+int checks_until(int last) {
   std::atomic<int> count{0};
-  const CancellationCheck ask = [&] {
+  const CancellationCheck check = [&] {
     if (++count == last) throw Enough{};
   };
-  const CancellationScope scope(&ask);
+  const CancellationScope scope(&check);
   const auto add = [] { selection::add(a_case().dataset, a_case().model, "stribeck_gaussian", {}); };
   if (last == 0) {
     add();
   } else {
-    EXPECT_THROW(add(), Enough) << "at ask " << last;
+    EXPECT_THROW(add(), Enough) << "at check " << last;
   }
   return count;
 }
 
 TEST(Cancellation, AFitEndsWhereItIsNoLongerWantedWhetherEarlyOrLate) {
-  const int whole = asked_until(0);
+  const int whole = checks_until(0);
   // Each record and each set of columns, of the fit before and of the one after.
   ASSERT_GT(whole, 40);
   for (const int last : {1, whole / 4, whole / 2, 3 * whole / 4}) {
-    const int asked = asked_until(last);
-    EXPECT_GE(asked, last);
-    EXPECT_LT(asked, whole) << "the rest was done all the same";
+    const int checks = checks_until(last);
+    EXPECT_GE(checks, last);
+    EXPECT_LT(checks, whole) << "the rest was done all the same";
   }
 }
 
-TEST(Cancellation, NobodyIsAskedOnceTheOneWhoAskedIsGone) {
+TEST(Cancellation, TheCheckEndsWithItsScope) {
   int count = 0;
-  const CancellationCheck ask = [&] { ++count; };
+  const CancellationCheck check = [&] { ++count; };
   {
-    const CancellationScope outer(&ask);
+    const CancellationScope outer(&check);
     const CancellationCheck other = [] {};
     {
       const CancellationScope inner(&other);

@@ -226,14 +226,15 @@ TEST(Identify, SpreadIsTheSampleDeviationOverTheAverageOfTheExperiments) {
   const auto found = identify(dataset_of(std::move(experiments)), model_of(kPlain), kOptions);
   const Estimate& viscous = estimate(*found, "viscous_friction", "coefficient");
   ASSERT_EQ(viscous.per_experiment.size(), 3u);
-  EXPECT_NEAR(*viscous.per_experiment[0].second / kViscous, 0.9, 2e-3);
+  EXPECT_NEAR(*viscous.per_experiment[0].value / kViscous, 0.9, 2e-3);
   EXPECT_NEAR(*viscous.average / kViscous, 1.0, 1e-3);
   // Deviations -0.1, 0, 0.1 have sqrt(0.02 / 2) = 0.1 with n - 1 and 0.082 with n.
   EXPECT_NEAR(*viscous.spread_percent, 10.0, 0.2);
-  EXPECT_TRUE(viscous.reliable);
+  EXPECT_EQ(viscous.reliable, std::optional(true));
 }
 
-TEST(Identify, SpreadIsUnknownWhereTheAverageDoesNotDifferFromZero) {
+// Their scatter is what makes the average uncertain: they are not reliable, and it is said by how much.
+TEST(Identify, ExperimentsThatDifferBeyondTheirErrorsAreUnreliableEvenAroundZero) {
   std::vector<data::Experiment> experiments;
   for (const double bias : {-0.010, 0.013, 0.003})
     experiments.push_back(
@@ -242,8 +243,17 @@ TEST(Identify, SpreadIsUnknownWhereTheAverageDoesNotDifferFromZero) {
   const auto found = identify(dataset_of(std::move(experiments)), model, kOptions);
   const Estimate& bias = estimate(*found, "torque_bias", "torque");
   EXPECT_NEAR(*bias.average, 0.002, 1e-4);
-  EXPECT_FALSE(bias.spread_percent);
-  EXPECT_TRUE(bias.reliable);
+  EXPECT_GT(bias.spread_percent.value(), 500.0);
+  EXPECT_EQ(bias.reliable, std::optional(false));
+}
+
+TEST(Identify, TwoExperimentsAreNoVerdictOnReliability) {
+  std::vector<data::Experiment> experiments;
+  for (const char* name : {"a", "b"}) experiments.push_back(experiment(name, kLively, plain));
+  const auto found = identify(dataset_of(std::move(experiments)), model_of(kPlain), kOptions);
+  const Estimate& viscous = estimate(*found, "viscous_friction", "coefficient");
+  EXPECT_EQ(viscous.counted(), 2u);
+  EXPECT_FALSE(viscous.reliable);
 }
 
 TEST(Identify, DirectionsAreSumAndDifferenceAndTheirSpreadJudgesTheAsymmetry) {

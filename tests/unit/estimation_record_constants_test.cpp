@@ -69,9 +69,9 @@ TEST(TorsionZero, IsFoundForEveryRecordAndLeavesTheStiffnessAsItIs) {
   const auto found = identify(recordings(), spring(true), kFilters);
   const Estimate& zero = of(*found, "torsion_zero");
   ASSERT_EQ(zero.per_experiment.size(), 3u);
-  for (std::size_t i = 0; i < 3; ++i) EXPECT_NEAR(*zero.per_experiment[i].second, kZeros[i], 2e-6) << i;
+  for (std::size_t i = 0; i < 3; ++i) EXPECT_NEAR(*zero.per_experiment[i].value, kZeros[i], 2e-6) << i;
   EXPECT_NEAR(*zero.average, (kZeros[0] + kZeros[1] + kZeros[2]) / 3.0, 2e-6);
-  EXPECT_TRUE(zero.reliable) << "it is meant to differ";
+  EXPECT_FALSE(zero.reliable) << "it is meant to differ: no verdict";
   EXPECT_NEAR(of(*found, "linear_stiffness").value / kStiffness, 1.0, 2e-3);
   EXPECT_NEAR(of(*found, "cubic_stiffness").value / kCubic, 1.0, 2e-2);
   EXPECT_LT(found->fits.front().rmse(), 0.02);

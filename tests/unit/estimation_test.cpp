@@ -124,9 +124,9 @@ TEST(Estimate, ThePartitionKeepsItsLinearParametersThroughTheSearchForShapes) {
   how.method = Method::partitioned;
   const auto plain = estimate(recorded(motor), model, kFilters, how);
   model.effects.push_back(catalogue::blank_effect(catalogue::get("stribeck_gaussian"), model.drive.axis));
-  const auto with_shapes = estimate(recorded(motor), model, kFilters, how);
+  const auto with_nonlinear = estimate(recorded(motor), model, kFilters, how);
   for (const char* name : {"inertia", "viscous_friction", "coulomb_friction"})
-    EXPECT_NEAR(of(*with_shapes, name).value / of(*plain, name).value, 1.0, 1e-9) << name;
+    EXPECT_NEAR(of(*with_nonlinear, name).value / of(*plain, name).value, 1.0, 1e-9) << name;
 }
 
 // For a linear model the sum of squares is a parabola: the profile's ends are the standard interval's.

@@ -1,4 +1,4 @@
-// Torque readings beside a held effort: against two rigid inertias, whose motion from sample to sample has a closed
+// Torque readings with a held effort: against two rigid inertias, whose motion from sample to sample has a closed
 // form.
 #include "host/estimation/zero_order_hold.hpp"
 

@@ -33,7 +33,7 @@ TEST(FirmwareImage, WhatIsMadeIsRead) {
   EXPECT_EQ(image.board(), "stm32f405");
   EXPECT_EQ(text_of(image.header.version), "3.14");
   EXPECT_EQ(image.header.bytes, 1000U);
-  EXPECT_EQ(image.header.signature_kind, 0U);
+  EXPECT_EQ(image.header.signature_kind, boot::SignatureKind::none);
   EXPECT_TRUE(std::equal(bytes.begin() + boot::kHeaderBytes, bytes.end(), program().begin()));
 }
 

@@ -57,9 +57,9 @@ double amplitude(VirtualDrive& drive, double order) {
 VirtualDrive drive_with_ripple(bool known) {
   plant::Drive truth = demo_drive();
   plant::with(truth, "torque_ripple:2");
-  plant::Drive told = known ? truth : demo_drive();
+  plant::Drive stated = known ? truth : demo_drive();
   return VirtualDrive({.drive = truth, .seed = 7001},
-                      Block(board::parameters_of(told, board::setup_of(told)), board::constants_of(told)));
+                      Block(board::parameters_of(stated, board::setup_of(stated)), board::constants_of(stated)));
 }
 
 TEST(ResidualMapOnTheDrive, ShowsARippleThatTheModelLacks) {

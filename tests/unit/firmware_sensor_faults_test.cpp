@@ -55,10 +55,10 @@ TEST(SensorFaults, AnOutputThatTurnsWhileTheMotorsEncoderDoesNotIsSeen) {
 // What a rounded gear ratio makes in hours, and what a wrong one makes within a turn.
 TEST(SensorFaults, AGearRatioThatIsOffByATwentiethOfAPercentIsNoFaultAndOneOffByThreePercentIs) {
   for (const double off : {5e-4, 0.03}) {
-    plant::Drive told = demo_drive();
-    told.gear_ratio *= 1.0 + off;
+    plant::Drive stated = demo_drive();
+    stated.gear_ratio *= 1.0 + off;
     VirtualDrive drive({.drive = demo_drive(), .seed = 1},
-                       Block(board::parameters_of(told, board::setup_of(told)), board::constants_of(told)));
+                       Block(board::parameters_of(stated, board::setup_of(stated)), board::constants_of(stated)));
     drive.run(100);
     drive.command(arm_velocity(150.0));
     run_with_host(drive, 8.0);
@@ -66,7 +66,7 @@ TEST(SensorFaults, AGearRatioThatIsOffByATwentiethOfAPercentIsNoFaultAndOneOffBy
   }
 }
 
-// A drive that presses against a stop in mode current does what it is told.
+// A drive that presses against a stop in mode current follows its command.
 TEST(SensorFaults, ATorqueThatABlockedOutputHoldsForSecondsIsNoFaultInModeCurrent) {
   VirtualDrive drive({.drive = demo_drive(), .seed = 1, .locked = true}, demo_block());
   drive.run(100);

@@ -59,6 +59,7 @@ TEST(Service, ServesNothingButIdentifyUntilTheMajorVersionsAgree) {
   protocol::Identity id;
   EXPECT_EQ(protocol::take_payload(m.content(), id), Code::done);
   EXPECT_EQ(id.major, protocol::kMajor);
+  EXPECT_EQ(id.firmware_key, protocol::FirmwareKey::development);
   EXPECT_EQ(id.tick_hz, 20'000U);
   EXPECT_EQ(id.block_bytes, TwinDrive::Store::kCapacity);
   EXPECT_STREQ(reinterpret_cast<const char*>(id.serial.data()), "SN-7");

@@ -1,4 +1,4 @@
-// The watch for an encoder of the motor that is stuck, beside all that looks like one: torque faster than the shaft,
+// The watch for an encoder of the motor that is stuck, and all that looks like one: torque faster than the shaft,
 // what braked it, friction that holds most of what the drive can give.
 #include <gtest/gtest.h>
 

@@ -1,4 +1,4 @@
-// The C header of a model, compiled by a C compiler and run beside the simulation's balances.
+// The C header of a model, compiled by a C compiler and compared with the simulation's balances.
 #include <fmt/format.h>
 #include <gtest/gtest.h>
 #include <unistd.h>
@@ -154,7 +154,7 @@ void expect_same(const std::vector<Torques>& found, const std::vector<Torques>& 
 TEST(CHeader, OfEveryEffectComputesWhatTheSimulationDoes) {
   std::vector<model::Model> models;
   for (const catalogue::Entry& entry : catalogue::all()) {
-    if (entry.info->made_by_user) continue;
+    if (entry.info->user_defined) continue;
     models.push_back(model_with(entry.name()));
   }
   ASSERT_GT(models.size(), 40u);

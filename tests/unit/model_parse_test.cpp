@@ -214,11 +214,12 @@ TEST(ModelParse, NamesTheLineOfEveryMistakeElsewhere) {
   expect_error(kHead + "[drive]\ngear_ratio = 1\ngear_ratio = 2\n", 4, "not TOML", "once");
   for (const char* header : {"[.x]\n", "[#]\n", "[=", "[[", "[\xc3\xa4]\n"})
     expect_error(kHead + header, 2, "not TOML", "correct");
-  for (const char* letter : {"\u00e4 = 1", "a = \u00e4", "[\u00b5]", "a = 1\"\u00e4\"", "name = \"\"\"\"\"\" \u00e4",
-                             "name = '\\' # '\n\u00e4"})
+  for (const char* letter :
+       {"\u00e4 = 1", "a = \u00e4", "[\u00b5]", "name = \"\"\"\"\"\" \u00e4", "name = '\\' # '\n\u00e4"})
     EXPECT_NE(error_of(kHead + letter).find("outside quotes; correct it"), std::string::npos) << letter;
   EXPECT_EQ(error_of(kHead + "name = \"\"\"\\\"\"\"\u00e4'\n\u00e4\"\"\"\"\" # '\u00e4"), "no error");
   expect_error(kHead + "name = \"\xff\"\n", 2, "not TOML", "UTF-8");
+  expect_error(kHead + "a = 1\"\u00e4\"", 2, "expected digit", "correct");
 }
 
 }  // namespace

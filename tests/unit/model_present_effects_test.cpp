@@ -46,7 +46,7 @@ typename Effect::template Coefficients<Fixed> usual() {
 }
 template <class Effect>
 constexpr bool on_a_drive() {
-  return !Effect::kInfo.host_only && !Effect::kInfo.made_by_user;
+  return !Effect::kInfo.host_only && !Effect::kInfo.user_defined;
 }
 bool same(const Torques<Fixed>& a, const Torques<Fixed>& b) {
   return a.motor.raw == b.motor.raw && a.transmission.raw == b.transmission.raw && a.load.raw == b.load.raw;

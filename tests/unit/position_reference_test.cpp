@@ -1,4 +1,4 @@
-// Where a drive's shafts are after it was switched on: what an encoder of each kind tells, what is left out until it is
+// Where a drive's shafts are after it was switched on: what an encoder of each kind knows, what is left out until it is
 // known, and what loses it again.
 #include <gtest/gtest.h>
 

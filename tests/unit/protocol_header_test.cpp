@@ -1,4 +1,4 @@
-// The C header's offsets beside bytes that the protocol and the block writer themselves put there.
+// The C header's offsets compared with bytes that the protocol and the block writer themselves put there.
 #include <gtest/gtest.h>
 
 #include <cstdio>

@@ -35,6 +35,7 @@ void randomise(std::mt19937& r, Identity& x) {
   x.tick_hz = r(), x.block_bytes = r(), x.effects = static_cast<std::uint16_t>(r());
   x.channels = below<std::uint8_t>(r, 256), x.most_channels = below<std::uint8_t>(r, 256);
   x.most_lines = below<std::uint8_t>(r, 256), x.has_output_encoder = below<std::uint8_t>(r, 2);
+  x.firmware_key = below<FirmwareKey>(r, kFirmwareKeys);
 }
 void randomise(std::mt19937& r, Effects& x) {
   fill(r, x.bits);
@@ -222,10 +223,10 @@ TEST(Protocol, BytesOnTheWireAreTheRecordedOnes) {
   id.board = {'b'};
   id.serial = {'A', '1'};
   id.tick_hz = 20'000, id.block_bytes = 16'128, id.effects = 43, id.channels = 21, id.most_channels = 12;
-  id.most_lines = 32, id.has_output_encoder = 1;
+  id.most_lines = 32, id.has_output_encoder = 1, id.firmware_key = FirmwareKey::development;
   EXPECT_EQ(wire(answer_to(request(Kind::identify, 7, Hello{}), Code::done, id)),
-            "810732000102030462000000000000000000000000000000"
-            "41310000000000000000000000000000204e0000003f00002b00150c2001");
+            "810733000103030462000000000000000000000000000000"
+            "41310000000000000000000000000000204e0000003f00002b00150c200102");
   Status s{0x01020304, Mode::fault, true, StoreState::fell_back, 13, 5, -2, 3, 4, 6, 8, {0x100, 0xA1B2C3D4}, {9, 10}};
   EXPECT_EQ(wire(answer_to(request(Kind::status, 1, Empty{}), Code::done, s)),
             "82012e0004030201070102"

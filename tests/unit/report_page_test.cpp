@@ -38,7 +38,7 @@ json document_in(const std::string& page) {
   return json::parse(page.substr(start + open.size(), end - start - open.size()));
 }
 
-// A free motion to fit and a locked one to judge, of a drive whose model lacks one effect.
+// A free motion to fit and a locked one held out, of a drive whose model lacks one effect.
 struct Case {
   data::Dataset dataset;
   model::Model model;
@@ -218,15 +218,15 @@ TEST(ReportDocument, EveryExperimentHasItsFreeRunBesideTheMeasurement) {
       EXPECT_EQ(run["measured"]["count"], points);
       EXPECT_EQ(run["model"]["count"], points);
       if (run["signal"] != "motor_velocity") continue;  // hardly any noise, which thinning would favour
-      // What is drawn has the error that is told.
+      // What is drawn has the error that is stated.
       double error = 0.0;
       for (std::size_t k = 0; k < points; ++k)
         error += std::pow(decoded(run["measured"], k) - decoded(run["model"], k), 2.0) / static_cast<double>(points);
       const json& signals = the_document()["comparison"]["experiments"][e]["signals"];
-      const auto told =
+      const auto stated =
           std::find_if(signals.begin(), signals.end(), [](const json& x) { return x["signal"] == "motor_velocity"; });
-      ASSERT_NE(told, signals.end());
-      EXPECT_NEAR(std::sqrt(error), (*told)["rmse"].get<double>(), 0.1 * (*told)["rmse"].get<double>());
+      ASSERT_NE(stated, signals.end());
+      EXPECT_NEAR(std::sqrt(error), (*stated)["rmse"].get<double>(), 0.1 * (*stated)["rmse"].get<double>());
     }
     for (const char* signal : {"motor_velocity", "torque"})
       EXPECT_NE(std::find(names.begin(), names.end(), signal), names.end()) << trace["experiment"] << signal;

@@ -239,7 +239,7 @@ TEST(ParameterStore, ACutCommitFollowedByACutRestoreLeavesOneOfTheBlocksThatWere
   std::printf("power cuts, commit and restore mixed: %zu\n", pairs);
 }
 
-// The newest block that rots is told from one that was never committed.
+// The newest block that rots is distinguished from one that was never committed.
 TEST(ParameterStore, DamagedBlocksAreSaidToBeDamagedAndNeverReplacedSilently) {
   Cells prepared;
   on(prepared, storing('a'));

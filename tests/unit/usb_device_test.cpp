@@ -152,7 +152,7 @@ TEST(UsbDevice, TakesItsAddressWhenTheHostHasSeenTheStatusStage) {
   b.host.bus_reset();
   EXPECT_EQ(b.device.address(), 0);
 
-  // Controllers that wait by themselves are told before.
+  // Controllers that wait by themselves are informed before.
   Bench<true, SmallHid> early;
   early.host.bus_reset();
   early.host.setup({0x00, 5, 9, 0, 0});

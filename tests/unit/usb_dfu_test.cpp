@@ -20,6 +20,7 @@ using usb::DfuStatus;
 
 struct Memory {
   static constexpr std::string_view kName = "bench";
+  static constexpr bool kCanUpload = true;
   DfuStatus write(std::size_t at, std::span<const std::uint8_t> block) {
     if (at != written.size()) return DfuStatus::unknown;
     written.insert(written.end(), block.begin(), block.end());
@@ -200,7 +201,27 @@ TEST(UsbDfu, DescriptorsAreThoseOfTheSpecification) {
   EXPECT_EQ(application.list[1].code, 0xfe);
   EXPECT_EQ(application.list[1].subclass, 1);
   EXPECT_EQ(application.list[1].protocol, 1);
-  EXPECT_EQ(application.list[1].others, std::vector<Octets>{functional});
+  Octets without_upload = functional;
+  without_upload[2] = 0x0d;
+  EXPECT_EQ(application.list[1].others, std::vector<Octets>{without_upload});
+}
+
+struct ClosedMemory : Memory {
+  static constexpr bool kCanUpload = false;
+};
+TEST(UsbDfu, ABootLoaderWithoutUploadSaysSoAndGivesNothingAway) {
+  ClosedMemory memory;
+  Bench<false, usb::DfuMode<ClosedMemory>> b;
+  b.device.get<usb::DfuMode<ClosedMemory>>().use(memory);
+  ASSERT_TRUE(b.host.enumerate());
+  const auto mode = read_configuration(b.host.descriptor(2, 0, 255).data).value();
+  EXPECT_EQ(mode.list[0].others[0][2], 0x0d);
+  const Done done = b.host.get({0xa1, 2, 0, 0, 64});
+  EXPECT_TRUE(done.stalled);
+  EXPECT_TRUE(done.data.empty());
+  EXPECT_EQ(b.host.get({0xa1, 3, 0, 0, 6}).data[0], 15) << "errSTALLEDPKT";
+  EXPECT_FALSE(b.host.set({0x21, 4, 0, 0, 0}).stalled);
+  EXPECT_FALSE(b.host.set({0x21, 1, 0, 0, 0}, counting(8)).stalled) << "a download goes on";
 }
 
 TEST(UsbDfu, AnApplicationGoesToItsBootLoaderOnceItMayAndTheHostHasTheAnswer) {
@@ -294,6 +315,8 @@ TEST(UsbDfu, AnUploadEndsWithAShortBlockAndWithoutAnImageItSaysSo) {
 // The whole chain: the host's code, the drive's core and class, its boot loader, and flash memory.
 struct LoaderBoard {
   using Slots = testing::SlotFlash;
+  using Trust = boot::AnySigner;
+  static constexpr bool kCanUpload = true;
   static constexpr std::string_view kName = testing::kTestBoard;
   static constexpr std::uint32_t kEraseMs = 3, kBlockMs = 2, kCheckMs = 1;
   Slots& slots() { return flash; }

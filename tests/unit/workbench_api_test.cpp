@@ -252,7 +252,7 @@ TEST_F(WorkbenchApi, RunsTheClosedLoopWithoutCompensationWithTheModelAsOpenedAnd
       o.what = "made up";
       o.seconds = 2.0;
       o.tick_hz = closed_loop::kTwinTickHz;
-      // Worse without compensation than with; the block tells the two models apart.
+      // Worse without compensation than with; the block distinguishes the two models.
       o.rms_error_rad = !job.compensation ? 1e-3 : job.block == ran.front().block ? 4e-4 : 2e-4;
       o.trace.time_s = {0.0, 1.0, 2.0};
       o.trace.error_rad = {0.0, o.rms_error_rad, -o.rms_error_rad};

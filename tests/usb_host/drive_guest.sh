@@ -1,4 +1,4 @@
-# Run in the guest, beside flexspline-hil twin --usbip: the tool's commands on a drive that the operating system takes for
+# Run in the guest, with flexspline-hil twin --usbip outside: the tool's commands on a drive that the operating system takes for
 # a real one, by both of hidapi's ways, and the plug pulled in the middle of them.
 
 # Both back ends have the same functions, so the one that is loaded first is the tool's, whichever it was linked to.

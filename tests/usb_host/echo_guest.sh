@@ -1,4 +1,4 @@
-# Run in the guest, beside echo_twin with two devices: Linux's own USB stack, usbip, lsusb and hidapi against shared/usb.
+# Run in the guest, with echo_twin and its two devices outside: Linux's own USB stack, usbip, lsusb and hidapi against shared/usb.
 
 usbip --tcp-port "$TWIN_PORT" list -r "$TWIN_HOST" >list.txt 2>&1 || fail "usbip list"
 expect "1-1:" list.txt

@@ -1,5 +1,5 @@
 #!/usr/bin/env bash
-# Boots Debian's kernel in QEMU and runs a script in it, beside a twin that offers USB devices on this machine's loopback.
+# Boots Debian's kernel in QEMU and runs a script in it, with a twin outside that offers USB devices on this machine's loopback.
 # What the script prints comes out here; its exit code is this one's. Nothing is installed and nobody has to be root.
 #
 #   guest.sh --work DIR --script FILE [--program PATH]... [--file PATH:IN_GUEST]... [--python MODULE]...

@@ -1,4 +1,4 @@
-# Run in the guest, beside flexspline-hil twin --usbip: a program of one's own, in Python, reads telemetry of a drive over USB by
+# Run in the guest, with flexspline-hil twin --usbip outside: a program of one's own, in Python, reads telemetry of a drive over USB by
 # the protocol's header and nothing else, by both of hidapi's ways; and says what is wrong where there is no drive.
 export PYTHONHOME=/python
 flexspline export --protocol-header --out protocol.h >said.txt 2>&1 || { cat said.txt; fail "there is no header"; }

@@ -1,4 +1,4 @@
-# Run in the guest, beside flexspline-hil twin --usbip: firmware updates by dfu-util and by flexspline flash, on a drive that
+# Run in the guest, with flexspline-hil twin --usbip outside: firmware updates by dfu-util and by flexspline flash, on a drive that
 # the operating system takes for a real one. It leaves the bus for its boot loader and comes back, so somebody has to put
 # the plug in again each time: USB/IP does not do that by itself.
 
@@ -63,6 +63,10 @@ refused "completion packet" dfu-util -D /images/short.image
 dfu-util -D /images/bad.image >said.txt 2>&1 || true
 expect "status(7)" said.txt
 refused "status(2)" dfu-util -D /images/noise.image
+refused "status(2)" dfu-util -D /images/unsigned.image
+# Its signature is checked once it is there.
+dfu-util -D /images/stranger.image >said.txt 2>&1 || true
+expect "status(2)" said.txt
 must dfu-util -D /images/0.2.dfu
 expect "Done!" said.txt
 unexpected "invalid dfu suffix" said.txt
@@ -98,7 +102,14 @@ must flexspline record --plan /drive/plan.toml --out again
 code=0
 flexspline flash --firmware /images/hangs.image >said.txt 2>&1 || code=$?
 [ $code -eq 1 ] || { cat said.txt; fail "an image that hangs ended with $code"; }
-expect "taken back; 0.1 runs" said.txt
+expect "rolled back; 0.1 runs" said.txt
 echo "  $(tail -n 1 said.txt)"
+# Signed by another key: refused by the drive, which goes on with what it had.
+refused "is not signed with the key" flexspline flash --firmware /images/stranger.image
+must flexspline flash --firmware /images/counter.image
+must flexspline record --plan /drive/plan.toml --out counted
+refused "smaller security counter" flexspline flash --firmware /images/0.3.image --older
+must flexspline flash --firmware /images/counter.image --older
+expect "Firmware 0.6 runs" said.txt
 dmesg | grep -iE 'usb|hid|vhci' >kernel.txt || fail "the kernel says nothing of USB"
 unexpected 'descriptor read|bogus|babble|BUG|oops' kernel.txt

@@ -1,8 +1,11 @@
 #include "tests/worlds/excess.hpp"
 
+#include <fmt/format.h>
+
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <stdexcept>
 
 namespace flexspline::worlds {
 namespace {
@@ -121,18 +124,6 @@ void shorten_presliding(Twin& twin) {
   }
 }
 
-// The squared error that an effect makes goes with the square of its size; that of the rest stays.
-void scale_hidden(Twin& twin) {
-  for (HiddenEffect& h : twin.hidden) {
-    const Hidden now = hidden_share(twin, without_noise(twin), h);
-    h.share = now.share;
-    const double made = std::max(1e-4, now.share) * now.total, rest = std::max(0.02, 1.0 - now.share) * now.total;
-    const double factor = std::sqrt(rest * h.wanted_share / (1.0 - h.wanted_share) / made);
-    h.size = std::min(h.size * std::clamp(factor, 0.02, 8.0), largest_size(twin, h));
-    set_size(twin, h, h.size);
-  }
-}
-
 // Torque k (i - s i^3) falls again beyond its turning point, and a controller runs away there: no drive is operated so.
 void keep_below_turning_point(Twin& twin) {
   constexpr double kMost = 0.8;  // of the turning point
@@ -146,6 +137,20 @@ void keep_below_turning_point(Twin& twin) {
       h.size *= 0.5;
       set_size(twin, h, h.size);
     }
+  }
+}
+
+// The squared error that an effect makes goes with the square of its size; that of the rest stays.
+void scale_hidden(Twin& twin) {
+  for (HiddenEffect& h : twin.hidden) {
+    const Hidden now = hidden_share(twin, without_noise(twin), h);
+    h.share = now.share;
+    const double made = std::max(1e-4, now.share) * now.total, rest = std::max(0.02, 1.0 - now.share) * now.total;
+    const double factor = std::sqrt(rest * h.wanted_share / (1.0 - h.wanted_share) / made);
+    h.size = std::min(h.size * std::clamp(factor, 0.02, 8.0), largest_size(twin, h));
+    set_size(twin, h, h.size);
+    // Before the next effect is judged by the motion.
+    if (h.effect == "torque_constant_saturation") keep_below_turning_point(twin);
   }
 }
 
@@ -277,6 +282,8 @@ Shares fit_sizes(Twin& twin) {
   const std::vector<Motion> motions = without_noise(twin);
   Shares shares;
   shares.error = error_after_fit(twin, motions, {});
+  if (!std::isfinite(shares.error))
+    throw std::runtime_error(fmt::format("seed {}: the controller ran away", twin.seed));
   for (HiddenEffect& h : twin.hidden) {
     const Hidden now = hidden_share(twin, motions, h);
     h.share = now.share;

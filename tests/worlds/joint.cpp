@@ -132,7 +132,7 @@ class Run {
     return direction > 0.0 ? conditions_.friction_forward : conditions_.friction_backward;
   }
 
-  // What acts beside inertia, current, friction of the bristles and the load.
+  // What acts apart from inertia, current, friction of the bristles and the load.
   double smooth_resistance() {
     const Joint& p = joint_;
     const double speed = std::abs(w_), direction = w_ < 0.0 ? -1.0 : 1.0;

@@ -190,6 +190,13 @@ TEST(RobotTwins, SharesOfWhatIsHiddenComeOutAsWantedWhereThatIsPlausible) {
   EXPECT_GE(10 * close, 7 * hidden);
 }
 
+TEST(RobotTwins, NoControllerRunsAwayWhereATorqueConstantSaturatesAndAnotherEffectIsHiddenToo) {
+  Twin twin = draw(20017, "robot-like");  // ran away while gravity was scaled behind the saturation
+  ASSERT_EQ(twin.hidden.size(), 2u);
+  EXPECT_TRUE(std::isfinite(fit_sizes(twin).error));
+  EXPECT_GT(twin.joint.saturation, 0.0);
+}
+
 TEST(RobotTwins, AnOffsetAndAnAsymmetryAreOneClassAndOtherNamesAreAcceptedOnlyWhereTheyExplainAsMuch) {
   for (std::uint64_t seed = 300; seed < 330; ++seed) {
     Twin twin = draw(seed, "robot-like");

@@ -212,6 +212,11 @@ nlohmann::ordered_json also_true(const Twin& twin, const Shares& shares) {
     add({"elastic_load", "linear_stiffness", "output_inertia"}, shares.elastic, "the load is elastic");
   if (std::abs(twin.sensors.effort_lag_samples) > 0.3)
     add({"current_delay"}, 0.0, "the effort's time base is off by some samples");
+  // A model in joint units has the joint's turns for the motor's: a wave over the joint's travel is a ripple there.
+  if (twin.joint.second == SecondStructure::wave_over_travel && twin.units == Units::joint) {
+    add({"torque_ripple"}, shares.second, "a wave over the joint's travel repeats with its turns");
+    list.back()["order"] = twin.joint.second_width;
+  }
   return list;
 }
 

@@ -84,7 +84,7 @@ export class Add {
         const half = p.interval[0] !== null && p.interval[1] !== null ? (p.interval[1] - p.interval[0]) / 2 : null;
         return el("tr", { class: isFirst ? "first" : "" }, el("th", { scope: "row" }, isFirst ? words(p.id) : ""), el("td", {}, words(p.parameter)), el("td", { class: "n" }, num(p.value, 5)), state.at > 0 ? el("td", { class: "n soft", title: "against the step before", "data-change": "" }, change(state, p)) : null,
           el("td", { class: "n", title: half !== null && p.value ? `${num(Math.abs(100 * half / p.value), 2)} % of the value` : "" }, num(half, 2)),
-          el("td", { class: `n ${p.reliable ? "" : "high"}`, title: p.reliable ? "" : "differs too much between experiments" }, p.spread_percent === null ? "–" : `${num(p.spread_percent, 3)} %${p.reliable ? "" : " !"}`), el("td", {}, unit(p.unit)),
+          el("td", { class: `n ${p.reliable === false ? "high" : ""}`, title: p.reliable === false ? "differs too much between experiments" : "" }, p.spread_percent === null ? "–" : `${num(p.spread_percent, 3)} %${p.reliable === false ? " !" : ""}`), el("td", {}, unit(p.unit)),
           el("td", {}, isFirst ? el("button", { type: "button", class: "quiet", "data-key": `remove ${p.id}`, "aria-label": `Remove ${words(p.id)} and refit`, title: "Remove and refit", disabled: state.work !== null, click: () => this.run("remove", { effect: p.id }) }, "✕") : null));
       }))));
   }

@@ -12,7 +12,7 @@ export interface Balance {
 export interface Step { action: string; what: string; balances: Balance[]; effects: string[] }
 export interface Parameter {
   id: string; effect: string; parameter: string; value: number | null; unit: string; std: number | null; interval: [number | null, number | null];
-  spread_percent: number | null; reliable: boolean; identifiable: boolean;
+  spread_percent: number | null; reliable: boolean | null; identifiable: boolean;
 }
 export interface Bin { low: number; high: number; lacking: number; effect: number }
 export interface Evidence { variable: string; unit: string; resisting: boolean; bins: Bin[] }

@@ -1,0 +1,183 @@
+#include <fmt/format.h>
+
+#include <array>
+#include <cmath>
+
+#include "hil/thesis_figures/figures.hpp"
+#include "hil/thesis_figures/twin_runs.hpp"
+#include "hil/thesis_models/published.hpp"
+#include "hil/thesis_models/published_tables.hpp"
+
+namespace flexspline::thesis_figures {
+namespace {
+
+namespace published = report::published;
+
+constexpr double kFromS = 4.0, kToS = 6.0;
+
+// A locked run as the report's regression sees it: torsion by the motor's position, its rate, and the torque, all
+// through the same zero-phase filter.
+struct LockedRun {
+  plant::Record record;
+  std::vector<double> torsion, rate, torque;
+
+  LockedRun(const rhs100::Set& set, const char* name, std::uint64_t seed) : record(twin_record(set, name, seed)) {
+    torsion = zero_phase(record.motor_position_rad, kCutoffHz, kHz);
+    for (double& x : torsion) x /= published::kGearRatio;
+    rate.assign(torsion.size(), 0.0);
+    for (std::size_t k = 1; k + 1 < torsion.size(); ++k) rate[k] = 0.5 * kHz * (torsion[k + 1] - torsion[k - 1]);
+    torque = zero_phase(record.torque_nm, kCutoffHz, kHz);
+  }
+
+  std::vector<double> model(double k1, double k3, double damping, double alpha) const {
+    std::vector<double> out;
+    for (std::size_t k = 0; k < torsion.size(); ++k)
+      out.push_back((k1 + k3 * torsion[k] * torsion[k]) * torsion[k] +
+                    damping * std::copysign(std::pow(std::abs(rate[k]), alpha), rate[k]));
+    return out;
+  }
+  // Linear regression of eq. 75 with K1 and T_st: two normal equations.
+  std::array<double, 2> regress(double alpha) const {
+    double xx = 0.0, xd = 0.0, dd = 0.0, xy = 0.0, dy = 0.0;
+    for (std::size_t k = 0; k < torsion.size(); ++k) {
+      const double x = torsion[k], d = std::copysign(std::pow(std::abs(rate[k]), alpha), rate[k]), y = torque[k];
+      xx += x * x;
+      xd += x * d;
+      dd += d * d;
+      xy += x * y;
+      dy += d * y;
+    }
+    const double det = xx * dd - xd * xd;
+    return {(xy * dd - dy * xd) / det, (dy * xx - xy * xd) / det};
+  }
+  Curve loop(std::string label, const std::vector<double>& y, Stroke stroke) const {
+    Curve c{std::move(label), {}, {}, stroke};
+    for (std::size_t k = 0; k < y.size(); ++k)
+      if (record.time_s[k] >= kFromS && record.time_s[k] <= kToS) {
+        c.x.push_back(1e3 * torsion[k]);
+        c.y.push_back(y[k]);
+      }
+    return c;
+  }
+  Panel panel(const char* name) const {
+    return {name, "torsion, mrad", "torque, N m", {loop("measured (twin)", torque, Stroke::solid)}};
+  }
+};
+
+Drawn hysteresis(std::uint64_t seed) {
+  const LockedRun run(rhs100::table_4(), "100-8", seed);
+  const auto panel = run.panel("100-8");
+  double loss = 0.0;
+  const Curve& c = panel.curves.front();
+  for (std::size_t k = 1; k < c.x.size(); ++k) loss += 0.5e-3 * (c.y[k] + c.y[k - 1]) * (c.x[k] - c.x[k - 1]);
+  return {{panel}, fmt::format("{:.3g} J are lost in a cycle", loss)};
+}
+
+Drawn exponents(std::uint64_t seed) {
+  const LockedRun run(rhs100::table_4(), "100-8", seed);
+  Drawn drawn{{run.panel("100-8")}, "error of the torque:"};
+  const std::pair<double, Stroke> kinds[] = {{1.0, Stroke::dashed}, {0.5, Stroke::dash_dotted}, {0.1, Stroke::dotted}};
+  for (const auto& [alpha, stroke] : kinds) {
+    const auto [k1, damping] = run.regress(alpha);
+    const auto y = run.model(k1, 0.0, damping, alpha);
+    drawn.panels[0].curves.push_back(run.loop(fmt::format("alpha {:g}", alpha), y, stroke));
+    drawn.ours += fmt::format(" alpha {:g} {:.2g} %;", alpha, error_percent(run.torque, y));
+  }
+  drawn.ours += " alpha = 1/2 is what the twin's rows have (circular)";
+  return drawn;
+}
+
+Drawn half_and_third(std::uint64_t seed) {
+  const LockedRun run(rhs100::table_4(), "100-8", seed);
+  const auto third =
+      run.model(published::kTable4Third[0].stiffness, 0.0, published::kTable4Third[0].damping, 1.0 / 3.0);
+  const auto half = run.model(published::kTable4[0].stiffness, 0.0, published::kTable4[0].damping, 0.5);
+  Panel panel = run.panel("100-8, the values of table 4");
+  panel.curves.push_back(run.loop("alpha 1/2", half, Stroke::dashed));
+  panel.curves.push_back(run.loop("alpha 1/3", third, Stroke::dotted));
+  return {{panel},
+          fmt::format("error of the torque: alpha 1/2 {:.2g} %, 1/3 {:.2g} % (the twin has 1/2: circular)",
+                      error_percent(run.torque, half), error_percent(run.torque, third))};
+}
+
+Drawn optimal(std::uint64_t seed) {
+  Drawn drawn{{}, "error of the torque, optimal / one half, values of tables 5 and 4:"};
+  struct Row {
+    const char* name;
+    double k1, damping, alpha;
+    std::size_t nominal;
+  };
+  // Table 5.
+  for (const Row& row : {Row{"50-8", 6.9867e3, 63.68, 0.5224, 1}, Row{"50-1", 6.0737e3, 58.71, 0.4928, 2}}) {
+    const LockedRun run(rhs100::table_4(), row.name, seed);
+    const auto best = run.model(row.k1, 0.0, row.damping, row.alpha);
+    const auto& nominal = published::kTable4[row.nominal];
+    const auto half = run.model(nominal.stiffness, 0.0, nominal.damping, 0.5);
+    Panel panel = run.panel(row.name);
+    panel.curves.push_back(run.loop("optimal alpha", best, Stroke::dashed));
+    panel.curves.push_back(run.loop("alpha 1/2", half, Stroke::dotted));
+    drawn.panels.push_back(std::move(panel));
+    drawn.ours += fmt::format(" {} {:.2g} % / {:.2g} %;", row.name, error_percent(run.torque, best),
+                              error_percent(run.torque, half));
+  }
+  return drawn;
+}
+
+Drawn cubic(std::uint64_t seed) {
+  const LockedRun run(rhs100::table_6(), "100-8", seed);
+  const auto linear = run.model(published::kStiffness, 0.0, published::kDampingTorque, 0.5);
+  const auto third = run.model(5.66e3, 1.10e9, 57.0, 0.5);  // table 6, averages
+  Panel panel = run.panel("100-8, averages of tables 4 and 6");
+  panel.curves.push_back(run.loop("linear", linear, Stroke::dashed));
+  panel.curves.push_back(run.loop("cubic", third, Stroke::dash_dotted));
+  double measured = 0.0, predicted = 0.0, straight = 0.0;
+  for (std::size_t k = 0; k < run.torque.size(); ++k)
+    if (std::abs(run.torque[k]) > measured) {
+      measured = std::abs(run.torque[k]);
+      predicted = std::abs(third[k]);
+      straight = std::abs(linear[k]);
+    }
+  return {{panel},
+          fmt::format("at the largest torque: cubic {:.2f} times the measured one, linear {:.2f} times",
+                      predicted / measured, straight / measured)};
+}
+
+Drawn nominal(bool over_time, std::uint64_t seed) {
+  Drawn drawn{{}, "error of the torque with the averages of eq. 79:"};
+  for (const char* name : {"100-8", "50-8", "50-1", "50-7"}) {
+    const LockedRun run(rhs100::table_4(), name, seed);
+    const auto y = run.model(published::kStiffness, 0.0, published::kDampingTorque, 0.5);
+    Panel panel = run.panel(name);
+    if (over_time) {
+      panel.x_label = "time, s";
+      panel.curves = {part("measured (twin)", run.record, run.torque, kFromS, kToS, Stroke::solid),
+                      part("model", run.record, y, kFromS, kToS, Stroke::dashed)};
+    } else {
+      panel.curves.push_back(run.loop("model", y, Stroke::dashed));
+    }
+    drawn.panels.push_back(std::move(panel));
+    drawn.ours += fmt::format(" {} {:.2g} %;", name, error_percent(run.torque, y));
+  }
+  return drawn;
+}
+Drawn nominal_loops(std::uint64_t seed) {
+  return nominal(false, seed);
+}
+Drawn nominal_torques(std::uint64_t seed) {
+  return nominal(true, seed);
+}
+
+}  // namespace
+
+std::vector<Figure> compliance_figures() {
+  return {{28, "torsion in locked load: hysteresis", "a loop", hysteresis, ""},
+          {30, "structural damping with alpha 1, 1/2, 0.1", "1/2 best: oscillations with 1, too narrow with 0.1",
+           exponents, ""},
+          {31, "alpha 1/2 and 1/3", "both good", half_and_third, ""},
+          {32, "optimal alpha and 1/2", "a small difference", optimal, ""},
+          {33, "linear and cubic stiffness", "the cubic model gives much higher torques", cubic, ""},
+          {34, "nominal model, hysteresis", "acceptable match", nominal_loops, ""},
+          {35, "nominal model, torque over time", "acceptable match", nominal_torques, ""}};
+}
+
+}  // namespace flexspline::thesis_figures

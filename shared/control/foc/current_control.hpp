@@ -1,0 +1,138 @@
+// Currents in d and q to voltages, with two degrees of freedom: a model of the winding says which voltage makes the
+// current follow a first-order response to the set point; a PI loop, which may be faster than that response, takes out
+// what the winding does otherwise. So the response stays that of the design where R, L and flux are not exact.
+//
+// The timing it stands on: sample k in the middle of the low sides' time; its voltage u[k] acts from half a PWM period
+// later on, for one period, whose middle is sample k+1. For each axis, with T the period, R and L of the winding,
+// a = exp(-R T/L), m[k] the model's current when u[k] begins to act and i the measured one:
+//   D    = (1 - exp(-w T)) (r - m[k])                        w: corner of the response, r: set point
+//   x    = sqrt(a) (m_mid[k] - i[k]) - p[k]                  error when u[k] begins to act: at the sample only half of
+//                                                            the last correction has acted, p is the other half
+//   u    = S D + R m[k] + Kp x + I[k] + cross                S = R/(1 - a), about L/T
+//   n[k+1] = m[k] + h D - x + p[k+1]                         current expected at the next sample, h = 1/(1 + sqrt(a))
+//   p[k+1] = h Kp/S x
+//   cross = -w_e Lq n_q in d, w_e (Ld n_d + flux) in q       decoupling, feedforward of the back-EMF
+//   D    <- D + (u_limited - u)/S                            the model moves as far as the voltage lets it
+//   m[k+1] = m[k] + D, m_mid[k+1] = m[k] + h D
+//   I[k+1] = I[k] + Ki x, but I[k] where the limit holds u back and x would push it further; within its own limit
+// Without delay in what x says, Kp may be near S, which takes out all of an error within a period.
+// The voltage is limited to a circle; d, which holds the flux, has it first: |u_d| <= U, |u_q| <= sqrt(U^2 - u_d^2).
+#pragma once
+
+#include <cstdint>
+
+#include "shared/control/foc/transforms.hpp"
+#include "shared/fixed/bits.hpp"
+
+namespace flexspline::control::foc {
+
+// Currents in 2^-27 of the current base, voltages in 2^-25 of the voltage base. The voltage base is the full scale of
+// the bus voltage times a power of two that leaves each coefficient below two: so products add up in 64 bits, and
+// nothing has to be shifted or limited on the way.
+struct AxisSettings {
+  std::int32_t proportional = 0;  // Kp, 2^-30
+  std::int32_t integral = 0;      // Ki, 2^-30
+  std::int32_t resistance = 0;    // R, 2^-30
+  std::int32_t slope = 0;         // S, 2^-30
+  std::int32_t per_slope = 0;     // 1/S, 2^-27
+  std::int32_t beyond = 0;        // h - 1, 2^-32
+  std::int32_t decay = 0;         // sqrt(a) - 1, 2^-32
+  std::int32_t pending = 0;       // h Kp/S, 2^-32
+  std::int32_t reactance = 0;     // 2 pi L/(8 T), 2^-30: the speed is counted in eighths of a turn per period
+};
+struct CurrentSettings {
+  AxisSettings d;
+  AxisSettings q;
+  std::int32_t flux = 0;            // 2 pi flux/(8 T), 2^-25
+  std::int32_t pull = 0;            // 1 - exp(-w T), 2^-32
+  std::int32_t integral_limit = 0;  // 2^-25
+  std::int32_t up = 0;              // voltages times 2^up are in 2^-30 of the bus voltage's full scale; 5 to 25
+};
+struct AxisState {
+  std::int64_t integral = 0;  // 2^-57
+  std::int32_t model = 0;
+  std::int32_t expected = 0;  // m_mid
+  std::int32_t pending = 0;   // p
+};
+struct CurrentState {
+  AxisState d;
+  AxisState q;
+};
+struct Voltages {
+  RotorVector limited;   // 2^-30 of the bus voltage's full scale
+  RotorVector wanted;    // 2^-25 of the voltage base
+  RotorVector expected;  // the currents n, for which the switches are compensated
+};
+
+inline constexpr int kCurrentBits = 28;  // two bases, of everything that comes in
+inline constexpr int kStepBits = 28;     // electrical turns per period: one sixteenth, in 2^-32
+
+namespace detail {
+struct AxisPlan {
+  std::int32_t error = 0;
+  std::int32_t move = 0;      // D
+  std::int32_t expected = 0;  // n
+  std::int32_t pending = 0;
+  std::int32_t voltage = 0;  // without cross
+};
+constexpr AxisPlan plan(const AxisSettings& c, const AxisState& s, std::int32_t pull, std::int32_t set_point,
+                        std::int32_t measured) {
+  AxisPlan p;
+  const std::int32_t seen = s.expected - measured;  // within four bases
+  p.error = fixed::add_high(seen, seen, c.decay) - s.pending;
+  p.pending = fixed::multiply_high(p.error, c.pending);
+  p.move = fixed::multiply_high(set_point - s.model, pull);
+  p.expected = held<kCurrentBits>(fixed::add_high(s.model + p.move, p.move, c.beyond) - p.error + p.pending);
+  // Each product is below 2^60, and so is the integral.
+  const std::int64_t sum = s.integral + std::int64_t{c.proportional} * p.error + std::int64_t{c.slope} * p.move +
+                           std::int64_t{c.resistance} * s.model;
+  p.voltage = static_cast<std::int32_t>(sum >> 32);
+  return p;
+}
+// `excess`: limited less wanted voltage.
+constexpr void advance(AxisState& s, const AxisSettings& c, const AxisPlan& p, std::int32_t excess,
+                       std::int32_t integral_limit) {
+  const std::int32_t back = held<22>(fixed::multiply_high(excess, c.per_slope));  // four bases in 2^-20
+  const std::int32_t next = held<kCurrentBits>(s.model + p.move + back * 128);
+  s.expected = fixed::add_high(next, next - s.model, c.beyond);
+  s.model = next;
+  s.pending = p.pending;
+  // Opposite signs: the limit holds back what the error asks for.
+  const std::int32_t counted = excess != 0 && (excess ^ p.error) < 0 ? 0 : p.error;
+  const std::int64_t sum = s.integral + fixed::long_product(c.integral, counted);
+  // Within the limit to both sides: one comparison.
+  const auto from_low = static_cast<std::uint32_t>(static_cast<std::int32_t>(sum >> 32) + integral_limit);
+  const auto most = static_cast<std::uint32_t>(integral_limit) * 2;
+  if (from_low >= most) return;
+  s.integral = sum;
+}
+}  // namespace detail
+
+// `set_point` and `measured` within two bases, `step` within a sixteenth of a turn; `most`: the circle, in 2^-25 of the
+// voltage base and within the bus voltage.
+constexpr Voltages control_currents(CurrentState& s, const CurrentSettings& c, const RotorVector& set_point,
+                                    const RotorVector& measured, std::int32_t step, std::int32_t most) {
+  using fixed::multiply_high;
+  const detail::AxisPlan d = detail::plan(c.d, s.d, c.pull, set_point.d, measured.d);
+  const detail::AxisPlan q = detail::plan(c.q, s.q, c.pull, set_point.q, measured.q);
+  const std::int32_t eighths = step * 8;
+  const std::int32_t linkage_d = fixed::add_high(c.flux, c.d.reactance, d.expected);
+  const std::int32_t linkage_q = multiply_high(c.q.reactance, q.expected);
+  Voltages u;
+  u.wanted = {d.voltage - multiply_high(linkage_q, eighths), fixed::add_high(q.voltage, linkage_d, eighths)};
+  u.expected = {d.expected, q.expected};
+
+  const std::int32_t limited_d = fixed::limited(u.wanted.d, -most, most);
+  const std::int32_t whole = most << c.up;
+  u.limited.d = limited_d << c.up;
+  // 2^-28, of which the root is taken in 2^-32.
+  const auto square = static_cast<std::uint32_t>(multiply_high(whole, whole) - multiply_high(u.limited.d, u.limited.d));
+  const auto most_q = static_cast<std::int32_t>(root_word(square << 4) >> (c.up + 1));
+  const std::int32_t limited_q = fixed::limited(u.wanted.q, -most_q, most_q);
+  u.limited.q = limited_q << c.up;
+  detail::advance(s.d, c.d, d, limited_d - u.wanted.d, c.integral_limit);
+  detail::advance(s.q, c.q, q, limited_q - u.wanted.q, c.integral_limit);
+  return u;
+}
+
+}  // namespace flexspline::control::foc

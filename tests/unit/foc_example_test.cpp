@@ -1,0 +1,100 @@
+// What the counts of instructions stand on: their numbers, and that the loop in floating point does the same.
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <cmath>
+#include <cstdio>
+#include <cstring>
+#include <numbers>
+
+#include "tests/counts/current_loop_example.hpp"
+#include "tests/counts/float_current_loop.hpp"
+#include "tests/unit/foc_rig.hpp"
+
+namespace flexspline::foc_rig {
+namespace {
+
+Bench example_bench() {
+  Bench b;
+  b.inverter.pwm_hz = 40e3;
+  return b;
+}
+deployment::FocSetup example_setup() {
+  auto s = setup_of(example_bench());
+  s.timer_counts = 2100;
+  return s;
+}
+// All numbers are words without gaps.
+template <class T>
+void expect_equal(const T& x, const T& y, const char* what) {
+  constexpr std::size_t kWords = sizeof(T) / sizeof(std::int32_t);
+  std::int32_t a[kWords], b[kWords];
+  std::memcpy(a, &x, sizeof(T));
+  std::memcpy(b, &y, sizeof(T));
+  for (std::size_t k = 0; k < kWords; ++k) EXPECT_EQ(a[k], b[k]) << what << " " << k;
+}
+
+TEST(FocExample, ItsNumbersAreThoseThatTheHostMakes) {
+  const auto setup = example_setup();
+  const foc::Settings made = deployment::foc_settings(setup);
+  expect_equal(made.current, counts::kExampleSettings.current, "current");
+  expect_equal(made.modulation, counts::kExampleSettings.modulation, "modulation");
+  EXPECT_EQ(made.circle, counts::kExampleSettings.circle);
+  deployment::FocLimitSetup l;
+  l.peak_a = 20.0;
+  l.continuous_a = 8.0;
+  l.thermal_s = 2.0;
+  l.weakening_a = 12.0;
+  l.highest_speed = 2.0 * std::numbers::pi * 600.0;
+  expect_equal(deployment::foc_limits(setup, l), counts::kExampleLimits, "limits");
+}
+
+peers::FloatSetup float_setup(const deployment::FocSetup& s) {
+  const double lost = s.dead_time_s * s.pwm_hz * (1.0 + 2.0 * s.diode_drop_v / s.bus_v);
+  peers::FloatSetup f;
+  f.resistance_ohm = s.resistance_ohm;
+  f.inductance_d_h = s.inductance_d_h;
+  f.inductance_q_h = s.inductance_q_h;
+  f.flux_vs = s.flux_vs;
+  f.current_full_scale_a = s.current_full_scale_a;
+  f.bus_full_scale_v = s.bus_full_scale_v;
+  f.pwm_hz = s.pwm_hz;
+  f.timer_counts = s.timer_counts;
+  f.lost = lost;
+  f.zone_a = s.dead_time_zone_a;
+  f.pulse = s.shortest_pulse_s * s.pwm_hz + lost;
+  f.window = (s.sampling_window_s + 2.0 * s.dead_time_s) * s.pwm_hz + lost;
+  f.bandwidth_hz = s.bandwidth_hz;
+  f.correction = s.correction;
+  f.integral_correction = s.integral_correction;
+  return f;
+}
+
+// The integers drive; the loop in floating point sees the same inputs and has to command the same.
+TEST(FocExample, TheLoopInFloatingPointGivesTheSameOnTimesUpToAFewCounts) {
+  const auto setup = example_setup();
+  Rig rig(example_bench(), setup, motor::Fidelity::averaged, 2.0 * std::numbers::pi * 150.0);
+  peers::FloatCurrentLoop in_float(float_setup(setup));
+  std::int32_t worst = 0;
+  for (int k = 0; k < 8000; ++k) {
+    // Steps in both axes, into the limit of the voltage and out of it.
+    const double d = k / 700 % 3 == 1 ? -4.0 : 0.0, q = k / 500 % 4 == 0   ? 3.0
+                                                        : k / 500 % 4 == 1 ? -12.0
+                                                        : k / 500 % 4 == 2 ? 25.0
+                                                                           : 0.2;
+    rig.set_speed(2.0 * std::numbers::pi * 150.0 * std::sin(k / 900.0));
+    rig.step(d, q);
+    const foc::Inputs& in = rig.inputs();
+    peers::FloatCurrentLoop::Outputs out;
+    in_float.tick({in.readings.a, in.readings.b, in.readings.c, in.bus, in.angle, in.step, static_cast<float>(d),
+                   static_cast<float>(q)},
+                  out);
+    const auto& counts = rig.outputs().counts;
+    worst = std::max({worst, std::abs(counts.a - out.a), std::abs(counts.b - out.b), std::abs(counts.c - out.c)});
+  }
+  std::printf("the loop in floating point: on-times %d of 2100 counts apart at most\n", static_cast<int>(worst));
+  EXPECT_LE(worst, 3);
+}
+
+}  // namespace
+}  // namespace flexspline::foc_rig
