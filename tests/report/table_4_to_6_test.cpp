@@ -16,8 +16,8 @@ namespace published = report::published;
 // lies below 2 Hz and would suggest a filter of 5 Hz.
 constexpr double kCutoffHz = 20.0;
 // A filter rounds the square root of the rate, and the cubic term takes part of that: where the torsion is small
-// (50-7), K_3 is 18 % too large at 20 Hz and 7 % at 120 Hz, averaged over seven seeds; one run has a standard error of
-// 5 to 8 %.
+// (50-7), K_3 is 18 % too large at 20 Hz, averaged over seven seeds, and 6 % at 120 Hz over six; one run has a standard
+// error of 5 to 8 %.
 constexpr double kCubicCutoffHz = 80.0;
 
 estimation::PipelineOptions pipeline(double cutoff_hz = kCutoffHz) {
