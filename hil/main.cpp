@@ -156,9 +156,9 @@ int main(int argc, char** argv) {
   flexspline::thesis_figures::ReportOptions report_options, model_options;
   CLI::App* report_command =
       app.add_subcommand("report", "draws the figures of Taghirad and Belanger's report again, as SVG and CSV");
-  report_command->add_option("what", report_options.what, "number of a figure, all, or list")->required();
+  report_command->add_option("figure", report_options.what, "number of a figure, all, or list")->required();
   report_command->add_option("--out", report_options.out, "folder to write into");
-  report_command->add_option("--seed", report_options.seed, "of all chance")->capture_default_str();
+  report_command->add_option("--seed", report_options.seed, "of all random numbers")->capture_default_str();
   report_command->footer("Example: flexspline-hil report 45 --out figures");
   report_command->callback([&] { flexspline::thesis_figures::write_report(report_options); });
   CLI::App* model_command = app.add_subcommand(

@@ -38,8 +38,8 @@ Response step_response(std::mt19937_64& random, motor::Fidelity fidelity, double
   const double per_ampere = b.motor.resistance_ohm + 2.0 * std::numbers::pi * 1000.0 * b.motor.inductance_q_h * 1.3;
   const double step = std::min(20.0, voltage / 3.0 / per_ampere) * (random() % 2 == 0 ? 1.0 : -1.0);
   Rig rig(b, setup, fidelity, speed);
-  const int settle = 400, after = 120;
-  for (int k = 0; k < settle; ++k) rig.step(0.0, 0.0);
+  const int settling_ticks = 400, after = 120;
+  for (int k = 0; k < settling_ticks; ++k) rig.step(0.0, 0.0);
   const double start = rig.sample().current.q;
   std::vector<double> y;
   for (int k = 0; k < after; ++k) y.push_back(rig.step(0.0, step).current.q);

@@ -118,7 +118,7 @@ TEST(FocModulation, NoPulseIsShorterThanTheShortestAndTwoPhasesCanAlwaysBeSample
 double ripple(const Bench& b, const deployment::FocSetup& setup, double hertz, double current, bool loop) {
   constexpr int kTurns = 3;
   const double period = 1.0 / b.inverter.pwm_hz;
-  const int settle = static_cast<int>(1.0 / hertz / period / 2.0);
+  const int settling_ticks = static_cast<int>(1.0 / hertz / period / 2.0);
   // Whole turns to the sample, or the mean would show in the amplitudes.
   const int samples = static_cast<int>(std::lround(kTurns / hertz / period));
   Rig rig(b, setup, motor::Fidelity::switched, kTurn * hertz);
@@ -127,7 +127,7 @@ double ripple(const Bench& b, const deployment::FocSetup& setup, double hertz, d
   motor::Triple duties{0.5, 0.5, 0.5};
   double angle = 0.0, mean = 0.0;
   std::array<std::complex<double>, 4> amplitude{};
-  for (int k = 0; k < settle + samples; ++k) {
+  for (int k = 0; k < settling_ticks + samples; ++k) {
     double torque = 0.0;
     if (loop) {
       torque = rig.step(0.0, current).torque_nm;
@@ -149,11 +149,11 @@ double ripple(const Bench& b, const deployment::FocSetup& setup, double hertz, d
                                           {q27(i[0] / base) / 4, q27(i[1] / base) / 4, q27(i[2] / base) / 4});
       duties = {p.counts.a / 4200.0, p.counts.b / 4200.0, p.counts.c / 4200.0};
     }
-    if (k < settle) continue;
+    if (k < settling_ticks) continue;
     mean += torque / samples;
     for (std::size_t n = 0; n < 4; ++n)
-      amplitude[n] +=
-          torque * std::polar(2.0 / samples, -kTurn * hertz * 6.0 * static_cast<double>(n + 1) * (k - settle) * period);
+      amplitude[n] += torque * std::polar(2.0 / samples, -kTurn * hertz * 6.0 * static_cast<double>(n + 1) *
+                                                             (k - settling_ticks) * period);
   }
   double square = 0.0;
   for (const auto& a : amplitude) square += std::norm(a);

@@ -6,6 +6,7 @@
 
 #include "host/selection/confounding.hpp"
 #include "tests/support/plain_model.hpp"
+#include "tests/support/ripple_candidate.hpp"
 
 namespace flexspline::selection {
 namespace {
@@ -44,16 +45,12 @@ Candidate named_ripple(const model::Drive& drive) {
   const Terms terms = estimation::terms_of(testing::plain_model());
   const Eigen::VectorXd keep = Eigen::VectorXd::Ones(data.rows());
   BalanceSearch search{&data, keep, cross_validate(data, terms, keep)};
-  const catalogue::Entry& entry = catalogue::get("torque_ripple");
-  CandidateFit candidate;
-  candidate.model = {&entry, 3.0, extend(terms, entry, 3.0), 2.0};
-  candidate.fit = cross_validate(data, candidate.model.terms, keep);
   Diagnosis result;
   result.named = {{"torque_ripple", 3.0}};
   result.candidates.resize(1);
   result.candidates.front().effect = "torque_ripple";
   result.candidates.front().order = 3.0;
-  explain_named(search, {candidate}, drive, result);
+  explain_named(search, {testing::ripple_candidate(search, 3.0, keep)}, drive, result);
   return result.candidates.front();
 }
 

@@ -9,6 +9,7 @@
 #include <random>
 
 #include "tests/support/plain_model.hpp"
+#include "tests/support/ripple_candidate.hpp"
 
 namespace flexspline::selection {
 namespace {
@@ -57,11 +58,7 @@ CandidateFit checked(const data::Experiment& e, double first = 0.0, double last 
   const Terms terms = estimation::terms_of(testing::plain_model());
   const Eigen::VectorXd keep = Eigen::VectorXd::Ones(data.rows());
   BalanceSearch search{&data, keep, cross_validate(data, terms, keep)};
-  const catalogue::Entry& entry = catalogue::get("torque_ripple");
-  CandidateFit candidate;
-  candidate.model = {&entry, 3.0, extend(terms, entry, 3.0), 2.0};
-  candidate.fit = cross_validate(data, candidate.model.terms, keep);
-  candidate.gain = likelihood_gain(search.base, candidate.fit, candidate.model.added);
+  CandidateFit candidate = testing::ripple_candidate(search, 3.0, keep);
   EXPECT_TRUE(passes(candidate)) << "else nothing is checked";
   const Eigen::Index rows = data.rows();
   for (Eigen::Index k = 0; k < rows; ++k) {
