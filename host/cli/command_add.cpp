@@ -3,13 +3,15 @@
 #include <functional>
 #include <nlohmann/json.hpp>
 
-#include "host/cli/commands.hpp"
+#include "host/cli/command.hpp"
+#include "host/cli/common_options.hpp"
 #include "host/cli/report_option.hpp"
 #include "host/model/signature.hpp"
 #include "host/output/json.hpp"
 #include "host/output/learned_table.hpp"
 #include "host/output/text.hpp"
 #include "host/selection/add.hpp"
+#include "host/selection/user_defined_effects.hpp"
 
 namespace flexspline::cli {
 namespace {
@@ -17,6 +19,23 @@ namespace {
 using nlohmann::json;
 using output::number;
 using selection::Addition;
+
+constexpr std::string_view kAdd =
+    "flexspline add viscous_asymmetry --model demo-out/base-model.toml demo-out --out better.toml";
+
+struct ChangeOptions {
+  std::string effect;
+  DataInputs data;
+  PipelineInputs pipeline;
+  std::filesystem::path model;
+  std::filesystem::path out;
+  std::filesystem::path report;  // empty: none
+  std::string json;
+};
+struct AddOptions : ChangeOptions {
+  selection::UserDefinition user_defined;
+};
+struct RemoveOptions : ChangeOptions {};
 
 constexpr int kDigits = 5;  // an interval of 0.1 % is still one
 
@@ -117,8 +136,6 @@ int change_model(const ChangeOptions& options, const std::string& command, const
   return kDone;
 }
 
-}  // namespace
-
 int run(const AddOptions& options, Console& console) {
   require_effect(options.effect.substr(0, options.effect.find(':')));
   // A wrong name is reported before files are read.
@@ -141,6 +158,67 @@ int run(const RemoveOptions& options, Console& console) {
         return selection::remove(dataset, model, options.effect, options.pipeline.options());
       },
       console);
+}
+
+void take_change(Parser& parser, ChangeOptions& options, const std::string& effect_help) {
+  parser.option("EFFECT", options.effect, effect_help).required().value("");
+  take_data(parser, options.data);
+  take_model(parser, options.model);
+  parser.option("--out", options.out, "the changed model").required().value("OUT");
+  take_holdout(parser, options.data);
+  take_report(parser, options.report);
+  take_pipeline(parser, options.pipeline);
+}
+
+void declare(Parser& parser, AddOptions& options) {
+  take_change(parser, options,
+              "effect of the catalogue; torque_ripple:2 gives an order; table_effect:velocity learns a curve over a "
+              "signal, table_effect:torque*direction one times the direction; expression_effect takes --formula");
+  parser
+      .option("--formula", options.user_defined.formula, "torque of an expression_effect, over signals and parameters")
+      .value("TEXT");
+  parser
+      .option("--parameter", options.user_defined.parameters,
+              "of the formula, with bounds where it does not only scale the torque; may be repeated")
+      .value("NAME=LOW..HIGH:UNIT")
+      .one_value_each_time();
+  parser.option("--points", options.user_defined.points, "of a table_effect (default: chosen from the data)")
+      .value("N");
+  parser
+      .option("--balance", options.user_defined.balance,
+              "of a table_effect or expression_effect: motor, transmission or load; else where its signals belong")
+      .value("NAME");
+}
+
+void declare(Parser& parser, RemoveOptions& options) {
+  take_change(parser, options, "id of the effect in the model, or its type");
+}
+
+}  // namespace
+
+Command add_command() {
+  return command<AddOptions>(
+      {"add",
+       "adds an effect to a model and refits it, with the error before and after",
+       "Adds an effect of the catalogue, re-estimates all parameters and reports what that does to the error, on the "
+       "data that were fitted and on those held out. table_effect:SIGNAL learns a curve over a signal of your "
+       "choice, as smooth as cross-validation chooses, where no effect of the catalogue fits; expression_effect fits "
+       "a formula of your own. Comments and layout of the model file stay; its history gets a line. --report writes "
+       "a page with plots, with the error before and after.",
+       {kMakeData, kAdd,
+        "flexspline add expression_effect --formula 'a*abs(velocity)' --parameter a:N*m*s/rad --model "
+        "demo-out/base-model.toml demo-out --out better.toml"}},
+      declare, run);
+}
+
+Command remove_command() {
+  return command<RemoveOptions>(
+      {"remove",
+       "takes an effect out of a model and refits it, and shows what that costs",
+       "Takes an effect out, by its id or its type, re-estimates the rest and reports what that does to the error, on "
+       "the data that were fitted and on those held out.",
+       {kMakeData, kAdd, "flexspline remove coulomb_asymmetry --model better.toml demo-out --out smaller.toml"}},
+      declare, run);
 }
 
 }  // namespace flexspline::cli

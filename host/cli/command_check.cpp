@@ -3,7 +3,8 @@
 #include <nlohmann/json.hpp>
 
 #include "host/cli/base_model.hpp"
-#include "host/cli/commands.hpp"
+#include "host/cli/command.hpp"
+#include "host/cli/common_options.hpp"
 #include "host/cli/record_summary.hpp"
 #include "host/output/identification.hpp"
 #include "host/output/json.hpp"
@@ -15,6 +16,12 @@ namespace {
 using nlohmann::json;
 using output::json_number;
 using output::number;
+
+struct CheckOptions {
+  DataInputs data;
+  PipelineInputs pipeline;
+  std::string json;
+};
 
 std::string severity_name(data::Severity severity) {
   switch (severity) {
@@ -123,8 +130,6 @@ json print_pipeline(const data::Dataset& dataset, const BaseModel& base, const e
   }
 }
 
-}  // namespace
-
 int run(const CheckOptions& options, Console& console) {
   console.progress("reading the measurements");
   const data::Dataset dataset = data::load(options.data.data, {options.data.tolerate, false});
@@ -151,6 +156,24 @@ int run(const CheckOptions& options, Console& console) {
                                    {"base_model", base.reasons},
                                    {"pipeline", std::move(pipeline)}});
   return kDone;
+}
+
+void declare(Parser& parser, CheckOptions& options) {
+  take_data(parser, options.data);
+  take_pipeline(parser, options.pipeline);
+}
+
+}  // namespace
+
+Command check_command() {
+  return command<CheckOptions>(
+      {"check",
+       "what is in the data: signals, rates, noise, excitation, findings",
+       "Reads measurements and lists what each experiment holds: signals with their range, noise and smallest "
+       "step, motion, reversals, a period if it repeats itself; then each problem and its remedy, "
+       " what can be identified from these signals, and which filters would be used.",
+       {kMakeData, "flexspline check demo-out"}},
+      declare, run);
 }
 
 }  // namespace flexspline::cli

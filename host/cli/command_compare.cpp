@@ -4,7 +4,8 @@
 #include <cmath>
 #include <nlohmann/json.hpp>
 
-#include "host/cli/commands.hpp"
+#include "host/cli/command.hpp"
+#include "host/cli/common_options.hpp"
 #include "host/cli/report_option.hpp"
 #include "host/comparison/compare.hpp"
 #include "host/output/json.hpp"
@@ -12,6 +13,16 @@
 
 namespace flexspline::cli {
 namespace {
+
+struct CompareOptions {
+  DataInputs data;
+  PipelineInputs pipeline;
+  std::filesystem::path model;
+  std::vector<std::string> limits;     // SIGNAL=RMSE
+  std::vector<std::string> baselines;  // fir:20, arx:4,4,1
+  std::filesystem::path report;        // empty: none
+  std::string json;
+};
 
 constexpr std::string_view kSignals[] = {"motor_balance",  "transmission_balance", "load_balance", "motor_velocity",
                                          "motor_position", "output_position",      "torque"};
@@ -52,8 +63,6 @@ bool is_kept(const Limit& limit, const comparison::Comparison& comparison, Conso
                   limit.signal));
 }
 
-}  // namespace
-
 int run(const CompareOptions& options, Console& console) {
   std::vector<Limit> limits;
   for (const std::string& text : options.limits) limits.push_back(parse_limit(text));
@@ -85,6 +94,38 @@ int run(const CompareOptions& options, Console& console) {
   bool all_kept = true;
   for (const Limit& limit : limits) all_kept = is_kept(limit, comparison, console) && all_kept;
   return all_kept ? kDone : kNotMet;
+}
+
+void declare(Parser& parser, CompareOptions& options) {
+  take_data(parser, options.data);
+  take_model(parser, options.model);
+  take_holdout(parser, options.data);
+  parser.option("--limit", options.limits, "exit code 1 if a signal's error is above this; may be repeated")
+      .value("SIGNAL=RMSE")
+      .one_value_each_time();
+  parser
+      .option("--beside", options.baselines,
+              "a black box to compare the model with: fir:N, arx:NA,NB,NK, or fir:auto, arx:auto; may be repeated")
+      .value("BOX")
+      .one_value_each_time();
+  take_report(parser, options.report);
+  take_pipeline(parser, options.pipeline);
+}
+
+}  // namespace
+
+Command compare_command() {
+  return command<CompareOptions>(
+      {"compare",
+       "model against measurement, by experiment, signal and region",
+       "Compares in both directions: the torque that the model needs for the measured motion (the balances), and the "
+       "motion that it predicts from the measured torque (free run). Errors are shown with the noise of the "
+       "measurement where that is known; the regions with the largest excess over it are named. --limit sets a "
+       "limit: exit code 1 where a signal's error is above it. --beside fits a linear black box (FIR or ARX) to the "
+       "same signals, on the experiments that are not held out, and shows what error its many parameters reach. "
+       "--report writes a page with plots of all of it.",
+       {kMakeData, kIdentify, "flexspline compare --model fitted.toml demo-out --beside arx:4,4,1"}},
+      declare, run);
 }
 
 }  // namespace flexspline::cli

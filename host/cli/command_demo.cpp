@@ -6,9 +6,11 @@
 #include <random>
 #include <utility>
 
-#include "host/cli/commands.hpp"
+#include "host/cli/command.hpp"
+#include "host/cli/command_flash.hpp"
+#include "host/cli/command_hil.hpp"
+#include "host/cli/common_options.hpp"
 #include "host/cli/drive_commands.hpp"
-#include "host/cli/hil_options.hpp"
 #include "host/cli/report_option.hpp"
 #include "host/cli/twin_process.hpp"
 #include "host/comparison/compare.hpp"
@@ -23,6 +25,13 @@ namespace {
 
 using nlohmann::json;
 using output::number;
+
+struct DemoOptions {
+  std::string hidden;  // empty: by chance; "none": nothing
+  std::optional<std::uint64_t> seed;
+  std::filesystem::path out = "demo-out";
+  std::string json;
+};
 
 // What the demo may hide: effects that a strain-wave drive may have and a first model lacks.
 constexpr std::string_view kMayHide[] = {
@@ -82,7 +91,7 @@ json close_the_loop(const std::filesystem::path& folder, const std::filesystem::
   flash.drive = "twin";
   flash.model = better;
   flash.yes = true;
-  run(flash, console);
+  cli::flash(flash, console);
   console.line();
   console.line(console.bold("6. A motion that was never recorded, in closed loop on the drive with its hidden effect"));
   HilOptions loop;
@@ -94,8 +103,6 @@ json close_the_loop(const std::filesystem::path& folder, const std::filesystem::
   loop.report = folder / "closed-loop.html";
   return closed_loop::to_json(run_closed_loop(loop, console));
 }
-
-}  // namespace
 
 int run(const DemoOptions& options, Console& console) {
   std::uint64_t seed = options.seed.value_or(0);
@@ -263,6 +270,25 @@ int run(const DemoOptions& options, Console& console) {
                            quoted(recording.string())));
   output::save_json(options.json, answer);
   return kDone;
+}
+
+void declare(Parser& parser, DemoOptions& options) {
+  parser.option("--hidden", options.hidden, "effect that the twin hides, or none (default: by chance)").value("EFFECT");
+  parser.option("--seed", options.seed, "of the random numbers (default: another one each time)").value("N");
+  parser.option("--out", options.out, "folder for recording and models (default: demo-out)").value("DIR");
+}
+
+}  // namespace
+
+Command demo_command() {
+  return command<DemoOptions>(
+      {"demo",
+       "all steps on the embedded twin, with a hidden effect",
+       "A simulated drive with one effect that the model does not know is recorded, identified and compared; "
+       "the missing effect is diagnosed and added, and both models are compared on motions that the fit "
+       "never saw. At the end the twin states what was hidden. report.html shows all of it with plots.",
+       {"flexspline demo --hidden stribeck_gaussian --seed 7 --out demo-out"}},
+      declare, run);
 }
 
 }  // namespace flexspline::cli

@@ -2,7 +2,8 @@
 
 #include <nlohmann/json.hpp>
 
-#include "host/cli/commands.hpp"
+#include "host/cli/command.hpp"
+#include "host/cli/common_options.hpp"
 #include "host/cli/report_option.hpp"
 #include "host/output/diagnosis.hpp"
 #include "host/output/json.hpp"
@@ -10,6 +11,15 @@
 
 namespace flexspline::cli {
 namespace {
+
+struct DiagnoseOptions {
+  DataInputs data;
+  PipelineInputs pipeline;
+  std::filesystem::path model;
+  bool all = false;              // --auto
+  std::filesystem::path report;  // empty: none
+  std::string json;
+};
 
 // An error that no addition ends is not searched for ever.
 constexpr std::size_t kMostRounds = 8;
@@ -42,8 +52,6 @@ void write_page(const DiagnoseOptions& options, const data::Dataset& dataset, co
   write_report(options.report, subject, console);
 }
 
-}  // namespace
-
 int run(const DiagnoseOptions& options, Console& console) {
   require_report_place(options.report);
   const model::ModelFile file = load_searched_model(options.model);
@@ -68,6 +76,29 @@ int run(const DiagnoseOptions& options, Console& console) {
   output::save_json(options.json, options.all ? output::rounds_json(done.rounds, done.removed)
                                               : output::diagnosis_json(done.rounds.front()));
   return kDone;
+}
+
+void declare(Parser& parser, DiagnoseOptions& options) {
+  take_data(parser, options.data);
+  take_model(parser, options.model);
+  take_holdout(parser, options.data);
+  parser.flag("--auto", options.all, "continue with the named effect added, until no more is found");
+  take_report(parser, options.report);
+  take_pipeline(parser, options.pipeline);
+}
+
+}  // namespace
+
+Command diagnose_command() {
+  return command<DiagnoseOptions>(
+      {"diagnose",
+       "which physical effect is missing from a model, or that none is",
+       "Fits the model, finds where its error is large, tries every effect of the catalogue against data left out of "
+       "the fit, and names the one that is missing; or reports that none is, or that these data cannot show it, and "
+       "which experiment would. The model needs no values. With --auto it continues with the effect added until "
+       "nothing more is found. --report writes a page with plots: where the model fails, and what is missing.",
+       {kMakeData, "flexspline diagnose --model demo-out/base-model.toml demo-out"}},
+      declare, run);
 }
 
 }  // namespace flexspline::cli

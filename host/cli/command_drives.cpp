@@ -2,6 +2,8 @@
 
 #include <nlohmann/json.hpp>
 
+#include "host/cli/command.hpp"
+#include "host/cli/common_options.hpp"
 #include "host/cli/drive_commands.hpp"
 #include "host/output/json.hpp"
 #include "shared/protocol/texts.hpp"
@@ -10,6 +12,11 @@ namespace flexspline::cli {
 namespace {
 
 using nlohmann::json;
+
+struct DrivesOptions {
+  std::vector<std::string> also;  // ports and sockets to search
+  std::string json;
+};
 
 struct FoundDrive {
   transport::Found found;
@@ -55,8 +62,6 @@ FoundDrive queried(transport::Found found) {
   return seen;
 }
 
-}  // namespace
-
 int run(const DrivesOptions& options, Console& console) {
   std::vector<FoundDrive> all;
   for (transport::Found& found : transport::find_drives()) all.push_back(queried(std::move(found)));
@@ -85,6 +90,24 @@ int run(const DrivesOptions& options, Console& console) {
         "serial:/dev/ttyACM0), and without hardware there is --drive twin.");
   output::save_json(options.json, {{"format", "flexspline-drives/1"}, {"drives", std::move(list)}});
   return kDone;
+}
+
+void declare(Parser& parser, DrivesOptions& options) {
+  parser.option("--also", options.also, "search here, too: serial:PORT, tcp:HOST:PORT/TOKEN; may be repeated")
+      .value("DRIVE")
+      .one_value_each_time();
+}
+
+}  // namespace
+
+Command drives_command() {
+  return command<DrivesOptions>(
+      {"drives",
+       "the drives that can be reached, and what each is",
+       "Lists the drives on USB with serial number, firmware, effects of the image and state; one that cannot be "
+       "opened with the reason and what to do. What is behind a serial port or a socket is found with --also.",
+       {"flexspline drives --also twin"}},
+      declare, run);
 }
 
 }  // namespace flexspline::cli

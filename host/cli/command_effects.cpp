@@ -3,7 +3,8 @@
 #include <nlohmann/json.hpp>
 
 #include "host/catalogue/user_defined_effect.hpp"
-#include "host/cli/commands.hpp"
+#include "host/cli/command.hpp"
+#include "host/cli/common_options.hpp"
 #include "host/output/effect_curve.hpp"
 #include "host/output/identification.hpp"
 #include "host/output/json.hpp"
@@ -14,6 +15,11 @@ namespace {
 
 using catalogue::Entry;
 using nlohmann::json;
+
+struct EffectsOptions {
+  std::string name;  // empty: all
+  std::string json;
+};
 
 std::string kind_name(effects::Kind kind) {
   switch (kind) {
@@ -170,8 +176,6 @@ void describe_user_defined(const effects::Description& info, Console& console) {
   console.line("  " + how_to_add(info.name));
 }
 
-}  // namespace
-
 int run(const EffectsOptions& options, Console& console) {
   json list = json::array();
   if (!options.name.empty()) {
@@ -203,6 +207,23 @@ int run(const EffectsOptions& options, Console& console) {
   }
   output::save_json(options.json, {{"format", "flexspline-effects/1"}, {"effects", std::move(list)}});
   return kDone;
+}
+
+void declare(Parser& parser, EffectsOptions& options) {
+  parser.option("NAME", options.name, "the effect to explain").value("");
+}
+
+}  // namespace
+
+Command effects_command() {
+  return command<EffectsOptions>(
+      {"effects",
+       "the catalogue of physical effects, or one of them explained",
+       "Without a name: all effects with the torque balance they act on, their equation, usual size and where they "
+       "show. With a name: what the effect is, where it comes from on a machine, what it is confused with and which "
+       "experiment distinguishes them; and a drawn curve.",
+       {"flexspline effects stribeck_gaussian"}},
+      declare, run);
 }
 
 }  // namespace flexspline::cli

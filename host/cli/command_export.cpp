@@ -3,7 +3,8 @@
 #include <nlohmann/json.hpp>
 
 #include "host/catalogue/user_defined_effect.hpp"
-#include "host/cli/export_options.hpp"
+#include "host/cli/command.hpp"
+#include "host/cli/common_options.hpp"
 #include "host/interchange/export.hpp"
 #include "host/interchange/protocol_header.hpp"
 #include "host/output/json.hpp"
@@ -13,6 +14,14 @@ namespace flexspline::cli {
 namespace {
 
 using nlohmann::json;
+
+struct ExportOptions {
+  std::filesystem::path model;
+  std::string as;                // "c", "csv", "mujoco", "urdf"
+  std::filesystem::path out;     // empty: standard output, or the model's name for the folder of tables
+  bool protocol_header = false;  // then without a model
+  std::string json;
+};
 
 void needs_values(const model::Model& model, const std::filesystem::path& path) {
   std::string missing;
@@ -40,9 +49,7 @@ void put_text(const ExportOptions& options, const std::string& text, json& files
   }
 }
 
-}  // namespace
-
-int run(const ExportCommandOptions& options, Console& console) {
+int run(const ExportOptions& options, Console& console) {
   if (options.protocol_header) {
     if (!options.model.empty() || !options.as.empty())
       throw UsageError("--protocol-header is of every drive; leave out --model and --as");
@@ -91,6 +98,34 @@ int run(const ExportCommandOptions& options, Console& console) {
   }
   output::save_json(options.json, answer);
   return kDone;
+}
+
+void declare(Parser& parser, ExportOptions& options) {
+  parser.option("--model", options.model, "model file").value("MODEL");
+  parser.flag("--protocol-header", options.protocol_header,
+              "no model, but messages and parameter block of a drive as a C header");
+  parser.option("--as", options.as, "c: a C header; csv: tables; mujoco, urdf: a joint for a physics engine")
+      .one_of({"c", "csv", "mujoco", "urdf"})
+      .value("");
+  parser.option("--out", options.out, "the file, or the folder of tables (default: print; csv needs it)").value("PATH");
+}
+
+}  // namespace
+
+Command export_command() {
+  return command<ExportOptions>(
+      {"export",
+       "the model for other tools: C header, tables, MuJoCo, URDF",
+       "c: one C99 header with all the model's effects, those with memory too, to be called once a sample; its "
+       "numbers are those of simulate, to rounding. csv: a folder with the parameters, the friction over speed, the "
+       "transmission's loop, and the curve of each effect that depends on one signal. mujoco, urdf: a joint with "
+       "armature, the linear law nearest to the friction, and stiffness; what a joint cannot hold is written in a "
+       "comment. --protocol-header writes what travels between host and drive, for programs of your own: message "
+       "kinds, codes, channels, layouts, and the parameter block with the places of its fields.",
+       {kMakeData, kIdentify, "flexspline export --protocol-header --out flexspline_protocol.h",
+        "flexspline export --model fitted.toml --as c --out drive_model.h",
+        "flexspline export --model fitted.toml --as csv --out tables"}},
+      declare, run);
 }
 
 }  // namespace flexspline::cli

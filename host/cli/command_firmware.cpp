@@ -6,7 +6,10 @@
 #include <nlohmann/json.hpp>
 #include <optional>
 
-#include "host/cli/firmware_commands.hpp"
+#include "host/cli/command.hpp"
+#include "host/cli/command_flash.hpp"
+#include "host/cli/common_options.hpp"
+#include "host/cli/drive_commands.hpp"
 #include "host/firmware/image_file.hpp"
 #include "host/firmware/signing.hpp"
 #include "host/firmware/update.hpp"
@@ -14,11 +17,37 @@
 #include "host/output/json.hpp"
 
 namespace flexspline::cli {
+namespace {
 
 using nlohmann::json;
 namespace files = firmware_files;
 
-namespace {
+struct ImageOptions {
+  std::filesystem::path program;
+  std::string board;
+  std::string version;
+  std::filesystem::path out;
+  bool with_suffix = false;
+  std::filesystem::path key;  // empty: the development key
+  bool is_unsigned = false;
+  std::uint16_t counter = 0;
+  std::string json;
+};
+
+struct SignOptions {
+  std::filesystem::path image;
+  std::filesystem::path key;
+  std::filesystem::path out;
+  std::optional<std::uint16_t> counter;  // none: the one that the image has
+  bool with_suffix = false;
+  std::string json;
+};
+
+struct KeyOptions {
+  std::filesystem::path make;
+  std::filesystem::path show;
+  std::string json;
+};
 
 std::string described(const std::optional<files::KeyPair>& key, std::uint16_t counter) {
   if (!key) return "not signed";
@@ -45,8 +74,6 @@ void save_image(const char* format, const std::filesystem::path& out, files::Byt
                                 {"development_key", key && key->is_development_key()},
                                 {"security_counter", counter}});
 }
-
-}  // namespace
 
 int run(const ImageOptions& options, Console& console) {
   if (options.is_unsigned && (!options.key.empty() || options.counter != 0))
@@ -96,6 +123,38 @@ int run(const KeyOptions& options, Console& console) {
   return kDone;
 }
 
+void declare(Parser& parser, ImageOptions& options) {
+  parser.option("--program", options.program, "BIN file of a linker, linked to start behind a header of 512 bytes")
+      .required()
+      .value("BIN");
+  parser.option("--board", options.board, "the board that it is for, as flexspline drives calls it")
+      .required()
+      .value("NAME");
+  parser.option("--version", options.version, "major and minor, as 1.2").required().value("N.N");
+  parser.option("--out", options.out, "file for the image").required().value("IMAGE");
+  parser.flag("--dfu", options.with_suffix, "with the suffix that dfu-util looks for");
+  parser.option("--key", options.key, "sign with this key of flexspline key (default: the public development key)")
+      .value("KEY");
+  parser.option("--counter", options.counter, "security counter: a drive takes no smaller one than it has run (0)")
+      .value("N");
+  parser.flag("--unsigned", options.is_unsigned, "without a signature; flexspline sign adds it later");
+}
+
+void declare(Parser& parser, SignOptions& options) {
+  parser.option("--image", options.image, "firmware image of flexspline image").required().value("IMAGE");
+  parser.option("--key", options.key, "file of flexspline key --new").required().value("KEY");
+  parser.option("--out", options.out, "file for the signed image").required().value("IMAGE");
+  parser.option("--counter", options.counter, "security counter (default: the one that the image has)").value("N");
+  parser.flag("--dfu", options.with_suffix, "with the suffix that dfu-util looks for");
+}
+
+void declare(Parser& parser, KeyOptions& options) {
+  parser.option("--new", options.make, "make a pair of keys and write it into this file").value("KEY");
+  parser.option("--show", options.show, "print the public key of this file").value("KEY");
+}
+
+}  // namespace
+
 int flash_firmware(const FlashOptions& options, Console& console) {
   if (!options.model.empty() || !options.block.empty() || !options.settings.empty())
     throw UsageError("--firmware goes alone; flash the model or block with a second command");
@@ -127,6 +186,46 @@ int flash_firmware(const FlashOptions& options, Console& console) {
                   "the image and flash it again",
                   target.serial, wanted, after));
   return kNotMet;
+}
+
+Command image_command() {
+  return command<ImageOptions>(
+      {"image",
+       "makes a firmware image of a program",
+       "Puts before a program (BIN file) the header that boot loader and flash --firmware check: length, checksum, "
+       "board, version, security counter and signature. The program has to be linked to begin 512 bytes behind its "
+       "slot. Without --key the image is signed with the development key, which is public: boot loaders that were "
+       "built without a key of their own take it. --dfu adds the suffix that dfu-util looks for. flexspline-hil "
+       "image makes images for the twin.",
+       {"echo a program | tee program.bin",
+        "flexspline image --program program.bin --board stm32f405-dac --version 1.2 --out firmware.image"}},
+      declare, run);
+}
+
+Command sign_command() {
+  return command<SignOptions>(
+      {"sign",
+       "signs a firmware image",
+       "Signs an image (Ed25519) with the secret key of a file of flexspline key --new, for boot loaders that were "
+       "built with its public key; a signature that the image has is replaced. --counter raises the security "
+       "counter: once such an image was confirmed by a drive, the drive refuses all with a smaller one.",
+       {"echo a program | tee program.bin",
+        "flexspline image --program program.bin --board stm32f405-dac --version 1.2 --unsigned --out plain.image",
+        "flexspline key --new product.key",
+        "flexspline sign --image plain.image --key product.key --counter 1 --out firmware.image"}},
+      declare, run);
+}
+
+Command key_command() {
+  return command<KeyOptions>(
+      {"key",
+       "makes and shows keys that firmware is signed with",
+       "--new makes a pair of Ed25519 keys and writes both into a file that its owner alone may read (mode 0600); "
+       "an existing file is never overwritten. Keep a copy: a drive whose boot loader has this public key takes "
+       "images signed by it and no others. --show prints the public key of a file, for the build of the boot "
+       "loader; it prints nothing secret.",
+       {"flexspline key --new product.key", "flexspline key --show product.key"}},
+      declare, run);
 }
 
 }  // namespace flexspline::cli

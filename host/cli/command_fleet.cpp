@@ -5,7 +5,8 @@
 #include <iterator>
 #include <nlohmann/json.hpp>
 
-#include "host/cli/fleet.hpp"
+#include "host/cli/command.hpp"
+#include "host/cli/common_options.hpp"
 #include "host/comparison/compare.hpp"
 #include "host/data/recording.hpp"
 #include "host/deployment/sha256.hpp"
@@ -23,6 +24,19 @@ namespace {
 
 namespace fs = std::filesystem;
 using nlohmann::json;
+
+struct FleetOptions {
+  std::string action;  // run, merge
+  std::vector<std::filesystem::path> places;
+  std::filesystem::path model;  // empty: base-model.toml of each folder
+  std::filesystem::path out;    // run: file for the result; empty: in the drive's folder
+  bool diagnose = false;
+  bool again = false;
+  std::vector<std::string> tolerate;
+  PipelineInputs pipeline;
+  std::optional<double> limit;  // merge: of |z|
+  std::string json;
+};
 
 constexpr int kFleetDigits = 4;
 
@@ -234,13 +248,52 @@ int merge_results(const FleetOptions& options, Console& console) {
   return kDone;
 }
 
-}  // namespace
-
 int run(const FleetOptions& options, Console& console) {
   if (options.action == "run") return run_drives(options, console);
   if (options.action == "merge") return merge_results(options, console);
   throw UsageError(
       fmt::format("there is no \"fleet {}\"; it is fleet run FOLDER, or fleet merge RESULTS", options.action));
+}
+
+void declare(Parser& parser, FleetOptions& options) {
+  parser.option("ACTION", options.action, "run: one drive; merge: the results of all").required().value("{run,merge}");
+  parser.option("FOLDER", options.places, "run: a drive's measurements; merge: results, or folders with them")
+      .required()
+      .value("");
+  parser.option("--model", options.model, "run: model to identify (default: base-model.toml in the folder)")
+      .value("MODEL");
+  parser.flag("--diagnose", options.diagnose, "run: diagnose, too");
+  parser.flag("--again", options.again, "run: even where there is a result of the same files");
+  parser.option("--out", options.out, "run: file for the result (default: fleet-result.json in the folder)")
+      .value("FILE");
+  parser.option("--tolerate", options.tolerate, "run: treat a finding as a warning")
+      .value("KIND")
+      .comma_separated()
+      .one_value_each_time();
+  parser.option("--cutoff-hz", options.pipeline.cutoff_hz, "run: cut-off of both filters (default: from the data)")
+      .value("HZ");
+  parser
+      .option("--limit", options.limit,
+              "merge: robust z-score beyond which a drive differs (default: what one fleet in a hundred of equal "
+              "drives exceeds)")
+      .value("Z");
+}
+
+}  // namespace
+
+Command fleet_command() {
+  return command<FleetOptions>(
+      {"fleet",
+       "many drives: one command a drive, then which of them differs from its siblings",
+       "run identifies a drive (with --diagnose diagnoses it, too) and writes fleet-result.json next to its "
+       "measurements; if that exists already, of the same files and the same build, nothing is done, so the "
+       "command can be repeated after a stop. It is for a scheduler: parallel flexspline fleet run {} ::: "
+       "drives/*, or in a Slurm array job: all=(drives/*); flexspline fleet run \"${all[$SLURM_ARRAY_TASK_ID]}\". "
+       "merge reads the results, reports how each parameter and each error is distributed over the drives, and names "
+       "drives that are further off than their siblings' scatter explains; at least five drives are needed.",
+       {"flexspline-hil record --out drives/one --seed 1", "flexspline fleet run drives/one",
+        "flexspline fleet merge drives"}},
+      declare, run);
 }
 
 }  // namespace flexspline::cli

@@ -7,7 +7,9 @@
 #include <nlohmann/json.hpp>
 #include <numbers>
 
-#include "host/cli/hil_options.hpp"
+#include "host/cli/command.hpp"
+#include "host/cli/command_hil.hpp"
+#include "host/cli/common_options.hpp"
 #include "host/cli/report_option.hpp"
 #include "host/cli/twin_runs.hpp"
 #include "host/closed_loop/compare.hpp"
@@ -80,6 +82,42 @@ void print(const Comparison& c, Console& console) {
   console.line(fmt::format("  {} times real time.", number(c.realtime_factor, 2)));
 }
 
+int run(const HilOptions& options, Console& console) {
+  const closed_loop::Comparison comparison = run_closed_loop(options, console);
+  output::save_json(options.json, closed_loop::to_json(comparison));
+  return kDone;
+}
+
+void declare(Parser& parser, HilOptions& options) {
+  parser.option("--scenario", options.scenario, "name or file; flexspline-hil scenarios lists names")
+      .required()
+      .value("S");
+  parser
+      .option("--model", options.model,
+              "model for the feedforward (default: the manufacturer's values, hidden effect unknown)")
+      .value("MODEL");
+  parser.option("--base", options.base, "model before an effect was added, for one more run").value("MODEL");
+  parser.option("--plant", options.plant, "plant file of the drive (default: the scenario's)").value("FILE");
+  parser.option("--with", options.with, "effects that the drive has and the manufacturer's values include, A,B")
+      .comma_separated()
+      .value("EFFECT");
+  parser.option("--hide", options.hide, "effect that the drive has and the manufacturer's values do not include")
+      .value("EFFECT");
+  parser
+      .option("--settings", options.settings,
+              "settings of the drive, as for pack --drive (default: the manufacturer's)")
+      .value("FILE.toml");
+  parser.option("--seconds", options.seconds, "duration of the motion (default: the scenario's)").value("S");
+  parser.option("--processor", options.processor, "firmware image that runs the controller, in QEMU").value("ELF");
+  parser.option("--draws", options.draws, "simulated drives of the prediction; 0: none").shows_default().value("N");
+  parser.option("--seed", options.seed, "seed of the sensors' noise").shows_default().value("N");
+  parser.option("--tick-hz", options.tick_hz, "ticks of the drive per second, a multiple of 1000")
+      .shows_default()
+      .value("HZ");
+  parser.option("--picture", options.picture, "write the tracking errors as a picture into this file").value("SVG");
+  parser.option("--report", options.report, "write a page with plots into this file").value("HTML");
+}
+
 }  // namespace
 
 closed_loop::Comparison run_closed_loop(const HilOptions& options, Console& console) {
@@ -117,10 +155,18 @@ closed_loop::Comparison run_closed_loop(const HilOptions& options, Console& cons
   return c;
 }
 
-int run(const HilOptions& options, Console& console) {
-  const closed_loop::Comparison comparison = run_closed_loop(options, console);
-  output::save_json(options.json, closed_loop::to_json(comparison));
-  return kDone;
+Command hil_command() {
+  return command<HilOptions>(
+      {"hil",
+       "a drive in closed loop, with and without compensation",
+       "Runs the drive's own firmware on a simulated drive along a motion, with the same loops each time: without "
+       "compensation, with a model, and with the model that an effect was added to (--base and --model). Reports the "
+       "tracking error of the output, the current, and limit cycles at rest; and what was predicted from the "
+       "model and the uncertainty of its parameters alone. A scenario is a name (flexspline-hil scenarios lists "
+       "them) or a file with motion, drive, surroundings and faults. Without --model the manufacturer's values are "
+       "used. --processor runs the controller as the image of an ARM processor.",
+       {"flexspline hil --scenario slow-reversals --hide stribeck_gaussian --seconds 4"}},
+      declare, run);
 }
 
 }  // namespace flexspline::cli

@@ -4,6 +4,8 @@
 #include <cmath>
 #include <nlohmann/json.hpp>
 
+#include "host/cli/command.hpp"
+#include "host/cli/common_options.hpp"
 #include "host/cli/drive_commands.hpp"
 #include "host/drive/scales.hpp"
 #include "host/output/json.hpp"
@@ -13,14 +15,18 @@ namespace {
 
 using nlohmann::json;
 
+struct HomeOptions {
+  std::string drive;
+  std::optional<double> position;  // of the motor; none: only queried
+  std::string json;
+};
+
 constexpr double kFarthestTurns = 0x1p23;
 
 std::string described(const protocol::Reference& known) {
   return fmt::format("the turn of the motor is {}, the angle of the output is {}",
                      known.knows_turn ? "known" : "not known", known.knows_output ? "known" : "not known");
 }
-
-}  // namespace
 
 int run(const HomeOptions& options, Console& console) {
   drive::Session session = open_drive(options.drive);
@@ -47,6 +53,29 @@ int run(const HomeOptions& options, Console& console) {
                                    {"knows_output", known.knows_output},
                                    {"position_rad", options.position ? json(*options.position) : json()}});
   return kDone;
+}
+
+void declare(Parser& parser, HomeOptions& options) {
+  take_drive(parser, options.drive);
+  parser
+      .option("--position-rad", options.position,
+              "the present position of the motor, m on a linear axis (default: only prints what the drive knows)")
+      .value("RAD");
+}
+
+}  // namespace
+
+Command home_command() {
+  return command<HomeOptions>(
+      {"home",
+       "sets the motor position of a drive",
+       "Incremental encoders do not know their absolute position: until it is set, or an index pulse came, a drive "
+       "leaves out of its compensation what depends on the angle, and limits of position do not hold. Bring the "
+       "shaft to a mark, at rest and not armed, and give the motor's angle there, as the model's data count it. "
+       "Absolute encoders at motor and output need none of this. The reference is lost when the power goes, or when "
+       "a fault reports that counts were lost. Without --position-rad it prints what the drive knows.",
+       {"flexspline home --drive twin", "flexspline home --drive twin --position-rad 0"}},
+      declare, run);
 }
 
 }  // namespace flexspline::cli

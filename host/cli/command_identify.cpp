@@ -5,7 +5,8 @@
 #include <nlohmann/json.hpp>
 #include <stdexcept>
 
-#include "host/cli/commands.hpp"
+#include "host/cli/command.hpp"
+#include "host/cli/common_options.hpp"
 #include "host/cli/report_option.hpp"
 #include "host/estimation/estimate.hpp"
 #include "host/model/signature.hpp"
@@ -15,6 +16,20 @@
 
 namespace flexspline::cli {
 namespace {
+
+struct IdentifyOptions {
+  DataInputs data;
+  PipelineInputs pipeline;
+  std::filesystem::path model;
+  std::filesystem::path out;  // empty: print only
+  std::string method;         // empty: what the model needs
+  std::string intervals = "standard";
+  std::vector<std::string> supply;  // EFFECT.PARAMETER=VALUE
+  int starts = 3;
+  std::uint64_t seed = 1;
+  std::filesystem::path report;  // empty: none
+  std::string json;
+};
 
 // "inertia.inertia=1.07e-4"
 estimation::SuppliedValue supplied_from(const std::string& text) {
@@ -43,8 +58,6 @@ estimation::Options options_from(const IdentifyOptions& options, Console& consol
   how.progress = [&console](std::string_view what) { console.progress(std::string(what)); };
   return how;
 }
-
-}  // namespace
 
 int run(const IdentifyOptions& options, Console& console) {
   require_report_place(options.report);
@@ -91,6 +104,60 @@ int run(const IdentifyOptions& options, Console& console) {
   output::save_json(options.json,
                     output::identification_json(*found, std::string(estimation::name_of(used)), options.intervals));
   return kDone;
+}
+
+void declare(Parser& parser, IdentifyOptions& options) {
+  take_data(parser, options.data);
+  take_model(parser, options.model);
+  parser.option("--out", options.out, "the model with the values in it (default: print only)").value("MODEL");
+  parser
+      .option(
+          "--method", options.method,
+          "ls: least squares; nls: with a search for nonlinear parameters; partitioned: linear parameters first, then "
+          "the others; iv: instrumental variables, for noisy velocities; oe: least error of the free run (default: "
+          "ls or nls, as the model needs)")
+      .one_of({"ls", "nls", "partitioned", "iv", "oe"})
+      .value("");
+  parser
+      .option("--intervals", options.intervals,
+              "standard; profile: where the best fit of all others gets significantly worse; bootstrap: from samples "
+              "drawn again (ls and nls)")
+      .one_of({"standard", "profile", "bootstrap"})
+      .shows_default()
+      .value("");
+  parser
+      .option(
+          "--supply", options.supply,
+          "a parameter that is known from another source, in its SI unit, as inertia.inertia=1.07e-4; may be repeated")
+      .value("EFFECT.PARAMETER=VALUE")
+      .one_value_each_time();
+  parser.option("--starts", options.starts, "starts of the search for nonlinear parameters")
+      .within(1, 100)
+      .shows_default()
+      .value("N");
+  parser.option("--seed", options.seed, "of the random starts and of the bootstrap").shows_default().value("N");
+  take_holdout(parser, options.data);
+  take_report(parser, options.report);
+  take_pipeline(parser, options.pipeline);
+}
+
+}  // namespace
+
+Command identify_command() {
+  return command<IdentifyOptions>(
+      {"identify",
+       "estimates the parameters of a model",
+       "Estimates every parameter that the model does not fix, from the experiments of role fit: for each experiment "
+       "alone, with average and spread, and for all together with 95 % intervals. A spread above 30 % is flagged: "
+       "the parameter is not reliable, or an effect is missing. \"excited\" is the share of a parameter's effect on "
+       "the data that no other parameter can explain. With --out the model is written with the values; its comments "
+       "and layout stay. --method iv or oe is for velocities so noisy that least squares is biased towards "
+       "zero; --intervals profile or bootstrap for parameters whose uncertainty is not symmetric; --supply for "
+       "a parameter that is known from another source, such as an inertia where the torque constant is not known "
+       "either. --report writes a page with plots for a browser or a printer.",
+       {kMakeData, kIdentify,
+        "flexspline identify demo-out --model demo-out/base-model.toml --method oe --supply inertia.inertia=1.04e-4"}},
+      declare, run);
 }
 
 }  // namespace flexspline::cli

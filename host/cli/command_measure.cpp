@@ -2,12 +2,20 @@
 
 #include <nlohmann/json.hpp>
 
-#include "host/cli/commands.hpp"
+#include "host/cli/command.hpp"
+#include "host/cli/common_options.hpp"
 #include "host/measurement/measure.hpp"
 #include "host/output/json.hpp"
 #include "host/output/measurement.hpp"
 
 namespace flexspline::cli {
+namespace {
+
+struct MeasureOptions {
+  DataInputs data;
+  std::optional<double> period_s;  // else found in the data
+  std::string json;
+};
 
 int run(const MeasureOptions& options, Console& console) {
   const data::Dataset dataset = load(options.data, console);
@@ -16,6 +24,29 @@ int run(const MeasureOptions& options, Console& console) {
   console.line(output::measurement_text(found));
   output::save_json(options.json, output::measurement_json(found));
   return kDone;
+}
+
+void declare(Parser& parser, MeasureOptions& options) {
+  take_data(parser, options.data);
+  parser.option("--period-s", options.period_s, "period of the excitation (default: found in the data)")
+      .positive()
+      .value("S");
+}
+
+}  // namespace
+
+Command measure_command() {
+  return command<MeasureOptions>(
+      {"measure",
+       "before any model: frequency response, noise floor, distortion, resonance",
+       "Reports what measurements show of a drive without any model: the frequency response from the current to "
+       "velocity, torque and torsion with its coherence and confidence band; resonances and anti-resonances with "
+       "damping; the noise of each signal, from what differs between the periods of an excitation; odd and even "
+       "nonlinear distortion, from the lines that a linear drive would leave empty. What the given motions cannot "
+       "show is printed, with the motion that would show it. Best is an odd random-phase multisine with some odd "
+       "lines left out, repeated six times.",
+       {kMakeData, "flexspline measure demo-out"}},
+      declare, run);
 }
 
 }  // namespace flexspline::cli

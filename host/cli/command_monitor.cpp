@@ -8,6 +8,9 @@
 #include <deque>
 #include <nlohmann/json.hpp>
 
+#include "host/cli/command.hpp"
+#include "host/cli/command_monitor.hpp"
+#include "host/cli/common_options.hpp"
 #include "host/cli/drive_commands.hpp"
 #include "host/drive/scales.hpp"
 #include "host/output/json.hpp"
@@ -118,8 +121,6 @@ class Screen {
   int lines_ = 0;
 };
 
-}  // namespace
-
 int run(const MonitorOptions& options, Console& console) {
   if (options.residual_map) return run_residual_map(options, console);
   const std::vector<Channel> channels = channels_of(options.channels);
@@ -186,6 +187,47 @@ int run(const MonitorOptions& options, Console& console) {
                                    {"frames_lost", lost},
                                    {"samples", samples}});
   return kDone;
+}
+
+void declare(Parser& parser, MonitorOptions& options) {
+  take_drive(parser, options.drive);
+  parser.option("--seconds", options.seconds, "duration (default: until Ctrl-C; with --residual-map: 0)")
+      .positive()
+      .value("S");
+  const Option rate =
+      parser.option("--rate-hz", options.rate_hz, "lines per second").within(0.5, 100.0).shows_default().value("HZ");
+  const Option channels =
+      parser.option("--channels", options.channels, "which signals, at most 12 (default: the main ones)")
+          .comma_separated()
+          .value("NAME")
+          .one_value_each_time();
+  const Option map = parser
+                         .flag("--residual-map", options.residual_map,
+                               "where the model fails: the map of the drive over velocity and motor angle")
+                         .excludes(rate)
+                         .excludes(channels);
+  parser.flag("--reset", options.reset, "clears the residual map after showing it").needs(map);
+  parser
+      .option("--limit-nm", options.limit_nm,
+              "smaller residuals are ignored (default: a hundredth of the motor's torque limit)")
+      .positive()
+      .value("NM")
+      .needs(map);
+}
+
+}  // namespace
+
+Command monitor_command() {
+  return command<MonitorOptions>(
+      {"monitor",
+       "live signals of a drive",
+       "Shows mode, faults and signals as they are; on a terminal with a curve of the last seconds behind each, else "
+       "a line at a time. --json writes the samples at the end. It only reads: nothing is armed. --residual-map "
+       "shows where over velocity and motor angle the model on the drive fails, and how significant that is: the "
+       "drive fills the map while feedforward of its model is on (record --compensate); the first call starts the "
+       "count.",
+       {"flexspline monitor --drive twin --seconds 0.5", "flexspline monitor --drive twin --residual-map"}},
+      declare, run);
 }
 
 }  // namespace flexspline::cli

@@ -7,6 +7,7 @@
 #include <nlohmann/json.hpp>
 #include <thread>
 
+#include "host/cli/command_monitor.hpp"
 #include "host/cli/drive_commands.hpp"
 #include "host/drive/residual_map_json.hpp"
 #include "host/output/json.hpp"

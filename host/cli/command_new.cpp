@@ -3,8 +3,10 @@
 #include <nlohmann/json.hpp>
 #include <utility>
 
-#include "host/cli/commands.hpp"
+#include "host/cli/command.hpp"
+#include "host/cli/common_options.hpp"
 #include "host/cli/first_project.hpp"
+#include "host/cli/new_options.hpp"
 #include "host/cli/unfinished_project.hpp"
 #include "host/output/json.hpp"
 #include "host/output/text.hpp"
@@ -33,8 +35,6 @@ json json_of(const NewOptions& options, const Draft& draft, const BaseModel& bas
           {"effects", std::move(effects)},
           {"notes", draft.notes}};
 }
-
-}  // namespace
 
 int run(const NewOptions& options, Console& console) {
   const fs::path dataset_file = options.out / "dataset.toml";
@@ -81,6 +81,65 @@ int run(const NewOptions& options, Console& console) {
   console.line(fmt::format("  flexspline diagnose --model {} {}", fitted, out));
   output::save_json(options.json, json_of(options, draft, base));
   return kDone;
+}
+
+void declare(Parser& parser, NewOptions& options) {
+  parser.option("--from", options.data.data, kDataHelp).required().value("DATA");
+  parser.option("--out", options.out, "folder for dataset.toml and base-model.toml").required().value("DIR");
+  parser.option("--map", options.map, "a column of ours is theirs, in this unit; may be repeated")
+      .value("OURS=THEIRS[:UNIT]")
+      .one_value_each_time();
+  parser
+      .option("--without", options.without,
+              "a column of theirs that is not to be used, whatever its name says; may be repeated")
+      .value("THEIRS")
+      .one_value_each_time();
+  parser
+      .option("--turn", options.turned,
+              "a column of ours whose sign is the other one, as current_a where a positive current decelerates; may "
+              "be repeated")
+      .value("OURS")
+      .one_value_each_time();
+  parser.option("--axis", options.axis, "rotary, or linear (m, m/s, N)").one_of({"rotary", "linear"}).value("");
+  parser.option("--gear-ratio", options.gear_ratio, "motor turns per output turn").positive().value("N");
+  parser
+      .option("--position-side", options.position_side,
+              "where the only position and velocity are measured: link or motor. Of the link, with --gear-ratio N, "
+              "the motor's are N times those, as most robots log them together with the motor's current")
+      .one_of({"link", "motor"})
+      .value("");
+  parser.option("--joint", options.joint, "of a file with several joints, by the number in the names")
+      .not_negative()
+      .value("K");
+  parser.option("--torque-constant", options.torque_constant_nm_a, "motor torque per ampere, N*m/A")
+      .positive()
+      .value("KM");
+  parser.option("--encoder-counts", options.encoder_counts, "counts per motor turn (per metre on a linear axis)")
+      .positive()
+      .value("COUNTS");
+  parser.option("--pole-pairs", options.pole_pairs, "of the motor, where the log has its speed in electrical turns")
+      .within(1, 1000)
+      .value("P");
+  parser.flag("--force", options.force, "write over a dataset.toml and base-model.toml that are there");
+  take_tolerate(parser, options.data);
+}
+
+}  // namespace
+
+Command new_command() {
+  return command<NewOptions>(
+      {"new",
+       "first dataset.toml and base model from measurements",
+       "Reads recordings as a logger left them (CSV, also of scopes and compressed by gzip; MAT; HDF5; NumPy; bags of "
+       "ROS 1 and 2 and MCAP, by topic and field; logs of moteus), finds out which column is what from names, units "
+       "and motion, and writes two files into a new folder: dataset.toml, which maps the columns to the names of the "
+       "tool, and base-model.toml, with the effects that these signals can show. The measurements are not changed. "
+       "What is guessed is printed, and written as a comment into the files; --map and the other options overrule "
+       "it. A robot's log, with the position of the link together with the current of the motor, takes "
+       "--position-side link --gear-ratio N. A single record is split into a part to fit and a part to verify. What "
+       "cannot be finished is left as a draft, with the command to continue.",
+       {kMakeData, "flexspline new --from demo-out --out project"}},
+      declare, run);
 }
 
 }  // namespace flexspline::cli

@@ -6,7 +6,8 @@
 #include <nlohmann/json.hpp>
 
 #include "host/catalogue/constants.hpp"
-#include "host/cli/commands.hpp"
+#include "host/cli/command.hpp"
+#include "host/cli/common_options.hpp"
 #include "host/cli/drive_commands.hpp"
 #include "host/deployment/bases.hpp"
 #include "host/deployment/maker.hpp"
@@ -20,6 +21,21 @@ namespace {
 
 using nlohmann::json;
 using output::number;
+
+struct PackCommandOptions {
+  std::filesystem::path model;
+  std::filesystem::path out;
+  std::filesystem::path drive;  // settings of the drive; empty: none in the block
+  std::string for_drive;        // empty: no drive is read
+  deployment::PackOptions pack;
+  std::string json;
+};
+
+struct UnpackOptions {
+  std::filesystem::path block;
+  std::filesystem::path out;  // empty: print only
+  std::string json;
+};
 
 constexpr int kErrorDigits = 3;
 
@@ -152,8 +168,6 @@ json json_of(const deployment::Unpacked& block) {
           {"coefficients_follow_from_parameters", block.model ? json(block.coefficients_follow) : json()}};
 }
 
-}  // namespace
-
 int run(const PackCommandOptions& options, Console& console) {
   const model::ModelFile file = load_model(options.model);
   console.progress("proving the block and comparing it with double");
@@ -242,6 +256,77 @@ int run(const UnpackOptions& options, Console& console) {
   answer["made_by"] = maker.empty() ? json() : json(maker);
   output::save_json(options.json, answer);
   return kDone;
+}
+
+void declare(Parser& parser, PackCommandOptions& options) {
+  take_model(parser, options.model);
+  parser.option("--out", options.out, "the parameter block").required().value("BLOCK");
+  parser.option("--tick-hz", options.pack.tick_hz, "ticks of the drive's control loop a second")
+      .shows_default()
+      .value("HZ");
+  parser.option("--bound", options.pack.bound, "largest error against double, as a share of rated torque")
+      .positive()
+      .shows_default()
+      .value("SHARE");
+  parser.flag("--measured", options.pack.measured,
+              "where the error cannot be proven, take the largest one along samples of the envelope");
+  parser.option("--drive", options.drive, "settings of the drive: its loops, limits and sensors").value("FILE.toml");
+  parser
+      .option("--for-drive", options.for_drive,
+              "a drive in reach: its tick rate, the effects of its image, and full scales, largest current and "
+              "sensors of its board, which the settings then need not state")
+      .value("DRIVE");
+  parser.option("--drive-name", options.pack.drive, "name of the drive that the block is for (default: any)")
+      .value("NAME");
+  parser.option("--encoder-counts", options.pack.encoder_counts, "per motor turn: the block then has an encoder filter")
+      .value("COUNTS");
+  parser.option("--filter-corner-hz", options.pack.filter_corner_hz, "corner of the encoder filter")
+      .positive()
+      .shows_default()
+      .value("HZ");
+  parser.option("--image", options.pack.image, "effects that the firmware has (default: all that can run)")
+      .value("EFFECT")
+      .comma_separated()
+      .one_value_each_time();
+}
+
+void declare(Parser& parser, UnpackOptions& options) {
+  parser.option("BLOCK", options.block, "parameter block").required().value("");
+  parser.option("--out", options.out, "the model that the block was made from (default: print only)").value("MODEL");
+}
+
+}  // namespace
+
+Command pack_command() {
+  return command<PackCommandOptions>(
+      {"pack",
+       "makes the parameter block of a drive from a model, with its proof",
+       "Turns a model into the bytes that a drive computes with: bases from the ratings in [drive], coefficients as "
+       "integers, and a checksum. Proves that no number can leave its range whatever the drive measures within twice "
+       "its ratings, bounds for each effect and for the sum how far the drive can be from the equations, and compares "
+       "the block with double along a hundred thousand samples of the whole envelope. A model that does not fit, "
+       "whose error along the samples is above --bound, or whose error has no bound that can be proven (unless "
+       "--measured goes without one), is refused with the reason (exit code 1 for the error, 2 for all else). The "
+       "model's parameters go into the block too, for unpack. With --drive the block has "
+       "all that a drive needs: loops (50 Hz velocity with integral, 10 Hz position), limits, sensors, feedforward "
+       "and observers, as a TOML file states them (host/deployment/README.md has the keys) and else as the ratings "
+       "and the model suggest. Without it a block is good to simulate with; a drive refuses it.",
+       {kMakeData, kIdentify, "flexspline pack --model fitted.toml --out drive.block --encoder-counts 4096",
+        "printf 'format = \"flexspline-drive/1\"\\n[output_encoder]\\ncounts = 65536\\n' | tee drive.toml",
+        "flexspline pack --model fitted.toml --drive drive.toml --tick-hz 20000 --encoder-counts 4096 --out "
+        "full.block"}},
+      declare, run);
+}
+
+Command unpack_command() {
+  return command<UnpackOptions>(
+      {"unpack",
+       "checks a parameter block and prints its contents",
+       "Checks a block with the drive's own code, prints its contents in SI, and with --out writes the "
+       "model that it was made from. A damaged block is refused: which entry and field, and why.",
+       {kMakeData, kIdentify, "flexspline pack --model fitted.toml --out drive.block",
+        "flexspline unpack drive.block --out again.toml"}},
+      declare, run);
 }
 
 }  // namespace flexspline::cli

@@ -3,13 +3,27 @@
 #include <algorithm>
 #include <nlohmann/json.hpp>
 
-#include "host/cli/commands.hpp"
+#include "host/cli/command.hpp"
+#include "host/cli/common_options.hpp"
 #include "host/output/json.hpp"
 #include "host/output/plan.hpp"
 #include "host/planning/design.hpp"
 
 namespace flexspline::cli {
 namespace {
+
+struct PlanOptions {
+  DataInputs data;  // may be none
+  PipelineInputs pipeline;
+  std::filesystem::path model;
+  std::filesystem::path out;
+  std::vector<std::string> separate;  // two effects, or none
+  std::vector<std::string> without;   // off, locked, load, temperature
+  std::vector<double> temperatures_c;
+  std::optional<double> current_a, velocity_rad_s, travel_rad, duration_s, load_torque_nm, run_s, sample_hz;
+  int motions = 4;
+  std::string json;
+};
 
 planning::MotionSettings setting_of(const PlanOptions& options, const model::Model& model,
                                     const data::Dataset* dataset) {
@@ -64,8 +78,6 @@ double sample_time(const PlanOptions& options, const data::Dataset* dataset, dou
   return 1.0 / hz;
 }
 
-}  // namespace
-
 int run(const PlanOptions& options, Console& console) {
   const model::ModelFile file = load_searched_model(options.model);
   std::optional<data::Dataset> dataset;
@@ -87,6 +99,57 @@ int run(const PlanOptions& options, Console& console) {
   output::print_plan(console, design, options.out.string());
   output::save_json(options.json, output::plan_json(design));
   return kDone;
+}
+
+void declare(Parser& parser, PlanOptions& options) {
+  parser.option("DATA", options.data.data, fmt::format("what there is already: {}", kDataHelp)).value("");
+  take_tolerate(parser, options.data);
+  take_model(parser, options.model);
+  parser.option("--out", options.out, "the plan").required().value("PLAN");
+  parser.option("--separate", options.separate, "two effects to distinguish (default: what is not well known)")
+      .comma_separated()
+      .number_of_values(2)
+      .value("A,B");
+  const auto limit = [&parser](const char* name, std::optional<double>& value, const char* help, const char* unit) {
+    parser.option(name, value, help).positive().value(unit);
+  };
+  limit("--current-a", options.current_a, "largest motor current (default: the model's rated one)", "A");
+  limit("--velocity-rad-s", options.velocity_rad_s, "largest motor velocity (default: the model's rated one)", "RAD/S");
+  limit("--travel-rad", options.travel_rad, "travel of the output from end to end (default: one turn)", "RAD");
+  limit("--duration-s", options.duration_s, "of all recordings together (default: 180)", "S");
+  limit("--load-torque-nm", options.load_torque_nm,
+        "constant torque that you can apply to the output (default: what half of the current holds)", "NM");
+  limit("--run-s", options.run_s, "of one recording (default: 8)", "S");
+  limit("--sample-hz", options.sample_hz, "rate of the recording (default: that of DATA, else 1000)", "HZ");
+  parser.option("--without", options.without, "what you cannot do: off, locked, load, temperature")
+      .comma_separated()
+      .one_of({"off", "locked", "load", "temperature"})
+      .value("WHAT");
+  parser.option("--temperatures", options.temperatures_c, "housing cold and warm, degC (default: 25,40)")
+      .comma_separated()
+      .number_of_values(2)
+      .value("COLD,WARM");
+  parser.option("--motions", options.motions, "at most so many").within(1, 20).shows_default().value("N");
+  take_pipeline(parser, options.pipeline);
+}
+
+}  // namespace
+
+Command plan_command() {
+  return command<PlanOptions>(
+      {"plan",
+       "designs the motion that distinguishes two effects, or that determines the parameters",
+       "Rehearses some thirty motions with the model, within the limits of the drive: triangles slow and fast, sines, "
+       "saw-teeth, multisines, chirps, steps of speed, a locked output, a constant load, two temperatures, the "
+       "drive off. With --separate, motions are chosen that distinguish two effects best: by the part of one "
+       "effect's torque that the model with the other cannot reproduce, over the noise. Without it, motions that "
+       "determine all parameters best. Measurements, where given, give the noise, the sizes of the effects and what "
+       "need not be recorded again. If no motion distinguishes two effects, the answer says so. The plan is a TOML "
+       "file that flexspline-hil record --plan runs on the twin.",
+       {kMakeData, kIdentify,
+        "flexspline plan --separate stribeck_gaussian,load_dependent_friction --model fitted.toml --out "
+        "plan.toml"}},
+      declare, run);
 }
 
 }  // namespace flexspline::cli

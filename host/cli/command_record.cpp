@@ -7,6 +7,8 @@
 #include <iostream>
 #include <nlohmann/json.hpp>
 
+#include "host/cli/command.hpp"
+#include "host/cli/common_options.hpp"
 #include "host/cli/drive_commands.hpp"
 #include "host/deployment/sha256.hpp"
 #include "host/drive/dataset_writer.hpp"
@@ -20,6 +22,20 @@ namespace {
 
 namespace fs = std::filesystem;
 using nlohmann::json;
+
+struct RecordOptions {
+  std::string drive;
+  std::filesystem::path plan;
+  std::filesystem::path out;
+  bool yes = false;
+  bool force = false;
+  bool clear_fault = false;
+  bool compensate = false;
+  std::vector<std::string> runs;              // of the plan, by name; none: all
+  std::optional<double> full_velocity_rad_s;  // of the report's plans
+  std::optional<double> full_current_a;
+  std::string json;
+};
 
 bool needs_a_person(const planning::Run& run) {
   return run.locked || run.load_torque_nm != 0.0 || run.temperature_c || !run.instructions.empty();
@@ -110,8 +126,6 @@ planning::Plan report_plan_of(const RecordOptions& options, planning::FullScale 
       fmt::format("there is no file {} and no such plan of the report; there are {}", options.plan.string(), known));
 }
 
-}  // namespace
-
 int run(const RecordOptions& options, Console& console) {
   const bool is_report = options.plan.string().starts_with("report-") && !fs::exists(options.plan);
   planning::Plan plan = is_report ? report_plan_of(options, {100.0, 1.0}) : planning::read(options.plan);
@@ -182,6 +196,55 @@ int run(const RecordOptions& options, Console& console) {
   }
   console.line(kept);
   return kDone;
+}
+
+void declare(Parser& parser, RecordOptions& options) {
+  std::string names;
+  for (const planning::ReportPlan& plan : planning::report_plans())
+    names += (names.empty() ? "" : ", ") + std::string(plan.name);
+  take_drive(parser, options.drive);
+  parser.option("--plan", options.plan, "motions: of flexspline plan, by hand, or the report's by name: " + names)
+      .required()
+      .value("PLAN");
+  parser.option("--out", options.out, "folder for the measurements").required().value("DIR");
+  parser.flag("--force", options.force, "write into a folder that is not empty");
+  parser.option("--runs", options.runs, "only these runs of the plan, by name (default: all)")
+      .comma_separated()
+      .value("NAME")
+      .one_value_each_time();
+  parser.flag("--compensate", options.compensate, "runs of mode position with feedforward of the model on the drive");
+  parser
+      .option("--full-velocity-rad-s", options.full_velocity_rad_s,
+              "motor velocity that is 100 % in the report's plans (default: nine tenths of the drive's limit)")
+      .positive()
+      .value("RAD/S");
+  parser
+      .option("--full-current-a", options.full_current_a,
+              "motor current that is 100 % in the report's plans (default: nine tenths of the drive's limit)")
+      .positive()
+      .value("A");
+  parser.flag("--clear-fault", options.clear_fault, "clear the present fault first; its cause must be gone");
+  take_yes(parser, options.yes);
+}
+
+}  // namespace
+
+Command record_command() {
+  return command<RecordOptions>(
+      {"record",
+       "runs the motions of a plan on a drive and saves the measurements",
+       "Runs each motion of a plan on the drive itself (currents and velocities as its excitation, positions by its "
+       "trajectory, from the present position of the shaft), at most at the plan's limits and the drive's, and "
+       "writes a data set: a CSV file for each run with the drive's identity and its block's hash, and dataset.toml. "
+       "Frames that got lost are counted and named in the file. Ctrl-C, a limit or a fault brings the drive to rest; "
+       "what was finished before is kept (exit code 1). Runs that need a person (a locked output, a load) ask on a "
+       "terminal, and without one need --yes.",
+       {kMakeData, kIdentify,
+        "flexspline plan --model fitted.toml --run-s 2 --motions 1 --without off,locked,load,temperature --out "
+        "plan.toml",
+        "flexspline record --drive twin --plan plan.toml --out recorded",
+        "flexspline record --drive twin --plan report-friction --runs 50-1-10 --out recorded-as-in-the-report"}},
+      declare, run);
 }
 
 }  // namespace flexspline::cli

@@ -5,7 +5,8 @@
 #include <nlohmann/json.hpp>
 #include <stdexcept>
 
-#include "host/cli/commands.hpp"
+#include "host/cli/command.hpp"
+#include "host/cli/common_options.hpp"
 #include "host/output/json.hpp"
 #include "host/output/text.hpp"
 #include "host/sensitivity/sensitivity.hpp"
@@ -17,6 +18,15 @@ using output::number;
 using sensitivity::Sensitivity;
 using sensitivity::SignalError;
 using sensitivity::Variant;
+
+struct SensitivityOptions {
+  DataInputs data;
+  PipelineInputs pipeline;
+  std::filesystem::path model;
+  bool refit = false;
+  std::vector<std::string> scale;  // EFFECT.PARAMETER=FACTOR
+  std::string json;
+};
 
 constexpr int kShareDigits = 3;
 constexpr std::size_t kSignalsOfOne = 3;
@@ -134,8 +144,6 @@ void print(const Sensitivity& answer, Console& console) {
                       0));
 }
 
-}  // namespace
-
 int run(const SensitivityOptions& options, Console& console) {
   sensitivity::Options wanted{.pipeline = options.pipeline.options(), .refit = options.refit};
   try {
@@ -154,6 +162,35 @@ int run(const SensitivityOptions& options, Console& console) {
   print(answer, console);
   output::save_json(options.json, sensitivity::to_json(answer));
   return kDone;
+}
+
+void declare(Parser& parser, SensitivityOptions& options) {
+  take_data(parser, options.data);
+  take_model(parser, options.model);
+  parser.flag("--refit", options.refit,
+              "re-estimate the remaining parameters each time: the error that the other effects cannot compensate");
+  parser.option("--scale", options.scale, "scale a parameter, too; may be repeated")
+      .value("EFFECT.PARAMETER=FACTOR")
+      .one_value_each_time();
+  take_holdout(parser, options.data);
+  take_pipeline(parser, options.pipeline);
+}
+
+}  // namespace
+
+Command sensitivity_command() {
+  return command<SensitivityOptions>(
+      {"sensitivity",
+       "what the model depends on: each effect left out or scaled in turn",
+       "Leaves each effect of the model out in turn, and scales the stiffness to a tenth and to ten times (and with "
+       "--scale any parameter), everything else as it is. Each of these models is evaluated as compare does: the "
+       "torque balances, and the free run with its amplitude and phase at the frequency of the motion. The largest "
+       "growth of an error comes first. An effect that hardly changes any error need not be modelled, or these "
+       "motions do not show it. With --refit the other parameters are re-estimated first: the error that they cannot "
+       "compensate is what the effect is needed for.",
+       {kMakeData, kIdentify,
+        "flexspline sensitivity --model fitted.toml demo-out --scale viscous_friction.coefficient=1.5"}},
+      declare, run);
 }
 
 }  // namespace flexspline::cli

@@ -5,7 +5,8 @@
 #include <iterator>
 #include <nlohmann/json.hpp>
 
-#include "host/cli/commands.hpp"
+#include "host/cli/command.hpp"
+#include "host/cli/common_options.hpp"
 #include "host/estimation/identify.hpp"
 #include "host/model/text.hpp"
 #include "host/output/json.hpp"
@@ -18,6 +19,13 @@ namespace {
 using data::Column;
 using data::Experiment;
 using nlohmann::json;
+
+struct SimulateOptions {
+  DataInputs data;
+  std::filesystem::path model;
+  std::filesystem::path out;
+  std::string json;
+};
 
 struct OutputColumn {
   Column column;
@@ -101,8 +109,6 @@ std::string dataset_head(const model::Drive& drive, const std::filesystem::path&
   return text;
 }
 
-}  // namespace
-
 int run(const SimulateOptions& options, Console& console) {
   model::Model model = load_model(options.model).model;
   const data::Dataset dataset = load(options.data, console);
@@ -154,6 +160,24 @@ int run(const SimulateOptions& options, Console& console) {
   console.line(fmt::format("{} describes them.", (options.out / "dataset.toml").string()));
   output::save_json(options.json, {{"format", "flexspline-simulate/1"}, {"experiments", std::move(experiments)}});
   return kDone;
+}
+
+void declare(Parser& parser, SimulateOptions& options) {
+  take_data(parser, options.data);
+  take_model(parser, options.model);
+  parser.option("--out", options.out, "folder for the simulated measurements").required().value("DIR");
+}
+
+}  // namespace
+
+Command simulate_command() {
+  return command<SimulateOptions>(
+      {"simulate",
+       "runs a model on the measured input",
+       "Runs the model from the measured effort alone, experiment by experiment, and writes the motion and torque "
+       "that it predicts as CSV files, with a dataset.toml so that every other command reads them.",
+       {kMakeData, kIdentify, "flexspline simulate --model fitted.toml demo-out --out simulated"}},
+      declare, run);
 }
 
 }  // namespace flexspline::cli

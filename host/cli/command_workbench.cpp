@@ -9,9 +9,10 @@
 #include <iterator>
 #include <nlohmann/json.hpp>
 
+#include "host/cli/command.hpp"
+#include "host/cli/common_options.hpp"
 #include "host/cli/drive_commands.hpp"
 #include "host/cli/twin_runs.hpp"
-#include "host/cli/workbench_command.hpp"
 #include "host/cli/workbench_project.hpp"
 #include "host/output/json.hpp"
 #include "host/workbench/server.hpp"
@@ -19,6 +20,18 @@
 
 namespace flexspline::cli {
 namespace {
+
+struct WorkbenchOptions {
+  DataInputs data;
+  PipelineInputs pipeline;
+  std::filesystem::path model;
+  std::string drive;            // empty: none yet
+  std::filesystem::path plant;  // for closed loops; empty: the twin that recorded the data, or the model
+  int port = 0;                 // zero: any that is free
+  double seconds = 0.0;         // zero: until Ctrl-C
+  bool no_open = false;
+  std::string json;
+};
 
 // The desktop's own program to open an address; nothing happens without a desktop.
 bool open_browser(const std::string& address) {
@@ -78,8 +91,6 @@ void begin_without_model(const WorkbenchOptions& options, workbench::Setup& setu
   if (!options.plant.empty()) setup.plant_setup = plant_setup_of(options, {});
 }
 
-}  // namespace
-
 int run(const WorkbenchOptions& options, Console& console) {
   workbench::Setup setup;
   setup.pipeline = options.pipeline.options();
@@ -112,6 +123,46 @@ int run(const WorkbenchOptions& options, Console& console) {
                                           },
                                       .ends = is_over});
   return kDone;
+}
+
+void declare(Parser& parser, WorkbenchOptions& options) {
+  parser.option("DATA", options.data.data, kDataHelp).value("");
+  take_tolerate(parser, options.data);
+  parser.option("--model", options.model, "model file (default: a first one, from what is chosen on the page)")
+      .value("MODEL");
+  parser.option("--drive", options.drive, fmt::format("{} (default: choose on the page)", transport::kDriveHelp))
+      .value("DRIVE");
+  parser
+      .option(
+          "--plant", options.plant,
+          "plant file of the drive that closed loops are run on (default: the twin that recorded the data, else one "
+          "of which the model is true)")
+      .existing_file()
+      .value("FILE");
+  parser.option("--port", options.port, "of 127.0.0.1 (default: any that is free)").within(1, 65535).value("PORT");
+  parser.option("--seconds", options.seconds, "ends after so long (default: at Ctrl-C)").positive().value("S");
+  parser.flag("--no-open", options.no_open, "open no browser; the address is printed");
+  take_holdout(parser, options.data);
+  take_pipeline(parser, options.pipeline);
+}
+
+}  // namespace
+
+Command workbench_command() {
+  return command<WorkbenchOptions>(
+      {"workbench",
+       "all steps with the mouse: a page in the browser of this machine",
+       "Serves a page on 127.0.0.1 and opens it: how good the model is, where it fails, what is missing, and the "
+       "error with that added; steps can be undone and compared. Without --model it begins as "
+       "flexspline new does: drop recordings on the page (or give them as DATA), look at the signals, choose which "
+       "column is which, type gear ratio and torque constant, and a first model is identified. Models, reports and "
+       "blocks are saved into the model's folder (without --model into this one), run in closed loop on a simulated "
+       "drive (--plant), and flashed to a drive or the twin, whose signals and residual map are shown. The address "
+       "has a token in it: requests without it are refused. Runs until Ctrl-C; --json writes the address once it "
+       "listens.",
+       {"flexspline workbench --no-open --seconds 0.5", kMakeData,
+        "flexspline workbench demo-out --model demo-out/base-model.toml --no-open --seconds 0.5"}},
+      declare, run);
 }
 
 }  // namespace flexspline::cli

@@ -1,5 +1,5 @@
-// --help within the width of the terminal. A class over CLI11's: app.cpp alone has its header, and includes it before
-// this one.
+// --help within the width of the terminal. A class over CLI11's: command_line.cpp alone has its header, and includes it
+// before this one.
 #pragma once
 
 #include <string>

@@ -8,7 +8,7 @@
 #include <vector>
 
 #include "host/cli/column_guess.hpp"
-#include "host/cli/commands.hpp"
+#include "host/cli/new_options.hpp"
 #include "host/data/dataset_toml.hpp"
 
 namespace flexspline::cli {

@@ -8,11 +8,11 @@
 namespace flexspline::cli_test {
 namespace {
 
-constexpr const char* kBuilt[] = {"demo",    "new",      "check",  "effects", "measure",     "identify",   "simulate",
-                                  "compare", "diagnose", "add",    "remove",  "sensitivity", "plan",       "pack",
-                                  "unpack",  "export",   "drives", "flash",   "image",       "backup",     "restore",
-                                  "monitor", "record",   "twin",   "hil",     "workbench",   "completion", "man",
-                                  "fleet",   "home",     "sign",   "key"};
+constexpr const char* kBuilt[] = {
+#define COMMAND(name) #name,
+#include "host/cli/command_list.inc"
+#undef COMMAND
+};
 
 std::vector<std::string> example_lines(const std::string& help) {
   std::vector<std::string> lines;

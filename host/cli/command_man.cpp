@@ -2,13 +2,18 @@
 
 #include <nlohmann/json.hpp>
 
-#include "host/cli/help.hpp"
-#include "host/cli/manual.hpp"
+#include "host/cli/app.hpp"
+#include "host/cli/common_options.hpp"
+#include "host/cli/option_tree.hpp"
 #include "host/output/json.hpp"
 #include "host/text/build_identity.hpp"
 
 namespace flexspline::cli {
 namespace {
+
+struct ManOptions {
+  std::string json;
+};
 
 // Text as it is: no dash becomes a hyphen, no line a request.
 std::string plain(std::string_view text) {
@@ -41,9 +46,9 @@ std::string label(const OptionText& option) {
 }
 
 std::string command_part(const CommandText& command) {
-  const CommandHelp& help = help_of(command.name);
+  const CommandHelp& help = command.help;
   std::string page =
-      fmt::format(".SS {}\n{}.\n.PP\n{}\n", plain(command.name), plain(help.summary), plain(help.description));
+      fmt::format(".SS {}\n{}.\n.PP\n{}\n", plain(help.name), plain(help.summary), plain(help.description));
   for (const OptionText& option : command.options) {
     if (option.name == "--help") continue;
     page += fmt::format(".TP\n{}\n{}{}{}\n", label(option), plain(option.help),
@@ -54,8 +59,6 @@ std::string command_part(const CommandText& command) {
   for (const std::string_view line : help.examples) page += plain(line) + "\n";
   return page + ".RE\n.fi\n";
 }
-
-}  // namespace
 
 std::string man_page(const std::vector<CommandText>& commands) {
   std::string page = fmt::format(
@@ -79,11 +82,25 @@ std::string man_page(const std::vector<CommandText>& commands) {
 }
 
 int run(const ManOptions& options, Console& console) {
-  const std::string page = man_page(options.tree());
+  const std::string page = man_page(option_tree(all_commands()));
   if (options.json != "-") fmt::print("{}", page);
   output::save_json(options.json, {{"format", "flexspline-man/1"}, {"page", page}});
   static_cast<void>(console);
   return kDone;
+}
+
+void declare(Parser&, ManOptions&) {}
+
+}  // namespace
+
+Command man_command() {
+  return command<ManOptions>(
+      {"man",
+       "this help as a man page",
+       "Prints the page in roff, made from the texts and options that --help shows: flexspline man > "
+       "flexspline.1, then man -l flexspline.1. An installed package brings it: man flexspline.",
+       {"flexspline man"}},
+      declare, run);
 }
 
 }  // namespace flexspline::cli

@@ -3,7 +3,9 @@
 #include <nlohmann/json.hpp>
 
 #include "host/catalogue/catalogue.hpp"
-#include "host/cli/manual.hpp"
+#include "host/cli/app.hpp"
+#include "host/cli/common_options.hpp"
+#include "host/cli/option_tree.hpp"
 #include "host/output/json.hpp"
 #include "host/text/build_identity.hpp"
 
@@ -11,6 +13,11 @@ namespace flexspline::cli {
 namespace {
 
 using Takes = OptionText::Takes;
+
+struct CompletionOptions {
+  std::string shell;
+  std::string json;
+};
 
 std::string joined(const std::vector<std::string>& words) {
   std::string text;
@@ -23,8 +30,8 @@ std::string replaced(std::string text, std::string_view what, std::string_view b
   return text;
 }
 // Within single quotes of bash and zsh.
-std::string in_quotes(const std::string& text) {
-  return replaced(text, "'", "'\\''");
+std::string in_quotes(std::string_view text) {
+  return replaced(std::string(text), "'", "'\\''");
 }
 // Up to the first stop: a list of options has room for a line each.
 std::string brief(const std::string& help) {
@@ -48,7 +55,7 @@ std::string bash_reply(const OptionText& option) {
 std::string bash(const std::vector<CommandText>& commands, const std::vector<std::string>& effects) {
   std::string names, values, options, places;
   for (const CommandText& command : commands) {
-    names += command.name + " ";
+    names += fmt::format("{} ", command.help.name);
     std::string dashed;
     std::vector<const OptionText*> positional;
     for (const OptionText& option : command.options) {
@@ -58,13 +65,13 @@ std::string bash(const std::vector<CommandText>& commands, const std::vector<std
       }
       dashed += option.name + " ";
       if (option.takes != Takes::nothing)
-        values += fmt::format("    '{} {}') {}; return ;;\n", command.name, option.name, bash_reply(option));
+        values += fmt::format("    '{} {}') {}; return ;;\n", command.help.name, option.name, bash_reply(option));
     }
-    options += fmt::format("      {}) _flexspline_words '{}' ;;\n", command.name, dashed);
+    options += fmt::format("      {}) _flexspline_words '{}' ;;\n", command.help.name, dashed);
     if (positional.empty()) continue;
     if (positional.size() > 1)
-      places += fmt::format("    '{} 2') {} ;;\n", command.name, bash_reply(*positional.front()));
-    places += fmt::format("    '{} '*) {} ;;\n", command.name, bash_reply(*positional.back()));
+      places += fmt::format("    '{} 2') {} ;;\n", command.help.name, bash_reply(*positional.front()));
+    places += fmt::format("    '{} '*) {} ;;\n", command.help.name, bash_reply(*positional.back()));
   }
   return fmt::format(R"(# Completion of flexspline for bash: source it, or put it into /etc/bash_completion.d.
 # Made by {}.
@@ -99,7 +106,7 @@ complete -F _flexspline flexspline
                      text::tool_name(), joined(effects), names, values, options, places);
 }
 
-std::string zsh_text(const std::string& text) {
+std::string zsh_text(std::string_view text) {
   std::string escaped;
   for (const char c : in_quotes(text)) {
     if (c == '[' || c == ']' || c == ':') escaped += '\\';
@@ -127,8 +134,8 @@ std::string zsh_value(const OptionText& option) {
 std::string zsh(const std::vector<CommandText>& commands, const std::vector<std::string>& effects) {
   std::string names, cases;
   for (const CommandText& command : commands) {
-    names += fmt::format("    '{}:{}'\n", command.name, zsh_text(command.summary));
-    cases += fmt::format("    {})\n      _arguments", command.name);
+    names += fmt::format("    '{}:{}'\n", command.help.name, zsh_text(command.help.summary));
+    cases += fmt::format("    {})\n      _arguments", command.help.name);
     std::size_t places = 0, place = 0;
     for (const OptionText& option : command.options) places += option.is_positional() ? 1 : 0;
     for (const OptionText& option : command.options) {
@@ -174,8 +181,8 @@ fi
                      text::tool_name(), joined(effects), names, cases);
 }
 
-std::string fish_quoted(const std::string& text) {
-  return "'" + replaced(replaced(text, "\\", "\\\\"), "'", "\\'") + "'";
+std::string fish_quoted(std::string_view text) {
+  return "'" + replaced(replaced(std::string(text), "\\", "\\\\"), "'", "\\'") + "'";
 }
 std::string fish(const std::vector<CommandText>& commands, const std::vector<std::string>& effects) {
   std::string text = fmt::format(
@@ -183,9 +190,10 @@ std::string fish(const std::vector<CommandText>& commands, const std::vector<std
       "{}.\nset -g __flexspline_effects {}\ncomplete -c flexspline -f\n",
       text::tool_name(), joined(effects));
   for (const CommandText& command : commands) {
-    text += fmt::format("complete -c flexspline -n __fish_use_subcommand -a {} -d {}\n", command.name,
-                        fish_quoted(command.summary));
-    const std::string here = fmt::format("complete -c flexspline -n '__fish_seen_subcommand_from {}'", command.name);
+    text += fmt::format("complete -c flexspline -n __fish_use_subcommand -a {} -d {}\n", command.help.name,
+                        fish_quoted(command.help.summary));
+    const std::string here =
+        fmt::format("complete -c flexspline -n '__fish_seen_subcommand_from {}'", command.help.name);
     for (const OptionText& option : command.options) {
       std::string offer;
       if (option.takes == Takes::files) offer = " -F";
@@ -203,8 +211,6 @@ std::string fish(const std::vector<CommandText>& commands, const std::vector<std
   return text;
 }
 
-}  // namespace
-
 std::string completion_script(std::string_view shell, const std::vector<CommandText>& commands,
                               const std::vector<std::string>& effects) {
   if (shell == "bash") return bash(commands, effects);
@@ -216,12 +222,29 @@ std::string completion_script(std::string_view shell, const std::vector<CommandT
 int run(const CompletionOptions& options, Console& console) {
   std::vector<std::string> effects;
   for (const catalogue::Entry& entry : catalogue::all()) effects.emplace_back(entry.info->name);
-  const std::string script = completion_script(options.shell, options.tree(), effects);
+  const std::string script = completion_script(options.shell, option_tree(all_commands()), effects);
   if (options.json != "-") fmt::print("{}", script);
   output::save_json(options.json,
                     {{"format", "flexspline-completion/1"}, {"shell", options.shell}, {"script", script}});
   static_cast<void>(console);
   return kDone;
+}
+
+void declare(Parser& parser, CompletionOptions& options) {
+  parser.option("SHELL", options.shell, "bash, zsh or fish").required().value("{bash,zsh,fish}");
+}
+
+}  // namespace
+
+Command completion_command() {
+  return command<CompletionOptions>(
+      {"completion",
+       "a script by which a shell completes commands, options and effects",
+       "Prints the script for bash, zsh or fish, made from the options that --help shows. bash: flexspline "
+       "completion bash > /etc/bash_completion.d/flexspline; zsh: into a folder of $fpath as _flexspline; "
+       "fish: ~/.config/fish/completions/flexspline.fish. An installed package brings all three.",
+       {"flexspline completion bash"}},
+      declare, run);
 }
 
 }  // namespace flexspline::cli

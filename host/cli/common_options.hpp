@@ -1,0 +1,25 @@
+// The options that several commands have.
+#pragma once
+
+#include <filesystem>
+#include <string>
+
+#include "host/cli/inputs.hpp"
+#include "host/cli/parser.hpp"
+
+namespace flexspline::cli {
+
+inline constexpr const char* kDataHelp =
+    "measurements: any number of recordings (CSV, MAT, HDF5, NumPy, ROS, MCAP), folders, dataset.tomls";
+
+// DATA and --tolerate.
+void take_data(Parser& parser, DataInputs& inputs);
+void take_tolerate(Parser& parser, DataInputs& inputs);
+void take_holdout(Parser& parser, DataInputs& inputs);
+void take_model(Parser& parser, std::filesystem::path& model);
+void take_pipeline(Parser& parser, PipelineInputs& pipeline);
+void take_report(Parser& parser, std::filesystem::path& report);
+void take_drive(Parser& parser, std::string& drive);
+void take_yes(Parser& parser, bool& yes);
+
+}  // namespace flexspline::cli
