@@ -9,6 +9,7 @@
 #include <exception>
 #include <filesystem>
 #include <fstream>
+#include <memory>
 #include <stdexcept>
 #include <string>
 #include <vector>
@@ -116,158 +117,205 @@ void list_effects(const std::string& plant_file) {
   }
 }
 
-}  // namespace
-
-int main(int argc, char** argv) {
-  CLI::App app{"The twin of a strain-wave drive: records measurements of a drive whose truth is known."};
-  app.require_subcommand(1);
-  RecordOptions options;
-  CLI::App* record_command =
-      app.add_subcommand("record", "simulates the experiments of a plant file and writes a data set");
-  record_command->add_option("--out", options.out, "folder to write into")->required();
-  record_command->add_option("--plant", options.plant_file, "plant file (default: the demo's drive, built in)");
-  record_command->add_option("--plan", options.plan,
-                             "runs of a plan that `flexspline plan` wrote, instead of the plant file's experiments");
-  record_command->add_option("--hide", options.hide,
-                             "effect that the base model does not have, such as torque_ripple:2");
-  record_command->add_option("--scale", options.scale, "size of the hidden effect, 1 = usual")->needs("--hide");
-  record_command->add_option("--with", options.with, "effects that the drive and the base model have, A,B")
-      ->delimiter(',');
-  record_command
-      ->add_option("--friction-variation", options.friction_variation, "relative std of friction from record to record")
+void add_record(CLI::App& app) {
+  const auto options = std::make_shared<RecordOptions>();
+  CLI::App* command = app.add_subcommand("record", "simulates the experiments of a plant file and writes a data set");
+  command->add_option("--out", options->out, "folder to write into")->required();
+  command->add_option("--plant", options->plant_file, "plant file (default: the demo's drive, built in)");
+  command->add_option("--plan", options->plan,
+                      "runs of a plan that `flexspline plan` wrote, instead of the plant file's experiments");
+  command->add_option("--hide", options->hide, "effect that the base model does not have, such as torque_ripple:2");
+  command->add_option("--scale", options->scale, "size of the hidden effect, 1 = usual")->needs("--hide");
+  command->add_option("--with", options->with, "effects that the drive and the base model have, A,B")->delimiter(',');
+  command
+      ->add_option("--friction-variation", options->friction_variation,
+                   "relative std of friction from record to record")
       ->check(CLI::Range(0.0, 0.3));
-  record_command->add_option("--noise-correlation", options.noise_correlation, "AR(1) coefficient of the noise")
+  command->add_option("--noise-correlation", options->noise_correlation, "AR(1) coefficient of the noise")
       ->check(CLI::Range(0.0, 0.999));
-  record_command->add_flag("--tachometer", options.tachometer, "record a tachometer as well");
-  record_command->add_option("--seed", options.seed, "of all random numbers (default 1)");
-  record_command->add_flag("--force", options.force, "write into a folder that is not empty");
-  record_command->footer("Example: flexspline-hil record --out data --hide stribeck_gaussian --seed 7");
-  record_command->callback([&] { record(options); });
-  CLI::App* rhs_command = app.add_subcommand(
+  command->add_flag("--tachometer", options->tachometer, "record a tachometer as well");
+  command->add_option("--seed", options->seed, "of all random numbers (default 1)");
+  command->add_flag("--force", options->force, "write into a folder that is not empty");
+  command->footer("Example: flexspline-hil record --out data --hide stribeck_gaussian --seed 7");
+  command->callback([options] { record(*options); });
+}
+
+void add_rhs(CLI::App& app) {
+  const auto options = std::make_shared<RecordOptions>();
+  CLI::App* command = app.add_subcommand(
       "rhs-100", "makes the experiments of Taghirad and Belanger's report, each with the parameters of its own row");
-  rhs_command->add_option("--out", options.out, "folder to write into")->required();
-  rhs_command
-      ->add_option("--part", options.parts, "only these, A,B: table-1, table-3, table-4, table-6, table-7, table-8")
+  command->add_option("--out", options->out, "folder to write into")->required();
+  command->add_option("--part", options->parts, "only these, A,B: table-1, table-3, table-4, table-6, table-7, table-8")
       ->delimiter(',');
-  rhs_command->add_option("--seed", options.seed, "of all random numbers (default 1)");
-  rhs_command->add_flag("--force", options.force, "write into a folder that is not empty");
-  rhs_command->footer("Example: flexspline-hil rhs-100 --out rhs-100");
-  rhs_command->callback([&] { make_rhs_100(options); });
-  flexspline::thesis_figures::ReportOptions report_options, model_options;
-  CLI::App* report_command =
+  command->add_option("--seed", options->seed, "of all random numbers (default 1)");
+  command->add_flag("--force", options->force, "write into a folder that is not empty");
+  command->footer("Example: flexspline-hil rhs-100 --out rhs-100");
+  command->callback([options] { make_rhs_100(*options); });
+}
+
+void add_report(CLI::App& app) {
+  const auto options = std::make_shared<flexspline::thesis_figures::ReportOptions>();
+  CLI::App* command =
       app.add_subcommand("report", "draws the figures of Taghirad and Belanger's report again, as SVG and CSV");
-  report_command->add_option("figure", report_options.what, "number of a figure, all, or list")->required();
-  report_command->add_option("--out", report_options.out, "folder to write into");
-  report_command->add_option("--seed", report_options.seed, "of all random numbers")->capture_default_str();
-  report_command->footer("Example: flexspline-hil report 45 --out figures");
-  report_command->callback([&] { flexspline::thesis_figures::write_report(report_options); });
-  CLI::App* model_command = app.add_subcommand(
+  command->add_option("figure", options->what, "number of a figure, all, or list")->required();
+  command->add_option("--out", options->out, "folder to write into");
+  command->add_option("--seed", options->seed, "of all random numbers")->capture_default_str();
+  command->footer("Example: flexspline-hil report 45 --out figures");
+  command->callback([options] { flexspline::thesis_figures::write_report(*options); });
+}
+
+void add_model(CLI::App& app) {
+  const auto options = std::make_shared<flexspline::thesis_figures::ReportOptions>();
+  CLI::App* command = app.add_subcommand(
       "model", "runs the report's own blocks: DC motor, saturation, friction block, models 1 to 3; SVG and CSV");
-  model_command->add_option("block", model_options.what, "motor, saturation, friction, models or all")->required();
-  model_command->add_option("--out", model_options.out, "folder to write into")->required();
-  model_command->footer("Example: flexspline-hil model friction --out blocks");
-  model_command->callback([&] { flexspline::thesis_figures::write_models(model_options); });
-  flexspline::scenario::DriveOptions drive_options;
-  CLI::App* drive_command = app.add_subcommand(
+  command->add_option("block", options->what, "motor, saturation, friction, models or all")->required();
+  command->add_option("--out", options->out, "folder to write into")->required();
+  command->footer("Example: flexspline-hil model friction --out blocks");
+  command->callback([options] { flexspline::thesis_figures::write_models(*options); });
+}
+
+void add_drive(CLI::App& app) {
+  const auto options = std::make_shared<flexspline::scenario::DriveOptions>();
+  CLI::App* command = app.add_subcommand(
       "drive", "runs the firmware's application on a simulated drive, with and without compensation");
-  drive_command->add_option("--scenario", drive_options.scenario,
-                            "a file, or one of `flexspline-hil scenarios` (default sine)");
-  drive_command->add_option("--seconds", drive_options.seconds, "simulated time (default: the scenario's)")
+  command->add_option("--scenario", options->scenario, "a file, or one of `flexspline-hil scenarios` (default sine)");
+  command->add_option("--seconds", options->seconds, "simulated time (default: the scenario's)")
       ->check(CLI::Range(0.01, 36000.0));
-  drive_command->add_option("--plant", drive_options.plant_file, "plant file (default: the demo's drive, built in)");
-  drive_command->add_option("--with", drive_options.with, "effects that the drive and its model have, A,B")
-      ->delimiter(',');
-  drive_command->add_option("--hide", drive_options.hide, "effect that the drive has and its model does not have");
-  drive_command->add_option("--compensation", drive_options.compensation, "on, off, both (default)")
+  command->add_option("--plant", options->plant_file, "plant file (default: the demo's drive, built in)");
+  command->add_option("--with", options->with, "effects that the drive and its model have, A,B")->delimiter(',');
+  command->add_option("--hide", options->hide, "effect that the drive has and its model does not have");
+  command->add_option("--compensation", options->compensation, "on, off, both (default)")
       ->check(CLI::IsMember({"on", "off", "both"}));
-  drive_command->add_option("--inject", drive_options.inject, "failure to inject, such as motor-encoder-stuck");
-  drive_command->add_option("--inject-at", drive_options.inject_at_s, "its time in seconds (default: half the run)");
-  drive_command->add_option(
-      "--block", drive_options.block_file,
+  command->add_option("--inject", options->inject, "failure to inject, such as motor-encoder-stuck");
+  command->add_option("--inject-at", options->inject_at_s, "its time in seconds (default: half the run)");
+  command->add_option(
+      "--block", options->block_file,
       "parameter block of `flexspline pack` for this --tick-hz: the drive's model (default: the plant's)");
-  drive_command->add_option("--processor", drive_options.processor_image,
-                            "firmware image to run it on, in QEMU (boards/qemu_stm32f405)");
-  drive_command->add_option("--trace", drive_options.trace_file, "CSV of one run, a line a millisecond");
-  drive_command->add_option("--json", drive_options.json, "file for the result; - is standard output");
-  drive_command->add_option("--tick-hz", drive_options.tick_hz, "ticks of the drive per second, a multiple of 1000")
+  command->add_option("--processor", options->processor_image,
+                      "firmware image to run it on, in QEMU (boards/qemu_stm32f405)");
+  command->add_option("--trace", options->trace_file, "CSV of one run, a line a millisecond");
+  command->add_option("--json", options->json, "file for the result; - is standard output");
+  command->add_option("--tick-hz", options->tick_hz, "ticks of the drive per second, a multiple of 1000")
       ->capture_default_str();
-  drive_command->add_option("--seed", drive_options.seed, "of the sensors' noise (default 1)");
-  drive_command->footer("Example: flexspline-hil drive --scenario slow-reversals --seconds 4");
-  drive_command->callback([&] { flexspline::scenario::run_drive(drive_options); });
-  flexspline::scenario::DataSheetOptions sheet;
-  CLI::App* sheet_command =
+  command->add_option("--seed", options->seed, "of the sensors' noise (default 1)");
+  command->footer("Example: flexspline-hil drive --scenario slow-reversals --seconds 4");
+  command->callback([options] { flexspline::scenario::run_drive(*options); });
+}
+
+void add_sheet(CLI::App& app) {
+  const auto options = std::make_shared<flexspline::scenario::DataSheetOptions>();
+  CLI::App* command =
       app.add_subcommand("data-sheet", "writes the data sheet of a drive: settings, and models with its true values");
-  sheet_command->add_option("--scenario", sheet.scenario, "whose drive it is (default: none)");
-  sheet_command->add_option("--plant", sheet.plant_file, "plant file (default: the demo's drive, built in)");
-  sheet_command->add_option("--with", sheet.with, "effects that the drive has and its data sheet has, A,B")
+  command->add_option("--scenario", options->scenario, "whose drive it is (default: none)");
+  command->add_option("--plant", options->plant_file, "plant file (default: the demo's drive, built in)");
+  command->add_option("--with", options->with, "effects that the drive has and its data sheet has, A,B")
       ->delimiter(',');
-  sheet_command->add_option("--hide", sheet.hide, "effect that is not in the data sheet");
-  sheet_command->add_option("--out", sheet.out, "folder to write into")->required();
-  sheet_command->footer("Example: flexspline-hil data-sheet --hide gravity --out sheet");
-  sheet_command->callback([&] { flexspline::scenario::write_data_sheet(sheet); });
-  CLI::App* scenarios_command = app.add_subcommand("scenarios", "lists the scenarios that come with the tool");
-  scenarios_command->callback([&] { flexspline::scenario::list_scenarios(); });
-  flexspline::twin::TwinOptions twin_options;
-  CLI::App* twin_command = app.add_subcommand("twin", "a drive for `flexspline --drive`, until it is stopped");
-  twin_command->add_option("--serve", twin_options.port, "port on 127.0.0.1 (default and 0: any that is free)")
+  command->add_option("--hide", options->hide, "effect that is not in the data sheet");
+  command->add_option("--out", options->out, "folder to write into")->required();
+  command->footer("Example: flexspline-hil data-sheet --hide gravity --out sheet");
+  command->callback([options] { flexspline::scenario::write_data_sheet(*options); });
+}
+
+void add_scenarios(CLI::App& app) {
+  CLI::App* command = app.add_subcommand("scenarios", "lists the scenarios that come with the tool");
+  command->callback([] { flexspline::scenario::list_scenarios(); });
+}
+
+// Where hosts find it, and for how long.
+void take_twin_address(CLI::App& command, flexspline::twin::TwinOptions& options) {
+  command.add_option("--serve", options.port, "port on 127.0.0.1 (default and 0: any that is free)")
       ->check(CLI::Range(0, 65535));
-  twin_command
-      ->add_option(
-          "--token", twin_options.token,
+  command
+      .add_option(
+          "--token", options.token,
           "32 hexadecimal digits, the end of its address: with the token of an earlier twin, hosts find it again")
       ->check([](const std::string& text) {
         const bool good = text.size() == 32 && text.find_first_not_of("0123456789abcdef") == std::string::npos;
         return good ? std::string() : "not 32 digits of 0 to 9 and a to f";
       });
-  twin_command
-      ->add_option("--usbip", twin_options.usbip,
-                   "a USB device instead: port of its USB/IP server, 0 any (3240 is usual)")
+  command
+      .add_option("--usbip", options.usbip, "a USB device instead: port of its USB/IP server, 0 any (3240 is usual)")
       ->check(CLI::Range(0, 65535));
-  twin_command->add_option("--seconds", twin_options.seconds, "ends after this time (default: never)")
-      ->check(CLI::PositiveNumber);
-  twin_command->add_option("--json", twin_options.json_file, "writes its address into this file; - is standard output");
-  twin_command->add_flag("--pty", twin_options.pty, "a serial line (pseudo terminal) instead of a port");
-  twin_command->add_flag("--inherit", twin_options.inherits, "uses standard input, which has to be a socket");
-  twin_command->add_option("--plant", twin_options.plant_file, "plant file (default: the demo's drive, built in)");
-  twin_command->add_option("--with", twin_options.with, "effects that the drive has and its data sheet has, A,B")
-      ->delimiter(',');
-  twin_command->add_option("--hide", twin_options.hide, "effect that the drive has and its data sheet does not have");
-  twin_command->add_option("--flash", twin_options.flash_file, "file that holds its flash memory (default: none)");
-  twin_command->add_option("--serial", twin_options.serial, "serial number (default TWIN)")
+  command.add_option("--seconds", options.seconds, "ends after this time (default: never)")->check(CLI::PositiveNumber);
+  command.add_option("--json", options.json_file, "writes its address into this file; - is standard output");
+  command.add_flag("--pty", options.pty, "a serial line (pseudo terminal) instead of a port");
+  command.add_flag("--inherit", options.inherits, "uses standard input, which has to be a socket");
+}
+
+// What it is a twin of.
+void take_twin_drive(CLI::App& command, flexspline::twin::TwinOptions& options) {
+  command.add_option("--plant", options.plant_file, "plant file (default: the demo's drive, built in)");
+  command.add_option("--with", options.with, "effects that the drive has and its data sheet has, A,B")->delimiter(',');
+  command.add_option("--hide", options.hide, "effect that the drive has and its data sheet does not have");
+  command.add_option("--flash", options.flash_file, "file that holds its flash memory (default: none)");
+  command.add_option("--serial", options.serial, "serial number (default TWIN)")
       ->check([](const std::string& text) -> std::string {
         constexpr const char* kLetters = "abcdefghijklmnopqrstuvwxyzABCDEFGHIJKLMNOPQRSTUVWXYZ0123456789-_.";
         const bool good = !text.empty() && text.size() <= 16 && text.find_first_not_of(kLetters) == std::string::npos;
         return good ? "" : "a serial number has 1 to 16 letters, digits, - _ .";
       });
-  twin_command->add_option("--cable", twin_options.cable_file,
-                           "file that unplugs it: contains in, out, or out N (after N more messages of the host)");
-  twin_command->add_option("--inject", twin_options.inject, "failure after it was armed, such as motor-encoder-stuck");
-  twin_command->add_option("--inject-at", twin_options.inject_at_s, "time after it was armed, s (default 1)");
-  twin_command->add_option("--seed", twin_options.seed, "of the sensors' noise (default 1)");
-  twin_command->add_flag("--empty", twin_options.empty, "an empty flash memory stays without parameters");
-  twin_command->add_flag("--locked", twin_options.locked, "the output is locked");
-  twin_command->add_flag("--fast", twin_options.fast, "while armed faster than real time, as far as its host follows");
-  twin_command->add_flag("--lossy", twin_options.lossy, "with --fast: does not wait for a host that reads slowly");
-  twin_command->footer("Example: flexspline-hil twin --serve 4711 --flash twin.flash");
-  twin_command->callback([&] { flexspline::twin::run_twin(twin_options); });
-  ImageOptions image_options;
-  CLI::App* image_command =
+}
+
+// What goes wrong, and how it runs.
+void take_twin_run(CLI::App& command, flexspline::twin::TwinOptions& options) {
+  command.add_option("--cable", options.cable_file,
+                     "file that unplugs it: contains in, out, or out N (after N more messages of the host)");
+  command.add_option("--inject", options.inject, "failure after it was armed, such as motor-encoder-stuck");
+  command.add_option("--inject-at", options.inject_at_s, "time after it was armed, s (default 1)");
+  command.add_option("--seed", options.seed, "of the sensors' noise (default 1)");
+  command.add_flag("--empty", options.empty, "an empty flash memory stays without parameters");
+  command.add_flag("--locked", options.locked, "the output is locked");
+  command.add_flag("--fast", options.fast, "while armed faster than real time, as far as its host follows");
+  command.add_flag("--lossy", options.lossy, "with --fast: does not wait for a host that reads slowly");
+}
+
+void add_twin(CLI::App& app) {
+  const auto options = std::make_shared<flexspline::twin::TwinOptions>();
+  CLI::App* command = app.add_subcommand("twin", "a drive for `flexspline --drive`, until it is stopped");
+  take_twin_address(*command, *options);
+  take_twin_drive(*command, *options);
+  take_twin_run(*command, *options);
+  command->footer("Example: flexspline-hil twin --serve 4711 --flash twin.flash");
+  command->callback([options] { flexspline::twin::run_twin(*options); });
+}
+
+void add_image(CLI::App& app) {
+  const auto options = std::make_shared<ImageOptions>();
+  CLI::App* command =
       app.add_subcommand("image", "makes a firmware image for the twin, for `flexspline flash --firmware`");
-  image_command->add_option("--out", image_options.out, "file to write")->required();
-  image_command->add_option("--major", image_options.major, "version, before the point (default 0)")
-      ->check(CLI::Range(0, 255));
-  image_command->add_option("--minor", image_options.minor, "version, after the point (default 1)")
-      ->check(CLI::Range(0, 255));
-  image_command->add_option("--bytes", image_options.bytes, "after its header (default 24000)")
-      ->check(CLI::Range(64, 64'000));
-  image_command->add_flag("--hangs", image_options.hangs, "it never confirms itself, and is rolled back");
-  image_command->add_option("--counter", image_options.counter, "security counter (default 0)");
-  image_command->add_flag("--unsigned", image_options.is_unsigned, "without a signature: the twin does not take it");
-  image_command->footer("Example: flexspline-hil image --minor 2 --out twin-0.2.image");
-  image_command->callback([&] { make_image(image_options); });
-  CLI::App* effects_command = app.add_subcommand("effects", "lists what can be hidden");
-  effects_command->add_option("--plant", options.plant_file, "plant file (default: the demo's drive, built in)");
-  effects_command->callback([&] { list_effects(options.plant_file); });
+  command->add_option("--out", options->out, "file to write")->required();
+  command->add_option("--major", options->major, "version, before the point (default 0)")->check(CLI::Range(0, 255));
+  command->add_option("--minor", options->minor, "version, after the point (default 1)")->check(CLI::Range(0, 255));
+  command->add_option("--bytes", options->bytes, "after its header (default 24000)")->check(CLI::Range(64, 64'000));
+  command->add_flag("--hangs", options->hangs, "it never confirms itself, and is rolled back");
+  command->add_option("--counter", options->counter, "security counter (default 0)");
+  command->add_flag("--unsigned", options->is_unsigned, "without a signature: the twin does not take it");
+  command->footer("Example: flexspline-hil image --minor 2 --out twin-0.2.image");
+  command->callback([options] { make_image(*options); });
+}
+
+void add_effects(CLI::App& app) {
+  const auto options = std::make_shared<RecordOptions>();
+  CLI::App* command = app.add_subcommand("effects", "lists what can be hidden");
+  command->add_option("--plant", options->plant_file, "plant file (default: the demo's drive, built in)");
+  command->callback([options] { list_effects(options->plant_file); });
+}
+
+}  // namespace
+
+int main(int argc, char** argv) {
+  CLI::App app{"The twin of a strain-wave drive: records measurements of a drive whose truth is known."};
+  app.require_subcommand(1);
+  add_record(app);
+  add_rhs(app);
+  add_report(app);
+  add_model(app);
+  add_drive(app);
+  add_sheet(app);
+  add_scenarios(app);
+  add_twin(app);
+  add_image(app);
+  add_effects(app);
   try {
     app.parse(argc, argv);
   } catch (const CLI::ParseError& error) {

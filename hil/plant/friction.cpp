@@ -19,6 +19,38 @@ void add_stribeck(const Stribeck& term, const FrictionPoint& at, double speed, F
   sum.by_velocity -= height * term.exponent * power / std::max(speed, 1e-9);
 }
 
+void add_hess_soom(const HessSoom& term, const FrictionPoint& at, double speed, FrictionTorque& sum) {
+  const double ratio = speed / term.velocity;
+  const double value = (at.direction > 0.0 ? term.positive : term.negative) / (1.0 + ratio * ratio);
+  sum.torque += at.direction * value;
+  sum.by_velocity -= value * 2.0 * ratio / (term.velocity * (1.0 + ratio * ratio));
+}
+
+void add_load_friction(const LoadFriction& term, const FrictionPoint& at, double gear_ratio, FrictionTorque& sum) {
+  const double magnitude = std::abs(at.torque);
+  const double ratio = magnitude / term.reference;
+  const double power = term.exponent == 1.0 ? ratio : std::pow(ratio, term.exponent);
+  const double value = term.coefficient * term.reference * power / gear_ratio;
+  sum.torque += at.direction * value;
+  const double slope = term.exponent * value / std::max(magnitude, 1e-9);
+  sum.by_torque += at.direction * (at.torque >= 0.0 ? slope : -slope);
+}
+
+void add_ripple(const Ripple& term, double angle, FrictionTorque& sum) {
+  const double c = std::cos(term.order * angle);
+  const double d = std::sin(term.order * angle);
+  sum.torque += term.cosine * c + term.sine * d;
+  sum.by_angle += term.order * (term.sine * c - term.cosine * d);
+}
+
+void add_load_ripple(const Ripple& term, const FrictionPoint& at, FrictionTorque& sum) {
+  const double c = std::cos(term.order * at.angle);
+  const double d = std::sin(term.order * at.angle);
+  sum.torque += at.torque * (term.cosine * c + term.sine * d);
+  sum.by_torque += term.cosine * c + term.sine * d;
+  sum.by_angle += at.torque * term.order * (term.sine * c - term.cosine * d);
+}
+
 void add_triangle(const TriangleRipple& term, double angle, FrictionTorque& sum) {
   const double turns = (term.order * angle + term.phase) / (2.0 * std::numbers::pi) + 0.25;
   const double fraction = turns - std::floor(turns);
@@ -101,40 +133,16 @@ FrictionTorque MotorFriction::evaluate(const FrictionPoint& at, double viscous_n
   } else {
     sum.torque += s * coulomb * dry_share;
   }
-  for (const HessSoom& term : hess_soom) {
-    const double ratio = speed / term.velocity;
-    const double value = (s > 0.0 ? term.positive : term.negative) / (1.0 + ratio * ratio);
-    sum.torque += s * value;
-    sum.by_velocity -= value * 2.0 * ratio / (term.velocity * (1.0 + ratio * ratio));
-  }
+  for (const HessSoom& term : hess_soom) add_hess_soom(term, at, speed, sum);
   for (const Stribeck& term : stribeck) add_stribeck(term, at, speed, sum);
   if (power_torque != 0.0) {
     const double value = power_torque * std::pow(speed / power_reference, power_exponent);
     sum.torque += along >= 0.0 ? s * value : -s * value;
     sum.by_velocity += value * power_exponent / std::max(speed, 1e-9);
   }
-  for (const LoadFriction& term : load) {
-    const double magnitude = std::abs(at.torque);
-    const double ratio = magnitude / term.reference;
-    const double power = term.exponent == 1.0 ? ratio : std::pow(ratio, term.exponent);
-    const double value = term.coefficient * term.reference * power / gear_ratio;
-    sum.torque += s * value;
-    const double slope = term.exponent * value / std::max(magnitude, 1e-9);
-    sum.by_torque += s * (at.torque >= 0.0 ? slope : -slope);
-  }
-  for (const Ripple& term : ripple) {
-    const double c = std::cos(term.order * at.angle);
-    const double d = std::sin(term.order * at.angle);
-    sum.torque += term.cosine * c + term.sine * d;
-    sum.by_angle += term.order * (term.sine * c - term.cosine * d);
-  }
-  for (const Ripple& term : load_ripple) {
-    const double c = std::cos(term.order * at.angle);
-    const double d = std::sin(term.order * at.angle);
-    sum.torque += at.torque * (term.cosine * c + term.sine * d);
-    sum.by_torque += term.cosine * c + term.sine * d;
-    sum.by_angle += at.torque * term.order * (term.sine * c - term.cosine * d);
-  }
+  for (const LoadFriction& term : load) add_load_friction(term, at, gear_ratio, sum);
+  for (const Ripple& term : ripple) add_ripple(term, at.angle, sum);
+  for (const Ripple& term : load_ripple) add_load_ripple(term, at, sum);
   for (const TriangleRipple& term : triangle_ripple) add_triangle(term, at.angle, sum);
   for (const Bump& term : bumps) add_bump(term, at, gear_ratio, sum);
   for (const Onset& term : onsets) add_onset(term, at, speed, sum);

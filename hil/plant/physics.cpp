@@ -2,14 +2,15 @@
 
 #include <fmt/format.h>
 
-#include <functional>
-#include <map>
+#include <algorithm>
 #include <stdexcept>
+#include <string_view>
+#include <vector>
 
 namespace flexspline::plant {
 namespace {
 
-using Apply = std::function<void(const Effect&, const Drive&, Physics&)>;
+using Apply = void (*)(const Effect&, const Drive&, Physics&);
 
 // The catalogue's relays switch along an edge as wide as the distance of two levels. Here each consists of several
 // ideal relays.
@@ -27,169 +28,179 @@ void add_relays(const Effect& e, const Drive&, Physics& p) {
     }
 }
 
-const std::map<std::string, Apply, std::less<>>& appliers() {
-  static const std::map<std::string, Apply, std::less<>> kAppliers = {
-      {"inertia", [](const Effect& e, const Drive&, Physics& p) { p.motor_inertia = e.value("inertia"); }},
-      {"viscous_friction",
-       [](const Effect& e, const Drive&, Physics& p) { p.friction.viscous = e.value("coefficient"); }},
-      {"coulomb_friction", [](const Effect& e, const Drive&, Physics& p) { p.friction.coulomb = e.value("torque"); }},
-      {"viscous_asymmetry",
-       [](const Effect& e, const Drive&, Physics& p) { p.friction.viscous_asymmetry = e.value("coefficient"); }},
-      {"coulomb_asymmetry",
-       [](const Effect& e, const Drive&, Physics& p) { p.friction.coulomb_asymmetry = e.value("torque"); }},
-      {"stribeck_gaussian",
-       [](const Effect& e, const Drive&, Physics& p) {
-         p.friction.stribeck.push_back(
-             {e.value("amplitude_positive"), e.value("amplitude_negative"), e.value("velocity"), 2.0});
-       }},
-      {"stribeck_exponent",
-       [](const Effect& e, const Drive&, Physics& p) {
-         p.friction.stribeck.push_back(
-             {e.value("amplitude_positive"), e.value("amplitude_negative"), e.value("velocity"), e.value("exponent")});
-       }},
-      {"power_law_friction",
-       [](const Effect& e, const Drive& d, Physics& p) {
-         p.friction.power_torque = e.value("torque");
-         p.friction.power_exponent = e.value("exponent");
-         p.friction.power_reference = d.rated_velocity_rad_s;
-       }},
-      {"load_dependent_friction",
-       [](const Effect& e, const Drive&, Physics& p) {
-         p.friction.load.push_back({e.value("coefficient"), 1.0, 1.0});
-       }},
-      {"load_power_friction",
-       [](const Effect& e, const Drive&, Physics& p) {
-         p.friction.load.push_back({e.value("coefficient"), e.value("exponent"), e.value("reference")});
-       }},
-      {"temperature_viscous",
-       [](const Effect& e, const Drive& d, Physics& p) {
-         p.friction.temperature_coefficient = e.value("coefficient");
-         p.friction.temperature_reference = d.temperature_reference_c;
-       }},
-      {"dahl_friction",
-       [](const Effect& e, const Drive&, Physics& p) {
-         p.friction.dahl_torque = e.value("torque");
-         p.friction.dahl_presliding = e.value("presliding");
-       }},
-      {"torque_ripple",
-       [](const Effect& e, const Drive&, Physics& p) {
-         p.friction.ripple.push_back({e.value("order"), e.value("cosine"), e.value("sine")});
-       }},
-      {"triangle_ripple",
-       [](const Effect& e, const Drive&, Physics& p) {
-         p.friction.triangle_ripple.push_back({e.value("order"), e.value("amplitude"), e.value("phase")});
-       }},
-      {"damaged_tooth",
-       [](const Effect& e, const Drive&, Physics& p) {
-         p.friction.bumps.push_back({e.value("height"), e.value("angle"), e.value("width"), false});
-       }},
-      {"tight_spot",
-       [](const Effect& e, const Drive&, Physics& p) {
-         p.friction.bumps.push_back({e.value("height"), e.value("angle"), e.value("width"), true});
-       }},
-      {"speed_onset",
-       [](const Effect& e, const Drive&, Physics& p) {
-         p.friction.onsets.push_back({e.value("height"), e.value("velocity"), e.value("width")});
-       }},
-      // The sensor's error is not a torque: the recorder adds it to the reading.
-      {"current_offset", [](const Effect&, const Drive&, Physics&) {}},
-      {"linear_stiffness",
-       [](const Effect& e, const Drive&, Physics& p) { p.transmission.stiffness = e.value("stiffness"); }},
-      {"cubic_stiffness",
-       [](const Effect& e, const Drive&, Physics& p) { p.transmission.cubic_stiffness = e.value("stiffness"); }},
-      {"structural_damping",
-       [](const Effect& e, const Drive&, Physics& p) {
-         p.damping_torque = e.value("torque");
-         p.damping_exponent = e.value("exponent");
-       }},
-      {"backlash",
-       [](const Effect& e, const Drive&, Physics& p) { p.transmission.backlash_half_width = e.value("half_width"); }},
-      {"output_inertia", [](const Effect& e, const Drive&, Physics& p) { p.output_inertia = e.value("inertia"); }},
-      {"output_viscous_friction",
-       [](const Effect& e, const Drive&, Physics& p) { p.output_viscous = e.value("coefficient"); }},
-      {"output_coulomb_friction",
-       [](const Effect& e, const Drive&, Physics& p) { p.output_coulomb = e.value("torque"); }},
-      {"gravity",
-       [](const Effect& e, const Drive&, Physics& p) {
-         p.gravity_cosine = e.value("cosine");
-         p.gravity_sine = e.value("sine");
-       }},
-      {"stribeck_hess_soom",
-       [](const Effect& e, const Drive&, Physics& p) {
-         p.friction.hess_soom.push_back(
-             {e.value("amplitude_positive"), e.value("amplitude_negative"), e.value("velocity")});
-       }},
-      {"quadratic_drag",
-       [](const Effect& e, const Drive&, Physics& p) { p.friction.quadratic = e.value("coefficient"); }},
-      {"temperature_coulomb",
-       [](const Effect& e, const Drive& d, Physics& p) {
-         p.friction.coulomb_temperature_coefficient = e.value("coefficient");
-         p.friction.temperature_reference = d.temperature_reference_c;
-       }},
-      {"lugre_friction",
-       [](const Effect& e, const Drive&, Physics& p) {
-         p.friction.lugre = {e.value("coulomb"), e.value("static"), e.value("velocity"), e.value("stiffness"),
-                             e.value("damping")};
-       }},
-      {"load_scaled_ripple",
-       [](const Effect& e, const Drive&, Physics& p) {
-         p.friction.load_ripple.push_back({e.value("order"), e.value("cosine"), e.value("sine")});
-       }},
-      {"torque_constant_error",
-       [](const Effect& e, const Drive&, Physics& p) { p.torque_constant *= 1.0 + e.value("ratio"); }},
-      {"torque_constant_saturation",
-       [](const Effect& e, const Drive&, Physics& p) { p.torque_saturation = e.value("coefficient"); }},
-      {"current_saturation", [](const Effect& e, const Drive&, Physics& p) { p.current_limit_a = e.value("limit"); }},
-      {"quadratic_stiffness",
-       [](const Effect& e, const Drive&, Physics& p) { p.transmission.quadratic_stiffness = e.value("stiffness"); }},
-      {"piecewise_stiffness",
-       [](const Effect& e, const Drive&, Physics& p) {
-         p.transmission.slopes = {e.value("stiffness_1"), e.value("stiffness_2"), e.value("stiffness_3"),
-                                  e.value("torque_1"), e.value("torque_2")};
-       }},
-      {"dahl_hysteresis",
-       [](const Effect& e, const Drive&, Physics& p) {
-         p.transmission.loops.dahl.push_back({e.value("torque"), e.value("stiffness"), e.value("exponent"), 0.0});
-       }},
-      {"modified_dahl_hysteresis",
-       [](const Effect& e, const Drive&, Physics& p) {
-         p.transmission.loops.dahl.push_back({e.value("torque"), e.value("stiffness"), 2.0, 0.0});
-       }},
-      {"torque_proportional_hysteresis",
-       [](const Effect& e, const Drive&, Physics& p) {
-         p.transmission.loops.dahl.push_back({e.value("torque"), e.value("stiffness"), 1.0, e.value("ratio")});
-       }},
-      {"duhem_hysteresis",
-       [](const Effect& e, const Drive&, Physics& p) {
-         p.transmission.loops.duhem.push_back(
-             {e.value("rate"),
-              e.value("stiffness"),
-              {e.value("phi_0"), e.value("phi_1"), e.value("phi_2"), e.value("phi_3")}});
-       }},
-      {"bouc_wen_hysteresis",
-       [](const Effect& e, const Drive&, Physics& p) {
-         p.transmission.loops.bouc_wen.push_back(
-             {e.value("stiffness"), e.value("beta"), e.value("gamma"), e.value("exponent")});
-       }},
-      {"prandtl_ishlinskii_hysteresis",
-       [](const Effect& e, const Drive&, Physics& p) {
-         for (int j = 1; e.has(fmt::format("threshold_{}", j)); ++j)
-           p.transmission.loops.plays.push_back(
-               {e.value(fmt::format("threshold_{}", j)), e.value(fmt::format("weight_{}", j))});
-       }},
-      {"preisach_hysteresis", &add_relays},
-      {"kinematic_error",
-       [](const Effect& e, const Drive&, Physics& p) {
-         p.transmission.kinematic_error.push_back({e.value("order"), e.value("cosine"), e.value("sine")});
-       }},
-      // Errors of sensors are not torques: the recorder adds them to the readings, and delays the current.
-      {"current_delay", [](const Effect&, const Drive&, Physics&) {}},
-      {"torque_offset", [](const Effect&, const Drive&, Physics&) {}},
-      {"torque_sensor_gain", [](const Effect&, const Drive&, Physics&) {}},
-      {"torque_sensor_ripple", [](const Effect&, const Drive&, Physics&) {}},
-      {"torsion_zero", [](const Effect&, const Drive&, Physics&) {}},
-  };
-  return kAppliers;
+struct Applier {
+  std::string_view effect;
+  Apply apply;
+};
+constexpr Applier kAppliers[] = {
+    {"inertia", [](const Effect& e, const Drive&, Physics& p) { p.motor_inertia = e.value("inertia"); }},
+    {"viscous_friction",
+     [](const Effect& e, const Drive&, Physics& p) { p.friction.viscous = e.value("coefficient"); }},
+    {"coulomb_friction", [](const Effect& e, const Drive&, Physics& p) { p.friction.coulomb = e.value("torque"); }},
+    {"viscous_asymmetry",
+     [](const Effect& e, const Drive&, Physics& p) { p.friction.viscous_asymmetry = e.value("coefficient"); }},
+    {"coulomb_asymmetry",
+     [](const Effect& e, const Drive&, Physics& p) { p.friction.coulomb_asymmetry = e.value("torque"); }},
+    {"stribeck_gaussian",
+     [](const Effect& e, const Drive&, Physics& p) {
+       p.friction.stribeck.push_back(
+           {e.value("amplitude_positive"), e.value("amplitude_negative"), e.value("velocity"), 2.0});
+     }},
+    {"stribeck_exponent",
+     [](const Effect& e, const Drive&, Physics& p) {
+       p.friction.stribeck.push_back(
+           {e.value("amplitude_positive"), e.value("amplitude_negative"), e.value("velocity"), e.value("exponent")});
+     }},
+    {"power_law_friction",
+     [](const Effect& e, const Drive& d, Physics& p) {
+       p.friction.power_torque = e.value("torque");
+       p.friction.power_exponent = e.value("exponent");
+       p.friction.power_reference = d.rated_velocity_rad_s;
+     }},
+    {"load_dependent_friction",
+     [](const Effect& e, const Drive&, Physics& p) {
+       p.friction.load.push_back({e.value("coefficient"), 1.0, 1.0});
+     }},
+    {"load_power_friction",
+     [](const Effect& e, const Drive&, Physics& p) {
+       p.friction.load.push_back({e.value("coefficient"), e.value("exponent"), e.value("reference")});
+     }},
+    {"temperature_viscous",
+     [](const Effect& e, const Drive& d, Physics& p) {
+       p.friction.temperature_coefficient = e.value("coefficient");
+       p.friction.temperature_reference = d.temperature_reference_c;
+     }},
+    {"dahl_friction",
+     [](const Effect& e, const Drive&, Physics& p) {
+       p.friction.dahl_torque = e.value("torque");
+       p.friction.dahl_presliding = e.value("presliding");
+     }},
+    {"torque_ripple",
+     [](const Effect& e, const Drive&, Physics& p) {
+       p.friction.ripple.push_back({e.value("order"), e.value("cosine"), e.value("sine")});
+     }},
+    {"triangle_ripple",
+     [](const Effect& e, const Drive&, Physics& p) {
+       p.friction.triangle_ripple.push_back({e.value("order"), e.value("amplitude"), e.value("phase")});
+     }},
+    {"damaged_tooth",
+     [](const Effect& e, const Drive&, Physics& p) {
+       p.friction.bumps.push_back({e.value("height"), e.value("angle"), e.value("width"), false});
+     }},
+    {"tight_spot",
+     [](const Effect& e, const Drive&, Physics& p) {
+       p.friction.bumps.push_back({e.value("height"), e.value("angle"), e.value("width"), true});
+     }},
+    {"speed_onset",
+     [](const Effect& e, const Drive&, Physics& p) {
+       p.friction.onsets.push_back({e.value("height"), e.value("velocity"), e.value("width")});
+     }},
+    // The sensor's error is not a torque: the recorder adds it to the reading.
+    {"current_offset", [](const Effect&, const Drive&, Physics&) {}},
+    {"linear_stiffness",
+     [](const Effect& e, const Drive&, Physics& p) { p.transmission.stiffness = e.value("stiffness"); }},
+    {"cubic_stiffness",
+     [](const Effect& e, const Drive&, Physics& p) { p.transmission.cubic_stiffness = e.value("stiffness"); }},
+    {"structural_damping",
+     [](const Effect& e, const Drive&, Physics& p) {
+       p.damping_torque = e.value("torque");
+       p.damping_exponent = e.value("exponent");
+     }},
+    {"backlash",
+     [](const Effect& e, const Drive&, Physics& p) { p.transmission.backlash_half_width = e.value("half_width"); }},
+    {"output_inertia", [](const Effect& e, const Drive&, Physics& p) { p.output_inertia = e.value("inertia"); }},
+    {"output_viscous_friction",
+     [](const Effect& e, const Drive&, Physics& p) { p.output_viscous = e.value("coefficient"); }},
+    {"output_coulomb_friction",
+     [](const Effect& e, const Drive&, Physics& p) { p.output_coulomb = e.value("torque"); }},
+    {"gravity",
+     [](const Effect& e, const Drive&, Physics& p) {
+       p.gravity_cosine = e.value("cosine");
+       p.gravity_sine = e.value("sine");
+     }},
+    {"stribeck_hess_soom",
+     [](const Effect& e, const Drive&, Physics& p) {
+       p.friction.hess_soom.push_back(
+           {e.value("amplitude_positive"), e.value("amplitude_negative"), e.value("velocity")});
+     }},
+    {"quadratic_drag",
+     [](const Effect& e, const Drive&, Physics& p) { p.friction.quadratic = e.value("coefficient"); }},
+    {"temperature_coulomb",
+     [](const Effect& e, const Drive& d, Physics& p) {
+       p.friction.coulomb_temperature_coefficient = e.value("coefficient");
+       p.friction.temperature_reference = d.temperature_reference_c;
+     }},
+    {"lugre_friction",
+     [](const Effect& e, const Drive&, Physics& p) {
+       p.friction.lugre = {e.value("coulomb"), e.value("static"), e.value("velocity"), e.value("stiffness"),
+                           e.value("damping")};
+     }},
+    {"load_scaled_ripple",
+     [](const Effect& e, const Drive&, Physics& p) {
+       p.friction.load_ripple.push_back({e.value("order"), e.value("cosine"), e.value("sine")});
+     }},
+    {"torque_constant_error",
+     [](const Effect& e, const Drive&, Physics& p) { p.torque_constant *= 1.0 + e.value("ratio"); }},
+    {"torque_constant_saturation",
+     [](const Effect& e, const Drive&, Physics& p) { p.torque_saturation = e.value("coefficient"); }},
+    {"current_saturation", [](const Effect& e, const Drive&, Physics& p) { p.current_limit_a = e.value("limit"); }},
+    {"quadratic_stiffness",
+     [](const Effect& e, const Drive&, Physics& p) { p.transmission.quadratic_stiffness = e.value("stiffness"); }},
+    {"piecewise_stiffness",
+     [](const Effect& e, const Drive&, Physics& p) {
+       p.transmission.slopes = {e.value("stiffness_1"), e.value("stiffness_2"), e.value("stiffness_3"),
+                                e.value("torque_1"), e.value("torque_2")};
+     }},
+    {"dahl_hysteresis",
+     [](const Effect& e, const Drive&, Physics& p) {
+       p.transmission.loops.dahl.push_back({e.value("torque"), e.value("stiffness"), e.value("exponent"), 0.0});
+     }},
+    {"modified_dahl_hysteresis",
+     [](const Effect& e, const Drive&, Physics& p) {
+       p.transmission.loops.dahl.push_back({e.value("torque"), e.value("stiffness"), 2.0, 0.0});
+     }},
+    {"torque_proportional_hysteresis",
+     [](const Effect& e, const Drive&, Physics& p) {
+       p.transmission.loops.dahl.push_back({e.value("torque"), e.value("stiffness"), 1.0, e.value("ratio")});
+     }},
+    {"duhem_hysteresis",
+     [](const Effect& e, const Drive&, Physics& p) {
+       p.transmission.loops.duhem.push_back({e.value("rate"),
+                                             e.value("stiffness"),
+                                             {e.value("phi_0"), e.value("phi_1"), e.value("phi_2"), e.value("phi_3")}});
+     }},
+    {"bouc_wen_hysteresis",
+     [](const Effect& e, const Drive&, Physics& p) {
+       p.transmission.loops.bouc_wen.push_back(
+           {e.value("stiffness"), e.value("beta"), e.value("gamma"), e.value("exponent")});
+     }},
+    {"prandtl_ishlinskii_hysteresis",
+     [](const Effect& e, const Drive&, Physics& p) {
+       for (int j = 1; e.has(fmt::format("threshold_{}", j)); ++j)
+         p.transmission.loops.plays.push_back(
+             {e.value(fmt::format("threshold_{}", j)), e.value(fmt::format("weight_{}", j))});
+     }},
+    {"preisach_hysteresis", &add_relays},
+    {"kinematic_error",
+     [](const Effect& e, const Drive&,
+        Physics&
+            p) { p.transmission.kinematic_error.push_back({e.value("order"), e.value("cosine"), e.value("sine")}); }},
+    // Errors of sensors are not torques: the recorder adds them to the readings, and delays the current.
+    {"current_delay", [](const Effect&, const Drive&, Physics&) {}},
+    {"torque_offset", [](const Effect&, const Drive&, Physics&) {}},
+    {"torque_sensor_gain", [](const Effect&, const Drive&, Physics&) {}},
+    {"torque_sensor_ripple", [](const Effect&, const Drive&, Physics&) {}},
+    {"torsion_zero", [](const Effect&, const Drive&, Physics&) {}},
+};
+
+Apply applier_of(const std::string& effect) {
+  for (const Applier& one : kAppliers)
+    if (one.effect == effect) return one.apply;
+  std::vector<std::string_view> all;
+  for (const Applier& one : kAppliers) all.push_back(one.effect);
+  std::sort(all.begin(), all.end());
+  throw std::invalid_argument(
+      fmt::format("the plant cannot simulate \"{}\"; take it out, or use one of {}", effect, fmt::join(all, ", ")));
 }
 
 }  // namespace
@@ -201,17 +212,11 @@ Physics physics_of(const Drive& drive) {
   physics.friction.gear_ratio = drive.gear_ratio;
   for (const Effect& effect : drive.effects) {
     if (!effect.present) continue;
-    const auto found = appliers().find(effect.type);
-    if (found == appliers().end()) {
-      std::string all;
-      for (const auto& [name, apply] : appliers()) all += (all.empty() ? "" : ", ") + name;
-      throw std::invalid_argument(
-          fmt::format("the plant cannot simulate \"{}\"; take it out, or use one of {}", effect.type, all));
-    }
+    const Apply apply = applier_of(effect.type);
     if (!effect.has("order") && drive.find(effect.type) != &effect) {
       throw std::invalid_argument(fmt::format("the effect \"{}\" is present twice; take one out", effect.type));
     }
-    found->second(effect, drive, physics);
+    apply(effect, drive, physics);
   }
   if (physics.transmission.slopes.stiffness_1 > 0.0 || !physics.transmission.loops.duhem.empty())
     physics.transmission.stiffness = 0.0;  // these replace it

@@ -132,6 +132,35 @@ void measure(const Drive& drive, std::uint64_t seed, std::uint64_t index, Record
   record.output_position_noise_std = quantisation_std(sensors.output_counts);
 }
 
+// What is true before the plant moves on with these inputs.
+void keep_truth(const TwoMass& plant, const Inputs& inputs, Record::Truth& truth) {
+  const State& state = plant.state();
+  truth.current_a.push_back(inputs.current_a);
+  truth.motor_position_rad.push_back(state.motor_angle);
+  truth.motor_velocity_rad_s.push_back(state.motor_velocity);
+  truth.motor_acceleration_rad_s2.push_back(plant.motor_acceleration(inputs));
+  truth.output_position_rad.push_back(state.output_angle);
+  truth.output_velocity_rad_s.push_back(state.output_velocity);
+  truth.torque_nm.push_back(plant.torque());
+  truth.temperature_c.push_back(inputs.temperature_c);
+}
+
+// By one sample; a late current changes within it.
+void advance(TwoMass& plant, Inputs inputs, const std::vector<double>& current_a, double current_delay_s,
+             const Drive& drive) {
+  double left_s = drive.sample_s;
+  if (current_delay_s > 0.0) {
+    const LateCurrent late = late_current(current_a, current_delay_s, drive.sample_s);
+    if (late.first_s > 0.0) {
+      inputs.current_a = late.first_a;
+      plant.advance(inputs, late.first_s, drive.steps_per_sample);
+    }
+    inputs.current_a = late.then_a;
+    left_s = drive.sample_s - late.first_s;
+  }
+  plant.advance(inputs, left_s, drive.steps_per_sample);
+}
+
 }  // namespace
 
 Record record_one(const Drive& drive, const ExperimentPlan& plan, std::uint64_t seed, std::uint64_t index) {
@@ -154,7 +183,6 @@ Record record_one(const Drive& drive, const ExperimentPlan& plan, std::uint64_t 
   const SensorErrors errors = sensor_errors_of(drive);
   const double offset = errors.current_offset_a;
   const auto samples = static_cast<std::size_t>(std::llround(plan.duration_s / drive.sample_s));
-  Record::Truth& truth = record.truth;
   const std::vector<double> set_points = commands(plan, drive.sample_s);
   if (plan.load_torque_nm != 0.0) record.load_torque_nm.assign(samples, plan.load_torque_nm);
   for (std::size_t k = 0; k < samples; ++k) {
@@ -172,25 +200,8 @@ Record record_one(const Drive& drive, const ExperimentPlan& plan, std::uint64_t 
 
     record.time_s.push_back(time);
     record.command.push_back(set_point);
-    truth.current_a.push_back(inputs.current_a);
-    truth.motor_position_rad.push_back(state.motor_angle);
-    truth.motor_velocity_rad_s.push_back(state.motor_velocity);
-    truth.motor_acceleration_rad_s2.push_back(plant.motor_acceleration(inputs));
-    truth.output_position_rad.push_back(state.output_angle);
-    truth.output_velocity_rad_s.push_back(state.output_velocity);
-    truth.torque_nm.push_back(plant.torque());
-    truth.temperature_c.push_back(inputs.temperature_c);
-    if (errors.current_delay_s > 0.0) {
-      const LateCurrent late = late_current(truth.current_a, errors.current_delay_s, drive.sample_s);
-      if (late.first_s > 0.0) {
-        inputs.current_a = late.first_a;
-        plant.advance(inputs, late.first_s, drive.steps_per_sample);
-      }
-      inputs.current_a = late.then_a;
-      plant.advance(inputs, drive.sample_s - late.first_s, drive.steps_per_sample);
-    } else {
-      plant.advance(inputs, drive.sample_s, drive.steps_per_sample);
-    }
+    keep_truth(plant, inputs, record.truth);
+    advance(plant, inputs, record.truth.current_a, errors.current_delay_s, drive);
   }
   measure(drive, seed, index, record);
   return record;

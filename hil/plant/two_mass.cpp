@@ -89,6 +89,58 @@ FrictionPoint TwoMass::friction_point(const State& s, double direction) const {
   return {direction, s.motor_velocity, torque(s), s.motor_angle, s.motor_angle, s.bristle, s.motor_velocity};
 }
 
+TwoMass::Response TwoMass::motor_response(const Stage& stage, const State& start, const State& s, double torque,
+                                          double ratio) const {
+  const double g = stage.weight;
+  const auto direction = static_cast<double>(s.motor_direction);
+  const FrictionTorque f = has_plain_friction_
+                               ? physics_.friction.evaluate_plain(direction, s.motor_velocity, viscous_)
+                               : physics_.friction.evaluate({direction, s.motor_velocity, torque, s.motor_angle,
+                                                             start.motor_angle, start.bristle, start.motor_velocity},
+                                                            viscous_);
+  const double residual = physics_.motor_inertia * (s.motor_velocity - stage.motor_velocity) -
+                          g * (motor_drive_ - f.torque - torque * ratio);
+  const double slope = physics_.motor_inertia + g * (f.by_velocity + g * f.by_angle);
+  return {-residual / slope, g * (ratio + f.by_torque) / slope};
+}
+
+TwoMass::Response TwoMass::output_response(const Stage& stage, const State& s, double torque) const {
+  const double g = stage.weight;
+  const double coulomb = s.output_direction * physics_.output_coulomb;
+  const double residual = physics_.output_inertia * (s.output_velocity - stage.output_velocity) -
+                          g * (torque - physics_.output_viscous * s.output_velocity - coulomb -
+                               gravity(s.output_angle) - inputs_.load_torque_nm);
+  const double gravity_slope = has_gravity_ ? physics_.gravity_sine * std::cos(s.output_angle) -
+                                                  physics_.gravity_cosine * std::sin(s.output_angle)
+                                            : 0.0;
+  const double slope = physics_.output_inertia + g * (physics_.output_viscous + g * gravity_slope);
+  return {-residual / slope, g / slope};
+}
+
+TwoMass::TorqueStep TwoMass::torque_step(const TorsionRate& rate, double damping) const {
+  const double c = physics_.damping_torque;
+  const double ks = rate.spring_slope;
+  if (!(c > 0.0)) return {ks * rate.free / (1.0 + rate.gain * ks), 0.0};
+  if (has_root_damping_ && rate.gain >= 0.0 && ks >= 0.0) {
+    // Of the new power u, whose rate is u|u|, (1 + gain ks) u|u| + gain c u is known: a square root.
+    const double by_rate = 1.0 + rate.gain * ks, by_power = rate.gain * c;
+    const double known = by_rate * rate.value + rate.free + by_power * damping;
+    const double size = std::abs(known);
+    const double root = std::sqrt(by_power * by_power + 4.0 * by_rate * size);
+    const double power = root > 0.0 ? 2.0 * known / (by_power + root) : 0.0;
+    const double step = power - damping;
+    return {ks * (rate_of(power) - rate.value) + c * step, step};
+  }
+  const double inverse_exponent = 1.0 / physics_.damping_exponent;
+  const double mismatch = rate.value - rate_of(damping);
+  const double magnitude = std::abs(damping);
+  const double slope = has_root_damping_
+                           ? 2.0 * magnitude
+                           : inverse_exponent * std::pow(std::max(magnitude, 1e-12), inverse_exponent - 1.0);
+  const double step = (rate.free + mismatch * (1.0 + rate.gain * ks)) / (slope + rate.gain * (ks * slope + c));
+  return {ks * (slope * step - mismatch) + c * step, step};
+}
+
 // Newton's method on motor velocity, output velocity and signed damping power. Using the power as the unknown keeps the
 // equations smooth where |v|^alpha has an infinite slope, and well scaled where the torsion rate is next to nothing. A
 // square root is solved exactly in each step: without other nonlinearities the first step is the solution.
@@ -105,76 +157,27 @@ bool TwoMass::solve_stage(const Stage& stage, const State& start, State& s) cons
     return true;
   }
   const double c = physics_.damping_torque;
-  const bool damped = c > 0.0;
-  const double inverse_exponent = 1.0 / physics_.damping_exponent;
-  const double coulomb = s.output_direction * physics_.output_coulomb;
-  if (!damped) s.damping = 0.0;
+  if (!(c > 0.0)) s.damping = 0.0;
   for (int iteration = 0; iteration < kNewtonLimit; ++iteration) {
     s.motor_angle = stage.motor_angle + g * s.motor_velocity;
     s.output_angle = stage.output_angle + g * s.output_velocity;
     const TorqueSlope spring = elastic(s);
     const double t = spring.torque + c * s.damping;
     const double n = ratio(s.motor_angle);
-    // Newton step: dw = motor_free - motor_gain dT, dwo = output_free + output_gain dT, dT = ks dv + c du.
-    double motor_free = 0.0, motor_gain = 0.0, output_free = 0.0, output_gain = 0.0;
-    if (motor_moves) {
-      const auto direction = static_cast<double>(s.motor_direction);
-      const FrictionTorque f =
-          has_plain_friction_ ? physics_.friction.evaluate_plain(direction, s.motor_velocity, viscous_)
-                              : physics_.friction.evaluate({direction, s.motor_velocity, t, s.motor_angle,
-                                                            start.motor_angle, start.bristle, start.motor_velocity},
-                                                           viscous_);
-      const double residual =
-          physics_.motor_inertia * (s.motor_velocity - stage.motor_velocity) - g * (motor_drive_ - f.torque - t * n);
-      const double slope = physics_.motor_inertia + g * (f.by_velocity + g * f.by_angle);
-      motor_free = -residual / slope;
-      motor_gain = g * (n + f.by_torque) / slope;
-    }
-    if (output_moves) {
-      const double residual = physics_.output_inertia * (s.output_velocity - stage.output_velocity) -
-                              g * (t - physics_.output_viscous * s.output_velocity - coulomb - gravity(s.output_angle) -
-                                   inputs_.load_torque_nm);
-      const double gravity_slope = has_gravity_ ? physics_.gravity_sine * std::cos(s.output_angle) -
-                                                      physics_.gravity_cosine * std::sin(s.output_angle)
-                                                : 0.0;
-      const double slope = physics_.output_inertia + g * (physics_.output_viscous + g * gravity_slope);
-      output_free = -residual / slope;
-      output_gain = g / slope;
-    }
-    const double rate = s.motor_velocity * n - s.output_velocity;
-    const double rate_free = motor_free * n - output_free;
-    const double rate_gain = motor_gain * n + output_gain;
-    const double ks = spring.slope * g;
-    double torque_step = 0.0;
-    double damping_step = 0.0;
-    if (!damped) {
-      torque_step = ks * rate_free / (1.0 + rate_gain * ks);
-    } else if (has_root_damping_ && rate_gain >= 0.0 && ks >= 0.0) {
-      // Of the new power u, whose rate is u|u|, (1 + gain ks) u|u| + gain c u is known: a square root.
-      const double by_rate = 1.0 + rate_gain * ks, by_power = rate_gain * c;
-      const double known = by_rate * rate + rate_free + by_power * s.damping;
-      const double size = std::abs(known);
-      const double root = std::sqrt(by_power * by_power + 4.0 * by_rate * size);
-      const double power = root > 0.0 ? 2.0 * known / (by_power + root) : 0.0;
-      damping_step = power - s.damping;
-      torque_step = ks * (rate_of(power) - rate) + c * damping_step;
-    } else {
-      const double mismatch = rate - rate_of(s.damping);
-      const double magnitude = std::abs(s.damping);
-      const double slope = has_root_damping_
-                               ? 2.0 * magnitude
-                               : inverse_exponent * std::pow(std::max(magnitude, 1e-12), inverse_exponent - 1.0);
-      damping_step = (rate_free + mismatch * (1.0 + rate_gain * ks)) / (slope + rate_gain * (ks * slope + c));
-      torque_step = ks * (slope * damping_step - mismatch) + c * damping_step;
-    }
-    const double motor_step = motor_free - motor_gain * torque_step;
-    const double output_step = output_free + output_gain * torque_step;
+    // dw = motor.free - motor.gain dT, dwo = output.free + output.gain dT, dT = ks dv + c du.
+    const Response motor = motor_moves ? motor_response(stage, start, s, t, n) : Response{};
+    const Response output = output_moves ? output_response(stage, s, t) : Response{};
+    const TorqueStep step = torque_step({s.motor_velocity * n - s.output_velocity, motor.free * n - output.free,
+                                         motor.gain * n + output.gain, spring.slope * g},
+                                        s.damping);
+    const double motor_step = motor.free - motor.gain * step.torque;
+    const double output_step = output.free + output.gain * step.torque;
     s.motor_velocity += motor_step;
     s.output_velocity += output_step;
-    s.damping += damping_step;
+    s.damping += step.damping;
     if (!std::isfinite(s.motor_velocity + s.output_velocity + s.damping)) return false;
     if (is_linear_ || (std::abs(motor_step) <= 1e-8 * (1.0 + 1e-3 * std::abs(s.motor_velocity)) &&
-                       std::abs(output_step) <= 1e-10 && std::abs(damping_step) <= 1e-8)) {
+                       std::abs(output_step) <= 1e-10 && std::abs(step.damping) <= 1e-8)) {
       s.motor_angle = stage.motor_angle + g * s.motor_velocity;
       s.output_angle = stage.output_angle + g * s.output_velocity;
       return true;

@@ -111,6 +111,20 @@ class TwoMass {
   double damping_of(double rate) const;
   FrictionPoint friction_point(const State& s, double direction) const;
   double gravity(double angle) const;
+  /// Newton's step of a velocity is free - gain * (step of the torque).
+  struct Response {
+    double free = 0.0, gain = 0.0;
+  };
+  Response motor_response(const Stage& stage, const State& start, const State& s, double torque, double ratio) const;
+  Response output_response(const Stage& stage, const State& s, double torque) const;
+  /// Of the torsion rate: its residual, and what it makes of the torque.
+  struct TorsionRate {
+    double value = 0.0, free = 0.0, gain = 0.0, spring_slope = 0.0;
+  };
+  struct TorqueStep {
+    double torque = 0.0, damping = 0.0;
+  };
+  TorqueStep torque_step(const TorsionRate& rate, double damping) const;
   bool solve_stage(const Stage& stage, const State& start, State& s) const;
   const FastPath& fast_path(double weight);
   Shafts solve_fast_path(const FastPath& known, const Stage& stage, const Shafts& start) const;

@@ -195,68 +195,102 @@ Balance balance_named(std::string_view name) {
   return name == "transmission" ? Balance::transmission : name == "load" ? Balance::load : Balance::motor;
 }
 
-std::vector<std::uint8_t> linear_in(const model::Effect& effect) {
-  constexpr int kTrials = 60;
-  constexpr double kRounding = 1e-9;
-  const std::size_t count = effect.parameters.size();
-  std::mt19937 random(7);
-  std::uniform_real_distribution<double> unit(0.0, 1.0);
-  Formula formula(effect.definition->formula, names_of(effect));
-  const auto drawn = [&](const model::Parameter& p) {
-    if (p.low && p.high) return *p.low + (*p.high - *p.low) * unit(random);
-    if (p.low) return *p.low + std::max(1.0, std::abs(*p.low)) * unit(random);
-    if (p.high) return *p.high - std::max(1.0, std::abs(*p.high)) * unit(random);
-    return 2.0 * unit(random) - 1.0;
-  };
+// In which parameters a formula is linear, by trial.
+class LinearityTest {
+ public:
+  explicit LinearityTest(const model::Effect& effect)
+      : effect_(effect), formula_(effect.definition->formula, names_of(effect)) {}
+
+  // f(x + u + v) - f(x + u) - f(x + v) + f(x) is zero where f is linear in the set.
+  bool is_linear(const std::vector<std::uint8_t>& set) {
+    return holds(set, [&](const Point& at, const Point& u, const Point& v, const Inputs& in) -> std::optional<bool> {
+      Point one = at, other = at, both = at;
+      for (std::size_t p = 0; p < at.size(); ++p) {
+        one[p] = at[p] + u[p];
+        other[p] = at[p] + v[p];
+        both[p] = one[p] + v[p];
+      }
+      const auto f = value(at, in), fu = value(one, in), fv = value(other, in), fuv = value(both, in);
+      if (!f || !fu || !fv || !fuv) return std::nullopt;
+      const double size = std::abs(*f) + std::abs(*fu) + std::abs(*fv) + std::abs(*fuv);
+      return std::abs(*fuv - *fu - *fv + *f) <= kRounding * size;
+    });
+  }
+
+  // Whether it is zero where the parameters of the set are.
+  bool vanishes(const std::vector<std::uint8_t>& set) {
+    return holds(set, [&](const Point& at, const Point& u, const Point&, const Inputs& in) -> std::optional<bool> {
+      Point zero = at, one = at;
+      for (std::size_t p = 0; p < at.size(); ++p) {
+        one[p] = at[p] + u[p];
+        if (set[p]) zero[p] = 0.0;
+      }
+      const auto none = value(zero, in);
+      const auto some = value(one, in);
+      if (!none || !some) return std::nullopt;
+      return std::abs(*none) <= kRounding * std::max(std::abs(*some), 1e-30);
+    });
+  }
+
+ private:
+  using Point = std::vector<double>;
+  using Inputs = effects::Inputs<Real>;
+  static constexpr int kTrials = 60;
+  static constexpr double kRounding = 1e-9;
+
+  // At so many points where the formula gives numbers. `test` gives nothing where it does not.
+  template <class Test>
+  bool holds(const std::vector<std::uint8_t>& set, const Test& test) {
+    int decided = 0;
+    for (int trial = 0; trial < 4 * kTrials && decided < kTrials; ++trial) {
+      const Inputs in = drawn_inputs(random_);
+      Point x(set.size()), u(set.size(), 0.0), v(set.size(), 0.0);
+      for (std::size_t p = 0; p < set.size(); ++p) {
+        x[p] = drawn(effect_.parameters[p]);
+        if (!set[p]) continue;
+        u[p] = (unit_(random_) - 0.5) * std::max(std::abs(x[p]), 1e-3);
+        v[p] = (unit_(random_) - 0.5) * std::max(std::abs(x[p]), 1e-3);
+      }
+      const std::optional<bool> kept = test(x, u, v, in);
+      if (!kept) continue;
+      ++decided;
+      if (!*kept) return false;
+    }
+    return decided > 0;
+  }
+
+  double drawn(const model::Parameter& p) {
+    if (p.low && p.high) return *p.low + (*p.high - *p.low) * unit_(random_);
+    if (p.low) return *p.low + std::max(1.0, std::abs(*p.low)) * unit_(random_);
+    if (p.high) return *p.high - std::max(1.0, std::abs(*p.high)) * unit_(random_);
+    return 2.0 * unit_(random_) - 1.0;
+  }
+
   // Nothing where the formula gives no number: its domain ends there.
-  const auto value = [&](const std::vector<double>& at, const effects::Inputs<Real>& in) -> std::optional<double> {
+  std::optional<double> value(const Point& at, const Inputs& in) {
     double sum = 0.0;
     try {
-      formula.add(at, 1.0, {&in, 1}, &sum);
+      formula_.add(at, 1.0, {&in, 1}, &sum);
     } catch (const FormulaError&) {
       return std::nullopt;
     }
     return sum;
-  };
-  // f(x + u + v) - f(x + u) - f(x + v) + f(x) is zero where f is linear in the set.
-  const auto linear_in_set = [&](const std::vector<std::uint8_t>& set, bool vanishes) {
-    int decided = 0;
-    for (int trial = 0; trial < 4 * kTrials && decided < kTrials; ++trial) {
-      const effects::Inputs<Real> in = drawn_inputs(random);
-      std::vector<double> x(count), u(count, 0.0), v(count, 0.0), both(count), one(count), other(count);
-      for (std::size_t p = 0; p < count; ++p) {
-        x[p] = drawn(effect.parameters[p]);
-        if (set[p]) {
-          u[p] = (unit(random) - 0.5) * std::max(std::abs(x[p]), 1e-3);
-          v[p] = (unit(random) - 0.5) * std::max(std::abs(x[p]), 1e-3);
-        }
-        one[p] = x[p] + u[p];
-        other[p] = x[p] + v[p];
-        both[p] = one[p] + v[p];
-        if (vanishes && set[p]) x[p] = 0.0;
-      }
-      if (vanishes) {
-        const auto none = value(x, in);
-        const auto some = value(one, in);
-        if (!none || !some) continue;
-        ++decided;
-        if (std::abs(*none) > kRounding * std::max(std::abs(*some), 1e-30)) return false;
-        continue;
-      }
-      const auto f = value(x, in), fu = value(one, in), fv = value(other, in), fuv = value(both, in);
-      if (!f || !fu || !fv || !fuv) continue;
-      ++decided;
-      const double size = std::abs(*f) + std::abs(*fu) + std::abs(*fv) + std::abs(*fuv);
-      if (std::abs(*fuv - *fu - *fv + *f) > kRounding * size) return false;
-    }
-    return decided > 0;
-  };
-  std::vector<std::uint8_t> set(count, 0);
-  for (std::size_t p = 0; p < count; ++p) {
-    set[p] = 1;
-    if (!linear_in_set(set, false)) set[p] = 0;
   }
-  if (!linear_in_set(set, true)) std::fill(set.begin(), set.end(), std::uint8_t{0});
+
+  const model::Effect& effect_;
+  Formula formula_;
+  std::mt19937 random_{7};
+  std::uniform_real_distribution<double> unit_{0.0, 1.0};
+};
+
+std::vector<std::uint8_t> linear_in(const model::Effect& effect) {
+  LinearityTest test(effect);
+  std::vector<std::uint8_t> set(effect.parameters.size(), 0);
+  for (std::size_t p = 0; p < set.size(); ++p) {
+    set[p] = 1;
+    if (!test.is_linear(set)) set[p] = 0;
+  }
+  if (!test.vanishes(set)) std::fill(set.begin(), set.end(), std::uint8_t{0});
   return set;
 }
 

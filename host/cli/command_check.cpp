@@ -2,13 +2,13 @@
 
 #include <nlohmann/json.hpp>
 
-#include "host/cli/base_model.hpp"
 #include "host/cli/command.hpp"
 #include "host/cli/common_options.hpp"
-#include "host/cli/record_summary.hpp"
+#include "host/data/record_summary.hpp"
 #include "host/output/identification.hpp"
 #include "host/output/json.hpp"
 #include "host/output/text.hpp"
+#include "host/project/base_model.hpp"
 
 namespace flexspline::cli {
 namespace {
@@ -42,7 +42,7 @@ std::string load_name(const data::Experiment& e) {
   return e.load == data::Load::free ? "free" : "locked";
 }
 
-void print(const data::Experiment& e, const RecordSummary& r, Console& console) {
+void print(const data::Experiment& e, const data::RecordSummary& r, Console& console) {
   console.line(fmt::format("{}  {}", console.bold(e.name), console.dim(e.file.string())));
   console.line(fmt::format("  {} samples at {:.6g} Hz, {:.4g} s{}{}; load {}, role {}", r.samples, r.rate_hz,
                            r.duration_s, r.gaps > 0 ? fmt::format(", {} gaps", r.gaps) : "",
@@ -55,7 +55,7 @@ void print(const data::Experiment& e, const RecordSummary& r, Console& console) 
                              number(r.lowest_speed), number(r.highest_speed), r.speed_unit, *r.reversals,
                              r.period_s ? fmt::format("; repeats itself every {:.4g} s", *r.period_s) : ""));
   output::Table table({"signal", "from", "to", "noise", "step", "unit", ""}, "lrrrrll");
-  for (const SignalSummary& s : r.signals)
+  for (const data::SignalSummary& s : r.signals)
     table.row({std::string(data::column_name(s.column)), number(s.low), number(s.high), number(s.noise_std),
                number(s.quantum), s.unit,
                s.stated_noise_std ? fmt::format("noise stated: {}", number(*s.stated_noise_std)) : ""});
@@ -63,9 +63,9 @@ void print(const data::Experiment& e, const RecordSummary& r, Console& console) 
   console.line();
 }
 
-json summary_json(const data::Experiment& e, const RecordSummary& r) {
+json summary_json(const data::Experiment& e, const data::RecordSummary& r) {
   json signals = json::array();
-  for (const SignalSummary& s : r.signals)
+  for (const data::SignalSummary& s : r.signals)
     signals.push_back({{"signal", data::column_name(s.column)},
                        {"unit", s.unit},
                        {"low", json_number(s.low)},
@@ -113,8 +113,8 @@ void print(const std::vector<data::Finding>& findings, Console& console) {
 }
 
 // Prints which filters an identification would use; null where these data allow none.
-json print_pipeline(const data::Dataset& dataset, const BaseModel& base, const estimation::PipelineOptions& options,
-                    Console& console) {
+json print_pipeline(const data::Dataset& dataset, const project::BaseModel& base,
+                    const estimation::PipelineOptions& options, Console& console) {
   std::vector<const data::Experiment*> experiments;
   for (const data::Experiment& e : dataset.experiments) experiments.push_back(&e);
   try {
@@ -137,13 +137,13 @@ int run(const CheckOptions& options, Console& console) {
   json experiments = json::array();
   for (const data::Experiment& e : dataset.experiments) {
     console.progress(fmt::format("looking at {}", e.name));
-    const RecordSummary summary = summary_of(e, axis);
+    const data::RecordSummary summary = data::summary_of(e, axis);
     print(e, summary, console);
     experiments.push_back(summary_json(e, summary));
   }
   print(dataset.findings, console);
 
-  const BaseModel base = base_model(dataset, "base");
+  const project::BaseModel base = project::base_model(dataset, "base");
   console.line(console.bold("What can be identified"));
   for (const std::string& reason : base.reasons) console.line(output::wrapped(reason));
   json pipeline = print_pipeline(dataset, base, options.pipeline.options(), console);

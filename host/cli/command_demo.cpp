@@ -1,7 +1,7 @@
 #include <fmt/format.h>
 
 #include <algorithm>
-#include <cmath>
+#include <memory>
 #include <nlohmann/json.hpp>
 #include <random>
 #include <utility>
@@ -15,6 +15,7 @@
 #include "host/cli/twin_process.hpp"
 #include "host/comparison/compare.hpp"
 #include "host/estimation/identify.hpp"
+#include "host/output/diagnosis.hpp"
 #include "host/output/json.hpp"
 #include "host/output/text.hpp"
 #include "host/selection/add.hpp"
@@ -40,7 +41,7 @@ constexpr std::string_view kMayHide[] = {
     "dahl_friction",     "backlash",          "structural_damping"};
 
 std::string label(const selection::NamedEffect& named) {
-  return named.order ? fmt::format("{}:{:g}", named.effect, *named.order) : named.effect;
+  return output::effect_label(named.effect, named.order);
 }
 
 // The same effect, whether or not an order was given with it.
@@ -82,85 +83,31 @@ void print_free_runs(const comparison::Comparison& before, const comparison::Com
                         "current is unstable: the smallest difference grows, and no model follows it for long."));
 }
 
-// On the drive, and a motion that was never recorded: without compensation, with the base model, with the added effect.
-json close_the_loop(const std::filesystem::path& folder, const std::filesystem::path& base,
-                    const std::filesystem::path& better, const std::string& hidden, std::uint64_t seed,
-                    Console& console) {
-  console.line(console.bold("5. Put it on the drive"));
-  FlashOptions flash;
-  flash.drive = "twin";
-  flash.model = better;
-  flash.yes = true;
-  cli::flash(flash, console);
-  console.line();
-  console.line(console.bold("6. A motion that was never recorded, in closed loop on the drive with its hidden effect"));
-  HilOptions loop;
-  loop.scenario = "slow-reversals";
-  loop.model = better;
-  loop.base = base;
-  loop.hide = hidden == "none" ? "" : hidden;
-  loop.seed = seed;
-  loop.report = folder / "closed-loop.html";
-  return closed_loop::to_json(run_closed_loop(loop, console));
-}
-
-int run(const DemoOptions& options, Console& console) {
-  std::uint64_t seed = options.seed.value_or(0);
-  if (!options.seed) seed = std::random_device{}() % 100000;
+// As the user says, else by chance.
+std::string hidden_effect(const DemoOptions& options, std::uint64_t seed) {
   std::mt19937_64 chance(seed);
   std::string hidden = options.hidden;
   if (hidden.empty()) hidden = kMayHide[std::uniform_int_distribution<std::size_t>(0, std::size(kMayHide) - 1)(chance)];
-  if (hidden != "none") {
-    const std::string name = hidden.substr(0, hidden.find(':'));
-    const bool known = std::any_of(std::begin(kMayHide), std::end(kMayHide),
-                                   [&](std::string_view may) { return may.substr(0, may.find(':')) == name; });
-    if (!known) {
-      std::string list;
-      for (const std::string_view may : kMayHide) list += fmt::format("{}{}", list.empty() ? "" : ", ", may);
-      throw UsageError(fmt::format("\"{}\" cannot be hidden; choose one of {}, or none", hidden, list));
-    }
-    if (hidden == "torque_ripple") hidden = "torque_ripple:2";
+  if (hidden == "none") return hidden;
+  const std::string name = hidden.substr(0, hidden.find(':'));
+  const bool known = std::any_of(std::begin(kMayHide), std::end(kMayHide),
+                                 [&](std::string_view may) { return may.substr(0, may.find(':')) == name; });
+  if (!known) {
+    std::string list;
+    for (const std::string_view may : kMayHide) list += fmt::format("{}{}", list.empty() ? "" : ", ", may);
+    throw UsageError(fmt::format("\"{}\" cannot be hidden; choose one of {}, or none", hidden, list));
   }
+  return hidden == "torque_ripple" ? "torque_ripple:2" : hidden;
+}
 
-  const std::filesystem::path folder = options.out;
-  make_folder(folder);
-  const std::filesystem::path recording = folder / "recording";
-  console.line(console.bold("1. Record"));
-  console.progress("the twin records 16 experiments");
-  std::vector<std::string> arguments{"record", "--force", "--out", recording.string(), "--seed", std::to_string(seed)};
-  if (hidden != "none") arguments.insert(arguments.end(), {"--hide", hidden});
-  run_twin(arguments);
-  DataInputs inputs;
-  inputs.data = {recording};
-  const data::Dataset dataset = load(inputs, console);
-  const auto unseen = std::count_if(dataset.experiments.begin(), dataset.experiments.end(),
-                                    [](const auto& e) { return e.role == data::Role::holdout; });
-  console.line(output::wrapped(fmt::format(
-      "A twin of a strain-wave drive (100:1, 40 N m) was moved through {} experiments, free and with its output "
-      "locked; {} of them are held out for validation. It has an effect that the model does not know{}. Recording: {}",
-      dataset.experiments.size(), unseen, options.hidden.empty() ? ", chosen by chance" : "", recording.string())));
-  console.line();
-
-  console.line(console.bold("2. Identify"));
-  const model::ModelFile base_file = load_model(recording / "base-model.toml");
-  console.progress("identifying the model");
-  const auto base = estimation::identify(dataset, base_file.model, {});
-  const std::filesystem::path base_path = folder / "model.toml";
-  model::Model stored = base->model;
-  stored.drive = base_file.model.drive;
-  const std::string base_text = model::rewrite(base_file, stored);
-  model::save(base_path, base_text);
+void print_estimates(const estimation::Identification& identified, Console& console) {
   output::Table parameters({"parameter", "value", "95 % interval", "", "unit"}, "lrrrl");
-  for (const auto& e : base->estimates)
+  for (const auto& e : identified.estimates)
     parameters.row({fmt::format("{}.{}", e.id, e.parameter), number(e.value), number(e.low), number(e.high), e.unit});
   console.line(parameters.text());
-  console.line(fmt::format("  Model: {}", base_path.string()));
-  console.line();
+}
 
-  console.line(console.bold("3. Where does it fail, and what is missing?"));
-  selection::Options diagnose_options;
-  diagnose_options.progress = [&](std::string_view stage) { console.progress(stage); };
-  const selection::Diagnosis found = selection::diagnose(dataset, base->model, diagnose_options);
+void print_candidates(const selection::Diagnosis& found, Console& console) {
   if (found.noise_floor)
     console.line(output::wrapped(fmt::format("The {} is off by {}, {:.1f} times what noise alone would leave.",
                                              found.balance ? selection::balance_signal(*found.balance) : "model",
@@ -178,97 +125,219 @@ int run(const DemoOptions& options, Console& console) {
   }
   console.line(ranked.text());
   console.line();
+}
 
-  json answer = {{"format", "flexspline-demo/1"},
-                 {"hidden", hidden == "none" ? json(nullptr) : json(hidden)},
-                 {"seed", seed},
-                 {"named", json::array()},
-                 {"verdict", selection::verdict_name(found.verdict)},
-                 {"error_before", nullptr},
-                 {"error_after", nullptr},
-                 {"noise_floor", output::json_number(found.noise_floor)},
-                 {"unit", found.unit},
-                 {"report", nullptr},
-                 {"closed_loop", nullptr}};
-  bool right = hidden == "none" && found.named.empty();
-  report::Subject page;
-  page.command = "demo";
-  page.data_name = recording.string();
-  page.model_name = base_path.string();
-  page.dataset = &dataset;
-  page.model = base->model;
-  page.estimates = base->estimates;
-  page.rounds = {found};
-  if (found.named.empty()) {
-    console.line(console.bold("  Nothing is missing that these data could show."));
-  } else {
-    std::vector<std::string> names;
-    for (const auto& n : found.named) {
-      names.push_back(label(n));
-      right = right || is_the_hidden_one(n, hidden);
-      answer["named"].push_back({{"effect", n.effect}, {"order", n.order ? json(*n.order) : json(nullptr)}});
-    }
-    const auto& info = *catalogue::get(found.named.front().effect).info;
-    console.line(console.bold(fmt::format("  Missing: {}", output::listed(names, "or"))));
-    console.line(output::wrapped(info.explanation));
-    console.line(output::wrapped(fmt::format("What it does: {}", info.consequence)));
-    console.line(output::wrapped(fmt::format("Usual causes: {}", info.causes)));
-    console.line(output::wrapped(fmt::format("Check on the machine: {}", info.check)));
-    console.line();
+void print_missing(const selection::Diagnosis& found, Console& console) {
+  std::vector<std::string> names;
+  for (const auto& n : found.named) names.push_back(label(n));
+  const auto& info = *catalogue::get(found.named.front().effect).info;
+  console.line(console.bold(fmt::format("  Missing: {}", output::listed(names, "or"))));
+  console.line(output::wrapped(info.explanation));
+  console.line(output::wrapped(fmt::format("What it does: {}", info.consequence)));
+  console.line(output::wrapped(fmt::format("Usual causes: {}", info.causes)));
+  console.line(output::wrapped(fmt::format("Check on the machine: {}", info.check)));
+  console.line();
+}
 
-    console.line(console.bold("4. Add it, and compare on motions that the fit never saw"));
-    console.progress("adding the effect and refitting");
-    const selection::Addition added = selection::add(dataset, base->model, names.front(), {});
-    const std::filesystem::path path = folder / "model-with-effect.toml";
-    model::Model better = added.model;
-    better.drive = base_file.model.drive;
-    model::save(path, model::rewrite(model::parse(base_text, base_path.string(), catalogue::known_effects()), better));
-    answer["error_before"] = output::json_number(added.before.rmse_holdout);
-    answer["error_after"] = output::json_number(added.after.rmse_holdout);
-    answer["noise_floor"] = output::json_number(added.noise_floor);
-    if (added.before.rmse_holdout && added.after.rmse_holdout) {
-      output::Table table({added.signal, "error", "unit", "of noise"}, "lrlr");
-      const auto row = [&](const char* what, double value) {
-        table.row({what, number(value), added.unit,
-                   added.noise_floor ? fmt::format("{:.2f}", value / *added.noise_floor) : "-"});
-      };
-      row("before", *added.before.rmse_holdout);
-      row("after", *added.after.rmse_holdout);
-      if (added.noise_floor) row("noise alone", *added.noise_floor);
-      console.line(table.text());
+void print_errors(const selection::Addition& added, Console& console) {
+  if (!added.before.rmse_holdout || !added.after.rmse_holdout) return;
+  output::Table table({added.signal, "error", "unit", "of noise"}, "lrlr");
+  const auto row = [&](const char* what, double value) {
+    table.row(
+        {what, number(value), added.unit, added.noise_floor ? fmt::format("{:.2f}", value / *added.noise_floor) : "-"});
+  };
+  row("before", *added.before.rmse_holdout);
+  row("after", *added.after.rmse_holdout);
+  if (added.noise_floor) row("noise alone", *added.noise_floor);
+  console.line(table.text());
+}
+
+// The steps in their order. Each prints what it found and keeps what the later ones need.
+class Demo {
+ public:
+  Demo(const DemoOptions& options, Console& console)
+      : options_(options),
+        console_(console),
+        seed_(options.seed ? *options.seed : std::random_device{}() % 100000),
+        hidden_(hidden_effect(options, seed_)) {}
+
+  void run() {
+    make_folder(options_.out);
+    record();
+    identify();
+    diagnose();
+    if (found_.named.empty()) {
+      console_.line(console_.bold("  Nothing is missing that these data could show."));
+    } else {
+      print_missing(found_, console_);
+      add();
+      put_on_drive();
     }
-    console.progress("running both models on the unseen motions");
-    print_free_runs(on_unseen(dataset, base->model), on_unseen(dataset, added.model), console);
-    console.line(fmt::format("  Model: {}", path.string()));
-    page.model_name = path.string();
-    page.before = std::exchange(page.model, added.model);
-    page.estimates = added.estimates;
-    page.addition = added;
-    console.line();
+    write_report();
+    reveal();
+    output::save_json(options_.json, answer_);
+  }
+
+ private:
+  void record() {
+    console_.line(console_.bold("1. Record"));
+    console_.progress("the twin records 16 experiments");
+    std::vector<std::string> arguments{
+        "record", "--force", "--out", recording_.string(), "--seed", std::to_string(seed_)};
+    if (hidden_ != "none") arguments.insert(arguments.end(), {"--hide", hidden_});
+    run_twin(arguments);
+    DataInputs inputs;
+    inputs.data = {recording_};
+    dataset_ = load(inputs, console_);
+    const auto unseen = std::count_if(dataset_.experiments.begin(), dataset_.experiments.end(),
+                                      [](const auto& e) { return e.role == data::Role::holdout; });
+    console_.line(output::wrapped(fmt::format(
+        "A twin of a strain-wave drive (100:1, 40 N m) was moved through {} experiments, free and with its output "
+        "locked; {} of them are held out for validation. It has an effect that the model does not know{}. Recording: "
+        "{}",
+        dataset_.experiments.size(), unseen, options_.hidden.empty() ? ", chosen by chance" : "",
+        recording_.string())));
+    console_.line();
+  }
+
+  void identify() {
+    console_.line(console_.bold("2. Identify"));
+    const model::ModelFile file = load_model(recording_ / "base-model.toml");
+    console_.progress("identifying the model");
+    base_ = estimation::identify(dataset_, file.model, {});
+    stated_drive_ = file.model.drive;
+    base_text_ = model::rewrite(file, with_stated_drive(base_->model));
+    model::save(base_path_, base_text_);
+    print_estimates(*base_, console_);
+    console_.line(fmt::format("  Model: {}", base_path_.string()));
+    console_.line();
+  }
+
+  void diagnose() {
+    console_.line(console_.bold("3. Where does it fail, and what is missing?"));
+    selection::Options how;
+    how.progress = [&](std::string_view stage) { console_.progress(stage); };
+    found_ = selection::diagnose(dataset_, base_->model, how);
+    print_candidates(found_, console_);
+    answer_ = {{"format", "flexspline-demo/1"},
+               {"hidden", hidden_ == "none" ? json(nullptr) : json(hidden_)},
+               {"seed", seed_},
+               {"named", json::array()},
+               {"verdict", selection::verdict_name(found_.verdict)},
+               {"error_before", nullptr},
+               {"error_after", nullptr},
+               {"noise_floor", output::json_number(found_.noise_floor)},
+               {"unit", found_.unit},
+               {"report", nullptr},
+               {"closed_loop", nullptr}};
+    named_right_ = hidden_ == "none" && found_.named.empty();
+    for (const auto& n : found_.named) {
+      named_right_ = named_right_ || is_the_hidden_one(n, hidden_);
+      answer_["named"].push_back({{"effect", n.effect}, {"order", n.order ? json(*n.order) : json(nullptr)}});
+    }
+    page_.command = "demo";
+    page_.data_name = recording_.string();
+    page_.model_name = base_path_.string();
+    page_.dataset = &dataset_;
+    page_.model = base_->model;
+    page_.estimates = base_->estimates;
+    page_.rounds = {found_};
+  }
+
+  void add() {
+    console_.line(console_.bold("4. Add it, and compare on motions that the fit never saw"));
+    console_.progress("adding the effect and refitting");
+    const selection::Addition added = selection::add(dataset_, base_->model, label(found_.named.front()), {});
+    const model::ModelFile base = model::parse(base_text_, base_path_.string(), catalogue::known_effects());
+    model::save(better_path_, model::rewrite(base, with_stated_drive(added.model)));
+    answer_["error_before"] = output::json_number(added.before.rmse_holdout);
+    answer_["error_after"] = output::json_number(added.after.rmse_holdout);
+    answer_["noise_floor"] = output::json_number(added.noise_floor);
+    print_errors(added, console_);
+    console_.progress("running both models on the unseen motions");
+    print_free_runs(on_unseen(dataset_, base_->model), on_unseen(dataset_, added.model), console_);
+    console_.line(fmt::format("  Model: {}", better_path_.string()));
+    page_.model_name = better_path_.string();
+    page_.before = std::exchange(page_.model, added.model);
+    page_.estimates = added.estimates;
+    page_.addition = added;
+    console_.line();
+  }
+
+  // And a motion that was never recorded: without compensation, with the base model, with the added effect.
+  void put_on_drive() {
     try {
-      answer["closed_loop"] = close_the_loop(folder, base_path, path, hidden, seed, console);
+      console_.line(console_.bold("5. Put it on the drive"));
+      FlashOptions flash;
+      flash.drive = "twin";
+      flash.model = better_path_;
+      flash.yes = true;
+      cli::flash(flash, console_);
+      console_.line();
+      console_.line(
+          console_.bold("6. A motion that was never recorded, in closed loop on the drive with its hidden effect"));
+      HilOptions loop;
+      loop.scenario = "slow-reversals";
+      loop.model = better_path_;
+      loop.base = base_path_;
+      loop.hide = hidden_ == "none" ? "" : hidden_;
+      loop.seed = seed_;
+      loop.report = options_.out / "closed-loop.html";
+      answer_["closed_loop"] = closed_loop::to_json(run_closed_loop(loop, console_));
     } catch (const std::runtime_error& error) {
-      console.warn(fmt::format("the model cannot be put on the drive: {}", error.what()));
+      console_.warn(fmt::format("the model cannot be put on the drive: {}", error.what()));
     }
   }
-  const std::filesystem::path report = folder / "report.html";
-  console.progress("writing the report");
-  report::write(report, page);
-  answer["report"] = report.string();
-  console.line();
-  console.line(console.bold(found.named.empty() ? "4. What the twin had hidden" : "7. What the twin had hidden"));
-  if (hidden == "none")
-    console.line(
-        fmt::format("  Nothing. {}", right ? console.good("Right.") : console.bad("The name above is a false alarm.")));
-  else
-    console.line(fmt::format("  {} (seed {}): {}. All true values: {}", hidden, seed,
-                             right ? console.good("named right") : console.bad("named wrong"),
-                             (recording / "truth.toml").string()));
-  console.line();
-  console.line(fmt::format("All of this with plots: {}, for a browser. With the mouse:", report.string()));
-  console.line(fmt::format("  flexspline workbench --model {} {} --drive twin", quoted(base_path.string()),
-                           quoted(recording.string())));
-  output::save_json(options.json, answer);
+
+  void write_report() {
+    console_.progress("writing the report");
+    report::write(report_, page_);
+    answer_["report"] = report_.string();
+    console_.line();
+  }
+
+  void reveal() {
+    console_.line(console_.bold(found_.named.empty() ? "4. What the twin had hidden" : "7. What the twin had hidden"));
+    if (hidden_ == "none")
+      console_.line(fmt::format(
+          "  Nothing. {}", named_right_ ? console_.good("Right.") : console_.bad("The name above is a false alarm.")));
+    else
+      console_.line(fmt::format("  {} (seed {}): {}. All true values: {}", hidden_, seed_,
+                                named_right_ ? console_.good("named right") : console_.bad("named wrong"),
+                                (recording_ / "truth.toml").string()));
+    console_.line();
+    console_.line(fmt::format("All of this with plots: {}, for a browser. With the mouse:", report_.string()));
+    console_.line(fmt::format("  flexspline workbench --model {} {} --drive twin", quoted(base_path_.string()),
+                              quoted(recording_.string())));
+  }
+
+  // Facts of the drive that only the data set has are not written into model files.
+  model::Model with_stated_drive(model::Model model) const {
+    model.drive = stated_drive_;
+    return model;
+  }
+
+  const DemoOptions& options_;
+  Console& console_;
+  const std::uint64_t seed_;
+  const std::string hidden_;
+  const std::filesystem::path recording_ = options_.out / "recording";
+  const std::filesystem::path base_path_ = options_.out / "model.toml";
+  const std::filesystem::path better_path_ = options_.out / "model-with-effect.toml";
+  const std::filesystem::path report_ = options_.out / "report.html";
+
+  data::Dataset dataset_;
+  model::Drive stated_drive_;
+  std::string base_text_;
+  std::unique_ptr<estimation::Identification> base_;
+  selection::Diagnosis found_;
+  bool named_right_ = false;
+  report::Subject page_;
+  json answer_;
+};
+
+int run(const DemoOptions& options, Console& console) {
+  Demo(options, console).run();
   return kDone;
 }
 

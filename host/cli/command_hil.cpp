@@ -15,6 +15,7 @@
 #include "host/closed_loop/compare.hpp"
 #include "host/output/json.hpp"
 #include "host/output/text.hpp"
+#include "host/system/temporary_folder.hpp"
 
 namespace flexspline::cli {
 namespace {
@@ -137,7 +138,7 @@ closed_loop::Comparison run_closed_loop(const HilOptions& options, Console& cons
   job.tick_hz = options.tick_hz;
   job.processor = options.processor.string();
   job.keeps_trace = !options.report.empty() || !options.picture.empty();
-  const ScratchFolder sheet;
+  const system::TemporaryFolder sheet;
   fetch_data_sheet(job, sheet.path());
   setup.models = models_of(options, sheet.path());
   const std::filesystem::path settings = options.settings.empty() ? sheet.path() / "settings.toml" : options.settings;

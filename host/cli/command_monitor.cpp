@@ -121,71 +121,107 @@ class Screen {
   int lines_ = 0;
 };
 
-int run(const MonitorOptions& options, Console& console) {
-  if (options.residual_map) return run_residual_map(options, console);
-  const std::vector<Channel> channels = channels_of(options.channels);
-  drive::Session session = open_drive(options.drive);
-  const drive::Scales scales = drive::scales_of(session);
-  const double tick_hz = session.identity().tick_hz;
-  const auto every = static_cast<std::uint16_t>(std::clamp(std::round(tick_hz / options.rate_hz), 1.0, 65535.0));
-  std::vector<Channel> subscribed{Channel::state};
-  for (const Channel c : channels) subscribed.push_back(c);
-  const bool is_terminal = isatty(STDOUT_FILENO) != 0 && options.json != "-";
-  console.line(named(session));
-  if (!is_terminal) {
+// Frames of the drive, shown as they come.
+class Monitor {
+ public:
+  Monitor(drive::Session& session, const MonitorOptions& options, Console& console)
+      : session_(session),
+        options_(options),
+        console_(console),
+        channels_(channels_of(options.channels)),
+        scales_(drive::scales_of(session)),
+        tick_hz_(session.identity().tick_hz),
+        every_(static_cast<std::uint16_t>(std::clamp(std::round(tick_hz_ / options.rate_hz), 1.0, 65535.0))),
+        is_terminal_(isatty(STDOUT_FILENO) != 0 && options.json != "-"),
+        screen_(channels_, console) {}
+
+  void run() {
+    if (!is_terminal_) print_head();
+    const Interruptible interruptible;
+    std::vector<Channel> subscribed{Channel::state};
+    for (const Channel c : channels_) subscribed.push_back(c);
+    session_.subscribe(subscribed, every_);
+    const auto begin = Clock::now();
+    auto heard_at = begin;
+    while (!Interruptible::interrupted()) {
+      const auto now = Clock::now();
+      if (options_.seconds > 0.0 && std::chrono::duration<double>(now - begin).count() >= options_.seconds) break;
+      const auto m = session_.next(transport::Milliseconds(20));
+      if (m) heard_at = now;
+      if (m && m->is_unasked())
+        protocol::for_each_frame(*m, [this](const auto& head, auto i, auto words) { take(head, i, words); });
+      if (now - heard_at > std::chrono::seconds(3))
+        session_.fail("the drive went silent; check cable and power, then try again");
+    }
+    session_.subscribe({}, 1);
+    if (lost_ > 0) console_.warn(fmt::format("{} frames were lost", lost_));
+  }
+
+  json answer() const {
+    json names = json::array();
+    for (const Channel c : channels_)
+      names.push_back({{"name", protocol::text_of(c).name}, {"unit", protocol::text_of(c).unit}});
+    return {{"format", "flexspline-monitor/1"},
+            {"drive", {{"serial", session_.serial()}, {"board", session_.board()}}},
+            {"channels", names},
+            {"frames_lost", lost_},
+            {"samples", samples_}};
+  }
+
+ private:
+  void print_head() {
     std::string head = "time_s,mode,fault";
-    for (const Channel c : channels)
+    for (const Channel c : channels_)
       head += fmt::format(",{}{}", protocol::text_of(c).name,
                           protocol::text_of(c).unit.empty() ? "" : fmt::format(" [{}]", protocol::text_of(c).unit));
-    console.line(head);
+    console_.line(head);
   }
-  const Interruptible interruptible;
-  session.subscribe(subscribed, every);
-  Screen screen(channels, console);
-  json samples = json::array();
-  std::uint32_t first_tick = 0, next = 0, lost = 0;
-  bool any = false;
-  auto heard_at = Clock::now();
-  const auto take = [&](const protocol::FrameHead& head, std::uint32_t i, std::span<const std::uint32_t> words) {
-    if (words.size() != subscribed.size()) return;
-    const std::uint32_t tick = head.tick + i * every;
-    if (!any) first_tick = tick;
-    any = true;
-    lost += head.sequence + i - next;
-    next = head.sequence + i + 1;
-    Sample s{static_cast<double>(tick - first_tick) / tick_hz, words[0], {}};
-    for (std::size_t k = 0; k < channels.size(); ++k) s.values.push_back(scales.value(channels[k], words[k + 1]));
-    if (is_terminal) {
-      screen.show(s);
-    } else {
-      std::string line = fmt::format("{:.4f},{},{}", s.time_s, s.mode(), s.fault().name);
-      for (const double value : s.values) line += fmt::format(",{:.6g}", value);
-      console.line(line);
-    }
-    if (!options.json.empty())
-      samples.push_back(
+
+  void take(const protocol::FrameHead& head, std::uint32_t i, std::span<const std::uint32_t> words) {
+    if (words.size() != channels_.size() + 1) return;
+    const std::uint32_t tick = head.tick + i * every_;
+    if (!first_tick_) first_tick_ = tick;
+    lost_ += head.sequence + i - next_;
+    next_ = head.sequence + i + 1;
+    Sample s{static_cast<double>(tick - *first_tick_) / tick_hz_, words[0], {}};
+    for (std::size_t k = 0; k < channels_.size(); ++k) s.values.push_back(scales_.value(channels_[k], words[k + 1]));
+    if (is_terminal_)
+      screen_.show(s);
+    else
+      print_line(s);
+    if (!options_.json.empty())
+      samples_.push_back(
           {{"time_s", s.time_s}, {"mode", s.mode()}, {"fault", s.fault().name}, {"values", std::move(s.values)}});
-  };
-  const auto begin = Clock::now();
-  while (!Interruptible::interrupted()) {
-    const auto now = Clock::now();
-    if (options.seconds > 0.0 && std::chrono::duration<double>(now - begin).count() >= options.seconds) break;
-    const auto m = session.next(transport::Milliseconds(20));
-    if (m) heard_at = now;
-    if (m && m->is_unasked()) protocol::for_each_frame(*m, take);
-    if (now - heard_at > std::chrono::seconds(3))
-      session.fail("the drive went silent; check cable and power, then try again");
   }
-  session.subscribe({}, 1);
-  if (lost > 0) console.warn(fmt::format("{} frames were lost", lost));
-  json names = json::array();
-  for (const Channel c : channels)
-    names.push_back({{"name", protocol::text_of(c).name}, {"unit", protocol::text_of(c).unit}});
-  output::save_json(options.json, {{"format", "flexspline-monitor/1"},
-                                   {"drive", {{"serial", session.serial()}, {"board", session.board()}}},
-                                   {"channels", names},
-                                   {"frames_lost", lost},
-                                   {"samples", samples}});
+
+  void print_line(const Sample& s) {
+    std::string line = fmt::format("{:.4f},{},{}", s.time_s, s.mode(), s.fault().name);
+    for (const double value : s.values) line += fmt::format(",{:.6g}", value);
+    console_.line(line);
+  }
+
+  drive::Session& session_;
+  const MonitorOptions& options_;
+  Console& console_;
+  const std::vector<Channel> channels_;
+  const drive::Scales scales_;
+  const double tick_hz_;
+  const std::uint16_t every_;
+  const bool is_terminal_;
+  Screen screen_;
+  std::optional<std::uint32_t> first_tick_;
+  std::uint32_t next_ = 0, lost_ = 0;
+  json samples_ = json::array();
+};
+
+int run(const MonitorOptions& options, Console& console) {
+  if (options.residual_map) return run_residual_map(options, console);
+  channels_of(options.channels);  // a wrong name is reported before a drive is opened
+  drive::Session session = open_drive(options.drive);
+  Monitor monitor(session, options, console);
+  console.line(named(session));
+  monitor.run();
+  output::save_json(options.json, monitor.answer());
   return kDone;
 }
 

@@ -5,17 +5,26 @@
 
 #include "host/cli/command.hpp"
 #include "host/cli/common_options.hpp"
-#include "host/cli/first_project.hpp"
-#include "host/cli/new_options.hpp"
 #include "host/cli/unfinished_project.hpp"
 #include "host/output/json.hpp"
 #include "host/output/text.hpp"
+#include "host/project/first_project.hpp"
 
 namespace flexspline::cli {
 namespace {
 
 namespace fs = std::filesystem;
 using nlohmann::json;
+using project::BaseModel;
+using project::ColumnGuess;
+using project::Draft;
+using project::FirstProject;
+
+struct NewOptions {
+  project::Request request;
+  bool force = false;
+  std::string json;
+};
 
 json json_of(const NewOptions& options, const Draft& draft, const BaseModel& base) {
   json columns = json::array();
@@ -27,8 +36,8 @@ json json_of(const NewOptions& options, const Draft& draft, const BaseModel& bas
   json effects = json::array();
   for (const model::Effect& effect : base.model.effects) effects.push_back(effect.type);
   return {{"format", "flexspline-new/1"},
-          {"dataset", (options.out / "dataset.toml").string()},
-          {"model", (options.out / "base-model.toml").string()},
+          {"dataset", (options.request.out / "dataset.toml").string()},
+          {"model", (options.request.out / "base-model.toml").string()},
           {"columns", std::move(columns)},
           {"unused_columns", draft.unused},
           {"experiments", draft.toml.experiments.size()},
@@ -37,30 +46,30 @@ json json_of(const NewOptions& options, const Draft& draft, const BaseModel& bas
 }
 
 int run(const NewOptions& options, Console& console) {
-  const fs::path dataset_file = options.out / "dataset.toml";
-  const fs::path model_file = options.out / "base-model.toml";
+  const fs::path dataset_file = options.request.out / "dataset.toml";
+  const fs::path model_file = options.request.out / "base-model.toml";
   for (const fs::path& file : {dataset_file, model_file})
     if (!options.force && fs::exists(file) && !is_unfinished(file))
       throw UsageError(
           fmt::format("{} is there already; give another --out, or --force to write over it", file.string()));
 
   console.progress("reading the measurements");
-  Draft draft = draft_of(options);
+  Draft draft = draft_of(options.request);
   BaseModel base;
   try {
-    FirstProject project = first_project(draft, options);
+    FirstProject project = first_project(draft, options.request);
     for (const std::string& warning : project.warnings) console.warn(warning);
     base = std::move(project.base);
   } catch (const data::DataError& unusable) {
-    leave_unfinished(draft, options, unusable, console);
+    leave_unfinished(draft, options.request, unusable, console);
     return kUnusable;
-  } catch (const UsageError& open) {
-    leave_unfinished(draft, options, open, console);
+  } catch (const project::RequestError& open) {
+    leave_unfinished(draft, options.request, open, console);
     return kUnusable;
   }
 
-  make_folder(options.out);
-  const std::string toml = text_of(draft, options.out);
+  make_folder(options.request.out);
+  const std::string toml = text_of(draft, options.request.out);
   model::save(dataset_file, toml);
   model::save(model_file, text_of(base));
 
@@ -73,8 +82,8 @@ int run(const NewOptions& options, Console& console) {
   for (const std::string& reason : base.reasons) console.line(output::wrapped("- " + reason, 2, 2));
   console.line();
   console.line(fmt::format("{} and {} are written. Next:", dataset_file.string(), model_file.string()));
-  const std::string out = quoted(options.out.string());
-  const std::string fitted = quoted((options.out / "fitted.toml").string());
+  const std::string out = quoted(options.request.out.string());
+  const std::string fitted = quoted((options.request.out / "fitted.toml").string());
   console.line(fmt::format("  flexspline check {}", out));
   console.line(fmt::format("  flexspline identify {} --model {} --out {}", out, quoted(model_file.string()), fitted));
   console.line(fmt::format("  flexspline compare --model {} {}", fitted, out));
@@ -84,44 +93,47 @@ int run(const NewOptions& options, Console& console) {
 }
 
 void declare(Parser& parser, NewOptions& options) {
-  parser.option("--from", options.data.data, kDataHelp).required().value("DATA");
-  parser.option("--out", options.out, "folder for dataset.toml and base-model.toml").required().value("DIR");
-  parser.option("--map", options.map, "a column of ours is theirs, in this unit; may be repeated")
+  parser.option("--from", options.request.data, kDataHelp).required().value("DATA");
+  parser.option("--out", options.request.out, "folder for dataset.toml and base-model.toml").required().value("DIR");
+  parser.option("--map", options.request.map, "a column of ours is theirs, in this unit; may be repeated")
       .value("OURS=THEIRS[:UNIT]")
       .one_value_each_time();
   parser
-      .option("--without", options.without,
+      .option("--without", options.request.without,
               "a column of theirs that is not to be used, whatever its name says; may be repeated")
       .value("THEIRS")
       .one_value_each_time();
   parser
-      .option("--turn", options.turned,
+      .option("--turn", options.request.turned,
               "a column of ours whose sign is the other one, as current_a where a positive current decelerates; may "
               "be repeated")
       .value("OURS")
       .one_value_each_time();
-  parser.option("--axis", options.axis, "rotary, or linear (m, m/s, N)").one_of({"rotary", "linear"}).value("");
-  parser.option("--gear-ratio", options.gear_ratio, "motor turns per output turn").positive().value("N");
+  parser.option("--axis", options.request.axis, "rotary, or linear (m, m/s, N)").one_of({"rotary", "linear"}).value("");
+  parser.option("--gear-ratio", options.request.gear_ratio, "motor turns per output turn").positive().value("N");
   parser
-      .option("--position-side", options.position_side,
+      .option("--position-side", options.request.position_side,
               "where the only position and velocity are measured: link or motor. Of the link, with --gear-ratio N, "
               "the motor's are N times those, as most robots log them together with the motor's current")
       .one_of({"link", "motor"})
       .value("");
-  parser.option("--joint", options.joint, "of a file with several joints, by the number in the names")
+  parser.option("--joint", options.request.joint, "of a file with several joints, by the number in the names")
       .not_negative()
       .value("K");
-  parser.option("--torque-constant", options.torque_constant_nm_a, "motor torque per ampere, N*m/A")
+  parser.option("--torque-constant", options.request.torque_constant_nm_a, "motor torque per ampere, N*m/A")
       .positive()
       .value("KM");
-  parser.option("--encoder-counts", options.encoder_counts, "counts per motor turn (per metre on a linear axis)")
+  parser
+      .option("--encoder-counts", options.request.encoder_counts, "counts per motor turn (per metre on a linear axis)")
       .positive()
       .value("COUNTS");
-  parser.option("--pole-pairs", options.pole_pairs, "of the motor, where the log has its speed in electrical turns")
+  parser
+      .option("--pole-pairs", options.request.pole_pairs,
+              "of the motor, where the log has its speed in electrical turns")
       .within(1, 1000)
       .value("P");
   parser.flag("--force", options.force, "write over a dataset.toml and base-model.toml that are there");
-  take_tolerate(parser, options.data);
+  take_tolerate(parser, options.request.tolerate);
 }
 
 }  // namespace

@@ -103,7 +103,7 @@ int run(const PlanOptions& options, Console& console) {
 
 void declare(Parser& parser, PlanOptions& options) {
   parser.option("DATA", options.data.data, fmt::format("what there is already: {}", kDataHelp)).value("");
-  take_tolerate(parser, options.data);
+  take_tolerate(parser, options.data.tolerate);
   take_model(parser, options.model);
   parser.option("--out", options.out, "the plan").required().value("PLAN");
   parser.option("--separate", options.separate, "two effects to distinguish (default: what is not well known)")

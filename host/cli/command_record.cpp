@@ -126,8 +126,7 @@ planning::Plan report_plan_of(const RecordOptions& options, planning::FullScale 
       fmt::format("there is no file {} and no such plan of the report; there are {}", options.plan.string(), known));
 }
 
-int run(const RecordOptions& options, Console& console) {
-  const bool is_report = options.plan.string().starts_with("report-") && !fs::exists(options.plan);
+planning::Plan plan_of(const RecordOptions& options, bool is_report) {
   planning::Plan plan = is_report ? report_plan_of(options, {100.0, 1.0}) : planning::read(options.plan);
   if (!is_report && (options.full_velocity_rad_s || options.full_current_a))
     throw UsageError(
@@ -137,6 +136,60 @@ int run(const RecordOptions& options, Console& console) {
   if (!options.force && fs::exists(options.out) && !fs::is_empty(options.out))
     throw UsageError(options.out.string() + ": is there and not empty; give another folder, or --force");
   require_person(plan, options.yes);
+  return plan;
+}
+
+struct RecordedRuns {
+  std::vector<drive::Recording> all;
+  std::string ended;    // why there are no more: by the user, a limit or a fault
+  std::string failure;  // of the link or the drive
+};
+
+// One run after the other; each complete one is saved at once.
+RecordedRuns record_runs(drive::Recorder& recorder, const planning::Plan& plan, const drive::Scales& scales,
+                         const drive::Origin& origin, const RecordOptions& options, Console& console) {
+  RecordedRuns recorded;
+  for (std::size_t i = 0; i < plan.runs.size() && recorded.ended.empty(); ++i) {
+    const planning::Run& run = plan.runs[i];
+    if (!prepared(run, options.yes)) {
+      recorded.ended = "interrupted";
+      break;
+    }
+    try {
+      drive::Recording r =
+          recorder.record(run, {Interruptible::interrupted, [&](double time_s) {
+                                  console.progress(fmt::format("run {} of {}, {}: {:.1f} of {:g} s", i + 1,
+                                                               plan.runs.size(), run.name, time_s, run.duration_s));
+                                }});
+      print(r, console);
+      recorded.ended = r.ended;
+      if (r.complete) model::save(options.out / (run.name + ".csv"), drive::csv_of(r, scales, origin));
+      recorded.all.push_back(std::move(r));
+    } catch (const std::exception& error) {
+      // What was finished is worth keeping.
+      recorded.failure = error.what();
+      break;
+    }
+  }
+  return recorded;
+}
+
+void save_answer(const RecordedRuns& recorded, const drive::Origin& origin, const std::string& file) {
+  json runs = json::array();
+  for (const drive::Recording& r : recorded.all) runs.push_back(json_of(r));
+  output::save_json(file,
+                    {{"format", "flexspline-record/1"},
+                     {"drive", {{"serial", origin.serial}, {"board", origin.board}, {"firmware", origin.firmware}}},
+                     {"block_sha256", origin.block_sha256},
+                     {"ended", !recorded.failure.empty() ? json(recorded.failure)
+                               : recorded.ended.empty()  ? json()
+                                                         : json(recorded.ended)},
+                     {"runs", runs}});
+}
+
+int run(const RecordOptions& options, Console& console) {
+  const bool is_report = options.plan.string().starts_with("report-") && !fs::exists(options.plan);
+  planning::Plan plan = plan_of(options, is_report);
   drive::Session session = open_drive(options.drive);
   const drive::Bytes block = session.read_block(protocol::Which::active);
   const drive::Scales scales = drive::scales_of(session);
@@ -152,46 +205,15 @@ int run(const RecordOptions& options, Console& console) {
   if (options.clear_fault) recorder.clear_fault();
   console.line(named(session));
   const Interruptible interruptible;
-  std::vector<drive::Recording> all;
-  std::string ended, failure;
-  for (std::size_t i = 0; i < plan.runs.size() && ended.empty(); ++i) {
-    const planning::Run& run = plan.runs[i];
-    if (!prepared(run, options.yes)) {
-      ended = "interrupted";
-      break;
-    }
-    try {
-      drive::Recording r =
-          recorder.record(run, {Interruptible::interrupted, [&](double time_s) {
-                                  console.progress(fmt::format("run {} of {}, {}: {:.1f} of {:g} s", i + 1,
-                                                               plan.runs.size(), run.name, time_s, run.duration_s));
-                                }});
-      print(r, console);
-      ended = r.ended;
-      if (r.complete) model::save(options.out / (run.name + ".csv"), drive::csv_of(r, scales, origin));
-      all.push_back(std::move(r));
-    } catch (const std::exception& error) {
-      // What was finished is worth keeping.
-      failure = error.what();
-      break;
-    }
-  }
-  const auto complete = std::count_if(all.begin(), all.end(), [](const auto& r) { return r.complete; });
-  if (complete > 0) model::save(options.out / "dataset.toml", drive::dataset_toml_of(all, scales, origin));
-  json runs = json::array();
-  for (const drive::Recording& r : all) runs.push_back(json_of(r));
-  output::save_json(options.json,
-                    {{"format", "flexspline-record/1"},
-                     {"drive", {{"serial", origin.serial}, {"board", origin.board}, {"firmware", origin.firmware}}},
-                     {"block_sha256", origin.block_sha256},
-                     {"ended", !failure.empty() ? json(failure)
-                               : ended.empty()  ? json()
-                                                : json(ended)},
-                     {"runs", runs}});
+  const RecordedRuns recorded = record_runs(recorder, plan, scales, origin, options, console);
+  const auto complete =
+      std::count_if(recorded.all.begin(), recorded.all.end(), [](const auto& r) { return r.complete; });
+  if (complete > 0) model::save(options.out / "dataset.toml", drive::dataset_toml_of(recorded.all, scales, origin));
+  save_answer(recorded, origin, options.json);
   const std::string kept = fmt::format("{} of {} runs are in {}", complete, plan.runs.size(), options.out.string());
-  if (!failure.empty()) throw drive::DriveError(fmt::format("{} ({})", failure, kept));
-  if (!ended.empty()) {
-    console.error(fmt::format("{}; the drive is at rest; {}", ended, kept));
+  if (!recorded.failure.empty()) throw drive::DriveError(fmt::format("{} ({})", recorded.failure, kept));
+  if (!recorded.ended.empty()) {
+    console.error(fmt::format("{}; the drive is at rest; {}", recorded.ended, kept));
     return kNotMet;
   }
   console.line(kept);

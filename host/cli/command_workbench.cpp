@@ -15,6 +15,7 @@
 #include "host/cli/twin_runs.hpp"
 #include "host/cli/workbench_project.hpp"
 #include "host/output/json.hpp"
+#include "host/system/temporary_folder.hpp"
 #include "host/workbench/server.hpp"
 #include "host/workbench/work.hpp"
 
@@ -55,7 +56,7 @@ workbench::SimulatedPlant plant_setup_of(const WorkbenchOptions& options, const 
   if (options.plant.empty()) return workbench::plant_of_recordings(options.data.data, dataset);
   closed_loop::Job job;
   job.plant_file = options.plant.string();
-  const ScratchFolder sheet;
+  const system::TemporaryFolder sheet;
   fetch_data_sheet(job, sheet.path());
   std::ifstream in(sheet.path() / "settings.toml", std::ios::binary);
   workbench::SimulatedPlant plant_setup;
@@ -127,7 +128,7 @@ int run(const WorkbenchOptions& options, Console& console) {
 
 void declare(Parser& parser, WorkbenchOptions& options) {
   parser.option("DATA", options.data.data, kDataHelp).value("");
-  take_tolerate(parser, options.data);
+  take_tolerate(parser, options.data.tolerate);
   parser.option("--model", options.model, "model file (default: a first one, from what is chosen on the page)")
       .value("MODEL");
   parser.option("--drive", options.drive, fmt::format("{} (default: choose on the page)", transport::kDriveHelp))

@@ -9,13 +9,11 @@ namespace flexspline::cli {
 
 void take_data(Parser& parser, DataInputs& inputs) {
   parser.option("DATA", inputs.data, kDataHelp).required().value("");
-  take_tolerate(parser, inputs);
+  take_tolerate(parser, inputs.tolerate);
 }
 
-void take_tolerate(Parser& parser, DataInputs& inputs) {
-  parser
-      .option("--tolerate", inputs.tolerate,
-              fmt::format("treat a finding as a warning; kinds: {}", data::tolerable_kinds()))
+void take_tolerate(Parser& parser, std::vector<std::string>& kinds) {
+  parser.option("--tolerate", kinds, fmt::format("treat a finding as a warning; kinds: {}", data::tolerable_kinds()))
       .value("KIND")
       .comma_separated()
       .one_value_each_time();

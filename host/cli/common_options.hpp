@@ -14,7 +14,7 @@ inline constexpr const char* kDataHelp =
 
 // DATA and --tolerate.
 void take_data(Parser& parser, DataInputs& inputs);
-void take_tolerate(Parser& parser, DataInputs& inputs);
+void take_tolerate(Parser& parser, std::vector<std::string>& kinds);
 void take_holdout(Parser& parser, DataInputs& inputs);
 void take_model(Parser& parser, std::filesystem::path& model);
 void take_pipeline(Parser& parser, PipelineInputs& pipeline);

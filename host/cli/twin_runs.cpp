@@ -2,19 +2,14 @@
 
 #include <fmt/format.h>
 
-#include <algorithm>
-#include <atomic>
-#include <cstdlib>
-#include <cstring>
-#include <exception>
 #include <fstream>
 #include <iterator>
-#include <mutex>
 #include <nlohmann/json.hpp>
 #include <stdexcept>
-#include <thread>
 
 #include "host/cli/twin_process.hpp"
+#include "host/estimation/in_parallel.hpp"
+#include "host/system/temporary_folder.hpp"
 
 namespace flexspline::cli {
 namespace {
@@ -61,41 +56,12 @@ Outcome run_one(const Job& job, const fs::path& stem) {
 
 }  // namespace
 
-ScratchFolder::ScratchFolder() {
-  std::string name = (fs::temp_directory_path() / "flexspline-hil-XXXXXX").string();
-  if (mkdtemp(name.data()) == nullptr)
-    throw std::runtime_error(fmt::format("{}could not be created: {}", name, std::strerror(errno)));
-  path_ = name;
-}
-ScratchFolder::~ScratchFolder() {
-  std::error_code ignored;
-  fs::remove_all(path_, ignored);
-}
-
 closed_loop::Runner twin_runner() {
   return [](const std::vector<Job>& jobs) {
-    const ScratchFolder folder;
+    const system::TemporaryFolder folder;
     std::vector<Outcome> outcomes(jobs.size());
-    std::atomic<std::size_t> next{0};
-    std::exception_ptr failure;
-    std::mutex guard;
-    const auto work = [&] {
-      for (std::size_t i = next++; i < jobs.size(); i = next++) {
-        try {
-          outcomes[i] = run_one(jobs[i], folder.path() / std::to_string(i));
-        } catch (...) {
-          const std::lock_guard lock(guard);
-          if (!failure) failure = std::current_exception();
-          next = jobs.size();
-        }
-      }
-    };
-    {
-      std::vector<std::jthread> others;
-      for (unsigned t = 1; t < std::max(1U, std::thread::hardware_concurrency()); ++t) others.emplace_back(work);
-      work();
-    }
-    if (failure) std::rethrow_exception(failure);
+    estimation::in_parallel(jobs.size(),
+                            [&](std::size_t i) { outcomes[i] = run_one(jobs[i], folder.path() / std::to_string(i)); });
     return outcomes;
   };
 }

@@ -8,19 +8,6 @@
 
 namespace flexspline::cli {
 
-// A folder of its own for as long as it lives.
-class ScratchFolder {
- public:
-  ScratchFolder();
-  ~ScratchFolder();
-  ScratchFolder(const ScratchFolder&) = delete;
-  ScratchFolder& operator=(const ScratchFolder&) = delete;
-  const std::filesystem::path& path() const { return path_; }
-
- private:
-  std::filesystem::path path_;
-};
-
 closed_loop::Runner twin_runner();
 // The manufacturer's data of the drive of a job, written into `folder` by the twin (settings.toml, known-model.toml
 // and, with a hidden effect, whole-model.toml).

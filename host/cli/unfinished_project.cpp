@@ -37,24 +37,24 @@ std::string number_argument(const std::string& name, const std::optional<double>
 }
 
 // What was given, to be typed again.
-std::string as_given(const NewOptions& options) {
+std::string as_given(const project::Request& request) {
   std::string line =
-      fmt::format("flexspline new --from {} --out {}", as_arguments(options.data.data), quoted(options.out.string()));
-  for (const std::string& map : options.map) line += as_argument("--map", map);
-  for (const std::string& name : options.without) line += as_argument("--without", name);
-  for (const std::string& name : options.turned) line += as_argument("--turn", name);
-  line += as_argument("--axis", options.axis) + as_argument("--position-side", options.position_side);
-  if (options.joint) line += fmt::format(" --joint {}", *options.joint);
-  if (options.pole_pairs) line += fmt::format(" --pole-pairs {}", *options.pole_pairs);
-  line += number_argument("--gear-ratio", options.gear_ratio);
-  line += number_argument("--torque-constant", options.torque_constant_nm_a);
-  line += number_argument("--encoder-counts", options.encoder_counts);
-  for (const std::string& kind : options.data.tolerate) line += as_argument("--tolerate", kind);
+      fmt::format("flexspline new --from {} --out {}", as_arguments(request.data), quoted(request.out.string()));
+  for (const std::string& map : request.map) line += as_argument("--map", map);
+  for (const std::string& name : request.without) line += as_argument("--without", name);
+  for (const std::string& name : request.turned) line += as_argument("--turn", name);
+  line += as_argument("--axis", request.axis) + as_argument("--position-side", request.position_side);
+  if (request.joint) line += fmt::format(" --joint {}", *request.joint);
+  if (request.pole_pairs) line += fmt::format(" --pole-pairs {}", *request.pole_pairs);
+  line += number_argument("--gear-ratio", request.gear_ratio);
+  line += number_argument("--torque-constant", request.torque_constant_nm_a);
+  line += number_argument("--encoder-counts", request.encoder_counts);
+  for (const std::string& kind : request.tolerate) line += as_argument("--tolerate", kind);
   return line;
 }
 
 // A --map for each signal that a motor balance needs and that was not found.
-std::string missing_maps(const Draft& draft) {
+std::string missing_maps(const project::Draft& draft) {
   const auto there = [&](std::initializer_list<const char*> any) {
     return std::any_of(any.begin(), any.end(), [&](const char* name) {
       return std::find(draft.there.begin(), draft.there.end(), name) != draft.there.end();
@@ -99,16 +99,17 @@ bool is_unfinished(const fs::path& dataset_toml) {
   return std::getline(file, first) && first.ends_with(kMark);
 }
 
-void leave_unfinished(const Draft& draft, const NewOptions& options, const std::exception& why, Console& console) {
-  const fs::path file = options.out / "dataset.toml";
-  make_folder(options.out);
-  std::string text = text_of(draft, options.out);
+void leave_unfinished(const project::Draft& draft, const project::Request& request, const std::exception& why,
+                      Console& console) {
+  const fs::path file = request.out / "dataset.toml";
+  make_folder(request.out);
+  std::string text = project::text_of(draft, request.out);
   text.insert(text.find('\n'), kMark);
   model::save(file, text);
   const std::vector<data::Finding> errors = errors_of(why);
   for (const data::Finding& error : errors) console.error(error.text());
   if (errors.empty()) console.error(why.what());
-  std::string line = as_given(options) + missing_maps(draft) + tolerations(errors);
+  std::string line = as_given(request) + missing_maps(draft) + tolerations(errors);
   if (!draft.open_question.empty()) line += " --position-side link";
   console.error(
       fmt::format("{} holds what could be found; replace NAME, or a wrong name, by the right one "

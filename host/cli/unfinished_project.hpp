@@ -5,7 +5,8 @@
 #include <filesystem>
 #include <string>
 
-#include "host/cli/project_draft.hpp"
+#include "host/cli/inputs.hpp"
+#include "host/project/draft.hpp"
 
 namespace flexspline::cli {
 
@@ -13,6 +14,7 @@ namespace flexspline::cli {
 bool is_unfinished(const std::filesystem::path& dataset_toml);
 
 // Writes the draft as OUT/dataset.toml, in which the lines of `why`'s findings are right, and reports what is missing.
-void leave_unfinished(const Draft& draft, const NewOptions& options, const std::exception& why, Console& console);
+void leave_unfinished(const project::Draft& draft, const project::Request& request, const std::exception& why,
+                      Console& console);
 
 }  // namespace flexspline::cli

@@ -8,10 +8,11 @@
 #include <nlohmann/json.hpp>
 #include <set>
 
-#include "host/cli/first_project.hpp"
+#include "host/cli/inputs.hpp"
 #include "host/data/recording.hpp"
 #include "host/data/units.hpp"
 #include "host/output/json.hpp"
+#include "host/project/first_project.hpp"
 #include "host/text/nearest.hpp"
 
 namespace flexspline::cli {
@@ -20,28 +21,33 @@ namespace {
 namespace fs = std::filesystem;
 using data::Column;
 using nlohmann::json;
+using project::ColumnGuess;
+using project::Draft;
+using project::FirstProject;
+using project::Request;
+using project::Side;
 
 // Signals of a file that are drawn; a logger of a robot writes hundreds.
 constexpr std::size_t kMostDrawn = 120;
 // Each gives its least and its largest value.
 constexpr std::size_t kBuckets = 120;
 
-NewOptions options_of(const std::vector<fs::path>& files, const workbench::Choices& choices, const fs::path& out) {
-  NewOptions options;
-  options.data.data = files;
-  options.data.tolerate = choices.tolerate;
-  options.out = out;
-  options.map = choices.map;
-  options.without = choices.without;
-  options.turned = choices.turned;
-  options.axis = choices.axis;
-  options.position_side = choices.position_side;
-  options.joint = choices.joint;
-  options.pole_pairs = choices.pole_pairs;
-  options.gear_ratio = choices.gear_ratio;
-  options.torque_constant_nm_a = choices.torque_constant_nm_a;
-  options.encoder_counts = choices.encoder_counts;
-  return options;
+Request request_of(const std::vector<fs::path>& files, const workbench::Choices& choices, const fs::path& out) {
+  Request request;
+  request.data = files;
+  request.tolerate = choices.tolerate;
+  request.out = out;
+  request.map = choices.map;
+  request.without = choices.without;
+  request.turned = choices.turned;
+  request.axis = choices.axis;
+  request.position_side = choices.position_side;
+  request.joint = choices.joint;
+  request.pole_pairs = choices.pole_pairs;
+  request.gear_ratio = choices.gear_ratio;
+  request.torque_constant_nm_a = choices.torque_constant_nm_a;
+  request.encoder_counts = choices.encoder_counts;
+  return request;
 }
 
 // Five digits are more than a picture shows.
@@ -159,12 +165,12 @@ json number_of(const data::KeyMap& keys, const char* key) {
 }
 
 // How the draft fares with the values in the files: the first model, or what is in its way.
-json outlook(Draft& draft, const NewOptions& options) {
+json outlook(Draft& draft, const Request& request) {
   json answer = {{"can_begin", false},        {"why_not", ""},
                  {"findings", json::array()}, {"warnings", json::array()},
                  {"effects", json::array()},  {"reasons", json::array()}};
   try {
-    const FirstProject project = first_project(draft, options);
+    const FirstProject project = first_project(draft, request);
     answer["can_begin"] = true;
     answer["warnings"] = project.warnings;
     answer["reasons"] = project.base.reasons;
@@ -176,16 +182,16 @@ json outlook(Draft& draft, const NewOptions& options) {
     for (const data::Finding& f : unusable.findings())
       if (f.severity == data::Severity::error) answer["findings"].push_back(finding_json(f));
     answer["why_not"] = "the measurements cannot be used like this";
-  } catch (const UsageError& open) {
+  } catch (const project::RequestError& open) {
     answer["why_not"] = open.what();
   }
   return answer;
 }
 
 json propose(const std::vector<fs::path>& files, const workbench::Choices& choices) {
-  const NewOptions options = options_of(files, choices, "project");
-  Draft draft = draft_of(options);
-  json proposal = outlook(draft, options);
+  const Request request = request_of(files, choices, "project");
+  Draft draft = draft_of(request);
+  json proposal = outlook(draft, request);
   const auto axis = draft.toml.drive.find("axis");
   const bool linear = axis != draft.toml.drive.end() && axis->second.text == "linear";
   json names = json::array();
@@ -212,9 +218,9 @@ json propose(const std::vector<fs::path>& files, const workbench::Choices& choic
 
 workbench::Project make(const std::vector<fs::path>& files, const workbench::Choices& choices, const fs::path& folder,
                         const fs::path& home) {
-  const NewOptions options = options_of(files, choices, folder);
-  Draft draft = draft_of(options);
-  FirstProject first = first_project(draft, options);
+  const Request request = request_of(files, choices, folder);
+  Draft draft = draft_of(request);
+  FirstProject first = first_project(draft, request);
   first.base.model.name = files.front().stem().string();
   make_folder(folder);
   model::save(folder / "dataset.toml", text_of(draft, folder));

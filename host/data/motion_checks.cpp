@@ -203,81 +203,105 @@ void check_wrapped_positions(Experiment& experiment, Axis axis, Findings& findin
   }
 }
 
-void check_standstill(Experiment& experiment, Findings& findings) {
-  const std::optional<Column> column = motion_column(experiment);
-  if (!column) return;
-  const std::vector<double>& x = experiment[*column];
-  const bool is_position = *column == Column::motor_position || *column == Column::output_position;
-  const double noise = noise_of(x, experiment.segments);
-  double resolution = 0.0;  // of a position: its smallest step; an encoder at rest flickers by one
-  double largest = 0.0;
-  if (is_position)
-    for (const Segment& s : experiment.segments)
-      for (std::size_t k = s.first + 1; k < s.last; ++k) {
-        const double step = std::abs(x[k] - x[k - 1]);
-        if (step > 0.0 && (resolution == 0.0 || step < resolution)) resolution = step;
-      }
-  const std::size_t block = std::max<std::size_t>(10, samples_in(0.1, experiment));
-  for (const Segment& s : experiment.segments)
-    for (std::size_t k = s.first; k < s.last; k += block)
-      largest = std::max(largest, excursion(x, is_position, k, std::min(k + block, s.last)));
-  const double floor = std::max(8.0 * noise, 2.0 * resolution);
-  double whole = 0.0;
-  for (const Segment& s : experiment.segments) whole = std::max(whole, excursion(x, is_position, s.first, s.last));
-  const auto note_rest = [&](double share) {
-    findings.add(Severity::note, "standstill", experiment.file.string(), 0, std::string(column_name(*column)),
-                 fmt::format("\"{}\" is at rest for {:.0f} % of its samples; none is masked for that", experiment.name,
-                             100.0 * share),
-                 "it identifies offsets alone; record motion as well");
-  };
-  if (whole <= 2.0 * floor) {
-    note_rest(1.0);
-    return;
+namespace {
+
+// The smallest step of a position: an encoder at rest flickers by one.
+double smallest_step(const std::vector<double>& x, const std::vector<Segment>& segments) {
+  double resolution = 0.0;
+  for (const Segment& s : segments)
+    for (std::size_t k = s.first + 1; k < s.last; ++k) {
+      const double step = std::abs(x[k] - x[k - 1]);
+      if (step > 0.0 && (resolution == 0.0 || step < resolution)) resolution = step;
+    }
+  return resolution;
+}
+
+// Where a motion is looked for in a signal, and what counts as one.
+struct RestSearch {
+  const std::vector<double>& x;
+  bool is_position;
+  double noise;
+  double largest;  // excursion in a block
+  double still;
+  std::size_t block;
+
+  // A creeping motion is small in each block but not over the interval.
+  bool creeps(std::size_t first, std::size_t end) const {
+    if (is_position) return excursion(x, true, first, end) > 1.5 * still;
+    double mean = 0.0;
+    for (std::size_t i = first; i < end; ++i) mean += x[i] / static_cast<double>(end - first);
+    return std::abs(mean) > std::max(4.0 * noise / std::sqrt(static_cast<double>(end - first)), 1e-3 * largest);
   }
 
-  const double still = std::max(floor, 0.005 * largest);
-  const std::size_t long_interval = std::max<std::size_t>(5 * block, samples_in(1.0, experiment));
-  std::vector<Segment> intervals;
-  std::size_t total = 0;
-  std::size_t samples = 0;
-  for (const Segment& s : experiment.segments) {
-    samples += s.last - s.first;
+  void find(const Segment& s, std::size_t shortest, std::vector<Segment>& intervals) const {
     for (std::size_t k = s.first; k < s.last;) {
       std::size_t end = k;
       while (end < s.last && excursion(x, is_position, end, std::min(end + block, s.last)) <= still)
         end = std::min(end + block, s.last);
-      // A creeping motion is small in each block but not over the interval.
-      bool creeps = false;
-      if (end > k && is_position) creeps = excursion(x, true, k, end) > 1.5 * still;
-      if (end > k && !is_position) {
-        double mean = 0.0;
-        for (std::size_t i = k; i < end; ++i) mean += x[i] / static_cast<double>(end - k);
-        creeps = std::abs(mean) > std::max(4.0 * noise / std::sqrt(static_cast<double>(end - k)), 1e-3 * largest);
-      }
-      if (end - k >= long_interval && !creeps) {
-        intervals.push_back({k, end});
-        total += end - k;
-      }
+      if (end - k >= shortest && !creeps(k, end)) intervals.push_back({k, end});
       k = end > k ? end : std::min(k + block, s.last);
     }
   }
-  if (intervals.empty()) return;
-  const double share = static_cast<double>(total) / static_cast<double>(samples);
-  if (share > 0.95) {
-    note_rest(share);
-    return;
-  }
+};
+
+void note_rest(const Experiment& experiment, Column column, double share, Findings& findings) {
+  findings.add(Severity::note, "standstill", experiment.file.string(), 0, std::string(column_name(column)),
+               fmt::format("\"{}\" is at rest for {:.0f} % of its samples; none is masked for that", experiment.name,
+                           100.0 * share),
+               "it identifies offsets alone; record motion as well");
+}
+
+void mask_rest(Experiment& experiment, Column column, const std::vector<Segment>& intervals, double share,
+               Findings& findings) {
   const bool mask = experiment.load == Load::free;
   if (mask)
     for (const Segment& s : intervals)
       std::fill(experiment.masked.begin() + static_cast<std::ptrdiff_t>(s.first),
                 experiment.masked.begin() + static_cast<std::ptrdiff_t>(s.last), std::uint8_t{1});
   findings.add(mask ? Severity::warning : Severity::note, "standstill", experiment.file.string(), 0,
-               std::string(column_name(*column)),
+               std::string(column_name(column)),
                fmt::format("\"{}\" is at rest for {:.0f} % of its samples, first from {:.6g} s to {:.6g} s{}",
                            experiment.name, 100.0 * share, experiment.time_s[intervals.front().first],
                            experiment.time_s[intervals.front().last - 1], mask ? "; those samples are masked" : ""),
                "nothing needs doing if the rest moves enough");
+}
+
+}  // namespace
+
+void check_standstill(Experiment& experiment, Findings& findings) {
+  const std::optional<Column> column = motion_column(experiment);
+  if (!column) return;
+  const std::vector<double>& x = experiment[*column];
+  const bool is_position = *column == Column::motor_position || *column == Column::output_position;
+  const double noise = noise_of(x, experiment.segments);
+  const double resolution = is_position ? smallest_step(x, experiment.segments) : 0.0;
+  const std::size_t block = std::max<std::size_t>(10, samples_in(0.1, experiment));
+  double largest = 0.0, whole = 0.0;
+  for (const Segment& s : experiment.segments) {
+    for (std::size_t k = s.first; k < s.last; k += block)
+      largest = std::max(largest, excursion(x, is_position, k, std::min(k + block, s.last)));
+    whole = std::max(whole, excursion(x, is_position, s.first, s.last));
+  }
+  const double floor = std::max(8.0 * noise, 2.0 * resolution);
+  if (whole <= 2.0 * floor) {
+    note_rest(experiment, *column, 1.0, findings);
+    return;
+  }
+  const RestSearch search{x, is_position, noise, largest, std::max(floor, 0.005 * largest), block};
+  const std::size_t shortest = std::max<std::size_t>(5 * block, samples_in(1.0, experiment));
+  std::vector<Segment> intervals;
+  std::size_t samples = 0, at_rest = 0;
+  for (const Segment& s : experiment.segments) {
+    samples += s.last - s.first;
+    search.find(s, shortest, intervals);
+  }
+  if (intervals.empty()) return;
+  for (const Segment& s : intervals) at_rest += s.last - s.first;
+  const double share = static_cast<double>(at_rest) / static_cast<double>(samples);
+  if (share > 0.95)
+    note_rest(experiment, *column, share, findings);
+  else
+    mask_rest(experiment, *column, intervals, share, findings);
 }
 
 }  // namespace flexspline::data

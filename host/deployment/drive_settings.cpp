@@ -225,30 +225,40 @@ control::ExcitationSetup<double> excitation(Settings& s, const DriveConstants<do
   return e;
 }
 
-}  // namespace
+double in_units(double thousandths) {
+  return 1e-3 * thousandths;
+}
 
-control::DriveSetup<double> parse_drive_setup(const std::string& toml, const std::string& origin,
-                                              const model::Model& model, const DriveConstants<double>& d,
-                                              std::optional<double> encoder_counts, const control::Hardware& hardware) {
-  Settings s(toml, origin);
-  const auto stated = [](double thousandths) { return 1e-3 * thousandths; };
-  s.require_no("output_encoder", hardware.output_encoder == control::SensorKind::none);
-  s.require_no("torque_sensor", hardware.torque_sensor == control::SensorKind::none);
-  control::DriveSetup<double> setup;
-  setup.tick_hz = static_cast<std::uint32_t>(std::lround(1.0 / d.time_base));
+// What the other settings follow from.
+struct Basis {
+  double current = 0.0;
+  double torque = 0.0;
+  double velocity = 0.0;
+  double overspeed = 0.0;
+  double most_torque = 0.0;  // of torque and current limit
+  double inertia = 0.0;
+  double stiffness = 0.0;
+};
 
-  const double most_a = stated(hardware.most_current_ma);
-  const double current = s.positive(
-      "limits", "current_a", most_a > 0.0 ? std::min(d.current_base, most_a) : d.current_base, 2.0 * d.current_base);
-  if (most_a > 0.0 && current > 1.003 * most_a)
-    s.disagrees("limits", "current_a", current, "A", fmt::format("the drive's board gives at most {:g} A", most_a));
-  const double torque = s.positive("limits", "torque_nm", current * d.torque_constant, 2.0 * d.torque_base);
-  const double velocity = s.positive("limits", "velocity_rad_s", d.velocity_base, 2.0 * d.velocity_base);
-  const double overspeed = s.positive("limits", "overspeed_rad_s", 1.15 * velocity, 2.0 * d.velocity_base);
-  const double most_torque = std::min(torque, current * d.torque_constant);
-  const double inertia =
+Basis basis_of(Settings& s, const model::Model& model, const DriveConstants<double>& d,
+               const control::Hardware& hardware) {
+  Basis b;
+  const double most_a = in_units(hardware.most_current_ma);
+  b.current = s.positive("limits", "current_a", most_a > 0.0 ? std::min(d.current_base, most_a) : d.current_base,
+                         2.0 * d.current_base);
+  if (most_a > 0.0 && b.current > 1.003 * most_a)
+    s.disagrees("limits", "current_a", b.current, "A", fmt::format("the drive's board gives at most {:g} A", most_a));
+  b.torque = s.positive("limits", "torque_nm", b.current * d.torque_constant, 2.0 * d.torque_base);
+  b.velocity = s.positive("limits", "velocity_rad_s", d.velocity_base, 2.0 * d.velocity_base);
+  b.overspeed = s.positive("limits", "overspeed_rad_s", 1.15 * b.velocity, 2.0 * d.velocity_base);
+  b.most_torque = std::min(b.torque, b.current * d.torque_constant);
+  b.inertia =
       s.needed("motor", "inertia_kg_m2", parameter(model, "inertia", "inertia"), "the model has no value for inertia");
+  return b;
+}
 
+void take_encoders(Settings& s, control::DriveSetup<double>& setup, std::optional<double> encoder_counts,
+                   const std::string& origin) {
   const auto given_counts = s.count("motor_encoder", "counts", 0, 4, observers::EncoderAngle::kMostCounts);
   if (given_counts == 0 && !encoder_counts)
     throw PackError(
@@ -263,34 +273,38 @@ control::DriveSetup<double> parse_drive_setup(const std::string& toml, const std
     if (setup.output_counts == 0) throw PackError(fmt::format("{}: [output_encoder] needs counts", origin));
     setup.output_corner = kTurn * s.positive("output_encoder", "corner_hz", 50.0);
   }
+}
 
-  const double torsion_limit = 1.9 * d.torsion_base;
-  const double stiffness = s.positive("feedforward", "stiffness_nm_rad", largest_stiffness(model, d.torsion_base));
-  if (setup.output_counts == 0) {
-    const char* const why = "the output has no encoder, and without one its motion is estimated";
-    setup.torsion = {
-        .inertia = inertia,
-        .output_inertia = s.needed("load", "inertia_kg_m2", parameter(model, "output_inertia", "inertia"), why),
-        .stiffness = s.needed("load", "stiffness_nm_rad", stiffness, why),
-        .torque_noise = s.positive("load", "torque_noise_nm", 0.05 * most_torque),
-        .load_walk = s.positive("load", "walk_nm_sqrt_s", 0.025 * d.output_torque_base),
-        .velocity_noise = s.positive("load", "velocity_noise_rad_s", 1.5e-3 * d.velocity_base)};
-  }
+void take_torsion_estimate(Settings& s, control::DriveSetup<double>& setup, const Basis& b, const model::Model& model,
+                           const DriveConstants<double>& d) {
+  const char* const why = "the output has no encoder, and without one its motion is estimated";
+  setup.torsion = {
+      .inertia = b.inertia,
+      .output_inertia = s.needed("load", "inertia_kg_m2", parameter(model, "output_inertia", "inertia"), why),
+      .stiffness = s.needed("load", "stiffness_nm_rad", b.stiffness, why),
+      .torque_noise = s.positive("load", "torque_noise_nm", 0.05 * b.most_torque),
+      .load_walk = s.positive("load", "walk_nm_sqrt_s", 0.025 * d.output_torque_base),
+      .velocity_noise = s.positive("load", "velocity_noise_rad_s", 1.5e-3 * d.velocity_base)};
+}
 
+void take_loops(Settings& s, control::DriveSetup<double>& setup, const Basis& b) {
   const double loop_hz = s.positive("velocity_loop", "bandwidth_hz", 50.0);
-  const double velocity_gain = s.positive("velocity_loop", "gain_nm_s_rad", inertia * kTurn * loop_hz);
+  const double velocity_gain = s.positive("velocity_loop", "gain_nm_s_rad", b.inertia * kTurn * loop_hz);
   const double position_hz = s.positive("position_loop", "bandwidth_hz", 10.0);
   setup.loops = {.position_gain = kTurn * position_hz,
                  .velocity_gain = velocity_gain,
                  .integral_gain =
                      s.number("velocity_loop", "integral_nm_rad", 0.0).value_or(velocity_gain * kTurn * loop_hz / 5.0),
-                 .velocity_limit = velocity,
-                 .overspeed = overspeed,
-                 .torque_limit = torque,
-                 .current_limit = current};
-  setup.trajectory.velocity_limit = velocity;
+                 .velocity_limit = b.velocity,
+                 .overspeed = b.overspeed,
+                 .torque_limit = b.torque,
+                 .current_limit = b.current};
+}
+
+void take_trajectory(Settings& s, control::DriveSetup<double>& setup, const Basis& b, const DriveConstants<double>& d) {
+  setup.trajectory.velocity_limit = b.velocity;
   setup.trajectory.acceleration_limit =
-      s.positive("limits", "acceleration_rad_s2", std::min(0.5 * most_torque / inertia, 1.9 * d.acceleration_base));
+      s.positive("limits", "acceleration_rad_s2", std::min(0.5 * b.most_torque / b.inertia, 1.9 * d.acceleration_base));
   const auto turns = [&](const char* key, std::int64_t otherwise) {
     const auto x = s.number("limits", key, -kMost, kMost);
     if (!x) return otherwise;
@@ -298,13 +312,16 @@ control::DriveSetup<double> parse_drive_setup(const std::string& toml, const std
   };
   setup.trajectory.lowest = turns("lowest_rad", setup.trajectory.lowest);
   setup.trajectory.highest = turns("highest_rad", setup.trajectory.highest);
+}
 
+void take_feedforward(Settings& s, control::DriveSetup<double>& setup, const Basis& b, const model::Model& model,
+                      const DriveConstants<double>& d) {
   setup.feedforward = {
       .direction_band = s.positive("feedforward", "direction_band_rad_s", 1e-4 * d.velocity_base),
       .torque_limit = 1.9 * d.torque_base,
       .load_limit = 1.9 * d.output_torque_base,
-      .stiffness = stiffness,
-      .torsion_limit = torsion_limit,
+      .stiffness = b.stiffness,
+      .torsion_limit = 1.9 * d.torsion_base,
       .torsion_rate_limit = s.positive("feedforward", "torsion_rate_limit_rad_s", 0.5 * d.velocity_base / d.gear_ratio,
                                        2.0 * d.velocity_base / d.gear_ratio),
       .output_zero_turns = s.number("feedforward", "output_zero_turns").value_or(0.0)};
@@ -312,45 +329,58 @@ control::DriveSetup<double> parse_drive_setup(const std::string& toml, const std
     setup.feedforward.damping_torque = *damping;
     setup.feedforward.damping_exponent = parameter(model, "structural_damping", "exponent").value_or(0.5);
   }
-  setup.disturbance = {.inertia = inertia,
+  setup.disturbance = {.inertia = b.inertia,
                        .time_constant_s = s.positive("disturbance", "time_constant_s", 0.01),
                        .limit = 1.9 * d.torque_base};
+}
 
-  setup.current = analog(s, "current_sensor", "a", 2.0 * current, stated(hardware.current_full_scale_ma));
-  setup.temperature = analog(s, "temperature_sensor", "c", 200.0, stated(hardware.temperature_full_scale_mc),
-                             stated(hardware.temperature_at_zero_mc));
+void take_analog_signals(Settings& s, control::DriveSetup<double>& setup, const Basis& b,
+                         const DriveConstants<double>& d, const control::Hardware& hardware) {
+  setup.current = analog(s, "current_sensor", "a", 2.0 * b.current, in_units(hardware.current_full_scale_ma));
+  setup.temperature = analog(s, "temperature_sensor", "c", 200.0, in_units(hardware.temperature_full_scale_mc),
+                             in_units(hardware.temperature_at_zero_mc));
   setup.has_torque_sensor = s.has("torque_sensor");
   if (setup.has_torque_sensor) {
-    setup.torque = analog(s, "torque_sensor", "nm", 3.0 * d.output_torque_base, stated(hardware.torque_full_scale_mnm));
+    setup.torque =
+        analog(s, "torque_sensor", "nm", 3.0 * d.output_torque_base, in_units(hardware.torque_full_scale_mnm));
     setup.ripple = {.order = s.positive("torque_sensor", "ripple_order", 2.0),
                     .memory = s.positive("torque_sensor", "ripple_memory_rad", kTurn * 20.0),
                     .largest_ripple = s.positive("torque_sensor", "largest_ripple_nm", 0.05 * d.output_torque_base)};
   }
   setup.amplifier_full_scale =
-      of_board(s, "amplifier", "full_scale_a", "A", stated(hardware.amplifier_full_scale_ma), 1.25 * current);
+      of_board(s, "amplifier", "full_scale_a", "A", in_units(hardware.amplifier_full_scale_ma), 1.25 * b.current);
+}
 
-  setup.residual_map = {.standstill_velocity = s.positive("residual_map", "standstill_rad_s", 2.5e-3 * d.velocity_base),
-                        .largest_velocity = s.positive("residual_map", "largest_rad_s", velocity),
-                        .largest_residual = s.positive("residual_map", "largest_nm", 0.25 * most_torque)};
+// Encoders that stopped counting.
+void take_stuck_encoder_faults(Settings& s, control::DriveSetup<double>& setup, const Basis& b,
+                               const model::Model& model, const DriveConstants<double>& d) {
+  control::SafetySetup<double>& f = setup.safety;
+  f.stuck_torque = s.positive(
+      "faults", "stuck_torque_nm",
+      std::min(std::max(kHeldBeforeStuck * torque_held_by_friction(model), kTorqueBeforeStuck * b.most_torque),
+               kMostTorqueChange * b.most_torque));
+  // A coarse encoder needs longer to show that the shaft follows its torque.
+  const double a_count_s = std::sqrt(2.0 * b.inertia * d.angle_base / setup.motor_counts / b.most_torque);
+  f.stuck_s = s.positive("faults", "stuck_s", std::clamp(kCountsTimesBeforeStuck * a_count_s, f.stuck_s, 3.0), 3.0);
+  const double by_counts = setup.output_counts != 0 ? kCountsBeforeStuck * d.angle_base / setup.output_counts : 0.0;
+  f.output_stuck = s.positive("faults", "output_stuck_rad", std::max(kTorsionsBeforeStuck * d.torsion_base, by_counts),
+                              100.0 * d.angle_base);
+}
 
+void take_faults(Settings& s, control::DriveSetup<double>& setup, const Basis& b, const model::Model& model,
+                 const DriveConstants<double>& d) {
   const double largest_acceleration = 15.0 * d.acceleration_base;
   control::SafetySetup<double>& f = setup.safety;
-  f.overspeed = s.positive("faults", "overspeed_rad_s", 1.09 * overspeed, 15.0 * d.velocity_base);
-  f.overcurrent = s.positive("faults", "overcurrent_a", 1.2 * current);
+  f.overspeed = s.positive("faults", "overspeed_rad_s", 1.09 * b.overspeed, 15.0 * d.velocity_base);
+  f.overcurrent = s.positive("faults", "overcurrent_a", 1.2 * b.current);
   f.overtemperature = s.positive("faults", "overtemperature_c", 80.0);
   // A slow filter of the encoder shows less of a count that stops.
   const double shown_acceleration = kShownOfStop * setup.motor_corner * f.overspeed;
   f.acceleration = s.positive("faults", "acceleration_rad_s2",
-                              std::min({10.0 * most_torque / inertia, largest_acceleration, shown_acceleration}),
+                              std::min({10.0 * b.most_torque / b.inertia, largest_acceleration, shown_acceleration}),
                               largest_acceleration);
-  f.stuck_torque =
-      s.positive("faults", "stuck_torque_nm",
-                 std::min(std::max(kHeldBeforeStuck * torque_held_by_friction(model), kTorqueBeforeStuck * most_torque),
-                          kMostTorqueChange * most_torque));
-  // A coarse encoder needs longer to show that the shaft follows its torque.
-  const double a_count_s = std::sqrt(2.0 * inertia * d.angle_base / setup.motor_counts / most_torque);
-  f.stuck_s = s.positive("faults", "stuck_s", std::clamp(kCountsTimesBeforeStuck * a_count_s, f.stuck_s, 3.0), 3.0);
-  f.current_mismatch = s.positive("faults", "current_mismatch_a", 0.2 * current);
+  take_stuck_encoder_faults(s, setup, b, model, d);
+  f.current_mismatch = s.positive("faults", "current_mismatch_a", 0.2 * b.current);
   f.mismatch_s = s.positive("faults", "mismatch_s", f.mismatch_s, 3.0);
   f.torque_same_s = s.positive("faults", "torque_same_s", f.torque_same_s, 3.0);
   f.standstill = s.positive("faults", "standstill_rad_s", 5e-3 * d.velocity_base);
@@ -359,14 +389,34 @@ control::DriveSetup<double> parse_drive_setup(const std::string& toml, const std
   // Twice where the position loop asks for all of the velocity: it no longer follows but catches up.
   const double farthest = 30'000.0 * d.angle_base;
   f.following_error = s.positive("faults", "following_error_rad",
-                                 std::min(2.0 * velocity / setup.loops.position_gain, farthest), farthest);
-  f.following_velocity = s.positive("faults", "following_velocity_rad_s", 0.75 * velocity, 15.0 * d.velocity_base);
+                                 std::min(2.0 * b.velocity / setup.loops.position_gain, farthest), farthest);
+  f.following_velocity = s.positive("faults", "following_velocity_rad_s", 0.75 * b.velocity, 15.0 * d.velocity_base);
   f.following_s = s.positive("faults", "following_s", f.following_s, 3.0);
-  const double by_counts = setup.output_counts != 0 ? kCountsBeforeStuck * d.angle_base / setup.output_counts : 0.0;
-  f.output_stuck = s.positive("faults", "output_stuck_rad", std::max(kTorsionsBeforeStuck * d.torsion_base, by_counts),
-                              100.0 * d.angle_base);
+}
 
-  setup.excitation = excitation(s, d, setup.excites_torque, most_torque, velocity, overspeed);
+}  // namespace
+
+control::DriveSetup<double> parse_drive_setup(const std::string& toml, const std::string& origin,
+                                              const model::Model& model, const DriveConstants<double>& d,
+                                              std::optional<double> encoder_counts, const control::Hardware& hardware) {
+  Settings s(toml, origin);
+  s.require_no("output_encoder", hardware.output_encoder == control::SensorKind::none);
+  s.require_no("torque_sensor", hardware.torque_sensor == control::SensorKind::none);
+  control::DriveSetup<double> setup;
+  setup.tick_hz = static_cast<std::uint32_t>(std::lround(1.0 / d.time_base));
+  Basis b = basis_of(s, model, d, hardware);
+  take_encoders(s, setup, encoder_counts, origin);
+  b.stiffness = s.positive("feedforward", "stiffness_nm_rad", largest_stiffness(model, d.torsion_base));
+  if (setup.output_counts == 0) take_torsion_estimate(s, setup, b, model, d);
+  take_loops(s, setup, b);
+  take_trajectory(s, setup, b, d);
+  take_feedforward(s, setup, b, model, d);
+  take_analog_signals(s, setup, b, d, hardware);
+  setup.residual_map = {.standstill_velocity = s.positive("residual_map", "standstill_rad_s", 2.5e-3 * d.velocity_base),
+                        .largest_velocity = s.positive("residual_map", "largest_rad_s", b.velocity),
+                        .largest_residual = s.positive("residual_map", "largest_nm", 0.25 * b.most_torque)};
+  take_faults(s, setup, b, model, d);
+  setup.excitation = excitation(s, d, setup.excites_torque, b.most_torque, b.velocity, b.overspeed);
   s.done();
   return setup;
 }

@@ -257,13 +257,109 @@ protocol::Mode Recorder::start(const planning::Run& run, std::optional<PositionM
   return protocol::Mode::excitation;
 }
 
-Recording Recorder::record(const planning::Run& run, const Watch& watch) {
-  Recording out;
-  out.run = run;
-  const double tick_s = 1.0 / session_.identity().tick_hz;
-  const bool moves = run.mode != planning::Mode::off;
+// The exchange with the drive during a run: set points or signs of life out, telemetry in.
+class Recorder::Exchange {
+ public:
+  Exchange(Session& session, const planning::Run& run, std::optional<PositionMotion>& position, Columns& columns,
+           Recording& out, const Watch& watch)
+      : session_(session), run_(run), position_(position), columns_(columns), out_(out), watch_(watch) {
+    const double tick_s = 1.0 / session.identity().tick_hz;
+    report_ticks_ = static_cast<std::uint32_t>((position ? kSetPoint_s : kHeartbeatTick_s) / tick_s);
+  }
+
+  // Until the run is over, a limit is exceeded, the user stops it or the drive leaves its mode.
+  void follow(protocol::Mode mode) {
+    mode_ = mode;
+    reported_at_ = received_at_ = Clock::now();
+    while (true) {
+      const auto m = session_.next(Milliseconds(5));
+      now_ = Clock::now();
+      if (m) received_at_ = now_;
+      if (m && m->is_unasked())
+        take_frames(*m);
+      else if (m && has_left_mode(*m))
+        return;
+      if (is_over()) return;
+      if (now_ - received_at_ > kSilence) session_.fail("the drive went silent; check cable and power");
+      if (is_due()) report();
+    }
+  }
+
+  // What is on its way yet.
+  void drain(std::uint32_t last_tick) {
+    while (const auto m = session_.next(Milliseconds(15))) {
+      if (!m->is_unasked()) continue;
+      take_frames(*m);
+      if (columns_.last_tick() >= last_tick || static_cast<std::int32_t>(columns_.last_tick() - last_tick) >= 0) break;
+    }
+  }
+
+ private:
+  double time_s() const { return out_.time_s.empty() ? 0.0 : out_.time_s.back(); }
+  bool moves() const { return run_.mode != planning::Mode::off; }
+
+  void take_frames(const protocol::Message& m) {
+    protocol::for_each_frame(m, [&](const auto& head, std::uint32_t i, auto words) { columns_.take(head, i, words); });
+  }
+
+  // By the answer to the last command.
+  bool has_left_mode(const protocol::Message& m) {
+    if (!waits_ || m.number != command_number_) return false;
+    waits_ = false;
+    protocol::CommandAnswer answer;
+    if (!moves() || protocol::take_payload(m.content(), answer) != protocol::Code::done || answer.mode == mode_)
+      return false;
+    out_.complete = !position_ && answer.mode == protocol::Mode::idle;
+    return true;
+  }
+
+  bool is_over() {
+    const double time = time_s();
+    if (position_ && !began_s_ && columns_.is_set()) began_s_ = time;
+    if (position_ && !began_s_ && time > kStart_s) session_.fail("it does not take up its position; try again");
+    if ((began_s_ && time - *began_s_ >= run_.duration_s) || (!moves() && time >= run_.duration_s)) {
+      out_.complete = true;
+      return true;
+    }
+    if (!columns_.exceeded().empty()) out_.ended = columns_.exceeded();
+    if (watch_.stops && watch_.stops()) out_.ended = "interrupted";
+    return !out_.ended.empty();
+  }
+
+  bool is_due() const {
+    const bool is_late = now_ - reported_at_ > Milliseconds(500);
+    return (!waits_ || is_late) && (now_ - reported_at_ >= (position_ ? kSetPoint : kHeartbeat) ||
+                                    columns_.last_tick() - reported_tick_ >= report_ticks_);
+  }
+
+  void report() {
+    waits_ = true;
+    const protocol::Command command =
+        began_s_ ? position_->at(time_s() - *began_s_, columns_.set_point_rad()) : protocol::Command{};
+    command_number_ = session_.post(protocol::request(Kind::command, 0, command));
+    reported_at_ = now_;
+    reported_tick_ = columns_.last_tick();
+    if (watch_.progress) watch_.progress(time_s());
+    if (watch_.seen) watch_.seen(out_);
+  }
+
+  Session& session_;
+  const planning::Run& run_;
+  std::optional<PositionMotion>& position_;
+  Columns& columns_;
+  Recording& out_;
+  const Watch& watch_;
+  protocol::Mode mode_ = protocol::Mode::idle;
+  Clock::time_point now_, reported_at_, received_at_;
+  std::uint32_t report_ticks_ = 0, reported_tick_ = 0;
+  std::optional<double> began_s_;  // of position
+  bool waits_ = false;
+  std::uint8_t command_number_ = 0;
+};
+
+// It starts, or comes to rest from what was before.
+void Recorder::require_idle() {
   protocol::Status before = session_.status();
-  // It starts, or comes to rest from what was before.
   for (int i = 0; i < 150 && (before.mode == protocol::Mode::boot || before.mode == protocol::Mode::stop); ++i) {
     std::this_thread::sleep_for(Milliseconds(10));
     before = session_.status();
@@ -273,80 +369,32 @@ Recording Recorder::record(const planning::Run& run, const Watch& watch) {
                               protocol::fault_text(before.fault).reason));
   if (before.mode != protocol::Mode::idle)
     session_.fail(fmt::format("it is in mode {}, not idle; another program may have it", name_of(before.mode)));
+}
+
+Recording Recorder::record(const planning::Run& run, const Watch& watch) {
+  Recording out;
+  out.run = run;
+  require_idle();
   std::optional<PositionMotion> position;
   // Fractions of turns alone would put each run somewhere else, and the torsion between motor and output with it.
   const ShaftPositions shaft = read_shaft_positions();
+  const bool moves = run.mode != planning::Mode::off;
   if (run.mode == planning::Mode::position) {
     position.emplace(run, plan_.limits, scales_);
     position->start_at(shaft.motor);
   } else if (moves) {
     send_excitation(run);
   }
-  const Milliseconds report_every = position ? kSetPoint : kHeartbeat;
-  const auto report_ticks = static_cast<std::uint32_t>((position ? kSetPoint_s : kHeartbeatTick_s) / tick_s);
-  Columns columns(scales_, plan_, tick_s, every_, out);
+  Columns columns(scales_, plan_, 1.0 / session_.identity().tick_hz, every_, out);
   columns.start_at(turns_of(shaft.motor), turns_of(shaft.output));
+  Exchange exchange(session_, run, position, columns, out, watch);
   try {
     session_.subscribe(channels_of(run), every_);
-    const protocol::Mode mode = moves ? start(run, position) : protocol::Mode::idle;
-    auto reported_at = Clock::now(), received_at = reported_at;
-    std::uint32_t reported_tick = 0;
-    std::optional<double> began_s;  // of position
-    bool waits = false;
-    std::uint8_t command_number = 0;
-    while (true) {
-      const auto m = session_.next(Milliseconds(5));
-      const auto now = Clock::now();
-      if (m) received_at = now;
-      if (m && m->is_unasked()) {
-        protocol::for_each_frame(*m,
-                                 [&](const auto& head, std::uint32_t i, auto words) { columns.take(head, i, words); });
-      } else if (m && waits && m->number == command_number) {
-        waits = false;
-        protocol::CommandAnswer answer;
-        if (moves && protocol::take_payload(m->content(), answer) == protocol::Code::done && answer.mode != mode) {
-          out.complete = !position && answer.mode == protocol::Mode::idle;
-          break;
-        }
-      }
-      const double time_s = out.time_s.empty() ? 0.0 : out.time_s.back();
-      if (position && !began_s && columns.is_set()) began_s = time_s;
-      if (position && !began_s && time_s > kStart_s) session_.fail("it does not take up its position; try again");
-      if (began_s && time_s - *began_s >= run.duration_s) {
-        out.complete = true;
-        break;
-      }
-      if (!moves && time_s >= run.duration_s) {
-        out.complete = true;
-        break;
-      }
-      if (!columns.exceeded().empty()) out.ended = columns.exceeded();
-      if (watch.stops && watch.stops()) out.ended = "interrupted";
-      if (!out.ended.empty()) break;
-      if (now - received_at > kSilence) session_.fail("the drive went silent; check cable and power");
-      const bool is_late = now - reported_at > Milliseconds(500);
-      if ((!waits || is_late) &&
-          (now - reported_at >= report_every || columns.last_tick() - reported_tick >= report_ticks)) {
-        waits = true;
-        const protocol::Command command =
-            began_s ? position->at(time_s - *began_s, columns.set_point_rad()) : protocol::Command{};
-        command_number = session_.post(protocol::request(Kind::command, 0, command));
-        reported_at = now;
-        reported_tick = columns.last_tick();
-        if (watch.progress) watch.progress(time_s);
-        if (watch.seen) watch.seen(out);
-      }
-    }
+    exchange.follow(moves ? start(run, position) : protocol::Mode::idle);
     session_.stop();
     const protocol::Status after = session_.status();
     out.dropped = after.dropped;
-    // What is on its way yet.
-    while (const auto m = session_.next(Milliseconds(15))) {
-      if (!m->is_unasked()) continue;
-      protocol::for_each_frame(*m,
-                               [&](const auto& head, std::uint32_t i, auto words) { columns.take(head, i, words); });
-      if (columns.last_tick() >= after.tick || static_cast<std::int32_t>(columns.last_tick() - after.tick) >= 0) break;
-    }
+    exchange.drain(after.tick);
     session_.subscribe({}, 1);
     if (!out.complete && out.ended.empty()) {
       const protocol::FaultText fault = protocol::fault_text(after.fault);

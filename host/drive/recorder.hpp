@@ -47,6 +47,8 @@ class Recorder {
 
  private:
   class Columns;
+  class Exchange;
+  void require_idle();
   void send_excitation(const planning::Run& run);
   // 2^-32 turns.
   struct ShaftPositions {

@@ -13,9 +13,9 @@
 
 namespace flexspline::estimation {
 
-// Calls work(i) for each i below count, on as many threads as there are cores. After all have ended the exception of
-// the lowest i is thrown again: the one that a loop would have met. After cancellation none continues or
-// begins.
+// Calls work(i) for each i below count, on as many threads as there are cores. After an exception none begins; after
+// all have ended that of the lowest i is thrown again: the one that a loop would have met. After cancellation none
+// continues or begins.
 template <class Work>
 void in_parallel(std::size_t count, const Work& work) {
   std::atomic<std::size_t> next{0};
@@ -43,6 +43,7 @@ void in_parallel(std::size_t count, const Work& work) {
         work(i);
       } catch (...) {
         const std::lock_guard lock(guard);
+        next = count;  // lower ones have begun already
         if (i < failed) {
           failed = i;
           failure = std::current_exception();

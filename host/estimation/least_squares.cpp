@@ -10,6 +10,24 @@
 
 namespace flexspline::estimation {
 
+namespace {
+
+// Parameters and covariance of the columns that were kept, which were scaled to length one.
+void put(LinearFit& fit, const std::vector<Eigen::Index>& kept, const Eigen::VectorXd& length,
+         const Eigen::VectorXd& solution, const Eigen::MatrixXd& covariance) {
+  const auto count = static_cast<Eigen::Index>(kept.size());
+  for (Eigen::Index i = 0; i < count; ++i) {
+    const Eigen::Index to = kept[static_cast<std::size_t>(i)];
+    fit.theta[to] = solution[i] / length[to];
+    for (Eigen::Index j = 0; j < count; ++j) {
+      const Eigen::Index other = kept[static_cast<std::size_t>(j)];
+      fit.unit_covariance(to, other) = covariance(i, j) / (length[to] * length[other]);
+    }
+  }
+}
+
+}  // namespace
+
 LinearFit least_squares(const Eigen::MatrixXd& X, const Eigen::VectorXd& y, const Eigen::VectorXd& root_weights) {
   const Eigen::Index columns = X.cols();
   LinearFit fit;
@@ -58,14 +76,7 @@ LinearFit least_squares(const Eigen::MatrixXd& X, const Eigen::VectorXd& y, cons
     const Eigen::VectorXd solution = qr.solve(weighted_y);
     const Eigen::MatrixXd inverse = inverse_rows * svd.matrixU().transpose();
     const Eigen::MatrixXd covariance = inverse * inverse.transpose();
-    for (Eigen::Index i = 0; i < count; ++i) {
-      const Eigen::Index to = kept[static_cast<std::size_t>(i)];
-      fit.theta[to] = solution[i] / length[to];
-      for (Eigen::Index j = 0; j < count; ++j) {
-        const Eigen::Index other = kept[static_cast<std::size_t>(j)];
-        fit.unit_covariance(to, other) = covariance(i, j) / (length[to] * length[other]);
-      }
-    }
+    put(fit, kept, length, solution, covariance);
     fit.condition_number = s[0] / smallest;
     fit.residual = y - X * fit.theta;
     return fit;

@@ -9,21 +9,15 @@ namespace {
 using catalogue::PlainInputs;
 constexpr std::size_t kMotor = 0, kTransmission = 1, kLoad = 2;
 
-}  // namespace
-
-std::vector<double> ScaledSignal::values() const {
-  std::vector<double> result(size());
-  for (std::size_t k = 0; k < result.size(); ++k) result[k] = (*this)[k];
-  return result;
-}
-
-double RecordSignals::direction_of(double rate, std::size_t balance) const {
-  if (at_rest) return 0.0;
-  const double width = velocity_noise[balance];
+double direction_of(const RecordSignals& s, double rate, std::size_t balance) {
+  if (s.at_rest) return 0.0;
+  const double width = s.velocity_noise[balance];
   return width > 0.0 ? std::tanh(rate / width) : catalogue::Real::sign(rate);
 }
 
-void RecordSignals::slopes(const std::vector<double>& signal, std::size_t first, std::span<double> slope) const {
+// Slopes of samples [first, first + slope.size()) of a signal, by segments.
+void slopes_of(const std::vector<double>& signal, const std::vector<data::Segment>& segments, double sample_s,
+               std::size_t first, std::span<double> slope) {
   std::fill(slope.begin(), slope.end(), 0.0);
   const std::size_t end = first + slope.size();
   auto s = std::upper_bound(segments.begin(), segments.end(), first,
@@ -49,6 +43,99 @@ void RecordSignals::slopes(const std::vector<double>& signal, std::size_t first,
   }
 }
 
+}  // namespace
+
+std::vector<double> ScaledSignal::values() const {
+  std::vector<double> result(size());
+  for (std::size_t k = 0; k < result.size(); ++k) result[k] = (*this)[k];
+  return result;
+}
+
+namespace {
+
+// One block of samples, from `first` on.
+class InputBlock {
+ public:
+  using Inputs = RecordSignals::Inputs;
+
+  InputBlock(const RecordSignals& signals, std::size_t first, std::span<Inputs> to)
+      : s_(signals), first_(first), to_(to) {}
+
+  void copy_motor() {
+    if (s_.velocity.empty()) {
+      along([](Inputs& in, std::size_t) { in.angle = in.velocity = in.speed = in.acceleration = 0.0; });
+    } else {
+      find_slope(s_.acceleration, s_.velocity);
+      along([&](Inputs& in, std::size_t k) {
+        in.angle = s_.angle[k];
+        in.velocity = s_.velocity[k];
+        in.speed = std::abs(s_.velocity[k]);
+        in.acceleration = slope_[k - first_];
+      });
+    }
+    copy_direction(kMotor, &Inputs::direction, [&](std::size_t k) { return s_.velocity_at(k); });
+  }
+
+  void copy_output() {
+    along([&](Inputs& in, std::size_t k) {
+      in.output_angle = s_.output_angle_at(k);
+      in.output_velocity = s_.output_velocity_at(k);
+      in.output_acceleration = 0.0;
+    });
+    // Without a sensor the output follows the motor through a rigid gear.
+    const bool follows = s_.output_velocity.empty() && !s_.locked;
+    const bool moves = follows ? !s_.velocity.empty() : !s_.output_velocity.empty();
+    if (moves) {
+      if (follows)
+        find_slope(s_.acceleration, s_.velocity);
+      else
+        find_slope(s_.output_acceleration, s_.output_velocity);
+      const double over = follows ? s_.gear_ratio : 1.0;
+      along([&](Inputs& in, std::size_t k) { in.output_acceleration = slope_[k - first_] / over; });
+    }
+    copy_direction(kLoad, &Inputs::output_direction, [&](std::size_t k) { return s_.output_velocity_at(k); });
+  }
+
+  void copy_torsion() {
+    along([&](Inputs& in, std::size_t k) {
+      in.torsion = s_.torsion_at(k);
+      in.torsion_rate = s_.torsion_rate_at(k);
+    });
+    copy_direction(kTransmission, &Inputs::torsion_direction, [&](std::size_t k) { return s_.torsion_rate_at(k); });
+  }
+
+  // Calls set(inputs, sample) for each sample.
+  template <class Set>
+  void along(const Set& set) const {
+    for (std::size_t i = 0; i < to_.size(); ++i) set(to_[i], first_ + i);
+  }
+
+ private:
+  // Of the accelerations that are known, else of the velocities.
+  void find_slope(const std::vector<double>& own, const std::vector<double>& velocities) {
+    if (!own.empty())
+      std::copy_n(own.begin() + static_cast<std::ptrdiff_t>(first_), to_.size(), slope_.begin());
+    else
+      slopes_of(velocities, s_.segments, s_.sample_s, first_, std::span(slope_).first(to_.size()));
+  }
+
+  template <class Rate>
+  void copy_direction(std::size_t balance, double Inputs::*what, const Rate& rate) const {
+    const std::vector<double>& kept = s_.directions[balance];
+    if (!kept.empty())
+      along([&](Inputs& in, std::size_t k) { in.*what = kept[k]; });
+    else
+      along([&](Inputs& in, std::size_t k) { in.*what = direction_of(s_, rate(k), balance); });
+  }
+
+  const RecordSignals& s_;
+  const std::size_t first_;
+  const std::span<Inputs> to_;
+  std::array<double, PlainInputs::kBlock> slope_;
+};
+
+}  // namespace
+
 void RecordSignals::copy(std::size_t first, std::span<Inputs> to, unsigned reads) const {
   using namespace effects;
   while (to.size() > PlainInputs::kBlock) {
@@ -56,75 +143,30 @@ void RecordSignals::copy(std::size_t first, std::span<Inputs> to, unsigned reads
     first += PlainInputs::kBlock;
     to = to.subspan(PlainInputs::kBlock);
   }
-  std::array<double, PlainInputs::kBlock> slope;
-  const auto along = [&](auto set) {
-    for (std::size_t i = 0; i < to.size(); ++i) set(to[i], first + i);
-  };
-  const auto accelerations = [&](const std::vector<double>& own, const std::vector<double>& velocities) {
-    if (!own.empty())
-      std::copy_n(own.begin() + static_cast<std::ptrdiff_t>(first), to.size(), slope.begin());
-    else
-      slopes(velocities, first, std::span(slope).first(to.size()));
-  };
-  const auto direction = [&](std::size_t balance, double Inputs::*what, auto rate) {
-    const std::vector<double>& kept = directions[balance];
-    if (!kept.empty())
-      along([&](Inputs& in, std::size_t k) { in.*what = kept[k]; });
-    else
-      along([&](Inputs& in, std::size_t k) { in.*what = direction_of(rate(k), balance); });
-  };
-
-  along([&](Inputs& in, std::size_t) {
+  InputBlock block(*this, first, to);
+  block.along([&](Inputs& in, std::size_t) {
     in.viscous_scale = in.coulomb_scale = 1.0;
     in.elapsed = sample_s;
   });
-  const bool follows = output_velocity.empty() && !locked;
-  if (reads & (kMotorMotion | kMotorAngle)) {
-    if (velocity.empty()) {
-      along([](Inputs& in, std::size_t) { in.angle = in.velocity = in.speed = in.acceleration = 0.0; });
-    } else {
-      accelerations(acceleration, velocity);
-      along([&](Inputs& in, std::size_t k) {
-        in.angle = angle[k];
-        in.velocity = velocity[k];
-        in.speed = std::abs(velocity[k]);
-        in.acceleration = slope[k - first];
-      });
-    }
-    direction(kMotor, &Inputs::direction, [&](std::size_t k) { return velocity_at(k); });
-  }
-  if (reads & (kOutputMotion | kOutputAngle)) {
-    along([&](Inputs& in, std::size_t k) {
-      in.output_angle = output_angle_at(k);
-      in.output_velocity = output_velocity_at(k);
-      in.output_acceleration = 0.0;
-    });
-    const bool moves = follows ? !velocity.empty() : !output_velocity.empty();
-    if (moves) {
-      // Without a sensor the output follows the motor through a rigid gear.
-      if (follows)
-        accelerations(acceleration, velocity);
-      else
-        accelerations(output_acceleration, output_velocity);
-      const double over = follows ? gear_ratio : 1.0;
-      along([&](Inputs& in, std::size_t k) { in.output_acceleration = slope[k - first] / over; });
-    }
-    direction(kLoad, &Inputs::output_direction, [&](std::size_t k) { return output_velocity_at(k); });
-  }
-  if (reads & kTorsion) {
-    along([&](Inputs& in, std::size_t k) {
-      in.torsion = torsion_at(k);
-      in.torsion_rate = torsion_rate_at(k);
-    });
-    direction(kTransmission, &Inputs::torsion_direction, [&](std::size_t k) { return torsion_rate_at(k); });
-  }
+  if (reads & (kMotorMotion | kMotorAngle)) block.copy_motor();
+  if (reads & (kOutputMotion | kOutputAngle)) block.copy_output();
+  if (reads & kTorsion) block.copy_torsion();
   if (reads & kTorque)
-    along([&](Inputs& in, std::size_t k) {
+    block.along([&](Inputs& in, std::size_t k) {
       in.torque = torque_at(k);
       in.torque_magnitude = std::abs(in.torque);
     });
-  if (reads & kCurrent) along([&](Inputs& in, std::size_t k) { in.current = current.empty() ? 0.0 : current[k]; });
-  if (reads & kTemperature) along([&](Inputs& in, std::size_t k) { in.temperature = temperature_at(k); });
+  if (reads & kCurrent)
+    block.along([&](Inputs& in, std::size_t k) { in.current = current.empty() ? 0.0 : current[k]; });
+  if (reads & kTemperature) block.along([&](Inputs& in, std::size_t k) { in.temperature = temperature_at(k); });
+}
+
+double RecordSignals::direction_of(double rate, std::size_t balance) const {
+  return estimation::direction_of(*this, rate, balance);
+}
+
+void RecordSignals::slopes(const std::vector<double>& signal, std::size_t first, std::span<double> slope) const {
+  slopes_of(signal, segments, sample_s, first, slope);
 }
 
 RecordSignals::Inputs RecordSignals::at(std::size_t sample, unsigned reads) const {

@@ -7,6 +7,7 @@
 
 #include "host/signals/differentiate.hpp"
 #include "host/signals/fused_velocity.hpp"
+#include "host/signals/quantum.hpp"
 
 namespace flexspline::estimation {
 
@@ -31,25 +32,6 @@ std::vector<double> slope_of(const std::vector<double>& signal, const std::vecto
 }
 
 namespace {
-
-// Size of the smallest step of a quantised signal; nothing if it is not quantised.
-std::optional<double> quantum_of(const std::vector<double>& position) {
-  std::vector<double> steps;
-  for (std::size_t k = 1; k < position.size(); ++k) {
-    const double step = std::abs(position[k] - position[k - 1]);
-    if (step > 0.0) steps.push_back(step);
-  }
-  if (steps.size() < 16) return std::nullopt;
-  std::sort(steps.begin(), steps.end());
-  const double smallest = steps[steps.size() / 100];
-  std::size_t whole = 0;
-  for (const double step : steps) {
-    const double multiple = step / smallest;
-    if (std::abs(multiple - std::round(multiple)) < 0.02 * std::max(1.0, multiple * 0.05)) ++whole;
-  }
-  if (10 * whole < 9 * steps.size()) return std::nullopt;
-  return smallest;
-}
 
 // Noise of the derivative over the white noise of the signal, after the filter.
 double derivative_noise_gain(const ZeroPhaseFilter& filter, double sample_s) {
@@ -157,7 +139,7 @@ SideMotion motor_side(const Experiment& e, const catalogue::DriveConstants<doubl
     const std::vector<double>& position = e[Column::motor_position];
     const std::optional<double> quantum = e.encoder_counts && drive.turn_angle_scale == 1.0
                                               ? std::optional(2.0 * M_PI / *e.encoder_counts)
-                                              : quantum_of(position);
+                                              : signals::quantum_of(position);
     return side_from_position(position, Column::motor_velocity, quantum, e, filter);
   }
   if (!e.has(Column::motor_velocity)) return {};
@@ -173,7 +155,7 @@ SideMotion output_side(const Experiment& e, const ZeroPhaseFilter& filter) {
   if (e.has(Column::output_position)) {
     const std::vector<double>& position = e[Column::output_position];
     const std::optional<double> quantum =
-        e.output_encoder_counts ? std::optional(2.0 * M_PI / *e.output_encoder_counts) : quantum_of(position);
+        e.output_encoder_counts ? std::optional(2.0 * M_PI / *e.output_encoder_counts) : signals::quantum_of(position);
     return side_from_position(position, Column::output_velocity, quantum, e, filter);
   }
   if (!e.has(Column::output_velocity)) return {};

@@ -228,90 +228,105 @@ void replace_all(std::string& text, std::string_view what, const std::string& wi
     text.replace(at, what.size(), with);
 }
 
-}  // namespace
+struct Variable {
+  std::string name;
+  Term value;
+};
 
-std::string c_name(std::string_view name) {
-  std::string out;
-  for (const char c : name) out += std::isalnum(static_cast<unsigned char>(c)) ? c : '_';
-  if (out.empty() || std::isdigit(static_cast<unsigned char>(out.front()))) out = "model_" + out;
-  return out;
+// What one step computes, as statements.
+struct Step {
+  CStatements page;
+  Inputs now;
+  Torques torques;
+  std::vector<Term> kept;               // the signals of the step before, as the struct holds them
+  std::vector<Variable> states;         // of effects with memory
+  std::vector<std::size_t> remembered;  // signals whose value of the step before is used
+  std::vector<Term> results;            // all that a step leaves
+};
+
+// Adds the statements of an effect, and what it remembers.
+void advance_and_evaluate(Step& step, const Placed& effect, const Inputs& before, const Term& started) {
+  std::vector<Term*> terms;
+  effect.author->state(terms);
+  std::vector<Term> rest;
+  const std::size_t first = step.states.size();
+  for (std::size_t k = 0; k < terms.size(); ++k) {
+    step.states.push_back({c_name(effect.id) + (terms.size() > 1 ? fmt::format("_{}", k) : ""), {}});
+    *terms[k] = step.page.input("state->" + step.states.back().name);
+    rest.push_back(*terms[k]);
+  }
+  effect.author->advance(step.now, before);
+  // The first step only stores the position of the drive.
+  for (std::size_t k = 0; k < terms.size(); ++k) {
+    *terms[k] = step.page.line("(%0 ? %1 : %2)", {started, *terms[k], rest[k]});
+    step.states[first + k].value = *terms[k];
+  }
+  effect.author->evaluate(step.now, step.torques);
 }
 
-std::string c_header(const model::Model& model, const std::string& source) {
-  const Constants constants = catalogue::constants_of(model.drive);
-  const bool linear = model.drive.axis == data::Axis::linear;
-  CStatements page;
-  c_statements() = &page;
-  const std::vector<Placed> effects = authors_of(model, constants);
-
-  Inputs now = inputs_of(page, constants);
-  change(effects, now);
-  const Term started = page.input("state->started");
-  const auto at_first = [&](const Term& later, const Term& first) {
-    return page.line("(%0 ? %1 : %2)", {started, later, first});
-  };
-  Inputs before = now;
-  std::vector<Term> kept;  // as the struct holds them
+// Writes the statements into `step`, whose page the numbers of the effects write to meanwhile.
+void compute(Step& step, const std::vector<Placed>& effects, const Constants& constants) {
+  step.now = inputs_of(step.page, constants);
+  change(effects, step.now);
+  const Term started = step.page.input("state->started");
+  Inputs before = step.now;
   for (const Signal& signal : kSignals) {
-    kept.push_back(page.input(std::string("state->") + signal.name));
-    before.*signal.at = at_first(kept.back(), now.*signal.at);
+    step.kept.push_back(step.page.input(std::string("state->") + signal.name));
+    before.*signal.at = step.page.line("(%0 ? %1 : %2)", {started, step.kept.back(), step.now.*signal.at});
   }
+  for (const Placed& effect : effects) advance_and_evaluate(step, effect, before, started);
+}
 
-  Torques torques;
-  struct Variable {
-    std::string name;
-    Term value;
-  };
-  std::vector<Variable> states;
-  for (const Placed& effect : effects) {
-    std::vector<Term*> terms;
-    effect.author->state(terms);
-    std::vector<Term> rest;
-    for (std::size_t k = 0; k < terms.size(); ++k) {
-      states.push_back({c_name(effect.id) + (terms.size() > 1 ? fmt::format("_{}", k) : ""), {}});
-      *terms[k] = page.input("state->" + states.back().name);
-      rest.push_back(*terms[k]);
-    }
-    effect.author->advance(now, before);
-    // The first step only stores the position of the drive.
-    for (std::size_t k = 0; k < terms.size(); ++k) {
-      *terms[k] = at_first(*terms[k], rest[k]);
-      states[states.size() - terms.size() + k].value = *terms[k];
-    }
-    effect.author->evaluate(now, torques);
-  }
-  c_statements() = nullptr;
-
-  std::vector<Term> results{torques.motor, torques.transmission, torques.load};
-  for (const Variable& s : states) results.push_back(s.value);
-  std::vector<std::size_t> remembered;
+void find_results(Step& step) {
+  step.results = {step.torques.motor, step.torques.transmission, step.torques.load};
+  for (const Variable& s : step.states) step.results.push_back(s.value);
   for (std::size_t k = 0; k < std::size(kSignals); ++k)
-    if (page.uses(kept[k], results)) remembered.push_back(k);
-  for (const std::size_t k : remembered) results.push_back(now.*kSignals[k].at);
+    if (step.page.uses(step.kept[k], step.results)) step.remembered.push_back(k);
+  for (const std::size_t k : step.remembered) step.results.push_back(step.now.*kSignals[k].at);
+}
 
-  const std::string name = c_name(model.name);
-  std::string body = page.statements(results);
-  for (const Variable& s : states) body += fmt::format("  state->{} = {};\n", s.name, page.text(s.value));
-  for (const std::size_t k : remembered)
-    body += fmt::format("  state->{} = {};\n", kSignals[k].name, page.text(now.*kSignals[k].at));
-  body += fmt::format("  state->started = 1;\n  out->motor = {};\n  out->transmission = {};\n  out->load = {};\n",
-                      page.text(torques.motor), page.text(torques.transmission), page.text(torques.load));
+std::string body_text(Step& step) {
+  std::string body = step.page.statements(step.results);
+  for (const Variable& s : step.states) body += fmt::format("  state->{} = {};\n", s.name, step.page.text(s.value));
+  for (const std::size_t k : step.remembered)
+    body += fmt::format("  state->{} = {};\n", kSignals[k].name, step.page.text(step.now.*kSignals[k].at));
+  return body + fmt::format("  state->started = 1;\n  out->motor = {};\n  out->transmission = {};\n  out->load = {};\n",
+                            step.page.text(step.torques.motor), step.page.text(step.torques.transmission),
+                            step.page.text(step.torques.load));
+}
 
+// Tables and functions that the statements use.
+std::string prelude_text(const Step& step) {
   std::string prelude;
-  for (std::size_t k = 0; k < page.arrays().size(); ++k) prelude += array_text(page.arrays()[k], k);
+  for (std::size_t k = 0; k < step.page.arrays().size(); ++k) prelude += array_text(step.page.arrays()[k], k);
   for (const Helper& helper : kHelpers)
-    if (page.calls(std::string("@") + helper.name, results)) prelude += helper.text;
+    if (step.page.calls(std::string("@") + helper.name, step.results)) prelude += helper.text;
+  return prelude;
+}
 
+std::string fields_text(bool linear) {
   std::string fields;
   for (const Field& f : kFields)
     fields += fmt::format("  double {}; /* {}{}{} */\n", f.name, linear ? f.unit_linear : f.unit_rotary,
                           *f.meaning ? ": " : "", f.meaning);
-  std::string memory;
-  for (const Variable& s : states) memory += fmt::format("  double {};\n", s.name);
-  for (const std::size_t k : remembered) memory += fmt::format("  double {};\n", kSignals[k].name);
+  return fields;
+}
 
-  std::string text = fmt::format(
-      R"(/* Model "{model}", written by flexspline export from {source}. C99; needs <math.h>.
+std::string memory_text(const Step& step) {
+  std::string memory;
+  for (const Variable& s : step.states) memory += fmt::format("  double {};\n", s.name);
+  for (const std::size_t k : step.remembered) memory += fmt::format("  double {};\n", kSignals[k].name);
+  return memory;
+}
+
+std::string ids_of(const std::vector<Placed>& effects) {
+  std::string list;
+  for (const Placed& p : effects) list += (list.empty() ? "" : ", ") + p.id;
+  return list;
+}
+
+// "@" stands for the model's name, in capitals before macros.
+constexpr const char* kPage = R"(/* Model "{model}", written by flexspline export from {source}. C99; needs <math.h>.
  *
  * Torques on the right-hand side of the three balances of a drive with a strain-wave gear, in SI; positive resists
  * positive motion:
@@ -351,23 +366,44 @@ static inline void @step(@state* state, const @inputs* in, @torques* out) {{
 {body}}}
 
 #endif
-)",
-      fmt::arg("model", model.name), fmt::arg("source", source),
-      fmt::arg("effects",
-               [&] {
-                 std::string list;
-                 for (const Placed& p : effects) list += (list.empty() ? "" : ", ") + p.id;
-                 return list;
-               }()),
-      fmt::arg("ratio", literal(constants.gear_ratio)), fmt::arg("km", literal(constants.torque_constant)),
-      fmt::arg("km_unit", linear ? "N/A" : "N*m/A"), fmt::arg("fields", fields), fmt::arg("memory", memory),
-      fmt::arg("unit", linear ? "N" : "N*m"), fmt::arg("prelude", prelude), fmt::arg("body", body));
+)";
+
+// Each name begins with the model's.
+std::string with_prefix(std::string text, const std::string& name) {
   std::string upper = name;
   for (char& c : upper) c = static_cast<char>(std::toupper(static_cast<unsigned char>(c)));
   for (const char* macro : {"GEAR_RATIO", "TORQUE_CONSTANT", "H\n"})
     replace_all(text, std::string("@") + macro, upper + "_" + macro);
   replace_all(text, "@", name + "_");
   return text;
+}
+
+}  // namespace
+
+std::string c_name(std::string_view name) {
+  std::string out;
+  for (const char c : name) out += std::isalnum(static_cast<unsigned char>(c)) ? c : '_';
+  if (out.empty() || std::isdigit(static_cast<unsigned char>(out.front()))) out = "model_" + out;
+  return out;
+}
+
+std::string c_header(const model::Model& model, const std::string& source) {
+  const Constants constants = catalogue::constants_of(model.drive);
+  const bool linear = model.drive.axis == data::Axis::linear;
+  Step step;
+  c_statements() = &step.page;
+  const std::vector<Placed> effects = authors_of(model, constants);
+  compute(step, effects, constants);
+  c_statements() = nullptr;
+  find_results(step);
+  const std::string body = body_text(step);
+  const std::string text = fmt::format(
+      fmt::runtime(kPage), fmt::arg("model", model.name), fmt::arg("source", source),
+      fmt::arg("effects", ids_of(effects)), fmt::arg("ratio", literal(constants.gear_ratio)),
+      fmt::arg("km", literal(constants.torque_constant)), fmt::arg("km_unit", linear ? "N/A" : "N*m/A"),
+      fmt::arg("fields", fields_text(linear)), fmt::arg("memory", memory_text(step)),
+      fmt::arg("unit", linear ? "N" : "N*m"), fmt::arg("prelude", prelude_text(step)), fmt::arg("body", body));
+  return with_prefix(text, c_name(model.name));
 }
 
 }  // namespace flexspline::interchange

@@ -259,18 +259,9 @@ void write_payloads(Writer& w) {
                        {"sequence", "tick"});
 }
 
-void write_block(Writer& w) {
+// Where the fields of a block's header are.
+void write_block_header(Writer& w) {
   namespace d = model::detail;
-  w.title("The parameter block. A number is an int32 mantissa and an int32 exponent: mantissa 2^(exponent - 30)");
-  w.number("BLOCK_MAGIC", model::kBlockMagic);
-  w.number("BLOCK_VERSION", model::kBlockVersion);
-  w.number("LARGEST_BLOCK", model::kLargestBlock);
-  w.number("MOST_ENTRIES", model::kMostEntries);
-  w.number("VALUE_FRACTION_BITS", fixed::kValueBits, "a value is an int32 in 2^-27 of its base");
-  w.number("BLOCK_MAGIC_AT", 0);
-  w.number("BLOCK_VERSION_AT", 4);
-  w.number("BLOCK_ENTRY_COUNT_AT", 6);
-  w.number("BLOCK_TOTAL_BYTES_AT", 8);
   std::size_t at = d::kBlockStart;
   w.number("BLOCK_DRIVE_NAME_AT", at);
   at += sizeof(model::Name);
@@ -292,12 +283,9 @@ void write_block(Writer& w) {
     w.number(fmt::format("LIMIT_{}_AT", limit), at, "value");
     at += 4;
   }
-  w.number("BLOCK_ENTRIES_AT", d::kBlockStart + d::kHeaderBytes, "uint16 kind, uint16 zero, uint32 bytes, bytes");
-  w.number("ENTRY_HEAD_BYTES", d::kEntryHeader);
-  w.number("BLOCK_CHECKSUM_BYTES", d::kChecksum, "CRC-32 of all before it, at the end");
-  w.number("FIRST_NOTE", model::kFirstNote, "entries from here on are for people and hosts");
-  w.title("A validator's verdict on a block");
-  w.numbers<model::BlockFault>("REASON", [](model::BlockFault fault) { return model::text_of(fault); });
+}
+
+void write_effect_entries(Writer& w) {
   w.title(
       "Entries of effects: their number, and where their coefficients are; behind the last a table has its points, 4 "
       "bytes each");
@@ -312,6 +300,28 @@ void write_block(Writer& w) {
       if (Image::number_of<Effect>() == number) w.entry<typename Effect::template Coefficients<fixed::Fixed>>(name);
     });
   }
+}
+
+void write_block(Writer& w) {
+  namespace d = model::detail;
+  w.title("The parameter block. A number is an int32 mantissa and an int32 exponent: mantissa 2^(exponent - 30)");
+  w.number("BLOCK_MAGIC", model::kBlockMagic);
+  w.number("BLOCK_VERSION", model::kBlockVersion);
+  w.number("LARGEST_BLOCK", model::kLargestBlock);
+  w.number("MOST_ENTRIES", model::kMostEntries);
+  w.number("VALUE_FRACTION_BITS", fixed::kValueBits, "a value is an int32 in 2^-27 of its base");
+  w.number("BLOCK_MAGIC_AT", 0);
+  w.number("BLOCK_VERSION_AT", 4);
+  w.number("BLOCK_ENTRY_COUNT_AT", 6);
+  w.number("BLOCK_TOTAL_BYTES_AT", 8);
+  write_block_header(w);
+  w.number("BLOCK_ENTRIES_AT", d::kBlockStart + d::kHeaderBytes, "uint16 kind, uint16 zero, uint32 bytes, bytes");
+  w.number("ENTRY_HEAD_BYTES", d::kEntryHeader);
+  w.number("BLOCK_CHECKSUM_BYTES", d::kChecksum, "CRC-32 of all before it, at the end");
+  w.number("FIRST_NOTE", model::kFirstNote, "entries from here on are for people and hosts");
+  w.title("A validator's verdict on a block");
+  w.numbers<model::BlockFault>("REASON", [](model::BlockFault fault) { return model::text_of(fault); });
+  write_effect_entries(w);
   w.title("Entries of sections");
   for_each_enumerator<model::Section, 0x100, 0x40>([&](std::string_view name, std::size_t value) {
     const std::string section = fmt::format("SECTION_{}", name);

@@ -52,6 +52,54 @@ std::string said_of(const model::Model& model, const Joint& joint, const std::st
 constexpr const char* kSmallMass = "0.001";
 constexpr const char* kSmallInertia = "1e-06";
 
+std::string urdf_link(const std::string& name, const std::string& which, const std::string& mass,
+                      const std::string& inertia) {
+  return fmt::format(
+      R"(  <link name="{}_{}">
+    <inertial>
+      <mass value="{}"/>
+      <inertia ixx="{}" ixy="0" ixz="0" iyy="{}" iyz="0" izz="{}"/>
+    </inertial>
+  </link>
+)",
+      name, which, mass, inertia, inertia, inertia);
+}
+
+// The gear's spring, between rotor and link.
+std::string urdf_spring(const Joint& joint, const std::string& name, const char* type, const std::string& limit) {
+  return fmt::format(
+      R"(  <joint name="{0}_flexspline" type="{1}">
+    <parent link="{0}_rotor"/>
+    <child link="{0}_link"/>
+    <axis xyz="0 0 1"/>
+    <dynamics damping="{2:.9g}" friction="0"/>
+{3}  </joint>
+  <gazebo reference="{0}_flexspline">
+    <springStiffness>{4:.9g}</springStiffness>
+    <springReference>0</springReference>
+  </gazebo>
+)",
+      name, type, joint.link_damping, limit, joint.stiffness);
+}
+
+std::string urdf_transmission(const Joint& joint, const std::string& name) {
+  return fmt::format(
+      R"(  <transmission name="{0}_transmission">
+    <type>transmission_interface/SimpleTransmission</type>
+    <joint name="{0}_motor">
+      <hardwareInterface>hardware_interface/EffortJointInterface</hardwareInterface>
+    </joint>
+    <actuator name="{0}_actuator">
+      <mechanicalReduction>{1:.9g}</mechanicalReduction>
+    </actuator>
+    <drake:rotor_inertia xmlns:drake="http://drake.mit.edu" value="{2:.9g}"/>
+    <drake:gear_ratio xmlns:drake="http://drake.mit.edu" value="{1:.9g}"/>
+  </transmission>
+</robot>
+)",
+      name, joint.gear_ratio, joint.armature / (joint.gear_ratio * joint.gear_ratio));
+}
+
 }  // namespace
 
 std::string mujoco(const model::Model& model, const std::string& source) {
@@ -105,17 +153,6 @@ std::string urdf(const model::Model& model, const std::string& source) {
   const bool linear = model.drive.axis == data::Axis::linear;
   const bool elastic = joint.stiffness > 0.0;
   const std::string inertia = joint.output_inertia > 0.0 ? fmt::format("{:.9g}", joint.output_inertia) : kSmallInertia;
-  const auto link = [&](const std::string& which, const std::string& mass, const std::string& j) {
-    return fmt::format(
-        R"(  <link name="{}_{}">
-    <inertial>
-      <mass value="{}"/>
-      <inertia ixx="{}" ixy="0" ixz="0" iyy="{}" iyz="0" izz="{}"/>
-    </inertial>
-  </link>
-)",
-        name, which, mass, j, j, j);
-  };
   const std::string limit =
       joint.torque_limit > 0.0
           ? fmt::format("    <limit lower=\"-1e9\" upper=\"1e9\" effort=\"{:.9g}\" velocity=\"{:.9g}\"/>\n",
@@ -128,8 +165,8 @@ std::string urdf(const model::Model& model, const std::string& source) {
   std::string text = fmt::format("<?xml version=\"1.0\"?>\n<robot name=\"{}\">\n  <!-- {} -->\n", name,
                                  escaped(said_of(model, joint, source)));
   text += fmt::format("  <link name=\"{}_base\"/>\n", name);
-  if (elastic) text += link("rotor", kSmallMass, kSmallInertia);
-  text += link("link", joint.output_inertia > 0.0 ? "1" : kSmallMass, inertia);
+  if (elastic) text += urdf_link(name, "rotor", kSmallMass, kSmallInertia);
+  text += urdf_link(name, "link", joint.output_inertia > 0.0 ? "1" : kSmallMass, inertia);
   text += fmt::format(
       R"(  <joint name="{name}_motor" type="{type}">
     <parent link="{name}_base"/>
@@ -140,36 +177,8 @@ std::string urdf(const model::Model& model, const std::string& source) {
 )",
       fmt::arg("name", name), fmt::arg("type", type), fmt::arg("child", elastic ? "rotor" : "link"),
       fmt::arg("damping", joint.damping), fmt::arg("friction", joint.friction), fmt::arg("limit", limit));
-  if (elastic)
-    text += fmt::format(
-        R"(  <joint name="{0}_flexspline" type="{1}">
-    <parent link="{0}_rotor"/>
-    <child link="{0}_link"/>
-    <axis xyz="0 0 1"/>
-    <dynamics damping="{2:.9g}" friction="0"/>
-{3}  </joint>
-  <gazebo reference="{0}_flexspline">
-    <springStiffness>{4:.9g}</springStiffness>
-    <springReference>0</springReference>
-  </gazebo>
-)",
-        name, type, joint.link_damping, limit, joint.stiffness);
-  text += fmt::format(
-      R"(  <transmission name="{0}_transmission">
-    <type>transmission_interface/SimpleTransmission</type>
-    <joint name="{0}_motor">
-      <hardwareInterface>hardware_interface/EffortJointInterface</hardwareInterface>
-    </joint>
-    <actuator name="{0}_actuator">
-      <mechanicalReduction>{1:.9g}</mechanicalReduction>
-    </actuator>
-    <drake:rotor_inertia xmlns:drake="http://drake.mit.edu" value="{2:.9g}"/>
-    <drake:gear_ratio xmlns:drake="http://drake.mit.edu" value="{1:.9g}"/>
-  </transmission>
-</robot>
-)",
-      name, joint.gear_ratio, joint.armature / (joint.gear_ratio * joint.gear_ratio));
-  return text;
+  if (elastic) text += urdf_spring(joint, name, type, limit);
+  return text + urdf_transmission(joint, name);
 }
 
 }  // namespace flexspline::interchange

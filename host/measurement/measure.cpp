@@ -262,6 +262,17 @@ class Measuring {
       notes.push_back(
           "The noise floor could not be found, as no record repeats itself: repeat one period of the excitation six "
           "times or more, or record a minute at rest for the sensors alone.");
+    advise_on_reversals();
+    advise_on_set_points();
+    for (const RecordMeasurement& r : answer_.records)
+      if (r.masked_percent > 5.0)
+        notes.push_back(fmt::format(
+            "{}: {:.0f} % of the samples are clipped or at standstill, and count here nevertheless; see flexspline "
+            "check.",
+            r.name, r.masked_percent));
+  }
+
+  void advise_on_reversals() {
     std::size_t reversing = 0;
     for (std::size_t k = 0; k < experiments_.size(); ++k) {
       const auto& responses = answer_.records[k].responses;
@@ -270,11 +281,14 @@ class Measuring {
         ++reversing;
     }
     if (reversing > 0)
-      notes.push_back(fmt::format(
+      answer_.notes.push_back(fmt::format(
           "In {} of {} records the free motor reverses: dry friction, where there is any, is part of the response "
           "then, which is not that of inertia and spring alone and changes with the amplitude; add a mean velocity "
           "that keeps one direction to see those.",
           reversing, answer_.records.size()));
+  }
+
+  void advise_on_set_points() {
     std::vector<std::string> blind;
     for (std::size_t k = 0; k < experiments_.size(); ++k) {
       const bool welch = std::any_of(answer_.records[k].responses.begin(), answer_.records[k].responses.end(),
@@ -283,17 +297,11 @@ class Measuring {
         blind.push_back(answer_.records[k].name);
     }
     if (!blind.empty())
-      notes.push_back(
+      answer_.notes.push_back(
           fmt::format("{} of {} records ({}{}) neither repeat themselves nor have a set point: if a controller moved "
                       "the drive, its answer to friction counts there as excitation and falsifies the response; record "
                       "the set point.",
                       blind.size(), answer_.records.size(), blind.front(), blind.size() > 1 ? ", ..." : ""));
-    for (const RecordMeasurement& r : answer_.records)
-      if (r.masked_percent > 5.0)
-        notes.push_back(fmt::format(
-            "{}: {:.0f} % of the samples are clipped or at standstill, and count here nevertheless; see flexspline "
-            "check.",
-            r.name, r.masked_percent));
   }
 
   const data::Dataset& dataset_;

@@ -34,6 +34,59 @@ double reading_at_rest(const simulation::Balances& balances, double temperature,
   return sums.motor / torque_constant;
 }
 
+// Velocity by a loop on an inertia: proportional for its bandwidth, integral a quarter of that lower.
+class VelocityLoop {
+ public:
+  VelocityLoop(double inertia, double torque_constant, double sample_s, double limit)
+      : sample_s_(sample_s), limit_(limit) {
+    const double bandwidth = 2.0 * std::numbers::pi * kBandwidth / sample_s;
+    proportional_ = bandwidth * inertia / torque_constant;
+    integral_ = 0.25 * bandwidth * proportional_;
+  }
+
+  double current(double wanted, double velocity) {
+    const double error = wanted - velocity;
+    const double next = integrated_ + integral_ * error * sample_s_;
+    const double unlimited = proportional_ * error + next;
+    const double current = std::clamp(unlimited, -limit_, limit_);
+    if (current == unlimited || (unlimited > current) != (error > 0.0)) integrated_ = next;
+    clipped_ += current != unlimited;
+    return current;
+  }
+  std::size_t clipped() const { return clipped_; }
+
+ private:
+  double sample_s_, limit_;
+  double proportional_ = 0.0, integral_ = 0.0, integrated_ = 0.0;
+  std::size_t clipped_ = 0;
+};
+
+data::Experiment empty_experiment(const Run& run, double sample_s, const Sensors& sensors) {
+  data::Experiment e;
+  e.name = run.name;
+  e.load = run.locked ? data::Load::locked : data::Load::free;
+  e.current_hold_stated = true;
+  e.sample_s = sample_s;
+  e.motor_position_zero = e.output_position_zero = data::PositionZero::absolute;
+  if (sensors.motor_counts > 0.0) e.encoder_counts = sensors.motor_counts;
+  if (sensors.output_counts > 0.0) e.output_encoder_counts = sensors.output_counts;
+  return e;
+}
+
+// What the sensors show of one sample.
+void measure(data::Experiment& e, const Run& run, const Sensors& sensors, const Forcing& forcing, double motor_position,
+             double output_position, double torque) {
+  e[sensors.current ? Column::current : Column::motor_torque].push_back(forcing.current);
+  e[Column::motor_position].push_back(sensors.motor_counts > 0.0 ? steps_of(motor_position, sensors.motor_counts)
+                                                                 : motor_position);
+  if (sensors.output_position)
+    e[Column::output_position].push_back(sensors.output_counts > 0.0 ? steps_of(output_position, sensors.output_counts)
+                                                                     : output_position);
+  if (sensors.torque) e[Column::torque].push_back(torque);
+  if (sensors.temperature) e[Column::temperature].push_back(forcing.temperature);
+  if (run.load_torque_nm != 0.0) e[Column::load_torque].push_back(run.load_torque_nm);
+}
+
 }  // namespace
 
 Rehearsal rehearse(const model::Model& model, const Run& run, double sample_s, const Limits& limits,
@@ -47,61 +100,30 @@ Rehearsal rehearse(const model::Model& model, const Run& run, double sample_s, c
   const Coupling coupling = run.locked ? Coupling::locked_output : two_masses ? Coupling::two_masses : Coupling::rigid;
   Rehearsal result;
   data::Experiment& e = result.experiment;
-  e.name = run.name;
-  e.load = run.locked ? data::Load::locked : data::Load::free;
-  e.current_hold_stated = true;
-  e.sample_s = sample_s;
-  e.motor_position_zero = e.output_position_zero = data::PositionZero::absolute;
-  if (sensors.motor_counts > 0.0) e.encoder_counts = sensors.motor_counts;
-  if (sensors.output_counts > 0.0) e.output_encoder_counts = sensors.output_counts;
+  e = empty_experiment(run, sample_s, sensors);
 
   simulation::Dynamics dynamics(simulation::Balances(model, constants), constants, coupling);
-  const double temperature = run.temperature_c.value_or(constants.reference_temperature);
-  const double offset = reading_at_rest(balances, temperature, constants.torque_constant);
-  // Gains of a loop on an inertia: proportional for its bandwidth, integral a quarter of that lower.
-  const double bandwidth = 2.0 * std::numbers::pi * kBandwidth / sample_s;
-  const double proportional = bandwidth * inertia / constants.torque_constant;
-  const double integral = 0.25 * bandwidth * proportional;
-  const double limit = limits.current_a;
+  VelocityLoop loop(inertia, constants.torque_constant, sample_s, limits.current_a);
+  Forcing forcing;
+  forcing.temperature = run.temperature_c.value_or(constants.reference_temperature);
+  forcing.load_torque = run.load_torque_nm;
+  const double offset = reading_at_rest(balances, forcing.temperature, constants.torque_constant);
   const std::vector<double> wanted = set_points(run, sample_s);
   const int steps = std::max(1, static_cast<int>(std::ceil(sample_s / kStep_s - 1e-6)));
-  double integrated = 0.0, low = 0.0, high = 0.0;
-  std::size_t clipped = 0;
-  const auto effort_column = sensors.current ? Column::current : Column::motor_torque;
-  bool started = false;
+  double low = 0.0, high = 0.0;
   for (std::size_t k = 0; k < wanted.size(); ++k) {
     const simulation::State& s = dynamics.state();
-    double current = 0.0;
-    if (run.mode == Mode::current) current = std::clamp(wanted[k], -limit, limit);
-    if (run.mode == Mode::velocity) {
-      const double error = wanted[k] - s.motor_velocity;
-      const double next = integrated + integral * error * sample_s;
-      const double unlimited = proportional * error + next;
-      current = std::clamp(unlimited, -limit, limit);
-      if (current == unlimited || (unlimited > current) != (error > 0.0)) integrated = next;
-      clipped += current != unlimited;
-    }
     // A drive that is off reads its offset; one that is on controls its biased reading.
-    if (run.mode == Mode::off) current = offset;
-    Forcing forcing;
-    forcing.current = current;
-    forcing.effort = current * constants.torque_constant;
-    forcing.temperature = temperature;
-    forcing.load_torque = run.load_torque_nm;
-    if (!started) dynamics.start({}, forcing, true, std::numeric_limits<double>::infinity(), 0.0);
-    started = true;
+    forcing.current = run.mode == Mode::current    ? std::clamp(wanted[k], -limits.current_a, limits.current_a)
+                      : run.mode == Mode::velocity ? loop.current(wanted[k], s.motor_velocity)
+                      : run.mode == Mode::off      ? offset
+                                                   : 0.0;
+    forcing.effort = forcing.current * constants.torque_constant;
+    if (k == 0) dynamics.start({}, forcing, true, std::numeric_limits<double>::infinity(), 0.0);
     e.time_s.push_back(static_cast<double>(k) * sample_s);
-    e[effort_column].push_back(current);
-    e[Column::motor_position].push_back(sensors.motor_counts > 0.0 ? steps_of(s.motor_position, sensors.motor_counts)
-                                                                   : s.motor_position);
     const double output = two_masses || run.locked ? s.output_position : s.motor_position / constants.gear_ratio;
-    if (sensors.output_position)
-      e[Column::output_position].push_back(sensors.output_counts > 0.0 ? steps_of(output, sensors.output_counts)
-                                                                       : output);
-    if (sensors.torque) e[Column::torque].push_back(dynamics.torque());
-    if (sensors.temperature) e[Column::temperature].push_back(temperature);
-    if (run.load_torque_nm != 0.0) e[Column::load_torque].push_back(run.load_torque_nm);
-    result.peak_current_a = std::max(result.peak_current_a, std::abs(current));
+    measure(e, run, sensors, forcing, s.motor_position, output, sensors.torque ? dynamics.torque() : 0.0);
+    result.peak_current_a = std::max(result.peak_current_a, std::abs(forcing.current));
     result.peak_velocity_rad_s = std::max(result.peak_velocity_rad_s, std::abs(s.motor_velocity));
     low = std::min(low, output);
     high = std::max(high, output);
@@ -112,7 +134,8 @@ Rehearsal rehearse(const model::Model& model, const Run& run, double sample_s, c
     }
   }
   result.travel_rad = high - low;
-  result.clipped_share = wanted.empty() ? 0.0 : static_cast<double>(clipped) / static_cast<double>(wanted.size());
+  result.clipped_share =
+      wanted.empty() ? 0.0 : static_cast<double>(loop.clipped()) / static_cast<double>(wanted.size());
   e.segments = {{0, e.time_s.size()}};
   e.masked.assign(e.time_s.size(), 0);
   return result;

@@ -16,6 +16,7 @@
 #include "host/comparison/free_run.hpp"
 #include "host/comparison/score.hpp"
 #include "host/estimation/identify.hpp"
+#include "host/estimation/in_parallel.hpp"
 #include "host/selection/add.hpp"
 #include "host/sensitivity/lines.hpp"
 
@@ -308,29 +309,17 @@ class Analysis {
   void run_all(const std::vector<Change>& changes) {
     std::atomic<std::size_t> next = 0;
     std::size_t done = 0;
-    std::exception_ptr failure;
     std::mutex guard;
-    const auto work = [&] {
-      try {
-        Worker worker(*this);
-        for (std::size_t i = next++; i < changes.size(); i = next++) {
-          Variant variant = worker.changed(changes[i]);
-          const std::lock_guard lock(guard);
-          result_.variants[i] = std::move(variant);
-          if (options_.progress) options_.progress(++done, changes.size());
-        }
-      } catch (...) {
-        const std::lock_guard lock(guard);
-        failure = std::current_exception();
-        next = changes.size();
-      }
-    };
     const std::size_t wanted = options_.threads > 0 ? options_.threads : std::thread::hardware_concurrency();
-    std::vector<std::thread> threads;
-    for (std::size_t t = 1; t < std::min(wanted, changes.size()); ++t) threads.emplace_back(work);
-    work();
-    for (std::thread& thread : threads) thread.join();
-    if (failure) std::rethrow_exception(failure);
+    estimation::in_parallel(std::min(std::max<std::size_t>(wanted, 1), changes.size()), [&](std::size_t) {
+      Worker worker(*this);
+      for (std::size_t i = next++; i < changes.size(); i = next++) {
+        Variant variant = worker.changed(changes[i]);
+        const std::lock_guard lock(guard);
+        result_.variants[i] = std::move(variant);
+        if (options_.progress) options_.progress(++done, changes.size());
+      }
+    });
   }
 
   const data::Dataset& dataset_;

@@ -9,6 +9,23 @@
 namespace flexspline::signals {
 namespace {
 
+// The signal's end, continued by its point reflection: the forward pass goes on over it, the backward pass begins
+// there.
+template <int Order, class V>
+void turn_round(Cascade<Order, V>& forward, Cascade<Order, V>& backward, const Columns<V>& raw, const Columns<V>& tail,
+                std::size_t pad, const V& origin) {
+  V back;
+  raw.load(pad, back);
+  in_blocks(forward, pad, [&](auto& c, std::size_t i) {
+    V v;
+    raw.load(pad - 1 - i, v);
+    v = (back - v) + (back - origin);
+    c.step(v);
+    tail.store(i, v);
+  });
+  begin_backward(backward, tail, 0, pad);
+}
+
 // Both passes over columns that are never in memory as a whole. `x` holds a block and what the backward pass needs
 // behind it to forget where it began.
 template <int Order>
@@ -49,17 +66,7 @@ void filter_blocks(const Sections& sections, std::size_t n, std::size_t pad, std
       Cascade<Order, V> backward(sections.a1, sections.a2, sections.gain);
       std::size_t kept = to;
       if (end == n) {
-        const Columns<V> raw = lanes(last, g);
-        V back;
-        raw.load(pad, back);
-        in_blocks(forward[g], pad, [&](auto& c, std::size_t i) {
-          V v;
-          raw.load(pad - 1 - i, v);
-          v = (back - v) + (back - origin);
-          c.step(v);
-          tail.store(i, v);
-        });
-        begin_backward(backward, tail, 0, pad);
+        turn_round(forward[g], backward, lanes(last, g), tail, pad, origin);
       } else {
         kept = block;
         begin_backward(backward, part, kept, to);

@@ -64,16 +64,38 @@ double two_digits(double value) {
   return std::round(value / step) * step;
 }
 
+// The bands up to the first wide gap.
+struct CoherentPower {
+  double total = 0.0;
+  std::size_t end = 0;
+};
+
+CoherentPower coherent_power_of(const std::vector<Band>& bands) {
+  CoherentPower sum;
+  double last_hz = 0.0;
+  for (std::size_t b = 0; b < bands.size(); ++b) {
+    if (!(bands[b].power > 0.0)) continue;
+    if (last_hz > 0.0 && bands[b].high_hz > kGapRatio * last_hz) break;
+    sum.total += bands[b].power;
+    last_hz = bands[b].high_hz;
+    sum.end = b + 1;
+  }
+  return sum;
+}
+
+void require_one_length(std::size_t effort, std::size_t motion, double sample_hz) {
+  if (!(sample_hz > 0.0))
+    throw std::invalid_argument(fmt::format("cut-off: sample rate {} Hz; check the time column", sample_hz));
+  if (effort != motion)
+    throw std::invalid_argument(
+        fmt::format("cut-off: {} samples of effort but {} of motion; they must be of one length", effort, motion));
+}
+
 }  // namespace
 
 CutoffChoice choose_cutoff(std::span<const double> effort, std::span<const double> motion_velocity_or_acceleration,
                            double sample_hz) {
-  if (!(sample_hz > 0.0))
-    throw std::invalid_argument(fmt::format("cut-off: sample rate {} Hz; check the time column", sample_hz));
-  if (effort.size() != motion_velocity_or_acceleration.size())
-    throw std::invalid_argument(
-        fmt::format("cut-off: {} samples of effort but {} of motion; they must be of one length", effort.size(),
-                    motion_velocity_or_acceleration.size()));
+  require_one_length(effort.size(), motion_velocity_or_acceleration.size(), sample_hz);
   const double highest = sample_hz / 10.0;
   const double lowest = std::min(kLowestCutoffHz, highest);
   CutoffChoice choice;
@@ -88,15 +110,7 @@ CutoffChoice choose_cutoff(std::span<const double> effort, std::span<const doubl
   const CrossSpectrum spectrum = cross_spectrum(motion_velocity_or_acceleration, effort, sample_hz, segment);
   const std::vector<Band> bands = coherent_bands(spectrum);
 
-  double total = 0.0, last_hz = 0.0;
-  std::size_t end = 0;
-  for (std::size_t b = 0; b < bands.size(); ++b) {
-    if (!(bands[b].power > 0.0)) continue;
-    if (last_hz > 0.0 && bands[b].high_hz > kGapRatio * last_hz) break;
-    total += bands[b].power;
-    last_hz = bands[b].high_hz;
-    end = b + 1;
-  }
+  const auto [total, end] = coherent_power_of(bands);
   if (!(total > 0.0)) {
     choice.cutoff_hz = lowest;
     choice.reason = fmt::format(

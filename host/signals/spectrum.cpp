@@ -141,22 +141,19 @@ double coherence_limit(double independent_averages, double probability) {
   return 1.0 - std::pow(probability, 1.0 / (independent_averages - 1.0));
 }
 
-std::optional<Repetition> find_repetition(std::span<const double> signal, double mismatch_limit) {
-  const std::size_t n = signal.size();
-  if (n < 8) return std::nullopt;
-  std::vector<double> x(signal.begin(), signal.end());
-  const double mean = mean_of(signal);
-  std::vector<double> energy(n + 1, 0.0);
-  for (std::size_t i = 0; i < n; ++i) {
-    x[i] -= mean;
-    energy[i + 1] = energy[i] + x[i] * x[i];
-  }
-  const double power = energy[n] / static_cast<double>(n);
-  // A constant leaves rounding only; `!` also turns away values that are not finite.
-  if (!(power > 1e-24 * mean * mean) || !std::isfinite(power)) return std::nullopt;
+namespace {
 
-  // Squared mismatch of all lags at once: energies of both parts less twice their product.
-  const std::size_t longest = n / 2;
+// A lag at which the signal may repeat itself.
+struct Candidate {
+  std::size_t lag;
+  double exact;
+  double mismatch;  // between samples, where the valley's parabola has its lowest point
+};
+
+// Squared mismatch of all lags at once: energies of both parts less twice their product. `energy`: sums of squares.
+std::vector<double> squared_mismatches(const std::vector<double>& x, const std::vector<double>& energy, double power,
+                                       std::size_t longest) {
+  const std::size_t n = x.size();
   const std::vector<double> product = lagged_products(x, longest + 1);
   std::vector<double> mismatch2(longest + 2);
   for (std::size_t lag = 0; lag < mismatch2.size(); ++lag) {
@@ -164,15 +161,13 @@ std::optional<Repetition> find_repetition(std::span<const double> signal, double
     const double sum = energy[n - lag] + (energy[n] - energy[lag]) - 2.0 * product[lag];
     mismatch2[lag] = std::max(0.0, sum / (pairs * power));
   }
+  return mismatch2;
+}
 
-  // The candidates are the lowest points of the valleys after the first rise.
-  struct Candidate {
-    std::size_t lag;
-    double exact;
-    double mismatch;  // between samples, where the valley's parabola has its lowest point
-  };
-  std::vector<Candidate> candidates;
+// The lowest points of the valleys after the first rise.
+std::vector<Candidate> valleys_of(const std::vector<double>& mismatch2, std::size_t longest, double mismatch_limit) {
   constexpr double kMoved2 = 0.5 * 0.5;
+  std::vector<Candidate> candidates;
   std::size_t lag = 0;
   while (lag <= longest && mismatch2[lag] < kMoved2) ++lag;
   while (lag <= longest) {
@@ -189,6 +184,27 @@ std::optional<Repetition> find_repetition(std::span<const double> signal, double
     if (std::sqrt(here) > mismatch_limit) continue;
     candidates.push_back({lowest, static_cast<double>(lowest) + shift, std::sqrt(floor2)});
   }
+  return candidates;
+}
+
+}  // namespace
+
+std::optional<Repetition> find_repetition(std::span<const double> signal, double mismatch_limit) {
+  const std::size_t n = signal.size();
+  if (n < 8) return std::nullopt;
+  std::vector<double> x(signal.begin(), signal.end());
+  const double mean = mean_of(signal);
+  std::vector<double> energy(n + 1, 0.0);
+  for (std::size_t i = 0; i < n; ++i) {
+    x[i] -= mean;
+    energy[i + 1] = energy[i] + x[i] * x[i];
+  }
+  const double power = energy[n] / static_cast<double>(n);
+  // A constant leaves rounding only; `!` also turns away values that are not finite.
+  if (!(power > 1e-24 * mean * mean) || !std::isfinite(power)) return std::nullopt;
+  const std::size_t longest = n / 2;
+  const std::vector<Candidate> candidates =
+      valleys_of(squared_mismatches(x, energy, power, longest), longest, mismatch_limit);
 
   double best = mismatch_limit;
   for (const Candidate& c : candidates) best = std::min(best, c.mismatch);

@@ -158,23 +158,55 @@ void start(Dynamics& dynamics, const model::Model& model, const data::Experiment
   dynamics.start(state, forcing, torsion_known, plausible_torque(model, experiment), resting_torque);
 }
 
-}  // namespace
-
-FreeRun run(const model::Model& model, const data::Experiment& experiment, const Options& options) {
-  if (!(options.step_s > 0.0)) throw std::invalid_argument("the step of a simulation must be positive (seconds)");
-  const Column effort = effort_column(model, experiment);
-  require_complete(model, effort == Column::current);
+void require_sample_time(const data::Experiment& experiment) {
   if (!(experiment.sample_s > 0.0))
     throw std::invalid_argument("experiment \"" + experiment.name +
                                 "\" cannot be simulated: it has no time between samples (sample_s)");
-
   // At its own step the simulation would run for hours, and no drive is controlled at this rate.
   if (experiment.sample_s >= kLongestSample_s)
     throw std::invalid_argument(fmt::format(
         "experiment \"{}\" cannot be simulated: a sample lasts {:.4g} s, the longest is {:g} s. Is time_s in another "
         "unit? Then write it as unit under [columns.time_s] in dataset.toml.",
         experiment.name, experiment.sample_s, kLongestSample_s));
+}
 
+// From a segment's first sample to its last, or to where the model diverges.
+void run_segment(Dynamics& dynamics, const RecordInputs& inputs, const data::Segment& segment, double sample_s,
+                 int steps, FreeRun& result) {
+  const double duration = sample_s / steps;
+  Forcing begin, end;
+  double arriving = std::numeric_limits<double>::quiet_NaN();
+  for (std::size_t k = segment.first; k < segment.last; ++k) {
+    const State& state = dynamics.state();
+    const double fastest = std::max(std::abs(state.motor_velocity), std::abs(state.output_velocity));
+    if (!(fastest < kDiverged)) break;
+    result.motor_position[k] = state.motor_position;
+    result.motor_velocity[k] = state.motor_velocity;
+    result.output_position[k] = state.output_position;
+    result.output_velocity[k] = state.output_velocity;
+    result.torque[k] = dynamics.torque();
+    result.motor_acceleration[k] = arriving;
+    if (k + 1 == segment.last) break;
+    for (int n = 0; n < steps; ++n) {
+      const auto time = [&](int at) { return static_cast<double>(k) + static_cast<double>(at) / steps; };
+      inputs.over(time(n), time(n + 1), begin, end);
+      const Dynamics::Accelerations accelerations = dynamics.step(begin, end, duration);
+      if (n == 0)
+        result.motor_acceleration[k] =
+            k == segment.first ? accelerations.first : 0.5 * (arriving + accelerations.first);
+      arriving = accelerations.last;
+    }
+  }
+  if (segment.last - segment.first == 1) result.motor_acceleration[segment.first] = 0.0;
+}
+
+}  // namespace
+
+FreeRun run(const model::Model& model, const data::Experiment& experiment, const Options& options) {
+  if (!(options.step_s > 0.0)) throw std::invalid_argument("the step of a simulation must be positive (seconds)");
+  const Column effort = effort_column(model, experiment);
+  require_complete(model, effort == Column::current);
+  require_sample_time(experiment);
   catalogue::DriveConstants<double> constants = catalogue::constants_of(model.drive);
   if (effort == Column::motor_torque) constants.torque_constant = 1.0;
   const Balances balances(model, constants);
@@ -196,41 +228,16 @@ FreeRun run(const model::Model& model, const data::Experiment& experiment, const
   std::vector<data::Segment> segments = experiment.segments;
   if (segments.empty()) segments.push_back({0, experiment.size()});
   const int steps = std::max(1, static_cast<int>(std::ceil(experiment.sample_s / options.step_s - 1e-6)));
-  const double duration = experiment.sample_s / steps;
-
   for (const data::Segment& segment : segments) {
     if (segment.last <= segment.first) continue;
     Dynamics dynamics(Balances(model, constants), constants, coupling);
     const RecordInputs inputs(experiment, segment, effort, constants.torque_constant, constants.reference_temperature,
                               options.effort_shift_samples);
-    Forcing begin;
-    Forcing end;
+    Forcing begin, end;
     const auto first_time = static_cast<double>(segment.first);
     inputs.over(first_time, first_time + 1.0 / steps, begin, end);
     start(dynamics, model, experiment, segment, begin, coupling, options, constants.gear_ratio);
-    double arriving = std::numeric_limits<double>::quiet_NaN();
-    for (std::size_t k = segment.first; k < segment.last; ++k) {
-      const State& state = dynamics.state();
-      const double fastest = std::max(std::abs(state.motor_velocity), std::abs(state.output_velocity));
-      if (!(fastest < kDiverged)) break;
-      result.motor_position[k] = state.motor_position;
-      result.motor_velocity[k] = state.motor_velocity;
-      result.output_position[k] = state.output_position;
-      result.output_velocity[k] = state.output_velocity;
-      result.torque[k] = dynamics.torque();
-      result.motor_acceleration[k] = arriving;
-      if (k + 1 == segment.last) break;
-      for (int n = 0; n < steps; ++n) {
-        const auto time = [&](int at) { return static_cast<double>(k) + static_cast<double>(at) / steps; };
-        inputs.over(time(n), time(n + 1), begin, end);
-        const Dynamics::Accelerations accelerations = dynamics.step(begin, end, duration);
-        if (n == 0)
-          result.motor_acceleration[k] =
-              k == segment.first ? accelerations.first : 0.5 * (arriving + accelerations.first);
-        arriving = accelerations.last;
-      }
-    }
-    if (segment.last - segment.first == 1) result.motor_acceleration[segment.first] = 0.0;
+    run_segment(dynamics, inputs, segment, experiment.sample_s, steps, result);
   }
   return result;
 }

@@ -79,12 +79,6 @@ std::string ending_of(const std::string& what) {
   throw UnknownNameError(fmt::format("there is no \"{}\" to save; model, report and block are", what));
 }
 
-std::filesystem::path own_folder() {
-  std::string name = (std::filesystem::temp_directory_path() / "flexspline-workbench-XXXXXX").string();
-  if (!mkdtemp(name.data())) throw std::runtime_error(fmt::format("no folder could be created at {}", name));
-  return name;
-}
-
 json reply_of(const std::string& what) {
   return {{"what", what}};
 }
@@ -92,14 +86,15 @@ json reply_of(const std::string& what) {
 }  // namespace
 
 Api::Api(Setup setup)
-    : setup_(std::move(setup)), dropped_(setup_.scratch.empty() ? own_folder() : setup_.scratch), drive_(setup_.drive) {
+    : setup_(std::move(setup)),
+      own_folder_(setup_.scratch.empty() ? std::make_unique<const system::TemporaryFolder>() : nullptr),
+      dropped_(own_folder_ ? own_folder_->path() : setup_.scratch),
+      drive_(setup_.drive) {
   restore_tabs();
 }
 
 Api::~Api() {
   tabs_.clear();  // work ends before the objects that it uses
-  std::error_code error;
-  if (setup_.scratch.empty()) std::filesystem::remove_all(dropped_, error);
 }
 
 void Api::store_all_tabs() {
@@ -259,10 +254,15 @@ json Api::post(const Request& request) {
 
 json Api::act(const std::shared_ptr<Session>& session, const json& body) {
   const std::string what = field(body, "do");
-  const auto pipeline = setup_.pipeline;
   constexpr std::string_view kWithoutModel[] = {"cancel", "dismiss", "propose", "begin", "forget"};
   if (!session->has_model() && std::ranges::find(kWithoutModel, what) == std::end(kWithoutModel))
     throw UnknownNameError("there is no model yet; drop recordings on the page and begin with them");
+  if (!act_on_project(session, what, body) && !act_on_model(session, what, body) && !act_on_drive(session, what, body))
+    throw UnknownNameError(fmt::format("\"{}\" cannot be done", what));
+  return json::object();
+}
+
+bool Api::act_on_project(const std::shared_ptr<Session>& session, const std::string& what, const json& body) {
   if (what == "propose") {
     start_proposal(session, choices_of(body));
   } else if (what == "begin") {
@@ -274,7 +274,15 @@ json Api::act(const std::shared_ptr<Session>& session, const json& body) {
     session->cancel();
   } else if (what == "dismiss") {
     session->set("problem", nullptr);
-  } else if (what == "undo" || what == "redo" || what == "go") {
+  } else {
+    return false;
+  }
+  return true;
+}
+
+bool Api::act_on_model(const std::shared_ptr<Session>& session, const std::string& what, const json& body) {
+  const auto pipeline = setup_.pipeline;
+  if (what == "undo" || what == "redo" || what == "go") {
     if (session->works()) throw BusyError("something is still running; wait, or cancel it");
     session->change([&](auto& history) {
       if (what == "undo") history.undo();
@@ -303,7 +311,14 @@ json Api::act(const std::shared_ptr<Session>& session, const json& body) {
     start_trial(session, field(body, "scenario"));
   } else if (what == "save") {
     start_save(session, body);
-  } else if (what == "connect") {
+  } else {
+    return false;
+  }
+  return true;
+}
+
+bool Api::act_on_drive(const std::shared_ptr<Session>& session, const std::string& what, const json& body) {
+  if (what == "connect") {
     const std::string drive = field(body, "drive");
     session->start("Connecting", [this, drive](const Progress& progress) {
       progress(drive);
@@ -336,9 +351,9 @@ json Api::act(const std::shared_ptr<Session>& session, const json& body) {
   } else if (what == "empty-map") {
     drive_.reset_residual_map();
   } else {
-    throw UnknownNameError(fmt::format("\"{}\" cannot be done", what));
+    return false;
   }
-  return json::object();
+  return true;
 }
 
 void Api::start_step(const std::shared_ptr<Session>& session, const std::string& what,

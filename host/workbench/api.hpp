@@ -10,6 +10,7 @@
 #include <string>
 #include <vector>
 
+#include "host/system/temporary_folder.hpp"
 #include "host/workbench/closed_loop_run.hpp"
 #include "host/workbench/live_drive.hpp"
 #include "host/workbench/project.hpp"
@@ -72,6 +73,10 @@ class Api {
   nlohmann::json post(const Request& request);
   Answer file(const Request& request);
   nlohmann::json act(const std::shared_ptr<Session>& session, const nlohmann::json& body);
+  // Each returns false where it knows no such action.
+  bool act_on_project(const std::shared_ptr<Session>& session, const std::string& what, const nlohmann::json& body);
+  bool act_on_model(const std::shared_ptr<Session>& session, const std::string& what, const nlohmann::json& body);
+  bool act_on_drive(const std::shared_ptr<Session>& session, const std::string& what, const nlohmann::json& body);
   void start_step(const std::shared_ptr<Session>& session, const std::string& what,
                   std::function<std::shared_ptr<Step>(const Step&, const Progress&)> make);
   void start_diagnosis(const std::shared_ptr<Session>& session);
@@ -92,7 +97,8 @@ class Api {
   void refuse_deadly_job(const std::string& key) const;
 
   Setup setup_;
-  std::filesystem::path dropped_;  // folder of dropped files; ends with the workbench
+  std::unique_ptr<const system::TemporaryFolder> own_folder_;  // where none was given
+  std::filesystem::path dropped_;                              // folder of dropped files; ends with the workbench
   LiveDrive drive_;
   std::mutex mutex_;
   std::list<std::shared_ptr<Session>> tabs_;  // latest used first

@@ -3,12 +3,12 @@
 #include <fmt/format.h>
 #include <httplib.h>
 
-#include <cstdlib>
 #include <filesystem>
 #include <memory>
 #include <nlohmann/json.hpp>
 #include <thread>
 
+#include "host/system/temporary_folder.hpp"
 #include "host/workbench/access_control.hpp"
 #include "host/workbench/assets.hpp"
 #include "host/workbench/supervisor.hpp"
@@ -64,22 +64,6 @@ bool send_asset(const std::string& path, httplib::Response& response) {
   return false;
 }
 
-// Files that were dropped, and the tabs: for as long as the workbench runs.
-struct Scratch {
-  Scratch() {
-    std::string name = (std::filesystem::temp_directory_path() / "flexspline-workbench-XXXXXX").string();
-    if (!mkdtemp(name.data())) throw std::runtime_error(fmt::format("no folder could be created at {}", name));
-    path = name;
-  }
-  ~Scratch() {
-    std::error_code error;
-    std::filesystem::remove_all(path, error);
-  }
-  Scratch(const Scratch&) = delete;
-  Scratch& operator=(const Scratch&) = delete;
-  std::filesystem::path path;
-};
-
 // In the worker process.
 void answer_until(httplib::Server& server, const Setup& setup, const std::function<bool()>& ends,
                   const std::string& token, int port) {
@@ -127,9 +111,10 @@ void serve(Setup setup, const ServerOptions& serving) {
   if (port <= 0)
     throw std::runtime_error(
         fmt::format("port {} of this machine is taken; give another --port, or none", serving.port));
-  const Scratch scratch;
+  // Files that were dropped, and the tabs: for as long as the workbench runs.
+  const system::TemporaryFolder scratch;
   JobTable jobs;
-  setup.scratch = scratch.path;
+  setup.scratch = scratch.path();
   setup.jobs = &jobs;
   serving.listening(fmt::format("http://{}:{}/{}/", kAddress, port, token));
   const auto work = [&](const std::vector<Failure>& failures) {

@@ -109,7 +109,7 @@ const Reasons& reasons() {
   static const Reasons kReasons = {
       {"host/catalogue/user_defined_effect.hpp",
        "what a user made is named in model files and made apart from the others"},
-      {"host/cli/base_model.cpp", "a first model has the effects that every drive has"},
+      {"host/project/base_model.cpp", "a first model has the effects that every drive has"},
       {"host/cli/command_demo.cpp",
        "what the demo may hide is chosen, so that a newcomer sees something that he knows"},
       {"host/deployment/drive_settings.cpp",

@@ -1,4 +1,4 @@
-#include "host/cli/column_guess.hpp"
+#include "host/project/column_guess.hpp"
 
 #include <fmt/format.h>
 
@@ -9,7 +9,7 @@
 #include <set>
 #include <utility>
 
-namespace flexspline::cli {
+namespace flexspline::project {
 namespace {
 
 using data::Quantity;
@@ -243,4 +243,4 @@ std::optional<std::string> velocity_unit_by_values(const std::vector<double>& ti
   return std::nullopt;
 }
 
-}  // namespace flexspline::cli
+}  // namespace flexspline::project

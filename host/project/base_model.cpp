@@ -1,4 +1,4 @@
-#include "host/cli/base_model.hpp"
+#include "host/project/base_model.hpp"
 
 #include <fmt/format.h>
 
@@ -11,7 +11,7 @@
 #include "host/output/text.hpp"
 #include "host/signals/differentiate.hpp"
 
-namespace flexspline::cli {
+namespace flexspline::project {
 namespace {
 
 using data::Column;
@@ -180,4 +180,4 @@ BaseModel base_model(const Dataset& dataset, const std::string& name) {
   return Builder(dataset, name).build();
 }
 
-}  // namespace flexspline::cli
+}  // namespace flexspline::project

@@ -7,10 +7,10 @@
 
 #include "host/data/dataset.hpp"
 
-namespace flexspline::cli {
+namespace flexspline::data {
 
 struct SignalSummary {
-  data::Column column = data::Column::current;
+  Column column = Column::current;
   std::string unit;
   double low = 0.0;
   double high = 0.0;
@@ -36,13 +36,13 @@ struct RecordSummary {
   std::optional<double> period_s;  // of a motion that repeats itself
 };
 
-RecordSummary summary_of(const data::Experiment& experiment, data::Axis axis);
+RecordSummary summary_of(const Experiment& experiment, Axis axis);
 
 // Speed of the motor, else of the output, smoothed over about ten samples; empty where no motion is measured.
-std::vector<double> velocity_of(const data::Experiment& experiment);
+std::vector<double> velocity_of(const Experiment& experiment);
 
 // Period after which the motion repeats itself in the longest segment: of the position or its set point, else of the
 // velocity.
-std::optional<double> period_samples(const data::Experiment& experiment);
+std::optional<double> period_samples(const Experiment& experiment);
 
-}  // namespace flexspline::cli
+}  // namespace flexspline::data

@@ -7,11 +7,11 @@
 #include <string>
 #include <vector>
 
-#include "host/cli/column_guess.hpp"
-#include "host/cli/new_options.hpp"
 #include "host/data/dataset_toml.hpp"
+#include "host/project/column_guess.hpp"
+#include "host/project/request.hpp"
 
-namespace flexspline::cli {
+namespace flexspline::project {
 
 struct Draft {
   data::DatasetToml toml;                       // files with absolute paths
@@ -31,14 +31,14 @@ struct Draft {
 };
 
 // From CSV and MAT files and folders of them, or from one dataset.toml, whose facts are kept.
-// Throws data::DataError and UsageError.
-Draft draft_of(const NewOptions& options);
+// Throws data::DataError and RequestError.
+Draft draft_of(const Request& request);
 
 // Reads the measurements as the draft describes them.
-data::Dataset load_draft(const Draft& draft, const NewOptions& options);
+data::Dataset load_draft(const Draft& draft, const Request& request);
 
 // Adds what only the values show: the gear ratio, and the split of a single record.
-void complete(Draft& draft, data::Dataset& dataset);
+void take_facts_of_values(Draft& draft, data::Dataset& dataset);
 
 // Why the only position may be of the other side of the gear: speeds that no motor, or no link of a robot, has.
 std::vector<std::string> implausible_sides(const Draft& draft, const data::Dataset& dataset);
@@ -51,4 +51,4 @@ inline data::KeyValue text_value(const std::string& text) {
   return {text, std::nullopt, "", 0};
 }
 
-}  // namespace flexspline::cli
+}  // namespace flexspline::project

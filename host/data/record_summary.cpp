@@ -1,16 +1,14 @@
-#include "host/cli/record_summary.hpp"
+#include "host/data/record_summary.hpp"
 
 #include <algorithm>
 #include <cmath>
 #include <numeric>
 
+#include "host/signals/quantum.hpp"
 #include "host/signals/spectrum.hpp"
 
-namespace flexspline::cli {
+namespace flexspline::data {
 namespace {
-
-using data::Column;
-using data::Experiment;
 
 constexpr double kMovingShare = 0.01;    // of the largest speed
 constexpr double kReversalShare = 0.05;  // a change of sign counts once it reaches this share of the largest speed
@@ -23,9 +21,9 @@ double quantile(std::vector<double> values, double share) {
 }
 
 // Third differences of white noise have 1 + 9 + 9 + 1 = 20 times its variance; motion hardly changes them.
-double noise_std(const std::vector<double>& x, const std::vector<data::Segment>& segments) {
+double noise_std(const std::vector<double>& x, const std::vector<Segment>& segments) {
   std::vector<double> thirds;
-  for (const data::Segment& s : segments)
+  for (const Segment& s : segments)
     for (std::size_t k = s.first + 3; k < s.last; ++k)
       thirds.push_back(std::abs(x[k] - 3.0 * x[k - 1] + 3.0 * x[k - 2] - x[k - 3]));
   if (thirds.empty()) return 0.0;
@@ -35,30 +33,16 @@ double noise_std(const std::vector<double>& x, const std::vector<data::Segment>&
   return std::sqrt(squares / static_cast<double>(thirds.size()) / 20.0);
 }
 
-std::optional<double> quantum(const std::vector<double>& x) {
-  std::vector<double> steps;
-  for (std::size_t k = 1; k < x.size(); ++k)
-    if (x[k] != x[k - 1]) steps.push_back(std::abs(x[k] - x[k - 1]));
-  if (steps.size() < 16) return std::nullopt;
-  const double smallest = quantile(steps, 0.01);
-  const auto is_multiple = [&](double step) {
-    const double count = step / smallest;
-    return std::abs(count - std::round(count)) < 0.02 * std::max(1.0, 0.05 * count);
-  };
-  const auto multiples = static_cast<std::size_t>(std::count_if(steps.begin(), steps.end(), is_multiple));
-  return 10 * multiples >= 9 * steps.size() ? std::optional(smallest) : std::nullopt;
-}
-
-SignalSummary signal_of(const Experiment& e, Column column, data::Axis axis) {
+SignalSummary signal_of(const Experiment& e, Column column, Axis axis) {
   const std::vector<double>& x = e[column];
   const auto [low, high] = std::minmax_element(x.begin(), x.end());
   SignalSummary s;
   s.column = column;
-  s.unit = data::unit_of(column, axis);
+  s.unit = unit_of(column, axis);
   s.low = *low;
   s.high = *high;
   s.noise_std = noise_std(x, e.segments);
-  s.quantum = quantum(x);
+  s.quantum = signals::quantum_of(x);
   s.stated_noise_std = e.noise_std[static_cast<std::size_t>(column)];
   return s;
 }
@@ -86,7 +70,7 @@ std::vector<double> velocity_of(const Experiment& e) {
     std::vector<double> v(p.size(), 0.0);
     // Ten samples apart, the encoder's resolution does not pass for speed.
     constexpr std::size_t kReach = 5;
-    for (const data::Segment& s : e.segments)
+    for (const Segment& s : e.segments)
       for (std::size_t k = s.first; k < s.last; ++k) {
         const std::size_t from = std::max(s.first, k >= kReach ? k - kReach : 0);
         const std::size_t to = std::min(s.last - 1, k + kReach);
@@ -111,7 +95,7 @@ std::optional<double> period_samples(const Experiment& e) {
   return std::nullopt;
 }
 
-RecordSummary summary_of(const Experiment& e, data::Axis axis) {
+RecordSummary summary_of(const Experiment& e, Axis axis) {
   RecordSummary r;
   r.samples = e.size();
   r.rate_hz = e.sample_s > 0.0 ? 1.0 / e.sample_s : 0.0;
@@ -119,9 +103,9 @@ RecordSummary summary_of(const Experiment& e, data::Axis axis) {
   r.gaps = e.segments.empty() ? 0 : e.segments.size() - 1;
   const auto masked = std::count_if(e.masked.begin(), e.masked.end(), [](std::uint8_t m) { return m != 0; });
   r.masked_percent = e.size() > 0 ? 100.0 * static_cast<double>(masked) / static_cast<double>(e.size()) : 0.0;
-  for (std::size_t c = 0; c < data::kColumns; ++c)
+  for (std::size_t c = 0; c < kColumns; ++c)
     if (e.has(static_cast<Column>(c))) r.signals.push_back(signal_of(e, static_cast<Column>(c), axis));
-  r.speed_unit = data::unit_of(Column::motor_velocity, axis);
+  r.speed_unit = unit_of(Column::motor_velocity, axis);
   if (const auto period = period_samples(e)) r.period_s = *period * e.sample_s;
 
   const std::vector<double> velocity = velocity_of(e);
@@ -139,4 +123,4 @@ RecordSummary summary_of(const Experiment& e, data::Axis axis) {
   return r;
 }
 
-}  // namespace flexspline::cli
+}  // namespace flexspline::data

@@ -1,16 +1,16 @@
 #include <fmt/format.h>
-#include <stdlib.h>
 
 #include <algorithm>
 #include <cmath>
 #include <optional>
 
-#include "host/cli/project_draft.hpp"
-#include "host/cli/record_summary.hpp"
+#include "host/data/record_summary.hpp"
 #include "host/model/text.hpp"
 #include "host/output/text.hpp"
+#include "host/project/draft.hpp"
+#include "host/system/temporary_folder.hpp"
 
-namespace flexspline::cli {
+namespace flexspline::project {
 namespace {
 
 namespace fs = std::filesystem;
@@ -18,26 +18,6 @@ using data::Column;
 
 // Each part of a split record must be long enough to be evaluated.
 constexpr std::size_t kFewestSamplesOfAPart = 500;
-
-class TemporaryFolder {
- public:
-  TemporaryFolder() {
-    std::string path = (fs::temp_directory_path() / "flexspline-XXXXXX").string();
-    if (::mkdtemp(path.data()) == nullptr)
-      throw UsageError(fmt::format("{}: no temporary folder could be created; check TMPDIR", path));
-    path_ = path;
-  }
-  TemporaryFolder(const TemporaryFolder&) = delete;
-  TemporaryFolder& operator=(const TemporaryFolder&) = delete;
-  ~TemporaryFolder() {
-    std::error_code ignored;
-    fs::remove_all(path_, ignored);
-  }
-  const fs::path& path() const { return path_; }
-
- private:
-  fs::path path_;
-};
 
 void replace_all(std::string& text, const std::string& what, const std::string& by) {
   for (std::size_t at = text.find(what); at != std::string::npos; at = text.find(what, at + by.size()))
@@ -75,7 +55,7 @@ struct Split {
 std::optional<Split> split_of(const data::Experiment& e) {
   const std::size_t n = e.size();
   if (n < 2 * kFewestSamplesOfAPart) return std::nullopt;
-  if (const auto period = period_samples(e)) {
+  if (const auto period = data::period_samples(e)) {
     const double periods = static_cast<double>(n) / *period;
     const double sample = std::round(std::round(periods) / 2.0) * *period;
     if (sample >= static_cast<double>(kFewestSamplesOfAPart) &&
@@ -87,7 +67,7 @@ std::optional<Split> split_of(const data::Experiment& e) {
                       *period * e.sample_s)};
   }
   // The standstill next to the middle; a cut there leaves both filters quiet.
-  const std::vector<double> velocity = velocity_of(e);
+  const std::vector<double> velocity = data::velocity_of(e);
   double fastest = 0.0;
   for (const double v : velocity) fastest = std::max(fastest, std::abs(v));
   std::size_t best = n / 2;
@@ -137,19 +117,19 @@ std::string remark(const std::string& comment) {
 
 }  // namespace
 
-data::Dataset load_draft(const Draft& draft, const NewOptions& options) {
-  const TemporaryFolder folder;
+data::Dataset load_draft(const Draft& draft, const Request& request) {
+  const system::TemporaryFolder folder;
   const fs::path file = folder.path() / "dataset.toml";
   model::save(file, text_of(draft, {}));
   // Messages name the file that is going to be, not the one that is gone.
   const auto renamed = [&](std::vector<data::Finding> findings) {
     for (data::Finding& f : findings)
       for (std::string* text : {&f.file, &f.what, &f.remedy})
-        replace_all(*text, file.string(), (options.out / "dataset.toml").string());
+        replace_all(*text, file.string(), (request.out / "dataset.toml").string());
     return findings;
   };
   try {
-    data::Dataset dataset = data::load({file}, {options.data.tolerate, false});
+    data::Dataset dataset = data::load({file}, {request.tolerate, false});
     dataset.findings = renamed(std::move(dataset.findings));
     return dataset;
   } catch (const data::DataError& error) {
@@ -157,7 +137,7 @@ data::Dataset load_draft(const Draft& draft, const NewOptions& options) {
   }
 }
 
-void complete(Draft& draft, data::Dataset& dataset) {
+void take_facts_of_values(Draft& draft, data::Dataset& dataset) {
   if (!dataset.drive.gear_ratio) {
     const auto ratio = gear_ratio_of(dataset);
     if (ratio && *ratio > 0.0) {
@@ -195,7 +175,7 @@ std::vector<std::string> implausible_sides(const Draft& draft, const data::Datas
   const double ratio = dataset.drive.gear_ratio.value_or(1.0);
   double fastest = 0.0;
   for (const data::Experiment& e : dataset.experiments)
-    if (const auto speed = summary_of(e, data::Axis::rotary).highest_speed) fastest = std::max(fastest, *speed);
+    if (const auto speed = data::summary_of(e, data::Axis::rotary).highest_speed) fastest = std::max(fastest, *speed);
   const bool scaled = *draft.side == Side::link && ratio != 1.0;
   if (scaled && fastest > kFastestMotor_rad_s)
     return {
@@ -245,4 +225,4 @@ std::string text_of(const Draft& draft, const fs::path& folder) {
   return text;
 }
 
-}  // namespace flexspline::cli
+}  // namespace flexspline::project

@@ -1,4 +1,4 @@
-#include "host/cli/project_draft.hpp"
+#include "host/project/draft.hpp"
 
 #include <fmt/format.h>
 
@@ -8,13 +8,13 @@
 #include <optional>
 #include <utility>
 
-#include "host/cli/record_summary.hpp"
+#include "host/data/record_summary.hpp"
 #include "host/data/recording.hpp"
 #include "host/model/text.hpp"
 #include "host/output/text.hpp"
 #include "host/text/nearest.hpp"
 
-namespace flexspline::cli {
+namespace flexspline::project {
 namespace {
 
 namespace fs = std::filesystem;
@@ -39,13 +39,13 @@ data::KeyValue number_value(double value) {
 ColumnGuess mapping_of(const std::string& text, const std::vector<std::string>& names, const data::Recording& first) {
   const std::size_t equals = text.find('=');
   if (equals == std::string::npos)
-    throw UsageError(fmt::format("--map {} is not OURS=THEIRS[:UNIT]; as in --map current_a=Iq:mA", text));
+    throw RequestError(fmt::format("--map {} is not OURS=THEIRS[:UNIT]; as in --map current_a=Iq:mA", text));
   ColumnGuess guess{text.substr(0, equals), text.substr(equals + 1), "", ""};
   if (guess.ours != "time_s" && !data::column_from_name(guess.ours)) {
     std::vector<std::string> ours = {"time_s"};
     for (std::size_t c = 0; c < data::kColumns; ++c) ours.emplace_back(data::column_name(static_cast<Column>(c)));
-    throw UsageError(fmt::format("--map {}: there is no column \"{}\" of ours; ours are {}", text, guess.ours,
-                                 output::listed(ours)));
+    throw RequestError(fmt::format("--map {}: there is no column \"{}\" of ours; ours are {}", text, guess.ours,
+                                   output::listed(ours)));
   }
   const auto is_name = [&](const std::string& name) {
     return std::find(names.begin(), names.end(), name) != names.end();
@@ -56,15 +56,15 @@ ColumnGuess mapping_of(const std::string& text, const std::vector<std::string>& 
     guess.unit = guess.theirs.substr(colon + 1);
     guess.theirs.erase(colon);
     if (!data::unit_from_text(guess.unit))
-      throw UsageError(fmt::format("--map {}: the unit \"{}\" is not known; write one as in --map {}={}:rpm", text,
-                                   guess.unit, guess.ours, guess.theirs));
+      throw RequestError(fmt::format("--map {}: the unit \"{}\" is not known; write one as in --map {}={}:rpm", text,
+                                     guess.unit, guess.ours, guess.theirs));
   }
   if (!is_name(guess.theirs)) {
     const std::string why = first.why_not(guess.theirs);
-    throw UsageError(fmt::format("--map {}: {}; the columns are {}", text,
-                                 why.empty() ? fmt::format("no file has a column \"{}\"", guess.theirs)
-                                             : fmt::format("\"{}\" {}", guess.theirs, why),
-                                 output::listed(text::nearest_first(guess.theirs, names))));
+    throw RequestError(fmt::format("--map {}: {}; the columns are {}", text,
+                                   why.empty() ? fmt::format("no file has a column \"{}\"", guess.theirs)
+                                               : fmt::format("\"{}\" {}", guess.theirs, why),
+                                   output::listed(text::nearest_first(guess.theirs, names))));
   }
   return guess;
 }
@@ -185,17 +185,17 @@ void turn(HeaderGuess& guess, const std::vector<std::string>& turned) {
       continue;
     }
     if (std::find(guess.native.begin(), guess.native.end(), ours) == guess.native.end())
-      throw UsageError(fmt::format("--turn {}: there is no such column; map one with --map {}=THEIRS", ours, ours));
+      throw RequestError(fmt::format("--turn {}: there is no such column; map one with --map {}=THEIRS", ours, ours));
     guess.columns.push_back({ours, ours, "", "", -1.0});
   }
 }
 
-void add_options(Draft& draft, const NewOptions& options) {
-  if (!options.axis.empty()) draft.toml.drive["axis"] = text_value(options.axis);
-  if (options.gear_ratio) draft.toml.drive["gear_ratio"] = number_value(*options.gear_ratio);
-  if (options.torque_constant_nm_a)
-    draft.toml.drive["torque_constant_nm_a"] = number_value(*options.torque_constant_nm_a);
-  if (options.encoder_counts) draft.toml.defaults["encoder_counts"] = number_value(*options.encoder_counts);
+void add_stated_facts(Draft& draft, const Request& request) {
+  if (!request.axis.empty()) draft.toml.drive["axis"] = text_value(request.axis);
+  if (request.gear_ratio) draft.toml.drive["gear_ratio"] = number_value(*request.gear_ratio);
+  if (request.torque_constant_nm_a)
+    draft.toml.drive["torque_constant_nm_a"] = number_value(*request.torque_constant_nm_a);
+  if (request.encoder_counts) draft.toml.defaults["encoder_counts"] = number_value(*request.encoder_counts);
 }
 
 std::vector<LoggedColumn> logged_columns(const std::vector<std::string>& names, const data::Recording& first) {
@@ -235,60 +235,78 @@ void take_side(Draft& draft, const HeaderGuess& guess) {
         "that makes a difference; give --position-side motor or --position-side link";
 }
 
-Draft draft_of_files(const std::vector<fs::path>& files, const NewOptions& options) {
-  Draft draft;
-  data::Findings findings;
+void add_new(const std::vector<std::string>& from, std::vector<std::string>& to) {
+  for (const std::string& name : from)
+    if (std::find(to.begin(), to.end(), name) == to.end()) to.push_back(name);
+}
+
+// The columns of all files.
+struct LoggedFiles {
   std::vector<std::string> names;
-  std::vector<Lengths> lengths;
+  std::vector<Lengths> lengths;  // by file
   std::unique_ptr<data::Recording> first;
-  const auto add_new = [](const std::vector<std::string>& from, std::vector<std::string>& to) {
-    for (const std::string& name : from)
-      if (std::find(to.begin(), to.end(), name) == to.end()) to.push_back(name);
-  };
+};
+
+// Adds an experiment a file, or a run in it, to the draft.
+LoggedFiles open_files(const std::vector<fs::path>& files, Draft& draft) {
+  LoggedFiles logged;
+  data::Findings findings;
   for (const fs::path& file : files) {
     std::unique_ptr<data::Recording> recording = data::open_recording(file, findings);
-    lengths.push_back(lengths_of(*recording));
+    logged.lengths.push_back(lengths_of(*recording));
     std::vector<std::string> of_file;
-    for (const auto& [name, length] : lengths.back()) of_file.push_back(name);
-    add_new(of_file, names);
+    for (const auto& [name, length] : logged.lengths.back()) of_file.push_back(name);
+    add_new(of_file, logged.names);
     for (data::ExperimentEntry& entry : entries_of(file, *recording))
       draft.toml.experiments.push_back(std::move(entry));
-    if (!first) first = std::move(recording);
+    if (!logged.first) logged.first = std::move(recording);
   }
-  std::vector<ColumnGuess> stated;
-  for (const std::string& text : options.map) stated.push_back(mapping_of(text, names, *first));
+  return logged;
+}
+
+GuessOptions guess_options(const Request& request, const std::vector<std::string>& names) {
   GuessOptions how;
-  if (!options.axis.empty()) how.axis = options.axis == "linear" ? data::Axis::linear : data::Axis::rotary;
-  how.position_side = options.position_side == "link"    ? Side::link
-                      : options.position_side == "motor" ? Side::motor
+  if (!request.axis.empty()) how.axis = request.axis == "linear" ? data::Axis::linear : data::Axis::rotary;
+  how.position_side = request.position_side == "link"    ? Side::link
+                      : request.position_side == "motor" ? Side::motor
                                                          : Side::open;
-  how.gear_ratio = options.gear_ratio;
-  how.joint = options.joint;
-  for (const std::string& name : options.without) {
+  how.gear_ratio = request.gear_ratio;
+  how.joint = request.joint;
+  for (const std::string& name : request.without) {
     if (std::find(names.begin(), names.end(), name) == names.end())
-      throw UsageError(fmt::format("--without {}: no file has such a column; the columns are {}", name,
-                                   output::listed(text::nearest_first(name, names))));
+      throw RequestError(fmt::format("--without {}: no file has such a column; the columns are {}", name,
+                                     output::listed(text::nearest_first(name, names))));
     if (name == "time_s" || data::column_from_name(name))
-      throw UsageError(
+      throw RequestError(
           fmt::format("--without {0}: a column that has a name of ours is always read; give it another name "
                       "in the file, or --map {0}=THEIRS to take another one for it",
                       name));
     how.without.push_back(name);
   }
-  how.pole_pairs = options.pole_pairs;
+  how.pole_pairs = request.pole_pairs;
+  return how;
+}
+
+HeaderGuess guess_of_files(const LoggedFiles& logged, const Request& request) {
+  std::vector<ColumnGuess> stated;
+  for (const std::string& text : request.map) stated.push_back(mapping_of(text, logged.names, *logged.first));
+  const GuessOptions how = guess_options(request, logged.names);
   const ColumnGuess* time = find(stated, "time_s");
   std::vector<std::string> of_one_table;
-  for (const Lengths& of_file : lengths)
+  for (const Lengths& of_file : logged.lengths)
     add_new(table_with(time != nullptr ? time->theirs : "time_s", of_file), of_one_table);
-  HeaderGuess guess = guess_columns(logged_columns(of_one_table, *first), stated, how);
-  if (options.joint && std::find(guess.joints.begin(), guess.joints.end(), *options.joint) == guess.joints.end())
-    throw UsageError(fmt::format("--joint {}: {}", *options.joint,
-                                 guess.joints.empty()
-                                     ? std::string("no position or velocity has the number of a joint")
-                                     : fmt::format("the joints are {}", fmt::join(guess.joints, ", "))));
-  guess_units(guess.columns, *first);
-  turn(guess, options.turned);
+  HeaderGuess guess = guess_columns(logged_columns(of_one_table, *logged.first), stated, how);
+  if (request.joint && std::find(guess.joints.begin(), guess.joints.end(), *request.joint) == guess.joints.end())
+    throw RequestError(fmt::format("--joint {}: {}", *request.joint,
+                                   guess.joints.empty()
+                                       ? std::string("no position or velocity has the number of a joint")
+                                       : fmt::format("the joints are {}", fmt::join(guess.joints, ", "))));
+  guess_units(guess.columns, *logged.first);
+  turn(guess, request.turned);
+  return guess;
+}
 
+void take_columns(Draft& draft, const HeaderGuess& guess) {
   for (const ColumnGuess& c : guess.columns) {
     data::ColumnMapping mapping;
     mapping.source = c.theirs;
@@ -300,7 +318,14 @@ Draft draft_of_files(const std::vector<fs::path>& files, const NewOptions& optio
                                       c.why.empty() ? fmt::format("\"{}\", as stated", c.theirs) : c.why,
                                       c.unit.empty() ? "" : fmt::format(" ({})", c.unit)));
   }
-  if (guess.axis == data::Axis::linear || !options.axis.empty()) {
+}
+
+Draft draft_of_files(const std::vector<fs::path>& files, const Request& request) {
+  Draft draft;
+  const LoggedFiles logged = open_files(files, draft);
+  const HeaderGuess guess = guess_of_files(logged, request);
+  take_columns(draft, guess);
+  if (guess.axis == data::Axis::linear || !request.axis.empty()) {
     draft.toml.drive["axis"] = text_value(guess.axis == data::Axis::linear ? "linear" : "rotary");
     if (!guess.axis_why.empty()) {
       draft.axis_comment = fmt::format("guess: {}", guess.axis_why);
@@ -316,15 +341,15 @@ Draft draft_of_files(const std::vector<fs::path>& files, const NewOptions& optio
   for (const ColumnGuess& c : guess.columns) draft.there.push_back(c.ours);
   draft.columns = guess.columns;
   draft.unused = guess.unused;
-  add_options(draft, options);
+  add_stated_facts(draft, request);
   return draft;
 }
 
-Draft draft_of_toml(const fs::path& path, const NewOptions& options) {
-  if (!options.map.empty())
-    throw UsageError(fmt::format("--map does not go with {}, which maps columns; change it there", path.string()));
+Draft draft_of_toml(const fs::path& path, const Request& request) {
+  if (!request.map.empty())
+    throw RequestError(fmt::format("--map does not go with {}, which maps columns; change it there", path.string()));
   Draft draft;
-  data::Findings findings(options.data.tolerate);
+  data::Findings findings(request.tolerate);
   draft.toml = data::read_dataset_toml(path, findings);
   if (draft.toml.experiments.empty())
     for (const fs::path& file :
@@ -336,30 +361,30 @@ Draft draft_of_toml(const fs::path& path, const NewOptions& options) {
   for (data::ExperimentEntry& entry : draft.toml.experiments) entry.file = fs::absolute(entry.file);
   draft.from_toml = true;
   draft.notes.push_back(fmt::format("the facts in {} are kept", path.string()));
-  add_options(draft, options);
+  add_stated_facts(draft, request);
   return draft;
 }
 
 }  // namespace
 
-Draft draft_of(const NewOptions& options) {
+Draft draft_of(const Request& request) {
   data::Findings findings;
   std::vector<fs::path> files;
-  for (const fs::path& path : options.data.data) {
+  for (const fs::path& path : request.data) {
     if (!fs::exists(path))
       fail(path, "there is no such file or folder", "give CSV or MAT files, folders of them, or a dataset.toml");
     if (const auto toml = toml_of(path)) {
-      if (options.data.data.size() > 1)
-        throw UsageError(fmt::format("{} already lists what belongs together; give it alone, or give recordings only",
-                                     toml->string()));
-      return draft_of_toml(*toml, options);
+      if (request.data.size() > 1)
+        throw RequestError(fmt::format("{} already lists what belongs together; give it alone, or give recordings only",
+                                       toml->string()));
+      return draft_of_toml(*toml, request);
     }
     if (fs::is_directory(path))
       for (fs::path& file : data::recordings_in(path, findings)) files.push_back(std::move(file));
     else
       files.push_back(path);
   }
-  return draft_of_files(files, options);
+  return draft_of_files(files, request);
 }
 
-}  // namespace flexspline::cli
+}  // namespace flexspline::project

@@ -7,7 +7,7 @@
 #include "host/data/dataset.hpp"
 #include "host/model/model.hpp"
 
-namespace flexspline::cli {
+namespace flexspline::project {
 
 struct BaseModel {
   model::Model model;
@@ -20,4 +20,4 @@ struct BaseModel {
 // values and their source says so.
 BaseModel base_model(const data::Dataset& dataset, const std::string& name);
 
-}  // namespace flexspline::cli
+}  // namespace flexspline::project

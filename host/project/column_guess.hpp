@@ -6,11 +6,11 @@
 #include <string_view>
 #include <vector>
 
-#include "host/cli/column_names.hpp"
 #include "host/data/dataset.hpp"
 #include "host/data/units.hpp"
+#include "host/project/column_names.hpp"
 
-namespace flexspline::cli {
+namespace flexspline::project {
 
 struct LoggedColumn {
   std::string name;
@@ -60,4 +60,4 @@ std::optional<std::string> velocity_unit_by_values(const std::vector<double>& ti
                                                    const std::vector<double>& position_rad,
                                                    const std::vector<double>& velocity);
 
-}  // namespace flexspline::cli
+}  // namespace flexspline::project

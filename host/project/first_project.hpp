@@ -5,11 +5,11 @@
 #include <string>
 #include <vector>
 
-#include "host/cli/base_model.hpp"
-#include "host/cli/project_draft.hpp"
 #include "host/data/dataset.hpp"
+#include "host/project/base_model.hpp"
+#include "host/project/draft.hpp"
 
-namespace flexspline::cli {
+namespace flexspline::project {
 
 struct FirstProject {
   BaseModel base;
@@ -17,11 +17,11 @@ struct FirstProject {
   std::vector<std::string> warnings;
 };
 
-// Completes the draft by what only the values show. Throws UsageError where a question is open or no torque balance can
-// be formed, data::DataError where the measurements cannot be used.
-FirstProject first_project(Draft& draft, const NewOptions& options);
+// Completes the draft by what only the values show. Throws RequestError where a question is open or no torque balance
+// can be formed, data::DataError where the measurements cannot be used.
+FirstProject first_project(Draft& draft, const Request& request);
 
 // The text of the model's file.
 std::string text_of(const BaseModel& base);
 
-}  // namespace flexspline::cli
+}  // namespace flexspline::project

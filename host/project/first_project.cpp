@@ -1,11 +1,11 @@
-#include "host/cli/first_project.hpp"
+#include "host/project/first_project.hpp"
 
 #include <fmt/format.h>
 
 #include "host/model/signature.hpp"
 #include "host/output/text.hpp"
 
-namespace flexspline::cli {
+namespace flexspline::project {
 namespace {
 
 std::string name_of(const std::filesystem::path& folder) {
@@ -15,18 +15,19 @@ std::string name_of(const std::filesystem::path& folder) {
 
 }  // namespace
 
-FirstProject first_project(Draft& draft, const NewOptions& options) {
-  if (!draft.open_question.empty()) throw UsageError(draft.open_question);
+FirstProject first_project(Draft& draft, const Request& request) {
+  if (!draft.open_question.empty()) throw RequestError(draft.open_question);
   FirstProject project;
-  project.dataset = load_draft(draft, options);
+  project.dataset = load_draft(draft, request);
   for (const data::Finding& finding : project.dataset.findings)
     if (finding.severity == data::Severity::warning) project.warnings.push_back(finding.text());
-  complete(draft, project.dataset);
+  take_facts_of_values(draft, project.dataset);
   for (const std::string& doubt : implausible_sides(draft, project.dataset)) project.warnings.push_back(doubt);
-  project.base = base_model(project.dataset, name_of(options.out));
+  project.base = base_model(project.dataset, name_of(request.out));
   if (project.base.model.effects.empty())
-    throw UsageError(fmt::format("no torque balance can be formed from these columns: {}; name the columns with --map",
-                                 output::listed(project.base.reasons, "and")));
+    throw RequestError(
+        fmt::format("no torque balance can be formed from these columns: {}; name the columns with --map",
+                    output::listed(project.base.reasons, "and")));
   return project;
 }
 
@@ -36,4 +37,4 @@ std::string text_of(const BaseModel& base) {
   return model::signed_by_tool(text + "\n" + model::write(base.model));
 }
 
-}  // namespace flexspline::cli
+}  // namespace flexspline::project

@@ -7,7 +7,7 @@
 #include <string_view>
 #include <vector>
 
-namespace flexspline::cli {
+namespace flexspline::project {
 
 enum class Kind : std::uint8_t { none, time, current, torque, position, velocity, temperature };
 // Of the gear. `open`: the name does not say.
@@ -33,4 +33,4 @@ ColumnReading read_name(const std::string& name, const std::string& stated_unit,
 // The unit that a name ends with, in brackets or after an underscore: "speed [rpm]", "position_mm", "i_ma".
 std::string unit_in_name(std::string_view name);
 
-}  // namespace flexspline::cli
+}  // namespace flexspline::project

@@ -1,4 +1,4 @@
-#include "host/cli/column_names.hpp"
+#include "host/project/column_names.hpp"
 
 #include <algorithm>
 #include <cctype>
@@ -8,7 +8,7 @@
 
 #include "host/data/units.hpp"
 
-namespace flexspline::cli {
+namespace flexspline::project {
 namespace {
 
 using data::Quantity;
@@ -223,4 +223,4 @@ std::string unit_in_name(std::string_view name) {
   return unit_of_word(words.back());
 }
 
-}  // namespace flexspline::cli
+}  // namespace flexspline::project
