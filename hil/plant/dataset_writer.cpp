@@ -3,25 +3,11 @@
 #include <iterator>
 
 #include "hil/plant/recorder.hpp"
+#include "hil/plant/text_lines.hpp"
 #include "hil/plant/whole_file.hpp"
 
 namespace flexspline::plant {
 namespace {
-
-using Text = fmt::memory_buffer;
-
-template <class... Args>
-void line(Text& text, fmt::format_string<Args...> format, Args&&... args) {
-  fmt::format_to(std::back_inserter(text), format, std::forward<Args>(args)...);
-  text.push_back('\n');
-}
-
-/// A TOML float, which needs a point with digits on both sides, or an exponent.
-std::string real(double value) {
-  std::string text = fmt::format("{}", value);
-  if (text.find_first_of(".e") == std::string::npos) text += ".0";
-  return text;
-}
 
 Text csv(const Record& record, const Drive& drive) {
   Text text;

@@ -9,6 +9,7 @@
 #include <stdexcept>
 #include <thread>
 
+#include "hil/plant/text_lines.hpp"
 #include "hil/plant/whole_file.hpp"
 #include "hil/rhs100/models.hpp"
 #include "hil/rhs100/readme.hpp"
@@ -17,20 +18,9 @@
 namespace flexspline::rhs100 {
 namespace {
 
-using Text = fmt::memory_buffer;
-
-template <class... Args>
-void line(Text& text, fmt::format_string<Args...> format, Args&&... args) {
-  fmt::format_to(std::back_inserter(text), format, std::forward<Args>(args)...);
-  text.push_back('\n');
-}
-
-/// A TOML float, which needs a point with digits on both sides, or an exponent.
-std::string real(double value) {
-  std::string text = fmt::format("{}", value);
-  if (text.find_first_of(".e") == std::string::npos) text += ".0";
-  return text;
-}
+using plant::line;
+using plant::real;
+using plant::Text;
 
 const char* load_of(const plant::ExperimentPlan& plan, const Set& set) {
   return set.sensors == Sensors::drive && plan.locked ? "locked" : "free";

@@ -9,15 +9,21 @@ namespace {
 using catalogue::PlainInputs;
 constexpr std::size_t kMotor = 0, kTransmission = 1, kLoad = 2;
 
-double direction_of(const RecordSignals& s, double rate, std::size_t balance) {
-  if (s.at_rest) return 0.0;
-  const double width = s.velocity_noise[balance];
+}  // namespace
+
+std::vector<double> ScaledSignal::values() const {
+  std::vector<double> result(size());
+  for (std::size_t k = 0; k < result.size(); ++k) result[k] = (*this)[k];
+  return result;
+}
+
+double RecordSignals::direction_of(double rate, std::size_t balance) const {
+  if (at_rest) return 0.0;
+  const double width = velocity_noise[balance];
   return width > 0.0 ? std::tanh(rate / width) : catalogue::Real::sign(rate);
 }
 
-// Slopes of samples [first, first + slope.size()) of a signal, by segments.
-void slopes_of(const std::vector<double>& signal, const std::vector<data::Segment>& segments, double sample_s,
-               std::size_t first, std::span<double> slope) {
+void RecordSignals::slopes(const std::vector<double>& signal, std::size_t first, std::span<double> slope) const {
   std::fill(slope.begin(), slope.end(), 0.0);
   const std::size_t end = first + slope.size();
   auto s = std::upper_bound(segments.begin(), segments.end(), first,
@@ -43,23 +49,17 @@ void slopes_of(const std::vector<double>& signal, const std::vector<data::Segmen
   }
 }
 
-}  // namespace
-
-std::vector<double> ScaledSignal::values() const {
-  std::vector<double> result(size());
-  for (std::size_t k = 0; k < result.size(); ++k) result[k] = (*this)[k];
-  return result;
-}
-
 namespace {
 
-// One block of samples, from `first` on.
+// One block of samples, from `first` on. `slopes` and `direction_of` are those of the signals.
+template <class Slopes, class Direction>
 class InputBlock {
  public:
   using Inputs = RecordSignals::Inputs;
 
-  InputBlock(const RecordSignals& signals, std::size_t first, std::span<Inputs> to)
-      : s_(signals), first_(first), to_(to) {}
+  InputBlock(const RecordSignals& signals, std::size_t first, std::span<Inputs> to, Slopes slopes,
+             Direction direction_of)
+      : s_(signals), first_(first), to_(to), slopes_(slopes), direction_of_(direction_of) {}
 
   void copy_motor() {
     if (s_.velocity.empty()) {
@@ -116,7 +116,7 @@ class InputBlock {
     if (!own.empty())
       std::copy_n(own.begin() + static_cast<std::ptrdiff_t>(first_), to_.size(), slope_.begin());
     else
-      slopes_of(velocities, s_.segments, s_.sample_s, first_, std::span(slope_).first(to_.size()));
+      slopes_(velocities, first_, std::span(slope_).first(to_.size()));
   }
 
   template <class Rate>
@@ -125,12 +125,14 @@ class InputBlock {
     if (!kept.empty())
       along([&](Inputs& in, std::size_t k) { in.*what = kept[k]; });
     else
-      along([&](Inputs& in, std::size_t k) { in.*what = direction_of(s_, rate(k), balance); });
+      along([&](Inputs& in, std::size_t k) { in.*what = direction_of_(rate(k), balance); });
   }
 
   const RecordSignals& s_;
   const std::size_t first_;
   const std::span<Inputs> to_;
+  const Slopes slopes_;
+  const Direction direction_of_;
   std::array<double, PlainInputs::kBlock> slope_;
 };
 
@@ -143,7 +145,10 @@ void RecordSignals::copy(std::size_t first, std::span<Inputs> to, unsigned reads
     first += PlainInputs::kBlock;
     to = to.subspan(PlainInputs::kBlock);
   }
-  InputBlock block(*this, first, to);
+  InputBlock block(
+      *this, first, to,
+      [this](const std::vector<double>& signal, std::size_t at, std::span<double> slope) { slopes(signal, at, slope); },
+      [this](double rate, std::size_t balance) { return direction_of(rate, balance); });
   block.along([&](Inputs& in, std::size_t) {
     in.viscous_scale = in.coulomb_scale = 1.0;
     in.elapsed = sample_s;
@@ -159,14 +164,6 @@ void RecordSignals::copy(std::size_t first, std::span<Inputs> to, unsigned reads
   if (reads & kCurrent)
     block.along([&](Inputs& in, std::size_t k) { in.current = current.empty() ? 0.0 : current[k]; });
   if (reads & kTemperature) block.along([&](Inputs& in, std::size_t k) { in.temperature = temperature_at(k); });
-}
-
-double RecordSignals::direction_of(double rate, std::size_t balance) const {
-  return estimation::direction_of(*this, rate, balance);
-}
-
-void RecordSignals::slopes(const std::vector<double>& signal, std::size_t first, std::span<double> slope) const {
-  slopes_of(signal, segments, sample_s, first, slope);
 }
 
 RecordSignals::Inputs RecordSignals::at(std::size_t sample, unsigned reads) const {
