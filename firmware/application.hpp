@@ -53,32 +53,29 @@ class Application {
     status_lock_.begin_write();
     ++status_.tick;
     watch_rest(readings.motor_counter);
-    watchdog_.report(Part::sensors);
     release_or_take_parameters();
-    const SlowTask task = slow_task_of(status_.tick);
+    const std::uint32_t due = control_.due_at(status_.tick);
     Estimate& estimate = signals_.estimate;
     // Still of the previous tick.
     Output& output = signals_.output;
     if (!is_armed(status_.mode)) output = {};
     if (has_parameters()) {
-      control_.observe(readings, task, estimate);
+      control_.observe(readings, due, estimate);
     } else {
       estimate = {};
     }
     if (has_parameters() && !is_armed(status_.mode)) keep_reference(readings, estimate);
-    if (task == SlowTask::residual_map && status_.maps_residual && control_.has_residual())
+    if ((due & kResidualMap) != 0 && status_.maps_residual && control_.has_residual())
       residual_map_.add(parameters().residual_map, estimate.velocity, estimate.angle, control_.residual());
     take_command(estimate);
-    check_safety(readings, estimate);
-    watchdog_.report(Part::safety);
+    check_safety(readings, estimate, due);
     if (is_armed(status_.mode)) {
-      control_.update(demand_, estimate, output);
+      control_.update(demand_, estimate, due, output);
     } else {
       output = {};
     }
-    watchdog_.report(Part::control);
     board_->actuate(actuation(output));
-    watchdog_.report(Part::output);
+    watchdog_.report_tick();
     update_mode(output);
     record(readings);
     // In a fault already, or stopping because of one: the first cause is kept.
@@ -166,6 +163,8 @@ class Application {
   const Status& status() const { return status_; }
   // The same for background work, which the tick interrupts: a consistent copy.
   Status snapshot() const { return status_lock_.read(status_); }
+  // What the encoders show at the zeros that `home` set, for a host that stores it.
+  control::StoredZero zero() const { return status_lock_.read(zero_); }
 
  private:
   enum class BlockStep : std::uint8_t { none, check, wait };
@@ -188,7 +187,7 @@ class Application {
 
   // The tick's part: releases the parameters while no mode uses them, and restarts with the new ones.
   void release_or_take_parameters() {
-    const Owner owner = owner_.load(std::memory_order_acquire);
+    const Owner owner = load_in_tick(owner_);
     if (owner == Owner::requested && !is_armed(status_.mode)) {
       status_.has_parameters = false;
       status_.maps_residual = false;  // in other bases the bins have another meaning
@@ -229,6 +228,8 @@ class Application {
 
   void forget_reference() {
     finds_reference_ = true;
+    has_index_ = false;
+    zero_ = {};
     set_reference(false, false);
   }
   void set_reference(bool turn, bool output) {
@@ -244,6 +245,8 @@ class Application {
     if (estimate.moved > counts || estimate.moved < -counts) lose_reference();
     if (status_.mode != Mode::idle) return;
     using control::SensorKind;
+    index_counter_ = readings.index_counter;
+    has_index_ = !finds_reference_ && readings.index_passes != index_passes_;
     if (finds_reference_) {
       finds_reference_ = false;
       index_passes_ = readings.index_passes;
@@ -251,6 +254,7 @@ class Application {
       const bool all = motor_encoder_ == SensorKind::not_stated;
       const bool turn = all || motor_encoder_ == SensorKind::absolute;
       const bool output = parameters().has_output_encoder && output_encoder_ == SensorKind::absolute;
+      control_.take_absolute(turn && !all, output);
       if (output) control_.take_output(turn);
       set_reference(turn, all || output);
       control_.show_angles(estimate);
@@ -280,13 +284,21 @@ class Application {
     control_.set_angle(command.position);
     finds_reference_ = false;
     set_reference(true, true);
+    note_zero();
     return Refusal::none;
+  }
+  // For a host that stores it: what the encoders show at the zeros that were just set.
+  void note_zero() {
+    using control::SensorKind;
+    const bool indexed = motor_encoder_ == SensorKind::indexed;
+    const SensorKind motor = indexed && !has_index_ ? SensorKind::none : motor_encoder_;
+    zero_ = control_.zero_now(motor, output_encoder_, indexed ? index_counter_ : 0);
   }
 
   // Commands.
 
   void take_command(const Estimate& estimate) {
-    if (!command_waits_.load(std::memory_order_acquire)) return;
+    if (!load_in_tick(command_waits_)) return;
     safety_.note_host();
     const Refusal refusal = obey(command_, estimate);
     answer_ = {command_.number, refusal, status_.mode};
@@ -362,13 +374,16 @@ class Application {
 
   // Modes.
 
-  void check_safety(const Readings& readings, const Estimate& estimate) {
+  void check_safety(const Readings& readings, const Estimate& estimate, std::uint32_t due) {
     const bool needs_output = has_parameters() && parameters().has_output_encoder;
-    FaultRecord found = safety_.check_samples(status_.tick, readings, needs_output, most_reading_);
+    FaultRecord found;
+    found.fault = Fault::none;
+    safety_.check_samples(found, readings, needs_output ? output_sample_ticks_of<B>() : 0, most_reading_);
     if (found.fault == Fault::none && has_parameters())
-      found = safety_.check(status_.tick, readings, estimate, signals_.output, parameters(), status_.mode,
-                            control_.streams_in_motion());
+      safety_.check(found, readings, estimate, signals_.output, parameters(), status_.mode, due,
+                    [this] { return control_.streams_in_motion(); });
     if (found.fault != Fault::none) {
+      found.tick = status_.tick;
       boot_ticks_ = 0;
       return respond(found, estimate);
     }
@@ -424,10 +439,8 @@ class Application {
   Actuation actuation(const Output& output) const {
     if (!is_armed(status_.mode)) return {};
     const N::Value share = N::scaled(parameters().amplifier, output.current);
-    const std::int64_t most = most_command_;
-    return {
-        static_cast<std::int16_t>(fixed::limited(fixed::shift_right(share.raw, fixed::kValueBits - 15), -most, most)),
-        true};
+    const std::int32_t word = fixed::rounded_shift<fixed::kValueBits - 15>(share.raw);
+    return {static_cast<std::int16_t>(fixed::limited_to(word, most_command_)), true};
   }
 
   void record(const Readings& readings) {
@@ -457,6 +470,9 @@ class Application {
   std::uint32_t boot_ticks_ = 0;
   std::uint32_t stop_ticks_ = 0;
   bool reported_reset_ = false;
+  bool has_index_ = false;
+  std::uint32_t index_counter_ = 0;
+  control::StoredZero zero_{};
 
   Command command_{};
   Answer answer_{};

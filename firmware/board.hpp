@@ -44,7 +44,7 @@ concept Board = requires(B board, const Actuation& actuation) {
   { B::kTelemetryWords } -> std::convertible_to<std::uint32_t>;  // a power of two
   // Called at each tick, in this order: samples at the start of the tick, current, and whether the tick took longer
   // than its period.
-  { board.read() } -> std::same_as<Readings>;
+  { board.read() } -> std::convertible_to<const Readings&>;
   board.actuate(actuation);
   { board.tick_overrun() } -> std::same_as<bool>;
   // Called from background work. The watchdog resets the drive when it is not fed for kWatchdogTicks (faults.hpp). A
@@ -61,6 +61,16 @@ bool amplifier_tripped_of(B& board) {
     return board.amplifier_tripped();
   } else {
     return false;
+  }
+}
+
+// The longest time between two samples of the output's encoder: a tick, unless the board has a slower one.
+template <Board B>
+constexpr std::uint32_t output_sample_ticks_of() {
+  if constexpr (requires { B::kOutputSampleTicks; }) {
+    return B::kOutputSampleTicks;
+  } else {
+    return 1;
   }
 }
 

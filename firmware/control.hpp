@@ -6,6 +6,7 @@
 #include "firmware/board.hpp"
 #include "firmware/messages.hpp"
 #include "shared/control/drive_parameters.hpp"
+#include "shared/control/hardware.hpp"
 #include "shared/control/reachable.hpp"
 
 namespace flexspline::firmware {
@@ -23,14 +24,20 @@ struct Demand {
   N::Value current{};
 };
 
-// Slow tasks, and those that feed no loop, run at every fourth tick, each at a different one, so that all ticks take
-// about the same time.
-enum class SlowTask : std::uint8_t { ripple_taken, residual_map, ripple_learnt, temperature_and_gear };
-inline constexpr std::uint32_t kSlowTasks = 4;
-static_assert(control::ResidualMap::kEveryTicks == kSlowTasks);
-constexpr SlowTask slow_task_of(std::uint32_t tick) {
-  return static_cast<SlowTask>(tick % kSlowTasks);
-}
+// What does not run at every tick, as bits: slow tasks, and those that feed no loop, at every eighth, each at a
+// different one; the lead of the feedforward at the ticks between them. So all ticks take about the same time.
+enum SlowTask : std::uint32_t {
+  kRippleTaken = 1U << 1,
+  kRippleLearnt = 1U << 3,
+  kTemperatureAndGear = 1U << 7,
+  kResidualMap = 1U << 5,
+  // Those that a block can have at every tick.
+  kOutputVelocity = 1U << 7 | 1U << 8,
+  kDisturbance = 1U << 5 | 1U << 9,
+  kLead = 1U << 0 | 1U << 2 | 1U << 4 | 1U << 6 | 1U << 10,
+};
+inline constexpr std::uint32_t kSlowTicks = control::kSlowTicks, kEveryTick = 1U << 8 | 1U << 9 | 1U << 10;
+static_assert(control::ResidualMap::kEveryTicks == kSlowTicks && control::Feedforward::kLeadTicks == 2);
 
 struct Estimate {
   N::Angle angle{};  // of the motor
@@ -69,13 +76,16 @@ class Control {
   const Parameters& parameters() const { return p_; }
 
   // After the parameters changed: all states at rest, only the angles of the shafts are kept. An encoder with another
-  // number of counts per turn restarts. True where one did.
+  // number of counts per turn restarts. True where one did, or has another zero.
   [[gnu::noinline]] bool restart() {
-    const bool restarted = motor_counts_ != p_.motor_encoder.counts || output_counts_ != p_.output_encoder.counts;
+    const bool restarted =
+        motor_counts_ != p_.motor_encoder.counts || output_counts_ != p_.output_encoder.counts || zero_ != p_.zero;
     if (motor_counts_ != p_.motor_encoder.counts) motor_encoder_ = {};
     if (output_counts_ != p_.output_encoder.counts) output_encoder_ = {};
     motor_counts_ = p_.motor_encoder.counts;
     output_counts_ = p_.output_encoder.counts;
+    zero_ = p_.zero;
+    every_tick_ = p_.has_slow_rates ? 0 : kEveryTick;
     lowest_ = p_.trajectory.lowest;
     highest_ = p_.trajectory.highest;
     disturbance_ = {};
@@ -134,9 +144,34 @@ class Control {
     forget_motion();
     off();
   }
-  // The motor was at a whole number of turns at that count.
+  // The encoders' own angles, from the zeros of their shafts.
+  [[gnu::noinline]] void take_absolute(bool motor, bool output) {
+    using observers::EncoderAngle;
+    if (p_.zero.motor.reading == 0 && p_.zero.output.reading == 0) return;
+    if (motor)
+      EncoderAngle::take_reading(motor_encoder_, p_.motor_encoder, motor_encoder_.before - p_.zero.motor.reading);
+    if (output)
+      EncoderAngle::take_reading(output_encoder_, p_.output_encoder, output_encoder_.before - p_.zero.output.reading);
+    forget_motion();
+    off();
+  }
+  // What the encoders show at the zeros of their shafts, with the angles as they are now. `origin`: of the motor's
+  // counter; that of an absolute encoder is zero.
+  [[gnu::noinline]] control::StoredZero zero_now(control::SensorKind motor, control::SensorKind output,
+                                                 std::uint32_t origin) const {
+    using control::SensorKind, observers::EncoderAngle;
+    control::StoredZero zero;
+    if (motor == SensorKind::absolute || motor == SensorKind::indexed)
+      zero.motor = {p_.motor_encoder.counts, EncoderAngle::zero_of(motor_encoder_, p_.motor_encoder, origin),
+                    static_cast<std::uint32_t>(motor)};
+    if (output == SensorKind::absolute && p_.has_output_encoder)
+      zero.output = {p_.output_encoder.counts, EncoderAngle::zero_of(output_encoder_, p_.output_encoder, 0),
+                     static_cast<std::uint32_t>(output)};
+    return zero;
+  }
+  // The motor's encoder had its index pulse at that count.
   [[gnu::noinline]] void take_index(std::uint32_t counter) {
-    observers::EncoderAngle::set_whole_at(motor_encoder_, p_.motor_encoder, counter);
+    observers::EncoderAngle::set_whole_at(motor_encoder_, p_.motor_encoder, counter + p_.zero.motor.reading);
     forget_motion();
     off();
   }
@@ -149,8 +184,8 @@ class Control {
   }
 
   // Writes the estimates from the sensors into `e`. Fields of sensors that the drive does not have stay as they are;
-  // those of slow signals change every fourth tick.
-  void observe(const Readings& readings, SlowTask task, Estimate& e) {
+  // those of slow signals change every eighth tick.
+  void observe(const Readings& readings, std::uint32_t due, Estimate& e) {
     e.moved = observers::EncoderAngle::moved(motor_encoder_, readings.motor_counter);
     e.angle = observers::EncoderAngle::update(motor_encoder_, p_.motor_encoder, readings.motor_counter);
     const auto motor = observers::EncoderKalman::update<N>(motor_motion_, p_.motor_motion, e.angle);
@@ -158,23 +193,27 @@ class Control {
     e.acceleration = motor.acceleration;
     if (p_.has_output_encoder) {
       e.output_angle = observers::EncoderAngle::update(output_encoder_, p_.output_encoder, readings.output_counter);
-      e.output_velocity =
-          observers::EncoderKalman::update<N>(output_motion_, p_.output_motion, e.output_angle).velocity;
+      if ((due & kOutputVelocity) != 0)
+        e.output_velocity =
+            observers::EncoderKalman::update<N>(output_motion_, p_.output_motion, e.output_angle).velocity;
     }
     e.shown_current = control::shown(p_.current, readings.current);
     e.current = N::clamp(e.shown_current, two_bases());
     const N::Value applied = N::scaled(p_.torque_of_current, e.current);
     if (!p_.has_output_encoder) estimate_output(applied, e);
-    if (task == SlowTask::temperature_and_gear) {
+    if ((due & kTemperatureAndGear) != 0) {
       e.shown_temperature = control::shown(p_.temperature, readings.temperature);
       e.temperature = N::clamp(e.shown_temperature, two_bases());
     }
-    if (p_.has_torque_sensor)
-      observe_torque(N::clamp(control::shown(p_.torque, readings.torque), two_bases()), task, e);
-    e.disturbance =
-        observers::DisturbanceObserver::update<N>(disturbance_, p_.disturbance, applied, nominal_.torque,
-                                                  N::clamp(e.acceleration - nominal_.acceleration, two_bases()));
+    if (p_.has_torque_sensor) observe_torque(control::shown(p_.torque, readings.torque, 2), due, e);
+    if ((due & kDisturbance) != 0)
+      e.disturbance =
+          observers::DisturbanceObserver::update<N>(disturbance_, p_.disturbance, applied, nominal_.torque,
+                                                    N::clamp(e.acceleration - nominal_.acceleration, two_bases()));
   }
+
+  // The slow tasks of a tick.
+  std::uint32_t due_at(std::uint32_t tick) const { return 1U << tick % kSlowTicks | every_tick_; }
 
   // Enters an armed mode at the shaft's present angle and velocity. The torque continues without a jump.
   [[gnu::noinline]] void start(const Demand& demand, const Estimate& e) {
@@ -214,8 +253,8 @@ class Control {
   N::Value residual() const { return disturbance_.residual; }
 
   // One armed tick: sets every field of `out`.
-  void update(const Demand& demand, const Estimate& e, Output& out) {
-    out = {};
+  void update(const Demand& demand, const Estimate& e, std::uint32_t due, Output& out) {
+    clear(out);
     control::Loops::Command<N> command;
     switch (demand.mode) {
       case Mode::current:
@@ -232,7 +271,7 @@ class Control {
         command = {control::Mode::position, out.position, out.velocity, {}};
         break;
       case Mode::excitation:
-        excite(e, out, command);
+        command = excite(e, out);
         break;
       default:
         off();
@@ -240,7 +279,7 @@ class Control {
     }
     nominal_ = {};
     compensates_ = demand.compensate && uses_trajectory(demand.mode);
-    if (compensates_) compensate(e, out, command);
+    if (compensates_) compensate(e, due, out, command);
     if (demand.mode == Mode::position) out.lag = command.position - e.angle;
     const auto loops = control::Loops::update<N>(loops_, p_.loops, command, e.angle, e.velocity);
     out.torque = loops.torque;
@@ -264,11 +303,17 @@ class Control {
     return mode == Mode::velocity || mode == Mode::position || mode == Mode::stop;
   }
   static constexpr N::Value two_bases() { return N::one() + N::one(); }
-  // The ripple's estimate is at most five ticks old.
-  void observe_torque(N::Value torque, SlowTask task, Estimate& e) {
-    if (task == SlowTask::ripple_taken) observers::RippleFilter::take<N>(ripple_, p_.ripple, e.angle, torque);
-    if (task == SlowTask::ripple_learnt && ripple_.started)
-      torque_ripple_ = observers::RippleFilter::learn<N>(ripple_, p_.ripple);
+  // The ripple that is taken out from the second to the ninth tick after the torque was stored is the one at the
+  // eighth.
+  void observe_torque(N::Value torque, std::uint32_t due, Estimate& e) {
+    if ((due & kRippleTaken) != 0) {
+      ripple_angle_ = ripple_.started ? e.angle + (e.angle - ripple_.before) : e.angle;
+      observers::RippleFilter::take<N>(ripple_, p_.ripple, e.angle, torque);
+    }
+    if ((due & kRippleLearnt) != 0 && ripple_.started) {
+      observers::RippleFilter::learn<N>(ripple_, p_.ripple);
+      torque_ripple_ = observers::RippleFilter::ripple_at<N>(ripple_, p_.ripple, ripple_angle_);
+    }
     e.torque = torque - torque_ripple_;
   }
   // The observer estimates how the drive differs from its nominal motion. Without a model friction would count as
@@ -302,26 +347,29 @@ class Control {
             any ? kAsFastAsAllowed : control::Trajectory::speed_of<N>(p_.trajectory, N::magnitude(demand.velocity))),
         out);
   }
+  // Field by field: of those that follow anyway nothing is left of it, and the rest is a few stores.
+  static void clear(Output& out) {
+    out.position = {};
+    out.velocity = out.acceleration = out.feedforward = {};
+    out.lag = {};
+    out.finished = false;
+  }
   static void set(const control::Trajectory::SetPoint<N>& point, Output& out) {
     out.position = point.position;
     out.velocity = point.velocity;
     out.acceleration = point.acceleration;
   }
-  [[gnu::noinline]] void excite(const Estimate& e, Output& out, control::Loops::Command<N>& command) {
+  [[gnu::noinline]] control::Loops::Command<N> excite(const Estimate& e, Output& out) {
     const auto set_point = control::Excitation::update<N>(excitation_, p_.excitation, e.velocity);
     out.finished = control::Excitation::finished<N>(excitation_);
-    if (p_.excites_torque) {
-      command.mode = control::Mode::torque;
-      command.torque = set_point;
-    } else {
-      out.velocity = set_point;
-      command = {control::Mode::velocity, {}, set_point, {}};
-    }
+    if (p_.excites_torque) return {control::Mode::torque, {}, {}, set_point};
+    out.velocity = set_point;
+    return {control::Mode::velocity, {}, set_point, {}};
   }
-  void compensate(const Estimate& e, Output& out, control::Loops::Command<N>& command) {
-    const auto forward =
-        control::Feedforward::update<N>(feedforward_, p_.feedforward, p_.model,
-                                        {out.position, out.velocity, out.acceleration}, {e.angle, e.temperature, {}});
+  void compensate(const Estimate& e, std::uint32_t due, Output& out, control::Loops::Command<N>& command) {
+    const auto forward = control::Feedforward::update<N>(feedforward_, p_.feedforward, p_.model,
+                                                         {out.position, out.velocity, out.acceleration},
+                                                         {e.angle, e.temperature, {}}, (due & kLead) != 0);
     out.feedforward = forward.torque;
     nominal_ = {forward.torque, out.velocity + forward.velocity, out.acceleration, feedforward_.torsion};
     command.torque = forward.torque;
@@ -338,6 +386,7 @@ class Control {
   observers::DisturbanceObserver::State<N> disturbance_{};
   observers::TorsionObserver::State<N> torsion_{};
   observers::RippleFilter::State<N> ripple_{};
+  N::Angle ripple_angle_{};
   N::Value torque_ripple_{};
   control::Trajectory::State trajectory_{};
   control::Stream::State stream_{};
@@ -355,6 +404,7 @@ class Control {
   // The parameters with which both encoders' angles were counted.
   std::uint32_t motor_counts_ = 0;
   std::uint32_t output_counts_ = 0;
+  std::uint32_t every_tick_ = 0;  // slow tasks that the parameters have at every tick
   // Limits of position, as the parameters have them.
   std::int64_t lowest_ = 0;
   std::int64_t highest_ = 0;
@@ -363,6 +413,7 @@ class Control {
   Mode last_mode_ = Mode::boot;
   bool streams_ = false;
   bool compensates_ = false;
+  control::StoredZero zero_{};  // that the parameters had at the last restart
 };
 
 }  // namespace flexspline::firmware

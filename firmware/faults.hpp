@@ -33,9 +33,9 @@ inline constexpr std::uint32_t kSettlingShare = 8;
 inline constexpr std::int32_t kRestCounts = 2;
 // The share of the following error that is allowed at standstill, 2^-3; all of it at the velocity limit.
 inline constexpr unsigned kFollowingFloorLog2 = 3;
-// Time constant of the reference for the angle between both encoders, which drifts as the gear ratio is rounded: 2^17
-// steps, at every fourth tick, are 26 s.
-inline constexpr unsigned kDriftStepsLog2 = 17;
+// Time constant of the reference for the angle between both encoders, which drifts as the gear ratio is rounded: 2^16
+// steps, at every eighth tick, are 26 s.
+inline constexpr unsigned kDriftStepsLog2 = 16;
 inline constexpr std::uint32_t kWatchdogTicks = 200;  // the time to which a board's watchdog has to be set
 
 // A controlled stop, where the loops can still be relied on. Loops that do not follow cannot; those of the motor do not

@@ -11,37 +11,32 @@ namespace flexspline::firmware {
 
 class Safety {
  public:
-  // Without parameters there are no scales and no limits: it only checks that samples arrive. Returns the first fault
-  // found. `most_reading`: the largest reading of the current, which no block can raise.
-  FaultRecord check_samples(std::uint32_t tick, const Readings& r, bool needs_output, std::int32_t most_reading) {
-    motor_age_ = r.motor_samples == before_.motor_samples ? motor_age_ + 1 : 0;
-    output_age_ = r.output_samples == before_.output_samples ? output_age_ + 1 : 0;
-    analog_age_ = r.analog_samples == before_.analog_samples ? analog_age_ + 1 : 0;
-    FaultRecord found{Fault::none, tick, 0, 0};
-    const auto stale = [&](Fault fault, std::uint32_t age) {
-      expect(found, fault, age < kStaleTicks, age, kStaleTicks);
-    };
-    stale(Fault::motor_encoder_stale, motor_age_);
-    if (needs_output) stale(Fault::output_encoder_stale, output_age_);
-    stale(Fault::analog_stale, analog_age_);
-    const std::int32_t reading = r.current < 0 ? -std::int32_t{r.current} : r.current;
-    above_board_ = reading > most_reading && reading < kRail ? above_board_ + 1 : 0;
-    expect(found, Fault::overcurrent, above_board_ < kOvercurrentTicks, r.current, most_reading);
+  // Each writes the first fault into `found`, which has none yet; the caller adds the tick.
+
+  // Without parameters there are no scales and no limits: it only checks that samples arrive. `most_reading`: the
+  // largest reading of the current, which no block can raise. `output_ticks`: as long as a sample of the output may
+  // take; zero where there is none.
+  void check_samples(FaultRecord& found, const Readings& r, std::uint32_t output_ticks, std::int32_t most_reading) {
+    const bool all_new = r.motor_samples != before_.motor_samples && r.output_samples != before_.output_samples &&
+                         r.analog_samples != before_.analog_samples;
+    if (!all_new || waits_) [[unlikely]]
+      count_stale(found, r, output_ticks);
     before_.motor_samples = r.motor_samples;
     before_.output_samples = r.output_samples;
     before_.analog_samples = r.analog_samples;
-    return found;
+    const std::int32_t reading = r.current < 0 ? -std::int32_t{r.current} : r.current;
+    above_board_ = reading > most_reading && reading < kRail ? above_board_ + 1 : 0;
+    expect(found, Fault::overcurrent, above_board_ < kOvercurrentTicks, r.current, most_reading);
   }
 
-  // `last`: the command of the previous tick.
-  // `streams`: set points have to arrive in time.
-  FaultRecord check(std::uint32_t tick, const Readings& r, const Estimate& e, const Output& last, const Parameters& p,
-                    Mode mode, bool streams) {
-    FaultRecord found{Fault::none, tick, 0, 0};
+  // `last`: the command of the previous tick. `streams`: whether set points have to arrive in time.
+  template <class Streams>
+  void check(FaultRecord& found, const Readings& r, const Estimate& e, const Output& last, const Parameters& p,
+             Mode mode, std::uint32_t due, Streams&& streams) {
     check_ranges(found, r, p);
-    check_always(found, e, p.safety);
+    check_always(found, e, p.safety, due);
     if (is_armed(mode)) {
-      check_output(found, r, e, p);
+      check_output(found, r, e, p, due);
       check_motion(found, e, last, p);
       check_following(found, e, last, p, mode);
     } else {
@@ -49,14 +44,13 @@ class Safety {
     }
     if (may_be_commanded(mode))
       expect(found, Fault::host_lost, host_age_ < p.safety.host_ticks, host_age_, p.safety.host_ticks);
-    if (streams && mode == Mode::position) {
+    if (mode == Mode::position) {
       const std::uint32_t most =
           p.safety.host_ticks < kOldestSetPointTicks ? p.safety.host_ticks : kOldestSetPointTicks;
-      expect(found, Fault::set_point_lost, set_point_age_ < most, set_point_age_, most);
+      expect(found, Fault::set_point_lost, set_point_age_ < most || !streams(), set_point_age_, most);
     }
     if (host_age_ < UINT32_MAX) ++host_age_;
     if (set_point_age_ < UINT32_MAX) ++set_point_age_;
-    return found;
   }
   // A command arrived.
   void note_host() { host_age_ = 0; }
@@ -67,15 +61,39 @@ class Safety {
 
  private:
   static constexpr std::int32_t kRail = 32767;  // a reading at this value is not valid
+  // Nearly every check is passed, in a comparison; the rest is not in line with it.
   template <class Seen, class Limit>
   static void expect(FaultRecord& found, Fault fault, bool holds, Seen seen, Limit limit) {
-    if (holds || found.fault != Fault::none) return;
-    found = {fault, found.tick, static_cast<std::int32_t>(seen), static_cast<std::int32_t>(limit)};
+    if (!holds) [[unlikely]]
+      note(found, fault, static_cast<std::int32_t>(seen), static_cast<std::int32_t>(limit));
   }
+  [[gnu::noinline]] static void note(FaultRecord& found, Fault fault, std::int32_t seen, std::int32_t limit) {
+    if (found.fault != Fault::none) return;
+    found.fault = fault;
+    found.seen = seen;
+    found.limit = limit;
+  }
+  // A sample did not arrive, in this tick or in the one before.
+  [[gnu::noinline]] void count_stale(FaultRecord& found, const Readings& r, std::uint32_t output_ticks) {
+    motor_age_ = r.motor_samples == before_.motor_samples ? motor_age_ + 1 : 0;
+    output_age_ = r.output_samples == before_.output_samples ? output_age_ + 1 : 0;
+    analog_age_ = r.analog_samples == before_.analog_samples ? analog_age_ + 1 : 0;
+    waits_ = (motor_age_ | output_age_ | analog_age_) != 0;
+    const auto stale = [&](Fault fault, std::uint32_t age, std::uint32_t ticks) {
+      const std::uint32_t most = ticks + kStaleTicks - 1;
+      expect(found, fault, age < most, age, most);
+    };
+    stale(Fault::motor_encoder_stale, motor_age_, 1);
+    if (output_ticks > 0) stale(Fault::output_encoder_stale, output_age_, output_ticks);
+    stale(Fault::analog_stale, analog_age_, 1);
+  }
+  static bool is_inside(const control::AnalogScale<N>& scale, std::int16_t share) {
+    return share > scale.lowest && share < scale.highest;
+  }
+  static bool is_within(std::int32_t x, std::int32_t most) { return fixed::limited_to(x, most) == x; }
   void check_range(FaultRecord& found, Fault fault, const control::AnalogScale<N>& scale, std::int16_t share,
                    std::uint8_t& count) {
-    const bool inside = share > scale.lowest && share < scale.highest;
-    if (inside) {
+    if (is_inside(scale, share)) {
       count = 0;
     } else if (count < kRangeTicks) {
       ++count;
@@ -83,29 +101,43 @@ class Safety {
     expect(found, fault, count < kRangeTicks, share, share < 0 ? scale.lowest : scale.highest);
   }
   void check_ranges(FaultRecord& found, const Readings& r, const Parameters& p) {
+    const bool inside = is_inside(p.current, r.current) && is_inside(p.temperature, r.temperature) &&
+                        (!p.has_torque_sensor || is_inside(p.torque, r.torque));
+    if (!inside || outside_) [[unlikely]]
+      count_outside(found, r, p);
+    if (!p.has_torque_sensor) return;
+    if (r.torque != before_.torque) [[likely]] {
+      before_.torque = r.torque;
+      torque_same_ = 0;
+    } else {
+      count_same_torque(found, p);
+    }
+  }
+  // A reading is not valid, in this tick or in the one before.
+  [[gnu::noinline]] void count_outside(FaultRecord& found, const Readings& r, const Parameters& p) {
     check_range(found, Fault::current_out_of_range, p.current, r.current, current_outside_);
     check_range(found, Fault::temperature_out_of_range, p.temperature, r.temperature, temperature_outside_);
-    if (!p.has_torque_sensor) return;
-    check_range(found, Fault::torque_out_of_range, p.torque, r.torque, torque_outside_);
-    torque_same_ = r.torque == before_.torque && torque_same_ < UINT16_MAX ? torque_same_ + 1U : 0U;
-    before_.torque = r.torque;
+    if (p.has_torque_sensor) check_range(found, Fault::torque_out_of_range, p.torque, r.torque, torque_outside_);
+    outside_ = (current_outside_ | temperature_outside_ | torque_outside_) != 0;
+  }
+  [[gnu::noinline]] void count_same_torque(FaultRecord& found, const Parameters& p) {
+    torque_same_ = torque_same_ < UINT16_MAX ? torque_same_ + 1U : 0U;
     const std::uint32_t most = p.safety.torque_same_ticks;
     expect(found, Fault::torque_stuck, most == 0 || torque_same_ < most, torque_same_, most);
   }
-  void check_always(FaultRecord& found, const Estimate& e, const control::SafetyLimits<N>& limits) {
+  void check_always(FaultRecord& found, const Estimate& e, const control::SafetyLimits<N>& limits, std::uint32_t due) {
     // A reading at the rail is not a measurement.
     const bool over = N::magnitude(e.shown_current) > limits.overcurrent && current_outside_ == 0;
     over_current_ = over ? over_current_ + 1 : 0;
     expect(found, Fault::overcurrent, over_current_ < kOvercurrentTicks, e.shown_current.raw, limits.overcurrent.raw);
-    if (slow_task_of(found.tick) == SlowTask::temperature_and_gear)
-      hot_ = e.shown_temperature > limits.overtemperature ? hot_ + 1 : 0;
-    expect(found, Fault::overtemperature, hot_ < kHotTicks / kSlowTasks, e.shown_temperature.raw,
+    if ((due & kTemperatureAndGear) != 0) hot_ = e.shown_temperature > limits.overtemperature ? hot_ + 1 : 0;
+    expect(found, Fault::overtemperature, hot_ < kHotTicks / kSlowTicks, e.shown_temperature.raw,
            limits.overtemperature.raw);
   }
   void check_motion(FaultRecord& found, const Estimate& e, const Output& last, const Parameters& p) {
     const control::SafetyLimits<N>& limits = p.safety;
     const std::int32_t most = limits.counts_a_tick;
-    expect(found, Fault::motor_encoder_jump, e.moved <= most && e.moved >= -most, e.moved, most);
+    expect(found, Fault::motor_encoder_jump, is_within(e.moved, most), e.moved, most);
     expect(found, Fault::implausible_motion, N::magnitude(e.acceleration) <= limits.acceleration, e.acceleration.raw,
            limits.acceleration.raw);
     expect(found, Fault::overspeed, N::magnitude(e.velocity) <= limits.overspeed, e.velocity.raw, limits.overspeed.raw);
@@ -157,9 +189,9 @@ class Safety {
     const bool drives_on = driven_direction_ != 0 && onward > limits.stuck_torque.raw / 2;
     if (unmoved_ < settling_ticks || span > limits.stuck_torque || drives_on) ++unmoved_;
     const std::int32_t most = p.loops.torque_limit.raw;
-    const bool at_limit = N::magnitude(smoothed_torque_).raw > most - most / 8;
-    const bool demands_motion = N::magnitude(last.error).raw > limits.standstill.raw / 8;
-    stalled_ = at_limit && demands_motion ? stalled_ + 1 : 0;
+    const bool at_limit = N::magnitude(smoothed_torque_).raw > most - (most >> 3);
+    const bool stalls = at_limit && N::magnitude(last.error).raw > limits.standstill.raw >> 3;
+    stalled_ = stalls ? stalled_ + 1 : 0;
     expect(found, Fault::motor_encoder_stuck,
            unmoved_ < settling_ticks + limits.stuck_ticks && stalled_ < settling_ticks + limits.stuck_ticks,
            smoothed_torque_.raw, limits.stuck_torque.raw);
@@ -173,7 +205,7 @@ class Safety {
   }
   // The output moves with the motor, except for torsion and backlash. With one line lost the count alternates, so a few
   // counts are not motion. Without limits any count is enough, and nothing is checked.
-  void check_output(FaultRecord& found, const Readings& r, const Estimate& e, const Parameters& p) {
+  void check_output(FaultRecord& found, const Readings& r, const Estimate& e, const Parameters& p, std::uint32_t due) {
     const control::FollowingLimits<N>& limits = p.following;
     turned_ += static_cast<std::uint32_t>(e.moved);
     const auto output = static_cast<std::int32_t>(r.output_counter - output_from_);
@@ -183,8 +215,8 @@ class Safety {
     }
     const auto turned = static_cast<std::int32_t>(turned_);
     const std::int32_t most = limits.motor_counts;
-    expect(found, Fault::output_encoder_stuck, turned <= most && turned >= -most, turned, most);
-    const bool is_due = !watches_ || slow_task_of(found.tick) == SlowTask::temperature_and_gear;
+    expect(found, Fault::output_encoder_stuck, is_within(turned, most), turned, most);
+    const bool is_due = !watches_ || (due & kTemperatureAndGear) != 0;
     if (p.has_output_encoder && most > 0 && is_due) check_gear(found, e, p);
   }
   // Since the drive was armed both encoders show the same motion, except for torsion and backlash. The reference
@@ -211,6 +243,32 @@ class Safety {
   // shaft, the latter while the shaft catches up.
   void check_following(FaultRecord& found, const Estimate& e, const Output& last, const Parameters& p, Mode mode) {
     const control::FollowingLimits<N>& limits = p.following;
+    // When a mode begins, the last demand belongs to the previous mode.
+    if (mode != mode_) [[unlikely]] {
+      mode_ = mode;
+      follows_ = false;
+      lagging_ = 0;
+      near_ = near_lag(limits, p);
+      return;
+    }
+    const bool near = mode == Mode::velocity ? N::magnitude(last.velocity - e.velocity) <= limits.velocity
+                                             : fixed::limited_to(last.lag.raw, near_) == last.lag.raw;
+    if (near) [[likely]] {
+      follows_ = true;
+      lagging_ = 0;
+    } else {
+      check_lag(found, e, last, p, mode);
+    }
+  }
+  // A lag that is allowed at any speed, so that most ticks need no products: the least part of the window is
+  // 2^-kFollowingFloorLog2 of it, rounded down, and half of that is below it for certain.
+  static std::int64_t near_lag(const control::FollowingLimits<N>& limits, const Parameters& p) {
+    const std::uint32_t near = magnitude_word(limits.position) >> (kFollowingFloorLog2 + 1);
+    return p.loops.velocity_limit.raw < 1 << (kFollowingFloorLog2 + 1) ? 0 : std::int64_t{near} << 16;
+  }
+  [[gnu::noinline]] void check_lag(FaultRecord& found, const Estimate& e, const Output& last, const Parameters& p,
+                                   Mode mode) {
+    const control::FollowingLimits<N>& limits = p.following;
     const N::Value closing = last.lag.raw < 0 ? -e.velocity : e.velocity;
     const N::Value set_speed = N::magnitude(last.velocity);
     const std::int32_t full = p.loops.velocity_limit.raw;
@@ -220,10 +278,8 @@ class Safety {
     const std::uint32_t lag = magnitude_word(last.lag.raw), window = magnitude_word(limits.position);
     bool behind = fixed::long_product(lag, static_cast<std::uint32_t>(full)) >
                   fixed::long_product(window, static_cast<std::uint32_t>(open));
-    if (mode == Mode::velocity) behind = N::magnitude(last.velocity - e.velocity) > limits.velocity;
-    // When a mode begins, the last demand belongs to the previous mode.
-    follows_ = mode == mode_ && (follows_ || !behind);
-    mode_ = mode;
+    if (mode == Mode::velocity) behind = true;
+    follows_ = follows_ || !behind;
     lagging_ = behind && follows_ ? lagging_ + 1 : 0;
     if (limits.ticks == 0 || lagging_ < limits.ticks) return;
     expect(found, Fault::following_error, false, lag, std::int64_t{window} * open / full);
@@ -267,6 +323,9 @@ class Safety {
   int driven_direction_ = 0;               // direction in which the shaft was driven when its count stopped
   std::int64_t reference_difference_ = 0;  // between both encoders when the drive was armed, 2^-32 turns of the output
   std::int64_t largest_difference_ = 0;    // zero: not known yet
+  std::int64_t near_ = 0;                  // a lag of the position that is allowed at any speed
+  bool waits_ = false;                     // for a sample that is older than a tick
+  bool outside_ = false;                   // a reading was not valid
   bool watches_ = false;
   bool follows_ = false;
   Mode mode_{};

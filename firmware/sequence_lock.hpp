@@ -8,6 +8,20 @@
 
 namespace flexspline::firmware {
 
+// Loads and stores of the tick that order what it shares with the background work that it interrupts. Both run on one
+// core, which sees its own accesses in order: only the compiler has to keep it.
+template <class T>
+T load_in_tick(const std::atomic<T>& shared) {
+  const T value = shared.load(std::memory_order_relaxed);
+  std::atomic_signal_fence(std::memory_order_seq_cst);
+  return value;
+}
+template <class T>
+void store_in_tick(std::atomic<T>& shared, T value) {
+  std::atomic_signal_fence(std::memory_order_seq_cst);
+  shared.store(value, std::memory_order_relaxed);
+}
+
 class SequenceLock {
  public:
   void begin_write() {

@@ -260,7 +260,7 @@ class Service {
 
   void reference() {
     const Status s = application_.snapshot();
-    finish(Code::done, protocol::Reference{s.knows_turn, s.knows_output});
+    finish(Code::done, protocol::Reference{s.knows_turn, s.knows_output, application_.zero()});
   }
 
   // Blocks.

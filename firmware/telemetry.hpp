@@ -14,6 +14,7 @@
 #include <cstring>
 #include <span>
 
+#include "firmware/sequence_lock.hpp"
 #include "shared/protocol/states.hpp"
 
 namespace flexspline::firmware {
@@ -77,19 +78,19 @@ class Telemetry {
     const std::uint32_t sequence = sequence_++;
     const std::uint32_t at = written_.load(std::memory_order_relaxed);
     const auto words = static_cast<std::uint32_t>(frame_words());
-    if (at - read_.load(std::memory_order_acquire) + words > kWords) {
+    if (at - load_in_tick(read_) + words > kWords) {
       dropped_ = dropped_ + 1;
       return;
     }
     // Nearly all frames do not reach the end of the ring and need no check of each word.
     const std::uint32_t from = at & (kWords - 1);
     if (from + words <= kWords) {
-      copy(&ring_[from], tick, sequence, signals, [](std::uint32_t*& to, std::uint32_t word) { *to++ = word; });
+      copy(tick, sequence, signals, [to = &ring_[from]](std::uint32_t i, std::uint32_t word) { to[i] = word; });
     } else {
-      copy(at, tick, sequence, signals,
-           [this](std::uint32_t& to, std::uint32_t word) { ring_[to++ & (kWords - 1)] = word; });
+      copy(tick, sequence, signals,
+           [this, at](std::uint32_t i, std::uint32_t word) { ring_[(at + i) & (kWords - 1)] = word; });
     }
-    written_.store(at + words, std::memory_order_release);
+    store_in_tick(written_, at + words);
   }
 
   // Background: takes the oldest frame. Returns its words (the front of `frame`), none where there is no frame or it
@@ -106,16 +107,57 @@ class Telemetry {
   std::uint32_t dropped() const { return dropped_; }
 
  private:
-  template <class To, class Signals, class Put>
-  void copy(To to, std::uint32_t tick, std::uint32_t sequence, const Signals& signals, Put&& put) {
-    put(to, sequence);
-    put(to, tick);
+  template <class Signals, class Put>
+  void copy(std::uint32_t tick, std::uint32_t sequence, const Signals& signals, Put&& put) {
+    put(0, sequence);
+    put(1, tick);
     const auto* bytes = reinterpret_cast<const std::byte*>(&signals);
-    const std::uint8_t* place = places_.data();
-    for (const std::uint8_t* const end = place + setup_.count; place != end; ++place) {
+    const auto one = [&](std::uint32_t channel) {
       std::uint32_t word = 0;
-      std::memcpy(&word, bytes + *place, sizeof(word));
-      put(to, word);
+      std::memcpy(&word, bytes + places_[channel], sizeof(word));
+      put(kHeaderWords + channel, word);
+    };
+    // From the last one down, without a loop, which would take as many instructions for counting as for copying.
+    static_assert(TelemetrySetup::kMost == 12);
+    switch (setup_.count) {
+      case 12:
+        one(11);
+        [[fallthrough]];
+      case 11:
+        one(10);
+        [[fallthrough]];
+      case 10:
+        one(9);
+        [[fallthrough]];
+      case 9:
+        one(8);
+        [[fallthrough]];
+      case 8:
+        one(7);
+        [[fallthrough]];
+      case 7:
+        one(6);
+        [[fallthrough]];
+      case 6:
+        one(5);
+        [[fallthrough]];
+      case 5:
+        one(4);
+        [[fallthrough]];
+      case 4:
+        one(3);
+        [[fallthrough]];
+      case 3:
+        one(2);
+        [[fallthrough]];
+      case 2:
+        one(1);
+        [[fallthrough]];
+      case 1:
+        one(0);
+        [[fallthrough]];
+      default:
+        break;
     }
   }
 

@@ -14,6 +14,8 @@ class Watchdog {
   // From the tick (all but the last part) or from background work. Each report is a byte of its own, as the tick may
   // interrupt background work while it writes its own.
   void report(Part part) { reports_[static_cast<std::uint8_t>(part)].store(1, std::memory_order_relaxed); }
+  // At the end of a tick, which only comes there when none of its parts hangs.
+  void report_tick() { report(Part::sensors), report(Part::safety), report(Part::control), report(Part::output); }
   // From background work: true when all have reported. Then all have to report again.
   bool all_reported() {
     for (const auto& report : reports_)

@@ -34,7 +34,7 @@ class QemuBoard {
   static constexpr std::uint32_t kTickHz = 20'000;
   static constexpr std::uint32_t kTelemetryWords = 2048;
 
-  Readings read() const { return input.readings; }
+  const Readings& read() const { return input.readings; }
   void actuate(const Actuation& command) { actuation = command; }
   // The next tick is due already.
   bool tick_overrun() const { return input.overrun || (hardware(kInterruptState) & kSysTickPending) != 0; }

@@ -1,5 +1,6 @@
 // The two amplifiers. Both run TIM1, which times the control tick: its trigger starts the converter at the start of
-// each period. After a reset, a break or a fault the amplifier is not enabled.
+// each period, and its fourth compare value the tick, once the conversions have ended. After a reset, a break or a
+// fault the amplifier is not enabled.
 //
 //   ServoAmplifier  a current controller outside; gets a voltage from the DAC and an enable (RM0090, 14)
 //   HBridge         two legs on TIM1's channels 1 and 3, with dead time and a break input (RM0090, 17)
@@ -15,7 +16,9 @@
 namespace flexspline::stm32f4 {
 
 namespace tim1 {
-inline constexpr std::uint32_t kControl2 = kTim1 + 0x04, kEvent = kTim1 + 0x14, kMode1 = kTim1 + 0x18,
+inline constexpr std::uint32_t kInterrupt = 27;  // compare
+inline constexpr std::uint32_t kControl2 = kTim1 + 0x04, kInterrupts = kTim1 + 0x0C, kStatus = kTim1 + 0x10,
+                               kCompare4 = kTim1 + 0x40, kEvent = kTim1 + 0x14, kMode1 = kTim1 + 0x18,
                                kMode2 = kTim1 + 0x1C, kOutputs = kTim1 + 0x20, kReload = kTim1 + 0x2C,
                                kRepeat = kTim1 + 0x30, kCompare1 = kTim1 + 0x34, kCompare3 = kTim1 + 0x3C,
                                kBreak = kTim1 + 0x44;
@@ -26,10 +29,23 @@ inline void set_up(std::uint32_t half_period) {
   hardware(kReload) = half_period;
   hardware(kRepeat) = 1;  // an update at every second end: at the bottom only
   hardware(kControl2) = 2U << 4;
+  // 7.25 us after the bottom: three conversions take 5.7.
+  hardware(kCompare4) = half_period * 29 / 100;
+}
+inline constexpr std::uint32_t kTickDue = 1U << 4;
+inline bool tick_is_due() {
+  return (hardware(kStatus) & kTickDue) != 0;
+}
+inline void take_tick() {
+  hardware(kStatus) = ~kTickDue;
 }
 inline void run() {
   hardware(kEvent) = 1;
-  hardware(kTim1) = (1U << 7) | (1U << 5) | 1U;  // compare values take effect at the update; centre-aligned mode 1
+  // Compare values take effect at the update; centre-aligned mode 2: they are flagged while it counts up.
+  hardware(kTim1) = (1U << 7) | (2U << 5) | 1U;
+  hardware(kStatus) = 0;
+  hardware(kInterrupts) = kTickDue;
+  cortex_m4::enable_interrupt(kInterrupt);
 }
 }  // namespace tim1
 

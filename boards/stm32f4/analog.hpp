@@ -1,5 +1,5 @@
-// Current, torque and temperature: three injected conversions of ADC1, started by TIM1 at each of its periods; the end
-// of the last one is the interrupt of the control tick (RM0090, 13).
+// Current, torque and temperature: three injected conversions of ADC1, started by TIM1 at each of its periods and ended
+// before the control tick, which TIM1 starts as well: a converter that hangs does not stop it (RM0090, 13).
 #pragma once
 
 #include <cstdint>
@@ -7,8 +7,6 @@
 #include "boards/stm32f4/registers.hpp"
 
 namespace flexspline::stm32f4 {
-
-inline constexpr std::uint32_t kAdcInterrupt = 18;
 
 // Converter inputs. Current and torque swing about half the supply, temperature begins at zero.
 struct AnalogInputs {
@@ -41,13 +39,12 @@ class Analog {
     hardware(kAdc1 + kSequence) = (2U << 20) | (std::uint32_t{inputs.current} << 5) |
                                   (std::uint32_t{inputs.torque} << 10) | (std::uint32_t{inputs.temperature} << 15);
     for (const std::uint8_t input : {inputs.current, inputs.torque, inputs.temperature}) set_sample_time(input);
-    hardware(kAdc1 + kControl1) = kScan | kInterruptAtEnd;
+    hardware(kAdc1 + kControl1) = kScan;
     hardware(kAdc1 + kControl2) = kOn;
     cortex_m4::spend_cycles(1'000);  // 3 us until it is stable
     hardware(kAdc1 + kStatus) = 0;
     // The current first, nearest to the middle of the period: at the rising edge of TIM1's trigger.
     hardware(kAdc1 + kControl2) = kOn | (1U << 16) | (1U << 20);
-    cortex_m4::enable_interrupt(kAdcInterrupt);
   }
   // A set of three samples is available. Taking it clears the flag.
   static bool ended() { return (hardware(kAdc1 + kStatus) & kInjectedEnd) != 0; }
@@ -57,7 +54,7 @@ class Analog {
  private:
   static constexpr std::uint32_t kStatus = 0x00, kControl1 = 0x04, kControl2 = 0x08, kSampleTime = 0x0C,
                                  kSequence = 0x38;
-  static constexpr std::uint32_t kInjectedEnd = 1U << 2, kInterruptAtEnd = 1U << 7, kScan = 1U << 8, kOn = 1U << 0;
+  static constexpr std::uint32_t kInjectedEnd = 1U << 2, kScan = 1U << 8, kOn = 1U << 0;
 
   // 28 cycles to sample and 12 to convert: three inputs in 5.7 us, for a source of up to 10 kOhm.
   static void set_sample_time(std::uint32_t input) {

@@ -7,6 +7,7 @@
 
 #include "boards/stm32f4/amplifier.hpp"
 #include "boards/stm32f4/analog.hpp"
+#include "boards/stm32f4/brown_out.hpp"
 #include "boards/stm32f4/clock.hpp"
 #include "boards/stm32f4/encoder.hpp"
 #include "boards/stm32f4/flash.hpp"
@@ -24,6 +25,13 @@ class DriveBoard {
  public:
   static constexpr std::uint32_t kTickHz = 20'000;
   static constexpr std::uint32_t kTelemetryWords = 4096;
+  static constexpr std::uint32_t kOutputSampleTicks = [] {
+    if constexpr (requires { Description::OutputEncoder::kSampleTicks; }) {
+      return Description::OutputEncoder::kSampleTicks;
+    } else {
+      return 1;
+    }
+  }();
 
   // Pins and clock first: the amplifier is off from the first instructions on. False: no clock that a drive can run on.
   bool start_clock() {
@@ -35,20 +43,23 @@ class DriveBoard {
     source_ = Clock::start(Description::kClock);
     // With its longest limit, before the first tick: a hang in start-up leads to a reset as well.
     if (source_ != ClockSource::bare) watchdog_.start();
+    // Elsewhere the boot loader does it.
+    if constexpr (!Description::kHasUsb) set_brown_out_level();
     return source_ != ClockSource::bare;
   }
   // The control tick starts here.
   void start_tick() {
+    Analog::start(Description::kAnalog);
     motor_.start(Description::kMotorReversed);
     output_.start(Description::kOutputReversed);
-    Analog::start(Description::kAnalog);
     amplifier_.start(Description::kClock.core_hz / kTickHz / 2);
   }
   bool clock_is_exact() const { return source_ == ClockSource::crystal; }
 
   // Called from the tick.
 
-  firmware::Readings read() {
+  const firmware::Readings& read() {
+    tim1::take_tick();
     if (Analog::ended()) {
       Analog::take();
       readings_.current = bipolar_share(Analog::result(0), Description::kAnalog.current_falls);
@@ -56,11 +67,16 @@ class DriveBoard {
       readings_.temperature = unipolar_share(Analog::result(2));
       ++readings_.analog_samples;
     }
-    readings_.motor_counter = motor_.count();
-    readings_.output_counter = output_.count();
-    ++readings_.motor_samples;
-    ++readings_.output_samples;
+    if (motor_.take(readings_.motor_counter)) ++readings_.motor_samples;
+    if (output_.take(readings_.output_counter)) ++readings_.output_samples;
+    if constexpr (requires { motor_.take_index(readings_.index_counter); })
+      if (motor_.take_index(readings_.index_counter)) ++readings_.index_passes;
     return readings_;
+  }
+  // After the tick.
+  void end_tick() {
+    if constexpr (requires { motor_.end_tick(); }) motor_.end_tick();
+    if constexpr (requires { output_.end_tick(); }) output_.end_tick();
   }
   void actuate(const firmware::Actuation& command) {
     amplifier_.actuate(command, readings_.current);
@@ -68,13 +84,13 @@ class DriveBoard {
   }
   static constexpr control::Hardware hardware() { return Description::kHardware; }
   bool amplifier_tripped() const { return amplifier_.tripped(); }
-  // The next set of samples is available already.
+  // The next tick is due already.
   bool tick_overrun() {
     if (late_ticks_ > 0) {
       late_ticks_ = static_cast<std::uint8_t>(late_ticks_ - 1);
       return false;
     }
-    return Analog::ended();
+    return tim1::tick_is_due();
   }
 
   // Called from background work.

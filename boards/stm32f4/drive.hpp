@@ -1,5 +1,5 @@
 // A whole drive on one of these processors: board, application, parameters in flash, and the links to a host. main() of
-// a board is run(); its tick is the converter's interrupt.
+// a board is run(); its tick is an interrupt of TIM1.
 #pragma once
 
 #include <array>
@@ -90,6 +90,7 @@ class Drive {
   // The interrupt handler.
   void tick() {
     application_.tick();
+    board_.end_tick();
     line_.move();
   }
 

@@ -6,6 +6,7 @@
 #include <string_view>
 
 #include "boards/stm32f4/board.hpp"
+#include "boards/stm32f4/brown_out.hpp"
 #include "boards/stm32f4/handover.hpp"
 #include "boards/stm32f4/signing_key.hpp"
 #include "firmware/boot_loader.hpp"
@@ -20,6 +21,7 @@ class Loader {
   [[noreturn]] void run() {
     set_up(Description::kPins);  // the amplifier is held off
     const ClockSource source = Clock::start(Description::kClock);
+    set_brown_out_level();
     static Board board;
     static firmware::BootLoader<Board> loader(board);
     const boot::Start start = loader.start();

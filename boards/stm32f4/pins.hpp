@@ -17,14 +17,16 @@ struct Pin {
   PinMode mode = PinMode::analog;
   std::uint8_t function = 0;  // of an alternate one
   Pull pull = Pull::none;
+  bool open_drain = false;
 
   constexpr std::uint32_t base() const { return kGpioA + kGpioBytes * static_cast<std::uint32_t>(port - 'A'); }
 };
 
 inline void set_up(const Pin& p) {
-  constexpr std::uint32_t kSpeed = 0x08, kPull = 0x0C, kFunction = 0x20;
+  constexpr std::uint32_t kType = 0x04, kSpeed = 0x08, kPull = 0x0C, kFunction = 0x20;
   switch_clock_on(p.base());
   const std::uint32_t two = 2U * p.number, four = 4U * (p.number % 8);
+  change_bits(p.base() + kType, 1U << p.number, (p.open_drain ? 1U : 0U) << p.number);
   change_bits(p.base() + kPull, 3U << two, static_cast<std::uint32_t>(p.pull) << two);
   // Fast edges where a timer or USB drives the pin.
   if (p.mode == PinMode::alternate) change_bits(p.base() + kSpeed, 3U << two, 2U << two);

@@ -9,7 +9,7 @@ extern "C" {
 extern std::uint32_t stack_top[];
 [[noreturn]] void Reset_Handler();
 [[noreturn]] void Unexpected_Handler();
-void ADC_IRQHandler();
+void TIM1_CC_IRQHandler();
 // The boot loader only.
 [[gnu::weak]] void SysTick_Handler() {
   Unexpected_Handler();
@@ -36,9 +36,9 @@ union Vector {
 constexpr Vector kGiveUp{.handler = Unexpected_Handler};
 constexpr Vector kNone{.handler = nullptr};
 constexpr Vector kSysTick{.handler = SysTick_Handler};
-constexpr Vector kTick{.handler = ADC_IRQHandler};
+constexpr Vector kTick{.handler = TIM1_CC_IRQHandler};
 // NMI: the crystal failed (RM0090, 7.2.7). The start after the reset takes the internal oscillator.
-[[gnu::section(".vectors"), gnu::used]] const Vector kVectors[16 + 19] = {
+[[gnu::section(".vectors"), gnu::used]] const Vector kVectors[16 + 28] = {
     {.stack = stack_top},
     {.handler = Reset_Handler},
     // NMI to usage fault
@@ -57,7 +57,16 @@ constexpr Vector kTick{.handler = ADC_IRQHandler};
     kNone,
     kGiveUp,
     kSysTick,
-    // interrupts 0 to 18
+    // interrupts 0 to 27
+    kGiveUp,
+    kGiveUp,
+    kGiveUp,
+    kGiveUp,
+    kGiveUp,
+    kGiveUp,
+    kGiveUp,
+    kGiveUp,
+    kGiveUp,
     kGiveUp,
     kGiveUp,
     kGiveUp,

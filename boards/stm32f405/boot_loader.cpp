@@ -9,7 +9,7 @@ constinit flexspline::stm32f4::Loader<flexspline::stm32f405::Description> loader
 extern "C" void SysTick_Handler() {
   loader.tick();
 }
-extern "C" void ADC_IRQHandler() {}
+extern "C" void TIM1_CC_IRQHandler() {}
 extern "C" void cut_amplifier() {
   flexspline::stm32f405::Description::Amplifier::cut();
 }

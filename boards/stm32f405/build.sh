@@ -1,15 +1,25 @@
 #!/bin/sh
-# Builds the images: build.sh OUT_DIR makes f405-dac and f405-pwm, the applications, and f405-dac-boot and f405-pwm-boot,
-# their boot loaders (.elf, .bin, .map). Exit 3 where there is no ARM compiler.
+# Builds the images: build.sh OUT_DIR [VARIANT...] makes f405-VARIANT, the application, and f405-VARIANT-boot, its boot
+# loader (.elf, .bin, .map). Variants: dac, pwm; with other encoders dac-index, pwm-index, dac-abs, pwm-abs. Default:
+# dac, pwm, dac-index, dac-abs.
+# Exit 3 where there is no ARM compiler.
 # FLEXSPLINE_PUBLIC_KEY: the key of images, 64 digits of `flexspline key --show` (default: the public development key).
 # FLEXSPLINE_DFU_UPLOAD=1: a host may read the firmware.
 set -eu
-out=${1:?usage: build.sh OUT_DIR}
+out=${1:?usage: build.sh OUT_DIR [VARIANT...]}
+shift
+[ $# -gt 0 ] || set -- dac pwm dac-index dac-abs
 here=$(cd -- "$(dirname -- "$0")" && pwd)
 compiler=${ARM_GXX:-arm-none-eabi-g++}
-for variant in dac pwm; do
+for variant in "$@"; do
   FLAGS=
-  [ $variant = dac ] || FLAGS=-DFLEXSPLINE_PWM
+  case $variant in
+    dac | pwm) ;;
+    *-index) FLAGS=-DFLEXSPLINE_INDEXED ;;
+    *-abs) FLAGS=-DFLEXSPLINE_ABSOLUTE ;;
+    *) echo "build.sh: no variant $variant" >&2; exit 2 ;;
+  esac
+  case $variant in pwm*) FLAGS="$FLAGS -DFLEXSPLINE_PWM" ;; esac
   [ -z "${FLEXSPLINE_PUBLIC_KEY:-}" ] || FLAGS="$FLAGS -DFLEXSPLINE_PUBLIC_KEY=\"$FLEXSPLINE_PUBLIC_KEY\""
   [ -z "${FLEXSPLINE_DFU_UPLOAD:-}" ] || FLAGS="$FLAGS -DFLEXSPLINE_DFU_UPLOAD"
   export FLAGS

@@ -6,7 +6,7 @@ namespace {
 constinit flexspline::stm32f4::Drive<flexspline::stm32f405::Description> drive;
 }  // namespace
 
-extern "C" void ADC_IRQHandler() {
+extern "C" void TIM1_CC_IRQHandler() {
   drive.tick();
 }
 extern "C" void cut_amplifier() {

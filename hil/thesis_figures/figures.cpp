@@ -19,9 +19,6 @@ std::vector<Figure> not_made() {
            "a block diagram: DriveSystem; its answer is in figures 45 and 48 to 54"},
           {21, "motor simulated, to test identification", "a block diagram", nullptr,
            "a block diagram: the sets table-1 of rhs-100; its result is table 1"},
-          {29, "modified Dahl damping and cubic stiffness against an experiment", "only a narrow loop", nullptr,
-           "needs the report's recording: the twin's locked drive has the static damping of eq. 68 built in, so a "
-           "worse fit of Dahl's model on it would be circular"},
           {36, "transmission model with friction", "a drawing", nullptr, "a drawing: eq. 80 to 82; see figure 15"},
           {43, "locked simulation", "a block diagram", nullptr, "a block diagram; see figures 48 to 54"},
           {44, "free simulation", "a block diagram", nullptr, "a block diagram; see figures 55 to 60"}};

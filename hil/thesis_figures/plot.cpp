@@ -8,6 +8,7 @@
 #include <fstream>
 #include <limits>
 #include <stdexcept>
+#include <utility>
 
 namespace flexspline::thesis_figures {
 namespace {
@@ -69,6 +70,44 @@ struct Range {
   }
 };
 
+struct Point {
+  double x = 0.0, y = 0.0;
+};
+
+// Distance from a line through two points, or from the first where they are one.
+double distance(const Point& p, const Point& a, const Point& b) {
+  const double dx = b.x - a.x, dy = b.y - a.y, length = std::hypot(dx, dy);
+  if (length < 1e-9) return std::hypot(p.x - a.x, p.y - a.y);
+  return std::abs(dx * (p.y - a.y) - dy * (p.x - a.x)) / length;
+}
+
+// Without the points that a line between their neighbours passes within `tolerance` (Douglas and Peucker 1973).
+std::vector<Point> simplified(const std::vector<Point>& points, double tolerance) {
+  if (points.size() < 3) return points;
+  std::vector<bool> kept(points.size(), false);
+  kept.front() = kept.back() = true;
+  std::vector<std::pair<std::size_t, std::size_t>> open{{0, points.size() - 1}};
+  while (!open.empty()) {
+    const auto [first, last] = open.back();
+    open.pop_back();
+    std::size_t farthest = first;
+    double most = tolerance;
+    for (std::size_t k = first + 1; k < last; ++k)
+      if (const double d = distance(points[k], points[first], points[last]); d > most) {
+        most = d;
+        farthest = k;
+      }
+    if (farthest == first) continue;
+    kept[farthest] = true;
+    open.emplace_back(first, farthest);
+    open.emplace_back(farthest, last);
+  }
+  std::vector<Point> left;
+  for (std::size_t k = 0; k < points.size(); ++k)
+    if (kept[k]) left.push_back(points[k]);
+  return left;
+}
+
 class PanelWriter {
  public:
   PanelWriter(const Panel& panel, double top) : panel_(panel), top_(top) {
@@ -122,9 +161,12 @@ class PanelWriter {
   std::string curve(std::size_t at) const {
     const Curve& c = panel_.curves[at];
     const std::size_t every = std::max<std::size_t>(1, c.x.size() / kMostPoints);
-    std::string points;
+    std::vector<Point> all;
     for (std::size_t k = 0; k < c.x.size(); k += every)
-      if (std::isfinite(c.y[k])) points += fmt::format("{:.1f},{:.1f} ", px(c.x[k]), py(c.y[k]));
+      if (std::isfinite(c.y[k])) all.push_back({px(c.x[k]), py(c.y[k])});
+    constexpr double kUnseen = 0.3;  // of a pixel
+    std::string points;
+    for (const Point& p : simplified(all, kUnseen)) points += fmt::format("{:.4g},{:.4g} ", p.x, p.y);
     return fmt::format("<polyline fill=\"none\" stroke=\"{}\" stroke-width=\"1.3\"{} points=\"{}\"/>\n",
                        kColours[at % kColours.size()], dashes(c.stroke), points);
   }

@@ -13,6 +13,7 @@
 #include "host/cli/flash_prediction.hpp"
 #include "host/drive/block_changes.hpp"
 #include "host/drive/model_block.hpp"
+#include "host/drive/stored_zero.hpp"
 #include "host/output/json.hpp"
 #include "host/output/text.hpp"
 #include "shared/protocol/texts.hpp"
@@ -194,7 +195,7 @@ int flash(const FlashOptions& options, Console& console) {
         "choose what to flash: --model MODEL, --block BLOCK of flexspline pack or backup, or --firmware IMAGE");
   drive::Session session = open_drive(options.drive);
   const Bytes active = session.read_block(protocol::Which::active);
-  const Bytes block = block_of(options, session, active, console);
+  const Bytes block = drive::keeping_stored_zero(block_of(options, session, active, console), active);
   const std::vector<BlockChange> changes = drive::changes(active, block);
   const BlockView before = drive::view_of(active), after = drive::view_of(block);
   console.line(fmt::format("{}", named(session)));

@@ -8,6 +8,7 @@
 #include "host/cli/common_options.hpp"
 #include "host/cli/drive_commands.hpp"
 #include "host/drive/scales.hpp"
+#include "host/drive/stored_zero.hpp"
 #include "host/output/json.hpp"
 
 namespace flexspline::cli {
@@ -18,6 +19,7 @@ using nlohmann::json;
 struct HomeOptions {
   std::string drive;
   std::optional<double> position;  // of the motor; none: only queried
+  bool store = false;              // keep the zero in the drive's flash memory
   std::string json;
 };
 
@@ -39,7 +41,12 @@ int run(const HomeOptions& options, Console& console) {
           fmt::format("--position {:g} is further than the {:g} turns that a drive counts to; give the "
                       "angle of the motor",
                       *options.position, kFarthestTurns));
-    session.home(std::llround(std::ldexp(turns, 32)));
+    const std::int64_t position = std::llround(std::ldexp(turns, 32));
+    session.home(position);
+    if (options.store) {
+      drive::store_zero(session, position);
+      console.line("  The zero is stored in the parameter block of the drive.");
+    }
   }
   const protocol::Reference known = session.reference();
   console.line(fmt::format("  {}", described(known)));
@@ -51,16 +58,21 @@ int run(const HomeOptions& options, Console& console) {
                                    {"drive", {{"serial", session.serial()}, {"drive", session.name()}}},
                                    {"knows_turn", known.knows_turn},
                                    {"knows_output", known.knows_output},
+                                   {"stored", options.store},
                                    {"position_rad", options.position ? json(*options.position) : json()}});
   return kDone;
 }
 
 void declare(Parser& parser, HomeOptions& options) {
   take_drive(parser, options.drive);
+  Option position = parser.option(
+      "--position-rad", options.position,
+      "the present position of the motor, m on a linear axis (default: only prints what the drive knows)");
+  position.value("RAD");
   parser
-      .option("--position-rad", options.position,
-              "the present position of the motor, m on a linear axis (default: only prints what the drive knows)")
-      .value("RAD");
+      .flag("--store", options.store,
+            "keep it in the drive: with absolute encoders or an index pulse it holds after the next power-on")
+      .needs(position);
 }
 
 }  // namespace
@@ -72,9 +84,11 @@ Command home_command() {
        "Incremental encoders do not know their absolute position: until it is set, or an index pulse came, a drive "
        "leaves out of its compensation what depends on the angle, and limits of position do not hold. Bring the "
        "shaft to a mark, at rest and not armed, and give the motor's angle there, as the model's data count it. "
-       "Absolute encoders at motor and output need none of this. The reference is lost when the power goes, or when "
-       "a fault reports that counts were lost. Without --position-rad it prints what the drive knows.",
-       {"flexspline home --drive twin", "flexspline home --drive twin --position-rad 0"}},
+       "Absolute encoders at motor and output need none of this where their zeros are the shafts'; with --store the "
+       "drive keeps where the zeros are. The reference is lost when the power goes, or when a fault reports that "
+       "counts were lost. Without --position-rad it prints what the drive knows.",
+       {"flexspline home --drive twin", "flexspline home --drive twin --position-rad 0",
+        "flexspline home --drive twin --position-rad 0 --store"}},
       declare, run);
 }
 

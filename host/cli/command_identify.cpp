@@ -114,8 +114,8 @@ void declare(Parser& parser, IdentifyOptions& options) {
       .option(
           "--method", options.method,
           "ls: least squares; nls: with a search for nonlinear parameters; partitioned: linear parameters first, then "
-          "the others; iv: instrumental variables, for noisy velocities; oe: least error of the free run (default: "
-          "ls or nls, as the model needs)")
+          "the others, on fast and on slow records where there are both; iv: instrumental variables, for noisy "
+          "velocities; oe: least error of the free run (default: ls or nls, as the model needs)")
       .one_of({"ls", "nls", "partitioned", "iv", "oe"})
       .value("");
   parser

@@ -34,6 +34,12 @@ void take_pipeline(Parser& parser, PipelineInputs& pipeline) {
   parser.option("--mask", pipeline.mask, "auto leaves out reversals and sticking, none keeps them (default: auto)")
       .one_of({"auto", "none"})
       .value("");
+  parser
+      .option("--derivatives", pipeline.derivatives,
+              "of positions: butterworth filters and differentiates them, kalman smooths them (Rauch, Tung and "
+              "Striebel) with the most likely covariances (default: butterworth)")
+      .one_of({"butterworth", "kalman"})
+      .value("");
 }
 
 void take_report(Parser& parser, std::filesystem::path& report) {

@@ -35,8 +35,12 @@ struct DataInputs {
 struct PipelineInputs {
   std::optional<double> cutoff_hz;
   std::string mask = "auto";
+  std::string derivatives = "butterworth";
 
-  estimation::PipelineOptions options() const { return {cutoff_hz, mask != "none"}; }
+  estimation::PipelineOptions options() const {
+    return {cutoff_hz, mask != "none", nullptr,
+            derivatives == "kalman" ? estimation::Derivatives::kalman : estimation::Derivatives::butterworth};
+  }
 };
 
 // Reads all measurements; those of `holdout` are never fitted, whatever role they state, and an experiment that both

@@ -428,9 +428,10 @@ control::DriveSettings<fixed::Fixed> settings_of(const control::DriveSetup<doubl
   if (fixed::OverflowLog::count() != 0)
     throw PackError(
         fmt::format("{}: the settings do not fit a drive with these ratings: {}", origin, fixed::OverflowLog::first()));
-  for (const auto& [counts, corner] :
-       {std::pair{setup.motor_counts, setup.motor_corner}, std::pair{setup.output_counts, setup.output_corner}})
-    if (counts != 0 && !observers::kalman_bounds(observers::kalman_gains(corner * d.time_base)).fit)
+  for (const auto& [counts, corner, period] :
+       {std::tuple{setup.motor_counts, setup.motor_corner, d.time_base},
+        std::tuple{setup.output_counts, setup.output_corner, control::slow(d).time_base}})
+    if (counts != 0 && !observers::kalman_bounds(observers::kalman_gains(corner * period)).fit)
       throw PackError(
           fmt::format("{}: the states of an encoder's filter leave their range; choose another corner than "
                       "{:g} Hz",

@@ -137,13 +137,14 @@ ProofPart add_encoder_filter(model::BlockWriter& writer, const DriveConstants<do
 
 // What the states of both encoders' filters stay below.
 void prove_filters(const control::DriveSetup<double>& setup, const DriveConstants<double>& d, Packed& packed) {
-  const auto filter = [&](const char* name, double corner, double base) {
-    const auto bounds = observers::kalman_bounds(observers::kalman_gains(corner * d.time_base));
+  const auto filter = [&](const char* name, double corner, double period, double base) {
+    const auto bounds = observers::kalman_bounds(observers::kalman_gains(corner * period));
     packed.proof.push_back(
         {name, "impulse_response", bounds.velocity * base, d.turn_angle_scale == 1.0 ? "rad/s" : "m/s"});
   };
-  filter("encoder_filter", setup.motor_corner, d.velocity_base);
-  if (setup.output_counts != 0) filter("output_filter", setup.output_corner, d.output_velocity_base);
+  filter("encoder_filter", setup.motor_corner, d.time_base, d.velocity_base);
+  if (setup.output_counts != 0)
+    filter("output_filter", setup.output_corner, control::slow(d).time_base, d.output_velocity_base);
 }
 
 struct ScaledModel {

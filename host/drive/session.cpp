@@ -56,21 +56,27 @@ control::Hardware Session::hardware() {
 protocol::Reference Session::reference() {
   if (identity_.minor < protocol::kMinorOfHardware)
     fail("its firmware is older than position references; bring the firmware up to date");
-  return ask<protocol::Reference>(Kind::reference);
+  protocol::Message m = done(exchange(protocol::request(Kind::reference, 0, protocol::Empty{})));
+  protocol::Reference known;
+  if (m.length == protocol::kReferenceBytesBeforeZero)
+    for (; m.length < protocol::kReferenceBytes; ++m.length) m.payload[m.length] = 0;
+  if (protocol::take_payload(m.content(), known) != Code::done) fail("its answer cannot be understood");
+  return known;
 }
 
 void Session::home(std::int64_t position) {
   if (identity_.minor < protocol::kMinorOfHardware)
     fail("its firmware is older than position references; bring the firmware up to date");
   const auto request = protocol::request(Kind::home, 0, protocol::Home{position});
-  // A drive that was just switched on checks its sensors first.
-  constexpr int kMostAttempts = 100;
+  // A drive that was just switched on checks its sensors first, and then whether its shaft stands.
+  constexpr int kMostAttempts = 100, kMostWhileMoving = 20;
   for (int attempt = 1;; ++attempt) {
     const protocol::Message answer = exchange(request);
     protocol::CommandAnswer refused;
-    const bool starts = static_cast<Code>(answer.code) == Code::refused &&
-                        protocol::take_payload(answer.content(), refused) == Code::done &&
-                        refused.refusal == protocol::Refusal::booting;
+    const bool is_refused = static_cast<Code>(answer.code) == Code::refused &&
+                            protocol::take_payload(answer.content(), refused) == Code::done;
+    const bool starts = is_refused && (refused.refusal == protocol::Refusal::booting ||
+                                       (refused.refusal == protocol::Refusal::moving && attempt < kMostWhileMoving));
     if (!starts || attempt == kMostAttempts) {
       take_refusal(answer);
       return;

@@ -10,6 +10,7 @@
 #include "host/catalogue/user_defined_effect.hpp"
 #include "host/estimation/instruments.hpp"
 #include "host/estimation/intervals.hpp"
+#include "host/estimation/least_squares.hpp"
 #include "host/estimation/output_error.hpp"
 #include "host/estimation/partition.hpp"
 
@@ -35,6 +36,7 @@ void warn_of_scale(Identification& identification) {
   for (const Estimate& e : identification.estimates) {
     const auto& info = *identification.terms[e.ref.term].entry->info;
     if (e.identifiable || e.fixed || (info.reads & effects::kTorqueScale) == 0) continue;
+    if (e.excitation.value_or(1.0) >= kUndetermined) continue;  // noise or a bound hide the scale, and assemble says so
     identification.warnings.push_back(fmt::format(
         "nothing fixes the scale of the torques, so {}.{} is not identifiable: supply one parameter that you know "
         "another way, such as --supply inertia.inertia=VALUE",

@@ -221,8 +221,62 @@ void store(model::Model& model, const std::vector<Estimate>& estimates) {
 
 namespace {
 
+bool is_length(const effects::ParameterInfo& info) {
+  return (info.limit == effects::Limit::torsion || info.limit == effects::Limit::travel) && info.low >= 0.0;
+}
+
+// Effects of which a nonlinear parameter stopped at an end of its range: the error still falls beyond it, so its slopes
+// there show neither that parameter's error nor that of the effect's others. (A length at the resolution of the data
+// may be zero; that end is a bound.)
+std::vector<std::size_t> effects_without_minimum(const BalanceData& data, const BalanceFit& fit, const Terms& terms) {
+  std::vector<std::size_t> found;
+  for (const ParameterRef& ref : fit.nonlinear) {
+    const effects::ParameterInfo& info = terms[ref.term].entry->parameters[ref.parameter];
+    const double share = share_of_range(data, terms, ref);
+    if (share > 1.0 - kAtTheEnd || (share < kAtTheEnd && !is_length(info))) found.push_back(ref.term);
+  }
+  return found;
+}
+
+// Why the scale of the torques is not known where a parameter of it is to be identified; empty: it is. All others on
+// the balance are scaled with it, so no interval of theirs would say how far they may be off. Either it was held at its
+// bound; or its column, which is a measured torque, has noise that is not small against the part of it that no other
+// column explains: noise of a column makes its parameter smaller by (noise / (noise + that part)) in squares. The
+// residual is the most that this noise can be.
+std::string why_no_scale(BalanceData& data, const BalanceFit& fit, const std::vector<ParameterRef>& held,
+                         const Terms& terms) {
+  constexpr double kMostAttenuation = 0.1;
+  const auto is_scale = [&](ParameterRef ref) {
+    return (terms[ref.term].entry->info->reads & effects::kTorqueScale) != 0;
+  };
+  const auto name = [&](ParameterRef ref) {
+    return fmt::format("{}.{}", terms[ref.term].id, terms[ref.term].entry->parameters[ref.parameter].name);
+  };
+  if (const auto at = std::ranges::find_if(held, is_scale); at != held.end())
+    return fmt::format("{} is held at its bound", name(*at));
+  const auto at = std::ranges::find_if(fit.linear, is_scale);
+  if (at == fit.linear.end()) return "";
+  const auto j = static_cast<Eigen::Index>(at - fit.linear.begin());
+  const double own = fit.root_tolerance[j] * columns_of(data, terms, {*at}).norm();
+  const double noise = fit.residual.norm();
+  if (fit.root_tolerance[j] < kUndetermined || noise * noise < kMostAttenuation * (noise * noise + own * own))
+    return "";
+  return fmt::format(
+      "noise may make {} too small: {:.2g} N m of its torque are orthogonal to the others, with {:.2g} "
+      "of noise",
+      name(*at), own / std::sqrt(static_cast<double>(data.rows())), fit.rmse());
+}
+
 // Estimates of what a fit found, with standard errors and intervals.
-void add_estimates(const BalanceData& data, const BalanceFit& fit, Identification& result) {
+void add_estimates(BalanceData& data, const BalanceFit& fit, const std::vector<ParameterRef>& held,
+                   Identification& result) {
+  const std::vector<std::size_t> open = effects_without_minimum(data, fit, result.terms);
+  const std::string no_scale = why_no_scale(data, fit, held, result.terms);
+  if (!no_scale.empty())
+    result.warnings.push_back(fmt::format(
+        "{}: the scale of the torques is not known, and the values of this balance have no intervals; supply one "
+        "parameter that you know another way, such as --supply inertia.inertia=VALUE, or record faster motion",
+        no_scale));
   std::vector<ParameterRef> all = fit.linear;
   all.insert(all.end(), fit.nonlinear.begin(), fit.nonlinear.end());
   for (std::size_t j = 0; j < all.size(); ++j) {
@@ -230,7 +284,7 @@ void add_estimates(const BalanceData& data, const BalanceFit& fit, Identificatio
     const auto at = static_cast<Eigen::Index>(j);
     Estimate e = estimate_of(result.terms, ref, result.model.drive.axis);
     const effects::ParameterInfo& info = result.terms[ref.term].entry->parameters[ref.parameter];
-    e.identifiable = fit.root_tolerance[at] >= kUndetermined;
+    e.identifiable = fit.root_tolerance[at] >= kUndetermined && no_scale.empty() && !std::ranges::count(open, ref.term);
     e.excitation = fit.excitation[at];
     const double variance = natural_value(result.terms[ref.term], ref, all, fit.covariance).variance;
     if (e.identifiable && std::isfinite(variance)) {
@@ -238,8 +292,7 @@ void add_estimates(const BalanceData& data, const BalanceFit& fit, Identificatio
       e.low = e.value - 1.96 * *e.std;
       e.high = e.value + 1.96 * *e.std;
       // A length below the resolution of these data stops at its bound and may be zero.
-      const bool length = info.limit == effects::Limit::torsion || info.limit == effects::Limit::travel;
-      if (j >= fit.linear.size() && length && info.low >= 0.0 && share_of_range(data, result.terms, ref) < kAtTheEnd)
+      if (j >= fit.linear.size() && is_length(info) && share_of_range(data, result.terms, ref) < kAtTheEnd)
         e.low = std::min(*e.low, info.low);
     }
     result.estimates.push_back(std::move(e));
@@ -282,7 +335,7 @@ void assemble(Identification& result) {
     BalanceData& data = result.data[b];
     const BalanceFit& fit = result.fits[b];
     const std::size_t first = result.estimates.size();
-    add_estimates(data, fit, result);
+    add_estimates(data, fit, result.held[b], result);
     alone.push_back({fit_alone(data, fit, result.terms), fit.linear});
     for (std::size_t j = first; j < result.estimates.size(); ++j)
       add_by_experiment(data, alone.back(), result, result.estimates[j]);

@@ -10,6 +10,7 @@
 
 #include "host/catalogue/user_defined_effect.hpp"
 #include "host/estimation/evidence.hpp"
+#include "host/estimation/form_on.hpp"
 #include "host/estimation/record_constants.hpp"
 #include "host/estimation/variable_projection.hpp"
 
@@ -173,17 +174,27 @@ model::Drive reconcile(const model::Drive& drive, const data::Dataset& dataset, 
   return result;
 }
 
-std::unique_ptr<Identification> form(const data::Dataset& dataset, const model::Model& model,
-                                     const PipelineOptions& options) {
-  auto result = std::make_unique<Identification>();
-  result->model = model;
-  result->model.drive = reconcile(model.drive, dataset, result->warnings);
+std::vector<const data::Experiment*> experiments_to_fit(const data::Dataset& dataset) {
   std::vector<const data::Experiment*> fit_on;
   for (const data::Experiment& e : dataset.experiments)
     if (e.role == data::Role::fit) fit_on.push_back(&e);
   if (fit_on.empty())
     throw data::DataError({{data::Severity::error, "too_few_samples", "", 0, "", "no experiment has the role fit",
                             "give at least one experiment to fit on, or drop --holdout"}});
+  return fit_on;
+}
+
+std::unique_ptr<Identification> form(const data::Dataset& dataset, const model::Model& model,
+                                     const PipelineOptions& options) {
+  return form_on(experiments_to_fit(dataset), dataset, model, options);
+}
+
+std::unique_ptr<Identification> form_on(const std::vector<const data::Experiment*>& fit_on,
+                                        const data::Dataset& dataset, const model::Model& model,
+                                        const PipelineOptions& options) {
+  auto result = std::make_unique<Identification>();
+  result->model = model;
+  result->model.drive = reconcile(model.drive, dataset, result->warnings);
   result->prepared = prepare(fit_on, result->model.drive, options);
   result->terms = terms_of(result->model);
   std::map<std::size_t, std::string> too_short;  // by record, of any balance
@@ -205,7 +216,7 @@ std::unique_ptr<Identification> form(const data::Dataset& dataset, const model::
     PipelineOptions unmasked = options;
     unmasked.mask = false;
     unmasked.ready = nullptr;
-    auto kept = form(dataset, model, unmasked);
+    auto kept = form_on(fit_on, dataset, model, unmasked);
     kept->warnings.push_back(fmt::format(
         "reversals are not left out, as too few samples would remain in {}: static friction laws do not hold "
         "there; record longer strokes",

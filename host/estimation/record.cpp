@@ -34,6 +34,11 @@ constexpr double kMaskReach = 1.5;
 constexpr double kCountingPowerShare = 0.01;
 constexpr double kMostMaskedShare = 0.75;
 constexpr double kMaskedShareThen = 0.5;  // where it was more than that
+// Of the samples that the best cut-off leaves of a record: with less it is as good as lost, and then so many are
+// wanted.
+constexpr double kLeastOfTheBest = 0.1, kThenOfTheBest = 0.9;
+constexpr double kWorthKeeping = 0.05;  // of a record's samples, at its best cut-off
+constexpr double kCutoffStep = 1.25;
 
 // A current that is held for a sample acts, on average, half a sample after its time stamp; the mean with the sample
 // before puts it at the instant at which positions are read.
@@ -140,6 +145,7 @@ void take_motion(Record& r, const Experiment& e, SideMotion motor, SideMotion ou
   r.has_output_motion = output.measured || r.locked;
   r.motor_quantum = motor.quantum;
   r.velocity_crossover_hz = motor.velocity_crossover_hz;
+  r.smoother_corner_hz = motor.smoother_corner_hz;
   r.output_quantum = output.quantum;
   r.velocity_noise[index(Balance::motor)] = motor.velocity_noise;
   r.velocity_noise[index(Balance::load)] =
@@ -153,8 +159,10 @@ void take_motion(Record& r, const Experiment& e, SideMotion motor, SideMotion ou
   }
   r.inputs.angle = std::move(motor.position);
   r.inputs.velocity = std::move(motor.velocity);
+  r.inputs.acceleration = std::move(motor.acceleration);
   r.inputs.output_angle = std::move(output.position);
   r.inputs.output_velocity = std::move(output.velocity);
+  r.inputs.output_acceleration = std::move(output.acceleration);
   r.inputs.at_rest = r.at_rest;
   r.inputs.velocity_noise = r.velocity_noise;
 }
@@ -178,7 +186,8 @@ Record prepare_one(const Experiment& e, const catalogue::DriveConstants<double>&
   r.inputs.reference_temperature = drive.reference_temperature;
   r.inputs.locked = r.locked;
   take_torques(r, e, drive, filter);
-  take_motion(r, e, motor_side(e, drive, filter), r.locked ? SideMotion{} : output_side(e, filter), drive.gear_ratio);
+  take_motion(r, e, motor_side(e, drive, filter, pipeline.derivatives),
+              r.locked ? SideMotion{} : output_side(e, filter, pipeline.derivatives), drive.gear_ratio);
   r.inputs.keep_directions();
   choose_rows(r, pipeline, filter.settling_samples());
   return r;
@@ -220,6 +229,7 @@ void leave_rows_between_reversals(Pipeline& pipeline, const std::vector<const Ex
 Pipeline choose_pipeline(const std::vector<const Experiment*>& experiments, const PipelineOptions& options) {
   Pipeline pipeline;
   pipeline.mask = options.mask;
+  pipeline.derivatives = options.derivatives;
   double slowest_hz = 1e300;
   for (const Experiment* e : experiments) slowest_hz = std::min(slowest_hz, 1.0 / e->sample_s);
   if (options.cutoff_hz) {
@@ -278,6 +288,50 @@ PreparedData without_records(const std::vector<const Experiment*>& experiments, 
   return prepared;
 }
 
+double share_left(const Record& r) {
+  const Rows& rows = r.rows[index(Balance::motor)];
+  const std::size_t all = rows.samples.size() + rows.masked;
+  return all > 0 ? static_cast<double>(rows.samples.size()) / static_cast<double>(all) : 0.0;
+}
+
+// What the number of reversals does not show: slow or short strokes of which the mask leaves next to nothing, because
+// they end before the filter has settled, or because the velocity is small for its noise. The mask itself is made at
+// rising cut-offs: it gets shorter, and the noise larger, so that each record has a best one. Returns whether the
+// cut-off was raised.
+bool raise_for_masked_records(PreparedData& prepared, double highest_hz) {
+  Pipeline& pipeline = prepared.pipeline;
+  std::vector<double> cutoffs;
+  for (double hz = pipeline.row_cutoff_hz; hz < highest_hz; hz *= kCutoffStep) cutoffs.push_back(hz);
+  cutoffs.push_back(highest_hz);
+  std::vector<double> wanted(prepared.records.size(), 0.0);
+  in_parallel(prepared.records.size(), [&](std::size_t i) {
+    const Record& r = prepared.records[i];
+    const double now = share_left(r);
+    if (!r.has_motor_motion || r.at_rest || now >= kLeastOfTheBest) return;
+    std::vector<double> shares = {now};
+    for (std::size_t c = 1; c < cutoffs.size(); ++c) {
+      throw_if_cancelled();
+      Pipeline tried = pipeline;
+      tried.row_cutoff_hz = cutoffs[c];
+      tried.motion_cutoff_hz = std::max(pipeline.motion_cutoff_hz, cutoffs[c]);
+      shares.push_back(share_left(prepare_one(*r.experiment, prepared.constants, tried)));
+    }
+    const double best = *std::max_element(shares.begin(), shares.end());
+    if (best < kWorthKeeping || now >= kLeastOfTheBest * best) return;
+    const auto enough = std::ranges::find_if(shares, [&](double s) { return s >= kThenOfTheBest * best; });
+    wanted[i] = cutoffs[static_cast<std::size_t>(enough - shares.begin())];
+  });
+  const auto most = std::max_element(wanted.begin(), wanted.end());
+  if (most == wanted.end() || *most <= pipeline.row_cutoff_hz) return false;
+  pipeline.row_cutoff_hz = std::min(std::ceil(*most), highest_hz);
+  // Slow motion is what such records have: a velocity that is small for its noise puts the friction of one speed at
+  // another one, so the positions' filter is no wider than it must be.
+  pipeline.motion_cutoff_hz = std::max(pipeline.motion_cutoff_hz, pipeline.row_cutoff_hz);
+  pipeline.reason += fmt::format("; raised to {:.4g} Hz, so that the mask leaves samples of {}", pipeline.row_cutoff_hz,
+                                 prepared.records[static_cast<std::size_t>(most - wanted.begin())].name);
+  return true;
+}
+
 }  // namespace
 
 PreparedData prepare_with(const std::vector<const Experiment*>& experiments, const model::Drive& drive,
@@ -316,6 +370,12 @@ PreparedData prepare(const std::vector<const Experiment*>& experiments, const mo
     return prepared;
   }
   PreparedData prepared = prepare_with(experiments, drive, choose_pipeline(experiments, options));
+  if (!options.cutoff_hz && options.mask) {
+    double slowest_hz = 1e300;
+    for (const Experiment* e : experiments) slowest_hz = std::min(slowest_hz, 1.0 / e->sample_s);
+    if (raise_for_masked_records(prepared, slowest_hz / 10.0))
+      prepared = prepare_with(experiments, drive, Pipeline(prepared.pipeline));
+  }
   prepared.pipeline.torque_per_step = torque_per_held_step(prepared);
   for (Record& record : prepared.records)
     correct_zero_order_hold(record, prepared.constants, prepared.pipeline.torque_per_step);

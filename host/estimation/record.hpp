@@ -13,6 +13,7 @@
 #include "host/catalogue/constants.hpp"
 #include "host/data/dataset.hpp"
 #include "host/estimation/record_signals.hpp"
+#include "host/estimation/side_motion.hpp"
 
 namespace flexspline::estimation {
 
@@ -31,6 +32,7 @@ struct PipelineOptions {
   // Records that were made before with these options, by prepare_all: a later request copies them, which costs
   // a tenth. Whoever keeps this keeps the data set, too. Null: nothing was.
   std::shared_ptr<const PreparedData> ready = nullptr;
+  Derivatives derivatives = Derivatives::butterworth;
 };
 
 // What was chosen for the data at hand; the same for all records, so that their samples can be compared.
@@ -40,6 +42,7 @@ struct Pipeline {
   bool mask = true;
   double torque_per_step = 0.0;  // of a held effort, that readings of the torque lack half of; see zero_order_hold.hpp
   std::string reason;            // where the cut-off comes from
+  Derivatives derivatives = Derivatives::butterworth;
 
   bool operator==(const Pipeline&) const = default;
 };
@@ -87,6 +90,7 @@ struct Record {
   // From here on the motor's velocity is the measured one, which has less noise than the derivative of the position;
   // zero: all of it is the derivative.
   double velocity_crossover_hz = 0.0;
+  double smoother_corner_hz = 0.0;  // of the motor's Kalman smoother; zero: positions are filtered and differentiated
   // Standard deviation of what the resolution and noise of the positions leave in the direction variable of each
   // balance: motor velocity, torsion rate, output velocity.
   std::array<double, kBalances> velocity_noise{};

@@ -7,6 +7,7 @@
 
 #include "host/signals/differentiate.hpp"
 #include "host/signals/fused_velocity.hpp"
+#include "host/signals/kalman_smoother.hpp"
 #include "host/signals/quantum.hpp"
 
 namespace flexspline::estimation {
@@ -117,9 +118,49 @@ double take_measured_velocity(SideMotion& motion, const std::vector<double>& mea
   return crossover_hz;
 }
 
+// Covariances are those of the longest segment, and hold for all. Nothing where the numbers are too large for any.
+std::optional<SideMotion> smoothed_side(const std::vector<double>& position, std::optional<double> quantum,
+                                        const Experiment& e) {
+  const auto part = [&](const Segment& s) {
+    return std::span<const double>(position.data() + s.first, s.last - s.first);
+  };
+  const Segment& longest = *std::ranges::max_element(e.segments, {}, [](const Segment& s) { return s.last - s.first; });
+  const signals::MotionCovariances covariances =
+      signals::most_likely_covariances(part(longest), e.sample_s, std::pow(quantum.value_or(0.0), 2) / 12.0);
+  if (!std::isfinite(covariances.position_variance) || !std::isfinite(covariances.jerk_density)) return std::nullopt;
+  SideMotion side;
+  for (std::vector<double>* signal : {&side.position, &side.velocity, &side.acceleration})
+    signal->resize(position.size(), 0.0);
+  for (const Segment& s : e.segments) {
+    const signals::SmoothedMotion motion = signals::rauch_tung_striebel(part(s), e.sample_s, covariances);
+    const auto first = static_cast<std::ptrdiff_t>(s.first);
+    std::ranges::copy(motion.position, side.position.begin() + first);
+    std::ranges::copy(motion.velocity, side.velocity.begin() + first);
+    std::ranges::copy(motion.acceleration, side.acceleration.begin() + first);
+    side.velocity_noise = motion.velocity_std;
+  }
+  side.position_noise = std::sqrt(covariances.position_variance);
+  side.smoother_corner_hz = covariances.corner_hz(e.sample_s);
+  side.quantum = quantum;
+  side.measured = true;
+  return side;
+}
+
+// The smoother takes three samples, and its covariances sixteen.
+bool is_long_enough(const std::vector<Segment>& segments) {
+  std::size_t longest = 0, shortest = SIZE_MAX;
+  for (const Segment& s : segments) {
+    longest = std::max(longest, s.last - s.first);
+    shortest = std::min(shortest, s.last - s.first);
+  }
+  return longest >= 16 && shortest >= 3;
+}
+
 // `velocity` is the column that may have been measured as well.
 SideMotion side_from_position(const std::vector<double>& position, Column velocity, std::optional<double> quantum,
-                              const Experiment& e, const ZeroPhaseFilter& filter) {
+                              const Experiment& e, const ZeroPhaseFilter& filter, Derivatives derivatives) {
+  if (derivatives == Derivatives::kalman && is_long_enough(e.segments))
+    if (auto smoothed = smoothed_side(position, quantum, e)) return std::move(*smoothed);
   SideMotion side = motion_from_position(position, e.segments, filter, e.sample_s);
   side.quantum = quantum;
   side.position_noise = std::max(side.position_noise, quantum.value_or(0.0) / std::sqrt(12.0));
@@ -134,13 +175,13 @@ SideMotion side_from_position(const std::vector<double>& position, Column veloci
 }  // namespace
 
 SideMotion motor_side(const Experiment& e, const catalogue::DriveConstants<double>& drive,
-                      const ZeroPhaseFilter& filter) {
+                      const ZeroPhaseFilter& filter, Derivatives derivatives) {
   if (e.has(Column::motor_position)) {
     const std::vector<double>& position = e[Column::motor_position];
     const std::optional<double> quantum = e.encoder_counts && drive.turn_angle_scale == 1.0
                                               ? std::optional(2.0 * M_PI / *e.encoder_counts)
                                               : signals::quantum_of(position);
-    return side_from_position(position, Column::motor_velocity, quantum, e, filter);
+    return side_from_position(position, Column::motor_velocity, quantum, e, filter, derivatives);
   }
   if (!e.has(Column::motor_velocity)) return {};
   SideMotion side = motion_from_velocity(e[Column::motor_velocity], e.segments, filter, e.sample_s);
@@ -151,12 +192,12 @@ SideMotion motor_side(const Experiment& e, const catalogue::DriveConstants<doubl
   return side;
 }
 
-SideMotion output_side(const Experiment& e, const ZeroPhaseFilter& filter) {
+SideMotion output_side(const Experiment& e, const ZeroPhaseFilter& filter, Derivatives derivatives) {
   if (e.has(Column::output_position)) {
     const std::vector<double>& position = e[Column::output_position];
     const std::optional<double> quantum =
         e.output_encoder_counts ? std::optional(2.0 * M_PI / *e.output_encoder_counts) : signals::quantum_of(position);
-    return side_from_position(position, Column::output_velocity, quantum, e, filter);
+    return side_from_position(position, Column::output_velocity, quantum, e, filter, derivatives);
   }
   if (!e.has(Column::output_velocity)) return {};
   SideMotion side = motion_from_velocity(e[Column::output_velocity], e.segments, filter, e.sample_s);

@@ -231,7 +231,8 @@ void write_payloads(Writer& w) {
       {"current_full_scale_ma", "amplifier_full_scale_ma", "most_current_ma", "torque_full_scale_mnm",
        "temperature_full_scale_mc", "temperature_at_zero_mc", "motor_encoder", "output_encoder", "torque_sensor"});
   w.payload<Reference>("reference", "reference, from the drive: what it knows of where its shafts are",
-                       {"knows_turn", "knows_output"});
+                       {"knows_turn", "knows_output", "motor_counts", "motor_zero", "motor_kind", "output_counts",
+                        "output_zero", "output_kind"});
   w.payload<Home>("home", "home, to the drive: the motor's present position, 2^-32 turns", {"position"});
   w.payload<Status>("status", "status, from the drive",
                     {"tick", "mode", "has_parameters", "store", "fault", "fault_tick", "fault_seen", "fault_limit",

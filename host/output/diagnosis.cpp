@@ -342,6 +342,8 @@ json resampling_json(const Diagnosis& d) {
           {"whiteness", json_number(d.resampling->whiteness)},
           {"lowest_hz", json_number(d.resampling->lowest_hz)},
           {"highest_hz", json_number(d.resampling->highest_hz)},
+          {"lag_s", json_number(d.resampling->lag_s)},
+          {"lag_std_s", json_number(d.resampling->lag_std_s)},
           {"decides", d.resampling->decides},
           {"found", std::move(found)}};
 }

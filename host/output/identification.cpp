@@ -174,6 +174,21 @@ namespace {
 
 // Which velocity was taken where a record has both a position and a velocity.
 std::string velocity_text(const estimation::PreparedData& prepared) {
+  if (prepared.pipeline.derivatives == estimation::Derivatives::kalman) {
+    double lowest = 0.0, highest = 0.0;
+    for (const estimation::Record& record : prepared.records) {
+      if (!(record.smoother_corner_hz > 0.0)) continue;
+      lowest = lowest > 0.0 ? std::min(lowest, record.smoother_corner_hz) : record.smoother_corner_hz;
+      highest = std::max(highest, record.smoother_corner_hz);
+    }
+    if (!(highest > 0.0)) return "; no motor position to smooth: its velocity is filtered";
+    const std::string corner = highest - lowest < 0.005 * highest ? fmt::format("{:.3g}", highest)
+                                                                  : fmt::format("{:.3g} to {:.3g}", lowest, highest);
+    return fmt::format(
+        "; positions are not filtered, but their velocity and acceleration are those of a Kalman filter with "
+        "Rauch-Tung-Striebel smoothing, of a corner of {} Hz at the motor, the most likely one",
+        corner);
+  }
   std::size_t both = 0, fused = 0;
   double highest_hz = 0.0;
   for (const estimation::Record& record : prepared.records) {
@@ -212,8 +227,11 @@ std::string pipeline_text(const estimation::PreparedData& prepared) {
       if (!record.experiment->current_hold_stated) ++held_by_assumption;
     }
   }
-  std::string text = fmt::format("filters: {:.4g} Hz for the regression, {:.4g} Hz for positions; {}", p.row_cutoff_hz,
-                                 p.motion_cutoff_hz, p.reason);
+  const std::string of_positions = p.derivatives == estimation::Derivatives::kalman
+                                       ? ""
+                                       : fmt::format(", {:.4g} Hz for positions", p.motion_cutoff_hz);
+  std::string text =
+      fmt::format("filters: {:.4g} Hz for the regression{}; {}", p.row_cutoff_hz, of_positions, p.reason);
   text += decimations == std::vector<std::string>{"1"}
               ? "; every sample is used"
               : fmt::format("; one sample in {} is used", listed(decimations, "or"));
@@ -270,6 +288,7 @@ json identification_json(const estimation::Identification& found, const std::str
           {"intervals", intervals},
           {"cutoff_hz", json_number(p.row_cutoff_hz)},
           {"motion_cutoff_hz", json_number(p.motion_cutoff_hz)},
+          {"derivatives", p.derivatives == estimation::Derivatives::kalman ? "kalman" : "butterworth"},
           {"cutoff_reason", p.reason},
           {"parameters", std::move(parameters)},
           {"derived", std::move(derived)},

@@ -12,6 +12,13 @@ bool is_placebo(const Frequency& f) {
   return !f.entry && f.order;
 }
 
+// Behind a structure that is in no catalogue, and for a term with a small share, the limit is stricter.
+double least_frequency(const FoundTerm& found, bool unknown, const SelectionPolicy& policy) {
+  const bool behind_unknown = unknown && found.group.front().first < policy.group_frequency;
+  const bool strict = behind_unknown || found.share < policy.line_share;
+  return strict && found.group.front().name != kPresliding ? policy.certain_frequency : policy.named_frequency;
+}
+
 }  // namespace
 
 std::vector<FoundTerm> decide(const Stability& stability, const SelectionPolicy& policy) {
@@ -23,7 +30,11 @@ std::vector<FoundTerm> decide(const Stability& stability, const SelectionPolicy&
     return std::find_if(stability.frequencies.begin(), stability.frequencies.end(),
                         [&](const Frequency& f) { return f.name == name; });
   };
-  for (const Frequency& lead : stability.frequencies) {
+  // What is chosen first most often leads, so that a term that can take the place of a larger one is in its group.
+  std::vector<Frequency> leads = stability.frequencies;
+  std::stable_sort(leads.begin(), leads.end(),
+                   [](const Frequency& a, const Frequency& b) { return a.first > b.first; });
+  for (const Frequency& lead : leads) {
     if (taken.count(lead.name) != 0 || lead.near < policy.named_frequency ||
         lead.frequency < policy.least_own_frequency)
       continue;
@@ -42,9 +53,8 @@ std::vector<FoundTerm> decide(const Stability& stability, const SelectionPolicy&
     // this refutes the waves only.
     if (lead.entry && !lead.order && lead.frequency >= policy.named_frequency &&
         std::any_of(found.group.begin(), found.group.end(), is_placebo)) {
+      // The subsamples that chose a wave chose it for what it shares with the leading term.
       std::erase_if(found.group, [](const Frequency& f) { return f.order.has_value(); });
-      found.frequency = 0.0;
-      for (const Frequency& f : found.group) found.frequency += f.frequency;
     }
     found.frequency = std::min(found.frequency, lead.near);
     if (found.frequency < policy.named_frequency) continue;
@@ -54,15 +64,9 @@ std::vector<FoundTerm> decide(const Stability& stability, const SelectionPolicy&
     }
     all.push_back(std::move(found));
   }
-  // Where there is also a structure that is not in the catalogue, and for terms with a small share, the limit is
-  // stricter.
   const bool unknown = std::any_of(all.begin(), all.end(), [](const FoundTerm& f) { return !f.in_catalogue; });
-  std::erase_if(all, [&](const FoundTerm& f) {
-    const bool presliding = f.group.front().name == kPresliding;
-    const double least =
-        !presliding && (unknown || f.share < policy.line_share) ? policy.certain_frequency : policy.named_frequency;
-    return f.in_catalogue && f.frequency < least;
-  });
+  std::erase_if(
+      all, [&](const FoundTerm& f) { return f.in_catalogue && f.frequency < least_frequency(f, unknown, policy); });
   // Waves that take off no more than a placebo wave found with them are not more significant than that.
   double placebo_share = 0.0;
   for (const FoundTerm& f : all)

@@ -160,12 +160,24 @@ std::string choose_named(SearchedBalance& chosen) {
   return alias;
 }
 
+// Whether resampling could not distinguish a candidate from the first one, and it leaves a similar error on all data.
+bool is_in_group(const std::optional<Resampling>& resampling, const CandidateFit& first, const CandidateFit& t) {
+  if (!resampling) return false;
+  const auto group = resampling->found_group({std::string(first.model.entry->name()), first.model.order});
+  return t.gain.chi2_percent >= kPolicy.similar * first.gain.chi2_percent &&
+         100.0 - t.gain.chi2_percent <= kPolicy.similar_left * (100.0 - first.gain.chi2_percent) &&
+         std::any_of(group.begin(), group.end(), [&](const NamedEffect& n) {
+           return n.effect == t.model.entry->name() && n.order == t.model.order;
+         });
+}
+
 void name_effects(const SearchedBalance& chosen, const std::string& alias, Diagnosis& result) {
   const auto& list = chosen.candidates;
   const auto is = [](const Candidate& c, const NamedEffect& n) { return c.effect == n.effect && c.order == n.order; };
   for (const CandidateFit& t : list) {
     const NamedEffect name{std::string(t.model.entry->name()), t.model.order};
-    const bool near = t.score() >= list.front().score() - kPolicy.confounded_margin;
+    const bool near = t.score() >= list.front().score() - kPolicy.confounded_margin ||
+                      is_in_group(result.resampling, list.front(), t);
     // A law with more parameters and the same error is not confounded with the simpler one, as it contains it. One with
     // a slightly smaller error is.
     const bool wider = t.model.added > list.front().model.added && !t.leads;
@@ -325,6 +337,7 @@ Diagnosis diagnose(const data::Dataset& dataset, const model::Model& model, cons
   if (names_one) name_effects(chosen, alias, result);
   if (!result.named.empty()) explain_named(chosen.search, chosen.candidates, model.drive, result);
   assess_remainder(chosen, result);
+  if (by_resampling && result.resampling->lag_s) result.delay_s = result.resampling->lag_s;
   if (!by_resampling || result.named.empty()) {
     if (options.progress) options.progress("looking for what no effect explains");
     check_unknown_structure(chosen.search, names_one ? &chosen.candidates.front() : nullptr, result);

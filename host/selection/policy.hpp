@@ -42,7 +42,8 @@ struct SelectionPolicy {
   double similar = 0.9;         // terms that take off that share of the best one's are not distinguished,
   double similar_left = 2.0;    // unless they leave that many times the squares above the noise
 
-  double group_frequency = 0.5;      // of the subsamples that chose the first of a group
+  double group_frequency = 0.5;      // of the subsamples that chose the first of a group; and from which on a term that
+                                     // was chosen first is not behind a structure that is in no catalogue
   double least_own_frequency = 0.3;  // of the first of a group
   double most_abstaining = 0.75;     // of the subsamples
 
@@ -53,8 +54,10 @@ struct SelectionPolicy {
   double friction_difference = 0.03;
   double friction_difference_records = 2.0;
 
-  double most_held_out_ratio = 1.02;  // error on experiments that are held out, with a term over without it: below,
-                                      // the difference is that of short records
+  // Error on experiments that are held out, with a term over without it: of a term of certain_frequency, as that much
+  // more is the difference of short records, and of any other.
+  double most_held_out_ratio_certain = 1.02;
+  double most_held_out_ratio = 1.0;
 
   double white = 0.95;  // semivariance over variance of what is left: above, it is noise
 

@@ -65,6 +65,16 @@ bool reaches_floor(const SearchedBalance& e) {
          (!is_of_effort(first) || first.gain.chi2_percent > kPolicy.nearly_all_percent);
 }
 
+// Whether resampling found another effect that explains what is above the noise, too.
+bool explains_instead(const Resampling& resampling, const CandidateFit& first) {
+  return std::any_of(resampling.found.begin(), resampling.found.end(), [&](const Resampling::FoundTerm& f) {
+    return !f.group.empty() && !f.refused_by_holdout && f.share_percent >= kPolicy.recovered_percent &&
+           f.frequency >= kPolicy.certain_frequency &&
+           std::none_of(f.group.begin(), f.group.end(),
+                        [&](const NamedEffect& n) { return is_of_family(n.effect, n.order, first); });
+  });
+}
+
 // Whether the model with the best effect leaves noise: then likelihood alone decides. Where more than one effect is
 // missing, structure remains whatever is added, and a small decrease proves nothing. Where the noise floor is unknown,
 // the residual must be white, and an effect of the effort alone is not taken, as it may explain its own noise.
@@ -109,13 +119,24 @@ bool names_several(const Resampling& resampling, const SearchedBalance& motor) {
   return names.size() > 1 && resampling.found_group(names.front()).size() < 2;
 }
 
+std::vector<std::string> first_names(const std::vector<FoundTerm>& decided) {
+  std::vector<std::string> names;
+  for (const FoundTerm& found : decided) names.push_back(found.group.front().name);
+  return names;
+}
+
 }  // namespace
 
 Resampling resample(const std::vector<const data::Experiment*>& experiments, const model::Drive& drive,
                     const estimation::Terms& terms) {
-  const StabilitySelection selection(experiments, drive, terms, estimation::Balance::motor, kPolicy);
+  StabilitySelection selection(experiments, drive, terms, estimation::Balance::motor, kPolicy);
   const Stability& stability = selection.result();
   Resampling result;
+  if (const std::optional<TimeLag> lag = selection.time_lag(first_names(decide(stability, kPolicy)))) {
+    selection.take_off(*lag);
+    result.lag_s = lag->seconds;
+    result.lag_std_s = lag->std;
+  }
   result.subsamples = stability.subsamples;
   result.too_little = stability.subsamples == 0.0 && selection.tables().sign.model_columns > 0;
   result.abstained = stability.abstained;
@@ -124,9 +145,7 @@ Resampling resample(const std::vector<const data::Experiment*>& experiments, con
   result.lowest_hz =
       result.highest_hz * std::pow(kPolicy.bandwidth_factor, static_cast<double>(kPolicy.bandwidths - 1));
   const std::vector<FoundTerm> decided = decide(stability, kPolicy);
-  std::vector<std::string> names;
-  for (const FoundTerm& found : decided) names.push_back(found.group.front().name);
-  const std::vector<double> held_out = selection.held_out_ratios(names);
+  const std::vector<double> held_out = selection.held_out_ratios(first_names(decided));
   for (std::size_t i = 0; i < decided.size(); ++i) {
     const FoundTerm& found = decided[i];
     Resampling::FoundTerm one;
@@ -141,8 +160,9 @@ Resampling resample(const std::vector<const data::Experiment*>& experiments, con
         const catalogue::Entry* entry = f.name == kPresliding ? presliding_law(terms) : f.entry;
         if (entry) one.group.push_back({std::string(entry->name()), f.order});
       }
-    one.refused_by_holdout =
-        !one.group.empty() && one.held_out_ratio && *one.held_out_ratio > kPolicy.most_held_out_ratio;
+    const double most_ratio =
+        one.frequency >= kPolicy.certain_frequency ? kPolicy.most_held_out_ratio_certain : kPolicy.most_held_out_ratio;
+    one.refused_by_holdout = !one.group.empty() && one.held_out_ratio && *one.held_out_ratio > most_ratio;
     result.found.push_back(std::move(one));
   }
   result.support = support_of(selection, terms);
@@ -152,8 +172,8 @@ Resampling resample(const std::vector<const data::Experiment*>& experiments, con
 bool resampling_decides(const Resampling& resampling, const SearchedBalance& motor) {
   if (resampling.subsamples == 0.0) return resampling.too_little;
   if (!motor.names_one()) return true;
-  if (reaches_floor(motor)) return false;
   const CandidateFit& first = motor.candidates.front();
+  if (reaches_floor(motor) && !explains_instead(resampling, first)) return false;
   const std::optional<double> support = support_of(resampling, first);
   const bool found_something = std::any_of(resampling.found.begin(), resampling.found.end(),
                                            [](const auto& f) { return !f.refused_by_holdout; });

@@ -32,12 +32,40 @@ StabilitySelection::StabilitySelection(const std::vector<const data::Experiment*
                                        const model::Drive& drive, const estimation::Terms& terms, Balance balance,
                                        const SelectionPolicy& policy)
     : policy_(policy), tables_(make_tables(experiments, drive, terms, balance, policy)) {
-  if (tables_.sign.model_columns == 0) return;
-  per_setting_.resize(tables_.settings.size());
+  if (tables_.sign.model_columns > 0) evaluate();
+}
+
+void StabilitySelection::evaluate() {
+  per_setting_.assign(tables_.settings.size(), {});
+  result_ = {};
   estimation::in_parallel(per_setting_.size(), [&](std::size_t i) {
     per_setting_[i] = evaluate_setting(tables_.settings[i].first, tables_.settings[i].second, kSeed + i);
   });
   count();
+}
+
+std::optional<TimeLag> StabilitySelection::time_lag(const std::vector<std::string>& names) const {
+  // At the setting of the highest bandwidth of the motion, reversals kept.
+  const auto at = std::find_if(tables_.settings.begin(), tables_.settings.end(), [&](const auto& s) {
+    return s.first <= 1.01 * tables_.bandwidth.highest_hz && !s.second;
+  });
+  if (at == tables_.settings.end()) return std::nullopt;
+  const SettingResult& setting = per_setting_[static_cast<std::size_t>(at - tables_.settings.begin())];
+  if (setting.votes.empty()) return std::nullopt;
+  std::vector<int> terms;
+  for (const std::string& name : names)
+    for (const int term : terms_of(setting, {name})) terms.push_back(term);
+  const bool presliding = std::erase(terms, kPreslidingTerm) > 0 && tables_.presliding;
+  const std::optional<TimeLag> lag = estimate_time_lag(presliding ? *tables_.presliding : tables_.sign, terms, policy_);
+  if (!lag || std::abs(lag->seconds) < policy_.delay_errors * lag->std || lag->share < policy_.line_share)
+    return std::nullopt;
+  return lag;
+}
+
+void StabilitySelection::take_off(const TimeLag& lag) {
+  take_off_lag(tables_.sign, lag.seconds);
+  if (tables_.presliding) take_off_lag(*tables_.presliding, lag.seconds);
+  evaluate();
 }
 
 StabilitySelection::SettingResult StabilitySelection::evaluate_setting(double cutoff_hz, bool mask,

@@ -6,6 +6,7 @@
 
 #include "host/selection/candidate_tables.hpp"
 #include "host/selection/halves.hpp"
+#include "host/selection/time_lag.hpp"
 
 namespace flexspline::selection {
 
@@ -38,6 +39,12 @@ class StabilitySelection {
   const CandidateTables& tables() const { return tables_; }
   const Stability& result() const { return result_; }
 
+  // Lag of the effort's time base, with these terms (of frequencies) in the model, where it is significant and takes
+  // off as much as a term must.
+  std::optional<TimeLag> time_lag(const std::vector<std::string>& names) const;
+  // Selects again with that lag taken off the effort.
+  void take_off(const TimeLag& lag);
+
   // Of each of `names` (of frequencies): held-out error of the model with all of them over that with all others, the
   // median of all settings; fitted on what is not held out. Empty where nothing is held out.
   std::vector<double> held_out_ratios(const std::vector<std::string>& names) const;
@@ -52,6 +59,7 @@ class StabilitySelection {
   };
 
   SettingResult evaluate_setting(double cutoff_hz, bool mask, std::uint64_t seed) const;
+  void evaluate();
   void count();
   // The terms of these names that fit best together; none where one cannot be seen there.
   std::vector<int> terms_of(const SettingResult& setting, const std::vector<std::string>& names) const;

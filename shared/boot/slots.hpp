@@ -23,7 +23,7 @@ enum class Slot : std::uint8_t {
 };
 inline constexpr std::size_t kSlots = 3;
 inline constexpr std::size_t kJournalBytes = 64;
-// Another sector, never erased: a word for each time that the security counter was raised.
+// Another sector, never erased: two words for each time that the security counter was raised.
 inline constexpr std::size_t kCounterSector = kSlots, kImageSectors = kSlots + 1;
 inline constexpr std::size_t kCounterBytes = 512;
 
@@ -57,6 +57,7 @@ class Slots {
 
   // At each start of the boot loader: finishes an update that was begun.
   constexpr Start resume() {
+    make_certain();
     if (is_pending()) {
       if ((is_set(Mark::installed) && may_run(Slot::application)) || install()) {
         for (std::size_t i = 0; i < kTrials && !is_set(Mark::fell_back); ++i) {
@@ -74,13 +75,14 @@ class Slots {
       return Start::application;
     }
     // It is damaged, or a first installation was interrupted: another image replaces it, the newest first.
-    const bool again = is_set(Mark::confirmed) && copy(Slot::download, Slot::application);
+    const bool again = is_confirmed() && copy(Slot::download, Slot::application);
     return again || copy(Slot::old, Slot::application) ? Start::application : Start::none;
   }
 
   // The same counter before a download, where the boot loader was started by a request: the application may have
   // confirmed itself since the last start.
   constexpr void keep_counter() {
+    make_certain();
     if (!is_pending() && may_run(Slot::application)) raise_counter();
   }
   // The largest of the images that were confirmed. Words that an interrupted write left have too few zeros, and do not
@@ -97,18 +99,18 @@ class Slots {
 
   // Whether the running application is on trial. It reads the whole image: call it once, before there are deadlines.
   constexpr bool on_trial() const { return is_pending() && is_set(Mark::installed) && !is_set(Mark::fell_back); }
-  // Confirms the running application, which is on trial: one word is written.
-  constexpr bool confirm() { return set(Mark::confirmed); }
+  // Confirms the running application, which is on trial: two words are written.
+  constexpr bool confirm() { return set(Mark::confirmed) && set(Mark::settled); }
 
   // Download.
 
   // Erases the download slot. An application that was never confirmed is rolled back first, so that the previous image
-  // is not lost.
+  // is not lost, and an update that was not begun is closed.
   constexpr SlotError begin() {
     staging_ = false;
     staged_ = 0;
     finding_ = ImageFinding::none;
-    if (is_pending() && is_set(Mark::saved)) fall_back();
+    if (is_pending()) fall_back();
     // The first word of an image is cleared before the rest, so that an interrupted erase does not leave an image with
     // half a journal.
     if (word(Slot::download, 0) != storage::kErasedWord) flash_.program(number(Slot::download), 0, 0);
@@ -188,8 +190,18 @@ class Slots {
  private:
   // Words of the journal, each set once: the request and its progress. They are not valid without a complete image
   // before them.
-  enum class Mark : std::uint8_t { requested, saved, installed, trial, confirmed = 3 + kTrials, fell_back, taken_back };
-  static constexpr std::size_t kMarks = 3 + kTrials + 3;
+  enum class Mark : std::uint8_t {
+    requested,
+    saved,
+    installed,
+    trial,
+    confirmed = 3 + kTrials,
+    fell_back,
+    taken_back,
+    settled,
+    certain
+  };
+  static constexpr std::size_t kMarks = 3 + kTrials + 5;
   static_assert(4 * kMarks <= kJournalBytes);
   static_assert(Flash::kSectorBytes > kHeaderBytes + kJournalBytes && Flash::kSectorBytes % 8 == 0);
   static_assert(Flash::kSectorBytes >= kCounterBytes);
@@ -210,9 +222,26 @@ class Slots {
   constexpr bool may_run(Slot slot) const { return !image_to_run(slot).empty(); }
   constexpr bool is_set(Mark mark) const { return word(Slot::download, place_of(mark)) == kSet; }
   constexpr bool set(Mark mark) { return put(Slot::download, place_of(mark), kSet); }
+  // `fell_back` may be a word that an interrupted write left, set at one start and not at the next: `settled` overrules
+  // it.
+  constexpr bool is_confirmed() const {
+    return is_set(Mark::confirmed) && (is_set(Mark::settled) || !is_set(Mark::fell_back));
+  }
+  constexpr bool is_closed() const { return is_confirmed() || is_set(Mark::taken_back); }
   // An update that was requested and is not finished.
-  constexpr bool is_pending() const {
-    return is_set(Mark::requested) && !is_set(Mark::confirmed) && !is_set(Mark::taken_back) && is_whole(Slot::download);
+  constexpr bool is_pending() const { return is_set(Mark::requested) && !is_closed() && is_whole(Slot::download); }
+  // Bits of an interrupted write can read differently at each start. So before a start acts on a word that is set it is
+  // written again, and an update whose request was interrupted is closed. Once `certain` is set nothing is left to do.
+  constexpr void make_certain() {
+    if (is_set(Mark::certain) || !is_whole(Slot::download)) return;
+    if (is_set(Mark::requested)) {
+      for (std::size_t i = 0; i < kMarks; ++i)
+        if (is_set(static_cast<Mark>(i))) set(static_cast<Mark>(i));
+      if (is_confirmed()) set(Mark::settled);
+    } else if (!is_set(Mark::taken_back)) {
+      fall_back();
+    }
+    if (is_closed()) set(Mark::certain);
   }
 
   constexpr bool put(Slot slot, std::size_t at, std::uint32_t value) {
@@ -235,12 +264,12 @@ class Slots {
       if (bytes(slot)[i] != there[i]) return false;
     return !there.empty();
   }
-  // An interrupted copy starts again; a finished one is not repeated.
+  // An interrupted copy starts again. One that looks finished is written again without an erase, as its last word may
+  // have been interrupted.
   constexpr bool copy(Slot from, Slot to) {
     const std::size_t words = (image_to_run(from).size() + 3) / 4;
     if (words == 0) return false;
-    if (is_copy(from, to)) return true;
-    if (erase(to) != SlotError::none) return false;
+    if (!is_copy(from, to) && erase(to) != SlotError::none) return false;
     for (std::size_t i = 0; i < words; ++i)
       if (!put(to, i, word(from, i))) return false;
     return is_whole(to);
@@ -261,6 +290,7 @@ class Slots {
     return (untouched || copy(Slot::old, Slot::application)) && set(Mark::taken_back);
   }
 
+  static constexpr std::size_t kTimes = 2;
   // The counter in both halves, once inverted: each word has sixteen zeros.
   static constexpr std::uint32_t code_of(std::uint16_t counter) {
     return std::uint32_t{counter} | (~std::uint32_t{counter} << 16);
@@ -269,16 +299,21 @@ class Slots {
     model::Reader r(flash_.bytes(kCounterSector).subspan(4 * i, 4));
     return r.take<std::uint32_t>();
   }
-  // To that of the application, which is confirmed. The first word that is blank or that an interrupted write of the
-  // same counter left takes it. Where all are used, the counter stays what it is.
+  // To that of the application, which is confirmed. The first two words that are blank or that an interrupted write of
+  // the same counter left take it: an interrupted one may read as whole, and is certain once there is a second. Where
+  // all are used, the counter stays what it is.
   constexpr void raise_counter() {
     ImageHeader header;
     if (read_header(bytes(Slot::application), header) != ImageFinding::none) return;
-    if (header.security_counter <= security_counter()) return;
+    if (header.security_counter < security_counter() || header.security_counter == 0) return;
     const std::uint32_t code = code_of(header.security_counter);
-    for (std::size_t i = 0; i < kCounterBytes / 4; ++i) {
+    std::size_t there = 0;
+    for (std::size_t i = 0; i < kCounterBytes / 4; ++i) there += counter_word(i) == code ? 1 : 0;
+    if (there >= kTimes) return;
+    there = 0;
+    for (std::size_t i = 0; i < kCounterBytes / 4 && there < kTimes; ++i) {
       if ((counter_word(i) & code) != code) continue;
-      if (flash_.program(kCounterSector, i, code) && counter_word(i) == code) return;
+      if (flash_.program(kCounterSector, i, code) && counter_word(i) == code) ++there;
     }
   }
 

@@ -31,6 +31,9 @@ struct SectionValues {
   GeneralSettings general{};
   Limited limited{};
   Stated stated{};
+  std::uint32_t motor_counts = 0;
+  std::uint32_t output_counts = 0;
+  StoredZero zero{};
 };
 
 template <class Base, class Derived>
@@ -62,11 +65,17 @@ inline bool encoder_agrees(const observers::EncoderAngle::Coefficients& c) {
 }
 struct MotorEncoderSection : SectionOf<Section::motor_encoder, observers::EncoderAngle::Coefficients> {
   static constexpr auto& data(auto& settings) { return settings.motor_encoder; }
-  static bool agrees(const Data& c, SectionValues&) { return encoder_agrees(c); }
+  static bool agrees(const Data& c, SectionValues& values) {
+    values.motor_counts = c.counts;
+    return encoder_agrees(c);
+  }
 };
 struct OutputEncoderSection : SectionOf<Section::output_encoder, observers::EncoderAngle::Coefficients> {
   static constexpr auto& data(auto& settings) { return settings.output_encoder; }
-  static bool agrees(const Data& c, SectionValues&) { return encoder_agrees(c); }
+  static bool agrees(const Data& c, SectionValues& values) {
+    values.output_counts = c.counts;
+    return encoder_agrees(c);
+  }
 };
 struct EncoderFilterSection : SectionOf<Section::encoder_filter, observers::EncoderKalman::Coefficients<Numbers>> {
   static constexpr auto& data(auto& settings) { return settings.motor_motion; }
@@ -153,6 +162,9 @@ struct FollowingSection : SectionOf<Section::following, FollowingLimits<Numbers>
     return true;
   }
 };
+struct RateSection : SectionOf<Section::rates, RateSettings> {
+  static constexpr auto& data(auto& settings) { return base_of<Data>(settings); }
+};
 struct ResidualMapSection : SectionOf<Section::residual_map, ResidualMap::Coefficients> {
   static constexpr auto& data(auto& settings) { return settings.residual_map; }
   static bool agrees(const Data& c, SectionValues&) {
@@ -162,11 +174,30 @@ struct ResidualMapSection : SectionOf<Section::residual_map, ResidualMap::Coeffi
   }
 };
 
+struct StoredZeroSection : SectionOf<Section::stored_zero, StoredZero> {
+  static constexpr auto& data(auto& settings) { return settings.zero; }
+  static bool agrees(const Data& c, SectionValues& values) {
+    values.zero = c;
+    return true;
+  }
+};
+// Of other counts a turn: the encoder is another one.
+constexpr bool zero_agrees(const StoredZero::Place& zero, std::uint32_t counts) {
+  return zero.counts == 0 ? zero == StoredZero::Place{} : zero.counts == counts && zero.reading < counts;
+}
+// A counter that begins at its angle at power-on has no reading that could be stored.
+constexpr bool zero_agrees(const StoredZero::Place& zero, SensorKind encoder) {
+  if (zero.counts == 0 || encoder == SensorKind::not_stated) return true;
+  return zero.kind == static_cast<std::uint32_t>(encoder) &&
+         (encoder == SensorKind::absolute || encoder == SensorKind::indexed);
+}
+
 // In the order in which they are written.
-using Sections = std::tuple<GeneralSection, MotorEncoderSection, OutputEncoderSection, EncoderFilterSection,
-                            OutputFilterSection, DisturbanceSection, TorsionSection, RippleSection, SensorSection,
-                            LoopsSection, TrajectorySection, FeedforwardSection, ExcitationSection,
-                            ExcitationLinesSection, SafetySection, FollowingSection, ResidualMapSection>;
+using Sections =
+    std::tuple<GeneralSection, MotorEncoderSection, OutputEncoderSection, EncoderFilterSection, OutputFilterSection,
+               DisturbanceSection, TorsionSection, RippleSection, SensorSection, LoopsSection, TrajectorySection,
+               FeedforwardSection, ExcitationSection, ExcitationLinesSection, SafetySection, FollowingSection,
+               ResidualMapSection, StoredZeroSection, RateSection>;
 template <std::size_t I, class Visit>
 constexpr void visit_section(Visit& visit) {
   visit(std::tuple_element_t<I, Sections>{});
@@ -288,6 +319,12 @@ model::BlockVerdict check_for_drive(std::span<const std::uint8_t> block, std::ui
   if ((needed & ~sections.seen) != 0) return {model::BlockFault::missing_section};
   if (general.tick_hz != tick_hz) return {model::BlockFault::other_tick_rate};
   if (unreachable(values.limited) != Limit::none) return {model::BlockFault::unreachable_limit};
+  const StoredZero& zero = values.zero;
+  if (!detail::zero_agrees(zero.motor, values.motor_counts) || !detail::zero_agrees(zero.output, values.output_counts))
+    return {model::BlockFault::unlike_coefficients};
+  if (!detail::zero_agrees(zero.motor, hardware.motor_encoder) ||
+      !detail::zero_agrees(zero.output, hardware.output_encoder))
+    return {model::BlockFault::other_hardware};
   Stated& stated = values.stated;
   stated.current_limit = values.limited.current_limit;
   stated.has_output_encoder = general.has_output_encoder;
@@ -317,6 +354,8 @@ inline void add_settings(model::BlockWriter& writer, const DriveSettings<fixed::
   required |= settings.has_output_encoder ? detail::kWithOutputEncoder : detail::kWithoutOutputEncoder;
   if (settings.has_torque_sensor) required |= detail::kWithTorqueSensor;
   if (settings.following.ticks > 0) required |= detail::bits_of({model::Section::following});
+  if (settings.zero != StoredZero{}) required |= detail::bits_of({model::Section::stored_zero});
+  if (settings.has_slow_rates) required |= detail::bits_of({model::Section::rates});
   if (settings.excitation.ticks > 0) {
     required |= detail::bits_of({model::Section::excitation});
     if (settings.excitation.line_count > 0) required |= detail::bits_of({model::Section::excitation_lines});

@@ -19,6 +19,16 @@
 
 namespace flexspline::control {
 
+// The velocity of the output and the disturbance, which no loop needs, are estimated at every eighth tick: their
+// observers are derived for a time base of so many ticks, and the lead of the feedforward for kLeadTicks. A block that
+// does not state this has all of them derived for every tick.
+inline constexpr std::uint32_t kSlowTicks = 8;
+template <class P>
+constexpr effects::DriveConstants<P> slow(effects::DriveConstants<P> d) {
+  d.time_base = P(static_cast<double>(kSlowTicks)) * d.time_base;
+  return d;
+}
+
 // An analogue sensor gives a share of its full scale, 2^-15; value = gain share - offset, in the base of the signal.
 // Readings at `lowest` or below and at `highest` or above mean a broken wire or an amplifier at its rail.
 template <class N>
@@ -74,6 +84,29 @@ struct FollowingLimits {
   }
 };
 
+// Where the zeros of the shafts are in the readings of their encoders, in counts within a turn: of an absolute encoder
+// its own angle, of an incremental one the count from its index pulse. It holds for encoders of these counts and kinds
+// (SensorKind), as they were mounted. Zero counts: none is stored, and an encoder's own zero is the shaft's.
+struct StoredZero {
+  struct Place {
+    std::uint32_t counts = 0;  // a turn
+    std::uint32_t reading = 0;
+    std::uint32_t kind = 0;
+    bool operator==(const Place&) const = default;
+    template <class Codec>
+    constexpr void fields(Codec& c) {
+      c.ticks_or_none(counts), c.ticks_or_none(reading), c.ticks_or_none(kind);
+    }
+  };
+  Place motor{};
+  Place output{};
+  bool operator==(const StoredZero&) const = default;
+  template <class Codec>
+  constexpr void fields(Codec& c) {
+    c(motor), c(output);
+  }
+};
+
 // Settings that are one section of a parameter block.
 struct GeneralSettings {
   std::uint32_t tick_hz = 0;
@@ -83,6 +116,13 @@ struct GeneralSettings {
   template <class Codec>
   constexpr void fields(Codec& c) {
     c.tick_rate(tick_hz), c(has_output_encoder), c(has_torque_sensor), c(excites_torque);
+  }
+};
+struct RateSettings {
+  bool has_slow_rates = false;
+  template <class Codec>
+  constexpr void fields(Codec& c) {
+    c(has_slow_rates);
   }
 };
 // Without an encoder at the output.
@@ -120,7 +160,7 @@ struct SetPointSettings {
 };
 
 template <class N>
-struct DriveSettings : GeneralSettings, TorsionSettings<N>, SensorSettings<N>, SetPointSettings<N> {
+struct DriveSettings : GeneralSettings, RateSettings, TorsionSettings<N>, SensorSettings<N>, SetPointSettings<N> {
   observers::EncoderAngle::Coefficients motor_encoder{};
   observers::EncoderAngle::Coefficients output_encoder{};
   observers::EncoderKalman::Coefficients<N> motor_motion{};
@@ -133,6 +173,7 @@ struct DriveSettings : GeneralSettings, TorsionSettings<N>, SensorSettings<N>, S
   SafetyLimits<N> safety{};
   FollowingLimits<N> following{};
   ResidualMap::Coefficients residual_map{};
+  StoredZero zero{};
 };
 
 template <class N>

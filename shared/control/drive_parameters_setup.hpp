@@ -41,6 +41,7 @@ struct DriveSetup {
   std::uint32_t output_counts = 0;  // zero: no encoder at the output
   P motor_corner{};                 // rad/s, of the motor's Kalman filter
   P output_corner{};
+  bool has_slow_rates = true;            // observers that no loop needs, and the lead, not at every tick
   observers::TorsionSetup<P> torsion{};  // used without an encoder at the output
   bool has_torque_sensor = false;
   observers::RippleSetup<P> ripple{};  // of the torque sensor
@@ -127,6 +128,8 @@ template <class N, class P>
 DriveParameters<N> derive(const DriveSetup<P>& s, const effects::DriveConstants<P>& d) {
   DriveParameters<N> p;
   p.tick_hz = s.tick_hz;
+  p.has_slow_rates = s.has_slow_rates;
+  const effects::DriveConstants<P> seldom = s.has_slow_rates ? slow(d) : d;
   p.has_output_encoder = s.output_counts != 0;
   p.has_torque_sensor = s.has_torque_sensor;
   p.excites_torque = s.excites_torque;
@@ -135,7 +138,7 @@ DriveParameters<N> derive(const DriveSetup<P>& s, const effects::DriveConstants<
       observers::setup_for_corner(P(static_cast<double>(s.motor_counts)), s.motor_corner, d), d);
   if (p.has_output_encoder) {
     // The output's own bases, in the same filter.
-    effects::DriveConstants<P> output = d;
+    effects::DriveConstants<P> output = seldom;
     output.velocity_base = d.output_velocity_base;
     output.acceleration_base = d.output_acceleration_base;
     p.output_encoder = observers::EncoderAngle::derive(s.output_counts);
@@ -148,7 +151,7 @@ DriveParameters<N> derive(const DriveSetup<P>& s, const effects::DriveConstants<
     p.torsion_turns = N::gain(d.torsion_base / d.angle_base);
     p.output_of_velocity = N::gain(d.velocity_base / (d.gear_ratio * d.output_velocity_base));
   }
-  p.disturbance = observers::DisturbanceObserver::derive<N>(s.disturbance, d);
+  p.disturbance = observers::DisturbanceObserver::derive<N>(s.disturbance, seldom);
   p.current = detail::analog_scale<N>(s.current, d.current_base);
   if (p.has_torque_sensor) {
     p.torque = detail::analog_scale<N>(s.torque, d.output_torque_base);
@@ -161,7 +164,7 @@ DriveParameters<N> derive(const DriveSetup<P>& s, const effects::DriveConstants<
   p.loops = Loops::derive<N>(s.loops, d);
   p.trajectory = Trajectory::derive<N>(s.trajectory, d);
   p.stream = Stream::derive(d);
-  p.feedforward = Feedforward::derive<N>(s.feedforward, d);
+  p.feedforward = Feedforward::derive<N>(s.feedforward, d, s.has_slow_rates ? Feedforward::kLeadTicks : 1);
   if (s.excitation.ticks > 0)
     p.excitation = Excitation::derive<N>(s.excitation, s.excites_torque ? d.torque_base : d.velocity_base, d);
   p.residual_map = ResidualMap::derive<N>(s.residual_map, d);

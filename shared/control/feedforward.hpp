@@ -38,6 +38,9 @@ struct FeedforwardSetup {
 };
 
 struct Feedforward {
+  // The torsion settles far more slowly than a tick: a drive computes the lead at every second one.
+  static constexpr int kLeadTicks = 2;
+
   template <class N>
   struct Coefficients {
     typename N::Gain per_band{};
@@ -56,7 +59,7 @@ struct Feedforward {
     typename N::RatioGain per_damping{};
     typename N::Exponent rate_exponent{};
     typename N::Value most_damping{};
-    typename N::Value creep{};  // bases of torsion in a tick at 1 rad/s
+    typename N::Value creep{};  // bases of torsion in a step at 1 rad/s
     typename N::Gain lead{};    // turns of the motor per torsion
     typename N::StepGain lead_velocity{};
     template <class Codec>
@@ -71,6 +74,8 @@ struct Feedforward {
     typename N::Value load{};  // torque through the flexspline, at the tick before
     typename N::Value torsion{};
     typename N::State torsion_state{};  // the torsion; its change in a tick may be below the resolution of a value
+    typename N::Step lead{};
+    typename N::Value lead_velocity{};
   };
   template <class N>
   struct SetPoint {
@@ -94,7 +99,7 @@ struct Feedforward {
   // Host only. The model's effects are derived with the same `d`; they determine the feedforward. Errors of sensors
   // must not be in it, as they do not act on a shaft.
   template <class N, class P>
-  static Coefficients<N> derive(const FeedforwardSetup<P>& s, const effects::DriveConstants<P>& d) {
+  static Coefficients<N> derive(const FeedforwardSetup<P>& s, const effects::DriveConstants<P>& d, int lead_ticks = 1) {
     constexpr double kTurn = 6.283185307179586;
     require(s.direction_band > P(0.0), "the band of the direction has to be positive");
     require(s.torque_limit <= P(2.0) * d.torque_base && s.load_limit <= P(2.0) * d.output_torque_base,
@@ -115,7 +120,8 @@ struct Feedforward {
             "the lead of a feedforward may change faster than two bases of velocity");
     c.compliance = N::gain(d.output_torque_base / (s.stiffness * d.torsion_base));
     c.torsion_limit = N::value(s.torsion_limit / d.torsion_base);
-    c.torsion_change = N::value(s.torsion_rate_limit * d.time_base / d.torsion_base);
+    const P lead_time = P(static_cast<double>(lead_ticks)) * d.time_base;
+    c.torsion_change = N::value(s.torsion_rate_limit * lead_time / d.torsion_base);
     c.damped = s.damping_torque > P(0.0);
     if (c.damped) {
       require(s.damping_exponent >= P(0.1) && s.damping_exponent <= P(1.0),
@@ -125,22 +131,22 @@ struct Feedforward {
       c.per_damping = N::ratio_gain(d.output_torque_base / s.damping_torque);
       c.rate_exponent = N::exponent(P(1.0) / s.damping_exponent);
       c.most_damping = N::value(most < P(8.0) ? most : P(8.0));
-      c.creep = N::value(d.time_base / d.torsion_base);
+      c.creep = N::value(lead_time / d.torsion_base);
     }
     c.lead = N::gain(d.gear_ratio * d.torsion_base / d.angle_base);
-    c.lead_velocity = N::step_gain(d.angle_base / (d.velocity_base * d.time_base));
+    c.lead_velocity = N::step_gain(d.angle_base / (d.velocity_base * lead_time));
     return c;
   }
 
-  // One tick. The set point within two bases.
+  // One tick. The set point within two bases. `steps_lead`: in the other ticks the lead is held.
   //   T = load(set point) + measured load;  torque = motor(set point, measured angle) + T/N
-  //   dq += (T - transmission(dq))/K_largest, a chord step a tick: it converges to the torsion at which the
+  //   dq += (T - transmission(dq))/K_largest, a chord step: it converges to the torsion at which the
   //   transmission carries T, for any curve that is not stiffer than K_largest; lead = N dq. With damping a step
-  //   is at most T_tick (abs(T - transmission(dq))/damping_torque)^(1/damping_exponent), the transmission's rate.
+  //   is at most T_step (abs(T - transmission(dq))/damping_torque)^(1/damping_exponent), the transmission's rate.
   // Friction that depends on the load takes the load of the previous tick.
   template <class N, class Image>
   static constexpr Output<N> update(State<N>& s, const Coefficients<N>& c, model::DriveModel<N, Image>& model,
-                                    const SetPoint<N>& set, const Measured<N>& measured) {
+                                    const SetPoint<N>& set, const Measured<N>& measured, bool steps_lead = true) {
     effects::Inputs<N> in{};
     in.angle = set.position;
     in.velocity = set.velocity;
@@ -162,20 +168,27 @@ struct Feedforward {
     motor += c.share_of_load * s.load;
     Output<N> out;
     out.torque = N::clamp(N::narrow(motor), c.torque_limit);
-    if (!c.leads) return out;
-    const auto missing = s.load - N::clamp(N::narrow(torques.transmission), c.load_limit + c.load_limit);
+    if (c.leads && steps_lead) update_lead<N>(s, c, torques.transmission);
+    out.lead = s.lead;
+    out.velocity = s.lead_velocity;
+    return out;
+  }
+
+ private:
+  template <class N>
+  static constexpr void update_lead(State<N>& s, const Coefficients<N>& c, typename N::Sum transmission) {
+    const auto missing = s.load - N::clamp(N::narrow(transmission), c.load_limit + c.load_limit);
     auto change = N::widen(N::clamp(N::scaled(c.compliance, missing), c.torsion_change));
     if (c.damped) {
       const auto rate = N::pow_abs(N::ratio(c.per_damping, N::clamp(missing, c.most_damping)), c.rate_exponent);
       const auto four = N::one() + N::one() + N::one() + N::one();
       change = N::clamp(change, N::times(N::widen(N::clamp(rate, four)), c.creep));
     }
-    const auto before = s.torsion;
+    const auto before = s.lead;
     s.torsion_state = N::clamp(s.torsion_state + change, c.torsion_limit);
     s.torsion = N::narrow(s.torsion_state);
-    out.lead = N::distance(c.lead, s.torsion);
-    out.velocity = N::narrow(N::signal(c.lead_velocity, N::distance(c.lead, s.torsion - before)));
-    return out;
+    s.lead = N::distance(c.lead, s.torsion);
+    s.lead_velocity = N::narrow(N::signal(c.lead_velocity, s.lead - before));
   }
 };
 

@@ -120,7 +120,7 @@ struct Loops {
     s.mode = command.mode;
     const auto bounds = SpeedGuard::bounds_within<N>(c.guard, w);
     const bool above = torque > bounds.high, below = torque < bounds.low;
-    s.torque = N::between(torque, bounds.low, bounds.high);
+    s.torque = above ? bounds.high : below ? bounds.low : torque;
     if (command.mode != Mode::torque && !(above && error > typename N::Value{}) &&
         !(below && error < typename N::Value{}))
       s.integral = N::clamp(s.integral + N::times(N::widen(error), c.integral), c.torque_limit);

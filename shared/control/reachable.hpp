@@ -13,11 +13,10 @@ using Shown = fixed::Fixed::Value;
 
 // An analogue reading in bases of its signal. Signals that a model reads are limited to two bases; limits use the whole
 // range.
-inline Shown shown(const AnalogScale<fixed::Fixed>& scale, std::int16_t share) {
-  constexpr std::int32_t kMost = std::int32_t{15} << fixed::kValueBits;
+inline Shown shown(const AnalogScale<fixed::Fixed>& scale, std::int16_t share, std::int32_t bases = 15) {
   const Shown part{{std::int32_t{share} * (1 << (fixed::kValueBits - 15))}};
   const std::int32_t value = fixed::saturated_difference(fixed::Fixed::scaled(scale.gain, part).raw, scale.offset.raw);
-  return {{fixed::limited(value, -kMost, kMost)}};
+  return {{fixed::limited_to(value, bases * (1 << fixed::kValueBits))}};
 }
 
 enum class Limit : std::uint8_t {

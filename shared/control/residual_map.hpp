@@ -34,7 +34,7 @@ class ResidualMap {
   static constexpr std::size_t kAngleBins = std::size_t{1} << kAngleBits;
   static constexpr std::int64_t kLargest = 511;
   static constexpr std::uint32_t kMostCount = 4094;
-  static constexpr std::uint32_t kEveryTicks = 4;  // interval at which a drive adds a residual
+  static constexpr std::uint32_t kEveryTicks = 8;  // interval at which a drive adds a residual
 
   struct Coefficients {
     std::array<std::int32_t, kEdges> edges{};  // raw values of velocity, rising

@@ -38,9 +38,9 @@ struct Stream {
   static constexpr State at(const Coefficients& c, const Trajectory::Coefficients<N>& limits, fixed::Angle position,
                             fixed::Value velocity, fixed::Value acceleration) {
     const std::int64_t v = Trajectory::speed_of<N>(limits, velocity);
-    const std::int64_t a = fixed::multiply_round(acceleration.raw, c.acceleration_base, fixed::kValueBits);
-    return {fixed::limited(position.raw, limits.lowest, limits.highest), 0,
-            fixed::limited(v, -limits.velocity, limits.velocity), fixed::limited(a, -limits.change, limits.change)};
+    const std::int64_t a = fixed::multiply_word_round(c.acceleration_base, acceleration.raw, fixed::kValueBits);
+    return {fixed::limited(position.raw, limits.lowest, limits.highest), 0, fixed::limited_to(v, limits.velocity),
+            fixed::limited_to(a, limits.change)};
   }
   // One tick: the set point of this tick; afterwards the state is that of the next tick.
   template <class N>
@@ -48,7 +48,7 @@ struct Stream {
     const Trajectory::SetPoint<N> point{N::angle(s.position),
                                         N::narrow(N::signal(limits.to_velocity, N::steps(s.velocity))),
                                         N::narrow(N::signal(limits.to_acceleration, N::steps(s.change)))};
-    const std::int64_t next = fixed::limited(s.velocity + s.change, -limits.velocity, limits.velocity);
+    const std::int64_t next = fixed::limited_to(s.velocity + s.change, limits.velocity);
     const std::int64_t fine = s.fraction + ((s.velocity + next) >> 1);
     s.change = next - s.velocity;
     s.velocity = next;

@@ -126,7 +126,7 @@ struct Trajectory {
   // A velocity in bases as `update` takes it.
   template <class N>
   static constexpr std::int64_t speed_of(const Coefficients<N>& c, fixed::Value velocity) {
-    return fixed::multiply_round(velocity.raw, c.velocity_base, fixed::kValueBits);
+    return fixed::multiply_word_round(c.velocity_base, velocity.raw, fixed::kValueBits);
   }
   static constexpr bool arrived(const State& s, std::int64_t target) {
     return s.velocity == 0 && s.fraction == 0 && s.position == target;

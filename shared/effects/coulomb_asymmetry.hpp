@@ -24,6 +24,7 @@ struct CoulombAsymmetry : Stateless {
       .separated_by = "a record with the drive off, which shows an offset of the sensor alone",
       .asymmetry_of = "coulomb_friction",
       .direction_symbols = "Tsp,Tsn",
+      .runs_always = true,
   };
   static constexpr ParameterInfo kParameters[] = {
       {.name = "torque", .unit = units::kTorque, .usual = 1e-3},

@@ -21,6 +21,7 @@ struct CoulombFriction : Stateless {
       .confused_with = "dahl_friction",
       .separated_by = "small slow motion that reverses often",
       .surface = "dry friction",
+      .runs_always = true,
   };
   static constexpr ParameterInfo kParameters[] = {
       {.name = "torque", .unit = units::kTorque, .usual = 0.045, .low = 0.0},

@@ -131,6 +131,9 @@ struct Description {
   bool host_only = false;  // too large for a drive
   // Its law is stated in the model file with its parameters, so that each one there is an effect of its own.
   bool user_defined = false;
+  // Its torque is a weight times a signal of motion. On a drive that costs less than to find out whether the model has
+  // it, so it runs at every tick, with a weight of zero where it has not.
+  bool runs_always = false;
 };
 constexpr unsigned on(Balance balance) {
   return 1U << static_cast<unsigned>(balance);

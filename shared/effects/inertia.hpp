@@ -18,6 +18,7 @@ struct Inertia : Stateless {
           "them.",
       .confused_with = "current_delay",
       .separated_by = "the same amplitude at a second frequency",
+      .runs_always = true,
   };
   static constexpr ParameterInfo kParameters[] = {
       {.name = "inertia", .unit = units::kInertia, .usual = 1.0e-4, .low = 0.0},

@@ -20,6 +20,7 @@ struct LinearStiffness : Stateless {
           "soft.",
       .confused_with = "cubic_stiffness",
       .separated_by = "locked load at full torque and at a tenth of it",
+      .runs_always = true,
   };
   static constexpr ParameterInfo kParameters[] = {
       {.name = "stiffness", .unit = units::kStiffness, .usual = 6.3e3, .low = 0.0},

@@ -22,6 +22,7 @@ struct OutputCoulombFriction : Stateless {
       .confused_with = "coulomb_friction",
       .separated_by = "a torque sensor",
       .surface = "the output's dry friction",
+      .runs_always = true,
   };
   static constexpr ParameterInfo kParameters[] = {
       {.name = "torque", .unit = units::kTorque, .usual = 0.6, .low = 0.0},

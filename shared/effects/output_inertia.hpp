@@ -17,6 +17,7 @@ struct OutputInertia : Stateless {
       .check = "Weigh the payload, or compute it from the drawings; ask what was mounted since the last recording.",
       .confused_with = "inertia",
       .separated_by = "a torque sensor, or a second known payload",
+      .runs_always = true,
   };
   static constexpr ParameterInfo kParameters[] = {
       {.name = "inertia", .unit = units::kInertia, .usual = 0.06, .low = 0.0},

@@ -18,6 +18,7 @@ struct OutputViscousFriction : Stateless {
       .confused_with = "viscous_friction",
       .separated_by = "a torque sensor",
       .surface = "the output's viscous friction",
+      .runs_always = true,
   };
   static constexpr ParameterInfo kParameters[] = {
       {.name = "coefficient", .unit = units::kViscous, .usual = 0.5, .low = 0.0},

@@ -22,6 +22,7 @@ struct ViscousAsymmetry : Stateless {
       .separated_by = "both directions at two speeds that differ by a factor of five",
       .asymmetry_of = "viscous_friction",
       .direction_symbols = "Tvp,Tvn",
+      .runs_always = true,
   };
   static constexpr ParameterInfo kParameters[] = {
       {.name = "coefficient", .unit = units::kViscous, .usual = 1e-5},

@@ -18,6 +18,7 @@ struct ViscousFriction : Stateless {
       .confused_with = "power_law_friction",
       .separated_by = "steady motion at several speeds",
       .surface = "viscous friction",
+      .runs_always = true,
   };
   static constexpr ParameterInfo kParameters[] = {
       {.name = "coefficient", .unit = units::kViscous, .usual = 3.6e-4, .low = 0.0},

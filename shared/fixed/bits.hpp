@@ -78,6 +78,15 @@ constexpr std::int64_t multiply_round(std::int64_t a, std::int64_t b, int bits) 
   return with_sign((high << (64 - bits)) | (low >> bits), (a < 0) != (b < 0));
 }
 
+// The same with a word, from two products.
+constexpr std::int64_t multiply_word_round(std::int64_t a, std::int32_t word, int bits) {
+  const Product p = multiply(size_of(a), magnitude_of(word));
+  const std::uint64_t half = std::uint64_t{1} << (bits - 1);
+  const std::uint64_t low = p.low + half;
+  const std::uint64_t high = p.high + (low < half ? 1 : 0);
+  return with_sign((high << (64 - bits)) | (low >> bits), (a < 0) != (word < 0));
+}
+
 // x 2^-bits rounded to the nearest; bits may be negative, and then the caller guarantees that it fits.
 constexpr std::int64_t shift_right(std::int64_t x, int bits) {
   if (bits <= 0) return bits <= -64 ? 0 : static_cast<std::int64_t>(static_cast<std::uint64_t>(x) << -bits);
@@ -104,6 +113,19 @@ constexpr std::int32_t polynomial(const std::int32_t (&coefficients)[Size], std:
 template <class T>
 constexpr T limited(T x, T low, T high) {
   return x < low ? low : x > high ? high : x;
+}
+// x limited to -limit to limit, which is not negative. Nearly every x is within, which one comparison shows.
+constexpr std::int32_t limited_to(std::int32_t x, std::int32_t limit) {
+  const auto most = static_cast<std::uint32_t>(limit);
+  if (static_cast<std::uint32_t>(x) + most <= 2 * most) [[likely]]
+    return x;
+  return static_cast<std::int32_t>(x < 0 ? 0 - most : most);
+}
+constexpr std::int64_t limited_to(std::int64_t x, std::int64_t limit) {
+  const auto most = static_cast<std::uint64_t>(limit);
+  if (static_cast<std::uint64_t>(x) + most <= 2 * most) [[likely]]
+    return x;
+  return static_cast<std::int64_t>(x < 0 ? 0 - most : most);
 }
 
 }  // namespace flexspline::fixed

@@ -138,17 +138,20 @@ struct SineCosine {
   std::int32_t sine = 0;
   std::int32_t cosine = 0;
 };
+namespace detail {
+// Not inside the function, where compilers copy them to the stack first.
+inline constexpr std::int32_t kSineEighth[] = {843314857, -86699833, 2674039, -39269, 332};  // sin(pi/4 t)/t over t^2
+inline constexpr std::int32_t kCosineEighth[] = {1073741824, -331168967, 17023452, -349974, 3790};  // cos(pi/4 t)
+}  // namespace detail
 constexpr SineCosine sine_cosine(std::uint32_t phase) {
-  constexpr std::int32_t kSine[] = {843314857, -86699833, 2674039, -39269, 332};         // sin(pi/4 t)/t over t^2
-  constexpr std::int32_t kCosine[] = {1073741824, -331168967, 17023452, -349974, 3790};  // cos(pi/4 t) over t^2
   const std::uint32_t quarter = (phase + (std::uint32_t{1} << 29)) >> 30;
   const auto rest = static_cast<std::int32_t>(phase - (quarter << 30));  // an eighth of a turn to each side
   const std::int32_t t = rest * 4;                                       // Q31
   // A square of exactly one would not fit; one unit less does.
   const auto whole = static_cast<std::uint32_t>(static_cast<std::uint64_t>(long_product(t, t)) >> 31);
   const auto square = static_cast<std::int32_t>(whole - (whole >> 31));
-  const std::int32_t sine = add_high(0, polynomial(kSine, square) * 2, t);
-  const std::int32_t cosine = polynomial(kCosine, square);
+  const std::int32_t sine = add_high(0, polynomial(detail::kSineEighth, square) * 2, t);
+  const std::int32_t cosine = polynomial(detail::kCosineEighth, square);
   switch (quarter & 3) {
     case 0:
       return {sine, cosine};

@@ -5,40 +5,27 @@
 
 #include <array>
 #include <cstdint>
+#include <type_traits>
 
 #include "shared/fixed/coefficients.hpp"
 #include "shared/fixed/elementary.hpp"
 #include "shared/fixed/types.hpp"
+#include "shared/fixed/unchecked.hpp"
 #include "shared/fixed/word.hpp"
 
 namespace flexspline::fixed {
-
-struct UncheckedArithmetic {
-  static constexpr std::int32_t value(std::int64_t x) { return static_cast<std::int32_t>(x); }
-  static constexpr std::int64_t state_sum(std::int64_t a, std::int64_t b) {
-    return static_cast<std::int64_t>(static_cast<std::uint64_t>(a) + static_cast<std::uint64_t>(b));
-  }
-  static constexpr std::int64_t state_difference(std::int64_t a, std::int64_t b) {
-    return static_cast<std::int64_t>(static_cast<std::uint64_t>(a) - static_cast<std::uint64_t>(b));
-  }
-  // x 2^bits as a state.
-  static constexpr std::int64_t state_shift(std::int64_t x, int bits) { return shift_right(x, -bits); }
-  static constexpr void expect(bool, const char*) {}
-};
-
-// The input limited, times the gain: Q57, below 16.
-constexpr std::int64_t product(const Gain& g, std::int32_t x) {
-  const std::int32_t limited_x = limited(x, -g.limit, g.limit);
-  return long_product(static_cast<std::int32_t>(static_cast<std::uint32_t>(limited_x) << g.up), g.factor);
-}
-inline constexpr int kProductBits = 57;
 
 template <class Policy>
 struct FixedSystem {
   using Parameter = double;
   // Values and states depend on the policy, as their sums may leave the range.
   struct Value : fixed::Value {
-    friend constexpr auto operator<=>(Value, Value) = default;
+    friend constexpr bool operator==(Value, Value) = default;
+    // Not by operator<=>, of which compilers keep the result as a number first.
+    friend constexpr bool operator<(Value a, Value b) { return a.raw < b.raw; }
+    friend constexpr bool operator>(Value a, Value b) { return a.raw > b.raw; }
+    friend constexpr bool operator<=(Value a, Value b) { return a.raw <= b.raw; }
+    friend constexpr bool operator>=(Value a, Value b) { return a.raw >= b.raw; }
     friend constexpr Value operator+(Value a, Value b) { return {{Policy::value(std::int64_t{a.raw} + b.raw)}}; }
     friend constexpr Value operator-(Value a, Value b) { return {{Policy::value(std::int64_t{a.raw} - b.raw)}}; }
     friend constexpr Value operator-(Value a) { return {{Policy::value(-std::int64_t{a.raw})}}; }
@@ -66,7 +53,7 @@ struct FixedSystem {
     fixed::RatioGain gain;
     Value signal;
     constexpr operator fixed::Ratio() const {
-      const std::int32_t x = limited(signal.raw, -gain.limit, gain.limit);
+      const std::int32_t x = limited_to(signal.raw, gain.limit);
       return {shift_right(long_product(x, gain.mantissa), kMantissaBits + kValueBits - kRatioBits - gain.exponent)};
     }
   };
@@ -125,11 +112,14 @@ struct FixedSystem {
     // Of signals that nothing modulates.
     if (__builtin_constant_p(b.raw) && b.raw == one().raw) return a;
 #endif
+    if constexpr (std::is_same_v<Policy, UncheckedArithmetic>)
+      return {{as_word(static_cast<std::int32_t>(long_product(a.raw, b.raw) >> kValueBits))}};
     return {{Policy::value(long_product(a.raw, b.raw) >> kValueBits)}};
   }
   static constexpr Value scaled(const Gain& g, Value x) {
-    constexpr std::int64_t kHalf = std::int64_t{1} << (kProductBits - kValueBits - 1);
-    return {{Policy::value((product(g, x.raw) + kHalf) >> (kProductBits - kValueBits))}};
+    constexpr int kDown = kProductBits - kValueBits;
+    if constexpr (std::is_same_v<Policy, UncheckedArithmetic>) return {{rounded_shift<kDown>(product(g, x.raw))}};
+    return {{Policy::value((product(g, x.raw) + (std::int64_t{1} << (kDown - 1))) >> kDown)}};
   }
   static constexpr Scaled ratio(const RatioGain& g, Value x) {
     return {g, x};
@@ -168,7 +158,8 @@ struct FixedSystem {
     return x.raw < 0 ? -x : x;
   }
   static constexpr Value clamp(Value x, Value limit) {
-    return {{limited(x.raw, (-limit).raw, limit.raw)}};
+    Policy::expect(limit.raw != INT32_MIN, "a value leaves its range");
+    return {{limited_to(x.raw, limit.raw)}};
   }
   // The limit has no lower word: the upper one decides.
   static constexpr State clamp(State x, Value limit) {
@@ -178,16 +169,16 @@ struct FixedSystem {
     return x;
   }
   static constexpr State clamp(State x, State limit) {
-    return {{limited(x.raw, negated(limit.raw), limit.raw)}};
+    return {{limited_to(x.raw, limit.raw)}};
   }
   static constexpr Value between(Value x, Value low, Value high) {
     return {{limited(x.raw, low.raw, high.raw)}};
   }
   static constexpr State clamp_to_one(State x) {
-    return {{limited(x.raw, -kOneState, kOneState)}};
+    return {{limited_to(x.raw, kOneState)}};
   }
   static constexpr State bounded(State x) {
-    return {{limited(x.raw, -4 * kOneState, 4 * kOneState)}};
+    return {{limited_to(x.raw, 4 * kOneState)}};
   }
   static constexpr Value by_sign(Value x, Value a, Value b) {
     return x.raw < 0 ? b : a;
@@ -211,10 +202,12 @@ struct FixedSystem {
   }
   // Within four: see DistanceGain.
   static constexpr State signal(const DistanceGain& g, Step x) {
-    const std::int64_t distance = limited<std::int64_t>(x.raw, -g.limit, g.limit);
-    const auto word = static_cast<std::int32_t>(
-        g.down >= 0 ? distance >> g.down : static_cast<std::int64_t>(static_cast<std::uint64_t>(distance) << -g.down));
-    return {{long_product(word, g.factor)}};
+    const std::int64_t distance = limited_to(x.raw, g.limit);
+    const auto low = static_cast<std::uint32_t>(distance), high = static_cast<std::uint32_t>(distance >> 32);
+    // It fits a word, so that the upper word gives the bits that the lower one lacks.
+    const auto down = static_cast<std::uint32_t>(std::int32_t{g.down});
+    const std::uint32_t word = g.down >= 0 ? shift_down(low, down) | shift_up(high, 32 - down) : low << (0 - down);
+    return {{long_product(static_cast<std::int32_t>(word), g.factor)}};
   }
   // Up to 16 turns; the gain is in turns per base.
   static constexpr Step distance(const Gain& g, Value x) {
@@ -254,6 +247,15 @@ struct FixedSystem {
   }
   static constexpr State times(State a, Value b) {
     constexpr std::uint64_t kMost = std::uint64_t{1} << 63;
+#if defined(__OPTIMIZE__)
+    // Of a value that was widened: one product, which is exact.
+    if (__builtin_constant_p(static_cast<std::uint32_t>(a.raw)) && static_cast<std::uint32_t>(a.raw) == 0) {
+      const std::int64_t exact = long_product(as_word(static_cast<std::int32_t>(a.raw >> 32)), b.raw);
+      constexpr std::int64_t kFits = (std::int64_t{1} << 58) - 1;
+      if (limited_to(exact, kFits) == exact) [[likely]]
+        return {{exact * 32}};
+    }
+#endif
     const Product p = multiply(size_of(a.raw), magnitude_of(b.raw));
     const bool fits = (p.high >> (kValueBits - 1)) == 0;
     Policy::expect(fits, "a product of a state leaves its range");

@@ -27,6 +27,9 @@ struct Value {
 // Difference of two positions, in 2^-32 turns.
 struct Step {
   std::int64_t raw = 0;
+  friend constexpr Step operator-(Step a, Step b) {
+    return {static_cast<std::int64_t>(static_cast<std::uint64_t>(a.raw) - static_cast<std::uint64_t>(b.raw))};
+  }
 };
 // A position in 2^-32 turns; it wraps after 2^31 turns.
 struct Angle {

@@ -147,6 +147,22 @@ constexpr std::uint32_t saturated(std::int32_t x) {
   constexpr std::int32_t kMost = (std::int32_t{1} << Bits) - 1;
   return static_cast<std::uint32_t>(x < 0 ? 0 : x > kMost ? kMost : x);
 }
+// x 2^-Bits rounded to the nearest (halves up), for Bits from 1 to 31; the caller guarantees that it fits.
+template <int Bits>
+constexpr std::int32_t rounded_shift(std::int64_t x) {
+#if defined(__arm__) && defined(__thumb2__)
+  // The last bit that is shifted out is the carry.
+  if (!std::is_constant_evaluated()) {
+    std::int32_t word;
+    asm("lsrs %0, %1, %3\n\tadc %0, %0, %2, lsl %4"
+        : "=&r"(word)
+        : "r"(static_cast<std::uint32_t>(x)), "r"(static_cast<std::int32_t>(x >> 32)), "n"(Bits), "n"(32 - Bits)
+        : "cc");
+    return word;
+  }
+#endif
+  return static_cast<std::int32_t>((x + (std::int64_t{1} << (Bits - 1))) >> Bits);
+}
 constexpr std::uint32_t magnitude_of(std::int32_t x) {
   const auto sign = static_cast<std::uint32_t>(x >> 31);
   return (static_cast<std::uint32_t>(x) ^ sign) - sign;

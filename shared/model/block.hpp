@@ -41,6 +41,8 @@ enum class Section : std::uint16_t {
   safety = 0x119,
   residual_map = 0x11A,
   following = 0x11B,
+  stored_zero = 0x11C,
+  rates = 0x11D,
 };
 inline constexpr std::uint16_t kFirstNote = 0xF000;
 inline constexpr std::uint16_t kParametersNote = 0xF000;  // the SI parameters of the effects, for `unpack`

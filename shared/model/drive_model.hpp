@@ -5,169 +5,15 @@
 #include <array>
 #include <cstddef>
 #include <cstdint>
-#include <cstring>
 #include <tuple>
 #include <type_traits>
 #include <utility>
 
 #include "shared/effects/list.hpp"
 #include "shared/fixed/types.hpp"
+#include "shared/model/effect_places.hpp"
 
 namespace flexspline::model {
-
-// How often an effect can occur in one model: four times where a given parameter distinguishes them (the order of a
-// ripple).
-template <class Effect>
-constexpr std::size_t places_of() {
-  for (const effects::ParameterInfo& p : Effect::kParameters)
-    if (p.kind == effects::Kind::given) return 4;
-  return 1;
-}
-
-// The effects that a firmware image can run. All of them, as often as a model may have them; a tick checks for each
-// whether it is present.
-struct EveryEffect {
-  static constexpr bool kFilled = false;
-  static constexpr bool kTables = true;
-  static constexpr std::size_t places(std::size_t, std::size_t most) { return most; }
-};
-// All except the user-defined ones: the points of a table take a kilobyte a place, which small processors do not have.
-struct EveryFormula : EveryEffect {
-  static constexpr bool kTables = false;
-};
-// The effects of these numbers, as often as each is listed. A tick runs all of them without a check: an effect that is
-// not in the block has coefficients of zero and no influence.
-template <std::size_t... Numbers>
-struct TheseEffects {
-  static constexpr bool kFilled = true;
-  static constexpr bool kTables = true;
-  static constexpr std::size_t places(std::size_t number, std::size_t most) {
-    const std::size_t often = (std::size_t{0} + ... + (Numbers == number ? 1 : 0));
-    return often < most ? often : most;
-  }
-};
-
-template <class Effect, class N, std::size_t Count = places_of<Effect>()>
-struct Places {
-  std::uint8_t count = 0;
-  std::array<typename Effect::template Coefficients<N>, Count> coefficients{};
-  std::array<typename Effect::template State<N>, Count> states{};
-};
-
-namespace detail {
-template <class Effect, class Image>
-constexpr std::size_t places_in(std::size_t number) {
-  if constexpr (std::is_void_v<Effect>) {
-    return 0;
-  } else if constexpr (Effect::kInfo.host_only || (Effect::kInfo.user_defined && !Image::kTables)) {
-    return 0;
-  } else {
-    return Image::places(number, places_of<Effect>());
-  }
-}
-template <std::size_t Id, class N, class Image,
-          std::size_t Count = places_in<typename effects::AtId<Id>::Effect, Image>(Id)>
-struct PlaceAt {
-  static constexpr bool kExists = true;
-  using Effect = typename effects::AtId<Id>::Effect;
-  Places<Effect, N, Count> places{};
-};
-template <std::size_t Id, class N, class Image>
-struct PlaceAt<Id, N, Image, 0> {
-  static constexpr bool kExists = false;
-};
-template <class N, class Image, class Ids>
-struct AllPlaces;
-template <class N, class Image, std::size_t... Ids>
-struct AllPlaces<N, Image, std::index_sequence<Ids...>> : PlaceAt<Ids, N, Image>... {
-  template <class Visit>
-  constexpr void for_each(Visit&& visit) {
-    (visit_one<Ids>(*this, visit), ...);
-  }
-  template <class Visit>
-  constexpr void for_each(Visit&& visit) const {
-    (visit_one<Ids>(*this, visit), ...);
-  }
-  // The same for those whose bit is set in `present`, by groups: a tick does not check each effect.
-  template <class Visit>
-  constexpr void for_each_present(std::uint64_t present, Visit&& visit) {
-    const auto low = static_cast<std::uint32_t>(present), high = static_cast<std::uint32_t>(present >> 32);
-    [&]<std::size_t... Groups>(std::index_sequence<Groups...>) {
-      (visit_group<Groups * kGroup>(Groups * kGroup < 32 ? low : high, visit), ...);
-    }
-    (std::make_index_sequence<(sizeof...(Ids) + kGroup - 1) / kGroup>{});
-  }
-  // Signals that effects with memory read: their values at the previous tick are stored.
-  static constexpr unsigned remembered() { return (0U | ... | remembered_by<Ids>()); }
-
- private:
-  static constexpr std::size_t kGroup = 4;
-  template <std::size_t First, class Visit>
-  constexpr void visit_group(std::uint32_t word, Visit& visit) {
-    constexpr std::uint32_t kBits = exists_from<First>() << (First % 32);
-    if constexpr (kBits != 0) {
-      if ((word & kBits) == 0) return;
-      [&]<std::size_t... I>(std::index_sequence<I...>) {
-        (visit_present<First + I>(word, visit), ...);
-      }
-      (std::make_index_sequence<kGroup>{});
-    }
-  }
-  template <std::size_t Id, class Visit>
-  constexpr void visit_present(std::uint32_t word, Visit& visit) {
-    if constexpr (exists<Id>()) {
-      if ((word & (std::uint32_t{1} << (Id % 32))) != 0) visit_one<Id>(*this, visit);
-    }
-  }
-  template <std::size_t Id>
-  static constexpr bool exists() {
-    if constexpr (Id < sizeof...(Ids)) return PlaceAt<Id, N, Image>::kExists;
-    return false;
-  }
-  template <std::size_t First>
-  static constexpr std::uint32_t exists_from() {
-    return []<std::size_t... I>(std::index_sequence<I...>) {
-      return (0U | ... | (exists<First + I>() ? 1U << I : 0U));
-    }
-    (std::make_index_sequence<kGroup>{});
-  }
-  template <std::size_t Id, class Self, class Visit>
-  static constexpr void visit_one(Self& self, Visit& visit) {
-    using Place = PlaceAt<Id, N, Image>;
-    if constexpr (Place::kExists) {
-      using Which = std::conditional_t<std::is_const_v<Self>, const Place, Place>;
-      visit.template operator()<typename Place::Effect>(static_cast<Which&>(self).places);
-    }
-  }
-  template <std::size_t Id>
-  static constexpr unsigned remembered_by() {
-    if constexpr (PlaceAt<Id, N, Image>::kExists) {
-      using Effect = typename PlaceAt<Id, N, Image>::Effect;
-      if constexpr (!std::is_empty_v<typename Effect::template State<N>>) return Effect::kInfo.reads;
-    }
-    return 0U;
-  }
-};
-// At rest every state of every effect is zero. Written this way it is one call instead of many stores.
-template <class States>
-constexpr void set_to_rest(States& states) {
-  if (std::is_constant_evaluated() || !std::is_trivially_copyable_v<States>) {
-    states = {};
-  } else {
-    std::memset(static_cast<void*>(&states), 0, sizeof(states));
-  }
-}
-struct Nothing {};
-// T where `kKept`, otherwise nothing.
-template <bool kKept, class T>
-struct Slot {
-  using Type = T;
-};
-template <class T>
-struct Slot<false, T> {
-  using Type = Nothing;
-};
-}  // namespace detail
 
 // The effects of `Image` in the number system N.
 template <class N, class Image = EveryEffect>
@@ -202,7 +48,7 @@ class DriveModel {
   constexpr void clear() {
     places_.for_each([]<class Effect>(auto& places) {
       places.count = 0;
-      if constexpr (Image::kFilled) places.coefficients = {};
+      if constexpr (Image::kFilled || kRunsAlways<Effect>) places.coefficients = {};
     });
     note_effects();
     reset();
@@ -266,7 +112,12 @@ class DriveModel {
     // Not const: compilers keep constants in memory.
     effects::Inputs<N> before = remembered(in);
     effects::Torques<N> out{};
-    for_each_present(~std::uint64_t{0}, [&]<class Effect>(auto& places) {
+    if constexpr (!Image::kFilled && kOnDrive) {
+      places_.for_each([&]<class Effect>(auto& places) {
+        if constexpr (kRunsAlways<Effect>) Effect::evaluate(places.states[0], places.coefficients[0], in, out);
+      });
+    }
+    for_each_present<kNotAlways>([&]<class Effect>(auto& places) {
       each_of<Effect>(places, [&](std::size_t i) {
         auto& state = places.states[i];
         const auto& coefficients = places.coefficients[i];
@@ -320,15 +171,25 @@ class DriveModel {
   static constexpr bool is_periodic() {
     return (Effect::kInfo.reads & effects::kMotorAngle) != 0 && std::is_empty_v<typename Effect::template State<N>>;
   }
-  // Of the effects in `among`, those that the model has.
-  template <class Visit>
-  constexpr void for_each_present(std::uint64_t among, Visit&& visit) {
+  // Of the effects in `kAmong`, those that the model has.
+  template <std::uint64_t kAmong, class Visit>
+  constexpr void for_each_present(Visit&& visit) {
     if constexpr (Image::kFilled) {
       places_.for_each(visit);
     } else {
-      places_.for_each_present(present_ & among, visit);
+      places_.template for_each_present<kAmong>(present_, visit);
     }
   }
+  static constexpr bool kOnDrive = std::is_base_of_v<fixed::Value, typename N::Value>;
+  template <class Effect>
+  static constexpr bool kRunsAlways = Effect::kInfo.runs_always;
+  static constexpr std::uint64_t kNotAlways = [] {
+    std::uint64_t others = ~std::uint64_t{0};
+    effects::for_each_effect([&]<class Effect>(std::size_t id) {
+      if (kOnDrive && kRunsAlways<Effect>) others &= ~(std::uint64_t{1} << id);
+    });
+    return others;
+  }();
   template <effects::Phase phase>
   static constexpr std::uint64_t of_phase() {
     std::uint64_t found = 0;
@@ -385,7 +246,7 @@ class DriveModel {
   template <bool kLast>
   constexpr void shift_those(effects::Inputs<N>& in, typename N::Angle periodic_angle) {
     const auto angle = in.angle;
-    for_each_present(of_phase<effects::Phase::shift>(), [&]<class Effect>(auto& places) {
+    for_each_present<of_phase<effects::Phase::shift>()>([&]<class Effect>(auto& places) {
       if constexpr (Effect::kInfo.phase == effects::Phase::shift && Effect::kInfo.acts_last == kLast)
         each_of<Effect>(places, [&](std::size_t i) {
           in.angle = is_periodic<Effect>() ? periodic_angle : angle;
@@ -399,7 +260,7 @@ class DriveModel {
   constexpr void modulate(effects::Inputs<N>& in) {
     constexpr std::uint64_t kModulates = of_phase<effects::Phase::modulate>();
     const auto modulate_all = [&](effects::Inputs<N>& seen) {
-      for_each_present(kModulates, [&]<class Effect>(auto& places) {
+      for_each_present<kModulates>([&]<class Effect>(auto& places) {
         if constexpr (Effect::kInfo.phase == effects::Phase::modulate)
           each_of<Effect>(places, [&](std::size_t i) { Effect::modulate(places.coefficients[i], seen); });
       });
@@ -421,6 +282,18 @@ class DriveModel {
     }
   }
 
+  // Whether an effect of the model reads signals of the previous tick.
+  constexpr bool has_memory() const {
+    constexpr std::uint64_t kWithMemory = [] {
+      std::uint64_t found = 0;
+      effects::for_each_effect([&]<class Effect>(std::size_t id) {
+        if (!std::is_empty_v<typename Effect::template State<N>>) found |= std::uint64_t{1} << id;
+      });
+      return found;
+    }();
+    return Image::kFilled || (present_ & kWithMemory) != 0;
+  }
+
   using All = detail::AllPlaces<N, Image, std::make_index_sequence<effects::kLastId + 1>>;
   // Signals of the previous tick that effects with memory may read: angle, torsion, magnitude of the torque, current.
   static constexpr unsigned kRemembered = All::remembered();
@@ -433,12 +306,14 @@ class DriveModel {
     [[no_unique_address]] Kept<effects::kCurrent, typename N::Value> current{};
   };
   constexpr void remember(const effects::Inputs<N>& in) {
+    if (!has_memory()) return;
     if constexpr ((kRemembered & effects::kMotorAngle) != 0) memory_.angle = in.angle;
     if constexpr ((kRemembered & effects::kTorsion) != 0) memory_.torsion = in.torsion;
     if constexpr ((kRemembered & effects::kTorque) != 0) memory_.torque_magnitude = in.torque_magnitude;
     if constexpr ((kRemembered & effects::kCurrent) != 0) memory_.current = in.current;
   }
   constexpr effects::Inputs<N> remembered(const effects::Inputs<N>& now) {
+    if (!has_memory()) return {};
     if constexpr (kRemembered != 0) {
       if (!started_) {
         remember(now);
@@ -458,7 +333,7 @@ class DriveModel {
   unsigned reads_ = 0;
   // For the last temperature, on a drive. Other number systems cannot compare temperatures, and an image that runs all
   // its effects at every tick makes no check.
-  static constexpr bool kKeepsScales = !Image::kFilled && std::is_base_of_v<fixed::Value, typename N::Value>;
+  static constexpr bool kKeepsScales = !Image::kFilled && kOnDrive;
   struct Scales {
     typename N::Value temperature{};
     typename N::Value viscous{};

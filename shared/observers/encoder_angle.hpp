@@ -4,6 +4,7 @@
 
 #include <cstdint>
 
+#include "shared/fixed/bits.hpp"
 #include "shared/fixed/overflow_log.hpp"
 #include "shared/fixed/types.hpp"
 
@@ -40,18 +41,30 @@ struct EncoderAngle {
     const auto moved = static_cast<std::int32_t>(s.started ? counter - s.before : counter);
     s.before = counter;
     if (!s.started) {
-      s = {counter, 0, 0, true};
-      const auto counts = static_cast<std::int32_t>(c.counts);
-      s.turns = moved / counts - (moved % counts < 0 ? 1 : 0);
-      s.rest = static_cast<std::uint32_t>(moved % counts + (moved % counts < 0 ? counts : 0));
+      s.started = true;
+      take_reading(s, c, counter);
       return angle(s, c);
     }
-    const std::int64_t rest = std::int64_t{s.rest} + limited_to_a_turn(c, moved);
-    const std::int64_t counts = c.counts;
-    const int carry = rest < 0 ? -1 : rest >= counts ? 1 : 0;
-    s.rest = static_cast<std::uint32_t>(rest - carry * counts);
-    s.turns = static_cast<std::int32_t>(static_cast<std::uint32_t>(s.turns) + static_cast<std::uint32_t>(carry));
+    // Below 2^25, and nearly always within the same turn.
+    s.rest += static_cast<std::uint32_t>(fixed::limited_to(moved, static_cast<std::int32_t>(c.counts)));
+    if (s.rest >= c.counts) [[unlikely]] {
+      const bool back = static_cast<std::int32_t>(s.rest) < 0;
+      s.rest += back ? c.counts : 0 - c.counts;
+      s.turns = static_cast<std::int32_t>(static_cast<std::uint32_t>(s.turns) + (back ? UINT32_MAX : 1));
+    }
     return angle(s, c);
+  }
+  // The shaft is at this many counts from its zero.
+  static constexpr void take_reading(State& s, const Coefficients& c, std::uint32_t reading) {
+    const auto shown = static_cast<std::int32_t>(reading), counts = static_cast<std::int32_t>(c.counts);
+    s.turns = shown / counts - (shown % counts < 0 ? 1 : 0);
+    s.rest = static_cast<std::uint32_t>(shown % counts + (shown % counts < 0 ? counts : 0));
+  }
+  // What the counter, less `origin`, would show at the shaft's zero, within a turn.
+  static constexpr std::uint32_t zero_of(const State& s, const Coefficients& c, std::uint32_t origin) {
+    State there;
+    take_reading(there, c, s.before - origin - s.rest);
+    return there.rest;
   }
   // Sets the present angle, to the nearest count, independent of what was counted before.
   static constexpr void set(State& s, const Coefficients& c, fixed::Angle angle) {
@@ -84,12 +97,6 @@ struct EncoderAngle {
     const std::uint64_t part = (s.rest * c.per_count + (std::uint64_t{1} << 23)) >> 24;
     const auto whole = static_cast<std::uint64_t>(static_cast<std::uint32_t>(s.turns)) << 32;
     return {static_cast<std::int64_t>(whole + part)};
-  }
-
- private:
-  static constexpr std::int64_t limited_to_a_turn(const Coefficients& c, std::int32_t moved) {
-    const auto counts = static_cast<std::int32_t>(c.counts);
-    return moved > counts ? counts : moved < -counts ? -counts : moved;
   }
 };
 

@@ -115,8 +115,10 @@ struct EncoderKalman {
   // stores the shaft's angle.
   template <class N>
   static constexpr Estimate<N> update(State<N>& s, const Coefficients<N>& c, typename N::Angle reading) {
-    if (!s.started) s.before = reading;
-    s.started = true;
+    if (!s.started) [[unlikely]] {
+      s.before = reading;
+      s.started = true;
+    }
     const auto travelled = N::signal(c.per_step, reading - s.before);
     s.before = reading;
     const auto half_rise = N::times_gain(s.acceleration, c.half_tick);

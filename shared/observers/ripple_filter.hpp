@@ -37,7 +37,7 @@ struct RippleFilter {
     typename N::State cosine{};
     typename N::State sine{};
     // The results of take(), for learn().
-    typename N::State step{};
+    decltype(N::exp_negative(typename N::Travel{})) kept{};  // of a difference to where the torque is
     typename N::Wave wave{};
     typename N::Value torque{};
     bool started = false;
@@ -73,7 +73,7 @@ struct RippleFilter {
       s.started = true;
     }
     const typename N::Travel travel = N::travel(c.per_travel, N::magnitude(angle - s.before));
-    s.step = N::widen(N::one()) - N::exp_negative(travel);
+    s.kept = N::exp_negative(travel);
     s.before = angle;
     s.wave = N::sincos(N::times_order(angle, c.order));
     s.torque = torque;
@@ -82,11 +82,20 @@ struct RippleFilter {
   static constexpr typename N::Value learn(State<N>& s, const Coefficients<N>& c) {
     const auto innovation = s.torque - N::narrow(s.mean) - ripple<N>(s, s.wave);
     // Random walks do not forget, and drift where the phase does not distinguish them, so each is limited.
-    s.mean = N::bounded(s.mean + N::times(s.step, N::times(c.mean_part, innovation)));
+    const auto moved = [&s](typename N::State from, typename N::Value by) {
+      const typename N::State all = N::widen(by);
+      return from + (all - N::relax(all, {}, s.kept));
+    };
+    s.mean = N::bounded(moved(s.mean, N::times(c.mean_part, innovation)));
     const auto part = N::times(c.wave_part, innovation);
-    s.cosine = N::clamp(s.cosine + N::times(s.step, N::times(part, s.wave.cosine)), c.largest);
-    s.sine = N::clamp(s.sine + N::times(s.step, N::times(part, s.wave.sine)), c.largest);
+    s.cosine = N::clamp(moved(s.cosine, N::times(part, s.wave.cosine)), c.largest);
+    s.sine = N::clamp(moved(s.sine, N::times(part, s.wave.sine)), c.largest);
     return ripple<N>(s, s.wave);
+  }
+  // The ripple at another angle, for ticks that do not learn.
+  template <class N>
+  static constexpr typename N::Value ripple_at(const State<N>& s, const Coefficients<N>& c, typename N::Angle angle) {
+    return ripple<N>(s, N::sincos(N::times_order(angle, c.order)));
   }
 
  private:

@@ -22,10 +22,11 @@ namespace flexspline::protocol {
 
 inline constexpr std::uint8_t kMajor = 1;  // with another one only `identify` is understood
 // Increases with each addition: 1 the residual map, 2 the board's hardware and the angles of the shafts, 3 the key of
-// the firmware.
-inline constexpr std::uint8_t kMinor = 3;
+// the firmware, 4 the stored zero.
+inline constexpr std::uint8_t kMinor = 4;
 
 inline constexpr std::uint8_t kMinorOfHardware = 2;
+inline constexpr std::uint8_t kMinorOfZero = 4;
 
 inline constexpr std::size_t kReportBytes = 64;
 inline constexpr std::size_t kHeadBytes = 4;

@@ -83,13 +83,19 @@ struct Hardware {
   bool operator==(const Hardware&) const = default;
 };
 
+inline constexpr std::size_t kReferenceBytesBeforeZero = 2, kReferenceBytes = 26;
 // Which angles of its shafts a drive knows.
 struct Reference {
   bool knows_turn = false;    // of the motor: effects that repeat with it act
   bool knows_output = false;  // effects of the output's angle act, and limits of position
+  // After `home`: what the encoders show at the zeros of their shafts. Zero counts: of an encoder whose reading says
+  // nothing after the next power-on. Not sent before protocol 1.4.
+  control::StoredZero zero{};
   template <class Codec>
   constexpr void fields(Codec& c) {
     c(knows_turn), c(knows_output);
+    for (control::StoredZero::Place* place : {&zero.motor, &zero.output})
+      c(place->counts), c(place->reading), c(place->kind);
   }
   bool operator==(const Reference&) const = default;
 };

@@ -80,7 +80,7 @@ class ParameterStore {
     staged_ = 0;
     if (bytes == 0 || bytes > kCapacity) return StoreError::too_long;
     const std::size_t s = target();
-    if (rank_[active_] != 0 && !invalidate_other()) return StoreError::flash;
+    if (!drop_interrupted() || (rank_[active_] != 0 && !invalidate_other())) return StoreError::flash;
     if (!erase(s)) return StoreError::flash;
     announced_ = bytes;
     crc_ = crc;
@@ -132,6 +132,7 @@ class ParameterStore {
     if (rank_[active_] == 0 || rank_[s] == 0 || !is_whole(s)) return StoreError::no_previous;
     reason = validate(block(s));
     if (reason != 0) return StoreError::invalid;
+    if (!drop_interrupted()) return StoreError::flash;
     const std::size_t slot = free_slot(s);
     // begin() needs the same number.
     return slot + 2 * kTwice > kSlotsEnd ? StoreError::worn : put_twice(s, slot, kActivates);
@@ -181,17 +182,29 @@ class ParameterStore {
     model::Reader r(flash_.bytes(sector).subspan(4 * at, 4));
     return r.take<std::uint32_t>();
   }
+  // The number in a slot, zero where there is none.
+  constexpr std::uint16_t rank_in(std::size_t sector, std::size_t slot) const {
+    const std::uint32_t code = word(sector, slot + 1);
+    const auto rank = static_cast<std::uint16_t>(code);
+    const bool valid =
+        code == code_of(rank) && word(sector, slot) == check_of(rank, word(sector, 2)) && rank <= kMostRank;
+    return valid ? rank : std::uint16_t{0};
+  }
   // The newest number in the slots, zero where there is none.
   constexpr std::uint16_t rank_of(std::size_t sector) const {
     std::uint16_t newest = 0;
-    const std::uint32_t crc = word(sector, 2);
-    for (std::size_t slot = kFirstSlot; slot < kSlotsEnd; slot += 2) {
-      const std::uint32_t code = word(sector, slot + 1);
-      const auto rank = static_cast<std::uint16_t>(code);
-      const bool valid = code == code_of(rank) && word(sector, slot) == check_of(rank, crc) && rank <= kMostRank;
-      if (valid && is_newer(rank, newest)) newest = rank;
-    }
+    for (std::size_t slot = kFirstSlot; slot < kSlotsEnd; slot += 2)
+      if (const std::uint16_t rank = rank_in(sector, slot); is_newer(rank, newest)) newest = rank;
     return newest;
+  }
+  // A number whose writing was interrupted can read as whole at a later start, and would then be newer than those
+  // written since. So it is made invalid before another is written. Its check was whole before it was begun.
+  constexpr bool drop_interrupted() {
+    for (std::size_t s = 0; s < kSectors; ++s)
+      for (std::size_t slot = kFirstSlot; slot < kSlotsEnd; slot += 2)
+        if (word(s, slot) != kErasedWord && word(s, slot + 1) != 0 && rank_in(s, slot) == 0 && !put(s, slot + 1, 0))
+          return false;
+    return true;
   }
   constexpr bool is_whole(std::size_t sector) const {
     const std::uint32_t bytes = word(sector, 1);

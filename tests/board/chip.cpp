@@ -20,7 +20,9 @@ Chip::Chip(const std::filesystem::path& image, const WrittenFlash& written)
   machine.attach(0x40003000, watchdog);
   machine.attach(0x40004400, usart2);
   machine.attach(0x40004800, usart3);
+  machine.attach(0x40005400, i2c1);
   machine.attach(0x40007000, power);
+  machine.attach(0x40013000, spi1);
   machine.attach(0x40007400, dac);
   for (std::uint32_t i = 0; i < ports.size(); ++i) machine.attach(0x40020000 + 0x400 * i, ports[i]);
   machine.attach(0x50000000, otg, 0x5000);
@@ -28,7 +30,7 @@ Chip::Chip(const std::filesystem::path& image, const WrittenFlash& written)
 }
 
 Stop Chip::tick() {
-  constexpr std::uint32_t kConverterInterrupt = 16 + 18;
+  constexpr std::uint32_t kTickInterrupt = 27;
   if (senses) senses();
   usart2.pass();
   usart3.pass();
@@ -37,8 +39,9 @@ Stop Chip::tick() {
     const Stop stop = machine.interrupt(15);
     if (stop != Stop::waits) return stop;
   }
-  if (tim1.triggers() && !converter_is_dead && converter.trigger() && machine.interrupt_is_enabled(18)) {
-    const Stop stop = machine.interrupt(kConverterInterrupt);
+  if (tim1.triggers() && !converter_is_dead) converter.trigger();
+  if (!timer_is_dead && tim1.reach_compare4() && machine.interrupt_is_enabled(kTickInterrupt)) {
+    const Stop stop = machine.interrupt(16 + kTickInterrupt);
     if (stop != Stop::waits) return stop;
   }
   if (acts) acts();

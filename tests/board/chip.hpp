@@ -4,6 +4,7 @@
 
 #include <filesystem>
 
+#include "tests/board/angle_sensor_models.hpp"
 #include "tests/board/chip_models.hpp"
 #include "tests/board/machine.hpp"
 #include "tests/board/otg_model.hpp"
@@ -25,7 +26,7 @@ class Chip {
 
   // Start-up and the first turn of the main loop.
   Stop start() { return machine.run(); }
-  // 50 us: TIM1 triggers the converter, its end interrupts, the main loop turns once.
+  // 50 us: TIM1 triggers the converter and then interrupts, the main loop turns once.
   Stop tick();
   Stop ticks(int n) {
     Stop stop = Stop::waits;
@@ -46,7 +47,9 @@ class Chip {
   LineModel usart2, usart3;
   std::array<PortModel, 8> ports;
   OtgModel otg{machine};
-  bool converter_is_dead = false;
+  AngleSensorOnSpi spi1{machine, [this] { return !ports[2].high(4); }};
+  AngleSensorOnI2c i2c1{machine};
+  bool converter_is_dead = false, timer_is_dead = false;
   // What the world does before a tick, and what comes of it.
   std::function<void()> senses, acts;
 };

@@ -59,6 +59,7 @@ class ClockModel : public Registers {
     if (at_page >= 0x40020000) return (at(0x30) >> ((at_page - 0x40020000) >> 10) & 1) != 0;
     if (at_page == 0x40010000) return (at(0x44) & 1) != 0;
     if (at_page == 0x40012000) return (at(0x44) >> 8 & 1) != 0;
+    if (at_page == 0x40013000) return (at(0x44) >> 12 & 1) != 0;
     return (at(0x40) >> ((at_page - 0x40000000) >> 10) & 1) != 0;  // timers, USARTs, PWR and DAC lie in order
   }
 
@@ -100,6 +101,10 @@ class FlashModel : public Peripheral {
   std::vector<std::uint8_t> bytes;
   std::uint32_t error = 0;  // what the next operation ends with (SR)
   int erases = 0, programs = 0;
+  // OPTCR, as delivered: no brown-out reset. Read-out protection of level 2 lets nothing be changed.
+  std::uint32_t options = 0x0FFFAAED;
+  bool options_are_final = false;
+  int option_writes = 0;
 
   std::uint32_t read(std::uint32_t offset) override {
     if (offset == 0x00) return access_;
@@ -107,7 +112,7 @@ class FlashModel : public Peripheral {
       if (busy_ > 0 && --busy_ == 0) end();
       return status_ | (busy_ > 0 ? 1U << 16 : 0U);
     }
-    return offset == 0x10 ? control_ : 0;
+    return offset == 0x10 ? control_ : offset == 0x14 ? options : 0;
   }
   void write(std::uint32_t offset, std::uint32_t value) override {
     if (busy_ > 0) return machine_.violation("a register of a busy flash memory is written");
@@ -127,6 +132,13 @@ class FlashModel : public Peripheral {
         } else {
           machine_.violation("a wrong key");
         }
+        return;
+      case 0x08:
+        if (value != (option_keys_ == 0 ? 0x08192A3BU : 0x4C5D6E7FU)) machine_.violation("a wrong key of the options");
+        if (++option_keys_ == 2 && !options_are_final) options &= ~1U;
+        return;
+      case 0x14:
+        write_options(value);
         return;
       case 0x0C:
         status_ &= ~value;
@@ -164,6 +176,20 @@ class FlashModel : public Peripheral {
     for (std::uint32_t i = 0; i < 4; ++i) value |= std::uint32_t{bytes[offset + i]} << (8 * i);
     return value;
   }
+  // 3.6.2: while OPTLOCK is set nothing changes; OPTSTRT programs what was written.
+  void write_options(std::uint32_t value) {
+    if ((options & 1) != 0) {
+      if (!options_are_final) machine_.violation("the option bytes are written while they are locked");
+      return;
+    }
+    option_keys_ = 0;
+    if ((value & 2) != 0) {
+      ++option_writes;
+      busy_ = 20;
+      programs_options_ = true;
+    }
+    options = value & ~2U;
+  }
   void start_erase() {
     if ((control_ & 2) == 0 || (control_ & 1) != 0) return machine_.violation("STRT without SER alone");
     const std::uint32_t number = control_ >> 3 & 15;
@@ -188,6 +214,10 @@ class FlashModel : public Peripheral {
     busy_ = 20;
   }
   void end() {
+    if (programs_options_) {
+      programs_options_ = false;
+      return;
+    }
     stale_ = access_ >> 9 & 3U;
     status_ |= error != 0 ? error : 1;
     if (error != 0) {
@@ -208,7 +238,8 @@ class FlashModel : public Peripheral {
   std::vector<FlashSector> sectors_;
   FlashSector sector_{};
   std::uint32_t access_ = 0, status_ = 0, control_ = 1U << 31, at_ = 0, value_ = 0;
-  int keys_ = 0, busy_ = 0;
+  int keys_ = 0, busy_ = 0, option_keys_ = 0;
+  bool programs_options_ = false;
   std::uint32_t stale_ = 0;  // bit 0 the cache of instructions, bit 1 that of data
   bool erasing_ = false;
 
@@ -225,15 +256,13 @@ class ConverterModel : public Registers {
   void write(std::uint32_t offset, std::uint32_t value) override {
     words[offset] = offset == 0x00 ? words[offset] & value : value;
   }
-  // True: it converted, and asks for an interrupt.
-  bool trigger() {
+  void trigger() {
     const std::uint32_t c2 = at(0x08);
-    if ((c2 & 1) == 0 || (c2 >> 16 & 15) != 1 || (c2 >> 20 & 3) != 1 || (at(0x04) & (1U << 8)) == 0) return false;
+    if ((c2 & 1) == 0 || (c2 >> 16 & 15) != 1 || (c2 >> 20 & 3) != 1 || (at(0x04) & (1U << 8)) == 0) return;
     const std::uint32_t conversions = (at(0x38) >> 20 & 3) + 1;
     for (std::uint32_t i = 0; i < conversions; ++i)
       words[0x3C + 4 * i] = inputs.at(at(0x38) >> (5 * (4 - conversions + i)) & 31);
     words[0x00] |= 1U << 2;
-    return (at(0x04) & (1U << 7)) != 0;
   }
   // Of the sequence, at this clock; the bus's (13.5, 13.3.7).
   double conversion_us(double apb2_hz) const {
@@ -260,6 +289,16 @@ class EncoderModel : public Registers {
     if (!encoder) return;
     words[0x24] = (words[0x24] + ((at(0x20) & 2) != 0 ? 0 - moved : moved)) & most_ & at(0x2C);
   }
+  // 18.3.5: a rising edge at channel 3, when the shaft was so many counts before where it is now.
+  void pulse(std::uint32_t counts_ago) {
+    if ((at(0x1C) & 3) != 1 || (at(0x20) >> 8 & 11) != 1) return;
+    words[0x3C] = (words[0x24] - counts_ago) & most_;
+    words[0x10] |= 1U << 3;
+  }
+  std::uint32_t read(std::uint32_t offset) override {
+    if (offset == 0x3C) words[0x10] &= ~(1U << 3);
+    return words[offset];
+  }
 
  private:
   std::uint32_t most_, before_ = 0;
@@ -273,8 +312,16 @@ class AdvancedTimerModel : public Registers {
     if (offset == 0x44 && (at(0x44) >> 8 & 3) >= 1 && ((value ^ at(0x44)) & 0x33FF) != 0)
       machine_.violation("dead time or break is changed after it was locked");
     if (offset == 0x44 && break_input) value &= ~(1U << 15);
-    words[offset] = value;
+    words[offset] = offset == 0x10 ? words[0x10] & value : value;
   }
+  // Its fourth compare value, reached while it counts up. True: it asks for an interrupt.
+  bool reach_compare4() {
+    if ((at(0x00) & 1) == 0 || (at(0x00) >> 5 & 3) != 2 || at(0x40) == 0 || at(0x40) >= at(0x2C)) return false;
+    words[0x10] |= 1U << 4;
+    return (at(0x0C) & (1U << 4)) != 0;
+  }
+  // From the trigger of the converter on.
+  double compare4_us(double timer_hz) const { return at(0x40) / timer_hz * 1e6; }
   bool break_input = false;
   void trip() {
     break_input = true;

@@ -43,16 +43,20 @@ class CellsPort {
 
 class DriveBench {
  public:
-  // `image`: dac or pwm. An empty flash memory without `parameters`.
-  explicit DriveBench(const std::string& variant, bool parameters = true)
-      : chip(std::string(FLEXSPLINE_BOARDS) + "/stm32f405/f405-" + variant + ".elf"), is_bridge_(variant == "pwm") {
-    if (parameters) store(twin::factory_block(demo(), setup()));
+  // `variant`: dac or pwm; dac-abs or dac-index for other encoders. An empty flash memory without `parameters`.
+  // `wakes`: the motor's angle at power-on, turns.
+  explicit DriveBench(const std::string& variant, bool parameters = true, double wakes = 0.7)
+      : chip(std::string(FLEXSPLINE_BOARDS) + "/stm32f405/f405-" + variant + ".elf"),
+        rig({.drive = made_for(variant), .seed = 3, .start_turns = wakes, .encoders = kind_of(variant)}),
+        is_bridge_(variant == "pwm"),
+        drive_(made_for(variant)) {
+    if (parameters) store(twin::factory_block(drive_, setup()));
     chip.senses = [this] { sense(); };
     chip.acts = [this] { act(); };
   }
   // The demo's, with the full scales of the board where it states them.
   control::DriveSetup<double> setup() const {
-    auto s = board::setup_of(demo());
+    auto s = board::setup_of(drive_);
     s.current.full_scale = sensor_a();
     if (is_bridge_) s.amplifier_full_scale = kBridgeA;
     return s;
@@ -94,11 +98,24 @@ class DriveBench {
 
   Chip chip;
   UsbBus bus{chip};
-  board::PlantRig rig{{.drive = demo(), .seed = 3}};
+  board::PlantRig rig;
   bool wired = true;      // to the simulated drive; else the test sets the inputs
   double bridge_a = 0.0;  // what flows out of the bridge
 
  private:
+  // The demo's, with as many counts a turn as the encoders of a variant have.
+  static plant::Drive made_for(const std::string& variant) {
+    plant::Drive drive = demo();
+    if (!variant.ends_with("-abs")) return drive;
+    drive.sensors.motor_counts = 1 << 14;
+    drive.sensors.output_counts = 1 << 12;
+    return drive;
+  }
+  static control::SensorKind kind_of(const std::string& variant) {
+    return variant.ends_with("-abs")     ? control::SensorKind::absolute
+           : variant.ends_with("-index") ? control::SensorKind::indexed
+                                         : control::SensorKind::incremental;
+  }
   static constexpr double kBridgeA = 5.0, kBridgeSensorA = 8.0;
   double sensor_a() const { return is_bridge_ ? kBridgeSensorA : board::scales_of(demo()).current_a; }
   // A converter of 12 bits with noise of its own, as real ones have.
@@ -112,7 +129,11 @@ class DriveBench {
     chip.converter.inputs[10] = converted(r.current / 32768.0 * board::scales_of(demo()).current_a / sensor_a());
     chip.converter.inputs[11] = converted(r.torque / 32768.0);
     chip.converter.inputs[12] = static_cast<std::uint32_t>(std::clamp(r.temperature / 8, 0, 4095));
+    chip.spi1.angle = r.motor_counter & 0x3FFF;
+    chip.i2c1.angle = r.output_counter & 0xFFF;
     chip.tim2.move_to(r.motor_counter);
+    if (r.index_passes != passes_) chip.tim2.pulse(r.motor_counter - r.index_counter);
+    passes_ = r.index_passes;
     chip.tim5.move_to(r.output_counter);
   }
   void act() {
@@ -136,6 +157,8 @@ class DriveBench {
   }
 
   bool is_bridge_;
+  plant::Drive drive_;
+  std::uint16_t passes_ = 0;
   std::mt19937 random_{7};
   std::uniform_real_distribution<double> noise_{-1.5, 1.5};
 };

@@ -211,7 +211,7 @@ TEST(BoardWatchdog, IsFedWhileAllPartsReportAndBitesWhenTheTickStops) {
   bench.chip.ticks(2000);
   EXPECT_FALSE(bench.chip.watchdog.bit);
   const int fed = bench.chip.watchdog.fed;
-  bench.chip.converter_is_dead = true;  // the main loop goes on
+  bench.chip.timer_is_dead = true;  // the main loop goes on
   bench.chip.ticks(200);
   EXPECT_LE(bench.chip.watchdog.fed, fed + 1);
 }
@@ -224,7 +224,7 @@ TEST(BoardWatchdog, ItsLimitIsTenMillisecondsWhileArmedEvenWithTheSlowestOscilla
   bench.run_with_host(0.01);
   ASSERT_TRUE(bench.enabled());
   EXPECT_LE(bench.chip.watchdog.limit_s(), 0.0101);
-  bench.chip.converter_is_dead = true;
+  bench.chip.timer_is_dead = true;
   bench.chip.ticks(210);
   EXPECT_TRUE(bench.chip.watchdog.bit);
 }

@@ -168,8 +168,8 @@ TEST(BoardLoader, StartsASignedApplicationKeepsItsCounterAndLeavesAQuarterOfItsS
   install_application(chip);
   EXPECT_EQ(chip.start(), Stop::fault);
   EXPECT_EQ(chip.machine.vectors(), 0x08020200U) << "the application's";
-  const std::vector<std::uint8_t> two{2, 0, 0xFD, 0xFF, 0xFF, 0xFF, 0xFF, 0xFF};
-  EXPECT_TRUE(std::equal(two.begin(), two.end(), chip.flash.bytes.begin())) << "one word of the counter";
+  const std::vector<std::uint8_t> two{2, 0, 0xFD, 0xFF, 2, 0, 0xFD, 0xFF, 0xFF, 0xFF, 0xFF, 0xFF};
+  EXPECT_TRUE(std::equal(two.begin(), two.end(), chip.flash.bytes.begin())) << "two words of the counter";
   expect_room_on_stack(chip, "at a start");
   expect_no_violation(chip);
 }

@@ -73,6 +73,23 @@ TEST(DriveHardware, HomeSaysWhatTheDriveKnowsAndTellsItWhereItsMotorStands) {
   EXPECT_TRUE(contains(far.err, "further than")) << far.err;
 }
 
+TEST(DriveHardware, HomeStoresTheZeroWhereTheEncodersKnowTheirAngleAndFlashKeepsIt) {
+  const Shell shell;
+  const std::string flash = (shell.folder() / "flash").string();
+  {
+    const TwinProcess twin({"--serve", "0", "--flash", flash});
+    EXPECT_EQ(shell.run("flexspline home --store --drive " + twin.name()).code, 2) << "at which position?";
+    shell.must("flexspline backup --out before.block --drive " + twin.name());
+    EXPECT_EQ(shell.json("flexspline home --position-rad -3.5 --store --drive " + twin.name())["stored"], true);
+    shell.must("flexspline backup --out stored.block --drive " + twin.name());
+    EXPECT_NE(content_of(shell.folder() / "stored.block"), content_of(shell.folder() / "before.block"));
+    const json again = shell.json("flexspline flash --block before.block --yes --drive " + twin.name());
+    EXPECT_EQ(again["flashed"], false) << "with the zero that the drive has it is the same block";
+  }
+  const TwinProcess next({"--serve", "0", "--flash", flash});
+  EXPECT_EQ(shell.json("flexspline home --drive " + next.name())["knows_output"], true);
+}
+
 TEST(DriveHardware, AFactoryResetLeavesNoBlock) {
   const Shell shell;
   const TwinProcess twin({"--serve", "0"});

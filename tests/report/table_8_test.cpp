@@ -72,9 +72,7 @@ TEST_F(Table8, SpreadsComeOutAsTheReportsRowsGive) {
 
 // By the tool's own std/avg, over the whole set in one identification: no run is blanked by the pooled error.
 TEST_F(Table8, AllTogetherTheSpreadIsThatOfTheRows) {
-  estimation::PipelineOptions options;
-  options.cutoff_hz = kCutoffHz;
-  const auto found = estimation::identify(dataset, base, options);
+  const auto found = estimation::identify(dataset, base, {});  // with the cut-off that the tool chooses
   const estimation::Estimate& positive = estimate(*found, "stribeck_gaussian", "amplitude_positive");
   const estimation::Estimate& negative = estimate(*found, "stribeck_gaussian", "amplitude_negative");
   EXPECT_EQ(positive.per_experiment.size(), 15u);

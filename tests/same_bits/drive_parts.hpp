@@ -183,6 +183,7 @@ inline control::DriveSetup<double> drive_setup() {
   s.motor_counts = 10'000;
   s.motor_corner = 900.0;
   s.has_torque_sensor = true;
+  s.has_slow_rates = false;  // as all blocks of version 1 were at first
   s.torsion = {.inertia = 1e-4,
                .output_inertia = 0.06,
                .stiffness = 6300.0,

@@ -64,8 +64,10 @@ class FlashModel {
         if (how == 1) bytes[i] = noise;
         if (how == 2 && (i / 4) % 3 != 0) bytes[i] = noise;
         if (how == 3) bytes[i] = random_() % 256 == 0 ? noise : 0xFF;
-        // Not the bits that were erased before.
-        if (cells_.weakens) cells_.weak[sector][i] = static_cast<std::uint8_t>(~whole | cells_.weak[sector][i]);
+        // Not the bits that were erased before; near its begin and its end those of a few cells.
+        const bool reached = how == 1 || how == 2 || (how == 0 ? bytes[i] != whole : bytes[i] != 0xFF);
+        if (cells_.weakens && reached)
+          cells_.weak[sector][i] = static_cast<std::uint8_t>(~whole | cells_.weak[sector][i]);
       }
       throw PowerCut{};
     }
@@ -80,9 +82,19 @@ class FlashModel {
     std::memcpy(&now, at, 4);
     std::uint32_t then = now & value;
     if (cut_here(CutAt::inside)) {
-      then |= now & static_cast<std::uint32_t>(random_());  // some of the bits, perhaps none or all
+      std::uint32_t missing = now & static_cast<std::uint32_t>(random_());  // some of the bits, perhaps none or all
+      std::uint32_t weak = now & ~value;
+      if (cells_.weakens) {
+        // Near its begin or its end a few bits are weak, and the others as before or as wanted.
+        const auto few = static_cast<std::uint32_t>(random_() & random_() & random_());
+        const auto how = random_() % 3;
+        if (how != 0) weak &= few;
+        if (how == 1) missing = now;
+        if (how == 2) missing = 0;
+        weaken(sector, word, weak);
+      }
+      then |= missing;
       std::memcpy(at, &then, 4);
-      if (cells_.weakens) weaken(sector, word, now & ~value);
       throw PowerCut{};
     }
     std::memcpy(at, &then, 4);

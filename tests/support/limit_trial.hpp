@@ -70,6 +70,9 @@ class Readout {
     down_.readings.temperature = share((celsius + setup_.temperature.at_zero) / setup_.temperature.full_scale);
   }
   void turn(double rad_s) { velocity_ = rad_s; }
+  void jump(double turns) { angle_ += turns * kTurn; }
+  // The host says nothing any more.
+  void be_silent() { silent_ = true; }
   bool arm(Command command) {
     command_ = command;
     tick();
@@ -85,7 +88,7 @@ class Readout {
       r.current = share(up_.actuation.current / 32768.0 * setup_.amplifier_full_scale / setup_.current.full_scale);
     ++r.motor_samples, ++r.output_samples, ++r.analog_samples;
     command_.kind = is_armed(up_.status.mode) ? Command::Kind::heartbeat : command_.kind;
-    down_.has_command = command_.kind != Command::Kind::clear_fault;
+    down_.has_command = command_.kind != Command::Kind::clear_fault && !silent_;
     down_.command = command_;
     return up_ = controller_.tick(down_);
   }
@@ -111,7 +114,7 @@ class Readout {
   firmware::CoSimulationOutput up_;
   Command command_ = of_kind(Command::Kind::heartbeat);
   double velocity_ = 0.0, angle_ = 0.0;
-  bool follows_ = true;
+  bool follows_ = true, silent_ = false;
 };
 
 // Drives the signal of each limit beyond it; what did not come, in words, or nothing.
@@ -162,6 +165,27 @@ inline std::string limits_that_do_not_act(const Block& block, const control::Dri
     r.current(0.0);
     r.arm(full);
     expect(r.fault_within(s.safety.mismatch_s + 0.01), "current_mismatch");
+  }
+  {
+    Readout r(block, s);
+    r.arm(arm(Mode::current));
+    r.jump(0.25);
+    expect(r.fault_within(0.001), "motor_encoder_jump");
+  }
+  {
+    Readout r(block, s);
+    r.arm(arm(Mode::current));
+    r.be_silent();
+    expect(r.fault_within(s.safety.host_s + 0.01), "host_lost");
+  }
+  {
+    // The shaft stands whatever the loop demands: which of both is found first depends on their times.
+    Readout r(block, s);
+    Command fast = arm(Mode::velocity);
+    fast.velocity = N::value(s.loops.velocity_limit / demo_constants().velocity_base);
+    r.arm(fast);
+    const std::string found = r.fault_within(2.0);
+    if (found != "motor_encoder_stuck") expect(found, "following_error");
   }
   return silent;
 }

@@ -136,6 +136,7 @@ const std::map<Section, std::vector<Expected>>& sections() {
       {Section::safety, row({{positive, 7}, {ticks, 3}, {short_ticks, 2}, {{4, 0, 65535}, 1}})},
       {Section::residual_map, row({{positive, 7}, {factor, 1}})},
       {Section::following, row({{speed, 1}, {positive, 1}, {{4, 0, kWord}, 2}, {short_ticks, 1}})},
+      {Section::rates, row({{flag, 1}})},
   };
   return all;
 }
@@ -280,7 +281,8 @@ TEST_F(DriveBlock, WithoutOneOfItsSectionsIsNoneForADriveThoughGoodToSimulateWit
           with(with(less, 8, static_cast<std::int64_t>(less.size()), 4), 8, static_cast<std::int64_t>(less.size()), 4);
       const bool optional = kind == static_cast<std::uint16_t>(Section::excitation) ||
                             kind == static_cast<std::uint16_t>(Section::excitation_lines) ||
-                            kind == static_cast<std::uint16_t>(Section::following);
+                            kind == static_cast<std::uint16_t>(Section::following) ||
+                            kind == static_cast<std::uint16_t>(Section::rates);
       EXPECT_EQ(checked(less).fault, optional ? BlockFault::none : BlockFault::missing_section) << kind;
       auto model = std::make_unique<model::DriveModel<N>>();
       EXPECT_TRUE(control::load(less, *model).good());

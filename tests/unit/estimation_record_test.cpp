@@ -217,6 +217,50 @@ TEST(Prepare, ASlowRecordLeavesAFastOneHalfOfItsRows) {
   EXPECT_LT(prepare({&slow, &fast}, {}, {std::nullopt, false}).pipeline.row_cutoff_hz, 20.0);
 }
 
+// 1.1 reversals a second mask two thirds at 5 Hz, and an encoder of which the stroke has nine steps nearly all the
+// rest.
+TEST(Prepare, ARecordOfWhichTheMaskWouldLeaveNothingRaisesTheCutOffAndPositionsAreFilteredNoWider) {
+  constexpr double kStep = 0.01;
+  const data::Experiment e = sine(8.0 * kStep, 0.55, 20.0, kStep);
+  const auto share = [](const PreparedData& found) {
+    const Rows& rows = found.records.front().rows[index(Balance::motor)];
+    return static_cast<double>(rows.samples.size()) / static_cast<double>(rows.samples.size() + rows.masked);
+  };
+  const PreparedData found = prepare({&e}, {}, {}), given = prepare({&e}, {}, {5.0, true});
+  EXPECT_EQ(given.pipeline.row_cutoff_hz, 5.0) << "what the user gives stays";
+  Pipeline coherent = found.pipeline;  // what the coherence alone gives
+  coherent.row_cutoff_hz = 5.0;
+  coherent.motion_cutoff_hz = 12.5;
+  EXPECT_LT(share(prepare_with({&e}, {}, coherent)), 0.2);
+  EXPECT_GT(share(found), 0.3) << found.pipeline.reason;
+  EXPECT_NE(found.pipeline.reason.find("the mask leaves samples of sine"), std::string::npos) << found.pipeline.reason;
+  EXPECT_LT(found.pipeline.row_cutoff_hz, 40.0);
+  EXPECT_LT(found.pipeline.motion_cutoff_hz, 2.0 * found.pipeline.row_cutoff_hz);
+}
+
+TEST(PreparedRecord, KalmanDerivativesFollowASineFromACoarseEncoder) {
+  constexpr double kStep = 2.0 * kPi / 4000.0;
+  const data::Experiment e = sine(5.0, 2.0, 10.0, kStep);
+  PipelineOptions options{40.0, true};
+  options.derivatives = Derivatives::kalman;
+  const Record r = prepared(e, options), filtered = prepared(e);
+  ASSERT_GT(r.smoother_corner_hz, 10.0);
+  EXPECT_EQ(filtered.smoother_corner_hz, 0.0);
+  const double rate = 4.0 * kPi;
+  double velocity = 0.0, acceleration = 0.0, filtered_acceleration = 0.0;
+  for (const std::size_t k : motor_rows(r)) {
+    const double truth = -5.0 * rate * rate * std::sin(rate * e.time_s[k]);
+    velocity += std::pow(r.inputs[k].velocity - 5.0 * rate * std::cos(rate * e.time_s[k]), 2);
+    acceleration += std::pow(r.inputs[k].acceleration - truth, 2);
+    filtered_acceleration += std::pow(filtered.inputs[k].acceleration - truth, 2);
+  }
+  const auto rows = static_cast<double>(motor_rows(r).size());
+  EXPECT_LT(std::sqrt(velocity / rows), 0.002 * 5.0 * rate);
+  EXPECT_LT(std::sqrt(acceleration / rows), 0.03 * 5.0 * rate * rate);
+  // Within a factor of four of a filter whose cut-off was given.
+  EXPECT_LT(acceleration, 16.0 * filtered_acceleration);
+}
+
 TEST(Prepare, WithoutACutOffPositionsAreFilteredWiderThanRowsAndTheReasonIsTold) {
   const data::Experiment e = sine(10.0, 1.0, 5.0);
   const Pipeline p = prepare({&e}, {}, {}).pipeline;

@@ -154,8 +154,8 @@ Ripple ripple_at(double velocity) {
   return ripple;
 }
 
-// It is learnt at every fourth tick and at most five ticks old where it is taken out: at 100 rad/s a twentieth of a
-// radian of its phase.
+// It is learnt at every eighth tick, and taken out as it is at the next one, up to six ticks away: at 100 rad/s less
+// than a tenth of a radian of its phase.
 TEST(RippleOfTheTorqueSensor, IsTakenOutOfWhatTheDriveTellsAtEverySpeed) {
   for (const double velocity : {20.0, 100.0}) {
     const Ripple ripple = ripple_at(velocity);

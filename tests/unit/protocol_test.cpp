@@ -46,7 +46,8 @@ void randomise(std::mt19937& r, Hardware& x) {
   x.board = {number(), number(), number(), number(), number(), static_cast<std::int32_t>(r()), kind(), kind(), kind()};
 }
 void randomise(std::mt19937& r, Reference& x) {
-  x = {(r() & 1) != 0, (r() & 1) != 0};
+  const auto number = [&] { return static_cast<std::uint32_t>(r()); };
+  x = {(r() & 1) != 0, (r() & 1) != 0, {{number(), number(), number()}, {number(), number(), number()}}};
 }
 void randomise(std::mt19937& r, Home& x) {
   x.position = static_cast<std::int64_t>(std::uint64_t{r()} << 32 | r());
@@ -225,7 +226,7 @@ TEST(Protocol, BytesOnTheWireAreTheRecordedOnes) {
   id.tick_hz = 20'000, id.block_bytes = 16'128, id.effects = 43, id.channels = 21, id.most_channels = 12;
   id.most_lines = 32, id.has_output_encoder = 1, id.firmware_key = FirmwareKey::development;
   EXPECT_EQ(wire(answer_to(request(Kind::identify, 7, Hello{}), Code::done, id)),
-            "810733000103030462000000000000000000000000000000"
+            "810733000104030462000000000000000000000000000000"
             "41310000000000000000000000000000204e0000003f00002b00150c200102");
   Status s{0x01020304, Mode::fault, true, StoreState::fell_back, 13, 5, -2, 3, 4, 6, 8, {0x100, 0xA1B2C3D4}, {9, 10}};
   EXPECT_EQ(wire(answer_to(request(Kind::status, 1, Empty{}), Code::done, s)),

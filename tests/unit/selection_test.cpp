@@ -254,6 +254,40 @@ TEST(Decision, GroupsWhatTakesTurns) {
   EXPECT_NEAR(found[0].frequency, 0.9, 1e-12);
 }
 
+// A law, with how often it came first, and a structure that is in no catalogue.
+std::vector<FoundTerm> with_unknown_structure(double law_first, double law_frequency) {
+  Stability s;
+  s.subsamples = 100.0;
+  s.frequencies = {frequency("curve", 0.8, 0.8, 0.2), frequency("law", law_frequency, law_frequency, 0.7)};
+  s.frequencies[0].entry = nullptr;
+  s.frequencies[0].first = 1.0 - law_first;
+  s.frequencies[1].first = law_first;
+  return decide(s, {});
+}
+
+TEST(Decision, ALawThatComesBeforeAnUnknownStructureNeedsTheOrdinaryFrequency) {
+  EXPECT_EQ(with_unknown_structure(0.7, 0.8).size(), 2U);
+}
+
+TEST(Decision, ALawThatComesAfterAnUnknownStructureNeedsTheHigherFrequency) {
+  const auto found = with_unknown_structure(0.2, 0.8);
+  ASSERT_EQ(found.size(), 1U);
+  EXPECT_EQ(found[0].group[0].name, "curve");
+  EXPECT_EQ(with_unknown_structure(0.2, 0.95).size(), 2U);
+}
+
+TEST(Decision, ATermThatMayTakeTheFirstOnesPlaceIsInItsGroupThoughItIsAlsoChosenBehindIt) {
+  Stability s;
+  s.subsamples = 100.0;
+  s.frequencies = {frequency("gravity", 0.7, 1.0, 0.03), frequency("offset", 0.4, 1.0, 0.9)};
+  s.frequencies[0].first = 0.1;
+  s.frequencies[1].first = 0.4;
+  s.frequencies[1].alternatives = {{"gravity", 0.9}};
+  const auto found = decide(s, {});
+  ASSERT_EQ(found.size(), 1U);
+  EXPECT_EQ(found[0].group.size(), 2U);
+}
+
 // A wave, or a placebo wave where `is_placebo`.
 Frequency wave(std::string name, double order, double often, double share, bool is_placebo = false) {
   Frequency f = frequency(std::move(name), often, 0.9, share);
@@ -282,6 +316,7 @@ TEST(Decision, APlaceboWaveSaysNothingAgainstALawThatIsNoWave) {
   ASSERT_EQ(found.size(), 1U);
   EXPECT_TRUE(found[0].in_catalogue);
   EXPECT_EQ(found[0].group.size(), 1U);
+  EXPECT_NEAR(found[0].frequency, 0.95, 1e-12);  // those that chose a wave chose it for what gravity has
 }
 
 TEST(Decision, AWaveIsNotSaidBesideAPlaceboWaveThatTakesOffAsMuch) {
