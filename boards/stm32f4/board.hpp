@@ -75,8 +75,8 @@ class DriveBoard {
   }
   // After the tick.
   void end_tick() {
-    if constexpr (requires { motor_.end_tick(); }) motor_.end_tick();
-    if constexpr (requires { output_.end_tick(); }) output_.end_tick();
+    end_tick_of(motor_);
+    end_tick_of(output_);
   }
   void actuate(const firmware::Actuation& command) {
     amplifier_.actuate(command, readings_.current);
@@ -102,6 +102,11 @@ class DriveBoard {
   void flash_works() { late_ticks_ = 2; }
 
  private:
+  template <class Encoder>
+  static void end_tick_of(Encoder& encoder) {
+    if constexpr (requires { encoder.end_tick(); }) encoder.end_tick();
+  }
+
   typename Description::MotorEncoder motor_{};
   typename Description::OutputEncoder output_{};
   typename Description::Amplifier amplifier_{};

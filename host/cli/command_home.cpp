@@ -38,7 +38,7 @@ int run(const HomeOptions& options, Console& console) {
     const double turns = *options.position / scales.constants.angle_base;
     if (!(std::abs(turns) < kFarthestTurns))
       throw UsageError(
-          fmt::format("--position {:g} is further than the {:g} turns that a drive counts to; give the "
+          fmt::format("--position-rad {:g} is further than the {:g} turns that a drive counts to; give the "
                       "angle of the motor",
                       *options.position, kFarthestTurns));
     const std::int64_t position = std::llround(std::ldexp(turns, 32));

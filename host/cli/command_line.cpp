@@ -20,6 +20,22 @@
 #include "host/text/nearest.hpp"
 
 namespace flexspline::cli {
+namespace {
+
+// CLI11's own checks of a sign print the range of a double.
+CLI::Validator sign_check(bool zero_is_allowed) {
+  const std::string name = zero_is_allowed ? "NONNEGATIVE" : "POSITIVE";
+  return CLI::Validator(
+      [zero_is_allowed](const std::string& text) {
+        double value = 0.0;
+        const bool good = CLI::detail::lexical_cast(text, value) && (value > 0.0 || (zero_is_allowed && value == 0.0));
+        if (good) return std::string();
+        return fmt::format("\"{}\" is not a number {}", text, zero_is_allowed ? "from zero on" : "above zero");
+      },
+      name);
+}
+
+}  // namespace
 
 Option& Option::required() {
   option_->required();
@@ -46,11 +62,11 @@ Option& Option::number_of_values(int count) {
   return *this;
 }
 Option& Option::positive() {
-  option_->check(CLI::PositiveNumber);
+  option_->check(sign_check(false));
   return *this;
 }
 Option& Option::not_negative() {
-  option_->check(CLI::NonNegativeNumber);
+  option_->check(sign_check(true));
   return *this;
 }
 Option& Option::existing_file() {

@@ -34,8 +34,8 @@ constexpr double kMaskReach = 1.5;
 constexpr double kCountingPowerShare = 0.01;
 constexpr double kMostMaskedShare = 0.75;
 constexpr double kMaskedShareThen = 0.5;  // where it was more than that
-// Of the samples that the best cut-off leaves of a record: with less it is as good as lost, and then so many are
-// wanted.
+// Of the samples that the best cut-off leaves of a record. The information of a fit goes with the number of samples:
+// with less than a tenth the record is as good as lost, and then so many are wanted.
 constexpr double kLeastOfTheBest = 0.1, kThenOfTheBest = 0.9;
 constexpr double kWorthKeeping = 0.05;  // of a record's samples, at its best cut-off
 constexpr double kCutoffStep = 1.25;
@@ -295,8 +295,8 @@ double share_left(const Record& r) {
 }
 
 // What the number of reversals does not show: slow or short strokes of which the mask leaves next to nothing, because
-// they end before the filter has settled, or because the velocity is small for its noise. The mask itself is made at
-// rising cut-offs: it gets shorter, and the noise larger, so that each record has a best one. Returns whether the
+// they end within the transient of the filter, or because the velocity is small for its noise. The mask itself is made
+// at rising cut-offs: it gets shorter, and the noise larger, so that each record has a best one. Returns whether the
 // cut-off was raised.
 bool raise_for_masked_records(PreparedData& prepared, double highest_hz) {
   Pipeline& pipeline = prepared.pipeline;

@@ -33,7 +33,7 @@ constexpr std::array<std::pair<std::string_view, const char*>, 4> kDrawn = {{{"b
                                                                              {"h2-bilinear", "#8a5a00"},
                                                                              {"butterworth-zero-phase", "#1f4e9c"},
                                                                              {"kalman-rts", "#c43b2f"}}};
-constexpr double kWidth = 820.0, kLeft = 90.0, kRight = 800.0, kHeight = 270.0, kAbove = 40.0, kBelow = 40.0;
+constexpr double kWidth = 820.0, kLeft = 90.0, kRight = 780.0, kHeight = 270.0, kAbove = 40.0, kBelow = 40.0;
 
 using Signal = std::vector<double> DerivativeMethod::*;
 

@@ -115,8 +115,8 @@ struct Resampling {
   double whiteness = 0.0;   // of what the best terms leave, reversals masked: 1 for noise, 0 for structure
   double lowest_hz = 0.0, highest_hz = 0.0;
   std::optional<double> lag_s, lag_std_s;  // of the effort's time base, taken off; nothing: not significant
-  std::vector<FoundTerm> found;  // largest share first
-  std::vector<Support> support;  // of all terms that could be chosen
+  std::vector<FoundTerm> found;            // largest share first
+  std::vector<Support> support;            // of all terms that could be chosen
   // The group that a name was found in.
   std::vector<NamedEffect> found_group(const NamedEffect& name) const;
   bool decides =

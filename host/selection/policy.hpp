@@ -69,6 +69,12 @@ struct SelectionPolicy {
   // Presliding needs that many reversals.
   double fewest_reversals = 3.0;
 
+  // Samples for each column of a fit: with fewer, halves of the data say nothing.
+  double fewest_rows_per_column = 10.0;
+  // Rows of the table by which effort and motion may be stamped apart: loggers differ by a few samples; a longer lag is
+  // another effect.
+  int most_lag_rows = 4;
+
   // Resampling against likelihood on the motor's balance.
   // Percent of the left-out chi-square from which on what resampling cannot choose counts by itself: what was named
   // instead of another effect took off at most 96 % in robot-like twins, a limit of the current that is there 99 %.

@@ -12,7 +12,6 @@ namespace flexspline::selection {
 namespace {
 
 constexpr std::uint64_t kSeed = 1234;
-constexpr double kFewestRowsPerColumn = 10.0;
 
 double median(std::vector<double> x) {
   if (x.empty()) return 0.0;
@@ -76,7 +75,7 @@ StabilitySelection::SettingResult StabilitySelection::evaluate_setting(double cu
   std::optional<Setting> two;
   if (tables_.presliding && !mask) two = make_setting(*tables_.presliding, cutoff_hz, mask, false, policy_);
   if (one.blocks.size() < 4 ||
-      static_cast<double>(one.rows.rows()) < kFewestRowsPerColumn * static_cast<double>(sign.model_columns))
+      static_cast<double>(one.rows.rows()) < policy_.fewest_rows_per_column * static_cast<double>(sign.model_columns))
     return result;
   const bool has_second = two && two->blocks.size() == one.blocks.size();
   const Setting* const second = has_second ? &*two : nullptr;

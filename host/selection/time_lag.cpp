@@ -13,11 +13,6 @@
 namespace flexspline::selection {
 namespace {
 
-// Loggers that stamp effort and motion apart differ by a few samples; a longer lag is another effect. Whole samples
-// alone are tried, as interpolation between them would take off noise.
-constexpr int kMostLagSamples = 4;
-constexpr double kFewestRowsPerLagColumn = 10.0;
-
 // The target as it was `lag_s` later.
 Eigen::VectorXd shifted(const RegressorTable& table, double lag_s) {
   Eigen::VectorXd target = table.target;
@@ -54,12 +49,13 @@ std::optional<TimeLag> estimate_time_lag(const RegressorTable& table, const std:
   double row_s = 0.0;
   for (const Run& run : table.runs) row_s = std::max(row_s, run.row_s);
   std::vector<double> lags;
-  for (int k = -kMostLagSamples; k <= kMostLagSamples; ++k) lags.push_back(row_s * k);
+  // Whole rows alone, as interpolation between them would take off noise.
+  for (int k = -policy.most_lag_rows; k <= policy.most_lag_rows; ++k) lags.push_back(row_s * k);
   const RegressorTable small = with_lags(table, terms, lags);
   const Setting setting = make_setting(small, table.highest_law_hz, false, false, policy);
   const auto tried = static_cast<Eigen::Index>(lags.size());
   const Eigen::Index columns = small.columns.cols() - tried;
-  if (static_cast<double>(setting.rows.rows()) < kFewestRowsPerLagColumn * static_cast<double>(columns))
+  if (static_cast<double>(setting.rows.rows()) < policy.fewest_rows_per_column * static_cast<double>(columns))
     return std::nullopt;
   Eigen::MatrixXd rows = setting.rows.leftCols(columns + tried);
   const std::vector<double> weights = record_weights(small, setting);

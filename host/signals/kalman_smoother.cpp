@@ -18,7 +18,7 @@ using Vector = Eigen::Vector3d;
 // Corner frequency times sample time that the search covers.
 constexpr double kLowest = 1e-4, kHighest = 3.0;
 constexpr std::size_t kFewestForLikelihood = 16, kFewestToSmooth = 3, kLongestForLikelihood = 40000;
-constexpr double kSettled = 1e-12;
+constexpr double kStationary = 1e-12;
 
 // With h = w T and the states position, velocity / w, acceleration / w^2 all covariances are of one size; they are over
 // the variance of the position.
@@ -38,15 +38,15 @@ struct MotionModel {
 class Covariances {
  public:
   // The first two samples give the position and the velocity; the acceleration is unknown.
-  explicit Covariances(double h) : model_(h) {
-    filtered_ = Vector(1.0, 4.0 / (h * h), 1e4 / (h * h * h * h)).asDiagonal();
+  explicit Covariances(double h)
+      : model_(h), filtered_(Vector(1.0, 4.0 / (h * h), 1e4 / (h * h * h * h)).asDiagonal()) {
     predict();
   }
   const Matrix& predicted() const { return predicted_; }
   const Matrix& filtered() const { return filtered_; }
   const Vector& gain() const { return gain_; }
   double innovation() const { return innovation_; }
-  bool is_settled() const { return settled_; }
+  bool is_stationary() const { return stationary_; }
   const MotionModel& model() const { return model_; }
   // From what is filtered back to the sample before.
   Matrix smoother_gain() const { return predicted_.ldlt().solve(model_.step * filtered_).transpose(); }
@@ -57,7 +57,7 @@ class Covariances {
     gain_ = predicted_.col(0) / innovation_;
     const Matrix left = Matrix::Identity() - gain_ * Vector::UnitX().transpose();
     filtered_ = left * predicted_ * left.transpose() + gain_ * gain_.transpose();
-    settled_ = (gain_ - before).cwiseAbs().maxCoeff() < kSettled * gain_.cwiseAbs().maxCoeff();
+    stationary_ = (gain_ - before).cwiseAbs().maxCoeff() < kStationary * gain_.cwiseAbs().maxCoeff();
   }
   void predict() {
     predicted_ = model_.step * filtered_ * model_.step.transpose() + model_.noise;
@@ -66,10 +66,10 @@ class Covariances {
 
  private:
   MotionModel model_;
-  Matrix predicted_, filtered_;
+  Matrix filtered_, predicted_;
   Vector gain_ = Vector::Zero();
   double innovation_ = 1.0;
-  bool settled_ = false;
+  bool stationary_ = false;
 };
 
 Vector first_state(std::span<const double> position, double h) {
@@ -93,7 +93,7 @@ Innovations innovations_at(std::span<const double> position, double h) {
   Innovations found;
   std::size_t count = 0;
   for (std::size_t k = 1; k < position.size(); ++k) {
-    if (!now.is_settled()) now.update();
+    if (!now.is_stationary()) now.update();
     const double error = position[k] - position[0] - state[0];
     if (k > kFewestToSmooth) {  // the samples that the first state was made of show nothing
       found.square += error * error / now.innovation();
@@ -101,7 +101,7 @@ Innovations innovations_at(std::span<const double> position, double h) {
       ++count;
     }
     state = step * (state + now.gain() * error);
-    if (!now.is_settled()) now.predict();
+    if (!now.is_stationary()) now.predict();
   }
   found.square /= static_cast<double>(count);
   found.log_variance /= static_cast<double>(count);
@@ -182,21 +182,21 @@ SmoothedMotion rauch_tung_striebel(std::span<const double> position, double samp
   const std::size_t n = position.size();
   Covariances now(h);
   const Matrix step = now.model().step;
-  // Forward. The gains that lead back are kept until they are settled; the last of them holds from there on.
+  // Forward. The gains that lead back are kept until they are stationary; the last of them holds from there on.
   std::vector<Vector> filtered(n);
   std::vector<Matrix> back;
   filtered[0] = first_state(position, h);
-  Matrix settled_filtered = now.filtered(), settled_predicted = now.predicted();
+  Matrix stationary_filtered = now.filtered(), stationary_predicted = now.predicted();
   back.push_back(now.smoother_gain());
   for (std::size_t k = 1; k < n; ++k) {
     const Vector predicted = step * filtered[k - 1];
-    const bool changes = !now.is_settled();
+    const bool changes = !now.is_stationary();
     if (changes) now.update();
     filtered[k] = predicted + now.gain() * (position[k] - position[0] - predicted[0]);
     if (!changes) continue;
-    settled_filtered = now.filtered();
+    stationary_filtered = now.filtered();
     now.predict();
-    settled_predicted = now.predicted();
+    stationary_predicted = now.predicted();
     back.push_back(now.smoother_gain());
   }
   // Backward.
@@ -211,10 +211,10 @@ SmoothedMotion rauch_tung_striebel(std::span<const double> position, double samp
     found.acceleration[k] = w * w * state[2];
   }
   const Matrix& gain = back.back();
-  Matrix smoothed = settled_filtered;
+  Matrix smoothed = stationary_filtered;
   for (int round = 0; round < 100000; ++round) {
-    const Matrix next = settled_filtered + gain * (smoothed - settled_predicted) * gain.transpose();
-    const bool same = (next - smoothed).cwiseAbs().maxCoeff() < kSettled * next.cwiseAbs().maxCoeff();
+    const Matrix next = stationary_filtered + gain * (smoothed - stationary_predicted) * gain.transpose();
+    const bool same = (next - smoothed).cwiseAbs().maxCoeff() < kStationary * next.cwiseAbs().maxCoeff();
     smoothed = next;
     if (same) break;
   }

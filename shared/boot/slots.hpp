@@ -100,7 +100,7 @@ class Slots {
   // Whether the running application is on trial. It reads the whole image: call it once, before there are deadlines.
   constexpr bool on_trial() const { return is_pending() && is_set(Mark::installed) && !is_set(Mark::fell_back); }
   // Confirms the running application, which is on trial: two words are written.
-  constexpr bool confirm() { return set(Mark::confirmed) && set(Mark::settled); }
+  constexpr bool confirm() { return set(Mark::confirmed) && set(Mark::permanent); }
 
   // Download.
 
@@ -198,7 +198,7 @@ class Slots {
     confirmed = 3 + kTrials,
     fell_back,
     taken_back,
-    settled,
+    permanent,
     certain
   };
   static constexpr std::size_t kMarks = 3 + kTrials + 5;
@@ -222,10 +222,10 @@ class Slots {
   constexpr bool may_run(Slot slot) const { return !image_to_run(slot).empty(); }
   constexpr bool is_set(Mark mark) const { return word(Slot::download, place_of(mark)) == kSet; }
   constexpr bool set(Mark mark) { return put(Slot::download, place_of(mark), kSet); }
-  // `fell_back` may be a word that an interrupted write left, set at one start and not at the next: `settled` overrules
-  // it.
+  // `fell_back` may be a word that an interrupted write left, set at one start and not at the next: `permanent`
+  // overrules it.
   constexpr bool is_confirmed() const {
-    return is_set(Mark::confirmed) && (is_set(Mark::settled) || !is_set(Mark::fell_back));
+    return is_set(Mark::confirmed) && (is_set(Mark::permanent) || !is_set(Mark::fell_back));
   }
   constexpr bool is_closed() const { return is_confirmed() || is_set(Mark::taken_back); }
   // An update that was requested and is not finished.
@@ -237,7 +237,7 @@ class Slots {
     if (is_set(Mark::requested)) {
       for (std::size_t i = 0; i < kMarks; ++i)
         if (is_set(static_cast<Mark>(i))) set(static_cast<Mark>(i));
-      if (is_confirmed()) set(Mark::settled);
+      if (is_confirmed()) set(Mark::permanent);
     } else if (!is_set(Mark::taken_back)) {
       fall_back();
     }
@@ -258,11 +258,12 @@ class Slots {
     staging_ = false;
     return error;
   }
+  // In whole words, as they are written: what follows the image in its last word counts.
   constexpr bool is_copy(Slot of, Slot slot) const {
-    const auto there = image(of);
-    for (std::size_t i = 0; i < there.size(); ++i)
-      if (bytes(slot)[i] != there[i]) return false;
-    return !there.empty();
+    const std::size_t words = (image(of).size() + 3) / 4;
+    for (std::size_t i = 0; i < words; ++i)
+      if (word(slot, i) != word(of, i)) return false;
+    return words > 0;
   }
   // An interrupted copy starts again. One that looks finished is written again without an erase, as its last word may
   // have been interrupted.

@@ -38,7 +38,7 @@ struct FeedforwardSetup {
 };
 
 struct Feedforward {
-  // The torsion settles far more slowly than a tick: a drive computes the lead at every second one.
+  // The torsion changes little within a tick: a drive computes the lead at every second one.
   static constexpr int kLeadTicks = 2;
 
   template <class N>

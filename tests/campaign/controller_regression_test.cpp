@@ -71,15 +71,18 @@ firmware::TelemetrySetup telemetry() {
           .channels = {Channel::velocity, Channel::disturbance, Channel::feedforward_torque, Channel::command_torque,
                        Channel::command_current}};
 }
-board::Block block() {
-  return board::Block(board::parameters_of(drive(), board::setup_of(drive())), board::constants_of(drive()));
+// Without slow rates every task runs at each tick, as when the inputs were recorded.
+board::Block block(bool slow_rates) {
+  auto setup = board::setup_of(drive());
+  setup.has_slow_rates = slow_rates;
+  return board::Block(board::parameters_of(drive(), setup), board::constants_of(drive()));
 }
 
 // Rows of a drive in closed loop: where inputs come from.
 std::vector<Row> recorded_inputs(const Case& c) {
   board::PlantRig rig({.drive = drive(), .seed = 11});
   board::SoftwareController controller;
-  controller.start(block(), telemetry(), firmware::ResetCause::power);
+  controller.start(block(false), telemetry(), firmware::ResetCause::power);
   std::vector<Row> rows;
   for (std::uint32_t k = 0; rows.size() < kRows; ++k) {
     firmware::CoSimulationInput down;
@@ -102,9 +105,9 @@ std::vector<Row> recorded_inputs(const Case& c) {
 }
 
 // The controller alone, on straight lines between the inputs of the rows: fills in its outputs.
-void replay(const Case& c, std::vector<Row>& rows) {
+void replay(const Case& c, bool slow_rates, std::vector<Row>& rows) {
   board::SoftwareController controller;
-  controller.start(block(), telemetry(), firmware::ResetCause::power);
+  controller.start(block(slow_rates), telemetry(), firmware::ResetCause::power);
   firmware::Readings readings;
   for (std::uint32_t k = 0; k < (kRows - 1) * kTicksPerRow; ++k) {
     const Row &from = rows[k / kTicksPerRow], &to = rows[k / kTicksPerRow + 1];
@@ -174,13 +177,13 @@ TEST_P(Controller, MakesOfRecordedInputsWhatItMadeOfThem) {
   const Case& c = GetParam();
   if (std::getenv("FLEXSPLINE_RECORD") != nullptr) {
     std::vector<Row> rows = recorded_inputs(c);
-    replay(c, rows);
+    replay(c, false, rows);
     write(c, rows);
   }
   const std::vector<Row> expected = read(c);
   ASSERT_EQ(expected.size(), kRows) << file_of(c) << " is missing or short";
   std::vector<Row> now = expected;
-  ASSERT_NO_FATAL_FAILURE(replay(c, now));
+  ASSERT_NO_FATAL_FAILURE(replay(c, false, now));
   std::size_t different = 0;
   double squares = 0.0;
   std::ostringstream table;
@@ -198,6 +201,28 @@ TEST_P(Controller, MakesOfRecordedInputsWhatItMadeOfThem) {
   const double torque = std::sqrt(squares / static_cast<double>(kRows - 1));
   EXPECT_GT(torque, c.least_torque);
   EXPECT_LT(torque, c.most_torque);
+}
+
+// No loop reads the disturbance that is updated at every fourth tick only, and between updates it is held.
+TEST_P(Controller, ChangesTheDisturbanceAloneWhereSlowTasksHaveTheirOwnRates) {
+  const Case& c = GetParam();
+  const std::vector<Row> expected = read(c);
+  ASSERT_EQ(expected.size(), kRows);
+  std::vector<Row> now = expected;
+  ASSERT_NO_FATAL_FAILURE(replay(c, true, now));
+  double apart = 0.0, whole = 0.0;
+  for (std::size_t k = 0; k + 1 < kRows; ++k)
+    for (std::size_t i = 0; i < kOutputs.size(); ++i) {
+      const double was = expected[k].outputs[i], is = now[k].outputs[i];
+      if (i != 1) {
+        EXPECT_NEAR(is, was, kTolerance) << "line " << k + 2 << " " << kOutputs[i];
+        continue;
+      }
+      apart += (is - was) * (is - was);
+      whole += was * was;
+    }
+  EXPECT_GT(apart, 0.0);
+  EXPECT_LT(apart, 0.05 * 0.05 * whole);
 }
 
 INSTANTIATE_TEST_SUITE_P(Recorded, Controller, testing::ValuesIn(kCases), [](const auto& test) {

@@ -82,6 +82,9 @@ TEST(Derivatives, WithoutATachometerTheSmootherIsTheReferenceAndAPictureIsDrawn)
   EXPECT_NE(nothing.err.find("output_position_rad"), std::string::npos) << nothing.err;
   EXPECT_EQ(shell.run("flexspline derivatives run.csv --picture d.svg --from-s 30").code, 2);
   EXPECT_EQ(shell.run("flexspline derivatives run.csv --cutoff-hz 600").code, 2);
+  const Answer negative = shell.run("flexspline derivatives run.csv --cutoff-hz -3");
+  EXPECT_EQ(negative.code, 2);
+  EXPECT_NE(negative.err.find("--cutoff-hz: \"-3\" is not a number above zero"), std::string::npos) << negative.err;
 }
 
 // The same parameters by both ways, on data that have them.
