@@ -2,8 +2,28 @@
 
 #include <algorithm>
 #include <string_view>
+#include <utility>
 
 namespace flexspline::estimation {
+namespace {
+
+// Friction of the two directions varies by itself: a group more for each friction whose asymmetry the model has.
+void add_asymmetries(const Terms& terms, const std::vector<ParameterRef>& linear, std::vector<FrictionGroup>& groups) {
+  std::vector<FrictionGroup> by_direction;
+  for (const FrictionGroup& group : groups) {
+    FrictionGroup own{group.name + " by direction", {}, {}, {}};
+    for (std::size_t j = 0; j < linear.size(); ++j) {
+      const std::string_view asymmetry_of = terms[linear[j].term].entry->info->asymmetry_of;
+      for (const Eigen::Index of : group.columns)
+        if (!asymmetry_of.empty() && terms[linear[static_cast<std::size_t>(of)].term].entry->name() == asymmetry_of)
+          own.asymmetries.push_back({static_cast<Eigen::Index>(j), of});
+    }
+    if (!own.asymmetries.empty()) by_direction.push_back(std::move(own));
+  }
+  for (FrictionGroup& group : by_direction) groups.push_back(std::move(group));
+}
+
+}  // namespace
 
 std::vector<FrictionGroup> friction_groups(const Terms& terms, const std::vector<ParameterRef>& linear,
                                            const std::vector<ParameterRef>& nonlinear) {
@@ -12,7 +32,7 @@ std::vector<FrictionGroup> friction_groups(const Terms& terms, const std::vector
     const std::string_view surface = terms[linear[j].term].entry->info->surface;
     if (surface.empty()) continue;
     auto group = std::find_if(groups.begin(), groups.end(), [&](const FrictionGroup& g) { return g.name == surface; });
-    if (group == groups.end()) group = groups.insert(groups.end(), {std::string(surface), {}, {}});
+    if (group == groups.end()) group = groups.insert(groups.end(), {std::string(surface), {}, {}, {}});
     group->columns.push_back(static_cast<Eigen::Index>(j));
     const Term& term = terms[linear[j].term];
     const auto& varies = term.entry->parameters[linear[j].parameter];
@@ -24,6 +44,7 @@ std::vector<FrictionGroup> friction_groups(const Terms& terms, const std::vector
         group->ratio_parameters.push_back({static_cast<Eigen::Index>(k), term.values[nonlinear[k].parameter]});
     }
   }
+  add_asymmetries(terms, linear, groups);
   return groups;
 }
 
@@ -35,6 +56,7 @@ Eigen::MatrixXd random_effect_directions(const std::vector<FrictionGroup>& group
     for (const Eigen::Index j : groups[g].columns) u(j, column) = theta[j];
     for (const FrictionGroup::RatioParameter& s : groups[g].ratio_parameters)
       if (const Eigen::Index j = first_nonlinear + s.nonlinear_ref; j < theta.size()) u(j, column) = -s.ratio * size[j];
+    for (const auto& [j, of] : groups[g].asymmetries) u(j, column) = theta[of] * size[j] / size[of];
   }
   return u;
 }

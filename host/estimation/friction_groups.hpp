@@ -20,8 +20,14 @@ struct FrictionGroup {
     double ratio;                // its value
   };
   std::vector<RatioParameter> ratio_parameters;
+  // What one direction has more of than the other, where the model has a column for that: it varies by a share of the
+  // friction, not of itself, as it may have any sign.
+  struct Asymmetry {
+    Eigen::Index column, of;
+  };
+  std::vector<Asymmetry> asymmetries;
 };
-inline constexpr Eigen::Index kMostGroups = 4;
+inline constexpr Eigen::Index kMostGroups = 8;
 // Fewer records than that do not identify a variance between them.
 inline constexpr std::size_t kFewestRecords = 3;
 

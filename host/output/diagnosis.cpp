@@ -139,6 +139,13 @@ void print_unknown(Console& console, const Diagnosis& d) {
   console.line(wrapped(fmt::format("Record next: {}.", u.record_next)));
 }
 
+json between_records_json(const selection::Diagnosis& d) {
+  if (!d.between_records) return nullptr;
+  return {{"records", d.between_records->records},
+          {"explained_percent", d.between_records->explained_percent},
+          {"p_value", d.between_records->p_value}};
+}
+
 json unknown_json(const Diagnosis& d) {
   if (!d.unknown) return nullptr;
   const selection::UnknownStructure& u = *d.unknown;
@@ -312,7 +319,9 @@ void print_diagnosis(Console& console, const Diagnosis& d, const std::string& ad
         wrapped(fmt::format("{}.{} differs between experiments with {}: the model lacks something that goes with it.",
                             t.id, t.parameter, t.over)));
   if (!d.named.empty() && !d.remaining_structure.empty())
-    console.line(wrapped(fmt::format("With that added, the error still goes with {}.", shares(d.remaining_structure))));
+    console.line(wrapped(fmt::format("With {}, the error still goes with {}.",
+                                     d.between_records ? "friction that is each record's own" : "that added",
+                                     shares(d.remaining_structure))));
   if (!d.disturbances.empty()) {
     Table table({"disturbance in", "from", "to", "peak"}, "lrrr");
     for (const selection::Disturbance& x : d.disturbances)
@@ -377,6 +386,7 @@ json diagnosis_json(const Diagnosis& d) {
           {"recovered_percent", json_number(d.recovered_percent)},
           {"disturbances", std::move(disturbances)},
           {"partial", d.partial},
+          {"between_records", between_records_json(d)},
           {"resampling", resampling_json(d)},
           {"unknown", unknown_json(d)},
           {"delay_s", json_number(d.delay_s)},

@@ -7,6 +7,7 @@
 #include "host/comparison/residual_map.hpp"
 #include "host/estimation/in_parallel.hpp"
 #include "host/estimation/variable_projection.hpp"
+#include "host/selection/between_records.hpp"
 #include "host/selection/candidate_fits.hpp"
 #include "host/selection/confounding.hpp"
 #include "host/selection/detection_limit.hpp"
@@ -342,6 +343,7 @@ Diagnosis diagnose(const data::Dataset& dataset, const model::Model& model, cons
     if (options.progress) options.progress("looking for what no effect explains");
     check_unknown_structure(chosen.search, names_one ? &chosen.candidates.front() : nullptr, result);
   }
+  if (by_resampling) name_between_records(*base, chosen, result);
   if (result.resampling && result.resampling->too_little)
     result.warnings.push_back(
         "these data have too few samples to choose effects on halves of them; record longer, with several strokes");

@@ -1,6 +1,7 @@
 // Which physical effect is missing from a model, or that none is.
 #pragma once
 
+#include <cstddef>
 #include <functional>
 #include <optional>
 #include <string>
@@ -123,6 +124,13 @@ struct Resampling {
       false;  // the model's error is no noise even with the likeliest effect, so that likelihood alone does not count
 };
 
+// Where a law is named by how friction differs between records.
+struct BetweenRecords {
+  std::size_t records = 0;
+  double explained_percent = 0.0;  // of the variance between records
+  double p_value = 1.0;            // by permutation of the records
+};
+
 enum class Verdict {
   missing_effect,
   confusable_effects,
@@ -155,7 +163,8 @@ struct Diagnosis {
   std::optional<Resampling> resampling;     // of the motor's balance
   bool partial = false;                     // more is missing than what is named
   std::optional<UnknownStructure> unknown;  // where the verdict is unknown_structure and a curve shows what it is
-  std::optional<double> delay_s;            // of the effort against the motion, beyond the alignment, where significant
+  std::optional<BetweenRecords> between_records;
+  std::optional<double> delay_s;  // of the effort against the motion, beyond the alignment, where significant
 };
 
 struct Options {

@@ -160,7 +160,7 @@ struct SelectionPolicy {
   // Of the chi-square above the noise: the best substitute for an effect that is not in the catalogue takes off 60 %
   // and less (step 14).
   double recovered_percent = 80.0;
-  double worth_adding = 0.003;  // of the first decrease of chi-square (step 15)
+  double worth_adding = 0.003;  // of the first decrease of chi-square (step 16)
 
   // Structure outside the catalogue. A curve has many numbers and the best of some two dozen signals is taken, so it
   // must show more than an effect of the catalogue; both limits were set on drives that lack nothing.
@@ -180,8 +180,12 @@ struct SelectionPolicy {
   std::size_t fewest_of_trend = 6;  // experiments
   double trend_p_value = 1e-3;      // after the correction for what was tried
   double trend_size = 0.03;         // of the parameter, over the records
-  double least_drift = 0.01;        // relative standard deviation of friction between records that is reported
-  double drift_deviance = 12.0;     // twice the log-likelihood ratio of random effects against none
+  // A law that shows between records only (step 15): standard error of a record's friction over the friction, and the
+  // share of the law's squares that the friction cannot take up (a power of the speed: below 0.01).
+  double known_between_records = 0.05;
+  double most_within_record = 0.05;
+  double least_drift = 0.01;     // relative standard deviation of friction between records that is reported
+  double drift_deviance = 12.0;  // twice the log-likelihood ratio of random effects against none
 };
 
 // The policy that all commands follow.

@@ -3,7 +3,8 @@
 
 CASES is the folder that flexspline_report_cases wrote. Each table as a whole and each row alone; a name is true where the effect is in
 the simulated drive and not in the base model, and for table 7 as a whole where it is sublinear friction, which its rows hold only
-together. CASES may also have a folder whole-drive, of all tables together. Prints a table; exit code 1 where a name is false."""
+together. CASES may also have a folder whole-drive, of all tables together. Prints a table; exit code 1 where a name is false, or one is
+missing that should be there."""
 import re
 import sys
 import time
@@ -57,7 +58,7 @@ def main():
             result = "FALSE" if false else "missed" if expected and not any(n in expected for n in names) else "right"
             print(f"| {name} {label} | {answer['verdict']} | {', '.join(names) or '-'} | {result} | {seconds:.1f} |", flush=True)
     print(f"\n{false_answers} of {answers} answers with a false name; {met} of {to_name} that should be named are.")
-    return 1 if false_answers else 0
+    return 1 if false_answers or met < to_name else 0
 
 
 if __name__ == "__main__":

@@ -144,12 +144,30 @@ TEST(FrictionGroups, LawsOfTheSameSurfaceAreOne) {
   EXPECT_EQ(groups[1].columns, std::vector<Eigen::Index>{2});
 }
 
+TEST(FrictionGroups, DirectionsVaryByThemselvesWhereTheModelHasTheirAsymmetry) {
+  const auto term = [](const char* name) { return candidate_term(catalogue::get(name)); };
+  const Terms terms{term("coulomb_friction"), term("coulomb_asymmetry"), term("viscous_friction")};
+  const std::vector<FrictionGroup> groups = friction_groups(terms, free_linear_parameters(terms, {0, 1, 2}));
+  ASSERT_EQ(groups.size(), 3u);
+  EXPECT_EQ(groups[2].name, "dry friction by direction");
+  // Scaled columns: torque = X theta, X the columns over `size`. A unit factor adds the friction to the asymmetry.
+  const Eigen::Vector3d size(2.0, 5.0, 1.0), theta(3.0, -7.0, 4.0);
+  const MatrixXd u = random_effect_directions(groups, theta, size, 3);
+  EXPECT_EQ(u.col(0), Eigen::Vector3d(3.0, 0.0, 0.0));
+  EXPECT_EQ(u.col(1), Eigen::Vector3d(0.0, 0.0, 4.0));
+  EXPECT_EQ(u.col(2), Eigen::Vector3d(0.0, 3.0 / 2.0 * 5.0, 0.0));
+}
+
 TEST(FrictionGroups, ACatalogueHasNoMoreThanTheirMatricesHold) {
   std::set<std::string_view> surfaces;
-  for (const catalogue::Entry& entry : catalogue::all())
+  std::size_t asymmetries = 0;
+  for (const catalogue::Entry& entry : catalogue::all()) {
     if (!entry.info->surface.empty()) surfaces.insert(entry.info->surface);
+    asymmetries += !entry.info->asymmetry_of.empty();
+  }
   EXPECT_GE(surfaces.size(), 2u);
-  EXPECT_LE(static_cast<Eigen::Index>(surfaces.size()), kMostGroups);
+  EXPECT_GE(asymmetries, 2u);
+  EXPECT_LE(static_cast<Eigen::Index>(surfaces.size() + asymmetries), kMostGroups);
 }
 
 TEST(NoiseCovarianceOfOneRecord, MakesTheDenseCovarianceTheIdentity) {

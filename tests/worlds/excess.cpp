@@ -124,15 +124,25 @@ void shorten_presliding(Twin& twin) {
   }
 }
 
+// The largest current of all records as they are recorded, the held out one among them; infinite where one runs away.
+double largest_current(const Twin& twin) {
+  double peak = 0.0;
+  const auto take = [&](const Record& r) {
+    for (const double i : simulate(twin.joint, r.conditions, twin.controller, r.trajectory, kCoarse_s).current)
+      peak = std::isfinite(i) ? std::max(peak, std::abs(i)) : INFINITY;
+  };
+  for (const Record& r : twin.fit) take(r);
+  take(twin.holdout);
+  return peak;
+}
+
 // Torque k (i - s i^3) falls again beyond its turning point, and a controller runs away there: no drive is operated so.
 void keep_below_turning_point(Twin& twin) {
   constexpr double kMost = 0.8;  // of the turning point
   for (HiddenEffect& h : twin.hidden) {
     if (h.effect != "torque_constant_saturation") continue;
     for (int round = 0; round < 20; ++round) {
-      double peak = 0.0;
-      for (const Motion& m : without_noise(twin))
-        for (const double i : m.current) peak = std::isfinite(i) ? std::max(peak, std::abs(i)) : INFINITY;
+      const double peak = largest_current(twin);
       if (peak < kMost * std::sqrt(1.0 / (3.0 * twin.joint.saturation))) break;
       h.size *= 0.5;
       set_size(twin, h, h.size);
@@ -149,8 +159,8 @@ void scale_hidden(Twin& twin) {
     const double factor = std::sqrt(rest * h.wanted_share / (1.0 - h.wanted_share) / made);
     h.size = std::min(h.size * std::clamp(factor, 0.02, 8.0), largest_size(twin, h));
     set_size(twin, h, h.size);
-    // Before the next effect is judged by the motion.
-    if (h.effect == "torque_constant_saturation") keep_below_turning_point(twin);
+    // Before the next effect is judged by the motion, and after one that may need more current.
+    keep_below_turning_point(twin);
   }
 }
 

@@ -197,6 +197,21 @@ TEST(RobotTwins, NoControllerRunsAwayWhereATorqueConstantSaturatesAndAnotherEffe
   EXPECT_GT(twin.joint.saturation, 0.0);
 }
 
+TEST(RobotTwins, NoCurrentOfARecordIsBeyondWhereMoreOfItGivesLessTorque) {
+  // Ran away with the noise, or in the held out record.
+  for (const auto& [seed, family] : {std::pair{62163u, "robot-like"}, {30310u, "few-records"}}) {
+    Twin twin = draw(seed, family);
+    fit_sizes(twin);
+    ASSERT_GT(twin.joint.saturation, 0.0) << seed;
+    std::vector<Record> all = twin.fit;
+    all.push_back(twin.holdout);
+    const double turning_point = std::sqrt(1.0 / (3.0 * twin.joint.saturation));
+    for (const Record& r : all)
+      for (const double i : simulate(twin.joint, r.conditions, twin.controller, r.trajectory, kStep_s).current)
+        ASSERT_LT(std::abs(i), turning_point) << seed << " " << r.name;
+  }
+}
+
 TEST(RobotTwins, AnOffsetAndAnAsymmetryAreOneClassAndOtherNamesAreAcceptedOnlyWhereTheyExplainAsMuch) {
   for (std::uint64_t seed = 300; seed < 330; ++seed) {
     Twin twin = draw(seed, "robot-like");

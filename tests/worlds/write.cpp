@@ -52,7 +52,7 @@ std::vector<double> lagged(const Motion& m, double lag_s) {
   return out;
 }
 
-// A user does not map a velocity column that is not the derivative of the position.
+// A user does not map a velocity column that is not the derivative of the position, be it in one record only.
 bool usable(const Motion& m, const std::vector<double>& column) {
   double product = 0.0, squares = 0.0;
   for (std::size_t k = 0; k < m.size(); ++k) {
@@ -86,7 +86,7 @@ Ranges ranges_of(const Motion& m) {
   return r;
 }
 
-std::string csv_of(const Twin& twin, const Record& record, const Motion& m, const Ranges& ranges) {
+std::string csv_of(const Twin& twin, const Record& record, const Motion& m, const Ranges& ranges, bool with_velocity) {
   const Sensors& s = twin.sensors;
   const Scales scale = scales_of(twin);
   Random random(record.conditions.seed ^ 0xABCDEF1234567ull);
@@ -98,7 +98,6 @@ std::string csv_of(const Twin& twin, const Record& record, const Motion& m, cons
   const double torque_step = 2.0 * twin.joint.rated_torque / std::exp2(s.effort_bits + 2.0);
   const double torque_zero = 0.3 * s.torque_noise * ranges.torque_rms * random.normal();
   const std::vector<double> velocity = lagged(m, s.velocity_lag_s);
-  const bool with_velocity = s.velocity_column && usable(m, velocity);
   const std::vector<double> angle = joint_side ? m.output_angle : m.angle;
   const double to_motor = joint_side ? twin.joint.gear_ratio : 1.0;
 
@@ -131,7 +130,8 @@ std::string csv_of(const Twin& twin, const Record& record, const Motion& m, cons
   return text;
 }
 
-std::string dataset_toml(const Twin& twin, const std::vector<const Record*>& records, const char* role) {
+std::string dataset_toml(const Twin& twin, const std::vector<const Record*>& records, const char* role,
+                         bool with_velocity) {
   const Scales scale = scales_of(twin);
   const double n = twin.joint.gear_ratio;
   std::string text = "format = \"flexspline-dataset/1\"\n\n[drive]\naxis = \"rotary\"\n";
@@ -141,7 +141,7 @@ std::string dataset_toml(const Twin& twin, const std::vector<const Record*>& rec
   if (twin.units != Units::motor) {
     const double turns = twin.units == Units::joint ? 1.0 : n;
     text += fmt::format("\n[columns.motor_position_rad]\nsource = \"{}\"\nscale = {:g}\n", scale.position, turns);
-    if (twin.sensors.velocity_column)
+    if (with_velocity)
       text += fmt::format("\n[columns.motor_velocity_rad_s]\nsource = \"{}\"\nscale = {:g}\n", scale.velocity, turns);
   }
   if (twin.units == Units::joint)
@@ -297,18 +297,21 @@ void write_case(const Twin& twin, const Shares& shares, const std::filesystem::p
   std::filesystem::create_directories(folder / "fit");
   std::filesystem::create_directories(folder / "holdout");
   std::vector<const Record*> records;
-  Ranges ranges;
-  for (const Record& r : twin.fit) {
-    const Motion m = simulate(twin.joint, r.conditions, twin.controller, r.trajectory, kFine_s);
-    if (records.empty()) ranges = ranges_of(m);
-    records.push_back(&r);
-    save(folder / "fit" / (r.name + ".csv"), csv_of(twin, r, m, ranges));
+  for (const Record& r : twin.fit) records.push_back(&r);
+  records.push_back(&twin.holdout);
+  std::vector<Motion> motions;
+  bool with_velocity = twin.sensors.velocity_column;
+  for (const Record* r : records) {
+    motions.push_back(simulate(twin.joint, r->conditions, twin.controller, r->trajectory, kFine_s));
+    with_velocity = with_velocity && usable(motions.back(), lagged(motions.back(), twin.sensors.velocity_lag_s));
   }
-  const Record& last = twin.holdout;
-  const Motion m = simulate(twin.joint, last.conditions, twin.controller, last.trajectory, kFine_s);
-  save(folder / "holdout" / (last.name + ".csv"), csv_of(twin, last, m, ranges));
-  save(folder / "fit" / "dataset.toml", dataset_toml(twin, records, "fit"));
-  save(folder / "holdout" / "dataset.toml", dataset_toml(twin, {&last}, "holdout"));
+  const Ranges ranges = ranges_of(motions.front());
+  for (std::size_t i = 0; i < records.size(); ++i)
+    save(folder / (records[i] == &twin.holdout ? "holdout" : "fit") / (records[i]->name + ".csv"),
+         csv_of(twin, *records[i], motions[i], ranges, with_velocity));
+  records.pop_back();
+  save(folder / "fit" / "dataset.toml", dataset_toml(twin, records, "fit", with_velocity));
+  save(folder / "holdout" / "dataset.toml", dataset_toml(twin, {&twin.holdout}, "holdout", with_velocity));
   save(folder / "model.toml", model_toml(twin));
   save(folder / "truth.json", truth_of(twin, shares, ranges).dump(2) + "\n");
 }

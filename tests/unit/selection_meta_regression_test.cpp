@@ -1,0 +1,134 @@
+// Meta-regression over records against closed forms: ordinary least squares, enumerated permutations, the likelihood.
+#include "host/selection/meta_regression.hpp"
+
+#include <gtest/gtest.h>
+
+#include <Eigen/Core>
+#include <algorithm>
+#include <cmath>
+#include <numeric>
+#include <random>
+#include <vector>
+
+namespace flexspline::selection {
+namespace {
+
+using Eigen::Index;
+using Eigen::MatrixXd;
+
+struct Records {
+  MatrixXd theta, added;
+  Records(Index records, double coefficient, unsigned seed) : theta(records, 2), added(records, 2) {
+    std::mt19937_64 random(seed);
+    std::normal_distribution<double> normal;
+    for (Index i = 0; i < records; ++i) {
+      const double speed = 1.0 + 0.1 * static_cast<double>(i);
+      added.row(i) << 0.5 / std::sqrt(speed), std::sqrt(speed);
+      theta.row(i) << 2.0 + coefficient * added(i, 0) + 0.05 * normal(random),
+          7.0 + coefficient * added(i, 1) + 0.3 * normal(random);
+    }
+  }
+};
+
+double deviance(const MatrixXd& theta, const MatrixXd& added, double coefficient) {
+  double sum = 0.0;
+  for (Index j = 0; j < theta.cols(); ++j) {
+    Eigen::VectorXd left = theta.col(j) - coefficient * added.col(j);
+    left.array() -= left.mean();
+    sum += static_cast<double>(theta.rows()) * std::log(left.squaredNorm() / static_cast<double>(theta.rows()));
+  }
+  return sum;
+}
+
+TEST(MetaRegression, OfOneParameterIsALeastSquaresLine) {
+  MatrixXd theta(5, 1), added(5, 1);
+  added << 1, 2, 3, 4, 5;
+  theta << 2.1, 2.9, 4.2, 4.8, 6.0;  // slope 0.97, intercept 1.09, squares 9.5 before and 0.091 after
+  const MetaRegression fit = meta_regression(theta, added);
+  EXPECT_NEAR(fit.coefficient, 0.97, 1e-12);
+  EXPECT_NEAR(fit.mean[0], 1.09, 1e-12);
+  EXPECT_NEAR(fit.likelihood_ratio, 5.0 * std::log(9.5 / 0.091), 1e-9);
+  EXPECT_NEAR(fit.explained_share, 1.0 - 0.091 / 9.5, 1e-12);
+}
+
+TEST(MetaRegression, OfTwoParametersHasTheGreatestLikelihood) {
+  const Records r(20, 1.5, 3);
+  const MetaRegression fit = meta_regression(r.theta, r.added);
+  EXPECT_NEAR(fit.coefficient, 1.5, 4.0 * fit.coefficient_std);
+  const double best = deviance(r.theta, r.added, fit.coefficient);
+  EXPECT_LT(best, deviance(r.theta, r.added, fit.coefficient + 1e-3));
+  EXPECT_LT(best, deviance(r.theta, r.added, fit.coefficient - 1e-3));
+  EXPECT_NEAR(fit.likelihood_ratio, deviance(r.theta, r.added, 0.0) - best, 1e-9);
+}
+
+TEST(MetaRegression, IsPossibleOnlyWithTheSignOfFriction) {
+  MetaRegression fit;
+  fit.mean = Eigen::Vector2d(1.0, 0.5);
+  fit.coefficient = 1.0;
+  EXPECT_TRUE(is_possible(fit));
+  fit.coefficient = -1.0;
+  EXPECT_FALSE(is_possible(fit));
+  fit.coefficient = 1.0;
+  fit.mean[1] = -0.1;
+  EXPECT_FALSE(is_possible(fit));
+}
+
+TEST(MetaRegression, OfAnEffectThatIsAlikeInAllRecordsExplainsNothing) {
+  Records r(8, 0.0, 5);
+  r.added.setConstant(2.0);
+  const MetaRegression fit = meta_regression(r.theta, r.added);
+  EXPECT_EQ(fit.likelihood_ratio, 0.0);
+  EXPECT_FALSE(is_possible(fit));
+}
+
+TEST(PermutationTest, AgreesWithAllPermutationsOfSixRecords) {
+  const Records r(6, 0.4, 7);
+  const auto ratio = [&](const MatrixXd& added) {
+    const MetaRegression fit = meta_regression(r.theta, added);
+    return is_possible(fit) ? fit.likelihood_ratio : 0.0;
+  };
+  const double recorded = ratio(r.added);
+  ASSERT_GT(recorded, 0.0);
+  std::vector<Index> order(6);
+  std::iota(order.begin(), order.end(), Index{0});
+  int reached = 0, all = 0;
+  do {
+    reached += ratio(r.added(order, Eigen::all)) >= recorded;
+    ++all;
+  } while (std::next_permutation(order.begin(), order.end()));
+  const double exact = static_cast<double>(reached) / all;
+  EXPECT_NEAR(permutation_p_value(r.theta, {r.added}, 20000, 1), exact, 4.0 * std::sqrt(exact / 20000.0));
+}
+
+TEST(PermutationTest, FindsALawAndSeldomOneThatIsNotThere) {
+  int found = 0, wrong = 0;
+  for (unsigned seed = 0; seed < 100; ++seed) {
+    const Records with(20, 0.8, seed), without(20, 0.0, 1000 + seed);
+    found += permutation_p_value(with.theta, {with.added}, 1000, seed) <= 0.01;
+    wrong += permutation_p_value(without.theta, {without.added}, 1000, seed) <= 0.05;
+  }
+  EXPECT_GT(found, 90);
+  EXPECT_LT(wrong, 11);  // 5 are expected; 11 and more in one of 90 runs
+}
+
+TEST(PermutationTest, CountsHowManyLawsAreTried) {
+  // The best of many laws that have nothing to do with the records is no better than a permutation of them.
+  int significant = 0;
+  for (unsigned seed = 0; seed < 40; ++seed) {
+    const Records r(12, 0.0, 2000 + seed);
+    std::mt19937_64 random(seed);
+    std::normal_distribution<double> normal;
+    std::vector<MatrixXd> laws;
+    for (int k = 0; k < 20; ++k) laws.push_back(MatrixXd::NullaryExpr(12, 2, [&] { return normal(random); }));
+    significant += permutation_p_value(r.theta, laws, 400, seed) <= 0.1;
+  }
+  EXPECT_LT(significant, 10);  // 4 are expected
+}
+
+TEST(PermutationTest, IsOneWhereNoLawIsPossible) {
+  const Records r(10, 1.0, 9);
+  EXPECT_EQ(permutation_p_value(r.theta, {MatrixXd(-r.added)}, 100, 1), 1.0);
+}
+
+}  // namespace
+}  // namespace flexspline::selection
