@@ -297,8 +297,24 @@ std::vector<CandidateFit> rank_candidates(BalanceSearch& search) {
   return candidates;
 }
 
+// Samples that count differ with the autocorrelation of what a candidate leaves, so that scores of candidates that
+// leave unlike structure are not comparable. Where the best one leaves a multiple of the squares that another leaves
+// with no more parameters, the other comes first.
+void prefer_smaller_error(std::vector<CandidateFit>& candidates) {
+  if (candidates.empty() || !passes(candidates.front())) return;
+  std::size_t smallest = 0;
+  const auto squares = [&](std::size_t i) { return std::pow(candidates[i].fit.rmse_cv_fixed_effects(), 2); };
+  for (std::size_t i = 1; i < candidates.size(); ++i)
+    if (passes(candidates[i]) && candidates[i].model.added <= candidates.front().model.added &&
+        kPolicy.similar_left * squares(i) < squares(0) && squares(i) < squares(smallest))
+      smallest = i;
+  const auto at = candidates.begin() + static_cast<std::ptrdiff_t>(smallest);
+  std::rotate(candidates.begin(), at, at + 1);
+}
+
 void sort_candidates(const BalanceSearch& search, std::vector<CandidateFit>& candidates) {
   std::stable_sort(candidates.begin(), candidates.end(), better);
+  prefer_smaller_error(candidates);
   prefer_simple(search, candidates);
 }
 

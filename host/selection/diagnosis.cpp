@@ -177,8 +177,11 @@ void name_effects(const SearchedBalance& chosen, const std::string& alias, Diagn
   const auto is = [](const Candidate& c, const NamedEffect& n) { return c.effect == n.effect && c.order == n.order; };
   for (const CandidateFit& t : list) {
     const NamedEffect name{std::string(t.model.entry->name()), t.model.order};
-    const bool near = t.score() >= list.front().score() - kPolicy.confounded_margin ||
-                      is_in_group(result.resampling, list.front(), t);
+    const double times_left =
+        std::pow(t.fit.rmse_cv_fixed_effects() / std::max(list.front().fit.rmse_cv_fixed_effects(), 1e-300), 2);
+    const bool near =
+        (t.score() >= list.front().score() - kPolicy.confounded_margin && times_left <= kPolicy.similar_left) ||
+        is_in_group(result.resampling, list.front(), t);
     // A law with more parameters and the same error is not confounded with the simpler one, as it contains it. One with
     // a slightly smaller error is.
     const bool wider = t.model.added > list.front().model.added && !t.leads;

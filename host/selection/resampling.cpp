@@ -175,9 +175,8 @@ bool resampling_decides(const Resampling& resampling, const SearchedBalance& mot
   const CandidateFit& first = motor.candidates.front();
   if (reaches_floor(motor) && !explains_instead(resampling, first)) return false;
   const std::optional<double> support = support_of(resampling, first);
-  const bool found_something = std::any_of(resampling.found.begin(), resampling.found.end(),
-                                           [](const auto& f) { return !f.refused_by_holdout; });
-  if (!support && first.gain.chi2_percent > kPolicy.nearly_all_percent && !found_something) return false;
+  if (!support && first.gain.chi2_percent > kPolicy.nearly_all_percent && !explains_instead(resampling, first))
+    return false;
   const auto is_first = [&](const NamedEffect& n) { return is_of_family(n.effect, n.order, first); };
   const bool found_first = std::any_of(resampling.found.begin(), resampling.found.end(), [&](const auto& f) {
     return std::any_of(f.group.begin(), f.group.end(), is_first);
