@@ -375,10 +375,12 @@ class Application {
   // Modes.
 
   void check_safety(const Readings& readings, const Estimate& estimate, std::uint32_t due) {
-    const bool needs_output = has_parameters() && parameters().has_output_encoder;
     FaultRecord found;
     found.fault = Fault::none;
-    safety_.check_samples(found, readings, needs_output ? output_sample_ticks_of<B>() : 0, most_reading_);
+    safety_.check_samples(found, readings, most_reading_, [this] {
+      const bool needs_output = has_parameters() && parameters().has_output_encoder;
+      return needs_output ? output_sample_ticks_of<B>() : std::uint32_t{0};
+    });
     if (found.fault == Fault::none && has_parameters())
       safety_.check(found, readings, estimate, signals_.output, parameters(), status_.mode, due,
                     [this] { return control_.streams_in_motion(); });

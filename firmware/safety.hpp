@@ -14,13 +14,14 @@ class Safety {
   // Each writes the first fault into `found`, which has none yet; the caller adds the tick.
 
   // Without parameters there are no scales and no limits: it only checks that samples arrive. `most_reading`: the
-  // largest reading of the current, which no block can raise. `output_ticks`: as long as a sample of the output may
-  // take; zero where there is none.
-  void check_samples(FaultRecord& found, const Readings& r, std::uint32_t output_ticks, std::int32_t most_reading) {
+  // largest reading of the current, which no block can raise. `output_ticks()`: as long as a sample of the output may
+  // take; zero where there is none. It is called only where a sample is late.
+  template <class OutputTicks>
+  void check_samples(FaultRecord& found, const Readings& r, std::int32_t most_reading, OutputTicks&& output_ticks) {
     const bool all_new = r.motor_samples != before_.motor_samples && r.output_samples != before_.output_samples &&
                          r.analog_samples != before_.analog_samples;
     if (!all_new || waits_) [[unlikely]]
-      count_stale(found, r, output_ticks);
+      count_stale(found, r, output_ticks());
     before_.motor_samples = r.motor_samples;
     before_.output_samples = r.output_samples;
     before_.analog_samples = r.analog_samples;

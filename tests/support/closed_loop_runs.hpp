@@ -2,18 +2,15 @@
 // twin for.
 #pragma once
 
-#include <atomic>
 #include <cmath>
-#include <exception>
-#include <mutex>
 #include <random>
 #include <string>
-#include <thread>
 #include <vector>
 
 #include "hil/scenario/scenario_file.hpp"
 #include "host/closed_loop/prediction.hpp"
 #include "host/deployment/pack.hpp"
+#include "tests/support/on_all_cores.hpp"
 #include "tests/support/twin_data.hpp"
 
 namespace flexspline::testing {
@@ -72,31 +69,6 @@ inline board::ScenarioResult run_loop(const LoopRun& run) {
   plan.compensation = run.compensation;
   plan.seed = run.seed;
   return board::run_scenario(plan);
-}
-
-// Calls act(0) to act(count - 1) on all cores. Throws what one of them threw first; the others are not begun then.
-template <class Act>
-void on_all_cores(std::size_t count, Act act) {
-  std::atomic<std::size_t> next{0};
-  std::exception_ptr failure;
-  std::mutex guard;
-  const auto work = [&] {
-    for (std::size_t i = next++; i < count; i = next++) {
-      try {
-        act(i);
-      } catch (...) {
-        const std::lock_guard lock(guard);
-        if (!failure) failure = std::current_exception();
-        next = count;
-      }
-    }
-  };
-  {
-    std::vector<std::jthread> others;
-    for (unsigned t = 1; t < std::thread::hardware_concurrency(); ++t) others.emplace_back(work);
-    work();
-  }
-  if (failure) std::rethrow_exception(failure);
 }
 
 inline closed_loop::Runner loop_runner() {

@@ -190,8 +190,8 @@ inline std::string limits_that_do_not_act(const Block& block, const control::Dri
   return silent;
 }
 
-// An armed drive with readings drawn from all that a sensor can say.
-inline void arm_with_random_readings(const Block& block, const control::DriveSetup<double>& s,
+// An armed drive with readings drawn from all that a sensor can say. False where it could not be armed.
+inline bool arm_with_random_readings(const Block& block, const control::DriveSetup<double>& s,
                                      std::mt19937_64& random) {
   Readout r(block, s);
   const Mode modes[] = {Mode::current, Mode::velocity, Mode::position};
@@ -199,7 +199,7 @@ inline void arm_with_random_readings(const Block& block, const control::DriveSet
   command.velocity = N::value(1.0);
   command.position = {static_cast<std::int64_t>(random()) >> 2};
   command.current = N::value(-1.0);
-  r.arm(command);
+  const bool armed = r.arm(command);
   for (int k = 0; k < 50; ++k) {
     r.turn(std::uniform_real_distribution<double>(-400.0, 400.0)(random));
     r.current(0.0);
@@ -207,6 +207,7 @@ inline void arm_with_random_readings(const Block& block, const control::DriveSet
     r.readings().temperature = static_cast<std::int16_t>(random());
     r.tick();
   }
+  return armed;
 }
 
 }  // namespace flexspline::tests
