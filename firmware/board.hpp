@@ -2,6 +2,7 @@
 // board of the desktop run the same sources, and no call is virtual.
 #pragma once
 
+#include <array>
 #include <concepts>
 #include <cstdint>
 
@@ -80,6 +81,18 @@ template <Board B>
 constexpr control::Hardware hardware_of(const B& board) {
   if constexpr (requires { board.hardware(); }) {
     return board.hardware();
+  } else {
+    return {};
+  }
+}
+
+// Random numbers of the hardware, for background work. A board that has no source of them has no such function, and
+// they are zeros: then challenges never repeat, but somebody may know the next one.
+using RandomWords = std::array<std::uint32_t, 4>;
+template <Board B>
+RandomWords random_words_of(B& board) {
+  if constexpr (requires { board.random_words(); }) {
+    return board.random_words();
   } else {
     return {};
   }

@@ -2,7 +2,8 @@
 // it. Every link, USB or serial, hands over whole messages and fetches whole messages.
 //
 // The rights of a host are checked here and in Application: parameters and excitation change only while the drive is
-// not armed; commands go through the application's mailbox, which arms from `idle` alone.
+// not armed; what writes is refused while a pairing key locks the parameters; commands go through the application's
+// mailbox, which arms from `idle` alone.
 #pragma once
 
 #include <array>
@@ -16,6 +17,8 @@
 #include "firmware/application.hpp"
 #include "firmware/excitation_intake.hpp"
 #include "firmware/map_messages.hpp"
+#include "firmware/pairing_messages.hpp"
+#include "firmware/parameter_lock.hpp"
 #include "firmware/telemetry_messages.hpp"
 #include "shared/protocol/payloads.hpp"
 #include "shared/storage/parameter_store.hpp"
@@ -70,14 +73,16 @@ static_assert(protocol::kMostChannels == TelemetrySetup::kMost);
 static_assert(static_cast<int>(protocol::Code::worn) - static_cast<int>(protocol::Code::too_long) + 1 ==
               static_cast<int>(storage::StoreError::worn));
 
-template <class Application, class Store, BlockUser Blocks>
+template <class Application, class Store, BlockUser Blocks, class Lock = NoLock>
 class Service {
  public:
-  Service(Application& application, Store& store, Blocks& blocks, std::uint32_t tick_hz, const DriveInfo& info)
-      : application_(application), store_(store), blocks_(blocks), tick_hz_(tick_hz), info_(info) {}
+  Service(Application& application, Store& store, Blocks& blocks, std::uint32_t tick_hz, const DriveInfo& info,
+          Lock& lock)
+      : application_(application), store_(store), blocks_(blocks), lock_(lock), tick_hz_(tick_hz), info_(info) {}
 
   // Before the first tick: applies the newest valid block of the store.
   void start() {
+    lock_.start({info_.board, info_.serial});
     store_.boot(validator());
     if (!store_.active().empty()) blocks_.adopt(store_.active());
   }
@@ -86,6 +91,7 @@ class Service {
   void disconnected() {
     agreed_ = false;
     has_answer_ = false;
+    lock_.close();
     frames_.restart();
     application_.telemetry().configure({});
   }
@@ -103,7 +109,11 @@ class Service {
       return true;
     }
     request_ = protocol::answer_to(m, protocol::Code::done);
-    serve(m);
+    if (lock_.admits(m, application_.snapshot().tick)) {
+      serve(m);
+    } else {
+      finish(protocol::Code::locked);
+    }
     return true;
   }
   // The next message to send, if there is one: answers before telemetry.
@@ -117,6 +127,7 @@ class Service {
   }
   // Call repeatedly, after Application::background().
   void background() {
+    lock_.watch(application_.snapshot().tick);
     if (has_answer_) return;  // to a request that was refused meanwhile: it is sent first
     if (waits_for_ == Wait::room) {
       if (application_.submit(command_)) waits_for_ = Wait::command;
@@ -214,6 +225,13 @@ class Service {
         return map_bins(m);
       case Kind::map_command:
         return map_command(m);
+      case Kind::pairing:
+      case Kind::pairing_challenge:
+      case Kind::pairing_part:
+      case Kind::pairing_answer:
+      case Kind::pairing_remove:
+      case Kind::pairing_lock:
+        return finish(PairingMessages::serve(application_, lock_, m, request_));
       default:
         return finish(Code::unknown_request);
     }
@@ -223,12 +241,14 @@ class Service {
     protocol::Hello hello;
     const Code code = protocol::take_front(m.content(), hello);
     agreed_ = code == Code::done && hello.major == protocol::kMajor;
+    lock_.close();  // a host begins with this request
     if (code != Code::done) return finish(code);
     protocol::Identity id;
     id.firmware = info_.firmware;
     id.board = info_.board;
     id.serial = info_.serial;
     id.firmware_key = info_.key;
+    id.pairing = lock_.state();
     id.tick_hz = tick_hz_;
     id.block_bytes = Store::kCapacity;
     for (const std::uint8_t byte : kEffects.bits)
@@ -407,6 +427,7 @@ class Service {
   Application& application_;
   Store& store_;
   Blocks& blocks_;
+  Lock& lock_;
   std::uint32_t tick_hz_;
   DriveInfo info_;
   protocol::Message answer_{};

@@ -43,6 +43,7 @@ struct Description {
   static constexpr std::uint32_t kBaud = 115'200;
   static constexpr bool kHasUsb = false;
   static constexpr std::uint32_t kParameterSector = 5;  // and the one after it, 128 KB each
+  static constexpr std::uint32_t kPairingSector = 7;
 };
 
 }  // namespace flexspline::nucleo_f446re

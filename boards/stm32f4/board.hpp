@@ -1,6 +1,6 @@
 // The board type for the application's template (firmware/board.hpp), made from the description of a board. A
-// description has: kClock, kPins, kAnalog, kHardware, kParameterSector, kMotorReversed, kOutputReversed, kName, and
-// types MotorEncoder, OutputEncoder, Amplifier, Serial and Usb (NoUsb where there is none).
+// description has: kClock, kPins, kAnalog, kHardware, kParameterSector, kPairingSector, kMotorReversed,
+// kOutputReversed, kName, and types MotorEncoder, OutputEncoder, Amplifier, Serial and Usb (NoUsb where there is none).
 #pragma once
 
 #include <cstdint>
@@ -97,6 +97,13 @@ class DriveBoard {
 
   void feed_watchdog() { watchdog_.feed(enabled_); }
   firmware::ResetCause reset_cause() const { return cause_; }
+  static firmware::RandomWords random_words() {
+    if constexpr (requires { typename Description::Random; }) {
+      return Description::Random::take();
+    } else {
+      return {};
+    }
+  }
   // The flash memory stops the processor: the ticks after that begin late, which is not counted as an overrun. The
   // service writes only while the amplifier is off.
   void flash_works() { late_ticks_ = 2; }

@@ -12,6 +12,7 @@
 #include "boards/stm32f4/usb_link.hpp"
 #include "firmware/application.hpp"
 #include "firmware/drive.hpp"
+#include "firmware/parameter_lock.hpp"
 #include "firmware/serial_link.hpp"
 #include "firmware/service.hpp"
 #include "firmware/update_watch.hpp"
@@ -31,7 +32,10 @@ class Drive {
   using Flash = ParameterFlash<Board, Description::kParameterSector>;
   using Store = storage::ParameterStore<Flash>;
   using Blocks = firmware::ApplicationBlocks<Application, Board::kTickHz>;
-  using Service = firmware::Service<Application, Store, Blocks>;
+  using KeyFlash = PairingFlash<Board, Description::kPairingSector>;
+  using Pairing = storage::PairingMemory<KeyFlash>;
+  using Lock = firmware::ParameterLock<Pairing, Board>;
+  using Service = firmware::Service<Application, Store, Blocks, Lock>;
   using Serial = typename Description::Serial;
   using UsbReports = flexspline::usb::Hid<8, 4>;
   using UsbDevice = usb::Device<usb::FlexsplineIdentity, OtgFs, UsbReports, usb::DfuRuntime>;
@@ -48,10 +52,18 @@ class Drive {
     static Flash flash(board_);
     static Store store(flash);
     static Blocks blocks(application_);
+    static KeyFlash key_flash(board_);
+    static Pairing pairing(key_flash);
+    static Lock lock(pairing, board_);
     static Service service(application_, store, blocks, Board::kTickHz,
                            firmware::DriveInfo::of({0, 1}, Description::kName, {serial, 12},
-                                                   Description::kHasUsb ? kFirmwareKey : protocol::FirmwareKey::none));
+                                                   Description::kHasUsb ? kFirmwareKey : protocol::FirmwareKey::none),
+                           lock);
     service.start();
+#ifdef FLEXSPLINE_FORGET_PAIRING
+    // For a drive whose key is lost: an image that ends the pairing, which its boot loader takes where it is signed.
+    if (pairing.is_paired()) static_cast<void>(pairing.remove());
+#endif
     line_.start(Description::kClock.core_hz / 4, Description::kBaud);
     using SerialLink = firmware::SerialLink<Service, Serial>;
     static SerialLink serial_link(service, line_);
@@ -95,7 +107,9 @@ class Drive {
   }
 
  private:
-  static void wait_for_interrupt() { asm volatile("wfi"); }
+  static void wait_for_interrupt() {
+    asm volatile("wfi");
+  }
   [[noreturn]] static void stay_off() {
     for (;;) wait_for_interrupt();
   }

@@ -106,6 +106,25 @@ class ParameterFlash {
   Flash<Busy> flash_;
 };
 
+// The sector of the pairing key (shared/storage/pairing_memory.hpp), the start of one of the memory's: never erased.
+template <class Busy, std::uint32_t sector>
+class PairingFlash {
+ public:
+  static constexpr std::size_t kSectorBytes = 0x4000;
+
+  explicit constexpr PairingFlash(Busy& busy) : flash_(busy) {}
+  static bool erase(std::size_t) { return false; }
+  bool program(std::size_t, std::size_t word, std::uint32_t value) {
+    return flash_.program(sector_address(sector) + 4 * static_cast<std::uint32_t>(word), value);
+  }
+  std::span<const std::uint8_t> bytes(std::size_t) const {
+    return {reinterpret_cast<const std::uint8_t*>(static_cast<std::uintptr_t>(sector_address(sector))), kSectorBytes};
+  }
+
+ private:
+  Flash<Busy> flash_;
+};
+
 // Three sectors of one size for images (shared/boot/slots.hpp), each at the start of a sector of the memory, which may
 // be longer: the application, the download and the previous application. Then one for the security counter.
 template <class Busy, std::size_t size, std::uint32_t application, std::uint32_t download, std::uint32_t old,

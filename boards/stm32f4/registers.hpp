@@ -18,7 +18,7 @@ inline constexpr std::uint32_t kTim1 = 0x40010000, kTim2 = 0x40000000, kTim3 = 0
                                kTim5 = 0x40000C00, kIwdg = 0x40003000, kUsart2 = 0x40004400, kUsart3 = 0x40004800,
                                kI2c1 = 0x40005400, kSpi1 = 0x40013000, kPower = 0x40007000, kDac = 0x40007400,
                                kAdc1 = 0x40012000, kAdcCommon = 0x40012300, kGpioA = 0x40020000, kGpioBytes = 0x400,
-                               kRcc = 0x40023800, kFlash = 0x40023C00, kOtgFs = 0x50000000;
+                               kRcc = 0x40023800, kFlash = 0x40023C00, kOtgFs = 0x50000000, kRng = 0x50060800;
 
 // The chip's unique number of 96 bits (RM0090, 39.1).
 inline constexpr std::uint32_t kUniqueId = 0x1FFF7A10;
@@ -56,6 +56,8 @@ constexpr ClockGate gate_of(std::uint32_t peripheral) {
       return {0x44, 1U << 8};
     case kOtgFs:
       return {0x34, 1U << 7};
+    case kRng:
+      return {0x34, 1U << 6};
     default:  // ports A to H
       return {0x30, 1U << ((peripheral - kGpioA) / kGpioBytes)};
   }

@@ -7,6 +7,7 @@
 
 #include "boards/stm32f4/board.hpp"
 #include "boards/stm32f4/i2c_encoder.hpp"
+#include "boards/stm32f4/random.hpp"
 #include "boards/stm32f4/spi_encoder.hpp"
 
 namespace flexspline::stm32f405 {
@@ -123,6 +124,8 @@ struct Description {
   static constexpr std::uint32_t kBaud = 115'200;
   static constexpr bool kHasUsb = true;
   static constexpr std::uint32_t kParameterSector = 1;  // and the one after it
+  static constexpr std::uint32_t kPairingSector = 4;
+  using Random = stm32f4::RandomNumbers;
   static constexpr std::uint32_t kApplicationSector = 5;
   // Application, download and previous application, 96 KB each, and the security counter (application.ld).
   template <class Busy>

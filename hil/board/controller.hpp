@@ -66,7 +66,20 @@ class SoftwareBoard {
   bool overrun = false;
   bool amplifier_tripped() const { return tripped; }
 
+  /// The same in each run: the generator of Steele, Lea and Flood (SplitMix64), from `random` on.
+  firmware::RandomWords random_words() {
+    firmware::RandomWords words{};
+    for (std::uint32_t& word : words) {
+      std::uint64_t x = random += 0x9E3779B97F4A7C15;
+      x = (x ^ (x >> 30)) * 0xBF58476D1CE4E5B9;
+      x = (x ^ (x >> 27)) * 0x94D049BB133111EB;
+      word = static_cast<std::uint32_t>(x ^ (x >> 31));
+    }
+    return words;
+  }
+
   bool tripped = false;
+  std::uint64_t random = 0;
   std::uint32_t ticks_since_fed = 0;
   firmware::ResetCause cause = firmware::ResetCause::power;
 };

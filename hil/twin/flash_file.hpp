@@ -44,6 +44,13 @@ class FlashFile : public FlashMemory {
   explicit FlashFile(const std::filesystem::path& file = {}) : FlashMemory(kSectorBytes, storage::kSectors, file) {}
 };
 
+/// The sector of its pairing key.
+class PairingFile : public FlashMemory {
+ public:
+  static constexpr std::size_t kSectorBytes = 16'384;
+  explicit PairingFile(const std::filesystem::path& file = {}) : FlashMemory(kSectorBytes, 1, file) {}
+};
+
 /// Its firmware images, and the security counter, without which older twins had images that were not signed.
 class ImageFlash : public FlashMemory {
  public:

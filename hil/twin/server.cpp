@@ -83,10 +83,12 @@ class Server {
   explicit Server(const TwinOptions& options)
       : options_(options),
         flash_(options.flash_file),
+        pairing_(options.flash_file.empty() ? "" : options.flash_file + ".pairing"),
         setup_(setup_of(options)),
         line_(line_of(options)),
         link_fault_(options.cable_file) {
     setup_.flash = &flash_;
+    setup_.pairing = &pairing_;
     usb_ = dynamic_cast<UsbLine*>(line_.get());
     if (usb_ != nullptr)
       machine_ =
@@ -208,6 +210,7 @@ class Server {
 
   TwinOptions options_;
   FlashFile flash_;
+  PairingFile pairing_;
   TwinSetup setup_;
   std::unique_ptr<TwinDrive> drive_;
   std::unique_ptr<HostLine> line_;

@@ -17,6 +17,10 @@ std::array<std::uint8_t, Size> text_in(const std::string& text) {
   return bytes;
 }
 
+std::filesystem::path pairing_file_of(std::filesystem::path flash_file) {
+  return flash_file.empty() ? flash_file : flash_file += ".pairing";
+}
+
 // A locked output is at its zero.
 double start_turns_of(const TwinSetup& setup) {
   if (setup.locked) return 0.0;
@@ -36,7 +40,11 @@ TwinDrive::TwinDrive(const TwinSetup& setup)
             .start_turns = start_turns_of(setup),
             .encoders = setup.encoders}),
       own_flash_(setup.flash == nullptr ? std::make_unique<FlashFile>(setup.flash_file) : nullptr),
-      store_(setup.flash == nullptr ? *own_flash_ : *setup.flash) {
+      store_(setup.flash == nullptr ? *own_flash_ : *setup.flash),
+      own_pairing_(setup.pairing == nullptr ? std::make_unique<PairingFile>(pairing_file_of(setup.flash_file))
+                                            : nullptr),
+      pairing_(setup.pairing == nullptr ? *own_pairing_ : *setup.pairing) {
+  board_.random = setup.seed;
   board_.hardware_stated = board::hardware_of(setup.drive, setup.encoders);
   application_.begin(board_);
   const auto validate = [this](std::span<const std::uint8_t> block) { return blocks_.validate(block); };
@@ -50,7 +58,7 @@ TwinDrive::TwinDrive(const TwinSetup& setup)
   }
   const auto info = firmware::DriveInfo::of({setup_.version.major, setup_.version.minor}, kBoardName, setup_.serial,
                                             protocol::FirmwareKey::development);
-  service_ = std::make_unique<Service>(application_, store_, blocks_, board::SoftwareBoard::kTickHz, info);
+  service_ = std::make_unique<Service>(application_, store_, blocks_, board::SoftwareBoard::kTickHz, info, lock_);
   service_->start();
   application_.background();
 }

@@ -25,6 +25,7 @@ struct TwinSetup {
   std::optional<double> start_turns{};
   control::SensorKind encoders = control::SensorKind::absolute;
   FlashFile* flash = nullptr;  ///< memory that outlives the drive, instead of the file
+  PairingFile* pairing = nullptr;
   boot::Version version = kFactoryVersion;
 };
 
@@ -37,7 +38,9 @@ using TwinBlocks = firmware::ApplicationBlocks<TwinApplication, board::SoftwareB
 class TwinDrive {
  public:
   using Store = storage::ParameterStore<FlashFile>;
-  using Service = firmware::Service<TwinApplication, Store, TwinBlocks>;
+  using Pairing = storage::PairingMemory<PairingFile>;
+  using Lock = firmware::ParameterLock<Pairing, board::SoftwareBoard>;
+  using Service = firmware::Service<TwinApplication, Store, TwinBlocks, Lock>;
 
   explicit TwinDrive(const TwinSetup& setup);
 
@@ -49,6 +52,7 @@ class TwinDrive {
   Service& service() { return *service_; }
   const firmware::Status& status() const { return application_.status(); }
   const Store& store() const { return store_; }
+  const Lock& lock() const { return lock_; }
   board::PlantRig& rig() { return rig_; }
 
  private:
@@ -59,6 +63,9 @@ class TwinDrive {
   std::unique_ptr<FlashFile> own_flash_;
   Store store_;
   TwinBlocks blocks_{application_};
+  std::unique_ptr<PairingFile> own_pairing_;
+  Pairing pairing_;
+  Lock lock_{pairing_, board_};
   std::unique_ptr<Service> service_;
 };
 

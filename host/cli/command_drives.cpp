@@ -44,12 +44,17 @@ FoundDrive queried(transport::Found found) {
     drive::Session session = open_drive(seen.found.drive);
     const protocol::Identity& id = session.identity();
     const protocol::Status status = session.status();
+    const protocol::Pairing pairing = drive::pairing_of(session);
+    const bool is_paired =
+        pairing.state == protocol::PairingState::locked || pairing.state == protocol::PairingState::open;
     seen.answer = {{"serial", session.serial()},
                    {"board", session.board()},
                    {"firmware", fmt::format("{}.{}", id.firmware[0], id.firmware[1])},
                    {"protocol", fmt::format("{}.{}", id.major, id.minor)},
                    {"tick_hz", id.tick_hz},
                    {"firmware_key", key_text(id.firmware_key)},
+                   {"pairing", protocol::name_of(pairing.state)},
+                   {"pairing_key", is_paired ? json(drive::fingerprint(pairing.key)) : json()},
                    {"effects", id.effects},
                    {"block_bytes", id.block_bytes},
                    {"mode", protocol::name_of(status.mode)},
@@ -75,12 +80,16 @@ int run(const DrivesOptions& options, Console& console) {
     if (one.answer.is_null()) {
       console.line(fmt::format("{:<28} {}", one.found.drive, console.bad(one.found.problem)));
     } else {
-      console.line(fmt::format(
-          "{:<28} {} (board {}, firmware {}), {} effects, {}{}{}", one.found.drive,
-          one.answer["serial"].get<std::string>(), one.answer["board"].get<std::string>(),
-          one.answer["firmware"].get<std::string>(), one.answer["effects"].get<int>(),
-          one.answer["mode"].get<std::string>(), one.answer["has_parameters"].get<bool>() ? "" : ", without parameters",
-          one.answer["firmware_key"] == "development" ? ", takes the public development key" : ""));
+      console.line(fmt::format("{:<28} {} (board {}, firmware {}), {} effects, {}{}{}{}", one.found.drive,
+                               one.answer["serial"].get<std::string>(), one.answer["board"].get<std::string>(),
+                               one.answer["firmware"].get<std::string>(), one.answer["effects"].get<int>(),
+                               one.answer["mode"].get<std::string>(),
+                               one.answer["has_parameters"].get<bool>() ? "" : ", without parameters",
+                               one.answer["firmware_key"] == "development" ? ", takes the public development key" : "",
+                               one.answer["pairing_key"].is_null()
+                                   ? ""
+                                   : fmt::format(", {} by the pairing key {}", one.answer["pairing"].get<std::string>(),
+                                                 one.answer["pairing_key"].get<std::string>())));
     }
     list.push_back(std::move(entry));
   }

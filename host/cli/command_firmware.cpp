@@ -158,6 +158,8 @@ void declare(Parser& parser, KeyOptions& options) {
 int flash_firmware(const FlashOptions& options, Console& console) {
   if (!options.model.empty() || !options.block.empty() || !options.settings.empty())
     throw UsageError("--firmware goes alone; flash the model or block with a second command");
+  if (!options.pairing_key.empty())
+    throw UsageError("--pairing-key is for parameters; firmware is signed with the key of the boot loader");
   const files::Image image = files::load_image(options.firmware);
   const files::Target target = files::find_target(options.drive);
   const std::string before = target.version ? files::text_of(*target.version) : "unknown";
@@ -219,7 +221,7 @@ Command sign_command() {
 Command key_command() {
   return command<KeyOptions>(
       {"key",
-       "makes and shows keys that firmware is signed with",
+       "makes and shows keys that firmware is signed with, or drives are paired with",
        "--new makes a pair of Ed25519 keys and writes both into a file that its owner alone may read (mode 0600); "
        "an existing file is never overwritten. Keep a copy: a drive whose boot loader has this public key takes "
        "images signed by it and no others. --show prints the public key of a file, for the build of the boot "

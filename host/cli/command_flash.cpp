@@ -36,6 +36,7 @@ struct BackupOptions {
 struct RestoreOptions {
   std::string drive;
   bool factory_reset = false;
+  std::filesystem::path pairing_key;  // empty: none
   bool yes = false;
   std::string json;
 };
@@ -113,12 +114,16 @@ int run(const BackupOptions& options, Console& console) {
   return kDone;
 }
 
-int factory_reset(const RestoreOptions& options, drive::Session& session, Console& console) {
+int factory_reset(const RestoreOptions& options, drive::Session& session,
+                  const std::optional<drive::PairingSigner>& signer, Console& console) {
   const BlockView before = drive::view_of(session.read_block(protocol::Which::active));
   console.line(named(session));
   console.line(fmt::format("  active    {}", described(before)));
   const bool erases = confirmed("Erase it and the one before? A backup is all that is left then.", options.yes);
-  if (erases) session.erase_all_blocks();
+  if (erases) {
+    const drive::Unlocked unlocked(session, signer);
+    session.erase_all_blocks();
+  }
   console.line(erases ? "Both blocks are erased; the block in use stays active until the drive restarts."
                       : "Nothing was changed.");
   output::save_json(options.json, {{"format", "flexspline-restore/1"},
@@ -132,8 +137,10 @@ int factory_reset(const RestoreOptions& options, drive::Session& session, Consol
 }
 
 int run(const RestoreOptions& options, Console& console) {
+  const auto signer = pairing_signer(options.pairing_key);
   drive::Session session = open_drive(options.drive);
-  if (options.factory_reset) return factory_reset(options, session, console);
+  drive::require_access(session, signer);
+  if (options.factory_reset) return factory_reset(options, session, signer, console);
   const Bytes active = session.read_block(protocol::Which::active);
   const Bytes previous = session.read_block(protocol::Which::previous);
   if (previous.empty()) session.fail(std::string(protocol::text_of(protocol::Code::no_previous)));
@@ -144,7 +151,10 @@ int run(const RestoreOptions& options, Console& console) {
   console.line(fmt::format("  before it {}", described(after)));
   print(changes, console);
   const bool restores = confirmed("Restore it?", options.yes);
-  if (restores) session.restore();
+  if (restores) {
+    const drive::Unlocked unlocked(session, signer);
+    session.restore();
+  }
   console.line(restores ? "Restored and in use; another restore goes forth again." : "Nothing was changed.");
   output::save_json(options.json, {{"format", "flexspline-restore/1"},
                                    {"drive", json_of(session)},
@@ -169,6 +179,7 @@ void declare(Parser& parser, FlashOptions& options) {
       .one_of_numbers({0, 3, 4, 5, 6, 8, 12, 20})
       .shows_default();
   parser.flag("--measured", options.measured, "as in pack --measured");
+  take_pairing_key(parser, options.pairing_key);
   take_yes(parser, options.yes);
 }
 
@@ -182,6 +193,7 @@ void declare(Parser& parser, RestoreOptions& options) {
   take_drive(parser, options.drive);
   parser.flag("--factory-reset", options.factory_reset,
               "erase both blocks permanently: after a restart the drive is as delivered by its manufacturer");
+  take_pairing_key(parser, options.pairing_key);
   take_yes(parser, options.yes);
 }
 
@@ -193,7 +205,9 @@ int flash(const FlashOptions& options, Console& console) {
   if (options.model.empty() == options.block.empty())
     throw UsageError(
         "choose what to flash: --model MODEL, --block BLOCK of flexspline pack or backup, or --firmware IMAGE");
+  const auto signer = pairing_signer(options.pairing_key);
   drive::Session session = open_drive(options.drive);
+  drive::require_access(session, signer);
   const Bytes active = session.read_block(protocol::Which::active);
   const Bytes block = drive::keeping_stored_zero(block_of(options, session, active, console), active);
   const std::vector<BlockChange> changes = drive::changes(active, block);
@@ -210,6 +224,7 @@ int flash(const FlashOptions& options, Console& console) {
   const bool flashes = is_new && confirmed("Flash it?", options.yes);
   if (is_new && !flashes) console.line("Nothing was changed.");
   if (flashes) {
+    const drive::Unlocked unlocked(session, signer);
     session.write_block(block, [&](std::size_t sent) {
       console.progress(fmt::format("flashing: {} of {} bytes", sent, block.size()));
     });

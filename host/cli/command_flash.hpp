@@ -14,9 +14,10 @@ struct FlashOptions {
   std::filesystem::path block;
   std::filesystem::path settings;  // empty: those of the active block
   std::filesystem::path firmware;
-  bool older = false;     // firmware
-  int draws = 4;          // of the prediction; zero: none
-  bool measured = false;  // as pack --measured
+  std::filesystem::path pairing_key;  // empty: none
+  bool older = false;                 // firmware
+  int draws = 4;                      // of the prediction; zero: none
+  bool measured = false;              // as pack --measured
   bool yes = false;
   std::string json;
 };

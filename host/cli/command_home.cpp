@@ -18,8 +18,9 @@ using nlohmann::json;
 
 struct HomeOptions {
   std::string drive;
-  std::optional<double> position;  // of the motor; none: only queried
-  bool store = false;              // keep the zero in the drive's flash memory
+  std::optional<double> position;     // of the motor; none: only queried
+  std::filesystem::path pairing_key;  // empty: none
+  bool store = false;                 // keep the zero in the drive's flash memory
   std::string json;
 };
 
@@ -31,7 +32,11 @@ std::string described(const protocol::Reference& known) {
 }
 
 int run(const HomeOptions& options, Console& console) {
+  if (!options.pairing_key.empty() && !options.store)
+    throw UsageError("--pairing-key is for --store; the position itself is not locked");
+  const auto signer = pairing_signer(options.pairing_key);
   drive::Session session = open_drive(options.drive);
+  if (options.store) drive::require_access(session, signer);
   console.line(named(session));
   if (options.position) {
     const drive::Scales scales = drive::scales_of(session);
@@ -44,6 +49,7 @@ int run(const HomeOptions& options, Console& console) {
     const std::int64_t position = std::llround(std::ldexp(turns, 32));
     session.home(position);
     if (options.store) {
+      const drive::Unlocked unlocked(session, signer);
       drive::store_zero(session, position);
       console.line("  The zero is stored in the parameter block of the drive.");
     }
@@ -73,6 +79,7 @@ void declare(Parser& parser, HomeOptions& options) {
       .flag("--store", options.store,
             "keep it in the drive: with absolute encoders or an index pulse it holds after the next power-on")
       .needs(position);
+  take_pairing_key(parser, options.pairing_key);
 }
 
 }  // namespace

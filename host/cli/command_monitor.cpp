@@ -216,6 +216,8 @@ class Monitor {
 
 int run(const MonitorOptions& options, Console& console) {
   if (options.residual_map) return run_residual_map(options, console);
+  if (!options.pairing_key.empty())
+    throw UsageError("--pairing-key is for --residual-map, which the drive may have to start; signals are not locked");
   channels_of(options.channels);  // a wrong name is reported before a drive is opened
   drive::Session session = open_drive(options.drive);
   Monitor monitor(session, options, console);
@@ -237,6 +239,7 @@ void declare(Parser& parser, MonitorOptions& options) {
           .comma_separated()
           .value("NAME")
           .one_value_each_time();
+  take_pairing_key(parser, options.pairing_key);
   const Option map = parser
                          .flag("--residual-map", options.residual_map,
                                "where the model fails: the map of the drive over velocity and motor angle")

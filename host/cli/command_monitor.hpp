@@ -1,6 +1,7 @@
 // What monitor shows: live signals, or the residual map.
 #pragma once
 
+#include <filesystem>
 #include <optional>
 #include <string>
 #include <vector>
@@ -16,6 +17,7 @@ struct MonitorOptions {
   std::vector<std::string> channels;
   bool residual_map = false;  // that, and not the signals
   bool reset = false;
+  std::filesystem::path pairing_key;  // empty: none
   std::optional<double> limit_nm;
   std::string json;
 };

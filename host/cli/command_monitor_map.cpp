@@ -83,10 +83,11 @@ void print(const drive::MapTest& j, double limit_nm, Console& console) {
 }  // namespace
 
 int run_residual_map(const MonitorOptions& options, Console& console) {
+  const auto signer = pairing_signer(options.pairing_key);
   drive::Session session = open_drive(options.drive);
   const drive::Scales scales = drive::scales_of(session);
   console.line(named(session));
-  const bool started = drive::start_residual_map(session);
+  const bool started = drive::start_residual_map(session, signer);
   const Interruptible interruptible;
   const auto end = std::chrono::steady_clock::now() + std::chrono::duration<double>(options.seconds);
   while (std::chrono::steady_clock::now() < end && !Interruptible::interrupted())
@@ -99,7 +100,7 @@ int run_residual_map(const MonitorOptions& options, Console& console) {
   show(map, console);
   print(test, limit_nm, console);
   if (options.reset) {
-    drive::reset_residual_map(session);
+    drive::reset_residual_map(session, signer);
     console.line("The residual map is empty again.");
   }
   json answer = drive::map_json(map, test, limit_nm);

@@ -26,10 +26,11 @@ struct WorkbenchOptions {
   DataInputs data;
   PipelineInputs pipeline;
   std::filesystem::path model;
-  std::string drive;            // empty: none yet
-  std::filesystem::path plant;  // for closed loops; empty: the twin that recorded the data, or the model
-  int port = 0;                 // zero: any that is free
-  double seconds = 0.0;         // zero: until Ctrl-C
+  std::string drive;                  // empty: none yet
+  std::filesystem::path pairing_key;  // empty: none
+  std::filesystem::path plant;        // for closed loops; empty: the twin that recorded the data, or the model
+  int port = 0;                       // zero: any that is free
+  double seconds = 0.0;               // zero: until Ctrl-C
   bool no_open = false;
   std::string json;
 };
@@ -97,6 +98,7 @@ int run(const WorkbenchOptions& options, Console& console) {
   setup.pipeline = options.pipeline.options();
   setup.data_name = as_arguments(options.data.data);
   setup.drive = options.drive;
+  setup.signer = pairing_signer(options.pairing_key);
   setup.run = twin_runner();
   setup.folder =
       options.model.empty() ? std::filesystem::current_path() : std::filesystem::absolute(options.model).parent_path();
@@ -133,6 +135,7 @@ void declare(Parser& parser, WorkbenchOptions& options) {
       .value("MODEL");
   parser.option("--drive", options.drive, fmt::format("{} (default: choose on the page)", transport::kDriveHelp))
       .value("DRIVE");
+  take_pairing_key(parser, options.pairing_key);
   parser
       .option(
           "--plant", options.plant,

@@ -52,6 +52,10 @@ void take_drive(Parser& parser, std::string& drive) {
       .value("DRIVE");
 }
 
+void take_pairing_key(Parser& parser, std::filesystem::path& key) {
+  parser.option("--pairing-key", key, "file of the key that a drive is paired with (flexspline pair)").value("KEY");
+}
+
 void take_yes(Parser& parser, bool& yes) {
   parser.flag("--yes", yes, "do not ask for confirmation");
 }

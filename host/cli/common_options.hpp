@@ -20,6 +20,7 @@ void take_model(Parser& parser, std::filesystem::path& model);
 void take_pipeline(Parser& parser, PipelineInputs& pipeline);
 void take_report(Parser& parser, std::filesystem::path& report);
 void take_drive(Parser& parser, std::string& drive);
+void take_pairing_key(Parser& parser, std::filesystem::path& key);
 void take_yes(Parser& parser, bool& yes);
 
 }  // namespace flexspline::cli

@@ -9,6 +9,7 @@
 #include <iostream>
 
 #include "host/deployment/pack.hpp"
+#include "host/firmware/signing.hpp"
 #include "shared/model/block.hpp"
 
 namespace flexspline::cli {
@@ -23,6 +24,13 @@ void note_signal(int) {
 
 drive::Session open_drive(const std::string& drive) {
   return drive::Session(transport::open_link(drive));
+}
+
+std::optional<drive::PairingSigner> pairing_signer(const std::filesystem::path& file) {
+  if (file.empty()) return {};
+  const firmware_files::KeyPair key = firmware_files::load_key_pair(file);
+  return drive::PairingSigner{file.string(), key.public_key(),
+                              [key](std::span<const std::uint8_t> message) { return key.signature_of(message); }};
 }
 
 std::string named(const drive::Session& session) {

@@ -7,12 +7,15 @@
 #include <vector>
 
 #include "host/cli/inputs.hpp"
+#include "host/drive/pairing.hpp"
 #include "host/drive/session.hpp"
 
 namespace flexspline::cli {
 
 // Opens what --drive names and identifies it.
 drive::Session open_drive(const std::string& drive);
+// The key of --pairing-key; none for an empty path. Throws as firmware_files::load_key_pair does.
+std::optional<drive::PairingSigner> pairing_signer(const std::filesystem::path& file);
 // "drive SERIAL (BOARD) at NAME".
 std::string named(const drive::Session& session);
 // Asks on a terminal, unless `yes`; without a terminal there is no question and the result is true.

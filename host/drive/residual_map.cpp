@@ -154,15 +154,17 @@ ResidualMap read_residual_map(Session& session, const Scales& scales) {
   return map;
 }
 
-bool start_residual_map(Session& session) {
+bool start_residual_map(Session& session, const std::optional<PairingSigner>& signer) {
   if (info_of(session).counts) return false;
+  const Unlocked unlocked(session, signer);
   command(session, MapAction::reset);
   command(session, MapAction::start);
   return true;
 }
 
-void reset_residual_map(Session& session) {
+void reset_residual_map(Session& session, const std::optional<PairingSigner>& signer) {
   info_of(session);
+  const Unlocked unlocked(session, signer);
   command(session, MapAction::reset);
 }
 

@@ -5,6 +5,7 @@
 #include <string_view>
 #include <vector>
 
+#include "host/drive/pairing.hpp"
 #include "host/drive/scales.hpp"
 #include "host/drive/session.hpp"
 
@@ -37,10 +38,10 @@ struct ResidualMap {
 // Throws DriveError where the firmware is too old for it or there are no parameters.
 ResidualMap read_residual_map(Session& session, const Scales& scales);
 // Starts counting where it does not, from an empty map: what was counted before may be of another block. Returns
-// whether it had to.
-bool start_residual_map(Session& session);
+// whether it had to. `signer`: of a drive that is paired.
+bool start_residual_map(Session& session, const std::optional<PairingSigner>& signer = {});
 // Empties it; it counts on as before. The drive refuses that while it is armed.
-void reset_residual_map(Session& session);
+void reset_residual_map(Session& session, const std::optional<PairingSigner>& signer = {});
 
 // An error of the model that a map shows.
 struct MapFinding {

@@ -40,7 +40,9 @@ Session::Session(std::unique_ptr<transport::Link> link, Milliseconds answer) : l
   } catch (const DriveError&) {
     fail("nothing there answers as a drive does; is it a Flexspline drive, and does its firmware run?");
   }
-  if (m.length == protocol::kIdentityBytesBeforeKey) m.payload[m.length++] = 0;  // the key: not stated
+  // Of older firmware: not stated.
+  if (m.length >= protocol::kIdentityBytesBeforeKey)
+    for (; m.length < protocol::kIdentityBytes; ++m.length) m.payload[m.length] = 0;
   if (protocol::take_front(m.content(), identity_) != Code::done) fail("what answers there is not a drive");
   if (identity_.major != protocol::kMajor)
     fail(fmt::format("its firmware speaks version {} of the protocol, this tool version {}; bring {} up to date",

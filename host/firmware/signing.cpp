@@ -76,6 +76,16 @@ bool KeyPair::is_development_key() const {
   return public_key_ == boot::kDevelopmentKey;
 }
 
+ed25519::Signature KeyPair::signature_of(std::span<const std::uint8_t> message) const {
+  std::array<std::uint8_t, crypto_sign_SECRETKEYBYTES> both{};
+  ed25519::PublicKey same{};
+  ed25519::Signature signature{};
+  crypto_sign_seed_keypair(same.data(), both.data(), secret_.data());
+  crypto_sign_detached(signature.data(), nullptr, message.data(), message.size(), both.data());
+  sodium_memzero(both.data(), both.size());
+  return signature;
+}
+
 void KeyPair::sign(Bytes& image, std::uint16_t security_counter) const {
   boot::ImageHeader header;
   if (boot::read_image(image, header) != boot::ImageFinding::none || header.whole_bytes() != image.size())
@@ -88,11 +98,7 @@ void KeyPair::sign(Bytes& image, std::uint16_t security_counter) const {
   std::vector<std::uint8_t> message;
   boot::each_signed_part(
       image, [&](std::span<const std::uint8_t> part) { message.insert(message.end(), part.begin(), part.end()); });
-  std::array<std::uint8_t, crypto_sign_SECRETKEYBYTES> both{};
-  ed25519::PublicKey same{};
-  crypto_sign_seed_keypair(same.data(), both.data(), secret_.data());
-  crypto_sign_detached(header.signature.data(), nullptr, message.data(), message.size(), both.data());
-  sodium_memzero(both.data(), both.size());
+  header.signature = signature_of(message);
   boot::write_header(room, header);
 }
 
@@ -143,7 +149,7 @@ KeyPair load_key_pair(const std::filesystem::path& path) {
                                                                              : std::string();
   };
   if (text_at("format") != kKeyFormat)
-    throw ImageError(fmt::format("{} is not a key for firmware; flexspline key --new makes one", path.string()));
+    throw ImageError(fmt::format("{} is not a file of keys; flexspline key --new makes one", path.string()));
   const auto secret = bytes_of_hex(text_at("secret"));
   if (!secret) throw ImageError(fmt::format("{}: its secret key is not 64 hexadecimal digits", path.string()));
   const KeyPair pair(*secret);

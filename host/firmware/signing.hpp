@@ -1,10 +1,11 @@
-// Signatures of firmware images: pairs of keys as files, and images signed by them (Ed25519 of libsodium). The drive's
-// half is shared/boot/signature.
+// Pairs of keys as files, and what they sign (Ed25519 of libsodium): firmware images, and the challenges of a drive
+// that is paired. The drive's half is shared/boot/signature.
 #pragma once
 
 #include <array>
 #include <cstdint>
 #include <filesystem>
+#include <span>
 #include <string>
 
 #include "host/firmware/image_file.hpp"
@@ -24,6 +25,7 @@ class KeyPair {
   const ed25519::PublicKey& public_key() const { return public_key_; }
   bool is_development_key() const;
 
+  ed25519::Signature signature_of(std::span<const std::uint8_t> message) const;
   // Signs an image that is whole: writes signature, counter and checksum into its header.
   void sign(Bytes& image, std::uint16_t security_counter) const;
   void save(const std::filesystem::path& path) const;

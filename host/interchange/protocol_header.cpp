@@ -207,6 +207,9 @@ void write_numbers(Writer& w) {
   w.title("What a drive found of its stored blocks when it started");
   w.numbers<StoreState>("STORE", kNoComment);
   w.numbers<Which>("BLOCK", kNoComment);
+  w.title("The lock of the parameters, and what a signature is for");
+  w.numbers<PairingState>("PAIRING", kNoComment);
+  w.numbers<PairingAction>("PAIRING_ACTION", kNoComment);
   w.title("Channels of telemetry: 32-bit words, shares of a base (2^-27) where a unit is given");
   w.numbers<Channel>("CHANNEL", [](Channel channel) { return text_of(channel).unit; });
   w.title("Faults");
@@ -224,7 +227,7 @@ void write_payloads(Writer& w) {
   w.payload<Hello>("hello", "identify, to the drive", {"major", "minor"});
   w.payload<Identity>("identity", "identify, from the drive",
                       {"major", "minor", "firmware", "board", "serial", "tick_hz", "block_bytes", "effects", "channels",
-                       "most_channels", "most_lines", "has_output_encoder", "firmware_key"});
+                       "most_channels", "most_lines", "has_output_encoder", "firmware_key", "pairing"});
   w.payload<Effects>("effects", "effects, from the drive: bit n % 8 of byte n / 8", {"bits"});
   w.payload<Hardware>(
       "hardware", "hardware, from the drive: what its board states; zero where it does not",
@@ -256,6 +259,11 @@ void write_payloads(Writer& w) {
   w.payload<ExcitationLines>("excitation_lines", "excitation_lines, to the drive", {"first", "count", "lines"});
   w.payload<Subscription>("subscription", "telemetry, to the drive; without channels it ends",
                           {"every", "count", "channels"});
+  w.payload<Pairing>("pairing", "pairing, from the drive", {"state", "wait_ms", "key"});
+  w.payload<PairingChallenge>("pairing_challenge", "pairing_challenge, from the drive", {"nonce"});
+  w.payload<PairingPart>("pairing_part", "pairing_part, to the drive: 0 the key, 1 and 2 the signature's halves",
+                         {"part", "bytes"});
+  w.payload<PairingAnswer>("pairing_answer", "pairing_answer, to the drive", {"action"});
   w.payload<FrameHead>("frame_head", "telemetry_frames, from the drive; words of the frames follow",
                        {"sequence", "tick"});
 }

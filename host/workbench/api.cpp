@@ -89,7 +89,7 @@ Api::Api(Setup setup)
     : setup_(std::move(setup)),
       own_folder_(setup_.scratch.empty() ? std::make_unique<const system::TemporaryFolder>() : nullptr),
       dropped_(own_folder_ ? own_folder_->path() : setup_.scratch),
-      drive_(setup_.drive) {
+      drive_(setup_.drive, {.signer = setup_.signer}) {
   restore_tabs();
 }
 

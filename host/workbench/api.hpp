@@ -49,9 +49,10 @@ struct Setup {
   std::string model_name;                   // likewise
   std::filesystem::path folder;             // where models, reports and blocks are saved
   estimation::PipelineOptions pipeline;
-  std::string drive;           // --drive; empty: none
-  SimulatedPlant plant_setup;  // for closed loops; none known: the present model
-  closed_loop::Runner run;     // of closed loops; empty: there are none
+  std::string drive;                             // --drive; empty: none
+  std::optional<drive::PairingSigner> signer{};  // --pairing-key
+  SimulatedPlant plant_setup;                    // for closed loops; none known: the present model
+  closed_loop::Runner run;                       // of closed loops; empty: there are none
   // Data that outlive a worker process: its jobs, a folder for dropped files and tabs, the failures of earlier workers.
   // Without these all of it ends with the Api.
   JobTable* jobs = nullptr;

@@ -290,10 +290,12 @@ json LiveDrive::flash(const model::Model& model, const std::function<void(std::s
     require_shown(shown, active_, made.bytes);
     json answer = comparison_json(active_, made.bytes);
     const bool is_new = made.bytes != active_;
-    if (is_new)
+    if (is_new) {
+      const drive::Unlocked unlocked(*session_, connection_.signer);
       session_->write_block(made.bytes, [&](std::size_t sent) {
         progress(fmt::format("flashing: {} of {} bytes", sent, made.bytes.size()));
       });
+    }
     read_block();
     subscribed_ = came_back_ = false;
     answer.update({{"warnings", made.warnings}, {"flashed", is_new}, {"drive", session_->serial()}});
@@ -310,7 +312,10 @@ json LiveDrive::restore(const std::optional<PreviewedBlocks>& shown) {
       read_block();
       require_shown(shown, active_, session_->read_block(protocol::Which::previous));
     }
-    session_->restore();
+    {
+      const drive::Unlocked unlocked(*session_, connection_.signer);
+      session_->restore();
+    }
     read_block();
     subscribed_ = came_back_ = false;
     return {{"before", view_json(before)}, {"after", view_json(drive::view_of(active_))}};
@@ -323,7 +328,7 @@ json LiveDrive::residual_map() {
     require();
     if (!scales_) throw drive::DriveError("the drive has no block, so nothing to compare its torque with; flash one");
     return noticing_losses([&]() -> json {
-      const bool started = drive::start_residual_map(*session_);
+      const bool started = drive::start_residual_map(*session_, connection_.signer);
       const drive::ResidualMap map = drive::read_residual_map(*session_, *scales_);
       const double limit_nm = drive::usual_map_limit_nm(*scales_);
       json answer = drive::map_json(map, drive::test_map(map, limit_nm), limit_nm);
@@ -339,7 +344,7 @@ json LiveDrive::residual_map() {
 void LiveDrive::reset_residual_map() {
   const PriorityLock turn(mutex_, waiting_);
   require();
-  noticing_losses([&] { drive::reset_residual_map(*session_); });
+  noticing_losses([&] { drive::reset_residual_map(*session_, connection_.signer); });
 }
 
 // A recording has fewer signals than the page shows; the others stay empty while it moves.
@@ -374,7 +379,7 @@ void LiveDrive::move(const std::function<void(std::string_view)>& progress) {
           "only a simulated drive is moved from here; move this one with flexspline record --compensate, where you see "
           "what is in its way");
     if (!scales_) throw drive::DriveError("the drive has no block, so it cannot move; flash one");
-    drive::start_residual_map(*session_);
+    drive::start_residual_map(*session_, connection_.signer);
     scales = *scales_;
     away_ = std::make_unique<json>(drive_status());
     (*away_)["moving"] = true;

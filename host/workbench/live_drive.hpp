@@ -13,6 +13,7 @@
 #include <thread>
 #include <vector>
 
+#include "host/drive/pairing.hpp"
 #include "host/drive/recorder.hpp"
 #include "host/drive/scales.hpp"
 #include "host/drive/session.hpp"
@@ -24,6 +25,7 @@ namespace flexspline::workbench {
 struct ConnectionOptions {
   std::function<std::unique_ptr<transport::Link>(const std::string&)> open = transport::open_link;
   std::chrono::milliseconds first{1000}, most{10000};
+  std::optional<drive::PairingSigner> signer{};  // of a drive that is paired
 };
 
 // The blocks of a preview, by their SHA-256; empty: none.

@@ -22,11 +22,12 @@ namespace flexspline::protocol {
 
 inline constexpr std::uint8_t kMajor = 1;  // with another one only `identify` is understood
 // Increases with each addition: 1 the residual map, 2 the board's hardware and the angles of the shafts, 3 the key of
-// the firmware, 4 the stored zero.
-inline constexpr std::uint8_t kMinor = 4;
+// the firmware, 4 the stored zero, 5 the pairing key.
+inline constexpr std::uint8_t kMinor = 5;
 
 inline constexpr std::uint8_t kMinorOfHardware = 2;
 inline constexpr std::uint8_t kMinorOfZero = 4;
+inline constexpr std::uint8_t kMinorOfPairing = 5;
 
 inline constexpr std::size_t kReportBytes = 64;
 inline constexpr std::size_t kHeadBytes = 4;
@@ -60,6 +61,12 @@ enum class Kind : std::uint8_t {
   map_info = 0x40,  // the residual map: map_payloads.hpp
   map_bins = 0x41,
   map_command = 0x42,
+  pairing = 0x50,  // the lock of the parameters: pairing_payloads.hpp
+  pairing_challenge = 0x51,
+  pairing_part = 0x52,
+  pairing_answer = 0x53,
+  pairing_remove = 0x54,
+  pairing_lock = 0x55,
   telemetry_frames = kFirstUnasked,
 };
 
@@ -76,6 +83,12 @@ enum class Code : std::uint8_t {
   no_block,
   not_available,  // this drive cannot do that
   moving,         // not while the shaft turns
+  locked,         // by a pairing key, which this host has not shown
+  not_paired,
+  other_key,        // the drive is paired with another key
+  wrong_signature,  // or there is no challenge that it could be for
+  wait,             // after a wrong signature; `pairing` says how long
+  pairing_full,     // no room to record another key
   // Of the parameter store, in its order.
   too_long = 0x20,
   not_begun,

@@ -8,6 +8,7 @@
 #include "shared/control/excitation_setup.hpp"
 #include "shared/control/hardware.hpp"
 #include "shared/protocol/message.hpp"
+#include "shared/protocol/pairing_payloads.hpp"
 #include "shared/protocol/states.hpp"
 
 namespace flexspline::protocol {
@@ -33,8 +34,8 @@ struct Hello {
 // Whose images the drive's boot loader takes. Not stated: by firmware before protocol 1.3.
 enum class FirmwareKey : std::uint8_t { not_stated, none, development, own };
 inline constexpr std::size_t kFirmwareKeys = 4;
-// Of an identity without it.
-inline constexpr std::size_t kIdentityBytesBeforeKey = 50;
+// Of an identity without it; and of a whole one, to which the state of the pairing was added.
+inline constexpr std::size_t kIdentityBytesBeforeKey = 50, kIdentityBytes = 52;
 
 struct Identity {
   std::uint8_t major = kMajor;
@@ -50,11 +51,12 @@ struct Identity {
   std::uint8_t most_lines = 0;     // of an excitation
   std::uint8_t has_output_encoder = 0;
   FirmwareKey firmware_key = FirmwareKey::not_stated;
+  PairingState pairing = PairingState::not_stated;
   template <class Codec>
   constexpr void fields(Codec& c) {
     c(major), c(minor), c(firmware), c(board), c(serial), c(tick_hz), c(block_bytes), c(effects), c(channels),
         c(most_channels), c(most_lines), c(has_output_encoder);
-    c.within(firmware_key, kFirmwareKeys);
+    c.within(firmware_key, kFirmwareKeys), c.within(pairing, kPairingStates);
   }
   bool operator==(const Identity&) const = default;
 };

@@ -36,6 +36,18 @@ constexpr std::string_view text_of(Code code) {
       return "this drive cannot do that";
     case Code::moving:
       return "the shaft turns, and writing flash memory would lose counts of it; bring it to rest first";
+    case Code::locked:
+      return "its parameters are locked by a pairing key; give the key's file with --pairing-key";
+    case Code::not_paired:
+      return "it is not paired with a key; leave --pairing-key out, or lock it with flexspline pair";
+    case Code::other_key:
+      return "it is paired with another key; give the file of that one (flexspline pair shows its fingerprint)";
+    case Code::wrong_signature:
+      return "it did not accept the signature of its challenge; does another program speak with it? Try again";
+    case Code::wait:
+      return "it waits after wrong signatures; try again in a minute";
+    case Code::pairing_full:
+      return "its memory for pairing keys is full; its sector has to be erased with a programmer";
     case Code::too_long:
       return "the block is empty or longer than the drive's flash has room for";
     case Code::not_begun:
@@ -89,6 +101,11 @@ constexpr std::string_view name_of(Mode mode) {
   constexpr std::array<std::string_view, kModes> kNames{"boot",     "idle",       "current", "velocity",
                                                         "position", "excitation", "stop",    "fault"};
   return static_cast<std::size_t>(mode) < kNames.size() ? kNames[static_cast<std::size_t>(mode)] : "unknown";
+}
+
+constexpr std::string_view name_of(PairingState state) {
+  constexpr std::array<std::string_view, kPairingStates> kNames{"not_stated", "none", "not_paired", "locked", "open"};
+  return static_cast<std::size_t>(state) < kNames.size() ? kNames[static_cast<std::size_t>(state)] : "unknown";
 }
 
 // A fault's name and its cause, by the numbers of firmware/faults.hpp.

@@ -1,5 +1,6 @@
 // All of the drive's code in one translation unit, for clang-tidy; never linked.
 #include "firmware/application.hpp"
+#include "firmware/parameter_lock.hpp"
 #include "firmware/report_link.hpp"
 #include "firmware/service.hpp"
 #include "shared/boot/slots.hpp"
@@ -10,6 +11,7 @@
 #include "shared/model/block.hpp"
 #include "shared/model/drive_model.hpp"
 #include "shared/protocol/serial_frame.hpp"
+#include "shared/storage/pairing_memory.hpp"
 #include "shared/storage/parameter_store.hpp"
 #include "shared/usb/device.hpp"
 #include "shared/usb/hid.hpp"

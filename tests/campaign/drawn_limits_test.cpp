@@ -1,6 +1,6 @@
 // Blocks with drawn limits, by the ten thousand: whatever the drive's validator takes, every protection acts when its
-// signal is driven beyond its limit, and random readings of an armed drive do no harm. With sanitizers it is a program of
-// its own, which `./dev soak MINUTES drawn-limits` runs over all seeds.
+// signal is driven beyond its limit, and random readings of an armed drive do no harm. With sanitizers it is a program
+// of its own, which `./dev soak MINUTES drawn-limits` runs over all seeds.
 #include <gtest/gtest.h>
 
 #include <atomic>

@@ -44,6 +44,10 @@ using Application = firmware::Application<Board>;
 using Flash = testing::FlashModel<kSector>;
 using Store = storage::ParameterStore<Flash>;
 using Blocks = firmware::ApplicationBlocks<Application, Board::kTickHz>;
+constexpr std::size_t kPairingSector = 16'384;
+using PairingFlash = testing::FlashModel<kPairingSector, 1>;
+using Pairing = storage::PairingMemory<PairingFlash>;
+using Lock = firmware::ParameterLock<Pairing, Board>;
 
 struct Drive {
   testing::FlashCells<kSector> cells;
@@ -52,7 +56,11 @@ struct Drive {
   Flash flash{cells};
   Store store{flash};
   Blocks blocks{application};
-  firmware::Service<Application, Store, Blocks> service{application, store, blocks, Board::kTickHz, {}};
+  testing::FlashCells<kPairingSector, 1> pairing_cells;
+  PairingFlash pairing_flash{pairing_cells};
+  Pairing pairing{pairing_flash};
+  Lock lock{pairing, board};
+  firmware::Service<Application, Store, Blocks, Lock> service{application, store, blocks, Board::kTickHz, {}, lock};
   std::uint64_t asked = 0, answered = 0;
 
   Drive() { service.start(); }
