@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <random>
 
 #include "hil/plant/sensors.hpp"
 #include "shared/fixed/turn.hpp"
@@ -39,6 +40,11 @@ plant::State woken(const RigSetup& setup) {
 }
 
 }  // namespace
+
+double waking_turns(std::uint64_t seed) {
+  std::mt19937_64 random(seed);
+  return std::uniform_real_distribution<double>(-2.0, 2.0)(random);
+}
 
 AnalogScales scales_of(const plant::Drive& drive) {
   const double limit = drive.current_limit_a;

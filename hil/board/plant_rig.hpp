@@ -59,6 +59,8 @@ struct RigSetup {
   /// The encoders' reading of that angle. Not stated: the true angle, as if they had counted from zero.
   control::SensorKind encoders = control::SensorKind::not_stated;
 };
+/// Where a drive of this seed wakes unless it is stated: the motor's angle, within two turns.
+double waking_turns(std::uint64_t seed);
 AnalogScales scales_of(const plant::Drive& drive);
 /// What the board of such a drive states about its hardware.
 control::Hardware hardware_of(const plant::Drive& drive,

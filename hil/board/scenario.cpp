@@ -54,11 +54,20 @@ class Host {
   bool compensation_;
 };
 
-// The motion, and after it the hold: from the velocity at its end to rest within a quarter of a second.
+// The motion, from where the output woke, and after it the hold: from the velocity at its end to rest within a quarter
+// of a second.
 class MotionAndHold {
  public:
-  MotionAndHold(const Scenario& motion, double duration_s) : motion_(motion), duration_s_(duration_s) {}
+  MotionAndHold(const Scenario& motion, double duration_s, double from_rad)
+      : motion_(motion), duration_s_(duration_s), from_rad_(from_rad) {}
   Reference at(double time_s) const {
+    Reference r = from_its_start(time_s);
+    r.position += from_rad_;
+    return r;
+  }
+
+ private:
+  Reference from_its_start(double time_s) const {
     if (time_s <= duration_s_) return motion_.at(time_s);
     constexpr double kStopS = 0.25;
     const Reference end = motion_.at(duration_s_);
@@ -67,10 +76,21 @@ class MotionAndHold {
     return {end.position + end.velocity * (t - t * t / (2.0 * kStopS)), end.velocity * (1.0 - t / kStopS), stopping};
   }
 
- private:
   const Scenario& motion_;
-  double duration_s_;
+  double duration_s_, from_rad_;
 };
+
+// Waits until it has checked its sensors, brings it to the start of the motion unless it woke there, and arms it.
+// Returns the ticks.
+std::uint32_t begin(VirtualDrive& drive, const Host& host, const Reference& start) {
+  constexpr std::uint32_t kBootTicks = 100;
+  drive.run(kBootTicks);
+  const firmware::Answer armed = drive.command(host.command(firmware::Command::Kind::arm, start));
+  if (armed.refusal != firmware::Refusal::none)
+    throw std::runtime_error("the drive cannot be armed: fault " +
+                             std::string(firmware::info_of(drive.status().fault.fault).name));
+  return kBootTicks + 1;
+}
 
 // Accumulates the measurements of a run, one a millisecond.
 class RunMeasures {
@@ -178,13 +198,14 @@ const Scenario& scenario(std::string_view name) {
 }
 
 ScenarioResult run_scenario(const ScenarioPlan& plan, std::unique_ptr<Controller> controller) {
-  constexpr std::uint32_t kBootTicks = 100;
   if (plan.tick_hz < 4'000 || plan.tick_hz > 40'000 || plan.tick_hz % 1000 != 0)
     throw std::invalid_argument("a drive of " + std::to_string(plan.tick_hz) +
                                 " ticks a second cannot be simulated; take a multiple of 1000 from 4000 to 40000");
   const std::uint32_t host_ticks = plan.tick_hz / 1000;
   const Scenario motion = plan.motion ? *plan.motion : scenario(plan.scenario);
-  const MotionAndHold motion_and_hold(motion, plan.duration_s);
+  ScenarioResult result;
+  result.start_turns = plan.start_turns.value_or(waking_turns(plan.seed));
+  const MotionAndHold motion_and_hold(motion, plan.duration_s, kTurn * result.start_turns / plan.drive.gear_ratio);
   const effects::DriveConstants<double> constants =
       plan.packed ? plan.packed->constants : constants_of(plan.drive, plan.tick_hz);
   if (std::abs(constants.gear_ratio - plan.drive.gear_ratio) > 1e-6 * plan.drive.gear_ratio)
@@ -194,16 +215,15 @@ ScenarioResult run_scenario(const ScenarioPlan& plan, std::unique_ptr<Controller
   const auto started = std::chrono::steady_clock::now();
   const Block block = plan.packed ? Block(plan.packed->bytes)
                                   : Block(parameters_of(plan.drive, setup_of(plan.drive, constants)), constants);
-  VirtualDrive drive({.drive = plan.drive, .seed = plan.seed, .tick_hz = plan.tick_hz, .noise = plan.noise}, block,
-                     telemetry(), std::move(controller));
+  VirtualDrive drive({.drive = plan.drive,
+                      .seed = plan.seed,
+                      .tick_hz = plan.tick_hz,
+                      .noise = plan.noise,
+                      .start_turns = result.start_turns},
+                     block, telemetry(), std::move(controller));
   drive.rig().set_load_torque(plan.load_torque_nm);
-  drive.run(kBootTicks);
-  const firmware::Answer armed = drive.command(host.command(firmware::Command::Kind::arm, motion_and_hold.at(0.0)));
-  if (armed.refusal != firmware::Refusal::none)
-    throw std::runtime_error("the drive cannot be armed: fault " +
-                             std::string(firmware::info_of(drive.status().fault.fault).name));
+  const std::uint32_t begun = begin(drive, host, motion_and_hold.at(0.0));
 
-  ScenarioResult result;
   result.compensation = plan.compensation;
   EventScript script(plan.events);
   RunMeasures measures(plan, result);
@@ -227,7 +247,7 @@ ScenarioResult run_scenario(const ScenarioPlan& plan, std::unique_ptr<Controller
     drive.run(1);
   }
   measures.finish();
-  result.ticks = kBootTicks + 1 + ticks;
+  result.ticks = begun + ticks;
   result.frames = drive.frame_count();
   result.telemetry_hash = drive.telemetry_hash();
   result.end = drive.status();

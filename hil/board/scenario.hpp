@@ -34,6 +34,9 @@ struct ScenarioPlan {
   double hold_s = 0.0;
   std::uint32_t tick_hz = SoftwareBoard::kTickHz;  ///< of the drive; whole ticks in a millisecond
   std::uint64_t seed = 1;
+  /// The motor's angle when the drive is switched on, where the motion begins. None: random within two turns, by the
+  /// seed.
+  std::optional<double> start_turns{};
   bool compensation = true;
   std::optional<Injection> injection{};
   double injection_s = 0.0;
@@ -75,6 +78,7 @@ struct ScenarioResult {
   std::uint64_t frames = 0;
   std::uint64_t telemetry_hash = 0;
   double wall_s = 0.0;
+  double start_turns = 0.0;  ///< where it woke
   firmware::Status end{};
   firmware::FaultRecord first_fault{};  ///< of the drive, even where it continued
   std::vector<TracePoint> trace{};

@@ -36,6 +36,7 @@ ScenarioPlan plan_of(const DriveOptions& options) {
     plan.hold_s = 0.0;
   }
   plan.seed = options.seed;
+  plan.start_turns = options.wake_turns;
   plan.tick_hz = options.tick_hz;
   if (!options.processor_image.empty() && options.tick_hz != board::SoftwareBoard::kTickHz)
     throw std::invalid_argument(fmt::format("the image of a processor ticks {} times a second; remove --tick-hz",
@@ -84,13 +85,16 @@ std::string json_of(const ScenarioPlan& plan, const std::vector<ScenarioResult>&
     wall_s += r.wall_s;
   }
   const double simulated_s = (plan.duration_s + plan.hold_s) * static_cast<double>(runs.size());
-  return text + fmt::format("],\"seconds\":{:g},\"ticks\":{},\"tick_hz\":{},\"realtime_factor\":{:.3g}}}\n",
-                            plan.duration_s, runs.front().ticks, plan.tick_hz, simulated_s / wall_s);
+  return text + fmt::format(
+                    "],\"seconds\":{:g},\"wake_turns\":{:.9g},\"ticks\":{},\"tick_hz\":{},"
+                    "\"realtime_factor\":{:.3g}}}\n",
+                    plan.duration_s, runs.front().start_turns, runs.front().ticks, plan.tick_hz, simulated_s / wall_s);
 }
 
 void print(const DriveOptions& options, const ScenarioPlan& plan, const std::vector<ScenarioResult>& runs) {
-  fmt::print("{}: {}, {:g} s at {} ticks a second, {}\n", plan.scenario, plan.motion->what, plan.duration_s,
-             plan.tick_hz, options.processor_image.empty() ? "software board" : "emulated processor");
+  fmt::print("{}: {}, {:g} s at {} ticks a second, {}; the motor woke at {:.4g} turns\n", plan.scenario,
+             plan.motion->what, plan.duration_s, plan.tick_hz,
+             options.processor_image.empty() ? "software board" : "emulated processor", runs.front().start_turns);
   fmt::print("{:<13} {:>14} {:>14} {:>13} {:>18} {:>9}\n", "compensation", "rms error rad", "peak error",
              "rms current A", "telemetry hash", "real time");
   for (const ScenarioResult& r : runs) {

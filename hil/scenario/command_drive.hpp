@@ -1,6 +1,7 @@
 #pragma once
 
 #include <cstdint>
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -22,6 +23,7 @@ struct DriveOptions {
   std::string json;
   std::uint32_t tick_hz = 20'000;
   std::uint64_t seed = 1;
+  std::optional<double> wake_turns;  ///< none: random, by the seed
 };
 
 /// Runs the scenario and prints the result. Throws std::exception with the reason where it cannot.

@@ -1,7 +1,6 @@
 #include "hil/twin/twin_drive.hpp"
 
 #include <algorithm>
-#include <random>
 #include <span>
 #include <stdexcept>
 
@@ -25,9 +24,7 @@ std::filesystem::path pairing_file_of(std::filesystem::path flash_file) {
 double start_turns_of(const TwinSetup& setup) {
   if (setup.locked) return 0.0;
   if (setup.start_turns) return *setup.start_turns;
-  constexpr double kMostTurns = 2.0;
-  std::mt19937_64 random(setup.seed);
-  return std::uniform_real_distribution<double>(-kMostTurns, kMostTurns)(random);
+  return board::waking_turns(setup.seed);
 }
 
 }  // namespace

@@ -118,7 +118,9 @@ TEST(ClosedLoop, NoiseInSetPointsShakesNoDriveAtRest) {
   const plant::Drive demo = plant::demo_plant().drive;
   const auto d = board::constants_of(demo);
   const auto setup = board::setup_of(demo);
-  board::VirtualDrive drive({.drive = demo, .seed = 5}, board::Block(board::parameters_of(demo, setup), d), {});
+  const double wakes = board::waking_turns(5);
+  board::VirtualDrive drive({.drive = demo, .seed = 5, .start_turns = wakes},
+                            board::Block(board::parameters_of(demo, setup), d), {});
   drive.run(100);
   std::mt19937_64 random(6);
   std::normal_distribution<double> noise(0.0, setup.feedforward.direction_band);
@@ -126,9 +128,10 @@ TEST(ClosedLoop, NoiseInSetPointsShakesNoDriveAtRest) {
   command.kind = firmware::Command::Kind::arm;
   command.mode = firmware::Mode::position;
   command.compensate = command.stream = true;
+  command.position = {std::llround(std::ldexp(wakes, 32))};
   ASSERT_EQ(drive.command(command).refusal, firmware::Refusal::none);
   command.kind = firmware::Command::Kind::set;
-  double lowest = 1.0, highest = -1.0, most_current = 0.0;
+  double lowest = 1e9, highest = -1e9, most_current = 0.0;
   for (int ms = 0; ms < 3000; ++ms) {
     command.velocity = firmware::N::value(noise(random) / d.velocity_base);
     drive.post(command);

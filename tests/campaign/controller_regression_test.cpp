@@ -80,7 +80,8 @@ board::Block block(bool slow_rates) {
 
 // Rows of a drive in closed loop: where inputs come from.
 std::vector<Row> recorded_inputs(const Case& c) {
-  board::PlantRig rig({.drive = drive(), .seed = 11});
+  // What is recorded are counts of a drive that wakes at its zero.
+  board::PlantRig rig({.drive = drive(), .seed = 11, .start_turns = 0.0});
   board::SoftwareController controller;
   controller.start(block(false), telemetry(), firmware::ResetCause::power);
   std::vector<Row> rows;

@@ -86,6 +86,7 @@ int record(const std::filesystem::path& folder) {
     plan.duration_s = kSeconds;
     plan.hold_s = 0.0;
     plan.seed = 7001;
+    plan.start_turns = 0.0;  // as when the budget was set
     plan.compensation = true;
     const std::filesystem::path to = folder / (seven ? "demo_and_seven" : "demo");
     std::filesystem::create_directories(to);

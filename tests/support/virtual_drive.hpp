@@ -88,19 +88,14 @@ inline void run_with_host(VirtualDrive& drive, double seconds) {
     drive.run(1);
   }
 }
-// Where a drive of this seed wakes, turns of the motor. Its encoders are absolute, as a twin's.
-inline double waking_turns(std::uint64_t seed) {
-  std::mt19937_64 random(seed);
-  return std::uniform_real_distribution<double>(-2.0, 2.0)(random);
-}
-// Ready to be armed: parameters taken, sensors found good.
+// Ready to be armed: parameters taken, sensors found good. Its encoders are absolute, as a twin's.
 inline std::unique_ptr<VirtualDrive> idle_drive(const control::DriveSetup<double>& setup = demo_setup(),
                                                 std::uint64_t seed = 1) {
   auto controller = std::make_unique<SoftwareController>();
   controller->state({.motor_encoder = control::SensorKind::absolute, .output_encoder = control::SensorKind::absolute});
   auto drive = std::make_unique<VirtualDrive>(RigSetup{.drive = demo_drive(),
                                                        .seed = seed,
-                                                       .start_turns = waking_turns(seed),
+                                                       .start_turns = board::waking_turns(seed),
                                                        .encoders = control::SensorKind::absolute},
                                               demo_block(setup), firmware::TelemetrySetup{}, std::move(controller));
   drive->run(100);
