@@ -7,9 +7,6 @@
 
 #include <array>
 #include <cstdint>
-#include <optional>
-#include <span>
-#include <string_view>
 
 #include "firmware/board.hpp"
 #include "shared/boot/signature/ed25519.hpp"
@@ -66,8 +63,8 @@ class ParameterLock {
   protocol::Code challenge(std::uint32_t tick, protocol::PairingChallenge& out) {
     has_nonce_ = false;
     if (wait_ticks_ > 0) return protocol::Code::wait;
-    const std::optional<std::uint32_t> start = memory_.start_number();
-    if (!start) return protocol::Code::pairing_full;
+    std::uint32_t start = 0;
+    if (!memory_.start_number(start)) return protocol::Code::pairing_full;
     ed25519::Sha512 hash;
     const auto add = [&](std::uint32_t word) {
       const std::array<std::uint8_t, 4> bytes{static_cast<std::uint8_t>(word), static_cast<std::uint8_t>(word >> 8),
@@ -76,7 +73,7 @@ class ParameterLock {
       hash.add(bytes);
     };
     hash.add(drive_.serial);
-    add(*start), add(++challenges_);
+    add(start), add(++challenges_);
     for (const std::uint32_t word : random_words_of(board_)) add(word);
     add(tick);
     const auto digest = hash.finish();

@@ -1,19 +1,19 @@
 #!/bin/sh
 # Builds the images: build.sh OUT_DIR [VARIANT...] makes f405-VARIANT, the application, and f405-VARIANT-boot, its boot
-# loader (.elf, .bin, .map). Variants: dac, pwm; with other encoders dac-index, pwm-index, dac-abs, pwm-abs. Default:
-# dac, pwm, dac-index, dac-abs.
+# loader (.elf, .bin, .map). Variants: dac, pwm; with other encoders dac-index, pwm-index, dac-abs, pwm-abs. With -forget
+# behind it, the application ends the pairing of a drive whose key is lost, at its start. Default: all, and dac-forget.
 # Exit 3 where there is no ARM compiler.
 # FLEXSPLINE_PUBLIC_KEY: the key of images, 64 digits of `flexspline key --show` (default: the public development key).
 # FLEXSPLINE_DFU_UPLOAD=1: a host may read the firmware.
 set -eu
 out=${1:?usage: build.sh OUT_DIR [VARIANT...]}
 shift
-[ $# -gt 0 ] || set -- dac pwm dac-index dac-abs
+[ $# -gt 0 ] || set -- dac pwm dac-index pwm-index dac-abs pwm-abs dac-forget
 here=$(cd -- "$(dirname -- "$0")" && pwd)
 compiler=${ARM_GXX:-arm-none-eabi-g++}
 for variant in "$@"; do
   FLAGS=
-  case $variant in
+  case ${variant%-forget} in
     dac | pwm) ;;
     *-index) FLAGS=-DFLEXSPLINE_INDEXED ;;
     *-abs) FLAGS=-DFLEXSPLINE_ABSOLUTE ;;
@@ -22,6 +22,7 @@ for variant in "$@"; do
   case $variant in pwm*) FLAGS="$FLAGS -DFLEXSPLINE_PWM" ;; esac
   [ -z "${FLEXSPLINE_PUBLIC_KEY:-}" ] || FLAGS="$FLAGS -DFLEXSPLINE_PUBLIC_KEY=\"$FLEXSPLINE_PUBLIC_KEY\""
   [ -z "${FLEXSPLINE_DFU_UPLOAD:-}" ] || FLAGS="$FLAGS -DFLEXSPLINE_DFU_UPLOAD"
+  case $variant in *-forget) FLAGS="$FLAGS -DFLEXSPLINE_FORGET_PAIRING" ;; esac
   export FLAGS
   "$here/../stm32f4/build_application.sh" stm32f405 "$out" f405-$variant
   "$here/../cortex_m4/build.sh" "$out" f405-$variant-boot "$here/boot_loader.ld" "$here/../stm32f4/vectors.cpp" \

@@ -169,6 +169,10 @@ int flash_firmware(const FlashOptions& options, Console& console) {
   console.line(fmt::format("  firmware  {}", before));
   console.line(fmt::format("  new       {}, {} bytes", wanted, image.bytes.size()));
   files::require_fit(image, target, options.older);
+  if (!target.version && !options.older)
+    console.warn(
+        "the boot loader does not say which firmware is installed, so whether the image is older is not checked; an "
+        "image with a smaller security counter is refused by the drive itself");
   const bool flashes = confirmed("Flash it?", options.yes);
   std::string after = before;
   if (flashes)

@@ -5,7 +5,6 @@
 #include <array>
 #include <cstddef>
 #include <cstdint>
-#include <optional>
 #include <span>
 
 #include "shared/model/encoding.hpp"
@@ -64,18 +63,19 @@ class PairingMemory {
   }
   constexpr PairingError remove() { return record(kNotPaired, {}); }
 
-  // A number that no start had before; the same from the first call of a start on. None: all are used, or the memory
+  // A number that no start had before; the same from the first call of a start on. False: all are used, or the memory
   // failed.
-  constexpr std::optional<std::uint32_t> start_number() {
-    if (counted_) return count_;
+  constexpr bool start_number(std::uint32_t& number) {
+    number = count_;
+    if (counted_) return true;
     const std::uint32_t next = used_counts();
-    if (next >= kMostCounts) return {};
+    if (next >= kMostCounts) return false;
     // All bits up to this one: those before it are zero already.
     const std::uint32_t value = ~std::uint32_t{0} << (next % 32) << 1;
-    if (!put(kCounterAt + next / 32, value)) return {};
+    if (!put(kCounterAt + next / 32, value)) return false;
     counted_ = true;
-    count_ = next;
-    return count_;
+    number = count_ = next;
+    return true;
   }
 
  private:

@@ -46,7 +46,7 @@ TEST(BoardBrownOut, AChipWhoseOptionBytesAreFinalStartsAllTheSame) {
 
 TEST(BoardBrownOut, AnApplicationWithoutABootLoaderSetsItItself) {
   Chip chip(std::string(FLEXSPLINE_BOARDS) + "/nucleo_f446re/nucleo-f446re.elf",
-            {.address = 0x08020000, .sectors = {{5, 0, 0x20000}, {6, 0x20000, 0x20000}}});
+            {.address = 0x08020000, .sectors = {{5, 0, 0x20000}, {6, 0x20000, 0x20000}, {7, 0x40000, 0x20000, false}}});
   ASSERT_EQ(chip.start(), Stop::waits) << chip.machine.where();
   EXPECT_EQ(chip.flash.options & kLevel, 0U);
   EXPECT_EQ(chip.flash.option_writes, 1);

@@ -26,6 +26,7 @@ Chip::Chip(const std::filesystem::path& image, const WrittenFlash& written)
   machine.attach(0x40007400, dac);
   for (std::uint32_t i = 0; i < ports.size(); ++i) machine.attach(0x40020000 + 0x400 * i, ports[i]);
   machine.attach(0x50000000, otg, 0x5000);
+  machine.attach(0x50060800, random);
   for (std::uint32_t& input : converter.inputs) input = 2048;
 }
 

@@ -14,7 +14,7 @@ namespace flexspline::tests {
 // What of the flash memory the image writes.
 struct WrittenFlash {
   std::uint32_t address = 0x08004000;
-  std::vector<FlashSector> sectors{{1, 0, 0x4000}, {2, 0x4000, 0x4000}};
+  std::vector<FlashSector> sectors{{1, 0, 0x4000}, {2, 0x4000, 0x4000}, {4, 0xC000, 0x10000, false}};
 };
 
 // Where the linker script has the word that outlasts a reset.
@@ -43,6 +43,7 @@ class Chip {
   AdvancedTimerModel tim1{machine};
   EncoderModel tim2, tim3{0xFFFF}, tim4{0xFFFF}, tim5;
   Registers dac, power;
+  RandomModel random;
   WatchdogModel watchdog{machine};
   LineModel usart2, usart3;
   std::array<PortModel, 8> ports;

@@ -54,6 +54,7 @@ class ClockModel : public Registers {
   bool from_crystal() const { return (at(0x04) >> 22 & 1) != 0; }
   bool gate(std::uint32_t address) const {
     const std::uint32_t at_page = address & ~0x3FFU;
+    if (address >= 0x50060800) return (at(0x34) >> 6 & 1) != 0;
     if (address >= 0x50000000) return (at(0x34) >> 7 & 1) != 0;
     if (at_page == 0x40023800 || at_page == 0x40023C00 || at_page == 0x40003000 || address < 0x40000000) return true;
     if (at_page >= 0x40020000) return (at(0x30) >> ((at_page - 0x40020000) >> 10) & 1) != 0;
@@ -89,6 +90,7 @@ class ClockModel : public Registers {
 // A sector of the flash memory, where it begins behind the first that a model serves.
 struct FlashSector {
   std::uint32_t number, offset, bytes;
+  bool may_be_erased = true;
 };
 
 // RM0090, 3: the registers, and sectors that the image writes, one behind the other.
@@ -193,8 +195,8 @@ class FlashModel : public Peripheral {
   void start_erase() {
     if ((control_ & 2) == 0 || (control_ & 1) != 0) return machine_.violation("STRT without SER alone");
     const std::uint32_t number = control_ >> 3 & 15;
-    const auto found =
-        std::find_if(sectors_.begin(), sectors_.end(), [&](const FlashSector& f) { return f.number == number; });
+    const auto found = std::find_if(sectors_.begin(), sectors_.end(),
+                                    [&](const FlashSector& f) { return f.number == number && f.may_be_erased; });
     if (found == sectors_.end()) return machine_.violation("a sector that is not the image's to erase");
     sector_ = *found;
     begin();
@@ -355,6 +357,20 @@ class PortModel : public Registers {
   std::uint32_t mode(std::uint32_t pin) const { return at(0x00) >> (2 * pin) & 3; }
   std::uint32_t function(std::uint32_t pin) const { return at(pin < 8 ? 0x20 : 0x24) >> (4 * (pin % 8)) & 15; }
   bool high(std::uint32_t pin) const { return (at(0x14) >> pin & 1) != 0; }
+};
+
+// RM0090, 24: a number every few looks, or never.
+class RandomModel : public Registers {
+ public:
+  bool is_dead = false;
+  std::uint32_t read(std::uint32_t offset) override {
+    if ((at(0x00) & (1U << 2)) == 0 || is_dead) return words[offset];
+    if (offset == 0x04) return ++looks_ % 8 == 0 ? 1U : 0U;
+    return offset == 0x08 ? number_ = 1664525 * number_ + 1013904223 : words[offset];
+  }
+
+ private:
+  std::uint32_t looks_ = 0, number_ = 1;
 };
 
 // RM0090, 21: counts down by its own oscillator.

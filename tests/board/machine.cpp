@@ -38,6 +38,7 @@ Machine::Machine(const std::filesystem::path& elf) {
   check(uc_mem_write(uc_, kUniqueId, id, sizeof(id)), "the unique number");
   window(0x40000000, 0x30000);
   window(0x50000000, 0x8000);
+  window(0x50060000, kPage);
   window(kCore, kPage);
   load(elf);
 }

@@ -111,7 +111,8 @@ TEST(BoardStart, AStackThatOverflowsLeavesTheRamInsteadOfWritingOverVariables) {
 }
 
 TEST(BoardStart, AnotherBoardRunsTheSameSourcesWithItsOwnClockTimersAndLine) {
-  Chip chip(kNucleo, {.address = 0x08020000, .sectors = {{5, 0, 0x20000}, {6, 0x20000, 0x20000}}});
+  Chip chip(kNucleo,
+            {.address = 0x08020000, .sectors = {{5, 0, 0x20000}, {6, 0x20000, 0x20000}, {7, 0x40000, 0x20000, false}}});
   ASSERT_EQ(chip.start(), Stop::waits) << chip.machine.where();
   EXPECT_EQ(chip.clock.core_hz(), 160e6);
   EXPECT_NE(chip.clock.at(0) & (1U << 18), 0U) << "its clock comes from another chip";

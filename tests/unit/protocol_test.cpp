@@ -35,7 +35,7 @@ void randomise(std::mt19937& r, Identity& x) {
   x.tick_hz = r(), x.block_bytes = r(), x.effects = static_cast<std::uint16_t>(r());
   x.channels = below<std::uint8_t>(r, 256), x.most_channels = below<std::uint8_t>(r, 256);
   x.most_lines = below<std::uint8_t>(r, 256), x.has_output_encoder = below<std::uint8_t>(r, 2);
-  x.firmware_key = below<FirmwareKey>(r, kFirmwareKeys);
+  x.firmware_key = below<FirmwareKey>(r, kFirmwareKeys), x.pairing = below<PairingState>(r, kPairingStates);
 }
 void randomise(std::mt19937& r, Effects& x) {
   fill(r, x.bits);
@@ -124,6 +124,20 @@ void randomise(std::mt19937& r, Subscription& x) {
   x.count = kMostChannels;
   for (auto& c : x.channels) c = below<Channel>(r, kChannels);
 }
+void randomise(std::mt19937& r, Pairing& x) {
+  x.state = below<PairingState>(r, kPairingStates), x.wait_ms = static_cast<std::uint32_t>(r());
+  fill(r, x.key);
+}
+void randomise(std::mt19937& r, PairingChallenge& x) {
+  fill(r, x.nonce);
+}
+void randomise(std::mt19937& r, PairingPart& x) {
+  x.part = below<std::uint8_t>(r, PairingPart::kParts);
+  fill(r, x.bytes);
+}
+void randomise(std::mt19937& r, PairingAnswer& x) {
+  x.action = below<PairingAction>(r, kPairingActions);
+}
 void randomise(std::mt19937& r, FrameHead& x) {
   x = {static_cast<std::uint32_t>(r()), static_cast<std::uint32_t>(r())};
 }
@@ -149,10 +163,10 @@ void randomise(std::mt19937& r, MapCommand& x) {
 
 template <class T>
 class Payload : public ::testing::Test {};
-using AllPayloads =
-    ::testing::Types<Empty, Hello, Identity, Effects, Hardware, Reference, Home, Status, BlockBegin, Chunk, BlockRead,
-                     BlockRestore, Reason, Command, CommandAnswer, Excitation, ExcitationGuard, ExcitationLines,
-                     Subscription, FrameHead, MapInfo, MapFirst, MapBins, MapCommand>;
+using AllPayloads = ::testing::Types<Empty, Hello, Identity, Effects, Hardware, Reference, Home, Status, BlockBegin,
+                                     Chunk, BlockRead, BlockRestore, Reason, Command, CommandAnswer, Excitation,
+                                     ExcitationGuard, ExcitationLines, Subscription, Pairing, PairingChallenge,
+                                     PairingPart, PairingAnswer, FrameHead, MapInfo, MapFirst, MapBins, MapCommand>;
 TYPED_TEST_SUITE(Payload, AllPayloads);
 
 TYPED_TEST(Payload, ComesBackAsItWasSentAndEveryOtherLengthIsRefused) {
@@ -225,9 +239,10 @@ TEST(Protocol, BytesOnTheWireAreTheRecordedOnes) {
   id.serial = {'A', '1'};
   id.tick_hz = 20'000, id.block_bytes = 16'128, id.effects = 43, id.channels = 21, id.most_channels = 12;
   id.most_lines = 32, id.has_output_encoder = 1, id.firmware_key = FirmwareKey::development;
+  id.pairing = PairingState::locked;
   EXPECT_EQ(wire(answer_to(request(Kind::identify, 7, Hello{}), Code::done, id)),
-            "810733000104030462000000000000000000000000000000"
-            "41310000000000000000000000000000204e0000003f00002b00150c200102");
+            "810734000105030462000000000000000000000000000000"
+            "41310000000000000000000000000000204e0000003f00002b00150c20010203");
   Status s{0x01020304, Mode::fault, true, StoreState::fell_back, 13, 5, -2, 3, 4, 6, 8, {0x100, 0xA1B2C3D4}, {9, 10}};
   EXPECT_EQ(wire(answer_to(request(Kind::status, 1, Empty{}), Code::done, s)),
             "82012e0004030201070102"
