@@ -75,6 +75,21 @@ void Motor::step(const Plane& voltage, const Rotor& at, double dt) {
   const double heat = 1.5 * resistance_ohm() * (i.d * i.d + i.q * i.q);
   temperature_c_ += (heat - (temperature_c_ - p_.ambient_c) / p_.thermal_resistance_k_w) / p_.heat_capacity_j_k * dt;
 }
+void Motor::step_open(const Triple& voltages, std::size_t open_phase, const Rotor& at, double dt) {
+  // The current at the end of the step is linear in the voltage, but for saturation, which the next step takes out.
+  const double after = at.angle + at.speed * dt;
+  const auto current_with = [&](double terminal_v) {
+    Motor copy = *this;
+    Triple v = voltages;
+    v[open_phase] = terminal_v;
+    copy.step(to_plane(v), at, dt);
+    return to_phases(to_plane(copy.currents(after), after))[open_phase];
+  };
+  const double without = current_with(0.0), with = current_with(1.0);
+  Triple v = voltages;
+  v[open_phase] = -without / (with - without);
+  step(to_plane(v), at, dt);
+}
 void Motor::stop(double angle) {
   flux_ = magnet(angle);
 }

@@ -36,6 +36,8 @@ class Motor {
 
   /// A step of `dt` with a voltage that stands still in the stator, second order.
   void step(const Plane& voltage, const Rotor& at, double dt);
+  /// The same where the wire of one phase is open: its terminal takes the voltage at which no current flows in it.
+  void step_open(const Triple& voltages, std::size_t open_phase, const Rotor& at, double dt);
   /// No current flows.
   void stop(double angle);
   void set_temperature_c(double temperature) { temperature_c_ = temperature; }

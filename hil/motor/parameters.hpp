@@ -1,6 +1,7 @@
 #pragma once
 
 #include <array>
+#include <cstddef>
 
 namespace flexspline::motor {
 
@@ -34,6 +35,7 @@ struct InverterParameters {
   double dead_time_s = 0.5e-6;
   double leg_capacitance_f = 1e-9;  // of both switches of a leg, seen from its output
   double pwm_hz = 20e3;
+  int averaged_steps = 20;  // a period of the averaged model; even, so that its middle is between two
 };
 
 /// Shunts in the low sides, amplifiers and converter; and the reading of the bus voltage.
@@ -45,7 +47,38 @@ struct SensorParameters {
   Triple delay_s{};         // of each phase's sampling instant after the middle of the low sides' time
   double settling_s = 0.0;  // time constant of the amplifier, from when the low side begins to carry the current
   int bits = 12;
+  std::array<std::size_t, 3> order{0, 1, 2};  // of which leg each reading is
   double bus_full_scale_v = 60.0;
+};
+
+/// How the motor's wires are connected to the legs, and faults of them. Shorts and open phases: averaged model only.
+struct WiringParameters {
+  std::array<std::size_t, 3> motor_phase{0, 1, 2};  // of each leg
+  std::array<bool, 3> open{};                       // a leg whose wire is open
+  Triple contact_ohm{};                             // of each leg's wire, beyond the motor's resistance
+  double short_ohm = 0.0;                           // between `short_from` and `short_to`; zero: no short
+  std::size_t short_from = 0;
+  std::size_t short_to = 0;
+  double ground_ohm = 0.0;  // from leg `ground_leg` to the negative side of the bus; zero: none
+  std::size_t ground_leg = 0;
+};
+
+/// The rotor with what turns with it, for tests of the electrical side alone.
+struct ShaftParameters {
+  double inertia_kg_m2 = 1e-4;
+  double coulomb_nm = 0.02;
+  double viscous_nms = 1e-4;
+  bool blocked = false;
+};
+
+/// An encoder on that shaft. It slips by `slip_turns` whenever the shaft has moved on by `slip_every_turns`.
+struct EncoderParameters {
+  int counts_per_turn = 16384;
+  bool reversed = false;
+  double offset_turns = 0.0;
+  bool stands = false;
+  double slip_turns = 0.0;
+  double slip_every_turns = 0.0;
 };
 
 }  // namespace flexspline::motor

@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <stdexcept>
 
 namespace flexspline::motor {
 namespace {
@@ -9,18 +10,77 @@ namespace {
 constexpr double kStep_s = 1e-6;       // within which the winding is of second order far below any sensor's error
 constexpr double kDeadStep_s = 40e-9;  // while a leg's capacitance is charged
 constexpr double kNothing_s = 1e-12;
-constexpr int kAveragedSteps = 20;  // a period; even, so that its middle is between two
+
+// Where f falls through zero, within -most and most.
+template <class F>
+double falling_zero(const F& f, double most) {
+  double low = -most, high = most;
+  constexpr int kHalves = 60;
+  for (int k = 0; k < kHalves; ++k) {
+    const double middle = (low + high) / 2.0;
+    (f(middle) > 0.0 ? low : high) = middle;
+  }
+  return (low + high) / 2.0;
+}
 
 }  // namespace
 
 PowerStage::PowerStage(const MotorParameters& motor, const InverterParameters& inverter,
-                       const SensorParameters& sensors, Fidelity fidelity)
-    : p_(inverter), sensors_(sensors), fidelity_(fidelity), motor_(motor), bus_v_(inverter.supply_v) {
+                       const SensorParameters& sensors, Fidelity fidelity, const WiringParameters& wiring)
+    : p_(inverter), sensors_(sensors), fidelity_(fidelity), wiring_(wiring), motor_(motor), bus_v_(inverter.supply_v) {
+  const bool open = wiring.open[0] || wiring.open[1] || wiring.open[2];
+  if (fidelity == Fidelity::switched && (open || wiring.short_ohm > 0.0 || wiring.ground_ohm > 0.0))
+    throw std::invalid_argument("open phases and shorts are in the averaged model only");
   for (Leg& leg : legs_) leg.since_s = 1.0;
 }
 
 Sample PowerStage::run(const Triple& duties, const Rotor& at) {
   return fidelity_ == Fidelity::switched ? run_switched(duties, at) : run_averaged(duties, at);
+}
+
+// Of the motor, in the order of the legs.
+Triple PowerStage::leg_currents(const Rotor& at) const {
+  const Triple motor = to_phases(to_plane(motor_.currents(at.angle), at.angle));
+  return {motor[wiring_.motor_phase[0]], motor[wiring_.motor_phase[1]], motor[wiring_.motor_phase[2]]};
+}
+// A leg's voltage falls with its current, so that each balance has one solution.
+void PowerStage::add_short_currents(Triple& legs, const Triple& duties) const {
+  if (wiring_.short_ohm > 0.0) {
+    const std::size_t from = wiring_.short_from, to = wiring_.short_to;
+    const double through = falling_zero(
+        [&](double i) {
+          return mean_leg_voltage(duties[from], legs[from] + i) - mean_leg_voltage(duties[to], legs[to] - i) -
+                 wiring_.short_ohm * i;
+        },
+        2.0 * p_.supply_v / wiring_.short_ohm);
+    legs[from] += through;
+    legs[to] -= through;
+  }
+  if (wiring_.ground_ohm > 0.0) {
+    const std::size_t leg = wiring_.ground_leg;
+    legs[leg] +=
+        falling_zero([&](double i) { return mean_leg_voltage(duties[leg], legs[leg] + i) - wiring_.ground_ohm * i; },
+                     2.0 * p_.supply_v / wiring_.ground_ohm);
+  }
+}
+void PowerStage::step_motor(const Triple& leg_voltages, const Rotor& at, double dt) {
+  const Triple current = leg_currents(at);
+  Triple v{};
+  int open = 0;
+  std::size_t open_phase = 0;
+  for (std::size_t x = 0; x < 3; ++x) {
+    const std::size_t phase = wiring_.motor_phase[x];
+    v[phase] = leg_voltages[x] - wiring_.contact_ohm[x] * current[x];
+    if (!wiring_.open[x]) continue;
+    open_phase = phase;
+    ++open;
+  }
+  if (open == 0)
+    motor_.step(to_plane(v), at, dt);
+  else if (open == 1)
+    motor_.step_open(v, open_phase, at, dt);
+  else
+    motor_.stop(at.angle + at.speed * dt);
 }
 
 void PowerStage::charge_bus(double drawn_a, double dt) {
@@ -69,7 +129,7 @@ Sample PowerStage::run_switched(const Triple& duties, const Rotor& start) {
     const auto until = [&](double event) {
       if (event > t + kNothing_s) next = std::min(next, event);
     };
-    const Triple current = to_phases(to_plane(motor_.currents(at.angle), at.angle));
+    const Triple current = leg_currents(at);
     double drawn = 0.0;
     for (std::size_t x = 0; x < 3; ++x) {
       Leg& leg = legs_[x];
@@ -103,7 +163,7 @@ Sample PowerStage::run_switched(const Triple& duties, const Rotor& start) {
     const double dt = next - t;
     const Triple voltages = leg_voltages(current, dt);
     sample.torque_nm += motor_.torque_nm(at.angle) * dt / period;
-    motor_.step(to_plane(voltages), at, dt);
+    step_motor(voltages, at, dt);
     charge_bus(drawn, dt);
     for (Leg& leg : legs_) leg.since_s += dt;
     at.angle += at.speed * dt;
@@ -129,10 +189,12 @@ double PowerStage::mean_leg_voltage(double duty, double current) const {
 Sample PowerStage::run_averaged(const Triple& duties, const Rotor& start) {
   Sample sample;
   Rotor at = start;
-  const double dt = period_s() / kAveragedSteps;
-  for (int k = 0; k < kAveragedSteps; ++k) {
-    const Triple current = to_phases(to_plane(motor_.currents(at.angle), at.angle));
-    if (k == kAveragedSteps / 2) {
+  const int steps = p_.averaged_steps;
+  const double dt = period_s() / steps;
+  for (int k = 0; k < steps; ++k) {
+    Triple current = leg_currents(at);
+    add_short_currents(current, duties);
+    if (k == steps / 2) {
       sample.current = motor_.currents(at.angle);
       sample.bus_v = bus_v_;
       for (std::size_t x = 0; x < 3; ++x)
@@ -144,8 +206,8 @@ Sample PowerStage::run_averaged(const Triple& duties, const Rotor& start) {
       v[x] = mean_leg_voltage(duties[x], current[x]);
       drawn += duties[x] * current[x];
     }
-    sample.torque_nm += motor_.torque_nm(at.angle) / kAveragedSteps;
-    motor_.step(to_plane(v), at, dt);
+    sample.torque_nm += motor_.torque_nm(at.angle) / steps;
+    step_motor(v, at, dt);
     charge_bus(drawn, dt);
     at.angle += at.speed * dt;
   }

@@ -21,7 +21,7 @@ struct Sample {
 class PowerStage {
  public:
   PowerStage(const MotorParameters& motor, const InverterParameters& inverter, const SensorParameters& sensors,
-             Fidelity fidelity);
+             Fidelity fidelity, const WiringParameters& wiring = {});
 
   /// Duties from 0 to 1; `at` is the rotor at the period's begin, its speed stands for the period.
   Sample run(const Triple& duties, const Rotor& at);
@@ -42,10 +42,14 @@ class PowerStage {
   double mean_leg_voltage(double duty, double current) const;
   double shown(double current, double low_for_s) const;
   void charge_bus(double drawn_a, double dt);
+  Triple leg_currents(const Rotor& at) const;
+  void add_short_currents(Triple& legs, const Triple& duties) const;
+  void step_motor(const Triple& leg_voltages, const Rotor& at, double dt);
 
   InverterParameters p_;
   SensorParameters sensors_;
   Fidelity fidelity_;
+  WiringParameters wiring_;
   Motor motor_;
   std::array<Leg, 3> legs_{};
   double bus_v_;

@@ -15,7 +15,7 @@ Readings Shunts::read(const Sample& sample) {
   Readings r;
   for (std::size_t x = 0; x < 3; ++x) {
     const double noise = p_.noise_a > 0.0 ? p_.noise_a * normal_() : 0.0;
-    r.current[x] = share((sample.seen_a[x] * p_.gain[x] + p_.offset_a[x] + noise) / p_.full_scale_a, -32768);
+    r.current[x] = share((sample.seen_a[p_.order[x]] * p_.gain[x] + p_.offset_a[x] + noise) / p_.full_scale_a, -32768);
   }
   r.bus = share(sample.bus_v / p_.bus_full_scale_v, 0);
   return r;
