@@ -191,6 +191,8 @@ void add_drive(CLI::App& app) {
   command->add_option(
       "--block", options->block_file,
       "parameter block of `flexspline pack` for this --tick-hz: the drive's model (default: the plant's)");
+  command->add_option("--motor", options->motor, "what its amplifier takes: current (default), or three-phase")
+      ->check(CLI::IsMember({"current", "three-phase"}));
   command->add_option("--processor", options->processor_image,
                       "firmware image to run it on, in QEMU (boards/qemu_stm32f405)");
   command->add_option("--trace", options->trace_file, "CSV of one run, a line a millisecond");
@@ -249,6 +251,8 @@ void take_twin_drive(CLI::App& command, flexspline::twin::TwinOptions& options) 
   command.add_option("--plant", options.plant_file, "plant file (default: the demo's drive, built in)");
   command.add_option("--with", options.with, "effects that the drive has and its data sheet has, A,B")->delimiter(',');
   command.add_option("--hide", options.hide, "effect that the drive has and its data sheet does not have");
+  command.add_option("--motor", options.motor, "what its amplifier takes: current (default), or three-phase")
+      ->check(CLI::IsMember({"current", "three-phase"}));
   command.add_option("--flash", options.flash_file, "file that holds its flash memory (default: none)");
   command.add_option("--serial", options.serial, "serial number (default TWIN)")
       ->check([](const std::string& text) -> std::string {

@@ -85,6 +85,7 @@ PlantRig::PlantRig(const RigSetup& setup)
   const double corner_hz = setup.drive.amplifier.bandwidth_hz;
   if (corner_hz > 0.0) lag_ = 1.0 - std::exp(-kTurn * corner_hz * tick_s_);
   if (setup.encoders != control::SensorKind::not_stated) begin_counters();
+  if (setup.three_phase) three_phase_ = std::make_unique<ThreePhaseAmplifier>(setup.drive, setup.tick_hz, setup.seed);
 }
 
 // An absolute encoder starts at its angle within a turn, another one at zero.
@@ -176,7 +177,8 @@ void PlantRig::sense(firmware::Readings& r) {
   }
   if (!has(Injection::analog_stale)) {
     ++r.analog_samples;
-    r.current = has(Injection::current_out_of_range) ? INT16_MIN : share(current, scales_.current_a);
+    const std::int16_t read = three_phase_ ? three_phase_->reading() : share(current, scales_.current_a);
+    r.current = has(Injection::current_out_of_range) ? INT16_MIN : read;
     r.temperature = has(Injection::temperature_out_of_range) ? INT16_MAX : share(temperature, scales_.temperature_c);
     if (has(Injection::torque_out_of_range)) {
       r.torque = INT16_MAX;
@@ -208,20 +210,30 @@ void PlantRig::warm(double current_a) {
   temperature_c_ += tick_s_ * (lost_w - to_air_w) / thermal.capacity_j_c;
 }
 
-void PlantRig::act(const firmware::Actuation& actuation) {
-  current_a_ = actuation.enabled ? actuation.current / 32768.0 * scales_.amplifier_a : 0.0;
+// The true current.
+double PlantRig::through_amplifier(const firmware::Actuation& actuation) {
   bool flows = actuation.enabled && !has(Injection::amplifier_dead);
+  if (three_phase_) {
+    const plant::State& state = plant_.state();
+    const double current = three_phase_->run({actuation.current, flows}, state.motor_angle, state.motor_velocity);
+    current_a_ = three_phase_->current_a();
+    return current;
+  }
+  current_a_ = actuation.enabled ? actuation.current / 32768.0 * scales_.amplifier_a : 0.0;
   double reading_a = flowing(flows);
   if (has(Injection::current_surge)) {
     reading_a = scales_.amplifier_a + kSurgeA;
     flows = true;
   }
   current_a_ = reading_a;
-  plant::Inputs inputs;
   // The amplifier makes its (biased) reading follow the command.
-  inputs.current_a =
-      flows ? reading_a - errors_.current_offset_a - disturbances_.current_offset_a + setup_.drive.amplifier.offset_a
-            : 0.0;
+  return flows ? reading_a - errors_.current_offset_a - disturbances_.current_offset_a + setup_.drive.amplifier.offset_a
+               : 0.0;
+}
+
+void PlantRig::act(const firmware::Actuation& actuation) {
+  plant::Inputs inputs;
+  inputs.current_a = through_amplifier(actuation);
   inputs.temperature_c = temperature_c_;
   inputs.load_torque_nm = load_torque_nm_;
   plant_.advance(inputs, tick_s_, plant_steps_);

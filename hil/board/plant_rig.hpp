@@ -1,9 +1,11 @@
 #pragma once
 
 #include <cstdint>
+#include <memory>
 #include <optional>
 
 #include "firmware/board.hpp"
+#include "hil/board/three_phase.hpp"
 #include "hil/plant/normal.hpp"
 #include "hil/plant/parameters.hpp"
 #include "hil/plant/physics.hpp"
@@ -58,6 +60,7 @@ struct RigSetup {
   double start_turns = 0.0;  ///< the motor's angle when the drive is switched on; the output at rest with it
   /// The encoders' reading of that angle. Not stated: the true angle, as if they had counted from zero.
   control::SensorKind encoders = control::SensorKind::not_stated;
+  bool three_phase = false;  ///< a three-phase motor and its power stage instead of an amplifier that takes a current
 };
 /// Where a drive of this seed wakes unless it is stated: the motor's angle, within two turns.
 double waking_turns(std::uint64_t seed);
@@ -98,6 +101,9 @@ class PlantRig {
   double torque_nm() const { return plant_.torque(); }
   /// The amplifier's own reading in the last tick, A; the true current is less by the offsets.
   double current_a() const { return current_a_; }
+  /// nullptr: its amplifier takes a current.
+  ThreePhaseAmplifier* three_phase() { return three_phase_.get(); }
+  bool amplifier_tripped() const { return three_phase_ && three_phase_->stage().tripped(); }
 
  private:
   static constexpr std::uint64_t bit(Injection what) { return std::uint64_t{1} << static_cast<int>(what); }
@@ -107,6 +113,7 @@ class PlantRig {
   double motor_zero() const;  // rad
   void pass_index(double shown_rad, firmware::Readings& r);
   double flowing(bool enabled);
+  double through_amplifier(const firmware::Actuation& actuation);
   void warm(double current_a);
   std::int16_t share(double value, double full_scale) const;
 
@@ -138,6 +145,7 @@ class PlantRig {
   std::int32_t output_slipped_ = 0;
   double temperature_c_;
   double load_torque_nm_ = 0.0;
+  std::unique_ptr<ThreePhaseAmplifier> three_phase_;
   double made_a_ = 0.0;  // of the amplifier, before its offset
   double current_a_ = 0.0;
 };

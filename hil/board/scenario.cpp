@@ -82,14 +82,13 @@ class MotionAndHold {
 
 // Waits until it has checked its sensors, brings it to the start of the motion unless it woke there, and arms it.
 // Returns the ticks.
-std::uint32_t begin(VirtualDrive& drive, const Host& host, const Reference& start) {
-  constexpr std::uint32_t kBootTicks = 100;
-  drive.run(kBootTicks);
+std::uint32_t begin(VirtualDrive& drive, const Host& host, const Reference& start, std::uint32_t boot_ticks) {
+  drive.run(boot_ticks);
   const firmware::Answer armed = drive.command(host.command(firmware::Command::Kind::arm, start));
   if (armed.refusal != firmware::Refusal::none)
     throw std::runtime_error("the drive cannot be armed: fault " +
                              std::string(firmware::info_of(drive.status().fault.fault).name));
-  return kBootTicks + 1;
+  return boot_ticks + 1;
 }
 
 // Accumulates the measurements of a run, one a millisecond.
@@ -161,6 +160,19 @@ Motion trapezoid() {
   return m;
 }
 
+RigSetup rig_of(const ScenarioPlan& plan, double start_turns) {
+  return {.drive = plan.drive,
+          .seed = plan.seed,
+          .tick_hz = plan.tick_hz,
+          .noise = plan.noise,
+          .start_turns = start_turns,
+          .three_phase = plan.three_phase};
+}
+// A three-phase drive measures its current sensors' zero first.
+std::uint32_t boot_ticks_of(const ScenarioPlan& plan) {
+  return plan.three_phase ? 1100 : 100;
+}
+
 TracePoint traced(double time_s, const Reference& set, const VirtualDrive& drive, double load_torque_nm) {
   const PlantRig& rig = drive.rig();
   return {time_s,
@@ -215,14 +227,9 @@ ScenarioResult run_scenario(const ScenarioPlan& plan, std::unique_ptr<Controller
   const auto started = std::chrono::steady_clock::now();
   const Block block = plan.packed ? Block(plan.packed->bytes)
                                   : Block(parameters_of(plan.drive, setup_of(plan.drive, constants)), constants);
-  VirtualDrive drive({.drive = plan.drive,
-                      .seed = plan.seed,
-                      .tick_hz = plan.tick_hz,
-                      .noise = plan.noise,
-                      .start_turns = result.start_turns},
-                     block, telemetry(), std::move(controller));
+  VirtualDrive drive(rig_of(plan, result.start_turns), block, telemetry(), std::move(controller));
   drive.rig().set_load_torque(plan.load_torque_nm);
-  const std::uint32_t begun = begin(drive, host, motion_and_hold.at(0.0));
+  const std::uint32_t begun = begin(drive, host, motion_and_hold.at(0.0), boot_ticks_of(plan));
 
   result.compensation = plan.compensation;
   EventScript script(plan.events);

@@ -44,7 +44,8 @@ struct ScenarioPlan {
   double load_torque_nm = 0.0;          ///< on the output all the time, positive resists
   std::optional<PackedModel> packed{};  ///< the drive's parameters; without it the plant's own values
   bool keeps_trace = false;
-  bool noise = true;  ///< of the sensors
+  bool noise = true;         ///< of the sensors
+  bool three_phase = false;  ///< RigSetup::three_phase
 };
 
 /// Trace of a run, every millisecond.

@@ -38,6 +38,7 @@ ScenarioPlan plan_of(const DriveOptions& options) {
   plan.seed = options.seed;
   plan.start_turns = options.wake_turns;
   plan.tick_hz = options.tick_hz;
+  plan.three_phase = options.motor == "three-phase";
   if (!options.processor_image.empty() && options.tick_hz != board::SoftwareBoard::kTickHz)
     throw std::invalid_argument(fmt::format("the image of a processor ticks {} times a second; remove --tick-hz",
                                             board::SoftwareBoard::kTickHz));

@@ -19,7 +19,8 @@ struct DriveOptions {
   double inject_at_s = -1.0;
   std::string processor_image;
   std::string block_file;
-  std::string trace_file;  ///< of one run
+  std::string motor = "current";  ///< what the amplifier takes: a current, or "three-phase"
+  std::string trace_file;         ///< of one run
   std::string json;
   std::uint32_t tick_hz = 20'000;
   std::uint64_t seed = 1;

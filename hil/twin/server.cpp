@@ -41,6 +41,7 @@ TwinSetup setup_of(const TwinOptions& options) {
   setup.seed = options.seed;
   setup.as_made = !options.empty;
   setup.locked = options.locked;
+  setup.three_phase = options.motor == "three-phase";
   return setup;
 }
 

@@ -12,8 +12,9 @@ struct TwinOptions {
   std::string hide;
   std::string flash_file;
   std::string serial = "TWIN";
-  std::string json_file;   ///< receives its address, once it listens; - is standard output
-  std::string cable_file;  ///< unplugs its link (link_fault.hpp); empty: none
+  std::string motor = "current";  ///< what the amplifier takes: a current, or "three-phase"
+  std::string json_file;          ///< receives its address, once it listens; - is standard output
+  std::string cable_file;         ///< unplugs its link (link_fault.hpp); empty: none
   std::string inject;
   double inject_at_s = 1.0;  ///< after the drive was first armed
   std::uint64_t seed = 1;

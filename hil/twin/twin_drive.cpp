@@ -35,7 +35,8 @@ TwinDrive::TwinDrive(const TwinSetup& setup)
             .seed = setup.seed,
             .locked = setup.locked,
             .start_turns = start_turns_of(setup),
-            .encoders = setup.encoders}),
+            .encoders = setup.encoders,
+            .three_phase = setup.three_phase}),
       own_flash_(setup.flash == nullptr ? std::make_unique<FlashFile>(setup.flash_file) : nullptr),
       store_(setup.flash == nullptr ? *own_flash_ : *setup.flash),
       own_pairing_(setup.pairing == nullptr ? std::make_unique<PairingFile>(pairing_file_of(setup.flash_file))
@@ -62,6 +63,7 @@ TwinDrive::TwinDrive(const TwinSetup& setup)
 
 void TwinDrive::tick() {
   board_.readings = &rig_.sense();
+  board_.tripped = rig_.amplifier_tripped();
   board_.overrun = rig_.has(board::Injection::tick_overrun);
   application_.tick();
   rig_.act(board_.actuation);

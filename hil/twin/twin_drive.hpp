@@ -24,6 +24,7 @@ struct TwinSetup {
   /// The motor's angle when the drive is switched on, turns; none: random within two turns, by the seed.
   std::optional<double> start_turns{};
   control::SensorKind encoders = control::SensorKind::absolute;
+  bool three_phase = false;    ///< board::RigSetup::three_phase
   FlashFile* flash = nullptr;  ///< memory that outlives the drive, instead of the file
   PairingFile* pairing = nullptr;
   boot::Version version = kFactoryVersion;

@@ -1,0 +1,153 @@
+// A three-phase power stage as the drive's amplifier. The application hands one current to its board and gets one
+// back, as from a servo amplifier; a board with three half bridges hands both to this class. Its two sides:
+//   command(), current()   with the tick of the motion loops: the set point of the current in q, its limits
+//   update()               once a PWM period, in the highest interrupt: field-oriented control, or commissioning
+// The tick is slower than the PWM and is interrupted by it. Set points are single words, each valid by itself; d is
+// other than zero in field weakening alone.
+#pragma once
+
+#include <cstdint>
+
+#include "firmware/board.hpp"
+#include "shared/control/commissioning/commissioning.hpp"
+#include "shared/control/foc/current_limits.hpp"
+#include "shared/control/foc/field_oriented.hpp"
+
+namespace flexspline::firmware {
+
+struct ThreePhaseSettings {
+  control::foc::Settings foc;
+  control::foc::LimitSettings limits;
+  control::foc::OffsetCalibration::Limits offsets;
+  // Electrical angle = +-pole_pairs encoder + offset_angle, as commissioning finds it.
+  std::int32_t pole_pairs = 1;
+  bool reversed = false;
+  std::uint32_t offset_angle = 0;    // 2^-32 turns
+  std::uint32_t encoder_counts = 1;  // a turn
+  std::int32_t set_point = 0;        // full scale of the command over the current's base, 2^-12; at most two
+  std::int32_t reading = 0;          // the current's base over full scale of the reading, 2^-20
+};
+
+class ThreePhaseStage {
+ public:
+  // One PWM period, sampled in the middle of the low sides' time.
+  struct Inputs {
+    control::foc::Phases readings;  // 2^-15 of full scale
+    std::int32_t bus = 0;           // likewise
+    std::uint32_t counter = 0;      // of the encoder, as Readings::motor_counter
+  };
+  using Outputs = control::commissioning::Outputs;
+
+  void begin(const ThreePhaseSettings& settings) {
+    *this = {};
+    s_ = settings;
+    per_count_ = static_cast<std::uint32_t>((std::uint64_t{1} << 32) / s_.encoder_counts);
+  }
+  const ThreePhaseSettings& settings() const { return s_; }
+
+  // The tick's side.
+
+  void command(const Actuation& actuation) {
+    const control::foc::RotorVector wanted = {0, actuation.current * s_.set_point};
+    const control::foc::Limits l = control::foc::limit_currents(
+        limits_, s_.limits, wanted, {out_.measured.d, out_.measured.q}, out_.wanted, out_.most, s_.foc.current.up);
+    set_point_.d = l.set_point.d;
+    set_point_.q = l.set_point.q;
+    commanded_ = actuation.enabled;
+  }
+  // In q, a share of full scale of the reading, 2^-15.
+  std::int16_t current() const {
+    return static_cast<std::int16_t>(
+        fixed::limited(fixed::multiply_high(out_.measured.q, s_.reading), -INT16_MAX, INT16_MAX));
+  }
+  // A current sensor's zero was out of range when it was last looked at: the stage stays off.
+  bool tripped() const { return commanded_ && !runs_ && offset_fault_ != control::foc::OffsetFault::none; }
+
+  // Takes the place of current control until it is done. The caller has the drive disarmed.
+  void commission(const control::commissioning::Settings& settings) {
+    commissioning_.begin(settings);
+    commissions_ = true;
+  }
+  bool commissions() const { return commissions_; }
+  const control::commissioning::Commissioning& commissioning() const { return commissioning_; }
+
+  // The interrupt's side.
+
+  Outputs update(const Inputs& in) {
+    follow(in.counter);
+    if (commissions_) {
+      const Outputs out = commissioning_.update({in.readings, in.bus, angle_});
+      commissions_ = !commissioning_.done();
+      return out;
+    }
+    // Once it runs it goes on until it is switched off: offsets are measured without current.
+    if (!commanded_ || !(runs_ || has_offsets_)) return off(in.readings);
+    if (!runs_) control::foc::reset(state_);
+    runs_ = true;
+    control::foc::update(
+        state_, s_.foc,
+        {in.readings, in.bus, electrical(angle_) + s_.offset_angle,
+         static_cast<std::int32_t>(electrical(static_cast<std::uint32_t>(speed_ >> kFilterBits))), set_point_},
+        out_);
+    return {out_.counts, true};
+  }
+
+ private:
+  static constexpr int kFilterBits = 4;  // of the speed: periods
+
+  std::uint32_t electrical(std::uint32_t angle) const {
+    const std::uint32_t turned = angle * static_cast<std::uint32_t>(s_.pole_pairs);
+    return s_.reversed ? 0 - turned : turned;
+  }
+  void follow(std::uint32_t counter) {
+    if (!began_) {
+      before_ = counter;
+      position_ = counter % s_.encoder_counts;
+      began_ = true;
+    }
+    const auto moved = static_cast<std::int32_t>(counter - before_);
+    before_ = counter;
+    // Less than a turn a period.
+    const auto counts = static_cast<std::int32_t>(s_.encoder_counts);
+    std::int32_t now = static_cast<std::int32_t>(position_) + fixed::limited(moved, -counts, counts);
+    if (now < 0) now += counts;
+    if (now >= counts) now -= counts;
+    position_ = static_cast<std::uint32_t>(now);
+    angle_ = position_ * per_count_;
+    speed_ += std::int64_t{moved} * per_count_ - (speed_ >> kFilterBits);
+  }
+  Outputs off(const control::foc::Phases& readings) {
+    runs_ = false;
+    out_.measured = {};
+    out_.wanted = {};
+    calibration_.add(readings);
+    if (!calibration_.done()) return {};
+    const auto result = calibration_.result(s_.foc.sensors, s_.offsets);
+    offset_fault_ = result.fault;
+    has_offsets_ = result.fault == control::foc::OffsetFault::none;
+    if (has_offsets_) s_.foc.sensors.offset = result.offset;
+    calibration_ = {};
+    return {};
+  }
+
+  ThreePhaseSettings s_;
+  control::foc::State state_;
+  control::foc::Outputs out_;
+  control::foc::LimitState limits_;
+  control::foc::RotorVector set_point_;
+  control::foc::OffsetCalibration calibration_;
+  control::foc::OffsetFault offset_fault_ = control::foc::OffsetFault::none;
+  bool commanded_ = false;
+  bool has_offsets_ = false;
+  bool runs_ = false;
+  bool commissions_ = false;
+  bool began_ = false;
+  std::uint32_t per_count_ = 0;
+  std::uint32_t before_ = 0;
+  std::uint32_t position_ = 0;  // counts within a turn
+  std::uint32_t angle_ = 0;     // of the encoder, 2^-32 turns
+  std::int64_t speed_ = 0;      // 2^-36 turns a period
+  control::commissioning::Commissioning commissioning_;
+};
+
+}  // namespace flexspline::firmware

@@ -1,0 +1,120 @@
+#include "hil/board/three_phase.hpp"
+
+#include <cmath>
+#include <stdexcept>
+
+#include "hil/board/plant_rig.hpp"
+#include "shared/fixed/turn.hpp"
+
+namespace flexspline::board {
+namespace {
+
+// The demo's drive, and how others scale from it: 3.5 A of 10, 7 pole pairs, a rated speed that induces 7.2 V of 48.
+constexpr double kDemoCurrentA = 3.5, kDemoTorqueConstant = 0.0543, kDemoVelocity = 200.0;
+constexpr double kFullScaleA = 10.0, kBusV = 48.0, kBusFullScaleV = 60.0;
+constexpr double kOhm = 1.0, kHenry = 1e-3;
+constexpr int kPolePairs = 7;
+constexpr int kTimerCounts = 2100;
+enum Stream : std::uint64_t { kShuntNoise = 23 };
+
+double current_scale(const plant::Drive& drive) {
+  return drive.current_limit_a / kDemoCurrentA;
+}
+double voltage_scale(const plant::Drive& drive) {
+  return drive.torque_constant_nm_a * drive.rated_velocity_rad_s / (kDemoTorqueConstant * kDemoVelocity);
+}
+
+}  // namespace
+
+ThreePhaseParameters three_phase_of(const plant::Drive& drive) {
+  const double ampere = current_scale(drive), volt = voltage_scale(drive), ohm = volt / ampere;
+  ThreePhaseParameters p;
+  p.motor.pole_pairs = kPolePairs;
+  p.motor.resistance_ohm = kOhm * ohm;
+  p.motor.inductance_d_h = p.motor.inductance_q_h = kHenry * ohm;
+  p.motor.flux_vs = drive.torque_constant_nm_a / (1.5 * kPolePairs);
+  // The mechanical plant has the temperature.
+  p.motor.heat_capacity_j_k = 1e12;
+  p.inverter.supply_v = kBusV * volt;
+  p.inverter.supply_resistance_ohm *= ohm;
+  p.inverter.on_resistance_ohm *= ohm;
+  p.inverter.diode_drop_v *= volt;
+  p.inverter.bus_capacitance_f /= ohm;
+  p.inverter.leg_capacitance_f /= ohm;
+  p.inverter.pwm_hz = ThreePhaseAmplifier::kPwmHz;
+  p.inverter.averaged_steps = 4;
+  p.sensors.full_scale_a = kFullScaleA * ampere;
+  p.sensors.bus_full_scale_v = kBusFullScaleV * volt;
+  p.sensors.noise_a = 0.01 * ampere;
+  return p;
+}
+
+// As host/deployment makes them from the parameters; a test compares them.
+firmware::ThreePhaseSettings three_phase_settings_of(const plant::Drive& drive) {
+  constexpr control::foc::AxisSettings kAxis = {1521094321,  543636828, 44918200,   1812122759, 79528380,
+                                                -2134008365, -53565016, 1813907110, 1405524761};
+  firmware::ThreePhaseSettings s;
+  s.foc.sensors.gain = {4096, 4096, 4096};
+  s.foc.current = {kAxis, kAxis, 22714284, 624333630, 8388608, 7};
+  s.foc.modulation = {129564847, 30780599, 5418, 36408889, 8400};
+  s.foc.circle = 9408655;
+  // The flux per unit is that of the speed's base.
+  s.foc.current.flux =
+      static_cast<std::int32_t>(std::lround(s.foc.current.flux * kDemoVelocity / drive.rated_velocity_rad_s));
+  const AnalogScales scales = scales_of(drive);
+  const double full_scale = kFullScaleA * current_scale(drive), peak = scales.amplifier_a / full_scale;
+  s.limits.peak_square = s.limits.continuous_square =
+      static_cast<std::uint32_t>(std::lround(std::ldexp(peak * peak, 30)));
+  s.limits.start_square = s.limits.peak_square;
+  s.limits.voltage_share = INT32_MAX;
+  s.offsets = {3276, 1638};  // a tenth of full scale, a twentieth
+  s.pole_pairs = kPolePairs;
+  s.encoder_counts = static_cast<std::uint32_t>(drive.sensors.motor_counts);
+  s.set_point = static_cast<std::int32_t>(std::lround(std::ldexp(peak, 12)));
+  s.reading = static_cast<std::int32_t>(std::lround(std::ldexp(full_scale / scales.current_a, 20)));
+  return s;
+}
+
+ThreePhaseAmplifier::ThreePhaseAmplifier(const plant::Drive& drive, std::uint32_t tick_hz, std::uint64_t seed)
+    : p_(three_phase_of(drive)),
+      torque_constant_(drive.torque_constant_nm_a),
+      full_scale_a_(scales_of(drive).current_a),
+      counts_(drive.sensors.motor_counts),
+      periods_(static_cast<int>(kPwmHz / tick_hz)),
+      power_(p_.motor, p_.inverter, p_.sensors, motor::Fidelity::averaged),
+      shunts_(p_.sensors, seed ^ kShuntNoise) {
+  if (periods_ == 0 || kPwmHz % tick_hz != 0)
+    throw std::invalid_argument("a three-phase drive needs a tick rate that divides its PWM rate of 40000 Hz");
+  stage_.begin(three_phase_settings_of(drive));
+}
+
+double ThreePhaseAmplifier::run(const firmware::Actuation& actuation, double motor_angle_rad, double motor_velocity) {
+  stage_.command(actuation);
+  // Without waiting for the next period.
+  if (!actuation.enabled && !stage_.commissions()) out_ = {};
+  const double period = power_.period_s();
+  double torque = 0.0;
+  for (int k = 0; k < periods_; ++k) {
+    const double start = motor_angle_rad + motor_velocity * period * k;
+    const motor::Rotor at = {start * p_.motor.pole_pairs, motor_velocity * p_.motor.pole_pairs};
+    if (!out_.enabled) power_.motor().stop(at.angle);
+    const double all = kTimerCounts;
+    const motor::Triple duties = {out_.counts.a / all, out_.counts.b / all, out_.counts.c / all};
+    // Off: open switches carry no current, but for back-EMF above the bus, which the rated speed does not reach.
+    const motor::Sample sample = out_.enabled
+                                     ? power_.run(duties, at)
+                                     : motor::Sample{{}, {}, power_.bus_v(), power_.motor().torque_nm(at.angle)};
+    torque += sample.torque_nm / periods_;
+    const motor::Readings r = shunts_.read(sample);
+    const double middle = start + motor_velocity * period / 2.0;
+    const auto counter = static_cast<std::uint32_t>(std::llround(middle / kTurn * counts_));
+    out_ = stage_.update({{r.current[0], r.current[1], r.current[2]}, r.bus, counter});
+  }
+  return torque / torque_constant_;
+}
+
+double ThreePhaseAmplifier::current_a() const {
+  return stage_.current() / 32768.0 * full_scale_a_;
+}
+
+}  // namespace flexspline::board

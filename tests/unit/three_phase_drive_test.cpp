@@ -1,0 +1,170 @@
+// A drive with a three-phase motor: the firmware's stage on the twin's power stage and mechanical plant.
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <cstdio>
+
+#include "hil/board/scenario.hpp"
+#include "hil/board/three_phase.hpp"
+#include "host/deployment/commissioning_settings.hpp"
+#include "host/deployment/foc_settings.hpp"
+#include "tests/support/virtual_drive.hpp"
+
+namespace flexspline::board {
+namespace {
+
+deployment::FocSetup foc_setup_of(const ThreePhaseParameters& p) {
+  deployment::FocSetup s;
+  s.resistance_ohm = p.motor.resistance_ohm + p.inverter.on_resistance_ohm;
+  s.inductance_d_h = p.motor.inductance_d_h;
+  s.inductance_q_h = p.motor.inductance_q_h;
+  s.flux_vs = p.motor.flux_vs;
+  s.current_full_scale_a = p.sensors.full_scale_a;
+  s.bus_full_scale_v = p.sensors.bus_full_scale_v;
+  s.pwm_hz = p.inverter.pwm_hz;
+  s.timer_counts = 2100;
+  s.dead_time_s = p.inverter.dead_time_s;
+  s.dead_time_zone_a = 1.5 * p.inverter.leg_capacitance_f * p.inverter.supply_v / p.inverter.dead_time_s;
+  s.diode_drop_v = p.inverter.diode_drop_v;
+  s.bus_v = p.inverter.supply_v;
+  s.shortest_pulse_s = 0.2e-6;
+  s.sampling_window_s = 1.5e-6;
+  return s;
+}
+void expect_near(std::int32_t a, std::int32_t b) {
+  EXPECT_NEAR(a, b, 1.0 + 1e-6 * std::abs(static_cast<double>(b)));
+}
+plant::Drive larger_drive() {
+  plant::Drive drive = plant::demo_plant().drive;
+  drive.torque_constant_nm_a *= 2.0;
+  drive.current_limit_a *= 3.0;
+  drive.rated_velocity_rad_s *= 0.7;
+  return drive;
+}
+
+TEST(ThreePhaseDrive, ItsSettingsAreThoseThatTheHostMakes) {
+  for (const plant::Drive& drive : {plant::demo_plant().drive, larger_drive()}) {
+    const auto made = deployment::foc_settings(foc_setup_of(three_phase_of(drive)));
+    const auto has = three_phase_settings_of(drive).foc;
+    expect_near(has.current.d.proportional, made.current.d.proportional);
+    expect_near(has.current.q.integral, made.current.q.integral);
+    expect_near(has.current.d.resistance, made.current.d.resistance);
+    expect_near(has.current.d.slope, made.current.d.slope);
+    expect_near(has.current.q.per_slope, made.current.q.per_slope);
+    expect_near(has.current.q.reactance, made.current.q.reactance);
+    expect_near(has.current.flux, made.current.flux);
+    expect_near(has.current.pull, made.current.pull);
+    EXPECT_EQ(has.current.up, made.current.up);
+    expect_near(has.modulation.window, made.modulation.window);
+    expect_near(has.modulation.dead_time, made.modulation.dead_time);
+    expect_near(has.modulation.dead_time_gain, made.modulation.dead_time_gain);
+    expect_near(has.circle, made.circle);
+  }
+}
+
+TEST(ThreePhaseDrive, MakesTheTorqueOfTheCurrentThatTheApplicationAsksFor) {
+  for (const plant::Drive& drive : {plant::demo_plant().drive, larger_drive()}) {
+    ThreePhaseAmplifier amplifier(drive, 20'000, 1);
+    const double full = scales_of(drive).amplifier_a, velocity = 0.5 * drive.rated_velocity_rad_s;
+    double angle = 0.3;
+    const auto run = [&](std::int16_t command, bool enabled, int ticks) {
+      double mean = 0.0;
+      for (int k = 0; k < ticks; ++k) {
+        mean += amplifier.run({command, enabled}, angle, velocity) / ticks;
+        angle += velocity / 20e3;
+      }
+      return mean;
+    };
+    EXPECT_EQ(run(8000, false, 600), 0.0) << "off";
+    run(12000, true, 200);
+    const double wanted = 12000.0 / 32768.0 * full;
+    EXPECT_NEAR(run(12000, true, 1000), wanted, 0.01 * wanted);
+    EXPECT_NEAR(amplifier.current_a(), wanted, 0.02 * wanted);
+    run(-12000, true, 40);
+    EXPECT_NEAR(run(-12000, true, 100), -wanted, 0.02 * wanted) << "2 ms later";
+    EXPECT_EQ(run(0, false, 10), 0.0);
+  }
+}
+
+TEST(ThreePhaseDrive, StaysOffWhereACurrentSensorsZeroIsOutOfRange) {
+  auto settings = three_phase_settings_of(plant::demo_plant().drive);
+  firmware::ThreePhaseStage stage;
+  stage.begin(settings);
+  stage.command({1000, true});
+  for (int k = 0; k < 1100; ++k) EXPECT_FALSE(stage.update({{0, 8000, 0}, 26214, 0}).enabled);
+  EXPECT_TRUE(stage.tripped());
+  for (int k = 0; k < 2100; ++k) stage.update({{0, 100, 0}, 26214, 0});
+  EXPECT_FALSE(stage.tripped());
+  EXPECT_TRUE(stage.update({{0, 100, 0}, 26214, 0}).enabled);
+}
+
+// Errors of the whole drive in closed loop, with its own amplifier as the reference.
+TEST(ThreePhaseDrive, FollowsAMotionAsADriveWithAServoAmplifier) {
+  ScenarioPlan plan;
+  plan.drive = plant::demo_plant().drive;
+  plan.duration_s = 3.0;
+  for (const char* name : {"sine", "slow-reversals"})
+    for (const bool compensation : {false, true}) {
+      plan.scenario = name;
+      plan.compensation = compensation;
+      plan.three_phase = false;
+      const ScenarioResult servo = run_scenario(plan);
+      plan.three_phase = true;
+      const ScenarioResult three = run_scenario(plan);
+      EXPECT_EQ(three.first_fault.fault, firmware::Fault::none);
+      std::printf("%s, compensation %s: rms error %.3e rad, with a servo amplifier %.3e\n", name,
+                  compensation ? "on" : "off", three.rms_error_rad, servo.rms_error_rad);
+      // A count of the output's encoder is 24e-6.
+      EXPECT_NEAR(three.rms_error_rad, servo.rms_error_rad, 0.02 * servo.rms_error_rad + 5e-7);
+    }
+}
+
+deployment::CommissioningSetup commissioning_of(const ThreePhaseParameters& p) {
+  deployment::CommissioningSetup s;
+  s.current_full_scale_a = p.sensors.full_scale_a;
+  s.bus_full_scale_v = p.sensors.bus_full_scale_v;
+  s.pwm_hz = p.inverter.pwm_hz;
+  s.timer_counts = 2100;
+  s.shortest_pulse_s = 0.2e-6;
+  s.sampling_window_s = 1.5e-6;
+  s.dead_time_s = p.inverter.dead_time_s;
+  s.offset_a = 0.1 * p.sensors.full_scale_a;
+  s.spread_a = 0.1 * p.sensors.full_scale_a;
+  s.current_a = 3.5;
+  s.bus_v = p.inverter.supply_v;
+  return s;
+}
+
+// On the drive's own mechanical plant: gear, friction, torsion, load.
+TEST(ThreePhaseDrive, CommissionsItsMotorBehindTheGear) {
+  const plant::Drive drive = plant::demo_plant().drive;
+  const ThreePhaseParameters p = three_phase_of(drive);
+  PlantRig rig({.drive = drive, .three_phase = true});
+  const auto setup = commissioning_of(p);
+  firmware::ThreePhaseStage& stage = rig.three_phase()->stage();
+  stage.commission(deployment::commissioning_settings(setup));
+  const int most_ticks = 30 * 20'000;
+  for (int k = 0; k < most_ticks && stage.commissions(); ++k) rig.act({});
+  ASSERT_FALSE(stage.commissions());
+  const auto& r = stage.commissioning().result();
+  ASSERT_EQ(deployment::commissioning_fault_text(r.fault).name, "none");
+  const auto found = deployment::commissioning_findings(setup, r);
+  std::printf("behind the gear: R %.4f ohm, Ld %.4f mH, Lq %.4f mH, flux %.4f mVs, lag %.1f degrees, %.1f s\n",
+              found.resistance_ohm, 1e3 * found.inductance_d_h, 1e3 * found.inductance_q_h, 1e3 * found.flux_vs,
+              360.0 * found.lag_turns, stage.commissioning().periods() / setup.pwm_hz);
+  EXPECT_NEAR(found.resistance_ohm, p.motor.resistance_ohm + p.inverter.on_resistance_ohm, 0.03);
+  EXPECT_NEAR(found.inductance_d_h, p.motor.inductance_d_h, 0.05 * p.motor.inductance_d_h);
+  EXPECT_NEAR(found.inductance_q_h, p.motor.inductance_q_h, 0.05 * p.motor.inductance_q_h);
+  EXPECT_NEAR(found.flux_vs, p.motor.flux_vs, 0.02 * p.motor.flux_vs);
+  EXPECT_EQ(found.pole_pairs, p.motor.pole_pairs);
+  EXPECT_FALSE(found.reversed);
+  EXPECT_NEAR((found.offset_turns - std::round(found.offset_turns)) * 360.0, 0.0, 1.0);
+}
+
+TEST(ThreePhaseDrive, RefusesATickRateThatDoesNotDivideThePwm) {
+  EXPECT_THROW(ThreePhaseAmplifier(plant::demo_plant().drive, 15'000, 1), std::invalid_argument);
+  EXPECT_NO_THROW(ThreePhaseAmplifier(plant::demo_plant().drive, 10'000, 1));
+}
+
+}  // namespace
+}  // namespace flexspline::board
