@@ -15,10 +15,24 @@
 
 namespace flexspline::firmware {
 
+// What switches the stage off by itself, until the drive is disarmed. Within so many PWM periods.
+enum class StageFault : std::uint8_t {
+  none,
+  sensor_zero,  // a current sensor's zero was out of range when it was last measured; before it switches on
+  bus_low,      // 1
+  bus_high,     // 1
+  overcurrent,  // 1; of a phase
+  current_sum,  // 4; the three currents do not add up to zero: a sensor, or a short to ground
+};
+
 struct ThreePhaseSettings {
   control::foc::Settings foc;
   control::foc::LimitSettings limits;
   control::foc::OffsetCalibration::Limits offsets;
+  std::int32_t least_bus = 0;           // 2^-15 of full scale
+  std::int32_t most_bus = INT16_MAX;    // likewise
+  std::int32_t most_phase = INT32_MAX;  // current of a phase, 2^-27 of its base
+  std::int32_t most_sum = INT32_MAX;    // of the three, likewise
   // Electrical angle = +-pole_pairs encoder + offset_angle, as commissioning finds it.
   std::int32_t pole_pairs = 1;
   bool reversed = false;
@@ -60,8 +74,9 @@ class ThreePhaseStage {
     return static_cast<std::int16_t>(
         fixed::limited(fixed::multiply_high(out_.measured.q, s_.reading), -INT16_MAX, INT16_MAX));
   }
-  // A current sensor's zero was out of range when it was last looked at: the stage stays off.
-  bool tripped() const { return commanded_ && !runs_ && offset_fault_ != control::foc::OffsetFault::none; }
+  // It is commanded on and stays off.
+  bool tripped() const { return commanded_ && fault_ != StageFault::none; }
+  StageFault fault() const { return fault_; }
 
   // Takes the place of current control until it is done. The caller has the drive disarmed.
   void commission(const control::commissioning::Settings& settings) {
@@ -81,7 +96,12 @@ class ThreePhaseStage {
       return out;
     }
     // Once it runs it goes on until it is switched off: offsets are measured without current.
-    if (!commanded_ || !(runs_ || has_offsets_)) return off(in.readings);
+    if (!commanded_ && latched_) {
+      latched_ = false;
+      fault_ = StageFault::none;
+    }
+    if (commanded_ && runs_) check(in);
+    if (!commanded_ || latched_ || !(runs_ || has_offsets_)) return off(in.readings);
     if (!runs_) control::foc::reset(state_);
     runs_ = true;
     control::foc::update(
@@ -94,6 +114,7 @@ class ThreePhaseStage {
 
  private:
   static constexpr int kFilterBits = 4;  // of the speed: periods
+  static constexpr std::int32_t kSumPeriods = 4;
 
   std::uint32_t electrical(std::uint32_t angle) const {
     const std::uint32_t turned = angle * static_cast<std::uint32_t>(s_.pole_pairs);
@@ -116,16 +137,31 @@ class ThreePhaseStage {
     angle_ = position_ * per_count_;
     speed_ += std::int64_t{moved} * per_count_ - (speed_ >> kFilterBits);
   }
+  void latch(StageFault fault) {
+    if (latched_) return;
+    latched_ = true;
+    fault_ = fault;
+  }
+  void check(const Inputs& in) {
+    if (in.bus < s_.least_bus) latch(StageFault::bus_low);
+    if (in.bus > s_.most_bus) latch(StageFault::bus_high);
+    const control::foc::Phases p = control::foc::phase_currents(s_.foc.sensors, in.readings, state_.unmeasured);
+    if (control::commissioning::largest_size(p) > s_.most_phase) latch(StageFault::overcurrent);
+    const bool adds_up = control::commissioning::size(p.a + p.b + p.c) <= s_.most_sum;
+    sum_periods_ = adds_up ? 0 : sum_periods_ + 1;
+    if (sum_periods_ >= kSumPeriods) latch(StageFault::current_sum);
+  }
   Outputs off(const control::foc::Phases& readings) {
+    sum_periods_ = 0;
     runs_ = false;
     out_.measured = {};
     out_.wanted = {};
     calibration_.add(readings);
     if (!calibration_.done()) return {};
     const auto result = calibration_.result(s_.foc.sensors, s_.offsets);
-    offset_fault_ = result.fault;
     has_offsets_ = result.fault == control::foc::OffsetFault::none;
     if (has_offsets_) s_.foc.sensors.offset = result.offset;
+    if (!latched_) fault_ = has_offsets_ ? StageFault::none : StageFault::sensor_zero;
     calibration_ = {};
     return {};
   }
@@ -136,7 +172,9 @@ class ThreePhaseStage {
   control::foc::LimitState limits_;
   control::foc::RotorVector set_point_;
   control::foc::OffsetCalibration calibration_;
-  control::foc::OffsetFault offset_fault_ = control::foc::OffsetFault::none;
+  StageFault fault_ = StageFault::none;
+  bool latched_ = false;  // a fault of a stage that ran
+  std::int32_t sum_periods_ = 0;
   bool commanded_ = false;
   bool has_offsets_ = false;
   bool runs_ = false;

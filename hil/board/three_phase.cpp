@@ -67,7 +67,11 @@ firmware::ThreePhaseSettings three_phase_settings_of(const plant::Drive& drive) 
       static_cast<std::uint32_t>(std::lround(std::ldexp(peak * peak, 30)));
   s.limits.start_square = s.limits.peak_square;
   s.limits.voltage_share = INT32_MAX;
-  s.offsets = {3276, 1638};  // a tenth of full scale, a twentieth
+  s.offsets = {3276, 1638};                          // a tenth of full scale, a twentieth
+  s.least_bus = 13107;                               // 24 V of 60 for the demo's drive
+  s.most_bus = 30583;                                // 56 V
+  s.most_phase = 10 * (std::int32_t{1} << 27) / 16;  // five eighths of full scale: 1.4 times the amplifier's largest
+  s.most_sum = (std::int32_t{1} << 27) / 16;
   s.pole_pairs = kPolePairs;
   s.encoder_counts = static_cast<std::uint32_t>(drive.sensors.motor_counts);
   s.set_point = static_cast<std::int32_t>(std::lround(std::ldexp(peak, 12)));

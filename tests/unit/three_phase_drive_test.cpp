@@ -98,6 +98,40 @@ TEST(ThreePhaseDrive, StaysOffWhereACurrentSensorsZeroIsOutOfRange) {
   EXPECT_TRUE(stage.update({{0, 100, 0}, 26214, 0}).enabled);
 }
 
+TEST(ThreePhaseDrive, SwitchesItsStageOffWithinTheStatedPeriodsUntilItIsDisarmed) {
+  using firmware::StageFault;
+  struct Case {
+    firmware::ThreePhaseStage::Inputs in;
+    StageFault fault;
+    int periods;
+  };
+  const Case cases[] = {{{{0, 0, 0}, 12'000, 0}, StageFault::bus_low, 1},
+                        {{{0, 0, 0}, 31'500, 0}, StageFault::bus_high, 1},
+                        {{{21'000, -10'500, -10'500}, 26'214, 0}, StageFault::overcurrent, 1},
+                        {{{0, 2'500, 0}, 26'214, 0}, StageFault::current_sum, 4}};
+  for (const Case& c : cases) {
+    firmware::ThreePhaseStage stage;
+    stage.begin(three_phase_settings_of(plant::demo_plant().drive));
+    const firmware::ThreePhaseStage::Inputs healthy{{0, 0, 0}, 26'214, 0};
+    for (int k = 0; k < 1100; ++k) stage.update(healthy);
+    // No set point: at the limit of the voltage a phase is not sampled, and the sum says nothing.
+    stage.command({0, true});
+    for (int k = 0; k < 100; ++k) ASSERT_TRUE(stage.update(healthy).enabled);
+    EXPECT_FALSE(stage.tripped());
+    for (int k = 1; k < c.periods; ++k) EXPECT_TRUE(stage.update(c.in).enabled) << k;
+    EXPECT_FALSE(stage.update(c.in).enabled);
+    EXPECT_TRUE(stage.tripped());
+    EXPECT_EQ(stage.fault(), c.fault);
+    for (int k = 0; k < 3000; ++k) EXPECT_FALSE(stage.update(healthy).enabled) << "it stays off";
+    EXPECT_EQ(stage.fault(), c.fault);
+    stage.command({0, false});
+    for (int k = 0; k < 2100; ++k) stage.update(healthy);
+    stage.command({1000, true});
+    EXPECT_TRUE(stage.update(healthy).enabled);
+    EXPECT_FALSE(stage.tripped());
+  }
+}
+
 // Errors of the whole drive in closed loop, with its own amplifier as the reference.
 TEST(ThreePhaseDrive, FollowsAMotionAsADriveWithAServoAmplifier) {
   ScenarioPlan plan;
@@ -159,6 +193,31 @@ TEST(ThreePhaseDrive, CommissionsItsMotorBehindTheGear) {
   EXPECT_EQ(found.pole_pairs, p.motor.pole_pairs);
   EXPECT_FALSE(found.reversed);
   EXPECT_NEAR((found.offset_turns - std::round(found.offset_turns)) * 360.0, 0.0, 1.0);
+
+  // What was found, and nothing else, sets the current loop.
+  deployment::FocSetup measured = foc_setup_of(p);
+  measured.resistance_ohm = found.resistance_ohm;
+  measured.inductance_d_h = found.inductance_d_h;
+  measured.inductance_q_h = found.inductance_q_h;
+  measured.flux_vs = found.flux_vs;
+  firmware::ThreePhaseSettings settings = stage.settings();
+  settings.foc = deployment::foc_settings(measured);
+  settings.foc.sensors.gain = r.gain;
+  settings.pole_pairs = r.pole_pairs;
+  settings.reversed = r.reversed;
+  settings.offset_angle = r.offset_angle;
+  stage.begin(settings);
+  const int offset_ticks = 600, settling_ticks = 100, ticks = 200;
+  for (int k = 0; k < offset_ticks; ++k) rig.act({});
+  double mean = 0.0;
+  for (int k = 0; k < settling_ticks; ++k) rig.act({8000, true});
+  for (int k = 0; k < ticks; ++k) {
+    rig.act({8000, true});
+    mean += rig.current_a() / ticks;
+  }
+  const double wanted = 8000.0 / 32768.0 * scales_of(drive).amplifier_a;
+  EXPECT_NEAR(mean, wanted, 0.01 * wanted);
+  EXPECT_GT(rig.truth().motor_velocity, 0.3) << "friction takes four fifths of the torque";
 }
 
 TEST(ThreePhaseDrive, RefusesATickRateThatDoesNotDivideThePwm) {

@@ -116,7 +116,7 @@ constexpr std::uint32_t angle_of(std::int32_t y, std::int32_t x) {
       y -= before >> k;
       angle += kSteps[k];
     } else {
-      x -= y >> k;
+      x += -y >> k;
       y += before >> k;
       angle -= kSteps[k];
     }
