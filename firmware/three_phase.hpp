@@ -72,7 +72,7 @@ class ThreePhaseStage {
   // In q, a share of full scale of the reading, 2^-15.
   std::int16_t current() const {
     return static_cast<std::int16_t>(
-        fixed::limited(fixed::multiply_high(out_.measured.q, s_.reading), -INT16_MAX, INT16_MAX));
+        fixed::limited<std::int32_t>(fixed::multiply_high(out_.measured.q, s_.reading), -INT16_MAX, INT16_MAX));
   }
   // It is commanded on and stays off.
   bool tripped() const { return commanded_ && fault_ != StageFault::none; }

@@ -80,11 +80,10 @@ class SlowCurrentLoop {
   static constexpr int kToVoltage = kSharesBits + 27 - 28 + kSixteenth;  // of a share times a current
   constexpr std::int32_t axis(std::int64_t& sum, std::int32_t error, std::int32_t most) const {
     const std::int64_t limit = std::int64_t{most} << kSumBits;
-    const std::int64_t added = (std::int64_t{resistance_} * error) >> (kToVoltage - kSumBits);
-    const std::int64_t next = fixed::limited<std::int64_t>(sum + added, -limit, limit);
-    sum = next;
-    const std::int64_t voltage = (next >> kSumBits) + ((std::int64_t{inductance_} * error) >> kToVoltage);
-    return static_cast<std::int32_t>(fixed::limited<std::int64_t>(voltage, -most, most));
+    const std::int64_t added = std::int64_t{resistance_} * error, direct = std::int64_t{inductance_} * error;
+    sum = fixed::limited_to(sum + fixed::shift_right(added, kToVoltage - kSumBits), limit);
+    const std::int64_t voltage = fixed::shift_right(sum, kSumBits) + fixed::shift_right(direct, kToVoltage);
+    return static_cast<std::int32_t>(fixed::limited_to(voltage, std::int64_t{most}));
   }
 
   std::int32_t resistance_ = 0;
