@@ -15,7 +15,7 @@ constexpr double kFullScaleA = 10.0, kBusV = 48.0, kBusFullScaleV = 60.0;
 constexpr double kOhm = 1.0, kHenry = 1e-3;
 constexpr int kPolePairs = 7;
 constexpr int kTimerCounts = 2100;
-enum Stream : std::uint64_t { kShuntNoise = 23 };
+constexpr std::uint64_t kShuntNoise = 23;
 
 double current_scale(const plant::Drive& drive) {
   return drive.current_limit_a / kDemoCurrentA;
