@@ -109,8 +109,8 @@ constexpr Row kRows[] = {
      "Relieve a housing that presses on the stator; map the torque and compensate for it.", kImperfections},
     {kTorque, kPolePairs, [](const MotorTurn& m) { return 6.0 * static_cast<double>(*m.pole_pairs); }, "6 x pole_pairs",
      "dead time of the inverter: its voltage error changes sign with each phase current, six times per electrical turn",
-     "The ripple does not change with the load, and the measured q current shows it. Change the dead time or its "
-     "compensation: the ripple follows.",
+     "The ripple does not change with the load. The measured q current shows it, so that it is not dead time where the "
+     "log's effort is that current. Change the dead time or its compensation: the ripple follows.",
      "Switch the dead-time compensation on and set it to the bridge's dead time; a current controller of higher "
      "bandwidth reduces the rest.",
      "Holmes and Lipo, Pulse Width Modulation for Power Converters"},

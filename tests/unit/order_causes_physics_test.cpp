@@ -88,6 +88,25 @@ TEST(OrdersByParkTransform, DeadTimeTurnsSixTimesPerElectricalTurnAndDoesNotDepe
   }
 }
 
+// Acceleration by second differences of the readings of an encoder whose disc is off centre, at constant speed.
+TEST(OrdersOfAnEncoder, AnEccentricDiscLooksLikeAnAccelerationOnceATurnThatGrowsWithTheSquareOfTheSpeed) {
+  constexpr double kEccentricity_rad = 1e-3;
+  for (const double speed : {10.0, 20.0}) {
+    constexpr int kSteps = 2000;
+    const double step_s = kTurn / speed / kSteps;
+    const auto reading = [&](int k) {
+      const double angle = kTurn * k / kSteps;
+      return std::atan2(std::sin(angle), std::cos(angle) - kEccentricity_rad);
+    };
+    std::vector<double> acceleration;
+    for (int k = -kSteps / 2 + 2; k < kSteps / 2 - 2; ++k)
+      acceleration.push_back((reading(k + 1) - 2.0 * reading(k) + reading(k - 1)) / (step_s * step_s));
+    const auto list = amplitudes(acceleration, 20);
+    EXPECT_EQ(largest_order(list), 1);
+    EXPECT_NEAR(list[1], kEccentricity_rad * speed * speed, 0.01 * list[1]);
+  }
+}
+
 // Attraction between every magnet and every slot: a short bump over the angle between them. Its slope is the torque.
 std::vector<double> cogging(int poles, int slots, double odd_magnet, double odd_slot) {
   std::vector<double> turn;
