@@ -106,6 +106,8 @@ std::string dataset_head(const model::Drive& drive, const std::filesystem::path&
   print("gear_ratio", drive.gear_ratio);
   print("torque_constant_nm_a", drive.torque_constant_nm_a);
   print("pitch_m", drive.pitch_m);
+  print("pole_pairs", drive.pole_pairs);
+  print("motor_slots", drive.motor_slots);
   return text;
 }
 

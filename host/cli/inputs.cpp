@@ -48,6 +48,8 @@ void hold_out(data::Dataset& dataset, data::Dataset held) {
   merge_fact(dataset.drive.gear_ratio, held.drive.gear_ratio, "gear_ratio");
   merge_fact(dataset.drive.torque_constant_nm_a, held.drive.torque_constant_nm_a, "torque_constant_nm_a");
   merge_fact(dataset.drive.pitch_m, held.drive.pitch_m, "pitch_m");
+  merge_fact(dataset.drive.pole_pairs, held.drive.pole_pairs, "pole_pairs");
+  merge_fact(dataset.drive.motor_slots, held.drive.motor_slots, "motor_slots");
   if (!dataset.drive.axis) dataset.drive.axis = held.drive.axis;
   dataset.findings.insert(dataset.findings.end(), held.findings.begin(), held.findings.end());
 }

@@ -88,6 +88,8 @@ struct DriveFacts {
   std::optional<double> gear_ratio;
   std::optional<double> torque_constant_nm_a;
   std::optional<double> pitch_m;
+  std::optional<double> pole_pairs;   // of the motor
+  std::optional<double> motor_slots;  // of its stator
 };
 
 struct Dataset {

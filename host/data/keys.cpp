@@ -12,7 +12,10 @@
 namespace flexspline::data {
 namespace {
 
-constexpr std::array<std::string_view, 4> kDriveKeys = {"axis", "gear_ratio", "torque_constant_nm_a", "pitch_m"};
+constexpr std::array<std::string_view, 6> kDriveKeys = {"axis",    "gear_ratio", "torque_constant_nm_a",
+                                                        "pitch_m", "pole_pairs", "motor_slots"};
+// Of what is counted in a motor.
+constexpr double kMostCounted = 1000.0;
 constexpr std::array<std::string_view, 9> kExperimentKeys = {"experiment",
                                                              "load",
                                                              "role",
@@ -56,6 +59,14 @@ std::optional<Choice> choice(const std::string& key, const KeyValue& value,
 std::optional<double> positive(const std::string& key, const KeyValue& value, Findings& findings) {
   if (value.number && *value.number > 0.0) return value.number;
   wrong_value(key, value, "a number above zero, with a decimal point", findings);
+  return std::nullopt;
+}
+
+std::optional<double> counted(const std::string& key, const KeyValue& value, Findings& findings) {
+  if (value.number && *value.number >= 1.0 && *value.number <= kMostCounted &&
+      *value.number == std::floor(*value.number))
+    return value.number;
+  wrong_value(key, value, fmt::format("a whole number from 1 to {:g}", kMostCounted), findings);
   return std::nullopt;
 }
 
@@ -140,8 +151,11 @@ void apply_drive_keys(const KeyMap& keys, DriveFacts& drive, Findings& findings)
     if (key == "gear_ratio") fact = &drive.gear_ratio;
     if (key == "torque_constant_nm_a") fact = &drive.torque_constant_nm_a;
     if (key == "pitch_m") fact = &drive.pitch_m;
+    if (key == "pole_pairs") fact = &drive.pole_pairs;
+    if (key == "motor_slots") fact = &drive.motor_slots;
     if (fact == nullptr) continue;
-    const std::optional<double> number = positive(key, value, findings);
+    const bool is_count = fact == &drive.pole_pairs || fact == &drive.motor_slots;
+    const std::optional<double> number = is_count ? counted(key, value, findings) : positive(key, value, findings);
     if (number && *fact && std::abs(*number - **fact) > 1e-3 * std::abs(**fact))
       conflict(key, value, fmt::format("{}", **fact));
     else if (number && !*fact)

@@ -23,7 +23,7 @@ struct KeyValue {
 };
 using KeyMap = std::map<std::string, KeyValue>;
 
-// Keys of the drive as a whole: axis, gear_ratio, torque_constant_nm_a, pitch_m.
+// Keys of the drive as a whole: axis, gear_ratio, torque_constant_nm_a, pitch_m, pole_pairs, motor_slots.
 bool is_drive_key(std::string_view key);
 // Keys of one experiment: load, role, encoder_counts, noise_std_current_a, ...
 bool is_experiment_key(std::string_view key);

@@ -17,6 +17,7 @@ BalanceData BalanceData::decimated(PreparedData& few) const {
   few = PreparedData{};
   few.pipeline = prepared_->pipeline;
   few.constants = prepared_->constants;
+  few.drive = prepared_->drive;
   few.torque_measured = prepared_->torque_measured;
   few.effort_is_current = prepared_->effort_is_current;
   few.rotary = prepared_->rotary;

@@ -169,6 +169,8 @@ model::Drive reconcile(const model::Drive& drive, const data::Dataset& dataset, 
   one(result.gear_ratio, dataset.drive.gear_ratio, "gear_ratio");
   one(result.torque_constant_nm_a, dataset.drive.torque_constant_nm_a, "torque_constant_nm_a");
   one(result.pitch_m, dataset.drive.pitch_m, "pitch_m");
+  one(result.pole_pairs, dataset.drive.pole_pairs, "pole_pairs");
+  one(result.motor_slots, dataset.drive.motor_slots, "motor_slots");
   if (dataset.drive.axis && *dataset.drive.axis != drive.axis)
     warnings.push_back("the data set's axis is not of the model's kind (rotary, linear); the model's is used");
   return result;

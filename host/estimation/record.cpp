@@ -281,6 +281,7 @@ PreparedData without_records(const std::vector<const Experiment*>& experiments, 
   PreparedData prepared;
   prepared.pipeline = pipeline;
   prepared.constants = catalogue::constants_of(drive);
+  prepared.drive = drive;
   prepared.rotary = drive.axis == data::Axis::rotary;
   for (const Experiment* e : experiments) {
     prepared.torque_measured = prepared.torque_measured || e->has(Column::torque);

@@ -110,6 +110,7 @@ struct PreparedData {
   Pipeline pipeline;
   std::vector<Record> records;
   catalogue::DriveConstants<double> constants;
+  model::Drive drive;            // that they come from
   bool torque_measured = false;  // else motor and load are one balance, with load terms divided by the gear ratio
   bool effort_is_current = false;
   bool rotary = true;

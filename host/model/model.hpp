@@ -27,7 +27,9 @@ struct Drive {
   Quantity rated_velocity_rad_s;
   Quantity rated_torque_nm;
   Quantity temperature_reference_c;
-  Quantity pitch_m;  // linear axis: travel of one motor turn
+  Quantity pitch_m;      // linear axis: travel of one motor turn
+  Quantity pole_pairs;   // of the motor; a whole number
+  Quantity motor_slots;  // of its stator; a whole number
 };
 
 struct Parameter {

@@ -31,9 +31,11 @@ struct Bounds {
   double high = std::numeric_limits<double>::infinity();
 };
 
-// Everything in [drive] is a size, except the temperature.
-Bounds drive_bounds(std::string_view key) {
-  if (key == "temperature_reference_c") return {-273.15, 1000.0};
+// Everything in [drive] is a size, except the temperature. What is counted is small in any motor.
+constexpr double kMostCounted = 1000.0;
+Bounds drive_bounds(const DriveKey& key) {
+  if (key.key == "temperature_reference_c") return {-273.15, 1000.0};
+  if (key.is_count) return {1.0, kMostCounted};
   return {std::numeric_limits<double>::min(), std::numeric_limits<double>::max()};
 }
 
@@ -137,11 +139,12 @@ class Reader {
       result.axis = name == "linear" ? data::Axis::linear : data::Axis::rotary;
     }
     for (const DriveKey& key : kDriveKeys)
-      if (const Node* value = node.find(key.key)) result.*key.quantity = quantity(*value, key.key);
+      if (const Node* value = node.find(key.key)) result.*key.quantity = quantity(*value, key);
     return result;
   }
 
-  Quantity quantity(const Node& node, std::string_view key) const {
+  Quantity quantity(const Node& node, const DriveKey& fact) const {
+    const std::string_view key = fact.key;
     Quantity result;
     const Node* value = &node;
     if (node.kind == NodeKind::table) {
@@ -150,7 +153,11 @@ class Reader {
       if (const Node* source = node.find("source")) result.source = text(*source, "source");
       value = node.find("value");
     }
-    if (value) result.value = number_within(*value, key, drive_bounds(key));
+    if (!value) return result;
+    result.value = number_within(*value, key, drive_bounds(fact));
+    if (fact.is_count && value->number != std::floor(value->number))
+      fail(value->line, fmt::format("{} = {} is not a whole number", key, exact_text(value->number)),
+           fmt::format("write how many the motor has, such as {} = 12, or leave the key out", key));
     return result;
   }
 

@@ -42,6 +42,7 @@ bool is_stated(const Parameter& parameter);
 struct DriveKey {
   std::string_view key;
   Quantity Drive::*quantity;
+  bool is_count = false;  // a whole number
 };
 inline constexpr DriveKey kDriveKeys[] = {
     {"gear_ratio", &Drive::gear_ratio},
@@ -51,6 +52,8 @@ inline constexpr DriveKey kDriveKeys[] = {
     {"rated_torque_nm", &Drive::rated_torque_nm},
     {"temperature_reference_c", &Drive::temperature_reference_c},
     {"pitch_m", &Drive::pitch_m},
+    {"pole_pairs", &Drive::pole_pairs, true},
+    {"motor_slots", &Drive::motor_slots, true},
 };
 
 std::string_view axis_name(data::Axis axis);

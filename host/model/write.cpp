@@ -15,6 +15,8 @@ std::string_view comment(std::string_view key, data::Axis axis) {
       {"rated_torque_nm", "output side; divided by gear_ratio at the motor"},
       {"temperature_reference_c", "at which the temperature effects are zero"},
       {"pitch_m", "travel of one motor turn"},
+      {"pole_pairs", "of the motor"},
+      {"motor_slots", "of the motor's stator"},
   };
   if (axis == data::Axis::linear && key == "torque_constant_nm_a") return "N/A on this axis";
   if (axis == data::Axis::linear && key == "rated_velocity_rad_s") return "m/s on this axis";

@@ -221,7 +221,9 @@ json candidate_json(const Candidate& c, std::size_t rank, const std::string& uni
           {"explanation", text(&effects::Description::explanation)},
           {"consequence", text(&effects::Description::consequence)},
           {"causes", text(&effects::Description::causes)},
-          {"check", text(&effects::Description::check)}};
+          {"check", text(&effects::Description::check)},
+          {"order_causes", order_causes_json(c)},
+          {"order_hint", c.order_hint.empty() ? json(nullptr) : json(c.order_hint)}};
 }
 
 }  // namespace

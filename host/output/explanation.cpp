@@ -61,6 +61,18 @@ void print_confounding(Console& console, const Candidate& c, std::string_view se
         wrapped(fmt::format("To separate them, record {}; flexspline plan --separate designs it.", separated_by)));
 }
 
+// What on this drive makes a ripple of this order.
+void print_order_causes(Console& console, const Candidate& c) {
+  if (!c.order_causes.empty())
+    console.line(wrapped(fmt::format("On this drive {:g} per motor turn is the order of:", *c.order)));
+  for (const catalogue::OrderCause& one : c.order_causes) {
+    console.line(wrapped(fmt::format("- {} ({}).", one.cause, one.from), 2, 2));
+    console.line(wrapped(fmt::format("Check: {}", one.check), 4, 2));
+    console.line(wrapped(fmt::format("Cure: {}", one.cure), 4, 2));
+  }
+  if (!c.order_hint.empty()) console.line(wrapped(c.order_hint));
+}
+
 }  // namespace
 
 void print_explanation(Console& console, const Candidate& c, const std::string& unit) {
@@ -86,6 +98,7 @@ void print_explanation(Console& console, const Candidate& c, const std::string& 
   print("", c.note);
   if (c.evidence && !c.evidence->bins.empty()) print_map(console, *c.evidence, unit);
   print("What it does: ", info.consequence);
+  print_order_causes(console, c);
   print("Usual causes: ", info.causes);
   print("Check on the machine: ", info.check);
   print_confounding(console, c, info.separated_by);
@@ -113,6 +126,18 @@ json confounding_reasons_json(const Candidate& c) {
     list.push_back({{"effect", r.effect},
                     {"own_percent", json_number(r.own_percent)},
                     {"variable", r.variable.empty() ? json(nullptr) : json(r.variable)}});
+  return list;
+}
+
+json order_causes_json(const Candidate& c) {
+  if (!c.order) return nullptr;
+  json list = json::array();
+  for (const catalogue::OrderCause& one : c.order_causes)
+    list.push_back({{"from", one.from},
+                    {"cause", one.cause},
+                    {"check", one.check},
+                    {"cure", one.cure},
+                    {"reference", one.reference}});
   return list;
 }
 

@@ -18,6 +18,8 @@ std::string detectable_in_words(const selection::Candidate& candidate);
 // P with "at_most" and "at", a list of P; null where there is none.
 nlohmann::json detectable_json(const selection::Candidate& candidate);
 nlohmann::json confounding_reasons_json(const selection::Candidate& candidate);
+// List of {"from", "cause", "check", "cure", "reference"}; null where the effect has no order.
+nlohmann::json order_causes_json(const selection::Candidate& candidate);
 nlohmann::json evidence_json(const selection::Candidate& candidate, const std::string& unit);
 // {"rms", "peak", "unit", "percent_of_rated"}; null where the effect is not named.
 nlohmann::json size_json(const selection::Candidate& candidate, const std::string& unit);

@@ -195,6 +195,7 @@ void add_stated_facts(Draft& draft, const Request& request) {
   if (request.gear_ratio) draft.toml.drive["gear_ratio"] = number_value(*request.gear_ratio);
   if (request.torque_constant_nm_a)
     draft.toml.drive["torque_constant_nm_a"] = number_value(*request.torque_constant_nm_a);
+  if (request.pole_pairs) draft.toml.drive["pole_pairs"] = number_value(*request.pole_pairs);
   if (request.encoder_counts) draft.toml.defaults["encoder_counts"] = number_value(*request.encoder_counts);
 }
 

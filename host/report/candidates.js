@@ -16,6 +16,10 @@ function candidateCard(c, round) {
   if (c.note) card.append(el("p", {}, c.note));
   if (c.evidence && c.evidence.bins.length) card.append(evidenceTable(c.evidence));
   if (c.consequence) card.append(el("p", {}, el("strong", {}, "What it does: "), c.consequence));
+  if (c.order_causes && c.order_causes.length)
+    card.append(el("p", {}, `On this drive ${number(c.order)} per motor turn is the order of:`), el("ul", {}, ...c.order_causes.map((o) =>
+      el("li", {}, el("strong", {}, `${o.cause} (${o.from}). `), `Check: ${o.check} Cure: ${o.cure} Reference: ${o.reference}.`))));
+  if (c.order_hint) card.append(el("p", { class: "note" }, c.order_hint));
   if (c.causes) card.append(el("p", {}, el("strong", {}, "Usual causes: "), c.causes));
   if (c.check) card.append(el("p", {}, el("strong", {}, "Check on the machine: "), c.check));
   if (c.rivals.length) {

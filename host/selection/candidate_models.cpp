@@ -8,6 +8,7 @@
 #include <algorithm>
 #include <cmath>
 
+#include "host/catalogue/order_causes.hpp"
 #include "host/estimation/pivoted_qr.hpp"
 #include "host/estimation/variable_projection.hpp"
 
@@ -126,7 +127,7 @@ std::vector<double> likely_orders(const BalanceData& data, const catalogue::Entr
   const std::size_t given = static_cast<std::size_t>(std::find_if(entry.parameters.begin(), entry.parameters.end(),
                                                                   [](const auto& p) { return p.kind == Kind::given; }) -
                                                      entry.parameters.begin());
-  for (int order = 1; order <= kPolicy.highest_order; ++order) {
+  for (const double order : possible_orders(entry, data.prepared().drive)) {
     Eigen::MatrixXd waves(left.residual.size(), 0);
     for (std::size_t p = 0; p < entry.parameters.size(); ++p) {
       if (p == given) continue;
@@ -183,6 +184,14 @@ bool states_a_torque(const Terms& terms) {
     for (std::size_t p = 0; p < t.known.size(); ++p)
       if (t.known[p] && t.entry->parameters[p].kind == Kind::linear && t.values[p] != 0.0) return true;
   return false;
+}
+
+std::vector<double> possible_orders(const catalogue::Entry& entry, const model::Drive& drive) {
+  std::vector<double> orders;
+  for (int order = 1; order <= kPolicy.highest_order; ++order) orders.push_back(order);
+  for (const double order : catalogue::orders_of_motor(entry, drive))
+    if (order > kPolicy.highest_order) orders.push_back(order);
+  return orders;
 }
 
 Terms extend(const Terms& terms, const catalogue::Entry& entry, std::optional<double> order) {

@@ -30,6 +30,10 @@ struct Unexplained {
 std::vector<CandidateModel> candidate_models(const estimation::BalanceData& data, const estimation::Terms& terms,
                                              const Unexplained& left);
 
+// The orders that a drive may have: all up to the policy's highest, and those that pole pairs and slots of its motor
+// give beyond.
+std::vector<double> possible_orders(const catalogue::Entry& entry, const model::Drive& drive);
+
 // Values of a nonlinear parameter that a search tries first; their columns are cached.
 inline constexpr std::size_t kGridPoints = 6;
 

@@ -47,11 +47,12 @@ CandidateTerm term_of(const catalogue::Entry& entry, std::optional<double> order
 }
 
 // Orders of which the data hold whole cycles; nothing where the effect has none.
-std::vector<std::optional<double>> orders_of(const catalogue::Entry& entry, const Motion& motion) {
+std::vector<std::optional<double>> orders_of(const catalogue::Entry& entry, const model::Drive& drive,
+                                             const Motion& motion) {
   if (entry.count(Kind::given) == 0) return {std::nullopt};
   std::vector<std::optional<double>> orders;
-  for (int k = 1; k <= kPolicy.highest_order; ++k)
-    if (motion.travel * k / motion.turn >= kFewestCycles) orders.emplace_back(k);
+  for (const double order : possible_orders(entry, drive))
+    if (motion.travel * order / motion.turn >= kFewestCycles) orders.emplace_back(order);
   for (const double order : kPlacebos)
     if (motion.travel * order / motion.turn >= kFewestCycles) orders.emplace_back(order);
   return orders;
@@ -164,7 +165,7 @@ void add_catalogue_terms(TableBuilder& builder, const Motion& motion) {
     if (entry.identified_on() != balance && !(collapsed && info.balance == Balance::load)) continue;
     if (info.phase == Phase::shift || entry.has_state || entry.definition) continue;  // states: see presliding
     if (!may_be_seen(builder.data, builder.terms, entry)) continue;
-    for (const std::optional<double>& order : orders_of(entry, motion)) {
+    for (const std::optional<double>& order : orders_of(entry, builder.prepared().drive, motion)) {
       Extension e{entry, order, {}, order ? *order * motion.typical_speed / motion.turn : 0.0};
       try {
         e.terms = extend(builder.terms, entry, order);

@@ -211,6 +211,15 @@ void name_effects(const SearchedBalance& chosen, const std::string& alias, Diagn
   }
 }
 
+void explain_orders(const model::Drive& drive, Diagnosis& result) {
+  for (Candidate& c : result.candidates) {
+    const catalogue::Entry* entry = catalogue::find(c.effect);
+    if (!c.order || entry == nullptr) continue;
+    c.order_causes = catalogue::order_causes(*entry, *c.order, drive);
+    c.order_hint = catalogue::order_hint(*entry, drive);
+  }
+}
+
 void list_candidates(std::vector<SearchedBalance>& all, data::Axis axis, Diagnosis& result) {
   for (SearchedBalance& e : all) {
     const DetectionLimit detection(e.search);
@@ -271,6 +280,14 @@ void assess_remainder(const SearchedBalance& chosen, Diagnosis& result) {
   else
     result.verdict =
         result.noise_floor && !remaining.empty() ? Verdict::unknown_structure : Verdict::nothing_significant;
+}
+
+// Whether the data could show anything at all.
+void assess_excitation(bool moves, Diagnosis& result) {
+  if (result.resampling && result.resampling->too_little)
+    result.warnings.push_back(
+        "these data have too few samples to choose effects on halves of them; record longer, with several strokes");
+  if (!moves || (result.resampling && result.resampling->too_little)) result.verdict = Verdict::insufficient_excitation;
 }
 
 }  // namespace
@@ -347,10 +364,8 @@ Diagnosis diagnose(const data::Dataset& dataset, const model::Model& model, cons
     check_unknown_structure(chosen.search, names_one ? &chosen.candidates.front() : nullptr, result);
   }
   if (by_resampling) name_between_records(*base, chosen, result);
-  if (result.resampling && result.resampling->too_little)
-    result.warnings.push_back(
-        "these data have too few samples to choose effects on halves of them; record longer, with several strokes");
-  if (!moves || (result.resampling && result.resampling->too_little)) result.verdict = Verdict::insufficient_excitation;
+  explain_orders(base->model.drive, result);
+  assess_excitation(moves, result);
   return result;
 }
 

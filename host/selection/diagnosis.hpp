@@ -7,6 +7,7 @@
 #include <string>
 #include <vector>
 
+#include "host/catalogue/order_causes.hpp"
 #include "host/data/dataset.hpp"
 #include "host/estimation/identify.hpp"
 #include "host/model/model.hpp"
@@ -75,6 +76,9 @@ struct Candidate {
   std::optional<EffectSize> size;    // of named effects
   std::optional<Detectable> minimum_detectable;
   std::string note;  // what its values mean, where that differs from the effect's name
+  // What on this drive makes its order, and which fact of the drive would tell more.
+  std::vector<catalogue::OrderCause> order_causes;
+  std::string order_hint;
 };
 
 struct LocalisedResidual {

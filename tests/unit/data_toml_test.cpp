@@ -99,6 +99,28 @@ TEST(DatasetToml, ForceOnARotaryAxisIsAWarningUnlessALeverArmConvertsIt) {
   EXPECT_TRUE(of_kind(load({folder.path()}).findings, "unit").empty());
 }
 
+TEST(DatasetToml, PolePairsAndSlotsOfTheDriveAreWholeNumbers) {
+  const TestFolder folder;
+  folder.write("run.csv", good_csv(1000));
+  folder.write("dataset.toml", std::string(kFormatLine) + "[drive]\npole_pairs = 7\nmotor_slots = 12\n");
+  const DriveFacts drive = load({folder.path()}).drive;
+  EXPECT_EQ(drive.pole_pairs, 7.0);
+  EXPECT_EQ(drive.motor_slots, 12.0);
+  for (const std::string key : {"pole_pairs", "motor_slots"})
+    for (const std::string value : {"0", "-7", "3.5", "2000", "\"seven\""}) {
+      folder.write("dataset.toml", std::string(kFormatLine) + "[drive]\n" + key + " = " + value + "\n");
+      try {
+        load({folder.path()});
+        ADD_FAILURE() << key << " = " << value;
+      } catch (const DataError& error) {
+        const std::string what = error.what();
+        EXPECT_NE(what.find(key), std::string::npos) << what;
+        EXPECT_NE(what.find("a whole number from 1 to 1000"), std::string::npos) << what;
+        EXPECT_NE(what.find("dataset.toml:3"), std::string::npos) << what;
+      }
+    }
+}
+
 TEST(DatasetToml, PartsOfAFileAreHalfOpenAndCarryTheirOwnKeys) {
   const TestFolder folder;
   folder.write("run.csv", "# temperature: warm\n" + good_csv(1000));

@@ -132,7 +132,7 @@ TEST_F(FirmwareKeys, WhatIsNoKeyOrOthersMayReadIsRefused) {
   const std::string good = read("a.key");
   EXPECT_NE(refusal("none.key").find("cannot be read"), std::string::npos);
   write("text.key", "hello");
-  EXPECT_NE(refusal("text.key").find("is not a key"), std::string::npos);
+  EXPECT_NE(refusal("text.key").find("is not a file of keys"), std::string::npos);
   write("short.key", R"({"format": "flexspline-signing-key/1", "public": "", "secret": "00"})");
   EXPECT_NE(refusal("short.key").find("64 hexadecimal digits"), std::string::npos);
   std::string other = good;

@@ -35,6 +35,28 @@ void expect_error(const std::string& text, int line, const std::string& what, co
   EXPECT_NE(message.find(remedy, semicolon), std::string::npos) << message;
 }
 
+TEST(ModelParse, PolePairsAndSlotsAreWholeNumbersFromOneToAThousand) {
+  const Model model =
+      model_of(kHead + "[drive]\npole_pairs = 7\nmotor_slots = { value = 12.0, source = \"data sheet\" }\n");
+  EXPECT_EQ(model.drive.pole_pairs.value, 7.0);
+  EXPECT_EQ(model.drive.motor_slots.value, 12.0);
+  EXPECT_EQ(model.drive.motor_slots.source, "data sheet");
+  EXPECT_FALSE(model_of(kHead + "[drive]\ngear_ratio = 100\n").drive.pole_pairs.value);
+  for (const std::string key : {"pole_pairs", "motor_slots"}) {
+    const auto with = [&](const std::string& value) { return kHead + "[drive]\n" + key + " = " + value + "\n"; };
+    expect_error(with("3.5"), 3, key + " = 3.5 is not a whole number", "how many the motor has");
+    expect_error(with("{ value = 0.99999999 }"), 3, "is not a whole number", "how many the motor has");
+    expect_error(with("0"), 3, key + " = 0 is outside its bounds", "between 1 and 1000");
+    expect_error(with("-4"), 3, key + " = -4 is outside its bounds", "between 1 and 1000");
+    expect_error(with("1e6"), 3, "is outside its bounds", "between 1 and 1000");
+    expect_error(with("\"7\""), 3, key + " is text, not a number", "without quotes");
+    expect_error(with("true"), 3, key + " is", "without quotes");
+    expect_error(with("nan"), 3, key + " is NaN", "leave the key out");
+    expect_error(with("{ value = 7, unit = \"1\" }"), 3, "has no key \"unit\"", "value, source");
+  }
+  expect_error(kHead + "[drive]\npole_pair = 7\n", 3, "no key \"pole_pair\"", "\"pole_pairs\"");
+}
+
 TEST(ModelParse, ReadsDriveEffectsAndHistory) {
   const Model model = model_of(R"(format = "flexspline-model/1"
 name = "rhs-100"

@@ -211,6 +211,24 @@ TEST(ModelRewrite, AnEffectOfAnotherTypeUnderTheSameIdTakesThePlaceOfTheFirst) {
   EXPECT_EQ(rewrite(file, changed), kHead + "\n[[effect]]\ntype = \"viscous_friction\"\nid = \"f\"\n");
 }
 
+TEST(ModelRewrite, PolePairsAndSlotsStayAndAreWrittenWhereTheyAreNew) {
+  const std::string text = kHead + "\n[drive]\npole_pairs = 7   # counted\n";
+  const ModelFile file = file_of(text);
+  EXPECT_EQ(rewrite(file, file.model), text);
+  Model changed = file.model;
+  changed.effects.push_back(effect_of("coulomb_friction"));
+  changed.drive.motor_slots = {12.0, "data set"};
+  const std::string result = rewrite(file, changed);
+  EXPECT_NE(result.find("pole_pairs = 7   # counted\n"), std::string::npos) << result;
+  EXPECT_EQ(file_of(result).model.drive.motor_slots.value, 12.0);
+  EXPECT_EQ(file_of(result).model.drive.motor_slots.source, "data set");
+  const std::string anew = write(changed);
+  EXPECT_NE(anew.find("pole_pairs = 7  # of the motor\n"), std::string::npos) << anew;
+  EXPECT_EQ(file_of(anew).model.drive.pole_pairs.value, 7.0);
+  changed.drive.pole_pairs.value = 3.5;
+  EXPECT_THROW(write(changed), std::logic_error);
+}
+
 TEST(ModelRewrite, AFileWithoutALastNewlineOrWithoutEffectsCanBeExtended) {
   ModelFile file = file_of("format = \"flexspline-model/1\"");
   Model changed = file.model;

@@ -21,6 +21,7 @@ export interface Candidate {
   rmse_cv_before: number | null; rmse_cv_after: number | null; unit: string; p_value: number | null; parameters: Parameter[];
   admissible: boolean; why_not: string | null; note: string | null; rivals: string[]; evidence: Evidence | null; equation: string | null;
   separating_experiment: string | null; explanation: string | null; consequence: string | null; causes: string | null; check: string | null;
+  order_causes: { from: string; cause: string; check: string; cure: string; reference: string }[] | null; order_hint: string | null;
 }
 export interface Diagnosis {
   verdict: string; verdict_in_words: string; named: { effect: string; order: number | null }[]; balance: string | null;

@@ -85,7 +85,10 @@ export class Missing {
       el("p", {}, el("strong", {}, "Evidence: "), `on left-out data the error of the ${c.balance} balance decreases from ${withUnit(c.rmse_cv_before, c.unit)} to ${withUnit(c.rmse_cv_after, c.unit)}` +
         (found.base.noise_floor ? `; noise is ${withUnit(found.base.noise_floor, c.unit)}` : "") + `. ${certainty(c, found)}.`),
       part("", c.note), c.rivals.length ? part("Cannot be distinguished from:", `${c.rivals.map(words).join(", ")}. What distinguishes them: ${c.separating_experiment ?? "unknown"}.`) : el("span"),
-      part("What it does:", c.consequence), part("Usual causes:", c.causes), part("Check on the machine:", c.check),
+      part("What it does:", c.consequence),
+      c.order_causes?.length ? el("div", { class: "order-causes" }, el("p", {}, `On this drive ${c.order} per motor turn is the order of:`), el("ul", {}, c.order_causes.map((o) =>
+        el("li", {}, el("strong", {}, `${o.cause} (${o.from}). `), `Check: ${o.check} Cure: ${o.cure}`)))) : el("span"),
+      part("", c.order_hint), part("Usual causes:", c.causes), part("Check on the machine:", c.check),
     ];
   }
 
