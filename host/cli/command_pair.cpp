@@ -127,9 +127,8 @@ Command pair_command() {
        "monitor --residual-map take it as --pairing-key. Telemetry, arming and set points stay free. Keep a copy of "
        "the file: without it the pairing ends only by firmware that was built for that, or with a programmer. Take "
        "another key than the one for firmware. Without --pairing-key the state is shown.",
-       {"flexspline key --new pairing.key", "flexspline pair --drive twin",
-        "flexspline pair --drive twin --pairing-key pairing.key",
-        "flexspline unpair --drive twin --pairing-key pairing.key"}},
+       {"flexspline key --new pairing.key", "flexspline pair --drive twin --pairing-key pairing.key",
+        "flexspline unpair --drive twin --pairing-key pairing.key", "flexspline pair --drive twin"}},
       declare, run);
 }
 
