@@ -7,17 +7,10 @@
 # Exit code: 1 if one failed.
 set -euo pipefail
 program=${1:?} minutes=${2:?} folder=${3:?}
-mkdir -p "$folder"
-# Another program starts a new campaign.
-sum=$(sha256sum "$program" | cut -d ' ' -f 1)
-if [[ $(cat "$folder/program" 2>/dev/null) != "$sum" ]]; then
-  rm -f "$folder"/*.txt
-  echo "$sum" >"$folder/program"
-fi
-touch "$folder/done.txt"
+# shellcheck source-path=SCRIPTDIR source=resumable.sh
+source "$(dirname -- "${BASH_SOURCE[0]}")/resumable.sh"
+begin_campaign "$program" "$minutes" "$folder"
 mapfile -t tests < <("$program" --gtest_list_tests | awk '/^[^ ]/ {suite = $1} /^ / {print suite $1}')
-until=$(awk -v m="$minutes" 'BEGIN {printf "%d", 60 * m}')
-SECONDS=0
 for test in "${tests[@]}"; do
   if grep -q "^$test " "$folder/done.txt"; then continue; fi
   ((SECONDS < until)) || break

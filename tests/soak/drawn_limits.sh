@@ -8,16 +8,9 @@
 set -euo pipefail
 program=${1:?} minutes=${2:?} folder=${3:?}
 all=180000 part=10000
-mkdir -p "$folder"
-# Another program starts anew.
-sum=$(sha256sum "$program" | cut -d ' ' -f 1)
-if [[ $(cat "$folder/program" 2>/dev/null) != "$sum" ]]; then
-  rm -f "$folder"/*.txt
-  echo "$sum" >"$folder/program"
-fi
-touch "$folder/done.txt"
-until=$(awk -v m="$minutes" 'BEGIN {printf "%d", 60 * m}')
-SECONDS=0
+# shellcheck source-path=SCRIPTDIR source=resumable.sh
+source "$(dirname -- "${BASH_SOURCE[0]}")/resumable.sh"
+begin_campaign "$program" "$minutes" "$folder"
 for ((first = 0; first < all; first += part)); do
   if grep -q "^$first " "$folder/done.txt"; then continue; fi
   ((SECONDS < until)) || break
