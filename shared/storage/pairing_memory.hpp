@@ -39,7 +39,7 @@ class PairingMemory {
     used_ = 0;
     for (std::size_t r = 0; r < kRecords; ++r)
       if (!is_blank(r)) used_ = r + 1;
-    if (used_ > 0) settle(used_ - 1);
+    if (used_ > 0) refresh_or_void(used_ - 1);
     is_paired_ = false;
     key_ = {};
     for (std::size_t r = 0; r < used_; ++r) {
@@ -111,7 +111,7 @@ class PairingMemory {
     return crc ^ (static_cast<std::uint32_t>(record + 1) * 0x9E3779B1U);
   }
   // Writing a valid record again also refreshes bits that fade.
-  constexpr void settle(std::size_t record) {
+  constexpr void refresh_or_void(std::size_t record) {
     const std::uint32_t code = word(record, kCode);
     if (code != kPaired && code != kNotPaired) {
       if (code != 0) put(record * kRecordWords + kCode, 0);

@@ -28,12 +28,12 @@ class Injection {
     }
     if (part_ == Part::grow) {
       if (size(current - static_cast<std::int32_t>(level_)) >= s.current / 4 || amplitude_ >= s.most_voltage) {
-        go(Part::settle);
+        go(Part::transient);
       } else {
         amplitude_ += s.most_voltage >> 11;
       }
-    } else if (part_ == Part::settle) {
-      if (++count_ >= kSettlePeriods && before == 0) part_ = Part::measure;
+    } else if (part_ == Part::transient) {
+      if (++count_ >= kTransientPeriods && before == 0) part_ = Part::measure;
     }
     if (part_ == Part::measure && !impedance_.done()) {
       impedance_.add(voltage, current);
@@ -45,9 +45,9 @@ class Injection {
   }
 
  private:
-  enum class Part : std::uint8_t { still, grow, settle, measure };
+  enum class Part : std::uint8_t { still, grow, transient, measure };
   static constexpr int kStillBits = 6;
-  static constexpr int kSettlePeriods = 256;
+  static constexpr int kTransientPeriods = 256;
   constexpr void go(Part part) {
     part_ = part;
     count_ = 0;

@@ -23,8 +23,8 @@ class ResistanceTest {
       case Part::ramp:
         ramp(c, target);
         break;
-      case Part::settle:
-        settle(c, target);
+      case Part::transient:
+        wait_for_transient(c, target);
         break;
       case Part::average:
         average(c, target);
@@ -64,7 +64,7 @@ class ResistanceTest {
   }
 
  private:
-  enum class Part : std::uint8_t { rest, ramp, settle, average };
+  enum class Part : std::uint8_t { rest, ramp, transient, average };
   struct Level {
     PhaseMeans phases;
     std::int64_t voltage = 0;
@@ -72,7 +72,7 @@ class ResistanceTest {
   static constexpr std::int32_t kOne = 4096;  // of gains and corrections
   static constexpr int kDirections = 3;
   static constexpr int kRestPeriods = 512;
-  static constexpr int kSettlePeriods = 1024;
+  static constexpr int kTransientPeriods = 1024;
   static constexpr int kSamplesBits = 10;
   static constexpr std::int32_t kMostWindows = 32;  // until the rotor stands
 
@@ -88,7 +88,7 @@ class ResistanceTest {
   // By the largest phase, whichever it is: sensors may be in another order than the legs.
   constexpr void ramp(Context& c, std::int32_t target) {
     const std::int32_t most = largest_size(c.now.phases);
-    if (most >= target) return go(Part::settle);
+    if (most >= target) return go(Part::transient);
     if (voltage_ < c.settings.most_voltage) {
       voltage_ += c.settings.voltage_ramp;
       return;
@@ -103,12 +103,12 @@ class ResistanceTest {
     next_direction();
   }
   // What a moving rotor induced, and the ramp added for it, goes down again.
-  constexpr void settle(const Context& c, std::int32_t target) {
+  constexpr void wait_for_transient(const Context& c, std::int32_t target) {
     if (largest_size(c.now.phases) > target + target / 8 && voltage_ > 0) {
       voltage_ -= c.settings.voltage_ramp;
       count_ = 0;
     }
-    if (++count_ >= kSettlePeriods) go(Part::average);
+    if (++count_ >= kTransientPeriods) go(Part::average);
   }
   constexpr void average(const Context& c, std::int32_t target) {
     const foc::Rotation r = foc::rotation(angle_of_phase(direction_));
