@@ -1,11 +1,11 @@
 // The lock of the parameters on the real image: memory of the key, random numbers, time and stack of a verification.
 #include <gtest/gtest.h>
-#include <sodium.h>
 
 #include <algorithm>
 #include <cstdio>
 
 #include "tests/board/drive_bench.hpp"
+#include "tests/support/signing_key.hpp"
 
 namespace flexspline::tests {
 namespace {
@@ -14,17 +14,6 @@ using protocol::Code;
 using protocol::Kind;
 using protocol::PairingAction;
 using protocol::PairingState;
-
-struct Key {
-  explicit Key(unsigned char seed) {
-    EXPECT_GE(sodium_init(), 0);
-    std::array<unsigned char, crypto_sign_SEEDBYTES> seeds{};
-    seeds.fill(seed);
-    crypto_sign_seed_keypair(public_key.data(), secret.data(), seeds.data());
-  }
-  protocol::PairingKey public_key{};
-  std::array<unsigned char, crypto_sign_SECRETKEYBYTES> secret{};
-};
 
 class Host {
  public:
@@ -37,10 +26,9 @@ class Host {
     EXPECT_EQ(protocol::take_payload(bench_.bus.ask(Kind::pairing_challenge).content(), c), Code::done);
     return c.nonce;
   }
-  Code answer(const Key& key, PairingAction action, const protocol::Nonce& nonce) {
+  Code answer(const SigningKey& key, PairingAction action, const protocol::Nonce& nonce) {
     const auto message = protocol::pairing_message(action, {id.board, id.serial}, nonce, key.public_key);
-    std::array<unsigned char, crypto_sign_BYTES> signature{};
-    crypto_sign_detached(signature.data(), nullptr, message.bytes.data(), message.bytes.size(), key.secret.data());
+    const ed25519::Signature signature = key.sign(message.bytes);
     protocol::PairingPart part{0, key.public_key};
     EXPECT_EQ(bench_.bus.code(Kind::pairing_part, part), Code::done);
     for (std::uint8_t half = 0; half < 2; ++half) {
@@ -66,7 +54,7 @@ void expect_no_violation(const DriveBench& bench) {
 }
 
 TEST(BoardPairing, IsKeptOverAPowerCycleAndRefusesAFactoryResetUntilTheChallengeIsAnswered) {
-  const Key key(1);
+  const SigningKey key(1);
   DriveBench bench("dac");
   bench.come_up();
   bench.chip.ticks(200);
@@ -98,7 +86,7 @@ TEST(BoardPairing, IsKeptOverAPowerCycleAndRefusesAFactoryResetUntilTheChallenge
   EXPECT_NE(second, first);
   EXPECT_EQ(next.answer(key, PairingAction::open, first), Code::wrong_signature) << "of the start before";
   again.chip.ticks(25'000);
-  EXPECT_EQ(next.answer(Key(2), PairingAction::open, next.challenge()), Code::other_key);
+  EXPECT_EQ(next.answer(SigningKey(2), PairingAction::open, next.challenge()), Code::other_key);
   EXPECT_EQ(next.answer(key, PairingAction::open, next.challenge()), Code::done);
   EXPECT_EQ(again.bus.code(Kind::block_erase_all, protocol::Empty{}), Code::done);
   EXPECT_EQ(again.chip.flash.erases, erases + 2) << "the key's sector is never erased";
@@ -123,7 +111,7 @@ TEST(BoardPairing, AnImageThatWasBuiltForItEndsThePairingOfALostKey) {
   bench.come_up();
   bench.chip.ticks(200);
   Host host(bench);
-  ASSERT_EQ(host.answer(Key(1), PairingAction::pair, host.challenge()), Code::done);
+  ASSERT_EQ(host.answer(SigningKey(1), PairingAction::pair, host.challenge()), Code::done);
   DriveBench rescued("dac-forget");
   rescued.chip.flash.bytes = bench.chip.flash.bytes;
   rescued.come_up();
@@ -145,7 +133,7 @@ TEST(BoardPairing, AnArmedDriveDoesNotVerifyAndStaysArmed) {
   const protocol::Nonce nonce = host.challenge();
   ASSERT_EQ(bench.command({.kind = protocol::CommandKind::arm, .mode = protocol::Mode::velocity}).refusal,
             protocol::Refusal::none);
-  EXPECT_EQ(host.answer(Key(1), PairingAction::pair, nonce), Code::armed);
+  EXPECT_EQ(host.answer(SigningKey(1), PairingAction::pair, nonce), Code::armed);
   EXPECT_EQ(bench.bus.code(Kind::pairing_challenge, protocol::Empty{}), Code::armed);
   EXPECT_EQ(bench.bus.status().mode, protocol::Mode::velocity);
   expect_no_violation(bench);

@@ -2,7 +2,6 @@
 #pragma once
 
 #include <gtest/gtest.h>
-#include <sodium.h>
 
 #include <algorithm>
 #include <array>
@@ -12,24 +11,9 @@
 #include "firmware/parameter_lock.hpp"
 #include "shared/protocol/payloads.hpp"
 #include "tests/support/flash_model.hpp"
+#include "tests/support/signing_key.hpp"
 
 namespace flexspline::tests {
-
-struct SigningKey {
-  explicit SigningKey(unsigned char seed) {
-    EXPECT_GE(sodium_init(), 0);
-    std::array<unsigned char, crypto_sign_SEEDBYTES> seeds{};
-    seeds.fill(seed);
-    crypto_sign_seed_keypair(public_key.data(), secret.data(), seeds.data());
-  }
-  ed25519::Signature sign(std::span<const std::uint8_t> message) const {
-    ed25519::Signature signature{};
-    crypto_sign_detached(signature.data(), nullptr, message.data(), message.size(), secret.data());
-    return signature;
-  }
-  protocol::PairingKey public_key{};
-  std::array<unsigned char, crypto_sign_SECRETKEYBYTES> secret{};
-};
 
 struct PairingAnswerOf {
   protocol::PairingKey key{};

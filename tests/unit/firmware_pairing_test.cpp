@@ -21,10 +21,6 @@ using protocol::Mode;
 using protocol::PairingAction;
 using protocol::PairingState;
 
-const SigningKey& owner() {
-  static const SigningKey key(1);
-  return key;
-}
 const plant::Drive& demo() {
   static const plant::Drive drive = plant::demo_plant().drive;
   return drive;

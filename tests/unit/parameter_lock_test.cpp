@@ -14,11 +14,6 @@ using protocol::Code;
 using protocol::PairingAction;
 using protocol::PairingState;
 
-const SigningKey& owner() {
-  static const SigningKey key(1);
-  return key;
-}
-
 // A drive that is paired and locked.
 struct Paired {
   PairingCells cells;

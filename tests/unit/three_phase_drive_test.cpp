@@ -9,26 +9,14 @@
 #include "host/deployment/commissioning_settings.hpp"
 #include "host/deployment/foc_settings.hpp"
 #include "tests/support/virtual_drive.hpp"
+#include "tests/unit/foc_rig.hpp"
 
 namespace flexspline::board {
 namespace {
 
 deployment::FocSetup foc_setup_of(const ThreePhaseParameters& p) {
-  deployment::FocSetup s;
-  s.resistance_ohm = p.motor.resistance_ohm + p.inverter.on_resistance_ohm;
-  s.inductance_d_h = p.motor.inductance_d_h;
-  s.inductance_q_h = p.motor.inductance_q_h;
-  s.flux_vs = p.motor.flux_vs;
-  s.current_full_scale_a = p.sensors.full_scale_a;
-  s.bus_full_scale_v = p.sensors.bus_full_scale_v;
-  s.pwm_hz = p.inverter.pwm_hz;
+  deployment::FocSetup s = foc_rig::setup_of({p.motor, p.inverter, p.sensors});
   s.timer_counts = 2100;
-  s.dead_time_s = p.inverter.dead_time_s;
-  s.dead_time_zone_a = 1.5 * p.inverter.leg_capacitance_f * p.inverter.supply_v / p.inverter.dead_time_s;
-  s.diode_drop_v = p.inverter.diode_drop_v;
-  s.bus_v = p.inverter.supply_v;
-  s.shortest_pulse_s = 0.2e-6;
-  s.sampling_window_s = 1.5e-6;
   return s;
 }
 void expect_near(std::int32_t a, std::int32_t b) {
