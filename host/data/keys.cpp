@@ -14,8 +14,6 @@ namespace {
 
 constexpr std::array<std::string_view, 6> kDriveKeys = {"axis",    "gear_ratio", "torque_constant_nm_a",
                                                         "pitch_m", "pole_pairs", "motor_slots"};
-// Of what is counted in a motor.
-constexpr double kMostCounted = 1000.0;
 constexpr std::array<std::string_view, 9> kExperimentKeys = {"experiment",
                                                              "load",
                                                              "role",

@@ -23,6 +23,9 @@ struct KeyValue {
 };
 using KeyMap = std::map<std::string, KeyValue>;
 
+// The most of anything that is counted in a motor: pole pairs, slots.
+inline constexpr double kMostCounted = 1000.0;
+
 // Keys of the drive as a whole: axis, gear_ratio, torque_constant_nm_a, pitch_m, pole_pairs, motor_slots.
 bool is_drive_key(std::string_view key);
 // Keys of one experiment: load, role, encoder_counts, noise_std_current_a, ...

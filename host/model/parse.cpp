@@ -7,6 +7,7 @@
 #include <map>
 #include <utility>
 
+#include "host/data/keys.hpp"
 #include "host/model/document.hpp"
 #include "host/model/model.hpp"
 #include "host/model/text.hpp"
@@ -31,11 +32,10 @@ struct Bounds {
   double high = std::numeric_limits<double>::infinity();
 };
 
-// Everything in [drive] is a size, except the temperature. What is counted is small in any motor.
-constexpr double kMostCounted = 1000.0;
+// Everything in [drive] is a size, except the temperature.
 Bounds drive_bounds(const DriveKey& key) {
   if (key.key == "temperature_reference_c") return {-273.15, 1000.0};
-  if (key.is_count) return {1.0, kMostCounted};
+  if (key.is_count) return {1.0, data::kMostCounted};
   return {std::numeric_limits<double>::min(), std::numeric_limits<double>::max()};
 }
 
