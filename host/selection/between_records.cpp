@@ -24,7 +24,7 @@ using estimation::Term;
 struct RecordFriction {
   std::vector<const Estimate*> parameters;
   std::vector<RowRange> records;
-  Eigen::MatrixXd theta;  // a row a record
+  RecordParameters values;
 };
 
 RecordFriction friction_by_record(const estimation::Identification& base, const BalanceData& data) {
@@ -35,25 +35,27 @@ RecordFriction friction_by_record(const estimation::Identification& base, const 
       continue;
     if (entry.parameters[e.ref.parameter].kind == effects::Kind::linear) friction.parameters.push_back(&e);
   }
-  std::vector<Eigen::VectorXd> rows;
+  const auto parameters = static_cast<Eigen::Index>(friction.parameters.size());
+  const auto most = static_cast<Eigen::Index>(data.records().size());
+  auto& [theta, variance] = friction.values;
+  theta.resize(most, parameters);
+  variance.resize(most, parameters);
   for (const RowRange& range : data.records()) {
     const estimation::Record& record = base.prepared.records[range.record];
-    if (record.at_rest) continue;
-    Eigen::VectorXd row(static_cast<Eigen::Index>(friction.parameters.size()));
-    bool known = true;
-    for (std::size_t j = 0; j < friction.parameters.size(); ++j) {
-      const auto& values = friction.parameters[j]->per_experiment;
+    const auto row = static_cast<Eigen::Index>(friction.records.size());
+    bool known = !record.at_rest;
+    for (Eigen::Index j = 0; known && j < parameters; ++j) {
+      const auto& values = friction.parameters[static_cast<std::size_t>(j)]->per_experiment;
       const auto at = std::find_if(values.begin(), values.end(), [&](const auto& v) { return v.name == record.name; });
-      known =
-          known && at != values.end() && at->value && at->std < kPolicy.known_between_records * std::abs(*at->value);
-      if (known) row[static_cast<Eigen::Index>(j)] = *at->value;
+      known = at != values.end() && at->value && at->std;
+      if (!known) break;
+      theta(row, j) = *at->value;
+      variance(row, j) = *at->std * *at->std;
     }
-    if (!known) continue;
-    friction.records.push_back(range);
-    rows.push_back(std::move(row));
+    if (known) friction.records.push_back(range);
   }
-  friction.theta.resize(static_cast<Eigen::Index>(rows.size()), static_cast<Eigen::Index>(friction.parameters.size()));
-  for (std::size_t i = 0; i < rows.size(); ++i) friction.theta.row(static_cast<Eigen::Index>(i)) = rows[i];
+  theta.conservativeResize(static_cast<Eigen::Index>(friction.records.size()), parameters);
+  variance.conservativeResize(theta.rows(), parameters);
   return friction;
 }
 
@@ -64,14 +66,14 @@ struct Law {
   Eigen::MatrixXd added;
 };
 
-// The friction that the model takes for the law in each record; nothing where the law's torque is none that the
-// model's friction could be taken for: then the records show it themselves.
+// The friction that the model takes for the law in each record; nothing where more of the law's torque is left in a
+// record than a term needs to be chosen there: then the records show it themselves.
 std::optional<Eigen::MatrixXd> as_friction(BalanceData& data, const estimation::Terms& base, const RecordFriction& own,
                                            const Eigen::VectorXd& torque, const Eigen::VectorXd& root_weights) {
   std::vector<estimation::ParameterRef> refs;
   for (const Estimate* e : own.parameters) refs.push_back(e->ref);
   const Eigen::MatrixXd columns = estimation::columns_of(data, base, refs);
-  Eigen::MatrixXd added(own.theta.rows(), own.theta.cols());
+  Eigen::MatrixXd added(own.values.theta.rows(), own.values.theta.cols());
   for (std::size_t i = 0; i < own.records.size(); ++i) {
     const RowRange& range = own.records[i];
     const Eigen::VectorXd weights = root_weights.segment(range.first, range.size());
@@ -79,7 +81,7 @@ std::optional<Eigen::MatrixXd> as_friction(BalanceData& data, const estimation::
     const Eigen::MatrixXd friction = columns.middleRows(range.first, range.size());
     const estimation::LinearFit fit = estimation::least_squares(friction, here, weights);
     const double left = weights.cwiseProduct(here - friction * fit.theta).squaredNorm();
-    if (!(left <= kPolicy.most_within_record * weights.cwiseProduct(here).squaredNorm())) return std::nullopt;
+    if (!(left <= kPolicy.line_share * weights.cwiseProduct(here).squaredNorm())) return std::nullopt;
     added.row(static_cast<Eigen::Index>(i)) = fit.theta.transpose();
   }
   return added;
@@ -115,7 +117,7 @@ std::vector<Law> laws(const estimation::Identification& base, const SearchedBala
 std::vector<std::pair<MetaRegression, const Law*>> possible(const RecordFriction& own, const std::vector<Law>& laws) {
   std::vector<std::pair<MetaRegression, const Law*>> best;
   for (const Law& law : laws) {
-    MetaRegression fit = meta_regression(own.theta, law.added);
+    MetaRegression fit = meta_regression(own.values, law.added);
     if (!is_possible(fit)) continue;
     const effects::Description& info = *law.candidate->model.entry->info;
     const auto same = std::find_if(best.begin(), best.end(), [&](const auto& other) {
@@ -169,8 +171,9 @@ void name_between_records(const estimation::Identification& base, const Searched
   if (best.empty()) return;
   std::vector<Eigen::MatrixXd> added;
   for (const Law& law : all) added.push_back(law.added);
-  constexpr int kPermutations = 5000;
-  const double p_value = permutation_p_value(own.theta, added, kPermutations, 1);
+  // So many that the limit is twenty permutations, known to a fifth.
+  const auto permutations = static_cast<int>(20.0 / kPolicy.trend_p_value);
+  const double p_value = permutation_p_value(own.values, added, permutations, 1);
   if (p_value > kPolicy.trend_p_value) return;
   for (const auto& [fit, law] : best) {
     if (fit.likelihood_ratio < best.front().first.likelihood_ratio - kPolicy.confounded_margin) break;

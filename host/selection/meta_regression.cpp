@@ -8,56 +8,93 @@
 namespace flexspline::selection {
 namespace {
 
-Eigen::MatrixXd centred(const Eigen::MatrixXd& rows) {
-  return rows.rowwise() - rows.colwise().mean();
+using Eigen::ArrayXXd;
+using Eigen::RowVectorXd;
+
+struct Fitted {
+  double coefficient = 0.0;
+  double coefficient_std = 0.0;
+  double deviance = 0.0;  // minus twice the log-likelihood
+  RowVectorXd mean;
+  RowVectorXd between;  // T
+};
+
+// Alternates between mean and coefficient, by weighted least squares, and the variances between records. These begin at
+// the variance of the parameters and are moved to where the derivative of the likelihood is zero (fixed point of
+// Thompson and Sharp 1999, method 3); never below zero. `with` is false: the coefficient stays zero.
+Fitted maximise_likelihood(const RecordParameters& records, const Eigen::MatrixXd& added, bool with) {
+  const ArrayXXd theta = records.theta, p = added, within = records.variance;
+  const auto weighted_mean = [](const ArrayXXd& w, const ArrayXXd& x) {
+    return RowVectorXd(((w * x).colwise().sum() / w.colwise().sum()).matrix());
+  };
+  const auto centred = [](const ArrayXXd& x, const RowVectorXd& mean) { return ArrayXXd(x.rowwise() - mean.array()); };
+  Fitted fit;
+  const RowVectorXd all = theta.colwise().mean();
+  const RowVectorXd spread = centred(theta, all).square().colwise().mean();
+  fit.between = spread;
+  const RowVectorXd least = 1e-12 * spread;
+  constexpr int kRounds = 100;
+  constexpr double kSame = 1e-9;
+  ArrayXXd residual, variance;
+  for (int round = 0; round < kRounds; ++round) {
+    variance = within.rowwise() + fit.between.cwiseMax(least).array();
+    const ArrayXXd w = variance.inverse();
+    const RowVectorXd mean_theta = weighted_mean(w, theta), mean_added = weighted_mean(w, p);
+    const ArrayXXd e = centred(theta, mean_theta), q = centred(p, mean_added);
+    const double information = (w * q.square()).sum();
+    if (with && information > 0.0) {
+      fit.coefficient = (w * q * e).sum() / information;
+      fit.coefficient_std = 1.0 / std::sqrt(information);
+    }
+    fit.mean = mean_theta - fit.coefficient * mean_added;
+    residual = e - fit.coefficient * q;
+    const RowVectorXd next = ((w.square() * (residual.square() - within)).colwise().sum() / w.square().colwise().sum())
+                                 .matrix()
+                                 .cwiseMax(0.0);
+    const double moved = ((next - fit.between).array().abs() / spread.array().max(1e-300)).maxCoeff();
+    fit.between = next;
+    if (moved < kSame) break;
+  }
+  variance = within.rowwise() + fit.between.cwiseMax(least).array();
+  fit.deviance = (variance.log() + residual.square() / variance).sum();
+  return fit;
 }
 
-double sum_of_logarithms(const Eigen::VectorXd& variance) {
-  return variance.array().log().sum();
+MetaRegression against(const Fitted& without, const RecordParameters& records, const Eigen::MatrixXd& added) {
+  const Fitted with = maximise_likelihood(records, added, true);
+  MetaRegression result;
+  result.coefficient = with.coefficient;
+  result.coefficient_std = with.coefficient_std;
+  result.likelihood_ratio = without.deviance - with.deviance;
+  const Eigen::ArrayXd before = without.between.array().max(1e-300);
+  result.explained_share = std::max(0.0, 1.0 - (with.between.transpose().array() / before).mean());
+  result.mean = with.mean.transpose();
+  return result;
+}
+
+Fitted without_effect(const RecordParameters& records) {
+  return maximise_likelihood(records, Eigen::MatrixXd::Zero(records.theta.rows(), records.theta.cols()), false);
 }
 
 }  // namespace
 
-// Alternates between the coefficient, by weighted least squares, and the variances, by what is left.
-MetaRegression meta_regression(const Eigen::MatrixXd& theta, const Eigen::MatrixXd& added) {
-  const auto records = static_cast<double>(theta.rows()), parameters = static_cast<double>(theta.cols());
-  const Eigen::MatrixXd e = centred(theta), q = centred(added);
-  const Eigen::VectorXd ee = e.colwise().squaredNorm(), qq = q.colwise().squaredNorm(),
-                        eq = e.cwiseProduct(q).colwise().sum();
-  MetaRegression result;
-  result.mean = theta.colwise().mean().transpose();
-  if (!(qq.maxCoeff() > 0.0) || !(ee.minCoeff() > 0.0)) return result;
-  Eigen::VectorXd variance = ee / records;
-  constexpr int kRounds = 50;
-  constexpr double kSame = 1e-10;
-  for (int round = 0; round < kRounds; ++round) {
-    const double information = qq.cwiseQuotient(variance).sum();
-    const double next = eq.cwiseQuotient(variance).sum() / information;
-    const double moved = std::abs(next - result.coefficient);
-    result.coefficient = next;
-    result.coefficient_std = 1.0 / std::sqrt(information);
-    variance = ((ee - 2.0 * next * eq + next * next * qq) / records).cwiseMax(1e-12 * ee / records);
-    if (moved <= kSame * std::abs(next)) break;
-  }
-  const double log_ratio = sum_of_logarithms(ee / records) - sum_of_logarithms(variance);
-  result.likelihood_ratio = records * log_ratio;
-  result.explained_share = 1.0 - std::exp(-log_ratio / parameters);
-  result.mean -= result.coefficient * added.colwise().mean().transpose();
-  return result;
+MetaRegression meta_regression(const RecordParameters& records, const Eigen::MatrixXd& added) {
+  return against(without_effect(records), records, added);
 }
 
 bool is_possible(const MetaRegression& fit) {
   return fit.coefficient > 0.0 && fit.mean.size() > 0 && fit.mean.minCoeff() >= 0.0;
 }
 
-double permutation_p_value(const Eigen::MatrixXd& theta, const std::vector<Eigen::MatrixXd>& added, int permutations,
+double permutation_p_value(const RecordParameters& records, const std::vector<Eigen::MatrixXd>& added, int permutations,
                            std::uint64_t seed) {
-  std::vector<Eigen::Index> order(static_cast<std::size_t>(theta.rows()));
+  std::vector<Eigen::Index> order(static_cast<std::size_t>(records.theta.rows()));
   std::iota(order.begin(), order.end(), Eigen::Index{0});
+  const Fitted without = without_effect(records);
   const auto best = [&] {
     double largest = 0.0;
     for (const Eigen::MatrixXd& one : added)
-      if (const MetaRegression fitted = meta_regression(theta, one(order, Eigen::all)); is_possible(fitted))
+      if (const MetaRegression fitted = against(without, records, one(order, Eigen::all)); is_possible(fitted))
         largest = std::max(largest, fitted.likelihood_ratio);
     return largest;
   };

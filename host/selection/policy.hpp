@@ -180,12 +180,8 @@ struct SelectionPolicy {
   std::size_t fewest_of_trend = 6;  // experiments
   double trend_p_value = 1e-3;      // after the correction for what was tried
   double trend_size = 0.03;         // of the parameter, over the records
-  // A law that shows between records only (step 15): standard error of a record's friction over the friction, and the
-  // share of the law's squares that the friction cannot take up (a power of the speed: below 0.01).
-  double known_between_records = 0.05;
-  double most_within_record = 0.05;
-  double least_drift = 0.01;     // relative standard deviation of friction between records that is reported
-  double drift_deviance = 12.0;  // twice the log-likelihood ratio of random effects against none
+  double least_drift = 0.01;        // relative standard deviation of friction between records that is reported
+  double drift_deviance = 12.0;     // twice the log-likelihood ratio of random effects against none
 };
 
 // The policy that all commands follow.

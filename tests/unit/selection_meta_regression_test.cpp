@@ -16,6 +16,11 @@ namespace {
 using Eigen::Index;
 using Eigen::MatrixXd;
 
+// Parameters without errors of their own.
+RecordParameters exact(const MatrixXd& theta) {
+  return {theta, MatrixXd::Zero(theta.rows(), theta.cols())};
+}
+
 struct Records {
   MatrixXd theta, added;
   Records(Index records, double coefficient, unsigned seed) : theta(records, 2), added(records, 2) {
@@ -44,7 +49,7 @@ TEST(MetaRegression, OfOneParameterIsALeastSquaresLine) {
   MatrixXd theta(5, 1), added(5, 1);
   added << 1, 2, 3, 4, 5;
   theta << 2.1, 2.9, 4.2, 4.8, 6.0;  // slope 0.97, intercept 1.09, squares 9.5 before and 0.091 after
-  const MetaRegression fit = meta_regression(theta, added);
+  const MetaRegression fit = meta_regression(exact(theta), added);
   EXPECT_NEAR(fit.coefficient, 0.97, 1e-12);
   EXPECT_NEAR(fit.mean[0], 1.09, 1e-12);
   EXPECT_NEAR(fit.likelihood_ratio, 5.0 * std::log(9.5 / 0.091), 1e-9);
@@ -53,12 +58,45 @@ TEST(MetaRegression, OfOneParameterIsALeastSquaresLine) {
 
 TEST(MetaRegression, OfTwoParametersHasTheGreatestLikelihood) {
   const Records r(20, 1.5, 3);
-  const MetaRegression fit = meta_regression(r.theta, r.added);
+  const MetaRegression fit = meta_regression(exact(r.theta), r.added);
   EXPECT_NEAR(fit.coefficient, 1.5, 4.0 * fit.coefficient_std);
   const double best = deviance(r.theta, r.added, fit.coefficient);
   EXPECT_LT(best, deviance(r.theta, r.added, fit.coefficient + 1e-3));
   EXPECT_LT(best, deviance(r.theta, r.added, fit.coefficient - 1e-3));
   EXPECT_NEAR(fit.likelihood_ratio, deviance(r.theta, r.added, 0.0) - best, 1e-9);
+}
+
+TEST(MetaRegression, WeighsARecordByItsOwnErrorAndWhatDiffersBetweenThem) {
+  const Records r(15, 1.0, 11);
+  RecordParameters records = exact(r.theta);
+  std::mt19937_64 random(1);
+  std::normal_distribution<double> normal;
+  for (Index i = 0; i < 15; ++i) {
+    const double large = i % 3 == 0 ? 1.0 : 0.01;
+    records.variance.row(i) << 0.04 * large, 1.0 * large;
+    for (Index j = 0; j < 2; ++j) records.theta(i, j) += std::sqrt(records.variance(i, j)) * normal(random);
+  }
+  const MetaRegression fit = meta_regression(records, r.added);
+  // Minus twice the log-likelihood, written out and least over the variances between records on a grid.
+  const auto deviance_of = [&](double coefficient) {
+    double sum = 0.0;
+    for (Index j = 0; j < 2; ++j) {
+      double least = 1e300;
+      for (double t = 1e-6; t < 10.0; t *= 1.002) {
+        const Eigen::ArrayXd v = records.variance.col(j).array() + t;
+        const Eigen::ArrayXd y = records.theta.col(j) - coefficient * r.added.col(j);
+        const double mean = (y / v).sum() / v.inverse().sum();
+        least = std::min(least, (v.log() + (y - mean).square() / v).sum());
+      }
+      sum += least;
+    }
+    return sum;
+  };
+  const double best = deviance_of(fit.coefficient);
+  EXPECT_LE(best, deviance_of(fit.coefficient + 0.02));
+  EXPECT_LE(best, deviance_of(fit.coefficient - 0.02));
+  EXPECT_NEAR(fit.likelihood_ratio, deviance_of(0.0) - best, 1e-2);
+  EXPECT_NEAR(fit.coefficient, 1.0, 4.0 * fit.coefficient_std);
 }
 
 TEST(MetaRegression, IsPossibleOnlyWithTheSignOfFriction) {
@@ -76,15 +114,15 @@ TEST(MetaRegression, IsPossibleOnlyWithTheSignOfFriction) {
 TEST(MetaRegression, OfAnEffectThatIsAlikeInAllRecordsExplainsNothing) {
   Records r(8, 0.0, 5);
   r.added.setConstant(2.0);
-  const MetaRegression fit = meta_regression(r.theta, r.added);
-  EXPECT_EQ(fit.likelihood_ratio, 0.0);
+  const MetaRegression fit = meta_regression(exact(r.theta), r.added);
+  EXPECT_NEAR(fit.likelihood_ratio, 0.0, 1e-9);
   EXPECT_FALSE(is_possible(fit));
 }
 
 TEST(PermutationTest, AgreesWithAllPermutationsOfSixRecords) {
   const Records r(6, 0.4, 7);
   const auto ratio = [&](const MatrixXd& added) {
-    const MetaRegression fit = meta_regression(r.theta, added);
+    const MetaRegression fit = meta_regression(exact(r.theta), added);
     return is_possible(fit) ? fit.likelihood_ratio : 0.0;
   };
   const double recorded = ratio(r.added);
@@ -96,16 +134,16 @@ TEST(PermutationTest, AgreesWithAllPermutationsOfSixRecords) {
     reached += ratio(r.added(order, Eigen::all)) >= recorded;
     ++all;
   } while (std::next_permutation(order.begin(), order.end()));
-  const double exact = static_cast<double>(reached) / all;
-  EXPECT_NEAR(permutation_p_value(r.theta, {r.added}, 20000, 1), exact, 4.0 * std::sqrt(exact / 20000.0));
+  const double of_all = static_cast<double>(reached) / all;
+  EXPECT_NEAR(permutation_p_value(exact(r.theta), {r.added}, 20000, 1), of_all, 4.0 * std::sqrt(of_all / 20000.0));
 }
 
 TEST(PermutationTest, FindsALawAndSeldomOneThatIsNotThere) {
   int found = 0, wrong = 0;
   for (unsigned seed = 0; seed < 100; ++seed) {
     const Records with(20, 0.8, seed), without(20, 0.0, 1000 + seed);
-    found += permutation_p_value(with.theta, {with.added}, 1000, seed) <= 0.01;
-    wrong += permutation_p_value(without.theta, {without.added}, 1000, seed) <= 0.05;
+    found += permutation_p_value(exact(with.theta), {with.added}, 1000, seed) <= 0.01;
+    wrong += permutation_p_value(exact(without.theta), {without.added}, 1000, seed) <= 0.05;
   }
   EXPECT_GT(found, 90);
   EXPECT_LT(wrong, 11);  // 5 are expected; 11 and more in one of 90 runs
@@ -120,14 +158,14 @@ TEST(PermutationTest, CountsHowManyLawsAreTried) {
     std::normal_distribution<double> normal;
     std::vector<MatrixXd> laws;
     for (int k = 0; k < 20; ++k) laws.push_back(MatrixXd::NullaryExpr(12, 2, [&] { return normal(random); }));
-    significant += permutation_p_value(r.theta, laws, 400, seed) <= 0.1;
+    significant += permutation_p_value(exact(r.theta), laws, 400, seed) <= 0.1;
   }
   EXPECT_LT(significant, 10);  // 4 are expected
 }
 
 TEST(PermutationTest, IsOneWhereNoLawIsPossible) {
   const Records r(10, 1.0, 9);
-  EXPECT_EQ(permutation_p_value(r.theta, {MatrixXd(-r.added)}, 100, 1), 1.0);
+  EXPECT_EQ(permutation_p_value(exact(r.theta), {MatrixXd(-r.added)}, 100, 1), 1.0);
 }
 
 }  // namespace
