@@ -91,7 +91,7 @@ class Reader {
   double number(const Node& node, std::string_view key) const {
     if (node.kind != NodeKind::number)
       fail(node.line, fmt::format("{} is {}, not a number", key, node.kind_name()),
-           fmt::format("write a number without quotes and unit, such as {} = 0.01", key));
+           fmt::format("write a number without quotes and unit, such as {} = 12", key));
     if (!std::isfinite(node.number))
       fail(node.line, fmt::format("{} is {}", key, std::isnan(node.number) ? "NaN" : "infinite"),
            "write a finite number, or leave the key out where the value is not known");

@@ -86,7 +86,7 @@ TEST(ModelFileOfMadeEffects, ErrorsNameTheLine) {
             "m.toml:12: value has 3 numbers, and at has 4; give one for each point");
   EXPECT_EQ(error("0.02, ", "\"0.02\", "),
             "m.toml:12: value is text, not a number; write a number without quotes and "
-            "unit, such as value = 0.01");
+            "unit, such as value = 12");
   EXPECT_NE(
       error("3.14159265", "3.5").find("m.toml:9: point 3 of the table is at 3.5, and even steps would have it at"),
       std::string::npos);
