@@ -28,12 +28,12 @@ std::string motions() {
 
 struct Parameter {
   double value = 0.0;
-  double half_width = 0.0;  // of the 95 % interval
+  double std = 0.0;  // standard error
 };
 Parameter parameter_of(const json& answer, const std::string& effect, const std::string& name) {
   for (const json& p : answer["parameters"])
     if (p["effect"] == effect && p["parameter"] == name)
-      return {p["value"], (p["interval"][1].get<double>() - p["interval"][0].get<double>()) / 2.0};
+      return {p["value"], (p["interval"][1].get<double>() - p["interval"][0].get<double>()) / (2.0 * 1.96)};
   ADD_FAILURE() << "no " << effect << "." << name;
   return {};
 }
@@ -75,9 +75,10 @@ TEST(ThreePhaseChain, GivesTheNumbersOfTheDriveWithAServoAmplifier) {
   const Chain servo = chain_on("current"), three = chain_on("three-phase");
   EXPECT_EQ(servo.named, kHidden);
   EXPECT_EQ(three.named, kHidden);
+  // Five values are compared, each by chance beyond 4 standard errors of the difference once in 16,000 runs.
   const auto same = [](const json& a, const json& b, const char* effect, const char* name) {
     const Parameter x = parameter_of(a, effect, name), y = parameter_of(b, effect, name);
-    EXPECT_NEAR(x.value, y.value, std::hypot(x.half_width, y.half_width)) << effect << "." << name;
+    EXPECT_NEAR(x.value, y.value, 4.0 * std::hypot(x.std, y.std)) << effect << "." << name;
     std::printf("%s.%s: %.5g, with a servo amplifier %.5g\n", effect, name, y.value, x.value);
   };
   same(servo.fitted, three.fitted, "viscous_friction", "coefficient");
@@ -90,8 +91,10 @@ TEST(ThreePhaseChain, GivesTheNumbersOfTheDriveWithAServoAmplifier) {
               1e6 * servo.base_rad, 1e6 * servo.added_rad);
   EXPECT_NEAR(three.none_rad, servo.none_rad, 0.02 * servo.none_rad);
   EXPECT_NEAR(three.base_rad, servo.base_rad, 0.15 * servo.base_rad);
+  // What is left after the effect is added comes from the errors of the estimates: 0.28 to 1.04 microrad over eleven
+  // recordings. Its difference between the two drives is chance; that it is well below what was left before is not.
   EXPECT_LT(three.added_rad, 0.5 * three.base_rad);
-  EXPECT_NEAR(three.added_rad, servo.added_rad, 5e-7);
+  EXPECT_LT(servo.added_rad, 0.5 * servo.base_rad);
 }
 
 }  // namespace
