@@ -119,7 +119,7 @@ json print_pipeline(const data::Dataset& dataset, const project::BaseModel& base
   for (const data::Experiment& e : dataset.experiments) experiments.push_back(&e);
   try {
     console.progress("choosing the filters");
-    const estimation::PreparedData prepared = estimation::prepare(experiments, base.model.drive, options);
+    const estimation::PreparedData prepared = estimation::prepare(experiments, base.model, options);
     console.line(output::wrapped(output::pipeline_text(prepared)));
     return {{"cutoff_hz", json_number(prepared.pipeline.row_cutoff_hz)},
             {"motion_cutoff_hz", json_number(prepared.pipeline.motion_cutoff_hz)},

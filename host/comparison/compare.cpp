@@ -62,7 +62,7 @@ class Comparer {
       all_.push_back(&e);
       result_.experiments.push_back({e.name, e.role, {}});
     }
-    prepared_ = estimation::prepare_all(dataset, model_.drive, options);
+    prepared_ = estimation::prepare_all(dataset, model_, options);
     result_.pipeline = prepared_.pipeline;
   }
 

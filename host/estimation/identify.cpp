@@ -197,7 +197,7 @@ std::unique_ptr<Identification> form_on(const std::vector<const data::Experiment
   auto result = std::make_unique<Identification>();
   result->model = model;
   result->model.drive = reconcile(model.drive, dataset, result->warnings);
-  result->prepared = prepare(fit_on, result->model.drive, options);
+  result->prepared = prepare(fit_on, result->model, options);
   result->terms = terms_of(result->model);
   std::map<std::size_t, std::string> too_short;  // by record, of any balance
   std::vector<std::uint8_t> used(result->prepared.records.size(), 0);

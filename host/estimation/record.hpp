@@ -115,19 +115,22 @@ struct PreparedData {
   bool effort_is_current = false;
   bool rotary = true;
   std::vector<const data::Experiment*> chosen_on;  // what the pipeline was chosen for; empty: it was given
+  std::optional<double> slowest_law_rad_s;         // whose slow samples the mask had to leave; see prepare()
 };
 
 // Makes all experiments ready. Equations: report 82 (motor), 78 (transmission), 45 (load). Positions, where there are
 // any, give velocity and acceleration; a tachometer is used only without them.
+// Of the model the drive is used, as reconcile() leaves it (identify.hpp), and the velocity of its friction laws where
+// it is given and fixed: the cut-off leaves samples that are as slow.
 // Throws data::DataError where no balance can be formed or a record is too short for the filters.
-PreparedData prepare(const std::vector<const data::Experiment*>& experiments, const model::Drive& drive,
+PreparedData prepare(const std::vector<const data::Experiment*>& experiments, const model::Model& model,
                      const PipelineOptions& options);
 // The same with a pipeline that was chosen before, as for hold-out records. Records that are among the ready ones by
 // that pipeline are taken from there.
 PreparedData prepare_with(const std::vector<const data::Experiment*>& experiments, const model::Drive& drive,
                           const Pipeline& pipeline, const PreparedData* ready = nullptr);
 // All experiments of a data set, by the pipeline that suits those to be fitted, or all where none is: errors on them
-// can be compared with those of an identification. `drive` as reconcile() leaves it (identify.hpp).
-PreparedData prepare_all(const data::Dataset& dataset, const model::Drive& drive, const PipelineOptions& options);
+// can be compared with those of an identification.
+PreparedData prepare_all(const data::Dataset& dataset, const model::Model& model, const PipelineOptions& options);
 
 }  // namespace flexspline::estimation

@@ -185,7 +185,7 @@ void RehearsedMotions::prepare(const PlanRequest& question) {
   std::vector<const data::Experiment*> list;
   for (const data::Experiment& e : experiments_) list.push_back(&e);
   prepared_ = identified_ ? estimation::prepare_with(list, model_.drive, identified_->prepared.pipeline)
-                          : estimation::prepare(list, model_.drive, question.pipeline);
+                          : estimation::prepare(list, model_, question.pipeline);
   for (const Balance balance : {Balance::motor, Balance::transmission, Balance::load}) {
     Side side;
     if (identified_) {

@@ -20,10 +20,10 @@ model::Model reconciled(const model::Model& model, const data::Dataset& dataset)
   return result;
 }
 
-std::shared_ptr<const estimation::PreparedData> records_for(const Subject& subject, const model::Drive& drive) {
+std::shared_ptr<const estimation::PreparedData> records_for(const Subject& subject, const model::Model& model) {
   if (subject.pipeline.ready) return subject.pipeline.ready;
   return std::make_shared<const estimation::PreparedData>(
-      estimation::prepare_all(*subject.dataset, drive, subject.pipeline));
+      estimation::prepare_all(*subject.dataset, model, subject.pipeline));
 }
 
 }  // namespace
@@ -32,7 +32,7 @@ View::View(const Subject& subject)
     : dataset(*subject.dataset),
       model(reconciled(subject.model, dataset)),
       model_before(subject.before),
-      ready(records_for(subject, model.drive)),
+      ready(records_for(subject, model)),
       prepared(*ready) {
   estimation::PipelineOptions pipeline = subject.pipeline;
   pipeline.ready = ready;

@@ -77,7 +77,7 @@ class Analysis {
       all.push_back(&e);
       if (e.role == data::Role::fit) fit.push_back(&e);
     }
-    prepared_ = estimation::prepare(fit.empty() ? all : fit, model_.drive, options.pipeline);
+    prepared_ = estimation::prepare(fit.empty() ? all : fit, model_, options.pipeline);
     if (!fit.empty() && fit.size() < all.size())
       prepared_ = estimation::prepare_with(all, model_.drive, prepared_.pipeline);
     result_.pipeline = prepared_.pipeline;

@@ -61,9 +61,10 @@ estimation::PipelineOptions with_records(const std::shared_ptr<const data::Datas
   progress("filtering the measurements");
   std::vector<std::string> warned_by_fit;
   pipeline.ready = nullptr;
-  const model::Drive drive = estimation::reconcile(model.drive, *dataset, warned_by_fit);
+  model::Model reconciled = model;
+  reconciled.drive = estimation::reconcile(model.drive, *dataset, warned_by_fit);
   const auto stored =
-      std::make_shared<const StoredCurves>(StoredCurves{dataset, estimation::prepare_all(*dataset, drive, pipeline)});
+      std::make_shared<const StoredCurves>(StoredCurves{dataset, estimation::prepare_all(*dataset, reconciled, pipeline)});
   pipeline.ready = {stored, &stored->records};
   return pipeline;
 }

@@ -66,7 +66,7 @@ Outcome recover(const std::string& label, std::uint64_t seed) {
 
   std::vector<const data::Experiment*> fit, holdout;
   for (const auto& e : dataset.experiments) (e.role == data::Role::holdout ? holdout : fit).push_back(&e);
-  const estimation::PreparedData prepared = estimation::prepare(fit, truth.drive, {});
+  const estimation::PreparedData prepared = estimation::prepare(fit, truth, {});
   const estimation::PreparedData held_out = estimation::prepare_with(holdout, truth.drive, prepared.pipeline);
   estimation::BalanceData on_holdout(held_out, balance);
   const double floor = root_mean_square(estimation::residual_of(on_holdout, estimation::terms_of(truth)));

@@ -76,7 +76,7 @@ Outcome run(const Case& c) {
   const model::Model true_model = testing::model_of(demo.drive, true, true);
   std::vector<const data::Experiment*> fit, holdout;
   for (const auto& e : dataset.experiments) (e.role == data::Role::holdout ? holdout : fit).push_back(&e);
-  const estimation::PreparedData prepared = estimation::prepare(fit, true_model.drive, {});
+  const estimation::PreparedData prepared = estimation::prepare(fit, true_model, {});
   const estimation::PreparedData held_out = estimation::prepare_with(holdout, true_model.drive, prepared.pipeline);
   estimation::BalanceData data(held_out, catalogue::get(truth.substr(0, truth.find(':'))).info->balance);
   const Eigen::VectorXd r = estimation::residual_of(data, estimation::terms_of(true_model));

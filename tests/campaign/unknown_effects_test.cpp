@@ -50,7 +50,7 @@ double floor_of(const plant::PlantFile& demo, std::uint64_t seed) {
   const model::Model truth = testing::model_of(plain.drive, true, true);
   std::vector<const data::Experiment*> fit, holdout;
   for (const auto& e : dataset.experiments) (e.role == data::Role::holdout ? holdout : fit).push_back(&e);
-  const estimation::PreparedData prepared = estimation::prepare(fit, truth.drive, {});
+  const estimation::PreparedData prepared = estimation::prepare(fit, truth, {});
   const estimation::PreparedData held_out = estimation::prepare_with(holdout, truth.drive, prepared.pipeline);
   estimation::BalanceData data(held_out, estimation::Balance::motor);
   const Eigen::VectorXd r = estimation::residual_of(data, estimation::terms_of(truth));

@@ -16,12 +16,6 @@ namespace published = report::published;
 
 constexpr double kDataSheetConstant = 0.0543;  // of the base model
 
-estimation::PipelineOptions pipeline() {
-  estimation::PipelineOptions options;
-  options.cutoff_hz = 20.0;  // the composite's bulk lies below 4 Hz, and 5 Hz would mask all of it
-  return options;
-}
-
 double torque_constant(const estimation::Identification& found) {
   return kDataSheetConstant * (1.0 + estimate(found, "torque_constant_error", "ratio").value);
 }
@@ -67,7 +61,7 @@ class MotorTables : public ::testing::Test {
     return model;
   }
   double free_run_error(const data::Dataset& dataset, const model::Model& model) const {
-    return comparison::compare(dataset, model, pipeline()).find_overall("motor_velocity")->nrmse;
+    return comparison::compare(dataset, model, {}).find_overall("motor_velocity")->nrmse;
   }
 };
 using Table2 = MotorTables;
@@ -75,7 +69,7 @@ using Table3 = MotorTables;
 using Figures24To27 = MotorTables;
 
 TEST_F(Table2, TheInertiaSuppliedSetsTheScaleOfAllElse) {
-  const auto found = estimation::identify(slow, by_direction, pipeline());
+  const auto found = estimation::identify(slow, by_direction, {});
   const report::DcMotor motor = published::identified_motor();
   EXPECT_NEAR(torque_constant(*found) / motor.torque_constant, 1.0, 0.02);
   EXPECT_NEAR(derived(*found, "Tsp") / motor.friction.positive.coulomb, 1.0, 0.02);
@@ -83,7 +77,7 @@ TEST_F(Table2, TheInertiaSuppliedSetsTheScaleOfAllElse) {
   // Another inertia scales torque constant and friction alike.
   model::Model heavier = by_direction;
   fix(heavier, "inertia", "inertia", 1.1 * motor.inertia);
-  const auto scaled = estimation::identify(slow, heavier, pipeline());
+  const auto scaled = estimation::identify(slow, heavier, {});
   EXPECT_NEAR(torque_constant(*scaled) / torque_constant(*found), 1.1, 0.001);
   EXPECT_NEAR(derived(*scaled, "Tsp") / derived(*found, "Tsp"), 1.1, 0.001);
 }
@@ -93,7 +87,7 @@ TEST_F(Table2, WithoutItNothingSetsTheScaleAndTheTorqueConstantIsNotClaimed) {
   model::Parameter* inertia = open.find("inertia")->find("inertia");
   inertia->fixed = false;
   inertia->value.reset();
-  const auto found = estimation::identify(slow, open, pipeline());
+  const auto found = estimation::identify(slow, open, {});
   // All parameters at zero, with a motor that makes no torque, would leave no error at all.
   EXPECT_FALSE(estimate(*found, "torque_constant_error", "ratio").identifiable);
   bool said = false;
@@ -104,7 +98,7 @@ TEST_F(Table2, WithoutItNothingSetsTheScaleAndTheTorqueConstantIsNotClaimed) {
 TEST_F(Table3, RowsAndDeviationsComeOutAsPrinted) {
   Column constant, viscous_positive, viscous_negative, coulomb_positive, coulomb_negative;
   for (std::size_t k = 0; k < fast.experiments.size(); ++k) {
-    const auto found = estimation::identify(only(fast, fast.experiments[k].name), by_direction, pipeline());
+    const auto found = estimation::identify(only(fast, fast.experiments[k].name), by_direction, {});
     constant.push_back(torque_constant(*found));
     viscous_positive.push_back(derived(*found, "Tvp"));
     viscous_negative.push_back(derived(*found, "Tvn"));
@@ -122,7 +116,7 @@ TEST_F(Table3, RowsAndDeviationsComeOutAsPrinted) {
 }
 
 TEST_F(Table3, HarmonicDriveFrictionIsTheTotalLessTheMotors) {
-  const auto motor = estimation::identify(slow, by_direction, pipeline());
+  const auto motor = estimation::identify(slow, by_direction, {});
   const rhs100::Set drive_set = rhs100::table_7();
   const auto drive = estimation::identify(dataset_of(drive_set), base_model(drive_set), {});
   // Section 4.3: T_f = T_fm + T_f1 + T_f2, of which the parts of the drive cannot be distinguished.
@@ -135,12 +129,12 @@ TEST_F(Table3, HarmonicDriveFrictionIsTheTotalLessTheMotors) {
 }
 
 TEST_F(Figures24To27, FrictionByDirectionMatchesSlowAndFastMotionWhereOneForBothDoesNot) {
-  const auto slow_both = estimation::identify(slow, symmetric(), pipeline());
-  const auto slow_each = estimation::identify(slow, by_direction, pipeline());
+  const auto slow_both = estimation::identify(slow, symmetric(), {});
+  const auto slow_each = estimation::identify(slow, by_direction, {});
   EXPECT_GT(free_run_error(slow, slow_both->model), 0.2);   // figure 24
   EXPECT_LT(free_run_error(slow, slow_each->model), 0.03);  // figure 26
-  const auto fast_both = estimation::identify(fast, symmetric(), pipeline());
-  const auto fast_each = estimation::identify(fast, by_direction, pipeline());
+  const auto fast_both = estimation::identify(fast, symmetric(), {});
+  const auto fast_each = estimation::identify(fast, by_direction, {});
   // "There is still little discrepancy observed for high velocity": its runs have parameters of their own. What one
   // model for all leaves is what the mean of the runs' own parameters leaves.
   const double left = free_run_error(fast, fast_each->model);
@@ -150,8 +144,8 @@ TEST_F(Figures24To27, FrictionByDirectionMatchesSlowAndFastMotionWhereOneForBoth
 }
 
 TEST_F(Figures24To27, BreakAwayDependsOnTheDirectionAndTheModelBreaksAwayWithTheShaft) {
-  const auto both = estimation::identify(slow, symmetric(), pipeline());
-  const auto each = estimation::identify(slow, by_direction, pipeline());
+  const auto both = estimation::identify(slow, symmetric(), {});
+  const auto each = estimation::identify(slow, by_direction, {});
   const auto late_ms = [&](const model::Model& model, int direction) {
     Column late;
     for (const data::Experiment& e : slow.experiments) {

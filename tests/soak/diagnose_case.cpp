@@ -86,7 +86,7 @@ struct Bench {
 
   // RMS of the true model's residual on the hold-out records.
   double holdout_floor(Balance balance) const {
-    const estimation::PreparedData prepared = estimation::prepare(of(data::Role::fit), truth.drive, {});
+    const estimation::PreparedData prepared = estimation::prepare(of(data::Role::fit), truth, {});
     const estimation::PreparedData held_out =
         estimation::prepare_with(of(data::Role::holdout), truth.drive, prepared.pipeline);
     BalanceData data(held_out, balance);
@@ -95,7 +95,7 @@ struct Bench {
 
   // The torque of the hidden effects orthogonal to the base model, over the noise, on the fitted records.
   double missing_over_noise(Balance balance) const {
-    const estimation::PreparedData prepared = estimation::prepare(of(data::Role::fit), truth.drive, {});
+    const estimation::PreparedData prepared = estimation::prepare(of(data::Role::fit), truth, {});
     BalanceData data(prepared, balance);
     const estimation::Terms full = estimation::terms_of(truth),
                             without = estimation::terms_of(testing::model_of(file.drive, false, true));

@@ -49,7 +49,7 @@ const Recorded& recorded() {
 estimation::PreparedData prepared(const data::Dataset& dataset, const model::Model& m) {
   estimation::PipelineOptions options;
   options.cutoff_hz = kCutoffHz;
-  return estimation::prepare(pointers(dataset), m.drive, options);
+  return estimation::prepare(pointers(dataset), m, options);
 }
 
 std::vector<NoiseFloor> floors_of(const data::Dataset& dataset, const model::Model& m, Balance balance) {
@@ -206,7 +206,7 @@ name = "train"
     m.effects.push_back(catalogue::blank_effect(catalogue::get(name), data::Axis::linear));
   estimation::PipelineOptions options;
   options.cutoff_hz = 100.0;
-  const estimation::PreparedData p = estimation::prepare(pointers(dataset), m.drive, options);
+  const estimation::PreparedData p = estimation::prepare(pointers(dataset), m, options);
   BalanceData data(p, Balance::motor);
   estimation::Terms terms = estimation::terms_of(m);
   estimation::fit_balance(data, terms);

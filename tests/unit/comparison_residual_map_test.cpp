@@ -33,7 +33,7 @@ struct Rows {
                      1);
     estimation::PipelineOptions options;
     options.cutoff_hz = 30.0;
-    prepared = estimation::prepare(pointers(dataset), known_model(drive).drive, options);
+    prepared = estimation::prepare(pointers(dataset), known_model(drive), options);
     motor = std::make_unique<BalanceData>(prepared, Balance::motor);
   }
   template <class F>
