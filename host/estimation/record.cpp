@@ -7,9 +7,9 @@
 #include <numeric>
 #include <utility>
 
-#include "host/catalogue/catalogue.hpp"
 #include "host/estimation/cancellation.hpp"
 #include "host/estimation/in_parallel.hpp"
+#include "host/estimation/mask_cutoff.hpp"
 #include "host/estimation/side_motion.hpp"
 #include "host/estimation/zero_order_hold.hpp"
 #include "host/signals/butterworth.hpp"
@@ -35,15 +35,6 @@ constexpr double kMaskReach = 1.5;
 constexpr double kCountingPowerShare = 0.01;
 constexpr double kMostMaskedShare = 0.75;
 constexpr double kMaskedShareThen = 0.5;  // where it was more than that
-// Of the samples that the best cut-off leaves of a record. The information of a fit goes with the number of samples:
-// with less than a tenth the record is as good as lost, and then so many are wanted. From 0.05 to 0.17 the report's
-// tables and the coverage of intervals come out as they should; at 0.25 the intervals are too wide.
-constexpr double kLeastOfTheBest = 0.1, kThenOfTheBest = 0.9;
-constexpr double kWorthKeeping = 0.05;  // of a record's samples, at its best cut-off
-constexpr double kCutoffStep = 1.25;
-// Of samples within the velocity of a friction law that is given, in one direction: with fewer than one period of the
-// cut-off holds there is not one that is independent.
-constexpr double kFewestOfALaw = kRowsOverCutoff;
 
 // A current that is held for a sample acts, on average, half a sample after its time stamp; the mean with the sample
 // before puts it at the instant at which positions are read.
@@ -294,101 +285,24 @@ PreparedData without_records(const std::vector<const Experiment*>& experiments, 
   return prepared;
 }
 
-// The smallest velocity scale of the friction laws whose velocity is given: such a law shows in slow motion alone.
-std::optional<double> slowest_law_rad_s(const model::Model& model) {
-  std::optional<double> slowest;
-  for (const model::Effect& effect : model.effects) {
-    const catalogue::Entry* entry = catalogue::find(effect.type);
-    if (!entry) continue;
-    for (const effects::ParameterInfo& info : entry->parameters) {
-      const model::Parameter* p = effect.find(info.name);
-      if (info.limit != effects::Limit::velocity || !p || !p->fixed || !p->value) continue;
-      slowest = std::min(slowest.value_or(*p->value), *p->value);
-    }
-  }
-  return slowest;
-}
-
-// What the mask leaves of a record in one direction, weighted by the square of a law exp(-(w/v)^2), which is the
-// information on the law's amplitude; as a share of all samples. Without a law every sample counts.
-double share_left(const Record& r, int direction, std::optional<double> law_rad_s) {
-  const Rows& rows = r.rows[index(Balance::motor)];
-  double sum = 0.0;
-  for (const std::size_t k : rows.samples) {
-    const double velocity = r.inputs.velocity_at(k) * direction;
-    if (velocity <= 0.0) continue;
-    sum += law_rad_s ? std::exp(-2.0 * velocity * velocity / (*law_rad_s * *law_rad_s)) : 1.0;
-  }
-  const std::size_t all = rows.samples.size() + rows.masked;
-  return all > 0 ? sum / static_cast<double>(all) : 0.0;
-}
-
-// Share of a record's samples with this sign of the velocity, masked or not: the most that a mask can leave.
-double share_of(const Record& r, int direction) {
-  std::size_t count = 0;
-  for (std::size_t k = 0; k < r.inputs.size(); ++k) count += r.inputs.velocity_at(k) * direction > 0.0;
-  return r.inputs.size() > 0 ? static_cast<double>(count) / static_cast<double>(r.inputs.size()) : 0.0;
-}
-
-// What the mask has to leave of a record, at rising cut-offs of which the first is the present one.
-struct MaskedShare {
-  int direction = 1;
-  std::optional<double> law_rad_s;
-  double worth_keeping = 0.0;     // at the best cut-off
-  std::vector<double> at_cutoff;  // see share_left()
-
-  // The lowest cut-off that leaves nearly the most, if the present one leaves next to nothing of that; else 0.
-  double cutoff_hz(const std::vector<double>& cutoffs) const {
-    const double best = *std::max_element(at_cutoff.begin(), at_cutoff.end());
-    if (best < worth_keeping || at_cutoff.front() >= kLeastOfTheBest * best) return 0.0;
-    const auto enough = std::ranges::find_if(at_cutoff, [&](double s) { return s >= kThenOfTheBest * best; });
-    return cutoffs[static_cast<std::size_t>(enough - at_cutoff.begin())];
-  }
-};
-
-std::vector<MaskedShare> shares_to_leave(const Record& r, std::optional<double> law_rad_s, double highest_hz) {
-  std::vector<MaskedShare> shares;
-  if (!r.has_motor_motion || r.at_rest) return shares;
-  const double rows = kRowsOverCutoff * highest_hz * r.sample_s * static_cast<double>(r.inputs.size());
-  for (const int direction : {1, -1}) {
-    if (share_left(r, direction, {}) < kLeastOfTheBest * share_of(r, direction))
-      shares.push_back({direction, std::nullopt, 0.5 * kWorthKeeping, {}});
-    if (law_rad_s) shares.push_back({direction, law_rad_s, kFewestOfALaw / rows, {}});
-  }
-  return shares;
-}
-
-// What the number of reversals does not show: slow or short strokes of which the mask leaves next to nothing in one
-// direction, because they end within the transient of the filter, or because the velocity is small for its noise. The
-// mask itself is made at rising cut-offs: it gets shorter, and the noise larger, so that each record has a best one.
-// The same for the slow samples that a friction law of a given velocity needs. Returns whether the cut-off was raised.
-bool raise_for_masked_records(PreparedData& prepared, std::optional<double> law_rad_s, double highest_hz) {
+// Returns whether the cut-off was raised.
+bool raise_for_mask(PreparedData& prepared, std::optional<double> law_rad_s, double highest_hz) {
   Pipeline& pipeline = prepared.pipeline;
-  std::vector<double> cutoffs;
-  for (double hz = pipeline.row_cutoff_hz; hz < highest_hz; hz *= kCutoffStep) cutoffs.push_back(hz);
-  cutoffs.push_back(highest_hz);
-  std::vector<double> wanted(prepared.records.size(), 0.0);
-  in_parallel(prepared.records.size(), [&](std::size_t i) {
-    const Record& r = prepared.records[i];
-    std::vector<MaskedShare> shares = shares_to_leave(r, law_rad_s, highest_hz);
-    for (std::size_t c = 0; c < cutoffs.size() && !shares.empty(); ++c) {
-      throw_if_cancelled();
-      Pipeline tried = pipeline;
-      tried.row_cutoff_hz = cutoffs[c];
-      tried.motion_cutoff_hz = std::max(pipeline.motion_cutoff_hz, cutoffs[c]);
-      const Record again = prepare_one(*r.experiment, prepared.constants, tried);
-      for (MaskedShare& share : shares) share.at_cutoff.push_back(share_left(again, share.direction, share.law_rad_s));
-    }
-    for (const MaskedShare& share : shares) wanted[i] = std::max(wanted[i], share.cutoff_hz(cutoffs));
-  });
-  const auto most = std::max_element(wanted.begin(), wanted.end());
-  if (most == wanted.end() || *most <= pipeline.row_cutoff_hz) return false;
-  pipeline.row_cutoff_hz = std::min(std::ceil(*most), highest_hz);
+  const auto made_at = [&](const Record& r, double hz) {
+    Pipeline tried = pipeline;
+    tried.row_cutoff_hz = hz;
+    tried.motion_cutoff_hz = std::max(pipeline.motion_cutoff_hz, hz);
+    return prepare_one(*r.experiment, prepared.constants, tried);
+  };
+  const MaskCutoff wanted =
+      cutoff_for_mask(prepared.records, {pipeline.row_cutoff_hz, highest_hz, kRowsOverCutoff}, law_rad_s, made_at);
+  if (wanted.hz <= pipeline.row_cutoff_hz) return false;
+  pipeline.row_cutoff_hz = std::min(std::ceil(wanted.hz), highest_hz);
   // Slow motion is what such records have: a velocity that is small for its noise puts the friction of one speed at
   // another one, so the positions' filter is no wider than it must be.
   pipeline.motion_cutoff_hz = std::max(pipeline.motion_cutoff_hz, pipeline.row_cutoff_hz);
   pipeline.reason += fmt::format("; raised to {:.4g} Hz, so that the mask leaves samples of {}", pipeline.row_cutoff_hz,
-                                 prepared.records[static_cast<std::size_t>(most - wanted.begin())].name);
+                                 wanted.reason);
   return true;
 }
 
@@ -436,7 +350,7 @@ PreparedData prepare(const std::vector<const Experiment*>& experiments, const mo
   if (!options.cutoff_hz && options.mask) {
     double slowest_hz = 1e300;
     for (const Experiment* e : experiments) slowest_hz = std::min(slowest_hz, 1.0 / e->sample_s);
-    if (raise_for_masked_records(prepared, law_rad_s, slowest_hz / 10.0))
+    if (raise_for_mask(prepared, law_rad_s, slowest_hz / 10.0))
       prepared = prepare_with(experiments, drive, Pipeline(prepared.pipeline));
   }
   prepared.pipeline.torque_per_step = torque_per_held_step(prepared);
