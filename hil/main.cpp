@@ -253,6 +253,10 @@ void take_twin_drive(CLI::App& command, flexspline::twin::TwinOptions& options) 
   command.add_option("--hide", options.hide, "effect that the drive has and its data sheet does not have");
   command.add_option("--motor", options.motor, "what its amplifier takes: current (default), or three-phase")
       ->check(CLI::IsMember({"current", "three-phase"}));
+  command.add_option("--motor-seed", options.motor_seed,
+                     "with --motor three-phase: a random motor that it was not commissioned with");
+  command.add_option("--wiring-fault", options.wiring_fault,
+                     "of the three-phase motor, such as phase-open-b, phases-swapped, encoder-slips");
   command.add_option("--flash", options.flash_file, "file that holds its flash memory (default: none)");
   command.add_option("--serial", options.serial, "serial number (default TWIN)")
       ->check([](const std::string& text) -> std::string {

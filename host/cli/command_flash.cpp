@@ -14,6 +14,7 @@
 #include "host/drive/block_changes.hpp"
 #include "host/drive/model_block.hpp"
 #include "host/drive/stored_zero.hpp"
+#include "host/drive/motor_block.hpp"
 #include "host/output/json.hpp"
 #include "host/output/text.hpp"
 #include "shared/protocol/texts.hpp"
@@ -209,7 +210,8 @@ int flash(const FlashOptions& options, Console& console) {
   drive::Session session = open_drive(options.drive);
   drive::require_access(session, signer);
   const Bytes active = session.read_block(protocol::Which::active);
-  const Bytes block = drive::keeping_stored_zero(block_of(options, session, active, console), active);
+  const Bytes block = drive::keeping_motor(
+      drive::keeping_stored_zero(block_of(options, session, active, console), active), active);
   const std::vector<BlockChange> changes = drive::changes(active, block);
   const BlockView before = drive::view_of(active), after = drive::view_of(block);
   console.line(fmt::format("{}", named(session)));

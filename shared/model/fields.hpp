@@ -126,6 +126,7 @@ class FieldNames {
   constexpr void operator()(T& x) { x.fields(codec()); }
   constexpr void positive(fixed::Value& x) { integer(Field::positive, x.raw); }
   constexpr void positive(std::int32_t& x) { integer(Field::positive, x); }
+  constexpr void signed_word(std::int32_t& x) { integer(Field::word, x); }
   constexpr void limit(fixed::Value& x) { integer(Field::limit, x.raw); }
   constexpr void unsigned_one(fixed::Value& x) { integer(Field::unsigned_one, x.raw); }
   constexpr void share(std::uint64_t& x) { integer(Field::share, x); }

@@ -48,6 +48,8 @@ constexpr std::string_view text_of(Code code) {
       return "it waits after wrong signatures; try again in a minute";
     case Code::pairing_full:
       return "its memory for pairing keys is full; its sector has to be erased with a programmer";
+    case Code::not_measured:
+      return "it has not measured its motor since it was switched on; run flexspline commission";
     case Code::too_long:
       return "the block is empty or longer than the drive's flash has room for";
     case Code::not_begun:
@@ -93,13 +95,19 @@ constexpr std::string_view text_of(Refusal refusal) {
       return "the drive is in a fault; find its cause and clear it first";
     case Refusal::booting:
       return "the drive is starting";
+    case Refusal::commissioning:
+      return "the drive measures its motor; stop that, or wait for its end";
+    case Refusal::no_stage:
+      return "the drive has no three-phase power stage, or the stage gives no samples";
+    case Refusal::not_commissioned:
+      return "the motor of this drive was never measured; run flexspline commission";
   }
   return "a refusal that this tool does not know";
 }
 
 constexpr std::string_view name_of(Mode mode) {
   constexpr std::array<std::string_view, kModes> kNames{"boot",     "idle",       "current", "velocity",
-                                                        "position", "excitation", "stop",    "fault"};
+                                                        "position", "excitation", "stop",    "fault", "commissioning"};
   return static_cast<std::size_t>(mode) < kNames.size() ? kNames[static_cast<std::size_t>(mode)] : "unknown";
 }
 
