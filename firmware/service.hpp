@@ -195,8 +195,7 @@ class Service {
       case Kind::block_commit:
       case Kind::block_erase_all:
       case Kind::map_info: {
-        protocol::Empty empty;
-        if (!taken(m, empty)) return;
+        if (protocol::Empty empty; !taken(m, empty)) return;
         if (m.request() == Kind::status) return status();
         if (m.request() == Kind::effects) return effects();
         if (m.request() == Kind::reference) return reference();

@@ -1,6 +1,7 @@
 // Measures the motor of a three-phase drive and sets its current loop.
 #include <fmt/format.h>
 
+#include <cmath>
 #include <nlohmann/json.hpp>
 #include <numbers>
 #include <stdexcept>
@@ -13,6 +14,7 @@
 #include "host/drive/scales.hpp"
 #include "host/output/json.hpp"
 #include "host/output/text.hpp"
+#include "shared/fixed/types.hpp"
 #include "shared/protocol/texts.hpp"
 
 namespace flexspline::cli {
@@ -50,16 +52,18 @@ Bench bench_of(drive::Session& session, const CommissionOptions& options) {
   Bench b;
   b.stage = drive::stage_of(session);
   b.hardware = session.hardware();
-  b.setup = drive::setup_of(
-      session, b.stage, b.hardware,
-      {options.current, options.most_speed, options.bus, options.turns, options.pole_pairs});
   b.active = session.read_block(protocol::Which::active);
   if (options.store && b.active.empty())
     session.fail("it has no parameter block that could keep the motor; flash one first, or leave --store out");
+  std::optional<double> motor_a;
   if (const auto scales = drive::scales_of(b.active)) {
+    motor_a = std::ldexp(scales->header.limits.current.raw, -fixed::kValueBits) * scales->constants.current_base;
     b.gear_ratio = scales->constants.gear_ratio;
     b.torque_constant_nm_a = scales->constants.torque_constant;
   }
+  b.setup = drive::setup_of(
+      session, b.stage, b.hardware,
+      {options.current, motor_a, options.most_speed, options.bus, options.turns, options.pole_pairs});
   b.bandwidth_hz = options.bandwidth.value_or(deployment::usual_bandwidth_hz(b.setup.pwm_hz));
   if (b.bandwidth_hz > 0.1 * b.setup.pwm_hz)
     throw UsageError(fmt::format("--bandwidth-hz {:g} is above a tenth of the PWM rate; give at most {:g}",
@@ -224,7 +228,7 @@ void declare(Parser& parser, CommissionOptions& options) {
   take_drive(parser, options.drive);
   parser
       .option("--test-current-a", options.current,
-              "amplitude of a phase (default: two thirds of what the board allows)")
+              "amplitude of a phase (default: the limit of the current in the block)")
       .positive()
       .value("A");
   parser.option("--max-speed-rad-s", options.most_speed, "of the motor (default: 157)").positive().value("RAD/S");

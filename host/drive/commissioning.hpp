@@ -15,6 +15,7 @@ namespace flexspline::drive {
 
 struct CommissioningOptions {
   std::optional<double> current_a;         // of the test
+  std::optional<double> motor_a;           // that the active block allows the motor; the test takes it by default
   std::optional<double> most_speed_rad_s;  // of the motor
   std::optional<double> bus_v;             // nominal; none: what the drive reads now
   double most_turns = 40.0;                // of the motor to either side

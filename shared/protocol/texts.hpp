@@ -10,6 +10,33 @@
 
 namespace flexspline::protocol {
 
+// Of the parameter store.
+constexpr std::string_view store_text_of(Code code) {
+  switch (code) {
+    case Code::too_long:
+      return "the block is empty or longer than the drive's flash has room for";
+    case Code::not_begun:
+      return "no block is being sent; start again";
+    case Code::out_of_order:
+      return "a piece of the block is missing; start again";
+    case Code::incomplete:
+      return "the block is not complete; start again";
+    case Code::wrong_checksum:
+      return "what arrived is not what was sent; try again over a better line";
+    case Code::invalid:
+      return "the drive's validator refused the block; nothing was changed";
+    case Code::flash:
+      return "the drive's flash memory did not take what was written; try again, and if it stays the memory is worn "
+             "out";
+    case Code::no_previous:
+      return "there is no valid block before the active one; flash one from a backup";
+    case Code::worn:
+      return "there is no room to note another restore; flash the block from a backup";
+    default:
+      return {};
+  }
+}
+
 constexpr std::string_view text_of(Code code) {
   switch (code) {
     case Code::done:
@@ -51,24 +78,15 @@ constexpr std::string_view text_of(Code code) {
     case Code::not_measured:
       return "it has not measured its motor since it was switched on; run flexspline commission";
     case Code::too_long:
-      return "the block is empty or longer than the drive's flash has room for";
     case Code::not_begun:
-      return "no block is being sent; start again";
     case Code::out_of_order:
-      return "a piece of the block is missing; start again";
     case Code::incomplete:
-      return "the block is not complete; start again";
     case Code::wrong_checksum:
-      return "what arrived is not what was sent; try again over a better line";
     case Code::invalid:
-      return "the drive's validator refused the block; nothing was changed";
     case Code::flash:
-      return "the drive's flash memory did not take what was written; try again, and if it stays the memory is worn "
-             "out";
     case Code::no_previous:
-      return "there is no valid block before the active one; flash one from a backup";
     case Code::worn:
-      return "there is no room to note another restore; flash the block from a backup";
+      return store_text_of(code);
   }
   return "a code that this tool does not know; bring the tool up to date";
 }

@@ -3,6 +3,8 @@
 #include <gtest/gtest.h>
 
 #include <cmath>
+#include <memory>
+#include <random>
 #include <string>
 #include <vector>
 
@@ -33,7 +35,7 @@ deployment::CommissioningSetup setup_for(const protocol::CommissioningStage& sta
   s.bus_full_scale_v = 1e-3 * stage.bus_full_scale_mv;
   s.pwm_hz = stage.pwm_hz;
   s.timer_counts = static_cast<int>(stage.timer_counts);
-  s.current_a = 2.33;
+  s.current_a = 3.5;
   s.bus_v = 48.0;
   return s;
 }
@@ -113,7 +115,8 @@ TEST(FirmwareCommissioning, FindsTheMotorThatTheTwinDrew) {
     const board::ThreePhaseParameters& truth = bench.drive->rig().three_phase()->parameters();
     const auto& g = truth.sensors.gain;
     const double gain = 3.0 / (1.0 / g[0] + 1.0 / g[1] + 1.0 / g[2]);  // what all sensors have in common
-    EXPECT_NEAR(found.resistance_ohm * gain, truth.motor.resistance_ohm, 0.03 * truth.motor.resistance_ohm) << seed;
+    const double ohm = truth.motor.resistance_ohm + truth.inverter.on_resistance_ohm;
+    EXPECT_NEAR(found.resistance_ohm * gain, ohm, 0.03 * ohm) << seed;
     EXPECT_NEAR(found.inductance_d_h * gain, truth.motor.inductance_d_h, 0.05 * truth.motor.inductance_d_h) << seed;
     EXPECT_NEAR(found.inductance_q_h * gain, truth.motor.inductance_q_h, 0.05 * truth.motor.inductance_q_h) << seed;
     EXPECT_NEAR(found.flux_vs, truth.motor.flux_vs, 0.02 * truth.motor.flux_vs) << seed;
@@ -122,7 +125,7 @@ TEST(FirmwareCommissioning, FindsTheMotorThatTheTwinDrew) {
     const double wired = found.reversed ? -truth.offset_turns : truth.offset_turns, off = found.offset_turns - wired;
     EXPECT_NEAR(360.0 * (off - std::round(off)), 0.0, 3.0) << seed;
     std::printf("seed %d: R %+.2f %%, Ld %+.2f %%, Lq %+.2f %%, flux %+.2f %%, angle %+.2f deg, %.1f s\n",
-                static_cast<int>(seed), 100.0 * (found.resistance_ohm * gain / truth.motor.resistance_ohm - 1.0),
+                static_cast<int>(seed), 100.0 * (found.resistance_ohm * gain / ohm - 1.0),
                 100.0 * (found.inductance_d_h * gain / truth.motor.inductance_d_h - 1.0),
                 100.0 * (found.inductance_q_h * gain / truth.motor.inductance_q_h - 1.0),
                 100.0 * (found.flux_vs / truth.motor.flux_vs - 1.0), 360.0 * (off - std::round(off)),
@@ -190,6 +193,46 @@ TEST(FirmwareCommissioning, ADriveWithoutAThreePhaseStageSaysSo) {
   EXPECT_EQ(bench.host->code(Kind::commissioning_begin, protocol::CommissioningBegin{}), Code::not_available);
 }
 
+TEST(FirmwareCommissioning, ADriveThatIsLockedByAKeyDoesNotBeginAndAnswersTheRest) {
+  Bench bench;
+  protocol::Identity id;
+  ASSERT_EQ(protocol::take_payload(bench.host->ask(Kind::identify, protocol::Hello{}).content(), id), Code::done);
+  const auto challenge = bench.ask<protocol::PairingChallenge>(Kind::pairing_challenge);
+  const auto answer =
+      answer_of(owner(), protocol::PairingAction::pair, {id.board, id.serial}, challenge.nonce);
+  for (const auto& part : answer.parts()) ASSERT_EQ(bench.host->code(Kind::pairing_part, part), Code::done);
+  ASSERT_EQ(bench.host->code(Kind::pairing_answer, protocol::PairingAnswer{protocol::PairingAction::pair}), Code::done);
+  ASSERT_EQ(bench.host->code(Kind::pairing_lock), Code::done);
+  const auto request = begin_of(bench.setup());
+  EXPECT_EQ(static_cast<Code>(bench.begin(request).code), Code::locked);
+  EXPECT_FALSE(bench.stage().commissions());
+  EXPECT_EQ(bench.progress().state, CommissioningState::none);
+  EXPECT_EQ(bench.host->code(Kind::commissioning_stop), Code::done);
+}
+
+TEST(FirmwareCommissioning, RequestsOfOtherLengthsAndNumbersBeginNothing) {
+  Bench bench;
+  const protocol::Message good = protocol::request(Kind::commissioning_begin, 1, begin_of(bench.setup()));
+  std::mt19937 random(3);
+  for (std::uint8_t length = 0; length <= protocol::kMostPayload; ++length) {
+    if (length == good.length) continue;
+    protocol::Message m = good;
+    m.length = length;
+    EXPECT_EQ(static_cast<Code>(bench.host->ask(m).code), Code::wrong_length) << int{length};
+  }
+  for (const Kind kind : {Kind::commissioning_stage, Kind::commissioning_stop, Kind::commissioning_state,
+                          Kind::commissioning_result})
+    EXPECT_EQ(static_cast<Code>(bench.host->ask(protocol::Message{static_cast<std::uint8_t>(kind), 1, 1, 0, {}}).code),
+              Code::wrong_length);
+  for (int i = 0; i < 2000; ++i) {
+    protocol::Message m = good;
+    for (std::size_t k = 0; k < m.length; ++k) m.payload[k] = static_cast<std::uint8_t>(random());
+    EXPECT_EQ(static_cast<Code>(bench.host->ask(m).code), Code::wrong_value);
+  }
+  EXPECT_EQ(bench.drive->status().mode, Mode::idle);
+  EXPECT_EQ(bench.progress().state, CommissioningState::none);
+}
+
 TEST(FirmwareCommissioning, AMotorThatWasNeverMeasuredIsNotArmed) {
   Bench bench;
   EXPECT_EQ(bench.host->arm(Mode::velocity).refusal, Refusal::not_commissioned);
@@ -236,7 +279,7 @@ TEST(FirmwareCommissioning, AStopADisarmALostLinkASilentHostAndAProtectionOpenTh
   const auto ended = [](const char* what, auto&& act, CommissioningState expected, Mode mode) {
     Bench bench;
     ASSERT_EQ(bench.begin(), Code::done);
-    bench.drive->run(10'000);
+    bench.drive->run(5'000);
     ASSERT_EQ(bench.progress().state, CommissioningState::runs) << what;
     act(bench);
     EXPECT_TRUE(bench.is_off()) << what;
