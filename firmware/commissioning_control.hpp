@@ -153,11 +153,13 @@ struct CommissioningChoice {
   using Type = NoCommissioning;
 };
 template <Board B>
-requires requires(B& board) { board.three_phase(); }
+requires requires(B& board) {
+  board.three_phase();
+}
 struct CommissioningChoice<B> {
   using Type = CommissioningControl;
 };
 template <Board B>
-using CommissioningOf = CommissioningChoice<B>::Type;
+using CommissioningOf = typename CommissioningChoice<B>::Type;
 
 }  // namespace flexspline::firmware

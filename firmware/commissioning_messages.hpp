@@ -9,8 +9,8 @@
 namespace flexspline::firmware {
 
 struct CommissioningMessages {
-  // Serves a request of the kinds `commissioning_...`; `answer` gets the payload, where there is one. `command`: for the
-  // tick, where the code is `done` and the request begins or ends it; otherwise a heartbeat.
+  // Serves a request of the kinds `commissioning_...`; `answer` gets the payload, where there is one. `command`: for
+  // the tick, where the code is `done` and the request begins or ends it; otherwise a heartbeat.
   template <class Control>
   static protocol::Code serve(Control& control, const protocol::Message& m, protocol::Message& answer,
                               Command::Kind& command) {

@@ -26,7 +26,10 @@ void bad_contact(ThreePhaseParameters& p, std::size_t leg) {
   p.wiring.contact_ohm[leg] = p.motor.resistance_ohm;
 }
 constexpr std::pair<const char*, void (*)(ThreePhaseParameters&, std::size_t)> kOfAPhase[] = {
-    {"phase-open", &open}, {"sensor-dead", &dead_sensor}, {"short-to-ground", &to_ground}, {"bad-contact", &bad_contact}};
+    {"phase-open", &open},
+    {"sensor-dead", &dead_sensor},
+    {"short-to-ground", &to_ground},
+    {"bad-contact", &bad_contact}};
 
 // The others.
 void swapped(ThreePhaseParameters& p) {
@@ -51,12 +54,15 @@ void slipping_encoder(ThreePhaseParameters& p) {
   p.slip_every_turns = 0.5;
 }
 void low_bus(ThreePhaseParameters& p) {
-  p.inverter.supply_v *= 0.6;
+  p.inverter.supply_v *= 0.4;
 }
-constexpr std::pair<const char*, void (*)(ThreePhaseParameters&)> kOthers[] = {
-    {"phases-swapped", &swapped},         {"phases-shorted", &shorted},          {"not-connected", &not_connected},
-    {"sensors-swapped", &swapped_sensors}, {"encoder-stands", &standing_encoder}, {"encoder-slips", &slipping_encoder},
-    {"bus-low", &low_bus}};
+constexpr std::pair<const char*, void (*)(ThreePhaseParameters&)> kOthers[] = {{"phases-swapped", &swapped},
+                                                                               {"phases-shorted", &shorted},
+                                                                               {"not-connected", &not_connected},
+                                                                               {"sensors-swapped", &swapped_sensors},
+                                                                               {"encoder-stands", &standing_encoder},
+                                                                               {"encoder-slips", &slipping_encoder},
+                                                                               {"bus-low", &low_bus}};
 
 }  // namespace
 

@@ -61,9 +61,9 @@ Bench bench_of(drive::Session& session, const CommissionOptions& options) {
     b.gear_ratio = scales->constants.gear_ratio;
     b.torque_constant_nm_a = scales->constants.torque_constant;
   }
-  b.setup = drive::setup_of(
-      session, b.stage, b.hardware,
-      {options.current, motor_a, options.most_speed, options.bus, options.turns, options.pole_pairs});
+  b.setup =
+      drive::setup_of(session, b.stage, b.hardware,
+                      {options.current, motor_a, options.most_speed, options.bus, options.turns, options.pole_pairs});
   b.bandwidth_hz = options.bandwidth.value_or(deployment::usual_bandwidth_hz(b.setup.pwm_hz));
   if (b.bandwidth_hz > 0.1 * b.setup.pwm_hz)
     throw UsageError(fmt::format("--bandwidth-hz {:g} is above a tenth of the PWM rate; give at most {:g}",
@@ -75,11 +75,12 @@ void print_plan(const Bench& b, Console& console) {
   const auto& s = b.setup;
   const std::string output =
       b.gear_ratio > 0.0 ? fmt::format(" ({:.3g} of the output)", s.most_travel_turns / b.gear_ratio) : "";
-  console.line(output::wrapped(fmt::format(
-      "The motor turns up to {:g} turns{} each way, at up to {:.3g} rad/s, with {:.3g} A (at most {:.3g} A a phase), for "
-      "up to {:g} s. It has to turn freely: take the load off and release the brake.",
-      s.most_travel_turns, output, 2.0 * std::numbers::pi * s.most_shaft_hz, s.current_a, s.most_current_a,
-      s.most_time_s)));
+  console.line(
+      output::wrapped(fmt::format("The motor turns up to {:g} turns{} each way, at up to {:.3g} rad/s, with {:.3g} A "
+                                  "(at most {:.3g} A a phase), for "
+                                  "up to {:g} s. It has to turn freely: take the load off and release the brake.",
+                                  s.most_travel_turns, output, 2.0 * std::numbers::pi * s.most_shaft_hz, s.current_a,
+                                  s.most_current_a, s.most_time_s)));
 }
 
 protocol::CommissioningProgress measure(drive::Session& session, const Bench& b, const CommissionOptions& options,
@@ -88,8 +89,8 @@ protocol::CommissioningProgress measure(drive::Session& session, const Bench& b,
   protocol::CommissioningProgress end;
   for (int run = 1; run <= options.repeat; ++run) {
     end = drive::commission(session, b.setup, [&](const protocol::CommissioningProgress& now) {
-      console.progress(fmt::format("run {} of {}: {}", run, options.repeat,
-                                   deployment::commissioning_step_text(now.step)));
+      console.progress(
+          fmt::format("run {} of {}: {}", run, options.repeat, deployment::commissioning_step_text(now.step)));
       return !Interruptible::interrupted();
     });
     if (end.state != CommissioningState::done) break;
@@ -111,7 +112,8 @@ Failure failure_of(drive::Session& session, const protocol::CommissioningProgres
     case CommissioningState::stopped:
       return {"stopped", "it was stopped by request", "run it again"};
     case CommissioningState::host_lost:
-      return {"host_lost", "the drive heard nothing of this host for half a second", "check cable and load of the host"};
+      return {"host_lost", "the drive heard nothing of this host for half a second",
+              "check cable and load of the host"};
     case CommissioningState::drive_fault: {
       const auto text = protocol::fault_text(session.status().fault);
       return {std::string(text.name), std::string(text.reason), "find the cause; disarming does not clear a fault"};
@@ -139,7 +141,8 @@ json print_results(const Bench& b, const std::vector<control::commissioning::Res
   json values = json::array();
   for (const drive::FoundValue& v : drive::found_values(b.setup, results)) {
     table.row({v.name, output::number(v.value), output::number(v.spread, 2), v.unit == "1" ? "" : v.unit});
-    values.push_back({{"name", v.name}, {"value", v.value}, {"unit", v.unit}, {"spread", output::json_number(v.spread)}});
+    values.push_back(
+        {{"name", v.name}, {"value", v.value}, {"unit", v.unit}, {"spread", output::json_number(v.spread)}});
   }
   console.line(table.text());
   return values;

@@ -54,8 +54,8 @@ struct CommissioningFindings {
 };
 CommissioningFindings commissioning_findings(const CommissioningSetup& setup, const control::commissioning::Result& r);
 
-// What a drive keeps of it (the section `motor` of its block), with a current loop of this bandwidth. `pulse`: shortest one
-// and dead time, a share of the PWM period. Throws std::invalid_argument that says which number does not fit.
+// What a drive keeps of it (the section `motor` of its block), with a current loop of this bandwidth. `pulse`: shortest
+// one and dead time, a share of the PWM period. Throws std::invalid_argument that says which number does not fit.
 control::MotorSettings motor_settings(const CommissioningSetup& setup, const control::commissioning::Result& r,
                                       double pulse, std::uint32_t encoder_counts, double bandwidth_hz);
 // The corner that is taken where none is given.

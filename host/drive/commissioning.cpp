@@ -80,9 +80,10 @@ deployment::CommissioningSetup setup_of(const Session& session, const protocol::
   const double motor_a = options.motor_a.value_or(kUnknownMotor * board_a);
   s.current_a = options.current_a.value_or(std::min({motor_a, board_a, most_a / kPeak}));
   if (!(s.current_a <= 0.999 * most_a / kPeak) && options.current_a)
-    session.fail(fmt::format("a test current of {:.3g} A needs a limit of {:.3g} A, and its stage takes {:.3g} A; give "
-                             "at most {:.3g} A",
-                             s.current_a, kPeak * s.current_a, most_a, 0.999 * most_a / kPeak));
+    session.fail(
+        fmt::format("a test current of {:.3g} A needs a limit of {:.3g} A, and its stage takes {:.3g} A; give "
+                    "at most {:.3g} A",
+                    s.current_a, kPeak * s.current_a, most_a, 0.999 * most_a / kPeak));
   s.current_a = std::min(s.current_a, 0.999 * most_a / kPeak);
   s.most_current_a = kPeak * s.current_a;
   const double least_v = share(stage.least_bus, 15) * s.bus_full_scale_v;
@@ -95,8 +96,8 @@ deployment::CommissioningSetup setup_of(const Session& session, const protocol::
   s.pole_pairs = options.pole_pairs;
   try {
     if (!(s.most_shaft_hz > 0.0 && s.most_shaft_hz <= s.pwm_hz / 100.0))
-      throw std::invalid_argument(fmt::format("the speed is not between 0 and {:.3g} rad/s",
-                                              2.0 * std::numbers::pi * s.pwm_hz / 100.0));
+      throw std::invalid_argument(
+          fmt::format("the speed is not between 0 and {:.3g} rad/s", 2.0 * std::numbers::pi * s.pwm_hz / 100.0));
     deployment::commissioning_settings(s);
   } catch (const std::invalid_argument& error) {
     session.fail(error.what());
@@ -158,8 +159,8 @@ control::commissioning::Result mean_of(const std::vector<control::commissioning:
   mean.flux = average([](const Result& r) { return r.flux; });
   mean.lost_voltage = average([](const Result& r) { return r.lost_voltage; });
   mean.lag = average([](const Result& r) { return r.lag; });
-  const std::int32_t beyond =
-      average([&](const Result& r) { return static_cast<std::int32_t>(r.offset_angle - results.front().offset_angle); });
+  const std::int32_t beyond = average(
+      [&](const Result& r) { return static_cast<std::int32_t>(r.offset_angle - results.front().offset_angle); });
   mean.offset_angle = results.front().offset_angle + static_cast<std::uint32_t>(beyond);
   return mean;
 }
@@ -231,14 +232,16 @@ std::vector<std::string> commissioning_warnings(const deployment::CommissioningS
                                 "abc"[leg], f.offset_a[leg]));
   }
   if (std::abs(f.lag_turns) > kLagTurns)
-    all.push_back(fmt::format("friction held the rotor {:.0f} degrees (electrical) behind the test current; a larger "
-                              "test current gives a better angle of the encoder",
-                              360.0 * std::abs(f.lag_turns)));
+    all.push_back(
+        fmt::format("friction held the rotor {:.0f} degrees (electrical) behind the test current; a larger "
+                    "test current gives a better angle of the encoder",
+                    360.0 * std::abs(f.lag_turns)));
   const double measured = 1.5 * f.pole_pairs * f.flux_vs;
   if (torque_constant_nm_a > 0.0 && std::abs(measured / torque_constant_nm_a - 1.0) > kConstant)
-    all.push_back(fmt::format("the torque constant by the flux is {:.3g} N*m/A, and the block of the drive has {:.3g}; "
-                              "identify again, or correct it in the model",
-                              measured, torque_constant_nm_a));
+    all.push_back(
+        fmt::format("the torque constant by the flux is {:.3g} N*m/A, and the block of the drive has {:.3g}; "
+                    "identify again, or correct it in the model",
+                    measured, torque_constant_nm_a));
   using control::SensorKind;
   if (hardware.motor_encoder == SensorKind::incremental || hardware.motor_encoder == SensorKind::indexed)
     all.emplace_back(

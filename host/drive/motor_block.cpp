@@ -42,8 +42,7 @@ Bytes with_motor(const Bytes& block, const control::MotorSettings& motor) {
 
 Bytes keeping_motor(const Bytes& block, const Bytes& active) {
   const control::MotorSettings motor = motor_of(active);
-  if (motor.pole_pairs == 0 || motor_of(block).pole_pairs > 0) return block;
-  return motor.encoder_counts == encoder_counts_of(block) ? with_motor(block, motor) : block;
+  return motor.pole_pairs > 0 && motor.encoder_counts == encoder_counts_of(block) ? with_motor(block, motor) : block;
 }
 
 }  // namespace flexspline::drive

@@ -12,8 +12,8 @@ control::MotorSettings motor_of(const Bytes& block);
 // The same block with this motor in place of its own.
 Bytes with_motor(const Bytes& block, const control::MotorSettings& motor);
 
-// A new block for a drive keeps the motor of the active one where it has none itself and its motor's encoder has as many
-// counts: a motor belongs to the drive, not to the model. `active` may be empty.
+// A new block for a drive gets the motor of the active one, in place of its own, where its motor's encoder has as many
+// counts: a motor belongs to the drive, not to the model, nor to a backup of another drive. `active` may be empty.
 Bytes keeping_motor(const Bytes& block, const Bytes& active);
 
 }  // namespace flexspline::drive

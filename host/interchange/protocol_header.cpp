@@ -234,10 +234,9 @@ void write_commissioning_payloads(Writer& w) {
        "most_shaft_step", "step_ramp", "most_travel", "most_periods", "stated_pole_pairs"});
   w.payload<CommissioningProgress>("commissioning_progress", "commissioning_state, from the drive",
                                    {"state", "step", "fault", "phase", "periods", "most_periods"});
-  w.payload<CommissioningResult>(
-      "commissioning_result", "commissioning_result, from the drive",
-      {"gain", "offset", "resistance", "inductance_d", "inductance_q", "flux", "lost_voltage", "pole_pairs", "reversed",
-       "offset_angle", "lag"});
+  w.payload<CommissioningResult>("commissioning_result", "commissioning_result, from the drive",
+                                 {"gain", "offset", "resistance", "inductance_d", "inductance_q", "flux",
+                                  "lost_voltage", "pole_pairs", "reversed", "offset_angle", "lag"});
 }
 
 void write_payloads(Writer& w) {

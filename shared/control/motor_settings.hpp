@@ -35,7 +35,8 @@ struct MotorSettings {
       for (std::int32_t* x : {&a->proportional, &a->integral, &a->resistance, &a->slope, &a->per_slope}) c.positive(*x);
       for (std::int32_t* x : {&a->beyond, &a->decay, &a->pending, &a->reactance}) c.signed_word(*x);
     }
-    for (std::int32_t* x : {&current.flux, &current.pull, &current.integral_limit, &current.up, &circle}) c.positive(*x);
+    for (std::int32_t* x : {&current.flux, &current.pull, &current.integral_limit, &current.up, &circle})
+      c.positive(*x);
     for (std::int32_t* x : {&resistance, &inductance_d, &inductance_q, &flux}) c.positive(*x);
     c.ticks(bandwidth_mhz);
   }

@@ -17,17 +17,17 @@ struct CommissioningStage {
   std::uint32_t current_full_scale_ma = 0;  // of a phase
   std::uint32_t bus_full_scale_mv = 0;
   std::uint32_t pwm_hz = 0;
-  std::uint32_t timer_counts = 0;    // on-time of a duty of one
-  std::int32_t shortest_pulse = 0;   // 2^-30 of a period
-  std::int32_t most_current = 0;     // of a phase, 2^-27 of full scale
-  std::uint16_t bus = 0;             // now, 2^-15 of full scale
-  std::uint16_t least_bus = 0;       // at which it runs
+  std::uint32_t timer_counts = 0;   // on-time of a duty of one
+  std::int32_t shortest_pulse = 0;  // 2^-30 of a period
+  std::int32_t most_current = 0;    // of a phase, 2^-27 of full scale
+  std::uint16_t bus = 0;            // now, 2^-15 of full scale
+  std::uint16_t least_bus = 0;      // at which it runs
   std::uint16_t most_bus = 0;
   std::uint32_t encoder_counts = 0;  // a turn
   bool two_sensors = false;
-  std::uint8_t pole_pairs = 0;       // zero: the motor was never measured
+  std::uint8_t pole_pairs = 0;  // zero: the motor was never measured
   bool reversed = false;
-  std::uint32_t offset_angle = 0;    // electrical angle = +-pole_pairs encoder + this, 2^-32 turns
+  std::uint32_t offset_angle = 0;  // electrical angle = +-pole_pairs encoder + this, 2^-32 turns
   template <class Codec>
   constexpr void fields(Codec& c) {
     c(current_full_scale_ma), c(bus_full_scale_mv), c(pwm_hz), c(timer_counts), c(shortest_pulse), c(most_current);
@@ -60,7 +60,7 @@ struct CommissioningBegin {
 
 // Whether it runs, and how it ended. All switches are open in every state but `runs`.
 enum class CommissioningState : std::uint8_t {
-  none,         // not since the drive was switched on
+  none,  // not since the drive was switched on
   runs,
   done,         // the motor was measured
   fault,        // it found `fault`

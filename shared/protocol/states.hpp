@@ -37,8 +37,8 @@ enum class CommandKind : std::uint8_t {
   // Messages of their own; in no `command`.
   start_map,  // residuals count from here on, in any mode in which the model's torque is fed forward
   stop_map,
-  clear_map,  // while the drive is not armed, as it takes as long as a tick
-  home,       // the shaft, at rest and not armed, is at `position`
+  clear_map,   // while the drive is not armed, as it takes as long as a tick
+  home,        // the shaft, at rest and not armed, is at `position`
   commission,  // measure the motor, from idle and at rest
   stop_commissioning,
 };

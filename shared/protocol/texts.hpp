@@ -124,8 +124,8 @@ constexpr std::string_view text_of(Refusal refusal) {
 }
 
 constexpr std::string_view name_of(Mode mode) {
-  constexpr std::array<std::string_view, kModes> kNames{"boot",     "idle",       "current", "velocity",
-                                                        "position", "excitation", "stop",    "fault", "commissioning"};
+  constexpr std::array<std::string_view, kModes> kNames{"boot",       "idle", "current", "velocity",     "position",
+                                                        "excitation", "stop", "fault",   "commissioning"};
   return static_cast<std::size_t>(mode) < kNames.size() ? kNames[static_cast<std::size_t>(mode)] : "unknown";
 }
 

@@ -41,12 +41,12 @@ TEST(Commission, FindsTheMotorOfTheTwinKeepsItAndTheDriveFollowsAfterAPowerCut) 
     const json truth = json::parse(shell.must("flexspline-hil motor --seed " + number));
     {
       const TwinProcess twin(start);
-      const json found =
-          answer_of(shell, "flexspline commission --store --yes --repeat 2 --drive " + twin.name(), 0);
+      const json found = answer_of(shell, "flexspline commission --store --yes --repeat 2 --drive " + twin.name(), 0);
       EXPECT_EQ(found["end"], "done");
       EXPECT_TRUE(found["stored"].get<bool>());
       EXPECT_TRUE(found["fault"].is_null());
-      expect_fields(found, {"format", "drive", "test", "step", "seconds", "runs", "result", "current_loop", "warnings"});
+      expect_fields(found,
+                    {"format", "drive", "test", "step", "seconds", "runs", "result", "current_loop", "warnings"});
       const auto of = [&](const char* name) { return truth[name].get<double>(); };
       double inverse = 0.0;
       for (const json& g : truth["current_gain"]) inverse += 1.0 / g.get<double>();
@@ -79,13 +79,13 @@ TEST(Commission, FindsTheMotorOfTheTwinKeepsItAndTheDriveFollowsAfterAPowerCut) 
 }
 
 TEST(Commission, NamesEachWiringFaultAndEndsWithCodeOne) {
-  for (const auto& [fault, named, phase] : std::vector<std::tuple<std::string, std::string, std::string>>{
-           {"phase-open-b", "phase_open", "b"},
-           {"sensors-swapped", "sensor_order", ""},
-           {"short-to-ground-c", "short_to_ground", "c"},
-           {"encoder-slips", "encoder_slips", ""},
-           {"encoder-stands", "encoder_stands", ""},
-           {"bus-low", "bus_too_low", ""}}) {
+  for (const auto& [fault, named, phase] :
+       std::vector<std::tuple<std::string, std::string, std::string>>{{"phase-open-b", "phase_open", "b"},
+                                                                      {"sensors-swapped", "sensor_order", ""},
+                                                                      {"short-to-ground-c", "short_to_ground", "c"},
+                                                                      {"encoder-slips", "encoder_slips", ""},
+                                                                      {"encoder-stands", "encoder_stands", ""},
+                                                                      {"bus-low", "bus_too_low", ""}}) {
     const Shell shell;
     const TwinProcess twin(words({"--motor-seed", "1", "--wiring-fault", fault}));
     const json answer = answer_of(shell, "flexspline commission --store --yes --drive " + twin.name(), 1);

@@ -82,7 +82,8 @@ Finding on_anything(std::mt19937_64& random, const Settings& s) {
       return static_cast<std::int32_t>(random() % (2 * spread)) - static_cast<std::int32_t>(spread);
     };
     encoder += static_cast<std::uint32_t>(random() >> (random() % 64));
-    const auto bus = static_cast<std::int32_t>(s.least_bus + random() % (32768 - static_cast<std::uint64_t>(s.least_bus)));
+    const auto bus =
+        static_cast<std::int32_t>(s.least_bus + random() % (32768 - static_cast<std::uint64_t>(s.least_bus)));
     const auto out = control.update({{reading(), reading(), reading()}, bus, encoder});
     for (const std::int32_t count : {out.counts.a, out.counts.b, out.counts.c})
       run.counts_fit = run.counts_fit && count >= 0 && count <= s.timer_counts;
@@ -116,15 +117,15 @@ TEST(CommissioningBounds, AnySettingsThatPassTheCheckEndInTimeOnReadingsThatMean
 TEST(CommissioningBounds, SettingsOutsideOfThemAreNotValid) {
   const Settings good = deployment::commissioning_settings(setup_of(Bench{}));
   EXPECT_TRUE(valid(good));
-  const auto is_valid = [&](std::int32_t Settings::* member, std::int32_t value) {
+  const auto is_valid = [&](std::int32_t Settings::*member, std::int32_t value) {
     Settings s = good;
     s.*member = value;
     return valid(s);
   };
-  for (const auto member : {&Settings::current, &Settings::most_current, &Settings::most_voltage,
-                            &Settings::voltage_ramp, &Settings::slow_step, &Settings::fast_step,
-                            &Settings::most_shaft_step, &Settings::step_ramp, &Settings::most_travel,
-                            &Settings::most_periods, &Settings::least_bus, &Settings::timer_counts}) {
+  for (const auto member :
+       {&Settings::current, &Settings::most_current, &Settings::most_voltage, &Settings::voltage_ramp,
+        &Settings::slow_step, &Settings::fast_step, &Settings::most_shaft_step, &Settings::step_ramp,
+        &Settings::most_travel, &Settings::most_periods, &Settings::least_bus, &Settings::timer_counts}) {
     EXPECT_FALSE(is_valid(member, 0));
     EXPECT_FALSE(is_valid(member, INT32_MAX));
     EXPECT_FALSE(is_valid(member, INT32_MIN));

@@ -69,9 +69,7 @@ struct Bench {
     EXPECT_EQ(protocol::take_payload(host->ask(kind).content(), payload), Code::done);
     return payload;
   }
-  protocol::CommissioningProgress progress() {
-    return ask<protocol::CommissioningProgress>(Kind::commissioning_state);
-  }
+  protocol::CommissioningProgress progress() { return ask<protocol::CommissioningProgress>(Kind::commissioning_state); }
   deployment::CommissioningSetup setup() {
     return setup_for(ask<protocol::CommissioningStage>(Kind::commissioning_stage));
   }
@@ -187,8 +185,8 @@ TEST(FirmwareCommissioning, OtherPolePairsThanStatedAreAFaultAndThoseThatWereMea
 
 TEST(FirmwareCommissioning, ADriveWithoutAThreePhaseStageSaysSo) {
   Bench bench("", 1, false);
-  for (const Kind kind : {Kind::commissioning_stage, Kind::commissioning_stop, Kind::commissioning_state,
-                          Kind::commissioning_result})
+  for (const Kind kind :
+       {Kind::commissioning_stage, Kind::commissioning_stop, Kind::commissioning_state, Kind::commissioning_result})
     EXPECT_EQ(bench.host->code(kind), Code::not_available);
   EXPECT_EQ(bench.host->code(Kind::commissioning_begin, protocol::CommissioningBegin{}), Code::not_available);
 }
@@ -198,8 +196,7 @@ TEST(FirmwareCommissioning, ADriveThatIsLockedByAKeyDoesNotBeginAndAnswersTheRes
   protocol::Identity id;
   ASSERT_EQ(protocol::take_payload(bench.host->ask(Kind::identify, protocol::Hello{}).content(), id), Code::done);
   const auto challenge = bench.ask<protocol::PairingChallenge>(Kind::pairing_challenge);
-  const auto answer =
-      answer_of(owner(), protocol::PairingAction::pair, {id.board, id.serial}, challenge.nonce);
+  const auto answer = answer_of(owner(), protocol::PairingAction::pair, {id.board, id.serial}, challenge.nonce);
   for (const auto& part : answer.parts()) ASSERT_EQ(bench.host->code(Kind::pairing_part, part), Code::done);
   ASSERT_EQ(bench.host->code(Kind::pairing_answer, protocol::PairingAnswer{protocol::PairingAction::pair}), Code::done);
   ASSERT_EQ(bench.host->code(Kind::pairing_lock), Code::done);
@@ -220,8 +217,8 @@ TEST(FirmwareCommissioning, RequestsOfOtherLengthsAndNumbersBeginNothing) {
     m.length = length;
     EXPECT_EQ(static_cast<Code>(bench.host->ask(m).code), Code::wrong_length) << int{length};
   }
-  for (const Kind kind : {Kind::commissioning_stage, Kind::commissioning_stop, Kind::commissioning_state,
-                          Kind::commissioning_result})
+  for (const Kind kind :
+       {Kind::commissioning_stage, Kind::commissioning_stop, Kind::commissioning_state, Kind::commissioning_result})
     EXPECT_EQ(static_cast<Code>(bench.host->ask(protocol::Message{static_cast<std::uint8_t>(kind), 1, 1, 0, {}}).code),
               Code::wrong_length);
   for (int i = 0; i < 2000; ++i) {
@@ -288,16 +285,21 @@ TEST(FirmwareCommissioning, AStopADisarmALostLinkASilentHostAndAProtectionOpenTh
     EXPECT_EQ(bench.progress().state, expected) << what;
     EXPECT_EQ(bench.drive->rig().three_phase()->power().motor().currents(0.0).q, 0.0) << what;
   };
-  ended("stop", [](Bench& b) { EXPECT_EQ(b.host->code(Kind::commissioning_stop), Code::done); },
-        CommissioningState::stopped, Mode::idle);
-  ended("disarm", [](Bench& b) { b.host->command({.kind = protocol::CommandKind::disarm}); },
-        CommissioningState::stopped, Mode::idle);
-  ended("link", [](Bench& b) { b.drive->service().disconnected(), b.drive->run(1); }, CommissioningState::host_lost,
-        Mode::idle);
-  ended("silence", [](Bench& b) { b.drive->run(10'001); }, CommissioningState::host_lost, Mode::idle);
-  ended("protection",
-        [](Bench& b) { b.drive->rig().inject(board::Injection::temperature_out_of_range), b.drive->run(5); },
-        CommissioningState::drive_fault, Mode::fault);
+  ended(
+      "stop", [](Bench& b) { EXPECT_EQ(b.host->code(Kind::commissioning_stop), Code::done); },
+      CommissioningState::stopped, Mode::idle);
+  ended(
+      "disarm", [](Bench& b) { b.host->command({.kind = protocol::CommandKind::disarm}); }, CommissioningState::stopped,
+      Mode::idle);
+  ended(
+      "link", [](Bench& b) { b.drive->service().disconnected(), b.drive->run(1); }, CommissioningState::host_lost,
+      Mode::idle);
+  ended(
+      "silence", [](Bench& b) { b.drive->run(10'001); }, CommissioningState::host_lost, Mode::idle);
+  ended(
+      "protection",
+      [](Bench& b) { b.drive->rig().inject(board::Injection::temperature_out_of_range), b.drive->run(5); },
+      CommissioningState::drive_fault, Mode::fault);
 }
 
 TEST(FirmwareCommissioning, TheDriveKeepsItsMotorOverAPowerCutAndFollowsWithIt) {
@@ -307,9 +309,8 @@ TEST(FirmwareCommissioning, TheDriveKeepsItsMotorOverAPowerCutAndFollowsWithIt) 
     const auto stage = bench.ask<protocol::CommissioningStage>(Kind::commissioning_stage);
     ASSERT_EQ(bench.begin(), Code::done);
     ASSERT_EQ(bench.finish().state, CommissioningState::done);
-    const auto motor =
-        deployment::motor_settings(setup, bench.stage().commissioning().result(),
-                                   std::ldexp(stage.shortest_pulse, -30), stage.encoder_counts, 1000.0);
+    const auto motor = deployment::motor_settings(setup, bench.stage().commissioning().result(),
+                                                  std::ldexp(stage.shortest_pulse, -30), stage.encoder_counts, 1000.0);
     const drive::Bytes active = bench.host->read(protocol::Which::active);
     ASSERT_EQ(bench.host->flash(drive::with_motor(active, motor)), Code::done);
     const board::ThreePhaseParameters truth = bench.drive->rig().three_phase()->parameters();
@@ -353,11 +354,15 @@ TEST(FirmwareCommissioning, ABlockWithAMotorOutsideItsBoundsIsRefused) {
   EXPECT_EQ(fault_of([](auto& m) { m.current.up = 4; }), BlockFault::unlike_coefficients);
   EXPECT_EQ(fault_of([](auto& m) { m.current.d.beyond = 1; }), BlockFault::unlike_coefficients);
   EXPECT_EQ(fault_of([](auto& m) { m.encoder_counts += 1; }), BlockFault::unlike_coefficients);
-  EXPECT_EQ(control::motor_of(drive::with_motor(made, motor)).current.d.proportional,
-            stage.foc.current.d.proportional);
+  EXPECT_EQ(control::motor_of(drive::with_motor(made, motor)).current.d.proportional, stage.foc.current.d.proportional);
   EXPECT_EQ(control::motor_of(made).pole_pairs, 0U);
-  // Another model keeps it; a block that has its own motor keeps that.
+  // Another model keeps it, and a backup of another drive does not bring its own; a drive without one takes that.
   EXPECT_EQ(drive::motor_of(drive::keeping_motor(made, drive::with_motor(made, motor))).pole_pairs, 7U);
+  control::MotorSettings other = motor;
+  other.pole_pairs = 5;
+  const drive::Bytes backup = drive::with_motor(made, other);
+  EXPECT_EQ(drive::motor_of(drive::keeping_motor(backup, drive::with_motor(made, motor))).pole_pairs, 7U);
+  EXPECT_EQ(drive::keeping_motor(backup, made), backup);
   EXPECT_EQ(drive::keeping_motor(made, made), made);
 }
 

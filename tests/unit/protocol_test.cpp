@@ -8,8 +8,8 @@
 #include <string>
 #include <vector>
 
-#include "shared/protocol/map_payloads.hpp"
 #include "shared/protocol/commissioning_payloads.hpp"
+#include "shared/protocol/map_payloads.hpp"
 #include "shared/protocol/payloads.hpp"
 #include "shared/protocol/serial_frame.hpp"
 #include "shared/protocol/texts.hpp"
@@ -140,8 +140,8 @@ void randomise(std::mt19937& r, PairingAnswer& x) {
   x.action = below<PairingAction>(r, kPairingActions);
 }
 void randomise(std::mt19937& r, CommissioningStage& x) {
-  for (std::uint32_t* word : {&x.current_full_scale_ma, &x.bus_full_scale_mv, &x.pwm_hz, &x.timer_counts,
-                              &x.encoder_counts, &x.offset_angle})
+  for (std::uint32_t* word :
+       {&x.current_full_scale_ma, &x.bus_full_scale_mv, &x.pwm_hz, &x.timer_counts, &x.encoder_counts, &x.offset_angle})
     *word = static_cast<std::uint32_t>(r());
   x.shortest_pulse = static_cast<std::int32_t>(r()), x.most_current = static_cast<std::int32_t>(r());
   x.bus = static_cast<std::uint16_t>(r()), x.least_bus = static_cast<std::uint16_t>(r());
@@ -149,9 +149,9 @@ void randomise(std::mt19937& r, CommissioningStage& x) {
   x.two_sensors = (r() & 1) != 0, x.reversed = (r() & 1) != 0;
 }
 void randomise(std::mt19937& r, CommissioningBegin& x) {
-  for (std::int32_t* word : {&x.least_bus, &x.current, &x.most_current, &x.most_voltage, &x.voltage_ramp, &x.slow_step,
-                             &x.fast_step, &x.most_shaft_step, &x.step_ramp, &x.most_travel, &x.most_periods,
-                             &x.stated_pole_pairs})
+  for (std::int32_t* word :
+       {&x.least_bus, &x.current, &x.most_current, &x.most_voltage, &x.voltage_ramp, &x.slow_step, &x.fast_step,
+        &x.most_shaft_step, &x.step_ramp, &x.most_travel, &x.most_periods, &x.stated_pole_pairs})
     *word = static_cast<std::int32_t>(r());
 }
 void randomise(std::mt19937& r, CommissioningProgress& x) {
@@ -194,12 +194,12 @@ void randomise(std::mt19937& r, MapCommand& x) {
 
 template <class T>
 class Payload : public ::testing::Test {};
-using AllPayloads = ::testing::Types<Empty, Hello, Identity, Effects, Hardware, Reference, Home, Status, BlockBegin,
-                                     Chunk, BlockRead, BlockRestore, Reason, Command, CommandAnswer, Excitation,
-                                     ExcitationGuard, ExcitationLines, Subscription, Pairing, PairingChallenge,
-                                     PairingPart, PairingAnswer, FrameHead, MapInfo, MapFirst, MapBins, MapCommand,
-                                     CommissioningStage, CommissioningBegin, CommissioningProgress,
-                                     CommissioningResult>;
+using AllPayloads =
+    ::testing::Types<Empty, Hello, Identity, Effects, Hardware, Reference, Home, Status, BlockBegin, Chunk, BlockRead,
+                     BlockRestore, Reason, Command, CommandAnswer, Excitation, ExcitationGuard, ExcitationLines,
+                     Subscription, Pairing, PairingChallenge, PairingPart, PairingAnswer, FrameHead, MapInfo, MapFirst,
+                     MapBins, MapCommand, CommissioningStage, CommissioningBegin, CommissioningProgress,
+                     CommissioningResult>;
 TYPED_TEST_SUITE(Payload, AllPayloads);
 
 TYPED_TEST(Payload, ComesBackAsItWasSentAndEveryOtherLengthIsRefused) {
