@@ -111,7 +111,7 @@ class Application {
   }
   // Whether this drive can take a block. It is checked in place.
   BlockFinding check(std::span<const std::byte> block) const {
-    return check_block(block, tick_hz_of(*board_), hardware());
+    return check_block(block, tick_hz_of(*board_), hardware(), CommissioningOf<B>::kMotorCheck);
   }
   control::Hardware hardware() const { return hardware_of(*board_); }
   // Before the first tick: takes the block in flash at once. If it is not valid the drive has no parameters.

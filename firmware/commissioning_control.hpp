@@ -19,6 +19,7 @@ namespace flexspline::firmware {
 // Of a board without a three-phase stage: no code and no memory.
 struct NoCommissioning {
   static constexpr bool kHasStage = false;
+  static constexpr control::MotorCheck kMotorCheck = control::kHasNoStage;
   template <Board B>
   void begin(B&) {}
   void use_block(std::span<const std::byte>) {}
@@ -32,6 +33,7 @@ struct NoCommissioning {
 class CommissioningControl {
  public:
   static constexpr bool kHasStage = true;
+  static constexpr control::MotorCheck kMotorCheck = control::kChecksMotor;
   using State = protocol::CommissioningState;
 
   template <Board B>

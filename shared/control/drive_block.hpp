@@ -27,6 +27,9 @@ using Numbers = fixed::Fixed;
 using Settings = DriveSettings<Numbers>;
 using model::Section;
 
+struct SectionValues;
+using MotorCheck = bool (*)(model::FieldReader&, SectionValues&);
+
 // Checks across sections: which ones are required, and whether signals can reach their limits.
 struct SectionValues {
   GeneralSettings general{};
@@ -36,7 +39,15 @@ struct SectionValues {
   std::uint32_t output_counts = 0;
   StoredZero zero{};
   std::uint32_t motor_counts_of_stage = 0;  // zero: the block has no motor section
+  MotorCheck check_motor = nullptr;         // none: what is in that section is passed over
 };
+// What a drive without a three-phase stage has no code for.
+inline bool check_motor(model::FieldReader& reader, SectionValues& values) {
+  MotorSettings motor;
+  motor.fields(reader);
+  values.motor_counts_of_stage = motor.encoder_counts;
+  return reader.verdict().fault == model::FieldFault::none && agrees(motor);
+}
 
 template <class Base, class Derived>
 constexpr auto& base_of(Derived& settings) {
@@ -237,7 +248,9 @@ inline constexpr std::uint32_t kWithTorqueSensor = bits_of({Section::torque_ripp
 // Reads sections into the settings, or checks them alone where there are none.
 class SectionReader {
  public:
-  explicit SectionReader(Settings* settings) : settings_(settings) {}
+  explicit SectionReader(Settings* settings, MotorCheck motor = nullptr) : settings_(settings) {
+    values.check_motor = motor;
+  }
   model::BlockVerdict take(std::uint32_t kind, std::span<const std::uint8_t> bytes) {
     std::uint32_t bit = 1;
     for (const Known& section : kKnown) {
@@ -272,10 +285,9 @@ class SectionReader {
     return reader.verdict().fault == model::FieldFault::none && S::agrees(data, values);
   }
   static bool take_motor(model::FieldReader& reader, Settings*, SectionValues& values) {
-    MotorSettings motor;
-    motor.fields(reader);
-    values.motor_counts_of_stage = motor.encoder_counts;
-    return reader.verdict().fault == model::FieldFault::none && agrees(motor);
+    if (values.check_motor != nullptr) return values.check_motor(reader, values);
+    reader.skip();
+    return true;
   }
   static bool take_lines(model::FieldReader& reader, Settings* settings, SectionValues&) {
     for (std::size_t i = 0; i < kMostLines && (i == 0 || reader.left() > 0) && reader.good(); ++i) {
@@ -308,19 +320,23 @@ class SectionReader {
 // one.
 template <class Model>
 model::BlockVerdict load(std::span<const std::uint8_t> block, Model& model) {
-  detail::SectionReader sections(nullptr);
+  detail::SectionReader sections(nullptr, &detail::check_motor);
   model.clear();
   const model::BlockVerdict verdict = model::read_block(block, &model, sections);
   model.note_effects();
   return verdict;
 }
 
+// For a drive with a three-phase stage, and for hosts. A drive without one passes over the motor's section.
+using MotorCheck = detail::MotorCheck;
+inline constexpr MotorCheck kChecksMotor = &detail::check_motor, kHasNoStage = nullptr;
+
 // Checks a whole block for a drive of this tick rate and board, in place, in flash or in memory; nothing is written. A
 // board that states nothing accepts any block. Returns the first fault.
 template <class Model = decltype(DriveParameters<fixed::Fixed>::model)>
 model::BlockVerdict check_for_drive(std::span<const std::uint8_t> block, std::uint32_t tick_hz,
-                                    const Hardware& hardware = {}) {
-  detail::SectionReader sections(nullptr);
+                                    const Hardware& hardware = {}, MotorCheck motor = kChecksMotor) {
+  detail::SectionReader sections(nullptr, motor);
   const model::BlockVerdict v = model::read_block<Model>(block, nullptr, sections);
   if (!v.good()) return v;
   detail::SectionValues& values = sections.values;

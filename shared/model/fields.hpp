@@ -192,6 +192,8 @@ class FieldReader : public FieldNames<FieldReader> {
   explicit FieldReader(std::span<const std::uint8_t> bytes) : from_(bytes.data()), left_(bytes.size()) {}
   std::size_t left() const { return left_; }
   bool good() const { return fault_ == FieldFault::none; }
+  // Of an entry that is not read.
+  void skip() { left_ = 0; }
   // After the last field. All bytes have to be of fields.
   FieldVerdict verdict() const {
     if (good()) return left_ == 0 ? FieldVerdict{} : FieldVerdict{FieldFault::length, -1};

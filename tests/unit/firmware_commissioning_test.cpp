@@ -356,6 +356,11 @@ TEST(FirmwareCommissioning, ABlockWithAMotorOutsideItsBoundsIsRefused) {
   EXPECT_EQ(fault_of([](auto& m) { m.encoder_counts += 1; }), BlockFault::unlike_coefficients);
   EXPECT_EQ(control::motor_of(drive::with_motor(made, motor)).current.d.proportional, stage.foc.current.d.proportional);
   EXPECT_EQ(control::motor_of(made).pole_pairs, 0U);
+  control::MotorSettings wrong = motor;
+  wrong.gain.b = 9000;
+  EXPECT_EQ(control::check_for_drive(drive::with_motor(made, wrong), 20'000, {}, control::kHasNoStage).fault,
+            BlockFault::none)
+      << "a drive without a stage passes over it";
   // Another model keeps it, and a backup of another drive does not bring its own; a drive without one takes that.
   EXPECT_EQ(drive::motor_of(drive::keeping_motor(made, drive::with_motor(made, motor))).pole_pairs, 7U);
   control::MotorSettings other = motor;
