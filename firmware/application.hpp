@@ -14,6 +14,7 @@
 #include <span>
 
 #include "firmware/board.hpp"
+#include "firmware/commissioning_control.hpp"
 #include "firmware/control.hpp"
 #include "firmware/faults.hpp"
 #include "firmware/messages.hpp"
@@ -44,6 +45,7 @@ class Application {
     most_reading_ = control::most_reading(hardware);
     motor_encoder_ = hardware.motor_encoder;
     output_encoder_ = hardware.output_encoder;
+    commissioning_.begin(board);
   }
 
   // The control tick: called by the board's timer, kTickHz times a second. All in one function: calls between its parts
@@ -69,6 +71,7 @@ class Application {
       residual_map_.add(parameters().residual_map, estimate.velocity, estimate.angle, control_.residual());
     take_command(estimate);
     check_safety(readings, estimate, due);
+    commissioning_.watch(status_);
     if (is_armed(status_.mode)) {
       control_.update(demand_, estimate, due, output);
     } else {
@@ -108,7 +111,7 @@ class Application {
   }
   // Whether this drive can take a block. It is checked in place.
   BlockFinding check(std::span<const std::byte> block) const {
-    return check_block(block, tick_hz_of(*board_), hardware());
+    return check_block(block, tick_hz_of(*board_), hardware(), CommissioningOf<B>::kMotorCheck);
   }
   control::Hardware hardware() const { return hardware_of(*board_); }
   // Before the first tick: takes the block in flash at once. If it is not valid the drive has no parameters.
@@ -116,6 +119,7 @@ class Application {
     const BlockFinding finding = check(block);
     if (finding == BlockFinding::none) {
       load_block(block, parameters());
+      commissioning_.use_block(block);
       new_parameters_ = true;
     }
     block_done(finding);
@@ -139,15 +143,7 @@ class Application {
     return true;
   }
   // A bin of the residual map, for background work. False: there is no bin of this number.
-  bool map_bin(std::uint16_t number, MapBin& bin) const {
-    using Map = control::ResidualMap;
-    if (number >= Map::kVelocityBins * Map::kAngleBins) return false;
-    Map::Bin found;
-    if (!residual_map_.read(number / Map::kAngleBins, number % Map::kAngleBins, found)) return false;
-    bin = {number, static_cast<std::uint16_t>(found.count), found.sum, found.squares};
-    return true;
-  }
-
+  bool map_bin(std::uint16_t number, MapBin& bin) const { return read_bin(residual_map_, number, bin); }
   // The meaning of the bins, from the parameters, which only background work changes. nullptr without parameters.
   const control::ResidualMap::Coefficients* map_coefficients() const {
     return has_parameters() ? &parameters().residual_map : nullptr;
@@ -165,6 +161,7 @@ class Application {
   Status snapshot() const { return status_lock_.read(status_); }
   // What the encoders show at the zeros that `home` set, for a host that stores it.
   control::StoredZero zero() const { return status_lock_.read(zero_); }
+  CommissioningOf<B>& commissioning() { return commissioning_; }
 
  private:
   enum class BlockStep : std::uint8_t { none, check, wait };
@@ -210,6 +207,7 @@ class Application {
     } else if (block_step_ == BlockStep::wait) {
       if (owner_.load(std::memory_order_acquire) == Owner::background) {
         load_block(block_, parameters());
+        commissioning_.use_block(block_);
         new_parameters_ = true;
         owner_.store(Owner::tick, std::memory_order_release);
         block_done(BlockFinding::none);
@@ -307,6 +305,7 @@ class Application {
   }
   // Rare commands are not inlined into the tick.
   [[gnu::noinline]] Refusal obey(const Command& command, const Estimate& estimate) {
+    if (const auto done = commissioning_.obey(command, status_, at_rest())) return *done;
     switch (command.kind) {
       case Command::Kind::heartbeat:
         return Refusal::none;
@@ -344,6 +343,9 @@ class Application {
         if (is_armed(status_.mode)) return Refusal::armed;
         residual_map_.reset();
         return Refusal::none;
+      case Command::Kind::commission:
+      case Command::Kind::stop_commissioning:
+        return Refusal::no_stage;
     }
     return Refusal::no_mode;
   }
@@ -352,6 +354,7 @@ class Application {
     if (status_.mode == Mode::fault || status_.mode == Mode::stop) return Refusal::fault;
     if (!may_be_commanded(command.mode)) return Refusal::no_mode;
     if (!has_parameters()) return Refusal::no_parameters;
+    if (!commissioning_.may_arm()) return Refusal::not_commissioned;
     if (command.mode == Mode::excitation && parameters().excitation.ticks == 0) return Refusal::no_excitation;
     if (status_.mode == Mode::idle && N::magnitude(estimate.velocity) > parameters().safety.standstill)
       return Refusal::moving;
@@ -487,6 +490,7 @@ class Application {
   std::uint32_t requested_at_ = 0;
   std::atomic<Owner> owner_{Owner::tick};
   bool new_parameters_ = false;
+  [[no_unique_address]] CommissioningOf<B> commissioning_{};
 
   // Last, as a tick reaches the first members in fewer instructions.
   Ring telemetry_{};

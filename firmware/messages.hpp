@@ -5,6 +5,7 @@
 #include <cstdint>
 
 #include "firmware/faults.hpp"
+#include "shared/control/residual_map.hpp"
 #include "shared/fixed/system.hpp"
 #include "shared/protocol/states.hpp"
 
@@ -13,6 +14,7 @@ namespace flexspline::firmware {
 using N = fixed::Fixed;
 
 using protocol::is_armed;
+using protocol::is_live;
 using protocol::Mode;
 using protocol::Refusal;
 constexpr bool may_be_commanded(Mode mode) {
@@ -58,5 +60,13 @@ struct MapBin {
   std::int32_t sum = 0;
   std::uint32_t squares = 0;
 };
+inline bool read_bin(const control::ResidualMap& map, std::uint16_t number, MapBin& bin) {
+  using Map = control::ResidualMap;
+  if (number >= Map::kVelocityBins * Map::kAngleBins) return false;
+  Map::Bin found;
+  if (!map.read(number / Map::kAngleBins, number % Map::kAngleBins, found)) return false;
+  bin = {number, static_cast<std::uint16_t>(found.count), found.sum, found.squares};
+  return true;
+}
 
 }  // namespace flexspline::firmware

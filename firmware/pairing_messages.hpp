@@ -29,7 +29,7 @@ struct PairingMessages {
       lock.close();
       return Code::done;
     }
-    if (is_armed(status.mode)) return Code::armed;
+    if (is_live(status.mode)) return Code::armed;
     if (!application.at_rest()) return Code::moving;
     if (m.request() == Kind::pairing_remove) return lock.remove();
     if (m.request() == Kind::pairing_challenge) {

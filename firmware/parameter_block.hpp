@@ -23,8 +23,9 @@ inline std::span<const std::uint8_t> octets(std::span<const std::byte> bytes) {
 // Whether a drive of this tick rate and board can take these bytes: BlockFinding::none, or the first reason why not.
 // The span is the block to its last byte; block_bytes() returns that length for a block in a larger page.
 inline BlockFinding check_block(std::span<const std::byte> block, std::uint32_t tick_hz,
-                                const control::Hardware& hardware = {}) {
-  return control::check_for_drive(detail::octets(block), tick_hz, hardware).fault;
+                                const control::Hardware& hardware = {},
+                                control::MotorCheck motor = control::kChecksMotor) {
+  return control::check_for_drive(detail::octets(block), tick_hz, hardware, motor).fault;
 }
 // The length of the block at the start of a page, as it states it; zero where none begins there or it exceeds the page.
 inline std::size_t block_bytes(std::span<const std::byte> page) {

@@ -15,6 +15,7 @@
 #include <string_view>
 
 #include "firmware/application.hpp"
+#include "firmware/commissioning_messages.hpp"
 #include "firmware/excitation_intake.hpp"
 #include "firmware/map_messages.hpp"
 #include "firmware/pairing_messages.hpp"
@@ -92,6 +93,7 @@ class Service {
     agreed_ = false;
     has_answer_ = false;
     lock_.close();
+    application_.commissioning().lose_host();
     frames_.restart();
     application_.telemetry().configure({});
   }
@@ -100,6 +102,7 @@ class Service {
   bool take(const protocol::Message& m) {
     if (has_answer_) return false;
     if (!m.is_request()) return true;
+    application_.commissioning().note_host();
     if (waits_for_ != Wait::none) {
       answer(protocol::answer_to(m, protocol::Code::busy));
       return true;
@@ -154,7 +157,7 @@ class Service {
   auto validator() {
     return [this](std::span<const std::uint8_t> block) { return blocks_.validate(block); };
   }
-  bool armed() const { return is_armed(application_.status().mode); }
+  bool armed() const { return is_live(application_.status().mode); }
 
   void answer(const protocol::Message& m) {
     answer_ = m;
@@ -192,8 +195,7 @@ class Service {
       case Kind::block_commit:
       case Kind::block_erase_all:
       case Kind::map_info: {
-        protocol::Empty empty;
-        if (!taken(m, empty)) return;
+        if (protocol::Empty empty; !taken(m, empty)) return;
         if (m.request() == Kind::status) return status();
         if (m.request() == Kind::effects) return effects();
         if (m.request() == Kind::reference) return reference();
@@ -232,6 +234,12 @@ class Service {
       case Kind::pairing_remove:
       case Kind::pairing_lock:
         return finish(PairingMessages::serve(application_, lock_, m, request_));
+      case Kind::commissioning_stage:
+      case Kind::commissioning_begin:
+      case Kind::commissioning_stop:
+      case Kind::commissioning_state:
+      case Kind::commissioning_result:
+        return commissioning(m);
       default:
         return finish(Code::unknown_request);
     }
@@ -374,6 +382,16 @@ class Service {
   void submit() {
     application_.answer();  // to a command whose host is gone
     waits_for_ = application_.submit(command_) ? Wait::command : Wait::room;
+  }
+
+  void commissioning(const protocol::Message& m) {
+    Command::Kind kind{};
+    const Code code = CommissioningMessages::serve(application_.commissioning(), m, request_, kind);
+    if (code != Code::done || kind == Command::Kind::heartbeat) return finish(code);
+    command_ = {};
+    command_.kind = kind;
+    command_.number = ++command_number_;
+    submit();
   }
 
   // The residual map.

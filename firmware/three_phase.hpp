@@ -6,12 +6,14 @@
 // other than zero in field weakening alone.
 #pragma once
 
+#include <atomic>
 #include <cstdint>
 
 #include "firmware/board.hpp"
 #include "shared/control/commissioning/commissioning.hpp"
 #include "shared/control/foc/current_limits.hpp"
 #include "shared/control/foc/field_oriented.hpp"
+#include "shared/control/motor_settings.hpp"
 
 namespace flexspline::firmware {
 
@@ -33,13 +35,19 @@ struct ThreePhaseSettings {
   std::int32_t most_bus = INT16_MAX;    // likewise
   std::int32_t most_phase = INT32_MAX;  // current of a phase, 2^-27 of its base
   std::int32_t most_sum = INT32_MAX;    // of the three, likewise
-  // Electrical angle = +-pole_pairs encoder + offset_angle, as commissioning finds it.
+  // Electrical angle = +-pole_pairs encoder + offset_angle, as commissioning finds it. Zero: it was never done.
   std::int32_t pole_pairs = 1;
   bool reversed = false;
   std::uint32_t offset_angle = 0;    // 2^-32 turns
   std::uint32_t encoder_counts = 1;  // a turn
   std::int32_t set_point = 0;        // full scale of the command over the current's base, 2^-12; at most two
   std::int32_t reading = 0;          // the current's base over full scale of the reading, 2^-20
+  // For commissioning, and for the host that makes its numbers.
+  control::foc::ModulationSettings test_modulation;  // without dead-time compensation
+  std::int32_t timer_counts = 0;                     // on-time of a duty of one
+  std::uint32_t pwm_hz = 0;
+  std::uint32_t current_full_scale_ma = 0;
+  std::uint32_t bus_full_scale_mv = 0;
 };
 
 class ThreePhaseStage {
@@ -54,7 +62,7 @@ class ThreePhaseStage {
 
   void begin(const ThreePhaseSettings& settings) {
     *this = {};
-    s_ = settings;
+    s_ = made_ = settings;
     per_count_ = static_cast<std::uint32_t>((std::uint64_t{1} << 32) / s_.encoder_counts);
   }
   const ThreePhaseSettings& settings() const { return s_; }
@@ -62,7 +70,7 @@ class ThreePhaseStage {
   // The tick's side.
 
   void command(const Actuation& actuation) {
-    const control::foc::RotorVector wanted = {0, actuation.current * s_.set_point};
+    const control::foc::RotorVector wanted = {0, signed_by_encoder(actuation.current * s_.set_point)};
     const control::foc::Limits l = control::foc::limit_currents(
         limits_, s_.limits, wanted, {out_.measured.d, out_.measured.q}, out_.wanted, out_.most, s_.foc.current.up);
     set_point_.d = l.set_point.d;
@@ -71,18 +79,41 @@ class ThreePhaseStage {
   }
   // In q, a share of full scale of the reading, 2^-15.
   std::int16_t current() const {
-    return static_cast<std::int16_t>(
-        fixed::limited<std::int32_t>(fixed::multiply_high(out_.measured.q, s_.reading), -INT16_MAX, INT16_MAX));
+    const std::int32_t reading = fixed::multiply_high(signed_by_encoder(out_.measured.q), s_.reading);
+    return static_cast<std::int16_t>(fixed::limited<std::int32_t>(reading, -INT16_MAX, INT16_MAX));
   }
   // It is commanded on and stays off.
   bool tripped() const { return commanded_ && fault_ != StageFault::none; }
   StageFault fault() const { return fault_; }
 
+  // The motor that commissioning found; without pole pairs that with which the stage began. While the drive is not
+  // armed, and from background work: the interrupt reads none of these then.
+  void use(const control::MotorSettings& motor) {
+    const bool is_found = motor.pole_pairs > 0;
+    s_.foc.sensors.gain = is_found ? motor.gain : made_.foc.sensors.gain;
+    s_.foc.current = is_found ? motor.current : made_.foc.current;
+    s_.foc.circle = is_found ? motor.circle : made_.foc.circle;
+    s_.reversed = is_found ? motor.reversed : made_.reversed;
+    s_.offset_angle = is_found ? motor.offset_angle : made_.offset_angle;
+    s_.pole_pairs = is_found ? static_cast<std::int32_t>(motor.pole_pairs) : made_.pole_pairs;
+    has_offsets_ = false;  // they are for the gains
+  }
+  bool is_commissioned() const { return s_.pole_pairs > 0; }
+  bool is_sampled() const { return began_; }
+  std::int32_t bus() const { return bus_; }
+
   // Takes the place of current control until it is done. The caller has the drive disarmed.
   void commission(const control::commissioning::Settings& settings) {
     commissioning_.begin(settings);
+    bus_high_ = false;
+    // The interrupt must not see it before it has begun.
+    std::atomic_signal_fence(std::memory_order_seq_cst);
     commissions_ = true;
   }
+  // From the next period on all switches are open.
+  void stop_commissioning() { commissions_ = false; }
+  // It ended because the rotor, which it turned, gave back more energy than the bus could take.
+  bool commissioning_raised_bus() const { return bus_high_; }
   bool commissions() const { return commissions_; }
   const control::commissioning::Commissioning& commissioning() const { return commissioning_; }
 
@@ -90,10 +121,12 @@ class ThreePhaseStage {
 
   Outputs update(const Inputs& in) {
     follow(in.counter);
+    bus_ = in.bus;
     if (commissions_) {
       const Outputs out = commissioning_.update({in.readings, in.bus, angle_});
-      commissions_ = !commissioning_.done();
-      return out;
+      bus_high_ = in.bus > s_.most_bus;
+      commissions_ = !commissioning_.done() && !bus_high_;
+      return commissions_ ? out : Outputs{};
     }
     // Once it runs it goes on until it is switched off: offsets are measured without current.
     if (!commanded_ && latched_) {
@@ -120,6 +153,8 @@ class ThreePhaseStage {
     const std::uint32_t turned = angle * static_cast<std::uint32_t>(s_.pole_pairs);
     return s_.reversed ? 0 - turned : turned;
   }
+  // A current in q accelerates towards growing electrical angles, one of the application towards growing counts.
+  std::int32_t signed_by_encoder(std::int32_t current) const { return s_.reversed ? -current : current; }
   void follow(std::uint32_t counter) {
     if (!began_) {
       before_ = counter;
@@ -167,6 +202,7 @@ class ThreePhaseStage {
   }
 
   ThreePhaseSettings s_;
+  ThreePhaseSettings made_;  // as it began
   control::foc::State state_;
   control::foc::Outputs out_;
   control::foc::LimitState limits_;
@@ -179,7 +215,9 @@ class ThreePhaseStage {
   bool has_offsets_ = false;
   bool runs_ = false;
   bool commissions_ = false;
+  bool bus_high_ = false;
   bool began_ = false;
+  std::int32_t bus_ = 0;
   std::uint32_t per_count_ = 0;
   std::uint32_t before_ = 0;
   std::uint32_t position_ = 0;  // counts within a turn

@@ -22,7 +22,7 @@ class UpdateWatch {
   // Call repeatedly. `has_host`: a host has configured the device. True: the host requested the boot loader and has the
   // answer; disconnect from the bus, leave a request for the boot loader, reset.
   bool poll(const Status& status, bool has_host, usb::DfuRuntime& dfu) {
-    const bool rests = !is_armed(status.mode);
+    const bool rests = !is_live(status.mode);
     dfu.allow(rests);
     // Correct means: two seconds of ticks without overrun, and a host that configured the device, as the next update
     // needs one. An armed drive does not wait for flash memory.

@@ -14,6 +14,7 @@
 #include <string>
 #include <vector>
 
+#include "hil/board/three_phase.hpp"
 #include "hil/plant/parameters.hpp"
 #include "hil/plant/recorder.hpp"
 #include "hil/rhs100/data_set.hpp"
@@ -253,6 +254,10 @@ void take_twin_drive(CLI::App& command, flexspline::twin::TwinOptions& options) 
   command.add_option("--hide", options.hide, "effect that the drive has and its data sheet does not have");
   command.add_option("--motor", options.motor, "what its amplifier takes: current (default), or three-phase")
       ->check(CLI::IsMember({"current", "three-phase"}));
+  command.add_option("--motor-seed", options.motor_seed,
+                     "with --motor three-phase: a random motor that it was not commissioned with");
+  command.add_option("--wiring-fault", options.wiring_fault,
+                     "of the three-phase motor, such as phase-open-b, phases-swapped, encoder-slips");
   command.add_option("--flash", options.flash_file, "file that holds its flash memory (default: none)");
   command.add_option("--serial", options.serial, "serial number (default TWIN)")
       ->check([](const std::string& text) -> std::string {
@@ -283,6 +288,34 @@ void add_twin(CLI::App& app) {
   take_twin_run(*command, *options);
   command->footer("Example: flexspline-hil twin --serve 4711 --flash twin.flash");
   command->callback([options] { flexspline::twin::run_twin(*options); });
+}
+
+struct MotorOptions {
+  std::string plant_file;
+  std::uint64_t seed = 1;
+};
+
+// The truth, for whoever compares it with what `flexspline commission` finds.
+void print_motor(const MotorOptions& options) {
+  const auto p = flexspline::board::drawn_motor(open_plant(options.plant_file).drive, options.seed);
+  fmt::print(
+      "{{\"format\": \"flexspline-hil-motor/1\", \"resistance_ohm\": {:.9g}, \"switch_ohm\": {:.9g}, "
+      "\"inductance_d_h\": {:.9g}, \"inductance_q_h\": {:.9g}, \"flux_vs\": {:.9g}, \"pole_pairs\": {}, "
+      "\"phases_swapped\": {}, \"offset_deg\": {:.9g}, \"current_gain\": [{:.9g}, {:.9g}, {:.9g}], "
+      "\"current_offset_a\": [{:.9g}, {:.9g}, {:.9g}]}}\n",
+      p.motor.resistance_ohm, p.inverter.on_resistance_ohm, p.motor.inductance_d_h, p.motor.inductance_q_h,
+      p.motor.flux_vs, p.motor.pole_pairs, p.wiring.motor_phase[1] == 2, 360.0 * p.offset_turns, p.sensors.gain[0],
+      p.sensors.gain[1], p.sensors.gain[2], p.sensors.offset_a[0], p.sensors.offset_a[1], p.sensors.offset_a[2]);
+}
+
+void add_motor(CLI::App& app) {
+  const auto options = std::make_shared<MotorOptions>();
+  CLI::App* command =
+      app.add_subcommand("motor", "prints the motor that `twin --motor three-phase --motor-seed` draws, as JSON");
+  command->add_option("--plant", options->plant_file, "plant file (default: the demo's drive, built in)");
+  command->add_option("--seed", options->seed, "the --motor-seed")->required();
+  command->footer("Example: flexspline-hil motor --seed 1");
+  command->callback([options] { print_motor(*options); });
 }
 
 void add_image(CLI::App& app) {
@@ -320,6 +353,7 @@ int main(int argc, char** argv) {
   add_sheet(app);
   add_scenarios(app);
   add_twin(app);
+  add_motor(app);
   add_image(app);
   add_effects(app);
   try {

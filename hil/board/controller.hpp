@@ -78,7 +78,11 @@ class SoftwareBoard {
     return words;
   }
 
+  /// nullptr: its amplifier takes a current.
+  firmware::ThreePhaseStage* three_phase() const { return stage; }
+
   bool tripped = false;
+  firmware::ThreePhaseStage* stage = nullptr;
   std::uint64_t random = 0;
   std::uint32_t ticks_since_fed = 0;
   firmware::ResetCause cause = firmware::ResetCause::power;

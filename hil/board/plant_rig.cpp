@@ -85,7 +85,9 @@ PlantRig::PlantRig(const RigSetup& setup)
   const double corner_hz = setup.drive.amplifier.bandwidth_hz;
   if (corner_hz > 0.0) lag_ = 1.0 - std::exp(-kTurn * corner_hz * tick_s_);
   if (setup.encoders != control::SensorKind::not_stated) begin_counters();
-  if (setup.three_phase) three_phase_ = std::make_unique<ThreePhaseAmplifier>(setup.drive, setup.tick_hz, setup.seed);
+  if (setup.three_phase)
+    three_phase_ = std::make_unique<ThreePhaseAmplifier>(setup.drive, setup.tick_hz, setup.seed,
+                                                         setup.motor.value_or(three_phase_of(setup.drive)));
 }
 
 // An absolute encoder starts at its angle within a turn, another one at zero.

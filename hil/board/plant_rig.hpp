@@ -61,6 +61,8 @@ struct RigSetup {
   /// The encoders' reading of that angle. Not stated: the true angle, as if they had counted from zero.
   control::SensorKind encoders = control::SensorKind::not_stated;
   bool three_phase = false;  ///< a three-phase motor and its power stage instead of an amplifier that takes a current
+  /// That motor; none: the one whose settings the drive was made with.
+  std::optional<ThreePhaseParameters> motor{};
 };
 /// Where a drive of this seed wakes unless it is stated: the motor's angle, within two turns.
 double waking_turns(std::uint64_t seed);

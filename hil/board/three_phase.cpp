@@ -16,6 +16,12 @@ constexpr double kOhm = 1.0, kHenry = 1e-3;
 constexpr int kPolePairs = 7;
 constexpr int kTimerCounts = 2100;
 constexpr std::uint64_t kShuntNoise = 23;
+constexpr double kShortestPulseS = 0.2e-6, kSamplingWindowS = 1.5e-6;
+
+// Of the whole period, as foc::ModulationSettings has it.
+std::int32_t duty(double share) {
+  return static_cast<std::int32_t>(std::lround(std::ldexp(share, control::foc::kDutyBits)));
+}
 
 double current_scale(const plant::Drive& drive) {
   return drive.current_limit_a / kDemoCurrentA;
@@ -76,20 +82,44 @@ firmware::ThreePhaseSettings three_phase_settings_of(const plant::Drive& drive) 
   s.encoder_counts = static_cast<std::uint32_t>(drive.sensors.motor_counts);
   s.set_point = static_cast<std::int32_t>(std::lround(std::ldexp(peak, 12)));
   s.reading = static_cast<std::int32_t>(std::lround(std::ldexp(full_scale / scales.current_a, 20)));
+  const motor::InverterParameters inverter = three_phase_of(drive).inverter;
+  s.test_modulation.pulse = duty((kShortestPulseS + inverter.dead_time_s) * inverter.pwm_hz);
+  s.test_modulation.window = duty((kSamplingWindowS + 5.0 * inverter.dead_time_s) * inverter.pwm_hz);
+  s.test_modulation.period = s.foc.modulation.period;
+  s.timer_counts = kTimerCounts;
+  s.pwm_hz = ThreePhaseAmplifier::kPwmHz;
+  s.current_full_scale_ma = static_cast<std::uint32_t>(std::lround(1e3 * full_scale));
+  s.bus_full_scale_mv = static_cast<std::uint32_t>(std::lround(1e3 * kBusFullScaleV * voltage_scale(drive)));
   return s;
 }
 
-ThreePhaseAmplifier::ThreePhaseAmplifier(const plant::Drive& drive, std::uint32_t tick_hz, std::uint64_t seed)
-    : p_(three_phase_of(drive)),
+ThreePhaseAmplifier::ThreePhaseAmplifier(const plant::Drive& drive, std::uint32_t tick_hz, std::uint64_t seed,
+                                         const ThreePhaseParameters& parameters)
+    : p_(parameters),
       torque_constant_(drive.torque_constant_nm_a),
       full_scale_a_(scales_of(drive).current_a),
       counts_(drive.sensors.motor_counts),
       periods_(static_cast<int>(kPwmHz / tick_hz)),
-      power_(p_.motor, p_.inverter, p_.sensors, motor::Fidelity::averaged),
+      power_(p_.motor, p_.inverter, p_.sensors, motor::Fidelity::averaged, p_.wiring),
       shunts_(p_.sensors, seed ^ kShuntNoise) {
   if (periods_ == 0 || kPwmHz % tick_hz != 0)
     throw std::invalid_argument("a three-phase drive needs a tick rate that divides its PWM rate of 40000 Hz");
-  stage_.begin(three_phase_settings_of(drive));
+  firmware::ThreePhaseSettings settings = three_phase_settings_of(drive);
+  if (!p_.commissioned) settings.pole_pairs = 0;
+  stage_.begin(settings);
+}
+
+// The encoder's counter, as the stage reads it.
+std::uint32_t ThreePhaseAmplifier::counter_at(double angle_rad) {
+  const double turns = angle_rad / kTurn;
+  if (!began_) slip_from_turns_ = turns;
+  began_ = true;
+  if (p_.encoder_stands) return static_cast<std::uint32_t>(std::llround(slip_from_turns_ * counts_));
+  if (p_.slip_every_turns > 0.0 && std::abs(turns - slip_from_turns_) >= p_.slip_every_turns) {
+    slipped_turns_ += turns > slip_from_turns_ ? p_.slip_turns : -p_.slip_turns;
+    slip_from_turns_ = turns;
+  }
+  return static_cast<std::uint32_t>(std::llround((turns - slipped_turns_) * counts_));
 }
 
 double ThreePhaseAmplifier::run(const firmware::Actuation& actuation, double motor_angle_rad, double motor_velocity) {
@@ -100,7 +130,8 @@ double ThreePhaseAmplifier::run(const firmware::Actuation& actuation, double mot
   double torque = 0.0;
   for (int k = 0; k < periods_; ++k) {
     const double start = motor_angle_rad + motor_velocity * period * k;
-    const motor::Rotor at = {start * p_.motor.pole_pairs, motor_velocity * p_.motor.pole_pairs};
+    const motor::Rotor at = {start * p_.motor.pole_pairs + kTurn * p_.offset_turns,
+                             motor_velocity * p_.motor.pole_pairs};
     if (!out_.enabled) power_.motor().stop(at.angle);
     const double all = kTimerCounts;
     const motor::Triple duties = {out_.counts.a / all, out_.counts.b / all, out_.counts.c / all};
@@ -111,8 +142,7 @@ double ThreePhaseAmplifier::run(const firmware::Actuation& actuation, double mot
     torque += sample.torque_nm / periods_;
     const motor::Readings r = shunts_.read(sample);
     const double middle = start + motor_velocity * period / 2.0;
-    const auto counter = static_cast<std::uint32_t>(std::llround(middle / kTurn * counts_));
-    out_ = stage_.update({{r.current[0], r.current[1], r.current[2]}, r.bus, counter});
+    out_ = stage_.update({{r.current[0], r.current[1], r.current[2]}, r.bus, counter_at(middle)});
   }
   return torque / torque_constant_;
 }

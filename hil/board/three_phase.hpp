@@ -1,6 +1,8 @@
 #pragma once
 
 #include <cstdint>
+#include <string>
+#include <vector>
 
 #include "firmware/three_phase.hpp"
 #include "hil/motor/power_stage.hpp"
@@ -14,9 +16,24 @@ struct ThreePhaseParameters {
   motor::MotorParameters motor;
   motor::InverterParameters inverter;
   motor::SensorParameters sensors;
+  motor::WiringParameters wiring;
+  double offset_turns = 0.0;  ///< electrical angle of the rotor where the encoder is at zero
+  /// As EncoderParameters has it, in what the stage reads.
+  bool encoder_stands = false;
+  double slip_turns = 0.0;
+  double slip_every_turns = 0.0;
+  bool commissioned = true;  ///< the drive has the settings of this motor in its memory
 };
 /// Of each drive in proportion to its largest current and its rated voltage, so that the numbers per unit are the same.
 ThreePhaseParameters three_phase_of(const plant::Drive& drive);
+/// Another motor of the same torque constant within 5 %, of which the drive knows nothing: resistance and inductances
+/// 0.6 to 1.6 times those, Lq/Ld from 0.7 to 1.5, 4 to 12 pole pairs, any angle of the encoder, two phases swapped or
+/// not, sensors whose gains differ by 2 % and whose zeros are off by up to 3 % of full scale.
+ThreePhaseParameters drawn_motor(const plant::Drive& drive, std::uint64_t seed);
+/// Names such as phase-open-b; what is wrong with the wires, sensors or the encoder then.
+std::vector<std::string> wiring_fault_names();
+/// False where there is no such fault.
+bool add_wiring_fault(ThreePhaseParameters& p, const std::string& name);
 /// What is in such a drive's memory once it was commissioned.
 firmware::ThreePhaseSettings three_phase_settings_of(const plant::Drive& drive);
 
@@ -27,7 +44,10 @@ class ThreePhaseAmplifier {
   static constexpr std::uint32_t kPwmHz = 40'000;
 
   /// Throws std::invalid_argument where a tick is not a whole number of PWM periods.
-  ThreePhaseAmplifier(const plant::Drive& drive, std::uint32_t tick_hz, std::uint64_t seed);
+  ThreePhaseAmplifier(const plant::Drive& drive, std::uint32_t tick_hz, std::uint64_t seed)
+      : ThreePhaseAmplifier(drive, tick_hz, seed, three_phase_of(drive)) {}
+  ThreePhaseAmplifier(const plant::Drive& drive, std::uint32_t tick_hz, std::uint64_t seed,
+                      const ThreePhaseParameters& parameters);
 
   /// One tick; the rotor is at this angle now and turns at this speed. Returns the mean torque of the tick as a current
   /// of the drive's torque constant, A.
@@ -39,8 +59,11 @@ class ThreePhaseAmplifier {
 
   firmware::ThreePhaseStage& stage() { return stage_; }
   motor::PowerStage& power() { return power_; }
+  const ThreePhaseParameters& parameters() const { return p_; }
 
  private:
+  std::uint32_t counter_at(double angle_rad);
+
   ThreePhaseParameters p_;
   double torque_constant_;
   double full_scale_a_;
@@ -50,6 +73,9 @@ class ThreePhaseAmplifier {
   motor::Shunts shunts_;
   firmware::ThreePhaseStage stage_;
   firmware::ThreePhaseStage::Outputs out_;
+  double slipped_turns_ = 0.0;
+  double slip_from_turns_ = 0.0;
+  bool began_ = false;
 };
 
 }  // namespace flexspline::board

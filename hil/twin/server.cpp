@@ -42,6 +42,13 @@ TwinSetup setup_of(const TwinOptions& options) {
   setup.as_made = !options.empty;
   setup.locked = options.locked;
   setup.three_phase = options.motor == "three-phase";
+  if (options.motor_seed == 0 && options.wiring_fault.empty()) return setup;
+  if (!setup.three_phase) throw std::runtime_error("--motor-seed and --wiring-fault need --motor three-phase");
+  setup.motor = options.motor_seed == 0 ? board::three_phase_of(setup.drive)
+                                        : board::drawn_motor(setup.drive, options.motor_seed);
+  if (!options.wiring_fault.empty() && !board::add_wiring_fault(*setup.motor, options.wiring_fault))
+    throw std::runtime_error(fmt::format("there is no wiring fault '{}'; there are {}", options.wiring_fault,
+                                         fmt::join(board::wiring_fault_names(), ", ")));
   return setup;
 }
 
@@ -164,7 +171,7 @@ class Server {
     const auto until = Clock::now() + kWatchdog;
     while (!over() && Clock::now() < until) usb_->bus().serve(5);
   }
-  bool runs_fast() const { return options_.fast && is_armed(drive_->status().mode) && line_->has_host(); }
+  bool runs_fast() const { return options_.fast && is_live(drive_->status().mode) && line_->has_host(); }
   std::uint32_t most_ahead() const {
     const firmware::Mode mode = drive_->status().mode;
     const bool streams = mode == firmware::Mode::position || mode == firmware::Mode::velocity;

@@ -36,7 +36,8 @@ TwinDrive::TwinDrive(const TwinSetup& setup)
             .locked = setup.locked,
             .start_turns = start_turns_of(setup),
             .encoders = setup.encoders,
-            .three_phase = setup.three_phase}),
+            .three_phase = setup.three_phase,
+            .motor = setup.motor}),
       own_flash_(setup.flash == nullptr ? std::make_unique<FlashFile>(setup.flash_file) : nullptr),
       store_(setup.flash == nullptr ? *own_flash_ : *setup.flash),
       own_pairing_(setup.pairing == nullptr ? std::make_unique<PairingFile>(pairing_file_of(setup.flash_file))
@@ -44,6 +45,7 @@ TwinDrive::TwinDrive(const TwinSetup& setup)
       pairing_(setup.pairing == nullptr ? *own_pairing_ : *setup.pairing) {
   board_.random = setup.seed;
   board_.hardware_stated = board::hardware_of(setup.drive, setup.encoders);
+  if (rig_.three_phase() != nullptr) board_.stage = &rig_.three_phase()->stage();
   application_.begin(board_);
   const auto validate = [this](std::span<const std::uint8_t> block) { return blocks_.validate(block); };
   if (setup_.as_made && store_.boot(validate) == storage::StoreState::empty) {

@@ -24,7 +24,8 @@ struct TwinSetup {
   /// The motor's angle when the drive is switched on, turns; none: random within two turns, by the seed.
   std::optional<double> start_turns{};
   control::SensorKind encoders = control::SensorKind::absolute;
-  bool three_phase = false;    ///< board::RigSetup::three_phase
+  bool three_phase = false;  ///< board::RigSetup::three_phase, with this motor
+  std::optional<board::ThreePhaseParameters> motor{};
   FlashFile* flash = nullptr;  ///< memory that outlives the drive, instead of the file
   PairingFile* pairing = nullptr;
   boot::Version version = kFactoryVersion;

@@ -13,6 +13,7 @@
 #include "host/cli/flash_prediction.hpp"
 #include "host/drive/block_changes.hpp"
 #include "host/drive/model_block.hpp"
+#include "host/drive/motor_block.hpp"
 #include "host/drive/stored_zero.hpp"
 #include "host/output/json.hpp"
 #include "host/output/text.hpp"
@@ -150,6 +151,8 @@ int run(const RestoreOptions& options, Console& console) {
   console.line(fmt::format("  active    {}", described(before)));
   console.line(fmt::format("  before it {}", described(after)));
   print(changes, console);
+  if (drive::motor_of(active).pole_pairs > 0 && drive::motor_of(previous).pole_pairs == 0)
+    console.warn("the block before has no motor of flexspline commission; run that again after it");
   const bool restores = confirmed("Restore it?", options.yes);
   if (restores) {
     const drive::Unlocked unlocked(session, signer);
@@ -209,7 +212,8 @@ int flash(const FlashOptions& options, Console& console) {
   drive::Session session = open_drive(options.drive);
   drive::require_access(session, signer);
   const Bytes active = session.read_block(protocol::Which::active);
-  const Bytes block = drive::keeping_stored_zero(block_of(options, session, active, console), active);
+  const Bytes block =
+      drive::keeping_motor(drive::keeping_stored_zero(block_of(options, session, active, console), active), active);
   const std::vector<BlockChange> changes = drive::changes(active, block);
   const BlockView before = drive::view_of(active), after = drive::view_of(block);
   console.line(fmt::format("{}", named(session)));

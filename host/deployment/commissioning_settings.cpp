@@ -1,5 +1,6 @@
 #include "host/deployment/commissioning_settings.hpp"
 
+#include <algorithm>
 #include <cmath>
 #include <numbers>
 #include <stdexcept>
@@ -98,6 +99,76 @@ CommissioningFindings commissioning_findings(const CommissioningSetup& s, const 
   const auto ampere = [&](std::int32_t x) { return real(x, 27) * s.current_full_scale_a; };
   f.offset_a = {ampere(r.offset.a), ampere(r.offset.b), ampere(r.offset.c)};
   return f;
+}
+
+double usual_bandwidth_hz(double pwm_hz) {
+  return std::min(1000.0, pwm_hz / 20.0);
+}
+
+control::MotorSettings motor_settings(const CommissioningSetup& s, const commissioning::Result& r, double pulse,
+                                      std::uint32_t encoder_counts, double bandwidth_hz) {
+  const CommissioningFindings found = commissioning_findings(s, r);
+  FocSetup f;
+  f.resistance_ohm = found.resistance_ohm;
+  f.inductance_d_h = found.inductance_d_h;
+  f.inductance_q_h = found.inductance_q_h;
+  f.flux_vs = found.flux_vs;
+  f.current_full_scale_a = s.current_full_scale_a;
+  f.bus_full_scale_v = s.bus_full_scale_v;
+  f.pwm_hz = s.pwm_hz;
+  f.timer_counts = s.timer_counts;
+  f.shortest_pulse_s = pulse / s.pwm_hz;
+  f.bandwidth_hz = bandwidth_hz;
+  const control::foc::Settings made = foc_settings(f);
+  control::MotorSettings m;
+  m.pole_pairs = static_cast<std::uint32_t>(r.pole_pairs);
+  m.reversed = r.reversed;
+  m.offset_angle = r.offset_angle;
+  m.encoder_counts = encoder_counts;
+  m.gain = r.gain;
+  m.current = made.current;
+  m.circle = made.circle;
+  m.resistance = r.resistance;
+  m.inductance_d = r.inductance_d;
+  m.inductance_q = r.inductance_q;
+  m.flux = r.flux;
+  m.bandwidth_mhz = static_cast<std::uint32_t>(std::lround(1e3 * bandwidth_hz));
+  return m;
+}
+
+std::string_view commissioning_step_text(commissioning::Step step) {
+  using commissioning::Step;
+  switch (step) {
+    case Step::bus:
+      return "bus voltage";
+    case Step::offsets:
+      return "zeros of the current sensors";
+    case Step::short_to_ground:
+      return "short to ground";
+    case Step::resistance:
+      return "resistance, wiring, gains of the current sensors";
+    case Step::first_inductance:
+      return "inductance at rest";
+    case Step::pole_pairs:
+      return "pole pairs; the motor turns";
+    case Step::forward:
+      return "angle of the encoder, forward; the motor turns";
+    case Step::backward:
+      return "angle of the encoder, backward; the motor turns";
+    case Step::does_it_turn:
+      return "whether the rotor turns";
+    case Step::inductances:
+      return "inductances in d and q";
+    case Step::flux_forward:
+      return "flux linkage, forward; the motor turns fast";
+    case Step::flux_backward:
+      return "flux linkage, backward; the motor turns fast";
+    case Step::stop:
+      return "the motor comes to rest";
+    case Step::done:
+      return "done";
+  }
+  return "a step that this tool does not know";
 }
 
 CommissioningFaultText commissioning_fault_text(Fault fault) {

@@ -5,6 +5,7 @@
 #include <string_view>
 
 #include "shared/control/commissioning/settings.hpp"
+#include "shared/control/motor_settings.hpp"
 
 namespace flexspline::deployment {
 
@@ -52,6 +53,16 @@ struct CommissioningFindings {
   std::array<double, 3> offset_a{};
 };
 CommissioningFindings commissioning_findings(const CommissioningSetup& setup, const control::commissioning::Result& r);
+
+// What a drive keeps of it (the section `motor` of its block), with a current loop of this bandwidth. `pulse`: shortest
+// one and dead time, a share of the PWM period. Throws std::invalid_argument that says which number does not fit.
+control::MotorSettings motor_settings(const CommissioningSetup& setup, const control::commissioning::Result& r,
+                                      double pulse, std::uint32_t encoder_counts, double bandwidth_hz);
+// The corner that is taken where none is given.
+double usual_bandwidth_hz(double pwm_hz);
+
+/// What a step does, for messages of progress.
+std::string_view commissioning_step_text(control::commissioning::Step step);
 
 /// Name of a fault as messages and JSON have it, what it means, and what to do.
 struct CommissioningFaultText {

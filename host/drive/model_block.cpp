@@ -6,8 +6,10 @@
 
 #include "host/deployment/bases.hpp"
 #include "host/deployment/pack.hpp"
+#include "host/drive/motor_block.hpp"
 #include "host/drive/scales.hpp"
 #include "host/drive/settings_text.hpp"
+#include "host/drive/stored_zero.hpp"
 #include "shared/fixed/system.hpp"
 #include "shared/model/drive_model.hpp"
 
@@ -69,8 +71,9 @@ ModelBlock model_block(Session& session, const Bytes& active, const model::Model
   } else {
     throw deployment::PackError("the drive has no block to take its settings from; state them: --settings FILE.toml");
   }
-  made.bytes = deployment::pack(model, pack).bytes;
-  require_same_gear(active, made.bytes);
+  const Bytes packed = deployment::pack(model, pack).bytes;
+  require_same_gear(active, packed);
+  made.bytes = keeping_motor(keeping_stored_zero(packed, active), active);
   return made;
 }
 

@@ -27,7 +27,7 @@ deployment::PackOptions pack_options_for(Session& session);
 
 // `active`: the drive's active block, empty where it has none; its settings are taken where `settings` are none.
 // `measured`: also where the block's error has no bound that can be proven. Throws deployment::PackError where the
-// model cannot be packed for this drive, or is of another gear.
+// model cannot be packed for this drive, or is of another gear. The zero and the motor of the drive stay.
 ModelBlock model_block(Session& session, const Bytes& active, const model::Model& model,
                        const std::optional<SettingsFile>& settings = {}, bool measured = false);
 

@@ -69,7 +69,14 @@ protocol::Reference Session::reference() {
 void Session::home(std::int64_t position) {
   if (identity_.minor < protocol::kMinorOfHardware)
     fail("its firmware is older than position references; bring the firmware up to date");
-  const auto request = protocol::request(Kind::home, 0, protocol::Home{position});
+  ask_at_rest(protocol::request(Kind::home, 0, protocol::Home{position}));
+}
+
+void Session::start_commissioning(const protocol::CommissioningBegin& request) {
+  ask_at_rest(protocol::request(Kind::commissioning_begin, 0, request));
+}
+
+void Session::ask_at_rest(const protocol::Message& request) {
   // A drive that was just switched on checks its sensors first, and then whether its shaft stands.
   constexpr int kMostAttempts = 100, kMostWhileMoving = 20;
   for (int attempt = 1;; ++attempt) {

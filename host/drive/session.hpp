@@ -12,6 +12,7 @@
 #include <vector>
 
 #include "host/transport/link.hpp"
+#include "shared/protocol/commissioning_payloads.hpp"
 #include "shared/protocol/payloads.hpp"
 
 namespace flexspline::drive {
@@ -53,6 +54,8 @@ class Session {
   protocol::Reference reference();
   // Sets the position of its motor, 2^-32 turns. Throws DriveError with the reason of a refusal.
   void home(std::int64_t position);
+  // Throws DriveError with the reason of a refusal.
+  void start_commissioning(const protocol::CommissioningBegin& request);
   protocol::Status status() { return ask<protocol::Status>(protocol::Kind::status); }
   protocol::Effects effects() { return ask<protocol::Effects>(protocol::Kind::effects); }
   // Throws DriveError with the reason of a refusal.
@@ -80,6 +83,7 @@ class Session {
 
  private:
   void wait_for_rest();
+  void ask_at_rest(const protocol::Message& request);
   protocol::CommandAnswer take_refusal(const protocol::Message& answer) const;
   protocol::Message done(const protocol::Message& answer) const;
 

@@ -72,7 +72,7 @@ Target find_target(const std::string& drive) {
   for (const char* other : {"tcp:", "serial:"})
     if (drive.starts_with(other))
       throw ImageError(fmt::format("{}: firmware goes over USB alone; connect the drive by USB", drive));
-  if (drive == "twin")
+  if (drive == "twin" || drive == transport::kThreePhaseTwin)
     throw ImageError(
         "twin: firmware goes over USB alone; start flexspline twin --usbip 3240, attach it (usbip), and leave --drive "
         "away");

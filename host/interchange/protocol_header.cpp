@@ -16,6 +16,7 @@
 #include "shared/fixed/system.hpp"
 #include "shared/model/block.hpp"
 #include "shared/model/block_texts.hpp"
+#include "shared/protocol/commissioning_payloads.hpp"
 #include "shared/protocol/payloads.hpp"
 #include "shared/protocol/serial_frame.hpp"
 #include "shared/protocol/texts.hpp"
@@ -210,11 +211,32 @@ void write_numbers(Writer& w) {
   w.title("The lock of the parameters, and what a signature is for");
   w.numbers<PairingState>("PAIRING", kNoComment);
   w.numbers<PairingAction>("PAIRING_ACTION", kNoComment);
+  w.title("Commissioning: how it ended, its steps, what it can find");
+  w.numbers<CommissioningState>("COMMISSIONING", kNoComment);
+  w.numbers<control::commissioning::Step>("COMMISSIONING_STEP", kNoComment);
+  w.numbers<control::commissioning::Fault>("COMMISSIONING_FAULT", kNoComment);
   w.title("Channels of telemetry: 32-bit words, shares of a base (2^-27) where a unit is given");
   w.numbers<Channel>("CHANNEL", [](Channel channel) { return text_of(channel).unit; });
   w.title("Faults");
   for (std::uint8_t fault = 0; fault < kFaults; ++fault)
     w.number(fmt::format("FAULT_{}", fault_text(fault).name), fault, fault_text(fault).reason);
+}
+
+void write_commissioning_payloads(Writer& w) {
+  using namespace protocol;
+  w.payload<CommissioningStage>(
+      "commissioning_stage", "commissioning_stage, from the drive: its power stage, and the motor in use",
+      {"current_full_scale_ma", "bus_full_scale_mv", "pwm_hz", "timer_counts", "shortest_pulse", "most_current", "bus",
+       "least_bus", "most_bus", "encoder_counts", "two_sensors", "pole_pairs", "reversed", "offset_angle"});
+  w.payload<CommissioningBegin>(
+      "commissioning_begin", "commissioning_begin, to the drive",
+      {"least_bus", "current", "most_current", "most_voltage", "voltage_ramp", "slow_step", "fast_step",
+       "most_shaft_step", "step_ramp", "most_travel", "most_periods", "stated_pole_pairs"});
+  w.payload<CommissioningProgress>("commissioning_progress", "commissioning_state, from the drive",
+                                   {"state", "step", "fault", "phase", "periods", "most_periods"});
+  w.payload<CommissioningResult>("commissioning_result", "commissioning_result, from the drive",
+                                 {"gain", "offset", "resistance", "inductance_d", "inductance_q", "flux",
+                                  "lost_voltage", "pole_pairs", "reversed", "offset_angle", "lag"});
 }
 
 void write_payloads(Writer& w) {
@@ -264,6 +286,7 @@ void write_payloads(Writer& w) {
   w.payload<PairingPart>("pairing_part", "pairing_part, to the drive: 0 the key, 1 and 2 the signature's halves",
                          {"part", "bytes"});
   w.payload<PairingAnswer>("pairing_answer", "pairing_answer, to the drive", {"action"});
+  write_commissioning_payloads(w);
   w.payload<FrameHead>("frame_head", "telemetry_frames, from the drive; words of the frames follow",
                        {"sequence", "tick"});
 }

@@ -53,8 +53,9 @@ std::unique_ptr<Link> open_hid(const std::string& serial);
 std::vector<Found> find_hid();
 std::unique_ptr<Link> open_serial(const std::string& port);
 std::unique_ptr<Link> open_tcp(const std::string& address);
+inline constexpr const char* kThreePhaseTwin = "twin:three-phase";
 // Starts `flexspline-hil twin` as a process of its own, which ends with the link.
-std::unique_ptr<Link> open_twin();
+std::unique_ptr<Link> open_twin(bool three_phase);
 // Over a file descriptor that is open, with the serial framing; it is closed with the link.
 std::unique_ptr<Link> stream_link(int fd, std::string name);
 

@@ -12,7 +12,7 @@ std::optional<std::string> behind(const std::string& text, const std::string& pr
 }  // namespace
 
 std::unique_ptr<Link> open_link(const std::string& drive) {
-  if (drive == "twin") return open_twin();
+  if (drive == "twin" || drive == kThreePhaseTwin) return open_twin(drive == kThreePhaseTwin);
   if (const auto port = behind(drive, "serial:")) return open_serial(*port);
   if (const auto address = behind(drive, "tcp:")) return open_tcp(*address);
   if (const auto serial = behind(drive, "hid:")) return open_hid(*serial);

@@ -21,7 +21,7 @@ namespace {
 namespace fs = std::filesystem;
 
 // Where the twin's flash memory is kept, so that what is flashed is there the next time.
-fs::path flash_file() {
+fs::path flash_file(const std::string& name) {
   const char* state = std::getenv("XDG_STATE_HOME");
   const char* home = std::getenv("HOME");
   fs::path folder = state != nullptr && *state != '\0' ? fs::path(state)
@@ -31,12 +31,12 @@ fs::path flash_file() {
   std::error_code error;
   fs::create_directories(folder, error);
   if (error) throw LinkError(fmt::format("twin: {} could not be created: {}", folder.string(), error.message()));
-  return folder / "twin.flash";
+  return folder / name;
 }
 
 class Twin : public Link {
  public:
-  Twin() {
+  explicit Twin(bool three_phase) : name_(three_phase ? kThreePhaseTwin : "twin") {
     std::error_code error;
     const fs::path self = fs::read_symlink("/proc/self/exe", error);
     const std::string program = (self.parent_path() / "flexspline-hil").string();
@@ -46,8 +46,9 @@ class Twin : public Link {
     int ends[2];
     if (socketpair(AF_UNIX, SOCK_STREAM | SOCK_CLOEXEC, 0, ends) != 0)
       throw LinkError(fmt::format("twin: no socket: {}", std::strerror(errno)));
-    std::string flash = flash_file().string();
+    std::string flash = flash_file(three_phase ? "twin-three-phase.flash" : "twin.flash").string();
     std::vector<std::string> words{program, "twin", "--inherit", "--flash", flash};
+    if (three_phase) words.insert(words.end(), {"--motor", "three-phase", "--motor-seed", "1", "--fast"});
     std::vector<char*> argv;
     for (std::string& word : words) argv.push_back(word.data());
     argv.push_back(nullptr);
@@ -67,7 +68,7 @@ class Twin : public Link {
       close(ends[0]);
       throw LinkError(fmt::format("twin: cannot start {}: {}", program, std::strerror(failed)));
     }
-    stream_ = stream_link(ends[0], "twin");
+    stream_ = stream_link(ends[0], name_);
   }
   ~Twin() override {
     stream_.reset();  // the twin ends with its line
@@ -79,17 +80,18 @@ class Twin : public Link {
 
   void send(const protocol::Message& m) override { stream_->send(m); }
   std::optional<protocol::Message> receive(Milliseconds limit) override { return stream_->receive(limit); }
-  std::string name() const override { return "twin"; }
+  std::string name() const override { return name_; }
 
  private:
+  std::string name_;
   pid_t child_ = 0;
   std::unique_ptr<Link> stream_;
 };
 
 }  // namespace
 
-std::unique_ptr<Link> open_twin() {
-  return std::make_unique<Twin>();
+std::unique_ptr<Link> open_twin(bool three_phase) {
+  return std::make_unique<Twin>(three_phase);
 }
 
 }  // namespace flexspline::transport

@@ -202,7 +202,7 @@ void LiveDrive::connect(const std::string& drive) {
   forget("");
   drive_ = drive;
   // A socket is a twin's (host/transport/link.hpp).
-  simulated_ = drive == "twin" || drive.starts_with("tcp:");
+  simulated_ = drive == "twin" || drive == transport::kThreePhaseTwin || drive.starts_with("tcp:");
   try {
     session_ = std::make_unique<drive::Session>(connection_.open(drive));
     read_block();

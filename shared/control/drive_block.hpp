@@ -15,6 +15,7 @@
 
 #include "shared/control/drive_parameters.hpp"
 #include "shared/control/hardware.hpp"
+#include "shared/control/motor_settings.hpp"
 #include "shared/control/reachable.hpp"
 #include "shared/fixed/system.hpp"
 #include "shared/model/block.hpp"
@@ -26,6 +27,9 @@ using Numbers = fixed::Fixed;
 using Settings = DriveSettings<Numbers>;
 using model::Section;
 
+struct SectionValues;
+using MotorCheck = bool (*)(model::FieldReader&, SectionValues&);
+
 // Checks across sections: which ones are required, and whether signals can reach their limits.
 struct SectionValues {
   GeneralSettings general{};
@@ -34,7 +38,16 @@ struct SectionValues {
   std::uint32_t motor_counts = 0;
   std::uint32_t output_counts = 0;
   StoredZero zero{};
+  std::uint32_t motor_counts_of_stage = 0;  // zero: the block has no motor section
+  MotorCheck check_motor = nullptr;         // none: what is in that section is passed over
 };
+// What a drive without a three-phase stage has no code for.
+inline bool check_motor(model::FieldReader& reader, SectionValues& values) {
+  MotorSettings motor;
+  motor.fields(reader);
+  values.motor_counts_of_stage = motor.encoder_counts;
+  return reader.verdict().fault == model::FieldFault::none && agrees(motor);
+}
 
 template <class Base, class Derived>
 constexpr auto& base_of(Derived& settings) {
@@ -181,6 +194,8 @@ struct StoredZeroSection : SectionOf<Section::stored_zero, StoredZero> {
     return true;
   }
 };
+// Not among the settings of the tick: the three-phase stage, where a board has one, reads it from the block.
+struct MotorSection : SectionOf<Section::motor, MotorSettings> {};
 // Of other counts a turn: the encoder is another one.
 constexpr bool zero_agrees(const StoredZero::Place& zero, std::uint32_t counts) {
   return zero.counts == 0 ? zero == StoredZero::Place{} : zero.counts == counts && zero.reading < counts;
@@ -197,7 +212,7 @@ using Sections =
     std::tuple<GeneralSection, MotorEncoderSection, OutputEncoderSection, EncoderFilterSection, OutputFilterSection,
                DisturbanceSection, TorsionSection, RippleSection, SensorSection, LoopsSection, TrajectorySection,
                FeedforwardSection, ExcitationSection, ExcitationLinesSection, SafetySection, FollowingSection,
-               ResidualMapSection, StoredZeroSection, RateSection>;
+               ResidualMapSection, StoredZeroSection, RateSection, MotorSection>;
 template <std::size_t I, class Visit>
 constexpr void visit_section(Visit& visit) {
   visit(std::tuple_element_t<I, Sections>{});
@@ -233,7 +248,9 @@ inline constexpr std::uint32_t kWithTorqueSensor = bits_of({Section::torque_ripp
 // Reads sections into the settings, or checks them alone where there are none.
 class SectionReader {
  public:
-  explicit SectionReader(Settings* settings) : settings_(settings) {}
+  explicit SectionReader(Settings* settings, MotorCheck motor = nullptr) : settings_(settings) {
+    values.check_motor = motor;
+  }
   model::BlockVerdict take(std::uint32_t kind, std::span<const std::uint8_t> bytes) {
     std::uint32_t bit = 1;
     for (const Known& section : kKnown) {
@@ -267,6 +284,11 @@ class SectionReader {
     data.fields(reader);
     return reader.verdict().fault == model::FieldFault::none && S::agrees(data, values);
   }
+  static bool take_motor(model::FieldReader& reader, Settings*, SectionValues& values) {
+    if (values.check_motor != nullptr) return values.check_motor(reader, values);
+    reader.skip();
+    return true;
+  }
   static bool take_lines(model::FieldReader& reader, Settings* settings, SectionValues&) {
     for (std::size_t i = 0; i < kMostLines && (i == 0 || reader.left() > 0) && reader.good(); ++i) {
       ExcitationLinesSection::Data line;
@@ -281,6 +303,8 @@ class SectionReader {
     for_each_section([&]<class S>(S) {
       if constexpr (std::is_same_v<S, ExcitationLinesSection>) {
         known[i++] = {S::kKind, &take_lines};
+      } else if constexpr (std::is_same_v<S, MotorSection>) {
+        known[i++] = {S::kKind, &take_motor};
       } else {
         known[i++] = {S::kKind, &take_one<S>};
       }
@@ -296,19 +320,23 @@ class SectionReader {
 // one.
 template <class Model>
 model::BlockVerdict load(std::span<const std::uint8_t> block, Model& model) {
-  detail::SectionReader sections(nullptr);
+  detail::SectionReader sections(nullptr, &detail::check_motor);
   model.clear();
   const model::BlockVerdict verdict = model::read_block(block, &model, sections);
   model.note_effects();
   return verdict;
 }
 
+// For a drive with a three-phase stage, and for hosts. A drive without one passes over the motor's section.
+using MotorCheck = detail::MotorCheck;
+inline constexpr MotorCheck kChecksMotor = &detail::check_motor, kHasNoStage = nullptr;
+
 // Checks a whole block for a drive of this tick rate and board, in place, in flash or in memory; nothing is written. A
 // board that states nothing accepts any block. Returns the first fault.
 template <class Model = decltype(DriveParameters<fixed::Fixed>::model)>
 model::BlockVerdict check_for_drive(std::span<const std::uint8_t> block, std::uint32_t tick_hz,
-                                    const Hardware& hardware = {}) {
-  detail::SectionReader sections(nullptr);
+                                    const Hardware& hardware = {}, MotorCheck motor = kChecksMotor) {
+  detail::SectionReader sections(nullptr, motor);
   const model::BlockVerdict v = model::read_block<Model>(block, nullptr, sections);
   if (!v.good()) return v;
   detail::SectionValues& values = sections.values;
@@ -319,6 +347,8 @@ model::BlockVerdict check_for_drive(std::span<const std::uint8_t> block, std::ui
   if ((needed & ~sections.seen) != 0) return {model::BlockFault::missing_section};
   if (general.tick_hz != tick_hz) return {model::BlockFault::other_tick_rate};
   if (unreachable(values.limited) != Limit::none) return {model::BlockFault::unreachable_limit};
+  if (values.motor_counts_of_stage != 0 && values.motor_counts_of_stage != values.motor_counts)
+    return {model::BlockFault::unlike_coefficients};
   const StoredZero& zero = values.zero;
   if (!detail::zero_agrees(zero.motor, values.motor_counts) || !detail::zero_agrees(zero.output, values.output_counts))
     return {model::BlockFault::unlike_coefficients};
@@ -334,6 +364,16 @@ model::BlockVerdict check_for_drive(std::span<const std::uint8_t> block, std::ui
   stated.temperature_base = model::base_at(block, model::kTemperatureBase);
   if (disagreement(stated, hardware) != Disagreement::none) return {model::BlockFault::other_hardware};
   return {};
+}
+// The motor of a block that was found valid; without pole pairs where it has none.
+inline MotorSettings motor_of(std::span<const std::uint8_t> block) {
+  MotorSettings motor;
+  model::for_each_entry(block, [&](std::uint16_t kind, std::span<const std::uint8_t> bytes) {
+    if (kind != static_cast<std::uint16_t>(model::Section::motor)) return;
+    model::FieldReader reader(bytes);
+    motor.fields(reader);
+  });
+  return motor;
 }
 // Fills parameters from a block that was found valid; the model is at rest afterwards.
 template <class Parameters>
@@ -368,7 +408,7 @@ inline void add_settings(model::BlockWriter& writer, const DriveSettings<fixed::
     const auto kind = static_cast<std::uint16_t>(S::kKind);
     if constexpr (std::is_same_v<S, detail::ExcitationLinesSection>) {
       writer.add(kind, std::span(S::data(settings)).first(settings.excitation.line_count));
-    } else {
+    } else if constexpr (!std::is_same_v<S, detail::MotorSection>) {
       writer.add(kind, S::data(settings));
     }
   });

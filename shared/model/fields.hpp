@@ -126,6 +126,7 @@ class FieldNames {
   constexpr void operator()(T& x) { x.fields(codec()); }
   constexpr void positive(fixed::Value& x) { integer(Field::positive, x.raw); }
   constexpr void positive(std::int32_t& x) { integer(Field::positive, x); }
+  constexpr void signed_word(std::int32_t& x) { integer(Field::word, x); }
   constexpr void limit(fixed::Value& x) { integer(Field::limit, x.raw); }
   constexpr void unsigned_one(fixed::Value& x) { integer(Field::unsigned_one, x.raw); }
   constexpr void share(std::uint64_t& x) { integer(Field::share, x); }
@@ -191,6 +192,8 @@ class FieldReader : public FieldNames<FieldReader> {
   explicit FieldReader(std::span<const std::uint8_t> bytes) : from_(bytes.data()), left_(bytes.size()) {}
   std::size_t left() const { return left_; }
   bool good() const { return fault_ == FieldFault::none; }
+  // Of an entry that is not read.
+  void skip() { left_ = 0; }
   // After the last field. All bytes have to be of fields.
   FieldVerdict verdict() const {
     if (good()) return left_ == 0 ? FieldVerdict{} : FieldVerdict{FieldFault::length, -1};

@@ -25,6 +25,9 @@ constexpr Access access_of(Kind kind) {
     case Kind::map_info:
     case Kind::map_bins:
     case Kind::pairing:
+    case Kind::commissioning_stage:
+    case Kind::commissioning_state:
+    case Kind::commissioning_result:
     case Kind::telemetry_frames:
       return Access::reads;
     // A challenge and its answer change who may write, by the key alone.
@@ -39,6 +42,7 @@ constexpr Access access_of(Kind kind) {
     case Kind::excitation_lines:
     case Kind::excitation_use:
     case Kind::telemetry:
+    case Kind::commissioning_stop:
       return Access::operates;
     case Kind::block_begin:
     case Kind::block_chunk:
@@ -47,6 +51,8 @@ constexpr Access access_of(Kind kind) {
     case Kind::block_erase_all:
     case Kind::map_command:
     case Kind::pairing_remove:
+    // It moves the motor by limits of its request, and what it finds is for the parameters.
+    case Kind::commissioning_begin:
       return Access::writes;
   }
   return Access::reads;

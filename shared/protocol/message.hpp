@@ -22,12 +22,13 @@ namespace flexspline::protocol {
 
 inline constexpr std::uint8_t kMajor = 1;  // with another one only `identify` is understood
 // Increases with each addition: 1 the residual map, 2 the board's hardware and the angles of the shafts, 3 the key of
-// the firmware, 4 the stored zero, 5 the pairing key.
-inline constexpr std::uint8_t kMinor = 5;
+// the firmware, 4 the stored zero, 5 the pairing key, 6 commissioning.
+inline constexpr std::uint8_t kMinor = 6;
 
 inline constexpr std::uint8_t kMinorOfHardware = 2;
 inline constexpr std::uint8_t kMinorOfZero = 4;
 inline constexpr std::uint8_t kMinorOfPairing = 5;
+inline constexpr std::uint8_t kMinorOfCommissioning = 6;
 
 inline constexpr std::size_t kReportBytes = 64;
 inline constexpr std::size_t kHeadBytes = 4;
@@ -67,6 +68,11 @@ enum class Kind : std::uint8_t {
   pairing_answer = 0x53,
   pairing_remove = 0x54,
   pairing_lock = 0x55,
+  commissioning_stage = 0x60,  // the measurement of a three-phase motor: commissioning_payloads.hpp
+  commissioning_begin = 0x61,
+  commissioning_stop = 0x62,
+  commissioning_state = 0x63,
+  commissioning_result = 0x64,
   telemetry_frames = kFirstUnasked,
 };
 
@@ -89,6 +95,7 @@ enum class Code : std::uint8_t {
   wrong_signature,  // or there is no challenge that it could be for
   wait,             // after a wrong signature; `pairing` says how long
   pairing_full,     // no room to record another key
+  not_measured,     // since its start the drive has not measured its motor
   // Of the parameter store, in its order.
   too_long = 0x20,
   not_begun,

@@ -16,10 +16,16 @@ enum class Mode : std::uint8_t {
   excitation,  // armed: the excitation of the parameters
   stop,        // armed: comes to rest by itself, then fault
   fault,       // amplifier off until cleared
+  // The motor is being measured by a three-phase stage, with limits of its own; no loop of the application runs.
+  commissioning,
 };
-inline constexpr std::uint32_t kModes = 8;
+inline constexpr std::uint32_t kModes = 9;
 constexpr bool is_armed(Mode mode) {
   return mode >= Mode::current && mode <= Mode::stop;
+}
+// Its power stage may switch.
+constexpr bool is_live(Mode mode) {
+  return is_armed(mode) || mode == Mode::commissioning;
 }
 
 enum class CommandKind : std::uint8_t {
@@ -31,8 +37,10 @@ enum class CommandKind : std::uint8_t {
   // Messages of their own; in no `command`.
   start_map,  // residuals count from here on, in any mode in which the model's torque is fed forward
   stop_map,
-  clear_map,  // while the drive is not armed, as it takes as long as a tick
-  home,       // the shaft, at rest and not armed, is at `position`
+  clear_map,   // while the drive is not armed, as it takes as long as a tick
+  home,        // the shaft, at rest and not armed, is at `position`
+  commission,  // measure the motor, from idle and at rest
+  stop_commissioning,
 };
 inline constexpr std::uint32_t kCommandKinds = 5;  // in a `command`
 
@@ -47,8 +55,11 @@ enum class Refusal : std::uint8_t {
   no_excitation,  // the parameters hold none
   fault,          // clear it first
   booting,
+  commissioning,     // the motor is being measured; stop that, or wait for its end
+  no_stage,          // no three-phase power stage, or one that gives no samples
+  not_commissioned,  // the motor of its stage was never measured
 };
-inline constexpr std::uint32_t kRefusals = 10;
+inline constexpr std::uint32_t kRefusals = 13;
 
 // What a drive found of its stored blocks when it started.
 enum class StoreState : std::uint8_t {

@@ -10,6 +10,33 @@
 
 namespace flexspline::protocol {
 
+// Of the parameter store.
+constexpr std::string_view store_text_of(Code code) {
+  switch (code) {
+    case Code::too_long:
+      return "the block is empty or longer than the drive's flash has room for";
+    case Code::not_begun:
+      return "no block is being sent; start again";
+    case Code::out_of_order:
+      return "a piece of the block is missing; start again";
+    case Code::incomplete:
+      return "the block is not complete; start again";
+    case Code::wrong_checksum:
+      return "what arrived is not what was sent; try again over a better line";
+    case Code::invalid:
+      return "the drive's validator refused the block; nothing was changed";
+    case Code::flash:
+      return "the drive's flash memory did not take what was written; try again, and if it stays the memory is worn "
+             "out";
+    case Code::no_previous:
+      return "there is no valid block before the active one; flash one from a backup";
+    case Code::worn:
+      return "there is no room to note another restore; flash the block from a backup";
+    default:
+      return {};
+  }
+}
+
 constexpr std::string_view text_of(Code code) {
   switch (code) {
     case Code::done:
@@ -48,25 +75,18 @@ constexpr std::string_view text_of(Code code) {
       return "it waits after wrong signatures; try again in a minute";
     case Code::pairing_full:
       return "its memory for pairing keys is full; its sector has to be erased with a programmer";
+    case Code::not_measured:
+      return "it has not measured its motor since it was switched on; run flexspline commission";
     case Code::too_long:
-      return "the block is empty or longer than the drive's flash has room for";
     case Code::not_begun:
-      return "no block is being sent; start again";
     case Code::out_of_order:
-      return "a piece of the block is missing; start again";
     case Code::incomplete:
-      return "the block is not complete; start again";
     case Code::wrong_checksum:
-      return "what arrived is not what was sent; try again over a better line";
     case Code::invalid:
-      return "the drive's validator refused the block; nothing was changed";
     case Code::flash:
-      return "the drive's flash memory did not take what was written; try again, and if it stays the memory is worn "
-             "out";
     case Code::no_previous:
-      return "there is no valid block before the active one; flash one from a backup";
     case Code::worn:
-      return "there is no room to note another restore; flash the block from a backup";
+      return store_text_of(code);
   }
   return "a code that this tool does not know; bring the tool up to date";
 }
@@ -93,13 +113,19 @@ constexpr std::string_view text_of(Refusal refusal) {
       return "the drive is in a fault; find its cause and clear it first";
     case Refusal::booting:
       return "the drive is starting";
+    case Refusal::commissioning:
+      return "the drive measures its motor; stop that, or wait for its end";
+    case Refusal::no_stage:
+      return "the drive has no three-phase power stage, or the stage gives no samples";
+    case Refusal::not_commissioned:
+      return "the motor of this drive was never measured; run flexspline commission";
   }
   return "a refusal that this tool does not know";
 }
 
 constexpr std::string_view name_of(Mode mode) {
-  constexpr std::array<std::string_view, kModes> kNames{"boot",     "idle",       "current", "velocity",
-                                                        "position", "excitation", "stop",    "fault"};
+  constexpr std::array<std::string_view, kModes> kNames{"boot",       "idle", "current", "velocity",     "position",
+                                                        "excitation", "stop", "fault",   "commissioning"};
   return static_cast<std::size_t>(mode) < kNames.size() ? kNames[static_cast<std::size_t>(mode)] : "unknown";
 }
 

@@ -30,6 +30,7 @@ struct Board {
     return readings;
   }
   void actuate(const firmware::Actuation& wanted) { actuation = wanted; }
+  firmware::ThreePhaseStage* three_phase() { return &stage; }
   bool tick_overrun() const { return overruns; }
   void feed_watchdog() {}
   firmware::ResetCause reset_cause() const { return firmware::ResetCause::power; }
@@ -37,6 +38,23 @@ struct Board {
   firmware::Readings readings{};
   firmware::Actuation actuation{};
   bool overruns = false;
+  firmware::ThreePhaseStage stage;
+  bool switches = false;
+
+  // Currents and encoder that stand still, and a bus voltage.
+  Board() {
+    firmware::ThreePhaseSettings s;
+    s.foc.sensors.gain = {4096, 4096, 4096};
+    s.foc.modulation.period = s.test_modulation.period = 8400;
+    s.offsets = {3276, 1638};
+    s.least_bus = 8192;
+    s.most_phase = 1 << 26;
+    s.pole_pairs = 0;
+    s.encoder_counts = 4096;
+    s.timer_counts = 2100;
+    stage.begin(s);
+  }
+  void interrupt() { switches = stage.update({{0, 0, 0}, 24'000, 0}).enabled; }
 };
 
 constexpr std::size_t kSector = 4096;
@@ -66,6 +84,9 @@ struct Drive {
   Drive() { service.start(); }
   void tick() {
     application.tick();
+    board.interrupt();
+    require(!board.switches || application.status().mode == protocol::Mode::commissioning,
+            "the stage switches although the motor is not being measured");
     application.background();
     service.background();
     require(!board.actuation.enabled, "the amplifier is on without parameters");

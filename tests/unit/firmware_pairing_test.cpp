@@ -82,7 +82,8 @@ TEST(Pairing, EveryRequestThatWritesIsRefusedByALockedDriveAndNoOther) {
     if (is_locked) refused.push_back(std::to_string(static_cast<int>(kind)));
     if (kind == Kind::identify) EXPECT_EQ(bench.host.identify(), Code::done);
   }
-  EXPECT_EQ(refused.size(), 7U) << "upload in three requests, restore, factory reset, residual map, end of the pairing";
+  EXPECT_EQ(refused.size(), 8U)
+      << "upload in three requests, restore, factory reset, residual map, end of the pairing, commissioning";
 }
 
 TEST(Pairing, WhateverElseALockedDriveIsSentItsMemoryAndItsBlockStay) {

@@ -8,6 +8,7 @@
 #include <string>
 #include <vector>
 
+#include "shared/protocol/commissioning_payloads.hpp"
 #include "shared/protocol/map_payloads.hpp"
 #include "shared/protocol/payloads.hpp"
 #include "shared/protocol/serial_frame.hpp"
@@ -138,6 +139,36 @@ void randomise(std::mt19937& r, PairingPart& x) {
 void randomise(std::mt19937& r, PairingAnswer& x) {
   x.action = below<PairingAction>(r, kPairingActions);
 }
+void randomise(std::mt19937& r, CommissioningStage& x) {
+  for (std::uint32_t* word :
+       {&x.current_full_scale_ma, &x.bus_full_scale_mv, &x.pwm_hz, &x.timer_counts, &x.encoder_counts, &x.offset_angle})
+    *word = static_cast<std::uint32_t>(r());
+  x.shortest_pulse = static_cast<std::int32_t>(r()), x.most_current = static_cast<std::int32_t>(r());
+  x.bus = static_cast<std::uint16_t>(r()), x.least_bus = static_cast<std::uint16_t>(r());
+  x.most_bus = static_cast<std::uint16_t>(r()), x.pole_pairs = static_cast<std::uint8_t>(r());
+  x.two_sensors = (r() & 1) != 0, x.reversed = (r() & 1) != 0;
+}
+void randomise(std::mt19937& r, CommissioningBegin& x) {
+  for (std::int32_t* word :
+       {&x.least_bus, &x.current, &x.most_current, &x.most_voltage, &x.voltage_ramp, &x.slow_step, &x.fast_step,
+        &x.most_shaft_step, &x.step_ramp, &x.most_travel, &x.most_periods, &x.stated_pole_pairs})
+    *word = static_cast<std::int32_t>(r());
+}
+void randomise(std::mt19937& r, CommissioningProgress& x) {
+  x.state = below<CommissioningState>(r, kCommissioningStates);
+  x.step = below<control::commissioning::Step>(r, control::commissioning::kStepCount);
+  x.fault = below<control::commissioning::Fault>(r, control::commissioning::kFaultCount);
+  x.phase = below<std::uint8_t>(r, 4), x.periods = static_cast<std::uint32_t>(r());
+  x.most_periods = static_cast<std::uint32_t>(r());
+}
+void randomise(std::mt19937& r, CommissioningResult& x) {
+  for (std::int32_t& word : x.gain) word = static_cast<std::int32_t>(r());
+  for (std::int32_t& word : x.offset) word = static_cast<std::int32_t>(r());
+  for (std::int32_t* word : {&x.resistance, &x.inductance_d, &x.inductance_q, &x.flux, &x.lost_voltage, &x.lag})
+    *word = static_cast<std::int32_t>(r());
+  x.pole_pairs = static_cast<std::uint8_t>(r()), x.reversed = (r() & 1) != 0;
+  x.offset_angle = static_cast<std::uint32_t>(r());
+}
 void randomise(std::mt19937& r, FrameHead& x) {
   x = {static_cast<std::uint32_t>(r()), static_cast<std::uint32_t>(r())};
 }
@@ -163,10 +194,12 @@ void randomise(std::mt19937& r, MapCommand& x) {
 
 template <class T>
 class Payload : public ::testing::Test {};
-using AllPayloads = ::testing::Types<Empty, Hello, Identity, Effects, Hardware, Reference, Home, Status, BlockBegin,
-                                     Chunk, BlockRead, BlockRestore, Reason, Command, CommandAnswer, Excitation,
-                                     ExcitationGuard, ExcitationLines, Subscription, Pairing, PairingChallenge,
-                                     PairingPart, PairingAnswer, FrameHead, MapInfo, MapFirst, MapBins, MapCommand>;
+using AllPayloads =
+    ::testing::Types<Empty, Hello, Identity, Effects, Hardware, Reference, Home, Status, BlockBegin, Chunk, BlockRead,
+                     BlockRestore, Reason, Command, CommandAnswer, Excitation, ExcitationGuard, ExcitationLines,
+                     Subscription, Pairing, PairingChallenge, PairingPart, PairingAnswer, FrameHead, MapInfo, MapFirst,
+                     MapBins, MapCommand, CommissioningStage, CommissioningBegin, CommissioningProgress,
+                     CommissioningResult>;
 TYPED_TEST_SUITE(Payload, AllPayloads);
 
 TYPED_TEST(Payload, ComesBackAsItWasSentAndEveryOtherLengthIsRefused) {
@@ -241,7 +274,7 @@ TEST(Protocol, BytesOnTheWireAreTheRecordedOnes) {
   id.most_lines = 32, id.has_output_encoder = 1, id.firmware_key = FirmwareKey::development;
   id.pairing = PairingState::locked;
   EXPECT_EQ(wire(answer_to(request(Kind::identify, 7, Hello{}), Code::done, id)),
-            "810734000105030462000000000000000000000000000000"
+            "810734000106030462000000000000000000000000000000"
             "41310000000000000000000000000000204e0000003f00002b00150c20010203");
   Status s{0x01020304, Mode::fault, true, StoreState::fell_back, 13, 5, -2, 3, 4, 6, 8, {0x100, 0xA1B2C3D4}, {9, 10}};
   EXPECT_EQ(wire(answer_to(request(Kind::status, 1, Empty{}), Code::done, s)),

@@ -33,6 +33,7 @@ enum class Fault : std::uint8_t {
   too_far,             // the limit of the travel
   too_long,            // the limit of the time
 };
+inline constexpr std::uint32_t kFaultCount = 20;
 
 struct Settings {
   foc::SensorSettings sensors;         // offsets are measured; gains are corrected against each other
@@ -52,6 +53,24 @@ struct Settings {
   std::int32_t most_periods = 0;
   std::int32_t stated_pole_pairs = 0;  // zero: not stated
 };
+
+// What the arithmetic of the steps stands on, whoever asks for it.
+constexpr bool valid(const Settings& s) {
+  constexpr std::int32_t kFullScale = std::int32_t{1} << 27;
+  constexpr std::int32_t kMostVoltage = 72'477'573;  // 0.27 in 2^-28: within the circle at any modulation
+  constexpr std::int32_t kMostStep = 42'949'672;     // a hundredth of a turn
+  constexpr std::int32_t kMostRamp = 1 << 20;
+  constexpr std::int32_t kMostPolePairs = 40;
+  const auto within = [](std::int32_t x, std::int32_t low, std::int32_t high) { return x >= low && x <= high; };
+  return within(s.current, kFullScale / 64, kFullScale / 2) &&
+         within(s.most_current, s.current + s.current / 4, kFullScale - kFullScale / 32) &&
+         within(s.most_voltage, 1 << 16, kMostVoltage) && within(s.voltage_ramp, 1, s.most_voltage) &&
+         within(s.slow_step, 1, kMostStep / 2) && within(s.fast_step, s.slow_step, kMostStep) &&
+         within(s.most_shaft_step, 1, kMostStep) && within(s.step_ramp, 4, kMostRamp) &&
+         within(s.most_travel, 1, 32'000 << 16) && within(s.most_periods, 1, INT32_MAX / 2) &&
+         within(s.stated_pole_pairs, 0, kMostPolePairs) && within(s.least_bus, foc::kLeastBus, INT16_MAX) &&
+         within(s.timer_counts, 64, 1 << 16);
+}
 
 // A resistance is in full scales of the voltage over that of the current, an inductance in those times a period, a flux
 // in voltage full scales times a period for an electrical turn; all in 2^-24.
@@ -87,5 +106,6 @@ enum class Step : std::uint8_t {
   stop,
   done,
 };
+inline constexpr std::uint32_t kStepCount = 14;
 
 }  // namespace flexspline::control::commissioning
