@@ -51,6 +51,14 @@ void add_load_ripple(const Ripple& term, const FrictionPoint& at, FrictionTorque
   sum.by_angle += at.torque * term.order * (term.sine * c - term.cosine * d);
 }
 
+// Only what resists: the sign of the wave changes with the direction of motion, its place does not.
+void add_angle_friction(const Ripple& term, const FrictionPoint& at, FrictionTorque& sum) {
+  const double amplitude = std::hypot(term.cosine, term.sine);
+  const double phase = term.order * at.angle - std::atan2(term.sine, term.cosine);
+  sum.torque += at.direction * amplitude * std::cos(phase);
+  sum.by_angle -= at.direction * amplitude * term.order * std::sin(phase);
+}
+
 void add_triangle(const TriangleRipple& term, double angle, FrictionTorque& sum) {
   const double turns = (term.order * angle + term.phase) / (2.0 * std::numbers::pi) + 0.25;
   const double fraction = turns - std::floor(turns);
@@ -80,7 +88,8 @@ void add_onset(const Onset& term, const FrictionPoint& at, double speed, Frictio
 
 bool MotorFriction::is_plain() const {
   return !has_bristle() && power_torque == 0.0 && hess_soom.empty() && stribeck.empty() && load.empty() &&
-         ripple.empty() && load_ripple.empty() && triangle_ripple.empty() && bumps.empty() && onsets.empty();
+         ripple.empty() && load_ripple.empty() && angle_friction.empty() && triangle_ripple.empty() && bumps.empty() &&
+         onsets.empty();
 }
 
 double MotorFriction::viscous_factor(double temperature_c) const {
@@ -143,6 +152,7 @@ FrictionTorque MotorFriction::evaluate(const FrictionPoint& at, double viscous_n
   for (const LoadFriction& term : load) add_load_friction(term, at, gear_ratio, sum);
   for (const Ripple& term : ripple) add_ripple(term, at.angle, sum);
   for (const Ripple& term : load_ripple) add_load_ripple(term, at, sum);
+  for (const Ripple& term : angle_friction) add_angle_friction(term, at, sum);
   for (const TriangleRipple& term : triangle_ripple) add_triangle(term, at.angle, sum);
   for (const Bump& term : bumps) add_bump(term, at, gear_ratio, sum);
   for (const Onset& term : onsets) add_onset(term, at, speed, sum);

@@ -102,7 +102,8 @@ struct MotorFriction {
   double dry_share = 1.0;  ///< present factor on friction that does not depend on speed
   double quadratic = 0.0;
   std::vector<HessSoom> hess_soom;
-  std::vector<Ripple> load_ripple;  ///< times the torque through the flexspline
+  std::vector<Ripple> load_ripple;     ///< times the torque through the flexspline
+  std::vector<Ripple> angle_friction;  ///< times the direction
   LuGre lugre;
   double dahl_torque = 0.0;
   double dahl_presliding = 0.0;

@@ -139,6 +139,10 @@ constexpr Applier kAppliers[] = {
      [](const Effect& e, const Drive&, Physics& p) {
        p.friction.load_ripple.push_back({e.value("order"), e.value("cosine"), e.value("sine")});
      }},
+    {"angle_dependent_friction",
+     [](const Effect& e, const Drive&, Physics& p) {
+       p.friction.angle_friction.push_back({e.value("order"), e.value("cosine"), e.value("sine")});
+     }},
     {"torque_constant_error",
      [](const Effect& e, const Drive&, Physics& p) { p.torque_constant *= 1.0 + e.value("ratio"); }},
     {"torque_constant_saturation",

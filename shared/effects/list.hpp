@@ -1,6 +1,7 @@
 // The list of effects: one line each, in the order of their numbers.
 #pragma once
 
+#include "shared/effects/angle_dependent_friction.hpp"
 #include "shared/effects/backlash.hpp"
 #include "shared/effects/bouc_wen_hysteresis.hpp"
 #include "shared/effects/coulomb_asymmetry.hpp"

@@ -164,6 +164,7 @@ const std::map<std::string, std::string> kShownBy = {
     {"lugre_friction", "travel x direction"},
     {"torque_ripple", "motor_angle"},
     {"load_scaled_ripple", "torque"},
+    {"angle_dependent_friction", "motor_angle x direction"},
     {"current_offset", "record"},
     {"torque_constant_error", "torque,current"},
     {"torque_constant_saturation", "current"},

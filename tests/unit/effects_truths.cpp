@@ -222,6 +222,9 @@ const std::map<std::string, Truth, std::less<>>& truths() {
       {"load_scaled_ripple", each([](const Values& p, const Instant& x) {
          return x.T * (p[1] * std::cos(p[0] * x.q) + p[2] * std::sin(p[0] * x.q));
        })},
+      {"angle_dependent_friction", each([](const Values& p, const Instant& x) {
+         return s(x.w) * std::hypot(p[1], p[2]) * std::cos(p[0] * x.q - std::atan2(p[2], p[1]));
+       })},
       {"torque_constant_error", each([](const Values& p, const Instant& x) { return -p[0] * kTorqueConstant * x.i; })},
       {"torque_constant_saturation",
        each([](const Values& p, const Instant& x) { return kTorqueConstant * p[0] * x.i * x.i * x.i; })},
