@@ -36,6 +36,17 @@ void add_load_friction(const LoadFriction& term, const FrictionPoint& at, double
   sum.by_torque += at.direction * (at.torque >= 0.0 ? slope : -slope);
 }
 
+void add_load_stiction(const LoadStiction& term, const FrictionPoint& at, double speed, double gear_ratio,
+                       FrictionTorque& sum) {
+  const double ratio = speed / term.velocity;
+  if (ratio * ratio > kNegligibleExponent) return;
+  const double share = term.coefficient * std::exp(-ratio * ratio) / gear_ratio;
+  const double height = share * std::abs(at.torque);
+  sum.torque += at.direction * height;
+  sum.by_torque += at.torque < 0.0 ? -at.direction * share : at.direction * share;
+  sum.by_velocity -= 2.0 * ratio / term.velocity * height;
+}
+
 void add_ripple(const Ripple& term, double angle, FrictionTorque& sum) {
   const double c = std::cos(term.order * angle);
   const double d = std::sin(term.order * angle);
@@ -88,8 +99,8 @@ void add_onset(const Onset& term, const FrictionPoint& at, double speed, Frictio
 
 bool MotorFriction::is_plain() const {
   return !has_bristle() && power_torque == 0.0 && hess_soom.empty() && stribeck.empty() && load.empty() &&
-         ripple.empty() && load_ripple.empty() && angle_friction.empty() && triangle_ripple.empty() && bumps.empty() &&
-         onsets.empty();
+         load_stiction.empty() && ripple.empty() && load_ripple.empty() && angle_friction.empty() &&
+         triangle_ripple.empty() && bumps.empty() && onsets.empty();
 }
 
 double MotorFriction::viscous_factor(double temperature_c) const {
@@ -150,6 +161,7 @@ FrictionTorque MotorFriction::evaluate(const FrictionPoint& at, double viscous_n
     sum.by_velocity += value * power_exponent / std::max(speed, 1e-9);
   }
   for (const LoadFriction& term : load) add_load_friction(term, at, gear_ratio, sum);
+  for (const LoadStiction& term : load_stiction) add_load_stiction(term, at, speed, gear_ratio, sum);
   for (const Ripple& term : ripple) add_ripple(term, at.angle, sum);
   for (const Ripple& term : load_ripple) add_load_ripple(term, at, sum);
   for (const Ripple& term : angle_friction) add_angle_friction(term, at, sum);

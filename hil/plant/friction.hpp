@@ -19,6 +19,12 @@ struct LoadFriction {
   double reference = 1.0;
 };
 
+/// s coefficient |T| exp(-(w/vs)^2) / N
+struct LoadStiction {
+  double coefficient = 0.0;
+  double velocity = 1.0;
+};
+
 /// cosine cos(k q) + sine sin(k q)
 struct Ripple {
   double order = 0.0;
@@ -109,6 +115,7 @@ struct MotorFriction {
   double dahl_presliding = 0.0;
   std::vector<Stribeck> stribeck;
   std::vector<LoadFriction> load;
+  std::vector<LoadStiction> load_stiction;
   std::vector<Ripple> ripple;
   std::vector<TriangleRipple> triangle_ripple;
   std::vector<Bump> bumps;

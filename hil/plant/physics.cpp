@@ -61,6 +61,10 @@ constexpr Applier kAppliers[] = {
      [](const Effect& e, const Drive&, Physics& p) {
        p.friction.load.push_back({e.value("coefficient"), 1.0, 1.0});
      }},
+    {"load_dependent_stiction",
+     [](const Effect& e, const Drive&, Physics& p) {
+       p.friction.load_stiction.push_back({e.value("coefficient"), e.value("velocity")});
+     }},
     {"load_power_friction",
      [](const Effect& e, const Drive&, Physics& p) {
        p.friction.load.push_back({e.value("coefficient"), e.value("exponent"), e.value("reference")});

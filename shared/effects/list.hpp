@@ -18,6 +18,7 @@
 #include "shared/effects/kinematic_error.hpp"
 #include "shared/effects/linear_stiffness.hpp"
 #include "shared/effects/load_dependent_friction.hpp"
+#include "shared/effects/load_dependent_stiction.hpp"
 #include "shared/effects/load_scaled_ripple.hpp"
 #include "shared/effects/lugre_friction.hpp"
 #include "shared/effects/modified_dahl_hysteresis.hpp"

@@ -56,6 +56,28 @@ Outcome diagnose(const std::string& hidden, const Experiments& experiments, doub
   return outcome;
 }
 
+// The demo's motions, and an arm of 20 N m that swings slowly and less slowly: the motor lifts it and is driven by it.
+Experiments with_swings() {
+  Experiments experiments = plant::demo_plant().experiments;
+  const auto swing = [&](double amplitude, double frequency_hz, bool holdout) {
+    plant::ExperimentPlan e;
+    e.name = fmt::format("{}-{:g}-rad-s", holdout ? "holdout-swing" : "swing", amplitude);
+    e.mode = plant::Mode::velocity;
+    e.waveform = plant::Waveform::triangle;
+    e.amplitude = amplitude;
+    e.frequency_hz = frequency_hz;
+    e.duration_s = 20.0;
+    e.holdout = holdout;
+    experiments.push_back(e);
+  };
+  swing(30.0, 0.05, false);
+  swing(60.0, 0.1, false);
+  swing(120.0, 0.2, false);
+  swing(45.0, 0.08, true);
+  return experiments;
+}
+constexpr double kArmNm = 20.0;
+
 TEST(FrictionByAngle, IsNamedWithItsOrder) {
   const Experiments experiments = plant::demo_plant().experiments;
   for (const std::uint64_t seed : {7001, 7002}) {
@@ -64,6 +86,22 @@ TEST(FrictionByAngle, IsNamedWithItsOrder) {
     EXPECT_GT(o.before, 1.3);
     EXPECT_LT(o.after, 1.05);
   }
+}
+
+// What BAM's models M3 and M4 and measured gears have: a law for each load, and one that falls with speed as well.
+TEST(FrictionByLoad, StictionThatGrowsWithTheLoadIsNamed) {
+  for (const std::uint64_t seed : {7001, 7002}) {
+    const Outcome o = diagnose("load_dependent_stiction", with_swings(), kArmNm, seed);
+    EXPECT_EQ(o.named, "load_dependent_stiction");
+    EXPECT_GT(o.before, 1.3);
+    EXPECT_LT(o.after, 1.05);
+  }
+}
+
+// Friction that grows with the load alone is not taken for it.
+TEST(FrictionByLoad, FrictionInProportionToTheLoadKeepsItsName) {
+  const Outcome o = diagnose("load_dependent_friction", with_swings(), kArmNm, 7001);
+  EXPECT_EQ(o.named, "load_dependent_friction");
 }
 
 }  // namespace

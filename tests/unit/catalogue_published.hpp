@@ -203,6 +203,11 @@ inline const std::vector<Published>& published() {
        motor,
        source,
        {{"order", "1", given, 2.0, 2.0}, {"cosine", "N*m", linear, 0.006, 0.006}, {"sine", "N*m", linear, 0.0, 0.006}}},
+      {"load_dependent_stiction",
+       47,
+       motor,
+       source,
+       {{"coefficient", "1", linear, 0.05, 0.05}, {"velocity", "rad/s", nonlinear, 3.0, 3.0}}},
   };
   return kList;
 }

@@ -191,6 +191,9 @@ const std::map<std::string, Truth, std::less<>>& truths() {
        })},
       {"load_dependent_friction",
        each([](const Values& p, const Instant& x) { return p[0] * std::abs(x.T) / kGearRatio * s(x.w); })},
+      {"load_dependent_stiction", each([](const Values& p, const Instant& x) {
+         return p[0] * std::abs(x.T) / kGearRatio * s(x.w) / std::exp(std::pow(x.w / p[1], 2.0));
+       })},
       // The factor on viscous friction; the term itself has a test of its own below.
       {"temperature_viscous",
        each([](const Values& p, const Instant& x) { return std::exp(-p[0] * (x.temp - kReferenceTemperature)); })},

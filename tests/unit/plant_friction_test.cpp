@@ -96,5 +96,27 @@ TEST(PlantFriction, OverTheOutputsAngleRepeatsOnceATurnOfTheOutput) {
   expect_torque_of("angle_dependent_friction", {1.0 / kGearRatio, 0.01, 0.0}, friction);
 }
 
+TEST(PlantFriction, StictionUnderLoadFallsWithSpeedAndIsProportionalToTheLoad) {
+  MotorFriction friction;
+  friction.gear_ratio = kGearRatio;
+  friction.load_stiction.push_back({0.05, 3.0});
+  ASSERT_FALSE(friction.is_plain());
+  FrictionPoint at;
+  for (const double direction : {1.0, -1.0})
+    for (const double load : {-20.0, 0.0, 20.0}) {
+      at.direction = direction;
+      at.torque = load;
+      at.velocity = 0.0;
+      const double stiction = direction * 0.05 * std::abs(load) / kGearRatio;
+      EXPECT_NEAR(torque_at(friction, at).torque, stiction, 1e-15);
+      at.velocity = direction * 3.0;
+      EXPECT_NEAR(torque_at(friction, at).torque, stiction / std::numbers::e, 1e-15);
+      at.velocity = direction * 30.0;
+      EXPECT_EQ(torque_at(friction, at).torque, 0.0) << "negligible";
+    }
+  expect_derivatives(friction);
+  expect_torque_of("load_dependent_stiction", {0.05, 3.0}, friction);
+}
+
 }  // namespace
 }  // namespace flexspline::tests
