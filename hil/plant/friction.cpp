@@ -47,6 +47,18 @@ void add_load_stiction(const LoadStiction& term, const FrictionPoint& at, double
   sum.by_velocity -= 2.0 * ratio / term.velocity * height;
 }
 
+// With the deflection at z, the loss is a quadratic of its magnitude that ends at the share of this direction of power.
+void add_loss(const DrivingLoss& term, const FrictionPoint& at, double z, double gear_ratio, FrictionTorque& sum) {
+  const bool drives = at.torque * z > 0.0;
+  const double most = drives ? term.driving : term.driven;
+  const double mean = 0.5 * (term.driving + term.driven);
+  const double size = std::abs(z), share = size * (mean + (most - mean) * size) / gear_ratio;
+  const double load = std::abs(at.torque);
+  sum.torque += std::copysign(load * share, z);
+  sum.by_torque += drives ? share : -share;
+  sum.by_angle += load * (mean + 2.0 * (most - mean) * size) / gear_ratio * (1.0 - at.direction * z) / term.presliding;
+}
+
 void add_ripple(const Ripple& term, double angle, FrictionTorque& sum) {
   const double c = std::cos(term.order * angle);
   const double d = std::sin(term.order * angle);
@@ -98,8 +110,8 @@ void add_onset(const Onset& term, const FrictionPoint& at, double speed, Frictio
 }  // namespace
 
 bool MotorFriction::is_plain() const {
-  return !has_bristle() && power_torque == 0.0 && hess_soom.empty() && stribeck.empty() && load.empty() &&
-         load_stiction.empty() && ripple.empty() && load_ripple.empty() && angle_friction.empty() &&
+  return !has_bristle() && !(loss.presliding > 0.0) && power_torque == 0.0 && hess_soom.empty() && stribeck.empty() &&
+         load.empty() && load_stiction.empty() && ripple.empty() && load_ripple.empty() && angle_friction.empty() &&
          triangle_ripple.empty() && bumps.empty() && onsets.empty();
 }
 
@@ -128,6 +140,11 @@ double MotorFriction::bristle(const FrictionPoint& at) const {
   if (dahl_presliding <= 0.0) return 0.0;
   const double limit = at.direction * dahl_presliding;
   return limit + (at.bristle - limit) * std::exp(-at.direction * (at.angle - at.anchor) / dahl_presliding);
+}
+
+double MotorFriction::loss_deflection(const FrictionPoint& at) const {
+  if (!(loss.presliding > 0.0)) return 0.0;
+  return at.direction + (at.loss - at.direction) * std::exp(-at.direction * (at.angle - at.anchor) / loss.presliding);
 }
 
 FrictionTorque MotorFriction::evaluate(const FrictionPoint& at, double viscous_now) const {
@@ -162,6 +179,7 @@ FrictionTorque MotorFriction::evaluate(const FrictionPoint& at, double viscous_n
   }
   for (const LoadFriction& term : load) add_load_friction(term, at, gear_ratio, sum);
   for (const LoadStiction& term : load_stiction) add_load_stiction(term, at, speed, gear_ratio, sum);
+  if (loss.presliding > 0.0) add_loss(loss, at, loss_deflection(at), gear_ratio, sum);
   for (const Ripple& term : ripple) add_ripple(term, at.angle, sum);
   for (const Ripple& term : load_ripple) add_load_ripple(term, at, sum);
   for (const Ripple& term : angle_friction) add_angle_friction(term, at, sum);

@@ -65,6 +65,10 @@ constexpr Applier kAppliers[] = {
      [](const Effect& e, const Drive&, Physics& p) {
        p.friction.load_stiction.push_back({e.value("coefficient"), e.value("velocity")});
      }},
+    {"driving_dependent_loss",
+     [](const Effect& e, const Drive&, Physics& p) {
+       p.friction.loss = {e.value("driving"), e.value("driven"), e.value("presliding")};
+     }},
     {"load_power_friction",
      [](const Effect& e, const Drive&, Physics& p) {
        p.friction.load.push_back({e.value("coefficient"), e.value("exponent"), e.value("reference")});

@@ -12,6 +12,7 @@
 #include "shared/effects/current_saturation.hpp"
 #include "shared/effects/dahl_friction.hpp"
 #include "shared/effects/dahl_hysteresis.hpp"
+#include "shared/effects/driving_dependent_loss.hpp"
 #include "shared/effects/duhem_hysteresis.hpp"
 #include "shared/effects/gravity.hpp"
 #include "shared/effects/inertia.hpp"

@@ -159,6 +159,7 @@ const std::map<std::string, std::string> kShownBy = {
     {"quadratic_drag", "speed x direction"},
     {"load_dependent_friction", "torque x direction"},
     {"load_dependent_stiction", "torque x direction,speed x direction"},
+    {"driving_dependent_loss", "torque x direction"},
     {"temperature_viscous", "temperature,record x direction"},
     {"temperature_coulomb", "temperature x direction"},
     {"dahl_friction", "travel x direction"},

@@ -98,7 +98,16 @@ TEST(FrictionByLoad, StictionThatGrowsWithTheLoadIsNamed) {
   }
 }
 
-// Friction that grows with the load alone is not taken for it.
+TEST(FrictionByLoad, LossThatDiffersBetweenDrivingAndDrivenIsNamed) {
+  for (const std::uint64_t seed : {7001, 7002}) {
+    const Outcome o = diagnose("driving_dependent_loss", with_swings(), kArmNm, seed);
+    EXPECT_EQ(o.named, "driving_dependent_loss");
+    EXPECT_GT(o.before, 1.3);
+    EXPECT_LT(o.after, 1.05);
+  }
+}
+
+// Friction that grows with the load alone is not taken for one of the two.
 TEST(FrictionByLoad, FrictionInProportionToTheLoadKeepsItsName) {
   const Outcome o = diagnose("load_dependent_friction", with_swings(), kArmNm, 7001);
   EXPECT_EQ(o.named, "load_dependent_friction");

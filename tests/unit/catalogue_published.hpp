@@ -208,6 +208,13 @@ inline const std::vector<Published>& published() {
        motor,
        source,
        {{"coefficient", "1", linear, 0.05, 0.05}, {"velocity", "rad/s", nonlinear, 3.0, 3.0}}},
+      {"driving_dependent_loss",
+       48,
+       motor,
+       source,
+       {{"driving", "1", linear, 0.08, 0.08},
+        {"driven", "1", linear, 0.04, 0.04},
+        {"presliding", "rad", nonlinear, 0.05, 0.05}}},
   };
   return kList;
 }

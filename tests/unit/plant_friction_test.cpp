@@ -118,5 +118,58 @@ TEST(PlantFriction, StictionUnderLoadFallsWithSpeedAndIsProportionalToTheLoad) {
   expect_torque_of("load_dependent_stiction", {0.05, 3.0}, friction);
 }
 
+// The loss as a share of the power through the gear: of a motor that drives, and of one that is driven.
+TEST(PlantFriction, LossGrowsOverATravelToTheShareOfItsDirectionOfPower) {
+  MotorFriction friction;
+  friction.gear_ratio = kGearRatio;
+  friction.loss = {0.08, 0.04, 0.05};
+  ASSERT_FALSE(friction.is_plain());
+  FrictionPoint at;
+  for (const double direction : {1.0, -1.0})
+    for (const double load : {-20.0, 20.0}) {
+      at = {};
+      at.direction = direction;
+      at.torque = load;
+      EXPECT_EQ(torque_at(friction, at).torque, 0.0) << "nothing has moved";
+      at.angle = direction * 5.0;  // a hundred travels on
+      const double share = load * direction > 0.0 ? 0.08 : 0.04;
+      EXPECT_NEAR(torque_at(friction, at).torque, direction * share * 20.0 / kGearRatio, 1e-15);
+      EXPECT_NEAR(friction.loss_deflection(at), direction, 1e-15);
+      // Back by a travel: z = -1 + 2/e of the way.
+      at.anchor = at.angle;
+      at.loss = direction;
+      at.direction = -direction;
+      at.angle -= direction * 0.05;
+      EXPECT_NEAR(friction.loss_deflection(at), direction * (2.0 / std::numbers::e - 1.0), 1e-12);
+    }
+  expect_derivatives(friction);
+}
+
+// Along a path, as the deflection remembers it.
+TEST(PlantFriction, LossIsThatOfTheEffectAlongAPathWithReversals) {
+  std::mt19937 random(5);
+  const Record record = random_record(random);
+  const std::vector<double> given =
+      response<Real>(catalogue::get("driving_dependent_loss"), {0.08, 0.04, 0.05}, record);
+  MotorFriction friction;
+  friction.gear_ratio = kGearRatio;
+  friction.loss = {0.08, 0.04, 0.05};
+  FrictionPoint at;
+  at.angle = record[0].q;
+  double largest = 0.0;
+  for (std::size_t k = 0; k < record.size(); ++k) {
+    at.anchor = at.angle;
+    at.angle = record[k].q;
+    at.direction = s(at.angle - at.anchor);
+    at.velocity = record[k].w;
+    at.torque = record[k].T;
+    if (at.direction != 0.0) at.loss = friction.loss_deflection(at);
+    at.anchor = at.angle;
+    ASSERT_NEAR(torque_at(friction, at).torque, given[k], 1e-12) << k;
+    largest = std::max(largest, std::abs(given[k]));
+  }
+  EXPECT_GT(largest, 1e-2);
+}
+
 }  // namespace
 }  // namespace flexspline::tests
