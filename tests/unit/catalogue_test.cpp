@@ -236,6 +236,23 @@ TEST(Catalogue, SaysThatANameIsUnknown) {
   EXPECT_EQ(gravity.index_of("tangent"), gravity.parameters.size());
 }
 
+// A new effect states what it is confused with, and its rivals' headers stay as they are.
+TEST(Catalogue, ConfusionsHoldBothWaysWhicheverHeaderStatesThem) {
+  const auto has = [](std::string_view effect, std::string_view other) {
+    const auto names = catalogue::confused_with(catalogue::get(effect));
+    return std::count(names.begin(), names.end(), other);
+  };
+  EXPECT_FALSE(
+      catalogue::names_contain(catalogue::get("torque_ripple").info->confused_with, "angle_dependent_friction"));
+  EXPECT_EQ(has("torque_ripple", "angle_dependent_friction"), 1);
+  EXPECT_EQ(has("angle_dependent_friction", "torque_ripple"), 1);
+  for (const Entry& one : catalogue::all())
+    for (const Entry& other : catalogue::all()) {
+      EXPECT_EQ(has(one.name(), other.name()), has(other.name(), one.name())) << one.name() << " " << other.name();
+      EXPECT_LE(has(one.name(), other.name()), 1);
+    }
+}
+
 TEST(Catalogue, SplitsListsOfNames) {
   EXPECT_TRUE(catalogue::split_names("").empty());
   EXPECT_EQ(catalogue::split_names("a,bc,d"), (std::vector<std::string_view>{"a", "bc", "d"}));
