@@ -36,6 +36,29 @@ void add_load_friction(const LoadFriction& term, const FrictionPoint& at, double
   sum.by_torque += at.direction * (at.torque >= 0.0 ? slope : -slope);
 }
 
+void add_load_stiction(const LoadStiction& term, const FrictionPoint& at, double speed, double gear_ratio,
+                       FrictionTorque& sum) {
+  const double ratio = speed / term.velocity;
+  if (ratio * ratio > kNegligibleExponent) return;
+  const double share = term.coefficient * std::exp(-ratio * ratio) / gear_ratio;
+  const double height = share * std::abs(at.torque);
+  sum.torque += at.direction * height;
+  sum.by_torque += at.torque < 0.0 ? -at.direction * share : at.direction * share;
+  sum.by_velocity -= 2.0 * ratio / term.velocity * height;
+}
+
+// With the deflection at z, the loss is a quadratic of its magnitude that ends at the share of this direction of power.
+void add_loss(const DrivingLoss& term, const FrictionPoint& at, double z, double gear_ratio, FrictionTorque& sum) {
+  const bool drives = at.torque * z > 0.0;
+  const double most = drives ? term.driving : term.driven;
+  const double mean = 0.5 * (term.driving + term.driven);
+  const double size = std::abs(z), share = size * (mean + (most - mean) * size) / gear_ratio;
+  const double load = std::abs(at.torque);
+  sum.torque += std::copysign(load * share, z);
+  sum.by_torque += drives ? share : -share;
+  sum.by_angle += load * (mean + 2.0 * (most - mean) * size) / gear_ratio * (1.0 - at.direction * z) / term.presliding;
+}
+
 void add_ripple(const Ripple& term, double angle, FrictionTorque& sum) {
   const double c = std::cos(term.order * angle);
   const double d = std::sin(term.order * angle);
@@ -49,6 +72,14 @@ void add_load_ripple(const Ripple& term, const FrictionPoint& at, FrictionTorque
   sum.torque += at.torque * (term.cosine * c + term.sine * d);
   sum.by_torque += term.cosine * c + term.sine * d;
   sum.by_angle += at.torque * term.order * (term.sine * c - term.cosine * d);
+}
+
+// Only what resists: the sign of the wave changes with the direction of motion, its place does not.
+void add_angle_friction(const Ripple& term, const FrictionPoint& at, FrictionTorque& sum) {
+  const double amplitude = std::hypot(term.cosine, term.sine);
+  const double phase = term.order * at.angle - std::atan2(term.sine, term.cosine);
+  sum.torque += at.direction * amplitude * std::cos(phase);
+  sum.by_angle -= at.direction * amplitude * term.order * std::sin(phase);
 }
 
 void add_triangle(const TriangleRipple& term, double angle, FrictionTorque& sum) {
@@ -79,8 +110,9 @@ void add_onset(const Onset& term, const FrictionPoint& at, double speed, Frictio
 }  // namespace
 
 bool MotorFriction::is_plain() const {
-  return !has_bristle() && power_torque == 0.0 && hess_soom.empty() && stribeck.empty() && load.empty() &&
-         ripple.empty() && load_ripple.empty() && triangle_ripple.empty() && bumps.empty() && onsets.empty();
+  return !has_bristle() && !(loss.presliding > 0.0) && power_torque == 0.0 && hess_soom.empty() && stribeck.empty() &&
+         load.empty() && load_stiction.empty() && ripple.empty() && load_ripple.empty() && angle_friction.empty() &&
+         triangle_ripple.empty() && bumps.empty() && onsets.empty();
 }
 
 double MotorFriction::viscous_factor(double temperature_c) const {
@@ -108,6 +140,11 @@ double MotorFriction::bristle(const FrictionPoint& at) const {
   if (dahl_presliding <= 0.0) return 0.0;
   const double limit = at.direction * dahl_presliding;
   return limit + (at.bristle - limit) * std::exp(-at.direction * (at.angle - at.anchor) / dahl_presliding);
+}
+
+double MotorFriction::loss_deflection(const FrictionPoint& at) const {
+  if (!(loss.presliding > 0.0)) return 0.0;
+  return at.direction + (at.loss - at.direction) * std::exp(-at.direction * (at.angle - at.anchor) / loss.presliding);
 }
 
 FrictionTorque MotorFriction::evaluate(const FrictionPoint& at, double viscous_now) const {
@@ -141,8 +178,11 @@ FrictionTorque MotorFriction::evaluate(const FrictionPoint& at, double viscous_n
     sum.by_velocity += value * power_exponent / std::max(speed, 1e-9);
   }
   for (const LoadFriction& term : load) add_load_friction(term, at, gear_ratio, sum);
+  for (const LoadStiction& term : load_stiction) add_load_stiction(term, at, speed, gear_ratio, sum);
+  if (loss.presliding > 0.0) add_loss(loss, at, loss_deflection(at), gear_ratio, sum);
   for (const Ripple& term : ripple) add_ripple(term, at.angle, sum);
   for (const Ripple& term : load_ripple) add_load_ripple(term, at, sum);
+  for (const Ripple& term : angle_friction) add_angle_friction(term, at, sum);
   for (const TriangleRipple& term : triangle_ripple) add_triangle(term, at.angle, sum);
   for (const Bump& term : bumps) add_bump(term, at, gear_ratio, sum);
   for (const Onset& term : onsets) add_onset(term, at, speed, sum);

@@ -19,6 +19,21 @@ struct LoadFriction {
   double reference = 1.0;
 };
 
+/// s coefficient |T| exp(-(w/vs)^2) / N
+struct LoadStiction {
+  double coefficient = 0.0;
+  double velocity = 1.0;
+};
+
+/// |T|/N times a share that the contacts carry: at most `driving` where the motor drives the load, at most `driven`
+/// where the load drives the motor. The deflection z goes to the direction of motion over a travel of some
+/// `presliding`; zero: the drive has none.
+struct DrivingLoss {
+  double driving = 0.0;
+  double driven = 0.0;
+  double presliding = 0.0;
+};
+
 /// cosine cos(k q) + sine sin(k q)
 struct Ripple {
   double order = 0.0;
@@ -76,6 +91,7 @@ struct FrictionPoint {
   double anchor = 0.0;           ///< motor angle at which the deflection was `bristle`
   double bristle = 0.0;          ///< bristle deflection at the anchor, rad
   double anchor_velocity = 0.0;  ///< motor rad/s there
+  double loss = 0.0;             ///< deflection of the loss at the anchor, -1 to 1
 };
 
 /// Torque that resists positive motion, and its partial derivatives.
@@ -102,12 +118,15 @@ struct MotorFriction {
   double dry_share = 1.0;  ///< present factor on friction that does not depend on speed
   double quadratic = 0.0;
   std::vector<HessSoom> hess_soom;
-  std::vector<Ripple> load_ripple;  ///< times the torque through the flexspline
+  std::vector<Ripple> load_ripple;     ///< times the torque through the flexspline
+  std::vector<Ripple> angle_friction;  ///< times the direction
   LuGre lugre;
+  DrivingLoss loss;
   double dahl_torque = 0.0;
   double dahl_presliding = 0.0;
   std::vector<Stribeck> stribeck;
   std::vector<LoadFriction> load;
+  std::vector<LoadStiction> load_stiction;
   std::vector<Ripple> ripple;
   std::vector<TriangleRipple> triangle_ripple;
   std::vector<Bump> bumps;
@@ -137,6 +156,8 @@ struct MotorFriction {
   /// Bristle deflection after the shaft moved, in one direction, from the anchor to `angle`: the rate-independent law
   /// dz/dq = 1 - s z/presliding, solved exactly.
   double bristle(const FrictionPoint& at) const;
+  /// The same of the loss.
+  double loss_deflection(const FrictionPoint& at) const;
 };
 
 }  // namespace flexspline::plant

@@ -61,6 +61,14 @@ constexpr Applier kAppliers[] = {
      [](const Effect& e, const Drive&, Physics& p) {
        p.friction.load.push_back({e.value("coefficient"), 1.0, 1.0});
      }},
+    {"load_dependent_stiction",
+     [](const Effect& e, const Drive&, Physics& p) {
+       p.friction.load_stiction.push_back({e.value("coefficient"), e.value("velocity")});
+     }},
+    {"driving_dependent_loss",
+     [](const Effect& e, const Drive&, Physics& p) {
+       p.friction.loss = {e.value("driving"), e.value("driven"), e.value("presliding")};
+     }},
     {"load_power_friction",
      [](const Effect& e, const Drive&, Physics& p) {
        p.friction.load.push_back({e.value("coefficient"), e.value("exponent"), e.value("reference")});
@@ -138,6 +146,10 @@ constexpr Applier kAppliers[] = {
     {"load_scaled_ripple",
      [](const Effect& e, const Drive&, Physics& p) {
        p.friction.load_ripple.push_back({e.value("order"), e.value("cosine"), e.value("sine")});
+     }},
+    {"angle_dependent_friction",
+     [](const Effect& e, const Drive&, Physics& p) {
+       p.friction.angle_friction.push_back({e.value("order"), e.value("cosine"), e.value("sine")});
      }},
     {"torque_constant_error",
      [](const Effect& e, const Drive&, Physics& p) { p.torque_constant *= 1.0 + e.value("ratio"); }},

@@ -86,18 +86,19 @@ double TwoMass::gravity(double angle) const {
 }
 
 FrictionPoint TwoMass::friction_point(const State& s, double direction) const {
-  return {direction, s.motor_velocity, torque(s), s.motor_angle, s.motor_angle, s.bristle, s.motor_velocity};
+  return {direction, s.motor_velocity, torque(s), s.motor_angle, s.motor_angle, s.bristle, s.motor_velocity, s.loss};
 }
 
 TwoMass::Response TwoMass::motor_response(const Stage& stage, const State& start, const State& s, double torque,
                                           double ratio) const {
   const double g = stage.weight;
   const auto direction = static_cast<double>(s.motor_direction);
-  const FrictionTorque f = has_plain_friction_
-                               ? physics_.friction.evaluate_plain(direction, s.motor_velocity, viscous_)
-                               : physics_.friction.evaluate({direction, s.motor_velocity, torque, s.motor_angle,
-                                                             start.motor_angle, start.bristle, start.motor_velocity},
-                                                            viscous_);
+  const FrictionTorque f =
+      has_plain_friction_
+          ? physics_.friction.evaluate_plain(direction, s.motor_velocity, viscous_)
+          : physics_.friction.evaluate({direction, s.motor_velocity, torque, s.motor_angle, start.motor_angle,
+                                        start.bristle, start.motor_velocity, start.loss},
+                                       viscous_);
   const double residual = physics_.motor_inertia * (s.motor_velocity - stage.motor_velocity) -
                           g * (motor_drive_ - f.torque - torque * ratio);
   const double slope = physics_.motor_inertia + g * (f.by_velocity + g * f.by_angle);
@@ -275,7 +276,9 @@ bool TwoMass::try_step(const State& from, double h, State& to) const {
     at.anchor = from.motor_angle;
     at.bristle = from.bristle;
     at.anchor_velocity = from.motor_velocity;
+    at.loss = from.loss;
     to.bristle = physics_.friction.bristle(at);
+    to.loss = physics_.friction.loss_deflection(at);
   }
   if (has_loops_) {
     to.loops = physics_.transmission.loops.ahead(from.loops, torsion(to), true);

@@ -32,6 +32,7 @@ struct Shafts {
   double output_velocity = 0.0;
   double damping = 0.0;
   double bristle = 0.0;
+  double loss = 0.0;        ///< deflection of the loss by driving direction
   int motor_direction = 0;  ///< branch of the friction: +1, -1, or 0 for exact sticking
   int output_direction = 0;
 };
@@ -49,8 +50,8 @@ struct Inputs {
 /// branches of both frictions; where a velocity changes its sign or sticking ends inside it, the step is split there.
 class TwoMass {
  public:
-  /// Only angles, velocities and bristle of `initial` count; the rest follows from them. Throws std::invalid_argument
-  /// for inertias, stiffness, gear ratio or damping exponent that are not positive.
+  /// Only angles, velocities, bristle and loss of `initial` count; the rest follows from them. Throws
+  /// std::invalid_argument for inertias, stiffness, gear ratio or damping exponent that are not positive.
   TwoMass(Physics physics, bool locked, State initial = {});
 
   /// Advances by `duration_s` in `steps` equal steps.

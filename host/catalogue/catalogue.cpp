@@ -208,6 +208,15 @@ const Entry& get(std::string_view name) {
   throw std::out_of_range("no effect named " + std::string(name));
 }
 
+std::vector<std::string_view> confused_with(const Entry& entry) {
+  std::vector<std::string_view> names = split_names(entry.info->confused_with);
+  for (const Entry& other : all())
+    if (names_contain(other.info->confused_with, entry.name()) &&
+        std::find(names.begin(), names.end(), other.name()) == names.end())
+      names.push_back(other.name());
+  return names;
+}
+
 std::vector<std::string_view> split_names(std::string_view names) {
   std::vector<std::string_view> parts;
   while (!names.empty()) {

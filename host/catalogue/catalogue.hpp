@@ -152,6 +152,9 @@ const Entry* find(std::string_view name);
 // As `find`, for names that are known to exist; throws std::out_of_range.
 const Entry& get(std::string_view name);
 
+// The effects that it names as confused with it, and those that name it: each header states the relation for itself.
+std::vector<std::string_view> confused_with(const Entry& entry);
+
 // "a,b" to {"a", "b"}.
 std::vector<std::string_view> split_names(std::string_view names);
 bool names_contain(std::string_view names, std::string_view name);

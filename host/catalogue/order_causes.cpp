@@ -12,11 +12,12 @@ namespace {
 
 // What an effect is able to show of a cause.
 enum ShowsAs : unsigned {
-  kTorque = 1,      // a torque at the motor that does not depend on the load
-  kWithLoad = 2,    // one in proportion to the motor's torque, or to its current
-  kPosition = 4,    // an angle between motor and output
-  kAnyTorque = 3,   // motion at one load does not distinguish these
-  kEverything = 7,  // of the gear
+  kTorque = 1,       // a torque at the motor that does not depend on the load
+  kWithLoad = 2,     // one in proportion to the motor's torque, or to its current
+  kPosition = 4,     // an angle between motor and output
+  kFriction = 8,     // friction that varies with the angle
+  kAnyTorque = 3,    // motion at one load does not distinguish these
+  kEverything = 15,  // of the gear
 };
 
 enum Facts : unsigned { kNoFact = 0, kPolePairs = 1, kSlots = 2, kGear = 4 };
@@ -132,6 +133,11 @@ constexpr Row kRows[] = {
      "Turn the shaft by hand or by another motor with the bridge off: the ripple stays.",
      "Map the torque over the motor's angle and compensate for it; a motor with skewed slots or magnets has less.",
      "Hendershot and Miller, Design of Brushless Permanent-Magnet Machines"},
+    {kFriction, kGear, [](const MotorTurn& m) { return 1.0 / *m.gear_ratio; }, "1 per output turn",
+     "the output: its bearing or seal is out of round or out of line, or a cable drags in a part of the turn",
+     "Turn the output by hand, uncoupled from the motor, and look for the tight place; release the cables and repeat.",
+     "Align or replace bearing and seal; lay the cables so that they do not drag.",
+     "Armstrong-Helouvry, Control of Machines with Friction, 1991"},
     {kEverything, kGear, [](const MotorTurn& m) { return 2.0 * *m.gear_ratio + 2.0; }, "2 x gear_ratio + 2",
      "the mesh of the teeth, where the circular spline is fixed: the number of its teeth",
      "Repeat with more load: wear and wrong shapes of teeth show under load. Look at the teeth and at the grease.",
@@ -147,6 +153,8 @@ unsigned shows_as(const Entry& effect) {
   if (effect.count(Kind::given) == 0) return 0;
   if (effect.info->phase == Phase::shift) return kPosition;
   if (effect.info->phase != Phase::source || effect.info->balance != Balance::motor) return 0;
+  // Of the causes only those that rub: current and magnets make no friction.
+  if ((effect.info->reads & effects::kBothDirections) != 0) return kFriction;
   return (effect.info->reads & effects::kTorque) != 0 ? kWithLoad : kAnyTorque;
 }
 

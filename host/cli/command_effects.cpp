@@ -65,7 +65,7 @@ json entry_json(const Entry& entry) {
                           {"low", output::json_number(p.low)},
                           {"high", output::json_number(p.high)}});
   json confused = json::array();
-  for (const std::string_view name : catalogue::split_names(entry.info->confused_with)) confused.push_back(name);
+  for (const std::string_view name : catalogue::confused_with(entry)) confused.push_back(name);
   return {{"name", entry.name()},
           {"balance", output::balance_name(entry.info->balance)},
           {"phase", phase_name(entry.info->phase)},
@@ -82,10 +82,8 @@ json entry_json(const Entry& entry) {
           {"curve", output::curve_json(output::effect_curve(entry))}};
 }
 
-std::string comma_separated(std::string_view names) {
-  std::vector<std::string> list;
-  for (const std::string_view name : catalogue::split_names(names)) list.emplace_back(name);
-  return output::listed(list);
+std::string comma_separated(const std::vector<std::string_view>& names) {
+  return output::listed(std::vector<std::string>(names.begin(), names.end()));
 }
 
 void describe(const Entry& entry, Console& console) {
@@ -117,9 +115,11 @@ void describe(const Entry& entry, Console& console) {
   print("What it does", info.consequence);
   print("Usual causes", info.causes);
   print("Check on the machine", info.check);
-  print("Confused with", comma_separated(info.confused_with));
+  print("Confused with", comma_separated(catalogue::confused_with(entry)));
   print("Distinguished by", info.separated_by);
-  print("Used instead of", comma_separated(info.replaces));
+  print("Used instead of", comma_separated(catalogue::split_names(info.replaces)));
+  print("Contains", comma_separated(catalogue::split_names(info.contains)));
+  print("Left by a wrong phase of", comma_separated(catalogue::split_names(info.phase_error_of)));
   print("Scales", info.modulates);
   print("Source", info.source);
 }

@@ -163,6 +163,18 @@ std::vector<double> likely_orders(const BalanceData& data, const catalogue::Entr
   return orders;
 }
 
+// The model has a wave of this order of which the effect is what an error of the phase leaves, or the reverse.
+bool has_phase_error(const Terms& terms, const catalogue::Entry& entry, std::optional<double> order) {
+  return order && std::any_of(terms.begin(), terms.end(), [&](const Term& t) {
+           const auto given = std::find_if(t.entry->parameters.begin(), t.entry->parameters.end(),
+                                           [](const auto& p) { return p.kind == Kind::given; });
+           return given != t.entry->parameters.end() &&
+                  t.values[static_cast<std::size_t>(given - t.entry->parameters.begin())] == *order &&
+                  (catalogue::names_contain(entry.info->phase_error_of, t.entry->name()) ||
+                   catalogue::names_contain(t.entry->info->phase_error_of, entry.name()));
+         });
+}
+
 std::size_t free_count(const Terms& terms) {
   std::size_t count = 0;
   for (const Term& t : terms)
@@ -235,6 +247,7 @@ std::vector<CandidateModel> candidate_models(const BalanceData& data, const Term
       CandidateModel model;
       model.entry = &entry;
       if (ordered) model.order = order;
+      if (has_phase_error(terms, entry, model.order)) continue;
       if (ordered && std::any_of(terms.begin(), terms.end(), [&](const Term& t) {
             return t.entry == &entry && t.label() == estimation::candidate_term(entry, order).label();
           }))

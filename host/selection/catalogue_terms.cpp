@@ -164,6 +164,8 @@ void add_catalogue_terms(TableBuilder& builder, const Motion& motion) {
     const effects::Description& info = *entry.info;
     if (entry.identified_on() != balance && !(collapsed && info.balance == Balance::load)) continue;
     if (info.phase == Phase::shift || entry.has_state || entry.definition) continue;  // states: see presliding
+    // Where several effects are missing, the phases of waves among them leave such a wave.
+    if (!info.phase_error_of.empty()) continue;
     if (!may_be_seen(builder.data, builder.terms, entry)) continue;
     for (const std::optional<double>& order : orders_of(entry, builder.prepared().drive, motion)) {
       Extension e{entry, order, {}, order ? *order * motion.typical_speed / motion.turn : 0.0};

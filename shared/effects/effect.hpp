@@ -114,6 +114,10 @@ struct Description {
   // Laws that are different formulas for the same curve have the same name here: most data cannot distinguish them.
   std::string_view family{};
   std::string_view contains{};  // effects whose torque it can represent as a part of its own
+  // Waves over the angle whose phase depends on the direction where effort and motion are apart in time, or behind
+  // presliding: they leave a torque like this one. So it is no candidate beside a wave of its order, and none where
+  // several effects are missing, of which some may be such waves.
+  std::string_view phase_error_of{};
   // The meaning of negative amplitudes, and their meaning over a wide range of velocity, as it is another law then.
   std::string_view negative_means{};
   std::string_view wide_negative_means{};

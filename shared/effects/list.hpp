@@ -1,6 +1,7 @@
 // The list of effects: one line each, in the order of their numbers.
 #pragma once
 
+#include "shared/effects/angle_dependent_friction.hpp"
 #include "shared/effects/backlash.hpp"
 #include "shared/effects/bouc_wen_hysteresis.hpp"
 #include "shared/effects/coulomb_asymmetry.hpp"
@@ -11,12 +12,14 @@
 #include "shared/effects/current_saturation.hpp"
 #include "shared/effects/dahl_friction.hpp"
 #include "shared/effects/dahl_hysteresis.hpp"
+#include "shared/effects/driving_dependent_loss.hpp"
 #include "shared/effects/duhem_hysteresis.hpp"
 #include "shared/effects/gravity.hpp"
 #include "shared/effects/inertia.hpp"
 #include "shared/effects/kinematic_error.hpp"
 #include "shared/effects/linear_stiffness.hpp"
 #include "shared/effects/load_dependent_friction.hpp"
+#include "shared/effects/load_dependent_stiction.hpp"
 #include "shared/effects/load_scaled_ripple.hpp"
 #include "shared/effects/lugre_friction.hpp"
 #include "shared/effects/modified_dahl_hysteresis.hpp"

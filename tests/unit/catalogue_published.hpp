@@ -197,6 +197,24 @@ inline const std::vector<Published>& published() {
        source,
        {{"order", "1", given, 2.0, 2.0}, {"cosine", "N*m", linear, 0.3, 0.3}, {"sine", "N*m", linear, 0.0, 0.3}}},
       {"torsion_zero", 44, transmission, shift, {{"angle", "rad", nonlinear, 1e-4, 1e-4}}},
+      // 45 is a table's.
+      {"angle_dependent_friction",
+       46,
+       motor,
+       source,
+       {{"order", "1", given, 2.0, 2.0}, {"cosine", "N*m", linear, 0.006, 0.006}, {"sine", "N*m", linear, 0.0, 0.006}}},
+      {"load_dependent_stiction",
+       47,
+       motor,
+       source,
+       {{"coefficient", "1", linear, 0.05, 0.05}, {"velocity", "rad/s", nonlinear, 3.0, 3.0}}},
+      {"driving_dependent_loss",
+       48,
+       motor,
+       source,
+       {{"driving", "1", linear, 0.08, 0.08},
+        {"driven", "1", linear, 0.04, 0.04},
+        {"presliding", "rad", nonlinear, 0.05, 0.05}}},
   };
   return kList;
 }

@@ -63,8 +63,8 @@ TEST(Catalogue, IsCompleteAndHasNothingThatIsNotPublished) {
   }
   for (const Published& expected : published()) EXPECT_TRUE(listed.insert(expected.name).second) << expected.name;
   EXPECT_EQ(built, listed);
-  EXPECT_EQ(listed.size(), 44U);
-  EXPECT_EQ(last, 44U) << "a number between is missing, or the table above lacks the newest effect";
+  EXPECT_EQ(listed.size(), 47U);
+  EXPECT_EQ(last, 48U) << "a number between is missing, or the table above lacks the newest effect";
   for (const std::string_view name : kMadeByUsers) EXPECT_EQ(catalogue::find(name), nullptr);
 }
 
@@ -221,10 +221,11 @@ TEST(Catalogue, OffersEachEffectTheFunctionsOfItsPhase) {
     EXPECT_NE(entry.make, nullptr);
     if (entry.has_state) with_memory.insert(entry.name());
   }
-  EXPECT_EQ(with_memory, (std::set<std::string_view>{"dahl_friction", "lugre_friction", "current_delay",
-                                                     "dahl_hysteresis", "modified_dahl_hysteresis", "duhem_hysteresis",
-                                                     "bouc_wen_hysteresis", "prandtl_ishlinskii_hysteresis",
-                                                     "preisach_hysteresis", "torque_proportional_hysteresis"}));
+  EXPECT_EQ(with_memory,
+            (std::set<std::string_view>{"dahl_friction", "lugre_friction", "current_delay", "dahl_hysteresis",
+                                        "modified_dahl_hysteresis", "duhem_hysteresis", "bouc_wen_hysteresis",
+                                        "prandtl_ishlinskii_hysteresis", "preisach_hysteresis",
+                                        "torque_proportional_hysteresis", "driving_dependent_loss"}));
 }
 
 TEST(Catalogue, SaysThatANameIsUnknown) {
@@ -233,6 +234,23 @@ TEST(Catalogue, SaysThatANameIsUnknown) {
   EXPECT_EQ(&catalogue::get("gravity"), catalogue::find("gravity"));
   const Entry& gravity = catalogue::get("gravity");
   EXPECT_EQ(gravity.index_of("tangent"), gravity.parameters.size());
+}
+
+// A new effect states what it is confused with, and its rivals' headers stay as they are.
+TEST(Catalogue, ConfusionsHoldBothWaysWhicheverHeaderStatesThem) {
+  const auto has = [](std::string_view effect, std::string_view other) {
+    const auto names = catalogue::confused_with(catalogue::get(effect));
+    return std::count(names.begin(), names.end(), other);
+  };
+  EXPECT_FALSE(
+      catalogue::names_contain(catalogue::get("torque_ripple").info->confused_with, "angle_dependent_friction"));
+  EXPECT_EQ(has("torque_ripple", "angle_dependent_friction"), 1);
+  EXPECT_EQ(has("angle_dependent_friction", "torque_ripple"), 1);
+  for (const Entry& one : catalogue::all())
+    for (const Entry& other : catalogue::all()) {
+      EXPECT_EQ(has(one.name(), other.name()), has(other.name(), one.name())) << one.name() << " " << other.name();
+      EXPECT_LE(has(one.name(), other.name()), 1);
+    }
 }
 
 TEST(Catalogue, SplitsListsOfNames) {

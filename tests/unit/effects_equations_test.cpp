@@ -230,8 +230,8 @@ TEST(FrictionEffects, ResistMotionAndAreZeroAtRest) {
   std::mt19937 random(9);
   const Record record = random_record(random);
   for (const char* name : {"viscous_friction", "coulomb_friction", "stribeck_gaussian", "stribeck_hess_soom",
-                           "power_law_friction", "quadratic_drag", "load_dependent_friction", "structural_damping",
-                           "output_viscous_friction", "output_coulomb_friction"}) {
+                           "power_law_friction", "quadratic_drag", "load_dependent_friction", "load_dependent_stiction",
+                           "structural_damping", "output_viscous_friction", "output_coulomb_friction"}) {
     const Entry& entry = catalogue::get(name);
     Values parameters;
     for (const auto& info : entry.parameters) parameters.push_back(info.usual);

@@ -173,6 +173,22 @@ double piecewise_truth(const Values& p, double torsion) {
   return s(torsion) * torque;
 }
 
+// Of the torque through the gear a share is lost, another one where the motor drives than where it is driven; z by its
+// rate form over the travel.
+Values loss_truth(const Values& p, const Record& record) {
+  double z = 0.0;
+  Values result;
+  for (std::size_t k = 0; k < record.size(); ++k) {
+    const Instant& x = record[k];
+    if (k > 0)
+      z = along_path(z, record[k - 1].q, x.q, 0.01 * p[2],
+                     [&](double at, double, double sign) { return (1.0 - sign * at) / p[2]; });
+    const double mean = 0.5 * (p[0] + p[1]), more = 0.5 * (p[0] - p[1]);
+    result.push_back((mean * std::abs(x.T) * z + more * x.T * z * z) / kGearRatio);
+  }
+  return result;
+}
+
 }  // namespace
 
 const std::map<std::string, Truth, std::less<>>& truths() {
@@ -191,6 +207,10 @@ const std::map<std::string, Truth, std::less<>>& truths() {
        })},
       {"load_dependent_friction",
        each([](const Values& p, const Instant& x) { return p[0] * std::abs(x.T) / kGearRatio * s(x.w); })},
+      {"load_dependent_stiction", each([](const Values& p, const Instant& x) {
+         return p[0] * std::abs(x.T) / kGearRatio * s(x.w) / std::exp(std::pow(x.w / p[1], 2.0));
+       })},
+      {"driving_dependent_loss", loss_truth},
       // The factor on viscous friction; the term itself has a test of its own below.
       {"temperature_viscous",
        each([](const Values& p, const Instant& x) { return std::exp(-p[0] * (x.temp - kReferenceTemperature)); })},
@@ -221,6 +241,9 @@ const std::map<std::string, Truth, std::less<>>& truths() {
       {"lugre_friction", lugre_truth},
       {"load_scaled_ripple", each([](const Values& p, const Instant& x) {
          return x.T * (p[1] * std::cos(p[0] * x.q) + p[2] * std::sin(p[0] * x.q));
+       })},
+      {"angle_dependent_friction", each([](const Values& p, const Instant& x) {
+         return s(x.w) * std::hypot(p[1], p[2]) * std::cos(p[0] * x.q - std::atan2(p[2], p[1]));
        })},
       {"torque_constant_error", each([](const Values& p, const Instant& x) { return -p[0] * kTorqueConstant * x.i; })},
       {"torque_constant_saturation",
