@@ -39,7 +39,7 @@ struct CommissionOptions {
 };
 
 // What there is to know of a drive before it begins.
-struct Bench {
+struct DriveFacts {
   protocol::CommissioningStage stage;
   control::Hardware hardware;
   deployment::CommissioningSetup setup;
@@ -48,8 +48,8 @@ struct Bench {
   double torque_constant_nm_a = 0;  // likewise
   double bandwidth_hz = 0.0;
 };
-Bench bench_of(drive::Session& session, const CommissionOptions& options) {
-  Bench b;
+DriveFacts facts_of(drive::Session& session, const CommissionOptions& options) {
+  DriveFacts b;
   b.stage = drive::stage_of(session);
   b.hardware = session.hardware();
   b.active = session.read_block(protocol::Which::active);
@@ -71,7 +71,7 @@ Bench bench_of(drive::Session& session, const CommissionOptions& options) {
   return b;
 }
 
-void print_plan(const Bench& b, Console& console) {
+void print_plan(const DriveFacts& b, Console& console) {
   const auto& s = b.setup;
   const std::string output =
       b.gear_ratio > 0.0 ? fmt::format(" ({:.3g} of the output)", s.most_travel_turns / b.gear_ratio) : "";
@@ -83,7 +83,7 @@ void print_plan(const Bench& b, Console& console) {
                                   s.most_current_a, s.most_time_s)));
 }
 
-protocol::CommissioningProgress measure(drive::Session& session, const Bench& b, const CommissionOptions& options,
+protocol::CommissioningProgress measure(drive::Session& session, const DriveFacts& b, const CommissionOptions& options,
                                         Console& console, std::vector<control::commissioning::Result>& results) {
   const Interruptible interruptible;
   protocol::CommissioningProgress end;
@@ -126,7 +126,7 @@ Failure failure_of(drive::Session& session, const protocol::CommissioningProgres
   }
 }
 
-json current_loop_json(const Bench& b, const control::MotorSettings& m) {
+json current_loop_json(const DriveFacts& b, const control::MotorSettings& m) {
   const double ohm = b.setup.bus_full_scale_v / b.setup.current_full_scale_a * std::ldexp(1.0, m.current.up - 5);
   const auto gain = [&](std::int32_t x) { return std::ldexp(static_cast<double>(x), -30) * ohm; };
   return {{"bandwidth_hz", b.bandwidth_hz},
@@ -136,7 +136,7 @@ json current_loop_json(const Bench& b, const control::MotorSettings& m) {
           {"integral_q_v_a_s", gain(m.current.q.integral) * b.setup.pwm_hz}};
 }
 
-json print_results(const Bench& b, const std::vector<control::commissioning::Result>& results, Console& console) {
+json print_results(const DriveFacts& b, const std::vector<control::commissioning::Result>& results, Console& console) {
   output::Table table({"", "value", "spread", "unit"}, "lrrl");
   json values = json::array();
   for (const drive::FoundValue& v : drive::found_values(b.setup, results)) {
@@ -149,7 +149,7 @@ json print_results(const Bench& b, const std::vector<control::commissioning::Res
 }
 
 // After the motor was measured: tables, the current loop, warnings, and the drive's memory.
-void conclude(drive::Session& session, const Bench& b, const CommissionOptions& options,
+void conclude(drive::Session& session, const DriveFacts& b, const CommissionOptions& options,
               const std::vector<control::commissioning::Result>& results, json& answer, Console& console) {
   answer["result"] = print_results(b, results, console);
   const control::commissioning::Result mean = drive::mean_of(results);
@@ -178,9 +178,9 @@ int run(const CommissionOptions& options, Console& console) {
   const auto signer = pairing_signer(options.pairing_key);
   drive::Session session = open_drive(options.drive);
   console.line(named(session));
-  const Bench bench = bench_of(session, options);
+  const DriveFacts facts = facts_of(session, options);
   drive::require_access(session, signer);
-  print_plan(bench, console);
+  print_plan(facts, console);
   if (!confirmed("Is the load off?", options.yes)) {
     console.line("Nothing was moved.");
     return kDone;
@@ -189,20 +189,20 @@ int run(const CommissionOptions& options, Console& console) {
   protocol::CommissioningProgress end;
   {
     const drive::Unlocked unlocked(session, signer);
-    end = measure(session, bench, options, console, results);
+    end = measure(session, facts, options, console, results);
   }
   const bool is_done = end.state == CommissioningState::done;
   json answer = {{"format", "flexspline-commission/1"},
                  {"drive", {{"serial", session.serial()}, {"drive", session.name()}}},
                  {"test",
-                  {{"current_a", bench.setup.current_a},
-                   {"most_current_a", bench.setup.most_current_a},
-                   {"bus_v", bench.setup.bus_v},
-                   {"most_speed_rad_s", 2.0 * std::numbers::pi * bench.setup.most_shaft_hz},
-                   {"most_turns", bench.setup.most_travel_turns}}},
+                  {{"current_a", facts.setup.current_a},
+                   {"most_current_a", facts.setup.most_current_a},
+                   {"bus_v", facts.setup.bus_v},
+                   {"most_speed_rad_s", 2.0 * std::numbers::pi * facts.setup.most_shaft_hz},
+                   {"most_turns", facts.setup.most_travel_turns}}},
                  {"end", drive::name_of(end.state)},
                  {"step", deployment::commissioning_step_text(end.step)},
-                 {"seconds", end.periods / bench.setup.pwm_hz},
+                 {"seconds", end.periods / facts.setup.pwm_hz},
                  {"runs", results.size()},
                  {"fault", nullptr},
                  {"result", nullptr},
@@ -210,7 +210,7 @@ int run(const CommissionOptions& options, Console& console) {
                  {"warnings", json::array()},
                  {"stored", false}};
   if (is_done) {
-    conclude(session, bench, options, results, answer, console);
+    conclude(session, facts, options, results, answer, console);
   } else {
     const Failure why = failure_of(session, end);
     const std::string phase = drive::phase_name(end.phase);

@@ -1,4 +1,4 @@
-// Every fault, brought about on the software board: it is found within the ticks that firmware/README.md states, and
+// Every fault, brought about on the software board: it is found within the ticks that firmware/OPERATION.md states, and
 // ends in the safe state that it states.
 #include <gtest/gtest.h>
 
