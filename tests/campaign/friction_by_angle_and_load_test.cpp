@@ -21,7 +21,7 @@ struct Outcome {
 double held_out_floor(const data::Dataset& dataset, const model::Model& truth) {
   std::vector<const data::Experiment*> fit, holdout;
   for (const auto& e : dataset.experiments) (e.role == data::Role::holdout ? holdout : fit).push_back(&e);
-  const estimation::PreparedData prepared = estimation::prepare(fit, truth.drive, {});
+  const estimation::PreparedData prepared = estimation::prepare(fit, truth, {});
   const estimation::PreparedData held_out = estimation::prepare_with(holdout, truth.drive, prepared.pipeline);
   estimation::BalanceData data(held_out, estimation::Balance::motor);
   const Eigen::VectorXd r = estimation::residual_of(data, estimation::terms_of(truth));

@@ -2,6 +2,7 @@
 
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <cmath>
 #include <random>
 
@@ -37,7 +38,9 @@ data::Experiment still(double seconds) {
 }
 
 Record prepared(const data::Experiment& e, PipelineOptions options = {40.0, true}, model::Drive drive = {}) {
-  return prepare({&e}, drive, options).records.front();
+  model::Model model;
+  model.drive = std::move(drive);
+  return prepare({&e}, model, options).records.front();
 }
 
 const std::vector<std::size_t>& motor_rows(const Record& r) {
@@ -236,6 +239,36 @@ TEST(Prepare, ARecordOfWhichTheMaskWouldLeaveNothingRaisesTheCutOffAndPositionsA
   EXPECT_NE(found.pipeline.reason.find("the mask leaves samples of sine"), std::string::npos) << found.pipeline.reason;
   EXPECT_LT(found.pipeline.row_cutoff_hz, 40.0);
   EXPECT_LT(found.pipeline.motion_cutoff_hz, 2.0 * found.pipeline.row_cutoff_hz);
+}
+
+// Of a sine of 0.94 rad/s the velocity is below 0.1 rad/s for 56 ms to either side of a reversal, and the mask of 5 Hz
+// takes 300 ms.
+TEST(Prepare, AFrictionLawOfAGivenVelocityKeepsSamplesThatAreAsSlow) {
+  const data::Experiment e = sine(0.5, 0.3, 20.0);
+  const auto slow_samples = [](const PreparedData& found) {
+    const Record& r = found.records.front();
+    return std::ranges::count_if(motor_rows(r), [&](std::size_t k) { return std::abs(r.inputs[k].velocity) < 0.1; });
+  };
+  model::Model law;
+  model::Parameter velocity;
+  velocity.name = "velocity";
+  velocity.value = 0.1;
+  law.effects.emplace_back();
+  law.effects.front().type = "stribeck_gaussian";
+  law.effects.front().parameters = {velocity};
+  const PreparedData plain = prepare({&e}, {}, {}), searched = prepare({&e}, law, {});
+  EXPECT_EQ(slow_samples(plain), 0);
+  EXPECT_EQ(searched.pipeline.row_cutoff_hz, plain.pipeline.row_cutoff_hz)
+      << "a velocity that is searched sets nothing";
+  law.effects.front().parameters.front().fixed = true;
+  const PreparedData found = prepare({&e}, law, {});
+  EXPECT_GT(slow_samples(found), 10);
+  EXPECT_NE(found.pipeline.reason.find("the mask leaves samples of 0.1 rad/s"), std::string::npos)
+      << found.pipeline.reason;
+  // The law's information is that of all records together: where others have slow samples, nothing is raised.
+  data::Experiment slower = sine(0.2, 0.02, 200.0);
+  slower.name = "slower";
+  EXPECT_LT(prepare({&e, &slower}, law, {}).pipeline.row_cutoff_hz, found.pipeline.row_cutoff_hz);
 }
 
 TEST(PreparedRecord, KalmanDerivativesFollowASineFromACoarseEncoder) {
