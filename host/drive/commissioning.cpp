@@ -209,9 +209,25 @@ std::string phase_name(std::uint8_t phase) {
 }
 
 std::string_view name_of(CommissioningState state) {
-  constexpr std::array<std::string_view, protocol::kCommissioningStates> kNames{
-      "none", "runs", "done", "fault", "stopped", "host_lost", "drive_fault", "bus_high"};
-  return static_cast<std::size_t>(state) < kNames.size() ? kNames[static_cast<std::size_t>(state)] : "unknown";
+  switch (state) {
+    case CommissioningState::none:
+      return "none";
+    case CommissioningState::runs:
+      return "runs";
+    case CommissioningState::done:
+      return "done";
+    case CommissioningState::fault:
+      return "fault";
+    case CommissioningState::stopped:
+      return "stopped";
+    case CommissioningState::host_lost:
+      return "host_lost";
+    case CommissioningState::drive_fault:
+      return "drive_fault";
+    case CommissioningState::bus_high:
+      return "bus_high";
+  }
+  return "unknown";
 }
 
 std::vector<std::string> commissioning_warnings(const deployment::CommissioningSetup& setup,
