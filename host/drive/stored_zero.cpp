@@ -2,24 +2,12 @@
 
 #include <span>
 
-#include "shared/control/drive_block.hpp"
+#include "host/drive/block_sections.hpp"
 
 namespace flexspline::drive {
 namespace {
 
 constexpr auto kZeroKind = static_cast<std::uint16_t>(model::Section::stored_zero);
-
-std::uint32_t counts_in(const Bytes& block, model::Section section) {
-  std::uint32_t counts = 0;
-  model::for_each_entry(block, [&](std::uint16_t kind, std::span<const std::uint8_t> bytes) {
-    if (kind != static_cast<std::uint16_t>(section)) return;
-    model::FieldReader reader(bytes);
-    observers::EncoderAngle::Coefficients c;
-    c.fields(reader);
-    counts = c.counts;
-  });
-  return counts;
-}
 
 }  // namespace
 
@@ -35,22 +23,14 @@ control::StoredZero stored_zero_of(const Bytes& block) {
 }
 
 Bytes with_stored_zero(const Bytes& block, const control::StoredZero& zero) {
-  Bytes out(block.size() + 64);
-  model::BlockWriter writer(out);
-  writer.begin(model::header_of(block));
-  model::for_each_entry(block, [&](std::uint16_t kind, std::span<const std::uint8_t> bytes) {
-    if (kind != kZeroKind) writer.add_bytes(kind, bytes);
-  });
-  if (zero != control::StoredZero{}) writer.add(kZeroKind, zero);
-  out.resize(writer.end());
-  return out;
+  return with_section(block, model::Section::stored_zero, zero != control::StoredZero{} ? &zero : nullptr);
 }
 
 Bytes keeping_stored_zero(const Bytes& block, const Bytes& active) {
   control::StoredZero zero = stored_zero_of(active);
   if (stored_zero_of(block) != control::StoredZero{}) return block;
-  if (zero.motor.counts != counts_in(block, model::Section::motor_encoder)) zero.motor = {};
-  if (zero.output.counts != counts_in(block, model::Section::output_encoder)) zero.output = {};
+  if (zero.motor.counts != encoder_counts_in(block, model::Section::motor_encoder)) zero.motor = {};
+  if (zero.output.counts != encoder_counts_in(block, model::Section::output_encoder)) zero.output = {};
   return zero == control::StoredZero{} ? block : with_stored_zero(block, zero);
 }
 
