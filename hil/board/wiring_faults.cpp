@@ -9,7 +9,7 @@ namespace flexspline::board {
 namespace {
 
 constexpr std::size_t kPhases = 3;
-constexpr double kShortShare = 0.05, kGroundOhm = 0.1;  // of the resistance of a phase; for the demo's drive
+constexpr double kShortShare = 0.05, kGroundShare = 0.1;  // resistance of the fault over that of a phase
 
 // The faults of one phase.
 void open(ThreePhaseParameters& p, std::size_t leg) {
@@ -19,7 +19,7 @@ void dead_sensor(ThreePhaseParameters& p, std::size_t leg) {
   p.sensors.gain[leg] = 0.0;
 }
 void to_ground(ThreePhaseParameters& p, std::size_t leg) {
-  p.wiring.ground_ohm = kGroundOhm * p.motor.resistance_ohm;
+  p.wiring.ground_ohm = kGroundShare * p.motor.resistance_ohm;
   p.wiring.ground_leg = leg;
 }
 void bad_contact(ThreePhaseParameters& p, std::size_t leg) {

@@ -65,7 +65,8 @@ bool counts(const Record& r) {
 }
 
 // A law's amplitude is found from all records together: what the present mask leaves of one direction, where that is
-// next to nothing of what there is.
+// next to nothing of what there is. Worth keeping is the time of one independent sample, a period of the highest
+// cut-off.
 std::vector<MaskedShare> shares_of_law(const std::vector<Record>& records, double law_rad_s, const CutoffRange& range) {
   std::vector<MaskedShare> shares;
   for (const int direction : {1, -1}) {
@@ -77,9 +78,7 @@ std::vector<MaskedShare> shares_of_law(const std::vector<Record>& records, doubl
       all += record_s * share_of(r, direction, law_rad_s);
       length_s += record_s;
     }
-    if (left < kLeastOfTheBest * all)
-      shares.push_back(
-          {direction, law_rad_s, range.rows_per_period / (range.rows_per_period * range.highest_hz * length_s), {}});
+    if (left < kLeastOfTheBest * all) shares.push_back({direction, law_rad_s, 1.0 / (range.highest_hz * length_s), {}});
   }
   return shares;
 }

@@ -15,7 +15,6 @@ namespace flexspline::estimation {
 struct CutoffRange {
   double lowest_hz = 0.0;  // the present one
   double highest_hz = 0.0;
-  double rows_per_period = 0.0;  // samples kept per period of the cut-off
 };
 
 struct MaskCutoff {

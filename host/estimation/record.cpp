@@ -294,8 +294,7 @@ bool raise_for_mask(PreparedData& prepared, std::optional<double> law_rad_s, dou
     tried.motion_cutoff_hz = std::max(pipeline.motion_cutoff_hz, hz);
     return prepare_one(*r.experiment, prepared.constants, tried);
   };
-  const MaskCutoff wanted =
-      cutoff_for_mask(prepared.records, {pipeline.row_cutoff_hz, highest_hz, kRowsOverCutoff}, law_rad_s, made_at);
+  const MaskCutoff wanted = cutoff_for_mask(prepared.records, {pipeline.row_cutoff_hz, highest_hz}, law_rad_s, made_at);
   if (wanted.hz <= pipeline.row_cutoff_hz) return false;
   pipeline.row_cutoff_hz = std::min(std::ceil(wanted.hz), highest_hz);
   // Slow motion is what such records have: a velocity that is small for its noise puts the friction of one speed at

@@ -3,7 +3,7 @@
 
 namespace flexspline::effects {
 
-struct DahlFriction {
+struct DahlFriction : DahlBristle {
   static constexpr Description kInfo{
       .name = "dahl_friction",
       .reads = kMotorMotion | kMotorAngle,
@@ -42,22 +42,9 @@ struct DahlFriction {
       c(torque), c(per_travel);
     }
   };
-  // Share of the full friction that the bristles carry, -1 to 1.
-  template <class N>
-  struct State {
-    typename N::State deflection{};
-  };
   template <class N, class P>
   static Coefficients<N> derive(const P* p, const DriveConstants<P>& d) {
     return {N::weight(p[0] / d.torque_base), N::step_gain(d.angle_base / p[1])};
-  }
-  // The law is rate independent, so it is advanced by travel, with the exact solution for one direction: an explicit
-  // step of its rate form diverges at rated speed.
-  template <class N>
-  static void advance(State<N>& state, const Coefficients<N>& c, const Inputs<N>& now, const Inputs<N>& before) {
-    const typename N::Step travel = now.angle - before.angle;
-    const auto decay = N::exp_negative(N::travel(c.per_travel, N::magnitude(travel)));
-    state.deflection = N::relax(state.deflection, N::sign(travel), decay);
   }
   template <class N>
   static void evaluate(const State<N>& state, const Coefficients<N>& c, const Inputs<N>& in, Torques<N>& out) {

@@ -3,7 +3,7 @@
 
 namespace flexspline::effects {
 
-struct DrivingDependentLoss {
+struct DrivingDependentLoss : DahlBristle {
   static constexpr Description kInfo{
       .name = "driving_dependent_loss",
       .reads = kMotorMotion | kMotorAngle | kTorque | kBothDirections,
@@ -50,22 +50,10 @@ struct DrivingDependentLoss {
       c(mean), c(difference), c(per_travel);
     }
   };
-  // Share of the full loss that the contacts carry, -1 to 1.
-  template <class N>
-  struct State {
-    typename N::State deflection{};
-  };
   template <class N, class P>
   static Coefficients<N> derive(const P* p, const DriveConstants<P>& d) {
     const P scale = P(0.5) * d.output_torque_base / (d.gear_ratio * d.torque_base);
     return {N::weight((p[0] + p[1]) * scale), N::weight((p[0] - p[1]) * scale), N::step_gain(d.angle_base / p[2])};
-  }
-  // As dahl_friction: rate independent, so it is advanced by travel, exactly.
-  template <class N>
-  static void advance(State<N>& state, const Coefficients<N>& c, const Inputs<N>& now, const Inputs<N>& before) {
-    const typename N::Step travel = now.angle - before.angle;
-    const auto decay = N::exp_negative(N::travel(c.per_travel, N::magnitude(travel)));
-    state.deflection = N::relax(state.deflection, N::sign(travel), decay);
   }
   // The square has no sign, so that its term has that of the torque: it adds where the motor drives.
   template <class N>

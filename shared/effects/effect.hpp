@@ -205,6 +205,22 @@ struct Stateless {
   static constexpr void advance(State<N>&, const C&, const Inputs<N>&, const Inputs<N>&) {}
 };
 
+// An effect that builds up over the motor's travel since a reversal: Dahl's bristle, z' = (w - abs(w) z)/presliding.
+// Its coefficients have `per_travel`. The law is rate independent, so it is advanced by travel, with the exact solution
+// for one direction: an explicit step of its rate form diverges at rated speed.
+struct DahlBristle {
+  template <class N>
+  struct State {
+    typename N::State deflection{};  // share of the full torque that the bristles carry, -1 to 1
+  };
+  template <class N, class C>
+  static void advance(State<N>& state, const C& c, const Inputs<N>& now, const Inputs<N>& before) {
+    const typename N::Step travel = now.angle - before.angle;
+    const auto decay = N::exp_negative(N::travel(c.per_travel, N::magnitude(travel)));
+    state.deflection = N::relax(state.deflection, N::sign(travel), decay);
+  }
+};
+
 // The effect with a number in the parameter block; each effect's header defines its own. A number used twice does not
 // compile, and numbers are not reused.
 template <std::size_t Id>
