@@ -55,7 +55,7 @@ ThreePhaseParameters three_phase_of(const plant::Drive& drive) {
   return p;
 }
 
-// As host/deployment makes them from the parameters; a test compares them.
+// As host/drive_link/deployment makes them from the parameters; a test compares them.
 firmware::ThreePhaseSettings three_phase_settings_of(const plant::Drive& drive) {
   constexpr control::foc::AxisSettings kAxis = {1521094321,  543636828, 44918200,   1812122759, 79528380,
                                                 -2134008365, -53565016, 1813907110, 1405524761};

@@ -14,10 +14,10 @@
 #include <string>
 #include <vector>
 
-#include "host/estimation/identify.hpp"
-#include "host/estimation/variable_projection.hpp"
-#include "host/selection/candidate_models.hpp"
-#include "host/selection/cross_validation.hpp"
+#include "host/engine/estimation/identify.hpp"
+#include "host/engine/estimation/variable_projection.hpp"
+#include "host/engine/selection/candidate_models.hpp"
+#include "host/engine/selection/cross_validation.hpp"
 #include "tests/bench/rows.hpp"
 #include "tests/support/twin_data.hpp"
 

@@ -20,8 +20,8 @@
 #include <string>
 #include <vector>
 
-#include "host/catalogue/constants.hpp"
-#include "host/estimation/identify.hpp"
+#include "host/engine/estimation/identify.hpp"
+#include "host/physics/catalogue/constants.hpp"
 #include "tests/bench/rows.hpp"
 
 namespace flexspline {

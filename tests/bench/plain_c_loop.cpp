@@ -1,7 +1,7 @@
 // C in all but the file's name: no classes, no templates, nothing called through a pointer, nothing allocated.
 //
-// Scheme, step, event location and tolerances are those of host/simulation/dynamics.cpp; only what a fixed model allows
-// is different: with straight friction on either shaft a velocity follows from the torque by one division.
+// Scheme, step, event location and tolerances are those of host/physics/simulation/dynamics.cpp; only what a fixed
+// model allows is different: with straight friction on either shaft a velocity follows from the torque by one division.
 #include "tests/bench/plain_c_loop.hpp"
 
 #include <math.h>

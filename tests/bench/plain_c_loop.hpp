@@ -1,4 +1,4 @@
-// The same free run as host/simulation, written as one would write it in C for one fixed model.
+// The same free run as host/physics/simulation, written as one would write it in C for one fixed model.
 #pragma once
 
 // Motor with Coulomb and viscous friction, linear spring, damping c |v|^alpha s(v), load with Coulomb and viscous

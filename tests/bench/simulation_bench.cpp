@@ -13,8 +13,8 @@
 #include <string>
 #include <vector>
 
-#include "host/catalogue/constants.hpp"
-#include "host/simulation/simulation.hpp"
+#include "host/physics/catalogue/constants.hpp"
+#include "host/physics/simulation/simulation.hpp"
 #include "tests/bench/plain_c_loop.hpp"
 #include "tests/bench/rows.hpp"
 

@@ -12,8 +12,8 @@
 #include <set>
 #include <thread>
 
-#include "host/comparison/residual_map.hpp"
-#include "host/selection/add.hpp"
+#include "host/engine/comparison/residual_map.hpp"
+#include "host/engine/selection/add.hpp"
 #include "tests/support/twin_data.hpp"
 
 namespace flexspline {

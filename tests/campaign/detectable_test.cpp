@@ -9,7 +9,7 @@
 #include <cstdlib>
 #include <thread>
 
-#include "host/selection/diagnosis.hpp"
+#include "host/engine/selection/diagnosis.hpp"
 #include "tests/support/campaign_size.hpp"
 #include "tests/support/twin_data.hpp"
 
@@ -81,7 +81,7 @@ Shown shown(const std::string& label, std::uint64_t seed, int seeds) {
 }
 
 // Effects of temperature are not tested: between records they look like friction that differs from run to run, which
-// takes them up, and the size that is said for them does not count with that (host/selection/METHOD.md).
+// takes them up, and the size that is said for them does not count with that (host/engine/selection/METHOD.md).
 TEST(Detectable, EffectsHalfAsLargeAgainAreNamedAndAThirdOfThemAreNot) {
   const std::vector<std::string> labels =
       testing::part_of({"viscous_asymmetry", "coulomb_asymmetry", "stribeck_gaussian", "load_dependent_friction",

@@ -6,8 +6,8 @@
 #include <functional>
 #include <random>
 
-#include "host/selection/add.hpp"
-#include "host/selection/add_until_complete.hpp"
+#include "host/engine/selection/add.hpp"
+#include "host/engine/selection/add_until_complete.hpp"
 
 namespace flexspline::selection {
 namespace {

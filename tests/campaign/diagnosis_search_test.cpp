@@ -7,11 +7,11 @@
 #include <functional>
 #include <random>
 
-#include "host/estimation/variable_projection.hpp"
-#include "host/selection/candidate_models.hpp"
-#include "host/selection/cross_validation.hpp"
-#include "host/selection/diagnosis.hpp"
-#include "host/selection/disturbances.hpp"
+#include "host/engine/estimation/variable_projection.hpp"
+#include "host/engine/selection/candidate_models.hpp"
+#include "host/engine/selection/cross_validation.hpp"
+#include "host/engine/selection/diagnosis.hpp"
+#include "host/engine/selection/disturbances.hpp"
 #include "tests/support/plain_model.hpp"
 
 namespace flexspline::selection {

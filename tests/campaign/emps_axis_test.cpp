@@ -8,8 +8,8 @@
 #include <filesystem>
 #include <fstream>
 
-#include "host/selection/add.hpp"
-#include "host/selection/diagnosis.hpp"
+#include "host/engine/selection/add.hpp"
+#include "host/engine/selection/diagnosis.hpp"
 
 namespace flexspline {
 namespace {

@@ -5,8 +5,8 @@
 #include <cstdio>
 #include <map>
 
-#include "host/estimation/estimate.hpp"
-#include "host/estimation/in_parallel.hpp"
+#include "host/engine/estimation/estimate.hpp"
+#include "host/engine/estimation/in_parallel.hpp"
 #include "tests/support/noisy_motor.hpp"
 
 namespace flexspline::testing {

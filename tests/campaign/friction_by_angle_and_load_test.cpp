@@ -4,8 +4,8 @@
 
 #include <fmt/format.h>
 
-#include "host/selection/add.hpp"
-#include "host/selection/diagnosis.hpp"
+#include "host/engine/selection/add.hpp"
+#include "host/engine/selection/diagnosis.hpp"
 #include "tests/support/twin_data.hpp"
 
 namespace flexspline {

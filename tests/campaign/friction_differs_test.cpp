@@ -9,7 +9,7 @@
 #include <cstdio>
 #include <string>
 
-#include "host/selection/add.hpp"
+#include "host/engine/selection/add.hpp"
 #include "tests/support/hidden_twin.hpp"
 
 namespace flexspline {

@@ -10,8 +10,8 @@
 #include <mutex>
 #include <thread>
 
-#include "host/selection/add.hpp"
-#include "host/selection/diagnosis.hpp"
+#include "host/engine/selection/add.hpp"
+#include "host/engine/selection/diagnosis.hpp"
 #include "tests/support/campaign_size.hpp"
 #include "tests/support/campaign_statistics.hpp"
 #include "tests/support/twin_data.hpp"

@@ -12,9 +12,9 @@
 #include <random>
 #include <sstream>
 
-#include "host/catalogue/constants.hpp"
-#include "host/data/findings.hpp"
-#include "host/selection/diagnosis.hpp"
+#include "host/engine/selection/diagnosis.hpp"
+#include "host/input/data/findings.hpp"
+#include "host/physics/catalogue/constants.hpp"
 
 namespace flexspline {
 namespace {

@@ -12,8 +12,8 @@
 #include <random>
 
 #include "hil/plant/physics.hpp"
-#include "host/estimation/identify.hpp"
-#include "host/selection/diagnosis.hpp"
+#include "host/engine/estimation/identify.hpp"
+#include "host/engine/selection/diagnosis.hpp"
 #include "tests/support/twin_data.hpp"
 
 namespace flexspline {

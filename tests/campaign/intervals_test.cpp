@@ -7,9 +7,9 @@
 #include <map>
 #include <string>
 
-#include "host/estimation/identify.hpp"
-#include "host/estimation/in_parallel.hpp"
-#include "host/selection/add.hpp"
+#include "host/engine/estimation/identify.hpp"
+#include "host/engine/estimation/in_parallel.hpp"
+#include "host/engine/selection/add.hpp"
 #include "tests/support/twin_data.hpp"
 
 namespace flexspline {
@@ -85,7 +85,7 @@ const std::vector<std::string> kLoad = {"output_inertia.inertia", "output_viscou
 
 // Twenty short sets determine a coverage to 7 % only; what matters is the width: that of noise compared with what
 // identify adds to each estimate for what filters leave (0.05 % of it). The load's come from a torque sensor that is
-// read just before the held current steps (host/estimation/zero_order_hold.hpp).
+// read just before the held current steps (host/engine/estimation/zero_order_hold.hpp).
 TEST(Intervals, AreHardlyWiderWhereFrictionIsTheSameInAllRecords) {
   constexpr double kBeyondNoise = 2.0 * 1.96 * 5e-4, kOfNoise = 0.0015;
   const auto coverage = over_seeds(0.0, "", 20);

@@ -6,8 +6,8 @@
 
 #include <cmath>
 
-#include "host/selection/add.hpp"
-#include "host/selection/diagnosis.hpp"
+#include "host/engine/selection/add.hpp"
+#include "host/engine/selection/diagnosis.hpp"
 #include "tests/support/campaign_size.hpp"
 #include "tests/support/hidden_twin.hpp"
 

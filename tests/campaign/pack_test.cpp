@@ -4,9 +4,9 @@
 #include <cstdio>
 #include <random>
 
-#include "host/deployment/bases.hpp"
-#include "host/deployment/fixed_point_check.hpp"
-#include "host/deployment/pack.hpp"
+#include "host/drive_link/deployment/bases.hpp"
+#include "host/drive_link/deployment/fixed_point_check.hpp"
+#include "host/drive_link/deployment/pack.hpp"
 #include "tests/support/random_model.hpp"
 
 namespace flexspline::tests {

@@ -12,8 +12,8 @@
 #include <fstream>
 #include <thread>
 
-#include "host/planning/design.hpp"
-#include "host/selection/diagnosis.hpp"
+#include "host/engine/planning/design.hpp"
+#include "host/engine/selection/diagnosis.hpp"
 #include "tests/support/twin_data.hpp"
 
 namespace flexspline {

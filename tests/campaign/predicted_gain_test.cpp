@@ -11,7 +11,7 @@
 #include <string>
 #include <vector>
 
-#include "host/selection/add.hpp"
+#include "host/engine/selection/add.hpp"
 #include "tests/support/campaign_size.hpp"
 #include "tests/support/closed_loop_runs.hpp"
 

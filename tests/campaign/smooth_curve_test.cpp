@@ -1,5 +1,5 @@
 // A penalised curve against its closed form with dense matrices.
-#include "host/estimation/smooth_curve.hpp"
+#include "host/engine/estimation/smooth_curve.hpp"
 
 #include <gtest/gtest.h>
 

@@ -12,9 +12,9 @@
 #include <set>
 #include <thread>
 
-#include "host/catalogue/user_defined_effect.hpp"
-#include "host/selection/add.hpp"
-#include "host/selection/diagnosis.hpp"
+#include "host/engine/selection/add.hpp"
+#include "host/engine/selection/diagnosis.hpp"
+#include "host/physics/catalogue/user_defined_effect.hpp"
 #include "tests/support/twin_data.hpp"
 
 namespace flexspline {

@@ -1,5 +1,5 @@
 // Tables and formulas as `add`, `identify` and `diagnose` take them, on motions that are written down.
-#include "host/selection/user_defined_effects.hpp"
+#include "host/engine/selection/user_defined_effects.hpp"
 
 #include <gtest/gtest.h>
 
@@ -7,10 +7,10 @@
 #include <functional>
 #include <random>
 
-#include "host/catalogue/constants.hpp"
-#include "host/catalogue/user_defined_effect.hpp"
-#include "host/selection/add.hpp"
-#include "host/selection/diagnosis.hpp"
+#include "host/engine/selection/add.hpp"
+#include "host/engine/selection/diagnosis.hpp"
+#include "host/physics/catalogue/constants.hpp"
+#include "host/physics/catalogue/user_defined_effect.hpp"
 #include "tests/support/plain_model.hpp"
 
 namespace flexspline::selection {

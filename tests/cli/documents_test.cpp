@@ -104,7 +104,7 @@ TEST(Documents, AnEffectOfOnesOwnIsOneFileAndOneLine) {
   shell.write("try.cpp", R"(#include <cmath>
 #include <cstdio>
 #include <string_view>
-#include "host/numbers/real.hpp"
+#include "host/common/numbers/real.hpp"
 #include "shared/effects/list.hpp"
 using namespace flexspline;
 using R = numbers::Real;

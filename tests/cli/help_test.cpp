@@ -10,7 +10,7 @@ namespace {
 
 constexpr const char* kBuilt[] = {
 #define COMMAND(name) #name,
-#include "host/cli/command_list.inc"
+#include "host/app/cli/command_list.inc"
 #undef COMMAND
 };
 

@@ -158,7 +158,7 @@ TEST(Install, BringsToolTwinAndAllThatGoesWithThem) {
         "share/bash-completion/completions/flexspline", "share/zsh/vendor-completions/_flexspline",
         "share/fish/vendor_completions.d/flexspline.fish", "include/flexspline/flexspline_protocol.h",
         "lib/udev/rules.d/70-flexspline.rules", "share/doc/flexspline/README.md", "share/doc/flexspline/copyright",
-        "share/doc/flexspline/host/data/RECORDINGS.md"})
+        "share/doc/flexspline/host/input/data/RECORDINGS.md"})
     EXPECT_TRUE(fs::exists(shell.folder() / "prefix" / file)) << file;
   EXPECT_EQ(shell.must("prefix/bin/flexspline --version"), shell.must("flexspline --version"));
   EXPECT_EQ(shell.file("prefix/include/flexspline/flexspline_protocol.h"),

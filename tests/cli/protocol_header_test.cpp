@@ -75,7 +75,7 @@ TEST(ProtocolHeader, APythonProgramReadsTelemetryOfADriveByIt) {
   const TwinProcess twin({"--serve", "0"});
   const std::string where = twin.name().substr(std::string("tcp:").size());
   const std::string program =
-      std::string("/usr/bin/python3 '") + FLEXSPLINE_SOURCE_DIR + "/host/drive/examples/read_telemetry.py'";
+      std::string("/usr/bin/python3 '") + FLEXSPLINE_SOURCE_DIR + "/host/drive_link/drive/examples/read_telemetry.py'";
   const Answer answer = shell.run(program + " --header flexspline_protocol.h --tcp " + where +
                                   " --channels velocity,current,temperature,motor_turns --frames 50 --every 40");
   ASSERT_EQ(answer.code, 0) << answer.err;

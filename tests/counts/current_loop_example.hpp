@@ -1,5 +1,5 @@
-// Numbers of one motor for the current loop. A unit test shows that host/deployment/foc_settings makes them: of 0.304
-// ohm, 0.3 mH and 6 mVs on 48 V at 40 kHz, full scales of 40 A and 60 V, 0.5 us dead time; 20 A at most, 8 A
+// Numbers of one motor for the current loop. A unit test shows that host/drive_link/deployment/foc_settings makes them:
+// of 0.304 ohm, 0.3 mH and 6 mVs on 48 V at 40 kHz, full scales of 40 A and 60 V, 0.5 us dead time; 20 A at most, 8 A
 // continuous.
 #pragma once
 

@@ -1,5 +1,5 @@
 // CSV files of any content, alone or with a dataset.toml next to them: what cannot be used is refused with a reason,
-// and what is used is a data set that holds what host/data promises of one.
+// and what is used is a data set that holds what host/input/data promises of one.
 #include <algorithm>
 #include <cmath>
 #include <cstddef>
@@ -8,8 +8,8 @@
 #include <string_view>
 #include <vector>
 
-#include "host/data/csv.hpp"
-#include "host/data/dataset.hpp"
+#include "host/input/data/csv.hpp"
+#include "host/input/data/dataset.hpp"
 #include "tests/fuzz/readers.hpp"
 
 namespace {

@@ -9,7 +9,7 @@
 #include <string_view>
 #include <vector>
 
-#include "host/catalogue/formula.hpp"
+#include "host/physics/catalogue/formula.hpp"
 #include "shared/effects/variables.hpp"
 #include "tests/fuzz/bytes.hpp"
 #include "tests/fuzz/readers.hpp"

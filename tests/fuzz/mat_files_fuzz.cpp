@@ -14,8 +14,8 @@
 #include <string_view>
 #include <vector>
 
-#include "host/data/array_file.hpp"
-#include "host/data/mat5_check.hpp"
+#include "host/input/data/array_file.hpp"
+#include "host/input/data/mat5_check.hpp"
 #include "tests/fuzz/readers.hpp"
 
 namespace {

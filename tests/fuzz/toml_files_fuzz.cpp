@@ -7,14 +7,14 @@
 
 #include "hil/plant/parameters.hpp"
 #include "hil/scenario/scenario_file.hpp"
-#include "host/catalogue/constants.hpp"
-#include "host/data/dataset_toml.hpp"
-#include "host/deployment/bases.hpp"
-#include "host/deployment/drive_settings.hpp"
-#include "host/deployment/pack.hpp"
-#include "host/model/model.hpp"
-#include "host/planning/plan.hpp"
-#include "host/text/toml.hpp"
+#include "host/common/text/toml.hpp"
+#include "host/drive_link/deployment/bases.hpp"
+#include "host/drive_link/deployment/drive_settings.hpp"
+#include "host/drive_link/deployment/pack.hpp"
+#include "host/engine/planning/plan.hpp"
+#include "host/input/data/dataset_toml.hpp"
+#include "host/physics/catalogue/constants.hpp"
+#include "host/physics/model/model.hpp"
 #include "tests/fuzz/readers.hpp"
 
 namespace {

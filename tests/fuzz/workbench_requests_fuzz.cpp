@@ -12,11 +12,11 @@
 #include <string_view>
 #include <vector>
 
-#include "host/catalogue/constants.hpp"
-#include "host/data/dataset.hpp"
-#include "host/workbench/access_control.hpp"
-#include "host/workbench/api.hpp"
-#include "host/workbench/work.hpp"
+#include "host/app/workbench/access_control.hpp"
+#include "host/app/workbench/api.hpp"
+#include "host/app/workbench/work.hpp"
+#include "host/input/data/dataset.hpp"
+#include "host/physics/catalogue/constants.hpp"
 #include "tests/fuzz/readers.hpp"
 
 namespace {

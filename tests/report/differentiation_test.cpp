@@ -12,7 +12,7 @@
 #include "hil/thesis_models/friction_block.hpp"
 #include "hil/thesis_models/published.hpp"
 #include "hil/thesis_models/runge_kutta.hpp"
-#include "host/signals/differentiators.hpp"
+#include "host/common/signals/differentiators.hpp"
 
 namespace flexspline {
 namespace {

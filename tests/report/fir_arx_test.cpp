@@ -12,7 +12,7 @@
 #include "hil/thesis_models/friction_block.hpp"
 #include "hil/thesis_models/published.hpp"
 #include "hil/thesis_models/runge_kutta.hpp"
-#include "host/blackbox/specification.hpp"
+#include "host/engine/blackbox/specification.hpp"
 
 namespace flexspline {
 namespace {

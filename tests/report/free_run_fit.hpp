@@ -10,8 +10,8 @@
 #include <string>
 #include <vector>
 
-#include "host/signals/butterworth.hpp"
-#include "host/simulation/simulation.hpp"
+#include "host/common/signals/butterworth.hpp"
+#include "host/physics/simulation/simulation.hpp"
 #include "tests/report/rhs100_data.hpp"
 
 namespace flexspline::testing {

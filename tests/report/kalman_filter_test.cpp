@@ -18,7 +18,7 @@
 #include <string>
 #include <vector>
 
-#include "host/numbers/real.hpp"
+#include "host/common/numbers/real.hpp"
 #include "shared/fixed/system.hpp"
 #include "shared/observers/encoder_kalman.hpp"
 

@@ -14,9 +14,9 @@
 #include <vector>
 
 #include "hil/rhs100/experiments.hpp"
-#include "host/catalogue/catalogue.hpp"
-#include "host/estimation/identify.hpp"
-#include "host/model/model.hpp"
+#include "host/engine/estimation/identify.hpp"
+#include "host/physics/catalogue/catalogue.hpp"
+#include "host/physics/model/model.hpp"
 
 namespace flexspline::testing {
 

@@ -5,7 +5,7 @@
 #include <stdexcept>
 
 #include "hil/plant/recorder.hpp"
-#include "host/sensitivity/sensitivity.hpp"
+#include "host/engine/sensitivity/sensitivity.hpp"
 #include "tests/support/twin_data.hpp"
 
 namespace flexspline {

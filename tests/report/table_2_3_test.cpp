@@ -4,9 +4,9 @@
 
 #include "hil/thesis_models/published.hpp"
 #include "hil/thesis_models/published_tables.hpp"
-#include "host/comparison/compare.hpp"
-#include "host/signals/butterworth.hpp"
-#include "host/simulation/simulation.hpp"
+#include "host/common/signals/butterworth.hpp"
+#include "host/engine/comparison/compare.hpp"
+#include "host/physics/simulation/simulation.hpp"
 #include "tests/report/rhs100_data.hpp"
 
 namespace flexspline::testing {

@@ -4,7 +4,7 @@
 
 #include "hil/thesis_models/published.hpp"
 #include "hil/thesis_models/published_tables.hpp"
-#include "host/comparison/compare.hpp"
+#include "host/engine/comparison/compare.hpp"
 #include "tests/report/rhs100_data.hpp"
 
 namespace flexspline::testing {

@@ -2,7 +2,7 @@
 #include <gtest/gtest.h>
 
 #include "hil/thesis_models/published_tables.hpp"
-#include "host/selection/trends.hpp"
+#include "host/engine/selection/trends.hpp"
 #include "tests/report/rhs100_data.hpp"
 
 namespace flexspline::testing {

@@ -3,7 +3,7 @@
 
 #include "hil/thesis_models/published.hpp"
 #include "hil/thesis_models/published_tables.hpp"
-#include "host/selection/diagnosis.hpp"
+#include "host/engine/selection/diagnosis.hpp"
 #include "tests/report/rhs100_data.hpp"
 
 namespace flexspline::testing {

@@ -8,10 +8,10 @@
 #include <cmath>
 #include <set>
 
-#include "host/estimation/variable_projection.hpp"
-#include "host/selection/add.hpp"
-#include "host/selection/add_until_complete.hpp"
-#include "host/selection/diagnosis.hpp"
+#include "host/engine/estimation/variable_projection.hpp"
+#include "host/engine/selection/add.hpp"
+#include "host/engine/selection/add_until_complete.hpp"
+#include "host/engine/selection/diagnosis.hpp"
 #include "tests/support/twin_data.hpp"
 
 namespace flexspline::soak {

@@ -8,7 +8,7 @@
 #include <map>
 #include <numeric>
 
-#include "host/catalogue/catalogue.hpp"
+#include "host/physics/catalogue/catalogue.hpp"
 #include "tests/soak/campaign.hpp"
 #include "tests/support/campaign_statistics.hpp"
 

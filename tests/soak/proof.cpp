@@ -6,9 +6,9 @@
 #include <fstream>
 #include <map>
 
-#include "host/deployment/bases.hpp"
-#include "host/deployment/error_proof.hpp"
-#include "host/deployment/pack.hpp"
+#include "host/drive_link/deployment/bases.hpp"
+#include "host/drive_link/deployment/error_proof.hpp"
+#include "host/drive_link/deployment/pack.hpp"
 #include "tests/support/random_model.hpp"
 
 namespace flexspline::soak {
@@ -71,7 +71,8 @@ int run_proof_campaign(double minutes, const std::string& page, const std::strin
   std::string text = fmt::format(
       "# The error of parameter blocks: proven and seen\n\nVersion {}. {} directed samples of {} random models. "
       "Errors are "
-      "in bases of torque; what the columns mean is in [`PROOF.md`](../../host/deployment/PROOF.md).\n\n| effect | "
+      "in bases of torque; what the columns mean is in [`PROOF.md`](../../host/drive_link/deployment/PROOF.md).\n\n| "
+      "effect | "
       "proven | "
       "not proven | largest bound | nearest to its bound | outside |\n| --- | --- | --- | --- | --- | --- |\n",
       version, samples, sums.models + sums.unproven);

@@ -8,8 +8,8 @@
 #include <vector>
 
 #include "hil/scenario/scenario_file.hpp"
-#include "host/closed_loop/prediction.hpp"
-#include "host/deployment/pack.hpp"
+#include "host/app/closed_loop/prediction.hpp"
+#include "host/drive_link/deployment/pack.hpp"
 #include "tests/support/on_all_cores.hpp"
 #include "tests/support/twin_data.hpp"
 

@@ -9,7 +9,7 @@
 #include "hil/motor/power_stage.hpp"
 #include "hil/motor/shaft.hpp"
 #include "hil/motor/shunts.hpp"
-#include "host/deployment/commissioning_settings.hpp"
+#include "host/drive_link/deployment/commissioning_settings.hpp"
 #include "shared/control/commissioning/commissioning.hpp"
 
 namespace flexspline::commissioning_rig {

@@ -11,7 +11,7 @@
 #include <string_view>
 #include <vector>
 
-#include "host/catalogue/catalogue.hpp"
+#include "host/physics/catalogue/catalogue.hpp"
 #include "shared/fixed/checked.hpp"
 #include "shared/fixed/overflow_log.hpp"
 #include "shared/model/drive_model.hpp"

@@ -7,7 +7,7 @@
 #include <cstdint>
 #include <string>
 
-#include "host/selection/diagnosis.hpp"
+#include "host/engine/selection/diagnosis.hpp"
 #include "tests/support/twin_data.hpp"
 
 namespace flexspline::testing {

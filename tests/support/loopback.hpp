@@ -10,7 +10,7 @@
 #include <optional>
 
 #include "hil/twin/twin_drive.hpp"
-#include "host/drive/session.hpp"
+#include "host/drive_link/drive/session.hpp"
 
 namespace flexspline::tests {
 

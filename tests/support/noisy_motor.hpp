@@ -10,9 +10,9 @@
 #include <string>
 #include <vector>
 
-#include "host/catalogue/constants.hpp"
-#include "host/data/dataset.hpp"
-#include "host/model/model.hpp"
+#include "host/input/data/dataset.hpp"
+#include "host/physics/catalogue/constants.hpp"
+#include "host/physics/model/model.hpp"
 
 namespace flexspline::testing {
 

@@ -1,7 +1,7 @@
 #pragma once
 
-#include "host/catalogue/catalogue.hpp"
-#include "host/catalogue/constants.hpp"
+#include "host/physics/catalogue/catalogue.hpp"
+#include "host/physics/catalogue/constants.hpp"
 
 namespace flexspline::testing {
 

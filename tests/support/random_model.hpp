@@ -6,9 +6,9 @@
 #include <random>
 #include <vector>
 
-#include "host/catalogue/constants.hpp"
-#include "host/deployment/fixed_point_check.hpp"
-#include "host/model/model.hpp"
+#include "host/drive_link/deployment/fixed_point_check.hpp"
+#include "host/physics/catalogue/constants.hpp"
+#include "host/physics/model/model.hpp"
 
 namespace flexspline::tests {
 

@@ -1,6 +1,6 @@
 #pragma once
 
-#include "host/selection/candidate_fits.hpp"
+#include "host/engine/selection/candidate_fits.hpp"
 
 namespace flexspline::testing {
 

@@ -7,9 +7,9 @@
 #include <vector>
 
 #include "hil/plant/recorder.hpp"
-#include "host/catalogue/constants.hpp"
-#include "host/data/dataset.hpp"
-#include "host/model/model.hpp"
+#include "host/input/data/dataset.hpp"
+#include "host/physics/catalogue/constants.hpp"
+#include "host/physics/model/model.hpp"
 
 namespace flexspline::testing {
 

@@ -4,8 +4,8 @@
 #include <string>
 #include <utility>
 
-#include "host/catalogue/constants.hpp"
-#include "host/model/model.hpp"
+#include "host/physics/catalogue/constants.hpp"
+#include "host/physics/model/model.hpp"
 
 namespace flexspline::testing {
 

@@ -9,7 +9,7 @@
 #include <set>
 #include <thread>
 
-#include "host/transport/link.hpp"
+#include "host/drive_link/transport/link.hpp"
 #include "tests/support/usbip_client.hpp"
 
 namespace flexspline::tests {

@@ -38,6 +38,10 @@ const std::map<std::string, std::set<std::string>, std::less<>> kMayInclude = {
     {"tests", {"shared", "firmware", "boards", "hil", "host", "tests"}},
 };
 
+// The groups of host/, from the bottom up: a file includes its own group and those before it.
+constexpr std::array<std::string_view, 7> kHostGroups = {"common", "input",      "physics", "engine",
+                                                         "output", "drive_link", "app"};
+
 // Headers that need neither heap nor floating point nor an operating system.
 const std::set<std::string, std::less<>> kFreestandingHeaders = {
     "array",  "bit",  "climits",     "compare", "concepts",    "cstddef", "cstdint", "cstring", "initializer_list",
@@ -129,6 +133,25 @@ Violations broken_arrows(const std::vector<SourceFile>& files) {
         found.push_back(place(file, include.line) + "shared may not include <" + include.name + ">");
       }
     }
+  }
+  return found;
+}
+
+std::size_t host_group(std::string_view path) {
+  const std::string_view inside = path.substr(std::min(path.size(), std::string_view("host/").size()));
+  const auto group = std::find(kHostGroups.begin(), kHostGroups.end(), inside.substr(0, inside.find('/')));
+  return static_cast<std::size_t>(group - kHostGroups.begin());
+}
+
+Violations arrows_up_in_host(const std::vector<SourceFile>& files) {
+  Violations found;
+  for (const SourceFile& file : files) {
+    if (!is_cpp(file.path) || !file.path.starts_with("host/") || file.path == "host/main.cpp") continue;
+    if (host_group(file.path) == kHostGroups.size()) found.push_back(file.path + ": stands in no group of host/");
+    for (const Include& include : includes_of(file))
+      if (include.name.starts_with("host/") && host_group(include.name) > host_group(file.path))
+        found.push_back(place(file, include.line) + std::string(kHostGroups[host_group(file.path)]) +
+                        " stands below what it includes (" + include.name + ")");
   }
   return found;
 }
@@ -266,6 +289,9 @@ TEST(Architecture, IsReadFromTheSourceTree) {
 TEST(Architecture, FoldersIncludeOnlyWhatTheyMay) {
   EXPECT_NO_VIOLATION(broken_arrows(project_files()));
 }
+TEST(Architecture, GroupsOfHostIncludeOnlyWhatStandsBelowThem) {
+  EXPECT_NO_VIOLATION(arrows_up_in_host(project_files()));
+}
 TEST(Architecture, SharedUsesNoHeapNoExceptionsAndNoMathLibrary) {
   EXPECT_NO_VIOLATION(forbidden_in_shared(project_files()));
 }
@@ -301,6 +327,15 @@ TEST(ArchitectureRules, ArrowsOfTheDesignAreAllowed) {
   EXPECT_NO_VIOLATION(arrows_of("host/a.cpp", "#include <Eigen/Dense>\n#include \"shared/x.hpp\"\n"));
   EXPECT_NO_VIOLATION(arrows_of("tests/unit/a.cpp", "#include \"host/x.hpp\"\n#include \"hil/x.hpp\"\n"));
   EXPECT_NO_VIOLATION(arrows_of("shared/a.hpp", "// #include <cmath>\n/*\n#include \"host/x.hpp\"\n*/\n"));
+}
+
+TEST(ArchitectureRules, ArrowsUpInHostAndFilesOutsideItsGroupsAreFound) {
+  const auto of = [](const char* path, const char* text) { return arrows_up_in_host({{path, text}}); };
+  EXPECT_EQ(of("host/engine/a/a.cpp", "#include \"host/output/b/b.hpp\"\n").size(), 1u);
+  EXPECT_EQ(of("host/common/a/a.hpp", "#include \"host/input/b/b.hpp\"\n").size(), 1u);
+  EXPECT_NO_VIOLATION(
+      of("host/output/b/b.cpp", "#include \"host/engine/a/a.hpp\"\n#include \"host/output/c/c.hpp\"\n"));
+  EXPECT_EQ(of("host/elsewhere/a.cpp", "").size(), 1u);
 }
 
 TEST(ArchitectureRules, HeadersOutsideTheAllowListAreFoundInShared) {

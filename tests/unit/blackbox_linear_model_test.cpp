@@ -1,5 +1,5 @@
 // FIR and ARX models against difference equations that are known, and the choice of orders.
-#include "host/blackbox/linear_model.hpp"
+#include "host/engine/blackbox/linear_model.hpp"
 
 #include <gtest/gtest.h>
 

@@ -1,5 +1,5 @@
 // Black boxes as a user writes them, and orders chosen on data left out.
-#include "host/blackbox/specification.hpp"
+#include "host/engine/blackbox/specification.hpp"
 
 #include <gtest/gtest.h>
 

@@ -6,7 +6,7 @@
 #include <string>
 #include <vector>
 
-#include "host/firmware/signing.hpp"
+#include "host/drive_link/firmware/signing.hpp"
 #include "shared/boot/development_key.hpp"
 #include "shared/boot/signature/ed25519.hpp"
 #include "tests/support/signature_cases.hpp"

@@ -11,7 +11,7 @@
 #include <vector>
 
 #include "hil/twin/machine.hpp"
-#include "host/firmware/signing.hpp"
+#include "host/drive_link/firmware/signing.hpp"
 #include "shared/boot/development_key.hpp"
 #include "tests/support/update_bench.hpp"
 

@@ -1,4 +1,4 @@
-#include "host/catalogue/constants.hpp"
+#include "host/physics/catalogue/constants.hpp"
 
 #include <gtest/gtest.h>
 
@@ -6,7 +6,7 @@
 #include <string>
 #include <vector>
 
-#include "host/catalogue/catalogue.hpp"
+#include "host/physics/catalogue/catalogue.hpp"
 
 namespace flexspline::catalogue {
 namespace {

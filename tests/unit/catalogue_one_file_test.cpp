@@ -12,7 +12,7 @@
 #include <string_view>
 #include <vector>
 
-#include "host/catalogue/catalogue.hpp"
+#include "host/physics/catalogue/catalogue.hpp"
 
 namespace flexspline::tests {
 namespace {
@@ -107,15 +107,15 @@ std::string effect_of(const std::string& path) {
 using Reasons = std::map<std::string, std::string>;
 const Reasons& reasons() {
   static const Reasons kReasons = {
-      {"host/catalogue/user_defined_effect.hpp",
+      {"host/physics/catalogue/user_defined_effect.hpp",
        "what a user made is named in model files and made apart from the others"},
-      {"host/project/base_model.cpp", "a first model has the effects that every drive has"},
-      {"host/cli/command_demo.cpp",
+      {"host/app/project/base_model.cpp", "a first model has the effects that every drive has"},
+      {"host/app/cli/command_demo.cpp",
        "what the demo may hide is chosen, so that a newcomer sees something that he knows"},
-      {"host/deployment/drive_settings.cpp",
+      {"host/drive_link/deployment/drive_settings.cpp",
        "loops are laid out for an inertia, and the lead of a feedforward is as slow as the damping lets it"},
-      {"host/sensitivity/changes.cpp", "the report scales the stiffness, and no other parameter"},
-      {"host/output/effect_curve.cpp", "a shift is drawn on a spring"}};
+      {"host/engine/sensitivity/changes.cpp", "the report scales the stiffness, and no other parameter"},
+      {"host/output/answers/effect_curve.cpp", "a shift is drawn on a spring"}};
   return kReasons;
 }
 
@@ -159,7 +159,7 @@ TEST(AddingAnEffect, IsOneFileAndOneLine) {
 
 TEST(AddingAnEffect, TheStatisticalEngineHasNoReasonToNameOne) {
   for (const auto& [path, reason] : reasons())
-    EXPECT_FALSE(path.starts_with("host/estimation/") || path.starts_with("host/selection/"))
+    EXPECT_FALSE(path.starts_with("host/engine/estimation/") || path.starts_with("host/engine/selection/"))
         << path << ": " << reason << "; state it in the effect's header (effects::Description)";
 }
 

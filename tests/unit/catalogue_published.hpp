@@ -9,7 +9,7 @@
 #include <utility>
 #include <vector>
 
-#include "host/catalogue/catalogue.hpp"
+#include "host/physics/catalogue/catalogue.hpp"
 
 namespace flexspline::tests {
 

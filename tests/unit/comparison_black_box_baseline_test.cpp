@@ -1,14 +1,14 @@
 // Black boxes compared with a model: on a drive that is linear both are right; on one with dry friction only the model
 // is.
-#include "host/comparison/black_box_baseline.hpp"
+#include "host/engine/comparison/black_box_baseline.hpp"
 
 #include <gtest/gtest.h>
 
 #include <cmath>
 #include <nlohmann/json.hpp>
 
-#include "host/catalogue/constants.hpp"
-#include "host/comparison/compare.hpp"
+#include "host/engine/comparison/compare.hpp"
+#include "host/physics/catalogue/constants.hpp"
 #include "tests/unit/comparison_test_drive.hpp"
 
 namespace flexspline::comparison {

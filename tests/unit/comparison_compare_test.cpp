@@ -1,5 +1,5 @@
-// host/comparison: figures against closed forms, and the twin against the model that it is.
-#include "host/comparison/compare.hpp"
+// host/engine/comparison: figures against closed forms, and the twin against the model that it is.
+#include "host/engine/comparison/compare.hpp"
 
 #include <gtest/gtest.h>
 
@@ -7,7 +7,7 @@
 #include <nlohmann/json.hpp>
 #include <random>
 
-#include "host/comparison/score.hpp"
+#include "host/engine/comparison/score.hpp"
 #include "tests/unit/comparison_test_drive.hpp"
 
 namespace flexspline::comparison {

@@ -1,5 +1,5 @@
-// host/comparison: the noise floor against records without noise.
-#include "host/comparison/noise_floor.hpp"
+// host/engine/comparison: the noise floor against records without noise.
+#include "host/engine/comparison/noise_floor.hpp"
 
 #include <fmt/format.h>
 #include <gtest/gtest.h>
@@ -7,7 +7,7 @@
 #include <cstdlib>
 #include <memory>
 
-#include "host/estimation/balance_fit.hpp"
+#include "host/engine/estimation/balance_fit.hpp"
 #include "tests/unit/comparison_test_drive.hpp"
 #include "tests/unit/data_test_files.hpp"
 

@@ -1,5 +1,5 @@
-// host/comparison: residuals with a known cause on the rows of real motions.
-#include "host/comparison/residual_map.hpp"
+// host/engine/comparison: residuals with a known cause on the rows of real motions.
+#include "host/engine/comparison/residual_map.hpp"
 
 #include <gtest/gtest.h>
 
@@ -8,8 +8,8 @@
 #include <memory>
 #include <random>
 
-#include "host/comparison/sample_variables.hpp"
-#include "host/estimation/least_squares.hpp"
+#include "host/engine/comparison/sample_variables.hpp"
+#include "host/engine/estimation/least_squares.hpp"
 #include "tests/unit/comparison_test_drive.hpp"
 
 namespace flexspline::comparison {

@@ -11,7 +11,7 @@
 #include <set>
 #include <vector>
 
-#include "host/numbers/real.hpp"
+#include "host/common/numbers/real.hpp"
 #include "shared/control/excitation.hpp"
 #include "shared/fixed/checked.hpp"
 #include "shared/fixed/overflow_log.hpp"

@@ -8,7 +8,7 @@
 #include <numbers>
 #include <random>
 
-#include "host/numbers/real.hpp"
+#include "host/common/numbers/real.hpp"
 #include "shared/control/loops.hpp"
 #include "shared/fixed/checked.hpp"
 #include "shared/fixed/overflow_log.hpp"

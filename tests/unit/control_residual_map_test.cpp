@@ -9,7 +9,7 @@
 #include <random>
 #include <utility>
 
-#include "host/numbers/real.hpp"
+#include "host/common/numbers/real.hpp"
 #include "shared/control/residual_map.hpp"
 #include "shared/fixed/overflow_log.hpp"
 

@@ -7,7 +7,7 @@
 #include <numbers>
 #include <random>
 
-#include "host/numbers/real.hpp"
+#include "host/common/numbers/real.hpp"
 #include "shared/control/stream.hpp"
 #include "shared/fixed/checked.hpp"
 

@@ -9,7 +9,7 @@
 #include <random>
 #include <vector>
 
-#include "host/numbers/real.hpp"
+#include "host/common/numbers/real.hpp"
 #include "shared/control/limits.hpp"
 #include "shared/control/trajectory.hpp"
 #include "shared/fixed/checked.hpp"

@@ -1,7 +1,7 @@
-// host/data: HDF5 and NumPy files, MAT files of other programs, struct arrays, and formats that are only named.
+// host/input/data: HDF5 and NumPy files, MAT files of other programs, struct arrays, and formats that are only named.
 #include <gtest/gtest.h>
 
-#include "host/data/recording.hpp"
+#include "host/input/data/recording.hpp"
 #include "tests/unit/data_test_files.hpp"
 
 namespace flexspline::data {

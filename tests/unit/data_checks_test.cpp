@@ -1,12 +1,12 @@
-// host/data: every check on a measurement that has what it looks for, and on one that has not.
-#include "host/data/checks.hpp"
+// host/input/data: every check on a measurement that has what it looks for, and on one that has not.
+#include "host/input/data/checks.hpp"
 
 #include <gtest/gtest.h>
 
 #include <numbers>
 #include <random>
 
-#include "host/data/findings.hpp"
+#include "host/input/data/findings.hpp"
 #include "tests/unit/data_test_files.hpp"
 
 namespace flexspline::data {
@@ -290,7 +290,7 @@ TEST(Tolerate, UnknownKindsAndThoseThatCannotBeToleratedAreErrors) {
 }
 
 TEST(Tolerate, EveryKindIsInTheDocument) {
-  std::ifstream document(std::filesystem::path(FLEXSPLINE_SOURCE_DIR) / "host/data/FINDINGS.md");
+  std::ifstream document(std::filesystem::path(FLEXSPLINE_SOURCE_DIR) / "host/input/data/FINDINGS.md");
   const std::string text((std::istreambuf_iterator<char>(document)), std::istreambuf_iterator<char>());
   for (const KindInfo& kind : known_kinds())
     EXPECT_NE(text.find("- `" + std::string(kind.name) + "`: "), std::string::npos) << kind.name;

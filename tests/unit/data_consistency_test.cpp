@@ -1,4 +1,4 @@
-// host/data: an effort of the wrong sign, and a velocity that is late.
+// host/input/data: an effort of the wrong sign, and a velocity that is late.
 #include <gtest/gtest.h>
 
 #include "tests/unit/data_test_files.hpp"

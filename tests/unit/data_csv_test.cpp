@@ -1,4 +1,4 @@
-// host/data: CSV as loggers write it, and what is refused.
+// host/input/data: CSV as loggers write it, and what is refused.
 #include <gtest/gtest.h>
 
 #include <bit>

@@ -1,4 +1,4 @@
-// host/data: the measured EMPS axis through a dataset.toml that maps its columns.
+// host/input/data: the measured EMPS axis through a dataset.toml that maps its columns.
 #include <gtest/gtest.h>
 
 #include <cstdlib>

@@ -1,4 +1,4 @@
-// host/data: lines that stand twice or in another order.
+// host/input/data: lines that stand twice or in another order.
 #include <gtest/gtest.h>
 
 #include <numeric>

@@ -1,4 +1,5 @@
-// host/data: MAT files that were cut short or damaged end in a message or in numbers, never in a crash or without end.
+// host/input/data: MAT files that were cut short or damaged end in a message or in numbers, never in a crash or without
+// end.
 #include <gtest/gtest.h>
 
 #include <algorithm>
@@ -6,8 +7,8 @@
 #include <iterator>
 #include <random>
 
-#include "host/data/contents_guard.hpp"
-#include "host/data/mat5_check.hpp"
+#include "host/input/data/contents_guard.hpp"
+#include "host/input/data/mat5_check.hpp"
 #include "tests/unit/data_mat_writer.hpp"
 #include "tests/unit/data_test_files.hpp"
 

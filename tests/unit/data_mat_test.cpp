@@ -1,4 +1,4 @@
-// host/data: MAT files give what CSV files of the same numbers give.
+// host/input/data: MAT files give what CSV files of the same numbers give.
 #include <gtest/gtest.h>
 
 #include <cmath>

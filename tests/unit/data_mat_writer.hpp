@@ -1,4 +1,4 @@
-// MAT files as matio writes them, for the tests of host/data.
+// MAT files as matio writes them, for the tests of host/input/data.
 #pragma once
 
 #include <cstddef>

@@ -1,12 +1,12 @@
-// host/data: recordings of messages, whole and damaged.
+// host/input/data: recordings of messages, whole and damaged.
 #include <gtest/gtest.h>
 
 #include <random>
 
-#include "host/data/byte_reader.hpp"
-#include "host/data/contents_guard.hpp"
-#include "host/data/message_logs.hpp"
-#include "host/data/ros_message.hpp"
+#include "host/input/data/byte_reader.hpp"
+#include "host/input/data/contents_guard.hpp"
+#include "host/input/data/message_logs.hpp"
+#include "host/input/data/ros_message.hpp"
 #include "tests/unit/data_test_files.hpp"
 
 namespace flexspline::data {

@@ -1,4 +1,5 @@
-// Measurements that the tests of host/data write: a folder that goes away, and a motion whose truth is closed form.
+// Measurements that the tests of host/input/data write: a folder that goes away, and a motion whose truth is closed
+// form.
 #pragma once
 
 #include <fmt/format.h>
@@ -12,7 +13,7 @@
 #include <string_view>
 #include <vector>
 
-#include "host/data/dataset.hpp"
+#include "host/input/data/dataset.hpp"
 
 namespace flexspline::data {
 

@@ -1,8 +1,8 @@
-// host/data: texts as loggers of all kinds write them, and what is no text.
+// host/input/data: texts as loggers of all kinds write them, and what is no text.
 #include <gtest/gtest.h>
 #include <zlib.h>
 
-#include "host/data/csv.hpp"
+#include "host/input/data/csv.hpp"
 #include "tests/unit/data_test_files.hpp"
 
 namespace flexspline::data {

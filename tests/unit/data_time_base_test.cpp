@@ -1,5 +1,5 @@
-// host/data: the uniform time base, gaps, and resampling.
-#include "host/data/time_base.hpp"
+// host/input/data: the uniform time base, gaps, and resampling.
+#include "host/input/data/time_base.hpp"
 
 #include <gtest/gtest.h>
 

@@ -1,4 +1,4 @@
-// host/data: dataset.toml, header keys, and how columns are mapped.
+// host/input/data: dataset.toml, header keys, and how columns are mapped.
 #include <gtest/gtest.h>
 
 #include <numbers>

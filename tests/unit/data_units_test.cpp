@@ -1,5 +1,5 @@
-// host/data: units of logs.
-#include "host/data/units.hpp"
+// host/input/data: units of logs.
+#include "host/input/data/units.hpp"
 
 #include <gtest/gtest.h>
 

@@ -1,4 +1,4 @@
-// host/data: counts, per cent and thousandths of a degree are noticed, whatever the time base.
+// host/input/data: counts, per cent and thousandths of a degree are noticed, whatever the time base.
 #include <gtest/gtest.h>
 
 #include "tests/unit/data_test_files.hpp"

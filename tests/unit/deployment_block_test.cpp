@@ -8,10 +8,10 @@
 #include <set>
 #include <vector>
 
-#include "host/catalogue/constants.hpp"
-#include "host/deployment/bases.hpp"
-#include "host/deployment/pack.hpp"
-#include "host/deployment/sha256.hpp"
+#include "host/drive_link/deployment/bases.hpp"
+#include "host/drive_link/deployment/pack.hpp"
+#include "host/drive_link/deployment/sha256.hpp"
+#include "host/physics/catalogue/constants.hpp"
 #include "shared/control/drive_block.hpp"
 #include "shared/fixed/system.hpp"
 #include "shared/model/block_texts.hpp"

@@ -5,11 +5,11 @@
 #include <memory>
 #include <random>
 
-#include "host/deployment/bases.hpp"
-#include "host/deployment/error_proof.hpp"
-#include "host/deployment/on_numbers.hpp"
-#include "host/deployment/pack.hpp"
-#include "host/deployment/samples.hpp"
+#include "host/drive_link/deployment/bases.hpp"
+#include "host/drive_link/deployment/error_proof.hpp"
+#include "host/drive_link/deployment/on_numbers.hpp"
+#include "host/drive_link/deployment/pack.hpp"
+#include "host/drive_link/deployment/samples.hpp"
 #include "tests/support/random_model.hpp"
 
 namespace flexspline::tests {

@@ -4,11 +4,11 @@
 #include <cmath>
 #include <string>
 
-#include "host/catalogue/constants.hpp"
-#include "host/catalogue/user_defined_effect.hpp"
-#include "host/deployment/bases.hpp"
-#include "host/deployment/fold.hpp"
-#include "host/deployment/pack.hpp"
+#include "host/drive_link/deployment/bases.hpp"
+#include "host/drive_link/deployment/fold.hpp"
+#include "host/drive_link/deployment/pack.hpp"
+#include "host/physics/catalogue/constants.hpp"
+#include "host/physics/catalogue/user_defined_effect.hpp"
 #include "shared/control/drive_block.hpp"
 
 namespace flexspline::tests {

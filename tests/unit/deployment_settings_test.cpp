@@ -8,10 +8,10 @@
 #include <utility>
 #include <vector>
 
-#include "host/catalogue/constants.hpp"
-#include "host/deployment/bases.hpp"
-#include "host/deployment/drive_settings.hpp"
-#include "host/deployment/pack.hpp"
+#include "host/drive_link/deployment/bases.hpp"
+#include "host/drive_link/deployment/drive_settings.hpp"
+#include "host/drive_link/deployment/pack.hpp"
+#include "host/physics/catalogue/constants.hpp"
 #include "shared/control/drive_block.hpp"
 #include "tests/support/two_ampere_drive.hpp"
 

@@ -1,5 +1,5 @@
 // A host that opens a paired drive, over a line that loses answers.
-#include "host/drive/pairing.hpp"
+#include "host/drive_link/drive/pairing.hpp"
 
 #include <gtest/gtest.h>
 

@@ -1,4 +1,4 @@
-#include "host/drive/residual_map.hpp"
+#include "host/drive_link/drive/residual_map.hpp"
 
 #include <gtest/gtest.h>
 

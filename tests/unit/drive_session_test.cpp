@@ -1,4 +1,4 @@
-#include "host/drive/session.hpp"
+#include "host/drive_link/drive/session.hpp"
 
 #include <gtest/gtest.h>
 
@@ -6,7 +6,7 @@
 
 #include "hil/twin/factory_block.hpp"
 #include "hil/twin/twin_drive.hpp"
-#include "host/drive/recorder.hpp"
+#include "host/drive_link/drive/recorder.hpp"
 #include "tests/support/loopback.hpp"
 
 namespace flexspline::drive {

@@ -5,7 +5,7 @@
 #include <cmath>
 #include <nlohmann/json.hpp>
 
-#include "host/output/effect_curve.hpp"
+#include "host/output/answers/effect_curve.hpp"
 
 namespace flexspline::output {
 namespace {

@@ -8,7 +8,7 @@
 #include <string_view>
 #include <vector>
 
-#include "host/catalogue/catalogue.hpp"
+#include "host/physics/catalogue/catalogue.hpp"
 
 namespace flexspline::tests {
 namespace {

@@ -1,7 +1,7 @@
 // std/avg over experiments, each judged by its own error.
 #include <gtest/gtest.h>
 
-#include "host/estimation/by_experiment.hpp"
+#include "host/engine/estimation/by_experiment.hpp"
 
 namespace flexspline::estimation {
 namespace {

@@ -1,15 +1,15 @@
 // A fit that is cancelled: it checks the cancellation token again and again, and what that throws ends it.
-#include "host/estimation/cancellation.hpp"
+#include "host/engine/estimation/cancellation.hpp"
 
 #include <gtest/gtest.h>
 
 #include <atomic>
 #include <cmath>
 
-#include "host/catalogue/constants.hpp"
-#include "host/estimation/identify.hpp"
-#include "host/estimation/minimise.hpp"
-#include "host/selection/add.hpp"
+#include "host/engine/estimation/identify.hpp"
+#include "host/engine/estimation/minimise.hpp"
+#include "host/engine/selection/add.hpp"
+#include "host/physics/catalogue/constants.hpp"
 #include "tests/unit/comparison_test_drive.hpp"
 
 namespace flexspline::estimation {

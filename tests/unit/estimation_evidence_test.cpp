@@ -1,5 +1,5 @@
 // Parameters that show on two torque balances, against one least-squares fit of both together.
-#include "host/estimation/evidence.hpp"
+#include "host/engine/estimation/evidence.hpp"
 
 #include <gtest/gtest.h>
 

@@ -1,4 +1,4 @@
-#include "host/estimation/identify.hpp"
+#include "host/engine/estimation/identify.hpp"
 
 #include <gtest/gtest.h>
 

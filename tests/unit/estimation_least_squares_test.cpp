@@ -1,4 +1,4 @@
-#include "host/estimation/least_squares.hpp"
+#include "host/engine/estimation/least_squares.hpp"
 
 #include <gtest/gtest.h>
 

@@ -1,5 +1,5 @@
 // The part of a torque that a model cannot draw, against angles that are known.
-#include "host/estimation/model_projection.hpp"
+#include "host/engine/estimation/model_projection.hpp"
 
 #include <gtest/gtest.h>
 

@@ -1,13 +1,13 @@
 // Errors that rows of a record have in common: against dense matrices.
-#include "host/estimation/noise_covariance.hpp"
+#include "host/engine/estimation/noise_covariance.hpp"
 
 #include <gtest/gtest.h>
 
 #include <Eigen/Cholesky>
 #include <Eigen/LU>
 
-#include "host/estimation/least_squares.hpp"
-#include "host/estimation/record_variance.hpp"
+#include "host/engine/estimation/least_squares.hpp"
+#include "host/engine/estimation/record_variance.hpp"
 
 namespace flexspline::estimation {
 namespace {

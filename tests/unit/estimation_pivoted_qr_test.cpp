@@ -1,5 +1,5 @@
-// host/estimation/pivoted_qr: also where there is nothing to factor.
-#include "host/estimation/pivoted_qr.hpp"
+// host/engine/estimation/pivoted_qr: also where there is nothing to factor.
+#include "host/engine/estimation/pivoted_qr.hpp"
 
 #include <gtest/gtest.h>
 

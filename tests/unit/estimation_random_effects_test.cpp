@@ -8,9 +8,9 @@
 #include <set>
 #include <string_view>
 
-#include "host/estimation/mixed_model.hpp"
-#include "host/estimation/noise_covariance.hpp"
-#include "host/estimation/random_effects.hpp"
+#include "host/engine/estimation/mixed_model.hpp"
+#include "host/engine/estimation/noise_covariance.hpp"
+#include "host/engine/estimation/random_effects.hpp"
 
 namespace flexspline::estimation {
 namespace {

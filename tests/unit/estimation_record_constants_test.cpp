@@ -1,12 +1,12 @@
 // Torsions that are counted from another zero in every recording.
-#include "host/estimation/record_constants.hpp"
+#include "host/engine/estimation/record_constants.hpp"
 
 #include <gtest/gtest.h>
 
 #include <cmath>
 
-#include "host/comparison/compare.hpp"
-#include "host/estimation/identify.hpp"
+#include "host/engine/comparison/compare.hpp"
+#include "host/engine/estimation/identify.hpp"
 
 namespace flexspline::estimation {
 namespace {

@@ -1,5 +1,5 @@
 // R factors of records and of their parts, against the rows that they stand for.
-#include "host/estimation/record_factors.hpp"
+#include "host/engine/estimation/record_factors.hpp"
 
 #include <gtest/gtest.h>
 
@@ -7,7 +7,7 @@
 #include <cmath>
 #include <random>
 
-#include "host/estimation/mixed_model.hpp"
+#include "host/engine/estimation/mixed_model.hpp"
 
 namespace flexspline::estimation {
 namespace {

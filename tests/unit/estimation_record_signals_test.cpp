@@ -1,5 +1,5 @@
 // The signals of a record: what is kept and what is made of it gives the same, however it is asked for.
-#include "host/estimation/record_signals.hpp"
+#include "host/engine/estimation/record_signals.hpp"
 
 #include <gtest/gtest.h>
 
@@ -8,8 +8,8 @@
 #include <limits>
 #include <numbers>
 
-#include "host/catalogue/user_defined_effect.hpp"
-#include "host/signals/differentiate.hpp"
+#include "host/common/signals/differentiate.hpp"
+#include "host/physics/catalogue/user_defined_effect.hpp"
 
 namespace flexspline::estimation {
 namespace {

@@ -1,4 +1,4 @@
-#include "host/estimation/record.hpp"
+#include "host/engine/estimation/record.hpp"
 
 #include <gtest/gtest.h>
 

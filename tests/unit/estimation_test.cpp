@@ -1,5 +1,5 @@
 // The estimators that a user chooses from: what each does on data whose truth is known, and what it refuses.
-#include "host/estimation/estimate.hpp"
+#include "host/engine/estimation/estimate.hpp"
 
 #include <gtest/gtest.h>
 

@@ -1,4 +1,4 @@
-#include "host/estimation/variable_projection.hpp"
+#include "host/engine/estimation/variable_projection.hpp"
 
 #include <gtest/gtest.h>
 
@@ -7,8 +7,8 @@
 #include <cmath>
 #include <functional>
 
-#include "host/estimation/identify.hpp"
-#include "host/estimation/minimise.hpp"
+#include "host/engine/estimation/identify.hpp"
+#include "host/engine/estimation/minimise.hpp"
 #include "tests/support/plain_model.hpp"
 
 namespace flexspline::estimation {

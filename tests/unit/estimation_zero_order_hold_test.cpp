@@ -1,14 +1,14 @@
 // Torque readings with a held effort: against two rigid inertias, whose motion from sample to sample has a closed
 // form.
-#include "host/estimation/zero_order_hold.hpp"
+#include "host/engine/estimation/zero_order_hold.hpp"
 
 #include <gtest/gtest.h>
 
 #include <cmath>
 #include <string>
 
-#include "host/catalogue/constants.hpp"
-#include "host/estimation/identify.hpp"
+#include "host/engine/estimation/identify.hpp"
+#include "host/physics/catalogue/constants.hpp"
 
 namespace flexspline {
 namespace {

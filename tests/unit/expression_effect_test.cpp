@@ -6,11 +6,11 @@
 #include <cmath>
 #include <random>
 
-#include "host/catalogue/constants.hpp"
-#include "host/catalogue/formula.hpp"
-#include "host/catalogue/user_defined_effect.hpp"
-#include "host/estimation/identify.hpp"
-#include "host/simulation/balances.hpp"
+#include "host/engine/estimation/identify.hpp"
+#include "host/physics/catalogue/constants.hpp"
+#include "host/physics/catalogue/formula.hpp"
+#include "host/physics/catalogue/user_defined_effect.hpp"
+#include "host/physics/simulation/balances.hpp"
 
 namespace flexspline::catalogue {
 namespace {

@@ -9,8 +9,8 @@
 #include <vector>
 
 #include "hil/twin/factory_block.hpp"
-#include "host/deployment/commissioning_settings.hpp"
-#include "host/drive/motor_block.hpp"
+#include "host/drive_link/deployment/commissioning_settings.hpp"
+#include "host/drive_link/drive/motor_block.hpp"
 #include "shared/control/drive_block.hpp"
 #include "tests/support/pairing_host.hpp"
 #include "tests/support/service_host.hpp"

@@ -4,7 +4,7 @@
 #include <algorithm>
 #include <string>
 
-#include "host/firmware/image_file.hpp"
+#include "host/drive_link/firmware/image_file.hpp"
 
 namespace flexspline::firmware_files {
 namespace {

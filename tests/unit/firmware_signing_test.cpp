@@ -6,7 +6,7 @@
 #include <fstream>
 #include <string>
 
-#include "host/firmware/signing.hpp"
+#include "host/drive_link/firmware/signing.hpp"
 #include "shared/boot/development_key.hpp"
 
 namespace flexspline::firmware_files {

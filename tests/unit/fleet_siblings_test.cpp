@@ -5,7 +5,7 @@
 #include <nlohmann/json.hpp>
 #include <random>
 
-#include "host/fleet/siblings.hpp"
+#include "host/app/fleet/siblings.hpp"
 
 namespace flexspline::fleet {
 namespace {

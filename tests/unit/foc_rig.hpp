@@ -8,7 +8,7 @@
 
 #include "hil/motor/power_stage.hpp"
 #include "hil/motor/shunts.hpp"
-#include "host/deployment/foc_settings.hpp"
+#include "host/drive_link/deployment/foc_settings.hpp"
 #include "shared/control/foc/field_oriented.hpp"
 
 namespace flexspline::foc_rig {

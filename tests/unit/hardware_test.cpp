@@ -5,9 +5,9 @@
 #include <random>
 
 #include "hil/twin/factory_block.hpp"
-#include "host/deployment/bases.hpp"
-#include "host/deployment/drive_settings.hpp"
-#include "host/deployment/pack.hpp"
+#include "host/drive_link/deployment/bases.hpp"
+#include "host/drive_link/deployment/drive_settings.hpp"
+#include "host/drive_link/deployment/pack.hpp"
 #include "tests/support/service_host.hpp"
 #include "tests/support/two_ampere_drive.hpp"
 #include "tests/support/virtual_drive.hpp"

@@ -9,10 +9,10 @@
 #include <fstream>
 #include <sstream>
 
-#include "host/catalogue/constants.hpp"
-#include "host/catalogue/user_defined_effect.hpp"
-#include "host/interchange/export.hpp"
-#include "host/simulation/balances.hpp"
+#include "host/output/interchange/export.hpp"
+#include "host/physics/catalogue/constants.hpp"
+#include "host/physics/catalogue/user_defined_effect.hpp"
+#include "host/physics/simulation/balances.hpp"
 
 namespace flexspline::interchange {
 namespace {

@@ -4,7 +4,7 @@
 #include <cmath>
 #include <map>
 
-#include "host/measurement/distortion.hpp"
+#include "host/engine/measurement/distortion.hpp"
 #include "tests/unit/measurement_signals.hpp"
 
 namespace flexspline::measurement {

@@ -4,9 +4,9 @@
 #include <algorithm>
 #include <cmath>
 
-#include "host/measurement/frequency_response.hpp"
-#include "host/measurement/measure.hpp"
-#include "host/measurement/resonance.hpp"
+#include "host/engine/measurement/frequency_response.hpp"
+#include "host/engine/measurement/measure.hpp"
+#include "host/engine/measurement/resonance.hpp"
 #include "tests/unit/measurement_signals.hpp"
 
 namespace flexspline::measurement {

@@ -3,9 +3,9 @@
 
 #include <cmath>
 
-#include "host/measurement/measure.hpp"
-#include "host/measurement/noise.hpp"
-#include "host/measurement/period.hpp"
+#include "host/engine/measurement/measure.hpp"
+#include "host/engine/measurement/noise.hpp"
+#include "host/engine/measurement/period.hpp"
 #include "tests/unit/measurement_signals.hpp"
 
 namespace flexspline::measurement {

@@ -8,7 +8,7 @@
 #include <random>
 
 #include "hil/plant/two_mass.hpp"
-#include "host/measurement/measure.hpp"
+#include "host/engine/measurement/measure.hpp"
 #include "tests/unit/measurement_signals.hpp"
 
 namespace flexspline::measurement {

@@ -1,4 +1,4 @@
-// Excitations and exact answers for the tests of host/measurement.
+// Excitations and exact answers for the tests of host/engine/measurement.
 #pragma once
 
 #include <complex>
@@ -8,8 +8,8 @@
 #include <random>
 #include <vector>
 
-#include "host/data/dataset.hpp"
-#include "host/measurement/channels.hpp"
+#include "host/engine/measurement/channels.hpp"
+#include "host/input/data/dataset.hpp"
 
 namespace flexspline::measurement::testing {
 

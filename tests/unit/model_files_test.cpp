@@ -7,7 +7,7 @@
 #include <fstream>
 #include <sstream>
 
-#include "host/model/model.hpp"
+#include "host/physics/model/model.hpp"
 #include "tests/unit/model_some_effects.hpp"
 
 namespace flexspline::model {

@@ -6,7 +6,7 @@
 #include <random>
 #include <string>
 
-#include "host/model/model.hpp"
+#include "host/physics/model/model.hpp"
 #include "tests/unit/model_some_effects.hpp"
 
 namespace flexspline::model {

@@ -6,7 +6,7 @@
 #include <utility>
 #include <vector>
 
-#include "host/model/model.hpp"
+#include "host/physics/model/model.hpp"
 #include "tests/unit/model_some_effects.hpp"
 
 namespace flexspline::model {

@@ -8,7 +8,7 @@
 #include <utility>
 #include <vector>
 
-#include "host/model/model.hpp"
+#include "host/physics/model/model.hpp"
 
 namespace flexspline::model {
 

@@ -1,5 +1,5 @@
 // How numbers, texts and units of model files are spelt.
-#include "host/model/text.hpp"
+#include "host/physics/model/text.hpp"
 
 #include <gtest/gtest.h>
 
@@ -9,7 +9,7 @@
 #include <cstdlib>
 #include <random>
 
-#include "host/model/units.hpp"
+#include "host/physics/model/units.hpp"
 
 namespace flexspline::model {
 namespace {

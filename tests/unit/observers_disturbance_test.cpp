@@ -6,7 +6,7 @@
 #include <cstdint>
 #include <random>
 
-#include "host/numbers/real.hpp"
+#include "host/common/numbers/real.hpp"
 #include "shared/fixed/checked.hpp"
 #include "shared/observers/disturbance.hpp"
 #include "shared/observers/encoder_angle.hpp"

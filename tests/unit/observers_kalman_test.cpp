@@ -12,7 +12,7 @@
 #include <random>
 #include <vector>
 
-#include "host/numbers/real.hpp"
+#include "host/common/numbers/real.hpp"
 #include "shared/fixed/checked.hpp"
 #include "shared/fixed/overflow_log.hpp"
 #include "shared/observers/encoder_kalman.hpp"

@@ -9,7 +9,7 @@
 #include <random>
 
 #include "hil/plant/two_mass.hpp"
-#include "host/numbers/real.hpp"
+#include "host/common/numbers/real.hpp"
 #include "shared/fixed/checked.hpp"
 #include "shared/observers/torsion.hpp"
 

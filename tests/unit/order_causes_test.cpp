@@ -1,5 +1,5 @@
 // What a ripple's order says of its cause on a drive: each order, several causes of one order, and what is missing.
-#include "host/catalogue/order_causes.hpp"
+#include "host/physics/catalogue/order_causes.hpp"
 
 #include <gtest/gtest.h>
 

@@ -8,8 +8,8 @@
 #include <fstream>
 
 #include "hil/plant/excitation.hpp"
-#include "host/catalogue/constants.hpp"
-#include "host/planning/design.hpp"
+#include "host/engine/planning/design.hpp"
+#include "host/physics/catalogue/constants.hpp"
 
 namespace flexspline::planning {
 namespace {

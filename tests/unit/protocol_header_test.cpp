@@ -6,11 +6,11 @@
 #include <map>
 #include <sstream>
 
-#include "host/deployment/maker.hpp"
-#include "host/interchange/enumerators.hpp"
-#include "host/interchange/protocol_header.hpp"
-#include "host/model/signature.hpp"
-#include "host/text/build_identity.hpp"
+#include "host/common/text/build_identity.hpp"
+#include "host/drive_link/deployment/maker.hpp"
+#include "host/output/interchange/enumerators.hpp"
+#include "host/output/interchange/protocol_header.hpp"
+#include "host/physics/model/signature.hpp"
 #include "shared/model/block.hpp"
 #include "shared/protocol/payloads.hpp"
 

@@ -2,10 +2,10 @@
 // drive's validator refuses it, and what both take acts.
 #include <gtest/gtest.h>
 
-#include "host/catalogue/constants.hpp"
-#include "host/deployment/bases.hpp"
-#include "host/deployment/drive_settings.hpp"
-#include "host/deployment/pack.hpp"
+#include "host/drive_link/deployment/bases.hpp"
+#include "host/drive_link/deployment/drive_settings.hpp"
+#include "host/drive_link/deployment/pack.hpp"
+#include "host/physics/catalogue/constants.hpp"
 #include "tests/support/limit_trial.hpp"
 #include "tests/support/two_ampere_drive.hpp"
 

@@ -6,11 +6,11 @@
 #include <filesystem>
 #include <nlohmann/json.hpp>
 
-#include "host/comparison/compare.hpp"
-#include "host/estimation/identify.hpp"
-#include "host/report/document.hpp"
-#include "host/report/page.hpp"
-#include "host/report/trace.hpp"
+#include "host/engine/comparison/compare.hpp"
+#include "host/engine/estimation/identify.hpp"
+#include "host/output/report/document.hpp"
+#include "host/output/report/page.hpp"
+#include "host/output/report/trace.hpp"
 #include "tests/unit/comparison_test_drive.hpp"
 
 namespace flexspline::report {

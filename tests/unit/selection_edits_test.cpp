@@ -6,8 +6,8 @@
 #include <map>
 #include <random>
 
-#include "host/selection/add.hpp"
-#include "host/selection/candidate_models.hpp"
+#include "host/engine/selection/add.hpp"
+#include "host/engine/selection/candidate_models.hpp"
 
 namespace flexspline::selection {
 namespace {

@@ -4,7 +4,7 @@
 #include <cmath>
 #include <random>
 
-#include "host/selection/confounding.hpp"
+#include "host/engine/selection/confounding.hpp"
 #include "tests/support/plain_model.hpp"
 #include "tests/support/ripple_candidate.hpp"
 

@@ -1,5 +1,5 @@
 // Meta-regression over records against closed forms: ordinary least squares, enumerated permutations, the likelihood.
-#include "host/selection/meta_regression.hpp"
+#include "host/engine/selection/meta_regression.hpp"
 
 #include <gtest/gtest.h>
 

@@ -1,5 +1,5 @@
-// host/selection/record_cross_validation: what records that were left out say, by the sign test.
-#include "host/selection/record_cross_validation.hpp"
+// host/engine/selection/record_cross_validation: what records that were left out say, by the sign test.
+#include "host/engine/selection/record_cross_validation.hpp"
 
 #include <gtest/gtest.h>
 

@@ -1,6 +1,6 @@
 // Checks of what a fit would name although the data are too short or too one-sided to show it, on motions that are
 // written down.
-#include "host/selection/significance_checks.hpp"
+#include "host/engine/selection/significance_checks.hpp"
 
 #include <gtest/gtest.h>
 

@@ -11,11 +11,11 @@
 #include <numbers>
 #include <random>
 
-#include "host/estimation/variance_components.hpp"
-#include "host/selection/bandwidth.hpp"
-#include "host/selection/decision.hpp"
-#include "host/selection/forward_selection.hpp"
-#include "host/selection/friction_random_effects.hpp"
+#include "host/engine/estimation/variance_components.hpp"
+#include "host/engine/selection/bandwidth.hpp"
+#include "host/engine/selection/decision.hpp"
+#include "host/engine/selection/forward_selection.hpp"
+#include "host/engine/selection/friction_random_effects.hpp"
 
 namespace flexspline::selection {
 namespace {

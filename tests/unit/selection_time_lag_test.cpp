@@ -5,8 +5,8 @@
 #include <numbers>
 #include <random>
 
-#include "host/selection/time_lag.hpp"
-#include "host/signals/butterworth.hpp"
+#include "host/common/signals/butterworth.hpp"
+#include "host/engine/selection/time_lag.hpp"
 
 namespace flexspline::selection {
 namespace {

@@ -1,5 +1,5 @@
 // Sensitivity against the transfer functions of linear drives, on which every change has a closed form.
-#include "host/sensitivity/sensitivity.hpp"
+#include "host/engine/sensitivity/sensitivity.hpp"
 
 #include <gtest/gtest.h>
 
@@ -9,8 +9,9 @@
 #include <numbers>
 #include <stdexcept>
 
-#include "host/catalogue/constants.hpp"
-#include "host/sensitivity/lines.hpp"
+#include "host/engine/sensitivity/lines.hpp"
+#include "host/output/answers/sensitivity.hpp"
+#include "host/physics/catalogue/constants.hpp"
 
 namespace flexspline::sensitivity {
 namespace {
@@ -239,7 +240,7 @@ TEST(Sensitivity, AModelThatDivergesComesFirstAndHasNoError) {
   EXPECT_TRUE(std::isnan(worst.find("motor_velocity", "free")->rmse));
   EXPECT_TRUE(std::isnan(worst.find("motor_velocity", "free")->response.amplitude_ratio));
   EXPECT_TRUE(std::isfinite(worst.find("motor_balance")->rmse));
-  const nlohmann::json json = to_json(answer)["variants"][0];
+  const nlohmann::json json = output::sensitivity_json(answer)["variants"][0];
   EXPECT_TRUE(json["growth"].is_null());
   EXPECT_TRUE(json["overall"][1]["rmse"].is_null());
 }
@@ -261,7 +262,7 @@ TEST(Sensitivity, RefittingMakesGoodWhatItCan) {
 TEST(Sensitivity, TheAnswerDoesNotDependOnTheNumberOfThreads) {
   const data::Dataset dataset = motor_data({1.0, 2.0});
   Options options{.pipeline = kPipeline, .threads = 1};
-  const nlohmann::json one = to_json(analyse(dataset, motor_model(), options));
+  const nlohmann::json one = output::sensitivity_json(analyse(dataset, motor_model(), options));
   for (const unsigned threads : {2u, 7u}) {
     options.threads = threads;
     std::size_t told = 0;
@@ -269,7 +270,7 @@ TEST(Sensitivity, TheAnswerDoesNotDependOnTheNumberOfThreads) {
       EXPECT_EQ(done, ++told);
       EXPECT_EQ(all, 2u);
     };
-    EXPECT_EQ(to_json(analyse(dataset, motor_model(), options)), one) << threads;
+    EXPECT_EQ(output::sensitivity_json(analyse(dataset, motor_model(), options)), one) << threads;
     EXPECT_EQ(told, 2u);
   }
 }

@@ -1,4 +1,4 @@
-#include "host/signals/autocorrelation.hpp"
+#include "host/common/signals/autocorrelation.hpp"
 
 #include <gtest/gtest.h>
 

@@ -1,6 +1,6 @@
 // A filter over a long signal that is made and taken a block at a time, against the same filter over all of it at
 // once.
-#include "host/signals/blockwise_filter.hpp"
+#include "host/common/signals/blockwise_filter.hpp"
 
 #include <gtest/gtest.h>
 

@@ -1,4 +1,4 @@
-#include "host/signals/butterworth.hpp"
+#include "host/common/signals/butterworth.hpp"
 
 #include <gtest/gtest.h>
 
@@ -10,7 +10,7 @@
 #include <string>
 #include <vector>
 
-#include "host/signals/differentiate.hpp"
+#include "host/common/signals/differentiate.hpp"
 
 namespace flexspline::signals {
 namespace {

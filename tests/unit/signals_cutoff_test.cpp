@@ -1,4 +1,4 @@
-#include "host/signals/cutoff.hpp"
+#include "host/common/signals/cutoff.hpp"
 
 #include <gtest/gtest.h>
 
@@ -8,7 +8,7 @@
 #include <stdexcept>
 #include <vector>
 
-#include "host/signals/butterworth.hpp"
+#include "host/common/signals/butterworth.hpp"
 
 namespace flexspline::signals {
 namespace {

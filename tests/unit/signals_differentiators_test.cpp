@@ -1,6 +1,6 @@
 // Derivatives by every method of the table: against closed forms, against sines sent through them, and against each
 // method's definition in continuous time.
-#include "host/signals/differentiators.hpp"
+#include "host/common/signals/differentiators.hpp"
 
 #include <gtest/gtest.h>
 

@@ -1,5 +1,5 @@
-// host/signals/fused_velocity: a velocity of two measurements.
-#include "host/signals/fused_velocity.hpp"
+// host/common/signals/fused_velocity: a velocity of two measurements.
+#include "host/common/signals/fused_velocity.hpp"
 
 #include <gtest/gtest.h>
 
@@ -8,8 +8,8 @@
 #include <string>
 #include <vector>
 
-#include "host/signals/butterworth.hpp"
-#include "host/signals/differentiate.hpp"
+#include "host/common/signals/butterworth.hpp"
+#include "host/common/signals/differentiate.hpp"
 
 namespace flexspline::signals {
 namespace {

@@ -1,4 +1,4 @@
-#include "host/signals/interpolate.hpp"
+#include "host/common/signals/interpolate.hpp"
 
 #include <gtest/gtest.h>
 

@@ -1,6 +1,6 @@
 // The Kalman smoother: against the least-squares solution of the same model, against motions drawn from it, and against
 // sines through an encoder.
-#include "host/signals/kalman_smoother.hpp"
+#include "host/common/signals/kalman_smoother.hpp"
 
 #include <gtest/gtest.h>
 

@@ -1,4 +1,4 @@
-#include "host/signals/spectrum.hpp"
+#include "host/common/signals/spectrum.hpp"
 
 #include <gtest/gtest.h>
 
@@ -14,7 +14,7 @@
 #include <string>
 #include <vector>
 
-#include "host/signals/fft.hpp"
+#include "host/common/signals/fft.hpp"
 
 namespace flexspline::signals {
 namespace {

@@ -10,9 +10,9 @@
 #include <utility>
 #include <vector>
 
-#include "host/catalogue/constants.hpp"
-#include "host/simulation/root.hpp"
-#include "host/simulation/simulation.hpp"
+#include "host/physics/catalogue/constants.hpp"
+#include "host/physics/simulation/root.hpp"
+#include "host/physics/simulation/simulation.hpp"
 
 namespace {
 

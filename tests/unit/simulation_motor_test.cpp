@@ -10,8 +10,8 @@
 #include <utility>
 #include <vector>
 
-#include "host/catalogue/constants.hpp"
-#include "host/simulation/simulation.hpp"
+#include "host/physics/catalogue/constants.hpp"
+#include "host/physics/simulation/simulation.hpp"
 
 namespace {
 

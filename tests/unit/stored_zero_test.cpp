@@ -1,5 +1,5 @@
 // A zero that the drive keeps in its parameter block: it holds after the next power-on, and what makes it invalid.
-#include "host/drive/stored_zero.hpp"
+#include "host/drive_link/drive/stored_zero.hpp"
 
 #include <gtest/gtest.h>
 

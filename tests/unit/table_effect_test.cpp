@@ -6,8 +6,8 @@
 #include <numbers>
 #include <random>
 
-#include "host/catalogue/constants.hpp"
-#include "host/catalogue/user_defined_effect.hpp"
+#include "host/physics/catalogue/constants.hpp"
+#include "host/physics/catalogue/user_defined_effect.hpp"
 #include "tests/support/drive_trial.hpp"
 
 namespace flexspline::tests {

@@ -1,4 +1,4 @@
-// host/text: TOML as a tree with positions, the nearest name, signs of units.
+// host/common/text: TOML as a tree with positions, the nearest name, signs of units.
 #include <gtest/gtest.h>
 
 #include <array>
@@ -6,9 +6,9 @@
 #include <string>
 #include <string_view>
 
-#include "host/text/nearest.hpp"
-#include "host/text/toml.hpp"
-#include "host/text/unit_signs.hpp"
+#include "host/common/text/nearest.hpp"
+#include "host/common/text/toml.hpp"
+#include "host/common/text/unit_signs.hpp"
 #include "tests/unit/data_test_files.hpp"
 
 namespace flexspline::text {

@@ -6,8 +6,8 @@
 
 #include "hil/board/scenario.hpp"
 #include "hil/board/three_phase.hpp"
-#include "host/deployment/commissioning_settings.hpp"
-#include "host/deployment/foc_settings.hpp"
+#include "host/drive_link/deployment/commissioning_settings.hpp"
+#include "host/drive_link/deployment/foc_settings.hpp"
 #include "tests/support/virtual_drive.hpp"
 #include "tests/unit/foc_rig.hpp"
 

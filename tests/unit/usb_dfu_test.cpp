@@ -7,7 +7,7 @@
 #include <vector>
 
 #include "firmware/boot_loader.hpp"
-#include "host/firmware/dfu_host.hpp"
+#include "host/drive_link/firmware/dfu_host.hpp"
 #include "shared/usb/dfu.hpp"
 #include "tests/support/update_bench.hpp"
 #include "tests/support/usb_parts.hpp"

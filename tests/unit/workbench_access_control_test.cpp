@@ -1,5 +1,5 @@
-// host/workbench: who may speak with the server, and which files a request may name.
-#include "host/workbench/access_control.hpp"
+// host/app/workbench: who may speak with the server, and which files a request may name.
+#include "host/app/workbench/access_control.hpp"
 
 #include <gtest/gtest.h>
 

@@ -1,5 +1,5 @@
-// host/workbench: what the page asks for, without a socket.
-#include "host/workbench/api.hpp"
+// host/app/workbench: what the page asks for, without a socket.
+#include "host/app/workbench/api.hpp"
 
 #include <gtest/gtest.h>
 
@@ -11,8 +11,8 @@
 #include <nlohmann/json.hpp>
 #include <thread>
 
-#include "host/selection/add.hpp"
-#include "host/workbench/work.hpp"
+#include "host/app/workbench/work.hpp"
+#include "host/engine/selection/add.hpp"
 #include "tests/unit/comparison_test_drive.hpp"
 
 namespace flexspline::workbench {

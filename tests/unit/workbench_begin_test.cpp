@@ -1,12 +1,12 @@
-// host/workbench without a model: recordings are dropped, columns chosen, and there is a first step.
+// host/app/workbench without a model: recordings are dropped, columns chosen, and there is a first step.
 #include <gtest/gtest.h>
 
 #include <filesystem>
 #include <fstream>
 #include <nlohmann/json.hpp>
 
-#include "host/workbench/api.hpp"
-#include "host/workbench/work.hpp"
+#include "host/app/workbench/api.hpp"
+#include "host/app/workbench/work.hpp"
 #include "tests/unit/comparison_test_drive.hpp"
 
 namespace flexspline::workbench {

@@ -1,5 +1,5 @@
-// host/workbench/live_drive: a drive that goes away and comes back.
-#include "host/workbench/live_drive.hpp"
+// host/app/workbench/live_drive: a drive that goes away and comes back.
+#include "host/app/workbench/live_drive.hpp"
 
 #include <gtest/gtest.h>
 
@@ -9,7 +9,7 @@
 
 #include "hil/twin/factory_block.hpp"
 #include "hil/twin/twin_drive.hpp"
-#include "host/deployment/bases.hpp"
+#include "host/drive_link/deployment/bases.hpp"
 #include "tests/support/loopback.hpp"
 #include "tests/unit/comparison_test_drive.hpp"
 

@@ -1,11 +1,11 @@
-// host/report/maps, as the workbench shows them: a ripple is drawn with enough points for each of its waves.
+// host/output/report/maps, as the workbench shows them: a ripple is drawn with enough points for each of its waves.
 #include <gtest/gtest.h>
 
 #include <cmath>
 #include <nlohmann/json.hpp>
 
-#include "host/workbench/result_view.hpp"
-#include "host/workbench/work.hpp"
+#include "host/app/workbench/result_view.hpp"
+#include "host/app/workbench/work.hpp"
 #include "tests/unit/comparison_test_drive.hpp"
 
 namespace flexspline::workbench {

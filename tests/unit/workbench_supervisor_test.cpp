@@ -1,5 +1,5 @@
-// host/workbench: a worker process that crashes, takes too much memory or does not end. Real signals, real limits.
-#include "host/workbench/supervisor.hpp"
+// host/app/workbench: a worker process that crashes, takes too much memory or does not end. Real signals, real limits.
+#include "host/app/workbench/supervisor.hpp"
 
 #include <gtest/gtest.h>
 #include <sys/mman.h>
@@ -12,7 +12,7 @@
 #include <sstream>
 #include <thread>
 
-#include "host/estimation/cancellation.hpp"
+#include "host/engine/estimation/cancellation.hpp"
 
 namespace flexspline::workbench {
 namespace {

@@ -1,5 +1,5 @@
-// host/workbench: signals within a window of time. No peak is lost, whatever the zoom.
-#include "host/workbench/window.hpp"
+// host/app/workbench: signals within a window of time. No peak is lost, whatever the zoom.
+#include "host/app/workbench/window.hpp"
 
 #include <gtest/gtest.h>
 
@@ -8,7 +8,7 @@
 #include <nlohmann/json.hpp>
 #include <random>
 
-#include "host/workbench/history.hpp"
+#include "host/app/workbench/history.hpp"
 
 namespace flexspline::workbench {
 namespace {

@@ -9,8 +9,8 @@
 #include <string>
 #include <vector>
 
-#include "host/drive/dataset_writer.hpp"
-#include "host/drive/recorder.hpp"
+#include "host/drive_link/drive/dataset_writer.hpp"
+#include "host/drive_link/drive/recorder.hpp"
 #include "tests/support/port_process.hpp"
 #include "tests/support/usbip_link.hpp"
 

@@ -1,4 +1,4 @@
-// Times of the page in headless Chromium, for host/workbench/README.md; no test, as times are no law.
+// Times of the page in headless Chromium, for host/app/workbench/README.md; no test, as times are no law.
 // figures.mjs TOOL MODULES WORK CHROMIUM
 import { spawn } from "node:child_process";
 import { mkdirSync, rmSync, writeFileSync } from "node:fs";

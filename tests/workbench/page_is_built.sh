@@ -22,6 +22,6 @@ npm run build >build.log 2>&1 || {
   exit 1
 }
 diff -r built "$page/built" >/dev/null || {
-  echo "host/workbench/page/built is not what its sources make; run: ./dev page"
+  echo "host/app/workbench/page/built is not what its sources make; run: ./dev page"
   exit 1
 }

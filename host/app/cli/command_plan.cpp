@@ -1,0 +1,155 @@
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <nlohmann/json.hpp>
+
+#include "host/app/cli/command.hpp"
+#include "host/app/cli/common_options.hpp"
+#include "host/engine/planning/design.hpp"
+#include "host/output/answers/json.hpp"
+#include "host/output/answers/plan.hpp"
+
+namespace flexspline::cli {
+namespace {
+
+struct PlanOptions {
+  DataInputs data;  // may be none
+  PipelineInputs pipeline;
+  std::filesystem::path model;
+  std::filesystem::path out;
+  std::vector<std::string> separate;  // two effects, or none
+  std::vector<std::string> without;   // off, locked, load, temperature
+  std::vector<double> temperatures_c;
+  std::optional<double> current_a, velocity_rad_s, travel_rad, duration_s, load_torque_nm, run_s, sample_hz;
+  int motions = 4;
+  std::string json;
+};
+
+planning::MotionSettings setting_of(const PlanOptions& options, const model::Model& model,
+                                    const data::Dataset* dataset) {
+  planning::MotionSettings setting = planning::setting_of(model, dataset);
+  planning::Limits& limits = setting.limits;
+  const double known_current = limits.current_a;
+  limits.current_a = options.current_a.value_or(limits.current_a);
+  limits.velocity_rad_s = options.velocity_rad_s.value_or(limits.velocity_rad_s);
+  limits.travel_rad = options.travel_rad.value_or(limits.travel_rad);
+  limits.duration_s = options.duration_s.value_or(limits.duration_s);
+  // What the gear carries, and what can be applied to it, go with the current that there is.
+  const double share = known_current > 0.0 ? std::min(1.0, limits.current_a / known_current) : 1.0;
+  setting.locked_current_a = known_current > 0.0 ? setting.locked_current_a * share : limits.current_a;
+  limits.load_torque_nm = options.load_torque_nm.value_or(limits.load_torque_nm * share);
+  setting.run_s = options.run_s.value_or(setting.run_s);
+  if (options.temperatures_c.size() == 2) {
+    setting.cold_c = std::min(options.temperatures_c[0], options.temperatures_c[1]);
+    setting.warm_c = std::max(options.temperatures_c[0], options.temperatures_c[1]);
+    setting.temperature = true;
+  }
+  for (const std::string& what : options.without) {
+    if (what == "off") setting.off = false;
+    if (what == "locked") setting.locked = false;
+    if (what == "load") setting.external_load = false;
+    if (what == "temperature") setting.temperature = false;
+  }
+  if (!(limits.current_a > 0.0))
+    throw UsageError("the largest current is not known; state rated_current_a in the model's [drive], or --current-a");
+  if (!(limits.velocity_rad_s > 0.0))
+    throw UsageError(
+        "the largest velocity is not known; state rated_velocity_rad_s in the model's [drive], or --velocity-rad-s");
+  return setting;
+}
+
+// In seconds: as the user states it, else that of the data. Logs of current loops are faster than any motion needs, and
+// each sample is rehearsed some hundred times.
+double sample_time(const PlanOptions& options, const data::Dataset* dataset, double run_s, Console& console) {
+  constexpr double kFastestHz = 20e3, kMostSamples = 1e6;
+  double hz = options.sample_hz.value_or(1000.0);
+  if (!options.sample_hz && dataset && !dataset->experiments.empty()) {
+    hz = 1.0 / dataset->experiments.front().sample_s;
+    if (hz > kFastestHz)
+      console.warn(fmt::format("the data have {:g} samples a second; the plan is for {:g}; --sample-hz states another",
+                               hz, kFastestHz));
+    hz = std::min(hz, kFastestHz);
+  }
+  if (run_s * hz > kMostSamples)
+    throw UsageError(
+        fmt::format("a run of {:g} s at {:g} Hz has more than {:g} samples; state a lower --sample-hz, or "
+                    "shorter runs by --run-s",
+                    run_s, hz, kMostSamples));
+  return 1.0 / hz;
+}
+
+int run(const PlanOptions& options, Console& console) {
+  const model::ModelFile file = load_searched_model(options.model);
+  std::optional<data::Dataset> dataset;
+  if (!options.data.data.empty()) dataset = load(options.data, console);
+  planning::PlanRequest question;
+  question.model = &file.model;
+  question.dataset = dataset ? &*dataset : nullptr;
+  question.pipeline = options.pipeline.options();
+  question.setting = setting_of(options, file.model, question.dataset);
+  question.sensors = planning::sensors_of(question.dataset);
+  question.sample_s = sample_time(options, dataset ? &*dataset : nullptr, question.setting.run_s, console);
+  question.most_motions = static_cast<std::size_t>(options.motions);
+  question.progress = [&](std::string_view stage) { console.progress(stage); };
+  const planning::Design design = options.separate.empty()
+                                      ? planning::excite(question)
+                                      : planning::separate(question, options.separate[0], options.separate[1]);
+  for (const std::string& warning : design.warnings) console.warn(warning);
+  model::save(options.out, planning::text_of(design.plan));
+  output::print_plan(console, design, options.out.string());
+  output::save_json(options.json, output::plan_json(design));
+  return kDone;
+}
+
+void declare(Parser& parser, PlanOptions& options) {
+  parser.option("DATA", options.data.data, fmt::format("what there is already: {}", kDataHelp)).value("");
+  take_tolerate(parser, options.data.tolerate);
+  take_model(parser, options.model);
+  parser.option("--out", options.out, "the plan").required().value("PLAN");
+  parser.option("--separate", options.separate, "two effects to distinguish (default: what is not well known)")
+      .comma_separated()
+      .number_of_values(2)
+      .value("A,B");
+  const auto limit = [&parser](const char* name, std::optional<double>& value, const char* help, const char* unit) {
+    parser.option(name, value, help).positive().value(unit);
+  };
+  limit("--current-a", options.current_a, "largest motor current (default: the model's rated one)", "A");
+  limit("--velocity-rad-s", options.velocity_rad_s, "largest motor velocity (default: the model's rated one)", "RAD/S");
+  limit("--travel-rad", options.travel_rad, "travel of the output from end to end (default: one turn)", "RAD");
+  limit("--duration-s", options.duration_s, "of all recordings together (default: 180)", "S");
+  limit("--load-torque-nm", options.load_torque_nm,
+        "constant torque that you can apply to the output (default: what half of the current holds)", "NM");
+  limit("--run-s", options.run_s, "of one recording (default: 8)", "S");
+  limit("--sample-hz", options.sample_hz, "rate of the recording (default: that of DATA, else 1000)", "HZ");
+  parser.option("--without", options.without, "what you cannot do: off, locked, load, temperature")
+      .comma_separated()
+      .one_of({"off", "locked", "load", "temperature"})
+      .value("WHAT");
+  parser.option("--temperatures", options.temperatures_c, "housing cold and warm, degC (default: 25,40)")
+      .comma_separated()
+      .number_of_values(2)
+      .value("COLD,WARM");
+  parser.option("--motions", options.motions, "at most so many").within(1, 20).shows_default().value("N");
+  take_pipeline(parser, options.pipeline);
+}
+
+}  // namespace
+
+Command plan_command() {
+  return command<PlanOptions>(
+      {"plan",
+       "designs the motion that distinguishes two effects, or that determines the parameters",
+       "Rehearses some thirty motions with the model, within the limits of the drive: triangles slow and fast, sines, "
+       "saw-teeth, multisines, chirps, steps of speed, a locked output, a constant load, two temperatures, the "
+       "drive off. With --separate, motions are chosen that distinguish two effects best: by the part of one "
+       "effect's torque that the model with the other cannot reproduce, over the noise. Without it, motions that "
+       "determine all parameters best. Measurements, where given, give the noise, the sizes of the effects and what "
+       "need not be recorded again. If no motion distinguishes two effects, the answer says so. The plan is a TOML "
+       "file that flexspline-hil record --plan runs on the twin.",
+       {kMakeData, kIdentify,
+        "flexspline plan --separate stribeck_gaussian,load_dependent_friction --model fitted.toml --out "
+        "plan.toml"}},
+      declare, run);
+}
+
+}  // namespace flexspline::cli

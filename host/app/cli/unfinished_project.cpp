@@ -1,0 +1,120 @@
+#include "host/app/cli/unfinished_project.hpp"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <fstream>
+#include <iterator>
+#include <set>
+#include <vector>
+
+#include "host/common/text/nearest.hpp"
+#include "host/input/data/findings.hpp"
+#include "host/physics/model/text.hpp"
+
+namespace flexspline::cli {
+namespace {
+
+namespace fs = std::filesystem;
+
+// Behind the first line's text, so that all lines stay where they are.
+constexpr std::string_view kMark = "  # an unfinished draft of flexspline new";
+
+std::vector<data::Finding> errors_of(const std::exception& why) {
+  std::vector<data::Finding> errors;
+  if (const auto* unusable = dynamic_cast<const data::DataError*>(&why))
+    for (const data::Finding& finding : unusable->findings())
+      if (finding.severity == data::Severity::error) errors.push_back(finding);
+  return errors;
+}
+
+std::string as_argument(const std::string& name, const std::string& value) {
+  return value.empty() ? "" : fmt::format(" {} {}", name, quoted(value));
+}
+
+std::string number_argument(const std::string& name, const std::optional<double>& value) {
+  return value ? fmt::format(" {} {:g}", name, *value) : "";
+}
+
+// What was given, to be typed again.
+std::string as_given(const project::Request& request) {
+  std::string line =
+      fmt::format("flexspline new --from {} --out {}", as_arguments(request.data), quoted(request.out.string()));
+  for (const std::string& map : request.map) line += as_argument("--map", map);
+  for (const std::string& name : request.without) line += as_argument("--without", name);
+  for (const std::string& name : request.turned) line += as_argument("--turn", name);
+  line += as_argument("--axis", request.axis) + as_argument("--position-side", request.position_side);
+  if (request.joint) line += fmt::format(" --joint {}", *request.joint);
+  if (request.pole_pairs) line += fmt::format(" --pole-pairs {}", *request.pole_pairs);
+  line += number_argument("--gear-ratio", request.gear_ratio);
+  line += number_argument("--torque-constant", request.torque_constant_nm_a);
+  line += number_argument("--encoder-counts", request.encoder_counts);
+  for (const std::string& kind : request.tolerate) line += as_argument("--tolerate", kind);
+  return line;
+}
+
+// A --map for each signal that a motor balance needs and that was not found.
+std::string missing_maps(const project::Draft& draft) {
+  const auto there = [&](std::initializer_list<const char*> any) {
+    return std::any_of(any.begin(), any.end(), [&](const char* name) {
+      return std::find(draft.there.begin(), draft.there.end(), name) != draft.there.end();
+    });
+  };
+  std::vector<std::string> missing;
+  if (!there({"time_s"})) missing.emplace_back("time_s");
+  if (!there({"current_a", "motor_torque_nm"})) missing.emplace_back("current_a");
+  if (!there({"motor_position_rad", "motor_velocity_rad_s"})) missing.emplace_back("motor_position_rad");
+  std::string line;
+  std::vector<std::string> left = draft.unused;
+  for (const std::string& ours : missing) {
+    std::string theirs = "NAME";
+    if (!left.empty()) {
+      theirs = text::nearest_first(ours, left).front();
+      std::erase(left, theirs);
+    }
+    line += fmt::format(" --map {}", quoted(fmt::format("{}={}", ours, theirs)));
+  }
+  return line;
+}
+
+// The kinds to tolerate, where that alone would do.
+std::string tolerations(const std::vector<data::Finding>& errors) {
+  std::set<std::string> kinds;
+  for (const data::Finding& error : errors) {
+    const auto known = data::known_kinds();
+    const auto kind = std::find_if(known.begin(), known.end(), [&](const auto& k) { return k.name == error.kind; });
+    if (kind == known.end() || !kind->tolerable || error.remedy.find("--tolerate") == std::string::npos) return {};
+    kinds.insert(error.kind);
+  }
+  std::string line;
+  for (const std::string& kind : kinds) line += fmt::format(" --tolerate {}", kind);
+  return line;
+}
+
+}  // namespace
+
+bool is_unfinished(const fs::path& dataset_toml) {
+  std::ifstream file(dataset_toml, std::ios::binary);
+  std::string first;
+  return std::getline(file, first) && first.ends_with(kMark);
+}
+
+void leave_unfinished(const project::Draft& draft, const project::Request& request, const std::exception& why,
+                      Console& console) {
+  const fs::path file = request.out / "dataset.toml";
+  make_folder(request.out);
+  std::string text = project::text_of(draft, request.out);
+  text.insert(text.find('\n'), kMark);
+  model::save(file, text);
+  const std::vector<data::Finding> errors = errors_of(why);
+  for (const data::Finding& error : errors) console.error(error.text());
+  if (errors.empty()) console.error(why.what());
+  std::string line = as_given(request) + missing_maps(draft) + tolerations(errors);
+  if (!draft.open_question.empty()) line += " --position-side link";
+  console.error(
+      fmt::format("{} holds what could be found; replace NAME, or a wrong name, by the right one "
+                  "(NAME:UNIT states its unit), and continue with\n  {}",
+                  file.string(), line));
+}
+
+}  // namespace flexspline::cli

@@ -1,0 +1,23 @@
+// The bases of per-unit numbers, from the ratings of a drive.
+#pragma once
+
+#include "host/physics/model/model.hpp"
+#include "shared/effects/effect.hpp"
+#include "shared/model/block.hpp"
+
+namespace flexspline::deployment {
+
+// Known facts and bases of a drive in SI, ready for `derive`: each base is exactly the number that a block holds.
+// `torque_scale` widens the bases of torque where a model gives more than 16 of them. Needs gear ratio, rated velocity
+// and a rated torque or current; throws PackError naming what is missing.
+effects::DriveConstants<double> bases_of(const model::Model& model, double tick_s, double torque_scale);
+
+// What rated torque means for the share of an error: at the motor it is that of the output over the gear ratio.
+double rated_output_torque(const model::Drive& drive);
+
+model::Number number_of(double x);
+double value_of(const model::Number& n);
+model::Bases in_block(const effects::DriveConstants<double>& d);
+effects::DriveConstants<double> from_block(const model::Bases& bases);
+
+}  // namespace flexspline::deployment

@@ -1,0 +1,176 @@
+#include "host/engine/estimation/balance_data.hpp"
+
+#include <fmt/format.h>
+
+#include "host/common/signals/differentiate.hpp"
+#include "host/engine/estimation/filtered_columns.hpp"
+
+namespace flexspline::estimation {
+namespace {
+
+constexpr Eigen::Index kFewestRows = 16;
+
+}  // namespace
+
+bool BalanceData::usable(const Record& r) const {
+  switch (balance_) {
+    case Balance::motor:
+      return !r.effort.empty() && r.has_motor_motion && (!prepared_->torque_measured || !r.torque.empty());
+    case Balance::transmission:
+      return !r.torque.empty() && r.has_motor_motion && r.has_output_motion && !r.at_rest;
+    case Balance::load:
+      return !r.torque.empty() && !r.locked && (r.has_output_motion || r.has_motor_motion) && !r.at_rest;
+  }
+  return false;
+}
+
+double BalanceData::share(const Record& r, Balance of_effect) const {
+  if (of_effect == balance_) return 1.0;
+  if (balance_ != Balance::motor || prepared_->torque_measured) return 0.0;
+  const Balance through = r.locked ? Balance::transmission : Balance::load;
+  return of_effect == through ? 1.0 / prepared_->constants.gear_ratio : 0.0;
+}
+
+void BalanceData::filter(const RowRange& range, Eigen::Ref<Eigen::MatrixXd> signals) const {
+  const auto at = static_cast<std::size_t>(&range - ranges_.data());
+  for (const data::Segment& s : prepared_->records[range.record].segments)
+    filters_[at].apply_columns_in_place(
+        signals.middleRows(static_cast<Eigen::Index>(s.first), static_cast<Eigen::Index>(s.last - s.first)));
+}
+
+bool BalanceData::have_equal_filters(const RowRange& a, const RowRange& b) const {
+  const Record &first = prepared_->records[a.record], &second = prepared_->records[b.record];
+  return first.sample_s == second.sample_s && first.segments.size() == 1 && second.segments.size() == 1 &&
+         first.inputs.size() == second.inputs.size() && first.segments[0].first == second.segments[0].first &&
+         first.segments[0].last == second.segments[0].last;
+}
+
+void BalanceData::take_rows(const RowRange& range, const double* signal, Eigen::Ref<Eigen::VectorXd> rows) const {
+  const auto& samples = prepared_->records[range.record].rows[index(balance_)].samples;
+  for (std::size_t k = 0; k < samples.size(); ++k) {
+    const double* at = signal + samples[k];
+    const double x = beyond_.empty() ? 0.0 : beyond_[static_cast<std::size_t>(range.first) + k];
+    // A cubic through four samples; the filter leaves nothing that it could not follow.
+    rows[static_cast<Eigen::Index>(k)] =
+        x == 0.0 ? *at
+                 : at[-1] * (x * (1.0 - x) * (x - 2.0) / 6.0) + at[0] * ((x + 1.0) * (x - 1.0) * (x - 2.0) / 2.0) +
+                       at[1] * ((x + 1.0) * x * (2.0 - x) / 2.0) + at[2] * ((x + 1.0) * x * (x - 1.0) / 6.0);
+  }
+}
+
+namespace {
+
+// Left sides of a balance and their negative slopes along a record, for BalanceData::filtered_columns.
+class LeftHandSides {
+ public:
+  LeftHandSides(const PreparedData& prepared, Balance balance) : prepared_(prepared), balance_(balance) {}
+
+  unsigned reads(std::size_t) const { return 0; }
+  void operator()(const RowRange& range, std::size_t column, const ColumnBlock& block) {
+    const Record& r = prepared_.records[range.record];
+    if (column == 0)
+      fill_target(r, block.first, block.signal);
+    else
+      fill_delay(r, block.first, block.signal);
+  }
+
+ private:
+  double left_side(const Record& r, std::size_t k) const {
+    switch (balance_) {
+      case Balance::motor:
+        return r.effort[k] - (prepared_.torque_measured ? r.torque[k] / prepared_.constants.gear_ratio : 0.0);
+      case Balance::transmission:
+        return r.torque[k];
+      case Balance::load:
+        return r.torque[k] - (r.load_torque.empty() ? 0.0 : r.load_torque[k]);
+    }
+    return 0.0;
+  }
+  void fill_target(const Record& r, std::size_t from, std::span<double> signal) const {
+    for (std::size_t k = 0; k < signal.size(); ++k) signal[k] = left_side(r, from + k);
+    // A known load torque reaches the motor through the gear.
+    if (balance_ == Balance::motor && !prepared_.torque_measured && !r.load_torque.empty())
+      for (std::size_t k = 0; k < signal.size(); ++k)
+        signal[k] -= r.load_torque[from + k] / prepared_.constants.gear_ratio;
+  }
+  void fill_delay(const Record& r, std::size_t from, std::span<double> signal) {
+    const std::size_t end = from + signal.size();
+    for (const data::Segment& s : r.segments) {
+      const std::size_t begin = std::max(from, s.first), last = std::min(end, s.last);
+      if (begin >= last) continue;
+      // With the neighbours that slopes need, at the ends of the segment two.
+      const std::size_t before = std::min<std::size_t>(begin - s.first, 2);
+      left_.resize(last - begin + before + std::min<std::size_t>(s.last - last, 2));
+      slope_.resize(left_.size());
+      fill_target(r, begin - before, left_);
+      signals::central_derivative(left_, r.sample_s, slope_);
+      for (std::size_t k = begin; k < last; ++k) signal[k - from] = -slope_[k - begin + before];
+    }
+  }
+
+  const PreparedData& prepared_;
+  Balance balance_;
+  std::vector<double> left_, slope_;
+};
+
+}  // namespace
+
+BalanceData::BalanceData(const PreparedData& prepared, Balance balance) : prepared_(&prepared), balance_(balance) {
+  Eigen::Index first = 0;
+  for (std::size_t i = 0; i < prepared.records.size(); ++i) {
+    const Record& r = prepared.records[i];
+    const auto count = static_cast<Eigen::Index>(r.rows[index(balance)].samples.size());
+    if (!usable(r)) continue;
+    if (count < kFewestRows) {
+      left_out_.emplace(i, fmt::format("{} (of its {} samples {} are masked)", r.name,
+                                       r.rows[index(balance)].masked + static_cast<std::size_t>(count),
+                                       r.rows[index(balance)].masked));
+      continue;
+    }
+    ranges_.push_back({i, first, first + count});
+    filters_.emplace_back(signals::ZeroPhaseFilter::kDefaultOrder,
+                          std::min(prepared.pipeline.row_cutoff_hz, 0.45 / r.sample_s), 1.0 / r.sample_s);
+    first += count;
+  }
+  const Eigen::MatrixXd both = filtered_columns(2, LeftHandSides(prepared, balance));
+  target_ = both.col(0);
+  delay_ = both.col(1);
+}
+
+double BalanceData::filter_autocorrelation_time() const {
+  double longest = 1.0;
+  for (std::size_t i = 0; i < ranges_.size(); ++i) {
+    const Record& r = prepared_->records[ranges_[i].record];
+    const double row_hz = 1.0 / (r.sample_s * static_cast<double>(r.decimation));
+    constexpr int kSteps = 200;
+    const double top_hz = std::min(3.0 * filters_[i].cutoff_hz(), 0.5 / r.sample_s);
+    double bandwidth_hz = 0.0;
+    for (int k = 0; k < kSteps; ++k) {
+      const double gain = filters_[i].gain((k + 0.5) / kSteps * top_hz);
+      bandwidth_hz += gain * gain * top_hz / kSteps;
+    }
+    longest = std::max(longest, row_hz / (2.0 * bandwidth_hz));
+  }
+  return longest;
+}
+
+std::vector<std::vector<RowRange>> BalanceData::folds(std::size_t parts) const {
+  std::vector<std::vector<RowRange>> folds(parts);
+  for (const RowRange& range : ranges_)
+    for (std::size_t part = 0; part < parts; ++part) {
+      const auto cut = [&](std::size_t p) {
+        return range.first + static_cast<Eigen::Index>(static_cast<std::size_t>(range.size()) * p / parts);
+      };
+      folds[part].push_back({range.record, cut(part), cut(part + 1)});
+    }
+  return folds;
+}
+
+std::size_t BalanceData::sample_of(const RowRange& range, Eigen::Index row) const {
+  Eigen::Index start = 0;
+  for (const RowRange& whole : ranges_)
+    if (whole.record == range.record) start = whole.first;
+  return prepared_->records[range.record].rows[index(balance_)].samples[static_cast<std::size_t>(row - start)];
+}
+
+}  // namespace flexspline::estimation

@@ -1,0 +1,201 @@
+#include "host/engine/estimation/balance_fit.hpp"
+
+#include <cmath>
+
+#include "host/engine/estimation/least_squares.hpp"
+#include "host/engine/estimation/record_variance.hpp"
+#include "host/engine/estimation/variable_projection.hpp"
+
+namespace flexspline::estimation {
+
+Eigen::MatrixXd nonlinear_columns(BalanceData& data, const Terms& terms, const std::vector<std::size_t>& on_balance,
+                                  const std::vector<ParameterRef>& nonlinear) {
+  return data.nonlinear_columns(terms, on_balance, nonlinear);
+}
+
+NaturalValue natural_value(const Term& term, ParameterRef requested, const std::vector<ParameterRef>& refs,
+                           const Eigen::MatrixXd& covariance) {
+  NaturalValue result;
+  result.value = catalogue::natural(*term.entry, term.values)[requested.parameter];
+  Eigen::VectorXd slopes = Eigen::VectorXd::Zero(covariance.rows());
+  for (std::size_t j = 0; j < refs.size(); ++j) {
+    if (refs[j].term != requested.term) continue;
+    std::vector<numbers::Jet> values(term.values.begin(), term.values.end());
+    values[refs[j].parameter].v[0] = 1.0;
+    slopes[static_cast<Eigen::Index>(j)] = catalogue::natural(*term.entry, values)[requested.parameter].v[0];
+  }
+  // An undetermined parameter has an infinite variance, which must not be multiplied by a slope of zero.
+  for (Eigen::Index i = 0; i < slopes.size(); ++i)
+    for (Eigen::Index j = 0; j < slopes.size(); ++j)
+      if (slopes[i] != 0.0 && slopes[j] != 0.0) result.variance += slopes[i] * covariance(i, j) * slopes[j];
+  return result;
+}
+
+Eigen::VectorXd residual_of(BalanceData& data, const Terms& terms) {
+  Eigen::VectorXd residual = data.target();
+  for (const std::size_t t : terms_on(terms, data.balance(), data.prepared().torque_measured))
+    residual -= data.term_torque(terms, t);
+  for (const std::size_t t : terms_acting_on_other_balance(terms, data.balance(), data.prepared().torque_measured))
+    residual -= data.term_torque(terms, t);
+  return residual;
+}
+
+// Columns of the linear parameters, and the target. A column that equals the target (the effort, where only the effort
+// fixes the scale of the torques, report 3.6) would be a trivial solution: it is set to zero, so it is not determined.
+static Eigen::MatrixXd columns_and_target(BalanceData& data, const Terms& terms,
+                                          const std::vector<ParameterRef>& linear, const Eigen::VectorXd& target) {
+  constexpr double kSame = 1e-3;
+  Eigen::MatrixXd X = columns_of(data, terms, linear);
+  for (std::size_t j = 0; j < linear.size(); ++j) {
+    if ((terms[linear[j].term].entry->info->reads & effects::kTorqueScale) == 0) continue;
+    const auto column = X.col(static_cast<Eigen::Index>(j));
+    const double square = column.squaredNorm();
+    if (square > 0.0 && (target - column * (column.dot(target) / square)).norm() < kSame * target.norm())
+      X.col(static_cast<Eigen::Index>(j)).setZero();
+  }
+  return X;
+}
+
+namespace {
+
+// A fit as it proceeds, at the values that the terms have.
+class Fitting {
+ public:
+  Fitting(BalanceData& data, Terms& terms, BalanceFit& fit) : data_(data), terms_(terms), fit_(fit) {}
+
+  // Weights by record and parameters, one after the other.
+  void fit_weighted();
+  // With friction that differs between records, if that leaves nothing but noise: generalised least squares.
+  void fit_generalised();
+  // Of linear parameters and nonlinear parameters together, to first order.
+  void take_uncertainty();
+
+ private:
+  // Linear parameters at given nonlinear parameters; `whitening` is the noise covariance.
+  void solve(const NoiseCovariance& whitening) {
+    const Eigen::VectorXd target = data_.target() - data_.known_torque(terms_, fit_.on_balance);
+    const Eigen::MatrixXd X = columns_and_target(data_, terms_, fit_.linear, target);
+    const LinearFit linear = least_squares(X, target, whitening);
+    for (std::size_t j = 0; j < fit_.linear.size(); ++j)
+      terms_[fit_.linear[j].term].values[fit_.linear[j].parameter] = linear.theta[static_cast<Eigen::Index>(j)];
+    fit_.residual = linear.residual;
+  }
+
+  // Columns of linear parameters and nonlinear parameters.
+  Eigen::MatrixXd columns() {
+    Eigen::MatrixXd J(data_.rows(), static_cast<Eigen::Index>(fit_.linear.size() + fit_.nonlinear.size()));
+    J << columns_and_target(data_, terms_, fit_.linear, data_.target() - data_.known_torque(terms_, fit_.on_balance)),
+        nonlinear_columns(data_, terms_, fit_.on_balance, fit_.nonlinear);
+    return J;
+  }
+
+  // The torque of each friction group, from `columns`.
+  Eigen::MatrixXd friction(const Eigen::MatrixXd& columns) const {
+    Eigen::VectorXd theta = Eigen::VectorXd::Zero(columns.cols());
+    for (std::size_t j = 0; j < fit_.linear.size(); ++j)
+      theta[static_cast<Eigen::Index>(j)] = terms_[fit_.linear[j].term].values[fit_.linear[j].parameter];
+    return columns * random_effect_directions(friction_groups(terms_, fit_.linear, fit_.nonlinear), theta,
+                                              Eigen::VectorXd::Ones(columns.cols()),
+                                              static_cast<Eigen::Index>(fit_.linear.size()));
+  }
+
+  // How friction differs between records at the present values.
+  void estimate_differences() {
+    J_ = columns();
+    friction_ = friction(J_);
+    torques_ = noise_weights_.asDiagonal() * friction_;
+    between_ = paule_mandel(data_, torques_, noise_weights_.cwiseProduct(fit_.residual));
+  }
+
+  BalanceData& data_;
+  Terms& terms_;
+  BalanceFit& fit_;
+  Eigen::VectorXd noise_weights_;  // of the residual without the records' random effects
+  Eigen::MatrixXd J_, friction_, torques_;
+  RecordVariance between_;
+};
+
+void Fitting::fit_weighted() {
+  // Weights and parameters depend on each other; two rounds are enough.
+  sweep_nonlinear(data_, terms_, fit_.on_balance, fit_.root_weights);
+  for (int round = 0; round < 2; ++round) {
+    solve(fit_.root_weights);
+    fit_.root_weights = record_weights(data_.records(), fit_.residual);
+    if (!fit_.nonlinear.empty()) refine_nonlinear(data_, terms_, fit_.on_balance, fit_.root_weights);
+  }
+  solve(fit_.root_weights);
+  fit_.whitening = noise_weights_ = fit_.root_weights;
+}
+
+void Fitting::fit_generalised() {
+  estimate_differences();
+  const Terms weighted_terms = terms_;
+  const Eigen::VectorXd weighted_residual = fit_.residual;
+  constexpr int kGeneralised = 3;
+  for (int round = 0; round < kGeneralised && between_.std.size() > 0 && between_.std.maxCoeff() > 0.0; ++round) {
+    noise_weights_ = record_weights(data_.records(), between_.left.cwiseQuotient(noise_weights_));
+    fit_.whitening = noise_covariance(data_, noise_weights_, noise_weights_.asDiagonal() * friction_, between_.std,
+                                      between_.autocorrelation_time);
+    // With random effects the best nonlinear parameter of a small effect may be far from that without.
+    if (round == 0) sweep_nonlinear(data_, terms_, fit_.on_balance, fit_.whitening, SweepFrom::values);
+    if (!fit_.nonlinear.empty()) refine_nonlinear(data_, terms_, fit_.on_balance, fit_.whitening);
+    solve(fit_.whitening);
+    estimate_differences();
+  }
+  if (fit_.whitening.is_diagonal()) return;
+  if (leaves_noise(between_, data_)) {
+    fit_.root_weights = record_weights(data_.records(), fit_.residual);
+    return;
+  }
+  terms_ = weighted_terms;
+  fit_.residual = weighted_residual;
+  fit_.whitening = noise_weights_ = fit_.root_weights;
+  estimate_differences();
+}
+
+void Fitting::take_uncertainty() {
+  const Eigen::VectorXd weighted = fit_.root_weights.cwiseProduct(fit_.residual);
+  fit_.autocorrelation_time =
+      std::max(autocorrelation_time(data_.records(), weighted), data_.filter_autocorrelation_time());
+  const LinearFit joint = least_squares(J_, fit_.residual, fit_.root_weights);
+  const LinearFit generalised = fit_.whitening.is_diagonal() ? joint : least_squares(J_, fit_.residual, fit_.whitening);
+  const double freedom = std::max(1.0, static_cast<double>(data_.rows() - J_.cols()));
+  fit_.covariance = generalised.unit_covariance;
+  std::vector<Eigen::Index> identified;
+  for (Eigen::Index j = 0; j < J_.cols(); ++j)
+    if (std::isfinite(generalised.unit_covariance(j, j))) identified.push_back(j);
+  // Covariance without the records' random effects, which are added below.
+  const Eigen::MatrixXd columns = fit_.whitening.score_columns(J_(Eigen::all, identified));
+  const Eigen::MatrixXd middle = newey_west(data_.records(), columns, between_.left,
+                                            newey_west_lags(between_.autocorrelation_time, data_.rows())) *
+                                 (static_cast<double>(data_.rows()) / freedom);
+  const Eigen::MatrixXd unit = generalised.unit_covariance(identified, identified);
+  fit_.covariance(identified, identified) =
+      add_record_variance(between_, data_, torques_, columns, unit, unit * middle * unit);
+  fit_.root_tolerance = joint.root_tolerance;
+  fit_.excitation = joint.root_tolerance_of_all;
+  fit_.white_variance =
+      generalised.unit_covariance.diagonal() * ((fit_.whitening * fit_.residual).squaredNorm() / freedom);
+  fit_.condition_number = joint.condition_number;
+}
+
+}  // namespace
+
+BalanceFit fit_balance(BalanceData& data, Terms& terms) {
+  BalanceFit fit;
+  fit.balance = data.balance();
+  fit.on_balance = terms_on(terms, data.balance(), data.prepared().torque_measured);
+  fit.linear = free_linear_parameters(terms, fit.on_balance);
+  fit.nonlinear = free_nonlinear_parameters(terms, fit.on_balance);
+  fit.root_weights = Eigen::VectorXd::Ones(data.rows());
+  fit.whitening = fit.root_weights;
+  if (data.empty()) return fit;
+  set_grid_values(data, terms, fit.on_balance);
+  Fitting fitting(data, terms, fit);
+  fitting.fit_weighted();
+  fitting.fit_generalised();
+  fitting.take_uncertainty();
+  return fit;
+}
+
+}  // namespace flexspline::estimation

@@ -1,0 +1,157 @@
+#include "host/engine/estimation/mask_cutoff.hpp"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cmath>
+
+#include "host/engine/estimation/cancellation.hpp"
+#include "host/engine/estimation/in_parallel.hpp"
+#include "host/physics/catalogue/catalogue.hpp"
+
+namespace flexspline::estimation {
+namespace {
+
+// Of the samples that the best cut-off leaves of a record. The information of a fit goes with the number of samples:
+// with less than a tenth the record is as good as lost, and then so many are wanted. From 0.05 to 0.17 the report's
+// tables and the coverage of intervals come out as they should; at 0.25 the intervals are too wide.
+constexpr double kLeastOfTheBest = 0.1, kThenOfTheBest = 0.9;
+constexpr double kWorthKeeping = 0.025;  // of a record's samples, in one direction, at its best cut-off
+constexpr double kCutoffStep = 1.25;
+
+double length_of(const Record& r) {
+  return r.sample_s * static_cast<double>(r.inputs.size());
+}
+
+// The square of a law exp(-(w/v)^2) at this velocity, if it has this direction: a sample's information on the law's
+// amplitude. Without a law every sample of the direction counts.
+double information(double velocity, int direction, std::optional<double> law_rad_s) {
+  if (velocity * direction <= 0.0) return 0.0;
+  return law_rad_s ? std::exp(-2.0 * velocity * velocity / (*law_rad_s * *law_rad_s)) : 1.0;
+}
+
+// What the mask leaves of a record's information, and what there is without it, per sample.
+double share_left(const Record& r, int direction, std::optional<double> law_rad_s) {
+  const Rows& rows = r.rows[index(Balance::motor)];
+  double sum = 0.0;
+  for (const std::size_t k : rows.samples) sum += information(r.inputs.velocity_at(k), direction, law_rad_s);
+  const std::size_t all = rows.samples.size() + rows.masked;
+  return all > 0 ? sum / static_cast<double>(all) : 0.0;
+}
+double share_of(const Record& r, int direction, std::optional<double> law_rad_s) {
+  double sum = 0.0;
+  for (std::size_t k = 0; k < r.inputs.size(); ++k) sum += information(r.inputs.velocity_at(k), direction, law_rad_s);
+  return r.inputs.size() > 0 ? sum / static_cast<double>(r.inputs.size()) : 0.0;
+}
+
+// What the mask has to leave of a record, at rising cut-offs of which the first is the present one.
+struct MaskedShare {
+  int direction = 1;
+  std::optional<double> law_rad_s;
+  double worth_keeping = 0.0;     // at the best cut-off
+  std::vector<double> at_cutoff;  // see share_left()
+
+  // The lowest cut-off that leaves nearly the most, if the present one leaves next to nothing of that; else 0.
+  double cutoff_hz(const std::vector<double>& cutoffs) const {
+    const double best = *std::max_element(at_cutoff.begin(), at_cutoff.end());
+    if (best < worth_keeping || at_cutoff.front() >= kLeastOfTheBest * best) return 0.0;
+    const auto enough = std::ranges::find_if(at_cutoff, [&](double s) { return s >= kThenOfTheBest * best; });
+    return cutoffs[static_cast<std::size_t>(enough - at_cutoff.begin())];
+  }
+};
+
+bool counts(const Record& r) {
+  return r.has_motor_motion && !r.at_rest;
+}
+
+// A law's amplitude is found from all records together: what the present mask leaves of one direction, where that is
+// next to nothing of what there is. Worth keeping is the time of one independent sample, a period of the highest
+// cut-off.
+std::vector<MaskedShare> shares_of_law(const std::vector<Record>& records, double law_rad_s, const CutoffRange& range) {
+  std::vector<MaskedShare> shares;
+  for (const int direction : {1, -1}) {
+    double left = 0.0, all = 0.0, length_s = 0.0;
+    for (const Record& r : records) {
+      if (!counts(r)) continue;
+      const double record_s = length_of(r);
+      left += record_s * share_left(r, direction, law_rad_s);
+      all += record_s * share_of(r, direction, law_rad_s);
+      length_s += record_s;
+    }
+    if (left < kLeastOfTheBest * all) shares.push_back({direction, law_rad_s, 1.0 / (range.highest_hz * length_s), {}});
+  }
+  return shares;
+}
+
+std::vector<MaskedShare> shares_of_record(const Record& r) {
+  std::vector<MaskedShare> shares;
+  for (const int direction : {1, -1})
+    if (counts(r) && share_left(r, direction, {}) < kLeastOfTheBest * share_of(r, direction, {}))
+      shares.push_back({direction, std::nullopt, kWorthKeeping, {}});
+  return shares;
+}
+
+// What is left of a law's information on all records, by their lengths; `parts` are those of the records.
+MaskedShare together(const MaskedShare& law, const std::vector<Record>& records,
+                     const std::vector<std::vector<MaskedShare>>& parts, std::size_t which) {
+  MaskedShare sum = law;
+  double length_s = 0.0;
+  for (std::size_t i = 0; i < records.size(); ++i) {
+    const std::vector<double>& part = parts[i][which].at_cutoff;
+    if (part.empty()) continue;
+    sum.at_cutoff.resize(part.size(), 0.0);
+    length_s += length_of(records[i]);
+    for (std::size_t c = 0; c < part.size(); ++c) sum.at_cutoff[c] += length_of(records[i]) * part[c];
+  }
+  for (double& share : sum.at_cutoff) share /= length_s;
+  return sum;
+}
+
+}  // namespace
+
+std::optional<double> slowest_law_rad_s(const model::Model& model) {
+  std::optional<double> slowest;
+  for (const model::Effect& effect : model.effects) {
+    const catalogue::Entry* entry = catalogue::find(effect.type);
+    if (!entry) continue;
+    for (const effects::ParameterInfo& info : entry->parameters) {
+      const model::Parameter* p = effect.find(info.name);
+      if (info.limit != effects::Limit::velocity || !p || !p->fixed || !p->value) continue;
+      slowest = std::min(slowest.value_or(*p->value), *p->value);
+    }
+  }
+  return slowest;
+}
+
+MaskCutoff cutoff_for_mask(const std::vector<Record>& records, const CutoffRange& range,
+                           std::optional<double> law_rad_s,
+                           const std::function<Record(const Record&, double)>& made_at) {
+  std::vector<double> cutoffs;
+  for (double hz = range.lowest_hz; hz < range.highest_hz; hz *= kCutoffStep) cutoffs.push_back(hz);
+  cutoffs.push_back(range.highest_hz);
+  std::vector<MaskedShare> of_law;
+  if (law_rad_s) of_law = shares_of_law(records, *law_rad_s, range);
+  std::vector<std::vector<MaskedShare>> parts(records.size(), of_law);
+  std::vector<double> wanted(records.size(), 0.0);
+  in_parallel(records.size(), [&](std::size_t i) {
+    std::vector<MaskedShare> of_record = shares_of_record(records[i]);
+    if (!counts(records[i]) || (of_law.empty() && of_record.empty())) return;
+    for (const double hz : cutoffs) {
+      throw_if_cancelled();
+      const Record again = made_at(records[i], hz);
+      for (std::vector<MaskedShare>* shares : {&of_record, &parts[i]})
+        for (MaskedShare& s : *shares) s.at_cutoff.push_back(share_left(again, s.direction, s.law_rad_s));
+    }
+    for (const MaskedShare& share : of_record) wanted[i] = std::max(wanted[i], share.cutoff_hz(cutoffs));
+  });
+  MaskCutoff best;
+  for (std::size_t i = 0; i < records.size(); ++i)
+    if (wanted[i] > best.hz) best = {wanted[i], records[i].name};
+  for (std::size_t d = 0; d < of_law.size(); ++d) {
+    const double hz = together(of_law[d], records, parts, d).cutoff_hz(cutoffs);
+    if (hz > best.hz) best = {hz, fmt::format("{:.4g} rad/s, which the model's friction needs", *law_rad_s)};
+  }
+  return best;
+}
+
+}  // namespace flexspline::estimation

@@ -1,0 +1,47 @@
+#include "host/engine/estimation/noise_covariance.hpp"
+
+#include <Eigen/Eigenvalues>
+#include <cmath>
+
+namespace flexspline::estimation {
+
+void NoiseCovariance::add_random_effects(const RowRange& rows, const Eigen::MatrixXd& columns) {
+  const Eigen::SelfAdjointEigenSolver<Eigen::MatrixXd> eigen(columns.transpose() * columns);
+  Common common{rows, Eigen::MatrixXd::Zero(columns.rows(), columns.cols()), Eigen::VectorXd::Zero(columns.cols())};
+  const double largest = eigen.eigenvalues().maxCoeff();
+  for (Eigen::Index k = 0; k < columns.cols(); ++k) {
+    const double square = eigen.eigenvalues()[k];
+    if (!(square > 1e-12 * largest) || !(square > 0.0)) continue;
+    common.basis.col(k) = columns * eigen.eigenvectors().col(k) / std::sqrt(square);
+    common.taken[k] = 1.0 - 1.0 / std::sqrt(1.0 + square);
+  }
+  common_.push_back(std::move(common));
+}
+
+void NoiseCovariance::remove_common(Eigen::MatrixXd& rows) const {
+  for (const Common& c : common_) {
+    auto part = rows.middleRows(c.rows.first, c.rows.size());
+    part -= c.basis * (c.taken.asDiagonal() * (c.basis.transpose() * part)).eval();
+  }
+}
+
+Eigen::MatrixXd NoiseCovariance::operator*(const Eigen::MatrixXd& rows) const {
+  Eigen::MatrixXd white = root_weights_.asDiagonal() * rows;
+  remove_common(white);
+  if (root_counts_.size() > 0) white = root_counts_.asDiagonal() * white;
+  return white;
+}
+
+NoiseCovariance NoiseCovariance::with_counts(const Eigen::VectorXd& root_counts) const {
+  NoiseCovariance other = *this;
+  other.root_counts_ = root_counts;
+  return other;
+}
+
+Eigen::MatrixXd NoiseCovariance::score_columns(const Eigen::MatrixXd& rows) const {
+  Eigen::MatrixXd white = *this * rows;
+  remove_common(white);
+  return white;
+}
+
+}  // namespace flexspline::estimation

@@ -1,0 +1,194 @@
+#include "host/engine/estimation/random_effects.hpp"
+
+#include <Eigen/Cholesky>
+#include <Eigen/QR>
+#include <algorithm>
+#include <cmath>
+
+namespace flexspline::estimation {
+namespace {
+
+// Bounds of the search, relative: friction does not differ by more from run to run, and less is not seen.
+constexpr double kLargestStd = 0.5;
+constexpr double kSmallestStd = 1e-4;
+
+// I + S Z'Z S/v: what random effects of standard deviation S add to noise of variance v.
+Eigen::LLT<SmallMatrix> inner(const RecordErrors& r, const SmallVector& std, double v) {
+  SmallMatrix m = SmallMatrix::Identity(std.size(), std.size());
+  m += std.asDiagonal() * r.zz * std.asDiagonal() / v;
+  return m.llt();
+}
+
+// Of minus twice a record's log likelihood: ln det V and e'V^-1 e, less what does not depend on the random effects.
+double deviance_of(const RecordErrors& r, const SmallVector& std, double v) {
+  const Eigen::LLT<SmallMatrix> m = inner(r, std, v);
+  const SmallVector g = std.cwiseProduct(r.ze) / v;
+  double log_det = 0.0;
+  for (Eigen::Index k = 0; k < std.size(); ++k) log_det += 2.0 * std::log(m.matrixLLT()(k, k));
+  return log_det - g.dot(m.solve(g));
+}
+
+// The middle of where a function of a logarithm is least, after ten golden sections (Kiefer 1953).
+template <class Function>
+double golden_section(double low, double high, const Function& at) {
+  constexpr double kGolden = 0.6180339887498949;
+  constexpr int kSections = 10;
+  double a = high - kGolden * (high - low), b = low + kGolden * (high - low);
+  double at_a = at(std::exp(a)), at_b = at(std::exp(b));
+  for (int k = 0; k < kSections; ++k)
+    if (at_a < at_b) {
+      high = b;
+      b = a;
+      at_b = at_a;
+      a = high - kGolden * (high - low);
+      at_a = at(std::exp(a));
+    } else {
+      low = a;
+      a = b;
+      at_a = at_b;
+      b = low + kGolden * (high - low);
+      at_b = at(std::exp(b));
+    }
+  return std::exp(0.5 * (low + high));
+}
+
+// The likeliest standard deviation of one group, the others as they are: a grid, then golden sections. Zero where that
+// is as likely.
+void choose_std(const std::vector<RecordErrors>& records, const std::vector<double>& noise, Eigen::Index group,
+                SmallVector& std) {
+  const auto total = [&](double s) {
+    std[group] = s;
+    double sum = 0.0;
+    for (std::size_t i = 0; i < records.size(); ++i) sum += deviance_of(records[i], std, noise[i]);
+    return sum;
+  };
+  constexpr int kSteps = 12;
+  const double ratio = std::pow(kLargestStd / kSmallestStd, 1.0 / kSteps);
+  double best = 0.0, least = total(0.0), at = kSmallestStd;
+  for (int k = 0; k <= kSteps; ++k, at *= ratio)
+    if (const double c = total(at); c < least) {
+      least = c;
+      best = at;
+    }
+  if (best > 0.0) best = golden_section(std::log(best / ratio), std::log(std::min(best * ratio, kLargestStd)), total);
+  std[group] = best;
+}
+
+// Predictions of each record's random effects, and the noise that they leave.
+void predict(const std::vector<RecordErrors>& records, double tau, double least_variance, RandomEffects& effects) {
+  for (std::size_t i = 0; i < records.size(); ++i) {
+    const RecordErrors& r = records[i];
+    const SmallVector& b = effects.predictions[i] = best_linear_predictions(r, effects.std, effects.variance[i] * tau);
+    double squares = r.ee;
+    if (b.size() > 0) squares += b.dot(r.zz * b) - 2.0 * b.dot(r.ze);
+    effects.squares[i] = std::max(squares, 0.0);
+    effects.variance[i] = std::max({effects.squares[i] / std::max(1.0, r.rows), least_variance, 1e-300});
+  }
+}
+
+// By group, whether enough records have it for its standard deviation to be estimated.
+std::vector<std::uint8_t> identifiable_groups(const std::vector<RecordErrors>& records) {
+  const Eigen::Index groups = records.empty() ? 0 : records.front().ze.size();
+  std::vector<std::uint8_t> identifiable;
+  for (Eigen::Index g = 0; g < groups; ++g)
+    identifiable.push_back(
+        static_cast<std::size_t>(std::count_if(records.begin(), records.end(), [&](const RecordErrors& r) {
+          return r.zz(g, g) > 0.0;
+        })) >= kFewestRecords);
+  return identifiable;
+}
+
+RandomEffects maximise_likelihood(const std::vector<RecordErrors>& records, const SmallVector* given, double tau,
+                                  double least_variance, const std::vector<double>& variance) {
+  RandomEffects effects;
+  const Eigen::Index groups = records.empty() ? 0 : records.front().ze.size();
+  effects.std = given ? *given : SmallVector(SmallVector::Zero(groups));
+  effects.predictions.assign(records.size(), SmallVector::Zero(groups));
+  effects.squares.assign(records.size(), 0.0);
+  for (std::size_t i = 0; i < records.size(); ++i)
+    effects.variance.push_back(std::max(
+        {variance.empty() ? records[i].ee / std::max(1.0, records[i].rows) : variance[i], least_variance, 1e-300}));
+  for (const RecordErrors& r : records) effects.deviance.push_back(r.rows);
+  const std::vector<std::uint8_t> identifiable = identifiable_groups(records);
+  constexpr int kPasses = 5;
+  for (int pass = 0; pass < (groups > 0 ? kPasses : 1); ++pass) {
+    std::vector<double> noise;
+    for (const double v : effects.variance) noise.push_back(v * tau);
+    if (!given)
+      for (Eigen::Index g = 0; g < groups; ++g)
+        if (identifiable[static_cast<std::size_t>(g)]) choose_std(records, noise, g, effects.std);
+    predict(records, tau, least_variance, effects);
+  }
+  for (std::size_t i = 0; i < records.size(); ++i) {
+    const RandomEffectCost cost = random_effect_cost(records[i], effects.std, effects.variance[i] * tau);
+    effects.deviance[i] = records[i].rows / tau * std::log(effects.variance[i]) + cost.squares + cost.log_det;
+  }
+  return effects;
+}
+
+}  // namespace
+
+RandomEffects fit_random_effects(const std::vector<RecordErrors>& records, double tau, double least_variance,
+                                 const std::vector<double>& variance) {
+  return maximise_likelihood(records, nullptr, tau, least_variance, variance);
+}
+
+RandomEffects random_effects_at(const std::vector<RecordErrors>& records, const SmallVector& std, double tau,
+                                double least_variance) {
+  return maximise_likelihood(records, &std, tau, least_variance, {});
+}
+
+RandomEffects largest_random_effects(const std::vector<RecordErrors>& records, double tau, double least_variance) {
+  const std::vector<std::uint8_t> identifiable = identifiable_groups(records);
+  SmallVector std = SmallVector::Zero(static_cast<Eigen::Index>(identifiable.size()));
+  for (std::size_t g = 0; g < identifiable.size(); ++g)
+    std[static_cast<Eigen::Index>(g)] = identifiable[g] ? kLargestStd : 0.0;
+  return maximise_likelihood(records, &std, tau, least_variance, {});
+}
+
+SmallVector best_linear_predictions(const RecordErrors& r, const SmallVector& std, double v) {
+  if (std.size() == 0) return std;
+  const SmallVector g = std.cwiseProduct(r.ze) / v;
+  return std.cwiseProduct(inner(r, std, v).solve(g));
+}
+
+RandomEffectCost random_effect_cost(const RecordErrors& r, const SmallVector& std, double v) {
+  RandomEffectCost cost;
+  const SmallVector b = best_linear_predictions(r, std, v);
+  const Eigen::LLT<SmallMatrix> m = inner(r, std, v);
+  for (Eigen::Index g = 0; g < std.size(); ++g) {
+    cost.log_det += 2.0 * std::log(m.matrixLLT()(g, g));
+    if (std[g] > 0.0) cost.squares += b[g] * b[g] / (std[g] * std[g]);
+  }
+  return cost;
+}
+
+Eigen::MatrixXd eliminate_random_effects(const Eigen::MatrixXd& factor, const Eigen::MatrixXd& u,
+                                         const SmallVector& std, double noise_variance) {
+  const double root = 1.0 / std::sqrt(noise_variance);
+  const Eigen::Index groups = u.cols(), width = factor.cols();
+  if (groups == 0 || std.maxCoeff() <= 0.0) return root * factor;
+  Eigen::MatrixXd block = Eigen::MatrixXd::Zero(factor.rows() + groups, groups + width);
+  block.topLeftCorner(groups, groups).setIdentity();
+  block.bottomLeftCorner(factor.rows(), groups) = root * factor.leftCols(width - 1) * u * std.asDiagonal();
+  block.bottomRightCorner(factor.rows(), width) = root * factor;
+  const Eigen::HouseholderQR<Eigen::MatrixXd> qr(std::move(block));
+  return qr.matrixQR().block(groups, groups, width, width).triangularView<Eigen::Upper>();
+}
+
+void add_errors(const Eigen::MatrixXd& factor, const Eigen::VectorXd& theta, const Eigen::MatrixXd& u, double rows,
+                RecordErrors& record) {
+  const Eigen::Index columns = theta.size();
+  if (record.ze.size() != u.cols()) {
+    record.ze = SmallVector::Zero(u.cols());
+    record.zz = SmallMatrix::Zero(u.cols(), u.cols());
+  }
+  const Eigen::VectorXd e = factor.col(columns) - factor.leftCols(columns) * theta;
+  const Eigen::MatrixXd z = factor.leftCols(columns) * u;
+  record.rows += rows;
+  record.ee += e.squaredNorm();
+  record.ze += z.transpose() * e;
+  record.zz += z.transpose() * z;
+}
+
+}  // namespace flexspline::estimation

@@ -1,0 +1,87 @@
+#include "host/engine/estimation/terms.hpp"
+
+#include <fmt/format.h>
+
+#include "host/physics/catalogue/user_defined_effect.hpp"
+
+namespace flexspline::estimation {
+
+using effects::Kind;
+
+std::string Term::label() const {
+  if (!entry->label.empty()) return entry->label;
+  for (std::size_t p = 0; p < entry->parameters.size(); ++p)
+    if (entry->parameters[p].kind == Kind::given) return fmt::format("{}:{:g}", entry->name(), values[p]);
+  return std::string(entry->name());
+}
+
+Term term_of(const model::Effect& effect) {
+  Term term;
+  term.entry = &catalogue::entry_of(effect);
+  term.id = effect.id;
+  term.values = catalogue::reduced(*term.entry, catalogue::values_of(effect, *term.entry));
+  for (const auto& info : term.entry->parameters) {
+    const model::Parameter* p = effect.find(info.name);
+    // A ratio to a parameter without a value is undefined.
+    const model::Parameter* per = info.per.empty() ? p : effect.find(info.per);
+    const bool stated = p && p->value.has_value() && (info.per.empty() || (per && per->value.value_or(0.0) != 0.0));
+    term.stated.push_back(stated);
+    term.known.push_back(info.kind == Kind::given || info.kind == Kind::grid || (stated && p->fixed));
+  }
+  return term;
+}
+
+Term candidate_term(const catalogue::Entry& entry, std::optional<double> order) {
+  Term term;
+  term.entry = &entry;
+  term.id = std::string(entry.name());
+  for (const auto& info : entry.parameters) {
+    const bool given = info.kind == Kind::given;
+    term.values.push_back(given ? order.value_or(info.usual) : 0.0);
+    term.known.push_back(given || info.kind == Kind::grid);
+    term.stated.push_back(given);
+  }
+  return term;
+}
+
+Terms terms_of(const model::Model& model) {
+  Terms terms;
+  for (const model::Effect& effect : model.effects) terms.push_back(term_of(effect));
+  return terms;
+}
+
+std::vector<ParameterRef> free_linear_parameters(const Terms& terms, const std::vector<std::size_t>& which) {
+  std::vector<ParameterRef> refs;
+  for (const std::size_t t : which)
+    for (std::size_t p = 0; p < terms[t].values.size(); ++p)
+      if (terms[t].free_linear(p)) refs.push_back({t, p});
+  return refs;
+}
+
+std::vector<ParameterRef> free_nonlinear_parameters(const Terms& terms, const std::vector<std::size_t>& which) {
+  std::vector<ParameterRef> refs;
+  for (const std::size_t t : which)
+    for (std::size_t p = 0; p < terms[t].values.size(); ++p)
+      if (terms[t].free_nonlinear(p)) refs.push_back({t, p});
+  return refs;
+}
+
+std::vector<std::size_t> terms_on(const Terms& terms, Balance balance, bool torque_measured) {
+  std::vector<std::size_t> which;
+  for (std::size_t t = 0; t < terms.size(); ++t) {
+    const Balance own = terms[t].entry->identified_on();
+    if (own == balance || (!torque_measured && balance == Balance::motor)) which.push_back(t);
+  }
+  return which;
+}
+
+std::vector<std::size_t> terms_acting_on_other_balance(const Terms& terms, Balance balance, bool torque_measured) {
+  std::vector<std::size_t> which;
+  if (!torque_measured) return which;
+  for (std::size_t t = 0; t < terms.size(); ++t)
+    if (terms[t].adds_torque() && terms[t].entry->identified_on() != balance && terms[t].entry->adds_to(balance))
+      which.push_back(t);
+  return which;
+}
+
+}  // namespace flexspline::estimation

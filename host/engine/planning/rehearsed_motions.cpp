@@ -1,0 +1,215 @@
+#include "host/engine/planning/rehearsed_motions.hpp"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cmath>
+
+#include "host/physics/simulation/simulation.hpp"
+
+namespace flexspline::planning {
+namespace {
+
+using data::Column;
+using estimation::Balance;
+
+// Noise where there are no data: as a share of the rated current, and of the rated torque.
+constexpr double kCurrentNoise = 0.005;
+constexpr double kTorqueNoise = 0.01;
+
+constexpr double kShrinking = 0.75;
+constexpr int kShrinkings = 8;
+
+// The limit that a rehearsed run exceeds; empty where it stays within all.
+std::string broken_limit(const Rehearsal& made, const Limits& limits) {
+  if (made.diverged) return "bounds of the simulation";
+  if (made.peak_velocity_rad_s > 1.02 * limits.velocity_rad_s) return "velocity limit";
+  if (made.travel_rad > 1.02 * limits.travel_rad) return "travel limit";
+  if (made.clipped_share > 0.01) return "current limit";
+  return {};
+}
+
+double largest(const data::Dataset* dataset, Column column) {
+  double most = 0.0;
+  if (dataset)
+    for (const data::Experiment& e : dataset->experiments)
+      for (const double x : e[column])
+        if (std::isfinite(x)) most = std::max(most, std::abs(x));
+  return most;
+}
+
+double stated_noise(const model::Drive& drive, const estimation::PreparedData& prepared, Balance balance,
+                    double sample_s) {
+  const auto& c = prepared.constants;
+  const double current = drive.rated_current_a.value.value_or(1.0) * c.torque_constant * kCurrentNoise;
+  const double torque = drive.rated_torque_nm.value.value_or(0.0) * kTorqueNoise;
+  double square = torque * torque;
+  if (balance == Balance::motor)
+    square = current * current + (prepared.torque_measured ? torque * torque / (c.gear_ratio * c.gear_ratio) : 0.0);
+  if (!(square > 0.0)) square = current * current * c.gear_ratio * c.gear_ratio;
+  return square * 2.0 * prepared.pipeline.row_cutoff_hz * sample_s;
+}
+
+// The size of a balance's signals in a record; the noise of sensors often grows with the signal.
+double loudness(const estimation::PreparedData& prepared, const estimation::Record& record, Balance balance) {
+  double sum = 0.0;
+  const double gear = balance == Balance::motor ? prepared.constants.gear_ratio : 1.0;
+  for (std::size_t k = 0; k < record.inputs.size(); ++k) {
+    const double torque = record.torque.empty() ? 0.0 : record.torque[k] / gear;
+    const double effort = balance == Balance::motor && !record.effort.empty() ? record.effort[k] : 0.0;
+    sum += torque * torque + effort * effort;
+  }
+  return std::sqrt(sum / std::max(1.0, static_cast<double>(record.inputs.size())));
+}
+
+double loudness(const BalanceData& data) {
+  double sum = 0.0, rows = 0.0;
+  for (const estimation::RowRange& range : data.records()) {
+    const double one = loudness(data.prepared(), data.prepared().records[range.record], data.balance());
+    sum += one * one * static_cast<double>(range.size());
+    rows += static_cast<double>(range.size());
+  }
+  return std::sqrt(sum / std::max(1.0, rows));
+}
+
+bool complete(const model::Model& model) {
+  for (const model::Effect& e : model.effects)
+    for (const model::Parameter& p : e.parameters)
+      if (!p.value &&
+          catalogue::get(e.type).parameters[catalogue::get(e.type).index_of(p.name)].kind != effects::Kind::grid)
+        return false;
+  return true;
+}
+
+}  // namespace
+
+Sensors sensors_of(const data::Dataset* dataset) {
+  Sensors sensors;
+  if (!dataset || dataset->experiments.empty()) return sensors;
+  sensors.current = dataset->has(Column::current);
+  sensors.output_position = dataset->has(Column::output_position);
+  sensors.torque = dataset->has(Column::torque);
+  sensors.temperature = dataset->has(Column::temperature);
+  for (const data::Experiment& e : dataset->experiments) {
+    if (e.encoder_counts) sensors.motor_counts = *e.encoder_counts;
+    if (e.output_encoder_counts) sensors.output_counts = *e.output_encoder_counts;
+  }
+  if (dataset->drive.axis == data::Axis::linear) sensors.motor_counts = sensors.output_counts = 0.0;
+  return sensors;
+}
+
+MotionSettings setting_of(const model::Model& model, const data::Dataset* dataset) {
+  MotionSettings setting;
+  const model::Drive& drive = model.drive;
+  setting.gear_ratio = drive.gear_ratio.value.value_or(dataset ? dataset->drive.gear_ratio.value_or(1.0) : 1.0);
+  // A motion that has been recorded before may be repeated.
+  setting.limits.current_a = drive.rated_current_a.value.value_or(largest(dataset, Column::current));
+  if (setting.limits.current_a == 0.0) setting.limits.current_a = largest(dataset, Column::motor_torque);
+  setting.limits.velocity_rad_s = drive.rated_velocity_rad_s.value.value_or(largest(dataset, Column::motor_velocity));
+  setting.limits.travel_rad = 2.0 * M_PI;
+  setting.limits.duration_s = 180.0;
+  const double constant =
+      drive.torque_constant_nm_a.value.value_or(dataset ? dataset->drive.torque_constant_nm_a.value_or(1.0) : 1.0);
+  const double holds = setting.gear_ratio * constant;  // output torque per ampere
+  const double rated = drive.rated_torque_nm.value.value_or(holds * setting.limits.current_a);
+  setting.locked_current_a = std::min(setting.limits.current_a, rated / holds);
+  // The drive has to move against it and friction.
+  setting.limits.load_torque_nm = std::min(0.25 * rated, 0.3 * setting.limits.current_a * holds);
+  const bool linear = drive.axis == data::Axis::linear;
+  if (linear) setting.limits.load_torque_nm = 0.0;
+  setting.locked = setting.gear_ratio > 1.0;
+  if (dataset) {
+    const bool any = std::any_of(dataset->experiments.begin(), dataset->experiments.end(),
+                                 [](const data::Experiment& e) { return e.has(Column::temperature); });
+    setting.temperature = any;
+  }
+  return setting;
+}
+
+RehearsedMotions::RehearsedMotions(const PlanRequest& question) {
+  if (question.dataset) {
+    if (question.progress) question.progress("fitting the model");
+    identified_ = estimation::identify(*question.dataset, *question.model, question.pipeline);
+    model_ = identified_->model;
+    terms_ = identified_->terms;
+  } else {
+    model_ = *question.model;
+    if (!complete(model_))
+      throw simulation::ModelIncomplete(fmt::format(
+          "the model {} has parameters without a value; run flexspline identify first, or give measurements",
+          model_.name));
+    terms_ = estimation::terms_of(model_);
+  }
+  rehearse_all(question);
+  prepare(question);
+}
+
+void RehearsedMotions::rehearse_all(const PlanRequest& question) {
+  if (question.progress) question.progress("rehearsing motions");
+  const Limits& limits = question.setting.limits;
+  std::string why = "there is none";
+  for (Motion& motion : planning::motions(question.setting)) {
+    std::vector<Design::Peak> peaks;
+    std::vector<data::Experiment> experiments;
+    for (Run& run : motion.runs) {
+      Rehearsal made = rehearse(model_, run, question.sample_s, limits, question.sensors);
+      // Friction and inertia may need more current than allowed although the velocity is within its limit: reduce the
+      // amplitude until it fits.
+      std::string breaks = broken_limit(made, limits);
+      for (int shrunk = 0; !breaks.empty() && shrunk < kShrinkings && run.amplitude > 0.0; ++shrunk) {
+        run.amplitude *= kShrinking;
+        made = rehearse(model_, run, question.sample_s, limits, question.sensors);
+        breaks = broken_limit(made, limits);
+      }
+      if (!breaks.empty()) {
+        why = fmt::format("{} would exceed the {}", run.name, breaks);
+        break;
+      }
+      peaks.push_back({made.peak_current_a, made.peak_velocity_rad_s, made.travel_rad});
+      experiments.push_back(std::move(made.experiment));
+    }
+    if (peaks.size() < motion.runs.size()) continue;
+    first_record_.push_back(experiments_.size());
+    for (data::Experiment& e : experiments) experiments_.push_back(std::move(e));
+    peaks_.push_back(std::move(peaks));
+    motions_.push_back(std::move(motion));
+  }
+  if (motions_.empty())
+    throw PlanError(
+        fmt::format("no motion stays within the limits ({}); give larger --current-a, --velocity-rad-s or "
+                    "--travel-rad",
+                    why));
+}
+
+void RehearsedMotions::prepare(const PlanRequest& question) {
+  std::vector<const data::Experiment*> list;
+  for (const data::Experiment& e : experiments_) list.push_back(&e);
+  prepared_ = identified_ ? estimation::prepare_with(list, model_.drive, identified_->prepared.pipeline)
+                          : estimation::prepare(list, model_, question.pipeline);
+  for (const Balance balance : {Balance::motor, Balance::transmission, Balance::load}) {
+    Side side;
+    if (identified_) {
+      for (std::size_t i = 0; i < identified_->data.size(); ++i)
+        if (identified_->data[i].balance() == balance) {
+          side.recorded = &identified_->data[i];
+          const estimation::BalanceFit& fit = identified_->fits[i];
+          side.noise = fit.rmse() * fit.rmse() * fit.autocorrelation_time;
+        }
+      if (!side.recorded) continue;
+    }
+    side.planned = std::make_unique<BalanceData>(prepared_, balance);
+    if (side.planned->empty()) continue;
+    if (balance != Balance::motor && !prepared_.torque_measured) continue;
+    if (!identified_)
+      side.noise = stated_noise(model_.drive, prepared_, balance, question.sample_s) *
+                   side.planned->filter_autocorrelation_time();
+    side.noise = std::max(side.noise, 1e-30);
+    side.louder.assign(prepared_.records.size(), 1.0);
+    const double known = side.recorded ? loudness(*side.recorded) : 0.0;
+    for (std::size_t i = 0; known > 0.0 && i < prepared_.records.size(); ++i)
+      side.louder[i] = std::max(1.0, loudness(prepared_, prepared_.records[i], balance) / known);
+    sides_.push_back(std::move(side));
+  }
+}
+
+}  // namespace flexspline::planning

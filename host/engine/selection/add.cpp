@@ -1,0 +1,206 @@
+#include "host/engine/selection/add.hpp"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <charconv>
+#include <cmath>
+
+#include "host/engine/comparison/noise_floor.hpp"
+#include "host/engine/estimation/in_parallel.hpp"
+#include "host/engine/selection/candidate_models.hpp"
+#include "host/physics/catalogue/user_defined_effect.hpp"
+
+namespace flexspline::selection {
+namespace {
+
+using estimation::Balance;
+using estimation::BalanceData;
+using estimation::Identification;
+
+double root_mean_square(const Eigen::VectorXd& r) {
+  return r.size() ? std::sqrt(r.squaredNorm() / static_cast<double>(r.size())) : 0.0;
+}
+
+// Hold-out records on the pipeline of the fit.
+struct Holdout {
+  std::vector<const data::Experiment*> experiments;
+  estimation::PreparedData prepared;
+  std::unique_ptr<BalanceData> data;
+
+  Holdout(const data::Dataset& dataset, const Identification& fitted, Balance balance,
+          const estimation::PreparedData* ready) {
+    for (const data::Experiment& e : dataset.experiments)
+      if (e.role == data::Role::holdout) experiments.push_back(&e);
+    if (experiments.empty()) return;
+    prepared = estimation::prepare_with(experiments, fitted.model.drive, fitted.prepared.pipeline, ready);
+    prepared.torque_measured = fitted.prepared.torque_measured;
+    data = std::make_unique<BalanceData>(prepared, balance);
+    if (data->empty()) data.reset();
+  }
+};
+
+// The balance on which an effect shows: its own, or the motor's where there is no torque sensor.
+const std::size_t* find_balance(const Identification& fitted, Balance own, std::size_t& found) {
+  const Balance balance = fitted.prepared.torque_measured ? own : Balance::motor;
+  for (std::size_t b = 0; b < fitted.data.size(); ++b)
+    if (fitted.data[b].balance() == balance) {
+      found = b;
+      return &found;
+    }
+  return nullptr;
+}
+
+Addition compare_models(const data::Dataset& dataset, const model::Model& before, const model::Model& after,
+                        Balance own, std::string effect, std::string action,
+                        const estimation::PipelineOptions& options) {
+  Addition result;
+  result.effect = std::move(effect);
+  std::unique_ptr<Identification> both[2];
+  estimation::in_parallel(
+      2, [&](std::size_t i) { both[i] = estimation::identify(dataset, i == 0 ? before : after, options); });
+  const auto& [base, extended] = both;
+  std::size_t b = 0, x = 0;
+  if (!find_balance(*base, own, b) || !find_balance(*extended, own, x))
+    throw data::DataError({{data::Severity::error, "missing_column", "", 0, "",
+                            fmt::format("these data hold nothing that would show {}", result.effect),
+                            fmt::format("see `flexspline effects {}` for what to record",
+                                        result.effect.substr(0, result.effect.find(':')))}});
+  const Balance balance = base->data[b].balance();
+  result.signal = std::string(balance_signal(balance));
+  result.unit = before.drive.axis == data::Axis::linear ? "N" : "N*m";
+  result.before.rmse_fit = root_mean_square(estimation::residual_of(base->data[b], base->terms));
+  result.after.rmse_fit = root_mean_square(estimation::residual_of(extended->data[x], extended->terms));
+  Holdout holdout(dataset, *base, balance, options.ready.get());
+  std::vector<const data::Experiment*> fitted, evaluated;
+  for (const data::Experiment& e : dataset.experiments)
+    if (e.role == data::Role::fit) fitted.push_back(&e);
+  BalanceData* evaluated_on = &extended->data[x];
+  if (holdout.data) {
+    result.before.rmse_holdout = root_mean_square(estimation::residual_of(*holdout.data, base->terms));
+    result.after.rmse_holdout = root_mean_square(estimation::residual_of(*holdout.data, extended->terms));
+    evaluated_on = holdout.data.get();
+    evaluated = holdout.experiments;
+  } else {
+    evaluated = fitted;
+  }
+  comparison::NoiseFloor floor =
+      comparison::pooled(comparison::noise_floors(*evaluated_on, extended->terms, evaluated, extended->model.drive),
+                         evaluated_on->records());
+  if (!floor.rmse && holdout.data)
+    floor =
+        comparison::pooled(comparison::noise_floors(extended->data[x], extended->terms, fitted, extended->model.drive),
+                           extended->data[x].records());
+  result.noise_floor = floor.rmse;
+  result.noise_floor_from = floor.from;
+  result.model = extended->model;
+  result.model.history.push_back({action, result.effect, result.before.rmse_holdout.value_or(result.before.rmse_fit),
+                                  result.after.rmse_holdout.value_or(result.after.rmse_fit)});
+  result.estimates = extended->estimates;
+  result.tables = extended->tables;
+  result.warnings = extended->warnings;
+  if (action == "add" && result.before.rmse_holdout && *result.after.rmse_holdout >= *result.before.rmse_holdout)
+    result.warnings.push_back(fmt::format(
+        "the error on held-out data did not decrease: {} does not hold beyond the data that it was fitted on",
+        result.effect));
+  return result;
+}
+
+}  // namespace
+
+std::string_view balance_signal(Balance balance) {
+  switch (balance) {
+    case Balance::motor:
+      return "motor_balance";
+    case Balance::transmission:
+      return "transmission_balance";
+    case Balance::load:
+      return "load_balance";
+  }
+  return "";
+}
+
+EffectName parse_effect(std::string_view text) {
+  const std::size_t colon = text.find(':');
+  EffectName name;
+  name.entry = catalogue::find(text.substr(0, colon));
+  if (!name.entry)
+    throw model::ModelError(
+        fmt::format("there is no effect named \"{}\"; `flexspline effects` lists them", text.substr(0, colon)));
+  const auto given = std::find_if(name.entry->parameters.begin(), name.entry->parameters.end(),
+                                  [](const auto& p) { return p.kind == effects::Kind::given; });
+  const bool ordered = given != name.entry->parameters.end();
+  if (colon == std::string_view::npos) {
+    if (ordered)
+      throw model::ModelError(fmt::format("{} needs its order per motor turn; write {}:2, for example", text, text));
+    return name;
+  }
+  const std::string_view order = text.substr(colon + 1);
+  double value = 0.0;
+  const auto parsed = std::from_chars(order.data(), order.data() + order.size(), value);
+  if (!ordered) throw model::ModelError(fmt::format("{} has no order; leave out \":{}\"", name.entry->name(), order));
+  if (parsed.ec != std::errc() || parsed.ptr != order.data() + order.size() ||
+      !(value >= given->low && value <= given->high))
+    throw model::ModelError(fmt::format("\"{}\" is no order; write a number from {:g} to {:g}, as in {}:2", order,
+                                        given->low, given->high, name.entry->name()));
+  name.order = value;
+  return name;
+}
+
+Addition add(const data::Dataset& dataset, const model::Model& model, std::string_view effect,
+             const estimation::PipelineOptions& options, const UserDefinition& given) {
+  if (names_user_defined_effect(effect)) {
+    model::Model after = model;
+    model::Effect added = user_defined_effect(effect, given, model);
+    // A table has its points from the data before it is refitted with the rest.
+    if (added.type == catalogue::kTableEffect)
+      added.definition->table = learn(*estimation::identify(dataset, model, options), added, given).table;
+    const Balance own = catalogue::entry_of(added).identified_on();
+    after.effects.push_back(std::move(added));
+    return compare_models(dataset, model, after, own, std::string(effect), "add", options);
+  }
+  const EffectName name = parse_effect(effect);
+  const estimation::Terms terms = estimation::terms_of(model);
+  const estimation::Terms extended = extend(terms, *name.entry, name.order);  // checks that it may be added
+  model::Model after = model;
+  std::erase_if(after.effects, [&](const model::Effect& e) {
+    return std::none_of(extended.begin(), extended.end(), [&](const estimation::Term& t) { return t.id == e.id; });
+  });
+  model::Effect added = catalogue::blank_effect(*name.entry, model.drive.axis);
+  added.id = extended.back().id;
+  if (name.order)
+    for (std::size_t p = 0; p < added.parameters.size(); ++p)
+      if (name.entry->parameters[p].kind == effects::Kind::given) added.parameters[p].value = name.order;
+  after.effects.push_back(std::move(added));
+  return compare_models(dataset, model, after, name.entry->identified_on(), std::string(effect), "add", options);
+}
+
+Addition remove(const data::Dataset& dataset, const model::Model& model, std::string_view id,
+                const estimation::PipelineOptions& options) {
+  const model::Effect* found = model.find(id);
+  if (!found && names_user_defined_effect(id)) {
+    for (const model::Effect& e : model.effects)
+      if (e.definition && (estimation::term_of(e).label() == id || e.type == id)) found = &e;
+  } else if (!found) {
+    const EffectName name = parse_effect(id);
+    for (const model::Effect& e : model.effects)
+      if (estimation::term_of(e).label() ==
+          (name.order ? fmt::format("{}:{:g}", name.entry->name(), *name.order) : std::string(id)))
+        found = &e;
+  }
+  if (!found) {
+    std::string known;
+    for (const model::Effect& e : model.effects) known += (known.empty() ? "" : ", ") + e.id;
+    throw model::ModelError(fmt::format("the model has no effect \"{}\"; it has {}", id, known));
+  }
+  const std::string out = found->id;
+  const catalogue::Entry& entry = catalogue::entry_of(*found);
+  for (const model::Effect& e : model.effects)
+    if (catalogue::entry_of(e).info->modulates == entry.name() && e.id != out)
+      throw model::ModelError(fmt::format("{} scales {}; remove {} first", e.id, out, e.id));
+  model::Model after = model;
+  std::erase_if(after.effects, [&](const model::Effect& e) { return e.id == out; });
+  return compare_models(dataset, model, after, entry.identified_on(), out, "remove", options);
+}
+
+}  // namespace flexspline::selection

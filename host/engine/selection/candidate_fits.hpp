@@ -1,0 +1,57 @@
+// Fits of one torque balance with each effect of the catalogue added.
+#pragma once
+
+#include <optional>
+#include <string>
+#include <string_view>
+#include <vector>
+
+#include "host/engine/selection/balance_search.hpp"
+#include "host/engine/selection/candidate_models.hpp"
+#include "host/engine/selection/cross_validation.hpp"
+#include "host/engine/selection/policy.hpp"
+
+namespace flexspline::selection {
+
+struct CandidateFit {
+  CandidateModel model;
+  CrossValidatedFit fit;
+  LikelihoodGain gain;
+  double other_balance_score = 0.0;    // on the other balances that the effect acts on, with the same parameters
+  double other_balance_percent = 0.0;  // largest decrease of left-out chi-square on those
+  bool at_floor_on_others = true;      // likewise
+  bool admissible = true;
+  std::string why_not;
+  std::string confounded_with;  // the effect of the model that the data cannot distinguish it from
+  std::string note;             // a remark for the user if it is named
+  bool leads = false;           // has a higher score than a simpler one that comes first, but not significantly
+  bool order_is_not_identifiable =
+      false;  // not admissible for this reason only: it has the usual order, which is the best of those tried
+
+  double score() const { return gain.score + other_balance_score; }
+};
+
+// Whether an effect may be named: admissible, certain, and large enough to matter.
+bool passes(const CandidateFit& candidate);
+
+// All effects that could be added, best first; the best ones with their nonlinear parameters searched continuously.
+std::vector<CandidateFit> rank_candidates(BalanceSearch& search);
+// Best first: admissible ones before others, by score; of confounded ones that leave almost the same error, the
+// simplest.
+void sort_candidates(const BalanceSearch& search, std::vector<CandidateFit>& candidates);
+
+// One more forward step, then backward elimination: an effect that was named because it resembles the true one is
+// dropped once the true one is in the model. Returns the candidate to name instead of `first`, or nothing.
+std::optional<CandidateFit> backward_elimination(BalanceSearch& search, const CandidateFit& first);
+
+// Whether all amplitudes of a law whose description explains that case came out negative.
+bool is_negative(const CandidateFit& candidate);
+// Whether it is negative over so wide a range of speed that it is another law, whatever its formula
+// (effects::Description::wide_negative_is).
+bool is_another_law(const CandidateFit& candidate, const BalanceData& data);
+
+// The position of a parameter among the linear ones of a cross-validated model, or nothing if it is not estimated
+// there.
+std::optional<std::size_t> position(const CrossValidatedFit& fit, std::string_view id, std::string_view parameter);
+
+}  // namespace flexspline::selection

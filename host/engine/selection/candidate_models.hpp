@@ -1,0 +1,54 @@
+// Effects of the catalogue that a model does not have and the data could show.
+#pragma once
+
+#include <Eigen/Core>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "host/engine/estimation/balance_data.hpp"
+#include "host/engine/estimation/terms.hpp"
+
+namespace flexspline::selection {
+
+struct CandidateModel {
+  const catalogue::Entry* entry = nullptr;
+  std::optional<double> order;
+  estimation::Terms terms;  // the model with it: what it replaces is gone, it is last
+  double added = 0.0;       // parameters more than before
+};
+
+// The residual of a model, each sample over its noise, and the span of the model's own columns.
+struct Unexplained {
+  Eigen::VectorXd residual;
+  Eigen::VectorXd root_weights;  // one over the noise of each sample
+  Eigen::MatrixXd own;           // orthonormal basis of the model's columns; empty: none
+};
+
+// All effects that may be added on this balance; nonlinear parameters are in the middle of their range. Of an effect
+// with orders per turn, the orders with the largest waves in the residual, orthogonal to the model.
+std::vector<CandidateModel> candidate_models(const estimation::BalanceData& data, const estimation::Terms& terms,
+                                             const Unexplained& left);
+
+// The orders that a drive may have: all up to the policy's highest, and those that pole pairs and slots of its motor
+// give beyond.
+std::vector<double> possible_orders(const catalogue::Entry& entry, const model::Drive& drive);
+
+// Values of a nonlinear parameter that a search tries first; their columns are cached.
+inline constexpr std::size_t kGridPoints = 6;
+
+// Whether these signals can show an effect that this model may be given.
+bool may_be_seen(const estimation::BalanceData& data, const estimation::Terms& terms, const catalogue::Entry& entry);
+
+// Whether the model states a linear parameter: a torque that the data need not identify.
+bool states_a_torque(const estimation::Terms& terms);
+
+// The model with one more effect. Throws model::ModelError where that is impossible: the effect is there already, or
+// the one that it modulates or replaces is missing.
+estimation::Terms extend(const estimation::Terms& terms, const catalogue::Entry& entry, std::optional<double> order);
+
+// Whether the torque is almost linear in a nonlinear parameter about zero (an angle, a ratio of either sign), so that
+// its slope replaces a grid search.
+bool begins_at_zero(const estimation::Term& term, std::size_t parameter);
+
+}  // namespace flexspline::selection

@@ -1,0 +1,90 @@
+#include "host/engine/selection/candidate_tables.hpp"
+
+#include <algorithm>
+#include <cmath>
+
+#include "host/engine/selection/modelled_torque.hpp"
+#include "host/engine/selection/presliding.hpp"
+
+namespace flexspline::selection {
+namespace {
+
+// The motion's filter is wider than the target's by this factor, as the columns are filtered once more.
+constexpr double kMotionOverRow = 2.5;
+
+// At the highest bandwidth; wider where waves over the motor's angle are above the bandwidth of the motion.
+estimation::PreparedData prepare(const std::vector<const data::Experiment*>& experiments, const model::Drive& drive,
+                                 double highest_hz, const SelectionPolicy& policy) {
+  double slowest_hz = 1e300;
+  for (const data::Experiment* e : experiments) slowest_hz = std::min(slowest_hz, 1.0 / e->sample_s);
+  estimation::Pipeline pipeline;
+  pipeline.motion_cutoff_hz = std::min(kMotionOverRow * highest_hz, 0.45 * slowest_hz);
+  pipeline.mask = false;
+  pipeline.row_cutoff_hz = highest_hz;
+  estimation::PreparedData prepared = estimation::prepare_with(experiments, drive, pipeline);
+  double widest_hz = highest_hz;
+  const double wanted_hz =
+      std::min({1.5 * highest_order_hz(prepared), policy.widest_over_sampling * slowest_hz, policy.widest_hz});
+  while (widest_hz < 0.99 * wanted_hz) widest_hz = std::min(2.0 * widest_hz, wanted_hz);
+  if (widest_hz <= 1.2 * highest_hz) return prepared;
+  pipeline.row_cutoff_hz = widest_hz;
+  return estimation::prepare_with(experiments, drive, pipeline);
+}
+
+estimation::PreparedData without_held_out(estimation::PreparedData prepared) {
+  std::erase_if(prepared.records,
+                [](const estimation::Record& r) { return r.experiment->role == data::Role::holdout; });
+  return prepared;
+}
+
+}  // namespace
+
+const catalogue::Entry* presliding_law(const estimation::Terms& terms) {
+  const catalogue::Entry* simplest = nullptr;
+  for (const catalogue::Entry& entry : catalogue::all()) {
+    if (!entry.has_state || entry.info->balance != effects::Balance::motor) continue;
+    const auto names = catalogue::split_names(entry.info->replaces);
+    const bool replaces = std::any_of(terms.begin(), terms.end(), [&](const estimation::Term& t) {
+      return std::find(names.begin(), names.end(), t.entry->name()) != names.end();
+    });
+    const bool travels = std::any_of(entry.parameters.begin(), entry.parameters.end(),
+                                     [](const effects::ParameterInfo& p) { return p.limit == effects::Limit::travel; });
+    if (replaces && travels && (!simplest || entry.parameters.size() < simplest->parameters.size())) simplest = &entry;
+  }
+  return simplest;
+}
+
+bool CandidateTables::may_enter(const CandidateTerm& term, double cutoff_hz) const {
+  return term.highest_hz <= 0.7 * cutoff_hz &&
+         (cutoff_hz <= 1.01 * bandwidth.highest_hz || term.highest_hz > 0.35 * bandwidth.highest_hz);
+}
+
+CandidateTables make_tables(const std::vector<const data::Experiment*>& experiments, const model::Drive& drive,
+                            const estimation::Terms& terms, Balance balance, const SelectionPolicy& policy) {
+  CandidateTables tables;
+  tables.bandwidth = highest_bandwidth(experiments, policy);
+  const double highest_hz = tables.bandwidth.highest_hz;
+  estimation::PreparedData prepared = prepare(experiments, drive, highest_hz, policy);
+  take_noise_off_torque(prepared);
+  if (!prepared.torque_measured) take_torque_from_load(prepared, terms);
+  tables.sign = make_regressor_table(prepared, balance, terms, std::nullopt, highest_hz, policy);
+  if (tables.sign.model_columns == 0) return tables;
+  if (balance == Balance::motor && presliding_law(terms) != nullptr) {
+    const estimation::PreparedData fitted = without_held_out(prepared);
+    const std::vector<double> travels = presliding_travels(fitted, policy);
+    const std::vector<double> squares = squares_by_travel(fitted, terms, travels);
+    if (!squares.empty()) {
+      tables.presliding_travel =
+          travels[static_cast<std::size_t>(std::min_element(squares.begin(), squares.end()) - squares.begin())];
+      tables.presliding = make_regressor_table(prepared, balance, terms, tables.presliding_travel, highest_hz, policy);
+    }
+  }
+  for (double f = prepared.pipeline.row_cutoff_hz; f > 1.2 * highest_hz; f *= 0.5)
+    for (const bool mask : {false, true}) tables.settings.emplace_back(f, mask);
+  for (std::size_t b = 0; b < policy.bandwidths; ++b)
+    for (const bool mask : {false, true})
+      tables.settings.emplace_back(highest_hz * std::pow(policy.bandwidth_factor, static_cast<double>(b)), mask);
+  return tables;
+}
+
+}  // namespace flexspline::selection

@@ -1,0 +1,35 @@
+// Regressor tables of one data set, and the settings at which it is searched.
+#pragma once
+
+#include <optional>
+#include <utility>
+#include <vector>
+
+#include "host/engine/selection/bandwidth.hpp"
+#include "host/engine/selection/regressor_table.hpp"
+
+namespace flexspline::selection {
+
+inline constexpr const char* kPresliding = "presliding";  // its name among the terms
+
+struct CandidateTables {
+  Bandwidth bandwidth;
+  RegressorTable sign;  // without model columns: nothing can be chosen
+  // The presliding state that fits best in the place of the sign of the velocity; nothing: none can be shown.
+  std::optional<RegressorTable> presliding;
+  double presliding_travel = 0.0;                 // rad of the motor
+  std::vector<std::pair<double, bool>> settings;  // bandwidth in Hz, reversals left out
+
+  // Whether a term can be seen at a bandwidth: waves below it, and above the motion's bandwidth waves alone.
+  bool may_enter(const CandidateTerm& term, double cutoff_hz) const;
+};
+
+// The simplest effect that puts a state of presliding in the place of the sign of an effect of the model; null where
+// none can.
+const catalogue::Entry* presliding_law(const estimation::Terms& terms);
+
+// Of all experiments, those that are held out among them.
+CandidateTables make_tables(const std::vector<const data::Experiment*>& experiments, const model::Drive& drive,
+                            const estimation::Terms& terms, Balance balance, const SelectionPolicy& policy);
+
+}  // namespace flexspline::selection

@@ -1,0 +1,21 @@
+// What stability selection found often enough to be reported: single terms, or groups that these data cannot
+// distinguish.
+#pragma once
+
+#include <vector>
+
+#include "host/engine/selection/stability_selection.hpp"
+
+namespace flexspline::selection {
+
+struct FoundTerm {
+  std::vector<Frequency> group;  // the most frequent first; more than one: not distinguished
+  double frequency = 0.0;        // of the subsamples that chose one of the group
+  double share = 0.0;            // of the squares above the noise
+  bool in_catalogue = true;      // else a curve or a placebo order does as well: an unknown structure
+};
+
+// Largest share first.
+std::vector<FoundTerm> decide(const Stability& stability, const SelectionPolicy& policy);
+
+}  // namespace flexspline::selection

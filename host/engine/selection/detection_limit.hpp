@@ -1,0 +1,35 @@
+// The smallest effect that the data at hand would have shown.
+#pragma once
+
+#include <optional>
+
+#include "host/engine/estimation/model_projection.hpp"
+#include "host/engine/selection/candidate_fits.hpp"
+#include "host/engine/selection/diagnosis.hpp"
+
+namespace flexspline::selection {
+
+// What the search is expected to find if an effect is there: its own score (`likelihood_gain`), where the model that
+// lacks the effect leaves, in addition to the noise, the orthogonal part of the effect's torque.
+class DetectionLimit {
+ public:
+  explicit DetectionLimit(BalanceSearch& search);
+
+  // Nothing where the effect has no single size, or none within its bounds would be named. Columns are made in `data`,
+  // a copy of the search's: each thread has its own.
+  std::optional<Detectable> smallest(const CandidateFit& candidate, BalanceData& data) const;
+
+ private:
+  bool named(const CandidateFit& candidate, const Eigen::VectorXd& own, double scale) const;
+  std::optional<double> scale_to_name(const CandidateFit& candidate, const Eigen::VectorXd& torque) const;
+  std::optional<Detectable> of_linear(const CandidateFit& candidate, estimation::Terms terms, BalanceData& data) const;
+  std::optional<Detectable> of_wave(const CandidateFit& candidate, estimation::Terms terms, BalanceData& data) const;
+  std::optional<Detectable> of_nonlinear(const CandidateFit& candidate, estimation::Terms terms,
+                                         BalanceData& data) const;
+
+  BalanceSearch* search_;
+  estimation::ModelProjection projection_;
+  Eigen::VectorXd base_torque_;
+};
+
+}  // namespace flexspline::selection

@@ -1,0 +1,372 @@
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cmath>
+
+#include "host/engine/comparison/noise_floor.hpp"
+#include "host/engine/comparison/residual_map.hpp"
+#include "host/engine/estimation/in_parallel.hpp"
+#include "host/engine/estimation/variable_projection.hpp"
+#include "host/engine/selection/between_records.hpp"
+#include "host/engine/selection/candidate_fits.hpp"
+#include "host/engine/selection/confounding.hpp"
+#include "host/engine/selection/detection_limit.hpp"
+#include "host/engine/selection/diagnosis.hpp"
+#include "host/engine/selection/disturbances.hpp"
+#include "host/engine/selection/other_balance_evidence.hpp"
+#include "host/engine/selection/policy.hpp"
+#include "host/engine/selection/record_cross_validation.hpp"
+#include "host/engine/selection/resampling.hpp"
+#include "host/engine/selection/searched_balance.hpp"
+#include "host/engine/selection/significance_checks.hpp"
+
+namespace flexspline::selection {
+namespace {
+
+using estimation::Term;
+
+Candidate candidate_of(const CandidateFit& candidate, const BalanceSearch& search, data::Axis axis) {
+  Candidate c;
+  c.effect = std::string(candidate.model.entry->name());
+  c.order = candidate.model.order;
+  c.balance = search.data->balance();
+  c.score = candidate.gain.score;
+  c.other_balance_score = candidate.other_balance_score;
+  c.chi2_decrease_percent = candidate.gain.chi2_percent;
+  c.rmse_cv_before = search.base.rmse_cv_fixed_effects();
+  c.rmse_cv_after = candidate.fit.rmse_cv_fixed_effects();
+  c.p_value = candidate.gain.p_value;
+  c.admissible = candidate.admissible;
+  c.why_not = candidate.why_not;
+  if (!candidate.confounded_with.empty()) c.cannot_distinguish.push_back(candidate.confounded_with);
+  const effects::Description& info = *candidate.model.entry->info;
+  if (is_another_law(candidate, *search.data))
+    c.note = fmt::format("Both amplitudes are negative over a wide range of speed: {}.", info.wide_negative_means);
+  else if (is_negative(candidate))
+    c.note = fmt::format("Both amplitudes are negative: {}.", info.negative_means);
+  if (!candidate.note.empty()) c.note = candidate.note;
+  const std::size_t added = candidate.fit.terms.size() - 1;
+  const Term& term = candidate.fit.terms[added];
+  const std::vector<double> natural = catalogue::natural(*term.entry, term.values);
+  for (std::size_t p = 0; p < term.values.size(); ++p) {
+    estimation::Estimate e;
+    e.ref = {added, p};
+    e.id = term.id;
+    e.effect = std::string(term.entry->name());
+    e.parameter = std::string(term.entry->parameters[p].name);
+    e.unit = std::string(catalogue::unit_on(term.entry->parameters[p].unit, axis));
+    e.value = natural[p];
+    e.fixed = term.known[p] != 0;
+    if (const auto at = position(candidate.fit, e.id, e.parameter)) {
+      e.std = candidate.fit.std[static_cast<Eigen::Index>(*at)];
+      e.low = e.value - 1.96 * *e.std;
+      e.high = e.value + 1.96 * *e.std;
+    }
+    c.parameters.push_back(std::move(e));
+  }
+  return c;
+}
+
+std::vector<LocalisedResidual> shares(const BalanceData& data, const CrossValidatedFit& fit,
+                                      const Eigen::VectorXd& residual, double least = kPolicy.shown_share_percent) {
+  std::vector<LocalisedResidual> list;
+  const data::Axis axis = data.prepared().rotary ? data::Axis::rotary : data::Axis::linear;
+  for (const auto& share : comparison::localise(data, residual, fit.autocorrelation_time, axis))
+    if (share.share_percent >= least) list.push_back({share.variable, share.share_percent});
+  return list;
+}
+
+// The nonlinear parameters were fitted with the same friction in all records. Where friction differs, they are searched
+// again with random effects; else a candidate could be named only because its search was better.
+void refine_base_nonlinear(BalanceSearch& search) {
+  BalanceData& data = *search.data;
+  if (search.base.groups.empty() || search.base.random_effects.std.maxCoeff() <= 0.0) return;
+  estimation::Terms terms = search.base.terms;
+  const auto on_balance = estimation::terms_on(terms, data.balance(), data.prepared().torque_measured);
+  if (estimation::free_nonlinear_parameters(terms, on_balance).empty()) return;
+  constexpr double kTolerance = 1e-7;
+  for (int round = 0; round < 2; ++round) {
+    estimation::refine_nonlinear(data, terms, on_balance, noise_covariance(data, search.base), kTolerance);
+    search.base = cross_validate(data, terms, search.keep);
+    terms = search.base.terms;
+  }
+}
+
+std::vector<SearchedBalance> search_balances(estimation::Identification& base,
+                                             const std::vector<const data::Experiment*>& experiments,
+                                             const Options& options, Diagnosis& result) {
+  std::vector<SearchedBalance> all;
+  for (BalanceData& data : base.data) {
+    if (options.progress)
+      options.progress(fmt::format("trying effects ({} of {} balances)", all.size() + 1, base.data.size()));
+    SearchedBalance one;
+    one.search = {&data, Eigen::VectorXd::Ones(data.rows()), {}};
+    CrossValidatedFit whole = cross_validate(data, base.terms, one.search.keep);
+    for (Disturbance& d : find_disturbances(data, whole.residual, one.search.keep)) {
+      d.unit = result.unit;
+      result.disturbances.push_back(std::move(d));
+    }
+    one.search.base =
+        one.search.keep.minCoeff() < 1.0 ? cross_validate(data, base.terms, one.search.keep) : std::move(whole);
+    refine_base_nonlinear(one.search);
+    one.candidates = rank_candidates(one.search);
+    if (std::string warning = one_direction_warning(data);
+        data.balance() == estimation::Balance::motor && !warning.empty())
+      result.warnings.push_back(std::move(warning));
+    one.floor = comparison::pooled(comparison::noise_floors(data, one.search.base.terms, experiments, base.model.drive),
+                                   data.records());
+    one.search.floor = one.floor.rmse;
+    all.push_back(std::move(one));
+  }
+  std::vector<BalanceSearch*> searches;
+  for (SearchedBalance& one : all) searches.push_back(&one.search);
+  for (SearchedBalance& one : all) {
+    add_other_balance_evidence(searches, one.search, one.candidates);
+    check_orders(searches, one.search, one.candidates);
+    check_by_record(one.search, one.candidates);
+  }
+  return all;
+}
+
+// The balance whose named effect scores best; where none is named, the one that is highest above its floor.
+SearchedBalance& most_significant(std::vector<SearchedBalance>& all) {
+  const auto importance = [](const SearchedBalance& e) {
+    if (e.names_one()) return 1e9 + e.candidates.front().score();
+    return e.floor.rmse ? e.search.base.rmse() / *e.floor.rmse : 0.0;
+  };
+  return *std::max_element(all.begin(), all.end(), [&](const SearchedBalance& a, const SearchedBalance& b) {
+    return importance(a) < importance(b);
+  });
+}
+
+// Puts the effect to name first. Returns the name of an effect that it is named for as well, if there is one.
+std::string choose_named(SearchedBalance& chosen) {
+  auto& list = chosen.candidates;
+  if (auto instead = backward_elimination(chosen.search, list.front())) {
+    std::erase_if(list, [&](const CandidateFit& t) {
+      return t.model.entry == instead->model.entry && t.model.order == instead->model.order;
+    });
+    list.insert(list.begin(), std::move(*instead));
+  }
+  const CandidateFit& first = list.front();
+  if (!is_another_law(first, *chosen.search.data)) return {};
+  const std::string_view other = first.model.entry->info->wide_negative_is;
+  const auto law =
+      std::find_if(list.begin(), list.end(), [&](const CandidateFit& t) { return t.model.entry->name() == other; });
+  if (law == list.end() || law->gain.score <= kPolicy.named_score) return {};
+  // The formula that leaves the other effects of the model their physical meaning comes first.
+  if (!law->admissible) return std::string(other);
+  std::string alias(first.model.entry->name());
+  std::rotate(list.begin(), law, law + 1);
+  return alias;
+}
+
+// Whether resampling could not distinguish a candidate from the first one, and it leaves a similar error on all data.
+bool is_in_group(const std::optional<Resampling>& resampling, const CandidateFit& first, const CandidateFit& t) {
+  if (!resampling) return false;
+  const auto group = resampling->found_group({std::string(first.model.entry->name()), first.model.order});
+  return t.gain.chi2_percent >= kPolicy.similar * first.gain.chi2_percent &&
+         100.0 - t.gain.chi2_percent <= kPolicy.similar_left * (100.0 - first.gain.chi2_percent) &&
+         std::any_of(group.begin(), group.end(), [&](const NamedEffect& n) {
+           return n.effect == t.model.entry->name() && n.order == t.model.order;
+         });
+}
+
+void name_effects(const SearchedBalance& chosen, const std::string& alias, Diagnosis& result) {
+  const auto& list = chosen.candidates;
+  const auto is = [](const Candidate& c, const NamedEffect& n) { return c.effect == n.effect && c.order == n.order; };
+  for (const CandidateFit& t : list) {
+    const NamedEffect name{std::string(t.model.entry->name()), t.model.order};
+    const double times_left =
+        std::pow(t.fit.rmse_cv_fixed_effects() / std::max(list.front().fit.rmse_cv_fixed_effects(), 1e-300), 2);
+    const bool near =
+        (t.score() >= list.front().score() - kPolicy.confounded_margin && times_left <= kPolicy.similar_left) ||
+        is_in_group(result.resampling, list.front(), t);
+    // A law with more parameters and the same error is not confounded with the simpler one, as it contains it. One with
+    // a slightly smaller error is.
+    const bool wider = t.model.added > list.front().model.added && !t.leads;
+    if ((passes(t) && !wider && (near || is_scale_confounded(chosen.search, list.front(), t))) || name.effect == alias)
+      result.named.push_back(name);
+    // Its order is not identifiable, and it may also be the other effect.
+    if (!t.order_is_not_identifiable || !near || t.model.entry == list.front().model.entry) continue;
+    result.named.push_back(name);
+    for (Candidate& c : result.candidates)
+      if (is(c, name)) {
+        c.admissible = true;
+        c.why_not.clear();
+      }
+  }
+  result.verdict = result.named.size() > 1 ? Verdict::confusable_effects : Verdict::missing_effect;
+  for (Candidate& c : result.candidates) {
+    if (std::none_of(result.named.begin(), result.named.end(), [&](const NamedEffect& n) { return is(c, n); }))
+      continue;
+    for (const NamedEffect& other : result.named)
+      if (!is(c, other)) c.cannot_distinguish.push_back(other.effect);
+  }
+  // The named effect is first in the list, even where a refused candidate has a higher score.
+  auto begin = result.candidates.begin();
+  for (const NamedEffect& n : result.named) {
+    const auto at = std::find_if(begin, result.candidates.end(), [&](const Candidate& c) { return is(c, n); });
+    if (at != result.candidates.end()) std::rotate(begin++, at, at + 1);
+  }
+}
+
+void explain_orders(const model::Drive& drive, Diagnosis& result) {
+  for (Candidate& c : result.candidates) {
+    const catalogue::Entry* entry = catalogue::find(c.effect);
+    if (!c.order || entry == nullptr) continue;
+    c.order_causes = catalogue::order_causes(*entry, *c.order, drive);
+    c.order_hint = catalogue::order_hint(*entry, drive);
+  }
+}
+
+void list_candidates(std::vector<SearchedBalance>& all, data::Axis axis, Diagnosis& result) {
+  for (SearchedBalance& e : all) {
+    const DetectionLimit detection(e.search);
+    std::vector<std::optional<Detectable>> smallest(e.candidates.size());
+    estimation::in_parallel(e.candidates.size(), [&](std::size_t i) {
+      BalanceData data = *e.search.data;
+      smallest[i] = detection.smallest(e.candidates[i], data);
+    });
+    for (std::size_t i = 0; i < e.candidates.size(); ++i) {
+      const CandidateFit& t = e.candidates[i];
+      result.candidates.push_back(candidate_of(t, e.search, axis));
+      result.candidates.back().minimum_detectable = std::move(smallest[i]);
+      if (t.confounded_with.empty()) continue;
+      result.candidates.back().confounding_reasons.push_back(compare_with_model(e.search, t));
+      result.warnings.push_back(
+          fmt::format("{0} cannot be distinguished from {1} in these data: {1} is named for what both share; {2} would "
+                      "separate them",
+                      t.model.entry->name(), t.confounded_with, t.model.entry->info->separated_by));
+    }
+  }
+  std::stable_sort(result.candidates.begin(), result.candidates.end(), [](const Candidate& a, const Candidate& b) {
+    return a.admissible != b.admissible ? a.admissible
+                                        : a.score + a.other_balance_score > b.score + b.other_balance_score;
+  });
+}
+
+// What is left, with the named effect in the model if there is one.
+void assess_remainder(const SearchedBalance& chosen, Diagnosis& result) {
+  const CrossValidatedFit& after = result.named.empty() ? chosen.search.base : chosen.candidates.front().fit;
+  // A missing effect may look like a delay, so the delay is taken from the better model.
+  const Eigen::Index delay = after.theta.size() - 1;
+  if (chosen.search.data->balance() == estimation::Balance::motor &&
+      std::abs(after.theta[delay]) > kPolicy.delay_errors * after.std[delay])
+    result.delay_s = after.theta[delay];
+  result.friction_drift = drifts(after);
+  for (const Drift& d : result.friction_drift)
+    result.warnings.push_back(fmt::format(
+        "{} differs between runs by {:.1f} %, and no recorded signal explains it: temperature? An effect that shows "
+        "only from run to run counts for less then; log the temperature, and repeat one motion from time to time",
+        d.group, d.percent));
+  const bool at_floor = result.noise_floor && after.rmse() < kPolicy.at_floor * *result.noise_floor;
+  bool enough = true;
+  if (result.noise_floor && !result.named.empty()) {
+    const auto above = [&](const CrossValidatedFit& j) {
+      return j.rmse() * j.rmse() - *result.noise_floor * *result.noise_floor;
+    };
+    if (above(chosen.search.base) > 0.0)
+      result.recovered_percent = std::clamp(100.0 * (1.0 - above(after) / above(chosen.search.base)), 0.0, 100.0);
+    enough = at_floor || result.recovered_percent.value_or(100.0) >= kPolicy.recovered_percent;
+  }
+  const std::vector<LocalisedResidual> remaining =
+      shares(*chosen.search.data, after, after.residual,
+             enough ? kPolicy.shown_share_percent : kPolicy.least_shown_share_percent);
+  if (!at_floor) result.remaining_structure = remaining;
+  if (!result.named.empty()) return;
+  if (at_floor)
+    result.verdict = Verdict::at_noise_floor;
+  else
+    result.verdict =
+        result.noise_floor && !remaining.empty() ? Verdict::unknown_structure : Verdict::nothing_significant;
+}
+
+// Whether the data could show anything at all.
+void assess_excitation(bool moves, Diagnosis& result) {
+  if (result.resampling && result.resampling->too_little)
+    result.warnings.push_back(
+        "these data have too few samples to choose effects on halves of them; record longer, with several strokes");
+  if (!moves || (result.resampling && result.resampling->too_little)) result.verdict = Verdict::insufficient_excitation;
+}
+
+}  // namespace
+
+std::string verdict_name(Verdict verdict) {
+  switch (verdict) {
+    case Verdict::missing_effect:
+      return "missing_effect";
+    case Verdict::confusable_effects:
+      return "confusable_effects";
+    case Verdict::at_noise_floor:
+      return "at_noise_floor";
+    case Verdict::nothing_significant:
+      return "nothing_significant";
+    case Verdict::unknown_structure:
+      return "unknown_structure";
+    case Verdict::insufficient_excitation:
+      return "insufficient_excitation";
+  }
+  return "";
+}
+
+Diagnosis diagnose(const data::Dataset& dataset, const model::Model& model, const Options& options) {
+  Diagnosis result;
+  result.unit = model.drive.axis == data::Axis::linear ? "N" : "N*m";
+  if (options.progress) options.progress("fitting the model");
+  const auto base = estimation::identify(dataset, model, options.pipeline);
+  result.warnings = base->warnings;
+  result.parameter_trends = parameter_trends(*base);
+  std::vector<const data::Experiment*> experiments;
+  for (const data::Experiment& e : dataset.experiments)
+    if (e.role == data::Role::fit) experiments.push_back(&e);
+
+  std::vector<SearchedBalance> all = search_balances(*base, experiments, options, result);
+  const bool moves = std::any_of(base->prepared.records.begin(), base->prepared.records.end(),
+                                 [](const estimation::Record& r) { return !r.at_rest; });
+  const auto motor = std::find_if(all.begin(), all.end(), [](const SearchedBalance& e) {
+    return e.search.data->balance() == estimation::Balance::motor;
+  });
+  if (moves && motor != all.end()) {
+    if (options.progress) options.progress("choosing effects on halves of the data");
+    std::vector<const data::Experiment*> with_held_out;
+    for (const data::Experiment& e : dataset.experiments)
+      if (e.role == data::Role::fit || e.role == data::Role::holdout) with_held_out.push_back(&e);
+    result.resampling = resample(with_held_out, base->model.drive, base->terms);
+    result.resampling->decides = &most_significant(all) == &*motor && resampling_decides(*result.resampling, *motor);
+  }
+  const bool by_resampling = result.resampling && result.resampling->decides;
+  SearchedBalance& chosen = by_resampling ? *motor : most_significant(all);
+  std::string alias;
+  if (chosen.names_one() && !by_resampling) {
+    if (options.progress) options.progress("checking what else could explain it");
+    alias = choose_named(chosen);
+  }
+  result.balance = chosen.search.data->balance();
+  const CrossValidatedFit& fit = chosen.search.base;
+  result.base_rmse = fit.rmse_fixed_effects();
+  result.base_rmse_cv = fit.rmse_cv_fixed_effects();
+  result.base_rmse_own_friction = fit.rmse();
+  result.noise_floor = chosen.floor.rmse;
+  result.noise_floor_from = chosen.floor.from;
+  // Where nothing is missing, friction that differs between runs is not a structure to search for.
+  const bool names_one = chosen.names_one() && !by_resampling;
+  result.localised =
+      shares(*chosen.search.data, fit, names_one || by_resampling ? fit.residual_fixed_effects() : fit.residual);
+  list_candidates(all, model.drive.axis, result);
+  if (by_resampling) name_stable(chosen, result);
+  if (names_one) name_effects(chosen, alias, result);
+  if (!result.named.empty()) explain_named(chosen.search, chosen.candidates, model.drive, result);
+  assess_remainder(chosen, result);
+  if (by_resampling && result.resampling->lag_s) result.delay_s = result.resampling->lag_s;
+  if (!by_resampling || result.named.empty()) {
+    if (options.progress) options.progress("looking for what no effect explains");
+    check_unknown_structure(chosen.search, names_one ? &chosen.candidates.front() : nullptr, result);
+  }
+  if (by_resampling) name_between_records(*base, chosen, result);
+  explain_orders(base->model.drive, result);
+  assess_excitation(moves, result);
+  return result;
+}
+
+}  // namespace flexspline::selection

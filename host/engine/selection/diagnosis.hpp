@@ -1,0 +1,183 @@
+// Which physical effect is missing from a model, or that none is.
+#pragma once
+
+#include <cstddef>
+#include <functional>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "host/engine/estimation/identify.hpp"
+#include "host/engine/selection/trends.hpp"
+#include "host/engine/selection/unknown_structure.hpp"
+#include "host/input/data/dataset.hpp"
+#include "host/physics/catalogue/order_causes.hpp"
+#include "host/physics/model/model.hpp"
+
+namespace flexspline::selection {
+
+struct NamedEffect {
+  std::string effect;
+  std::optional<double> order;
+};
+
+// The smallest effect that these data, with this model, would have shown.
+struct Detectable {
+  // The smallest value that would be named: of the effect's only size, of the first of several in their usual ratio,
+  // or, as "amplitude", of a wave at the phase that is seen worst. Without std and interval.
+  estimation::Estimate size;
+  bool at_most = false;                  // an effect that grows as this falls: a limit that it stays below
+  std::vector<estimation::Estimate> at;  // nonlinear parameters at which that holds
+};
+
+// Why an effect is confounded with another one in these data.
+struct ConfoundingReason {
+  std::string effect;
+  double own_percent = 0.0;  // of its torque that is orthogonal to the other
+  std::string variable;      // over which both do the same; empty: no single one
+};
+
+// What the model lacks over the variable in which an effect shows most, and what the effect makes of it.
+struct Evidence {
+  std::string variable, unit;
+  bool resisting = false;  // torques count as positive where they resist the motion
+  double share_percent = 0.0;
+  struct Bin {
+    double low = 0.0, high = 0.0;
+    double lacking = 0.0;  // mean, N m
+    double effect = 0.0;
+  };
+  std::vector<Bin> bins;
+};
+
+// The torque of an effect that the model cannot replace (orthogonal to the model's regressors), on the samples of the
+// fit.
+struct EffectSize {
+  double rms = 0.0, peak = 0.0;            // N m, N on a linear axis
+  std::optional<double> percent_of_rated;  // the RMS, of the rated torque on this balance; none: not stated
+};
+
+struct Candidate {
+  std::string effect;
+  std::optional<double> order;
+  estimation::Balance balance = estimation::Balance::motor;
+  double score = 0.0;  // decrease of cross-validated chi-square over the autocorrelation time, less k ln(n_eff)
+  double other_balance_score = 0.0;    // on the other balances that the effect acts on, with the same parameters
+  double chi2_decrease_percent = 0.0;  // cross-validated
+  double rmse_cv_before = 0.0;
+  double rmse_cv_after = 0.0;
+  std::optional<double> p_value;
+  std::vector<estimation::Estimate> parameters;
+  bool admissible = true;
+  std::string why_not;  // where it is not admissible
+  std::vector<std::string> cannot_distinguish;
+  std::vector<ConfoundingReason> confounding_reasons;
+  std::optional<Evidence> evidence;  // of named effects
+  std::optional<EffectSize> size;    // of named effects
+  std::optional<Detectable> minimum_detectable;
+  std::string note;  // what its values mean, where that differs from the effect's name
+  // What on this drive makes its order, and which fact of the drive would tell more.
+  std::vector<catalogue::OrderCause> order_causes;
+  std::string order_hint;
+};
+
+struct LocalisedResidual {
+  std::string variable;
+  double share_percent = 0.0;
+};
+
+// An interval in which something acted on the axis that no model of the drive explains.
+struct Disturbance {
+  std::string experiment;
+  double from_s = 0.0;
+  double to_s = 0.0;
+  double peak = 0.0;
+  std::string unit;
+};
+
+// The result of resampling: how often a term is chosen on halves of the data, over bandwidths and with and without
+// reversals.
+struct Resampling {
+  struct FoundTerm {
+    std::vector<NamedEffect> group;  // more than one: these data cannot distinguish them; empty: in no catalogue
+    std::string name;                // of what is in no catalogue
+    double frequency = 0.0;          // of the subsamples
+    double share_percent = 0.0;      // of the squared error above the noise, median of the subsamples
+    double share_low_percent = 0.0, share_high_percent = 0.0;  // of 95 % of the subsamples
+    // Error on the experiments that are held out, with it over without it; nothing where none are.
+    std::optional<double> held_out_ratio;
+    bool refused_by_holdout = false;  // in the catalogue, but the held-out error rises with it
+  };
+  // How often a term was chosen, or was nearly as good as what was; zero for one that never was.
+  struct Support {
+    std::string effect;
+    std::optional<double> order;
+    double frequency = 0.0;
+  };
+  double subsamples = 0.0;
+  bool too_little = false;  // there are not enough samples for halves
+  double abstained = 0.0;   // saw nothing above the noise
+  double whiteness = 0.0;   // of what the best terms leave, reversals masked: 1 for noise, 0 for structure
+  double lowest_hz = 0.0, highest_hz = 0.0;
+  std::optional<double> lag_s, lag_std_s;  // of the effort's time base, taken off; nothing: not significant
+  std::vector<FoundTerm> found;            // largest share first
+  std::vector<Support> support;            // of all terms that could be chosen
+  // The group that a name was found in.
+  std::vector<NamedEffect> found_group(const NamedEffect& name) const;
+  bool decides =
+      false;  // the model's error is no noise even with the likeliest effect, so that likelihood alone does not count
+};
+
+// Where a law is named by how friction differs between records.
+struct BetweenRecords {
+  std::size_t records = 0;
+  double explained_percent = 0.0;  // of the variance between records
+  double p_value = 1.0;            // by permutation of the records
+};
+
+enum class Verdict {
+  missing_effect,
+  confusable_effects,
+  at_noise_floor,
+  nothing_significant,
+  unknown_structure,
+  insufficient_excitation,
+};
+std::string verdict_name(Verdict verdict);
+
+struct Diagnosis {
+  Verdict verdict = Verdict::nothing_significant;
+  std::vector<NamedEffect> named;
+  std::optional<estimation::Balance> balance;  // of the named effect, else of the largest excess
+  std::string unit;                            // of the balances' errors
+  double base_rmse = 0.0;                      // with one friction for all runs, as all errors of candidates are
+  double base_rmse_cv = 0.0;
+  double base_rmse_own_friction = 0.0;  // with each run's own friction where it differs from run to run
+  std::optional<double> noise_floor;
+  std::string noise_floor_from = "none";
+  std::vector<LocalisedResidual> localised;
+  std::vector<Candidate> candidates;    // best first
+  std::vector<Trend> parameter_trends;  // of the model as it is
+  std::vector<Drift> friction_drift;    // with the named effect in the model
+  std::vector<LocalisedResidual> remaining_structure;
+  // Of the chi-square above the noise floor, the share in percent that the named effect takes off.
+  std::optional<double> recovered_percent;
+  std::vector<Disturbance> disturbances;
+  std::vector<std::string> warnings;
+  std::optional<Resampling> resampling;     // of the motor's balance
+  bool partial = false;                     // more is missing than what is named
+  std::optional<UnknownStructure> unknown;  // where the verdict is unknown_structure and a curve shows what it is
+  std::optional<BetweenRecords> between_records;
+  std::optional<double> delay_s;  // of the effort against the motion, beyond the alignment, where significant
+};
+
+struct Options {
+  estimation::PipelineOptions pipeline;
+  std::function<void(std::string_view)> progress;  // called at each stage; may be empty
+};
+
+// The method is in METHOD.md. Uses experiments of role fit. The model need not have values:
+// all free parameters are estimated.
+Diagnosis diagnose(const data::Dataset& dataset, const model::Model& model, const Options& options);
+
+}  // namespace flexspline::selection

@@ -1,0 +1,100 @@
+#include "host/engine/selection/friction_random_effects.hpp"
+
+#include <Eigen/Cholesky>
+#include <cmath>
+#include <numeric>
+
+#include "host/engine/estimation/variance_components.hpp"
+
+namespace flexspline::selection {
+namespace {
+
+// Those that differ at all.
+std::vector<Eigen::Index> components(const FrictionRandomEffects& differences) {
+  std::vector<Eigen::Index> vary;
+  for (Eigen::Index g = 0; g < differences.variance.size(); ++g)
+    if (differences.variance[g] > 0.0) vary.push_back(g);
+  return vary;
+}
+
+}  // namespace
+
+void eliminate_friction_effects(Eigen::MatrixXd& products, const FrictionRandomEffects& differences) {
+  const auto& [columns, variance, noise] = differences;
+  const std::vector<Eigen::Index> vary = components(differences);
+  if (vary.empty()) return;
+  const auto k = static_cast<Eigen::Index>(vary.size());
+  Eigen::MatrixXd along(products.rows(), k), inner(k, k);
+  for (Eigen::Index i = 0; i < k; ++i)
+    along.col(i) = products.col(columns[static_cast<std::size_t>(vary[static_cast<std::size_t>(i)])]);
+  for (Eigen::Index i = 0; i < k; ++i)
+    for (Eigen::Index j = 0; j < k; ++j)
+      inner(i, j) = along(columns[static_cast<std::size_t>(vary[static_cast<std::size_t>(i)])], j);
+  for (Eigen::Index i = 0; i < k; ++i) inner(i, i) += noise / variance[vary[static_cast<std::size_t>(i)]];
+  products.noalias() -= along * inner.llt().solve(along.transpose());
+}
+
+Eigen::VectorXd friction_effects_of(const RegressorTable& table, const Setting& setting,
+                                    const std::vector<double>& weights, double noise, const SelectionPolicy& policy) {
+  constexpr double kLeast = 0.005, kMost = 0.5;  // of the friction
+  std::vector<Eigen::Index> fixed(static_cast<std::size_t>(table.model_columns));
+  std::iota(fixed.begin(), fixed.end(), Eigen::Index{0});
+  fixed.insert(fixed.end(), table.differences.begin(), table.differences.end());
+  std::vector<estimation::RecordProducts> records;
+  const auto k = static_cast<Eigen::Index>(table.differences.size());
+  Eigen::VectorXd size(k);
+  for (Eigen::Index g = 0; g < k; ++g) size[g] = table.scale[table.differences[static_cast<std::size_t>(g)]];
+  for (std::size_t first = 0; first < setting.blocks.size();) {
+    std::size_t last = first;
+    const std::size_t record = setting.blocks[first].record;
+    Eigen::MatrixXd own = Eigen::MatrixXd::Zero(setting.rows.cols(), setting.rows.cols());
+    for (; last < setting.blocks.size() && setting.blocks[last].record == record; ++last)
+      own += setting.blocks[last].products;
+    own *= weights[record];
+    const Eigen::Index y = own.cols() - 1;
+    estimation::RecordProducts r;
+    r.xx = own(fixed, fixed);
+    r.xz = own(fixed, table.differences) * size.asDiagonal();
+    r.zz = size.asDiagonal() * own(table.differences, table.differences) * size.asDiagonal();
+    r.xy = own(fixed, y);
+    r.zy = size.asDiagonal() * own(table.differences, y);
+    records.push_back(std::move(r));
+    first = last;
+  }
+  // Columns of the table are scaled; one unit is the friction over that scale.
+  const Eigen::VectorXd variance =
+      estimation::reml(records, noise, kLeast, kMost, {policy.friction_difference, policy.friction_difference_records})
+          .variance;
+  return variance.cwiseProduct(size.cwiseAbs2());
+}
+
+Eigen::VectorXd weighted_residual(const Setting& seen, const TermFit& fitted, const std::vector<double>& weights,
+                                  const FrictionRandomEffects& differences) {
+  Eigen::VectorXd residual = seen.rows.col(seen.rows.cols() - 1);
+  for (std::size_t j = 0; j < fitted.columns.size(); ++j)
+    residual -= fitted.theta[static_cast<Eigen::Index>(j)] * seen.rows.col(fitted.columns[j]);
+  const std::vector<Eigen::Index> vary = components(differences);
+  const auto k = static_cast<Eigen::Index>(vary.size());
+  for (std::size_t first = 0; first < seen.runs.size();) {
+    std::size_t last = first;
+    const std::size_t record = seen.runs[first].record;
+    while (last < seen.runs.size() && seen.runs[last].record == record) ++last;
+    const Eigen::Index from = seen.runs[first].first, rows = seen.runs[last - 1].last - from;
+    if (k > 0) {
+      Eigen::MatrixXd Z(rows, k);
+      for (Eigen::Index j = 0; j < k; ++j)
+        Z.col(j) = seen.rows.col(differences.columns[static_cast<std::size_t>(vary[static_cast<std::size_t>(j)])])
+                       .segment(from, rows);
+      Eigen::MatrixXd inner = weights[record] * Z.transpose() * Z;
+      for (Eigen::Index j = 0; j < k; ++j)
+        inner(j, j) += differences.noise / differences.variance[vary[static_cast<std::size_t>(j)]];
+      residual.segment(from, rows) -=
+          Z * inner.llt().solve(weights[record] * (Z.transpose() * residual.segment(from, rows)));
+    }
+    residual.segment(from, rows) *= std::sqrt(weights[record]);
+    first = last;
+  }
+  return residual;
+}
+
+}  // namespace flexspline::selection

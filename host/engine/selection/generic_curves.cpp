@@ -1,0 +1,108 @@
+// Curves of a regressor table that are in no catalogue.
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cmath>
+
+#include "host/engine/selection/table_builder.hpp"
+
+namespace flexspline::selection {
+namespace {
+
+constexpr int kCurveDegree = 3;
+
+void add_generic(TableBuilder& builder, std::string name, std::vector<Eigen::VectorXd> columns) {
+  CandidateTerm term;
+  term.name = std::move(name);
+  for (Eigen::VectorXd& column : columns) {
+    builder.filter(column);
+    term.columns.push_back(builder.add(std::move(column)));
+    term.low.push_back(-effects::kUnbounded);
+  }
+  builder.table.terms.push_back(std::move(term));
+}
+
+// Friction with kinks at two speeds.
+void add_friction_curve(TableBuilder& builder, double top_speed) {
+  const auto kinked_at = [&](double knot) {
+    return builder.at_rows([knot](const estimation::Record& r, std::size_t k) {
+      return TableBuilder::direction(r, k) * std::min(std::abs(r.inputs.velocity_at(k)), knot);
+    });
+  };
+  add_generic(builder, "friction curve over speed", {kinked_at(0.1 * top_speed), kinked_at(0.3 * top_speed)});
+}
+
+// Torque and friction over the output angle: Chebyshev polynomials, which are well conditioned.
+void add_angle_curves(TableBuilder& builder) {
+  double low_angle = 1e300, high_angle = -1e300;
+  for (const estimation::Record& r : builder.prepared().records)
+    for (std::size_t k = 0; k < r.inputs.size(); k += r.decimation) {
+      low_angle = std::min(low_angle, r.inputs.output_angle_at(k));
+      high_angle = std::max(high_angle, r.inputs.output_angle_at(k));
+    }
+  const double span = high_angle - low_angle, middle = 0.5 * (high_angle + low_angle);
+  if (!(span > 0.0)) return;
+  const auto chebyshev = [&](int degree, bool friction) {
+    return builder.at_rows([&](const estimation::Record& r, std::size_t k) {
+      const double x = std::clamp(2.0 * (r.inputs.output_angle_at(k) - middle) / span, -1.0, 1.0);
+      return std::cos(degree * std::acos(x)) * (friction ? TableBuilder::direction(r, k) : 1.0);
+    });
+  };
+  for (const bool friction : {false, true}) {
+    std::vector<Eigen::VectorXd> curve;
+    for (int degree = 1; degree <= kCurveDegree; ++degree) curve.push_back(chebyshev(degree, friction));
+    add_generic(builder, fmt::format("{} over the output angle", friction ? "friction" : "torque"), std::move(curve));
+  }
+}
+
+// A column less its first-order lag, along each run.
+Eigen::VectorXd lag_of(const Eigen::VectorXd& column, const std::vector<Run>& runs, double time_constant_s) {
+  Eigen::VectorXd lag = column;
+  for (const Run& run : runs) {
+    const double share = 1.0 - std::exp(-run.row_s / time_constant_s);
+    for (Eigen::Index k = run.first + 1; k < run.last; ++k) lag[k] = lag[k - 1] + share * (column[k] - lag[k - 1]);
+  }
+  return column - lag;
+}
+
+// Friction that falls after each reversal.
+Eigen::VectorXd since_reversal(const TableBuilder& builder, double time_constant_s) {
+  const estimation::BalanceData& data = builder.data;
+  Eigen::VectorXd column(data.rows());
+  for (const estimation::RowRange& range : data.records()) {
+    const estimation::Record& r = builder.prepared().records[range.record];
+    const auto& samples = r.rows[estimation::index(data.balance())].samples;
+    double sign = 0.0;
+    std::size_t since = 0, k = 0;
+    for (std::size_t row = 0; row < samples.size(); ++row) {
+      for (; k <= samples[row]; ++k) {
+        const double v = r.inputs.velocity_at(k);
+        if (v * sign > 0.0 || std::abs(v) < 3.0 * r.velocity_noise[0]) continue;
+        sign = v > 0.0 ? 1.0 : -1.0;
+        since = k;
+      }
+      const double t = static_cast<double>(samples[row] - since) * r.sample_s;
+      column[range.first + static_cast<Eigen::Index>(row)] =
+          TableBuilder::direction(r, samples[row]) * std::exp(-t / time_constant_s);
+    }
+  }
+  return column;
+}
+
+}  // namespace
+
+void add_generic_curves(TableBuilder& builder, const Motion& motion) {
+  add_friction_curve(builder, motion.top_speed);
+  add_angle_curves(builder);
+  add_generic(builder, "creep",
+              {lag_of(builder.effort, builder.table.runs, 0.1), lag_of(builder.effort, builder.table.runs, 1.0)});
+  add_generic(builder, "friction after a reversal", {since_reversal(builder, 0.3), since_reversal(builder, 1.5)});
+  const auto time_of = [](const estimation::Record& r, std::size_t k) { return static_cast<double>(k) * r.sample_s; };
+  add_generic(builder, "drift over time",
+              {builder.at_rows([&](const estimation::Record& r, std::size_t k) {
+                 return TableBuilder::direction(r, k) * static_cast<double>(k) * r.sample_s;
+               }),
+               builder.at_rows(time_of)});
+}
+
+}  // namespace flexspline::selection

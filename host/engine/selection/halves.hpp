@@ -1,0 +1,28 @@
+// Sums of blocks: halves of the data, and records weighted by what the model leaves in them.
+#pragma once
+
+#include <cstdint>
+#include <random>
+#include <span>
+#include <vector>
+
+#include "host/engine/selection/friction_random_effects.hpp"
+
+namespace flexspline::selection {
+
+// Weights of the records: one over the variance that the model leaves in each, none more than ten times the median.
+// Zero for a record without samples.
+std::vector<double> record_weights(const RegressorTable& table, const Setting& setting);
+
+// Products of the blocks k with in[k] == which, or of all where `in` is empty; each record's differences eliminated.
+// `presliding` is null where that state does not compete; else its blocks are those of `sign`.
+HalfData sum_of(const Setting& sign, const Setting* presliding, const std::vector<double>& weights,
+                std::span<const std::uint8_t> in, std::uint8_t which, const FrictionRandomEffects& differences);
+
+// Which blocks are in the first of two complementary halves: half of each record's blocks, so that no half lacks a
+// record.
+std::vector<std::uint8_t> half_of_blocks(const Setting& setting, std::mt19937_64& chance);
+// The same of whole records.
+std::vector<std::uint8_t> half_of_records(const Setting& setting, std::mt19937_64& chance);
+
+}  // namespace flexspline::selection

@@ -1,0 +1,22 @@
+// Evidence of the other torque balances for an effect: many act on two of them, with the same parameters.
+#pragma once
+
+#include <vector>
+
+#include "host/engine/selection/candidate_fits.hpp"
+
+namespace flexspline::selection {
+
+// The searches among `all`, other than `own`, on whose balances the effect of a candidate acts as well.
+std::vector<BalanceSearch*> other_balances_of(const std::vector<BalanceSearch*>& all, const BalanceSearch& own,
+                                              const CandidateFit& candidate);
+
+// For each candidate of `own` above the limit, cross-validates its effect on every other balance that it acts on, with
+// parameters on which both agree: a ripple of the torque sensor and an error of the gear have the same effect where the
+// spring twists, but only the gear's error turns the motor. The scores go to `CandidateFit::other_balance_score`, what
+// is refuted there is refused, and the candidates are put in order again. `all` holds the searches of every balance,
+// `own` the one whose candidates these are.
+void add_other_balance_evidence(const std::vector<BalanceSearch*>& all, BalanceSearch& own,
+                                std::vector<CandidateFit>& candidates);
+
+}  // namespace flexspline::selection

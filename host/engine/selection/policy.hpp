@@ -1,0 +1,190 @@
+// Every threshold of the diagnosis in one place, with its unit and its source. Steps are those of METHOD.md.
+#pragma once
+
+#include <cstddef>
+
+#include "host/engine/selection/named_score.hpp"
+
+namespace flexspline::selection {
+
+struct SelectionPolicy {
+  // Bandwidths: the highest, and four lower ones, each by this factor.
+  std::size_t bandwidths = 5;
+  double bandwidth_factor = 0.7071;
+  // Highest bandwidth, Hz: above the coherent motion of drives, below the resonances of arms. Presliding shows at 20
+  // Hz.
+  double highest_hz = 40.0;
+  // The same for waves over the motor's angle.
+  double widest_hz = 200.0;
+  double widest_over_sampling = 0.4;
+  // Share of the variance of an acceleration that may be noise of the position: the attenuation of the inertia.
+  double acceleration_noise_share = 0.02;
+  // Noise of the inertia's torque over the residual, as variances: what noise of a regressor may add to the residual.
+  double regressor_noise_share = 0.05;
+
+  // Resampling (Shah and Samworth 2013: complementary pairs; 50 pairs bound the error of a frequency to 0.07).
+  std::size_t blocks = 24;
+  std::size_t pairs = 12;                   // for each bandwidth and mask
+  std::size_t fewest_records_to_split = 4;  // from so many on every second pair halves the records, not their blocks
+  std::size_t most_steps = 4;
+  double named_frequency = 0.6;    // Meinshausen and Buehlmann 2010: 0.6 to 0.9
+  double certain_frequency = 0.9;  // behind a structure that is in no catalogue
+
+  // Share of the squares above the noise that a term has to take off on samples that the fit did not see.
+  double line_share = 0.05;  // a linear term
+  double law_share = 0.10;   // a term with nonlinear parameters
+  // Log-likelihood gain, in units of one: chance alone gives a term with two parameters 6 in one of 20 trials.
+  double least_gain = 6.0;
+  // A subsample without that share of its squares above the noise abstains.
+  double least_excess = 0.03;
+
+  double curve_discount = 0.8;  // a law has to take off at least this share of what any curve does
+  double similar = 0.9;         // terms that take off that share of the best one's are not distinguished,
+  double similar_left = 2.0;    // unless they leave that many times the squares above the noise
+
+  double group_frequency = 0.5;      // of the subsamples that chose the first of a group; and from which on a term that
+                                     // was chosen first is not behind a structure that is in no catalogue
+  double least_own_frequency = 0.3;  // of the first of a group
+  double most_abstaining = 0.75;     // of the subsamples
+
+  double most_leverage = 3.0;  // error per sample of the half that judges over that of the half that fits: beyond, the
+                               // model itself does not carry over
+
+  // Friction of one drive differs between runs by 0 to 10 %, by 3 % mostly: a prior worth that many records.
+  double friction_difference = 0.03;
+  double friction_difference_records = 2.0;
+
+  // Error on experiments that are held out, with a term over without it: of a term of certain_frequency, as that much
+  // more is the difference of short records, and of any other.
+  double most_held_out_ratio_certain = 1.02;
+  double most_held_out_ratio = 1.0;
+
+  double white = 0.95;  // semivariance over variance of what is left: above, it is noise
+
+  // What corrects the effort: at most that share of it at its peaks, and only where the peaks are that much above the
+  // median.
+  double most_of_effort = 0.3;
+  double least_effort_range = 2.0;
+
+  // Presliding needs that many reversals.
+  double fewest_reversals = 3.0;
+
+  // Samples for each column of a fit: with fewer, halves of the data say nothing.
+  double fewest_rows_per_column = 10.0;
+  // Rows of the table by which effort and motion may be stamped apart: loggers differ by a few samples; a longer lag is
+  // another effect.
+  int most_lag_rows = 4;
+
+  // Resampling against likelihood on the motor's balance.
+  // Percent of the left-out chi-square from which on what resampling cannot choose counts by itself: what was named
+  // instead of another effect took off at most 96 % in robot-like twins, a limit of the current that is there 99 %.
+  double nearly_all_percent = 98.0;
+  double floor_uncertainty = 0.1;   // relative, of a floor of some ten periods
+  double filter_uncertainty = 0.2;  // relative, of an autocorrelation time
+
+  // Likelihood on one balance.
+  // Score (twice the log-likelihood gain less k ln n_eff) from which on an effect may be named: one in 1000 sets with
+  // nothing hidden passes it; calibrated by `./dev soak MINUTES calibrate`.
+  double named_score = kNamedScore;
+  // Percent of the left-out chi-square: an effect must matter, not only be there (step 7).
+  double named_chi2_percent = 0.5;
+  // Score within which two effects are not distinguished (step 12).
+  double confounded_margin = 10.0;
+  // Of the one-sided sign test over records that were predicted without them: four of four are enough, three of three
+  // are not.
+  double sign_test_p_value = 0.1;
+  // Share of a candidate's torque that is orthogonal to the model: below, both are one in the data (by hand, on drives
+  // with an effect that the model has in another form).
+  double least_orthogonal_share = 0.003;
+  // Residual over noise floor: what the filters leave around reversals repeats with the motion, so a true model is
+  // some 15 % above its floor on simulated drives.
+  double at_floor = 1.3;
+  // A candidate that takes as much off the left-out chi-square, in percent, may change the base model as it likes (by
+  // hand: loads that the model lacks wholly).
+  double all_explained_percent = 99.0;
+  // Else it may not change the torque of a base effect of physical sign by more than that share of the larger one, if
+  // that effect stands out by so many standard errors and is so many times what is missing (by hand, seeds below 1100).
+  double most_base_change = 0.5;
+  double known_base_errors = 5.0;
+  double known_base_over_missing = 2.0;
+  // Velocity over the end of its range (a quarter of the fast motion) from which on a negative law is wide (EFFECTS).
+  double wide_share_of_range = 0.4;
+
+  // A law that contains another one fits at least as well. How much more the simpler one may leave: of the error itself
+  // as a ratio of squares, and of what was missing as a share. On drives with laws of friction and hysteresis of which
+  // one contains the other: where the simpler one was the truth the other took 0.02 % of what was missing (0.8 % where
+  // an encoder smears it), by however much it led; where the wider one was, at least 0.2 %.
+  struct Same {
+    double left, share_of_missing;
+  };
+  Same same{2.25, 0.001};
+  Same same_smeared{2.89, 0.01};
+  Same hardly_more{1.21, 0.005};
+  double smeared_quanta = 20.0;   // travels of fewer encoder steps are smeared (the same drives)
+  double many_parameters = 12.0;  // a law of so many more is confounded with any
+
+  // Orders per motor turn.
+  int highest_order = 24;          // of gears and motors: the wave generator's, slots, poles and bearings
+  std::size_t orders_tried = 3;    // those that the residual holds most of
+  double usual_order_share = 0.9;  // of the best one's squares: from there the usual order is tried, too
+  // Placebo orders, which no gear, motor or bearing makes: in data of few turns they explain as much as any.
+  double first_placebo_order = 0.63;
+  int placebo_orders = 24;
+  double least_over_placebo = 1.5;  // squares over those of the best placebo (by hand, records of one to five turns)
+  // Where nothing but noise is left, likelihood distinguishes orders although a wrong one may explain most of it: score
+  // over that of any placebo.
+  double score_over_placebo = 3.0 * kNamedScore;
+  // A true order shows in so many of the parts of the data, and not in one of them mostly (by hand, bursts).
+  std::size_t order_parts = 8;
+  int order_parts_with_gain = 5;
+  double most_in_one_part = 0.7;
+
+  // Visibility.
+  double least_temperature_span = 3.0;  // degC: less shows no effect of temperature
+  double least_loaded_share = 0.1;      // torque of the sensor over the motor's: above, it fixes the torque scale
+  double least_direction_share = 0.1;   // samples of the rarer direction that make a record one of both directions
+  int fewest_one_way_records = 3;       // of each direction, where no record has both
+  double one_way_share = 0.01;          // samples of the rarer direction below which data count as one way
+
+  // Disturbances (by hand: pushes on a simulated axis, against bursts that filters make of friction at reversals).
+  double far_out = 6.0;           // robust standard deviations
+  double longest_burst_s = 0.15;  // what lasts longer is a state of the drive
+  double burst_repeats = 0.35;    // share of like samples that stand out too: above, it depends on that signal
+  std::size_t like_rows = 120;    // that count as like ones
+  double most_disturbed = 0.3;    // of a record: more is no exception
+
+  // What is reported in addition to the name.
+  double shown_share_percent = 5.0;        // maps of a complete model show significant shares of a few percent
+  double least_shown_share_percent = 1.0;  // where much is left
+  double delay_errors = 5.0;               // standard errors from which on a delay is reported
+  // Of the chi-square above the noise: the best substitute for an effect that is not in the catalogue takes off 60 %
+  // and less (step 14).
+  double recovered_percent = 80.0;
+  double worth_adding = 0.003;  // of the first decrease of chi-square (step 16)
+
+  // Structure outside the catalogue. A curve has many numbers and the best of some two dozen signals is taken, so it
+  // must show more than an effect of the catalogue; both limits were set on drives that lack nothing.
+  double curve_score = 60.0;
+  double curve_chi2_percent = 3.0;
+  // What is named must recover this share of what a curve does: substitutes for unknown laws stay below, effects of the
+  // catalogue that are the nearest to one above.
+  double curve_recovered = 0.9;
+  double recovered_by_two = 0.98;  // two that are right leave nothing to a curve
+  double simpler_curve = 0.02;     // of the left-out squares: a simpler curve is taken where it predicts as well
+  // A table that a user adds: below that score it is noise that was fitted, and it must lower the left-out squares
+  // by that many percent.
+  double table_score = 20.0;
+  double least_table_percent = 0.1;
+
+  // Trends of parameters over experiments (step 14).
+  std::size_t fewest_of_trend = 6;  // experiments
+  double trend_p_value = 1e-3;      // after the correction for what was tried
+  double trend_size = 0.03;         // of the parameter, over the records
+  double least_drift = 0.01;        // relative standard deviation of friction between records that is reported
+  double drift_deviance = 12.0;     // twice the log-likelihood ratio of random effects against none
+};
+
+// The policy that all commands follow.
+inline constexpr SelectionPolicy kPolicy{};
+
+}  // namespace flexspline::selection

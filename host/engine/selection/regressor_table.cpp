@@ -1,0 +1,111 @@
+#include "host/engine/selection/regressor_table.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <numbers>
+
+#include "host/engine/selection/presliding.hpp"
+#include "host/engine/selection/table_builder.hpp"
+
+namespace flexspline::selection {
+namespace {
+
+using estimation::BalanceData;
+using estimation::PreparedData;
+using estimation::Record;
+using estimation::Terms;
+
+// E[sign v] of a velocity with normal noise: erf(v / (sqrt 2 sigma)).
+std::vector<double> expected_sign(const Record& record) {
+  std::vector<double> sign(record.inputs.size(), 0.0);
+  const double width = std::numbers::sqrt2 * std::max(record.velocity_noise[0], 1e-12);
+  for (std::size_t k = 0; k < sign.size(); ++k) sign[k] = std::erf(record.inputs.velocity_at(k) / width);
+  return sign;
+}
+
+void add_runs(const BalanceData& data, RegressorTable& table) {
+  for (const estimation::RowRange& range : data.records()) {
+    const Record& r = data.prepared().records[range.record];
+    const auto& samples = r.rows[estimation::index(data.balance())].samples;
+    const double row_s = r.sample_s * static_cast<double>(r.decimation);
+    Eigen::Index first = range.first;
+    for (std::size_t k = 1; k <= samples.size(); ++k)
+      if (k == samples.size() || samples[k] != samples[k - 1] + r.decimation) {
+        const Eigen::Index last = range.first + static_cast<Eigen::Index>(k);
+        if (last - first >= 16) table.runs.push_back({range.record, first, last, row_s});
+        first = last;
+      }
+  }
+}
+
+// What masks need: velocities over their noise, and how often the motion reverses.
+void add_row_signals(const TableBuilder& builder) {
+  RegressorTable& table = builder.table;
+  const Balance balance = builder.data.balance();
+  table.velocity_over_noise = builder.at_rows([&](const Record& r, std::size_t k) {
+    return r.at_rest ? effects::kUnbounded
+                     : r.direction_variable(balance, k) / std::max(r.velocity_noise[estimation::index(balance)], 1e-12);
+  });
+  for (const Run& run : table.runs) {
+    double sign = 0.0;
+    for (Eigen::Index k = run.first; k < run.last; ++k) {
+      const double v = table.velocity_over_noise[k];
+      if (std::abs(v) < 3.0 || std::isinf(v)) continue;
+      if (v * sign < 0.0) table.reversals += 1.0;
+      sign = v;
+    }
+  }
+}
+
+// Columns over their root mean squares.
+void scale_columns(const TableBuilder& builder) {
+  RegressorTable& table = builder.table;
+  table.columns.resize(builder.data.rows(), static_cast<Eigen::Index>(builder.columns.size()));
+  table.scale.resize(table.columns.cols());
+  for (Eigen::Index j = 0; j < table.columns.cols(); ++j) {
+    const Eigen::VectorXd& column = builder.columns[static_cast<std::size_t>(j)];
+    const double size = column.norm() / std::sqrt(std::max<double>(1.0, static_cast<double>(column.size())));
+    table.scale[j] = size > 0.0 && std::isfinite(size) ? size : 1.0;
+    table.columns.col(j) = column / table.scale[j];
+  }
+  for (CandidateTerm& term : table.terms)
+    if (term.most_at_peak > 0.0) term.most_at_peak *= table.scale[term.columns.front()];
+}
+
+}  // namespace
+
+double highest_order_hz(const PreparedData& prepared) {
+  std::vector<double> speeds;
+  for (const Record& r : prepared.records)
+    for (std::size_t k = 0; k < r.inputs.size() && !r.inputs.velocity.empty(); k += r.decimation)
+      speeds.push_back(std::abs(r.inputs.velocity_at(k)));
+  const bool turns = prepared.rotary || prepared.constants.turn_angle_scale != 1.0;
+  return turns ? kPolicy.highest_order * quantile(speeds, 0.5) * prepared.constants.turn_angle_scale /
+                     (2.0 * std::numbers::pi)
+               : 0.0;
+}
+
+RegressorTable make_regressor_table(const PreparedData& original, Balance balance, const Terms& terms,
+                                    Presliding presliding, double highest_law_hz, const SelectionPolicy& policy) {
+  PreparedData prepared = original;
+  for (Record& r : prepared.records)
+    r.inputs.directions[0] = presliding ? presliding_state(r, *presliding) : expected_sign(r);
+  BalanceData data(prepared, balance);
+  RegressorTable table;
+  table.records = prepared.records.size();
+  for (const Record& r : prepared.records) table.held_out.push_back(r.experiment->role == data::Role::holdout ? 1 : 0);
+  table.highest_hz = prepared.pipeline.row_cutoff_hz;
+  table.highest_law_hz = highest_law_hz;
+  add_runs(data, table);
+  TableBuilder builder{data, terms, policy, table, {}, {}};
+  if (!add_model_columns(builder)) return table;
+  const Motion motion = motion_of(prepared);
+  add_catalogue_terms(builder, motion);
+  add_generic_curves(builder, motion);
+  add_differences(builder);
+  add_row_signals(builder);
+  scale_columns(builder);
+  return table;
+}
+
+}  // namespace flexspline::selection

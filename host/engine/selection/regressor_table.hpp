@@ -1,0 +1,74 @@
+// The regression that a diagnosis searches: target, columns of the model, and columns of all terms that may be added,
+// at the highest bandwidth and without a mask. Immutable; lower bandwidths and masks are made from its samples.
+#pragma once
+
+#include <Eigen/Core>
+#include <cstdint>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "host/engine/estimation/balance_data.hpp"
+#include "host/engine/estimation/terms.hpp"
+#include "host/engine/selection/policy.hpp"
+#include "host/engine/selection/presliding.hpp"
+
+namespace flexspline::selection {
+
+using estimation::Balance;
+
+// A term that may be added, at one value of its nonlinear parameters.
+struct CandidateTerm {
+  const catalogue::Entry* entry = nullptr;  // null: a placebo order or a curve that is in no catalogue
+  std::optional<double> order;
+  // "torque_ripple:2"; the same for all values of its nonlinear parameters, and for laws of one family.
+  std::string name;
+  std::vector<double> values;  // as estimation::Term has them, where there is an entry
+  std::vector<Eigen::Index> columns;
+  std::vector<double> low;       // of each column's coefficient
+  std::vector<double> high;      // likewise, where it has one
+  bool sum_is_positive = false;  // of the coefficients: amplitudes of a law that may differ by direction
+  double most_at_peak = 0.0;     // largest coefficient that is plausible; 0: any
+  bool is_placebo = false;
+  std::size_t nonlinear = 0;  // parameters that were searched over
+  double highest_hz = 0.0;    // the bandwidth must reach that far for it to be seen
+};
+
+// Consecutive samples of one record, evenly spaced in time.
+struct Run {
+  std::size_t record = 0;
+  Eigen::Index first = 0, last = 0;
+  double row_s = 0.0;
+};
+
+struct RegressorTable {
+  Eigen::MatrixXd columns;  // those of the model first; N m per unit, scaled to unit root mean square
+  Eigen::VectorXd scale;    // root mean squares that the columns were divided by
+  Eigen::VectorXd target;   // N m
+  Eigen::Index model_columns = 0;
+  std::vector<std::string> model_names;  // "coulomb_friction.torque"
+  std::vector<double> model_low;         // lower bound of each model column's coefficient
+  // Friction that may differ from run to run, by surface in common and by direction: columns of a relative change of
+  // one.
+  std::vector<Eigen::Index> differences;
+  std::vector<CandidateTerm> terms;
+  std::vector<const catalogue::Entry*> not_visible;  // that these data could not show if they were there
+  std::vector<Run> runs;
+  std::size_t records = 0;
+  std::vector<std::uint8_t> held_out;  // by record: not fitted on and not chosen with
+  double highest_hz = 0.0;             // of the samples
+  double highest_law_hz = 0.0;         // of the motion: wider bandwidths serve waves over the motor's angle alone
+  // For masks: velocity over its noise, by sample.
+  Eigen::VectorXd velocity_over_noise;
+  double reversals = 0.0;
+};
+
+// `prepared` is at the highest bandwidth and not masked; `terms` have the values of a first fit.
+RegressorTable make_regressor_table(const estimation::PreparedData& prepared, Balance balance,
+                                    const estimation::Terms& terms, Presliding presliding, double highest_law_hz,
+                                    const SelectionPolicy& policy);
+
+// Highest frequency of an order of the motor's turn that counts, Hz, at the typical speed.
+double highest_order_hz(const estimation::PreparedData& prepared);
+
+}  // namespace flexspline::selection

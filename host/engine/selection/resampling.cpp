@@ -1,0 +1,244 @@
+#include "host/engine/selection/resampling.hpp"
+
+#include <algorithm>
+#include <cmath>
+
+#include "host/engine/selection/decision.hpp"
+#include "host/engine/selection/policy.hpp"
+#include "host/engine/selection/record_cross_validation.hpp"
+#include "host/engine/selection/stability_selection.hpp"
+
+namespace flexspline::selection {
+namespace {
+
+std::vector<Resampling::Support> support_of(const StabilitySelection& selection, const estimation::Terms& terms) {
+  std::vector<Resampling::Support> all;
+  const auto near = [&](const std::string& name) {
+    for (const Frequency& f : selection.result().frequencies)
+      if (f.name == name) return f.near;
+    return 0.0;
+  };
+  for (const CandidateTerm& term : selection.tables().sign.terms) {
+    if (!term.entry) continue;
+    const bool is_there = std::any_of(all.begin(), all.end(), [&](const Resampling::Support& s) {
+      return s.effect == term.entry->name() && s.order == term.order;
+    });
+    if (!is_there) all.push_back({std::string(term.entry->name()), term.order, near(term.name)});
+  }
+  for (const catalogue::Entry* entry : selection.tables().sign.not_visible)
+    all.push_back({std::string(entry->name()), std::nullopt, 0.0});
+  if (const catalogue::Entry* law = presliding_law(terms); law && selection.tables().presliding)
+    all.push_back({std::string(law->name()), std::nullopt, near(kPresliding)});
+  return all;
+}
+
+// Whether a name that resampling chose is that of a candidate, or of another law of its family: resampling has the
+// nonlinear parameters at fixed values only, so likelihood decides which law of the family it is.
+bool is_of_family(const std::string& effect, std::optional<double> order, const CandidateFit& candidate) {
+  if (order != candidate.model.order) return false;
+  const std::string_view family = candidate.model.entry->info->family;
+  return effect == candidate.model.entry->name() || (!family.empty() && catalogue::get(effect).info->family == family);
+}
+
+// Of a candidate; nothing where resampling cannot choose it: it has no linear parameter, or more nonlinear ones than
+// one.
+std::optional<double> support_of(const Resampling& resampling, const CandidateFit& candidate) {
+  std::optional<double> support;
+  for (const Resampling::Support& s : resampling.support)
+    if (is_of_family(s.effect, s.order, candidate)) support = std::max(support.value_or(0.0), s.frequency);
+  return support;
+}
+
+bool is_of_effort(const CandidateFit& candidate) {
+  return candidate.model.entry->info->reads == effects::kCurrent;
+}
+
+// Whether the model with the best effect leaves known noise: as large as a noise floor that is not from a fit, with no
+// more correlation than the filter causes. An effect built from the measured effort may explain its own noise, so it
+// must take off nearly all.
+bool reaches_floor(const SearchedBalance& e) {
+  if (!e.floor.rmse || !e.names_one()) return false;
+  const CandidateFit& first = e.candidates.front();
+  return std::abs(first.fit.rmse() / *e.floor.rmse - 1.0) < kPolicy.floor_uncertainty &&
+         first.fit.autocorrelation_time <
+             (1.0 + kPolicy.filter_uncertainty) * e.search.data->filter_autocorrelation_time() &&
+         (!is_of_effort(first) || first.gain.chi2_percent > kPolicy.nearly_all_percent);
+}
+
+// Whether resampling found another effect that explains what is above the noise, too.
+bool explains_instead(const Resampling& resampling, const CandidateFit& first) {
+  return std::any_of(resampling.found.begin(), resampling.found.end(), [&](const Resampling::FoundTerm& f) {
+    return !f.group.empty() && !f.refused_by_holdout && f.share_percent >= kPolicy.recovered_percent &&
+           f.frequency >= kPolicy.certain_frequency &&
+           std::none_of(f.group.begin(), f.group.end(),
+                        [&](const NamedEffect& n) { return is_of_family(n.effect, n.order, first); });
+  });
+}
+
+// Whether the model with the best effect leaves noise: then likelihood alone decides. Where more than one effect is
+// missing, structure remains whatever is added, and a small decrease proves nothing. Where the noise floor is unknown,
+// the residual must be white, and an effect of the effort alone is not taken, as it may explain its own noise.
+bool leaves_noise(const SearchedBalance& e, double whiteness) {
+  const CrossValidatedFit& fit = e.names_one() ? e.candidates.front().fit : e.search.base;
+  if (e.floor.rmse) return fit.rmse() < kPolicy.at_floor * *e.floor.rmse;
+  return whiteness >= kPolicy.white && !(e.names_one() && is_of_effort(e.candidates.front()));
+}
+
+// Whether the likelihood of all data agrees with a name that resampling chose. Where the model alone leaves known
+// noise, most subsamples abstain and the others may have selected noise: likelihood must be significant then. Otherwise
+// it is not used, as it sees one bandwidth, without reversals.
+bool likelihood_agrees(const SearchedBalance& motor, const NamedEffect& name) {
+  if (!motor.floor.rmse || motor.search.base.rmse() > (1.0 + kPolicy.floor_uncertainty) * *motor.floor.rmse)
+    return true;
+  return std::any_of(motor.candidates.begin(), motor.candidates.end(), [&](const CandidateFit& candidate) {
+    return is_of_family(name.effect, name.order, candidate) && candidate.gain.score > kPolicy.named_score;
+  });
+}
+
+// The effects to name, among those in the catalogue that do not increase the held-out error: the group with the largest
+// share where these data cannot distinguish its members, else all single ones. After the first, a term below the share
+// of a linear term is a remainder of the first law, or not worth a parameter.
+std::vector<NamedEffect> names_of(const Resampling& resampling, const SearchedBalance& motor) {
+  const double least_percent = 100.0 * kPolicy.line_share;
+  std::vector<NamedEffect> names;
+  if (is_within_floor_of_few_records(motor.search)) return names;
+  for (const Resampling::FoundTerm& found : resampling.found) {
+    if (found.group.empty() || found.refused_by_holdout) continue;
+    if (std::none_of(found.group.begin(), found.group.end(),
+                     [&](const NamedEffect& n) { return likelihood_agrees(motor, n); }))
+      continue;
+    if (names.empty() && found.group.size() > 1) return found.group;
+    if (found.group.size() > 1 || (!names.empty() && found.share_percent < least_percent)) continue;
+    names.push_back(found.group.front());
+  }
+  return names;
+}
+
+bool names_several(const Resampling& resampling, const SearchedBalance& motor) {
+  const std::vector<NamedEffect> names = names_of(resampling, motor);
+  return names.size() > 1 && resampling.found_group(names.front()).size() < 2;
+}
+
+std::vector<std::string> first_names(const std::vector<FoundTerm>& decided) {
+  std::vector<std::string> names;
+  for (const FoundTerm& found : decided) names.push_back(found.group.front().name);
+  return names;
+}
+
+}  // namespace
+
+Resampling resample(const std::vector<const data::Experiment*>& experiments, const model::Drive& drive,
+                    const estimation::Terms& terms) {
+  StabilitySelection selection(experiments, drive, terms, estimation::Balance::motor, kPolicy);
+  const Stability& stability = selection.result();
+  Resampling result;
+  if (const std::optional<TimeLag> lag = selection.time_lag(first_names(decide(stability, kPolicy)))) {
+    selection.take_off(*lag);
+    result.lag_s = lag->seconds;
+    result.lag_std_s = lag->std;
+  }
+  result.subsamples = stability.subsamples;
+  result.too_little = stability.subsamples == 0.0 && selection.tables().sign.model_columns > 0;
+  result.abstained = stability.abstained;
+  result.whiteness = stability.whiteness;
+  result.highest_hz = selection.tables().bandwidth.highest_hz;
+  result.lowest_hz =
+      result.highest_hz * std::pow(kPolicy.bandwidth_factor, static_cast<double>(kPolicy.bandwidths - 1));
+  const std::vector<FoundTerm> decided = decide(stability, kPolicy);
+  const std::vector<double> held_out = selection.held_out_ratios(first_names(decided));
+  for (std::size_t i = 0; i < decided.size(); ++i) {
+    const FoundTerm& found = decided[i];
+    Resampling::FoundTerm one;
+    for (const Frequency& f : found.group) one.name += (one.name.empty() ? "" : " or ") + f.name;
+    one.frequency = found.frequency;
+    one.share_percent = 100.0 * found.share;
+    one.share_low_percent = 100.0 * found.group.front().share_low;
+    one.share_high_percent = 100.0 * found.group.front().share_high;
+    if (!held_out.empty()) one.held_out_ratio = held_out[i];
+    if (found.in_catalogue)
+      for (const Frequency& f : found.group) {
+        const catalogue::Entry* entry = f.name == kPresliding ? presliding_law(terms) : f.entry;
+        if (entry) one.group.push_back({std::string(entry->name()), f.order});
+      }
+    const double most_ratio =
+        one.frequency >= kPolicy.certain_frequency ? kPolicy.most_held_out_ratio_certain : kPolicy.most_held_out_ratio;
+    one.refused_by_holdout = !one.group.empty() && one.held_out_ratio && *one.held_out_ratio > most_ratio;
+    result.found.push_back(std::move(one));
+  }
+  result.support = support_of(selection, terms);
+  return result;
+}
+
+bool resampling_decides(const Resampling& resampling, const SearchedBalance& motor) {
+  if (resampling.subsamples == 0.0) return resampling.too_little;
+  if (!motor.names_one()) return true;
+  const CandidateFit& first = motor.candidates.front();
+  if (reaches_floor(motor) && !explains_instead(resampling, first)) return false;
+  const std::optional<double> support = support_of(resampling, first);
+  if (!support && first.gain.chi2_percent > kPolicy.nearly_all_percent && !explains_instead(resampling, first))
+    return false;
+  const auto is_first = [&](const NamedEffect& n) { return is_of_family(n.effect, n.order, first); };
+  const bool found_first = std::any_of(resampling.found.begin(), resampling.found.end(), [&](const auto& f) {
+    return std::any_of(f.group.begin(), f.group.end(), is_first);
+  });
+  if (!resampling.found.empty() && !found_first) return true;
+  // Likelihood is the more sensitive method where exactly one effect is missing.
+  if (names_several(resampling, motor)) return true;
+  const bool silent = resampling.abstained > kPolicy.most_abstaining * resampling.subsamples;
+  if (!silent && support && *support < kPolicy.named_frequency) return true;
+  // An effect built from the measured effort also explains its noise.
+  if (!support && is_of_effort(first)) return true;
+  return !leaves_noise(motor, resampling.whiteness);
+}
+
+void name_stable(SearchedBalance& chosen, Diagnosis& result) {
+  result.named = names_of(*result.resampling, chosen);
+  const bool is_group = !result.named.empty() && result.resampling->found_group(result.named.front()).size() > 1;
+  result.partial =
+      static_cast<std::ptrdiff_t>(result.resampling->found.size()) > (is_group ? 1 : std::ssize(result.named));
+  if (result.named.empty()) return;
+  // Laws of one family: the one that fits best with its nonlinear parameters searched continuously.
+  for (NamedEffect& n : result.named) {
+    const std::string_view family = catalogue::get(n.effect).info->family;
+    if (family.empty()) continue;
+    const CandidateFit* best = nullptr;
+    for (const CandidateFit& t : chosen.candidates)
+      if (t.model.entry->info->family == family && t.admissible && (!best || t.gain.score > best->gain.score))
+        best = &t;
+    if (best) n.effect = std::string(best->model.entry->name());
+  }
+  result.verdict = is_group ? Verdict::confusable_effects : Verdict::missing_effect;
+  const auto is = [](const Candidate& c, const NamedEffect& n) { return c.effect == n.effect && c.order == n.order; };
+  auto begin = result.candidates.begin() - result.candidates.begin();
+  for (const NamedEffect& n : result.named) {
+    auto at = std::find_if(result.candidates.begin() + begin, result.candidates.end(),
+                           [&](const Candidate& c) { return is(c, n); });
+    if (at == result.candidates.end()) {
+      Candidate c;
+      c.effect = n.effect;
+      c.order = n.order;
+      c.rmse_cv_before = result.base_rmse_cv;
+      c.rmse_cv_after = result.base_rmse_cv;
+      at = result.candidates.insert(result.candidates.end(), std::move(c));
+    }
+    at->admissible = true;
+    at->why_not.clear();
+    for (const NamedEffect& other : result.named)
+      if (is_group && !is(*at, other)) at->cannot_distinguish.push_back(other.effect);
+    std::rotate(result.candidates.begin() + begin, at, at + 1);
+    ++begin;
+  }
+  const auto candidate = std::find_if(chosen.candidates.begin(), chosen.candidates.end(), [&](const CandidateFit& t) {
+    return t.model.entry->name() == result.named.front().effect && t.model.order == result.named.front().order;
+  });
+  if (candidate != chosen.candidates.end()) std::rotate(chosen.candidates.begin(), candidate, candidate + 1);
+}
+
+std::vector<NamedEffect> Resampling::found_group(const NamedEffect& name) const {
+  for (const FoundTerm& one : found)
+    for (const NamedEffect& n : one.group)
+      if (n.effect == name.effect && n.order == name.order) return one.group;
+  return {};
+}
+
+}  // namespace flexspline::selection

@@ -1,0 +1,23 @@
+// Resampling (host/engine/selection) on the motor's balance, and the verdict from it.
+#pragma once
+
+#include <vector>
+
+#include "host/engine/selection/diagnosis.hpp"
+#include "host/engine/selection/searched_balance.hpp"
+
+namespace flexspline::selection {
+
+// Experiments of role fit select the terms, those of role holdout validate them.
+Resampling resample(const std::vector<const data::Experiment*>& experiments, const model::Drive& drive,
+                    const estimation::Terms& terms);
+
+// Whether resampling decides the verdict on the motor's balance. Likelihood has more power where exactly one effect is
+// missing: it decides where the halves of the data show nothing above the noise, and where resampling does not
+// contradict it.
+bool resampling_decides(const Resampling& resampling, const SearchedBalance& motor);
+
+// Names the effects that resampling found in the catalogue, if any. Their candidates come first.
+void name_stable(SearchedBalance& chosen, Diagnosis& result);
+
+}  // namespace flexspline::selection

@@ -1,0 +1,73 @@
+// Stability selection over bandwidths, masks and halves of the data.
+#pragma once
+
+#include <string>
+#include <vector>
+
+#include "host/engine/selection/candidate_tables.hpp"
+#include "host/engine/selection/halves.hpp"
+#include "host/engine/selection/time_lag.hpp"
+
+namespace flexspline::selection {
+
+struct Frequency {
+  std::string name;
+  const catalogue::Entry* entry = nullptr;
+  std::optional<double> order;
+  double frequency = 0.0;                                    // of the subsamples that do not abstain
+  double share = 0.0;                                        // of the excess squares, median where it was selected
+  double share_low = 0.0, share_high = 0.0;                  // of 95 % of these subsamples
+  double first = 0.0;                                        // of the subsamples in which it came first
+  double near = 0.0;                                         // chosen, or nearly as good as what was
+  std::vector<std::pair<std::string, double>> alternatives;  // how often, of the times that it was chosen
+};
+
+struct Stability {
+  std::vector<Frequency> frequencies;  // largest first
+  double subsamples = 0.0, abstained = 0.0;
+  double extrapolated = 0.0;  // of the subsamples: the model alone does not carry over
+  double whiteness = 0.0;     // of what is left, reversals masked: semivariance over variance, median
+  double explained = 0.0;     // share of the excess that all steps take off, median
+};
+
+class StabilitySelection {
+ public:
+  // Experiments of role fit are chosen with; those of role holdout are kept for held_out_ratios().
+  StabilitySelection(const std::vector<const data::Experiment*>& experiments, const model::Drive& drive,
+                     const estimation::Terms& terms, Balance balance, const SelectionPolicy& policy);
+
+  const CandidateTables& tables() const { return tables_; }
+  const Stability& result() const { return result_; }
+
+  // Lag of the effort's time base, with these terms (of frequencies) in the model, where it is significant and takes
+  // off as much as a term must.
+  std::optional<TimeLag> time_lag(const std::vector<std::string>& names) const;
+  // Selects again with that lag taken off the effort.
+  void take_off(const TimeLag& lag);
+
+  // Of each of `names` (of frequencies): held-out error of the model with all of them over that with all others, the
+  // median of all settings; fitted on what is not held out. Empty where nothing is held out.
+  std::vector<double> held_out_ratios(const std::vector<std::string>& names) const;
+
+ private:
+  // One bandwidth, with or without reversals.
+  struct SettingResult {
+    std::vector<SelectionPath> votes;
+    std::vector<std::uint8_t> may_enter;  // by term
+    double whiteness = -1.0;
+    HalfData all, held_out;
+  };
+
+  SettingResult evaluate_setting(double cutoff_hz, bool mask, std::uint64_t seed) const;
+  void evaluate();
+  void count();
+  // The terms of these names that fit best together; none where one cannot be seen there.
+  std::vector<int> terms_of(const SettingResult& setting, const std::vector<std::string>& names) const;
+
+  SelectionPolicy policy_;
+  CandidateTables tables_;
+  std::vector<SettingResult> per_setting_;  // one each setting
+  Stability result_;
+};
+
+}  // namespace flexspline::selection

@@ -1,0 +1,60 @@
+#include "host/engine/selection/table_builder.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <numbers>
+#include <span>
+
+#include "host/common/signals/butterworth.hpp"
+
+namespace flexspline::selection {
+
+std::vector<std::size_t> TableBuilder::on_balance() const {
+  return estimation::terms_on(terms, data.balance(), prepared().torque_measured);
+}
+
+Eigen::Index TableBuilder::add(Eigen::VectorXd column) {
+  columns.push_back(std::move(column));
+  return static_cast<Eigen::Index>(columns.size()) - 1;
+}
+
+void TableBuilder::filter(Eigen::VectorXd& column) const {
+  for (const Run& run : table.runs) {
+    const signals::ZeroPhaseFilter filter(signals::ZeroPhaseFilter::kDefaultOrder,
+                                          std::min(table.highest_hz, 0.45 / run.row_s), 1.0 / run.row_s);
+    filter.apply_in_place(std::span<double>(column.data() + run.first, static_cast<std::size_t>(run.last - run.first)));
+  }
+}
+
+Motion motion_of(const estimation::PreparedData& prepared) {
+  Motion motion;
+  std::vector<double> speeds;
+  for (const estimation::Record& r : prepared.records)
+    for (std::size_t k = 1; k < r.inputs.size() && !r.inputs.angle.empty(); ++k) {
+      motion.travel += std::abs(r.inputs.angle_at(k) - r.inputs.angle_at(k - 1));
+      if (k % r.decimation == 0) speeds.push_back(std::abs(r.inputs.velocity_at(k)));
+    }
+  motion.turn = 2.0 * std::numbers::pi / prepared.constants.turn_angle_scale;
+  motion.typical_speed = quantile(speeds, 0.5);
+  motion.top_speed = quantile(speeds, 0.95);
+  return motion;
+}
+
+double quantile(std::vector<double> x, double share) {
+  if (x.empty()) return 0.0;
+  const auto at = static_cast<std::ptrdiff_t>(share * static_cast<double>(x.size() - 1));
+  std::nth_element(x.begin(), x.begin() + at, x.end());
+  return x[static_cast<std::size_t>(at)];
+}
+
+Eigen::VectorXd slope_of(const Eigen::VectorXd& column, const std::vector<Run>& runs) {
+  Eigen::VectorXd slope = Eigen::VectorXd::Zero(column.size());
+  for (const Run& run : runs)
+    for (Eigen::Index k = run.first; k < run.last; ++k) {
+      const Eigen::Index a = std::max(run.first, k - 1), b = std::min(run.last - 1, k + 1);
+      slope[k] = (column[b] - column[a]) / (static_cast<double>(b - a) * run.row_s);
+    }
+  return slope;
+}
+
+}  // namespace flexspline::selection

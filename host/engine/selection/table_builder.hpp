@@ -1,0 +1,66 @@
+// Builds the parts of a regressor table, one after the other. For the sources of make_regressor_table alone.
+#pragma once
+
+#include <Eigen/Core>
+#include <vector>
+
+#include "host/engine/estimation/balance_data.hpp"
+#include "host/engine/selection/regressor_table.hpp"
+
+namespace flexspline::selection {
+
+struct TableBuilder {
+  estimation::BalanceData& data;
+  const estimation::Terms& terms;
+  const SelectionPolicy& policy;
+  RegressorTable& table;
+  std::vector<Eigen::VectorXd> columns;
+  // The model's prediction of the effort, N m. Terms that read the current are built from it, not from the measured
+  // current, whose noise is in the target.
+  Eigen::VectorXd effort;
+
+  const estimation::PreparedData& prepared() const { return data.prepared(); }
+  std::vector<std::size_t> on_balance() const;
+  // Direction of the motor's friction: the expected sign of its velocity, or a presliding state.
+  static double direction(const estimation::Record& r, std::size_t k) { return r.inputs.directions[0][k]; }
+
+  Eigen::Index add(Eigen::VectorXd column);
+  // A signal of each record at the samples.
+  template <class Value>
+  Eigen::VectorXd at_rows(Value value) const {
+    Eigen::VectorXd column(data.rows());
+    for (const estimation::RowRange& range : data.records()) {
+      const estimation::Record& r = prepared().records[range.record];
+      const auto& samples = r.rows[estimation::index(data.balance())].samples;
+      for (std::size_t k = 0; k < samples.size(); ++k)
+        column[range.first + static_cast<Eigen::Index>(k)] = value(r, samples[k]);
+    }
+    return column;
+  }
+  // Filters a column along each run, as the columns of effects are.
+  void filter(Eigen::VectorXd& column) const;
+};
+
+// How far the motor travels over all records, and how fast.
+struct Motion {
+  double turn = 0.0;  // of the motor, in units of its position
+  double travel = 0.0;
+  double typical_speed = 0.0, top_speed = 0.0;
+};
+Motion motion_of(const estimation::PreparedData& prepared);
+
+// Value below which that share of the numbers is; zero of none.
+double quantile(std::vector<double> x, double share);
+// Slope in time of a column, along each run.
+Eigen::VectorXd slope_of(const Eigen::VectorXd& column, const std::vector<Run>& runs);
+
+// The parts, in this order. Columns of the model, and what it makes of the effort; false: there are none.
+bool add_model_columns(TableBuilder& builder);
+// Effects of the catalogue, and placebo orders of those that come in orders.
+void add_catalogue_terms(TableBuilder& builder, const Motion& motion);
+// Generic curves: they compete with the effects, and are never named.
+void add_generic_curves(TableBuilder& builder, const Motion& motion);
+// Relative changes of viscous and of dry friction, in common and by direction.
+void add_differences(TableBuilder& builder);
+
+}  // namespace flexspline::selection

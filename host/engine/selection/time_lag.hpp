@@ -1,0 +1,27 @@
+// Lag of the effort's time base against that of the motion. It shifts the phase of a wave over the motor's angle with
+// the speed, so that a ripple found at one speed does not hold at another.
+#pragma once
+
+#include <optional>
+#include <vector>
+
+#include "host/engine/selection/regressor_table.hpp"
+
+namespace flexspline::selection {
+
+struct TimeLag {
+  double seconds = 0.0;  // positive: the effort comes later than the motion that it belongs to
+  double std = 0.0;      // s
+  double share = 0.0;    // of the squares above the noise that it takes off
+};
+
+// By least squares over all lags of up to policy.most_lag_rows (profile likelihood), with the model's columns and those
+// of `terms` (places in table.terms), at the highest bandwidth of the motion. Nothing where the data have too few
+// samples or the best lag is at the end of the range.
+std::optional<TimeLag> estimate_time_lag(const RegressorTable& table, const std::vector<int>& terms,
+                                         const SelectionPolicy& policy);
+
+// Takes a lag off the target.
+void take_off_lag(RegressorTable& table, double lag_s);
+
+}  // namespace flexspline::selection

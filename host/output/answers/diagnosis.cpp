@@ -1,0 +1,414 @@
+#include "host/output/answers/diagnosis.hpp"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cmath>
+#include <nlohmann/json.hpp>
+#include <span>
+
+#include "host/output/answers/explanation.hpp"
+#include "host/output/answers/identification.hpp"
+#include "host/output/answers/json.hpp"
+#include "host/output/answers/learned_table.hpp"
+#include "host/output/answers/text.hpp"
+#include "host/physics/catalogue/catalogue.hpp"
+
+namespace flexspline::output {
+namespace {
+
+using nlohmann::json;
+using selection::Candidate;
+using selection::Diagnosis;
+using selection::Verdict;
+
+constexpr std::size_t kRowsShown = 10;
+// Errors that differ by less are reported as equal.
+constexpr double kRunFrictionMatters = 0.95;
+
+std::string evidence(const Diagnosis& d) {
+  std::string text;
+  if (d.balance) text += fmt::format("{} balance: ", balance_name(*d.balance));
+  text += fmt::format("error {}, {} on data left out of the fit", with_unit(d.base_rmse, d.unit),
+                      with_unit(d.base_rmse_cv, d.unit));
+  if (d.noise_floor)
+    text += fmt::format("; noise {} (from {}), so the error is {:.2f} times the noise",
+                        with_unit(*d.noise_floor, d.unit), d.noise_floor_from, d.base_rmse / *d.noise_floor);
+  else
+    text += "; noise not known (state noise_std_COLUMN in dataset.toml, or record a periodic motion)";
+  // What is named may pass for friction that differs; only where nothing is, the difference is the runs' own.
+  if (d.named.empty() && d.base_rmse_own_friction < kRunFrictionMatters * d.base_rmse)
+    text += fmt::format("; with friction that is each run's own {}{}", with_unit(d.base_rmse_own_friction, d.unit),
+                        d.noise_floor ? fmt::format(", {:.2f} times", d.base_rmse_own_friction / *d.noise_floor) : "");
+  return text;
+}
+
+std::string shares(const std::vector<selection::LocalisedResidual>& parts) {
+  std::vector<std::string> texts;
+  // Signals go together in any motion; the first few are enough.
+  for (const selection::LocalisedResidual& part : std::span(parts).first(std::min<std::size_t>(3, parts.size())))
+    texts.push_back(fmt::format("{} {:.1f} %", part.variable, part.share_percent));
+  return listed(texts);
+}
+
+std::string candidate_table(const Diagnosis& d) {
+  Table table({"", "candidate", "balance", "score", "explains", "error before", "after", "", "would show from", ""},
+              "rllrrrrlll");
+  std::size_t rank = 0;
+  for (const Candidate& c : d.candidates) {
+    if (++rank > kRowsShown) break;
+    table.row({fmt::format("{}", rank), effect_label(c.effect, c.order), balance_name(c.balance), number(c.score),
+               fmt::format("{:.1f} %", c.chi2_decrease_percent), number(c.rmse_cv_before), number(c.rmse_cv_after),
+               d.unit, detectable_in_words(c), c.admissible ? "" : "refused: " + c.why_not});
+  }
+  return table.text();
+}
+
+const Candidate* candidate_of(const Diagnosis& d, const selection::NamedEffect& named) {
+  for (const Candidate& c : d.candidates)
+    if (c.effect == named.effect && c.order == named.order) return &c;
+  return nullptr;
+}
+
+std::string replaced(std::string text, std::string_view what, const std::string& by) {
+  const std::size_t at = text.find(what);
+  return at == std::string::npos ? text : text.replace(at, what.size(), by);
+}
+
+// Of the points that rows reach, the standard error of the one in the middle.
+double typical_error(const estimation::LearnedTable& curve) {
+  std::vector<double> errors;
+  for (std::size_t k = 0; k < curve.table.std.size(); ++k)
+    if (curve.visited[k]) errors.push_back(curve.table.std[k]);
+  if (errors.empty()) return 0.0;
+  std::nth_element(errors.begin(), errors.begin() + static_cast<std::ptrdiff_t>(errors.size() / 2), errors.end());
+  return errors[errors.size() / 2];
+}
+
+void print_next(Console& console, const Diagnosis& d, const std::string& add_command) {
+  std::vector<std::string> steps;
+  switch (d.verdict) {
+    case Verdict::missing_effect:
+    case Verdict::confusable_effects:
+      for (const selection::NamedEffect& n : d.named)
+        if (const Candidate* c = candidate_of(d, n); c == nullptr || c->admissible)
+          steps.push_back(replaced(add_command, "EFFECT", effect_label(n.effect, n.order)));
+      if (d.named.size() > 1)
+        steps.push_back(fmt::format(
+            "flexspline plan --separate {},{} --help   shows how to record what distinguishes them",
+            effect_label(d.named[0].effect, d.named[0].order), effect_label(d.named[1].effect, d.named[1].order)));
+      break;
+    case Verdict::unknown_structure:
+      if (d.unknown)
+        steps.push_back(fmt::format("{} --balance {}", replaced(add_command, "EFFECT", d.unknown->effect),
+                                    d.unknown->definition.balance));
+      steps.push_back("flexspline compare shows in which region the error is large; examine the drive there");
+      break;
+    case Verdict::insufficient_excitation:
+      steps.push_back(
+          "record slow and fast motion in both directions; flexspline identify names what cannot be identified");
+      break;
+    case Verdict::at_noise_floor:
+    case Verdict::nothing_significant:
+      break;
+  }
+  if (steps.empty()) return;
+  console.line();
+  console.line("Next:");
+  for (const std::string& step : steps) console.line("  " + step);
+}
+
+void print_unknown(Console& console, const Diagnosis& d) {
+  const selection::UnknownStructure& u = *d.unknown;
+  console.line();
+  console.line(
+      wrapped(fmt::format("It goes with {}{}: a curve over it takes {:.1f} % off the squared error on data left out of "
+                          "the fit (score {:.0f}). At the points that the data reach it is known to {}.",
+                          u.definition.variable, u.definition.times_direction ? ", times the direction of motion" : "",
+                          u.curve.decrease_percent, u.curve.score, with_unit(typical_error(u.curve), d.unit))));
+  if (u.named_share_percent && !d.candidates.empty())
+    console.line(wrapped(
+        fmt::format("The nearest effect of the catalogue, {}, explains {:.0f} % of what the curve does.",
+                    effect_label(d.candidates.front().effect, d.candidates.front().order), *u.named_share_percent)));
+  std::vector<std::string> others;
+  for (std::size_t k = 1; k < std::min<std::size_t>(4, u.depends_on.size()); ++k)
+    others.push_back(fmt::format("{} {:.1f} %", u.depends_on[k].variable, u.depends_on[k].decrease_percent));
+  if (!others.empty())
+    console.line(wrapped(fmt::format("Curves over other signals, which may go along with it: {}.", listed(others))));
+  console.line(curve_text(curve_of_table(u.definition, u.curve.table, d.unit), takes_braille()));
+  console.line(wrapped(fmt::format("Record next: {}.", u.record_next)));
+}
+
+json between_records_json(const selection::Diagnosis& d) {
+  if (!d.between_records) return nullptr;
+  return {{"records", d.between_records->records},
+          {"explained_percent", d.between_records->explained_percent},
+          {"p_value", d.between_records->p_value}};
+}
+
+json unknown_json(const Diagnosis& d) {
+  if (!d.unknown) return nullptr;
+  const selection::UnknownStructure& u = *d.unknown;
+  json answer = learned_table_json("unknown", u.definition, u.curve, d.unit);
+  answer["effect"] = u.effect;
+  answer["depends_on"] = json::array();
+  for (const auto& over : u.depends_on)
+    answer["depends_on"].push_back({{"variable", over.variable}, {"fall_percent", json_number(over.decrease_percent)}});
+  answer["named_share_percent"] = json_number(u.named_share_percent);
+  answer["record_next"] = u.record_next;
+  return answer;
+}
+
+json localised_json(const std::vector<selection::LocalisedResidual>& parts) {
+  json list = json::array();
+  for (const selection::LocalisedResidual& part : parts)
+    list.push_back({{"variable", part.variable}, {"share_percent", json_number(part.share_percent)}});
+  return list;
+}
+
+json drift_json(const std::vector<selection::Drift>& drifts) {
+  json list = json::array();
+  for (const selection::Drift& drift : drifts)
+    list.push_back({{"group", drift.group}, {"percent", json_number(drift.percent)}});
+  return list;
+}
+
+json trends_json(const std::vector<selection::Trend>& trends) {
+  json list = json::array();
+  for (const selection::Trend& t : trends)
+    list.push_back({{"id", t.id},
+                    {"parameter", t.parameter},
+                    {"over", t.over},
+                    {"slope", json_number(t.slope)},
+                    {"p_value", json_number(t.p_value)}});
+  return list;
+}
+
+json named_json(const std::vector<selection::NamedEffect>& named) {
+  json list = json::array();
+  for (const selection::NamedEffect& n : named) list.push_back({{"effect", n.effect}, {"order", json_number(n.order)}});
+  return list;
+}
+
+json candidate_json(const Candidate& c, std::size_t rank, const std::string& unit) {
+  json parameters = json::array();
+  for (const estimation::Estimate& e : c.parameters) parameters.push_back(json_parameter(e));
+  const catalogue::Entry* entry = catalogue::find(c.effect);
+  const auto text = [&](std::string_view effects::Description::*field) {
+    return entry ? json(std::string(entry->info->*field)) : json(nullptr);
+  };
+  return {{"effect", c.effect},
+          {"order", json_number(c.order)},
+          {"balance", balance_name(c.balance)},
+          {"rank", rank},
+          {"score", json_number(c.score)},
+          {"score_elsewhere", json_number(c.other_balance_score)},
+          {"chi2_fall_percent", json_number(c.chi2_decrease_percent)},
+          {"rmse_cv_before", json_number(c.rmse_cv_before)},
+          {"rmse_cv_after", json_number(c.rmse_cv_after)},
+          {"unit", unit},
+          {"p_value", json_number(c.p_value)},
+          {"parameters", std::move(parameters)},
+          {"minimum_detectable", detectable_json(c)},
+          {"admissible", c.admissible},
+          {"why_not", c.admissible ? json(nullptr) : json(c.why_not)},
+          {"note", c.note.empty() ? json(nullptr) : json(c.note)},
+          {"rivals", c.cannot_distinguish},
+          {"rival_reasons", confounding_reasons_json(c)},
+          {"evidence", evidence_json(c, unit)},
+          {"size", size_json(c, unit)},
+          {"separating_experiment", text(&effects::Description::separated_by)},
+          {"explanation", text(&effects::Description::explanation)},
+          {"consequence", text(&effects::Description::consequence)},
+          {"causes", text(&effects::Description::causes)},
+          {"check", text(&effects::Description::check)},
+          {"order_causes", order_causes_json(c)},
+          {"order_hint", c.order_hint.empty() ? json(nullptr) : json(c.order_hint)}};
+}
+
+}  // namespace
+
+std::string effect_label(const std::string& effect, const std::optional<double>& order) {
+  return order ? fmt::format("{}:{:g}", effect, *order) : effect;
+}
+
+std::string effect_in_words(const std::string& effect, const std::optional<double>& order) {
+  return order ? fmt::format("{} ({:g} per turn)", effect, *order) : effect;
+}
+
+std::string verdict_in_words(const Diagnosis& d) {
+  std::vector<std::string> names;
+  for (const selection::NamedEffect& n : d.named) names.push_back(effect_in_words(n.effect, n.order));
+  switch (d.verdict) {
+    case Verdict::missing_effect:
+      return fmt::format("The model lacks {}.", listed(names));
+    case Verdict::confusable_effects:
+      return fmt::format("The model lacks one of {}; these data cannot show which.", listed(names, "or"));
+    case Verdict::at_noise_floor:
+      if (d.base_rmse_own_friction < kRunFrictionMatters * d.base_rmse)
+        return "Nothing is missing: friction differs from run to run, and otherwise the model's error is the noise "
+               "of the measurement.";
+      return "Nothing is missing: the model's error is the noise of the measurement.";
+    case Verdict::nothing_significant:
+      return "No effect of the catalogue improves the model. How large the noise is is not known, so something small "
+             "may be missing.";
+    case Verdict::unknown_structure:
+      return "Something is missing that no effect of the catalogue explains.";
+    case Verdict::insufficient_excitation:
+      return "These data do not excite the drive enough to show it.";
+  }
+  return {};
+}
+
+// The result on the experiments that are held out. They decide whether an effect is named, so that their error is no
+// proof of the gain.
+void print_held_out(Console& console, const selection::Resampling& r) {
+  std::vector<std::string> better, worse;
+  for (const selection::Resampling::FoundTerm& f : r.found) {
+    if (!f.held_out_ratio || f.group.empty()) continue;
+    const std::string name = effect_in_words(f.group.front().effect, f.group.front().order);
+    (f.refused_by_holdout ? worse : better).push_back(fmt::format("{} {:.3f}", name, *f.held_out_ratio));
+  }
+  if (better.empty() && worse.empty()) return;
+  std::string text = "Error on the experiments that are held out, with the effect over without it: ";
+  text += listed(better.empty() ? worse : better);
+  if (!better.empty() && !worse.empty()) text += fmt::format("; {}", listed(worse));
+  text += worse.empty() ? "."
+                        : fmt::format(". It rises with {}, so {} not named.", listed(worse),
+                                      worse.size() > 1 ? "these are" : "that is");
+  console.line(wrapped(text +
+                       " As it was used to decide, it does not prove the gain: test that with `compare` on data of a "
+                       "later measurement."));
+}
+
+void print_resampling(Console& console, const selection::Resampling& r) {
+  std::vector<std::string> found;
+  for (const selection::Resampling::FoundTerm& f : r.found) {
+    std::vector<std::string> names;
+    for (const selection::NamedEffect& n : f.group) names.push_back(effect_in_words(n.effect, n.order));
+    found.push_back(
+        fmt::format("{} in {:.0f} of 100 ({:.0f} % of the squared error above the noise, {:.0f} to {:.0f} %)",
+                    names.empty() ? f.name + ", which is in no catalogue," : listed(names, "or"), 100.0 * f.frequency,
+                    f.share_percent, f.share_low_percent, f.share_high_percent));
+  }
+  const std::string how =
+      fmt::format("{:.0f} subsamples at bandwidths from {:.3g} to {:.3g} Hz, with and without reversals", r.subsamples,
+                  r.lowest_hz, r.highest_hz);
+  console.line(wrapped(found.empty() ? fmt::format("Nothing is chosen in more than half of {}.", how)
+                                     : fmt::format("Of {}: {}.", how, listed(found))));
+  print_held_out(console, r);
+}
+
+void print_diagnosis(Console& console, const Diagnosis& d, const std::string& add_command) {
+  console.line(console.bold(verdict_in_words(d)));
+  console.line(wrapped(evidence(d)));
+  if (d.resampling && d.resampling->decides) print_resampling(console, *d.resampling);
+  if (!d.localised.empty()) console.line(wrapped(fmt::format("The error goes with {}.", shares(d.localised))));
+  if (d.delay_s)
+    console.line(
+        wrapped(fmt::format("The effort {} the motion by {:.3g} ms beyond the alignment: check the time stamps, or "
+                            "current_hold.",
+                            *d.delay_s > 0.0 ? "lags" : "leads", 1e3 * std::abs(*d.delay_s))));
+  for (const selection::NamedEffect& named : d.named)
+    if (const Candidate* c = candidate_of(d, named)) print_explanation(console, *c, d.unit);
+  if (d.unknown) print_unknown(console, d);
+  if (!d.candidates.empty()) {
+    console.line();
+    console.line(candidate_table(d));
+  }
+  for (const selection::Trend& t : d.parameter_trends)
+    console.line(
+        wrapped(fmt::format("{}.{} differs between experiments with {}: the model lacks something that goes with it.",
+                            t.id, t.parameter, t.over)));
+  if (!d.named.empty() && !d.remaining_structure.empty())
+    console.line(wrapped(fmt::format("With {}, the error still goes with {}.",
+                                     d.between_records ? "friction that is each record's own" : "that added",
+                                     shares(d.remaining_structure))));
+  if (!d.disturbances.empty()) {
+    Table table({"disturbance in", "from", "to", "peak"}, "lrrr");
+    for (const selection::Disturbance& x : d.disturbances)
+      table.row({x.experiment, fmt::format("{:.3f} s", x.from_s), fmt::format("{:.3f} s", x.to_s),
+                 with_unit(x.peak, x.unit)});
+    console.line();
+    console.line(table.text());
+  }
+  print_next(console, d, add_command);
+}
+
+json resampling_json(const Diagnosis& d) {
+  if (!d.resampling) return nullptr;
+  json found = json::array();
+  for (const selection::Resampling::FoundTerm& f : d.resampling->found)
+    found.push_back({{"effects", named_json(f.group)},
+                     {"structure", f.group.empty() ? json(f.name) : json(nullptr)},
+                     {"frequency", json_number(f.frequency)},
+                     {"share_percent", json_number(f.share_percent)},
+                     {"share_low_percent", json_number(f.share_low_percent)},
+                     {"share_high_percent", json_number(f.share_high_percent)},
+                     {"held_out_ratio", json_number(f.held_out_ratio)},
+                     {"refused_by_holdout", f.refused_by_holdout}});
+  return {{"subsamples", d.resampling->subsamples},
+          {"abstained", d.resampling->abstained},
+          {"too_little", d.resampling->too_little},
+          {"whiteness", json_number(d.resampling->whiteness)},
+          {"lowest_hz", json_number(d.resampling->lowest_hz)},
+          {"highest_hz", json_number(d.resampling->highest_hz)},
+          {"lag_s", json_number(d.resampling->lag_s)},
+          {"lag_std_s", json_number(d.resampling->lag_std_s)},
+          {"decides", d.resampling->decides},
+          {"found", std::move(found)}};
+}
+
+json diagnosis_json(const Diagnosis& d) {
+  json candidates = json::array();
+  for (const Candidate& c : d.candidates) candidates.push_back(candidate_json(c, candidates.size() + 1, d.unit));
+  json disturbances = json::array();
+  for (const selection::Disturbance& x : d.disturbances)
+    disturbances.push_back({{"experiment", x.experiment},
+                            {"from_s", json_number(x.from_s)},
+                            {"to_s", json_number(x.to_s)},
+                            {"peak", json_number(x.peak)},
+                            {"unit", x.unit}});
+  return {{"format", "flexspline-diagnose/1"},
+          {"verdict", selection::verdict_name(d.verdict)},
+          {"named", named_json(d.named)},
+          {"balance", d.balance ? json(balance_name(*d.balance)) : json(nullptr)},
+          {"base",
+           {{"rmse", json_number(d.base_rmse)},
+            {"rmse_cv", json_number(d.base_rmse_cv)},
+            {"rmse_own_friction", json_number(d.base_rmse_own_friction)},
+            {"noise_floor", json_number(d.noise_floor)},
+            {"noise_floor_from", d.noise_floor_from},
+            {"unit", d.unit}}},
+          {"localised", localised_json(d.localised)},
+          {"candidates", std::move(candidates)},
+          {"parameter_trends", trends_json(d.parameter_trends)},
+          {"friction_drift", drift_json(d.friction_drift)},
+          {"remaining_structure", localised_json(d.remaining_structure)},
+          {"recovered_percent", json_number(d.recovered_percent)},
+          {"disturbances", std::move(disturbances)},
+          {"partial", d.partial},
+          {"between_records", between_records_json(d)},
+          {"resampling", resampling_json(d)},
+          {"unknown", unknown_json(d)},
+          {"delay_s", json_number(d.delay_s)},
+          {"warnings", d.warnings},
+          {"rounds", json::array()}};
+}
+
+json rounds_json(const std::vector<Diagnosis>& rounds, const std::vector<std::string>& removed) {
+  json result = diagnosis_json(rounds.front());
+  std::vector<selection::NamedEffect> all;
+  for (const Diagnosis& d : rounds) {
+    // The last round ends the search; it names nothing that was added.
+    if (&d != &rounds.back() || rounds.size() == 1) all.insert(all.end(), d.named.begin(), d.named.end());
+    result["rounds"].push_back(diagnosis_json(d));
+  }
+  std::erase_if(all, [&](const selection::NamedEffect& n) {
+    return std::find(removed.begin(), removed.end(), effect_label(n.effect, n.order)) != removed.end();
+  });
+  if (!all.empty()) result["named"] = named_json(all);
+  return result;
+}
+
+}  // namespace flexspline::output

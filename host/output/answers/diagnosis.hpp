@@ -1,0 +1,32 @@
+// What a diagnosis found, as text and as JSON.
+#pragma once
+
+#include <nlohmann/json_fwd.hpp>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "host/engine/selection/diagnosis.hpp"
+#include "host/output/answers/console.hpp"
+
+namespace flexspline::output {
+
+// "torque_ripple:2", as the command `add` takes it.
+std::string effect_label(const std::string& effect, const std::optional<double>& order);
+// "torque_ripple (2 per turn)", for people.
+std::string effect_in_words(const std::string& effect, const std::optional<double>& order);
+
+// "The model lacks stribeck_gaussian."
+std::string verdict_in_words(const selection::Diagnosis& found);
+
+// Verdict, evidence, candidates, effects that cannot be distinguished, with the experiment that separates them, where
+// the error is, what to do next. `add_command`: what to type to add the named effect, with EFFECT where its name
+// goes.
+void print_diagnosis(Console& console, const selection::Diagnosis& found, const std::string& add_command);
+
+// "flexspline-diagnose/1". With more than one round, `named` holds all that were added and not removed again.
+nlohmann::json diagnosis_json(const selection::Diagnosis& found);
+nlohmann::json rounds_json(const std::vector<selection::Diagnosis>& rounds,
+                           const std::vector<std::string>& removed = {});
+
+}  // namespace flexspline::output

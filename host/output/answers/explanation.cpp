@@ -1,0 +1,168 @@
+#include "host/output/answers/explanation.hpp"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cmath>
+#include <nlohmann/json.hpp>
+
+#include "host/output/answers/diagnosis.hpp"
+#include "host/output/answers/json.hpp"
+#include "host/output/answers/text.hpp"
+#include "host/physics/catalogue/catalogue.hpp"
+
+namespace flexspline::output {
+namespace {
+
+using nlohmann::json;
+using selection::Candidate;
+using selection::Evidence;
+
+constexpr int kBarWidth = 24;
+
+std::string variable_in_words(std::string name) {
+  std::replace(name.begin(), name.end(), '_', ' ');
+  return name;
+}
+
+// A bar from the middle: to the right what is positive.
+std::string bar(double value, double largest) {
+  const int half = kBarWidth / 2;
+  const int length = largest > 0.0 ? static_cast<int>(std::lround(std::abs(value) / largest * half)) : 0;
+  std::string text(kBarWidth + 1, ' ');
+  text[half] = '|';
+  for (int i = 1; i <= length; ++i) text[static_cast<std::size_t>(value < 0.0 ? half - i : half + i)] = '#';
+  return text;
+}
+
+void print_map(Console& console, const Evidence& map, const std::string& unit) {
+  console.line(
+      wrapped(fmt::format("Where it shows here: over {}. What the model lacks{}, and what the effect makes of it:",
+                          variable_in_words(map.variable), map.resisting ? " (positive: it resists the motion)" : "")));
+  Table table({fmt::format("{}{}", variable_in_words(map.variable), map.unit.empty() ? "" : ", " + map.unit),
+               "lacks, " + unit, "effect, " + unit, ""},
+              "rrrl");
+  double largest = 0.0;
+  for (const Evidence::Bin& bin : map.bins) largest = std::max(largest, std::abs(bin.lacking));
+  for (const Evidence::Bin& bin : map.bins)
+    table.row({fmt::format("{} to {}", number(bin.low, 3), number(bin.high, 3)), number(bin.lacking, 3),
+               number(bin.effect, 3), bar(bin.lacking, largest)});
+  console.line(table.text(4));
+}
+
+void print_confounding(Console& console, const Candidate& c, std::string_view separated_by) {
+  for (const selection::ConfoundingReason& reason : c.confounding_reasons)
+    console.line(wrapped(fmt::format(
+        "Not to be distinguished from {} here: only {:.2g} % of what it does in these data is its own{}.",
+        reason.effect, reason.own_percent,
+        reason.variable.empty() ? "" : fmt::format("; both go with {}", variable_in_words(reason.variable)))));
+  if (!c.cannot_distinguish.empty() && !separated_by.empty())
+    console.line(
+        wrapped(fmt::format("To separate them, record {}; flexspline plan --separate designs it.", separated_by)));
+}
+
+// What on this drive makes a ripple of this order.
+void print_order_causes(Console& console, const Candidate& c) {
+  if (!c.order_causes.empty())
+    console.line(wrapped(fmt::format("On this drive {:g} per motor turn is the order of:", *c.order)));
+  for (const catalogue::OrderCause& one : c.order_causes) {
+    console.line(wrapped(fmt::format("- {} ({}).", one.cause, one.from), 2, 2));
+    console.line(wrapped(fmt::format("Check: {}", one.check), 4, 2));
+    console.line(wrapped(fmt::format("Cure: {}", one.cure), 4, 2));
+  }
+  if (!c.order_hint.empty()) console.line(wrapped(c.order_hint));
+}
+
+}  // namespace
+
+void print_explanation(Console& console, const Candidate& c, const std::string& unit) {
+  const catalogue::Entry* entry = catalogue::find(c.effect);
+  if (entry == nullptr) return;
+  const effects::Description& info = *entry->info;
+  console.line();
+  console.line(console.bold(effect_in_words(c.effect, c.order)));
+  const auto print = [&](std::string_view what, std::string_view text) {
+    if (!text.empty()) console.line(wrapped(fmt::format("{}{}", what, text)));
+  };
+  print("", info.explanation);
+  for (const estimation::Estimate& e : c.parameters)
+    console.line(
+        fmt::format("  {} = {}{}", e.parameter, with_unit(e.value, e.unit),
+                    e.low && e.high ? fmt::format("   (95 %: {} to {})", number(*e.low), number(*e.high)) : ""));
+  if (c.size)
+    console.line(wrapped(fmt::format(
+        "Its torque that the model cannot replace: {} {} (RMS), {} at most{}.", number(c.size->rms), unit,
+        number(c.size->peak),
+        c.size->percent_of_rated ? fmt::format("; {} % of the rated torque", number(*c.size->percent_of_rated, 2))
+                                 : "")));
+  print("", c.note);
+  if (c.evidence && !c.evidence->bins.empty()) print_map(console, *c.evidence, unit);
+  print("What it does: ", info.consequence);
+  print_order_causes(console, c);
+  print("Usual causes: ", info.causes);
+  print("Check on the machine: ", info.check);
+  print_confounding(console, c, info.separated_by);
+}
+
+std::string detectable_in_words(const Candidate& c) {
+  if (!c.minimum_detectable) return "";
+  const estimation::Estimate& e = c.minimum_detectable->size;
+  return fmt::format("{}{} {}", c.minimum_detectable->at_most ? "below " : "", e.parameter,
+                     with_unit(std::stod(number(e.value, 2)), e.unit));
+}
+
+json detectable_json(const Candidate& c) {
+  if (!c.minimum_detectable) return nullptr;
+  json answer = json_parameter(c.minimum_detectable->size);
+  answer["at_most"] = c.minimum_detectable->at_most;
+  answer["at"] = json::array();
+  for (const estimation::Estimate& e : c.minimum_detectable->at) answer["at"].push_back(json_parameter(e));
+  return answer;
+}
+
+json confounding_reasons_json(const Candidate& c) {
+  json list = json::array();
+  for (const selection::ConfoundingReason& r : c.confounding_reasons)
+    list.push_back({{"effect", r.effect},
+                    {"own_percent", json_number(r.own_percent)},
+                    {"variable", r.variable.empty() ? json(nullptr) : json(r.variable)}});
+  return list;
+}
+
+json order_causes_json(const Candidate& c) {
+  if (!c.order) return nullptr;
+  json list = json::array();
+  for (const catalogue::OrderCause& one : c.order_causes)
+    list.push_back({{"from", one.from},
+                    {"cause", one.cause},
+                    {"check", one.check},
+                    {"cure", one.cure},
+                    {"reference", one.reference}});
+  return list;
+}
+
+json size_json(const Candidate& c, const std::string& unit) {
+  if (!c.size) return nullptr;
+  return {{"rms", json_number(c.size->rms)},
+          {"peak", json_number(c.size->peak)},
+          {"unit", unit},
+          {"percent_of_rated", c.size->percent_of_rated ? json_number(*c.size->percent_of_rated) : json(nullptr)}};
+}
+
+json evidence_json(const Candidate& c, const std::string& unit) {
+  if (!c.evidence) return nullptr;
+  const Evidence& map = *c.evidence;
+  json bins = json::array();
+  for (const Evidence::Bin& bin : map.bins)
+    bins.push_back({{"low", json_number(bin.low)},
+                    {"high", json_number(bin.high)},
+                    {"lacking", json_number(bin.lacking)},
+                    {"effect", json_number(bin.effect)}});
+  return {{"variable", map.variable},
+          {"variable_unit", map.unit},
+          {"unit", unit},
+          {"resisting", map.resisting},
+          {"bins", std::move(bins)}};
+}
+
+}  // namespace flexspline::output
