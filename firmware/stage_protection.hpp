@@ -35,8 +35,9 @@ constexpr std::uint32_t periods_of(StageFault fault) {
     case StageFault::thermistor_shorted:
       return control::protection::Thermistor::kWireSamples;
     case StageFault::phase_lost:
+      return control::protection::WindingWatch::kLostPeriods;
     case StageFault::voltage_residual:
-      return control::protection::WindingWatch::kPeriods;
+      return control::protection::WindingWatch::kResidualPeriods;
     case StageFault::none:
     case StageFault::sensor_zero:
       return 0;

@@ -35,8 +35,10 @@ enum class WindingFault : std::uint8_t { none, phase_lost, residual };
 class WindingWatch {
  public:
   static constexpr std::uint32_t kEvery = 4;  // PWM periods a sample
-  // What both faults take at most: a set point of the lost phase that stays above its threshold, a residual that stays.
-  static constexpr std::uint32_t kPeriods = 512;
+  // What both faults take at most, with a set point of the lost phase that stays above its threshold and a residual that
+  // stays above its own.
+  static constexpr std::uint32_t kLostPeriods = 128;
+  static constexpr std::uint32_t kResidualPeriods = 260;
 
   constexpr void reset() { *this = {}; }
   // Once a PWM period, after foc::update with the same inputs. `phases`: as it measured them.
@@ -51,14 +53,16 @@ class WindingWatch {
     const bool unexplained =
         size(integral(state.current.d)) > most || size(integral(state.current.q)) > most;
     residual_samples_ = unexplained ? residual_samples_ + 1 : 0;
-    return residual_samples_ >= kSamples ? WindingFault::residual : WindingFault::none;
+    return residual_samples_ >= kResidualSamples ? WindingFault::residual : WindingFault::none;
   }
   // 1 to 3, of a phase that is lost.
   constexpr std::uint8_t phase() const { return phase_; }
 
  private:
-  static constexpr int kFilterBits = 5;  // of the means: 32 samples, 128 periods
-  static constexpr std::uint32_t kSamples = 64;
+  static constexpr int kFilterBits = 3;  // of the means: 8 samples, 32 periods
+  // A mean falls to a quarter within 11 samples.
+  static constexpr std::uint32_t kLostSamples = 20;
+  static constexpr std::uint32_t kResidualSamples = 64;
 
   static constexpr std::int32_t size(std::int32_t x) { return x < 0 ? -x : x; }
   static constexpr std::int32_t integral(const foc::AxisState& s) { return static_cast<std::int32_t>(s.integral >> 32); }
@@ -78,7 +82,7 @@ class WindingWatch {
       const bool lost =
           wanted_[x] > s.least_current && measured_[x] < wanted_[x] / 4 && (others_carry || has_voltage);
       samples_[x] = lost ? samples_[x] + 1 : 0;
-      if (samples_[x] < kSamples) continue;
+      if (samples_[x] < kLostSamples) continue;
       phase_ = static_cast<std::uint8_t>(x + 1);
       return true;
     }
