@@ -111,8 +111,8 @@ class ThreePhaseStageOf {
   }
   // From the next period on all switches are open.
   void stop_commissioning() { commissions_ = false; }
-  // What of the stage ended it. The bus is too high where the rotor, which it turned, gave back more energy than the bus
-  // could take.
+  // What of the stage ended it. The bus is too high where the rotor, which it turned, gave back more energy than the
+  // bus could take.
   StageFault commissioning_fault() const { return commissioning_fault_; }
   bool commissions() const { return commissions_; }
   const control::commissioning::Commissioning& commissioning() const { return commissioning_; }
@@ -159,8 +159,7 @@ class ThreePhaseStageOf {
       runs_ = true;
     }
     if (!protection_.charge(s_.protection)) return {{}, true};
-    const control::foc::Phases phases =
-        control::foc::phase_currents(s_.foc.sensors, in.readings, state_.unmeasured);
+    const control::foc::Phases phases = control::foc::phase_currents(s_.foc.sensors, in.readings, state_.unmeasured);
     const control::foc::Inputs inputs = {
         in.readings, in.bus, electrical(angle_) + s_.offset_angle,
         static_cast<std::int32_t>(electrical(static_cast<std::uint32_t>(speed_ >> kFilterBits))), set_point_};

@@ -109,9 +109,9 @@ void PlantRig::pass_faults_to_stage() {
                             .thermistor_open = has(Injection::thermistor_open),
                             .thermistor_shorted = has(Injection::thermistor_shorted),
                             .brake_missing = has(Injection::brake_missing)});
-  const bool is_held = has(Injection::motor_encoder_stale) || has(Injection::motor_encoder_stuck) ||
-                       has(Injection::encoder_line_lost);
-  three_phase_->set_encoder(is_held                                  ? StageEncoder::held
+  const bool is_held =
+      has(Injection::motor_encoder_stale) || has(Injection::motor_encoder_stuck) || has(Injection::encoder_line_lost);
+  three_phase_->set_encoder(is_held                                 ? StageEncoder::held
                             : has(Injection::motor_encoder_jump)    ? StageEncoder::jumped
                             : has(Injection::motor_encoder_slips)   ? StageEncoder::halved
                             : has(Injection::motor_encoder_swapped) ? StageEncoder::reversed

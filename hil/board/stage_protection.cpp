@@ -69,10 +69,10 @@ firmware::ProtectionSettings protection_of(const plant::Drive& drive) {
   const motor::InverterParameters& inverter = p.inverter;
   s.winding.least_current = word(std::ldexp(peak / 14.0, 27));
   s.winding.resistance_error = word(std::ldexp(0.4 * peak, 27));
-  s.winding.lost_voltage = word(std::ldexp(inverter.dead_time_s * inverter.pwm_hz *
-                                               (inverter.supply_v + 2.0 * inverter.diode_drop_v) /
-                                               p.sensors.bus_full_scale_v,
-                                           30));
+  s.winding.lost_voltage =
+      word(std::ldexp(inverter.dead_time_s * inverter.pwm_hz * (inverter.supply_v + 2.0 * inverter.diode_drop_v) /
+                          p.sensors.bus_full_scale_v,
+                      30));
   s.bootstrap_periods = ThreePhaseAmplifier::kPwmHz / 1000;
   return s;
 }

@@ -204,11 +204,8 @@ double ThreePhaseAmplifier::run(const firmware::Actuation& actuation, double mot
     const motor::Readings r = shunts_.read(sample);
     const double middle = start + motor_velocity * period / 2.0;
     const bool was_enabled = out_.enabled;
-    out_ = stage_.update({{r.current[0], r.current[1], r.current[2]},
-                          r.bus,
-                          faulty(counter_at(middle)),
-                          faults_.driver,
-                          thermistor()});
+    out_ = stage_.update(
+        {{r.current[0], r.current[1], r.current[2]}, r.bus, faulty(counter_at(middle)), faults_.driver, thermistor()});
     if (out_.clears_driver) faults_.driver = false;
     ++periods_run_;
     if (was_enabled && !out_.enabled) opened_at_ = periods_run_;

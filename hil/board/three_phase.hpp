@@ -110,7 +110,7 @@ class ThreePhaseAmplifier {
   bool began_ = false;
   StageFaults faults_;
   StageEncoder encoder_ = StageEncoder::intact;
-  std::uint32_t counter_ = 0;          // intact, of the last period
+  std::uint32_t counter_ = 0;  // intact, of the last period
   std::uint32_t counter_at_fault_ = 0;
   double temperature_c_ = 30.0;
   double peak_phase_a_ = 0.0;

@@ -185,15 +185,18 @@ inline constexpr std::array<FaultText, kStageFaults> kStageFaultTexts{{
     {"bus_high",
      "the bus voltage is above its range: the motor gave back more than supply and brake resistor take, or the supply "
      "is wrong"},
-    {"overcurrent", "a phase's current is above the power stage's limit: phases shorted, or a current loop that swings"},
-    {"current_sum", "the phase currents do not add up to zero: a phase is shorted to ground, or a current sensor broken"},
+    {"overcurrent",
+     "a phase's current is above the power stage's limit: phases shorted, or a current loop that swings"},
+    {"current_sum",
+     "the phase currents do not add up to zero: a phase is shorted to ground, or a current sensor broken"},
     {"driver", "the gate driver reports a fault: a short, its supply, or a switch broken"},
     {"hot", "the power stage is too hot"},
     {"thermistor_open", "the power stage's thermistor is open: wire or part broken"},
     {"thermistor_shorted", "the power stage's thermistor is shorted"},
     {"phase_lost", "a phase carries no current: wire, connector or winding open"},
     {"voltage_residual",
-     "the motor's voltages are not those of its currents and speed: phases shorted, the encoder shows a wrong angle, or "
+     "the motor's voltages are not those of its currents and speed: phases shorted, the encoder shows a wrong angle, "
+     "or "
      "another motor; run flexspline commission"},
 }};
 constexpr FaultText stage_fault_text(std::int32_t number) {

@@ -14,7 +14,8 @@
 
 namespace flexspline::tests {
 
-// Where a fault has no time, as a shaft at rest without torque shows nothing of it: speed, current and travel are bounded.
+// Where a fault has no time, as a shaft at rest without torque shows nothing of it: speed, current and travel are
+// bounded.
 enum class StageTime {
   always,   // in every cell
   turning,  // from a tenth of rated speed on; and a sixth of an electrical turn, in which a phase passes zero
@@ -42,24 +43,52 @@ inline const std::vector<StageFaultKind>& stage_faults() {
                                               Fault::output_encoder_stuck};
   static const std::vector<StageFaultKind> all = {
       {"none", {}, {}, {}},
-      {"phase lost", {Injection::phase_lost}, {S::phase_lost, S::voltage_residual}, {},
-       stated_s(S::phase_lost), StageTime::turning},
-      {"phases shorted", {Injection::phases_shorted}, {S::overcurrent}, {}, stated_s(S::current_sum),
-       StageTime::always, true},
-      {"phase to ground", {Injection::phase_grounded}, {S::current_sum, S::overcurrent}, {},
-       stated_s(S::current_sum), StageTime::always, true},
+      {"phase lost",
+       {Injection::phase_lost},
+       {S::phase_lost, S::voltage_residual},
+       {},
+       stated_s(S::phase_lost),
+       StageTime::turning},
+      {"phases shorted",
+       {Injection::phases_shorted},
+       {S::overcurrent},
+       {},
+       stated_s(S::current_sum),
+       StageTime::always,
+       true},
+      {"phase to ground",
+       {Injection::phase_grounded},
+       {S::current_sum, S::overcurrent},
+       {},
+       stated_s(S::current_sum),
+       StageTime::always,
+       true},
       // The bus falls with its capacitor and the supply's resistance, 25 us.
       {"bus collapse", {Injection::bus_collapse}, {S::bus_low}, {}, stated_s(S::bus_low) + 4 * 25e-6},
       {"driver fault", {Injection::driver_fault}, {S::driver}, {}, stated_s(S::driver)},
       {"thermistor open", {Injection::thermistor_open}, {S::thermistor_open}, {}, stated_s(S::thermistor_open)},
-      {"thermistor shorted", {Injection::thermistor_shorted}, {S::thermistor_shorted}, {},
+      {"thermistor shorted",
+       {Injection::thermistor_shorted},
+       {S::thermistor_shorted},
+       {},
        stated_s(S::thermistor_shorted)},
-      {"encoder stale", {Injection::motor_encoder_stale}, {}, {Fault::motor_encoder_stale},
+      {"encoder stale",
+       {Injection::motor_encoder_stale},
+       {},
+       {Fault::motor_encoder_stale},
        (firmware::kStaleTicks + 1) * kTickS},
       {"encoder jump", {Injection::motor_encoder_jump}, {}, {Fault::motor_encoder_jump}, 2 * kTickS},
-      {"encoder stuck", {Injection::motor_encoder_stuck}, {S::voltage_residual}, kEncoder, 60 * kTickS,
+      {"encoder stuck",
+       {Injection::motor_encoder_stuck},
+       {S::voltage_residual},
+       kEncoder,
+       60 * kTickS,
        StageTime::fast},
-      {"encoder halved", {Injection::motor_encoder_slips}, {S::voltage_residual}, kEncoder, 60 * kTickS,
+      {"encoder halved",
+       {Injection::motor_encoder_slips},
+       {S::voltage_residual},
+       kEncoder,
+       60 * kTickS,
        StageTime::fast},
   };
   return all;
@@ -80,8 +109,8 @@ struct StageFaultCell {
 };
 inline double stated_s(const StageFaultCell& cell) {
   if (cell.kind->time != StageTime::turning) return cell.kind->within_s;
-  const double electrical_rad_s = board::three_phase_of(demo_drive()).motor.pole_pairs * cell.speed_share *
-                                  demo_drive().rated_velocity_rad_s;
+  const double electrical_rad_s =
+      board::three_phase_of(demo_drive()).motor.pole_pairs * cell.speed_share * demo_drive().rated_velocity_rad_s;
   return cell.kind->within_s + kTurn / 6.0 / electrical_rad_s;
 }
 // Whether the fault has to be found within its time.

@@ -39,9 +39,10 @@ class Thermistor {
   static constexpr std::uint32_t kWireSamples = 64;
 
   constexpr ThermistorFault update(const ThermistorSettings& s, std::int32_t reading) {
-    const bool below = reading < s.least, above = reading > s.most;
+    const bool below = reading<s.least, above = reading> s.most;
     wire_samples_ = below || above ? next(wire_samples_, kWireSamples) : 0;
-    if (wire_samples_ >= kWireSamples) return above == s.opens_upwards ? ThermistorFault::open : ThermistorFault::shorted;
+    if (wire_samples_ >= kWireSamples)
+      return above == s.opens_upwards ? ThermistorFault::open : ThermistorFault::shorted;
     if (below || above) return fault_;
     celsius_ = celsius(s, reading);
     hot_samples_ = celsius_ >= s.limit ? next(hot_samples_, kHotSamples) : 0;
@@ -52,7 +53,9 @@ class Thermistor {
   constexpr std::int32_t now() const { return celsius_; }
 
  private:
-  static constexpr std::uint32_t next(std::uint32_t count, std::uint32_t most) { return count < most ? count + 1 : most; }
+  static constexpr std::uint32_t next(std::uint32_t count, std::uint32_t most) {
+    return count < most ? count + 1 : most;
+  }
   std::int32_t celsius_ = 0;
   std::uint32_t hot_samples_ = 0;
   std::uint32_t wire_samples_ = 0;

@@ -35,8 +35,8 @@ enum class WindingFault : std::uint8_t { none, phase_lost, residual };
 class WindingWatch {
  public:
   static constexpr std::uint32_t kEvery = 4;  // PWM periods a sample
-  // What both faults take at most, with a set point of the lost phase that stays above its threshold and a residual that
-  // stays above its own.
+  // What both faults take at most, with a set point of the lost phase that stays above its threshold and a residual
+  // that stays above its own.
   static constexpr std::uint32_t kLostPeriods = 128;
   static constexpr std::uint32_t kResidualPeriods = 260;
 
@@ -48,10 +48,9 @@ class WindingWatch {
     period_ = 0;
     const std::int32_t emf = size(fixed::multiply_high(c.current.flux, foc::held<foc::kStepBits>(in.step) * 8));
     if (is_lost(s, in, phases, emf < out.most / 2)) return WindingFault::phase_lost;
-    const std::int32_t most = fixed::multiply_high(c.current.d.resistance, s.resistance_error) +
-                              (s.lost_voltage >> c.current.up) + emf / 4;
-    const bool unexplained =
-        size(integral(state.current.d)) > most || size(integral(state.current.q)) > most;
+    const std::int32_t most =
+        fixed::multiply_high(c.current.d.resistance, s.resistance_error) + (s.lost_voltage >> c.current.up) + emf / 4;
+    const bool unexplained = size(integral(state.current.d)) > most || size(integral(state.current.q)) > most;
     residual_samples_ = unexplained ? residual_samples_ + 1 : 0;
     return residual_samples_ >= kResidualSamples ? WindingFault::residual : WindingFault::none;
   }
@@ -65,10 +64,13 @@ class WindingWatch {
   static constexpr std::uint32_t kResidualSamples = 64;
 
   static constexpr std::int32_t size(std::int32_t x) { return x < 0 ? -x : x; }
-  static constexpr std::int32_t integral(const foc::AxisState& s) { return static_cast<std::int32_t>(s.integral >> 32); }
+  static constexpr std::int32_t integral(const foc::AxisState& s) {
+    return static_cast<std::int32_t>(s.integral >> 32);
+  }
   constexpr bool is_lost(const WindingSettings& s, const foc::Inputs& in, const foc::Phases& phases, bool has_voltage) {
     const foc::Rotation at = foc::rotation(in.angle);
-    const foc::RotorVector set = {foc::held<foc::kCurrentBits>(in.set_point.d), foc::held<foc::kCurrentBits>(in.set_point.q)};
+    const foc::RotorVector set = {foc::held<foc::kCurrentBits>(in.set_point.d),
+                                  foc::held<foc::kCurrentBits>(in.set_point.q)};
     const foc::Phases quarter = foc::inverse_clarke(foc::inverse_park_quarter(set, at));
     const std::array<std::int32_t, 3> wanted = {quarter.a * 4, quarter.b * 4, quarter.c * 4};
     const std::array<std::int32_t, 3> measured = {phases.a, phases.b, phases.c};
@@ -79,8 +81,7 @@ class WindingWatch {
     for (std::size_t x = 0; x < wanted.size(); ++x) {
       const std::size_t y = (x + 1) % 3, z = (x + 2) % 3;
       const bool others_carry = measured_[y] + measured_[z] > (wanted_[y] + wanted_[z]) / 2;
-      const bool lost =
-          wanted_[x] > s.least_current && measured_[x] < wanted_[x] / 4 && (others_carry || has_voltage);
+      const bool lost = wanted_[x] > s.least_current && measured_[x] < wanted_[x] / 4 && (others_carry || has_voltage);
       samples_[x] = lost ? samples_[x] + 1 : 0;
       if (samples_[x] < kLostSamples) continue;
       phase_ = static_cast<std::uint8_t>(x + 1);
