@@ -102,13 +102,7 @@ TEST(StageFaultMatrix, WithoutABrakeResistorRegenerationEndsInBusHighBelowTheSta
     for (const bool has_brake : {true, false}) {
       board::ThreePhaseParameters p = nominal;
       p.inverter.supply_takes_back = false;
-      auto controller = std::make_unique<SoftwareController>();
-      SoftwareController* software = controller.get();
-      VirtualDrive drive({.drive = demo_drive(), .seed = 7, .three_phase = true, .motor = p}, block, {},
-                         std::move(controller));
-      software->connect(drive.rig().three_phase()->stage());
-      drive.power(false);
-      drive.power(true);
+      VirtualDrive drive({.drive = demo_drive(), .seed = 7, .three_phase = true, .motor = p}, block);
       drive.read_frames(false);
       drive.run(1000);
       ASSERT_EQ(drive.command(arm_velocity(load.rad_s)).refusal, Refusal::none);

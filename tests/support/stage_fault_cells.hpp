@@ -148,18 +148,12 @@ struct StageFaultOutcome {
   }
 };
 
-// A drive whose application knows its stage.
 inline std::unique_ptr<VirtualDrive> three_phase_drive(const StageFaultCell& cell, const Block& block) {
-  auto controller = std::make_unique<SoftwareController>();
-  SoftwareController* software = controller.get();
   auto drive = std::make_unique<VirtualDrive>(RigSetup{.drive = cell_drive(cell.load),
                                                        .seed = cell.seed,
                                                        .start_turns = board::waking_turns(cell.seed),
                                                        .three_phase = true},
-                                              block, firmware::TelemetrySetup{}, std::move(controller));
-  software->connect(drive->rig().three_phase()->stage());
-  drive->power(false);
-  drive->power(true);
+                                              block);
   drive->read_frames(false);
   return drive;
 }
