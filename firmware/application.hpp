@@ -395,7 +395,7 @@ class Application {
     if (status_.mode == Mode::boot) boot();
     if (is_armed(status_.mode) && amplifier_tripped_of(*board_)) {
       const auto before = static_cast<std::int32_t>(status_.mode == Mode::stop ? status_.fault.fault : Fault::none);
-      enter_fault({Fault::amplifier_fault, status_.tick, before, 0});
+      enter_fault({Fault::amplifier_fault, status_.tick, before, amplifier_fault_of(*board_)});
     }
   }
   void boot() {

@@ -65,6 +65,16 @@ bool amplifier_tripped_of(B& board) {
   }
 }
 
+// Why it did, as protocol::StageFault; zero where the board does not say.
+template <Board B>
+std::int32_t amplifier_fault_of(B& board) {
+  if constexpr (requires { board.amplifier_fault(); }) {
+    return static_cast<std::int32_t>(board.amplifier_fault());
+  } else {
+    return 0;
+  }
+}
+
 // The longest time between two samples of the output's encoder: a tick, unless the board has a slower one.
 template <Board B>
 constexpr std::uint32_t output_sample_ticks_of() {

@@ -6,6 +6,8 @@
 #include <cstdint>
 #include <optional>
 #include <span>
+#include <type_traits>
+#include <utility>
 
 #include "firmware/board.hpp"
 #include "firmware/messages.hpp"
@@ -30,6 +32,7 @@ struct NoCommissioning {
   void lose_host() {}
 };
 
+template <class Stage>
 class CommissioningControl {
  public:
   static constexpr bool kHasStage = true;
@@ -54,7 +57,11 @@ class CommissioningControl {
     const State next = status.mode != Mode::commissioning ? State::drive_fault : state_now(c);
     if (next == State::runs) return;
     end(next);
-    if (status.mode == Mode::commissioning) status.mode = Mode::idle;
+    if (status.mode != Mode::commissioning) return;
+    status.mode = Mode::idle;
+    if (next != State::drive_fault) return;
+    status.mode = Mode::fault;
+    status.fault = {Fault::amplifier_fault, status.tick, 0, static_cast<std::int32_t>(stage_->commissioning_fault())};
   }
   // While the motor is measured every command is for that; otherwise only that which begins it. None: another one.
   [[gnu::noinline]] std::optional<Refusal> obey(const Command& command, Status& status, bool at_rest) {
@@ -90,7 +97,7 @@ class CommissioningControl {
     if (stage_ != nullptr) stage_->use(control::motor_of(detail::octets(block)));
   }
   bool exists() const { return stage_ != nullptr; }
-  const ThreePhaseStage& stage() const { return *stage_; }
+  const Stage& stage() const { return *stage_; }
   // For the command that begins it. False: a number is outside what the drive takes; the board's limits hold.
   bool prepare(const protocol::CommissioningBegin& r) {
     const ThreePhaseSettings& s = stage_->settings();
@@ -130,7 +137,8 @@ class CommissioningControl {
   static constexpr std::int32_t kWhole = 4096;   // SensorSettings::gain of an exact sensor
 
   State state_now(const control::commissioning::Commissioning& c) const {
-    if (stage_->commissioning_raised_bus()) return State::bus_high;
+    const StageFault fault = stage_->commissioning_fault();
+    if (fault != StageFault::none) return fault == StageFault::bus_high ? State::bus_high : State::drive_fault;
     if (c.done()) return c.result().fault == control::commissioning::Fault::none ? State::done : State::fault;
     const bool lost = is_host_lost_.load(std::memory_order_relaxed) || age_ >= most_age_;
     return lost ? State::host_lost : State::runs;
@@ -140,7 +148,7 @@ class CommissioningControl {
     store_in_tick(state_, state);
   }
 
-  ThreePhaseStage* stage_ = nullptr;
+  Stage* stage_ = nullptr;
   control::commissioning::Settings request_;
   std::atomic<State> state_{State::none};
   std::atomic<bool> heard_{false};
@@ -159,7 +167,7 @@ requires requires(B& board) {
   board.three_phase();
 }
 struct CommissioningChoice<B> {
-  using Type = CommissioningControl;
+  using Type = CommissioningControl<std::remove_pointer_t<decltype(std::declval<B&>().three_phase())>>;
 };
 template <Board B>
 using CommissioningOf = typename CommissioningChoice<B>::Type;

@@ -39,7 +39,8 @@ struct CommissioningMessages {
   }
 
  private:
-  static protocol::CommissioningStage stage(const ThreePhaseStage& stage) {
+  template <class Stage>
+  static protocol::CommissioningStage stage(const Stage& stage) {
     const ThreePhaseSettings& s = stage.settings();
     protocol::CommissioningStage out;
     out.current_full_scale_ma = s.current_full_scale_ma;
@@ -58,7 +59,8 @@ struct CommissioningMessages {
     out.offset_angle = s.offset_angle;
     return out;
   }
-  static protocol::CommissioningProgress progress(const CommissioningControl& control) {
+  template <class Control>
+  static protocol::CommissioningProgress progress(const Control& control) {
     using State = protocol::CommissioningState;
     protocol::CommissioningProgress out;
     out.state = control.state();

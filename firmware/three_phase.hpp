@@ -10,22 +10,13 @@
 #include <cstdint>
 
 #include "firmware/board.hpp"
+#include "firmware/stage_protection.hpp"
 #include "shared/control/commissioning/commissioning.hpp"
 #include "shared/control/foc/current_limits.hpp"
 #include "shared/control/foc/field_oriented.hpp"
 #include "shared/control/motor_settings.hpp"
 
 namespace flexspline::firmware {
-
-// What switches the stage off by itself, until the drive is disarmed. Within so many PWM periods.
-enum class StageFault : std::uint8_t {
-  none,
-  sensor_zero,  // a current sensor's zero was out of range when it was last measured; before it switches on
-  bus_low,      // 1
-  bus_high,     // 1
-  overcurrent,  // 1; of a phase
-  current_sum,  // 4; the three currents do not add up to zero: a sensor, or a short to ground
-};
 
 struct ThreePhaseSettings {
   control::foc::Settings foc;
@@ -35,6 +26,7 @@ struct ThreePhaseSettings {
   std::int32_t most_bus = INT16_MAX;    // likewise
   std::int32_t most_phase = INT32_MAX;  // current of a phase, 2^-27 of its base
   std::int32_t most_sum = INT32_MAX;    // of the three, likewise
+  ProtectionSettings protection;
   // Electrical angle = +-pole_pairs encoder + offset_angle, as commissioning finds it. Zero: it was never done.
   std::int32_t pole_pairs = 1;
   bool reversed = false;
@@ -50,15 +42,22 @@ struct ThreePhaseSettings {
   std::uint32_t bus_full_scale_mv = 0;
 };
 
-class ThreePhaseStage {
+template <StageParts kParts>
+class ThreePhaseStageOf {
  public:
   // One PWM period, sampled in the middle of the low sides' time.
   struct Inputs {
     control::foc::Phases readings;  // 2^-15 of full scale
     std::int32_t bus = 0;           // likewise
     std::uint32_t counter = 0;      // of the encoder, as Readings::motor_counter
+    // Of the parts that the board has.
+    bool driver_fault = false;
+    std::int32_t temperature = 1 << 14;  // of the thermistor's divider, 2^-15
   };
-  using Outputs = control::commissioning::Outputs;
+  struct Outputs : control::commissioning::Outputs {
+    std::int32_t brake = 0;      // share of the period for the brake resistor, 2^-15; on or off, whether it is enabled
+    bool clears_driver = false;  // the driver's reset line
+  };
 
   void begin(const ThreePhaseSettings& settings) {
     *this = {};
@@ -105,15 +104,16 @@ class ThreePhaseStage {
   // Takes the place of current control until it is done. The caller has the drive disarmed.
   void commission(const control::commissioning::Settings& settings) {
     commissioning_.begin(settings);
-    bus_high_ = false;
+    commissioning_fault_ = StageFault::none;
     // The interrupt must not see it before it has begun.
     std::atomic_signal_fence(std::memory_order_seq_cst);
     commissions_ = true;
   }
   // From the next period on all switches are open.
   void stop_commissioning() { commissions_ = false; }
-  // It ended because the rotor, which it turned, gave back more energy than the bus could take.
-  bool commissioning_raised_bus() const { return bus_high_; }
+  // What of the stage ended it. The bus is too high where the rotor, which it turned, gave back more energy than the
+  // bus could take.
+  StageFault commissioning_fault() const { return commissioning_fault_; }
   bool commissions() const { return commissions_; }
   const control::commissioning::Commissioning& commissioning() const { return commissioning_; }
 
@@ -122,33 +122,54 @@ class ThreePhaseStage {
   Outputs update(const Inputs& in) {
     follow(in.counter);
     bus_ = in.bus;
-    if (commissions_) {
-      const Outputs out = commissioning_.update({in.readings, in.bus, angle_});
-      bus_high_ = in.bus > s_.most_bus;
-      commissions_ = !commissioning_.done() && !bus_high_;
-      return commissions_ ? out : Outputs{};
-    }
-    // Once it runs it goes on until it is switched off: offsets are measured without current.
-    if (!commanded_ && latched_) {
-      latched_ = false;
-      fault_ = StageFault::none;
-    }
-    if (commanded_ && runs_) check(in);
-    if (!commanded_ || latched_ || !(runs_ || has_offsets_)) return off(in.readings);
-    if (!runs_) control::foc::reset(state_);
-    runs_ = true;
-    control::foc::update(
-        state_, s_.foc,
-        {in.readings, in.bus, electrical(angle_) + s_.offset_angle,
-         static_cast<std::int32_t>(electrical(static_cast<std::uint32_t>(speed_ >> kFilterBits))), set_point_},
-        out_);
-    return {out_.counts, true};
+    const StageFault cause = protection_.update(s_.protection, in.driver_fault, in.temperature);
+    Outputs out;
+    static_cast<control::commissioning::Outputs&>(out) = commissions_ ? measure(in, cause) : run(in, cause);
+    if (!out.enabled) protection_.discharge();
+    out.brake = protection_.brake(s_.protection, in.bus);
+    out.clears_driver = protection_.clears_driver(commanded_ || commissions_, in.driver_fault);
+    return out;
   }
 
  private:
   static constexpr int kFilterBits = 4;  // of the speed: periods
-  static constexpr std::int32_t kSumPeriods = 4;
+  using Switches = control::commissioning::Outputs;
 
+  Switches measure(const Inputs& in, StageFault cause) {
+    // The bus first: a driver may trip by it.
+    commissioning_fault_ = in.bus > s_.most_bus ? StageFault::bus_high : cause;
+    commissions_ = commissioning_fault_ == StageFault::none;
+    if (!commissions_) return {};
+    if (!protection_.charge(s_.protection)) return {{}, true};
+    const Switches out = commissioning_.update({in.readings, in.bus, angle_});
+    commissions_ = !commissioning_.done();
+    return commissions_ ? out : Switches{};
+  }
+  // Once it runs it goes on until it is switched off: offsets are measured without current.
+  Switches run(const Inputs& in, StageFault cause) {
+    if (!commanded_ && latched_) {
+      latched_ = false;
+      fault_ = StageFault::none;
+    }
+    if (commanded_) check(in, cause);
+    if (!commanded_ || latched_ || !(runs_ || has_offsets_)) return off(in.readings);
+    if (!runs_) {
+      control::foc::reset(state_);
+      winding_.reset();
+      runs_ = true;
+    }
+    if (!protection_.charge(s_.protection)) return {{}, true};
+    const control::foc::Phases phases = control::foc::phase_currents(s_.foc.sensors, in.readings, state_.unmeasured);
+    const control::foc::Inputs inputs = {
+        in.readings, in.bus, electrical(angle_) + s_.offset_angle,
+        static_cast<std::int32_t>(electrical(static_cast<std::uint32_t>(speed_ >> kFilterBits))), set_point_};
+    control::foc::update(state_, s_.foc, inputs, out_);
+    const auto found = winding_.update(s_.protection.winding, s_.foc, state_, inputs, out_, phases);
+    if (found == control::protection::WindingFault::none) return {out_.counts, true};
+    latch(found == control::protection::WindingFault::phase_lost ? StageFault::phase_lost
+                                                                 : StageFault::voltage_residual);
+    return off(in.readings);
+  }
   std::uint32_t electrical(std::uint32_t angle) const {
     const std::uint32_t turned = angle * static_cast<std::uint32_t>(s_.pole_pairs);
     return s_.reversed ? 0 - turned : turned;
@@ -177,16 +198,20 @@ class ThreePhaseStage {
     latched_ = true;
     fault_ = fault;
   }
-  void check(const Inputs& in) {
+  void check(const Inputs& in, StageFault cause) {
+    if (runs_) check_currents(in.readings);
     if (in.bus < s_.least_bus) latch(StageFault::bus_low);
     if (in.bus > s_.most_bus) latch(StageFault::bus_high);
-    const control::foc::Phases p = control::foc::phase_currents(s_.foc.sensors, in.readings, state_.unmeasured);
+    if (cause != StageFault::none) latch(cause);
+  }
+  void check_currents(const control::foc::Phases& readings) {
+    const control::foc::Phases p = control::foc::phase_currents(s_.foc.sensors, readings, state_.unmeasured);
     if (control::commissioning::largest_size(p) > s_.most_phase) latch(StageFault::overcurrent);
     const bool adds_up = control::commissioning::size(p.a + p.b + p.c) <= s_.most_sum;
     sum_periods_ = adds_up ? 0 : sum_periods_ + 1;
     if (sum_periods_ >= kSumPeriods) latch(StageFault::current_sum);
   }
-  Outputs off(const control::foc::Phases& readings) {
+  Switches off(const control::foc::Phases& readings) {
     sum_periods_ = 0;
     runs_ = false;
     out_.measured = {};
@@ -210,12 +235,11 @@ class ThreePhaseStage {
   control::foc::OffsetCalibration calibration_;
   StageFault fault_ = StageFault::none;
   bool latched_ = false;  // a fault of a stage that ran
-  std::int32_t sum_periods_ = 0;
+  std::uint32_t sum_periods_ = 0;
   bool commanded_ = false;
   bool has_offsets_ = false;
   bool runs_ = false;
   bool commissions_ = false;
-  bool bus_high_ = false;
   bool began_ = false;
   std::int32_t bus_ = 0;
   std::uint32_t per_count_ = 0;
@@ -223,7 +247,12 @@ class ThreePhaseStage {
   std::uint32_t position_ = 0;  // counts within a turn
   std::uint32_t angle_ = 0;     // of the encoder, 2^-32 turns
   std::int64_t speed_ = 0;      // 2^-36 turns a period
+  StageProtection<kParts> protection_;
+  control::protection::WindingWatch winding_;
+  StageFault commissioning_fault_ = StageFault::none;
   control::commissioning::Commissioning commissioning_;
 };
+// With all parts, as the twin's board has them.
+using ThreePhaseStage = ThreePhaseStageOf<kAllStageParts>;
 
 }  // namespace flexspline::firmware

@@ -72,6 +72,7 @@ void SoftwareController::start(const Block& block, const firmware::TelemetrySetu
   board_.tick_hz = tick_hz;
   board_.cause = cause;
   board_.hardware_stated = hardware_;
+  board_.stage = stage_;
   application_ = std::make_unique<firmware::Application<SoftwareBoard>>(board_);
   application_->telemetry().configure(telemetry_);
   if (!flash_.empty()) application_->boot_with(flash_.bytes());

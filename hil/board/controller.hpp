@@ -64,7 +64,10 @@ class SoftwareBoard {
       &kNone;  ///< not a copy: copying a struct whose members were just written is slow
   firmware::Actuation actuation{};
   bool overrun = false;
-  bool amplifier_tripped() const { return tripped; }
+  bool amplifier_tripped() const { return tripped || (stage != nullptr && stage->tripped()); }
+  firmware::StageFault amplifier_fault() const {
+    return stage != nullptr ? stage->fault() : firmware::StageFault::none;
+  }
 
   /// The same in each run: the generator of Steele, Lea and Flood (SplitMix64), from `random` on.
   firmware::RandomWords random_words() {
@@ -100,6 +103,9 @@ class SoftwareController : public Controller {
   /// A bin of the residual map, as a message requests it.
   bool map_bin(std::uint16_t number, firmware::MapBin& bin) const { return application_->map_bin(number, bin); }
 
+  /// The three-phase stage of its amplifier, from the next start on.
+  void connect(firmware::ThreePhaseStage& stage) { stage_ = &stage; }
+
   /// The control tick, or background work, hangs.
   void hang_tick(bool hangs) { tick_hangs_ = hangs; }
   void hang_background(bool hangs) { background_hangs_ = hangs; }
@@ -111,6 +117,7 @@ class SoftwareController : public Controller {
  private:
   Block flash_;
   control::Hardware hardware_{};
+  firmware::ThreePhaseStage* stage_ = nullptr;
   firmware::TelemetrySetup telemetry_;
   SoftwareBoard board_;
   std::unique_ptr<firmware::Application<SoftwareBoard>> application_;

@@ -7,7 +7,7 @@
 namespace flexspline::board {
 namespace {
 
-constexpr std::array<std::pair<std::string_view, Injection>, 18> kInjections{
+constexpr std::array<std::pair<std::string_view, Injection>, 26> kInjections{
     {{"motor-encoder-stale", Injection::motor_encoder_stale},
      {"output-encoder-stale", Injection::output_encoder_stale},
      {"analog-stale", Injection::analog_stale},
@@ -25,7 +25,15 @@ constexpr std::array<std::pair<std::string_view, Injection>, 18> kInjections{
      {"torque-stuck", Injection::torque_stuck},
      {"amplifier-dead", Injection::amplifier_dead},
      {"current-surge", Injection::current_surge},
-     {"tick-overrun", Injection::tick_overrun}}};
+     {"tick-overrun", Injection::tick_overrun},
+     {"phase-lost", Injection::phase_lost},
+     {"phases-shorted", Injection::phases_shorted},
+     {"phase-grounded", Injection::phase_grounded},
+     {"bus-collapse", Injection::bus_collapse},
+     {"driver-fault", Injection::driver_fault},
+     {"thermistor-open", Injection::thermistor_open},
+     {"thermistor-shorted", Injection::thermistor_shorted},
+     {"brake-missing", Injection::brake_missing}}};
 
 struct Named {
   std::string_view name;

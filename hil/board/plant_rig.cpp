@@ -90,6 +90,34 @@ PlantRig::PlantRig(const RigSetup& setup)
                                                          setup.motor.value_or(three_phase_of(setup.drive)));
 }
 
+void PlantRig::inject(Injection what) {
+  injected_ |= bit(what);
+  pass_faults_to_stage();
+}
+void PlantRig::clear(Injection what) {
+  injected_ &= ~bit(what);
+  pass_faults_to_stage();
+}
+// The stage reads the same encoder.
+void PlantRig::pass_faults_to_stage() {
+  if (!three_phase_) return;
+  three_phase_->set_faults({.phase_open = has(Injection::phase_lost),
+                            .phases_shorted = has(Injection::phases_shorted),
+                            .phase_grounded = has(Injection::phase_grounded),
+                            .bus_collapsed = has(Injection::bus_collapse),
+                            .driver = has(Injection::driver_fault),
+                            .thermistor_open = has(Injection::thermistor_open),
+                            .thermistor_shorted = has(Injection::thermistor_shorted),
+                            .brake_missing = has(Injection::brake_missing)});
+  const bool is_held =
+      has(Injection::motor_encoder_stale) || has(Injection::motor_encoder_stuck) || has(Injection::encoder_line_lost);
+  three_phase_->set_encoder(is_held                                 ? StageEncoder::held
+                            : has(Injection::motor_encoder_jump)    ? StageEncoder::jumped
+                            : has(Injection::motor_encoder_slips)   ? StageEncoder::halved
+                            : has(Injection::motor_encoder_swapped) ? StageEncoder::reversed
+                                                                    : StageEncoder::intact);
+}
+
 // An absolute encoder starts at its angle within a turn, another one at zero.
 void PlantRig::begin_counters() {
   const bool absolute = setup_.encoders == control::SensorKind::absolute;

@@ -33,6 +33,15 @@ enum class Injection {
   amplifier_dead,  ///< no current flows, for any command
   current_surge,   ///< 2 A above the amplifier's largest current flow, and are measured
   tick_overrun,    ///< each tick takes longer than its period
+  // Of a three-phase power stage.
+  phase_lost,
+  phases_shorted,
+  phase_grounded,
+  bus_collapse,
+  driver_fault,
+  thermistor_open,
+  thermistor_shorted,
+  brake_missing,  ///< no brake resistor: what the motor gives back stays in the bus
 };
 
 /// Full scales of the analogue inputs and of the amplifier; a reading is a share of them in 2^-15.
@@ -87,8 +96,8 @@ class PlantRig {
   /// Applies the amplifier's command and advances the plant by one tick.
   void act(const firmware::Actuation& actuation);
 
-  void inject(Injection what) { injected_ |= bit(what); }
-  void clear(Injection what) { injected_ &= ~bit(what); }
+  void inject(Injection what);
+  void clear(Injection what);
   bool has(Injection what) const { return (injected_ & bit(what)) != 0; }
   void disturb(const Disturbances& what) { disturbances_ = what; }
   void set_temperature(double celsius) { temperature_c_ = celsius; }
@@ -110,6 +119,7 @@ class PlantRig {
  private:
   static constexpr std::uint64_t bit(Injection what) { return std::uint64_t{1} << static_cast<int>(what); }
   double noise(double standard_deviation);
+  void pass_faults_to_stage();
   std::uint32_t motor_count(std::uint32_t true_count);
   void begin_counters();
   double motor_zero() const;  // rad

@@ -1,5 +1,6 @@
 #include "hil/board/three_phase.hpp"
 
+#include <algorithm>
 #include <cmath>
 #include <stdexcept>
 
@@ -13,6 +14,7 @@ namespace {
 constexpr double kDemoCurrentA = 3.5, kDemoTorqueConstant = 0.0543, kDemoVelocity = 200.0;
 constexpr double kFullScaleA = 10.0, kBusV = 48.0, kBusFullScaleV = 60.0;
 constexpr double kOhm = 1.0, kHenry = 1e-3;
+constexpr double kBrakeOhm = 20.0;
 constexpr int kPolePairs = 7;
 constexpr int kTimerCounts = 2100;
 constexpr std::uint64_t kShuntNoise = 23;
@@ -47,6 +49,7 @@ ThreePhaseParameters three_phase_of(const plant::Drive& drive) {
   p.inverter.diode_drop_v *= volt;
   p.inverter.bus_capacitance_f /= ohm;
   p.inverter.leg_capacitance_f /= ohm;
+  p.inverter.brake_ohm = kBrakeOhm * ohm;
   p.inverter.pwm_hz = ThreePhaseAmplifier::kPwmHz;
   p.inverter.averaged_steps = 4;
   p.sensors.full_scale_a = kFullScaleA * ampere;
@@ -78,6 +81,7 @@ firmware::ThreePhaseSettings three_phase_settings_of(const plant::Drive& drive) 
   s.most_bus = 30583;                                // 56 V
   s.most_phase = 10 * (std::int32_t{1} << 27) / 16;  // five eighths of full scale: 1.4 times the amplifier's largest
   s.most_sum = (std::int32_t{1} << 27) / 16;
+  s.protection = protection_of(drive);
   s.pole_pairs = kPolePairs;
   s.encoder_counts = static_cast<std::uint32_t>(drive.sensors.motor_counts);
   s.set_point = static_cast<std::int32_t>(std::lround(std::ldexp(peak, 12)));
@@ -122,27 +126,89 @@ std::uint32_t ThreePhaseAmplifier::counter_at(double angle_rad) {
   return static_cast<std::uint32_t>(std::llround((turns - slipped_turns_) * counts_));
 }
 
+std::uint32_t ThreePhaseAmplifier::faulty(std::uint32_t counter) {
+  counter_ = counter;
+  const std::uint32_t moved = counter - counter_at_fault_;
+  switch (encoder_) {
+    case StageEncoder::intact:
+      return counter;
+    case StageEncoder::held:
+      return counter_at_fault_;
+    case StageEncoder::jumped:
+      return counter + static_cast<std::uint32_t>(counts_ / 4);
+    case StageEncoder::halved:
+      return counter_at_fault_ + static_cast<std::uint32_t>(static_cast<std::int32_t>(moved) / 2);
+    case StageEncoder::reversed:
+      return counter_at_fault_ - moved;
+  }
+  return counter;
+}
+void ThreePhaseAmplifier::set_encoder(StageEncoder encoder) {
+  if (encoder == encoder_) return;
+  encoder_ = encoder;
+  counter_at_fault_ = counter_;
+}
+
+void ThreePhaseAmplifier::set_faults(const StageFaults& faults) {
+  if (faults == faults_) return;
+  faults_ = faults;
+  constexpr double kShortShare = 0.05, kGroundShare = 0.1;  // as a wiring fault has them
+  motor::WiringParameters wiring = p_.wiring;
+  if (faults.phase_open) wiring.open[0] = true;
+  if (faults.phases_shorted) {
+    wiring.short_ohm = kShortShare * p_.motor.resistance_ohm;
+    wiring.short_from = 1;
+    wiring.short_to = 2;
+  }
+  if (faults.phase_grounded) {
+    wiring.ground_ohm = kGroundShare * p_.motor.resistance_ohm;
+    wiring.ground_leg = 0;
+  }
+  power_.set_wiring(wiring);
+  power_.set_supply_v((faults.bus_collapsed ? 0.2 : 1.0) * p_.inverter.supply_v);
+  power_.set_brake_ohm(faults.brake_missing ? 0.0 : p_.inverter.brake_ohm);
+}
+std::int32_t ThreePhaseAmplifier::thermistor() const {
+  if (faults_.thermistor_open) return 32752;
+  if (faults_.thermistor_shorted) return 0;
+  return thermistor_reading(temperature_c_);
+}
+
 double ThreePhaseAmplifier::run(const firmware::Actuation& actuation, double motor_angle_rad, double motor_velocity) {
   stage_.command(actuation);
   // Without waiting for the next period.
-  if (!actuation.enabled && !stage_.commissions()) out_ = {};
+  if (!actuation.enabled && !stage_.commissions()) {
+    if (out_.enabled) opened_at_ = periods_run_;
+    out_ = {};
+  }
   const double period = power_.period_s();
   double torque = 0.0;
   for (int k = 0; k < periods_; ++k) {
     const double start = motor_angle_rad + motor_velocity * period * k;
     const motor::Rotor at = {start * p_.motor.pole_pairs + kTurn * p_.offset_turns,
                              motor_velocity * p_.motor.pole_pairs};
-    if (!out_.enabled) power_.motor().stop(at.angle);
     const double all = kTimerCounts;
     const motor::Triple duties = {out_.counts.a / all, out_.counts.b / all, out_.counts.c / all};
     // Off: open switches carry no current, but for back-EMF above the bus, which the rated speed does not reach.
-    const motor::Sample sample = out_.enabled
-                                     ? power_.run(duties, at)
-                                     : motor::Sample{{}, {}, power_.bus_v(), power_.motor().torque_nm(at.angle)};
+    // Off: open switches carry no current, but for back-EMF above the bus, which the rated speed does not reach.
+    power_.set_brake(out_.brake / 32768.0);
+    motor::Sample sample;
+    if (out_.enabled) {
+      sample = power_.run(duties, at);
+    } else {
+      power_.rest(at);
+      sample = {{}, {}, power_.bus_v(), power_.motor().torque_nm(at.angle)};
+    }
+    for (const double x : sample.seen_a) peak_phase_a_ = std::max(peak_phase_a_, std::abs(x));
     torque += sample.torque_nm / periods_;
     const motor::Readings r = shunts_.read(sample);
     const double middle = start + motor_velocity * period / 2.0;
-    out_ = stage_.update({{r.current[0], r.current[1], r.current[2]}, r.bus, counter_at(middle)});
+    const bool was_enabled = out_.enabled;
+    out_ = stage_.update(
+        {{r.current[0], r.current[1], r.current[2]}, r.bus, faulty(counter_at(middle)), faults_.driver, thermistor()});
+    if (out_.clears_driver) faults_.driver = false;
+    ++periods_run_;
+    if (was_enabled && !out_.enabled) opened_at_ = periods_run_;
   }
   return torque / torque_constant_;
 }

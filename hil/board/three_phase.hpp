@@ -37,6 +37,26 @@ bool add_wiring_fault(ThreePhaseParameters& p, const std::string& name);
 /// What is in such a drive's memory once it was commissioned.
 firmware::ThreePhaseSettings three_phase_settings_of(const plant::Drive& drive);
 
+/// Faults of the power stage while it runs; each may come and go.
+struct StageFaults {
+  bool phase_open = false;  ///< the wire of leg a
+  bool phases_shorted = false;
+  bool phase_grounded = false;
+  bool bus_collapsed = false;
+  bool driver = false;  ///< until its reset line
+  bool thermistor_open = false;
+  bool thermistor_shorted = false;
+  bool brake_missing = false;
+  bool operator==(const StageFaults&) const = default;
+};
+/// What the stage's encoder shows while it runs.
+enum class StageEncoder { intact, held, jumped, halved, reversed };
+
+/// The protection of that stage: thermistor, brake resistor, bootstrap supplies, limits of the winding.
+firmware::ProtectionSettings protection_of(const plant::Drive& drive);
+/// Reading of the thermistor's divider at a temperature, 2^-15.
+std::int32_t thermistor_reading(double celsius);
+
 /// The amplifier of a three-phase drive: the firmware's stage on the twin's motor and power stage, several PWM periods
 /// a tick. Rotor and encoder are those of the mechanical plant.
 class ThreePhaseAmplifier {
@@ -57,12 +77,24 @@ class ThreePhaseAmplifier {
   /// The same, A.
   double current_a() const;
 
+  void set_faults(const StageFaults& faults);
+  void set_encoder(StageEncoder encoder);
+  void set_temperature_c(double celsius) { temperature_c_ = celsius; }
+  /// The largest current of a wire since then, with that of a short, A; sampled once a PWM period.
+  double peak_phase_a() const { return peak_phase_a_; }
+  void forget_peak() { peak_phase_a_ = 0.0; }
+  /// PWM periods until now, and the one in which the stage opened its switches last.
+  std::uint64_t periods() const { return periods_run_; }
+  std::uint64_t opened_at() const { return opened_at_; }
+
   firmware::ThreePhaseStage& stage() { return stage_; }
   motor::PowerStage& power() { return power_; }
   const ThreePhaseParameters& parameters() const { return p_; }
 
  private:
   std::uint32_t counter_at(double angle_rad);
+  std::uint32_t faulty(std::uint32_t counter);
+  std::int32_t thermistor() const;
 
   ThreePhaseParameters p_;
   double torque_constant_;
@@ -76,6 +108,14 @@ class ThreePhaseAmplifier {
   double slipped_turns_ = 0.0;
   double slip_from_turns_ = 0.0;
   bool began_ = false;
+  StageFaults faults_;
+  StageEncoder encoder_ = StageEncoder::intact;
+  std::uint32_t counter_ = 0;  // intact, of the last period
+  std::uint32_t counter_at_fault_ = 0;
+  double temperature_c_ = 30.0;
+  double peak_phase_a_ = 0.0;
+  std::uint64_t periods_run_ = 0;
+  std::uint64_t opened_at_ = 0;
 };
 
 }  // namespace flexspline::board

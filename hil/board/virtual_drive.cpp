@@ -13,10 +13,19 @@ void FrameHash::add(std::uint64_t words) {
   hash_ ^= hash_ >> 29U;
 }
 
+namespace {
+// Its application knows why the three-phase stage switched itself off.
+std::unique_ptr<Controller> own_controller(PlantRig& rig) {
+  auto controller = std::make_unique<SoftwareController>(rig.tick_hz());
+  if (rig.three_phase() != nullptr) controller->connect(rig.three_phase()->stage());
+  return controller;
+}
+}  // namespace
+
 VirtualDrive::VirtualDrive(const RigSetup& setup, const Block& block, const firmware::TelemetrySetup& telemetry,
                            std::unique_ptr<Controller> controller)
     : rig_(setup),
-      controller_(controller ? std::move(controller) : std::make_unique<SoftwareController>(setup.tick_hz)),
+      controller_(controller ? std::move(controller) : own_controller(rig_)),
       flash_(block),
       telemetry_(telemetry) {
   controller_->start(flash_, telemetry_, firmware::ResetCause::power);

@@ -30,6 +30,8 @@ struct InverterParameters {
   double supply_v = 48.0;
   double supply_resistance_ohm = 0.05;
   double bus_capacitance_f = 500e-6;
+  double brake_ohm = 0.0;         // of the brake resistor; zero: none
+  bool supply_takes_back = true;  // not: a rectifier or a battery switch between supply and bus
   double on_resistance_ohm = 0.004;
   double diode_drop_v = 0.8;
   double dead_time_s = 0.5e-6;

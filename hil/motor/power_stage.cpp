@@ -27,11 +27,21 @@ double falling_zero(const F& f, double most) {
 
 PowerStage::PowerStage(const MotorParameters& motor, const InverterParameters& inverter,
                        const SensorParameters& sensors, Fidelity fidelity, const WiringParameters& wiring)
-    : p_(inverter), sensors_(sensors), fidelity_(fidelity), wiring_(wiring), motor_(motor), bus_v_(inverter.supply_v) {
-  const bool open = wiring.open[0] || wiring.open[1] || wiring.open[2];
-  if (fidelity == Fidelity::switched && (open || wiring.short_ohm > 0.0 || wiring.ground_ohm > 0.0))
-    throw std::invalid_argument("open phases and shorts are in the averaged model only");
+    : p_(inverter), sensors_(sensors), fidelity_(fidelity), motor_(motor), bus_v_(inverter.supply_v) {
+  set_wiring(wiring);
   for (Leg& leg : legs_) leg.since_s = 1.0;
+}
+
+void PowerStage::set_wiring(const WiringParameters& wiring) {
+  const bool open = wiring.open[0] || wiring.open[1] || wiring.open[2];
+  if (fidelity_ == Fidelity::switched && (open || wiring.short_ohm > 0.0 || wiring.ground_ohm > 0.0))
+    throw std::invalid_argument("open phases and shorts are in the averaged model only");
+  wiring_ = wiring;
+}
+
+void PowerStage::rest(const Rotor& at) {
+  motor_.stop(at.angle + at.speed * period_s());
+  charge_bus(0.0, period_s());
 }
 
 Sample PowerStage::run(const Triple& duties, const Rotor& at) {
@@ -85,8 +95,12 @@ void PowerStage::step_motor(const Triple& leg_voltages, const Rotor& at, double 
 
 void PowerStage::charge_bus(double drawn_a, double dt) {
   // Implicit in its own voltage, so that a small capacitance stays stable.
-  const double g = dt / p_.bus_capacitance_f;
-  bus_v_ = (bus_v_ + g * (p_.supply_v / p_.supply_resistance_ohm - drawn_a)) / (1.0 + g / p_.supply_resistance_ohm);
+  const double g = dt / p_.bus_capacitance_f, braked = p_.brake_ohm > 0.0 ? g * brake_duty_ / p_.brake_ohm : 0.0;
+  const auto bus_with = [&](double supply_a, double supply_share) {
+    return (bus_v_ + g * (supply_a - drawn_a)) / (1.0 + supply_share + braked);
+  };
+  const double connected = bus_with(p_.supply_v / p_.supply_resistance_ohm, g / p_.supply_resistance_ohm);
+  bus_v_ = connected > p_.supply_v && !p_.supply_takes_back ? bus_with(0.0, 0.0) : connected;
 }
 
 // From when the low side carries the current, the amplifier follows with its time constant.

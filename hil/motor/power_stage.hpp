@@ -25,7 +25,14 @@ class PowerStage {
 
   /// Duties from 0 to 1; `at` is the rotor at the period's begin, its speed stands for the period.
   Sample run(const Triple& duties, const Rotor& at);
+  /// A period with all switches open: no current flows, the bus goes on.
+  void rest(const Rotor& at);
 
+  /// What changes while it runs. Duty of the brake resistor from 0 to 1; wiring: averaged model only.
+  void set_brake(double duty) { brake_duty_ = duty; }
+  void set_brake_ohm(double ohm) { p_.brake_ohm = ohm; }
+  void set_supply_v(double volt) { p_.supply_v = volt; }
+  void set_wiring(const WiringParameters& wiring);
   Motor& motor() { return motor_; }
   double bus_v() const { return bus_v_; }
   double period_s() const { return 1.0 / p_.pwm_hz; }
@@ -53,6 +60,7 @@ class PowerStage {
   Motor motor_;
   std::array<Leg, 3> legs_{};
   double bus_v_;
+  double brake_duty_ = 0.0;
 };
 
 }  // namespace flexspline::motor

@@ -110,7 +110,8 @@ void print(const DriveOptions& options, const ScenarioPlan& plan, const std::vec
     if (r.first_fault.fault == Fault::none) continue;
     const firmware::FaultInfo& info = firmware::info_of(r.first_fault.fault);
     fmt::print("compensation {}: fault {} at tick {}: {}; the drive {}\n", r.compensation ? "on" : "off", info.name,
-               r.first_fault.tick, info.reason,
+               r.first_fault.tick,
+               protocol::fault_text(static_cast<std::uint8_t>(r.first_fault.fault), r.first_fault.limit).reason,
                r.end.mode == firmware::Mode::position ? "goes on afterwards"
                : r.end.mode == firmware::Mode::fault  ? "is switched off"
                                                       : "comes to rest");

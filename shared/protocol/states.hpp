@@ -99,6 +99,24 @@ enum class Fault : std::uint8_t {
 };
 inline constexpr std::size_t kFaults = 25;
 
+// Why a three-phase power stage switched itself off: `fault_limit` of an amplifier_fault; zero where the amplifier does
+// not say why.
+enum class StageFault : std::uint8_t {
+  none,
+  sensor_zero,  // a current sensor's zero was out of range when it was last measured; before it switches on
+  bus_low,
+  bus_high,
+  overcurrent,  // of a phase
+  current_sum,  // the three currents do not add up to zero: a sensor, or a short to ground
+  driver,       // its gate driver reports a fault
+  hot,
+  thermistor_open,
+  thermistor_shorted,
+  phase_lost,
+  voltage_residual,  // voltages that the motor's model does not explain: a short, a wrong angle, another motor
+};
+inline constexpr std::uint32_t kStageFaults = 12;
+
 // Signals of telemetry. Values are of 2^-27 bases unless said otherwise.
 enum class Channel : std::uint8_t {
   state,           // mode, fault << 8, loops limited << 16

@@ -177,8 +177,42 @@ inline constexpr std::array<FaultText, kFaults> kFaultTexts{{
     {"amplifier_fault", "the amplifier switched itself off: its overcurrent protection or its supply tripped"},
     {"crashed", "the drive was reset by itself: an exception (a failure of firmware or memory), or its crystal died"},
 }};
+// Why a three-phase power stage switched itself off.
+inline constexpr std::array<FaultText, kStageFaults> kStageFaultTexts{{
+    {"none", "the amplifier switched itself off: its overcurrent protection or its supply tripped"},
+    {"sensor_zero", "a current sensor's zero is out of range: sensor or wire broken, or a current flows"},
+    {"bus_low", "the bus voltage is below its range: supply off, too weak or fuse blown"},
+    {"bus_high",
+     "the bus voltage is above its range: the motor gave back more than supply and brake resistor take, or the supply "
+     "is wrong"},
+    {"overcurrent",
+     "a phase's current is above the power stage's limit: phases shorted, or a current loop that swings"},
+    {"current_sum",
+     "the phase currents do not add up to zero: a phase is shorted to ground, or a current sensor broken"},
+    {"driver", "the gate driver reports a fault: a short, its supply, or a switch broken"},
+    {"hot", "the power stage is too hot"},
+    {"thermistor_open", "the power stage's thermistor is open: wire or part broken"},
+    {"thermistor_shorted", "the power stage's thermistor is shorted"},
+    {"phase_lost", "a phase carries no current: wire, connector or winding open"},
+    {"voltage_residual",
+     "the motor's voltages are not those of its currents and speed: phases shorted, the encoder shows a wrong angle, "
+     "or "
+     "another motor; run flexspline commission"},
+}};
+constexpr FaultText stage_fault_text(std::int32_t number) {
+  return number >= 0 && number < static_cast<std::int32_t>(kStageFaults)
+             ? kStageFaultTexts[static_cast<std::size_t>(number)]
+             : FaultText{"unknown", "the power stage switched itself off for a reason that this tool does not know"};
+}
+
 constexpr FaultText fault_text(std::uint8_t number) {
   return number < kFaults ? kFaultTexts[number] : FaultText{"unknown", "a fault that this tool does not know"};
+}
+// With what its limit says about it; the name stays that of the fault.
+constexpr FaultText fault_text(std::uint8_t number, std::int32_t limit) {
+  const FaultText text = fault_text(number);
+  const bool says_why = number == static_cast<std::uint8_t>(Fault::amplifier_fault) && limit != 0;
+  return says_why ? FaultText{text.name, stage_fault_text(limit).reason} : text;
 }
 
 // The base of a channel's numbers, in 2^-27; or another meaning of its word.

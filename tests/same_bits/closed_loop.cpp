@@ -16,6 +16,7 @@
 #include "hil/board/packed_model.cpp"
 #include "hil/board/plant_rig.cpp"
 #include "hil/board/scenario.cpp"
+#include "hil/board/stage_protection.cpp"
 #include "hil/board/three_phase.cpp"
 #include "hil/board/virtual_drive.cpp"
 #include "hil/motor/motor.cpp"

@@ -12,6 +12,7 @@
 #include "host/drive_link/deployment/commissioning_settings.hpp"
 #include "host/drive_link/drive/motor_block.hpp"
 #include "shared/control/drive_block.hpp"
+#include "shared/protocol/texts.hpp"
 #include "tests/support/pairing_host.hpp"
 #include "tests/support/service_host.hpp"
 
@@ -269,6 +270,28 @@ TEST(FirmwareCommissioning, IsRefusedWhileArmedInAFaultAndWithNumbersOutsideItsB
   bench.drive->run(100);
   ASSERT_EQ(bench.drive->status().mode, Mode::fault);
   EXPECT_EQ(bench.refusal(bench.begin(good)), Refusal::fault);
+}
+
+TEST(FirmwareCommissioning, AFaultOfThePowerStageEndsItAndIsNamed) {
+  const std::pair<board::Injection, firmware::StageFault> cases[] = {
+      {board::Injection::driver_fault, firmware::StageFault::driver},
+      {board::Injection::thermistor_open, firmware::StageFault::thermistor_open}};
+  for (const auto& [injection, named] : cases) {
+    Bench bench;
+    ASSERT_EQ(bench.begin(), Code::done);
+    bench.drive->run(5'000);
+    ASSERT_EQ(bench.progress().state, CommissioningState::runs);
+    bench.drive->rig().inject(injection);
+    bench.drive->run(firmware::periods_of(named) / 2 + 2);
+    EXPECT_FALSE(bench.stage().commissions());
+    EXPECT_EQ(bench.progress().state, CommissioningState::drive_fault);
+    const auto status = bench.ask<protocol::Status>(Kind::status);
+    EXPECT_EQ(status.mode, protocol::Mode::fault);
+    EXPECT_EQ(protocol::fault_text(status.fault).name, "amplifier_fault");
+    EXPECT_EQ(protocol::fault_text(status.fault, status.fault_limit).reason,
+              protocol::stage_fault_text(static_cast<std::int32_t>(named)).reason);
+    EXPECT_EQ(bench.refusal(bench.begin(begin_of(bench.setup()))), Refusal::fault);
+  }
 }
 
 // The switches open within a tick, whatever ends it, and the reason can be read.

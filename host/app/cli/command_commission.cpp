@@ -115,7 +115,7 @@ Failure failure_of(drive::Session& session, const protocol::CommissioningProgres
       return {"host_lost", "the drive heard nothing of this host for half a second",
               "check cable and load of the host"};
     case CommissioningState::drive_fault: {
-      const auto text = protocol::fault_text(session.status().fault);
+      const auto text = protocol::fault_text(session.status().fault, session.status().fault_limit);
       return {std::string(text.name), std::string(text.reason), "find the cause; disarming does not clear a fault"};
     }
     case CommissioningState::bus_high:

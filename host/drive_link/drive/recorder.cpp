@@ -366,7 +366,7 @@ void Recorder::require_idle() {
   }
   if (before.mode == protocol::Mode::fault)
     session_.fail(fmt::format("it is in the fault state: {}; find its cause, then record with --clear-fault",
-                              protocol::fault_text(before.fault).reason));
+                              protocol::fault_text(before.fault, before.fault_limit).reason));
   if (before.mode != protocol::Mode::idle)
     session_.fail(fmt::format("it is in mode {}, not idle; another program may have it", name_of(before.mode)));
 }
@@ -397,7 +397,7 @@ Recording Recorder::record(const planning::Run& run, const Watch& watch) {
     exchange.drain(after.tick);
     session_.subscribe({}, 1);
     if (!out.complete && out.ended.empty()) {
-      const protocol::FaultText fault = protocol::fault_text(after.fault);
+      const protocol::FaultText fault = protocol::fault_text(after.fault, after.fault_limit);
       out.ended = fmt::format("fault {}: {}", fault.name, fault.reason);
     }
   } catch (const std::exception&) {

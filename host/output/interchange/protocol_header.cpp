@@ -220,6 +220,9 @@ void write_numbers(Writer& w) {
   w.title("Faults");
   for (std::uint8_t fault = 0; fault < kFaults; ++fault)
     w.number(fmt::format("FAULT_{}", fault_text(fault).name), fault, fault_text(fault).reason);
+  w.title("Why a three-phase power stage switched itself off: the limit of an amplifier_fault");
+  w.numbers<StageFault>("STAGE_FAULT",
+                        [](StageFault fault) { return stage_fault_text(static_cast<std::int32_t>(fault)).reason; });
 }
 
 void write_commissioning_payloads(Writer& w) {
