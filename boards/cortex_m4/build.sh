@@ -1,5 +1,6 @@
 #!/bin/sh
 # build.sh OUT_DIR NAME SCRIPT.ld SOURCE...: builds OUT_DIR/NAME.elf, .bin and .map for a Cortex-M4; flags in FLAGS.
+# EFFECTS="coulomb_friction,torque_ripple": only these effects of shared/effects; default: all that run on a drive.
 # FOR=speed for an application, whose tick has to be fast; otherwise it optimises for size, as for a boot loader. Exit 3 where there is no ARM compiler.
 set -eu
 here=$(cd -- "$(dirname -- "$0")" && pwd)
@@ -12,6 +13,7 @@ command -v "$compiler" >/dev/null || {
   exit 3
 }
 mkdir -p "$out"
+[ -z "${EFFECTS:-}" ] || FLAGS="${FLAGS:-} -DFLEXSPLINE_EFFECTS=\"$EFFECTS\""
 new=$out/$name.elf.new
 # Link-time optimisation; without scheduling, which needs registers and gains little on these processors. Without copies of
 # functions for constant arguments for size; for speed without partial redundancy elimination, conditional instructions and

@@ -1,5 +1,5 @@
 #!/bin/sh
-# Builds the image: build.sh OUT_DIR. Exit 3 where there is no ARM compiler.
+# Builds the image: build.sh OUT_DIR; the effects of EFFECTS, separated by commas (default: all that run on a drive). Exit 3 where there is no ARM compiler.
 set -eu
 out=${1:?usage: build.sh OUT_DIR}
 here=$(cd -- "$(dirname -- "$0")" && pwd)

@@ -4,6 +4,7 @@
 # behind it, the application ends the pairing of a drive whose key is lost, at its start. Default: all, and dac-forget.
 # Exit 3 where there is no ARM compiler.
 # FLEXSPLINE_PUBLIC_KEY: the key of images, 64 digits of `flexspline key --show` (default: the public development key).
+# EFFECTS: the effects that the application runs, separated by commas (default: all that run on a drive).
 # FLEXSPLINE_DFU_UPLOAD=1: a host may read the firmware.
 set -eu
 out=${1:?usage: build.sh OUT_DIR [VARIANT...]}

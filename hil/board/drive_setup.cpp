@@ -43,7 +43,7 @@ double output_inertia_of(const plant::Drive& drive) {
 
 template <class Effect>
 void add_all(const plant::Drive& drive, const effects::DriveConstants<double>& d,
-             model::DriveModel<N, model::EveryFormula>& model) {
+             model::DriveModel<N, model::ImageEffects>& model) {
   // Errors of sensors do not act on a shaft.
   for (const std::string_view of_sensor :
        {"torsion_zero", "torque_offset", "torque_sensor_gain", "torque_sensor_ripple"})

@@ -178,7 +178,7 @@ struct DriveSettings : GeneralSettings, RateSettings, TorsionSettings<N>, Sensor
 
 template <class N>
 struct DriveParameters : DriveSettings<N> {
-  model::DriveModel<N, model::EveryFormula> model{};
+  model::DriveModel<N, model::ImageEffects> model{};
 };
 
 }  // namespace flexspline::control

@@ -28,9 +28,15 @@ struct AngleDependentFriction : Stateless {
   };
   // An order of 1/N is one a turn of the output.
   static constexpr ParameterInfo kParameters[] = {
-      {.name = "order", .unit = units::kNone, .kind = Kind::given, .usual = 2.0, .low = 0.001, .high = 1000.0},
-      {.name = "cosine", .unit = units::kTorque, .usual = 0.006},
-      {.name = "sine", .unit = units::kTorque, .usual = 0.0},
+      {.name = "order",
+       .symbol = "k",
+       .unit = units::kNone,
+       .kind = Kind::given,
+       .usual = 2.0,
+       .low = 0.001,
+       .high = 1000.0},
+      {.name = "cosine", .symbol = "a", .unit = units::kTorque, .usual = 0.006},
+      {.name = "sine", .symbol = "b", .unit = units::kTorque, .usual = 0.0},
   };
   template <class N>
   struct Coefficients {

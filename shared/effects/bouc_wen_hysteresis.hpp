@@ -28,7 +28,7 @@ struct BoucWenHysteresis {
           "amplitudes against other laws of hysteresis",
   };
   static constexpr ParameterInfo kParameters[] = {
-      {.name = "stiffness", .unit = units::kStiffness, .usual = 5000.0, .low = 0.0},
+      {.name = "stiffness", .symbol = "kz", .unit = units::kStiffness, .usual = 5000.0, .low = 0.0},
       {.name = "beta",
        .unit = units::kNone,
        .kind = Kind::nonlinear,
@@ -43,7 +43,13 @@ struct BoucWenHysteresis {
        .low = -0.5,
        .high = 1.0,
        .per = "beta"},
-      {.name = "exponent", .unit = units::kNone, .kind = Kind::nonlinear, .usual = 1.0, .low = 1.0, .high = 3.0},
+      {.name = "exponent",
+       .symbol = "n",
+       .unit = units::kNone,
+       .kind = Kind::nonlinear,
+       .usual = 1.0,
+       .low = 1.0,
+       .high = 3.0},
   };
   template <class N>
   struct Coefficients {

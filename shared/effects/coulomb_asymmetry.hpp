@@ -27,7 +27,7 @@ struct CoulombAsymmetry : Stateless {
       .runs_always = true,
   };
   static constexpr ParameterInfo kParameters[] = {
-      {.name = "torque", .unit = units::kTorque, .usual = 1e-3},
+      {.name = "torque", .symbol = "dTs", .unit = units::kTorque, .usual = 1e-3},
   };
   template <class N>
   struct Coefficients {

@@ -24,7 +24,7 @@ struct CoulombFriction : Stateless {
       .runs_always = true,
   };
   static constexpr ParameterInfo kParameters[] = {
-      {.name = "torque", .unit = units::kTorque, .usual = 0.045, .low = 0.0},
+      {.name = "torque", .symbol = "Ts", .unit = units::kTorque, .usual = 0.045, .low = 0.0},
   };
   template <class N>
   struct Coefficients {

@@ -23,7 +23,7 @@ struct CubicStiffness : Stateless {
       .separated_by = "two multi-sines: a small amplitude about zero, and one up to the peak torque",
   };
   static constexpr ParameterInfo kParameters[] = {
-      {.name = "stiffness", .unit = {"N*m/rad^3", "N/m^3"}, .usual = 3e8},
+      {.name = "stiffness", .symbol = "K3", .unit = {"N*m/rad^3", "N/m^3"}, .usual = 3e8},
   };
   template <class N>
   struct Coefficients {

@@ -24,7 +24,13 @@ struct CurrentDelay {
       .separated_by = "motion at several frequencies up to the current loop's bandwidth",
   };
   static constexpr ParameterInfo kParameters[] = {
-      {.name = "delay", .unit = units::kTime, .kind = Kind::nonlinear, .usual = 1e-3, .low = 1e-6, .high = 0.02},
+      {.name = "delay",
+       .symbol = "d",
+       .unit = units::kTime,
+       .kind = Kind::nonlinear,
+       .usual = 1e-3,
+       .low = 1e-6,
+       .high = 0.02},
   };
   template <class N>
   struct Coefficients {

@@ -20,7 +20,7 @@ struct CurrentOffset : Stateless {
       .separated_by = "a record with the drive off",
   };
   static constexpr ParameterInfo kParameters[] = {
-      {.name = "current", .unit = units::kCurrent, .usual = 0.05},
+      {.name = "current", .symbol = "i0", .unit = units::kCurrent, .usual = 0.05},
   };
   template <class N>
   struct Coefficients {

@@ -23,6 +23,7 @@ struct CurrentSaturation : Stateless {
   };
   static constexpr ParameterInfo kParameters[] = {
       {.name = "limit",
+       .symbol = "sat",
        .unit = units::kCurrent,
        .kind = Kind::nonlinear,
        .usual = 3.0,

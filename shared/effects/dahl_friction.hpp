@@ -25,7 +25,7 @@ struct DahlFriction : DahlBristle {
       .surface = "dry friction",
   };
   static constexpr ParameterInfo kParameters[] = {
-      {.name = "torque", .unit = units::kTorque, .usual = 0.045, .low = 0.0},
+      {.name = "torque", .symbol = "Ts", .unit = units::kTorque, .usual = 0.045, .low = 0.0},
       {.name = "presliding",
        .unit = units::kAngle,
        .kind = Kind::nonlinear,

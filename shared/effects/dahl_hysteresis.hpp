@@ -29,15 +29,22 @@ struct DahlHysteresis {
           "amplitudes against other laws of hysteresis",
   };
   static constexpr ParameterInfo kParameters[] = {
-      {.name = "torque", .unit = units::kTorque, .usual = 2.0, .low = 0.0},
+      {.name = "torque", .symbol = "Tc", .unit = units::kTorque, .usual = 2.0, .low = 0.0},
       {.name = "stiffness",
+       .symbol = "sigma",
        .unit = units::kStiffness,
        .kind = Kind::nonlinear,
        .usual = 5000.0,
        .low = 1e-9,
        .limit = Limit::inverse_torsion,
        .per = "torque"},
-      {.name = "exponent", .unit = units::kNone, .kind = Kind::nonlinear, .usual = 1.0, .low = 0.5, .high = 4.0},
+      {.name = "exponent",
+       .symbol = "i",
+       .unit = units::kNone,
+       .kind = Kind::nonlinear,
+       .usual = 1.0,
+       .low = 0.5,
+       .high = 4.0},
   };
   template <class N>
   struct Coefficients {

@@ -31,9 +31,10 @@ struct DrivingDependentLoss : DahlBristle {
       .contains = "load_dependent_friction",
   };
   static constexpr ParameterInfo kParameters[] = {
-      {.name = "driving", .unit = units::kNone, .usual = 0.08, .low = 0.0, .high = 1.0},
-      {.name = "driven", .unit = units::kNone, .usual = 0.04, .low = 0.0, .high = 1.0},
+      {.name = "driving", .symbol = "d1", .unit = units::kNone, .usual = 0.08, .low = 0.0, .high = 1.0},
+      {.name = "driven", .symbol = "d2", .unit = units::kNone, .usual = 0.04, .low = 0.0, .high = 1.0},
       {.name = "presliding",
+       .symbol = "h",
        .unit = units::kAngle,
        .kind = Kind::nonlinear,
        .usual = 0.05,

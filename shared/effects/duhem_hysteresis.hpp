@@ -29,12 +29,13 @@ struct DuhemHysteresis {
   };
   static constexpr ParameterInfo kParameters[] = {
       {.name = "rate",
+       .symbol = "a",
        .unit = units::kPerAngle,
        .kind = Kind::nonlinear,
        .usual = 2500.0,
        .low = 1e-9,
        .limit = Limit::inverse_torsion},
-      {.name = "stiffness", .unit = units::kStiffness, .usual = 11300.0},
+      {.name = "stiffness", .symbol = "b", .unit = units::kStiffness, .usual = 11300.0},
       {.name = "phi_0", .unit = units::kTorque, .usual = 0.0},
       {.name = "phi_1", .unit = units::kStiffness, .usual = 6300.0},
       {.name = "phi_2", .unit = {"N*m/rad^2", "N/m^2"}, .usual = 0.0},

@@ -79,6 +79,7 @@ inline constexpr double kUnbounded = std::numeric_limits<double>::infinity();
 
 struct ParameterInfo {
   std::string_view name{};
+  std::string_view symbol{};  // its letter in `equation`; empty where that is its name
   Unit unit{};
   Kind kind = Kind::linear;
   double usual = 0.0;  // on a drive of the report's class (N = 100, 40 N m, 0.15 N m motor)

@@ -21,7 +21,7 @@ struct Inertia : Stateless {
       .runs_always = true,
   };
   static constexpr ParameterInfo kParameters[] = {
-      {.name = "inertia", .unit = units::kInertia, .usual = 1.0e-4, .low = 0.0},
+      {.name = "inertia", .symbol = "J", .unit = units::kInertia, .usual = 1.0e-4, .low = 0.0},
   };
   template <class N>
   struct Coefficients {

@@ -29,7 +29,13 @@ struct KinematicError : Stateless {
       .adds_to = on(Balance::motor),
   };
   static constexpr ParameterInfo kParameters[] = {
-      {.name = "order", .unit = units::kNone, .kind = Kind::given, .usual = 2.0, .low = 0.01, .high = 1000.0},
+      {.name = "order",
+       .symbol = "k",
+       .unit = units::kNone,
+       .kind = Kind::given,
+       .usual = 2.0,
+       .low = 0.01,
+       .high = 1000.0},
       {.name = "cosine", .unit = units::kAngle, .kind = Kind::nonlinear, .usual = 4e-5, .limit = Limit::torsion},
       {.name = "sine", .unit = units::kAngle, .kind = Kind::nonlinear, .usual = 0.0, .limit = Limit::torsion},
   };

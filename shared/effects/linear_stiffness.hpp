@@ -23,7 +23,7 @@ struct LinearStiffness : Stateless {
       .runs_always = true,
   };
   static constexpr ParameterInfo kParameters[] = {
-      {.name = "stiffness", .unit = units::kStiffness, .usual = 6.3e3, .low = 0.0},
+      {.name = "stiffness", .symbol = "K1", .unit = units::kStiffness, .usual = 6.3e3, .low = 0.0},
   };
   template <class N>
   struct Coefficients {

@@ -25,7 +25,7 @@ struct LoadDependentFriction : Stateless {
           "a constant external load in both directions at low current; a slow free triangle against Stribeck",
   };
   static constexpr ParameterInfo kParameters[] = {
-      {.name = "coefficient", .unit = units::kNone, .usual = 0.03, .low = 0.0, .high = 1.0},
+      {.name = "coefficient", .symbol = "mu", .unit = units::kNone, .usual = 0.03, .low = 0.0, .high = 1.0},
   };
   template <class N>
   struct Coefficients {

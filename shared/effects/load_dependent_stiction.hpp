@@ -27,8 +27,9 @@ struct LoadDependentStiction : Stateless {
           "under that load",
   };
   static constexpr ParameterInfo kParameters[] = {
-      {.name = "coefficient", .unit = units::kNone, .usual = 0.05, .low = 0.0, .high = 1.0},
+      {.name = "coefficient", .symbol = "mu", .unit = units::kNone, .usual = 0.05, .low = 0.0, .high = 1.0},
       {.name = "velocity",
+       .symbol = "vs",
        .unit = units::kVelocity,
        .kind = Kind::nonlinear,
        .usual = 3.0,

@@ -21,9 +21,15 @@ struct LoadScaledRipple : Stateless {
       .separated_by = "slow constant speed over many turns at two loads, with an output encoder",
   };
   static constexpr ParameterInfo kParameters[] = {
-      {.name = "order", .unit = units::kNone, .kind = Kind::given, .usual = 2.0, .low = 0.01, .high = 1000.0},
-      {.name = "cosine", .unit = units::kNone, .usual = 5e-4},
-      {.name = "sine", .unit = units::kNone, .usual = 0.0},
+      {.name = "order",
+       .symbol = "k",
+       .unit = units::kNone,
+       .kind = Kind::given,
+       .usual = 2.0,
+       .low = 0.01,
+       .high = 1000.0},
+      {.name = "cosine", .symbol = "a", .unit = units::kNone, .usual = 5e-4},
+      {.name = "sine", .symbol = "b", .unit = units::kNone, .usual = 0.0},
   };
   template <class N>
   struct Coefficients {

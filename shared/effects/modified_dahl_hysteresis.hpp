@@ -26,8 +26,9 @@ struct ModifiedDahlHysteresis {
           "amplitudes against other laws of hysteresis",
   };
   static constexpr ParameterInfo kParameters[] = {
-      {.name = "torque", .unit = units::kTorque, .usual = 2.0, .low = 0.0},
+      {.name = "torque", .symbol = "Tc", .unit = units::kTorque, .usual = 2.0, .low = 0.0},
       {.name = "stiffness",
+       .symbol = "sigma",
        .unit = units::kStiffness,
        .kind = Kind::nonlinear,
        .usual = 5000.0,

@@ -25,7 +25,7 @@ struct OutputCoulombFriction : Stateless {
       .runs_always = true,
   };
   static constexpr ParameterInfo kParameters[] = {
-      {.name = "torque", .unit = units::kTorque, .usual = 0.6, .low = 0.0},
+      {.name = "torque", .symbol = "Ts3", .unit = units::kTorque, .usual = 0.6, .low = 0.0},
   };
   template <class N>
   struct Coefficients {

@@ -20,7 +20,7 @@ struct OutputInertia : Stateless {
       .runs_always = true,
   };
   static constexpr ParameterInfo kParameters[] = {
-      {.name = "inertia", .unit = units::kInertia, .usual = 0.06, .low = 0.0},
+      {.name = "inertia", .symbol = "Jo", .unit = units::kInertia, .usual = 0.06, .low = 0.0},
   };
   template <class N>
   struct Coefficients {

@@ -21,7 +21,7 @@ struct OutputViscousFriction : Stateless {
       .runs_always = true,
   };
   static constexpr ParameterInfo kParameters[] = {
-      {.name = "coefficient", .unit = units::kViscous, .usual = 0.5, .low = 0.0},
+      {.name = "coefficient", .symbol = "Tv3", .unit = units::kViscous, .usual = 0.5, .low = 0.0},
   };
   template <class N>
   struct Coefficients {

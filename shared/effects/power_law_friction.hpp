@@ -23,8 +23,14 @@ struct PowerLawFriction : Stateless {
       .surface = "viscous friction",
   };
   static constexpr ParameterInfo kParameters[] = {
-      {.name = "torque", .unit = units::kTorque, .usual = 0.02, .low = 0.0},
-      {.name = "exponent", .unit = units::kNone, .kind = Kind::nonlinear, .usual = 0.4, .low = 0.15, .high = 0.85},
+      {.name = "torque", .symbol = "c", .unit = units::kTorque, .usual = 0.02, .low = 0.0},
+      {.name = "exponent",
+       .symbol = "d",
+       .unit = units::kNone,
+       .kind = Kind::nonlinear,
+       .usual = 0.4,
+       .low = 0.15,
+       .high = 0.85},
   };
   template <class N>
   struct Coefficients {

@@ -19,7 +19,7 @@ struct QuadraticDrag : Stateless {
       .separated_by = "steady motion at five or more speeds from slow to rated",
   };
   static constexpr ParameterInfo kParameters[] = {
-      {.name = "coefficient", .unit = {"N*m*s^2/rad^2", "N*s^2/m^2"}, .usual = 4e-7, .low = 0.0},
+      {.name = "coefficient", .symbol = "c", .unit = {"N*m*s^2/rad^2", "N*s^2/m^2"}, .usual = 4e-7, .low = 0.0},
   };
   template <class N>
   struct Coefficients {

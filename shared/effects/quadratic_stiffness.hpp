@@ -23,7 +23,7 @@ struct QuadraticStiffness : Stateless {
       .separated_by = "large and small sines of torque about zero in locked load",
   };
   static constexpr ParameterInfo kParameters[] = {
-      {.name = "stiffness", .unit = {"N*m/rad^2", "N/m^2"}, .usual = 4e5},
+      {.name = "stiffness", .symbol = "K2", .unit = {"N*m/rad^2", "N/m^2"}, .usual = 4e5},
   };
   template <class N>
   struct Coefficients {

@@ -31,9 +31,10 @@ struct StribeckGaussian : Stateless {
       .wide_negative_is = "power_law_friction",
   };
   static constexpr ParameterInfo kParameters[] = {
-      {.name = "amplitude_positive", .unit = units::kTorque, .usual = 0.012},
-      {.name = "amplitude_negative", .unit = units::kTorque, .usual = 0.012},
+      {.name = "amplitude_positive", .symbol = "F (forward)", .unit = units::kTorque, .usual = 0.012},
+      {.name = "amplitude_negative", .symbol = "F (backward)", .unit = units::kTorque, .usual = 0.012},
       {.name = "velocity",
+       .symbol = "vs",
        .unit = units::kVelocity,
        .kind = Kind::nonlinear,
        .usual = 3.0,

@@ -24,9 +24,10 @@ struct StribeckHessSoom : Stateless {
       .negative_means = "friction rises out of standstill, so that slow motion starts smoothly",
   };
   static constexpr ParameterInfo kParameters[] = {
-      {.name = "amplitude_positive", .unit = units::kTorque, .usual = 0.012},
-      {.name = "amplitude_negative", .unit = units::kTorque, .usual = 0.012},
+      {.name = "amplitude_positive", .symbol = "F (forward)", .unit = units::kTorque, .usual = 0.012},
+      {.name = "amplitude_negative", .symbol = "F (backward)", .unit = units::kTorque, .usual = 0.012},
       {.name = "velocity",
+       .symbol = "vs",
        .unit = units::kVelocity,
        .kind = Kind::nonlinear,
        .usual = 3.0,

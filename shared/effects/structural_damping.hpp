@@ -22,8 +22,14 @@ struct StructuralDamping : Stateless {
       .separated_by = "the same torsion amplitude at a second frequency",
   };
   static constexpr ParameterInfo kParameters[] = {
-      {.name = "torque", .unit = units::kTorque, .usual = 57.0, .low = 0.0},
-      {.name = "exponent", .unit = units::kNone, .kind = Kind::nonlinear, .usual = 0.5, .low = 0.1, .high = 1.0},
+      {.name = "torque", .symbol = "c", .unit = units::kTorque, .usual = 57.0, .low = 0.0},
+      {.name = "exponent",
+       .symbol = "alpha",
+       .unit = units::kNone,
+       .kind = Kind::nonlinear,
+       .usual = 0.5,
+       .low = 0.1,
+       .high = 1.0},
   };
   template <class N>
   struct Coefficients {

@@ -23,6 +23,7 @@ struct TemperatureCoulomb : Stateless {
   };
   static constexpr ParameterInfo kParameters[] = {
       {.name = "coefficient",
+       .symbol = "b",
        .unit = units::kPerKelvin,
        .kind = Kind::nonlinear,
        .usual = 0.005,

@@ -19,7 +19,7 @@ struct TorqueBias : Stateless {
       .separated_by = "a record with the drive off",
   };
   static constexpr ParameterInfo kParameters[] = {
-      {.name = "torque", .unit = units::kTorque, .usual = 0.003},
+      {.name = "torque", .symbol = "tau0", .unit = units::kTorque, .usual = 0.003},
   };
   template <class N>
   struct Coefficients {

@@ -23,7 +23,7 @@ struct TorqueConstantError : Stateless {
       .separated_by = "a known inertia or weight at the output, or the back EMF at a known speed",
   };
   static constexpr ParameterInfo kParameters[] = {
-      {.name = "ratio", .unit = units::kNone, .usual = 0.2, .low = -0.5, .high = 0.5},
+      {.name = "ratio", .symbol = "kappa", .unit = units::kNone, .usual = 0.2, .low = -0.5, .high = 0.5},
   };
   template <class N>
   struct Coefficients {

@@ -21,7 +21,7 @@ struct TorqueConstantSaturation : Stateless {
       .separated_by = "a constant external load in both directions at low current",
   };
   static constexpr ParameterInfo kParameters[] = {
-      {.name = "coefficient", .unit = {"1/A^2", "1/A^2"}, .usual = 5e-3, .low = 0.0},
+      {.name = "coefficient", .symbol = "k3", .unit = {"1/A^2", "1/A^2"}, .usual = 5e-3, .low = 0.0},
   };
   template <class N>
   struct Coefficients {

@@ -22,7 +22,7 @@ struct TorqueOffset : Stateless {
       .adds_to = on(Balance::motor) | on(Balance::load),
   };
   static constexpr ParameterInfo kParameters[] = {
-      {.name = "torque", .unit = units::kTorque, .usual = 0.2},
+      {.name = "torque", .symbol = "T0", .unit = units::kTorque, .usual = 0.2},
   };
   template <class N>
   struct Coefficients {

@@ -23,8 +23,9 @@ struct TorqueProportionalHysteresis {
       .separated_by = "loops of small amplitude at no load and at half the rated torque",
   };
   static constexpr ParameterInfo kParameters[] = {
-      {.name = "torque", .unit = units::kTorque, .usual = 0.5, .low = 0.0},
+      {.name = "torque", .symbol = "c0", .unit = units::kTorque, .usual = 0.5, .low = 0.0},
       {.name = "ratio",
+       .symbol = "c1",
        .unit = units::kNone,
        .kind = Kind::nonlinear,
        .usual = 0.05,
@@ -32,6 +33,7 @@ struct TorqueProportionalHysteresis {
        .limit = Limit::inverse_torque,
        .per = "torque"},
       {.name = "stiffness",
+       .symbol = "sigma",
        .unit = units::kStiffness,
        .kind = Kind::nonlinear,
        .usual = 5000.0,

@@ -23,9 +23,15 @@ struct TorqueRipple : Stateless {
       .separated_by = "slow constant speed over many turns, then the same at a second load",
   };
   static constexpr ParameterInfo kParameters[] = {
-      {.name = "order", .unit = units::kNone, .kind = Kind::given, .usual = 2.0, .low = 0.01, .high = 1000.0},
-      {.name = "cosine", .unit = units::kTorque, .usual = 0.004},
-      {.name = "sine", .unit = units::kTorque, .usual = 0.0},
+      {.name = "order",
+       .symbol = "k",
+       .unit = units::kNone,
+       .kind = Kind::given,
+       .usual = 2.0,
+       .low = 0.01,
+       .high = 1000.0},
+      {.name = "cosine", .symbol = "a", .unit = units::kTorque, .usual = 0.004},
+      {.name = "sine", .symbol = "b", .unit = units::kTorque, .usual = 0.0},
   };
   template <class N>
   struct Coefficients {

@@ -26,9 +26,15 @@ struct TorqueSensorRipple : Stateless {
       .adds_to = on(Balance::motor) | on(Balance::load),
   };
   static constexpr ParameterInfo kParameters[] = {
-      {.name = "order", .unit = units::kNone, .kind = Kind::given, .usual = 2.0, .low = 0.01, .high = 1000.0},
-      {.name = "cosine", .unit = units::kTorque, .usual = 0.3},
-      {.name = "sine", .unit = units::kTorque, .usual = 0.0},
+      {.name = "order",
+       .symbol = "k",
+       .unit = units::kNone,
+       .kind = Kind::given,
+       .usual = 2.0,
+       .low = 0.01,
+       .high = 1000.0},
+      {.name = "cosine", .symbol = "a", .unit = units::kTorque, .usual = 0.3},
+      {.name = "sine", .symbol = "b", .unit = units::kTorque, .usual = 0.0},
   };
   template <class N>
   struct Coefficients {

@@ -25,7 +25,7 @@ struct ViscousAsymmetry : Stateless {
       .runs_always = true,
   };
   static constexpr ParameterInfo kParameters[] = {
-      {.name = "coefficient", .unit = units::kViscous, .usual = 1e-5},
+      {.name = "coefficient", .symbol = "dTv", .unit = units::kViscous, .usual = 1e-5},
   };
   template <class N>
   struct Coefficients {

@@ -21,7 +21,7 @@ struct ViscousFriction : Stateless {
       .runs_always = true,
   };
   static constexpr ParameterInfo kParameters[] = {
-      {.name = "coefficient", .unit = units::kViscous, .usual = 3.6e-4, .low = 0.0},
+      {.name = "coefficient", .symbol = "Tv", .unit = units::kViscous, .usual = 3.6e-4, .low = 0.0},
   };
   template <class N>
   struct Coefficients {

@@ -5,6 +5,7 @@
 #include <cstddef>
 #include <cstdint>
 #include <cstring>
+#include <string_view>
 #include <type_traits>
 #include <utility>
 
@@ -32,6 +33,63 @@ struct EveryEffect {
 struct EveryFormula : EveryEffect {
   static constexpr bool kTables = false;
 };
+namespace detail {
+constexpr std::string_view name_of(std::size_t number) {
+  std::string_view name;
+  effects::for_each_effect([&]<class Effect>(std::size_t id) {
+    if (id == number) name = Effect::kInfo.name;
+  });
+  return name;
+}
+// Visits the names of a list, "coulomb_friction,torque_ripple".
+template <class Visit>
+constexpr void for_each_name(std::string_view list, Visit&& visit) {
+  while (!list.empty()) {
+    const std::size_t comma = list.find(',');
+    visit(list.substr(0, comma));
+    list = comma == std::string_view::npos ? std::string_view{} : list.substr(comma + 1);
+  }
+}
+constexpr bool is_named(std::string_view list, std::string_view name) {
+  bool found = false;
+  for_each_name(list, [&](std::string_view one) { found = found || one == name; });
+  return found;
+}
+// How many names of the list a drive cannot run: misspelt, or too large.
+constexpr std::size_t unknown_names(std::string_view list) {
+  std::size_t unknown = 0;
+  for_each_name(list, [&](std::string_view one) {
+    bool known = false;
+    effects::for_each_effect([&]<class Effect>(std::size_t) {
+      known = known || (Effect::kInfo.name == one && !Effect::kInfo.host_only && !Effect::kInfo.user_defined);
+    });
+    unknown += known ? 0 : 1;
+  });
+  return unknown;
+}
+}  // namespace detail
+
+// The effects that `List::kNames` names, separated by commas; a tick checks for each whether it is present. A name that
+// no effect of a drive has does not compile.
+template <class List>
+struct NamedEffects : EveryFormula {
+  static_assert(detail::unknown_names(List::kNames) == 0,
+                "FLEXSPLINE_EFFECTS: a name that no effect has, or none that runs on a drive");
+  static constexpr std::size_t places(std::size_t number, std::size_t most) {
+    return detail::is_named(List::kNames, detail::name_of(number)) ? most : 0;
+  }
+};
+
+// What this image runs: all formulas, or those that its build names, which saves flash and memory.
+#if defined(FLEXSPLINE_EFFECTS)
+struct EffectsOfBuild {
+  static constexpr std::string_view kNames = FLEXSPLINE_EFFECTS;
+};
+using ImageEffects = NamedEffects<EffectsOfBuild>;
+#else
+using ImageEffects = EveryFormula;
+#endif
+
 // The effects of these numbers, as often as each is listed. A tick runs all of them without a check: an effect that is
 // not in the block has coefficients of zero and no influence.
 template <std::size_t... Numbers>

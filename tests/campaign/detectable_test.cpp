@@ -86,7 +86,8 @@ TEST(Detectable, EffectsHalfAsLargeAgainAreNamedAndAThirdOfThemAreNot) {
   const std::vector<std::string> labels =
       testing::part_of({"viscous_asymmetry", "coulomb_asymmetry", "stribeck_gaussian", "load_dependent_friction",
                         "power_law_friction", "gravity", "current_offset", "torque_ripple:2",
-                        "torque_constant_saturation", "cubic_stiffness", "backlash", "quadratic_drag"});
+                        "torque_constant_saturation", "cubic_stiffness", "backlash", "quadratic_drag"},
+                       3, 1);
   constexpr int kSeeds = 1;
   std::vector<Shown> all(labels.size());
   std::atomic<std::size_t> next{0};

@@ -18,11 +18,12 @@ Number in_campaign(Number of_test, Number of_whole) {
   return whole_campaigns() ? of_whole : of_test;
 }
 
-// Every second case, or all.
-inline std::vector<std::string> part_of(const std::vector<std::string>& all) {
+// One case of `of`, from the case `first` on; or all. Tests that begin with another case share the cases between them.
+inline std::vector<std::string> part_of(const std::vector<std::string>& all, std::size_t of = 2,
+                                        std::size_t first = 0) {
   if (whole_campaigns()) return all;
   std::vector<std::string> part;
-  for (std::size_t i = 0; i < all.size(); i += 2) part.push_back(all[i]);
+  for (std::size_t i = first; i < all.size(); i += of) part.push_back(all[i]);
   return part;
 }
 

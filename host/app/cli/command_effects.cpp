@@ -58,6 +58,7 @@ json entry_json(const Entry& entry) {
   json parameters = json::array();
   for (const effects::ParameterInfo& p : entry.parameters)
     parameters.push_back({{"parameter", p.name},
+                          {"symbol", p.symbol.empty() ? p.name : p.symbol},
                           {"unit", p.unit.rotary},
                           {"unit_linear", p.unit.linear},
                           {"kind", kind_name(p.kind)},
@@ -67,6 +68,7 @@ json entry_json(const Entry& entry) {
   json confused = json::array();
   for (const std::string_view name : catalogue::confused_with(entry)) confused.push_back(name);
   return {{"name", entry.name()},
+          {"number", entry.id},
           {"balance", output::balance_name(entry.info->balance)},
           {"phase", phase_name(entry.info->phase)},
           {"equation", entry.info->equation},
@@ -78,6 +80,9 @@ json entry_json(const Entry& entry) {
           {"causes", entry.info->causes},
           {"check", entry.info->check},
           {"separated_by", entry.info->separated_by},
+          {"replaces", catalogue::split_names(entry.info->replaces)},
+          {"modulates", entry.info->modulates},
+          {"host_only", entry.info->host_only},
           {"rivals", std::move(confused)},
           {"curve", output::curve_json(output::effect_curve(entry))}};
 }
@@ -93,15 +98,15 @@ void describe(const Entry& entry, Console& console) {
   console.line();
   console.line(
       output::wrapped(fmt::format("On the {} balance: {}", output::balance_name(info.balance), info.equation)));
-  output::Table table({"parameter", "unit", "(linear axis)", "", "usual"}, "llllr");
+  output::Table table({"parameter", "", "unit", "(linear axis)", "", "usual"}, "lllllr");
   for (const effects::ParameterInfo& p : entry.parameters) {
     const char* how = p.kind == effects::Kind::linear      ? "estimated"
                       : p.kind == effects::Kind::nonlinear ? "estimated, a nonlinear parameter: searched for"
                       : p.kind == effects::Kind::grid
                           ? "set from the range of the data where the model does not state it"
                           : "stated by you";
-    table.row(
-        {std::string(p.name), std::string(p.unit.rotary), std::string(p.unit.linear), how, output::number(p.usual)});
+    table.row({std::string(p.name), std::string(p.symbol), std::string(p.unit.rotary), std::string(p.unit.linear), how,
+               output::number(p.usual)});
   }
   console.line(table.text_within(output::line_width()));
   console.line();
