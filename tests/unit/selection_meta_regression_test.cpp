@@ -181,7 +181,8 @@ TEST(PermutationTest, FindsALawAndSeldomOneThatIsNotThere) {
   for (unsigned seed = 0; seed < 100; ++seed) {
     const Records with(20, 0.8, seed), without(20, 0.0, 1000 + seed);
     found += permutation_p_value(exact(with.theta), {with.added}, {all_of(exact(with.theta))}, 1000, seed) <= 0.01;
-    wrong += permutation_p_value(exact(without.theta), {without.added}, {all_of(exact(without.theta))}, 1000, seed) <= 0.05;
+    wrong +=
+        permutation_p_value(exact(without.theta), {without.added}, {all_of(exact(without.theta))}, 1000, seed) <= 0.05;
   }
   EXPECT_GT(found, 90);
   EXPECT_LT(wrong, 11);  // 5 are expected; 11 and more in one of 90 runs

@@ -108,8 +108,7 @@ std::optional<LawInRange> law_in_range(const estimation::Identification& base, c
     }
   if (!chosen) return std::nullopt;
   LawInRange found;
-  found.p_value =
-      permutation_p_value(own.values, added, ranges, static_cast<int>(20.0 / kPolicy.range_p_value), 1);
+  found.p_value = permutation_p_value(own.values, added, ranges, static_cast<int>(20.0 / kPolicy.range_p_value), 1);
   if (found.p_value > kPolicy.range_p_value) return std::nullopt;
   for (const auto& [fit, law] : best) found.effects.emplace_back(law->candidate->model.entry->name());
   found.records = chosen->records.size();

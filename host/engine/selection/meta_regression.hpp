@@ -39,9 +39,7 @@ struct Part {
   std::vector<Eigen::Index> records, parameters;
 
   Eigen::MatrixXd operator()(const Eigen::MatrixXd& all) const { return all(records, parameters); }
-  RecordParameters operator()(const RecordParameters& all) const {
-    return {(*this)(all.theta), (*this)(all.variance)};
-  }
+  RecordParameters operator()(const RecordParameters& all) const { return {(*this)(all.theta), (*this)(all.variance)}; }
 };
 
 // The share of the permutations of the records (drawn, the identity among them) in which the best possible of several

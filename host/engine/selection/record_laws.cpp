@@ -93,9 +93,8 @@ std::vector<Part> ranges_of_speed(const RecordFriction& own, const std::vector<d
   const auto add = [&](auto first, auto last) {
     Part range{{first, last}, {}};
     for (const Eigen::Index j : all_of(own.values).parameters) {
-      const auto identify = std::count_if(first, last, [&](Eigen::Index i) {
-        return std::isfinite(own.values.variance(i, j));
-      });
+      const auto identify =
+          std::count_if(first, last, [&](Eigen::Index i) { return std::isfinite(own.values.variance(i, j)); });
       if (static_cast<std::size_t>(identify) >= kPolicy.fewest_of_trend) range.parameters.push_back(j);
     }
     if (!range.parameters.empty()) ranges.push_back(std::move(range));

@@ -22,8 +22,8 @@ struct RecordFriction {
 // records as a trend.
 RecordFriction friction_by_record(const estimation::Identification& base, const estimation::BalanceData& data);
 
-// The slower and the faster records, parted at each tenth of them; only those parts that identify a parameter as a trend
-// does. `speeds`: one a record.
+// The slower and the faster records, parted at each tenth of them; only those parts that identify a parameter as a
+// trend does. `speeds`: one a record.
 std::vector<Part> ranges_of_speed(const RecordFriction& own, const std::vector<double>& speeds);
 
 // A law at one value of its nonlinear parameters: what it adds to the friction of each record.
