@@ -42,7 +42,8 @@ little, never = [], []
 functions = collections.defaultdict(lambda: [0, 0])
 for f in files:
     path = f["file"]
-    folder = "/".join(path.split("/")[:2]) if path.count("/") > 1 else path.split("/")[0]
+    # host/ has groups of folders, the other top folders do not.
+    folder = "/".join(path.split("/")[:-1][:3 if path.startswith("host/") else 2])
     code = [l for l in f["lines"] if not l.get("gcovr/noncode", False)]
     run = sum(l["count"] > 0 for l in code)
     lines[folder][0] += len(code)

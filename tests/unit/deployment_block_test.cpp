@@ -262,6 +262,10 @@ TEST_F(Block, OfRandomBytesNeverDoesHarm) {
   EXPECT_GT(taken, 10);
 }
 
+struct InertiaAlone {
+  static constexpr std::string_view kNames = "inertia";
+};
+
 TEST_F(Block, IsForTheEffectsOfItsImage) {
   PackOptions options = quick();
   options.image = {"inertia", "viscous_friction"};
@@ -270,10 +274,7 @@ TEST_F(Block, IsForTheEffectsOfItsImage) {
   using Small = model::DriveModel<Fixed, model::TheseEffects<1>>;
   Small small;
   EXPECT_EQ(control::load(bytes, small).fault, BlockFault::missing_effect);
-  struct Inertia {
-    static constexpr std::string_view kNames = "inertia";
-  };
-  model::DriveModel<Fixed, model::NamedEffects<Inertia>> chosen;
+  model::DriveModel<Fixed, model::NamedEffects<InertiaAlone>> chosen;
   EXPECT_EQ(control::load(bytes, chosen).fault, BlockFault::missing_effect);
 }
 

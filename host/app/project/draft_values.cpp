@@ -6,6 +6,7 @@
 
 #include "host/app/project/draft.hpp"
 #include "host/common/system/temporary_folder.hpp"
+#include "host/input/data/period.hpp"
 #include "host/input/data/record_summary.hpp"
 #include "host/output/answers/text.hpp"
 #include "host/physics/model/text.hpp"

@@ -6,10 +6,10 @@
 #include <random>
 #include <stdexcept>
 
-#include "host/common/signals/spectrum.hpp"
 #include "host/engine/comparison/full_rate.hpp"
 #include "host/engine/estimation/balance_fit.hpp"
 #include "host/engine/estimation/in_parallel.hpp"
+#include "host/input/data/period.hpp"
 
 namespace flexspline::comparison {
 namespace {
@@ -103,22 +103,10 @@ struct Pairs {
   }
 };
 
-// Period of the motion in samples. Set points repeat exactly, so they are used first; the start of a record is left
-// out where it takes that, as motions are faded in.
+// A motion that repeats exactly is preferred to one that repeats about.
 std::optional<double> period_of(const Experiment& e) {
-  const auto& longest = *std::max_element(e.segments.begin(), e.segments.end(), [](const auto& a, const auto& b) {
-    return a.last - a.first < b.last - b.first;
-  });
-  const std::size_t n = longest.last - longest.first;
-  for (const double limit : {kRepetition, kLooseRepetition})
-    for (const Column column : {Column::position_command, Column::motor_position, Column::velocity_command}) {
-      if (!e.has(column)) continue;
-      for (const std::size_t skip : {std::size_t{0}, n / 10, n / 4}) {
-        const std::span<const double> signal(e[column].data() + longest.first + skip, n - skip);
-        if (const auto repetition = signals::find_repetition(signal, limit)) return repetition->exact_samples;
-      }
-    }
-  return std::nullopt;
+  const std::optional<double> exact = data::period_samples(e, kRepetition);
+  return exact ? exact : data::period_samples(e, kLooseRepetition);
 }
 
 bool are_replicates(const Experiment& a, const Experiment& b) {

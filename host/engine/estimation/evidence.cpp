@@ -5,6 +5,7 @@
 #include <algorithm>
 #include <cmath>
 
+#include "host/common/algebra/decompositions.hpp"
 #include "host/engine/estimation/least_squares.hpp"
 #include "host/engine/estimation/record_variance.hpp"
 
@@ -36,9 +37,7 @@ Evidence evidence_of(const Eigen::MatrixXd& cross_columns, const Eigen::MatrixXd
   Eigen::MatrixXd scaled = whitening * own;
   for (auto column : scaled.colwise()) column /= std::max(column.norm(), 1e-300);
   if (scaled.cols() > 0) {
-    Eigen::ColPivHouseholderQR<Eigen::MatrixXd> qr(scaled);
-    qr.setThreshold(1e-7);
-    const Eigen::MatrixXd span = qr.householderQ() * Eigen::MatrixXd::Identity(scaled.rows(), qr.rank());
+    const Eigen::MatrixXd span = algebra::PivotedQr(scaled, 1e-7).span();
     left -= span * (span.transpose() * left);
   }
   return {left.transpose() * (whitening * residual).col(0) / autocorrelation_time,
@@ -84,7 +83,7 @@ NoiseModel noise_model(const Eigen::MatrixXd& cross_columns, const Eigen::Matrix
 
 Eigen::MatrixXd scaled_inverse(const Eigen::MatrixXd& symmetric) {
   const Eigen::VectorXd scale = symmetric.diagonal().cwiseMax(1e-300).cwiseSqrt().cwiseInverse();
-  return scale.asDiagonal() * (scale.asDiagonal() * symmetric * scale.asDiagonal()).fullPivLu().inverse() *
+  return scale.asDiagonal() * algebra::inverse_of(scale.asDiagonal() * symmetric * scale.asDiagonal()) *
          scale.asDiagonal();
 }
 

@@ -3,8 +3,8 @@
 #include <Eigen/QR>
 #include <algorithm>
 
+#include "host/common/algebra/decompositions.hpp"
 #include "host/engine/estimation/balance_fit.hpp"
-#include "host/engine/estimation/pivoted_qr.hpp"
 #include "host/engine/estimation/variable_projection.hpp"
 
 namespace flexspline::estimation {
@@ -33,7 +33,7 @@ ModelProjection::ModelProjection(const Eigen::MatrixXd& columns, const Eigen::Ve
     : root_weights_(root_weights) {
   Eigen::MatrixXd scaled = root_weights.asDiagonal() * columns;
   for (auto column : scaled.colwise()) column /= std::max(column.norm(), 1e-300);
-  span_ = PivotedQr(scaled, 1e-7).span();
+  span_ = algebra::PivotedQr(scaled, 1e-7).span();
 }
 
 Eigen::MatrixXd ModelProjection::orthogonal_part(const Eigen::MatrixXd& torques) const {

@@ -1,18 +1,19 @@
 #include "host/engine/estimation/noise_covariance.hpp"
 
-#include <Eigen/Eigenvalues>
+#include <Eigen/Core>
 #include <cmath>
+#include "host/common/algebra/decompositions.hpp"
 
 namespace flexspline::estimation {
 
 void NoiseCovariance::add_random_effects(const RowRange& rows, const Eigen::MatrixXd& columns) {
-  const Eigen::SelfAdjointEigenSolver<Eigen::MatrixXd> eigen(columns.transpose() * columns);
+  const algebra::Eigenpairs eigen = algebra::eigenpairs(columns.transpose() * columns);
   Common common{rows, Eigen::MatrixXd::Zero(columns.rows(), columns.cols()), Eigen::VectorXd::Zero(columns.cols())};
-  const double largest = eigen.eigenvalues().maxCoeff();
+  const double largest = eigen.values.maxCoeff();
   for (Eigen::Index k = 0; k < columns.cols(); ++k) {
-    const double square = eigen.eigenvalues()[k];
+    const double square = eigen.values[k];
     if (!(square > 1e-12 * largest) || !(square > 0.0)) continue;
-    common.basis.col(k) = columns * eigen.eigenvectors().col(k) / std::sqrt(square);
+    common.basis.col(k) = columns * eigen.vectors.col(k) / std::sqrt(square);
     common.taken[k] = 1.0 - 1.0 / std::sqrt(1.0 + square);
   }
   common_.push_back(std::move(common));

@@ -4,6 +4,7 @@
 #include <Eigen/QR>
 #include <algorithm>
 #include <cmath>
+#include "host/common/algebra/decompositions.hpp"
 
 namespace flexspline::estimation {
 namespace {
@@ -172,8 +173,7 @@ Eigen::MatrixXd eliminate_random_effects(const Eigen::MatrixXd& factor, const Ei
   block.topLeftCorner(groups, groups).setIdentity();
   block.bottomLeftCorner(factor.rows(), groups) = root * factor.leftCols(width - 1) * u * std.asDiagonal();
   block.bottomRightCorner(factor.rows(), width) = root * factor;
-  const Eigen::HouseholderQR<Eigen::MatrixXd> qr(std::move(block));
-  return qr.matrixQR().block(groups, groups, width, width).triangularView<Eigen::Upper>();
+  return algebra::r_factor(std::move(block)).block(groups, groups, width, width);
 }
 
 void add_errors(const Eigen::MatrixXd& factor, const Eigen::VectorXd& theta, const Eigen::MatrixXd& u, double rows,

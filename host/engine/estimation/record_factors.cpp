@@ -1,24 +1,10 @@
 #include "host/engine/estimation/record_factors.hpp"
 
-#include <Eigen/QR>
+#include <Eigen/Core>
 #include <numeric>
+#include "host/common/algebra/decompositions.hpp"
 
 namespace flexspline::estimation {
-namespace {
-
-Eigen::MatrixXd r_factor(Eigen::MatrixXd block) {
-  const Eigen::Index columns = block.cols();
-  if (block.rows() < columns) {
-    const Eigen::Index rows = block.rows();
-    block.conservativeResize(columns, Eigen::NoChange);
-    block.bottomRows(columns - rows).setZero();
-  }
-  const Eigen::HouseholderQR<Eigen::MatrixXd> qr(std::move(block));
-  return qr.matrixQR().topRows(columns).triangularView<Eigen::Upper>();
-}
-
-}  // namespace
-
 double RecordFactors::rows_of(std::size_t record) const {
   return std::accumulate(rows[record].begin(), rows[record].end(), 0.0);
 }
@@ -32,7 +18,7 @@ Eigen::MatrixXd combined_factor(const std::vector<const Eigen::MatrixXd*>& block
     all.middleRows(rows, block->rows()) = *block;
     rows += block->rows();
   }
-  return r_factor(std::move(all));
+  return algebra::r_factor(std::move(all));
 }
 
 RecordFactors record_factors(const BalanceData& data, const Eigen::MatrixXd& X, const Eigen::VectorXd& y,
@@ -54,7 +40,7 @@ RecordFactors record_factors(const BalanceData& data, const Eigen::MatrixXd& X, 
         block(used++, columns) = y[row];
       }
       block.conservativeResize(used, Eigen::NoChange);
-      t.parts[i].push_back(r_factor(std::move(block)));
+      t.parts[i].push_back(algebra::r_factor(std::move(block)));
       t.rows[i].push_back(static_cast<double>(used));
     }
   for (const auto& of_record : t.parts) {

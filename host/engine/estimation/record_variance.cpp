@@ -1,11 +1,12 @@
 #include "host/engine/estimation/record_variance.hpp"
 
-#include <Eigen/Cholesky>
+#include <Eigen/Core>
 #include <algorithm>
 #include <boost/math/distributions/chi_squared.hpp>
 #include <boost/math/distributions/students_t.hpp>
 #include <cmath>
 
+#include "host/common/algebra/decompositions.hpp"
 #include "host/engine/estimation/least_squares.hpp"
 
 namespace flexspline::estimation {
@@ -36,7 +37,7 @@ std::vector<OwnFactors> own_factors(const BalanceData& data, const Eigen::Matrix
     own.along = Z.transpose() * residual.segment(range.first, range.size()) / noise;
     const Eigen::MatrixXd H =
         own.torques + Eigen::MatrixXd::Identity(Z.cols(), Z.cols()) / std::pow(kLargestDifference, 2);
-    const Eigen::MatrixXd inverse = H.llt().solve(Eigen::MatrixXd::Identity(Z.cols(), Z.cols()));
+    const Eigen::MatrixXd inverse = algebra::inverse_of_positive(H);
     own.value = inverse * own.along;
     own.variance = inverse.diagonal();
     list.push_back(std::move(own));
@@ -101,7 +102,7 @@ RecordVariance paule_mandel(const BalanceData& data, const Eigen::MatrixXd& torq
       Eigen::MatrixXd inner = between.std.asDiagonal() * records[i].torques * between.std.asDiagonal();
       inner.diagonal().array() += 1.0;
       const Eigen::VectorXd scaled = between.std.cwiseProduct(records[i].along);
-      take_off(data.records()[i], between.std.cwiseProduct(inner.llt().solve(scaled)));
+      take_off(data.records()[i], between.std.cwiseProduct(algebra::solve_positive(inner, scaled).col(0)));
     }
     if (between.std.maxCoeff() <= 0.0) break;
   }

@@ -1,12 +1,10 @@
 #include "host/engine/estimation/smooth_curve.hpp"
 
-#include <Eigen/Cholesky>
-#include <Eigen/Eigenvalues>
-#include <Eigen/QR>
-#include <Eigen/SVD>
+#include <Eigen/Core>
 #include <algorithm>
 #include <cmath>
 #include <limits>
+#include "host/common/algebra/decompositions.hpp"
 
 namespace flexspline::estimation {
 namespace {
@@ -61,13 +59,12 @@ Products products_of(const CurveProblem& p) {
 // S with S' G S = 1 on the directions of G that have a length.
 Matrix inverse_root(const Matrix& products) {
   if (products.size() == 0) return products;
-  const Eigen::SelfAdjointEigenSolver<Matrix> eigen(products);
-  const Vector values = eigen.eigenvalues();
+  const auto [values, vectors] = algebra::eigenpairs(products);
   const double least = kNoLength * std::max(values.maxCoeff(), 1e-300);
   std::vector<Eigen::Index> kept;
   for (Eigen::Index k = 0; k < values.size(); ++k)
     if (values[k] > least) kept.push_back(k);
-  return eigen.eigenvectors()(Eigen::all, kept) * values(kept).cwiseSqrt().cwiseInverse().asDiagonal();
+  return vectors(Eigen::all, kept) * values(kept).cwiseSqrt().cwiseInverse().asDiagonal();
 }
 
 struct EffectiveParameters {
@@ -85,21 +82,19 @@ EffectiveParameters freedom_of(const Products& g) {
   const Matrix cross = g.all.block(0, g.others, g.others, g.points);
   const Matrix root_others = inverse_root(others), root_points = inverse_root(points);
   if (root_others.cols() == 0 || root_points.cols() == 0) return freedom;
-  const Eigen::JacobiSVD<Matrix> svd(root_others.transpose() * cross * root_points,
-                                     Eigen::ComputeThinU | Eigen::ComputeThinV);
+  const algebra::SingularValues svd = algebra::singular_values(root_others.transpose() * cross * root_points);
   Eigen::Index count = 0;
-  while (count < svd.singularValues().size() && svd.singularValues()[count] > kCollinear) ++count;
+  while (count < svd.s.size() && svd.s[count] > kCollinear) ++count;
   if (count == 0) return freedom;
-  const Matrix theirs = root_others * svd.matrixU().leftCols(count);
+  const Matrix theirs = root_others * svd.u.leftCols(count);
   for (Eigen::Index k = 0; k < count; ++k) {
     // Columns are of unit size, so what each has in common with the direction can be compared.
     Eigen::Index most = 0;
     (others * theirs.col(k)).cwiseAbs().maxCoeff(&most);
     freedom.left_to.push_back(most);
   }
-  const Matrix constraint = points * (root_points * svd.matrixV().leftCols(count));  // points x count
-  const Eigen::HouseholderQR<Matrix> qr(constraint);
-  const Matrix whole = qr.householderQ();
+  const Matrix constraint = points * (root_points * svd.v.leftCols(count));  // points x count
+  const Matrix whole = algebra::orthogonal_of(constraint);
   freedom.basis = whole.rightCols(g.points - count);
   return freedom;
 }
@@ -121,13 +116,13 @@ class Solver {
   // Factor of the penalty at which it is as large as the data's part.
   double size() const { return size_; }
 
-  Eigen::LDLT<Matrix> factor(const Matrix& products, double smoothing) const {
+  algebra::SymmetricFactor factor(const Matrix& products, double smoothing) const {
     Matrix normal = projected(products);
     const Eigen::Index n = freedom_.basis.cols();
     normal.bottomRightCorner(n, n) += smoothing * penalty_;
     normal.diagonal().head(g_.others).array() += kRidge;
     normal.diagonal().tail(n).array() += kRidge * size_;
-    return Eigen::LDLT<Matrix>(normal);
+    return algebra::SymmetricFactor(normal);
   }
   Solution solve(const Matrix& products, double smoothing) const {
     Vector right(g_.others + freedom_.basis.cols());
@@ -175,7 +170,7 @@ double left_out_without(const Products& g) {
     if (g.others > 0) {
       Matrix normal = seen.topLeftCorner(g.others, g.others);
       normal.diagonal().array() += kRidge;
-      s.beta = Eigen::LDLT<Matrix>(normal).solve(seen.col(g.others + g.points).head(g.others));
+      s.beta = algebra::SymmetricFactor(normal).solve(seen.col(g.others + g.points).head(g.others));
     }
     sum += squares(g, fold, s);
   }

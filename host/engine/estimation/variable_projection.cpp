@@ -5,9 +5,9 @@
 #include <cmath>
 #include <functional>
 
+#include "host/common/algebra/decompositions.hpp"
 #include "host/engine/estimation/least_squares.hpp"
 #include "host/engine/estimation/minimise.hpp"
-#include "host/engine/estimation/pivoted_qr.hpp"
 
 namespace flexspline::estimation {
 namespace {
@@ -96,7 +96,7 @@ ScaledColumns scaled_columns(const Eigen::MatrixXd& X, const NoiseCovariance& wh
 double projected_cost(const Eigen::MatrixXd& X, const Eigen::VectorXd& y, const NoiseCovariance& whitening) {
   const Eigen::MatrixXd A = scaled_columns(X, whitening).A;
   const Eigen::VectorXd b = whitening * y;
-  return (b - A * PivotedQr(A).solve(b)).squaredNorm();
+  return (b - A * algebra::PivotedQr(A).solve(b)).squaredNorm();
 }
 
 }  // namespace
@@ -301,7 +301,7 @@ class ProjectedResidual {
     A_ = std::move(columns.A);
     size_ = std::move(columns.size);
     const Eigen::VectorXd b = whitening_ * (on_->target() - on_->known_torque(terms_, on_balance_));
-    qr_ = PivotedQr(A_);
+    qr_ = algebra::PivotedQr(A_);
     theta_ = qr_.solve(b);
     left_ = b - A_ * theta_;
     factored_at_ = shares;
@@ -331,7 +331,7 @@ class ProjectedResidual {
   std::vector<double> factored_at_;
   Eigen::MatrixXd A_;
   Eigen::VectorXd size_, theta_, left_;
-  PivotedQr qr_;
+  algebra::PivotedQr qr_;
 };
 
 }  // namespace

@@ -1,8 +1,9 @@
 #include "host/engine/estimation/variance_components.hpp"
 
-#include <Eigen/Cholesky>
+#include <Eigen/Core>
 #include <algorithm>
 #include <cmath>
+#include "host/common/algebra/decompositions.hpp"
 
 namespace flexspline::estimation {
 namespace {
@@ -33,14 +34,14 @@ VarianceComponents reml(const std::vector<RecordProducts>& records, double noise
     for (std::size_t r = 0; r < records.size(); ++r) {
       Eigen::MatrixXd own = records[r].zz / noise;
       own.diagonal() += variance.cwiseInverse();
-      inverse[r] = own.llt().solve(Eigen::MatrixXd::Identity(k, k));
+      inverse[r] = algebra::inverse_of_positive(own);
       const Eigen::MatrixXd gain = records[r].xz * inverse[r] / noise;
       inner += (records[r].xx - gain * records[r].xz.transpose()) / noise;
       along += (records[r].xy - gain * records[r].zy) / noise;
     }
     const double scale = inner.diagonal().maxCoeff();
     inner.diagonal().array() += 1e-10 * scale;
-    const Eigen::LDLT<Eigen::MatrixXd> solver(inner);
+    const algebra::SymmetricFactor solver(inner);
     result.beta = solver.solve(along);
     Eigen::VectorXd next = Eigen::VectorXd::Zero(k);
     for (std::size_t r = 0; r < records.size(); ++r) {

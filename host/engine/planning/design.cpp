@@ -2,10 +2,11 @@
 
 #include <fmt/format.h>
 
-#include <Eigen/Eigenvalues>
+#include <Eigen/Core>
 #include <algorithm>
 #include <cmath>
 
+#include "host/common/algebra/decompositions.hpp"
 #include "host/engine/planning/hypotheses.hpp"
 
 namespace flexspline::planning {
@@ -165,8 +166,8 @@ class Parameters {
     constexpr double kLost = 1e4;
     // An undetermined parameter has a prior of a thousandth of the required information.
     const Eigen::Index n = information.rows();
-    const Eigen::MatrixXd covariance =
-        (information + 1e-8 * Eigen::MatrixXd::Identity(n, n)).ldlt().solve(Eigen::MatrixXd::Identity(n, n));
+    const Eigen::MatrixXd covariance = algebra::SymmetricFactor(information + 1e-8 * Eigen::MatrixXd::Identity(n, n))
+                                           .solve(Eigen::MatrixXd::Identity(n, n));
     std::vector<std::optional<double>> list;
     for (Eigen::Index j = 0; j < n; ++j) {
       const double value = 100.0 * std::sqrt(std::max(0.0, covariance(j, j)));
@@ -184,9 +185,7 @@ class Parameters {
 double log_determinant(const Eigen::MatrixXd& information) {
   // A prior of ten times the value prevents that parameters that no motion shows dominate the choice.
   const Eigen::Index n = information.rows();
-  const Eigen::SelfAdjointEigenSolver<Eigen::MatrixXd> solver(information + 0.01 * Eigen::MatrixXd::Identity(n, n),
-                                                              Eigen::EigenvaluesOnly);
-  return solver.eigenvalues().array().max(1e-12).log().sum();
+  return algebra::eigenvalues(information + 0.01 * Eigen::MatrixXd::Identity(n, n)).array().max(1e-12).log().sum();
 }
 
 }  // namespace

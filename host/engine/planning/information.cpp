@@ -5,9 +5,9 @@
 #include <Eigen/QR>
 #include <algorithm>
 
+#include "host/common/algebra/decompositions.hpp"
 #include "host/engine/estimation/balance_fit.hpp"
 #include "host/engine/estimation/model_projection.hpp"
-#include "host/engine/estimation/pivoted_qr.hpp"
 
 namespace flexspline::planning {
 namespace {
@@ -120,8 +120,7 @@ Eigen::MatrixXd stacked_factor(const std::vector<const Eigen::MatrixXd*>& parts)
       stack.middleRows(rows, part->rows()) = *part;
       rows += part->rows();
     }
-  const Eigen::HouseholderQR<Eigen::MatrixXd> qr(std::move(stack));
-  return qr.matrixQR().topRows(columns).triangularView<Eigen::Upper>();
+  return algebra::r_factor(std::move(stack));
 }
 
 double unexplained(const Eigen::MatrixXd& factor, const Hypothesis& truth, const Hypothesis& other) {
@@ -134,7 +133,7 @@ double unexplained(const Eigen::MatrixXd& factor, const Hypothesis& truth, const
   }
   const Eigen::VectorXd y =
       factor.col(static_cast<Eigen::Index>(truth.torque)) - factor.col(static_cast<Eigen::Index>(other.known));
-  return (y - X * estimation::PivotedQr(X, 1e-7).solve(y)).squaredNorm();
+  return (y - X * algebra::PivotedQr(X, 1e-7).solve(y)).squaredNorm();
 }
 
 }  // namespace flexspline::planning

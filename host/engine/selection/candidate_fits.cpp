@@ -8,9 +8,9 @@
 #include <cmath>
 #include <limits>
 
+#include "host/common/algebra/decompositions.hpp"
 #include "host/engine/estimation/in_parallel.hpp"
 #include "host/engine/estimation/least_squares.hpp"
-#include "host/engine/estimation/pivoted_qr.hpp"
 #include "host/engine/estimation/variable_projection.hpp"
 
 namespace flexspline::selection {
@@ -171,7 +171,7 @@ Unexplained left_by(BalanceData& data, const CrossValidatedFit& base) {
   left.residual = base.root_weights.cwiseProduct(base.residual);
   if (base.linear.empty()) return left;
   const Eigen::MatrixXd X = base.root_weights.asDiagonal() * estimation::columns_of(data, base.terms, base.linear);
-  left.own = estimation::PivotedQr(X).span();
+  left.own = algebra::PivotedQr(X).span();
   return left;
 }
 

@@ -8,7 +8,7 @@
 #include <algorithm>
 #include <cmath>
 
-#include "host/engine/estimation/pivoted_qr.hpp"
+#include "host/common/algebra/decompositions.hpp"
 #include "host/engine/estimation/variable_projection.hpp"
 #include "host/physics/catalogue/order_causes.hpp"
 
@@ -147,7 +147,7 @@ std::vector<double> likely_orders(const BalanceData& data, const catalogue::Entr
           left.root_weights.cwiseProduct(Eigen::Map<const Eigen::VectorXd>(wave.data(), left.residual.size()));
     }
     if (left.own.cols() > 0) waves -= left.own * (left.own.transpose() * waves);
-    const Eigen::VectorXd explained = waves * estimation::PivotedQr(waves).solve(left.residual);
+    const Eigen::VectorXd explained = waves * algebra::PivotedQr(waves).solve(left.residual);
     found.emplace_back(-explained.squaredNorm(), order);
   }
   std::sort(found.begin(), found.end());

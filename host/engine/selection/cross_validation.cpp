@@ -5,11 +5,11 @@
 #include <cmath>
 #include <numeric>
 
+#include "host/common/algebra/decompositions.hpp"
 #include "host/engine/estimation/balance_fit.hpp"
 #include "host/engine/estimation/least_squares.hpp"
 #include "host/engine/estimation/mixed_model.hpp"
 #include "host/engine/estimation/model_projection.hpp"
-#include "host/engine/estimation/pivoted_qr.hpp"
 #include "host/engine/estimation/record_variance.hpp"
 #include "host/engine/estimation/variable_projection.hpp"
 
@@ -51,7 +51,7 @@ std::vector<LeftOut> predict_left_out(const RecordFactors& factors, const MixedF
           estimation::eliminate_random_effects(others[i], whole.u, whole.effects.std, whole.effects.variance[i] * tau));
     const Eigen::MatrixXd all = estimation::combined_factor(reduced);
     Eigen::VectorXd theta = Eigen::VectorXd::Zero(columns);
-    theta(used) = estimation::PivotedQr(all(Eigen::all, used), 1e-5).solve(all.col(columns));
+    theta(used) = algebra::PivotedQr(all(Eigen::all, used), 1e-5).solve(all.col(columns));
     for (std::size_t i = 0; i < records.size(); ++i) {
       RecordErrors seen;
       estimation::add_errors(others[i], theta, whole.u, factors.rows_of(i) - factors.rows[i][out], seen);
@@ -239,7 +239,7 @@ double whitened_squares(BalanceData& data, const Terms& terms, const CrossValida
       reduced.push_back(estimation::eliminate_random_effects(
           factors.whole[i], u, std, fit.random_effects.variance[i] * fit.autocorrelation_time));
     const Eigen::MatrixXd all = estimation::combined_factor(reduced);
-    theta = estimation::PivotedQr(all.leftCols(columns), 1e-5).solve(all.col(columns));
+    theta = algebra::PivotedQr(all.leftCols(columns), 1e-5).solve(all.col(columns));
     left = (all.col(columns) - all.leftCols(columns) * theta).squaredNorm();
     std = std_for(groups, fit);
     if (groups.empty() || std.maxCoeff() <= 0.0) break;

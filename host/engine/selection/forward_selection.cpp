@@ -1,9 +1,10 @@
 #include "host/engine/selection/forward_selection.hpp"
 
-#include <Eigen/Cholesky>
+#include <Eigen/Core>
 #include <algorithm>
 #include <cmath>
 #include <map>
+#include "host/common/algebra/decompositions.hpp"
 
 namespace flexspline::selection {
 namespace {
@@ -51,7 +52,7 @@ TermFit fit_terms(const RegressorTable& table, const std::vector<int>& terms, co
   }
   // Columns that are collinear share their coefficient.
   inner.diagonal().array() += 1e-8;
-  result.theta = inner.ldlt().solve(along).cwiseQuotient(size);
+  result.theta = algebra::SymmetricFactor(inner).solve(along).col(0).cwiseQuotient(size);
   result.training_squares = squares(on, result.columns, result.theta);
   result.validation_squares = squares(other, result.columns, result.theta);
   return result;

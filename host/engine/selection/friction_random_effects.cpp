@@ -4,6 +4,7 @@
 #include <cmath>
 #include <numeric>
 
+#include "host/common/algebra/decompositions.hpp"
 #include "host/engine/estimation/variance_components.hpp"
 
 namespace flexspline::selection {
@@ -31,7 +32,7 @@ void eliminate_friction_effects(Eigen::MatrixXd& products, const FrictionRandomE
     for (Eigen::Index j = 0; j < k; ++j)
       inner(i, j) = along(columns[static_cast<std::size_t>(vary[static_cast<std::size_t>(i)])], j);
   for (Eigen::Index i = 0; i < k; ++i) inner(i, i) += noise / variance[vary[static_cast<std::size_t>(i)]];
-  products.noalias() -= along * inner.llt().solve(along.transpose());
+  products.noalias() -= along * algebra::solve_positive(inner, along.transpose());
 }
 
 Eigen::VectorXd friction_effects_of(const RegressorTable& table, const Setting& setting,
@@ -89,7 +90,7 @@ Eigen::VectorXd weighted_residual(const Setting& seen, const TermFit& fitted, co
       for (Eigen::Index j = 0; j < k; ++j)
         inner(j, j) += differences.noise / differences.variance[vary[static_cast<std::size_t>(j)]];
       residual.segment(from, rows) -=
-          Z * inner.llt().solve(weights[record] * (Z.transpose() * residual.segment(from, rows)));
+          Z * algebra::solve_positive(inner, weights[record] * (Z.transpose() * residual.segment(from, rows)));
     }
     residual.segment(from, rows) *= std::sqrt(weights[record]);
     first = last;

@@ -4,7 +4,7 @@
 #include <Eigen/QR>
 #include <cmath>
 
-#include "host/engine/estimation/pivoted_qr.hpp"
+#include "host/common/algebra/decompositions.hpp"
 #include "host/engine/selection/table_builder.hpp"
 
 namespace flexspline::selection {
@@ -35,7 +35,7 @@ bool add_model_columns(TableBuilder& builder) {
       add(slopes.col(static_cast<Eigen::Index>(j)), fmt::format("slope by {}", terms[nonlinear[j].term].id),
           -effects::kUnbounded);
   }
-  const Eigen::VectorXd fitted = base * estimation::PivotedQr(base).solve(table.target);
+  const Eigen::VectorXd fitted = base * algebra::PivotedQr(base).solve(table.target);
   const estimation::PreparedData& prepared = builder.prepared();
   const Eigen::VectorXd through_gear = prepared.torque_measured
                                            ? builder.at_rows([&](const estimation::Record& r, std::size_t k) {

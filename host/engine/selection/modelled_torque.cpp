@@ -1,9 +1,10 @@
 #include "host/engine/selection/modelled_torque.hpp"
 
-#include <Eigen/QR>
+#include <Eigen/Core>
 #include <algorithm>
 #include <cmath>
 #include <span>
+#include "host/common/algebra/decompositions.hpp"
 
 namespace flexspline::selection {
 
@@ -33,9 +34,7 @@ void take_noise_off_torque(PreparedData& prepared) {
     const Eigen::VectorXd size = X.colwise().norm().transpose().array().max(1e-300);
     X *= size.cwiseInverse().asDiagonal();
     const Eigen::Map<const Eigen::VectorXd> measured(r.torque.data(), n);
-    Eigen::ColPivHouseholderQR<Eigen::MatrixXd> qr(X);
-    qr.setThreshold(1e-7);
-    const Eigen::VectorXd fitted = X * qr.solve(measured);
+    const Eigen::VectorXd fitted = X * algebra::PivotedQr(X, 1e-7).solve(measured);
     const Eigen::VectorXd rest = measured - fitted;
     double steps = 0.0;
     for (Eigen::Index k = 1; k < n; ++k) steps += 0.5 * (rest[k] - rest[k - 1]) * (rest[k] - rest[k - 1]);

@@ -4,9 +4,9 @@
 #include <algorithm>
 #include <cmath>
 
+#include "host/common/algebra/decompositions.hpp"
 #include "host/engine/estimation/balance_data.hpp"
 #include "host/engine/estimation/in_parallel.hpp"
-#include "host/engine/estimation/pivoted_qr.hpp"
 #include "host/engine/selection/bandwidth.hpp"
 
 namespace flexspline::selection {
@@ -86,7 +86,7 @@ std::vector<double> squares_by_travel(const PreparedData& original, const Terms&
     const auto on_balance = estimation::terms_on(terms, Balance::motor, prepared.torque_measured);
     const Eigen::MatrixXd X = data.columns(terms, estimation::free_linear_parameters(terms, on_balance));
     const Eigen::VectorXd y = data.target() - data.known_torque(terms, on_balance);
-    squares[i] = (y - X * estimation::PivotedQr(X).solve(y)).squaredNorm();
+    squares[i] = (y - X * algebra::PivotedQr(X).solve(y)).squaredNorm();
   });
   return squares;
 }

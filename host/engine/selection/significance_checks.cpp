@@ -7,10 +7,10 @@
 #include <cmath>
 #include <map>
 
+#include "host/common/algebra/decompositions.hpp"
 #include "host/engine/comparison/sample_variables.hpp"
 #include "host/engine/estimation/evidence.hpp"
 #include "host/engine/estimation/model_projection.hpp"
-#include "host/engine/estimation/pivoted_qr.hpp"
 #include "host/engine/selection/other_balance_evidence.hpp"
 #include "host/engine/selection/policy.hpp"
 
@@ -86,7 +86,7 @@ double explained(const std::vector<ActingBalance>& acting, const Terms& terms, d
   }
   // Parameters differ in size by their units.
   for (auto column : own.colwise()) column /= std::max(column.norm(), 1e-300);
-  const Eigen::VectorXd left = residual - own * estimation::PivotedQr(own, 1e-7).solve(residual);
+  const Eigen::VectorXd left = residual - own * algebra::PivotedQr(own, 1e-7).solve(residual);
   return residual.squaredNorm() - left.squaredNorm();
 }
 

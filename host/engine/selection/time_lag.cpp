@@ -4,9 +4,9 @@
 #include <cmath>
 #include <span>
 
+#include "host/common/algebra/decompositions.hpp"
 #include "host/common/signals/interpolate.hpp"
 #include "host/engine/estimation/least_squares.hpp"
-#include "host/engine/estimation/pivoted_qr.hpp"
 #include "host/engine/selection/halves.hpp"
 #include "host/engine/selection/setting.hpp"
 
@@ -62,7 +62,7 @@ std::optional<TimeLag> estimate_time_lag(const RegressorTable& table, const std:
   for (const Run& run : setting.runs)
     rows.middleRows(run.first, run.last - run.first) *= std::sqrt(weights[run.record]);
   const Eigen::MatrixXd own = rows.leftCols(columns), targets = rows.rightCols(tried);
-  const Eigen::MatrixXd residuals = targets - own * estimation::PivotedQr(own).solve(targets);
+  const Eigen::MatrixXd residuals = targets - own * algebra::PivotedQr(own).solve(targets);
   const Eigen::VectorXd squares = residuals.colwise().squaredNorm();
   Eigen::Index best = 0;
   squares.minCoeff(&best);

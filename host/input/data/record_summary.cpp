@@ -5,7 +5,7 @@
 #include <numeric>
 
 #include "host/common/signals/quantum.hpp"
-#include "host/common/signals/spectrum.hpp"
+#include "host/input/data/period.hpp"
 
 namespace flexspline::data {
 namespace {
@@ -79,20 +79,6 @@ std::vector<double> velocity_of(const Experiment& e) {
     return v;
   }
   return {};
-}
-
-std::optional<double> period_samples(const Experiment& e) {
-  const auto longest = std::max_element(e.segments.begin(), e.segments.end(), [](const auto& a, const auto& b) {
-    return a.last - a.first < b.last - b.first;
-  });
-  if (longest == e.segments.end()) return std::nullopt;
-  for (const Column c : {Column::motor_position, Column::position_command, Column::output_position,
-                         Column::motor_velocity, Column::velocity_command}) {
-    if (!e.has(c)) continue;
-    const std::span<const double> part(e[c].data() + longest->first, longest->last - longest->first);
-    if (const auto repetition = signals::find_repetition(part)) return repetition->exact_samples;
-  }
-  return std::nullopt;
 }
 
 RecordSummary summary_of(const Experiment& e, Axis axis) {

@@ -41,8 +41,4 @@ RecordSummary summary_of(const Experiment& experiment, Axis axis);
 // Speed of the motor, else of the output, smoothed over about ten samples; empty where no motion is measured.
 std::vector<double> velocity_of(const Experiment& experiment);
 
-// Period after which the motion repeats itself in the longest segment: of the position or its set point, else of the
-// velocity.
-std::optional<double> period_samples(const Experiment& experiment);
-
 }  // namespace flexspline::data

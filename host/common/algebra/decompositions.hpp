@@ -1,0 +1,80 @@
+// Decompositions of dense matrices of doubles, each compiled in one place: as templates they would be compiled again in
+// every file that solves a system, and took a third of the time of the library's build. Golub and Van Loan, Matrix
+// Computations, describe all of them.
+#pragma once
+
+#include <Eigen/Core>
+#include <memory>
+
+namespace flexspline::algebra {
+
+using Matrix = Eigen::MatrixXd;
+using Vector = Eigen::VectorXd;
+
+// The square upper triangular R with R'R = A'A, by Householder reflections. A matrix with fewer rows than columns is
+// filled up with zeros.
+Matrix r_factor(Matrix a);
+
+// An orthogonal matrix whose first columns span those of A, which are independent: rows x rows.
+Matrix orthogonal_of(const Matrix& a);
+
+// x of A x = b by Cholesky's decomposition, A symmetric and positive definite. What comes of another A is not defined.
+Matrix solve_positive(const Matrix& a, const Matrix& b);
+Matrix inverse_of_positive(const Matrix& a);
+
+// By LU with full pivoting; of a singular matrix not defined.
+Matrix inverse_of(const Matrix& a);
+
+// The decomposition L D L' with pivots of a symmetric semidefinite matrix, to solve with several right-hand sides.
+class SymmetricFactor {
+ public:
+  explicit SymmetricFactor(const Matrix& a);
+  ~SymmetricFactor();
+  SymmetricFactor(SymmetricFactor&&) noexcept;
+  SymmetricFactor& operator=(SymmetricFactor&&) noexcept;
+  Matrix solve(const Matrix& b) const;
+
+ private:
+  struct Factor;
+  std::unique_ptr<const Factor> factor_;
+};
+
+// Of a symmetric matrix; values rise.
+struct Eigenpairs {
+  Vector values;
+  Matrix vectors;
+};
+Eigenpairs eigenpairs(const Matrix& symmetric);
+Vector eigenvalues(const Matrix& symmetric);
+
+// A = u diag(s) v', as many columns as the smaller side of A; s falls (one-sided Jacobi).
+struct SingularValues {
+  Matrix u;
+  Vector s;
+  Matrix v;
+};
+SingularValues singular_values(const Matrix& a);
+
+// Least squares by QR with column pivoting. It also takes a matrix without columns: a model without linear parameters,
+// or data that determine none.
+class PivotedQr {
+ public:
+  PivotedQr();
+  // `threshold`: pivots below that share of the largest count as zero; zero: the precision of doubles.
+  explicit PivotedQr(const Matrix& a, double threshold = 0.0);
+  ~PivotedQr();
+  PivotedQr(PivotedQr&&) noexcept;
+  PivotedQr& operator=(PivotedQr&&) noexcept;
+
+  // The least-squares solution; of a matrix without columns a matrix without rows.
+  Matrix solve(const Matrix& b) const;
+  // Orthonormal columns that span those of the matrix, as many as its rank.
+  Matrix span() const;
+
+ private:
+  struct Factor;
+  std::unique_ptr<const Factor> factor_;  // none where the matrix has no columns
+  Eigen::Index rows_ = 0;
+};
+
+}  // namespace flexspline::algebra
