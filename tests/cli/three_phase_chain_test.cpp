@@ -33,7 +33,7 @@ struct Parameter {
 Parameter parameter_of(const json& answer, const std::string& effect, const std::string& name) {
   for (const json& p : answer["parameters"])
     if (p["effect"] == effect && p["parameter"] == name)
-      return {p["value"], (p["interval"][1].get<double>() - p["interval"][0].get<double>()) / (2.0 * 1.96)};
+      return {p["value"], p["std"]};
   ADD_FAILURE() << "no " << effect << "." << name;
   return {};
 }

@@ -7,6 +7,7 @@
 #include <stdexcept>
 #include <utility>
 
+#include "host/engine/estimation/cutoff_change.hpp"
 #include "host/engine/estimation/instruments.hpp"
 #include "host/engine/estimation/intervals.hpp"
 #include "host/engine/estimation/least_squares.hpp"
@@ -123,8 +124,12 @@ std::unique_ptr<Identification> estimate(const data::Dataset& dataset, const mod
     assemble(*result);
   }
   warn_of_scale(*result);
-  if (options.intervals == Intervals::standard) return result;
-  if (method == Method::instruments || method == Method::output_error || method == Method::partitioned) {
+  const bool is_least_squares = method == Method::ls || method == Method::nls;
+  if (options.intervals == Intervals::standard) {
+    if (is_least_squares) widen_by_cutoff(*result, dataset, known, pipeline);
+    return result;
+  }
+  if (!is_least_squares) {
     result->warnings.push_back(
         "intervals by profile and bootstrap are those of least squares; with this method they are the standard ones");
     return result;

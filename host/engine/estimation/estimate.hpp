@@ -21,7 +21,8 @@ enum class Method : std::uint8_t {
   output_error,  // oe: least error of the free run
 };
 enum class Intervals : std::uint8_t {
-  standard,   // from the covariance, corrected for the residual's autocorrelation
+  standard,   // from the covariance, corrected for the residual's autocorrelation and, for ls and nls, for what twice
+              // the cut-off changes
   profile,    // where the best fit of all others gets significantly worse
   bootstrap,  // from fits to blocks of the samples drawn at random
 };

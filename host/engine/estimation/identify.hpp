@@ -22,6 +22,7 @@ struct Estimate : ByExperiment {
   double value = 0.0;
   std::optional<double> std;
   std::optional<double> low, high;  // 95 % interval
+  std::optional<double> change_at_twice_cutoff;
   bool identifiable = true;
   bool fixed = false;
   // Persistent excitation, by parameter (report 3.1): the share of its effect on the data, 0 to 1, that no other

@@ -135,6 +135,16 @@ struct BetweenRecords {
   double p_value = 1.0;            // by permutation of the records
 };
 
+// A law that the friction of the slower, or of the faster, records follows, but not that of all: it is not named.
+struct LawInRange {
+  std::vector<std::string> effects;  // more than one: not distinguished
+  std::size_t records = 0, of_records = 0;
+  double lowest_speed = 0.0, highest_speed = 0.0;  // rms of the records, rad/s
+  double explained_percent = 0.0;                  // of the variance between the records of the range
+  double p_value = 1.0;                            // by permutation; that ranges were tried is counted
+  double p_value_of_all = 1.0;                     // of the best law over all records
+};
+
 enum class Verdict {
   missing_effect,
   confusable_effects,
@@ -168,6 +178,7 @@ struct Diagnosis {
   bool partial = false;                     // more is missing than what is named
   std::optional<UnknownStructure> unknown;  // where the verdict is unknown_structure and a curve shows what it is
   std::optional<BetweenRecords> between_records;
+  std::optional<LawInRange> law_in_range;
   std::optional<double> delay_s;  // of the effort against the motion, beyond the alignment, where significant
 };
 

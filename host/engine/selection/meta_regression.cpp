@@ -2,7 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
-#include <numeric>
+#include <map>
 #include <random>
 
 namespace flexspline::selection {
@@ -21,16 +21,18 @@ struct Fitted {
 
 // Alternates between mean and coefficient, by weighted least squares, and the variances between records. These begin at
 // the variance of the parameters and are moved to where the derivative of the likelihood is zero (fixed point of
-// Thompson and Sharp 1999, method 3); never below zero. `with` is false: the coefficient stays zero.
+// Thompson and Sharp 1999, method 3); never below zero. What a record does not identify has weight zero. `with` is
+// false: the coefficient stays zero.
 Fitted maximise_likelihood(const RecordParameters& records, const Eigen::MatrixXd& added, bool with) {
-  const ArrayXXd theta = records.theta, p = added, within = records.variance;
+  const ArrayXXd theta = records.theta, p = added;
+  const ArrayXXd known = records.variance.array().isFinite().cast<double>();
+  const ArrayXXd within = records.variance.array().isFinite().select(records.variance.array(), 0.0);
   const auto weighted_mean = [](const ArrayXXd& w, const ArrayXXd& x) {
     return RowVectorXd(((w * x).colwise().sum() / w.colwise().sum()).matrix());
   };
   const auto centred = [](const ArrayXXd& x, const RowVectorXd& mean) { return ArrayXXd(x.rowwise() - mean.array()); };
   Fitted fit;
-  const RowVectorXd all = theta.colwise().mean();
-  const RowVectorXd spread = centred(theta, all).square().colwise().mean();
+  const RowVectorXd spread = weighted_mean(known, centred(theta, weighted_mean(known, theta)).square());
   fit.between = spread;
   const RowVectorXd least = 1e-12 * spread;
   constexpr int kRounds = 100;
@@ -38,7 +40,7 @@ Fitted maximise_likelihood(const RecordParameters& records, const Eigen::MatrixX
   ArrayXXd residual, variance;
   for (int round = 0; round < kRounds; ++round) {
     variance = within.rowwise() + fit.between.cwiseMax(least).array();
-    const ArrayXXd w = variance.inverse();
+    const ArrayXXd w = known / variance;
     const RowVectorXd mean_theta = weighted_mean(w, theta), mean_added = weighted_mean(w, p);
     const ArrayXXd e = centred(theta, mean_theta), q = centred(p, mean_added);
     const double information = (w * q.square()).sum();
@@ -56,7 +58,7 @@ Fitted maximise_likelihood(const RecordParameters& records, const Eigen::MatrixX
     if (moved < kSame) break;
   }
   variance = within.rowwise() + fit.between.cwiseMax(least).array();
-  fit.deviance = (variance.log() + residual.square() / variance).sum();
+  fit.deviance = (known * (variance.log() + residual.square() / variance)).sum();
   return fit;
 }
 
@@ -86,27 +88,64 @@ bool is_possible(const MetaRegression& fit) {
   return fit.coefficient > 0.0 && fit.mean.size() > 0 && fit.mean.minCoeff() >= 0.0;
 }
 
-double permutation_p_value(const RecordParameters& records, const std::vector<Eigen::MatrixXd>& added, int permutations,
-                           std::uint64_t seed) {
-  std::vector<Eigen::Index> order(static_cast<std::size_t>(records.theta.rows()));
-  std::iota(order.begin(), order.end(), Eigen::Index{0});
-  const Fitted without = without_effect(records);
-  const auto best = [&] {
+namespace {
+
+// Records that identify the same parameters.
+std::vector<std::vector<Eigen::Index>> strata_of(const Eigen::MatrixXd& variance) {
+  std::map<std::vector<bool>, std::vector<Eigen::Index>> strata;
+  for (Eigen::Index i = 0; i < variance.rows(); ++i) {
+    std::vector<bool> known;
+    for (Eigen::Index j = 0; j < variance.cols(); ++j) known.push_back(std::isfinite(variance(i, j)));
+    strata[known].push_back(i);
+  }
+  std::vector<std::vector<Eigen::Index>> list;
+  for (auto& [known, records] : strata) list.push_back(std::move(records));
+  return list;
+}
+
+}  // namespace
+
+Part all_of(const RecordParameters& records) {
+  Part all;
+  for (Eigen::Index i = 0; i < records.theta.rows(); ++i) all.records.push_back(i);
+  for (Eigen::Index j = 0; j < records.theta.cols(); ++j) all.parameters.push_back(j);
+  return all;
+}
+
+double permutation_p_value(const RecordParameters& records, const std::vector<Eigen::MatrixXd>& added,
+                           const std::vector<Part>& parts, int permutations, std::uint64_t seed) {
+  std::vector<RecordParameters> in_part;
+  std::vector<Fitted> without;
+  for (const Part& part : parts) {
+    in_part.push_back(part(records));
+    without.push_back(without_effect(in_part.back()));
+  }
+  const auto best = [&](const std::vector<Eigen::Index>& order) {
     double largest = 0.0;
-    for (const Eigen::MatrixXd& one : added)
-      if (const MetaRegression fitted = against(without, records, one(order, Eigen::all)); is_possible(fitted))
-        largest = std::max(largest, fitted.likelihood_ratio);
+    for (const Eigen::MatrixXd& one : added) {
+      const Eigen::MatrixXd permuted = one(order, Eigen::all);
+      for (std::size_t k = 0; k < parts.size(); ++k)
+        if (const MetaRegression fitted = against(without[k], in_part[k], parts[k](permuted)); is_possible(fitted))
+          largest = std::max(largest, fitted.likelihood_ratio);
+    }
     return largest;
   };
-  const double recorded = best();
+  std::vector<Eigen::Index> order = all_of(records).records;
+  const double recorded = best(order);
   if (recorded <= 0.0) return 1.0;
+  const std::vector<std::vector<Eigen::Index>> strata = strata_of(records.variance);
   std::mt19937_64 random(seed);
-  int reached = 1;
-  for (int k = 1; k < permutations; ++k) {
-    std::shuffle(order.begin(), order.end(), random);
-    if (best() >= recorded) ++reached;
+  constexpr int kEnough = 20;
+  int reached = 1, tried = 1;
+  for (; tried < permutations && reached < kEnough; ++tried) {
+    for (const std::vector<Eigen::Index>& stratum : strata) {
+      std::vector<Eigen::Index> drawn = stratum;
+      std::shuffle(drawn.begin(), drawn.end(), random);
+      for (std::size_t i = 0; i < drawn.size(); ++i) order[static_cast<std::size_t>(stratum[i])] = drawn[i];
+    }
+    if (best(order) >= recorded) ++reached;
   }
-  return static_cast<double>(reached) / permutations;
+  return static_cast<double>(reached) / tried;
 }
 
 }  // namespace flexspline::selection

@@ -179,6 +179,7 @@ struct SelectionPolicy {
   // Trends of parameters over experiments (step 14).
   std::size_t fewest_of_trend = 6;  // experiments
   double trend_p_value = 1e-3;      // after the correction for what was tried
+  double range_p_value = 0.01;      // of a law that holds for the slower or the faster records: is told, not named
   double trend_size = 0.03;         // of the parameter, over the records
   double least_drift = 0.01;        // relative standard deviation of friction between records that is reported
   double drift_deviance = 12.0;     // twice the log-likelihood ratio of random effects against none

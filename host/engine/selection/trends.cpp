@@ -107,6 +107,14 @@ std::vector<Trend> parameter_trends(const estimation::Identification& identified
   return trends;
 }
 
+double rms_speed(const estimation::Record& record) {
+  double squares = 0.0;
+  record.inputs.all().each_block([&](std::size_t, auto stretch) {
+    for (const auto& in : stretch) squares += in.velocity * in.velocity;
+  });
+  return std::sqrt(squares / static_cast<double>(std::max<std::size_t>(1, record.inputs.size())));
+}
+
 std::vector<Drift> drifts(const CrossValidatedFit& fit) {
   std::vector<Drift> list;
   const double tau = fit.autocorrelation_time;

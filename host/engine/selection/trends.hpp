@@ -23,6 +23,9 @@ struct Trend {
 // first. Needs six experiments that identify the parameter; standing still counts as none.
 std::vector<Trend> parameter_trends(const estimation::Identification& identified);
 
+// Of the velocity that the balance of the motor has, rad/s.
+double rms_speed(const estimation::Record& record);
+
 // Friction that differs between runs without a known cause.
 struct Drift {
   std::string group;  // "viscous friction"

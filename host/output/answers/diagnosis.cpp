@@ -146,6 +146,28 @@ json between_records_json(const selection::Diagnosis& d) {
           {"p_value", d.between_records->p_value}};
 }
 
+json law_in_range_json(const selection::Diagnosis& d) {
+  if (!d.law_in_range) return nullptr;
+  const selection::LawInRange& law = *d.law_in_range;
+  return {{"effects", law.effects},
+          {"records", law.records},
+          {"of_records", law.of_records},
+          {"lowest_speed", law.lowest_speed},
+          {"highest_speed", law.highest_speed},
+          {"explained_percent", law.explained_percent},
+          {"p_value", law.p_value},
+          {"p_value_of_all", law.p_value_of_all}};
+}
+
+std::string law_in_range_text(const selection::LawInRange& law) {
+  return fmt::format(
+      "Friction of the {} records with an rms speed of {:.3g} to {:.3g} rad/s differs between them as {} says (p = "
+      "{:.2g}, {:.0f} % of its variance). Over all {} records it does not (p = {:.2g}), so it is not named: what the "
+      "others lack is something else, or the law ends there. Record one motion over the whole range of speeds.",
+      law.records, law.lowest_speed, law.highest_speed, listed(law.effects, "or"), law.p_value, law.explained_percent,
+      law.of_records, law.p_value_of_all);
+}
+
 json unknown_json(const Diagnosis& d) {
   if (!d.unknown) return nullptr;
   const selection::UnknownStructure& u = *d.unknown;
@@ -311,6 +333,7 @@ void print_diagnosis(Console& console, const Diagnosis& d, const std::string& ad
                             *d.delay_s > 0.0 ? "lags" : "leads", 1e3 * std::abs(*d.delay_s))));
   for (const selection::NamedEffect& named : d.named)
     if (const Candidate* c = candidate_of(d, named)) print_explanation(console, *c, d.unit);
+  if (d.law_in_range) console.line(wrapped(law_in_range_text(*d.law_in_range)));
   if (d.unknown) print_unknown(console, d);
   if (!d.candidates.empty()) {
     console.line();
@@ -389,6 +412,7 @@ json diagnosis_json(const Diagnosis& d) {
           {"disturbances", std::move(disturbances)},
           {"partial", d.partial},
           {"between_records", between_records_json(d)},
+          {"law_in_range", law_in_range_json(d)},
           {"resampling", resampling_json(d)},
           {"unknown", unknown_json(d)},
           {"delay_s", json_number(d.delay_s)},

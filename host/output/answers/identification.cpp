@@ -267,6 +267,7 @@ json identification_json(const estimation::Identification& found, const std::str
     add_by_experiment(parameter, e);
     parameter["identifiable"] = e.identifiable;
     parameter["excitation"] = json_number(e.excitation);
+    parameter["change_at_twice_cutoff"] = json_number(e.change_at_twice_cutoff);
     parameters.push_back(std::move(parameter));
   }
   json derived = json::array();

@@ -1,0 +1,136 @@
+#include "host/engine/selection/record_laws.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+#include <optional>
+#include <string>
+#include <tuple>
+#include <utility>
+
+#include "host/engine/estimation/least_squares.hpp"
+#include "host/engine/estimation/model_projection.hpp"
+#include "host/engine/estimation/variable_projection.hpp"
+#include "host/engine/selection/policy.hpp"
+
+namespace flexspline::selection {
+namespace {
+
+using estimation::BalanceData;
+using estimation::Estimate;
+using estimation::RowRange;
+using estimation::Term;
+
+// What the record says of a parameter: value and variance, an infinite one where it does not identify it.
+std::pair<double, double> value_in(const Estimate& parameter, const std::string& record) {
+  const auto& values = parameter.per_experiment;
+  const auto at = std::find_if(values.begin(), values.end(), [&](const auto& v) { return v.name == record; });
+  if (at == values.end() || !at->value || !at->std) return {0.0, std::numeric_limits<double>::infinity()};
+  return {*at->value, *at->std * *at->std};
+}
+
+// The friction that the model takes for the law in each record; nothing where more of the law's torque is left in a
+// record than a term needs to be chosen there: then the records show it themselves.
+std::optional<Eigen::MatrixXd> as_friction(BalanceData& data, const estimation::Terms& base, const RecordFriction& own,
+                                           const Eigen::VectorXd& torque, const Eigen::VectorXd& root_weights) {
+  std::vector<estimation::ParameterRef> refs;
+  for (const Estimate* e : own.parameters) refs.push_back(e->ref);
+  const Eigen::MatrixXd columns = estimation::columns_of(data, base, refs);
+  Eigen::MatrixXd added(own.values.theta.rows(), own.values.theta.cols());
+  for (std::size_t i = 0; i < own.records.size(); ++i) {
+    const RowRange& range = own.records[i];
+    const Eigen::VectorXd weights = root_weights.segment(range.first, range.size());
+    const Eigen::VectorXd here = torque.segment(range.first, range.size());
+    const Eigen::MatrixXd friction = columns.middleRows(range.first, range.size());
+    const estimation::LinearFit fit = estimation::least_squares(friction, here, weights);
+    const double left = weights.cwiseProduct(here - friction * fit.theta).squaredNorm();
+    if (!(left <= kPolicy.line_share * weights.cwiseProduct(here).squaredNorm())) return std::nullopt;
+    added.row(static_cast<Eigen::Index>(i)) = fit.theta.transpose();
+  }
+  return added;
+}
+
+}  // namespace
+
+RecordFriction friction_by_record(const estimation::Identification& base, const BalanceData& data) {
+  const auto identified = [&](const Estimate& e) {
+    return static_cast<std::size_t>(
+        std::count_if(data.records().begin(), data.records().end(), [&](const RowRange& range) {
+          const estimation::Record& record = base.prepared.records[range.record];
+          return !record.at_rest && std::isfinite(value_in(e, record.name).second);
+        }));
+  };
+  RecordFriction friction;
+  for (const Estimate& e : base.estimates) {
+    const catalogue::Entry& entry = *base.terms[e.ref.term].entry;
+    if (entry.info->balance != data.balance() || entry.info->surface.empty() || e.fixed) continue;
+    if (entry.parameters[e.ref.parameter].kind == effects::Kind::linear && identified(e) >= kPolicy.fewest_of_trend)
+      friction.parameters.push_back(&e);
+  }
+  const auto parameters = static_cast<Eigen::Index>(friction.parameters.size());
+  auto& [theta, variance] = friction.values;
+  theta.resize(static_cast<Eigen::Index>(data.records().size()), parameters);
+  variance.resize(theta.rows(), parameters);
+  for (const RowRange& range : data.records()) {
+    const estimation::Record& record = base.prepared.records[range.record];
+    const auto row = static_cast<Eigen::Index>(friction.records.size());
+    for (Eigen::Index j = 0; j < parameters; ++j)
+      std::tie(theta(row, j), variance(row, j)) =
+          value_in(*friction.parameters[static_cast<std::size_t>(j)], record.name);
+    if (!record.at_rest && variance.row(row).array().isFinite().any()) friction.records.push_back(range);
+  }
+  theta.conservativeResize(static_cast<Eigen::Index>(friction.records.size()), parameters);
+  variance.conservativeResize(theta.rows(), parameters);
+  return friction;
+}
+
+std::vector<Part> ranges_of_speed(const RecordFriction& own, const std::vector<double>& speeds) {
+  std::vector<Eigen::Index> order = all_of(own.values).records;
+  std::stable_sort(order.begin(), order.end(), [&](Eigen::Index a, Eigen::Index b) {
+    return speeds[static_cast<std::size_t>(a)] < speeds[static_cast<std::size_t>(b)];
+  });
+  std::vector<Part> ranges;
+  const auto add = [&](auto first, auto last) {
+    Part range{{first, last}, {}};
+    for (const Eigen::Index j : all_of(own.values).parameters) {
+      const auto identify =
+          std::count_if(first, last, [&](Eigen::Index i) { return std::isfinite(own.values.variance(i, j)); });
+      if (static_cast<std::size_t>(identify) >= kPolicy.fewest_of_trend) range.parameters.push_back(j);
+    }
+    if (!range.parameters.empty()) ranges.push_back(std::move(range));
+  };
+  for (std::ptrdiff_t tenth = 1; tenth < 10; ++tenth) {
+    const auto at = order.begin() + std::ssize(order) * tenth / 10;
+    add(order.begin(), at);
+    add(at, order.end());
+  }
+  return ranges;
+}
+
+std::vector<Law> laws(const estimation::Identification& base, const SearchedBalance& motor, const RecordFriction& own) {
+  BalanceData data = *motor.search.data;
+  std::vector<Law> all;
+  for (const CandidateFit& candidate : motor.candidates) {
+    estimation::Terms terms = candidate.model.terms;
+    Term& law = terms.back();
+    std::vector<std::size_t> nonlinear;
+    for (std::size_t p = 0; p < law.values.size(); ++p) {
+      if (law.free_nonlinear(p)) nonlinear.push_back(p);
+      if (law.free_linear(p)) law.values[p] = law.entry->parameters[p].usual;
+    }
+    // An order over the angle averages out over a record.
+    if (candidate.model.order || law.entry->count(effects::Kind::linear) == 0 || nonlinear.size() > 1) continue;
+    std::vector<double> grid{0.0};
+    if (!nonlinear.empty())
+      grid = estimation::parameter_grid(estimation::parameter_range(data, law, nonlinear[0]), kGridPoints);
+    for (const double value : grid) {
+      if (!nonlinear.empty()) law.values[nonlinear[0]] = value;
+      const Eigen::VectorXd torque = data.term_torque(terms, terms.size() - 1);
+      if (auto added = as_friction(data, base.terms, own, torque, motor.search.base.root_weights))
+        all.push_back({&candidate, law.values, std::move(*added)});
+    }
+  }
+  return all;
+}
+
+}  // namespace flexspline::selection
