@@ -35,6 +35,8 @@ class DriveBoard {
 
   // Pins and clock first: the amplifier is off from the first instructions on. False: no clock that a drive can run on.
   bool start_clock() {
+    static_assert(Description::kClock.core_hz > 150'000'000 && Description::kClock.core_hz <= 168'000'000,
+                  "the PLL's and the converter's dividers are for 150 to 168 MHz: boards/PORTING.md, step 3");
     const bool crashed = crash_was_noted();
     cause_ = watchdog_was_the_reset() ? firmware::ResetCause::watchdog
              : crashed                ? firmware::ResetCause::crash

@@ -1,4 +1,4 @@
-// The list of effects: one line each, in the order of their numbers.
+// The list of effects: one line each, by name.
 #pragma once
 
 #include "shared/effects/angle_dependent_friction.hpp"

@@ -32,8 +32,7 @@ struct Parameter {
 };
 Parameter parameter_of(const json& answer, const std::string& effect, const std::string& name) {
   for (const json& p : answer["parameters"])
-    if (p["effect"] == effect && p["parameter"] == name)
-      return {p["value"], p["std"]};
+    if (p["effect"] == effect && p["parameter"] == name) return {p["value"], p["std"]};
   ADD_FAILURE() << "no " << effect << "." << name;
   return {};
 }
