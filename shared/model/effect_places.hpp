@@ -44,10 +44,11 @@ constexpr std::string_view name_of(std::size_t number) {
 // Visits the names of a list, "coulomb_friction,torque_ripple".
 template <class Visit>
 constexpr void for_each_name(std::string_view list, Visit&& visit) {
-  while (!list.empty()) {
-    const std::size_t comma = list.find(',');
-    visit(list.substr(0, comma));
-    list = comma == std::string_view::npos ? std::string_view{} : list.substr(comma + 1);
+  std::size_t begin = 0;
+  for (std::size_t i = 0; i <= list.size(); ++i) {
+    if (i < list.size() && list[i] != ',') continue;
+    if (i > begin) visit(list.substr(begin, i - begin));
+    begin = i + 1;
   }
 }
 constexpr bool is_named(std::string_view list, std::string_view name) {

@@ -52,6 +52,7 @@ TEST(Drives, SaysWhatStandsBehindASocketAndWhatCannotBeReached) {
   EXPECT_GT(first["effects"].get<int>(), 40);
   EXPECT_TRUE(first["usable"].get<bool>());
   EXPECT_EQ(first["firmware_key"], "development");
+  EXPECT_TRUE(first["fault_reason"].is_null());
   EXPECT_FALSE(answer["drives"][1]["usable"].get<bool>());
   EXPECT_TRUE(contains(answer["drives"][1]["problem"].get<std::string>(), "is the twin running?"));
 }
@@ -266,6 +267,10 @@ TEST(Record, StopsAtALimitOfThePlanAndAtAFaultAndSaysSo) {
   const Answer again = shell.run("flexspline record --plan plan.toml --out three --drive " + twin.name());
   EXPECT_EQ(again.code, 2);
   EXPECT_TRUE(contains(again.err, "is in the fault state")) << again.err;
+  const json seen = shell.json("flexspline drives --also " + twin.name())["drives"][0];
+  EXPECT_EQ(seen["mode"], "fault");
+  EXPECT_EQ(seen["fault"], "motor_encoder_stale");
+  EXPECT_TRUE(contains(seen["fault_reason"].get<std::string>(), "encoder"));
 }
 
 TEST(Record, RefusesAPlanThatTheDriveCannotRunBeforeAnythingMoves) {

@@ -138,6 +138,7 @@ cut_short() { # TOOL
   now_in_use "$1"
   wanted=$other
   must "$1" restore
+  rm -f cut.block # of the other way, where that backup was done before the plug was pulled
   pulled 0 "$1" backup --out cut.block
   if was_cut "a backup"; then
     cut=$((cut + 1))

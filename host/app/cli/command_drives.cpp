@@ -6,6 +6,7 @@
 #include "host/app/cli/common_options.hpp"
 #include "host/app/cli/drive_commands.hpp"
 #include "host/output/answers/json.hpp"
+#include "host/output/answers/text.hpp"
 #include "shared/protocol/texts.hpp"
 
 namespace flexspline::cli {
@@ -36,6 +37,11 @@ json key_text(protocol::FirmwareKey key) {
   }
 }
 
+// Of the present fault, or of the last one where the drive works again; null without one.
+json reason_of(const protocol::Status& status) {
+  return status.fault == 0 ? json() : json(protocol::fault_text(status.fault, status.fault_limit).reason);
+}
+
 // Queries the identity of a drive. A problem of one drive does not hide the others.
 FoundDrive queried(transport::Found found) {
   FoundDrive seen{std::move(found), nullptr};
@@ -59,6 +65,7 @@ FoundDrive queried(transport::Found found) {
                    {"block_bytes", id.block_bytes},
                    {"mode", protocol::name_of(status.mode)},
                    {"fault", protocol::fault_text(status.fault).name},
+                   {"fault_reason", reason_of(status)},
                    {"has_parameters", status.has_parameters}};
   } catch (const std::exception& error) {
     seen.found.usable = false;
@@ -90,6 +97,8 @@ int run(const DrivesOptions& options, Console& console) {
                                    ? ""
                                    : fmt::format(", {} by the pairing key {}", one.answer["pairing"].get<std::string>(),
                                                  one.answer["pairing_key"].get<std::string>())));
+      if (one.answer["mode"] == "fault")
+        console.line(output::wrapped(console.bad(one.answer["fault_reason"].get<std::string>()), 4));
     }
     list.push_back(std::move(entry));
   }
