@@ -11,8 +11,8 @@ mkdir -p "$folder"
 names=$(cd "$root/shared/effects" && grep -l '^FLEXSPLINE_EFFECT(' ./*.hpp | xargs grep -LE '\.(host_only|user_defined) = true' |
   sed 's/^\.\///; s/\.hpp$//' | sort)
 
-build() { # NAME EFFECTS: the line that the build prints
-  EFFECTS=$2 FLAGS= "$root/boards/stm32f4/build_application.sh" stm32f405 "$folder/$1" application 2>"$folder/$1.log" >"$folder/$1.txt" ||
+build() { # NAME EFFECTS, or - for all: the line that the build prints
+  EFFECTS=${2#-} FLAGS= "$root/boards/stm32f4/build_application.sh" stm32f405 "$folder/$1" application 2>"$folder/$1.log" >"$folder/$1.txt" ||
     {
       cat "$folder/$1.log" >&2
       exit 1
@@ -22,9 +22,9 @@ export -f build
 export root folder
 {
   echo "none inertia"
-  echo "all "
+  echo "all -"
   for name in $names; do [[ $name == inertia ]] || echo "$name inertia,$name"; done
-} | xargs -P "$(nproc)" -L 1 bash -c 'build "$0" "${1:-}"'
+} | xargs -P "$(nproc)" -L 1 bash -c 'build "$0" "$1"'
 
 bytes() { sed -n "s/.*$2 *\([0-9]*\).*/\1/p" "$folder/$1.txt"; } # NAME flash|RAM
 none_flash=$(bytes none flash) none_ram=$(bytes none RAM)
@@ -34,7 +34,7 @@ none_flash=$(bytes none flash) none_ram=$(bytes none RAM)
   echo "Made by \`./dev firmware costs\` at $version, not edited by hand. The application of the STM32F405 (variant dac) with the effect"
   echo "\`inertia\` alone takes $none_flash bytes of flash and $none_ram of RAM, with all effects $(bytes all flash) and $(bytes all RAM). A row has what"
   echo "one effect adds to that: an effect with a stated order has four places in a model. Instructions: of a tick on a Cortex-M4, in an image that has"
-  echo "no other effect. A set costs less than the sum of its rows, as effects share functions."
+  echo "no other effect. A set costs less than the sum of its rows, as effects share functions: all of them $(($(bytes all flash) - none_flash)) bytes."
   echo
   echo "A set is chosen when the image is built: \`EFFECTS=inertia,viscous_friction,coulomb_friction boards/stm32f405/build.sh OUT dac\`,"
   echo "which prints its flash and RAM. The drive tells the host which effects it has; \`pack\` and \`flash\` refuse a model with others."
