@@ -4,7 +4,7 @@
 #include <cmath>
 
 #include "host/physics/catalogue/constants.hpp"
-#include "host/physics/catalogue/settled.hpp"
+#include "host/physics/catalogue/steady_torques.hpp"
 #include "host/physics/catalogue/user_defined_effect.hpp"
 
 namespace flexspline::deployment {
@@ -52,7 +52,7 @@ double torque_held_by_friction(const model::Model& model) {
         in.torque = in.torque_magnitude = load;
         in.temperature = drive.reference_temperature;
         in.viscous_scale = in.coulomb_scale = 1.0;
-        held += way * catalogue::settled_torques(*entry.make(values.data(), drive), entry.has_state, in).motor;
+        held += way * catalogue::steady_torques(*entry.make(values.data(), drive), entry.has_state, in).motor;
       }
     }
     most = std::max(most, held);

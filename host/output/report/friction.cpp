@@ -6,7 +6,7 @@
 #include "host/engine/estimation/least_squares.hpp"
 #include "host/output/answers/json.hpp"
 #include "host/output/report/parts.hpp"
-#include "host/physics/catalogue/settled.hpp"
+#include "host/physics/catalogue/steady_torques.hpp"
 
 namespace flexspline::report {
 namespace {
@@ -19,8 +19,8 @@ using output::json_numbers;
 constexpr std::size_t kBinsOfADirection = 30;
 constexpr double kFewestInBin = 8.0;
 
-// Torque on the motor of an effect in steady motion of a loaded drive, once its memory has settled. The angle is the
-// same in all: what follows it is no friction.
+// Torque on the motor of an effect in steady motion of a loaded drive, with its memory in steady state. The angle is
+// the same in all: what follows it is no friction.
 double steady_torque(const estimation::Term& term, const View& view, double velocity) {
   const std::vector<double> values = catalogue::natural(*term.entry, term.values);
   const auto instance = term.entry->make(values.data(), view.prepared.constants);
@@ -34,7 +34,7 @@ double steady_torque(const estimation::Term& term, const View& view, double velo
   in.current = 1.0;
   in.temperature = view.prepared.constants.reference_temperature;
   in.viscous_scale = in.coulomb_scale = 1.0;
-  const effects::Torques<catalogue::Real> torques = catalogue::settled_torques(*instance, term.entry->has_state, in);
+  const effects::Torques<catalogue::Real> torques = catalogue::steady_torques(*instance, term.entry->has_state, in);
   return torques.motor + (view.prepared.torque_measured ? 0.0 : torques.load / gear);
 }
 

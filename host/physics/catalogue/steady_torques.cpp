@@ -1,11 +1,11 @@
-#include "host/physics/catalogue/settled.hpp"
+#include "host/physics/catalogue/steady_torques.hpp"
 
 #include <cmath>
 #include <numbers>
 
 namespace flexspline::catalogue {
 
-effects::Torques<Real> settled_torques(Instance& effect, bool has_state, effects::Inputs<Real> in) {
+effects::Torques<Real> steady_torques(Instance& effect, bool has_state, effects::Inputs<Real> in) {
   constexpr int kStepsATurn = 4096;  // short compared with presliding
   if (has_state) {
     const double turn = std::copysign(2.0 * std::numbers::pi, in.velocity);
