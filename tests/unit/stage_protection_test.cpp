@@ -77,8 +77,7 @@ TEST(StageProtection, AHotStageStaysHotUntilItIsBelowTheLowerTemperature) {
   EXPECT_EQ(thermistor.update(s, thermistor_reading(88.0)), ThermistorFault::none);
 }
 
-// Duty and heat by the two equations in double.
-TEST(StageProtection, TheBrakeResistorsShareAndItsHeatFollowTheirEquations) {
+deployment::ChopperSetup brake_of_20_ohm() {
   deployment::ChopperSetup setup;
   setup.bus_full_scale_v = 60.0;
   setup.pwm_hz = 40e3;
@@ -87,7 +86,12 @@ TEST(StageProtection, TheBrakeResistorsShareAndItsHeatFollowTheirEquations) {
   setup.ohm = 20.0;
   setup.energy_j = 20.0;
   setup.continuous_w = 5.0;
-  const auto s = deployment::chopper_settings(setup);
+  return setup;
+}
+
+// Duty and heat by the two equations in double.
+TEST(StageProtection, TheBrakeResistorsShareAndItsHeatFollowTheirEquations) {
+  const auto s = deployment::chopper_settings(brake_of_20_ohm());
   BrakeChopper chopper;
   double heat_j = 0.0;
   int on = 0;
@@ -103,15 +107,7 @@ TEST(StageProtection, TheBrakeResistorsShareAndItsHeatFollowTheirEquations) {
 }
 
 TEST(StageProtection, ABrakeResistorThatTookItsEnergyGoesOffUntilHalfOfItHasGone) {
-  deployment::ChopperSetup setup;
-  setup.bus_full_scale_v = 60.0;
-  setup.pwm_hz = 40e3;
-  setup.begin_v = 51.0;
-  setup.full_v = 54.0;
-  setup.ohm = 20.0;
-  setup.energy_j = 20.0;
-  setup.continuous_w = 5.0;
-  const auto s = deployment::chopper_settings(setup);
+  const auto s = deployment::chopper_settings(brake_of_20_ohm());
   BrakeChopper chopper;
   const std::int32_t bus = 29'900;  // 54.7 V: 0.9 of 150 W
   int periods = 0;
