@@ -135,7 +135,8 @@ class ThreePhaseStageOf {
   static constexpr int kFilterBits = 4;  // of the speed: periods
   using Switches = control::commissioning::Outputs;
 
-  Switches measure(const Inputs& in, StageFault cause) {
+  // Cold: not a part of the current loop's code, and made for size.
+  [[gnu::cold, gnu::noinline]] Switches measure(const Inputs& in, StageFault cause) {
     // The bus first: a driver may trip by it.
     commissioning_fault_ = in.bus > s_.most_bus ? StageFault::bus_high : cause;
     commissions_ = commissioning_fault_ == StageFault::none;

@@ -49,4 +49,29 @@ Stop Chip::tick() {
   return machine.run();
 }
 
+Stop Chip::period() {
+  constexpr std::uint32_t kWatch = 27, kConverted = 18, kTick = 14;
+  usart2.pass();
+  usart3.pass();
+  watchdog.pass(50e-6);
+  if (senses) senses();
+  tim1.counts_down = false;
+  if (!timer_is_dead && tim1.reach_compare4() && machine.interrupt_is_enabled(kWatch)) {
+    const Stop stop = machine.interrupt(16 + kWatch);
+    if (stop != Stop::waits) return stop;
+  }
+  if (tim1.triggers_by_compare4() && !converter_is_dead) converter.trigger();
+  tim1.counts_down = !loop_is_late;
+  if (converter.interrupts() && machine.interrupt_is_enabled(kConverted)) {
+    const Stop stop = machine.interrupt(16 + kConverted);
+    if (stop != Stop::waits) return stop;
+  }
+  if (machine.tick_is_requested()) {
+    const Stop stop = machine.interrupt(kTick);
+    if (stop != Stop::waits) return stop;
+  }
+  if (acts) acts();
+  return machine.run();
+}
+
 }  // namespace flexspline::tests

@@ -33,13 +33,21 @@ class Chip {
     for (int i = 0; i < n && stop == Stop::waits; ++i) stop = tick();
     return stop;
   }
+  // The same of a chip with three half bridges: the world, the trigger of the converters, the current loop, and every
+  // second time the tick.
+  Stop period();
+  Stop periods(int n) {
+    Stop stop = Stop::waits;
+    for (int i = 0; i < n && stop == Stop::waits; ++i) stop = period();
+    return stop;
+  }
   // What the drive's share of full scale would be of the DAC, where it is enabled.
   double command() const { return dac.at(0x08) / 2048.0 - 1.0; }
 
   Machine machine;
   ClockModel clock{machine};
   FlashModel flash;
-  ConverterModel converter;
+  ConverterModel converter{machine, clock};
   AdvancedTimerModel tim1{machine};
   EncoderModel tim2, tim3{0xFFFF}, tim4{0xFFFF}, tim5;
   Registers dac, power;
@@ -50,7 +58,7 @@ class Chip {
   OtgModel otg{machine};
   AngleSensorOnSpi spi1{machine, [this] { return !ports[2].high(4); }};
   AngleSensorOnI2c i2c1{machine};
-  bool converter_is_dead = false, timer_is_dead = false;
+  bool converter_is_dead = false, timer_is_dead = false, loop_is_late = false;
   // What the world does before a tick, and what comes of it.
   std::function<void()> senses, acts;
 };

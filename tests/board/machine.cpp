@@ -15,7 +15,7 @@ namespace {
 constexpr std::uint32_t kRam = 0x20000000, kRamBytes = 128 * 1024, kFlash = 0x08000000, kFlashBytes = 512 * 1024;
 constexpr std::uint32_t kSystemMemory = 0x1FFF7000, kPage = 0x1000, kUniqueId = 0x1FFF7A10;
 constexpr std::uint32_t kReturn = kSystemMemory + 0x10;  // where a handler returns to
-constexpr std::uint32_t kCore = 0xE000E000, kVectorTable = 0xD08, kReset = 0xD0C, kInterruptEnable = 0x100;
+constexpr std::uint32_t kCore = 0xE000E000, kControlState = 0xD04, kVectorTable = 0xD08, kPriorities3 = 0xD20, kReset = 0xD0C, kInterruptEnable = 0x100;
 
 void check(uc_err error, const char* what) {
   if (error != UC_ERR_OK) throw std::runtime_error(std::string(what) + ": " + uc_strerror(error));
@@ -132,7 +132,10 @@ void Machine::write_window(uc_engine* uc, std::uint64_t offset, unsigned size, s
   const std::uint32_t address = window.start + static_cast<std::uint32_t>(offset);
   const auto word = static_cast<std::uint32_t>(value);
   if (window.start == kCore) {
-    m.system_[static_cast<std::uint32_t>(offset)] = word;
+    // Of the enables of interrupts zeros do nothing (ARMv7-M, B3.4.4).
+    const bool sets_only = offset >= kInterruptEnable && offset < kInterruptEnable + 32;
+    std::uint32_t& reg = m.system_[static_cast<std::uint32_t>(offset)];
+    reg = sets_only ? reg | word : word;
     if (offset == kVectorTable) m.vectors_ = word;
     if (offset == kReset && word == 0x05FA0004) {
       m.wants_reset_ = true;
@@ -168,6 +171,8 @@ Stop Machine::interrupt(std::uint32_t number) {
   for (std::size_t i = 0; i < std::size(kSaved); ++i) saved[i] = reg(kSaved[i]);
   set_reg(UC_ARM_REG_SP, (reg(UC_ARM_REG_SP) - 32) & ~7U);
   set_reg(UC_ARM_REG_LR, kReturn | 1);
+  constexpr std::uint32_t kPendSv = 14;
+  if (number == kPendSv) system_[kControlState] = 0;
   const Stop stop = go(word(vectors_ + 4 * number), kReturn);
   if (stop != Stop::waits) return stop;
   for (std::size_t i = 0; i < std::size(kSaved); ++i) set_reg(kSaved[i], saved[i]);
@@ -176,6 +181,25 @@ Stop Machine::interrupt(std::uint32_t number) {
 bool Machine::ticks_itself() const {
   const auto found = system_.find(0x010);
   return found != system_.end() && (found->second & 3) == 3;
+}
+bool Machine::tick_is_requested() const {
+  const auto found = system_.find(kControlState);
+  return found != system_.end() && (found->second >> 28 & 1) != 0;
+}
+std::uint32_t Machine::tick_priority() const {
+  const auto found = system_.find(kPriorities3);
+  return found == system_.end() ? 0 : found->second >> 16 & 0xFF;
+}
+void Machine::count_instructions(bool on) {
+  if (!on) {
+    uc_hook_del(uc_, counter_);
+    return;
+  }
+  const auto count = +[](uc_engine*, std::uint64_t, std::uint32_t, void* user) {
+    ++static_cast<Machine*>(user)->instructions_;
+  };
+  check(uc_hook_add(uc_, &counter_, UC_HOOK_CODE, reinterpret_cast<void*>(count), this, 1, 0),
+        "instructions cannot be counted");
 }
 bool Machine::interrupt_is_enabled(std::uint32_t number) const {
   const auto found = system_.find(kInterruptEnable + 4 * (number / 32));

@@ -61,6 +61,10 @@ class Machine {
   // As an exception of this number of the vector table: 16 and up are interrupts. The handler runs to its end.
   Stop interrupt(std::uint32_t number);
   bool ticks_itself() const;  // SysTick runs, with its interrupt
+  bool tick_is_requested() const;              // PendSV is pending
+  std::uint32_t tick_priority() const;         // its priority; zero is the highest
+  std::uint64_t instructions() const { return instructions_; }  // executed while they are counted
+  void count_instructions(bool on);
   std::uint32_t vectors() const { return vectors_; }
   bool interrupt_is_enabled(std::uint32_t number) const;
 
@@ -97,6 +101,8 @@ class Machine {
   std::map<std::uint32_t, std::uint32_t> system_;  // of the core: NVIC, SCB
   std::vector<std::string> violations_;
   std::uint32_t vectors_ = 0;
+  std::uint64_t instructions_ = 0;
+  uc_hook counter_ = 0;
   bool started_ = false;
   bool wants_reset_ = false;
   uc_err error_ = UC_ERR_OK;

@@ -1,0 +1,233 @@
+// Boards with three half bridges: set-up, the instant of the samples, what opens the switches, and the measurement of a
+// motor by the real image.
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <cstdio>
+#include <random>
+#include <set>
+#include <string>
+
+#include "shared/protocol/texts.hpp"
+#include "host/drive_link/deployment/commissioning_settings.hpp"
+#include "tests/board/stage_bench.hpp"
+
+namespace flexspline::tests {
+namespace {
+
+using protocol::CommissioningState, protocol::Kind, protocol::Mode;
+
+// RM0390 and the schematic of the X-NUCLEO-IHM08M1: shunts of 10 milliohm, amplifiers of 5.182 about 1.71 V, which fall
+// with a current into the motor; a divider of 169 and 9.31 kiloohm at the bus.
+StageWiring nucleo(const std::string& name = "ihm08m1") {
+  StageWiring w;
+  w.image = std::string(FLEXSPLINE_BOARDS) + "/nucleo_ihm08m1/" + name + ".elf";
+  w.written = {.address = 0x08020000,
+               .sectors = {{5, 0, 0x20000}, {6, 0x20000, 0x20000}, {7, 0x40000, 0x20000, false}}};
+  w.currents = {0, 11, 10};
+  w.full_scale_a = 1.65 / (0.01 * 5.1818);
+  w.zero_share = 1.71 / 1.65 - 1.0;
+  w.currents_fall = true;
+  w.bus = 1;
+  w.bus_full_scale_v = 3.3 * (169.0 + 9.31) / 9.31;
+  w.temperature = 12;
+  w.temperature_share = 4.7 / (10.0 + 4.7);  // 25 degrees Celsius
+  return w;
+}
+motor::MotorParameters some_motor() {
+  motor::MotorParameters m;
+  m.pole_pairs = 7;
+  m.resistance_ohm = 0.42;
+  m.inductance_d_h = 0.35e-3;
+  m.inductance_q_h = 0.45e-3;
+  m.flux_vs = 0.0075;
+  return m;
+}
+motor::InverterParameters inverter_of_24_v() {
+  motor::InverterParameters i;
+  i.supply_v = 24.0;
+  i.averaged_steps = 6;
+  return i;
+}
+struct NucleoBench : StageBench {
+  explicit NucleoBench(const std::string& name = "ihm08m1") : StageBench(nucleo(name), some_motor(), inverter_of_24_v()) {}
+};
+double timer_hz(const Chip& chip) {
+  return 2.0 * chip.clock.apb2_hz();
+}
+
+TEST(BoardStage, StartsWithAllSwitchesOpenADeadTimeAndABreakInput) {
+  NucleoBench bench;
+  Chip& chip = bench.chip;
+  bench.come_up();
+  EXPECT_EQ(chip.clock.core_hz(), 160e6);
+  EXPECT_FALSE(chip.tim1.outputs_on());
+  const std::uint32_t bdtr = chip.tim1.at(0x44);
+  EXPECT_NEAR((bdtr & 0x7F) / timer_hz(chip), 500e-9, 10e-9);
+  EXPECT_EQ(bdtr & 0x80, 0U);
+  EXPECT_EQ(bdtr & 0x3000, 0x1000U) << "a low break input opens all switches";
+  EXPECT_EQ(bdtr & 0x4000, 0U) << "they do not close by themselves";
+  for (const std::uint32_t channel : {1U, 2U, 3U}) {
+    EXPECT_EQ(chip.tim1.at(0x20) >> (4 * (channel - 1)) & 15, 13U) << "high side active high, low side active low";
+    EXPECT_FALSE(chip.tim1.is_on_while_off(channel, false)) << channel;
+    EXPECT_FALSE(chip.tim1.is_on_while_off(channel, true)) << channel;
+  }
+  EXPECT_DOUBLE_EQ(chip.tim1.period_us(timer_hz(chip)), 50.0);
+  EXPECT_EQ(chip.machine.tick_priority(), 0xFFU) << "the current loop interrupts the tick";
+  // Pins of the timer with pulls that hold the switches open before it drives them.
+  for (const auto& [port, pin, pull] : {std::array{0, 8, 2}, {0, 9, 2}, {0, 10, 2}, {0, 7, 1}, {1, 0, 1}, {1, 1, 1}}) {
+    EXPECT_EQ(chip.ports[port].mode(pin), 2U);
+    EXPECT_EQ(chip.ports[port].function(pin), 1U);
+    EXPECT_EQ(chip.ports[port].at(0x0C) >> (2 * pin) & 3, static_cast<std::uint32_t>(pull));
+  }
+  const auto status = bench.status();
+  EXPECT_EQ(status.mode, Mode::idle) << protocol::fault_text(status.fault).name << " " << status.fault_seen << " "
+                                     << status.fault_limit;
+  bench.expect_no_violation();
+}
+
+// The instant at which the currents are held is a number of the timer's and of the converters' registers: nothing that
+// the processor does moves it.
+TEST(BoardStage, TheInstantOfTheSamplesIsTheTimersWhateverTheProcessorDoes) {
+  NucleoBench bench;
+  Chip& chip = bench.chip;
+  bench.come_up();
+  const double hz = timer_hz(chip), apb2 = chip.clock.apb2_hz();
+  ASSERT_TRUE(chip.tim1.triggers_by_compare4());
+  const int timer_set_ups = chip.tim1.set_ups_while_it_runs, converter_set_ups = chip.converter.set_ups;
+  std::mt19937 random{3};
+  std::set<double> instants;
+  for (int k = 0; k < 2000; ++k) {
+    instants.insert(chip.tim1.trigger_us(hz) + chip.converter.sample_us(apb2) - chip.tim1.top_us(hz));
+    // The tick, an interrupt that waits, a command, a loop that ends late: whatever delays instructions.
+    if (random() % 8 == 0) bench.ask(Kind::status, protocol::Empty{});
+    chip.loop_is_late = random() % 16 == 0;
+    ASSERT_EQ(chip.period(), Stop::waits);
+  }
+  EXPECT_EQ(instants.size(), 1U) << "no jitter";
+  EXPECT_NEAR(*instants.begin(), 0.0, 0.01) << "us: held in the middle of the low sides' time";
+  EXPECT_EQ(chip.tim1.set_ups_while_it_runs, timer_set_ups) << "no register that the instant depends on is written";
+  EXPECT_EQ(chip.converter.set_ups, converter_set_ups);
+  EXPECT_LT(chip.converter.conversion_us(apb2), 4.0);
+  bench.expect_no_violation();
+}
+
+TEST(BoardStage, AConverterThatStopsOpensTheSwitchesWithinThreePeriodsAndIsAFault) {
+  NucleoBench bench;
+  bench.come_up();
+  Chip& chip = bench.chip;
+  chip.tim1.write(0x44, chip.tim1.at(0x44) | 1U << 15);  // as if it were on
+  ASSERT_TRUE(chip.tim1.outputs_on());
+  chip.converter_is_dead = true;
+  chip.converter.words[0x00] = 0;
+  chip.periods(3);
+  EXPECT_FALSE(chip.tim1.outputs_on());
+  const auto status = bench.status();
+  EXPECT_EQ(status.mode, Mode::fault);
+  EXPECT_EQ(protocol::fault_text(status.fault).name, "motor_encoder_stale") << "nothing is sampled any more";
+  EXPECT_GT(bench.status().tick, status.tick) << "the application goes on";
+  bench.expect_no_violation();
+}
+
+TEST(BoardStage, ACurrentLoopThatEndsAfterTheTimersBottomIsAnOverrun) {
+  NucleoBench bench;
+  bench.come_up();
+  bench.chip.loop_is_late = true;
+  bench.chip.periods(4);
+  bench.chip.loop_is_late = false;
+  EXPECT_EQ(protocol::fault_text(bench.status().fault).name, "tick_overrun");
+}
+
+// A host's part of commissioning.
+deployment::CommissioningSetup setup_of(const protocol::CommissioningStage& stage, double test_a) {
+  deployment::CommissioningSetup s;
+  s.current_full_scale_a = 1e-3 * stage.current_full_scale_ma;
+  s.bus_full_scale_v = 1e-3 * stage.bus_full_scale_mv;
+  s.pwm_hz = stage.pwm_hz;
+  s.timer_counts = static_cast<int>(stage.timer_counts);
+  s.two_sensors = stage.two_sensors;
+  s.current_a = test_a;
+  s.bus_v = 24.0;
+  return s;
+}
+protocol::CommissioningBegin begin_of(const deployment::CommissioningSetup& setup) {
+  const auto s = deployment::commissioning_settings(setup);
+  return {s.least_bus, s.current,         s.most_current, s.most_voltage, s.voltage_ramp, s.slow_step,
+          s.fast_step, s.most_shaft_step, s.step_ramp,    s.most_travel,  s.most_periods, s.stated_pole_pairs};
+}
+protocol::CommissioningProgress measure(StageBench& bench, const deployment::CommissioningSetup& setup) {
+  EXPECT_EQ(bench.ask(Kind::commissioning_begin, begin_of(setup)).code, 0);
+  for (;;) {
+    const auto now = bench.get<protocol::CommissioningProgress>(Kind::commissioning_state);
+    if (now.state != CommissioningState::runs) return now;
+    bench.chip.periods(2000);
+  }
+}
+control::commissioning::Result result_of(StageBench& bench) {
+  const auto from = bench.get<protocol::CommissioningResult>(Kind::commissioning_result);
+  control::commissioning::Result r;
+  r.gain = {from.gain[0], from.gain[1], from.gain[2]};
+  r.resistance = from.resistance;
+  r.inductance_d = from.inductance_d;
+  r.inductance_q = from.inductance_q;
+  r.flux = from.flux;
+  r.pole_pairs = from.pole_pairs;
+  r.reversed = from.reversed;
+  r.offset_angle = from.offset_angle;
+  return r;
+}
+void expect_measured(StageBench& bench, const motor::MotorParameters& truth, double test_a) {
+  const auto setup = setup_of(bench.get<protocol::CommissioningStage>(Kind::commissioning_stage), test_a);
+  const auto end = measure(bench, setup);
+  ASSERT_EQ(end.state, CommissioningState::done)
+      << deployment::commissioning_fault_text(end.fault).name << " " << int{end.phase} << " in "
+      << deployment::commissioning_step_text(end.step);
+  const auto found = deployment::commissioning_findings(setup, result_of(bench));
+  const double ohm = truth.resistance_ohm + motor::InverterParameters{}.on_resistance_ohm;
+  EXPECT_NEAR(found.resistance_ohm, ohm, 0.03 * ohm);
+  EXPECT_NEAR(found.inductance_d_h, truth.inductance_d_h, 0.05 * truth.inductance_d_h);
+  EXPECT_NEAR(found.inductance_q_h, truth.inductance_q_h, 0.05 * truth.inductance_q_h);
+  EXPECT_NEAR(found.flux_vs, truth.flux_vs, 0.02 * truth.flux_vs);
+  EXPECT_EQ(found.pole_pairs, truth.pole_pairs);
+  EXPECT_FALSE(found.reversed);
+  std::printf("R %+.2f %%, Ld %+.2f %%, Lq %+.2f %%, flux %+.2f %%, %.1f s\n", 100.0 * (found.resistance_ohm / ohm - 1.0),
+              100.0 * (found.inductance_d_h / truth.inductance_d_h - 1.0),
+              100.0 * (found.inductance_q_h / truth.inductance_q_h - 1.0),
+              100.0 * (found.flux_vs / truth.flux_vs - 1.0), end.periods / setup.pwm_hz);
+  bench.chip.periods(2);
+  EXPECT_FALSE(bench.is_on());
+  bench.expect_no_violation();
+}
+
+TEST(BoardStage, TheImageMeasuresAMotorThatNothingIsKnownOf) {
+  NucleoBench bench;
+  bench.come_up();
+  expect_measured(bench, some_motor(), 6.0);
+}
+
+TEST(BoardStage, ABreakOpensTheSwitchesWithoutTheProcessorAndStopsTheMeasurement) {
+  NucleoBench bench;
+  bench.come_up();
+  const auto setup = setup_of(bench.get<protocol::CommissioningStage>(Kind::commissioning_stage), 6.0);
+  ASSERT_EQ(bench.ask(Kind::commissioning_begin, begin_of(setup)).code, 0);
+  bench.chip.periods(3000);
+  ASSERT_TRUE(bench.is_on());
+  bench.chip.tim1.trip();
+  EXPECT_FALSE(bench.is_on()) << "before an instruction runs";
+  bench.chip.tim1.break_input = false;
+  bench.chip.periods(10);
+  EXPECT_FALSE(bench.is_on());
+  EXPECT_EQ(bench.get<protocol::CommissioningProgress>(Kind::commissioning_state).state,
+            CommissioningState::drive_fault);
+  EXPECT_EQ(protocol::fault_text(bench.status().fault).name, "amplifier_fault");
+  EXPECT_EQ(bench.status().fault_limit, static_cast<int>(protocol::StageFault::driver));
+  EXPECT_EQ(bench.command({.kind = protocol::CommandKind::clear_fault}), protocol::Refusal::none);
+  bench.chip.periods(300);
+  EXPECT_EQ(bench.ask(Kind::commissioning_begin, begin_of(setup)).code, 0);
+  bench.chip.periods(3000);
+  EXPECT_TRUE(bench.is_on()) << "the flag of the break was cleared";
+  bench.expect_no_violation();
+}
+
+}  // namespace
+}  // namespace flexspline::tests
