@@ -8,8 +8,13 @@
 #include <set>
 #include <string>
 
-#include "shared/protocol/texts.hpp"
+#include "hil/board/drive_setup.hpp"
+#include "hil/board/plant_rig.hpp"
+#include "hil/twin/factory_block.hpp"
 #include "host/drive_link/deployment/commissioning_settings.hpp"
+#include "host/drive_link/drive/motor_block.hpp"
+#include "shared/protocol/texts.hpp"
+#include "shared/storage/parameter_store.hpp"
 #include "tests/board/stage_bench.hpp"
 
 namespace flexspline::tests {
@@ -203,6 +208,123 @@ TEST(BoardStage, TheImageMeasuresAMotorThatNothingIsKnownOf) {
   NucleoBench bench;
   bench.come_up();
   expect_measured(bench, some_motor(), 6.0);
+}
+
+// Puts a block into the first parameter sectors before the drive is switched on.
+template <std::size_t size>
+class SectorsPort {
+ public:
+  static constexpr std::size_t kSectorBytes = size;
+  explicit SectorsPort(FlashModel& flash, std::size_t from = 0) : flash_(flash), from_(from) {}
+  bool erase(std::size_t) { return true; }
+  bool program(std::size_t sector, std::size_t word, std::uint32_t value) {
+    for (std::size_t i = 0; i < 4; ++i)
+      flash_.bytes[from_ + sector * size + 4 * word + i] = static_cast<std::uint8_t>(value >> (8 * i));
+    return true;
+  }
+  std::span<const std::uint8_t> bytes(std::size_t sector) const {
+    return std::span<const std::uint8_t>(flash_.bytes).subspan(from_ + sector * size, size);
+  }
+
+ private:
+  FlashModel& flash_;
+  std::size_t from_;
+};
+
+// The demo's drive with the scales of a board, and a motor of its torque constant.
+struct Turned {
+  plant::Drive drive = plant::demo_plant().drive;
+  motor::MotorParameters motor = some_motor();
+  motor::ShaftParameters shaft;
+
+  explicit Turned(const StageWiring& w) {
+    drive.sensors.motor_counts = static_cast<int>(w.counts);
+    motor.flux_vs = drive.torque_constant_nm_a / (1.5 * motor.pole_pairs);
+    shaft.inertia_kg_m2 = drive.find("inertia")->value("inertia");
+  }
+  std::vector<std::uint8_t> block(const control::MotorSettings& found, double full_scale_a, double most_a) const {
+    control::DriveSetup<double> s = board::setup_of(drive, board::constants_of(drive, 10'000));
+    s.has_torque_sensor = false;
+    s.output_counts = 0;
+    s.current.full_scale = full_scale_a;
+    s.amplifier_full_scale = most_a;
+    s.temperature = {.full_scale = 256.0};
+    return drive::with_motor(twin::factory_block(drive, s), found);
+  }
+};
+control::MotorSettings motor_found(StageBench& bench, double test_a) {
+  const auto stage = bench.get<protocol::CommissioningStage>(Kind::commissioning_stage);
+  const auto setup = setup_of(stage, test_a);
+  EXPECT_EQ(measure(bench, setup).state, CommissioningState::done);
+  return deployment::motor_settings(setup, result_of(bench), std::ldexp(stage.shortest_pulse, -30),
+                                    stage.encoder_counts, 1000.0);
+}
+template <class Port>
+void store(Port port, const std::vector<std::uint8_t>& block) {
+  storage::ParameterStore<Port> into(port);
+  const auto good = [](std::span<const std::uint8_t>) { return 0U; };
+  std::uint32_t reason = 0;
+  into.boot(good);
+  EXPECT_EQ(into.begin(block.size(), model::crc32(block)), storage::StoreError::none);
+  EXPECT_EQ(into.write(0, block), storage::StoreError::none);
+  EXPECT_EQ(into.commit(good, reason), storage::StoreError::none);
+}
+std::int32_t per_unit(double value, double base) {
+  return static_cast<std::int32_t>(std::lround(std::ldexp(value / base, 27)));
+}
+// Host that says each 2 ms that it is there.
+void run_with_host(StageBench& bench, double seconds) {
+  for (int left = static_cast<int>(std::lround(seconds * 20'000)); left > 0; left -= 200) {
+    bench.command({.kind = protocol::CommandKind::heartbeat});
+    bench.chip.periods(150);
+  }
+}
+
+TEST(BoardStage, TheMotorThatWasMeasuredTurnsAsTheHostSaysAndItsTorqueIsThatOfTheCurrent) {
+  const StageWiring w = nucleo();
+  const Turned turned(w);
+  control::MotorSettings found;
+  {
+    StageBench bench(w, turned.motor, inverter_of_24_v(), turned.shaft);
+    bench.come_up();
+    found = motor_found(bench, 5.0);
+  }
+  StageBench bench(w, turned.motor, inverter_of_24_v(), turned.shaft);
+  store(SectorsPort<0x20000>(bench.chip.flash), turned.block(found, 31.842, 15.0));
+  bench.come_up();
+  ASSERT_TRUE(bench.status().has_parameters);
+  bench.chip.periods(1200);  // the zeros of the current sensors
+  const auto constants = board::constants_of(turned.drive, 10'000);
+  int low_sides_only = 0;
+  bench.observes = [&] {
+    const motor::Triple d = bench.duties();
+    if (bench.is_on() && d[0] + d[1] + d[2] == 0.0) ++low_sides_only;
+  };
+  ASSERT_EQ(bench.command({.kind = protocol::CommandKind::arm,
+                           .mode = Mode::current,
+                           .current = per_unit(2.0, constants.current_base)}),
+            protocol::Refusal::none);
+  bench.chip.periods(100);
+  EXPECT_EQ(bench.status().mode, Mode::current) << protocol::fault_text(bench.status().fault).name << " "
+                                                << bench.status().fault_limit;
+  EXPECT_GE(low_sides_only, 39) << "2 ms of low sides charge the bootstrap supplies before the first voltage";
+  double torque = 0.0;
+  bench.observes = [&] { torque += bench.sample().torque_nm / 100.0; };
+  bench.chip.periods(100);
+  EXPECT_NEAR(torque, 2.0 * turned.drive.torque_constant_nm_a, 0.03 * 2.0 * turned.drive.torque_constant_nm_a);
+  bench.observes = nullptr;
+  EXPECT_EQ(bench.command({.kind = protocol::CommandKind::disarm}), protocol::Refusal::none);
+  EXPECT_FALSE(bench.is_on());
+  bench.chip.periods(8000);  // it comes to rest
+  constexpr double kWanted = 80.0;  // rad/s
+  ASSERT_EQ(bench.command({.kind = protocol::CommandKind::arm,
+                           .mode = Mode::velocity,
+                           .velocity = per_unit(kWanted, constants.velocity_base)}),
+            protocol::Refusal::none);
+  run_with_host(bench, 0.4);
+  EXPECT_EQ(bench.status().mode, Mode::velocity);
+  EXPECT_NEAR(bench.rotor.speed_rad_s(), kWanted, 0.05 * kWanted);
+  bench.expect_no_violation();
 }
 
 TEST(BoardStage, ABreakOpensTheSwitchesWithoutTheProcessorAndStopsTheMeasurement) {
