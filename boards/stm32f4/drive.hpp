@@ -83,7 +83,7 @@ class Drive {
       static OtgFs port;
       // The internal oscillator is not accurate enough for USB: the host would reject the device. The serial line
       // works.
-      const bool usb = board_.clock_is_exact() && port.start(Description::kClock.core_hz);
+      const bool usb = board_.clock_is_exact() && port.start(Description::kClock.core_hz, senses_usb_power<Description>());
       static UsbDevice device(port, serial);
       using ImageMemory = typename Description::template Images<Board>;
       static ImageMemory images(board_);

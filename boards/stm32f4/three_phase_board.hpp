@@ -3,7 +3,8 @@
 //   period()   at the end of the conversions, once a PWM period, highest priority: the current loop
 //   watch()    at the trigger of the conversions, likewise: whether the current loop still comes; the serial line
 //   tick       every second period, lowest priority, begun by period(): the application
-// A description has besides what board.hpp says: kStage, kStageParts and Bridge instead of Amplifier.
+// A description has besides what board.hpp says: kStage, kStageParts, Bridge instead of Amplifier, and
+// Brake where that is one of the parts.
 #pragma once
 
 #include <cstdint>
@@ -40,6 +41,7 @@ class ThreePhaseBoard : public CoreBoard<Description, 10'000> {
     cortex_m4::set_tick_priority();
     motor_.start(Description::kMotorReversed);
     output_.start(Description::kOutputReversed);
+    if constexpr (Description::kStageParts.brake) Description::Brake::start();
     ThreePhaseAnalog::start(Description::kAnalog);
     bridge_.start(Description::kClock.core_hz / kPwmHz / 2);
   }

@@ -76,7 +76,7 @@ class ThreePhaseBridge {
   // While it is off. The flag of a break input that is still low comes back.
   void clear() {
     hardware(tim1::kStatus) = ~kBroken;
-    Driver::clear();
+    driver_.clear();
   }
   // The bottom has passed: what is written now acts from the top on, in the middle of a sample's period.
   static bool is_late() { return (hardware(kTim1) & kCountsDown) == 0; }

@@ -18,6 +18,7 @@ Chip::Chip(const std::filesystem::path& image, const WrittenFlash& written)
   machine.attach(0x40000800, tim4);
   machine.attach(0x40000C00, tim5);
   machine.attach(0x40003000, watchdog);
+  machine.attach(0x40003C00, spi3);
   machine.attach(0x40004400, usart2);
   machine.attach(0x40004800, usart3);
   machine.attach(0x40005400, i2c1);
@@ -63,7 +64,9 @@ Stop Chip::period() {
   if (tim1.triggers_by_compare4() && !converter_is_dead) converter.trigger();
   tim1.counts_down = !loop_is_late;
   if (converter.interrupts() && machine.interrupt_is_enabled(kConverted)) {
+    const std::uint64_t before = machine.instructions();
     const Stop stop = machine.interrupt(16 + kConverted);
+    loop_instructions = machine.instructions() - before;
     if (stop != Stop::waits) return stop;
   }
   if (machine.tick_is_requested()) {

@@ -6,6 +6,7 @@
 
 #include "tests/board/angle_sensor_models.hpp"
 #include "tests/board/chip_models.hpp"
+#include "tests/board/gate_driver_model.hpp"
 #include "tests/board/machine.hpp"
 #include "tests/board/otg_model.hpp"
 
@@ -57,8 +58,11 @@ class Chip {
   std::array<PortModel, 8> ports;
   OtgModel otg{machine};
   AngleSensorOnSpi spi1{machine, [this] { return !ports[2].high(4); }};
+  // Selected by PC13, enabled by PB12.
+  GateDriverModel spi3{machine, [this] { return !ports[2].high(13); }, [this] { return ports[1].high(12); }};
   AngleSensorOnI2c i2c1{machine};
   bool converter_is_dead = false, timer_is_dead = false, loop_is_late = false;
+  std::uint64_t loop_instructions = 0;  // of the current loop's interrupt in the last period, while they are counted
   // What the world does before a tick, and what comes of it.
   std::function<void()> senses, acts;
 };

@@ -190,16 +190,15 @@ std::uint32_t Machine::tick_priority() const {
   const auto found = system_.find(kPriorities3);
   return found == system_.end() ? 0 : found->second >> 16 & 0xFF;
 }
-void Machine::count_instructions(bool on) {
-  if (!on) {
-    uc_hook_del(uc_, counter_);
-    return;
-  }
+void Machine::count_instructions() {
   const auto count = +[](uc_engine*, std::uint64_t, std::uint32_t, void* user) {
     ++static_cast<Machine*>(user)->instructions_;
   };
-  check(uc_hook_add(uc_, &counter_, UC_HOOK_CODE, reinterpret_cast<void*>(count), this, 1, 0),
+  uc_hook hook = 0;
+  check(uc_hook_add(uc_, &hook, UC_HOOK_CODE, reinterpret_cast<void*>(count), this, 1, 0),
         "instructions cannot be counted");
+  // What was translated before does not count.
+  for (std::uint32_t at = kFlash; at < kFlash + kFlashBytes; at += 2) uc_ctl_remove_cache(uc_, at, at + 2);
 }
 bool Machine::interrupt_is_enabled(std::uint32_t number) const {
   const auto found = system_.find(kInterruptEnable + 4 * (number / 32));

@@ -64,7 +64,7 @@ class Machine {
   bool tick_is_requested() const;              // PendSV is pending
   std::uint32_t tick_priority() const;         // its priority; zero is the highest
   std::uint64_t instructions() const { return instructions_; }  // executed while they are counted
-  void count_instructions(bool on);
+  void count_instructions();  // from now on, slowly
   std::uint32_t vectors() const { return vectors_; }
   bool interrupt_is_enabled(std::uint32_t number) const;
 
@@ -102,7 +102,6 @@ class Machine {
   std::vector<std::string> violations_;
   std::uint32_t vectors_ = 0;
   std::uint64_t instructions_ = 0;
-  uc_hook counter_ = 0;
   bool started_ = false;
   bool wants_reset_ = false;
   uc_err error_ = UC_ERR_OK;
