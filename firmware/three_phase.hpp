@@ -85,10 +85,11 @@ class ThreePhaseStageOf {
   bool tripped() const { return commanded_ && fault_ != StageFault::none; }
   StageFault fault() const { return fault_; }
 
-  // The motor that commissioning found; without pole pairs that with which the stage began. While the drive is not
+  // The motor that commissioning found; without pole pairs, or with another encoder than the board's, that with which
+  // the stage began. While the drive is not
   // armed, and from background work: the interrupt reads none of these then.
   void use(const control::MotorSettings& motor) {
-    const bool is_found = motor.pole_pairs > 0;
+    const bool is_found = motor.pole_pairs > 0 && motor.encoder_counts == made_.encoder_counts;
     s_.foc.sensors.gain = is_found ? motor.gain : made_.foc.sensors.gain;
     s_.foc.current = is_found ? motor.current : made_.foc.current;
     s_.foc.circle = is_found ? motor.circle : made_.foc.circle;

@@ -207,7 +207,39 @@ void expect_measured(StageBench& bench, const motor::MotorParameters& truth, dou
 TEST(BoardStage, TheImageMeasuresAMotorThatNothingIsKnownOf) {
   NucleoBench bench;
   bench.come_up();
+  bench.chip.machine.count_instructions();
+  std::uint64_t most = 0;
+  bench.observes = [&] { most = std::max(most, bench.chip.loop_instructions); };
   expect_measured(bench, some_motor(), 6.0);
+  std::printf("at most %d instructions in a period\n", static_cast<int>(most));
+  EXPECT_LT(most, 4'000U) << "half a PWM period has as many cycles";
+}
+// Half a PWM period has enough room for every period of it; one that is late all the same does no harm.
+TEST(BoardStage, APeriodThatIsLateWhileAMotorIsMeasuredIsNoFault) {
+  NucleoBench bench;
+  bench.come_up();
+  const auto setup = setup_of(bench.get<protocol::CommissioningStage>(Kind::commissioning_stage), 6.0);
+  ASSERT_EQ(bench.ask(Kind::commissioning_begin, begin_of(setup)).code, 0);
+  bench.chip.periods(3000);
+  bench.chip.loop_is_late = true;
+  bench.chip.periods(2);
+  bench.chip.loop_is_late = false;
+  EXPECT_EQ(bench.get<protocol::CommissioningProgress>(Kind::commissioning_state).state, CommissioningState::runs);
+}
+TEST(BoardStage, WithAnEncoderOnSpiOneFrameAPeriodIsEnough) {
+  StageWiring w = nucleo("ihm08m1-abs");
+  w.counts = 1 << 14;
+  StageBench bench(w, some_motor(), inverter_of_24_v());
+  AngleSensorOnSpi sensor(bench.chip.machine, [&] { return !bench.chip.ports[3].high(2); });
+  bench.chip.machine.attach(0x40003C00, sensor);
+  bench.encoder = [&](std::uint32_t counts) { sensor.angle = counts & 0x3FFF; };
+  bench.come_up();
+  EXPECT_EQ(bench.status().mode, Mode::idle);
+  EXPECT_LE(sensor.clock_hz(bench.chip.clock.apb1_hz()), 10e6);
+  expect_measured(bench, some_motor(), 6.0);
+  sensor.fault = AngleSensorOnSpi::Fault::no_magnet;
+  bench.chip.periods(600);
+  EXPECT_EQ(protocol::fault_text(bench.status().fault).name, "motor_encoder_stale");
 }
 
 // Puts a block into the first parameter sectors before the drive is switched on.
