@@ -41,8 +41,8 @@ inline void enable_interrupt(std::uint32_t number) {
 
 // A tick that is requested by another interrupt: PendSV, with the lowest priority, so that all others interrupt it. It
 // is one level only: interrupts that are never given a priority have the highest.
-inline constexpr std::uint32_t kInterruptControl = 0xE000ED04;   // SCB_ICSR
-inline constexpr std::uint32_t kSystemPriorities = 0xE000ED20;   // SCB_SHPR3
+inline constexpr std::uint32_t kInterruptControl = 0xE000ED04;  // SCB_ICSR
+inline constexpr std::uint32_t kSystemPriorities = 0xE000ED20;  // SCB_SHPR3
 inline void set_tick_priority() {
   change_bits(kSystemPriorities, 0xFFU << 16, 0xFFU << 16);
 }

@@ -1,6 +1,6 @@
-// Numbers of the X-NUCLEO-IHM08M1 with a motor that nothing is known of. A unit test makes them from ohms and volts with
-// host/drive_link/deployment: three shunts of 10 milliohm with amplifiers of 5.182 on 3.3 V, a divider of 169 and 9.31
-// kiloohm at the bus, a thermistor of 10 kiloohm above 4.7; 20 kHz at 160 MHz, 500 ns dead time.
+// Numbers of the X-NUCLEO-IHM08M1 with a motor that nothing is known of. A unit test makes them from ohms and volts
+// with host/drive_link/deployment: three shunts of 10 milliohm with amplifiers of 5.182 on 3.3 V, a divider of 169
+// and 9.31 kiloohm at the bus, a thermistor of 10 kiloohm above 4.7; 20 kHz at 160 MHz, 500 ns dead time.
 #pragma once
 
 #include "firmware/three_phase.hpp"
@@ -36,9 +36,9 @@ constexpr firmware::ThreePhaseSettings stage_settings(std::uint32_t encoder_coun
            19049783};
   s.limits.peak_square = s.limits.continuous_square = s.limits.start_square = 238276774;  // 15 A
   s.limits.voltage_share = INT32_MAX;
-  s.offsets = {3277, 1638};  // a tenth of full scale, a twentieth
-  s.least_bus = 5185;        // 10 V
-  s.most_bus = 25'923;       // 50 V
+  s.offsets = {3277, 1638};   // a tenth of full scale, a twentieth
+  s.least_bus = 5185;         // 10 V
+  s.most_bus = 25'923;        // 50 V
   s.most_phase = 88'517'439;  // 21 A
   s.most_sum = 8'388'608;     // 2 A
   s.protection.thermistor = kThermistor;
@@ -46,7 +46,7 @@ constexpr firmware::ThreePhaseSettings stage_settings(std::uint32_t encoder_coun
   s.protection.bootstrap_periods = 40;  // 2 ms
   s.pole_pairs = 0;
   s.encoder_counts = encoder_counts;
-  s.set_point = 1930;    // 15 A
+  s.set_point = 1930;  // 15 A
   s.reading = 1 << 20;
   s.test_modulation = {96636764, 17179869, 0, 0, 16000};
   s.timer_counts = 4000;

@@ -30,11 +30,10 @@ inline constexpr stm32f4::Drv8301Setup kDriver{.core_hz = kCoreHz,
                                                .control1 = stm32f4::drv8301_control1(21),
                                                .control2 = stm32f4::drv8301_control2(stm32f4::Drv8301Gain::forty)};
 // The shunts are in legs B and C: they are the stage's phases a and b, and leg A is its phase c.
-inline constexpr stm32f4::ThreePhaseBridgeSetup kBridge{
-    .dead_time_cycles = 40,  // 240 ns; the driver has 50 of its own
-    .legs = {2, 3, 1},
-    // The sample is held in the middle of the low sides' time.
-    .sample_lead_cycles = stm32f4::ThreePhaseAnalog::kSampleCycles};
+inline constexpr stm32f4::ThreePhaseBridgeSetup kBridge{.dead_time_cycles = 40,  // 240 ns; the driver has 50 of its own
+                                                        .legs = {2, 3, 1},
+                                                        // The sample is held in the middle of the low sides' time.
+                                                        .sample_lead_cycles = stm32f4::ThreePhaseAnalog::kSampleCycles};
 
 struct Description {
   static constexpr std::string_view kName = "odrive-v3.6-m0";
@@ -95,7 +94,7 @@ struct Description {
   using Serial = stm32f4::Usart<stm32f4::kUsart2>;
   static constexpr std::uint32_t kBaud = 115'200;
   static constexpr bool kHasUsb = true;
-  static constexpr bool kSensesUsbPower = false;  // PA9 drives a switch
+  static constexpr bool kSensesUsbPower = false;        // PA9 drives a switch
   static constexpr std::uint32_t kParameterSector = 1;  // and the one after it
   static constexpr std::uint32_t kPairingSector = 4;
   using Random = stm32f4::RandomNumbers;

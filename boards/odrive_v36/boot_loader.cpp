@@ -1,6 +1,6 @@
 // The boot loader on an ODrive v3.6.
-#include "boards/stm32f4/loader.hpp"
 #include "boards/odrive_v36/board.hpp"
+#include "boards/stm32f4/loader.hpp"
 
 namespace {
 constinit flexspline::stm32f4::Loader<flexspline::odrive_v36::Description> loader;

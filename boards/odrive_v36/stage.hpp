@@ -1,6 +1,6 @@
-// Numbers of the ODrive v3.6 (56 V) with a motor that nothing is known of. A unit test makes them from ohms and volts with
-// host/drive_link/deployment: two shunts of 0.5 milliohm with amplifiers of 40 on 3.3 V, a divider by 19 at the bus, a
-// thermistor of 10 kiloohm above 3.3, a brake resistor of 2 ohm; 20 kHz at 168 MHz, 240 ns dead time.
+// Numbers of the ODrive v3.6 (56 V) with a motor that nothing is known of. A unit test makes them from ohms and volts
+// with host/drive_link/deployment: two shunts of 0.5 milliohm with amplifiers of 40 on 3.3 V, a divider by 19 at the
+// bus, a thermistor of 10 kiloohm above 3.3, a brake resistor of 2 ohm; 20 kHz at 168 MHz, 240 ns dead time.
 #pragma once
 
 #include "firmware/three_phase.hpp"
@@ -9,7 +9,8 @@ namespace flexspline::odrive_v36 {
 
 inline constexpr std::uint32_t kCurrentFullScaleMa = 82'500, kBusFullScaleMv = 62'700, kMostCurrentMa = 40'000;
 
-inline constexpr firmware::StageParts kParts{.brake = true, .driver_fault = true, .thermistor = true, .bootstrap = true};
+inline constexpr firmware::StageParts kParts{
+    .brake = true, .driver_fault = true, .thermistor = true, .bootstrap = true};
 
 inline constexpr control::protection::ThermistorSettings kThermistor{
     .celsius = {-32640, -4758, -3211, -2213, -1453, -829,  -292,  184,   614,   1009,  1377,  1723,  2051,
@@ -37,10 +38,10 @@ constexpr firmware::ThreePhaseSettings stage_settings(std::uint32_t encoder_coun
            4481284};
   s.limits.peak_square = s.limits.continuous_square = s.limits.start_square = 252413138;  // 40 A
   s.limits.voltage_share = INT32_MAX;
-  s.offsets = {3277, 1638};   // a tenth of full scale, a twentieth
-  s.least_bus = 6271;         // 12 V
-  s.most_bus = 29'266;        // 56 V
-  s.most_phase = 91'105'367;  // 56 A
+  s.offsets = {3277, 1638};                                              // a tenth of full scale, a twentieth
+  s.least_bus = 6271;                                                    // 12 V
+  s.most_bus = 29'266;                                                   // 56 V
+  s.most_phase = 91'105'367;                                             // 56 A
   s.protection.chopper = {26'653, 4815, 29'491, 3277525160444, 35'791};  // from 51 V on, all of it at 54; 300 J, 50 W
   s.protection.thermistor = kThermistor;
   s.protection.winding = {4648233, 26030105, 2104328};

@@ -30,7 +30,9 @@ struct BoardChoice {
   using Type = DriveBoard<Description>;
 };
 template <class Description>
-requires requires { Description::kStage; }
+requires requires {
+  Description::kStage;
+}
 struct BoardChoice<Description> {
   using Type = ThreePhaseBoard<Description>;
 };
@@ -39,7 +41,7 @@ template <class Description>
 class Drive {
  public:
   using Board = typename BoardChoice<Description>::Type;
-  static constexpr bool kHasStage = requires(Board& board) { board.three_phase(); };
+  static constexpr bool kHasStage = requires(Board & board) { board.three_phase(); };
   using Application = firmware::Application<Board>;
   using Flash = ParameterFlash<Board, Description::kParameterSector>;
   using Store = storage::ParameterStore<Flash>;
@@ -83,7 +85,8 @@ class Drive {
       static OtgFs port;
       // The internal oscillator is not accurate enough for USB: the host would reject the device. The serial line
       // works.
-      const bool usb = board_.clock_is_exact() && port.start(Description::kClock.core_hz, senses_usb_power<Description>());
+      const bool usb =
+          board_.clock_is_exact() && port.start(Description::kClock.core_hz, senses_usb_power<Description>());
       static UsbDevice device(port, serial);
       using ImageMemory = typename Description::template Images<Board>;
       static ImageMemory images(board_);
@@ -118,7 +121,9 @@ class Drive {
     if constexpr (!kHasStage) line_.move();
   }
   // Of a board with three half bridges. A tick is too slow for the line there.
-  void period() { board_.period(); }
+  void period() {
+    board_.period();
+  }
   void watch() {
     board_.watch();
     line_.move();

@@ -28,7 +28,8 @@ class ThreePhaseBoard : public CoreBoard<Description, 10'000> {
  public:
   static constexpr std::uint32_t kPwmHz = 20'000, kPeriods = kPwmHz / Core::kTickHz;
   static_assert(Description::kStage.pwm_hz == kPwmHz &&
-                Description::kStage.timer_counts == static_cast<std::int32_t>(Description::kClock.core_hz / kPwmHz / 2));
+                Description::kStage.timer_counts ==
+                    static_cast<std::int32_t>(Description::kClock.core_hz / kPwmHz / 2));
   using Stage = firmware::ThreePhaseStageOf<Description::kStageParts>;
 
   // As every board, and the stage: a block in flash sets its motor before the first tick.

@@ -45,8 +45,8 @@ class ThreePhaseBridge {
     hardware(tim1::kControl2) = (7U << 4) | (setup.low_sides_inverted ? 0x2A00U : 0U);
     hardware(tim1::kOutputs) = setup.low_sides_inverted ? 0xDDDU : 0x555U;
     // As in HBridge.
-    hardware(tim1::kBreak) = setup.dead_time_cycles | (1U << 8) | (1U << 10) | (1U << 11) |
-                             (setup.has_break_input ? kBreakOn : 0U);
+    hardware(tim1::kBreak) =
+        setup.dead_time_cycles | (1U << 8) | (1U << 10) | (1U << 11) | (setup.has_break_input ? kBreakOn : 0U);
     tim1::run();
   }
   void set(const control::foc::Phases& counts) {
@@ -84,7 +84,9 @@ class ThreePhaseBridge {
  private:
   static constexpr std::uint32_t kBreakOn = 1U << 12, kOutputsOn = 1U << 15, kBroken = 1U << 7, kCountsDown = 1U << 4;
 
-  static constexpr std::uint32_t compare_of(std::size_t phase) { return tim1::kCompare1 + 4U * (setup.legs[phase] - 1U); }
+  static constexpr std::uint32_t compare_of(std::size_t phase) {
+    return tim1::kCompare1 + 4U * (setup.legs[phase] - 1U);
+  }
 
   Driver driver_{};
   bool on_ = false;

@@ -1,5 +1,7 @@
 #include "tests/board/chip.hpp"
 
+#include <utility>
+
 namespace flexspline::tests {
 
 Chip::Chip(const std::filesystem::path& image, const WrittenFlash& written)
@@ -32,6 +34,7 @@ Chip::Chip(const std::filesystem::path& image, const WrittenFlash& written)
 }
 
 Stop Chip::tick() {
+  if (tim1.triggers_by_compare4()) return period();
   constexpr std::uint32_t kTickInterrupt = 27;
   if (senses) senses();
   usart2.pass();
@@ -70,11 +73,18 @@ Stop Chip::period() {
     if (stop != Stop::waits) return stop;
   }
   if (machine.tick_is_requested()) {
-    const Stop stop = machine.interrupt(kTick);
+    const std::uint64_t after = std::exchange(interrupts_tick_after, 0);
+    const Stop stop = after == 0 ? machine.interrupt(kTick) : machine.interrupted_interrupt(kTick, after, [this] {
+      ++interrupted_ticks;
+      is_within_tick = true;
+      const Stop other = period();
+      is_within_tick = false;
+      return other;
+    });
     if (stop != Stop::waits) return stop;
   }
   if (acts) acts();
-  return machine.run();
+  return is_within_tick ? Stop::waits : machine.run();
 }
 
 }  // namespace flexspline::tests

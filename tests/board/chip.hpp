@@ -9,6 +9,7 @@
 #include "tests/board/gate_driver_model.hpp"
 #include "tests/board/machine.hpp"
 #include "tests/board/otg_model.hpp"
+#include "tests/board/power_models.hpp"
 
 namespace flexspline::tests {
 
@@ -27,7 +28,8 @@ class Chip {
 
   // Start-up and the first turn of the main loop.
   Stop start() { return machine.run(); }
-  // 50 us: TIM1 triggers the converter and then interrupts, the main loop turns once.
+  // 50 us: TIM1 triggers the converter and then interrupts, the main loop turns once. With three half bridges:
+  // period().
   Stop tick();
   Stop ticks(int n) {
     Stop stop = Stop::waits;
@@ -62,7 +64,11 @@ class Chip {
   GateDriverModel spi3{machine, [this] { return !ports[2].high(13); }, [this] { return ports[1].high(12); }};
   AngleSensorOnI2c i2c1{machine};
   bool converter_is_dead = false, timer_is_dead = false, loop_is_late = false;
+  // The next period, with its current loop, comes after so many instructions of a tick; zero: after its end.
+  std::uint64_t interrupts_tick_after = 0;
+  int interrupted_ticks = 0;
   std::uint64_t loop_instructions = 0;  // of the current loop's interrupt in the last period, while they are counted
+  bool is_within_tick = false;
   // What the world does before a tick, and what comes of it.
   std::function<void()> senses, acts;
 };

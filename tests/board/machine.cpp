@@ -15,7 +15,8 @@ namespace {
 constexpr std::uint32_t kRam = 0x20000000, kRamBytes = 128 * 1024, kFlash = 0x08000000, kFlashBytes = 512 * 1024;
 constexpr std::uint32_t kSystemMemory = 0x1FFF7000, kPage = 0x1000, kUniqueId = 0x1FFF7A10;
 constexpr std::uint32_t kReturn = kSystemMemory + 0x10;  // where a handler returns to
-constexpr std::uint32_t kCore = 0xE000E000, kControlState = 0xD04, kVectorTable = 0xD08, kPriorities3 = 0xD20, kReset = 0xD0C, kInterruptEnable = 0x100;
+constexpr std::uint32_t kCore = 0xE000E000, kControlState = 0xD04, kVectorTable = 0xD08, kPriorities3 = 0xD20,
+                        kReset = 0xD0C, kInterruptEnable = 0x100;
 
 void check(uc_err error, const char* what) {
   if (error != UC_ERR_OK) throw std::runtime_error(std::string(what) + ": " + uc_strerror(error));
@@ -163,17 +164,33 @@ Stop Machine::run() {
   return go(reg(UC_ARM_REG_PC), 0xFFFFFFFE);
 }
 Stop Machine::interrupt(std::uint32_t number) {
+  return handle(number, nullptr);
+}
+Stop Machine::interrupted_interrupt(std::uint32_t number, std::uint64_t after, const std::function<Stop()>& other) {
+  pause_at_ = instructions_ + after;
+  const Stop stop = handle(number, &other);
+  pause_at_ = 0;
+  return stop;
+}
+Stop Machine::handle(std::uint32_t number, const std::function<Stop()>* other) {
   // A handler is a function as any other: the hardware saves what a caller would.
   constexpr int kSaved[] = {UC_ARM_REG_R0,  UC_ARM_REG_R1, UC_ARM_REG_R2, UC_ARM_REG_R3, UC_ARM_REG_R4,  UC_ARM_REG_R5,
                             UC_ARM_REG_R6,  UC_ARM_REG_R7, UC_ARM_REG_R8, UC_ARM_REG_R9, UC_ARM_REG_R10, UC_ARM_REG_R11,
                             UC_ARM_REG_R12, UC_ARM_REG_SP, UC_ARM_REG_LR, UC_ARM_REG_PC, UC_ARM_REG_XPSR};
+  constexpr std::uint32_t kPendSv = 14, kConditional = 0x0600FC00;
   std::uint32_t saved[std::size(kSaved)];
   for (std::size_t i = 0; i < std::size(kSaved); ++i) saved[i] = reg(kSaved[i]);
+  // What is left of an IT block is not the handler's.
+  set_reg(UC_ARM_REG_XPSR, reg(UC_ARM_REG_XPSR) & ~kConditional);
   set_reg(UC_ARM_REG_SP, (reg(UC_ARM_REG_SP) - 32) & ~7U);
   set_reg(UC_ARM_REG_LR, kReturn | 1);
-  constexpr std::uint32_t kPendSv = 14;
   if (number == kPendSv) system_[kControlState] = 0;
-  const Stop stop = go(word(vectors_ + 4 * number), kReturn);
+  Stop stop = go(word(vectors_ + 4 * number), kReturn);
+  if (other != nullptr && stop == Stop::waits && reg(UC_ARM_REG_PC) != kReturn) {
+    pause_at_ = 0;
+    stop = (*other)();
+    if (stop == Stop::waits) stop = go(reg(UC_ARM_REG_PC), kReturn);
+  }
   if (stop != Stop::waits) return stop;
   for (std::size_t i = 0; i < std::size(kSaved); ++i) set_reg(kSaved[i], saved[i]);
   return stop;
@@ -192,7 +209,13 @@ std::uint32_t Machine::tick_priority() const {
 }
 void Machine::count_instructions() {
   const auto count = +[](uc_engine*, std::uint64_t, std::uint32_t, void* user) {
-    ++static_cast<Machine*>(user)->instructions_;
+    Machine& m = *static_cast<Machine*>(user);
+    // Then the present instruction has not been executed.
+    if (m.pause_at_ != 0 && m.instructions_ >= m.pause_at_) {
+      uc_emu_stop(m.uc_);
+    } else {
+      ++m.instructions_;
+    }
   };
   uc_hook hook = 0;
   check(uc_hook_add(uc_, &hook, UC_HOOK_CODE, reinterpret_cast<void*>(count), this, 1, 0),

@@ -90,6 +90,14 @@ class StageBench {
     for (std::size_t leg = 0; leg < 3; ++leg) d[leg] = chip.tim1.duty_of(wiring.channels[leg]);
     return d;
   }
+  // Of the stack, bytes that were never used.
+  std::uint32_t unused_stack() const {
+    constexpr std::uint32_t kPaint = 0xA5A5A5A5;
+    const std::uint32_t bottom = chip.machine.symbol("stack_bottom"), top = chip.machine.symbol("stack_top");
+    std::uint32_t at = bottom;
+    while (at < top && chip.machine.word(at) == kPaint) at += 4;
+    return at - bottom;
+  }
   const motor::Sample& sample() const { return sample_; }
   void expect_no_violation() const {
     for (const std::string& what : chip.machine.violations()) ADD_FAILURE() << what;
