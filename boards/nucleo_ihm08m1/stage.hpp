@@ -42,7 +42,7 @@ constexpr firmware::ThreePhaseSettings stage_settings(std::uint32_t encoder_coun
   s.most_phase = 88'517'439;  // 21 A
   s.most_sum = 8'388'608;     // 2 A
   s.protection.thermistor = kThermistor;
-  s.protection.winding = {4516196, 25290697, 4349128};
+  s.protection.winding = {4516196, 25290697, 4349128, 2};
   s.protection.bootstrap_periods = 40;  // 2 ms
   s.pole_pairs = 0;
   s.encoder_counts = encoder_counts;

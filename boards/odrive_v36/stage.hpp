@@ -44,7 +44,7 @@ constexpr firmware::ThreePhaseSettings stage_settings(std::uint32_t encoder_coun
   s.most_phase = 91'105'367;                                             // 56 A
   s.protection.chopper = {26'653, 4815, 29'491, 3277525160444, 35'791};  // from 51 V on, all of it at 54; 300 J, 50 W
   s.protection.thermistor = kThermistor;
-  s.protection.winding = {4648233, 26030105, 2104328};
+  s.protection.winding = {4648233, 26030105, 2104328, 2};
   s.protection.bootstrap_periods = 40;  // 2 ms
   s.pole_pairs = 0;
   s.encoder_counts = encoder_counts;

@@ -4,53 +4,11 @@
 #include <algorithm>
 #include <string>
 
-#include "tests/board/stage_host.hpp"
+#include "tests/board/stage_boards.hpp"
 #include "tests/board/usb_bus.hpp"
 
 namespace flexspline::tests {
 namespace {
-
-// Schematic and sources of the ODrive v3.6: shunts of 0.5 milliohm in legs B and C, a divider by 19 at the bus.
-StageWiring odrive() {
-  StageWiring w;
-  w.image = std::string(FLEXSPLINE_BOARDS) + "/odrive_v36/odrive.elf";
-  w.written = {
-      .address = 0x08004000,
-      .sectors = {{1, 0, 0x4000}, {2, 0x4000, 0x4000}, {3, 0x8000, 0x4000, false}, {4, 0xC000, 0x10000, false}}};
-  w.channels = {1, 2, 3};
-  w.currents = {0, 10, 11};
-  w.has_shunt = {false, true, true};
-  w.full_scale_a = 1.65 / (40.0 * 0.5e-3);
-  w.bus = 6;
-  w.bus_full_scale_v = 62.7;
-  w.temperature = 15;
-  w.temperature_share = 3.3 / (10.0 + 3.3);  // 25 degrees Celsius
-  w.counts = 8192;
-  return w;
-}
-struct OdriveBench : StageBench {
-  explicit OdriveBench(const motor::MotorParameters& motor = some_motor(), const motor::ShaftParameters& shaft = {},
-                       double supply_v = 24.0)
-      : StageBench(odrive(), motor, inverter(supply_v), shaft) {
-    driver_is_on = [this] { return chip.spi3.is_good(); };
-    encoder = [this](std::uint32_t counts) {
-      chip.tim3.move_to(counts);
-      chip.ports[3].words[0x10] = chip.spi3.is_good() ? 1U << 2 : 0U;  // its fault line
-    };
-    chip.ports[3].words[0x10] = 1U << 2;
-  }
-  static motor::InverterParameters inverter(double supply_v) {
-    motor::InverterParameters i = inverter_of_24_v();
-    i.supply_v = supply_v;
-    i.dead_time_s = 0.24e-6;
-    return i;
-  }
-  // Shares of the period of both switches of the brake resistor, and the time from one's end to the other's begin.
-  double brake_high() const { return std::max(0.0, 1.0 - double(chip.tim2.at(0x40)) / chip.tim2.at(0x2C)); }
-  double brake_gap_us() const {
-    return (double(chip.tim2.at(0x40)) - double(chip.tim2.at(0x3C))) / (2.0 * chip.clock.apb1_hz()) * 1e6;
-  }
-};
 
 TEST(BoardOdrive, SetsItsGateDriverUpAndHoldsAllSwitchesOpen) {
   OdriveBench bench;

@@ -161,7 +161,7 @@ void store(Port port, const std::vector<std::uint8_t>& block) {
 inline std::int32_t per_unit(double value, double base) {
   return static_cast<std::int32_t>(std::lround(std::ldexp(value / base, 27)));
 }
-// Host that says each 2 ms that it is there.
+// With a host that says each ten milliseconds that it is there.
 inline void run_with_host(StageBench& bench, double seconds) {
   for (int left = static_cast<int>(std::lround(seconds * 20'000)); left > 0; left -= 200) {
     bench.command({.kind = protocol::CommandKind::heartbeat});

@@ -83,6 +83,7 @@ void expect_settings(const firmware::ThreePhaseSettings& s, const StageNumbers& 
   expect_near(s.protection.winding.least_current, winding.least_current);
   expect_near(s.protection.winding.resistance_error, winding.resistance_error);
   expect_near(s.protection.winding.lost_voltage, winding.lost_voltage);
+  EXPECT_EQ(s.protection.winding.every, 2U) << "10 000 samples a second";
   const auto thermistor = deployment::thermistor_settings(n.thermistor);
   EXPECT_EQ(s.protection.thermistor.celsius, thermistor.celsius);
   EXPECT_EQ(s.protection.thermistor.least, thermistor.least);

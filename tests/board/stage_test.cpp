@@ -8,32 +8,11 @@
 #include <set>
 #include <string>
 
-#include "tests/board/stage_host.hpp"
+#include "tests/board/stage_boards.hpp"
 
 namespace flexspline::tests {
 namespace {
 
-// RM0390 and the schematic of the X-NUCLEO-IHM08M1: shunts of 10 milliohm, amplifiers of 5.182 about 1.71 V, which fall
-// with a current into the motor; a divider of 169 and 9.31 kiloohm at the bus.
-StageWiring nucleo(const std::string& name = "ihm08m1") {
-  StageWiring w;
-  w.image = std::string(FLEXSPLINE_BOARDS) + "/nucleo_ihm08m1/" + name + ".elf";
-  w.written = {.address = 0x08020000,
-               .sectors = {{5, 0, 0x20000}, {6, 0x20000, 0x20000}, {7, 0x40000, 0x20000, false}}};
-  w.currents = {0, 11, 10};
-  w.full_scale_a = 1.65 / (0.01 * 5.1818);
-  w.zero_share = 1.71 / 1.65 - 1.0;
-  w.currents_fall = true;
-  w.bus = 1;
-  w.bus_full_scale_v = 3.3 * (169.0 + 9.31) / 9.31;
-  w.temperature = 12;
-  w.temperature_share = 4.7 / (10.0 + 4.7);  // 25 degrees Celsius
-  return w;
-}
-struct NucleoBench : StageBench {
-  explicit NucleoBench(const std::string& name = "ihm08m1")
-      : StageBench(nucleo(name), some_motor(), inverter_of_24_v()) {}
-};
 TEST(BoardStage, StartsWithAllSwitchesOpenADeadTimeAndABreakInput) {
   NucleoBench bench;
   Chip& chip = bench.chip;
