@@ -115,5 +115,19 @@ TEST(BoardOdrive, UsbWorksWithoutAPinThatSensesItsPower) {
   bench.expect_no_violation();
 }
 
+TEST(BoardOdrive, ItsBootLoaderWaitsForAnImageOverUsbWithItsGateDriverOff) {
+  Chip chip(
+      std::string(FLEXSPLINE_BOARDS) + "/odrive_v36/odrive-boot.elf",
+      {.address = 0x0800C000,
+       .sectors = {
+           {3, 0, 0x4000}, {4, 0x4000, 0x10000}, {5, 0x14000, 0x20000}, {6, 0x34000, 0x20000}, {7, 0x54000, 0x20000}}});
+  ASSERT_EQ(chip.start(), Stop::waits) << chip.machine.where();
+  UsbBus bus(chip);
+  ASSERT_TRUE(bus.enumerate());
+  EXPECT_FALSE(chip.ports[1].high(12));
+  EXPECT_FALSE(chip.tim1.outputs_on());
+  for (const std::string& what : chip.machine.violations()) ADD_FAILURE() << what;
+}
+
 }  // namespace
 }  // namespace flexspline::tests

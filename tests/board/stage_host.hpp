@@ -138,7 +138,8 @@ struct Turned {
     s.current.full_scale = full_scale_a;
     s.amplifier_full_scale = most_a;
     s.temperature = {.full_scale = 256.0};
-    return drive::with_motor(twin::factory_block(drive, s), found);
+    const std::vector<std::uint8_t> made = twin::factory_block(drive, s);
+    return found.pole_pairs > 0 ? drive::with_motor(made, found) : made;
   }
 };
 inline control::MotorSettings motor_found(StageBench& bench, double test_a) {

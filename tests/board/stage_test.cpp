@@ -43,6 +43,22 @@ TEST(BoardStage, StartsWithAllSwitchesOpenADeadTimeAndABreakInput) {
   bench.expect_no_violation();
 }
 
+TEST(BoardStage, TheIndexPulseOfTheMotorsEncoderGivesItsTurn) {
+  const StageWiring w = nucleo("ihm08m1-index");
+  NucleoBench bench("ihm08m1-index");
+  const Turned turned(w);
+  store(SectorsPort<0x20000>(bench.chip.flash), turned.block({}, 31.842, 15.0));
+  bench.come_up();
+  ASSERT_TRUE(bench.status().has_parameters);
+  EXPECT_FALSE(bench.get<protocol::Reference>(Kind::reference).knows_turn);
+  EXPECT_EQ(bench.command({.kind = protocol::CommandKind::arm, .mode = Mode::current}),
+            protocol::Refusal::not_commissioned);
+  bench.chip.tim2.pulse(3);
+  bench.chip.periods(4);
+  EXPECT_TRUE(bench.get<protocol::Reference>(Kind::reference).knows_turn);
+  bench.expect_no_violation();
+}
+
 // The instant at which the currents are held is a number of the timer's and of the converters' registers: nothing that
 // the processor does moves it.
 TEST(BoardStage, TheInstantOfTheSamplesIsTheTimersWhateverTheProcessorDoes) {
