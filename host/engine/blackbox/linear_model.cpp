@@ -103,8 +103,7 @@ LinearModel fit(const std::vector<Record>& records, const Orders& orders) {
   model.orders = orders;
   model.parameters = columns;
   model.rows = rows;
-  model.condition_number =
-      solver.rank() < A.cols() ? std::numeric_limits<double>::infinity() : solver.pivot_ratio();
+  model.condition_number = solver.rank() < A.cols() ? std::numeric_limits<double>::infinity() : solver.pivot_ratio();
   model.a = theta.head(orders.na);
   for (std::size_t u = 0; u < inputs; ++u)
     model.b.emplace_back(theta.segment(orders.na + static_cast<Index>(u) * orders.nb, orders.nb));

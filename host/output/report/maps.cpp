@@ -6,8 +6,8 @@
 #include <limits>
 #include <nlohmann/json.hpp>
 
-#include "host/engine/comparison/residual_map.hpp"
 #include "host/common/algebra/decompositions.hpp"
+#include "host/engine/comparison/residual_map.hpp"
 #include "host/engine/comparison/sample_variables.hpp"
 #include "host/engine/estimation/in_parallel.hpp"
 #include "host/engine/estimation/least_squares.hpp"
