@@ -1,11 +1,11 @@
 #include "host/app/closed_loop/prediction.hpp"
 
 #include <algorithm>
-#include <boost/math/distributions/students_t.hpp>
 #include <cmath>
 #include <random>
 #include <stdexcept>
 
+#include "host/common/numbers/distributions.hpp"
 #include "host/physics/catalogue/catalogue.hpp"
 
 namespace flexspline::closed_loop {
@@ -82,8 +82,7 @@ std::vector<Prediction> predict(const Question& question, const Runner& run) {
     }
     const double n = question.draws, mean = sum / n;
     const double variance = std::max(0.0, (squares - n * mean * mean) / (n - 1.0)) + kLeastSpread * kLeastSpread;
-    const boost::math::students_t t(n - 1.0);
-    const double half = boost::math::quantile(t, 0.975) * std::sqrt(variance * (1.0 + 1.0 / n));
+    const double half = numbers::student_t_quantile(n - 1.0, 0.975) * std::sqrt(variance * (1.0 + 1.0 / n));
     p.ratio = std::exp(mean);
     p.low = std::exp(mean - half);
     p.high = std::exp(mean + half);

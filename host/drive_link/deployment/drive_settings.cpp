@@ -164,8 +164,8 @@ double largest_stiffness(const catalogue::ResolvedModel& model, double torsion) 
 // What the settings take from the model.
 struct ModelFacts {
   std::optional<double> inertia, output_inertia, damping_torque, damping_exponent;
-  double stiffness = 0.0;    // the largest within the base of torsion, N m/rad
-  double held_torque = 0.0;  // torque_held_by_friction
+  double stiffness = 0.0;         // the largest within the base of torsion, N m/rad
+  double held_by_friction = 0.0;  // torque_held_by_friction
 };
 ModelFacts facts_of(const catalogue::ResolvedModel& model, const DriveConstants<double>& d) {
   return {parameter(model, "inertia", "inertia"),           parameter(model, "output_inertia", "inertia"),
@@ -362,12 +362,13 @@ void take_analog_signals(Settings& s, control::DriveSetup<double>& setup, const 
 }
 
 // Encoders that stopped counting.
-void take_stuck_encoder_faults(Settings& s, control::DriveSetup<double>& setup, const Basis& b, double held_torque,
+void take_stuck_encoder_faults(Settings& s, control::DriveSetup<double>& setup, const Basis& b, double held_by_friction,
                                const DriveConstants<double>& d) {
   control::SafetySetup<double>& f = setup.safety;
-  f.stuck_torque = s.positive("faults", "stuck_torque_nm",
-                              std::min(std::max(kHeldBeforeStuck * held_torque, kTorqueBeforeStuck * b.most_torque),
-                                       kMostTorqueChange * b.most_torque));
+  f.stuck_torque =
+      s.positive("faults", "stuck_torque_nm",
+                 std::min(std::max(kHeldBeforeStuck * held_by_friction, kTorqueBeforeStuck * b.most_torque),
+                          kMostTorqueChange * b.most_torque));
   // A coarse encoder needs longer to show that the shaft follows its torque.
   const double a_count_s = std::sqrt(2.0 * b.inertia * d.angle_base / setup.motor_counts / b.most_torque);
   f.stuck_s = s.positive("faults", "stuck_s", std::clamp(kCountsTimesBeforeStuck * a_count_s, f.stuck_s, 3.0), 3.0);
@@ -388,7 +389,7 @@ void take_faults(Settings& s, control::DriveSetup<double>& setup, const Basis& b
   f.acceleration = s.positive("faults", "acceleration_rad_s2",
                               std::min({10.0 * b.most_torque / b.inertia, largest_acceleration, shown_acceleration}),
                               largest_acceleration);
-  take_stuck_encoder_faults(s, setup, b, model.held_torque, d);
+  take_stuck_encoder_faults(s, setup, b, model.held_by_friction, d);
   f.current_mismatch = s.positive("faults", "current_mismatch_a", 0.2 * b.current);
   f.mismatch_s = s.positive("faults", "mismatch_s", f.mismatch_s, 3.0);
   f.torque_same_s = s.positive("faults", "torque_same_s", f.torque_same_s, 3.0);

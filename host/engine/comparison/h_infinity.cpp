@@ -1,10 +1,10 @@
 #include "host/engine/comparison/h_infinity.hpp"
 
 #include <algorithm>
-#include <boost/math/distributions/normal.hpp>
 #include <cmath>
 #include <span>
 
+#include "host/common/numbers/distributions.hpp"
 #include "host/common/signals/spectrum.hpp"
 
 namespace flexspline::comparison {
@@ -39,8 +39,7 @@ HInfinityNorm h_infinity_norm(const std::vector<double>& measured, const std::ve
   for (std::size_t k = 1; k < last; ++k)
     if (s.xx[k] >= kExcited * strongest) excited.push_back(k);
   norm.windows = s.independent_averages();
-  const double quantile =
-      boost::math::quantile(boost::math::normal(), 1.0 - 0.025 / static_cast<double>(excited.size()));
+  const double quantile = numbers::normal_quantile(1.0 - 0.025 / static_cast<double>(excited.size()));
   norm.value = 0.0;
   double low = 0.0, high = 0.0;
   for (const std::size_t k : excited) {

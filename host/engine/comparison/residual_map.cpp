@@ -4,7 +4,6 @@
 
 #include <Eigen/QR>
 #include <algorithm>
-#include <boost/math/distributions/fisher_f.hpp>
 #include <cmath>
 #include <functional>
 #include <iterator>
@@ -12,6 +11,7 @@
 #include <optional>
 
 #include "host/common/algebra/decompositions.hpp"
+#include "host/common/numbers/distributions.hpp"
 #include "host/engine/comparison/sample_variables.hpp"
 #include "host/engine/estimation/in_parallel.hpp"
 #include "host/engine/estimation/least_squares.hpp"
@@ -53,8 +53,7 @@ std::optional<double> significant_share(const Eigen::VectorXd& residual, const E
   const double independent = e.rows / tau, freedom = independent - 1.0 - e.parameters;
   if (freedom < 4.0) return std::nullopt;
   const double f = (r2 / e.parameters) / ((1.0 - r2) / freedom);
-  const boost::math::fisher_f distribution(e.parameters, freedom);
-  if (boost::math::cdf(boost::math::complement(distribution, f)) > level) return std::nullopt;
+  if (numbers::fisher_f_above(e.parameters, freedom, f) > level) return std::nullopt;
   const double adjusted = 1.0 - (1.0 - r2) * (independent - 1.0) / freedom;
   if (!(adjusted > 0.0) || !(e.all > 0.0)) return std::nullopt;
   return adjusted * std::min(1.0, e.total / e.all);

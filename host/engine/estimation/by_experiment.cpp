@@ -3,10 +3,10 @@
 #include <fmt/format.h>
 
 #include <algorithm>
-#include <boost/math/distributions/chi_squared.hpp>
 #include <cmath>
 #include <limits>
 
+#include "host/common/numbers/distributions.hpp"
 #include "host/engine/estimation/least_squares.hpp"
 
 namespace flexspline::estimation {
@@ -83,7 +83,7 @@ void summarise(ByExperiment& e) {
   // than their own errors explain: then it is the disagreement that makes the average uncertain, and it is said.
   const auto freedom = static_cast<double>(n - 1);
   const bool average_is_zero = std::abs(m.mean) <= 2.0 * m.deviation / std::sqrt(freedom + 1.0);
-  const bool differ = m.chi2 > boost::math::quantile(boost::math::chi_squared(freedom), 0.95);
+  const bool differ = m.chi2 > numbers::chi_squared_quantile(freedom, 0.95);
   if (m.mean == 0.0 || (average_is_zero && !differ)) return;
   e.spread_percent = 100.0 * m.deviation / std::abs(m.mean);
   if (n >= kFewestForReliable) e.reliable = *e.spread_percent <= kReliableSpreadPercent;

@@ -1,10 +1,10 @@
 #include "host/engine/estimation/cutoff_change.hpp"
 
 #include <algorithm>
-#include <boost/math/distributions/normal.hpp>
 #include <cmath>
 #include <memory>
 
+#include "host/common/numbers/distributions.hpp"
 #include "host/input/data/finding.hpp"
 
 namespace flexspline::estimation {
@@ -29,9 +29,8 @@ std::unique_ptr<Identification> at_higher_cutoff(const Identification& found, co
 
 double half_width_under_bias(double bias) {
   constexpr double kInside = 0.95;
-  const boost::math::normal_distribution<double> normal;
   const auto inside = [&](double half) {
-    return boost::math::cdf(normal, half - bias) - boost::math::cdf(normal, -half - bias);
+    return numbers::normal_up_to(half - bias) - numbers::normal_up_to(-half - bias);
   };
   double low = 0.0, high = bias + 2.0;
   for (int i = 0; i < 60; ++i) (inside(0.5 * (low + high)) < kInside ? low : high) = 0.5 * (low + high);

@@ -2,11 +2,10 @@
 
 #include <Eigen/Core>
 #include <algorithm>
-#include <boost/math/distributions/chi_squared.hpp>
-#include <boost/math/distributions/students_t.hpp>
 #include <cmath>
 
 #include "host/common/algebra/decompositions.hpp"
+#include "host/common/numbers/distributions.hpp"
 #include "host/engine/estimation/least_squares.hpp"
 
 namespace flexspline::estimation {
@@ -63,7 +62,7 @@ std::pair<double, double> variance_between(const std::vector<OwnFactors>& record
     for (const auto& [value, variance] : identified) sum += (value - mean) * (value - mean) / (variance + between);
     return sum;
   };
-  if (scatter(0.0) <= boost::math::quantile(boost::math::chi_squared(freedom), kCertain)) return {0.0, 0.0};
+  if (scatter(0.0) <= numbers::chi_squared_quantile(freedom, kCertain)) return {0.0, 0.0};
   double low = 0.0, high = kLargestDifference * kLargestDifference;
   for (int i = 0; i < 60; ++i) (scatter(0.5 * (low + high)) > freedom ? low : high) = 0.5 * (low + high);
   return {0.5 * (low + high), freedom};
@@ -147,7 +146,7 @@ Eigen::MatrixXd add_record_variance(const RecordVariance& between, const Balance
   for (Eigen::Index j = 0; j < wider.size(); ++j) {
     if (!(uncertainty[j] > 0.0)) continue;
     const double freedom = std::max(1.0, covariance(j, j) * covariance(j, j) / uncertainty[j]);
-    wider[j] = boost::math::quantile(boost::math::students_t(freedom), 0.975) / 1.959963984540054;
+    wider[j] = numbers::student_t_quantile(freedom, 0.975) / 1.959963984540054;
   }
   return wider.asDiagonal() * covariance * wider.asDiagonal();
 }

@@ -1,10 +1,11 @@
 #include "host/engine/measurement/distortion.hpp"
 
 #include <algorithm>
-#include <boost/math/distributions/fisher_f.hpp>
 #include <cmath>
 #include <limits>
 #include <numbers>
+
+#include "host/common/numbers/distributions.hpp"
 
 namespace flexspline::measurement {
 namespace {
@@ -63,8 +64,7 @@ class Lines {
       // Differences of neighbours share a period: two thirds of them count as independent.
       const double of_power = 2.0 * noise * noise / squares;
       const double of_noise = of_power * (periods - 1.0) * (periods > 2.0 ? 2.0 / 3.0 : 1.0);
-      level.p_value =
-          boost::math::cdf(boost::math::complement(boost::math::fisher_f(of_power, of_noise), power / noise));
+      level.p_value = numbers::fisher_f_above(of_power, of_noise, power / noise);
     } else if (power > 0.0) {
       level.p_value = 0.0;
     }

@@ -1,11 +1,11 @@
 #include "host/engine/selection/cross_validation.hpp"
 
 #include <algorithm>
-#include <boost/math/distributions/chi_squared.hpp>
 #include <cmath>
 #include <numeric>
 
 #include "host/common/algebra/decompositions.hpp"
+#include "host/common/numbers/distributions.hpp"
 #include "host/engine/estimation/balance_fit.hpp"
 #include "host/engine/estimation/least_squares.hpp"
 #include "host/engine/estimation/mixed_model.hpp"
@@ -286,8 +286,7 @@ LikelihoodGain likelihood_gain(const CrossValidatedFit& base, const CrossValidat
   gain.score = ratio - added * std::log(std::max(2.0, effective));
   gain.chi2_percent = chi2_before > 0.0 ? 100.0 * (1.0 - chi2_after / chi2_before) : 0.0;
   gain.fixed_effects_percent = fixed_effects_percent_of(base, extended);
-  const boost::math::chi_squared_distribution<double> distribution(std::max(1.0, added));
-  gain.p_value = ratio > 0.0 ? boost::math::cdf(boost::math::complement(distribution, ratio)) : 1.0;
+  gain.p_value = ratio > 0.0 ? numbers::chi_squared_above(std::max(1.0, added), ratio) : 1.0;
   return gain;
 }
 

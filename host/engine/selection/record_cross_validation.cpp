@@ -3,9 +3,9 @@
 #include <fmt/format.h>
 
 #include <algorithm>
-#include <boost/math/distributions/binomial.hpp>
 #include <cmath>
 
+#include "host/common/numbers/distributions.hpp"
 #include "host/engine/estimation/in_parallel.hpp"
 #include "host/engine/estimation/model_projection.hpp"
 #include "host/engine/estimation/variable_projection.hpp"
@@ -68,8 +68,7 @@ bool RecordCrossValidation::is_certain() const {
   const int all = better + worse;
   if (better == 0) return false;
   // Better by chance in so many of all records or more.
-  const boost::math::binomial_distribution<double> chance(all, 0.5);
-  return boost::math::cdf(boost::math::complement(chance, better - 1)) < kPolicy.sign_test_p_value;
+  return numbers::binomial_at_least(better, all, 0.5) < kPolicy.sign_test_p_value;
 }
 
 RecordCrossValidation cross_validate_by_record(const BalanceSearch& search, const CandidateFit& candidate) {

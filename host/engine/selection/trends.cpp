@@ -1,12 +1,12 @@
 #include "host/engine/selection/trends.hpp"
 
 #include <algorithm>
-#include <boost/math/distributions/students_t.hpp>
 #include <cmath>
 #include <numeric>
 #include <optional>
 #include <utility>
 
+#include "host/common/numbers/distributions.hpp"
 #include "host/engine/selection/policy.hpp"
 
 namespace flexspline::selection {
@@ -64,8 +64,7 @@ std::optional<Line> fit_line(const std::vector<double>& x, const std::vector<dou
   const double slope = xy / xx;
   const double variance = std::max(yy - slope * xy, 1e-12 * yy) / (n - 2.0) / xx;
   if (!(variance > 0.0)) return std::nullopt;
-  const boost::math::students_t_distribution<double> t(n - 2.0);
-  return Line{slope, 2.0 * boost::math::cdf(boost::math::complement(t, std::abs(slope) / std::sqrt(variance)))};
+  return Line{slope, 2.0 * numbers::student_t_above(n - 2.0, std::abs(slope) / std::sqrt(variance))};
 }
 
 }  // namespace
