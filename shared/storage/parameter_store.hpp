@@ -251,10 +251,10 @@ class ParameterStore {
     if (confirmed_ && rank_[1 - active_] == 0) return true;
     const std::size_t slot = free_slot(active_, kTwice);
     if (slot + kTwice <= kSlotsEnd) return put_twice(active_, slot, kGivesUp) == StoreError::none;
-    for (std::size_t slot = kFirstSlot; slot < kSlotsEnd; slot += kSlotWords)
-      if (word(active_, code_at(slot)) == code_of(rank_[active_])) {
-        confirmed_ = put(active_, check_at(slot), word(active_, check_at(slot))) &&
-                     put(active_, code_at(slot), code_of(rank_[active_]));
+    for (std::size_t used = kFirstSlot; used < kSlotsEnd; used += kSlotWords)
+      if (word(active_, code_at(used)) == code_of(rank_[active_])) {
+        confirmed_ = put(active_, check_at(used), word(active_, check_at(used))) &&
+                     put(active_, code_at(used), code_of(rank_[active_]));
         return confirmed_;
       }
     return false;
