@@ -1,6 +1,7 @@
-// The parameter store's memory on one that is written in double words, once after each erase. Both sectors have a copy
-// in RAM, which everything is read from. A word at an even place waits for its neighbour: both are written together,
-// the first one alone as soon as another double word is begun. So the memory is written in the order of the words.
+// The port of a store or of an update's slots on a memory that is written in double words, once after each erase. All
+// sectors have a copy in RAM, which everything is read from. A word at an even place waits for its neighbour: both are
+// written together, the first one alone as soon as another double word is begun. So the memory is written in the order
+// of the words.
 //
 // A double word that cannot be corrected reads as neither erased nor any valid number or check.
 #pragma once
@@ -26,7 +27,7 @@ class WriteOnceFlash {
   }
 
   constexpr bool erase(std::size_t sector) {
-    const bool kept = waits_ && waiting_.sector != sector ? flush() : true;
+    const bool kept = waiting_.sector == sector || flush();
     waits_ = false;
     const bool good = port_.erase(sector);
     read_sector(sector);
@@ -34,19 +35,25 @@ class WriteOnceFlash {
   }
   constexpr bool program(std::size_t sector, std::size_t word, std::uint32_t value) {
     const Place place{sector, word / 2};
-    if (waits_ && place != waiting_ && !flush()) return false;
+    if (place != waiting_ && !flush()) return false;
     const int shift = word % 2 == 0 ? 0 : 32;
     const std::uint64_t before = copy(place);
-    const std::uint64_t wanted = before & (~(std::uint64_t{kErasedWord} << shift) | std::uint64_t{value} << shift);
-    if (wanted == before) return true;
     if (waits_ || before == kErasedDoubleWord) {
-      set_copy(place, wanted);
+      if (value == kErasedWord) return true;
+      set_copy(place, before & (~(std::uint64_t{kErasedWord} << shift) | std::uint64_t{value} << shift));
       waits_ = true;
       waiting_ = place;
       return word % 2 == 0 || flush();
     }
-    // It is used: nothing but zeros can be written, to both of its words.
-    return value == 0 && write(place, 0);
+    // It is used: nothing but zeros can be written, to both of its words; again where they are there, as an interrupted
+    // write may have left them.
+    if (value == 0) return write(place, 0);
+    return static_cast<std::uint32_t>(before >> shift) == value;
+  }
+  constexpr bool flush() {
+    if (!waits_) return true;
+    waits_ = false;
+    return write(waiting_, copy(waiting_));
   }
   // Of the copy.
   constexpr std::span<const std::uint8_t> bytes(std::size_t sector) const { return copy_[sector].bytes; }
@@ -82,10 +89,6 @@ class WriteOnceFlash {
     const bool good = port_.program(place.sector, place.at, value);
     read_back(place);
     return good && copy(place) == value;
-  }
-  constexpr bool flush() {
-    waits_ = false;
-    return write(waiting_, copy(waiting_));
   }
 
   Port& port_;

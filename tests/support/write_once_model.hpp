@@ -79,8 +79,10 @@ class OnceModel {
   }
 
  private:
-  // Near its begin it reads as before, near its end as wanted, and cannot be corrected between.
+  // Near its begin it reads as before, near its end as wanted, and cannot be corrected between. Where no bit changes,
+  // nothing does.
   void interrupt(Cell& c, std::uint64_t wanted) {
+    if (c.readable && c.value == wanted) return;
     const std::uint64_t was = c.readable ? c.value : random_();
     c.weak = cells_.weakens;
     c.was = was;
@@ -110,13 +112,13 @@ class OnceModel {
   CutAt where_ = CutAt::before;
 };
 
-// As the parameter store sees it, from one start to the next.
-template <std::size_t kBytes>
+// As a store or an update sees it, from one start to the next.
+template <std::size_t kBytes, std::size_t kCount = storage::kSectors>
 class OnceFlash {
  public:
   static constexpr std::size_t kSectorBytes = kBytes;
   static constexpr bool kWriteOnce = true;
-  explicit OnceFlash(OnceCells<kBytes>& cells, std::uint64_t seed = 1) : model_(cells, seed), flash_(model_) {}
+  explicit OnceFlash(OnceCells<kBytes, kCount>& cells, std::uint64_t seed = 1) : model_(cells, seed), flash_(model_) {}
   OnceFlash(const OnceFlash&) = delete;
   OnceFlash& operator=(const OnceFlash&) = delete;
 
@@ -127,11 +129,13 @@ class OnceFlash {
   bool program(std::size_t sector, std::size_t word, std::uint32_t value) {
     return flash_.program(sector, word, value);
   }
+  bool flush() { return flash_.flush(); }
   std::span<const std::uint8_t> bytes(std::size_t sector) const { return flash_.bytes(sector); }
 
  private:
-  OnceModel<kBytes> model_;
-  storage::WriteOnceFlash<OnceModel<kBytes>> flash_;
+  using Model = OnceModel<kBytes, kCount>;
+  Model model_;
+  storage::WriteOnceFlash<Model, kCount> flash_;
 };
 
 }  // namespace flexspline::testing
