@@ -285,15 +285,21 @@ class Slots {
     return words > 0;
   }
   // An interrupted copy starts again. One that looks finished is written again without an erase, as its last word may
-  // have been interrupted; with one where words are written once.
+  // have been interrupted.
   constexpr bool copy(Slot from, Slot to) {
     const std::size_t words = (image_to_run(from).size() + 3) / 4;
     if (words == 0) return false;
-    if ((kOnce || !is_copy(from, to)) && erase(to) != SlotError::none) return false;
-    for (std::size_t i = 0; i < words; ++i)
+    const bool is_there = is_copy(from, to) && (!kOnce || has_end(to));
+    if (!is_there && erase(to) != SlotError::none) return false;
+    for (std::size_t i = 0; i < words && !(kOnce && is_there); ++i)
       if (!put(to, i, word(from, i))) return false;
-    return flush() && is_whole(to);
+    return flush() && is_whole(to) && (!kOnce || put_end(to));
   }
+  // Where words are written once: behind a copy, zeros. Once they are begun its last word is certain, and before that
+  // no word of the journal relies on it: so a copy without them may be erased, and one with them never is. They are
+  // where the download has its journal.
+  constexpr bool has_end(Slot slot) const { return word(slot, kImageBytes / 4) == 0; }
+  constexpr bool put_end(Slot slot) { return put(slot, kImageBytes / 4, 0) && put(slot, kImageBytes / 4 + 1, 0); }
   // The application is saved before a word of it is changed, unless it may not run.
   constexpr bool install() {
     if (is_set(Mark::fell_back)) return false;

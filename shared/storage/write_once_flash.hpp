@@ -45,10 +45,11 @@ class WriteOnceFlash {
       waiting_ = place;
       return word % 2 == 0 || flush();
     }
-    // It is used: nothing but zeros can be written, to both of its words; again where they are there, as an interrupted
+    // It is used: nothing but zeros can be written, to both of its words; again where both are there, as an interrupted
     // write may have left them.
-    if (value == 0) return write(place, 0);
-    return static_cast<std::uint32_t>(before >> shift) == value;
+    const auto there = static_cast<std::uint32_t>(before >> shift);
+    if (value == 0 && (there != 0 || before == 0)) return write(place, 0);
+    return there == value;
   }
   constexpr bool flush() {
     if (!waits_) return true;
