@@ -65,7 +65,6 @@ const Hidden kHidden[] = {
      "cogging: the magnets pull at the teeth"},
     {"cogging-magnet", [](double, double slots) { return slots; }, "cogging by magnets that differ"},
     {"current-gain", [](double pairs, double) { return 2 * pairs; }, "the gains of the current sensors differ"},
-    {"back-emf", [](double pairs, double) { return 6 * pairs; }, "fifth and seventh harmonic of the motor's back-EMF"},
     {"encoder-eccentricity", [](double, double) { return 1.0; }, "the motor's encoder is eccentric"},
 };
 
