@@ -47,7 +47,8 @@ struct CommissioningMessages {
     out.bus_full_scale_mv = s.bus_full_scale_mv;
     out.pwm_hz = s.pwm_hz;
     out.timer_counts = static_cast<std::uint32_t>(s.timer_counts);
-    out.shortest_pulse = s.foc.modulation.pulse;
+    // The rest is what a voltage may use. With two sensors nothing stands in for a phase that cannot be sampled.
+    out.shortest_pulse = s.foc.sensors.two ? s.foc.modulation.window : s.foc.modulation.pulse;
     out.most_current = s.most_phase;
     out.bus = static_cast<std::uint16_t>(std::max<std::int32_t>(stage.bus(), 0));
     out.least_bus = static_cast<std::uint16_t>(s.least_bus);

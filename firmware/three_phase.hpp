@@ -85,10 +85,11 @@ class ThreePhaseStageOf {
   bool tripped() const { return commanded_ && fault_ != StageFault::none; }
   StageFault fault() const { return fault_; }
 
-  // The motor that commissioning found; without pole pairs that with which the stage began. While the drive is not
+  // The motor that commissioning found; without pole pairs, or with another encoder than the board's, that with which
+  // the stage began. While the drive is not
   // armed, and from background work: the interrupt reads none of these then.
   void use(const control::MotorSettings& motor) {
-    const bool is_found = motor.pole_pairs > 0;
+    const bool is_found = motor.pole_pairs > 0 && motor.encoder_counts == made_.encoder_counts;
     s_.foc.sensors.gain = is_found ? motor.gain : made_.foc.sensors.gain;
     s_.foc.current = is_found ? motor.current : made_.foc.current;
     s_.foc.circle = is_found ? motor.circle : made_.foc.circle;
@@ -135,7 +136,8 @@ class ThreePhaseStageOf {
   static constexpr int kFilterBits = 4;  // of the speed: periods
   using Switches = control::commissioning::Outputs;
 
-  Switches measure(const Inputs& in, StageFault cause) {
+  // Cold: not a part of the current loop's code, and made for size.
+  [[gnu::cold, gnu::noinline]] Switches measure(const Inputs& in, StageFault cause) {
     // The bus first: a driver may trip by it.
     commissioning_fault_ = in.bus > s_.most_bus ? StageFault::bus_high : cause;
     commissions_ = commissioning_fault_ == StageFault::none;

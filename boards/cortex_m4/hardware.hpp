@@ -38,6 +38,21 @@ inline constexpr std::uint32_t kResetControl = 0xE000ED0C;     // SCB_AIRCR
 inline void enable_interrupt(std::uint32_t number) {
   hardware(kInterruptEnable + 4 * (number / 32)) = std::uint32_t{1} << (number % 32);
 }
+
+// A tick that is requested by another interrupt: PendSV, with the lowest priority, so that all others interrupt it. It
+// is one level only: interrupts that are never given a priority have the highest.
+inline constexpr std::uint32_t kInterruptControl = 0xE000ED04;  // SCB_ICSR
+inline constexpr std::uint32_t kSystemPriorities = 0xE000ED20;  // SCB_SHPR3
+inline void set_tick_priority() {
+  change_bits(kSystemPriorities, 0xFFU << 16, 0xFFU << 16);
+}
+inline void request_tick() {
+  hardware(kInterruptControl) = 1U << 28;
+}
+inline bool tick_is_requested() {
+  return (hardware(kInterruptControl) >> 28 & 1) != 0;
+}
+
 [[noreturn]] inline void reset_processor() {
   asm volatile("dsb" ::: "memory");
   hardware(kResetControl) = 0x05FA0004;  // key, SYSRESETREQ

@@ -1,5 +1,5 @@
 // A whole drive on one of these processors: board, application, parameters in flash, and the links to a host. main() of
-// a board is run(); its tick is an interrupt of TIM1.
+// a board is run(); its tick is an interrupt of TIM1, or one that those of the current loop begin.
 #pragma once
 
 #include <array>
@@ -9,6 +9,7 @@
 #include "boards/stm32f4/board.hpp"
 #include "boards/stm32f4/handover.hpp"
 #include "boards/stm32f4/signing_key.hpp"
+#include "boards/stm32f4/three_phase_board.hpp"
 #include "boards/stm32f4/usb_link.hpp"
 #include "firmware/application.hpp"
 #include "firmware/drive.hpp"
@@ -25,9 +26,22 @@ extern "C" const std::uint32_t vectors[];  // of the linker script
 namespace flexspline::stm32f4 {
 
 template <class Description>
+struct BoardChoice {
+  using Type = DriveBoard<Description>;
+};
+template <class Description>
+requires requires {
+  Description::kStage;
+}
+struct BoardChoice<Description> {
+  using Type = ThreePhaseBoard<Description>;
+};
+
+template <class Description>
 class Drive {
  public:
-  using Board = DriveBoard<Description>;
+  using Board = typename BoardChoice<Description>::Type;
+  static constexpr bool kHasStage = requires(Board & board) { board.three_phase(); };
   using Application = firmware::Application<Board>;
   using Flash = ParameterFlash<Board, Description::kParameterSector>;
   using Store = storage::ParameterStore<Flash>;
@@ -71,7 +85,8 @@ class Drive {
       static OtgFs port;
       // The internal oscillator is not accurate enough for USB: the host would reject the device. The serial line
       // works.
-      const bool usb = board_.clock_is_exact() && port.start(Description::kClock.core_hz);
+      const bool usb =
+          board_.clock_is_exact() && port.start(Description::kClock.core_hz, senses_usb_power<Description>());
       static UsbDevice device(port, serial);
       using ImageMemory = typename Description::template Images<Board>;
       static ImageMemory images(board_);
@@ -103,6 +118,14 @@ class Drive {
   void tick() {
     application_.tick();
     board_.end_tick();
+    if constexpr (!kHasStage) line_.move();
+  }
+  // Of a board with three half bridges. A tick is too slow for the line there.
+  void period() {
+    board_.period();
+  }
+  void watch() {
+    board_.watch();
     line_.move();
   }
 

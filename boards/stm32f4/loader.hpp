@@ -38,7 +38,8 @@ class Loader {
     static usb::Device<usb::LoaderIdentity, OtgFs, Dfu> device(port, serial);
     loader.serve(device.template get<Dfu>());
     // Without a crystal there is no USB: a debugger is needed.
-    const bool usb = source == ClockSource::crystal && port.start(Description::kClock.core_hz);
+    const bool usb =
+        source == ClockSource::crystal && port.start(Description::kClock.core_hz, senses_usb_power<Description>());
     hardware(kSysTickReload) = Description::kClock.core_hz / kTickHz - 1;
     hardware(kSysTick) = 7;
     for (;;) {

@@ -14,19 +14,30 @@
 
 namespace flexspline::stm32f4 {
 
+// PA9 senses the power of the bus, unless a board has another use for that pin and says so.
+template <class Description>
+constexpr bool senses_usb_power() {
+  if constexpr (requires { Description::kSensesUsbPower; }) {
+    return Description::kSensesUsbPower;
+  } else {
+    return true;
+  }
+}
+
 class OtgFs {
  public:
   static constexpr bool kAddressBeforeStatus = true;
   static constexpr std::uint8_t kEndpoints = 4;  // of each direction, with endpoint 0
 
-  // Connects to the bus (pulls D+ up) while it is powered. False: the controller does not answer.
-  bool start(std::uint32_t core_hz) {
+  // Connects to the bus (pulls D+ up) while it is powered; a board that does not sense its power connects always, and
+  // does not see that it was unplugged. False: the controller does not answer.
+  bool start(std::uint32_t core_hz, bool senses_power = true) {
     switch_clock_on(kOtgFs);
     hardware(kUsbSetup) = kInternalPhy;
     if (!wait_for(kReset, kBusIdle, kBusIdle, kTries)) return false;
     set_bits(kReset, 1);  // the core itself
     if (!wait_for(kReset, 1, 0, kTries)) return false;
-    hardware(kPhy) = (1U << 16) | (1U << 19);  // power; sensing of the bus's power for a device
+    hardware(kPhy) = (1U << 16) | (senses_power ? 1U << 19 : 1U << 21);  // power; sensing of the bus's for a device
     // Turnaround time for a bus clock above 32 MHz; forced device mode, which takes 25 ms.
     hardware(kUsbSetup) = kInternalPhy | (6U << 10) | (1U << 30);
     cortex_m4::spend_cycles(core_hz / 1000 * 25);

@@ -41,5 +41,8 @@ inline void set_up(std::span<const Pin> pins) {
 inline void write(const Pin& p, bool high) {
   hardware(p.base() + 0x18) = std::uint32_t{1} << (p.number + (high ? 0U : 16U));
 }
+inline bool reads_high(const Pin& p) {
+  return (hardware(p.base() + 0x10) >> p.number & 1) != 0;
+}
 
 }  // namespace flexspline::stm32f4

@@ -16,9 +16,10 @@ using cortex_m4::wait_for;
 
 inline constexpr std::uint32_t kTim1 = 0x40010000, kTim2 = 0x40000000, kTim3 = 0x40000400, kTim4 = 0x40000800,
                                kTim5 = 0x40000C00, kIwdg = 0x40003000, kUsart2 = 0x40004400, kUsart3 = 0x40004800,
-                               kI2c1 = 0x40005400, kSpi1 = 0x40013000, kPower = 0x40007000, kDac = 0x40007400,
-                               kAdc1 = 0x40012000, kAdcCommon = 0x40012300, kGpioA = 0x40020000, kGpioBytes = 0x400,
-                               kRcc = 0x40023800, kFlash = 0x40023C00, kOtgFs = 0x50000000, kRng = 0x50060800;
+                               kI2c1 = 0x40005400, kSpi1 = 0x40013000, kSpi3 = 0x40003C00, kPower = 0x40007000,
+                               kDac = 0x40007400, kAdc1 = 0x40012000, kAdc2 = 0x40012100, kAdc3 = 0x40012200,
+                               kAdcCommon = 0x40012300, kGpioA = 0x40020000, kGpioBytes = 0x400, kRcc = 0x40023800,
+                               kFlash = 0x40023C00, kOtgFs = 0x50000000, kRng = 0x50060800;
 
 // The chip's unique number of 96 bits (RM0090, 39.1).
 inline constexpr std::uint32_t kUniqueId = 0x1FFF7A10;
@@ -48,12 +49,18 @@ constexpr ClockGate gate_of(std::uint32_t peripheral) {
       return {0x40, 1U << 21};
     case kSpi1:
       return {0x44, 1U << 12};
+    case kSpi3:
+      return {0x40, 1U << 15};
     case kPower:
       return {0x40, 1U << 28};
     case kDac:
       return {0x40, 1U << 29};
     case kAdc1:
       return {0x44, 1U << 8};
+    case kAdc2:
+      return {0x44, 1U << 9};
+    case kAdc3:
+      return {0x44, 1U << 10};
     case kOtgFs:
       return {0x34, 1U << 7};
     case kRng:

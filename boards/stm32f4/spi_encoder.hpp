@@ -35,6 +35,16 @@ class As5047 {
     count = total_;
     return true;
   }
+  // Instead of both for who calls once a PWM period: one frame a call, each 256th for the diagnosis. The angle is one
+  // period old.
+  bool take_one(std::uint32_t& count) {
+    fresh_ = false;
+    finish();
+    begin(frames_++ % 256 == 0 ? Command::diagnosis : Command::angle);
+    if (!fresh_ || !magnet_) return false;
+    count = total_;
+    return true;
+  }
   // At its end.
   void end_tick() {
     fresh_ = false;
@@ -53,7 +63,7 @@ class As5047 {
   // 350 ns from the selection to the first clock, and between two frames.
   static constexpr std::uint32_t kSelectCycles = 60;
 
-  // Master, 16 bits, data at the second edge, a sixteenth of APB2: 5.25 MHz of at most 10.
+  // Master, 16 bits, data at the second edge, a sixteenth of its bus: 5.25 MHz of at most 10, half of it on APB1.
   static void set_up_bus() {
     hardware(spi + kControl) = 0;
     hardware(spi + kControl) = (1U << 11) | (3U << 8) | (3U << 3) | (1U << 2) | (1U << 0);
@@ -94,6 +104,7 @@ class As5047 {
   std::uint32_t total_ = 0;  // begins within a turn
   // The answer to a command comes with the next frame. All members are zero at first, or the whole drive would take
   // flash memory for its initial value.
+  std::uint8_t frames_ = 0;
   Command sent_ = Command::none, answered_ = Command::none;
   bool has_error_ = false;
   bool reversed_ = false;

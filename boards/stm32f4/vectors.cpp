@@ -1,4 +1,4 @@
-// The vector table up to the one interrupt that is ever enabled, and the handler of unexpected exceptions: the
+// The vector table up to the last interrupt that is ever enabled, and the handler of unexpected exceptions: the
 // amplifier off, then a reset. A stack overflow leaves the RAM at its lower end and ends here as well.
 #include <cstdint>
 
@@ -12,6 +12,13 @@ extern std::uint32_t stack_top[];
 void TIM1_CC_IRQHandler();
 // The boot loader only.
 [[gnu::weak]] void SysTick_Handler() {
+  Unexpected_Handler();
+}
+// Boards with three half bridges: the end of the conversions, and the tick.
+[[gnu::weak]] void ADC_IRQHandler() {
+  Unexpected_Handler();
+}
+[[gnu::weak]] void PendSV_Handler() {
   Unexpected_Handler();
 }
 // Provided by the board: opens all switches by writing registers only.
@@ -36,6 +43,8 @@ union Vector {
 constexpr Vector kGiveUp{.handler = Unexpected_Handler};
 constexpr Vector kNone{.handler = nullptr};
 constexpr Vector kSysTick{.handler = SysTick_Handler};
+constexpr Vector kPendSv{.handler = PendSV_Handler};
+constexpr Vector kConverters{.handler = ADC_IRQHandler};
 constexpr Vector kTick{.handler = TIM1_CC_IRQHandler};
 // NMI: the crystal failed (RM0090, 7.2.7). The start after the reset takes the internal oscillator.
 [[gnu::section(".vectors"), gnu::used]] const Vector kVectors[16 + 28] = {
@@ -55,7 +64,7 @@ constexpr Vector kTick{.handler = TIM1_CC_IRQHandler};
     kGiveUp,
     kGiveUp,
     kNone,
-    kGiveUp,
+    kPendSv,
     kSysTick,
     // interrupts 0 to 27
     kGiveUp,
@@ -76,7 +85,7 @@ constexpr Vector kTick{.handler = TIM1_CC_IRQHandler};
     kGiveUp,
     kGiveUp,
     kGiveUp,
-    kGiveUp,
+    kConverters,
     kGiveUp,
     kGiveUp,
     kGiveUp,

@@ -25,7 +25,7 @@ std::vector<std::uint8_t> factory_block(const plant::Drive& drive) {
 }
 
 std::vector<std::uint8_t> factory_block(const plant::Drive& drive, const control::DriveSetup<double>& setup) {
-  const board::Block made(board::parameters_of(drive, setup), board::constants_of(drive));
+  const board::Block made(board::parameters_of(drive, setup), board::constants_of(drive, setup.tick_hz));
   const auto* const bytes = reinterpret_cast<const std::uint8_t*>(made.bytes().data());
   std::vector<std::uint8_t> block(bytes, bytes + made.bytes().size());
   set_name(block, model::detail::kBlockStart, drive.name);

@@ -1,5 +1,7 @@
 #include "tests/board/chip.hpp"
 
+#include <utility>
+
 namespace flexspline::tests {
 
 Chip::Chip(const std::filesystem::path& image, const WrittenFlash& written)
@@ -18,6 +20,7 @@ Chip::Chip(const std::filesystem::path& image, const WrittenFlash& written)
   machine.attach(0x40000800, tim4);
   machine.attach(0x40000C00, tim5);
   machine.attach(0x40003000, watchdog);
+  machine.attach(0x40003C00, spi3);
   machine.attach(0x40004400, usart2);
   machine.attach(0x40004800, usart3);
   machine.attach(0x40005400, i2c1);
@@ -31,6 +34,7 @@ Chip::Chip(const std::filesystem::path& image, const WrittenFlash& written)
 }
 
 Stop Chip::tick() {
+  if (tim1.triggers_by_compare4()) return period();
   constexpr std::uint32_t kTickInterrupt = 27;
   if (senses) senses();
   usart2.pass();
@@ -47,6 +51,40 @@ Stop Chip::tick() {
   }
   if (acts) acts();
   return machine.run();
+}
+
+Stop Chip::period() {
+  constexpr std::uint32_t kWatch = 27, kConverted = 18, kTick = 14;
+  usart2.pass();
+  usart3.pass();
+  watchdog.pass(50e-6);
+  if (senses) senses();
+  tim1.counts_down = false;
+  if (!timer_is_dead && tim1.reach_compare4() && machine.interrupt_is_enabled(kWatch)) {
+    const Stop stop = machine.interrupt(16 + kWatch);
+    if (stop != Stop::waits) return stop;
+  }
+  if (tim1.triggers_by_compare4() && !converter_is_dead) converter.trigger();
+  tim1.counts_down = !loop_is_late;
+  if (converter.interrupts() && machine.interrupt_is_enabled(kConverted)) {
+    const std::uint64_t before = machine.instructions();
+    const Stop stop = machine.interrupt(16 + kConverted);
+    loop_instructions = machine.instructions() - before;
+    if (stop != Stop::waits) return stop;
+  }
+  if (machine.tick_is_requested()) {
+    const std::uint64_t after = std::exchange(interrupts_tick_after, 0);
+    const Stop stop = after == 0 ? machine.interrupt(kTick) : machine.interrupted_interrupt(kTick, after, [this] {
+      ++interrupted_ticks;
+      is_within_tick = true;
+      const Stop other = period();
+      is_within_tick = false;
+      return other;
+    });
+    if (stop != Stop::waits) return stop;
+  }
+  if (acts) acts();
+  return is_within_tick ? Stop::waits : machine.run();
 }
 
 }  // namespace flexspline::tests

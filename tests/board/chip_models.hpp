@@ -249,37 +249,6 @@ class FlashModel : public Peripheral {
   Cells cells;
 };
 
-// RM0090, 13: an injected sequence, which an edge of TIM1's trigger starts.
-class ConverterModel : public Registers {
- public:
-  std::array<std::uint32_t, 19> inputs{};  // 12 bits each
-
-  std::uint32_t read(std::uint32_t offset) override { return words[offset]; }
-  void write(std::uint32_t offset, std::uint32_t value) override {
-    words[offset] = offset == 0x00 ? words[offset] & value : value;
-  }
-  void trigger() {
-    const std::uint32_t c2 = at(0x08);
-    if ((c2 & 1) == 0 || (c2 >> 16 & 15) != 1 || (c2 >> 20 & 3) != 1 || (at(0x04) & (1U << 8)) == 0) return;
-    const std::uint32_t conversions = (at(0x38) >> 20 & 3) + 1;
-    for (std::uint32_t i = 0; i < conversions; ++i)
-      words[0x3C + 4 * i] = inputs.at(at(0x38) >> (5 * (4 - conversions + i)) & 31);
-    words[0x00] |= 1U << 2;
-  }
-  // Of the sequence, at this clock; the bus's (13.5, 13.3.7).
-  double conversion_us(double apb2_hz) const {
-    constexpr double kCycles[8] = {3, 15, 28, 56, 84, 112, 144, 480};
-    const double clock = apb2_hz / (2 * ((at(0x304) >> 16 & 3) + 1));
-    double cycles = 0;
-    const std::uint32_t conversions = (at(0x38) >> 20 & 3) + 1;
-    for (std::uint32_t i = 0; i < conversions; ++i) {
-      const std::uint32_t input = at(0x38) >> (5 * (4 - conversions + i)) & 31;
-      cycles += 12 + kCycles[at(input < 10 ? 0x10 : 0x0C) >> (3 * (input % 10)) & 7];
-    }
-    return cycles / clock * 1e6;
-  }
-};
-
 // RM0090, 18.3.12: a counter that follows two tracks. `moved` counts of the shaft, four to a line.
 class EncoderModel : public Registers {
  public:
@@ -304,44 +273,6 @@ class EncoderModel : public Registers {
 
  private:
   std::uint32_t most_, before_ = 0;
-};
-
-// RM0090, 17: what time base and outputs are set to. A break input that is low takes MOE away.
-class AdvancedTimerModel : public Registers {
- public:
-  explicit AdvancedTimerModel(Machine& machine) : machine_(machine) {}
-  void write(std::uint32_t offset, std::uint32_t value) override {
-    if (offset == 0x44 && (at(0x44) >> 8 & 3) >= 1 && ((value ^ at(0x44)) & 0x33FF) != 0)
-      machine_.violation("dead time or break is changed after it was locked");
-    if (offset == 0x44 && break_input) value &= ~(1U << 15);
-    words[offset] = offset == 0x10 ? words[0x10] & value : value;
-  }
-  // Its fourth compare value, reached while it counts up. True: it asks for an interrupt.
-  bool reach_compare4() {
-    if ((at(0x00) & 1) == 0 || (at(0x00) >> 5 & 3) != 2 || at(0x40) == 0 || at(0x40) >= at(0x2C)) return false;
-    words[0x10] |= 1U << 4;
-    return (at(0x0C) & (1U << 4)) != 0;
-  }
-  // From the trigger of the converter on.
-  double compare4_us(double timer_hz) const { return at(0x40) / timer_hz * 1e6; }
-  bool break_input = false;
-  void trip() {
-    break_input = true;
-    if ((at(0x44) & (1U << 12)) != 0 && (at(0x44) & (1U << 13)) == 0) words[0x44] &= ~(1U << 15);
-  }
-  bool outputs_on() const { return (at(0x44) & (1U << 15)) != 0; }
-  bool triggers() const { return (at(0x00) & 1) != 0 && (at(0x04) >> 4 & 7) == 2; }
-  // Updates, which trigger the converter, a second.
-  double updates_hz(double timer_hz) const {
-    const bool centred = (at(0x00) >> 5 & 3) != 0;
-    const double half = timer_hz / (at(0x2C) + (centred ? 0.0 : 1.0));
-    return half / (at(0x30) + 1);
-  }
-  // Share of the supply between the legs.
-  double duty() const { return (double(at(0x34)) - double(at(0x3C))) / at(0x2C); }
-
- private:
-  Machine& machine_;
 };
 
 // RM0090, 8: BSRR works on ODR.

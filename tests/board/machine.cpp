@@ -15,7 +15,8 @@ namespace {
 constexpr std::uint32_t kRam = 0x20000000, kRamBytes = 128 * 1024, kFlash = 0x08000000, kFlashBytes = 512 * 1024;
 constexpr std::uint32_t kSystemMemory = 0x1FFF7000, kPage = 0x1000, kUniqueId = 0x1FFF7A10;
 constexpr std::uint32_t kReturn = kSystemMemory + 0x10;  // where a handler returns to
-constexpr std::uint32_t kCore = 0xE000E000, kVectorTable = 0xD08, kReset = 0xD0C, kInterruptEnable = 0x100;
+constexpr std::uint32_t kCore = 0xE000E000, kControlState = 0xD04, kVectorTable = 0xD08, kPriorities3 = 0xD20,
+                        kReset = 0xD0C, kInterruptEnable = 0x100;
 
 void check(uc_err error, const char* what) {
   if (error != UC_ERR_OK) throw std::runtime_error(std::string(what) + ": " + uc_strerror(error));
@@ -132,7 +133,10 @@ void Machine::write_window(uc_engine* uc, std::uint64_t offset, unsigned size, s
   const std::uint32_t address = window.start + static_cast<std::uint32_t>(offset);
   const auto word = static_cast<std::uint32_t>(value);
   if (window.start == kCore) {
-    m.system_[static_cast<std::uint32_t>(offset)] = word;
+    // Of the enables of interrupts zeros do nothing (ARMv7-M, B3.4.4).
+    const bool sets_only = offset >= kInterruptEnable && offset < kInterruptEnable + 32;
+    std::uint32_t& reg = m.system_[static_cast<std::uint32_t>(offset)];
+    reg = sets_only ? reg | word : word;
     if (offset == kVectorTable) m.vectors_ = word;
     if (offset == kReset && word == 0x05FA0004) {
       m.wants_reset_ = true;
@@ -160,15 +164,33 @@ Stop Machine::run() {
   return go(reg(UC_ARM_REG_PC), 0xFFFFFFFE);
 }
 Stop Machine::interrupt(std::uint32_t number) {
+  return handle(number, nullptr);
+}
+Stop Machine::interrupted_interrupt(std::uint32_t number, std::uint64_t after, const std::function<Stop()>& other) {
+  pause_at_ = instructions_ + after;
+  const Stop stop = handle(number, &other);
+  pause_at_ = 0;
+  return stop;
+}
+Stop Machine::handle(std::uint32_t number, const std::function<Stop()>* other) {
   // A handler is a function as any other: the hardware saves what a caller would.
   constexpr int kSaved[] = {UC_ARM_REG_R0,  UC_ARM_REG_R1, UC_ARM_REG_R2, UC_ARM_REG_R3, UC_ARM_REG_R4,  UC_ARM_REG_R5,
                             UC_ARM_REG_R6,  UC_ARM_REG_R7, UC_ARM_REG_R8, UC_ARM_REG_R9, UC_ARM_REG_R10, UC_ARM_REG_R11,
                             UC_ARM_REG_R12, UC_ARM_REG_SP, UC_ARM_REG_LR, UC_ARM_REG_PC, UC_ARM_REG_XPSR};
+  constexpr std::uint32_t kPendSv = 14, kConditional = 0x0600FC00;
   std::uint32_t saved[std::size(kSaved)];
   for (std::size_t i = 0; i < std::size(kSaved); ++i) saved[i] = reg(kSaved[i]);
+  // What is left of an IT block is not the handler's.
+  set_reg(UC_ARM_REG_XPSR, reg(UC_ARM_REG_XPSR) & ~kConditional);
   set_reg(UC_ARM_REG_SP, (reg(UC_ARM_REG_SP) - 32) & ~7U);
   set_reg(UC_ARM_REG_LR, kReturn | 1);
-  const Stop stop = go(word(vectors_ + 4 * number), kReturn);
+  if (number == kPendSv) system_[kControlState] = 0;
+  Stop stop = go(word(vectors_ + 4 * number), kReturn);
+  if (other != nullptr && stop == Stop::waits && reg(UC_ARM_REG_PC) != kReturn) {
+    pause_at_ = 0;
+    stop = (*other)();
+    if (stop == Stop::waits) stop = go(reg(UC_ARM_REG_PC), kReturn);
+  }
   if (stop != Stop::waits) return stop;
   for (std::size_t i = 0; i < std::size(kSaved); ++i) set_reg(kSaved[i], saved[i]);
   return stop;
@@ -176,6 +198,30 @@ Stop Machine::interrupt(std::uint32_t number) {
 bool Machine::ticks_itself() const {
   const auto found = system_.find(0x010);
   return found != system_.end() && (found->second & 3) == 3;
+}
+bool Machine::tick_is_requested() const {
+  const auto found = system_.find(kControlState);
+  return found != system_.end() && (found->second >> 28 & 1) != 0;
+}
+std::uint32_t Machine::tick_priority() const {
+  const auto found = system_.find(kPriorities3);
+  return found == system_.end() ? 0 : found->second >> 16 & 0xFF;
+}
+void Machine::count_instructions() {
+  const auto count = +[](uc_engine*, std::uint64_t, std::uint32_t, void* user) {
+    Machine& m = *static_cast<Machine*>(user);
+    // Then the present instruction has not been executed.
+    if (m.pause_at_ != 0 && m.instructions_ >= m.pause_at_) {
+      uc_emu_stop(m.uc_);
+    } else {
+      ++m.instructions_;
+    }
+  };
+  uc_hook hook = 0;
+  check(uc_hook_add(uc_, &hook, UC_HOOK_CODE, reinterpret_cast<void*>(count), this, 1, 0),
+        "instructions cannot be counted");
+  // What was translated before does not count.
+  for (std::uint32_t at = kFlash; at < kFlash + kFlashBytes; at += 2) uc_ctl_remove_cache(uc_, at, at + 2);
 }
 bool Machine::interrupt_is_enabled(std::uint32_t number) const {
   const auto found = system_.find(kInterruptEnable + 4 * (number / 32));

@@ -60,7 +60,14 @@ class Machine {
   Stop run();
   // As an exception of this number of the vector table: 16 and up are interrupts. The handler runs to its end.
   Stop interrupt(std::uint32_t number);
-  bool ticks_itself() const;  // SysTick runs, with its interrupt
+  // The same, but after so many instructions of the handler `other` happens, which may be another interrupt, and it
+  // goes on. Instructions have to be counted.
+  Stop interrupted_interrupt(std::uint32_t number, std::uint64_t after, const std::function<Stop()>& other);
+  bool ticks_itself() const;                                    // SysTick runs, with its interrupt
+  bool tick_is_requested() const;                               // PendSV is pending
+  std::uint32_t tick_priority() const;                          // its priority; zero is the highest
+  std::uint64_t instructions() const { return instructions_; }  // executed while they are counted
+  void count_instructions();                                    // from now on, slowly
   std::uint32_t vectors() const { return vectors_; }
   bool interrupt_is_enabled(std::uint32_t number) const;
 
@@ -85,6 +92,7 @@ class Machine {
   Peripheral* find(std::uint32_t address, std::uint32_t& offset);
   void load(const std::filesystem::path& elf);
   Stop go(std::uint32_t from, std::uint32_t until);
+  Stop handle(std::uint32_t number, const std::function<Stop()>* other);
 
   uc_engine* uc_ = nullptr;
   std::vector<std::unique_ptr<Window>> windows_;
@@ -97,6 +105,8 @@ class Machine {
   std::map<std::uint32_t, std::uint32_t> system_;  // of the core: NVIC, SCB
   std::vector<std::string> violations_;
   std::uint32_t vectors_ = 0;
+  std::uint64_t instructions_ = 0;
+  std::uint64_t pause_at_ = 0;  // zero: nowhere
   bool started_ = false;
   bool wants_reset_ = false;
   uc_err error_ = UC_ERR_OK;

@@ -214,7 +214,7 @@ void OtgModel::check_fifos() {
 
 bool OtgModel::attached() const {
   const bool device = (setup_ >> 30 & 1) != 0 && (phy_ >> 16 & 1) != 0 && (device_ & 3) == 3;
-  const bool sees_power = plugged_ && (phy_ >> 19 & 1) != 0;
+  const bool sees_power = plugged_ && ((phy_ >> 19 & 1) != 0 || (phy_ >> 21 & 1) != 0);
   return device && sees_power && (device_control_ & 2) == 0;
 }
 void OtgModel::plug(bool in) {

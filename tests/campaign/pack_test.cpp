@@ -33,7 +33,7 @@ TEST(PackedModels, ThreeHundredAreWithinAMillionthOfRatedTorqueAndOthersRefusedW
       ++admitted;
       EXPECT_TRUE(deployment::unpack(packed.bytes).coefficients_follow);
       const auto effects = values_of(m);
-      const auto drive = deployment::bases_of(m, 1.0 / options.tick_hz, packed.torque_scale);
+      const auto drive = deployment::widened(deployment::bases_of(m, 1.0 / options.tick_hz), packed.torque_scale);
       const auto other = deployment::compare(effects, drive, deployment::prove(effects, drive), 4000, random());
       const double rated = *m.drive.rated_torque_nm.value;
       worst = std::max({worst, other.worst[0] * drive.torque_base / (rated / drive.gear_ratio),
@@ -64,7 +64,7 @@ TEST(PackedModels, NoneOfAMillionDirectedSamplesLeavesItsProof) {
     const model::Model m = random_model(random);
     const auto effects = values_of(m);
     try {
-      const auto drive = deployment::bases_of(m, 1.0 / 16000.0, 1.0);
+      const auto drive = deployment::bases_of(m, 1.0 / 16000.0);
       const auto bounds = deployment::prove(effects, drive);
       if (!bounds.holds) continue;
       const auto difference = deployment::compare(effects, drive, bounds, 20'000, random());

@@ -101,7 +101,7 @@ parameters.inertia = 0.06
 }
 
 void read_settings(const std::string& text) {
-  static const auto bases = deployment::bases_of(some_model(), 1.0 / 20'000.0, 1.0);
+  static const auto bases = deployment::bases_of(some_model(), 1.0 / 20'000.0);
   try {
     const auto setup = deployment::parse_drive_setup(text, kName, some_model(), bases);
     const auto settings = deployment::settings_of(setup, bases, kName);

@@ -47,7 +47,7 @@ int run_proof_campaign(double minutes, const std::string& page, const std::strin
     const model::Model m = tests::random_model(random);
     const auto effects = tests::values_of(m);
     try {
-      const auto drive = deployment::bases_of(m, kTickS, 1.0);
+      const auto drive = deployment::bases_of(m, kTickS);
       const auto range = deployment::prove(effects, drive);
       if (!range.holds) continue;
       const auto proof = deployment::prove_error(effects, drive);

@@ -4,6 +4,7 @@
 #include <gtest/gtest.h>
 
 #include <Eigen/Dense>
+#include <complex>
 
 namespace flexspline::algebra {
 namespace {
@@ -74,6 +75,41 @@ TEST(Decompositions, OrthogonalMatrixBeginsWithTheColumnsOfTheOther) {
   ASSERT_EQ(Q.cols(), 3);
   EXPECT_LT((Q.transpose() * Q - Matrix::Identity(3, 3)).norm(), 1e-12);
   EXPECT_LT((Q.rightCols(2).transpose() * A).norm(), 1e-12);
+}
+
+TEST(HouseholderQr, SolvesAsTheNormalEquationsDoAndItsFactorHasTheProductsOfTheMatrix) {
+  const Matrix A{{1.0, 2.0}, {3.0, 5.0}, {-1.0, 4.0}};
+  const Vector b{{1.0, -2.0, 0.5}};
+  const HouseholderQr qr(A);
+  EXPECT_LT((qr.r().transpose() * qr.r() - A.transpose() * A).norm(), 1e-12);
+  EXPECT_LT((A.transpose() * (A * qr.solve(b) - b)).norm(), 1e-12);
+}
+
+TEST(LeastNormSolver, OfColumnsThatAreOneAndTheSameSharesTheSolutionEqually) {
+  const Matrix A{{1.0, 1.0}, {2.0, 2.0}, {-1.0, -1.0}};
+  const LeastNormSolver solver(A, 1e-7);
+  EXPECT_EQ(solver.rank(), 1);
+  EXPECT_LT((solver.solve(Vector{{2.0, 4.0, -2.0}}) - Vector{{1.0, 1.0}}).norm(), 1e-12);
+  EXPECT_LT((A * solver.pseudo_inverse() * A - A).norm(), 1e-12);  // Penrose's first condition
+}
+
+TEST(LeastNormSolver, OfOrthogonalColumnsThePivotsAreTheirLengths) {
+  EXPECT_NEAR(LeastNormSolver(Matrix{{8.0, 0.0}, {0.0, 2.0}}).pivot_ratio(), 4.0, 1e-12);
+}
+
+TEST(FullPivotLu, TheHilbertMatrixOfThreeHasItsKnownInverseAndCondition) {
+  const Matrix hilbert{{1.0, 1.0 / 2, 1.0 / 3}, {1.0 / 2, 1.0 / 3, 1.0 / 4}, {1.0 / 3, 1.0 / 4, 1.0 / 5}};
+  const FullPivotLu lu(hilbert);
+  EXPECT_LT((lu.inverse() - Matrix{{9.0, -36.0, 30.0}, {-36.0, 192.0, -180.0}, {30.0, -180.0, 180.0}}).norm(), 1e-9);
+  EXPECT_LT((lu.solve(hilbert) - Matrix::Identity(3, 3)).norm(), 1e-12);
+  EXPECT_NEAR(lu.reciprocal_condition(), 1.0 / 748.0, 1e-6);  // by sums of columns
+}
+
+TEST(ComplexEigenvalues, OfACompanionMatrixAreTheRootsOfItsPolynomial) {
+  // s^3 - 3 s^2 + 4 s - 2 = (s - 1) (s^2 - 2 s + 2): 1, 1 + i, 1 - i.
+  const Eigen::VectorXcd roots = complex_eigenvalues(Matrix{{0.0, 0.0, 2.0}, {1.0, 0.0, -4.0}, {0.0, 1.0, 3.0}});
+  for (const std::complex<double> expected : {std::complex(1.0, 0.0), std::complex(1.0, 1.0), std::complex(1.0, -1.0)})
+    EXPECT_LT((roots.array() - expected).abs().minCoeff(), 1e-12);
 }
 
 }  // namespace

@@ -1,22 +1,11 @@
 // No function is longer than a page: one does what its name says, and a part of it that has a name is a function.
 #include <gtest/gtest.h>
 
-#include <map>
-
 #include "tests/unit/architecture_source.hpp"
 
 namespace {
 
 constexpr long kMostLines = 60;
-
-// Longer ones, by file and length, until they are cut along what they do.
-const std::map<std::string, long>& exceptions() {
-  static const std::map<std::string, long> kLonger = {
-      {"host/engine/selection/forward_selection.cpp", 75},
-      {"host/engine/selection/stability_selection.cpp", 62},
-  };
-  return kLonger;
-}
 
 struct Function {
   long line = 0;
@@ -134,14 +123,13 @@ std::vector<Function> functions_of(std::string_view text) {
   return FunctionFinder(text).find();
 }
 
-// "path:line: a function of N lines", of all but the exceptions.
-std::string too_long(const std::vector<architecture::SourceFile>& files, const std::map<std::string, long>& longer) {
+// "path:line: a function of N lines".
+std::string too_long(const std::vector<architecture::SourceFile>& files) {
   std::string all;
   for (const architecture::SourceFile& file : files) {
     if (file.path.starts_with("tests/") || !(file.path.ends_with(".cpp") || file.path.ends_with(".hpp"))) continue;
-    const auto exception = longer.find(file.path);
     for (const Function& f : functions_of(file.text))
-      if (f.lines > (exception == longer.end() ? kMostLines : exception->second))
+      if (f.lines > kMostLines)
         all += "\n  " + file.path + ":" + std::to_string(f.line) + ": a function of " + std::to_string(f.lines) +
                " lines; cut it along what it does";
   }
@@ -155,23 +143,13 @@ std::string body(long lines) {
 }
 
 TEST(ArchitectureFunctions, AreAtMostAPageLong) {
-  EXPECT_EQ(too_long(architecture::project_files(), exceptions()), "");
-}
-
-TEST(ArchitectureFunctions, NoExceptionOutlivesItsReason) {
-  for (const auto& [path, lines] : exceptions()) {
-    long longest = 0;
-    for (const architecture::SourceFile& file : architecture::project_files())
-      if (file.path == path)
-        for (const Function& f : functions_of(file.text)) longest = std::max(longest, f.lines);
-    EXPECT_GT(longest, kMostLines) << path << ": take it out of the list";
-  }
+  EXPECT_EQ(too_long(architecture::project_files()), "");
 }
 
 TEST(ArchitectureFunctions, ALongOneIsFoundWithItsLine) {
-  EXPECT_EQ(too_long({{"host/a.cpp", "int a;\nvoid f(int x) " + body(kMostLines + 1)}}, {}),
+  EXPECT_EQ(too_long({{"host/a.cpp", "int a;\nvoid f(int x) " + body(kMostLines + 1)}}),
             "\n  host/a.cpp:2: a function of 61 lines; cut it along what it does");
-  EXPECT_EQ(too_long({{"host/a.cpp", "void f(int x) " + body(kMostLines)}}, {}), "");
+  EXPECT_EQ(too_long({{"host/a.cpp", "void f(int x) " + body(kMostLines)}}), "");
 }
 
 TEST(ArchitectureFunctions, AreFoundInClassesNamespacesAndBehindInitialisers) {

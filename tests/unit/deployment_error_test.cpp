@@ -37,7 +37,7 @@ model::Model drive_with(const std::vector<std::string>& types) {
   return m;
 }
 ErrorProof proof_of(const model::Model& m) {
-  return deployment::prove_error(values_of(m), deployment::bases_of(m, kTickS, 1.0));
+  return deployment::prove_error(values_of(m), deployment::bases_of(m, kTickS));
 }
 std::string unproven(const ErrorProof& proof, const std::string& id) {
   for (const auto& part : proof.parts)
@@ -49,7 +49,7 @@ std::string unproven(const ErrorProof& proof, const std::string& id) {
 std::size_t expect_within(const model::Model& m, std::size_t samples, std::uint64_t seed) {
   const auto effects = values_of(m);
   try {
-    const auto drive = deployment::bases_of(m, kTickS, 1.0);
+    const auto drive = deployment::bases_of(m, kTickS);
     const auto range = deployment::prove(effects, drive);
     if (!range.holds) return 0;
     const auto proof = deployment::prove_error(effects, drive);
@@ -80,7 +80,7 @@ TEST(ErrorProof, HoldsForEveryEffectAndForSumsAlongAHundredThousandDirectedSampl
 // A weight is rounded to 2^-27 and its product is exact: two bases of acceleration make twice what it is off.
 TEST(ErrorProof, OfAnInertiaIsTheRoundingOfItsOneCoefficientAtTheEndOfTheEnvelope) {
   const model::Model m = drive_with({"inertia"});
-  const auto d = deployment::bases_of(m, kTickS, 1.0);
+  const auto d = deployment::bases_of(m, kTickS);
   const double weight = *m.effects[0].parameters[0].value * d.acceleration_base / d.torque_base;
   const double off = std::abs(std::ldexp(std::round(std::ldexp(weight, 27)), -27) - weight);
   EXPECT_NEAR(proof_of(m).sum[0], 2.0 * off, 1e-10);
@@ -92,7 +92,7 @@ TEST(ErrorProof, IsOfATickThatGivesTheBitsOfTheDrivesOwn) {
   for (int k = 0; k < 10; ++k) {
     const model::Model m = random_model(random);
     const auto effects = values_of(m);
-    const auto drive = deployment::bases_of(m, kTickS, 8.0);
+    const auto drive = deployment::widened(deployment::bases_of(m, kTickS), 8.0);
     std::unique_ptr<model::DriveModel<fixed::Fixed>> whole, parted;
     try {
       whole = deployment::model_of<fixed::Fixed>(effects, drive);

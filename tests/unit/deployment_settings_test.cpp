@@ -26,7 +26,7 @@ model::Model some_model() {
   return testing::two_ampere_drive();
 }
 control::DriveSetup<double> parsed(const std::string& tables, const model::Model& m = some_model()) {
-  const auto d = deployment::bases_of(m, 1.0 / 20'000.0, 1.0);
+  const auto d = deployment::bases_of(m, 1.0 / 20'000.0);
   return deployment::parse_drive_setup("format = \"flexspline-drive/1\"\n" + tables, "d.toml", m, d);
 }
 std::string error_of(const std::string& tables, const model::Model& m = some_model()) {
@@ -155,7 +155,7 @@ TEST(DriveSettings, ThatAreWrongAreRefusedWithTheirPlace) {
   expect(error_of(kCounts, m), {"inertia_kg_m2", "[load]"});
   EXPECT_EQ(error_of(kCounts + "[output_encoder]\ncounts = 4096\n", m), "none");
   try {
-    deployment::parse_drive_setup("format = \"flexspline-model/1\"\n", "d.toml", m, deployment::bases_of(m, 5e-5, 1.0));
+    deployment::parse_drive_setup("format = \"flexspline-model/1\"\n", "d.toml", m, deployment::bases_of(m, 5e-5));
     ADD_FAILURE();
   } catch (const PackError& error) {
     expect(error.what(), {"d.toml:1:", "flexspline-drive/1"});
@@ -163,7 +163,7 @@ TEST(DriveSettings, ThatAreWrongAreRefusedWithTheirPlace) {
 }
 
 TEST(DriveSettings, ThatContradictEachOtherDoNotFit) {
-  const auto d = deployment::bases_of(some_model(), 1.0 / 20'000.0, 1.0);
+  const auto d = deployment::bases_of(some_model(), 1.0 / 20'000.0);
   const auto s = parsed(kCounts + "[limits]\nvelocity_rad_s = 150\noverspeed_rad_s = 100\n");
   EXPECT_THROW(deployment::settings_of(s, d, "d.toml"), PackError);
   // An encoder too coarse to show the stated angle: a turn over 1000, of which 8 counts are 0.05 rad.

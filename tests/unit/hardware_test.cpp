@@ -143,7 +143,7 @@ TEST(BoardHardware, PackTakesWhatTheBoardStatesAndSaysWhichSettingDisagrees) {
                         .most_current_ma = 5000,
                         .torque_sensor = control::SensorKind::none};
   const model::Model m = testing::two_ampere_drive();
-  const auto d = deployment::bases_of(m, 1.0 / kTickHz, 1.0);
+  const auto d = deployment::bases_of(m, 1.0 / kTickHz);
   const auto setup = [&](const std::string& tables, const Hardware& hardware) {
     return deployment::parse_drive_setup("format = \"flexspline-drive/1\"\n[motor_encoder]\ncounts = 16384\n" + tables,
                                          "d.toml", m, d, {}, hardware);

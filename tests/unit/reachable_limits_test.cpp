@@ -17,7 +17,7 @@ using firmware::BlockFinding;
 // A drive of 2 A and 200 rad/s with these settings: what pack says, or "taken".
 std::string packed(const std::string& tables) {
   const model::Model m = testing::two_ampere_drive();
-  const auto d = deployment::bases_of(m, 1.0 / kTickHz, 1.0);
+  const auto d = deployment::bases_of(m, 1.0 / kTickHz);
   const std::string all = "format = \"flexspline-drive/1\"\n[motor_encoder]\ncounts = 16384\n" + tables;
   try {
     deployment::settings_of(deployment::parse_drive_setup(all, "d.toml", m, d), d, "d.toml");

@@ -86,6 +86,21 @@ TEST(ThreePhaseDrive, StaysOffWhereACurrentSensorsZeroIsOutOfRange) {
   EXPECT_TRUE(stage.update({{0, 100, 0}, 26214, 0}).enabled);
 }
 
+TEST(ThreePhaseDrive, AMotorThatWasMeasuredWithAnotherEncoderIsNotUsed) {
+  auto settings = three_phase_settings_of(plant::demo_plant().drive);
+  settings.pole_pairs = 0;
+  firmware::ThreePhaseStage stage;
+  stage.begin(settings);
+  control::MotorSettings motor;
+  motor.pole_pairs = 7;
+  motor.encoder_counts = 2 * settings.encoder_counts;
+  stage.use(motor);
+  EXPECT_FALSE(stage.is_commissioned()) << "its angle would run at half the speed of the rotor's";
+  motor.encoder_counts = settings.encoder_counts;
+  stage.use(motor);
+  EXPECT_TRUE(stage.is_commissioned());
+}
+
 TEST(ThreePhaseDrive, SwitchesItsStageOffWithinTheStatedPeriodsUntilItIsDisarmed) {
   using firmware::StageFault;
   struct Case {

@@ -24,7 +24,7 @@ void pack_all(ComparisonSetup& setup) {
     pack.settings_origin = setup.settings_origin;
     one.block = deployment::pack(one.model, pack).bytes;
     if (&one != setup.models.data()) continue;
-    const double most_a = 1.99 * deployment::bases_of(one.model, 1.0 / setup.job.tick_hz, 1.0).current_base;
+    const double most_a = 1.99 * deployment::bases_of(one.model, 1.0 / setup.job.tick_hz).current_base;
     std::optional<double> lowered_from_a;
     settings = drive::settings_text(deployment::unpack(one.block), most_a, lowered_from_a);
   }
@@ -59,7 +59,7 @@ Comparison compare(ComparisonSetup setup, const Runner& run, const std::function
   c.scenario = setup.job.scenario;
   c.processor = setup.job.processor;
   c.take_gains(deployment::parse_drive_setup(setup.settings, setup.settings_origin, first,
-                                             deployment::bases_of(first, 1.0 / setup.job.tick_hz, 1.0)));
+                                             deployment::bases_of(first, 1.0 / setup.job.tick_hz)));
   std::vector<Prediction> predicted;
   if (setup.draws > 0) {
     progress("predicting the gain");

@@ -41,8 +41,7 @@ SimulatedPlant plant_of(const model::Model& truth, const data::Dataset& dataset,
   }
   SimulatedPlant plant_setup;
   plant_setup.what = std::move(what);
-  hardware.current_limit_a =
-      kPeakCurrent * deployment::bases_of(truth, 1.0 / closed_loop::kTwinTickHz, 1.0).current_base;
+  hardware.current_limit_a = kPeakCurrent * deployment::bases_of(truth, 1.0 / closed_loop::kTwinTickHz).current_base;
   plant_setup.plant = closed_loop::plant_text(truth, hardware);
   // As in a manufacturer's data sheet; the loops follow from the model.
   plant_setup.settings = fmt::format(

@@ -5,6 +5,8 @@
 #include <Eigen/LU>
 #include <Eigen/QR>
 #include <Eigen/SVD>
+#include <cmath>
+#include <utility>
 
 namespace flexspline::algebra {
 
@@ -18,6 +20,21 @@ Matrix r_factor(Matrix a) {
   return qr.matrixQR().topRows(columns).triangularView<Eigen::Upper>();
 }
 
+struct HouseholderQr::Factor {
+  Eigen::HouseholderQR<Matrix> qr;
+};
+HouseholderQr::HouseholderQr(const Matrix& a)
+    : factor_(std::make_unique<Factor>(Factor{Eigen::HouseholderQR<Matrix>(a)})) {}
+HouseholderQr::~HouseholderQr() = default;
+HouseholderQr::HouseholderQr(HouseholderQr&&) noexcept = default;
+HouseholderQr& HouseholderQr::operator=(HouseholderQr&&) noexcept = default;
+Matrix HouseholderQr::r() const {
+  return factor_->qr.matrixQR().topRows(factor_->qr.cols()).triangularView<Eigen::Upper>();
+}
+Matrix HouseholderQr::solve(const Matrix& b) const {
+  return factor_->qr.solve(b);
+}
+
 Matrix orthogonal_of(const Matrix& a) {
   return Eigen::HouseholderQR<Matrix>(a).householderQ();
 }
@@ -29,8 +46,50 @@ Matrix inverse_of_positive(const Matrix& a) {
   return solve_positive(a, Matrix::Identity(a.rows(), a.cols()));
 }
 
+struct FullPivotLu::Factor {
+  Eigen::FullPivLU<Matrix> lu;
+};
+FullPivotLu::FullPivotLu(const Matrix& a) : factor_(std::make_unique<Factor>(Factor{Eigen::FullPivLU<Matrix>(a)})) {}
+FullPivotLu::~FullPivotLu() = default;
+FullPivotLu::FullPivotLu(FullPivotLu&&) noexcept = default;
+FullPivotLu& FullPivotLu::operator=(FullPivotLu&&) noexcept = default;
+double FullPivotLu::reciprocal_condition() const {
+  return factor_->lu.rcond();
+}
+Matrix FullPivotLu::solve(const Matrix& b) const {
+  return factor_->lu.solve(b);
+}
+Matrix FullPivotLu::inverse() const {
+  return factor_->lu.inverse();
+}
 Matrix inverse_of(const Matrix& a) {
-  return Eigen::FullPivLU<Matrix>(a).inverse();
+  return FullPivotLu(a).inverse();
+}
+
+struct LeastNormSolver::Factor {
+  Eigen::CompleteOrthogonalDecomposition<Matrix> qtz;
+};
+LeastNormSolver::LeastNormSolver(const Matrix& a, double threshold) {
+  auto factor = std::make_unique<Factor>();
+  if (threshold > 0.0) factor->qtz.setThreshold(threshold);
+  factor->qtz.compute(a);
+  factor_ = std::move(factor);
+}
+LeastNormSolver::~LeastNormSolver() = default;
+LeastNormSolver::LeastNormSolver(LeastNormSolver&&) noexcept = default;
+LeastNormSolver& LeastNormSolver::operator=(LeastNormSolver&&) noexcept = default;
+Eigen::Index LeastNormSolver::rank() const {
+  return factor_->qtz.rank();
+}
+double LeastNormSolver::pivot_ratio() const {
+  const auto& t = factor_->qtz.matrixT();
+  return std::abs(t(0, 0)) / std::abs(t(rank() - 1, rank() - 1));
+}
+Matrix LeastNormSolver::solve(const Matrix& b) const {
+  return factor_->qtz.solve(b);
+}
+Matrix LeastNormSolver::pseudo_inverse() const {
+  return factor_->qtz.pseudoInverse();
 }
 
 struct SymmetricFactor::Factor {
@@ -50,6 +109,9 @@ Eigenpairs eigenpairs(const Matrix& symmetric) {
 }
 Vector eigenvalues(const Matrix& symmetric) {
   return Eigen::SelfAdjointEigenSolver<Matrix>(symmetric, Eigen::EigenvaluesOnly).eigenvalues();
+}
+Eigen::VectorXcd complex_eigenvalues(const Matrix& a) {
+  return Eigen::EigenSolver<Matrix>(a, false).eigenvalues();
 }
 
 SingularValues singular_values(const Matrix& a) {

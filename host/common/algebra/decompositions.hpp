@@ -15,6 +15,21 @@ using Vector = Eigen::VectorXd;
 // filled up with zeros.
 Matrix r_factor(Matrix a);
 
+// Least squares of a matrix with at least as many rows as columns, all independent, by Householder reflections.
+class HouseholderQr {
+ public:
+  explicit HouseholderQr(const Matrix& a);
+  ~HouseholderQr();
+  HouseholderQr(HouseholderQr&&) noexcept;
+  HouseholderQr& operator=(HouseholderQr&&) noexcept;
+  Matrix r() const;  // columns x columns, upper triangular
+  Matrix solve(const Matrix& b) const;
+
+ private:
+  struct Factor;
+  std::unique_ptr<const Factor> factor_;
+};
+
 // An orthogonal matrix whose first columns span those of A, which are independent: rows x rows.
 Matrix orthogonal_of(const Matrix& a);
 
@@ -22,8 +37,42 @@ Matrix orthogonal_of(const Matrix& a);
 Matrix solve_positive(const Matrix& a, const Matrix& b);
 Matrix inverse_of_positive(const Matrix& a);
 
-// By LU with full pivoting; of a singular matrix not defined.
+// LU with full pivoting; solution and inverse of a singular matrix are not defined.
+class FullPivotLu {
+ public:
+  explicit FullPivotLu(const Matrix& a);
+  ~FullPivotLu();
+  FullPivotLu(FullPivotLu&&) noexcept;
+  FullPivotLu& operator=(FullPivotLu&&) noexcept;
+  // An estimate of 1 / (norm of A times norm of its inverse).
+  double reciprocal_condition() const;
+  Matrix solve(const Matrix& b) const;
+  Matrix inverse() const;
+
+ private:
+  struct Factor;
+  std::unique_ptr<const Factor> factor_;
+};
 Matrix inverse_of(const Matrix& a);
+
+// The least-squares solution of least norm, by a complete orthogonal decomposition, where A need not have full rank.
+class LeastNormSolver {
+ public:
+  // `threshold`: pivots below that share of the largest count as zero; zero: the precision of doubles.
+  explicit LeastNormSolver(const Matrix& a, double threshold = 0.0);
+  ~LeastNormSolver();
+  LeastNormSolver(LeastNormSolver&&) noexcept;
+  LeastNormSolver& operator=(LeastNormSolver&&) noexcept;
+  Eigen::Index rank() const;
+  // The largest pivot over the smallest that counts.
+  double pivot_ratio() const;
+  Matrix solve(const Matrix& b) const;
+  Matrix pseudo_inverse() const;
+
+ private:
+  struct Factor;
+  std::unique_ptr<const Factor> factor_;
+};
 
 // The decomposition L D L' with pivots of a symmetric semidefinite matrix, to solve with several right-hand sides.
 class SymmetricFactor {
@@ -46,6 +95,8 @@ struct Eigenpairs {
 };
 Eigenpairs eigenpairs(const Matrix& symmetric);
 Vector eigenvalues(const Matrix& symmetric);
+// Of a square matrix that need not be symmetric, in no order.
+Eigen::VectorXcd complex_eigenvalues(const Matrix& a);
 
 // A = u diag(s) v', as many columns as the smaller side of A; s falls (one-sided Jacobi).
 struct SingularValues {

@@ -6,8 +6,6 @@
 
 #include "host/drive_link/deployment/pack.hpp"
 #include "host/drive_link/deployment/statics.hpp"
-#include "host/physics/catalogue/constants.hpp"
-#include "host/physics/catalogue/user_defined_effect.hpp"
 #include "shared/fixed/coefficients.hpp"
 #include "shared/fixed/turn.hpp"
 
@@ -26,7 +24,7 @@ double needed(const model::Quantity& q, const char* key) {
 }
 
 // The torsion at which the transmission carries rated torque: how far effects without memory have to be twisted.
-double rated_torsion(const model::Model& model, double rated_torque) {
+double rated_torsion(const catalogue::ResolvedModel& model, double rated_torque) {
   const Springs springs(model);
   const auto torque_at = [&](double torsion) { return std::abs(springs.torque_at(torsion)); };
   constexpr double kLeast = 1e-7, kMost = 1.0;
@@ -70,15 +68,15 @@ double rated_output_torque(const model::Drive& drive) {
          drive.torque_constant_nm_a.value.value_or(1.0) * needed(drive.gear_ratio, "gear_ratio");
 }
 
-DriveConstants<double> bases_of(const model::Model& model, double tick_s, double torque_scale) {
-  const model::Drive& drive = model.drive;
-  DriveConstants<double> d = catalogue::constants_of(drive);
+DriveConstants<double> bases_of(const catalogue::ResolvedModel& model, double tick_s) {
+  const model::Drive& drive = model.model->drive;
+  DriveConstants<double> d = model.constants;
   needed(drive.gear_ratio, "gear_ratio");
   d.velocity_base = needed(drive.rated_velocity_rad_s, "rated_velocity_rad_s");
   const double rated = rated_output_torque(drive);
-  d.output_torque_base = rated * torque_scale;
+  d.output_torque_base = rated;
   const double of_current = drive.rated_current_a.value.value_or(0.0) * d.torque_constant;
-  d.torque_base = std::max(rated / d.gear_ratio, of_current) * torque_scale;
+  d.torque_base = std::max(rated / d.gear_ratio, of_current);
   d.output_velocity_base = d.velocity_base / d.gear_ratio;
   d.acceleration_base = d.velocity_base / kFullSpeedAfterS;
   d.output_acceleration_base = d.acceleration_base / d.gear_ratio;
@@ -89,6 +87,12 @@ DriveConstants<double> bases_of(const model::Model& model, double tick_s, double
   d.current_base = drive.rated_current_a.value.value_or(rated / d.gear_ratio / d.torque_constant);
   d.time_base = tick_s;
   return from_block(in_block(d));
+}
+
+DriveConstants<double> widened(DriveConstants<double> bases, double torque_scale) {
+  bases.torque_base *= torque_scale;
+  bases.output_torque_base *= torque_scale;
+  return from_block(in_block(bases));
 }
 
 model::Number number_of(double x) {

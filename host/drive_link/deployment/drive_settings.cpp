@@ -141,16 +141,16 @@ class Settings {
   std::map<std::string, std::set<std::string>> taken_;
 };
 
-std::optional<double> parameter(const model::Model& model, const char* effect, const char* name) {
-  for (const model::Effect& e : model.effects)
-    if (e.type == effect)
-      for (const model::Parameter& p : e.parameters)
+std::optional<double> parameter(const catalogue::ResolvedModel& model, const char* effect, const char* name) {
+  for (const catalogue::ResolvedEffect& e : model.effects)
+    if (e.effect->type == effect)
+      for (const model::Parameter& p : e.effect->parameters)
         if (p.name == name) return p.value;
   return {};
 }
 
 // The largest slope of what the transmission carries without memory, within a torsion; zero without such effects.
-double largest_stiffness(const model::Model& model, double torsion) {
+double largest_stiffness(const catalogue::ResolvedModel& model, double torsion) {
   constexpr int kSteps = 400;
   const Springs springs(model);
   double steepest = 0.0;
@@ -159,6 +159,18 @@ double largest_stiffness(const model::Model& model, double torsion) {
         std::max(steepest, (springs.torque_at(torsion * (k + 1) / kSteps) - springs.torque_at(torsion * k / kSteps)) /
                                (torsion / kSteps));
   return steepest;
+}
+
+// What the settings take from the model.
+struct ModelFacts {
+  std::optional<double> inertia, output_inertia, damping_torque, damping_exponent;
+  double stiffness = 0.0;    // the largest within the base of torsion, N m/rad
+  double held_torque = 0.0;  // torque_held_by_friction
+};
+ModelFacts facts_of(const catalogue::ResolvedModel& model, const DriveConstants<double>& d) {
+  return {parameter(model, "inertia", "inertia"),           parameter(model, "output_inertia", "inertia"),
+          parameter(model, "structural_damping", "torque"), parameter(model, "structural_damping", "exponent"),
+          largest_stiffness(model, d.torsion_base),         torque_held_by_friction(model)};
 }
 
 // Of the board, where it states it: the settings have to agree with it.
@@ -240,7 +252,7 @@ struct Basis {
   double stiffness = 0.0;
 };
 
-Basis basis_of(Settings& s, const model::Model& model, const DriveConstants<double>& d,
+Basis basis_of(Settings& s, const ModelFacts& model, const DriveConstants<double>& d,
                const control::Hardware& hardware) {
   Basis b;
   const double most_a = in_units(hardware.most_current_ma);
@@ -252,8 +264,7 @@ Basis basis_of(Settings& s, const model::Model& model, const DriveConstants<doub
   b.velocity = s.positive("limits", "velocity_rad_s", d.velocity_base, 2.0 * d.velocity_base);
   b.overspeed = s.positive("limits", "overspeed_rad_s", 1.15 * b.velocity, 2.0 * d.velocity_base);
   b.most_torque = std::min(b.torque, b.current * d.torque_constant);
-  b.inertia =
-      s.needed("motor", "inertia_kg_m2", parameter(model, "inertia", "inertia"), "the model has no value for inertia");
+  b.inertia = s.needed("motor", "inertia_kg_m2", model.inertia, "the model has no value for inertia");
   return b;
 }
 
@@ -275,16 +286,15 @@ void take_encoders(Settings& s, control::DriveSetup<double>& setup, std::optiona
   }
 }
 
-void take_torsion_estimate(Settings& s, control::DriveSetup<double>& setup, const Basis& b, const model::Model& model,
+void take_torsion_estimate(Settings& s, control::DriveSetup<double>& setup, const Basis& b, const ModelFacts& model,
                            const DriveConstants<double>& d) {
   const char* const why = "the output has no encoder, and without one its motion is estimated";
-  setup.torsion = {
-      .inertia = b.inertia,
-      .output_inertia = s.needed("load", "inertia_kg_m2", parameter(model, "output_inertia", "inertia"), why),
-      .stiffness = s.needed("load", "stiffness_nm_rad", b.stiffness, why),
-      .torque_noise = s.positive("load", "torque_noise_nm", 0.05 * b.most_torque),
-      .load_walk = s.positive("load", "walk_nm_sqrt_s", 0.025 * d.output_torque_base),
-      .velocity_noise = s.positive("load", "velocity_noise_rad_s", 1.5e-3 * d.velocity_base)};
+  setup.torsion = {.inertia = b.inertia,
+                   .output_inertia = s.needed("load", "inertia_kg_m2", model.output_inertia, why),
+                   .stiffness = s.needed("load", "stiffness_nm_rad", b.stiffness, why),
+                   .torque_noise = s.positive("load", "torque_noise_nm", 0.05 * b.most_torque),
+                   .load_walk = s.positive("load", "walk_nm_sqrt_s", 0.025 * d.output_torque_base),
+                   .velocity_noise = s.positive("load", "velocity_noise_rad_s", 1.5e-3 * d.velocity_base)};
 }
 
 void take_loops(Settings& s, control::DriveSetup<double>& setup, const Basis& b) {
@@ -314,7 +324,7 @@ void take_trajectory(Settings& s, control::DriveSetup<double>& setup, const Basi
   setup.trajectory.highest = turns("highest_rad", setup.trajectory.highest);
 }
 
-void take_feedforward(Settings& s, control::DriveSetup<double>& setup, const Basis& b, const model::Model& model,
+void take_feedforward(Settings& s, control::DriveSetup<double>& setup, const Basis& b, const ModelFacts& model,
                       const DriveConstants<double>& d) {
   setup.feedforward = {
       .direction_band = s.positive("feedforward", "direction_band_rad_s", 1e-4 * d.velocity_base),
@@ -325,9 +335,9 @@ void take_feedforward(Settings& s, control::DriveSetup<double>& setup, const Bas
       .torsion_rate_limit = s.positive("feedforward", "torsion_rate_limit_rad_s", 0.5 * d.velocity_base / d.gear_ratio,
                                        2.0 * d.velocity_base / d.gear_ratio),
       .output_zero_turns = s.number("feedforward", "output_zero_turns").value_or(0.0)};
-  if (const auto damping = parameter(model, "structural_damping", "torque"); damping && *damping > 0.0) {
-    setup.feedforward.damping_torque = *damping;
-    setup.feedforward.damping_exponent = parameter(model, "structural_damping", "exponent").value_or(0.5);
+  if (model.damping_torque && *model.damping_torque > 0.0) {
+    setup.feedforward.damping_torque = *model.damping_torque;
+    setup.feedforward.damping_exponent = model.damping_exponent.value_or(0.5);
   }
   setup.disturbance = {.inertia = b.inertia,
                        .time_constant_s = s.positive("disturbance", "time_constant_s", 0.01),
@@ -352,13 +362,12 @@ void take_analog_signals(Settings& s, control::DriveSetup<double>& setup, const 
 }
 
 // Encoders that stopped counting.
-void take_stuck_encoder_faults(Settings& s, control::DriveSetup<double>& setup, const Basis& b,
-                               const model::Model& model, const DriveConstants<double>& d) {
+void take_stuck_encoder_faults(Settings& s, control::DriveSetup<double>& setup, const Basis& b, double held_torque,
+                               const DriveConstants<double>& d) {
   control::SafetySetup<double>& f = setup.safety;
-  f.stuck_torque = s.positive(
-      "faults", "stuck_torque_nm",
-      std::min(std::max(kHeldBeforeStuck * torque_held_by_friction(model), kTorqueBeforeStuck * b.most_torque),
-               kMostTorqueChange * b.most_torque));
+  f.stuck_torque = s.positive("faults", "stuck_torque_nm",
+                              std::min(std::max(kHeldBeforeStuck * held_torque, kTorqueBeforeStuck * b.most_torque),
+                                       kMostTorqueChange * b.most_torque));
   // A coarse encoder needs longer to show that the shaft follows its torque.
   const double a_count_s = std::sqrt(2.0 * b.inertia * d.angle_base / setup.motor_counts / b.most_torque);
   f.stuck_s = s.positive("faults", "stuck_s", std::clamp(kCountsTimesBeforeStuck * a_count_s, f.stuck_s, 3.0), 3.0);
@@ -367,7 +376,7 @@ void take_stuck_encoder_faults(Settings& s, control::DriveSetup<double>& setup, 
                               100.0 * d.angle_base);
 }
 
-void take_faults(Settings& s, control::DriveSetup<double>& setup, const Basis& b, const model::Model& model,
+void take_faults(Settings& s, control::DriveSetup<double>& setup, const Basis& b, const ModelFacts& model,
                  const DriveConstants<double>& d) {
   const double largest_acceleration = 15.0 * d.acceleration_base;
   control::SafetySetup<double>& f = setup.safety;
@@ -379,7 +388,7 @@ void take_faults(Settings& s, control::DriveSetup<double>& setup, const Basis& b
   f.acceleration = s.positive("faults", "acceleration_rad_s2",
                               std::min({10.0 * b.most_torque / b.inertia, largest_acceleration, shown_acceleration}),
                               largest_acceleration);
-  take_stuck_encoder_faults(s, setup, b, model, d);
+  take_stuck_encoder_faults(s, setup, b, model.held_torque, d);
   f.current_mismatch = s.positive("faults", "current_mismatch_a", 0.2 * b.current);
   f.mismatch_s = s.positive("faults", "mismatch_s", f.mismatch_s, 3.0);
   f.torque_same_s = s.positive("faults", "torque_same_s", f.torque_same_s, 3.0);
@@ -397,16 +406,17 @@ void take_faults(Settings& s, control::DriveSetup<double>& setup, const Basis& b
 }  // namespace
 
 control::DriveSetup<double> parse_drive_setup(const std::string& toml, const std::string& origin,
-                                              const model::Model& model, const DriveConstants<double>& d,
+                                              const catalogue::ResolvedModel& resolved, const DriveConstants<double>& d,
                                               std::optional<double> encoder_counts, const control::Hardware& hardware) {
   Settings s(toml, origin);
   s.require_no("output_encoder", hardware.output_encoder == control::SensorKind::none);
   s.require_no("torque_sensor", hardware.torque_sensor == control::SensorKind::none);
   control::DriveSetup<double> setup;
   setup.tick_hz = static_cast<std::uint32_t>(std::lround(1.0 / d.time_base));
+  const ModelFacts model = facts_of(resolved, d);
   Basis b = basis_of(s, model, d, hardware);
   take_encoders(s, setup, encoder_counts, origin);
-  b.stiffness = s.positive("feedforward", "stiffness_nm_rad", largest_stiffness(model, d.torsion_base));
+  b.stiffness = s.positive("feedforward", "stiffness_nm_rad", model.stiffness);
   if (setup.output_counts == 0) take_torsion_estimate(s, setup, b, model, d);
   take_loops(s, setup, b);
   take_trajectory(s, setup, b, d);

@@ -8,7 +8,7 @@
 #include <string_view>
 #include <vector>
 
-#include "host/physics/model/model.hpp"
+#include "host/physics/catalogue/resolved_model.hpp"
 #include "shared/control/drive_parameters_setup.hpp"
 #include "shared/control/hardware.hpp"
 #include "shared/fixed/system.hpp"
@@ -22,7 +22,8 @@ inline constexpr std::string_view kDriveFormat = "flexspline-drive/1";
 // (`hardware`) is the default. Throws PackError with file, line, table and key: what is no setting, is of another type
 // or outside its bounds, is missing and follows from nothing, or contradicts another or the board.
 control::DriveSetup<double> parse_drive_setup(const std::string& toml, const std::string& origin,
-                                              const model::Model& model, const effects::DriveConstants<double>& d,
+                                              const catalogue::ResolvedModel& model,
+                                              const effects::DriveConstants<double>& d,
                                               std::optional<double> encoder_counts = {},
                                               const control::Hardware& hardware = {});
 

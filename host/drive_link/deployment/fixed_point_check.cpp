@@ -1,5 +1,7 @@
 #include "host/drive_link/deployment/fixed_point_check.hpp"
 
+#include <fmt/format.h>
+
 #include <algorithm>
 #include <cmath>
 
@@ -79,10 +81,18 @@ double most(const Intervals::Sum& s) {
 }  // namespace
 
 Bounds prove(const std::vector<EffectValues>& effects, const DriveConstants<double>& drive) {
-  const model::Proof proof = model::prove(*model_of<Intervals>(effects, drive));
-  return {proof.holds,
-          std::string(proof.reason),
-          {most(proof.torques.motor), most(proof.torques.transmission), most(proof.torques.load)}};
+  const auto torques = [](const model::Proof& proof) {
+    return std::array{most(proof.torques.motor), most(proof.torques.transmission), most(proof.torques.load)};
+  };
+  const model::Proof all = model::prove(*model_of<Intervals>(effects, drive));
+  Bounds bounds{all.holds, {}, torques(all), {}};
+  if (!all.holds) bounds.reason = fmt::format("the proof fails: {}", all.reason);
+  for (const EffectValues& e : effects) {
+    const model::Proof alone = model::prove(*model_of<Intervals>({e}, drive));
+    if (!all.holds && !alone.holds) bounds.reason = fmt::format("{} does not fit: {}", e.id, alone.reason);
+    bounds.alone.push_back(torques(alone));
+  }
+  return bounds;
 }
 
 Difference compare(const std::vector<EffectValues>& effects, const DriveConstants<double>& drive, const Bounds& bounds,

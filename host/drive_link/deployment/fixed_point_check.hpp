@@ -22,10 +22,11 @@ inline constexpr std::array<const char*, 3> kBalances = {"motor", "transmission"
 struct Bounds {
   bool holds = false;
   std::string reason;
-  std::array<double, 3> torque{};  // largest magnitude on each balance, in bases
+  std::array<double, 3> torque{};            // largest magnitude on each balance, in bases
+  std::vector<std::array<double, 3>> alone;  // the same of each effect by itself
 };
-// The proof over intervals. Throws PackError where an effect does not fit: a coefficient leaves its format, or there is
-// no place left.
+// The proof over intervals. Where it fails, the reason names the effect that fails by itself, if one does. Throws
+// PackError where an effect does not fit: a coefficient leaves its format, or there is no place left.
 Bounds prove(const std::vector<EffectValues>& effects, const effects::DriveConstants<double>& drive);
 
 struct Difference {

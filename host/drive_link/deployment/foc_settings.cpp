@@ -3,17 +3,15 @@
 #include <algorithm>
 #include <cmath>
 #include <numbers>
-#include <stdexcept>
 #include <string>
+
+#include "host/drive_link/deployment/require.hpp"
 
 namespace flexspline::deployment {
 namespace {
 
 using control::foc::AxisSettings;
 
-void require(bool holds, const std::string& what) {
-  if (!holds) throw std::invalid_argument(what);
-}
 std::int32_t quantised(double x, int bits, const std::string& what) {
   const double scaled = std::round(std::ldexp(x, bits));
   require(std::isfinite(scaled) && std::abs(scaled) <= 2147483647.0, what + " does not fit its format");

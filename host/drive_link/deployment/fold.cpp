@@ -4,8 +4,8 @@
 #include <array>
 #include <cmath>
 #include <stdexcept>
+#include <tuple>
 
-#include "host/physics/catalogue/constants.hpp"
 #include "host/physics/catalogue/user_defined_effect.hpp"
 #include "shared/effects/variables.hpp"
 
@@ -33,11 +33,10 @@ std::size_t table_number() {
   return table_entry().id;
 }
 
-std::optional<FoldedTable> folded(const model::Effect& effect, const model::Drive& drive,
+std::optional<FoldedTable> folded(const catalogue::ResolvedEffect& resolved,
+                                  const effects::DriveConstants<double>& constants,
                                   const effects::DriveConstants<double>& bases) {
-  const catalogue::Entry& entry = catalogue::entry_of(effect);
-  const auto constants = catalogue::constants_of(drive);
-  const std::vector<double> parameters = catalogue::values_of(effect, entry);
+  const auto& [effect, entry, parameters] = std::tie(*resolved.effect, *resolved.entry, resolved.values);
   const auto single = catalogue::single_variable(entry, parameters, constants);
   if (!single) return {};
   const effects::VariableInfo& variable = info_of(single->variable);
@@ -72,9 +71,7 @@ std::optional<FoldedTable> folded(const model::Effect& effect, const model::Driv
       result.error = std::max(result.error, std::abs(exact[i - 1] - (left + (right - left) * share)));
     }
   }
-  result.table.type = std::string(catalogue::kTableEffect);
-  result.table.id = effect.id;
-  result.table.definition = std::move(d);
+  result.parameters = catalogue::table_parameters(d);
   return result;
 }
 

@@ -6,17 +6,21 @@
 #include <optional>
 #include <vector>
 
+#include "host/physics/catalogue/resolved_model.hpp"
 #include "host/physics/model/model.hpp"
 #include "shared/effects/effect.hpp"
 
 namespace flexspline::deployment {
 
 struct FoldedTable {
-  model::Effect table;  // on the balance of the effect, over the whole envelope of a drive with these bases
-  double error = 0.0;   // largest difference to the effect within the envelope, N m on its balance
+  // As catalogue::table_parameters, on the balance of the effect, over the whole envelope of a drive with these bases.
+  std::vector<double> parameters;
+  double error = 0.0;  // largest difference to the effect within the envelope, N m on its balance
 };
-// Nothing where the effect depends on more than one signal, on none, or on what was before.
-std::optional<FoldedTable> folded(const model::Effect& effect, const model::Drive& drive,
+// `constants` of the drive in SI. Nothing where the effect depends on more than one signal, on none, or on what was
+// before.
+std::optional<FoldedTable> folded(const catalogue::ResolvedEffect& effect,
+                                  const effects::DriveConstants<double>& constants,
                                   const effects::DriveConstants<double>& bases);
 
 // The number of table effects in a block.

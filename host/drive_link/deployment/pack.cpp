@@ -8,15 +8,13 @@
 #include <limits>
 
 #include "host/drive_link/deployment/bases.hpp"
+#include "host/drive_link/deployment/drive_effects.hpp"
 #include "host/drive_link/deployment/error_proof.hpp"
 #include "host/drive_link/deployment/fixed_point_check.hpp"
-#include "host/drive_link/deployment/fold.hpp"
 #include "host/drive_link/deployment/maker.hpp"
 #include "host/drive_link/deployment/note.hpp"
 #include "host/drive_link/deployment/sha256.hpp"
-#include "host/output/answers/text.hpp"
-#include "host/physics/catalogue/constants.hpp"
-#include "host/physics/catalogue/user_defined_effect.hpp"
+#include "host/physics/catalogue/catalogue.hpp"
 #include "shared/control/drive_block.hpp"
 #include "shared/fixed/system.hpp"
 #include "shared/fixed/turn.hpp"
@@ -34,59 +32,6 @@ constexpr std::array<double, 4> kTorqueScales = {1.0, 2.0, 4.0, 8.0};
 constexpr double kOverspeed = 1.25;
 constexpr double kDirectionBand = 1.0 / 200.0;
 constexpr double kTorsionLimit = 2.0;
-
-// The effects of a model as a drive runs them, with tables for those that the image lacks.
-struct OnDrive {
-  std::vector<EffectValues> effects;
-  std::array<double, 3> folding_error{};  // N m on each balance, of all tables together
-  std::vector<ProofPart> folds;
-};
-OnDrive on_drive(const model::Model& model, const PackOptions& options) {
-  OnDrive all;
-  std::vector<std::string> missing;
-  const auto has = [&](std::string_view type) {
-    return options.image.empty() || std::find(options.image.begin(), options.image.end(), type) != options.image.end();
-  };
-  for (const model::Effect& effect : model.effects)
-    for (const std::string& name : catalogue::missing_values(effect)) missing.push_back(effect.id + "." + name);
-  if (!missing.empty())
-    throw PackError(fmt::format("the model has no value for {}; identify it first", output::listed(missing)));
-  for (const model::Effect& effect : model.effects) {
-    const catalogue::Entry& entry = catalogue::entry_of(effect);
-    if (entry.info->host_only && effect.type != catalogue::kExpressionEffect)
-      throw PackError(
-          fmt::format("{} does not fit: it is too large for a drive, and has a memory that no table holds; "
-                      "replace it by one of {}",
-                      effect.id, entry.info->confused_with));
-    if (effect.type == catalogue::kTableEffect && has(effect.type)) {
-      all.effects.push_back({table_number(), effect.id, catalogue::table_parameters(*effect.definition)});
-    } else if (effect.type != catalogue::kExpressionEffect && effect.type != catalogue::kTableEffect &&
-               has(effect.type)) {
-      all.effects.push_back({entry.id, effect.id, catalogue::values_of(effect, entry)});
-    } else {
-      const auto table = has(catalogue::kTableEffect)
-                             ? folded(effect, model.drive, bases_of(model, 1.0 / options.tick_hz, 1.0))
-                             : std::nullopt;
-      if (!table)
-        throw PackError(fmt::format(
-            "{} does not fit: the firmware image lacks it, and {}; take it out of the model, or build an "
-            "image with it",
-            effect.id,
-            has(catalogue::kTableEffect) ? "it depends on more than one signal or on what was before, which "
-                                           "no table holds"
-                                         : "table_effect, which it could be folded into"));
-      all.effects.push_back({table_number(), effect.id, catalogue::table_parameters(*table->table.definition)});
-      const auto balance = static_cast<std::size_t>(all.effects.back().parameters[1]);
-      all.folding_error[balance] += table->error;
-      all.folds.push_back(
-          {effect.id, "interpolation", table->error, model.drive.axis == data::Axis::linear ? "N" : "N*m"});
-    }
-  }
-  // As drives read them, by rising number; the order of those of one kind is the model's.
-  std::stable_sort(all.effects.begin(), all.effects.end(),
-                   [](const auto& a, const auto& b) { return a.number < b.number; });
-  return all;
-}
 
 model::Name name_of(const std::string& text) {
   model::Name name{};
@@ -152,26 +97,19 @@ struct ScaledModel {
   Bounds bounds;
 };
 // Widens the bases of torque until the proof holds.
-ScaledModel proven(const model::Model& model, const std::vector<EffectValues>& effects, const PackOptions& options,
-                   Packed& packed) {
+ScaledModel proven(const std::vector<EffectValues>& effects, const DriveConstants<double>& bases, Packed& packed) {
   std::string reason;
   for (const double scale : kTorqueScales) {
-    ScaledModel tried{bases_of(model, 1.0 / options.tick_hz, scale), {}};
+    ScaledModel tried{widened(bases, scale), {}};
     try {
       tried.bounds = prove(effects, tried.drive);
     } catch (const PackError& error) {
       reason = error.what();
       continue;
     }
-    if (tried.bounds.holds) {
-      packed.torque_scale = scale;
-      return tried;
-    }
-    reason = fmt::format("the proof fails: {}", tried.bounds.reason);
-    // Which of them it is: those that fail alone.
-    for (const EffectValues& e : effects)
-      if (const Bounds alone = prove({e}, tried.drive); !alone.holds)
-        reason = fmt::format("{} does not fit: {}", e.id, alone.reason);
+    packed.torque_scale = scale;
+    if (tried.bounds.holds) return tried;
+    reason = tried.bounds.reason;
   }
   throw PackError(reason + fmt::format(" (with torques up to {:g} times the rated one); check its parameters against "
                                        "the ratings in [drive]",
@@ -186,11 +124,11 @@ void prove_parts(const std::vector<EffectValues>& effects, const ScaledModel& tr
                  Packed& packed) {
   const auto bases = torque_bases(tried.drive);
   const auto entries = catalogue::all();
-  for (const EffectValues& e : effects) {
+  for (std::size_t k = 0; k < effects.size(); ++k) {
+    const EffectValues& e = effects[k];
     const auto entry = std::find_if(entries.begin(), entries.end(), [&](const auto& x) { return x.id == e.number; });
-    const Bounds alone = prove({e}, tried.drive);
     double most = 0.0;
-    for (std::size_t b = 0; b < bases.size(); ++b) most = std::max(most, alone.torque[b] * bases[b]);
+    for (std::size_t b = 0; b < bases.size(); ++b) most = std::max(most, tried.bounds.alone[k][b] * bases[b]);
     packed.proof.push_back({e.id, entry != entries.end() && entry->has_state ? "invariant" : "interval", most, unit});
   }
   for (std::size_t b = 0; b < bases.size(); ++b)
@@ -239,13 +177,13 @@ void measure_error(const Difference& d, const PackOptions& options, const Scale&
 }
 
 // The proof of the error, by parts, with the measured error of each.
-void prove_errors(const OnDrive& run, const ScaledModel& tried, const Difference& measured, const PackOptions& options,
-                  const Scale& scale, Packed& packed) {
+void prove_errors(const DriveEffects& run, const ScaledModel& tried, const Difference& measured,
+                  const PackOptions& options, const Scale& scale, Packed& packed) {
   constexpr double kNone = std::numeric_limits<double>::infinity();
   ErrorProof proof = prove_error(run.effects, tried.drive);
   for (ErrorPart& part : proof.parts)
-    for (const ProofPart& fold : run.folds)
-      if (fold.part == part.id)
+    for (const DriveEffects::Folded& fold : run.folded)
+      if (fold.id == part.id)
         part.unproven = "it was folded into a table, and what that is off between its points is measured";
   std::string why;
   for (std::size_t e = 0; e < proof.parts.size(); ++e) {
@@ -277,13 +215,17 @@ Packed pack(const model::Model& model, const PackOptions& options) {
     throw PackError(fmt::format("a tick of {:g} Hz is not between 1 Hz and 1 MHz", options.tick_hz));
   if (options.encoder_counts && !(*options.encoder_counts >= 4.0 && *options.encoder_counts <= 0x1p30))
     throw PackError("encoder counts are not between 4 and 2^30 a turn");
-  const OnDrive run = on_drive(model, options);
+  const catalogue::ResolvedModel resolved = model;
+  require_values(resolved);
+  const DriveConstants<double> bases = bases_of(resolved, 1.0 / options.tick_hz);
+  const DriveEffects run = drive_effects(resolved, options.image, bases);
   const std::vector<EffectValues>& effects = run.effects;
   const std::string unit = model.drive.axis == data::Axis::linear ? "N" : "N*m";
   Packed packed;
-  const ScaledModel tried = proven(model, effects, options, packed);
+  const ScaledModel tried = proven(effects, bases, packed);
   prove_parts(effects, tried, unit, packed);
-  packed.proof.insert(packed.proof.end(), run.folds.begin(), run.folds.end());
+  for (const DriveEffects::Folded& fold : run.folded)
+    packed.proof.push_back({fold.id, "interpolation", fold.error, unit});
   const double rated = rated_output_torque(model.drive);
   const Scale scale{torque_bases(tried.drive), {rated / tried.drive.gear_ratio, rated, rated}, unit};
   const Difference measured = compare(effects, tried.drive, tried.bounds, options.samples, options.seed);
@@ -294,7 +236,7 @@ Packed pack(const model::Model& model, const PackOptions& options) {
   model::BlockHeader header = header_of(model, tried.drive, options);
   std::optional<control::DriveSetup<double>> setup;
   if (options.settings) {
-    setup = parse_drive_setup(*options.settings, options.settings_origin, model, tried.drive, options.encoder_counts,
+    setup = parse_drive_setup(*options.settings, options.settings_origin, resolved, tried.drive, options.encoder_counts,
                               options.hardware);
     header.encoder_counts = setup->motor_counts;
   }

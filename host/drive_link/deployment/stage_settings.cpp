@@ -2,8 +2,9 @@
 
 #include <algorithm>
 #include <cmath>
-#include <stdexcept>
 #include <string>
+
+#include "host/drive_link/deployment/require.hpp"
 
 namespace flexspline::deployment {
 namespace {
@@ -11,9 +12,6 @@ namespace {
 constexpr double kZeroK = 273.15, kReferenceK = kZeroK + 25.0, kFullScale = 32768.0;
 constexpr double kMostCelsius = 255.0;
 
-void require(bool holds, const std::string& what) {
-  if (!holds) throw std::invalid_argument(what);
-}
 std::int32_t rounded(double x) {
   return static_cast<std::int32_t>(std::lround(x));
 }

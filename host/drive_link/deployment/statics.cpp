@@ -3,9 +3,7 @@
 #include <algorithm>
 #include <cmath>
 
-#include "host/physics/catalogue/constants.hpp"
 #include "host/physics/catalogue/steady_torques.hpp"
-#include "host/physics/catalogue/user_defined_effect.hpp"
 
 namespace flexspline::deployment {
 namespace {
@@ -16,13 +14,10 @@ constexpr double kCreepShare = 1e-6;  // of rated velocity
 
 }  // namespace
 
-Springs::Springs(const model::Model& model) {
-  const auto drive = catalogue::constants_of(model.drive);
-  for (const model::Effect& effect : model.effects) {
-    const catalogue::Entry& entry = catalogue::entry_of(effect);
-    if (entry.info->balance != effects::Balance::transmission || entry.has_state) continue;
-    effects_.push_back(entry.make(catalogue::values_of(effect, entry).data(), drive));
-  }
+Springs::Springs(const catalogue::ResolvedModel& model) {
+  for (const catalogue::ResolvedEffect& e : model.effects)
+    if (e.entry->info->balance == effects::Balance::transmission && !e.entry->has_state)
+      effects_.push_back(e.entry->make(e.values.data(), model.constants));
 }
 
 double Springs::torque_at(double torsion) const {
@@ -34,15 +29,13 @@ double Springs::torque_at(double torsion) const {
   return out.transmission;
 }
 
-double torque_held_by_friction(const model::Model& model) {
-  const auto drive = catalogue::constants_of(model.drive);
+double torque_held_by_friction(const catalogue::ResolvedModel& model) {
+  const auto& drive = model.constants;
   double most = 0.0;
-  for (const double load : {0.0, model.drive.rated_torque_nm.value.value_or(0.0)}) {
+  for (const double load : {0.0, model.model->drive.rated_torque_nm.value.value_or(0.0)}) {
     double held = 0.0;
-    for (const model::Effect& effect : model.effects) {
-      const catalogue::Entry& entry = catalogue::entry_of(effect);
-      if (!entry.adds_to(effects::Balance::motor)) continue;
-      const std::vector<double> values = catalogue::values_of(effect, entry);
+    for (const catalogue::ResolvedEffect& e : model.effects) {
+      if (!e.entry->adds_to(effects::Balance::motor)) continue;
       for (const double way : {1.0, -1.0}) {
         effects::Inputs<Real> in{};
         in.direction = in.output_direction = way;
@@ -52,7 +45,7 @@ double torque_held_by_friction(const model::Model& model) {
         in.torque = in.torque_magnitude = load;
         in.temperature = drive.reference_temperature;
         in.viscous_scale = in.coulomb_scale = 1.0;
-        held += way * catalogue::steady_torques(*entry.make(values.data(), drive), entry.has_state, in).motor;
+        held += way * catalogue::steady_torques(*e.entry->make(e.values.data(), drive), e.entry->has_state, in).motor;
       }
     }
     most = std::max(most, held);

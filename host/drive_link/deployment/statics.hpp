@@ -6,7 +6,7 @@
 #include <vector>
 
 #include "host/physics/catalogue/catalogue.hpp"
-#include "host/physics/model/model.hpp"
+#include "host/physics/catalogue/resolved_model.hpp"
 
 namespace flexspline::deployment {
 
@@ -14,7 +14,7 @@ namespace flexspline::deployment {
 class Springs {
  public:
   // Effects need their values.
-  explicit Springs(const model::Model& model);
+  explicit Springs(const catalogue::ResolvedModel& model);
   // N m at the output, torsion in rad of the output.
   double torque_at(double torsion) const;
 
@@ -25,6 +25,6 @@ class Springs {
 // By how much the motor's torque may change while friction holds the shaft, N m: the most by which torque of creeping
 // forward exceeds that of creeping back, unloaded and at rated load. What is the same both ways, as gravity, ripple
 // and offsets, is not in it. Friction at the reference temperature. Effects need their values.
-double torque_held_by_friction(const model::Model& model);
+double torque_held_by_friction(const catalogue::ResolvedModel& model);
 
 }  // namespace flexspline::deployment

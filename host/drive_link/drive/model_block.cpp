@@ -58,7 +58,7 @@ ModelBlock model_block(Session& session, const Bytes& active, const model::Model
     pack.settings_origin = settings->origin;
   } else if (!active.empty()) {
     // Signals are limited to two bases where they enter a drive.
-    const double most_a = 1.99 * deployment::bases_of(model, 1.0 / pack.tick_hz, 1.0).current_base;
+    const double most_a = 1.99 * deployment::bases_of(model, 1.0 / pack.tick_hz).current_base;
     std::optional<double> lowered_from_a;
     pack.settings = settings_text(deployment::unpack(active), most_a, lowered_from_a);
     // Rounding of the block's integers is not reported.

@@ -26,14 +26,14 @@ std::unique_ptr<Link> open_serial(const std::string& port) {
     close(fd);
     throw LinkError(fmt::format("serial:{}: is no serial port", port));
   }
-  // 8N1 without any flow control; a port over USB takes no notice of the speed.
+  // 8N1 without any flow control, at the speed of the boards' lines; a drive's own port over USB takes no notice of it.
   cfmakeraw(&settings);
   settings.c_cflag |= CLOCAL | CREAD;
   settings.c_cflag &= ~static_cast<tcflag_t>(CRTSCTS | CSTOPB | PARENB);
-  cfsetspeed(&settings, B921600);
+  cfsetspeed(&settings, B115200);
   if (tcsetattr(fd, TCSANOW, &settings) != 0) {
     close(fd);
-    throw LinkError(fmt::format("serial:{}: does not take 921600 bauds: {}", port, std::strerror(errno)));
+    throw LinkError(fmt::format("serial:{}: does not take 115200 bauds: {}", port, std::strerror(errno)));
   }
   ioctl(fd, TIOCEXCL);
   tcflush(fd, TCIOFLUSH);

@@ -2,12 +2,13 @@
 
 #include <fmt/format.h>
 
-#include <Eigen/Eigenvalues>
-#include <Eigen/QR>
+#include <Eigen/Core>
 #include <algorithm>
 #include <cmath>
 #include <limits>
 #include <stdexcept>
+
+#include "host/common/algebra/decompositions.hpp"
 
 namespace flexspline::blackbox {
 namespace {
@@ -94,18 +95,15 @@ LinearModel fit(const std::vector<Record>& records, const Orders& orders) {
   for (Index j = 0; j < length.size(); ++j)
     if (!(length[j] > 0.0)) length[j] = 1.0;
   for (Index j = 0; j < length.size(); ++j) A.col(j) /= length[j];
-  Eigen::CompleteOrthogonalDecomposition<Eigen::MatrixXd> qr;
-  qr.setThreshold(kRank);
-  qr.compute(A);
-  const Eigen::VectorXd theta = qr.solve(y).cwiseQuotient(length);
+  const algebra::LeastNormSolver solver(A, kRank);
+  const Eigen::VectorXd solution = solver.solve(y);
+  const Eigen::VectorXd theta = solution.cwiseQuotient(length);
 
   LinearModel model;
   model.orders = orders;
   model.parameters = columns;
   model.rows = rows;
-  const double smallest = std::abs(qr.matrixT()(qr.rank() - 1, qr.rank() - 1));
-  model.condition_number =
-      qr.rank() < A.cols() ? std::numeric_limits<double>::infinity() : std::abs(qr.matrixT()(0, 0)) / smallest;
+  model.condition_number = solver.rank() < A.cols() ? std::numeric_limits<double>::infinity() : solver.pivot_ratio();
   model.a = theta.head(orders.na);
   for (std::size_t u = 0; u < inputs; ++u)
     model.b.emplace_back(theta.segment(orders.na + static_cast<Index>(u) * orders.nb, orders.nb));
@@ -121,7 +119,7 @@ double LinearModel::largest_pole() const {
   Eigen::MatrixXd companion = Eigen::MatrixXd::Zero(n, n);
   companion.row(0) = -a.head(n).transpose();
   for (Index k = 1; k < n; ++k) companion(k, k - 1) = 1.0;
-  return Eigen::EigenSolver<Eigen::MatrixXd>(companion, false).eigenvalues().cwiseAbs().maxCoeff();
+  return algebra::complex_eigenvalues(companion).cwiseAbs().maxCoeff();
 }
 
 double LinearModel::static_gain(std::size_t input) const {

@@ -11,6 +11,7 @@
 #include <limits>
 #include <optional>
 
+#include "host/common/algebra/decompositions.hpp"
 #include "host/engine/comparison/sample_variables.hpp"
 #include "host/engine/estimation/in_parallel.hpp"
 #include "host/engine/estimation/least_squares.hpp"
@@ -162,7 +163,7 @@ Explained wave_of(const BalanceData& data, const Eigen::VectorXd& residual, int 
   e.all = (residual.array() - residual.mean()).square().sum();
   e.prediction = Eigen::VectorXd::Zero(residual.size());
   for (const Group& group : groups) {
-    const Eigen::Vector3d theta = group.normal.colPivHouseholderQr().solve(group.y);
+    const Eigen::Vector3d theta = algebra::PivotedQr(group.normal).solve(group.y);
     const double mean_part = group.y[0] * group.y[0] / group.normal(0, 0);
     e.explained += group.y.dot(theta) - mean_part;
     e.total += group.squares - mean_part;

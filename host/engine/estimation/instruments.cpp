@@ -2,10 +2,11 @@
 
 #include <fmt/format.h>
 
-#include <Eigen/LU>
+#include <Eigen/Core>
 #include <algorithm>
 #include <cmath>
 
+#include "host/common/algebra/decompositions.hpp"
 #include "host/engine/estimation/free_motion.hpp"
 #include "host/engine/estimation/least_squares.hpp"
 #include "host/engine/estimation/variable_projection.hpp"
@@ -60,8 +61,8 @@ void refit(BalanceData& data, const FreeMotion& motion, Terms& terms, BalanceFit
     const Eigen::VectorXd size = A.colwise().norm().transpose().array().max(1e-300);
     const Eigen::VectorXd instrument_size = Z.colwise().norm().transpose().array().max(1e-300);
     const Eigen::MatrixXd zs = Z * instrument_size.cwiseInverse().asDiagonal();
-    const Eigen::FullPivLU<Eigen::MatrixXd> normal(zs.transpose() * A * size.cwiseInverse().asDiagonal());
-    if (normal.rcond() < 1e-9) return;  // the free run does not excite this parameter
+    const algebra::FullPivotLu normal(zs.transpose() * A * size.cwiseInverse().asDiagonal());
+    if (normal.reciprocal_condition() < 1e-9) return;  // the free run does not excite this parameter
     const Eigen::VectorXd by = normal.solve(zs.transpose() * fit.root_weights.cwiseProduct(fit.residual));
     for (Eigen::Index j = 0; j < count; ++j) {
       const Eigen::Index at = kept[static_cast<std::size_t>(j)];

@@ -1,11 +1,11 @@
 #include "host/engine/estimation/least_squares.hpp"
 
-#include <Eigen/QR>
-#include <Eigen/SVD>
+#include <Eigen/Core>
 #include <algorithm>
 #include <cmath>
 #include <limits>
 
+#include "host/common/algebra/decompositions.hpp"
 #include "host/common/signals/autocorrelation.hpp"
 
 namespace flexspline::estimation {
@@ -51,13 +51,11 @@ LinearFit least_squares(const Eigen::MatrixXd& X, const Eigen::VectorXd& y, cons
     Eigen::MatrixXd A(X.rows(), count);
     for (Eigen::Index j = 0; j < count; ++j)
       A.col(j) = scaled.col(kept[static_cast<std::size_t>(j)]) / length[kept[static_cast<std::size_t>(j)]];
-    const Eigen::HouseholderQR<Eigen::MatrixXd> qr(A);
-    const Eigen::MatrixXd R = qr.matrixQR().topRows(count).triangularView<Eigen::Upper>();
-    const Eigen::JacobiSVD<Eigen::MatrixXd> svd(R, Eigen::ComputeThinU | Eigen::ComputeThinV);
-    const Eigen::VectorXd s = svd.singularValues();
+    const algebra::HouseholderQr qr(A);
+    const auto [u, s, v] = algebra::singular_values(qr.r());
     const double smallest = std::max(s[count - 1], 1e-14 * s[0]);
     // Rows of R^-1 have length one over the tolerance of their column.
-    Eigen::MatrixXd inverse_rows = svd.matrixV();
+    Eigen::MatrixXd inverse_rows = v;
     for (Eigen::Index j = 0; j < count; ++j) inverse_rows.col(j) /= std::max(s[j], 1e-14 * s[0]);
     const Eigen::VectorXd own = inverse_rows.rowwise().norm().cwiseInverse();
     Eigen::Index worst = 0;
@@ -74,7 +72,7 @@ LinearFit least_squares(const Eigen::MatrixXd& X, const Eigen::VectorXd& y, cons
     }
     const Eigen::VectorXd weighted_y = root_weights.cwiseProduct(y);
     const Eigen::VectorXd solution = qr.solve(weighted_y);
-    const Eigen::MatrixXd inverse = inverse_rows * svd.matrixU().transpose();
+    const Eigen::MatrixXd inverse = inverse_rows * u.transpose();
     const Eigen::MatrixXd covariance = inverse * inverse.transpose();
     put(fit, kept, length, solution, covariance);
     fit.condition_number = s[0] / smallest;

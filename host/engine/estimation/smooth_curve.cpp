@@ -109,7 +109,8 @@ class Solver {
  public:
   Solver(const Products& g, const EffectiveParameters& freedom, bool closed) : g_(g), freedom_(freedom) {
     const Matrix d = second_differences(g.points, closed);
-    penalty_ = freedom.basis.transpose() * (d.transpose() * d) * freedom.basis;
+    const Matrix roughness = d * freedom.basis;
+    penalty_ = roughness.transpose() * roughness;
     size_ = std::max(g.all.block(g.others, g.others, g.points, g.points).trace(), 1e-300) /
             std::max(penalty_.trace(), 1e-300);
   }
@@ -137,8 +138,8 @@ class Solver {
     normal.topLeftCorner(g_.others, g_.others) = products.topLeftCorner(g_.others, g_.others);
     normal.topRightCorner(g_.others, n) = products.block(0, g_.others, g_.others, g_.points) * freedom_.basis;
     normal.bottomLeftCorner(n, g_.others) = normal.topRightCorner(g_.others, n).transpose();
-    normal.bottomRightCorner(n, n) =
-        freedom_.basis.transpose() * products.block(g_.others, g_.others, g_.points, g_.points) * freedom_.basis;
+    const Matrix of_points = products.block(g_.others, g_.others, g_.points, g_.points) * freedom_.basis;
+    normal.bottomRightCorner(n, n) = freedom_.basis.transpose() * of_points;
     return normal;
   }
 

@@ -3,10 +3,10 @@
 #include <fmt/format.h>
 
 #include <Eigen/Dense>
-#include <Eigen/Eigenvalues>
 #include <algorithm>
 #include <cmath>
 #include <utility>
+#include "host/common/algebra/decompositions.hpp"
 
 namespace flexspline::measurement {
 namespace {
@@ -40,7 +40,7 @@ std::optional<Root> root_near(const Vector& c, const Matrix& covariance) {
   Matrix companion = Matrix::Zero(degree, degree);
   companion.diagonal(-1).setOnes();
   companion.col(degree - 1) = -c.head(degree) / c[degree];
-  const Eigen::VectorXcd roots = Eigen::EigenSolver<Matrix>(companion, false).eigenvalues();
+  const Eigen::VectorXcd roots = algebra::complex_eigenvalues(companion);
   std::complex<double> p;
   for (const std::complex<double> root : roots)
     if (root.imag() > 0.0 && (p == 0.0 || std::abs(std::abs(root) - 1.0) < std::abs(std::abs(p) - 1.0))) p = root;
@@ -138,14 +138,14 @@ class LocalFit {
       of_instruments += (z.conjugate() * z.transpose()).real();
       right += (z.conjugate() * (weight * g_[k] * std::pow(s_[k], poles_))).real();
     }
-    const Vector next = normal.fullPivLu().solve(right);
+    const Vector next = algebra::FullPivotLu(normal).solve(right);
     ok_ = next.allFinite();
     if (!ok_) return;
     theta_ = next;
     chi2_ = 0.0;
     for (std::size_t k = 0; k < s_.size(); ++k) chi2_ += std::norm((g_[k] - model(k)) / std_[k]);
     ok_ = std::isfinite(chi2_);
-    covariance_ = of_instruments.completeOrthogonalDecomposition().pseudoInverse();
+    covariance_ = algebra::LeastNormSolver(of_instruments).pseudo_inverse();
   }
 
   int zeros_, poles_;

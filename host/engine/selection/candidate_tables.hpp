@@ -10,8 +10,6 @@
 
 namespace flexspline::selection {
 
-inline constexpr const char* kPresliding = "presliding";  // its name among the terms
-
 struct CandidateTables {
   Bandwidth bandwidth;
   RegressorTable sign;  // without model columns: nothing can be chosen

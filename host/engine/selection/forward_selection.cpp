@@ -93,80 +93,138 @@ bool is_possible(const RegressorTable& table, const std::vector<int>& terms, con
   return true;
 }
 
+bool is_generic_curve(const RegressorTable& table, int term) {
+  return term >= 0 && !table.terms[static_cast<std::size_t>(term)].entry &&
+         !table.terms[static_cast<std::size_t>(term)].is_placebo;
+}
+
+// The terms that were taken so far, and what a step from there needs to know.
+class ForwardStep {
+ public:
+  struct Best {
+    int term = 0;
+    TermFit fitted;
+    double gain = -1e300;
+  };
+
+  ForwardStep(const RegressorTable& table, const HalfData& fit, const HalfData& validation, const Noise& noise,
+              const SelectionPolicy& policy)
+      : table_(table),
+        fit_(fit),
+        validation_(validation),
+        noise_(noise),
+        policy_(policy),
+        now_(fit_terms(table, {}, fit, validation)),
+        was_possible_(is_possible(table, {}, now_, fit)) {}
+
+  const TermFit& now() const { return now_; }
+  double floor() const { return floor_; }
+  void set_floor(double floor) { floor_ = floor; }
+
+  // Of each name the values of its nonlinear parameters that fit best on the training half.
+  std::map<std::string, Best> best_by_name(const std::vector<std::uint8_t>& may_enter) const {
+    std::map<std::string, Best> by_name;
+    for (std::size_t t = 0; t < table_.terms.size(); ++t)
+      if (may_enter[t] && std::find(terms_.begin(), terms_.end(), static_cast<int>(t)) == terms_.end())
+        try_term(static_cast<int>(t), table_.terms[t].name,
+                 static_cast<double>(table_.terms[t].columns.size() + table_.terms[t].nonlinear), by_name);
+    if (fit_.presliding.size() > 0 && !has_presliding(terms_)) try_term(kPreslidingTerm, kPresliding, 1.0, by_name);
+    return by_name;
+  }
+
+  bool is_worth_it(const Best& chosen) const {
+    const bool law =
+        chosen.term == kPreslidingTerm || table_.terms[static_cast<std::size_t>(chosen.term)].nonlinear > 0;
+    const double drop = now_.validation_squares - chosen.fitted.validation_squares;
+    return drop >= (law ? policy_.law_share : policy_.line_share) * above() &&
+           drop >= policy_.least_gain * per_one(chosen);
+  }
+
+  // Names that would have done as well.
+  std::vector<std::string> alternatives(const std::map<std::string, Best>& by_name, const Best& chosen) const {
+    std::vector<std::string> names;
+    const auto left = [&](const TermFit& f) { return std::max(f.validation_squares - floor_, 0.0); };
+    for (const auto& [name, other] : by_name) {
+      // A generic curve that fits no better than a law does not refute that law.
+      if (is_generic_curve(table_, other.term) || other.term == chosen.term ||
+          other.gain < policy_.similar * chosen.gain)
+        continue;
+      // Where the chosen one leaves noise and the other one does not, they are distinguished.
+      if (left(other.fitted) <= policy_.similar_left * left(chosen.fitted) + policy_.least_gain * per_one(chosen))
+        names.push_back(name);
+    }
+    return names;
+  }
+
+  // Squares above the noise.
+  double above() const { return std::max(now_.validation_squares - floor_, 1e-300); }
+
+  void take(const Best& chosen) {
+    terms_.push_back(chosen.term);
+    now_ = chosen.fitted;
+    was_possible_ = is_possible(table_, terms_, now_, fit_);
+  }
+
+ private:
+  // What one parameter takes off by chance.
+  double per_one(const Best& chosen) const { return chosen.fitted.validation_squares / validation_.rows * noise_.tau; }
+
+  void try_term(int t, const std::string& name, double parameters, std::map<std::string, Best>& by_name) const {
+    std::vector<int> with = terms_;
+    with.push_back(t);
+    TermFit fitted = fit_terms(table_, with, fit_, validation_);
+    const auto found = by_name.find(name);
+    if (found != by_name.end() && found->second.fitted.training_squares <= fitted.training_squares) return;
+    if (!is_possible(table_, with, fitted, fit_) && was_possible_) return;
+    const double by_chance = now_.validation_squares / validation_.rows * noise_.tau;
+    double gain = now_.validation_squares - fitted.validation_squares - parameters * by_chance;
+    // A curve that is in no catalogue can follow most laws: it has to do better.
+    if (is_generic_curve(table_, t) && gain > 0.0) gain *= policy_.curve_discount;
+    by_name[name] = {t, std::move(fitted), gain};
+  }
+
+  const RegressorTable& table_;
+  const HalfData &fit_, &validation_;
+  const Noise& noise_;
+  const SelectionPolicy& policy_;
+  std::vector<int> terms_;
+  TermFit now_;
+  double floor_ = 0.0;
+  bool was_possible_;
+};
+
 }  // namespace
 
 SelectionPath select_forward(const RegressorTable& table, const HalfData& fit, const HalfData& validation,
                              const Noise& noise, const std::vector<std::uint8_t>& may_enter,
                              const SelectionPolicy& policy) {
   SelectionPath result;
-  std::vector<int> terms;
-  TermFit now = fit_terms(table, terms, fit, validation);
-  result.before = result.after = now.validation_squares;
-  if (now.validation_squares / validation.rows > policy.most_leverage * now.training_squares / fit.rows) {
+  ForwardStep at(table, fit, validation, noise, policy);
+  const double before = at.now().validation_squares;
+  result.before = result.after = before;
+  if (before / validation.rows > policy.most_leverage * at.now().training_squares / fit.rows) {
     result.abstains = result.extrapolates = true;
     return result;
   }
-  const double floor = std::min(noise.variance * validation.rows, 0.999 * now.validation_squares);
-  const double excess = now.validation_squares - floor;
-  if (excess < policy.least_excess * now.validation_squares) {
+  at.set_floor(std::min(noise.variance * validation.rows, 0.999 * before));
+  const double excess = before - at.floor();
+  if (excess < policy.least_excess * before) {
     result.abstains = true;
     return result;
   }
-  bool was_possible = is_possible(table, terms, now, fit);
   for (std::size_t step = 0; step < policy.most_steps; ++step) {
-    struct Best {
-      int term = 0;
-      TermFit fitted;
-      double gain = -1e300;
-    };
-    // For each name the values of its nonlinear parameters that fit best on the training half.
-    std::map<std::string, Best> by_name;
-    const auto try_term = [&](int t, const std::string& name, double parameters) {
-      std::vector<int> with = terms;
-      with.push_back(t);
-      TermFit fitted = fit_terms(table, with, fit, validation);
-      const auto found = by_name.find(name);
-      if (found != by_name.end() && found->second.fitted.training_squares <= fitted.training_squares) return;
-      if (!is_possible(table, with, fitted, fit) && was_possible) return;
-      const double per_one = now.validation_squares / validation.rows * noise.tau;
-      double gain = now.validation_squares - fitted.validation_squares - parameters * per_one;
-      // A curve that is in no catalogue can follow most laws: it has to do better.
-      const bool curve = t >= 0 && !table.terms[static_cast<std::size_t>(t)].entry &&
-                         !table.terms[static_cast<std::size_t>(t)].is_placebo;
-      if (curve && gain > 0.0) gain *= policy.curve_discount;
-      by_name[name] = {t, std::move(fitted), gain};
-    };
-    for (std::size_t t = 0; t < table.terms.size(); ++t)
-      if (may_enter[t] && std::find(terms.begin(), terms.end(), static_cast<int>(t)) == terms.end())
-        try_term(static_cast<int>(t), table.terms[t].name,
-                 static_cast<double>(table.terms[t].columns.size() + table.terms[t].nonlinear));
-    if (fit.presliding.size() > 0 && !has_presliding(terms)) try_term(kPreslidingTerm, "presliding", 1.0);
+    const auto by_name = at.best_by_name(may_enter);
     if (by_name.empty()) break;
-    const auto best = std::max_element(by_name.begin(), by_name.end(),
-                                       [](const auto& a, const auto& b) { return a.second.gain < b.second.gain; });
-    const Best& chosen = best->second;
-    const double drop = now.validation_squares - chosen.fitted.validation_squares;
-    const double above = std::max(now.validation_squares - floor, 1e-300);
-    const bool law = chosen.term == kPreslidingTerm || table.terms[static_cast<std::size_t>(chosen.term)].nonlinear > 0;
-    const double per_one = chosen.fitted.validation_squares / validation.rows * noise.tau;
-    if (drop < (law ? policy.law_share : policy.line_share) * above || drop < policy.least_gain * per_one) break;
-    terms.push_back(chosen.term);
-    SelectionStep taken{chosen.term, drop / above, drop / excess, {}};
-    const auto left = [&](const TermFit& f) { return std::max(f.validation_squares - floor, 0.0); };
-    for (const auto& [name, other] : by_name) {
-      // A generic curve that fits no better than a law does not refute that law.
-      const bool curve = other.term >= 0 && !table.terms[static_cast<std::size_t>(other.term)].entry &&
-                         !table.terms[static_cast<std::size_t>(other.term)].is_placebo;
-      if (curve || other.term == chosen.term || other.gain < policy.similar * chosen.gain) continue;
-      // Where the chosen one leaves noise and the other one does not, they are distinguished.
-      if (left(other.fitted) > policy.similar_left * left(chosen.fitted) + policy.least_gain * per_one) continue;
-      taken.alternatives.push_back(name);
-    }
-    result.steps.push_back(std::move(taken));
-    now = chosen.fitted;
-    was_possible = is_possible(table, terms, now, fit);
-    result.after = now.validation_squares;
-    if (now.validation_squares - floor < policy.least_excess * now.validation_squares) break;
+    const ForwardStep::Best& chosen =
+        std::max_element(by_name.begin(), by_name.end(), [](const auto& a, const auto& b) {
+          return a.second.gain < b.second.gain;
+        })->second;
+    if (!at.is_worth_it(chosen)) break;
+    const double drop = at.now().validation_squares - chosen.fitted.validation_squares;
+    result.steps.push_back({chosen.term, drop / at.above(), drop / excess, at.alternatives(by_name, chosen)});
+    at.take(chosen);
+    result.after = at.now().validation_squares;
+    if (result.after - at.floor() < policy.least_excess * result.after) break;
   }
   return result;
 }

@@ -16,6 +16,7 @@ struct HalfData {
 };
 
 inline constexpr int kPreslidingTerm = -1;
+inline constexpr const char* kPresliding = "presliding";  // its name among the terms
 
 struct SelectionStep {
   int term = 0;                           // index of RegressorTable::terms, or kPreslidingTerm

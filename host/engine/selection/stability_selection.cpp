@@ -67,24 +67,9 @@ void StabilitySelection::take_off(const TimeLag& lag) {
   evaluate();
 }
 
-StabilitySelection::SettingResult StabilitySelection::evaluate_setting(double cutoff_hz, bool mask,
-                                                                       std::uint64_t seed) const {
-  SettingResult result;
+Noise StabilitySelection::noise_of_best(const Setting& one, const Setting* second, const std::vector<double>& weights,
+                                        FrictionRandomEffects& differences, SettingResult& result) const {
   const RegressorTable& sign = tables_.sign;
-  const Setting one = make_setting(sign, cutoff_hz, mask, false, policy_);
-  std::optional<Setting> two;
-  if (tables_.presliding && !mask) two = make_setting(*tables_.presliding, cutoff_hz, mask, false, policy_);
-  if (one.blocks.size() < 4 ||
-      static_cast<double>(one.rows.rows()) < policy_.fewest_rows_per_column * static_cast<double>(sign.model_columns))
-    return result;
-  const bool has_second = two && two->blocks.size() == one.blocks.size();
-  const Setting* const second = has_second ? &*two : nullptr;
-  std::vector<double> weights = record_weights(sign, one);
-  for (const CandidateTerm& term : sign.terms) result.may_enter.push_back(tables_.may_enter(term, cutoff_hz) ? 1 : 0);
-
-  // Noise of the best model of all data: first with the same friction in all records, then with random effects, which
-  // would otherwise count as slow noise.
-  FrictionRandomEffects differences{sign.differences, {}, 0.0};
   Noise noise;
   for (int round = 0; round < 2; ++round) {
     result.all = sum_of(one, second, weights, {}, 0, differences);
@@ -106,6 +91,26 @@ StabilitySelection::SettingResult StabilitySelection::evaluate_setting(double cu
     differences.variance =
         friction_effects_of(z ? *tables_.presliding : sign, seen, weights, differences.noise, policy_);
   }
+  return noise;
+}
+
+StabilitySelection::SettingResult StabilitySelection::evaluate_setting(double cutoff_hz, bool mask,
+                                                                       std::uint64_t seed) const {
+  SettingResult result;
+  const RegressorTable& sign = tables_.sign;
+  const Setting one = make_setting(sign, cutoff_hz, mask, false, policy_);
+  std::optional<Setting> two;
+  if (tables_.presliding && !mask) two = make_setting(*tables_.presliding, cutoff_hz, mask, false, policy_);
+  if (one.blocks.size() < 4 ||
+      static_cast<double>(one.rows.rows()) < policy_.fewest_rows_per_column * static_cast<double>(sign.model_columns))
+    return result;
+  const bool has_second = two && two->blocks.size() == one.blocks.size();
+  const Setting* const second = has_second ? &*two : nullptr;
+  std::vector<double> weights = record_weights(sign, one);
+  for (const CandidateTerm& term : sign.terms) result.may_enter.push_back(tables_.may_enter(term, cutoff_hz) ? 1 : 0);
+
+  FrictionRandomEffects differences{sign.differences, {}, 0.0};
+  const Noise noise = noise_of_best(one, second, weights, differences, result);
 
   std::mt19937_64 chance(seed);
   std::size_t records = 0;

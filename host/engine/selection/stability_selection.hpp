@@ -59,6 +59,10 @@ class StabilitySelection {
   };
 
   SettingResult evaluate_setting(double cutoff_hz, bool mask, std::uint64_t seed) const;
+  // Noise that the best model of all data leaves: first with the same friction in all records, then with random
+  // effects, which would otherwise count as slow noise. Sets `differences`, and of `result` the sums and the whiteness.
+  Noise noise_of_best(const Setting& one, const Setting* second, const std::vector<double>& weights,
+                      FrictionRandomEffects& differences, SettingResult& result) const;
   void evaluate();
   void count();
   // The terms of these names that fit best together; none where one cannot be seen there.

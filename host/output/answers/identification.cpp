@@ -44,7 +44,7 @@ std::optional<double> value_in(const ByExperiment& e, const std::string& experim
 }
 
 // What stands below each other: the parameters, then what is derived of two of them.
-std::vector<std::pair<std::string, const ByExperiment*>> lines_of(const estimation::Identification& found) {
+std::vector<std::pair<std::string, const ByExperiment*>> values_to_list(const estimation::Identification& found) {
   std::vector<std::pair<std::string, const ByExperiment*>> lines;
   for (const Estimate& e : found.estimates)
     if (!e.per_experiment.empty()) lines.emplace_back(label(e), &e);
@@ -109,7 +109,7 @@ std::string remarks(const std::vector<std::pair<std::string, const ByExperiment*
 std::string by_experiment(const estimation::Identification& found) {
   const std::vector<std::string> names = experiment_names(found);
   if (names.empty()) return {};
-  const auto lines = lines_of(found);
+  const auto lines = values_to_list(found);
   std::string text;
   // Side by side as far as a terminal is wide; average and spread are next to the last ones.
   for (std::size_t first = 0; first < names.size(); first += kExperimentsAbreast) {

@@ -6,6 +6,7 @@
 #include <limits>
 #include <nlohmann/json.hpp>
 
+#include "host/common/algebra/decompositions.hpp"
 #include "host/engine/comparison/residual_map.hpp"
 #include "host/engine/comparison/sample_variables.hpp"
 #include "host/engine/estimation/in_parallel.hpp"
@@ -118,7 +119,7 @@ std::vector<double> order_amplitudes(const View& view, const BalanceView& balanc
         high = std::max(high, record.inputs.angle_at(sample));
       }
       if (per_unit * (high - low) < kWholeWaves * 2.0 * M_PI) continue;
-      const Eigen::Vector3d theta = x.colPivHouseholderQr().solve(residual.segment(range.first, range.size()));
+      const Eigen::Vector3d theta = algebra::PivotedQr(x).solve(residual.segment(range.first, range.size()));
       squares += 0.5 * (theta[1] * theta[1] + theta[2] * theta[2]) * static_cast<double>(range.size());
       rows += static_cast<double>(range.size());
     }

@@ -17,7 +17,8 @@ constexpr std::int32_t ratio(std::int64_t a, std::int64_t b, int bits) {
   const std::uint64_t size = fixed::size_of(a), by = b == 0 ? 1 : fixed::size_of(b);
   if (size == 0) return 0;
   const int up = std::countl_zero(size), down = by >> 31 == 0 ? 0 : 33 - std::countl_zero(by);
-  const std::uint64_t quotient = fixed::detail::divided(size << up, static_cast<std::uint32_t>(by >> down));
+  // By the library: bit by bit, what ends a step would take longer than a PWM period.
+  const std::uint64_t quotient = (size << up) / (by >> down);
   const int shift = up + down - bits;
   constexpr std::uint64_t kMost = INT32_MAX;
   std::uint64_t x = kMost;

@@ -29,12 +29,15 @@ struct WindingSettings {
   std::int32_t least_current = INT32_MAX;  // of E, 2^-27 of the current's base
   std::int32_t resistance_error = 0;       // largest current times the relative error of R, 2^-27
   std::int32_t lost_voltage = INT32_MAX;   // 2^-30 of the bus voltage's full scale
+  // PWM periods a sample, at most kEvery. A drive has other checks of its current, of a few milliseconds: at 20 kHz two
+  // name the cause before them.
+  std::uint32_t every = 4;
 };
 enum class WindingFault : std::uint8_t { none, phase_lost, residual };
 
 class WindingWatch {
  public:
-  static constexpr std::uint32_t kEvery = 4;  // PWM periods a sample
+  static constexpr std::uint32_t kEvery = 4;
   // What both faults take at most, with a set point of the lost phase that stays above its threshold and a residual
   // that stays above its own.
   static constexpr std::uint32_t kLostPeriods = 128;
@@ -44,7 +47,7 @@ class WindingWatch {
   // Once a PWM period, after foc::update with the same inputs. `phases`: as it measured them.
   constexpr WindingFault update(const WindingSettings& s, const foc::Settings& c, const foc::State& state,
                                 const foc::Inputs& in, const foc::Outputs& out, const foc::Phases& phases) {
-    if (++period_ < kEvery) return WindingFault::none;
+    if (++period_ < s.every) return WindingFault::none;
     period_ = 0;
     const std::int32_t emf = size(fixed::multiply_high(c.current.flux, foc::held<foc::kStepBits>(in.step) * 8));
     if (is_lost(s, in, phases, emf < out.most / 2)) return WindingFault::phase_lost;

@@ -107,7 +107,7 @@ def serial_line(port):
     handle = os.open(port, os.O_RDWR | os.O_NOCTTY)
     tty.setraw(handle)
     settings = termios.tcgetattr(handle)
-    settings[4] = settings[5] = termios.B921600
+    settings[4] = settings[5] = termios.B115200
     settings[6][termios.VMIN], settings[6][termios.VTIME] = 0, 1
     termios.tcsetattr(handle, termios.TCSANOW, settings)
     return Line(lambda: os.read(handle, 4096), lambda data: os.write(handle, data))
