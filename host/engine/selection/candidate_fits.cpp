@@ -70,18 +70,6 @@ bool scales_torques(const Terms& terms) {
                      [](const Term& t) { return (t.entry->info->reads & effects::kTorqueScale) != 0; });
 }
 
-// A nonlinear parameter of the added effect that was not searched within its range, and came out beyond it: its name
-// and value. The gain of a torque sensor does so where it takes off the sensor's own noise.
-std::string beyond_its_range(const Term& added) {
-  for (std::size_t p = 0; p < added.values.size(); ++p) {
-    const effects::ParameterInfo& info = added.entry->parameters[p];
-    if (!added.free_nonlinear(p) || !begins_at_zero(added, p) || info.limit != effects::Limit::stated) continue;
-    if (added.values[p] < info.low || added.values[p] > info.high)
-      return fmt::format("its {} would be {:.3g}, which is not possible", info.name, added.values[p]);
-  }
-  return {};
-}
-
 // A candidate that needs an impossible value, or that makes the base model impossible, is a fit, not an explanation.
 void check_admissible(BalanceData& data, const CrossValidatedFit& base, CandidateFit& candidate) {
   const auto& fit = candidate.fit;
@@ -90,7 +78,6 @@ void check_admissible(BalanceData& data, const CrossValidatedFit& base, Candidat
     candidate.admissible = false;
   };
   const std::size_t added = fit.terms.size() - 1;
-  if (std::string why = beyond_its_range(fit.terms[added]); !why.empty()) refuse(std::move(why));
   bool any_own = fit.terms[added].entry->count(effects::Kind::linear) == 0;
   for (std::size_t j = 0; j < fit.linear.size(); ++j) {
     const Term& t = fit.terms[fit.linear[j].term];

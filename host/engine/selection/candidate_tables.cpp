@@ -26,9 +26,10 @@ estimation::PreparedData prepare(const std::vector<const data::Experiment*>& exp
   pipeline.row_cutoff_hz = highest_hz;
   estimation::PreparedData prepared = estimation::prepare_with(experiments, drive, pipeline);
   double widest_hz = highest_hz;
-  // Where the highest order is above what the highest bandwidth takes, but hardly.
+  // Where an order that the motor gives is above what the highest bandwidth takes, but hardly.
   const double order_hz = highest_order_hz(prepared);
-  const double least_hz = order_hz > kTakenShare * highest_hz ? kLeastWidening * highest_hz : 0.0;
+  const bool is_beyond = highest_order(drive) > policy.highest_order && order_hz > kTakenShare * highest_hz;
+  const double least_hz = is_beyond ? kLeastWidening * highest_hz : 0.0;
   const double wanted_hz =
       std::min({std::max(1.5 * order_hz, least_hz), policy.widest_over_sampling * slowest_hz, policy.widest_hz});
   while (widest_hz < 0.99 * wanted_hz) widest_hz = std::min(2.0 * widest_hz, wanted_hz);
