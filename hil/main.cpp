@@ -258,6 +258,10 @@ void take_twin_drive(CLI::App& command, flexspline::twin::TwinOptions& options) 
                      "with --motor three-phase: a random motor that it was not commissioned with");
   command.add_option("--wiring-fault", options.wiring_fault,
                      "of the three-phase motor, such as phase-open-b, phases-swapped, encoder-slips");
+  command.add_option("--motor-ripple", options.motor_ripple,
+                     "what the three-phase motor has since it was commissioned: cogging, cogging-magnet, "
+                     "current-offset, current-gain, back-emf, dead-time, encoder-eccentricity");
+  command.add_option("--motor-ripple-size", options.motor_ripple_size, "1 = usual")->needs("--motor-ripple");
   command.add_option("--flash", options.flash_file, "file that holds its flash memory (default: none)");
   command.add_option("--serial", options.serial, "serial number (default TWIN)")
       ->check([](const std::string& text) -> std::string {
@@ -300,12 +304,13 @@ void print_motor(const MotorOptions& options) {
   const auto p = flexspline::board::drawn_motor(open_plant(options.plant_file).drive, options.seed);
   fmt::print(
       "{{\"format\": \"flexspline-hil-motor/1\", \"resistance_ohm\": {:.9g}, \"switch_ohm\": {:.9g}, "
-      "\"inductance_d_h\": {:.9g}, \"inductance_q_h\": {:.9g}, \"flux_vs\": {:.9g}, \"pole_pairs\": {}, "
+      "\"inductance_d_h\": {:.9g}, \"inductance_q_h\": {:.9g}, \"flux_vs\": {:.9g}, \"pole_pairs\": {}, \"slots\": {}, "
       "\"phases_swapped\": {}, \"offset_deg\": {:.9g}, \"current_gain\": [{:.9g}, {:.9g}, {:.9g}], "
       "\"current_offset_a\": [{:.9g}, {:.9g}, {:.9g}]}}\n",
       p.motor.resistance_ohm, p.inverter.on_resistance_ohm, p.motor.inductance_d_h, p.motor.inductance_q_h,
-      p.motor.flux_vs, p.motor.pole_pairs, p.wiring.motor_phase[1] == 2, 360.0 * p.offset_turns, p.sensors.gain[0],
-      p.sensors.gain[1], p.sensors.gain[2], p.sensors.offset_a[0], p.sensors.offset_a[1], p.sensors.offset_a[2]);
+      p.motor.flux_vs, p.motor.pole_pairs, flexspline::board::usual_slots(p.motor.pole_pairs),
+      p.wiring.motor_phase[1] == 2, 360.0 * p.offset_turns, p.sensors.gain[0], p.sensors.gain[1], p.sensors.gain[2],
+      p.sensors.offset_a[0], p.sensors.offset_a[1], p.sensors.offset_a[2]);
 }
 
 void add_motor(CLI::App& app) {

@@ -127,7 +127,7 @@ void PlantRig::begin_counters() {
     return static_cast<std::uint32_t>(absolute ? now - rest : now);
   };
   const plant::Sensors& sensors = setup_.drive.sensors;
-  const double motor = plant_.state().motor_angle - motor_zero(), output = plant_.state().output_angle;
+  const double motor = shown_motor_rad(), output = plant_.state().output_angle;
   motor_origin_ = origin(motor, sensors.motor_counts);
   output_origin_ = sensors.output_counts > 0 ? origin(output, sensors.output_counts) : 0;
   motor_before_ = counter(motor, sensors.motor_counts) - motor_origin_;
@@ -135,8 +135,10 @@ void PlantRig::begin_counters() {
   turn_before_ = static_cast<std::int64_t>(std::floor(motor / kTurn));
 }
 
-double PlantRig::motor_zero() const {
-  return errors_.torsion_zero_rad * setup_.drive.gear_ratio;
+// The motor's angle, as its encoder shows it.
+double PlantRig::shown_motor_rad() const {
+  const double angle = plant_.state().motor_angle - errors_.torsion_zero_rad * setup_.drive.gear_ratio;
+  return setup_.motor ? encoder_angle(*setup_.motor, angle) : angle;
 }
 
 // Drawn even where it is not used, so that an injected fault does not change the later noise.
@@ -180,7 +182,7 @@ void PlantRig::sense(firmware::Readings& r) {
   torque += noise(torque_noise_nm_);
   const double temperature = temperature_c_ + noise(temperature_noise_c_);
 
-  const double shown = state.motor_angle - motor_zero();
+  const double shown = shown_motor_rad();
   const std::uint32_t motor = motor_count(counter(shown, sensors.motor_counts) - motor_origin_);
   if (!has(Injection::motor_encoder_stale)) {
     ++r.motor_samples;

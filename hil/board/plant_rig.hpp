@@ -122,7 +122,7 @@ class PlantRig {
   void pass_faults_to_stage();
   std::uint32_t motor_count(std::uint32_t true_count);
   void begin_counters();
-  double motor_zero() const;  // rad
+  double shown_motor_rad() const;
   void pass_index(double shown_rad, firmware::Readings& r);
   double flowing(bool enabled);
   double through_amplifier(const firmware::Actuation& actuation);

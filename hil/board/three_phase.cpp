@@ -113,9 +113,14 @@ ThreePhaseAmplifier::ThreePhaseAmplifier(const plant::Drive& drive, std::uint32_
   stage_.begin(settings);
 }
 
+double encoder_angle(const ThreePhaseParameters& p, double angle_rad) {
+  if (p.eccentricity_rad == 0.0) return angle_rad;
+  return angle_rad + p.eccentricity_rad * std::sin(angle_rad + p.eccentricity_phase_rad);
+}
+
 // The encoder's counter, as the stage reads it.
 std::uint32_t ThreePhaseAmplifier::counter_at(double angle_rad) {
-  const double turns = angle_rad / kTurn;
+  const double turns = encoder_angle(p_, angle_rad) / kTurn;
   if (!began_) slip_from_turns_ = turns;
   began_ = true;
   if (p_.encoder_stands) return static_cast<std::uint32_t>(std::llround(slip_from_turns_ * counts_));
@@ -174,6 +179,12 @@ std::int32_t ThreePhaseAmplifier::thermistor() const {
   return thermistor_reading(temperature_c_);
 }
 
+// While current control runs; readings follow by the sensors' own gains.
+void ThreePhaseAmplifier::drift(motor::Sample& sample) const {
+  if (!out_.enabled || stage_.commissions()) return;
+  for (std::size_t x = 0; x < 3; ++x) sample.seen_a[x] = sample.seen_a[x] * p_.drift_gain[x] + p_.drift_offset_a[x];
+}
+
 double ThreePhaseAmplifier::run(const firmware::Actuation& actuation, double motor_angle_rad, double motor_velocity) {
   stage_.command(actuation);
   // Without waiting for the next period.
@@ -190,7 +201,6 @@ double ThreePhaseAmplifier::run(const firmware::Actuation& actuation, double mot
     const double all = kTimerCounts;
     const motor::Triple duties = {out_.counts.a / all, out_.counts.b / all, out_.counts.c / all};
     // Off: open switches carry no current, but for back-EMF above the bus, which the rated speed does not reach.
-    // Off: open switches carry no current, but for back-EMF above the bus, which the rated speed does not reach.
     power_.set_brake(out_.brake / 32768.0);
     motor::Sample sample;
     if (out_.enabled) {
@@ -201,6 +211,7 @@ double ThreePhaseAmplifier::run(const firmware::Actuation& actuation, double mot
     }
     for (const double x : sample.seen_a) peak_phase_a_ = std::max(peak_phase_a_, std::abs(x));
     torque += sample.torque_nm / periods_;
+    drift(sample);
     const motor::Readings r = shunts_.read(sample);
     const double middle = start + motor_velocity * period / 2.0;
     const bool was_enabled = out_.enabled;

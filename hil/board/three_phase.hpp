@@ -23,7 +23,16 @@ struct ThreePhaseParameters {
   double slip_turns = 0.0;
   double slip_every_turns = 0.0;
   bool commissioned = true;  ///< the drive has the settings of this motor in its memory
+  /// What calibration and commissioning do not see, as it came after them: errors of the sensors that current control
+  /// runs with.
+  motor::Triple drift_offset_a{};
+  motor::Triple drift_gain{1.0, 1.0, 1.0};
+  /// Of the encoder's disc: it shows angle + eccentricity sin(angle + phase), to the stage and to the motion loops.
+  double eccentricity_rad = 0.0;
+  double eccentricity_phase_rad = 0.0;
 };
+/// What that encoder shows of an angle of the rotor.
+double encoder_angle(const ThreePhaseParameters& p, double angle_rad);
 /// Of each drive in proportion to its largest current and its rated voltage, so that the numbers per unit are the same.
 ThreePhaseParameters three_phase_of(const plant::Drive& drive);
 /// Another motor of the same torque constant within 5 %, of which the drive knows nothing: resistance and inductances
@@ -34,6 +43,13 @@ ThreePhaseParameters drawn_motor(const plant::Drive& drive, std::uint64_t seed);
 std::vector<std::string> wiring_fault_names();
 /// False where there is no such fault.
 bool add_wiring_fault(ThreePhaseParameters& p, const std::string& name);
+/// What makes ripples in a motor that runs: cogging, cogging-magnet, current-offset, current-gain, back-emf, dead-time,
+/// encoder-eccentricity.
+std::vector<std::string> motor_ripple_names();
+/// `size` times its usual size; angles and phases are random by `seed`. False where there is no such name.
+bool add_motor_ripple(ThreePhaseParameters& p, const std::string& name, double size, std::uint64_t seed);
+/// Slots of a stator that goes with a number of pole pairs: a usual winding of concentrated coils.
+int usual_slots(int pole_pairs);
 /// What is in such a drive's memory once it was commissioned.
 firmware::ThreePhaseSettings three_phase_settings_of(const plant::Drive& drive);
 
@@ -93,6 +109,7 @@ class ThreePhaseAmplifier {
 
  private:
   std::uint32_t counter_at(double angle_rad);
+  void drift(motor::Sample& sample) const;
   std::uint32_t faulty(std::uint32_t counter);
   std::int32_t thermistor() const;
 

@@ -42,13 +42,18 @@ TwinSetup setup_of(const TwinOptions& options) {
   setup.as_made = !options.empty;
   setup.locked = options.locked;
   setup.three_phase = options.motor == "three-phase";
-  if (options.motor_seed == 0 && options.wiring_fault.empty()) return setup;
-  if (!setup.three_phase) throw std::runtime_error("--motor-seed and --wiring-fault need --motor three-phase");
+  if (options.motor_seed == 0 && options.wiring_fault.empty() && options.motor_ripple.empty()) return setup;
+  if (!setup.three_phase)
+    throw std::runtime_error("--motor-seed, --wiring-fault and --motor-ripple need --motor three-phase");
   setup.motor = options.motor_seed == 0 ? board::three_phase_of(setup.drive)
                                         : board::drawn_motor(setup.drive, options.motor_seed);
   if (!options.wiring_fault.empty() && !board::add_wiring_fault(*setup.motor, options.wiring_fault))
     throw std::runtime_error(fmt::format("there is no wiring fault '{}'; there are {}", options.wiring_fault,
                                          fmt::join(board::wiring_fault_names(), ", ")));
+  if (!options.motor_ripple.empty() &&
+      !board::add_motor_ripple(*setup.motor, options.motor_ripple, options.motor_ripple_size, options.seed))
+    throw std::runtime_error(fmt::format("there is no cause of ripple '{}'; there are {}", options.motor_ripple,
+                                         fmt::join(board::motor_ripple_names(), ", ")));
   return setup;
 }
 

@@ -22,6 +22,7 @@ enum class Slot : std::uint8_t {
   old,          // the previous application
 };
 inline constexpr std::size_t kSlots = 3;
+// Of a memory whose double words are written once (storage::kIsWriteOnce) twice as long.
 inline constexpr std::size_t kJournalBytes = 64;
 // Another sector, never erased: two words for each time that the security counter was raised.
 inline constexpr std::size_t kCounterSector = kSlots, kImageSectors = kSlots + 1;
@@ -48,7 +49,9 @@ enum class Start : std::uint8_t {
 template <storage::FlashPort Flash, class Trust = AnySigner>
 class Slots {
  public:
-  static constexpr std::size_t kImageBytes = Flash::kSectorBytes - kJournalBytes;
+  static constexpr bool kOnce = storage::kIsWriteOnce<Flash>;
+  static constexpr std::size_t kStepWords = kOnce ? 2 : 1;
+  static constexpr std::size_t kImageBytes = Flash::kSectorBytes - kStepWords * kJournalBytes;
   // A power cut during a trial is not the image's fault, so it is started this many times before it is rolled back.
   static constexpr std::size_t kTrials = 3;
 
@@ -89,7 +92,7 @@ class Slots {
   // count.
   constexpr std::uint16_t security_counter() const {
     std::uint16_t most = 0;
-    for (std::size_t i = 0; i < kCounterBytes / 4; ++i) {
+    for (std::size_t i = 0; i < kCounters; ++i) {
       const std::uint32_t code = counter_word(i);
       const auto counter = static_cast<std::uint16_t>(code);
       if (code == code_of(counter) && counter > most) most = counter;
@@ -155,6 +158,7 @@ class Slots {
   constexpr SlotError finish() {
     if (!staging_) return SlotError::out_of_order;
     staging_ = false;
+    if (!flush()) return SlotError::program;
     ImageHeader header;
     finding_ = read_image(bytes(Slot::download).first(staged_), header);
     if (finding_ == ImageFinding::none && header.board != board_bytes(board_)) finding_ = ImageFinding::wrong_board;
@@ -202,15 +206,18 @@ class Slots {
     certain
   };
   static constexpr std::size_t kMarks = 3 + kTrials + 5;
-  static_assert(4 * kMarks <= kJournalBytes);
+  static_assert(4 * kMarks <= kJournalBytes);  // a step each
   static_assert(Flash::kSectorBytes > kHeaderBytes + kJournalBytes && Flash::kSectorBytes % 8 == 0);
   static_assert(Flash::kSectorBytes >= kCounterBytes);
-  // Sixteen of its bits are zero: an interrupted write has fewer, and is completed by writing it again.
-  static constexpr std::uint32_t kSet = 0x5AA53CC3;
+  // Sixteen of its bits are zero: an interrupted write has fewer, and is completed by writing it again. A double word
+  // that is written once takes zeros again, and an interrupted write of them cannot be corrected.
+  static constexpr std::uint32_t kSet = kOnce ? 0 : 0x5AA53CC3;
 
   static constexpr Mark trial_of(std::size_t i) { return static_cast<Mark>(static_cast<std::size_t>(Mark::trial) + i); }
   static constexpr std::size_t number(Slot slot) { return static_cast<std::size_t>(slot); }
-  static constexpr std::size_t place_of(Mark mark) { return kImageBytes / 4 + static_cast<std::size_t>(mark); }
+  static constexpr std::size_t place_of(Mark mark) {
+    return kImageBytes / 4 + kStepWords * static_cast<std::size_t>(mark);
+  }
 
   constexpr std::span<const std::uint8_t> all_of(Slot slot) const { return flash_.bytes(number(slot)); }
   constexpr std::span<const std::uint8_t> bytes(Slot slot) const { return all_of(slot).first(kImageBytes); }
@@ -221,7 +228,11 @@ class Slots {
   constexpr bool is_whole(Slot slot) const { return !image(slot).empty(); }
   constexpr bool may_run(Slot slot) const { return !image_to_run(slot).empty(); }
   constexpr bool is_set(Mark mark) const { return word(Slot::download, place_of(mark)) == kSet; }
-  constexpr bool set(Mark mark) { return put(Slot::download, place_of(mark), kSet); }
+  constexpr bool set(Mark mark) {
+    for (std::size_t i = 0; i < kStepWords; ++i)
+      if (!put(Slot::download, place_of(mark) + i, kSet)) return false;
+    return true;
+  }
   // `fell_back` may be a word that an interrupted write left, set at one start and not at the next: `permanent`
   // overrules it.
   constexpr bool is_confirmed() const {
@@ -246,13 +257,21 @@ class Slots {
 
   constexpr bool put(Slot slot, std::size_t at, std::uint32_t value) {
     if (value == storage::kErasedWord) return word(slot, at) == value;
-    return flash_.program(number(slot), at, value) && word(slot, at) == value;
+    // Half a double word waits for the other half, and is read back with it by its port.
+    return flash_.program(number(slot), at, value) && (kOnce || word(slot, at) == value);
   }
   constexpr SlotError erase(Slot slot) {
     if (!flash_.erase(number(slot))) return SlotError::erase;
     for (const std::uint8_t byte : all_of(slot))
       if (byte != 0xFF) return SlotError::not_blank;
     return SlotError::none;
+  }
+  // What waits for the rest of a double word.
+  constexpr bool flush() {
+    if constexpr (kOnce)
+      return flash_.flush();
+    else
+      return true;
   }
   constexpr SlotError fail(SlotError error) {
     staging_ = false;
@@ -270,11 +289,17 @@ class Slots {
   constexpr bool copy(Slot from, Slot to) {
     const std::size_t words = (image_to_run(from).size() + 3) / 4;
     if (words == 0) return false;
-    if (!is_copy(from, to) && erase(to) != SlotError::none) return false;
-    for (std::size_t i = 0; i < words; ++i)
+    const bool is_there = is_copy(from, to) && (!kOnce || has_end(to));
+    if (!is_there && erase(to) != SlotError::none) return false;
+    for (std::size_t i = 0; i < words && !(kOnce && is_there); ++i)
       if (!put(to, i, word(from, i))) return false;
-    return is_whole(to);
+    return flush() && is_whole(to) && (!kOnce || put_end(to));
   }
+  // Where words are written once: behind a copy, zeros. Once they are begun its last word is certain, and before that
+  // no word of the journal relies on it: so a copy without them may be erased, and one with them never is. They are
+  // where the download has its journal.
+  constexpr bool has_end(Slot slot) const { return word(slot, kImageBytes / 4) == 0; }
+  constexpr bool put_end(Slot slot) { return put(slot, kImageBytes / 4, 0) && put(slot, kImageBytes / 4 + 1, 0); }
   // The application is saved before a word of it is changed, unless it may not run.
   constexpr bool install() {
     if (is_set(Mark::fell_back)) return false;
@@ -292,12 +317,19 @@ class Slots {
   }
 
   static constexpr std::size_t kTimes = 2;
+  static constexpr std::size_t kCounters = kCounterBytes / 4 / kStepWords;
   // The counter in both halves, once inverted: each word has sixteen zeros.
   static constexpr std::uint32_t code_of(std::uint16_t counter) {
     return std::uint32_t{counter} | (~std::uint32_t{counter} << 16);
   }
+  // With the second word a double word is written.
+  static constexpr std::size_t counter_at(std::size_t i) { return kStepWords * i + kStepWords - 1; }
+  // Blank, or what an interrupted write of this code left and it can be completed.
+  static constexpr bool takes(std::uint32_t word, std::uint32_t code) {
+    return kOnce ? word == storage::kErasedWord || word == code : (word & code) == code;
+  }
   constexpr std::uint32_t counter_word(std::size_t i) const {
-    model::Reader r(flash_.bytes(kCounterSector).subspan(4 * i, 4));
+    model::Reader r(flash_.bytes(kCounterSector).subspan(4 * counter_at(i), 4));
     return r.take<std::uint32_t>();
   }
   // To that of the application, which is confirmed. The first two words that are blank or that an interrupted write of
@@ -309,12 +341,12 @@ class Slots {
     if (header.security_counter < security_counter() || header.security_counter == 0) return;
     const std::uint32_t code = code_of(header.security_counter);
     std::size_t there = 0;
-    for (std::size_t i = 0; i < kCounterBytes / 4; ++i) there += counter_word(i) == code ? 1 : 0;
+    for (std::size_t i = 0; i < kCounters; ++i) there += counter_word(i) == code ? 1 : 0;
     if (there >= kTimes) return;
     there = 0;
-    for (std::size_t i = 0; i < kCounterBytes / 4 && there < kTimes; ++i) {
-      if ((counter_word(i) & code) != code) continue;
-      if (flash_.program(kCounterSector, i, code) && counter_word(i) == code) ++there;
+    for (std::size_t i = 0; i < kCounters && there < kTimes; ++i) {
+      if (!takes(counter_word(i), code)) continue;
+      if (flash_.program(kCounterSector, counter_at(i), code) && counter_word(i) == code) ++there;
     }
   }
 

@@ -24,4 +24,25 @@ concept FlashPort = requires(F flash, const F& memory, std::size_t sector, std::
   { memory.bytes(sector) } -> std::same_as<std::span<const std::uint8_t>>;
 };
 
+// Whether its words cannot be changed once they are written, but to zero (write_once_flash.hpp): then what is written
+// in several steps has a double word for each of them.
+template <class F>
+inline constexpr bool kIsWriteOnce = requires {
+  requires F::kWriteOnce;
+};
+
+// A memory in double words with error correction (STM32G4, STM32L4): each takes one value after an erase, and after
+// that nothing but zeros. A power cut in that leaves what cannot be corrected. write_once_flash.hpp makes a FlashPort
+// of it.
+inline constexpr std::uint64_t kErasedDoubleWord = ~std::uint64_t{0};
+template <class F>
+concept WriteOncePort = requires(F flash, const F& memory, std::size_t sector, std::size_t at, std::uint64_t value,
+                                 std::uint64_t& read) {
+  { F::kSectorBytes } -> std::convertible_to<std::size_t>;  // a multiple of eight
+  { flash.erase(sector) } -> std::same_as<bool>;
+  { flash.program(sector, at, value) } -> std::same_as<bool>;  // the double word of that number in the sector
+  // False: it cannot be corrected.
+  { memory.read(sector, at, read) } -> std::same_as<bool>;
+};
+
 }  // namespace flexspline::storage

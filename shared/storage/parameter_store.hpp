@@ -33,7 +33,9 @@ using protocol::StoreState;  // what boot() found
 template <FlashPort Flash>
 class ParameterStore {
  public:
-  static constexpr std::size_t kHeaderBytes = 256;
+  // Steps of a slot are a word each, or a double word of a memory that is written once.
+  static constexpr std::size_t kStepWords = kIsWriteOnce<Flash> ? 2 : 1;
+  static constexpr std::size_t kHeaderBytes = 256 * kStepWords;
   static constexpr std::size_t kCapacity = Flash::kSectorBytes - kHeaderBytes;
   static constexpr std::uint32_t kMagic = 0x504C5846;  // "FXLP"
   static_assert(Flash::kSectorBytes > kHeaderBytes && Flash::kSectorBytes % 8 == 0);
@@ -150,11 +152,15 @@ class ParameterStore {
   }
 
  private:
-  // Words of the header: magic, bytes, CRC, one unused; then a slot of two words for each time that the block became
-  // active: a check, and finally the number and its complement.
+  // Words of the header: magic, bytes, CRC, one unused; then a slot of two steps for each time that the block became
+  // active: a check, and finally the number and its complement. In a double word they are in its second word, with
+  // which it is written.
   static constexpr std::size_t kFirstSlot = 4;
-  static constexpr std::size_t kSlotsEnd = kHeaderBytes / 4;
-  static constexpr std::size_t kTwice = 4;  // words
+  static constexpr std::size_t kSlotWords = 2 * kStepWords;
+  static constexpr std::size_t kSlotsEnd = kFirstSlot + (kHeaderBytes / 4 - kFirstSlot) / kSlotWords * kSlotWords;
+  static constexpr std::size_t kTwice = 2 * kSlotWords;
+  static constexpr std::size_t check_at(std::size_t slot) { return slot + kStepWords - 1; }
+  static constexpr std::size_t code_at(std::size_t slot) { return slot + kSlotWords - 1; }
   static constexpr std::uint16_t kMostRank = 0xFFFE;
   // Increments of the number: for a block that becomes active, and for an active one that invalidates the other. A
   // block that is older than the active one by more than the first increment is invalid.
@@ -184,16 +190,16 @@ class ParameterStore {
   }
   // The number in a slot, zero where there is none.
   constexpr std::uint16_t rank_in(std::size_t sector, std::size_t slot) const {
-    const std::uint32_t code = word(sector, slot + 1);
+    const std::uint32_t code = word(sector, code_at(slot));
     const auto rank = static_cast<std::uint16_t>(code);
     const bool valid =
-        code == code_of(rank) && word(sector, slot) == check_of(rank, word(sector, 2)) && rank <= kMostRank;
+        code == code_of(rank) && word(sector, check_at(slot)) == check_of(rank, word(sector, 2)) && rank <= kMostRank;
     return valid ? rank : std::uint16_t{0};
   }
   // The newest number in the slots, zero where there is none.
   constexpr std::uint16_t rank_of(std::size_t sector) const {
     std::uint16_t newest = 0;
-    for (std::size_t slot = kFirstSlot; slot < kSlotsEnd; slot += 2)
+    for (std::size_t slot = kFirstSlot; slot < kSlotsEnd; slot += kSlotWords)
       if (const std::uint16_t rank = rank_in(sector, slot); is_newer(rank, newest)) newest = rank;
     return newest;
   }
@@ -201,8 +207,9 @@ class ParameterStore {
   // written since. So it is made invalid before another is written. Its check was whole before it was begun.
   constexpr bool drop_interrupted() {
     for (std::size_t s = 0; s < kSectors; ++s)
-      for (std::size_t slot = kFirstSlot; slot < kSlotsEnd; slot += 2)
-        if (word(s, slot) != kErasedWord && word(s, slot + 1) != 0 && rank_in(s, slot) == 0 && !put(s, slot + 1, 0))
+      for (std::size_t slot = kFirstSlot; slot < kSlotsEnd; slot += kSlotWords)
+        if (word(s, check_at(slot)) != kErasedWord && word(s, code_at(slot)) != 0 && rank_in(s, slot) == 0 &&
+            !put(s, code_at(slot), 0))
           return false;
     return true;
   }
@@ -244,20 +251,21 @@ class ParameterStore {
     if (confirmed_ && rank_[1 - active_] == 0) return true;
     const std::size_t slot = free_slot(active_, kTwice);
     if (slot + kTwice <= kSlotsEnd) return put_twice(active_, slot, kGivesUp) == StoreError::none;
-    for (std::size_t at = kFirstSlot; at < kSlotsEnd; at += 2)
-      if (word(active_, at + 1) == code_of(rank_[active_])) {
-        confirmed_ = put(active_, at, word(active_, at)) && put(active_, at + 1, code_of(rank_[active_]));
+    for (std::size_t used = kFirstSlot; used < kSlotsEnd; used += kSlotWords)
+      if (word(active_, code_at(used)) == code_of(rank_[active_])) {
+        confirmed_ = put(active_, check_at(used), word(active_, check_at(used))) &&
+                     put(active_, code_at(used), code_of(rank_[active_]));
         return confirmed_;
       }
     return false;
   }
   // The first slot with this many free words from its start: a free slot may be followed by damaged words.
-  constexpr std::size_t free_slot(std::size_t sector, std::size_t words = 2) const {
+  constexpr std::size_t free_slot(std::size_t sector, std::size_t words = kSlotWords) const {
     std::size_t slot = kSlotsEnd;
     std::size_t free = 0;
     for (std::size_t at = kSlotsEnd; at-- > kFirstSlot;) {
       free = word(sector, at) == kErasedWord ? free + 1 : 0;
-      if (at % 2 == 0 && free >= words) slot = at;
+      if ((at - kFirstSlot) % kSlotWords == 0 && free >= words) slot = at;
     }
     return slot;
   }
@@ -272,12 +280,13 @@ class ParameterStore {
     const std::uint32_t crc = word(sector, 2);
     if (const StoreError error = put_slot(sector, slot, steps); error != StoreError::none) return error;
     const std::uint16_t rank = rank_[sector];
-    const bool good = put(sector, slot + 2, check_of(rank, crc)) && put(sector, slot + 3, code_of(rank));
+    const bool good = put(sector, check_at(slot + kSlotWords), check_of(rank, crc)) &&
+                      put(sector, code_at(slot + kSlotWords), code_of(rank));
     return good ? StoreError::none : StoreError::flash;
   }
   constexpr StoreError put_slot(std::size_t sector, std::size_t slot, unsigned steps) {
     const std::uint16_t rank = later(rank_[active_], steps);
-    if (!put(sector, slot, check_of(rank, word(sector, 2))) || !put(sector, slot + 1, code_of(rank)))
+    if (!put(sector, check_at(slot), check_of(rank, word(sector, 2))) || !put(sector, code_at(slot), code_of(rank)))
       return StoreError::flash;
     rank_[sector] = rank;
     active_ = sector;

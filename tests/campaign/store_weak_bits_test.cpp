@@ -11,6 +11,7 @@
 #include "shared/storage/parameter_store.hpp"
 #include "tests/support/campaign_size.hpp"
 #include "tests/support/flash_model.hpp"
+#include "tests/support/write_once_model.hpp"
 
 namespace flexspline {
 namespace {
@@ -19,10 +20,17 @@ using storage::StoreError;
 using testing::CutAt;
 using testing::PowerCut;
 using Bytes = std::vector<std::uint8_t>;
-constexpr std::size_t kSector = 320;
-using Cells = testing::FlashCells<kSector>;
-using Flash = testing::FlashModel<kSector>;
-using Store = storage::ParameterStore<Flash>;
+// Bits that are programmed one by one, and double words that are written once.
+struct Bits {
+  static constexpr std::size_t kSector = 320;
+  using Cells = testing::FlashCells<kSector>;
+  using Flash = testing::FlashModel<kSector>;
+};
+struct DoubleWords {
+  static constexpr std::size_t kSector = 576;
+  using Cells = testing::OnceCells<kSector>;
+  using Flash = testing::OnceFlash<kSector>;
+};
 
 Bytes block_named(std::uint8_t name) {
   Bytes bytes(12);
@@ -35,8 +43,12 @@ std::uint32_t validate(std::span<const std::uint8_t> bytes) {
   return std::equal(wanted.begin(), wanted.end(), bytes.begin()) ? 0 : 2;
 }
 
-// One drive: which blocks its store may start with, as far as is known from what was done.
+// One drive, with such a memory: which blocks its store may start with, as far as is known from what was done.
+template <class Memory>
 class History {
+  using Flash = typename Memory::Flash;
+  using Store = storage::ParameterStore<Flash>;
+
  public:
   explicit History(std::uint64_t seed) : random_(seed) { cells_.weakens = true; }
 
@@ -86,23 +98,31 @@ class History {
 
   static constexpr int kNone = -1, kDamaged = -2;
   std::mt19937_64 random_;
-  Cells cells_;
+  typename Memory::Cells cells_;
   std::set<int> may_be_{kNone};
   std::uint8_t last_ = 0;
   std::size_t cuts_ = 0;
 };
 
-TEST(StoreWithWeakBits, LosesNothingButTheOperationThatWasCut) {
+template <class Memory>
+void cut_histories(const char* memory) {
   const std::size_t wanted = testing::in_campaign<std::size_t>(200'000, 1'000'000);
   std::size_t cuts = 0;
   std::uint64_t seed = 0;
   for (; cuts < wanted;) {
-    History history(++seed);
+    History<Memory> history(++seed);
     for (int k = 0; k < 400; ++k) ASSERT_TRUE(history.step()) << "seed " << seed << ", step " << k;
     cuts += history.cuts();
   }
-  std::printf("power cuts of the store with weak bits: %zu, seeds 1 to %llu\n", cuts,
+  std::printf("power cuts of the store with weak %s: %zu, seeds 1 to %llu\n", memory, cuts,
               static_cast<unsigned long long>(seed));
+}
+
+TEST(StoreWithWeakBits, LosesNothingButTheOperationThatWasCut) {
+  cut_histories<Bits>("bits");
+}
+TEST(StoreWithWeakBits, LosesNothingButTheOperationThatWasCutInAMemoryOfDoubleWordsThatAreWrittenOnce) {
+  cut_histories<DoubleWords>("double words");
 }
 
 }  // namespace

@@ -11,6 +11,7 @@
 
 #include "tests/support/campaign_size.hpp"
 #include "tests/support/update_bench.hpp"
+#include "tests/support/write_once_model.hpp"
 
 namespace flexspline {
 namespace {
@@ -19,12 +20,23 @@ using boot::Slot;
 using boot::Start;
 using testing::CutAt;
 using testing::PowerCut;
-using testing::SlotCells;
-using testing::SlotFlash;
-using testing::TestSlots;
 
-// One drive: which images may be started, as far as is known from what was done.
+// Bits that are programmed one by one, and double words that are written once.
+struct Bits {
+  using Cells = testing::SlotCells;
+  using Flash = testing::SlotFlash;
+};
+struct DoubleWords {
+  using Cells = testing::OnceCells<testing::kSlotBytes, boot::kImageSectors>;
+  using Flash = testing::OnceFlash<testing::kSlotBytes, boot::kImageSectors>;
+};
+
+// One drive, with such a memory: which images may be started, as far as is known from what was done.
+template <class Memory>
 class UpdateHistory {
+  using SlotFlash = typename Memory::Flash;
+  using TestSlots = boot::Slots<SlotFlash>;
+
  public:
   explicit UpdateHistory(std::uint64_t seed) : random_(seed) {
     SlotFlash flash(cells_);
@@ -132,7 +144,7 @@ class UpdateHistory {
   }
 
   std::mt19937_64 random_;
-  SlotCells cells_;
+  typename Memory::Cells cells_;
   std::uint8_t confirmed_ = 1;
   std::uint8_t pending_ = kNone;  // may be started as well
   bool is_certain_ = false;       // ... and has to be: its download was complete
@@ -142,12 +154,13 @@ class UpdateHistory {
   std::size_t cuts_ = 0, updates_ = 0, taken_back_ = 0;
 };
 
-TEST(UpdateWithWeakBits, LosesNothingButTheOperationThatWasCut) {
+template <class Memory>
+void cut_updates(const char* memory) {
   const std::size_t wanted = testing::in_campaign<std::size_t>(100'000, 1'000'000);
   std::size_t cuts = 0, updates = 0, taken_back = 0;
   std::uint64_t seed = 0;
   for (; cuts < wanted;) {
-    UpdateHistory history(++seed);
+    UpdateHistory<Memory> history(++seed);
     for (int k = 0; k < 400; ++k) {
       const std::string wrong = history.step();
       ASSERT_EQ(wrong, "") << "seed " << seed << ", step " << k << ", after " << cuts + history.cuts() << " cuts";
@@ -156,10 +169,17 @@ TEST(UpdateWithWeakBits, LosesNothingButTheOperationThatWasCut) {
     updates += history.updates();
     taken_back += history.taken_back();
   }
-  std::printf("power cuts of updates with weak bits: %zu, seeds 1 to %llu; %zu updates done, %zu taken back\n", cuts,
-              static_cast<unsigned long long>(seed), updates, taken_back);
+  std::printf("power cuts of updates with weak %s: %zu, seeds 1 to %llu; %zu updates done, %zu taken back\n", memory,
+              cuts, static_cast<unsigned long long>(seed), updates, taken_back);
   EXPECT_GT(updates, wanted / 100);
   EXPECT_GT(taken_back, wanted / 1000);
+}
+
+TEST(UpdateWithWeakBits, LosesNothingButTheOperationThatWasCut) {
+  cut_updates<Bits>("bits");
+}
+TEST(UpdateWithWeakBits, LosesNothingButTheOperationThatWasCutInAMemoryOfDoubleWordsThatAreWrittenOnce) {
+  cut_updates<DoubleWords>("double words");
 }
 
 }  // namespace

@@ -204,6 +204,26 @@ TEST(Monitor, GivesLinesWithoutATerminalAndSamplesAsJson) {
   EXPECT_TRUE(contains(wrong.err, "did you mean current?")) << wrong.err;
 }
 
+TEST(Monitor, SaysWhyAThreePhaseStageSwitchedItselfOff) {
+  const Shell shell;
+  const TwinProcess twin(
+      {"--serve", "0", "--fast", "--motor", "three-phase", "--inject", "driver-fault", "--inject-at", "0.2"});
+  const std::string monitor = "flexspline monitor --seconds 0.3 --drive " + twin.name();
+  EXPECT_TRUE(shell.json(monitor)["fault_reason"].is_null()) << "nothing has happened yet";
+  shell.write("plan.toml",
+              "format = \"flexspline-plan/1\"\nsample_s = 0.001\n[limits]\nvelocity_rad_s = 150\n[[run]]\n"
+              "name = \"sine\"\nmode = \"velocity\"\nwaveform = \"sine\"\namplitude = 20\nfrequency_hz = 1\n"
+              "duration_s = 2\n");
+  EXPECT_NE(shell.run("flexspline record --plan plan.toml --out recorded --drive " + twin.name()).code, 0);
+  const json seen = shell.json(monitor);
+  ASSERT_FALSE(seen["samples"].empty());
+  EXPECT_EQ(seen["samples"].back()["fault"], "amplifier_fault");
+  const std::string reason = shell.json("flexspline drives --also " + twin.name())["drives"].back()["fault_reason"];
+  EXPECT_TRUE(contains(reason, "driver")) << reason;
+  EXPECT_EQ(seen["fault_reason"], reason);
+  EXPECT_TRUE(contains(shell.run(monitor).err, reason));
+}
+
 TEST(Record, WhatWasRecordedIdentifiesTheDrive) {
   const Shell shell;
   shell.write("plan.toml",

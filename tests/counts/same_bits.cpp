@@ -4,6 +4,7 @@
 #include "tests/counts/bare.hpp"
 #include "tests/same_bits/adversarial.hpp"
 #include "tests/same_bits/drive_parts.hpp"
+#include "tests/same_bits/three_phase_parts.hpp"
 
 namespace flexspline {
 namespace {
@@ -57,5 +58,5 @@ int main() {
   };
   same_bits::run<FromBlock>(200, 2'000, print);
   same_bits::run_parts<FromBlock>(settings, 200, print);
-  return 0;
+  return same_bits::run_three_phase(20'000, print) ? 0 : 5;
 }

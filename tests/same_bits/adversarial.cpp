@@ -10,6 +10,7 @@
 #include "shared/model/block.hpp"
 #include "tests/same_bits/adversarial.hpp"
 #include "tests/same_bits/drive_parts.hpp"
+#include "tests/same_bits/three_phase_parts.hpp"
 
 namespace {
 
@@ -55,6 +56,10 @@ int main(int argc, char** argv) {
   };
   same_bits::run<same_bits::Derived>(few ? 200 : 20'000, many, print);
   same_bits::run_parts<same_bits::Derived>(same_bits::settings(), many / 10, print);
+  if (!same_bits::run_three_phase(few ? 20'000 : many / 2, print)) {
+    std::fprintf(stderr, "commissioning does not find the motor in integers\n");
+    return 1;
+  }
   if (!few) print("drawn_blocks", same_bits::hash_of_drawn_blocks(100, many / 1'000));
   if (fixed::OverflowLog::count() != 0) {
     std::fprintf(stderr, "%s\n", std::string(fixed::OverflowLog::first()).c_str());

@@ -1,5 +1,5 @@
 # Runs PROGRAM, and beside it OTHER (the same by another compiler) or TWIN (flexspline-hil of this build, on the first case), from one
-# seed, seven cases of nine seconds: all bits have to be the same, and from another seed they have to be others.
+# seed, eight cases of nine seconds: all bits have to be the same, and from another seed they have to be others.
 function(run seed to)
   execute_process(COMMAND ${ARGN} ${seed} OUTPUT_VARIABLE given RESULT_VARIABLE status)
   if(NOT status EQUAL 0)

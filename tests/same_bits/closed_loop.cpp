@@ -13,6 +13,7 @@
 #include "hil/board/drive_setup.cpp"
 #include "hil/board/events.cpp"
 #include "hil/board/motion.cpp"
+#include "hil/board/motor_ripples.cpp"
 #include "hil/board/packed_model.cpp"
 #include "hil/board/plant_rig.cpp"
 #include "hil/board/scenario.cpp"
@@ -45,6 +46,7 @@ struct Case {
   std::string hide;               // and one that it does not
   bool compensation;
   std::uint32_t tick_hz;
+  bool three_phase = false;
 };
 
 // Every function of the C library that the twin computes with, loops of the gear, sticking, a slow amplifier, heat, an
@@ -58,6 +60,7 @@ std::vector<Case> cases() {
       {"warm-up", {"temperature_viscous", "cubic_stiffness"}, "lugre_friction", true, 8'000},
       {"weak-amplifier", {"backlash"}, "bouc_wen_hysteresis", false, 8'000},
       {"power-cut", {}, "dahl_hysteresis", true, 8'000},
+      {"sine", {}, "torque_ripple:2", true, 20'000, true},
   };
 }
 
@@ -79,9 +82,11 @@ void run(const Case& one, std::uint64_t seed, double seconds) {
   plan.duration_s = seconds;
   plan.hold_s = 0.0;
   plan.keeps_trace = true;
+  plan.three_phase = one.three_phase;
   const board::ScenarioResult result = board::run_scenario(plan);
   const std::string name = std::string(one.scenario) + (one.compensation ? " on " : " off ") +
-                           std::to_string(one.tick_hz) + " Hz" + (one.hide.empty() ? "" : " " + one.hide);
+                           std::to_string(one.tick_hz) + " Hz" + (one.hide.empty() ? "" : " " + one.hide) +
+                           (one.three_phase ? " three-phase" : "");
   Bits positions, currents, torques;
   for (std::size_t i = 0; i < result.trace.size(); ++i) {
     const board::TracePoint& p = result.trace[i];

@@ -81,6 +81,10 @@ struct Sample {
   std::vector<double> values;
   std::string mode() const { return std::string(protocol::name_of(static_cast<protocol::Mode>(state & 0xFF))); }
   protocol::FaultText fault() const { return protocol::fault_text(static_cast<std::uint8_t>(state >> 8)); }
+  bool is_fault() const {
+    const auto mode = static_cast<protocol::Mode>(state & 0xFF);
+    return mode == protocol::Mode::fault || mode == protocol::Mode::stop;
+  }
 };
 
 class Screen {
@@ -88,7 +92,8 @@ class Screen {
   Screen(std::vector<Channel> channels, Console& console)
       : channels_(std::move(channels)), console_(console), history_(channels_.size()) {}
 
-  void show(const Sample& s) {
+  // `reason`: of its fault; empty: not known yet.
+  void show(const Sample& s, const std::string& reason) {
     std::string text;
     if (lines_ > 0) text += fmt::format("\x1b[{}A", lines_);
     lines_ = 0;
@@ -96,8 +101,8 @@ class Screen {
       text += "\x1b[2K" + content + "\n";
       ++lines_;
     };
-    line(fmt::format("{:9.2f} s  {}  {}", s.time_s, console_.bold(s.mode()),
-                     s.mode() == "fault" || s.mode() == "stop" ? console_.bad(std::string(s.fault().reason)) : ""));
+    const std::string known = reason.empty() ? std::string(s.fault().reason) : reason;
+    line(fmt::format("{:9.2f} s  {}  {}", s.time_s, console_.bold(s.mode()), s.is_fault() ? console_.bad(known) : ""));
     std::optional<double> feedforward, command;
     for (std::size_t i = 0; i < channels_.size(); ++i) {
       history_[i].push_back(s.values[i]);
@@ -150,6 +155,7 @@ class Monitor {
       if (m) heard_at = now;
       if (m && m->is_unasked())
         protocol::for_each_frame(*m, [this](const auto& head, auto i, auto words) { take(head, i, words); });
+      if (asks_reason_) ask_reason();
       if (now - heard_at > std::chrono::seconds(3))
         session_.fail("the drive went silent; check cable and power, then try again");
     }
@@ -165,6 +171,7 @@ class Monitor {
             {"drive", {{"serial", session_.serial()}, {"board", session_.board()}}},
             {"channels", names},
             {"frames_lost", lost_},
+            {"fault_reason", reason_.empty() ? json() : json(reason_)},
             {"samples", samples_}};
   }
 
@@ -177,6 +184,22 @@ class Monitor {
     console_.line(head);
   }
 
+  // Frames name the fault; why an amplifier switched itself off is in the drive's status.
+  void ask_reason() {
+    asks_reason_ = false;
+    const protocol::Status status = session_.status();
+    if (status.fault == 0) return;
+    reason_ = protocol::fault_text(status.fault, status.fault_limit).reason;
+    if (!is_terminal_) console_.warn(reason_);
+  }
+  void note_fault(const Sample& s) {
+    if (s.is_fault() && !was_fault_) {
+      asks_reason_ = true;
+      reason_.clear();
+    }
+    was_fault_ = s.is_fault();
+  }
+
   void take(const protocol::FrameHead& head, std::uint32_t i, std::span<const std::uint32_t> words) {
     if (words.size() != channels_.size() + 1) return;
     const std::uint32_t tick = head.tick + i * every_;
@@ -185,8 +208,9 @@ class Monitor {
     next_ = head.sequence + i + 1;
     Sample s{static_cast<double>(tick - *first_tick_) / tick_hz_, words[0], {}};
     for (std::size_t k = 0; k < channels_.size(); ++k) s.values.push_back(scales_.value(channels_[k], words[k + 1]));
+    note_fault(s);
     if (is_terminal_)
-      screen_.show(s);
+      screen_.show(s, reason_);
     else
       print_line(s);
     if (!options_.json.empty())
@@ -211,6 +235,8 @@ class Monitor {
   Screen screen_;
   std::optional<std::uint32_t> first_tick_;
   std::uint32_t next_ = 0, lost_ = 0;
+  bool was_fault_ = false, asks_reason_ = false;
+  std::string reason_;  // of the present or the last fault
   json samples_ = json::array();
 };
 

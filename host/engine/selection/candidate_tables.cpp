@@ -11,6 +11,9 @@ namespace {
 
 // The motion's filter is wider than the target's by this factor, as the columns are filtered once more.
 constexpr double kMotionOverRow = 2.5;
+// Share of a bandwidth up to which a wave is taken; a bandwidth that is wider by less is none of its own. So where the
+// highest order needs a wider one, it is at least the second.
+constexpr double kTakenShare = 0.7, kWider = 1.2, kLeastWidening = 1.25;
 
 // At the highest bandwidth; wider where waves over the motor's angle are above the bandwidth of the motion.
 estimation::PreparedData prepare(const std::vector<const data::Experiment*>& experiments, const model::Drive& drive,
@@ -23,10 +26,14 @@ estimation::PreparedData prepare(const std::vector<const data::Experiment*>& exp
   pipeline.row_cutoff_hz = highest_hz;
   estimation::PreparedData prepared = estimation::prepare_with(experiments, drive, pipeline);
   double widest_hz = highest_hz;
+  // Where an order that the motor gives is above what the highest bandwidth takes, but hardly.
+  const double order_hz = highest_order_hz(prepared);
+  const bool is_beyond = highest_order(drive) > policy.highest_order && order_hz > kTakenShare * highest_hz;
+  const double least_hz = is_beyond ? kLeastWidening * highest_hz : 0.0;
   const double wanted_hz =
-      std::min({1.5 * highest_order_hz(prepared), policy.widest_over_sampling * slowest_hz, policy.widest_hz});
+      std::min({std::max(1.5 * order_hz, least_hz), policy.widest_over_sampling * slowest_hz, policy.widest_hz});
   while (widest_hz < 0.99 * wanted_hz) widest_hz = std::min(2.0 * widest_hz, wanted_hz);
-  if (widest_hz <= 1.2 * highest_hz) return prepared;
+  if (widest_hz <= kWider * highest_hz) return prepared;
   pipeline.row_cutoff_hz = widest_hz;
   return estimation::prepare_with(experiments, drive, pipeline);
 }
@@ -55,7 +62,7 @@ const catalogue::Entry* presliding_law(const estimation::Terms& terms) {
 }
 
 bool CandidateTables::may_enter(const CandidateTerm& term, double cutoff_hz) const {
-  return term.highest_hz <= 0.7 * cutoff_hz &&
+  return term.highest_hz <= kTakenShare * cutoff_hz &&
          (cutoff_hz <= 1.01 * bandwidth.highest_hz || term.highest_hz > 0.35 * bandwidth.highest_hz);
 }
 
@@ -79,7 +86,7 @@ CandidateTables make_tables(const std::vector<const data::Experiment*>& experime
       tables.presliding = make_regressor_table(prepared, balance, terms, tables.presliding_travel, highest_hz, policy);
     }
   }
-  for (double f = prepared.pipeline.row_cutoff_hz; f > 1.2 * highest_hz; f *= 0.5)
+  for (double f = prepared.pipeline.row_cutoff_hz; f > kWider * highest_hz; f *= 0.5)
     for (const bool mask : {false, true}) tables.settings.emplace_back(f, mask);
   for (std::size_t b = 0; b < policy.bandwidths; ++b)
     for (const bool mask : {false, true})

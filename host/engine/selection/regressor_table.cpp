@@ -6,6 +6,7 @@
 
 #include "host/engine/selection/presliding.hpp"
 #include "host/engine/selection/table_builder.hpp"
+#include "host/physics/catalogue/order_causes.hpp"
 
 namespace flexspline::selection {
 namespace {
@@ -74,13 +75,20 @@ void scale_columns(const TableBuilder& builder) {
 
 }  // namespace
 
+double highest_order(const model::Drive& drive) {
+  double highest = kPolicy.highest_order;
+  for (const catalogue::Entry& entry : catalogue::all())
+    for (const double order : catalogue::orders_of_motor(entry, drive)) highest = std::max(highest, order);
+  return highest;
+}
+
 double highest_order_hz(const PreparedData& prepared) {
   std::vector<double> speeds;
   for (const Record& r : prepared.records)
     for (std::size_t k = 0; k < r.inputs.size() && !r.inputs.velocity.empty(); k += r.decimation)
       speeds.push_back(std::abs(r.inputs.velocity_at(k)));
   const bool turns = prepared.rotary || prepared.constants.turn_angle_scale != 1.0;
-  return turns ? kPolicy.highest_order * quantile(speeds, 0.5) * prepared.constants.turn_angle_scale /
+  return turns ? highest_order(prepared.drive) * quantile(speeds, 0.5) * prepared.constants.turn_angle_scale /
                      (2.0 * std::numbers::pi)
                : 0.0;
 }

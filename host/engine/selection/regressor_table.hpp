@@ -70,5 +70,7 @@ RegressorTable make_regressor_table(const estimation::PreparedData& prepared, Ba
 
 // Highest frequency of an order of the motor's turn that counts, Hz, at the typical speed.
 double highest_order_hz(const estimation::PreparedData& prepared);
+// The highest order that is tried: those that pole pairs and slots of the motor give may be beyond the policy's.
+double highest_order(const model::Drive& drive);
 
 }  // namespace flexspline::selection

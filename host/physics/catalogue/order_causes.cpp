@@ -15,7 +15,8 @@ enum ShowsAs : unsigned {
   kTorque = 1,       // a torque at the motor that does not depend on the load
   kWithLoad = 2,     // one in proportion to the motor's torque, or to its current
   kPosition = 4,     // an angle between motor and output
-  kFriction = 8,     // friction that varies with the angle
+  kFriction = 8,     // a torque against the motion that varies with the angle: friction, or what is in proportion to
+                     // the current where friction alone asks for it
   kAnyTorque = 3,    // motion at one load does not distinguish these
   kEverything = 15,  // of the gear
 };
@@ -92,12 +93,12 @@ constexpr Row kRows[] = {
      "Read the phase currents with the bridge off, cold and warm: they must be zero. The ripple does not change with "
      "the load, and the measured q current does not show it, as the current controller hides it.",
      "Calibrate the offset at every start, and again when warm.", kMeasurementErrors},
-    {kWithLoad, kPolePairs, [](const MotorTurn& m) { return 2.0 * static_cast<double>(*m.pole_pairs); },
+    {kWithLoad | kFriction, kPolePairs, [](const MotorTurn& m) { return 2.0 * static_cast<double>(*m.pole_pairs); },
      "2 x pole_pairs", "the gains of the current sensors differ: the currents have a part that turns backwards",
      "Repeat at twice the load: the ripple doubles. Send one current through two phases in series and compare the "
      "readings of their sensors.",
      "Calibrate the gains of the sensors against each other.", kMeasurementErrors},
-    {kWithLoad, kPolePairs, [](const MotorTurn& m) { return 2.0 * static_cast<double>(*m.pole_pairs); },
+    {kWithLoad | kFriction, kPolePairs, [](const MotorTurn& m) { return 2.0 * static_cast<double>(*m.pole_pairs); },
      "2 x pole_pairs", "the phases differ in resistance or inductance: a bad contact, or turns that are shorted",
      "Measure the resistance between each two of the three terminals, cold and warm: the three must agree.",
      "Repair the contact or the winding; a current controller of higher bandwidth reduces the ripple.",
@@ -115,7 +116,7 @@ constexpr Row kRows[] = {
      "Switch the dead-time compensation on and set it to the bridge's dead time; a current controller of higher "
      "bandwidth reduces the rest.",
      "Holmes and Lipo, Pulse Width Modulation for Power Converters"},
-    {kWithLoad, kPolePairs, [](const MotorTurn& m) { return 6.0 * static_cast<double>(*m.pole_pairs); },
+    {kWithLoad | kFriction, kPolePairs, [](const MotorTurn& m) { return 6.0 * static_cast<double>(*m.pole_pairs); },
      "6 x pole_pairs", "fifth and seventh harmonic of the motor's back-EMF",
      "Turn the shaft by another motor with the bridge off and record the voltage between two terminals over some "
      "turns: look for its fifth and seventh harmonic. The ripple grows in proportion to the current.",
@@ -153,7 +154,7 @@ unsigned shows_as(const Entry& effect) {
   if (effect.count(Kind::given) == 0) return 0;
   if (effect.info->phase == Phase::shift) return kPosition;
   if (effect.info->phase != Phase::source || effect.info->balance != Balance::motor) return 0;
-  // Of the causes only those that rub: current and magnets make no friction.
+  // Of the causes those that rub, and those in proportion to the current: an offset and magnets make no friction.
   if ((effect.info->reads & effects::kBothDirections) != 0) return kFriction;
   return (effect.info->reads & effects::kTorque) != 0 ? kWithLoad : kAnyTorque;
 }
