@@ -19,6 +19,7 @@
 #include "host/engine/selection/resampling.hpp"
 #include "host/engine/selection/searched_balance.hpp"
 #include "host/engine/selection/significance_checks.hpp"
+#include "host/engine/selection/wald_test.hpp"
 
 namespace flexspline::selection {
 namespace {
@@ -356,6 +357,7 @@ Diagnosis diagnose(const data::Dataset& dataset, const model::Model& model, cons
   list_candidates(all, model.drive.axis, result);
   if (by_resampling) name_stable(chosen, result);
   if (names_one) name_effects(chosen, alias, result);
+  take_back_insignificant(result);
   if (!result.named.empty()) explain_named(chosen.search, chosen.candidates, model.drive, result);
   assess_remainder(chosen, result);
   if (by_resampling && result.resampling->lag_s) result.delay_s = result.resampling->lag_s;

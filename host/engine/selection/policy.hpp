@@ -28,6 +28,8 @@ struct SelectionPolicy {
   std::size_t fewest_records_to_split = 4;  // from so many on every second pair halves the records, not their blocks
   std::size_t most_steps = 4;
   double named_frequency = 0.6;    // Meinshausen and Buehlmann 2010: 0.6 to 0.9
+  double least_of_all = 0.5;       // with abstaining subsamples counted as not choosing: the least that Meinshausen and
+                                   // Buehlmann's bound of false selections allows; below, likelihood has to agree
   double certain_frequency = 0.9;  // behind a structure that is in no catalogue
 
   // Share of the squares above the noise that a term has to take off on samples that the fit did not see.
@@ -175,6 +177,9 @@ struct SelectionPolicy {
   // by that many percent.
   double table_score = 20.0;
   double least_table_percent = 0.1;
+
+  // Values of a named linear effect must differ from zero (Wald), whatever else speaks for it.
+  double wald_p_value = 0.05;
 
   // Trends of parameters over experiments (step 14).
   std::size_t fewest_of_trend = 6;  // experiments

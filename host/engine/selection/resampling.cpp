@@ -85,13 +85,16 @@ bool leaves_noise(const SearchedBalance& e, double whiteness) {
 }
 
 // Whether the likelihood of all data agrees with a name that resampling chose. Where the model alone leaves known
-// noise, most subsamples abstain and the others may have selected noise: likelihood must be significant then. Otherwise
-// it is not used, as it sees one bandwidth, without reversals.
-bool likelihood_agrees(const SearchedBalance& motor, const NamedEffect& name) {
-  if (!motor.floor.rmse || motor.search.base.rmse() > (1.0 + kPolicy.floor_uncertainty) * *motor.floor.rmse)
-    return true;
+// noise, many subsamples abstain and the others may have selected noise: likelihood must be significant then. Where the
+// name was not chosen in most of all subsamples, its criterion must prefer the effect. Otherwise it is not used, as it
+// sees one bandwidth, without reversals.
+bool likelihood_agrees(const SearchedBalance& motor, const NamedEffect& name, double frequency_of_all) {
+  const bool leaves_known_noise =
+      motor.floor.rmse && motor.search.base.rmse() <= (1.0 + kPolicy.floor_uncertainty) * *motor.floor.rmse;
+  if (!leaves_known_noise && frequency_of_all >= kPolicy.least_of_all) return true;
+  const double least_score = leaves_known_noise ? kPolicy.named_score : 0.0;
   return std::any_of(motor.candidates.begin(), motor.candidates.end(), [&](const CandidateFit& candidate) {
-    return is_of_family(name.effect, name.order, candidate) && candidate.gain.score > kPolicy.named_score;
+    return is_of_family(name.effect, name.order, candidate) && candidate.gain.score > least_score;
   });
 }
 
@@ -104,8 +107,9 @@ std::vector<NamedEffect> names_of(const Resampling& resampling, const SearchedBa
   if (is_within_floor_of_few_records(motor.search)) return names;
   for (const Resampling::FoundTerm& found : resampling.found) {
     if (found.group.empty() || found.refused_by_holdout) continue;
+    const double of_all = found.frequency * (1.0 - resampling.abstained / resampling.subsamples);
     if (std::none_of(found.group.begin(), found.group.end(),
-                     [&](const NamedEffect& n) { return likelihood_agrees(motor, n); }))
+                     [&](const NamedEffect& n) { return likelihood_agrees(motor, n, of_all); }))
       continue;
     if (names.empty() && found.group.size() > 1) return found.group;
     if (found.group.size() > 1 || (!names.empty() && found.share_percent < least_percent)) continue;

@@ -1,0 +1,37 @@
+#include "host/engine/selection/wald_test.hpp"
+
+#include <algorithm>
+
+#include "host/common/numbers/distributions.hpp"
+#include "host/engine/selection/policy.hpp"
+
+namespace flexspline::selection {
+
+std::optional<double> wald_p_value(const Candidate& candidate) {
+  double parameters = 0.0, chi2 = 0.0;
+  for (const estimation::Estimate& e : candidate.parameters) {
+    if (e.fixed) continue;
+    if (!e.std || !(*e.std > 0.0)) return std::nullopt;
+    parameters += 1.0;
+    chi2 += (e.value / *e.std) * (e.value / *e.std);
+  }
+  if (parameters == 0.0) return std::nullopt;
+  const double tried = candidate.order ? kPolicy.highest_order : 1.0;
+  return std::min(1.0, tried * numbers::chi_squared_above(parameters, chi2));
+}
+
+void take_back_insignificant(Diagnosis& result) {
+  if (result.verdict == Verdict::confusable_effects) return;
+  std::erase_if(result.named, [&](const NamedEffect& name) {
+    const auto at = std::find_if(result.candidates.begin(), result.candidates.end(),
+                                 [&](const Candidate& c) { return c.effect == name.effect && c.order == name.order; });
+    if (at == result.candidates.end()) return false;
+    const std::optional<double> p = wald_p_value(*at);
+    if (!p || *p <= kPolicy.wald_p_value) return false;
+    at->admissible = false;
+    at->why_not = "its values do not differ from zero beyond their intervals";
+    return true;
+  });
+}
+
+}  // namespace flexspline::selection

@@ -1,0 +1,17 @@
+// Whether the values of an effect differ from zero (Wald's test), as its reader sees by the intervals.
+#pragma once
+
+#include "host/engine/selection/diagnosis.hpp"
+
+namespace flexspline::selection {
+
+// Probability that chance alone gives values of a linear effect so far from zero: chi-square of all, taken as
+// independent, times the number of orders that were tried (Bonferroni). Nothing for a law with nonlinear parameters,
+// which are no parameters where the effect is zero (Davies, 1977), and where no interval is known.
+std::optional<double> wald_p_value(const Candidate& candidate);
+
+// Takes back the names of linear effects whose values do not differ from zero, but for groups that are confounded: each
+// of those stands in the place of another.
+void take_back_insignificant(Diagnosis& result);
+
+}  // namespace flexspline::selection

@@ -1,0 +1,70 @@
+// Wald's test of a named effect against the table of chi-square (Abramowitz and Stegun, 26.8).
+#include <gtest/gtest.h>
+
+#include "host/engine/selection/policy.hpp"
+#include "host/engine/selection/wald_test.hpp"
+
+namespace flexspline::selection {
+namespace {
+
+estimation::Estimate value(double times_std) {
+  estimation::Estimate e;
+  e.value = -2.0 * times_std;
+  e.std = 2.0;
+  return e;
+}
+Candidate candidate(std::initializer_list<double> times_std) {
+  Candidate c;
+  c.effect = "gravity";
+  for (const double z : times_std) c.parameters.push_back(value(z));
+  return c;
+}
+
+TEST(WaldTest, TheProbabilityIsThatOfChiSquareWithAsManyParameters) {
+  EXPECT_NEAR(*wald_p_value(candidate({1.959964})), 0.05, 1e-6);
+  EXPECT_NEAR(*wald_p_value(candidate({1.730818, 1.730818})), 0.05, 1e-5);  // 5.99146 in sum
+}
+
+TEST(WaldTest, OfARippleEachOrderThatIsTriedCounts) {
+  Candidate ripple = candidate({3.0, 0.0});
+  const double alone = *wald_p_value(ripple);
+  ripple.order = 11.0;
+  EXPECT_NEAR(*wald_p_value(ripple), kPolicy.highest_order * alone, 1e-12);
+}
+
+TEST(WaldTest, LawsWithNonlinearParametersHaveNone) {
+  Candidate law = candidate({0.1});
+  law.parameters.push_back({});
+  EXPECT_FALSE(wald_p_value(law));
+  law.parameters.back().fixed = true;
+  EXPECT_TRUE(wald_p_value(law));
+}
+
+Diagnosis with(Candidate c) {
+  Diagnosis result;
+  result.verdict = Verdict::missing_effect;
+  result.named.push_back({c.effect, c.order});
+  result.candidates.push_back(std::move(c));
+  return result;
+}
+
+TEST(WaldTest, ANameWhoseValuesMayBeZeroIsTakenBackWithItsReason) {
+  Diagnosis result = with(candidate({1.0, -1.2}));
+  take_back_insignificant(result);
+  EXPECT_TRUE(result.named.empty());
+  EXPECT_FALSE(result.candidates.front().admissible);
+  EXPECT_NE(result.candidates.front().why_not, "");
+}
+
+TEST(WaldTest, ASignificantNameAndAConfoundedGroupStay) {
+  Diagnosis result = with(candidate({1.0, -5.0}));
+  take_back_insignificant(result);
+  EXPECT_EQ(result.named.size(), 1U);
+  result = with(candidate({0.1}));
+  result.verdict = Verdict::confusable_effects;
+  take_back_insignificant(result);
+  EXPECT_EQ(result.named.size(), 1U);
+}
+
+}  // namespace
+}  // namespace flexspline::selection
