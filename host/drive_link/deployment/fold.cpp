@@ -4,7 +4,6 @@
 #include <array>
 #include <cmath>
 #include <stdexcept>
-#include <tuple>
 
 #include "host/physics/catalogue/user_defined_effect.hpp"
 #include "shared/effects/variables.hpp"
@@ -36,7 +35,8 @@ std::size_t table_number() {
 std::optional<FoldedTable> folded(const catalogue::ResolvedEffect& resolved,
                                   const effects::DriveConstants<double>& constants,
                                   const effects::DriveConstants<double>& bases) {
-  const auto& [effect, entry, parameters] = std::tie(*resolved.effect, *resolved.entry, resolved.values);
+  const catalogue::Entry& entry = *resolved.entry;
+  const std::vector<double>& parameters = resolved.values;
   const auto single = catalogue::single_variable(entry, parameters, constants);
   if (!single) return {};
   const effects::VariableInfo& variable = info_of(single->variable);
@@ -51,7 +51,7 @@ std::optional<FoldedTable> folded(const catalogue::ResolvedEffect& resolved,
   FoldedTable result;
   model::Definition d;
   d.balance = kBalanceNames[static_cast<std::size_t>(entry.info->balance)];
-  if (effect.definition) d.balance = effect.definition->balance;
+  if (resolved.effect->definition) d.balance = resolved.effect->definition->balance;
   d.variable = std::string(variable.name);
   d.times_direction = single->times_direction;
   d.table.at = at;

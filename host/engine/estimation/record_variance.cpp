@@ -88,8 +88,8 @@ RecordVariance paule_mandel(const BalanceData& data, const Eigen::MatrixXd& torq
     for (std::size_t i = 0; i < records.size(); ++i) take_off(data.records()[i], records[i].value);
   }
   // Noise and its autocorrelation are those of what the factors leave, which depends on both.
-  constexpr int kRounds = 3;
-  for (int round = 0; round < kRounds && torques.cols() > 0; ++round) {
+  constexpr int kRefinements = 3;
+  for (int round = 0; round < kRefinements && torques.cols() > 0; ++round) {
     const std::vector<OwnFactors> records = own_factors(data, torques, residual, between.left, tau());
     for (Eigen::Index g = 0; g < torques.cols(); ++g) {
       const auto [variance, freedom] = variance_between(records, g);

@@ -72,7 +72,7 @@ CandidateTables make_tables(const std::vector<const data::Experiment*>& experime
   tables.bandwidth = highest_bandwidth(experiments, policy);
   const double highest_hz = tables.bandwidth.highest_hz;
   estimation::PreparedData prepared = prepare(experiments, drive, highest_hz, policy);
-  take_noise_off_torque(prepared);
+  tables.torque_has_noise = take_noise_off_torque(prepared) > 0;
   if (!prepared.torque_measured) take_torque_from_load(prepared, terms);
   tables.sign = make_regressor_table(prepared, balance, terms, std::nullopt, highest_hz, policy);
   if (tables.sign.model_columns == 0) return tables;

@@ -115,9 +115,10 @@ struct Resampling {
     double frequency = 0.0;
   };
   double subsamples = 0.0;
-  bool too_little = false;  // there are not enough samples for halves
-  double abstained = 0.0;   // saw nothing above the noise
-  double whiteness = 0.0;   // of what the best terms leave, reversals masked: 1 for noise, 0 for structure
+  bool torque_has_noise = false;  // of its sensor, so that what reads the measured torque also explains its noise
+  bool too_little = false;        // there are not enough samples for halves
+  double abstained = 0.0;         // saw nothing above the noise
+  double whiteness = 0.0;         // of what the best terms leave, reversals masked: 1 for noise, 0 for structure
   double lowest_hz = 0.0, highest_hz = 0.0;
   std::optional<double> lag_s, lag_std_s;  // of the effort's time base, taken off; nothing: not significant
   std::vector<FoundTerm> found;            // largest share first

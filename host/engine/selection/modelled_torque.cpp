@@ -14,10 +14,11 @@ using estimation::PreparedData;
 using estimation::Record;
 using estimation::Terms;
 
-void take_noise_off_torque(PreparedData& prepared) {
+std::size_t take_noise_off_torque(PreparedData& prepared) {
   constexpr double kWhite =
       0.5;  // semivariance of neighbours over the variance: 1 for white noise, 0 for a slow signal
   constexpr Eigen::Index kRowsPerColumn = 20;
+  std::size_t replaced = 0;
   for (Record& r : prepared.records) {
     if (r.torque.empty() || r.inputs.torque.empty()) continue;
     const auto n = static_cast<Eigen::Index>(r.inputs.size());
@@ -38,8 +39,11 @@ void take_noise_off_torque(PreparedData& prepared) {
     const Eigen::VectorXd rest = measured - fitted;
     double steps = 0.0;
     for (Eigen::Index k = 1; k < n; ++k) steps += 0.5 * (rest[k] - rest[k - 1]) * (rest[k] - rest[k - 1]);
-    if (steps > kWhite * rest.squaredNorm()) r.inputs.torque.assign(fitted.data(), fitted.data() + n);
+    if (!(steps > kWhite * rest.squaredNorm())) continue;
+    r.inputs.torque.assign(fitted.data(), fitted.data() + n);
+    ++replaced;
   }
+  return replaced;
 }
 
 void take_torque_from_load(PreparedData& prepared, const Terms& terms) {

@@ -53,6 +53,10 @@ bool is_of_effort(const CandidateFit& candidate) {
   return candidate.model.entry->info->reads == effects::kCurrent;
 }
 
+bool is_of_torque(const CandidateFit& candidate) {
+  return (candidate.model.entry->info->reads & effects::kTorque) != 0;
+}
+
 // Whether the model with the best effect leaves known noise: as large as a noise floor that is not from a fit, with no
 // more correlation than the filter causes. An effect built from the measured effort may explain its own noise, so it
 // must take off nearly all.
@@ -144,6 +148,7 @@ Resampling resample(const std::vector<const data::Experiment*>& experiments, con
   result.subsamples = stability.subsamples;
   result.too_little = stability.subsamples == 0.0 && selection.tables().sign.model_columns > 0;
   result.abstained = stability.abstained;
+  result.torque_has_noise = selection.tables().torque_has_noise;
   result.whiteness = stability.whiteness;
   result.highest_hz = selection.tables().bandwidth.highest_hz;
   result.lowest_hz =
@@ -190,8 +195,9 @@ bool resampling_decides(const Resampling& resampling, const SearchedBalance& mot
   if (names_several(resampling, motor)) return true;
   const bool silent = resampling.abstained > kPolicy.most_abstaining * resampling.subsamples;
   if (!silent && support && *support < kPolicy.named_frequency) return true;
-  // An effect built from the measured effort also explains its noise.
+  // An effect built from the measured effort or from a noisy torque also explains its noise.
   if (!support && is_of_effort(first)) return true;
+  if (resampling.torque_has_noise && is_of_torque(first)) return true;
   return !leaves_noise(motor, resampling.whiteness);
 }
 

@@ -69,11 +69,12 @@ bool belongs(Balance balance, const effects::VariableInfo& v) {
 }
 
 // Signals that a curve may run over on this balance: measured, varying, and not the left side itself.
-std::vector<TableSpecification> table_specifications(BalanceData& data, const Terms& model) {
+// A torque with noise of its sensor is on that side, too.
+std::vector<TableSpecification> table_specifications(BalanceData& data, const Terms& model, bool torque_has_noise) {
   std::vector<TableSpecification> list;
   for (const effects::VariableInfo& v : effects::kVariables) {
     if (!measured(data, v)) continue;
-    if (!belongs(data.balance(), v)) continue;
+    if (!belongs(data.balance(), v) || (torque_has_noise && (v.reads & effects::kTorque) != 0)) continue;
     const Eigen::VectorXd signal = data.signal_at_rows(model, v.variable);
     const estimation::SignalRange range = estimation::central_range(signal);
     const double span = range.high - range.low;
@@ -133,10 +134,11 @@ std::string next_record(const UnknownStructure& unknown, const data::Axis axis) 
 
 }  // namespace
 
-std::optional<UnknownStructure> find_unknown_structure(BalanceSearch& search, const Terms& model) {
+std::optional<UnknownStructure> find_unknown_structure(BalanceSearch& search, const Terms& model,
+                                                       bool torque_has_noise) {
   BalanceData& data = *search.data;
   const Eigen::VectorXd weights = search.base.root_weights.cwiseProduct(search.keep);
-  std::vector<TableSpecification> specifications = table_specifications(data, model);
+  std::vector<TableSpecification> specifications = table_specifications(data, model, torque_has_noise);
   for (TableSpecification& q : specifications) {
     // Without the filter a curve costs little, and serves to distinguish signals.
     q.filtered = false;
@@ -206,7 +208,8 @@ double share_of(const CrossValidatedFit& base, const CrossValidatedFit& named, c
 }  // namespace
 
 void check_unknown_structure(BalanceSearch& search, const CandidateFit* named, Diagnosis& result) {
-  auto unknown = find_unknown_structure(search, search.base.terms);
+  auto unknown =
+      find_unknown_structure(search, search.base.terms, result.resampling && result.resampling->torque_has_noise);
   if (!unknown) return;
   if (named) {
     const CrossValidatedFit curve = with_curve(search, *unknown);

@@ -32,8 +32,10 @@ struct UnknownStructure {
   std::string record_next;
 };
 
-// Learns curves on what `model` leaves. Nothing where none predicts left-out samples better by more than chance would.
-std::optional<UnknownStructure> find_unknown_structure(BalanceSearch& search, const estimation::Terms& model);
+// Learns curves on what `model` leaves; over the torque only where its sensor has no noise. Nothing where none predicts
+// left-out samples better by more than chance would.
+std::optional<UnknownStructure> find_unknown_structure(BalanceSearch& search, const estimation::Terms& model,
+                                                       bool torque_has_noise);
 
 // Whether what is missing is outside the catalogue. `named` is the candidate that would be named, or null
 // where none is. Where a curve explains what no effect does, or a named one explains less than nine tenths of it and no
