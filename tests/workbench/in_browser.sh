@@ -15,9 +15,13 @@ chromium=$(command -v chromium || command -v chromium-browser || command -v goog
 command -v npm >/dev/null && command -v node >/dev/null || skip "there is no Node.js with npm (Debian: nodejs npm)"
 mkdir -p "$work/npm"
 cp "$here/package.json" "$work/npm/"
+# Tests that run at once would install into one another's folder.
+exec 8>"$work/npm.lock"
+flock 8
 if [[ ! -f $work/npm/node_modules/axe-core/axe.min.js || ! -d $work/npm/node_modules/playwright-core ]]; then
   (cd "$work/npm" && timeout 300 npm install --no-save --no-audit --no-fund --no-package-lock --ignore-scripts >npm.log 2>&1) ||
     skip "the packages of package.json cannot be had from npm: $(tail -n 1 "$work/npm/npm.log")"
 fi
+flock -u 8
 # A long name without a space: the page shows the folder, and must not grow wider by it.
 exec node "$here/$what.mjs" "$tool" "$work/npm" "$work/$what-in_a_folder_with_a_long_name_that_has_no_space" "$chromium"
