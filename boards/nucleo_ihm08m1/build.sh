@@ -5,7 +5,7 @@
 set -eu
 out=${1:?usage: build.sh OUT_DIR}
 here=$(cd -- "$(dirname -- "$0")" && pwd)
-counts=-DFLEXSPLINE_ENCODER_COUNTS=${COUNTS:-4096}
+counts=$("$here/../stm32f4/encoder_counts.sh" 4096)
 FLAGS=$counts "$here/../stm32f4/build_application.sh" nucleo_ihm08m1 "$out" ihm08m1
 FLAGS="$counts -DFLEXSPLINE_INDEXED" "$here/../stm32f4/build_application.sh" nucleo_ihm08m1 "$out" ihm08m1-index
 FLAGS=-DFLEXSPLINE_ABSOLUTE "$here/../stm32f4/build_application.sh" nucleo_ihm08m1 "$out" ihm08m1-abs

@@ -6,7 +6,7 @@ set -eu
 out=${1:?usage: build.sh OUT_DIR}
 here=$(cd -- "$(dirname -- "$0")" && pwd)
 compiler=${ARM_GXX:-arm-none-eabi-g++}
-FLAGS=-DFLEXSPLINE_ENCODER_COUNTS=${COUNTS:-8192}
+FLAGS=$("$here/../stm32f4/encoder_counts.sh" 8192)
 [ -z "${FLEXSPLINE_PUBLIC_KEY:-}" ] || FLAGS="$FLAGS -DFLEXSPLINE_PUBLIC_KEY=\"$FLEXSPLINE_PUBLIC_KEY\""
 export FLAGS
 "$here/../stm32f4/build_application.sh" odrive_v36 "$out" odrive
