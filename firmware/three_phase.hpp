@@ -86,8 +86,7 @@ class ThreePhaseStageOf {
   StageFault fault() const { return fault_; }
 
   // The motor that commissioning found; without pole pairs, or with another encoder than the board's, that with which
-  // the stage began. While the drive is not
-  // armed, and from background work: the interrupt reads none of these then.
+  // the stage began. While the drive is not armed, and from background work: the interrupt reads none of these then.
   void use(const control::MotorSettings& motor) {
     const bool is_found = motor.pole_pairs > 0 && motor.encoder_counts == made_.encoder_counts;
     s_.foc.sensors.gain = is_found ? motor.gain : made_.foc.sensors.gain;

@@ -12,7 +12,7 @@
 #include "hil/board/drive_setup.hpp"
 #include "hil/board/plant_rig.hpp"
 #include "hil/twin/factory_block.hpp"
-#include "shared/storage/parameter_store.hpp"
+#include "tests/board/stored_block.hpp"
 #include "tests/board/usb_bus.hpp"
 
 namespace flexspline::tests {
@@ -61,16 +61,7 @@ class DriveBench {
     if (is_bridge_) s.amplifier_full_scale = kBridgeA;
     return s;
   }
-  void store(const std::vector<std::uint8_t>& block) {
-    CellsPort port(chip.flash);
-    storage::ParameterStore<CellsPort> into(port);
-    const auto good = [](std::span<const std::uint8_t>) { return 0U; };
-    std::uint32_t reason = 0;
-    into.boot(good);
-    EXPECT_EQ(into.begin(block.size(), model::crc32(block)), storage::StoreError::none);
-    EXPECT_EQ(into.write(0, block), storage::StoreError::none);
-    EXPECT_EQ(into.commit(good, reason), storage::StoreError::none);
-  }
+  void store(const std::vector<std::uint8_t>& block) { tests::store(CellsPort(chip.flash), block); }
   // Started, enumerated, identified, and idle.
   void come_up() {
     ASSERT_EQ(chip.start(), Stop::waits) << chip.machine.where();

@@ -10,10 +10,11 @@
 #include "hil/board/plant_rig.hpp"
 #include "hil/twin/factory_block.hpp"
 #include "host/drive_link/deployment/commissioning_settings.hpp"
+#include "host/drive_link/drive/commissioning_result.hpp"
 #include "host/drive_link/drive/motor_block.hpp"
 #include "shared/protocol/texts.hpp"
-#include "shared/storage/parameter_store.hpp"
 #include "tests/board/stage_bench.hpp"
+#include "tests/board/stored_block.hpp"
 
 namespace flexspline::tests {
 
@@ -64,17 +65,7 @@ inline protocol::CommissioningProgress measure(StageBench& bench, const deployme
   }
 }
 inline control::commissioning::Result result_of(StageBench& bench) {
-  const auto from = bench.get<protocol::CommissioningResult>(Kind::commissioning_result);
-  control::commissioning::Result r;
-  r.gain = {from.gain[0], from.gain[1], from.gain[2]};
-  r.resistance = from.resistance;
-  r.inductance_d = from.inductance_d;
-  r.inductance_q = from.inductance_q;
-  r.flux = from.flux;
-  r.pole_pairs = from.pole_pairs;
-  r.reversed = from.reversed;
-  r.offset_angle = from.offset_angle;
-  return r;
+  return drive::result_of(bench.get<protocol::CommissioningResult>(Kind::commissioning_result));
 }
 inline void expect_measured(StageBench& bench, const motor::MotorParameters& truth, double test_a) {
   const auto setup = setup_of(bench.get<protocol::CommissioningStage>(Kind::commissioning_stage), test_a);
@@ -148,16 +139,6 @@ inline control::MotorSettings motor_found(StageBench& bench, double test_a) {
   EXPECT_EQ(measure(bench, setup).state, CommissioningState::done);
   return deployment::motor_settings(setup, result_of(bench), std::ldexp(stage.shortest_pulse, -30),
                                     stage.encoder_counts, 1000.0);
-}
-template <class Port>
-void store(Port port, const std::vector<std::uint8_t>& block) {
-  storage::ParameterStore<Port> into(port);
-  const auto good = [](std::span<const std::uint8_t>) { return 0U; };
-  std::uint32_t reason = 0;
-  into.boot(good);
-  EXPECT_EQ(into.begin(block.size(), model::crc32(block)), storage::StoreError::none);
-  EXPECT_EQ(into.write(0, block), storage::StoreError::none);
-  EXPECT_EQ(into.commit(good, reason), storage::StoreError::none);
 }
 inline std::int32_t per_unit(double value, double base) {
   return static_cast<std::int32_t>(std::lround(std::ldexp(value / base, 27)));

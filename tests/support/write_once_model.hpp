@@ -37,7 +37,7 @@ class OnceModel {
   explicit OnceModel(Cells& cells, std::uint64_t seed = 1) : cells_(cells), random_(seed) {
     for (auto& sector : cells.sectors)
       for (Cell& c : sector)
-        if (c.weak) settle(c);
+        if (c.weak) draw_contents(c);
   }
   void cut(std::size_t operation, CutAt where) {
     cut_ = static_cast<long>(operation);
@@ -87,9 +87,9 @@ class OnceModel {
     c.weak = cells_.weakens;
     c.was = was;
     c.wanted = wanted;
-    settle(c);
+    draw_contents(c);
   }
-  void settle(Cell& c) {
+  void draw_contents(Cell& c) {
     const auto how = random_() % 3;
     c.readable = how != 0;
     c.value = how == 0 ? random_() : how == 1 ? c.was : c.wanted;

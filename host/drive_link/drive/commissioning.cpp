@@ -9,6 +9,8 @@
 #include <stdexcept>
 #include <thread>
 
+#include "host/drive_link/drive/commissioning_result.hpp"
+
 namespace flexspline::drive {
 namespace {
 
@@ -122,20 +124,7 @@ protocol::CommissioningProgress commission(
 }
 
 control::commissioning::Result commissioning_result(Session& session) {
-  const auto from = session.ask<protocol::CommissioningResult>(Kind::commissioning_result);
-  control::commissioning::Result r;
-  r.gain = {from.gain[0], from.gain[1], from.gain[2]};
-  r.offset = {from.offset[0], from.offset[1], from.offset[2]};
-  r.resistance = from.resistance;
-  r.inductance_d = from.inductance_d;
-  r.inductance_q = from.inductance_q;
-  r.flux = from.flux;
-  r.lost_voltage = from.lost_voltage;
-  r.pole_pairs = from.pole_pairs;
-  r.reversed = from.reversed;
-  r.offset_angle = from.offset_angle;
-  r.lag = from.lag;
-  return r;
+  return result_of(session.ask<protocol::CommissioningResult>(Kind::commissioning_result));
 }
 
 control::commissioning::Result mean_of(const std::vector<control::commissioning::Result>& results) {
