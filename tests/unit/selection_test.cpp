@@ -16,6 +16,7 @@
 #include "host/engine/selection/decision.hpp"
 #include "host/engine/selection/forward_selection.hpp"
 #include "host/engine/selection/friction_random_effects.hpp"
+#include "host/engine/selection/halves.hpp"
 
 namespace flexspline::selection {
 namespace {
@@ -168,6 +169,63 @@ TEST(RecordDifferences, ResidualIsWhatTheBestLinearUnbiasedPredictionLeaves) {
   EXPECT_LT((weighted_residual(setting, fitted, {weight}, differences) - truth).norm(), 1e-9 * truth.norm());
 }
 
+// Two records of three blocks with ten samples each.
+Setting blocks_of(const Eigen::MatrixXd& rows) {
+  Setting setting;
+  setting.rows = rows;
+  const Eigen::Index p = rows.cols();
+  setting.products.resize(p * p, 6);
+  for (Eigen::Index b = 0; b < 6; ++b) {
+    setting.blocks.push_back({static_cast<std::size_t>(b / 3), 10.0});
+    const Eigen::MatrixXd own = rows.middleRows(10 * b, 10);
+    setting.products.col(b) = Eigen::MatrixXd(own.transpose() * own).reshaped();
+  }
+  return setting;
+}
+
+TEST(Halves, HoldTheProductsOfTheirSamplesWithTheDifferencesOfEachRecordEliminated) {
+  const Random r = random_table(60, 2, 21);
+  const Setting setting = blocks_of(r.rows);
+  const std::vector<double> weights = {2.0, 0.5};
+  const std::vector<std::vector<std::uint8_t>> in = {{1, 0, 0, 1, 1, 0}, {1, 1, 1, 0, 0, 0}};
+  const FrictionRandomEffects differences{{1}, Eigen::VectorXd::Constant(1, 0.3), 0.5};
+  const std::vector<HalfPair> pairs = halves_of(setting, nullptr, weights, in, differences);
+  ASSERT_EQ(pairs.size(), 2U);
+  for (std::size_t i = 0; i < 2; ++i)
+    for (const std::size_t half : {std::size_t{0}, std::size_t{1}}) {
+      Eigen::MatrixXd truth = Eigen::MatrixXd::Zero(5, 5);
+      double rows = 0.0;
+      for (std::size_t record = 0; record < 2; ++record) {
+        Eigen::MatrixXd own = Eigen::MatrixXd::Zero(5, 5);
+        for (std::size_t b = 3 * record; b < 3 * record + 3; ++b) {
+          if ((in[i][b] == 1) != (half == 0)) continue;
+          const Eigen::MatrixXd samples = r.rows.middleRows(10 * static_cast<Eigen::Index>(b), 10);
+          own += weights[record] * samples.transpose() * samples;
+          rows += 10.0;
+        }
+        eliminate_friction_effects(own, differences);
+        truth += own;
+      }
+      EXPECT_LT((pairs[i][half].sign - truth).norm(), 1e-12 * truth.norm());
+      EXPECT_EQ(pairs[i][half].rows, rows);
+    }
+}
+
+TEST(RegressorTable, WithFewerTermsKeepsTheColumnsOfTheModelAndOfThese) {
+  Random r = random_table(30, 4, 22);
+  r.table.columns = r.rows.leftCols(6);
+  r.table.scale = r.table.columns.colwise().norm();
+  r.table.differences = {5};
+  r.table.terms.pop_back();
+  const RegressorTable small = with_terms(r.table, {2, 0});
+  EXPECT_EQ(small.columns, r.table.columns(Eigen::all, std::vector<Eigen::Index>{0, 1, 4, 2, 5}));
+  EXPECT_EQ(small.scale, r.table.scale(std::vector<Eigen::Index>{0, 1, 4, 2, 5}));
+  ASSERT_EQ(small.terms.size(), 2U);
+  EXPECT_EQ(small.terms[0].name, "term 2");
+  EXPECT_EQ(small.terms[0].columns.front(), 2);
+  EXPECT_EQ(small.differences.front(), 4);
+}
+
 TEST(ForwardSelection, FitsAreThoseOfLeastSquares) {
   Random r = random_table(200, 3, 1);
   const HalfData all = half_of(r.rows);
@@ -182,7 +240,7 @@ TEST(ForwardSelection, ChoosesWhatIsThereAndNothingElse) {
   Random r = random_table(400, 20, 2);
   r.rows.col(22) = 0.1 * r.rows.col(22) + r.rows.col(0) - 0.4 * r.rows.col(9);
   const HalfData a = half_of(r.rows.topRows(200)), b = half_of(r.rows.bottomRows(200));
-  const SelectionPath selected = select_forward(r.table, a, b, {0.01, 1.0}, std::vector<std::uint8_t>(20, 1), {});
+  const SelectionPath selected = select_forward(r.table, a, b, {0.01, 1.0}, {});
   ASSERT_EQ(selected.steps.size(), 1U);
   EXPECT_EQ(selected.steps[0].term, 7);
   EXPECT_NEAR(selected.steps[0].of_all, 1.0, 0.05);
@@ -192,7 +250,7 @@ TEST(ForwardSelection, AbstainsWhereNothingStandsAboveTheNoise) {
   Random r = random_table(400, 20, 3);
   r.rows.col(22) = r.rows.col(22) + r.rows.col(0);
   const HalfData a = half_of(r.rows.topRows(200)), b = half_of(r.rows.bottomRows(200));
-  EXPECT_TRUE(select_forward(r.table, a, b, {1.1, 1.0}, std::vector<std::uint8_t>(20, 1), {}).abstains);
+  EXPECT_TRUE(select_forward(r.table, a, b, {1.1, 1.0}, {}).abstains);
 }
 
 TEST(ForwardSelection, AbstainsWhereTheModelAloneDoesNotCarryOver) {
@@ -201,7 +259,7 @@ TEST(ForwardSelection, AbstainsWhereTheModelAloneDoesNotCarryOver) {
   r.rows.topRows(200).col(1).setZero();
   r.rows.bottomRows(200).col(4) += 3.0 * r.rows.bottomRows(200).col(1);
   const HalfData a = half_of(r.rows.topRows(200)), b = half_of(r.rows.bottomRows(200));
-  EXPECT_TRUE(select_forward(r.table, a, b, {1e-4, 1.0}, {1, 1}, {}).extrapolates);
+  EXPECT_TRUE(select_forward(r.table, a, b, {1e-4, 1.0}, {}).extrapolates);
 }
 
 TEST(ForwardSelection, ATermOfImpossibleSignIsNotChosen) {
@@ -209,7 +267,7 @@ TEST(ForwardSelection, ATermOfImpossibleSignIsNotChosen) {
   r.table.terms[7].low = {0.0};
   r.rows.col(22) = 0.1 * r.rows.col(22) - 0.4 * r.rows.col(9);
   const HalfData a = half_of(r.rows.topRows(200)), b = half_of(r.rows.bottomRows(200));
-  EXPECT_TRUE(select_forward(r.table, a, b, {0.01, 1.0}, std::vector<std::uint8_t>(20, 1), {}).steps.empty());
+  EXPECT_TRUE(select_forward(r.table, a, b, {0.01, 1.0}, {}).steps.empty());
 }
 
 TEST(Semivariance, IsTheVarianceOfWhiteNoiseAndNothingOfAConstant) {

@@ -96,7 +96,10 @@ Command diagnose_command() {
        "Fits the model, finds where its error is large, tries every effect of the catalogue against data left out of "
        "the fit, and names the one that is missing; or reports that none is, or that these data cannot show it, and "
        "which experiment would. The model needs no values. With --auto it continues with the effect added until "
-       "nothing more is found. --report writes a page with plots: where the model fails, and what is missing.",
+       "nothing more is found. --report writes a page with plots: where the model fails, and what is missing. The "
+       "verdict "
+       "is made at the cut-off and the mask that the data give; where --cutoff-hz or --mask state others, the answer "
+       "says what these alone would name.",
        {kMakeData, "flexspline diagnose --model demo-out/base-model.toml demo-out"}},
       declare, run);
 }

@@ -291,27 +291,8 @@ void assess_excitation(bool moves, Diagnosis& result) {
   if (!moves || (result.resampling && result.resampling->too_little)) result.verdict = Verdict::insufficient_excitation;
 }
 
-}  // namespace
-
-std::string verdict_name(Verdict verdict) {
-  switch (verdict) {
-    case Verdict::missing_effect:
-      return "missing_effect";
-    case Verdict::confusable_effects:
-      return "confusable_effects";
-    case Verdict::at_noise_floor:
-      return "at_noise_floor";
-    case Verdict::nothing_significant:
-      return "nothing_significant";
-    case Verdict::unknown_structure:
-      return "unknown_structure";
-    case Verdict::insufficient_excitation:
-      return "insufficient_excitation";
-  }
-  return "";
-}
-
-Diagnosis diagnose(const data::Dataset& dataset, const model::Model& model, const Options& options) {
+// At the cut-off and the mask of the options.
+Diagnosis diagnose_at(const data::Dataset& dataset, const model::Model& model, const Options& options) {
   Diagnosis result;
   result.unit = model.drive.axis == data::Axis::linear ? "N" : "N*m";
   if (options.progress) options.progress("fitting the model");
@@ -368,6 +349,39 @@ Diagnosis diagnose(const data::Dataset& dataset, const model::Model& model, cons
   if (by_resampling) name_between_records(*base, chosen, result);
   explain_orders(base->model.drive, result);
   assess_excitation(moves, result);
+  return result;
+}
+
+}  // namespace
+
+std::string verdict_name(Verdict verdict) {
+  switch (verdict) {
+    case Verdict::missing_effect:
+      return "missing_effect";
+    case Verdict::confusable_effects:
+      return "confusable_effects";
+    case Verdict::at_noise_floor:
+      return "at_noise_floor";
+    case Verdict::nothing_significant:
+      return "nothing_significant";
+    case Verdict::unknown_structure:
+      return "unknown_structure";
+    case Verdict::insufficient_excitation:
+      return "insufficient_excitation";
+  }
+  return "";
+}
+
+Diagnosis diagnose(const data::Dataset& dataset, const model::Model& model, const Options& options) {
+  Options automatic = options;
+  automatic.pipeline.cutoff_hz.reset();
+  automatic.pipeline.mask = true;
+  const bool is_stated = options.pipeline.cutoff_hz || !options.pipeline.mask;
+  if (is_stated) automatic.pipeline.ready = nullptr;
+  Diagnosis result = diagnose_at(dataset, model, automatic);
+  if (!is_stated) return result;
+  const Diagnosis stated = diagnose_at(dataset, model, options);
+  result.at_stated_setting = {stated.verdict, stated.named};
   return result;
 }
 

@@ -156,6 +156,12 @@ enum class Verdict {
 };
 std::string verdict_name(Verdict verdict);
 
+// What one cut-off or mask would give alone, where the user states one.
+struct StatedSetting {
+  Verdict verdict = Verdict::nothing_significant;
+  std::vector<NamedEffect> named;
+};
+
 struct Diagnosis {
   Verdict verdict = Verdict::nothing_significant;
   std::vector<NamedEffect> named;
@@ -181,6 +187,7 @@ struct Diagnosis {
   std::optional<BetweenRecords> between_records;
   std::optional<LawInRange> law_in_range;
   std::optional<double> delay_s;  // of the effort against the motion, beyond the alignment, where significant
+  std::optional<StatedSetting> at_stated_setting;
 };
 
 struct Options {
@@ -189,7 +196,8 @@ struct Options {
 };
 
 // The method is in METHOD.md. Uses experiments of role fit. The model need not have values:
-// all free parameters are estimated.
+// all free parameters are estimated. A verdict must not depend on a cut-off or a mask, so it is made at those that are
+// found in the data; where `options` state others, at_stated_setting says what these would give alone.
 Diagnosis diagnose(const data::Dataset& dataset, const model::Model& model, const Options& options);
 
 }  // namespace flexspline::selection

@@ -122,10 +122,10 @@ class ForwardStep {
   void set_floor(double floor) { floor_ = floor; }
 
   // Of each name the values of its nonlinear parameters that fit best on the training half.
-  std::map<std::string, Best> best_by_name(const std::vector<std::uint8_t>& may_enter) const {
+  std::map<std::string, Best> best_by_name() const {
     std::map<std::string, Best> by_name;
     for (std::size_t t = 0; t < table_.terms.size(); ++t)
-      if (may_enter[t] && std::find(terms_.begin(), terms_.end(), static_cast<int>(t)) == terms_.end())
+      if (std::find(terms_.begin(), terms_.end(), static_cast<int>(t)) == terms_.end())
         try_term(static_cast<int>(t), table_.terms[t].name,
                  static_cast<double>(table_.terms[t].columns.size() + table_.terms[t].nonlinear), by_name);
     if (fit_.presliding.size() > 0 && !has_presliding(terms_)) try_term(kPreslidingTerm, kPresliding, 1.0, by_name);
@@ -196,8 +196,7 @@ class ForwardStep {
 }  // namespace
 
 SelectionPath select_forward(const RegressorTable& table, const HalfData& fit, const HalfData& validation,
-                             const Noise& noise, const std::vector<std::uint8_t>& may_enter,
-                             const SelectionPolicy& policy) {
+                             const Noise& noise, const SelectionPolicy& policy) {
   SelectionPath result;
   ForwardStep at(table, fit, validation, noise, policy);
   const double before = at.now().validation_squares;
@@ -213,7 +212,7 @@ SelectionPath select_forward(const RegressorTable& table, const HalfData& fit, c
     return result;
   }
   for (std::size_t step = 0; step < policy.most_steps; ++step) {
-    const auto by_name = at.best_by_name(may_enter);
+    const auto by_name = at.best_by_name();
     if (by_name.empty()) break;
     const ForwardStep::Best& chosen =
         std::max_element(by_name.begin(), by_name.end(), [](const auto& a, const auto& b) {

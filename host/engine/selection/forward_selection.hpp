@@ -47,7 +47,6 @@ TermFit fit_terms(const RegressorTable& table, const std::vector<int>& terms, co
                   const HalfData& validation);
 
 SelectionPath select_forward(const RegressorTable& table, const HalfData& fit, const HalfData& validation,
-                             const Noise& noise, const std::vector<std::uint8_t>& may_enter,
-                             const SelectionPolicy& policy);
+                             const Noise& noise, const SelectionPolicy& policy);
 
 }  // namespace flexspline::selection

@@ -45,13 +45,8 @@ Eigen::VectorXd friction_effects_of(const RegressorTable& table, const Setting& 
   const auto k = static_cast<Eigen::Index>(table.differences.size());
   Eigen::VectorXd size(k);
   for (Eigen::Index g = 0; g < k; ++g) size[g] = table.scale[table.differences[static_cast<std::size_t>(g)]];
-  for (std::size_t first = 0; first < setting.blocks.size();) {
-    std::size_t last = first;
-    const std::size_t record = setting.blocks[first].record;
-    Eigen::MatrixXd own = Eigen::MatrixXd::Zero(setting.rows.cols(), setting.rows.cols());
-    for (; last < setting.blocks.size() && setting.blocks[last].record == record; ++last)
-      own += setting.blocks[last].products;
-    own *= weights[record];
+  for (const BlockRange& blocks : blocks_by_record(setting)) {
+    const Eigen::MatrixXd own = weights[blocks.record] * products_of(setting, blocks);
     const Eigen::Index y = own.cols() - 1;
     estimation::RecordProducts r;
     r.xx = own(fixed, fixed);
@@ -60,7 +55,6 @@ Eigen::VectorXd friction_effects_of(const RegressorTable& table, const Setting& 
     r.xy = own(fixed, y);
     r.zy = size.asDiagonal() * own(table.differences, y);
     records.push_back(std::move(r));
-    first = last;
   }
   // Columns of the table are scaled; one unit is the friction over that scale.
   const Eigen::VectorXd variance =

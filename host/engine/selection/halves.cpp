@@ -8,11 +8,9 @@ namespace flexspline::selection {
 std::vector<double> record_weights(const RegressorTable& table, const Setting& setting) {
   std::vector<double> weights(table.records, 0.0), rows(table.records, 0.0);
   std::vector<Eigen::MatrixXd> products(table.records);
-  for (const Block& b : setting.blocks) {
-    auto& sum = products[b.record];
-    if (sum.size() == 0) sum = Eigen::MatrixXd::Zero(b.products.rows(), b.products.cols());
-    sum += b.products;
-    rows[b.record] += b.rows;
+  for (const BlockRange& blocks : blocks_by_record(setting)) {
+    products[blocks.record] = products_of(setting, blocks);
+    for (std::size_t b = blocks.first; b < blocks.last; ++b) rows[blocks.record] += setting.blocks[b].rows;
   }
   for (std::size_t r = 0; r < table.records; ++r) weights[r] = rows[r] > 0.0 ? 1.0 : 0.0;
   for (int round = 0; round < 3; ++round) {
@@ -45,40 +43,70 @@ std::vector<double> record_weights(const RegressorTable& table, const Setting& s
   return weights;
 }
 
-HalfData sum_of(const Setting& sign, const Setting* presliding, const std::vector<double>& weights,
-                std::span<const std::uint8_t> in, std::uint8_t which, const FrictionRandomEffects& differences) {
-  HalfData half;
-  const Eigen::Index p = sign.rows.cols();
-  half.sign = Eigen::MatrixXd::Zero(p, p);
-  if (presliding) half.presliding = Eigen::MatrixXd::Zero(p, p);
-  const bool differs = differences.any();
-  const auto add = [&](const Setting& setting, Eigen::MatrixXd& to, bool count) {
-    for (std::size_t first = 0; first < setting.blocks.size();) {
-      std::size_t last = first;
-      const std::size_t record = setting.blocks[first].record;
-      Eigen::MatrixXd own;
-      for (; last < setting.blocks.size() && setting.blocks[last].record == record; ++last) {
-        if (!in.empty() && in[last] != which) continue;
-        if (!differs) {
-          to += weights[record] * setting.blocks[last].products;
-        } else if (own.size() == 0) {
-          own = setting.blocks[last].products;
-        } else {
-          own += setting.blocks[last].products;
-        }
-        if (count) half.rows += setting.blocks[last].rows;
-      }
-      if (own.size() > 0) {
-        own *= weights[record];
-        eliminate_friction_effects(own, differences);
-        to += own;
-      }
-      first = last;
+namespace {
+
+// Sums over the blocks that each column of `choices` takes (ones and zeros), and over all others, in turn.
+std::vector<Eigen::MatrixXd> sums_of(const Setting& setting, const std::vector<double>& weights,
+                                     const Eigen::MatrixXd& choices, const FrictionRandomEffects& differences) {
+  const Eigen::Index p = setting.rows.cols(), n = choices.cols();
+  std::vector<Eigen::MatrixXd> sums(static_cast<std::size_t>(2 * n), Eigen::MatrixXd::Zero(p, p));
+  // Friction that differs is eliminated from each record alone, so that records are added one after the other.
+  for (const BlockRange& blocks : blocks_by_record(setting)) {
+    const auto first = static_cast<Eigen::Index>(blocks.first), count = static_cast<Eigen::Index>(blocks.last) - first;
+    const double weight = weights[blocks.record];
+    const Eigen::MatrixXd whole = weight * products_of(setting, blocks);
+    const Eigen::MatrixXd taken =
+        setting.products.middleCols(first, count) * (weight * choices.middleRows(first, count));
+    for (Eigen::Index i = 0; i < n; ++i) {
+      Eigen::MatrixXd in = taken.col(i).reshaped(p, p), out = whole - in;
+      eliminate_friction_effects(in, differences);
+      eliminate_friction_effects(out, differences);
+      sums[static_cast<std::size_t>(2 * i)] += in;
+      sums[static_cast<std::size_t>(2 * i + 1)] += out;
     }
+  }
+  return sums;
+}
+
+}  // namespace
+
+HalfData sum_of(const Setting& sign, const Setting* presliding, const std::vector<double>& weights,
+                const FrictionRandomEffects& differences) {
+  HalfData all;
+  const auto add = [&](const Setting& setting) {
+    Eigen::MatrixXd sum = Eigen::MatrixXd::Zero(setting.rows.cols(), setting.rows.cols());
+    for (const BlockRange& blocks : blocks_by_record(setting)) {
+      Eigen::MatrixXd own = weights[blocks.record] * products_of(setting, blocks);
+      eliminate_friction_effects(own, differences);
+      sum += own;
+    }
+    return sum;
   };
-  add(sign, half.sign, true);
-  if (presliding) add(*presliding, half.presliding, false);
-  return half;
+  all.sign = add(sign);
+  if (presliding) all.presliding = add(*presliding);
+  for (const Block& block : sign.blocks) all.rows += block.rows;
+  return all;
+}
+
+std::vector<HalfPair> halves_of(const Setting& sign, const Setting* presliding, const std::vector<double>& weights,
+                                std::span<const std::vector<std::uint8_t>> in,
+                                const FrictionRandomEffects& differences) {
+  Eigen::MatrixXd choices(std::ssize(sign.blocks), std::ssize(in));
+  for (std::size_t i = 0; i < in.size(); ++i)
+    for (std::size_t b = 0; b < in[i].size(); ++b)
+      choices(static_cast<Eigen::Index>(b), static_cast<Eigen::Index>(i)) = in[i][b];
+  std::vector<HalfPair> pairs(in.size());
+  std::vector<Eigen::MatrixXd> sums = sums_of(sign, weights, choices, differences), slow;
+  if (presliding) slow = sums_of(*presliding, weights, choices, differences);
+  for (std::size_t i = 0; i < pairs.size(); ++i)
+    for (const std::size_t other : {std::size_t{0}, std::size_t{1}}) {
+      HalfData& half = pairs[i][other];
+      half.sign = std::move(sums[2 * i + other]);
+      if (presliding) half.presliding = std::move(slow[2 * i + other]);
+      for (std::size_t b = 0; b < sign.blocks.size(); ++b)
+        if ((in[i][b] != 0) == (other == 0)) half.rows += sign.blocks[b].rows;
+    }
+  return pairs;
 }
 
 std::vector<std::uint8_t> half_of_blocks(const Setting& setting, std::mt19937_64& chance) {

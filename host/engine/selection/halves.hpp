@@ -1,6 +1,7 @@
 // Sums of blocks: halves of the data, and records weighted by what the model leaves in them.
 #pragma once
 
+#include <array>
 #include <cstdint>
 #include <random>
 #include <span>
@@ -14,10 +15,16 @@ namespace flexspline::selection {
 // Zero for a record without samples.
 std::vector<double> record_weights(const RegressorTable& table, const Setting& setting);
 
-// Products of the blocks k with in[k] == which, or of all where `in` is empty; each record's differences eliminated.
-// `presliding` is null where that state does not compete; else its blocks are those of `sign`.
+// Products of all blocks; each record's differences eliminated. `presliding` is null where that state does not compete;
+// else its blocks are those of `sign`.
 HalfData sum_of(const Setting& sign, const Setting* presliding, const std::vector<double>& weights,
-                std::span<const std::uint8_t> in, std::uint8_t which, const FrictionRandomEffects& differences);
+                const FrictionRandomEffects& differences);
+
+// Of each choice `in` of blocks: the half with in[k] != 0, and the other half.
+using HalfPair = std::array<HalfData, 2>;
+std::vector<HalfPair> halves_of(const Setting& sign, const Setting* presliding, const std::vector<double>& weights,
+                                std::span<const std::vector<std::uint8_t>> in,
+                                const FrictionRandomEffects& differences);
 
 // Which blocks are in the first of two complementary halves: half of each record's blocks, so that no half lacks a
 // record.

@@ -22,14 +22,14 @@ struct SelectionPolicy {
   // Noise of the inertia's torque over the residual, as variances: what noise of a regressor may add to the residual.
   double regressor_noise_share = 0.05;
 
-  // Resampling (Shah and Samworth 2013: complementary pairs; 50 pairs bound the error of a frequency to 0.07).
+  // Resampling (Shah and Samworth 2013: complementary pairs, 50 of them).
   std::size_t blocks = 24;
-  std::size_t pairs = 12;                   // for each bandwidth and mask
+  std::size_t pairs = 48;                   // for each bandwidth and mask
   std::size_t fewest_records_to_split = 4;  // from so many on every second pair halves the records, not their blocks
   std::size_t most_steps = 4;
   double named_frequency = 0.6;    // Meinshausen and Buehlmann 2010: 0.6 to 0.9
   double least_of_all = 0.5;       // with abstaining subsamples counted as not choosing: the least that Meinshausen and
-                                   // Buehlmann's bound of false selections allows; below, likelihood has to agree
+                                   // Buehlmann's bound of false selections allows
   double certain_frequency = 0.9;  // behind a structure that is in no catalogue
 
   // Share of the squares above the noise that a term has to take off on samples that the fit did not see.

@@ -93,6 +93,36 @@ double highest_order_hz(const PreparedData& prepared) {
                : 0.0;
 }
 
+RegressorTable with_terms(const RegressorTable& table, const std::vector<int>& terms) {
+  std::vector<Eigen::Index> kept;
+  const auto keep = [&](Eigen::Index column) {
+    kept.push_back(column);
+    return std::ssize(kept) - 1;
+  };
+  RegressorTable small;
+  for (Eigen::Index j = 0; j < table.model_columns; ++j) keep(j);
+  for (const int t : terms) {
+    small.terms.push_back(table.terms[static_cast<std::size_t>(t)]);
+    for (Eigen::Index& column : small.terms.back().columns) column = keep(column);
+  }
+  for (const Eigen::Index column : table.differences) small.differences.push_back(keep(column));
+  small.columns = table.columns(Eigen::all, kept);
+  small.scale = table.scale(kept);
+  small.target = table.target;
+  small.model_columns = table.model_columns;
+  small.model_names = table.model_names;
+  small.model_low = table.model_low;
+  small.not_visible = table.not_visible;
+  small.runs = table.runs;
+  small.records = table.records;
+  small.held_out = table.held_out;
+  small.highest_hz = table.highest_hz;
+  small.highest_law_hz = table.highest_law_hz;
+  small.velocity_over_noise = table.velocity_over_noise;
+  small.reversals = table.reversals;
+  return small;
+}
+
 RegressorTable make_regressor_table(const PreparedData& original, Balance balance, const Terms& terms,
                                     Presliding presliding, double highest_law_hz, const SelectionPolicy& policy) {
   PreparedData prepared = original;

@@ -68,6 +68,10 @@ RegressorTable make_regressor_table(const estimation::PreparedData& prepared, Ba
                                     const estimation::Terms& terms, Presliding presliding, double highest_law_hz,
                                     const SelectionPolicy& policy);
 
+// The same samples with fewer columns: those of the model, of friction that may differ, and of these terms (places in
+// table.terms), in their order.
+RegressorTable with_terms(const RegressorTable& table, const std::vector<int>& terms);
+
 // Highest frequency of an order of the motor's turn that counts, Hz, at the typical speed.
 double highest_order_hz(const estimation::PreparedData& prepared);
 // The highest order that is tried: those that pole pairs and slots of the motor give may be beyond the policy's.

@@ -88,17 +88,15 @@ bool leaves_noise(const SearchedBalance& e, double whiteness) {
   return whiteness >= kPolicy.white && !(e.names_one() && is_of_effort(e.candidates.front()));
 }
 
-// Whether the likelihood of all data agrees with a name that resampling chose. Where the model alone leaves known
-// noise, many subsamples abstain and the others may have selected noise: likelihood must be significant then. Where the
-// name was not chosen in most of all subsamples, its criterion must prefer the effect. Otherwise it is not used, as it
-// sees one bandwidth, without reversals.
-bool likelihood_agrees(const SearchedBalance& motor, const NamedEffect& name, double frequency_of_all) {
+// Whether a name that resampling found may be stated: most of all subsamples chose it. Where the model alone leaves
+// known noise, many subsamples abstain and the others may have selected noise: there the likelihood of all data must be
+// significant. It leaves out reversals, so it cannot judge a state of presliding, which shows around them alone.
+bool may_be_stated(const SearchedBalance& motor, const NamedEffect& name, double frequency_of_all) {
   const bool leaves_known_noise =
       motor.floor.rmse && motor.search.base.rmse() <= (1.0 + kPolicy.floor_uncertainty) * *motor.floor.rmse;
-  if (!leaves_known_noise && frequency_of_all >= kPolicy.least_of_all) return true;
-  const double least_score = leaves_known_noise ? kPolicy.named_score : 0.0;
+  if (!leaves_known_noise || catalogue::get(name.effect).has_state) return frequency_of_all >= kPolicy.least_of_all;
   return std::any_of(motor.candidates.begin(), motor.candidates.end(), [&](const CandidateFit& candidate) {
-    return is_of_family(name.effect, name.order, candidate) && candidate.gain.score > least_score;
+    return is_of_family(name.effect, name.order, candidate) && candidate.gain.score > kPolicy.named_score;
   });
 }
 
@@ -113,7 +111,7 @@ std::vector<NamedEffect> names_of(const Resampling& resampling, const SearchedBa
     if (found.group.empty() || found.refused_by_holdout) continue;
     const double of_all = found.frequency * (1.0 - resampling.abstained / resampling.subsamples);
     if (std::none_of(found.group.begin(), found.group.end(),
-                     [&](const NamedEffect& n) { return likelihood_agrees(motor, n, of_all); }))
+                     [&](const NamedEffect& n) { return may_be_stated(motor, n, of_all); }))
       continue;
     if (names.empty() && found.group.size() > 1) return found.group;
     if (found.group.size() > 1 || (!names.empty() && found.share_percent < least_percent)) continue;

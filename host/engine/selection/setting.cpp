@@ -80,31 +80,67 @@ void take_rows(const RegressorTable& table, const Run& run, double cutoff_hz, bo
 }
 
 // Number of blocks of one record: in proportion to its samples, at least two, so that each half can have one.
-void add_blocks(Setting& setting, std::size_t record, Eigen::Index rows_of_record, std::size_t blocks) {
+void add_blocks(Setting& setting, std::vector<Eigen::MatrixXd>& products, std::size_t record,
+                Eigen::Index rows_of_record, std::size_t blocks) {
   const Eigen::Index columns = setting.rows.cols();
   const auto parts =
       std::max<Eigen::Index>(2, std::lround(static_cast<double>(blocks) * static_cast<double>(rows_of_record) /
                                             static_cast<double>(setting.rows.rows())));
   Eigen::Index seen = 0;
   const std::size_t first = setting.blocks.size();
-  for (Eigen::Index b = 0; b < parts; ++b)
-    setting.blocks.push_back({record, 0.0, Eigen::MatrixXd::Zero(columns, columns)});
+  setting.blocks.resize(first + static_cast<std::size_t>(parts), {record, 0.0});
+  products.resize(setting.blocks.size(), Eigen::MatrixXd::Zero(columns, columns));
   for (const Run& run : setting.runs) {
     if (run.record != record) continue;
     for (Eigen::Index k = run.first; k < run.last;) {
       const Eigen::Index b = std::min(parts - 1, (seen * parts) / rows_of_record);
       const Eigen::Index end_of_block = ((b + 1) * rows_of_record + parts - 1) / parts;
       const Eigen::Index many = std::max<Eigen::Index>(1, std::min(run.last - k, end_of_block - seen));
-      Block& block = setting.blocks[first + static_cast<std::size_t>(b)];
-      block.products.selfadjointView<Eigen::Lower>().rankUpdate(setting.rows.middleRows(k, many).transpose());
-      block.rows += static_cast<double>(many);
+      const std::size_t block = first + static_cast<std::size_t>(b);
+      products[block].selfadjointView<Eigen::Lower>().rankUpdate(setting.rows.middleRows(k, many).transpose());
+      setting.blocks[block].rows += static_cast<double>(many);
       k += many;
       seen += many;
     }
   }
 }
 
+// Puts the products of the blocks into columns, without blocks that have no samples.
+void take_products(Setting& setting, std::vector<Eigen::MatrixXd>& products) {
+  const Eigen::Index columns = setting.rows.cols();
+  std::vector<Block> blocks;
+  setting.products.resize(columns * columns, std::ssize(products));
+  for (std::size_t b = 0; b < products.size(); ++b) {
+    if (setting.blocks[b].rows == 0.0) continue;
+    products[b].triangularView<Eigen::StrictlyUpper>() = products[b].transpose();
+    setting.products.col(std::ssize(blocks)) = products[b].reshaped();
+    blocks.push_back(setting.blocks[b]);
+  }
+  setting.products.conservativeResize(Eigen::NoChange, std::ssize(blocks));
+  setting.blocks = std::move(blocks);
+}
+
 }  // namespace
+
+std::vector<BlockRange> blocks_by_record(const Setting& setting) {
+  std::vector<BlockRange> ranges;
+  for (std::size_t b = 0; b < setting.blocks.size(); ++b) {
+    const std::size_t record = setting.blocks[b].record;
+    if (ranges.empty() || ranges.back().record != record) ranges.push_back({record, b, b});
+    ranges.back().last = b + 1;
+  }
+  return ranges;
+}
+
+Eigen::MatrixXd products_of(const Setting& setting, const BlockRange& blocks) {
+  const Eigen::Index columns = setting.rows.cols();
+  const Eigen::VectorXd sum =
+      setting.products
+          .middleCols(static_cast<Eigen::Index>(blocks.first), static_cast<Eigen::Index>(blocks.last - blocks.first))
+          .rowwise()
+          .sum();
+  return sum.reshaped(columns, columns);
+}
 
 Setting make_setting(const RegressorTable& table, double cutoff_hz, bool mask, bool held_out,
                      const SelectionPolicy& policy) {
@@ -120,11 +156,10 @@ Setting make_setting(const RegressorTable& table, double cutoff_hz, bool mask, b
   setting.runs = std::move(kept.runs);
   std::vector<Eigen::Index> of_record(table.records, 0);
   for (const Run& run : setting.runs) of_record[run.record] += run.last - run.first;
+  std::vector<Eigen::MatrixXd> products;
   for (std::size_t r = 0; r < table.records; ++r)
-    if (of_record[r] > 0) add_blocks(setting, r, of_record[r], policy.blocks);
-  for (Block& block : setting.blocks)
-    block.products.triangularView<Eigen::StrictlyUpper>() = block.products.transpose();
-  std::erase_if(setting.blocks, [](const Block& b) { return b.rows == 0.0; });
+    if (of_record[r] > 0) add_blocks(setting, products, r, of_record[r], policy.blocks);
+  take_products(setting, products);
   return setting;
 }
 

@@ -53,7 +53,8 @@ std::optional<TimeLag> StabilitySelection::time_lag(const std::vector<std::strin
   if (setting.votes.empty()) return std::nullopt;
   std::vector<int> terms;
   for (const std::string& name : names)
-    for (const int term : terms_of(setting, {name})) terms.push_back(term);
+    for (const int term : terms_of(setting, {name}))
+      terms.push_back(term == kPreslidingTerm ? term : setting.terms[static_cast<std::size_t>(term)]);
   const bool presliding = std::erase(terms, kPreslidingTerm) > 0 && tables_.presliding;
   const std::optional<TimeLag> lag = estimate_time_lag(presliding ? *tables_.presliding : tables_.sign, terms, policy_);
   if (!lag || std::abs(lag->seconds) < policy_.delay_errors * lag->std || lag->share < policy_.line_share)
@@ -67,18 +68,18 @@ void StabilitySelection::take_off(const TimeLag& lag) {
   evaluate();
 }
 
-Noise StabilitySelection::noise_of_best(const Setting& one, const Setting* second, const std::vector<double>& weights,
+Noise StabilitySelection::noise_of_best(const Samples& samples, const std::vector<double>& weights,
                                         FrictionRandomEffects& differences, SettingResult& result) const {
-  const RegressorTable& sign = tables_.sign;
+  const Setting& one = samples.sign;
   Noise noise;
   for (int round = 0; round < 2; ++round) {
-    result.all = sum_of(one, second, weights, {}, 0, differences);
-    const SelectionPath rough = select_forward(sign, result.all, result.all, noise, result.may_enter, policy_);
+    result.all = sum_of(one, samples.presliding(), weights, differences);
+    const SelectionPath rough = select_forward(result.columns, result.all, result.all, noise, policy_);
     std::vector<int> chosen;
     for (const SelectionStep& s : rough.steps) chosen.push_back(s.term);
-    const TermFit fitted = fit_terms(sign, chosen, result.all, result.all);
+    const TermFit fitted = fit_terms(result.columns, chosen, result.all, result.all);
     const bool z = std::find(chosen.begin(), chosen.end(), kPreslidingTerm) != chosen.end();
-    const Setting& seen = z ? *second : one;
+    const Setting& seen = z ? *samples.presliding() : one;
     const Eigen::VectorXd residual = weighted_residual(seen, fitted, weights, differences);
     noise.variance = semivariance(one, residual);
     std::vector<estimation::RowRange> ranges;
@@ -86,10 +87,10 @@ Noise StabilitySelection::noise_of_best(const Setting& one, const Setting* secon
     noise.tau = std::max(2.0, estimation::autocorrelation_time(ranges, residual));
     const double left = residual.squaredNorm() / static_cast<double>(std::max<Eigen::Index>(1, residual.size()));
     result.whiteness = residual.size() > 0 ? noise.variance / std::max(left, 1e-300) : -1.0;
-    if (sign.differences.empty() || round == 1) break;
+    if (result.columns.differences.empty() || round == 1) break;
     differences.noise = noise.tau * std::max(left, 1e-12);
-    differences.variance =
-        friction_effects_of(z ? *tables_.presliding : sign, seen, weights, differences.noise, policy_);
+    differences.variance = friction_effects_of(z ? *samples.presliding_table : samples.sign_table, seen, weights,
+                                               differences.noise, policy_);
   }
   return noise;
 }
@@ -97,42 +98,59 @@ Noise StabilitySelection::noise_of_best(const Setting& one, const Setting* secon
 StabilitySelection::SettingResult StabilitySelection::evaluate_setting(double cutoff_hz, bool mask,
                                                                        std::uint64_t seed) const {
   SettingResult result;
-  const RegressorTable& sign = tables_.sign;
-  const Setting one = make_setting(sign, cutoff_hz, mask, false, policy_);
-  std::optional<Setting> two;
-  if (tables_.presliding && !mask) two = make_setting(*tables_.presliding, cutoff_hz, mask, false, policy_);
-  if (one.blocks.size() < 4 ||
-      static_cast<double>(one.rows.rows()) < policy_.fewest_rows_per_column * static_cast<double>(sign.model_columns))
+  for (std::size_t t = 0; t < tables_.sign.terms.size(); ++t)
+    if (tables_.may_enter(tables_.sign.terms[t], cutoff_hz)) result.terms.push_back(static_cast<int>(t));
+  // Columns of waves that a bandwidth cannot show would cost most of the time.
+  Samples samples{with_terms(tables_.sign, result.terms), std::nullopt, {}, std::nullopt};
+  samples.sign = make_setting(samples.sign_table, cutoff_hz, mask, false, policy_);
+  const Setting& one = samples.sign;
+  if (one.blocks.size() < 4 || static_cast<double>(one.rows.rows()) <
+                                   policy_.fewest_rows_per_column * static_cast<double>(tables_.sign.model_columns))
     return result;
-  const bool has_second = two && two->blocks.size() == one.blocks.size();
-  const Setting* const second = has_second ? &*two : nullptr;
-  std::vector<double> weights = record_weights(sign, one);
-  for (const CandidateTerm& term : sign.terms) result.may_enter.push_back(tables_.may_enter(term, cutoff_hz) ? 1 : 0);
-
-  FrictionRandomEffects differences{sign.differences, {}, 0.0};
-  const Noise noise = noise_of_best(one, second, weights, differences, result);
-
-  std::mt19937_64 chance(seed);
-  std::size_t records = 0;
-  for (const double w : weights) records += w > 0.0 ? 1 : 0;
-  for (std::size_t pair = 0; pair < policy_.pairs; ++pair) {
-    const bool by_record = records >= policy_.fewest_records_to_split && pair % 2 == 1;
-    const std::vector<std::uint8_t> in = by_record ? half_of_records(one, chance) : half_of_blocks(one, chance);
-    const HalfData a = sum_of(one, second, weights, in, 0, differences),
-                   b = sum_of(one, second, weights, in, 1, differences);
-    result.votes.push_back(select_forward(sign, a, b, noise, result.may_enter, policy_));
-    result.votes.push_back(select_forward(sign, b, a, noise, result.may_enter, policy_));
+  if (tables_.presliding && !mask) {
+    samples.presliding_table = with_terms(*tables_.presliding, result.terms);
+    samples.presliding_setting = make_setting(*samples.presliding_table, cutoff_hz, mask, false, policy_);
+    if (samples.presliding()->blocks.size() != one.blocks.size()) samples.presliding_setting.reset();
   }
+  result.columns = samples.sign_table;
+  result.columns.columns.resize(0, 0);
+  std::vector<double> weights = record_weights(samples.sign_table, one);
+  FrictionRandomEffects differences{samples.sign_table.differences, {}, 0.0};
+  const Noise noise = noise_of_best(samples, weights, differences, result);
+  select_on_halves(samples, weights, differences, noise, seed, result);
 
-  const Setting held = make_setting(sign, cutoff_hz, mask, true, policy_);
+  const Setting held = make_setting(samples.sign_table, cutoff_hz, mask, true, policy_);
   if (held.blocks.empty()) return result;
-  std::optional<Setting> held_second;
-  if (second) held_second = make_setting(*tables_.presliding, cutoff_hz, mask, true, policy_);
+  std::optional<Setting> held_presliding;
+  if (samples.presliding()) held_presliding = make_setting(*samples.presliding_table, cutoff_hz, mask, true, policy_);
   // A record that was not fitted on has no variance of its own: it counts as the median of the others.
   const double usual = median_of_positive(weights);
   for (double& w : weights) w = w > 0.0 ? w : usual;
-  result.held_out = sum_of(held, held_second ? &*held_second : nullptr, weights, {}, 0, differences);
+  result.held_out = sum_of(held, held_presliding ? &*held_presliding : nullptr, weights, differences);
   return result;
+}
+
+void StabilitySelection::select_on_halves(const Samples& samples, const std::vector<double>& weights,
+                                          const FrictionRandomEffects& differences, const Noise& noise,
+                                          std::uint64_t seed, SettingResult& result) const {
+  constexpr std::size_t kTogether = 8;  // pairs: as many as leave their products in memory that is near
+  std::mt19937_64 chance(seed);
+  std::size_t records = 0;
+  for (const double w : weights) records += w > 0.0 ? 1 : 0;
+  std::vector<std::vector<std::uint8_t>> in;
+  for (std::size_t pair = 0; pair < policy_.pairs; ++pair) {
+    const bool by_record = records >= policy_.fewest_records_to_split && pair % 2 == 1;
+    in.push_back(by_record ? half_of_records(samples.sign, chance) : half_of_blocks(samples.sign, chance));
+    if (in.size() < kTogether && pair + 1 < policy_.pairs) continue;
+    for (const auto& [a, b] : halves_of(samples.sign, samples.presliding(), weights, in, differences)) {
+      result.votes.push_back(select_forward(result.columns, a, b, noise, policy_));
+      result.votes.push_back(select_forward(result.columns, b, a, noise, policy_));
+    }
+    in.clear();
+  }
+  for (SelectionPath& vote : result.votes)
+    for (SelectionStep& step : vote.steps)
+      if (step.term != kPreslidingTerm) step.term = result.terms[static_cast<std::size_t>(step.term)];
 }
 
 namespace {
@@ -196,8 +214,10 @@ void StabilitySelection::count() {
   for (std::size_t i = 0; i < per_setting_.size(); ++i) {
     if (per_setting_[i].votes.empty()) continue;
     std::map<std::string, const CandidateTerm*> open;
-    for (std::size_t t = 0; t < sign.terms.size(); ++t)
-      if (per_setting_[i].may_enter[t]) open[sign.terms[t].name] = &sign.terms[t];
+    for (const int t : per_setting_[i].terms) {
+      const CandidateTerm& term = sign.terms[static_cast<std::size_t>(t)];
+      open[term.name] = &term;
+    }
     if (tables_.presliding && !tables_.settings[i].second) open[kPresliding] = nullptr;
     for (const SelectionPath& vote : per_setting_[i].votes) {
       result_.subsamples += 1.0;
@@ -241,10 +261,10 @@ std::vector<int> StabilitySelection::terms_of(const SettingResult& setting,
     }
     int best = -1;
     double least = 0.0;
-    for (std::size_t t = 0; t < tables_.sign.terms.size(); ++t) {
-      if (tables_.sign.terms[t].name != name || !setting.may_enter[t]) continue;
+    for (std::size_t t = 0; t < setting.columns.terms.size(); ++t) {
+      if (setting.columns.terms[t].name != name) continue;
       chosen.push_back(static_cast<int>(t));
-      const double squares = fit_terms(tables_.sign, chosen, setting.all, setting.all).training_squares;
+      const double squares = fit_terms(setting.columns, chosen, setting.all, setting.all).training_squares;
       chosen.pop_back();
       if (best >= 0 && squares >= least) continue;
       best = static_cast<int>(t);
@@ -265,12 +285,12 @@ std::vector<double> StabilitySelection::held_out_ratios(const std::vector<std::s
     for (const std::string& name : names)
       if (!terms_of(setting, {name}).empty()) seen.push_back(name);
     const double with_all =
-        fit_terms(tables_.sign, terms_of(setting, seen), setting.all, setting.held_out).validation_squares;
+        fit_terms(setting.columns, terms_of(setting, seen), setting.all, setting.held_out).validation_squares;
     for (std::size_t i = 0; i < names.size(); ++i) {
       std::vector<std::string> others = seen;
       if (std::erase(others, names[i]) == 0) continue;
       const double without =
-          fit_terms(tables_.sign, terms_of(setting, others), setting.all, setting.held_out).validation_squares;
+          fit_terms(setting.columns, terms_of(setting, others), setting.all, setting.held_out).validation_squares;
       if (without > 0.0) ratios[i].push_back(std::sqrt(with_all / without));
     }
   }

@@ -52,20 +52,35 @@ class StabilitySelection {
  private:
   // One bandwidth, with or without reversals.
   struct SettingResult {
-    std::vector<SelectionPath> votes;
-    std::vector<std::uint8_t> may_enter;  // by term
+    std::vector<SelectionPath> votes;  // places of terms as in the whole table
+    std::vector<int> terms;            // of the whole table, those that may be seen at this bandwidth
+    RegressorTable columns;            // of these terms, without samples
     double whiteness = -1.0;
     HalfData all, held_out;
+  };
+
+  // The samples of a setting, with the sign of the velocity and with the presliding state.
+  struct Samples {
+    RegressorTable sign_table;
+    std::optional<RegressorTable> presliding_table;
+    Setting sign;
+    std::optional<Setting> presliding_setting;
+    const Setting* presliding() const { return presliding_setting ? &*presliding_setting : nullptr; }
   };
 
   SettingResult evaluate_setting(double cutoff_hz, bool mask, std::uint64_t seed) const;
   // Noise that the best model of all data leaves: first with the same friction in all records, then with random
   // effects, which would otherwise count as slow noise. Sets `differences`, and of `result` the sums and the whiteness.
-  Noise noise_of_best(const Setting& one, const Setting* second, const std::vector<double>& weights,
-                      FrictionRandomEffects& differences, SettingResult& result) const;
+  Noise noise_of_best(const Samples& samples, const std::vector<double>& weights, FrictionRandomEffects& differences,
+                      SettingResult& result) const;
+  // Chooses on each of policy.pairs pairs of halves, in both directions.
+  void select_on_halves(const Samples& samples, const std::vector<double>& weights,
+                        const FrictionRandomEffects& differences, const Noise& noise, std::uint64_t seed,
+                        SettingResult& result) const;
   void evaluate();
   void count();
-  // The terms of these names that fit best together; none where one cannot be seen there.
+  // The terms of these names that fit best together (places in setting.columns.terms); none where one cannot be seen
+  // there.
   std::vector<int> terms_of(const SettingResult& setting, const std::vector<std::string>& names) const;
 
   SelectionPolicy policy_;

@@ -159,6 +159,21 @@ json law_in_range_json(const selection::Diagnosis& d) {
           {"p_value_of_all", law.p_value_of_all}};
 }
 
+std::string stated_setting_text(const selection::StatedSetting& stated) {
+  std::string names;
+  for (const selection::NamedEffect& n : stated.named)
+    names += (names.empty() ? "" : ", ") + (n.order ? fmt::format("{}:{:g}", n.effect, *n.order) : n.effect);
+  return fmt::format(
+      "The verdict is made at the cut-off and the mask that the data give. The stated ones alone would name {}: a name "
+      "that depends on them is not certain.",
+      names.empty() ? "nothing" : names);
+}
+
+bool has_same_names(const std::vector<selection::NamedEffect>& a, const std::vector<selection::NamedEffect>& b) {
+  return std::equal(a.begin(), a.end(), b.begin(), b.end(),
+                    [](const auto& x, const auto& y) { return x.effect == y.effect && x.order == y.order; });
+}
+
 std::string law_in_range_text(const selection::LawInRange& law) {
   return fmt::format(
       "Friction of the {} records with an rms speed of {:.3g} to {:.3g} rad/s differs between them as {} says (p = "
@@ -210,6 +225,12 @@ json named_json(const std::vector<selection::NamedEffect>& named) {
   json list = json::array();
   for (const selection::NamedEffect& n : named) list.push_back({{"effect", n.effect}, {"order", json_number(n.order)}});
   return list;
+}
+
+json stated_setting_json(const selection::Diagnosis& d) {
+  if (!d.at_stated_setting) return nullptr;
+  return {{"verdict", selection::verdict_name(d.at_stated_setting->verdict)},
+          {"named", named_json(d.at_stated_setting->named)}};
 }
 
 json candidate_json(const Candidate& c, std::size_t rank, const std::string& unit) {
@@ -334,6 +355,8 @@ void print_diagnosis(Console& console, const Diagnosis& d, const std::string& ad
   for (const selection::NamedEffect& named : d.named)
     if (const Candidate* c = candidate_of(d, named)) print_explanation(console, *c, d.unit);
   if (d.law_in_range) console.line(wrapped(law_in_range_text(*d.law_in_range)));
+  if (d.at_stated_setting && !has_same_names(d.at_stated_setting->named, d.named))
+    console.line(wrapped(stated_setting_text(*d.at_stated_setting)));
   if (d.unknown) print_unknown(console, d);
   if (!d.candidates.empty()) {
     console.line();
@@ -416,6 +439,7 @@ json diagnosis_json(const Diagnosis& d) {
           {"resampling", resampling_json(d)},
           {"unknown", unknown_json(d)},
           {"delay_s", json_number(d.delay_s)},
+          {"at_stated_setting", stated_setting_json(d)},
           {"warnings", d.warnings},
           {"rounds", json::array()}};
 }
