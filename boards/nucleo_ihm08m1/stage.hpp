@@ -25,15 +25,15 @@ inline constexpr control::protection::ThermistorSettings kThermistor{
 };
 
 // The axis of a motor of 0.3 ohm and 0.3 mH: the drive cannot be armed before its own was measured.
-inline constexpr control::foc::AxisSettings kAxis{1379295938,  499133993,  81143507,   1663779978, 86619138,
-                                                  -2120641500, -106043120, 1802545275, 1274599228};
+inline constexpr control::foc::AxisSettings kAxis{1184571806,  748700990,  40571754,   831889989, 173238277,
+                                                  -2120641500, 1611943798, 1766625812, 637299614};
 
 constexpr firmware::ThreePhaseSettings stage_settings(std::uint32_t encoder_counts) {
   firmware::ThreePhaseSettings s;
   s.foc = {{{4096, 4096, 4096}, {}, false},
-           {kAxis, kAxis, 25018043, 1157911625, 16777216, 6},
+           {kAxis, kAxis, 12509021, 1157911625, 8388608, 7},
            {97352592, 17895697, 2796, 55647928, 16000},
-           19049783};
+           9524891};
   s.limits.peak_square = s.limits.continuous_square = s.limits.start_square = 238276774;  // 15 A
   s.limits.voltage_share = INT32_MAX;
   s.offsets = {3277, 1638};   // a tenth of full scale, a twentieth

@@ -26,8 +26,8 @@ inline constexpr control::protection::ThermistorSettings kThermistor{
 };
 
 // The axis of a motor of 0.3 ohm and 0.3 mH: the drive cannot be armed before its own was measured.
-inline constexpr control::foc::AxisSettings kAxis{900577783,   325897418,  52980682,   1086324727, 132663084,
-                                                  -2120641500, -106043120, 1802545275, 832218608};
+inline constexpr control::foc::AxisSettings kAxis{1546874780,  977692254,  52980682,   1086324727, 132663084,
+                                                  -2120641500, 1611943798, 1766625812, 832218608};
 
 constexpr firmware::ThreePhaseSettings stage_settings(std::uint32_t encoder_counts) {
   firmware::ThreePhaseSettings s;

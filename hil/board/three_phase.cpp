@@ -60,8 +60,8 @@ ThreePhaseParameters three_phase_of(const plant::Drive& drive) {
 
 // As host/drive_link/deployment makes them from the parameters; a test compares them.
 firmware::ThreePhaseSettings three_phase_settings_of(const plant::Drive& drive) {
-  constexpr control::foc::AxisSettings kAxis = {1521094321,  543636828, 44918200,   1812122759, 79528380,
-                                                -2134008365, -53565016, 1813907110, 1405524761};
+  constexpr control::foc::AxisSettings kAxis = {1521094321,  543636828, 44918200,  1812122759, 79528380,
+                                                -2134008365, -53565016, 906953555, 1405524761};
   firmware::ThreePhaseSettings s;
   s.foc.sensors.gain = {4096, 4096, 4096};
   s.foc.current = {kAxis, kAxis, 22714284, 624333630, 8388608, 7};

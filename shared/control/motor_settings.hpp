@@ -33,7 +33,7 @@ struct MotorSettings {
     for (std::int32_t* x : {&gain.a, &gain.b, &gain.c}) c.positive(*x);
     for (foc::AxisSettings* a : {&current.d, &current.q}) {
       for (std::int32_t* x : {&a->proportional, &a->integral, &a->resistance, &a->slope, &a->per_slope}) c.positive(*x);
-      for (std::int32_t* x : {&a->beyond, &a->decay, &a->pending, &a->reactance}) c.signed_word(*x);
+      for (std::int32_t* x : {&a->beyond, &a->weight, &a->pending, &a->reactance}) c.signed_word(*x);
     }
     for (std::int32_t* x : {&current.flux, &current.pull, &current.integral_limit, &current.up, &circle})
       c.positive(*x);
@@ -48,7 +48,7 @@ constexpr bool agrees(const MotorSettings& m) {
   for (const std::int32_t gain : {m.gain.a, m.gain.b, m.gain.c})
     if (gain < kLeastGain || gain > kMostGain) return false;
   for (const foc::AxisSettings* a : {&m.current.d, &m.current.q})
-    if (a->beyond > 0 || a->decay > 0 || a->pending < 0 || a->reactance < 0) return false;
+    if (a->beyond > 0 || a->pending < 0 || a->reactance < 0) return false;
   return m.pole_pairs <= MotorSettings::kMostPolePairs && m.current.up >= kLeastUp && m.current.up <= kMostUp;
 }
 

@@ -38,7 +38,7 @@ void expect_axis(const control::foc::AxisSettings& a, const control::foc::AxisSe
   expect_near(a.slope, b.slope);
   expect_near(a.per_slope, b.per_slope);
   expect_near(a.beyond, b.beyond);
-  expect_near(a.decay, b.decay);
+  expect_near(a.weight, b.weight);
   expect_near(a.pending, b.pending);
   expect_near(a.reactance, b.reactance);
 }

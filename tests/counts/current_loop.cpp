@@ -79,8 +79,9 @@ Float float_loop({.resistance_ohm = 0.304,
                   .pulse = 0.2e-6 * 40e3 + 0.020667,
                   .window = 2.5e-6 * 40e3 + 0.020667,
                   .bandwidth_hz = 1000.0,
-                  .correction = 0.85,
-                  .integral_correction = 0.3});
+                  .proportional = 0.85,
+                  .integral = 0.3,
+                  .extrapolated = 0.0});
 Float::Inputs float_in;
 Float::Outputs float_out;
 [[gnu::noinline, gnu::flatten]] void float_tick(Float& loop, const Float::Inputs& in, Float::Outputs& out) {

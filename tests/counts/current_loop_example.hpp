@@ -8,8 +8,8 @@
 
 namespace flexspline::counts {
 
-inline constexpr control::foc::AxisSettings kExampleAxis = {912656145,   326219994, 27201460,   1087399978, 132531903,
-                                                            -2133883100, -54059817, 1813800635, 843314857};
+inline constexpr control::foc::AxisSettings kExampleAxis = {912656145,   326219994, 27201460,  1087399978, 132531903,
+                                                            -2133883100, -54059817, 906900318, 843314857};
 inline constexpr control::foc::Settings kExampleSettings = {
     {{4096, 4096, 4096}, {}, false},
     {kExampleAxis, kExampleAxis, 13176795, 624333630, 4194304, 8},

@@ -15,7 +15,7 @@ struct FloatSetup {
   double resistance_ohm = 0, inductance_d_h = 0, inductance_q_h = 0, flux_vs = 0;
   double current_full_scale_a = 0, bus_full_scale_v = 0, pwm_hz = 0, timer_counts = 0;
   double lost = 0, zone_a = 0, pulse = 0, window = 0;  // shares of a period
-  double bandwidth_hz = 0, correction = 0, integral_correction = 0;
+  double bandwidth_hz = 0, proportional = 0, integral = 0, extrapolated = 0;
 };
 
 class FloatCurrentLoop {
@@ -98,14 +98,15 @@ class FloatCurrentLoop {
       resistance = static_cast<float>(s.resistance_ohm);
       slope = static_cast<float>(s.resistance_ohm / less);
       per_slope = static_cast<float>(less / s.resistance_ohm);
-      keep = static_cast<float>(half);
       middle = static_cast<float>(1.0 / (1.0 + half));
-      proportional = static_cast<float>(s.correction * half) * slope;
-      integral_gain = static_cast<float>(s.integral_correction) * slope;
-      pending_gain = static_cast<float>(1.0 / (1.0 + half) * s.correction * half);
+      weight = static_cast<float>(half + s.extrapolated);
+      proportional = static_cast<float>(s.proportional * half) * slope;
+      integral_gain = static_cast<float>(s.integral) * slope;
+      pending_gain =
+          static_cast<float>(s.extrapolated * half + (1.0 - s.extrapolated) / (1.0 + half) * s.proportional * half);
     }
     void plan(float pull, float set_point, float measured) {
-      error = keep * (expected - measured) - pending;
+      error = weight * (expected - measured) - pending;
       pending = pending_gain * error;
       move = pull * (set_point - model);
       next = model + middle * move - error + pending;
@@ -119,7 +120,7 @@ class FloatCurrentLoop {
       const float sum = integral + integral_gain * error;
       if (sum < limit && sum > -limit) integral = sum;
     }
-    float inductance, resistance, slope, per_slope, keep, middle, proportional, integral_gain, pending_gain;
+    float inductance, resistance, slope, per_slope, weight, middle, proportional, integral_gain, pending_gain;
     float integral = 0, model = 0, expected = 0, pending = 0;
     float error = 0, move = 0, next = 0, voltage = 0;
   };

@@ -45,6 +45,25 @@ TEST(Commissioning, NamesEachFaultAndItsPhase) {
   }
 }
 
+// Reluctance turns such a rotor away from the current until the magnet's voltage across it cannot be told from that of
+// the inductances at another current; against what the inductances give at a standing rotor it can.
+TEST(Commissioning, ARotorThatReluctanceTurnsIsNotTakenForABlockedOne) {
+  std::mt19937_64 random(31);
+  for (int k = 0; k < 3; ++k) {
+    FaultCase c = random_fault(Fault::encoder_stands, random);
+    motor::MotorParameters& m = c.bench.motor;
+    m.flux_vs = 0.002;
+    m.inductance_d_h = 0.3e-3 + 0.25e-3 * k;
+    m.inductance_q_h = 2.0 * m.inductance_d_h;
+    c.bench.shaft.coulomb_nm = 0.15 * 1.5 * m.pole_pairs * m.flux_vs * 10.0;
+    c.bench.shaft.inertia_kg_m2 = c.bench.shaft.coulomb_nm / 600.0;
+    EXPECT_EQ(name_of(commission(c.bench, c.setup).result.fault), "encoder_stands") << k;
+    c.bench.encoder.stands = false;
+    c.bench.shaft.blocked = true;
+    EXPECT_EQ(name_of(commission(c.bench, c.setup).result.fault), "rotor_blocked") << k;
+  }
+}
+
 TEST(Commissioning, SwitchesOffAtOnceWhereACurrentPassesItsLimit) {
   const Bench b;
   commissioning::Commissioning control;

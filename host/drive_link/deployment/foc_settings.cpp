@@ -20,7 +20,7 @@ std::int32_t quantised(double x, int bits, const std::string& what) {
 
 // Coefficients of an axis; gains in ohms.
 struct Axis {
-  double proportional, integral, resistance, slope, middle, keep, pending, reactance;
+  double proportional, integral, resistance, slope, middle, keep, weight, pending, reactance;
 };
 Axis axis_of(const FocSetup& s, double inductance) {
   const double period = 1.0 / s.pwm_hz, lost = -std::expm1(-s.resistance_ohm * period / inductance);  // 1 - a
@@ -29,9 +29,11 @@ Axis axis_of(const FocSetup& s, double inductance) {
   x.slope = s.resistance_ohm / lost;
   x.keep = std::sqrt(1.0 - lost);
   x.middle = 1.0 / (1.0 + x.keep);
-  x.proportional = s.correction * x.keep * x.slope;
-  x.integral = s.integral_correction * x.slope;
-  x.pending = x.middle * x.proportional / x.slope;
+  x.proportional = s.corrections.proportional * x.keep * x.slope;
+  x.integral = s.corrections.integral * x.slope;
+  const double more = s.corrections.extrapolated;
+  x.weight = x.keep + more;
+  x.pending = more * x.keep + (1.0 - more) * x.middle * x.proportional / x.slope;
   x.reactance = 2.0 * std::numbers::pi * inductance / (8.0 * period);
   return x;
 }
@@ -43,9 +45,9 @@ AxisSettings settings_of(const Axis& a, double base_ohm) {
   c.slope = quantised(a.slope / base_ohm, 30, "the inductance over a period");
   c.per_slope = quantised(base_ohm / a.slope, 27, "a period over the inductance: d and q differ too much, it");
   c.beyond = quantised(a.middle - 1.0, 32, "the weight of the middle of a period");
-  c.decay =
-      quantised(a.keep - 1.0, 32, "the resistance over the inductance, for this PWM rate, the decay of half a period");
-  c.pending = quantised(a.pending, 32, "the part of a correction that is still to act");
+  c.weight = quantised(a.weight - 1.0, 32,
+                       "the resistance over the inductance, for this PWM rate, the decay of half a period");
+  c.pending = quantised(a.pending, 31, "the part of a correction that is still to act");
   c.reactance = quantised(a.reactance / base_ohm, 30, "the reactance");
   return c;
 }
@@ -55,14 +57,28 @@ double largest(const Axis& a) {
 
 }  // namespace
 
-control::foc::Settings foc_settings(const FocSetup& s) {
+// With twenty periods in one of the bandwidth a rise lasts seven, and the gains have to be high. Found by a search over
+// linear motors: of those with which R and L that are wrong by 20 % change the rise by at most 5 %, poles stay within
+// 0.83 then and the loop is stable with L wrong by 40 %, the ones with the least noise in the voltage. It is four times
+// that of the gains that do with twice as many periods.
+Corrections usual_corrections(double pwm_hz, double bandwidth_hz) {
+  constexpr double kPeriods = 30.0;
+  if (pwm_hz < kPeriods * bandwidth_hz) return {.proportional = 1.46, .integral = 0.9, .extrapolated = 0.4};
+  return {.proportional = 0.85, .integral = 0.3, .extrapolated = 0.0};
+}
+
+control::foc::Settings foc_settings(const FocSetup& given) {
+  FocSetup s = given;
+  if (s.corrections.proportional == 0.0) s.corrections = usual_corrections(s.pwm_hz, s.bandwidth_hz);
   require(s.resistance_ohm > 0.0 && s.inductance_d_h > 0.0 && s.inductance_q_h > 0.0 && s.flux_vs >= 0.0,
           "resistance and inductances have to be above zero");
   require(s.current_full_scale_a > 0.0 && s.bus_full_scale_v > 0.0 && s.pwm_hz > 0.0 && s.timer_counts > 0,
           "full scales, the PWM rate and the timer's counts have to be above zero");
   require(s.bandwidth_hz > 0.0 && s.bandwidth_hz <= 0.1 * s.pwm_hz, "the bandwidth is above a tenth of the PWM rate");
-  require(s.correction > 0.0 && s.correction < 1.0 && s.integral_correction > 0.0 && s.integral_correction <= 0.4,
-          "a correction within a period is not between zero and one, or an integral one not between zero and 0.4");
+  const Corrections& k = s.corrections;
+  require(k.proportional > 0.0 && k.proportional < 2.0 && k.integral > 0.0 && k.integral <= 1.0 &&
+              k.extrapolated >= 0.0 && k.extrapolated < 0.5,
+          "the corrections are not between zero and 2, 1 and 0.5");
   const Axis d = axis_of(s, s.inductance_d_h), q = axis_of(s, s.inductance_q_h);
   // The voltage base: all coefficients below two.
   const double bus_ohm = s.bus_full_scale_v / s.current_full_scale_a;

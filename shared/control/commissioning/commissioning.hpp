@@ -7,7 +7,8 @@
 //   first inductance                 an injected voltage along phase a: gains of a slow current loop
 //   pole pairs, forward, backward    a current vector that turns slowly: pole pairs, direction and angle of the encoder
 //   inductances                      the injected voltage in the rotor's axes and between them
-//   flux                             the voltage that the rotor induces, faster, both ways
+//   flux                             the voltage that the rotor induces, faster, both ways, at both signs of the
+//   current
 #pragma once
 
 #include <cstdint>
@@ -29,6 +30,7 @@ class Commissioning {
     output_.begin(settings);
   }
   constexpr Step step() const {
+    if (step_ == Step::inductances && rotation_.stands()) return Step::does_it_turn;
     return step_ == Step::pole_pairs ? rotation_.step() : step_ == Step::flux_forward ? flux_.step() : step_;
   }
   constexpr bool done() const { return step_ == Step::done; }
@@ -143,63 +145,79 @@ class Commissioning {
     if (count_ == kRise + kStillPeriods)
       added = injection_.update(c_.settings, c_.now.voltage.alpha, c_.now.current.alpha);
     if (injection_.done()) {
-      loop_.begin(c_.result.resistance, injection_.inductance(c_.result.resistance), {whole, 0});
+      loop_.begin(c_.result.resistance, injection_.inductance(c_.result.resistance), {drop(), 0});
       rotation_.begin(0);
       begin(Step::pole_pairs);
     }
     const auto held = static_cast<std::int32_t>((std::int64_t{whole} * share) >> 9);
     return output_.on_times(c_.settings, {held + added, 0}, c_.now.bus);
   }
-  constexpr std::int32_t level() const {
-    const std::int32_t drop = scaled(c_.result.resistance, c_.settings.current, kSharesBits - 1);
-    return drop + c_.result.lost_voltage + c_.result.lost_voltage / 3;
-  }
+  constexpr std::int32_t drop() const { return scaled(c_.result.resistance, c_.settings.current, kSharesBits - 1); }
+  constexpr std::int32_t level() const { return drop() + c_.result.lost_voltage + c_.result.lost_voltage / 3; }
   constexpr foc::Phases rotation() {
     const foc::Rotation at = foc::rotation(rotation_.vector().angle());
-    const foc::RotorVector current = in_axes(c_.now.current, at), voltage = in_axes(c_.now.voltage, at);
-    const foc::RotorVector v = loop_.update(rotation_.wanted(c_), current, c_.settings.most_voltage);
-    rotation_.update(c_, voltage);
-    if (rotation_.done()) begin(Step::inductances);
-    return output_.on_times(c_.settings, in_stator(v, foc::rotation(rotation_.vector().angle())), c_.now.bus);
+    const foc::RotorVector wanted = rotation_.wanted(c_);
+    const foc::RotorVector v = loop_.update(wanted, in_axes(c_.now.current, at), c_.settings.most_voltage);
+    rotation_.update(c_, in_axes(c_.motor_voltage(), at));
+    if (rotation_.done() || rotation_.stands()) begin(Step::inductances);
+    const foc::StatorVector u = compensated(v, wanted, foc::rotation(rotation_.vector().angle()));
+    return output_.on_times(c_.settings, u, c_.now.bus);
   }
-  // The current along the rotor's own axis makes no torque. While the voltage is injected nothing else changes.
+  // With what the legs lose at the currents that are wanted: else these stay at zero whenever they pass it, until the
+  // loop has made up for the losses' change of sign.
+  constexpr foc::StatorVector compensated(const foc::RotorVector& v, const foc::RotorVector& wanted,
+                                          const foc::Rotation& at) const {
+    const foc::StatorVector u = in_stator(v, at), lost = c_.lost(foc::inverse_clarke(in_stator(wanted, at)));
+    return {u.alpha + lost.alpha, u.beta + lost.beta};
+  }
+  // The current along the rotor's own axis makes no torque. While the voltage is injected nothing else changes. Where
+  // the encoder says nothing of that axis, it is along the vector that the rotor may have followed; half of the
+  // current, as the flux of all of it is about in proportion to the inductance there.
   constexpr foc::Phases inductances() {
-    if (count_ == 0 || count_ == kStillPeriods) placed_ = rotor_angle(c_.result, c_.now.encoder);
+    const bool follows = !rotation_.stands();
+    if (count_ == 0 || count_ == kStillPeriods) placed_ = rotor_axis();
     const foc::Rotation at = foc::rotation(placed_);
     if (count_ < 2 * kStillPeriods) {
       ++count_;
-      held_ = loop_.update({c_.settings.current, 0}, in_axes(c_.now.current, at), c_.settings.most_voltage);
-      return output_.on_times(c_.settings, in_stator(held_, at), c_.now.bus);
+      const foc::RotorVector wanted = {follows ? c_.settings.current : c_.settings.current / 2, 0};
+      held_ = compensated(loop_.update(wanted, in_axes(c_.now.current, at), c_.settings.most_voltage), wanted, at);
+      return output_.on_times(c_.settings, held_, c_.now.bus);
     }
-    const foc::Rotation axis = foc::rotation(placed_ + static_cast<std::uint32_t>(axis_) * (1U << 29));
-    const foc::StatorVector held = in_stator(held_, at);
+    // It may shake the rotor loose.
+    if (!injection_.measures()) facing_ = rotor_axis();
+    const foc::Rotation axis = foc::rotation(facing_ + static_cast<std::uint32_t>(axis_) * (1U << 29));
     const std::int32_t added =
         injection_.update(c_.settings, in_axes(c_.now.voltage, axis).d, in_axes(c_.now.current, axis).d);
     const foc::StatorVector more = in_stator({added, 0}, axis);
     if (injection_.done()) next_axis();
-    return output_.on_times(c_.settings, {held.alpha + more.alpha, held.beta + more.beta}, c_.now.bus);
+    return output_.on_times(c_.settings, {held_.alpha + more.alpha, held_.beta + more.beta}, c_.now.bus);
+  }
+  constexpr std::uint32_t rotor_axis() const {
+    return rotation_.stands() ? rotation_.vector().angle() : rotor_angle(c_.result, c_.now.encoder);
   }
   constexpr void next_axis() {
     along_[axis_] = injection_.inductance(c_.result.resistance);
     injection_.begin();
     if (++axis_ < kAxes) return;
-    // The rotor may have moved since.
-    const auto moved = static_cast<std::int32_t>(rotor_angle(c_.result, c_.now.encoder) - placed_);
-    const Inductances found = inductances_of(along_[0], along_[1], along_[2], moved);
+    const Inductances found = inductances_of(along_[0], along_[1], along_[2], 0);
+    if (rotation_.stands()) return rotation_.conclude_turning(c_, found);
     c_.result.inductance_d = found.d;
     c_.result.inductance_q = found.q;
     c_.result.offset_angle += static_cast<std::uint32_t>(found.off);
     loop_.begin(c_.result.resistance, found.d < found.q ? found.d : found.q, {});
+    flux_.begin(c_);
     begin(Step::flux_forward);
   }
   constexpr foc::Phases flux() {
     const std::uint32_t angle = rotor_angle(c_.result, c_.now.encoder);
     const foc::Rotation at = foc::rotation(angle);
     const foc::RotorVector current = in_axes(c_.now.current, at);
-    const foc::RotorVector v = loop_.update(flux_.wanted(c_), current, c_.settings.most_voltage);
+    const foc::RotorVector wanted = flux_.wanted(c_);
+    const foc::RotorVector v = loop_.update(wanted, current, c_.settings.most_voltage);
     flux_.update(c_, current, in_axes(c_.motor_voltage(), at), v);
     if (flux_.done()) step_ = Step::done;
-    return output_.on_times(c_.settings, in_stator(v, foc::rotation(angle + flux_.ahead(c_))), c_.now.bus);
+    const foc::StatorVector u = compensated(v, wanted, foc::rotation(angle + flux_.ahead(c_)));
+    return output_.on_times(c_.settings, u, c_.now.bus);
   }
   constexpr void begin(Step step) {
     step_ = step;
@@ -216,10 +234,11 @@ class Commissioning {
   std::uint32_t shown_ = 0;  // phases of which a sensor has shown current
   std::int64_t travel_ = 0;
   static constexpr int kAxes = 3;
-  std::uint32_t placed_ = 0;
+  std::uint32_t placed_ = 0;  // of the current
+  std::uint32_t facing_ = 0;  // of the rotor where the injection is measured
   int axis_ = 0;
   std::int32_t along_[kAxes]{};  // inductances
-  foc::RotorVector held_;
+  foc::StatorVector held_;
   foc::Phases readings_;
   foc::OffsetCalibration calibration_;
   ResistanceTest resistance_;

@@ -16,14 +16,17 @@ struct Context {
   foc::SensorSettings sensors;  // with what was found of them
   Sample now;
 
-  // What the motor has of the voltage: without the legs' losses, around zero current in proportion, as noise would
-  // decide the sign.
-  constexpr foc::StatorVector motor_voltage() const {
+  // What the legs lose at these currents: around zero in proportion, as noise would decide the sign.
+  constexpr foc::StatorVector lost(const foc::Phases& currents) const {
     constexpr int kZoneBits = 6, kShareBits = 12;  // a zone of a sixty-fourth of the test current
     const std::int32_t zone = settings.current >> kZoneBits, per_share = result.lost_voltage / (zone >> kShareBits);
     const auto loss = [&](std::int32_t i) { return (fixed::limited(i, -zone, zone) >> kShareBits) * per_share; };
-    const foc::StatorVector lost = foc::clarke({loss(now.phases.a), loss(now.phases.b), loss(now.phases.c)});
-    return {now.voltage.alpha - lost.alpha, now.voltage.beta - lost.beta};
+    return foc::clarke({loss(currents.a), loss(currents.b), loss(currents.c)});
+  }
+  // What the motor has of the voltage.
+  constexpr foc::StatorVector motor_voltage() const {
+    const foc::StatorVector x = lost(now.phases);
+    return {now.voltage.alpha - x.alpha, now.voltage.beta - x.beta};
   }
   constexpr void fail(Fault fault, int phase = 0) {
     if (result.fault != Fault::none) return;

@@ -166,4 +166,14 @@ constexpr std::int32_t scaled(std::int32_t x, std::int32_t a, int bits) {
   return static_cast<std::int32_t>(fixed::limited<std::int64_t>((std::int64_t{x} * a) >> bits, -INT32_MAX, INT32_MAX));
 }
 
+// The flux of a current, for a turn instead of a radian; and the voltage that it induces at a speed in 2^-32 turns a
+// period, 2^-28. Units of the rest as `Result` has them.
+constexpr std::int32_t linkage(std::int32_t inductance, std::int32_t current) {
+  constexpr std::int32_t kTwoPi = 1686629713;  // 2^-28
+  return scaled(scaled(inductance, current, 27), kTwoPi, 28);
+}
+constexpr std::int32_t induced_voltage(std::int32_t inductance, std::int32_t current, std::int32_t speed) {
+  return scaled(linkage(inductance, current), speed, 32 - 28 + kSharesBits);
+}
+
 }  // namespace flexspline::control::commissioning

@@ -11,6 +11,7 @@ class Injection {
  public:
   constexpr void begin() { *this = {}; }
   constexpr bool done() const { return impedance_.done(); }
+  constexpr bool measures() const { return part_ == Part::measure; }
   constexpr std::int32_t inductance(std::int32_t resistance) const { return impedance_.inductance(resistance); }
 
   // Voltage and current of this sample along the axis; returns what to add to the voltage of the next period. The

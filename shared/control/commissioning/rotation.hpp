@@ -28,25 +28,38 @@ class RotationTest {
   constexpr Step step() const { return step_; }
 
   // Current wanted along the vector, in its frame.
-  constexpr foc::RotorVector wanted(const Context& c) const {
-    return {step_ == Step::does_it_turn && less_ ? c.settings.current - c.settings.current / 4 : c.settings.current, 0};
-  }
-  // The sample belongs to the angle that the vector has now; afterwards it has that of the next one.
+  constexpr foc::RotorVector wanted(const Context& c) const { return {c.settings.current, 0}; }
+  // The sample belongs to the angle that the vector has now; afterwards it has that of the next one. `voltage`: what
+  // the motor has of it along and across the vector.
   constexpr void update(Context& c, const foc::RotorVector& voltage) {
-    const std::int32_t slow = c.settings.slow_step, target = step_ == Step::backward ? -slow : slow;
+    travel_ += c.now.moved;
+    const std::int32_t slow = step_ == Step::does_it_turn ? c.settings.slow_step : c.settings.slow_step >> slower_,
+                       target = step_ == Step::backward ? -slow : slow;
     if (!waited_) {
       if (vector_.step() == target && size_of_turn(vector_.turned() - since_) >= wait_) begin_part(c);
     } else if (step_ == Step::pole_pairs) {
       pole_pairs(c);
     } else if (step_ == Step::does_it_turn) {
-      does_it_turn(c, voltage);
+      if (!stops_) does_it_turn(c, voltage);
     } else {
       pass(c);
     }
-    travel_ += c.now.moved;
-    vector_.advance(step_ == Step::stop ? 0 : target, c.settings.step_ramp / 4);
+    vector_.advance(step_ == Step::stop || stops_ ? 0 : target, c.settings.step_ramp / 4);
   }
   constexpr bool done() const { return step_ == Step::stop && vector_.step() == 0; }
+  // The vector stands for `does_it_turn`, which needs the inductances.
+  constexpr bool stands() const { return stops_ && vector_.step() == 0; }
+  // A standing rotor answers the turning current with the voltage of its inductances, in the mean over an electrical
+  // turn with the mean of both, w I (Ld + Lq)/2. One that turns induces w flux, and has its d along the vector as long
+  // as the magnet is stronger there than reluctance, which leaves at least half of w flux above that mean; else
+  // reluctance has turned it, and there is at least as much.
+  constexpr void conclude_turning(Context& c, const Inductances& found) const {
+    const std::int32_t mean = found.d / 2 + found.q / 2;
+    const std::int32_t standing = induced_voltage(mean, c.settings.current, c.settings.slow_step);
+    // What the inductances may be wrong by, and what is left of the legs' losses.
+    const std::int64_t noise = standing / 32 + c.result.lost_voltage / 64;
+    c.fail(std::int64_t{across_mean_} - standing > noise ? Fault::encoder_stands : Fault::rotor_blocked);
+  }
 
  private:
   static constexpr std::int64_t kPolePairTurns = 8;
@@ -66,10 +79,11 @@ class RotationTest {
     waited_ = true;
     since_ = vector_.turned();
     travel_ = furthest_ = nearest_ = 0;
-    lead_ = {};
-    across_ = 0;
-    count_ = 0;
+    all_ = first_ = last_ = {};
+    least_ = most_ = 0;
+    across_ = {};
     if (step_ != Step::backward) reference_ = lead(c);
+    began_ = static_cast<std::int32_t>(lead(c) - reference_);
   }
   // Of the vector before the encoder.
   constexpr std::uint32_t lead(const Context& c) const {
@@ -85,25 +99,29 @@ class RotationTest {
     if (c.result.pole_pairs == 0) return c.fail(Fault::encoder_slips);
     go(Step::forward, 0);
   }
+  // A turn of the rotor for the mean, and the vector's first turn again to compare with. Both are means, as harmonics
+  // of the magnet's flux and cogging can make a rotor jump from tooth to tooth.
   constexpr void pass(Context& c) {
-    const auto now = static_cast<std::int32_t>(lead(c) - reference_);
-    if (count_ == 0) lead_ = {0, now, now};
-    lead_.sum += now;
-    if (now < lead_.least) lead_.least = now;
-    if (now > lead_.most) lead_.most = now;
-    ++count_;
-    if (size_of_turn(vector_.turned() - since_) < c.result.pole_pairs * kTurn) return;
-    constexpr std::int64_t kMostChange = kTurn / 12, kMostRange = kTurn / 3;
-    // Whole turns that a slip takes do not show in the angle.
-    const std::int64_t rotor = travel_ * c.result.pole_pairs;
-    const std::int64_t change = vector_.turned() - since_ - (c.result.reversed ? -rotor : rotor),
-                       range = std::int64_t{lead_.most} - lead_.least;
-    if (size_of_turn(change) > kMostChange || range > kMostRange) {
-      // Reluctance can hold the rotor at either side of the vector; it changes once. A coupling slips again.
+    // Of the vector since the part began; whole turns that a slip takes show as well.
+    const std::int64_t turned = vector_.turned() - since_, rotor = travel_ * c.result.pole_pairs;
+    const std::int64_t ahead = turned - (c.result.reversed ? -rotor : rotor);
+    if (ahead < least_) least_ = ahead;
+    if (ahead > most_) most_ = ahead;
+    const std::int64_t whole = c.result.pole_pairs * kTurn, at = size_of_turn(turned);
+    if (at < whole) all_.add(ahead);
+    if (at < kTurn) first_.add(ahead);
+    if (at >= whole) last_.add(ahead);
+    if (at < whole + kTurn) return;
+    constexpr std::int64_t kMostChange = kTurn / 12, kMostRange = kTurn / 2;
+    const std::int64_t change = std::int64_t{last_.mean()} - first_.mean();
+    if (size_of_turn(change) > kMostChange || most_ - least_ > kMostRange) {
+      // Reluctance can hold the rotor at either side of the vector, and changes once; jumps can make it swing, less so
+      // at half of the speed. A coupling slips again.
+      if (slower_ < kRepeats) ++slower_;
       return ++repeated_ > kRepeats ? go(Step::does_it_turn, 1) : go(step_, 1);
     }
     repeated_ = 0;
-    const std::int32_t mean = ratio(lead_.sum, count_, 0);
+    const std::int32_t mean = began_ + all_.mean();
     if (step_ == Step::forward) {
       forward_ = mean;
       return go(Step::backward, 1);
@@ -121,31 +139,26 @@ class RotationTest {
     if (stated != 0 && stated != c.result.pole_pairs) return c.fail(Fault::wrong_pole_pairs);
     go(Step::stop, 0);
   }
-  // The encoder does not follow the vector. A rotor that turns with it induces flux times speed, whatever the current
-  // is; the rest of the voltage across the vector is in proportion to the current.
+  // The encoder does not follow the vector.
   constexpr void does_it_turn(Context& c, const foc::RotorVector& voltage) {
-    across_ += voltage.q;
-    ++count_;
+    across_.add(voltage.q);
     if (travel_ > furthest_) furthest_ = travel_;
     if (travel_ < nearest_) nearest_ = travel_;
     if (vector_.turned() - since_ < kCheckTurns * kTurn) return;
-    const std::int32_t mean = ratio(across_, count_, 0);
-    if (!less_) {
-      // The range, as a slip may take back what the rotor moved.
-      if ((furthest_ - nearest_) * (2 * kMostPolePairs) > kCheckTurns * kTurn) return c.fail(Fault::encoder_slips);
-      whole_ = mean;
-      less_ = true;
-      return go(Step::does_it_turn, 1);
-    }
-    const std::int64_t induced = 4 * std::int64_t{mean} - 3 * std::int64_t{whole_};
-    const bool turns = induced > c.settings.most_voltage / 512 && induced > whole_ / 16;
-    c.fail(turns ? Fault::encoder_stands : Fault::rotor_blocked);
+    // The range, as a slip may take back what the rotor moved.
+    if ((furthest_ - nearest_) * (2 * kMostPolePairs) > kCheckTurns * kTurn) return c.fail(Fault::encoder_slips);
+    across_mean_ = across_.mean();
+    stops_ = true;
   }
 
-  struct Lead {
+  struct Mean {
     std::int64_t sum = 0;
-    std::int32_t least = 0;
-    std::int32_t most = 0;
+    std::int32_t count = 0;
+    constexpr void add(std::int64_t x) {
+      sum += x;
+      ++count;
+    }
+    constexpr std::int32_t mean() const { return ratio(sum, count, 0); }
   };
   TurningVector vector_;
   Step step_ = Step::pole_pairs;
@@ -155,14 +168,17 @@ class RotationTest {
   std::int64_t travel_ = 0;  // of the encoder since then
   std::int64_t furthest_ = 0;
   std::int64_t nearest_ = 0;
-  std::int32_t count_ = 0;
   int repeated_ = 0;
+  int slower_ = 0;  // exponent of two by which the slow speed is lower
   std::uint32_t reference_ = 0;
-  Lead lead_;
+  std::int32_t began_ = 0;   // the lead where the part began, above the reference
+  Mean all_, first_, last_;  // of what the vector is ahead since then
+  std::int64_t least_ = 0;
+  std::int64_t most_ = 0;
   std::int32_t forward_ = 0;
-  std::int64_t across_ = 0;
-  std::int32_t whole_ = 0;
-  bool less_ = false;
+  Mean across_;
+  std::int32_t across_mean_ = 0;
+  bool stops_ = false;
 };
 
 }  // namespace flexspline::control::commissioning

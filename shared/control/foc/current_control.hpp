@@ -6,17 +6,18 @@
 // later on, for one period, whose middle is sample k+1. For each axis, with T the period, R and L of the winding,
 // a = exp(-R T/L), m[k] the model's current when u[k] begins to act and i the measured one:
 //   D    = (1 - exp(-w T)) (r - m[k])                        w: corner of the response, r: set point
-//   x    = sqrt(a) (m_mid[k] - i[k]) - p[k]                  error when u[k] begins to act: at the sample only half of
-//                                                            the last correction has acted, p is the other half
+//   x    = (sqrt(a) + B) (m_mid[k] - i[k]) - p[k]            error when u[k] begins to act, see below
 //   u    = S D + R m[k] + Kp x + I[k] + cross                S = R/(1 - a), about L/T
-//   n[k+1] = m[k] + h D - x + p[k+1]                         current expected at the next sample, h = 1/(1 + sqrt(a))
-//   p[k+1] = h Kp/S x
+//   n[k+1] = m[k] + h D - x + p[k+1]                         current at the next sample, about; h = 1/(1 + sqrt(a))
+//   p[k+1] = (B sqrt(a) + (1 - B) h Kp/S) x
 //   cross = -w_e Lq n_q in d, w_e (Ld n_d + flux) in q       decoupling, feedforward of the back-EMF
 //   D    <- D + (u_limited - u)/S                            the model moves as far as the voltage lets it
 //   m[k+1] = m[k] + D, m_mid[k+1] = m[k] + h D
 //   I[k+1] = I[k] + Ki x, but I[k] where the limit holds u back and x would push it further; within its own limit
-// Without delay in what x says, Kp may be near S, which takes out all of an error within a period.
-// The voltage is limited to a circle; d, which holds the flux, has it first: |u_d| <= U, |u_q| <= sqrt(U^2 - u_d^2).
+// x is an observer's: the error before, less what its correction takes, and sqrt(a) + B of what the sample has more
+// than that. An error that a wrong slope has made by the middle of a period is larger at its end, hence B. The three
+// gains B, Kp/S and Ki/S belong to the PWM rate over the bandwidth: host/drive_link/deployment/foc_settings. The
+// voltage is limited to a circle; d, which holds the flux, has it first: |u_d| <= U, |u_q| <= sqrt(U^2 - u_d^2).
 #pragma once
 
 #include <cstdint>
@@ -36,8 +37,8 @@ struct AxisSettings {
   std::int32_t slope = 0;         // S, 2^-30
   std::int32_t per_slope = 0;     // 1/S, 2^-27
   std::int32_t beyond = 0;        // h - 1, 2^-32
-  std::int32_t decay = 0;         // sqrt(a) - 1, 2^-32
-  std::int32_t pending = 0;       // h Kp/S, 2^-32
+  std::int32_t weight = 0;        // sqrt(a) + B - 1, 2^-32
+  std::int32_t pending = 0;       // B sqrt(a) + (1 - B) h Kp/S, 2^-31
   std::int32_t reactance = 0;     // 2 pi L/(8 T), 2^-30: the speed is counted in eighths of a turn per period
 };
 struct CurrentSettings {
@@ -52,7 +53,7 @@ struct AxisState {
   std::int64_t integral = 0;  // 2^-57
   std::int32_t model = 0;
   std::int32_t expected = 0;  // m_mid
-  std::int32_t pending = 0;   // p
+  std::int32_t pending = 0;   // p/2
 };
 struct CurrentState {
   AxisState d;
@@ -72,17 +73,18 @@ struct AxisPlan {
   std::int32_t error = 0;
   std::int32_t move = 0;      // D
   std::int32_t expected = 0;  // n
-  std::int32_t pending = 0;
-  std::int32_t voltage = 0;  // without cross
+  std::int32_t pending = 0;   // half of it
+  std::int32_t voltage = 0;   // without cross
 };
 constexpr AxisPlan plan(const AxisSettings& c, const AxisState& s, std::int32_t pull, std::int32_t set_point,
                         std::int32_t measured) {
   AxisPlan p;
   const std::int32_t seen = s.expected - measured;  // within four bases
-  p.error = fixed::add_high(seen, seen, c.decay) - s.pending;
+  // Held, as readings that mean nothing can drive it up: within four bases, with a pending part below one of itself.
+  p.error = held<kCurrentBits + 1>(fixed::add_high(seen, seen, c.weight) - s.pending * 2);
   p.pending = fixed::multiply_high(p.error, c.pending);
   p.move = fixed::multiply_high(set_point - s.model, pull);
-  p.expected = held<kCurrentBits>(fixed::add_high(s.model + p.move, p.move, c.beyond) - p.error + p.pending);
+  p.expected = held<kCurrentBits>(fixed::add_high(s.model + p.move, p.move, c.beyond) - p.error + p.pending * 2);
   // Each product is below 2^60, and so is the integral.
   const std::int64_t sum = s.integral + std::int64_t{c.proportional} * p.error + std::int64_t{c.slope} * p.move +
                            std::int64_t{c.resistance} * s.model;
