@@ -86,7 +86,8 @@ TEST(CatalogueIntervals, HoldTheTruthOfEachEffectInEachWorld) {
 TEST(CatalogueIntervals, OfAnAddedEffectAreThoseOfTheModelWithIt) {
   plant::Drive drive = plant::demo_plant().drive;
   plant::hide(drive, "cubic_stiffness");
-  const data::Dataset dataset = dataset_of(drive, plant::record_all(drive, plant::demo_plant().experiments, kFirstSeed));
+  const data::Dataset dataset =
+      dataset_of(drive, plant::record_all(drive, plant::demo_plant().experiments, kFirstSeed));
   const auto added = selection::add(dataset, model_of(drive, false, false), "cubic_stiffness", {});
   const auto identified_with = identified(dataset, model_of(drive, true, false));
   std::size_t compared = 0;

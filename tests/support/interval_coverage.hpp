@@ -27,14 +27,14 @@ struct World {
 };
 
 inline std::vector<World> interval_worlds() {
-  return {{"demo", [](plant::Drive&) {}},
-          {"friction differs by 3 %", [](plant::Drive& d) { d.friction_variation = 0.03; }},
-          {"correlated noise", [](plant::Drive& d) { d.sensors.current.correlation = d.sensors.torque.correlation = 0.9; }},
-          {"coarse encoders",
-           [](plant::Drive& d) {
-             d.sensors.motor_counts /= 8;
-             d.sensors.output_counts /= 8;
-           }}};
+  return {
+      {"demo", [](plant::Drive&) {}},
+      {"friction differs by 3 %", [](plant::Drive& d) { d.friction_variation = 0.03; }},
+      {"correlated noise", [](plant::Drive& d) { d.sensors.current.correlation = d.sensors.torque.correlation = 0.9; }},
+      {"coarse encoders", [](plant::Drive& d) {
+         d.sensors.motor_counts /= 8;
+         d.sensors.output_counts /= 8;
+       }}};
 }
 
 struct ParameterCoverage {
@@ -148,10 +148,12 @@ inline void print(const std::string& heading, const Coverage& coverage) {
     const double bias = mean_of(c.errors);
     double square = 0.0;
     for (const double e : c.errors) square += (e - bias) * (e - bias);
-    fmt::print("{:24} {:46} {:4} of {:4} ({:5.1f} %; {:5.1f} to {:5.1f}), none {:3} | bias {:8.4f} %, spread {:8.4f} %, half width {:8.4f} %\n",
-               heading, name, c.inside, c.all, 100.0 * c.share(), 100.0 * exact.low, 100.0 * exact.high, c.without,
-               100.0 * bias, 100.0 * std::sqrt(square / static_cast<double>(std::max<std::size_t>(1, c.errors.size()))),
-               100.0 * median_of(c.half_widths));
+    fmt::print(
+        "{:24} {:46} {:4} of {:4} ({:5.1f} %; {:5.1f} to {:5.1f}), none {:3} | bias {:8.4f} %, spread {:8.4f} %, half "
+        "width {:8.4f} %\n",
+        heading, name, c.inside, c.all, 100.0 * c.share(), 100.0 * exact.low, 100.0 * exact.high, c.without,
+        100.0 * bias, 100.0 * std::sqrt(square / static_cast<double>(std::max<std::size_t>(1, c.errors.size()))),
+        100.0 * median_of(c.half_widths));
   }
 }
 

@@ -99,8 +99,8 @@ TEST(Identify, AtRestFrictionHoldsTheWeightAndTheSensorReadsItsOffset) {
   for (double& torque : rest[Column::motor_torque]) torque += noise(random);
   model::Model model = model_of({"inertia", "viscous_friction", "coulomb_friction", "torque_bias", "torque_ripple"});
   model.effects.back().find("order")->value = 2.0;
-  const auto found =
-      identify(dataset_of({experiment("lively", kLively, law), experiment("other", kOther, law), rest}), model, kOptions);
+  const auto found = identify(dataset_of({experiment("lively", kLively, law), experiment("other", kOther, law), rest}),
+                              model, kOptions);
   for (const Estimate& e : found->estimates) {
     if (e.effect == "torque_bias") {
       EXPECT_NEAR(e.value, kOffset, 2e-4);

@@ -76,8 +76,8 @@ model::Model spring() {
   return model;
 }
 
-// The position is filtered before it is differentiated and as a column: both leave so much of its noise's variance N, by
-// which least squares attenuates the stiffness, by N/(S + N).
+// The position is filtered before it is differentiated and as a column: both leave so much of its noise's variance N,
+// by which least squares attenuates the stiffness, by N/(S + N).
 TEST(RegressorNoise, FindsTheAttenuationOfAStiffnessByNoiseOfThePosition) {
   constexpr double kNoise = 4e-4;
   constexpr int kSteps = 5000, kSeeds = 6;

@@ -7,12 +7,12 @@
 #include <stdexcept>
 #include <utility>
 
-#include "host/engine/estimation/standard_intervals.hpp"
 #include "host/engine/estimation/instruments.hpp"
 #include "host/engine/estimation/intervals.hpp"
 #include "host/engine/estimation/least_squares.hpp"
 #include "host/engine/estimation/output_error.hpp"
 #include "host/engine/estimation/partition.hpp"
+#include "host/engine/estimation/standard_intervals.hpp"
 #include "host/physics/catalogue/user_defined_effect.hpp"
 
 namespace flexspline::estimation {

@@ -74,8 +74,7 @@ std::vector<std::vector<SignalNoise>> draw_all(const Identification& found, std:
       noise.push_back(draw(e, Column::motor_position, filter, record.motor_quantum, random));
     if (e.has(Column::output_position) && !record.locked)
       noise.push_back(draw(e, Column::output_position, filter, record.output_quantum, random));
-    if (e.has(Column::torque) && reads_torque)
-      noise.push_back(draw(e, Column::torque, filter, std::nullopt, random));
+    if (e.has(Column::torque) && reads_torque) noise.push_back(draw(e, Column::torque, filter, std::nullopt, random));
   }
   return all;
 }
@@ -160,8 +159,7 @@ void add_draw(const BalanceData& data, const BalanceFit& fit, const Linearised& 
   changes.chance.col(draw_index) = 0.5 * (step[0] - step[1]);
   const Eigen::VectorXd moved =
       0.5 * (noisy[0]->residual - noisy[1]->residual) - own.J * changes.chance.col(draw_index);
-  changes.middle += newey_west(data.records(), fit.whitening.score_columns(own.J),
-                               fit.root_weights.cwiseProduct(moved),
+  changes.middle += newey_west(data.records(), fit.whitening.score_columns(own.J), fit.root_weights.cwiseProduct(moved),
                                newey_west_lags(fit.autocorrelation_time, data.rows())) /
                     static_cast<double>(kDraws);
 }

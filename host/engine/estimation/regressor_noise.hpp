@@ -18,10 +18,11 @@ struct RegressorNoise {
 };
 
 // For each balance, by simulation and extrapolation (Cook and Stefanski 1994): noise as that of each position, and of
-// the torque where an effect of the motor's balance reads it, is drawn and added to what was measured, so that its variance is twice and four
-// times as large; the change is taken for a power of the variance, and extrapolated to none. The same noise is added
-// and subtracted: half the difference of both changes is what is proportional to it, chance; half their sum has no
-// such part (antithetic variates, Hammersley and Morton 1956). Each is one Gauss-Newton step from the estimates.
+// the torque where an effect of the motor's balance reads it, is drawn and added to what was measured, so that its
+// variance is twice and four times as large; the change is taken for a power of the variance, and extrapolated to none.
+// The same noise is added and subtracted: half the difference of both changes is what is proportional to it, chance;
+// half their sum has no such part (antithetic variates, Hammersley and Morton 1956). Each is one Gauss-Newton step from
+// the estimates.
 //
 // A balance whose values rest on the evidence of another one as well is left out.
 //
