@@ -89,6 +89,28 @@ bool warns_of(const Identification& found, std::string_view what) {
   return false;
 }
 
+// A vertical axis that friction holds while the drive is off: its sensor then reads its offset, not the weight.
+TEST(Identify, AtRestFrictionHoldsTheWeightAndTheSensorReadsItsOffset) {
+  constexpr double kWeight = 0.03, kOffset = 0.01;
+  const auto law = [](double q, double w, double a) { return plain(q, w, a) + kWeight * std::cos(2.0 * q) + kOffset; };
+  data::Experiment rest = experiment("rest", {}, [](double, double, double) { return kOffset; });
+  std::mt19937_64 random(1);
+  std::normal_distribution<double> noise(0.0, 1e-4);
+  for (double& torque : rest[Column::motor_torque]) torque += noise(random);
+  model::Model model = model_of({"inertia", "viscous_friction", "coulomb_friction", "torque_bias", "torque_ripple"});
+  model.effects.back().find("order")->value = 2.0;
+  const auto found = identify(dataset_of({experiment("lively", kLively, law), experiment("other", kOther, law), rest}),
+                              model, kOptions);
+  for (const Estimate& e : found->estimates) {
+    if (e.effect == "torque_bias") {
+      EXPECT_NEAR(e.value, kOffset, 2e-4);
+    }
+    if (e.parameter == "cosine") {
+      EXPECT_NEAR(e.value, kWeight, 5e-4);
+    }
+  }
+}
+
 TEST(Identify, FindsTheParametersOfAnExactExperiment) {
   const auto found = identify(dataset_of({experiment("a", kLively, plain)}), model_of(kPlain), kOptions);
   EXPECT_NEAR(value(*found, "inertia", "inertia") / kInertia, 1.0, 1e-3);

@@ -141,6 +141,23 @@ TEST(PreparedRecord, KeepsARecordWithTheDriveOffAndGivesItNoDirection) {
   }
 }
 
+TEST(PreparedRecord, KnowsADriveThatIsOffByNoiseThatIsCorrelatedOverSomeSamples) {
+  std::mt19937_64 random(1);
+  std::normal_distribution<double> normal;
+  int at_rest = 0;
+  for (int record = 0; record < 20; ++record) {
+    data::Experiment e = still(4.0);
+    double noise = normal(random);
+    for (double& torque : e[Column::motor_torque]) {
+      torque = 0.02 + 1e-3 * noise;
+      noise = 0.9 * noise + std::sqrt(1.0 - 0.81) * normal(random);
+    }
+    e.current_hold = data::CurrentHold::zoh;
+    at_rest += prepared(e).at_rest;
+  }
+  EXPECT_GE(at_rest, 19);
+}
+
 TEST(PreparedRecord, AStuckAxisUnderAChangingEffortIsNotAtRestAndIsMasked) {
   data::Experiment e = still(3.0);
   for (std::size_t k = 0; k < e.size(); ++k)
@@ -148,6 +165,11 @@ TEST(PreparedRecord, AStuckAxisUnderAChangingEffortIsNotAtRestAndIsMasked) {
   const Record r = prepared(e);
   EXPECT_FALSE(r.at_rest);
   EXPECT_TRUE(motor_rows(r).empty()) << "friction of a sticking axis is unknown";
+  // Nor under noise that is correlated as much as neighbours of a slow effort behind white noise are.
+  std::mt19937_64 random(1);
+  std::normal_distribution<double> noise(0.0, 0.02 / std::sqrt(20.0));
+  for (double& torque : e[Column::motor_torque]) torque += noise(random);
+  EXPECT_FALSE(prepared(e).at_rest);
 }
 
 TEST(PreparedRecord, AHeldEffortIsPutHalfASampleLater) {

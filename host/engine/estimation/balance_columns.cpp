@@ -144,8 +144,8 @@ void BalanceData::add_torque(const Terms& terms, const Term& term, const std::ve
   std::vector<effects::Inputs<N>> changed;
   const bool any = change_inputs<N>(terms, term, r, all_values, changed);
   const std::vector<P> natural = catalogue::natural(*term.entry, values);
-  const auto share_of = [&](Balance to) { return share(r, to); };
-  add_by_shares(term, share_of, torque, [&](Balance to, typename N::Value* sum) {
+  const auto share_here = [&](Balance to) { return share_of(term, r, to); };
+  add_by_shares(term, share_here, torque, [&](Balance to, typename N::Value* sum) {
     const catalogue::BlockFunctions<N>& functions = functions_of<N>(*term.entry);
     if (any)
       functions.torque(natural.data(), constants, to, changed, sum);
@@ -261,12 +261,12 @@ void BalanceData::make_columns(const Terms& terms, const std::vector<ParameterRe
   const auto fill = [&](const RowRange& range, const UnitColumn& column, const ColumnBlock& block) {
     const Term& term = *column.term;
     const Record& r = prepared_->records[range.record];
-    const auto share_of = [&](Balance to) { return share(r, to); };
+    const auto share_here = [&](Balance to) { return share_of(term, r, to); };
     if (column.reads == kWholeRecord) return add_torque<Real>(terms, term, column.values, r, all, block.signal);
     if (!term.adds_torque()) return;
     if (ColumnPair* const both = column.second_of ? column.second_of.get() : column.first_of.get()) {
       if (both->begins(range, block))
-        add_by_shares(term, share_of, std::span(both->torque), [&](Balance to, Jet* sum) {
+        add_by_shares(term, share_here, std::span(both->torque), [&](Balance to, Jet* sum) {
           term.entry->dual.torque_of_plain(both->parameters.data(), lifted_constants, to, block.inputs, sum);
         });
       for (std::size_t k = 0; k < block.signal.size(); ++k)
@@ -274,7 +274,7 @@ void BalanceData::make_columns(const Terms& terms, const std::vector<ParameterRe
       return;
     }
     const std::vector<double> natural = catalogue::natural(*term.entry, column.values);
-    add_by_shares(term, share_of, block.signal, [&](Balance to, double* sum) {
+    add_by_shares(term, share_here, block.signal, [&](Balance to, double* sum) {
       term.entry->real.torque_of_plain(natural.data(), prepared_->constants, to, block.inputs, sum);
     });
   };

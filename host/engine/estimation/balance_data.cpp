@@ -31,6 +31,14 @@ double BalanceData::share(const Record& r, Balance of_effect) const {
   return of_effect == through ? 1.0 / prepared_->constants.gear_ratio : 0.0;
 }
 
+// With the drive off friction holds the shaft against whatever else acts on it, a weight or a ripple.
+double BalanceData::share_of(const Term& term, const Record& r, Balance of_effect) const {
+  const effects::Description& info = *term.entry->info;
+  const bool is_of_effort = !term.entry->definition && info.balance == Balance::motor &&
+                            (info.reads & (effects::kCurrent | effects::kTorqueInput)) != 0;
+  return r.at_rest && !is_of_effort ? 0.0 : share(r, of_effect);
+}
+
 void BalanceData::filter(const RowRange& range, Eigen::Ref<Eigen::MatrixXd> signals) const {
   const auto at = static_cast<std::size_t>(&range - ranges_.data());
   for (const data::Segment& s : prepared_->records[range.record].segments)
@@ -78,6 +86,7 @@ class LeftHandSides {
   double left_side(const Record& r, std::size_t k) const {
     switch (balance_) {
       case Balance::motor:
+        if (r.at_rest) return r.effort[k];  // friction holds the torque of the gear
         return r.effort[k] - (prepared_.torque_measured ? r.torque[k] / prepared_.constants.gear_ratio : 0.0);
       case Balance::transmission:
         return r.torque[k];
@@ -89,7 +98,7 @@ class LeftHandSides {
   void fill_target(const Record& r, std::size_t from, std::span<double> signal) const {
     for (std::size_t k = 0; k < signal.size(); ++k) signal[k] = left_side(r, from + k);
     // A known load torque reaches the motor through the gear.
-    if (balance_ == Balance::motor && !prepared_.torque_measured && !r.load_torque.empty())
+    if (balance_ == Balance::motor && !prepared_.torque_measured && !r.load_torque.empty() && !r.at_rest)
       for (std::size_t k = 0; k < signal.size(); ++k)
         signal[k] -= r.load_torque[from + k] / prepared_.constants.gear_ratio;
   }

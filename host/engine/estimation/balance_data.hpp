@@ -96,6 +96,8 @@ class BalanceData {
   bool usable(const Record& record) const;
   // How much of what adds to a balance reaches this one: its own, and by way of the gear without a torque sensor.
   double share(const Record& record, Balance of_effect) const;
+  // The same of one effect. A drive at rest shows what the sensor of its effort reads, and nothing else.
+  double share_of(const Term& term, const Record& record, Balance of_effect) const;
   // Samples from what `fill(range, column, signal)` writes along each record, filtered.
   template <class Fill>
   Eigen::MatrixXd filtered_columns(std::size_t columns, Fill fill) const;

@@ -118,6 +118,8 @@ class Fitting {
 void Fitting::fit_weighted() {
   // Weights and parameters depend on each other; two rounds are enough.
   sweep_nonlinear(data_, terms_, fit_.on_balance, fit_.root_weights);
+  // Weights of the best point of a grid would be small on just those records that show where between points it lies.
+  if (!fit_.nonlinear.empty()) refine_nonlinear(data_, terms_, fit_.on_balance, fit_.root_weights);
   for (int round = 0; round < 2; ++round) {
     solve(fit_.root_weights);
     fit_.root_weights = record_weights(data_.records(), fit_.residual);

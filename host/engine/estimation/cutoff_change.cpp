@@ -4,7 +4,6 @@
 #include <cmath>
 #include <memory>
 
-#include "host/common/numbers/distributions.hpp"
 #include "host/input/data/finding.hpp"
 
 namespace flexspline::estimation {
@@ -27,33 +26,21 @@ std::unique_ptr<Identification> at_higher_cutoff(const Identification& found, co
 
 }  // namespace
 
-double half_width_under_bias(double bias) {
-  constexpr double kInside = 0.95;
-  const auto inside = [&](double half) {
-    return numbers::normal_up_to(half - bias) - numbers::normal_up_to(-half - bias);
-  };
-  double low = 0.0, high = bias + 2.0;
-  for (int i = 0; i < 60; ++i) (inside(0.5 * (low + high)) < kInside ? low : high) = 0.5 * (low + high);
-  return high;
-}
-
-void widen_by_cutoff(Identification& identification, const data::Dataset& dataset, const model::Model& model,
-                     const PipelineOptions& pipeline) {
+std::vector<double> bias_of_cutoff(Identification& identification, const data::Dataset& dataset,
+                                   const model::Model& model, const PipelineOptions& pipeline) {
+  std::vector<double> bias(identification.estimates.size(), 0.0);
   const auto higher = at_higher_cutoff(identification, dataset, model, pipeline);
-  if (!higher) return;
-  for (Estimate& e : identification.estimates) {
+  for (std::size_t i = 0; higher && i < bias.size(); ++i) {
+    Estimate& e = identification.estimates[i];
     const auto other = std::find_if(higher->estimates.begin(), higher->estimates.end(),
                                     [&](const Estimate& o) { return o.ref == e.ref; });
-    if (e.fixed || !e.std || !(*e.std > 0.0) || !e.low || !e.high) continue;
+    if (e.fixed || !e.std || !(*e.std > 0.0)) continue;
     if (other == higher->estimates.end() || !other->identifiable || !other->std) continue;
     e.change_at_twice_cutoff = other->value - e.value;
     const double of_noise = std::abs(*other->std * *other->std - *e.std * *e.std);
-    const double squared = *e.change_at_twice_cutoff * *e.change_at_twice_cutoff - of_noise;
-    if (squared <= 0.0) continue;
-    const double half = half_width_under_bias(std::sqrt(squared) / *e.std) * *e.std;
-    e.low = std::min(*e.low, e.value - half);
-    e.high = std::max(*e.high, e.value + half);
+    bias[i] = std::sqrt(std::max(*e.change_at_twice_cutoff * *e.change_at_twice_cutoff - of_noise, 0.0));
   }
+  return bias;
 }
 
 }  // namespace flexspline::estimation

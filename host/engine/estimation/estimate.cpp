@@ -7,12 +7,12 @@
 #include <stdexcept>
 #include <utility>
 
-#include "host/engine/estimation/cutoff_change.hpp"
 #include "host/engine/estimation/instruments.hpp"
 #include "host/engine/estimation/intervals.hpp"
 #include "host/engine/estimation/least_squares.hpp"
 #include "host/engine/estimation/output_error.hpp"
 #include "host/engine/estimation/partition.hpp"
+#include "host/engine/estimation/standard_intervals.hpp"
 #include "host/physics/catalogue/user_defined_effect.hpp"
 
 namespace flexspline::estimation {
@@ -126,7 +126,7 @@ std::unique_ptr<Identification> estimate(const data::Dataset& dataset, const mod
   warn_of_scale(*result);
   const bool is_least_squares = method == Method::ls || method == Method::nls;
   if (options.intervals == Intervals::standard) {
-    if (is_least_squares) widen_by_cutoff(*result, dataset, known, pipeline);
+    if (is_least_squares) count_biases(*result, dataset, known, pipeline);
     return result;
   }
   if (!is_least_squares) {

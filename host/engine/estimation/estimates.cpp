@@ -6,6 +6,7 @@
 #include <cmath>
 
 #include "host/engine/estimation/least_squares.hpp"
+#include "host/engine/estimation/standard_intervals.hpp"
 #include "host/engine/estimation/variable_projection.hpp"
 
 namespace flexspline::estimation {
@@ -287,10 +288,12 @@ void add_estimates(BalanceData& data, const BalanceFit& fit, const std::vector<P
     e.identifiable = fit.root_tolerance[at] >= kUndetermined && no_scale.empty() && !std::ranges::count(open, ref.term);
     e.excitation = fit.excitation[at];
     const double variance = natural_value(result.terms[ref.term], ref, all, fit.covariance).variance;
-    if (e.identifiable && std::isfinite(variance)) {
+    // What differs from a column that was left out by too little has its value and that one's together.
+    if (e.identifiable && std::isfinite(variance) && fit.excitation[at] >= kUndetermined) {
       e.std = std::hypot(std::sqrt(variance), beyond_noise(data, info, e.value));
-      e.low = e.value - 1.96 * *e.std;
-      e.high = e.value + 1.96 * *e.std;
+      const Interval interval = interval_95(e.value, *e.std);
+      e.low = interval.low;
+      e.high = interval.high;
       // A length below the resolution of these data stops at its bound and may be zero.
       if (j >= fit.linear.size() && is_length(info) && share_of_range(data, result.terms, ref) < kAtTheEnd)
         e.low = std::min(*e.low, info.low);

@@ -79,7 +79,7 @@ Eigen::MatrixXd BalanceData::point_columns(const Terms& terms, const Points& poi
   Eigen::MatrixXd columns = Eigen::MatrixXd::Zero(rows(), count);
   for (const RowRange& range : ranges_) {
     const Record& r = prepared_->records[range.record];
-    const double weight = share(r, points.balance);
+    const double weight = r.at_rest ? 0.0 : share(r, points.balance);
     if (weight == 0.0) continue;
     std::vector<effects::Inputs<Real>> changed;
     const bool any = change_inputs<Real>(terms, reader.term, r, all, changed);

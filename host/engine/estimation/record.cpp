@@ -61,19 +61,39 @@ std::vector<std::uint8_t> spread(const std::vector<std::uint8_t>& bad, std::size
   return marked;
 }
 
-// Drive off: nothing moves, and the effort changes no more than white noise does. A stuck axis under a changing effort
-// is none: its friction is unknown.
+// Drive off: nothing moves, and the effort changes no more than noise does. A stuck axis under a changing effort is
+// none: its friction is unknown. Noise may be correlated over some samples (of the first order, by its correlation of
+// neighbours); its means over eighths of the record then scatter no more than three times as they should.
 bool is_at_rest(const Record& record, double motion_span, double resolution) {
-  if (record.locked || record.effort.size() < 16 || motion_span > 2.0 * resolution) return false;
-  double mean = 0.0, steps = 0.0, spread_squared = 0.0;
-  for (std::size_t k = 0; k < record.effort.size(); ++k)
-    mean += record.effort[k] / static_cast<double>(record.effort.size());
-  for (std::size_t k = 1; k < record.effort.size(); ++k) {
+  constexpr double kMostCorrelated = 0.97, kMostScatter = 3.0;
+  constexpr std::size_t kParts = 8;
+  const std::size_t n = record.effort.size();
+  if (record.locked || n < 2 * kParts || motion_span > 2.0 * resolution) return false;
+  const auto mean_of = [&](std::size_t from, std::size_t to) {
+    double sum = 0.0;
+    for (std::size_t k = from; k < to; ++k) sum += record.effort[k];
+    return sum / static_cast<double>(to - from);
+  };
+  const double mean = mean_of(0, n);
+  double steps = 0.0, spread_squared = 0.0;
+  for (std::size_t k = 1; k < n; ++k) {
     steps += (record.effort[k] - record.effort[k - 1]) * (record.effort[k] - record.effort[k - 1]);
     spread_squared += (record.effort[k] - mean) * (record.effort[k] - mean);
   }
-  // Neighbours of white noise differ by sqrt(2) times its deviation; of noise averaged over two samples by once.
-  return spread_squared <= 2.0 * steps + 1e-12 * mean * mean * static_cast<double>(record.effort.size());
+  const double rounding = 1e-12 * mean * mean * static_cast<double>(n);
+  // Neighbours of white noise differ by sqrt(2) times its deviation; of noise averaged over two samples by once (von
+  // Neumann 1941).
+  if (spread_squared <= 2.0 * steps + rounding) return true;
+  const double correlation = 1.0 - 0.5 * steps / spread_squared;
+  if (correlation > kMostCorrelated) return false;
+  double between = 0.0;
+  for (std::size_t p = 0; p < kParts; ++p) {
+    const double off = mean_of(n * p / kParts, n * (p + 1) / kParts) - mean;
+    between += off * off / static_cast<double>(kParts - 1);
+  }
+  const double variance = spread_squared / static_cast<double>(n);
+  const double as_one = (1.0 + correlation) / (1.0 - correlation);
+  return between <= kMostScatter * variance * as_one * static_cast<double>(kParts) / static_cast<double>(n);
 }
 
 void choose_rows(Record& record, const Pipeline& pipeline, std::size_t settling) {

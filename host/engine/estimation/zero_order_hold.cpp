@@ -106,7 +106,7 @@ class Fit {
 
 }  // namespace
 
-double torque_per_held_step(const PreparedData& prepared) {
+HeldStep held_step(const PreparedData& prepared) {
   // In addition to the inertias: friction, an offset, and what a weight on the output would do, which looks like an
   // inertia where the motion is a sine.
   struct Fits {
@@ -146,14 +146,19 @@ double torque_per_held_step(const PreparedData& prepared) {
     together.output.add(one.output);
   }
   const auto motor = together.all.solve(), load = together.output.solve();
-  if (!motor || !load) return 0.0;
+  if (!motor || !load) return {};
   const double inertia_of_all = motor->value[0], output_inertia = load->value[0];
   const bool known = inertia_of_all > kCertainErrors * motor->std[0] && output_inertia > kCertainErrors * load->std[0];
-  if (!known) return 0.0;
+  if (!known) return {};
   const double per_step = output_inertia / (prepared.constants.gear_ratio * inertia_of_all);
   // The share of the half step that readings lack.
   const double lacking = -load->value[6] / per_step, doubt = load->std[6] / per_step;
-  return lacking - kCertainErrors * doubt > 0.5 ? per_step : 0.0;
+  return {per_step, lacking - kCertainErrors * doubt > 0.5, lacking + kCertainErrors * doubt > 0.5};
+}
+
+double torque_per_held_step(const PreparedData& prepared) {
+  const HeldStep step = held_step(prepared);
+  return step.lacks ? step.torque_per_step : 0.0;
 }
 
 void correct_zero_order_hold(Record& r, const catalogue::DriveConstants<double>& constants, double torque_per_step) {

@@ -11,8 +11,14 @@ namespace flexspline::estimation {
 // one of J/(N J_all) in the torque, J being the output's inertia and J_all that of all, at the motor.
 //
 // Both inertias are estimated from all free records together, and so is how much of the half step the readings lack.
-// Where that is more than half of it for certain, returns the step of the torque per step of the effort; else, as
-// behind a soft gear, zero. `prepared.pipeline.torque_per_step` must be zero still.
+struct HeldStep {
+  double torque_per_step = 0.0;  // step of the torque per step of the effort; zero: not known
+  bool lacks = false;            // more than half of the half step is missing for certain
+  bool may_lack = false;         // or it is not certain that no more than half of it is
+};
+// `prepared.pipeline.torque_per_step` must be zero still.
+HeldStep held_step(const PreparedData& prepared);
+// The step where it is missing for certain; else, as behind a soft gear, zero.
 double torque_per_held_step(const PreparedData& prepared);
 // Adds the other half of the steps to `torque` of a record (not to the inputs of effects), where it is free.
 void correct_zero_order_hold(Record& record, const catalogue::DriveConstants<double>& constants,

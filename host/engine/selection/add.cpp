@@ -8,6 +8,7 @@
 
 #include "host/engine/comparison/noise_floor.hpp"
 #include "host/engine/estimation/in_parallel.hpp"
+#include "host/engine/estimation/standard_intervals.hpp"
 #include "host/engine/selection/candidate_models.hpp"
 #include "host/physics/catalogue/user_defined_effect.hpp"
 
@@ -60,6 +61,7 @@ Addition compare_models(const data::Dataset& dataset, const model::Model& before
   estimation::in_parallel(
       2, [&](std::size_t i) { both[i] = estimation::identify(dataset, i == 0 ? before : after, options); });
   const auto& [base, extended] = both;
+  estimation::count_biases(*extended, dataset, after, options);
   std::size_t b = 0, x = 0;
   if (!find_balance(*base, own, b) || !find_balance(*extended, own, x))
     throw data::DataError({{data::Severity::error, "missing_column", "", 0, "",

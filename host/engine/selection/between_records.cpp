@@ -8,6 +8,7 @@
 #include <string>
 #include <utility>
 
+#include "host/engine/estimation/standard_intervals.hpp"
 #include "host/engine/selection/meta_regression.hpp"
 #include "host/engine/selection/policy.hpp"
 #include "host/engine/selection/record_laws.hpp"
@@ -58,8 +59,9 @@ void take_values(const MetaRegression& fit, const Law& law, double p_value, std:
     e.std = e.low = e.high = std::nullopt;
     if (!term.free_linear(e.ref.parameter)) continue;
     e.std = std::abs(e.value) * fit.coefficient_std / fit.coefficient;
-    e.low = e.value - 1.96 * *e.std;
-    e.high = e.value + 1.96 * *e.std;
+    const estimation::Interval interval = estimation::interval_95(e.value, *e.std);
+    e.low = interval.low;
+    e.high = interval.high;
   }
   candidate.admissible = true;
   candidate.why_not.clear();

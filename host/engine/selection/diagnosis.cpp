@@ -6,6 +6,7 @@
 #include "host/engine/comparison/noise_floor.hpp"
 #include "host/engine/comparison/residual_map.hpp"
 #include "host/engine/estimation/in_parallel.hpp"
+#include "host/engine/estimation/standard_intervals.hpp"
 #include "host/engine/estimation/variable_projection.hpp"
 #include "host/engine/selection/between_records.hpp"
 #include "host/engine/selection/candidate_fits.hpp"
@@ -60,8 +61,9 @@ Candidate candidate_of(const CandidateFit& candidate, const BalanceSearch& searc
     e.fixed = term.known[p] != 0;
     if (const auto at = position(candidate.fit, e.id, e.parameter)) {
       e.std = candidate.fit.std[static_cast<Eigen::Index>(*at)];
-      e.low = e.value - 1.96 * *e.std;
-      e.high = e.value + 1.96 * *e.std;
+      const estimation::Interval interval = estimation::interval_95(e.value, *e.std);
+      e.low = interval.low;
+      e.high = interval.high;
     }
     c.parameters.push_back(std::move(e));
   }

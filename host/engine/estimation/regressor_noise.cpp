@@ -1,0 +1,249 @@
+#include "host/engine/estimation/regressor_noise.hpp"
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <memory>
+#include <optional>
+#include <random>
+
+#include "host/common/signals/butterworth.hpp"
+#include "host/engine/estimation/in_parallel.hpp"
+#include "host/engine/estimation/least_squares.hpp"
+#include "host/engine/estimation/side_motion.hpp"
+#include "host/engine/estimation/variable_projection.hpp"
+#include "host/engine/estimation/zero_order_hold.hpp"
+
+namespace flexspline::estimation {
+namespace {
+
+using data::Column;
+
+constexpr std::size_t kDraws = 3;
+// Factors on the noise that is added: the variance is twice and four times what it was.
+constexpr std::array<double, 4> kFactors = {1.0, -1.0, 1.7320508075688772, -1.7320508075688772};
+
+// Noise of one signal of a record.
+struct SignalNoise {
+  Column column{};
+  std::vector<double> values;
+};
+
+// Standard deviation of white noise, from what a filter has taken away of a signal.
+double white_noise(const std::vector<double>& raw, const std::vector<double>& kept, double kept_share) {
+  double sum = 0.0;
+  for (std::size_t k = 0; k < raw.size(); ++k) sum += (raw[k] - kept[k]) * (raw[k] - kept[k]);
+  return std::sqrt(sum / static_cast<double>(std::max<std::size_t>(1, raw.size())) / (1.0 - kept_share));
+}
+
+SignalNoise draw(const data::Experiment& e, Column column, const signals::ZeroPhaseFilter& filter,
+                 std::optional<double> quantum, std::mt19937_64& random) {
+  constexpr double kMoreThanSteps = 1.5;
+  const std::vector<double>& measured = e[column];
+  const std::vector<double> smooth = filtered(measured, e.segments, filter);
+  const double white = white_noise(measured, smooth, std::min(0.8, 2.0 * filter.cutoff_hz() * e.sample_s));
+  SignalNoise noise{column, std::vector<double>(measured.size(), 0.0)};
+  if (quantum && white < kMoreThanSteps * *quantum / std::sqrt(12.0)) {
+    const double zero = std::uniform_real_distribution<double>(0.0, *quantum)(random);
+    for (std::size_t k = 0; k < measured.size(); ++k)
+      noise.values[k] = std::round((smooth[k] + zero) / *quantum) * *quantum - zero - smooth[k];
+    return noise;
+  }
+  std::normal_distribution<double> normal(0.0, white);
+  for (double& value : noise.values) value = normal(random);
+  return noise;
+}
+
+// By record.
+std::vector<std::vector<SignalNoise>> draw_all(const Identification& found, std::uint64_t seed) {
+  // On the other balances the torque is what is explained.
+  const bool reads_torque = std::ranges::any_of(found.terms, [](const Term& t) {
+    return t.entry->identified_on() == Balance::motor && (t.entry->info->reads & effects::kTorque) != 0;
+  });
+  std::mt19937_64 random(seed);
+  std::vector<std::vector<SignalNoise>> all;
+  for (const Record& record : found.prepared.records) {
+    std::vector<SignalNoise>& noise = all.emplace_back();
+    if (record.at_rest) continue;
+    const data::Experiment& e = *record.experiment;
+    const double sample_hz = 1.0 / record.sample_s;
+    const signals::ZeroPhaseFilter filter(signals::ZeroPhaseFilter::kDefaultOrder,
+                                          std::min(found.prepared.pipeline.motion_cutoff_hz, 0.45 * sample_hz),
+                                          sample_hz);
+    if (e.has(Column::motor_position))
+      noise.push_back(draw(e, Column::motor_position, filter, record.motor_quantum, random));
+    if (e.has(Column::output_position) && !record.locked)
+      noise.push_back(draw(e, Column::output_position, filter, record.output_quantum, random));
+    if (e.has(Column::torque) && reads_torque) noise.push_back(draw(e, Column::torque, filter, std::nullopt, random));
+  }
+  return all;
+}
+
+// Columns of a balance's identified parameters and its residual, at the estimates.
+struct Linearised {
+  Eigen::MatrixXd J;
+  Eigen::VectorXd residual;
+};
+Linearised linearised(BalanceData& data, const BalanceFit& fit, const Terms& terms,
+                      const std::vector<Eigen::Index>& identified) {
+  Eigen::MatrixXd all(data.rows(), static_cast<Eigen::Index>(fit.linear.size() + fit.nonlinear.size()));
+  all << columns_of(data, terms, fit.linear), nonlinear_columns(data, terms, fit.on_balance, fit.nonlinear);
+  return {all(Eigen::all, identified), residual_of(data, terms)};
+}
+
+// All balances of the same samples, from these experiments in place of the measured ones.
+std::vector<Linearised> of_others(const Identification& found, const std::vector<const data::Experiment*>& experiments,
+                                  const Pipeline& pipeline, const std::vector<std::vector<Eigen::Index>>& identified) {
+  PreparedData prepared = prepare_with(experiments, found.prepared.drive, pipeline);
+  prepared.torque_measured = found.prepared.torque_measured;
+  for (std::size_t i = 0; i < prepared.records.size(); ++i) {
+    Record& record = prepared.records[i];
+    const Record& original = found.prepared.records[i];
+    record.rows = original.rows;
+    record.torsion_zero_rad = original.torsion_zero_rad;
+    record.inputs.torsion_zero = original.inputs.torsion_zero;
+  }
+  std::vector<Linearised> result;
+  for (std::size_t b = 0; b < found.data.size(); ++b) {
+    BalanceData data(prepared, found.data[b].balance());
+    result.push_back(linearised(data, found.fits[b], found.terms, identified[b]));
+  }
+  return result;
+}
+
+std::vector<Linearised> with_noise(const Identification& found, const std::vector<std::vector<SignalNoise>>& noise,
+                                   double factor, const std::vector<std::vector<Eigen::Index>>& identified) {
+  std::vector<data::Experiment> noisy;
+  for (std::size_t i = 0; i < noise.size(); ++i) {
+    data::Experiment& e = noisy.emplace_back(*found.prepared.records[i].experiment);
+    for (const SignalNoise& signal : noise[i])
+      for (std::size_t k = 0; k < signal.values.size(); ++k) e[signal.column][k] += factor * signal.values[k];
+  }
+  std::vector<const data::Experiment*> experiments;
+  for (const data::Experiment& e : noisy) experiments.push_back(&e);
+  return of_others(found, experiments, found.prepared.pipeline, identified);
+}
+
+// Whether values of a balance rest on what the motor's has to say as well (see combine_balances in identify.cpp): its
+// own samples alone may not determine them, and a step on those would be of any size.
+bool rests_on_motor_balance(const Identification& found, std::size_t b) {
+  if (found.data[b].balance() == Balance::motor) return false;
+  const auto adds = [&](const ParameterRef& ref) { return found.terms[ref.term].entry->adds_to(Balance::motor); };
+  return std::ranges::any_of(found.fits[b].linear, adds) || std::ranges::any_of(found.fits[b].nonlinear, adds);
+}
+
+// By balance, the parameters whose error is known.
+std::vector<std::vector<Eigen::Index>> identified_of(const Identification& found) {
+  std::vector<std::vector<Eigen::Index>> identified(found.fits.size());
+  for (std::size_t b = 0; b < found.fits.size(); ++b) {
+    if (rests_on_motor_balance(found, b)) continue;
+    const Eigen::MatrixXd& covariance = found.fits[b].covariance;
+    for (Eigen::Index j = 0; j < covariance.rows(); ++j)
+      if (std::isfinite(covariance(j, j))) identified[b].push_back(j);
+  }
+  return identified;
+}
+
+struct Changes {
+  Eigen::MatrixXd at_twice, at_four_times, chance;  // a column a draw
+  Eigen::MatrixXd middle;                           // of the covariance that standard errors count
+};
+
+void add_draw(const BalanceData& data, const BalanceFit& fit, const Linearised& own,
+              const std::vector<const Linearised*>& noisy, Eigen::Index draw_index, Changes& changes) {
+  const Eigen::VectorXd start = least_squares(own.J, own.residual, fit.whitening).theta;
+  std::vector<Eigen::VectorXd> step;
+  for (const Linearised* n : noisy) step.push_back(least_squares(n->J, n->residual, fit.whitening).theta - start);
+  changes.at_twice.col(draw_index) = 0.5 * (step[0] + step[1]);
+  changes.at_four_times.col(draw_index) = 0.5 * (step[2] + step[3]);
+  changes.chance.col(draw_index) = 0.5 * (step[0] - step[1]);
+  const Eigen::VectorXd moved =
+      0.5 * (noisy[0]->residual - noisy[1]->residual) - own.J * changes.chance.col(draw_index);
+  changes.middle += newey_west(data.records(), fit.whitening.score_columns(own.J), fit.root_weights.cwiseProduct(moved),
+                               newey_west_lags(fit.autocorrelation_time, data.rows())) /
+                    static_cast<double>(kDraws);
+}
+
+RegressorNoise summarised(const Changes& changes, const Eigen::MatrixXd& unit,
+                          const std::vector<Eigen::Index>& identified, Eigen::Index parameters) {
+  RegressorNoise result{Eigen::VectorXd::Zero(parameters), Eigen::MatrixXd::Zero(parameters, parameters),
+                        Eigen::MatrixXd::Zero(parameters, parameters)};
+  result.chance(identified, identified) =
+      changes.chance * changes.chance.transpose() / static_cast<double>(changes.chance.cols());
+  if (unit.allFinite()) result.counted(identified, identified) = unit * changes.middle * unit;
+  for (std::size_t j = 0; j < identified.size(); ++j) {
+    const auto row = static_cast<Eigen::Index>(j);
+    result.bias[identified[j]] =
+        extrapolated_bias(changes.at_twice.row(row).mean(), changes.at_four_times.row(row).mean());
+  }
+  return result;
+}
+
+}  // namespace
+
+double extrapolated_bias(double at_twice, double at_four_times) {
+  // Of a bias c V^p the changes are c (2^p - 1) and c (4^p - 1), whose ratio is 2^p + 1.
+  const double ratio = at_twice != 0.0 ? at_four_times / at_twice : 0.0;
+  const double two_to_p = std::clamp(ratio - 1.0, std::sqrt(2.0), 2.0);
+  return at_four_times / (two_to_p * two_to_p - 1.0);
+}
+
+std::vector<RegressorNoise> regressor_noise(Identification& found) {
+  const std::vector<std::vector<Eigen::Index>> identified = identified_of(found);
+  std::vector<Linearised> own;
+  std::vector<Changes> changes(found.fits.size());
+  for (std::size_t b = 0; b < found.fits.size(); ++b) {
+    own.push_back(linearised(found.data[b], found.fits[b], found.terms, identified[b]));
+    const Eigen::Index n = own.back().J.cols();
+    changes[b].at_twice = changes[b].at_four_times = changes[b].chance =
+        Eigen::MatrixXd::Zero(n, static_cast<Eigen::Index>(kDraws));
+    changes[b].middle = Eigen::MatrixXd::Zero(n, n);
+  }
+  for (std::size_t d = 0; d < kDraws; ++d) {
+    const auto noise = draw_all(found, d + 1);
+    std::array<std::vector<Linearised>, kFactors.size()> noisy;
+    in_parallel(kFactors.size(), [&](std::size_t f) { noisy[f] = with_noise(found, noise, kFactors[f], identified); });
+    for (std::size_t b = 0; b < found.fits.size(); ++b) {
+      std::vector<const Linearised*> of_balance;
+      for (const std::vector<Linearised>& n : noisy) of_balance.push_back(&n[b]);
+      if (!identified[b].empty())
+        add_draw(found.data[b], found.fits[b], own[b], of_balance, static_cast<Eigen::Index>(d), changes[b]);
+    }
+  }
+  std::vector<RegressorNoise> result;
+  for (std::size_t b = 0; b < found.fits.size(); ++b) {
+    if (identified[b].empty()) {
+      const Eigen::Index n = found.fits[b].covariance.rows();
+      result.push_back({Eigen::VectorXd::Zero(n), Eigen::MatrixXd::Zero(n, n), Eigen::MatrixXd::Zero(n, n)});
+      continue;
+    }
+    const Eigen::MatrixXd unit = least_squares(own[b].J, own[b].residual, found.fits[b].whitening).unit_covariance;
+    result.push_back(summarised(changes[b], unit, identified[b], found.fits[b].covariance.rows()));
+  }
+  return result;
+}
+
+std::vector<Eigen::VectorXd> change_by_held_step(Identification& found) {
+  std::vector<Eigen::VectorXd> changes;
+  for (const BalanceFit& fit : found.fits) changes.emplace_back(Eigen::VectorXd::Zero(fit.covariance.rows()));
+  if (found.prepared.pipeline.torque_per_step != 0.0) return changes;
+  const HeldStep step = held_step(found.prepared);
+  if (!step.may_lack) return changes;
+  Pipeline corrected = found.prepared.pipeline;
+  corrected.torque_per_step = step.torque_per_step;
+  std::vector<const data::Experiment*> experiments;
+  for (const Record& record : found.prepared.records) experiments.push_back(record.experiment);
+  const auto identified = identified_of(found);
+  const std::vector<Linearised> others = of_others(found, experiments, corrected, identified);
+  for (std::size_t b = 0; b < found.fits.size(); ++b) {
+    if (identified[b].empty()) continue;
+    const Linearised own = linearised(found.data[b], found.fits[b], found.terms, identified[b]);
+    const auto estimate = [&](const Linearised& data) {
+      return least_squares(data.J, data.residual, found.fits[b].whitening).theta;
+    };
+    changes[b](identified[b]) = estimate(others[b]) - estimate(own);
+  }
+  return changes;
+}
+
+}  // namespace flexspline::estimation
