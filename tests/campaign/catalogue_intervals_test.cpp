@@ -79,7 +79,7 @@ TEST(CatalogueIntervals, HoldTheTruthOfEachEffectInEachWorld) {
   if (whole_campaigns())
     judge(all_labels(), worlds, 25);
   else
-    judge({"", "dahl_hysteresis", "torque_ripple:2"}, {worlds.front(), worlds.back()}, 6);
+    judge({"", "dahl_hysteresis"}, {worlds.front(), worlds.back()}, 4);
 }
 
 // The intervals of `add` are those of `identify`.
