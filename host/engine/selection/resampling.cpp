@@ -88,15 +88,21 @@ bool leaves_noise(const SearchedBalance& e, double whiteness) {
   return whiteness >= kPolicy.white && !(e.names_one() && is_of_effort(e.candidates.front()));
 }
 
-// Whether a name that resampling found may be stated: most of all subsamples chose it. Where the model alone leaves
-// known noise, many subsamples abstain and the others may have selected noise: there the likelihood of all data must be
-// significant. It leaves out reversals, so it cannot judge a state of presliding, which shows around them alone.
-bool may_be_stated(const SearchedBalance& motor, const NamedEffect& name, double frequency_of_all) {
+// Whether the names that resampling found may be stated: most of all subsamples chose one, or the squared error on
+// experiments that are held out falls by a term's share, or the likelihood of all data is significant for one. Where
+// the model alone leaves known noise, many subsamples abstain and the others may have selected noise, so that their
+// frequency does not count; but likelihood leaves out reversals, and cannot judge a state of presliding.
+bool may_be_stated(const Resampling& resampling, const Resampling::FoundTerm& found, const SearchedBalance& motor) {
+  const double frequency_of_all = found.frequency * (1.0 - resampling.abstained / resampling.subsamples);
+  const double held_out = found.held_out_ratio.value_or(1.0);
+  const bool is_supported = frequency_of_all >= kPolicy.least_of_all || held_out * held_out <= 1.0 - kPolicy.line_share;
   const bool leaves_known_noise =
       motor.floor.rmse && motor.search.base.rmse() <= (1.0 + kPolicy.floor_uncertainty) * *motor.floor.rmse;
-  if (!leaves_known_noise || catalogue::get(name.effect).has_state) return frequency_of_all >= kPolicy.least_of_all;
-  return std::any_of(motor.candidates.begin(), motor.candidates.end(), [&](const CandidateFit& candidate) {
-    return is_of_family(name.effect, name.order, candidate) && candidate.gain.score > kPolicy.named_score;
+  return std::any_of(found.group.begin(), found.group.end(), [&](const NamedEffect& name) {
+    if (is_supported && (!leaves_known_noise || catalogue::get(name.effect).has_state)) return true;
+    return std::any_of(motor.candidates.begin(), motor.candidates.end(), [&](const CandidateFit& candidate) {
+      return is_of_family(name.effect, name.order, candidate) && candidate.gain.score > kPolicy.named_score;
+    });
   });
 }
 
@@ -109,10 +115,7 @@ std::vector<NamedEffect> names_of(const Resampling& resampling, const SearchedBa
   if (is_within_floor_of_few_records(motor.search)) return names;
   for (const Resampling::FoundTerm& found : resampling.found) {
     if (found.group.empty() || found.refused_by_holdout) continue;
-    const double of_all = found.frequency * (1.0 - resampling.abstained / resampling.subsamples);
-    if (std::none_of(found.group.begin(), found.group.end(),
-                     [&](const NamedEffect& n) { return may_be_stated(motor, n, of_all); }))
-      continue;
+    if (!may_be_stated(resampling, found, motor)) continue;
     if (names.empty() && found.group.size() > 1) return found.group;
     if (found.group.size() > 1 || (!names.empty() && found.share_percent < least_percent)) continue;
     names.push_back(found.group.front());
