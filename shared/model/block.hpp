@@ -43,7 +43,8 @@ enum class Section : std::uint16_t {
   following = 0x11B,
   stored_zero = 0x11C,
   rates = 0x11D,
-  motor = 0x11E,  // of a three-phase stage
+  // Of a three-phase stage. 0x11E was the same with other units of the current loop, and is refused.
+  motor = 0x11F,
 };
 inline constexpr std::uint16_t kFirstNote = 0xF000;
 inline constexpr std::uint16_t kParametersNote = 0xF000;  // the SI parameters of the effects, for `unpack`

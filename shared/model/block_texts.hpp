@@ -36,7 +36,7 @@ constexpr const char* text_of(BlockFault fault) {
     case BlockFault::entry_of_wrong_length:
       return "an entry is longer or shorter than its coefficients";
     case BlockFault::unknown_entry:
-      return "an entry has an unknown kind";
+      return "an entry is of another version: pack the model again, and commission a three-phase motor again";
     case BlockFault::missing_effect:
       return "an effect is not in this firmware";
     case BlockFault::too_often:

@@ -224,6 +224,8 @@ TEST_F(Block, EachEntryAndCoefficientIsJudged) {
   refused(with(good(), at, std::uint16_t{38}), BlockFault::missing_effect, "an effect that no drive can run");
   refused(with(good(), at, std::uint16_t{2}), BlockFault::too_often, "viscous friction twice");
   refused(with(good(), at, std::uint16_t{0x1FE}), BlockFault::unknown_entry, "a section that is none");
+  refused(with(good(), at, std::uint16_t{0x11E}), BlockFault::unknown_entry,
+          "a motor whose current loop has the units of earlier builds");
   refused(with(good(), at + 2, std::uint16_t{1}), BlockFault::unknown_entry, "what has to be zero");
   refused(with(good(), at + 4, std::uint32_t{1} << 20), BlockFault::entry_cut_off, "length");
   refused(with(good(), at, std::uint16_t{10}), BlockFault::entry_of_wrong_length, "too short for that effect");
