@@ -20,13 +20,21 @@ Eigen::LLT<SmallMatrix> inner(const RecordErrors& r, const SmallVector& std, dou
   return m.llt();
 }
 
-// Of minus twice a record's log likelihood: ln det V and e'V^-1 e, less what does not depend on the random effects.
-double deviance_of(const RecordErrors& r, const SmallVector& std, double v) {
-  const Eigen::LLT<SmallMatrix> m = inner(r, std, v);
-  const SmallVector g = std.cwiseProduct(r.ze) / v;
-  double log_det = 0.0;
-  for (Eigen::Index k = 0; k < std.size(); ++k) log_det += 2.0 * std::log(m.matrixLLT()(k, k));
-  return log_det - g.dot(m.solve(g));
+// What a record says of the standard deviation s of one group, the others as they are. Of minus twice its log
+// likelihood, ln det V + e'V^-1 e, the part that depends on s is ln(1 + s^2 zz) - s^2 ze^2/(1 + s^2 zz), with the
+// others eliminated (Schur complement).
+struct OneGroup {
+  double zz = 0.0, ze = 0.0;  // over the noise
+  double deviance(double s) const {
+    const double more = 1.0 + s * s * zz;
+    return std::log(more) - s * s * ze * ze / more;
+  }
+};
+OneGroup without_others(const RecordErrors& r, SmallVector std, Eigen::Index group, double v) {
+  std[group] = 0.0;
+  const SmallVector along = std.cwiseProduct(r.zz.col(group)) / v, error = std.cwiseProduct(r.ze) / v;
+  const SmallVector weight = inner(r, std, v).solve(along);
+  return {std::max(r.zz(group, group) / v - along.dot(weight), 0.0), r.ze[group] / v - error.dot(weight)};
 }
 
 // The middle of where a function of a logarithm is least, after ten golden sections (Kiefer 1953).
@@ -57,10 +65,12 @@ double golden_section(double low, double high, const Function& at) {
 // is as likely.
 void choose_std(const std::vector<RecordErrors>& records, const std::vector<double>& noise, Eigen::Index group,
                 SmallVector& std) {
+  std::vector<OneGroup> of_records;
+  for (std::size_t i = 0; i < records.size(); ++i)
+    of_records.push_back(without_others(records[i], std, group, noise[i]));
   const auto total = [&](double s) {
-    std[group] = s;
     double sum = 0.0;
-    for (std::size_t i = 0; i < records.size(); ++i) sum += deviance_of(records[i], std, noise[i]);
+    for (const OneGroup& record : of_records) sum += record.deviance(s);
     return sum;
   };
   constexpr int kSteps = 12;

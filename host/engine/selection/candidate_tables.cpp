@@ -1,8 +1,10 @@
 #include "host/engine/selection/candidate_tables.hpp"
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 
+#include "host/engine/estimation/in_parallel.hpp"
 #include "host/engine/selection/modelled_torque.hpp"
 #include "host/engine/selection/presliding.hpp"
 
@@ -44,6 +46,17 @@ estimation::PreparedData without_held_out(estimation::PreparedData prepared) {
   return prepared;
 }
 
+// The travel of presliding with which the model alone leaves least; nothing where none can be shown.
+std::optional<double> best_presliding_travel(const estimation::PreparedData& prepared, const estimation::Terms& terms,
+                                             Balance balance, const SelectionPolicy& policy) {
+  if (balance != Balance::motor || presliding_law(terms) == nullptr) return std::nullopt;
+  const estimation::PreparedData fitted = without_held_out(prepared);
+  const std::vector<double> travels = presliding_travels(fitted, policy);
+  const std::vector<double> squares = squares_by_travel(fitted, terms, travels);
+  if (squares.empty()) return std::nullopt;
+  return travels[static_cast<std::size_t>(std::min_element(squares.begin(), squares.end()) - squares.begin())];
+}
+
 }  // namespace
 
 const catalogue::Entry* presliding_law(const estimation::Terms& terms) {
@@ -74,17 +87,16 @@ CandidateTables make_tables(const std::vector<const data::Experiment*>& experime
   estimation::PreparedData prepared = prepare(experiments, drive, highest_hz, policy);
   tables.torque_has_noise = take_noise_off_torque(prepared) > 0;
   if (!prepared.torque_measured) take_torque_from_load(prepared, terms);
-  tables.sign = make_regressor_table(prepared, balance, terms, std::nullopt, highest_hz, policy);
+  const std::optional<double> travel = best_presliding_travel(prepared, terms, balance, policy);
+  std::array<RegressorTable, 2> made;
+  estimation::in_parallel(travel ? 2 : 1, [&](std::size_t i) {
+    made[i] = make_regressor_table(prepared, balance, terms, i == 0 ? std::nullopt : travel, highest_hz, policy);
+  });
+  tables.sign = std::move(made[0]);
   if (tables.sign.model_columns == 0) return tables;
-  if (balance == Balance::motor && presliding_law(terms) != nullptr) {
-    const estimation::PreparedData fitted = without_held_out(prepared);
-    const std::vector<double> travels = presliding_travels(fitted, policy);
-    const std::vector<double> squares = squares_by_travel(fitted, terms, travels);
-    if (!squares.empty()) {
-      tables.presliding_travel =
-          travels[static_cast<std::size_t>(std::min_element(squares.begin(), squares.end()) - squares.begin())];
-      tables.presliding = make_regressor_table(prepared, balance, terms, tables.presliding_travel, highest_hz, policy);
-    }
+  if (travel) {
+    tables.presliding_travel = *travel;
+    tables.presliding = std::move(made[1]);
   }
   for (double f = prepared.pipeline.row_cutoff_hz; f > kWider * highest_hz; f *= 0.5)
     for (const bool mask : {false, true}) tables.settings.emplace_back(f, mask);
