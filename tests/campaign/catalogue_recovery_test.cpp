@@ -180,7 +180,9 @@ const std::map<std::string, std::string> kShownBy = {
     {"dahl_hysteresis", "travel x direction"},
     {"modified_dahl_hysteresis", "travel x direction"},
     {"duhem_hysteresis", "travel x direction"},
-    {"bouc_wen_hysteresis", "travel x direction"},
+    // The structural damping of the base model takes the place of most of its loop: what is left goes with the
+    // direction of the torsion's rate, which says on which branch of the loop it is.
+    {"bouc_wen_hysteresis", "travel x direction,torsion_rate x direction"},
     {"prandtl_ishlinskii_hysteresis", "travel x direction"},
     {"preisach_hysteresis", "travel x direction,record"},
     {"torque_proportional_hysteresis", "travel x direction"},
