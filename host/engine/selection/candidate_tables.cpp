@@ -46,6 +46,30 @@ estimation::PreparedData without_held_out(estimation::PreparedData prepared) {
   return prepared;
 }
 
+// Places of the terms of a table that the other has, too.
+std::vector<int> common_terms(const RegressorTable& table, const RegressorTable& other) {
+  std::vector<int> common;
+  for (std::size_t t = 0; t < table.terms.size(); ++t)
+    if (std::any_of(other.terms.begin(), other.terms.end(), [&](const CandidateTerm& o) {
+          return o.name == table.terms[t].name && o.entry == table.terms[t].entry && o.values == table.terms[t].values;
+        }))
+      common.push_back(static_cast<int>(t));
+  return common;
+}
+
+// Whether an effect that corrects the effort can be seen depends on what the model makes of the effort, so that one
+// table may lack it. Both get the same terms in the same order: the columns of a term have one place in both.
+void keep_common_terms(RegressorTable& sign, RegressorTable& presliding) {
+  const std::vector<int> of_sign = common_terms(sign, presliding), of_presliding = common_terms(presliding, sign);
+  if (of_sign.size() == sign.terms.size() && of_presliding.size() == presliding.terms.size()) return;
+  for (const CandidateTerm& term : sign.terms)
+    if (term.entry && std::none_of(of_sign.begin(), of_sign.end(),
+                                   [&](int t) { return sign.terms[static_cast<std::size_t>(t)].entry == term.entry; }))
+      sign.not_visible.push_back(term.entry);
+  sign = with_terms(sign, of_sign);
+  presliding = with_terms(presliding, of_presliding);
+}
+
 // The travel of presliding with which the model alone leaves least; nothing where none can be shown.
 std::optional<double> best_presliding_travel(const estimation::PreparedData& prepared, const estimation::Terms& terms,
                                              Balance balance, const SelectionPolicy& policy) {
@@ -97,6 +121,7 @@ CandidateTables make_tables(const std::vector<const data::Experiment*>& experime
   if (travel) {
     tables.presliding_travel = *travel;
     tables.presliding = std::move(made[1]);
+    keep_common_terms(tables.sign, *tables.presliding);
   }
   for (double f = prepared.pipeline.row_cutoff_hz; f > kWider * highest_hz; f *= 0.5)
     for (const bool mask : {false, true}) tables.settings.emplace_back(f, mask);
