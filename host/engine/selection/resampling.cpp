@@ -128,6 +128,19 @@ bool names_several(const Resampling& resampling, const SearchedBalance& motor) {
   return names.size() > 1 && resampling.found_group(names.front()).size() < 2;
 }
 
+// Where no torque is known, data do not show whether the scale of the motor's torque or that of its sensor is wrong.
+// Adds the other one to a name that stands alone; false: there is none to add.
+bool add_other_scale(const SearchedBalance& motor, std::vector<NamedEffect>& names) {
+  const auto is_scale = [](const catalogue::Entry& entry) { return (entry.info->reads & effects::kTorqueScale) != 0; };
+  if (names.size() != 1 || states_a_torque(motor.search.base.terms)) return false;
+  const std::string first = names.front().effect;
+  if (!is_scale(catalogue::get(first))) return false;
+  for (const CandidateFit& t : motor.candidates)
+    if (t.model.entry->name() != first && is_scale(*t.model.entry) && passes(t))
+      names.push_back({std::string(t.model.entry->name()), t.model.order});
+  return names.size() > 1;
+}
+
 std::vector<std::string> first_names(const std::vector<FoundTerm>& decided) {
   std::vector<std::string> names;
   for (const FoundTerm& found : decided) names.push_back(found.group.front().name);
@@ -204,7 +217,9 @@ bool resampling_decides(const Resampling& resampling, const SearchedBalance& mot
 
 void name_stable(SearchedBalance& chosen, Diagnosis& result) {
   result.named = names_of(*result.resampling, chosen);
-  const bool is_group = !result.named.empty() && result.resampling->found_group(result.named.front()).size() > 1;
+  const bool is_of_scale = add_other_scale(chosen, result.named);
+  const bool is_group =
+      is_of_scale || (!result.named.empty() && result.resampling->found_group(result.named.front()).size() > 1);
   result.partial =
       static_cast<std::ptrdiff_t>(result.resampling->found.size()) > (is_group ? 1 : std::ssize(result.named));
   if (result.named.empty()) return;
