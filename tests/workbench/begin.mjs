@@ -51,7 +51,7 @@ try {
     const context = await browser.newContext({ viewport: { width, height }, colorScheme });
     const page = await context.newPage();
     page.setDefaultTimeout(kPatience);
-    page.on("console", (m) => { if (["error", "warning"].includes(m.type())) complaints.push(`console: ${m.text()}`); });
+    page.on("console", (m) => { if (["error", "warning"].includes(m.type())) complaints.push(`console: ${m.text()} ${m.location().url}`); });
     page.on("pageerror", (e) => complaints.push(`page: ${e.stack}`));
     const shot = (name) => page.screenshot({ path: join(work, `begin-${name}-${width}-${colorScheme}.png`), fullPage: true });
     const fits = async (what) => assert.ok((await page.evaluate(() => document.documentElement.scrollWidth - innerWidth)) <= 0, `${what} is wider than ${width} px`);

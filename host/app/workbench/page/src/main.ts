@@ -31,9 +31,12 @@ function run(what: string, more: Record<string, unknown> = {}): void {
   local = null;
   if (what === "complain") return complain(new Error(String(more["what"])));
   // A search for what is missing is cancelled by what the user starts, and begins again where the model is the same then.
-  const searching = (state?.work?.what.startsWith("Searching") && !["cancel", "diagnose", "dismiss", "disconnect", "empty-map"].includes(what)) || (state?.work?.what.startsWith("Reading") && what === "propose");
-  (searching ? act("cancel").then(() => act(what, more)).finally(again) : act(what, more)).catch(complain);
+  const searching = state?.work?.what.startsWith("Searching") && !["cancel", "diagnose", "dismiss", "disconnect", "empty-map"].includes(what);
+  if (what === "propose") proposed = proposed.then(() => act("cancel")).then(() => act(what, more)).finally(again).catch(complain);
+  else (searching ? act("cancel").then(() => act(what, more)).finally(again) : act(what, more)).catch(complain);
 }
+// Choices may follow each other before the page knows that the last one is being read: each is sent after the one before.
+let proposed: Promise<void> = Promise.resolve();
 
 // The search uses all cores, so the first panels are drawn before it begins.
 const good = new FitQuality(), where = new ErrorLocation(() => setTimeout(() => { if (state) searchAutomatically(state); }, 50));
