@@ -100,6 +100,8 @@ RegressorTable with_terms(const RegressorTable& table, const std::vector<int>& t
     return std::ssize(kept) - 1;
   };
   RegressorTable small;
+  static_cast<TableSamples&>(small) = table;
+  static_cast<TableModel&>(small) = table;
   for (Eigen::Index j = 0; j < table.model_columns; ++j) keep(j);
   for (const int t : terms) {
     small.terms.push_back(table.terms[static_cast<std::size_t>(t)]);
@@ -108,18 +110,7 @@ RegressorTable with_terms(const RegressorTable& table, const std::vector<int>& t
   for (const Eigen::Index column : table.differences) small.differences.push_back(keep(column));
   small.columns = table.columns(Eigen::all, kept);
   small.scale = table.scale(kept);
-  small.target = table.target;
-  small.model_columns = table.model_columns;
-  small.model_names = table.model_names;
-  small.model_low = table.model_low;
   small.not_visible = table.not_visible;
-  small.runs = table.runs;
-  small.records = table.records;
-  small.held_out = table.held_out;
-  small.highest_hz = table.highest_hz;
-  small.highest_law_hz = table.highest_law_hz;
-  small.velocity_over_noise = table.velocity_over_noise;
-  small.reversals = table.reversals;
   return small;
 }
 

@@ -41,18 +41,9 @@ struct Run {
   double row_s = 0.0;
 };
 
-struct RegressorTable {
-  Eigen::MatrixXd columns;  // those of the model first; N m per unit, scaled to unit root mean square
-  Eigen::VectorXd scale;    // root mean squares that the columns were divided by
-  Eigen::VectorXd target;   // N m
-  Eigen::Index model_columns = 0;
-  std::vector<std::string> model_names;  // "coulomb_friction.torque"
-  std::vector<double> model_low;         // lower bound of each model column's coefficient
-  // Friction that may differ from run to run, by surface in common and by direction: columns of a relative change of
-  // one.
-  std::vector<Eigen::Index> differences;
-  std::vector<CandidateTerm> terms;
-  std::vector<const catalogue::Entry*> not_visible;  // that these data could not show if they were there
+// What a table says of its samples, whatever its columns are.
+struct TableSamples {
+  Eigen::VectorXd target;  // N m
   std::vector<Run> runs;
   std::size_t records = 0;
   std::vector<std::uint8_t> held_out;  // by record: not fitted on and not chosen with
@@ -61,6 +52,23 @@ struct RegressorTable {
   // For masks: velocity over its noise, by sample.
   Eigen::VectorXd velocity_over_noise;
   double reversals = 0.0;
+};
+
+// The columns of the model that terms are added to.
+struct TableModel {
+  Eigen::Index model_columns = 0;
+  std::vector<std::string> model_names;  // "coulomb_friction.torque"
+  std::vector<double> model_low;         // lower bound of each model column's coefficient
+};
+
+struct RegressorTable : TableSamples, TableModel {
+  Eigen::MatrixXd columns;  // those of the model first; N m per unit, scaled to unit root mean square
+  Eigen::VectorXd scale;    // root mean squares that the columns were divided by
+  // Friction that may differ from run to run, by surface in common and by direction: columns of a relative change of
+  // one.
+  std::vector<Eigen::Index> differences;
+  std::vector<CandidateTerm> terms;
+  std::vector<const catalogue::Entry*> not_visible;  // that these data could not show if they were there
 };
 
 // `prepared` is at the highest bandwidth and not masked; `terms` have the values of a first fit.
