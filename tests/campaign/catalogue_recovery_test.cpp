@@ -37,8 +37,9 @@ struct Outcome {
   double without_over_floor = 0.0;  // hold-out error of the model without the effect
   double with_over_floor = 0.0;
   double removed_over_floor = 0.0;
-  double fit_share = 0.0;         // error on the records of the fit, with over without
-  std::vector<std::string> maps;  // variables that the error without it depends on, most explaining first
+  double fit_share = 0.0;          // error on the records of the fit, with over without
+  std::vector<std::string> maps;   // variables that the error without it depends on, most explaining first
+  std::vector<double> map_shares;  // percent that each explains
   std::string failure;
 };
 
@@ -99,7 +100,10 @@ Outcome recover(const std::string& label, std::uint64_t seed) {
       for (const auto& share :
            comparison::localise(without->data[b], estimation::residual_of(without->data[b], without->terms),
                                 without->fits[b].autocorrelation_time))
-        if (share.share_percent > 1.0) outcome.maps.push_back(share.variable);
+        if (share.share_percent > 1.0) {
+          outcome.maps.push_back(share.variable);
+          outcome.map_shares.push_back(share.share_percent);
+        }
   return outcome;
 }
 
@@ -180,9 +184,7 @@ const std::map<std::string, std::string> kShownBy = {
     {"dahl_hysteresis", "travel x direction"},
     {"modified_dahl_hysteresis", "travel x direction"},
     {"duhem_hysteresis", "travel x direction"},
-    // The structural damping of the base model takes the place of most of its loop: what is left goes with the
-    // direction of the torsion's rate, which says on which branch of the loop it is.
-    {"bouc_wen_hysteresis", "travel x direction,torsion_rate x direction"},
+    {"bouc_wen_hysteresis", "travel x direction"},
     {"prandtl_ishlinskii_hysteresis", "travel x direction"},
     {"preisach_hysteresis", "travel x direction,record"},
     {"torque_proportional_hysteresis", "travel x direction"},
@@ -231,13 +233,16 @@ TEST(Catalogue, IsRecoveredEffectByEffectFromThePlant) {
     const auto expected = kShownBy.find(type);
     ASSERT_NE(expected, kShownBy.end());
     const auto names = catalogue::split_names(expected->second);
-    const std::size_t looked_at = std::min<std::size_t>(4, o.maps.size());
+    // The first four, and what explains as much: seven maps of a Bouc-Wen law have 39 to 45 %, in an order by chance.
+    constexpr double kAsMuch = 0.85;
+    std::size_t looked_at = std::min<std::size_t>(4, o.maps.size());
+    while (looked_at < o.maps.size() && o.map_shares[looked_at] >= kAsMuch * o.map_shares.front()) ++looked_at;
     EXPECT_TRUE(std::any_of(o.maps.begin(), o.maps.begin() + static_cast<std::ptrdiff_t>(looked_at),
                             [&](const std::string& map) {
                               return std::any_of(names.begin(), names.end(),
                                                  [&](std::string_view n) { return map.starts_with(n); });
                             }))
-        << "none of the first four maps is one of " << expected->second;
+        << "none of the first maps is one of " << expected->second;
   }
 }
 
