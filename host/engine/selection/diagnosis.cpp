@@ -375,14 +375,13 @@ std::string verdict_name(Verdict verdict) {
 }
 
 Diagnosis diagnose(const data::Dataset& dataset, const model::Model& model, const Options& options) {
+  if (!options.pipeline.cutoff_hz && options.pipeline.mask) return diagnose_at(dataset, model, options);
+  const Diagnosis stated = diagnose_at(dataset, model, options);
   Options automatic = options;
   automatic.pipeline.cutoff_hz.reset();
   automatic.pipeline.mask = true;
-  const bool is_stated = options.pipeline.cutoff_hz || !options.pipeline.mask;
-  if (is_stated) automatic.pipeline.ready = nullptr;
+  automatic.pipeline.ready = nullptr;
   Diagnosis result = diagnose_at(dataset, model, automatic);
-  if (!is_stated) return result;
-  const Diagnosis stated = diagnose_at(dataset, model, options);
   result.at_stated_setting = {stated.verdict, stated.named};
   return result;
 }
