@@ -12,8 +12,14 @@ namespace {
 // Coefficients below their bound by no more than that share of the target are noise about zero.
 constexpr double kSmall = 0.02;
 
-double squares(const Eigen::MatrixXd& products, const std::vector<Eigen::Index>& columns,
-               const Eigen::VectorXd& theta) {
+bool has_presliding(const std::vector<int>& terms) {
+  return std::find(terms.begin(), terms.end(), kPreslidingTerm) != terms.end();
+}
+
+}  // namespace
+
+double squares_left(const Eigen::MatrixXd& products, const std::vector<Eigen::Index>& columns,
+                    const Eigen::VectorXd& theta) {
   const Eigen::Index y = products.cols() - 1;
   double sum = products(y, y);
   for (std::size_t i = 0; i < columns.size(); ++i) {
@@ -24,12 +30,6 @@ double squares(const Eigen::MatrixXd& products, const std::vector<Eigen::Index>&
   }
   return std::max(sum, 0.0);
 }
-
-bool has_presliding(const std::vector<int>& terms) {
-  return std::find(terms.begin(), terms.end(), kPreslidingTerm) != terms.end();
-}
-
-}  // namespace
 
 TermFit fit_terms(const RegressorTable& table, const std::vector<int>& terms, const HalfData& fit,
                   const HalfData& validation) {
@@ -53,8 +53,8 @@ TermFit fit_terms(const RegressorTable& table, const std::vector<int>& terms, co
   // Columns that are collinear share their coefficient.
   inner.diagonal().array() += 1e-8;
   result.theta = algebra::SymmetricFactor(inner).solve(along).col(0).cwiseQuotient(size);
-  result.training_squares = squares(on, result.columns, result.theta);
-  result.validation_squares = squares(other, result.columns, result.theta);
+  result.training_squares = squares_left(on, result.columns, result.theta);
+  result.validation_squares = squares_left(other, result.columns, result.theta);
   return result;
 }
 

@@ -43,6 +43,9 @@ struct TermFit {
   std::vector<Eigen::Index> columns;
   double training_squares = 0.0, validation_squares = 0.0;
 };
+// Squares that coefficients of some columns leave of the target, from its products.
+double squares_left(const Eigen::MatrixXd& products, const std::vector<Eigen::Index>& columns,
+                    const Eigen::VectorXd& theta);
 TermFit fit_terms(const RegressorTable& table, const std::vector<int>& terms, const HalfData& fit,
                   const HalfData& validation);
 

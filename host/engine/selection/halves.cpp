@@ -24,16 +24,7 @@ std::vector<double> record_weights(const RegressorTable& table, const Setting& s
     std::vector<double> found;
     for (std::size_t r = 0; r < table.records; ++r) {
       if (rows[r] == 0.0) continue;
-      HalfData one{products[r], {}, rows[r]};
-      double sum = products[r](products[r].rows() - 1, products[r].cols() - 1);
-      const Eigen::Index y = products[r].cols() - 1;
-      for (std::size_t i = 0; i < fitted.columns.size(); ++i) {
-        double row = -2.0 * products[r](fitted.columns[i], y);
-        for (std::size_t j = 0; j < fitted.columns.size(); ++j)
-          row += products[r](fitted.columns[i], fitted.columns[j]) * fitted.theta[static_cast<Eigen::Index>(j)];
-        sum += fitted.theta[static_cast<Eigen::Index>(i)] * row;
-      }
-      weights[r] = rows[r] / std::max(sum, 1e-300);
+      weights[r] = rows[r] / std::max(squares_left(products[r], fitted.columns, fitted.theta), 1e-300);
       found.push_back(weights[r]);
     }
     std::nth_element(found.begin(), found.begin() + static_cast<std::ptrdiff_t>(found.size() / 2), found.end());
