@@ -56,6 +56,21 @@ TEST(WaldTest, ANameWhoseValuesMayBeZeroIsTakenBackWithItsReason) {
   EXPECT_NE(result.candidates.front().why_not, "");
 }
 
+TEST(WaldTest, ANameThatHeldOutExperimentsConfirmStaysThoughWhatElseIsMissingWidensItsInterval) {
+  Diagnosis result = with(candidate({1.0, -1.2}));
+  Resampling::FoundTerm found;
+  found.group = result.named;
+  found.held_out_ratio = 0.9;  // of the error: 0.81 of its square
+  result.resampling.emplace();
+  result.resampling->decides = true;
+  result.resampling->found = {found};
+  take_back_insignificant(result);
+  EXPECT_EQ(result.named.size(), 1u);
+  result.resampling->found.front().held_out_ratio = 0.98;  // 0.96 of its square
+  take_back_insignificant(result);
+  EXPECT_TRUE(result.named.empty());
+}
+
 TEST(WaldTest, ASignificantNameAndAConfoundedGroupStay) {
   Diagnosis result = with(candidate({1.0, -5.0}));
   take_back_insignificant(result);

@@ -8,6 +8,7 @@
 #include "host/common/algebra/decompositions.hpp"
 #include "host/engine/estimation/least_squares.hpp"
 #include "host/engine/estimation/minimise.hpp"
+#include "host/engine/estimation/strokes.hpp"
 
 namespace flexspline::estimation {
 namespace {
@@ -33,26 +34,14 @@ std::vector<double> magnitudes(const BalanceData& data, Signal signal) {
   return values;
 }
 
-// Shortest stroke between reversals over all records, jitter excluded.
-double shortest_stroke(const BalanceData& data) {
-  std::vector<double> strokes;
+// A short stroke of all records: those that are shorter make a tenth of the travel.
+double short_stroke(const BalanceData& data) {
+  std::vector<double> all;
   for (const RowRange& range : data.records()) {
-    const Record& r = data.prepared().records[range.record];
-    if (r.at_rest) continue;
-    double start = r.inputs.angle_at(0);
-    double last_sign = 0.0;
-    for (std::size_t k = 0; k < r.inputs.size(); ++k) {
-      const double velocity = r.inputs.velocity_at(k);
-      if (std::abs(velocity) < 3.0 * r.velocity_noise[index(Balance::motor)]) continue;
-      const double sign = velocity > 0.0 ? 1.0 : -1.0;
-      if (last_sign != 0.0 && sign != last_sign) {
-        strokes.push_back(std::abs(r.inputs.angle_at(k) - start));
-        start = r.inputs.angle_at(k);
-      }
-      last_sign = sign;
-    }
+    const std::vector<double> own = strokes(data.prepared().records[range.record]);
+    all.insert(all.end(), own.begin(), own.end());
   }
-  return quantile(strokes, 0.1);
+  return stroke_quantile(std::move(all), 0.1);
 }
 
 // Travel after a reversal that the data cannot resolve: some counts of the encoder, and what is covered under the mask.
@@ -168,7 +157,7 @@ ParameterRange parameter_range(const BalanceData& data, const Term& term, std::s
     case Limit::inverse_velocity:
       return velocity_range(data, info);
     case Limit::travel:
-      return scale_between(info, std::max(unseen_travel(data), kNegligible), shortest_stroke(data));
+      return scale_between(info, std::max(unseen_travel(data), kNegligible), short_stroke(data));
     case Limit::torsion:
     case Limit::corner:
     case Limit::span:
@@ -178,7 +167,7 @@ ParameterRange parameter_range(const BalanceData& data, const Term& term, std::s
       return current_range(data, info);
     case Limit::inverse_travel: {
       const double least = std::max(unseen_travel(data), kNegligible);
-      return scale_between(info, 1.0 / std::max(shortest_stroke(data), 2.0 * least), 1.0 / least);
+      return scale_between(info, 1.0 / std::max(short_stroke(data), 2.0 * least), 1.0 / least);
     }
     case Limit::inverse_torque: {
       const double largest =

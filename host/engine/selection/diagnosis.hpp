@@ -107,6 +107,8 @@ struct Resampling {
     // Error on the experiments that are held out, with it over without it; nothing where none are.
     std::optional<double> held_out_ratio;
     bool refused_by_holdout = false;  // in the catalogue, but the held-out error rises with it
+    // The squared error on the experiments that are held out falls by as much as a term must take off.
+    bool is_confirmed() const;
   };
   // How often a term was chosen, or was nearly as good as what was; zero for one that never was.
   struct Support {

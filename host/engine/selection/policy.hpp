@@ -68,8 +68,14 @@ struct SelectionPolicy {
   double most_of_effort = 0.3;
   double least_effort_range = 2.0;
 
-  // Presliding needs that many reversals.
+  // Presliding needs that many reversals. Its travel, in rad of the motor: the state comes to its end within a quarter
+  // of a stroke (exp(-4) is left), and the hysteresis of gears is far below 1 rad of the motor (10 mrad of the output
+  // at a ratio of 100); a longer one would be a spring or a drift. It is seen over that many standard deviations of
+  // the noise of the position.
   double fewest_reversals = 3.0;
+  double longest_presliding = 1.0;
+  double presliding_of_stroke = 0.25;
+  double least_travel_noise = 4.0;
 
   // Samples for each column of a fit: with fewer, halves of the data say nothing.
   double fewest_rows_per_column = 10.0;

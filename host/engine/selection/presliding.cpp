@@ -7,6 +7,7 @@
 #include "host/common/algebra/decompositions.hpp"
 #include "host/engine/estimation/balance_data.hpp"
 #include "host/engine/estimation/in_parallel.hpp"
+#include "host/engine/estimation/strokes.hpp"
 #include "host/engine/selection/bandwidth.hpp"
 
 namespace flexspline::selection {
@@ -39,36 +40,23 @@ std::vector<double> presliding_state(const Record& record, double travel) {
   return state;
 }
 
-namespace {
-
-double lower_median(std::vector<double> x) {
-  const auto middle = x.begin() + static_cast<std::ptrdiff_t>((x.size() - 1) / 2);
-  std::nth_element(x.begin(), middle, x.end());
-  return *middle;
-}
-
-}  // namespace
-
 std::vector<double> presliding_travels(const PreparedData& prepared, const SelectionPolicy& policy) {
   std::vector<double> strokes;
-  double noise = 0.0;
+  double noise = 0.0, reversals = 0.0;
   for (const Record& r : prepared.records) {
     if (r.at_rest || !r.has_motor_motion || r.inputs.angle.empty()) continue;
     noise = std::max({noise, r.motor_quantum.value_or(0.0), noise_by_fourth_differences(r.inputs.angle, r.segments)});
-    double sign = 0.0, start = r.inputs.angle_at(0);
-    for (std::size_t k = 0; k < r.inputs.size(); ++k) {
-      const double v = r.inputs.velocity_at(k);
-      if (std::abs(v) < 3.0 * r.velocity_noise[0]) continue;
-      const double now = v > 0.0 ? 1.0 : -1.0;
-      if (now != sign) {
-        if (sign != 0.0) strokes.push_back(std::abs(r.inputs.angle_at(k) - start));
-        start = r.inputs.angle_at(k);
-      }
-      sign = now;
-    }
   }
-  if (static_cast<double>(strokes.size()) < policy.fewest_reversals) return {};
-  const double high = 0.25 * lower_median(strokes), low = std::max(4.0 * noise, 1e-4 * high);
+  for (const Record& r : prepared.records) {
+    std::vector<double> own = estimation::strokes(r);
+    std::erase_if(own, [&](double stroke) { return stroke < policy.least_travel_noise * noise; });
+    reversals += std::max(0.0, static_cast<double>(own.size()) - 1.0);
+    strokes.insert(strokes.end(), own.begin(), own.end());
+  }
+  if (reversals < policy.fewest_reversals) return {};
+  const double high = std::min(policy.longest_presliding,
+                               policy.presliding_of_stroke * estimation::stroke_quantile(std::move(strokes), 0.5));
+  const double low = std::max(policy.least_travel_noise * noise, 1e-4 * high);
   std::vector<double> travels;
   constexpr int kTravels = 9;
   for (int i = 0; i < kTravels && high > low; ++i)

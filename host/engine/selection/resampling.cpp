@@ -53,6 +53,11 @@ bool is_of_effort(const CandidateFit& candidate) {
   return candidate.model.entry->info->reads == effects::kCurrent;
 }
 
+// Whether an effect differs from what it replaces around reversals alone, which likelihood leaves out.
+bool is_of_presliding(const catalogue::Entry& entry) {
+  return entry.has_state && !entry.info->replaces.empty();
+}
+
 bool is_of_torque(const CandidateFit& candidate) {
   return (candidate.model.entry->info->reads & effects::kTorque) != 0;
 }
@@ -94,12 +99,11 @@ bool leaves_noise(const SearchedBalance& e, double whiteness) {
 // frequency does not count; but likelihood leaves out reversals, and cannot judge a state of presliding.
 bool may_be_stated(const Resampling& resampling, const Resampling::FoundTerm& found, const SearchedBalance& motor) {
   const double frequency_of_all = found.frequency * (1.0 - resampling.abstained / resampling.subsamples);
-  const double held_out = found.held_out_ratio.value_or(1.0);
-  const bool is_supported = frequency_of_all >= kPolicy.least_of_all || held_out * held_out <= 1.0 - kPolicy.line_share;
+  const bool is_supported = frequency_of_all >= kPolicy.least_of_all || found.is_confirmed();
   const bool leaves_known_noise =
       motor.floor.rmse && motor.search.base.rmse() <= (1.0 + kPolicy.floor_uncertainty) * *motor.floor.rmse;
   return std::any_of(found.group.begin(), found.group.end(), [&](const NamedEffect& name) {
-    if (is_supported && (!leaves_known_noise || catalogue::get(name.effect).has_state)) return true;
+    if (is_supported && (!leaves_known_noise || is_of_presliding(catalogue::get(name.effect)))) return true;
     return std::any_of(motor.candidates.begin(), motor.candidates.end(), [&](const CandidateFit& candidate) {
       return is_of_family(name.effect, name.order, candidate) && candidate.gain.score > kPolicy.named_score;
     });
@@ -112,10 +116,11 @@ bool may_be_stated(const Resampling& resampling, const Resampling::FoundTerm& fo
 std::vector<NamedEffect> names_of(const Resampling& resampling, const SearchedBalance& motor) {
   const double least_percent = 100.0 * kPolicy.line_share;
   std::vector<NamedEffect> names;
-  if (is_within_floor_of_few_records(motor.search)) return names;
+  const bool is_judged_by_few = is_within_floor_of_few_records(motor.search);
   for (const Resampling::FoundTerm& found : resampling.found) {
     if (found.group.empty() || found.refused_by_holdout) continue;
     if (!may_be_stated(resampling, found, motor)) continue;
+    if (is_judged_by_few && !found.is_confirmed()) continue;
     if (names.empty() && found.group.size() > 1) return found.group;
     if (found.group.size() > 1 || (!names.empty() && found.share_percent < least_percent)) continue;
     names.push_back(found.group.front());
@@ -196,6 +201,7 @@ bool resampling_decides(const Resampling& resampling, const SearchedBalance& mot
   if (resampling.subsamples == 0.0) return resampling.too_little;
   if (!motor.names_one()) return true;
   const CandidateFit& first = motor.candidates.front();
+  if (is_of_presliding(*first.model.entry)) return true;
   if (reaches_floor(motor) && !explains_instead(resampling, first)) return false;
   const std::optional<double> support = support_of(resampling, first);
   if (!support && first.gain.chi2_percent > kPolicy.nearly_all_percent && !explains_instead(resampling, first))
@@ -258,6 +264,10 @@ void name_stable(SearchedBalance& chosen, Diagnosis& result) {
     return t.model.entry->name() == result.named.front().effect && t.model.order == result.named.front().order;
   });
   if (candidate != chosen.candidates.end()) std::rotate(chosen.candidates.begin(), candidate, candidate + 1);
+}
+
+bool Resampling::FoundTerm::is_confirmed() const {
+  return held_out_ratio && *held_out_ratio * *held_out_ratio <= 1.0 - kPolicy.line_share;
 }
 
 std::vector<NamedEffect> Resampling::found_group(const NamedEffect& name) const {
