@@ -301,6 +301,32 @@ TEST(Decision, NamesWhatIsChosenOftenEnoughAlone) {
   EXPECT_EQ(found[0].group[0].name, "often");
 }
 
+TEST(Decision, WhatNeitherEnoughSubsamplesChoseNorEnoughDidNotIsUndecided) {
+  Stability s;
+  s.subsamples = 100.0;
+  s.frequencies = {frequency("often", 0.8, 0.8, 0.5), frequency("half", 0.5, 0.5, 0.5),
+                   frequency("curve", 0.5, 0.5, 0.5), frequency("seldom", 0.35, 0.39, 0.5)};
+  s.frequencies[2].entry = nullptr;
+  const auto open = undecided(s, decide(s, {}), {});
+  ASSERT_EQ(open.size(), 1U);
+  EXPECT_EQ(open[0].group[0].name, "half");
+  s.abstained = 80.0;
+  EXPECT_TRUE(undecided(s, {}, {}).empty());
+}
+
+TEST(Decision, WhatIsChosenOftenButNotOftenEnoughBehindAnUnknownStructureIsUndecided) {
+  Stability s;
+  s.subsamples = 100.0;
+  s.frequencies = {frequency("curve", 0.8, 0.8, 0.2), frequency("law", 0.8, 0.8, 0.7)};
+  s.frequencies[0].entry = nullptr;
+  s.frequencies[0].first = 1.0;
+  const auto found = decide(s, {});
+  ASSERT_EQ(found.size(), 1U);
+  const auto open = undecided(s, found, {});
+  ASSERT_EQ(open.size(), 1U);
+  EXPECT_EQ(open[0].group[0].name, "law");
+}
+
 TEST(Decision, GroupsWhatTakesTurns) {
   Stability s;
   s.subsamples = 100.0;

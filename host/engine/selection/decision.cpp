@@ -19,13 +19,23 @@ double least_frequency(const FoundTerm& found, bool unknown, const SelectionPoli
   return strict && found.group.front().name != kPresliding ? policy.certain_frequency : policy.named_frequency;
 }
 
-}  // namespace
+// Waves that take off no more than a placebo wave found with them are not more significant than that.
+bool is_no_more_than_placebo(const FoundTerm& term, const std::vector<FoundTerm>& found,
+                             const SelectionPolicy& policy) {
+  double placebo_share = 0.0;
+  for (const FoundTerm& f : found)
+    if (is_placebo(f.group.front())) placebo_share = std::max(placebo_share, f.share);
+  return term.in_catalogue && term.group.front().order && term.share < policy.similar_left * placebo_share;
+}
 
-std::vector<FoundTerm> decide(const Stability& stability, const SelectionPolicy& policy) {
+bool has_unknown(const std::vector<FoundTerm>& found) {
+  return std::any_of(found.begin(), found.end(), [](const FoundTerm& f) { return !f.in_catalogue; });
+}
+
+// Groups that at least `least` of the subsamples chose, without those in `taken`, to which their members are added.
+std::vector<FoundTerm> groups_chosen(const Stability& stability, double least, std::set<std::string>& taken,
+                                     const SelectionPolicy& policy) {
   std::vector<FoundTerm> all;
-  std::set<std::string> taken;
-  // Most subsamples abstain: nothing is above the noise.
-  if (stability.abstained > policy.most_abstaining * stability.subsamples) return all;
   const auto find = [&](const std::string& name) {
     return std::find_if(stability.frequencies.begin(), stability.frequencies.end(),
                         [&](const Frequency& f) { return f.name == name; });
@@ -35,9 +45,7 @@ std::vector<FoundTerm> decide(const Stability& stability, const SelectionPolicy&
   std::stable_sort(leads.begin(), leads.end(),
                    [](const Frequency& a, const Frequency& b) { return a.first > b.first; });
   for (const Frequency& lead : leads) {
-    if (taken.count(lead.name) != 0 || lead.near < policy.named_frequency ||
-        lead.frequency < policy.least_own_frequency)
-      continue;
+    if (taken.count(lead.name) != 0 || lead.near < least || lead.frequency < policy.least_own_frequency) continue;
     FoundTerm found;
     found.group.push_back(lead);
     found.frequency = lead.frequency;
@@ -51,30 +59,49 @@ std::vector<FoundTerm> decide(const Stability& stability, const SelectionPolicy&
     }
     // A placebo wave that does as well shows that no order is identifiable here. Where the leading term is not a wave,
     // this refutes the waves only.
-    if (lead.entry && !lead.order && lead.frequency >= policy.named_frequency &&
+    if (lead.entry && !lead.order && lead.frequency >= least &&
         std::any_of(found.group.begin(), found.group.end(), is_placebo)) {
       // The subsamples that chose a wave chose it for what it shares with the leading term.
       std::erase_if(found.group, [](const Frequency& f) { return f.order.has_value(); });
     }
     found.frequency = std::min(found.frequency, lead.near);
-    if (found.frequency < policy.named_frequency) continue;
+    if (found.frequency < least) continue;
     for (const Frequency& f : found.group) {
       taken.insert(f.name);
       if (!f.entry && f.name != kPresliding) found.in_catalogue = false;
     }
     all.push_back(std::move(found));
   }
-  const bool unknown = std::any_of(all.begin(), all.end(), [](const FoundTerm& f) { return !f.in_catalogue; });
+  return all;
+}
+
+}  // namespace
+
+std::vector<FoundTerm> decide(const Stability& stability, const SelectionPolicy& policy) {
+  // Most subsamples abstain: nothing is above the noise.
+  if (stability.abstained > policy.most_abstaining * stability.subsamples) return {};
+  std::set<std::string> taken;
+  std::vector<FoundTerm> all = groups_chosen(stability, policy.named_frequency, taken, policy);
+  const bool unknown = has_unknown(all);
   std::erase_if(
       all, [&](const FoundTerm& f) { return f.in_catalogue && f.frequency < least_frequency(f, unknown, policy); });
-  // Waves that take off no more than a placebo wave found with them are not more significant than that.
-  double placebo_share = 0.0;
-  for (const FoundTerm& f : all)
-    if (is_placebo(f.group.front())) placebo_share = std::max(placebo_share, f.share);
-  std::erase_if(all, [&](const FoundTerm& f) {
-    return f.in_catalogue && f.group.front().order && f.share < policy.similar_left * placebo_share;
-  });
+  const std::vector<FoundTerm> with_waves = all;
+  std::erase_if(all, [&](const FoundTerm& f) { return is_no_more_than_placebo(f, with_waves, policy); });
   std::stable_sort(all.begin(), all.end(), [](const FoundTerm& a, const FoundTerm& b) { return a.share > b.share; });
+  return all;
+}
+
+std::vector<FoundTerm> undecided(const Stability& stability, const std::vector<FoundTerm>& found,
+                                 const SelectionPolicy& policy) {
+  if (stability.abstained > policy.most_abstaining * stability.subsamples) return {};
+  std::set<std::string> taken;
+  for (const FoundTerm& one : found)
+    for (const Frequency& f : one.group) taken.insert(f.name);
+  std::vector<FoundTerm> all = groups_chosen(stability, 1.0 - policy.named_frequency, taken, policy);
+  std::erase_if(
+      all, [&](const FoundTerm& term) { return !term.in_catalogue || is_no_more_than_placebo(term, found, policy); });
+  std::stable_sort(all.begin(), all.end(),
+                   [](const FoundTerm& a, const FoundTerm& b) { return a.frequency > b.frequency; });
   return all;
 }
 

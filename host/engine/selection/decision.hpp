@@ -18,4 +18,9 @@ struct FoundTerm {
 // Largest share first.
 std::vector<FoundTerm> decide(const Stability& stability, const SelectionPolicy& policy);
 
+// Terms of the catalogue, and groups, that are neither found nor ruled out: fewer subsamples chose them than must, and
+// fewer did not than must. Most frequent first.
+std::vector<FoundTerm> undecided(const Stability& stability, const std::vector<FoundTerm>& found,
+                                 const SelectionPolicy& policy);
+
 }  // namespace flexspline::selection

@@ -124,6 +124,7 @@ struct Resampling {
   double lowest_hz = 0.0, highest_hz = 0.0;
   std::optional<double> lag_s, lag_std_s;  // of the effort's time base, taken off; nothing: not significant
   std::vector<FoundTerm> found;            // largest share first
+  std::vector<FoundTerm> undecided;        // in the catalogue; neither found nor ruled out
   std::vector<Support> support;            // of all terms that could be chosen
   // The group that a name was found in.
   std::vector<NamedEffect> found_group(const NamedEffect& name) const;
@@ -158,6 +159,14 @@ enum class Verdict {
 };
 std::string verdict_name(Verdict verdict);
 
+// Effects of which these data cannot tell whether the model lacks them.
+struct PossibleEffect {
+  std::vector<NamedEffect> group;  // more than one: not distinguished
+  std::string why_not;             // it is not named
+  // Of the subsamples that chose one of them, and error on the experiments that are held out, with it over without it.
+  std::optional<double> frequency, held_out_ratio;
+};
+
 // What one cut-off or mask would give alone, where the user states one.
 struct StatedSetting {
   Verdict verdict = Verdict::nothing_significant;
@@ -184,6 +193,7 @@ struct Diagnosis {
   std::vector<Disturbance> disturbances;
   std::vector<std::string> warnings;
   std::optional<Resampling> resampling;     // of the motor's balance
+  std::vector<PossibleEffect> possible;     // where resampling decides: not named, and not ruled out
   bool partial = false;                     // more is missing than what is named
   std::optional<UnknownStructure> unknown;  // where the verdict is unknown_structure and a curve shows what it is
   std::optional<BetweenRecords> between_records;

@@ -1,5 +1,7 @@
 #include "host/engine/selection/resampling.hpp"
 
+#include <fmt/format.h>
+
 #include <algorithm>
 #include <cmath>
 
@@ -152,6 +154,54 @@ std::vector<std::string> first_names(const std::vector<FoundTerm>& decided) {
   return names;
 }
 
+Resampling::FoundTerm found_term(const FoundTerm& found, std::optional<double> held_out_ratio,
+                                 const estimation::Terms& terms) {
+  Resampling::FoundTerm one;
+  for (const Frequency& f : found.group) one.name += (one.name.empty() ? "" : " or ") + f.name;
+  one.frequency = found.frequency;
+  one.share_percent = 100.0 * found.share;
+  one.share_low_percent = 100.0 * found.group.front().share_low;
+  one.share_high_percent = 100.0 * found.group.front().share_high;
+  one.held_out_ratio = held_out_ratio;
+  if (found.in_catalogue)
+    for (const Frequency& f : found.group) {
+      const catalogue::Entry* entry = f.name == kPresliding ? presliding_law(terms) : f.entry;
+      if (entry) one.group.push_back({std::string(entry->name()), f.order});
+    }
+  const double most_ratio =
+      one.frequency >= kPolicy.certain_frequency ? kPolicy.most_held_out_ratio_certain : kPolicy.most_held_out_ratio;
+  one.refused_by_holdout = !one.group.empty() && one.held_out_ratio && *one.held_out_ratio > most_ratio;
+  return one;
+}
+
+// Why a group that is not named is not.
+std::string why_not_named(const Resampling::FoundTerm& term, bool is_undecided) {
+  if (term.refused_by_holdout)
+    return fmt::format("the error on experiments that are held out rises by {:.1f} % with it",
+                       100.0 * (*term.held_out_ratio - 1.0));
+  if (is_undecided)
+    return fmt::format("{:.0f} are needed, {:.0f} where it shows little or behind an unknown structure",
+                       100.0 * kPolicy.named_frequency, 100.0 * kPolicy.certain_frequency);
+  if (term.group.size() > 1) return "its members cannot be distinguished, and what is named explains more";
+  return "too few of all subsamples see anything above the noise";
+}
+
+// Groups of the catalogue that were found, or are undecided, and are not named.
+std::vector<PossibleEffect> possible_effects(const Resampling& resampling, const std::vector<NamedEffect>& named) {
+  std::vector<PossibleEffect> all;
+  const auto is_named = [&](const NamedEffect& a) {
+    return std::any_of(named.begin(), named.end(),
+                       [&](const NamedEffect& b) { return a.effect == b.effect && a.order == b.order; });
+  };
+  const auto add = [&](const Resampling::FoundTerm& term, bool is_undecided) {
+    if (term.group.empty() || std::any_of(term.group.begin(), term.group.end(), is_named)) return;
+    all.push_back({term.group, why_not_named(term, is_undecided), term.frequency, term.held_out_ratio});
+  };
+  for (const Resampling::FoundTerm& term : resampling.found) add(term, false);
+  for (const Resampling::FoundTerm& term : resampling.undecided) add(term, true);
+  return all;
+}
+
 }  // namespace
 
 Resampling resample(const std::vector<const data::Experiment*>& experiments, const model::Drive& drive,
@@ -174,24 +224,15 @@ Resampling resample(const std::vector<const data::Experiment*>& experiments, con
       result.highest_hz * std::pow(kPolicy.bandwidth_factor, static_cast<double>(kPolicy.bandwidths - 1));
   const std::vector<FoundTerm> decided = decide(stability, kPolicy);
   const std::vector<double> held_out = selection.held_out_ratios(first_names(decided));
-  for (std::size_t i = 0; i < decided.size(); ++i) {
-    const FoundTerm& found = decided[i];
-    Resampling::FoundTerm one;
-    for (const Frequency& f : found.group) one.name += (one.name.empty() ? "" : " or ") + f.name;
-    one.frequency = found.frequency;
-    one.share_percent = 100.0 * found.share;
-    one.share_low_percent = 100.0 * found.group.front().share_low;
-    one.share_high_percent = 100.0 * found.group.front().share_high;
-    if (!held_out.empty()) one.held_out_ratio = held_out[i];
-    if (found.in_catalogue)
-      for (const Frequency& f : found.group) {
-        const catalogue::Entry* entry = f.name == kPresliding ? presliding_law(terms) : f.entry;
-        if (entry) one.group.push_back({std::string(entry->name()), f.order});
-      }
-    const double most_ratio =
-        one.frequency >= kPolicy.certain_frequency ? kPolicy.most_held_out_ratio_certain : kPolicy.most_held_out_ratio;
-    one.refused_by_holdout = !one.group.empty() && one.held_out_ratio && *one.held_out_ratio > most_ratio;
-    result.found.push_back(std::move(one));
+  for (std::size_t i = 0; i < decided.size(); ++i)
+    result.found.push_back(
+        found_term(decided[i], held_out.empty() ? std::nullopt : std::optional(held_out[i]), terms));
+  for (const FoundTerm& one : undecided(stability, decided, kPolicy)) {
+    std::vector<std::string> names = first_names(decided);
+    names.push_back(one.group.front().name);
+    const std::vector<double> with_it = selection.held_out_ratios(names);
+    result.undecided.push_back(
+        found_term(one, with_it.empty() ? std::nullopt : std::optional(with_it.back()), terms));
   }
   result.support = support_of(selection, terms);
   return result;
@@ -223,6 +264,7 @@ bool resampling_decides(const Resampling& resampling, const SearchedBalance& mot
 
 void name_stable(SearchedBalance& chosen, Diagnosis& result) {
   result.named = names_of(*result.resampling, chosen);
+  result.possible = possible_effects(*result.resampling, result.named);
   const bool is_of_scale = add_other_scale(chosen, result.named);
   const bool is_group =
       is_of_scale || (!result.named.empty() && result.resampling->found_group(result.named.front()).size() > 1);

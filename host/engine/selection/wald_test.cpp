@@ -24,12 +24,11 @@ namespace {
 
 // Whether experiments that are held out confirm a name.
 bool is_confirmed(const Diagnosis& result, const NamedEffect& name) {
-  return result.resampling && result.resampling->decides &&
-         std::any_of(result.resampling->found.begin(), result.resampling->found.end(), [&](const auto& found) {
-           return found.is_confirmed() && std::any_of(found.group.begin(), found.group.end(), [&](const NamedEffect& n) {
-                    return n.effect == name.effect && n.order == name.order;
-                  });
-         });
+  if (!result.resampling || !result.resampling->decides) return false;
+  const auto is_it = [&](const NamedEffect& n) { return n.effect == name.effect && n.order == name.order; };
+  return std::any_of(result.resampling->found.begin(), result.resampling->found.end(), [&](const auto& found) {
+    return found.is_confirmed() && std::any_of(found.group.begin(), found.group.end(), is_it);
+  });
 }
 
 }  // namespace
@@ -45,6 +44,7 @@ void take_back_insignificant(Diagnosis& result) {
     if (!p || *p <= kPolicy.wald_p_value) return false;
     at->admissible = false;
     at->why_not = "its values do not differ from zero beyond their intervals";
+    if (result.resampling && result.resampling->decides) result.possible.push_back({{name}, at->why_not, std::nullopt, std::nullopt});
     return true;
   });
 }

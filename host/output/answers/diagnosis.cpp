@@ -337,15 +337,44 @@ void print_resampling(Console& console, const selection::Resampling& r) {
   const std::string how =
       fmt::format("{:.0f} subsamples at bandwidths from {:.3g} to {:.3g} Hz, with and without reversals", r.subsamples,
                   r.lowest_hz, r.highest_hz);
-  console.line(wrapped(found.empty() ? fmt::format("Nothing is chosen in more than half of {}.", how)
+  console.line(wrapped(found.empty() ? fmt::format("Nothing is chosen often enough in {}.", how)
                                      : fmt::format("Of {}: {}.", how, listed(found))));
   print_held_out(console, r);
+}
+
+std::string words(const std::vector<selection::NamedEffect>& group) {
+  std::vector<std::string> names;
+  for (const selection::NamedEffect& n : group) names.push_back(effect_in_words(n.effect, n.order));
+  return listed(names, "or");
+}
+
+// What these data neither show nor rule out, and what to record.
+void print_possible(Console& console, const std::vector<selection::PossibleEffect>& possible) {
+  for (const selection::PossibleEffect& one : possible) {
+    std::string text = fmt::format("Cannot tell whether {} is missing", words(one.group));
+    if (one.frequency) text += fmt::format(": chosen in {:.0f} of 100 subsamples", 100.0 * *one.frequency);
+    text += fmt::format("; {}.", one.why_not);
+    if (const catalogue::Entry* entry = catalogue::find(one.group.front().effect))
+      text += fmt::format(" Record {}.", entry->info->separated_by);
+    console.line(wrapped(text));
+  }
+}
+
+json possible_json(const std::vector<selection::PossibleEffect>& possible) {
+  json list = json::array();
+  for (const selection::PossibleEffect& one : possible)
+    list.push_back({{"effects", named_json(one.group)},
+                    {"frequency", json_number(one.frequency)},
+                    {"held_out_ratio", json_number(one.held_out_ratio)},
+                    {"why_not", one.why_not}});
+  return list;
 }
 
 void print_diagnosis(Console& console, const Diagnosis& d, const std::string& add_command) {
   console.line(console.bold(verdict_in_words(d)));
   console.line(wrapped(evidence(d)));
   if (d.resampling && d.resampling->decides) print_resampling(console, *d.resampling);
+  print_possible(console, d.possible);
   if (!d.localised.empty()) console.line(wrapped(fmt::format("The error goes with {}.", shares(d.localised))));
   if (d.delay_s)
     console.line(
@@ -434,6 +463,7 @@ json diagnosis_json(const Diagnosis& d) {
           {"recovered_percent", json_number(d.recovered_percent)},
           {"disturbances", std::move(disturbances)},
           {"partial", d.partial},
+          {"possible", possible_json(d.possible)},
           {"between_records", between_records_json(d)},
           {"law_in_range", law_in_range_json(d)},
           {"resampling", resampling_json(d)},
