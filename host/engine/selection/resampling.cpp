@@ -34,12 +34,20 @@ std::vector<Resampling::Support> support_of(const StabilitySelection& selection,
   return all;
 }
 
+// Whether an effect differs from what it replaces around reversals alone, which likelihood leaves out.
+bool is_of_presliding(const catalogue::Entry& entry) {
+  return entry.has_state && !entry.info->replaces.empty();
+}
+
 // Whether a name that resampling chose is that of a candidate, or of another law of its family: resampling has the
-// nonlinear parameters at fixed values only, so likelihood decides which law of the family it is.
+// nonlinear parameters at fixed values only, and one law of presliding for all, so likelihood decides which law of the
+// family it is.
 bool is_of_family(const std::string& effect, std::optional<double> order, const CandidateFit& candidate) {
   if (order != candidate.model.order) return false;
   const std::string_view family = candidate.model.entry->info->family;
-  return effect == candidate.model.entry->name() || (!family.empty() && catalogue::get(effect).info->family == family);
+  const catalogue::Entry& chosen = catalogue::get(effect);
+  return effect == candidate.model.entry->name() || (!family.empty() && chosen.info->family == family) ||
+         (is_of_presliding(chosen) && is_of_presliding(*candidate.model.entry));
 }
 
 // Of a candidate; nothing where resampling cannot choose it: it has no linear parameter, or more nonlinear ones than
@@ -55,25 +63,29 @@ bool is_of_effort(const CandidateFit& candidate) {
   return candidate.model.entry->info->reads == effects::kCurrent;
 }
 
-// Whether an effect differs from what it replaces around reversals alone, which likelihood leaves out.
-bool is_of_presliding(const catalogue::Entry& entry) {
-  return entry.has_state && !entry.info->replaces.empty();
-}
-
 bool is_of_torque(const CandidateFit& candidate) {
   return (candidate.model.entry->info->reads & effects::kTorque) != 0;
 }
 
+// Whether an effect takes off nearly all squares of the model's error; or, of what is above a known noise floor where
+// the model's error is above it, all but what no term needs to take off. An effect built from the measured effort may
+// explain a part of its own noise.
+bool takes_off_nearly_all(const SearchedBalance& e, const CandidateFit& candidate) {
+  if (candidate.gain.chi2_percent > kPolicy.nearly_all_percent) return true;
+  if (!e.floor.rmse || e.search.base.rmse() < (1.0 + kPolicy.floor_uncertainty) * *e.floor.rmse) return false;
+  const auto above = [&](double rmse) { return rmse * rmse - *e.floor.rmse * *e.floor.rmse; };
+  return above(candidate.fit.rmse()) < kPolicy.line_share * above(e.search.base.rmse());
+}
+
 // Whether the model with the best effect leaves known noise: as large as a noise floor that is not from a fit, with no
-// more correlation than the filter causes. An effect built from the measured effort may explain its own noise, so it
-// must take off nearly all.
+// more correlation than the filter causes.
 bool reaches_floor(const SearchedBalance& e) {
   if (!e.floor.rmse || !e.names_one()) return false;
   const CandidateFit& first = e.candidates.front();
   return std::abs(first.fit.rmse() / *e.floor.rmse - 1.0) < kPolicy.floor_uncertainty &&
          first.fit.autocorrelation_time <
              (1.0 + kPolicy.filter_uncertainty) * e.search.data->filter_autocorrelation_time() &&
-         (!is_of_effort(first) || first.gain.chi2_percent > kPolicy.nearly_all_percent);
+         (!is_of_effort(first) || takes_off_nearly_all(e, first));
 }
 
 // Whether resampling found another effect that explains what is above the noise, too.
@@ -242,8 +254,8 @@ bool resampling_decides(const Resampling& resampling, const SearchedBalance& mot
   if (resampling.subsamples == 0.0) return resampling.too_little;
   if (!motor.names_one()) return true;
   const CandidateFit& first = motor.candidates.front();
-  if (is_of_presliding(*first.model.entry)) return true;
   if (reaches_floor(motor) && !explains_instead(resampling, first)) return false;
+  if (is_of_presliding(*first.model.entry)) return true;
   const std::optional<double> support = support_of(resampling, first);
   if (!support && first.gain.chi2_percent > kPolicy.nearly_all_percent && !explains_instead(resampling, first))
     return false;
