@@ -27,6 +27,8 @@ export interface Diagnosis {
   verdict: string; verdict_in_words: string; named: { effect: string; order: number | null }[]; balance: string | null;
   base: { rmse: number | null; rmse_cv: number | null; noise_floor: number | null; unit?: string };
   localised: { variable: string; share_percent: number }[]; candidates: Candidate[];
+  resampling?: { decides: boolean; found: { effects: { effect: string; order: number | null }[]; frequency: number | null }[] } | null;
+  possible?: { effects: { effect: string; order: number | null }[]; frequency: number | null; why_not: string }[];
   unknown?: Unknown | null; disturbances: { experiment: string; from_s: number; to_s: number; peak: number; unit: string }[];
 }
 // A curve that no effect explains.

@@ -12,6 +12,10 @@ function certainty(c: Candidate, found: Diagnosis): string {
   if (!c.admissible) return `refused: ${c.why_not ?? "its values are impossible"}`;
   const named = found.named.some((n) => label(n) === label(c));
   const score = c.score ?? 0, falls = c.chi2_fall_percent ?? 0;
+  const chosen = found.resampling?.decides ? found.resampling.found.find((f) => f.effects.some((e) => label(e) === label(c))) : undefined;
+  if (named && chosen) return `chosen in ${num(100 * (chosen.frequency ?? 0), 2)} of 100 subsamples` + (found.verdict === "confusable_effects" ? "; cannot be distinguished from other effects" : "");
+  const open = found.possible?.find((p) => p.effects.some((e) => label(e) === label(c)));
+  if (open) return `cannot tell: ${open.why_not}`;
   if (falls < 0 || score < 0) return "makes left-out data worse";
   if (named) return found.named.length > 1 ? "likely; cannot be distinguished from other effects" : score >= 200 ? "certain" : score >= 20 ? "sure" : "weak";
   if (score < 10) return "could be chance";
@@ -49,6 +53,8 @@ export class Missing {
     const shown = found.candidates.slice(0, 12);
     const list = el("div", { class: "column candidates" },
       el("p", { class: `verdict ${good ? "fine" : none ? "open" : "bad"}`, "data-verdict": found.verdict }, el("span", { class: "sign", "aria-hidden": "true" }, good ? "✓" : none ? "?" : "!"), sentence(found)),
+      found.possible?.length ? el("p", { class: "rivals", "data-possible": String(found.possible.length) }, el("strong", {}, "Cannot tell whether missing: "), found.possible.map((p) =>
+        p.effects.map(inWords).join(" or ") + (p.frequency === null ? "" : ` (chosen in ${num(100 * p.frequency, 2)} of 100 subsamples; ${p.why_not})`)).join("; "), ".") : null,
       unknown ? el("div", { class: "choice" }, button("Its shape", () => { this.chosen = ""; this.render(state); }, { "aria-pressed": chosen ? "false" : "true" })) : null,
       found.named.length > 1 ? el("p", { class: "rivals" }, el("strong", {}, "To distinguish them: "), found.candidates.find((c) => label(c) === first)?.separating_experiment ?? "flexspline plan --separate designs a motion", ".") : null,
       shown.length ? el("div", { class: "side", role: "listbox", "aria-label": "Candidates, best first", "data-scroll": "candidates",

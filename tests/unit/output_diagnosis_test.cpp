@@ -1,0 +1,51 @@
+// What a reader of a diagnosis is told of effects that the data neither show nor rule out.
+#include "host/output/answers/diagnosis.hpp"
+
+#include <gtest/gtest.h>
+
+#include <cstdio>
+#include <nlohmann/json.hpp>
+
+namespace flexspline::output {
+namespace {
+
+selection::Diagnosis with_possible_effects() {
+  selection::Diagnosis d;
+  d.unit = "N*m";
+  d.possible.push_back({{{"dahl_friction", std::nullopt}}, "60 are needed", 0.512, 0.81});
+  d.possible.push_back({{{"torque_ripple", 2.0}, {"load_scaled_ripple", 2.0}}, "too few", std::nullopt, std::nullopt});
+  return d;
+}
+
+TEST(DiagnosisAnswer, SaysOfWhatTheDataCannotTellWhyAndWhatToRecord) {
+  ::testing::internal::CaptureStdout();
+  {
+    Console console("diagnose", false);
+    print_diagnosis(console, with_possible_effects(), "");
+    std::fflush(stdout);
+  }
+  std::string text = ::testing::internal::GetCapturedStdout();
+  for (std::size_t at = 0; (at = text.find("\n  ", at)) != std::string::npos;) text.replace(at, 3, " ");  // unwrapped
+  EXPECT_NE(text.find("Cannot tell whether dahl_friction is missing: chosen in 51 of 100 subsamples; 60 are needed. "
+                      "Record small slow motion that reverses often."),
+            std::string::npos)
+      << text;
+  EXPECT_NE(text.find("Cannot tell whether torque_ripple (2 per turn) or load_scaled_ripple (2 per turn) is missing; "
+                      "too few. Record "),
+            std::string::npos)
+      << text;
+}
+
+TEST(DiagnosisAnswer, HasPossibleEffectsInItsJson) {
+  const nlohmann::json possible = diagnosis_json(with_possible_effects()).at("possible");
+  ASSERT_EQ(possible.size(), 2u);
+  EXPECT_EQ(possible[0].at("effects"), nlohmann::json::parse(R"([{"effect": "dahl_friction", "order": null}])"));
+  EXPECT_EQ(possible[0].at("frequency"), 0.512);
+  EXPECT_EQ(possible[0].at("held_out_ratio"), 0.81);
+  EXPECT_EQ(possible[0].at("why_not"), "60 are needed");
+  EXPECT_EQ(possible[1].at("effects").size(), 2u);
+  EXPECT_TRUE(possible[1].at("frequency").is_null());
+}
+
+}  // namespace
+}  // namespace flexspline::output
