@@ -24,7 +24,8 @@ Record swinging(double amplitude_rad, double frequency_hz, double noise_rad) {
   for (std::size_t k = 0; k < 8000; ++k) {
     const double t = 1e-3 * static_cast<double>(k);
     e.time_s.push_back(t);
-    e[Column::motor_position].push_back(-amplitude_rad * std::cos(kTurn * frequency_hz * t) + noise_rad * noise(random));
+    e[Column::motor_position].push_back(-amplitude_rad * std::cos(kTurn * frequency_hz * t) +
+                                        noise_rad * noise(random));
     e[Column::motor_torque].push_back(0.1 * std::sin(kTurn * frequency_hz * t));
   }
   e.segments = {{0, e.size()}};

@@ -16,6 +16,7 @@ std::unique_ptr<Identification> at_higher_cutoff(const Identification& found, co
   PipelineOptions higher = pipeline;
   higher.cutoff_hz = kHigherCutoff * found.prepared.pipeline.row_cutoff_hz;
   higher.mask = found.prepared.pipeline.mask;
+  higher.keep_motor_reversals = found.prepared.pipeline.keep_motor_reversals;
   higher.ready = nullptr;
   try {
     return identify(dataset, model, higher);

@@ -109,7 +109,8 @@ void choose_rows(Record& record, const Pipeline& pipeline, std::size_t settling)
   for (const Balance balance : {Balance::motor, Balance::transmission, Balance::load}) {
     Rows& rows = record.rows[index(balance)];
     std::vector<std::uint8_t> unsure(n, 0);
-    if (pipeline.mask && !record.at_rest) {
+    const bool is_kept = balance == Balance::motor && pipeline.keep_motor_reversals;
+    if (pipeline.mask && !is_kept && !record.at_rest) {
       const double visible = 3.0 * record.velocity_noise[index(balance)];
       for (std::size_t k = 0; k < n; ++k) {
         const double v = record.direction_variable(balance, k);
@@ -354,11 +355,20 @@ PreparedData prepare_with(const std::vector<const Experiment*>& experiments, con
   return prepared;
 }
 
+bool has_presliding(const model::Model& model) {
+  return std::any_of(model.effects.begin(), model.effects.end(), [](const model::Effect& effect) {
+    const catalogue::Entry* entry = catalogue::find(effect.type);
+    return entry && entry->is_presliding();
+  });
+}
+
 PreparedData prepare(const std::vector<const Experiment*>& experiments, const model::Model& model,
                      const PipelineOptions& options) {
   const model::Drive& drive = model.drive;
   const std::optional<double> law_rad_s = slowest_law_rad_s(model);
+  const bool keeps_reversals = options.mask && (options.keep_motor_reversals || has_presliding(model));
   if (options.ready && options.ready->chosen_on == experiments && options.ready->slowest_law_rad_s == law_rad_s &&
+      options.ready->pipeline.keep_motor_reversals == keeps_reversals &&
       are_similar(options.ready->constants, without_records(experiments, drive, {}).constants)) {
     PreparedData prepared = prepare_with(experiments, drive, options.ready->pipeline, options.ready.get());
     prepared.chosen_on = experiments;
@@ -371,6 +381,11 @@ PreparedData prepare(const std::vector<const Experiment*>& experiments, const mo
     for (const Experiment* e : experiments) slowest_hz = std::min(slowest_hz, 1.0 / e->sample_s);
     if (raise_for_mask(prepared, law_rad_s, slowest_hz / 10.0))
       prepared = prepare_with(experiments, drive, Pipeline(prepared.pipeline));
+  }
+  // The cut-off is that of the other models, so that their errors can be compared.
+  if (keeps_reversals) {
+    prepared.pipeline.keep_motor_reversals = true;
+    prepared = prepare_with(experiments, drive, Pipeline(prepared.pipeline));
   }
   prepared.pipeline.torque_per_step = torque_per_held_step(prepared);
   for (Record& record : prepared.records)

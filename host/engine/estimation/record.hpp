@@ -33,6 +33,8 @@ struct PipelineOptions {
   // a tenth. Whoever keeps this keeps the data set, too. Null: nothing was.
   std::shared_ptr<const PreparedData> ready = nullptr;
   Derivatives derivatives = Derivatives::butterworth;
+  // Keep reversals of the motor as where the model has a law of presliding: to compare another model with one that has.
+  bool keep_motor_reversals = false;
 };
 
 // What was chosen for the data at hand; the same for all records, so that their samples can be compared.
@@ -40,6 +42,7 @@ struct Pipeline {
   double row_cutoff_hz = 0.0;     // filter of the target and of every column, Butterworth of order five, zero phase
   double motion_cutoff_hz = 0.0;  // filter of positions before they are differentiated
   bool mask = true;
+  bool keep_motor_reversals = false;  // on the motor's balance nothing is masked
   double torque_per_step = 0.0;  // of a held effort, that readings of the torque lack half of; see zero_order_hold.hpp
   std::string reason;            // where the cut-off comes from
   Derivatives derivatives = Derivatives::butterworth;
@@ -117,6 +120,9 @@ struct PreparedData {
   std::vector<const data::Experiment*> chosen_on;  // what the pipeline was chosen for; empty: it was given
   std::optional<double> slowest_law_rad_s;         // whose slow samples the mask had to leave; see prepare()
 };
+
+// Whether a model has a law of presliding: friction around reversals follows the model then, so they are not masked.
+bool has_presliding(const model::Model& model);
 
 // Makes all experiments ready. Equations: report 82 (motor), 78 (transmission), 45 (load). Positions, where there are
 // any, give velocity and acceleration; a tachometer is used only without them.

@@ -54,8 +54,11 @@ const std::size_t* find_balance(const Identification& fitted, Balance own, std::
 
 Addition compare_models(const data::Dataset& dataset, const model::Model& before, const model::Model& after,
                         Balance own, std::string effect, std::string action,
-                        const estimation::PipelineOptions& options) {
+                        const estimation::PipelineOptions& stated) {
   Addition result;
+  // Both are judged on the same samples.
+  estimation::PipelineOptions options = stated;
+  options.keep_motor_reversals = estimation::has_presliding(before) || estimation::has_presliding(after);
   result.effect = std::move(effect);
   std::unique_ptr<Identification> both[2];
   estimation::in_parallel(

@@ -86,7 +86,7 @@ std::optional<double> best_presliding_travel(const estimation::PreparedData& pre
 const catalogue::Entry* presliding_law(const estimation::Terms& terms) {
   const catalogue::Entry* simplest = nullptr;
   for (const catalogue::Entry& entry : catalogue::all()) {
-    if (!entry.has_state || entry.info->balance != effects::Balance::motor) continue;
+    if (!entry.is_presliding()) continue;
     const auto names = catalogue::split_names(entry.info->replaces);
     const bool replaces = std::any_of(terms.begin(), terms.end(), [&](const estimation::Term& t) {
       return std::find(names.begin(), names.end(), t.entry->name()) != names.end();

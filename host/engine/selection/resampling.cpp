@@ -34,11 +34,6 @@ std::vector<Resampling::Support> support_of(const StabilitySelection& selection,
   return all;
 }
 
-// Whether an effect differs from what it replaces around reversals alone, which likelihood leaves out.
-bool is_of_presliding(const catalogue::Entry& entry) {
-  return entry.has_state && !entry.info->replaces.empty();
-}
-
 // Whether a name that resampling chose is that of a candidate, or of another law of its family: resampling has the
 // nonlinear parameters at fixed values only, and one law of presliding for all, so likelihood decides which law of the
 // family it is.
@@ -47,7 +42,7 @@ bool is_of_family(const std::string& effect, std::optional<double> order, const 
   const std::string_view family = candidate.model.entry->info->family;
   const catalogue::Entry& chosen = catalogue::get(effect);
   return effect == candidate.model.entry->name() || (!family.empty() && chosen.info->family == family) ||
-         (is_of_presliding(chosen) && is_of_presliding(*candidate.model.entry));
+         (chosen.is_presliding() && candidate.model.entry->is_presliding());
 }
 
 // Of a candidate; nothing where resampling cannot choose it: it has no linear parameter, or more nonlinear ones than
@@ -117,7 +112,7 @@ bool may_be_stated(const Resampling& resampling, const Resampling::FoundTerm& fo
   const bool leaves_known_noise =
       motor.floor.rmse && motor.search.base.rmse() <= (1.0 + kPolicy.floor_uncertainty) * *motor.floor.rmse;
   return std::any_of(found.group.begin(), found.group.end(), [&](const NamedEffect& name) {
-    if (is_supported && (!leaves_known_noise || is_of_presliding(catalogue::get(name.effect)))) return true;
+    if (is_supported && (!leaves_known_noise || catalogue::get(name.effect).is_presliding())) return true;
     return std::any_of(motor.candidates.begin(), motor.candidates.end(), [&](const CandidateFit& candidate) {
       return is_of_family(name.effect, name.order, candidate) && candidate.gain.score > kPolicy.named_score;
     });
@@ -237,14 +232,12 @@ Resampling resample(const std::vector<const data::Experiment*>& experiments, con
   const std::vector<FoundTerm> decided = decide(stability, kPolicy);
   const std::vector<double> held_out = selection.held_out_ratios(first_names(decided));
   for (std::size_t i = 0; i < decided.size(); ++i)
-    result.found.push_back(
-        found_term(decided[i], held_out.empty() ? std::nullopt : std::optional(held_out[i]), terms));
+    result.found.push_back(found_term(decided[i], held_out.empty() ? std::nullopt : std::optional(held_out[i]), terms));
   for (const FoundTerm& one : undecided(stability, decided, kPolicy)) {
     std::vector<std::string> names = first_names(decided);
     names.push_back(one.group.front().name);
     const std::vector<double> with_it = selection.held_out_ratios(names);
-    result.undecided.push_back(
-        found_term(one, with_it.empty() ? std::nullopt : std::optional(with_it.back()), terms));
+    result.undecided.push_back(found_term(one, with_it.empty() ? std::nullopt : std::optional(with_it.back()), terms));
   }
   result.support = support_of(selection, terms);
   return result;
@@ -255,7 +248,8 @@ bool resampling_decides(const Resampling& resampling, const SearchedBalance& mot
   if (!motor.names_one()) return true;
   const CandidateFit& first = motor.candidates.front();
   if (reaches_floor(motor) && !explains_instead(resampling, first)) return false;
-  if (is_of_presliding(*first.model.entry)) return true;
+  // Likelihood leaves out reversals, where alone presliding shows.
+  if (first.model.entry->is_presliding()) return true;
   const std::optional<double> support = support_of(resampling, first);
   if (!support && first.gain.chi2_percent > kPolicy.nearly_all_percent && !explains_instead(resampling, first))
     return false;

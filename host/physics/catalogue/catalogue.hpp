@@ -109,6 +109,8 @@ struct Entry {
   // The definition of a user-defined effect in its model file; else null.
   const model::Definition* definition = nullptr;
   std::string label{};  // "table_effect:velocity"
+  // A law of presliding: it has a memory, replaces a law of the velocity alone, and differs from that around reversals.
+  bool is_presliding() const { return has_state && info->balance == Balance::motor && !info->replaces.empty(); }
 
   std::string_view name() const { return info->name; }
   // Position of a parameter, or parameters.size() if there is none of that name.

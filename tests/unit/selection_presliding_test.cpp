@@ -1,0 +1,92 @@
+// A law of presliding, added to a model of Coulomb friction, on a motion and a torque that are written down.
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <cmath>
+#include <random>
+
+#include "host/engine/selection/add.hpp"
+#include "host/engine/selection/presliding.hpp"
+#include "tests/support/plain_model.hpp"
+
+namespace flexspline::selection {
+namespace {
+
+using data::Column;
+using estimation::Balance;
+
+constexpr double kTurn = 6.283185307179586;
+constexpr double kTravel_rad = 0.2, kDry_nm = 0.05, kNoise_nm = 5e-4;
+
+// Strokes of several rad with an inertia, viscous friction, and dry friction that builds up over a travel (Dahl's law:
+// exact along each step).
+data::Dataset swinging() {
+  std::mt19937_64 random(1);
+  std::normal_distribution<double> noise(0.0, kNoise_nm);
+  data::Dataset dataset;
+  for (const double frequency_hz : {0.21, 0.34}) {
+    data::Experiment e;
+    e.name = frequency_hz < 0.3 ? "slow" : "fast";
+    e.sample_s = 2e-3;
+    e.current_hold = data::CurrentHold::none;
+    double z = 1.0, before = 0.0;
+    for (std::size_t k = 0; k < 6000; ++k) {
+      const double t = 2e-3 * static_cast<double>(k), rate = kTurn * frequency_hz;
+      const double q = 3.0 * std::sin(rate * t), w = 3.0 * rate * std::cos(rate * t);
+      const double end = q >= before ? 1.0 : -1.0;
+      z = end + (z - end) * std::exp(-std::abs(q - before) / kTravel_rad);
+      before = q;
+      e.time_s.push_back(t);
+      e[Column::motor_position].push_back(q);
+      e[Column::motor_torque].push_back(-1e-3 * rate * rate * q + 4e-3 * w + kDry_nm * z + noise(random));
+    }
+    e.segments = {{0, e.size()}};
+    dataset.experiments.push_back(std::move(e));
+  }
+  return dataset;
+}
+
+TEST(PreslidingLaw, ThatIsAddedIsFittedAroundReversalsAndTakesTheErrorThereToTheNoise) {
+  const data::Dataset dataset = swinging();
+  const Addition added = add(dataset, testing::plain_model(), "dahl_friction", {});
+  EXPECT_GT(added.before.rmse_fit, 10.0 * added.after.rmse_fit);
+  EXPECT_LT(added.after.rmse_fit, 1.5 * kNoise_nm);
+  for (const estimation::Estimate& e : added.estimates) {
+    if (e.effect != "dahl_friction") continue;
+    EXPECT_NEAR(e.value, e.parameter == "presliding" ? kTravel_rad : kDry_nm,
+                0.03 * (e.parameter == "presliding" ? kTravel_rad : kDry_nm));
+  }
+}
+
+TEST(PreslidingLaw, KeepsTheSamplesAroundReversalsOfTheMotorThatAModelOfVelocityAloneMasks) {
+  const data::Dataset dataset = swinging();
+  const std::vector<const data::Experiment*> all = {&dataset.experiments[0], &dataset.experiments[1]};
+  model::Model with = testing::plain_model();
+  for (model::Effect& effect : with.effects)
+    if (effect.type == "coulomb_friction") effect = catalogue::blank_effect(catalogue::get("dahl_friction"), {});
+  const auto masked = [&](const model::Model& model) {
+    std::size_t sum = 0;
+    const estimation::PreparedData prepared = estimation::prepare(all, model, {});
+    for (const estimation::Record& r : prepared.records) sum += r.rows[estimation::index(Balance::motor)].masked;
+    return sum;
+  };
+  EXPECT_GT(masked(testing::plain_model()), 0u);
+  EXPECT_EQ(masked(with), 0u);
+}
+
+TEST(PreslidingLaw, IsSearchedUpToAQuarterOfTheUsualStrokeThoughNoiseMakesManyTinyOnes) {
+  data::Dataset dataset = swinging();
+  std::mt19937_64 random(2);
+  std::normal_distribution<double> noise(0.0, 1e-3);
+  for (data::Experiment& e : dataset.experiments)
+    for (double& q : e[Column::motor_position]) q += noise(random);
+  const estimation::PreparedData prepared =
+      estimation::prepare({&dataset.experiments[0], &dataset.experiments[1]}, testing::plain_model(), {});
+  const std::vector<double> travels = presliding_travels(prepared, kPolicy);
+  ASSERT_FALSE(travels.empty());
+  EXPECT_LT(travels.front(), 0.5 * kTravel_rad);
+  EXPECT_NEAR(travels.back(), std::min(kPolicy.longest_presliding, 0.25 * 6.0), 0.02);
+}
+
+}  // namespace
+}  // namespace flexspline::selection
