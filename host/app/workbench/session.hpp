@@ -111,7 +111,7 @@ class Session {
 
   // Number of changes so far. Waits until there are more than `seen`, at most so long.
   std::uint64_t wait(std::uint64_t seen, std::chrono::milliseconds limit) const;
-  // All that the page shows except curves and maps; README.md says what is in it.
+  // All that the page shows except curves and maps.
   nlohmann::json state() const;
 
  private:
