@@ -51,6 +51,8 @@ TEST(PreslidingLaw, ThatIsAddedIsFittedAroundReversalsAndTakesTheErrorThereToThe
   const Addition added = add(dataset, testing::plain_model(), "dahl_friction", {});
   EXPECT_GT(added.before.rmse_fit, 10.0 * added.after.rmse_fit);
   EXPECT_LT(added.after.rmse_fit, 1.5 * kNoise_nm);
+  ASSERT_FALSE(added.warnings.empty());
+  EXPECT_NE(added.warnings.back().find("around reversals of the motor"), std::string::npos);
   for (const estimation::Estimate& e : added.estimates) {
     if (e.effect != "dahl_friction") continue;
     EXPECT_NEAR(e.value, e.parameter == "presliding" ? kTravel_rad : kDry_nm,

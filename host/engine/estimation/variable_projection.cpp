@@ -44,20 +44,20 @@ double short_stroke(const BalanceData& data) {
   return stroke_quantile(std::move(all), 0.1);
 }
 
-// Travel after a reversal that the data cannot resolve: some counts of the encoder, and what is covered under the mask
-// where reversals are masked.
+// Travel after a reversal that the data cannot resolve: some counts of the encoder, and what is covered under the mask,
+// or, where reversals are kept, between two rows, of which four are kept in a period of the cut-off.
 double unseen_travel(const BalanceData& data) {
   std::vector<double> travel;
+  double counts = 0.0;
   const Pipeline& pipeline = data.prepared().pipeline;
   const bool is_masked = pipeline.mask && !pipeline.keep_motor_reversals;
-  double counts = 0.0;
+  const double unseen_s = (is_masked ? 1.0 : 0.25) / pipeline.row_cutoff_hz;
   for (const RowRange& range : data.records()) {
     const Record& r = data.prepared().records[range.record];
     counts = std::max(counts, 4.0 * r.motor_quantum.value_or(0.0));
-    const double masked_s = 1.0 / pipeline.row_cutoff_hz;
-    for (std::size_t k = 1; is_masked && k < r.inputs.size(); ++k)
+    for (std::size_t k = 1; k < r.inputs.size(); ++k)
       if (r.inputs.velocity_at(k) * r.inputs.velocity_at(k - 1) < 0.0)
-        travel.push_back(0.5 * std::abs(r.inputs[k].acceleration) * masked_s * masked_s);
+        travel.push_back(0.5 * std::abs(r.inputs[k].acceleration) * unseen_s * unseen_s);
   }
   return std::max(counts, quantile(travel, 0.1));
 }

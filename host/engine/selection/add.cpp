@@ -104,6 +104,13 @@ Addition compare_models(const data::Dataset& dataset, const model::Model& before
   result.estimates = extended->estimates;
   result.tables = extended->tables;
   result.warnings = extended->warnings;
+  if (estimation::has_presliding(before) != estimation::has_presliding(after) && balance == Balance::motor)
+    result.warnings.push_back(
+        fmt::format("samples around reversals of the motor are judged, too, as presliding shows there: on the same "
+                    "samples the error was {:.4g} {} and is {:.4g} {}; models without such a law are else judged "
+                    "without them",
+                    result.before.rmse_holdout.value_or(result.before.rmse_fit), result.unit,
+                    result.after.rmse_holdout.value_or(result.after.rmse_fit), result.unit));
   if (action == "add" && result.before.rmse_holdout && *result.after.rmse_holdout >= *result.before.rmse_holdout)
     result.warnings.push_back(fmt::format(
         "the error on held-out data did not decrease: {} does not hold beyond the data that it was fitted on",
