@@ -56,9 +56,7 @@ struct SelectionPolicy {
   double friction_difference = 0.03;
   double friction_difference_records = 2.0;
 
-  // Error on experiments that are held out, with a term over without it: of a term of certain_frequency, as that much
-  // more is the difference of short records, and of any other.
-  double most_held_out_ratio_certain = 1.02;
+  // Error on experiments that are held out, with a term over without it: above, the term is not named.
   double most_held_out_ratio = 1.0;
 
   double white = 0.95;  // semivariance over variance of what is left: above, it is noise

@@ -132,6 +132,10 @@ std::vector<NamedEffect> names_of(const Resampling& resampling, const SearchedBa
     if (is_judged_by_few && !found.is_confirmed()) continue;
     if (names.empty() && found.group.size() > 1) return found.group;
     if (found.group.size() > 1 || (!names.empty() && found.share_percent < least_percent)) continue;
+    // Behind another one, a name that is not certain may be what the first law leaves: held-out experiments decide.
+    const bool is_certain =
+        found.frequency >= kPolicy.certain_frequency || !found.held_out_ratio || found.is_confirmed();
+    if (!names.empty() && !is_certain) continue;
     names.push_back(found.group.front());
   }
   return names;
@@ -175,9 +179,7 @@ Resampling::FoundTerm found_term(const FoundTerm& found, std::optional<double> h
       const catalogue::Entry* entry = f.name == kPresliding ? presliding_law(terms) : f.entry;
       if (entry) one.group.push_back({std::string(entry->name()), f.order});
     }
-  const double most_ratio =
-      one.frequency >= kPolicy.certain_frequency ? kPolicy.most_held_out_ratio_certain : kPolicy.most_held_out_ratio;
-  one.refused_by_holdout = !one.group.empty() && one.held_out_ratio && *one.held_out_ratio > most_ratio;
+  one.refused_by_holdout = !one.group.empty() && one.held_out_ratio && *one.held_out_ratio > kPolicy.most_held_out_ratio;
   return one;
 }
 
@@ -190,6 +192,9 @@ std::string why_not_named(const Resampling::FoundTerm& term, bool is_undecided) 
     return fmt::format("{:.0f} are needed, {:.0f} where it shows little or behind an unknown structure",
                        100.0 * kPolicy.named_frequency, 100.0 * kPolicy.certain_frequency);
   if (term.group.size() > 1) return "its members cannot be distinguished, and what is named explains more";
+  if (term.held_out_ratio)
+    return fmt::format("the error on experiments that are held out falls by {:.1f} % only",
+                       100.0 * (1.0 - *term.held_out_ratio));
   return "too few of all subsamples see anything above the noise";
 }
 
