@@ -52,6 +52,14 @@ const std::size_t* find_balance(const Identification& fitted, Balance own, std::
   return nullptr;
 }
 
+std::string reversals_are_judged(const Addition& change) {
+  return fmt::format(
+      "samples around reversals of the motor are judged, too, as presliding shows there: on the same samples the error "
+      "was {:.4g} {} and is {:.4g} {}; models without such a law are else judged without them",
+      change.before.rmse_holdout.value_or(change.before.rmse_fit), change.unit,
+      change.after.rmse_holdout.value_or(change.after.rmse_fit), change.unit);
+}
+
 Addition compare_models(const data::Dataset& dataset, const model::Model& before, const model::Model& after,
                         Balance own, std::string effect, std::string action,
                         const estimation::PipelineOptions& stated) {
@@ -105,12 +113,7 @@ Addition compare_models(const data::Dataset& dataset, const model::Model& before
   result.tables = extended->tables;
   result.warnings = extended->warnings;
   if (estimation::has_presliding(before) != estimation::has_presliding(after) && balance == Balance::motor)
-    result.warnings.push_back(
-        fmt::format("samples around reversals of the motor are judged, too, as presliding shows there: on the same "
-                    "samples the error was {:.4g} {} and is {:.4g} {}; models without such a law are else judged "
-                    "without them",
-                    result.before.rmse_holdout.value_or(result.before.rmse_fit), result.unit,
-                    result.after.rmse_holdout.value_or(result.after.rmse_fit), result.unit));
+    result.warnings.push_back(reversals_are_judged(result));
   if (action == "add" && result.before.rmse_holdout && *result.after.rmse_holdout >= *result.before.rmse_holdout)
     result.warnings.push_back(fmt::format(
         "the error on held-out data did not decrease: {} does not hold beyond the data that it was fitted on",
