@@ -53,11 +53,21 @@ TEST(PreslidingLaw, ThatIsAddedIsFittedAroundReversalsAndTakesTheErrorThereToThe
   EXPECT_LT(added.after.rmse_fit, 1.5 * kNoise_nm);
   ASSERT_FALSE(added.warnings.empty());
   EXPECT_NE(added.warnings.back().find("around reversals of the motor"), std::string::npos);
+  std::size_t compared = 0;
   for (const estimation::Estimate& e : added.estimates) {
     if (e.effect != "dahl_friction") continue;
-    EXPECT_NEAR(e.value, e.parameter == "presliding" ? kTravel_rad : kDry_nm,
-                0.03 * (e.parameter == "presliding" ? kTravel_rad : kDry_nm));
+    const double truth = e.parameter == "presliding" ? kTravel_rad : kDry_nm;
+    EXPECT_NEAR(e.value, truth, 0.03 * truth) << e.parameter;
+    ++compared;
   }
+  EXPECT_EQ(compared, 2u);
+}
+
+TEST(PreslidingLaw, ThatIsAddedWithoutAMaskHasNoNoteOnReversalsAsAllModelsAreJudgedThere) {
+  const Addition added = add(swinging(), testing::plain_model(), "dahl_friction", {std::nullopt, false});
+  EXPECT_GT(added.before.rmse_fit, 10.0 * added.after.rmse_fit);
+  for (const std::string& warning : added.warnings)
+    EXPECT_EQ(warning.find("around reversals of the motor"), std::string::npos) << warning;
 }
 
 TEST(PreslidingLaw, KeepsTheSamplesAroundReversalsOfTheMotorThatAModelOfVelocityAloneMasks) {

@@ -52,6 +52,18 @@ const std::size_t* find_balance(const Identification& fitted, Balance own, std::
   return nullptr;
 }
 
+// Of the data that the models are judged on; where these show none, of those that were fitted.
+comparison::NoiseFloor floor_of(const Identification& found, BalanceData& fitted_data,
+                                const std::vector<const data::Experiment*>& fitted, BalanceData& judged_data,
+                                const std::vector<const data::Experiment*>& judged) {
+  const auto of = [&](BalanceData& data, const std::vector<const data::Experiment*>& experiments) {
+    return comparison::pooled(comparison::noise_floors(data, found.terms, experiments, found.model.drive),
+                              data.records());
+  };
+  const comparison::NoiseFloor floor = of(judged_data, judged);
+  return floor.rmse || &judged_data == &fitted_data ? floor : of(fitted_data, fitted);
+}
+
 std::string reversals_are_judged(const Addition& change) {
   return fmt::format(
       "samples around reversals of the motor are judged, too, as presliding shows there: on the same samples the error "
@@ -97,13 +109,7 @@ Addition compare_models(const data::Dataset& dataset, const model::Model& before
   } else {
     evaluated = fitted;
   }
-  comparison::NoiseFloor floor =
-      comparison::pooled(comparison::noise_floors(*evaluated_on, extended->terms, evaluated, extended->model.drive),
-                         evaluated_on->records());
-  if (!floor.rmse && holdout.data)
-    floor =
-        comparison::pooled(comparison::noise_floors(extended->data[x], extended->terms, fitted, extended->model.drive),
-                           extended->data[x].records());
+  const comparison::NoiseFloor floor = floor_of(*extended, extended->data[x], fitted, *evaluated_on, evaluated);
   result.noise_floor = floor.rmse;
   result.noise_floor_from = floor.from;
   result.model = extended->model;
@@ -112,7 +118,8 @@ Addition compare_models(const data::Dataset& dataset, const model::Model& before
   result.estimates = extended->estimates;
   result.tables = extended->tables;
   result.warnings = extended->warnings;
-  if (estimation::has_presliding(before) != estimation::has_presliding(after) && balance == Balance::motor)
+  if (options.mask && balance == Balance::motor &&
+      estimation::has_presliding(before) != estimation::has_presliding(after))
     result.warnings.push_back(reversals_are_judged(result));
   if (action == "add" && result.before.rmse_holdout && *result.after.rmse_holdout >= *result.before.rmse_holdout)
     result.warnings.push_back(fmt::format(

@@ -179,23 +179,29 @@ Resampling::FoundTerm found_term(const FoundTerm& found, std::optional<double> h
       const catalogue::Entry* entry = f.name == kPresliding ? presliding_law(terms) : f.entry;
       if (entry) one.group.push_back({std::string(entry->name()), f.order});
     }
-  one.refused_by_holdout = !one.group.empty() && one.held_out_ratio && *one.held_out_ratio > kPolicy.most_held_out_ratio;
+  one.refused_by_holdout =
+      !one.group.empty() && one.held_out_ratio && *one.held_out_ratio > kPolicy.most_held_out_ratio;
   return one;
 }
 
-// Why a group that is not named is not.
-std::string why_not_named(const Resampling::FoundTerm& term, bool is_undecided) {
+// Why a group that is not named is not. `behind`: something else is.
+std::string why_not_named(const Resampling::FoundTerm& term, bool is_undecided, bool behind) {
   if (term.refused_by_holdout)
     return fmt::format("the error on experiments that are held out rises by {:.1f} % with it",
                        100.0 * (*term.held_out_ratio - 1.0));
   if (is_undecided)
     return fmt::format("{:.0f} are needed, {:.0f} where it shows little or behind an unknown structure",
                        100.0 * kPolicy.named_frequency, 100.0 * kPolicy.certain_frequency);
-  if (term.group.size() > 1) return "its members cannot be distinguished, and what is named explains more";
-  if (term.held_out_ratio)
+  if (behind && term.group.size() > 1) return "its members cannot be distinguished, and what is named explains more";
+  if (behind && term.share_percent < 100.0 * kPolicy.line_share)
+    return fmt::format(
+        "it takes off {:.1f} % of the squared error above the noise, and {:.0f} % are needed behind "
+        "another effect",
+        term.share_percent, 100.0 * kPolicy.line_share);
+  if (term.held_out_ratio && !term.is_confirmed())
     return fmt::format("the error on experiments that are held out falls by {:.1f} % only",
                        100.0 * (1.0 - *term.held_out_ratio));
-  return "too few of all subsamples see anything above the noise";
+  return "the model alone is near the noise in most subsamples, or in fewer than three records";
 }
 
 // Groups of the catalogue that were found, or are undecided, and are not named.
@@ -207,7 +213,7 @@ std::vector<PossibleEffect> possible_effects(const Resampling& resampling, const
   };
   const auto add = [&](const Resampling::FoundTerm& term, bool is_undecided) {
     if (term.group.empty() || std::any_of(term.group.begin(), term.group.end(), is_named)) return;
-    all.push_back({term.group, why_not_named(term, is_undecided), term.frequency, term.held_out_ratio});
+    all.push_back({term.group, why_not_named(term, is_undecided, !named.empty()), term.frequency, term.held_out_ratio});
   };
   for (const Resampling::FoundTerm& term : resampling.found) add(term, false);
   for (const Resampling::FoundTerm& term : resampling.undecided) add(term, true);
