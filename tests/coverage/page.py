@@ -63,14 +63,13 @@ for f in files:
 print("# What the quick tests run, by folder\n")
 print(f"Written by `./dev coverage` from version {version}: {passed} tests passed"
       + (f", and tests failed in {failed} runs" if failed else "")
-      + ". gcc's counters at -O1 without sanitizers; unit, command and report tests. Campaigns, fuzzing, boards, guests and the")
-print("workbench's page are not counted. That a line ran does not prove that it is right. Files and functions: `build/coverage/coverage/files.md`.\n")
-print("Share of the lines that ran:\n")
-for folder in sorted(lines):
-    all_lines, run = lines[folder]
-    print(f"- `{folder}`: {percent(run, all_lines):.1f} % of {all_lines}")
+      + ". gcc's counters at -O1; unit, command and report tests; not campaigns, fuzzing, boards,")
+print("guests and the workbench's page. That a line ran does not prove that it is right. Files and functions: `build/coverage/coverage/files.md`.\n")
+shares = sorted((percent(run, whole), folder) for folder, (whole, run) in lines.items())
+print("Share of the lines that ran, in percent, least first: "
+      + ", ".join(f"`{folder}` {share:.1f}" for share, folder in shares) + ".\n")
 all_lines, run = (sum(x[i] for x in lines.values()) for i in (0, 1))
-print(f"- all: {percent(run, all_lines):.1f} % of {all_lines}\n")
+print(f"All: {percent(run, all_lines):.1f} % of {all_lines} lines. ", end="")
 all_functions, called = (sum(x[i] for x in functions.values()) for i in (0, 1))
 print(f"Of {all_functions} functions {called} were called ({percent(called, all_functions):.1f} %). "
       f"Of {len(little)} files less than {LITTLE_PERCENT:.0f} % of the lines ran; "
