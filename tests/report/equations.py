@@ -21,9 +21,10 @@ def main():
             tests.add(f"{suite}.{name}")
     problems, seen = [], []
     for line in (root / "tests/report/EQUATIONS.md").read_text().splitlines():
-        if not re.match(r"\| \d", line):
+        if not re.match(r"- \d", line):
             continue
-        equation, _, where, test = [c.strip() for c in line.strip("|").split("|")]
+        equation, text = line[2:].split(": ", 1)
+        where, test = text.split("; ")[-2:]
         seen += numbers(equation)
         if "/" in where.split(" ")[0] and not (root / where.split(" ")[0]).exists():
             problems.append(f"equation {equation}: there is no {where}")
