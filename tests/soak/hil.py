@@ -116,9 +116,9 @@ def page():
     head = "| | drives | least | 5 % | median | 95 % | worst | worse than none | went wrong |\n| --- | ---: | ---: | ---: | ---: | ---: | ---: | ---: | ---: |"
     parts = [
         "# Campaign: drives that are not what their model says",
-        f"Made by `./dev soak MINUTES hil` of version {version}: {len(ones)} simulated drives. Each is the demo's with every friction, inertia and stiffness off "
-        "by a random share (uniform, up to the one stated), along one of seven scenarios with the drive's firmware. Figures: RMS error of the output with the "
-        "maker's values as compensation, over the error without. *Went wrong*: a fault, a limit cycle at rest that is absent without compensation, or no number.",
+        f"Made by `./dev soak MINUTES hil` of version {version}: {len(ones)} simulated drives, each the demo's with every friction, inertia and stiffness off "
+        "by a random share (uniform, up to the one stated), along one of seven scenarios. RMS error of the output with the "
+        "maker's values as compensation, over that without. *Went wrong*: a fault, a limit cycle that is absent without compensation, or no number.",
         f"## Parameters wrong by up to {100 * FIRST_SHARE:.0f} %: {len(first)} drives, {sum(bool(one['wrong']) for one in first)} went wrong",
         head + "\n" + "\n".join(row(f"`{s}`", [one for one in first if one["scenario"] == s]) for s in SCENARIOS) + "\n" + row("all", first),
     ]
