@@ -114,7 +114,7 @@ struct Bench {
             ((viscous ? at->viscous_factor : at->coulomb_factor) - 1.0) * torque.segment(range.first, range.size());
       }
     }
-    const auto on_balance = estimation::terms_on(without, balance, true);
+    const auto on_balance = estimation::terms_on(without, balance, {.torque = true, .torsion = true});
     Eigen::MatrixXd X = estimation::columns_of(data, without, estimation::free_linear_parameters(without, on_balance));
     if (X.cols() == 0) {
       estimation::Terms open = estimation::terms_of(base);

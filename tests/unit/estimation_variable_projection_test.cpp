@@ -190,7 +190,7 @@ TEST(BalanceRows, ColumnsMadeTogetherAreThoseMadeOneByOne) {
       dataset_of({experiment("a", kFast, plain), experiment("b", kSlow, plain), experiment("c", kFast, plain, 7.0)});
   const auto found = identify(d, m, kOptions);
   BalanceData together(found->prepared, Balance::motor), single(found->prepared, Balance::motor);
-  const auto on_balance = terms_on(found->terms, Balance::motor, false);
+  const auto on_balance = terms_on(found->terms, Balance::motor, {});
   const std::vector<ParameterRef> refs = free_linear_parameters(found->terms, on_balance);
   ASSERT_EQ(refs.size(), 5U);
   const Eigen::MatrixXd columns = together.columns(found->terms, refs);
@@ -215,7 +215,7 @@ TEST(BalanceRows, ColumnsFromFewerSamplesFollowThoseOfAll) {
     ASSERT_EQ(decimated.rows(), all.rows());
     EXPECT_EQ((decimated.target() - all.target()).norm(), 0.0);
     const std::vector<ParameterRef> refs =
-        free_linear_parameters(found->terms, terms_on(found->terms, Balance::motor, false));
+        free_linear_parameters(found->terms, terms_on(found->terms, Balance::motor, {}));
     const Eigen::MatrixXd a = all.columns(found->terms, refs), b = decimated.columns(found->terms, refs);
     for (Eigen::Index j = 0; j < a.cols(); ++j)
       EXPECT_LT((a.col(j) - b.col(j)).norm(), 0.02 * a.col(j).norm()) << cutoff_hz << " Hz, column " << j;

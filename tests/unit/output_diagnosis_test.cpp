@@ -27,11 +27,11 @@ TEST(DiagnosisAnswer, SaysOfWhatTheDataCannotTellWhyAndWhatToRecord) {
   std::string text = ::testing::internal::GetCapturedStdout();
   for (std::size_t at = 0; (at = text.find("\n  ", at)) != std::string::npos;) text.replace(at, 3, " ");  // unwrapped
   EXPECT_NE(text.find("Cannot tell whether dahl_friction is missing: chosen in 51 of 100 subsamples; 60 are needed. "
-                      "Record small slow motion that reverses often."),
+                      "What would tell: small slow motion that reverses often."),
             std::string::npos)
       << text;
   EXPECT_NE(text.find("Cannot tell whether torque_ripple (2 per turn) or load_scaled_ripple (2 per turn) is missing; "
-                      "too few. Record "),
+                      "too few. What would tell: "),
             std::string::npos)
       << text;
 }

@@ -57,6 +57,23 @@ TEST(MetaRegression, OfOneParameterIsALeastSquaresLine) {
   EXPECT_NEAR(fit.explained_share, 1.0 - 0.091 / 9.5, 1e-12);
 }
 
+TEST(MetaRegression, HasStudentsTOfALeastSquaresLine) {
+  MatrixXd theta(5, 1), added(5, 1);
+  added << 1, 2, 3, 4, 5;
+  theta << 2.1, 2.9, 4.2, 4.8, 6.0;
+  const MetaRegression fit = meta_regression(exact(theta), added);
+  EXPECT_EQ(fit.freedom, 3.0);
+  EXPECT_NEAR(fit.t, 0.97 / std::sqrt(0.091 / 3.0 / 10.0), 1e-6);
+}
+
+TEST(MetaRegression, TIsNoLargerThanTheErrorsOfTheRecordsAllow) {
+  MatrixXd theta(5, 1), added(5, 1);
+  added << 1, 2, 3, 4, 5;
+  theta << 2.1, 2.9, 4.2, 4.8, 6.0;
+  const RecordParameters records{theta, MatrixXd::Constant(5, 1, 4.0)};
+  EXPECT_NEAR(meta_regression(records, added).t, 0.97 / std::sqrt(4.0 / 10.0), 1e-6);
+}
+
 TEST(MetaRegression, OfTwoParametersHasTheGreatestLikelihood) {
   const Records r(20, 1.5, 3);
   const MetaRegression fit = meta_regression(exact(r.theta), r.added);

@@ -327,6 +327,19 @@ TEST(Decision, WhatIsChosenOftenButNotOftenEnoughBehindAnUnknownStructureIsUndec
   EXPECT_EQ(open[0].group[0].name, "law");
 }
 
+TEST(Decision, WhatIsNotChosenWithReversalsOrNotWithoutThemIsUndecided) {
+  Stability s;
+  s.subsamples = 100.0;
+  s.frequencies = {frequency("law", 0.7, 0.7, 0.5)};
+  s.frequencies[0].least_near_by_mask = 0.41;
+  EXPECT_EQ(decide(s, {}).size(), 1U);
+  s.frequencies[0].least_near_by_mask = 0.39;
+  EXPECT_TRUE(decide(s, {}).empty());
+  const auto open = undecided(s, {}, {});
+  ASSERT_EQ(open.size(), 1U);
+  EXPECT_EQ(open[0].least_by_mask, 0.39);
+}
+
 TEST(Decision, GroupsWhatTakesTurns) {
   Stability s;
   s.subsamples = 100.0;

@@ -164,7 +164,7 @@ BaselineSignal balance_signal(const PreparedData& prepared, const estimation::Ba
   BaselineSignal signal;
   signal.signal = name;
   signal.unit = unit;
-  const bool collapsed = data.balance() == Balance::motor && !prepared.torque_measured;
+  const bool collapsed = data.balance() == Balance::motor && !prepared.output_signals.torque;
   const std::span<const NamedInput> inputs = inputs_of(data.balance(), collapsed);
   for (const NamedInput& input : inputs) signal.inputs.emplace_back(input.name);
   for (const estimation::RowRange& range : data.records()) {

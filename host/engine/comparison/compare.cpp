@@ -68,8 +68,8 @@ class Comparer {
 
   Comparison all(const Extent& extent) {
     for (const Balance balance : {Balance::motor, Balance::transmission, Balance::load}) {
-      if (balance != Balance::motor && !prepared_.torque_measured) continue;
-      if (estimation::terms_on(terms_, balance, prepared_.torque_measured).empty()) continue;
+      if (balance != Balance::motor && !prepared_.output_signals.torque) continue;
+      if (estimation::terms_on(terms_, balance, prepared_.output_signals).empty()) continue;
       BalanceData data(prepared_, balance);
       if (data.empty()) continue;
       if (estimation::refine_record_constants(prepared_, data, terms_, {}, Eigen::VectorXd::Ones(data.rows())))
@@ -150,7 +150,7 @@ class Comparer {
     const Eigen::VectorXd residual = estimation::residual_of(data, terms_);
     const std::vector<NoiseFloor> floors = noise_floors(data, terms_, all_, model_.drive);
     const std::string signal = signal_name(data.balance());
-    const bool collapsed = data.balance() == Balance::motor && !prepared_.torque_measured;
+    const bool collapsed = data.balance() == Balance::motor && !prepared_.output_signals.torque;
     Eigen::VectorXd floor_squared = Eigen::VectorXd::Constant(data.rows(), kUnknown);
     const std::vector<HInfinityNorm> norms =
         regions_and_gains ? h_infinity_norms(data) : std::vector<HInfinityNorm>(data.records().size());

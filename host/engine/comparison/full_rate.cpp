@@ -12,7 +12,7 @@ std::optional<FullRate> full_rate(const estimation::PreparedData& prepared, cons
   all.pipeline = prepared.pipeline;
   all.records = {record};
   all.constants = prepared.constants;
-  all.torque_measured = prepared.torque_measured;
+  all.output_signals = prepared.output_signals;
   all.effort_is_current = prepared.effort_is_current;
   all.rotary = prepared.rotary;
   const std::vector<std::size_t>& rows = record.rows[estimation::index(balance)].samples;

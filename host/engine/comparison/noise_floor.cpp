@@ -204,7 +204,7 @@ class Floors {
     }
     if (const auto rmse = by_periods(record)) return {rmse, "periods"};
     if (const auto rmse = by_replicates(record)) return {rmse, "replicates"};
-    if (noise_is_stated(record, data_.balance(), prepared_.torque_measured))
+    if (noise_is_stated(record, data_.balance(), prepared_.output_signals.torque))
       if (const auto rmse = by_propagation(record, residual)) return {rmse, "propagated"};
     return {};
   }
@@ -226,7 +226,7 @@ class Floors {
       if (other == record.experiment || other->name == record.name || !are_replicates(*record.experiment, *other))
         continue;
       PreparedData theirs = estimation::prepare_with({other}, drive_, prepared_.pipeline);
-      theirs.torque_measured = prepared_.torque_measured;
+      theirs.output_signals = prepared_.output_signals;
       theirs.constants = prepared_.constants;
       const auto a = full_rate(prepared_, record, data_.balance(), terms_);
       const auto b = full_rate(theirs, theirs.records[0], data_.balance(), terms_);
@@ -242,7 +242,7 @@ class Floors {
     for (int realisation = 0; realisation < kRealisations; ++realisation) {
       const Experiment noisy = with_noise(record, static_cast<std::uint64_t>(realisation) + 1);
       PreparedData again = estimation::prepare_with({&noisy}, drive_, prepared_.pipeline);
-      again.torque_measured = prepared_.torque_measured;
+      again.output_signals = prepared_.output_signals;
       again.constants = prepared_.constants;
       again.records[0].at_rest = record.at_rest;
       again.records[0].rows = record.rows;  // the mask depends on the noise

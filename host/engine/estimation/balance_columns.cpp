@@ -358,7 +358,7 @@ Eigen::VectorXd BalanceData::known_torque(const Terms& terms, const std::vector<
         sum += terms[t].values[p] * column(terms, {t, p});
   for (const std::size_t t : on_balance)
     if (terms[t].scaled_by_none()) sum += term_torque(terms, t);
-  for (const std::size_t t : terms_acting_on_other_balance(terms, balance_, prepared_->torque_measured))
+  for (const std::size_t t : terms_acting_on_other_balance(terms, balance_, prepared_->output_signals))
     sum += term_torque(terms, t);
   return sum;
 }

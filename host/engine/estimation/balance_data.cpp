@@ -6,16 +6,11 @@
 #include "host/engine/estimation/filtered_columns.hpp"
 
 namespace flexspline::estimation {
-namespace {
-
-constexpr Eigen::Index kFewestRows = 16;
-
-}  // namespace
 
 bool BalanceData::usable(const Record& r) const {
   switch (balance_) {
     case Balance::motor:
-      return !r.effort.empty() && r.has_motor_motion && (!prepared_->torque_measured || !r.torque.empty());
+      return !r.effort.empty() && r.has_motor_motion && (!prepared_->output_signals.torque || !r.torque.empty());
     case Balance::transmission:
       return !r.torque.empty() && r.has_motor_motion && r.has_output_motion && !r.at_rest;
     case Balance::load:
@@ -26,7 +21,7 @@ bool BalanceData::usable(const Record& r) const {
 
 double BalanceData::share(const Record& r, Balance of_effect) const {
   if (of_effect == balance_) return 1.0;
-  if (balance_ != Balance::motor || prepared_->torque_measured) return 0.0;
+  if (balance_ != Balance::motor || prepared_->output_signals.torque) return 0.0;
   const Balance through = r.locked ? Balance::transmission : Balance::load;
   return of_effect == through ? 1.0 / prepared_->constants.gear_ratio : 0.0;
 }
@@ -87,7 +82,7 @@ class LeftHandSides {
     switch (balance_) {
       case Balance::motor:
         if (r.at_rest) return r.effort[k];  // friction holds the torque of the gear
-        return r.effort[k] - (prepared_.torque_measured ? r.torque[k] / prepared_.constants.gear_ratio : 0.0);
+        return r.effort[k] - (prepared_.output_signals.torque ? r.torque[k] / prepared_.constants.gear_ratio : 0.0);
       case Balance::transmission:
         return r.torque[k];
       case Balance::load:
@@ -98,7 +93,7 @@ class LeftHandSides {
   void fill_target(const Record& r, std::size_t from, std::span<double> signal) const {
     for (std::size_t k = 0; k < signal.size(); ++k) signal[k] = left_side(r, from + k);
     // A known load torque reaches the motor through the gear.
-    if (balance_ == Balance::motor && !prepared_.torque_measured && !r.load_torque.empty() && !r.at_rest)
+    if (balance_ == Balance::motor && !prepared_.output_signals.torque && !r.load_torque.empty() && !r.at_rest)
       for (std::size_t k = 0; k < signal.size(); ++k)
         signal[k] -= r.load_torque[from + k] / prepared_.constants.gear_ratio;
   }
@@ -130,7 +125,7 @@ BalanceData::BalanceData(const PreparedData& prepared, Balance balance) : prepar
     const Record& r = prepared.records[i];
     const auto count = static_cast<Eigen::Index>(r.rows[index(balance)].samples.size());
     if (!usable(r)) continue;
-    if (count < kFewestRows) {
+    if (count < static_cast<Eigen::Index>(kFewestRows)) {
       left_out_.emplace(i, fmt::format("{} (of its {} samples {} are masked)", r.name,
                                        r.rows[index(balance)].masked + static_cast<std::size_t>(count),
                                        r.rows[index(balance)].masked));

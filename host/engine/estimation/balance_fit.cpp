@@ -33,9 +33,9 @@ NaturalValue natural_value(const Term& term, ParameterRef requested, const std::
 
 Eigen::VectorXd residual_of(BalanceData& data, const Terms& terms) {
   Eigen::VectorXd residual = data.target();
-  for (const std::size_t t : terms_on(terms, data.balance(), data.prepared().torque_measured))
+  for (const std::size_t t : terms_on(terms, data.balance(), data.prepared().output_signals))
     residual -= data.term_torque(terms, t);
-  for (const std::size_t t : terms_acting_on_other_balance(terms, data.balance(), data.prepared().torque_measured))
+  for (const std::size_t t : terms_acting_on_other_balance(terms, data.balance(), data.prepared().output_signals))
     residual -= data.term_torque(terms, t);
   return residual;
 }
@@ -186,7 +186,7 @@ void Fitting::take_uncertainty() {
 BalanceFit fit_balance(BalanceData& data, Terms& terms) {
   BalanceFit fit;
   fit.balance = data.balance();
-  fit.on_balance = terms_on(terms, data.balance(), data.prepared().torque_measured);
+  fit.on_balance = terms_on(terms, data.balance(), data.prepared().output_signals);
   fit.linear = free_linear_parameters(terms, fit.on_balance);
   fit.nonlinear = free_nonlinear_parameters(terms, fit.on_balance);
   fit.root_weights = Eigen::VectorXd::Ones(data.rows());

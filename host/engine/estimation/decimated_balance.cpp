@@ -18,7 +18,7 @@ BalanceData BalanceData::decimated(PreparedData& few) const {
   few.pipeline = prepared_->pipeline;
   few.constants = prepared_->constants;
   few.drive = prepared_->drive;
-  few.torque_measured = prepared_->torque_measured;
+  few.output_signals = prepared_->output_signals;
   few.effort_is_current = prepared_->effort_is_current;
   few.rotary = prepared_->rotary;
   few.records.resize(prepared_->records.size());

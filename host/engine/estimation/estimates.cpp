@@ -139,7 +139,6 @@ std::size_t likest(const Eigen::MatrixXd& X, std::size_t j) {
   return best;
 }
 
-constexpr double kAtTheEnd = 0.005;  // of the range
 double share_of_range(const BalanceData& data, const Terms& terms, ParameterRef nonlinear_ref) {
   const Term& term = terms[nonlinear_ref.term];
   return parameter_range(data, term, nonlinear_ref.parameter).share(term.values[nonlinear_ref.parameter]);
@@ -221,10 +220,6 @@ void store(model::Model& model, const std::vector<Estimate>& estimates) {
 }
 
 namespace {
-
-bool is_length(const effects::ParameterInfo& info) {
-  return (info.limit == effects::Limit::torsion || info.limit == effects::Limit::travel) && info.low >= 0.0;
-}
 
 // Effects of which a nonlinear parameter stopped at an end of its range: the error still falls beyond it, so its slopes
 // there show neither that parameter's error nor that of the effect's others. (A length at the resolution of the data

@@ -70,7 +70,7 @@ FreeMotion free_motion(const Identification& identification, const FreeMotionOpt
   result.experiments.resize(records);
   result.prepared.pipeline = measured.pipeline;
   result.prepared.constants = measured.constants;
-  result.prepared.torque_measured = measured.torque_measured;
+  result.prepared.output_signals = measured.output_signals;
   result.prepared.effort_is_current = measured.effort_is_current;
   result.prepared.rotary = measured.rotary;
   result.prepared.records.resize(records);

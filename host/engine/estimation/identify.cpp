@@ -142,7 +142,7 @@ std::vector<std::vector<ParameterRef>> fit_all(Identification& result, data::Axi
       std::tie(result.fits[b], held[b]) = fit_within_bounds(result.data[b], result.terms, axis, warnings);
       if (pass > 0 || !identified_on_other_balance) std::ranges::move(warnings, std::back_inserter(result.warnings));
     }
-  for (std::size_t b = 0; b < result.data.size() && reach && result.prepared.torque_measured; ++b)
+  for (std::size_t b = 0; b < result.data.size() && reach && result.prepared.output_signals.torque; ++b)
     for (std::size_t other = 0; other < result.data.size(); ++other)
       if (other != b && result.data[other].balance() == Balance::motor && combine_balances(result, b, other)) {
         std::vector<std::string> warned_before;
@@ -202,8 +202,8 @@ std::unique_ptr<Identification> form_on(const std::vector<const data::Experiment
   std::map<std::size_t, std::string> too_short;  // by record, of any balance
   std::vector<std::uint8_t> used(result->prepared.records.size(), 0);
   for (const Balance balance : {Balance::motor, Balance::transmission, Balance::load}) {
-    if (balance != Balance::motor && !result->prepared.torque_measured) continue;
-    if (terms_on(result->terms, balance, result->prepared.torque_measured).empty()) continue;
+    if (balance != Balance::motor && !result->prepared.output_signals.torque) continue;
+    if (terms_on(result->terms, balance, result->prepared.output_signals).empty()) continue;
     BalanceData data(result->prepared, balance);
     too_short.insert(data.left_out().begin(), data.left_out().end());
     if (data.empty()) continue;

@@ -38,7 +38,7 @@ OtherColumns others(BalanceData& data, const Terms& all, const TableSpecificatio
   Terms terms;
   for (const Term& t : all)
     if (but.empty() || t.id != but) terms.push_back(t);
-  const auto on_balance = terms_on(terms, data.balance(), data.prepared().torque_measured);
+  const auto on_balance = terms_on(terms, data.balance(), data.prepared().output_signals);
   const std::vector<ParameterRef> linear = free_linear_parameters(terms, on_balance),
                                   nonlinear = free_nonlinear_parameters(terms, on_balance);
   OtherColumns b;

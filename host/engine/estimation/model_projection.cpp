@@ -10,7 +10,7 @@
 namespace flexspline::estimation {
 
 Eigen::VectorXd model_torque(BalanceData& data, const Terms& terms) {
-  const auto on_balance = terms_on(terms, data.balance(), data.prepared().torque_measured);
+  const auto on_balance = terms_on(terms, data.balance(), data.prepared().output_signals);
   Eigen::VectorXd sum = data.known_torque(terms, on_balance);
   for (const std::size_t t : on_balance) {
     if (!terms[t].adds_torque() || terms[t].scaled_by_none()) continue;
@@ -21,7 +21,7 @@ Eigen::VectorXd model_torque(BalanceData& data, const Terms& terms) {
 }
 
 Eigen::MatrixXd model_columns(BalanceData& data, const Terms& terms) {
-  const auto on_balance = terms_on(terms, data.balance(), data.prepared().torque_measured);
+  const auto on_balance = terms_on(terms, data.balance(), data.prepared().output_signals);
   const std::vector<ParameterRef> linear = free_linear_parameters(terms, on_balance);
   const std::vector<ParameterRef> nonlinear = free_nonlinear_parameters(terms, on_balance);
   Eigen::MatrixXd X(data.rows(), static_cast<Eigen::Index>(linear.size() + nonlinear.size() + 1));

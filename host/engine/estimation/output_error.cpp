@@ -89,7 +89,8 @@ class OutputError {
       const Record& record = all_.prepared.records[i];
       if (!motion.simulated[i] || record.at_rest || !record.has_motor_motion) continue;
       take(i, record.locked ? Signal::position : Signal::velocity, rows);
-      if (all_.prepared.torque_measured && record.experiment->has(data::Column::torque)) take(i, Signal::torque, rows);
+      if (all_.prepared.output_signals.torque && record.experiment->has(data::Column::torque))
+        take(i, Signal::torque, rows);
     }
     rows_ = rows;
     const Eigen::VectorXd error = errors(motion);

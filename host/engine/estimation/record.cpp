@@ -4,6 +4,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <numbers>
 #include <numeric>
 #include <utility>
 
@@ -96,6 +97,28 @@ bool is_at_rest(const Record& record, double motion_span, double resolution) {
   return between <= kMostScatter * variance * as_one * static_cast<double>(kParts) / static_cast<double>(n);
 }
 
+bool has_torsion(const Record& r) {
+  return !r.torque.empty() && r.has_motor_motion && r.has_output_motion && !r.at_rest;
+}
+
+// Whether the torsion of a record is far above its noise, whatever its rate is. Noise of a position that is white below
+// the cut-off has a rate of 2 pi f / sqrt(3) times its own deviation.
+bool has_large_torsion(const Record& r, double cutoff_hz) {
+  constexpr double kLarge = 10.0;
+  if (!has_torsion(r)) return false;
+  double sum = 0.0, squares = 0.0;
+  for (std::size_t k = 0; k < r.inputs.size(); ++k) {
+    const double torsion = r.inputs[k].torsion;
+    sum += torsion;
+    squares += torsion * torsion;
+  }
+  const auto n = static_cast<double>(r.inputs.size());
+  const double deviation = std::sqrt(std::max(0.0, squares / n - sum * sum / (n * n)));
+  const double noise =
+      r.velocity_noise[index(Balance::transmission)] * std::sqrt(3.0) / (2.0 * std::numbers::pi * cutoff_hz);
+  return deviation > kLarge * noise;
+}
+
 void choose_rows(Record& record, const Pipeline& pipeline, std::size_t settling) {
   const std::size_t n = record.inputs.size();
   const auto reach = static_cast<std::size_t>(std::lround(kMaskReach / (pipeline.row_cutoff_hz * record.sample_s)));
@@ -109,7 +132,9 @@ void choose_rows(Record& record, const Pipeline& pipeline, std::size_t settling)
   for (const Balance balance : {Balance::motor, Balance::transmission, Balance::load}) {
     Rows& rows = record.rows[index(balance)];
     std::vector<std::uint8_t> unsure(n, 0);
-    const bool is_kept = balance == Balance::motor && pipeline.keep_motor_reversals;
+    const bool is_kept = (balance == Balance::motor && pipeline.keep_motor_reversals) ||
+                         (balance == Balance::transmission && pipeline.keep_torsion_reversals &&
+                          has_large_torsion(record, pipeline.row_cutoff_hz));
     if (pipeline.mask && !is_kept && !record.at_rest) {
       const double visible = 3.0 * record.velocity_noise[index(balance)];
       for (std::size_t k = 0; k < n; ++k) {
@@ -136,7 +161,11 @@ void take_torques(Record& r, const Experiment& e, const catalogue::DriveConstant
     r.torque = e[Column::torque];
     r.inputs.torque = filtered(r.torque, r.segments, filter);
   }
-  if (e.has(Column::load_torque)) r.load_torque = e[Column::load_torque];
+  if (e.has(Column::load_torque)) {
+    r.load_torque = e[Column::load_torque];
+    // Without a sensor it is what is known of the torque through the gear.
+    if (!e.has(Column::torque)) r.inputs.torque = filtered(r.load_torque, r.segments, filter);
+  }
   if (e.has(Column::temperature)) {
     // Housings warm up over minutes: all that is faster is noise.
     const double sample_hz = 1.0 / e.sample_s;
@@ -291,6 +320,17 @@ bool are_similar(const catalogue::DriveConstants<double>& a, const catalogue::Dr
          a.reference_temperature == b.reference_temperature && a.turn_angle_scale == b.turn_angle_scale;
 }
 
+// Whether the mask of reversals leaves nothing to fit on of a torsion that is far above its noise: its rate is the
+// difference of two velocities, and often hardly above theirs.
+bool masks_all_torsion(const PreparedData& prepared) {
+  bool is_large = false;
+  for (const Record& r : prepared.records) {
+    if (has_torsion(r) && r.rows[index(Balance::transmission)].samples.size() >= kFewestRows) return false;
+    is_large = is_large || has_large_torsion(r, prepared.pipeline.row_cutoff_hz);
+  }
+  return is_large;
+}
+
 // All but the records.
 PreparedData without_records(const std::vector<const Experiment*>& experiments, const model::Drive& drive,
                              const Pipeline& pipeline) {
@@ -300,7 +340,7 @@ PreparedData without_records(const std::vector<const Experiment*>& experiments, 
   prepared.drive = drive;
   prepared.rotary = drive.axis == data::Axis::rotary;
   for (const Experiment* e : experiments) {
-    prepared.torque_measured = prepared.torque_measured || e->has(Column::torque);
+    prepared.output_signals.torque = prepared.output_signals.torque || e->has(Column::torque);
     prepared.effort_is_current = prepared.effort_is_current || e->has(Column::current);
   }
   return prepared;
@@ -352,6 +392,9 @@ PreparedData prepare_with(const std::vector<const Experiment*>& experiments, con
     correct_zero_order_hold(made[m], prepared.constants, pipeline.torque_per_step);
   });
   for (std::size_t m = 0; m < made.size(); ++m) prepared.records[missing[m]] = std::move(made[m]);
+  prepared.output_signals.torsion = std::ranges::any_of(prepared.records, [](const Record& r) {
+    return has_torsion(r) && r.rows[index(Balance::transmission)].samples.size() >= kFewestRows;
+  });
   return prepared;
 }
 
@@ -385,6 +428,11 @@ PreparedData prepare(const std::vector<const Experiment*>& experiments, const mo
   // The cut-off is that of the other models, so that their errors can be compared.
   if (keeps_reversals) {
     prepared.pipeline.keep_motor_reversals = true;
+    prepared = prepare_with(experiments, drive, Pipeline(prepared.pipeline));
+  }
+  if (prepared.pipeline.mask && masks_all_torsion(prepared)) {
+    prepared.pipeline.keep_torsion_reversals = true;
+    prepared.pipeline.reason += "; reversals of the torsion are kept, as its rate is hardly above its noise";
     prepared = prepare_with(experiments, drive, Pipeline(prepared.pipeline));
   }
   prepared.pipeline.torque_per_step = torque_per_held_step(prepared);

@@ -12,6 +12,7 @@
 
 #include "host/engine/estimation/record_signals.hpp"
 #include "host/engine/estimation/side_motion.hpp"
+#include "host/engine/estimation/terms.hpp"
 #include "host/input/data/dataset.hpp"
 #include "host/physics/catalogue/constants.hpp"
 
@@ -42,7 +43,8 @@ struct Pipeline {
   double row_cutoff_hz = 0.0;     // filter of the target and of every column, Butterworth of order five, zero phase
   double motion_cutoff_hz = 0.0;  // filter of positions before they are differentiated
   bool mask = true;
-  bool keep_motor_reversals = false;  // on the motor's balance nothing is masked
+  bool keep_motor_reversals = false;    // on the motor's balance nothing is masked
+  bool keep_torsion_reversals = false;  // on the transmission's, where the mask would leave nothing
   double torque_per_step = 0.0;  // of a held effort, that readings of the torque lack half of; see zero_order_hold.hpp
   std::string reason;            // where the cut-off comes from
   Derivatives derivatives = Derivatives::butterworth;
@@ -55,6 +57,8 @@ struct Rows {
   std::vector<std::size_t> samples;  // after decimation and mask
   std::size_t masked = 0;            // left out by the mask, counted after decimation
 };
+// A record with fewer samples on a balance is not fitted on there.
+inline constexpr std::size_t kFewestRows = 16;
 
 // What follows from the measurement alone and takes long: computed at its first use, once for all copies of a
 // record.
@@ -113,8 +117,9 @@ struct PreparedData {
   Pipeline pipeline;
   std::vector<Record> records;
   catalogue::DriveConstants<double> constants;
-  model::Drive drive;            // that they come from
-  bool torque_measured = false;  // else motor and load are one balance, with load terms divided by the gear ratio
+  model::Drive drive;  // that they come from
+  // Without a torque motor and load are one balance, with load terms divided by the gear ratio.
+  OutputSignals output_signals;
   bool effort_is_current = false;
   bool rotary = true;
   std::vector<const data::Experiment*> chosen_on;  // what the pipeline was chosen for; empty: it was given

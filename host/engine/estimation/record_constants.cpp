@@ -18,7 +18,7 @@ std::vector<ParameterRef> record_constants(const Terms& terms) {
 
 bool refine_record_constants(PreparedData& prepared, BalanceData& data, const Terms& terms,
                              const std::vector<ParameterRef>& together_with, const Eigen::VectorXd& root_weights) {
-  const std::vector<std::size_t> on_balance = terms_on(terms, data.balance(), prepared.torque_measured);
+  const std::vector<std::size_t> on_balance = terms_on(terms, data.balance(), prepared.output_signals);
   const std::vector<ParameterRef> constants = record_constants(terms);
   const auto here = std::ranges::find_if(
       constants, [&](const ParameterRef& s) { return std::ranges::find(on_balance, s.term) != on_balance.end(); });

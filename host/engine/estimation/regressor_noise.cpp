@@ -95,7 +95,7 @@ Linearised linearised(BalanceData& data, const BalanceFit& fit, const Terms& ter
 std::vector<Linearised> of_others(const Identification& found, const std::vector<const data::Experiment*>& experiments,
                                   const Pipeline& pipeline, const std::vector<std::vector<Eigen::Index>>& identified) {
   PreparedData prepared = prepare_with(experiments, found.prepared.drive, pipeline);
-  prepared.torque_measured = found.prepared.torque_measured;
+  prepared.output_signals = found.prepared.output_signals;
   for (std::size_t i = 0; i < prepared.records.size(); ++i) {
     Record& record = prepared.records[i];
     const Record& original = found.prepared.records[i];

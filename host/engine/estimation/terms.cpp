@@ -66,20 +66,32 @@ std::vector<ParameterRef> free_nonlinear_parameters(const Terms& terms, const st
   return refs;
 }
 
-std::vector<std::size_t> terms_on(const Terms& terms, Balance balance, bool torque_measured) {
+Balance identified_on(const catalogue::Entry& entry, const OutputSignals& signals) {
+  if (!signals.torque) return Balance::motor;
+  const Balance own = entry.identified_on();
+  const bool is_of_sensor = own == Balance::transmission && entry.adds_torque() && entry.adds_to(Balance::motor) &&
+                            (entry.info->reads & effects::kTorsion) == 0;
+  return is_of_sensor && !signals.torsion ? Balance::motor : own;
+}
+
+std::vector<std::size_t> terms_on(const Terms& terms, Balance balance, const OutputSignals& signals) {
   std::vector<std::size_t> which;
   for (std::size_t t = 0; t < terms.size(); ++t) {
-    const Balance own = terms[t].entry->identified_on();
-    if (own == balance || (!torque_measured && balance == Balance::motor)) which.push_back(t);
+    // Without a torque sensor the motor balance alone can be formed; effects of another one have their column there.
+    if (identified_on(*terms[t].entry, signals) == balance ||
+        (!signals.torque && terms[t].entry->identified_on() == balance))
+      which.push_back(t);
   }
   return which;
 }
 
-std::vector<std::size_t> terms_acting_on_other_balance(const Terms& terms, Balance balance, bool torque_measured) {
+std::vector<std::size_t> terms_acting_on_other_balance(const Terms& terms, Balance balance,
+                                                       const OutputSignals& signals) {
   std::vector<std::size_t> which;
-  if (!torque_measured) return which;
+  if (!signals.torque) return which;
   for (std::size_t t = 0; t < terms.size(); ++t)
-    if (terms[t].adds_torque() && terms[t].entry->identified_on() != balance && terms[t].entry->adds_to(balance))
+    if (terms[t].adds_torque() && identified_on(*terms[t].entry, signals) != balance &&
+        terms[t].entry->adds_to(balance))
       which.push_back(t);
   return which;
 }

@@ -53,10 +53,20 @@ Terms terms_of(const model::Model& model);
 std::vector<ParameterRef> free_linear_parameters(const Terms& terms, const std::vector<std::size_t>& which);
 std::vector<ParameterRef> free_nonlinear_parameters(const Terms& terms, const std::vector<std::size_t>& which);
 
-// Terms of a model whose parameters are identified on a balance. In a drive without a torque sensor the motor balance
-// holds the load's (and, in locked load, the transmission's) terms too.
-std::vector<std::size_t> terms_on(const Terms& terms, Balance balance, bool torque_measured);
+// What is measured at the gear's output, in any record.
+struct OutputSignals {
+  bool torque = false;
+  bool torsion = false;  // with a torque: only then there is a transmission balance
+};
+
+// The balance on which the parameters of an effect are identified. In a drive without a torque sensor the motor balance
+// holds the load's (and, in locked load, the transmission's) terms too. Without a torsion the errors of a torque sensor
+// show on the motor balance alone.
+Balance identified_on(const catalogue::Entry& entry, const OutputSignals& signals);
+// Terms of a model whose parameters are identified on a balance.
+std::vector<std::size_t> terms_on(const Terms& terms, Balance balance, const OutputSignals& signals);
 // Terms that add to a balance although their parameters are identified on another one.
-std::vector<std::size_t> terms_acting_on_other_balance(const Terms& terms, Balance balance, bool torque_measured);
+std::vector<std::size_t> terms_acting_on_other_balance(const Terms& terms, Balance balance,
+                                                       const OutputSignals& signals);
 
 }  // namespace flexspline::estimation

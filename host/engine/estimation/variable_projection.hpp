@@ -17,6 +17,14 @@ struct ParameterRange {
 };
 ParameterRange parameter_range(const BalanceData& data, const Term& term, std::size_t parameter);
 
+// Share of the range within which a parameter is at its end.
+inline constexpr double kAtTheEnd = 0.005;
+// Whether a parameter is a travel or a torsion that may be zero: the shortest that the data can show stands for any
+// below it.
+inline bool is_length(const effects::ParameterInfo& info) {
+  return (info.limit == effects::Limit::torsion || info.limit == effects::Limit::travel) && info.low >= 0.0;
+}
+
 // Gives parameters of kind grid that the model does not state their values, from the largest torsion of the data.
 void set_grid_values(const BalanceData& data, Terms& terms, const std::vector<std::size_t>& which);
 

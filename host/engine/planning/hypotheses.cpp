@@ -70,7 +70,7 @@ selection::CrossValidatedFit fitted(BalanceData& data, Terms terms) {
   selection::CrossValidatedFit fit = selection::cross_validate(data, std::move(terms), all);
   for (int step = 0; step < 2; ++step) {
     Term& added = fit.terms.back();
-    const auto on_balance = estimation::terms_on(fit.terms, data.balance(), data.prepared().torque_measured);
+    const auto on_balance = estimation::terms_on(fit.terms, data.balance(), data.prepared().output_signals);
     const auto nonlinear = estimation::free_nonlinear_parameters(fit.terms, on_balance);
     bool moved = false;
     for (std::size_t i = 0; i < nonlinear.size(); ++i) {

@@ -39,7 +39,7 @@ std::string label_of(const Terms& terms) {
 }
 
 std::vector<std::size_t> on_balance(const Terms& terms, const BalanceData& data) {
-  return estimation::terms_on(terms, data.balance(), data.prepared().torque_measured);
+  return estimation::terms_on(terms, data.balance(), data.prepared().output_signals);
 }
 
 bool is_on(const Terms& terms, const BalanceData& data, std::size_t term) {

@@ -45,7 +45,8 @@ double stated_noise(const model::Drive& drive, const estimation::PreparedData& p
   const double torque = drive.rated_torque_nm.value.value_or(0.0) * kTorqueNoise;
   double square = torque * torque;
   if (balance == Balance::motor)
-    square = current * current + (prepared.torque_measured ? torque * torque / (c.gear_ratio * c.gear_ratio) : 0.0);
+    square =
+        current * current + (prepared.output_signals.torque ? torque * torque / (c.gear_ratio * c.gear_ratio) : 0.0);
   if (!(square > 0.0)) square = current * current * c.gear_ratio * c.gear_ratio;
   return square * 2.0 * prepared.pipeline.row_cutoff_hz * sample_s;
 }
@@ -199,7 +200,7 @@ void RehearsedMotions::prepare(const PlanRequest& question) {
     }
     side.planned = std::make_unique<BalanceData>(prepared_, balance);
     if (side.planned->empty()) continue;
-    if (balance != Balance::motor && !prepared_.torque_measured) continue;
+    if (balance != Balance::motor && !prepared_.output_signals.torque) continue;
     if (!identified_)
       side.noise = stated_noise(model_.drive, prepared_, balance, question.sample_s) *
                    side.planned->filter_autocorrelation_time();

@@ -10,6 +10,7 @@
 #include "host/engine/estimation/in_parallel.hpp"
 #include "host/engine/estimation/standard_intervals.hpp"
 #include "host/engine/selection/candidate_models.hpp"
+#include "host/engine/selection/held_out.hpp"
 #include "host/physics/catalogue/user_defined_effect.hpp"
 
 namespace flexspline::selection {
@@ -23,27 +24,9 @@ double root_mean_square(const Eigen::VectorXd& r) {
   return r.size() ? std::sqrt(r.squaredNorm() / static_cast<double>(r.size())) : 0.0;
 }
 
-// Hold-out records on the pipeline of the fit.
-struct Holdout {
-  std::vector<const data::Experiment*> experiments;
-  estimation::PreparedData prepared;
-  std::unique_ptr<BalanceData> data;
-
-  Holdout(const data::Dataset& dataset, const Identification& fitted, Balance balance,
-          const estimation::PreparedData* ready) {
-    for (const data::Experiment& e : dataset.experiments)
-      if (e.role == data::Role::holdout) experiments.push_back(&e);
-    if (experiments.empty()) return;
-    prepared = estimation::prepare_with(experiments, fitted.model.drive, fitted.prepared.pipeline, ready);
-    prepared.torque_measured = fitted.prepared.torque_measured;
-    data = std::make_unique<BalanceData>(prepared, balance);
-    if (data->empty()) data.reset();
-  }
-};
-
 // The balance on which an effect shows: its own, or the motor's where there is no torque sensor.
 const std::size_t* find_balance(const Identification& fitted, Balance own, std::size_t& found) {
-  const Balance balance = fitted.prepared.torque_measured ? own : Balance::motor;
+  const Balance balance = fitted.prepared.output_signals.torque ? own : Balance::motor;
   for (std::size_t b = 0; b < fitted.data.size(); ++b)
     if (fitted.data[b].balance() == balance) {
       found = b;
@@ -96,14 +79,14 @@ Addition compare_models(const data::Dataset& dataset, const model::Model& before
   result.unit = before.drive.axis == data::Axis::linear ? "N" : "N*m";
   result.before.rmse_fit = root_mean_square(estimation::residual_of(base->data[b], base->terms));
   result.after.rmse_fit = root_mean_square(estimation::residual_of(extended->data[x], extended->terms));
-  Holdout holdout(dataset, *base, balance, options.ready.get());
+  const HeldOut holdout(dataset, *base, balance, options.ready.get());
   std::vector<const data::Experiment*> fitted, evaluated;
   for (const data::Experiment& e : dataset.experiments)
     if (e.role == data::Role::fit) fitted.push_back(&e);
   BalanceData* evaluated_on = &extended->data[x];
   if (holdout.data) {
-    result.before.rmse_holdout = root_mean_square(estimation::residual_of(*holdout.data, base->terms));
-    result.after.rmse_holdout = root_mean_square(estimation::residual_of(*holdout.data, extended->terms));
+    result.before.rmse_holdout = holdout.rmse(base->terms);
+    result.after.rmse_holdout = holdout.rmse(extended->terms);
     evaluated_on = holdout.data.get();
     evaluated = holdout.experiments;
   } else {

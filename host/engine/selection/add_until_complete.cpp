@@ -33,7 +33,7 @@ std::string needless(const data::Dataset& dataset, const model::Model& model, co
   double least = kPolicy.named_score;
   for (BalanceData& data : fitted->data) {
     const Eigen::VectorXd keep = Eigen::VectorXd::Ones(data.rows());
-    const auto on_balance = estimation::terms_on(fitted->terms, data.balance(), fitted->prepared.torque_measured);
+    const auto on_balance = estimation::terms_on(fitted->terms, data.balance(), fitted->prepared.output_signals);
     CrossValidatedFit full;
     for (const std::size_t t : on_balance) {
       const estimation::Term& term = fitted->terms[t];

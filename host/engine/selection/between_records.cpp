@@ -9,6 +9,7 @@
 #include <utility>
 
 #include "host/engine/estimation/standard_intervals.hpp"
+#include "host/engine/selection/friction_scaling.hpp"
 #include "host/engine/selection/meta_regression.hpp"
 #include "host/engine/selection/policy.hpp"
 #include "host/engine/selection/record_laws.hpp"
@@ -125,7 +126,8 @@ std::optional<LawInRange> law_in_range(const estimation::Identification& base, c
 
 void name_between_records(const estimation::Identification& base, const SearchedBalance& motor, Diagnosis& result) {
   if (!result.named.empty() || result.friction_drift.empty()) return;
-  const RecordFriction own = friction_by_record(base, *motor.search.data);
+  if (name_scaling(base, motor, result)) return;
+  const RecordFriction own = friction_by_record(base, *motor.search.data, kPolicy.fewest_of_trend);
   if (own.parameters.empty() || own.records.size() < kPolicy.fewest_of_trend) return;
   const std::vector<Law> all = laws(base, motor, own);
   std::vector<Eigen::MatrixXd> added;

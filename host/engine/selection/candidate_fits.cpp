@@ -70,6 +70,21 @@ bool scales_torques(const Terms& terms) {
                      [](const Term& t) { return (t.entry->info->reads & effects::kTorqueScale) != 0; });
 }
 
+// A nonlinear parameter of the added effect that stops at an end of what the data can show: the error still falls
+// beyond it, so it is another law. (The shortest travel or torsion that can be shown stands for any below it.) Empty:
+// there is none.
+std::string why_no_minimum(const BalanceData& data, const Term& added) {
+  for (std::size_t p = 0; p < added.values.size(); ++p) {
+    if (!added.free_nonlinear(p) || begins_at_zero(added, p)) continue;
+    const effects::ParameterInfo& info = added.entry->parameters[p];
+    const double share = estimation::parameter_range(data, added, p).share(added.values[p]);
+    if (share <= 1.0 - estimation::kAtTheEnd && (share >= estimation::kAtTheEnd || estimation::is_length(info)))
+      continue;
+    return fmt::format("its {} stops at the end of what these data can show ({:.4g})", info.name, added.values[p]);
+  }
+  return {};
+}
+
 // A candidate that needs an impossible value, or that makes the base model impossible, is a fit, not an explanation.
 void check_admissible(BalanceData& data, const CrossValidatedFit& base, CandidateFit& candidate) {
   const auto& fit = candidate.fit;
@@ -113,6 +128,7 @@ void check_admissible(BalanceData& data, const CrossValidatedFit& base, Candidat
       refuse(fmt::format("{} would change by {:.0f} % (its {} from {:.3g} to {:.3g})", t.id,
                          100.0 * (now - torque).norm() / torque.norm(), info.name, was, value));
   }
+  if (const std::string why = why_no_minimum(data, fit.terms.back()); !why.empty()) refuse(why);
   if (!any_own) {
     candidate.confounded_with = most_collinear_effect(data, fit, added);
     refuse(fmt::format("it is confounded with {} in these data", candidate.confounded_with));
@@ -121,7 +137,7 @@ void check_admissible(BalanceData& data, const CrossValidatedFit& base, Candidat
 
 // Moves nonlinear parameters that begin at zero to their fitted values; the model is almost linear in them there.
 void take_first_step(const BalanceData& data, CrossValidatedFit& fit) {
-  const auto on_balance = estimation::terms_on(fit.terms, data.balance(), data.prepared().torque_measured);
+  const auto on_balance = estimation::terms_on(fit.terms, data.balance(), data.prepared().output_signals);
   const std::vector<ParameterRef> nonlinear = estimation::free_nonlinear_parameters(fit.terms, on_balance);
   for (std::size_t k = 0; k < nonlinear.size(); ++k) {
     Term& added = fit.terms.back();
@@ -287,11 +303,13 @@ std::vector<CandidateFit> rank_candidates(BalanceSearch& search) {
     BalanceSearch own{&data, search.keep, search.base};
     CandidateModel refined = candidate.model;
     refined.terms = candidate.fit.terms;
-    const auto on_balance = estimation::terms_on(refined.terms, data.balance(), data.prepared().torque_measured);
+    const auto on_balance = estimation::terms_on(refined.terms, data.balance(), data.prepared().output_signals);
     estimation::refine_nonlinear(data, refined.terms, on_balance, noise_covariance(data, candidate.fit), kSameSquares,
                                  &coarse);
     CandidateFit again = evaluate(own, std::move(refined));
-    if (better(again, candidate) || !candidate.admissible) candidate = std::move(again);
+    // A value of the grid near an end of the range, where the best one stops, is no minimum either.
+    const bool stops = !why_no_minimum(data, again.fit.terms.back()).empty() && again.score() > candidate.score();
+    if (better(again, candidate) || !candidate.admissible || stops) candidate = std::move(again);
   });
   sort_candidates(search, candidates);
   return candidates;

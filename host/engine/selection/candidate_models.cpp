@@ -41,7 +41,7 @@ bool replaces_it(const Terms& terms, std::string_view name) {
 // user gave, or the torque of a loaded sensor.
 bool knows_torque_scale(const BalanceData& data, const Terms& terms) {
   if (states_a_torque(terms)) return true;
-  if (!data.prepared().torque_measured) return false;
+  if (!data.prepared().output_signals.torque) return false;
   double sensor = 0.0, effort = 0.0;
   for (const auto& range : data.records()) {
     const estimation::Record& r = data.prepared().records[range.record];
@@ -82,9 +82,11 @@ bool visible(const BalanceData& data, const Terms& terms, const catalogue::Entry
   const unsigned reads = entry.info->reads;
   const estimation::PreparedData& p = data.prepared();
   const bool has_torque =
-      p.torque_measured || std::any_of(p.records.begin(), p.records.end(),
-                                       [](const estimation::Record& r) { return !r.inputs.torque.empty(); });
+      p.output_signals.torque || std::any_of(p.records.begin(), p.records.end(),
+                                             [](const estimation::Record& r) { return !r.inputs.torque.empty(); });
   if ((reads & effects::kTorque) && !has_torque) return false;
+  const bool is_of_sensor = (reads & effects::kTorque) && entry.info->balance == estimation::Balance::transmission;
+  if (is_of_sensor && !p.output_signals.torque) return false;
   if ((reads & effects::kCurrent) && !p.effort_is_current) return false;
   if ((reads & effects::kTorqueInput) && p.effort_is_current) return false;
   if ((reads & effects::kTorqueScale) && !knows_torque_scale(data, terms)) return false;
@@ -231,7 +233,7 @@ bool begins_at_zero(const Term& term, std::size_t p) {
 
 std::vector<CandidateModel> candidate_models(const BalanceData& data, const Terms& terms, const Unexplained& left) {
   std::vector<CandidateModel> list;
-  const bool collapsed = !data.prepared().torque_measured && data.balance() == estimation::Balance::motor;
+  const bool collapsed = !data.prepared().output_signals.torque && data.balance() == estimation::Balance::motor;
   for (const catalogue::Entry& entry : catalogue::all()) {
     if (entry.identified_on() != data.balance() && !collapsed) continue;
     if (!visible(data, terms, entry) || covered(terms, entry)) continue;

@@ -70,15 +70,24 @@ void keep_common_terms(RegressorTable& sign, RegressorTable& presliding) {
   presliding = with_terms(presliding, of_presliding);
 }
 
-// The travel of presliding with which the model alone leaves least; nothing where none can be shown.
-std::optional<double> best_presliding_travel(const estimation::PreparedData& prepared, const estimation::Terms& terms,
-                                             Balance balance, const SelectionPolicy& policy) {
+// The travel of presliding with which the model alone leaves least, and shorter and longer ones that the data can show;
+// nothing where none can be shown.
+std::optional<PreslidingTravels> best_presliding_travels(const estimation::PreparedData& prepared,
+                                                         const estimation::Terms& terms, Balance balance,
+                                                         const SelectionPolicy& policy) {
   if (balance != Balance::motor || presliding_law(terms) == nullptr) return std::nullopt;
   const estimation::PreparedData fitted = without_held_out(prepared);
   const std::vector<double> travels = presliding_travels(fitted, policy);
   const std::vector<double> squares = squares_by_travel(fitted, terms, travels);
   if (squares.empty()) return std::nullopt;
-  return travels[static_cast<std::size_t>(std::min_element(squares.begin(), squares.end()) - squares.begin())];
+  PreslidingTravels best;
+  best.state = travels[static_cast<std::size_t>(std::min_element(squares.begin(), squares.end()) - squares.begin())];
+  for (const double factor : {1.0 / policy.presliding_shape_factor, policy.presliding_shape_factor}) {
+    const double travel = std::clamp(factor * best.state, travels.front(), travels.back());
+    if (std::abs(std::log(travel / best.state)) > 0.5 * std::log(policy.presliding_shape_factor))
+      best.shape.push_back(travel);
+  }
+  return best;
 }
 
 }  // namespace
@@ -110,16 +119,17 @@ CandidateTables make_tables(const std::vector<const data::Experiment*>& experime
   const double highest_hz = tables.bandwidth.highest_hz;
   estimation::PreparedData prepared = prepare(experiments, drive, highest_hz, policy);
   tables.torque_has_noise = take_noise_off_torque(prepared) > 0;
-  if (!prepared.torque_measured) take_torque_from_load(prepared, terms);
-  const std::optional<double> travel = best_presliding_travel(prepared, terms, balance, policy);
+  if (!prepared.output_signals.torque) take_torque_from_load(prepared, terms);
+  const std::optional<PreslidingTravels> travels = best_presliding_travels(prepared, terms, balance, policy);
   std::array<RegressorTable, 2> made;
-  estimation::in_parallel(travel ? 2 : 1, [&](std::size_t i) {
-    made[i] = make_regressor_table(prepared, balance, terms, i == 0 ? std::nullopt : travel, highest_hz, policy);
+  estimation::in_parallel(travels ? 2 : 1, [&](std::size_t i) {
+    made[i] = make_regressor_table(prepared, balance, terms, i == 0 ? Direction::sign : Direction::presliding, travels,
+                                   highest_hz, policy);
   });
   tables.sign = std::move(made[0]);
   if (tables.sign.model_columns == 0) return tables;
-  if (travel) {
-    tables.presliding_travel = *travel;
+  if (travels) {
+    tables.presliding_travel = travels->state;
     tables.presliding = std::move(made[1]);
     keep_common_terms(tables.sign, *tables.presliding);
   }

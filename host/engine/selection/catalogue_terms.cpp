@@ -76,7 +76,7 @@ Eigen::VectorXd from_model_current(const TableBuilder& builder, const catalogue:
 void add_modulation(TableBuilder& builder, const Extension& e) {
   CandidateTerm term = term_of(e.entry, e.order);
   const estimation::Term& added = e.terms.back();
-  const auto on = estimation::terms_on(e.terms, builder.data.balance(), builder.prepared().torque_measured);
+  const auto on = estimation::terms_on(e.terms, builder.data.balance(), builder.prepared().output_signals);
   for (std::size_t p = 0; p < added.values.size(); ++p)
     if (added.free_nonlinear(p)) {
       term.columns.push_back(builder.add(builder.data.nonlinear_column(e.terms, on, {e.added(), p})));
@@ -159,7 +159,7 @@ void add_effect(TableBuilder& builder, Extension e) {
 
 void add_catalogue_terms(TableBuilder& builder, const Motion& motion) {
   const Balance balance = builder.data.balance();
-  const bool collapsed = !builder.prepared().torque_measured && balance == Balance::motor;
+  const bool collapsed = !builder.prepared().output_signals.torque && balance == Balance::motor;
   for (const catalogue::Entry& entry : catalogue::all()) {
     const effects::Description& info = *entry.info;
     if (entry.identified_on() != balance && !(collapsed && info.balance == Balance::load)) continue;

@@ -158,7 +158,7 @@ double rmse_of(const std::vector<LeftOut>& records) {
 
 CrossValidatedFit cross_validate(BalanceData& data, Terms terms, const Eigen::VectorXd& keep) {
   CrossValidatedFit fit;
-  const auto on_balance = estimation::terms_on(terms, data.balance(), data.prepared().torque_measured);
+  const auto on_balance = estimation::terms_on(terms, data.balance(), data.prepared().output_signals);
   fit.linear = estimation::free_linear_parameters(terms, on_balance);
   const std::vector<ParameterRef> nonlinear = estimation::free_nonlinear_parameters(terms, on_balance);
   fit.groups = estimation::friction_groups(terms, fit.linear, nonlinear);
@@ -221,7 +221,7 @@ NoiseCovariance noise_covariance(BalanceData& data, const CrossValidatedFit& fit
 }
 
 double whitened_squares(BalanceData& data, const Terms& terms, const CrossValidatedFit& fit) {
-  const auto on_balance = estimation::terms_on(terms, data.balance(), data.prepared().torque_measured);
+  const auto on_balance = estimation::terms_on(terms, data.balance(), data.prepared().output_signals);
   const auto linear = estimation::free_linear_parameters(terms, on_balance);
   const Eigen::VectorXd keep = (fit.root_weights.array() > 0.0).cast<double>();
   const RecordFactors factors = estimation::record_factors(

@@ -50,6 +50,7 @@ std::vector<FoundTerm> groups_chosen(const Stability& stability, double least, s
     found.group.push_back(lead);
     found.frequency = lead.frequency;
     found.share = lead.share;
+    found.least_by_mask = lead.least_near_by_mask;
     for (const auto& [name, often] : lead.alternatives) {
       if (often < policy.group_frequency || taken.count(name) != 0) continue;
       const auto other = find(name);
@@ -83,8 +84,11 @@ std::vector<FoundTerm> decide(const Stability& stability, const SelectionPolicy&
   std::set<std::string> taken;
   std::vector<FoundTerm> all = groups_chosen(stability, policy.named_frequency, taken, policy);
   const bool unknown = has_unknown(all);
-  std::erase_if(
-      all, [&](const FoundTerm& f) { return f.in_catalogue && f.frequency < least_frequency(f, unknown, policy); });
+  // What the samples with reversals, or those without, rule out is the misfit of another law there.
+  std::erase_if(all, [&](const FoundTerm& f) {
+    return f.in_catalogue &&
+           (f.frequency < least_frequency(f, unknown, policy) || f.least_by_mask < 1.0 - policy.named_frequency);
+  });
   const std::vector<FoundTerm> with_waves = all;
   std::erase_if(all, [&](const FoundTerm& f) { return is_no_more_than_placebo(f, with_waves, policy); });
   std::stable_sort(all.begin(), all.end(), [](const FoundTerm& a, const FoundTerm& b) { return a.share > b.share; });

@@ -12,6 +12,7 @@ struct FoundTerm {
   std::vector<Frequency> group;  // the most frequent first; more than one: not distinguished
   double frequency = 0.0;        // of the subsamples that chose one of the group
   double share = 0.0;            // of the squares above the noise
+  double least_by_mask = 1.0;    // frequency with reversals or without, the lesser one
   bool in_catalogue = true;      // else a curve or a placebo order does as well: an unknown structure
 };
 

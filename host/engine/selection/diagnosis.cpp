@@ -14,6 +14,8 @@
 #include "host/engine/selection/detection_limit.hpp"
 #include "host/engine/selection/diagnosis.hpp"
 #include "host/engine/selection/disturbances.hpp"
+#include "host/engine/selection/friction_scaling.hpp"
+#include "host/engine/selection/held_out.hpp"
 #include "host/engine/selection/other_balance_evidence.hpp"
 #include "host/engine/selection/policy.hpp"
 #include "host/engine/selection/record_cross_validation.hpp"
@@ -85,7 +87,7 @@ void refine_base_nonlinear(BalanceSearch& search) {
   BalanceData& data = *search.data;
   if (search.base.groups.empty() || search.base.random_effects.std.maxCoeff() <= 0.0) return;
   estimation::Terms terms = search.base.terms;
-  const auto on_balance = estimation::terms_on(terms, data.balance(), data.prepared().torque_measured);
+  const auto on_balance = estimation::terms_on(terms, data.balance(), data.prepared().output_signals);
   if (estimation::free_nonlinear_parameters(terms, on_balance).empty()) return;
   constexpr double kTolerance = 1e-7;
   for (int round = 0; round < 2; ++round) {
@@ -95,9 +97,16 @@ void refine_base_nonlinear(BalanceSearch& search) {
   }
 }
 
-std::vector<SearchedBalance> search_balances(estimation::Identification& base,
-                                             const std::vector<const data::Experiment*>& experiments,
+std::vector<const data::Experiment*> of_role(const data::Dataset& dataset, data::Role role) {
+  std::vector<const data::Experiment*> found;
+  for (const data::Experiment& e : dataset.experiments)
+    if (e.role == role) found.push_back(&e);
+  return found;
+}
+
+std::vector<SearchedBalance> search_balances(estimation::Identification& base, const data::Dataset& dataset,
                                              const Options& options, Diagnosis& result) {
+  const std::vector<const data::Experiment*> experiments = of_role(dataset, data::Role::fit);
   std::vector<SearchedBalance> all;
   for (BalanceData& data : base.data) {
     if (options.progress)
@@ -127,14 +136,20 @@ std::vector<SearchedBalance> search_balances(estimation::Identification& base,
     add_other_balance_evidence(searches, one.search, one.candidates);
     check_orders(searches, one.search, one.candidates);
     check_by_record(one.search, one.candidates);
+    const HeldOut held_out(dataset, base, one.search.data->balance(), options.pipeline.ready.get());
+    check_on_held_out(held_out, one.search, one.candidates);
   }
   return all;
 }
 
-// The balance whose named effect scores best; where none is named, the one that is highest above its floor.
+// The balance whose named effect scores best; where none is named, the one that is highest above its floor. A torsion
+// that is hardly above its noise shows errors of the encoders before anything else, so that its balance comes last.
 SearchedBalance& most_significant(std::vector<SearchedBalance>& all) {
   const auto importance = [](const SearchedBalance& e) {
-    if (e.names_one()) return 1e9 + e.candidates.front().score();
+    const BalanceData& data = *e.search.data;
+    const bool is_noisy =
+        data.balance() == estimation::Balance::transmission && data.prepared().pipeline.keep_torsion_reversals;
+    if (e.names_one()) return (is_noisy ? 1e9 : 2e9) + e.candidates.front().score();
     return e.floor.rmse ? e.search.base.rmse() / *e.floor.rmse : 0.0;
   };
   return *std::max_element(all.begin(), all.end(), [&](const SearchedBalance& a, const SearchedBalance& b) {
@@ -249,6 +264,36 @@ void list_candidates(std::vector<SearchedBalance>& all, data::Axis axis, Diagnos
   });
 }
 
+std::string drift_text(const Drift& drift, const estimation::PreparedData& prepared) {
+  const bool has_temperature = std::any_of(prepared.records.begin(), prepared.records.end(),
+                                           [](const estimation::Record& r) { return r.has_temperature; });
+  return fmt::format(
+      "{} differs between runs by {:.1f} %, and the model says of no recorded signal why: {} An effect that shows only "
+      "from run to run counts for less then; repeat one motion from time to time",
+      drift.group, drift.percent,
+      has_temperature ? "the temperature is recorded, so see whether it is named or possible here."
+                      : "temperature? It is not recorded: log it.");
+}
+
+// What to do about a delay of the effort against the motion; empty where it is within what the alignment leaves open.
+std::string delay_advice(double delay_s, const estimation::PreparedData& prepared) {
+  constexpr double kSure = 0.25, kMoreThanHold = 0.75;  // samples
+  double longest_s = 0.0;
+  for (const estimation::Record& r : prepared.records) longest_s = std::max(longest_s, r.sample_s);
+  const double samples = std::abs(delay_s) / std::max(longest_s, 1e-300);
+  if (samples < kSure) return {};
+  const bool is_held = std::any_of(prepared.records.begin(), prepared.records.end(), [](const estimation::Record& r) {
+    return r.experiment->current_hold == data::CurrentHold::zoh;
+  });
+  const std::string what = fmt::format("The effort {} the motion by {:.3g} ms ({:.2g} samples)",
+                                       delay_s > 0.0 ? "lags" : "leads", 1e3 * std::abs(delay_s), samples);
+  if (samples < kMoreThanHold && is_held)
+    return what +
+           ": it was moved by half a sample, as if the drive held it from sample to sample. If yours does not, state "
+           "current_hold = \"none\" in dataset.toml.";
+  return what + " beyond the alignment: check the time stamps, or current_hold in dataset.toml.";
+}
+
 // What is left, with the named effect in the model if there is one.
 void assess_remainder(const SearchedBalance& chosen, Diagnosis& result) {
   const CrossValidatedFit& after = result.named.empty() ? chosen.search.base : chosen.candidates.front().fit;
@@ -258,11 +303,7 @@ void assess_remainder(const SearchedBalance& chosen, Diagnosis& result) {
       std::abs(after.theta[delay]) > kPolicy.delay_errors * after.std[delay])
     result.delay_s = after.theta[delay];
   result.friction_drift = drifts(after);
-  for (const Drift& d : result.friction_drift)
-    result.warnings.push_back(fmt::format(
-        "{} differs between runs by {:.1f} %, and no recorded signal explains it: temperature? An effect that shows "
-        "only from run to run counts for less then; log the temperature, and repeat one motion from time to time",
-        d.group, d.percent));
+  for (const Drift& d : result.friction_drift) result.warnings.push_back(drift_text(d, chosen.search.data->prepared()));
   const bool at_floor = result.noise_floor && after.rmse() < kPolicy.at_floor * *result.noise_floor;
   bool enough = true;
   if (result.noise_floor && !result.named.empty()) {
@@ -301,11 +342,7 @@ Diagnosis diagnose_at(const data::Dataset& dataset, const model::Model& model, c
   const auto base = estimation::identify(dataset, model, options.pipeline);
   result.warnings = base->warnings;
   result.parameter_trends = parameter_trends(*base);
-  std::vector<const data::Experiment*> experiments;
-  for (const data::Experiment& e : dataset.experiments)
-    if (e.role == data::Role::fit) experiments.push_back(&e);
-
-  std::vector<SearchedBalance> all = search_balances(*base, experiments, options, result);
+  std::vector<SearchedBalance> all = search_balances(*base, dataset, options, result);
   const bool moves = std::any_of(base->prepared.records.begin(), base->prepared.records.end(),
                                  [](const estimation::Record& r) { return !r.at_rest; });
   const auto motor = std::find_if(all.begin(), all.end(), [](const SearchedBalance& e) {
@@ -313,14 +350,16 @@ Diagnosis diagnose_at(const data::Dataset& dataset, const model::Model& model, c
   });
   if (moves && motor != all.end()) {
     if (options.progress) options.progress("choosing effects on halves of the data");
-    std::vector<const data::Experiment*> with_held_out;
-    for (const data::Experiment& e : dataset.experiments)
-      if (e.role == data::Role::fit || e.role == data::Role::holdout) with_held_out.push_back(&e);
+    std::vector<const data::Experiment*> with_held_out = of_role(dataset, data::Role::fit);
+    for (const data::Experiment* e : of_role(dataset, data::Role::holdout)) with_held_out.push_back(e);
     result.resampling = resample(with_held_out, base->model.drive, base->terms);
-    result.resampling->decides = &most_significant(all) == &*motor && resampling_decides(*result.resampling, *motor);
   }
-  const bool by_resampling = result.resampling && result.resampling->decides;
-  SearchedBalance& chosen = by_resampling ? *motor : most_significant(all);
+  const bool decides = result.resampling && resampling_decides(*result.resampling, *motor);
+  const bool is_motor_first = base->prepared.pipeline.keep_torsion_reversals && motor != all.end() &&
+                              (decides ? names_any(*result.resampling, *motor) : motor->names_one());
+  SearchedBalance& chosen = is_motor_first ? *motor : most_significant(all);
+  const bool by_resampling = decides && &chosen == &*motor;
+  if (result.resampling) result.resampling->decides = by_resampling;
   std::string alias;
   if (chosen.names_one() && !by_resampling) {
     if (options.progress) options.progress("checking what else could explain it");
@@ -341,9 +380,11 @@ Diagnosis diagnose_at(const data::Dataset& dataset, const model::Model& model, c
   if (by_resampling) name_stable(chosen, result);
   if (names_one) name_effects(chosen, alias, result);
   take_back_insignificant(result);
+  if (by_resampling) take_back_unconfirmed_scaling(*base, chosen, result);
   if (!result.named.empty()) explain_named(chosen.search, chosen.candidates, model.drive, result);
   assess_remainder(chosen, result);
   if (by_resampling && result.resampling->lag_s) result.delay_s = result.resampling->lag_s;
+  if (result.delay_s) result.delay_advice = delay_advice(*result.delay_s, base->prepared);
   if (!by_resampling || result.named.empty()) {
     if (options.progress) options.progress("looking for what no effect explains");
     check_unknown_structure(chosen.search, names_one ? &chosen.candidates.front() : nullptr, result);

@@ -102,6 +102,7 @@ struct Resampling {
     std::vector<NamedEffect> group;  // more than one: these data cannot distinguish them; empty: in no catalogue
     std::string name;                // of what is in no catalogue
     double frequency = 0.0;          // of the subsamples
+    double least_by_mask = 1.0;      // of those with reversals, or of those without: the lesser one
     double share_percent = 0.0;      // of the squared error above the noise, median of the subsamples
     double share_low_percent = 0.0, share_high_percent = 0.0;  // of 95 % of the subsamples
     // Error on the experiments that are held out, with it over without it; nothing where none are.
@@ -124,6 +125,7 @@ struct Resampling {
   double lowest_hz = 0.0, highest_hz = 0.0;
   std::optional<double> lag_s, lag_std_s;  // of the effort's time base, taken off; nothing: not significant
   std::vector<FoundTerm> found;            // largest share first
+  std::vector<std::string> not_visible;    // effects that these data could not show to resampling
   std::vector<FoundTerm> undecided;        // in the catalogue; neither found nor ruled out
   std::vector<Support> support;            // of all terms that could be chosen
   // The group that a name was found in.
@@ -199,6 +201,7 @@ struct Diagnosis {
   std::optional<BetweenRecords> between_records;
   std::optional<LawInRange> law_in_range;
   std::optional<double> delay_s;  // of the effort against the motion, beyond the alignment, where significant
+  std::string delay_advice;       // where it is large enough to matter
   std::optional<StatedSetting> at_stated_setting;
 };
 

@@ -41,6 +41,8 @@ TermFit fit_terms(const RegressorTable& table, const std::vector<int>& terms, co
   for (const int t : terms)
     if (t >= 0)
       for (const Eigen::Index c : table.terms[static_cast<std::size_t>(t)].columns) result.columns.push_back(c);
+  if (presliding)
+    result.columns.insert(result.columns.end(), table.presliding_shape.begin(), table.presliding_shape.end());
   const auto n = static_cast<Eigen::Index>(result.columns.size());
   Eigen::MatrixXd inner(n, n);
   Eigen::VectorXd along(n), size(n);
@@ -128,7 +130,8 @@ class ForwardStep {
       if (std::find(terms_.begin(), terms_.end(), static_cast<int>(t)) == terms_.end())
         try_term(static_cast<int>(t), table_.terms[t].name,
                  static_cast<double>(table_.terms[t].columns.size() + table_.terms[t].nonlinear), by_name);
-    if (fit_.presliding.size() > 0 && !has_presliding(terms_)) try_term(kPreslidingTerm, kPresliding, 1.0, by_name);
+    if (fit_.presliding.size() > 0 && !has_presliding(terms_))
+      try_term(kPreslidingTerm, kPresliding, 1.0 + static_cast<double>(table_.presliding_shape.size()), by_name);
     return by_name;
   }
 

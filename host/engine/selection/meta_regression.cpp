@@ -15,6 +15,8 @@ struct Fitted {
   double coefficient = 0.0;
   double coefficient_std = 0.0;
   double deviance = 0.0;  // minus twice the log-likelihood
+  double squares = 0.0;   // weighted, of what is left
+  double freedom = 0.0;
   RowVectorXd mean;
   RowVectorXd between;  // T
 };
@@ -58,7 +60,9 @@ Fitted maximise_likelihood(const RecordParameters& records, const Eigen::MatrixX
     if (moved < kSame) break;
   }
   variance = within.rowwise() + fit.between.cwiseMax(least).array();
-  fit.deviance = (known * (variance.log() + residual.square() / variance)).sum();
+  fit.squares = (known * residual.square() / variance).sum();
+  fit.freedom = known.sum() - static_cast<double>(known.cols()) - (with ? 1.0 : 0.0);
+  fit.deviance = (known * variance.log()).sum() + fit.squares;
   return fit;
 }
 
@@ -68,6 +72,10 @@ MetaRegression against(const Fitted& without, const RecordParameters& records, c
   result.coefficient = with.coefficient;
   result.coefficient_std = with.coefficient_std;
   result.likelihood_ratio = without.deviance - with.deviance;
+  result.freedom = with.freedom;
+  // The maximum of the likelihood takes the variances between records from as many squares as there are records.
+  if (with.freedom > 0.0 && with.coefficient_std > 0.0)
+    result.t = with.coefficient / (with.coefficient_std * std::sqrt(std::max(1.0, with.squares / with.freedom)));
   const Eigen::ArrayXd before = without.between.array().max(1e-300);
   result.explained_share = std::max(0.0, 1.0 - (with.between.transpose().array() / before).mean());
   result.mean = with.mean.transpose();

@@ -18,7 +18,10 @@ struct MetaRegression {
   double coefficient_std = 0.0;
   double likelihood_ratio = 0.0;  // twice the logarithm, against coefficient zero
   double explained_share = 0.0;   // of T, mean of the parameters: 0 to 1
-  Eigen::VectorXd mean;           // of the parameters, without what the effect adds
+  // Of the coefficient, by Knapp and Hartung 2003 (the variance by the squares that are left, but not below that by the
+  // model), and its degrees of freedom: for few records, of which there are few permutations.
+  double t = 0.0, freedom = 0.0;
+  Eigen::VectorXd mean;  // of the parameters, without what the effect adds
 };
 
 // Parameters of each record (a row) and their variances within it. Infinite: the record does not identify the

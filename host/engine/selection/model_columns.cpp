@@ -37,7 +37,7 @@ bool add_model_columns(TableBuilder& builder) {
   }
   const Eigen::VectorXd fitted = base * algebra::PivotedQr(base).solve(table.target);
   const estimation::PreparedData& prepared = builder.prepared();
-  const Eigen::VectorXd through_gear = prepared.torque_measured
+  const Eigen::VectorXd through_gear = prepared.output_signals.torque
                                            ? builder.at_rows([&](const estimation::Record& r, std::size_t k) {
                                                return r.inputs.torque_at(k) / prepared.constants.gear_ratio;
                                              })
@@ -47,6 +47,22 @@ bool add_model_columns(TableBuilder& builder) {
   add(slope_of(builder.effort, table.runs), "time lag", -effects::kUnbounded);
   table.model_columns = static_cast<Eigen::Index>(builder.columns.size());
   return true;
+}
+
+void add_presliding_shape(TableBuilder& builder, Direction direction, const PreslidingTravels& travels) {
+  for (const double travel : travels.shape) {
+    Eigen::VectorXd column = Eigen::VectorXd::Zero(builder.data.rows());
+    if (direction == Direction::presliding) {
+      std::vector<std::vector<double>> states;
+      for (const estimation::Record& r : builder.prepared().records) states.push_back(presliding_state(r, travel));
+      column = builder.at_rows([&](const estimation::Record& r, std::size_t k) {
+        return states[static_cast<std::size_t>(&r - builder.prepared().records.data())][k] -
+               TableBuilder::direction(r, k);
+      });
+      builder.filter(column);
+    }
+    builder.table.presliding_shape.push_back(builder.add(std::move(column)));
+  }
 }
 
 void add_differences(TableBuilder& builder) {

@@ -35,7 +35,7 @@ Identified identified_of(const BalanceSearch& own, CandidateFit& candidate) {
   Identified identified;
   CrossValidatedFit& fit = candidate.fit;
   const std::size_t added = fit.terms.size() - 1;
-  const auto on_balance = estimation::terms_on(fit.terms, own.data->balance(), own.data->prepared().torque_measured);
+  const auto on_balance = estimation::terms_on(fit.terms, own.data->balance(), own.data->prepared().output_signals);
   std::vector<ParameterRef> refs = fit.linear;
   const std::vector<ParameterRef> nonlinear = estimation::free_nonlinear_parameters(fit.terms, on_balance);
   refs.insert(refs.end(), nonlinear.begin(), nonlinear.end());
@@ -125,7 +125,7 @@ bool acts_on(const catalogue::Entry& entry, const BalanceSearch& own, const Bala
 std::vector<BalanceSearch*> other_balances_of(const std::vector<BalanceSearch*>& all, const BalanceSearch& own,
                                               const CandidateFit& candidate) {
   std::vector<BalanceSearch*> others;
-  if (!own.data->prepared().torque_measured) return others;  // the motor's balance is the only one
+  if (!own.data->prepared().output_signals.torque) return others;  // the motor's balance is the only one
   for (BalanceSearch* other : all)
     if (acts_on(*candidate.model.entry, own, *other)) others.push_back(other);
   return others;

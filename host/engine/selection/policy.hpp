@@ -74,6 +74,7 @@ struct SelectionPolicy {
   double longest_presliding = 1.0;
   double presliding_of_stroke = 0.25;
   double least_travel_noise = 4.0;
+  double presliding_shape_factor = 4.0;  // of shorter and longer bristles over the travel of the law
 
   // Samples for each column of a fit: with fewer, halves of the data say nothing.
   double fewest_rows_per_column = 10.0;
@@ -186,12 +187,14 @@ struct SelectionPolicy {
   double wald_p_value = 0.05;
 
   // Trends of parameters over experiments (step 14).
-  std::size_t fewest_of_trend = 6;  // experiments
-  double trend_p_value = 1e-3;      // after the correction for what was tried
-  double range_p_value = 0.01;      // of a law that holds for the slower or the faster records: is told, not named
-  double trend_size = 0.03;         // of the parameter, over the records
-  double least_drift = 0.01;        // relative standard deviation of friction between records that is reported
-  double drift_deviance = 12.0;     // twice the log-likelihood ratio of random effects against none
+  std::size_t fewest_of_trend = 6;    // experiments
+  double trend_p_value = 1e-3;        // after the correction for what was tried
+  double range_p_value = 0.01;        // of a law that holds for the slower or the faster records: is told, not named
+  std::size_t fewest_of_scaling = 4;  // records: with fewer a line through them has one degree of freedom
+  double scaling_p_value = 0.01;      // of an effect that scales friction by a recorded signal, for all that were tried
+  double trend_size = 0.03;           // of the parameter, over the records
+  double least_drift = 0.01;          // relative standard deviation of friction between records that is reported
+  double drift_deviance = 12.0;       // twice the log-likelihood ratio of random effects against none
 };
 
 // The policy that all commands follow.

@@ -71,7 +71,7 @@ std::vector<double> squares_by_travel(const PreparedData& original, const Terms&
     PreparedData prepared = original;
     for (Record& r : prepared.records) r.inputs.directions[0] = presliding_state(r, travels[i]);
     BalanceData data(prepared, Balance::motor);
-    const auto on_balance = estimation::terms_on(terms, Balance::motor, prepared.torque_measured);
+    const auto on_balance = estimation::terms_on(terms, Balance::motor, prepared.output_signals);
     const Eigen::MatrixXd X = data.columns(terms, estimation::free_linear_parameters(terms, on_balance));
     const Eigen::VectorXd y = data.target() - data.known_torque(terms, on_balance);
     squares[i] = (y - X * algebra::PivotedQr(X).solve(y)).squaredNorm();

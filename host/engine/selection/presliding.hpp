@@ -10,8 +10,13 @@
 
 namespace flexspline::selection {
 
-// Which presliding travel replaces the sign of the velocity; nothing: the sign itself.
-using Presliding = std::optional<double>;  // rad of the motor
+// Travels of presliding, rad of the motor: `state` is that of the law, which replaces the sign of the velocity; `shape`
+// are shorter and longer ones. Real friction has bristles of unlike lengths (generalised Maxwell slip, Al-Bender 2005),
+// so that the state of one travel alone leaves structure around reversals that other laws would be chosen for.
+struct PreslidingTravels {
+  double state = 0.0;
+  std::vector<double> shape;
+};
 
 // The state of Dahl's law along a record, -1 to 1, advanced by travel (exact for one direction).
 std::vector<double> presliding_state(const estimation::Record& record, double travel);

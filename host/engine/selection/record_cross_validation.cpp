@@ -20,7 +20,7 @@ constexpr double kSameSquares = 1e-4;
 // A model fitted on the samples in `keep`; nonlinear parameters start at the values from all records.
 CrossValidatedFit fit_without(BalanceData& data, const Terms& terms, const Eigen::VectorXd& keep) {
   CrossValidatedFit fit = cross_validate(data, terms, keep);
-  const auto on_balance = estimation::terms_on(fit.terms, data.balance(), data.prepared().torque_measured);
+  const auto on_balance = estimation::terms_on(fit.terms, data.balance(), data.prepared().output_signals);
   if (estimation::free_nonlinear_parameters(fit.terms, on_balance).empty()) return fit;
   Terms refined = fit.terms;
   estimation::refine_nonlinear(data, refined, on_balance, noise_covariance(data, fit), kSameSquares);

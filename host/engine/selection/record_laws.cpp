@@ -29,14 +29,15 @@ std::pair<double, double> value_in(const Estimate& parameter, const std::string&
   return {*at->value, *at->std * *at->std};
 }
 
-// The friction that the model takes for the law in each record; nothing where more of the law's torque is left in a
-// record than a term needs to be chosen there: then the records show it themselves.
-std::optional<Eigen::MatrixXd> as_friction(BalanceData& data, const estimation::Terms& base, const RecordFriction& own,
-                                           const Eigen::VectorXd& torque, const Eigen::VectorXd& root_weights) {
+}  // namespace
+
+AsFriction as_friction(BalanceData& data, const estimation::Terms& base, const RecordFriction& own,
+                       const Eigen::VectorXd& torque, const Eigen::VectorXd& root_weights) {
   std::vector<estimation::ParameterRef> refs;
   for (const Estimate* e : own.parameters) refs.push_back(e->ref);
   const Eigen::MatrixXd columns = estimation::columns_of(data, base, refs);
-  Eigen::MatrixXd added(own.values.theta.rows(), own.values.theta.cols());
+  AsFriction result;
+  result.added.resize(own.values.theta.rows(), own.values.theta.cols());
   for (std::size_t i = 0; i < own.records.size(); ++i) {
     const RowRange& range = own.records[i];
     const Eigen::VectorXd weights = root_weights.segment(range.first, range.size());
@@ -44,15 +45,13 @@ std::optional<Eigen::MatrixXd> as_friction(BalanceData& data, const estimation::
     const Eigen::MatrixXd friction = columns.middleRows(range.first, range.size());
     const estimation::LinearFit fit = estimation::least_squares(friction, here, weights);
     const double left = weights.cwiseProduct(here - friction * fit.theta).squaredNorm();
-    if (!(left <= kPolicy.line_share * weights.cwiseProduct(here).squaredNorm())) return std::nullopt;
-    added.row(static_cast<Eigen::Index>(i)) = fit.theta.transpose();
+    result.most_left = std::max(result.most_left, left / std::max(weights.cwiseProduct(here).squaredNorm(), 1e-300));
+    result.added.row(static_cast<Eigen::Index>(i)) = fit.theta.transpose();
   }
-  return added;
+  return result;
 }
 
-}  // namespace
-
-RecordFriction friction_by_record(const estimation::Identification& base, const BalanceData& data) {
+RecordFriction friction_by_record(const estimation::Identification& base, const BalanceData& data, std::size_t fewest) {
   const auto identified = [&](const Estimate& e) {
     return static_cast<std::size_t>(
         std::count_if(data.records().begin(), data.records().end(), [&](const RowRange& range) {
@@ -64,7 +63,7 @@ RecordFriction friction_by_record(const estimation::Identification& base, const 
   for (const Estimate& e : base.estimates) {
     const catalogue::Entry& entry = *base.terms[e.ref.term].entry;
     if (entry.info->balance != data.balance() || entry.info->surface.empty() || e.fixed) continue;
-    if (entry.parameters[e.ref.parameter].kind == effects::Kind::linear && identified(e) >= kPolicy.fewest_of_trend)
+    if (entry.parameters[e.ref.parameter].kind == effects::Kind::linear && identified(e) >= fewest)
       friction.parameters.push_back(&e);
   }
   const auto parameters = static_cast<Eigen::Index>(friction.parameters.size());
@@ -126,8 +125,9 @@ std::vector<Law> laws(const estimation::Identification& base, const SearchedBala
     for (const double value : grid) {
       if (!nonlinear.empty()) law.values[nonlinear[0]] = value;
       const Eigen::VectorXd torque = data.term_torque(terms, terms.size() - 1);
-      if (auto added = as_friction(data, base.terms, own, torque, motor.search.base.root_weights))
-        all.push_back({&candidate, law.values, std::move(*added)});
+      AsFriction taken = as_friction(data, base.terms, own, torque, motor.search.base.root_weights);
+      // Where more is left than a term needs to be chosen, the record shows the law itself.
+      if (taken.most_left <= kPolicy.line_share) all.push_back({&candidate, law.values, std::move(taken.added)});
     }
   }
   return all;

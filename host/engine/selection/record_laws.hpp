@@ -18,9 +18,10 @@ struct RecordFriction {
   RecordParameters values;
 };
 
-// A slow record does not identify viscous friction: each counts with what it identifies. A parameter needs as many
-// records as a trend.
-RecordFriction friction_by_record(const estimation::Identification& base, const estimation::BalanceData& data);
+// A slow record does not identify viscous friction: each counts with what it identifies. A parameter needs `fewest`
+// records that identify it.
+RecordFriction friction_by_record(const estimation::Identification& base, const estimation::BalanceData& data,
+                                  std::size_t fewest);
 
 // The slower and the faster records, parted at each tenth of them; only those parts that identify a parameter as a
 // trend does. `speeds`: one a record.
@@ -33,7 +34,17 @@ struct Law {
   Eigen::MatrixXd added;
 };
 
-// All candidates that a record's own friction fits as well, at each value of a grid of their nonlinear parameter.
+// All candidates that a record's own friction fits as well, at each value of a grid of their nonlinear parameter; not
+// those that scale friction.
 std::vector<Law> laws(const estimation::Identification& base, const SearchedBalance& motor, const RecordFriction& own);
+
+// The friction that the model takes for a torque in each record, and the largest share of the torque's squares in a
+// record that this leaves.
+struct AsFriction {
+  Eigen::MatrixXd added;
+  double most_left = 0.0;
+};
+AsFriction as_friction(estimation::BalanceData& data, const estimation::Terms& base, const RecordFriction& own,
+                       const Eigen::VectorXd& torque, const Eigen::VectorXd& root_weights);
 
 }  // namespace flexspline::selection

@@ -107,6 +107,7 @@ RegressorTable with_terms(const RegressorTable& table, const std::vector<int>& t
     small.terms.push_back(table.terms[static_cast<std::size_t>(t)]);
     for (Eigen::Index& column : small.terms.back().columns) column = keep(column);
   }
+  for (const Eigen::Index column : table.presliding_shape) small.presliding_shape.push_back(keep(column));
   for (const Eigen::Index column : table.differences) small.differences.push_back(keep(column));
   small.columns = table.columns(Eigen::all, kept);
   small.scale = table.scale(kept);
@@ -115,10 +116,12 @@ RegressorTable with_terms(const RegressorTable& table, const std::vector<int>& t
 }
 
 RegressorTable make_regressor_table(const PreparedData& original, Balance balance, const Terms& terms,
-                                    Presliding presliding, double highest_law_hz, const SelectionPolicy& policy) {
+                                    Direction direction, const std::optional<PreslidingTravels>& travels,
+                                    double highest_law_hz, const SelectionPolicy& policy) {
   PreparedData prepared = original;
   for (Record& r : prepared.records)
-    r.inputs.directions[0] = presliding ? presliding_state(r, *presliding) : expected_sign(r);
+    r.inputs.directions[0] =
+        direction == Direction::presliding ? presliding_state(r, travels->state) : expected_sign(r);
   BalanceData data(prepared, balance);
   RegressorTable table;
   table.records = prepared.records.size();
@@ -131,6 +134,7 @@ RegressorTable make_regressor_table(const PreparedData& original, Balance balanc
   const Motion motion = motion_of(prepared);
   add_catalogue_terms(builder, motion);
   add_generic_curves(builder, motion);
+  if (travels) add_presliding_shape(builder, direction, *travels);
   add_differences(builder);
   add_row_signals(builder);
   scale_columns(builder);

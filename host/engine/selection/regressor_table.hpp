@@ -64,6 +64,8 @@ struct TableModel {
 struct RegressorTable : TableSamples, TableModel {
   Eigen::MatrixXd columns;  // those of the model first; N m per unit, scaled to unit root mean square
   Eigen::VectorXd scale;    // root mean squares that the columns were divided by
+  // Dry friction over the states of PreslidingTravels::shape less that of the law: fitted with the term of presliding.
+  std::vector<Eigen::Index> presliding_shape;
   // Friction that may differ from run to run, by surface in common and by direction: columns of a relative change of
   // one.
   std::vector<Eigen::Index> differences;
@@ -71,9 +73,13 @@ struct RegressorTable : TableSamples, TableModel {
   std::vector<const catalogue::Entry*> not_visible;  // that these data could not show if they were there
 };
 
-// `prepared` is at the highest bandwidth and not masked; `terms` have the values of a first fit.
+enum class Direction { sign, presliding };
+
+// `prepared` is at the highest bandwidth and not masked; `terms` have the values of a first fit. Where there are no
+// `travels`, direction must be the sign; the columns of the shape of presliding are zero in a table of the sign.
 RegressorTable make_regressor_table(const estimation::PreparedData& prepared, Balance balance,
-                                    const estimation::Terms& terms, Presliding presliding, double highest_law_hz,
+                                    const estimation::Terms& terms, Direction direction,
+                                    const std::optional<PreslidingTravels>& travels, double highest_law_hz,
                                     const SelectionPolicy& policy);
 
 // The same samples with fewer columns: those of the model, of friction that may differ, and of these terms (places in

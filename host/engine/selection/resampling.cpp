@@ -119,6 +119,34 @@ bool may_be_stated(const Resampling& resampling, const Resampling::FoundTerm& fo
   });
 }
 
+// Whether resampling cannot choose an effect on these data although the model could have it: what corrects the effort,
+// where that has no peaks.
+bool is_not_visible(const Resampling& resampling, const CandidateFit& candidate) {
+  return std::any_of(resampling.not_visible.begin(), resampling.not_visible.end(),
+                     [&](const std::string& name) { return name == candidate.model.entry->name(); });
+}
+
+// The effect that resampling cannot choose, that is confused with what it found, and is likelier; null: there is none.
+const CandidateFit* likelier_unseen(const Resampling& resampling, const Resampling::FoundTerm& found,
+                                    const SearchedBalance& motor) {
+  double score = kPolicy.named_score;
+  for (const CandidateFit& t : motor.candidates)
+    for (const NamedEffect& n : found.group) {
+      // Likelihood leaves out reversals, where alone presliding shows.
+      if (catalogue::get(n.effect).is_presliding()) return nullptr;
+      if (is_of_family(n.effect, n.order, t)) score = std::max(score, t.gain.score + kPolicy.confounded_margin);
+    }
+  const auto is_confused = [&](const catalogue::Entry& unseen) {
+    return std::any_of(found.group.begin(), found.group.end(), [&](const NamedEffect& n) {
+      return catalogue::names_contain(unseen.info->confused_with, n.effect) ||
+             catalogue::names_contain(catalogue::get(n.effect).info->confused_with, unseen.name());
+    });
+  };
+  for (const CandidateFit& t : motor.candidates)
+    if (passes(t) && t.gain.score > score && is_not_visible(resampling, t) && is_confused(*t.model.entry)) return &t;
+  return nullptr;
+}
+
 // The effects to name, among those in the catalogue that do not increase the held-out error: the group with the largest
 // share where these data cannot distinguish its members, else all single ones. After the first, a term below the share
 // of a linear term is a remainder of the first law, or not worth a parameter.
@@ -130,6 +158,7 @@ std::vector<NamedEffect> names_of(const Resampling& resampling, const SearchedBa
     if (found.group.empty() || found.refused_by_holdout) continue;
     if (!may_be_stated(resampling, found, motor)) continue;
     if (is_judged_by_few && !found.is_confirmed()) continue;
+    if (likelier_unseen(resampling, found, motor)) continue;
     if (names.empty() && found.group.size() > 1) return found.group;
     if (found.group.size() > 1 || (!names.empty() && found.share_percent < least_percent)) continue;
     // Behind another one, a name that is not certain may be what the first law leaves: held-out experiments decide.
@@ -170,6 +199,7 @@ Resampling::FoundTerm found_term(const FoundTerm& found, std::optional<double> h
   Resampling::FoundTerm one;
   for (const Frequency& f : found.group) one.name += (one.name.empty() ? "" : " or ") + f.name;
   one.frequency = found.frequency;
+  one.least_by_mask = found.least_by_mask;
   one.share_percent = 100.0 * found.share;
   one.share_low_percent = 100.0 * found.group.front().share_low;
   one.share_high_percent = 100.0 * found.group.front().share_high;
@@ -189,6 +219,8 @@ std::string why_not_named(const Resampling::FoundTerm& term, bool is_undecided, 
   if (term.refused_by_holdout)
     return fmt::format("the error on experiments that are held out rises by {:.1f} % with it",
                        100.0 * (*term.held_out_ratio - 1.0));
+  if (is_undecided && term.frequency >= kPolicy.named_frequency && term.least_by_mask < 1.0 - kPolicy.named_frequency)
+    return fmt::format("only {:.0f} of 100 do either with the reversals or without them", 100.0 * term.least_by_mask);
   if (is_undecided)
     return fmt::format("{:.0f} are needed, {:.0f} where it shows little or behind an unknown structure",
                        100.0 * kPolicy.named_frequency, 100.0 * kPolicy.certain_frequency);
@@ -205,7 +237,8 @@ std::string why_not_named(const Resampling::FoundTerm& term, bool is_undecided, 
 }
 
 // Groups of the catalogue that were found, or are undecided, and are not named.
-std::vector<PossibleEffect> possible_effects(const Resampling& resampling, const std::vector<NamedEffect>& named) {
+std::vector<PossibleEffect> possible_effects(const Resampling& resampling, const SearchedBalance& motor,
+                                             const std::vector<NamedEffect>& named) {
   std::vector<PossibleEffect> all;
   const auto is_named = [&](const NamedEffect& a) {
     return std::any_of(named.begin(), named.end(),
@@ -213,10 +246,35 @@ std::vector<PossibleEffect> possible_effects(const Resampling& resampling, const
   };
   const auto add = [&](const Resampling::FoundTerm& term, bool is_undecided) {
     if (term.group.empty() || std::any_of(term.group.begin(), term.group.end(), is_named)) return;
-    all.push_back({term.group, why_not_named(term, is_undecided, !named.empty()), term.frequency, term.held_out_ratio});
+    const CandidateFit* unseen = is_undecided ? nullptr : likelier_unseen(resampling, term, motor);
+    const std::string why =
+        unseen ? fmt::format("{}, which halves of the data cannot judge here, is likelier", unseen->model.entry->name())
+               : why_not_named(term, is_undecided, !named.empty());
+    all.push_back({term.group, why, term.frequency, term.held_out_ratio});
   };
   for (const Resampling::FoundTerm& term : resampling.found) add(term, false);
   for (const Resampling::FoundTerm& term : resampling.undecided) add(term, true);
+  // What likelihood alone would name.
+  if (!motor.names_one()) return all;
+  const CandidateFit& first = motor.candidates.front();
+  const NamedEffect name{std::string(first.model.entry->name()), first.model.order};
+  const auto is_listed = [&](const PossibleEffect& p) {
+    return std::any_of(p.group.begin(), p.group.end(),
+                       [&](const NamedEffect& n) { return is_of_family(n.effect, n.order, first); });
+  };
+  const bool is_in_names = std::any_of(named.begin(), named.end(),
+                                       [&](const NamedEffect& n) { return is_of_family(n.effect, n.order, first); });
+  if (is_in_names || first.model.entry->is_presliding() || std::any_of(all.begin(), all.end(), is_listed) ||
+      first.gain.chi2_percent < 100.0 * kPolicy.line_share)
+    return all;
+  const std::optional<double> support = support_of(resampling, first);
+  const std::string less = support && !is_not_visible(resampling, first)
+                               ? fmt::format("{:.0f} of 100 subsamples chose it", 100.0 * *support)
+                               : std::string("halves of the data cannot judge it here");
+  all.push_back({{name},
+                 fmt::format("its likelihood is significant (score {:.0f}), but {}", first.gain.score, less),
+                 std::nullopt,
+                 std::nullopt});
   return all;
 }
 
@@ -251,6 +309,8 @@ Resampling resample(const std::vector<const data::Experiment*>& experiments, con
     result.undecided.push_back(found_term(one, with_it.empty() ? std::nullopt : std::optional(with_it.back()), terms));
   }
   result.support = support_of(selection, terms);
+  for (const catalogue::Entry* entry : selection.tables().sign.not_visible)
+    result.not_visible.emplace_back(entry->name());
   return result;
 }
 
@@ -279,9 +339,13 @@ bool resampling_decides(const Resampling& resampling, const SearchedBalance& mot
   return !leaves_noise(motor, resampling.whiteness);
 }
 
+bool names_any(const Resampling& resampling, const SearchedBalance& motor) {
+  return !names_of(resampling, motor).empty();
+}
+
 void name_stable(SearchedBalance& chosen, Diagnosis& result) {
   result.named = names_of(*result.resampling, chosen);
-  result.possible = possible_effects(*result.resampling, result.named);
+  result.possible = possible_effects(*result.resampling, chosen, result.named);
   const bool is_of_scale = add_other_scale(chosen, result.named);
   const bool is_group =
       is_of_scale || (!result.named.empty() && result.resampling->found_group(result.named.front()).size() > 1);

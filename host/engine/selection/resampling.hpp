@@ -17,6 +17,9 @@ Resampling resample(const std::vector<const data::Experiment*>& experiments, con
 // contradict it.
 bool resampling_decides(const Resampling& resampling, const SearchedBalance& motor);
 
+// Whether it names any effect.
+bool names_any(const Resampling& resampling, const SearchedBalance& motor);
+
 // Names the effects that resampling found in the catalogue, if any. Their candidates come first.
 void name_stable(SearchedBalance& chosen, Diagnosis& result);
 

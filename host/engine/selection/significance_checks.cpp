@@ -29,7 +29,7 @@ std::size_t order_place(const catalogue::Entry& entry) {
 Eigen::MatrixXd order_columns(BalanceData& data, Terms terms, double order) {
   estimation::Term& added = terms.back();
   added.values[order_place(*added.entry)] = order;
-  const auto on_balance = estimation::terms_on(terms, data.balance(), data.prepared().torque_measured);
+  const auto on_balance = estimation::terms_on(terms, data.balance(), data.prepared().output_signals);
   Eigen::MatrixXd columns(data.rows(), 0);
   const auto take = [&](const Eigen::VectorXd& column) {
     columns.conservativeResize(Eigen::NoChange, columns.cols() + 1);

@@ -1,9 +1,11 @@
 #include "host/engine/selection/stability_selection.hpp"
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <map>
 #include <random>
+#include <set>
 
 #include "host/engine/estimation/in_parallel.hpp"
 #include "host/engine/estimation/least_squares.hpp"
@@ -158,7 +160,10 @@ namespace {
 // How often a term was chosen, over the subsamples of all settings.
 struct Count {
   Frequency f;
-  double could = 0.0, was = 0.0, first = 0.0, near = 0.0;
+  double was = 0.0, first = 0.0;
+  // With reversals, and without: subsamples, those that do not abstain, and those with it or nearly.
+  std::array<double, 2> open{}, could{}, near{};
+  double all() const { return could[0] + could[1]; }
   std::map<std::string, double> alternatives;
   std::vector<double> shares;
 };
@@ -169,30 +174,46 @@ const std::string& name_of(const RegressorTable& table, int term) {
   return term == kPreslidingTerm ? presliding : table.terms[static_cast<std::size_t>(term)].name;
 }
 
-// Counts a subsample that does not abstain. Returns the share of the excess that its steps explain.
-double count_steps(const RegressorTable& table, const SelectionPath& vote, Counts& counts) {
+// Counts a subsample that does not abstain: each name once, although a law may have been taken at two values of its
+// nonlinear parameter. Returns the share of the excess that its steps explain.
+double count_steps(const RegressorTable& table, const SelectionPath& vote, bool mask, Counts& counts) {
+  struct Chosen {
+    double share = 0.0;
+    std::set<std::string> alternatives;
+  };
+  std::map<std::string, Chosen> chosen;
+  std::set<std::string> near;
   double sum = 0.0;
-  for (std::size_t k = 0; k < vote.steps.size(); ++k) {
-    const SelectionStep& s = vote.steps[k];
-    Count& c = counts[name_of(table, s.term)];
-    c.was += 1.0;
-    for (const std::string& other : s.alternatives) {
-      c.alternatives[other] += 1.0;
-      counts[other].near += 1.0;
-    }
-    if (k == 0) c.first += 1.0;
-    c.shares.push_back(s.of_all);
+  for (const SelectionStep& s : vote.steps) {
+    Chosen& one = chosen[name_of(table, s.term)];
+    one.share += s.of_all;
+    one.alternatives.insert(s.alternatives.begin(), s.alternatives.end());
+    near.insert(s.alternatives.begin(), s.alternatives.end());
     sum += s.of_all;
   }
+  for (const auto& [name, one] : chosen) {
+    Count& c = counts[name];
+    c.was += 1.0;
+    c.shares.push_back(one.share);
+    for (const std::string& other : one.alternatives)
+      if (other != name) c.alternatives[other] += 1.0;
+    near.insert(name);
+  }
+  for (const std::string& name : near) counts[name].near[mask ? 1 : 0] += 1.0;
+  if (!vote.steps.empty()) counts[name_of(table, vote.steps.front().term)].first += 1.0;
   return sum;
 }
 
 // Of a term that was chosen at least once.
 Frequency frequency_of(Count& c) {
   constexpr double kOften = 0.3;
-  c.f.frequency = c.was / c.could;
-  c.f.first = c.first / c.could;
-  c.f.near = std::min(1.0, (c.was + c.near) / c.could);
+  c.f.frequency = c.was / c.all();
+  c.f.first = c.first / c.all();
+  c.f.near = (c.near[0] + c.near[1]) / c.all();
+  c.f.least_near_by_mask = 1.0;
+  for (const std::size_t mask : {0, 1})
+    if (c.open[mask] > 0.0)
+      c.f.least_near_by_mask = std::min(c.f.least_near_by_mask, c.near[mask] / std::max(1.0, c.could[mask]));
   for (const auto& [other, times] : c.alternatives)
     if (times >= kOften * c.was) c.f.alternatives.emplace_back(other, times / c.was);
   std::sort(c.shares.begin(), c.shares.end());
@@ -221,6 +242,7 @@ void StabilitySelection::count() {
     if (tables_.presliding && !tables_.settings[i].second) open[kPresliding] = nullptr;
     for (const SelectionPath& vote : per_setting_[i].votes) {
       result_.subsamples += 1.0;
+      for (const auto& [name, term] : open) counts[name].open[tables_.settings[i].second ? 1 : 0] += 1.0;
       if (vote.extrapolates) result_.extrapolated += 1.0;
       if (vote.abstains) {
         result_.abstained += 1.0;
@@ -233,9 +255,9 @@ void StabilitySelection::count() {
           c.f.entry = term->entry;
           c.f.order = term->order;
         }
-        c.could += 1.0;
+        c.could[tables_.settings[i].second ? 1 : 0] += 1.0;
       }
-      explained.push_back(count_steps(sign, vote, counts));
+      explained.push_back(count_steps(sign, vote, tables_.settings[i].second, counts));
     }
   }
   for (std::size_t i = 0; i < per_setting_.size(); ++i)
@@ -245,7 +267,7 @@ void StabilitySelection::count() {
   result_.explained = median(explained);
   result_.whiteness = median(white);
   for (auto& [name, c] : counts)
-    if (c.was > 0.0 && c.could > 0.0) result_.frequencies.push_back(frequency_of(c));
+    if (c.was > 0.0 && c.all() > 0.0) result_.frequencies.push_back(frequency_of(c));
   std::sort(result_.frequencies.begin(), result_.frequencies.end(),
             [](const Frequency& a, const Frequency& b) { return a.frequency > b.frequency; });
 }

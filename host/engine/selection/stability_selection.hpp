@@ -19,6 +19,7 @@ struct Frequency {
   double share_low = 0.0, share_high = 0.0;                  // of 95 % of these subsamples
   double first = 0.0;                                        // of the subsamples in which it came first
   double near = 0.0;                                         // chosen, or nearly as good as what was
+  double least_near_by_mask = 1.0;                           // the same with reversals or without, the lesser one
   std::vector<std::pair<std::string, double>> alternatives;  // how often, of the times that it was chosen
 };
 

@@ -10,7 +10,7 @@
 namespace flexspline::selection {
 
 std::vector<std::size_t> TableBuilder::on_balance() const {
-  return estimation::terms_on(terms, data.balance(), prepared().torque_measured);
+  return estimation::terms_on(terms, data.balance(), prepared().output_signals);
 }
 
 Eigen::Index TableBuilder::add(Eigen::VectorXd column) {

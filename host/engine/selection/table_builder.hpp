@@ -60,6 +60,8 @@ bool add_model_columns(TableBuilder& builder);
 void add_catalogue_terms(TableBuilder& builder, const Motion& motion);
 // Generic curves: they compete with the effects, and are never named.
 void add_generic_curves(TableBuilder& builder, const Motion& motion);
+// Dry friction over other travels of presliding less that over the law's.
+void add_presliding_shape(TableBuilder& builder, Direction direction, const PreslidingTravels& travels);
 // Relative changes of viscous and of dry friction, in common and by direction.
 void add_differences(TableBuilder& builder);
 

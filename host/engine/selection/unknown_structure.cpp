@@ -40,7 +40,7 @@ bool measured(const BalanceData& data, const effects::VariableInfo& v) {
     return std::all_of(data.records().begin(), data.records().end(),
                        [&](const RowRange& range) { return has(p.records[range.record]); });
   };
-  if ((v.reads & effects::kTorque) && !p.torque_measured) return false;
+  if ((v.reads & effects::kTorque) && !p.output_signals.torque) return false;
   if ((v.reads & effects::kCurrent) && !p.effort_is_current) return false;
   if ((v.reads & effects::kTemperature) && !all([](const auto& r) { return r.has_temperature; })) return false;
   if ((v.reads & effects::kOutputMotion) && !all([](const auto& r) { return r.has_output_motion; })) return false;

@@ -160,7 +160,8 @@ estimation::LearnedTable learn(estimation::Identification& base, const model::Ef
   const auto fail = [&](const char* kind, std::string what, std::string remedy) {
     throw data::DataError({{data::Severity::error, kind, "", 0, "", std::move(what), std::move(remedy)}});
   };
-  const estimation::Balance on = base.prepared.torque_measured ? specification.balance : estimation::Balance::motor;
+  const estimation::Balance on =
+      base.prepared.output_signals.torque ? specification.balance : estimation::Balance::motor;
   const std::string& variable = table.definition->variable;
   for (std::size_t b = 0; b < base.data.size(); ++b) {
     if (base.data[b].balance() != on) continue;

@@ -20,10 +20,7 @@ std::optional<double> wald_p_value(const Candidate& candidate) {
   return std::min(1.0, tried * numbers::chi_squared_above(parameters, chi2));
 }
 
-namespace {
-
-// Whether experiments that are held out confirm a name.
-bool is_confirmed(const Diagnosis& result, const NamedEffect& name) {
+bool is_confirmed_by_held_out(const Diagnosis& result, const NamedEffect& name) {
   if (!result.resampling || !result.resampling->decides) return false;
   const auto is_it = [&](const NamedEffect& n) { return n.effect == name.effect && n.order == name.order; };
   return std::any_of(result.resampling->found.begin(), result.resampling->found.end(), [&](const auto& found) {
@@ -31,20 +28,19 @@ bool is_confirmed(const Diagnosis& result, const NamedEffect& name) {
   });
 }
 
-}  // namespace
-
 void take_back_insignificant(Diagnosis& result) {
   if (result.verdict == Verdict::confusable_effects) return;
   std::erase_if(result.named, [&](const NamedEffect& name) {
     const auto at = std::find_if(result.candidates.begin(), result.candidates.end(),
                                  [&](const Candidate& c) { return c.effect == name.effect && c.order == name.order; });
     if (at == result.candidates.end()) return false;
-    if (is_confirmed(result, name)) return false;
+    if (is_confirmed_by_held_out(result, name)) return false;
     const std::optional<double> p = wald_p_value(*at);
     if (!p || *p <= kPolicy.wald_p_value) return false;
     at->admissible = false;
     at->why_not = "its values do not differ from zero beyond their intervals";
-    if (result.resampling && result.resampling->decides) result.possible.push_back({{name}, at->why_not, std::nullopt, std::nullopt});
+    if (result.resampling && result.resampling->decides)
+      result.possible.push_back({{name}, at->why_not, std::nullopt, std::nullopt});
     return true;
   });
 }

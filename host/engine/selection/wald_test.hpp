@@ -14,4 +14,7 @@ std::optional<double> wald_p_value(const Candidate& candidate);
 // of those stands in the place of another.
 void take_back_insignificant(Diagnosis& result);
 
+// Whether resampling decided and experiments that are held out confirm a name.
+bool is_confirmed_by_held_out(const Diagnosis& result, const NamedEffect& name);
+
 }  // namespace flexspline::selection

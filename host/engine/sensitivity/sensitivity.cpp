@@ -274,8 +274,8 @@ class Analysis {
   void find_balances() {
     const estimation::Terms terms = estimation::terms_of(model_);
     for (const Balance balance : {Balance::motor, Balance::transmission, Balance::load}) {
-      if (balance != Balance::motor && !prepared_.torque_measured) continue;
-      if (estimation::terms_on(terms, balance, prepared_.torque_measured).empty()) continue;
+      if (balance != Balance::motor && !prepared_.output_signals.torque) continue;
+      if (estimation::terms_on(terms, balance, prepared_.output_signals).empty()) continue;
       if (!BalanceData(prepared_, balance).empty()) balances_.push_back(balance);
     }
     if (balances_.empty())

@@ -263,8 +263,9 @@ class ExperimentReader {
   }
 
   std::string jitter_text(const TimeBase& base) const {
-    return fmt::format("in \"{}\" steps of time differ from {:.6g} s by up to {:.2g} % of it ({:.2g} % at most)",
-                       experiment_.name, base.sample_s, 100.0 * base.jitter, 100.0 * base.jitter_max);
+    return fmt::format(
+        "in \"{}\" 99 of 100 steps of time differ from {:.6g} s by at most {:.2g} %, the worst by {:.2g} %",
+        experiment_.name, base.sample_s, std::max(0.01, 100.0 * base.jitter), 100.0 * base.jitter_max);
   }
 
   void report_gaps(const TimeBase& base) {

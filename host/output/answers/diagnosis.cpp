@@ -293,6 +293,9 @@ std::string verdict_in_words(const Diagnosis& d) {
                "of the measurement.";
       return "Nothing is missing: the model's error is the noise of the measurement.";
     case Verdict::nothing_significant:
+      if (!d.possible.empty())
+        return "No effect of the catalogue can be named; what may be missing is below. How large the noise is is not "
+               "known.";
       return "No effect of the catalogue improves the model. How large the noise is is not known, so something small "
              "may be missing.";
     case Verdict::unknown_structure:
@@ -355,7 +358,7 @@ void print_possible(Console& console, const std::vector<selection::PossibleEffec
     if (one.frequency) text += fmt::format(": chosen in {:.0f} of 100 subsamples", 100.0 * *one.frequency);
     text += fmt::format("; {}.", one.why_not);
     if (const catalogue::Entry* entry = catalogue::find(one.group.front().effect))
-      text += fmt::format(" Record {}.", entry->info->separated_by);
+      text += fmt::format(" What would tell: {}.", entry->info->separated_by);
     console.line(wrapped(text));
   }
 }
@@ -376,11 +379,7 @@ void print_diagnosis(Console& console, const Diagnosis& d, const std::string& ad
   if (d.resampling && d.resampling->decides) print_resampling(console, *d.resampling);
   print_possible(console, d.possible);
   if (!d.localised.empty()) console.line(wrapped(fmt::format("The error goes with {}.", shares(d.localised))));
-  if (d.delay_s)
-    console.line(
-        wrapped(fmt::format("The effort {} the motion by {:.3g} ms beyond the alignment: check the time stamps, or "
-                            "current_hold.",
-                            *d.delay_s > 0.0 ? "lags" : "leads", 1e3 * std::abs(*d.delay_s))));
+  if (!d.delay_advice.empty()) console.line(wrapped(d.delay_advice));
   for (const selection::NamedEffect& named : d.named)
     if (const Candidate* c = candidate_of(d, named)) print_explanation(console, *c, d.unit);
   if (d.law_in_range) console.line(wrapped(law_in_range_text(*d.law_in_range)));
@@ -469,6 +468,7 @@ json diagnosis_json(const Diagnosis& d) {
           {"resampling", resampling_json(d)},
           {"unknown", unknown_json(d)},
           {"delay_s", json_number(d.delay_s)},
+          {"delay_advice", d.delay_advice.empty() ? json(nullptr) : json(d.delay_advice)},
           {"at_stated_setting", stated_setting_json(d)},
           {"warnings", d.warnings},
           {"rounds", json::array()}};

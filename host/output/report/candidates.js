@@ -85,7 +85,7 @@ function fillRound(s, round) {
   const telling = round.localised.slice(0, 3).map((l) => `${variableName(l.variable)} (${number(l.share_percent, 3)} %)`);
   if (telling.length) s.append(el("p", {}, `Most of the error goes with ${listed(telling)}; shares overlap, as these quantities move together.`));
   if (round.delay_s !== null)
-    s.append(el("p", { class: "note" }, `The effort ${round.delay_s > 0 ? "lags" : "leads"} the motion by ${number(1e3 * Math.abs(round.delay_s), 3)} ms beyond the alignment: check the time stamps, or current_hold.`));
+    s.append(el("p", { class: "note" }, round.delay_advice));
   const same = (a, b) => a.effect === b.effect && a.order === b.order;
   for (const named of round.named) {
     const c = round.candidates.find((x) => same(x, named));

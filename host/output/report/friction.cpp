@@ -35,7 +35,7 @@ double steady_torque(const estimation::Term& term, const View& view, double velo
   in.temperature = view.prepared.constants.reference_temperature;
   in.viscous_scale = in.coulomb_scale = 1.0;
   const effects::Torques<catalogue::Real> torques = catalogue::steady_torques(*instance, term.entry->has_state, in);
-  return torques.motor + (view.prepared.torque_measured ? 0.0 : torques.load / gear);
+  return torques.motor + (view.prepared.output_signals.torque ? 0.0 : torques.load / gear);
 }
 
 // What depends on how fast, or in which direction, the motor turns.
@@ -97,9 +97,9 @@ json friction_curve(View& view) {
   for (const comparison::SampleVariable& v : comparison::sample_variables(data, view.axis()))
     if (v.name == "velocity") velocity = v.values;
   std::vector<std::size_t> friction;
-  std::vector<std::size_t> all = estimation::terms_on(view.terms, Balance::motor, view.prepared.torque_measured);
+  std::vector<std::size_t> all = estimation::terms_on(view.terms, Balance::motor, view.prepared.output_signals);
   for (const std::size_t t :
-       estimation::terms_acting_on_other_balance(view.terms, Balance::motor, view.prepared.torque_measured))
+       estimation::terms_acting_on_other_balance(view.terms, Balance::motor, view.prepared.output_signals))
     all.push_back(t);
   for (const std::size_t t : all)
     if (is_friction(view.terms[t], view)) friction.push_back(t);

@@ -1,0 +1,188 @@
+#include "host/engine/selection/friction_scaling.hpp"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cmath>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "host/common/numbers/distributions.hpp"
+#include "host/engine/selection/meta_regression.hpp"
+#include "host/engine/selection/policy.hpp"
+#include "host/engine/selection/record_laws.hpp"
+#include "host/engine/selection/wald_test.hpp"
+
+namespace flexspline::selection {
+namespace {
+
+using estimation::BalanceData;
+using estimation::Estimate;
+using estimation::Record;
+
+// An effect that scales a friction of the model, and how the records' friction goes with it.
+struct Scaling {
+  const CandidateFit* candidate;
+  MetaRegression fit;
+  double p_value;  // for one effect alone, and for the sign that physics gives it
+};
+
+bool is_scaling(const catalogue::Entry& entry) {
+  return entry.info->phase == effects::Phase::modulate && (entry.info->reads & effects::kTemperature) != 0 &&
+         entry.parameters.size() == 1;
+}
+
+// What a unit of the effect's parameter adds to first order, about zero, with the friction of the base fit.
+Eigen::VectorXd slope_of(BalanceData& data, const estimation::Terms& base, const CandidateFit& candidate) {
+  estimation::Terms terms = candidate.model.terms;
+  terms.back().values[0] = 0.0;
+  for (estimation::Term& term : terms)
+    for (const estimation::Term& fitted : base)
+      if (term.id == fitted.id) term.values = fitted.values;
+  const auto on_balance = estimation::terms_on(terms, data.balance(), data.prepared().output_signals);
+  return data.nonlinear_column(terms, on_balance, {terms.size() - 1, 0});
+}
+
+std::vector<Scaling> scalings(const estimation::Identification& base, const SearchedBalance& motor,
+                              const RecordFriction& own) {
+  std::vector<Scaling> all;
+  BalanceData data = *motor.search.data;
+  for (const CandidateFit& candidate : motor.candidates) {
+    const catalogue::Entry& entry = *candidate.model.entry;
+    if (!is_scaling(entry)) continue;
+    Part part{all_of(own.values).records, {}};
+    for (std::size_t j = 0; j < own.parameters.size(); ++j)
+      if (base.terms[own.parameters[j]->ref.term].entry->name() == entry.info->modulates)
+        part.parameters.push_back(static_cast<Eigen::Index>(j));
+    if (part.parameters.empty()) continue;
+    const AsFriction added =
+        as_friction(data, base.terms, own, slope_of(data, base.terms, candidate), motor.search.base.root_weights);
+    Scaling one{&candidate, meta_regression(part(own.values), part(added.added)), 1.0};
+    const effects::ParameterInfo& info = entry.parameters.front();
+    // To first order a large coefficient comes out too large.
+    constexpr double kFirstOrder = 2.0;
+    if (one.fit.freedom > 0.0 && one.fit.coefficient * info.usual > 0.0 &&
+        one.fit.coefficient < kFirstOrder * info.high)
+      one.p_value = numbers::student_t_above(one.fit.freedom, std::abs(one.fit.t));
+    all.push_back(std::move(one));
+  }
+  return all;
+}
+
+// By chance, in one of the effects that were tried.
+double p_value_of_all(const Scaling& one, const std::vector<Scaling>& all) {
+  return std::min(1.0, static_cast<double>(all.size()) * one.p_value);
+}
+
+void list_as_possible(const NamedEffect& name, std::size_t records, double p_value, Diagnosis& result) {
+  std::erase_if(result.possible, [&](const PossibleEffect& p) {
+    return std::any_of(p.group.begin(), p.group.end(), [&](const NamedEffect& n) { return n.effect == name.effect; });
+  });
+  result.possible.push_back(
+      {{name},
+       fmt::format("it shows between records only, and friction of {} records goes with it by chance with p = {:.2g}",
+                   records, p_value),
+       std::nullopt,
+       std::nullopt});
+}
+
+// The candidate's value is that of the records' friction.
+void take_value(const Scaling& one, std::size_t records, double p_value, Candidate& candidate) {
+  for (Estimate& e : candidate.parameters) {
+    const effects::ParameterInfo& info = one.candidate->model.entry->parameters[e.ref.parameter];
+    e.value = std::clamp(one.fit.coefficient, info.low, info.high);
+    e.std = std::abs(one.fit.coefficient / one.fit.t);
+    const double reach = numbers::student_t_quantile(one.fit.freedom, 0.975) * *e.std;
+    e.low = e.value - reach;
+    e.high = e.value + reach;
+  }
+  candidate.admissible = true;
+  candidate.why_not.clear();
+  candidate.p_value = p_value;
+  candidate.note = fmt::format(
+      "Found between records: friction of {} records goes with it (t = {:.3g}, {:.0f} degrees of freedom, p = {:.2g}). "
+      "What else changed from record to record, such as wear-in over time, would look the same: repeat one motion cold "
+      "and warm to make sure.",
+      records, one.fit.t, one.fit.freedom, p_value);
+}
+
+// Share of the variance of the temperature that is within records.
+double share_within_records(const BalanceData& data) {
+  double within = 0.0, sum = 0.0, squares = 0.0, count = 0.0;
+  for (const estimation::RowRange& range : data.records()) {
+    const Record& r = data.prepared().records[range.record];
+    if (!r.has_temperature || r.at_rest) continue;
+    double own_sum = 0.0, own_squares = 0.0;
+    const auto n = static_cast<double>(r.inputs.size());
+    for (std::size_t k = 0; k < r.inputs.size(); ++k) {
+      const double t = r.inputs.temperature_at(k);
+      own_sum += t;
+      own_squares += t * t;
+    }
+    within += own_squares - own_sum * own_sum / n;
+    sum += own_sum;
+    squares += own_squares;
+    count += n;
+  }
+  const double all = squares - sum * sum / std::max(count, 1.0);
+  return all > 0.0 ? within / all : 1.0;
+}
+
+}  // namespace
+
+bool name_scaling(const estimation::Identification& base, const SearchedBalance& motor, Diagnosis& result) {
+  const RecordFriction own = friction_by_record(base, *motor.search.data, kPolicy.fewest_of_scaling);
+  if (own.parameters.empty()) return false;
+  const std::vector<Scaling> all = scalings(base, motor, own);
+  const auto best = std::min_element(all.begin(), all.end(),
+                                     [](const Scaling& a, const Scaling& b) { return a.p_value < b.p_value; });
+  if (best == all.end() || p_value_of_all(*best, all) > kPolicy.wald_p_value) return false;
+  const double p_value = p_value_of_all(*best, all);
+  const NamedEffect name{std::string(best->candidate->model.entry->name()), std::nullopt};
+  const auto at = std::find_if(result.candidates.begin(), result.candidates.end(), [&](const Candidate& c) {
+    return c.effect == name.effect && c.balance == estimation::Balance::motor;
+  });
+  if (at == result.candidates.end()) return false;
+  const std::size_t records = own.records.size();
+  if (p_value > kPolicy.scaling_p_value) {
+    list_as_possible(name, records, p_value, result);
+    return false;
+  }
+  take_value(*best, records, p_value, *at);
+  std::erase_if(result.possible, [&](const PossibleEffect& p) { return p.group.front().effect == name.effect; });
+  std::rotate(result.candidates.begin(), at, at + 1);
+  result.named = {name};
+  result.verdict = Verdict::missing_effect;
+  result.balance = estimation::Balance::motor;
+  result.partial = true;
+  result.between_records = {records, 100.0 * best->fit.explained_share, p_value};
+  return true;
+}
+
+void take_back_unconfirmed_scaling(const estimation::Identification& base, const SearchedBalance& motor,
+                                   Diagnosis& result) {
+  // So much of the signal's variance within records shows the effect there.
+  constexpr double kShownWithin = 0.25;
+  const auto is_open = [&](const NamedEffect& n) {
+    return !n.order && is_scaling(catalogue::get(n.effect)) && !is_confirmed_by_held_out(result, n);
+  };
+  if (result.verdict == Verdict::confusable_effects ||
+      std::none_of(result.named.begin(), result.named.end(), is_open) ||
+      share_within_records(*motor.search.data) > kShownWithin)
+    return;
+  const RecordFriction own = friction_by_record(base, *motor.search.data, 1);
+  const std::vector<Scaling> all = scalings(base, motor, own);
+  std::vector<NamedEffect> kept;
+  for (const NamedEffect& n : result.named) {
+    const auto at = std::find_if(all.begin(), all.end(),
+                                 [&](const Scaling& s) { return s.candidate->model.entry->name() == n.effect; });
+    if (!is_open(n) || at == all.end() || p_value_of_all(*at, all) <= kPolicy.wald_p_value)
+      kept.push_back(n);
+    else
+      list_as_possible(n, own.records.size(), p_value_of_all(*at, all), result);
+  }
+  result.named = std::move(kept);
+}
+
+}  // namespace flexspline::selection

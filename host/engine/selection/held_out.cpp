@@ -1,0 +1,56 @@
+#include "host/engine/selection/held_out.hpp"
+
+#include <fmt/format.h>
+
+#include <cmath>
+
+#include "host/engine/selection/policy.hpp"
+
+namespace flexspline::selection {
+
+HeldOut::HeldOut(const data::Dataset& dataset, const estimation::Identification& fitted, estimation::Balance balance,
+                 const estimation::PreparedData* ready) {
+  for (const data::Experiment& e : dataset.experiments)
+    if (e.role == data::Role::holdout) experiments.push_back(&e);
+  if (experiments.empty()) return;
+  prepared = estimation::prepare_with(experiments, fitted.model.drive, fitted.prepared.pipeline, ready);
+  prepared.output_signals = fitted.prepared.output_signals;
+  data = std::make_unique<BalanceData>(prepared, balance);
+  if (data->empty()) data.reset();
+}
+
+double HeldOut::rmse(const Terms& terms) const {
+  const Eigen::VectorXd residual = estimation::residual_of(*data, terms);
+  return residual.size() > 0 ? std::sqrt(residual.squaredNorm() / static_cast<double>(residual.size())) : 0.0;
+}
+
+namespace {
+
+// Squared error on held-out data with a candidate over that without it, from which on it is contradicted: it grows by
+// what a term must take off; where friction differs from run to run, that of the held-out runs, too, by much more.
+double most_growth(const CrossValidatedFit& base, const CrossValidatedFit& with) {
+  const auto differs = [](const CrossValidatedFit& fit) {
+    return fit.random_effects.std.size() > 0 && fit.random_effects.std.maxCoeff() > 0.0;
+  };
+  return differs(base) || differs(with) ? kPolicy.most_leverage : 1.0 + kPolicy.line_share;
+}
+
+}  // namespace
+
+void check_on_held_out(const HeldOut& held_out, const BalanceSearch& search, std::vector<CandidateFit>& candidates) {
+  constexpr std::size_t kMostRefused = 8;
+  // Of the torsion each record has a zero of its own, which the held-out ones were not fitted for.
+  if (!held_out.data || search.data->balance() != estimation::Balance::motor) return;
+  const double before = held_out.rmse(search.base.terms);
+  for (std::size_t k = 0; k < kMostRefused && !candidates.empty() && passes(candidates.front()); ++k) {
+    CandidateFit& first = candidates.front();
+    const double ratio = held_out.rmse(first.fit.terms) / std::max(before, 1e-300);
+    if (ratio * ratio <= most_growth(search.base, first.fit)) return;
+    first.why_not =
+        fmt::format("the error on experiments that are held out rises by {:.1f} % with it", 100.0 * (ratio - 1.0));
+    first.admissible = false;
+    sort_candidates(search, candidates);
+  }
+}
+
+}  // namespace flexspline::selection

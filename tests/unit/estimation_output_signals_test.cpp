@@ -1,0 +1,90 @@
+// Which balance identifies what, by what is measured at the gear's output: torques and motions that are written down.
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <random>
+
+#include "host/engine/estimation/identify.hpp"
+#include "tests/support/plain_model.hpp"
+
+namespace flexspline::estimation {
+namespace {
+
+using data::Column;
+
+constexpr double kTurn = 6.283185307179586;
+constexpr double kRatio = 50.0, kStiffness = 2e4;                 // N m/rad
+constexpr double kLoad_nm = 4.0, kOffset_nm = 0.9, kStep = 2e-5;  // of the sensor; of the output encoder, rad
+
+struct Sensors {
+  bool has_output_position = false;
+};
+
+// Two records under a load that swings; the sensor of the torque reads `kOffset_nm` too much.
+data::Dataset loaded_axis(const Sensors& sensors) {
+  std::mt19937_64 random(3);
+  std::normal_distribution<double> noise(0.0, 1.0);
+  data::Dataset dataset;
+  for (const double frequency_hz : {0.4, 0.7}) {
+    data::Experiment e;
+    e.name = frequency_hz < 0.5 ? "slow" : "fast";
+    e.sample_s = 2e-3;
+    e.current_hold = data::CurrentHold::none;
+    for (std::size_t k = 0; k < 6000; ++k) {
+      const double t = 2e-3 * static_cast<double>(k), rate = kTurn * frequency_hz;
+      const double q = 30.0 * std::sin(rate * t), w = 30.0 * rate * std::cos(rate * t), a = -rate * rate * q;
+      const double torque = kLoad_nm * std::sin(0.31 * kTurn * t);
+      e.time_s.push_back(t);
+      e[Column::motor_position].push_back(q);
+      e[Column::motor_torque].push_back(1e-4 * a + 1e-3 * w + 0.05 * (w > 0.0 ? 1.0 : -1.0) + torque / kRatio +
+                                        2e-4 * noise(random));
+      e[Column::torque].push_back(torque + kOffset_nm + 1e-3 * noise(random));
+      if (sensors.has_output_position)
+        e[Column::output_position].push_back(kStep * std::round((q / kRatio - torque / kStiffness) / kStep));
+    }
+    e.segments = {{0, e.size()}};
+    dataset.experiments.push_back(std::move(e));
+  }
+  dataset.drive.gear_ratio = kRatio;
+  return dataset;
+}
+
+model::Model with(std::initializer_list<const char*> more) {
+  model::Model model = testing::plain_model();
+  for (const char* name : more)
+    model.effects.push_back(catalogue::blank_effect(catalogue::get(name), data::Axis::rotary));
+  return model;
+}
+
+TEST(SensorOffset, IsIdentifiedOnTheMotorBalanceWhereNoTorsionIsMeasured) {
+  const auto found = identify(loaded_axis({}), with({"torque_offset"}), {});
+  const auto offset = std::find_if(found->estimates.begin(), found->estimates.end(),
+                                   [](const Estimate& e) { return e.effect == "torque_offset"; });
+  ASSERT_NE(offset, found->estimates.end());
+  EXPECT_NEAR(offset->value, kOffset_nm, 0.02 * kOffset_nm);
+  for (const std::string& warning : found->warnings)
+    EXPECT_EQ(warning.find("torque_offset"), std::string::npos) << warning;
+}
+
+TEST(SensorOffset, StaysOnTheTransmissionBalanceWhereATorsionIsMeasured) {
+  const catalogue::Entry& offset = catalogue::get("torque_offset");
+  EXPECT_EQ(identified_on(offset, {.torque = true, .torsion = true}), Balance::transmission);
+  EXPECT_EQ(identified_on(offset, {.torque = true, .torsion = false}), Balance::motor);
+  // A stiffness adds nothing to the motor's balance.
+  EXPECT_EQ(identified_on(catalogue::get("linear_stiffness"), {.torque = true, .torsion = false}),
+            Balance::transmission);
+}
+
+TEST(NoisyTorsion, KeepsItsReversalsWhereAMaskWouldLeaveNothing) {
+  // The torsion is 200 urad in all, so that its rate is far below the noise of a difference of two velocities.
+  const auto found =
+      identify(loaded_axis({.has_output_position = true}), with({"linear_stiffness", "torque_offset"}), {});
+  EXPECT_TRUE(found->prepared.pipeline.keep_torsion_reversals);
+  const auto stiffness = std::find_if(found->estimates.begin(), found->estimates.end(),
+                                      [](const Estimate& e) { return e.effect == "linear_stiffness"; });
+  ASSERT_NE(stiffness, found->estimates.end());
+  EXPECT_NEAR(stiffness->value, kStiffness, 0.05 * kStiffness);
+}
+
+}  // namespace
+}  // namespace flexspline::estimation
