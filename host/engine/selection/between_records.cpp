@@ -125,8 +125,8 @@ std::optional<LawInRange> law_in_range(const estimation::Identification& base, c
 }  // namespace
 
 void name_between_records(const estimation::Identification& base, const SearchedBalance& motor, Diagnosis& result) {
-  if (!result.named.empty() || result.friction_drift.empty()) return;
-  if (name_scaling(base, motor, result)) return;
+  if (result.friction_drift.empty() || result.verdict == Verdict::confusable_effects) return;
+  if (name_scaling(base, motor, result) || !result.named.empty()) return;
   const RecordFriction own = friction_by_record(base, *motor.search.data, kPolicy.fewest_of_trend);
   if (own.parameters.empty() || own.records.size() < kPolicy.fewest_of_trend) return;
   const std::vector<Law> all = laws(base, motor, own);

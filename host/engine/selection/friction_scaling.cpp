@@ -140,6 +140,9 @@ bool name_scaling(const estimation::Identification& base, const SearchedBalance&
   if (best == all.end() || p_value_of_all(*best, all) > kPolicy.wald_p_value) return false;
   const double p_value = p_value_of_all(*best, all);
   const NamedEffect name{std::string(best->candidate->model.entry->name()), std::nullopt};
+  if (std::any_of(result.named.begin(), result.named.end(),
+                  [&](const NamedEffect& n) { return n.effect == name.effect; }))
+    return false;
   const auto at = std::find_if(result.candidates.begin(), result.candidates.end(), [&](const Candidate& c) {
     return c.effect == name.effect && c.balance == estimation::Balance::motor;
   });
@@ -151,8 +154,8 @@ bool name_scaling(const estimation::Identification& base, const SearchedBalance&
   }
   take_value(*best, records, p_value, *at);
   std::erase_if(result.possible, [&](const PossibleEffect& p) { return p.group.front().effect == name.effect; });
-  std::rotate(result.candidates.begin(), at, at + 1);
-  result.named = {name};
+  std::rotate(result.candidates.begin() + std::ssize(result.named), at, at + 1);
+  result.named.push_back(name);
   result.verdict = Verdict::missing_effect;
   result.balance = estimation::Balance::motor;
   result.partial = true;

@@ -9,7 +9,7 @@
 
 namespace flexspline::selection {
 
-// Where nothing is named: names the effect with which the records' friction goes (meta-regression to first order,
+// Names the effect with which the records' friction goes, behind what is named already (meta-regression to first order,
 // Student's t by Knapp and Hartung 2003, times the effects that were tried), or lists it as possible. Returns whether
 // one is named.
 bool name_scaling(const estimation::Identification& base, const SearchedBalance& motor, Diagnosis& result);
