@@ -268,11 +268,11 @@ std::string drift_text(const Drift& drift, const estimation::PreparedData& prepa
   const bool has_temperature = std::any_of(prepared.records.begin(), prepared.records.end(),
                                            [](const estimation::Record& r) { return r.has_temperature; });
   return fmt::format(
-      "{} differs between runs by {:.1f} %, and the model says of no recorded signal why: {} An effect that shows only "
-      "from run to run counts for less then; repeat one motion from time to time",
+      "{} differs between runs by {:.1f} %, which the model does not explain. {} An effect that shows only from run to "
+      "run counts for less then; repeat one motion from time to time",
       drift.group, drift.percent,
-      has_temperature ? "the temperature is recorded, so see whether it is named or possible here."
-                      : "temperature? It is not recorded: log it.");
+      has_temperature ? "The temperature is recorded: see whether an effect of it is named or possible."
+                      : "The usual cause is the temperature, which is not recorded: log it.");
 }
 
 // What to do about a delay of the effort against the motion; empty where it is within what the alignment leaves open.

@@ -220,7 +220,8 @@ std::string why_not_named(const Resampling::FoundTerm& term, bool is_undecided, 
     return fmt::format("the error on experiments that are held out rises by {:.1f} % with it",
                        100.0 * (*term.held_out_ratio - 1.0));
   if (is_undecided && term.frequency >= kPolicy.named_frequency && term.least_by_mask < 1.0 - kPolicy.named_frequency)
-    return fmt::format("only {:.0f} of 100 do either with the reversals or without them", 100.0 * term.least_by_mask);
+    return fmt::format("of those with the reversals, or of those without, only {:.0f} of 100 did",
+                       100.0 * term.least_by_mask);
   if (is_undecided)
     return fmt::format("{:.0f} are needed, {:.0f} where it shows little or behind an unknown structure",
                        100.0 * kPolicy.named_frequency, 100.0 * kPolicy.certain_frequency);
