@@ -9,6 +9,7 @@
 
 #include "host/engine/selection/diagnosis.hpp"
 #include "tests/support/plain_model.hpp"
+#include "tests/support/written_experiment.hpp"
 
 namespace flexspline::selection {
 namespace {
@@ -38,18 +39,13 @@ data::Dataset recorded(const Drive& drive) {
   data::Dataset dataset;
   dataset.drive.gear_ratio = kRatio;
   for (std::size_t r = 0; r < drive.temperature.size(); ++r) {
-    data::Experiment e;
-    e.name = "record-" + std::to_string(r + 1);
-    e.sample_s = 4e-3;
-    e.current_hold = data::CurrentHold::none;
     std::vector<double> rate, amplitude, phase;
     for (int i = 0; i < 4; ++i) {
       rate.push_back(kTurn * (0.15 + 0.5 * draw(random)));
       amplitude.push_back(drive.speed * 25.0 / rate.back());
       phase.push_back(kTurn * draw(random));
     }
-    for (std::size_t k = 0; k < 5000; ++k) {
-      const double t = 4e-3 * static_cast<double>(k);
+    const auto fill = [&](double t, data::Experiment& e) {
       double q = 0.0, w = 0.0, a = 0.0;
       for (std::size_t i = 0; i < rate.size(); ++i) {
         q += amplitude[i] * std::sin(rate[i] * t + phase[i]);
@@ -58,16 +54,14 @@ data::Dataset recorded(const Drive& drive) {
       }
       const double load = drive.load_nm * (0.3 + std::sin(0.23 * kTurn * t));
       const double sign = w > 0.0 ? 1.0 : -1.0;
-      e.time_s.push_back(t);
       e[Column::motor_position].push_back(q);
       e[Column::temperature].push_back(drive.temperature[r] + 0.05 * noise(random));
       e[Column::motor_torque].push_back(1.2e-4 * a + 8e-4 * drive.viscous[r] * w + 0.05 * sign +
                                         drive.drag * w * w * sign + load / kRatio +
                                         drive.mu * std::abs(load) / kRatio * sign + 1e-3 * noise(random));
       if (drive.logs_load) e[Column::load_torque].push_back(load);
-    }
-    e.segments = {{0, e.size()}};
-    dataset.experiments.push_back(std::move(e));
+    };
+    dataset.experiments.push_back(testing::written_experiment("record-" + std::to_string(r + 1), 4e-3, 5000, fill));
   }
   return dataset;
 }

@@ -6,6 +6,7 @@
 
 #include "host/engine/estimation/identify.hpp"
 #include "tests/support/plain_model.hpp"
+#include "tests/support/written_experiment.hpp"
 
 namespace flexspline::estimation {
 namespace {
@@ -26,24 +27,18 @@ data::Dataset loaded_axis(const Sensors& sensors) {
   std::normal_distribution<double> noise(0.0, 1.0);
   data::Dataset dataset;
   for (const double frequency_hz : {0.4, 0.7}) {
-    data::Experiment e;
-    e.name = frequency_hz < 0.5 ? "slow" : "fast";
-    e.sample_s = 2e-3;
-    e.current_hold = data::CurrentHold::none;
-    for (std::size_t k = 0; k < 6000; ++k) {
-      const double t = 2e-3 * static_cast<double>(k), rate = kTurn * frequency_hz;
-      const double q = 30.0 * std::sin(rate * t), w = 30.0 * rate * std::cos(rate * t), a = -rate * rate * q;
-      const double torque = kLoad_nm * std::sin(0.31 * kTurn * t);
-      e.time_s.push_back(t);
-      e[Column::motor_position].push_back(q);
-      e[Column::motor_torque].push_back(1e-4 * a + 1e-3 * w + 0.05 * (w > 0.0 ? 1.0 : -1.0) + torque / kRatio +
-                                        2e-4 * noise(random));
-      e[Column::torque].push_back(torque + kOffset_nm + 1e-3 * noise(random));
-      if (sensors.has_output_position)
-        e[Column::output_position].push_back(kStep * std::round((q / kRatio - torque / kStiffness) / kStep));
-    }
-    e.segments = {{0, e.size()}};
-    dataset.experiments.push_back(std::move(e));
+    const double rate = kTurn * frequency_hz;
+    dataset.experiments.push_back(testing::written_experiment(
+        frequency_hz < 0.5 ? "slow" : "fast", 2e-3, 6000, [&](double t, data::Experiment& e) {
+          const double q = 30.0 * std::sin(rate * t), w = 30.0 * rate * std::cos(rate * t), a = -rate * rate * q;
+          const double torque = kLoad_nm * std::sin(0.31 * kTurn * t);
+          e[Column::motor_position].push_back(q);
+          e[Column::motor_torque].push_back(1e-4 * a + 1e-3 * w + 0.05 * (w > 0.0 ? 1.0 : -1.0) + torque / kRatio +
+                                            2e-4 * noise(random));
+          e[Column::torque].push_back(torque + kOffset_nm + 1e-3 * noise(random));
+          if (sensors.has_output_position)
+            e[Column::output_position].push_back(kStep * std::round((q / kRatio - torque / kStiffness) / kStep));
+        }));
   }
   dataset.drive.gear_ratio = kRatio;
   return dataset;

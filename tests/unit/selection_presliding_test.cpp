@@ -8,6 +8,7 @@
 #include "host/engine/selection/add.hpp"
 #include "host/engine/selection/presliding.hpp"
 #include "tests/support/plain_model.hpp"
+#include "tests/support/written_experiment.hpp"
 
 namespace flexspline::selection {
 namespace {
@@ -25,23 +26,17 @@ data::Dataset swinging() {
   std::normal_distribution<double> noise(0.0, kNoise_nm);
   data::Dataset dataset;
   for (const double frequency_hz : {0.21, 0.34}) {
-    data::Experiment e;
-    e.name = frequency_hz < 0.3 ? "slow" : "fast";
-    e.sample_s = 2e-3;
-    e.current_hold = data::CurrentHold::none;
     double z = 1.0, before = 0.0;
-    for (std::size_t k = 0; k < 6000; ++k) {
-      const double t = 2e-3 * static_cast<double>(k), rate = kTurn * frequency_hz;
-      const double q = 3.0 * std::sin(rate * t), w = 3.0 * rate * std::cos(rate * t);
-      const double end = q >= before ? 1.0 : -1.0;
-      z = end + (z - end) * std::exp(-std::abs(q - before) / kTravel_rad);
-      before = q;
-      e.time_s.push_back(t);
-      e[Column::motor_position].push_back(q);
-      e[Column::motor_torque].push_back(-1e-3 * rate * rate * q + 4e-3 * w + kDry_nm * z + noise(random));
-    }
-    e.segments = {{0, e.size()}};
-    dataset.experiments.push_back(std::move(e));
+    const double rate = kTurn * frequency_hz;
+    dataset.experiments.push_back(testing::written_experiment(
+        frequency_hz < 0.3 ? "slow" : "fast", 2e-3, 6000, [&](double t, data::Experiment& e) {
+          const double q = 3.0 * std::sin(rate * t), w = 3.0 * rate * std::cos(rate * t);
+          const double end = q >= before ? 1.0 : -1.0;
+          z = end + (z - end) * std::exp(-std::abs(q - before) / kTravel_rad);
+          before = q;
+          e[Column::motor_position].push_back(q);
+          e[Column::motor_torque].push_back(-1e-3 * rate * rate * q + 4e-3 * w + kDry_nm * z + noise(random));
+        }));
   }
   return dataset;
 }

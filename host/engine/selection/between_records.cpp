@@ -64,13 +64,12 @@ void take_values(const MetaRegression& fit, const Law& law, double p_value, std:
     e.low = interval.low;
     e.high = interval.high;
   }
-  candidate.admissible = true;
-  candidate.why_not.clear();
+  candidate.admit();
   candidate.p_value = p_value;
   candidate.note = fmt::format(
       "Found between records: it explains {:.0f} % of the variance of their friction ({} records, p = {:.2g}). Its "
-      "values "
-      "are those for that. Within a record the model's own friction fits as well, and differs for other reasons, too: "
+      "values are those for that. Within a record the model's own friction fits as well, and differs for other "
+      "reasons, too: "
       "one record with many speeds would decide.",
       100.0 * fit.explained_share, records, p_value);
 }

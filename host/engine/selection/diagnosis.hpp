@@ -70,6 +70,11 @@ struct Candidate {
   std::vector<estimation::Estimate> parameters;
   bool admissible = true;
   std::string why_not;  // where it is not admissible
+  // It is named for another reason than its own fit.
+  void admit() {
+    admissible = true;
+    why_not.clear();
+  }
   std::vector<std::string> cannot_distinguish;
   std::vector<ConfoundingReason> confounding_reasons;
   std::optional<Evidence> evidence;  // of named effects

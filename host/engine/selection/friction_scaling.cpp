@@ -97,8 +97,7 @@ void take_value(const Scaling& one, std::size_t records, double p_value, Candida
     e.low = e.value - reach;
     e.high = e.value + reach;
   }
-  candidate.admissible = true;
-  candidate.why_not.clear();
+  candidate.admit();
   candidate.p_value = p_value;
   candidate.note = fmt::format(
       "Found between records: friction of {} records goes with it (t = {:.3g}, {:.0f} degrees of freedom, p = {:.2g}). "

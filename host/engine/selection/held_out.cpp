@@ -39,8 +39,7 @@ double most_growth(const CrossValidatedFit& base, const CrossValidatedFit& with)
 
 void check_on_held_out(const HeldOut& held_out, const BalanceSearch& search, std::vector<CandidateFit>& candidates) {
   constexpr std::size_t kMostRefused = 8;
-  // Of the torsion each record has a zero of its own, which the held-out ones were not fitted for.
-  if (!held_out.data || search.data->balance() != estimation::Balance::motor) return;
+  if (!held_out.data) return;
   const double before = held_out.rmse(search.base.terms);
   for (std::size_t k = 0; k < kMostRefused && !candidates.empty() && passes(candidates.front()); ++k) {
     CandidateFit& first = candidates.front();

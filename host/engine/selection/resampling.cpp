@@ -377,8 +377,7 @@ void name_stable(SearchedBalance& chosen, Diagnosis& result) {
       c.rmse_cv_after = result.base_rmse_cv;
       at = result.candidates.insert(result.candidates.end(), std::move(c));
     }
-    at->admissible = true;
-    at->why_not.clear();
+    at->admit();
     for (const NamedEffect& other : result.named)
       if (is_group && !is(*at, other)) at->cannot_distinguish.push_back(other.effect);
     std::rotate(result.candidates.begin() + begin, at, at + 1);
