@@ -115,12 +115,13 @@ TEST(MachinePlant, EveryLawOfFrictionAddsWhatItsEquationSaysAtAConstantSpeed) {
 
 TEST(MachinePlant, FrictionOfTheLoadAndSaturationAddWhatTheirEquationsSay) {
   Plant loaded = plain_plant();
+  loaded.gear.ratio = 4.0;
   Inputs in = inputs_of(3.0, loaded, [](double t) { return t < 0.5 ? 50.0 * t * t : 50.0 * (t - 0.25); });
-  in.output_torque_nm.assign(in.output_torque_nm.size(), 0.2);
+  in.output_torque_nm.assign(in.output_torque_nm.size(), 0.8);
   const double before = simulate(loaded, in).back().acting_current_a;
   loaded.friction.load_coefficient = 0.1;
   const double constant = loaded.electric.torque_constant_nm_a;
-  EXPECT_NEAR(constant * (simulate(loaded, in).back().acting_current_a - before), 0.1 * 0.2, 2e-4);
+  EXPECT_NEAR(constant * (simulate(loaded, in).back().acting_current_a - before), 0.1 * 0.8 / 4.0, 2e-4);
 
   Plant saturating = plain_plant();
   saturating.electric.saturation_1_a2 = 0.1;
@@ -151,6 +152,25 @@ TEST(MachinePlant, TwoInertiasOnTheirGearSwingAtTheirNaturalFrequency) {
   const double expected_hz = std::sqrt(5000.0 * (1.0 / 0.4 + 1.0 / rotor)) / kTurn_rad;
   ASSERT_GT(crossings, 10);
   EXPECT_NEAR((crossings - 1) / (last - first), expected_hz, 0.002 * expected_hz);
+}
+
+TEST(MachinePlant, TheGearIsAsStiffAsItsLinearCubicAndHystereticPartsTogether) {
+  Plant p = free_plant();
+  p.rotor_inertia_kgm2 = 1e9;  // clamped
+  set_gear(p, 50.0, 5000.0, 0.0);
+  p.gear.cubic_stiffness_nm_rad3 = 5e8;
+  p.gear.hysteresis_nm = 2.0;
+  p.gear.hysteresis_stiffness_nm_rad = 2500.0;
+  p.load = {0.1, 60.0, 0.0, 0.0};
+  Inputs in = inputs_of(4.0, p);
+  for (std::size_t k = 0; k < in.output_torque_nm.size(); ++k)
+    in.output_torque_nm[k] = 12.0 * std::min(1.0, static_cast<double>(k) / kControlRate_hz / 2.5);
+  const Sample end = simulate(p, in).back();
+  const double torsion = end.angle_rad / 50.0 - end.output_angle_rad;
+  const double expected =
+      5000.0 * torsion + 5e8 * torsion * torsion * torsion + 2.0 * (1.0 - std::exp(-torsion * 2500.0 / 2.0));
+  EXPECT_NEAR(end.gear_torque_nm, 12.0, 1e-3);
+  EXPECT_NEAR(expected, 12.0, 1e-3);
 }
 
 TEST(MachinePlant, BelowTheCoulombFrictionItYieldsAsPreslidingSays) {
@@ -190,16 +210,18 @@ TEST(MachinePlant, TheCurrentFollowsAStepOverItsTimeConstantAndTheTorqueComesAft
   }
 }
 
-TEST(MachinePlant, GravityAndTorsionBalanceAtRest) {
+TEST(MachinePlant, GravityAndTorsionBalanceAtRestWithTheErrorOfTheGear) {
   Plant p = plain_plant();
   set_gear(p, 100.0, 1e4, 5.0);
+  p.gear.kinematic_error_rad = {2.0, 1e-4, -2e-4};
   p.load = {0.5, 0.5, 0.0, 10.0};
   p.controller.bandwidth_rad_s = 20.0;
   const double angle = 100.0 * 0.5;
   const Log log = simulate(p, inputs_of(4.0, p, [&](double) { return angle; }));
   const Sample& end = log.back();
+  const double error = 1e-4 * std::cos(2.0 * end.angle_rad) - 2e-4 * std::sin(2.0 * end.angle_rad);
   EXPECT_NEAR(end.gear_torque_nm, 10.0 * std::sin(end.output_angle_rad), 0.02);
-  EXPECT_NEAR(end.angle_rad / 100.0 - end.output_angle_rad, end.gear_torque_nm / 1e4, 1e-5);
+  EXPECT_NEAR(end.angle_rad / 100.0 - end.output_angle_rad + error, end.gear_torque_nm / 1e4, 1e-5);
 }
 
 TEST(MachineSignals, TheLowPassHalvesItsCornerWithoutALag) {
@@ -225,7 +247,7 @@ TEST(MachineSignals, LeastSquaresLeavesWhatIsOrthogonal) {
   EXPECT_NEAR(rms_after_least_squares({one, ramp, ramp}, target), 0.3 / std::sqrt(2.0), 1e-12);
 }
 
-TEST(Machines, WhatIsHiddenRaisesTheErrorAsWantedAndIsWorthNothingInTheTrueModel) {
+TEST(Machines, WhatIsHiddenRaisesTheErrorAsWantedWhereThatIsPlausible) {
   int close = 0, hidden = 0;
   for (std::uint64_t seed = 500; seed < 508; ++seed) {
     const Machine m = machine_of(seed, kKinds[seed % kKinds.size()], false);
@@ -260,7 +282,9 @@ TEST(Machines, WhereAnEffectOfTheTemperatureCanBeHiddenTheLogHasTheTemperature) 
 
 TEST(Machines, OneThatTheControllerDoesNotHoldIsDrawnAgain) {
   Machine m = draw_machine(44, 0, Kind::scara, false);
-  EXPECT_FALSE(tune_controller(m) && fit_size(m));
+  ASSERT_EQ(m.hidden->effect, "torque_constant_saturation");
+  ASSERT_TRUE(tune_controller(m));  // at a usual size
+  EXPECT_FALSE(fit_size(m));
   EXPECT_GT(machine_of(44, Kind::scara, false).draw, 0);
 }
 
