@@ -99,7 +99,25 @@ void add_presliding(const Machine& m, const Accountant& a, std::vector<Imperfect
   out.push_back({"friction around reversals", a.excess(Balance::motor, reversal, Samples::all), names});
 }
 
-void add_signals(const Machine& m, const Accountant& a, const std::vector<Run>& runs, std::vector<Imperfection>& out) {
+void add_encoders(const Machine& m, const Accountant& a, const std::vector<Run>& runs, std::vector<Imperfection>& out) {
+  std::vector<Run> at_motor = runs, at_output = runs;
+  const EncoderParameters& e = m.plant.encoder;
+  for (std::size_t i = 0; i < runs.size(); ++i)
+    for (std::size_t k = 0; k < runs[i].log.size(); ++k) {
+      const Sample& now = runs[i].log[k];
+      at_motor[i].measured.angle_rad[k] -= e.eccentricity_rad * std::sin(now.angle_rad + e.eccentricity_phase_rad);
+      if (m.sensors.output_encoder) at_output[i].measured.output_angle_rad[k] -= output_eccentricity_rad(m, now);
+    }
+  // An error of the angle once per turn is an acceleration, or a torsion, once per turn.
+  out.push_back({"eccentric encoder", a.excess_over(Balance::motor, at_motor), {{"torque_ripple", 1.0}}});
+  if (!m.base.stiffness) return;
+  const std::vector<CatalogueName> per_turn = {{"kinematic_error", 1.0}};
+  out.push_back({"eccentric encoder, torsion", a.excess_over(Balance::transmission, at_motor), per_turn});
+  // Over less than a turn of the output it is an angle that hardly changes.
+  out.push_back({"eccentric output encoder", a.excess_over(Balance::transmission, at_output), {{"torsion_zero"}}});
+}
+
+void add_signals(const Machine& m, const Accountant& a, std::vector<Imperfection>& out) {
   const double ratio = m.plant.gear.ratio;
   const Term late = [&](const Run& run) {
     const Signal difference =
@@ -108,17 +126,6 @@ void add_signals(const Machine& m, const Accountant& a, const std::vector<Run>& 
   };
   if (!a.is_hidden("current_delay"))
     out.push_back({"delay of the current", a.excess(Balance::motor, late), {{"current_delay"}}});
-  std::vector<Run> clean = runs;
-  const EncoderParameters& e = m.plant.encoder;
-  for (Run& run : clean)
-    for (std::size_t k = 0; k < run.log.size(); ++k)
-      run.measured.angle_rad[k] -= e.eccentricity_rad * std::sin(run.log[k].angle_rad + e.eccentricity_phase_rad);
-  // An error of the angle once per turn is an acceleration, or a torsion, once per turn.
-  out.push_back({"eccentric encoder", a.excess_over(Balance::motor, clean), {{"torque_ripple", 1.0}}});
-  if (m.base.stiffness) {
-    const std::vector<CatalogueName> names = {{"kinematic_error", 1.0}};
-    out.push_back({"eccentric encoder, torsion", a.excess_over(Balance::transmission, clean), names});
-  }
   const Term link = [&](const Run& run) {
     const double rate = m.sensors.sample_hz;
     const Signal lag =
@@ -152,7 +159,8 @@ Account account_of(const Machine& machine, const std::vector<Run>& runs) {
   add_ripples(machine, a, out.imperfections);
   add_friction(machine, a, out.imperfections);
   add_presliding(machine, a, out.imperfections);
-  add_signals(machine, a, runs, out.imperfections);
+  add_encoders(machine, a, runs, out.imperfections);
+  add_signals(machine, a, out.imperfections);
   return out;
 }
 

@@ -109,6 +109,9 @@ struct Measured {
   Signal current_a, angle_rad, output_angle_rad, torque_nm, load_torque_nm, temperature_c, velocity_rpm;
 };
 
+// By how much the output encoder reads too much there.
+double output_eccentricity_rad(const Machine& machine, const Sample& sample);
+
 Measured measure(const Machine& machine, const Record& record, const Log& log);
 
 }  // namespace flexspline::worlds::machines

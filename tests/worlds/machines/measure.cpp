@@ -33,8 +33,8 @@ void measure_output(const Machine& machine, const Log& log, Dice& dice, Measured
   for (std::size_t k = 0; k < log.size(); ++k) {
     const Sample& now = log[k];
     if (s.output_encoder) {
-      const double eccentric = s.output_eccentricity_rad * std::sin(now.output_angle_rad + 1.0);
-      m.output_angle_rad.push_back(rounded(now.output_angle_rad + eccentric + 0.3 * count * dice.normal(), count));
+      const double seen = now.output_angle_rad + output_eccentricity_rad(machine, now);
+      m.output_angle_rad.push_back(rounded(seen + 0.3 * count * dice.normal(), count));
     }
     if (s.torque) {
       const double noise = s.torque_noise_nm * (0.8 * dice.normal() + 0.4 * slow[k]);
@@ -49,6 +49,10 @@ void measure_output(const Machine& machine, const Log& log, Dice& dice, Measured
 }
 
 }  // namespace
+
+double output_eccentricity_rad(const Machine& machine, const Sample& sample) {
+  return machine.sensors.output_eccentricity_rad * std::sin(sample.output_angle_rad + 1.0);
+}
 
 Measured measure(const Machine& machine, const Record& record, const Log& log) {
   const Sensors& s = machine.sensors;

@@ -136,6 +136,8 @@ Json plant_of(const Machine& m) {
           {"viscous_nms_rad", p.friction.viscous_nms_rad},
           {"presliding", name_of(m.presliding)},
           {"presliding_rad", p.friction.presliding_rad},
+          {"encoder_eccentricity_rad", p.encoder.eccentricity_rad},
+          {"output_eccentricity_rad", m.sensors.output_eccentricity_rad},
           {"sample_hz", m.sensors.sample_hz},
           {"jitter", m.sensors.jitter},
           {"stamps_are_true", m.sensors.stamps_are_true},
