@@ -6,7 +6,7 @@ namespace flexspline::effects {
 struct AngleDependentFriction : Stateless {
   static constexpr Description kInfo{
       .name = "angle_dependent_friction",
-      .reads = kMotorMotion | kMotorAngle | kBothDirections,
+      .reads = kMotorMotion | kDirection | kMotorAngle | kBothDirections,
       .equation = "s(w) (a cos(k q) + b sin(k q))",
       .shows_over = "motor angle, by direction",
       .source = "Armstrong-Helouvry, friction over position",

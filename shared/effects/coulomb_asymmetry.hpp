@@ -6,7 +6,7 @@ namespace flexspline::effects {
 struct CoulombAsymmetry : Stateless {
   static constexpr Description kInfo{
       .name = "coulomb_asymmetry",
-      .reads = kMotorMotion | kBothDirections,
+      .reads = kMotorMotion | kDirection | kBothDirections,
       .equation = "dTs while moving",
       .shows_over = "bias while moving",
       .source = "report eq. 27, 62",

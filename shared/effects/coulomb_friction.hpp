@@ -6,7 +6,7 @@ namespace flexspline::effects {
 struct CoulombFriction : Stateless {
   static constexpr Description kInfo{
       .name = "coulomb_friction",
-      .reads = kMotorMotion,
+      .reads = kMotorMotion | kDirection,
       .equation = "Ts s(w)",
       .shows_over = "direction",
       .source = "report eq. 27, 48",

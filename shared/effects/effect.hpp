@@ -52,6 +52,7 @@ enum Signals : std::uint16_t {
   kTemperature = 128,
   kTorqueInput = 256,      // where effort is given as torque or force, not as current
   kBothDirections = 1024,  // motion both ways: with one direction it is only a part of that direction's friction
+  kDirection = 2048,       // of the motor's velocity, or the state of presliding that is in its place
   kTorqueScale = 512,      // needs something that fixes the torque scale: a known parameter, or a loaded torque sensor
 };
 
@@ -116,8 +117,8 @@ struct Description {
   std::string_view family{};
   std::string_view contains{};  // effects whose torque it can represent as a part of its own
   // Waves over the angle whose phase depends on the direction where effort and motion are apart in time, or behind
-  // presliding: they leave a torque like this one. So it is no candidate beside a wave of its order, and none where
-  // several effects are missing, of which some may be such waves.
+  // presliding: they leave a torque like this one. So it is no candidate where such a wave of its order is in the
+  // model, or was chosen before it.
   std::string_view phase_error_of{};
   // The meaning of negative amplitudes, and their meaning over a wide range of velocity, as it is another law then.
   std::string_view negative_means{};

@@ -6,7 +6,7 @@ namespace flexspline::effects {
 struct LoadDependentFriction : Stateless {
   static constexpr Description kInfo{
       .name = "load_dependent_friction",
-      .reads = kMotorMotion | kTorque,
+      .reads = kMotorMotion | kDirection | kTorque,
       .equation = "mu abs(T)/N s(w)",
       .shows_over = "torque, by direction",
       .source = "mesh friction, efficiency",

@@ -6,7 +6,7 @@ namespace flexspline::effects {
 struct LoadDependentStiction : Stateless {
   static constexpr Description kInfo{
       .name = "load_dependent_stiction",
-      .reads = kMotorMotion | kTorque,
+      .reads = kMotorMotion | kDirection | kTorque,
       .equation = "mu abs(T)/N s(w) exp(-(w/vs)^2)",
       .shows_over = "torque, by direction, at low velocity",
       .source = "boundary lubrication under load; BAM's model M4",

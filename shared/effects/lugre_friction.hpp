@@ -6,7 +6,7 @@ namespace flexspline::effects {
 struct LugreFriction {
   static constexpr Description kInfo{
       .name = "lugre_friction",
-      .reads = kMotorMotion | kMotorAngle,
+      .reads = kMotorMotion | kDirection | kMotorAngle,
       .equation =
           "replaces coulomb_friction, stribeck: s0 z + s1 z', z' = w - s0 abs(w) z/g, g = Fc + (Fs-Fc) "
           "exp(-(w/vs)^2)",

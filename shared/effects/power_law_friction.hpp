@@ -6,7 +6,7 @@ namespace flexspline::effects {
 struct PowerLawFriction : Stateless {
   static constexpr Description kInfo{
       .name = "power_law_friction",
-      .reads = kMotorMotion,
+      .reads = kMotorMotion | kDirection,
       .equation = "c abs(w/wref)^d s(w), 0 < d < 1, wref = rated velocity",
       .shows_over = "velocity, concave",
       .source = "grease shear thinning",

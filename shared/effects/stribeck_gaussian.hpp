@@ -6,7 +6,7 @@ namespace flexspline::effects {
 struct StribeckGaussian : Stateless {
   static constexpr Description kInfo{
       .name = "stribeck_gaussian",
-      .reads = kMotorMotion,
+      .reads = kMotorMotion | kDirection,
       .equation = "s(w) F exp(-(w/vs)^2), F by direction",
       .shows_over = "low velocity",
       .source = "Tustin; report eq. 53, 85",

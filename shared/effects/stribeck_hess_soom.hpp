@@ -6,7 +6,7 @@ namespace flexspline::effects {
 struct StribeckHessSoom : Stateless {
   static constexpr Description kInfo{
       .name = "stribeck_hess_soom",
-      .reads = kMotorMotion,
+      .reads = kMotorMotion | kDirection,
       .equation = "s(w) F/(1+(w/vs)^2), F by direction",
       .shows_over = "low velocity",
       .source = "Hess and Soom; report eq. 52",

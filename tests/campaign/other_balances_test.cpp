@@ -4,6 +4,7 @@
 
 #include <fmt/format.h>
 
+#include <algorithm>
 #include <cmath>
 
 #include "host/engine/selection/add.hpp"
@@ -42,6 +43,30 @@ TEST(OtherBalances, TellASmallErrorOfTheGear) {
 }
 TEST(OtherBalances, TellARippleOfTheTorqueSensorFromOneOfTheMotor) {
   expect_named("torque_sensor_ripple", 1.0, 0.0);
+}
+
+// A stiffness that hardens, and a ripple of the motor: each balance lacks an effect of its own.
+TEST(OtherBalances, AreEachNamedWhatTheyLack) {
+  std::size_t both = 0;
+  constexpr std::uint64_t kSeeds = 4;
+  for (std::uint64_t seed = kFirstSeed + 200; seed < kFirstSeed + 200 + kSeeds; ++seed) {
+    const HiddenTwin twin("cubic_stiffness", 2.0, seed, 0.0);
+    model::Model base = twin.base;
+    std::erase_if(base.effects, [](const model::Effect& e) { return e.type == "coulomb_asymmetry"; });
+    const selection::Diagnosis d = selection::diagnose(twin.dataset, base, {});
+    fmt::print("seed {}: {}\n", seed, names(d));
+    const auto has = [&](const char* name) {
+      return std::any_of(d.named.begin(), d.named.end(), [&](const auto& n) { return n.effect == name; });
+    };
+    both += has("cubic_stiffness") && has("coulomb_asymmetry") ? 1 : 0;
+    EXPECT_EQ(d.verdict, selection::Verdict::missing_effect);
+    EXPECT_LE(d.named.size(), 2U) << names(d);
+    for (const selection::Candidate& c : d.candidates)
+      if (c.effect == "cubic_stiffness") {
+        EXPECT_EQ(c.balance, estimation::Balance::transmission);
+      }
+  }
+  EXPECT_EQ(both, kSeeds);
 }
 
 TEST(OtherBalances, GiveTheWaveOfTheGearItsPhase) {

@@ -75,7 +75,8 @@ TEST(Formula, IsEvaluatedAtEverySampleAsWrittenHere) {
     formula.add(parameters, 1.0, {&in, 1}, &alone);
     EXPECT_NEAR(alone, expected, 1e-12);
   }
-  EXPECT_EQ(formula.reads(), effects::kMotorMotion | effects::kTorque | effects::kTorsion | effects::kMotorAngle);
+  EXPECT_EQ(formula.reads(),
+            effects::kMotorMotion | effects::kTorque | effects::kTorsion | effects::kMotorAngle | effects::kDirection);
 }
 
 TEST(Formula, ErrorsSayWhatIsWrongAndWhichSignalsThereAre) {

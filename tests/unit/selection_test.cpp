@@ -158,6 +158,7 @@ TEST(RecordDifferences, ResidualIsWhatTheBestLinearUnbiasedPredictionLeaves) {
   const FrictionRandomEffects differences{{1}, Eigen::VectorXd::Constant(1, variance), noise};
   Setting setting;
   setting.rows = r.rows;
+  setting.sign_width = r.rows.cols();
   setting.runs = {{0, 0, 30, 0.01}, {0, 30, 60, 0.01}};
   TermFit fitted;
   fitted.columns = {0};
@@ -166,13 +167,15 @@ TEST(RecordDifferences, ResidualIsWhatTheBestLinearUnbiasedPredictionLeaves) {
   const Eigen::MatrixXd V =
       noise / weight * Eigen::MatrixXd::Identity(60, 60) + variance * r.rows.col(1) * r.rows.col(1).transpose();
   const Eigen::VectorXd truth = std::sqrt(weight) * (noise / weight) * V.llt().solve(raw);
-  EXPECT_LT((weighted_residual(setting, fitted, {weight}, differences) - truth).norm(), 1e-9 * truth.norm());
+  EXPECT_LT((weighted_residual(setting, Direction::sign, fitted, {weight}, differences) - truth).norm(),
+            1e-9 * truth.norm());
 }
 
 // Two records of three blocks with ten samples each.
 Setting blocks_of(const Eigen::MatrixXd& rows) {
   Setting setting;
   setting.rows = rows;
+  setting.sign_width = rows.cols();
   const Eigen::Index p = rows.cols();
   setting.products.resize(p * p, 6);
   for (Eigen::Index b = 0; b < 6; ++b) {
@@ -189,7 +192,7 @@ TEST(Halves, HoldTheProductsOfTheirSamplesWithTheDifferencesOfEachRecordEliminat
   const std::vector<double> weights = {2.0, 0.5};
   const std::vector<std::vector<std::uint8_t>> in = {{1, 0, 0, 1, 1, 0}, {1, 1, 1, 0, 0, 0}};
   const FrictionRandomEffects differences{{1}, Eigen::VectorXd::Constant(1, 0.3), 0.5};
-  const std::vector<HalfPair> pairs = halves_of(setting, nullptr, weights, in, differences);
+  const std::vector<HalfPair> pairs = halves_of(setting, weights, in, differences);
   ASSERT_EQ(pairs.size(), 2U);
   for (std::size_t i = 0; i < 2; ++i)
     for (const std::size_t half : {std::size_t{0}, std::size_t{1}}) {
@@ -224,6 +227,21 @@ TEST(RegressorTable, WithFewerTermsKeepsTheColumnsOfTheModelAndOfThese) {
   EXPECT_EQ(small.terms[0].name, "term 2");
   EXPECT_EQ(small.terms[0].columns.front(), 2);
   EXPECT_EQ(small.differences.front(), 4);
+}
+
+// What an error of a wave's phase leaves is not chosen behind it, nor the reverse.
+TEST(ForwardSelection, DoesNotChooseWhatAnErrorOfThePhaseOfAChosenWaveLeaves) {
+  Random r = random_table(400, 3, 5);
+  r.rows.col(5) = 2.0 * r.rows.col(2) + 1.5 * r.rows.col(3) + 0.1 * r.rows.col(5);
+  const HalfData all = half_of(r.rows);
+  const auto chosen = [&] {
+    std::vector<int> terms;
+    for (const SelectionStep& s : select_forward(r.table, all, all, {0.01, 1.0}, {}).steps) terms.push_back(s.term);
+    return terms;
+  };
+  EXPECT_EQ(chosen(), (std::vector<int>{0, 1}));
+  r.table.terms[1].excludes = {r.table.terms[0].name};
+  EXPECT_EQ(chosen(), (std::vector<int>{0}));
 }
 
 TEST(ForwardSelection, FitsAreThoseOfLeastSquares) {

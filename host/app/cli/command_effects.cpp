@@ -69,7 +69,7 @@ json entry_json(const Entry& entry) {
   for (const std::string_view name : catalogue::confused_with(entry)) confused.push_back(name);
   return {{"name", entry.name()},
           {"number", entry.id},
-          {"balance", output::balance_name(entry.info->balance)},
+          {"balance", catalogue::balance_name(entry.info->balance)},
           {"phase", phase_name(entry.info->phase)},
           {"equation", entry.info->equation},
           {"parameters", std::move(parameters)},
@@ -97,7 +97,7 @@ void describe(const Entry& entry, Console& console) {
   console.line(output::wrapped(info.explanation));
   console.line();
   console.line(
-      output::wrapped(fmt::format("On the {} balance: {}", output::balance_name(info.balance), info.equation)));
+      output::wrapped(fmt::format("On the {} balance: {}", catalogue::balance_name(info.balance), info.equation)));
   output::Table table({"parameter", "", "unit", "(linear axis)", "", "usual"}, "lllllr");
   for (const effects::ParameterInfo& p : entry.parameters) {
     const char* how = p.kind == effects::Kind::linear      ? "estimated"
@@ -197,7 +197,7 @@ int run(const EffectsOptions& options, Console& console) {
   } else {
     output::Table table({"effect", "balance", "torque or change", "usual", "shows over"}, "lllll");
     for (const Entry& entry : catalogue::all()) {
-      table.row({std::string(entry.name()), output::balance_name(entry.info->balance),
+      table.row({std::string(entry.name()), catalogue::balance_name(entry.info->balance),
                  std::string(entry.info->equation), usual(entry), std::string(entry.info->shows_over)});
       list.push_back(entry_json(entry));
     }

@@ -50,7 +50,7 @@ std::optional<FoldedTable> folded(const catalogue::ResolvedEffect& resolved,
   };
   FoldedTable result;
   model::Definition d;
-  d.balance = kBalanceNames[static_cast<std::size_t>(entry.info->balance)];
+  d.balance = catalogue::balance_name(entry.info->balance);
   if (resolved.effect->definition) d.balance = resolved.effect->definition->balance;
   d.variable = std::string(variable.name);
   d.times_direction = single->times_direction;

@@ -16,6 +16,7 @@
 #include "host/engine/estimation/balance_fit.hpp"
 #include "host/engine/estimation/identify.hpp"
 #include "host/engine/estimation/in_parallel.hpp"
+#include "host/engine/estimation/modelled_torque.hpp"
 #include "host/engine/estimation/record_constants.hpp"
 #include "host/physics/catalogue/user_defined_effect.hpp"
 #include "host/physics/simulation/simulation.hpp"
@@ -63,6 +64,7 @@ class Comparer {
       result_.experiments.push_back({e.name, e.role, {}});
     }
     prepared_ = estimation::prepare_all(dataset, model_, options);
+    estimation::take_torque_where_read(prepared_, terms_);
     result_.pipeline = prepared_.pipeline;
   }
 

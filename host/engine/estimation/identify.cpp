@@ -10,15 +10,13 @@
 
 #include "host/engine/estimation/evidence.hpp"
 #include "host/engine/estimation/form_on.hpp"
+#include "host/engine/estimation/modelled_torque.hpp"
 #include "host/engine/estimation/record_constants.hpp"
 #include "host/engine/estimation/variable_projection.hpp"
 #include "host/physics/catalogue/user_defined_effect.hpp"
 
 namespace flexspline::estimation {
-namespace {
 
-// Fits a balance; a parameter whose best value is not possible (negative friction) is held at its bound and the others
-// are fitted again. Returns the fit and what was held at a bound, which is among the warnings.
 std::pair<BalanceFit, std::vector<ParameterRef>> fit_within_bounds(BalanceData& data, Terms& terms, data::Axis axis,
                                                                    std::vector<std::string>& warnings) {
   std::vector<ParameterRef> held;
@@ -47,6 +45,8 @@ std::pair<BalanceFit, std::vector<ParameterRef>> fit_within_bounds(BalanceData& 
     held.push_back(*outside);
   }
 }
+
+namespace {
 
 // Parameters of a fit that act on the balance of other data as well, with their places in the fit's covariance. Of what
 // the fit does not identify, other balances are not used either.
@@ -292,6 +292,11 @@ void fit(Identification& result) {
   constexpr int kRounds = 3;
   for (int round = 0; round < kRounds && refine_record_constants(result); ++round) again();
   if (learn_tables(result)) again();
+  // The load that effects read has to be known before they can be fitted, and changes with them.
+  for (int round = 0; round < kRounds && take_torque_where_read(result.prepared, result.terms); ++round) {
+    for (BalanceData& data : result.data) data = BalanceData(result.prepared, data.balance());
+    again();
+  }
 }
 
 std::unique_ptr<Identification> identify(const data::Dataset& dataset, const model::Model& model,

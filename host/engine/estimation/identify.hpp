@@ -61,6 +61,10 @@ std::unique_ptr<Identification> identify(const data::Dataset& dataset, const mod
 std::unique_ptr<Identification> form(const data::Dataset& dataset, const model::Model& model,
                                      const PipelineOptions& options);
 void fit(Identification& identification);
+// Fits a balance; a parameter whose best value is not possible (negative friction) is held at its bound and the others
+// are fitted again. Returns the fit and what was held at a bound, which is among the warnings.
+std::pair<BalanceFit, std::vector<ParameterRef>> fit_within_bounds(BalanceData& data, Terms& terms, data::Axis axis,
+                                                                   std::vector<std::string>& warnings);
 void assemble(Identification& identification);
 
 // Where data set and model differ in what they know of the drive by more than 0.1 %: the model wins, with a warning.

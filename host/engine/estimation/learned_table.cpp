@@ -188,9 +188,7 @@ model::Effect effect_of(const TableSpecification& specification, const model::Ta
   model::Definition definition;
   for (const effects::VariableInfo& v : effects::kVariables)
     if (v.variable == specification.variable) definition.variable = std::string(v.name);
-  definition.balance = specification.balance == Balance::motor          ? "motor"
-                       : specification.balance == Balance::transmission ? "transmission"
-                                                                        : "load";
+  definition.balance = catalogue::balance_name(specification.balance);
   definition.times_direction = specification.times_direction;
   definition.table = table;
   effect.definition = std::move(definition);

@@ -6,6 +6,7 @@
 #include <cmath>
 #include <limits>
 #include <random>
+#include <tuple>
 #include <utility>
 
 #include "host/engine/estimation/form_on.hpp"
@@ -237,7 +238,12 @@ void search_from_several_starts(Identification& identification, int starts, std:
       identification.terms[ref.term].values[ref.parameter] = term.values[ref.parameter];
       identification.terms[ref.term].stated[ref.parameter] = 1;
     }
-    fit = fit_balance(data, identification.terms);
+    std::vector<std::string> warnings;
+    std::tie(fit, identification.held[b]) =
+        fit_within_bounds(data, identification.terms, identification.model.drive.axis, warnings);
+    for (std::string& warning : warnings)
+      if (std::ranges::find(identification.warnings, warning) == identification.warnings.end())
+        identification.warnings.push_back(std::move(warning));
   }
 }
 

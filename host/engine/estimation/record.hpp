@@ -88,6 +88,8 @@ struct Record {
   ScaledSignal effort;         // motor torque (or force), aligned to the instants of the positions; empty: not measured
   std::vector<double> torque;  // as measured
   std::vector<double> load_torque;
+  // Of inputs.torque, where the model's weight and inertia were put on top of it; see modelled_torque.hpp.
+  std::optional<std::vector<double>> torque_without_load;
   double torsion_zero_rad = 0.0;  // by how much the torsion was moved, see record_constants.hpp
   bool has_motor_motion = false;
   bool has_output_motion = false;  // measured, or locked

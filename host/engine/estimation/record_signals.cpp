@@ -73,6 +73,8 @@ class InputBlock {
         in.acceleration = slope_[k - first_];
       });
     }
+  }
+  void copy_motor_direction() {
     copy_direction(kMotor, &Inputs::direction, [&](std::size_t k) { return s_.velocity_at(k); });
   }
 
@@ -154,6 +156,7 @@ void RecordSignals::copy(std::size_t first, std::span<Inputs> to, unsigned reads
     in.elapsed = sample_s;
   });
   if (reads & (kMotorMotion | kMotorAngle)) block.copy_motor();
+  if (reads & kDirection) block.copy_motor_direction();
   if (reads & (kOutputMotion | kOutputAngle)) block.copy_output();
   if (reads & kTorsion) block.copy_torsion();
   if (reads & kTorque)

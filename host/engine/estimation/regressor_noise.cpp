@@ -10,6 +10,7 @@
 #include "host/common/signals/butterworth.hpp"
 #include "host/engine/estimation/in_parallel.hpp"
 #include "host/engine/estimation/least_squares.hpp"
+#include "host/engine/estimation/modelled_torque.hpp"
 #include "host/engine/estimation/side_motion.hpp"
 #include "host/engine/estimation/variable_projection.hpp"
 #include "host/engine/estimation/zero_order_hold.hpp"
@@ -96,6 +97,7 @@ std::vector<Linearised> of_others(const Identification& found, const std::vector
                                   const Pipeline& pipeline, const std::vector<std::vector<Eigen::Index>>& identified) {
   PreparedData prepared = prepare_with(experiments, found.prepared.drive, pipeline);
   prepared.output_signals = found.prepared.output_signals;
+  take_torque_where_read(prepared, found.terms);
   for (std::size_t i = 0; i < prepared.records.size(); ++i) {
     Record& record = prepared.records[i];
     const Record& original = found.prepared.records[i];

@@ -13,6 +13,24 @@
 #include "host/physics/catalogue/order_causes.hpp"
 
 namespace flexspline::selection {
+
+bool moves_both_ways(const BalanceData& data) {
+  int forward_only = 0, backward_only = 0;
+  for (const auto& range : data.records()) {
+    const estimation::Record& r = data.prepared().records[range.record];
+    if (r.at_rest) return true;
+    double forward = 0.0, backward = 0.0;
+    for (const std::size_t k : r.rows[estimation::index(data.balance())].samples) {
+      const double v = r.direction_variable(data.balance(), k);
+      (v > 0.0 ? forward : backward) += v != 0.0 ? 1.0 : 0.0;
+    }
+    if (std::min(forward, backward) >= kPolicy.least_direction_share * (forward + backward) && forward + backward > 0.0)
+      return true;
+    (forward > backward ? forward_only : backward_only) += 1;
+  }
+  return std::min(forward_only, backward_only) >= kPolicy.fewest_one_way_records;
+}
+
 namespace {
 
 using effects::Kind;
@@ -57,25 +75,6 @@ bool knows_torque_scale(const BalanceData& data, const Terms& terms) {
 bool covered(const Terms& terms, const catalogue::Entry& entry) {
   return std::any_of(terms.begin(), terms.end(),
                      [&](const Term& t) { return catalogue::names_contain(t.entry->info->replaces, entry.name()); });
-}
-
-// Some record moves in both directions (each a tenth of its samples), or is at rest, or there are several records of
-// each direction. Else differences between directions are confounded with differences between records.
-bool moves_both_ways(const BalanceData& data) {
-  int forward_only = 0, backward_only = 0;
-  for (const auto& range : data.records()) {
-    const estimation::Record& r = data.prepared().records[range.record];
-    if (r.at_rest) return true;
-    double forward = 0.0, backward = 0.0;
-    for (const std::size_t k : r.rows[estimation::index(data.balance())].samples) {
-      const double v = r.direction_variable(data.balance(), k);
-      (v > 0.0 ? forward : backward) += v != 0.0 ? 1.0 : 0.0;
-    }
-    if (std::min(forward, backward) >= kPolicy.least_direction_share * (forward + backward) && forward + backward > 0.0)
-      return true;
-    (forward > backward ? forward_only : backward_only) += 1;
-  }
-  return std::min(forward_only, backward_only) >= kPolicy.fewest_one_way_records;
 }
 
 bool visible(const BalanceData& data, const Terms& terms, const catalogue::Entry& entry) {
@@ -165,18 +164,6 @@ std::vector<double> likely_orders(const BalanceData& data, const catalogue::Entr
   return orders;
 }
 
-// The model has a wave of this order of which the effect is what an error of the phase leaves, or the reverse.
-bool has_phase_error(const Terms& terms, const catalogue::Entry& entry, std::optional<double> order) {
-  return order && std::any_of(terms.begin(), terms.end(), [&](const Term& t) {
-           const auto given = std::find_if(t.entry->parameters.begin(), t.entry->parameters.end(),
-                                           [](const auto& p) { return p.kind == Kind::given; });
-           return given != t.entry->parameters.end() &&
-                  t.values[static_cast<std::size_t>(given - t.entry->parameters.begin())] == *order &&
-                  (catalogue::names_contain(entry.info->phase_error_of, t.entry->name()) ||
-                   catalogue::names_contain(t.entry->info->phase_error_of, entry.name()));
-         });
-}
-
 std::size_t free_count(const Terms& terms) {
   std::size_t count = 0;
   for (const Term& t : terms)
@@ -198,6 +185,17 @@ bool states_a_torque(const Terms& terms) {
     for (std::size_t p = 0; p < t.known.size(); ++p)
       if (t.known[p] && t.entry->parameters[p].kind == Kind::linear && t.values[p] != 0.0) return true;
   return false;
+}
+
+bool has_phase_error(const Terms& terms, const catalogue::Entry& entry, std::optional<double> order) {
+  return order && std::any_of(terms.begin(), terms.end(), [&](const Term& t) {
+           const auto given = std::find_if(t.entry->parameters.begin(), t.entry->parameters.end(),
+                                           [](const auto& p) { return p.kind == Kind::given; });
+           return given != t.entry->parameters.end() &&
+                  t.values[static_cast<std::size_t>(given - t.entry->parameters.begin())] == *order &&
+                  (catalogue::names_contain(entry.info->phase_error_of, t.entry->name()) ||
+                   catalogue::names_contain(t.entry->info->phase_error_of, entry.name()));
+         });
 }
 
 std::vector<double> possible_orders(const catalogue::Entry& entry, const model::Drive& drive) {

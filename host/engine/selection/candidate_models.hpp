@@ -34,9 +34,15 @@ std::vector<CandidateModel> candidate_models(const estimation::BalanceData& data
 // give beyond.
 std::vector<double> possible_orders(const catalogue::Entry& entry, const model::Drive& drive);
 
+// The model has a wave of this order of which the effect is what an error of the phase leaves, or the reverse.
+bool has_phase_error(const estimation::Terms& terms, const catalogue::Entry& entry, std::optional<double> order);
+
 // Values of a nonlinear parameter that a search tries first; their columns are cached.
 inline constexpr std::size_t kGridPoints = 6;
 
+// Some record moves in both directions (each a tenth of its samples), or is at rest, or there are several records of
+// each direction. Else differences between directions are confounded with differences between records.
+bool moves_both_ways(const estimation::BalanceData& data);
 // Whether these signals can show an effect that this model may be given.
 bool may_be_seen(const estimation::BalanceData& data, const estimation::Terms& terms, const catalogue::Entry& entry);
 

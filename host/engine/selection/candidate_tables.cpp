@@ -1,10 +1,9 @@
 #include "host/engine/selection/candidate_tables.hpp"
 
 #include <algorithm>
-#include <array>
 #include <cmath>
 
-#include "host/engine/estimation/in_parallel.hpp"
+#include "host/engine/estimation/modelled_torque.hpp"
 #include "host/engine/selection/modelled_torque.hpp"
 #include "host/engine/selection/presliding.hpp"
 
@@ -44,30 +43,6 @@ estimation::PreparedData without_held_out(estimation::PreparedData prepared) {
   std::erase_if(prepared.records,
                 [](const estimation::Record& r) { return r.experiment->role == data::Role::holdout; });
   return prepared;
-}
-
-// Places of the terms of a table that the other has, too.
-std::vector<int> common_terms(const RegressorTable& table, const RegressorTable& other) {
-  std::vector<int> common;
-  for (std::size_t t = 0; t < table.terms.size(); ++t)
-    if (std::any_of(other.terms.begin(), other.terms.end(), [&](const CandidateTerm& o) {
-          return o.name == table.terms[t].name && o.entry == table.terms[t].entry && o.values == table.terms[t].values;
-        }))
-      common.push_back(static_cast<int>(t));
-  return common;
-}
-
-// Whether an effect that corrects the effort can be seen depends on what the model makes of the effort, so that one
-// table may lack it. Both get the same terms in the same order: the columns of a term have one place in both.
-void keep_common_terms(RegressorTable& sign, RegressorTable& presliding) {
-  const std::vector<int> of_sign = common_terms(sign, presliding), of_presliding = common_terms(presliding, sign);
-  if (of_sign.size() == sign.terms.size() && of_presliding.size() == presliding.terms.size()) return;
-  for (const CandidateTerm& term : sign.terms)
-    if (term.entry && std::none_of(of_sign.begin(), of_sign.end(),
-                                   [&](int t) { return sign.terms[static_cast<std::size_t>(t)].entry == term.entry; }))
-      sign.not_visible.push_back(term.entry);
-  sign = with_terms(sign, of_sign);
-  presliding = with_terms(presliding, of_presliding);
 }
 
 // The travel of presliding with which the model alone leaves least, and shorter and longer ones that the data can show;
@@ -119,20 +94,10 @@ CandidateTables make_tables(const std::vector<const data::Experiment*>& experime
   const double highest_hz = tables.bandwidth.highest_hz;
   estimation::PreparedData prepared = prepare(experiments, drive, highest_hz, policy);
   tables.torque_has_noise = take_noise_off_torque(prepared) > 0;
-  if (!prepared.output_signals.torque) take_torque_from_load(prepared, terms);
+  estimation::take_torque_from_load(prepared, terms);
   const std::optional<PreslidingTravels> travels = best_presliding_travels(prepared, terms, balance, policy);
-  std::array<RegressorTable, 2> made;
-  estimation::in_parallel(travels ? 2 : 1, [&](std::size_t i) {
-    made[i] = make_regressor_table(prepared, balance, terms, i == 0 ? Direction::sign : Direction::presliding, travels,
-                                   highest_hz, policy);
-  });
-  tables.sign = std::move(made[0]);
-  if (tables.sign.model_columns == 0) return tables;
-  if (travels) {
-    tables.presliding_travel = travels->state;
-    tables.presliding = std::move(made[1]);
-    keep_common_terms(tables.sign, *tables.presliding);
-  }
+  tables.table = make_regressor_table(prepared, balance, terms, travels, highest_hz, policy);
+  if (tables.table.model_columns == 0) return tables;
   for (double f = prepared.pipeline.row_cutoff_hz; f > kWider * highest_hz; f *= 0.5)
     for (const bool mask : {false, true}) tables.settings.emplace_back(f, mask);
   for (std::size_t b = 0; b < policy.bandwidths; ++b)

@@ -12,11 +12,8 @@ namespace flexspline::selection {
 
 struct CandidateTables {
   Bandwidth bandwidth;
-  RegressorTable sign;  // without model columns: nothing can be chosen
-  // The presliding state that fits best in the place of the sign of the velocity; nothing: none can be shown.
-  std::optional<RegressorTable> presliding;
-  bool torque_has_noise = false;   // of the sensor, white, in a record: terms read the modelled torque there
-  double presliding_travel = 0.0;  // rad of the motor
+  RegressorTable table;           // without model columns: nothing can be chosen
+  bool torque_has_noise = false;  // of the sensor, white, in a record: terms read the modelled torque there
   std::vector<std::pair<double, bool>> settings;  // bandwidth in Hz, reversals left out
 
   // Whether a term can be seen at a bandwidth: waves below it, and above the motion's bandwidth waves alone.

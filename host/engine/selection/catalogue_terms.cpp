@@ -3,7 +3,10 @@
 
 #include <algorithm>
 #include <cmath>
+#include <map>
 
+#include "host/common/algebra/decompositions.hpp"
+#include "host/engine/estimation/in_parallel.hpp"
 #include "host/engine/estimation/variable_projection.hpp"
 #include "host/engine/selection/candidate_models.hpp"
 #include "host/engine/selection/table_builder.hpp"
@@ -13,6 +16,7 @@ namespace {
 
 using effects::Kind;
 using effects::Phase;
+using estimation::BalanceData;
 using estimation::ParameterRef;
 using estimation::Terms;
 
@@ -20,13 +24,29 @@ using estimation::Terms;
 constexpr double kPlacebos[] = {1.27, 2.73, 3.29, 4.71, 5.31, 6.73, 8.27, 9.71, 11.29, 13.73, 16.27, 19.71};
 constexpr double kFewestCycles = 2.0;
 
-// An effect with the model that has it, last.
+// An effect at one value of its nonlinear parameters, with the model that has it, last.
 struct Extension {
   const catalogue::Entry& entry;
   std::optional<double> order;
   Terms terms;
-  double highest_hz = 0.0;  // of its order
-  std::size_t added() const { return terms.size() - 1; }
+  double highest_hz = 0.0;    // of its order
+  std::size_t nonlinear = 0;  // parameters that are searched over
+
+  const estimation::Term& added() const { return terms.back(); }
+  // No drive has such an order. It competes with the others and is never named.
+  bool is_placebo() const { return order && *order != std::round(*order); }
+  bool modulates() const { return entry.info->phase == Phase::modulate; }
+  bool is_of_effort() const { return (entry.info->reads & effects::kCurrent) != 0 && !entry.has_state; }
+  bool reads_direction() const {
+    return modulates() || is_of_effort() || (entry.info->reads & effects::kDirection) != 0;
+  }
+  // Parameters that its columns belong to: those of what scales another effect are nonlinear.
+  std::vector<ParameterRef> parameters() const {
+    std::vector<ParameterRef> refs;
+    for (std::size_t p = 0; p < added().values.size(); ++p)
+      if (modulates() ? added().free_nonlinear(p) : added().free_linear(p)) refs.push_back({terms.size() - 1, p});
+    return refs;
+  }
 };
 
 // Not proportional to the other, and not constant.
@@ -58,125 +78,200 @@ std::vector<std::optional<double>> orders_of(const catalogue::Entry& entry, cons
   return orders;
 }
 
-// The column of a parameter over the current that the model's effort is.
-Eigen::VectorXd from_model_current(const TableBuilder& builder, const catalogue::Entry& entry, std::size_t parameter) {
-  const auto& constants = builder.prepared().constants;
-  const Eigen::VectorXd& effort = builder.effort;
-  std::vector<effects::Inputs<catalogue::Real>> in(static_cast<std::size_t>(effort.size()));
+// Columns of parameters over the current that the model's effort is.
+Eigen::MatrixXd from_model_current(const DirectedData& from, const catalogue::Entry& entry,
+                                   const std::vector<ParameterRef>& parameters) {
+  const auto& constants = from.prepared.constants;
+  std::vector<effects::Inputs<catalogue::Real>> in(static_cast<std::size_t>(from.effort.size()));
   for (std::size_t k = 0; k < in.size(); ++k)
-    in[k].current = effort[static_cast<Eigen::Index>(k)] / constants.torque_constant;
-  std::vector<double> unit(entry.parameters.size(), 0.0);
-  unit[parameter] = 1.0;
-  Eigen::VectorXd column = Eigen::VectorXd::Zero(effort.size());
-  entry.real.torque(unit.data(), constants, builder.data.balance(), in, column.data());
-  return column;
+    in[k].current = from.effort[static_cast<Eigen::Index>(k)] / constants.torque_constant;
+  Eigen::MatrixXd columns = Eigen::MatrixXd::Zero(from.effort.size(), std::ssize(parameters));
+  for (std::size_t j = 0; j < parameters.size(); ++j) {
+    std::vector<double> unit(entry.parameters.size(), 0.0);
+    unit[parameters[j].parameter] = 1.0;
+    entry.real.torque(unit.data(), constants, from.data.balance(), in,
+                      columns.col(static_cast<Eigen::Index>(j)).data());
+  }
+  return columns;
 }
 
-// What scales another effect: slopes by its nonlinear parameters.
-void add_modulation(TableBuilder& builder, const Extension& e) {
-  CandidateTerm term = term_of(e.entry, e.order);
-  const estimation::Term& added = e.terms.back();
-  const auto on = estimation::terms_on(e.terms, builder.data.balance(), builder.prepared().output_signals);
-  for (std::size_t p = 0; p < added.values.size(); ++p)
-    if (added.free_nonlinear(p)) {
-      term.columns.push_back(builder.add(builder.data.nonlinear_column(e.terms, on, {e.added(), p})));
-      term.low.push_back(e.entry.parameters[p].low);
+// `data` is a copy of that of `from`.
+Eigen::MatrixXd columns_of(const Extension& e, const DirectedData& from, BalanceData& data) {
+  const std::vector<ParameterRef> parameters = e.parameters();
+  if (e.modulates()) {
+    const auto on = estimation::terms_on(e.terms, data.balance(), from.prepared.output_signals);
+    return data.nonlinear_columns(e.terms, on, parameters);
+  }
+  return e.is_of_effort() ? from_model_current(from, e.entry, parameters) : data.columns(e.terms, parameters);
+}
+
+// The columns of all extensions, made on all cores.
+std::vector<TableBuilder::Made> columns_of(const std::vector<Extension>& extensions, const TableBuilder& builder) {
+  constexpr std::size_t kParts = 8;
+  std::vector<TableBuilder::Made> made(extensions.size());
+  estimation::in_parallel(kParts, [&](std::size_t part) {
+    BalanceData sign = builder.sign.data;
+    std::optional<BalanceData> presliding;
+    if (builder.presliding) presliding = builder.presliding->data;
+    for (std::size_t i = part; i < extensions.size(); i += kParts) {
+      made[i].sign = columns_of(extensions[i], builder.sign, sign);
+      if (presliding && extensions[i].reads_direction())
+        made[i].presliding = columns_of(extensions[i], *builder.presliding, *presliding);
     }
-  term.values = added.values;
-  builder.table.terms.push_back(std::move(term));
+  });
+  return made;
 }
 
-// Bounds the coefficient of a term that corrects the effort by what is plausible at its peaks; false where the effort
-// has no peaks that would show it.
-bool bound_at_peaks(const TableBuilder& builder, CandidateTerm& term) {
-  const Eigen::VectorXd& effort = builder.effort;
-  const Eigen::VectorXd& column = builder.columns[static_cast<std::size_t>(term.columns.front())];
+// The largest coefficient that is plausible at the peaks of the effort, of a column that corrects it; nothing where the
+// effort has no peaks that would show it.
+std::optional<double> most_at_peaks(const TableBuilder& builder, const Eigen::VectorXd& column) {
+  const Eigen::VectorXd& effort = builder.sign.effort;
   std::vector<double> efforts, ratios;
   for (Eigen::Index k = 0; k < effort.size(); ++k) efforts.push_back(std::abs(effort[k]));
   const double peak = quantile(efforts, 0.99);
-  if (peak < builder.policy.least_effort_range * quantile(efforts, 0.5)) return false;
+  if (peak < builder.policy.least_effort_range * quantile(efforts, 0.5)) return std::nullopt;
   for (Eigen::Index k = 0; k < effort.size(); ++k)
     if (std::abs(effort[k]) >= peak) ratios.push_back(std::abs(column[k] / effort[k]));
-  term.most_at_peak = builder.policy.most_of_effort / std::max(quantile(ratios, 0.5), 1e-300);
-  return true;
+  return builder.policy.most_of_effort / std::max(quantile(ratios, 0.5), 1e-300);
 }
 
-// A term at the values that its nonlinear parameters have.
-void add_source(TableBuilder& builder, const Extension& e, std::size_t nonlinear) {
+void add_term(TableBuilder& builder, const Extension& e, TableBuilder::Made columns) {
   const effects::Description& info = *e.entry.info;
-  const estimation::Term& added = e.terms.back();
   CandidateTerm term = term_of(e.entry, e.order);
-  term.nonlinear = nonlinear;
-  term.values = added.values;
+  term.nonlinear = e.nonlinear;
+  term.values = e.added().values;
   term.highest_hz = e.highest_hz;
-  // No drive has such an order. It competes with the others and is never named.
-  term.is_placebo = e.order && *e.order != std::round(*e.order);
+  term.is_placebo = e.is_placebo();
   if (term.is_placebo) {
     term.entry = nullptr;
     term.name = "placebo " + term.name;
   }
-  term.sum_is_positive = info.replaces.empty() && nonlinear > 0 && e.entry.count(Kind::linear) == 2;
-  std::vector<ParameterRef> refs;
-  for (std::size_t p = 0; p < added.values.size(); ++p)
-    if (added.free_linear(p)) refs.push_back({e.added(), p});
-  bool corrects_effort = false;
-  const Eigen::MatrixXd own = builder.data.columns(e.terms, refs);
-  for (std::size_t j = 0; j < refs.size(); ++j) {
-    Eigen::VectorXd column = own.col(static_cast<Eigen::Index>(j));
-    if ((info.reads & effects::kCurrent) != 0 && !e.entry.has_state) {
-      column = from_model_current(builder, e.entry, refs[j].parameter);
-      corrects_effort = info.reads == effects::kCurrent && is_curved(column, builder.effort);
-    }
-    term.columns.push_back(builder.add(std::move(column)));
-    term.low.push_back(e.entry.parameters[refs[j].parameter].low);
-    term.high.push_back(e.entry.parameters[refs[j].parameter].high);
+  term.sum_is_positive = info.replaces.empty() && e.nonlinear > 0 && e.entry.count(Kind::linear) == 2;
+  if (info.reads == effects::kCurrent && is_curved(columns.sign.rightCols(1), builder.sign.effort)) {
+    const std::optional<double> most = most_at_peaks(builder, columns.sign.col(0));
+    if (!most) return builder.table.not_visible.push_back(&e.entry);
+    term.most_at_peak = *most;
   }
-  if (term.columns.empty()) return;
-  if (corrects_effort && !bound_at_peaks(builder, term)) {
-    builder.table.not_visible.push_back(&e.entry);
-    return;
+  term.columns = builder.add(std::move(columns));
+  for (const ParameterRef& ref : e.parameters()) {
+    term.low.push_back(e.entry.parameters[ref.parameter].low);
+    if (!e.modulates()) term.high.push_back(e.entry.parameters[ref.parameter].high);
   }
   builder.table.terms.push_back(std::move(term));
 }
 
-void add_effect(TableBuilder& builder, Extension e) {
-  if (e.entry.info->phase == Phase::modulate) return add_modulation(builder, e);
-  if (e.entry.info->reads & effects::kCurrent && e.entry.count(Kind::linear) == 0) return;  // delay, saturation
+// An effect at each value of its nonlinear parameter, if it has one; nothing where it has several, or no column.
+void append_values(Extension e, BalanceData& data, std::vector<Extension>& all) {
+  if (e.parameters().empty()) return;
+  if (e.modulates()) return all.push_back(std::move(e));
   estimation::Term& added = e.terms.back();
   std::vector<std::size_t> free_nonlinear;
   for (std::size_t p = 0; p < added.values.size(); ++p)
     if (added.free_nonlinear(p)) free_nonlinear.push_back(p);
   if (free_nonlinear.size() > 1) return;
-  if (free_nonlinear.empty()) return add_source(builder, e, 0);
-  const estimation::ParameterRange range = estimation::parameter_range(builder.data, added, free_nonlinear[0]);
+  if (free_nonlinear.empty()) return all.push_back(std::move(e));
+  e.nonlinear = 1;
+  const estimation::ParameterRange range = estimation::parameter_range(data, added, free_nonlinear[0]);
   for (const double value : estimation::parameter_grid(range, kGridPoints)) {
     added.values[free_nonlinear[0]] = value;
-    add_source(builder, e, 1);
+    all.push_back(e);
   }
 }
 
-}  // namespace
-
-void add_catalogue_terms(TableBuilder& builder, const Motion& motion) {
-  const Balance balance = builder.data.balance();
-  const bool collapsed = !builder.prepared().output_signals.torque && balance == Balance::motor;
+std::vector<Extension> extensions_of(const TableBuilder& builder, const Motion& motion) {
+  BalanceData& data = builder.sign.data;
+  const model::Drive& drive = builder.sign.prepared.drive;
+  const bool collapsed = !builder.sign.prepared.output_signals.torque && data.balance() == Balance::motor;
+  std::vector<Extension> all;
   for (const catalogue::Entry& entry : catalogue::all()) {
     const effects::Description& info = *entry.info;
-    if (entry.identified_on() != balance && !(collapsed && info.balance == Balance::load)) continue;
+    if (entry.identified_on() != data.balance() && !(collapsed && info.balance == Balance::load)) continue;
     if (info.phase == Phase::shift || entry.has_state || entry.definition) continue;  // states: see presliding
-    // Where several effects are missing, the phases of waves among them leave such a wave.
-    if (!info.phase_error_of.empty()) continue;
-    if (!may_be_seen(builder.data, builder.terms, entry)) continue;
-    for (const std::optional<double>& order : orders_of(entry, builder.prepared().drive, motion)) {
+    if (!may_be_seen(data, builder.terms, entry)) continue;
+    for (const std::optional<double>& order : orders_of(entry, drive, motion)) {
+      if (has_phase_error(builder.terms, entry, order)) continue;
       Extension e{entry, order, {}, order ? *order * motion.typical_speed / motion.turn : 0.0};
       try {
         e.terms = extend(builder.terms, entry, order);
       } catch (const model::ModelError&) {
         continue;
       }
-      add_effect(builder, std::move(e));
+      append_values(std::move(e), data, all);
     }
   }
+  return all;
+}
+
+// The columns of the model that are fitted on, with either direction of friction: an orthonormal basis, zero on samples
+// that are held out.
+Eigen::MatrixXd basis_of_model(const TableBuilder& builder, const Eigen::VectorXd& fitted_on) {
+  const Eigen::Index rows = builder.table.target.size();
+  const std::size_t own = builder.columns.size(), presliding = builder.presliding_columns.size();
+  Eigen::MatrixXd all(rows, static_cast<Eigen::Index>(own + presliding));
+  for (std::size_t j = 0; j < own; ++j) all.col(static_cast<Eigen::Index>(j)) = builder.columns[j];
+  for (std::size_t j = 0; j < presliding; ++j)
+    all.col(static_cast<Eigen::Index>(own + j)) = builder.presliding_columns[j];
+  all = fitted_on.asDiagonal() * all;
+  for (auto column : all.colwise()) column /= std::max(column.norm(), 1e-300);
+  return algebra::PivotedQr(all, 1e-7).span();
+}
+
+// Which extensions compete: of waves over the angle, of each effect and of placebos likewise, the orders that take most
+// off what the model leaves of all data. The others would cost most of the time.
+std::vector<std::uint8_t> with_largest_waves(const std::vector<Extension>& extensions,
+                                             const std::vector<TableBuilder::Made>& columns,
+                                             const TableBuilder& builder) {
+  const RegressorTable& table = builder.table;
+  Eigen::VectorXd fitted_on = Eigen::VectorXd::Zero(table.target.size());
+  for (const Run& run : table.runs)
+    if (table.held_out[run.record] == 0) fitted_on.segment(run.first, run.last - run.first).setOnes();
+  const Eigen::MatrixXd basis = basis_of_model(builder, fitted_on);
+  const auto orthogonal = [&](Eigen::MatrixXd x) -> Eigen::MatrixXd {
+    x = fitted_on.asDiagonal() * x;
+    return x - basis * (basis.transpose() * x);
+  };
+  const Eigen::VectorXd residual = orthogonal(table.target);
+  std::vector<std::uint8_t> kept(extensions.size(), 1);
+  std::map<std::pair<const catalogue::Entry*, bool>, std::vector<std::pair<double, std::size_t>>> waves;
+  for (std::size_t i = 0; i < extensions.size(); ++i) {
+    const Extension& e = extensions[i];
+    if (!e.order) continue;
+    const Eigen::MatrixXd own = orthogonal(columns[i].sign);
+    const double taken = (own * algebra::PivotedQr(own, 1e-7).solve(residual)).squaredNorm();
+    waves[{&e.entry, e.is_placebo()}].emplace_back(-taken, i);
+  }
+  for (auto& [effect, list] : waves) {
+    std::sort(list.begin(), list.end());
+    for (std::size_t k = builder.policy.orders_resampled; k < list.size(); ++k) kept[list[k].second] = 0;
+  }
+  return kept;
+}
+
+// Terms from `first` on that are what an error of another one's phase leaves.
+void exclude_phase_errors(RegressorTable& table, std::size_t first) {
+  for (std::size_t a = first; a < table.terms.size(); ++a)
+    for (std::size_t b = first; b < table.terms.size(); ++b) {
+      CandidateTerm &left = table.terms[a], &wave = table.terms[b];
+      if (!left.entry || !wave.entry || !left.order || left.order != wave.order) continue;
+      if (!catalogue::names_contain(left.entry->info->phase_error_of, wave.entry->name())) continue;
+      left.excludes.push_back(wave.name);
+      wave.excludes.push_back(left.name);
+    }
+}
+
+}  // namespace
+
+void add_catalogue_terms(TableBuilder& builder, const Motion& motion) {
+  const std::vector<Extension> extensions = extensions_of(builder, motion);
+  std::vector<TableBuilder::Made> columns = columns_of(extensions, builder);
+  const std::vector<std::uint8_t> kept = with_largest_waves(extensions, columns, builder);
+  const std::size_t first = builder.table.terms.size();
+  for (std::size_t i = 0; i < extensions.size(); ++i)
+    if (kept[i] != 0)
+      add_term(builder, extensions[i], std::move(columns[i]));
+    else if (!extensions[i].is_placebo())
+      builder.table.smaller_waves.emplace_back(&extensions[i].entry, *extensions[i].order);
+  exclude_phase_errors(builder.table, first);
 }
 
 }  // namespace flexspline::selection

@@ -16,6 +16,7 @@
 #include "host/engine/selection/disturbances.hpp"
 #include "host/engine/selection/friction_scaling.hpp"
 #include "host/engine/selection/held_out.hpp"
+#include "host/engine/selection/named_on_balances.hpp"
 #include "host/engine/selection/other_balance_evidence.hpp"
 #include "host/engine/selection/policy.hpp"
 #include "host/engine/selection/record_cross_validation.hpp"
@@ -146,86 +147,19 @@ std::vector<SearchedBalance> search_balances(estimation::Identification& base, c
 
 // The balance whose named effect scores best; where none is named, the one that is highest above its floor. A torsion
 // that is hardly above its noise shows errors of the encoders before anything else, so that its balance comes last.
-SearchedBalance& most_significant(std::vector<SearchedBalance>& all) {
-  const auto importance = [](const SearchedBalance& e) {
+SearchedBalance& most_significant(std::vector<SearchedBalance>& all, const std::optional<Resampling>& by_resampling) {
+  const auto importance = [&](const SearchedBalance& e) {
     const BalanceData& data = *e.search.data;
     const bool is_noisy =
         data.balance() == estimation::Balance::transmission && data.prepared().pipeline.keep_torsion_reversals;
-    if (e.names_one()) return (is_noisy ? 1e9 : 2e9) + e.candidates.front().score();
+    const bool is_motor = data.balance() == estimation::Balance::motor;
+    const bool names_one = is_motor && by_resampling ? names_any(*by_resampling, e) : e.names_one();
+    if (names_one && !e.candidates.empty()) return (is_noisy ? 1e9 : 2e9) + e.candidates.front().score();
     return e.floor.rmse ? e.search.base.rmse() / *e.floor.rmse : 0.0;
   };
   return *std::max_element(all.begin(), all.end(), [&](const SearchedBalance& a, const SearchedBalance& b) {
     return importance(a) < importance(b);
   });
-}
-
-// Puts the effect to name first. Returns the name of an effect that it is named for as well, if there is one.
-std::string choose_named(SearchedBalance& chosen) {
-  auto& list = chosen.candidates;
-  if (auto instead = backward_elimination(chosen.search, list.front())) {
-    std::erase_if(list, [&](const CandidateFit& t) {
-      return t.model.entry == instead->model.entry && t.model.order == instead->model.order;
-    });
-    list.insert(list.begin(), std::move(*instead));
-  }
-  const CandidateFit& first = list.front();
-  if (!is_another_law(first, *chosen.search.data)) return {};
-  const std::string_view other = first.model.entry->info->wide_negative_is;
-  const auto law =
-      std::find_if(list.begin(), list.end(), [&](const CandidateFit& t) { return t.model.entry->name() == other; });
-  if (law == list.end() || law->gain.score <= kPolicy.named_score) return {};
-  // The formula that leaves the other effects of the model their physical meaning comes first.
-  if (!law->admissible) return std::string(other);
-  std::string alias(first.model.entry->name());
-  std::rotate(list.begin(), law, law + 1);
-  return alias;
-}
-
-// Whether resampling could not distinguish a candidate from the first one, and it leaves a similar error on all data.
-bool is_in_group(const std::optional<Resampling>& resampling, const CandidateFit& first, const CandidateFit& t) {
-  if (!resampling) return false;
-  const auto group = resampling->found_group({std::string(first.model.entry->name()), first.model.order});
-  return t.gain.chi2_percent >= kPolicy.similar * first.gain.chi2_percent &&
-         100.0 - t.gain.chi2_percent <= kPolicy.similar_left * (100.0 - first.gain.chi2_percent) &&
-         std::any_of(group.begin(), group.end(), [&](const NamedEffect& n) {
-           return n.effect == t.model.entry->name() && n.order == t.model.order;
-         });
-}
-
-void name_effects(const SearchedBalance& chosen, const std::string& alias, Diagnosis& result) {
-  const auto& list = chosen.candidates;
-  const auto is = [](const Candidate& c, const NamedEffect& n) { return c.effect == n.effect && c.order == n.order; };
-  for (const CandidateFit& t : list) {
-    const NamedEffect name{std::string(t.model.entry->name()), t.model.order};
-    const double times_left =
-        std::pow(t.fit.rmse_cv_fixed_effects() / std::max(list.front().fit.rmse_cv_fixed_effects(), 1e-300), 2);
-    const bool near =
-        (t.score() >= list.front().score() - kPolicy.confounded_margin && times_left <= kPolicy.similar_left) ||
-        is_in_group(result.resampling, list.front(), t);
-    // A law with more parameters and the same error is not confounded with the simpler one, as it contains it. One with
-    // a slightly smaller error is.
-    const bool wider = t.model.added > list.front().model.added && !t.leads;
-    if ((passes(t) && !wider && (near || is_scale_confounded(chosen.search, list.front(), t))) || name.effect == alias)
-      result.named.push_back(name);
-    // Its order is not identifiable, and it may also be the other effect.
-    if (!t.order_is_not_identifiable || !near || t.model.entry == list.front().model.entry) continue;
-    result.named.push_back(name);
-    for (Candidate& c : result.candidates)
-      if (is(c, name)) c.admit();
-  }
-  result.verdict = result.named.size() > 1 ? Verdict::confusable_effects : Verdict::missing_effect;
-  for (Candidate& c : result.candidates) {
-    if (std::none_of(result.named.begin(), result.named.end(), [&](const NamedEffect& n) { return is(c, n); }))
-      continue;
-    for (const NamedEffect& other : result.named)
-      if (!is(c, other)) c.cannot_distinguish.push_back(other.effect);
-  }
-  // The named effect is first in the list, even where a refused candidate has a higher score.
-  auto begin = result.candidates.begin();
-  for (const NamedEffect& n : result.named) {
-    const auto at = std::find_if(begin, result.candidates.end(), [&](const Candidate& c) { return is(c, n); });
-    if (at != result.candidates.end()) std::rotate(begin++, at, at + 1);
-  }
 }
 
 void explain_orders(const model::Drive& drive, Diagnosis& result) {
@@ -356,7 +290,7 @@ Diagnosis diagnose_at(const data::Dataset& dataset, const model::Model& model, c
   const bool decides = result.resampling && resampling_decides(*result.resampling, *motor);
   const bool is_motor_first = base->prepared.pipeline.keep_torsion_reversals && motor != all.end() &&
                               (decides ? names_any(*result.resampling, *motor) : motor->names_one());
-  SearchedBalance& chosen = is_motor_first ? *motor : most_significant(all);
+  SearchedBalance& chosen = is_motor_first ? *motor : most_significant(all, decides ? result.resampling : std::nullopt);
   const bool by_resampling = decides && &chosen == &*motor;
   if (result.resampling) result.resampling->decides = by_resampling;
   std::string alias;
@@ -377,7 +311,7 @@ Diagnosis diagnose_at(const data::Dataset& dataset, const model::Model& model, c
       shares(*chosen.search.data, fit, names_one || by_resampling ? fit.residual_fixed_effects() : fit.residual);
   list_candidates(all, model.drive.axis, result);
   if (by_resampling) name_stable(chosen, result);
-  if (names_one) name_effects(chosen, alias, result);
+  if (names_one) name_by_likelihood(chosen, alias, result);
   take_back_insignificant(result);
   if (by_resampling) take_back_unconfirmed_scaling(*base, chosen, result);
   if (!result.named.empty()) explain_named(chosen.search, chosen.candidates, model.drive, result);
@@ -389,6 +323,7 @@ Diagnosis diagnose_at(const data::Dataset& dataset, const model::Model& model, c
     check_unknown_structure(chosen.search, names_one ? &chosen.candidates.front() : nullptr, result);
   }
   if (by_resampling) name_between_records(*base, chosen, result);
+  name_on_other_balances(all, chosen, result);
   explain_orders(base->model.drive, result);
   assess_excitation(moves, result);
   return result;

@@ -115,6 +115,8 @@ struct Resampling {
     bool refused_by_holdout = false;  // in the catalogue, but the held-out error rises with it
     // The squared error on the experiments that are held out falls by as much as a term must take off.
     bool is_confirmed() const;
+    // It falls by as much as an effect that matters.
+    bool is_strongly_confirmed() const;
   };
   // How often a term was chosen, or was nearly as good as what was; zero for one that never was.
   struct Support {

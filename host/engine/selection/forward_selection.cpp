@@ -31,6 +31,27 @@ double squares_left(const Eigen::MatrixXd& products, const std::vector<Eigen::In
   return std::max(sum, 0.0);
 }
 
+namespace {
+
+// Coefficients of some columns by least squares, from their products.
+Eigen::VectorXd coefficients(const Eigen::MatrixXd& products, const std::vector<Eigen::Index>& columns) {
+  const auto n = static_cast<Eigen::Index>(columns.size());
+  Eigen::MatrixXd inner(n, n);
+  Eigen::VectorXd along(n), size(n);
+  const Eigen::Index y = products.cols() - 1;
+  const auto at = [&](Eigen::Index i) { return columns[static_cast<std::size_t>(i)]; };
+  for (Eigen::Index i = 0; i < n; ++i) size[i] = std::sqrt(std::max(products(at(i), at(i)), 1e-300));
+  for (Eigen::Index i = 0; i < n; ++i) {
+    for (Eigen::Index j = 0; j < n; ++j) inner(i, j) = products(at(i), at(j)) / (size[i] * size[j]);
+    along[i] = products(at(i), y) / size[i];
+  }
+  // Columns that are collinear share their coefficient.
+  inner.diagonal().array() += 1e-8;
+  return algebra::SymmetricFactor(inner).solve(along).col(0).cwiseQuotient(size);
+}
+
+}  // namespace
+
 TermFit fit_terms(const RegressorTable& table, const std::vector<int>& terms, const HalfData& fit,
                   const HalfData& validation) {
   const bool presliding = has_presliding(terms);
@@ -41,20 +62,19 @@ TermFit fit_terms(const RegressorTable& table, const std::vector<int>& terms, co
   for (const int t : terms)
     if (t >= 0)
       for (const Eigen::Index c : table.terms[static_cast<std::size_t>(t)].columns) result.columns.push_back(c);
+  const std::size_t others = result.columns.size();
   if (presliding)
-    result.columns.insert(result.columns.end(), table.presliding_shape.begin(), table.presliding_shape.end());
-  const auto n = static_cast<Eigen::Index>(result.columns.size());
-  Eigen::MatrixXd inner(n, n);
-  Eigen::VectorXd along(n), size(n);
-  const Eigen::Index y = on.cols() - 1;
-  for (Eigen::Index i = 0; i < n; ++i) size[i] = std::sqrt(std::max(on(result.columns[i], result.columns[i]), 1e-300));
-  for (Eigen::Index i = 0; i < n; ++i) {
-    for (Eigen::Index j = 0; j < n; ++j) inner(i, j) = on(result.columns[i], result.columns[j]) / (size[i] * size[j]);
-    along[i] = on(result.columns[i], y) / size[i];
+    for (const Eigen::Index place : table.presliding_shape()) result.columns.push_back(place);
+  result.theta = coefficients(on, result.columns);
+  // Bristles in parallel (Maxwell slip) each hold a force of their own. With negative ones their sum could fall after a
+  // reversal, which is another law: friction that falls with speed.
+  while (result.columns.size() > others) {
+    Eigen::Index least = 0;
+    const auto shape = result.theta.tail(std::ssize(result.columns) - static_cast<std::ptrdiff_t>(others));
+    if (shape.minCoeff(&least) >= 0.0) break;
+    result.columns.erase(result.columns.begin() + static_cast<std::ptrdiff_t>(others) + least);
+    result.theta = coefficients(on, result.columns);
   }
-  // Columns that are collinear share their coefficient.
-  inner.diagonal().array() += 1e-8;
-  result.theta = algebra::SymmetricFactor(inner).solve(along).col(0).cwiseQuotient(size);
   result.training_squares = squares_left(on, result.columns, result.theta);
   result.validation_squares = squares_left(other, result.columns, result.theta);
   return result;
@@ -127,11 +147,11 @@ class ForwardStep {
   std::map<std::string, Best> best_by_name() const {
     std::map<std::string, Best> by_name;
     for (std::size_t t = 0; t < table_.terms.size(); ++t)
-      if (std::find(terms_.begin(), terms_.end(), static_cast<int>(t)) == terms_.end())
+      if (std::find(terms_.begin(), terms_.end(), static_cast<int>(t)) == terms_.end() && !is_excluded(table_.terms[t]))
         try_term(static_cast<int>(t), table_.terms[t].name,
                  static_cast<double>(table_.terms[t].columns.size() + table_.terms[t].nonlinear), by_name);
     if (fit_.presliding.size() > 0 && !has_presliding(terms_))
-      try_term(kPreslidingTerm, kPresliding, 1.0 + static_cast<double>(table_.presliding_shape.size()), by_name);
+      try_term(kPreslidingTerm, kPresliding, 1.0 + static_cast<double>(table_.presliding_shape().size()), by_name);
     return by_name;
   }
 
@@ -169,6 +189,12 @@ class ForwardStep {
   }
 
  private:
+  bool is_excluded(const CandidateTerm& term) const {
+    return std::any_of(terms_.begin(), terms_.end(), [&](int t) {
+      return t >= 0 && std::find(term.excludes.begin(), term.excludes.end(),
+                                 table_.terms[static_cast<std::size_t>(t)].name) != term.excludes.end();
+    });
+  }
   // What one parameter takes off by chance.
   double per_one(const Best& chosen) const { return chosen.fitted.validation_squares / validation_.rows * noise_.tau; }
 

@@ -35,7 +35,7 @@ void eliminate_friction_effects(Eigen::MatrixXd& products, const FrictionRandomE
   products.noalias() -= along * algebra::solve_positive(inner, along.transpose());
 }
 
-Eigen::VectorXd friction_effects_of(const RegressorTable& table, const Setting& setting,
+Eigen::VectorXd friction_effects_of(const RegressorTable& table, const Setting& setting, Direction direction,
                                     const std::vector<double>& weights, double noise, const SelectionPolicy& policy) {
   constexpr double kLeast = 0.005, kMost = 0.5;  // of the friction
   std::vector<Eigen::Index> fixed(static_cast<std::size_t>(table.model_columns));
@@ -46,7 +46,7 @@ Eigen::VectorXd friction_effects_of(const RegressorTable& table, const Setting& 
   Eigen::VectorXd size(k);
   for (Eigen::Index g = 0; g < k; ++g) size[g] = table.scale[table.differences[static_cast<std::size_t>(g)]];
   for (const BlockRange& blocks : blocks_by_record(setting)) {
-    const Eigen::MatrixXd own = weights[blocks.record] * products_of(setting, blocks);
+    const Eigen::MatrixXd own = weights[blocks.record] * products_of(setting, blocks, direction);
     const Eigen::Index y = own.cols() - 1;
     estimation::RecordProducts r;
     r.xx = own(fixed, fixed);
@@ -63,23 +63,24 @@ Eigen::VectorXd friction_effects_of(const RegressorTable& table, const Setting& 
   return variance.cwiseProduct(size.cwiseAbs2());
 }
 
-Eigen::VectorXd weighted_residual(const Setting& seen, const TermFit& fitted, const std::vector<double>& weights,
-                                  const FrictionRandomEffects& differences) {
-  Eigen::VectorXd residual = seen.rows.col(seen.rows.cols() - 1);
+Eigen::VectorXd weighted_residual(const Setting& setting, Direction direction, const TermFit& fitted,
+                                  const std::vector<double>& weights, const FrictionRandomEffects& differences) {
+  Eigen::VectorXd residual = setting.target(direction);
   for (std::size_t j = 0; j < fitted.columns.size(); ++j)
-    residual -= fitted.theta[static_cast<Eigen::Index>(j)] * seen.rows.col(fitted.columns[j]);
+    residual -= fitted.theta[static_cast<Eigen::Index>(j)] * setting.column(fitted.columns[j], direction);
   const std::vector<Eigen::Index> vary = components(differences);
   const auto k = static_cast<Eigen::Index>(vary.size());
-  for (std::size_t first = 0; first < seen.runs.size();) {
+  for (std::size_t first = 0; first < setting.runs.size();) {
     std::size_t last = first;
-    const std::size_t record = seen.runs[first].record;
-    while (last < seen.runs.size() && seen.runs[last].record == record) ++last;
-    const Eigen::Index from = seen.runs[first].first, rows = seen.runs[last - 1].last - from;
+    const std::size_t record = setting.runs[first].record;
+    while (last < setting.runs.size() && setting.runs[last].record == record) ++last;
+    const Eigen::Index from = setting.runs[first].first, rows = setting.runs[last - 1].last - from;
     if (k > 0) {
       Eigen::MatrixXd Z(rows, k);
       for (Eigen::Index j = 0; j < k; ++j)
-        Z.col(j) = seen.rows.col(differences.columns[static_cast<std::size_t>(vary[static_cast<std::size_t>(j)])])
-                       .segment(from, rows);
+        Z.col(j) =
+            setting.column(differences.columns[static_cast<std::size_t>(vary[static_cast<std::size_t>(j)])], direction)
+                .segment(from, rows);
       Eigen::MatrixXd inner = weights[record] * Z.transpose() * Z;
       for (Eigen::Index j = 0; j < k; ++j)
         inner(j, j) += differences.noise / differences.variance[vary[static_cast<std::size_t>(j)]];

@@ -23,12 +23,12 @@ void eliminate_friction_effects(Eigen::MatrixXd& products, const FrictionRandomE
 // Variance components by record of the model's friction; columns scaled as the table has them. What all records have in
 // common is no difference: the columns of the differences are fixed effects as well as random ones, so that an
 // asymmetry that the model lacks does not pass for friction that differs.
-Eigen::VectorXd friction_effects_of(const RegressorTable& table, const Setting& setting,
+Eigen::VectorXd friction_effects_of(const RegressorTable& table, const Setting& setting, Direction direction,
                                     const std::vector<double>& weights, double noise, const SelectionPolicy& policy);
 
 // What a fit leaves of the samples, times the root of the record's weight. Each record's own friction is taken off as
 // its best linear unbiased prediction.
-Eigen::VectorXd weighted_residual(const Setting& seen, const TermFit& fitted, const std::vector<double>& weights,
-                                  const FrictionRandomEffects& differences);
+Eigen::VectorXd weighted_residual(const Setting& setting, Direction direction, const TermFit& fitted,
+                                  const std::vector<double>& weights, const FrictionRandomEffects& differences);
 
 }  // namespace flexspline::selection

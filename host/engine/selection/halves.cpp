@@ -9,7 +9,7 @@ std::vector<double> record_weights(const RegressorTable& table, const Setting& s
   std::vector<double> weights(table.records, 0.0), rows(table.records, 0.0);
   std::vector<Eigen::MatrixXd> products(table.records);
   for (const BlockRange& blocks : blocks_by_record(setting)) {
-    products[blocks.record] = products_of(setting, blocks);
+    products[blocks.record] = products_of(setting, blocks, Direction::sign);
     for (std::size_t b = blocks.first; b < blocks.last; ++b) rows[blocks.record] += setting.blocks[b].rows;
   }
   for (std::size_t r = 0; r < table.records; ++r) weights[r] = rows[r] > 0.0 ? 1.0 : 0.0;
@@ -36,67 +36,56 @@ std::vector<double> record_weights(const RegressorTable& table, const Setting& s
 
 namespace {
 
-// Sums over the blocks that each column of `choices` takes (ones and zeros), and over all others, in turn.
-std::vector<Eigen::MatrixXd> sums_of(const Setting& setting, const std::vector<double>& weights,
-                                     const Eigen::MatrixXd& choices, const FrictionRandomEffects& differences) {
-  const Eigen::Index p = setting.rows.cols(), n = choices.cols();
-  std::vector<Eigen::MatrixXd> sums(static_cast<std::size_t>(2 * n), Eigen::MatrixXd::Zero(p, p));
-  // Friction that differs is eliminated from each record alone, so that records are added one after the other.
-  for (const BlockRange& blocks : blocks_by_record(setting)) {
-    const auto first = static_cast<Eigen::Index>(blocks.first), count = static_cast<Eigen::Index>(blocks.last) - first;
-    const double weight = weights[blocks.record];
-    const Eigen::MatrixXd whole = weight * products_of(setting, blocks);
-    const Eigen::MatrixXd taken =
-        setting.products.middleCols(first, count) * (weight * choices.middleRows(first, count));
-    for (Eigen::Index i = 0; i < n; ++i) {
-      Eigen::MatrixXd in = taken.col(i).reshaped(p, p), out = whole - in;
-      eliminate_friction_effects(in, differences);
-      eliminate_friction_effects(out, differences);
-      sums[static_cast<std::size_t>(2 * i)] += in;
-      sums[static_cast<std::size_t>(2 * i + 1)] += out;
-    }
-  }
-  return sums;
+void add_products(Eigen::MatrixXd&& products, const FrictionRandomEffects& differences, Eigen::MatrixXd& sum) {
+  eliminate_friction_effects(products, differences);
+  if (sum.size() == 0)
+    sum = std::move(products);
+  else
+    sum += products;
 }
 
 }  // namespace
 
-HalfData sum_of(const Setting& sign, const Setting* presliding, const std::vector<double>& weights,
-                const FrictionRandomEffects& differences) {
+HalfData sum_of(const Setting& setting, const std::vector<double>& weights, const FrictionRandomEffects& differences) {
   HalfData all;
-  const auto add = [&](const Setting& setting) {
-    Eigen::MatrixXd sum = Eigen::MatrixXd::Zero(setting.rows.cols(), setting.rows.cols());
-    for (const BlockRange& blocks : blocks_by_record(setting)) {
-      Eigen::MatrixXd own = weights[blocks.record] * products_of(setting, blocks);
-      eliminate_friction_effects(own, differences);
-      sum += own;
-    }
-    return sum;
-  };
-  all.sign = add(sign);
-  if (presliding) all.presliding = add(*presliding);
-  for (const Block& block : sign.blocks) all.rows += block.rows;
+  for (const BlockRange& blocks : blocks_by_record(setting)) {
+    const double weight = weights[blocks.record];
+    add_products(weight * products_of(setting, blocks, Direction::sign), differences, all.sign);
+    if (setting.presliding.empty()) continue;
+    add_products(weight * products_of(setting, blocks, Direction::presliding), differences, all.presliding);
+  }
+  for (const Block& block : setting.blocks) all.rows += block.rows;
   return all;
 }
 
-std::vector<HalfPair> halves_of(const Setting& sign, const Setting* presliding, const std::vector<double>& weights,
+std::vector<HalfPair> halves_of(const Setting& setting, const std::vector<double>& weights,
                                 std::span<const std::vector<std::uint8_t>> in,
                                 const FrictionRandomEffects& differences) {
-  Eigen::MatrixXd choices(std::ssize(sign.blocks), std::ssize(in));
+  Eigen::MatrixXd choices(std::ssize(setting.blocks), std::ssize(in));
   for (std::size_t i = 0; i < in.size(); ++i)
     for (std::size_t b = 0; b < in[i].size(); ++b)
       choices(static_cast<Eigen::Index>(b), static_cast<Eigen::Index>(i)) = in[i][b];
   std::vector<HalfPair> pairs(in.size());
-  std::vector<Eigen::MatrixXd> sums = sums_of(sign, weights, choices, differences), slow;
-  if (presliding) slow = sums_of(*presliding, weights, choices, differences);
-  for (std::size_t i = 0; i < pairs.size(); ++i)
-    for (const std::size_t other : {std::size_t{0}, std::size_t{1}}) {
-      HalfData& half = pairs[i][other];
-      half.sign = std::move(sums[2 * i + other]);
-      if (presliding) half.presliding = std::move(slow[2 * i + other]);
-      for (std::size_t b = 0; b < sign.blocks.size(); ++b)
-        if ((in[i][b] != 0) == (other == 0)) half.rows += sign.blocks[b].rows;
+  const auto add = [&](const Eigen::VectorXd& products, HalfData& half) {
+    add_products(products_of(setting, products, Direction::sign), differences, half.sign);
+    if (setting.presliding.empty()) return;
+    add_products(products_of(setting, products, Direction::presliding), differences, half.presliding);
+  };
+  // Friction that differs is eliminated from each record alone, so that records are added one after the other.
+  for (const BlockRange& blocks : blocks_by_record(setting)) {
+    const auto first = static_cast<Eigen::Index>(blocks.first), count = static_cast<Eigen::Index>(blocks.last) - first;
+    const double weight = weights[blocks.record];
+    const Eigen::VectorXd whole = weight * setting.products.middleCols(first, count).rowwise().sum();
+    const Eigen::MatrixXd taken =
+        setting.products.middleCols(first, count) * (weight * choices.middleRows(first, count));
+    for (std::size_t i = 0; i < pairs.size(); ++i) {
+      add(taken.col(static_cast<Eigen::Index>(i)), pairs[i][0]);
+      add(whole - taken.col(static_cast<Eigen::Index>(i)), pairs[i][1]);
     }
+  }
+  for (std::size_t i = 0; i < pairs.size(); ++i)
+    for (std::size_t b = 0; b < setting.blocks.size(); ++b)
+      pairs[i][in[i][b] != 0 ? 0 : 1].rows += setting.blocks[b].rows;
   return pairs;
 }
 

@@ -15,14 +15,12 @@ namespace flexspline::selection {
 // Zero for a record without samples.
 std::vector<double> record_weights(const RegressorTable& table, const Setting& setting);
 
-// Products of all blocks; each record's differences eliminated. `presliding` is null where that state does not compete;
-// else its blocks are those of `sign`.
-HalfData sum_of(const Setting& sign, const Setting* presliding, const std::vector<double>& weights,
-                const FrictionRandomEffects& differences);
+// Products of all blocks; each record's differences eliminated. Those of the state of presliding where it competes.
+HalfData sum_of(const Setting& setting, const std::vector<double>& weights, const FrictionRandomEffects& differences);
 
 // Of each choice `in` of blocks: the half with in[k] != 0, and the other half.
 using HalfPair = std::array<HalfData, 2>;
-std::vector<HalfPair> halves_of(const Setting& sign, const Setting* presliding, const std::vector<double>& weights,
+std::vector<HalfPair> halves_of(const Setting& setting, const std::vector<double>& weights,
                                 std::span<const std::vector<std::uint8_t>> in,
                                 const FrictionRandomEffects& differences);
 

@@ -4,6 +4,7 @@
 
 #include <cmath>
 
+#include "host/engine/estimation/modelled_torque.hpp"
 #include "host/engine/selection/policy.hpp"
 
 namespace flexspline::selection {
@@ -20,7 +21,13 @@ HeldOut::HeldOut(const data::Dataset& dataset, const estimation::Identification&
 }
 
 double HeldOut::rmse(const Terms& terms) const {
-  const Eigen::VectorXd residual = estimation::residual_of(*data, terms);
+  estimation::PreparedData own;
+  std::optional<BalanceData> with_load;
+  if (!prepared.output_signals.torque) {
+    own = prepared;
+    if (estimation::take_torque_where_read(own, terms)) with_load.emplace(own, data->balance());
+  }
+  const Eigen::VectorXd residual = estimation::residual_of(with_load ? *with_load : *data, terms);
   return residual.size() > 0 ? std::sqrt(residual.squaredNorm() / static_cast<double>(residual.size())) : 0.0;
 }
 

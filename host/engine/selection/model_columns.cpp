@@ -9,65 +9,106 @@
 
 namespace flexspline::selection {
 
+namespace {
+
+// What the model's parameters make of the target, and the torque that goes through the gear.
+Eigen::VectorXd modelled_effort(const DirectedData& from, const Eigen::MatrixXd& base, const Eigen::VectorXd& target) {
+  Eigen::VectorXd effort = base * algebra::PivotedQr(base).solve(target);
+  if (from.prepared.output_signals.torque)
+    effort += from.at_rows([&](const estimation::Record& r, std::size_t k) {
+      return r.inputs.torque_at(k) / from.prepared.constants.gear_ratio;
+    });
+  return effort;
+}
+
+}  // namespace
+
 bool add_model_columns(TableBuilder& builder) {
-  estimation::BalanceData& data = builder.data;
   RegressorTable& table = builder.table;
   const estimation::Terms& terms = builder.terms;
   const auto on_balance = builder.on_balance();
   const std::vector<estimation::ParameterRef> linear = estimation::free_linear_parameters(terms, on_balance);
   const std::vector<estimation::ParameterRef> nonlinear = estimation::free_nonlinear_parameters(terms, on_balance);
-  table.target = data.target() - data.known_torque(terms, on_balance);
-  if (linear.empty() || data.rows() == 0) return false;
-  const Eigen::MatrixXd base = data.columns(terms, linear);
-  const auto add = [&](Eigen::VectorXd column, std::string name, double low) {
-    builder.add(std::move(column));
+  const auto target_of = [&](DirectedData& from) {
+    return Eigen::VectorXd(from.data.target() - from.data.known_torque(terms, on_balance));
+  };
+  table.target = target_of(builder.sign);
+  if (linear.empty() || table.target.size() == 0) return false;
+  if (builder.presliding) table.presliding = {{}, {}, target_of(*builder.presliding)};
+  const auto add = [&](TableBuilder::Made made, std::string name, double low) {
+    builder.add(std::move(made));
     table.model_names.push_back(std::move(name));
     table.model_low.push_back(low);
+  };
+  const TableBuilder::Made base = builder.make([&](DirectedData& d) { return d.data.columns(terms, linear); }, true);
+  const auto column_of = [](const TableBuilder::Made& made, std::size_t j) {
+    const auto at = static_cast<Eigen::Index>(j);
+    TableBuilder::Made one{made.sign.col(at), {}};
+    if (made.presliding.cols() > 0) one.presliding = made.presliding.col(at);
+    return one;
   };
   for (std::size_t j = 0; j < linear.size(); ++j) {
     const estimation::Term& t = terms[linear[j].term];
     const auto& info = t.entry->parameters[linear[j].parameter];
-    add(base.col(static_cast<Eigen::Index>(j)), fmt::format("{}.{}", t.id, info.name), info.low);
+    add(column_of(base, j), fmt::format("{}.{}", t.id, info.name), info.low);
   }
   if (!nonlinear.empty()) {
-    const Eigen::MatrixXd slopes = data.nonlinear_columns(terms, on_balance, nonlinear);
+    const TableBuilder::Made slopes =
+        builder.make([&](DirectedData& d) { return d.data.nonlinear_columns(terms, on_balance, nonlinear); }, true);
     for (std::size_t j = 0; j < nonlinear.size(); ++j)
-      add(slopes.col(static_cast<Eigen::Index>(j)), fmt::format("slope by {}", terms[nonlinear[j].term].id),
-          -effects::kUnbounded);
+      add(column_of(slopes, j), fmt::format("slope by {}", terms[nonlinear[j].term].id), -effects::kUnbounded);
   }
-  const Eigen::VectorXd fitted = base * algebra::PivotedQr(base).solve(table.target);
-  const estimation::PreparedData& prepared = builder.prepared();
-  const Eigen::VectorXd through_gear = prepared.output_signals.torque
-                                           ? builder.at_rows([&](const estimation::Record& r, std::size_t k) {
-                                               return r.inputs.torque_at(k) / prepared.constants.gear_ratio;
-                                             })
-                                           : Eigen::VectorXd::Zero(data.rows());
-  builder.effort = fitted + through_gear;
+  builder.sign.effort = modelled_effort(builder.sign, base.sign, table.target);
+  if (builder.presliding)
+    builder.presliding->effort = modelled_effort(*builder.presliding, base.presliding, table.presliding->target);
   // A lag between the columns is a nuisance parameter of every model.
-  add(slope_of(builder.effort, table.runs), "time lag", -effects::kUnbounded);
+  add(builder.make([&](DirectedData& d) { return slope_of(d.effort, table.runs); }, true), "time lag",
+      -effects::kUnbounded);
   table.model_columns = static_cast<Eigen::Index>(builder.columns.size());
   return true;
 }
 
-void add_presliding_shape(TableBuilder& builder, Direction direction, const PreslidingTravels& travels) {
+void add_presliding_shape(TableBuilder& builder, const PreslidingTravels& travels) {
+  const DirectedData& law = *builder.presliding;
   for (const double travel : travels.shape) {
-    Eigen::VectorXd column = Eigen::VectorXd::Zero(builder.data.rows());
-    if (direction == Direction::presliding) {
-      std::vector<std::vector<double>> states;
-      for (const estimation::Record& r : builder.prepared().records) states.push_back(presliding_state(r, travel));
-      column = builder.at_rows([&](const estimation::Record& r, std::size_t k) {
-        return states[static_cast<std::size_t>(&r - builder.prepared().records.data())][k] -
-               TableBuilder::direction(r, k);
-      });
-      builder.filter(column);
+    std::vector<std::vector<double>> states;
+    for (const estimation::Record& r : law.prepared.records) states.push_back(presliding_state(r, travel));
+    builder.shapes.emplace_back(builder.filtered(law.at_rows([&](const estimation::Record& r, std::size_t k) {
+      return states[static_cast<std::size_t>(&r - law.prepared.records.data())][k] - DirectedData::direction(r, k);
+    })));
+  }
+}
+
+void add_other_travels(TableBuilder& builder) {
+  const DirectedData& sign = builder.sign;
+  for (const std::size_t t : builder.on_balance()) {
+    const estimation::Term& law = builder.terms[t];
+    const auto is_travel = [](const effects::ParameterInfo& p) { return p.limit == effects::Limit::travel; };
+    const auto at = std::find_if(law.entry->parameters.begin(), law.entry->parameters.end(), is_travel);
+    if (!law.entry->is_presliding() || at == law.entry->parameters.end()) continue;
+    const double travel = law.values[static_cast<std::size_t>(at - law.entry->parameters.begin())];
+    for (const double factor : {1.0 / builder.policy.presliding_shape_factor, builder.policy.presliding_shape_factor}) {
+      std::vector<std::vector<double>> change;
+      for (const estimation::Record& r : sign.prepared.records) {
+        change.push_back(presliding_state(r, factor * travel));
+        const std::vector<double> own = presliding_state(r, travel);
+        for (std::size_t k = 0; k < own.size(); ++k) change.back()[k] -= own[k];
+      }
+      CandidateTerm term;
+      term.name = "presliding over another travel";
+      term.columns = builder.add({builder.filtered(sign.at_rows([&](const estimation::Record& r, std::size_t k) {
+                                    return change[static_cast<std::size_t>(&r - sign.prepared.records.data())][k];
+                                  })),
+                                  {}});
+      term.low = {0.0};
+      builder.table.terms.push_back(std::move(term));
     }
-    builder.table.presliding_shape.push_back(builder.add(std::move(column)));
   }
 }
 
 void add_differences(TableBuilder& builder) {
   using estimation::Record;
-  if (builder.data.balance() != Balance::motor) return;
+  if (builder.sign.data.balance() != Balance::motor) return;
   const estimation::Terms& terms = builder.terms;
   const auto friction_of = [&](std::string_view surface) {
     double sum = 0.0;
@@ -80,18 +121,19 @@ void add_differences(TableBuilder& builder) {
           }
     return sum;
   };
-  const auto difference = [&](double size, auto value) {
+  const auto difference = [&](double size, bool reads_direction, auto value) {
     if (size == 0.0) return;
-    Eigen::VectorXd column = builder.at_rows([&](const Record& r, std::size_t k) { return size * value(r, k); });
-    builder.filter(column);
-    builder.table.differences.push_back(builder.add(std::move(column)));
+    const auto column = [&](DirectedData& d) {
+      return builder.filtered(d.at_rows([&](const Record& r, std::size_t k) { return size * value(r, k); }));
+    };
+    builder.table.differences.push_back(builder.add(builder.make(column, reads_direction)).front());
   };
-  const auto direction = TableBuilder::direction;
+  const auto direction = DirectedData::direction;
   const double viscous = friction_of("viscous friction"), dry = friction_of("dry friction");
-  difference(viscous, [](const Record& r, std::size_t k) { return r.inputs.velocity_at(k); });
-  difference(viscous, [](const Record& r, std::size_t k) { return std::abs(r.inputs.velocity_at(k)); });
-  difference(dry, [&](const Record& r, std::size_t k) { return direction(r, k); });
-  difference(dry, [&](const Record& r, std::size_t k) { return direction(r, k) * direction(r, k); });
+  difference(viscous, false, [](const Record& r, std::size_t k) { return r.inputs.velocity_at(k); });
+  difference(viscous, false, [](const Record& r, std::size_t k) { return std::abs(r.inputs.velocity_at(k)); });
+  difference(dry, true, [&](const Record& r, std::size_t k) { return direction(r, k); });
+  difference(dry, true, [&](const Record& r, std::size_t k) { return direction(r, k) * direction(r, k); });
 }
 
 }  // namespace flexspline::selection

@@ -3,16 +3,12 @@
 #include <Eigen/Core>
 #include <algorithm>
 #include <cmath>
-#include <span>
 #include "host/common/algebra/decompositions.hpp"
 
 namespace flexspline::selection {
 
-using effects::Phase;
-using estimation::Balance;
 using estimation::PreparedData;
 using estimation::Record;
-using estimation::Terms;
 
 std::size_t take_noise_off_torque(PreparedData& prepared) {
   constexpr double kWhite =
@@ -44,36 +40,6 @@ std::size_t take_noise_off_torque(PreparedData& prepared) {
     ++replaced;
   }
   return replaced;
-}
-
-void take_torque_from_load(PreparedData& prepared, const Terms& terms) {
-  // Weight on the output and inertia: most of both is behind the gear.
-  const auto torque_of = [&](const estimation::Term& t, const std::vector<double>& values, double acceleration) {
-    effects::Inputs<catalogue::Real> in;
-    in.acceleration = acceleration;
-    double torque = 0.0;
-    t.entry->real.torque(values.data(), prepared.constants, Balance::motor, std::span(&in, 1), &torque);
-    return torque;
-  };
-  const auto has_weight = [](const estimation::Term& t) {
-    return t.entry->info->balance == Balance::load && (t.entry->info->reads & effects::kOutputAngle) != 0;
-  };
-  if (std::none_of(terms.begin(), terms.end(), has_weight)) return;
-  for (const estimation::Term& t : terms) {
-    if (t.entry->has_state || t.entry->info->phase != Phase::source || !t.entry->adds_torque()) continue;
-    const std::vector<double> values = catalogue::natural(*t.entry, t.values);
-    const bool inertia = t.entry->info->balance == Balance::motor && torque_of(t, values, 1.0) != 0.0;
-    if (!has_weight(t) && !inertia) continue;
-    const double ratio = inertia ? prepared.constants.gear_ratio : 1.0;
-    for (Record& r : prepared.records) {
-      if (r.locked || r.inputs.size() == 0) continue;
-      std::vector<double> torque(r.inputs.size(), 0.0);
-      t.entry->real.torque_of_plain(values.data(), prepared.constants, inertia ? Balance::motor : Balance::load,
-                                    r.inputs.all(), torque.data());
-      r.inputs.torque.resize(r.inputs.size(), 0.0);
-      for (std::size_t k = 0; k < torque.size(); ++k) r.inputs.torque[k] += ratio * torque[k];
-    }
-  }
 }
 
 }  // namespace flexspline::selection

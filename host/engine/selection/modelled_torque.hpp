@@ -11,8 +11,4 @@ namespace flexspline::selection {
 // itself. Returns in how many records.
 std::size_t take_noise_off_torque(estimation::PreparedData& prepared);
 
-// Without a torque sensor: the torque that weight and inertia of the model make, for terms that read a torque. Nothing
-// where the model has no weight on the output.
-void take_torque_from_load(estimation::PreparedData& prepared, const estimation::Terms& terms);
-
 }  // namespace flexspline::selection

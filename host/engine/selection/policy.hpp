@@ -59,6 +59,10 @@ struct SelectionPolicy {
   // Error on experiments that are held out, with a term over without it: above, the term is not named.
   double most_held_out_ratio = 1.0;
 
+  // Share of the squared error on experiments that are held out: a term that takes off so much there matters, and needs
+  // no more than the usual share of the subsamples, whatever else is missing.
+  double matters_share = 0.2;
+
   double white = 0.95;  // semivariance over variance of what is left: above, it is noise
 
   // What corrects the effort: at most that share of it at its peaks, and only where the peaks are that much above the
@@ -131,9 +135,10 @@ struct SelectionPolicy {
   double many_parameters = 12.0;  // a law of so many more is confounded with any
 
   // Orders per motor turn.
-  int highest_order = 24;          // of gears and motors: the wave generator's, slots, poles and bearings
-  std::size_t orders_tried = 3;    // those that the residual holds most of
-  double usual_order_share = 0.9;  // of the best one's squares: from there the usual order is tried, too
+  int highest_order = 24;            // of gears and motors: the wave generator's, slots, poles and bearings
+  std::size_t orders_tried = 3;      // those that the residual holds most of
+  std::size_t orders_resampled = 6;  // likewise, of each effect and of as many placebos, on halves of the data
+  double usual_order_share = 0.9;    // of the best one's squares: from there the usual order is tried, too
   // Placebo orders, which no gear, motor or bearing makes: in data of few turns they explain as much as any.
   double first_placebo_order = 0.63;
   int placebo_orders = 24;

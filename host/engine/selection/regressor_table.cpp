@@ -42,8 +42,8 @@ void add_runs(const BalanceData& data, RegressorTable& table) {
 // What masks need: velocities over their noise, and how often the motion reverses.
 void add_row_signals(const TableBuilder& builder) {
   RegressorTable& table = builder.table;
-  const Balance balance = builder.data.balance();
-  table.velocity_over_noise = builder.at_rows([&](const Record& r, std::size_t k) {
+  const Balance balance = builder.sign.data.balance();
+  table.velocity_over_noise = builder.sign.at_rows([&](const Record& r, std::size_t k) {
     return r.at_rest ? effects::kUnbounded
                      : r.direction_variable(balance, k) / std::max(r.velocity_noise[estimation::index(balance)], 1e-12);
   });
@@ -58,19 +58,33 @@ void add_row_signals(const TableBuilder& builder) {
   }
 }
 
+double root_mean_square(const Eigen::VectorXd& column) {
+  const double size = column.norm() / std::sqrt(std::max<double>(1.0, static_cast<double>(column.size())));
+  return size > 0.0 && std::isfinite(size) ? size : 1.0;
+}
+
 // Columns over their root mean squares.
 void scale_columns(const TableBuilder& builder) {
   RegressorTable& table = builder.table;
-  table.columns.resize(builder.data.rows(), static_cast<Eigen::Index>(builder.columns.size()));
-  table.scale.resize(table.columns.cols());
-  for (Eigen::Index j = 0; j < table.columns.cols(); ++j) {
-    const Eigen::VectorXd& column = builder.columns[static_cast<std::size_t>(j)];
-    const double size = column.norm() / std::sqrt(std::max<double>(1.0, static_cast<double>(column.size())));
-    table.scale[j] = size > 0.0 && std::isfinite(size) ? size : 1.0;
-    table.columns.col(j) = column / table.scale[j];
+  const auto rows = table.target.size(), count = static_cast<Eigen::Index>(builder.columns.size());
+  table.columns.resize(rows, count);
+  table.scale.resize(count);
+  for (Eigen::Index j = 0; j < count; ++j) {
+    table.scale[j] = root_mean_square(builder.columns[static_cast<std::size_t>(j)]);
+    table.columns.col(j) = builder.columns[static_cast<std::size_t>(j)] / table.scale[j];
   }
   for (CandidateTerm& term : table.terms)
     if (term.most_at_peak > 0.0) term.most_at_peak *= table.scale[term.columns.front()];
+  if (!table.presliding) return;
+  PreslidingColumns& presliding = *table.presliding;
+  const auto differ = static_cast<Eigen::Index>(builder.presliding_columns.size());
+  presliding.columns.resize(rows, differ + static_cast<Eigen::Index>(builder.shapes.size()));
+  for (Eigen::Index i = 0; i < differ; ++i)
+    presliding.columns.col(i) = builder.presliding_columns[static_cast<std::size_t>(i)] /
+                                table.scale[presliding.instead_of[static_cast<std::size_t>(i)]];
+  for (std::size_t i = 0; i < builder.shapes.size(); ++i)
+    presliding.columns.col(differ + static_cast<Eigen::Index>(i)) =
+        builder.shapes[i] / root_mean_square(builder.shapes[i]);
 }
 
 }  // namespace
@@ -93,7 +107,15 @@ double highest_order_hz(const PreparedData& prepared) {
                : 0.0;
 }
 
-RegressorTable with_terms(const RegressorTable& table, const std::vector<int>& terms) {
+std::vector<Eigen::Index> RegressorTable::presliding_shape() const {
+  std::vector<Eigen::Index> places;
+  if (presliding)
+    for (auto i = std::ssize(presliding->instead_of); i < presliding->columns.cols(); ++i)
+      places.push_back(scale.size() + static_cast<Eigen::Index>(places.size()));
+  return places;
+}
+
+RegressorTable with_terms(const RegressorTable& table, const std::vector<int>& terms, bool presliding) {
   std::vector<Eigen::Index> kept;
   const auto keep = [&](Eigen::Index column) {
     kept.push_back(column);
@@ -107,34 +129,47 @@ RegressorTable with_terms(const RegressorTable& table, const std::vector<int>& t
     small.terms.push_back(table.terms[static_cast<std::size_t>(t)]);
     for (Eigen::Index& column : small.terms.back().columns) column = keep(column);
   }
-  for (const Eigen::Index column : table.presliding_shape) small.presliding_shape.push_back(keep(column));
   for (const Eigen::Index column : table.differences) small.differences.push_back(keep(column));
   small.columns = table.columns(Eigen::all, kept);
   small.scale = table.scale(kept);
   small.not_visible = table.not_visible;
+  if (!presliding || !table.presliding) return small;
+  std::vector<Eigen::Index> place(static_cast<std::size_t>(table.columns.cols()), -1), of_presliding;
+  for (std::size_t i = 0; i < kept.size(); ++i) place[static_cast<std::size_t>(kept[i])] = static_cast<Eigen::Index>(i);
+  PreslidingColumns& own = small.presliding.emplace();
+  for (std::size_t i = 0; i < table.presliding->instead_of.size(); ++i) {
+    const Eigen::Index at = place[static_cast<std::size_t>(table.presliding->instead_of[i])];
+    if (at < 0) continue;
+    own.instead_of.push_back(at);
+    of_presliding.push_back(static_cast<Eigen::Index>(i));
+  }
+  for (auto i = std::ssize(table.presliding->instead_of); i < table.presliding->columns.cols(); ++i)
+    of_presliding.push_back(i);
+  own.columns = table.presliding->columns(Eigen::all, of_presliding);
+  own.target = table.presliding->target;
   return small;
 }
 
-RegressorTable make_regressor_table(const PreparedData& original, Balance balance, const Terms& terms,
-                                    Direction direction, const std::optional<PreslidingTravels>& travels,
-                                    double highest_law_hz, const SelectionPolicy& policy) {
-  PreparedData prepared = original;
-  for (Record& r : prepared.records)
-    r.inputs.directions[0] =
-        direction == Direction::presliding ? presliding_state(r, travels->state) : expected_sign(r);
-  BalanceData data(prepared, balance);
+RegressorTable make_regressor_table(const PreparedData& prepared, Balance balance, const Terms& terms,
+                                    const std::optional<PreslidingTravels>& travels, double highest_law_hz,
+                                    const SelectionPolicy& policy) {
+  DirectedData sign(prepared, balance, [](const Record& r) { return expected_sign(r); });
+  std::optional<DirectedData> presliding;
+  if (travels)
+    presliding.emplace(prepared, balance, [&](const Record& r) { return presliding_state(r, travels->state); });
   RegressorTable table;
   table.records = prepared.records.size();
   for (const Record& r : prepared.records) table.held_out.push_back(r.experiment->role == data::Role::holdout ? 1 : 0);
   table.highest_hz = prepared.pipeline.row_cutoff_hz;
   table.highest_law_hz = highest_law_hz;
-  add_runs(data, table);
-  TableBuilder builder{data, terms, policy, table, {}, {}};
+  add_runs(sign.data, table);
+  TableBuilder builder{sign, presliding ? &*presliding : nullptr, terms, policy, table, {}, {}, {}};
   if (!add_model_columns(builder)) return table;
   const Motion motion = motion_of(prepared);
   add_catalogue_terms(builder, motion);
   add_generic_curves(builder, motion);
-  if (travels) add_presliding_shape(builder, direction, *travels);
+  if (travels) add_presliding_shape(builder, *travels);
+  add_other_travels(builder);
   add_differences(builder);
   add_row_signals(builder);
   scale_columns(builder);

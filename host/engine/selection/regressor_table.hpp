@@ -32,6 +32,8 @@ struct CandidateTerm {
   bool is_placebo = false;
   std::size_t nonlinear = 0;  // parameters that were searched over
   double highest_hz = 0.0;    // the bandwidth must reach that far for it to be seen
+  // Terms of which this is what an error of the phase leaves, or the reverse: not both are chosen.
+  std::vector<std::string> excludes;
 };
 
 // Consecutive samples of one record, evenly spaced in time.
@@ -61,30 +63,41 @@ struct TableModel {
   std::vector<double> model_low;         // lower bound of each model column's coefficient
 };
 
+enum class Direction { sign, presliding };
+
+// What a table has where a state of presliding is in the place of the sign of the velocity.
+struct PreslidingColumns {
+  std::vector<Eigen::Index> instead_of;  // columns of the table that differ there
+  // In their place, scaled as they are; then dry friction over the states of PreslidingTravels::shape less that of the
+  // law, scaled to unit root mean square: fitted with the term of presliding.
+  Eigen::MatrixXd columns;
+  Eigen::VectorXd target;
+};
+
 struct RegressorTable : TableSamples, TableModel {
   Eigen::MatrixXd columns;  // those of the model first; N m per unit, scaled to unit root mean square
   Eigen::VectorXd scale;    // root mean squares that the columns were divided by
-  // Dry friction over the states of PreslidingTravels::shape less that of the law: fitted with the term of presliding.
-  std::vector<Eigen::Index> presliding_shape;
+  std::optional<PreslidingColumns> presliding;  // nothing: it cannot be shown
+  // Places of the shape of presliding: behind the columns.
+  std::vector<Eigen::Index> presliding_shape() const;
   // Friction that may differ from run to run, by surface in common and by direction: columns of a relative change of
   // one.
   std::vector<Eigen::Index> differences;
   std::vector<CandidateTerm> terms;
   std::vector<const catalogue::Entry*> not_visible;  // that these data could not show if they were there
+  // Effects and orders that do not compete, as other orders take more off what the model leaves.
+  std::vector<std::pair<const catalogue::Entry*, double>> smaller_waves;
 };
 
-enum class Direction { sign, presliding };
-
-// `prepared` is at the highest bandwidth and not masked; `terms` have the values of a first fit. Where there are no
-// `travels`, direction must be the sign; the columns of the shape of presliding are zero in a table of the sign.
+// `prepared` is at the highest bandwidth and not masked; `terms` have the values of a first fit. Without `travels` no
+// state of presliding competes with the sign of the velocity.
 RegressorTable make_regressor_table(const estimation::PreparedData& prepared, Balance balance,
-                                    const estimation::Terms& terms, Direction direction,
-                                    const std::optional<PreslidingTravels>& travels, double highest_law_hz,
-                                    const SelectionPolicy& policy);
+                                    const estimation::Terms& terms, const std::optional<PreslidingTravels>& travels,
+                                    double highest_law_hz, const SelectionPolicy& policy);
 
 // The same samples with fewer columns: those of the model, of friction that may differ, and of these terms (places in
-// table.terms), in their order.
-RegressorTable with_terms(const RegressorTable& table, const std::vector<int>& terms);
+// table.terms), in their order. `presliding`: with what is in their place there, if the table has it.
+RegressorTable with_terms(const RegressorTable& table, const std::vector<int>& terms, bool presliding = true);
 
 // Highest frequency of an order of the motor's turn that counts, Hz, at the typical speed.
 double highest_order_hz(const estimation::PreparedData& prepared);

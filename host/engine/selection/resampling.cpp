@@ -20,16 +20,18 @@ std::vector<Resampling::Support> support_of(const StabilitySelection& selection,
       if (f.name == name) return f.near;
     return 0.0;
   };
-  for (const CandidateTerm& term : selection.tables().sign.terms) {
+  for (const CandidateTerm& term : selection.tables().table.terms) {
     if (!term.entry) continue;
     const bool is_there = std::any_of(all.begin(), all.end(), [&](const Resampling::Support& s) {
       return s.effect == term.entry->name() && s.order == term.order;
     });
     if (!is_there) all.push_back({std::string(term.entry->name()), term.order, near(term.name)});
   }
-  for (const catalogue::Entry* entry : selection.tables().sign.not_visible)
+  for (const auto& [entry, order] : selection.tables().table.smaller_waves)
+    all.push_back({std::string(entry->name()), order, 0.0});
+  for (const catalogue::Entry* entry : selection.tables().table.not_visible)
     all.push_back({std::string(entry->name()), std::nullopt, 0.0});
-  if (const catalogue::Entry* law = presliding_law(terms); law && selection.tables().presliding)
+  if (const catalogue::Entry* law = presliding_law(terms); law && selection.tables().table.presliding)
     all.push_back({std::string(law->name()), std::nullopt, near(kPresliding)});
   return all;
 }
@@ -160,7 +162,8 @@ std::vector<NamedEffect> names_of(const Resampling& resampling, const SearchedBa
     if (is_judged_by_few && !found.is_confirmed()) continue;
     if (likelier_unseen(resampling, found, motor)) continue;
     if (names.empty() && found.group.size() > 1) return found.group;
-    if (found.group.size() > 1 || (!names.empty() && found.share_percent < least_percent)) continue;
+    if (found.group.size() > 1) continue;
+    if (!names.empty() && found.share_percent < least_percent && !found.is_strongly_confirmed()) continue;
     // Behind another one, a name that is not certain may be what the first law leaves: held-out experiments decide.
     const bool is_certain =
         found.frequency >= kPolicy.certain_frequency || !found.held_out_ratio || found.is_confirmed();
@@ -292,7 +295,7 @@ Resampling resample(const std::vector<const data::Experiment*>& experiments, con
     result.lag_std_s = lag->std;
   }
   result.subsamples = stability.subsamples;
-  result.too_little = stability.subsamples == 0.0 && selection.tables().sign.model_columns > 0;
+  result.too_little = stability.subsamples == 0.0 && selection.tables().table.model_columns > 0;
   result.abstained = stability.abstained;
   result.torque_has_noise = selection.tables().torque_has_noise;
   result.whiteness = stability.whiteness;
@@ -307,10 +310,14 @@ Resampling resample(const std::vector<const data::Experiment*>& experiments, con
     std::vector<std::string> names = first_names(decided);
     names.push_back(one.group.front().name);
     const std::vector<double> with_it = selection.held_out_ratios(names);
-    result.undecided.push_back(found_term(one, with_it.empty() ? std::nullopt : std::optional(with_it.back()), terms));
+    const Resampling::FoundTerm term =
+        found_term(one, with_it.empty() ? std::nullopt : std::optional(with_it.back()), terms);
+    const bool is_found = term.frequency >= kPolicy.named_frequency && term.is_strongly_confirmed() &&
+                          term.least_by_mask >= 1.0 - kPolicy.named_frequency;
+    (is_found ? result.found : result.undecided).push_back(term);
   }
   result.support = support_of(selection, terms);
-  for (const catalogue::Entry* entry : selection.tables().sign.not_visible)
+  for (const catalogue::Entry* entry : selection.tables().table.not_visible)
     result.not_visible.emplace_back(entry->name());
   return result;
 }
@@ -344,25 +351,30 @@ bool names_any(const Resampling& resampling, const SearchedBalance& motor) {
   return !names_of(resampling, motor).empty();
 }
 
-void name_stable(SearchedBalance& chosen, Diagnosis& result) {
-  result.named = names_of(*result.resampling, chosen);
-  result.possible = possible_effects(*result.resampling, chosen, result.named);
-  const bool is_of_scale = add_other_scale(chosen, result.named);
-  const bool is_group =
-      is_of_scale || (!result.named.empty() && result.resampling->found_group(result.named.front()).size() > 1);
-  result.partial =
-      static_cast<std::ptrdiff_t>(result.resampling->found.size()) > (is_group ? 1 : std::ssize(result.named));
-  if (result.named.empty()) return;
+StableNames stable_names(const Resampling& resampling, const SearchedBalance& motor) {
+  StableNames stable{names_of(resampling, motor), false};
+  stable.is_group = !stable.names.empty() && resampling.found_group(stable.names.front()).size() > 1;
   // Laws of one family: the one that fits best with its nonlinear parameters searched continuously.
-  for (NamedEffect& n : result.named) {
+  for (NamedEffect& n : stable.names) {
     const std::string_view family = catalogue::get(n.effect).info->family;
     if (family.empty()) continue;
     const CandidateFit* best = nullptr;
-    for (const CandidateFit& t : chosen.candidates)
+    for (const CandidateFit& t : motor.candidates)
       if (t.model.entry->info->family == family && t.admissible && (!best || t.gain.score > best->gain.score))
         best = &t;
     if (best) n.effect = std::string(best->model.entry->name());
   }
+  return stable;
+}
+
+void name_stable(SearchedBalance& chosen, Diagnosis& result) {
+  const StableNames stable = stable_names(*result.resampling, chosen);
+  result.named = stable.names;
+  result.possible = possible_effects(*result.resampling, chosen, names_of(*result.resampling, chosen));
+  const bool is_group = add_other_scale(chosen, result.named) || stable.is_group;
+  result.partial =
+      static_cast<std::ptrdiff_t>(result.resampling->found.size()) > (is_group ? 1 : std::ssize(result.named));
+  if (result.named.empty()) return;
   result.verdict = is_group ? Verdict::confusable_effects : Verdict::missing_effect;
   const auto is = [](const Candidate& c, const NamedEffect& n) { return c.effect == n.effect && c.order == n.order; };
   auto begin = result.candidates.begin() - result.candidates.begin();
@@ -387,6 +399,10 @@ void name_stable(SearchedBalance& chosen, Diagnosis& result) {
     return t.model.entry->name() == result.named.front().effect && t.model.order == result.named.front().order;
   });
   if (candidate != chosen.candidates.end()) std::rotate(chosen.candidates.begin(), candidate, candidate + 1);
+}
+
+bool Resampling::FoundTerm::is_strongly_confirmed() const {
+  return held_out_ratio && *held_out_ratio * *held_out_ratio <= 1.0 - kPolicy.matters_share;
 }
 
 bool Resampling::FoundTerm::is_confirmed() const {

@@ -17,6 +17,13 @@ Resampling resample(const std::vector<const data::Experiment*>& experiments, con
 // contradict it.
 bool resampling_decides(const Resampling& resampling, const SearchedBalance& motor);
 
+// The effects to name: single ones, or a group that these data cannot distinguish. Of a family of laws the one that
+// fits all data best.
+struct StableNames {
+  std::vector<NamedEffect> names;
+  bool is_group = false;
+};
+StableNames stable_names(const Resampling& resampling, const SearchedBalance& motor);
 // Whether it names any effect.
 bool names_any(const Resampling& resampling, const SearchedBalance& motor);
 

@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <numeric>
 
 #include "host/common/signals/butterworth.hpp"
 
@@ -45,11 +46,21 @@ struct SelectedRows {
   Eigen::Index total = 0;
 };
 
+Eigen::Index width_of(const RegressorTable& table) {
+  return table.columns.cols() + 1 + (table.presliding ? table.presliding->columns.cols() + 1 : 0);
+}
+
 // Adds the samples of a run, filtered and decimated, without those that are left out.
 void take_rows(const RegressorTable& table, const Run& run, double cutoff_hz, bool mask, SelectedRows& kept) {
   const Eigen::Index n = run.last - run.first;
-  Eigen::MatrixXd rows(n, table.columns.cols() + 1);
-  rows << table.columns.middleRows(run.first, n), table.target.segment(run.first, n);
+  Eigen::MatrixXd rows(n, width_of(table));
+  rows.leftCols(table.columns.cols()) = table.columns.middleRows(run.first, n);
+  rows.col(table.columns.cols()) = table.target.segment(run.first, n);
+  if (table.presliding) {
+    rows.middleCols(table.columns.cols() + 1, table.presliding->columns.cols()) =
+        table.presliding->columns.middleRows(run.first, n);
+    rows.rightCols(1) = table.presliding->target.segment(run.first, n);
+  }
   if (cutoff_hz < 0.99 * table.highest_hz) {
     const signals::ZeroPhaseFilter filter(signals::ZeroPhaseFilter::kDefaultOrder,
                                           std::min(cutoff_hz, 0.45 / run.row_s), 1.0 / run.row_s);
@@ -77,6 +88,18 @@ void take_rows(const RegressorTable& table, const Run& run, double cutoff_hz, bo
       take.push_back(k);
   }
   close();
+}
+
+// Columns of a setting's rows, by place.
+std::vector<Eigen::Index> presliding_columns(const RegressorTable& table) {
+  const PreslidingColumns& own = *table.presliding;
+  std::vector<Eigen::Index> columns(static_cast<std::size_t>(table.columns.cols()));
+  std::iota(columns.begin(), columns.end(), Eigen::Index{0});
+  const Eigen::Index first = table.columns.cols() + 1;
+  for (std::size_t i = 0; i < own.instead_of.size(); ++i)
+    columns[static_cast<std::size_t>(own.instead_of[i])] = first + static_cast<Eigen::Index>(i);
+  for (auto i = std::ssize(own.instead_of); i <= own.columns.cols(); ++i) columns.push_back(first + i);
+  return columns;
 }
 
 // Number of blocks of one record: in proportion to its samples, at least two, so that each half can have one.
@@ -132,14 +155,19 @@ std::vector<BlockRange> blocks_by_record(const Setting& setting) {
   return ranges;
 }
 
-Eigen::MatrixXd products_of(const Setting& setting, const BlockRange& blocks) {
-  const Eigen::Index columns = setting.rows.cols();
+Eigen::MatrixXd products_of(const Setting& setting, const Eigen::Ref<const Eigen::VectorXd>& all, Direction direction) {
+  const Eigen::Map<const Eigen::MatrixXd> square(all.data(), setting.rows.cols(), setting.rows.cols());
+  if (direction == Direction::sign) return square.topLeftCorner(setting.sign_width, setting.sign_width);
+  return square(setting.presliding, setting.presliding);
+}
+
+Eigen::MatrixXd products_of(const Setting& setting, const BlockRange& blocks, Direction direction) {
   const Eigen::VectorXd sum =
       setting.products
           .middleCols(static_cast<Eigen::Index>(blocks.first), static_cast<Eigen::Index>(blocks.last - blocks.first))
           .rowwise()
           .sum();
-  return sum.reshaped(columns, columns);
+  return products_of(setting, sum, direction);
 }
 
 Setting make_setting(const RegressorTable& table, double cutoff_hz, bool mask, bool held_out,
@@ -150,7 +178,9 @@ Setting make_setting(const RegressorTable& table, double cutoff_hz, bool mask, b
   SelectedRows kept;
   for (const Run& run : table.runs)
     if ((table.held_out[run.record] != 0) == held_out) take_rows(table, run, cutoff_hz, mask, kept);
-  setting.rows.resize(kept.total, table.columns.cols() + 1);
+  setting.rows.resize(kept.total, width_of(table));
+  setting.sign_width = table.columns.cols() + 1;
+  if (table.presliding) setting.presliding = presliding_columns(table);
   for (std::size_t i = 0; i < kept.runs.size(); ++i)
     setting.rows.middleRows(kept.runs[i].first, kept.runs[i].last - kept.runs[i].first) = kept.rows[i];
   setting.runs = std::move(kept.runs);

@@ -19,12 +19,24 @@ struct Setting {
   double cutoff_hz = 0.0;
   bool mask = false;
   std::vector<Block> blocks;
-  // Of each block, in a column, the products of [columns, target] with each other: sums over many choices of blocks are
-  // then one product of matrices.
+  // Of each block, in a column, the products of the columns of `rows` with each other: sums over many choices of blocks
+  // are then one product of matrices.
   Eigen::MatrixXd products;
-  // The samples, filtered and masked, for residuals.
-  Eigen::MatrixXd rows;  // [columns, target]
+  // The samples, filtered and masked: [columns, target], and behind them [columns, target] of the state of presliding.
+  Eigen::MatrixXd rows;
+  Eigen::Index sign_width = 0;  // of the first
+  // Columns of `rows` that a fit with the state of presliding uses in their places: those of the table, those of the
+  // shape of presliding, the target. Empty: it does not compete.
+  std::vector<Eigen::Index> presliding;
   std::vector<Run> runs;
+
+  // What a fit uses in a place, its target in the last one.
+  auto column(Eigen::Index place, Direction direction) const {
+    return rows.col(direction == Direction::sign ? place : presliding[static_cast<std::size_t>(place)]);
+  }
+  auto target(Direction direction) const {
+    return rows.col(direction == Direction::sign ? sign_width - 1 : presliding.back());
+  }
 };
 
 // Samples left out at each end of a run, in periods of the cut-off, where the filter guesses what lies beyond; masked
@@ -36,8 +48,10 @@ struct BlockRange {
   std::size_t record = 0, first = 0, last = 0;
 };
 std::vector<BlockRange> blocks_by_record(const Setting& setting);
-// Products of all samples of these blocks.
-Eigen::MatrixXd products_of(const Setting& setting, const BlockRange& blocks);
+// Products of all samples of these blocks: of what a fit uses, by place.
+Eigen::MatrixXd products_of(const Setting& setting, const BlockRange& blocks, Direction direction);
+// The same of products of all columns, which are one column of numbers.
+Eigen::MatrixXd products_of(const Setting& setting, const Eigen::Ref<const Eigen::VectorXd>& all, Direction direction);
 
 // Of the records that are held out, or of all others.
 Setting make_setting(const RegressorTable& table, double cutoff_hz, bool mask, bool held_out,

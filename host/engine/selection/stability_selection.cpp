@@ -27,13 +27,20 @@ double median_of_positive(std::vector<double> x) {
   return x.empty() ? 1.0 : median(std::move(x));
 }
 
+RegressorTable without_samples(const RegressorTable& table) {
+  RegressorTable places = table;
+  places.columns.resize(0, table.columns.cols());
+  if (places.presliding) places.presliding->columns.resize(0, table.presliding->columns.cols());
+  return places;
+}
+
 }  // namespace
 
 StabilitySelection::StabilitySelection(const std::vector<const data::Experiment*>& experiments,
                                        const model::Drive& drive, const estimation::Terms& terms, Balance balance,
                                        const SelectionPolicy& policy)
     : policy_(policy), tables_(make_tables(experiments, drive, terms, balance, policy)) {
-  if (tables_.sign.model_columns > 0) evaluate();
+  if (tables_.table.model_columns > 0) evaluate();
 }
 
 void StabilitySelection::evaluate() {
@@ -57,42 +64,41 @@ std::optional<TimeLag> StabilitySelection::time_lag(const std::vector<std::strin
   for (const std::string& name : names)
     for (const int term : terms_of(setting, {name}))
       terms.push_back(term == kPreslidingTerm ? term : setting.terms[static_cast<std::size_t>(term)]);
-  const bool presliding = std::erase(terms, kPreslidingTerm) > 0 && tables_.presliding;
-  const std::optional<TimeLag> lag = estimate_time_lag(presliding ? *tables_.presliding : tables_.sign, terms, policy_);
+  const bool presliding = std::erase(terms, kPreslidingTerm) > 0 && tables_.table.presliding;
+  const std::optional<TimeLag> lag =
+      estimate_time_lag(tables_.table, terms, presliding ? Direction::presliding : Direction::sign, policy_);
   if (!lag || std::abs(lag->seconds) < policy_.delay_errors * lag->std || lag->share < policy_.line_share)
     return std::nullopt;
   return lag;
 }
 
 void StabilitySelection::take_off(const TimeLag& lag) {
-  take_off_lag(tables_.sign, lag.seconds);
-  if (tables_.presliding) take_off_lag(*tables_.presliding, lag.seconds);
+  take_off_lag(tables_.table, lag.seconds);
   evaluate();
 }
 
-Noise StabilitySelection::noise_of_best(const Samples& samples, const std::vector<double>& weights,
-                                        FrictionRandomEffects& differences, SettingResult& result) const {
-  const Setting& one = samples.sign;
+Noise StabilitySelection::noise_of_best(const RegressorTable& table, const Setting& setting,
+                                        const std::vector<double>& weights, FrictionRandomEffects& differences,
+                                        SettingResult& result) const {
   Noise noise;
   for (int round = 0; round < 2; ++round) {
-    result.all = sum_of(one, samples.presliding(), weights, differences);
+    result.all = sum_of(setting, weights, differences);
     const SelectionPath rough = select_forward(result.columns, result.all, result.all, noise, policy_);
     std::vector<int> chosen;
     for (const SelectionStep& s : rough.steps) chosen.push_back(s.term);
     const TermFit fitted = fit_terms(result.columns, chosen, result.all, result.all);
     const bool z = std::find(chosen.begin(), chosen.end(), kPreslidingTerm) != chosen.end();
-    const Setting& seen = z ? *samples.presliding() : one;
-    const Eigen::VectorXd residual = weighted_residual(seen, fitted, weights, differences);
-    noise.variance = semivariance(one, residual);
+    const Direction direction = z ? Direction::presliding : Direction::sign;
+    const Eigen::VectorXd residual = weighted_residual(setting, direction, fitted, weights, differences);
+    noise.variance = semivariance(setting, residual);
     std::vector<estimation::RowRange> ranges;
-    for (const Run& run : one.runs) ranges.push_back({run.record, run.first, run.last});
+    for (const Run& run : setting.runs) ranges.push_back({run.record, run.first, run.last});
     noise.tau = std::max(2.0, estimation::autocorrelation_time(ranges, residual));
     const double left = residual.squaredNorm() / static_cast<double>(std::max<Eigen::Index>(1, residual.size()));
     result.whiteness = residual.size() > 0 ? noise.variance / std::max(left, 1e-300) : -1.0;
     if (result.columns.differences.empty() || round == 1) break;
     differences.noise = noise.tau * std::max(left, 1e-12);
-    differences.variance = friction_effects_of(z ? *samples.presliding_table : samples.sign_table, seen, weights,
-                                               differences.noise, policy_);
+    differences.variance = friction_effects_of(table, setting, direction, weights, differences.noise, policy_);
   }
   return noise;
 }
@@ -100,39 +106,30 @@ Noise StabilitySelection::noise_of_best(const Samples& samples, const std::vecto
 StabilitySelection::SettingResult StabilitySelection::evaluate_setting(double cutoff_hz, bool mask,
                                                                        std::uint64_t seed) const {
   SettingResult result;
-  for (std::size_t t = 0; t < tables_.sign.terms.size(); ++t)
-    if (tables_.may_enter(tables_.sign.terms[t], cutoff_hz)) result.terms.push_back(static_cast<int>(t));
-  // Columns of waves that a bandwidth cannot show would cost most of the time.
-  Samples samples{with_terms(tables_.sign, result.terms), std::nullopt, {}, std::nullopt};
-  samples.sign = make_setting(samples.sign_table, cutoff_hz, mask, false, policy_);
-  const Setting& one = samples.sign;
-  if (one.blocks.size() < 4 || static_cast<double>(one.rows.rows()) <
-                                   policy_.fewest_rows_per_column * static_cast<double>(tables_.sign.model_columns))
+  for (std::size_t t = 0; t < tables_.table.terms.size(); ++t)
+    if (tables_.may_enter(tables_.table.terms[t], cutoff_hz)) result.terms.push_back(static_cast<int>(t));
+  // Columns of waves that a bandwidth cannot show would cost most of the time. Presliding shows around reversals alone.
+  const RegressorTable table = with_terms(tables_.table, result.terms, !mask);
+  const Setting setting = make_setting(table, cutoff_hz, mask, false, policy_);
+  if (setting.blocks.size() < 4 || static_cast<double>(setting.rows.rows()) <
+                                       policy_.fewest_rows_per_column * static_cast<double>(table.model_columns))
     return result;
-  if (tables_.presliding && !mask) {
-    samples.presliding_table = with_terms(*tables_.presliding, result.terms);
-    samples.presliding_setting = make_setting(*samples.presliding_table, cutoff_hz, mask, false, policy_);
-    if (samples.presliding()->blocks.size() != one.blocks.size()) samples.presliding_setting.reset();
-  }
-  result.columns = samples.sign_table;
-  result.columns.columns.resize(0, 0);
-  std::vector<double> weights = record_weights(samples.sign_table, one);
-  FrictionRandomEffects differences{samples.sign_table.differences, {}, 0.0};
-  const Noise noise = noise_of_best(samples, weights, differences, result);
-  select_on_halves(samples, weights, differences, noise, seed, result);
+  result.columns = without_samples(table);
+  std::vector<double> weights = record_weights(table, setting);
+  FrictionRandomEffects differences{table.differences, {}, 0.0};
+  const Noise noise = noise_of_best(table, setting, weights, differences, result);
+  select_on_halves(setting, weights, differences, noise, seed, result);
 
-  const Setting held = make_setting(samples.sign_table, cutoff_hz, mask, true, policy_);
+  const Setting held = make_setting(table, cutoff_hz, mask, true, policy_);
   if (held.blocks.empty()) return result;
-  std::optional<Setting> held_presliding;
-  if (samples.presliding()) held_presliding = make_setting(*samples.presliding_table, cutoff_hz, mask, true, policy_);
   // A record that was not fitted on has no variance of its own: it counts as the median of the others.
   const double usual = median_of_positive(weights);
   for (double& w : weights) w = w > 0.0 ? w : usual;
-  result.held_out = sum_of(held, held_presliding ? &*held_presliding : nullptr, weights, differences);
+  result.held_out = sum_of(held, weights, differences);
   return result;
 }
 
-void StabilitySelection::select_on_halves(const Samples& samples, const std::vector<double>& weights,
+void StabilitySelection::select_on_halves(const Setting& setting, const std::vector<double>& weights,
                                           const FrictionRandomEffects& differences, const Noise& noise,
                                           std::uint64_t seed, SettingResult& result) const {
   constexpr std::size_t kTogether = 8;  // pairs: as many as leave their products in memory that is near
@@ -142,9 +139,9 @@ void StabilitySelection::select_on_halves(const Samples& samples, const std::vec
   std::vector<std::vector<std::uint8_t>> in;
   for (std::size_t pair = 0; pair < policy_.pairs; ++pair) {
     const bool by_record = records >= policy_.fewest_records_to_split && pair % 2 == 1;
-    in.push_back(by_record ? half_of_records(samples.sign, chance) : half_of_blocks(samples.sign, chance));
+    in.push_back(by_record ? half_of_records(setting, chance) : half_of_blocks(setting, chance));
     if (in.size() < kTogether && pair + 1 < policy_.pairs) continue;
-    for (const auto& [a, b] : halves_of(samples.sign, samples.presliding(), weights, in, differences)) {
+    for (const auto& [a, b] : halves_of(setting, weights, in, differences)) {
       result.votes.push_back(select_forward(result.columns, a, b, noise, policy_));
       result.votes.push_back(select_forward(result.columns, b, a, noise, policy_));
     }
@@ -229,17 +226,17 @@ Frequency frequency_of(Count& c) {
 }  // namespace
 
 void StabilitySelection::count() {
-  const RegressorTable& sign = tables_.sign;
+  const RegressorTable& table = tables_.table;
   Counts counts;
   std::vector<double> explained, white;
   for (std::size_t i = 0; i < per_setting_.size(); ++i) {
     if (per_setting_[i].votes.empty()) continue;
     std::map<std::string, const CandidateTerm*> open;
     for (const int t : per_setting_[i].terms) {
-      const CandidateTerm& term = sign.terms[static_cast<std::size_t>(t)];
+      const CandidateTerm& term = table.terms[static_cast<std::size_t>(t)];
       open[term.name] = &term;
     }
-    if (tables_.presliding && !tables_.settings[i].second) open[kPresliding] = nullptr;
+    if (tables_.table.presliding && !tables_.settings[i].second) open[kPresliding] = nullptr;
     for (const SelectionPath& vote : per_setting_[i].votes) {
       result_.subsamples += 1.0;
       for (const auto& [name, term] : open) counts[name].open[tables_.settings[i].second ? 1 : 0] += 1.0;
@@ -257,7 +254,7 @@ void StabilitySelection::count() {
         }
         c.could[tables_.settings[i].second ? 1 : 0] += 1.0;
       }
-      explained.push_back(count_steps(sign, vote, tables_.settings[i].second, counts));
+      explained.push_back(count_steps(table, vote, tables_.settings[i].second, counts));
     }
   }
   for (std::size_t i = 0; i < per_setting_.size(); ++i)

@@ -60,22 +60,13 @@ class StabilitySelection {
     HalfData all, held_out;
   };
 
-  // The samples of a setting, with the sign of the velocity and with the presliding state.
-  struct Samples {
-    RegressorTable sign_table;
-    std::optional<RegressorTable> presliding_table;
-    Setting sign;
-    std::optional<Setting> presliding_setting;
-    const Setting* presliding() const { return presliding_setting ? &*presliding_setting : nullptr; }
-  };
-
   SettingResult evaluate_setting(double cutoff_hz, bool mask, std::uint64_t seed) const;
   // Noise that the best model of all data leaves: first with the same friction in all records, then with random
   // effects, which would otherwise count as slow noise. Sets `differences`, and of `result` the sums and the whiteness.
-  Noise noise_of_best(const Samples& samples, const std::vector<double>& weights, FrictionRandomEffects& differences,
-                      SettingResult& result) const;
+  Noise noise_of_best(const RegressorTable& table, const Setting& setting, const std::vector<double>& weights,
+                      FrictionRandomEffects& differences, SettingResult& result) const;
   // Chooses on each of policy.pairs pairs of halves, in both directions.
-  void select_on_halves(const Samples& samples, const std::vector<double>& weights,
+  void select_on_halves(const Setting& setting, const std::vector<double>& weights,
                         const FrictionRandomEffects& differences, const Noise& noise, std::uint64_t seed,
                         SettingResult& result) const;
   void evaluate();

@@ -3,27 +3,52 @@
 #include <algorithm>
 #include <cmath>
 #include <numbers>
-#include <span>
 
 #include "host/common/signals/butterworth.hpp"
 
 namespace flexspline::selection {
 
+namespace {
+
+estimation::PreparedData with_direction(
+    estimation::PreparedData prepared, const std::function<std::vector<double>(const estimation::Record&)>& direction) {
+  for (estimation::Record& r : prepared.records) r.inputs.directions[0] = direction(r);
+  return prepared;
+}
+
+}  // namespace
+
+DirectedData::DirectedData(const estimation::PreparedData& original, Balance balance,
+                           const std::function<std::vector<double>(const estimation::Record&)>& direction)
+    : prepared(with_direction(original, direction)), data(prepared, balance) {}
+
 std::vector<std::size_t> TableBuilder::on_balance() const {
-  return estimation::terms_on(terms, data.balance(), prepared().output_signals);
+  return estimation::terms_on(terms, sign.data.balance(), sign.prepared.output_signals);
 }
 
-Eigen::Index TableBuilder::add(Eigen::VectorXd column) {
-  columns.push_back(std::move(column));
-  return static_cast<Eigen::Index>(columns.size()) - 1;
+TableBuilder::Made TableBuilder::make(const Make& columns_of, bool reads_direction) const {
+  return {columns_of(sign), presliding && reads_direction ? columns_of(*presliding) : Eigen::MatrixXd()};
 }
 
-void TableBuilder::filter(Eigen::VectorXd& column) const {
+std::vector<Eigen::Index> TableBuilder::add(Made made) {
+  std::vector<Eigen::Index> places;
+  for (Eigen::Index j = 0; j < made.sign.cols(); ++j) {
+    places.push_back(std::ssize(columns));
+    columns.emplace_back(made.sign.col(j));
+    if (made.presliding.cols() == 0) continue;
+    table.presliding->instead_of.push_back(places.back());
+    presliding_columns.emplace_back(made.presliding.col(j));
+  }
+  return places;
+}
+
+Eigen::MatrixXd TableBuilder::filtered(Eigen::MatrixXd rows) const {
   for (const Run& run : table.runs) {
     const signals::ZeroPhaseFilter filter(signals::ZeroPhaseFilter::kDefaultOrder,
                                           std::min(table.highest_hz, 0.45 / run.row_s), 1.0 / run.row_s);
-    filter.apply_in_place(std::span<double>(column.data() + run.first, static_cast<std::size_t>(run.last - run.first)));
+    filter.apply_columns_in_place(rows.middleRows(run.first, run.last - run.first));
   }
+  return rows;
 }
 
 Motion motion_of(const estimation::PreparedData& prepared) {

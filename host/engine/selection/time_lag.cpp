@@ -13,13 +13,13 @@
 namespace flexspline::selection {
 namespace {
 
-// The target as it was `lag_s` later.
-Eigen::VectorXd shifted(const RegressorTable& table, double lag_s) {
-  Eigen::VectorXd target = table.target;
-  for (const Run& run : table.runs) {
+// A target as it was `lag_s` later.
+Eigen::VectorXd shifted(const Eigen::VectorXd& now, const std::vector<Run>& runs, double lag_s) {
+  Eigen::VectorXd target = now;
+  for (const Run& run : runs) {
     const auto n = static_cast<std::size_t>(run.last - run.first);
     const std::vector<double> moved =
-        signals::fractional_delay(std::span<const double>(table.target.data() + run.first, n), -lag_s / run.row_s);
+        signals::fractional_delay(std::span<const double>(now.data() + run.first, n), -lag_s / run.row_s);
     target.segment(run.first, run.last - run.first) =
         Eigen::Map<const Eigen::VectorXd>(moved.data(), run.last - run.first);
   }
@@ -27,9 +27,11 @@ Eigen::VectorXd shifted(const RegressorTable& table, double lag_s) {
 }
 
 // The table with the model's columns, those of some terms and the target at each lag, in this order.
-RegressorTable with_lags(const RegressorTable& table, const std::vector<int>& terms, const std::vector<double>& lags) {
-  RegressorTable small = table;
-  small.terms.clear();
+RegressorTable with_lags(const RegressorTable& table, const std::vector<int>& terms, Direction direction,
+                         const std::vector<double>& lags) {
+  RegressorTable small;
+  static_cast<TableSamples&>(small) = table;
+  static_cast<TableModel&>(small) = table;
   std::vector<Eigen::Index> own;
   for (Eigen::Index j = 0; j < table.model_columns; ++j) own.push_back(j);
   for (const int t : terms)
@@ -37,21 +39,29 @@ RegressorTable with_lags(const RegressorTable& table, const std::vector<int>& te
   const auto columns = static_cast<Eigen::Index>(own.size());
   small.columns.resize(table.columns.rows(), columns + static_cast<Eigen::Index>(lags.size()));
   small.columns.leftCols(columns) = table.columns(Eigen::all, own);
+  const bool presliding = direction == Direction::presliding;
+  if (presliding)
+    for (std::size_t i = 0; i < table.presliding->instead_of.size(); ++i) {
+      const auto at = std::find(own.begin(), own.end(), table.presliding->instead_of[i]);
+      if (at != own.end())
+        small.columns.col(at - own.begin()) = table.presliding->columns.col(static_cast<Eigen::Index>(i));
+    }
   for (std::size_t i = 0; i < lags.size(); ++i)
-    small.columns.col(columns + static_cast<Eigen::Index>(i)) = shifted(table, lags[i]);
+    small.columns.col(columns + static_cast<Eigen::Index>(i)) =
+        shifted(presliding ? table.presliding->target : table.target, table.runs, lags[i]);
   return small;
 }
 
 }  // namespace
 
 std::optional<TimeLag> estimate_time_lag(const RegressorTable& table, const std::vector<int>& terms,
-                                         const SelectionPolicy& policy) {
+                                         Direction direction, const SelectionPolicy& policy) {
   double row_s = 0.0;
   for (const Run& run : table.runs) row_s = std::max(row_s, run.row_s);
   std::vector<double> lags;
   // Whole rows alone, as interpolation between them would take off noise.
   for (int k = -policy.most_lag_rows; k <= policy.most_lag_rows; ++k) lags.push_back(row_s * k);
-  const RegressorTable small = with_lags(table, terms, lags);
+  const RegressorTable small = with_lags(table, terms, direction, lags);
   const Setting setting = make_setting(small, table.highest_law_hz, false, false, policy);
   const auto tried = static_cast<Eigen::Index>(lags.size());
   const Eigen::Index columns = small.columns.cols() - tried;
@@ -88,7 +98,8 @@ std::optional<TimeLag> estimate_time_lag(const RegressorTable& table, const std:
 }
 
 void take_off_lag(RegressorTable& table, double lag_s) {
-  table.target = shifted(table, lag_s);
+  table.target = shifted(table.target, table.runs, lag_s);
+  if (table.presliding) table.presliding->target = shifted(table.presliding->target, table.runs, lag_s);
 }
 
 }  // namespace flexspline::selection

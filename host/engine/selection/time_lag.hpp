@@ -19,7 +19,7 @@ struct TimeLag {
 // of `terms` (places in table.terms), at the highest bandwidth of the motion. Nothing where the data have too few
 // samples or the best lag is at the end of the range.
 std::optional<TimeLag> estimate_time_lag(const RegressorTable& table, const std::vector<int>& terms,
-                                         const SelectionPolicy& policy);
+                                         Direction direction, const SelectionPolicy& policy);
 
 // Takes a lag off the target.
 void take_off_lag(RegressorTable& table, double lag_s);

@@ -205,6 +205,19 @@ double share_of(const CrossValidatedFit& base, const CrossValidatedFit& named, c
   return with_curve < 1.0 ? (1.0 - with_named) / (1.0 - with_curve) : 1.0;
 }
 
+// Whether halves of the data choose the effect as well, and experiments that are held out confirm it.
+bool is_chosen_and_confirmed(const Diagnosis& result, const CandidateFit& named) {
+  if (!result.resampling) return false;
+  return std::any_of(result.resampling->found.begin(), result.resampling->found.end(), [&](const auto& found) {
+    return found.is_strongly_confirmed() && std::any_of(found.group.begin(), found.group.end(), [&](const auto& n) {
+             const catalogue::Entry& entry = catalogue::get(n.effect);
+             const std::string_view family = entry.info->family;
+             return n.order == named.model.order &&
+                    (&entry == named.model.entry || (!family.empty() && named.model.entry->info->family == family));
+           });
+  });
+}
+
 }  // namespace
 
 void check_unknown_structure(BalanceSearch& search, const CandidateFit* named, Diagnosis& result) {
@@ -224,6 +237,11 @@ void check_unknown_structure(BalanceSearch& search, const CandidateFit* named, D
     if (!more.empty() && passes(more.front()) &&
         share(more.front(), named->model.added + more.front().model.added) >= kPolicy.recovered_by_two)
       return;
+    // The curve then shows what else is missing.
+    if (is_chosen_and_confirmed(result, *named)) {
+      result.partial = true;
+      return;
+    }
     result.named.clear();
     result.remaining_structure = result.localised;
   } else if (likelihood_gain(search.base, with_curve(search, *unknown), unknown->curve.effective).score <

@@ -22,7 +22,11 @@ std::optional<double> wald_p_value(const Candidate& candidate) {
 
 bool is_confirmed_by_held_out(const Diagnosis& result, const NamedEffect& name) {
   if (!result.resampling || !result.resampling->decides) return false;
-  const auto is_it = [&](const NamedEffect& n) { return n.effect == name.effect && n.order == name.order; };
+  const std::string_view family = catalogue::get(name.effect).info->family;
+  const auto is_it = [&](const NamedEffect& n) {
+    const bool same = n.effect == name.effect || (!family.empty() && catalogue::get(n.effect).info->family == family);
+    return same && n.order == name.order;
+  };
   return std::any_of(result.resampling->found.begin(), result.resampling->found.end(), [&](const auto& found) {
     return found.is_confirmed() && std::any_of(found.group.begin(), found.group.end(), is_it);
   });

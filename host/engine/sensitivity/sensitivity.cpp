@@ -17,6 +17,7 @@
 #include "host/engine/comparison/score.hpp"
 #include "host/engine/estimation/identify.hpp"
 #include "host/engine/estimation/in_parallel.hpp"
+#include "host/engine/estimation/modelled_torque.hpp"
 #include "host/engine/selection/add.hpp"
 #include "host/engine/sensitivity/lines.hpp"
 
@@ -80,6 +81,7 @@ class Analysis {
     prepared_ = estimation::prepare(fit.empty() ? all : fit, model_, options.pipeline);
     if (!fit.empty() && fit.size() < all.size())
       prepared_ = estimation::prepare_with(all, model_.drive, prepared_.pipeline);
+    estimation::take_torque_where_read(prepared_, estimation::terms_of(model_));
     result_.pipeline = prepared_.pipeline;
     find_balances();
     find_lines();

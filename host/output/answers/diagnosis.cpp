@@ -28,7 +28,7 @@ constexpr double kRunFrictionMatters = 0.95;
 
 std::string evidence(const Diagnosis& d) {
   std::string text;
-  if (d.balance) text += fmt::format("{} balance: ", balance_name(*d.balance));
+  if (d.balance) text += fmt::format("{} balance: ", catalogue::balance_name(*d.balance));
   text += fmt::format("error {}, {} on data left out of the fit", with_unit(d.base_rmse, d.unit),
                       with_unit(d.base_rmse_cv, d.unit));
   if (d.noise_floor)
@@ -57,9 +57,9 @@ std::string candidate_table(const Diagnosis& d) {
   std::size_t rank = 0;
   for (const Candidate& c : d.candidates) {
     if (++rank > kRowsShown) break;
-    table.row({fmt::format("{}", rank), effect_label(c.effect, c.order), balance_name(c.balance), number(c.score),
-               fmt::format("{:.1f} %", c.chi2_decrease_percent), number(c.rmse_cv_before), number(c.rmse_cv_after),
-               d.unit, detectable_in_words(c), c.admissible ? "" : "refused: " + c.why_not});
+    table.row({fmt::format("{}", rank), effect_label(c.effect, c.order), catalogue::balance_name(c.balance),
+               number(c.score), fmt::format("{:.1f} %", c.chi2_decrease_percent), number(c.rmse_cv_before),
+               number(c.rmse_cv_after), d.unit, detectable_in_words(c), c.admissible ? "" : "refused: " + c.why_not});
   }
   return table.text();
 }
@@ -93,7 +93,7 @@ void print_next(Console& console, const Diagnosis& d, const std::string& add_com
       for (const selection::NamedEffect& n : d.named)
         if (const Candidate* c = candidate_of(d, n); c == nullptr || c->admissible)
           steps.push_back(replaced(add_command, "EFFECT", effect_label(n.effect, n.order)));
-      if (d.named.size() > 1)
+      if (d.verdict == Verdict::confusable_effects && d.named.size() > 1)
         steps.push_back(fmt::format(
             "flexspline plan --separate {},{} --help   shows how to record what distinguishes them",
             effect_label(d.named[0].effect, d.named[0].order), effect_label(d.named[1].effect, d.named[1].order)));
@@ -242,7 +242,7 @@ json candidate_json(const Candidate& c, std::size_t rank, const std::string& uni
   };
   return {{"effect", c.effect},
           {"order", json_number(c.order)},
-          {"balance", balance_name(c.balance)},
+          {"balance", catalogue::balance_name(c.balance)},
           {"rank", rank},
           {"score", json_number(c.score)},
           {"score_elsewhere", json_number(c.other_balance_score)},
@@ -446,7 +446,7 @@ json diagnosis_json(const Diagnosis& d) {
   return {{"format", "flexspline-diagnose/1"},
           {"verdict", selection::verdict_name(d.verdict)},
           {"named", named_json(d.named)},
-          {"balance", d.balance ? json(balance_name(*d.balance)) : json(nullptr)},
+          {"balance", d.balance ? json(catalogue::balance_name(*d.balance)) : json(nullptr)},
           {"base",
            {{"rmse", json_number(d.base_rmse)},
             {"rmse_cv", json_number(d.base_rmse_cv)},

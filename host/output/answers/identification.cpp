@@ -147,7 +147,7 @@ std::string pooled(const estimation::Identification& found) {
 std::string errors(const estimation::Identification& found) {
   Table table({"balance", "rmse", "unit", "samples", "condition"}, "lrlrr");
   for (const estimation::BalanceFit& fit : found.fits)
-    table.row({balance_name(fit.balance), number(fit.rmse()), torque_unit(found.model.drive.axis),
+    table.row({catalogue::balance_name(fit.balance), number(fit.rmse()), torque_unit(found.model.drive.axis),
                fmt::format("{}", fit.residual.size()), number(fit.condition_number)});
   return table.text();
 }
@@ -156,18 +156,6 @@ std::string errors(const estimation::Identification& found) {
 
 std::string torque_unit(data::Axis axis) {
   return axis == data::Axis::rotary ? "N*m" : "N";
-}
-
-std::string balance_name(estimation::Balance balance) {
-  switch (balance) {
-    case estimation::Balance::motor:
-      return "motor";
-    case estimation::Balance::transmission:
-      return "transmission";
-    case estimation::Balance::load:
-      return "load";
-  }
-  return "";
 }
 
 namespace {
@@ -278,7 +266,7 @@ json identification_json(const estimation::Identification& found, const std::str
   }
   json balances = json::array();
   for (const estimation::BalanceFit& fit : found.fits)
-    balances.push_back({{"balance", balance_name(fit.balance)},
+    balances.push_back({{"balance", catalogue::balance_name(fit.balance)},
                         {"rmse", json_number(fit.rmse())},
                         {"unit", torque_unit(found.model.drive.axis)},
                         {"rows", fit.residual.size()},

@@ -21,6 +21,5 @@ nlohmann::json identification_json(const estimation::Identification& found, cons
 
 // "N*m", or "N" on a linear axis.
 std::string torque_unit(data::Axis axis);
-std::string balance_name(estimation::Balance balance);
 
 }  // namespace flexspline::output

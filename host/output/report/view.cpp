@@ -6,6 +6,7 @@
 #include "host/engine/estimation/balance_fit.hpp"
 #include "host/engine/estimation/in_parallel.hpp"
 #include "host/engine/estimation/least_squares.hpp"
+#include "host/engine/estimation/modelled_torque.hpp"
 
 namespace flexspline::report {
 namespace {
@@ -21,9 +22,12 @@ model::Model reconciled(const model::Model& model, const data::Dataset& dataset)
 }
 
 std::shared_ptr<const estimation::PreparedData> records_for(const Subject& subject, const model::Model& model) {
-  if (subject.pipeline.ready) return subject.pipeline.ready;
-  return std::make_shared<const estimation::PreparedData>(
-      estimation::prepare_all(*subject.dataset, model, subject.pipeline));
+  const estimation::Terms terms = estimation::terms_of(model);
+  if (subject.pipeline.ready && !estimation::reads_torque(terms)) return subject.pipeline.ready;
+  const auto records =
+      std::make_shared<estimation::PreparedData>(estimation::prepare_all(*subject.dataset, model, subject.pipeline));
+  estimation::take_torque_where_read(*records, terms);
+  return records;
 }
 
 }  // namespace

@@ -147,6 +147,18 @@ const std::vector<Entry>& entries() {
 
 }  // namespace
 
+std::string balance_name(Balance balance) {
+  switch (balance) {
+    case Balance::motor:
+      return "motor";
+    case Balance::transmission:
+      return "transmission";
+    case Balance::load:
+      return "load";
+  }
+  return {};
+}
+
 std::size_t Entry::index_of(std::string_view parameter) const {
   const auto at =
       std::find_if(parameters.begin(), parameters.end(), [&](const auto& p) { return p.name == parameter; });

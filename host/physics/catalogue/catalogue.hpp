@@ -20,11 +20,15 @@ struct Definition;
 namespace flexspline::catalogue {
 
 using effects::Balance;
+
 using effects::DriveConstants;
 using effects::Kind;
 using effects::Phase;
 using numbers::Dual;
 using numbers::Real;
+
+// "motor", "transmission" or "load", as model files and answers have it.
+std::string balance_name(Balance balance);
 
 // An effect at work in a simulation: coefficients and inner state.
 class Instance {

@@ -20,7 +20,7 @@ struct Direction {
   double RealInputs::*signal;
   unsigned reads;
 };
-constexpr Direction kDirections[] = {{"direction", &RealInputs::direction, effects::kMotorMotion},
+constexpr Direction kDirections[] = {{"direction", &RealInputs::direction, effects::kMotorMotion | effects::kDirection},
                                      {"output_direction", &RealInputs::output_direction, effects::kOutputMotion},
                                      {"torsion_direction", &RealInputs::torsion_direction, effects::kTorsion}};
 

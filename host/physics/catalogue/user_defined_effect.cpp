@@ -67,7 +67,7 @@ BlockFunctions<N> with_stated(const BlockFunctions<N>& base, const std::vector<d
 
 // The signals that hold a balance's direction.
 unsigned motion_on(Balance balance) {
-  return balance == Balance::motor  ? effects::kMotorMotion
+  return balance == Balance::motor  ? effects::kMotorMotion | effects::kDirection
          : balance == Balance::load ? effects::kOutputMotion
                                     : effects::kTorsion;
 }
