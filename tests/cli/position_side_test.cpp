@@ -55,6 +55,28 @@ TEST(PositionSide, OfTheLinkWithTheCurrentOfTheMotorGivesTheMotorsInertiaByOneOp
   EXPECT_NEAR(inertia_of(shell, "--gear-ratio 100 --position-side motor"), kJ, 0.02 * kJ);
 }
 
+// A joint with an elastic gear in the symbols of its textbooks, which libfranka uses as well: theta of the motor, q of
+// the link, tau_J between both. tau_J is no torque of the motor.
+TEST(PositionSide, IsSaidByTheSymbolsOfElasticJoints) {
+  const Shell shell;
+  std::string log = "time,theta,q,dq,tau_J,iq\n";
+  for (int k = 0; k < 3000; ++k) {
+    const double t = 0.002 * k, q = 0.8 * std::sin(2.0 * t), torque = 20.0 * std::sin(q);
+    char line[200];
+    std::snprintf(line, sizeof line, "%.3f,%.9g,%.9g,%.9g,%.6g,%.6g\n", t, kRatio * (q + torque / 2e4), q,
+                  1.6 * std::cos(2.0 * t), torque, torque / kRatio / kKm);
+    log += line;
+  }
+  shell.write("log.csv", log);
+  const std::string said =
+      shell.must("flexspline new --from log.csv --out project --gear-ratio 100 --torque-constant 0.1");
+  EXPECT_TRUE(contains(said, "motor_position_rad: \"theta\"")) << said;
+  EXPECT_TRUE(contains(said, "output_position_rad: \"q\"")) << said;
+  EXPECT_TRUE(contains(said, "torque_nm: \"tau_J\"")) << said;
+  EXPECT_FALSE(contains(said, "motor_torque_nm")) << said;
+  EXPECT_TRUE(contains(said, "linear_stiffness")) << said;
+}
+
 TEST(PositionSide, IsAskedForWhereNamesDoNotSayAndTheRatioMakesADifference) {
   const Shell shell;
   shell.write("log.csv", joint_log("time,pos,vel,iq"));

@@ -118,13 +118,30 @@ Side side_by_letter(const std::string& name, Kind kind, const std::vector<std::s
   return std::find(names.begin(), names.end(), other) != names.end() ? side : Side::open;
 }
 
+// The torque between motor and link, as texts on joints with an elastic gear and libfranka call it.
+bool is_joint_torque(const std::vector<std::string>& words) {
+  return words == std::vector<std::string>{"tau", "j"};
+}
+
+// Such texts call the motor's angle theta and the link's q: where both are there, they say which side a column is of.
+Side side_by_joint_symbols(const std::vector<std::string>& words, const std::vector<std::string>& names) {
+  if (is_joint_torque(words)) return Side::link;
+  const auto is_there = [&](const char* symbol) {
+    return std::any_of(names.begin(), names.end(),
+                       [&](const std::string& name) { return has_any(words_of(without_index(name)), {symbol}); });
+  };
+  if (!is_there("theta") || !is_there("q")) return Side::open;
+  return has_any(words, {"theta", "dtheta"}) ? Side::motor : has_any(words, {"q", "dq"}) ? Side::link : Side::open;
+}
+
 Kind kind_of_words(const std::vector<std::string>& words) {
   if (has_any(words,
               {"time", "t", "timestamp", "zeit", "tout", "ts", "stamp", "uhrzeit", "timestamps", "duration", "today"}))
     return Kind::time;
   if (has_any(words, {"temperature", "temp", "temperatur"})) return Kind::temperature;
-  if (has_any(words, {"velocity", "vel",      "speed", "omega",           "w",  "qd", "dq",  "qdot", "rpm", "erpm",
-                      "actvelo",  "drehzahl", "velo",  "geschwindigkeit", "wm", "wl", "dqm", "dql",  "qdm", "qdl"}))
+  if (has_any(words,
+              {"velocity", "vel",      "speed", "omega",           "w",  "qd", "dq",  "qdot", "rpm", "erpm", "dtheta",
+               "actvelo",  "drehzahl", "velo",  "geschwindigkeit", "wm", "wl", "dqm", "dql",  "qdm", "qdl"}))
     return Kind::velocity;
   if (has_any(words, {"torque", "force", "tau", "moment", "effort", "trq", "tq", "drehmoment", "taum", "taul"}))
     return Kind::torque;
@@ -191,12 +208,14 @@ ColumnReading read_name(const std::string& name, const std::string& stated_unit,
                     (has_any(words, {"actual", "target"}) && has_any(words, {"q", "qd"}));
   const bool motor = has_any(words, {"motor", "mot", "rotor", "wg", "qm", "thetam", "phim", "wm", "dqm", "taum", "im"});
   r.side = motor ? Side::motor : link ? Side::link : side_by_letter(name, r.kind, names);
+  if (r.side == Side::open) r.side = side_by_joint_symbols(words, names);
   if (unit && kind_of_quantity(unit->quantity) != r.kind) r.unit.clear();
   // The last letter gave the side, so it is not a unit.
   if (r.side == Side::motor && r.unit == "m" && stated_unit.empty() && before_brackets(name).size() == name.size())
     r.unit.clear();
   r.external = has_any(words, {"external", "ext", "disturbance"});
-  r.sensor = has_any(words, {"sensor", "transducer", "measured", "gear", "gearbox", "flexspline"});
+  r.sensor =
+      is_joint_torque(words) || has_any(words, {"sensor", "transducer", "measured", "gear", "gearbox", "flexspline"});
   return r;
 }
 
