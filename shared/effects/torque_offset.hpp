@@ -17,7 +17,7 @@ struct TorqueOffset : Stateless {
       .check =
           "Read the sensor with the output free and at rest, in several positions; zero the bridge amplifier when it "
           "is warm.",
-      .confused_with = "torsion_zero,quadratic_stiffness",
+      .confused_with = "torsion_zero,quadratic_stiffness,current_offset,coulomb_asymmetry",
       .separated_by = "a record with the output free and the drive off",
       .adds_to = on(Balance::motor) | on(Balance::load),
   };

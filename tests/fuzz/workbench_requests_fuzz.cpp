@@ -3,6 +3,7 @@
 // models.
 #include <algorithm>
 #include <charconv>
+#include <chrono>
 #include <cmath>
 #include <cstddef>
 #include <cstdint>
@@ -10,6 +11,7 @@
 #include <set>
 #include <string>
 #include <string_view>
+#include <thread>
 #include <vector>
 
 #include "host/app/workbench/access_control.hpp"
@@ -63,6 +65,19 @@ struct Bench {
     setup.run = [](const auto&) -> std::vector<closed_loop::Outcome> { throw std::runtime_error("no twin here"); };
     api = std::make_unique<workbench::Api>(std::move(setup));
   }
+  // A job that is cancelled may be about to end a file: "better.toml.mkSKFA" gets its name in the next moment. One that
+  // stays is found by require_tidy().
+  void wait_for_writers() const {
+    const auto is_written = [](const fs::directory_entry& entry) {
+      return entry.path().stem().has_extension() && entry.path().extension().string().size() == 7;
+    };
+    const auto any = [&] {
+      const fs::directory_iterator files(folder);
+      return std::any_of(begin(files), end(files), is_written);
+    };
+    for (int tries = 0; tries < 500 && any(); ++tries) std::this_thread::sleep_for(std::chrono::milliseconds(10));
+  }
+
   // Nothing but models, reports and blocks under plain names, and nothing else where the folder is.
   void require_tidy() const {
     for (const auto& entry : fs::directory_iterator(place.path()))
@@ -172,6 +187,7 @@ extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* bytes, std::size_t siz
       ask(*bench.api, id, line);
   }
   bench.api->answer({"POST", "/api/do", {{"tab", id}}, R"({"do": "cancel"})", {}});
+  bench.wait_for_writers();
   bench.require_tidy();
   for (const auto& entry : fs::directory_iterator(bench.folder)) fs::remove(entry.path());
   return 0;

@@ -142,6 +142,7 @@ std::vector<SearchedBalance> search_balances(estimation::Identification& base, c
     const HeldOut held_out(dataset, base, estimation::Balance::motor, options.pipeline.ready.get());
     check_on_held_out(held_out, one.search, one.candidates);
   }
+  for (SearchedBalance& one : all) discount_evidence(all, one);
   return all;
 }
 

@@ -7,6 +7,7 @@
 
 #include "host/engine/selection/candidate_fits.hpp"
 #include "host/engine/selection/confounding.hpp"
+#include "host/engine/selection/other_balance_evidence.hpp"
 #include "host/engine/selection/policy.hpp"
 #include "host/engine/selection/resampling.hpp"
 
@@ -135,9 +136,7 @@ void take_back_shadows(const CandidateFit& first, const SearchedBalance& chosen,
     return;
   const catalogue::Entry& entry = *first.model.entry;
   std::erase_if(result.named, [&](const NamedEffect& n) {
-    const bool is_confused = catalogue::names_contain(entry.info->confused_with, n.effect) ||
-                             catalogue::names_contain(catalogue::get(n.effect).info->confused_with, entry.name());
-    if (!is_confused || n.order != first.model.order) return false;
+    if (!is_confused_with(first.model, catalogue::get(n.effect), n.order)) return false;
     result.possible.push_back({{n},
                                fmt::format("{}, which the {} balance shows, makes the same error here", entry.name(),
                                            catalogue::balance_name(entry.info->balance)),

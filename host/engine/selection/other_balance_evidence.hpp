@@ -3,7 +3,7 @@
 
 #include <vector>
 
-#include "host/engine/selection/candidate_fits.hpp"
+#include "host/engine/selection/searched_balance.hpp"
 
 namespace flexspline::selection {
 
@@ -18,5 +18,13 @@ std::vector<BalanceSearch*> other_balances_of(const std::vector<BalanceSearch*>&
 // `own` the one whose candidates these are.
 void add_other_balance_evidence(const std::vector<BalanceSearch*>& all, BalanceSearch& own,
                                 std::vector<CandidateFit>& candidates);
+
+// Whether the effect of a candidate and the named one may be taken for each other, by the catalogue, with the same
+// order if they have one.
+bool is_confused_with(const CandidateModel& candidate, const catalogue::Entry& named, std::optional<double> order);
+
+// Takes the evidence of other balances off a candidate of `own` without an order where a candidate of those, with which
+// it may be confused, explains more there: an offset of the motor's current is no offset of the torque's sensor.
+void discount_evidence(const std::vector<SearchedBalance>& all, SearchedBalance& own);
 
 }  // namespace flexspline::selection
