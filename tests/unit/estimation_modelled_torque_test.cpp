@@ -44,13 +44,6 @@ data::Dataset swinging_arm() {
   return dataset;
 }
 
-model::Model with(std::initializer_list<const char*> more) {
-  model::Model model = testing::plain_model();
-  for (const char* name : more)
-    model.effects.push_back(catalogue::blank_effect(catalogue::get(name), data::Axis::rotary));
-  return model;
-}
-
 // Of a unit coefficient, at one newton metre: the catalogue's own unit.
 double torque_of_unit() {
   catalogue::DriveConstants<double> constants;
@@ -64,7 +57,7 @@ double torque_of_unit() {
 }
 
 TEST(ModelledTorque, FrictionThatGrowsWithTheLoadIsIdentifiedWithoutATorqueSensor) {
-  const auto found = identify(swinging_arm(), with({"gravity", "load_dependent_friction"}), {});
+  const auto found = identify(swinging_arm(), testing::plain_model_with({"gravity", "load_dependent_friction"}), {});
   const auto value = [&](const char* effect, const char* parameter) {
     for (const Estimate& e : found->estimates)
       if (e.effect == effect && e.parameter == parameter) return e.value;
@@ -77,7 +70,8 @@ TEST(ModelledTorque, FrictionThatGrowsWithTheLoadIsIdentifiedWithoutATorqueSenso
 }
 
 TEST(ModelledTorque, AddedLoadFrictionTakesTheErrorOnHeldOutDataToTheNoise) {
-  const selection::Addition added = selection::add(swinging_arm(), with({"gravity"}), "load_dependent_friction", {});
+  const selection::Addition added =
+      selection::add(swinging_arm(), testing::plain_model_with({"gravity"}), "load_dependent_friction", {});
   ASSERT_TRUE(added.before.rmse_holdout && added.after.rmse_holdout);
   EXPECT_GT(*added.before.rmse_holdout, 8.0 * *added.after.rmse_holdout);
   EXPECT_LT(*added.after.rmse_holdout, 1.5 * kNoise_nm);
@@ -88,7 +82,7 @@ TEST(ModelledTorque, AddedLoadFrictionTakesTheErrorOnHeldOutDataToTheNoise) {
 }
 
 TEST(ModelledTorque, SetTwiceIsSetOnce) {
-  const auto found = identify(swinging_arm(), with({"gravity", "load_dependent_friction"}), {});
+  const auto found = identify(swinging_arm(), testing::plain_model_with({"gravity", "load_dependent_friction"}), {});
   PreparedData again = found->prepared;
   ASSERT_TRUE(take_torque_where_read(again, found->terms));
   PreparedData twice = again;
@@ -99,10 +93,10 @@ TEST(ModelledTorque, SetTwiceIsSetOnce) {
 }
 
 TEST(ModelledTorque, IsNotMadeWithoutAWeightOrWhereNothingReadsIt) {
-  const auto no_weight = identify(swinging_arm(), with({"load_dependent_friction"}), {});
+  const auto no_weight = identify(swinging_arm(), testing::plain_model_with({"load_dependent_friction"}), {});
   PreparedData prepared = no_weight->prepared;
   EXPECT_FALSE(take_torque_from_load(prepared, no_weight->terms));
-  const auto no_reader = identify(swinging_arm(), with({"gravity"}), {});
+  const auto no_reader = identify(swinging_arm(), testing::plain_model_with({"gravity"}), {});
   prepared = no_reader->prepared;
   EXPECT_FALSE(take_torque_where_read(prepared, no_reader->terms));
   EXPECT_TRUE(prepared.records.front().inputs.torque.empty());

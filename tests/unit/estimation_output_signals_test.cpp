@@ -44,15 +44,8 @@ data::Dataset loaded_axis(const Sensors& sensors) {
   return dataset;
 }
 
-model::Model with(std::initializer_list<const char*> more) {
-  model::Model model = testing::plain_model();
-  for (const char* name : more)
-    model.effects.push_back(catalogue::blank_effect(catalogue::get(name), data::Axis::rotary));
-  return model;
-}
-
 TEST(SensorOffset, IsIdentifiedOnTheMotorBalanceWhereNoTorsionIsMeasured) {
-  const auto found = identify(loaded_axis({}), with({"torque_offset"}), {});
+  const auto found = identify(loaded_axis({}), testing::plain_model_with({"torque_offset"}), {});
   const auto offset = std::find_if(found->estimates.begin(), found->estimates.end(),
                                    [](const Estimate& e) { return e.effect == "torque_offset"; });
   ASSERT_NE(offset, found->estimates.end());
@@ -72,8 +65,8 @@ TEST(SensorOffset, StaysOnTheTransmissionBalanceWhereATorsionIsMeasured) {
 
 TEST(NoisyTorsion, KeepsItsReversalsWhereAMaskWouldLeaveNothing) {
   // The torsion is 200 urad in all, so that its rate is far below the noise of a difference of two velocities.
-  const auto found =
-      identify(loaded_axis({.has_output_position = true}), with({"linear_stiffness", "torque_offset"}), {});
+  const auto found = identify(loaded_axis({.has_output_position = true}),
+                              testing::plain_model_with({"linear_stiffness", "torque_offset"}), {});
   EXPECT_TRUE(found->prepared.pipeline.keep_torsion_reversals);
   const auto stiffness = std::find_if(found->estimates.begin(), found->estimates.end(),
                                       [](const Estimate& e) { return e.effect == "linear_stiffness"; });

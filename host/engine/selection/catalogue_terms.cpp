@@ -106,9 +106,10 @@ Eigen::MatrixXd columns_of(const Extension& e, const DirectedData& from, Balance
 }
 
 // The columns of all extensions, made on all cores.
-std::vector<TableBuilder::Made> columns_of(const std::vector<Extension>& extensions, const TableBuilder& builder) {
+std::vector<TableBuilder::DirectedColumns> columns_of(const std::vector<Extension>& extensions,
+                                                      const TableBuilder& builder) {
   constexpr std::size_t kParts = 8;
-  std::vector<TableBuilder::Made> made(extensions.size());
+  std::vector<TableBuilder::DirectedColumns> made(extensions.size());
   estimation::in_parallel(kParts, [&](std::size_t part) {
     BalanceData sign = builder.sign.data;
     std::optional<BalanceData> presliding;
@@ -135,7 +136,7 @@ std::optional<double> most_at_peaks(const TableBuilder& builder, const Eigen::Ve
   return builder.policy.most_of_effort / std::max(quantile(ratios, 0.5), 1e-300);
 }
 
-void add_term(TableBuilder& builder, const Extension& e, TableBuilder::Made columns) {
+void add_term(TableBuilder& builder, const Extension& e, TableBuilder::DirectedColumns columns) {
   const effects::Description& info = *e.entry.info;
   CandidateTerm term = term_of(e.entry, e.order);
   term.nonlinear = e.nonlinear;
@@ -219,7 +220,7 @@ Eigen::MatrixXd basis_of_model(const TableBuilder& builder, const Eigen::VectorX
 // Which extensions compete: of waves over the angle, of each effect and of placebos likewise, the orders that take most
 // off what the model leaves of all data. The others would cost most of the time.
 std::vector<std::uint8_t> with_largest_waves(const std::vector<Extension>& extensions,
-                                             const std::vector<TableBuilder::Made>& columns,
+                                             const std::vector<TableBuilder::DirectedColumns>& columns,
                                              const TableBuilder& builder) {
   const RegressorTable& table = builder.table;
   Eigen::VectorXd fitted_on = Eigen::VectorXd::Zero(table.target.size());
@@ -263,7 +264,7 @@ void exclude_phase_errors(RegressorTable& table, std::size_t first) {
 
 void add_catalogue_terms(TableBuilder& builder, const Motion& motion) {
   const std::vector<Extension> extensions = extensions_of(builder, motion);
-  std::vector<TableBuilder::Made> columns = columns_of(extensions, builder);
+  std::vector<TableBuilder::DirectedColumns> columns = columns_of(extensions, builder);
   const std::vector<std::uint8_t> kept = with_largest_waves(extensions, columns, builder);
   const std::size_t first = builder.table.terms.size();
   for (std::size_t i = 0; i < extensions.size(); ++i)

@@ -161,6 +161,7 @@ void explain_named(BalanceSearch& search, const std::vector<CandidateFit>& candi
       if (c.effect != n.effect || c.order != n.order || trial_of(n) == candidates.end()) continue;
       c.evidence = evidence(search, *trial_of(n), drive.axis);
       c.size = size_of(search, *trial_of(n), drive);
+      if (result.verdict != Verdict::confusable_effects) continue;
       for (const NamedEffect& other : result.named)
         if (&other != &n && trial_of(other) != candidates.end())
           c.confounding_reasons.push_back(compare(search, *trial_of(n), *trial_of(other)));

@@ -324,7 +324,7 @@ Diagnosis diagnose_at(const data::Dataset& dataset, const model::Model& model, c
     check_unknown_structure(chosen.search, names_one ? &chosen.candidates.front() : nullptr, result);
   }
   if (by_resampling) name_between_records(*base, chosen, result);
-  name_on_other_balances(all, chosen, result);
+  name_on_other_balances(all, chosen, model.drive, result);
   explain_orders(base->model.drive, result);
   assess_excitation(moves, result);
   return result;

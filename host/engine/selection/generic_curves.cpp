@@ -25,8 +25,8 @@ using Curve = std::function<std::vector<Eigen::VectorXd>(const DirectedData&)>;
 void add_generic(TableBuilder& builder, std::string name, bool reads_direction, const Curve& curve) {
   CandidateTerm term;
   term.name = std::move(name);
-  term.columns = builder.add(
-      builder.make([&](const DirectedData& d) { return builder.filtered(together(curve(d))); }, reads_direction));
+  term.columns = builder.add(builder.directed_columns(
+      [&](const DirectedData& d) { return builder.filtered(together(curve(d))); }, reads_direction));
   term.low.assign(term.columns.size(), -effects::kUnbounded);
   builder.table.terms.push_back(std::move(term));
 }

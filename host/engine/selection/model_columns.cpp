@@ -35,15 +35,16 @@ bool add_model_columns(TableBuilder& builder) {
   table.target = target_of(builder.sign);
   if (linear.empty() || table.target.size() == 0) return false;
   if (builder.presliding) table.presliding = {{}, {}, target_of(*builder.presliding)};
-  const auto add = [&](TableBuilder::Made made, std::string name, double low) {
+  const auto add = [&](TableBuilder::DirectedColumns made, std::string name, double low) {
     builder.add(std::move(made));
     table.model_names.push_back(std::move(name));
     table.model_low.push_back(low);
   };
-  const TableBuilder::Made base = builder.make([&](DirectedData& d) { return d.data.columns(terms, linear); }, true);
-  const auto column_of = [](const TableBuilder::Made& made, std::size_t j) {
+  const TableBuilder::DirectedColumns base =
+      builder.directed_columns([&](DirectedData& d) { return d.data.columns(terms, linear); }, true);
+  const auto column_of = [](const TableBuilder::DirectedColumns& made, std::size_t j) {
     const auto at = static_cast<Eigen::Index>(j);
-    TableBuilder::Made one{made.sign.col(at), {}};
+    TableBuilder::DirectedColumns one{made.sign.col(at), {}};
     if (made.presliding.cols() > 0) one.presliding = made.presliding.col(at);
     return one;
   };
@@ -53,8 +54,8 @@ bool add_model_columns(TableBuilder& builder) {
     add(column_of(base, j), fmt::format("{}.{}", t.id, info.name), info.low);
   }
   if (!nonlinear.empty()) {
-    const TableBuilder::Made slopes =
-        builder.make([&](DirectedData& d) { return d.data.nonlinear_columns(terms, on_balance, nonlinear); }, true);
+    const TableBuilder::DirectedColumns slopes = builder.directed_columns(
+        [&](DirectedData& d) { return d.data.nonlinear_columns(terms, on_balance, nonlinear); }, true);
     for (std::size_t j = 0; j < nonlinear.size(); ++j)
       add(column_of(slopes, j), fmt::format("slope by {}", terms[nonlinear[j].term].id), -effects::kUnbounded);
   }
@@ -62,44 +63,48 @@ bool add_model_columns(TableBuilder& builder) {
   if (builder.presliding)
     builder.presliding->effort = modelled_effort(*builder.presliding, base.presliding, table.presliding->target);
   // A lag between the columns is a nuisance parameter of every model.
-  add(builder.make([&](DirectedData& d) { return slope_of(d.effort, table.runs); }, true), "time lag",
+  add(builder.directed_columns([&](DirectedData& d) { return slope_of(d.effort, table.runs); }, true), "time lag",
       -effects::kUnbounded);
   table.model_columns = static_cast<Eigen::Index>(builder.columns.size());
   return true;
 }
 
-void add_presliding_shape(TableBuilder& builder, const PreslidingTravels& travels) {
-  const DirectedData& law = *builder.presliding;
-  for (const double travel : travels.shape) {
-    std::vector<std::vector<double>> states;
-    for (const estimation::Record& r : law.prepared.records) states.push_back(presliding_state(r, travel));
-    builder.shapes.emplace_back(builder.filtered(law.at_rows([&](const estimation::Record& r, std::size_t k) {
-      return states[static_cast<std::size_t>(&r - law.prepared.records.data())][k] - DirectedData::direction(r, k);
-    })));
+namespace {
+
+// The state of presliding over a travel less another state of each record, which is given sample by sample.
+template <class State>
+Eigen::MatrixXd change_of_state(const TableBuilder& builder, const DirectedData& from, double travel, State less) {
+  std::vector<std::vector<double>> change;
+  for (const estimation::Record& r : from.prepared.records) {
+    change.push_back(presliding_state(r, travel));
+    const std::vector<double> other = less(r);
+    for (std::size_t k = 0; k < other.size(); ++k) change.back()[k] -= other[k];
   }
+  return builder.filtered(from.at_rows([&](const estimation::Record& r, std::size_t k) {
+    return change[static_cast<std::size_t>(&r - from.prepared.records.data())][k];
+  }));
+}
+
+}  // namespace
+
+void add_presliding_shape(TableBuilder& builder, const PreslidingTravels& travels) {
+  const auto of_law = [](const estimation::Record& r) { return r.inputs.directions[0]; };
+  for (const double travel : travels.shape)
+    builder.shapes.emplace_back(change_of_state(builder, *builder.presliding, travel, of_law));
 }
 
 void add_other_travels(TableBuilder& builder) {
-  const DirectedData& sign = builder.sign;
   for (const std::size_t t : builder.on_balance()) {
     const estimation::Term& law = builder.terms[t];
     const auto is_travel = [](const effects::ParameterInfo& p) { return p.limit == effects::Limit::travel; };
     const auto at = std::find_if(law.entry->parameters.begin(), law.entry->parameters.end(), is_travel);
     if (!law.entry->is_presliding() || at == law.entry->parameters.end()) continue;
     const double travel = law.values[static_cast<std::size_t>(at - law.entry->parameters.begin())];
+    const auto of_law = [&](const estimation::Record& r) { return presliding_state(r, travel); };
     for (const double factor : {1.0 / builder.policy.presliding_shape_factor, builder.policy.presliding_shape_factor}) {
-      std::vector<std::vector<double>> change;
-      for (const estimation::Record& r : sign.prepared.records) {
-        change.push_back(presliding_state(r, factor * travel));
-        const std::vector<double> own = presliding_state(r, travel);
-        for (std::size_t k = 0; k < own.size(); ++k) change.back()[k] -= own[k];
-      }
       CandidateTerm term;
       term.name = "presliding over another travel";
-      term.columns = builder.add({builder.filtered(sign.at_rows([&](const estimation::Record& r, std::size_t k) {
-                                    return change[static_cast<std::size_t>(&r - sign.prepared.records.data())][k];
-                                  })),
-                                  {}});
+      term.columns = builder.add({change_of_state(builder, builder.sign, factor * travel, of_law), {}});
       term.low = {0.0};
       builder.table.terms.push_back(std::move(term));
     }
@@ -126,7 +131,7 @@ void add_differences(TableBuilder& builder) {
     const auto column = [&](DirectedData& d) {
       return builder.filtered(d.at_rows([&](const Record& r, std::size_t k) { return size * value(r, k); }));
     };
-    builder.table.differences.push_back(builder.add(builder.make(column, reads_direction)).front());
+    builder.table.differences.push_back(builder.add(builder.directed_columns(column, reads_direction)).front());
   };
   const auto direction = DirectedData::direction;
   const double viscous = friction_of("viscous friction"), dry = friction_of("dry friction");

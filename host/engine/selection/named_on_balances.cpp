@@ -131,7 +131,7 @@ bool is_changed_by(const SearchedBalance& balance, const std::vector<NamedEffect
 // An effect of another balance that acts on the one of `chosen` as well, and shows there with the same values, may be
 // what was named there under another name: a wave of the torque's sensor looks like one of the motor. That name is
 // taken back.
-void take_back_shadows(const CandidateFit& first, const SearchedBalance& chosen, Diagnosis& result) {
+void take_back_confused(const CandidateFit& first, const SearchedBalance& chosen, Diagnosis& result) {
   if (!first.model.entry->adds_to(chosen.search.data->balance()) || first.other_balance_score <= kPolicy.named_score)
     return;
   const catalogue::Entry& entry = *first.model.entry;
@@ -148,7 +148,8 @@ void take_back_shadows(const CandidateFit& first, const SearchedBalance& chosen,
 
 }  // namespace
 
-void name_on_other_balances(std::vector<SearchedBalance>& all, const SearchedBalance& chosen, Diagnosis& result) {
+void name_on_other_balances(std::vector<SearchedBalance>& all, const SearchedBalance& chosen, const model::Drive& drive,
+                            Diagnosis& result) {
   if (result.named.empty()) return;
   const std::vector<NamedEffect> first = result.named;
   for (SearchedBalance& balance : all) {
@@ -164,12 +165,13 @@ void name_on_other_balances(std::vector<SearchedBalance>& all, const SearchedBal
            std::nullopt, std::nullopt});
       continue;
     }
-    if (!balance.candidates.empty()) take_back_shadows(balance.candidates.front(), chosen, result);
+    if (!balance.candidates.empty()) take_back_confused(balance.candidates.front(), chosen, result);
     for (const NamedEffect& n : names) {
       result.named.push_back(n);
       for (Candidate& c : result.candidates)
         if (is(c, n)) c.admit();
     }
+    explain_named(balance.search, balance.candidates, drive, result);
   }
   put_first(result);
 }

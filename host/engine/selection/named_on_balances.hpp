@@ -17,6 +17,7 @@ void name_by_likelihood(const SearchedBalance& chosen, const std::string& alias,
 
 // What the other balances lack as well: each is a regression of its own, and an effect on one does not explain the
 // error of another. Appends single names; what cannot be distinguished from others there becomes `possible`.
-void name_on_other_balances(std::vector<SearchedBalance>& all, const SearchedBalance& chosen, Diagnosis& result);
+void name_on_other_balances(std::vector<SearchedBalance>& all, const SearchedBalance& chosen, const model::Drive& drive,
+                            Diagnosis& result);
 
 }  // namespace flexspline::selection

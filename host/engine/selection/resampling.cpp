@@ -11,6 +11,14 @@
 #include "host/engine/selection/stability_selection.hpp"
 
 namespace flexspline::selection {
+
+bool is_of_family(const NamedEffect& a, const NamedEffect& b) {
+  if (a.order != b.order) return false;
+  const catalogue::Entry &one = catalogue::get(a.effect), &other = catalogue::get(b.effect);
+  return &one == &other || (!one.info->family.empty() && one.info->family == other.info->family) ||
+         (one.is_presliding() && other.is_presliding());
+}
+
 namespace {
 
 std::vector<Resampling::Support> support_of(const StabilitySelection& selection, const estimation::Terms& terms) {
@@ -36,15 +44,9 @@ std::vector<Resampling::Support> support_of(const StabilitySelection& selection,
   return all;
 }
 
-// Whether a name that resampling chose is that of a candidate, or of another law of its family: resampling has the
-// nonlinear parameters at fixed values only, and one law of presliding for all, so likelihood decides which law of the
-// family it is.
 bool is_of_family(const std::string& effect, std::optional<double> order, const CandidateFit& candidate) {
-  if (order != candidate.model.order) return false;
-  const std::string_view family = candidate.model.entry->info->family;
-  const catalogue::Entry& chosen = catalogue::get(effect);
-  return effect == candidate.model.entry->name() || (!family.empty() && chosen.info->family == family) ||
-         (chosen.is_presliding() && candidate.model.entry->is_presliding());
+  const NamedEffect name{std::string(candidate.model.entry->name()), candidate.model.order};
+  return selection::is_of_family(NamedEffect{effect, order}, name);
 }
 
 // Of a candidate; nothing where resampling cannot choose it: it has no linear parameter, or more nonlinear ones than

@@ -8,6 +8,10 @@
 
 namespace flexspline::selection {
 
+// Whether two names are one, or two laws of a family: resampling has the nonlinear parameters at fixed values only, and
+// one law of presliding for all, so likelihood decides which law of the family it is.
+bool is_of_family(const NamedEffect& a, const NamedEffect& b);
+
 // Experiments of role fit select the terms, those of role holdout validate them.
 Resampling resample(const std::vector<const data::Experiment*>& experiments, const model::Drive& drive,
                     const estimation::Terms& terms);

@@ -26,11 +26,11 @@ std::vector<std::size_t> TableBuilder::on_balance() const {
   return estimation::terms_on(terms, sign.data.balance(), sign.prepared.output_signals);
 }
 
-TableBuilder::Made TableBuilder::make(const Make& columns_of, bool reads_direction) const {
+TableBuilder::DirectedColumns TableBuilder::directed_columns(const ColumnsOf& columns_of, bool reads_direction) const {
   return {columns_of(sign), presliding && reads_direction ? columns_of(*presliding) : Eigen::MatrixXd()};
 }
 
-std::vector<Eigen::Index> TableBuilder::add(Made made) {
+std::vector<Eigen::Index> TableBuilder::add(DirectedColumns made) {
   std::vector<Eigen::Index> places;
   for (Eigen::Index j = 0; j < made.sign.cols(); ++j) {
     places.push_back(std::ssize(columns));

@@ -48,14 +48,14 @@ struct TableBuilder {
   RegressorTable& table;
   std::vector<Eigen::VectorXd> columns, presliding_columns, shapes;
 
-  using Make = std::function<Eigen::MatrixXd(DirectedData&)>;
+  using ColumnsOf = std::function<Eigen::MatrixXd(DirectedData&)>;
   // Columns side by side; those with presliding are empty where they are the same.
-  struct Made {
+  struct DirectedColumns {
     Eigen::MatrixXd sign, presliding;
   };
-  Made make(const Make& columns_of, bool reads_direction) const;
+  DirectedColumns directed_columns(const ColumnsOf& columns_of, bool reads_direction) const;
   // Places of the columns that are added.
-  std::vector<Eigen::Index> add(Made made);
+  std::vector<Eigen::Index> add(DirectedColumns made);
   // Filters columns along each run, as the columns of effects are.
   Eigen::MatrixXd filtered(Eigen::MatrixXd columns) const;
   std::vector<std::size_t> on_balance() const;

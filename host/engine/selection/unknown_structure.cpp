@@ -9,6 +9,7 @@
 #include "host/engine/selection/candidate_fits.hpp"
 #include "host/engine/selection/diagnosis.hpp"
 #include "host/engine/selection/policy.hpp"
+#include "host/engine/selection/resampling.hpp"
 #include "host/physics/catalogue/user_defined_effect.hpp"
 
 namespace flexspline::selection {
@@ -208,13 +209,10 @@ double share_of(const CrossValidatedFit& base, const CrossValidatedFit& named, c
 // Whether halves of the data choose the effect as well, and experiments that are held out confirm it.
 bool is_chosen_and_confirmed(const Diagnosis& result, const CandidateFit& named) {
   if (!result.resampling) return false;
+  const NamedEffect name{std::string(named.model.entry->name()), named.model.order};
   return std::any_of(result.resampling->found.begin(), result.resampling->found.end(), [&](const auto& found) {
-    return found.is_strongly_confirmed() && std::any_of(found.group.begin(), found.group.end(), [&](const auto& n) {
-             const catalogue::Entry& entry = catalogue::get(n.effect);
-             const std::string_view family = entry.info->family;
-             return n.order == named.model.order &&
-                    (&entry == named.model.entry || (!family.empty() && named.model.entry->info->family == family));
-           });
+    return found.is_strongly_confirmed() &&
+           std::any_of(found.group.begin(), found.group.end(), [&](const auto& n) { return is_of_family(n, name); });
   });
 }
 

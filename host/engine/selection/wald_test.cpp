@@ -4,6 +4,7 @@
 
 #include "host/common/numbers/distributions.hpp"
 #include "host/engine/selection/policy.hpp"
+#include "host/engine/selection/resampling.hpp"
 
 namespace flexspline::selection {
 
@@ -22,11 +23,7 @@ std::optional<double> wald_p_value(const Candidate& candidate) {
 
 bool is_confirmed_by_held_out(const Diagnosis& result, const NamedEffect& name) {
   if (!result.resampling || !result.resampling->decides) return false;
-  const std::string_view family = catalogue::get(name.effect).info->family;
-  const auto is_it = [&](const NamedEffect& n) {
-    const bool same = n.effect == name.effect || (!family.empty() && catalogue::get(n.effect).info->family == family);
-    return same && n.order == name.order;
-  };
+  const auto is_it = [&](const NamedEffect& n) { return is_of_family(n, name); };
   return std::any_of(result.resampling->found.begin(), result.resampling->found.end(), [&](const auto& found) {
     return found.is_confirmed() && std::any_of(found.group.begin(), found.group.end(), is_it);
   });
