@@ -434,6 +434,22 @@ TEST(Decision, APlaceboWaveSaysNothingAgainstALawThatIsNoWave) {
   EXPECT_NEAR(found[0].frequency, 0.95, 1e-12);  // those that chose a wave chose it for what gravity has
 }
 
+TEST(Decision, AnEffectOfOneParameterThatDoesAsWellAsTheWavesIsTakenForThem) {
+  Stability s;
+  s.subsamples = 100.0;
+  s.frequencies = {wave("order 1", 1.0, 0.5, 0.9), wave("placebo order 1.27", 1.27, 0.3, 0.9, true),
+                   frequency("offset", 0.2, 0.9, 0.9)};
+  s.frequencies[0].alternatives = {{"placebo order 1.27", 0.9}, {"offset", 0.9}};
+  s.frequencies[2].near = 0.9;
+  const auto found = decide(s, {});
+  ASSERT_EQ(found.size(), 1U);
+  EXPECT_TRUE(found[0].in_catalogue);
+  EXPECT_EQ(found[0].group.front().name, "offset");
+  s.frequencies[2].near = 0.5;
+  ASSERT_EQ(decide(s, {}).size(), 1U);
+  EXPECT_FALSE(decide(s, {})[0].in_catalogue) << "it does as well in half of the subsamples only";
+}
+
 TEST(Decision, AWaveIsNotSaidBesideAPlaceboWaveThatTakesOffAsMuch) {
   Stability s;
   s.subsamples = 100.0;

@@ -145,7 +145,7 @@ void add_term(TableBuilder& builder, const Extension& e, TableBuilder::DirectedC
   term.is_placebo = e.is_placebo();
   if (term.is_placebo) {
     term.entry = nullptr;
-    term.name = "placebo " + term.name;
+    term.name += " (an order that no drive has)";
   }
   term.sum_is_positive = info.replaces.empty() && e.nonlinear > 0 && e.entry.count(Kind::linear) == 2;
   if (info.reads == effects::kCurrent && is_curved(columns.sign.rightCols(1), builder.sign.effort)) {

@@ -32,6 +32,17 @@ bool has_unknown(const std::vector<FoundTerm>& found) {
   return std::any_of(found.begin(), found.end(), [](const FoundTerm& f) { return !f.in_catalogue; });
 }
 
+// A placebo wave that does as well shows that no order is identifiable here. Where an effect that is no wave was chosen
+// `least` often, or was nearly as good as what was, this refutes the waves only: they were chosen for what they share
+// with that effect, which has fewer parameters.
+void leave_out_waves(double least, std::vector<Frequency>& group) {
+  if (std::none_of(group.begin(), group.end(), is_placebo)) return;
+  const auto is_other = [&](const Frequency& f) { return f.entry && !f.order && f.near >= least; };
+  if (std::none_of(group.begin(), group.end(), is_other)) return;
+  std::erase_if(group, [](const Frequency& f) { return f.order.has_value(); });
+  std::stable_sort(group.begin(), group.end(), [](const Frequency& a, const Frequency& b) { return a.near > b.near; });
+}
+
 // Groups that at least `least` of the subsamples chose, without those in `taken`, to which their members are added.
 std::vector<FoundTerm> groups_chosen(const Stability& stability, double least, std::set<std::string>& taken,
                                      const SelectionPolicy& policy) {
@@ -58,13 +69,8 @@ std::vector<FoundTerm> groups_chosen(const Stability& stability, double least, s
       found.group.push_back(*other);
       found.frequency += other->frequency;
     }
-    // A placebo wave that does as well shows that no order is identifiable here. Where the leading term is not a wave,
-    // this refutes the waves only.
-    if (lead.entry && !lead.order && lead.frequency >= least &&
-        std::any_of(found.group.begin(), found.group.end(), is_placebo)) {
-      // The subsamples that chose a wave chose it for what it shares with the leading term.
-      std::erase_if(found.group, [](const Frequency& f) { return f.order.has_value(); });
-    }
+    leave_out_waves(least, found.group);
+    found.share = found.group.front().share;
     found.frequency = std::min(found.frequency, lead.near);
     if (found.frequency < least) continue;
     for (const Frequency& f : found.group) {

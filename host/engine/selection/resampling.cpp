@@ -91,7 +91,7 @@ bool reaches_floor(const SearchedBalance& e) {
 bool explains_instead(const Resampling& resampling, const CandidateFit& first) {
   return std::any_of(resampling.found.begin(), resampling.found.end(), [&](const Resampling::FoundTerm& f) {
     return !f.group.empty() && !f.refused_by_holdout && f.share_percent >= kPolicy.recovered_percent &&
-           f.frequency >= kPolicy.certain_frequency &&
+           (f.frequency >= kPolicy.certain_frequency || f.is_strongly_confirmed()) &&
            std::none_of(f.group.begin(), f.group.end(),
                         [&](const NamedEffect& n) { return is_of_family(n.effect, n.order, first); });
   });
@@ -161,7 +161,7 @@ std::vector<NamedEffect> names_of(const Resampling& resampling, const SearchedBa
   for (const Resampling::FoundTerm& found : resampling.found) {
     if (found.group.empty() || found.refused_by_holdout) continue;
     if (!may_be_stated(resampling, found, motor)) continue;
-    if (is_judged_by_few && !found.is_confirmed()) continue;
+    if ((is_judged_by_few || found.is_second_choice) && !found.is_confirmed()) continue;
     if (likelier_unseen(resampling, found, motor)) continue;
     if (names.empty() && found.group.size() > 1) return found.group;
     if (found.group.size() > 1) continue;
@@ -242,6 +242,15 @@ std::string why_not_named(const Resampling::FoundTerm& term, bool is_undecided, 
   return "the model alone is near the noise in most subsamples, or in fewer than three records";
 }
 
+// Why resampling does not name what likelihood would.
+std::string why_not_chosen(const Resampling& resampling, const CandidateFit& first) {
+  const std::optional<double> support = support_of(resampling, first);
+  if (!support || is_not_visible(resampling, first)) return "halves of the data cannot judge it here";
+  const std::string chosen = fmt::format("{:.0f} of 100 subsamples", 100.0 * *support);
+  if (*support < kPolicy.named_frequency) return fmt::format("only {} chose it", chosen);
+  return fmt::format("in {} something else did nearly as well", chosen);
+}
+
 // Groups of the catalogue that were found, or are undecided, and are not named.
 std::vector<PossibleEffect> possible_effects(const Resampling& resampling, const SearchedBalance& motor,
                                              const std::vector<NamedEffect>& named) {
@@ -273,15 +282,50 @@ std::vector<PossibleEffect> possible_effects(const Resampling& resampling, const
   if (is_in_names || first.model.entry->is_presliding() || std::any_of(all.begin(), all.end(), is_listed) ||
       first.gain.chi2_percent < 100.0 * kPolicy.line_share)
     return all;
-  const std::optional<double> support = support_of(resampling, first);
-  const std::string less = support && !is_not_visible(resampling, first)
-                               ? fmt::format("{:.0f} of 100 subsamples chose it", 100.0 * *support)
-                               : std::string("halves of the data cannot judge it here");
   all.push_back({{name},
-                 fmt::format("its likelihood is significant (score {:.0f}), but {}", first.gain.score, less),
+                 fmt::format("its likelihood is significant (score {:.0f}), but {}", first.gain.score,
+                             why_not_chosen(resampling, first)),
                  std::nullopt,
                  std::nullopt});
   return all;
+}
+
+// What the subsamples chose, with its error on experiments that are held out.
+void find_terms(const StabilitySelection& selection, const estimation::Terms& terms, Resampling& result) {
+  const std::vector<FoundTerm> decided = decide(selection.result(), kPolicy);
+  const std::vector<double> held_out = selection.held_out_ratios(first_names(decided));
+  for (std::size_t i = 0; i < decided.size(); ++i)
+    result.found.push_back(found_term(decided[i], held_out.empty() ? std::nullopt : std::optional(held_out[i]), terms));
+  for (const FoundTerm& one : undecided(selection.result(), decided, kPolicy)) {
+    std::vector<std::string> names = first_names(decided);
+    names.push_back(one.group.front().name);
+    const std::vector<double> with_it = selection.held_out_ratios(names);
+    const Resampling::FoundTerm term =
+        found_term(one, with_it.empty() ? std::nullopt : std::optional(with_it.back()), terms);
+    const bool is_found = term.frequency >= kPolicy.named_frequency && term.is_strongly_confirmed() &&
+                          term.least_by_mask >= 1.0 - kPolicy.named_frequency;
+    (is_found ? result.found : result.undecided).push_back(term);
+  }
+}
+
+// A term that the held-out error refuses takes the place of what is there: chooses again without such terms. What is
+// found then has to be confirmed by the held-out error.
+void find_instead_of_refused(StabilitySelection& selection, const estimation::Terms& terms, Resampling& result) {
+  std::vector<Resampling::FoundTerm> refused;
+  std::vector<std::string> names;
+  const std::vector<FoundTerm> decided = decide(selection.result(), kPolicy);
+  for (std::size_t i = 0; i < decided.size(); ++i) {
+    if (!result.found[i].refused_by_holdout) continue;
+    refused.push_back(result.found[i]);
+    for (const Frequency& f : decided[i].group) names.push_back(f.name);
+  }
+  if (names.empty()) return;
+  selection.leave_out(names);
+  result.found.clear();
+  result.undecided.clear();
+  find_terms(selection, terms, result);
+  for (Resampling::FoundTerm& f : result.found) f.is_second_choice = true;
+  result.found.insert(result.found.end(), refused.begin(), refused.end());
 }
 
 }  // namespace
@@ -304,23 +348,11 @@ Resampling resample(const std::vector<const data::Experiment*>& experiments, con
   result.highest_hz = selection.tables().bandwidth.highest_hz;
   result.lowest_hz =
       result.highest_hz * std::pow(kPolicy.bandwidth_factor, static_cast<double>(kPolicy.bandwidths - 1));
-  const std::vector<FoundTerm> decided = decide(stability, kPolicy);
-  const std::vector<double> held_out = selection.held_out_ratios(first_names(decided));
-  for (std::size_t i = 0; i < decided.size(); ++i)
-    result.found.push_back(found_term(decided[i], held_out.empty() ? std::nullopt : std::optional(held_out[i]), terms));
-  for (const FoundTerm& one : undecided(stability, decided, kPolicy)) {
-    std::vector<std::string> names = first_names(decided);
-    names.push_back(one.group.front().name);
-    const std::vector<double> with_it = selection.held_out_ratios(names);
-    const Resampling::FoundTerm term =
-        found_term(one, with_it.empty() ? std::nullopt : std::optional(with_it.back()), terms);
-    const bool is_found = term.frequency >= kPolicy.named_frequency && term.is_strongly_confirmed() &&
-                          term.least_by_mask >= 1.0 - kPolicy.named_frequency;
-    (is_found ? result.found : result.undecided).push_back(term);
-  }
+  find_terms(selection, terms, result);
   result.support = support_of(selection, terms);
   for (const catalogue::Entry* entry : selection.tables().table.not_visible)
     result.not_visible.emplace_back(entry->name());
+  find_instead_of_refused(selection, terms, result);
   return result;
 }
 

@@ -77,6 +77,17 @@ void StabilitySelection::take_off(const TimeLag& lag) {
   evaluate();
 }
 
+void StabilitySelection::leave_out(const std::vector<std::string>& names) {
+  const auto is_left_out = [&](const std::string& name) {
+    return std::find(names.begin(), names.end(), name) != names.end();
+  };
+  std::vector<int> kept;
+  for (std::size_t t = 0; t < tables_.table.terms.size(); ++t)
+    if (!is_left_out(tables_.table.terms[t].name)) kept.push_back(static_cast<int>(t));
+  tables_.table = with_terms(tables_.table, kept, !is_left_out(kPresliding));
+  evaluate();
+}
+
 Noise StabilitySelection::noise_of_best(const RegressorTable& table, const Setting& setting,
                                         const std::vector<double>& weights, FrictionRandomEffects& differences,
                                         SettingResult& result) const {

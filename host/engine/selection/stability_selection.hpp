@@ -45,6 +45,8 @@ class StabilitySelection {
   std::optional<TimeLag> time_lag(const std::vector<std::string>& names) const;
   // Selects again with that lag taken off the effort.
   void take_off(const TimeLag& lag);
+  // Selects again without the terms of these names.
+  void leave_out(const std::vector<std::string>& names);
 
   // Of each of `names` (of frequencies): held-out error of the model with all of them over that with all others, the
   // median of all settings; fitted on what is not held out. Empty where nothing is held out.

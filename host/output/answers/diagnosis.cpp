@@ -327,6 +327,12 @@ void print_held_out(Console& console, const selection::Resampling& r) {
                        "later measurement."));
 }
 
+// Of a structure that no single effect of the catalogue explains best.
+std::string name_outside_catalogue(const std::string& name) {
+  const bool are_several = name.find(" or ") != std::string::npos;
+  return name + (are_several ? ", which these data cannot distinguish," : ", which is in no catalogue,");
+}
+
 void print_resampling(Console& console, const selection::Resampling& r) {
   std::vector<std::string> found;
   for (const selection::Resampling::FoundTerm& f : r.found) {
@@ -334,7 +340,7 @@ void print_resampling(Console& console, const selection::Resampling& r) {
     for (const selection::NamedEffect& n : f.group) names.push_back(effect_in_words(n.effect, n.order));
     found.push_back(
         fmt::format("{} in {:.0f} of 100 ({:.0f} % of the squared error above the noise, {:.0f} to {:.0f} %)",
-                    names.empty() ? f.name + ", which is in no catalogue," : listed(names, "or"), 100.0 * f.frequency,
+                    names.empty() ? name_outside_catalogue(f.name) : listed(names, "or"), 100.0 * f.frequency,
                     f.share_percent, f.share_low_percent, f.share_high_percent));
   }
   const std::string how =
