@@ -32,6 +32,7 @@ struct Recipe {
   unsigned seed = 1;
   double late_s = 0.0;  // the torque is logged as it was that long ago
   std::function<double(double t, double q, double w)> extra = [](double, double, double) { return 0.0; };
+  bool with_reversals = false;
 };
 
 // An axis whose motion (three sines that do not come round within a record) and torque are written down, not simulated.
@@ -65,6 +66,12 @@ data::Experiment experiment(const Recipe& recipe) {
   return e;
 }
 
+estimation::PipelineOptions options(const Recipe& recipe) {
+  estimation::PipelineOptions options = kOptions;
+  options.keep_motor_reversals = recipe.with_reversals;
+  return options;
+}
+
 // One record with what a search keeps of it.
 struct Bench {
   data::Experiment record;
@@ -76,7 +83,7 @@ struct Bench {
 
   explicit Bench(const Recipe& recipe)
       : record(experiment(recipe)),
-        prepared(estimation::prepare({&record}, {}, kOptions)),
+        prepared(estimation::prepare({&record}, {}, options(recipe))),
         data(prepared, Balance::motor),
         keep(Eigen::VectorXd::Ones(data.rows())),
         base(cross_validate(data, terms, keep)) {}
@@ -237,6 +244,19 @@ TEST(Disturbances, APushIsFoundAtItsTimeAndLeftOut) {
       EXPECT_EQ(bench.keep[row], 1.0) << t;
     }
   }
+}
+
+// A model with a law of presliding is judged with the samples around reversals, where it fits worst.
+TEST(Disturbances, WhatPreslidingLeavesAroundReversalsIsNone) {
+  double since = 0.0, before = 0.0;
+  Bench bench({.extra =
+                   [&](double, double q, double w) {
+                     if (w * before < 0.0) since = q;
+                     before = w;
+                     return -0.08 * std::copysign(std::exp(-std::abs(q - since) / 0.01), w);
+                   },
+               .with_reversals = true});
+  EXPECT_TRUE(disturbances_of(bench).empty());
 }
 
 TEST(Disturbances, NoiseIsNone) {

@@ -77,6 +77,31 @@ TEST(PositionSide, IsSaidByTheSymbolsOfElasticJoints) {
   EXPECT_TRUE(contains(said, "linear_stiffness")) << said;
 }
 
+// As robot controllers log it: the joint's angle with the motor's speed, and a torque in percent.
+TEST(PositionSide, IsFoundByTheSpeedWhereThatIsOfTheOtherSide) {
+  const Shell shell;
+  std::string log = "time_s,AXIS_POS[deg],MOT_SPEED[rpm],MOT_TORQUE[%]\n";
+  std::istringstream lines(joint_log("t,q,w,i", 1.0));
+  std::string line;
+  std::getline(lines, line);
+  constexpr double kRated_nm = 0.5;
+  while (std::getline(lines, line)) {
+    double t = 0.0, q = 0.0, w = 0.0, current = 0.0;
+    ASSERT_EQ(std::sscanf(line.c_str(), "%lf,%lf,%lf,%lf", &t, &q, &w, &current), 4);
+    char text[200];
+    std::snprintf(text, sizeof text, "%.3f,%.9g,%.9g,%.9g\n", t, q / kRatio * 180.0 / M_PI, w * 30.0 / M_PI,
+                  100.0 * current * kKm / kRated_nm);
+    log += text;
+  }
+  shell.write("log.csv", log);
+  for (const std::string side : {"", " --position-side link", " --position-side motor"})
+    EXPECT_NEAR(inertia_of(shell, "--gear-ratio 100 --map 'motor_torque_nm=MOT_TORQUE[%]:0.005 N*m'" + side), kJ,
+                0.02 * kJ)
+        << side;
+  const std::string said = shell.must("flexspline new --force --from log.csv --out project --gear-ratio 100");
+  EXPECT_TRUE(contains(said, "state the size of 1 % as its unit")) << said;
+}
+
 TEST(PositionSide, IsAskedForWhereNamesDoNotSayAndTheRatioMakesADifference) {
   const Shell shell;
   shell.write("log.csv", joint_log("time,pos,vel,iq"));

@@ -43,6 +43,15 @@ TEST(Units, WhatIsNoUnitIsNone) {
   for (const std::string_view text : {"", "furlong", "Mn*m", "%", "V"}) EXPECT_FALSE(unit_from_text(text)) << text;
 }
 
+TEST(Units, ANumberBeforeAUnitIsItsSize) {
+  EXPECT_NEAR(in_si("0.125 N*m", 80.0), 10.0, 1e-12) << "80 % of 12.5 N m";
+  EXPECT_NEAR(in_si("0.01deg", 18000.0), 3.141592653589793, 1e-12);
+  EXPECT_NEAR(in_si("1e-4 rad", 5.0), 5e-4, 1e-18);
+  // Counts get their size from the encoder, and zero of a scaled temperature is not known.
+  for (const std::string_view text : {"2 counts", "0.1 degF", "0 rad", "-1 rad", "12", "0.125 %", "nan rad"})
+    EXPECT_FALSE(unit_from_text(text)) << text;
+}
+
 TEST(Units, OfColumnsFollowTheAxis) {
   EXPECT_EQ(unit_of(Column::motor_position, Axis::rotary), "rad");
   EXPECT_EQ(unit_of(Column::motor_position, Axis::linear), "m");

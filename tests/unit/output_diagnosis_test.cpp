@@ -36,6 +36,31 @@ TEST(DiagnosisAnswer, SaysOfWhatTheDataCannotTellWhyAndWhatToRecord) {
       << text;
 }
 
+TEST(DiagnosisAnswer, SaysWhereTheNoiseIsKnownAndWhatTheErrorsLeaveOut) {
+  selection::Diagnosis d;
+  d.unit = "N*m";
+  d.base_rmse = 0.002;
+  d.base_rmse_cv = 0.003;
+  d.balance = estimation::Balance::motor;
+  d.noise_of_some = {{"sine"}, 0.001, 0.0005, "periods"};
+  d.reversals_left_out = true;
+  d.delay_advice = "The effort lags.";
+  ::testing::internal::CaptureStdout();
+  {
+    Console console("diagnose", false);
+    print_diagnosis(console, d, "");
+    std::fflush(stdout);
+  }
+  std::string text = ::testing::internal::GetCapturedStdout();
+  for (std::size_t at = 0; (at = text.find("\n  ", at)) != std::string::npos;) text.replace(at, 3, " ");
+  EXPECT_NE(text.find("error 0.002 N*m, 0.003 N*m on data left out of the fit, both without reversals and without the "
+                      "delay of the effort; the noise is known in sine only: 0.0005 N*m (from periods), where the "
+                      "error is 2.00 times that"),
+            std::string::npos)
+      << text;
+  EXPECT_EQ(diagnosis_json(d).at("base").at("noise_of_some").at("experiments"), nlohmann::json({"sine"}));
+}
+
 TEST(DiagnosisAnswer, HasPossibleEffectsInItsJson) {
   const nlohmann::json possible = diagnosis_json(with_possible_effects()).at("possible");
   ASSERT_EQ(possible.size(), 2u);

@@ -38,6 +38,11 @@ std::string ours_for(const ColumnReading& r, bool other_effort) {
   return {};
 }
 
+bool is_in_percent(std::string_view name) {
+  return name.find("[%]") != std::string_view::npos || name.find("(%)") != std::string_view::npos ||
+         name.ends_with("_percent") || name.ends_with("_pct");
+}
+
 std::string reason(const std::string& theirs, const ColumnReading& r) {
   static constexpr std::string_view kNames[] = {"",           "a time",     "a current",    "a torque or force",
                                                 "a position", "a velocity", "a temperature"};
@@ -47,7 +52,12 @@ std::string reason(const std::string& theirs, const ColumnReading& r) {
                                  : r.side == Side::motor ? ", of the motor"
                                                          : "");
   if (r.by_unit_only) text += ", by its unit alone";
-  return r.unit.empty() ? text + "; no unit in its name, taken as SI" : text;
+  if (!r.unit.empty()) return text;
+  if (is_in_percent(theirs))
+    return text +
+           "; in percent of what is not known, taken as SI: state the size of 1 % as its unit, as in --map "
+           "motor_torque_nm=NAME:\"0.125 N*m\" where 12.5 N*m are 100 %";
+  return text + "; no unit in its name, taken as SI";
 }
 
 bool is_linear_unit(const std::string& text) {
@@ -222,9 +232,8 @@ std::optional<std::string> time_unit_by_values(const std::vector<double>& time) 
   return unit ? std::optional(std::string(*unit)) : std::nullopt;
 }
 
-std::optional<std::string> velocity_unit_by_values(const std::vector<double>& time_s,
-                                                   const std::vector<double>& position_rad,
-                                                   const std::vector<double>& velocity) {
+std::optional<double> velocity_over_slope(const std::vector<double>& time_s, const std::vector<double>& position_rad,
+                                          const std::vector<double>& velocity) {
   const std::size_t n = std::min({time_s.size(), position_rad.size(), velocity.size()});
   constexpr std::size_t kReach = 5;
   double cross = 0.0, square = 0.0;
@@ -235,7 +244,13 @@ std::optional<std::string> velocity_unit_by_values(const std::vector<double>& ti
     cross += slope * velocity[k];
     square += slope * slope;
   }
-  const double factor = square > 0.0 ? cross / square : 0.0;
+  return square > 0.0 ? std::optional(cross / square) : std::nullopt;
+}
+
+std::optional<std::string> velocity_unit_by_values(const std::vector<double>& time_s,
+                                                   const std::vector<double>& position_rad,
+                                                   const std::vector<double>& velocity) {
+  const double factor = velocity_over_slope(time_s, position_rad, velocity).value_or(0.0);
   const auto is = [&](double wanted) { return std::abs(factor / wanted - 1.0) < 0.03; };
   if (is(30.0 / std::numbers::pi)) return "rpm";
   if (is(180.0 / std::numbers::pi)) return "deg/s";

@@ -56,6 +56,9 @@ HeaderGuess guess_columns(const std::vector<LoggedColumn>& logged, const std::ve
 // Units that the values give away where the name does not: time by its steps, velocity against the position's slope.
 // Returns the unit, or nothing where SI fits or cannot be refuted.
 std::optional<std::string> time_unit_by_values(const std::vector<double>& time);
+// Velocity over the slope of the position, by least squares; nothing where nothing moves.
+std::optional<double> velocity_over_slope(const std::vector<double>& time_s, const std::vector<double>& position_rad,
+                                          const std::vector<double>& velocity);
 std::optional<std::string> velocity_unit_by_values(const std::vector<double>& time_s,
                                                    const std::vector<double>& position_rad,
                                                    const std::vector<double>& velocity);

@@ -178,6 +178,36 @@ void guess_units(std::vector<ColumnGuess>& columns, const data::Recording& recor
   }
 }
 
+// Position and velocity of two sides of the gear: where one is the other's rate times the gear ratio, both become the
+// motor's, whatever side was taken for both.
+void take_sides_of_values(HeaderGuess& guess, const data::Recording& recording, const Request& request) {
+  constexpr double kSameRatio = 0.03;
+  ColumnGuess* position = find(guess.columns, "motor_position_rad");
+  ColumnGuess* velocity = find(guess.columns, "motor_velocity_rad_s");
+  const ColumnGuess* time = find(guess.columns, "time_s");
+  const double ratio = std::abs(request.gear_ratio.value_or(1.0));
+  if (position == nullptr || velocity == nullptr || ratio < 2.0) return;
+  auto values = values_of(recording, {time != nullptr ? time->theirs : "time_s", position->theirs, velocity->theirs});
+  for (double& t : values[0]) t *= time != nullptr ? factor_of(time->unit) : 1.0;
+  for (double& q : values[1]) q *= factor_of(position->unit);
+  for (double& w : values[2]) w *= factor_of(velocity->unit);
+  const double factor = std::abs(velocity_over_slope(values[0], values[1], values[2]).value_or(1.0));
+  const auto is = [&](double wanted) { return std::abs(factor / wanted - 1.0) < kSameRatio; };
+  if (!is(ratio) && !is(1.0 / ratio)) return;
+  ColumnGuess& link = is(ratio) ? *position : *velocity;
+  ColumnGuess& motor = is(ratio) ? *velocity : *position;
+  link.scale = *request.gear_ratio;
+  motor.scale = 1.0;
+  const auto add = [](ColumnGuess& c, const std::string& side) {
+    c.why = (c.why.empty() ? fmt::format("\"{}\", as stated", c.theirs) : c.why) + side;
+  };
+  add(link, fmt::format("; of the link by comparison of both, here times the gear ratio {:g}", ratio));
+  add(motor, "; of the motor by comparison of both");
+  guess.side.reset();
+  guess.side_is_asked_for = guess.joint_side = false;
+  guess.scaled_by = 1.0;
+}
+
 void turn(HeaderGuess& guess, const std::vector<std::string>& turned) {
   for (const std::string& ours : turned) {
     if (ColumnGuess* column = find(guess.columns, ours)) {
@@ -303,6 +333,7 @@ HeaderGuess guess_of_files(const LoggedFiles& logged, const Request& request) {
                                        ? std::string("no position or velocity has the number of a joint")
                                        : fmt::format("the joints are {}", fmt::join(guess.joints, ", "))));
   guess_units(guess.columns, *logged.first);
+  take_sides_of_values(guess, *logged.first, request);
   turn(guess, request.turned);
   return guess;
 }

@@ -90,11 +90,23 @@ class Comparer {
       s.h_infinity = t.h_infinity;
       result_.overall.push_back(std::move(s));
     }
+    warn_of_free_runs();
     result_.baselines = fit_baselines(baseline_signals_, baseline_specifications_, result_.warnings);
     return std::move(result_);
   }
 
  private:
+  // A free run whose velocity is further from the measured one than its mean is says nothing about the model.
+  void warn_of_free_runs() {
+    const SignalResult* velocity = result_.find_overall("motor_velocity");
+    if (velocity == nullptr || !(velocity->nrmse > 1.0)) return;
+    result_.warnings.push_back(fmt::format(
+        "free runs miss the measured velocity by {:.0f} % of its standard deviation. They simulate the "
+        "drive from its effort alone, with nothing at the output but what the model states: where a brake, "
+        "a load or a hand acts there, or where little friction holds the axis, compare the balances instead",
+        100.0 * velocity->nrmse));
+  }
+
   std::string unit_of(const std::string& signal) const {
     const data::Axis axis = model_.drive.axis;
     if (signal == "motor_velocity") return data::unit_of(Column::motor_velocity, axis);

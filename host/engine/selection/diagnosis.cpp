@@ -126,8 +126,8 @@ std::vector<SearchedBalance> search_balances(estimation::Identification& base, c
     if (std::string warning = one_direction_warning(data);
         data.balance() == estimation::Balance::motor && !warning.empty())
       result.warnings.push_back(std::move(warning));
-    one.floor = comparison::pooled(comparison::noise_floors(data, one.search.base.terms, experiments, base.model.drive),
-                                   data.records());
+    one.floors = comparison::noise_floors(data, one.search.base.terms, experiments, base.model.drive);
+    one.floor = comparison::pooled(one.floors, data.records());
     one.search.floor = one.floor.rmse;
     all.push_back(std::move(one));
   }
@@ -161,6 +161,33 @@ SearchedBalance& most_significant(std::vector<SearchedBalance>& all, const std::
   return *std::max_element(all.begin(), all.end(), [&](const SearchedBalance& a, const SearchedBalance& b) {
     return importance(a) < importance(b);
   });
+}
+
+// Error and noise of the records whose noise is known, where that of all is not.
+std::optional<NoiseOfSome> noise_of_some(const SearchedBalance& balance) {
+  if (balance.floor.rmse) return std::nullopt;
+  const BalanceData& data = *balance.search.data;
+  const Eigen::VectorXd residual = balance.search.base.residual_fixed_effects();
+  NoiseOfSome some;
+  std::vector<comparison::NoiseFloor> known;
+  std::vector<estimation::RowRange> rows;
+  double squares = 0.0, count = 0.0;
+  for (std::size_t i = 0; i < balance.floors.size(); ++i) {
+    const estimation::RowRange& range = data.records()[i];
+    const estimation::Record& record = data.prepared().records[range.record];
+    if (!balance.floors[i].rmse || record.at_rest) continue;
+    some.records.push_back(record.name);
+    known.push_back(balance.floors[i]);
+    rows.push_back(range);
+    squares += residual.segment(range.first, range.size()).squaredNorm();
+    count += static_cast<double>(range.size());
+  }
+  if (known.empty()) return std::nullopt;
+  const comparison::NoiseFloor pooled = comparison::pooled(known, rows);
+  some.rmse = std::sqrt(squares / count);
+  some.noise = *pooled.rmse;
+  some.from = pooled.from;
+  return some;
 }
 
 void explain_orders(const model::Drive& drive, Diagnosis& result) {
@@ -306,6 +333,10 @@ Diagnosis diagnose_at(const data::Dataset& dataset, const model::Model& model, c
   result.base_rmse_own_friction = fit.rmse();
   result.noise_floor = chosen.floor.rmse;
   result.noise_floor_from = chosen.floor.from;
+  result.reversals_left_out =
+      std::any_of(base->prepared.records.begin(), base->prepared.records.end(),
+                  [&](const estimation::Record& r) { return r.rows[estimation::index(*result.balance)].masked > 0; });
+  result.noise_of_some = noise_of_some(chosen);
   // Where nothing is missing, friction that differs between runs is not a structure to search for.
   const bool names_one = chosen.names_one() && !by_resampling;
   result.localised =

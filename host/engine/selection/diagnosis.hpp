@@ -183,6 +183,13 @@ struct StatedSetting {
   std::vector<NamedEffect> named;
 };
 
+// Noise of the records whose noise is known, where that of others is not.
+struct NoiseOfSome {
+  std::vector<std::string> records;
+  double rmse = 0.0, noise = 0.0;  // of the balance on these records
+  std::string from;                // as noise_floor_from
+};
+
 struct Diagnosis {
   Verdict verdict = Verdict::nothing_significant;
   std::vector<NamedEffect> named;
@@ -190,9 +197,11 @@ struct Diagnosis {
   std::string unit;                            // of the balances' errors
   double base_rmse = 0.0;                      // with one friction for all runs, as all errors of candidates are
   double base_rmse_cv = 0.0;
+  bool reversals_left_out = false;      // of these errors, as alone presliding shows there
   double base_rmse_own_friction = 0.0;  // with each run's own friction where it differs from run to run
   std::optional<double> noise_floor;
   std::string noise_floor_from = "none";
+  std::optional<NoiseOfSome> noise_of_some;
   std::vector<LocalisedResidual> localised;
   std::vector<Candidate> candidates;    // best first
   std::vector<Trend> parameter_trends;  // of the model as it is

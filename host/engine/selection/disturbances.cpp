@@ -136,9 +136,17 @@ std::optional<Outliers> outliers(const BalanceData& data, const Eigen::VectorXd&
   return found;
 }
 
+// Whether the direction changes from one sample of a record to another.
+bool reverses(const BalanceData& data, const Record& r, std::size_t first, std::size_t last) {
+  for (std::size_t k = first + 1; k <= last; ++k)
+    if (r.direction_variable(data.balance(), k) * r.direction_variable(data.balance(), k - 1) <= 0.0) return true;
+  return false;
+}
+
 // Lists the bursts of a record that are disturbances, and leaves out their samples.
-void list_bursts(const Record& r, const Outliers& rows, const std::vector<std::size_t>& samples,
-                 Eigen::Ref<Eigen::VectorXd> keep, std::vector<Disturbance>& found) {
+void list_bursts(const BalanceData& data, const Record& r, const Outliers& rows,
+                 const std::vector<std::size_t>& samples, Eigen::Ref<Eigen::VectorXd> keep,
+                 std::vector<Disturbance>& found) {
   const std::size_t n = samples.size(), reach = rows.reach;
   for (std::size_t k = 0; k < n;) {
     if (!rows.marked[k]) {
@@ -159,12 +167,12 @@ void list_bursts(const Record& r, const Outliers& rows, const std::vector<std::s
     }
     const double from = r.experiment->time_s[samples[k]], to = r.experiment->time_s[samples[last]];
     const std::size_t low = k > reach ? k - reach : 0, high = std::min(n - 1, last + reach);
-    // Next to samples that the mask left out, at a reversal or a start, friction that the model lacks has the same
-    // residual.
+    // At a reversal or a start, which the mask may have left out, friction that the model lacks has the same residual.
     const std::size_t before = low > reach ? low - reach : 0, after = std::min(n - 1, high + reach);
     const bool next_to_mask =
         samples[after] - samples[before] != (after - before) * r.decimation || before == 0 || after == n - 1;
-    if (to - from <= kPolicy.longest_burst_s && explained / count < kPolicy.burst_repeats && !next_to_mask) {
+    if (to - from <= kPolicy.longest_burst_s && explained / count < kPolicy.burst_repeats && !next_to_mask &&
+        !reverses(data, r, samples[before], samples[after])) {
       found.push_back({r.name, from, to, peak, {}});
       for (std::size_t j = low; j <= high; ++j) keep[static_cast<Eigen::Index>(j)] = 0.0;
     }
@@ -183,7 +191,7 @@ std::vector<Disturbance> find_disturbances(const BalanceData& data, const Eigen:
     const auto& samples = r.rows[estimation::index(data.balance())].samples;
     if (r.at_rest || samples.size() < kFewestRows) continue;
     if (const auto rows = outliers(data, residual, range, samples))
-      list_bursts(r, *rows, samples, keep.segment(range.first, range.size()), found);
+      list_bursts(data, r, *rows, samples, keep.segment(range.first, range.size()), found);
   }
   return found;
 }

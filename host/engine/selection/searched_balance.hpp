@@ -11,8 +11,9 @@ namespace flexspline::selection {
 
 struct SearchedBalance {
   BalanceSearch search;
-  std::vector<CandidateFit> candidates;  // best first
-  comparison::NoiseFloor floor;
+  std::vector<CandidateFit> candidates;        // best first
+  std::vector<comparison::NoiseFloor> floors;  // one each record
+  comparison::NoiseFloor floor;                // of all; none where one record has none
 
   bool names_one() const { return !candidates.empty() && passes(candidates.front()); }
 };

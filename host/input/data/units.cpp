@@ -2,6 +2,8 @@
 
 #include <algorithm>
 #include <array>
+#include <cctype>
+#include <charconv>
 #include <numbers>
 
 #include "host/common/text/unit_signs.hpp"
@@ -119,13 +121,27 @@ std::string normalised(std::string_view text) {
   return unit;
 }
 
-}  // namespace
-
-std::optional<Unit> unit_from_text(std::string_view text) {
-  const std::string unit = normalised(text);
+std::optional<Unit> listed_unit(std::string_view unit) {
   for (const Entry& entry : kUnits)
     if (entry.text == unit) return entry.unit;
   return std::nullopt;
+}
+
+}  // namespace
+
+std::optional<Unit> unit_from_text(std::string_view text) {
+  const std::string name = normalised(text);
+  if (const auto unit = listed_unit(name)) return unit;
+  if (name.empty() || std::isdigit(static_cast<unsigned char>(name.front())) == 0) return std::nullopt;
+  double factor = 0.0;
+  const char* const end = name.data() + name.size();
+  const auto [rest, error] = std::from_chars(name.data(), end, factor);
+  std::optional<Unit> unit = error == std::errc{} ? listed_unit({rest, end}) : std::nullopt;
+  // Counts get their size from the encoder, and a temperature may have another zero.
+  if (!unit || unit->offset != 0.0 || !(factor > 0.0) || unit->quantity == counts || unit->quantity == counts_rate)
+    return std::nullopt;
+  unit->factor *= factor;
+  return unit;
 }
 
 std::string known_units(Quantity quantity) {

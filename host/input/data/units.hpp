@@ -30,7 +30,8 @@ struct Unit {
   double offset = 0.0;
 };
 
-// Accepts spellings with or without *, blanks and the degree sign: "N*m", "Nm", "N m"; "deg/s", "°/s".
+// Accepts spellings with or without *, blanks and the degree sign: "N*m", "Nm", "N m"; "deg/s", "°/s". A number may
+// stand before the unit: "0.125 N*m" for a torque in percent of 12.5 N m.
 std::optional<Unit> unit_from_text(std::string_view text);
 
 // "rpm, rad/s, deg/s, ...": the units that a quantity may be given in (with counts where an encoder may give it).
