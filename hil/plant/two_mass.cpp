@@ -93,12 +93,11 @@ TwoMass::Response TwoMass::motor_response(const Stage& stage, const State& start
                                           double ratio) const {
   const double g = stage.weight;
   const auto direction = static_cast<double>(s.motor_direction);
-  const FrictionTorque f =
-      has_plain_friction_
-          ? physics_.friction.evaluate_plain(direction, s.motor_velocity, viscous_)
-          : physics_.friction.evaluate({start, direction, s.motor_velocity, torque, s.motor_angle, start.motor_angle,
-                                        start.motor_velocity},
-                                       viscous_);
+  const FrictionTorque f = has_plain_friction_
+                               ? physics_.friction.evaluate_plain(direction, s.motor_velocity, viscous_)
+                               : physics_.friction.evaluate({start, direction, s.motor_velocity, torque, s.motor_angle,
+                                                             start.motor_angle, start.motor_velocity},
+                                                            viscous_);
   const double residual = physics_.motor_inertia * (s.motor_velocity - stage.motor_velocity) -
                           g * (motor_drive_ - f.torque - torque * ratio);
   const double slope = physics_.motor_inertia + g * (f.by_velocity + g * f.by_angle);
