@@ -12,6 +12,7 @@
 #include "boards/stm32f4/encoder.hpp"
 #include "boards/stm32f4/flash.hpp"
 #include "boards/stm32f4/otg_fs.hpp"
+#include "boards/stm32f4/pins.hpp"
 #include "boards/stm32f4/usart.hpp"
 #include "firmware/board.hpp"
 
@@ -24,6 +25,9 @@ class DriveBoard : public CoreBoard<Description, 20'000> {
  public:
   // The control tick starts here.
   void start_tick() {
+    static_assert(are_analog(Description::kPins, Description::kAnalog.current, Description::kAnalog.torque,
+                             Description::kAnalog.temperature),
+                  "kPins has no analog pin for an input of kAnalog: boards/PORTING.md, step 6");
     Analog::start(Description::kAnalog);
     motor_.start(Description::kMotorReversed);
     output_.start(Description::kOutputReversed);

@@ -15,6 +15,16 @@ struct ClockSetup {
   std::uint32_t core_hz = 0;  // at most 168 MHz (no overdrive); USB needs a PLL of 48 MHz times a whole number
 };
 
+// The PLL divides the crystal to 2 MHz and the VCO, twice the core's clock, to USB's 48 MHz.
+constexpr bool is_even_megahertz(std::uint32_t hz) {
+  return hz > 0 && hz % 2'000'000 == 0;
+}
+constexpr bool makes_usb_clock(const ClockSetup& c) {
+  return 2 * c.core_hz % 48'000'000 == 0;
+}
+static_assert(is_even_megahertz(8'000'000) && !is_even_megahertz(25'000'000) && !is_even_megahertz(0));
+static_assert(makes_usb_clock({.core_hz = 168'000'000}) && !makes_usb_clock({.core_hz = 160'000'000}));
+
 enum class ClockSource : std::uint8_t {
   bare,  // 16 MHz as after reset: the PLL is dead, and that is too slow for a drive
   crystal,

@@ -29,6 +29,11 @@ class CoreBoard {
   bool start_clock() {
     static_assert(Description::kClock.core_hz > 150'000'000 && Description::kClock.core_hz <= 168'000'000,
                   "the PLL's and the converter's dividers are for 150 to 168 MHz: boards/PORTING.md, step 3");
+    static_assert(is_even_megahertz(Description::kClock.crystal_hz) && is_even_megahertz(Description::kClock.core_hz),
+                  "crystal and core's clock have to be multiples of 2 MHz: boards/PORTING.md, step 3");
+    static_assert(!Description::kHasUsb || makes_usb_clock(Description::kClock),
+                  "with USB the core's clock has to be 168 MHz: boards/PORTING.md, step 3");
+    static_assert(Description::kName.size() <= 15, "kName has more than 15 letters: boards/PORTING.md, step 2");
     const bool crashed = crash_was_noted();
     cause_ = watchdog_was_the_reset() ? firmware::ResetCause::watchdog
              : crashed                ? firmware::ResetCause::crash

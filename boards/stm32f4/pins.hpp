@@ -22,6 +22,25 @@ struct Pin {
   constexpr std::uint32_t base() const { return kGpioA + kGpioBytes * static_cast<std::uint32_t>(port - 'A'); }
 };
 
+// The pin of an input of ADC1 or ADC2; of ADC3 the same up to 3, and from 10 to 13 (data sheets, pin table).
+constexpr Pin pin_of_analog_input(std::uint8_t input) {
+  if (input < 8) return {'A', input};
+  if (input < 10) return {'B', static_cast<std::uint8_t>(input - 8)};
+  return {'C', static_cast<std::uint8_t>(input - 10)};
+}
+// Whether the pin of each of these inputs is set up as an analog one.
+template <class... Input>
+constexpr bool are_analog(std::span<const Pin> pins, Input... inputs) {
+  const auto is_analog = [&](const Pin& wanted) {
+    for (const Pin& p : pins)
+      if (p.port == wanted.port && p.number == wanted.number) return p.mode == PinMode::analog;
+    return false;
+  };
+  return (is_analog(pin_of_analog_input(inputs)) && ...);
+}
+static_assert(pin_of_analog_input(7).port == 'A' && pin_of_analog_input(9).number == 1 &&
+              pin_of_analog_input(15).port == 'C' && pin_of_analog_input(15).number == 5);
+
 inline void set_up(const Pin& p) {
   constexpr std::uint32_t kType = 0x04, kSpeed = 0x08, kPull = 0x0C, kFunction = 0x20;
   switch_clock_on(p.base());

@@ -13,6 +13,7 @@
 #include "boards/stm32f4/encoder.hpp"
 #include "boards/stm32f4/flash.hpp"
 #include "boards/stm32f4/otg_fs.hpp"
+#include "boards/stm32f4/pins.hpp"
 #include "boards/stm32f4/three_phase_analog.hpp"
 #include "boards/stm32f4/three_phase_bridge.hpp"
 #include "boards/stm32f4/usart.hpp"
@@ -39,6 +40,10 @@ class ThreePhaseBoard : public CoreBoard<Description, 10'000> {
   }
   // The PWM starts here, with all switches open, and with it the tick.
   void start_tick() {
+    constexpr const ThreePhaseInputs& in = Description::kAnalog;
+    static_assert(are_analog(Description::kPins, in.currents[0], in.currents[1], in.bus, in.temperature) &&
+                      (in.two_currents || are_analog(Description::kPins, in.currents[2])),
+                  "kPins has no analog pin for an input of kAnalog: boards/PORTING.md, three half bridges");
     cortex_m4::set_tick_priority();
     motor_.start(Description::kMotorReversed);
     output_.start(Description::kOutputReversed);

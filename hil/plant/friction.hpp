@@ -82,16 +82,20 @@ struct LuGre {
   double limit(double velocity_rad_s) const;
 };
 
-/// The state at which the friction on the motor shaft is evaluated.
-struct FrictionPoint {
+/// What the laws of friction remember of the shaft's travel. A law with memory has its state here.
+struct FrictionMemory {
+  double bristle = 0.0;  ///< deflection of the bristle, rad
+  double loss = 0.0;     ///< deflection of the loss by driving direction, -1 to 1
+};
+
+/// The state at which the friction on the motor shaft is evaluated; what it remembers is that of the anchor.
+struct FrictionPoint : FrictionMemory {
   double direction = 0.0;        ///< +1 or -1: the branch of the set-valued sign
   double velocity = 0.0;         ///< motor rad/s
   double torque = 0.0;           ///< through the flexspline, output side, N m
   double angle = 0.0;            ///< motor rad
-  double anchor = 0.0;           ///< motor angle at which the deflection was `bristle`
-  double bristle = 0.0;          ///< bristle deflection at the anchor, rad
+  double anchor = 0.0;           ///< motor angle at the anchor, from where it moved in one direction
   double anchor_velocity = 0.0;  ///< motor rad/s there
-  double loss = 0.0;             ///< deflection of the loss at the anchor, -1 to 1
 };
 
 /// Torque that resists positive motion, and its partial derivatives.
@@ -158,6 +162,8 @@ struct MotorFriction {
   double bristle(const FrictionPoint& at) const;
   /// The same of the loss.
   double loss_deflection(const FrictionPoint& at) const;
+  /// All of it.
+  FrictionMemory remember(const FrictionPoint& at) const { return {bristle(at), loss_deflection(at)}; }
 };
 
 }  // namespace flexspline::plant

@@ -86,19 +86,18 @@ double TwoMass::gravity(double angle) const {
 }
 
 FrictionPoint TwoMass::friction_point(const State& s, double direction) const {
-  return {direction, s.motor_velocity, torque(s), s.motor_angle, s.motor_angle, s.bristle, s.motor_velocity, s.loss};
+  return {s, direction, s.motor_velocity, torque(s), s.motor_angle, s.motor_angle, s.motor_velocity};
 }
 
 TwoMass::Response TwoMass::motor_response(const Stage& stage, const State& start, const State& s, double torque,
                                           double ratio) const {
   const double g = stage.weight;
   const auto direction = static_cast<double>(s.motor_direction);
-  const FrictionTorque f =
-      has_plain_friction_
-          ? physics_.friction.evaluate_plain(direction, s.motor_velocity, viscous_)
-          : physics_.friction.evaluate({direction, s.motor_velocity, torque, s.motor_angle, start.motor_angle,
-                                        start.bristle, start.motor_velocity, start.loss},
-                                       viscous_);
+  const FrictionTorque f = has_plain_friction_
+                               ? physics_.friction.evaluate_plain(direction, s.motor_velocity, viscous_)
+                               : physics_.friction.evaluate({start, direction, s.motor_velocity, torque, s.motor_angle,
+                                                             start.motor_angle, start.motor_velocity},
+                                                            viscous_);
   const double residual = physics_.motor_inertia * (s.motor_velocity - stage.motor_velocity) -
                           g * (motor_drive_ - f.torque - torque * ratio);
   const double slope = physics_.motor_inertia + g * (f.by_velocity + g * f.by_angle);
@@ -274,11 +273,9 @@ bool TwoMass::try_step(const State& from, double h, State& to) const {
   if (to.motor_direction != 0 && !has_plain_friction_) {
     FrictionPoint at = friction_point(to, to.motor_direction);
     at.anchor = from.motor_angle;
-    at.bristle = from.bristle;
     at.anchor_velocity = from.motor_velocity;
-    at.loss = from.loss;
-    to.bristle = physics_.friction.bristle(at);
-    to.loss = physics_.friction.loss_deflection(at);
+    static_cast<FrictionMemory&>(at) = from;
+    static_cast<FrictionMemory&>(to) = physics_.friction.remember(at);
   }
   if (has_loops_) {
     to.loops = physics_.transmission.loops.ahead(from.loops, torsion(to), true);

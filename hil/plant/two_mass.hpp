@@ -25,14 +25,12 @@ struct Physics {
 
 /// Positions and velocities of both shafts. `damping` is the signed power |v|^alpha s(v) of the torsion rate; it is a
 /// state because it keeps its precision where v itself is too small.
-struct Shafts {
+struct Shafts : FrictionMemory {
   double motor_angle = 0.0;
   double motor_velocity = 0.0;
   double output_angle = 0.0;
   double output_velocity = 0.0;
   double damping = 0.0;
-  double bristle = 0.0;
-  double loss = 0.0;        ///< deflection of the loss by driving direction
   int motor_direction = 0;  ///< branch of the friction: +1, -1, or 0 for exact sticking
   int output_direction = 0;
 };
@@ -50,7 +48,7 @@ struct Inputs {
 /// branches of both frictions; where a velocity changes its sign or sticking ends inside it, the step is split there.
 class TwoMass {
  public:
-  /// Only angles, velocities, bristle and loss of `initial` count; the rest follows from them. Throws
+  /// Only angles, velocities and the memory of the friction count in `initial`; the rest follows from them. Throws
   /// std::invalid_argument for inertias, stiffness, gear ratio or damping exponent that are not positive.
   TwoMass(Physics physics, bool locked, State initial = {});
 

@@ -84,6 +84,26 @@ TEST(Documents, LinksBetweenThemLeadSomewhere) {
   EXPECT_GT(links, 40);
 }
 
+// A new command's answer is described, or this test names its format.
+TEST(Documents, EachFormatOfAnAnswerIsInTheListOfAnswers) {
+  const fs::path root = FLEXSPLINE_SOURCE_DIR;
+  const std::string list = content_of(root / "host/output/answers/JSON.md");
+  const std::string mark = "{\"format\", \"";
+  int formats = 0;
+  for (const char* folder : {"host/app/cli", "host/output/answers"})
+    for (const fs::directory_entry& entry : fs::directory_iterator(root / folder)) {
+      // What the workbench's page asks for is its own.
+      if (entry.path().extension() != ".cpp" || entry.path().filename().string().starts_with("workbench")) continue;
+      const std::string source = content_of(entry.path());
+      for (std::size_t at = 0; (at = source.find(mark, at)) != std::string::npos; ++formats) {
+        at += mark.size();
+        const std::string format = source.substr(at, source.find('"', at) - at);
+        EXPECT_TRUE(contains(list, format)) << entry.path() << ": " << format << " is not in JSON.md";
+      }
+    }
+  EXPECT_GT(formats, 25);
+}
+
 // The page on an effect of one's own, followed in a copy of shared/: the header as printed there, the line as printed
 // there, and nothing else; then the effect is in the list and computes what its equation says. That tool and drive have
 // what the list has, their own tests show.

@@ -88,6 +88,9 @@ def main():
         print(f"check.py: no measurements in {DATA}; set FLEXSPLINE_DATA")
         return 77  # skipped, for a test that says so
     cases = json.loads((HERE / "expected.json").read_text())["cases"]
+    unknown = [w for w in wanted if w not in cases]
+    if unknown:
+        sys.exit(f"check.py: no case {', '.join(unknown)}; there are {', '.join(cases)}")
     failed = required = met = 0
     print("| case | verdict | named | expected | result | s |\n| --- | --- | --- | --- | --- | ---: |")
     with tempfile.TemporaryDirectory() as scratch:

@@ -30,6 +30,10 @@ def main():
         sys.exit(__doc__)
     tool, root, wanted = arguments[0], Path(arguments[1]), arguments[2:]
     cases = sorted(root.glob("table-?")) + sorted(root.glob("whole-drive")) + sorted(root.glob("table-?-rows/*"))
+    known = {str(c.relative_to(root)) for c in cases} | {c.relative_to(root).parts[0] for c in cases}
+    unknown = [w for w in wanted if w not in known]
+    if not cases or unknown:
+        sys.exit(f"diagnose_cases.py: {root} has no case {', '.join(unknown) or 'at all'}; flexspline_report_cases {root} writes all")
     false_answers = answers = met = to_name = said = to_say = 0
     print("| case | verdict | named | result | s |\n| --- | --- | --- | --- | ---: |")
     for case in cases:

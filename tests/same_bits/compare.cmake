@@ -1,4 +1,5 @@
 # Runs PROGRAM and compares what it prints with RECORDED, line by line: a readable difference.
+cmake_minimum_required(VERSION 3.25)
 execute_process(COMMAND ${PROGRAM} OUTPUT_VARIABLE given RESULT_VARIABLE status)
 if(NOT status EQUAL 0)
   message(FATAL_ERROR "${PROGRAM} ended with ${status}")

@@ -114,7 +114,8 @@ def main():
             sys.exit("shared/effects/CATALOGUE.md is not what the effects' headers say; run: ./dev effect")
         return
     page.write_text(made)
-    print(f"CATALOGUE.md: {len(effects)} effects")
+    last = max(e["number"] for e in effects)
+    print(f"CATALOGUE.md: {len(effects)} effects; the next one's number: {last + 1}, the last possible one: 63")
     if wanted is None:
         return
     found = [e for e in effects if e["name"] == wanted]

@@ -8,7 +8,6 @@
 #include "host/output/answers/json.hpp"
 #include "host/output/interchange/export.hpp"
 #include "host/output/interchange/protocol_header.hpp"
-#include "host/physics/catalogue/user_defined_effect.hpp"
 
 namespace flexspline::cli {
 namespace {
@@ -22,19 +21,6 @@ struct ExportOptions {
   bool protocol_header = false;  // then without a model
   std::string json;
 };
-
-void needs_values(const model::Model& model, const std::filesystem::path& path) {
-  std::string missing;
-  for (const model::Effect& effect : model.effects)
-    for (const std::string& parameter : catalogue::missing_values(effect))
-      missing += (missing.empty() ? "" : ", ") + effect.id + "." + parameter;
-  if (!missing.empty())
-    throw interchange::ExportError(
-        fmt::format("{}: no value for {}; run flexspline identify first", path.string(), missing));
-  if (model.effects.empty())
-    throw interchange::ExportError(
-        fmt::format("{}: the model has no effects, so there is nothing to write", path.string()));
-}
 
 // Into --out, else onto standard output.
 void put_text(const ExportOptions& options, const std::string& text, json& files, Console& console) {
@@ -62,8 +48,10 @@ int run(const ExportOptions& options, Console& console) {
   }
   if (options.model.empty() || options.as.empty())
     throw UsageError("give --model MODEL and --as c, csv, mujoco or urdf; or --protocol-header");
-  const model::Model model = load_model(options.model).model;
-  needs_values(model, options.model);
+  const model::Model model = load_identified_model(options.model);
+  if (model.effects.empty())
+    throw interchange::ExportError(
+        fmt::format("{}: the model has no effects, so there is nothing to write", options.model.string()));
   const std::string source = options.model.filename().string();
   json files = json::array();
   if (options.as == "csv") {

@@ -69,6 +69,17 @@ model::ModelFile load_model(const fs::path& path) {
   return model::read(path, catalogue::known_effects());
 }
 
+model::Model load_identified_model(const fs::path& path) {
+  model::Model model = load_model(path).model;
+  std::string missing;
+  for (const model::Effect& effect : model.effects)
+    for (const std::string& parameter : catalogue::missing_values(effect))
+      missing += (missing.empty() ? "" : ", ") + effect.id + "." + parameter;
+  if (!missing.empty())
+    throw UsageError(fmt::format("{}: no value for {}; run flexspline identify first", path.string(), missing));
+  return model;
+}
+
 model::ModelFile load_searched_model(const fs::path& path) {
   // The time of a search grows with their square and more.
   constexpr std::ptrdiff_t kMostEstimated = 250;

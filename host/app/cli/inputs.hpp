@@ -52,6 +52,8 @@ model::ModelFile load_model(const std::filesystem::path& path);
 // The same for commands that fit the model again and again; throws UsageError where it has so many parameters to be
 // estimated that none of them would answer.
 model::ModelFile load_searched_model(const std::filesystem::path& path);
+// The same for commands that take the model as it is; throws UsageError where a parameter has no value.
+model::Model load_identified_model(const std::filesystem::path& path);
 
 // Paths as they would be typed after a command.
 std::string as_arguments(const std::vector<std::filesystem::path>& paths);
