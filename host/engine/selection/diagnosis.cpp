@@ -190,6 +190,23 @@ std::optional<NoiseOfSome> noise_of_some(const SearchedBalance& balance) {
   return some;
 }
 
+// The errors of the model without what is named, and the noise.
+void describe_base(const SearchedBalance& chosen, Diagnosis& result) {
+  const BalanceData& data = *chosen.search.data;
+  const CrossValidatedFit& fit = chosen.search.base;
+  result.balance = data.balance();
+  result.base_rmse = fit.rmse_fixed_effects();
+  result.base_rmse_cv = fit.rmse_cv_fixed_effects();
+  result.base_rmse_own_friction = fit.rmse();
+  result.noise_floor = chosen.floor.rmse;
+  result.noise_floor_from = chosen.floor.from;
+  result.noise_of_some = noise_of_some(chosen);
+  const std::vector<estimation::Record>& records = data.prepared().records;
+  result.reversals_left_out = std::any_of(records.begin(), records.end(), [&](const estimation::Record& r) {
+    return r.rows[estimation::index(data.balance())].masked > 0;
+  });
+}
+
 void explain_orders(const model::Drive& drive, Diagnosis& result) {
   for (Candidate& c : result.candidates) {
     const catalogue::Entry* entry = catalogue::find(c.effect);
@@ -326,19 +343,10 @@ Diagnosis diagnose_at(const data::Dataset& dataset, const model::Model& model, c
     if (options.progress) options.progress("checking what else could explain it");
     alias = choose_named(chosen);
   }
-  result.balance = chosen.search.data->balance();
-  const CrossValidatedFit& fit = chosen.search.base;
-  result.base_rmse = fit.rmse_fixed_effects();
-  result.base_rmse_cv = fit.rmse_cv_fixed_effects();
-  result.base_rmse_own_friction = fit.rmse();
-  result.noise_floor = chosen.floor.rmse;
-  result.noise_floor_from = chosen.floor.from;
-  result.reversals_left_out =
-      std::any_of(base->prepared.records.begin(), base->prepared.records.end(),
-                  [&](const estimation::Record& r) { return r.rows[estimation::index(*result.balance)].masked > 0; });
-  result.noise_of_some = noise_of_some(chosen);
+  describe_base(chosen, result);
   // Where nothing is missing, friction that differs between runs is not a structure to search for.
   const bool names_one = chosen.names_one() && !by_resampling;
+  const CrossValidatedFit& fit = chosen.search.base;
   result.localised =
       shares(*chosen.search.data, fit, names_one || by_resampling ? fit.residual_fixed_effects() : fit.residual);
   list_candidates(all, model.drive.axis, result);
