@@ -8,6 +8,9 @@
 
 namespace flexspline::estimation {
 
+namespace {
+
+// The parameters of the model that are constants of each record and that the user has not fixed.
 std::vector<ParameterRef> record_constants(const Terms& terms) {
   std::vector<ParameterRef> found;
   for (std::size_t t = 0; t < terms.size(); ++t)
@@ -15,6 +18,8 @@ std::vector<ParameterRef> record_constants(const Terms& terms) {
       if (terms[t].entry->parameters[p].per_record && !terms[t].known[p]) found.push_back({t, p});
   return found;
 }
+
+}  // namespace
 
 bool refine_record_constants(PreparedData& prepared, BalanceData& data, const Terms& terms,
                              const std::vector<ParameterRef>& together_with, const Eigen::VectorXd& root_weights) {
@@ -39,7 +44,7 @@ bool refine_record_constants(PreparedData& prepared, BalanceData& data, const Te
     const RowRange& range = data.records()[static_cast<std::size_t>(r)];
     X.col(first + r).segment(range.first, range.size()) = slope.segment(range.first, range.size());
   }
-  const LinearFit step = least_squares(X, residual_of(data, terms), root_weights);
+  const LinearFit step = least_squares(X, data.residual(terms), root_weights);
   const Eigen::VectorXd constant = step.theta.tail(records);
   if (!(constant.cwiseAbs().maxCoeff() > 0.0)) return false;
   const double mean = constant.mean();

@@ -74,9 +74,7 @@ RecordVariance paule_mandel(const BalanceData& data, const Eigen::MatrixXd& torq
   RecordVariance between;
   between.std = between.freedom = Eigen::VectorXd::Zero(torques.cols());
   between.left = residual;
-  const auto tau = [&] {
-    return std::max(autocorrelation_time(data.records(), between.left), data.filter_autocorrelation_time());
-  };
+  const auto tau = [&] { return autocorrelation_time(data, between.left); };
   const auto take_off = [&](const RowRange& range, const Eigen::VectorXd& factors) {
     between.left.segment(range.first, range.size()) =
         residual.segment(range.first, range.size()) - torques.middleRows(range.first, range.size()) * factors;

@@ -87,9 +87,7 @@ struct Linearised {
 };
 Linearised linearised(BalanceData& data, const BalanceFit& fit, const Terms& terms,
                       const std::vector<Eigen::Index>& identified) {
-  Eigen::MatrixXd all(data.rows(), static_cast<Eigen::Index>(fit.linear.size() + fit.nonlinear.size()));
-  all << columns_of(data, terms, fit.linear), nonlinear_columns(data, terms, fit.on_balance, fit.nonlinear);
-  return {all(Eigen::all, identified), residual_of(data, terms)};
+  return {data.slopes(terms, fit.on_balance, fit.linear, fit.nonlinear)(Eigen::all, identified), data.residual(terms)};
 }
 
 // All balances of the same samples, from these experiments in place of the measured ones.
