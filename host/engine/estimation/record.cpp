@@ -435,9 +435,10 @@ PreparedData prepare(const std::vector<const Experiment*>& experiments, const mo
     prepared.pipeline.reason += "; reversals of the torsion are kept, as its rate is hardly above its noise";
     prepared = prepare_with(experiments, drive, Pipeline(prepared.pipeline));
   }
-  prepared.pipeline.torque_per_step = torque_per_held_step(prepared);
-  for (Record& record : prepared.records)
-    correct_zero_order_hold(record, prepared.constants, prepared.pipeline.torque_per_step);
+  if (const HeldStep step = held_step(prepared); step.lacks) {
+    prepared.pipeline.torque_per_step = step.torque_per_step;
+    prepared = prepare_with(experiments, drive, Pipeline(prepared.pipeline));
+  }
   prepared.chosen_on = experiments;
   prepared.slowest_law_rad_s = law_rad_s;
   return prepared;
