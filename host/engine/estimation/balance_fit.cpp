@@ -55,13 +55,15 @@ class Fitting {
     }
   }
 
-  // Linear parameters at given nonlinear parameters; `whitening` is the noise covariance.
-  void solve(const NoiseCovariance& whitening) {
+  // Linear parameters at given nonlinear parameters; `whitening` is the noise covariance. Returns the weights of
+  // records that follow from the residual.
+  Eigen::VectorXd solve(const NoiseCovariance& whitening) {
     form_regression();
     const LinearFit linear = least_squares(regression_.X, regression_.y, whitening);
     for (std::size_t j = 0; j < fit_.linear.size(); ++j)
       terms_[fit_.linear[j].term].values[fit_.linear[j].parameter] = linear.theta[static_cast<Eigen::Index>(j)];
     fit_.residual = linear.residual;
+    return record_weights(data_.records(), fit_.residual);
   }
 
   // How friction differs between records at the present values, for which the regression is formed.
@@ -88,14 +90,14 @@ class Fitting {
 };
 
 void Fitting::fit_weighted() {
-  // Weights and parameters depend on each other; two rounds are enough.
-  sweep_nonlinear(data_, terms_, fit_.on_balance, fit_.root_weights);
+  const bool searches = !fit_.nonlinear.empty();
+  if (searches) sweep_nonlinear(data_, terms_, fit_.on_balance, fit_.root_weights);
   // Weights of the best point of a grid would be small on just those records that show where between points it lies.
-  if (!fit_.nonlinear.empty()) refine_nonlinear(data_, terms_, fit_.on_balance, fit_.root_weights);
+  if (searches) refine_nonlinear(data_, terms_, fit_.on_balance, fit_.root_weights);
+  // Weights and parameters depend on each other; two rounds are enough.
   for (int round = 0; round < 2; ++round) {
-    solve(fit_.root_weights);
-    fit_.root_weights = record_weights(data_.records(), fit_.residual);
-    if (!fit_.nonlinear.empty()) refine_nonlinear(data_, terms_, fit_.on_balance, fit_.root_weights);
+    fit_.root_weights = solve(fit_.root_weights);
+    if (searches) refine_nonlinear(data_, terms_, fit_.on_balance, fit_.root_weights);
   }
   solve(fit_.root_weights);
   fit_.whitening = noise_weights_ = fit_.root_weights;
@@ -103,22 +105,24 @@ void Fitting::fit_weighted() {
 
 void Fitting::fit_generalised() {
   estimate_differences();
+  const bool searches = !fit_.nonlinear.empty();
   const Terms weighted_terms = terms_;
   const Eigen::VectorXd weighted_residual = fit_.residual;
+  Eigen::VectorXd generalised_weights;
   constexpr int kGeneralised = 3;
   for (int round = 0; round < kGeneralised && between_.std.size() > 0 && between_.std.maxCoeff() > 0.0; ++round) {
     noise_weights_ = record_weights(data_.records(), between_.left.cwiseQuotient(noise_weights_));
     fit_.whitening = noise_covariance(data_, noise_weights_, noise_weights_.asDiagonal() * friction_, between_.std,
                                       between_.autocorrelation_time);
     // With random effects the best nonlinear parameter of a small effect may be far from that without.
-    if (round == 0) sweep_nonlinear(data_, terms_, fit_.on_balance, fit_.whitening, SweepFrom::values);
-    if (!fit_.nonlinear.empty()) refine_nonlinear(data_, terms_, fit_.on_balance, fit_.whitening);
-    solve(fit_.whitening);
+    if (searches && round == 0) sweep_nonlinear(data_, terms_, fit_.on_balance, fit_.whitening, SweepFrom::values);
+    if (searches) refine_nonlinear(data_, terms_, fit_.on_balance, fit_.whitening);
+    generalised_weights = solve(fit_.whitening);
     estimate_differences();
   }
   if (fit_.whitening.is_diagonal()) return;
-  if (leaves_noise(between_, data_)) {
-    fit_.root_weights = record_weights(data_.records(), fit_.residual);
+  if (between_.leaves_noise) {
+    fit_.root_weights = generalised_weights;
     return;
   }
   terms_ = weighted_terms;

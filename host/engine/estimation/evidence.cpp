@@ -74,7 +74,7 @@ NoiseModel noise_model(const Eigen::MatrixXd& cross_columns, const Eigen::Matrix
     torques = friction();
     between = differences(torques);
   }
-  if (whitening.is_diagonal() || !leaves_noise(between, data)) return alike;
+  if (whitening.is_diagonal() || !between.leaves_noise) return alike;
   return {whitening, between.autocorrelation_time};
 }
 
