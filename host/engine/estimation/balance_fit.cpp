@@ -91,9 +91,11 @@ class Fitting {
 
 void Fitting::fit_weighted() {
   const bool searches = !fit_.nonlinear.empty();
-  if (searches) sweep_nonlinear(data_, terms_, fit_.on_balance, fit_.root_weights);
-  // Weights of the best point of a grid would be small on just those records that show where between points it lies.
-  if (searches) refine_nonlinear(data_, terms_, fit_.on_balance, fit_.root_weights);
+  if (searches) {
+    sweep_nonlinear(data_, terms_, fit_.on_balance, fit_.root_weights);
+    // Weights of the best point of a grid would be small on just those records that show where between points it lies.
+    refine_nonlinear(data_, terms_, fit_.on_balance, fit_.root_weights);
+  }
   // Weights and parameters depend on each other; two rounds are enough.
   for (int round = 0; round < 2; ++round) {
     fit_.root_weights = solve(fit_.root_weights);

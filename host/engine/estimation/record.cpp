@@ -419,25 +419,27 @@ PreparedData prepare(const std::vector<const Experiment*>& experiments, const mo
     return prepared;
   }
   PreparedData prepared = prepare_with(experiments, drive, choose_pipeline(experiments, options));
+  Pipeline& pipeline = prepared.pipeline;
+  // What the records show changes the pipeline; then they are prepared again.
+  const auto again = [&] { prepared = prepare_with(experiments, drive, Pipeline(pipeline)); };
   if (!options.cutoff_hz && options.mask) {
     double slowest_hz = 1e300;
     for (const Experiment* e : experiments) slowest_hz = std::min(slowest_hz, 1.0 / e->sample_s);
-    if (raise_for_mask(prepared, law_rad_s, slowest_hz / 10.0))
-      prepared = prepare_with(experiments, drive, Pipeline(prepared.pipeline));
+    if (raise_for_mask(prepared, law_rad_s, slowest_hz / 10.0)) again();
   }
   // The cut-off is that of the other models, so that their errors can be compared.
   if (keeps_reversals) {
-    prepared.pipeline.keep_motor_reversals = true;
-    prepared = prepare_with(experiments, drive, Pipeline(prepared.pipeline));
+    pipeline.keep_motor_reversals = true;
+    again();
   }
-  if (prepared.pipeline.mask && masks_all_torsion(prepared)) {
-    prepared.pipeline.keep_torsion_reversals = true;
-    prepared.pipeline.reason += "; reversals of the torsion are kept, as its rate is hardly above its noise";
-    prepared = prepare_with(experiments, drive, Pipeline(prepared.pipeline));
+  if (pipeline.mask && masks_all_torsion(prepared)) {
+    pipeline.keep_torsion_reversals = true;
+    pipeline.reason += "; reversals of the torsion are kept, as its rate is hardly above its noise";
+    again();
   }
   if (const HeldStep step = held_step(prepared); step.lacks) {
-    prepared.pipeline.torque_per_step = step.torque_per_step;
-    prepared = prepare_with(experiments, drive, Pipeline(prepared.pipeline));
+    pipeline.torque_per_step = step.torque_per_step;
+    again();
   }
   prepared.chosen_on = experiments;
   prepared.slowest_law_rad_s = law_rad_s;
