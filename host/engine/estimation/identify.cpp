@@ -239,6 +239,7 @@ namespace {
 
 // Moves the constants of each record to where they fit best, and forms the balances again. Returns whether any moved.
 bool refine_record_constants(Identification& result) {
+  if (record_constants(result.terms).empty()) return false;
   bool moved = false;
   for (std::size_t b = 0; b < result.data.size(); ++b) {
     const BalanceFit& found = result.fits[b];

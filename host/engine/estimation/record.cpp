@@ -389,7 +389,7 @@ PreparedData prepare_with(const std::vector<const Experiment*>& experiments, con
   in_parallel(missing.size(), [&](std::size_t m) {
     throw_if_cancelled();
     made[m] = prepare_one(*experiments[missing[m]], prepared.constants, pipeline);
-    correct_zero_order_hold(made[m], prepared.constants, pipeline.torque_per_step);
+    if (pipeline.torque_per_step != 0.0) correct_zero_order_hold(made[m], prepared.constants, pipeline.torque_per_step);
   });
   for (std::size_t m = 0; m < made.size(); ++m) prepared.records[missing[m]] = std::move(made[m]);
   prepared.output_signals.torsion = std::ranges::any_of(prepared.records, [](const Record& r) {

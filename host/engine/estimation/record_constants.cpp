@@ -8,9 +8,6 @@
 
 namespace flexspline::estimation {
 
-namespace {
-
-// The parameters of the model that are constants of each record and that the user has not fixed.
 std::vector<ParameterRef> record_constants(const Terms& terms) {
   std::vector<ParameterRef> found;
   for (std::size_t t = 0; t < terms.size(); ++t)
@@ -18,8 +15,6 @@ std::vector<ParameterRef> record_constants(const Terms& terms) {
       if (terms[t].entry->parameters[p].per_record && !terms[t].known[p]) found.push_back({t, p});
   return found;
 }
-
-}  // namespace
 
 bool refine_record_constants(PreparedData& prepared, BalanceData& data, const Terms& terms,
                              const std::vector<ParameterRef>& together_with, const Eigen::VectorXd& root_weights) {

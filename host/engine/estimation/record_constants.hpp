@@ -9,6 +9,9 @@
 
 namespace flexspline::estimation {
 
+// The parameters of the model that are constants of each record and that the user has not fixed.
+std::vector<ParameterRef> record_constants(const Terms& terms);
+
 // One step of Gauss and Newton on `data` at the values of `terms`: the constants of all records together with the
 // parameters in `together_with` (linear and nonlinear ones), which would else take up a part of them. Moves the torsion
 // of each record by its constant less their mean, and adds that to Record::torsion_zero_rad. Afterwards balances have
