@@ -12,7 +12,6 @@
 #include "host/engine/estimation/form_on.hpp"
 #include "host/engine/estimation/modelled_torque.hpp"
 #include "host/engine/estimation/record_constants.hpp"
-#include "host/engine/estimation/variable_projection.hpp"
 #include "host/physics/catalogue/user_defined_effect.hpp"
 
 namespace flexspline::estimation {

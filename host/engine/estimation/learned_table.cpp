@@ -7,7 +7,6 @@
 
 #include "host/engine/estimation/balance_fit.hpp"
 #include "host/engine/estimation/least_squares.hpp"
-#include "host/engine/estimation/variable_projection.hpp"
 #include "host/physics/catalogue/user_defined_effect.hpp"
 
 namespace flexspline::estimation {

@@ -5,7 +5,6 @@
 
 #include "host/common/algebra/decompositions.hpp"
 #include "host/engine/estimation/balance_fit.hpp"
-#include "host/engine/estimation/variable_projection.hpp"
 
 namespace flexspline::estimation {
 

@@ -12,7 +12,6 @@
 #include "host/engine/estimation/least_squares.hpp"
 #include "host/engine/estimation/modelled_torque.hpp"
 #include "host/engine/estimation/side_motion.hpp"
-#include "host/engine/estimation/variable_projection.hpp"
 #include "host/engine/estimation/zero_order_hold.hpp"
 
 namespace flexspline::estimation {
