@@ -70,7 +70,7 @@ Outcome recover(const std::string& label, std::uint64_t seed) {
   const estimation::PreparedData prepared = estimation::prepare(fit, truth, {});
   const estimation::PreparedData held_out = estimation::prepare_with(holdout, truth.drive, prepared.pipeline);
   estimation::BalanceData on_holdout(held_out, balance);
-  const double floor = root_mean_square(estimation::residual_of(on_holdout, estimation::terms_of(truth)));
+  const double floor = root_mean_square(on_holdout.residual(estimation::terms_of(truth)));
 
   const selection::Addition added = selection::add(dataset, base, label, {});
   outcome.without_over_floor = *added.before.rmse_holdout / floor;
@@ -97,9 +97,8 @@ Outcome recover(const std::string& label, std::uint64_t seed) {
   const auto without = estimation::identify(dataset, base, {});
   for (std::size_t b = 0; b < without->data.size(); ++b)
     if (without->data[b].balance() == balance)
-      for (const auto& share :
-           comparison::localise(without->data[b], estimation::residual_of(without->data[b], without->terms),
-                                without->fits[b].autocorrelation_time))
+      for (const auto& share : comparison::localise(without->data[b], without->data[b].residual(without->terms),
+                                                    without->fits[b].autocorrelation_time))
         if (share.share_percent > 1.0) {
           outcome.maps.push_back(share.variable);
           outcome.map_shares.push_back(share.share_percent);

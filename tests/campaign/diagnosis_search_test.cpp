@@ -175,7 +175,7 @@ TEST(CrossValidate, PredictsEachFifthAsAFitOfTheOthersDoes) {
   const Bench bench({.extra = [](double, double q, double) { return 1e-3 * std::cos(3.0 * q); }});
   BalanceData data = bench.data;
   Eigen::MatrixXd X(data.rows(), 4);
-  X << estimation::columns_of(data, bench.terms, bench.base.linear), data.delay_column();
+  X << data.columns(bench.terms, bench.base.linear), data.delay_column();
   using Exact = Eigen::Matrix<long double, Eigen::Dynamic, Eigen::Dynamic>;
   double squares = 0.0;
   for (const auto& fold : data.folds(5)) {

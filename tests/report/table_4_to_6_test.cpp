@@ -176,7 +176,7 @@ TEST_F(Table6, TheCubicModelOverpredictsAtLargeTorsionAndTheLinearOneDoesNot) {
     const data::Dataset largest = only(dataset, "100-8");
     const estimation::PreparedData prepared = estimation::prepare({&largest.experiments.front()}, model, {});
     estimation::BalanceData balance(prepared, estimation::Balance::transmission);
-    const Eigen::VectorXd rest = estimation::residual_of(balance, estimation::terms_of(model));
+    const Eigen::VectorXd rest = balance.residual(estimation::terms_of(model));
     Eigen::Index at = 0;
     const double measured = balance.target().cwiseAbs().maxCoeff(&at);
     return (balance.target()[at] - rest[at]) / std::copysign(measured, balance.target()[at]);

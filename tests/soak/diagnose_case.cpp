@@ -90,7 +90,7 @@ struct Bench {
     const estimation::PreparedData held_out =
         estimation::prepare_with(of(data::Role::holdout), truth.drive, prepared.pipeline);
     BalanceData data(held_out, balance);
-    return root_mean_square(estimation::residual_of(data, estimation::terms_of(truth)));
+    return root_mean_square(data.residual(estimation::terms_of(truth)));
   }
 
   // The torque of the hidden effects orthogonal to the base model, over the noise, on the fitted records.
@@ -99,8 +99,8 @@ struct Bench {
     BalanceData data(prepared, balance);
     const estimation::Terms full = estimation::terms_of(truth),
                             without = estimation::terms_of(testing::model_of(file.drive, false, true));
-    Eigen::VectorXd noise = estimation::residual_of(data, full);
-    Eigen::VectorXd missing = estimation::residual_of(data, without) - noise;
+    Eigen::VectorXd noise = data.residual(full);
+    Eigen::VectorXd missing = data.residual(without) - noise;
     for (std::size_t t = 0; t < full.size(); ++t) {
       const std::string_view name = full[t].entry->name();
       const bool viscous = name == "viscous_friction", dry = name == "coulomb_friction" || name == "dahl_friction";
@@ -115,10 +115,10 @@ struct Bench {
       }
     }
     const auto on_balance = estimation::terms_on(without, balance, {.torque = true, .torsion = true});
-    Eigen::MatrixXd X = estimation::columns_of(data, without, estimation::free_linear_parameters(without, on_balance));
+    Eigen::MatrixXd X = data.columns(without, estimation::free_linear_parameters(without, on_balance));
     if (X.cols() == 0) {
       estimation::Terms open = estimation::terms_of(base);
-      X = estimation::columns_of(data, open, estimation::free_linear_parameters(open, on_balance));
+      X = data.columns(open, estimation::free_linear_parameters(open, on_balance));
     }
     const Eigen::VectorXd size = X.colwise().norm().transpose().array().max(1e-300);
     X *= size.cwiseInverse().asDiagonal();

@@ -68,7 +68,7 @@ std::vector<double> true_floors(const Recorded& r, const model::Model& m, Balanc
   }
   BalanceData a(p, balance), b(q, balance);
   const auto terms = estimation::terms_of(m);
-  const Eigen::VectorXd d = estimation::residual_of(a, terms) - estimation::residual_of(b, terms);
+  const Eigen::VectorXd d = a.residual(terms) - b.residual(terms);
   std::vector<double> floors;
   for (const auto& range : a.records())
     floors.push_back(std::sqrt(d.segment(range.first, range.size()).squaredNorm() / static_cast<double>(range.size())));
@@ -146,7 +146,7 @@ TEST(NoiseFloor, DoesNotCountAnEffectThatTheModelLacks) {
   const auto terms = estimation::terms_of(m);
   const auto floors = noise_floors(data, terms, pointers(dataset), m.drive);
   const auto truth = true_floors(rippled, m, Balance::motor);
-  const Eigen::VectorXd r = estimation::residual_of(data, terms);
+  const Eigen::VectorXd r = data.residual(terms);
   for (std::size_t k = 0; k < 2; ++k) {
     const auto& range = data.records()[k];
     const double rmse =

@@ -85,9 +85,8 @@ TEST(Estimate, AnOpenScaleIsSaidAndOneSuppliedParameterClosesIt) {
   EXPECT_FALSE(of(*open, "torque_constant_error").identifiable);
   EXPECT_TRUE(warns_of(*open, "--supply inertia.inertia=VALUE"));
 
-  Options how;
-  how.supplied.push_back({"inertia", "inertia", motor.inertia});
-  const auto closed = estimate(recorded(motor), model, kFilters, how);
+  supply(model, {"inertia", "inertia", motor.inertia});
+  const auto closed = estimate(recorded(motor), model, kFilters);
   EXPECT_TRUE(of(*closed, "torque_constant_error").identifiable);
   EXPECT_NEAR(of(*closed, "torque_constant_error").value, 0.1, 2e-3);
   EXPECT_NEAR(of(*closed, "coulomb_friction").value / motor.coulomb, 1.0, 5e-3);

@@ -104,8 +104,7 @@ json result_of(const FleetOptions& options, const Task& task, Console& console) 
   const estimation::PipelineOptions pipeline = options.pipeline.options();
   console.progress("estimating the parameters");
   const auto found = estimation::estimate(dataset, file.model, pipeline);
-  const auto method = estimation::method_for(file.model);
-  const json identified = output::identification_json(*found, std::string(estimation::name_of(method)), "standard");
+  const json identified = output::identification_json(*found, "standard");
   console.progress("comparing model and measurement");
   json errors = json::array();
   try {

@@ -52,7 +52,6 @@ estimation::Options options_from(const IdentifyOptions& options, Console& consol
   estimation::Options how;
   how.method = estimation::method_from_name(options.method);
   how.intervals = estimation::intervals_from_name(options.intervals);
-  for (const std::string& text : options.supply) how.supplied.push_back(supplied_from(text));
   how.starts = options.starts;
   how.seed = options.seed;
   how.progress = [&console](std::string_view what) { console.progress(std::string(what)); };
@@ -68,7 +67,7 @@ int run(const IdentifyOptions& options, Console& console) {
   const data::Dataset dataset = load(options.data, console);
   console.progress("estimating the parameters");
   try {
-    for (const estimation::SuppliedValue& supplied : how.supplied) estimation::supply(known, supplied);
+    for (const std::string& text : options.supply) estimation::supply(known, supplied_from(text));
     found = estimation::estimate(dataset, known, options.pipeline.options(), how);
   } catch (const std::invalid_argument& unsuitable) {
     throw UsageError(unsuitable.what());
@@ -100,9 +99,7 @@ int run(const IdentifyOptions& options, Console& console) {
                   .pipeline = options.pipeline.options(),
                   .estimates = found->estimates},
                  console);
-  const auto used = how.method == estimation::Method::automatic ? estimation::method_for(known) : how.method;
-  output::save_json(options.json,
-                    output::identification_json(*found, std::string(estimation::name_of(used)), options.intervals));
+  output::save_json(options.json, output::identification_json(*found, options.intervals));
   return kDone;
 }
 

@@ -6,7 +6,6 @@
 
 #include "host/drive_link/deployment/fold.hpp"
 #include "host/drive_link/deployment/pack.hpp"
-#include "host/output/answers/text.hpp"
 #include "host/physics/catalogue/user_defined_effect.hpp"
 
 namespace flexspline::deployment {
@@ -34,14 +33,6 @@ FoldedTable table_of(const catalogue::ResolvedEffect& e, bool image_has_tables,
 }
 
 }  // namespace
-
-void require_values(const catalogue::ResolvedModel& model) {
-  std::vector<std::string> missing;
-  for (const catalogue::ResolvedEffect& e : model.effects)
-    for (const std::string& name : catalogue::missing_values(*e.effect)) missing.push_back(e.effect->id + "." + name);
-  if (!missing.empty())
-    throw PackError(fmt::format("the model has no value for {}; identify it first", output::listed(missing)));
-}
 
 DriveEffects drive_effects(const catalogue::ResolvedModel& model, std::span<const std::string> image,
                            const effects::DriveConstants<double>& bases) {

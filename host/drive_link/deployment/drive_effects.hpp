@@ -23,9 +23,6 @@ struct DriveEffects {
   std::array<double, 3> folding_error{};  // on each balance, of all tables together
 };
 
-// Throws PackError naming all parameters that have no value.
-void require_values(const catalogue::ResolvedModel& model);
-
 // `image`: names of the effects that the firmware has; empty: all. `bases` of the drive, for the range of tables. The
 // effects have their values. Throws PackError where one of them runs on no drive.
 DriveEffects drive_effects(const catalogue::ResolvedModel& model, std::span<const std::string> image,

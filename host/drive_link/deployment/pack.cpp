@@ -14,7 +14,9 @@
 #include "host/drive_link/deployment/maker.hpp"
 #include "host/drive_link/deployment/note.hpp"
 #include "host/drive_link/deployment/sha256.hpp"
+#include "host/output/answers/text.hpp"
 #include "host/physics/catalogue/catalogue.hpp"
+#include "host/physics/catalogue/user_defined_effect.hpp"
 #include "shared/control/drive_block.hpp"
 #include "shared/fixed/system.hpp"
 #include "shared/fixed/turn.hpp"
@@ -33,6 +35,15 @@ constexpr double kOverspeed = 1.25;
 constexpr double kDirectionBand = 1.0 / 200.0;
 constexpr double kTorsionLimit = 2.0;
 
+// Throws PackError naming all parameters that have no value.
+void require_values(const catalogue::ResolvedModel& model) {
+  std::vector<std::string> missing;
+  for (const catalogue::ResolvedEffect& e : model.effects)
+    for (const std::string& name : catalogue::missing_values(*e.effect)) missing.push_back(e.effect->id + "." + name);
+  if (!missing.empty())
+    throw PackError(fmt::format("the model has no value for {}; identify it first", output::listed(missing)));
+}
+
 model::Name name_of(const std::string& text) {
   model::Name name{};
   std::size_t bytes = std::min(text.size(), name.size() - 1);
@@ -45,14 +56,15 @@ model::Name name_of(const std::string& text) {
   return name;
 }
 
-model::BlockHeader header_of(const model::Model& model, const DriveConstants<double>& d, const PackOptions& options) {
+// `rated`: torque at the output.
+model::BlockHeader header_of(const model::Model& model, double rated, const DriveConstants<double>& d,
+                             const PackOptions& options) {
   model::BlockHeader h;
   h.drive = name_of(options.drive);
   h.model = name_of(model.name);
   h.axis = model.drive.axis == data::Axis::linear ? 1 : 0;
   h.encoder_counts = static_cast<std::uint32_t>(std::llround(options.encoder_counts.value_or(0.0)));
   h.bases = in_block(d);
-  const double rated = rated_output_torque(model.drive);
   const auto value = [](double x) { return fixed::Value(Fixed::value(std::clamp(x, 1e-6, 2.0))); };
   h.limits.torque = value(std::max(rated / d.gear_ratio, d.torque_constant * d.current_base) / d.torque_base);
   h.limits.load = value(rated / d.output_torque_base);
@@ -233,7 +245,7 @@ Packed pack(const model::Model& model, const PackOptions& options) {
   prove_errors(run, tried, measured, options, scale, packed);
 
   packed.bytes.resize(model::kLargestBlock);
-  model::BlockHeader header = header_of(model, tried.drive, options);
+  model::BlockHeader header = header_of(model, rated, tried.drive, options);
   std::optional<control::DriveSetup<double>> setup;
   if (options.settings) {
     setup = parse_drive_setup(*options.settings, options.settings_origin, resolved, tried.drive, options.encoder_counts,

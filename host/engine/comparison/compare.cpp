@@ -161,7 +161,7 @@ class Comparer {
   }
 
   void inverse(BalanceData& data, bool regions_and_gains) {
-    const Eigen::VectorXd residual = estimation::residual_of(data, terms_);
+    const Eigen::VectorXd residual = data.residual(terms_);
     const std::vector<NoiseFloor> floors = noise_floors(data, terms_, all_, model_.drive);
     const std::string signal = signal_name(data.balance());
     const bool collapsed = data.balance() == Balance::motor && !prepared_.output_signals.torque;

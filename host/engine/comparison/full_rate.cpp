@@ -22,7 +22,7 @@ std::optional<FullRate> full_rate(const estimation::PreparedData& prepared, cons
     for (std::size_t k = s.first; k < s.last; ++k) samples.push_back(k);
   estimation::BalanceData data(all, balance);
   if (data.empty()) return std::nullopt;
-  const Eigen::VectorXd residual = estimation::residual_of(data, terms);
+  const Eigen::VectorXd residual = data.residual(terms);
   const std::size_t n = record.inputs.size();
   FullRate result{std::vector<double>(n, 0.0), std::vector<double>(n, 0.0), std::vector<std::uint8_t>(n, 0)};
   for (std::size_t k = 0; k < samples.size(); ++k) {

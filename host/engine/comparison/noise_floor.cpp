@@ -185,7 +185,7 @@ class Floors {
   }
 
   std::vector<NoiseFloor> all() {
-    const Eigen::VectorXd residual = estimation::residual_of(data_, terms_);
+    const Eigen::VectorXd residual = data_.residual(terms_);
     std::vector<NoiseFloor> floors(data_.records().size());
     estimation::in_parallel(floors.size(), [&](std::size_t i) {
       const estimation::RowRange& range = data_.records()[i];
@@ -248,7 +248,7 @@ class Floors {
       again.records[0].rows = record.rows;  // the mask depends on the noise
       BalanceData data(again, data_.balance());
       if (data.rows() != residual.size()) return std::nullopt;
-      sum += (estimation::residual_of(data, terms_) - residual).squaredNorm();
+      sum += (data.residual(terms_) - residual).squaredNorm();
     }
     return std::sqrt(sum / (kRealisations * static_cast<double>(residual.size())));
   }

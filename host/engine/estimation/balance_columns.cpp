@@ -103,6 +103,21 @@ void add_by_shares(const Term& term, Share share, std::span<V> torque, Add add) 
 
 }  // namespace
 
+double BalanceData::share(const Record& r, Balance of_effect) const {
+  if (of_effect == balance_) return 1.0;
+  if (balance_ != Balance::motor || prepared_->output_signals.torque) return 0.0;
+  const Balance through = r.locked ? Balance::transmission : Balance::load;
+  return of_effect == through ? 1.0 / prepared_->constants.gear_ratio : 0.0;
+}
+
+// With the drive off friction holds the shaft against whatever else acts on it, a weight or a ripple.
+double BalanceData::share_of(const Term& term, const Record& r, Balance of_effect) const {
+  const effects::Description& info = *term.entry->info;
+  const bool is_of_effort = !term.entry->definition && info.balance == Balance::motor &&
+                            (info.reads & (effects::kCurrent | effects::kTorqueInput)) != 0;
+  return r.at_rest && !is_of_effort ? 0.0 : share(r, of_effect);
+}
+
 template <class N>
 bool BalanceData::change_inputs(const Terms& terms, const Term& term, const Record& r,
                                 const std::vector<std::vector<typename N::Parameter>>& all_values,
@@ -320,6 +335,14 @@ Eigen::MatrixXd BalanceData::nonlinear_columns(const Terms& terms, const std::ve
   return columns;
 }
 
+Eigen::MatrixXd BalanceData::slopes(const Terms& terms, const std::vector<std::size_t>& on_balance,
+                                    const std::vector<ParameterRef>& linear,
+                                    const std::vector<ParameterRef>& nonlinear) {
+  Eigen::MatrixXd both(rows(), static_cast<Eigen::Index>(linear.size() + nonlinear.size()));
+  both << columns(terms, linear), nonlinear_columns(terms, on_balance, nonlinear);
+  return both;
+}
+
 bool BalanceData::is_slope_cached(const Terms& terms, ParameterRef nonlinear_ref) const {
   const Term& term = terms[nonlinear_ref.term];
   return term.entry->info->phase == Phase::source && term.adds_torque() && term.entry->count(Kind::linear) == 1;
@@ -361,6 +384,19 @@ Eigen::VectorXd BalanceData::known_torque(const Terms& terms, const std::vector<
   for (const std::size_t t : terms_acting_on_other_balance(terms, balance_, prepared_->output_signals))
     sum += term_torque(terms, t);
   return sum;
+}
+
+BalanceData::Regression BalanceData::regression(const Terms& terms, const std::vector<std::size_t>& on_balance,
+                                                const std::vector<ParameterRef>& linear) {
+  return {columns(terms, linear), target() - known_torque(terms, on_balance)};
+}
+
+Eigen::VectorXd BalanceData::residual(const Terms& terms) {
+  Eigen::VectorXd left = target();
+  for (const std::size_t t : terms_on(terms, balance_, prepared_->output_signals)) left -= term_torque(terms, t);
+  for (const std::size_t t : terms_acting_on_other_balance(terms, balance_, prepared_->output_signals))
+    left -= term_torque(terms, t);
+  return left;
 }
 
 Eigen::VectorXd BalanceData::term_torque(const Terms& terms, std::size_t t) {

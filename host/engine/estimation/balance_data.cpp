@@ -19,48 +19,6 @@ bool BalanceData::usable(const Record& r) const {
   return false;
 }
 
-double BalanceData::share(const Record& r, Balance of_effect) const {
-  if (of_effect == balance_) return 1.0;
-  if (balance_ != Balance::motor || prepared_->output_signals.torque) return 0.0;
-  const Balance through = r.locked ? Balance::transmission : Balance::load;
-  return of_effect == through ? 1.0 / prepared_->constants.gear_ratio : 0.0;
-}
-
-// With the drive off friction holds the shaft against whatever else acts on it, a weight or a ripple.
-double BalanceData::share_of(const Term& term, const Record& r, Balance of_effect) const {
-  const effects::Description& info = *term.entry->info;
-  const bool is_of_effort = !term.entry->definition && info.balance == Balance::motor &&
-                            (info.reads & (effects::kCurrent | effects::kTorqueInput)) != 0;
-  return r.at_rest && !is_of_effort ? 0.0 : share(r, of_effect);
-}
-
-void BalanceData::filter(const RowRange& range, Eigen::Ref<Eigen::MatrixXd> signals) const {
-  const auto at = static_cast<std::size_t>(&range - ranges_.data());
-  for (const data::Segment& s : prepared_->records[range.record].segments)
-    filters_[at].apply_columns_in_place(
-        signals.middleRows(static_cast<Eigen::Index>(s.first), static_cast<Eigen::Index>(s.last - s.first)));
-}
-
-bool BalanceData::have_equal_filters(const RowRange& a, const RowRange& b) const {
-  const Record &first = prepared_->records[a.record], &second = prepared_->records[b.record];
-  return first.sample_s == second.sample_s && first.segments.size() == 1 && second.segments.size() == 1 &&
-         first.inputs.size() == second.inputs.size() && first.segments[0].first == second.segments[0].first &&
-         first.segments[0].last == second.segments[0].last;
-}
-
-void BalanceData::take_rows(const RowRange& range, const double* signal, Eigen::Ref<Eigen::VectorXd> rows) const {
-  const auto& samples = prepared_->records[range.record].rows[index(balance_)].samples;
-  for (std::size_t k = 0; k < samples.size(); ++k) {
-    const double* at = signal + samples[k];
-    const double x = beyond_.empty() ? 0.0 : beyond_[static_cast<std::size_t>(range.first) + k];
-    // A cubic through four samples; the filter leaves nothing that it could not follow.
-    rows[static_cast<Eigen::Index>(k)] =
-        x == 0.0 ? *at
-                 : at[-1] * (x * (1.0 - x) * (x - 2.0) / 6.0) + at[0] * ((x + 1.0) * (x - 1.0) * (x - 2.0) / 2.0) +
-                       at[1] * ((x + 1.0) * x * (2.0 - x) / 2.0) + at[2] * ((x + 1.0) * x * (x - 1.0) / 6.0);
-  }
-}
-
 namespace {
 
 // Left sides of a balance and their negative slopes along a record, for BalanceData::filtered_columns.

@@ -54,12 +54,26 @@ class BalanceData {
                                    ParameterRef nonlinear_ref);
   Eigen::MatrixXd nonlinear_columns(const Terms& terms, const std::vector<std::size_t>& on_balance,
                                     const std::vector<ParameterRef>& nonlinear);
+  // Slopes by linear, then by nonlinear parameters: columns that let a linear fit move nonlinear parameters to first
+  // order.
+  Eigen::MatrixXd slopes(const Terms& terms, const std::vector<std::size_t>& on_balance,
+                         const std::vector<ParameterRef>& linear, const std::vector<ParameterRef>& nonlinear);
   // Torque of terms with known linear parameters, of those that no linear parameter scales at their nonlinear
   // parameters as they stand, and of those that only reach this balance, filtered: belongs on the left side. It moves
   // with the nonlinear parameters.
   Eigen::VectorXd known_torque(const Terms& terms, const std::vector<std::size_t>& on_balance);
+  // The linear regression y = X theta at the nonlinear parameters of `terms`: columns of the linear parameters, and the
+  // target less what is known.
+  struct Regression {
+    Eigen::MatrixXd X;
+    Eigen::VectorXd y;
+  };
+  Regression regression(const Terms& terms, const std::vector<std::size_t>& on_balance,
+                        const std::vector<ParameterRef>& linear);
   // Torque of one term at its values, all parameters in, filtered.
   Eigen::VectorXd term_torque(const Terms& terms, std::size_t term);
+  // The target less the torques of all terms at their values, N m.
+  Eigen::VectorXd residual(const Terms& terms);
 
   // What one unit at each point of a table adds, one column a point: linear interpolation between even points of a
   // signal

@@ -8,15 +8,8 @@
 
 namespace flexspline::estimation {
 
-Eigen::MatrixXd nonlinear_columns(BalanceData& data, const Terms& terms, const std::vector<std::size_t>& on_balance,
-                                  const std::vector<ParameterRef>& nonlinear) {
-  return data.nonlinear_columns(terms, on_balance, nonlinear);
-}
-
-NaturalValue natural_value(const Term& term, ParameterRef requested, const std::vector<ParameterRef>& refs,
-                           const Eigen::MatrixXd& covariance) {
-  NaturalValue result;
-  result.value = catalogue::natural(*term.entry, term.values)[requested.parameter];
+double natural_variance(const Term& term, ParameterRef requested, const std::vector<ParameterRef>& refs,
+                        const Eigen::MatrixXd& covariance) {
   Eigen::VectorXd slopes = Eigen::VectorXd::Zero(covariance.rows());
   for (std::size_t j = 0; j < refs.size(); ++j) {
     if (refs[j].term != requested.term) continue;
@@ -24,36 +17,12 @@ NaturalValue natural_value(const Term& term, ParameterRef requested, const std::
     values[refs[j].parameter].v[0] = 1.0;
     slopes[static_cast<Eigen::Index>(j)] = catalogue::natural(*term.entry, values)[requested.parameter].v[0];
   }
+  double variance = 0.0;
   // An undetermined parameter has an infinite variance, which must not be multiplied by a slope of zero.
   for (Eigen::Index i = 0; i < slopes.size(); ++i)
     for (Eigen::Index j = 0; j < slopes.size(); ++j)
-      if (slopes[i] != 0.0 && slopes[j] != 0.0) result.variance += slopes[i] * covariance(i, j) * slopes[j];
-  return result;
-}
-
-Eigen::VectorXd residual_of(BalanceData& data, const Terms& terms) {
-  Eigen::VectorXd residual = data.target();
-  for (const std::size_t t : terms_on(terms, data.balance(), data.prepared().output_signals))
-    residual -= data.term_torque(terms, t);
-  for (const std::size_t t : terms_acting_on_other_balance(terms, data.balance(), data.prepared().output_signals))
-    residual -= data.term_torque(terms, t);
-  return residual;
-}
-
-// Columns of the linear parameters, and the target. A column that equals the target (the effort, where only the effort
-// fixes the scale of the torques, report 3.6) would be a trivial solution: it is set to zero, so it is not determined.
-static Eigen::MatrixXd columns_and_target(BalanceData& data, const Terms& terms,
-                                          const std::vector<ParameterRef>& linear, const Eigen::VectorXd& target) {
-  constexpr double kSame = 1e-3;
-  Eigen::MatrixXd X = columns_of(data, terms, linear);
-  for (std::size_t j = 0; j < linear.size(); ++j) {
-    if ((terms[linear[j].term].entry->info->reads & effects::kTorqueScale) == 0) continue;
-    const auto column = X.col(static_cast<Eigen::Index>(j));
-    const double square = column.squaredNorm();
-    if (square > 0.0 && (target - column * (column.dot(target) / square)).norm() < kSame * target.norm())
-      X.col(static_cast<Eigen::Index>(j)).setZero();
-  }
-  return X;
+      if (slopes[i] != 0.0 && slopes[j] != 0.0) variance += slopes[i] * covariance(i, j) * slopes[j];
+  return variance;
 }
 
 namespace {
@@ -71,38 +40,40 @@ class Fitting {
   void take_uncertainty();
 
  private:
-  // Linear parameters at given nonlinear parameters; `whitening` is the noise covariance.
-  void solve(const NoiseCovariance& whitening) {
-    const Eigen::VectorXd target = data_.target() - data_.known_torque(terms_, fit_.on_balance);
-    const Eigen::MatrixXd X = columns_and_target(data_, terms_, fit_.linear, target);
-    const LinearFit linear = least_squares(X, target, whitening);
+  // The regression at the present nonlinear parameters. A column that equals the target (the effort, where only the
+  // effort fixes the scale of the torques, report 3.6) would be a trivial solution: it is set to zero, so it is not
+  // determined.
+  void form_regression() {
+    constexpr double kSame = 1e-3;
+    regression_ = data_.regression(terms_, fit_.on_balance, fit_.linear);
+    for (std::size_t j = 0; j < fit_.linear.size(); ++j) {
+      if ((terms_[fit_.linear[j].term].entry->info->reads & effects::kTorqueScale) == 0) continue;
+      auto column = regression_.X.col(static_cast<Eigen::Index>(j));
+      const Eigen::VectorXd& y = regression_.y;
+      const double square = column.squaredNorm();
+      if (square > 0.0 && (y - column * (column.dot(y) / square)).norm() < kSame * y.norm()) column.setZero();
+    }
+  }
+
+  // Linear parameters at given nonlinear parameters; `whitening` is the noise covariance. Returns the weights of
+  // records that follow from the residual.
+  Eigen::VectorXd solve(const NoiseCovariance& whitening) {
+    form_regression();
+    const LinearFit linear = least_squares(regression_.X, regression_.y, whitening);
     for (std::size_t j = 0; j < fit_.linear.size(); ++j)
       terms_[fit_.linear[j].term].values[fit_.linear[j].parameter] = linear.theta[static_cast<Eigen::Index>(j)];
     fit_.residual = linear.residual;
+    return record_weights(data_.records(), fit_.residual);
   }
 
-  // Columns of linear parameters and nonlinear parameters.
-  Eigen::MatrixXd columns() {
-    Eigen::MatrixXd J(data_.rows(), static_cast<Eigen::Index>(fit_.linear.size() + fit_.nonlinear.size()));
-    J << columns_and_target(data_, terms_, fit_.linear, data_.target() - data_.known_torque(terms_, fit_.on_balance)),
-        nonlinear_columns(data_, terms_, fit_.on_balance, fit_.nonlinear);
-    return J;
-  }
-
-  // The torque of each friction group, from `columns`.
-  Eigen::MatrixXd friction(const Eigen::MatrixXd& columns) const {
-    Eigen::VectorXd theta = Eigen::VectorXd::Zero(columns.cols());
+  // How friction differs between records at the present values, for which the regression is formed.
+  void estimate_differences() {
+    J_.resize(data_.rows(), static_cast<Eigen::Index>(fit_.linear.size() + fit_.nonlinear.size()));
+    J_ << regression_.X, data_.nonlinear_columns(terms_, fit_.on_balance, fit_.nonlinear);
+    Eigen::VectorXd theta = Eigen::VectorXd::Zero(J_.cols());
     for (std::size_t j = 0; j < fit_.linear.size(); ++j)
       theta[static_cast<Eigen::Index>(j)] = terms_[fit_.linear[j].term].values[fit_.linear[j].parameter];
-    return columns * random_effect_directions(friction_groups(terms_, fit_.linear, fit_.nonlinear), theta,
-                                              Eigen::VectorXd::Ones(columns.cols()),
-                                              static_cast<Eigen::Index>(fit_.linear.size()));
-  }
-
-  // How friction differs between records at the present values.
-  void estimate_differences() {
-    J_ = columns();
-    friction_ = friction(J_);
+    friction_ = friction_torques(J_, theta, terms_, fit_.linear, fit_.nonlinear);
     torques_ = noise_weights_.asDiagonal() * friction_;
     between_ = paule_mandel(data_, torques_, noise_weights_.cwiseProduct(fit_.residual));
   }
@@ -111,19 +82,24 @@ class Fitting {
   Terms& terms_;
   BalanceFit& fit_;
   Eigen::VectorXd noise_weights_;  // of the residual without the records' random effects
-  Eigen::MatrixXd J_, friction_, torques_;
+  BalanceData::Regression regression_;
+  Eigen::MatrixXd J_;         // columns of linear parameters and nonlinear parameters
+  Eigen::MatrixXd friction_;  // the torque of each friction group
+  Eigen::MatrixXd torques_;   // the same, weighted
   RecordVariance between_;
 };
 
 void Fitting::fit_weighted() {
+  const bool searches = !fit_.nonlinear.empty();
+  if (searches) {
+    sweep_nonlinear(data_, terms_, fit_.on_balance, fit_.root_weights);
+    // Weights of the best point of a grid would be small on just those records that show where between points it lies.
+    refine_nonlinear(data_, terms_, fit_.on_balance, fit_.root_weights);
+  }
   // Weights and parameters depend on each other; two rounds are enough.
-  sweep_nonlinear(data_, terms_, fit_.on_balance, fit_.root_weights);
-  // Weights of the best point of a grid would be small on just those records that show where between points it lies.
-  if (!fit_.nonlinear.empty()) refine_nonlinear(data_, terms_, fit_.on_balance, fit_.root_weights);
   for (int round = 0; round < 2; ++round) {
-    solve(fit_.root_weights);
-    fit_.root_weights = record_weights(data_.records(), fit_.residual);
-    if (!fit_.nonlinear.empty()) refine_nonlinear(data_, terms_, fit_.on_balance, fit_.root_weights);
+    fit_.root_weights = solve(fit_.root_weights);
+    if (searches) refine_nonlinear(data_, terms_, fit_.on_balance, fit_.root_weights);
   }
   solve(fit_.root_weights);
   fit_.whitening = noise_weights_ = fit_.root_weights;
@@ -131,34 +107,36 @@ void Fitting::fit_weighted() {
 
 void Fitting::fit_generalised() {
   estimate_differences();
+  const bool searches = !fit_.nonlinear.empty();
   const Terms weighted_terms = terms_;
   const Eigen::VectorXd weighted_residual = fit_.residual;
+  Eigen::VectorXd generalised_weights;
   constexpr int kGeneralised = 3;
   for (int round = 0; round < kGeneralised && between_.std.size() > 0 && between_.std.maxCoeff() > 0.0; ++round) {
     noise_weights_ = record_weights(data_.records(), between_.left.cwiseQuotient(noise_weights_));
     fit_.whitening = noise_covariance(data_, noise_weights_, noise_weights_.asDiagonal() * friction_, between_.std,
                                       between_.autocorrelation_time);
     // With random effects the best nonlinear parameter of a small effect may be far from that without.
-    if (round == 0) sweep_nonlinear(data_, terms_, fit_.on_balance, fit_.whitening, SweepFrom::values);
-    if (!fit_.nonlinear.empty()) refine_nonlinear(data_, terms_, fit_.on_balance, fit_.whitening);
-    solve(fit_.whitening);
+    if (searches && round == 0) sweep_nonlinear(data_, terms_, fit_.on_balance, fit_.whitening, SweepFrom::values);
+    if (searches) refine_nonlinear(data_, terms_, fit_.on_balance, fit_.whitening);
+    generalised_weights = solve(fit_.whitening);
     estimate_differences();
   }
   if (fit_.whitening.is_diagonal()) return;
-  if (leaves_noise(between_, data_)) {
-    fit_.root_weights = record_weights(data_.records(), fit_.residual);
+  if (between_.leaves_noise) {
+    fit_.root_weights = generalised_weights;
     return;
   }
   terms_ = weighted_terms;
   fit_.residual = weighted_residual;
   fit_.whitening = noise_weights_ = fit_.root_weights;
+  form_regression();
   estimate_differences();
 }
 
 void Fitting::take_uncertainty() {
   const Eigen::VectorXd weighted = fit_.root_weights.cwiseProduct(fit_.residual);
-  fit_.autocorrelation_time =
-      std::max(autocorrelation_time(data_.records(), weighted), data_.filter_autocorrelation_time());
+  fit_.autocorrelation_time = autocorrelation_time(data_, weighted);
   const LinearFit joint = least_squares(J_, fit_.residual, fit_.root_weights);
   const LinearFit generalised = fit_.whitening.is_diagonal() ? joint : least_squares(J_, fit_.residual, fit_.whitening);
   const double freedom = std::max(1.0, static_cast<double>(data_.rows() - J_.cols()));

@@ -37,22 +37,10 @@ struct BalanceFit {
 // root_tolerance).
 BalanceFit fit_balance(BalanceData& data, Terms& terms);
 
-// A parameter in its own unit, where it was searched for as a ratio or a root, with the variance that follows from the
-// covariance of what it depends on.
-struct NaturalValue {
-  double value = 0.0;
-  double variance = 0.0;
-};
-// `refs` are the parameters of `covariance`, in its order; the requested one need not be among them.
-NaturalValue natural_value(const Term& term, ParameterRef requested, const std::vector<ParameterRef>& refs,
-                           const Eigen::MatrixXd& covariance);
-
-// Residual of terms at their present values on (other) data, N m.
-Eigen::VectorXd residual_of(BalanceData& data, const Terms& terms);
-
-// Slopes of the model by its free nonlinear parameters: columns that let a linear fit move nonlinear parameters to
-// first order.
-Eigen::MatrixXd nonlinear_columns(BalanceData& data, const Terms& terms, const std::vector<std::size_t>& on_balance,
-                                  const std::vector<ParameterRef>& nonlinear);
+// Variance of a parameter in its own unit, where it was searched for as a ratio or a root: it follows from the
+// covariance of what the parameter depends on. `refs` are the parameters of `covariance`, in its order; the requested
+// one need not be among them.
+double natural_variance(const Term& term, ParameterRef requested, const std::vector<ParameterRef>& refs,
+                        const Eigen::MatrixXd& covariance);
 
 }  // namespace flexspline::estimation

@@ -96,18 +96,17 @@ Method method_for(const model::Model& model) {
 
 std::unique_ptr<Identification> estimate(const data::Dataset& dataset, const model::Model& model,
                                          const PipelineOptions& pipeline, const Options& options) {
-  model::Model known = model;
-  for (const SuppliedValue& supplied : options.supplied) supply(known, supplied);
-  const Method method = options.method == Method::automatic ? method_for(known) : options.method;
-  if (method == Method::ls && method_for(known) == Method::nls)
+  const Method needed = method_for(model);
+  const Method method = options.method == Method::automatic ? needed : options.method;
+  if (method == Method::ls && needed == Method::nls)
     throw std::invalid_argument(
         "the model has nonlinear parameters, which linear least squares cannot estimate; give --method nls, or state "
         "them with fixed = true");
   std::unique_ptr<Identification> result;
   if (method == Method::partitioned) {
-    result = partitioned(dataset, known, pipeline);
+    result = partitioned(dataset, model, pipeline);
   } else {
-    result = form(dataset, known, pipeline);
+    result = form(dataset, model, pipeline);
     fit(*result);
     if (method != Method::ls && options.starts > 1) {
       options.progress("searching from several starts");
@@ -123,10 +122,11 @@ std::unique_ptr<Identification> estimate(const data::Dataset& dataset, const mod
     }
     assemble(*result);
   }
+  result->method = name_of(method);
   warn_of_scale(*result);
   const bool is_least_squares = method == Method::ls || method == Method::nls;
   if (options.intervals == Intervals::standard) {
-    if (is_least_squares) count_biases(*result, dataset, known, pipeline);
+    if (is_least_squares) count_biases(*result, dataset, model, pipeline);
     return result;
   }
   if (!is_least_squares) {

@@ -37,7 +37,6 @@ struct SuppliedValue {
 struct Options {
   Method method = Method::automatic;
   Intervals intervals = Intervals::standard;
-  std::vector<SuppliedValue> supplied;
   int starts = 3;  // of the search for nonlinear parameters: the swept one and random ones
   std::uint64_t seed = 1;
   int replicates = 200;  // of the bootstrap
@@ -51,7 +50,7 @@ Intervals intervals_from_name(std::string_view name);
 
 // Fits the model to the experiments of role fit. What the method could not do is among the warnings. Throws
 // data::DataError as identify does, and std::invalid_argument where the options do not suit the model: ls
-// with free nonlinear parameters, a supplied parameter that is not there; the text states what to do.
+// with free nonlinear parameters; the text states what to do.
 std::unique_ptr<Identification> estimate(const data::Dataset& dataset, const model::Model& model,
                                          const PipelineOptions& pipeline, const Options& options = {});
 

@@ -14,7 +14,8 @@ namespace {
 
 // Each record fitted alone, with nonlinear parameters as pooled. Its error is its own: from its residual and that
 // residual's autocorrelation, not from those of all records, which contain the differences between the records.
-std::vector<AloneFit> fit_alone(const BalanceData& data, const Eigen::MatrixXd& X, const Eigen::VectorXd& target) {
+std::vector<AloneFit> fit_alone(BalanceData& data, const BalanceFit& balance_fit, const Terms& terms) {
+  const auto [X, y] = data.regression(terms, balance_fit.on_balance, balance_fit.linear);
   std::vector<AloneFit> all;
   for (const RowRange& range : data.records()) {
     AloneFit& fit = all.emplace_back();
@@ -23,7 +24,7 @@ std::vector<AloneFit> fit_alone(const BalanceData& data, const Eigen::MatrixXd& 
       fit.too_short = fmt::format("{} rows for {} parameters", range.size(), X.cols());
       continue;
     }
-    LinearFit alone = least_squares(X.middleRows(range.first, range.size()), target.segment(range.first, range.size()),
+    LinearFit alone = least_squares(X.middleRows(range.first, range.size()), y.segment(range.first, range.size()),
                                     Eigen::VectorXd::Ones(range.size()));
     const double noise = alone.residual.squaredNorm() / static_cast<double>(range.size() - X.cols());
     const double rows_as_one = std::max(autocorrelation_time({{range.record, 0, range.size()}}, alone.residual),
@@ -38,11 +39,6 @@ std::vector<AloneFit> fit_alone(const BalanceData& data, const Eigen::MatrixXd& 
     fit.too_short = "too few rows are left of it";
   }
   return all;
-}
-
-std::vector<AloneFit> fit_alone(BalanceData& data, const BalanceFit& fit, const Terms& terms) {
-  const Eigen::MatrixXd X = columns_of(data, terms, fit.linear);
-  return fit_alone(data, X, data.target() - data.known_torque(terms, fit.on_balance));
 }
 
 Estimate estimate_of(const Terms& terms, ParameterRef ref, data::Axis axis) {
@@ -158,7 +154,7 @@ double beyond_noise(const BalanceData& data, const effects::ParameterInfo& info,
 }
 
 void warn_of_excitation(BalanceData& data, const BalanceFit& fit, const Terms& terms, Identification& result) {
-  const Eigen::MatrixXd X = columns_of(data, terms, fit.linear);
+  const Eigen::MatrixXd X = data.columns(terms, fit.linear);
   for (std::size_t j = 0; j < fit.linear.size(); ++j) {
     const Term& term = terms[fit.linear[j].term];
     const auto c = static_cast<Eigen::Index>(j);
@@ -253,7 +249,7 @@ std::string why_no_scale(BalanceData& data, const BalanceFit& fit, const std::ve
   const auto at = std::ranges::find_if(fit.linear, is_scale);
   if (at == fit.linear.end()) return "";
   const auto j = static_cast<Eigen::Index>(at - fit.linear.begin());
-  const double own = fit.root_tolerance[j] * columns_of(data, terms, {*at}).norm();
+  const double own = fit.root_tolerance[j] * data.column(terms, *at).norm();
   const double noise = fit.residual.norm();
   if (fit.root_tolerance[j] < kUndetermined || noise * noise < kMostAttenuation * (noise * noise + own * own))
     return "";
@@ -282,7 +278,7 @@ void add_estimates(BalanceData& data, const BalanceFit& fit, const std::vector<P
     const effects::ParameterInfo& info = result.terms[ref.term].entry->parameters[ref.parameter];
     e.identifiable = fit.root_tolerance[at] >= kUndetermined && no_scale.empty() && !std::ranges::count(open, ref.term);
     e.excitation = fit.excitation[at];
-    const double variance = natural_value(result.terms[ref.term], ref, all, fit.covariance).variance;
+    const double variance = natural_variance(result.terms[ref.term], ref, all, fit.covariance);
     // What differs from a column that was left out by too little has its value and that one's together.
     if (e.identifiable && std::isfinite(variance) && fit.excitation[at] >= kUndetermined) {
       e.std = std::hypot(std::sqrt(variance), beyond_noise(data, info, e.value));

@@ -52,15 +52,12 @@ NoiseModel noise_model(const Eigen::MatrixXd& cross_columns, const Eigen::Matrix
   LinearFit moved = least_squares(all, residual, weights);
   weights = record_weights(data.records(), moved.residual);
   moved = least_squares(all, residual, weights);
-  const NoiseModel alike{weights, std::max(autocorrelation_time(data.records(), weights.cwiseProduct(moved.residual)),
-                                           data.filter_autocorrelation_time())};
-  const std::vector<FrictionGroup> groups = friction_groups(terms, fit.linear, fit.nonlinear);
+  const NoiseModel alike{weights, autocorrelation_time(data, weights.cwiseProduct(moved.residual))};
   const auto friction = [&] {
     Eigen::VectorXd theta = moved.theta.head(own.cols());
     for (std::size_t j = 0; j < fit.linear.size(); ++j)
       theta[static_cast<Eigen::Index>(j)] += terms[fit.linear[j].term].values[fit.linear[j].parameter];
-    return Eigen::MatrixXd(own * random_effect_directions(groups, theta, Eigen::VectorXd::Ones(own.cols()),
-                                                          static_cast<Eigen::Index>(fit.linear.size())));
+    return friction_torques(own, theta, terms, fit.linear, fit.nonlinear);
   };
   const auto differences = [&](const Eigen::MatrixXd& torques) {
     return paule_mandel(data, weights.asDiagonal() * torques, weights.cwiseProduct(moved.residual));
@@ -77,7 +74,7 @@ NoiseModel noise_model(const Eigen::MatrixXd& cross_columns, const Eigen::Matrix
     torques = friction();
     between = differences(torques);
   }
-  if (whitening.is_diagonal() || !leaves_noise(between, data)) return alike;
+  if (whitening.is_diagonal() || !between.leaves_noise) return alike;
   return {whitening, between.autocorrelation_time};
 }
 

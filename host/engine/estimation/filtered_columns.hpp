@@ -98,6 +98,34 @@ struct WholeRecord {
 template <class Work>
 WholeRecord(Work) -> WholeRecord<Work>;
 
+inline void BalanceData::filter(const RowRange& range, Eigen::Ref<Eigen::MatrixXd> signals) const {
+  const auto at = static_cast<std::size_t>(&range - ranges_.data());
+  for (const data::Segment& s : prepared_->records[range.record].segments)
+    filters_[at].apply_columns_in_place(
+        signals.middleRows(static_cast<Eigen::Index>(s.first), static_cast<Eigen::Index>(s.last - s.first)));
+}
+
+inline bool BalanceData::have_equal_filters(const RowRange& a, const RowRange& b) const {
+  const Record &first = prepared_->records[a.record], &second = prepared_->records[b.record];
+  return first.sample_s == second.sample_s && first.segments.size() == 1 && second.segments.size() == 1 &&
+         first.inputs.size() == second.inputs.size() && first.segments[0].first == second.segments[0].first &&
+         first.segments[0].last == second.segments[0].last;
+}
+
+inline void BalanceData::take_rows(const RowRange& range, const double* signal,
+                                   Eigen::Ref<Eigen::VectorXd> rows) const {
+  const auto& samples = prepared_->records[range.record].rows[index(balance_)].samples;
+  for (std::size_t k = 0; k < samples.size(); ++k) {
+    const double* at = signal + samples[k];
+    const double x = beyond_.empty() ? 0.0 : beyond_[static_cast<std::size_t>(range.first) + k];
+    // A cubic through four samples; the filter leaves nothing that it could not follow.
+    rows[static_cast<Eigen::Index>(k)] =
+        x == 0.0 ? *at
+                 : at[-1] * (x * (1.0 - x) * (x - 2.0) / 6.0) + at[0] * ((x + 1.0) * (x - 1.0) * (x - 2.0) / 2.0) +
+                       at[1] * ((x + 1.0) * x * (2.0 - x) / 2.0) + at[2] * ((x + 1.0) * x * (x - 1.0) / 6.0);
+  }
+}
+
 template <class Fill>
 Eigen::MatrixXd BalanceData::filtered_columns(std::size_t columns, Fill fill) const {
   // Some at a time: more would not stay in the processor's cache. Records with equal filters are filtered together.

@@ -61,4 +61,11 @@ Eigen::MatrixXd random_effect_directions(const std::vector<FrictionGroup>& group
   return u;
 }
 
+Eigen::MatrixXd friction_torques(const Eigen::MatrixXd& slopes, const Eigen::VectorXd& theta, const Terms& terms,
+                                 const std::vector<ParameterRef>& linear, const std::vector<ParameterRef>& nonlinear) {
+  return slopes * random_effect_directions(friction_groups(terms, linear, nonlinear), theta,
+                                           Eigen::VectorXd::Ones(slopes.cols()),
+                                           static_cast<Eigen::Index>(linear.size()));
+}
+
 }  // namespace flexspline::estimation

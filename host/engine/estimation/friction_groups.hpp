@@ -41,4 +41,9 @@ std::vector<FrictionGroup> friction_groups(const Terms& terms, const std::vector
 Eigen::MatrixXd random_effect_directions(const std::vector<FrictionGroup>& groups, const Eigen::VectorXd& theta,
                                          const Eigen::VectorXd& size, Eigen::Index first_nonlinear);
 
+// The torque of each friction group, one column each: of `slopes` by linear, then by nonlinear parameters, at the
+// values `theta` of the linear ones (one for each column of `slopes`).
+Eigen::MatrixXd friction_torques(const Eigen::MatrixXd& slopes, const Eigen::VectorXd& theta, const Terms& terms,
+                                 const std::vector<ParameterRef>& linear, const std::vector<ParameterRef>& nonlinear);
+
 }  // namespace flexspline::estimation

@@ -12,7 +12,6 @@
 #include "host/engine/estimation/form_on.hpp"
 #include "host/engine/estimation/modelled_torque.hpp"
 #include "host/engine/estimation/record_constants.hpp"
-#include "host/engine/estimation/variable_projection.hpp"
 #include "host/physics/catalogue/user_defined_effect.hpp"
 
 namespace flexspline::estimation {
@@ -77,15 +76,13 @@ bool combine_balances(Identification& result, std::size_t identified, std::size_
   if (shared.refs.empty()) return false;
   BalanceData& data = result.data[other];
   const BalanceFit& its = result.fits[other];
-  Eigen::MatrixXd cross_columns(data.rows(), 0),
-      own(data.rows(), static_cast<Eigen::Index>(its.linear.size() + its.nonlinear.size()));
+  Eigen::MatrixXd cross_columns(data.rows(), 0);
   for (const ParameterRef& ref : shared.refs) {
     cross_columns.conservativeResize(Eigen::NoChange, cross_columns.cols() + 1);
     cross_columns.rightCols(1) = cross_balance_columns(data, result.terms, ref.term, {ref.parameter});
   }
-  own << columns_of(data, result.terms, its.linear),
-      nonlinear_columns(data, result.terms, its.on_balance, its.nonlinear);
-  const Eigen::VectorXd residual = residual_of(data, result.terms);
+  const Eigen::MatrixXd own = data.slopes(result.terms, its.on_balance, its.linear, its.nonlinear);
+  const Eigen::VectorXd residual = data.residual(result.terms);
   const NoiseModel noise = noise_model(cross_columns, own, data, result.terms, its, residual);
   const Evidence evidence =
       evidence_of(cross_columns, own, residual, noise.whitening, std::max(1.0, noise.autocorrelation_time));
@@ -115,7 +112,7 @@ bool combine_balances(Identification& result, std::size_t identified, std::size_
   for (std::size_t i = 0; i < known.size(); ++i)
     for (std::size_t j = 0; j < known.size(); ++j)
       fit.covariance(known[i], known[j]) -= less(static_cast<Eigen::Index>(i), static_cast<Eigen::Index>(j));
-  fit.residual = residual_of(result.data[identified], result.terms);
+  fit.residual = result.data[identified].residual(result.terms);
   return true;
 }
 

@@ -5,6 +5,7 @@
 #include <memory>
 #include <optional>
 #include <string>
+#include <string_view>
 #include <utility>
 #include <vector>
 
@@ -38,6 +39,7 @@ struct Derived : ByExperiment {
 };
 
 struct Identification {
+  std::string_view method = "";  // as in Options of estimate.hpp; empty: of identify()
   PreparedData prepared;
   Terms terms;                                  // with values
   std::vector<BalanceData> data;                // the balances that could be formed

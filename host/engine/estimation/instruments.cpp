@@ -17,13 +17,6 @@ namespace {
 constexpr int kFreeRuns = 3;
 constexpr int kSteps = 4;
 
-// Slopes of the model by all free parameters, linear ones first.
-Eigen::MatrixXd slopes(BalanceData& data, const Terms& terms, const BalanceFit& fit) {
-  Eigen::MatrixXd J(data.rows(), static_cast<Eigen::Index>(fit.linear.size() + fit.nonlinear.size()));
-  J << columns_of(data, terms, fit.linear), nonlinear_columns(data, terms, fit.on_balance, fit.nonlinear);
-  return J;
-}
-
 // Adds to a parameter, within its bounds.
 void move(BalanceData& data, Terms& terms, const ParameterRef& ref, double by, bool nonlinear_ref) {
   Term& term = terms[ref.term];
@@ -48,8 +41,8 @@ void refit(BalanceData& data, const FreeMotion& motion, Terms& terms, BalanceFit
   const auto linear = static_cast<Eigen::Index>(fit.linear.size());
   Eigen::MatrixXd A(data.rows(), count), Z(data.rows(), count);
   for (int step = 0; step < kSteps; ++step) {
-    const Eigen::MatrixXd own = slopes(data, terms, fit);
-    Eigen::MatrixXd instruments = slopes(simulated, terms, fit);
+    const Eigen::MatrixXd own = data.slopes(terms, fit.on_balance, fit.linear, fit.nonlinear);
+    Eigen::MatrixXd instruments = simulated.slopes(terms, fit.on_balance, fit.linear, fit.nonlinear);
     for (const RowRange& range : data.records())
       if (!motion.simulated[range.record])
         instruments.middleRows(range.first, range.size()) = own.middleRows(range.first, range.size());
@@ -57,7 +50,7 @@ void refit(BalanceData& data, const FreeMotion& motion, Terms& terms, BalanceFit
       A.col(j) = fit.root_weights.cwiseProduct(own.col(kept[static_cast<std::size_t>(j)]));
       Z.col(j) = fit.root_weights.cwiseProduct(instruments.col(kept[static_cast<std::size_t>(j)]));
     }
-    fit.residual = residual_of(data, terms);
+    fit.residual = data.residual(terms);
     const Eigen::VectorXd size = A.colwise().norm().transpose().array().max(1e-300);
     const Eigen::VectorXd instrument_size = Z.colwise().norm().transpose().array().max(1e-300);
     const Eigen::MatrixXd zs = Z * instrument_size.cwiseInverse().asDiagonal();
@@ -72,10 +65,9 @@ void refit(BalanceData& data, const FreeMotion& motion, Terms& terms, BalanceFit
            nonlinear_ref);
     }
     if (step + 1 < kSteps) continue;
-    fit.residual = residual_of(data, terms);
+    fit.residual = data.residual(terms);
     const Eigen::VectorXd weighted = fit.root_weights.cwiseProduct(fit.residual);
-    fit.autocorrelation_time =
-        std::max(autocorrelation_time(data.records(), weighted), data.filter_autocorrelation_time());
+    fit.autocorrelation_time = autocorrelation_time(data, weighted);
     const double freedom = std::max(1.0, static_cast<double>(data.rows() - count));
     const Eigen::MatrixXd inverse = normal.inverse();
     const Eigen::MatrixXd middle =

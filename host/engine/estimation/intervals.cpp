@@ -31,8 +31,8 @@ double fit_rest(BalanceData& data, Terms& terms, const std::vector<std::size_t>&
                 const NoiseCovariance& whitening) {
   refine_nonlinear(data, terms, on_balance, whitening);
   const std::vector<ParameterRef> linear = free_linear_parameters(terms, on_balance);
-  const LinearFit fit =
-      least_squares(columns_of(data, terms, linear), data.target() - data.known_torque(terms, on_balance), whitening);
+  const auto [X, y] = data.regression(terms, on_balance, linear);
+  const LinearFit fit = least_squares(X, y, whitening);
   for (std::size_t j = 0; j < linear.size(); ++j)
     terms[linear[j].term].values[linear[j].parameter] = fit.theta[static_cast<Eigen::Index>(j)];
   return (whitening * fit.residual).squaredNorm();

@@ -7,7 +7,6 @@
 
 #include "host/engine/estimation/balance_fit.hpp"
 #include "host/engine/estimation/least_squares.hpp"
-#include "host/engine/estimation/variable_projection.hpp"
 #include "host/physics/catalogue/user_defined_effect.hpp"
 
 namespace flexspline::estimation {
@@ -42,13 +41,12 @@ OtherColumns others(BalanceData& data, const Terms& all, const TableSpecificatio
   const std::vector<ParameterRef> linear = free_linear_parameters(terms, on_balance),
                                   nonlinear = free_nonlinear_parameters(terms, on_balance);
   OtherColumns b;
-  const Eigen::VectorXd y = data.target() - data.known_torque(terms, on_balance);
-  const Eigen::MatrixXd X = columns_of(data, terms, linear);
+  const auto [X, y] = data.regression(terms, on_balance, linear);
   const auto count = static_cast<Eigen::Index>(linear.size() + nonlinear.size()) + (specification.delay_too ? 1 : 0);
   b.problem.others.resize(data.rows(), count);
   b.problem.others.leftCols(X.cols()) = X;
   b.problem.others.middleCols(X.cols(), static_cast<Eigen::Index>(nonlinear.size())) =
-      nonlinear_columns(data, terms, on_balance, nonlinear);
+      data.nonlinear_columns(terms, on_balance, nonlinear);
   if (specification.delay_too) b.problem.others.rightCols(1) = data.delay_column();
   for (const auto* refs : {&linear, &nonlinear})
     for (const ParameterRef& ref : *refs) b.ids.push_back(terms[ref.term].id);
@@ -93,7 +91,7 @@ LearnedTable learned(BalanceData& data, const OtherColumns& b, Fitted fitted) {
   LearnedTable result;
   const Curve& curve = fitted.curve;
   const Eigen::VectorXd weighted = b.problem.root_weights.cwiseProduct(curve.residual);
-  const double tau = std::max(autocorrelation_time(data.records(), weighted), data.filter_autocorrelation_time());
+  const double tau = autocorrelation_time(data, weighted);
   result.table.at = std::move(fitted.at);
   result.table.value.assign(curve.value.begin(), curve.value.end());
   for (Eigen::Index k = 0; k < curve.value.size(); ++k)

@@ -44,5 +44,7 @@ Eigen::Index newey_west_lags(double autocorrelation_time, Eigen::Index rows);
 
 // Samples that count as one: integrated autocorrelation time of the weighted residual over all records, at least one.
 double autocorrelation_time(const std::vector<RowRange>& records, const Eigen::VectorXd& weighted_residual);
+// The same of a whole balance, at least that of its filter.
+double autocorrelation_time(const BalanceData& data, const Eigen::VectorXd& weighted_residual);
 
 }  // namespace flexspline::estimation

@@ -5,7 +5,6 @@
 
 #include "host/common/algebra/decompositions.hpp"
 #include "host/engine/estimation/balance_fit.hpp"
-#include "host/engine/estimation/variable_projection.hpp"
 
 namespace flexspline::estimation {
 
@@ -25,7 +24,7 @@ Eigen::MatrixXd model_columns(BalanceData& data, const Terms& terms) {
   const std::vector<ParameterRef> linear = free_linear_parameters(terms, on_balance);
   const std::vector<ParameterRef> nonlinear = free_nonlinear_parameters(terms, on_balance);
   Eigen::MatrixXd X(data.rows(), static_cast<Eigen::Index>(linear.size() + nonlinear.size() + 1));
-  X << columns_of(data, terms, linear), nonlinear_columns(data, terms, on_balance, nonlinear), data.delay_column();
+  X << data.slopes(terms, on_balance, linear, nonlinear), data.delay_column();
   return X;
 }
 

@@ -45,4 +45,15 @@ Eigen::MatrixXd NoiseCovariance::score_columns(const Eigen::MatrixXd& rows) cons
   return white;
 }
 
+NoiseCovariance noise_covariance(const BalanceData& data, const Eigen::VectorXd& root_weights,
+                                 const Eigen::MatrixXd& torques, const Eigen::VectorXd& std,
+                                 double autocorrelation_time) {
+  NoiseCovariance whitening(root_weights);
+  if (std.size() == 0 || std.maxCoeff() <= 0.0) return whitening;
+  const Eigen::MatrixXd along = torques * std.asDiagonal() / std::sqrt(autocorrelation_time);
+  for (const RowRange& range : data.records())
+    whitening.add_random_effects(range, along.middleRows(range.first, range.size()));
+  return whitening;
+}
+
 }  // namespace flexspline::estimation

@@ -45,4 +45,10 @@ class NoiseCovariance {
   std::vector<Common> common_;
 };
 
+// Errors of samples at these weights that records have in common by their own friction: `torques` (weighted, a column a
+// group) vary by `std`, noise of which `autocorrelation_time` samples count as one by one.
+NoiseCovariance noise_covariance(const BalanceData& data, const Eigen::VectorXd& root_weights,
+                                 const Eigen::MatrixXd& torques, const Eigen::VectorXd& std,
+                                 double autocorrelation_time);
+
 }  // namespace flexspline::estimation

@@ -468,7 +468,7 @@ void refit_to_output(Identification& identification, const std::function<void(st
   problem.set(best.x.data());
   mark_undetermined(identification, problem, ends);
   for (std::size_t b = 0; b < identification.fits.size(); ++b)
-    identification.fits[b].residual = residual_of(identification.data[b], identification.terms);
+    identification.fits[b].residual = identification.data[b].residual(identification.terms);
   std::string without;
   for (std::size_t i = 0; i < problem.usable().size(); ++i)
     if (!problem.usable()[i]) without += (without.empty() ? "" : ", ") + identification.prepared.records[i].name;

@@ -4,6 +4,7 @@
 #include <numbers>
 
 #include "host/engine/estimation/balance_data.hpp"
+#include "host/engine/estimation/filtered_columns.hpp"
 #include "shared/fixed/turn.hpp"
 
 namespace flexspline::estimation {

@@ -389,7 +389,7 @@ PreparedData prepare_with(const std::vector<const Experiment*>& experiments, con
   in_parallel(missing.size(), [&](std::size_t m) {
     throw_if_cancelled();
     made[m] = prepare_one(*experiments[missing[m]], prepared.constants, pipeline);
-    correct_zero_order_hold(made[m], prepared.constants, pipeline.torque_per_step);
+    if (pipeline.torque_per_step != 0.0) correct_zero_order_hold(made[m], prepared.constants, pipeline.torque_per_step);
   });
   for (std::size_t m = 0; m < made.size(); ++m) prepared.records[missing[m]] = std::move(made[m]);
   prepared.output_signals.torsion = std::ranges::any_of(prepared.records, [](const Record& r) {
@@ -419,25 +419,28 @@ PreparedData prepare(const std::vector<const Experiment*>& experiments, const mo
     return prepared;
   }
   PreparedData prepared = prepare_with(experiments, drive, choose_pipeline(experiments, options));
+  Pipeline& pipeline = prepared.pipeline;
+  // What the records show changes the pipeline; then they are prepared again.
+  const auto again = [&] { prepared = prepare_with(experiments, drive, Pipeline(pipeline)); };
   if (!options.cutoff_hz && options.mask) {
     double slowest_hz = 1e300;
     for (const Experiment* e : experiments) slowest_hz = std::min(slowest_hz, 1.0 / e->sample_s);
-    if (raise_for_mask(prepared, law_rad_s, slowest_hz / 10.0))
-      prepared = prepare_with(experiments, drive, Pipeline(prepared.pipeline));
+    if (raise_for_mask(prepared, law_rad_s, slowest_hz / 10.0)) again();
   }
   // The cut-off is that of the other models, so that their errors can be compared.
   if (keeps_reversals) {
-    prepared.pipeline.keep_motor_reversals = true;
-    prepared = prepare_with(experiments, drive, Pipeline(prepared.pipeline));
+    pipeline.keep_motor_reversals = true;
+    again();
   }
-  if (prepared.pipeline.mask && masks_all_torsion(prepared)) {
-    prepared.pipeline.keep_torsion_reversals = true;
-    prepared.pipeline.reason += "; reversals of the torsion are kept, as its rate is hardly above its noise";
-    prepared = prepare_with(experiments, drive, Pipeline(prepared.pipeline));
+  if (pipeline.mask && masks_all_torsion(prepared)) {
+    pipeline.keep_torsion_reversals = true;
+    pipeline.reason += "; reversals of the torsion are kept, as its rate is hardly above its noise";
+    again();
   }
-  prepared.pipeline.torque_per_step = torque_per_held_step(prepared);
-  for (Record& record : prepared.records)
-    correct_zero_order_hold(record, prepared.constants, prepared.pipeline.torque_per_step);
+  if (const HeldStep step = held_step(prepared); step.lacks) {
+    pipeline.torque_per_step = step.torque_per_step;
+    again();
+  }
   prepared.chosen_on = experiments;
   prepared.slowest_law_rad_s = law_rad_s;
   return prepared;

@@ -39,7 +39,7 @@ bool refine_record_constants(PreparedData& prepared, BalanceData& data, const Te
     const RowRange& range = data.records()[static_cast<std::size_t>(r)];
     X.col(first + r).segment(range.first, range.size()) = slope.segment(range.first, range.size());
   }
-  const LinearFit step = least_squares(X, residual_of(data, terms), root_weights);
+  const LinearFit step = least_squares(X, data.residual(terms), root_weights);
   const Eigen::VectorXd constant = step.theta.tail(records);
   if (!(constant.cwiseAbs().maxCoeff() > 0.0)) return false;
   const double mean = constant.mean();

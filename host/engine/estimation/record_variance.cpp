@@ -71,12 +71,12 @@ std::pair<double, double> variance_between(const std::vector<OwnFactors>& record
 }  // namespace
 
 RecordVariance paule_mandel(const BalanceData& data, const Eigen::MatrixXd& torques, const Eigen::VectorXd& residual) {
+  constexpr double kNoise = 2.0;
+  const double filter_time = data.filter_autocorrelation_time();
   RecordVariance between;
   between.std = between.freedom = Eigen::VectorXd::Zero(torques.cols());
   between.left = residual;
-  const auto tau = [&] {
-    return std::max(autocorrelation_time(data.records(), between.left), data.filter_autocorrelation_time());
-  };
+  const auto tau = [&] { return std::max(autocorrelation_time(data.records(), between.left), filter_time); };
   const auto take_off = [&](const RowRange& range, const Eigen::VectorXd& factors) {
     between.left.segment(range.first, range.size()) =
         residual.segment(range.first, range.size()) - torques.middleRows(range.first, range.size()) * factors;
@@ -106,23 +106,8 @@ RecordVariance paule_mandel(const BalanceData& data, const Eigen::MatrixXd& torq
     if (between.std.maxCoeff() <= 0.0) break;
   }
   between.autocorrelation_time = tau();
+  between.leaves_noise = between.autocorrelation_time <= kNoise * filter_time;
   return between;
-}
-
-bool leaves_noise(const RecordVariance& between, const BalanceData& data) {
-  constexpr double kNoise = 2.0;
-  return between.autocorrelation_time <= kNoise * data.filter_autocorrelation_time();
-}
-
-NoiseCovariance noise_covariance(const BalanceData& data, const Eigen::VectorXd& root_weights,
-                                 const Eigen::MatrixXd& torques, const Eigen::VectorXd& std,
-                                 double autocorrelation_time) {
-  NoiseCovariance whitening(root_weights);
-  if (std.size() == 0 || std.maxCoeff() <= 0.0) return whitening;
-  const Eigen::MatrixXd along = torques * std.asDiagonal() / std::sqrt(autocorrelation_time);
-  for (const RowRange& range : data.records())
-    whitening.add_random_effects(range, along.middleRows(range.first, range.size()));
-  return whitening;
 }
 
 Eigen::MatrixXd add_record_variance(const RecordVariance& between, const BalanceData& data,

@@ -6,7 +6,6 @@
 
 #include "host/engine/estimation/balance_data.hpp"
 #include "host/engine/estimation/friction_groups.hpp"
-#include "host/engine/estimation/noise_covariance.hpp"
 
 namespace flexspline::estimation {
 
@@ -16,21 +15,14 @@ struct RecordVariance {
   Eigen::VectorXd freedom;            // of that estimate: records that identify it, less one
   Eigen::VectorXd left;               // residual without the records' own factors
   double autocorrelation_time = 1.0;  // of what is left
+  // Whether differences of friction leave nothing but noise. A missing effect differs from record to record, too, and
+  // to take that for friction ruins what the model knows of friction.
+  bool leaves_noise = true;
 };
 
 // From a fit's residual and the friction torques (a column a group), both weighted. The variance of b is the one at
 // which the factors of the records scatter as they should, after their own errors (Paule and Mandel, 1982).
 RecordVariance paule_mandel(const BalanceData& data, const Eigen::MatrixXd& torques, const Eigen::VectorXd& residual);
-
-// Whether differences of friction leave nothing but noise. A missing effect differs from record to record, too, and to
-// take that for friction ruins what the model knows of friction.
-bool leaves_noise(const RecordVariance& between, const BalanceData& data);
-
-// Errors of samples at these weights that records have in common by their own friction: `torques` (weighted, a column a
-// group) vary by `std`, noise of which `autocorrelation_time` samples count as one by one.
-NoiseCovariance noise_covariance(const BalanceData& data, const Eigen::VectorXd& root_weights,
-                                 const Eigen::MatrixXd& torques, const Eigen::VectorXd& std,
-                                 double autocorrelation_time);
 
 // Covariance of the estimates (`unit` is (X'WX)^-1, `columns` W^1/2 X), `within` being what it is without differences
 // between records: what those add, and all of it widened so far that 1.96 standard errors hold 95 % although the

@@ -12,7 +12,6 @@
 #include "host/engine/estimation/least_squares.hpp"
 #include "host/engine/estimation/modelled_torque.hpp"
 #include "host/engine/estimation/side_motion.hpp"
-#include "host/engine/estimation/variable_projection.hpp"
 #include "host/engine/estimation/zero_order_hold.hpp"
 
 namespace flexspline::estimation {
@@ -87,9 +86,7 @@ struct Linearised {
 };
 Linearised linearised(BalanceData& data, const BalanceFit& fit, const Terms& terms,
                       const std::vector<Eigen::Index>& identified) {
-  Eigen::MatrixXd all(data.rows(), static_cast<Eigen::Index>(fit.linear.size() + fit.nonlinear.size()));
-  all << columns_of(data, terms, fit.linear), nonlinear_columns(data, terms, fit.on_balance, fit.nonlinear);
-  return {all(Eigen::all, identified), residual_of(data, terms)};
+  return {data.slopes(terms, fit.on_balance, fit.linear, fit.nonlinear)(Eigen::all, identified), data.residual(terms)};
 }
 
 // All balances of the same samples, from these experiments in place of the measured ones.
@@ -151,9 +148,9 @@ struct Changes {
   Eigen::MatrixXd middle;                           // of the covariance that standard errors count
 };
 
-void add_draw(const BalanceData& data, const BalanceFit& fit, const Linearised& own,
+// `start`: the step that the samples as they are would take.
+void add_draw(const BalanceData& data, const BalanceFit& fit, const Linearised& own, const Eigen::VectorXd& start,
               const std::vector<const Linearised*>& noisy, Eigen::Index draw_index, Changes& changes) {
-  const Eigen::VectorXd start = least_squares(own.J, own.residual, fit.whitening).theta;
   std::vector<Eigen::VectorXd> step;
   for (const Linearised* n : noisy) step.push_back(least_squares(n->J, n->residual, fit.whitening).theta - start);
   changes.at_twice.col(draw_index) = 0.5 * (step[0] + step[1]);
@@ -193,9 +190,11 @@ double extrapolated_bias(double at_twice, double at_four_times) {
 std::vector<RegressorNoise> regressor_noise(Identification& found) {
   const std::vector<std::vector<Eigen::Index>> identified = identified_of(found);
   std::vector<Linearised> own;
+  std::vector<LinearFit> fits;  // of the samples as they are
   std::vector<Changes> changes(found.fits.size());
   for (std::size_t b = 0; b < found.fits.size(); ++b) {
     own.push_back(linearised(found.data[b], found.fits[b], found.terms, identified[b]));
+    fits.push_back(least_squares(own.back().J, own.back().residual, found.fits[b].whitening));
     const Eigen::Index n = own.back().J.cols();
     changes[b].at_twice = changes[b].at_four_times = changes[b].chance =
         Eigen::MatrixXd::Zero(n, static_cast<Eigen::Index>(kDraws));
@@ -209,7 +208,8 @@ std::vector<RegressorNoise> regressor_noise(Identification& found) {
       std::vector<const Linearised*> of_balance;
       for (const std::vector<Linearised>& n : noisy) of_balance.push_back(&n[b]);
       if (!identified[b].empty())
-        add_draw(found.data[b], found.fits[b], own[b], of_balance, static_cast<Eigen::Index>(d), changes[b]);
+        add_draw(found.data[b], found.fits[b], own[b], fits[b].theta, of_balance, static_cast<Eigen::Index>(d),
+                 changes[b]);
     }
   }
   std::vector<RegressorNoise> result;
@@ -219,8 +219,7 @@ std::vector<RegressorNoise> regressor_noise(Identification& found) {
       result.push_back({Eigen::VectorXd::Zero(n), Eigen::MatrixXd::Zero(n, n), Eigen::MatrixXd::Zero(n, n)});
       continue;
     }
-    const Eigen::MatrixXd unit = least_squares(own[b].J, own[b].residual, found.fits[b].whitening).unit_covariance;
-    result.push_back(summarised(changes[b], unit, identified[b], found.fits[b].covariance.rows()));
+    result.push_back(summarised(changes[b], fits[b].unit_covariance, identified[b], found.fits[b].covariance.rows()));
   }
   return result;
 }

@@ -16,9 +16,9 @@ struct Interval {
 };
 Interval interval_95(double value, double std, double bias = 0.0);
 
-// Widens the intervals of a fit by least squares by its biases, of the filters (cutoff_change.hpp) and of noise in its
-// columns (regressor_noise.hpp), and its standard errors by what they did not count of that noise. `model` is what the
-// search for nonlinear parameters began from.
+// Widens the intervals of a fit by least squares by its biases, of the filters (which a fit at twice the cut-off shows)
+// and of noise in its columns (regressor_noise.hpp), and its standard errors by what they did not count of that noise.
+// `model` is what the search for nonlinear parameters began from.
 void count_biases(Identification& identification, const data::Dataset& dataset, const model::Model& model,
                   const PipelineOptions& pipeline);
 

@@ -85,9 +85,9 @@ ScaledColumns scaled_columns(const Eigen::MatrixXd& X, const NoiseCovariance& wh
 }
 
 // The sum over samples of weighted squares after the best linear parameters.
-double projected_cost(const Eigen::MatrixXd& X, const Eigen::VectorXd& y, const NoiseCovariance& whitening) {
-  const Eigen::MatrixXd A = scaled_columns(X, whitening).A;
-  const Eigen::VectorXd b = whitening * y;
+double projected_cost(const BalanceData::Regression& regression, const NoiseCovariance& whitening) {
+  const Eigen::MatrixXd A = scaled_columns(regression.X, whitening).A;
+  const Eigen::VectorXd b = whitening * regression.y;
   return (b - A * algebra::PivotedQr(A).solve(b)).squaredNorm();
 }
 
@@ -198,10 +198,6 @@ std::vector<double> parameter_grid(const ParameterRange& range, std::size_t coun
   return values;
 }
 
-Eigen::MatrixXd columns_of(BalanceData& data, const Terms& terms, const std::vector<ParameterRef>& linear) {
-  return data.columns(terms, linear);
-}
-
 void sweep_nonlinear(BalanceData& data, Terms& terms, const std::vector<std::size_t>& on_balance,
                      const NoiseCovariance& whitening, SweepFrom from) {
   const std::vector<ParameterRef> nonlinear = free_nonlinear_parameters(terms, on_balance);
@@ -218,10 +214,7 @@ void sweep_nonlinear(BalanceData& data, Terms& terms, const std::vector<std::siz
                                             : parameter_range(data, terms[s.term], s.parameter).at(0.5);
   }
   constexpr std::size_t kGrid = 6;
-  const auto cost_now = [&] {
-    return projected_cost(columns_of(data, terms, linear), data.target() - data.known_torque(terms, on_balance),
-                          whitening);
-  };
+  const auto cost_now = [&] { return projected_cost(data.regression(terms, on_balance, linear), whitening); };
   for (int around = 0; around < (open.size() > 1 ? 2 : 1); ++around)
     for (const ParameterRef& s : open) {
       double& value = terms[s.term].values[s.parameter];
@@ -289,10 +282,11 @@ class ProjectedResidual {
 
  private:
   void factor(const std::vector<double>& shares) {
-    ScaledColumns columns = scaled_columns(columns_of(*on_, terms_, linear_), whitening_);
+    const BalanceData::Regression regression = on_->regression(terms_, on_balance_, linear_);
+    ScaledColumns columns = scaled_columns(regression.X, whitening_);
     A_ = std::move(columns.A);
     size_ = std::move(columns.size);
-    const Eigen::VectorXd b = whitening_ * (on_->target() - on_->known_torque(terms_, on_balance_));
+    const Eigen::VectorXd b = whitening_ * regression.y;
     qr_ = algebra::PivotedQr(A_);
     theta_ = qr_.solve(b);
     left_ = b - A_ * theta_;
@@ -332,8 +326,7 @@ double refine_nonlinear(BalanceData& data, Terms& terms, const std::vector<std::
                         const NoiseCovariance& whitening, double tolerance, BalanceData* coarse) {
   ProjectedResidual projected(data, terms, on_balance, whitening);
   if (projected.nonlinear() == 0 || data.empty())
-    return projected_cost(columns_of(data, terms, free_linear_parameters(terms, on_balance)),
-                          data.target() - data.known_torque(terms, on_balance), whitening);
+    return projected_cost(data.regression(terms, on_balance, free_linear_parameters(terms, on_balance)), whitening);
   Minimisation how;
   how.low.assign(projected.nonlinear(), 0.0);
   how.high.assign(projected.nonlinear(), 1.0);

@@ -31,9 +31,6 @@ void set_grid_values(const BalanceData& data, Terms& terms, const std::vector<st
 // Values to start from or to rank candidates on, spread over the range.
 std::vector<double> parameter_grid(const ParameterRange& range, std::size_t count);
 
-// Columns of all linear parameters that are free, in the order of `linear`.
-Eigen::MatrixXd columns_of(BalanceData& data, const Terms& terms, const std::vector<ParameterRef>& linear);
-
 // Minimises the weighted residual over the free nonlinear parameters on this balance by variable projection (linear
 // parameters are eliminated at each step; Jacobian after Kaufman), from the values in `terms`, within their ranges.
 // Writes the result into `terms`. Returns the weighted sum of squares.

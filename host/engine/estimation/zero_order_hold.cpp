@@ -156,13 +156,8 @@ HeldStep held_step(const PreparedData& prepared) {
   return {per_step, lacking - kCertainErrors * doubt > 0.5, lacking + kCertainErrors * doubt > 0.5};
 }
 
-double torque_per_held_step(const PreparedData& prepared) {
-  const HeldStep step = held_step(prepared);
-  return step.lacks ? step.torque_per_step : 0.0;
-}
-
 void correct_zero_order_hold(Record& r, const catalogue::DriveConstants<double>& constants, double torque_per_step) {
-  if (torque_per_step == 0.0 || !steps_with_effort(r)) return;
+  if (!steps_with_effort(r)) return;
   const std::vector<double> steps = half_steps(r, constants.torque_constant);
   for (std::size_t k = 0; k < steps.size(); ++k) r.torque[k] += torque_per_step * steps[k];
 }

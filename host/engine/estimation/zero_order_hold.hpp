@@ -18,8 +18,6 @@ struct HeldStep {
 };
 // `prepared.pipeline.torque_per_step` must be zero still.
 HeldStep held_step(const PreparedData& prepared);
-// The step where it is missing for certain; else, as behind a soft gear, zero.
-double torque_per_held_step(const PreparedData& prepared);
 // Adds the other half of the steps to `torque` of a record (not to the inputs of effects), where it is free.
 void correct_zero_order_hold(Record& record, const catalogue::DriveConstants<double>& constants,
                              double torque_per_step);

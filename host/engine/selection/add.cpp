@@ -77,8 +77,8 @@ Addition compare_models(const data::Dataset& dataset, const model::Model& before
   const Balance balance = base->data[b].balance();
   result.signal = std::string(balance_signal(balance));
   result.unit = before.drive.axis == data::Axis::linear ? "N" : "N*m";
-  result.before.rmse_fit = root_mean_square(estimation::residual_of(base->data[b], base->terms));
-  result.after.rmse_fit = root_mean_square(estimation::residual_of(extended->data[x], extended->terms));
+  result.before.rmse_fit = root_mean_square(base->data[b].residual(base->terms));
+  result.after.rmse_fit = root_mean_square(extended->data[x].residual(extended->terms));
   const HeldOut holdout(dataset, *base, balance, options.ready.get());
   std::vector<const data::Experiment*> fitted, evaluated;
   for (const data::Experiment& e : dataset.experiments)

@@ -186,7 +186,7 @@ Unexplained left_by(BalanceData& data, const CrossValidatedFit& base) {
   left.root_weights = base.root_weights;
   left.residual = base.root_weights.cwiseProduct(base.residual);
   if (base.linear.empty()) return left;
-  const Eigen::MatrixXd X = base.root_weights.asDiagonal() * estimation::columns_of(data, base.terms, base.linear);
+  const Eigen::MatrixXd X = base.root_weights.asDiagonal() * data.columns(base.terms, base.linear);
   left.own = algebra::PivotedQr(X).span();
   return left;
 }

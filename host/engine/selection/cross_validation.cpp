@@ -121,9 +121,7 @@ std::pair<MixedFit, double> fit_with_autocorrelation(const BalanceData& data, co
     fit.theta = mixed.linear.theta.cwiseQuotient(regression.factors.size);
     fit.residual = residual_of(data, regression, fit.theta, mixed);
     fit.root_weights = root_weights_of(data, keep, mixed.effects.variance);
-    fit.autocorrelation_time =
-        std::max(estimation::autocorrelation_time(data.records(), fit.root_weights.cwiseProduct(fit.residual)),
-                 data.filter_autocorrelation_time());
+    fit.autocorrelation_time = estimation::autocorrelation_time(data, fit.root_weights.cwiseProduct(fit.residual));
     if (fit.groups.empty() || fit.autocorrelation_time < 1.1 * tau) break;
     tau = fit.autocorrelation_time;
   }
@@ -168,7 +166,7 @@ CrossValidatedFit cross_validate(BalanceData& data, Terms terms, const Eigen::Ve
   if (!nonlinear.empty()) {
     // Slopes by nonlinear parameters need the linear parameters.
     const RecordFactors linear =
-        estimation::record_factors(data, estimation::columns_of(data, terms, fit.linear), regression.y, keep, 1);
+        estimation::record_factors(data, data.columns(terms, fit.linear), regression.y, keep, 1);
     const MixedFit first =
         estimation::fit_mixed_model(linear, fit.groups, regression.first_nonlinear, data.filter_autocorrelation_time());
     set_linear(terms, fit.linear, first.linear.theta.cwiseQuotient(linear.size));
@@ -212,8 +210,8 @@ NoiseCovariance noise_covariance(BalanceData& data, const CrossValidatedFit& fit
   const auto first_nonlinear = static_cast<Eigen::Index>(fit.linear.size());
   const bool ratio_parameters = std::any_of(fit.groups.begin(), fit.groups.end(),
                                             [](const FrictionGroup& g) { return !g.ratio_parameters.empty(); });
-  const Eigen::MatrixXd X = ratio_parameters ? estimation::model_columns(data, fit.terms)
-                                             : estimation::columns_of(data, fit.terms, fit.linear);
+  const Eigen::MatrixXd X =
+      ratio_parameters ? estimation::model_columns(data, fit.terms) : data.columns(fit.terms, fit.linear);
   const Eigen::MatrixXd u = estimation::random_effect_directions(fit.groups, fit.theta.head(X.cols()),
                                                                  Eigen::VectorXd::Ones(X.cols()), first_nonlinear);
   return estimation::noise_covariance(data, fit.root_weights, fit.root_weights.asDiagonal() * (X * u),
@@ -224,8 +222,8 @@ double whitened_squares(BalanceData& data, const Terms& terms, const CrossValida
   const auto on_balance = estimation::terms_on(terms, data.balance(), data.prepared().output_signals);
   const auto linear = estimation::free_linear_parameters(terms, on_balance);
   const Eigen::VectorXd keep = (fit.root_weights.array() > 0.0).cast<double>();
-  const RecordFactors factors = estimation::record_factors(
-      data, estimation::columns_of(data, terms, linear), data.target() - data.known_torque(terms, on_balance), keep, 1);
+  const auto [X, y] = data.regression(terms, on_balance, linear);
+  const RecordFactors factors = estimation::record_factors(data, X, y, keep, 1);
   const std::vector<FrictionGroup> groups = estimation::friction_groups(terms, linear);
   const Eigen::Index columns = factors.columns();
   SmallVector std = SmallVector::Zero(static_cast<Eigen::Index>(groups.size()));

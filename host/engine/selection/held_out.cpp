@@ -27,7 +27,7 @@ double HeldOut::rmse(const Terms& terms) const {
     own = prepared;
     if (estimation::take_torque_where_read(own, terms)) with_load.emplace(own, data->balance());
   }
-  const Eigen::VectorXd residual = estimation::residual_of(with_load ? *with_load : *data, terms);
+  const Eigen::VectorXd residual = (with_load ? *with_load : *data).residual(terms);
   return residual.size() > 0 ? std::sqrt(residual.squaredNorm() / static_cast<double>(residual.size())) : 0.0;
 }
 

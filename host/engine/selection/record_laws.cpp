@@ -35,7 +35,7 @@ AsFriction as_friction(BalanceData& data, const estimation::Terms& base, const R
                        const Eigen::VectorXd& torque, const Eigen::VectorXd& root_weights) {
   std::vector<estimation::ParameterRef> refs;
   for (const Estimate* e : own.parameters) refs.push_back(e->ref);
-  const Eigen::MatrixXd columns = estimation::columns_of(data, base, refs);
+  const Eigen::MatrixXd columns = data.columns(base, refs);
   AsFriction result;
   result.added.resize(own.values.theta.rows(), own.values.theta.cols());
   for (std::size_t i = 0; i < own.records.size(); ++i) {

@@ -167,7 +167,7 @@ class Analysis {
 
     void inverse(BalanceData& data, const estimation::Terms& terms, Variant& variant,
                  std::vector<PooledErrors>& together) {
-      const Eigen::VectorXd residual = estimation::residual_of(data, terms);
+      const Eigen::VectorXd residual = data.residual(terms);
       for (const estimation::RowRange& range : data.records()) {
         comparison::Score score;
         for (Eigen::Index k = range.first; k < range.last; ++k) score.add(data.target()[k], residual[k]);

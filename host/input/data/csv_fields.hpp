@@ -37,8 +37,4 @@ struct Number {
 Number number_from_field(std::string_view field, char separator);
 bool is_number(std::string_view field, char separator);
 
-// Digits with at most one point, as loggers write them: the same bits as std::from_chars, in a third of its time.
-// nullptr for all else.
-const char* plain_decimal(const char* at, const char* end, double& value);
-
 }  // namespace flexspline::data

@@ -326,14 +326,4 @@ bool read_experiment(const Table& table, const ColumnPlan& plan, const TimeBound
   return ExperimentReader(table, plan, experiment, findings).read(bounds, axis);
 }
 
-void check_experiment(Experiment& experiment, const DriveFacts& drive, Findings& findings) {
-  check_velocities(experiment, drive, findings);
-  check_velocity_lag(experiment, findings);
-  check_effort_sign(experiment, findings);
-  check_gear_ratio(experiment, drive, findings);
-  check_standstill(experiment, findings);
-  check_constant_columns(experiment, findings);
-  check_ranges(experiment, drive.axis.value_or(Axis::rotary), findings);
-}
-
 }  // namespace flexspline::data

@@ -24,7 +24,4 @@ struct TimeBounds {
 bool read_experiment(const Table& table, const ColumnPlan& plan, const TimeBounds& bounds, Axis axis,
                      Experiment& experiment, Findings& findings);
 
-// The checks on the uniform time base, once all of the drive is known.
-void check_experiment(Experiment& experiment, const DriveFacts& drive, Findings& findings);
-
 }  // namespace flexspline::data

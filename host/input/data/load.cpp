@@ -7,6 +7,7 @@
 #include <memory>
 #include <set>
 
+#include "host/input/data/checks.hpp"
 #include "host/input/data/columns.hpp"
 #include "host/input/data/dataset.hpp"
 #include "host/input/data/dataset_toml.hpp"
@@ -24,6 +25,17 @@ fs::path real_path(const fs::path& path) {
   std::error_code error;
   const fs::path whole = fs::weakly_canonical(path, error);
   return error ? path : whole;
+}
+
+// The checks on the uniform time base, once all of the drive is known.
+void check_experiment(Experiment& experiment, const DriveFacts& drive, Findings& findings) {
+  check_velocities(experiment, drive, findings);
+  check_velocity_lag(experiment, findings);
+  check_effort_sign(experiment, findings);
+  check_gear_ratio(experiment, drive, findings);
+  check_standstill(experiment, findings);
+  check_constant_columns(experiment, findings);
+  check_ranges(experiment, drive.axis.value_or(Axis::rotary), findings);
 }
 
 class Loader {

@@ -247,8 +247,7 @@ std::string identification_text(const estimation::Identification& found) {
   return text + "\n\n" + errors(found) + "\n\n" + wrapped(pipeline_text(found.prepared));
 }
 
-json identification_json(const estimation::Identification& found, const std::string& method,
-                         const std::string& intervals) {
+json identification_json(const estimation::Identification& found, const std::string& intervals) {
   json parameters = json::array();
   for (const Estimate& e : found.estimates) {
     json parameter = json_parameter(e);
@@ -273,7 +272,7 @@ json identification_json(const estimation::Identification& found, const std::str
                         {"autocorrelation_time", json_number(fit.autocorrelation_time)}});
   const estimation::Pipeline& p = found.prepared.pipeline;
   return {{"format", "flexspline-identify/1"},
-          {"method", method},
+          {"method", found.method},
           {"intervals", intervals},
           {"cutoff_hz", json_number(p.row_cutoff_hz)},
           {"motion_cutoff_hz", json_number(p.motion_cutoff_hz)},

@@ -15,9 +15,8 @@ std::string pipeline_text(const estimation::PreparedData& prepared);
 // the balances.
 std::string identification_text(const estimation::Identification& found);
 
-// "flexspline-identify/1"; `method` and `intervals` by their names: nls, profile.
-nlohmann::json identification_json(const estimation::Identification& found, const std::string& method,
-                                   const std::string& intervals);
+// "flexspline-identify/1"; `intervals` by their name: profile.
+nlohmann::json identification_json(const estimation::Identification& found, const std::string& intervals);
 
 // "N*m", or "N" on a linear axis.
 std::string torque_unit(data::Axis axis);

@@ -60,8 +60,8 @@ View::View(const Subject& subject)
   estimation::in_parallel(balances.size(), [&](std::size_t b) {
     BalanceView& view = balances[b];
     view.data = std::make_unique<estimation::BalanceData>(prepared, view.balance);
-    view.residual = estimation::residual_of(*view.data, terms);
-    if (terms_before) view.before = estimation::residual_of(*view.data, *terms_before);
+    view.residual = view.data->residual(terms);
+    if (terms_before) view.before = view.data->residual(*terms_before);
     view.floor_squared = Eigen::VectorXd::Constant(view.data->rows(), std::numeric_limits<double>::quiet_NaN());
     for (const estimation::RowRange& range : view.data->records())
       if (const auto* r = result(range.record, view.signal); r && r->noise_floor)
