@@ -356,6 +356,29 @@ Resampling resample(const std::vector<const data::Experiment*>& experiments, con
   return result;
 }
 
+void take_likelier_waves(Resampling& resampling, const SearchedBalance& motor) {
+  const auto candidate = [&](std::string_view effect, std::optional<double> order) {
+    return std::find_if(motor.candidates.begin(), motor.candidates.end(), [&](const CandidateFit& t) {
+      return t.model.entry->name() == effect && t.model.order == order;
+    });
+  };
+  for (Resampling::FoundTerm& found : resampling.found) {
+    if (found.group.size() != 1 || !found.group.front().order) continue;
+    const NamedEffect name = found.group.front();
+    const auto own = candidate(name.effect, name.order);
+    const double own_score = own == motor.candidates.end() ? 0.0 : own->gain.score;
+    for (const std::string_view wave : catalogue::split_names(catalogue::get(name.effect).info->phase_error_of)) {
+      const auto other = candidate(wave, name.order);
+      if (other == motor.candidates.end() || !passes(*other)) continue;
+      const double more = other->gain.score - own_score;
+      if (more < -kPolicy.confounded_margin) continue;
+      found.group = {{std::string(wave), name.order}};
+      if (more <= kPolicy.confounded_margin) found.group.push_back(name);
+      break;
+    }
+  }
+}
+
 bool resampling_decides(const Resampling& resampling, const SearchedBalance& motor) {
   if (resampling.subsamples == 0.0) return resampling.too_little;
   if (!motor.names_one()) return true;

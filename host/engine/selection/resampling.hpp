@@ -16,6 +16,10 @@ bool is_of_family(const NamedEffect& a, const NamedEffect& b);
 Resampling resample(const std::vector<const data::Experiment*>& experiments, const model::Drive& drive,
                     const estimation::Terms& terms);
 
+// An error of the phase, of a filter or an elastic gear, makes of a wave what a law of friction over the angle is.
+// Halves of the data take either for the other, so likelihood decides which it is, or that both are one group.
+void take_likelier_waves(Resampling& resampling, const SearchedBalance& motor);
+
 // Whether resampling decides the verdict on the motor's balance. Likelihood has more power where exactly one effect is
 // missing: it decides where the halves of the data show nothing above the noise, and where resampling does not
 // contradict it.
