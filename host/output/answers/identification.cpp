@@ -80,11 +80,12 @@ std::string left_out_text(const ByExperiment& e) {
 
 std::string remarks(const std::vector<std::pair<std::string, const ByExperiment*>>& lines) {
   std::string text;
-  bool differs = false, few = false;
+  bool differs = false;
+  std::vector<std::string> few;
   for (const auto& [name, e] : lines) {
     differs = differs || e->spread_percent.value_or(0.0) > estimation::kReliableSpreadPercent;
-    few = few ||
-          (e->per_experiment.size() >= estimation::kFewestForReliable && e->counted() < estimation::kFewestForReliable);
+    if (e->per_experiment.size() >= estimation::kFewestForReliable && e->counted() < estimation::kFewestForReliable)
+      few.push_back(name);
   }
   if (differs)
     text +=
@@ -102,7 +103,10 @@ std::string remarks(const std::vector<std::pair<std::string, const ByExperiment*
       same->second += ", " + name;
   }
   for (const auto& [why, names] : by_text) text += "\n" + wrapped(fmt::format("  {}: {}", names, why));
-  if (few) text += "\n  Fewer than three experiments do not show whether a value is reliable.";
+  if (!few.empty())
+    text += "\n" + wrapped(fmt::format("  Fewer than three experiments count for {}, which does not show whether {} "
+                                       "reliable.",
+                                       listed(few), few.size() > 1 ? "they are" : "it is"));
   return text;
 }
 
