@@ -35,6 +35,15 @@ data::KeyValue number_value(double value) {
   return {model::exact_text(value), value, "", 0};
 }
 
+// Those that a column of ours may be given in, on an axis that turns and on one that moves straight.
+std::string units_of(const std::string& ours) {
+  const std::optional<Column> column = data::column_from_name(ours);
+  if (!column) return data::known_units(data::Quantity::time);
+  const std::string rotary = data::known_units(data::quantity_of(*column, data::Axis::rotary));
+  const std::string linear = data::known_units(data::quantity_of(*column, data::Axis::linear));
+  return rotary == linear ? rotary : rotary + "; on a linear axis " + linear;
+}
+
 // `names`: the columns of all files; `first` may say why it has none of a name.
 ColumnGuess mapping_of(const std::string& text, const std::vector<std::string>& names, const data::Recording& first) {
   const std::size_t equals = text.find('=');
@@ -56,8 +65,10 @@ ColumnGuess mapping_of(const std::string& text, const std::vector<std::string>& 
     guess.unit = guess.theirs.substr(colon + 1);
     guess.theirs.erase(colon);
     if (!data::unit_from_text(guess.unit))
-      throw RequestError(fmt::format("--map {}: the unit \"{}\" is not known; write one as in --map {}={}:rpm", text,
-                                     guess.unit, guess.ours, guess.theirs));
+      throw RequestError(
+          fmt::format("--map {}: the unit \"{}\" is not known; those of {} are {}, also with a number "
+                      "before them",
+                      text, guess.unit, guess.ours, units_of(guess.ours)));
   }
   if (!is_name(guess.theirs)) {
     const std::string why = first.why_not(guess.theirs);
