@@ -25,7 +25,7 @@ namespace flexspline {
 namespace {
 
 using estimation::Balance;
-using estimation::BalanceData;
+using estimation::RegressionProblem;
 using estimation::Terms;
 
 constexpr int kRuns = 7;
@@ -64,7 +64,7 @@ data::Dataset measured(model::Model& model) {
 }
 
 // What the script needs of the measurement; both sides begin here.
-void write(const std::filesystem::path& folder, const BalanceData& data, const std::vector<double>& grid) {
+void write(const std::filesystem::path& folder, const RegressionProblem& data, const std::vector<double>& grid) {
   const estimation::PreparedData& p = data.prepared();
   std::ofstream about(folder / "about.txt");
   about << fmt::format("{:.17g} {:.17g} {:.17g}\n", 1.0 / p.records[0].sample_s, p.pipeline.row_cutoff_hz,
@@ -103,7 +103,7 @@ struct Answer {
 
 Answer search(const estimation::PreparedData& prepared, const Terms& terms, const std::vector<double>& grid,
               const std::vector<Question>& asked) {
-  BalanceData data(prepared, Balance::motor);
+  RegressionProblem data(prepared, Balance::motor);
   const Eigen::VectorXd keep = Eigen::VectorXd::Ones(data.rows());
   const selection::CrossValidatedFit base = selection::cross_validate(data, terms, keep);
   Answer answer;
@@ -133,7 +133,7 @@ int compare(const std::string& python, const std::string& script) {
   model::Model model;
   const data::Dataset dataset = measured(model);
   const auto found = estimation::identify(dataset, model, {});
-  const BalanceData& motor = found->data.front();
+  const RegressionProblem& motor = found->data.front();
   Terms candidate{estimation::candidate_term(catalogue::get("stribeck_gaussian"))};
   const std::size_t velocity = candidate[0].entry->index_of("velocity");
   const std::vector<double> grid =

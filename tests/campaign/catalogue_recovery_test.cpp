@@ -69,7 +69,7 @@ Outcome recover(const std::string& label, std::uint64_t seed) {
   for (const auto& e : dataset.experiments) (e.role == data::Role::holdout ? holdout : fit).push_back(&e);
   const estimation::PreparedData prepared = estimation::prepare(fit, truth, {});
   const estimation::PreparedData held_out = estimation::prepare_with(holdout, truth.drive, prepared.pipeline);
-  estimation::BalanceData on_holdout(held_out, balance);
+  estimation::RegressionProblem on_holdout(held_out, balance);
   const double floor = root_mean_square(on_holdout.residual(estimation::terms_of(truth)));
 
   const selection::Addition added = selection::add(dataset, base, label, {});

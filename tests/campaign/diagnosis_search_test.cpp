@@ -76,7 +76,7 @@ estimation::PipelineOptions options(const Recipe& recipe) {
 struct Bench {
   data::Experiment record;
   estimation::PreparedData prepared;
-  BalanceData data;
+  RegressionProblem data;
   Eigen::VectorXd keep;
   Terms terms = estimation::terms_of(plain_model());
   CrossValidatedFit base;
@@ -173,7 +173,7 @@ TEST(LikelihoodGainOf, ATrueColumnGainsInProportionToTheLengthOfTheRecord) {
 
 TEST(CrossValidate, PredictsEachFifthAsAFitOfTheOthersDoes) {
   const Bench bench({.extra = [](double, double q, double) { return 1e-3 * std::cos(3.0 * q); }});
-  BalanceData data = bench.data;
+  const RegressionProblem& data = bench.data;
   Eigen::MatrixXd X(data.rows(), 4);
   X << data.columns(bench.terms, bench.base.linear), data.delay_column();
   using Exact = Eigen::Matrix<long double, Eigen::Dynamic, Eigen::Dynamic>;
@@ -207,7 +207,7 @@ TEST(CrossValidate, ADelayOfTheEffortIsANuisanceThatBiasesNothing) {
 TEST(CrossValidate, RowsThatDoNotCountMoveNothing) {
   Bench bench({});
   const Bench pushed({.extra = [](double t, double, double) { return t > 2.0 && t < 2.5 ? 1.0 : 0.0; }});
-  BalanceData data = pushed.data;
+  const RegressionProblem& data = pushed.data;
   Eigen::VectorXd keep = pushed.keep;
   for (Eigen::Index row = 0; row < data.rows(); ++row) {
     const double t = 1e-3 * static_cast<double>(data.sample_of(data.records()[0], row));

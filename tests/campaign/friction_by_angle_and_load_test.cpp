@@ -23,7 +23,7 @@ double held_out_floor(const data::Dataset& dataset, const model::Model& truth) {
   for (const auto& e : dataset.experiments) (e.role == data::Role::holdout ? holdout : fit).push_back(&e);
   const estimation::PreparedData prepared = estimation::prepare(fit, truth, {});
   const estimation::PreparedData held_out = estimation::prepare_with(holdout, truth.drive, prepared.pipeline);
-  estimation::BalanceData data(held_out, estimation::Balance::motor);
+  estimation::RegressionProblem data(held_out, estimation::Balance::motor);
   const Eigen::VectorXd r = data.residual(estimation::terms_of(truth));
   return std::sqrt(r.squaredNorm() / static_cast<double>(r.size()));
 }

@@ -78,7 +78,7 @@ Outcome run(const Case& c) {
   for (const auto& e : dataset.experiments) (e.role == data::Role::holdout ? holdout : fit).push_back(&e);
   const estimation::PreparedData prepared = estimation::prepare(fit, true_model, {});
   const estimation::PreparedData held_out = estimation::prepare_with(holdout, true_model.drive, prepared.pipeline);
-  estimation::BalanceData data(held_out, catalogue::get(truth.substr(0, truth.find(':'))).info->balance);
+  estimation::RegressionProblem data(held_out, catalogue::get(truth.substr(0, truth.find(':'))).info->balance);
   const Eigen::VectorXd r = data.residual(estimation::terms_of(true_model));
   const double floor = std::sqrt(r.squaredNorm() / static_cast<double>(r.size()));
   outcome.holdout_over_floor = *added.after.rmse_holdout / floor;

@@ -175,7 +175,7 @@ TEST_F(Table6, TheCubicModelOverpredictsAtLargeTorsionAndTheLinearOneDoesNot) {
     if (!rows.cubic.empty()) fix(model, "cubic_stiffness", "stiffness", mean(rows.cubic));
     const data::Dataset largest = only(dataset, "100-8");
     const estimation::PreparedData prepared = estimation::prepare({&largest.experiments.front()}, model, {});
-    estimation::BalanceData balance(prepared, estimation::Balance::transmission);
+    estimation::RegressionProblem balance(prepared, estimation::Balance::transmission);
     const Eigen::VectorXd rest = balance.residual(estimation::terms_of(model));
     Eigen::Index at = 0;
     const double measured = balance.target().cwiseAbs().maxCoeff(&at);

@@ -18,7 +18,7 @@ namespace flexspline::soak {
 namespace {
 
 using estimation::Balance;
-using estimation::BalanceData;
+using estimation::RegressionProblem;
 
 // Of a set in which no candidate is admissible.
 constexpr double kNoScore = -20.0;
@@ -89,14 +89,14 @@ struct Bench {
     const estimation::PreparedData prepared = estimation::prepare(of(data::Role::fit), truth, {});
     const estimation::PreparedData held_out =
         estimation::prepare_with(of(data::Role::holdout), truth.drive, prepared.pipeline);
-    BalanceData data(held_out, balance);
+    RegressionProblem data(held_out, balance);
     return root_mean_square(data.residual(estimation::terms_of(truth)));
   }
 
   // The torque of the hidden effects orthogonal to the base model, over the noise, on the fitted records.
   double missing_over_noise(Balance balance) const {
     const estimation::PreparedData prepared = estimation::prepare(of(data::Role::fit), truth, {});
-    BalanceData data(prepared, balance);
+    RegressionProblem data(prepared, balance);
     const estimation::Terms full = estimation::terms_of(truth),
                             without = estimation::terms_of(testing::model_of(file.drive, false, true));
     Eigen::VectorXd noise = data.residual(full);

@@ -15,7 +15,7 @@ namespace flexspline::comparison {
 namespace {
 
 using estimation::Balance;
-using estimation::BalanceData;
+using estimation::RegressionProblem;
 using plant::Mode;
 using plant::Waveform;
 
@@ -54,7 +54,7 @@ estimation::PreparedData prepared(const data::Dataset& dataset, const model::Mod
 
 std::vector<NoiseFloor> floors_of(const data::Dataset& dataset, const model::Model& m, Balance balance) {
   const estimation::PreparedData p = prepared(dataset, m);
-  BalanceData data(p, balance);
+  RegressionProblem data(p, balance);
   return noise_floors(data, estimation::terms_of(m), pointers(dataset), m.drive);
 }
 
@@ -66,7 +66,7 @@ std::vector<double> true_floors(const Recorded& r, const model::Model& m, Balanc
     q.records[k].rows = p.records[k].rows;
     q.records[k].at_rest = p.records[k].at_rest;
   }
-  BalanceData a(p, balance), b(q, balance);
+  RegressionProblem a(p, balance), b(q, balance);
   const auto terms = estimation::terms_of(m);
   const Eigen::VectorXd d = a.residual(terms) - b.residual(terms);
   std::vector<double> floors;
@@ -142,7 +142,7 @@ TEST(NoiseFloor, DoesNotCountAnEffectThatTheModelLacks) {
   const data::Dataset& dataset = rippled.measured;
   const model::Model m = known_model(drive);
   const estimation::PreparedData p = prepared(dataset, m);
-  BalanceData data(p, Balance::motor);
+  RegressionProblem data(p, Balance::motor);
   const auto terms = estimation::terms_of(m);
   const auto floors = noise_floors(data, terms, pointers(dataset), m.drive);
   const auto truth = true_floors(rippled, m, Balance::motor);
@@ -207,7 +207,7 @@ name = "train"
   estimation::PipelineOptions options;
   options.cutoff_hz = 100.0;
   const estimation::PreparedData p = estimation::prepare(pointers(dataset), m, options);
-  BalanceData data(p, Balance::motor);
+  RegressionProblem data(p, Balance::motor);
   estimation::Terms terms = estimation::terms_of(m);
   estimation::fit_balance(data, terms);
   const auto floors = noise_floors(data, terms, pointers(dataset), m.drive);

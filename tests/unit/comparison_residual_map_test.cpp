@@ -16,14 +16,14 @@ namespace flexspline::comparison {
 namespace {
 
 using estimation::Balance;
-using estimation::BalanceData;
+using estimation::RegressionProblem;
 using plant::Mode;
 using plant::Waveform;
 
 struct Rows {
   data::Dataset dataset;
   estimation::PreparedData prepared;
-  std::unique_ptr<BalanceData> motor;
+  std::unique_ptr<RegressionProblem> motor;
   Rows() {
     const plant::Drive drive = plant::demo_plant().drive;
     dataset = record(drive,
@@ -34,7 +34,7 @@ struct Rows {
     estimation::PipelineOptions options;
     options.cutoff_hz = 30.0;
     prepared = estimation::prepare(pointers(dataset), known_model(drive), options);
-    motor = std::make_unique<BalanceData>(prepared, Balance::motor);
+    motor = std::make_unique<RegressionProblem>(prepared, Balance::motor);
   }
   template <class F>
   Eigen::VectorXd along(F value) const {

@@ -22,7 +22,7 @@ constexpr std::size_t kParts = 5;
 struct Bench {
   std::vector<data::Experiment> experiments{record(0.7, 3000), record(1.3, 2000)};
   PreparedData prepared = prepare({&experiments[0], &experiments[1]}, {}, {40.0, false});
-  BalanceData data{prepared, Balance::motor};
+  RegressionProblem data{prepared, Balance::motor};
   MatrixXd X = MatrixXd(data.rows(), 3);
   VectorXd y = VectorXd(data.rows()), keep = VectorXd::Ones(data.rows());
 

@@ -65,28 +65,6 @@ double value(const Identification& found, std::string_view effect, std::string_v
 const Motion kSlow{{1.5, 0.4, 0.3}, {0.2, 1.1, 1.0}};
 const Motion kFast{{6.0, 0.7, 0.3}, {0.5, 2.7, 1.0}};
 
-TEST(Columns, OfTwoParametersByOneEvaluationAreThoseOfEachAlone) {
-  const data::Dataset dataset = dataset_of({experiment("slow", kSlow, plain), experiment("fast", kFast, plain)});
-  const auto found = identify(dataset, plain_model(), kOptions);
-  int told = 0;
-  for (const catalogue::Entry& entry : catalogue::all()) {
-    const Terms terms{candidate_term(entry)};
-    std::vector<ParameterRef> refs;
-    for (std::size_t p = 0; p < entry.parameters.size(); ++p)
-      if (entry.parameters[p].kind == effects::Kind::linear) refs.push_back({0, p});
-    if (refs.size() < 2 || !terms[0].adds_torque()) continue;
-    BalanceData together(found->prepared, Balance::motor);
-    const Eigen::MatrixXd all = together.columns(terms, refs);
-    for (std::size_t j = 0; j < refs.size(); ++j) {
-      BalanceData alone(found->prepared, Balance::motor);
-      const Eigen::VectorXd& column = alone.column(terms, refs[j]);
-      EXPECT_LE((all.col(static_cast<Eigen::Index>(j)) - column).norm(), 1e-13 * column.norm()) << entry.name() << j;
-      told += column.norm() > 0.0 ? 1 : 0;
-    }
-  }
-  EXPECT_GE(told, 6);  // ripple and both Stribeck laws at least
-}
-
 TEST(ShapeSearch, RecoversAStribeckVelocityFromExactData) {
   constexpr double kPositive = 0.03, kNegative = 0.02, kVelocity = 2.5;
   const Law law = [&](double q, double w, double a) {
@@ -135,7 +113,7 @@ TEST(ShapeSearch, RangesMapToSharesAndBack) {
 TEST(ShapeSearch, AStribeckVelocityEndsAtAQuarterOfTheFastMotion) {
   const data::Experiment e = experiment("fast", kFast, plain);
   const PreparedData prepared = prepare({&e}, {}, kOptions);
-  const BalanceData data(prepared, Balance::motor);
+  const RegressionProblem data(prepared, Balance::motor);
   const Term term = candidate_term(catalogue::get("stribeck_gaussian"));
   const ParameterRange range = parameter_range(data, term, 2);
   std::vector<double> speeds;
@@ -150,10 +128,10 @@ TEST(ShapeSearch, AStribeckVelocityEndsAtAQuarterOfTheFastMotion) {
 TEST(BalanceRows, SlopeByAShapeIsTheDifferenceOfTorques) {
   const data::Experiment e = experiment("fast", kFast, plain);
   const PreparedData prepared = prepare({&e}, {}, kOptions);
-  BalanceData data(prepared, Balance::motor);
+  RegressionProblem data(prepared, Balance::motor);
   Terms terms{candidate_term(catalogue::get("stribeck_gaussian"))};
   terms[0].values = {0.03, 0.02, 2.0};
-  const Eigen::VectorXd slope = data.nonlinear_column(terms, {0}, {0, 2});
+  const Eigen::VectorXd slope = data.nonlinear_columns(terms, {0}, {{0, 2}});
   constexpr double kStep = 1e-4;
   terms[0].values[2] = 2.0 + kStep;
   const Eigen::VectorXd above = data.term_torque(terms, 0);
@@ -166,7 +144,7 @@ TEST(BalanceRows, SlopeByAShapeIsTheDifferenceOfTorques) {
 TEST(BalanceRows, FoldsCutEachRecordIntoEqualPartsWithoutGapOrOverlap) {
   const data::Experiment a = experiment("a", kSlow, plain), b = experiment("b", kFast, plain, 3.0);
   const PreparedData prepared = prepare({&a, &b}, {}, kOptions);
-  const BalanceData data(prepared, Balance::motor);
+  const RegressionProblem data(prepared, Balance::motor);
   const auto folds = data.folds(5);
   ASSERT_EQ(folds.size(), 5u);
   for (std::size_t record = 0; record < 2; ++record) {
@@ -189,7 +167,7 @@ TEST(BalanceRows, ColumnsMadeTogetherAreThoseMadeOneByOne) {
   const data::Dataset d =
       dataset_of({experiment("a", kFast, plain), experiment("b", kSlow, plain), experiment("c", kFast, plain, 7.0)});
   const auto found = identify(d, m, kOptions);
-  BalanceData together(found->prepared, Balance::motor), single(found->prepared, Balance::motor);
+  RegressionProblem together(found->prepared, Balance::motor), single(found->prepared, Balance::motor);
   const auto on_balance = terms_on(found->terms, Balance::motor, {});
   const std::vector<ParameterRef> refs = free_linear_parameters(found->terms, on_balance);
   ASSERT_EQ(refs.size(), 5U);
@@ -208,10 +186,9 @@ TEST(BalanceRows, ColumnsFromFewerSamplesFollowThoseOfAll) {
   // One sample in 6 or in 13 is a row: every third is kept, or every sixth and rows fall between them.
   for (const double cutoff_hz : {40.0, 19.0}) {
     const auto found = identify(d, m, {cutoff_hz, true});
-    BalanceData all(found->prepared, Balance::motor);
-    PreparedData few;
-    BalanceData decimated = all.decimated(few);
-    EXPECT_LT(3 * few.records[0].inputs.size(), found->prepared.records[0].inputs.size() + 3);
+    RegressionProblem all(found->prepared, Balance::motor);
+    const RegressionProblem decimated = all.decimated();
+    EXPECT_LT(3 * decimated.prepared().records[0].inputs.size(), found->prepared.records[0].inputs.size() + 3);
     ASSERT_EQ(decimated.rows(), all.rows());
     EXPECT_EQ((decimated.target() - all.target()).norm(), 0.0);
     const std::vector<ParameterRef> refs =

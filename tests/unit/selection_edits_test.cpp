@@ -101,7 +101,7 @@ TEST(Extend, PutsTheNewEffectLastAndTakesOutWhatItReplaces) {
             (std::vector<std::string>{"inertia", "viscous_friction", "dahl_friction"}));
 }
 
-Unexplained whole(const estimation::BalanceData& data) {
+Unexplained whole(const estimation::RegressionProblem& data) {
   return {data.target(), Eigen::VectorXd::Ones(data.rows()), {}};
 }
 
@@ -129,7 +129,7 @@ TEST(CandidateModels, HoldWhatTheSignalsCanShowAndTheModelLacks) {
       "a", 0.0, [](double, double) { return 0.0; }, 1);
   const auto names_for = [&](const Terms& terms) {
     const estimation::PreparedData prepared = estimation::prepare({&e}, {}, kOptions);
-    const estimation::BalanceData data(prepared, estimation::Balance::motor);
+    const estimation::RegressionProblem data(prepared, estimation::Balance::motor);
     std::vector<std::string> names;
     for (const CandidateModel& p : candidate_models(data, terms, whole(data))) names.push_back(p.terms.back().label());
     return names;
@@ -161,7 +161,7 @@ TEST(CandidateModels, CountTheParametersThatTheyAdd) {
   const data::Experiment e = experiment(
       "a", 0.0, [](double, double) { return 0.0; }, 1);
   const estimation::PreparedData prepared = estimation::prepare({&e}, {}, kOptions);
-  const estimation::BalanceData data(prepared, estimation::Balance::motor);
+  const estimation::RegressionProblem data(prepared, estimation::Balance::motor);
   std::map<std::string_view, double> added;
   for (const CandidateModel& p : candidate_models(data, estimation::terms_of(model_of(kPlain)), whole(data)))
     added[p.entry->name()] = p.added;

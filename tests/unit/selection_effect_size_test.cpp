@@ -41,7 +41,7 @@ data::Experiment rippled_experiment() {
 Candidate named_ripple(const model::Drive& drive) {
   const data::Experiment e = rippled_experiment();
   const estimation::PreparedData prepared = estimation::prepare({&e}, {}, {20.0, true});
-  BalanceData data(prepared, Balance::motor);
+  RegressionProblem data(prepared, Balance::motor);
   const Terms terms = estimation::terms_of(testing::plain_model());
   const Eigen::VectorXd keep = Eigen::VectorXd::Ones(data.rows());
   BalanceSearch search{&data, keep, cross_validate(data, terms, keep)};

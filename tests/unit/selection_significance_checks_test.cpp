@@ -54,7 +54,7 @@ double ripple(double, double q) {
 // `last`, shares of all, alone.
 CandidateFit checked(const data::Experiment& e, double first = 0.0, double last = 1.0) {
   const estimation::PreparedData prepared = estimation::prepare({&e}, {}, kOptions);
-  BalanceData data(prepared, Balance::motor);
+  RegressionProblem data(prepared, Balance::motor);
   const Terms terms = estimation::terms_of(testing::plain_model());
   const Eigen::VectorXd keep = Eigen::VectorXd::Ones(data.rows());
   BalanceSearch search{&data, keep, cross_validate(data, terms, keep)};
@@ -93,7 +93,7 @@ TEST(OneDirectionWarning, IsGivenWhereTheAxisHardlyComesBack) {
   const auto warning = [](double amplitude_rad, double drift_rad_s) {
     const data::Experiment e = experiment(amplitude_rad, drift_rad_s, ripple);
     const estimation::PreparedData prepared = estimation::prepare({&e}, {}, kOptions);
-    return one_direction_warning(BalanceData(prepared, Balance::motor));
+    return one_direction_warning(RegressionProblem(prepared, Balance::motor));
   };
   EXPECT_EQ(warning(20.0, 0.0), "");
   EXPECT_NE(warning(1.0, 20.0).find("moves forward in 100.0 %"), std::string::npos) << warning(1.0, 20.0);

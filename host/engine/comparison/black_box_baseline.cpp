@@ -159,7 +159,7 @@ BaselineResult result_of(const BaselineSignal& signal, const blackbox::Specifica
 
 }  // namespace
 
-BaselineSignal balance_signal(const PreparedData& prepared, const estimation::BalanceData& data,
+BaselineSignal balance_signal(const PreparedData& prepared, const estimation::RegressionProblem& data,
                               const estimation::Terms& terms, const std::string& name, const std::string& unit) {
   BaselineSignal signal;
   signal.signal = name;

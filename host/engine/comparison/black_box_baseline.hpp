@@ -7,7 +7,7 @@
 #include <vector>
 
 #include "host/engine/blackbox/specification.hpp"
-#include "host/engine/estimation/balance_data.hpp"
+#include "host/engine/estimation/regression_problem.hpp"
 #include "host/input/data/dataset.hpp"
 
 namespace flexspline::comparison {
@@ -64,7 +64,7 @@ struct BaselineResult {
 // torsion and torsion rate (transmission), acceleration and velocity of the output (load); a motor balance that holds
 // the others takes the torsion too; what is zero throughout is left out. The motion at the same instant is known: nk =
 // 1 refers to it.
-BaselineSignal balance_signal(const estimation::PreparedData& prepared, const estimation::BalanceData& data,
+BaselineSignal balance_signal(const estimation::PreparedData& prepared, const estimation::RegressionProblem& data,
                               const estimation::Terms& terms, const std::string& signal, const std::string& unit);
 
 // Adds a record to the free run of motor_velocity or torque: what the measured effort makes of it (report, figure 4).

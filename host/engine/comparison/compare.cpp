@@ -27,9 +27,9 @@ namespace {
 using data::Column;
 using data::Experiment;
 using estimation::Balance;
-using estimation::BalanceData;
 using estimation::PreparedData;
 using estimation::Record;
+using estimation::RegressionProblem;
 
 constexpr std::size_t kFewestBins = 12;
 constexpr std::size_t kMostBins = 24;
@@ -72,10 +72,10 @@ class Comparer {
     for (const Balance balance : {Balance::motor, Balance::transmission, Balance::load}) {
       if (balance != Balance::motor && !prepared_.output_signals.torque) continue;
       if (estimation::terms_on(terms_, balance, prepared_.output_signals).empty()) continue;
-      BalanceData data(prepared_, balance);
+      RegressionProblem data(prepared_, balance);
       if (data.empty()) continue;
       if (estimation::refine_record_constants(prepared_, data, terms_, {}, Eigen::VectorXd::Ones(data.rows())))
-        data = BalanceData(prepared_, balance);
+        data = RegressionProblem(prepared_, balance);
       inverse(data, extent.regions_and_gains);
     }
     if (result_.experiments.empty() || together_.empty())
@@ -147,7 +147,7 @@ class Comparer {
   }
 
   // Of the balance at full rate, by range of its samples.
-  std::vector<HInfinityNorm> h_infinity_norms(const BalanceData& data) const {
+  std::vector<HInfinityNorm> h_infinity_norms(const RegressionProblem& data) const {
     std::vector<HInfinityNorm> norms(data.records().size());
     estimation::in_parallel(norms.size(), [&](std::size_t i) {
       const Record& record = prepared_.records[data.records()[i].record];
@@ -160,7 +160,7 @@ class Comparer {
     return norms;
   }
 
-  void inverse(BalanceData& data, bool regions_and_gains) {
+  void inverse(const RegressionProblem& data, bool regions_and_gains) {
     const Eigen::VectorXd residual = data.residual(terms_);
     const std::vector<NoiseFloor> floors = noise_floors(data, terms_, all_, model_.drive);
     const std::string signal = signal_name(data.balance());
@@ -195,7 +195,7 @@ class Comparer {
     if (regions_and_gains) add_regions(data, signal, residual, floor_squared);
   }
 
-  void add_regions(const BalanceData& data, const std::string& signal, const Eigen::VectorXd& residual,
+  void add_regions(const RegressionProblem& data, const std::string& signal, const Eigen::VectorXd& residual,
                    const Eigen::VectorXd& floor_squared) {
     // A short record has few samples; its regions are wider then, never too small for a test.
     const auto rows = static_cast<std::size_t>(data.rows());

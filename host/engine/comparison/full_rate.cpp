@@ -20,7 +20,7 @@ std::optional<FullRate> full_rate(const estimation::PreparedData& prepared, cons
   samples.clear();
   for (const data::Segment& s : record.segments)
     for (std::size_t k = s.first; k < s.last; ++k) samples.push_back(k);
-  estimation::BalanceData data(all, balance);
+  estimation::RegressionProblem data(all, balance);
   if (data.empty()) return std::nullopt;
   const Eigen::VectorXd residual = data.residual(terms);
   const std::size_t n = record.inputs.size();

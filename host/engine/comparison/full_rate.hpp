@@ -5,7 +5,7 @@
 #include <optional>
 #include <vector>
 
-#include "host/engine/estimation/balance_data.hpp"
+#include "host/engine/estimation/regression_problem.hpp"
 
 namespace flexspline::comparison {
 

@@ -16,9 +16,9 @@ namespace {
 
 using data::Column;
 using data::Experiment;
-using estimation::BalanceData;
 using estimation::PreparedData;
 using estimation::Record;
+using estimation::RegressionProblem;
 using estimation::Terms;
 
 // A motion counts as repeated at a sample where the motor returns to within this angle (a ripple of order ten then
@@ -178,7 +178,7 @@ bool noise_is_stated(const Record& record, estimation::Balance balance, bool tor
 
 class Floors {
  public:
-  Floors(BalanceData& data, const Terms& terms, const std::vector<const Experiment*>& experiments,
+  Floors(const RegressionProblem& data, const Terms& terms, const std::vector<const Experiment*>& experiments,
          const model::Drive& drive)
       : data_(data), terms_(terms), experiments_(experiments), drive_(drive), prepared_(data.prepared()) {
     turns_known_ = drive.axis == data::Axis::rotary || drive.pitch_m.value.has_value();
@@ -246,14 +246,14 @@ class Floors {
       again.constants = prepared_.constants;
       again.records[0].at_rest = record.at_rest;
       again.records[0].rows = record.rows;  // the mask depends on the noise
-      BalanceData data(again, data_.balance());
+      RegressionProblem data(again, data_.balance());
       if (data.rows() != residual.size()) return std::nullopt;
       sum += (data.residual(terms_) - residual).squaredNorm();
     }
     return std::sqrt(sum / (kRealisations * static_cast<double>(residual.size())));
   }
 
-  BalanceData& data_;
+  const RegressionProblem& data_;
   const Terms& terms_;
   const std::vector<const Experiment*>& experiments_;
   const model::Drive& drive_;
@@ -263,7 +263,7 @@ class Floors {
 
 }  // namespace
 
-std::vector<NoiseFloor> noise_floors(BalanceData& data, const Terms& terms,
+std::vector<NoiseFloor> noise_floors(const RegressionProblem& data, const Terms& terms,
                                      const std::vector<const Experiment*>& experiments, const model::Drive& drive) {
   return Floors(data, terms, experiments, drive).all();
 }

@@ -5,7 +5,7 @@
 #include <string>
 #include <vector>
 
-#include "host/engine/estimation/balance_data.hpp"
+#include "host/engine/estimation/regression_problem.hpp"
 
 namespace flexspline::comparison {
 
@@ -18,7 +18,7 @@ struct NoiseFloor {
 // period-to-period variance where the motion repeats itself; replicates; stated noise and quantisation of the columns
 // propagated through the pipeline. Never extrapolated from above the band. Replicates of a record are looked for among
 // `experiments`: those that a key names as such, and those with the same position set points.
-std::vector<NoiseFloor> noise_floors(estimation::BalanceData& data, const estimation::Terms& terms,
+std::vector<NoiseFloor> noise_floors(const estimation::RegressionProblem& data, const estimation::Terms& terms,
                                      const std::vector<const data::Experiment*>& experiments,
                                      const model::Drive& drive);
 

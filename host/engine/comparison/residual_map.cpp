@@ -19,7 +19,7 @@
 namespace flexspline::comparison {
 namespace {
 
-using estimation::BalanceData;
+using estimation::RegressionProblem;
 using estimation::RowRange;
 
 constexpr double kSignificant = 1e-3;
@@ -60,7 +60,7 @@ std::optional<double> significant_share(const Eigen::VectorXd& residual, const E
 }
 
 // A step function over the bins, of the residual or, with `directions`, of the residual times the direction.
-Explained map_of(const BalanceData& data, const Bins& bins, const Eigen::VectorXd& residual,
+Explained map_of(const RegressionProblem& data, const Bins& bins, const Eigen::VectorXd& residual,
                  const Eigen::VectorXd* directions) {
   Explained e;
   e.records = data.records();
@@ -98,7 +98,7 @@ Explained map_of(const BalanceData& data, const Bins& bins, const Eigen::VectorX
   return e;
 }
 
-Bins record_bins(const BalanceData& data) {
+Bins record_bins(const RegressionProblem& data) {
   Bins bins;
   bins.bin.assign(static_cast<std::size_t>(data.rows()), -1);
   for (std::size_t r = 0; r < data.records().size(); ++r)
@@ -118,7 +118,7 @@ Bins direction_bins(const Eigen::VectorXd& directions) {
 // A wave of the motor's turn after the filter, which removes high orders at speed. The zero of an angle
 // that is not absolute differs from record to record, so each record has a phase of its own then. Records with less
 // than a few whole waves are left out: a part of a wave resembles any smooth curve.
-Explained wave_of(const BalanceData& data, const Eigen::VectorXd& residual, int order) {
+Explained wave_of(const RegressionProblem& data, const Eigen::VectorXd& residual, int order) {
   const auto& prepared = data.prepared();
   const auto balance = estimation::index(data.balance());
   const double per_unit = static_cast<double>(order) * prepared.constants.turn_angle_scale;
@@ -177,7 +177,7 @@ Explained wave_of(const BalanceData& data, const Eigen::VectorXd& residual, int 
 
 }  // namespace
 
-std::vector<Share> localise(const BalanceData& data, const Eigen::VectorXd& residual, double autocorrelation_time,
+std::vector<Share> localise(const RegressionProblem& data, const Eigen::VectorXd& residual, double autocorrelation_time,
                             data::Axis axis) {
   if (residual.size() != data.rows() || residual.size() < 16) return {};
   const double tau = std::max(1.0, autocorrelation_time);

@@ -5,7 +5,7 @@
 #include <string>
 #include <vector>
 
-#include "host/engine/estimation/balance_data.hpp"
+#include "host/engine/estimation/regression_problem.hpp"
 
 namespace flexspline::comparison {
 
@@ -20,7 +20,7 @@ struct Share {
 // Largest share first; only those that an F test at 1e-3 (of each kind of map) separates from noise, where samples are
 // counted as independent after the autocorrelation time of what the map leaves, at most `autocorrelation_time`. Shares
 // overlap, so they need not add up to less than 100 %.
-std::vector<Share> localise(const estimation::BalanceData& data, const Eigen::VectorXd& residual,
+std::vector<Share> localise(const estimation::RegressionProblem& data, const Eigen::VectorXd& residual,
                             double autocorrelation_time, data::Axis axis = data::Axis::rotary);
 
 }  // namespace flexspline::comparison

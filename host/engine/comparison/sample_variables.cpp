@@ -10,13 +10,13 @@ namespace {
 
 using data::Column;
 using estimation::Balance;
-using estimation::BalanceData;
 using estimation::Record;
+using estimation::RegressionProblem;
 
 constexpr double kNone = std::numeric_limits<double>::quiet_NaN();
 
 template <class Value>
-Eigen::VectorXd along_rows(const BalanceData& data, Value value) {
+Eigen::VectorXd along_rows(const RegressionProblem& data, Value value) {
   Eigen::VectorXd rows(data.rows());
   for (const estimation::RowRange& range : data.records()) {
     const Record& record = data.prepared().records[range.record];
@@ -50,7 +50,7 @@ bool varies(const Eigen::VectorXd& values) {
 
 }  // namespace
 
-std::vector<SampleVariable> sample_variables(const BalanceData& data, data::Axis axis) {
+std::vector<SampleVariable> sample_variables(const RegressionProblem& data, data::Axis axis) {
   const estimation::PreparedData& prepared = data.prepared();
   const Balance balance = data.balance();
   const bool on_load = balance == Balance::load;
@@ -105,7 +105,7 @@ std::vector<SampleVariable> sample_variables(const BalanceData& data, data::Axis
   return variables;
 }
 
-Eigen::VectorXd sample_directions(const BalanceData& data) {
+Eigen::VectorXd sample_directions(const RegressionProblem& data) {
   return along_rows(data, [&](const Record& r, std::size_t k) {
     const double v = r.direction_variable(data.balance(), k);
     return r.at_rest || v == 0.0 ? kNone : v > 0.0 ? 1.0 : -1.0;

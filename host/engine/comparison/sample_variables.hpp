@@ -5,7 +5,7 @@
 #include <string>
 #include <vector>
 
-#include "host/engine/estimation/balance_data.hpp"
+#include "host/engine/estimation/regression_problem.hpp"
 
 namespace flexspline::comparison {
 
@@ -18,10 +18,10 @@ struct SampleVariable {
 // All variables that the data hold and that vary: velocity, speed (of the motor; of the output on the load balance),
 // acceleration, motor_angle (within a turn, rad), output_angle, current, torque, torsion, torsion_rate, temperature,
 // time and travel (since the last reversal). Torsion and its rate are output side. SI units of the axis.
-std::vector<SampleVariable> sample_variables(const estimation::BalanceData& data, data::Axis axis);
+std::vector<SampleVariable> sample_variables(const estimation::RegressionProblem& data, data::Axis axis);
 
 // Direction of the balance's friction in each sample: +1, -1, or NaN at rest.
-Eigen::VectorXd sample_directions(const estimation::BalanceData& data);
+Eigen::VectorXd sample_directions(const estimation::RegressionProblem& data);
 
 // Bins of about equal counts.
 struct Bins {

@@ -30,7 +30,7 @@ namespace {
 // A fit as it proceeds, at the values that the terms have.
 class Fitting {
  public:
-  Fitting(BalanceData& data, Terms& terms, BalanceFit& fit) : data_(data), terms_(terms), fit_(fit) {}
+  Fitting(const RegressionProblem& data, Terms& terms, BalanceFit& fit) : data_(data), terms_(terms), fit_(fit) {}
 
   // Weights by record and parameters, one after the other.
   void fit_weighted();
@@ -78,11 +78,11 @@ class Fitting {
     between_ = paule_mandel(data_, torques_, noise_weights_.cwiseProduct(fit_.residual));
   }
 
-  BalanceData& data_;
+  const RegressionProblem& data_;
   Terms& terms_;
   BalanceFit& fit_;
   Eigen::VectorXd noise_weights_;  // of the residual without the records' random effects
-  BalanceData::Regression regression_;
+  RegressionProblem::Regression regression_;
   Eigen::MatrixXd J_;         // columns of linear parameters and nonlinear parameters
   Eigen::MatrixXd friction_;  // the torque of each friction group
   Eigen::MatrixXd torques_;   // the same, weighted
@@ -161,7 +161,7 @@ void Fitting::take_uncertainty() {
 
 }  // namespace
 
-BalanceFit fit_balance(BalanceData& data, Terms& terms) {
+BalanceFit fit_balance(const RegressionProblem& data, Terms& terms) {
   BalanceFit fit;
   fit.balance = data.balance();
   fit.on_balance = terms_on(terms, data.balance(), data.prepared().output_signals);

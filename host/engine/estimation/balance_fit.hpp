@@ -7,8 +7,8 @@
 #include <string>
 #include <vector>
 
-#include "host/engine/estimation/balance_data.hpp"
 #include "host/engine/estimation/noise_covariance.hpp"
+#include "host/engine/estimation/regression_problem.hpp"
 
 namespace flexspline::estimation {
 
@@ -35,7 +35,7 @@ struct BalanceFit {
 // Estimates all free parameters on the balance and writes them into `terms`. Nonlinear parameters that the model states
 // are where the search starts; others are swept first. Parameters that the data do not determine are set to zero (see
 // root_tolerance).
-BalanceFit fit_balance(BalanceData& data, Terms& terms);
+BalanceFit fit_balance(const RegressionProblem& data, Terms& terms);
 
 // Variance of a parameter in its own unit, where it was searched for as a ratio or a root: it follows from the
 // covariance of what the parameter depends on. `refs` are the parameters of `covariance`, in its order; the requested

@@ -14,7 +14,7 @@ namespace {
 
 // Each record fitted alone, with nonlinear parameters as pooled. Its error is its own: from its residual and that
 // residual's autocorrelation, not from those of all records, which contain the differences between the records.
-std::vector<AloneFit> fit_alone(BalanceData& data, const BalanceFit& balance_fit, const Terms& terms) {
+std::vector<AloneFit> fit_alone(const RegressionProblem& data, const BalanceFit& balance_fit, const Terms& terms) {
   const auto [X, y] = data.regression(terms, balance_fit.on_balance, balance_fit.linear);
   std::vector<AloneFit> all;
   for (const RowRange& range : data.records()) {
@@ -33,7 +33,7 @@ std::vector<AloneFit> fit_alone(BalanceData& data, const BalanceFit& balance_fit
     fit.root_tolerance = std::move(alone.root_tolerance);
     fit.covariance = alone.unit_covariance * (noise * rows_as_one);
   }
-  for (const auto& [record, reason] : data.left_out()) {
+  for (const auto& [record, reason] : data.evaluator().left_out()) {
     AloneFit& fit = all.emplace_back();
     fit.name = data.prepared().records[record].name;
     fit.too_short = "too few rows are left of it";
@@ -135,7 +135,7 @@ std::size_t likest(const Eigen::MatrixXd& X, std::size_t j) {
   return best;
 }
 
-double share_of_range(const BalanceData& data, const Terms& terms, ParameterRef nonlinear_ref) {
+double share_of_range(const RegressionProblem& data, const Terms& terms, ParameterRef nonlinear_ref) {
   const Term& term = terms[nonlinear_ref.term];
   return parameter_range(data, term, nonlinear_ref.parameter).share(term.values[nonlinear_ref.parameter]);
 }
@@ -143,7 +143,7 @@ double share_of_range(const BalanceData& data, const Terms& terms, ParameterRef 
 // Standard error that more data do not take away: of filters and differentiation, measured on simulated drives whose
 // noise leaves less (0.02 to 0.07 % of inertia and friction), and of a travel, which no encoder resolves within its
 // step.
-double beyond_noise(const BalanceData& data, const effects::ParameterInfo& info, double value) {
+double beyond_noise(const RegressionProblem& data, const effects::ParameterInfo& info, double value) {
   constexpr double kPipeline = 5e-4;  // of the value
   constexpr double kOfAStep = 0.5;
   double step = 0.0;
@@ -153,7 +153,8 @@ double beyond_noise(const BalanceData& data, const effects::ParameterInfo& info,
   return std::hypot(kPipeline * value, kOfAStep * step);
 }
 
-void warn_of_excitation(BalanceData& data, const BalanceFit& fit, const Terms& terms, Identification& result) {
+void warn_of_excitation(const RegressionProblem& data, const BalanceFit& fit, const Terms& terms,
+                        Identification& result) {
   const Eigen::MatrixXd X = data.columns(terms, fit.linear);
   for (std::size_t j = 0; j < fit.linear.size(); ++j) {
     const Term& term = terms[fit.linear[j].term];
@@ -220,7 +221,8 @@ namespace {
 // Effects of which a nonlinear parameter stopped at an end of its range: the error still falls beyond it, so its slopes
 // there show neither that parameter's error nor that of the effect's others. (A length at the resolution of the data
 // may be zero; that end is a bound.)
-std::vector<std::size_t> effects_without_minimum(const BalanceData& data, const BalanceFit& fit, const Terms& terms) {
+std::vector<std::size_t> effects_without_minimum(const RegressionProblem& data, const BalanceFit& fit,
+                                                 const Terms& terms) {
   std::vector<std::size_t> found;
   for (const ParameterRef& ref : fit.nonlinear) {
     const effects::ParameterInfo& info = terms[ref.term].entry->parameters[ref.parameter];
@@ -235,7 +237,7 @@ std::vector<std::size_t> effects_without_minimum(const BalanceData& data, const 
 // bound; or its column, which is a measured torque, has noise that is not small against the part of it that no other
 // column explains: noise of a column makes its parameter smaller by (noise / (noise + that part)) in squares. The
 // residual is the most that this noise can be.
-std::string why_no_scale(BalanceData& data, const BalanceFit& fit, const std::vector<ParameterRef>& held,
+std::string why_no_scale(const RegressionProblem& data, const BalanceFit& fit, const std::vector<ParameterRef>& held,
                          const Terms& terms) {
   constexpr double kMostAttenuation = 0.1;
   const auto is_scale = [&](ParameterRef ref) {
@@ -260,7 +262,7 @@ std::string why_no_scale(BalanceData& data, const BalanceFit& fit, const std::ve
 }
 
 // Estimates of what a fit found, with standard errors and intervals.
-void add_estimates(BalanceData& data, const BalanceFit& fit, const std::vector<ParameterRef>& held,
+void add_estimates(const RegressionProblem& data, const BalanceFit& fit, const std::vector<ParameterRef>& held,
                    Identification& result) {
   const std::vector<std::size_t> open = effects_without_minimum(data, fit, result.terms);
   const std::string no_scale = why_no_scale(data, fit, held, result.terms);
@@ -294,7 +296,8 @@ void add_estimates(BalanceData& data, const BalanceFit& fit, const std::vector<P
 }
 
 // The values by experiment, with average and spread.
-void add_by_experiment(const BalanceData& data, const AloneFits& alone, const Identification& result, Estimate& e) {
+void add_by_experiment(const RegressionProblem& data, const AloneFits& alone, const Identification& result,
+                       Estimate& e) {
   if (const auto column = alone.column_of(e.ref)) take(by_experiment(alone.fits, {*column, std::nullopt}), e);
   if (!result.terms[e.ref.term].entry->parameters[e.ref.parameter].per_record) return;
   e.per_experiment.clear();
@@ -326,7 +329,7 @@ void assemble(Identification& result) {
   std::vector<std::uint8_t> touched(result.terms.size(), 0);
   std::vector<AloneFits> alone;
   for (std::size_t b = 0; b < result.data.size(); ++b) {
-    BalanceData& data = result.data[b];
+    const RegressionProblem& data = result.data[b];
     const BalanceFit& fit = result.fits[b];
     const std::size_t first = result.estimates.size();
     add_estimates(data, fit, result.held[b], result);

@@ -11,7 +11,7 @@
 
 namespace flexspline::estimation {
 
-Eigen::MatrixXd cross_balance_columns(BalanceData& data, const Terms& terms, std::size_t t,
+Eigen::MatrixXd cross_balance_columns(const RegressionProblem& data, const Terms& terms, std::size_t t,
                                       const std::vector<std::size_t>& parameters) {
   constexpr double kStep = 1e-3;  // of the usual value
   Eigen::MatrixXd columns = Eigen::MatrixXd::Zero(data.rows(), static_cast<Eigen::Index>(parameters.size()));
@@ -44,7 +44,7 @@ Evidence evidence_of(const Eigen::MatrixXd& cross_columns, const Eigen::MatrixXd
           left.transpose() * left / autocorrelation_time};
 }
 
-NoiseModel noise_model(const Eigen::MatrixXd& cross_columns, const Eigen::MatrixXd& own, const BalanceData& data,
+NoiseModel noise_model(const Eigen::MatrixXd& cross_columns, const Eigen::MatrixXd& own, const RegressionProblem& data,
                        const Terms& terms, const BalanceFit& fit, const Eigen::VectorXd& residual) {
   Eigen::MatrixXd all(own.rows(), own.cols() + cross_columns.cols());
   all << own, cross_columns;

@@ -4,9 +4,9 @@
 #include <Eigen/Core>
 #include <vector>
 
-#include "host/engine/estimation/balance_data.hpp"
 #include "host/engine/estimation/balance_fit.hpp"
 #include "host/engine/estimation/noise_covariance.hpp"
+#include "host/engine/estimation/regression_problem.hpp"
 
 namespace flexspline::estimation {
 
@@ -19,7 +19,7 @@ struct Evidence {
 
 // Slopes of the torque of term `t` on `data` by its parameters, a column each, about the values in `terms`. By
 // differences: what reaches over to another balance does so in proportion.
-Eigen::MatrixXd cross_balance_columns(BalanceData& data, const Terms& terms, std::size_t t,
+Eigen::MatrixXd cross_balance_columns(const RegressionProblem& data, const Terms& terms, std::size_t t,
                                       const std::vector<std::size_t>& parameters);
 
 // `cross_columns`: slopes of the requested parameters; `own`: of the balance's own parameters; `residual` at the
@@ -34,7 +34,7 @@ struct NoiseModel {
   NoiseCovariance whitening;
   double autocorrelation_time;
 };
-NoiseModel noise_model(const Eigen::MatrixXd& cross_columns, const Eigen::MatrixXd& own, const BalanceData& data,
+NoiseModel noise_model(const Eigen::MatrixXd& cross_columns, const Eigen::MatrixXd& own, const RegressionProblem& data,
                        const Terms& terms, const BalanceFit& fit, const Eigen::VectorXd& residual);
 
 // Inverse of a covariance or a precision whose parameters differ much in size by their units.

@@ -1,4 +1,4 @@
-// How the columns of a balance are computed along its records and filtered, for the sources of BalanceData.
+// How the columns of a balance are computed along its records and filtered, for the sources of RegressorEvaluator.
 #pragma once
 
 #include <algorithm>
@@ -6,7 +6,7 @@
 #include <vector>
 
 #include "host/common/signals/blockwise_filter.hpp"
-#include "host/engine/estimation/balance_data.hpp"
+#include "host/engine/estimation/regressor_evaluator.hpp"
 
 namespace flexspline::estimation {
 
@@ -98,22 +98,22 @@ struct WholeRecord {
 template <class Work>
 WholeRecord(Work) -> WholeRecord<Work>;
 
-inline void BalanceData::filter(const RowRange& range, Eigen::Ref<Eigen::MatrixXd> signals) const {
+inline void RegressorEvaluator::filter(const RowRange& range, Eigen::Ref<Eigen::MatrixXd> signals) const {
   const auto at = static_cast<std::size_t>(&range - ranges_.data());
   for (const data::Segment& s : prepared_->records[range.record].segments)
     filters_[at].apply_columns_in_place(
         signals.middleRows(static_cast<Eigen::Index>(s.first), static_cast<Eigen::Index>(s.last - s.first)));
 }
 
-inline bool BalanceData::have_equal_filters(const RowRange& a, const RowRange& b) const {
+inline bool RegressorEvaluator::have_equal_filters(const RowRange& a, const RowRange& b) const {
   const Record &first = prepared_->records[a.record], &second = prepared_->records[b.record];
   return first.sample_s == second.sample_s && first.segments.size() == 1 && second.segments.size() == 1 &&
          first.inputs.size() == second.inputs.size() && first.segments[0].first == second.segments[0].first &&
          first.segments[0].last == second.segments[0].last;
 }
 
-inline void BalanceData::take_rows(const RowRange& range, const double* signal,
-                                   Eigen::Ref<Eigen::VectorXd> rows) const {
+inline void RegressorEvaluator::take_rows(const RowRange& range, const double* signal,
+                                          Eigen::Ref<Eigen::VectorXd> rows) const {
   const auto& samples = prepared_->records[range.record].rows[index(balance_)].samples;
   for (std::size_t k = 0; k < samples.size(); ++k) {
     const double* at = signal + samples[k];
@@ -127,7 +127,7 @@ inline void BalanceData::take_rows(const RowRange& range, const double* signal,
 }
 
 template <class Fill>
-Eigen::MatrixXd BalanceData::filtered_columns(std::size_t columns, Fill fill) const {
+Eigen::MatrixXd RegressorEvaluator::filtered_columns(std::size_t columns, Fill fill) const {
   // Some at a time: more would not stay in the processor's cache. Records with equal filters are filtered together.
   constexpr std::size_t kTogether = 8;
   constexpr std::size_t kBlocksAtOnce = 8;  // a cache further out still holds these

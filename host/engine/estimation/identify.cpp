@@ -16,7 +16,8 @@
 
 namespace flexspline::estimation {
 
-std::pair<BalanceFit, std::vector<ParameterRef>> fit_within_bounds(BalanceData& data, Terms& terms, data::Axis axis,
+std::pair<BalanceFit, std::vector<ParameterRef>> fit_within_bounds(const RegressionProblem& data, Terms& terms,
+                                                                   data::Axis axis,
                                                                    std::vector<std::string>& warnings) {
   std::vector<ParameterRef> held;
   for (;;) {
@@ -74,7 +75,7 @@ bool combine_balances(Identification& result, std::size_t identified, std::size_
   BalanceFit& fit = result.fits[identified];
   const Shared shared = shared_with(fit, result.terms, result.data[other].balance());
   if (shared.refs.empty()) return false;
-  BalanceData& data = result.data[other];
+  const RegressionProblem& data = result.data[other];
   const BalanceFit& its = result.fits[other];
   Eigen::MatrixXd cross_columns(data.rows(), 0);
   for (const ParameterRef& ref : shared.refs) {
@@ -201,8 +202,8 @@ std::unique_ptr<Identification> form_on(const std::vector<const data::Experiment
   for (const Balance balance : {Balance::motor, Balance::transmission, Balance::load}) {
     if (balance != Balance::motor && !result->prepared.output_signals.torque) continue;
     if (terms_on(result->terms, balance, result->prepared.output_signals).empty()) continue;
-    BalanceData data(result->prepared, balance);
-    too_short.insert(data.left_out().begin(), data.left_out().end());
+    RegressionProblem data(result->prepared, balance);
+    too_short.insert(data.evaluator().left_out().begin(), data.evaluator().left_out().end());
     if (data.empty()) continue;
     for (const RowRange& range : data.records()) used[range.record] = 1;
     result->data.push_back(std::move(data));
@@ -247,7 +248,7 @@ bool refine_record_constants(Identification& result) {
     moved = refine_record_constants(result.prepared, result.data[b], result.terms, others, found.root_weights) || moved;
   }
   if (!moved) return false;
-  for (BalanceData& data : result.data) data = BalanceData(result.prepared, data.balance());
+  for (RegressionProblem& data : result.data) data = RegressionProblem(result.prepared, data.balance());
   return true;
 }
 
@@ -291,7 +292,7 @@ void fit(Identification& result) {
   if (learn_tables(result)) again();
   // The load that effects read has to be known before they can be fitted, and changes with them.
   for (int round = 0; round < kRounds && take_torque_where_read(result.prepared, result.terms); ++round) {
-    for (BalanceData& data : result.data) data = BalanceData(result.prepared, data.balance());
+    for (RegressionProblem& data : result.data) data = RegressionProblem(result.prepared, data.balance());
     again();
   }
 }

@@ -42,7 +42,7 @@ struct Identification {
   std::string_view method = "";  // as in Options of estimate.hpp; empty: of identify()
   PreparedData prepared;
   Terms terms;                                  // with values
-  std::vector<BalanceData> data;                // the balances that could be formed
+  std::vector<RegressionProblem> data;          // the balances that could be formed
   std::vector<BalanceFit> fits;                 // one each
   std::vector<std::vector<ParameterRef>> held;  // on each, parameters that are held at a bound
   std::vector<Estimate> estimates;
@@ -65,8 +65,8 @@ std::unique_ptr<Identification> form(const data::Dataset& dataset, const model::
 void fit(Identification& identification);
 // Fits a balance; a parameter whose best value is not possible (negative friction) is held at its bound and the others
 // are fitted again. Returns the fit and what was held at a bound, which is among the warnings.
-std::pair<BalanceFit, std::vector<ParameterRef>> fit_within_bounds(BalanceData& data, Terms& terms, data::Axis axis,
-                                                                   std::vector<std::string>& warnings);
+std::pair<BalanceFit, std::vector<ParameterRef>> fit_within_bounds(const RegressionProblem& data, Terms& terms,
+                                                                   data::Axis axis, std::vector<std::string>& warnings);
 void assemble(Identification& identification);
 
 // Where data set and model differ in what they know of the drive by more than 0.1 %: the model wins, with a warning.

@@ -18,7 +18,7 @@ constexpr int kFreeRuns = 3;
 constexpr int kSteps = 4;
 
 // Adds to a parameter, within its bounds.
-void move(BalanceData& data, Terms& terms, const ParameterRef& ref, double by, bool nonlinear_ref) {
+void move(const RegressionProblem& data, Terms& terms, const ParameterRef& ref, double by, bool nonlinear_ref) {
   Term& term = terms[ref.term];
   double& value = term.values[ref.parameter];
   if (nonlinear_ref) {
@@ -30,8 +30,8 @@ void move(BalanceData& data, Terms& terms, const ParameterRef& ref, double by, b
   }
 }
 
-void refit(BalanceData& data, const FreeMotion& motion, Terms& terms, BalanceFit& fit) {
-  BalanceData simulated(motion.prepared, data.balance());
+void refit(const RegressionProblem& data, const FreeMotion& motion, Terms& terms, BalanceFit& fit) {
+  RegressionProblem simulated(motion.prepared, data.balance());
   if (data.empty() || simulated.rows() != data.rows()) return;
   std::vector<Eigen::Index> kept;  // what the data determine
   for (Eigen::Index j = 0; j < fit.root_tolerance.size(); ++j)

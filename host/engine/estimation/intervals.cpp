@@ -27,7 +27,7 @@ double natural(const Terms& terms, const ParameterRef& ref) {
 
 // Fits all that is free on the balance from the present values of the terms, and returns the sum of squares of white
 // errors.
-double fit_rest(BalanceData& data, Terms& terms, const std::vector<std::size_t>& on_balance,
+double fit_rest(const RegressionProblem& data, Terms& terms, const std::vector<std::size_t>& on_balance,
                 const NoiseCovariance& whitening) {
   refine_nonlinear(data, terms, on_balance, whitening);
   const std::vector<ParameterRef> linear = free_linear_parameters(terms, on_balance);
@@ -40,7 +40,7 @@ double fit_rest(BalanceData& data, Terms& terms, const std::vector<std::size_t>&
 
 // The value of one parameter at which the sum of squares, with all others fitted, has grown by `allowed`; `side` -1
 // or 1.
-std::optional<double> end_of_profile(BalanceData& data, const Terms& best, const BalanceFit& fit,
+std::optional<double> end_of_profile(const RegressionProblem& data, const Terms& best, const BalanceFit& fit,
                                      const ParameterRef& ref, double step, double low, double high, double least,
                                      double allowed, int side) {
   const double start = best[ref.term].values[ref.parameter];
@@ -80,7 +80,7 @@ std::vector<ParameterRef> parameter_refs(const BalanceFit& fit) {
 void profile(Identification& identification, const Progress& progress) {
   for (std::size_t b = 0; b < identification.fits.size(); ++b) {
     const BalanceFit& fit = identification.fits[b];
-    BalanceData& data = identification.data[b];
+    const RegressionProblem& data = identification.data[b];
     Terms best = identification.terms;
     const double least = fit_rest(data, best, fit.on_balance, fit.whitening);
     const auto refs = parameter_refs(fit);
@@ -122,7 +122,7 @@ void bootstrap(Identification& identification, int replicates, std::uint64_t see
   std::mt19937_64 random(seed);
   for (std::size_t b = 0; b < identification.fits.size(); ++b) {
     const BalanceFit& fit = identification.fits[b];
-    BalanceData& data = identification.data[b];
+    const RegressionProblem& data = identification.data[b];
     const auto refs = parameter_refs(fit);
     if (refs.empty()) continue;
     // Blocks are long against what neighbours have in common, and there are at least twenty where there are so many

@@ -32,7 +32,7 @@ struct OtherColumns {
   std::map<std::size_t, Eigen::MatrixXd> columns;  // of tables, by their points
 };
 
-OtherColumns others(BalanceData& data, const Terms& all, const TableSpecification& specification,
+OtherColumns others(const RegressionProblem& data, const Terms& all, const TableSpecification& specification,
                     const Eigen::VectorXd& root_weights, std::string_view but) {
   Terms terms;
   for (const Term& t : all)
@@ -72,12 +72,12 @@ struct Fitted {
   double decrease() const { return curve.squares_without - curve.squares_with; }
 };
 
-Fitted fit_points(BalanceData& data, const Terms& terms, const TableSpecification& specification,
+Fitted fit_points(const RegressionProblem& data, const Terms& terms, const TableSpecification& specification,
                   std::vector<double> at, OtherColumns& b, int smoothings = kSmoothings) {
-  const BalanceData::Points points{
+  const RegressorEvaluator::Points points{
       specification.variable, specification.times_direction, specification.balance, at.front(), at.back(), at.size()};
   Eigen::MatrixXd& columns = b.columns[at.size()];
-  if (columns.size() == 0) columns = data.point_columns(terms, points, specification.filtered);
+  if (columns.size() == 0) columns = data.evaluator().point_columns(terms, points, specification.filtered);
   b.problem.points = columns;
   Fitted fitted;
   fitted.curve = fit_curve(b.problem, smoothings);
@@ -87,7 +87,7 @@ Fitted fit_points(BalanceData& data, const Terms& terms, const TableSpecificatio
   return fitted;
 }
 
-LearnedTable learned(BalanceData& data, const OtherColumns& b, Fitted fitted) {
+LearnedTable learned(const RegressionProblem& data, const OtherColumns& b, Fitted fitted) {
   LearnedTable result;
   const Curve& curve = fitted.curve;
   const Eigen::VectorXd weighted = b.problem.root_weights.cwiseProduct(curve.residual);
@@ -127,11 +127,12 @@ SignalRange central_range(const Eigen::VectorXd& signal) {
   return {at(0.001), at(0.999)};
 }
 
-std::optional<LearnedTable> learn_table(BalanceData& data, const Terms& terms, const TableSpecification& specification,
-                                        const Eigen::VectorXd& root_weights, std::string_view but) {
+std::optional<LearnedTable> learn_table(const RegressionProblem& data, const Terms& terms,
+                                        const TableSpecification& specification, const Eigen::VectorXd& root_weights,
+                                        std::string_view but) {
   if (data.empty()) return std::nullopt;
   const bool closed = is_closed(specification.variable);
-  const SignalRange range = central_range(data.signal_at_rows(terms, specification.variable));
+  const SignalRange range = central_range(data.evaluator().signal_at_rows(terms, specification.variable));
   if (!(range.high > range.low)) return std::nullopt;
   OtherColumns b = others(data, terms, specification, root_weights, but);
   const auto points = [&](std::size_t count) {

@@ -5,7 +5,7 @@
 #include <string>
 #include <vector>
 
-#include "host/engine/estimation/balance_data.hpp"
+#include "host/engine/estimation/regression_problem.hpp"
 #include "host/engine/estimation/smooth_curve.hpp"
 #include "host/physics/model/model.hpp"
 
@@ -43,8 +43,9 @@ struct TableSpecification {
 // order), as smooth as cross-validation chooses. A table of `terms` with the id `but` is left out: it is the one to
 // learn. The number of points is the least that predicts left-out samples as well as more would, within a fiftieth of
 // their squares. Nothing where the signal does not vary.
-std::optional<LearnedTable> learn_table(BalanceData& data, const Terms& terms, const TableSpecification& specification,
-                                        const Eigen::VectorXd& root_weights, std::string_view but = {});
+std::optional<LearnedTable> learn_table(const RegressionProblem& data, const Terms& terms,
+                                        const TableSpecification& specification, const Eigen::VectorXd& root_weights,
+                                        std::string_view but = {});
 
 // The signal at the samples covers this range, but for one sample in a thousand at each end.
 struct SignalRange {

@@ -138,7 +138,7 @@ double autocorrelation_time(const std::vector<RowRange>& records, const Eigen::V
   return signals::integrated_autocorrelation_time(parts, std::max<std::size_t>(1, longest / 4));
 }
 
-double autocorrelation_time(const BalanceData& data, const Eigen::VectorXd& weighted_residual) {
+double autocorrelation_time(const RegressionProblem& data, const Eigen::VectorXd& weighted_residual) {
   return std::max(autocorrelation_time(data.records(), weighted_residual), data.filter_autocorrelation_time());
 }
 

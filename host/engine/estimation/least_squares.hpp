@@ -4,8 +4,8 @@
 #include <Eigen/Core>
 #include <vector>
 
-#include "host/engine/estimation/balance_data.hpp"
 #include "host/engine/estimation/noise_covariance.hpp"
+#include "host/engine/estimation/regression_problem.hpp"
 
 namespace flexspline::estimation {
 
@@ -45,6 +45,6 @@ Eigen::Index newey_west_lags(double autocorrelation_time, Eigen::Index rows);
 // Samples that count as one: integrated autocorrelation time of the weighted residual over all records, at least one.
 double autocorrelation_time(const std::vector<RowRange>& records, const Eigen::VectorXd& weighted_residual);
 // The same of a whole balance, at least that of its filter.
-double autocorrelation_time(const BalanceData& data, const Eigen::VectorXd& weighted_residual);
+double autocorrelation_time(const RegressionProblem& data, const Eigen::VectorXd& weighted_residual);
 
 }  // namespace flexspline::estimation

@@ -8,7 +8,7 @@
 
 namespace flexspline::estimation {
 
-Eigen::VectorXd model_torque(BalanceData& data, const Terms& terms) {
+Eigen::VectorXd model_torque(const RegressionProblem& data, const Terms& terms) {
   const auto on_balance = terms_on(terms, data.balance(), data.prepared().output_signals);
   Eigen::VectorXd sum = data.known_torque(terms, on_balance);
   for (const std::size_t t : on_balance) {
@@ -19,7 +19,7 @@ Eigen::VectorXd model_torque(BalanceData& data, const Terms& terms) {
   return sum;
 }
 
-Eigen::MatrixXd model_columns(BalanceData& data, const Terms& terms) {
+Eigen::MatrixXd model_columns(const RegressionProblem& data, const Terms& terms) {
   const auto on_balance = terms_on(terms, data.balance(), data.prepared().output_signals);
   const std::vector<ParameterRef> linear = free_linear_parameters(terms, on_balance);
   const std::vector<ParameterRef> nonlinear = free_nonlinear_parameters(terms, on_balance);

@@ -3,16 +3,16 @@
 
 #include <Eigen/Core>
 
-#include "host/engine/estimation/balance_data.hpp"
+#include "host/engine/estimation/regression_problem.hpp"
 
 namespace flexspline::estimation {
 
 // Torque of all effects on the balance at their values, filtered as the target is, N m.
-Eigen::VectorXd model_torque(BalanceData& data, const Terms& terms);
+Eigen::VectorXd model_torque(const RegressionProblem& data, const Terms& terms);
 
 // The columns that a fit of the model has on a balance: its free linear parameters, the slopes by its free nonlinear
 // parameters, and a delay of the effort.
-Eigen::MatrixXd model_columns(BalanceData& data, const Terms& terms);
+Eigen::MatrixXd model_columns(const RegressionProblem& data, const Terms& terms);
 
 class ModelProjection {
  public:

@@ -45,7 +45,7 @@ Eigen::MatrixXd NoiseCovariance::score_columns(const Eigen::MatrixXd& rows) cons
   return white;
 }
 
-NoiseCovariance noise_covariance(const BalanceData& data, const Eigen::VectorXd& root_weights,
+NoiseCovariance noise_covariance(const RegressionProblem& data, const Eigen::VectorXd& root_weights,
                                  const Eigen::MatrixXd& torques, const Eigen::VectorXd& std,
                                  double autocorrelation_time) {
   NoiseCovariance whitening(root_weights);

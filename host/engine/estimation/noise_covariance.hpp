@@ -6,7 +6,7 @@
 #include <utility>
 #include <vector>
 
-#include "host/engine/estimation/balance_data.hpp"
+#include "host/engine/estimation/regression_problem.hpp"
 
 namespace flexspline::estimation {
 
@@ -47,7 +47,7 @@ class NoiseCovariance {
 
 // Errors of samples at these weights that records have in common by their own friction: `torques` (weighted, a column a
 // group) vary by `std`, noise of which `autocorrelation_time` samples count as one by one.
-NoiseCovariance noise_covariance(const BalanceData& data, const Eigen::VectorXd& root_weights,
+NoiseCovariance noise_covariance(const RegressionProblem& data, const Eigen::VectorXd& root_weights,
                                  const Eigen::MatrixXd& torques, const Eigen::VectorXd& std,
                                  double autocorrelation_time);
 

@@ -200,7 +200,7 @@ void search_from_several_starts(Identification& identification, int starts, std:
   std::uniform_real_distribution<double> share(0.0, 1.0);
   for (std::size_t b = 0; b < identification.fits.size(); ++b) {
     BalanceFit& fit = identification.fits[b];
-    BalanceData& data = identification.data[b];
+    const RegressionProblem& data = identification.data[b];
     std::vector<ParameterRef> open;
     for (const ParameterRef& ref : fit.nonlinear)
       if (!identification.terms[ref.term].stated[ref.parameter]) open.push_back(ref);

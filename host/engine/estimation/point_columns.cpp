@@ -3,8 +3,8 @@
 #include <cmath>
 #include <numbers>
 
-#include "host/engine/estimation/balance_data.hpp"
 #include "host/engine/estimation/filtered_columns.hpp"
+#include "host/engine/estimation/regressor_evaluator.hpp"
 #include "shared/fixed/turn.hpp"
 
 namespace flexspline::estimation {
@@ -36,12 +36,12 @@ struct Place {
   double share = 0.0, size = 0.0;
 };
 
-bool is_closed(const BalanceData::Points& points) {
+bool is_closed(const RegressorEvaluator::Points& points) {
   return points.variable == effects::Variable::motor_angle || points.variable == effects::Variable::output_angle;
 }
 
-std::vector<Place> places_of(const catalogue::PlainInputs& inputs, const BalanceData::Points& points, double weight,
-                             double turn_angle_scale) {
+std::vector<Place> places_of(const catalogue::PlainInputs& inputs, const RegressorEvaluator::Points& points,
+                             double weight, double turn_angle_scale) {
   const bool closed = is_closed(points);
   const auto count = static_cast<Eigen::Index>(points.count);
   const double per_signal = closed ? static_cast<double>(count) / (2.0 * std::numbers::pi)
@@ -73,7 +73,7 @@ std::vector<std::vector<std::size_t>> samples_by_point(const std::vector<Place>&
 
 }  // namespace
 
-Eigen::MatrixXd BalanceData::point_columns(const Terms& terms, const Points& points, bool filtered) {
+Eigen::MatrixXd RegressorEvaluator::point_columns(const Terms& terms, const Points& points, bool filtered) const {
   const Reader reader(points.variable);
   const auto all = values_of_all(terms);
   const auto count = static_cast<Eigen::Index>(points.count);
@@ -123,7 +123,7 @@ Eigen::MatrixXd BalanceData::point_columns(const Terms& terms, const Points& poi
   return columns;
 }
 
-Eigen::VectorXd BalanceData::signal_at_rows(const Terms& terms, effects::Variable variable) {
+Eigen::VectorXd RegressorEvaluator::signal_at_rows(const Terms& terms, effects::Variable variable) const {
   const Reader reader(variable);
   const auto all = values_of_all(terms);
   Eigen::VectorXd signal(rows());

@@ -16,7 +16,7 @@ std::vector<ParameterRef> record_constants(const Terms& terms) {
   return found;
 }
 
-bool refine_record_constants(PreparedData& prepared, BalanceData& data, const Terms& terms,
+bool refine_record_constants(PreparedData& prepared, const RegressionProblem& data, const Terms& terms,
                              const std::vector<ParameterRef>& together_with, const Eigen::VectorXd& root_weights) {
   const std::vector<std::size_t> on_balance = terms_on(terms, data.balance(), prepared.output_signals);
   const std::vector<ParameterRef> constants = record_constants(terms);
@@ -32,8 +32,8 @@ bool refine_record_constants(PreparedData& prepared, BalanceData& data, const Te
   for (std::size_t j = 0; j < others.size(); ++j)
     X.col(static_cast<Eigen::Index>(j)) = terms[others[j].term].free_linear(others[j].parameter)
                                               ? data.column(terms, others[j])
-                                              : data.nonlinear_column(terms, on_balance, others[j]);
-  const Eigen::VectorXd slope = data.nonlinear_column(terms, on_balance, *here);
+                                              : data.nonlinear_columns(terms, on_balance, {others[j]}).col(0);
+  const Eigen::VectorXd slope = data.nonlinear_columns(terms, on_balance, {*here});
   const auto first = static_cast<Eigen::Index>(others.size());
   for (Eigen::Index r = 0; r < records; ++r) {
     const RowRange& range = data.records()[static_cast<std::size_t>(r)];

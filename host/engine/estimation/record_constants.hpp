@@ -5,7 +5,7 @@
 #include <Eigen/Core>
 #include <vector>
 
-#include "host/engine/estimation/balance_data.hpp"
+#include "host/engine/estimation/regression_problem.hpp"
 
 namespace flexspline::estimation {
 
@@ -16,7 +16,7 @@ std::vector<ParameterRef> record_constants(const Terms& terms);
 // parameters in `together_with` (linear and nonlinear ones), which would else take up a part of them. Moves the torsion
 // of each record by its constant less their mean, and adds that to Record::torsion_zero_rad. Afterwards balances have
 // to be formed again. False, and nothing changes, where there are fewer than two records, or nothing to move.
-bool refine_record_constants(PreparedData& prepared, BalanceData& data, const Terms& terms,
+bool refine_record_constants(PreparedData& prepared, const RegressionProblem& data, const Terms& terms,
                              const std::vector<ParameterRef>& together_with, const Eigen::VectorXd& root_weights);
 
 }  // namespace flexspline::estimation

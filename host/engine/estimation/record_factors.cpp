@@ -21,7 +21,7 @@ Eigen::MatrixXd combined_factor(const std::vector<const Eigen::MatrixXd*>& block
   return algebra::r_factor(std::move(all));
 }
 
-RecordFactors record_factors(const BalanceData& data, const Eigen::MatrixXd& X, const Eigen::VectorXd& y,
+RecordFactors record_factors(const RegressionProblem& data, const Eigen::MatrixXd& X, const Eigen::VectorXd& y,
                              const Eigen::VectorXd& keep, std::size_t parts) {
   RecordFactors t;
   const Eigen::Index columns = X.cols();

@@ -5,7 +5,7 @@
 #include <Eigen/Core>
 #include <vector>
 
-#include "host/engine/estimation/balance_data.hpp"
+#include "host/engine/estimation/regression_problem.hpp"
 
 namespace flexspline::estimation {
 
@@ -21,8 +21,8 @@ struct RecordFactors {
 };
 
 // `keep` is zero for samples that do not count. Records are cut into `parts` pieces of equal length
-// (BalanceData::folds).
-RecordFactors record_factors(const BalanceData& data, const Eigen::MatrixXd& X, const Eigen::VectorXd& y,
+// (RegressionProblem::folds).
+RecordFactors record_factors(const RegressionProblem& data, const Eigen::MatrixXd& X, const Eigen::VectorXd& y,
                              const Eigen::VectorXd& keep, std::size_t parts);
 
 // The R factor of matrices that are stacked. All have the same number of columns.

@@ -23,7 +23,7 @@ struct OwnFactors {
   Eigen::VectorXd value, variance;
 };
 
-std::vector<OwnFactors> own_factors(const BalanceData& data, const Eigen::MatrixXd& torques,
+std::vector<OwnFactors> own_factors(const RegressionProblem& data, const Eigen::MatrixXd& torques,
                                     const Eigen::VectorXd& residual, const Eigen::VectorXd& left, double tau) {
   std::vector<OwnFactors> list;
   for (const RowRange& range : data.records()) {
@@ -70,7 +70,8 @@ std::pair<double, double> variance_between(const std::vector<OwnFactors>& record
 
 }  // namespace
 
-RecordVariance paule_mandel(const BalanceData& data, const Eigen::MatrixXd& torques, const Eigen::VectorXd& residual) {
+RecordVariance paule_mandel(const RegressionProblem& data, const Eigen::MatrixXd& torques,
+                            const Eigen::VectorXd& residual) {
   constexpr double kNoise = 2.0;
   const double filter_time = data.filter_autocorrelation_time();
   RecordVariance between;
@@ -110,7 +111,7 @@ RecordVariance paule_mandel(const BalanceData& data, const Eigen::MatrixXd& torq
   return between;
 }
 
-Eigen::MatrixXd add_record_variance(const RecordVariance& between, const BalanceData& data,
+Eigen::MatrixXd add_record_variance(const RecordVariance& between, const RegressionProblem& data,
                                     const Eigen::MatrixXd& torques, const Eigen::MatrixXd& columns,
                                     const Eigen::MatrixXd& unit, const Eigen::MatrixXd& within) {
   Eigen::MatrixXd covariance = within;

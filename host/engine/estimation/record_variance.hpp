@@ -4,8 +4,8 @@
 
 #include <Eigen/Core>
 
-#include "host/engine/estimation/balance_data.hpp"
 #include "host/engine/estimation/friction_groups.hpp"
+#include "host/engine/estimation/regression_problem.hpp"
 
 namespace flexspline::estimation {
 
@@ -22,12 +22,13 @@ struct RecordVariance {
 
 // From a fit's residual and the friction torques (a column a group), both weighted. The variance of b is the one at
 // which the factors of the records scatter as they should, after their own errors (Paule and Mandel, 1982).
-RecordVariance paule_mandel(const BalanceData& data, const Eigen::MatrixXd& torques, const Eigen::VectorXd& residual);
+RecordVariance paule_mandel(const RegressionProblem& data, const Eigen::MatrixXd& torques,
+                            const Eigen::VectorXd& residual);
 
 // Covariance of the estimates (`unit` is (X'WX)^-1, `columns` W^1/2 X), `within` being what it is without differences
 // between records: what those add, and all of it widened so far that 1.96 standard errors hold 95 % although the
 // spread is known from few records (Student's t, degrees of freedom after Satterthwaite).
-Eigen::MatrixXd add_record_variance(const RecordVariance& between, const BalanceData& data,
+Eigen::MatrixXd add_record_variance(const RecordVariance& between, const RegressionProblem& data,
                                     const Eigen::MatrixXd& torques, const Eigen::MatrixXd& columns,
                                     const Eigen::MatrixXd& unit, const Eigen::MatrixXd& within);
 

@@ -84,7 +84,7 @@ struct Linearised {
   Eigen::MatrixXd J;
   Eigen::VectorXd residual;
 };
-Linearised linearised(BalanceData& data, const BalanceFit& fit, const Terms& terms,
+Linearised linearised(const RegressionProblem& data, const BalanceFit& fit, const Terms& terms,
                       const std::vector<Eigen::Index>& identified) {
   return {data.slopes(terms, fit.on_balance, fit.linear, fit.nonlinear)(Eigen::all, identified), data.residual(terms)};
 }
@@ -104,7 +104,7 @@ std::vector<Linearised> of_others(const Identification& found, const std::vector
   }
   std::vector<Linearised> result;
   for (std::size_t b = 0; b < found.data.size(); ++b) {
-    BalanceData data(prepared, found.data[b].balance());
+    RegressionProblem data(prepared, found.data[b].balance());
     result.push_back(linearised(data, found.fits[b], found.terms, identified[b]));
   }
   return result;
@@ -149,7 +149,7 @@ struct Changes {
 };
 
 // `start`: the step that the samples as they are would take.
-void add_draw(const BalanceData& data, const BalanceFit& fit, const Linearised& own, const Eigen::VectorXd& start,
+void add_draw(const RegressionProblem& data, const BalanceFit& fit, const Linearised& own, const Eigen::VectorXd& start,
               const std::vector<const Linearised*>& noisy, Eigen::Index draw_index, Changes& changes) {
   std::vector<Eigen::VectorXd> step;
   for (const Linearised* n : noisy) step.push_back(least_squares(n->J, n->residual, fit.whitening).theta - start);

@@ -15,6 +15,18 @@ std::string Term::label() const {
   return std::string(entry->name());
 }
 
+bool changes_inputs_of(const Term& changer, const Term& term) {
+  const effects::Description& what = *changer.entry->info;
+  // The torque of a kinematic error follows from the measured torque.
+  if (what.phase == effects::Phase::shift)
+    return (term.entry->info->reads & effects::kTorsion) != 0 && term.entry->info->phase == effects::Phase::source;
+  // An effect that replaces another one is scaled like it.
+  if (what.phase == effects::Phase::modulate)
+    return catalogue::names_contain(what.modulates, term.entry->name()) ||
+           catalogue::names_contain(term.entry->info->replaces, what.modulates);
+  return false;
+}
+
 Term term_of(const model::Effect& effect) {
   Term term;
   term.entry = &catalogue::entry_of(effect);

@@ -39,6 +39,9 @@ struct ParameterRef {
 
 using Terms = std::vector<Term>;
 
+// Whether a shift or modulation changes what the torque of a term is made of.
+bool changes_inputs_of(const Term& changer, const Term& term);
+
 inline std::vector<std::vector<double>> values_of_all(const Terms& terms) {
   std::vector<std::vector<double>> values;
   for (const Term& term : terms) values.push_back(term.values);

@@ -24,7 +24,7 @@ double quantile(std::vector<double> values, double share) {
 
 // Magnitudes of a signal over the samples of the balance.
 template <class Signal>
-std::vector<double> magnitudes(const BalanceData& data, Signal signal) {
+std::vector<double> magnitudes(const RegressionProblem& data, Signal signal) {
   std::vector<double> values;
   for (const RowRange& range : data.records()) {
     const Record& r = data.prepared().records[range.record];
@@ -35,7 +35,7 @@ std::vector<double> magnitudes(const BalanceData& data, Signal signal) {
 }
 
 // A short stroke of all records: those that are shorter make a tenth of the travel.
-double short_stroke(const BalanceData& data) {
+double short_stroke(const RegressionProblem& data) {
   std::vector<double> all;
   for (const RowRange& range : data.records()) {
     const std::vector<double> own = strokes(data.prepared().records[range.record]);
@@ -46,7 +46,7 @@ double short_stroke(const BalanceData& data) {
 
 // Travel after a reversal that the data cannot resolve: some counts of the encoder, and what is covered under the mask,
 // or, where reversals are kept, between two rows, of which four are kept in a period of the cut-off.
-double unseen_travel(const BalanceData& data) {
+double unseen_travel(const RegressionProblem& data) {
   std::vector<double> travel;
   double counts = 0.0;
   const Pipeline& pipeline = data.prepared().pipeline;
@@ -62,7 +62,7 @@ double unseen_travel(const BalanceData& data) {
   return std::max(counts, quantile(travel, 0.1));
 }
 
-double largest_torsion(const BalanceData& data) {
+double largest_torsion(const RegressionProblem& data) {
   return quantile(magnitudes(data, [](const auto& in) { return in.torsion; }), 0.99);
 }
 
@@ -85,7 +85,7 @@ ScaledColumns scaled_columns(const Eigen::MatrixXd& X, const NoiseCovariance& wh
 }
 
 // The sum over samples of weighted squares after the best linear parameters.
-double projected_cost(const BalanceData::Regression& regression, const NoiseCovariance& whitening) {
+double projected_cost(const RegressionProblem::Regression& regression, const NoiseCovariance& whitening) {
   const Eigen::MatrixXd A = scaled_columns(regression.X, whitening).A;
   const Eigen::VectorXd b = whitening * regression.y;
   return (b - A * algebra::PivotedQr(A).solve(b)).squaredNorm();
@@ -116,7 +116,7 @@ ParameterRange scale_between(const effects::ParameterInfo& info, double low, dou
 
 constexpr double kNegligible = 1e-9;
 
-ParameterRange torsion_range(const BalanceData& data, const effects::ParameterInfo& info) {
+ParameterRange torsion_range(const RegressionProblem& data, const effects::ParameterInfo& info) {
   const double largest = largest_torsion(data);
   switch (info.limit) {
     case Limit::torsion:
@@ -131,7 +131,7 @@ ParameterRange torsion_range(const BalanceData& data, const effects::ParameterIn
   }
 }
 
-ParameterRange velocity_range(const BalanceData& data, const effects::ParameterInfo& info) {
+ParameterRange velocity_range(const RegressionProblem& data, const effects::ParameterInfo& info) {
   const std::vector<double> all = magnitudes(data, [](const auto& in) { return in.velocity; });
   // The unmasked samples must cover the term: its width is at least the slowest hundredth of the samples.
   if (info.limit == Limit::velocity)
@@ -140,7 +140,7 @@ ParameterRange velocity_range(const BalanceData& data, const effects::ParameterI
                        1.0 / std::max(quantile(all, 0.01), kNegligible));
 }
 
-ParameterRange current_range(const BalanceData& data, const effects::ParameterInfo& info) {
+ParameterRange current_range(const RegressionProblem& data, const effects::ParameterInfo& info) {
   const std::vector<double> all = magnitudes(data, [](const auto& in) { return in.current; });
   const double largest = quantile(all, 1.0);
   // A limit shows as a plateau at the peaks. A limit below half of the log could reproduce any measured signal.
@@ -149,7 +149,7 @@ ParameterRange current_range(const BalanceData& data, const effects::ParameterIn
 
 }  // namespace
 
-ParameterRange parameter_range(const BalanceData& data, const Term& term, std::size_t parameter) {
+ParameterRange parameter_range(const RegressionProblem& data, const Term& term, std::size_t parameter) {
   const auto& info = term.entry->parameters[parameter];
   switch (info.limit) {
     case Limit::stated:
@@ -181,7 +181,7 @@ ParameterRange parameter_range(const BalanceData& data, const Term& term, std::s
   return {info.low, info.high, false};
 }
 
-void set_grid_values(const BalanceData& data, Terms& terms, const std::vector<std::size_t>& which) {
+void set_grid_values(const RegressionProblem& data, Terms& terms, const std::vector<std::size_t>& which) {
   for (const std::size_t t : which)
     for (std::size_t p = 0; p < terms[t].values.size(); ++p) {
       const auto& info = terms[t].entry->parameters[p];
@@ -198,7 +198,7 @@ std::vector<double> parameter_grid(const ParameterRange& range, std::size_t coun
   return values;
 }
 
-void sweep_nonlinear(BalanceData& data, Terms& terms, const std::vector<std::size_t>& on_balance,
+void sweep_nonlinear(const RegressionProblem& data, Terms& terms, const std::vector<std::size_t>& on_balance,
                      const NoiseCovariance& whitening, SweepFrom from) {
   const std::vector<ParameterRef> nonlinear = free_nonlinear_parameters(terms, on_balance);
   const std::vector<ParameterRef> linear = free_linear_parameters(terms, on_balance);
@@ -231,7 +231,7 @@ void sweep_nonlinear(BalanceData& data, Terms& terms, const std::vector<std::siz
     }
 }
 
-double refine_nonlinear(BalanceData& data, Terms& terms, const std::vector<std::size_t>& on_balance,
+double refine_nonlinear(const RegressionProblem& data, Terms& terms, const std::vector<std::size_t>& on_balance,
                         const NoiseCovariance& whitening) {
   constexpr double kTolerance = 1e-9;
   return refine_nonlinear(data, terms, on_balance, whitening, kTolerance);
@@ -242,7 +242,7 @@ namespace {
 // Residual of the best linear fit as a function of the nonlinear parameters alone, each as a share of its range.
 class ProjectedResidual {
  public:
-  ProjectedResidual(const BalanceData& data, Terms& terms, const std::vector<std::size_t>& on_balance,
+  ProjectedResidual(const RegressionProblem& data, Terms& terms, const std::vector<std::size_t>& on_balance,
                     const NoiseCovariance& whitening)
       : terms_(terms),
         on_balance_(on_balance),
@@ -266,7 +266,7 @@ class ProjectedResidual {
       terms_[nonlinear_[j].term].values[nonlinear_[j].parameter] = ranges_[j].at(shares[j]);
   }
   // Columns come from this from now on.
-  void use(BalanceData& data) {
+  void use(const RegressionProblem& data) {
     on_ = &data;
     factored_at_.clear();
   }
@@ -282,7 +282,7 @@ class ProjectedResidual {
 
  private:
   void factor(const std::vector<double>& shares) {
-    const BalanceData::Regression regression = on_->regression(terms_, on_balance_, linear_);
+    const RegressionProblem::Regression regression = on_->regression(terms_, on_balance_, linear_);
     ScaledColumns columns = scaled_columns(regression.X, whitening_);
     A_ = std::move(columns.A);
     size_ = std::move(columns.size);
@@ -313,7 +313,7 @@ class ProjectedResidual {
   const NoiseCovariance& whitening_;
   std::vector<ParameterRef> nonlinear_, linear_;
   std::vector<ParameterRange> ranges_;
-  BalanceData* on_ = nullptr;
+  const RegressionProblem* on_ = nullptr;
   std::vector<double> factored_at_;
   Eigen::MatrixXd A_;
   Eigen::VectorXd size_, theta_, left_;
@@ -322,8 +322,8 @@ class ProjectedResidual {
 
 }  // namespace
 
-double refine_nonlinear(BalanceData& data, Terms& terms, const std::vector<std::size_t>& on_balance,
-                        const NoiseCovariance& whitening, double tolerance, BalanceData* coarse) {
+double refine_nonlinear(const RegressionProblem& data, Terms& terms, const std::vector<std::size_t>& on_balance,
+                        const NoiseCovariance& whitening, double tolerance, const RegressionProblem* coarse) {
   ProjectedResidual projected(data, terms, on_balance, whitening);
   if (projected.nonlinear() == 0 || data.empty())
     return projected_cost(data.regression(terms, on_balance, free_linear_parameters(terms, on_balance)), whitening);
@@ -334,7 +334,7 @@ double refine_nonlinear(BalanceData& data, Terms& terms, const std::vector<std::
   std::vector<double> shares = projected.start();
   // The decimated samples give a start from which all samples need one or two steps.
   double cost = 0.0;
-  for (BalanceData* const stage : {coarse, &data}) {
+  for (const RegressionProblem* const stage : {coarse, &data}) {
     if (!stage) continue;
     projected.use(*stage);
     cost = minimise(shares, data.rows(), std::ref(projected), how);

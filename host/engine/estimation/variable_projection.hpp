@@ -1,8 +1,8 @@
 // Nonlinear parameters: the range in which data can show them, and the search within it.
 #pragma once
 
-#include "host/engine/estimation/balance_data.hpp"
 #include "host/engine/estimation/noise_covariance.hpp"
+#include "host/engine/estimation/regression_problem.hpp"
 
 namespace flexspline::estimation {
 
@@ -15,7 +15,7 @@ struct ParameterRange {
   double at(double share) const;
   double share(double value) const;
 };
-ParameterRange parameter_range(const BalanceData& data, const Term& term, std::size_t parameter);
+ParameterRange parameter_range(const RegressionProblem& data, const Term& term, std::size_t parameter);
 
 // Share of the range within which a parameter is at its end.
 inline constexpr double kAtTheEnd = 0.005;
@@ -26,7 +26,7 @@ inline bool is_length(const effects::ParameterInfo& info) {
 }
 
 // Gives parameters of kind grid that the model does not state their values, from the largest torsion of the data.
-void set_grid_values(const BalanceData& data, Terms& terms, const std::vector<std::size_t>& which);
+void set_grid_values(const RegressionProblem& data, Terms& terms, const std::vector<std::size_t>& which);
 
 // Values to start from or to rank candidates on, spread over the range.
 std::vector<double> parameter_grid(const ParameterRange& range, std::size_t count);
@@ -34,18 +34,18 @@ std::vector<double> parameter_grid(const ParameterRange& range, std::size_t coun
 // Minimises the weighted residual over the free nonlinear parameters on this balance by variable projection (linear
 // parameters are eliminated at each step; Jacobian after Kaufman), from the values in `terms`, within their ranges.
 // Writes the result into `terms`. Returns the weighted sum of squares.
-double refine_nonlinear(BalanceData& data, Terms& terms, const std::vector<std::size_t>& on_balance,
+double refine_nonlinear(const RegressionProblem& data, Terms& terms, const std::vector<std::size_t>& on_balance,
                         const NoiseCovariance& whitening);
 // The same to a relative change of the sum below `tolerance`. Where `coarse`
-// (BalanceData::decimated) is given, the search begins on that.
-double refine_nonlinear(BalanceData& data, Terms& terms, const std::vector<std::size_t>& on_balance,
-                        const NoiseCovariance& whitening, double tolerance, BalanceData* coarse = nullptr);
+// (RegressionProblem::decimated) is given, the search begins on that.
+double refine_nonlinear(const RegressionProblem& data, Terms& terms, const std::vector<std::size_t>& on_balance,
+                        const NoiseCovariance& whitening, double tolerance, const RegressionProblem* coarse = nullptr);
 
 // Chooses starting values for nonlinear parameters that the model does not state: sweeps each over its grid, twice
 // around; from the usual ones or the middle of their ranges, or from those that `terms` has, which stay where none is
 // better.
 enum class SweepFrom { usual, values };
-void sweep_nonlinear(BalanceData& data, Terms& terms, const std::vector<std::size_t>& on_balance,
+void sweep_nonlinear(const RegressionProblem& data, Terms& terms, const std::vector<std::size_t>& on_balance,
                      const NoiseCovariance& whitening, SweepFrom from = SweepFrom::usual);
 
 }  // namespace flexspline::estimation

@@ -43,7 +43,7 @@ std::vector<std::size_t> grid_parameters(const Term& term) {
 
 // The added term's values over its grid: one nonlinear parameter over its range, the others as usual; then a second
 // likewise.
-std::vector<std::vector<double>> grid_of(const BalanceData& data, const Term& term) {
+std::vector<std::vector<double>> grid_of(const RegressionProblem& data, const Term& term) {
   const std::vector<double> usual = usual_values(term);
   std::vector<std::vector<double>> grid{usual};
   for (const std::size_t p : grid_parameters(term)) {
@@ -65,7 +65,7 @@ bool possible(const Term& term) {
 }
 
 // A model fitted to what was recorded; nonlinear parameters of either sign follow their slopes.
-selection::CrossValidatedFit fitted(BalanceData& data, Terms terms) {
+selection::CrossValidatedFit fitted(const RegressionProblem& data, Terms terms) {
   const Eigen::VectorXd all = Eigen::VectorXd::Ones(data.rows());
   selection::CrossValidatedFit fit = selection::cross_validate(data, std::move(terms), all);
   for (int step = 0; step < 2; ++step) {
@@ -87,7 +87,7 @@ selection::CrossValidatedFit fitted(BalanceData& data, Terms terms) {
 }
 
 // Share of an effect's usual size that could be present without a significant effect on these data.
-double unseen_share(BalanceData& data, const Terms& base, const Terms& usual,
+double unseen_share(const RegressionProblem& data, const Terms& base, const Terms& usual,
                     const estimation::ModelProjection& projection, double noise) {
   // Fits its own parameters alone; the others keep the values of the base.
   Terms terms = usual;

@@ -38,18 +38,18 @@ std::string label_of(const Terms& terms) {
   return label;
 }
 
-std::vector<std::size_t> on_balance(const Terms& terms, const BalanceData& data) {
+std::vector<std::size_t> on_balance(const Terms& terms, const RegressionProblem& data) {
   return estimation::terms_on(terms, data.balance(), data.prepared().output_signals);
 }
 
-bool is_on(const Terms& terms, const BalanceData& data, std::size_t term) {
+bool is_on(const Terms& terms, const RegressionProblem& data, std::size_t term) {
   const auto list = on_balance(terms, data);
   return std::find(list.begin(), list.end(), term) != list.end();
 }
 
 }  // namespace
 
-std::size_t ColumnLayout::place(std::string label, std::function<Eigen::VectorXd(BalanceData&)> make) {
+std::size_t ColumnLayout::place(std::string label, std::function<Eigen::VectorXd(const RegressionProblem&)> make) {
   for (std::size_t i = 0; i < columns_.size(); ++i)
     if (columns_[i].label == label) return i;
   columns_.push_back({std::move(label), std::move(make)});
@@ -62,33 +62,35 @@ Hypothesis ColumnLayout::add(Terms terms) {
     for (std::size_t p = 0; p < terms[t].values.size(); ++p) {
       const ParameterRef ref{t, p};
       if (terms[t].free_linear(p))
-        h.columns.push_back(place(label_of(terms, ref), [terms, ref](BalanceData& data) -> Eigen::VectorXd {
+        h.columns.push_back(place(label_of(terms, ref), [terms, ref](const RegressionProblem& data) -> Eigen::VectorXd {
           if (!is_on(terms, data, ref.term)) return Eigen::VectorXd::Zero(data.rows());
           return data.column(terms, ref);
         }));
       else if (terms[t].free_nonlinear(p))
         h.columns.push_back(place(fmt::format("slope {}{}", label_of(terms, ref), label_of(terms)),
-                                  [terms, ref](BalanceData& data) -> Eigen::VectorXd {
-                                    return data.nonlinear_column(terms, on_balance(terms, data), ref);
+                                  [terms, ref](const RegressionProblem& data) -> Eigen::VectorXd {
+                                    return data.nonlinear_columns(terms, on_balance(terms, data), {ref});
                                   }));
     }
-  h.columns.push_back(place("delay", [](BalanceData& data) -> Eigen::VectorXd { return data.delay_column(); }));
-  h.torque = place("torque" + label_of(terms),
-                   [terms](BalanceData& data) -> Eigen::VectorXd { return estimation::model_torque(data, terms); });
-  h.known = place("known" + label_of(terms), [terms](BalanceData& data) -> Eigen::VectorXd {
+  h.columns.push_back(
+      place("delay", [](const RegressionProblem& data) -> Eigen::VectorXd { return data.delay_column(); }));
+  h.torque = place("torque" + label_of(terms), [terms](const RegressionProblem& data) -> Eigen::VectorXd {
+    return estimation::model_torque(data, terms);
+  });
+  h.known = place("known" + label_of(terms), [terms](const RegressionProblem& data) -> Eigen::VectorXd {
     return data.known_torque(terms, on_balance(terms, data));
   });
   h.terms = std::move(terms);
   return h;
 }
 
-Eigen::MatrixXd ColumnLayout::over(BalanceData& data) const {
+Eigen::MatrixXd ColumnLayout::over(const RegressionProblem& data) const {
   Eigen::MatrixXd all(data.rows(), static_cast<Eigen::Index>(columns_.size()));
   for (std::size_t i = 0; i < columns_.size(); ++i) all.col(static_cast<Eigen::Index>(i)) = columns_[i].make(data);
   return all;
 }
 
-std::vector<Eigen::MatrixXd> factors(const BalanceData& data, const Eigen::MatrixXd& columns) {
+std::vector<Eigen::MatrixXd> factors(const RegressionProblem& data, const Eigen::MatrixXd& columns) {
   std::vector<Eigen::MatrixXd> all(data.prepared().records.size());
   for (const estimation::RowRange& range : data.records()) {
     const Eigen::MatrixXd rows = columns.middleRows(range.first, range.size());

@@ -8,11 +8,11 @@
 #include <string_view>
 #include <vector>
 
-#include "host/engine/estimation/balance_data.hpp"
+#include "host/engine/estimation/regression_problem.hpp"
 
 namespace flexspline::planning {
 
-using estimation::BalanceData;
+using estimation::RegressionProblem;
 using estimation::Terms;
 
 // A model with values for all parameters, and the columns that a fit of it may use.
@@ -31,20 +31,20 @@ class ColumnLayout {
   Hypothesis add(Terms terms);
   std::size_t size() const { return columns_.size(); }
   // All columns over the samples of a balance, one each.
-  Eigen::MatrixXd over(BalanceData& data) const;
+  Eigen::MatrixXd over(const RegressionProblem& data) const;
 
  private:
   struct Column {
     std::string label;
-    std::function<Eigen::VectorXd(BalanceData&)> make;
+    std::function<Eigen::VectorXd(const RegressionProblem&)> make;
   };
-  std::size_t place(std::string label, std::function<Eigen::VectorXd(BalanceData&)> make);
+  std::size_t place(std::string label, std::function<Eigen::VectorXd(const RegressionProblem&)> make);
   std::vector<Column> columns_;
 };
 
 // R factors of columns over each record of the data, by the index of the record among the prepared ones; an
 // empty matrix where a record has no samples.
-std::vector<Eigen::MatrixXd> factors(const BalanceData& data, const Eigen::MatrixXd& columns);
+std::vector<Eigen::MatrixXd> factors(const RegressionProblem& data, const Eigen::MatrixXd& columns);
 // The factor of the samples of all `factors` together. Empty ones are ignored.
 Eigen::MatrixXd stacked_factor(const std::vector<const Eigen::MatrixXd*>& factors);
 

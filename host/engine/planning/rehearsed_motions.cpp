@@ -63,7 +63,7 @@ double loudness(const estimation::PreparedData& prepared, const estimation::Reco
   return std::sqrt(sum / std::max(1.0, static_cast<double>(record.inputs.size())));
 }
 
-double loudness(const BalanceData& data) {
+double loudness(const RegressionProblem& data) {
   double sum = 0.0, rows = 0.0;
   for (const estimation::RowRange& range : data.records()) {
     const double one = loudness(data.prepared(), data.prepared().records[range.record], data.balance());
@@ -198,7 +198,7 @@ void RehearsedMotions::prepare(const PlanRequest& question) {
         }
       if (!side.recorded) continue;
     }
-    side.planned = std::make_unique<BalanceData>(prepared_, balance);
+    side.planned = std::make_unique<RegressionProblem>(prepared_, balance);
     if (side.planned->empty()) continue;
     if (balance != Balance::motor && !prepared_.output_signals.torque) continue;
     if (!identified_)

@@ -24,9 +24,9 @@ class RehearsedMotions {
 
   // One balance, over the rehearsed motions and over the data.
   struct Side {
-    std::unique_ptr<BalanceData> planned;
-    BalanceData* recorded = nullptr;  // null where there are no data
-    std::vector<double> louder;       // noise of each planned record over that of the recorded data
+    std::unique_ptr<RegressionProblem> planned;
+    const RegressionProblem* recorded = nullptr;  // null where there are no data
+    std::vector<double> louder;                   // noise of each planned record over that of the recorded data
     double noise = 1.0;  // squares per sample of the residual of a true model, times the autocorrelation time
   };
   std::vector<Side>& sides() { return sides_; }

@@ -17,8 +17,8 @@ namespace flexspline::selection {
 namespace {
 
 using estimation::Balance;
-using estimation::BalanceData;
 using estimation::Identification;
+using estimation::RegressionProblem;
 
 double root_mean_square(const Eigen::VectorXd& r) {
   return r.size() ? std::sqrt(r.squaredNorm() / static_cast<double>(r.size())) : 0.0;
@@ -36,10 +36,11 @@ const std::size_t* find_balance(const Identification& fitted, Balance own, std::
 }
 
 // Of the data that the models are judged on; where these show none, of those that were fitted.
-comparison::NoiseFloor floor_of(const Identification& found, BalanceData& fitted_data,
-                                const std::vector<const data::Experiment*>& fitted, BalanceData& judged_data,
+comparison::NoiseFloor floor_of(const Identification& found, const RegressionProblem& fitted_data,
+                                const std::vector<const data::Experiment*>& fitted,
+                                const RegressionProblem& judged_data,
                                 const std::vector<const data::Experiment*>& judged) {
-  const auto of = [&](BalanceData& data, const std::vector<const data::Experiment*>& experiments) {
+  const auto of = [&](const RegressionProblem& data, const std::vector<const data::Experiment*>& experiments) {
     return comparison::pooled(comparison::noise_floors(data, found.terms, experiments, found.model.drive),
                               data.records());
   };
@@ -83,7 +84,7 @@ Addition compare_models(const data::Dataset& dataset, const model::Model& before
   std::vector<const data::Experiment*> fitted, evaluated;
   for (const data::Experiment& e : dataset.experiments)
     if (e.role == data::Role::fit) fitted.push_back(&e);
-  BalanceData* evaluated_on = &extended->data[x];
+  const RegressionProblem* evaluated_on = &extended->data[x];
   if (holdout.data) {
     result.before.rmse_holdout = holdout.rmse(base->terms);
     result.after.rmse_holdout = holdout.rmse(extended->terms);

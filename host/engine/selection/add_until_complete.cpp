@@ -31,7 +31,7 @@ std::string needless(const data::Dataset& dataset, const model::Model& model, co
   const auto fitted = estimation::identify(dataset, model, options.pipeline);
   std::string worst;
   double least = kPolicy.named_score;
-  for (BalanceData& data : fitted->data) {
+  for (const RegressionProblem& data : fitted->data) {
     const Eigen::VectorXd keep = Eigen::VectorXd::Ones(data.rows());
     const auto on_balance = estimation::terms_on(fitted->terms, data.balance(), fitted->prepared.output_signals);
     CrossValidatedFit full;

@@ -11,7 +11,7 @@ namespace flexspline::selection {
 
 // One balance with the model as it is.
 struct BalanceSearch {
-  BalanceData* data = nullptr;
+  const RegressionProblem* data = nullptr;
   Eigen::VectorXd keep;  // zero for samples in which a disturbance acted
   CrossValidatedFit base;
   std::optional<double> floor = std::nullopt;  // RMS of the noise, N m, where it is known

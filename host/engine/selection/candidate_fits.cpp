@@ -25,7 +25,7 @@ constexpr std::size_t kRefined = 4;  // candidates whose nonlinear parameters ar
 
 // Chooses the nonlinear parameters of the added effect on a grid. `coarse` has the same samples, from decimated
 // signals.
-void choose_nonlinear(BalanceSearch& search, BalanceData& coarse, CandidateModel& model) {
+void choose_nonlinear(const BalanceSearch& search, const RegressionProblem& coarse, CandidateModel& model) {
   Term& added = model.terms.back();
   for (std::size_t p = 0; p < added.values.size(); ++p) {
     if (!added.free_nonlinear(p) || begins_at_zero(added, p)) continue;
@@ -45,7 +45,7 @@ void choose_nonlinear(BalanceSearch& search, BalanceData& coarse, CandidateModel
 }
 
 // The effect of the model whose column is most similar to that of the added one.
-std::string most_collinear_effect(BalanceData& data, const CrossValidatedFit& fit, std::size_t added) {
+std::string most_collinear_effect(const RegressionProblem& data, const CrossValidatedFit& fit, std::size_t added) {
   std::string best = "the model";
   double most = 0.0;
   for (const ParameterRef& own : fit.linear) {
@@ -73,7 +73,7 @@ bool scales_torques(const Terms& terms) {
 // A nonlinear parameter of the added effect that stops at an end of what the data can show: the error still falls
 // beyond it, so it is another law. (The shortest travel or torsion that can be shown stands for any below it.) Empty:
 // there is none.
-std::string why_no_minimum(const BalanceData& data, const Term& added) {
+std::string why_no_minimum(const RegressionProblem& data, const Term& added) {
   for (std::size_t p = 0; p < added.values.size(); ++p) {
     if (!added.free_nonlinear(p) || begins_at_zero(added, p)) continue;
     const effects::ParameterInfo& info = added.entry->parameters[p];
@@ -86,7 +86,7 @@ std::string why_no_minimum(const BalanceData& data, const Term& added) {
 }
 
 // A candidate that needs an impossible value, or that makes the base model impossible, is a fit, not an explanation.
-void check_admissible(BalanceData& data, const CrossValidatedFit& base, CandidateFit& candidate) {
+void check_admissible(const RegressionProblem& data, const CrossValidatedFit& base, CandidateFit& candidate) {
   const auto& fit = candidate.fit;
   const auto refuse = [&](std::string why) {
     if (candidate.admissible) candidate.why_not = std::move(why);
@@ -136,7 +136,7 @@ void check_admissible(BalanceData& data, const CrossValidatedFit& base, Candidat
 }
 
 // Moves nonlinear parameters that begin at zero to their fitted values; the model is almost linear in them there.
-void take_first_step(const BalanceData& data, CrossValidatedFit& fit) {
+void take_first_step(const RegressionProblem& data, CrossValidatedFit& fit) {
   const auto on_balance = estimation::terms_on(fit.terms, data.balance(), data.prepared().output_signals);
   const std::vector<ParameterRef> nonlinear = estimation::free_nonlinear_parameters(fit.terms, on_balance);
   for (std::size_t k = 0; k < nonlinear.size(); ++k) {
@@ -148,7 +148,7 @@ void take_first_step(const BalanceData& data, CrossValidatedFit& fit) {
   }
 }
 
-CandidateFit evaluate(BalanceSearch& search, CandidateModel model) {
+CandidateFit evaluate(const BalanceSearch& search, CandidateModel model) {
   CandidateFit candidate;
   candidate.fit = cross_validate(*search.data, model.terms, search.keep);
   take_first_step(*search.data, candidate.fit);
@@ -162,7 +162,7 @@ bool better(const CandidateFit& a, const CandidateFit& b);
 
 // Where the best value of a nonlinear parameter makes the model impossible, returns the best admissible value of the
 // grid; `refused` where there is none.
-CandidateFit best_admissible(BalanceSearch& search, CandidateModel model, CandidateFit refused) {
+CandidateFit best_admissible(const BalanceSearch& search, CandidateModel model, CandidateFit refused) {
   Term& added = model.terms.back();
   if (refused.gain.score < kPolicy.named_score) return refused;
   for (std::size_t p = 0; p < added.values.size(); ++p) {
@@ -181,7 +181,7 @@ CandidateFit best_admissible(BalanceSearch& search, CandidateModel model, Candid
 }
 
 // Residual and span of the base model, for the choice of orders.
-Unexplained left_by(BalanceData& data, const CrossValidatedFit& base) {
+Unexplained left_by(const RegressionProblem& data, const CrossValidatedFit& base) {
   Unexplained left;
   left.root_weights = base.root_weights;
   left.residual = base.root_weights.cwiseProduct(base.residual);
@@ -215,7 +215,7 @@ bool passes(const CandidateFit& t) {
 
 // Whether the law is nonlinear over a travel that the encoder resolves in few steps: the residual there is the
 // encoder's.
-bool is_smeared(const BalanceData& data, const CandidateFit& candidate) {
+bool is_smeared(const RegressionProblem& data, const CandidateFit& candidate) {
   const Term& added = candidate.fit.terms.back();
   for (std::size_t p = 0; p < added.values.size(); ++p) {
     if (!added.free_nonlinear(p) || added.entry->parameters[p].limit != effects::Limit::travel) continue;
@@ -269,22 +269,16 @@ void prefer_simple(const BalanceSearch& search, std::vector<CandidateFit>& candi
               candidates.begin() + static_cast<std::ptrdiff_t>(simplest) + 1);
 }
 
-std::vector<CandidateFit> rank_candidates(BalanceSearch& search) {
+std::vector<CandidateFit> rank_candidates(const BalanceSearch& search) {
   std::vector<CandidateModel> tried =
       candidate_models(*search.data, search.base.terms, left_by(*search.data, search.base));
   std::vector<CandidateFit> candidates(tried.size());
-  estimation::PreparedData few;
-  BalanceData decimated = search.data->decimated(few);
-  decimated.columns(search.base.terms, search.base.linear);
-  // Each candidate has its own copy of the data and its cached columns, so the result does not depend on the number of
-  // threads.
+  const RegressionProblem coarse = search.data->decimated();
   estimation::in_parallel(tried.size(), [&](std::size_t i) {
-    BalanceData data = *search.data, coarse = decimated;
-    BalanceSearch own{&data, search.keep, search.base};
     CandidateModel& model = tried[i];
-    choose_nonlinear(own, coarse, model);
-    candidates[i] = evaluate(own, model);
-    if (!candidates[i].admissible) candidates[i] = best_admissible(own, std::move(model), std::move(candidates[i]));
+    choose_nonlinear(search, coarse, model);
+    candidates[i] = evaluate(search, model);
+    if (!candidates[i].admissible) candidates[i] = best_admissible(search, std::move(model), std::move(candidates[i]));
   });
   // By score alone: a grid value near the best one may make the model impossible although the best one does not.
   std::stable_sort(candidates.begin(), candidates.end(),
@@ -299,14 +293,13 @@ std::vector<CandidateFit> rank_candidates(BalanceSearch& search) {
   }
   estimation::in_parallel(to_refine.size(), [&](std::size_t i) {
     CandidateFit& candidate = *to_refine[i];
-    BalanceData data = *search.data, coarse = decimated;
-    BalanceSearch own{&data, search.keep, search.base};
+    const RegressionProblem& data = *search.data;
     CandidateModel refined = candidate.model;
     refined.terms = candidate.fit.terms;
     const auto on_balance = estimation::terms_on(refined.terms, data.balance(), data.prepared().output_signals);
     estimation::refine_nonlinear(data, refined.terms, on_balance, noise_covariance(data, candidate.fit), kSameSquares,
                                  &coarse);
-    CandidateFit again = evaluate(own, std::move(refined));
+    CandidateFit again = evaluate(search, std::move(refined));
     // A value of the grid near an end of the range, where the best one stops, is no minimum either.
     const bool stops = !why_no_minimum(data, again.fit.terms.back()).empty() && again.score() > candidate.score();
     if (better(again, candidate) || !candidate.admissible || stops) candidate = std::move(again);
@@ -344,7 +337,7 @@ bool is_negative(const CandidateFit& candidate) {
   return true;
 }
 
-bool is_another_law(const CandidateFit& candidate, const BalanceData& data) {
+bool is_another_law(const CandidateFit& candidate, const RegressionProblem& data) {
   if (candidate.model.entry->info->wide_negative_is.empty() || !is_negative(candidate)) return false;
   const Term& term = candidate.fit.terms.back();
   for (std::size_t p = 0; p < term.values.size(); ++p) {
@@ -355,7 +348,7 @@ bool is_another_law(const CandidateFit& candidate, const BalanceData& data) {
   return false;
 }
 
-std::optional<CandidateFit> backward_elimination(BalanceSearch& search, const CandidateFit& first) {
+std::optional<CandidateFit> backward_elimination(const BalanceSearch& search, const CandidateFit& first) {
   BalanceSearch next{search.data, search.keep, first.fit};
   std::vector<CandidateFit> more = rank_candidates(next);
   if (more.empty() || !passes(more.front())) return std::nullopt;

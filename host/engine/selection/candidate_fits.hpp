@@ -35,20 +35,20 @@ struct CandidateFit {
 bool passes(const CandidateFit& candidate);
 
 // All effects that could be added, best first; the best ones with their nonlinear parameters searched continuously.
-std::vector<CandidateFit> rank_candidates(BalanceSearch& search);
+std::vector<CandidateFit> rank_candidates(const BalanceSearch& search);
 // Best first: admissible ones before others, by score; of confounded ones that leave almost the same error, the
 // simplest.
 void sort_candidates(const BalanceSearch& search, std::vector<CandidateFit>& candidates);
 
 // One more forward step, then backward elimination: an effect that was named because it resembles the true one is
 // dropped once the true one is in the model. Returns the candidate to name instead of `first`, or nothing.
-std::optional<CandidateFit> backward_elimination(BalanceSearch& search, const CandidateFit& first);
+std::optional<CandidateFit> backward_elimination(const BalanceSearch& search, const CandidateFit& first);
 
 // Whether all amplitudes of a law whose description explains that case came out negative.
 bool is_negative(const CandidateFit& candidate);
 // Whether it is negative over so wide a range of speed that it is another law, whatever its formula
 // (effects::Description::wide_negative_is).
-bool is_another_law(const CandidateFit& candidate, const BalanceData& data);
+bool is_another_law(const CandidateFit& candidate, const RegressionProblem& data);
 
 // The position of a parameter among the linear ones of a cross-validated model, or nothing if it is not estimated
 // there.

@@ -14,7 +14,7 @@
 
 namespace flexspline::selection {
 
-bool moves_both_ways(const BalanceData& data) {
+bool moves_both_ways(const RegressionProblem& data) {
   int forward_only = 0, backward_only = 0;
   for (const auto& range : data.records()) {
     const estimation::Record& r = data.prepared().records[range.record];
@@ -35,7 +35,7 @@ namespace {
 
 using effects::Kind;
 using effects::Phase;
-using estimation::BalanceData;
+using estimation::RegressionProblem;
 using estimation::Term;
 using estimation::Terms;
 
@@ -57,7 +57,7 @@ bool replaces_it(const Terms& terms, std::string_view name) {
 
 // All torques of the motor balance could be scaled by one factor, unless one of them is known: a parameter that the
 // user gave, or the torque of a loaded sensor.
-bool knows_torque_scale(const BalanceData& data, const Terms& terms) {
+bool knows_torque_scale(const RegressionProblem& data, const Terms& terms) {
   if (states_a_torque(terms)) return true;
   if (!data.prepared().output_signals.torque) return false;
   double sensor = 0.0, effort = 0.0;
@@ -77,7 +77,7 @@ bool covered(const Terms& terms, const catalogue::Entry& entry) {
                      [&](const Term& t) { return catalogue::names_contain(t.entry->info->replaces, entry.name()); });
 }
 
-bool visible(const BalanceData& data, const Terms& terms, const catalogue::Entry& entry) {
+bool visible(const RegressionProblem& data, const Terms& terms, const catalogue::Entry& entry) {
   const unsigned reads = entry.info->reads;
   const estimation::PreparedData& p = data.prepared();
   const bool has_torque =
@@ -118,7 +118,8 @@ bool visible(const BalanceData& data, const Terms& terms, const catalogue::Entry
 // The orders with the largest waves in the residual. Waves are not filtered: the filter costs much and hardly changes
 // the ranking. Where the motor hardly turns, waves of all orders resemble the model's offset, so only their orthogonal
 // part counts.
-std::vector<double> likely_orders(const BalanceData& data, const catalogue::Entry& entry, const Unexplained& left) {
+std::vector<double> likely_orders(const RegressionProblem& data, const catalogue::Entry& entry,
+                                  const Unexplained& left) {
   std::vector<std::pair<double, double>> found;  // minus the decrease, order
   std::vector<effects::Inputs<catalogue::Real>> rows;
   for (const auto& range : data.records()) {
@@ -173,7 +174,7 @@ std::size_t free_count(const Terms& terms) {
 
 }  // namespace
 
-bool may_be_seen(const BalanceData& data, const Terms& terms, const catalogue::Entry& entry) {
+bool may_be_seen(const RegressionProblem& data, const Terms& terms, const catalogue::Entry& entry) {
   if (!visible(data, terms, entry) || covered(terms, entry)) return false;
   if (!entry.info->replaces.empty() && !replaced_in(terms, entry)) return false;
   if (!entry.info->modulates.empty() && !replaces_it(terms, entry.info->modulates)) return false;
@@ -229,7 +230,8 @@ bool begins_at_zero(const Term& term, std::size_t p) {
   return info.low < 0.0 && info.per.empty() && term.entry->info->phase != Phase::modulate;
 }
 
-std::vector<CandidateModel> candidate_models(const BalanceData& data, const Terms& terms, const Unexplained& left) {
+std::vector<CandidateModel> candidate_models(const RegressionProblem& data, const Terms& terms,
+                                             const Unexplained& left) {
   std::vector<CandidateModel> list;
   const bool collapsed = !data.prepared().output_signals.torque && data.balance() == estimation::Balance::motor;
   for (const catalogue::Entry& entry : catalogue::all()) {

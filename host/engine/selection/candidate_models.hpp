@@ -6,7 +6,7 @@
 #include <string>
 #include <vector>
 
-#include "host/engine/estimation/balance_data.hpp"
+#include "host/engine/estimation/regression_problem.hpp"
 #include "host/engine/estimation/terms.hpp"
 
 namespace flexspline::selection {
@@ -27,7 +27,7 @@ struct Unexplained {
 
 // All effects that may be added on this balance; nonlinear parameters are in the middle of their range. Of an effect
 // with orders per turn, the orders with the largest waves in the residual, orthogonal to the model.
-std::vector<CandidateModel> candidate_models(const estimation::BalanceData& data, const estimation::Terms& terms,
+std::vector<CandidateModel> candidate_models(const estimation::RegressionProblem& data, const estimation::Terms& terms,
                                              const Unexplained& left);
 
 // The orders that a drive may have: all up to the policy's highest, and those that pole pairs and slots of its motor
@@ -42,9 +42,10 @@ inline constexpr std::size_t kGridPoints = 6;
 
 // Some record moves in both directions (each a tenth of its samples), or is at rest, or there are several records of
 // each direction. Else differences between directions are confounded with differences between records.
-bool moves_both_ways(const estimation::BalanceData& data);
+bool moves_both_ways(const estimation::RegressionProblem& data);
 // Whether these signals can show an effect that this model may be given.
-bool may_be_seen(const estimation::BalanceData& data, const estimation::Terms& terms, const catalogue::Entry& entry);
+bool may_be_seen(const estimation::RegressionProblem& data, const estimation::Terms& terms,
+                 const catalogue::Entry& entry);
 
 // Whether the model states a linear parameter: a torque that the data need not identify.
 bool states_a_torque(const estimation::Terms& terms);

@@ -16,8 +16,8 @@ namespace {
 
 using effects::Kind;
 using effects::Phase;
-using estimation::BalanceData;
 using estimation::ParameterRef;
+using estimation::RegressionProblem;
 using estimation::Terms;
 
 // Placebo orders: none is within a fifth of a whole number or of a half.
@@ -95,8 +95,8 @@ Eigen::MatrixXd from_model_current(const DirectedData& from, const catalogue::En
   return columns;
 }
 
-// `data` is a copy of that of `from`.
-Eigen::MatrixXd columns_of(const Extension& e, const DirectedData& from, BalanceData& data) {
+Eigen::MatrixXd columns_of(const Extension& e, const DirectedData& from) {
+  const RegressionProblem& data = from.data;
   const std::vector<ParameterRef> parameters = e.parameters();
   if (e.modulates()) {
     const auto on = estimation::terms_on(e.terms, data.balance(), from.prepared.output_signals);
@@ -111,13 +111,10 @@ std::vector<TableBuilder::DirectedColumns> columns_of(const std::vector<Extensio
   constexpr std::size_t kParts = 8;
   std::vector<TableBuilder::DirectedColumns> made(extensions.size());
   estimation::in_parallel(kParts, [&](std::size_t part) {
-    BalanceData sign = builder.sign.data;
-    std::optional<BalanceData> presliding;
-    if (builder.presliding) presliding = builder.presliding->data;
     for (std::size_t i = part; i < extensions.size(); i += kParts) {
-      made[i].sign = columns_of(extensions[i], builder.sign, sign);
-      if (presliding && extensions[i].reads_direction())
-        made[i].presliding = columns_of(extensions[i], *builder.presliding, *presliding);
+      made[i].sign = columns_of(extensions[i], builder.sign);
+      if (builder.presliding && extensions[i].reads_direction())
+        made[i].presliding = columns_of(extensions[i], *builder.presliding);
     }
   });
   return made;
@@ -162,7 +159,7 @@ void add_term(TableBuilder& builder, const Extension& e, TableBuilder::DirectedC
 }
 
 // An effect at each value of its nonlinear parameter, if it has one; nothing where it has several, or no column.
-void append_values(Extension e, BalanceData& data, std::vector<Extension>& all) {
+void append_values(Extension e, const RegressionProblem& data, std::vector<Extension>& all) {
   if (e.parameters().empty()) return;
   if (e.modulates()) return all.push_back(std::move(e));
   estimation::Term& added = e.terms.back();
@@ -180,7 +177,7 @@ void append_values(Extension e, BalanceData& data, std::vector<Extension>& all) 
 }
 
 std::vector<Extension> extensions_of(const TableBuilder& builder, const Motion& motion) {
-  BalanceData& data = builder.sign.data;
+  const RegressionProblem& data = builder.sign.data;
   const model::Drive& drive = builder.sign.prepared.drive;
   const bool collapsed = !builder.sign.prepared.output_signals.torque && data.balance() == Balance::motor;
   std::vector<Extension> all;

@@ -19,7 +19,7 @@ std::string label_of(const CandidateFit& candidate) {
   return candidate.fit.terms.back().label();
 }
 
-data::Axis axis_of(const BalanceData& data) {
+data::Axis axis_of(const RegressionProblem& data) {
   return data.prepared().rotary ? data::Axis::rotary : data::Axis::linear;
 }
 
@@ -39,7 +39,7 @@ std::size_t bins_for(const CandidateFit& candidate, const std::string& variable,
 }
 
 // The plain variable that a torque depends on most: "speed" of "speed x direction".
-std::string variable_of(const BalanceData& data, const Eigen::VectorXd& torque) {
+std::string variable_of(const RegressionProblem& data, const Eigen::VectorXd& torque) {
   const auto shares = comparison::localise(data, torque, 1.0, axis_of(data));
   for (const comparison::Share& share : shares)
     if (share.variable != "record" && share.variable != "direction")
@@ -48,7 +48,7 @@ std::string variable_of(const BalanceData& data, const Eigen::VectorXd& torque) 
 }
 
 ConfoundingReason compare(BalanceSearch& search, const CandidateFit& first, const CandidateFit& second) {
-  BalanceData& data = *search.data;
+  const RegressionProblem& data = *search.data;
   ConfoundingReason reason;
   reason.effect = label_of(second);
   const estimation::ModelProjection by_model(estimation::model_columns(data, search.base.terms),
@@ -67,7 +67,7 @@ ConfoundingReason compare(BalanceSearch& search, const CandidateFit& first, cons
 // Mean of what the model lacks over bins of a variable in which the effect shows most (what resists motion, where that
 // shows more), and the torque of the effect in the same bins.
 std::optional<Evidence> evidence(BalanceSearch& search, const CandidateFit& candidate, data::Axis axis) {
-  BalanceData& data = *search.data;
+  const RegressionProblem& data = *search.data;
   // With one friction for all runs: what is missing may pass for friction that differs.
   const Eigen::VectorXd &weights = search.base.root_weights_fixed_effects(),
                         &lacking = search.base.residual_fixed_effects();
@@ -129,7 +129,7 @@ EffectSize size_of(BalanceSearch& search, const CandidateFit& candidate, const m
 }  // namespace
 
 ConfoundingReason compare_with_model(BalanceSearch& search, const CandidateFit& candidate) {
-  BalanceData& data = *search.data;
+  const RegressionProblem& data = *search.data;
   ConfoundingReason reason;
   reason.effect = candidate.confounded_with;
   const estimation::ModelProjection by_model(estimation::model_columns(data, search.base.terms),

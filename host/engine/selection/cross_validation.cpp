@@ -66,7 +66,7 @@ std::vector<LeftOut> predict_left_out(const RecordFactors& factors, const MixedF
 }
 
 // By the noise of each record; zero where `keep` is.
-Eigen::VectorXd root_weights_of(const BalanceData& data, const Eigen::VectorXd& keep,
+Eigen::VectorXd root_weights_of(const RegressionProblem& data, const Eigen::VectorXd& keep,
                                 const std::vector<double>& variance) {
   Eigen::VectorXd weights(keep.size());
   for (std::size_t i = 0; i < data.records().size(); ++i) {
@@ -95,7 +95,7 @@ struct Regression {
 };
 
 // The residual of `theta`, with each record's predicted random effects.
-Eigen::VectorXd residual_of(const BalanceData& data, const Regression& regression, const Eigen::VectorXd& theta,
+Eigen::VectorXd residual_of(const RegressionProblem& data, const Regression& regression, const Eigen::VectorXd& theta,
                             const MixedFit& mixed) {
   Eigen::VectorXd residual = regression.y - regression.X * theta;
   for (std::size_t i = 0; i < data.records().size(); ++i) {
@@ -110,7 +110,7 @@ Eigen::VectorXd residual_of(const BalanceData& data, const Regression& regressio
 
 // Fits the mixed model with the number of samples that count as one by its residual's autocorrelation. Returns the fit
 // and that number.
-std::pair<MixedFit, double> fit_with_autocorrelation(const BalanceData& data, const Regression& regression,
+std::pair<MixedFit, double> fit_with_autocorrelation(const RegressionProblem& data, const Regression& regression,
                                                      const Eigen::VectorXd& keep, CrossValidatedFit& fit) {
   double tau = data.filter_autocorrelation_time();
   MixedFit mixed;
@@ -154,7 +154,7 @@ double rmse_of(const std::vector<LeftOut>& records) {
   return std::sqrt(squares / std::max(1.0, rows_of(records)));
 }
 
-CrossValidatedFit cross_validate(BalanceData& data, Terms terms, const Eigen::VectorXd& keep) {
+CrossValidatedFit cross_validate(const RegressionProblem& data, Terms terms, const Eigen::VectorXd& keep) {
   CrossValidatedFit fit;
   const auto on_balance = estimation::terms_on(terms, data.balance(), data.prepared().output_signals);
   fit.linear = estimation::free_linear_parameters(terms, on_balance);
@@ -205,7 +205,7 @@ SmallVector std_for(const std::vector<FrictionGroup>& groups, const CrossValidat
 
 }  // namespace
 
-NoiseCovariance noise_covariance(BalanceData& data, const CrossValidatedFit& fit) {
+NoiseCovariance noise_covariance(const RegressionProblem& data, const CrossValidatedFit& fit) {
   if (fit.groups.empty()) return fit.root_weights;
   const auto first_nonlinear = static_cast<Eigen::Index>(fit.linear.size());
   const bool ratio_parameters = std::any_of(fit.groups.begin(), fit.groups.end(),
@@ -218,7 +218,7 @@ NoiseCovariance noise_covariance(BalanceData& data, const CrossValidatedFit& fit
                                       fit.random_effects.std, fit.autocorrelation_time);
 }
 
-double whitened_squares(BalanceData& data, const Terms& terms, const CrossValidatedFit& fit) {
+double whitened_squares(const RegressionProblem& data, const Terms& terms, const CrossValidatedFit& fit) {
   const auto on_balance = estimation::terms_on(terms, data.balance(), data.prepared().output_signals);
   const auto linear = estimation::free_linear_parameters(terms, on_balance);
   const Eigen::VectorXd keep = (fit.root_weights.array() > 0.0).cast<double>();

@@ -4,18 +4,18 @@
 #include <Eigen/Core>
 #include <vector>
 
-#include "host/engine/estimation/balance_data.hpp"
 #include "host/engine/estimation/noise_covariance.hpp"
 #include "host/engine/estimation/random_effects.hpp"
+#include "host/engine/estimation/regression_problem.hpp"
 
 namespace flexspline::selection {
 
-using estimation::BalanceData;
 using estimation::FrictionGroup;
 using estimation::NoiseCovariance;
 using estimation::ParameterRef;
 using estimation::RandomEffects;
 using estimation::RecordErrors;
+using estimation::RegressionProblem;
 using estimation::RowRange;
 using estimation::SmallVector;
 using estimation::Terms;
@@ -74,13 +74,13 @@ struct CrossValidatedFit {
 
 // Fits `terms` on `data` and cross-validates them by fifths of each record. `keep` holds one a sample, or zero for
 // samples that must not count.
-CrossValidatedFit cross_validate(BalanceData& data, Terms terms, const Eigen::VectorXd& keep);
+CrossValidatedFit cross_validate(const RegressionProblem& data, Terms terms, const Eigen::VectorXd& keep);
 
 // Covariance of the errors of a fit, random effects among them.
-NoiseCovariance noise_covariance(BalanceData& data, const CrossValidatedFit& fit);
+NoiseCovariance noise_covariance(const RegressionProblem& data, const CrossValidatedFit& fit);
 // Whitened squares that `terms` leave after their best linear fit, with noise and random effects as `fit` has them:
 // enough to choose a nonlinear parameter on a grid.
-double whitened_squares(BalanceData& data, const Terms& terms, const CrossValidatedFit& fit);
+double whitened_squares(const RegressionProblem& data, const Terms& terms, const CrossValidatedFit& fit);
 
 struct LikelihoodGain {
   // Twice the log likelihood ratio of left-out samples over the autocorrelation time, less k ln(n_eff).

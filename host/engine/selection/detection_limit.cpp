@@ -27,7 +27,7 @@ std::vector<double> usual_values(const catalogue::Entry& entry) {
 
 // Nonlinear parameters as usual, on the nearest point of the search's grid; a candidate that is named keeps those it
 // was found with.
-void set_usual_nonlinear(const BalanceData& data, const CandidateFit& candidate, Term& term) {
+void set_usual_nonlinear(const RegressionProblem& data, const CandidateFit& candidate, Term& term) {
   if (passes(candidate)) return;
   const std::vector<double> usual = usual_values(*term.entry);
   for (std::size_t p = 0; p < term.values.size(); ++p) {
@@ -69,7 +69,7 @@ bool is_wave(const catalogue::Entry& entry) {
 
 }  // namespace
 
-DetectionLimit::DetectionLimit(BalanceSearch& search)
+DetectionLimit::DetectionLimit(const BalanceSearch& search)
     : search_(&search),
       projection_(estimation::model_columns(*search.data, search.base.terms), search.base.root_weights),
       base_torque_(estimation::model_torque(*search.data, search.base.terms)) {}
@@ -108,8 +108,7 @@ std::optional<double> DetectionLimit::scale_to_name(const CandidateFit& candidat
   return high;
 }
 
-std::optional<Detectable> DetectionLimit::of_linear(const CandidateFit& candidate, estimation::Terms terms,
-                                                    BalanceData& data) const {
+std::optional<Detectable> DetectionLimit::of_linear(const CandidateFit& candidate, estimation::Terms terms) const {
   Term& term = terms.back();
   const std::vector<double> usual = usual_values(*term.entry);
   Eigen::VectorXd torque = Eigen::VectorXd::Zero(search_->data->rows());
@@ -117,7 +116,7 @@ std::optional<Detectable> DetectionLimit::of_linear(const CandidateFit& candidat
   for (std::size_t p = 0; p < term.values.size(); ++p) {
     if (!term.free_linear(p) || usual[p] == 0.0) continue;
     first = std::min(first, p);
-    torque += usual[p] * data.column(terms, {terms.size() - 1, p});
+    torque += usual[p] * search_->data->column(terms, {terms.size() - 1, p});
   }
   const auto scale = first < term.values.size() ? scale_to_name(candidate, torque) : std::nullopt;
   if (!scale) return std::nullopt;
@@ -128,8 +127,7 @@ std::optional<Detectable> DetectionLimit::of_linear(const CandidateFit& candidat
                     nonlinear_values_of(*search_, term, first)};
 }
 
-std::optional<Detectable> DetectionLimit::of_wave(const CandidateFit& candidate, estimation::Terms terms,
-                                                  BalanceData& data) const {
+std::optional<Detectable> DetectionLimit::of_wave(const CandidateFit& candidate, estimation::Terms terms) const {
   Term& term = terms.back();
   const std::size_t cosine = term.entry->index_of("cosine"), sine = term.entry->index_of("sine");
   const double usual = std::hypot(usual_values(*term.entry)[cosine], usual_values(*term.entry)[sine]);
@@ -140,7 +138,7 @@ std::optional<Detectable> DetectionLimit::of_wave(const CandidateFit& candidate,
   for (int i = 0; i < 2; ++i) {
     term.values[cosine] = i == 0 ? usual : 0.0;
     term.values[sine] = i == 0 ? 0.0 : usual;
-    parts[i] = estimation::model_torque(data, terms) - base_torque_;
+    parts[i] = estimation::model_torque(*search_->data, terms) - base_torque_;
   }
   for (int i = 0; i < kPhases; ++i) {
     const double phase = std::numbers::pi * i / kPhases;
@@ -154,15 +152,14 @@ std::optional<Detectable> DetectionLimit::of_wave(const CandidateFit& candidate,
 }
 
 // A size that the torque is not proportional to: the first value, from where the effect vanishes, that would be named.
-std::optional<Detectable> DetectionLimit::of_nonlinear(const CandidateFit& candidate, estimation::Terms terms,
-                                                       BalanceData& data) const {
+std::optional<Detectable> DetectionLimit::of_nonlinear(const CandidateFit& candidate, estimation::Terms terms) const {
   Term& term = terms.back();
   std::size_t size = 0;
   while (size < term.values.size() && !term.free_nonlinear(size)) ++size;
   if (size == term.values.size()) return std::nullopt;
   const auto torque_at = [&](double value) -> Eigen::VectorXd {
     term.values[size] = value;
-    return estimation::model_torque(data, terms) - base_torque_;
+    return estimation::model_torque(*search_->data, terms) - base_torque_;
   };
   const auto& info = term.entry->parameters[size];
   if (info.low < 0.0 && info.per.empty()) {
@@ -194,15 +191,15 @@ std::optional<Detectable> DetectionLimit::of_nonlinear(const CandidateFit& candi
   return Detectable{estimate(*search_, term, size, value), decreases, nonlinear_values_of(*search_, term, size)};
 }
 
-std::optional<Detectable> DetectionLimit::smallest(const CandidateFit& candidate, BalanceData& data) const {
+std::optional<Detectable> DetectionLimit::smallest(const CandidateFit& candidate) const {
   estimation::Terms terms = candidate.fit.terms;
   Term& term = terms.back();
   set_usual_nonlinear(*search_->data, candidate, term);
-  if (is_wave(*term.entry)) return of_wave(candidate, std::move(terms), data);
+  if (is_wave(*term.entry)) return of_wave(candidate, std::move(terms));
   // An effect that replaces another one has the size of that one.
   if (term.entry->count(Kind::linear) > 0 && term.entry->info->replaces.empty())
-    return of_linear(candidate, std::move(terms), data);
-  return of_nonlinear(candidate, std::move(terms), data);
+    return of_linear(candidate, std::move(terms));
+  return of_nonlinear(candidate, std::move(terms));
 }
 
 }  // namespace flexspline::selection

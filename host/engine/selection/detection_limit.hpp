@@ -13,21 +13,20 @@ namespace flexspline::selection {
 // lacks the effect leaves, in addition to the noise, the orthogonal part of the effect's torque.
 class DetectionLimit {
  public:
-  explicit DetectionLimit(BalanceSearch& search);
+  explicit DetectionLimit(const BalanceSearch& search);
 
   // Nothing where the effect has no single size, or none within its bounds would be named. Columns are made in `data`,
   // a copy of the search's: each thread has its own.
-  std::optional<Detectable> smallest(const CandidateFit& candidate, BalanceData& data) const;
+  std::optional<Detectable> smallest(const CandidateFit& candidate) const;
 
  private:
   bool named(const CandidateFit& candidate, const Eigen::VectorXd& own, double scale) const;
   std::optional<double> scale_to_name(const CandidateFit& candidate, const Eigen::VectorXd& torque) const;
-  std::optional<Detectable> of_linear(const CandidateFit& candidate, estimation::Terms terms, BalanceData& data) const;
-  std::optional<Detectable> of_wave(const CandidateFit& candidate, estimation::Terms terms, BalanceData& data) const;
-  std::optional<Detectable> of_nonlinear(const CandidateFit& candidate, estimation::Terms terms,
-                                         BalanceData& data) const;
+  std::optional<Detectable> of_linear(const CandidateFit& candidate, estimation::Terms terms) const;
+  std::optional<Detectable> of_wave(const CandidateFit& candidate, estimation::Terms terms) const;
+  std::optional<Detectable> of_nonlinear(const CandidateFit& candidate, estimation::Terms terms) const;
 
-  BalanceSearch* search_;
+  const BalanceSearch* search_;
   estimation::ModelProjection projection_;
   Eigen::VectorXd base_torque_;
 };

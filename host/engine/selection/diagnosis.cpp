@@ -73,7 +73,7 @@ Candidate candidate_of(const CandidateFit& candidate, const BalanceSearch& searc
   return c;
 }
 
-std::vector<LocalisedResidual> shares(const BalanceData& data, const CrossValidatedFit& fit,
+std::vector<LocalisedResidual> shares(const RegressionProblem& data, const CrossValidatedFit& fit,
                                       const Eigen::VectorXd& residual, double least = kPolicy.shown_share_percent) {
   std::vector<LocalisedResidual> list;
   const data::Axis axis = data.prepared().rotary ? data::Axis::rotary : data::Axis::linear;
@@ -85,7 +85,7 @@ std::vector<LocalisedResidual> shares(const BalanceData& data, const CrossValida
 // The nonlinear parameters were fitted with the same friction in all records. Where friction differs, they are searched
 // again with random effects; else a candidate could be named only because its search was better.
 void refine_base_nonlinear(BalanceSearch& search) {
-  BalanceData& data = *search.data;
+  const RegressionProblem& data = *search.data;
   if (search.base.groups.empty() || search.base.random_effects.std.maxCoeff() <= 0.0) return;
   estimation::Terms terms = search.base.terms;
   const auto on_balance = estimation::terms_on(terms, data.balance(), data.prepared().output_signals);
@@ -109,7 +109,7 @@ std::vector<SearchedBalance> search_balances(estimation::Identification& base, c
                                              const Options& options, Diagnosis& result) {
   const std::vector<const data::Experiment*> experiments = of_role(dataset, data::Role::fit);
   std::vector<SearchedBalance> all;
-  for (BalanceData& data : base.data) {
+  for (const RegressionProblem& data : base.data) {
     if (options.progress)
       options.progress(fmt::format("trying effects ({} of {} balances)", all.size() + 1, base.data.size()));
     SearchedBalance one;
@@ -150,7 +150,7 @@ std::vector<SearchedBalance> search_balances(estimation::Identification& base, c
 // that is hardly above its noise shows errors of the encoders before anything else, so that its balance comes last.
 SearchedBalance& most_significant(std::vector<SearchedBalance>& all, const std::optional<Resampling>& by_resampling) {
   const auto importance = [&](const SearchedBalance& e) {
-    const BalanceData& data = *e.search.data;
+    const RegressionProblem& data = *e.search.data;
     const bool is_noisy =
         data.balance() == estimation::Balance::transmission && data.prepared().pipeline.keep_torsion_reversals;
     const bool is_motor = data.balance() == estimation::Balance::motor;
@@ -166,7 +166,7 @@ SearchedBalance& most_significant(std::vector<SearchedBalance>& all, const std::
 // Error and noise of the records whose noise is known, where that of all is not.
 std::optional<NoiseOfSome> noise_of_some(const SearchedBalance& balance) {
   if (balance.floor.rmse) return std::nullopt;
-  const BalanceData& data = *balance.search.data;
+  const RegressionProblem& data = *balance.search.data;
   const Eigen::VectorXd residual = balance.search.base.residual_fixed_effects();
   NoiseOfSome some;
   std::vector<comparison::NoiseFloor> known;
@@ -192,7 +192,7 @@ std::optional<NoiseOfSome> noise_of_some(const SearchedBalance& balance) {
 
 // The errors of the model without what is named, and the noise.
 void describe_base(const SearchedBalance& chosen, Diagnosis& result) {
-  const BalanceData& data = *chosen.search.data;
+  const RegressionProblem& data = *chosen.search.data;
   const CrossValidatedFit& fit = chosen.search.base;
   result.balance = data.balance();
   result.base_rmse = fit.rmse_fixed_effects();
@@ -220,10 +220,8 @@ void list_candidates(std::vector<SearchedBalance>& all, data::Axis axis, Diagnos
   for (SearchedBalance& e : all) {
     const DetectionLimit detection(e.search);
     std::vector<std::optional<Detectable>> smallest(e.candidates.size());
-    estimation::in_parallel(e.candidates.size(), [&](std::size_t i) {
-      BalanceData data = *e.search.data;
-      smallest[i] = detection.smallest(e.candidates[i], data);
-    });
+    estimation::in_parallel(e.candidates.size(),
+                            [&](std::size_t i) { smallest[i] = detection.smallest(e.candidates[i]); });
     for (std::size_t i = 0; i < e.candidates.size(); ++i) {
       const CandidateFit& t = e.candidates[i];
       result.candidates.push_back(candidate_of(t, e.search, axis));

@@ -12,8 +12,8 @@
 namespace flexspline::selection {
 namespace {
 
-using estimation::BalanceData;
 using estimation::Record;
+using estimation::RegressionProblem;
 using estimation::RowRange;
 
 double median(std::vector<double> x) {
@@ -81,8 +81,8 @@ std::vector<std::uint8_t> recurs(const Record& r, const std::vector<std::size_t>
 
 // For each sample, the largest share of marked samples among its neighbours in a signal that an effect may depend on:
 // velocity, time since a reversal, angle, torsion.
-std::vector<double> share_among_like(const BalanceData& data, const Record& r, const std::vector<std::size_t>& samples,
-                                     const std::vector<std::uint8_t>& marked) {
+std::vector<double> share_among_like(const RegressionProblem& data, const Record& r,
+                                     const std::vector<std::size_t>& samples, const std::vector<std::uint8_t>& marked) {
   const std::size_t n = samples.size();
   std::array<std::vector<double>, 4> signals;
   for (auto& signal : signals) signal.resize(n);
@@ -116,7 +116,7 @@ struct Outliers {
 };
 
 // Nothing where no sample stands out, or too many do.
-std::optional<Outliers> outliers(const BalanceData& data, const Eigen::VectorXd& residual, const RowRange& range,
+std::optional<Outliers> outliers(const RegressionProblem& data, const Eigen::VectorXd& residual, const RowRange& range,
                                  const std::vector<std::size_t>& samples) {
   const Record& r = data.prepared().records[range.record];
   const std::size_t n = samples.size();
@@ -137,14 +137,14 @@ std::optional<Outliers> outliers(const BalanceData& data, const Eigen::VectorXd&
 }
 
 // Whether the direction changes from one sample of a record to another.
-bool reverses(const BalanceData& data, const Record& r, std::size_t first, std::size_t last) {
+bool reverses(const RegressionProblem& data, const Record& r, std::size_t first, std::size_t last) {
   for (std::size_t k = first + 1; k <= last; ++k)
     if (r.direction_variable(data.balance(), k) * r.direction_variable(data.balance(), k - 1) <= 0.0) return true;
   return false;
 }
 
 // Lists the bursts of a record that are disturbances, and leaves out their samples.
-void list_bursts(const BalanceData& data, const Record& r, const Outliers& rows,
+void list_bursts(const RegressionProblem& data, const Record& r, const Outliers& rows,
                  const std::vector<std::size_t>& samples, Eigen::Ref<Eigen::VectorXd> keep,
                  std::vector<Disturbance>& found) {
   const std::size_t n = samples.size(), reach = rows.reach;
@@ -182,7 +182,7 @@ void list_bursts(const BalanceData& data, const Record& r, const Outliers& rows,
 
 }  // namespace
 
-std::vector<Disturbance> find_disturbances(const BalanceData& data, const Eigen::VectorXd& residual,
+std::vector<Disturbance> find_disturbances(const RegressionProblem& data, const Eigen::VectorXd& residual,
                                            Eigen::VectorXd& keep) {
   constexpr std::size_t kFewestRows = 200;
   std::vector<Disturbance> found;

@@ -5,7 +5,7 @@
 #include <Eigen/Core>
 #include <vector>
 
-#include "host/engine/estimation/balance_data.hpp"
+#include "host/engine/estimation/regression_problem.hpp"
 #include "host/engine/selection/diagnosis.hpp"
 
 namespace flexspline::selection {
@@ -14,7 +14,7 @@ namespace flexspline::selection {
 // same time after a reversal at other places without such a residual. An effect of the drive shows wherever its signals
 // come back; a disturbance does not. Returns the intervals in time; `keep` gets zeros at their samples and at their
 // filter's reach around them.
-std::vector<Disturbance> find_disturbances(const estimation::BalanceData& data, const Eigen::VectorXd& residual,
+std::vector<Disturbance> find_disturbances(const estimation::RegressionProblem& data, const Eigen::VectorXd& residual,
                                            Eigen::VectorXd& keep);
 
 }  // namespace flexspline::selection

@@ -20,19 +20,26 @@ std::vector<Eigen::Index> components(const FrictionRandomEffects& differences) {
 
 }  // namespace
 
+std::vector<Eigen::Index> columns_that_differ(const FrictionRandomEffects& differences) {
+  std::vector<Eigen::Index> columns;
+  for (const Eigen::Index g : components(differences))
+    columns.push_back(differences.columns[static_cast<std::size_t>(g)]);
+  return columns;
+}
+
+Eigen::MatrixXd eliminated_factor(const Eigen::MatrixXd& along, const FrictionRandomEffects& differences) {
+  const std::vector<Eigen::Index> vary = components(differences), columns = columns_that_differ(differences);
+  Eigen::MatrixXd inner = along(columns, Eigen::all);
+  for (Eigen::Index i = 0; i < inner.rows(); ++i)
+    inner(i, i) += differences.noise / differences.variance[vary[static_cast<std::size_t>(i)]];
+  return inner.llt().matrixL().solve(along.transpose()).transpose();
+}
+
 void eliminate_friction_effects(Eigen::MatrixXd& products, const FrictionRandomEffects& differences) {
-  const auto& [columns, variance, noise] = differences;
-  const std::vector<Eigen::Index> vary = components(differences);
-  if (vary.empty()) return;
-  const auto k = static_cast<Eigen::Index>(vary.size());
-  Eigen::MatrixXd along(products.rows(), k), inner(k, k);
-  for (Eigen::Index i = 0; i < k; ++i)
-    along.col(i) = products.col(columns[static_cast<std::size_t>(vary[static_cast<std::size_t>(i)])]);
-  for (Eigen::Index i = 0; i < k; ++i)
-    for (Eigen::Index j = 0; j < k; ++j)
-      inner(i, j) = along(columns[static_cast<std::size_t>(vary[static_cast<std::size_t>(i)])], j);
-  for (Eigen::Index i = 0; i < k; ++i) inner(i, i) += noise / variance[vary[static_cast<std::size_t>(i)]];
-  products.noalias() -= along * algebra::solve_positive(inner, along.transpose());
+  const std::vector<Eigen::Index> columns = columns_that_differ(differences);
+  if (columns.empty()) return;
+  const Eigen::MatrixXd factor = eliminated_factor(products(Eigen::all, columns), differences);
+  products.noalias() -= factor * factor.transpose();
 }
 
 Eigen::VectorXd friction_effects_of(const RegressorTable& table, const Setting& setting, Direction direction,

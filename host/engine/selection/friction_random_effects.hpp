@@ -19,6 +19,11 @@ struct FrictionRandomEffects {
 // Eliminates them from a record's cross products (Schur complement): what is left are the products of generalised least
 // squares with the differences' covariance.
 void eliminate_friction_effects(Eigen::MatrixXd& products, const FrictionRandomEffects& differences);
+// Columns that differ between records at all.
+std::vector<Eigen::Index> columns_that_differ(const FrictionRandomEffects& differences);
+// The factor L of what elimination takes off a record's products, L L', from the products with the columns that differ
+// (`along`, one column each): the products of all other columns are not needed for it.
+Eigen::MatrixXd eliminated_factor(const Eigen::MatrixXd& along, const FrictionRandomEffects& differences);
 
 // Variance components by record of the model's friction; columns scaled as the table has them. What all records have in
 // common is no difference: the columns of the differences are fixed effects as well as random ones, so that an

@@ -17,9 +17,9 @@
 namespace flexspline::selection {
 namespace {
 
-using estimation::BalanceData;
 using estimation::Estimate;
 using estimation::Record;
+using estimation::RegressionProblem;
 
 // An effect that scales a friction of the model, and how the records' friction goes with it.
 struct Scaling {
@@ -34,20 +34,20 @@ bool is_scaling(const catalogue::Entry& entry) {
 }
 
 // What a unit of the effect's parameter adds to first order, about zero, with the friction of the base fit.
-Eigen::VectorXd slope_of(BalanceData& data, const estimation::Terms& base, const CandidateFit& candidate) {
+Eigen::VectorXd slope_of(const RegressionProblem& data, const estimation::Terms& base, const CandidateFit& candidate) {
   estimation::Terms terms = candidate.model.terms;
   terms.back().values[0] = 0.0;
   for (estimation::Term& term : terms)
     for (const estimation::Term& fitted : base)
       if (term.id == fitted.id) term.values = fitted.values;
   const auto on_balance = estimation::terms_on(terms, data.balance(), data.prepared().output_signals);
-  return data.nonlinear_column(terms, on_balance, {terms.size() - 1, 0});
+  return data.nonlinear_columns(terms, on_balance, {{terms.size() - 1, 0}});
 }
 
 std::vector<Scaling> scalings(const estimation::Identification& base, const SearchedBalance& motor,
                               const RecordFriction& own) {
   std::vector<Scaling> all;
-  BalanceData data = *motor.search.data;
+  const RegressionProblem& data = *motor.search.data;
   for (const CandidateFit& candidate : motor.candidates) {
     const catalogue::Entry& entry = *candidate.model.entry;
     if (!is_scaling(entry)) continue;
@@ -107,7 +107,7 @@ void take_value(const Scaling& one, std::size_t records, double p_value, Candida
 }
 
 // Share of the variance of the temperature that is within records.
-double share_within_records(const BalanceData& data) {
+double share_within_records(const RegressionProblem& data) {
   double within = 0.0, sum = 0.0, squares = 0.0, count = 0.0;
   for (const estimation::RowRange& range : data.records()) {
     const Record& r = data.prepared().records[range.record];

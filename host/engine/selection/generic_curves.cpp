@@ -101,7 +101,7 @@ Eigen::VectorXd lag_of(const Eigen::VectorXd& column, const std::vector<Run>& ru
 
 // Friction that falls after each reversal.
 Eigen::VectorXd since_reversal(const DirectedData& directed, double time_constant_s) {
-  const estimation::BalanceData& data = directed.data;
+  const estimation::RegressionProblem& data = directed.data;
   Eigen::VectorXd column(data.rows());
   for (const estimation::RowRange& range : data.records()) {
     const estimation::Record& r = directed.prepared.records[range.record];

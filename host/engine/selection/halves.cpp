@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <numeric>
+#include <optional>
 
 namespace flexspline::selection {
 
@@ -58,34 +59,100 @@ HalfData sum_of(const Setting& setting, const std::vector<double>& weights, cons
   return all;
 }
 
+namespace {
+
+// By record, the products of the samples that are taken with the columns that differ between records: of each column,
+// the products with all columns in one column for each choice of blocks, and in the last one those of all blocks.
+using ProductsAlong = std::vector<std::vector<Eigen::MatrixXd>>;
+ProductsAlong products_along(const Setting& setting, const Eigen::MatrixXd& choices,
+                             const std::vector<Eigen::Index>& columns) {
+  const Eigen::Index width = setting.rows.cols();
+  ProductsAlong along;
+  for (const BlockRange& blocks : blocks_by_record(setting)) {
+    const auto first = static_cast<Eigen::Index>(blocks.first), count = static_cast<Eigen::Index>(blocks.last) - first;
+    along.emplace_back();
+    for (const Eigen::Index column : columns)
+      along.back().push_back(setting.products.block(column * width, first, width, count) *
+                             choices.middleRows(first, count));
+  }
+  return along;
+}
+
+// The products of half the data: what is taken, or what is left of all. Friction that differs is eliminated from each
+// record alone, by a matrix of low rank.
+class HalfProducts {
+ public:
+  HalfProducts(const Setting& setting, const Eigen::MatrixXd& choices, const FrictionRandomEffects& differences,
+               Direction direction)
+      : setting_(setting), differences_(differences), direction_(direction), places_(places(setting, direction)) {
+    std::vector<Eigen::Index> columns;
+    for (const Eigen::Index place : columns_that_differ(differences))
+      columns.push_back(places_[static_cast<std::size_t>(place)]);
+    if (!columns.empty()) along_ = products_along(setting, choices, columns);
+  }
+
+  // `sums`: products of all columns by choice of blocks, in the last column those of all blocks.
+  Eigen::MatrixXd of(const Eigen::MatrixXd& sums, Eigen::Index choice, bool taken) const {
+    const auto half = [&](const Eigen::MatrixXd& by_choice) -> Eigen::VectorXd {
+      if (taken) return by_choice.col(choice);
+      return by_choice.rightCols<1>() - by_choice.col(choice);
+    };
+    Eigen::MatrixXd products = products_of(setting_, half(sums), direction_);
+    if (along_.empty()) return products;
+    const auto many = static_cast<Eigen::Index>(along_.front().size());
+    Eigen::MatrixXd factors(products.rows(), many * std::ssize(along_));
+    for (std::size_t record = 0; record < along_.size(); ++record) {
+      Eigen::MatrixXd along(products.rows(), many);
+      for (Eigen::Index j = 0; j < many; ++j) along.col(j) = half(along_[record][static_cast<std::size_t>(j)])(places_);
+      factors.middleCols(static_cast<Eigen::Index>(record) * many, many) = eliminated_factor(along, differences_);
+    }
+    products.noalias() -= factors * factors.transpose();
+    return products;
+  }
+
+ private:
+  static std::vector<Eigen::Index> places(const Setting& setting, Direction direction) {
+    if (direction == Direction::presliding) return setting.presliding;
+    std::vector<Eigen::Index> all(static_cast<std::size_t>(setting.sign_width));
+    std::iota(all.begin(), all.end(), Eigen::Index{0});
+    return all;
+  }
+
+  const Setting& setting_;
+  const FrictionRandomEffects& differences_;
+  Direction direction_;
+  std::vector<Eigen::Index> places_;  // columns of the setting, by place of the direction
+  ProductsAlong along_;
+};
+
+}  // namespace
+
 std::vector<HalfPair> halves_of(const Setting& setting, const std::vector<double>& weights,
                                 std::span<const std::vector<std::uint8_t>> in,
                                 const FrictionRandomEffects& differences) {
-  Eigen::MatrixXd choices(std::ssize(setting.blocks), std::ssize(in));
-  for (std::size_t i = 0; i < in.size(); ++i)
-    for (std::size_t b = 0; b < in[i].size(); ++b)
-      choices(static_cast<Eigen::Index>(b), static_cast<Eigen::Index>(i)) = in[i][b];
-  std::vector<HalfPair> pairs(in.size());
-  const auto add = [&](const Eigen::VectorXd& products, HalfData& half) {
-    add_products(products_of(setting, products, Direction::sign), differences, half.sign);
-    if (setting.presliding.empty()) return;
-    add_products(products_of(setting, products, Direction::presliding), differences, half.presliding);
-  };
-  // Friction that differs is eliminated from each record alone, so that records are added one after the other.
-  for (const BlockRange& blocks : blocks_by_record(setting)) {
-    const auto first = static_cast<Eigen::Index>(blocks.first), count = static_cast<Eigen::Index>(blocks.last) - first;
-    const double weight = weights[blocks.record];
-    const Eigen::VectorXd whole = weight * setting.products.middleCols(first, count).rowwise().sum();
-    const Eigen::MatrixXd taken =
-        setting.products.middleCols(first, count) * (weight * choices.middleRows(first, count));
-    for (std::size_t i = 0; i < pairs.size(); ++i) {
-      add(taken.col(static_cast<Eigen::Index>(i)), pairs[i][0]);
-      add(whole - taken.col(static_cast<Eigen::Index>(i)), pairs[i][1]);
-    }
+  const auto pairs_count = std::ssize(in);
+  Eigen::MatrixXd choices(std::ssize(setting.blocks), pairs_count + 1);
+  for (std::size_t b = 0; b < setting.blocks.size(); ++b) {
+    const double weight = weights[setting.blocks[b].record];
+    const auto row = static_cast<Eigen::Index>(b);
+    for (std::size_t i = 0; i < in.size(); ++i)
+      choices(row, static_cast<Eigen::Index>(i)) = in[i][b] != 0 ? weight : 0.0;
+    choices(row, pairs_count) = weight;
   }
-  for (std::size_t i = 0; i < pairs.size(); ++i)
+  const Eigen::MatrixXd sums = setting.products * choices;
+  const HalfProducts sign(setting, choices, differences, Direction::sign);
+  std::optional<HalfProducts> presliding;
+  if (!setting.presliding.empty()) presliding.emplace(setting, choices, differences, Direction::presliding);
+  std::vector<HalfPair> pairs(in.size());
+  for (std::size_t i = 0; i < pairs.size(); ++i) {
+    for (const bool taken : {true, false}) {
+      HalfData& half = pairs[i][taken ? 0 : 1];
+      half.sign = sign.of(sums, static_cast<Eigen::Index>(i), taken);
+      if (presliding) half.presliding = presliding->of(sums, static_cast<Eigen::Index>(i), taken);
+    }
     for (std::size_t b = 0; b < setting.blocks.size(); ++b)
       pairs[i][in[i][b] != 0 ? 0 : 1].rows += setting.blocks[b].rows;
+  }
   return pairs;
 }
 

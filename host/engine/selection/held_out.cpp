@@ -16,13 +16,13 @@ HeldOut::HeldOut(const data::Dataset& dataset, const estimation::Identification&
   if (experiments.empty()) return;
   prepared = estimation::prepare_with(experiments, fitted.model.drive, fitted.prepared.pipeline, ready);
   prepared.output_signals = fitted.prepared.output_signals;
-  data = std::make_unique<BalanceData>(prepared, balance);
+  data = std::make_unique<RegressionProblem>(prepared, balance);
   if (data->empty()) data.reset();
 }
 
 double HeldOut::rmse(const Terms& terms) const {
   estimation::PreparedData own;
-  std::optional<BalanceData> with_load;
+  std::optional<RegressionProblem> with_load;
   if (!prepared.output_signals.torque) {
     own = prepared;
     if (estimation::take_torque_where_read(own, terms)) with_load.emplace(own, data->balance());

@@ -13,7 +13,7 @@ namespace flexspline::selection {
 struct HeldOut {
   std::vector<const data::Experiment*> experiments;
   estimation::PreparedData prepared;
-  std::unique_ptr<BalanceData> data;  // null where no experiment is held out or none shows the balance
+  std::unique_ptr<RegressionProblem> data;  // null where no experiment is held out or none shows the balance
 
   // `ready`: signals of these experiments that are prepared already, or null.
   HeldOut(const data::Dataset& dataset, const estimation::Identification& fitted, estimation::Balance balance,

@@ -78,7 +78,7 @@ bool only_scales(const BalanceSearch& other, const catalogue::Entry& entry) {
 
 // Twice the log of the Jacobian of a left side from which the added effect takes a share of itself: else a smaller left
 // side would count as a smaller error.
-double jacobian_of(BalanceData& data, const Terms& terms, std::size_t added, double rows, double tau) {
+double jacobian_of(const RegressionProblem& data, const Terms& terms, std::size_t added, double rows, double tau) {
   constexpr unsigned kScale = effects::kTorqueScale | effects::kTorque;
   if ((terms[added].entry->info->reads & kScale) != kScale) return 0.0;
   const Eigen::VectorXd& target = data.target();
@@ -90,7 +90,7 @@ double jacobian_of(BalanceData& data, const Terms& terms, std::size_t added, dou
 // change on its own balance.
 double score_on(BalanceSearch& other, CandidateFit& candidate, const Identified& identified) {
   if (only_scales(other, *candidate.model.entry)) return 0.0;
-  BalanceData data = *other.data;
+  const RegressionProblem& data = *other.data;
   Terms terms = as_seen_by(other, candidate);
   const std::size_t added = terms.size() - 1;
   const double tau = std::max(1.0, other.base.autocorrelation_time);

@@ -5,17 +5,17 @@
 #include <cmath>
 
 #include "host/common/algebra/decompositions.hpp"
-#include "host/engine/estimation/balance_data.hpp"
 #include "host/engine/estimation/in_parallel.hpp"
+#include "host/engine/estimation/regression_problem.hpp"
 #include "host/engine/estimation/strokes.hpp"
 #include "host/engine/selection/bandwidth.hpp"
 
 namespace flexspline::selection {
 
 using estimation::Balance;
-using estimation::BalanceData;
 using estimation::PreparedData;
 using estimation::Record;
+using estimation::RegressionProblem;
 using estimation::Terms;
 
 std::vector<double> presliding_state(const Record& record, double travel) {
@@ -70,7 +70,7 @@ std::vector<double> squares_by_travel(const PreparedData& original, const Terms&
   estimation::in_parallel(travels.size(), [&](std::size_t i) {
     PreparedData prepared = original;
     for (Record& r : prepared.records) r.inputs.directions[0] = presliding_state(r, travels[i]);
-    BalanceData data(prepared, Balance::motor);
+    RegressionProblem data(prepared, Balance::motor);
     const auto on_balance = estimation::terms_on(terms, Balance::motor, prepared.output_signals);
     const Eigen::MatrixXd X = data.columns(terms, estimation::free_linear_parameters(terms, on_balance));
     const Eigen::VectorXd y = data.target() - data.known_torque(terms, on_balance);

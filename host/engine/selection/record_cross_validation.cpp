@@ -18,7 +18,7 @@ constexpr std::size_t kMostFolds = 6;
 constexpr double kSameSquares = 1e-4;
 
 // A model fitted on the samples in `keep`; nonlinear parameters start at the values from all records.
-CrossValidatedFit fit_without(BalanceData& data, const Terms& terms, const Eigen::VectorXd& keep) {
+CrossValidatedFit fit_without(const RegressionProblem& data, const Terms& terms, const Eigen::VectorXd& keep) {
   CrossValidatedFit fit = cross_validate(data, terms, keep);
   const auto on_balance = estimation::terms_on(fit.terms, data.balance(), data.prepared().output_signals);
   if (estimation::free_nonlinear_parameters(fit.terms, on_balance).empty()) return fit;
@@ -29,7 +29,8 @@ CrossValidatedFit fit_without(BalanceData& data, const Terms& terms, const Eigen
 
 // Squares that a fit leaves in a record that it has not seen, the record's own random effects predicted from its
 // samples.
-double squares_of(BalanceData& data, const CrossValidatedFit& fit, const RowRange& range, double noise_variance) {
+double squares_of(const RegressionProblem& data, const CrossValidatedFit& fit, const RowRange& range,
+                  double noise_variance) {
   const Eigen::VectorXd e = fit.residual.segment(range.first, range.size());
   if (fit.groups.empty() || fit.random_effects.std.maxCoeff() <= 0.0) return e.squaredNorm();
   const Eigen::MatrixXd X = estimation::model_columns(data, fit.terms).middleRows(range.first, range.size());
@@ -78,10 +79,8 @@ RecordCrossValidation cross_validate_by_record(const BalanceSearch& search, cons
   const std::size_t folds = std::min(kMostFolds, ranges.size());
   // Twice the log-likelihood ratio of each record; zero where it does not count.
   std::vector<double> gains(ranges.size(), 0.0);
-  estimation::PreparedData few;
-  const BalanceData decimated = search.data->decimated(few);
+  const RegressionProblem data = search.data->decimated();
   estimation::in_parallel(folds, [&](std::size_t fold) {
-    BalanceData data = decimated;
     Eigen::VectorXd keep = search.keep;
     for (std::size_t i = fold; i < ranges.size(); i += folds) keep.segment(ranges[i].first, ranges[i].size()).setZero();
     if (keep.maxCoeff() <= 0.0) return;

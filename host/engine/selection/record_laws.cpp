@@ -16,8 +16,8 @@
 namespace flexspline::selection {
 namespace {
 
-using estimation::BalanceData;
 using estimation::Estimate;
+using estimation::RegressionProblem;
 using estimation::RowRange;
 using estimation::Term;
 
@@ -31,7 +31,7 @@ std::pair<double, double> value_in(const Estimate& parameter, const std::string&
 
 }  // namespace
 
-AsFriction as_friction(BalanceData& data, const estimation::Terms& base, const RecordFriction& own,
+AsFriction as_friction(const RegressionProblem& data, const estimation::Terms& base, const RecordFriction& own,
                        const Eigen::VectorXd& torque, const Eigen::VectorXd& root_weights) {
   std::vector<estimation::ParameterRef> refs;
   for (const Estimate* e : own.parameters) refs.push_back(e->ref);
@@ -51,7 +51,8 @@ AsFriction as_friction(BalanceData& data, const estimation::Terms& base, const R
   return result;
 }
 
-RecordFriction friction_by_record(const estimation::Identification& base, const BalanceData& data, std::size_t fewest) {
+RecordFriction friction_by_record(const estimation::Identification& base, const RegressionProblem& data,
+                                  std::size_t fewest) {
   const auto identified = [&](const Estimate& e) {
     return static_cast<std::size_t>(
         std::count_if(data.records().begin(), data.records().end(), [&](const RowRange& range) {
@@ -107,7 +108,7 @@ std::vector<Part> ranges_of_speed(const RecordFriction& own, const std::vector<d
 }
 
 std::vector<Law> laws(const estimation::Identification& base, const SearchedBalance& motor, const RecordFriction& own) {
-  BalanceData data = *motor.search.data;
+  const RegressionProblem& data = *motor.search.data;
   std::vector<Law> all;
   for (const CandidateFit& candidate : motor.candidates) {
     estimation::Terms terms = candidate.model.terms;

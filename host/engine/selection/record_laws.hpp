@@ -20,7 +20,7 @@ struct RecordFriction {
 
 // A slow record does not identify viscous friction: each counts with what it identifies. A parameter needs `fewest`
 // records that identify it.
-RecordFriction friction_by_record(const estimation::Identification& base, const estimation::BalanceData& data,
+RecordFriction friction_by_record(const estimation::Identification& base, const estimation::RegressionProblem& data,
                                   std::size_t fewest);
 
 // The slower and the faster records, parted at each tenth of them; only those parts that identify a parameter as a
@@ -44,7 +44,7 @@ struct AsFriction {
   Eigen::MatrixXd added;
   double most_left = 0.0;
 };
-AsFriction as_friction(estimation::BalanceData& data, const estimation::Terms& base, const RecordFriction& own,
-                       const Eigen::VectorXd& torque, const Eigen::VectorXd& root_weights);
+AsFriction as_friction(const estimation::RegressionProblem& data, const estimation::Terms& base,
+                       const RecordFriction& own, const Eigen::VectorXd& torque, const Eigen::VectorXd& root_weights);
 
 }  // namespace flexspline::selection

@@ -11,9 +11,9 @@
 namespace flexspline::selection {
 namespace {
 
-using estimation::BalanceData;
 using estimation::PreparedData;
 using estimation::Record;
+using estimation::RegressionProblem;
 using estimation::Terms;
 
 // E[sign v] of a velocity with normal noise: erf(v / (sqrt 2 sigma)).
@@ -24,7 +24,7 @@ std::vector<double> expected_sign(const Record& record) {
   return sign;
 }
 
-void add_runs(const BalanceData& data, RegressorTable& table) {
+void add_runs(const RegressionProblem& data, RegressorTable& table) {
   for (const estimation::RowRange& range : data.records()) {
     const Record& r = data.prepared().records[range.record];
     const auto& samples = r.rows[estimation::index(data.balance())].samples;

@@ -8,7 +8,7 @@
 #include <string>
 #include <vector>
 
-#include "host/engine/estimation/balance_data.hpp"
+#include "host/engine/estimation/regression_problem.hpp"
 #include "host/engine/estimation/terms.hpp"
 #include "host/engine/selection/policy.hpp"
 #include "host/engine/selection/presliding.hpp"

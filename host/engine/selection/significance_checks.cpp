@@ -26,7 +26,7 @@ std::size_t order_place(const catalogue::Entry& entry) {
 }
 
 // Columns of the added effect at an order: of its linear parameters, or slopes by its nonlinear parameters about zero.
-Eigen::MatrixXd order_columns(BalanceData& data, Terms terms, double order) {
+Eigen::MatrixXd order_columns(const RegressionProblem& data, Terms terms, double order) {
   estimation::Term& added = terms.back();
   added.values[order_place(*added.entry)] = order;
   const auto on_balance = estimation::terms_on(terms, data.balance(), data.prepared().output_signals);
@@ -39,14 +39,14 @@ Eigen::MatrixXd order_columns(BalanceData& data, Terms terms, double order) {
     if (added.free_nonlinear(p)) added.values[p] = 0.0;
   for (std::size_t p = 0; p < added.values.size(); ++p) {
     if (added.free_linear(p)) take(data.column(terms, {terms.size() - 1, p}));
-    if (added.free_nonlinear(p)) take(data.nonlinear_column(terms, on_balance, {terms.size() - 1, p}));
+    if (added.free_nonlinear(p)) take(data.nonlinear_columns(terms, on_balance, {{terms.size() - 1, p}}));
   }
   return columns;
 }
 
 // A balance on which the effect of a candidate acts, and the span of its model there.
 struct ActingBalance {
-  BalanceSearch* search = nullptr;
+  const BalanceSearch* search = nullptr;
   const estimation::ModelProjection* projection = nullptr;
   const CrossValidatedFit* noise = nullptr;  // whose weights count
 };
@@ -92,7 +92,7 @@ double explained(const std::vector<ActingBalance>& acting, const Terms& terms, d
 
 // Whether the order is likelier than any that no drive has, by the noise that is left with it.
 bool is_likelier_than_placebos(std::vector<ActingBalance> acting, const CandidateFit& candidate) {
-  BalanceSearch& own_search = *acting.front().search;
+  const BalanceSearch& own_search = *acting.front().search;
   if (!own_search.at_floor(candidate.fit) || (acting.size() > 1 && !candidate.at_floor_on_others)) return false;
   const estimation::ModelProjection projection(estimation::model_columns(*own_search.data, own_search.base.terms),
                                                candidate.fit.root_weights);
@@ -115,7 +115,7 @@ bool usual_and_best(const std::vector<CandidateFit>& candidates, const Candidate
 }
 
 std::string objection_to_order(const std::vector<ActingBalance>& acting, const CandidateFit& candidate) {
-  BalanceSearch& search = *acting.front().search;
+  const BalanceSearch& search = *acting.front().search;
   const double order = *candidate.model.order;
   const double true_gain = explained(acting, candidate.fit.terms, order);
   double best_gain = 0.0, best_placebo = 0.0;
@@ -188,7 +188,7 @@ void check_orders(const std::vector<BalanceSearch*>& all, BalanceSearch& own_sea
   sort_candidates(own_search, candidates);
 }
 
-std::string one_direction_warning(const BalanceData& data) {
+std::string one_direction_warning(const RegressionProblem& data) {
   const Eigen::VectorXd directions = comparison::sample_directions(data);
   double forward = 0.0, backward = 0.0;
   for (const double d : directions) (d > 0.0 ? forward : backward) += std::isfinite(d) && d != 0.0 ? 1.0 : 0.0;

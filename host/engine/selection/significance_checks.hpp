@@ -16,6 +16,6 @@ void check_orders(const std::vector<BalanceSearch*>& all, BalanceSearch& own, st
 
 // "The axis moves one way only ...": what differs by direction is not identifiable then. Empty where it moves both
 // ways.
-std::string one_direction_warning(const BalanceData& data);
+std::string one_direction_warning(const RegressionProblem& data);
 
 }  // namespace flexspline::selection

@@ -5,7 +5,7 @@
 #include <functional>
 #include <vector>
 
-#include "host/engine/estimation/balance_data.hpp"
+#include "host/engine/estimation/regression_problem.hpp"
 #include "host/engine/selection/regressor_table.hpp"
 
 namespace flexspline::selection {
@@ -20,7 +20,7 @@ class DirectedData {
   DirectedData& operator=(const DirectedData&) = delete;
 
   const estimation::PreparedData prepared;
-  estimation::BalanceData data;
+  estimation::RegressionProblem data;
   // The model's prediction of the effort, N m. Terms that read the current are built from it, not from the measured
   // current, whose noise is in the target.
   Eigen::VectorXd effort;

@@ -35,7 +35,7 @@ std::string label_of(const TableSpecification& q) {
   return {};
 }
 
-bool measured(const BalanceData& data, const effects::VariableInfo& v) {
+bool measured(const RegressionProblem& data, const effects::VariableInfo& v) {
   const estimation::PreparedData& p = data.prepared();
   const auto all = [&](auto has) {
     return std::all_of(data.records().begin(), data.records().end(),
@@ -71,12 +71,13 @@ bool belongs(Balance balance, const effects::VariableInfo& v) {
 
 // Signals that a curve may run over on this balance: measured, varying, and not the left side itself.
 // A torque with noise of its sensor is on that side, too.
-std::vector<TableSpecification> table_specifications(BalanceData& data, const Terms& model, bool torque_has_noise) {
+std::vector<TableSpecification> table_specifications(const RegressionProblem& data, const Terms& model,
+                                                     bool torque_has_noise) {
   std::vector<TableSpecification> list;
   for (const effects::VariableInfo& v : effects::kVariables) {
     if (!measured(data, v)) continue;
     if (!belongs(data.balance(), v) || (torque_has_noise && (v.reads & effects::kTorque) != 0)) continue;
-    const Eigen::VectorXd signal = data.signal_at_rows(model, v.variable);
+    const Eigen::VectorXd signal = data.evaluator().signal_at_rows(model, v.variable);
     const estimation::SignalRange range = estimation::central_range(signal);
     const double span = range.high - range.low;
     if (!(span > 0.0) || (v.variable == Variable::temperature && span < kPolicy.least_temperature_span)) continue;
@@ -94,13 +95,12 @@ std::vector<TableSpecification> table_specifications(BalanceData& data, const Te
 }
 
 // Those that the data identify, in the order of the specifications; learnt on all cores.
-std::vector<ScreenedCurve> curves(BalanceData& data, const Terms& model,
+std::vector<ScreenedCurve> curves(const RegressionProblem& data, const Terms& model,
                                   const std::vector<TableSpecification>& specifications,
                                   const Eigen::VectorXd& weights) {
   std::vector<std::optional<LearnedTable>> learned(specifications.size());
   estimation::in_parallel(specifications.size(), [&](std::size_t i) {
-    BalanceData own = data;
-    learned[i] = estimation::learn_table(own, model, specifications[i], weights);
+    learned[i] = estimation::learn_table(data, model, specifications[i], weights);
   });
   std::vector<ScreenedCurve> list;
   for (std::size_t i = 0; i < specifications.size(); ++i)
@@ -137,7 +137,7 @@ std::string next_record(const UnknownStructure& unknown, const data::Axis axis) 
 
 std::optional<UnknownStructure> find_unknown_structure(BalanceSearch& search, const Terms& model,
                                                        bool torque_has_noise) {
-  BalanceData& data = *search.data;
+  const RegressionProblem& data = *search.data;
   const Eigen::VectorXd weights = search.base.root_weights.cwiseProduct(search.keep);
   std::vector<TableSpecification> specifications = table_specifications(data, model, torque_has_noise);
   for (TableSpecification& q : specifications) {

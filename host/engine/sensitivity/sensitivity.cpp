@@ -26,9 +26,9 @@ namespace {
 
 using data::Experiment;
 using estimation::Balance;
-using estimation::BalanceData;
 using estimation::PreparedData;
 using estimation::Record;
+using estimation::RegressionProblem;
 
 // Less of a signal's variance in a line does not test the model there.
 constexpr double kLeastShareOfLine = 0.01;
@@ -137,7 +137,7 @@ class Analysis {
         variant.experiments.push_back({e.name, e.role, e.load == data::Load::locked ? "locked" : "free", {}});
       std::vector<PooledErrors> together;
       const estimation::Terms terms = estimation::terms_of(model);
-      for (BalanceData& data : data_) inverse(data, terms, variant, together);
+      for (const RegressionProblem& data : data_) inverse(data, terms, variant, together);
       for (std::size_t i = 0; i < analysis_.prepared_.records.size(); ++i) free_run(i, model, variant, together);
       for (PooledErrors& t : together) {
         SignalError& s = t.error;
@@ -165,7 +165,7 @@ class Analysis {
       return variant;
     }
 
-    void inverse(BalanceData& data, const estimation::Terms& terms, Variant& variant,
+    void inverse(const RegressionProblem& data, const estimation::Terms& terms, Variant& variant,
                  std::vector<PooledErrors>& together) {
       const Eigen::VectorXd residual = data.residual(terms);
       for (const estimation::RowRange& range : data.records()) {
@@ -265,7 +265,7 @@ class Analysis {
     }
 
     const Analysis& analysis_;
-    std::vector<BalanceData> data_;
+    std::vector<RegressionProblem> data_;
   };
 
   struct Lines {
@@ -278,7 +278,7 @@ class Analysis {
     for (const Balance balance : {Balance::motor, Balance::transmission, Balance::load}) {
       if (balance != Balance::motor && !prepared_.output_signals.torque) continue;
       if (estimation::terms_on(terms, balance, prepared_.output_signals).empty()) continue;
-      if (!BalanceData(prepared_, balance).empty()) balances_.push_back(balance);
+      if (!RegressionProblem(prepared_, balance).empty()) balances_.push_back(balance);
     }
     if (balances_.empty())
       throw data::DataError({{data::Severity::error, "missing_column", "", 0, "",

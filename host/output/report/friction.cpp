@@ -92,7 +92,7 @@ json friction_curve(View& view) {
   const auto balance = std::find_if(view.balances.begin(), view.balances.end(),
                                     [](const BalanceView& b) { return b.data->balance() == Balance::motor; });
   if (balance == view.balances.end()) return nullptr;
-  estimation::BalanceData& data = *balance->data;
+  const estimation::RegressionProblem& data = *balance->data;
   Eigen::VectorXd velocity;
   for (const comparison::SampleVariable& v : comparison::sample_variables(data, view.axis()))
     if (v.name == "velocity") velocity = v.values;

@@ -59,7 +59,7 @@ View::View(const Subject& subject)
   }
   estimation::in_parallel(balances.size(), [&](std::size_t b) {
     BalanceView& view = balances[b];
-    view.data = std::make_unique<estimation::BalanceData>(prepared, view.balance);
+    view.data = std::make_unique<estimation::RegressionProblem>(prepared, view.balance);
     view.residual = view.data->residual(terms);
     if (terms_before) view.before = view.data->residual(*terms_before);
     view.floor_squared = Eigen::VectorXd::Constant(view.data->rows(), std::numeric_limits<double>::quiet_NaN());

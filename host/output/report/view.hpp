@@ -7,14 +7,14 @@
 #include <vector>
 
 #include "host/engine/comparison/compare.hpp"
-#include "host/engine/estimation/balance_data.hpp"
+#include "host/engine/estimation/regression_problem.hpp"
 #include "host/output/report/document.hpp"
 
 namespace flexspline::report {
 
 struct BalanceView {
   estimation::Balance balance = estimation::Balance::motor;
-  std::unique_ptr<estimation::BalanceData> data;
+  std::unique_ptr<estimation::RegressionProblem> data;
   std::string signal;  // "motor_balance"
   std::string unit;
   Eigen::VectorXd residual;               // measured minus model, one a sample

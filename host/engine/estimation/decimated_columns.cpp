@@ -1,8 +1,8 @@
-// A balance on fewer samples, for searches over many nonlinear parameters.
+// Columns from fewer samples, for searches over many nonlinear parameters.
 #include <algorithm>
 #include <cmath>
 
-#include "host/engine/estimation/balance_data.hpp"
+#include "host/engine/estimation/regressor_evaluator.hpp"
 
 namespace flexspline::estimation {
 namespace {
@@ -13,8 +13,9 @@ constexpr std::size_t kSamplesPerRow = 2;
 
 }  // namespace
 
-BalanceData BalanceData::decimated(PreparedData& few) const {
-  few = PreparedData{};
+RegressorEvaluator RegressorEvaluator::decimated() const {
+  auto made = std::make_shared<PreparedData>();
+  PreparedData& few = *made;
   few.pipeline = prepared_->pipeline;
   few.constants = prepared_->constants;
   few.drive = prepared_->drive;
@@ -22,9 +23,9 @@ BalanceData BalanceData::decimated(PreparedData& few) const {
   few.effort_is_current = prepared_->effort_is_current;
   few.rotary = prepared_->rotary;
   few.records.resize(prepared_->records.size());
-  BalanceData thin = *this;
-  thin.prepared_ = &few;
-  thin.cache_.clear();
+  RegressorEvaluator thin = *this;
+  thin.prepared_ = made.get();
+  thin.decimated_ = std::move(made);
   thin.beyond_.assign(static_cast<std::size_t>(rows()), 0.0);
   for (std::size_t i = 0; i < ranges_.size(); ++i) {
     const Record& r = prepared_->records[ranges_[i].record];

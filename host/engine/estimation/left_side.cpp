@@ -1,13 +1,15 @@
-#include "host/engine/estimation/balance_data.hpp"
-
+// Rows of a balance and its measured left side.
 #include <fmt/format.h>
+
+#include <algorithm>
 
 #include "host/common/signals/differentiate.hpp"
 #include "host/engine/estimation/filtered_columns.hpp"
+#include "host/engine/estimation/regressor_evaluator.hpp"
 
 namespace flexspline::estimation {
 
-bool BalanceData::usable(const Record& r) const {
+bool RegressorEvaluator::usable(const Record& r) const {
   switch (balance_) {
     case Balance::motor:
       return !r.effort.empty() && r.has_motor_motion && (!prepared_->output_signals.torque || !r.torque.empty());
@@ -21,7 +23,7 @@ bool BalanceData::usable(const Record& r) const {
 
 namespace {
 
-// Left sides of a balance and their negative slopes along a record, for BalanceData::filtered_columns.
+// Left sides of a balance and their negative slopes along a record, for RegressorEvaluator::filtered_columns.
 class LeftHandSides {
  public:
   LeftHandSides(const PreparedData& prepared, Balance balance) : prepared_(prepared), balance_(balance) {}
@@ -77,7 +79,8 @@ class LeftHandSides {
 
 }  // namespace
 
-BalanceData::BalanceData(const PreparedData& prepared, Balance balance) : prepared_(&prepared), balance_(balance) {
+RegressorEvaluator::RegressorEvaluator(const PreparedData& prepared, Balance balance)
+    : prepared_(&prepared), balance_(balance) {
   Eigen::Index first = 0;
   for (std::size_t i = 0; i < prepared.records.size(); ++i) {
     const Record& r = prepared.records[i];
@@ -94,12 +97,13 @@ BalanceData::BalanceData(const PreparedData& prepared, Balance balance) : prepar
                           std::min(prepared.pipeline.row_cutoff_hz, 0.45 / r.sample_s), 1.0 / r.sample_s);
     first += count;
   }
-  const Eigen::MatrixXd both = filtered_columns(2, LeftHandSides(prepared, balance));
-  target_ = both.col(0);
-  delay_ = both.col(1);
 }
 
-double BalanceData::filter_autocorrelation_time() const {
+Eigen::MatrixXd RegressorEvaluator::left_side() const {
+  return filtered_columns(2, LeftHandSides(*prepared_, balance_));
+}
+
+double RegressorEvaluator::filter_autocorrelation_time() const {
   double longest = 1.0;
   for (std::size_t i = 0; i < ranges_.size(); ++i) {
     const Record& r = prepared_->records[ranges_[i].record];
@@ -114,25 +118,6 @@ double BalanceData::filter_autocorrelation_time() const {
     longest = std::max(longest, row_hz / (2.0 * bandwidth_hz));
   }
   return longest;
-}
-
-std::vector<std::vector<RowRange>> BalanceData::folds(std::size_t parts) const {
-  std::vector<std::vector<RowRange>> folds(parts);
-  for (const RowRange& range : ranges_)
-    for (std::size_t part = 0; part < parts; ++part) {
-      const auto cut = [&](std::size_t p) {
-        return range.first + static_cast<Eigen::Index>(static_cast<std::size_t>(range.size()) * p / parts);
-      };
-      folds[part].push_back({range.record, cut(part), cut(part + 1)});
-    }
-  return folds;
-}
-
-std::size_t BalanceData::sample_of(const RowRange& range, Eigen::Index row) const {
-  Eigen::Index start = 0;
-  for (const RowRange& whole : ranges_)
-    if (whole.record == range.record) start = whole.first;
-  return prepared_->records[range.record].rows[index(balance_)].samples[static_cast<std::size_t>(row - start)];
 }
 
 }  // namespace flexspline::estimation
