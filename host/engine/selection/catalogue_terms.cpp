@@ -95,27 +95,70 @@ Eigen::MatrixXd from_model_current(const DirectedData& from, const catalogue::En
   return columns;
 }
 
-Eigen::MatrixXd columns_of(const Extension& e, const DirectedData& from) {
-  const RegressionProblem& data = from.data;
-  const std::vector<ParameterRef> parameters = e.parameters();
-  if (e.modulates()) {
-    const auto on = estimation::terms_on(e.terms, data.balance(), from.prepared.output_signals);
-    return data.nonlinear_columns(e.terms, on, parameters);
+// Extensions [first, last) whose columns are made together: sources of torque that read what is measured do not change
+// each other's columns, and read the signals once.
+struct Group {
+  std::size_t first = 0, last = 0;
+};
+
+std::vector<Group> groups_of(const std::vector<Extension>& extensions) {
+  constexpr std::size_t kTogether = 8;  // columns: as many as are filtered at once
+  std::vector<Group> groups;
+  std::size_t columns = kTogether;
+  for (std::size_t i = 0; i < extensions.size(); ++i) {
+    const Extension& e = extensions[i];
+    const bool alone = e.entry.info->phase != Phase::source || e.is_of_effort();
+    const std::size_t own = e.parameters().size();
+    if (alone || groups.empty() || columns + own > kTogether) {
+      groups.push_back({i, i});
+      columns = 0;
+    }
+    groups.back().last = i + 1;
+    columns = alone ? kTogether : columns + own;
   }
-  return e.is_of_effort() ? from_model_current(from, e.entry, parameters) : data.columns(e.terms, parameters);
+  return groups;
+}
+
+// One block of columns for each extension of a group.
+std::vector<Eigen::MatrixXd> columns_of(std::span<const Extension> group, const DirectedData& from) {
+  const Extension& e = group.front();
+  if (e.modulates()) {
+    const auto on = estimation::terms_on(e.terms, from.data.balance(), from.prepared.output_signals);
+    return {from.data.nonlinear_columns(e.terms, on, e.parameters())};
+  }
+  if (e.is_of_effort()) return {from_model_current(from, e.entry, e.parameters())};
+  Terms terms = e.terms;
+  std::vector<ParameterRef> refs;
+  for (std::size_t i = 0; i < group.size(); ++i) {
+    if (i > 0) terms.push_back(group[i].added());
+    for (const ParameterRef& ref : group[i].parameters()) refs.push_back({terms.size() - 1, ref.parameter});
+  }
+  const Eigen::MatrixXd all = from.data.evaluator().unit_columns(terms, refs);
+  std::vector<Eigen::MatrixXd> made;
+  Eigen::Index at = 0;
+  for (const Extension& one : group) {
+    made.emplace_back(all.middleCols(at, std::ssize(one.parameters())));
+    at += made.back().cols();
+  }
+  return made;
 }
 
 // The columns of all extensions, made on all cores.
 std::vector<TableBuilder::DirectedColumns> columns_of(const std::vector<Extension>& extensions,
                                                       const TableBuilder& builder) {
-  constexpr std::size_t kParts = 8;
   std::vector<TableBuilder::DirectedColumns> made(extensions.size());
-  estimation::in_parallel(kParts, [&](std::size_t part) {
-    for (std::size_t i = part; i < extensions.size(); i += kParts) {
-      made[i].sign = columns_of(extensions[i], builder.sign);
-      if (builder.presliding && extensions[i].reads_direction())
-        made[i].presliding = columns_of(extensions[i], *builder.presliding);
-    }
+  const std::vector<Group> groups = groups_of(extensions);
+  estimation::in_parallel(groups.size(), [&](std::size_t g) {
+    const auto& [first, last] = groups[g];
+    const std::span<const Extension> group = std::span(extensions).subspan(first, last - first);
+    std::vector<Eigen::MatrixXd> sign = columns_of(group, builder.sign);
+    for (std::size_t i = first; i < last; ++i) made[i].sign = std::move(sign[i - first]);
+    const bool reads_direction =
+        std::any_of(group.begin(), group.end(), [](const Extension& e) { return e.reads_direction(); });
+    if (!builder.presliding || !reads_direction) return;
+    std::vector<Eigen::MatrixXd> presliding = columns_of(group, *builder.presliding);
+    for (std::size_t i = first; i < last; ++i)
+      if (extensions[i].reads_direction()) made[i].presliding = std::move(presliding[i - first]);
   });
   return made;
 }
