@@ -1,3 +1,5 @@
+#include <cstdlib>  // defines __GLIBC__ where it is glibc
+
 #include "host/app/cli/app.hpp"
 
 #ifdef __GLIBC__

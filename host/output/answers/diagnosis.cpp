@@ -23,6 +23,11 @@ constexpr std::size_t kRowsShown = 10;
 // Errors that differ by less are reported as equal.
 constexpr double kRunFrictionMatters = 0.95;
 
+// A share above zero is not called 0 %.
+std::string percent(double share) {
+  return share > 0.0 && share < 1.0 ? "less than 1" : fmt::format("{:.0f}", share);
+}
+
 std::string evidence(const Diagnosis& d) {
   std::string text;
   if (d.balance) text += fmt::format("{} balance: ", catalogue::balance_name(*d.balance));
@@ -35,10 +40,10 @@ std::string evidence(const Diagnosis& d) {
   else if (d.reversals_left_out)
     text += ", both without reversals";
   if (d.noise_floor)
-    text += fmt::format("; noise {} (from {}), so the error is {:.2f} times the noise",
+    text += fmt::format("; noise {} (from {}), so the error is {:.3g} times the noise",
                         with_unit(*d.noise_floor, d.unit), d.noise_floor_from, d.base_rmse / *d.noise_floor);
   else if (d.noise_of_some)
-    text += fmt::format("; the noise is known in {} only: {} (from {}), where the error is {:.2f} times that",
+    text += fmt::format("; the noise is known in {} only: {} (from {}), where the error is {:.3g} times that",
                         listed(d.noise_of_some->records), with_unit(d.noise_of_some->noise, d.unit),
                         d.noise_of_some->from, d.noise_of_some->rmse / d.noise_of_some->noise);
   else
@@ -46,7 +51,7 @@ std::string evidence(const Diagnosis& d) {
   // What is named may pass for friction that differs; only where nothing is, the difference is the runs' own.
   if (d.named.empty() && d.base_rmse_own_friction < kRunFrictionMatters * d.base_rmse)
     text += fmt::format("; with friction that is each run's own {}{}", with_unit(d.base_rmse_own_friction, d.unit),
-                        d.noise_floor ? fmt::format(", {:.2f} times", d.base_rmse_own_friction / *d.noise_floor) : "");
+                        d.noise_floor ? fmt::format(", {:.3g} times", d.base_rmse_own_friction / *d.noise_floor) : "");
   return text;
 }
 
@@ -239,10 +244,10 @@ void print_resampling(Console& console, const selection::Resampling& r) {
   for (const selection::Resampling::FoundTerm& f : r.found) {
     std::vector<std::string> names;
     for (const selection::NamedEffect& n : f.group) names.push_back(effect_in_words(n.effect, n.order));
-    found.push_back(
-        fmt::format("{} in {:.0f} of 100 ({:.0f} % of the squared error above the noise, {:.0f} to {:.0f} %)",
-                    names.empty() ? name_outside_catalogue(f.name) : listed(names, "or"), 100.0 * f.frequency,
-                    f.share_percent, f.share_low_percent, f.share_high_percent));
+    found.push_back(fmt::format("{} in {:.0f} of 100 ({} % of the squared error above the noise, {:.0f} to {:.0f} %)",
+                                names.empty() ? name_outside_catalogue(f.name) : listed(names, "or"),
+                                100.0 * f.frequency, percent(f.share_percent), f.share_low_percent,
+                                f.share_high_percent));
   }
   const std::string how =
       fmt::format("{:.0f} subsamples at bandwidths from {:.3g} to {:.3g} Hz, with and without reversals", r.subsamples,
