@@ -177,13 +177,23 @@ Setting blocks_of(const Eigen::MatrixXd& rows) {
   setting.rows = rows;
   setting.sign_width = rows.cols();
   const Eigen::Index p = rows.cols();
-  setting.products.resize(p * p, 6);
+  setting.products.resize(p * (p + 1) / 2, 6);
   for (Eigen::Index b = 0; b < 6; ++b) {
     setting.blocks.push_back({static_cast<std::size_t>(b / 3), 10.0});
     const Eigen::MatrixXd own = rows.middleRows(10 * b, 10);
-    setting.products.col(b) = Eigen::MatrixXd(own.transpose() * own).reshaped();
+    setting.products.col(b) = lower_triangle(own.transpose() * own);
   }
   return setting;
+}
+
+TEST(Setting, LowerTriangleHoldsEachProductOnceAtItsPlace) {
+  const Eigen::MatrixXd rows = random_table(9, 2, 3).rows;
+  const Eigen::MatrixXd square = rows.transpose() * rows;
+  const Eigen::VectorXd packed = lower_triangle(square);
+  ASSERT_EQ(packed.size(), 15);
+  for (Eigen::Index i = 0; i < 5; ++i)
+    for (Eigen::Index j = 0; j < 5; ++j)
+      EXPECT_EQ(packed[place_in_triangle(i, j, 5)], square(std::max(i, j), std::min(i, j)));
 }
 
 TEST(Halves, HoldTheProductsOfTheirSamplesWithTheDifferencesOfEachRecordEliminated) {

@@ -71,9 +71,12 @@ ProductsAlong products_along(const Setting& setting, const Eigen::MatrixXd& choi
   for (const BlockRange& blocks : blocks_by_record(setting)) {
     const auto first = static_cast<Eigen::Index>(blocks.first), count = static_cast<Eigen::Index>(blocks.last) - first;
     along.emplace_back();
-    for (const Eigen::Index column : columns)
-      along.back().push_back(setting.products.block(column * width, first, width, count) *
-                             choices.middleRows(first, count));
+    for (const Eigen::Index column : columns) {
+      std::vector<Eigen::Index> places;
+      for (Eigen::Index j = 0; j < width; ++j) places.push_back(place_in_triangle(column, j, width));
+      const Eigen::MatrixXd own = setting.products(places, Eigen::seqN(first, count));
+      along.back().push_back(own * choices.middleRows(first, count));
+    }
   }
   return along;
 }

@@ -132,11 +132,10 @@ void add_blocks(Setting& setting, std::vector<Eigen::MatrixXd>& products, std::s
 void take_products(Setting& setting, std::vector<Eigen::MatrixXd>& products) {
   const Eigen::Index columns = setting.rows.cols();
   std::vector<Block> blocks;
-  setting.products.resize(columns * columns, std::ssize(products));
+  setting.products.resize(columns * (columns + 1) / 2, std::ssize(products));
   for (std::size_t b = 0; b < products.size(); ++b) {
     if (setting.blocks[b].rows == 0.0) continue;
-    products[b].triangularView<Eigen::StrictlyUpper>() = products[b].transpose();
-    setting.products.col(std::ssize(blocks)) = products[b].reshaped();
+    setting.products.col(std::ssize(blocks)) = lower_triangle(products[b]);
     blocks.push_back(setting.blocks[b]);
   }
   setting.products.conservativeResize(Eigen::NoChange, std::ssize(blocks));
@@ -144,6 +143,14 @@ void take_products(Setting& setting, std::vector<Eigen::MatrixXd>& products) {
 }
 
 }  // namespace
+
+Eigen::VectorXd lower_triangle(const Eigen::MatrixXd& symmetric) {
+  const Eigen::Index n = symmetric.cols();
+  Eigen::VectorXd packed(n * (n + 1) / 2);
+  Eigen::Index at = 0;
+  for (Eigen::Index j = 0; j < n; at += n - j, ++j) packed.segment(at, n - j) = symmetric.col(j).tail(n - j);
+  return packed;
+}
 
 std::vector<BlockRange> blocks_by_record(const Setting& setting) {
   std::vector<BlockRange> ranges;
@@ -156,9 +163,21 @@ std::vector<BlockRange> blocks_by_record(const Setting& setting) {
 }
 
 Eigen::MatrixXd products_of(const Setting& setting, const Eigen::Ref<const Eigen::VectorXd>& all, Direction direction) {
-  const Eigen::Map<const Eigen::MatrixXd> square(all.data(), setting.rows.cols(), setting.rows.cols());
-  if (direction == Direction::sign) return square.topLeftCorner(setting.sign_width, setting.sign_width);
-  return square(setting.presliding, setting.presliding);
+  const Eigen::Index columns = setting.rows.cols();
+  const bool presliding = direction == Direction::presliding;
+  const Eigen::Index n = presliding ? std::ssize(setting.presliding) : setting.sign_width;
+  Eigen::MatrixXd square(n, n);
+  for (Eigen::Index j = 0; j < n; ++j) {
+    if (!presliding) {
+      square.col(j).tail(n - j) = all.segment(place_in_triangle(j, j, columns), n - j);
+      continue;
+    }
+    const Eigen::Index own = setting.presliding[static_cast<std::size_t>(j)];
+    for (Eigen::Index i = j; i < n; ++i)
+      square(i, j) = all[place_in_triangle(setting.presliding[static_cast<std::size_t>(i)], own, columns)];
+  }
+  square.triangularView<Eigen::StrictlyUpper>() = square.transpose();
+  return square;
 }
 
 Eigen::MatrixXd products_of(const Setting& setting, const BlockRange& blocks, Direction direction) {

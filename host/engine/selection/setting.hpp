@@ -3,6 +3,7 @@
 #pragma once
 
 #include <Eigen/Core>
+#include <algorithm>
 #include <vector>
 
 #include "host/engine/selection/regressor_table.hpp"
@@ -19,8 +20,8 @@ struct Setting {
   double cutoff_hz = 0.0;
   bool mask = false;
   std::vector<Block> blocks;
-  // Of each block, in a column, the products of the columns of `rows` with each other: sums over many choices of blocks
-  // are then one product of matrices.
+  // Of each block, in a column, the products of the columns of `rows` with each other, the lower triangle of their
+  // symmetric matrix: sums over many choices of blocks are then one product of matrices.
   Eigen::MatrixXd products;
   // The samples, filtered and masked: [columns, target], and behind them [columns, target] of the state of presliding.
   Eigen::MatrixXd rows;
@@ -43,6 +44,13 @@ struct Setting {
 // samples reach as far around a reversal.
 inline constexpr double kFilterReach = 1.5;
 
+// Place of the product of two columns in a lower triangle of so many columns, stored column by column.
+inline Eigen::Index place_in_triangle(Eigen::Index a, Eigen::Index b, Eigen::Index columns) {
+  const Eigen::Index column = std::min(a, b), row = std::max(a, b);
+  return column * columns - column * (column - 1) / 2 + row - column;
+}
+Eigen::VectorXd lower_triangle(const Eigen::MatrixXd& symmetric);
+
 // Blocks of one record: first, and one after the last.
 struct BlockRange {
   std::size_t record = 0, first = 0, last = 0;
@@ -50,7 +58,7 @@ struct BlockRange {
 std::vector<BlockRange> blocks_by_record(const Setting& setting);
 // Products of all samples of these blocks: of what a fit uses, by place.
 Eigen::MatrixXd products_of(const Setting& setting, const BlockRange& blocks, Direction direction);
-// The same of products of all columns, which are one column of numbers.
+// The same of products of all columns, as a lower triangle.
 Eigen::MatrixXd products_of(const Setting& setting, const Eigen::Ref<const Eigen::VectorXd>& all, Direction direction);
 
 // Of the records that are held out, or of all others.
