@@ -1,9 +1,10 @@
-#include "host/engine/estimation/mask_cutoff.hpp"
+#include "host/engine/estimation/reversal_mask.hpp"
 
 #include <fmt/format.h>
 
 #include <algorithm>
 #include <cmath>
+#include <numbers>
 
 #include "host/engine/estimation/cancellation.hpp"
 #include "host/engine/estimation/in_parallel.hpp"
@@ -11,6 +12,44 @@
 
 namespace flexspline::estimation {
 namespace {
+
+// Marks what is within `reach` samples of a sample for which `bad` holds.
+std::vector<std::uint8_t> spread(const std::vector<std::uint8_t>& bad, std::size_t reach) {
+  std::vector<std::uint8_t> marked(bad.size(), 0);
+  std::ptrdiff_t last = -1;
+  const auto n = static_cast<std::ptrdiff_t>(bad.size());
+  const auto r = static_cast<std::ptrdiff_t>(reach);
+  for (std::ptrdiff_t k = 0; k < n; ++k) {
+    if (!bad[static_cast<std::size_t>(k)]) continue;
+    for (std::ptrdiff_t j = std::max(last + 1, k - r); j <= std::min(n - 1, k + r); ++j) {
+      marked[static_cast<std::size_t>(j)] = 1;
+      last = j;
+    }
+  }
+  return marked;
+}
+
+bool has_torsion(const Record& r) {
+  return !r.torque.empty() && r.has_motor_motion && r.has_output_motion && !r.at_rest;
+}
+
+// Whether the torsion of a record is far above its noise, whatever its rate is. Noise of a position that is white below
+// the cut-off has a rate of 2 pi f / sqrt(3) times its own deviation.
+bool has_large_torsion(const Record& r, double cutoff_hz) {
+  constexpr double kLarge = 10.0;
+  if (!has_torsion(r)) return false;
+  double sum = 0.0, squares = 0.0;
+  for (std::size_t k = 0; k < r.inputs.size(); ++k) {
+    const double torsion = r.inputs[k].torsion;
+    sum += torsion;
+    squares += torsion * torsion;
+  }
+  const auto n = static_cast<double>(r.inputs.size());
+  const double deviation = std::sqrt(std::max(0.0, squares / n - sum * sum / (n * n)));
+  const double noise =
+      r.velocity_noise[index(Balance::transmission)] * std::sqrt(3.0) / (2.0 * std::numbers::pi * cutoff_hz);
+  return deviation > kLarge * noise;
+}
 
 // Of the samples that the best cut-off leaves of a record. The information of a fit goes with the number of samples:
 // with less than a tenth the record is as good as lost, and then so many are wanted. From 0.05 to 0.17 the report's
@@ -108,6 +147,55 @@ MaskedShare together(const MaskedShare& law, const std::vector<Record>& records,
 }
 
 }  // namespace
+
+void choose_rows(Record& record, const Pipeline& pipeline) {
+  const std::size_t n = record.inputs.size();
+  const auto reach = static_cast<std::size_t>(std::lround(kMaskReach / (pipeline.row_cutoff_hz * record.sample_s)));
+  std::vector<std::uint8_t> unusable(n, 1);
+  for (const Segment& s : record.segments) {
+    // The ends of a segment carry the filters' guess of what is beyond; short segments keep at least their middle.
+    const std::size_t edge = std::min(record.settling, (s.last - s.first) / 10);
+    for (std::size_t k = s.first + edge; k + edge < s.last; ++k) unusable[k] = 0;
+  }
+  const std::vector<std::uint8_t> clipped = spread(record.experiment->masked, reach);
+  for (const Balance balance : {Balance::motor, Balance::transmission, Balance::load}) {
+    Rows& rows = record.rows[index(balance)];
+    rows = {};
+    std::vector<std::uint8_t> unsure(n, 0);
+    const bool is_kept = (balance == Balance::motor && pipeline.keep_motor_reversals) ||
+                         (balance == Balance::transmission && pipeline.keep_torsion_reversals &&
+                          has_large_torsion(record, pipeline.row_cutoff_hz));
+    if (pipeline.mask && !is_kept && !record.at_rest) {
+      const double visible = 3.0 * record.velocity_noise[index(balance)];
+      for (std::size_t k = 0; k < n; ++k) {
+        const double v = record.direction_variable(balance, k);
+        const double before = k > 0 ? record.direction_variable(balance, k - 1) : v;
+        unsure[k] = std::abs(v) <= visible || v * before < 0.0;  // a position that stays is without noise, too
+      }
+      unsure = spread(unsure, reach);
+    }
+    for (std::size_t k = 0; k < n; k += record.decimation) {
+      if (unusable[k]) continue;
+      if (unsure[k] || (!clipped.empty() && clipped[k]))
+        ++rows.masked;
+      else
+        rows.samples.push_back(k);
+    }
+  }
+}
+
+bool shows_torsion(const Record& r) {
+  return has_torsion(r) && r.rows[index(Balance::transmission)].samples.size() >= kFewestRows;
+}
+
+bool masks_all_torsion(const PreparedData& prepared) {
+  bool is_large = false;
+  for (const Record& r : prepared.records) {
+    if (shows_torsion(r)) return false;
+    is_large = is_large || has_large_torsion(r, prepared.pipeline.row_cutoff_hz);
+  }
+  return is_large;
+}
 
 std::optional<double> slowest_law_rad_s(const model::Model& model) {
   std::optional<double> slowest;

@@ -1,5 +1,6 @@
-// A cut-off at which the mask of reversals leaves what a fit needs. The mask gets shorter as the cut-off rises, and the
-// noise of the velocity larger, so that each record has a best one.
+// The second stage of a record: the samples that balances are fitted on, without those around reversals, and a cut-off
+// at which that mask leaves what a fit needs. The mask gets shorter as the cut-off rises, and the noise of the velocity
+// larger, so that each record has a best one.
 #pragma once
 
 #include <functional>
@@ -11,6 +12,18 @@
 #include "host/physics/model/model.hpp"
 
 namespace flexspline::estimation {
+
+// How far, in periods of the cut-off, the step of friction at a reversal rings through the filter.
+inline constexpr double kMaskReach = 1.5;
+
+// Chooses the rows of a record, again where it has some.
+void choose_rows(Record& record, const Pipeline& pipeline);
+
+// Whether there are samples to fit the transmission's balance on.
+bool shows_torsion(const Record& record);
+// Whether the mask of reversals leaves nothing to fit on of a torsion that is far above its noise: its rate is the
+// difference of two velocities, and often hardly above theirs.
+bool masks_all_torsion(const PreparedData& prepared);
 
 struct CutoffRange {
   double lowest_hz = 0.0;  // the present one
