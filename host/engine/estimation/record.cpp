@@ -130,15 +130,7 @@ PreparedData without_records(const std::vector<const Experiment*>& experiments, 
   return prepared;
 }
 
-// A record by its three stages.
-Record record_of(const Experiment& e, const catalogue::DriveConstants<double>& drive, const Pipeline& pipeline) {
-  Record record = with_signals(e, drive, pipeline);
-  choose_rows(record, pipeline);
-  if (pipeline.torque_per_step != 0.0) correct_zero_order_hold(record, drive, pipeline.torque_per_step);
-  return record;
-}
-
-// Makes those records that are not among the ready ones.
+// Makes those records that are not among the ready ones, by the three stages: signals, rows, torque.
 void make_records(PreparedData& prepared, const std::vector<const Experiment*>& experiments,
                   const PreparedData* ready) {
   const bool is_ready =
@@ -153,36 +145,20 @@ void make_records(PreparedData& prepared, const std::vector<const Experiment*>& 
       }
     }
     throw_if_cancelled();
-    prepared.records[i] = record_of(*experiments[i], prepared.constants, prepared.pipeline);
+    Record& record = prepared.records[i];
+    record = with_signals(*experiments[i], prepared.constants, prepared.pipeline);
+    choose_rows(record, prepared.pipeline);
+    if (prepared.pipeline.torque_per_step != 0.0)
+      correct_zero_order_hold(record, prepared.constants, prepared.pipeline.torque_per_step);
   });
   prepared.output_signals.torsion = std::ranges::any_of(prepared.records, shows_torsion);
-}
-
-// Where the mask leaves too little at the present cut-off: raises it. Returns whether it did.
-bool raise_for_mask(PreparedData& prepared, std::optional<double> law_rad_s, double highest_hz) {
-  Pipeline& pipeline = prepared.pipeline;
-  const auto made_at = [&](const Record& r, double hz) {
-    Pipeline tried = pipeline;
-    tried.row_cutoff_hz = hz;
-    tried.motion_cutoff_hz = std::max(pipeline.motion_cutoff_hz, hz);
-    return record_of(*r.experiment, prepared.constants, tried);
-  };
-  const MaskCutoff wanted = cutoff_for_mask(prepared.records, {pipeline.row_cutoff_hz, highest_hz}, law_rad_s, made_at);
-  if (wanted.hz <= pipeline.row_cutoff_hz) return false;
-  pipeline.row_cutoff_hz = std::min(std::ceil(wanted.hz), highest_hz);
-  // Slow motion is what such records have: a velocity that is small for its noise puts the friction of one speed at
-  // another one, so the positions' filter is no wider than it must be.
-  pipeline.motion_cutoff_hz = std::max(pipeline.motion_cutoff_hz, pipeline.row_cutoff_hz);
-  pipeline.reason += fmt::format("; raised to {:.4g} Hz, so that the mask leaves samples of {}", pipeline.row_cutoff_hz,
-                                 wanted.reason);
-  return true;
 }
 
 // What the records show changes the pipeline. Each change repeats the stage that it is about, and those after it.
 void suit_to_records(PreparedData& prepared, const std::vector<const Experiment*>& experiments,
                      std::optional<double> law_rad_s, bool may_raise, bool keeps_motor_reversals) {
   Pipeline& pipeline = prepared.pipeline;
-  if (may_raise && pipeline.mask && raise_for_mask(prepared, law_rad_s, slowest_sample_hz(experiments) / 10.0))
+  if (may_raise && pipeline.mask && raise_cutoff_for_mask(prepared, law_rad_s, slowest_sample_hz(experiments) / 10.0))
     make_records(prepared, experiments, nullptr);
   // The cut-off is that of the other models, so that their errors can be compared.
   pipeline.keep_motor_reversals = keeps_motor_reversals;

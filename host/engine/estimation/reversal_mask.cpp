@@ -5,8 +5,11 @@
 #include <algorithm>
 #include <cmath>
 #include <numbers>
+#include <string>
+#include <vector>
 
 #include "host/engine/estimation/cancellation.hpp"
+#include "host/engine/estimation/filtered_signals.hpp"
 #include "host/engine/estimation/in_parallel.hpp"
 #include "host/physics/catalogue/catalogue.hpp"
 
@@ -70,14 +73,14 @@ double information(double velocity, int direction, std::optional<double> law_rad
 }
 
 // What the mask leaves of a record's information, and what there is without it, per sample.
-double share_left(const Record& r, int direction, std::optional<double> law_rad_s) {
+double information_left(const Record& r, int direction, std::optional<double> law_rad_s) {
   const Rows& rows = r.rows[index(Balance::motor)];
   double sum = 0.0;
   for (const std::size_t k : rows.samples) sum += information(r.inputs.velocity_at(k), direction, law_rad_s);
   const std::size_t all = rows.samples.size() + rows.masked;
   return all > 0 ? sum / static_cast<double>(all) : 0.0;
 }
-double share_of(const Record& r, int direction, std::optional<double> law_rad_s) {
+double information_of_all(const Record& r, int direction, std::optional<double> law_rad_s) {
   double sum = 0.0;
   for (std::size_t k = 0; k < r.inputs.size(); ++k) sum += information(r.inputs.velocity_at(k), direction, law_rad_s);
   return r.inputs.size() > 0 ? sum / static_cast<double>(r.inputs.size()) : 0.0;
@@ -88,7 +91,7 @@ struct MaskedShare {
   int direction = 1;
   std::optional<double> law_rad_s;
   double worth_keeping = 0.0;     // at the best cut-off
-  std::vector<double> at_cutoff;  // see share_left()
+  std::vector<double> at_cutoff;  // see information_left()
 
   // The lowest cut-off that leaves nearly the most, if the present one leaves next to nothing of that; else 0.
   double cutoff_hz(const std::vector<double>& cutoffs) const {
@@ -106,18 +109,18 @@ bool counts(const Record& r) {
 // A law's amplitude is found from all records together: what the present mask leaves of one direction, where that is
 // next to nothing of what there is. Worth keeping is the time of one independent sample, a period of the highest
 // cut-off.
-std::vector<MaskedShare> shares_of_law(const std::vector<Record>& records, double law_rad_s, const CutoffRange& range) {
+std::vector<MaskedShare> shares_of_law(const std::vector<Record>& records, double law_rad_s, double highest_hz) {
   std::vector<MaskedShare> shares;
   for (const int direction : {1, -1}) {
     double left = 0.0, all = 0.0, length_s = 0.0;
     for (const Record& r : records) {
       if (!counts(r)) continue;
       const double record_s = length_of(r);
-      left += record_s * share_left(r, direction, law_rad_s);
-      all += record_s * share_of(r, direction, law_rad_s);
+      left += record_s * information_left(r, direction, law_rad_s);
+      all += record_s * information_of_all(r, direction, law_rad_s);
       length_s += record_s;
     }
-    if (left < kLeastOfTheBest * all) shares.push_back({direction, law_rad_s, 1.0 / (range.highest_hz * length_s), {}});
+    if (left < kLeastOfTheBest * all) shares.push_back({direction, law_rad_s, 1.0 / (highest_hz * length_s), {}});
   }
   return shares;
 }
@@ -125,7 +128,7 @@ std::vector<MaskedShare> shares_of_law(const std::vector<Record>& records, doubl
 std::vector<MaskedShare> shares_of_record(const Record& r) {
   std::vector<MaskedShare> shares;
   for (const int direction : {1, -1})
-    if (counts(r) && share_left(r, direction, {}) < kLeastOfTheBest * share_of(r, direction, {}))
+    if (counts(r) && information_left(r, direction, {}) < kLeastOfTheBest * information_of_all(r, direction, {}))
       shares.push_back({direction, std::nullopt, kWorthKeeping, {}});
   return shares;
 }
@@ -146,13 +149,26 @@ MaskedShare together(const MaskedShare& law, const std::vector<Record>& records,
   return sum;
 }
 
+struct MaskCutoff {
+  double hz = 0.0;     // 0: the present one does
+  std::string reason;  // what samples it leaves: a record's name, or a velocity
+};
+
+// Slow motion is what such records have: a velocity that is small for its noise puts the friction of one speed at
+// another one, so the positions' filter is no wider than it must be.
+Pipeline raised(Pipeline pipeline, double cutoff_hz) {
+  pipeline.row_cutoff_hz = cutoff_hz;
+  pipeline.motion_cutoff_hz = std::max(pipeline.motion_cutoff_hz, cutoff_hz);
+  return pipeline;
+}
+
 }  // namespace
 
 void choose_rows(Record& record, const Pipeline& pipeline) {
   const std::size_t n = record.inputs.size();
   const auto reach = static_cast<std::size_t>(std::lround(kMaskReach / (pipeline.row_cutoff_hz * record.sample_s)));
   std::vector<std::uint8_t> unusable(n, 1);
-  for (const Segment& s : record.segments) {
+  for (const data::Segment& s : record.segments) {
     // The ends of a segment carry the filters' guess of what is beyond; short segments keep at least their middle.
     const std::size_t edge = std::min(record.settling, (s.last - s.first) / 10);
     for (std::size_t k = s.first + edge; k + edge < s.last; ++k) unusable[k] = 0;
@@ -211,14 +227,15 @@ std::optional<double> slowest_law_rad_s(const model::Model& model) {
   return slowest;
 }
 
-MaskCutoff cutoff_for_mask(const std::vector<Record>& records, const CutoffRange& range,
-                           std::optional<double> law_rad_s,
-                           const std::function<Record(const Record&, double)>& made_at) {
+namespace {
+
+MaskCutoff cutoff_for_mask(const PreparedData& prepared, double highest_hz, std::optional<double> law_rad_s) {
+  const std::vector<Record>& records = prepared.records;
   std::vector<double> cutoffs;
-  for (double hz = range.lowest_hz; hz < range.highest_hz; hz *= kCutoffStep) cutoffs.push_back(hz);
-  cutoffs.push_back(range.highest_hz);
+  for (double hz = prepared.pipeline.row_cutoff_hz; hz < highest_hz; hz *= kCutoffStep) cutoffs.push_back(hz);
+  cutoffs.push_back(highest_hz);
   std::vector<MaskedShare> of_law;
-  if (law_rad_s) of_law = shares_of_law(records, *law_rad_s, range);
+  if (law_rad_s) of_law = shares_of_law(records, *law_rad_s, highest_hz);
   std::vector<std::vector<MaskedShare>> parts(records.size(), of_law);
   std::vector<double> wanted(records.size(), 0.0);
   in_parallel(records.size(), [&](std::size_t i) {
@@ -226,9 +243,11 @@ MaskCutoff cutoff_for_mask(const std::vector<Record>& records, const CutoffRange
     if (!counts(records[i]) || (of_law.empty() && of_record.empty())) return;
     for (const double hz : cutoffs) {
       throw_if_cancelled();
-      const Record again = made_at(records[i], hz);
+      const Pipeline tried = raised(prepared.pipeline, hz);
+      Record again = with_signals(*records[i].experiment, prepared.constants, tried);
+      choose_rows(again, tried);
       for (std::vector<MaskedShare>* shares : {&of_record, &parts[i]})
-        for (MaskedShare& s : *shares) s.at_cutoff.push_back(share_left(again, s.direction, s.law_rad_s));
+        for (MaskedShare& s : *shares) s.at_cutoff.push_back(information_left(again, s.direction, s.law_rad_s));
     }
     for (const MaskedShare& share : of_record) wanted[i] = std::max(wanted[i], share.cutoff_hz(cutoffs));
   });
@@ -240,6 +259,18 @@ MaskCutoff cutoff_for_mask(const std::vector<Record>& records, const CutoffRange
     if (hz > best.hz) best = {hz, fmt::format("{:.4g} rad/s, which the model's friction needs", *law_rad_s)};
   }
   return best;
+}
+
+}  // namespace
+
+bool raise_cutoff_for_mask(PreparedData& prepared, std::optional<double> law_rad_s, double highest_hz) {
+  Pipeline& pipeline = prepared.pipeline;
+  const MaskCutoff wanted = cutoff_for_mask(prepared, highest_hz, law_rad_s);
+  if (wanted.hz <= pipeline.row_cutoff_hz) return false;
+  pipeline = raised(pipeline, std::min(std::ceil(wanted.hz), highest_hz));
+  pipeline.reason += fmt::format("; raised to {:.4g} Hz, so that the mask leaves samples of {}", pipeline.row_cutoff_hz,
+                                 wanted.reason);
+  return true;
 }
 
 }  // namespace flexspline::estimation

@@ -3,10 +3,7 @@
 // larger, so that each record has a best one.
 #pragma once
 
-#include <functional>
 #include <optional>
-#include <string>
-#include <vector>
 
 #include "host/engine/estimation/record.hpp"
 #include "host/physics/model/model.hpp"
@@ -25,26 +22,14 @@ bool shows_torsion(const Record& record);
 // difference of two velocities, and often hardly above theirs.
 bool masks_all_torsion(const PreparedData& prepared);
 
-struct CutoffRange {
-  double lowest_hz = 0.0;  // the present one
-  double highest_hz = 0.0;
-};
-
-struct MaskCutoff {
-  double hz = 0.0;     // 0: the present one does
-  std::string reason;  // what samples it leaves: a record's name, or a velocity
-};
-
 /// The smallest velocity of the model's friction laws (Stribeck) where it is given and fixed, rad/s: such a law shows
 /// in slow motion alone.
 std::optional<double> slowest_law_rad_s(const model::Model& model);
 
-/// What the number of reversals does not show: slow or short strokes of which the mask leaves next to nothing in one
-/// direction, because they end within the transient of the filter, or because the velocity is small for its noise; and
-/// the slow samples, of all records together, that a friction law of a given velocity needs.
-/// made_at(record, hz) makes a record again with another cut-off.
-MaskCutoff cutoff_for_mask(const std::vector<Record>& records, const CutoffRange& range,
-                           std::optional<double> law_rad_s,
-                           const std::function<Record(const Record&, double)>& made_at);
+/// Raises the cut-off of the pipeline, up to `highest_hz`, for what the number of reversals does not show: slow or
+/// short strokes of which the mask leaves next to nothing in one direction, because they end within the transient of
+/// the filter, or because the velocity is small for its noise; and the slow samples, of all records together, that a
+/// friction law of a given velocity needs. Returns whether it did; the records are to be made again then.
+bool raise_cutoff_for_mask(PreparedData& prepared, std::optional<double> law_rad_s, double highest_hz);
 
 }  // namespace flexspline::estimation
