@@ -8,7 +8,6 @@
 #include <set>
 #include <string_view>
 
-#include "host/engine/estimation/mixed_model.hpp"
 #include "host/engine/estimation/noise_covariance.hpp"
 #include "host/engine/estimation/random_effects.hpp"
 

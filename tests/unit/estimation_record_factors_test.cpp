@@ -7,7 +7,7 @@
 #include <cmath>
 #include <random>
 
-#include "host/engine/estimation/mixed_model.hpp"
+#include "host/engine/estimation/random_effects.hpp"
 
 namespace flexspline::estimation {
 namespace {

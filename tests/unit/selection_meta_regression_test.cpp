@@ -189,7 +189,7 @@ TEST(PermutationTest, AgreesWithAllPermutationsOfSixRecords) {
   double mean = 0.0;
   constexpr int kSeeds = 40;
   for (unsigned seed = 0; seed < kSeeds; ++seed)
-    mean += permutation_p_value(exact(r.theta), {r.added}, {all_of(exact(r.theta))}, 20000, seed) / kSeeds;
+    mean += permutation_p_value(exact(r.theta), {r.added}, {whole_of(exact(r.theta))}, 20000, seed) / kSeeds;
   EXPECT_NEAR(mean, of_all, 4.0 * of_all / std::sqrt(20.0 * kSeeds) + of_all / 20.0);
 }
 
@@ -197,9 +197,9 @@ TEST(PermutationTest, FindsALawAndSeldomOneThatIsNotThere) {
   int found = 0, wrong = 0;
   for (unsigned seed = 0; seed < 100; ++seed) {
     const Records with(20, 0.8, seed), without(20, 0.0, 1000 + seed);
-    found += permutation_p_value(exact(with.theta), {with.added}, {all_of(exact(with.theta))}, 1000, seed) <= 0.01;
-    wrong +=
-        permutation_p_value(exact(without.theta), {without.added}, {all_of(exact(without.theta))}, 1000, seed) <= 0.05;
+    found += permutation_p_value(exact(with.theta), {with.added}, {whole_of(exact(with.theta))}, 1000, seed) <= 0.01;
+    wrong += permutation_p_value(exact(without.theta), {without.added}, {whole_of(exact(without.theta))}, 1000, seed) <=
+             0.05;
   }
   EXPECT_GT(found, 90);
   EXPECT_LT(wrong, 11);  // 5 are expected; 11 and more in one of 90 runs
@@ -214,7 +214,7 @@ TEST(PermutationTest, CountsHowManyLawsAreTried) {
     std::normal_distribution<double> normal;
     std::vector<MatrixXd> laws;
     for (int k = 0; k < 20; ++k) laws.push_back(MatrixXd::NullaryExpr(12, 2, [&] { return normal(random); }));
-    significant += permutation_p_value(exact(r.theta), laws, {all_of(exact(r.theta))}, 400, seed) <= 0.1;
+    significant += permutation_p_value(exact(r.theta), laws, {whole_of(exact(r.theta))}, 400, seed) <= 0.1;
   }
   EXPECT_LT(significant, 10);  // 4 are expected
 }
@@ -233,7 +233,7 @@ TEST(PermutationTest, OfRecordsThatIdentifyDifferentParametersIsSeldomWrong) {
     Records r(24, 0.0, 3000 + seed);
     r.theta.topRows(10).col(1).array() += 2.0;
     const RecordParameters records = two_kinds(r, 10);
-    wrong += permutation_p_value(records, {r.added}, {all_of(records)}, 400, seed) <= 0.05;
+    wrong += permutation_p_value(records, {r.added}, {whole_of(records)}, 400, seed) <= 0.05;
   }
   EXPECT_LT(wrong, 11);  // 5 are expected
 }
@@ -252,7 +252,7 @@ TEST(PermutationTest, FindsALawThatHoldsForTheFasterRecordsOnly) {
       for (Index i = first; i < 40; ++i) parts.back().records.push_back(i);
     }
     found += permutation_p_value(exact(with.theta), {with.added}, parts, 400, seed) <= 0.05;
-    of_all += permutation_p_value(exact(with.theta), {with.added}, {all_of(exact(with.theta))}, 400, seed) <= 0.05;
+    of_all += permutation_p_value(exact(with.theta), {with.added}, {whole_of(exact(with.theta))}, 400, seed) <= 0.05;
     wrong += permutation_p_value(exact(without.theta), {without.added}, parts, 400, seed) <= 0.05;
   }
   EXPECT_GT(found, 25);
@@ -262,7 +262,7 @@ TEST(PermutationTest, FindsALawThatHoldsForTheFasterRecordsOnly) {
 
 TEST(PermutationTest, IsOneWhereNoLawIsPossible) {
   const Records r(10, 1.0, 9);
-  EXPECT_EQ(permutation_p_value(exact(r.theta), {MatrixXd(-r.added)}, {all_of(exact(r.theta))}, 100, 1), 1.0);
+  EXPECT_EQ(permutation_p_value(exact(r.theta), {MatrixXd(-r.added)}, {whole_of(exact(r.theta))}, 100, 1), 1.0);
 }
 
 }  // namespace

@@ -53,6 +53,30 @@ using Orders = std::make_integer_sequence<int, ZeroPhaseFilter::kMaxOrder>;
 
 }  // namespace
 
+Sections sections_of(int order, double cutoff_hz, double sample_hz) {
+  const double k = std::tan(std::numbers::pi * cutoff_hz / sample_hz);
+  Sections s;
+  for (int pair = 0; pair < order / 2; ++pair) {
+    const double damping = 2.0 * std::sin(std::numbers::pi * (2.0 * pair + 1.0) / (2.0 * order));
+    const double norm = 1.0 / (1.0 + damping * k + k * k);
+    const double a1 = 2.0 * (k * k - 1.0) * norm;
+    const double a2 = (1.0 - damping * k + k * k) * norm;
+    s.a1.push_back(a1);
+    s.a2.push_back(a2);
+    // From the rounded denominator, so that the gain at zero frequency is one whatever the rounding did to the poles.
+    s.gain *= ((1.0 + a1) + a2) / 4.0;
+    s.slowest = std::max(s.slowest, std::sqrt(std::abs(a2)));
+  }
+  if (order % 2 == 1) {
+    const double a1 = (k - 1.0) / (k + 1.0);
+    s.a1.push_back(a1);
+    s.a2.push_back(0.0);
+    s.gain *= (1.0 + a1) / 2.0;
+    s.slowest = std::max(s.slowest, std::abs(a1));
+  }
+  return s;
+}
+
 ZeroPhaseFilter::ZeroPhaseFilter(int order, double cutoff_hz, double sample_hz)
     : order_(order), cutoff_hz_(cutoff_hz), sample_hz_(sample_hz) {
   if (order < 1 || order > kMaxOrder)

@@ -7,6 +7,15 @@
 
 namespace flexspline::signals {
 
+// The second-order sections of a ZeroPhaseFilter.
+struct Sections {
+  std::vector<double> a1, a2;
+  double gain = 1.0;
+  double slowest = 0.0;  // magnitude of the slowest pole
+};
+
+Sections sections_of(int order, double cutoff_hz, double sample_hz);
+
 /// Low-pass Butterworth filter applied forward and backward, so that it shifts nothing in time.
 ///
 /// Design: second-order sections by the bilinear transform, pre-warped at the cut-off. The cut-off is the -3 dB point

@@ -4,7 +4,6 @@
 #include <algorithm>
 #include <cmath>
 #include <cstddef>
-#include <numbers>
 #include <vector>
 
 namespace flexspline::signals {
@@ -169,36 +168,6 @@ void pass_backward(C& cascade, const Columns<V>& x, std::size_t count, const V& 
     v = v + origin;
     x.store(count - 1 - i, v);
   });
-}
-
-struct Sections {
-  std::vector<double> a1, a2;
-  double gain = 1.0;
-  double slowest = 0.0;  // magnitude of the slowest pole
-};
-
-inline Sections sections_of(int order, double cutoff_hz, double sample_hz) {
-  const double k = std::tan(std::numbers::pi * cutoff_hz / sample_hz);
-  Sections s;
-  for (int pair = 0; pair < order / 2; ++pair) {
-    const double damping = 2.0 * std::sin(std::numbers::pi * (2.0 * pair + 1.0) / (2.0 * order));
-    const double norm = 1.0 / (1.0 + damping * k + k * k);
-    const double a1 = 2.0 * (k * k - 1.0) * norm;
-    const double a2 = (1.0 - damping * k + k * k) * norm;
-    s.a1.push_back(a1);
-    s.a2.push_back(a2);
-    // From the rounded denominator, so that the gain at zero frequency is one whatever the rounding did to the poles.
-    s.gain *= ((1.0 + a1) + a2) / 4.0;
-    s.slowest = std::max(s.slowest, std::sqrt(std::abs(a2)));
-  }
-  if (order % 2 == 1) {
-    const double a1 = (k - 1.0) / (k + 1.0);
-    s.a1.push_back(a1);
-    s.a2.push_back(0.0);
-    s.gain *= (1.0 + a1) / 2.0;
-    s.slowest = std::max(s.slowest, std::abs(a1));
-  }
-  return s;
 }
 
 }  // namespace flexspline::signals

@@ -108,6 +108,12 @@ std::vector<double> integral(std::span<const double> rate, double sample_s) {
   return sum;
 }
 
+// Low-passes work on positions, whose ends have little noise: what reflects a derivative at its noisy last sample is
+// off for as long as the filter remembers.
+std::vector<double> slow_slope(const ZeroPhaseFilter& filter, std::span<const double> position, double sample_s) {
+  return central_derivative(filter.apply(position), sample_s);
+}
+
 std::vector<double> without(const std::vector<double>& signal, std::vector<double> slow) {
   for (std::size_t k = 0; k < signal.size(); ++k) slow[k] = signal[k] - slow[k];
   return slow;
@@ -125,29 +131,23 @@ std::optional<FusedVelocity> fused_velocity(std::span<const double> position, st
   const double crossover_hz = std::max(equal_hz, kPeriods / (static_cast<double>(n) * sample_s));
   if (crossover_hz > kHighestCrossover * cutoff_hz || crossover_hz >= 0.45 * sample_hz) return std::nullopt;
 
-  // Low-passes work on positions, whose ends have little noise: what reflects a derivative at its noisy last sample
-  // is off for as long as the filter remembers.
-  const auto slow_slope = [&](const ZeroPhaseFilter& filter, std::span<const double> of) {
-    return central_derivative(filter.apply(of), sample_s);
-  };
+  const ZeroPhaseFilter calm(2, crossover_hz, sample_hz), slow(1, crossover_hz, sample_hz);
+  const std::vector<double> derivative = central_derivative(position, sample_s),
+                            slope = central_derivative(measured, sample_s);
   const std::vector<double> travelled = integral(measured, sample_s);
-  const ZeroPhaseFilter calm(2, crossover_hz, sample_hz);
   const std::size_t edge = std::min(calm.settling_samples(), n / 8);
   const double independent = 2.0 * crossover_hz * sample_s * static_cast<double>(n - 2 * edge);
-  const auto relation =
-      relation_of(slow_slope(calm, position), slow_slope(calm, travelled), edge, independent, sample_s);
+  const auto relation = relation_of(slow_slope(calm, position, sample_s), slow_slope(calm, travelled, sample_s), edge,
+                                    independent, sample_s);
   if (!relation) return std::nullopt;
 
-  const std::vector<double> slope = central_derivative(measured, sample_s);
   std::vector<double> velocity(n);
   for (std::size_t k = 0; k < n; ++k) velocity[k] = (measured[k] + relation->lag_s * slope[k]) / relation->gain;
   const NoiseLeft left =
       noise_left(position_std, velocity_std, crossover_hz, std::min(cutoff_hz, 0.5 * sample_hz), sample_s);
-  const ZeroPhaseFilter slow(1, crossover_hz, sample_hz);
-  const std::vector<double> fast = without(velocity, slow_slope(slow, integral(velocity, sample_s)));
-  const std::vector<double> of_position = slow_slope(slow, position);
-  if (!is_better_where_fast(without(central_derivative(position, sample_s), of_position), fast, edge, left))
-    return std::nullopt;
+  const std::vector<double> fast = without(velocity, slow_slope(slow, integral(velocity, sample_s), sample_s));
+  const std::vector<double> of_position = slow_slope(slow, position, sample_s);
+  if (!is_better_where_fast(without(derivative, of_position), fast, edge, left)) return std::nullopt;
   FusedVelocity fused{std::move(velocity), crossover_hz, std::sqrt(left.fused)};
   for (std::size_t k = 0; k < n; ++k) fused.velocity[k] = of_position[k] + fast[k];
   return fused;

@@ -108,12 +108,12 @@ double RegressorEvaluator::filter_autocorrelation_time() const {
   for (std::size_t i = 0; i < ranges_.size(); ++i) {
     const Record& r = prepared_->records[ranges_[i].record];
     const double row_hz = 1.0 / (r.sample_s * static_cast<double>(r.decimation));
-    constexpr int kSteps = 200;
+    constexpr int kFrequencies = 200;
     const double top_hz = std::min(3.0 * filters_[i].cutoff_hz(), 0.5 / r.sample_s);
     double bandwidth_hz = 0.0;
-    for (int k = 0; k < kSteps; ++k) {
-      const double gain = filters_[i].gain((k + 0.5) / kSteps * top_hz);
-      bandwidth_hz += gain * gain * top_hz / kSteps;
+    for (int k = 0; k < kFrequencies; ++k) {
+      const double gain = filters_[i].gain((k + 0.5) / kFrequencies * top_hz);
+      bandwidth_hz += gain * gain * top_hz / kFrequencies;
     }
     longest = std::max(longest, row_hz / (2.0 * bandwidth_hz));
   }

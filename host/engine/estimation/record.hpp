@@ -4,6 +4,7 @@
 
 #include <array>
 #include <cstddef>
+#include <cstdint>
 #include <memory>
 #include <mutex>
 #include <optional>
@@ -11,7 +12,6 @@
 #include <vector>
 
 #include "host/engine/estimation/record_signals.hpp"
-#include "host/engine/estimation/side_motion.hpp"
 #include "host/engine/estimation/terms.hpp"
 #include "host/input/data/dataset.hpp"
 #include "host/physics/catalogue/constants.hpp"
@@ -24,6 +24,12 @@ inline constexpr std::size_t kBalances = 3;
 constexpr std::size_t index(Balance balance) {
   return static_cast<std::size_t>(balance);
 }
+
+// How positions become velocities and accelerations.
+enum class Derivatives : std::uint8_t {
+  butterworth,  // zero-phase filter, then central differences; a measured velocity helps where it has less noise
+  kalman,       // Kalman filter with Rauch-Tung-Striebel smoothing, covariances by likelihood; the position alone
+};
 
 struct PreparedData;
 
@@ -84,6 +90,7 @@ struct Record {
   double sample_s = 0.0;
   std::size_t decimation = 1;
   std::vector<data::Segment> segments;
+  std::size_t settling = 0;  // samples that the filter of positions takes at the ends of a segment
   RecordSignals inputs;
   ScaledSignal effort;         // motor torque (or force), aligned to the instants of the positions; empty: not measured
   std::vector<double> torque;  // as measured

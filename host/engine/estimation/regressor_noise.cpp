@@ -8,10 +8,10 @@
 #include <random>
 
 #include "host/common/signals/butterworth.hpp"
+#include "host/engine/estimation/filtered_signals.hpp"
 #include "host/engine/estimation/in_parallel.hpp"
 #include "host/engine/estimation/least_squares.hpp"
 #include "host/engine/estimation/modelled_torque.hpp"
-#include "host/engine/estimation/side_motion.hpp"
 #include "host/engine/estimation/zero_order_hold.hpp"
 
 namespace flexspline::estimation {

@@ -17,8 +17,8 @@ using data::Column;
 using Signals = std::vector<std::vector<double>>;
 
 constexpr double kCertainErrors = 3.0;  // standard errors
-// Samples that count as one: the filter keeps half of their band (record.cpp), and the errors are coloured noise as
-// well.
+// Samples that count as one: the filter keeps half of their band (filtered_signals.cpp), and the errors are coloured
+// noise as well.
 constexpr double kRowsPerSample = 4.0;
 constexpr double kFewestHeldRows = 100.0;
 

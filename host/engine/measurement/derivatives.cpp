@@ -12,7 +12,6 @@
 #include "host/common/signals/differentiate.hpp"
 #include "host/common/signals/differentiators.hpp"
 #include "host/common/signals/quantum.hpp"
-#include "host/engine/estimation/side_motion.hpp"
 
 namespace flexspline::measurement {
 namespace {

@@ -74,7 +74,7 @@ void take_values(const MetaRegression& fit, const Law& law, double p_value, std:
       100.0 * fit.explained_share, records, p_value);
 }
 
-void name(const Possible& best, double p_value, std::size_t records, Diagnosis& result) {
+void name_likeliest(const Possible& best, double p_value, std::size_t records, Diagnosis& result) {
   for (const auto& [fit, law] : best) {
     const std::string name(law->candidate->model.entry->name());
     const auto at = std::find_if(result.candidates.begin(), result.candidates.end(), [&](const Candidate& c) {
@@ -131,11 +131,12 @@ void name_between_records(const estimation::Identification& base, const Searched
   const std::vector<Law> all = laws(base, motor, own);
   std::vector<Eigen::MatrixXd> added;
   for (const Law& law : all) added.push_back(law.added);
-  const Part whole = all_of(own.values);
+  const Part whole = whole_of(own.values);
   // So many that the limit is twenty permutations, known to a fifth.
   const auto permutations = static_cast<int>(20.0 / kPolicy.trend_p_value);
   const double p_value = permutation_p_value(own.values, added, {whole}, permutations, 1);
-  if (p_value <= kPolicy.trend_p_value) return name(possible(own, all, whole), p_value, own.records.size(), result);
+  if (p_value <= kPolicy.trend_p_value)
+    return name_likeliest(possible(own, all, whole), p_value, own.records.size(), result);
   result.law_in_range = law_in_range(base, own, all, added);
   if (result.law_in_range) result.law_in_range->p_value_of_all = p_value;
 }

@@ -23,10 +23,10 @@ data::Axis axis_of(const RegressionProblem& data) {
   return data.prepared().rotary ? data::Axis::rotary : data::Axis::linear;
 }
 
-// The part of an effect's torque that is orthogonal to the model.
-Eigen::VectorXd own_torque(BalanceSearch& search, const CandidateFit& candidate,
-                           const estimation::ModelProjection& projection) {
-  return projection
+// The part of an effect's torque that is orthogonal to the model, over samples of these weights.
+Eigen::VectorXd own_torque(BalanceSearch& search, const CandidateFit& candidate, const Eigen::VectorXd& weights) {
+  const estimation::ModelProjection by_model(estimation::model_columns(*search.data, search.base.terms), weights);
+  return by_model
       .orthogonal_part(estimation::model_torque(*search.data, candidate.fit.terms) -
                        estimation::model_torque(*search.data, search.base.terms))
       .col(0);
@@ -47,13 +47,11 @@ std::string variable_of(const RegressionProblem& data, const Eigen::VectorXd& to
   return shares.empty() ? "" : shares.front().variable;
 }
 
-ConfoundingReason compare(BalanceSearch& search, const CandidateFit& first, const CandidateFit& second) {
+// `own` is the torque of the first effect, orthogonal to the model.
+ConfoundingReason compare(BalanceSearch& search, const Eigen::VectorXd& own, const CandidateFit& second) {
   const RegressionProblem& data = *search.data;
   ConfoundingReason reason;
   reason.effect = label_of(second);
-  const estimation::ModelProjection by_model(estimation::model_columns(data, search.base.terms),
-                                             search.base.root_weights);
-  const Eigen::VectorXd own = own_torque(search, first, by_model);
   const estimation::ModelProjection by_confounded(estimation::model_columns(data, second.fit.terms),
                                                   search.base.root_weights);
   // The second may lack an effect that it replaces; that torque is the same for both.
@@ -71,8 +69,7 @@ std::optional<Evidence> evidence(BalanceSearch& search, const CandidateFit& cand
   // With one friction for all runs: what is missing may pass for friction that differs.
   const Eigen::VectorXd &weights = search.base.root_weights_fixed_effects(),
                         &lacking = search.base.residual_fixed_effects();
-  const estimation::ModelProjection by_model(estimation::model_columns(data, search.base.terms), weights);
-  const Eigen::VectorXd own = own_torque(search, candidate, by_model);
+  const Eigen::VectorXd own = own_torque(search, candidate, weights);
   const auto shares = comparison::localise(data, own, 1.0, axis);
   const std::vector<comparison::SampleVariable> variables = comparison::sample_variables(data, axis);
   const Eigen::VectorXd directions = comparison::sample_directions(data);
@@ -107,10 +104,8 @@ std::optional<Evidence> evidence(BalanceSearch& search, const CandidateFit& cand
   return std::nullopt;
 }
 
-EffectSize size_of(BalanceSearch& search, const CandidateFit& candidate, const model::Drive& drive) {
+EffectSize size_of(const BalanceSearch& search, const Eigen::VectorXd& own, const model::Drive& drive) {
   const Eigen::VectorXd& weights = search.base.root_weights;
-  const estimation::ModelProjection by_model(estimation::model_columns(*search.data, search.base.terms), weights);
-  const Eigen::VectorXd own = own_torque(search, candidate, by_model);
   EffectSize size;
   double squares = 0.0, rows = 0.0;
   for (Eigen::Index k = 0; k < own.size(); ++k) {
@@ -160,11 +155,12 @@ void explain_named(BalanceSearch& search, const std::vector<CandidateFit>& candi
     for (const NamedEffect& n : result.named) {
       if (c.effect != n.effect || c.order != n.order || trial_of(n) == candidates.end()) continue;
       c.evidence = evidence(search, *trial_of(n), drive.axis);
-      c.size = size_of(search, *trial_of(n), drive);
+      const Eigen::VectorXd own = own_torque(search, *trial_of(n), search.base.root_weights);
+      c.size = size_of(search, own, drive);
       if (result.verdict != Verdict::confusable_effects) continue;
       for (const NamedEffect& other : result.named)
         if (&other != &n && trial_of(other) != candidates.end())
-          c.confounding_reasons.push_back(compare(search, *trial_of(n), *trial_of(other)));
+          c.confounding_reasons.push_back(compare(search, own, *trial_of(other)));
     }
 }
 

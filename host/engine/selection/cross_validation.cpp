@@ -8,8 +8,8 @@
 #include "host/common/numbers/distributions.hpp"
 #include "host/engine/estimation/balance_fit.hpp"
 #include "host/engine/estimation/least_squares.hpp"
-#include "host/engine/estimation/mixed_model.hpp"
 #include "host/engine/estimation/model_projection.hpp"
+#include "host/engine/estimation/random_effects.hpp"
 #include "host/engine/estimation/record_variance.hpp"
 #include "host/engine/estimation/variable_projection.hpp"
 

@@ -51,7 +51,7 @@ std::vector<Scaling> scalings(const estimation::Identification& base, const Sear
   for (const CandidateFit& candidate : motor.candidates) {
     const catalogue::Entry& entry = *candidate.model.entry;
     if (!is_scaling(entry)) continue;
-    Part part{all_of(own.values).records, {}};
+    Part part{whole_of(own.values).records, {}};
     for (std::size_t j = 0; j < own.parameters.size(); ++j)
       if (base.terms[own.parameters[j]->ref.term].entry->name() == entry.info->modulates)
         part.parameters.push_back(static_cast<Eigen::Index>(j));

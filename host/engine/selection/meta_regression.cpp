@@ -113,7 +113,7 @@ std::vector<std::vector<Eigen::Index>> strata_of(const Eigen::MatrixXd& variance
 
 }  // namespace
 
-Part all_of(const RecordParameters& records) {
+Part whole_of(const RecordParameters& records) {
   Part all;
   for (Eigen::Index i = 0; i < records.theta.rows(); ++i) all.records.push_back(i);
   for (Eigen::Index j = 0; j < records.theta.cols(); ++j) all.parameters.push_back(j);
@@ -138,7 +138,7 @@ double permutation_p_value(const RecordParameters& records, const std::vector<Ei
     }
     return largest;
   };
-  std::vector<Eigen::Index> order = all_of(records).records;
+  std::vector<Eigen::Index> order = whole_of(records).records;
   const double recorded = best(order);
   if (recorded <= 0.0) return 1.0;
   const std::vector<std::vector<Eigen::Index>> strata = strata_of(records.variance);

@@ -53,6 +53,6 @@ double permutation_p_value(const RecordParameters& records, const std::vector<Ei
                            const std::vector<Part>& parts, int permutations, std::uint64_t seed);
 
 // The part that is all of them.
-Part all_of(const RecordParameters& records);
+Part whole_of(const RecordParameters& records);
 
 }  // namespace flexspline::selection
