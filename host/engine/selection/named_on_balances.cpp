@@ -17,10 +17,14 @@ namespace flexspline::selection {
 std::string choose_named(SearchedBalance& chosen) {
   auto& list = chosen.candidates;
   if (auto instead = backward_elimination(chosen.search, list.front())) {
-    std::erase_if(list, [&](const CandidateFit& t) {
+    const auto is_it = [&](const CandidateFit& t) {
       return t.model.entry == instead->model.entry && t.model.order == instead->model.order;
-    });
-    list.insert(list.begin(), std::move(*instead));
+    };
+    // Held-out data and other checks may have refused it already.
+    if (std::none_of(list.begin(), list.end(), [&](const CandidateFit& t) { return is_it(t) && !t.admissible; })) {
+      std::erase_if(list, is_it);
+      list.insert(list.begin(), std::move(*instead));
+    }
   }
   const CandidateFit& first = list.front();
   if (!is_another_law(first, *chosen.search.data)) return {};
