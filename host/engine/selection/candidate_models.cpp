@@ -165,6 +165,26 @@ std::vector<double> likely_orders(const RegressionProblem& data, const catalogue
   return orders;
 }
 
+// Of each linear parameter, the largest torque of a unit over these samples; nonlinear ones are in the middle of their
+// range.
+std::vector<double> largest_torques(const BalanceData& data, const Term& added,
+                                    const std::vector<effects::Inputs<catalogue::Real>>& samples) {
+  std::vector<double> middle = added.values, largest(added.values.size(), 0.0);
+  for (std::size_t p = 0; p < middle.size(); ++p) {
+    if (added.free_linear(p)) middle[p] = 0.0;
+    if (added.free_nonlinear(p))
+      middle[p] = begins_at_zero(added, p) ? 0.0 : estimation::parameter_range(data, added, p).at(0.5);
+  }
+  for (std::size_t p = 0; p < middle.size(); ++p) {
+    if (!added.free_linear(p)) continue;
+    std::vector<double> values = middle, torque(samples.size(), 0.0);
+    values[p] = 1.0;
+    added.entry->real.torque(values.data(), data.prepared().constants, data.balance(), samples, torque.data());
+    for (const double t : torque) largest[p] = std::max(largest[p], std::abs(t));
+  }
+  return largest;
+}
+
 std::size_t free_count(const Terms& terms) {
   std::size_t count = 0;
   for (const Term& t : terms)
@@ -179,6 +199,31 @@ bool may_be_seen(const RegressionProblem& data, const Terms& terms, const catalo
   if (!entry.info->replaces.empty() && !replaced_in(terms, entry)) return false;
   if (!entry.info->modulates.empty() && !replaces_it(terms, entry.info->modulates)) return false;
   return entry.count(Kind::given) > 0 || !has(terms, entry.name());
+}
+
+void leave_out_unseen_direction(const BalanceData& data, Terms& terms) {
+  Term& added = terms.back();
+  const catalogue::Entry& entry = *added.entry;
+  if (entry.has_state || entry.info->phase != Phase::source || !(entry.info->reads & effects::kDirection)) return;
+  std::vector<effects::Inputs<catalogue::Real>> forward, backward;
+  for (const auto& range : data.records()) {
+    const estimation::Record& r = data.prepared().records[range.record];
+    if (r.at_rest || r.experiment->role == data::Role::holdout) continue;
+    for (const std::size_t k : r.rows[estimation::index(data.balance())].samples)
+      if (const double v = r.direction_variable(data.balance(), k); v != 0.0)
+        (v > 0.0 ? forward : backward).push_back(r.inputs[k]);
+  }
+  const double all = static_cast<double>(forward.size() + backward.size());
+  const auto rarer = static_cast<double>(std::min(forward.size(), backward.size()));
+  if (all == 0.0 || rarer > kPolicy.one_way_share * all) return;
+  const auto& seen = forward.size() > backward.size() ? forward : backward;
+  const std::vector<double> sizes = largest_torques(data, added, seen);
+  const double largest = *std::max_element(sizes.begin(), sizes.end());
+  for (std::size_t p = 0; p < sizes.size(); ++p) {
+    if (!added.free_linear(p) || sizes[p] >= kPolicy.unseen_torque * largest) continue;
+    added.known[p] = 1;
+    added.values[p] = 0.0;
+  }
 }
 
 bool states_a_torque(const Terms& terms) {
@@ -259,6 +304,7 @@ std::vector<CandidateModel> candidate_models(const RegressionProblem& data, cons
       for (std::size_t p = 0; p < added.values.size(); ++p)
         if (added.free_nonlinear(p))
           added.values[p] = begins_at_zero(added, p) ? 0.0 : estimation::parameter_range(data, added, p).at(0.5);
+      leave_out_unseen_direction(data, model.terms);
       estimation::set_grid_values(data, model.terms, {model.terms.size() - 1});
       model.added = static_cast<double>(free_count(model.terms)) - static_cast<double>(free_count(terms));
       list.push_back(std::move(model));

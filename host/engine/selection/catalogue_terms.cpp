@@ -237,6 +237,7 @@ std::vector<Extension> extensions_of(const TableBuilder& builder, const Motion& 
       } catch (const model::ModelError&) {
         continue;
       }
+      leave_out_unseen_direction(data, e.terms);
       append_values(std::move(e), data, all);
     }
   }

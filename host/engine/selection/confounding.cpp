@@ -6,6 +6,7 @@
 #include "host/engine/comparison/residual_map.hpp"
 #include "host/engine/comparison/sample_variables.hpp"
 #include "host/engine/estimation/model_projection.hpp"
+#include "host/engine/selection/policy.hpp"
 
 namespace flexspline::selection {
 namespace {
@@ -142,6 +143,17 @@ ConfoundingReason compare_with_model(BalanceSearch& search, const CandidateFit& 
 bool is_scale_confounded(const BalanceSearch& search, const CandidateFit& first, const CandidateFit& second) {
   const unsigned both = first.model.entry->info->reads & second.model.entry->info->reads;
   return (both & effects::kTorqueScale) != 0 && !states_a_torque(search.base.terms);
+}
+
+bool is_angle_confounded(const CandidateFit& first, const CandidateFit& second) {
+  constexpr unsigned kAngle = effects::kMotorAngle | effects::kOutputAngle;
+  constexpr unsigned kMotion = effects::kMotorMotion | effects::kOutputMotion;
+  const unsigned reads = second.model.entry->info->reads;
+  const bool is_of_angle = (reads & kAngle) != 0 && (reads & ~(kAngle | kMotion)) == 0;
+  const bool is_offset =
+      (first.model.entry->info->reads & (effects::kBothDirections | kMotion)) == effects::kBothDirections;
+  return is_offset && is_of_angle && !second.model.order && passes(first) && passes(second) &&
+         second.gain.score >= first.gain.score - kPolicy.confounded_margin;
 }
 
 void explain_named(BalanceSearch& search, const std::vector<CandidateFit>& candidates, const model::Drive& drive,

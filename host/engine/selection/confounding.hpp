@@ -17,6 +17,11 @@ ConfoundingReason compare_with_model(BalanceSearch& search, const CandidateFit& 
 // the measured torque, whose noise differs.
 bool is_scale_confounded(const BalanceSearch& search, const CandidateFit& first, const CandidateFit& second);
 
+// Whether `first` is an offset (it needs both directions and reads no motion), `second` depends on the angle alone, and
+// likelihood does not distinguish them: over a short travel an effect of the angle looks like an offset, although it is
+// no wider form of the same law.
+bool is_angle_confounded(const CandidateFit& first, const CandidateFit& second);
+
 // For each named effect, where it shows and how large its torque is; for effects that are named together, how similar
 // they are in these data: what of the torque of each, orthogonal to the model, is orthogonal to the model with the
 // other as well, and over which variable they do the same.

@@ -17,10 +17,14 @@ namespace flexspline::selection {
 std::string choose_named(SearchedBalance& chosen) {
   auto& list = chosen.candidates;
   if (auto instead = backward_elimination(chosen.search, list.front())) {
-    std::erase_if(list, [&](const CandidateFit& t) {
+    const auto is_it = [&](const CandidateFit& t) {
       return t.model.entry == instead->model.entry && t.model.order == instead->model.order;
-    });
-    list.insert(list.begin(), std::move(*instead));
+    };
+    // Held-out data and other checks may have refused it already.
+    if (std::none_of(list.begin(), list.end(), [&](const CandidateFit& t) { return is_it(t) && !t.admissible; })) {
+      std::erase_if(list, is_it);
+      list.insert(list.begin(), std::move(*instead));
+    }
   }
   const CandidateFit& first = list.front();
   if (!is_another_law(first, *chosen.search.data)) return {};
@@ -70,7 +74,7 @@ std::vector<NamedEffect> likely_names(const SearchedBalance& chosen, const std::
         is_in_group(resampling, list.front(), t);
     // A law with more parameters and the same error is not confounded with the simpler one, as it contains it. One with
     // a slightly smaller error is.
-    const bool wider = t.model.added > list.front().model.added && !t.leads;
+    const bool wider = t.model.added > list.front().model.added && !t.leads && !is_angle_confounded(list.front(), t);
     if ((passes(t) && !wider && (near || is_scale_confounded(chosen.search, list.front(), t))) || name.effect == alias)
       named.push_back(name);
     // Its order is not identifiable, and it may also be the other effect.
@@ -89,6 +93,20 @@ void put_first(Diagnosis& result) {
 }
 
 }  // namespace
+
+void add_effects_of_angle(Resampling& resampling, const SearchedBalance& motor) {
+  const auto has = [](const Resampling::FoundTerm& found, const CandidateFit& t) {
+    return std::any_of(found.group.begin(), found.group.end(),
+                       [&](const NamedEffect& n) { return is_of_family(n, name_of(t)); });
+  };
+  for (Resampling::FoundTerm& found : resampling.found) {
+    const auto first = std::find_if(motor.candidates.begin(), motor.candidates.end(),
+                                    [&](const CandidateFit& t) { return has(found, t); });
+    if (first == motor.candidates.end()) continue;
+    for (const CandidateFit& t : motor.candidates)
+      if (!has(found, t) && is_angle_confounded(*first, t)) found.group.push_back(name_of(t));
+  }
+}
 
 void name_by_likelihood(const SearchedBalance& chosen, const std::string& alias, Diagnosis& result) {
   result.named = likely_names(chosen, alias, result.resampling);

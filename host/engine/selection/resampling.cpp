@@ -106,6 +106,13 @@ bool leaves_noise(const SearchedBalance& e, double whiteness) {
   return whiteness >= kPolicy.white && !(e.names_one() && is_of_effort(e.candidates.front()));
 }
 
+// Whether the likelihood of all data is significant for an effect.
+bool is_significant(const SearchedBalance& motor, const NamedEffect& name) {
+  return std::any_of(motor.candidates.begin(), motor.candidates.end(), [&](const CandidateFit& candidate) {
+    return is_of_family(name.effect, name.order, candidate) && candidate.gain.score > kPolicy.named_score;
+  });
+}
+
 // Whether the names that resampling found may be stated: most of all subsamples chose one, or the squared error on
 // experiments that are held out falls by a term's share, or the likelihood of all data is significant for one. Where
 // the model alone leaves known noise, many subsamples abstain and the others may have selected noise, so that their
@@ -117,10 +124,17 @@ bool may_be_stated(const Resampling& resampling, const Resampling::FoundTerm& fo
       motor.floor.rmse && motor.search.base.rmse() <= (1.0 + kPolicy.floor_uncertainty) * *motor.floor.rmse;
   return std::any_of(found.group.begin(), found.group.end(), [&](const NamedEffect& name) {
     if (is_supported && (!leaves_known_noise || catalogue::get(name.effect).is_presliding())) return true;
-    return std::any_of(motor.candidates.begin(), motor.candidates.end(), [&](const CandidateFit& candidate) {
-      return is_of_family(name.effect, name.order, candidate) && candidate.gain.score > kPolicy.named_score;
-    });
+    return is_significant(motor, name);
   });
+}
+
+// Whether the halves of fewer than three records, of unknown noise, may decide: parts of the same motions agree in what
+// is peculiar to these. So where data are held out, their error has to confirm it, or the likelihood of all data.
+bool carries_over(const Resampling::FoundTerm& found, const SearchedBalance& motor) {
+  if (motor.search.data->records().size() >= estimation::kFewestRecords || motor.floor.rmse || !found.held_out_ratio)
+    return true;
+  return found.is_confirmed() || std::any_of(found.group.begin(), found.group.end(),
+                                             [&](const NamedEffect& name) { return is_significant(motor, name); });
 }
 
 // Whether resampling cannot choose an effect on these data although the model could have it: what corrects the effort,
@@ -160,7 +174,7 @@ std::vector<NamedEffect> names_of(const Resampling& resampling, const SearchedBa
   const bool is_judged_by_few = is_within_floor_of_few_records(motor.search);
   for (const Resampling::FoundTerm& found : resampling.found) {
     if (found.group.empty() || found.refused_by_holdout) continue;
-    if (!may_be_stated(resampling, found, motor)) continue;
+    if (!may_be_stated(resampling, found, motor) || !carries_over(found, motor)) continue;
     if ((is_judged_by_few || found.is_second_choice) && !found.is_confirmed()) continue;
     if (likelier_unseen(resampling, found, motor)) continue;
     if (names.empty() && found.group.size() > 1) return found.group;
