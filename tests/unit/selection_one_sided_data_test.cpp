@@ -51,7 +51,7 @@ std::vector<std::uint8_t> known_on(double amplitude_rad, double drift_rad_s) {
   const data::Experiment e = experiment(amplitude_rad, drift_rad_s, [](double) { return 0.0; });
   const estimation::PreparedData prepared = estimation::prepare({&e}, {}, kOptions);
   Terms terms = extend(estimation::terms_of(testing::plain_model()), catalogue::get("stribeck_gaussian"), std::nullopt);
-  leave_out_unseen_direction(BalanceData(prepared, Balance::motor), terms);
+  leave_out_unseen_direction(RegressionProblem(prepared, Balance::motor), terms);
   for (std::size_t p = 0; p < 2; ++p) EXPECT_TRUE(terms.back().known[p] == 0 || terms.back().values[p] == 0.0);
   return terms.back().known;
 }
@@ -66,7 +66,7 @@ TEST(UnseenDirection, LeavesOutTheAmplitudeThatNoSampleShows) {
 bool are_confounded(double amplitude_rad, const std::function<double(double)>& more) {
   const data::Experiment e = experiment(amplitude_rad, 0.0, more);
   const estimation::PreparedData prepared = estimation::prepare({&e}, {}, kOptions);
-  BalanceData data(prepared, Balance::motor);
+  RegressionProblem data(prepared, Balance::motor);
   const Terms terms = estimation::terms_of(testing::plain_model());
   const Eigen::VectorXd keep = Eigen::VectorXd::Ones(data.rows());
   BalanceSearch search{&data, keep, cross_validate(data, terms, keep)};

@@ -167,7 +167,7 @@ std::vector<double> likely_orders(const RegressionProblem& data, const catalogue
 
 // Of each linear parameter, the largest torque of a unit over these samples; nonlinear ones are in the middle of their
 // range.
-std::vector<double> largest_torques(const BalanceData& data, const Term& added,
+std::vector<double> largest_torques(const RegressionProblem& data, const Term& added,
                                     const std::vector<effects::Inputs<catalogue::Real>>& samples) {
   std::vector<double> middle = added.values, largest(added.values.size(), 0.0);
   for (std::size_t p = 0; p < middle.size(); ++p) {
@@ -201,22 +201,26 @@ bool may_be_seen(const RegressionProblem& data, const Terms& terms, const catalo
   return entry.count(Kind::given) > 0 || !has(terms, entry.name());
 }
 
-void leave_out_unseen_direction(const BalanceData& data, Terms& terms) {
+void leave_out_unseen_direction(const RegressionProblem& data, Terms& terms) {
   Term& added = terms.back();
   const catalogue::Entry& entry = *added.entry;
   if (entry.has_state || entry.info->phase != Phase::source || !(entry.info->reads & effects::kDirection)) return;
-  std::vector<effects::Inputs<catalogue::Real>> forward, backward;
-  for (const auto& range : data.records()) {
-    const estimation::Record& r = data.prepared().records[range.record];
-    if (r.at_rest || r.experiment->role == data::Role::holdout) continue;
-    for (const std::size_t k : r.rows[estimation::index(data.balance())].samples)
-      if (const double v = r.direction_variable(data.balance(), k); v != 0.0)
-        (v > 0.0 ? forward : backward).push_back(r.inputs[k]);
-  }
-  const double all = static_cast<double>(forward.size() + backward.size());
-  const auto rarer = static_cast<double>(std::min(forward.size(), backward.size()));
-  if (all == 0.0 || rarer > kPolicy.one_way_share * all) return;
-  const auto& seen = forward.size() > backward.size() ? forward : backward;
+  // Calls work(record, sample, velocity) for each sample in motion that is fitted on.
+  const auto each_in_motion = [&](const auto& work) {
+    for (const auto& range : data.records()) {
+      const estimation::Record& r = data.prepared().records[range.record];
+      if (r.at_rest || r.experiment->role == data::Role::holdout) continue;
+      for (const std::size_t k : r.rows[estimation::index(data.balance())].samples)
+        if (const double v = r.direction_variable(data.balance(), k); v != 0.0) work(r, k, v);
+    }
+  };
+  double forward = 0.0, backward = 0.0;
+  each_in_motion([&](const estimation::Record&, std::size_t, double v) { (v > 0.0 ? forward : backward) += 1.0; });
+  if (std::min(forward, backward) > kPolicy.one_way_share * (forward + backward) || forward == backward) return;
+  std::vector<effects::Inputs<catalogue::Real>> seen;
+  each_in_motion([&](const estimation::Record& r, std::size_t k, double v) {
+    if ((v > 0.0) == (forward > backward)) seen.push_back(r.inputs[k]);
+  });
   const std::vector<double> sizes = largest_torques(data, added, seen);
   const double largest = *std::max_element(sizes.begin(), sizes.end());
   for (std::size_t p = 0; p < sizes.size(); ++p) {

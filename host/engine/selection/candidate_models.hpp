@@ -49,7 +49,7 @@ bool may_be_seen(const estimation::RegressionProblem& data, const estimation::Te
 
 // Sets the linear parameters of the last term to zero, and known, that act in one direction of motion alone, where the
 // records to fit on hold none of it: nothing would determine their values.
-void leave_out_unseen_direction(const estimation::BalanceData& data, estimation::Terms& terms);
+void leave_out_unseen_direction(const estimation::RegressionProblem& data, estimation::Terms& terms);
 
 // Whether the model states a linear parameter: a torque that the data need not identify.
 bool states_a_torque(const estimation::Terms& terms);
