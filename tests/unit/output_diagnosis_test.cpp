@@ -55,7 +55,7 @@ TEST(DiagnosisAnswer, SaysWhereTheNoiseIsKnownAndWhatTheErrorsLeaveOut) {
   for (std::size_t at = 0; (at = text.find("\n  ", at)) != std::string::npos;) text.replace(at, 3, " ");
   EXPECT_NE(text.find("error 0.002 N*m, 0.003 N*m on data left out of the fit, both without reversals and without the "
                       "delay of the effort; the noise is known in sine only: 0.0005 N*m (from periods), where the "
-                      "error is 2.00 times that"),
+                      "error is 2 times that"),
             std::string::npos)
       << text;
   EXPECT_EQ(diagnosis_json(d).at("base").at("noise_of_some").at("experiments"), nlohmann::json({"sine"}));
