@@ -77,6 +77,18 @@ def false_names(names, verdict, expected):
     return [n for n in names if not true(n)]
 
 
+def wanted_cases(script, wanted):
+    """The cases of expected.json with these names, or all. Ends the script where there are no measurements or no such case."""
+    if not DATA.is_dir():
+        print(f"{script}: no measurements in {DATA}; set FLEXSPLINE_DATA")
+        sys.exit(77)  # skipped, for a test that says so
+    cases = json.loads((HERE / "expected.json").read_text())["cases"]
+    unknown = [w for w in wanted if w not in cases]
+    if unknown:
+        sys.exit(f"{script}: no case {', '.join(unknown)}; there are {', '.join(cases)}")
+    return {case: expected for case, expected in cases.items() if not wanted or case in wanted}
+
+
 def main():
     arguments = sys.argv[1:]
     with_variants = "--variants" in arguments
@@ -84,19 +96,11 @@ def main():
     if not arguments:
         sys.exit(__doc__)
     tool, wanted = arguments[0], arguments[1:]
-    if not DATA.is_dir():
-        print(f"check.py: no measurements in {DATA}; set FLEXSPLINE_DATA")
-        return 77  # skipped, for a test that says so
-    cases = json.loads((HERE / "expected.json").read_text())["cases"]
-    unknown = [w for w in wanted if w not in cases]
-    if unknown:
-        sys.exit(f"check.py: no case {', '.join(unknown)}; there are {', '.join(cases)}")
+    cases = wanted_cases("check.py", wanted)
     failed = required = met = 0
     print("| case | verdict | named | expected | result | s |\n| --- | --- | --- | --- | --- | ---: |")
     with tempfile.TemporaryDirectory() as scratch:
         for case, expected in cases.items():
-            if wanted and case not in wanted:
-                continue
             place = places(case, Path(scratch))
             runs = [("", ())]
             for label, more in runs:

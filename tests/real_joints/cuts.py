@@ -6,7 +6,6 @@ fit on and held-out ones change places. A part has the physics of its joint, so 
 whole log. Prints tables by log and by kind of cut with exact (Clopper-Pearson) bounds, and lists each false name. Exit code 1 where a
 name is false. Measurements are in FLEXSPLINE_DATA, by default ../shared/data next to the project."""
 import collections
-import json
 import re
 import shutil
 import sys
@@ -134,19 +133,11 @@ def main():
     if not arguments or arguments[0].startswith("-"):
         sys.exit(__doc__)
     tool, wanted = arguments[0], arguments[1:]
-    if not check.DATA.is_dir():
-        print(f"cuts.py: no measurements in {check.DATA}; set FLEXSPLINE_DATA")
-        return 77  # skipped, for a test that says so
-    cases = json.loads((HERE / "expected.json").read_text())["cases"]
-    unknown = [w for w in wanted if w not in cases]
-    if unknown:
-        sys.exit(f"cuts.py: no case {', '.join(unknown)}; there are {', '.join(cases)}")
+    cases = check.wanted_cases("cuts.py", wanted)
     started = time.monotonic()
     by_log, by_kind, listed = collections.defaultdict(list), collections.defaultdict(list), []
     with tempfile.TemporaryDirectory() as scratch:
         for case, expected in cases.items():
-            if wanted and case not in wanted:
-                continue
             results, lines = run_case(tool, case, expected, Path(scratch), "--show-all" in sys.argv)
             listed += lines
             for kind, outcome in results:

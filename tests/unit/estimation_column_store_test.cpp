@@ -6,6 +6,7 @@
 
 #include "host/engine/estimation/identify.hpp"
 #include "tests/support/plain_model.hpp"
+#include "tests/support/written_experiment.hpp"
 
 namespace flexspline::estimation {
 namespace {
@@ -89,19 +90,11 @@ TEST(ColumnKey, HoldsTheEffectsThatChangeTheInputsOfATermAndNoOthers) {
 
 // An axis that moves as a sum of two sines, with friction.
 data::Experiment moving_axis() {
-  data::Experiment e;
-  e.name = "sines";
-  e.sample_s = 1e-3;
-  e.current_hold = data::CurrentHold::none;
-  for (std::size_t k = 0; k < 5000; ++k) {
-    const double t = 1e-3 * static_cast<double>(k);
+  return testing::written_experiment("sines", 1e-3, 5000, [](double t, data::Experiment& e) {
     const double w = 6.0 * std::cos(4.0 * t) + 3.0 * std::cos(13.0 * t);
-    e.time_s.push_back(t);
     e[data::Column::motor_position].push_back(1.5 * std::sin(4.0 * t) + 3.0 / 13.0 * std::sin(13.0 * t));
     e[data::Column::motor_torque].push_back(4e-3 * w + std::copysign(0.05, w));
-  }
-  e.segments = {{0, e.size()}};
-  return e;
+  });
 }
 
 class RegressorEvaluatorOfSines : public ::testing::Test {

@@ -5,50 +5,23 @@
 #include <algorithm>
 #include <cmath>
 #include <functional>
-#include <random>
 
 #include "host/engine/selection/candidate_models.hpp"
 #include "host/engine/selection/confounding.hpp"
 #include "tests/support/plain_model.hpp"
+#include "tests/support/two_sines.hpp"
 
 namespace flexspline::selection {
 namespace {
 
-using data::Column;
 using estimation::Balance;
 
-constexpr double kTurn = 6.283185307179586;
 const estimation::PipelineOptions kOptions{20.0, true};
-
-// Inertia, viscous and Coulomb friction and something more over the angle, with noise of 1 % of the friction.
-data::Experiment experiment(double amplitude_rad, double drift_rad_s, const std::function<double(double)>& more) {
-  std::mt19937_64 random(1);
-  std::normal_distribution<double> noise(0.0, 5e-4);
-  data::Experiment e;
-  e.name = "written down";
-  e.sample_s = 2e-3;
-  e.current_hold = data::CurrentHold::none;
-  for (std::size_t k = 0; k < 6000; ++k) {
-    const double t = 2e-3 * static_cast<double>(k);
-    double q = drift_rad_s * t, w = drift_rad_s, a = 0.0;
-    for (const auto& [share, frequency_hz] : {std::pair{0.7, 0.2123}, {0.3, 0.7183}}) {
-      const double rate = kTurn * frequency_hz;
-      q += share * amplitude_rad * std::sin(rate * t);
-      w += share * amplitude_rad * rate * std::cos(rate * t);
-      a -= share * amplitude_rad * rate * rate * std::sin(rate * t);
-    }
-    e.time_s.push_back(t);
-    e[Column::motor_position].push_back(q);
-    e[Column::motor_torque].push_back(1e-3 * a + 4e-3 * w + std::copysign(0.05, w) + more(q) + noise(random));
-  }
-  e.segments = {{0, e.size()}};
-  return e;
-}
 
 // Which of the two amplitudes of Stribeck friction and its velocity are known, after the missing direction was left
 // out.
 std::vector<std::uint8_t> known_on(double amplitude_rad, double drift_rad_s) {
-  const data::Experiment e = experiment(amplitude_rad, drift_rad_s, [](double) { return 0.0; });
+  const data::Experiment e = testing::two_sines(amplitude_rad, drift_rad_s, [](double, double) { return 0.0; });
   const estimation::PreparedData prepared = estimation::prepare({&e}, {}, kOptions);
   Terms terms = extend(estimation::terms_of(testing::plain_model()), catalogue::get("stribeck_gaussian"), std::nullopt);
   leave_out_unseen_direction(RegressionProblem(prepared, Balance::motor), terms);
@@ -64,7 +37,7 @@ TEST(UnseenDirection, LeavesOutTheAmplitudeThatNoSampleShows) {
 
 // Whether an offset and gravity are one group on such a record.
 bool are_confounded(double amplitude_rad, const std::function<double(double)>& more) {
-  const data::Experiment e = experiment(amplitude_rad, 0.0, more);
+  const data::Experiment e = testing::two_sines(amplitude_rad, 0.0, [&](double, double q) { return more(q); });
   const estimation::PreparedData prepared = estimation::prepare({&e}, {}, kOptions);
   RegressionProblem data(prepared, Balance::motor);
   const Terms terms = estimation::terms_of(testing::plain_model());

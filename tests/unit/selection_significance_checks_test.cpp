@@ -6,45 +6,17 @@
 
 #include <cmath>
 #include <functional>
-#include <random>
 
 #include "tests/support/plain_model.hpp"
 #include "tests/support/ripple_candidate.hpp"
+#include "tests/support/two_sines.hpp"
 
 namespace flexspline::selection {
 namespace {
 
-using data::Column;
 using estimation::Balance;
 
-constexpr double kTurn = 6.283185307179586;
 const estimation::PipelineOptions kOptions{20.0, true};
-
-// Inertia, viscous and Coulomb friction, and something more, with noise of 1 % of the friction.
-data::Experiment experiment(double amplitude_rad, double drift_rad_s,
-                            const std::function<double(double t, double q)>& more) {
-  std::mt19937_64 random(1);
-  std::normal_distribution<double> noise(0.0, 5e-4);
-  data::Experiment e;
-  e.name = "written down";
-  e.sample_s = 2e-3;
-  e.current_hold = data::CurrentHold::none;
-  for (std::size_t k = 0; k < 6000; ++k) {
-    const double t = 2e-3 * static_cast<double>(k);
-    double q = drift_rad_s * t, w = drift_rad_s, a = 0.0;
-    for (const auto& [share, frequency_hz] : {std::pair{0.7, 0.2123}, {0.3, 0.7183}}) {
-      const double rate = kTurn * frequency_hz;
-      q += share * amplitude_rad * std::sin(rate * t);
-      w += share * amplitude_rad * rate * std::cos(rate * t);
-      a -= share * amplitude_rad * rate * rate * std::sin(rate * t);
-    }
-    e.time_s.push_back(t);
-    e[Column::motor_position].push_back(q);
-    e[Column::motor_torque].push_back(1e-3 * a + 4e-3 * w + std::copysign(0.05, w) + more(t, q) + noise(random));
-  }
-  e.segments = {{0, e.size()}};
-  return e;
-}
 
 double ripple(double, double q) {
   return 0.02 * std::cos(3.0 * q + 0.4);
@@ -71,27 +43,27 @@ CandidateFit checked(const data::Experiment& e, double first = 0.0, double last 
 }
 
 TEST(CheckOrders, AnOrderThatManyTurnsShowPasses) {
-  const CandidateFit candidate = checked(experiment(20.0, 0.0, ripple));
+  const CandidateFit candidate = checked(testing::two_sines(20.0, 0.0, ripple));
   EXPECT_TRUE(candidate.admissible) << candidate.why_not;
   EXPECT_TRUE(candidate.note.empty());
 }
 
 TEST(CheckOrders, AFractionOfATurnCannotTellAnOrderFromOneThatNoDriveHas) {
-  const CandidateFit candidate = checked(experiment(0.5, 0.0, ripple));
+  const CandidateFit candidate = checked(testing::two_sines(0.5, 0.0, ripple));
   EXPECT_FALSE(candidate.admissible);
   EXPECT_NE(candidate.why_not.find("too short to distinguish orders"), std::string::npos) << candidate.why_not;
 }
 
 TEST(CheckOrders, WhatShowsInAFewPartsOfTheDataIsNoPropertyOfTheDrive) {
-  const CandidateFit few = checked(experiment(20.0, 0.0, ripple), 0.25, 0.7);
+  const CandidateFit few = checked(testing::two_sines(20.0, 0.0, ripple), 0.25, 0.7);
   EXPECT_FALSE(few.admissible);
   EXPECT_EQ(few.why_not, "it shows in 4 of 8 parts of the data only");
-  EXPECT_TRUE(checked(experiment(20.0, 0.0, ripple), 0.125, 0.95).admissible) << "seven parts are enough";
+  EXPECT_TRUE(checked(testing::two_sines(20.0, 0.0, ripple), 0.125, 0.95).admissible) << "seven parts are enough";
 }
 
 TEST(OneDirectionWarning, IsGivenWhereTheAxisHardlyComesBack) {
   const auto warning = [](double amplitude_rad, double drift_rad_s) {
-    const data::Experiment e = experiment(amplitude_rad, drift_rad_s, ripple);
+    const data::Experiment e = testing::two_sines(amplitude_rad, drift_rad_s, ripple);
     const estimation::PreparedData prepared = estimation::prepare({&e}, {}, kOptions);
     return one_direction_warning(RegressionProblem(prepared, Balance::motor));
   };

@@ -165,24 +165,34 @@ std::vector<double> likely_orders(const RegressionProblem& data, const catalogue
   return orders;
 }
 
-// Of each linear parameter, the largest torque of a unit over these samples; nonlinear ones are in the middle of their
+// Inputs of a sample in motion with its direction as a pure sign. Smoothed over the noise of the velocity it would
+// leave a small part of what acts the other way.
+effects::Inputs<catalogue::Real> with_sign(effects::Inputs<catalogue::Real> in, Balance balance, double sign) {
+  (balance == Balance::motor  ? in.direction
+   : balance == Balance::load ? in.output_direction
+                              : in.torsion_direction) = sign;
+  return in;
+}
+
+// Linear parameters of which one unit adds no torque at any of these samples; nonlinear ones are in the middle of their
 // range.
-std::vector<double> largest_torques(const RegressionProblem& data, const Term& added,
-                                    const std::vector<effects::Inputs<catalogue::Real>>& samples) {
-  std::vector<double> middle = added.values, largest(added.values.size(), 0.0);
+std::vector<std::size_t> without_torque(const RegressionProblem& data, const Term& added,
+                                        const std::vector<effects::Inputs<catalogue::Real>>& samples) {
+  std::vector<double> middle = added.values;
   for (std::size_t p = 0; p < middle.size(); ++p) {
     if (added.free_linear(p)) middle[p] = 0.0;
     if (added.free_nonlinear(p))
       middle[p] = begins_at_zero(added, p) ? 0.0 : estimation::parameter_range(data, added, p).at(0.5);
   }
+  std::vector<std::size_t> unseen;
   for (std::size_t p = 0; p < middle.size(); ++p) {
     if (!added.free_linear(p)) continue;
     std::vector<double> values = middle, torque(samples.size(), 0.0);
     values[p] = 1.0;
     added.entry->real.torque(values.data(), data.prepared().constants, data.balance(), samples, torque.data());
-    for (const double t : torque) largest[p] = std::max(largest[p], std::abs(t));
+    if (std::all_of(torque.begin(), torque.end(), [](double t) { return t == 0.0; })) unseen.push_back(p);
   }
-  return largest;
+  return unseen;
 }
 
 std::size_t free_count(const Terms& terms) {
@@ -217,14 +227,14 @@ void leave_out_unseen_direction(const RegressionProblem& data, Terms& terms) {
   double forward = 0.0, backward = 0.0;
   each_in_motion([&](const estimation::Record&, std::size_t, double v) { (v > 0.0 ? forward : backward) += 1.0; });
   if (std::min(forward, backward) > kPolicy.one_way_share * (forward + backward) || forward == backward) return;
+  const double sign = forward > backward ? 1.0 : -1.0;
   std::vector<effects::Inputs<catalogue::Real>> seen;
   each_in_motion([&](const estimation::Record& r, std::size_t k, double v) {
-    if ((v > 0.0) == (forward > backward)) seen.push_back(r.inputs[k]);
+    if (v * sign > 0.0) seen.push_back(with_sign(r.inputs[k], data.balance(), sign));
   });
-  const std::vector<double> sizes = largest_torques(data, added, seen);
-  const double largest = *std::max_element(sizes.begin(), sizes.end());
-  for (std::size_t p = 0; p < sizes.size(); ++p) {
-    if (!added.free_linear(p) || sizes[p] >= kPolicy.unseen_torque * largest) continue;
+  const std::vector<std::size_t> unseen = without_torque(data, added, seen);
+  if (unseen.size() == entry.count(Kind::linear)) return;  // another cause than the direction
+  for (const std::size_t p : unseen) {
     added.known[p] = 1;
     added.values[p] = 0.0;
   }

@@ -157,9 +157,6 @@ struct SelectionPolicy {
   double least_direction_share = 0.1;   // samples of the rarer direction that make a record one of both directions
   int fewest_one_way_records = 3;       // of each direction, where no record has both
   double one_way_share = 0.01;          // samples of the rarer direction below which data count as one way
-  // Largest torque of a parameter over that of the effect's other ones, at the same value: below, it acts only in the
-  // direction that is missing (what is left there is rounding).
-  double unseen_torque = 1e-6;
 
   // Disturbances (by hand: pushes on a simulated axis, against bursts that filters make of friction at reversals).
   double far_out = 6.0;           // robust standard deviations
