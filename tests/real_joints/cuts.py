@@ -1,9 +1,9 @@
 #!/usr/bin/env python3
-"""Runs `flexspline diagnose` on parts of the logs of real joints: cuts.py TOOL [--show-all] [CASE...]
+"""Runs `flexspline diagnose` on parts of the logs of real joints: cuts.py TOOL [--without-holdout] [--show-all] [CASE...]
 
 Each record to fit on is cut into halves and thirds and thinned to every second sample; of several records one is left out; records to
 fit on and held-out ones change places. A part has the physics of its joint, so a name must be one that expected.json defends for the
-whole log. Prints tables by log and by kind of cut with exact (Clopper-Pearson) bounds, and lists each false name. Exit code 1 where a
+whole log. --without-holdout gives the tool the records to fit on alone. Prints tables by log and by kind of cut with exact (Clopper-Pearson) bounds, and lists each false name. Exit code 1 where a
 name is false. Measurements are in FLEXSPLINE_DATA, by default ../shared/data next to the project."""
 import collections
 import re
@@ -109,14 +109,18 @@ def table(title, groups):
         yield f"| {name} | {len(outcomes)} | " + " | ".join(str(count[o]) for o in OUTCOMES) + f" | {bounds} |"
 
 
-def run_case(tool, case, expected, scratch, show_all):
+def run_case(tool, case, expected, scratch, show_all, with_holdout):
     """Kind and outcome of each cut of a log, and a line for each false one."""
     place = check.places(case, scratch / "whole")
-    whole = diagnose_runs.diagnose(tool, *place)
+
+    def diagnose(model, fit, holdout):
+        return diagnose_runs.diagnose(tool, model, fit, holdout if with_holdout else None)
+
+    whole = diagnose(*place)
     whole_names = [] if isinstance(whole, str) else check.names_of(whole)
     results, lines = [], []
     for kind, label, cut in cuts(place, scratch / case):
-        answer = diagnose_runs.diagnose(tool, *cut)
+        answer = diagnose(*cut)
         outcome, names, false = outcome_of(answer, whole_names, expected)
         results.append((kind, outcome))
         if show_all:
@@ -129,7 +133,8 @@ def run_case(tool, case, expected, scratch, show_all):
 
 
 def main():
-    arguments = [a for a in sys.argv[1:] if a != "--show-all"]
+    options = {"--show-all", "--without-holdout"} & set(sys.argv[1:])
+    arguments = [a for a in sys.argv[1:] if a not in options]
     if not arguments or arguments[0].startswith("-"):
         sys.exit(__doc__)
     tool, wanted = arguments[0], arguments[1:]
@@ -138,7 +143,7 @@ def main():
     by_log, by_kind, listed = collections.defaultdict(list), collections.defaultdict(list), []
     with tempfile.TemporaryDirectory() as scratch:
         for case, expected in cases.items():
-            results, lines = run_case(tool, case, expected, Path(scratch), "--show-all" in sys.argv)
+            results, lines = run_case(tool, case, expected, Path(scratch), "--show-all" in options, "--without-holdout" not in options)
             listed += lines
             for kind, outcome in results:
                 by_log[case].append(outcome)

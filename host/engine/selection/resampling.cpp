@@ -99,10 +99,12 @@ bool explains_instead(const Resampling& resampling, const CandidateFit& first) {
 
 // Whether the model with the best effect leaves noise: then likelihood alone decides. Where more than one effect is
 // missing, structure remains whatever is added, and a small decrease proves nothing. Where the noise floor is unknown,
-// the residual must be white, and an effect of the effort alone is not taken, as it may explain its own noise.
+// the residual must be white, of three records or more, as what is peculiar to one motion may be white in its own
+// record; and an effect of the effort alone is not taken, as it may explain its own noise.
 bool leaves_noise(const SearchedBalance& e, double whiteness) {
   const CrossValidatedFit& fit = e.names_one() ? e.candidates.front().fit : e.search.base;
   if (e.floor.rmse) return fit.rmse() < kPolicy.at_floor * *e.floor.rmse;
+  if (e.search.data->records().size() < estimation::kFewestRecords) return false;
   return whiteness >= kPolicy.white && !(e.names_one() && is_of_effort(e.candidates.front()));
 }
 
