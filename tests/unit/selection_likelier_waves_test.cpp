@@ -1,7 +1,7 @@
 // Which of two effects of one order over the motor's angle is named where an error of the phase makes them alike.
 #include <gtest/gtest.h>
 
-#include "host/engine/selection/resampling.hpp"
+#include "host/engine/selection/named_by_resampling.hpp"
 
 namespace flexspline::selection {
 namespace {

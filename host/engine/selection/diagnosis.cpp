@@ -16,6 +16,7 @@
 #include "host/engine/selection/disturbances.hpp"
 #include "host/engine/selection/friction_scaling.hpp"
 #include "host/engine/selection/held_out.hpp"
+#include "host/engine/selection/named_by_resampling.hpp"
 #include "host/engine/selection/named_on_balances.hpp"
 #include "host/engine/selection/other_balance_evidence.hpp"
 #include "host/engine/selection/policy.hpp"

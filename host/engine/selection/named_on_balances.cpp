@@ -7,9 +7,9 @@
 
 #include "host/engine/selection/candidate_fits.hpp"
 #include "host/engine/selection/confounding.hpp"
+#include "host/engine/selection/named_by_resampling.hpp"
 #include "host/engine/selection/other_balance_evidence.hpp"
 #include "host/engine/selection/policy.hpp"
-#include "host/engine/selection/resampling.hpp"
 
 namespace flexspline::selection {
 

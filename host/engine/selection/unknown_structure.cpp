@@ -8,8 +8,8 @@
 #include "host/engine/estimation/in_parallel.hpp"
 #include "host/engine/selection/candidate_fits.hpp"
 #include "host/engine/selection/diagnosis.hpp"
+#include "host/engine/selection/named_by_resampling.hpp"
 #include "host/engine/selection/policy.hpp"
-#include "host/engine/selection/resampling.hpp"
 #include "host/physics/catalogue/user_defined_effect.hpp"
 
 namespace flexspline::selection {

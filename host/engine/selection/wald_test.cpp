@@ -3,8 +3,8 @@
 #include <algorithm>
 
 #include "host/common/numbers/distributions.hpp"
+#include "host/engine/selection/named_by_resampling.hpp"
 #include "host/engine/selection/policy.hpp"
-#include "host/engine/selection/resampling.hpp"
 
 namespace flexspline::selection {
 

@@ -1,0 +1,43 @@
+// What is named of what resampling found on the motor's balance.
+#pragma once
+
+#include <vector>
+
+#include "host/engine/selection/diagnosis.hpp"
+#include "host/engine/selection/searched_balance.hpp"
+
+namespace flexspline::selection {
+
+// Whether two names are one, or two laws of a family: resampling has the nonlinear parameters at fixed values only, and
+// one law of presliding for all, so likelihood decides which law of the family it is.
+bool is_of_family(const NamedEffect& a, const NamedEffect& b);
+
+// An error of the phase, of a filter or an elastic gear, makes of a wave what a law of friction over the angle is.
+// Halves of the data take either for the other, so likelihood decides which it is, or that both are one group.
+void take_likelier_waves(Resampling& resampling, const SearchedBalance& motor);
+
+// Whether all data contradict what their halves chose: with it, the likelihood of the data left out of the fit falls
+// significantly, and their error rises. The halves are parts of the same motions, and agree in what those have in
+// common; then the held-out error has to fall by as much as an effect that matters. Presliding is not judged, as the
+// likelihood leaves out reversals.
+bool is_contradicted(const Resampling::FoundTerm& found, const SearchedBalance& motor);
+
+// Whether resampling decides the verdict on the motor's balance. Likelihood has more power where exactly one effect is
+// missing: it decides where the halves of the data show nothing above the noise, and where resampling does not
+// contradict it.
+bool resampling_decides(const Resampling& resampling, const SearchedBalance& motor);
+
+// The effects to name: single ones, or a group that these data cannot distinguish. Of a family of laws the one that
+// fits all data best.
+struct StableNames {
+  std::vector<NamedEffect> names;
+  bool is_group = false;
+};
+StableNames stable_names(const Resampling& resampling, const SearchedBalance& motor);
+// Whether it names any effect.
+bool names_any(const Resampling& resampling, const SearchedBalance& motor);
+
+// Names the effects that resampling found in the catalogue, if any. Their candidates come first.
+void name_stable(SearchedBalance& chosen, Diagnosis& result);
+
+}  // namespace flexspline::selection
