@@ -80,24 +80,14 @@ void find_terms(const StabilitySelection& selection, const estimation::Terms& te
   }
 }
 
-// Whether a structure of no catalogue does not show on the experiments that are held out.
-bool is_unconfirmed_structure(const Resampling::FoundTerm& f) {
-  return f.group.empty() && f.held_out_ratio && !f.is_confirmed();
-}
-
-// A term that the held-out error refuses takes the place of what is there, and so may a structure of no catalogue that
-// is found alone and that the held-out error does not confirm: chooses again without such terms. What is found then has
-// to be confirmed by the held-out error.
+// A term that the held-out error refuses takes the place of what is there: chooses again without such terms. What is
+// found then has to be confirmed by the held-out error.
 void find_instead_of_refused(StabilitySelection& selection, const estimation::Terms& terms, Resampling& result) {
   std::vector<Resampling::FoundTerm> refused;
   std::vector<std::string> names;
   const std::vector<FoundTerm> decided = decide(selection.result(), kPolicy);
-  const bool is_none_found = std::all_of(result.found.begin(), result.found.end(), [](const auto& f) {
-    return f.refused_by_holdout || is_unconfirmed_structure(f);
-  });
   for (std::size_t i = 0; i < decided.size(); ++i) {
-    const Resampling::FoundTerm& found = result.found[i];
-    if (!found.refused_by_holdout && !(is_none_found && is_unconfirmed_structure(found))) continue;
+    if (!result.found[i].refused_by_holdout) continue;
     refused.push_back(result.found[i]);
     for (const Frequency& f : decided[i].group) names.push_back(f.name);
   }
