@@ -3,8 +3,8 @@
 
 Each record to fit on is cut into halves and thirds and thinned to every second sample; of several records one is left out; records to
 fit on and held-out ones change places. A part has the physics of its joint, so a name must be one that expected.json defends for the
-whole log. --without-holdout gives the tool the records to fit on alone. Prints tables by log and by kind of cut with exact (Clopper-Pearson) bounds, and lists each false name. Exit code 1 where a
-name is false. Measurements are in FLEXSPLINE_DATA, by default ../shared/data next to the project."""
+whole log. --without-holdout gives the tool the records to fit on alone. Prints tables by log and by kind of cut with exact
+(Clopper-Pearson) bounds, and lists each false name. Exit code 1 where a name is false. Measurements are in FLEXSPLINE_DATA, by default ../shared/data next to the project."""
 import collections
 import re
 import shutil
