@@ -166,14 +166,16 @@ void take_back_unconfirmed_scaling(const estimation::Identification& base, const
                                    Diagnosis& result) {
   // So much of the signal's variance within records shows the effect there.
   constexpr double kShownWithin = 0.25;
-  const auto is_open = [&](const NamedEffect& n) {
-    return !n.order && is_scaling(catalogue::get(n.effect)) && !is_confirmed_by_held_out(result, n);
-  };
+  const auto is_scaled = [](const NamedEffect& n) { return !n.order && is_scaling(catalogue::get(n.effect)); };
   if (result.verdict == Verdict::confusable_effects ||
-      std::none_of(result.named.begin(), result.named.end(), is_open) ||
+      std::none_of(result.named.begin(), result.named.end(), is_scaled) ||
       share_within_records(*motor.search.data) > kShownWithin)
     return;
   const RecordFriction own = friction_by_record(base, *motor.search.data, 1);
+  const bool has_test = own.records.size() >= kPolicy.fewest_of_scaling;
+  const auto is_open = [&](const NamedEffect& n) {
+    return is_scaled(n) && (has_test || !is_confirmed_by_held_out(result, n));
+  };
   const std::vector<Scaling> all = scalings(base, motor, own);
   std::vector<NamedEffect> kept;
   for (const NamedEffect& n : result.named) {

@@ -14,8 +14,9 @@ namespace flexspline::selection {
 // one is named.
 bool name_scaling(const estimation::Identification& base, const SearchedBalance& motor, Diagnosis& result);
 
-// Takes back such effects that halves of the data chose and that the records do not confirm, unless held-out
-// experiments do. Lists them as possible.
+// Takes back such effects that halves of the data chose and that the records do not confirm. Of fewer records than a
+// test needs, held-out experiments may confirm it instead: of more, these are few and go with any drift by chance.
+// Lists what is taken back as possible.
 void take_back_unconfirmed_scaling(const estimation::Identification& base, const SearchedBalance& motor,
                                    Diagnosis& result);
 

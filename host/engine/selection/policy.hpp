@@ -196,7 +196,7 @@ struct SelectionPolicy {
   double trend_p_value = 1e-3;        // after the correction for what was tried
   double range_p_value = 0.01;        // of a law that holds for the slower or the faster records: is told, not named
   std::size_t fewest_of_scaling = 4;  // records: with fewer a line through them has one degree of freedom
-  double scaling_p_value = 0.01;      // of an effect that scales friction by a recorded signal, for all that were tried
+  double scaling_p_value = 1e-3;      // of an effect that scales friction by a recorded signal, for all that were tried
   double trend_size = 0.03;           // of the parameter, over the records
   double least_drift = 0.01;          // relative standard deviation of friction between records that is reported
   double drift_deviance = 12.0;       // twice the log-likelihood ratio of random effects against none
