@@ -162,6 +162,11 @@ bool name_scaling(const estimation::Identification& base, const SearchedBalance&
   return true;
 }
 
+bool is_shown_between_records(std::size_t records, double p_value, bool held_out_confirms) {
+  if (p_value <= kPolicy.wald_p_value) return true;
+  return records < kPolicy.fewest_of_scaling && held_out_confirms;
+}
+
 void take_back_unconfirmed_scaling(const estimation::Identification& base, const SearchedBalance& motor,
                                    Diagnosis& result) {
   // So much of the signal's variance within records shows the effect there.
@@ -172,16 +177,13 @@ void take_back_unconfirmed_scaling(const estimation::Identification& base, const
       share_within_records(*motor.search.data) > kShownWithin)
     return;
   const RecordFriction own = friction_by_record(base, *motor.search.data, 1);
-  const bool has_test = own.records.size() >= kPolicy.fewest_of_scaling;
-  const auto is_open = [&](const NamedEffect& n) {
-    return is_scaled(n) && (has_test || !is_confirmed_by_held_out(result, n));
-  };
   const std::vector<Scaling> all = scalings(base, motor, own);
   std::vector<NamedEffect> kept;
   for (const NamedEffect& n : result.named) {
     const auto at = std::find_if(all.begin(), all.end(),
                                  [&](const Scaling& s) { return s.candidate->model.entry->name() == n.effect; });
-    if (!is_open(n) || at == all.end() || p_value_of_all(*at, all) <= kPolicy.wald_p_value)
+    if (!is_scaled(n) || at == all.end() ||
+        is_shown_between_records(own.records.size(), p_value_of_all(*at, all), is_confirmed_by_held_out(result, n)))
       kept.push_back(n);
     else
       list_as_possible(n, own.records.size(), p_value_of_all(*at, all), result);

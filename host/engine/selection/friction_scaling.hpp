@@ -14,9 +14,11 @@ namespace flexspline::selection {
 // one is named.
 bool name_scaling(const estimation::Identification& base, const SearchedBalance& motor, Diagnosis& result);
 
-// Takes back such effects that halves of the data chose and that the records do not confirm. Of fewer records than a
-// test needs, held-out experiments may confirm it instead: of more, these are few and go with any drift by chance.
-// Lists what is taken back as possible.
+// Whether the records show such an effect that halves of the data chose. Of fewer records than a test needs, held-out
+// experiments may confirm it instead; of more, these are few and go with any drift of the friction by chance.
+bool is_shown_between_records(std::size_t records, double p_value, bool held_out_confirms);
+
+// Takes back what halves of the data chose and the records do not show, and lists it as possible.
 void take_back_unconfirmed_scaling(const estimation::Identification& base, const SearchedBalance& motor,
                                    Diagnosis& result);
 
