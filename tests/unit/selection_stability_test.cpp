@@ -78,5 +78,20 @@ TEST_F(SelectionOnHalves, WithoutATermChoosesAmongTheOthersAndWithItAgainTheSame
   EXPECT_GT(frequency(other, "viscous_asymmetry"), 0.9);
 }
 
+TEST(CandidateTables, PreslidingShowsAtBandwidthsOfTheMotionAloneAsLawsOfFrictionDo) {
+  CandidateTables tables;
+  tables.bandwidth.highest_hz = 20.0;
+  EXPECT_FALSE(tables.shows_presliding({20.0, false})) << "the model has no friction that it may replace";
+  tables.table.presliding.emplace();
+  EXPECT_TRUE(tables.shows_presliding({20.0, false}));
+  EXPECT_FALSE(tables.shows_presliding({20.0, true})) << "reversals are left out";
+  EXPECT_FALSE(tables.shows_presliding({40.0, false})) << "a bandwidth of waves";
+  CandidateTerm law, wave;
+  wave.highest_hz = 18.0;
+  EXPECT_TRUE(tables.may_enter(law, 20.0));
+  EXPECT_FALSE(tables.may_enter(law, 40.0));
+  EXPECT_TRUE(tables.may_enter(wave, 40.0));
+}
+
 }  // namespace
 }  // namespace flexspline::selection

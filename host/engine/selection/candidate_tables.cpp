@@ -65,6 +65,10 @@ std::optional<PreslidingTravels> best_presliding_travels(const estimation::Prepa
   return best;
 }
 
+bool is_of_motion(double cutoff_hz, const Bandwidth& bandwidth) {
+  return cutoff_hz <= 1.01 * bandwidth.highest_hz;
+}
+
 }  // namespace
 
 const catalogue::Entry* presliding_law(const estimation::Terms& terms) {
@@ -84,7 +88,11 @@ const catalogue::Entry* presliding_law(const estimation::Terms& terms) {
 
 bool CandidateTables::may_enter(const CandidateTerm& term, double cutoff_hz) const {
   return term.highest_hz <= kTakenShare * cutoff_hz &&
-         (cutoff_hz <= 1.01 * bandwidth.highest_hz || term.highest_hz > 0.35 * bandwidth.highest_hz);
+         (is_of_motion(cutoff_hz, bandwidth) || term.highest_hz > 0.35 * bandwidth.highest_hz);
+}
+
+bool CandidateTables::shows_presliding(const std::pair<double, bool>& setting) const {
+  return table.presliding && !setting.second && is_of_motion(setting.first, bandwidth);
 }
 
 CandidateTables make_tables(const std::vector<const data::Experiment*>& experiments, const model::Drive& drive,

@@ -18,6 +18,9 @@ struct CandidateTables {
 
   // Whether a term can be seen at a bandwidth: waves below it, and above the motion's bandwidth waves alone.
   bool may_enter(const CandidateTerm& term, double cutoff_hz) const;
+  // Whether a subsample of a setting may count for presliding, or against it: as of any law of friction, only at a
+  // bandwidth of the motion; and there is none without reversals.
+  bool shows_presliding(const std::pair<double, bool>& setting) const;
 };
 
 // The simplest effect that puts a state of presliding in the place of the sign of an effect of the model; null where

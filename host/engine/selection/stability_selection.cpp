@@ -184,7 +184,8 @@ const std::string& name_of(const RegressorTable& table, int term) {
 
 // Counts a subsample that does not abstain: each name once, although a law may have been taken at two values of its
 // nonlinear parameter. Returns the share of the excess that its steps explain.
-double count_steps(const RegressorTable& table, const SelectionPath& vote, bool mask, Counts& counts) {
+double count_steps(const RegressorTable& table, const SelectionPath& vote, bool mask, bool shows_presliding,
+                   Counts& counts) {
   struct Chosen {
     double share = 0.0;
     std::set<std::string> alternatives;
@@ -199,6 +200,11 @@ double count_steps(const RegressorTable& table, const SelectionPath& vote, bool 
     near.insert(s.alternatives.begin(), s.alternatives.end());
     sum += s.of_all;
   }
+  if (!shows_presliding) {
+    chosen.erase(kPresliding);
+    near.erase(kPresliding);
+    for (auto& [name, one] : chosen) one.alternatives.erase(kPresliding);
+  }
   for (const auto& [name, one] : chosen) {
     Count& c = counts[name];
     c.was += 1.0;
@@ -208,7 +214,8 @@ double count_steps(const RegressorTable& table, const SelectionPath& vote, bool 
     near.insert(name);
   }
   for (const std::string& name : near) counts[name].near[mask ? 1 : 0] += 1.0;
-  if (!vote.steps.empty()) counts[name_of(table, vote.steps.front().term)].first += 1.0;
+  if (!vote.steps.empty() && (shows_presliding || vote.steps.front().term != kPreslidingTerm))
+    counts[name_of(table, vote.steps.front().term)].first += 1.0;
   return sum;
 }
 
@@ -247,7 +254,8 @@ void StabilitySelection::count() {
       const CandidateTerm& term = table.terms[static_cast<std::size_t>(t)];
       open[term.name] = &term;
     }
-    if (tables_.table.presliding && !tables_.settings[i].second) open[kPresliding] = nullptr;
+    const bool shows_presliding = tables_.shows_presliding(tables_.settings[i]);
+    if (shows_presliding) open[kPresliding] = nullptr;
     for (const SelectionPath& vote : per_setting_[i].votes) {
       result_.subsamples += 1.0;
       for (const auto& [name, term] : open) counts[name].open[tables_.settings[i].second ? 1 : 0] += 1.0;
@@ -265,7 +273,7 @@ void StabilitySelection::count() {
         }
         c.could[tables_.settings[i].second ? 1 : 0] += 1.0;
       }
-      explained.push_back(count_steps(table, vote, tables_.settings[i].second, counts));
+      explained.push_back(count_steps(table, vote, tables_.settings[i].second, shows_presliding, counts));
     }
   }
   for (std::size_t i = 0; i < per_setting_.size(); ++i)
@@ -308,7 +316,8 @@ std::vector<int> StabilitySelection::terms_of(const SettingResult& setting,
 
 std::vector<double> StabilitySelection::held_out_ratios(const std::vector<std::string>& names) const {
   std::vector<std::vector<double>> ratios(names.size());
-  for (const SettingResult& setting : per_setting_) {
+  for (std::size_t at = 0; at < per_setting_.size(); ++at) {
+    const SettingResult& setting = per_setting_[at];
     if (setting.held_out.rows == 0.0) continue;
     // Terms that are not visible at this bandwidth, or without reversals, are left out of all fits.
     std::vector<std::string> seen;
@@ -319,6 +328,7 @@ std::vector<double> StabilitySelection::held_out_ratios(const std::vector<std::s
     for (std::size_t i = 0; i < names.size(); ++i) {
       std::vector<std::string> others = seen;
       if (std::erase(others, names[i]) == 0) continue;
+      if (names[i] == kPresliding && !tables_.shows_presliding(tables_.settings[at])) continue;
       const double without =
           fit_terms(setting.columns, terms_of(setting, others), setting.all, setting.held_out).validation_squares;
       if (without > 0.0) ratios[i].push_back(std::sqrt(with_all / without));
