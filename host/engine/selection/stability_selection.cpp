@@ -182,9 +182,12 @@ const std::string& name_of(const RegressorTable& table, int term) {
   return term == kPreslidingTerm ? presliding : table.terms[static_cast<std::size_t>(term)].name;
 }
 
-// Counts a subsample that does not abstain: each name once, although a law may have been taken at two values of its
-// nonlinear parameter. Returns the share of the excess that its steps explain.
-double count_steps(const RegressorTable& table, const SelectionPath& vote, bool mask, bool shows_presliding,
+// Terms by name that a subsample of a setting may count for, or against; null: presliding.
+using OpenTerms = std::map<std::string, const CandidateTerm*>;
+
+// Counts a subsample that does not abstain: each open name once, although a law may have been taken at two values of
+// its nonlinear parameter. Returns the share of the excess that its steps explain.
+double count_steps(const RegressorTable& table, const SelectionPath& vote, bool mask, const OpenTerms& open,
                    Counts& counts) {
   struct Chosen {
     double share = 0.0;
@@ -200,21 +203,19 @@ double count_steps(const RegressorTable& table, const SelectionPath& vote, bool 
     near.insert(s.alternatives.begin(), s.alternatives.end());
     sum += s.of_all;
   }
-  if (!shows_presliding) {
-    chosen.erase(kPresliding);
-    near.erase(kPresliding);
-    for (auto& [name, one] : chosen) one.alternatives.erase(kPresliding);
-  }
+  const auto is_open = [&](const std::string& name) { return open.count(name) != 0; };
   for (const auto& [name, one] : chosen) {
+    if (!is_open(name)) continue;
     Count& c = counts[name];
     c.was += 1.0;
     c.shares.push_back(one.share);
     for (const std::string& other : one.alternatives)
-      if (other != name) c.alternatives[other] += 1.0;
+      if (other != name && is_open(other)) c.alternatives[other] += 1.0;
     near.insert(name);
   }
-  for (const std::string& name : near) counts[name].near[mask ? 1 : 0] += 1.0;
-  if (!vote.steps.empty() && (shows_presliding || vote.steps.front().term != kPreslidingTerm))
+  for (const std::string& name : near)
+    if (is_open(name)) counts[name].near[mask ? 1 : 0] += 1.0;
+  if (!vote.steps.empty() && is_open(name_of(table, vote.steps.front().term)))
     counts[name_of(table, vote.steps.front().term)].first += 1.0;
   return sum;
 }
@@ -249,13 +250,12 @@ void StabilitySelection::count() {
   std::vector<double> explained, white;
   for (std::size_t i = 0; i < per_setting_.size(); ++i) {
     if (per_setting_[i].votes.empty()) continue;
-    std::map<std::string, const CandidateTerm*> open;
+    OpenTerms open;
     for (const int t : per_setting_[i].terms) {
       const CandidateTerm& term = table.terms[static_cast<std::size_t>(t)];
       open[term.name] = &term;
     }
-    const bool shows_presliding = tables_.shows_presliding(tables_.settings[i]);
-    if (shows_presliding) open[kPresliding] = nullptr;
+    if (tables_.shows_presliding(tables_.settings[i])) open[kPresliding] = nullptr;
     for (const SelectionPath& vote : per_setting_[i].votes) {
       result_.subsamples += 1.0;
       for (const auto& [name, term] : open) counts[name].open[tables_.settings[i].second ? 1 : 0] += 1.0;
@@ -273,7 +273,7 @@ void StabilitySelection::count() {
         }
         c.could[tables_.settings[i].second ? 1 : 0] += 1.0;
       }
-      explained.push_back(count_steps(table, vote, tables_.settings[i].second, shows_presliding, counts));
+      explained.push_back(count_steps(table, vote, tables_.settings[i].second, open, counts));
     }
   }
   for (std::size_t i = 0; i < per_setting_.size(); ++i)
