@@ -123,9 +123,10 @@ std::optional<LawInRange> law_in_range(const estimation::Identification& base, c
 
 }  // namespace
 
-void name_between_records(const estimation::Identification& base, const SearchedBalance& motor, Diagnosis& result) {
+void name_between_records(const estimation::Identification& base, const estimation::Identification& all_records,
+                          const SearchedBalance& motor, Diagnosis& result) {
   if (result.friction_drift.empty() || result.verdict == Verdict::confusable_effects) return;
-  if (name_scaling(base, motor, result) || !result.named.empty()) return;
+  if (name_scaling(all_records, motor, result) || !result.named.empty()) return;
   const RecordFriction own = friction_by_record(base, *motor.search.data, kPolicy.fewest_of_trend);
   if (own.parameters.empty() || own.records.size() < kPolicy.fewest_of_trend) return;
   const std::vector<Law> all = laws(base, motor, own);

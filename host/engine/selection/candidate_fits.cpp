@@ -206,11 +206,33 @@ std::optional<std::size_t> position(const CrossValidatedFit& fit, std::string_vi
   return std::nullopt;
 }
 
+namespace {
+
+// Percent of the left-out chi-square. An effect that differs between records only (temperature) reduces the random
+// effects and hardly the residual.
+double explained_percent(const CandidateFit& t) {
+  return std::max({t.gain.chi2_percent, t.gain.fixed_effects_percent, t.other_balance_percent});
+}
+
+}  // namespace
+
 bool passes(const CandidateFit& t) {
-  // An effect that differs between records only (temperature) reduces the random effects and hardly the residual.
-  return t.admissible && t.score() > kPolicy.named_score &&
-         std::max({t.gain.chi2_percent, t.gain.fixed_effects_percent, t.other_balance_percent}) >
-             kPolicy.named_chi2_percent;
+  return t.admissible && t.score() > kPolicy.named_score && explained_percent(t) > kPolicy.named_chi2_percent;
+}
+
+bool is_worth_a_term(const BalanceSearch& search, const CandidateFit& candidate) {
+  const double noise = search.floor.value_or(0.0) / std::max(search.base.rmse_cv_fixed_effects(), 1e-300);
+  return passes(candidate) &&
+         explained_percent(candidate) >= 100.0 * kPolicy.line_share * std::max(0.0, 1.0 - noise * noise);
+}
+
+void check_worth(const BalanceSearch& search, std::vector<CandidateFit>& candidates) {
+  while (!candidates.empty() && passes(candidates.front()) && !is_worth_a_term(search, candidates.front())) {
+    CandidateFit& first = candidates.front();
+    first.admissible = false;
+    first.why_not = fmt::format("it takes only {:.1f} % off the squared error", explained_percent(first));
+    sort_candidates(search, candidates);
+  }
 }
 
 // Whether the law is nonlinear over a travel that the encoder resolves in few steps: the residual there is the
@@ -269,9 +291,11 @@ void prefer_simple(const BalanceSearch& search, std::vector<CandidateFit>& candi
               candidates.begin() + static_cast<std::ptrdiff_t>(simplest) + 1);
 }
 
-std::vector<CandidateFit> rank_candidates(const BalanceSearch& search) {
+std::vector<CandidateFit> rank_candidates(const BalanceSearch& search,
+                                          const std::function<bool(const CandidateModel&)>& is_tried) {
   std::vector<CandidateModel> tried =
       candidate_models(*search.data, search.base.terms, left_by(*search.data, search.base));
+  if (is_tried) std::erase_if(tried, [&](const CandidateModel& model) { return !is_tried(model); });
   std::vector<CandidateFit> candidates(tried.size());
   const RegressionProblem coarse = search.data->decimated();
   estimation::in_parallel(tried.size(), [&](std::size_t i) {

@@ -1,6 +1,7 @@
 // Fits of one torque balance with each effect of the catalogue added.
 #pragma once
 
+#include <functional>
 #include <optional>
 #include <string>
 #include <string_view>
@@ -33,9 +34,16 @@ struct CandidateFit {
 
 // Whether an effect may be named: admissible, certain, and large enough to matter.
 bool passes(const CandidateFit& candidate);
+// Whether it also takes the share off the left-out squares above the noise that a term has to; off all of them where
+// the noise is not known.
+bool is_worth_a_term(const BalanceSearch& search, const CandidateFit& candidate);
+// Refuses those that would be named and are not worth it, best first. The list stays best first.
+void check_worth(const BalanceSearch& search, std::vector<CandidateFit>& candidates);
 
-// All effects that could be added, best first; the best ones with their nonlinear parameters searched continuously.
-std::vector<CandidateFit> rank_candidates(const BalanceSearch& search);
+// All effects that could be added (where `is_tried` is given, of those alone), best first; the best ones with their
+// nonlinear parameters searched continuously.
+std::vector<CandidateFit> rank_candidates(const BalanceSearch& search,
+                                          const std::function<bool(const CandidateModel&)>& is_tried = {});
 // Best first: admissible ones before others, by score; of confounded ones that leave almost the same error, the
 // simplest.
 void sort_candidates(const BalanceSearch& search, std::vector<CandidateFit>& candidates);

@@ -14,6 +14,7 @@
 #include "host/engine/selection/detection_limit.hpp"
 #include "host/engine/selection/diagnosis.hpp"
 #include "host/engine/selection/disturbances.hpp"
+#include "host/engine/selection/encoder_errors.hpp"
 #include "host/engine/selection/friction_scaling.hpp"
 #include "host/engine/selection/held_out.hpp"
 #include "host/engine/selection/named_by_resampling.hpp"
@@ -139,7 +140,11 @@ std::vector<SearchedBalance> search_balances(estimation::Identification& base, c
     check_orders(searches, one.search, one.candidates);
     check_by_record(one.search, one.candidates);
     // Of the torsion each record has a zero of its own, which the held-out ones were not fitted for.
-    if (one.search.data->balance() != estimation::Balance::motor) continue;
+    if (one.search.data->balance() != estimation::Balance::motor) {
+      check_encoder_errors(one.search, one.candidates);
+      check_worth(one.search, one.candidates);
+      continue;
+    }
     const HeldOut held_out(dataset, base, estimation::Balance::motor, options.pipeline.ready.get());
     check_on_held_out(held_out, one.search, one.candidates);
   }
@@ -354,7 +359,10 @@ Diagnosis diagnose_at(const data::Dataset& dataset, const model::Model& model, c
   if (by_resampling) name_stable(chosen, result);
   if (names_one) name_by_likelihood(chosen, alias, result);
   take_back_insignificant(result);
-  if (by_resampling) take_back_unconfirmed_scaling(*base, chosen, result);
+  const std::unique_ptr<AllRecords> all_records =
+      by_resampling ? fit_all_records(chosen, dataset, model, options.pipeline) : nullptr;
+  const estimation::Identification& of_all_records = all_records ? *all_records->fitted : *base;
+  if (by_resampling) take_back_unconfirmed_scaling(of_all_records, chosen, result);
   if (!result.named.empty()) explain_named(chosen.search, chosen.candidates, model.drive, result);
   assess_remainder(chosen, result);
   if (by_resampling && result.resampling->lag_s) result.delay_s = result.resampling->lag_s;
@@ -363,7 +371,7 @@ Diagnosis diagnose_at(const data::Dataset& dataset, const model::Model& model, c
     if (options.progress) options.progress("looking for what no effect explains");
     check_unknown_structure(chosen.search, names_one ? &chosen.candidates.front() : nullptr, result);
   }
-  if (by_resampling) name_between_records(*base, chosen, result);
+  if (by_resampling) name_between_records(*base, of_all_records, chosen, result);
   name_on_other_balances(all, chosen, model.drive, result);
   explain_orders(base->model.drive, result);
   assess_excitation(moves, result);

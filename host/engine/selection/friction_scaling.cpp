@@ -44,11 +44,11 @@ Eigen::VectorXd slope_of(const RegressionProblem& data, const estimation::Terms&
   return data.nonlinear_columns(terms, on_balance, {{terms.size() - 1, 0}});
 }
 
-std::vector<Scaling> scalings(const estimation::Identification& base, const SearchedBalance& motor,
-                              const RecordFriction& own) {
+std::vector<Scaling> scalings(const estimation::Identification& base, const RegressionProblem& data,
+                              const std::vector<CandidateFit>& candidates, const RecordFriction& own) {
   std::vector<Scaling> all;
-  const RegressionProblem& data = *motor.search.data;
-  for (const CandidateFit& candidate : motor.candidates) {
+  const Eigen::VectorXd weights = Eigen::VectorXd::Ones(data.rows());
+  for (const CandidateFit& candidate : candidates) {
     const catalogue::Entry& entry = *candidate.model.entry;
     if (!is_scaling(entry)) continue;
     Part part{whole_of(own.values).records, {}};
@@ -56,8 +56,7 @@ std::vector<Scaling> scalings(const estimation::Identification& base, const Sear
       if (base.terms[own.parameters[j]->ref.term].entry->name() == entry.info->modulates)
         part.parameters.push_back(static_cast<Eigen::Index>(j));
     if (part.parameters.empty()) continue;
-    const AsFriction added =
-        as_friction(data, base.terms, own, slope_of(data, base.terms, candidate), motor.search.base.root_weights);
+    const AsFriction added = as_friction(data, base.terms, own, slope_of(data, base.terms, candidate), weights);
     Scaling one{&candidate, meta_regression(part(own.values), part(added.added)), 1.0};
     const effects::ParameterInfo& info = entry.parameters.front();
     // To first order a large coefficient comes out too large.
@@ -106,6 +105,11 @@ void take_value(const Scaling& one, std::size_t records, double p_value, Candida
       records, one.fit.t, one.fit.freedom, p_value);
 }
 
+const RegressionProblem& motor_balance_of(const estimation::Identification& base) {
+  return *std::find_if(base.data.begin(), base.data.end(),
+                       [](const RegressionProblem& d) { return d.balance() == estimation::Balance::motor; });
+}
+
 // Share of the variance of the temperature that is within records.
 double share_within_records(const RegressionProblem& data) {
   double within = 0.0, sum = 0.0, squares = 0.0, count = 0.0;
@@ -130,10 +134,27 @@ double share_within_records(const RegressionProblem& data) {
 
 }  // namespace
 
+std::unique_ptr<AllRecords> fit_all_records(const SearchedBalance& motor, const data::Dataset& dataset,
+                                            const model::Model& model, estimation::PipelineOptions pipeline) {
+  const bool any_scaling = std::any_of(motor.candidates.begin(), motor.candidates.end(),
+                                       [](const CandidateFit& t) { return is_scaling(*t.model.entry); });
+  const bool any_held_out = std::any_of(dataset.experiments.begin(), dataset.experiments.end(),
+                                        [](const data::Experiment& e) { return e.role == data::Role::holdout; });
+  if (!any_scaling || !any_held_out) return nullptr;
+  auto all = std::make_unique<AllRecords>();
+  all->dataset = dataset;
+  for (data::Experiment& e : all->dataset.experiments)
+    if (e.role == data::Role::holdout) e.role = data::Role::fit;
+  pipeline.ready = nullptr;  // those of `dataset` itself
+  all->fitted = estimation::identify(all->dataset, model, pipeline);
+  return all;
+}
+
 bool name_scaling(const estimation::Identification& base, const SearchedBalance& motor, Diagnosis& result) {
-  const RecordFriction own = friction_by_record(base, *motor.search.data, kPolicy.fewest_of_scaling);
+  const RegressionProblem& data = motor_balance_of(base);
+  const RecordFriction own = friction_by_record(base, data, kPolicy.fewest_of_scaling);
   if (own.parameters.empty()) return false;
-  const std::vector<Scaling> all = scalings(base, motor, own);
+  const std::vector<Scaling> all = scalings(base, data, motor.candidates, own);
   const auto best = std::min_element(all.begin(), all.end(),
                                      [](const Scaling& a, const Scaling& b) { return a.p_value < b.p_value; });
   if (best == all.end() || p_value_of_all(*best, all) > kPolicy.wald_p_value) return false;
@@ -176,8 +197,9 @@ void take_back_unconfirmed_scaling(const estimation::Identification& base, const
       std::none_of(result.named.begin(), result.named.end(), is_scaled) ||
       share_within_records(*motor.search.data) > kShownWithin)
     return;
-  const RecordFriction own = friction_by_record(base, *motor.search.data, 1);
-  const std::vector<Scaling> all = scalings(base, motor, own);
+  const RegressionProblem& data = motor_balance_of(base);
+  const RecordFriction own = friction_by_record(base, data, 1);
+  const std::vector<Scaling> all = scalings(base, data, motor.candidates, own);
   std::vector<NamedEffect> kept;
   for (const NamedEffect& n : result.named) {
     const auto at = std::find_if(all.begin(), all.end(),

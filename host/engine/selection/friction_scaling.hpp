@@ -3,15 +3,26 @@
 // there are.
 #pragma once
 
+#include <memory>
+
 #include "host/engine/estimation/identify.hpp"
 #include "host/engine/selection/diagnosis.hpp"
 #include "host/engine/selection/searched_balance.hpp"
 
 namespace flexspline::selection {
 
+// The model fitted on all records, those held out among them: of a few records each one counts.
+struct AllRecords {
+  data::Dataset dataset;  // which `fitted` points into
+  std::unique_ptr<estimation::Identification> fitted;
+};
+// Null where nothing is held out, or no candidate scales friction.
+std::unique_ptr<AllRecords> fit_all_records(const SearchedBalance& motor, const data::Dataset& dataset,
+                                            const model::Model& model, estimation::PipelineOptions pipeline);
+
 // Names the effect with which the records' friction goes, behind what is named already (meta-regression to first order,
 // Student's t by Knapp and Hartung 2003, times the effects that were tried), or lists it as possible. Returns whether
-// one is named.
+// one is named. `base`: the model fitted on the records that count.
 bool name_scaling(const estimation::Identification& base, const SearchedBalance& motor, Diagnosis& result);
 
 // Whether the records show such an effect that halves of the data chose. Of fewer records than a test needs, held-out
