@@ -195,6 +195,8 @@ std::vector<std::size_t> without_torque(const RegressionProblem& data, const Ter
   return unseen;
 }
 
+}  // namespace
+
 std::size_t free_count(const Terms& terms) {
   std::size_t count = 0;
   for (const Term& t : terms)
@@ -202,7 +204,9 @@ std::size_t free_count(const Terms& terms) {
   return count;
 }
 
-}  // namespace
+bool is_each_records_own(const catalogue::Entry& entry) {
+  return std::any_of(entry.parameters.begin(), entry.parameters.end(), [](const auto& p) { return p.per_record; });
+}
 
 bool may_be_seen(const RegressionProblem& data, const Terms& terms, const catalogue::Entry& entry) {
   if (!visible(data, terms, entry) || covered(terms, entry)) return false;

@@ -34,6 +34,12 @@ std::vector<CandidateModel> candidate_models(const estimation::RegressionProblem
 // give beyond.
 std::vector<double> possible_orders(const catalogue::Entry& entry, const model::Drive& drive);
 
+// Parameters that are fitted.
+std::size_t free_count(const estimation::Terms& terms);
+
+// Whether the effect is a constant of each record, which others do not predict.
+bool is_each_records_own(const catalogue::Entry& entry);
+
 // The model has a wave of this order of which the effect is what an error of the phase leaves, or the reverse.
 bool has_phase_error(const estimation::Terms& terms, const catalogue::Entry& entry, std::optional<double> order);
 

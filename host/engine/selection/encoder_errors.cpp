@@ -12,21 +12,10 @@ namespace {
 
 constexpr double kOrdersOfOutput[] = {1.0, 2.0};  // an eccentric disc, and one that is bent or tilted
 
-bool is_each_records_own(const catalogue::Entry& entry) {
-  return std::any_of(entry.parameters.begin(), entry.parameters.end(), [](const auto& p) { return p.per_record; });
-}
-
 // What an encoder's error does: it shifts the torsion by a constant, or by waves over the angle.
 bool is_error_of_angle(const catalogue::Entry& entry) {
   return entry.identified_on() == estimation::Balance::transmission && entry.info->phase == effects::Phase::shift &&
          (is_each_records_own(entry) || entry.count(effects::Kind::given) > 0);
-}
-
-std::size_t free_parameters(const Terms& terms) {
-  std::size_t count = 0;
-  for (const estimation::Term& term : terms)
-    for (std::size_t p = 0; p < term.values.size(); ++p) count += term.free_linear(p) || term.free_nonlinear(p);
-  return count;
 }
 
 // The model with a zero of the torsion, and with waves once and twice per turn of the output, as far as each of the two
@@ -48,7 +37,7 @@ CrossValidatedFit with_encoder_errors(const BalanceSearch& own) {
       }
     }
     if (terms.size() == fit.terms.size()) continue;
-    const auto more = static_cast<double>(free_parameters(terms) - free_parameters(fit.terms));
+    const auto more = static_cast<double>(free_count(terms) - free_count(fit.terms));
     CrossValidatedFit next = cross_validate(*own.data, std::move(terms), own.keep);
     const LikelihoodGain gain = likelihood_gain(fit, next, more);
     if (gain.score > kPolicy.named_score && gain.chi2_percent > kPolicy.named_chi2_percent) fit = std::move(next);

@@ -41,11 +41,6 @@ double squares_of(const RegressionProblem& data, const CrossValidatedFit& fit, c
   return (e - Z * estimation::best_linear_predictions(errors, fit.random_effects.std, noise_variance)).squaredNorm();
 }
 
-bool is_each_records_own(const CandidateFit& candidate) {
-  const auto& parameters = candidate.model.entry->parameters;
-  return std::any_of(parameters.begin(), parameters.end(), [](const auto& p) { return p.per_record; });
-}
-
 // Empty where a candidate carries over.
 std::string why_not(const BalanceSearch& search, const CandidateFit& candidate) {
   if (is_within_floor_of_few_records(search))
@@ -75,7 +70,7 @@ bool RecordCrossValidation::is_certain() const {
 RecordCrossValidation cross_validate_by_record(const BalanceSearch& search, const CandidateFit& candidate) {
   const std::vector<RowRange>& ranges = search.data->records();
   RecordCrossValidation result;
-  if (ranges.size() < estimation::kFewestRecords || is_each_records_own(candidate)) return result;
+  if (ranges.size() < estimation::kFewestRecords || is_each_records_own(*candidate.model.entry)) return result;
   const std::size_t folds = std::min(kMostFolds, ranges.size());
   // Twice the log-likelihood ratio of each record; zero where it does not count.
   std::vector<double> gains(ranges.size(), 0.0);
