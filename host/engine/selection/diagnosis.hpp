@@ -118,6 +118,8 @@ struct Resampling {
     bool is_confirmed() const;
     // It falls by as much as an effect that matters.
     bool is_strongly_confirmed() const;
+    // It falls by more than what stays, so that nothing else can be the larger part of what is missing.
+    bool is_most_of_held_out_error() const;
   };
   // How often a term was chosen, or was nearly as good as what was; zero for one that never was.
   struct Support {

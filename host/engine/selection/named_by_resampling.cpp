@@ -101,20 +101,27 @@ bool is_significant(const SearchedBalance& motor, const NamedEffect& name) {
   });
 }
 
-// Whether the names that resampling found may be stated: most of all subsamples chose one, or the squared error on
-// experiments that are held out falls by a term's share, or the likelihood of all data is significant for one. Where
-// the model alone leaves known noise, many subsamples abstain and the others may have selected noise, so that their
-// frequency does not count; but likelihood leaves out reversals, and cannot judge a state of presliding.
+// Whether an effect is a wave of the output's angle. Over a part of a turn that is an offset and a slope, which halves
+// choose for any slow function of the angle.
+bool is_of_output_angle(const NamedEffect& name) {
+  return (catalogue::get(name.effect).info->reads & effects::kOutputAngle) != 0;
+}
+
+}  // namespace
+
 bool may_be_stated(const Resampling& resampling, const Resampling::FoundTerm& found, const SearchedBalance& motor) {
   const double frequency_of_all = found.frequency * (1.0 - resampling.abstained / resampling.subsamples);
   const bool is_supported = frequency_of_all >= kPolicy.least_of_all || found.is_confirmed();
   const bool leaves_known_noise =
       motor.floor.rmse && motor.search.base.rmse() <= (1.0 + kPolicy.floor_uncertainty) * *motor.floor.rmse;
   return std::any_of(found.group.begin(), found.group.end(), [&](const NamedEffect& name) {
-    if (is_supported && (!leaves_known_noise || catalogue::get(name.effect).is_presliding())) return true;
+    const bool is_enough = is_of_output_angle(name) ? found.is_most_of_held_out_error() : is_supported;
+    if (is_enough && (!leaves_known_noise || catalogue::get(name.effect).is_presliding())) return true;
     return is_significant(motor, name);
   });
 }
+
+namespace {
 
 // Whether the halves of fewer than three records, of unknown noise, may decide: parts of the same motions agree in what
 // is peculiar to these. So where data are held out, their error has to confirm it, or the likelihood of all data.
@@ -213,6 +220,9 @@ std::string why_not_named(const Resampling::FoundTerm& term, bool is_undecided, 
         "it takes off {:.1f} % of the squared error above the noise, and {:.0f} % are needed behind "
         "another effect",
         term.share_percent, 100.0 * kPolicy.line_share);
+  if (is_of_output_angle(term.group.front()))
+    return "other functions of the output's angle look like it on these data: its likelihood would have to be "
+           "significant, or the squared error on experiments that are held out to fall by half";
   if (term.held_out_ratio && !term.is_confirmed())
     return fmt::format("the error on experiments that are held out falls by {:.1f} % only",
                        100.0 * (1.0 - *term.held_out_ratio));

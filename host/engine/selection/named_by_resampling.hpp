@@ -22,6 +22,13 @@ void take_likelier_waves(Resampling& resampling, const SearchedBalance& motor);
 // likelihood leaves out reversals.
 bool is_contradicted(const Resampling::FoundTerm& found, const SearchedBalance& motor);
 
+// Whether the names that resampling found may be stated: most of all subsamples chose one, or the squared error on
+// experiments that are held out falls by a term's share, or the likelihood of all data is significant for one. Where
+// the model alone leaves known noise, many subsamples abstain and the others may have selected noise, so that their
+// frequency does not count; but likelihood leaves out reversals, and cannot judge a state of presliding. For an effect
+// of the output's angle the frequency does not count either, and the held-out error has to fall by half.
+bool may_be_stated(const Resampling& resampling, const Resampling::FoundTerm& found, const SearchedBalance& motor);
+
 // Whether resampling decides the verdict on the motor's balance. Likelihood has more power where exactly one effect is
 // missing: it decides where the halves of the data show nothing above the noise, and where resampling does not
 // contradict it.

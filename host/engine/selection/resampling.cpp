@@ -132,6 +132,10 @@ bool Resampling::FoundTerm::is_strongly_confirmed() const {
   return held_out_ratio && *held_out_ratio * *held_out_ratio <= 1.0 - kPolicy.matters_share;
 }
 
+bool Resampling::FoundTerm::is_most_of_held_out_error() const {
+  return held_out_ratio && *held_out_ratio * *held_out_ratio <= 0.5;
+}
+
 bool Resampling::FoundTerm::is_confirmed() const {
   return held_out_ratio && *held_out_ratio * *held_out_ratio <= 1.0 - kPolicy.line_share;
 }

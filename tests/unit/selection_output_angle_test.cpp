@@ -1,0 +1,49 @@
+// Over a part of an output turn a wave of its angle is an offset and a slope: halves of the data that chose it do not
+// show that it is one.
+#include <gtest/gtest.h>
+
+#include "host/engine/selection/named_by_resampling.hpp"
+#include "host/engine/selection/policy.hpp"
+
+namespace flexspline::selection {
+namespace {
+
+// A balance with one candidate of that score, and no known floor.
+SearchedBalance balance(std::string_view effect, double score) {
+  SearchedBalance motor;
+  motor.search.base.left_out = {{100.0, 100.0}};
+  CandidateFit candidate;
+  candidate.model.entry = &catalogue::get(effect);
+  candidate.gain.score = score;
+  motor.candidates = {candidate};
+  return motor;
+}
+
+// All subsamples chose it.
+bool is_stated(std::string_view effect, double score, std::optional<double> held_out_ratio) {
+  Resampling resampling;
+  resampling.subsamples = 100.0;
+  Resampling::FoundTerm found;
+  found.group = {{std::string(effect), std::nullopt}};
+  found.frequency = 1.0;
+  found.held_out_ratio = held_out_ratio;
+  return may_be_stated(resampling, found, balance(effect, score));
+}
+
+TEST(OutputAngle, AnEffectOfItNeedsALikelihoodThatIsSignificant) {
+  EXPECT_TRUE(is_stated("gravity", kPolicy.named_score + 1.0, std::nullopt));
+  EXPECT_FALSE(is_stated("gravity", kPolicy.named_score - 1.0, std::nullopt));
+}
+
+TEST(OutputAngle, OrHalfOfTheSquaredHeldOutError) {
+  EXPECT_TRUE(is_stated("gravity", 0.0, 0.70));
+  EXPECT_FALSE(is_stated("gravity", 0.0, 0.71));
+}
+
+TEST(OutputAngle, OtherEffectsAreStatedByTheirFrequencyAlone) {
+  EXPECT_TRUE(is_stated("quadratic_drag", 0.0, std::nullopt));
+  EXPECT_TRUE(is_stated("torque_ripple", 0.0, 0.99));
+}
+
+}  // namespace
+}  // namespace flexspline::selection
