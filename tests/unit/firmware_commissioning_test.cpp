@@ -13,6 +13,7 @@
 #include "host/drive_link/drive/motor_block.hpp"
 #include "shared/control/drive_block.hpp"
 #include "shared/protocol/texts.hpp"
+#include "tests/support/campaign_size.hpp"
 #include "tests/support/pairing_host.hpp"
 #include "tests/support/service_host.hpp"
 
@@ -103,7 +104,7 @@ struct Bench {
 };
 
 TEST(FirmwareCommissioning, FindsTheMotorThatTheTwinDrew) {
-  for (const std::uint64_t seed : {1U, 2U, 3U, 4U}) {
+  for (std::uint64_t seed = 1; seed <= testing::in_campaign<std::uint64_t>(2, 4); ++seed) {
     Bench bench("", seed);
     const auto setup = bench.setup();
     ASSERT_EQ(bench.begin(), Code::done);
@@ -326,7 +327,7 @@ TEST(FirmwareCommissioning, AStopADisarmALostLinkASilentHostAndAProtectionOpenTh
 }
 
 TEST(FirmwareCommissioning, TheDriveKeepsItsMotorOverAPowerCutAndFollowsWithIt) {
-  for (const std::uint64_t seed : {1U, 2U, 3U, 4U}) {
+  for (std::uint64_t seed = 1; seed <= testing::in_campaign<std::uint64_t>(2, 4); ++seed) {
     Bench bench("", seed);
     const auto setup = bench.setup();
     const auto stage = bench.ask<protocol::CommissioningStage>(Kind::commissioning_stage);
