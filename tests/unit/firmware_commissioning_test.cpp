@@ -161,7 +161,11 @@ TEST(FirmwareCommissioning, EachWiringFaultOfTheTwinIsNamedWithItsPhase) {
                                {"encoder-slips", "encoder_slips", 0},
                                {"bus-low", "bus_too_low", 0}};
   ASSERT_EQ(board::wiring_fault_names().size(), std::size(kAll));
-  for (const Expected& e : kAll) {
+  for (std::size_t i = 0; i < std::size(kAll); ++i) {
+    // Of a fault that each phase can have one phase by turns, in the whole campaign all.
+    const std::size_t kind = i / 3, phase = i % 3;
+    if (kind < 4 && phase != kind % 3 && !testing::whole_campaigns()) continue;
+    const Expected& e = kAll[i];
     Bench bench(e.fault);
     ASSERT_EQ(bench.begin(), Code::done) << e.fault;
     const auto end = bench.finish();
