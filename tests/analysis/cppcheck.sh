@@ -50,9 +50,16 @@ done < <(find shared firmware boards hil host -name '*.cpp' -o -name '*.hpp' | s
 readable tests/analysis/drive_headers.cpp "$out/source/tests/analysis/drive_headers.cpp"
 
 cd "$out/source"
+# cppcheck keeps what it found in a file until that file changes; here also until options, suppressions or cppcheck change.
+key=$({ cat "$here/cppcheck.sh" "$here/cppcheck-suppressions.txt" && cppcheck --version; } | sha256sum)
+if [[ $(cat ../kept/key 2>/dev/null) != "$key" ]]; then
+  rm -rf ../kept
+  mkdir -p ../kept/files ../kept/drive
+  echo "$key" >../kept/key
+fi
 {
-  check --file-list=../files.txt
-  check -I. tests/analysis/drive_headers.cpp
+  check --cppcheck-build-dir=../kept/files --file-list=../files.txt
+  check --cppcheck-build-dir=../kept/drive -I. tests/analysis/drive_headers.cpp
 } | sort -u >../findings.txt
 cat ../findings.txt
 [[ ! -s ../findings.txt ]] || {

@@ -1,18 +1,19 @@
-// The numbers of the drive over many drives and long times: 300 random blocks over the whole envelope, and hysteresis
-// in motion so slow that each tick moves a state by less than a signal could show.
+// The numbers of the drive over many drives and long times: 100 random blocks over the whole envelope, in the whole
+// campaign 300, and hysteresis in motion so slow that each tick moves a state by less than a signal could show.
 #include <gtest/gtest.h>
 
 #include <cstdio>
 
+#include "tests/support/campaign_size.hpp"
 #include "tests/support/drive_trial.hpp"
 
 namespace flexspline::tests {
 namespace {
 
-constexpr int kBlocks = 300;
+const int kBlocks = testing::in_campaign(100, 300);
 constexpr double kBoundOfAnEffect = 1e-6;  // of rated torque
 
-TEST(FixedPoint, EachEffectIsWithinAMillionthOfRatedTorqueOver300Blocks) {
+TEST(FixedPoint, EachEffectIsWithinAMillionthOfRatedTorqueOverTheEnvelope) {
   for (const std::string& name : names_on_drive()) {
     Random random(7001);
     double worst = 0.0, largest = 0.0;
@@ -38,7 +39,7 @@ TEST(FixedPoint, EachEffectIsWithinAMillionthOfRatedTorqueOver300Blocks) {
 }
 
 // Blocks of a dozen effects, none of which stands in for another.
-TEST(FixedPoint, TheirSumIsWithinTheProofAndAMillionthForEachOver300Blocks) {
+TEST(FixedPoint, TheirSumIsWithinTheProofAndAMillionthForEachOverTheEnvelope) {
   Random random(7002);
   const std::vector<std::string> names = names_on_drive();
   double worst = 0.0;
@@ -74,7 +75,7 @@ TEST(FixedPoint, TheirSumIsWithinTheProofAndAMillionthForEachOver300Blocks) {
 
 // Ten minutes at a millionth of rated speed: the gear's play of a few characteristic lengths, in ten million ticks. The
 // exact answer is one step of the same length in long double, as these laws are rate independent.
-class SlowHysteresis : public testing::TestWithParam<std::string> {};
+class SlowHysteresis : public ::testing::TestWithParam<std::string> {};
 
 TEST_P(SlowHysteresis, LosesLessThanATenThousandthOfItsBoundInTenMinutes) {
   const catalogue::Entry& entry = catalogue::get(GetParam());
@@ -123,9 +124,9 @@ TEST_P(SlowHysteresis, LosesLessThanATenThousandthOfItsBoundInTenMinutes) {
 }
 
 INSTANTIATE_TEST_SUITE_P(Laws, SlowHysteresis,
-                         testing::Values("dahl_friction", "lugre_friction", "dahl_hysteresis",
-                                         "modified_dahl_hysteresis", "duhem_hysteresis", "bouc_wen_hysteresis",
-                                         "prandtl_ishlinskii_hysteresis", "torque_proportional_hysteresis"),
+                         ::testing::Values("dahl_friction", "lugre_friction", "dahl_hysteresis",
+                                           "modified_dahl_hysteresis", "duhem_hysteresis", "bouc_wen_hysteresis",
+                                           "prandtl_ishlinskii_hysteresis", "torque_proportional_hysteresis"),
                          [](const auto& at) { return at.param; });
 
 }  // namespace

@@ -6,6 +6,7 @@
 
 #include "host/engine/selection/add.hpp"
 #include "host/engine/selection/diagnosis.hpp"
+#include "tests/support/campaign_size.hpp"
 #include "tests/support/twin_data.hpp"
 
 namespace flexspline {
@@ -80,7 +81,7 @@ constexpr double kArmNm = 20.0;
 
 TEST(FrictionByAngle, IsNamedWithItsOrder) {
   const Experiments experiments = plant::demo_plant().experiments;
-  for (const std::uint64_t seed : {7001, 7002}) {
+  for (std::uint64_t seed = 7001; seed <= testing::in_campaign<std::uint64_t>(7001, 7002); ++seed) {
     const Outcome o = diagnose("angle_dependent_friction:2", experiments, 0.0, seed);
     EXPECT_EQ(o.named, "angle_dependent_friction:2");
     EXPECT_GT(o.before, 1.3);
@@ -90,7 +91,7 @@ TEST(FrictionByAngle, IsNamedWithItsOrder) {
 
 // What BAM's models M3 and M4 and measured gears have: a law for each load, and one that falls with speed as well.
 TEST(FrictionByLoad, StictionThatGrowsWithTheLoadIsNamed) {
-  for (const std::uint64_t seed : {7001, 7002}) {
+  for (std::uint64_t seed = 7001; seed <= testing::in_campaign<std::uint64_t>(7001, 7002); ++seed) {
     const Outcome o = diagnose("load_dependent_stiction", with_swings(), kArmNm, seed);
     EXPECT_EQ(o.named, "load_dependent_stiction");
     EXPECT_GT(o.before, 1.3);
@@ -99,7 +100,7 @@ TEST(FrictionByLoad, StictionThatGrowsWithTheLoadIsNamed) {
 }
 
 TEST(FrictionByLoad, LossThatDiffersBetweenDrivingAndDrivenIsNamed) {
-  for (const std::uint64_t seed : {7001, 7002}) {
+  for (std::uint64_t seed = 7001; seed <= testing::in_campaign<std::uint64_t>(7001, 7002); ++seed) {
     const Outcome o = diagnose("driving_dependent_loss", with_swings(), kArmNm, seed);
     EXPECT_EQ(o.named, "driving_dependent_loss");
     EXPECT_GT(o.before, 1.3);

@@ -132,7 +132,7 @@ std::vector<Case> cases_at(const std::vector<std::string>& effects, double scale
 }
 
 TEST(HiddenEffects, AreNamedAtUsualSizeAndAddingThemReachesTheFloor) {
-  const auto outcomes = run_all(cases_at(part_of(kHidden, 3, 0), 1.0, in_campaign(1, 2)));
+  const auto outcomes = run_all(cases_at(part_of(kHidden, 6, 0), 1.0, in_campaign(1, 2)));
   print(outcomes);
   for (const Outcome& o : outcomes) {
     EXPECT_TRUE(o.right) << o.what.hidden << " seed " << o.what.seed << ": named " << o.named << ";" << o.detail;
@@ -142,7 +142,7 @@ TEST(HiddenEffects, AreNamedAtUsualSizeAndAddingThemReachesTheFloor) {
 
 TEST(HiddenEffects, AreNamedOnADriveThatHasMostOtherEffectsToo) {
   const auto outcomes =
-      run_all(cases_at(part_of(kHidden, 3, 1), 1.0, 1,
+      run_all(cases_at(part_of(kHidden, 6, 1), 1.0, 1,
                        "stribeck_gaussian,load_dependent_friction,gravity,torque_ripple:2,temperature_viscous"));
   print(outcomes);
   for (const Outcome& o : outcomes) {
@@ -152,14 +152,14 @@ TEST(HiddenEffects, AreNamedOnADriveThatHasMostOtherEffectsToo) {
 }
 
 TEST(HiddenEffects, AreNamedAtAFifthOfTheirSizeInNineOfTenDrives) {
-  const auto outcomes = run_all(cases_at(part_of(kHidden, 3, 2), 0.2, in_campaign(1, 3)));
+  const auto outcomes = run_all(cases_at(part_of(kHidden, 6, 2), 0.2, in_campaign(1, 3)));
   print(outcomes);
   const auto right = std::count_if(outcomes.begin(), outcomes.end(), [](const Outcome& o) { return o.right; });
   EXPECT_GE(right, static_cast<std::ptrdiff_t>(std::ceil(0.9 * static_cast<double>(outcomes.size()))));
 }
 
 TEST(HiddenEffects, AreNamedWhereFrictionDiffersFromRunToRun) {
-  const auto outcomes = run_all(cases_at(part_of(kHidden, 4, 3), 1.0, 1, "", 0.03));
+  const auto outcomes = run_all(cases_at(part_of(kHidden, 6, 3), 1.0, 1, "", 0.03));
   print(outcomes);
   // The hold-out records have their own friction, so that their error says nothing of the effect that was added.
   for (const Outcome& o : outcomes) EXPECT_TRUE(o.right) << o.what.hidden << ": named " << o.named << ";" << o.detail;
@@ -181,16 +181,16 @@ std::ptrdiff_t false_names(std::uint64_t first_seed, std::uint64_t drives, doubl
 }
 
 TEST(HiddenEffects, NothingIsNamedWhereNothingIsHidden) {
-  EXPECT_LE(false_names(kFirstSeed + 1000, in_campaign(5, 20), 0.0, 0.0), in_campaign(0, 1));
+  EXPECT_LE(false_names(kFirstSeed + 1000, in_campaign(3, 20), 0.0, 0.0), in_campaign(0, 1));
 }
 
 TEST(HiddenEffects, NothingIsNamedWhereOnlyFrictionDiffersFromRunToRun) {
-  EXPECT_LE(false_names(kFirstSeed + 2000, in_campaign(4, 12), 0.03, 0.0), in_campaign(0, 1));
+  EXPECT_LE(false_names(kFirstSeed + 2000, in_campaign(2, 12), 0.03, 0.0), in_campaign(0, 1));
 }
 
 TEST(HiddenEffects, NothingIsNamedInColouredNoise) {
-  EXPECT_LE(false_names(kFirstSeed + 3000, in_campaign(3, 12), 0.0, 0.9), in_campaign(0, 1));
-  EXPECT_LE(false_names(kFirstSeed + 4000, in_campaign(3, 12), 0.03, 0.9), in_campaign(0, 1));
+  EXPECT_LE(false_names(kFirstSeed + 3000, in_campaign(2, 12), 0.0, 0.9), in_campaign(0, 1));
+  EXPECT_LE(false_names(kFirstSeed + 4000, in_campaign(2, 12), 0.03, 0.9), in_campaign(0, 1));
 }
 
 }  // namespace

@@ -10,6 +10,7 @@
 #include "host/engine/estimation/identify.hpp"
 #include "host/engine/estimation/in_parallel.hpp"
 #include "host/engine/selection/add.hpp"
+#include "tests/support/campaign_size.hpp"
 #include "tests/support/twin_data.hpp"
 
 namespace flexspline {
@@ -96,9 +97,14 @@ TEST(Intervals, AreHardlyWiderWhereFrictionIsTheSameInAllRecords) {
 }
 
 TEST(Intervals, OfAnAddedEffectHoldWhereFrictionDiffersToo) {
-  const auto coverage = over_seeds(0.03, "stribeck_gaussian", 24);
-  EXPECT_GE(together(coverage, kFriction), 0.88);
-  EXPECT_GE(together(coverage, {"stribeck_gaussian.amplitude_positive", "stribeck_gaussian.amplitude_negative"}), 0.88);
+  // At most 3 of 24 intervals outside, in the whole campaign 5 of 48: of intervals that hold the truth with 95 % more
+  // are outside in 3 % of all such runs.
+  const auto sets = testing::in_campaign<std::size_t>(12, 24);
+  const double least = testing::in_campaign(0.87, 0.88);
+  const auto coverage = over_seeds(0.03, "stribeck_gaussian", sets);
+  EXPECT_GE(together(coverage, kFriction), least);
+  EXPECT_GE(together(coverage, {"stribeck_gaussian.amplitude_positive", "stribeck_gaussian.amplitude_negative"}),
+            least);
 }
 
 }  // namespace

@@ -126,7 +126,11 @@ TEST(UnknownEffects, AreFlaggedOrGivenTheNameOfTheirClassAndTheirCurveTakesTheEr
   std::vector<Case> cases;
   const std::uint64_t seeds = testing::in_campaign(1, 2);
   for (std::uint64_t seed = 7001; seed < 7001 + seeds; ++seed)
-    for (const Truth& t : truths(1.0)) cases.push_back({t, seed});
+    for (const Truth& t : truths(1.0)) {
+      // Three have a relative in the catalogue, whose name is given: one of them, in the whole campaign all.
+      const bool is_another = t.hidden == "load_power_friction" || t.hidden == "triangle_ripple";
+      if (!is_another || testing::whole_campaigns()) cases.push_back({t, seed});
+    }
   const std::vector<Outcome> outcomes = run_all(cases);
   int found = 0, flagged = 0, right_signal = 0;
   std::vector<double> after;
@@ -152,7 +156,8 @@ TEST(UnknownEffects, AreFlaggedOrGivenTheNameOfTheirClassAndTheirCurveTakesTheEr
 
 TEST(UnknownEffects, AreNotSeenWhereNothingIsMissing) {
   std::vector<Case> cases;
-  for (const std::uint64_t seed : {7003, 7004}) cases.push_back({{}, seed});
+  for (std::uint64_t seed = 7003; seed <= testing::in_campaign<std::uint64_t>(7003, 7004); ++seed)
+    cases.push_back({{}, seed});
   for (const Outcome& o : run_all(cases)) {
     EXPECT_FALSE(o.flagged) << o.what.seed << " " << o.curve;
     EXPECT_TRUE(o.curve.empty());

@@ -101,12 +101,12 @@ Tally tally(const Hidden& hidden, int first, int motors) {
   return t;
 }
 
-// In ./dev test one motor with each of two; in the whole campaign six motors with each of all.
+// In ./dev test one motor with one of them; in the whole campaign six motors with each of all.
 TEST(MotorRipples, OfMotorsThatAreDrawnAreNamedWithTheirOrderCauseAndCure) {
   const int motors = testing::in_campaign(1, 6);
   Tally all;
   for (const Hidden& hidden : kHidden) {
-    if (&hidden - kHidden >= 2 && !testing::whole_campaigns()) continue;
+    if (&hidden - kHidden >= 1 && !testing::whole_campaigns()) continue;
     const Tally t = tally(hidden, 501, motors);
     EXPECT_GE(t.right, 1) << hidden.name;
     all.right += t.right;

@@ -2,6 +2,7 @@
 # Builds and runs programs on bare machines in QEMU.
 #   build.sh MACHINE SOURCE ELF [FLAGS...]   MACHINE: m0 m3 m4 m7 riscv; an image for that machine in QEMU
 #   build.sh run MACHINE ELF                 its output on standard output
+#   build.sh key MACHINE SOURCE ELF [FLAGS...]   a number that changes with what the image would be made of
 # `count-m0`, `count-m3`, `count-m4` are code for those processors on the one machine that counts instructions.
 set -euo pipefail
 here=$(cd -- "$(dirname -- "${BASH_SOURCE[0]}")" && pwd)
@@ -39,8 +40,25 @@ if [[ $1 == run ]]; then
   exit
 fi
 
+key=''
+if [[ $1 == key ]]; then
+  key=yes
+  shift
+fi
 machine=$1 source=$2 elf=$3
 shift 3
+# compile COMPILER FLAGS...; `last` are flags that have to stand behind the sources.
+compile() {
+  if [[ -z $key ]]; then exec "$@" "$source" "$here/bare.cpp" -o "$elf" "${last[@]}"; fi
+  {
+    "$1" --version
+    printf '%s\n' "$@" "${last[@]}"
+    cat "$here/bare.ld"
+    for file in "$source" "$here/bare.cpp"; do "$@" -E "$file"; done
+  } | sha256sum
+  exit
+}
+last=()
 case $machine in
   m0) target=(-mcpu=cortex-m0 -mthumb "$(memory 0 0x40000 0x20000000 0x4000)") ;;
   m3) target=(-mcpu=cortex-m3 -mthumb "$(memory 0 0x40000 0x20000000 0x10000)") ;;
@@ -49,13 +67,14 @@ case $machine in
   count-m4) target=(-mcpu=cortex-m4 -mthumb -mfloat-abi=hard -mfpu=fpv4-sp-d16 "$(memory 0x08000000 0x100000 0x20000000 0x1C000)") ;;
   count-m[03]) target=(-mcpu=cortex-"${machine#count-}" -mthumb "$(memory 0x08000000 0x100000 0x20000000 0x1C000)") ;;
   riscv)
+    last=(-lgcc)
     # shellcheck disable=SC2046
-    exec riscv64-unknown-elf-g++ "${common[@]}" -march=rv32im -mabi=ilp32 -nodefaultlibs $(arm_headers) \
-      "$(memory 0x80000000 0x100000 0x80100000 0x100000)" "$@" "$source" "$here/bare.cpp" -o "$elf" -lgcc
+    compile riscv64-unknown-elf-g++ "${common[@]}" -march=rv32im -mabi=ilp32 -nodefaultlibs $(arm_headers) \
+      "$(memory 0x80000000 0x100000 0x80100000 0x100000)" "$@"
     ;;
   *)
     echo "no machine $machine" >&2
     exit 2
     ;;
 esac
-exec arm-none-eabi-g++ "${common[@]}" "${target[@]}" --specs=nosys.specs "$@" "$source" "$here/bare.cpp" -o "$elf"
+compile arm-none-eabi-g++ "${common[@]}" "${target[@]}" --specs=nosys.specs "$@"

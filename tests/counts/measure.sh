@@ -6,12 +6,18 @@
 set -euo pipefail
 here=$(cd -- "$(dirname -- "${BASH_SOURCE[0]}")" && pwd)
 
+# An image takes up to half a minute, so that of an earlier run is kept where nothing that it is made of has changed.
 build() { # MACHINE SOURCE ELF FLAGS...
+  local key
+  key=$("$here/build.sh" key "$@")
+  if [[ -f $3 && $(cat "$3.key" 2>/dev/null) == "$key" ]]; then return; fi
+  rm -f "$3.key"
   # Newlib warns of what semihosting programs never call.
   "$here/build.sh" "$@" >"$3.log" 2>&1 || {
     cat "$3.log" >&2
     exit 1
   }
+  echo "$key" >"$3.key"
 }
 
 if [[ $1 == bits ]]; then

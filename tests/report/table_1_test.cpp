@@ -9,6 +9,7 @@
 #include "hil/thesis_models/published.hpp"
 #include "tests/report/free_run_fit.hpp"
 #include "tests/report/rhs100_data.hpp"
+#include "tests/support/campaign_size.hpp"
 
 namespace flexspline::testing {
 namespace {
@@ -121,7 +122,7 @@ FreeRunFit stribeck_of(const rhs100::Set& saw_tooth, const estimation::Identific
 TEST_F(Table1, TheFreeRunOnTheSlowSawToothTellsAmplitudeAndSpeed) {
   const report::DirectionalFriction& truth = kTruth.friction.positive;
   std::vector<std::future<FreeRunFit>> fits;
-  for (std::uint64_t seed = 7001; seed < 7005; ++seed) {
+  for (std::uint64_t seed = 7001; seed < in_campaign<std::uint64_t>(7003, 7005); ++seed) {
     fits.push_back(std::async(std::launch::async,
                               [this, seed] { return stribeck_of(saw_tooth, *linear(seed, cutoff(10.0)), seed); }));
   }
@@ -135,8 +136,10 @@ TEST_F(Table1, TheFreeRunOnTheSlowSawToothTellsAmplitudeAndSpeed) {
     speeds.push_back(fit.values[1]);
     claimed.push_back(0.25 * (fit.high[1] - fit.low[1]));
   }
-  EXPECT_GE(covered, 3) << "of 4 intervals of 95 %";
-  // What the intervals claim is what the estimates scatter by.
+  // Two intervals of 95 % both miss in 0.3 % of all such runs, two of four in 1.4 %.
+  EXPECT_GE(covered, in_campaign(1, 3));
+  if (!whole_campaigns()) return;
+  // What the intervals claim is what the estimates scatter by, which two estimates do not show.
   EXPECT_LT(spread_percent(speeds), 2.5 * 100.0 * mean(claimed) / mean(speeds));
   EXPECT_GT(spread_percent(speeds), 0.4 * 100.0 * mean(claimed) / mean(speeds));
 }

@@ -10,7 +10,7 @@ program=${1:?} minutes=${2:?} folder=${3:?}
 all=180000 part=10000
 # shellcheck source-path=SCRIPTDIR source=resumable.sh
 source "$(dirname -- "${BASH_SOURCE[0]}")/resumable.sh"
-begin_campaign "$program" "$minutes" "$folder"
+begin_campaign "$minutes" "$folder" "$program"
 for ((first = 0; first < all; first += part)); do
   if grep -q "^$first " "$folder/done.txt"; then continue; fi
   ((SECONDS < until)) || break

@@ -13,6 +13,7 @@
 #include "host/drive_link/drive/motor_block.hpp"
 #include "shared/control/drive_block.hpp"
 #include "shared/protocol/texts.hpp"
+#include "tests/support/campaign_size.hpp"
 #include "tests/support/pairing_host.hpp"
 #include "tests/support/service_host.hpp"
 
@@ -103,7 +104,7 @@ struct Bench {
 };
 
 TEST(FirmwareCommissioning, FindsTheMotorThatTheTwinDrew) {
-  for (const std::uint64_t seed : {1U, 2U, 3U, 4U}) {
+  for (std::uint64_t seed = 1; seed <= testing::in_campaign<std::uint64_t>(2, 4); ++seed) {
     Bench bench("", seed);
     const auto setup = bench.setup();
     ASSERT_EQ(bench.begin(), Code::done);
@@ -160,7 +161,11 @@ TEST(FirmwareCommissioning, EachWiringFaultOfTheTwinIsNamedWithItsPhase) {
                                {"encoder-slips", "encoder_slips", 0},
                                {"bus-low", "bus_too_low", 0}};
   ASSERT_EQ(board::wiring_fault_names().size(), std::size(kAll));
-  for (const Expected& e : kAll) {
+  for (std::size_t i = 0; i < std::size(kAll); ++i) {
+    // Of a fault that each phase can have one phase by turns, in the whole campaign all.
+    const std::size_t kind = i / 3, phase = i % 3;
+    if (kind < 4 && phase != kind % 3 && !testing::whole_campaigns()) continue;
+    const Expected& e = kAll[i];
     Bench bench(e.fault);
     ASSERT_EQ(bench.begin(), Code::done) << e.fault;
     const auto end = bench.finish();
@@ -326,7 +331,7 @@ TEST(FirmwareCommissioning, AStopADisarmALostLinkASilentHostAndAProtectionOpenTh
 }
 
 TEST(FirmwareCommissioning, TheDriveKeepsItsMotorOverAPowerCutAndFollowsWithIt) {
-  for (const std::uint64_t seed : {1U, 2U, 3U, 4U}) {
+  for (std::uint64_t seed = 1; seed <= testing::in_campaign<std::uint64_t>(2, 4); ++seed) {
     Bench bench("", seed);
     const auto setup = bench.setup();
     const auto stage = bench.ask<protocol::CommissioningStage>(Kind::commissioning_stage);

@@ -1,4 +1,4 @@
-// A drive that cannot run away: part of the matrix of tests/campaign/sensor_fault_matrix_test.cpp, as it is quick, and
+// A drive that cannot run away: one speed of the matrix of tests/campaign/sensor_fault_matrix_test.cpp, and
 // single checks of what makes it hold.
 #include <gtest/gtest.h>
 
@@ -19,7 +19,7 @@ const SensorFault& sensor_fault(std::string_view name) {
 TEST(SensorFaults, TheTrueSpeedStaysWithinATenthBeyondTheOverspeedLimit) {
   const double limit = 1.1 * demo_setup().safety.overspeed;
   const Block with = demo_block(cell_setup(true)), without = demo_block(cell_setup(false));
-  for (const SensorFaultCell& cell : all_cells({0.0, 0.05, 0.225})) {
+  for (const SensorFaultCell& cell : all_cells({0.05})) {
     if (cell.load != CellLoad::free || cell.direction < 0 || cell.compensate) continue;
     const SensorFaultOutcome o = run_cell(cell, cell.output_encoder ? with : without, 0.5);
     EXPECT_EQ(o.before, Fault::none) << "false alarm: " << cell.name();

@@ -154,7 +154,7 @@ Command identify_command() {
        "a parameter that is known from another source, such as an inertia where the torque constant is not known "
        "either. --report writes a page with plots for a browser or a printer.",
        {kMakeData, kIdentify,
-        "flexspline identify demo-out --model demo-out/base-model.toml --method oe --supply inertia.inertia=1.04e-4"}},
+        "flexspline identify demo-out --model demo-out/base-model.toml --method iv --supply inertia.inertia=1.04e-4"}},
       declare, run);
 }
 
