@@ -162,7 +162,7 @@ void suit_to_records(PreparedData& prepared, const std::vector<const Experiment*
     make_records(prepared, experiments, nullptr);
   // The cut-off is that of the other models, so that their errors can be compared.
   pipeline.keep_motor_reversals = keeps_motor_reversals;
-  pipeline.keep_torsion_reversals = pipeline.mask && masks_all_torsion(prepared);
+  pipeline.keep_torsion_reversals = pipeline.mask && masks_most_torsion(prepared);
   if (pipeline.keep_torsion_reversals)
     pipeline.reason += "; reversals of the torsion are kept, as its rate is hardly above its noise";
   if (pipeline.keep_motor_reversals || pipeline.keep_torsion_reversals)

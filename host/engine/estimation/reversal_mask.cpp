@@ -204,13 +204,15 @@ bool shows_torsion(const Record& r) {
   return has_torsion(r) && r.rows[index(Balance::transmission)].samples.size() >= kFewestRows;
 }
 
-bool masks_all_torsion(const PreparedData& prepared) {
-  bool is_large = false;
+bool masks_most_torsion(const PreparedData& prepared) {
+  std::size_t kept = 0, all = 0;
   for (const Record& r : prepared.records) {
-    if (shows_torsion(r)) return false;
-    is_large = is_large || has_large_torsion(r, prepared.pipeline.row_cutoff_hz);
+    if (!has_large_torsion(r, prepared.pipeline.row_cutoff_hz)) continue;
+    const Rows& rows = r.rows[index(Balance::transmission)];
+    kept += rows.samples.size();
+    all += rows.samples.size() + rows.masked;
   }
-  return is_large;
+  return static_cast<double>(kept) < kLeastOfTheBest * static_cast<double>(all);
 }
 
 std::optional<double> slowest_law_rad_s(const model::Model& model) {

@@ -281,7 +281,9 @@ void prefer_simple(const BalanceSearch& search, std::vector<CandidateFit>& candi
       return left <= same.left * least && left - least <= same.share_of_missing * decrease;
     };
     const bool same = within(is_smeared(*search.data, other) ? kPolicy.same_smeared : kPolicy.same) ||
-                      (dozens && within(kPolicy.hardly_more));
+                      (dozens && within(kPolicy.hardly_more)) ||
+                      (left <= kPolicy.hardly_more.left * least &&
+                       standard_errors_over(other.fit.left_out, best.fit.left_out) < kPolicy.simpler_standard_errors);
     if (!same && !(best.score() - other.score() <= kPolicy.confounded_margin && within(kPolicy.hardly_more))) continue;
     simplest = i;
     distinguished = same;

@@ -20,10 +20,6 @@ using estimation::MixedFit;
 using estimation::RandomEffectCost;
 using estimation::RecordFactors;
 
-// Parts that each record is cut into: part k of all records is predicted from the other parts. Whole records cannot be
-// left out, because some parameters are shown by a single one (a record at rest, a warm one).
-constexpr std::size_t kFolds = 5;
-
 // R factors of all parts of the records but one.
 std::vector<Eigen::MatrixXd> factors_without(const RecordFactors& factors, std::size_t out) {
   std::vector<Eigen::MatrixXd> others;
@@ -59,7 +55,8 @@ std::vector<LeftOut> predict_left_out(const RecordFactors& factors, const MixedF
                                                         seen, whole.effects.std, whole.effects.variance[i] * tau);
       const Eigen::MatrixXd& part = factors.parts[i][out];
       records[i].rows += factors.rows[i][out];
-      records[i].squares += (part.col(columns) - part.leftCols(columns) * own).squaredNorm();
+      records[i].squares_of_part[out] = (part.col(columns) - part.leftCols(columns) * own).squaredNorm();
+      records[i].squares += records[i].squares_of_part[out];
     }
   }
   return records;
@@ -152,6 +149,22 @@ double rmse_of(const std::vector<LeftOut>& records) {
   const double squares = std::accumulate(records.begin(), records.end(), 0.0,
                                          [](double sum, const LeftOut& r) { return sum + r.squares; });
   return std::sqrt(squares / std::max(1.0, rows_of(records)));
+}
+
+double standard_errors_over(const std::vector<LeftOut>& larger, const std::vector<LeftOut>& other) {
+  double n = 0.0, sum = 0.0, squares = 0.0;
+  for (std::size_t i = 0; i < other.size(); ++i)
+    for (std::size_t f = 0; f < kFolds; ++f) {
+      const double of_larger = larger[i].squares_of_part[f], of_other = other[i].squares_of_part[f];
+      if (of_larger == 0.0 && of_other == 0.0) continue;  // a part without samples
+      const double difference = (of_larger - of_other) * other[i].rows / std::max(other[i].squares, 1e-300);
+      n += 1.0;
+      sum += difference;
+      squares += difference * difference;
+    }
+  if (sum <= 0.0) return 0.0;
+  const double variance = (squares - sum * sum / n) / std::max(1.0, n - 1.0);
+  return sum / std::sqrt(std::max(n * variance, 1e-300));
 }
 
 CrossValidatedFit cross_validate(const RegressionProblem& data, Terms terms, const Eigen::VectorXd& keep) {

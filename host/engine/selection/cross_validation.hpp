@@ -2,6 +2,7 @@
 #pragma once
 
 #include <Eigen/Core>
+#include <array>
 #include <vector>
 
 #include "host/engine/estimation/noise_covariance.hpp"
@@ -20,12 +21,22 @@ using estimation::RowRange;
 using estimation::SmallVector;
 using estimation::Terms;
 
+// Parts that each record is cut into: part k of all records is predicted from the other parts. Whole records cannot be
+// left out, because some parameters are shown by a single one (a record at rest, a warm one).
+inline constexpr std::size_t kFolds = 5;
+
 // A record's samples, each predicted from others: parameters from all records without its part, the record's own random
 // effects from its other parts.
 struct LeftOut {
   double rows = 0.0;
   double squares = 0.0;
+  std::array<double, kFolds> squares_of_part{};
 };
+
+/// By how many standard errors the error of one model on the left-out parts of all records is larger than that of
+/// another one: the differences of the squares by part, in units of the record's noise as the other one leaves it. Zero
+/// where it is not larger.
+double standard_errors_over(const std::vector<LeftOut>& larger, const std::vector<LeftOut>& other);
 
 // Root mean square of the residual over samples with weight.
 double rmse_of(const Eigen::VectorXd& residual, const Eigen::VectorXd& root_weights);

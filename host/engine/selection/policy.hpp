@@ -131,6 +131,9 @@ struct SelectionPolicy {
   Same same{2.25, 0.001};
   Same same_smeared{2.89, 0.01};
   Same hardly_more{1.21, 0.005};
+  // Or its error is larger by less than one standard error of the parts left out (Breiman, Friedman, Olshen and Stone
+  // 1984: the one-standard-error rule): where something else is missing, too, the parts disagree which law is better.
+  double simpler_standard_errors = 1.0;
   double smeared_quanta = 20.0;   // travels of fewer encoder steps are smeared (the same drives)
   double many_parameters = 12.0;  // a law of so many more is confounded with any
 
