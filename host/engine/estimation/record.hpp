@@ -50,7 +50,7 @@ struct Pipeline {
   double motion_cutoff_hz = 0.0;  // filter of positions before they are differentiated
   bool mask = true;
   bool keep_motor_reversals = false;    // on the motor's balance nothing is masked
-  bool keep_torsion_reversals = false;  // on the transmission's, where the mask would leave next to nothing
+  bool keep_torsion_reversals = false;  // on the transmission's, where the mask would leave nothing
   double torque_per_step = 0.0;  // of a held effort, that readings of the torque lack half of; see zero_order_hold.hpp
   std::string reason;            // where the cut-off comes from
   Derivatives derivatives = Derivatives::butterworth;

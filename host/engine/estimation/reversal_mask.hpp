@@ -18,8 +18,9 @@ void choose_rows(Record& record, const Pipeline& pipeline);
 
 // Whether there are samples to fit the transmission's balance on.
 bool shows_torsion(const Record& record);
-// Whether the mask of reversals leaves less than a tenth of the samples of a torsion that is far above its noise: its
-// rate is the difference of two velocities, and often hardly above theirs.
+// Whether the mask of reversals leaves less than a fifth of the information on the stiffness, which goes with the
+// square of the torsion, of records whose torsion is far above its noise: its rate is the difference of two velocities,
+// and often hardly above theirs.
 bool masks_most_torsion(const PreparedData& prepared);
 
 /// The smallest velocity of the model's friction laws (Stribeck) where it is given and fixed, rad/s: such a law shows
