@@ -5,6 +5,7 @@
 #include <random>
 
 #include "host/engine/estimation/identify.hpp"
+#include "host/engine/estimation/reversal_mask.hpp"
 #include "tests/support/plain_model.hpp"
 #include "tests/support/written_experiment.hpp"
 
@@ -19,7 +20,6 @@ constexpr double kLoad_nm = 4.0, kOffset_nm = 0.9, kStep = 2e-5;  // of the sens
 
 struct Sensors {
   bool has_output_position = false;
-  bool has_short_loaded_record = false;  // so that the rate of its torsion is above its noise
 };
 
 // Two records under a load that swings; the sensor of the torque reads `kOffset_nm` too much.
@@ -27,22 +27,20 @@ data::Dataset loaded_axis(const Sensors& sensors) {
   std::mt19937_64 random(3);
   std::normal_distribution<double> noise(0.0, 1.0);
   data::Dataset dataset;
-  const auto record = [&](const char* name, double frequency_hz, std::size_t samples, double load_nm) {
+  for (const double frequency_hz : {0.4, 0.7}) {
     const double rate = kTurn * frequency_hz;
-    dataset.experiments.push_back(testing::written_experiment(name, 2e-3, samples, [&](double t, data::Experiment& e) {
-      const double q = 30.0 * std::sin(rate * t), w = 30.0 * rate * std::cos(rate * t), a = -rate * rate * q;
-      const double torque = load_nm * std::sin(0.31 * kTurn * t);
-      e[Column::motor_position].push_back(q);
-      e[Column::motor_torque].push_back(1e-4 * a + 1e-3 * w + 0.05 * (w > 0.0 ? 1.0 : -1.0) + torque / kRatio +
-                                        2e-4 * noise(random));
-      e[Column::torque].push_back(torque + kOffset_nm + 1e-3 * noise(random));
-      if (sensors.has_output_position)
-        e[Column::output_position].push_back(kStep * std::round((q / kRatio - torque / kStiffness) / kStep));
-    }));
-  };
-  record("slow", 0.4, 6000, kLoad_nm);
-  record("fast", 0.7, 6000, kLoad_nm);
-  if (sensors.has_short_loaded_record) record("loaded", 0.7, 600, 20.0 * kLoad_nm);
+    dataset.experiments.push_back(testing::written_experiment(
+        frequency_hz < 0.5 ? "slow" : "fast", 2e-3, 6000, [&](double t, data::Experiment& e) {
+          const double q = 30.0 * std::sin(rate * t), w = 30.0 * rate * std::cos(rate * t), a = -rate * rate * q;
+          const double torque = kLoad_nm * std::sin(0.31 * kTurn * t);
+          e[Column::motor_position].push_back(q);
+          e[Column::motor_torque].push_back(1e-4 * a + 1e-3 * w + 0.05 * (w > 0.0 ? 1.0 : -1.0) + torque / kRatio +
+                                            2e-4 * noise(random));
+          e[Column::torque].push_back(torque + kOffset_nm + 1e-3 * noise(random));
+          if (sensors.has_output_position)
+            e[Column::output_position].push_back(kStep * std::round((q / kRatio - torque / kStiffness) / kStep));
+        }));
+  }
   dataset.drive.gear_ratio = kRatio;
   return dataset;
 }
@@ -66,9 +64,10 @@ TEST(SensorOffset, StaysOnTheTransmissionBalanceWhereATorsionIsMeasured) {
             Balance::transmission);
 }
 
-void expect_stiffness_with_reversals(const Sensors& sensors) {
-  const auto found =
-      identify(loaded_axis(sensors), testing::plain_model_with({"linear_stiffness", "torque_offset"}), {});
+TEST(NoisyTorsion, KeepsItsReversalsWhereAMaskWouldLeaveNothing) {
+  // The torsion is 200 urad in all, so that its rate is far below the noise of a difference of two velocities.
+  const auto found = identify(loaded_axis({.has_output_position = true}),
+                              testing::plain_model_with({"linear_stiffness", "torque_offset"}), {});
   EXPECT_TRUE(found->prepared.pipeline.keep_torsion_reversals);
   const auto stiffness = std::find_if(found->estimates.begin(), found->estimates.end(),
                                       [](const Estimate& e) { return e.effect == "linear_stiffness"; });
@@ -76,13 +75,27 @@ void expect_stiffness_with_reversals(const Sensors& sensors) {
   EXPECT_NEAR(stiffness->value, kStiffness, 0.05 * kStiffness);
 }
 
-TEST(NoisyTorsion, KeepsItsReversalsWhereAMaskWouldLeaveNothing) {
-  // The torsion is 200 urad in all, so that its rate is far below the noise of a difference of two velocities.
-  expect_stiffness_with_reversals({.has_output_position = true});
+// Whether too little is left where the mask leaves the first samples of each record, so large a share of them.
+bool leaves_too_little(double share) {
+  const data::Dataset dataset = loaded_axis({.has_output_position = true});
+  PreparedData prepared =
+      identify(dataset, testing::plain_model_with({"linear_stiffness", "torque_offset"}), {})->prepared;
+  for (Record& r : prepared.records) {
+    std::vector<std::size_t>& samples = r.rows[static_cast<std::size_t>(Balance::transmission)].samples;
+    samples.clear();
+    for (std::size_t k = 0; k < static_cast<std::size_t>(share * static_cast<double>(r.inputs.size()));
+         k += r.decimation)
+      samples.push_back(k);
+  }
+  return masks_most_torsion(prepared);
 }
 
-TEST(NoisyTorsion, KeepsItsReversalsWhereAMaskWouldLeaveOneShortRecordAlone) {
-  expect_stiffness_with_reversals({.has_output_position = true, .has_short_loaded_record = true});
+TEST(NoisyTorsion, IsOneOfWhichTheMaskLeavesLessThanAFifthOfTheSquares) {
+  // The load swings nearly four times in a record, so that the share of the squares is about that of the samples.
+  EXPECT_TRUE(leaves_too_little(0.0));
+  EXPECT_TRUE(leaves_too_little(0.1));
+  EXPECT_FALSE(leaves_too_little(0.3));
+  EXPECT_FALSE(leaves_too_little(1.0));
 }
 
 }  // namespace
