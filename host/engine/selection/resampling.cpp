@@ -133,7 +133,7 @@ bool Resampling::FoundTerm::is_strongly_confirmed() const {
 }
 
 bool Resampling::FoundTerm::is_most_of_held_out_error() const {
-  return held_out_ratio && *held_out_ratio * *held_out_ratio <= 0.5;
+  return held_out_ratio && *held_out_ratio * *held_out_ratio <= 1.0 - kPolicy.angle_share;
 }
 
 bool Resampling::FoundTerm::is_confirmed() const {

@@ -28,9 +28,18 @@ double median_of_positive(std::vector<double> x) {
 }
 
 RegressorTable without_samples(const RegressorTable& table) {
-  RegressorTable places = table;
+  RegressorTable places;
+  static_cast<TableModel&>(places) = table;
   places.columns.resize(0, table.columns.cols());
-  if (places.presliding) places.presliding->columns.resize(0, table.presliding->columns.cols());
+  places.terms = table.terms;
+  places.differences = table.differences;
+  places.scale = table.scale;
+  places.not_visible = table.not_visible;
+  if (table.presliding) {
+    PreslidingColumns& own = places.presliding.emplace();
+    own.instead_of = table.presliding->instead_of;
+    own.columns.resize(0, table.presliding->columns.cols());
+  }
   return places;
 }
 
