@@ -18,7 +18,8 @@ struct AngleDependentFriction : Stateless {
           "some angles more easily than at others.",
       .causes =
           "A shaft, bearing or seal that is out of round or out of line, uneven preload or wear of the teeth, a cable "
-          "that drags in a part of the output's turn.",
+          "that drags in a part of the output's turn. At twice the motor's pole pairs also current sensors whose gains "
+          "differ: what varies then is the current that is logged, not the friction.",
       .check =
           "Turn slowly over several turns forward and then backward: half the difference of the two currents over the "
           "angle is friction, half their sum is ripple. Look at the angle of the maximum for rubbing, runout and wear.",

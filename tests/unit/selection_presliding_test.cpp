@@ -5,8 +5,11 @@
 #include <cmath>
 #include <random>
 
+#include "host/engine/estimation/identify.hpp"
 #include "host/engine/selection/add.hpp"
+#include "host/engine/selection/candidate_tables.hpp"
 #include "host/engine/selection/presliding.hpp"
+#include "host/engine/selection/resampling.hpp"
 #include "tests/support/plain_model.hpp"
 #include "tests/support/written_experiment.hpp"
 
@@ -21,7 +24,7 @@ constexpr double kTravel_rad = 0.2, kDry_nm = 0.05, kNoise_nm = 5e-4;
 
 // Strokes of several rad with an inertia, viscous friction, and dry friction that builds up over a travel (Dahl's law:
 // exact along each step).
-data::Dataset swinging() {
+data::Dataset swinging(double travel_rad = kTravel_rad, double encoder_step_rad = 0.0) {
   std::mt19937_64 random(1);
   std::normal_distribution<double> noise(0.0, kNoise_nm);
   data::Dataset dataset;
@@ -32,9 +35,10 @@ data::Dataset swinging() {
         frequency_hz < 0.3 ? "slow" : "fast", 2e-3, 6000, [&](double t, data::Experiment& e) {
           const double q = 3.0 * std::sin(rate * t), w = 3.0 * rate * std::cos(rate * t);
           const double end = q >= before ? 1.0 : -1.0;
-          z = end + (z - end) * std::exp(-std::abs(q - before) / kTravel_rad);
+          z = end + (z - end) * std::exp(-std::abs(q - before) / travel_rad);
           before = q;
-          e[Column::motor_position].push_back(q);
+          e[Column::motor_position].push_back(
+              encoder_step_rad > 0.0 ? encoder_step_rad * std::round(q / encoder_step_rad) : q);
           e[Column::motor_torque].push_back(-1e-3 * rate * rate * q + 4e-3 * w + kDry_nm * z + noise(random));
         }));
   }
@@ -93,6 +97,64 @@ TEST(PreslidingLaw, IsSearchedUpToAQuarterOfTheUsualStrokeThoughNoiseMakesManyTi
   ASSERT_FALSE(travels.empty());
   EXPECT_LT(travels.front(), 0.5 * kTravel_rad);
   EXPECT_NEAR(travels.back(), std::min(kPolicy.longest_presliding, 0.25 * 6.0), 0.02);
+}
+
+// The same strokes with dry friction alone, whose axis sticks at each reversal until the torque has passed from one
+// limit of friction to the other.
+data::Dataset sticking() {
+  constexpr double kStuck_s = 0.03;
+  std::mt19937_64 random(3);
+  std::normal_distribution<double> noise(0.0, kNoise_nm);
+  data::Dataset dataset;
+  for (const double frequency_hz : {0.21, 0.34}) {
+    const double rate = kTurn * frequency_hz, half_s = 0.5 / frequency_hz;
+    dataset.experiments.push_back(testing::written_experiment(
+        frequency_hz < 0.3 ? "slow" : "fast", 2e-3, 6000, [&](double t, data::Experiment& e) {
+          const double strokes = std::floor(t / (half_s + kStuck_s)), within = t - strokes * (half_s + kStuck_s);
+          const double way = std::fmod(strokes, 2.0) == 0.0 ? 1.0 : -1.0, angle = rate * std::min(within, half_s);
+          const double q = -3.0 * way * std::cos(angle), w = 3.0 * way * rate * std::sin(angle);
+          const double passed = std::max(within - half_s, 0.0) / kStuck_s;
+          e[Column::motor_position].push_back(q);
+          e[Column::motor_torque].push_back(-1e-3 * rate * rate * q + 4e-3 * w + kDry_nm * way * (1.0 - 2.0 * passed) +
+                                            noise(random));
+        }));
+  }
+  return dataset;
+}
+
+using Experiments = std::vector<const data::Experiment*>;
+
+bool resolves_presliding(const data::Dataset& dataset) {
+  const auto fitted = estimation::identify(dataset, testing::plain_model(), {});
+  const Experiments all = {&dataset.experiments[0], &dataset.experiments[1]};
+  return make_tables(all, fitted->model.drive, fitted->terms, Balance::motor, kPolicy).presliding_is_resolved;
+}
+
+TEST(PreslidingLaw, HasATravelThatIsResolvedWhereItIsThereAndNoneWhereTheAxisOnlySticks) {
+  EXPECT_TRUE(resolves_presliding(swinging()));
+  EXPECT_FALSE(resolves_presliding(sticking()));
+}
+
+// Terms that subsamples found, or left open, that are presliding.
+std::vector<Resampling::FoundTerm> presliding_of(const std::vector<Resampling::FoundTerm>& terms) {
+  std::vector<Resampling::FoundTerm> all;
+  for (const Resampling::FoundTerm& term : terms)
+    if (!term.group.empty() && term.group.front().effect == "dahl_friction") all.push_back(term);
+  return all;
+}
+
+TEST(PreslidingLaw, ThatSubsamplesChooseWithATravelOfAFewEncoderStepsIsLeftOpenAsTheAxisMayStick) {
+  const auto resampled = [](const data::Dataset& dataset) {
+    const auto fitted = estimation::identify(dataset, testing::plain_model(), {});
+    const Experiments all = {&dataset.experiments[0], &dataset.experiments[1]};
+    return resample(all, fitted->model.drive, fitted->terms);
+  };
+  const Resampling there = resampled(swinging()), hidden = resampled(swinging(0.02, 0.006));
+  EXPECT_EQ(presliding_of(there.found).size(), 1u);
+  EXPECT_TRUE(presliding_of(hidden.found).empty());
+  const auto open = presliding_of(hidden.undecided);
+  ASSERT_EQ(open.size(), 1u);
+  EXPECT_TRUE(open.front().may_be_sticking);
 }
 
 }  // namespace

@@ -25,7 +25,9 @@ struct CandidateFit {
   std::string why_not;
   std::string confounded_with;  // the effect of the model that the data cannot distinguish it from
   std::string note;             // a remark for the user if it is named
-  bool leads = false;           // has a higher score than a simpler one that comes first, but not significantly
+  // Error on experiments that are held out, with it over without it; of the best one that passes alone.
+  std::optional<double> held_out_ratio;
+  bool leads = false;  // has a higher score than a simpler one that comes first, but not significantly
   bool order_is_not_identifiable =
       false;  // not admissible for this reason only: it has the usual order, which is the best of those tried
 

@@ -55,8 +55,10 @@ std::optional<PreslidingTravels> best_presliding_travels(const estimation::Prepa
   const std::vector<double> travels = presliding_travels(fitted, policy);
   const std::vector<double> squares = squares_by_travel(fitted, terms, travels);
   if (squares.empty()) return std::nullopt;
+  const auto least = std::min_element(squares.begin(), squares.end());
   PreslidingTravels best;
-  best.state = travels[static_cast<std::size_t>(std::min_element(squares.begin(), squares.end()) - squares.begin())];
+  best.is_resolved = least != squares.begin();
+  best.state = travels[static_cast<std::size_t>(least - squares.begin())];
   for (const double factor : {1.0 / policy.presliding_shape_factor, policy.presliding_shape_factor}) {
     const double travel = std::clamp(factor * best.state, travels.front(), travels.back());
     if (std::abs(std::log(travel / best.state)) > 0.5 * std::log(policy.presliding_shape_factor))
@@ -104,6 +106,7 @@ CandidateTables make_tables(const std::vector<const data::Experiment*>& experime
   tables.torque_has_noise = take_noise_off_torque(prepared) > 0;
   estimation::take_torque_from_load(prepared, terms);
   const std::optional<PreslidingTravels> travels = best_presliding_travels(prepared, terms, balance, policy);
+  tables.presliding_is_resolved = !travels || travels->is_resolved;
   tables.table = make_regressor_table(prepared, balance, terms, travels, highest_hz, policy);
   if (tables.table.model_columns == 0) return tables;
   for (double f = prepared.pipeline.row_cutoff_hz; f > kWider * highest_hz; f *= 0.5)

@@ -12,8 +12,9 @@ namespace flexspline::selection {
 
 struct CandidateTables {
   Bandwidth bandwidth;
-  RegressorTable table;           // without model columns: nothing can be chosen
-  bool torque_has_noise = false;  // of the sensor, white, in a record: terms read the modelled torque there
+  RegressorTable table;                // without model columns: nothing can be chosen
+  bool presliding_is_resolved = true;  // as PreslidingTravels has it
+  bool torque_has_noise = false;       // of the sensor, white, in a record: terms read the modelled torque there
   std::vector<std::pair<double, bool>> settings;  // bandwidth in Hz, reversals left out
 
   // Whether a term can be seen at a bandwidth: waves below it, and above the motion's bandwidth waves alone.

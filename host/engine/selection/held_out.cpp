@@ -51,6 +51,7 @@ void check_on_held_out(const HeldOut& held_out, const BalanceSearch& search, std
   for (std::size_t k = 0; k < kMostRefused && !candidates.empty() && passes(candidates.front()); ++k) {
     CandidateFit& first = candidates.front();
     const double ratio = held_out.rmse(first.fit.terms) / std::max(before, 1e-300);
+    first.held_out_ratio = ratio;
     if (ratio * ratio <= most_growth(search.base, first.fit)) return;
     first.why_not =
         fmt::format("the error on experiments that are held out rises by {:.1f} % with it", 100.0 * (ratio - 1.0));

@@ -62,9 +62,10 @@ struct SelectionPolicy {
   // Share of the squared error on experiments that are held out: a term that takes off so much there matters, and needs
   // no more than the usual share of the subsamples, whatever else is missing.
   double matters_share = 0.2;
-  // The same for a wave of the output's angle whose likelihood is not significant: over a part of a turn it takes off a
-  // part of any slow function of the angle (by hand, five false and 28 true ones of robot-like twins).
-  double angle_share = 0.5;
+  // Most of it. What takes off so much needs no majority of the subsamples, only none against it; and a wave of the
+  // output's angle whose likelihood is not significant needs as much: over a part of a turn it takes off a part of any
+  // slow function of the angle (by hand, robot-like twins).
+  double most_share = 0.5;
 
   double white = 0.95;  // semivariance over variance of what is left: above, it is noise
 

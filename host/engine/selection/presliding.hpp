@@ -16,6 +16,9 @@ namespace flexspline::selection {
 struct PreslidingTravels {
   double state = 0.0;
   std::vector<double> shape;
+  // `state` is longer than the least that the noise of the position lets show. The least one may be dry friction on an
+  // axis that sticks: it takes any value up to its limit there, while the position tells nothing.
+  bool is_resolved = true;
 };
 
 // The state of Dahl's law along a record, -1 to 1, advanced by travel (exact for one direction).

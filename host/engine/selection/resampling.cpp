@@ -74,10 +74,30 @@ void find_terms(const StabilitySelection& selection, const estimation::Terms& te
     const std::vector<double> with_it = selection.held_out_ratios(names);
     const Resampling::FoundTerm term =
         found_term(one, with_it.empty() ? std::nullopt : std::optional(with_it.back()), terms);
-    const bool is_found = term.frequency >= kPolicy.named_frequency && term.is_strongly_confirmed() &&
-                          term.least_by_mask >= 1.0 - kPolicy.named_frequency;
+    const bool is_found =
+        (term.frequency >= kPolicy.named_frequency ? term.is_strongly_confirmed() : term.is_most_of_held_out_error()) &&
+        term.least_by_mask >= 1.0 - kPolicy.named_frequency;
     (is_found ? result.found : result.undecided).push_back(term);
   }
+}
+
+// Presliding whose travel is not resolved may be an axis that sticks. Chooses again without it, unless nearly all
+// subsamples have it and the held-out error falls by as much as an effect that matters.
+void leave_out_sticking(StabilitySelection& selection, const estimation::Terms& terms, Resampling& result) {
+  if (selection.tables().presliding_is_resolved) return;
+  const auto is_presliding = [](const Resampling::FoundTerm& f) {
+    return !f.group.empty() && catalogue::get(f.group.front().effect).is_presliding();
+  };
+  const auto found = std::find_if(result.found.begin(), result.found.end(), is_presliding);
+  if (found == result.found.end()) return;
+  if (found->frequency >= kPolicy.certain_frequency && found->is_strongly_confirmed()) return;
+  Resampling::FoundTerm sticking = *found;
+  sticking.may_be_sticking = true;
+  selection.leave_out({kPresliding});
+  result.found.clear();
+  result.undecided.clear();
+  find_terms(selection, terms, result);
+  result.undecided.push_back(std::move(sticking));
 }
 
 // A term that the held-out error refuses takes the place of what is there: chooses again without such terms. What is
@@ -121,6 +141,7 @@ Resampling resample(const std::vector<const data::Experiment*>& experiments, con
   result.lowest_hz =
       result.highest_hz * std::pow(kPolicy.bandwidth_factor, static_cast<double>(kPolicy.bandwidths - 1));
   find_terms(selection, terms, result);
+  leave_out_sticking(selection, terms, result);
   result.support = support_of(selection, terms);
   for (const catalogue::Entry* entry : selection.tables().table.not_visible)
     result.not_visible.emplace_back(entry->name());
@@ -133,7 +154,7 @@ bool Resampling::FoundTerm::is_strongly_confirmed() const {
 }
 
 bool Resampling::FoundTerm::is_most_of_held_out_error() const {
-  return held_out_ratio && *held_out_ratio * *held_out_ratio <= 1.0 - kPolicy.angle_share;
+  return held_out_ratio && *held_out_ratio * *held_out_ratio <= 1.0 - kPolicy.most_share;
 }
 
 bool Resampling::FoundTerm::is_confirmed() const {
