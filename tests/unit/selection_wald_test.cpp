@@ -71,14 +71,25 @@ TEST(WaldTest, ANameThatHeldOutExperimentsConfirmStaysThoughWhatElseIsMissingWid
   EXPECT_TRUE(result.named.empty());
 }
 
-TEST(WaldTest, ASignificantNameAndAConfoundedGroupStay) {
+TEST(WaldTest, ASignificantNameStays) {
   Diagnosis result = with(candidate({1.0, -5.0}));
   take_back_insignificant(result);
   EXPECT_EQ(result.named.size(), 1U);
-  result = with(candidate({0.1}));
-  result.verdict = Verdict::confusable_effects;
-  take_back_insignificant(result);
-  EXPECT_EQ(result.named.size(), 1U);
+}
+
+TEST(WaldTest, AConfoundedGroupStaysWhereOneOfItsMembersDiffersFromZeroAndGoesWhereNoneDoes) {
+  const auto named_of_group = [](double times_std_of_second) {
+    Diagnosis result = with(candidate({0.1}));
+    result.verdict = Verdict::confusable_effects;
+    Candidate second = candidate({times_std_of_second});
+    second.effect = "current_offset";
+    result.named.push_back({second.effect, second.order});
+    result.candidates.push_back(std::move(second));
+    take_back_insignificant(result);
+    return result.named.size();
+  };
+  EXPECT_EQ(named_of_group(5.0), 2U);
+  EXPECT_EQ(named_of_group(1.0), 0U);
 }
 
 }  // namespace

@@ -29,19 +29,32 @@ bool is_confirmed_by_held_out(const Diagnosis& result, const NamedEffect& name) 
   });
 }
 
+namespace {
+
+// The candidate of a name whose values do not differ from zero; null where they do, where no test can tell, or where
+// experiments that are held out confirm the name.
+Candidate* insignificant(Diagnosis& result, const NamedEffect& name) {
+  const auto at = std::find_if(result.candidates.begin(), result.candidates.end(),
+                               [&](const Candidate& c) { return c.effect == name.effect && c.order == name.order; });
+  if (at == result.candidates.end() || is_confirmed_by_held_out(result, name)) return nullptr;
+  const std::optional<double> p = wald_p_value(*at);
+  return p && *p > kPolicy.wald_p_value ? &*at : nullptr;
+}
+
+}  // namespace
+
 void take_back_insignificant(Diagnosis& result) {
-  if (result.verdict == Verdict::confusable_effects) return;
+  const auto is_insignificant = [&](const NamedEffect& name) { return insignificant(result, name) != nullptr; };
+  if (result.verdict == Verdict::confusable_effects &&
+      !std::all_of(result.named.begin(), result.named.end(), is_insignificant))
+    return;
   std::erase_if(result.named, [&](const NamedEffect& name) {
-    const auto at = std::find_if(result.candidates.begin(), result.candidates.end(),
-                                 [&](const Candidate& c) { return c.effect == name.effect && c.order == name.order; });
-    if (at == result.candidates.end()) return false;
-    if (is_confirmed_by_held_out(result, name)) return false;
-    const std::optional<double> p = wald_p_value(*at);
-    if (!p || *p <= kPolicy.wald_p_value) return false;
-    at->admissible = false;
-    at->why_not = "its values do not differ from zero beyond their intervals";
+    Candidate* const candidate = insignificant(result, name);
+    if (!candidate) return false;
+    candidate->admissible = false;
+    candidate->why_not = "its values do not differ from zero beyond their intervals";
     if (result.resampling && result.resampling->decides)
-      result.possible.push_back({{name}, at->why_not, std::nullopt, std::nullopt});
+      result.possible.push_back({{name}, candidate->why_not, std::nullopt, std::nullopt});
     return true;
   });
 }

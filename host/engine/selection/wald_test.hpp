@@ -10,8 +10,8 @@ namespace flexspline::selection {
 // which are no parameters where the effect is zero (Davies, 1977), and where no interval is known.
 std::optional<double> wald_p_value(const Candidate& candidate);
 
-// Takes back the names of linear effects whose values do not differ from zero, but for groups that are confounded: each
-// of those stands in the place of another.
+// Takes back the names of linear effects whose values do not differ from zero; a confounded group, of which each may
+// stand in the place of another, only where none of them does.
 void take_back_insignificant(Diagnosis& result);
 
 // Whether resampling decided and experiments that are held out confirm a name.
