@@ -277,7 +277,7 @@ std::vector<PossibleEffect> possible_effects(const Resampling& resampling, const
   all.push_back({{name},
                  fmt::format("its likelihood is significant (score {:.0f}), but {}", first.gain.score,
                              why_not_chosen(resampling, first)),
-                 support_of(resampling, first),
+                 std::nullopt,
                  first.held_out_ratio});
   return all;
 }
