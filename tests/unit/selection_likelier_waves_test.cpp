@@ -49,5 +49,27 @@ TEST(LikelierWaves, OfAnotherOrderOrWithoutSignificanceSayNothing) {
   EXPECT_EQ(found_with(1.0, 2.0)[0].effect, "angle_dependent_friction");
 }
 
+// The group of a ripple once a turn beside a weight of that score and share of chi-square.
+std::size_t group_with_a_weight(double score, double chi2_percent) {
+  Resampling resampling;
+  resampling.found.push_back({.group = {{"torque_ripple", 1.0}}, .frequency = 0.8});
+  SearchedBalance motor;
+  CandidateFit weight = candidate("gravity", 1.0, score);
+  weight.model.order.reset();
+  weight.gain.chi2_percent = chi2_percent;
+  motor.candidates = {candidate("torque_ripple", 1.0, 77.7332), weight};
+  add_identical_effects(resampling, motor);
+  return resampling.found.front().group.size();
+}
+
+TEST(IdenticalEffects, AreOneGroupAsAWeightAndARippleOnceATurnAreWithoutAGear) {
+  EXPECT_EQ(group_with_a_weight(77.7332 + 1e-9, 50.0 - 1e-9), 2U);
+}
+
+TEST(IdenticalEffects, AreNotThoseThatAreOnlyAboutAsLikely) {
+  EXPECT_EQ(group_with_a_weight(77.9, 50.0), 1U);
+  EXPECT_EQ(group_with_a_weight(77.7332, 49.9), 1U);
+}
+
 }  // namespace
 }  // namespace flexspline::selection

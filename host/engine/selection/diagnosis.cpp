@@ -336,6 +336,7 @@ Diagnosis diagnose_at(const data::Dataset& dataset, const model::Model& model, c
     for (const data::Experiment* e : of_role(dataset, data::Role::holdout)) with_held_out.push_back(e);
     result.resampling = resample(with_held_out, base->model.drive, base->terms);
     take_likelier_waves(*result.resampling, *motor);
+    add_identical_effects(*result.resampling, *motor);
     add_effects_of_angle(*result.resampling, *motor);
   }
   const bool decides = result.resampling && resampling_decides(*result.resampling, *motor);

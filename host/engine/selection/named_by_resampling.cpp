@@ -313,6 +313,19 @@ void take_likelier_waves(Resampling& resampling, const SearchedBalance& motor) {
   }
 }
 
+void add_identical_effects(Resampling& resampling, const SearchedBalance& motor) {
+  constexpr double kRounding = 1e-6;  // relative
+  const auto are_same = [](double a, double b) { return std::abs(a - b) <= kRounding * std::abs(a); };
+  for (Resampling::FoundTerm& found : resampling.found) {
+    const CandidateFit* own = judged_candidate(found, motor);
+    if (!own || own->gain.chi2_percent == 0.0) continue;
+    for (const CandidateFit& t : motor.candidates)
+      if (&t != own && t.admissible && are_same(own->gain.score, t.gain.score) &&
+          are_same(own->gain.chi2_percent, t.gain.chi2_percent))
+        found.group.push_back({std::string(t.model.entry->name()), t.model.order});
+  }
+}
+
 bool resampling_decides(const Resampling& resampling, const SearchedBalance& motor) {
   if (resampling.subsamples == 0.0) return resampling.too_little;
   if (!motor.names_one()) return true;

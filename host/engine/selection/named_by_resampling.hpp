@@ -16,6 +16,10 @@ bool is_of_family(const NamedEffect& a, const NamedEffect& b);
 // Halves of the data take either for the other, so likelihood decides which it is, or that both are one group.
 void take_likelier_waves(Resampling& resampling, const SearchedBalance& motor);
 
+// Effects whose torques are one on these data, as a weight and a ripple once a turn are without a gear, are one group:
+// halves choose the one that is visible at more bandwidths. They have the same likelihood.
+void add_identical_effects(Resampling& resampling, const SearchedBalance& motor);
+
 // Whether all data contradict what their halves chose: with it, the likelihood of the data left out of the fit falls
 // significantly, and their error rises. The halves are parts of the same motions, and agree in what those have in
 // common; then the held-out error has to fall by as much as an effect that matters. Presliding is not judged, as the
