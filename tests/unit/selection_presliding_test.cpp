@@ -9,9 +9,8 @@
 #include "host/engine/selection/add.hpp"
 #include "host/engine/selection/candidate_tables.hpp"
 #include "host/engine/selection/presliding.hpp"
-#include "host/engine/selection/resampling.hpp"
 #include "tests/support/plain_model.hpp"
-#include "tests/support/written_experiment.hpp"
+#include "tests/support/swinging_axis.hpp"
 
 namespace flexspline::selection {
 namespace {
@@ -20,29 +19,10 @@ using data::Column;
 using estimation::Balance;
 
 constexpr double kTurn = 6.283185307179586;
-constexpr double kTravel_rad = 0.2, kDry_nm = 0.05, kNoise_nm = 5e-4;
+constexpr double kTravel_rad = 0.2, kDry_nm = testing::kSwingingDry_nm, kNoise_nm = testing::kSwingingNoise_nm;
 
-// Strokes of several rad with an inertia, viscous friction, and dry friction that builds up over a travel (Dahl's law:
-// exact along each step).
-data::Dataset swinging(double travel_rad = kTravel_rad, double encoder_step_rad = 0.0) {
-  std::mt19937_64 random(1);
-  std::normal_distribution<double> noise(0.0, kNoise_nm);
-  data::Dataset dataset;
-  for (const double frequency_hz : {0.21, 0.34}) {
-    double z = 1.0, before = 0.0;
-    const double rate = kTurn * frequency_hz;
-    dataset.experiments.push_back(testing::written_experiment(
-        frequency_hz < 0.3 ? "slow" : "fast", 2e-3, 6000, [&](double t, data::Experiment& e) {
-          const double q = 3.0 * std::sin(rate * t), w = 3.0 * rate * std::cos(rate * t);
-          const double end = q >= before ? 1.0 : -1.0;
-          z = end + (z - end) * std::exp(-std::abs(q - before) / travel_rad);
-          before = q;
-          e[Column::motor_position].push_back(
-              encoder_step_rad > 0.0 ? encoder_step_rad * std::round(q / encoder_step_rad) : q);
-          e[Column::motor_torque].push_back(-1e-3 * rate * rate * q + 4e-3 * w + kDry_nm * z + noise(random));
-        }));
-  }
-  return dataset;
+data::Dataset swinging() {
+  return testing::swinging_axis(kTravel_rad);
 }
 
 TEST(PreslidingLaw, ThatIsAddedIsFittedAroundReversalsAndTakesTheErrorThereToTheNoise) {
@@ -133,28 +113,6 @@ bool resolves_presliding(const data::Dataset& dataset) {
 TEST(PreslidingLaw, HasATravelThatIsResolvedWhereItIsThereAndNoneWhereTheAxisOnlySticks) {
   EXPECT_TRUE(resolves_presliding(swinging()));
   EXPECT_FALSE(resolves_presliding(sticking()));
-}
-
-// Terms that subsamples found, or left open, that are presliding.
-std::vector<Resampling::FoundTerm> presliding_of(const std::vector<Resampling::FoundTerm>& terms) {
-  std::vector<Resampling::FoundTerm> all;
-  for (const Resampling::FoundTerm& term : terms)
-    if (!term.group.empty() && term.group.front().effect == "dahl_friction") all.push_back(term);
-  return all;
-}
-
-TEST(PreslidingLaw, ThatSubsamplesChooseWithATravelOfAFewEncoderStepsIsLeftOpenAsTheAxisMayStick) {
-  const auto resampled = [](const data::Dataset& dataset) {
-    const auto fitted = estimation::identify(dataset, testing::plain_model(), {});
-    const Experiments all = {&dataset.experiments[0], &dataset.experiments[1]};
-    return resample(all, fitted->model.drive, fitted->terms);
-  };
-  const Resampling there = resampled(swinging()), hidden = resampled(swinging(0.02, 0.006));
-  EXPECT_EQ(presliding_of(there.found).size(), 1u);
-  EXPECT_TRUE(presliding_of(hidden.found).empty());
-  const auto open = presliding_of(hidden.undecided);
-  ASSERT_EQ(open.size(), 1u);
-  EXPECT_TRUE(open.front().may_be_sticking);
 }
 
 }  // namespace
