@@ -316,6 +316,18 @@ void assess_excitation(bool moves, Diagnosis& result) {
   if (!moves || (result.resampling && result.resampling->too_little)) result.verdict = Verdict::insufficient_excitation;
 }
 
+// What halves of the data choose on the motor's balance, held-out experiments kept for the check.
+Resampling resample_motor(const data::Dataset& dataset, const estimation::Identification& base,
+                          const SearchedBalance& motor) {
+  std::vector<const data::Experiment*> with_held_out = of_role(dataset, data::Role::fit);
+  for (const data::Experiment* e : of_role(dataset, data::Role::holdout)) with_held_out.push_back(e);
+  Resampling result = resample(with_held_out, base.model.drive, base.terms);
+  take_likelier_waves(result, motor);
+  add_identical_effects(result, motor);
+  add_effects_of_angle(result, motor);
+  return result;
+}
+
 // At the cut-off and the mask of the options.
 Diagnosis diagnose_at(const data::Dataset& dataset, const model::Model& model, const Options& options) {
   Diagnosis result;
@@ -332,12 +344,7 @@ Diagnosis diagnose_at(const data::Dataset& dataset, const model::Model& model, c
   });
   if (moves && motor != all.end()) {
     if (options.progress) options.progress("choosing effects on halves of the data");
-    std::vector<const data::Experiment*> with_held_out = of_role(dataset, data::Role::fit);
-    for (const data::Experiment* e : of_role(dataset, data::Role::holdout)) with_held_out.push_back(e);
-    result.resampling = resample(with_held_out, base->model.drive, base->terms);
-    take_likelier_waves(*result.resampling, *motor);
-    add_identical_effects(*result.resampling, *motor);
-    add_effects_of_angle(*result.resampling, *motor);
+    result.resampling = resample_motor(dataset, *base, *motor);
   }
   const bool decides = result.resampling && resampling_decides(*result.resampling, *motor);
   const bool is_motor_first = base->prepared.pipeline.keep_torsion_reversals && motor != all.end() &&
