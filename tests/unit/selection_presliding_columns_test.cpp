@@ -6,6 +6,7 @@
 #include <algorithm>
 #include <random>
 
+#include "host/engine/selection/filtered_table.hpp"
 #include "host/engine/selection/halves.hpp"
 
 namespace flexspline::selection {
@@ -53,7 +54,8 @@ TEST(PreslidingColumns, TakeThePlacesOfThoseThatDifferInProductsAndHalves) {
   const WithPresliding w = table_with_presliding(31);
   SelectionPolicy policy;
   // At the bandwidth of the table nothing is filtered; all samples but those at the ends are taken.
-  const Setting setting = make_setting(w.table, w.table.highest_hz, false, false, policy);
+  const Setting setting = make_setting(filtered_table(w.table, all_columns(w.table), w.table.highest_hz),
+                                       all_columns(w.table), false, false, policy);
   ASSERT_EQ(setting.sign_width, 4);
   ASSERT_EQ(setting.presliding.size(), 6U);
   const std::vector<double> weights = {2.0, 0.5};
@@ -83,12 +85,12 @@ TEST(PreslidingColumns, TakeThePlacesOfThoseThatDifferInProductsAndHalves) {
 
 TEST(PreslidingColumns, StayWithTheTermsThatAreKept) {
   const WithPresliding w = table_with_presliding(32);
-  const RegressorTable none = with_terms(w.table, {});
-  ASSERT_TRUE(none.presliding);
-  EXPECT_EQ(none.presliding->instead_of, std::vector<Eigen::Index>{1});
-  EXPECT_EQ(none.presliding->columns, w.table.presliding->columns);
-  EXPECT_EQ(none.presliding_shape(), (std::vector<Eigen::Index>{2, 3}));
-  EXPECT_FALSE(with_terms(w.table, {0}, false).presliding);
+  const ChosenColumns none = choose_columns(w.table, {});
+  ASSERT_TRUE(none.table.presliding);
+  EXPECT_EQ(none.table.presliding->instead_of, std::vector<Eigen::Index>{1});
+  EXPECT_EQ(none.presliding, (std::vector<Eigen::Index>{0, 1, 2}));
+  EXPECT_EQ(none.table.presliding_shape(), (std::vector<Eigen::Index>{2, 3}));
+  EXPECT_FALSE(choose_columns(w.table, {0}, false).table.presliding);
 }
 
 // Bristles in parallel hold forces of one sign: of all subsets of the shape's columns the best one whose coefficients

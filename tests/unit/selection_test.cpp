@@ -230,8 +230,10 @@ TEST(RegressorTable, WithFewerTermsKeepsTheColumnsOfTheModelAndOfThese) {
   r.table.scale = r.table.columns.colwise().norm();
   r.table.differences = {5};
   r.table.terms.pop_back();
-  const RegressorTable small = with_terms(r.table, {2, 0});
-  EXPECT_EQ(small.columns, r.table.columns(Eigen::all, std::vector<Eigen::Index>{0, 1, 4, 2, 5}));
+  const ChosenColumns chosen = choose_columns(r.table, {2, 0});
+  const RegressorTable& small = chosen.table;
+  EXPECT_EQ(chosen.columns, (std::vector<Eigen::Index>{0, 1, 4, 2, 5}));
+  EXPECT_EQ(small.columns.cols(), 5);
   EXPECT_EQ(small.scale, r.table.scale(std::vector<Eigen::Index>{0, 1, 4, 2, 5}));
   ASSERT_EQ(small.terms.size(), 2U);
   EXPECT_EQ(small.terms[0].name, "term 2");

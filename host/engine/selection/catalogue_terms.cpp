@@ -143,22 +143,14 @@ std::vector<Eigen::MatrixXd> columns_of(std::span<const Extension> group, const 
   return made;
 }
 
-// The columns of all extensions, made on all cores.
-std::vector<TableBuilder::DirectedColumns> columns_of(const std::vector<Extension>& extensions,
-                                                      const TableBuilder& builder) {
-  std::vector<TableBuilder::DirectedColumns> made(extensions.size());
+// The columns of extensions, made on all cores.
+std::vector<Eigen::MatrixXd> columns_of_all(const std::vector<Extension>& extensions, const DirectedData& from) {
+  std::vector<Eigen::MatrixXd> made(extensions.size());
   const std::vector<Group> groups = groups_of(extensions);
   estimation::in_parallel(groups.size(), [&](std::size_t g) {
     const auto& [first, last] = groups[g];
-    const std::span<const Extension> group = std::span(extensions).subspan(first, last - first);
-    std::vector<Eigen::MatrixXd> sign = columns_of(group, builder.sign);
-    for (std::size_t i = first; i < last; ++i) made[i].sign = std::move(sign[i - first]);
-    const bool reads_direction =
-        std::any_of(group.begin(), group.end(), [](const Extension& e) { return e.reads_direction(); });
-    if (!builder.presliding || !reads_direction) return;
-    std::vector<Eigen::MatrixXd> presliding = columns_of(group, *builder.presliding);
-    for (std::size_t i = first; i < last; ++i)
-      if (extensions[i].reads_direction()) made[i].presliding = std::move(presliding[i - first]);
+    std::vector<Eigen::MatrixXd> own = columns_of(std::span(extensions).subspan(first, last - first), from);
+    std::move(own.begin(), own.end(), made.begin() + static_cast<std::ptrdiff_t>(first));
   });
   return made;
 }
@@ -261,8 +253,7 @@ Eigen::MatrixXd basis_of_model(const TableBuilder& builder, const Eigen::VectorX
 // Which extensions compete: of waves over the angle, of each effect and of placebos likewise, the orders that take most
 // off what the model leaves of all data. The others would cost most of the time.
 std::vector<std::uint8_t> with_largest_waves(const std::vector<Extension>& extensions,
-                                             const std::vector<TableBuilder::DirectedColumns>& columns,
-                                             const TableBuilder& builder) {
+                                             const std::vector<Eigen::MatrixXd>& columns, const TableBuilder& builder) {
   const RegressorTable& table = builder.table;
   Eigen::VectorXd fitted_on = Eigen::VectorXd::Zero(table.target.size());
   for (const Run& run : table.runs)
@@ -278,7 +269,7 @@ std::vector<std::uint8_t> with_largest_waves(const std::vector<Extension>& exten
   for (std::size_t i = 0; i < extensions.size(); ++i) {
     const Extension& e = extensions[i];
     if (!e.order) continue;
-    const Eigen::MatrixXd own = orthogonal(columns[i].sign);
+    const Eigen::MatrixXd own = orthogonal(columns[i]);
     const double taken = (own * algebra::PivotedQr(own, 1e-7).solve(residual)).squaredNorm();
     waves[{&e.entry, e.is_placebo()}].emplace_back(-taken, i);
   }
@@ -305,12 +296,20 @@ void exclude_phase_errors(RegressorTable& table, std::size_t first) {
 
 void add_catalogue_terms(TableBuilder& builder, const Motion& motion) {
   const std::vector<Extension> extensions = extensions_of(builder, motion);
-  std::vector<TableBuilder::DirectedColumns> columns = columns_of(extensions, builder);
-  const std::vector<std::uint8_t> kept = with_largest_waves(extensions, columns, builder);
+  std::vector<Eigen::MatrixXd> sign = columns_of_all(extensions, builder.sign);
+  const std::vector<std::uint8_t> kept = with_largest_waves(extensions, sign, builder);
+  std::vector<Extension> directed;
+  for (std::size_t i = 0; i < extensions.size(); ++i)
+    if (builder.presliding && kept[i] != 0 && extensions[i].reads_direction()) directed.push_back(extensions[i]);
+  std::vector<Eigen::MatrixXd> presliding;
+  if (builder.presliding) presliding = columns_of_all(directed, *builder.presliding);
+  auto next = presliding.begin();
   const std::size_t first = builder.table.terms.size();
   for (std::size_t i = 0; i < extensions.size(); ++i)
     if (kept[i] != 0)
-      add_term(builder, extensions[i], std::move(columns[i]));
+      add_term(builder, extensions[i],
+               {std::move(sign[i]),
+                builder.presliding && extensions[i].reads_direction() ? std::move(*next++) : Eigen::MatrixXd()});
     else if (!extensions[i].is_placebo())
       builder.table.smaller_waves.emplace_back(&extensions[i].entry, *extensions[i].order);
   exclude_phase_errors(builder.table, first);

@@ -3,7 +3,9 @@
 #include <algorithm>
 #include <cmath>
 #include <numbers>
+#include <numeric>
 
+#include "host/engine/estimation/in_parallel.hpp"
 #include "host/engine/selection/presliding.hpp"
 #include "host/engine/selection/table_builder.hpp"
 #include "host/physics/catalogue/order_causes.hpp"
@@ -66,13 +68,14 @@ double root_mean_square(const Eigen::VectorXd& column) {
 // Columns over their root mean squares.
 void scale_columns(const TableBuilder& builder) {
   RegressorTable& table = builder.table;
-  const auto rows = table.target.size(), count = static_cast<Eigen::Index>(builder.columns.size());
-  table.columns.resize(rows, count);
-  table.scale.resize(count);
-  for (Eigen::Index j = 0; j < count; ++j) {
-    table.scale[j] = root_mean_square(builder.columns[static_cast<std::size_t>(j)]);
-    table.columns.col(j) = builder.columns[static_cast<std::size_t>(j)] / table.scale[j];
-  }
+  const auto rows = table.target.size();
+  table.columns.resize(rows, std::ssize(builder.columns));
+  table.scale.resize(std::ssize(builder.columns));
+  estimation::in_parallel(builder.columns.size(), [&](std::size_t i) {
+    const auto j = static_cast<Eigen::Index>(i);
+    table.scale[j] = root_mean_square(builder.columns[i]);
+    table.columns.col(j) = builder.columns[i] / table.scale[j];
+  });
   for (CandidateTerm& term : table.terms)
     if (term.most_at_peak > 0.0) term.most_at_peak *= table.scale[term.columns.front()];
   if (!table.presliding) return;
@@ -115,39 +118,67 @@ std::vector<Eigen::Index> RegressorTable::presliding_shape() const {
   return places;
 }
 
-RegressorTable with_terms(const RegressorTable& table, const std::vector<int>& terms, bool presliding) {
-  std::vector<Eigen::Index> kept;
+namespace {
+
+RegressorTable without_columns(const RegressorTable& table) {
+  RegressorTable same;
+  static_cast<TableModel&>(same) = table;
+  same.records = table.records;
+  same.held_out = table.held_out;
+  same.highest_hz = table.highest_hz;
+  same.highest_law_hz = table.highest_law_hz;
+  same.reversals = table.reversals;
+  same.not_visible = table.not_visible;
+  return same;
+}
+
+}  // namespace
+
+ChosenColumns choose_columns(const RegressorTable& table, const std::vector<int>& terms, bool presliding) {
+  ChosenColumns chosen{without_columns(table), {}, {}};
   const auto keep = [&](Eigen::Index column) {
-    kept.push_back(column);
-    return std::ssize(kept) - 1;
+    chosen.columns.push_back(column);
+    return std::ssize(chosen.columns) - 1;
   };
-  RegressorTable small;
-  static_cast<TableSamples&>(small) = table;
-  static_cast<TableModel&>(small) = table;
   for (Eigen::Index j = 0; j < table.model_columns; ++j) keep(j);
   for (const int t : terms) {
-    small.terms.push_back(table.terms[static_cast<std::size_t>(t)]);
-    for (Eigen::Index& column : small.terms.back().columns) column = keep(column);
+    chosen.table.terms.push_back(table.terms[static_cast<std::size_t>(t)]);
+    for (Eigen::Index& column : chosen.table.terms.back().columns) column = keep(column);
   }
-  for (const Eigen::Index column : table.differences) small.differences.push_back(keep(column));
-  small.columns = table.columns(Eigen::all, kept);
-  small.scale = table.scale(kept);
-  small.not_visible = table.not_visible;
-  if (!presliding || !table.presliding) return small;
-  std::vector<Eigen::Index> place(static_cast<std::size_t>(table.columns.cols()), -1), of_presliding;
-  for (std::size_t i = 0; i < kept.size(); ++i) place[static_cast<std::size_t>(kept[i])] = static_cast<Eigen::Index>(i);
-  PreslidingColumns& own = small.presliding.emplace();
+  for (const Eigen::Index column : table.differences) chosen.table.differences.push_back(keep(column));
+  chosen.table.scale = table.scale(chosen.columns);
+  chosen.table.columns.resize(0, std::ssize(chosen.columns));
+  if (!presliding || !table.presliding) return chosen;
+  std::vector<Eigen::Index> place(static_cast<std::size_t>(table.columns.cols()), -1);
+  for (std::size_t i = 0; i < chosen.columns.size(); ++i)
+    place[static_cast<std::size_t>(chosen.columns[i])] = static_cast<Eigen::Index>(i);
+  PreslidingColumns& own = chosen.table.presliding.emplace();
   for (std::size_t i = 0; i < table.presliding->instead_of.size(); ++i) {
     const Eigen::Index at = place[static_cast<std::size_t>(table.presliding->instead_of[i])];
     if (at < 0) continue;
     own.instead_of.push_back(at);
-    of_presliding.push_back(static_cast<Eigen::Index>(i));
+    chosen.presliding.push_back(static_cast<Eigen::Index>(i));
   }
   for (auto i = std::ssize(table.presliding->instead_of); i < table.presliding->columns.cols(); ++i)
-    of_presliding.push_back(i);
-  own.columns = table.presliding->columns(Eigen::all, of_presliding);
-  own.target = table.presliding->target;
-  return small;
+    chosen.presliding.push_back(i);
+  own.columns.resize(0, std::ssize(chosen.presliding));
+  return chosen;
+}
+
+ChosenColumns all_columns(const RegressorTable& table) {
+  ChosenColumns all{without_columns(table), {}, {}};
+  all.table.terms = table.terms;
+  all.table.differences = table.differences;
+  all.table.scale = table.scale;
+  all.table.columns.resize(0, table.columns.cols());
+  all.columns.resize(static_cast<std::size_t>(table.columns.cols()));
+  std::iota(all.columns.begin(), all.columns.end(), Eigen::Index{0});
+  if (!table.presliding) return all;
+  all.presliding.resize(static_cast<std::size_t>(table.presliding->columns.cols()));
+  std::iota(all.presliding.begin(), all.presliding.end(), Eigen::Index{0});
+  all.table.presliding = PreslidingColumns{table.presliding->instead_of, {}, {}};
+  all.table.presliding->columns.resize(0, table.presliding->columns.cols());
+  return all;
 }
 
 RegressorTable make_regressor_table(const PreparedData& prepared, Balance balance, const Terms& terms,

@@ -43,6 +43,8 @@ struct Run {
   double row_s = 0.0;
 };
 
+enum class SampleState : std::uint8_t { in_motion, near_reversal, at_rest };
+
 // What a table says of its samples, whatever its columns are.
 struct TableSamples {
   Eigen::VectorXd target;  // N m
@@ -51,8 +53,9 @@ struct TableSamples {
   std::vector<std::uint8_t> held_out;  // by record: not fitted on and not chosen with
   double highest_hz = 0.0;             // of the samples
   double highest_law_hz = 0.0;         // of the motion: wider bandwidths serve waves over the motor's angle alone
-  // For masks: velocity over its noise, by sample.
+  // For masks, by sample: velocity over its noise; of a table at one bandwidth (filtered_table), the states instead.
   Eigen::VectorXd velocity_over_noise;
+  std::vector<SampleState> states;
   double reversals = 0.0;
 };
 
@@ -95,9 +98,15 @@ RegressorTable make_regressor_table(const estimation::PreparedData& prepared, Ba
                                     const estimation::Terms& terms, const std::optional<PreslidingTravels>& travels,
                                     double highest_law_hz, const SelectionPolicy& policy);
 
-// The same samples with fewer columns: those of the model, of friction that may differ, and of these terms (places in
-// table.terms), in their order. `presliding`: with what is in their place there, if the table has it.
-RegressorTable with_terms(const RegressorTable& table, const std::vector<int>& terms, bool presliding = true);
+// Some columns of a table: what it says of them, and their places in it.
+struct ChosenColumns {
+  RegressorTable table;                           // of these columns, without samples
+  std::vector<Eigen::Index> columns, presliding;  // in the table, and in its columns with presliding
+};
+// Those of the model, of friction that may differ, and of these terms (places in table.terms), in their order.
+// `presliding`: with what is in their place there, if the table has it.
+ChosenColumns choose_columns(const RegressorTable& table, const std::vector<int>& terms, bool presliding = true);
+ChosenColumns all_columns(const RegressorTable& table);
 
 // Highest frequency of an order of the motor's turn that counts, Hz, at the typical speed.
 double highest_order_hz(const estimation::PreparedData& prepared);

@@ -21,7 +21,7 @@ std::vector<Resampling::Support> support_of(const StabilitySelection& selection,
     return 0.0;
   };
   for (const CandidateTerm& term : selection.tables().table.terms) {
-    if (!term.entry) continue;
+    if (!term.entry || selection.is_left_out(term.name)) continue;
     const bool is_there = std::any_of(all.begin(), all.end(), [&](const Resampling::Support& s) {
       return s.effect == term.entry->name() && s.order == term.order;
     });
@@ -31,7 +31,8 @@ std::vector<Resampling::Support> support_of(const StabilitySelection& selection,
     all.push_back({std::string(entry->name()), order, 0.0});
   for (const catalogue::Entry* entry : selection.tables().table.not_visible)
     all.push_back({std::string(entry->name()), std::nullopt, 0.0});
-  if (const catalogue::Entry* law = presliding_law(terms); law && selection.tables().table.presliding)
+  if (const catalogue::Entry* law = presliding_law(terms);
+      law && selection.tables().table.presliding && !selection.is_left_out(kPresliding))
     all.push_back({std::string(law->name()), std::nullopt, near(kPresliding)});
   return all;
 }
@@ -114,7 +115,7 @@ void find_instead_of_refused(StabilitySelection& selection, const estimation::Te
   if (names.empty()) return;
   selection.leave_out(names);
   result.found.clear();
-  result.undecided.clear();
+  std::erase_if(result.undecided, [](const Resampling::FoundTerm& f) { return !f.may_be_sticking; });
   find_terms(selection, terms, result);
   for (Resampling::FoundTerm& f : result.found) f.is_second_choice = true;
   result.found.insert(result.found.end(), refused.begin(), refused.end());

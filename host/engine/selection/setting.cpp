@@ -4,90 +4,36 @@
 #include <cmath>
 #include <numeric>
 
-#include "host/common/signals/butterworth.hpp"
-
 namespace flexspline::selection {
 namespace {
 
-constexpr double kRowsPerPeriod = 4.0;
-constexpr double kAtRest = 0.5;   // periods of the cut-off
-constexpr double kVisible = 3.0;  // velocities in units of their noise
-
-// Samples of a run that are left out: around reversals and sticking where `mask` is set, and where the axis is at rest.
-std::vector<std::uint8_t> unsure_rows(const RegressorTable& table, const Run& run, double cutoff_hz, bool mask,
-                                      Eigen::Index reach) {
-  const Eigen::Index n = run.last - run.first;
-  std::vector<std::uint8_t> unsure(static_cast<std::size_t>(n), 0);
-  if (mask)
-    for (Eigen::Index k = 0; k < n; ++k) {
-      const double v = table.velocity_over_noise[run.first + k];
-      const double before = k > 0 ? table.velocity_over_noise[run.first + k - 1] : v;
-      if (!std::isinf(v) && (std::abs(v) <= kVisible || v * before < 0.0))
-        for (Eigen::Index j = std::max<Eigen::Index>(0, k - reach); j <= std::min(n - 1, k + reach); ++j)
-          unsure[static_cast<std::size_t>(j)] = 1;
-    }
-  // Where the axis is at rest, friction takes any value up to its limit, whatever law holds in motion.
-  const auto rest_rows = std::max<Eigen::Index>(2, std::lround(kAtRest / (cutoff_hz * run.row_s)));
-  for (Eigen::Index k = 0; k < n;) {
-    Eigen::Index end = k;
-    while (end < n && std::abs(table.velocity_over_noise[run.first + end]) <= kVisible) ++end;
-    if (end - k >= rest_rows)
-      for (Eigen::Index j = std::max<Eigen::Index>(0, k - reach / 2); j < std::min(n, end + reach / 2); ++j)
-        unsure[static_cast<std::size_t>(j)] = 1;
-    k = std::max(end, k + 1);
-  }
-  return unsure;
-}
-
-// Samples of the setting, run by run.
-struct SelectedRows {
-  std::vector<Eigen::MatrixXd> rows;  // by run
-  std::vector<Run> runs;
-  Eigen::Index total = 0;
+// Samples of the table that follow each other and are taken, and their places in the setting.
+struct TakenRun {
+  Eigen::Index from = 0;  // in the table
+  Run run;
 };
 
-Eigen::Index width_of(const RegressorTable& table) {
-  return table.columns.cols() + 1 + (table.presliding ? table.presliding->columns.cols() + 1 : 0);
-}
-
-// Adds the samples of a run, filtered and decimated, without those that are left out.
-void take_rows(const RegressorTable& table, const Run& run, double cutoff_hz, bool mask, SelectedRows& kept) {
-  const Eigen::Index n = run.last - run.first;
-  Eigen::MatrixXd rows(n, width_of(table));
-  rows.leftCols(table.columns.cols()) = table.columns.middleRows(run.first, n);
-  rows.col(table.columns.cols()) = table.target.segment(run.first, n);
-  if (table.presliding) {
-    rows.middleCols(table.columns.cols() + 1, table.presliding->columns.cols()) =
-        table.presliding->columns.middleRows(run.first, n);
-    rows.rightCols(1) = table.presliding->target.segment(run.first, n);
-  }
-  if (cutoff_hz < 0.99 * table.highest_hz) {
-    const signals::ZeroPhaseFilter filter(signals::ZeroPhaseFilter::kDefaultOrder,
-                                          std::min(cutoff_hz, 0.45 / run.row_s), 1.0 / run.row_s);
-    filter.apply_columns_in_place(rows);
-  }
-  const auto step = std::max<Eigen::Index>(
-      1, static_cast<Eigen::Index>(std::floor(1.0 / (kRowsPerPeriod * cutoff_hz * run.row_s) + 1e-6)));
-  const auto reach = static_cast<Eigen::Index>(std::lround(kFilterReach / (cutoff_hz * run.row_s)));
-  const Eigen::Index edge = std::min(reach, n / 10);
-  const std::vector<std::uint8_t> unsure = unsure_rows(table, run, cutoff_hz, mask, reach);
-  std::vector<Eigen::Index> take;
-  const auto close = [&] {
-    if (take.size() >= 4) {
-      kept.rows.push_back(rows(take, Eigen::all));
-      const auto count = static_cast<Eigen::Index>(take.size());
-      kept.runs.push_back({run.record, kept.total, kept.total + count, run.row_s * static_cast<double>(step)});
-      kept.total += count;
+std::vector<TakenRun> taken_runs(const RegressorTable& table, bool mask, bool held_out) {
+  constexpr Eigen::Index kFewest = 4;
+  std::vector<TakenRun> taken;
+  Eigen::Index rows = 0;
+  for (const Run& run : table.runs) {
+    if ((table.held_out[run.record] != 0) != held_out) continue;
+    const auto is_sure = [&](Eigen::Index at) {
+      const SampleState state = table.states[static_cast<std::size_t>(at)];
+      return state == SampleState::in_motion || (state == SampleState::near_reversal && !mask);
+    };
+    for (Eigen::Index k = run.first; k < run.last;) {
+      Eigen::Index end = k;
+      while (end < run.last && is_sure(end)) ++end;
+      if (end - k >= kFewest) {
+        taken.push_back({k, {run.record, rows, rows + end - k, run.row_s}});
+        rows += end - k;
+      }
+      k = end + 1;
     }
-    take.clear();
-  };
-  for (Eigen::Index k = edge; k < n - edge; k += step) {
-    if (unsure[static_cast<std::size_t>(k)])
-      close();
-    else
-      take.push_back(k);
   }
-  close();
+  return taken;
 }
 
 // Columns of a setting's rows, by place.
@@ -189,20 +135,29 @@ Eigen::MatrixXd products_of(const Setting& setting, const BlockRange& blocks, Di
   return products_of(setting, sum, direction);
 }
 
-Setting make_setting(const RegressorTable& table, double cutoff_hz, bool mask, bool held_out,
+Setting make_setting(const RegressorTable& table, const ChosenColumns& chosen, bool mask, bool held_out,
                      const SelectionPolicy& policy) {
   Setting setting;
-  setting.cutoff_hz = cutoff_hz;
+  setting.cutoff_hz = table.highest_hz;
   setting.mask = mask;
-  SelectedRows kept;
-  for (const Run& run : table.runs)
-    if ((table.held_out[run.record] != 0) == held_out) take_rows(table, run, cutoff_hz, mask, kept);
-  setting.rows.resize(kept.total, width_of(table));
-  setting.sign_width = table.columns.cols() + 1;
-  if (table.presliding) setting.presliding = presliding_columns(table);
-  for (std::size_t i = 0; i < kept.runs.size(); ++i)
-    setting.rows.middleRows(kept.runs[i].first, kept.runs[i].last - kept.runs[i].first) = kept.rows[i];
-  setting.runs = std::move(kept.runs);
+  const std::vector<TakenRun> taken = taken_runs(table, mask, held_out);
+  const auto own = std::ssize(chosen.columns), presliding = std::ssize(chosen.presliding);
+  setting.sign_width = own + 1;
+  setting.rows.resize(taken.empty() ? 0 : taken.back().run.last,
+                      own + 1 + (chosen.table.presliding ? presliding + 1 : 0));
+  const auto take = [&](Eigen::Index to, const auto& column) {
+    for (const auto& [from, run] : taken)
+      setting.rows.col(to).segment(run.first, run.last - run.first) = column.segment(from, run.last - run.first);
+  };
+  for (Eigen::Index j = 0; j < own; ++j) take(j, table.columns.col(chosen.columns[static_cast<std::size_t>(j)]));
+  take(own, table.target);
+  if (chosen.table.presliding) {
+    setting.presliding = presliding_columns(chosen.table);
+    for (Eigen::Index j = 0; j < presliding; ++j)
+      take(own + 1 + j, table.presliding->columns.col(chosen.presliding[static_cast<std::size_t>(j)]));
+    take(own + 1 + presliding, table.presliding->target);
+  }
+  for (const TakenRun& one : taken) setting.runs.push_back(one.run);
   std::vector<Eigen::Index> of_record(table.records, 0);
   for (const Run& run : setting.runs) of_record[run.record] += run.last - run.first;
   std::vector<Eigen::MatrixXd> products;

@@ -40,10 +40,6 @@ struct Setting {
   }
 };
 
-// Samples left out at each end of a run, in periods of the cut-off, where the filter guesses what lies beyond; masked
-// samples reach as far around a reversal.
-inline constexpr double kFilterReach = 1.5;
-
 // Place of the product of two columns in a lower triangle of so many columns, stored column by column.
 inline Eigen::Index place_in_triangle(Eigen::Index a, Eigen::Index b, Eigen::Index columns) {
   const Eigen::Index column = std::min(a, b), row = std::max(a, b);
@@ -61,8 +57,8 @@ Eigen::MatrixXd products_of(const Setting& setting, const BlockRange& blocks, Di
 // The same of products of all columns, as a lower triangle.
 Eigen::MatrixXd products_of(const Setting& setting, const Eigen::Ref<const Eigen::VectorXd>& all, Direction direction);
 
-// Of the records that are held out, or of all others.
-Setting make_setting(const RegressorTable& table, double cutoff_hz, bool mask, bool held_out,
+// Columns of a table at one bandwidth (filtered_table), of its records that are held out, or of all others.
+Setting make_setting(const RegressorTable& table, const ChosenColumns& chosen, bool mask, bool held_out,
                      const SelectionPolicy& policy);
 
 // Mean squared difference of a residual over one period of the cut-off, halved (semivariance): what changes within a

@@ -9,6 +9,7 @@
 
 #include "host/engine/estimation/in_parallel.hpp"
 #include "host/engine/estimation/least_squares.hpp"
+#include "host/engine/selection/filtered_table.hpp"
 
 namespace flexspline::selection {
 namespace {
@@ -27,36 +28,37 @@ double median_of_positive(std::vector<double> x) {
   return x.empty() ? 1.0 : median(std::move(x));
 }
 
-RegressorTable without_samples(const RegressorTable& table) {
-  RegressorTable places;
-  static_cast<TableModel&>(places) = table;
-  places.columns.resize(0, table.columns.cols());
-  places.terms = table.terms;
-  places.differences = table.differences;
-  places.scale = table.scale;
-  places.not_visible = table.not_visible;
-  if (table.presliding) {
-    PreslidingColumns& own = places.presliding.emplace();
-    own.instead_of = table.presliding->instead_of;
-    own.columns.resize(0, table.presliding->columns.cols());
-  }
-  return places;
-}
-
 }  // namespace
 
 StabilitySelection::StabilitySelection(const std::vector<const data::Experiment*>& experiments,
                                        const model::Drive& drive, const estimation::Terms& terms, Balance balance,
                                        const SelectionPolicy& policy)
     : policy_(policy), tables_(make_tables(experiments, drive, terms, balance, policy)) {
-  if (tables_.table.model_columns > 0) evaluate();
+  if (tables_.table.model_columns == 0) return;
+  filter_samples();
+  evaluate();
+}
+
+void StabilitySelection::filter_samples() {
+  for (const auto& [cutoff_hz, mask] : tables_.settings)
+    if (!mask) samples_.push_back({cutoff_hz, {}, {}});
+  estimation::in_parallel(samples_.size(), [&](std::size_t b) {
+    BandwidthSamples& samples = samples_[b];
+    // Columns of waves that a bandwidth cannot show would cost most of the time.
+    for (std::size_t t = 0; t < tables_.table.terms.size(); ++t)
+      if (tables_.may_enter(tables_.table.terms[t], samples.cutoff_hz)) samples.terms.push_back(static_cast<int>(t));
+    samples.table = filtered_table(tables_.table, choose_columns(tables_.table, samples.terms), samples.cutoff_hz);
+  });
 }
 
 void StabilitySelection::evaluate() {
   per_setting_.assign(tables_.settings.size(), {});
   result_ = {};
   estimation::in_parallel(per_setting_.size(), [&](std::size_t i) {
-    per_setting_[i] = evaluate_setting(tables_.settings[i].first, tables_.settings[i].second, kSeed + i);
+    const auto& [cutoff_hz, mask] = tables_.settings[i];
+    const auto samples = std::find_if(samples_.begin(), samples_.end(),
+                                      [&](const BandwidthSamples& s) { return s.cutoff_hz == cutoff_hz; });
+    per_setting_[i] = evaluate_setting(*samples, mask, kSeed + i);
   });
   count();
 }
@@ -83,23 +85,17 @@ std::optional<TimeLag> StabilitySelection::time_lag(const std::vector<std::strin
 
 void StabilitySelection::take_off(const TimeLag& lag) {
   take_off_lag(tables_.table, lag.seconds);
+  estimation::in_parallel(samples_.size(), [&](std::size_t b) { filter_targets(tables_.table, samples_[b].table); });
   evaluate();
 }
 
 void StabilitySelection::leave_out(const std::vector<std::string>& names) {
-  const auto is_left_out = [&](const std::string& name) {
-    return std::find(names.begin(), names.end(), name) != names.end();
-  };
-  std::vector<int> kept;
-  for (std::size_t t = 0; t < tables_.table.terms.size(); ++t)
-    if (!is_left_out(tables_.table.terms[t].name)) kept.push_back(static_cast<int>(t));
-  tables_.table = with_terms(tables_.table, kept, !is_left_out(kPresliding));
+  left_out_.insert(names.begin(), names.end());
   evaluate();
 }
 
-Noise StabilitySelection::noise_of_best(const RegressorTable& table, const Setting& setting,
-                                        const std::vector<double>& weights, FrictionRandomEffects& differences,
-                                        SettingResult& result) const {
+Noise StabilitySelection::noise_of_best(const Setting& setting, const std::vector<double>& weights,
+                                        FrictionRandomEffects& differences, SettingResult& result) const {
   Noise noise;
   for (int round = 0; round < 2; ++round) {
     result.all = sum_of(setting, weights, differences);
@@ -118,29 +114,33 @@ Noise StabilitySelection::noise_of_best(const RegressorTable& table, const Setti
     result.whiteness = residual.size() > 0 ? noise.variance / std::max(left, 1e-300) : -1.0;
     if (result.columns.differences.empty() || round == 1) break;
     differences.noise = noise.tau * std::max(left, 1e-12);
-    differences.variance = friction_effects_of(table, setting, direction, weights, differences.noise, policy_);
+    differences.variance = friction_effects_of(result.columns, setting, direction, weights, differences.noise, policy_);
   }
   return noise;
 }
 
-StabilitySelection::SettingResult StabilitySelection::evaluate_setting(double cutoff_hz, bool mask,
+StabilitySelection::SettingResult StabilitySelection::evaluate_setting(const BandwidthSamples& samples, bool mask,
                                                                        std::uint64_t seed) const {
   SettingResult result;
-  for (std::size_t t = 0; t < tables_.table.terms.size(); ++t)
-    if (tables_.may_enter(tables_.table.terms[t], cutoff_hz)) result.terms.push_back(static_cast<int>(t));
-  // Columns of waves that a bandwidth cannot show would cost most of the time. Presliding shows around reversals alone.
-  const RegressorTable table = with_terms(tables_.table, result.terms, !mask);
-  const Setting setting = make_setting(table, cutoff_hz, mask, false, policy_);
+  std::vector<int> places;
+  for (std::size_t t = 0; t < samples.terms.size(); ++t) {
+    if (is_left_out(samples.table.terms[t].name)) continue;
+    places.push_back(static_cast<int>(t));
+    result.terms.push_back(samples.terms[t]);
+  }
+  // Presliding shows around reversals alone.
+  const ChosenColumns chosen = choose_columns(samples.table, places, !mask && !is_left_out(kPresliding));
+  const Setting setting = make_setting(samples.table, chosen, mask, false, policy_);
   if (setting.blocks.size() < 4 || static_cast<double>(setting.rows.rows()) <
-                                       policy_.fewest_rows_per_column * static_cast<double>(table.model_columns))
+                                       policy_.fewest_rows_per_column * static_cast<double>(chosen.table.model_columns))
     return result;
-  result.columns = without_samples(table);
-  std::vector<double> weights = record_weights(table, setting);
-  FrictionRandomEffects differences{table.differences, {}, 0.0};
-  const Noise noise = noise_of_best(table, setting, weights, differences, result);
+  result.columns = chosen.table;
+  std::vector<double> weights = record_weights(result.columns, setting);
+  FrictionRandomEffects differences{result.columns.differences, {}, 0.0};
+  const Noise noise = noise_of_best(setting, weights, differences, result);
   select_on_halves(setting, weights, differences, noise, seed, result);
 
-  const Setting held = make_setting(table, cutoff_hz, mask, true, policy_);
+  const Setting held = make_setting(samples.table, chosen, mask, true, policy_);
   if (held.blocks.empty()) return result;
   // A record that was not fitted on has no variance of its own: it counts as the median of the others.
   const double usual = median_of_positive(weights);
@@ -264,7 +264,7 @@ void StabilitySelection::count() {
       const CandidateTerm& term = table.terms[static_cast<std::size_t>(t)];
       open[term.name] = &term;
     }
-    if (tables_.shows_presliding(tables_.settings[i])) open[kPresliding] = nullptr;
+    if (tables_.shows_presliding(tables_.settings[i]) && !is_left_out(kPresliding)) open[kPresliding] = nullptr;
     for (const SelectionPath& vote : per_setting_[i].votes) {
       result_.subsamples += 1.0;
       for (const auto& [name, term] : open) counts[name].open[tables_.settings[i].second ? 1 : 0] += 1.0;

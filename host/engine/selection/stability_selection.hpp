@@ -1,6 +1,7 @@
 // Stability selection over bandwidths, masks and halves of the data.
 #pragma once
 
+#include <set>
 #include <string>
 #include <vector>
 
@@ -47,12 +48,19 @@ class StabilitySelection {
   void take_off(const TimeLag& lag);
   // Selects again without the terms of these names.
   void leave_out(const std::vector<std::string>& names);
+  bool is_left_out(const std::string& name) const { return left_out_.count(name) != 0; }
 
   // Of each of `names` (of frequencies): held-out error of the model with all of them over that with all others, the
   // median of all settings; fitted on what is not held out. Empty where nothing is held out.
   std::vector<double> held_out_ratios(const std::vector<std::string>& names) const;
 
  private:
+  // One bandwidth: the samples of the terms that may be seen there, for both masks.
+  struct BandwidthSamples {
+    double cutoff_hz = 0.0;
+    std::vector<int> terms;  // of the whole table
+    RegressorTable table;    // of these terms
+  };
   // One bandwidth, with or without reversals.
   struct SettingResult {
     std::vector<SelectionPath> votes;  // places of terms as in the whole table
@@ -62,11 +70,12 @@ class StabilitySelection {
     HalfData all, held_out;
   };
 
-  SettingResult evaluate_setting(double cutoff_hz, bool mask, std::uint64_t seed) const;
+  void filter_samples();
+  SettingResult evaluate_setting(const BandwidthSamples& samples, bool mask, std::uint64_t seed) const;
   // Noise that the best model of all data leaves: first with the same friction in all records, then with random
   // effects, which would otherwise count as slow noise. Sets `differences`, and of `result` the sums and the whiteness.
-  Noise noise_of_best(const RegressorTable& table, const Setting& setting, const std::vector<double>& weights,
-                      FrictionRandomEffects& differences, SettingResult& result) const;
+  Noise noise_of_best(const Setting& setting, const std::vector<double>& weights, FrictionRandomEffects& differences,
+                      SettingResult& result) const;
   // Chooses on each of policy.pairs pairs of halves, in both directions.
   void select_on_halves(const Setting& setting, const std::vector<double>& weights,
                         const FrictionRandomEffects& differences, const Noise& noise, std::uint64_t seed,
@@ -79,6 +88,8 @@ class StabilitySelection {
 
   SelectionPolicy policy_;
   CandidateTables tables_;
+  std::vector<BandwidthSamples> samples_;   // one each bandwidth
+  std::set<std::string> left_out_;          // names of terms
   std::vector<SettingResult> per_setting_;  // one each setting
   Stability result_;
 };

@@ -7,6 +7,7 @@
 #include "host/common/algebra/decompositions.hpp"
 #include "host/common/signals/interpolate.hpp"
 #include "host/engine/estimation/least_squares.hpp"
+#include "host/engine/selection/filtered_table.hpp"
 #include "host/engine/selection/halves.hpp"
 #include "host/engine/selection/setting.hpp"
 
@@ -62,7 +63,8 @@ std::optional<TimeLag> estimate_time_lag(const RegressorTable& table, const std:
   // Whole rows alone, as interpolation between them would take off noise.
   for (int k = -policy.most_lag_rows; k <= policy.most_lag_rows; ++k) lags.push_back(row_s * k);
   const RegressorTable small = with_lags(table, terms, direction, lags);
-  const Setting setting = make_setting(small, table.highest_law_hz, false, false, policy);
+  const ChosenColumns all = all_columns(small);
+  const Setting setting = make_setting(filtered_table(small, all, table.highest_law_hz), all, false, false, policy);
   const auto tried = static_cast<Eigen::Index>(lags.size());
   const Eigen::Index columns = small.columns.cols() - tried;
   if (static_cast<double>(setting.rows.rows()) < policy.fewest_rows_per_column * static_cast<double>(columns))

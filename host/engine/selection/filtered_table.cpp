@@ -1,0 +1,124 @@
+#include "host/engine/selection/filtered_table.hpp"
+
+#include <algorithm>
+#include <cmath>
+
+#include "host/common/signals/butterworth.hpp"
+
+namespace flexspline::selection {
+namespace {
+
+constexpr double kRowsPerPeriod = 4.0;
+constexpr double kAtRest = 0.5;   // periods of the cut-off
+constexpr double kVisible = 3.0;  // velocities in units of their noise
+
+Eigen::Index reach_of(const Run& run, double cutoff_hz) {
+  return static_cast<Eigen::Index>(std::lround(kFilterReach / (cutoff_hz * run.row_s)));
+}
+
+// Of each sample of a run.
+std::vector<SampleState> states_of(const RegressorTable& table, const Run& run, double cutoff_hz) {
+  const Eigen::Index n = run.last - run.first, reach = reach_of(run, cutoff_hz);
+  std::vector<SampleState> states(static_cast<std::size_t>(n), SampleState::in_motion);
+  const auto set = [&](Eigen::Index first, Eigen::Index last, SampleState state) {
+    for (Eigen::Index j = std::max<Eigen::Index>(0, first); j < std::min(n, last); ++j)
+      states[static_cast<std::size_t>(j)] = state;
+  };
+  for (Eigen::Index k = 0; k < n; ++k) {
+    const double v = table.velocity_over_noise[run.first + k];
+    const double before = k > 0 ? table.velocity_over_noise[run.first + k - 1] : v;
+    if (!std::isinf(v) && (std::abs(v) <= kVisible || v * before < 0.0))
+      set(k - reach, k + reach + 1, SampleState::near_reversal);
+  }
+  // Where the axis is at rest, friction takes any value up to its limit, whatever law holds in motion.
+  const auto rest_rows = std::max<Eigen::Index>(2, std::lround(kAtRest / (cutoff_hz * run.row_s)));
+  for (Eigen::Index k = 0; k < n;) {
+    Eigen::Index end = k;
+    while (end < n && std::abs(table.velocity_over_noise[run.first + end]) <= kVisible) ++end;
+    if (end - k >= rest_rows) set(k - reach / 2, end + reach / 2, SampleState::at_rest);
+    k = std::max(end, k + 1);
+  }
+  return states;
+}
+
+// Rows of a run that are kept.
+struct Decimation {
+  Eigen::Index first = 0, step = 1, rows = 0;
+};
+
+Decimation decimation_of(const Run& run, double cutoff_hz) {
+  Decimation d;
+  const Eigen::Index n = run.last - run.first;
+  d.step = std::max<Eigen::Index>(
+      1, static_cast<Eigen::Index>(std::floor(1.0 / (kRowsPerPeriod * cutoff_hz * run.row_s) + 1e-6)));
+  d.first = std::min(reach_of(run, cutoff_hz), n / 10);
+  d.rows = (n - 2 * d.first + d.step - 1) / d.step;
+  return d;
+}
+
+// Filters the samples of a run of `table` into those of `made`, which has the columns `chosen`.
+void filter_run(const RegressorTable& table, const ChosenColumns& chosen, const Run& run, RegressorTable& made,
+                const Run& into) {
+  const Eigen::Index n = run.last - run.first;
+  const auto own = std::ssize(chosen.columns), presliding = std::ssize(chosen.presliding);
+  Eigen::MatrixXd rows(n, own + 1 + (made.presliding ? presliding + 1 : 0));
+  for (Eigen::Index j = 0; j < own; ++j)
+    rows.col(j) = table.columns.col(chosen.columns[static_cast<std::size_t>(j)]).segment(run.first, n);
+  rows.col(own) = table.target.segment(run.first, n);
+  if (made.presliding) {
+    for (Eigen::Index j = 0; j < presliding; ++j)
+      rows.col(own + 1 + j) =
+          table.presliding->columns.col(chosen.presliding[static_cast<std::size_t>(j)]).segment(run.first, n);
+    rows.rightCols(1) = table.presliding->target.segment(run.first, n);
+  }
+  if (made.highest_hz < 0.99 * table.highest_hz) {
+    const signals::ZeroPhaseFilter filter(signals::ZeroPhaseFilter::kDefaultOrder,
+                                          std::min(made.highest_hz, 0.45 / run.row_s), 1.0 / run.row_s);
+    filter.apply_columns_in_place(rows);
+  }
+  const Decimation d = decimation_of(run, made.highest_hz);
+  const auto taken = Eigen::seqN(d.first, d.rows, d.step);
+  const auto places = Eigen::seqN(into.first, d.rows);
+  for (Eigen::Index j = 0; j < own; ++j) made.columns.col(j)(places) = rows.col(j)(taken);
+  made.target(places) = rows.col(own)(taken);
+  if (!made.presliding) return;
+  for (Eigen::Index j = 0; j < presliding; ++j) made.presliding->columns.col(j)(places) = rows.col(own + 1 + j)(taken);
+  made.presliding->target(places) = rows.rightCols(1)(taken, 0);
+}
+
+}  // namespace
+
+RegressorTable filtered_table(const RegressorTable& table, ChosenColumns chosen, double cutoff_hz) {
+  RegressorTable made = std::move(chosen.table);
+  made.highest_hz = cutoff_hz;
+  Eigen::Index rows = 0;
+  for (const Run& run : table.runs) {
+    const Decimation d = decimation_of(run, cutoff_hz);
+    made.runs.push_back({run.record, rows, rows + d.rows, run.row_s * static_cast<double>(d.step)});
+    rows += d.rows;
+    const std::vector<SampleState> states = states_of(table, run, cutoff_hz);
+    for (Eigen::Index k = 0; k < d.rows; ++k)
+      made.states.push_back(states[static_cast<std::size_t>(d.first + k * d.step)]);
+  }
+  made.columns.resize(rows, made.columns.cols());
+  made.target.resize(rows);
+  if (made.presliding) {
+    made.presliding->columns.resize(rows, made.presliding->columns.cols());
+    made.presliding->target.resize(rows);
+  }
+  for (std::size_t i = 0; i < table.runs.size(); ++i) filter_run(table, chosen, table.runs[i], made, made.runs[i]);
+  return made;
+}
+
+void filter_targets(const RegressorTable& table, RegressorTable& filtered) {
+  ChosenColumns targets = all_columns(table);
+  targets.columns.clear();
+  targets.presliding.clear();
+  targets.table.columns.resize(0, 0);
+  if (targets.table.presliding) targets.table.presliding->columns.resize(0, 0);
+  RegressorTable made = filtered_table(table, std::move(targets), filtered.highest_hz);
+  filtered.target = std::move(made.target);
+  if (filtered.presliding) filtered.presliding->target = std::move(made.presliding->target);
+}
+
+}  // namespace flexspline::selection
