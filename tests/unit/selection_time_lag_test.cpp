@@ -86,6 +86,15 @@ TEST(TimeLag, TakenOffItLeavesNone) {
   EXPECT_NEAR(after->seconds, 0.0, 1e-4);
 }
 
+// Four rows are 16 ms.
+TEST(TimeLag, LongerThanUsualIsFoundUpToTheLongestOfAnAmplifier) {
+  for (const double lag_s : {-22e-3, 21e-3}) {
+    const auto lag = estimate_time_lag(sines(lag_s, 0.1, 4), {0}, Direction::sign, {});
+    ASSERT_TRUE(lag) << lag_s;
+    EXPECT_NEAR(lag->seconds, lag_s, 4.0 * lag->std + 1e-4) << lag_s;
+  }
+}
+
 TEST(TimeLag, BeyondTheSearchedRangeIsNotStated) {
   EXPECT_FALSE(estimate_time_lag(sines(30e-3, 0.1, 3), {0}, Direction::sign, {}));
 }

@@ -279,9 +279,14 @@ std::string delay_advice(double delay_s, const estimation::PreparedData& prepare
 // What is left, with the named effect in the model if there is one.
 void assess_remainder(const SearchedBalance& chosen, Diagnosis& result) {
   const CrossValidatedFit& after = result.named.empty() ? chosen.search.base : chosen.candidates.front().fit;
-  // A missing effect may look like a delay, so the delay is taken from the better model.
+  // A missing effect may look like a delay, so the delay is taken from the better model. Where a delay is named, it
+  // says how large it is.
+  const bool names_delay = std::any_of(result.named.begin(), result.named.end(), [](const NamedEffect& n) {
+    const catalogue::Entry& entry = catalogue::get(n.effect);
+    return entry.has_state && entry.info->reads == effects::kCurrent;
+  });
   const Eigen::Index delay = after.theta.size() - 1;
-  if (chosen.search.data->balance() == estimation::Balance::motor &&
+  if (chosen.search.data->balance() == estimation::Balance::motor && !names_delay &&
       std::abs(after.theta[delay]) > kPolicy.delay_errors * after.std[delay])
     result.delay_s = after.theta[delay];
   result.friction_drift = drifts(after);

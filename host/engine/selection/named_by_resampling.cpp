@@ -326,6 +326,11 @@ void add_identical_effects(Resampling& resampling, const SearchedBalance& motor)
   }
 }
 
+bool stands_alone(const Resampling& resampling, const CandidateFit& first) {
+  return resampling.found.empty() && first.gain.chi2_percent >= 100.0 * kPolicy.most_share && first.held_out_ratio &&
+         *first.held_out_ratio * *first.held_out_ratio <= 1.0 - kPolicy.matters_share;
+}
+
 bool resampling_decides(const Resampling& resampling, const SearchedBalance& motor) {
   if (resampling.subsamples == 0.0) return resampling.too_little;
   if (!motor.names_one()) return true;
@@ -336,6 +341,7 @@ bool resampling_decides(const Resampling& resampling, const SearchedBalance& mot
   const std::optional<double> support = support_of(resampling, first);
   if (!support && first.gain.chi2_percent > kPolicy.nearly_all_percent && !explains_instead(resampling, first))
     return false;
+  if (!support && stands_alone(resampling, first)) return false;
   const auto is_first = [&](const NamedEffect& n) { return is_of_family(n.effect, n.order, first); };
   const bool found_first = std::any_of(resampling.found.begin(), resampling.found.end(), [&](const auto& f) {
     return std::any_of(f.group.begin(), f.group.end(), is_first);

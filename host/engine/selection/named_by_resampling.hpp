@@ -33,6 +33,10 @@ bool is_contradicted(const Resampling::FoundTerm& found, const SearchedBalance& 
 // of the output's angle the frequency does not count either, and the held-out error has to fall by half.
 bool may_be_stated(const Resampling& resampling, const Resampling::FoundTerm& found, const SearchedBalance& motor);
 
+// Whether the likeliest effect, which resampling cannot choose, takes off most of the squared error on data left out
+// and a part that matters of that on held-out experiments, while halves find nothing else.
+bool stands_alone(const Resampling& resampling, const CandidateFit& first);
+
 // Whether resampling decides the verdict on the motor's balance. Likelihood has more power where exactly one effect is
 // missing: it decides where the halves of the data show nothing above the noise, and where resampling does not
 // contradict it.

@@ -86,9 +86,11 @@ struct SelectionPolicy {
 
   // Samples for each column of a fit: with fewer, halves of the data say nothing.
   double fewest_rows_per_column = 10.0;
-  // Rows of the table by which effort and motion may be stamped apart: loggers differ by a few samples; a longer lag is
-  // another effect.
-  int most_lag_rows = 4;
+  // Rows of the table by which effort and motion may be stamped apart, as loggers differ by a few samples; and seconds
+  // up to which the range is doubled where the best lag is at its end: the longest delay of an amplifier that the
+  // catalogue has, and a quarter more.
+  int usual_lag_rows = 4;
+  double longest_lag_s = 0.025;
 
   // Resampling against likelihood on the motor's balance.
   // Percent of the left-out chi-square from which on what resampling cannot choose counts by itself: what was named

@@ -53,22 +53,25 @@ RegressorTable with_lags(const RegressorTable& table, const std::vector<int>& te
   return small;
 }
 
-}  // namespace
+enum class Found { nothing, inside, at_end };
+struct LagWithin {
+  Found found = Found::nothing;
+  TimeLag lag;
+};
 
-std::optional<TimeLag> estimate_time_lag(const RegressorTable& table, const std::vector<int>& terms,
-                                         Direction direction, const SelectionPolicy& policy) {
-  double row_s = 0.0;
-  for (const Run& run : table.runs) row_s = std::max(row_s, run.row_s);
+// The best of all lags of up to so many rows.
+LagWithin best_lag_within(int most_rows, double row_s, const RegressorTable& table, const std::vector<int>& terms,
+                          Direction direction, const SelectionPolicy& policy) {
   std::vector<double> lags;
   // Whole rows alone, as interpolation between them would take off noise.
-  for (int k = -policy.most_lag_rows; k <= policy.most_lag_rows; ++k) lags.push_back(row_s * k);
+  for (int k = -most_rows; k <= most_rows; ++k) lags.push_back(row_s * k);
   const RegressorTable small = with_lags(table, terms, direction, lags);
   const ChosenColumns all = all_columns(small);
   const Setting setting = make_setting(filtered_table(small, all, table.highest_law_hz), all, false, false, policy);
   const auto tried = static_cast<Eigen::Index>(lags.size());
   const Eigen::Index columns = small.columns.cols() - tried;
   if (static_cast<double>(setting.rows.rows()) < policy.fewest_rows_per_column * static_cast<double>(columns))
-    return std::nullopt;
+    return {};
   Eigen::MatrixXd rows = setting.rows.leftCols(columns + tried);
   const std::vector<double> weights = record_weights(small, setting);
   for (const Run& run : setting.runs)
@@ -78,11 +81,11 @@ std::optional<TimeLag> estimate_time_lag(const RegressorTable& table, const std:
   const Eigen::VectorXd squares = residuals.colwise().squaredNorm();
   Eigen::Index best = 0;
   squares.minCoeff(&best);
-  if (best == 0 || best == tried - 1) return std::nullopt;
+  if (best == 0 || best == tried - 1) return {Found::at_end, {}};
   // The parabola through the least squares and its neighbours.
   const double before = squares[best - 1], least = squares[best], after = squares[best + 1];
   const double curvature = before - 2.0 * least + after;
-  if (!(curvature > 0.0)) return std::nullopt;
+  if (!(curvature > 0.0)) return {};
   const double step = lags[1] - lags[0];
   TimeLag lag;
   lag.seconds = lags[static_cast<std::size_t>(best)] + 0.5 * step * (before - after) / curvature;
@@ -96,7 +99,23 @@ std::optional<TimeLag> estimate_time_lag(const RegressorTable& table, const std:
   const double without = squares[tried / 2];
   const double floor = std::min(semivariance(setting, left) * static_cast<double>(left.size()), 0.999 * without);
   lag.share = (without - least) / (without - floor);
-  return lag;
+  return {Found::inside, lag};
+}
+
+}  // namespace
+
+std::optional<TimeLag> estimate_time_lag(const RegressorTable& table, const std::vector<int>& terms,
+                                         Direction direction, const SelectionPolicy& policy) {
+  double row_s = 0.0;
+  for (const Run& run : table.runs) row_s = std::max(row_s, run.row_s);
+  int most_rows = policy.usual_lag_rows;
+  while (true) {
+    const LagWithin best = best_lag_within(most_rows, row_s, table, terms, direction, policy);
+    if (best.found == Found::inside) return best.lag;
+    const int longest = static_cast<int>(std::ceil(policy.longest_lag_s / row_s));
+    if (best.found == Found::nothing || most_rows >= longest) return std::nullopt;
+    most_rows = std::min(2 * most_rows, longest);
+  }
 }
 
 void take_off_lag(RegressorTable& table, double lag_s) {

@@ -15,9 +15,9 @@ struct TimeLag {
   double share = 0.0;    // of the squares above the noise that it takes off
 };
 
-// By least squares over all lags of up to policy.most_lag_rows (profile likelihood), with the model's columns and those
-// of `terms` (places in table.terms), at the highest bandwidth of the motion. Nothing where the data have too few
-// samples or the best lag is at the end of the range.
+// By least squares over all lags of up to policy.usual_lag_rows, or of policy.longest_lag_s (profile likelihood), with
+// the model's columns and those of `terms` (places in table.terms), at the highest bandwidth of the motion. Nothing
+// where the data have too few samples or the best lag is at the end of the range.
 std::optional<TimeLag> estimate_time_lag(const RegressorTable& table, const std::vector<int>& terms,
                                          Direction direction, const SelectionPolicy& policy);
 
