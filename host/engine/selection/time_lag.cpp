@@ -105,7 +105,7 @@ LagWithin best_lag_within(int most_rows, double row_s, const RegressorTable& tab
 }  // namespace
 
 std::optional<TimeLag> estimate_time_lag(const RegressorTable& table, const std::vector<int>& terms,
-                                         Direction direction, const SelectionPolicy& policy) {
+                                         Direction direction, LagRange range, const SelectionPolicy& policy) {
   double row_s = 0.0;
   for (const Run& run : table.runs) row_s = std::max(row_s, run.row_s);
   int most_rows = policy.usual_lag_rows;
@@ -113,7 +113,7 @@ std::optional<TimeLag> estimate_time_lag(const RegressorTable& table, const std:
     const LagWithin best = best_lag_within(most_rows, row_s, table, terms, direction, policy);
     if (best.found == Found::inside) return best.lag;
     const int longest = static_cast<int>(std::ceil(policy.longest_lag_s / row_s));
-    if (best.found == Found::nothing || most_rows >= longest) return std::nullopt;
+    if (best.found == Found::nothing || range == LagRange::usual || most_rows >= longest) return std::nullopt;
     most_rows = std::min(2 * most_rows, longest);
   }
 }

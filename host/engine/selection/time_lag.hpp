@@ -15,11 +15,14 @@ struct TimeLag {
   double share = 0.0;    // of the squares above the noise that it takes off
 };
 
-// By least squares over all lags of up to policy.usual_lag_rows, or of policy.longest_lag_s (profile likelihood), with
-// the model's columns and those of `terms` (places in table.terms), at the highest bandwidth of the motion. Nothing
-// where the data have too few samples or the best lag is at the end of the range.
+enum class LagRange { usual, longest };
+
+// By least squares over all lags of up to policy.usual_lag_rows (profile likelihood), with the model's columns and
+// those of `terms` (places in table.terms), at the highest bandwidth of the motion; where the best one is at the end
+// and `range` is the longest, up to policy.longest_lag_s. Nothing where the data have too few samples or the best lag
+// is at the end of the range.
 std::optional<TimeLag> estimate_time_lag(const RegressorTable& table, const std::vector<int>& terms,
-                                         Direction direction, const SelectionPolicy& policy);
+                                         Direction direction, LagRange range, const SelectionPolicy& policy);
 
 // Takes a lag off the target.
 void take_off_lag(RegressorTable& table, double lag_s);
