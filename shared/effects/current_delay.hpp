@@ -15,11 +15,11 @@ struct CurrentDelay {
           "Phase is lost at high frequency: the current loop and everything around it has less margin than the log "
           "suggests.",
       .causes =
-          "Filters and sampling in the amplifier, a command that was logged instead of the measured current, "
-          "clocks that differ.",
+          "Filters and sampling in the amplifier, a command that was logged instead of the measured current, a "
+          "position that is filtered or sent late, clocks that differ.",
       .check =
-          "Compare the time stamps of current and position, look for a filter in the amplifier's monitor output, log "
-          "the measured current and not the command.",
+          "Compare the time stamps of current and position, look for a filter of the encoder's signal and in the "
+          "amplifier's monitor output, log the measured current and not the command.",
       .confused_with = "inertia",
       .separated_by = "motion at several frequencies up to the current loop's bandwidth",
   };

@@ -36,6 +36,23 @@ TEST(EffectThatHalvesCannotChoose, IsNotNamedWithoutHeldOutDataThatConfirmIt) {
   EXPECT_FALSE(stands_alone(nothing_found(), delay(80.0, std::nullopt)));
 }
 
+// The effort leads by 5 ms, which explains a share of what is above the noise. The model that the delay is compared
+// with has that lag, so that little is left for the likelihood.
+TEST(EffectThatHalvesCannotChoose, MayBeALagThatExplainsMostOfTheErrorAndOfThatOnHeldOutData) {
+  Resampling leads = nothing_found();
+  leads.lag_s = -5e-3;
+  leads.lag_share = 0.6;
+  EXPECT_TRUE(stands_alone(leads, delay(3.0, 0.70)));
+  EXPECT_FALSE(stands_alone(leads, delay(3.0, 0.71)));
+  leads.lag_share = 0.4;
+  EXPECT_FALSE(stands_alone(leads, delay(3.0, 0.70)));
+  // The current that is logged late is no effect of the catalogue.
+  Resampling lags = nothing_found();
+  lags.lag_s = 5e-3;
+  lags.lag_share = 0.6;
+  EXPECT_FALSE(stands_alone(lags, delay(3.0, 0.70)));
+}
+
 TEST(EffectThatHalvesCannotChoose, IsNotNamedWhereHalvesFindSomethingElse) {
   Resampling resampling = nothing_found();
   Resampling::FoundTerm found;

@@ -282,8 +282,7 @@ void assess_remainder(const SearchedBalance& chosen, Diagnosis& result) {
   // A missing effect may look like a delay, so the delay is taken from the better model. Where a delay is named, it
   // says how large it is.
   const bool names_delay = std::any_of(result.named.begin(), result.named.end(), [](const NamedEffect& n) {
-    const catalogue::Entry& entry = catalogue::get(n.effect);
-    return entry.has_state && entry.info->reads == effects::kCurrent;
+    return is_delay_of_current(catalogue::get(n.effect));
   });
   const Eigen::Index delay = after.theta.size() - 1;
   if (chosen.search.data->balance() == estimation::Balance::motor && !names_delay &&

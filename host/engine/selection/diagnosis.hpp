@@ -135,6 +135,7 @@ struct Resampling {
   double whiteness = 0.0;         // of what the best terms leave, reversals masked: 1 for noise, 0 for structure
   double lowest_hz = 0.0, highest_hz = 0.0;
   std::optional<double> lag_s, lag_std_s;  // of the effort's time base, taken off; nothing: not significant
+  double lag_share = 0.0;                  // of the squares above the noise that taking it off removes
   std::vector<FoundTerm> found;            // largest share first
   std::vector<std::string> not_visible;    // effects that these data could not show to resampling
   std::vector<FoundTerm> undecided;        // in the catalogue; neither found nor ruled out

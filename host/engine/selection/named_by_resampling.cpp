@@ -326,9 +326,17 @@ void add_identical_effects(Resampling& resampling, const SearchedBalance& motor)
   }
 }
 
+bool is_delay_of_current(const catalogue::Entry& entry) {
+  return entry.has_state && entry.info->reads == effects::kCurrent;
+}
+
 bool stands_alone(const Resampling& resampling, const CandidateFit& first) {
-  return resampling.found.empty() && first.gain.chi2_percent >= 100.0 * kPolicy.most_share && first.held_out_ratio &&
-         *first.held_out_ratio * *first.held_out_ratio <= 1.0 - kPolicy.matters_share;
+  if (!resampling.found.empty() || !first.held_out_ratio) return false;
+  const double fall = 1.0 - *first.held_out_ratio * *first.held_out_ratio;
+  // A lag is in the model that a delay is compared with, so that the likelihood counts only what is more than a lag.
+  const bool is_lag = is_delay_of_current(*first.model.entry) && resampling.lag_s.value_or(0.0) < 0.0;
+  if (is_lag && resampling.lag_share >= kPolicy.most_share && fall >= kPolicy.most_share) return true;
+  return first.gain.chi2_percent >= 100.0 * kPolicy.most_share && fall >= kPolicy.matters_share;
 }
 
 bool resampling_decides(const Resampling& resampling, const SearchedBalance& motor) {

@@ -33,8 +33,13 @@ bool is_contradicted(const Resampling::FoundTerm& found, const SearchedBalance& 
 // of the output's angle the frequency does not count either, and the held-out error has to fall by half.
 bool may_be_stated(const Resampling& resampling, const Resampling::FoundTerm& found, const SearchedBalance& motor);
 
+// Whether an effect delays the current: it reads the current alone and has a state.
+bool is_delay_of_current(const catalogue::Entry& entry);
+
 // Whether the likeliest effect, which resampling cannot choose, takes off most of the squared error on data left out
-// and a part that matters of that on held-out experiments, while halves find nothing else.
+// and a part that matters of that on held-out experiments, while halves find nothing else; or it is a delay of the
+// current, and the effort leads the motion by a lag that explains most of what is above the noise, as it does of the
+// squared error on held-out experiments.
 bool stands_alone(const Resampling& resampling, const CandidateFit& first);
 
 // Whether resampling decides the verdict on the motor's balance. Likelihood has more power where exactly one effect is

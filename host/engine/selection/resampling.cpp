@@ -132,6 +132,7 @@ Resampling resample(const std::vector<const data::Experiment*>& experiments, con
     selection.take_off(*lag);
     result.lag_s = lag->seconds;
     result.lag_std_s = lag->std;
+    result.lag_share = lag->share;
   }
   result.subsamples = stability.subsamples;
   result.too_little = stability.subsamples == 0.0 && selection.tables().table.model_columns > 0;
