@@ -152,12 +152,19 @@ TEST(OrderCauses, SayNothingWhereATurnOfTheMotorIsNotKnown) {
   model::Drive unknown;
   unknown.pole_pairs.value = 4.0;
   // In joint units with a ratio of one, 4 per turn of the joint is not 4 per turn of the motor.
-  for (const model::Drive& drive : {unknown, drive_of(1.0, 4.0)}) {
+  for (const model::Drive& drive : {unknown, drive_of(1.0)}) {
     for (const double order : {1.0, 2.0, 4.0, 8.0, 24.0})
       EXPECT_TRUE(causes("torque_ripple", order, drive).empty()) << order;
     EXPECT_TRUE(orders_of_motor(get("torque_ripple"), drive).empty());
     EXPECT_NE(order_hint(get("torque_ripple"), drive).find("gear"), std::string::npos);
   }
+}
+
+TEST(OrderCauses, WithARatioOfOneAndPolePairsTheMotorHasNoGear) {
+  const model::Drive direct = drive_of(1.0, 8.0);
+  EXPECT_EQ(orders_of_motor(get("torque_ripple"), direct), (std::vector<double>{8, 16, 48}));
+  EXPECT_EQ(says(causes("torque_ripple", 48.0, direct), "dead time"), 1);
+  EXPECT_TRUE(causes("torque_ripple", 2.0, direct).empty());
 }
 
 TEST(OrderCauses, OnALinearAxisThePitchIsATurnOfTheMotorAndThereIsNoWaveGenerator) {

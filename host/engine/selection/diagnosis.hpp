@@ -114,7 +114,7 @@ struct Resampling {
     std::optional<double> held_out_ratio;
     bool refused_by_holdout = false;  // in the catalogue, but the held-out error rises with it
     bool is_second_choice = false;    // found without the terms that the held-out error refused
-    bool may_be_sticking = false;     // presliding whose travel is no longer than what noise of the position hides
+    bool may_be_sticking = false;     // presliding whose travel is no longer than what the encoder hides
     // The squared error on the experiments that are held out falls by as much as a term must take off.
     bool is_confirmed() const;
     // It falls by as much as an effect that matters.

@@ -206,7 +206,7 @@ bool add_other_scale(const SearchedBalance& motor, std::vector<NamedEffect>& nam
 // Why a group that is not named is not. `behind`: something else is.
 std::string why_not_named(const Resampling::FoundTerm& term, bool is_undecided, bool behind) {
   if (term.may_be_sticking)
-    return "its travel is no longer than what the noise of the position hides: the axis may only stick";
+    return "its travel is no longer than what steps and noise of the encoder hide: the axis may only stick";
   if (term.refused_by_holdout)
     return fmt::format("the error on experiments that are held out rises by {:.1f} % with it",
                        100.0 * (*term.held_out_ratio - 1.0));

@@ -55,10 +55,10 @@ void StabilitySelection::evaluate() {
   per_setting_.assign(tables_.settings.size(), {});
   result_ = {};
   estimation::in_parallel(per_setting_.size(), [&](std::size_t i) {
-    const auto& [cutoff_hz, mask] = tables_.settings[i];
+    const std::pair<double, bool>& setting = tables_.settings[i];
     const auto samples = std::find_if(samples_.begin(), samples_.end(),
-                                      [&](const BandwidthSamples& s) { return s.cutoff_hz == cutoff_hz; });
-    per_setting_[i] = evaluate_setting(*samples, mask, kSeed + i);
+                                      [&](const BandwidthSamples& s) { return s.cutoff_hz == setting.first; });
+    per_setting_[i] = evaluate_setting(*samples, setting.second, kSeed + i);
   });
   count();
 }

@@ -171,7 +171,9 @@ MotorTurn motor_turn_of(const model::Drive& drive) {
   const double ratio = drive.gear_ratio.value.value_or(1.0);
   const bool rotary = drive.axis == data::Axis::rotary;
   if (rotary && ratio >= kLeastStrainWaveRatio) turn.gear_ratio = ratio;
-  turn.is_known = rotary ? ratio != 1.0 : drive.pitch_m.value.has_value();
+  // Positions with a ratio of one may be those of the joint; a motor whose poles or slots are stated has no gear then.
+  const bool is_direct = drive.gear_ratio.value && (turn.pole_pairs || turn.slots);
+  turn.is_known = rotary ? ratio != 1.0 || is_direct : drive.pitch_m.value.has_value();
   return turn;
 }
 
@@ -205,8 +207,8 @@ std::string order_hint(const Entry& effect, const model::Drive& drive) {
                ? "What an order means is known per turn of the motor: state pitch_m in [drive] of the model."
            : drive.gear_ratio.value
                ? "The gear ratio is 1, so positions and orders may be those of the joint, and causes are known per "
-                 "turn "
-                 "of the motor: with motor positions and the gear's ratio in [drive] of the model they can be named."
+                 "turn of the motor: state the gear's ratio, with motor positions, or pole_pairs of a motor without a "
+                 "gear in [drive] of the model."
                : "What an order means is known per turn of the motor: state gear_ratio in [drive] of the model.";
   unsigned needed = 0;
   for (const Row& row : kRows)

@@ -21,7 +21,7 @@ struct OrderCause {
 
 // All causes of this order on this drive; the effect decides between ripples of torque, ripples that grow with the load
 // and errors of position. Empty for effects without an order, and where the turn of the motor is not known: with a gear
-// ratio of one, positions and orders may be those of the joint.
+// ratio of one, positions and orders may be those of the joint, unless pole pairs or slots are stated.
 std::vector<OrderCause> order_causes(const Entry& effect, double order, const model::Drive& drive);
 
 // Which fact of the drive would tell more, as a sentence; empty where none would.
