@@ -385,6 +385,7 @@ Diagnosis diagnose_at(const data::Dataset& dataset, const model::Model& model, c
   }
   if (by_resampling) name_between_records(*base, of_all_records, chosen, result);
   name_on_other_balances(all, chosen, model.drive, result);
+  take_back_insignificant(result);
   explain_orders(base->model.drive, result);
   assess_excitation(moves, result);
   return result;

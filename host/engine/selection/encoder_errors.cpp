@@ -45,22 +45,33 @@ CrossValidatedFit with_encoder_errors(const BalanceSearch& own) {
   return fit;
 }
 
-// RMS torque that the encoders' steps make where the gear were a spring alone.
-double torque_of_steps(const RegressionProblem& data) {
-  double square = 0.0;
+// Torque that the encoders' steps make where the gear were a spring alone.
+struct TorqueOfSteps {
+  double rms = 0.0;
+  double largest = 0.0;  // of both angles rounded by half a step
+};
+
+TorqueOfSteps torque_of_steps(const RegressionProblem& data) {
+  double rms = 0.0, motor_step = 0.0, output_step = 0.0;
   for (const RowRange& range : data.records()) {
     const estimation::Record& record = data.prepared().records[range.record];
     const double motor = record.motor_quantum.value_or(0.0) / data.prepared().constants.gear_ratio;
     const double output = record.output_quantum.value_or(0.0);
-    square = std::max(square, (motor * motor + output * output) / 12.0);
+    rms = std::max(rms, std::sqrt((motor * motor + output * output) / 12.0));
+  }
+  // A locked output does not show its steps; it shows them where it moves.
+  for (const estimation::Record& record : data.prepared().records) {
+    motor_step = std::max(motor_step, record.motor_quantum.value_or(0.0) / data.prepared().constants.gear_ratio);
+    output_step = std::max(output_step, record.output_quantum.value_or(0.0));
   }
   const auto variables =
       comparison::sample_variables(data, data.prepared().rotary ? data::Axis::rotary : data::Axis::linear);
   const auto torsion =
       std::find_if(variables.begin(), variables.end(), [](const auto& v) { return v.name == "torsion"; });
-  if (torsion == variables.end() || !torsion->values.allFinite()) return 0.0;
+  if (torsion == variables.end() || !torsion->values.allFinite()) return {};
   const Eigen::VectorXd x = torsion->values.array() - torsion->values.mean();
-  return std::sqrt(square) * std::abs(x.dot(data.target())) / std::max(x.squaredNorm(), 1e-300);
+  const double stiffness = std::abs(x.dot(data.target())) / std::max(x.squaredNorm(), 1e-300);
+  return {stiffness * rms, stiffness * 0.5 * (motor_step + output_step)};
 }
 
 // RMS torque that a candidate takes off the residual.
@@ -75,15 +86,21 @@ bool is_same(const CandidateFit& a, const CandidateFit& b) {
 }  // namespace
 
 void check_encoder_errors(const BalanceSearch& own, std::vector<CandidateFit>& candidates) {
+  if (own.data->balance() != estimation::Balance::transmission) return;
+  const TorqueOfSteps steps = torque_of_steps(*own.data);
+  // A constant does not average out as a loop does: rounded angles may be off by as much all the time.
+  for (CandidateFit& t : candidates) {
+    if (!passes(t) || !is_each_records_own(*t.model.entry) || torque_explained(own, t) >= steps.largest) continue;
+    t.admissible = false;
+    t.why_not = "it is smaller than half a step of the encoders";
+  }
+  sort_candidates(own, candidates);
   const auto is_checked = [](const CandidateFit& t) {
     return passes(t) && !t.model.order && !is_error_of_angle(*t.model.entry);
   };
-  if (own.data->balance() != estimation::Balance::transmission ||
-      std::none_of(candidates.begin(), candidates.end(), is_checked))
-    return;
-  const double steps = torque_of_steps(*own.data);
+  if (std::none_of(candidates.begin(), candidates.end(), is_checked)) return;
   for (CandidateFit& t : candidates) {
-    if (!is_checked(t) || !t.model.entry->has_state || torque_explained(own, t) >= steps) continue;
+    if (!is_checked(t) || !t.model.entry->has_state || torque_explained(own, t) >= steps.rms) continue;
     t.admissible = false;
     t.why_not = "its loop is smaller than the steps of the encoders";
   }
