@@ -37,6 +37,8 @@ int main(int count, char** arguments) {
   const std::vector<std::string> words(arguments + 1, arguments + count);
   const drives::Kind* only = words.size() == 5 && words[3] == "--kind" ? kind_of(words[4]) : nullptr;
   if (words.size() != 3 && only == nullptr) {
+    if (words.size() == 5 && words[3] == "--kind")
+      std::fprintf(stderr, "flexspline_drives: there is no kind '%s'; known are those below\n", words[4].c_str());
     std::fputs(kUsage, stderr);
     for (const drives::Kind& kind : drives::kinds())
       std::fprintf(stderr, "  %.*s\n", static_cast<int>(kind.name.size()), kind.name.data());
