@@ -220,7 +220,8 @@ std::string page_of(const std::vector<Outcome>& all, const std::string& version)
     seconds += o.seconds;
   }
   std::string text = fmt::format(
-      "# Campaign: what the diagnosis names\n\nMade by `./dev soak MINUTES diagnose` of version {}: {} simulated "
+      "# Campaign: what the diagnosis names\n\nWritten by `./dev soak MINUTES diagnose`, not by hand; version {}: {} "
+      "simulated "
       "drives, "
       "seeds {} to {} (test seeds start at {}; those that set the limits end at {}), {:.1f} s for each diagnosis.\n\n",
       version, all.size(), low, high, kFirstTestSeed, kLastTuningSeed,
