@@ -221,9 +221,8 @@ std::string page_of(const std::vector<Outcome>& all, const std::string& version)
   }
   std::string text = fmt::format(
       "# Campaign: what the diagnosis names\n\nWritten by `./dev soak MINUTES diagnose`, not by hand; version {}: {} "
-      "simulated "
-      "drives, "
-      "seeds {} to {} (test seeds start at {}; those that set the limits end at {}), {:.1f} s for each diagnosis.\n\n",
+      "simulated drives, seeds {} to {} (test seeds start at {}; those that set the limits end at {}), {:.1f} s for "
+      "each diagnosis.\n\n",
       version, all.size(), low, high, kFirstTestSeed, kLastTuningSeed,
       all.empty() ? 0.0 : seconds / static_cast<double>(all.size()));
   return text + false_alarms(all) + power(all) + after_adding(all) + others(all) + confusion(all) +
